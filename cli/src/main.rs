@@ -1,0 +1,3 @@
+//! policyc: from a trained policy to verified controller code.
+
+fn main() {}

@@ -1,0 +1,1 @@
+//! lower: Policy + TargetSpec -> Program; backends: Program -> GeneratedFiles.

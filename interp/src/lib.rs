@@ -1,0 +1,1 @@
+//! Reference interpreter of a policy, written from the numeric contract.

@@ -1,0 +1,1 @@
+//! include_policy!(): a trained policy as a no_std controller.

@@ -1,0 +1,314 @@
+//! The checked policy: what holds from here on needs no second check.
+//!
+//! A [`Policy`] comes from [`crate::check`] only. All numbers are binary64 as written in the contract; each stage
+//! that needs another format rounds once, as `docs/numeric-contract.md` says.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+/// Closed interval `[low, high]`, `low <= high`, both finite.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Interval {
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// Number format in which the whole controller computes (`docs/numeric-contract.md`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NumericFormat {
+    /// IEEE 754 binary32, fixed order, never contracted.
+    F32,
+}
+
+/// A trained controller, whole: signals, features, network, actions, mapping, limits.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Policy {
+    /// Identifier used in file and symbol names: `[a-z][a-z0-9_]{0,30}`, no keyword of C or Rust.
+    pub name: String,
+    /// Control period T in seconds.
+    pub sample_period: f64,
+    /// Format of all arithmetic.
+    pub numeric_format: NumericFormat,
+    /// Compile-time constants usable in feature sources (already folded into them), kept for reports.
+    pub parameters: BTreeMap<String, f64>,
+    /// Measured signals in the order of the measurement struct.
+    pub signals: Vec<Signal>,
+    /// Observation in network input order.
+    pub features: Vec<Feature>,
+    /// Dense layers, first to last; `layers[0].inputs == features.len()`.
+    pub layers: Vec<Layer>,
+    /// Duty per network output; same length as the last layer's outputs, at least 2.
+    pub actions: Vec<Action>,
+    /// Duty ratio mapping, if any.
+    pub mapping: Option<Mapping>,
+    /// Limits of the commanded duty.
+    pub limits: Limits,
+    /// What happens without a usable measurement.
+    pub fallback: Fallback,
+    /// Known answers from the trainer.
+    pub golden: Option<Golden>,
+    /// SHA-256 of the parts, over canonical content (not over file bytes).
+    pub digests: Digests,
+    /// What was converted, skipped or inferred while reading, as sentences for the user.
+    pub notes: Vec<String>,
+}
+
+/// A measured quantity.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Signal {
+    /// Field name in the measurement struct.
+    pub name: String,
+    /// Unit as text, for reports only.
+    pub unit: String,
+    /// Plausible range in physical units; a sample outside is held.
+    pub range: Interval,
+    /// If present the sample arrives as an integer ADC code.
+    pub adc: Option<Adc>,
+}
+
+/// `physical = gain * code + offset`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Adc {
+    /// Unit per code.
+    pub gain: f64,
+    /// Physical value at code 0.
+    pub offset: f64,
+}
+
+/// One network input: a source through filters, then scale, offset, clip (contract sections 3 to 5).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Feature {
+    /// Name, for reports and state fields.
+    pub name: String,
+    /// Affine expression, constants folded.
+    pub source: Expr,
+    /// The expression as the user wrote it.
+    pub source_text: String,
+    /// Filter chain, first to last.
+    pub filters: Vec<Filter>,
+    /// Multiplier after the filters.
+    pub scale: f64,
+    /// Addend after the multiplication.
+    pub offset: f64,
+    /// Clip of the observation.
+    pub clip: Option<Interval>,
+    /// Sound bound of the observation in f32 arithmetic, by interval analysis from the signals' ranges and the clip.
+    pub bound: Interval,
+}
+
+/// Leaf of a source expression.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Input {
+    /// Sanitised signal by index into [`Policy::signals`].
+    Signal(usize),
+    /// Duty of the last chosen action, before the mapping.
+    PreviousDuty,
+    /// Duty that last left the controller.
+    PreviousCommand,
+}
+
+/// Affine expression with constants folded (contract section 3); evaluated exactly as the tree stands.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub enum Expr {
+    /// A measured or remembered value.
+    Input(Input),
+    /// A folded constant.
+    Constant(f64),
+    /// Exact negation.
+    Neg(Box<Expr>),
+    /// Rounded sum.
+    Add(Box<Expr>, Box<Expr>),
+    /// Rounded difference.
+    Sub(Box<Expr>, Box<Expr>),
+    /// Rounded product with a constant other than 1.
+    Scale(f64, Box<Expr>),
+}
+
+/// Discrete-time filter (contract section 4).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Filter {
+    /// Pure delay.
+    Delay {
+        /// Sample periods, 1 to [`crate::limits::MAX_LINE`].
+        samples: usize,
+    },
+    /// Difference to the sample before, over T.
+    BackwardDifference,
+    /// First order, backward Euler.
+    LowPass {
+        /// tau in seconds, > 0.
+        time_constant: f64,
+    },
+    /// Derivative with first-order low-pass, backward Euler.
+    FilteredDerivative {
+        /// tau in seconds, > 0.
+        time_constant: f64,
+    },
+    /// Mean of the last samples.
+    MovingAverage {
+        /// Number of samples, 2 to [`crate::limits::MAX_LINE`].
+        samples: usize,
+    },
+    /// Integral over time, clamped.
+    Integrator {
+        /// Lower clamp.
+        min: f64,
+        /// Upper clamp.
+        max: f64,
+        /// Value at priming, within the clamp.
+        initial: f64,
+    },
+}
+
+/// Dense layer `y = activation(W x + b)`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layer {
+    /// Tensor name without `.weight`.
+    pub name: String,
+    /// Number of inputs.
+    pub inputs: usize,
+    /// Number of outputs.
+    pub outputs: usize,
+    /// Row-major `[outputs][inputs]`.
+    pub weights: Vec<f32>,
+    /// `[outputs]`; +0 where the network has no bias.
+    pub bias: Vec<f32>,
+    /// Activation behind the layer; `Identity` for the last.
+    pub activation: Activation,
+    /// Sound bound of each output (after the activation) over the observation box, f32 rounding included.
+    pub bounds: Vec<Interval>,
+}
+
+/// Activation behind a layer (contract section 6).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Activation {
+    /// None.
+    Identity,
+    /// max(x, 0).
+    Relu,
+    /// x or slope * x.
+    LeakyRelu {
+        /// Slope for x < 0, 0 < slope < 1.
+        slope: f64,
+    },
+    /// Rational approximation without libm, |error| < 4e-7.
+    Tanh,
+}
+
+/// One discrete action.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Action {
+    /// Duty `xi + c * phi` in binary64.
+    pub duty: f64,
+    /// The pair it came from, if the contract gave pairs.
+    pub pair: Option<Pair>,
+}
+
+/// The paper's action form: duty = xi + c phi.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Pair {
+    /// Centre duty.
+    pub xi: f64,
+    /// Step.
+    pub phi: f64,
+    /// -1, 0 or 1.
+    pub c: i8,
+}
+
+/// Duty ratio mapping `d_real = a d_sim + b i_out + c (+ r i_out d_sim)`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Mapping {
+    /// Coefficients.
+    pub coefficients: Coefficients,
+    /// Index of the load current in [`Policy::signals`].
+    pub load_current: usize,
+    /// Validity range of the load current in A.
+    pub valid_i_out: Interval,
+    /// Validity range of d_sim.
+    pub valid_d_sim: Interval,
+    /// Run-time adjustment allowed for `a`.
+    pub adjust_a: Interval,
+    /// Run-time adjustment allowed for `b`, 1/A.
+    pub adjust_b: Interval,
+    /// Run-time adjustment allowed for `c`.
+    pub adjust_c: Interval,
+    /// Run-time adjustment allowed for `r`, 1/A; used in the four-term form only.
+    pub adjust_r: Interval,
+}
+
+/// Coefficients of a mapping.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Coefficients {
+    /// Gain on d_sim, > 0.
+    pub a: f64,
+    /// Per ampere of load current.
+    pub b: f64,
+    /// Constant.
+    pub c: f64,
+    /// Product term per ampere; `None` is the three-term form.
+    pub r: Option<f64>,
+}
+
+/// Limits of the commanded duty (contract section 9).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Limits {
+    /// Smallest and largest duty, 0..1.
+    pub duty: Interval,
+    /// Largest change per sample period, > 0.
+    pub slew: Option<f64>,
+    /// Rising upper limit after start and after a fallback.
+    pub soft_start: Option<SoftStart>,
+    /// Duty assumed before the first step, 0..1.
+    pub initial_duty: f64,
+}
+
+/// Upper duty limit rising from `from` to the maximum in `steps` sample periods.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SoftStart {
+    /// First upper limit, 0 <= from <= max.
+    pub from: f64,
+    /// Sample periods, 1 to 1e6.
+    pub steps: u32,
+}
+
+/// Behaviour without a usable measurement.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Fallback {
+    /// Commanded duty, 0..1; the only command that may lie outside the limits.
+    pub duty: f64,
+    /// K: consecutive bad steps bridged with held samples.
+    pub hold: u32,
+}
+
+/// Known answers from the trainer: observation in, Q values and action out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Golden {
+    /// Number of vectors.
+    pub count: usize,
+    /// Row-major `[count][features]`.
+    pub observations: Vec<f32>,
+    /// Row-major `[count][actions]`; may be empty if the trainer gave actions only.
+    pub q_values: Vec<f32>,
+    /// `[count]`; may be empty if the trainer gave Q values only.
+    pub action_indices: Vec<u32>,
+    /// Allowed |Q - golden| relative to the largest |Q| of the vector.
+    pub tolerance: f64,
+}
+
+/// Lower-case hex SHA-256 digests of canonical content.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Digests {
+    /// Of the layers' shapes, weights and biases (f32 bits, little-endian) in network order.
+    pub weights: String,
+    /// Of everything in `policy.toml` that changes the controller, defaults filled in; mapping and weights apart.
+    pub contract: String,
+    /// Of the mapping; `None` without one.
+    pub mapping: Option<String>,
+}

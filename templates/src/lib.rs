@@ -1,0 +1,1 @@
+//! askama templates and their view structs: layout only.

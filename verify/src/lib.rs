@@ -1,0 +1,1 @@
+//! Differential check: generated code against the interpreter, step by step.

@@ -1,0 +1,3 @@
+//! One entry for desk and CI.
+
+fn main() {}

@@ -1,3 +1,50 @@
-//! policyc: from a trained policy to verified controller code.
+//! `policyc`: from a trained policy to verified controller code.
 
-fn main() {}
+mod arguments;
+mod commands;
+mod output;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use arguments::{Arguments, Command};
+
+/// How a run ended; the number is the exit code.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Outcome {
+    /// Done; for `verify`: everything equal.
+    Done = 0,
+    /// `verify`: something differs.
+    Different = 1,
+}
+
+/// Why a run could not be done: bad input or an output that cannot be written. Exit code 2, nothing written.
+#[derive(Debug)]
+struct Failure(String);
+
+impl<E: std::error::Error> From<E> for Failure {
+    fn from(error: E) -> Self {
+        Failure(error.to_string())
+    }
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let result = match &arguments.command {
+        Command::New(options) => commands::new::run(options),
+        Command::Inspect(options) => commands::inspect::run(options),
+        Command::Compile(options) => commands::compile::run(options),
+        Command::Verify(options) => commands::verify::run(options),
+        Command::Demo(options) => commands::demo::run(options),
+    };
+    match result {
+        Ok(outcome) => ExitCode::from(outcome as u8),
+        Err(Failure(message)) => {
+            let message = message.trim_end();
+            let label = if message.starts_with("error") { "" } else { "error: " };
+            eprintln!("{label}{message}");
+            ExitCode::from(2)
+        }
+    }
+}

@@ -1,1 +1,100 @@
-//! lower: Policy + TargetSpec -> Program; backends: Program -> GeneratedFiles.
+//! The compiler: `lower` turns a checked [`Policy`] into a [`Program`], a [`Backend`] turns that into files.
+//!
+//! Nothing here writes to disk; the order of operations is the one of `docs/numeric-contract.md`.
+
+pub mod backend;
+pub mod crc;
+pub mod lower;
+pub mod manifest;
+pub mod program;
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use policy::Policy;
+use targets::TargetSpec;
+
+pub use backend::Backend;
+pub use lower::lower;
+pub use program::Program;
+
+/// Version stamped into every generated file.
+pub const TOOL: &str = concat!("policyc ", env!("CARGO_PKG_VERSION"));
+
+/// Language of the generated code.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Language {
+    /// C99 that is also C90 with `stdint.h` and C++.
+    C,
+    /// `no_std` Rust.
+    Rust,
+}
+
+impl Language {
+    /// Both languages.
+    pub const ALL: [Language; 2] = [Language::C, Language::Rust];
+
+    /// Name on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Language::C => "c",
+            Language::Rust => "rust",
+        }
+    }
+}
+
+/// Relative path to text, in path order.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct GeneratedFiles {
+    /// The files.
+    pub files: BTreeMap<String, String>,
+}
+
+/// A fault of the compiler itself: the policy was accepted, yet no code could be made of it.
+#[derive(Debug)]
+pub enum CodegenError {
+    /// A template did not render.
+    Template(String),
+    /// Generated Rust did not parse.
+    Rust(String),
+    /// This build of the compiler lacks the backend.
+    NotBuilt(Language),
+}
+
+impl fmt::Display for CodegenError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            CodegenError::Template(message) => write!(f, "internal fault: template: {message}"),
+            CodegenError::Rust(message) => write!(f, "internal fault: generated Rust: {message}"),
+            CodegenError::NotBuilt(language) => write!(f, "this build has no {} backend", language.name()),
+        }
+    }
+}
+
+impl std::error::Error for CodegenError {}
+
+/// Lowers and emits one language.
+///
+/// # Errors
+/// Only for a fault in the compiler itself.
+pub fn compile(policy: &Policy, target: &TargetSpec, language: Language) -> Result<GeneratedFiles, CodegenError> {
+    let program = lower(policy, target, language);
+    backend_for(language)?.emit(&program)
+}
+
+/// The backend of a language.
+///
+/// # Errors
+/// If this build leaves it out (cargo features `c`, `rust-text`).
+pub fn backend_for(language: Language) -> Result<&'static dyn Backend, CodegenError> {
+    match language {
+        #[cfg(feature = "c")]
+        Language::C => Ok(&backend::c99::C99),
+        #[cfg(feature = "rust-text")]
+        Language::Rust => Ok(&backend::rust::RustText),
+        #[allow(unreachable_patterns)]
+        other => Err(CodegenError::NotBuilt(other)),
+    }
+}

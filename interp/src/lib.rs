@@ -1,1 +1,43 @@
-//! Reference interpreter of a policy, written from the numeric contract.
+//! Reference interpreter of a policy, written from `docs/numeric-contract.md` alone.
+//!
+//! It is the oracle against which generated code is compared bit by bit, so it shares nothing with the code generator:
+//! no lowering, no templates. The modules follow the sections of the contract page:
+//!
+//! | section | module |
+//! |---|---|
+//! | 1 state | [`state`] |
+//! | 2 sanitise | `sanitise` |
+//! | 3, 4, 5 source, filters, observation | `feature`, `filter` |
+//! | 6, 7 network, argmax | `network` |
+//! | 8 action, mapping | `mapping` |
+//! | 9 limits and status | `limits`, [`status`] |
+//! | 10 commit | [`controller`] |
+//!
+//! ```no_run
+//! use interp::{Controller, Sample};
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let policy: policy::Policy = std::process::exit(0);
+//! let mut controller = Controller::<f32>::new(&policy);
+//! let trace = controller.step(&[Sample::Physical(99.5), Sample::Physical(10.0), Sample::Physical(9.8)])?;
+//! println!("duty {} because of Q {}", trace.command.duty, trace.q_values);
+//! # Ok(()) }
+//! ```
+
+pub mod controller;
+mod feature;
+mod filter;
+mod limits;
+mod mapping;
+mod network;
+mod real;
+mod sanitise;
+pub mod state;
+pub mod status;
+mod trace;
+
+pub use controller::Controller;
+pub use network::{argmax, tanh};
+pub use real::Real;
+pub use sanitise::{InputError, Sample};
+pub use state::{Coefficients, State};
+pub use trace::{Command, FeatureTrace, LayerTrace, Trace};

@@ -1,1 +1,23 @@
-//! include_policy!(): a trained policy as a no_std controller.
+//! `include_policy!()`: a trained policy as a `no_std` controller in a firmware crate.
+//!
+//! ```ignore
+//! policy_macro::include_policy!("policy/policy.toml");              // mod buck12 with buck12::Controller
+//! policy_macro::include_policy!(pub Regulator = "policy/policy.toml"); // pub mod buck12 with buck12::Regulator
+//! ```
+
+mod expand;
+
+use proc_macro::TokenStream;
+
+/// Expands to a module named after the policy, with `Measurement`, `Command`, `status` and the controller type.
+///
+/// `include_policy!([visibility] [Type =] "path/policy.toml")`. The path is relative to the crate's manifest folder and
+/// must stay inside it, as must the files that the policy names. The crate is rebuilt when one of them changes.
+/// The code needs `core` only: no allocation, no unsafe code, no panic. `Type::new()` is `const`.
+///
+/// # Errors
+/// One `compile_error!` at the path with every fault of the policy.
+#[proc_macro]
+pub fn include_policy(input: TokenStream) -> TokenStream {
+    expand::expand(input.into()).into()
+}

@@ -1,4 +1,44 @@
-//! The contract of a trained policy.
-#![doc = ""]
+//! The contract of a trained policy: `policy.toml`, its weights, its duty ratio mapping, its golden vectors.
+//!
+//! ```text
+//! read(path) -> RawPolicy      the files as they are, every value with its place
+//! check(raw) -> Policy         shapes, finiteness, ranges and names hold from here on
+//! ```
+//!
+//! [`load`] does both. What is wrong comes back as [`Faults`], all of them at once, each with file, place, what was
+//! found, what was expected and what to do.
+
+use std::path::Path;
+
+mod bounds;
+mod catalogue;
+mod check;
+mod contract;
+pub mod describe;
+mod digests;
+mod expression;
+mod faults;
+pub mod limits;
 pub mod model;
+mod names;
+mod notes;
+mod raw;
+pub mod rounding;
+mod scaffold;
+mod source;
+mod toml_reader;
+mod weights;
+
+pub use check::check;
+pub use faults::{Fault, Faults, Place};
 pub use model::*;
+pub use raw::{RawPolicy, ReadOptions, read};
+pub use scaffold::new_contract;
+
+/// Reads and checks the contract at `path`.
+///
+/// # Errors
+/// All faults of the files; see [`read`] and [`check`].
+pub fn load(path: &Path) -> Result<Policy, Faults> {
+    check(read(path, &ReadOptions::default())?)
+}

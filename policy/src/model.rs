@@ -4,6 +4,7 @@
 //! that needs another format rounds once, as `docs/numeric-contract.md` says.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use serde::Serialize;
 
@@ -56,6 +57,8 @@ pub struct Policy {
     pub digests: Digests,
     /// What was converted, skipped or inferred while reading, as sentences for the user.
     pub notes: Vec<String>,
+    /// Every file that was read, the contract first; for rebuild tracking.
+    pub files: Vec<PathBuf>,
 }
 
 /// A measured quantity.

@@ -1,1 +1,5 @@
-//! askama templates and their view structs: layout only.
+//! askama templates and their view structs: layout only. Every string in a view is already target-language text.
+
+pub mod c;
+
+pub use askama::{Error, Template};

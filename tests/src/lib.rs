@@ -1,1 +1,17 @@
-//! Tests across crates.
+//! Shared by the tests: places, policies drawn at random, tool runs.
+
+pub mod random;
+
+use std::path::{Path, PathBuf};
+
+/// Root of the workspace.
+#[must_use]
+pub fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// The example policy that the README uses.
+#[must_use]
+pub fn example() -> PathBuf {
+    root().join("examples/buck12/policy.toml")
+}

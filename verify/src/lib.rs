@@ -1,1 +1,34 @@
-//! Differential check: generated code against the interpreter, step by step.
+//! Differential check: generated code against the interpreter, step by step, to the bit.
+//!
+//! [`run`] compiles the code of a policy with every compiler it finds, feeds all builds and the reference interpreter
+//! the same stream of events and compares every word that comes back: observation, Q values, command and the whole
+//! state. The first difference of each build is reported with its step, name, bits and measurement.
+//!
+//! The way through the modules:
+//!
+//! | stage | module |
+//! |---|---|
+//! | what is built | [`toolchain`], [`drivers`] |
+//! | what is fed | [`traces`] |
+//! | how it travels | [`protocol`] |
+//! | what is expected | [`oracle`] |
+//! | who answers | [`runner`]: [`runner::Runner`] has one implementation per way of running a build |
+//! | what differs | [`compare`], [`report`] |
+//! | checked-in files against the policy | [`drift`] |
+
+pub mod compare;
+pub mod drift;
+pub mod drivers;
+mod golden;
+pub mod lane;
+pub mod oracle;
+pub mod protocol;
+pub mod report;
+pub mod runner;
+mod session;
+pub mod toolchain;
+pub mod traces;
+
+pub use drift::drift;
+pub use report::{BuildReport, Difference, GoldenResult, Outcome, Report};
+pub use session::{Files, Options, Progress, VerifyError, run};

@@ -1,3 +1,145 @@
-//! One entry for desk and CI.
+//! One entry for desk and CI: `cargo xtask <command>`.
 
-fn main() {}
+mod process;
+mod rules;
+mod steps;
+mod tools;
+mod workspace;
+
+use std::process::ExitCode;
+
+use steps::Options;
+use workspace::Workspace;
+
+const USAGE: &str = "\
+usage: cargo xtask <command>
+
+  test [--quick] [--skip-install]   everything CI asks for; the last line counts the steps
+         --quick          without the crate `tests`, rustdoc, firmware and the demo
+         --skip-install   look for the tools, install none
+  install                           only the tools: compilers, valgrind
+  bless                             rewrite the golden files from what the code produces now
+  layers                            only the layer rules
+";
+
+#[derive(Debug, PartialEq)]
+enum Command {
+    Test(Options),
+    Install,
+    Bless,
+    Layers,
+    Help,
+}
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let command = match parse(&arguments) {
+        Ok(command) => command,
+        Err(message) => {
+            eprint!("error: {message}\n\n{USAGE}");
+            return ExitCode::from(2);
+        }
+    };
+    match run(command) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(message) => {
+            eprintln!("error: {message}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn parse(arguments: &[String]) -> Result<Command, String> {
+    let Some((name, rest)) = arguments.split_first() else {
+        return Err("no command given".into());
+    };
+    let command = match name.as_str() {
+        "test" => return parse_test(rest),
+        "install" => Command::Install,
+        "bless" => Command::Bless,
+        "layers" => Command::Layers,
+        "help" | "--help" | "-h" => Command::Help,
+        _ => return Err(format!("unknown command `{name}`")),
+    };
+    match rest.first() {
+        Some(extra) => Err(format!("`{name}` takes no argument, found `{extra}`")),
+        None => Ok(command),
+    }
+}
+
+fn parse_test(flags: &[String]) -> Result<Command, String> {
+    let mut options = Options::default();
+    for flag in flags {
+        match flag.as_str() {
+            "--quick" => options.quick = true,
+            "--skip-install" => options.skip_install = true,
+            _ => return Err(format!("unknown option `{flag}` of `test`")),
+        }
+    }
+    Ok(Command::Test(options))
+}
+
+/// `Ok(false)`: the command ran and found faults, which it has printed.
+fn run(command: Command) -> Result<bool, String> {
+    match command {
+        Command::Help => {
+            print!("{USAGE}");
+            Ok(true)
+        }
+        Command::Install => {
+            tools::provide(&process::Output::Terminal)?;
+            println!("all tools are there");
+            Ok(true)
+        }
+        Command::Test(options) => Ok(steps::run_all(&Workspace::load()?, options)),
+        Command::Bless => bless(&Workspace::load()?),
+        Command::Layers => layers(&Workspace::load()?),
+    }
+}
+
+fn bless(workspace: &Workspace) -> Result<bool, String> {
+    let mut command = workspace.cargo(&["test", "-p", "tests", "golden"]);
+    command.env(steps::BLESS, "1");
+    process::run(&mut command, &process::Output::Terminal)?;
+    println!("golden files are rewritten: read the difference before you commit it");
+    Ok(true)
+}
+
+fn layers(workspace: &Workspace) -> Result<bool, String> {
+    let findings = rules::layers(workspace)?;
+    for fault in &findings.faults {
+        println!("{fault}");
+    }
+    println!(
+        "{} crates, {} violations",
+        workspace.crates.len(),
+        findings.faults.len()
+    );
+    Ok(findings.faults.is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parsed(line: &str) -> Result<Command, String> {
+        parse(&line.split(' ').map(String::from).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn flags_of_test_are_read() {
+        let options = Options {
+            quick: true,
+            skip_install: true,
+        };
+        assert_eq!(parsed("test --skip-install --quick"), Ok(Command::Test(options)));
+    }
+
+    #[test]
+    fn unknown_words_are_named() {
+        assert!(parsed("tset").unwrap_err().contains("`tset`"));
+        assert!(parsed("test --fast").unwrap_err().contains("`--fast`"));
+        assert!(parsed("bless now").unwrap_err().contains("`now`"));
+    }
+}

@@ -1,0 +1,111 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// From a trained policy to verified controller code.
+///
+/// A policy is a folder with `policy.toml` (signals, features, actions, limits), the network's weights as safetensors
+/// and, if you map duties, `drm.toml`. Exit code 0: done or equal, 1: verify found a difference, 2: bad input or an
+/// output that cannot be written; then nothing was written.
+#[derive(Debug, Parser)]
+#[command(name = "policyc", version, max_term_width = 100)]
+pub struct Arguments {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Write a commented contract for a safetensors file, to be filled in
+    New(New),
+    /// Show what a policy means: signals, features, network, actions, mapping, limits, sizes
+    Inspect(Inspect),
+    /// Generate C or Rust and manifest.json
+    Compile(Compile),
+    /// Compile the generated code and compare it with the interpreter, bit by bit
+    Verify(Verify),
+    /// Inspect, compile and verify the built-in example
+    Demo(Demo),
+}
+
+#[derive(Debug, Args)]
+pub struct New {
+    /// Network weights
+    pub weights: PathBuf,
+    /// File to write; must not exist yet
+    #[arg(long, value_name = "FILE", default_value = "policy.toml")]
+    pub out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub struct Inspect {
+    /// policy.toml or the folder that holds it
+    pub policy: PathBuf,
+    /// Machine-readable
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Language on the command line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Lang {
+    C,
+    Rust,
+}
+
+impl From<Lang> for codegen::Language {
+    fn from(lang: Lang) -> Self {
+        match lang {
+            Lang::C => codegen::Language::C,
+            Lang::Rust => codegen::Language::Rust,
+        }
+    }
+}
+
+#[derive(Debug, Args)]
+pub struct Compile {
+    /// policy.toml or the folder that holds it
+    pub policy: PathBuf,
+    /// Language; several separated by commas
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "c")]
+    pub lang: Vec<Lang>,
+    /// Deployment target
+    #[arg(long, default_value = "host")]
+    pub target: String,
+    /// Folder for the generated files; made if missing
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub struct Verify {
+    /// policy.toml or the folder that holds it
+    pub policy: PathBuf,
+    /// Control steps to compare per build
+    #[arg(long, default_value_t = 20_000)]
+    pub steps: u64,
+    /// Seed of the generated measurements
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Verify the generated code in this folder, and that it is what the policy yields today
+    #[arg(long, value_name = "DIR")]
+    pub generated: Option<PathBuf>,
+    /// Recorded measurements to replay first: CSV with one column per signal
+    #[arg(long, value_name = "CSV")]
+    pub trace: Vec<PathBuf>,
+    /// Machine-readable
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct Demo {
+    /// Folder for the example and the generated files
+    #[arg(long, value_name = "DIR", default_value = "policyc-demo")]
+    pub out: PathBuf,
+    /// Control steps to compare per build
+    #[arg(long, default_value_t = 20_000)]
+    pub steps: u64,
+}

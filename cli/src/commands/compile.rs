@@ -1,0 +1,57 @@
+//! `policyc compile`
+
+use std::path::Path;
+
+use codegen::{GeneratedFiles, Language, manifest};
+use policy::Policy;
+use targets::TargetSpec;
+
+use super::{bytes, grouped};
+use crate::arguments::Compile;
+use crate::{Failure, Outcome, output};
+
+/// Generates, then writes everything at once.
+pub fn run(options: &Compile) -> Result<Outcome, Failure> {
+    let target = super::target(&options.target)?;
+    let policy = super::load(&options.policy)?;
+    let mut languages: Vec<Language> = options.lang.iter().map(|lang| (*lang).into()).collect();
+    languages.sort();
+    languages.dedup();
+    let files = generate(&policy, target, &languages)?;
+    write(&policy, target, &options.out, &files)?;
+    Ok(Outcome::Done)
+}
+
+/// Writes the files and says what they are.
+pub fn write(policy: &Policy, target: &TargetSpec, folder: &Path, files: &GeneratedFiles) -> Result<(), Failure> {
+    output::write_texts(folder, &files.files)?;
+    for note in &policy.notes {
+        println!("note: {note}");
+    }
+    let sizes = manifest::sizes(policy, target);
+    let (macs, tables, state) = (
+        grouped(sizes.macs as u64),
+        bytes(sizes.table_bytes),
+        bytes(sizes.state_bytes),
+    );
+    println!(
+        "{}: {macs} MACs per step, {tables} of tables, {state} of state",
+        policy.name
+    );
+    for (name, text) in &files.files {
+        println!("  {} ({})", folder.join(name).display(), bytes(text.len()));
+    }
+    Ok(())
+}
+
+/// The files of all languages and the manifest.
+pub fn generate(policy: &Policy, target: &TargetSpec, languages: &[Language]) -> Result<GeneratedFiles, Failure> {
+    let mut all = GeneratedFiles::default();
+    for language in languages {
+        all.files.extend(codegen::compile(policy, target, *language)?.files);
+    }
+    let manifest = manifest::manifest(policy, target, languages, &all);
+    let text = serde_json::to_string_pretty(&manifest)? + "\n";
+    all.files.insert(manifest::FILE.to_owned(), text);
+    Ok(all)
+}

@@ -1,0 +1,84 @@
+//! `policyc demo`: the whole way on the built-in example.
+
+use std::path::Path;
+
+use codegen::Language;
+
+use super::{compile, inspect, verify};
+use crate::arguments::{Demo, Inspect, Verify};
+use crate::{Failure, Outcome, output};
+
+/// The example as shipped, so that the demo runs anywhere.
+const EXAMPLE: [(&str, &[u8]); 4] = [
+    ("policy.toml", include_bytes!("../../../examples/buck12/policy.toml")),
+    ("drm.toml", include_bytes!("../../../examples/buck12/drm.toml")),
+    (
+        "weights.safetensors",
+        include_bytes!("../../../examples/buck12/weights.safetensors"),
+    ),
+    (
+        "golden.safetensors",
+        include_bytes!("../../../examples/buck12/golden.safetensors"),
+    ),
+];
+
+/// Inspect, compile, verify; prints where the files are.
+pub fn run(options: &Demo) -> Result<Outcome, Failure> {
+    let policy_folder = options.out.join("policy");
+    let files = EXAMPLE
+        .iter()
+        .map(|(name, content)| ((*name).to_owned(), content.to_vec()))
+        .collect();
+    output::write_all(&policy_folder, &files)?;
+    heading("The policy", &format!("policyc inspect {}", policy_folder.display()));
+    inspect::run(&Inspect {
+        policy: policy_folder.clone(),
+        json: false,
+    })?;
+
+    let generated = options.out.join("generated");
+    let command = format!(
+        "policyc compile {} --lang c,rust --out {}",
+        policy_folder.display(),
+        generated.display()
+    );
+    heading("The code", &command);
+    let policy = super::load(&policy_folder)?;
+    let files = compile::generate(&policy, super::target("host")?, &Language::ALL)?;
+    compile::write(&policy, super::target("host")?, &generated, &files)?;
+
+    let (policy, generated) = (policy_folder.display(), generated.display());
+    heading(
+        "The proof",
+        &format!(
+            "policyc verify {policy} --generated {generated} --steps {}",
+            options.steps
+        ),
+    );
+    let outcome = verify::run(&Verify {
+        policy: policy_folder.clone(),
+        steps: options.steps,
+        seed: 1,
+        generated: Some(options.out.join("generated")),
+        trace: Vec::new(),
+        json: false,
+    })?;
+    println!("\nfiles");
+    show(
+        &policy_folder,
+        "the policy: edit policy.toml and run the commands above again",
+    );
+    show(
+        &options.out.join("generated"),
+        "the controller in C and Rust, and manifest.json",
+    );
+    Ok(outcome)
+}
+
+fn heading(title: &str, command: &str) {
+    println!("\n== {title} ==   {command}\n");
+}
+
+fn show(folder: &Path, meaning: &str) {
+    println!("  {}   {meaning}", folder.display());
+}

@@ -1,0 +1,289 @@
+//! `policyc inspect`
+
+use std::fmt::Write;
+
+use codegen::manifest;
+use policy::{Activation, Fallback, Interval, Policy};
+use serde::Serialize;
+
+use super::{bytes, grouped};
+use crate::arguments::Inspect;
+use crate::{Failure, Outcome};
+
+/// Prints the checked policy.
+pub fn run(options: &Inspect) -> Result<Outcome, Failure> {
+    let policy = super::load(&options.policy)?;
+    if options.json {
+        println!("{}", serde_json::to_string_pretty(&view(&policy)?)?);
+    } else {
+        print!("{}", text(&policy)?);
+    }
+    Ok(Outcome::Done)
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct View<'p> {
+    name: &'p str,
+    sample_period: f64,
+    numeric_format: policy::NumericFormat,
+    signals: &'p [policy::Signal],
+    features: &'p [policy::Feature],
+    layers: Vec<LayerView<'p>>,
+    actions: &'p [policy::Action],
+    mapping: Option<policy::Mapping>,
+    limits: policy::Limits,
+    fallback: policy::Fallback,
+    golden_vectors: usize,
+    digests: &'p policy::Digests,
+    sizes: manifest::Sizes,
+    notes: &'p [String],
+}
+
+#[derive(Serialize)]
+struct LayerView<'p> {
+    name: &'p str,
+    inputs: usize,
+    outputs: usize,
+    activation: Activation,
+    /// Smallest and largest bound of an output over the box of observations.
+    bound: Interval,
+}
+
+fn view(policy: &Policy) -> Result<View<'_>, Failure> {
+    Ok(View {
+        name: &policy.name,
+        sample_period: policy.sample_period,
+        numeric_format: policy.numeric_format,
+        signals: &policy.signals,
+        features: &policy.features,
+        layers: policy
+            .layers
+            .iter()
+            .map(|layer| LayerView {
+                name: &layer.name,
+                inputs: layer.inputs,
+                outputs: layer.outputs,
+                activation: layer.activation,
+                bound: hull(&layer.bounds),
+            })
+            .collect(),
+        actions: &policy.actions,
+        mapping: policy.mapping,
+        limits: policy.limits,
+        fallback: policy.fallback,
+        golden_vectors: policy.golden.as_ref().map_or(0, |golden| golden.count),
+        digests: &policy.digests,
+        sizes: manifest::sizes(policy, super::target("host")?),
+        notes: &policy.notes,
+    })
+}
+
+fn hull(bounds: &[Interval]) -> Interval {
+    let empty = Interval {
+        low: f64::INFINITY,
+        high: f64::NEG_INFINITY,
+    };
+    bounds.iter().fold(empty, |all, one| Interval {
+        low: all.low.min(one.low),
+        high: all.high.max(one.high),
+    })
+}
+
+fn text(policy: &Policy) -> Result<String, Failure> {
+    let mut out = String::new();
+    let period = policy.sample_period;
+    let sizes = manifest::sizes(policy, super::target("host")?);
+    writeln!(
+        out,
+        "{}   one step every {} us ({:.6} kHz), f32",
+        policy.name,
+        period * 1e6,
+        1e-3 / period
+    )?;
+    signals(&mut out, policy)?;
+    features(&mut out, policy)?;
+    network(&mut out, policy)?;
+    actions(&mut out, policy)?;
+    limits(&mut out, policy)?;
+    writeln!(out, "\nsize")?;
+    let macs = grouped(sizes.macs as u64);
+    writeln!(
+        out,
+        "  {macs} MACs per step, {} of tables, {} of state",
+        bytes(sizes.table_bytes),
+        bytes(sizes.state_bytes)
+    )?;
+    writeln!(out, "\ndigests (sha256)")?;
+    writeln!(
+        out,
+        "  weights  {}\n  contract {}",
+        policy.digests.weights, policy.digests.contract
+    )?;
+    if let Some(mapping) = &policy.digests.mapping {
+        writeln!(out, "  mapping  {mapping}")?;
+    }
+    for note in &policy.notes {
+        writeln!(out, "\nnote: {note}")?;
+    }
+    Ok(out)
+}
+
+fn range(interval: Interval) -> String {
+    let number = |x: f64| {
+        let text = format!("{x:.5}");
+        let text = text.trim_end_matches('0').trim_end_matches('.');
+        if x != 0.0 && (x.abs() < 1e-3 || x.abs() >= 1e7) {
+            format!("{x:.4e}")
+        } else {
+            text.to_owned()
+        }
+    };
+    format!("[{}, {}]", number(interval.low), number(interval.high))
+}
+
+fn signals(out: &mut String, policy: &Policy) -> Result<(), Failure> {
+    writeln!(out, "\nsignals (plausible range; a sample outside is held)")?;
+    let width = policy
+        .signals
+        .iter()
+        .map(|signal| signal.name.len())
+        .max()
+        .unwrap_or_default();
+    for signal in &policy.signals {
+        let adc = signal
+            .adc
+            .map(|adc| format!("   = {} * code + {}", adc.gain, adc.offset))
+            .unwrap_or_default();
+        writeln!(
+            out,
+            "  {:width$}  {} {}{adc}",
+            signal.name,
+            range(signal.range),
+            signal.unit
+        )?;
+    }
+    for (name, value) in &policy.parameters {
+        writeln!(out, "  {name:width$}  {value} (parameter)")?;
+    }
+    Ok(())
+}
+
+fn features(out: &mut String, policy: &Policy) -> Result<(), Failure> {
+    writeln!(
+        out,
+        "\nobservation (network input order; bound over all plausible measurements)"
+    )?;
+    for (index, feature) in policy.features.iter().enumerate() {
+        let formula = policy::describe::formula(feature, &policy.signals);
+        writeln!(out, "  {index:2}  {formula}   in {}", range(feature.bound))?;
+    }
+    Ok(())
+}
+
+fn network(out: &mut String, policy: &Policy) -> Result<(), Failure> {
+    writeln!(out, "\nnetwork")?;
+    let width = policy
+        .layers
+        .iter()
+        .map(|layer| layer.name.len())
+        .max()
+        .unwrap_or_default();
+    for layer in &policy.layers {
+        let activation = match layer.activation {
+            Activation::Identity => "identity".to_owned(),
+            Activation::Relu => "relu".to_owned(),
+            Activation::LeakyRelu { slope } => format!("leaky relu, slope {slope}"),
+            Activation::Tanh => "tanh".to_owned(),
+        };
+        let (inputs, outputs, bound) = (layer.inputs, layer.outputs, range(hull(&layer.bounds)));
+        writeln!(
+            out,
+            "  {:width$}  {inputs:4} -> {outputs:<4} {activation}, outputs in {bound}",
+            layer.name
+        )?;
+    }
+    match &policy.golden {
+        Some(golden) => writeln!(out, "  {} golden vectors from the trainer", golden.count)?,
+        None => writeln!(
+            out,
+            "  no golden vectors: nothing shows that the weights were read as the trainer meant"
+        )?,
+    }
+    Ok(())
+}
+
+fn actions(out: &mut String, policy: &Policy) -> Result<(), Failure> {
+    writeln!(out, "\nactions (argmax of Q, lowest index wins)")?;
+    let texts = policy
+        .actions
+        .iter()
+        .enumerate()
+        .map(|(index, action)| match action.pair {
+            None => format!("{index}: {}", action.duty),
+            Some(pair) => format!("{index}: {} {:+} * {} = {:.6}", pair.xi, pair.c, pair.phi, action.duty),
+        });
+    let mut line = String::new();
+    for text in texts {
+        if line.len() + text.len() > 96 {
+            writeln!(out, "  {line}")?;
+            line.clear();
+        }
+        if !line.is_empty() {
+            line.push_str("   ");
+        }
+        line.push_str(&text);
+    }
+    writeln!(out, "  {line}")?;
+    Ok(())
+}
+
+fn limits(out: &mut String, policy: &Policy) -> Result<(), Failure> {
+    writeln!(out, "\nmapping")?;
+    match &policy.mapping {
+        None => writeln!(out, "  none: duty = duty of the action")?,
+        Some(mapping) => {
+            let c = mapping.coefficients;
+            let current = &policy.signals[mapping.load_current].name;
+            let product = c.r.map(|r| format!(" {r:+} {current} d_sim")).unwrap_or_default();
+            writeln!(out, "  duty = {} d_sim {:+} {current} {:+}{product}", c.a, c.b, c.c)?;
+            writeln!(
+                out,
+                "  valid for {current} in {}, d_sim in {}",
+                range(mapping.valid_i_out),
+                range(mapping.valid_d_sim)
+            )?;
+            let adjust = [
+                ("a", mapping.adjust_a),
+                ("b", mapping.adjust_b),
+                ("c", mapping.adjust_c),
+                ("r", mapping.adjust_r),
+            ];
+            let shown = adjust.iter().filter(|(name, _)| *name != "r" || c.r.is_some());
+            let text: Vec<String> = shown
+                .map(|(name, interval)| format!("{name} in {}", range(*interval)))
+                .collect();
+            writeln!(out, "  at run time {}", text.join(", "))?;
+        }
+    }
+    writeln!(out, "\nlimits")?;
+    writeln!(
+        out,
+        "  duty in {}, {} before the first step",
+        range(policy.limits.duty),
+        policy.limits.initial_duty
+    )?;
+    if let Some(slew) = policy.limits.slew {
+        writeln!(out, "  at most {slew} per step")?;
+    }
+    if let Some(soft) = policy.limits.soft_start {
+        writeln!(
+            out,
+            "  soft start: upper limit from {} in {} steps",
+            soft.from, soft.steps
+        )?;
+    }
+    let Fallback { duty, hold } = policy.fallback;
+    writeln!(out, "  invalid measurement: hold {hold} steps, then duty {duty}")?;
+    Ok(())
+}

@@ -1,0 +1,58 @@
+//! One file per command.
+
+pub mod compile;
+pub mod demo;
+pub mod inspect;
+pub mod new;
+pub mod verify;
+
+use std::path::{Path, PathBuf};
+
+use policy::Policy;
+use targets::TargetSpec;
+
+use crate::Failure;
+
+/// `policy.toml` itself, also if the folder that holds it was named.
+fn contract_path(path: &Path) -> PathBuf {
+    if path.is_dir() {
+        path.join("policy.toml")
+    } else {
+        path.to_owned()
+    }
+}
+
+fn load(path: &Path) -> Result<Policy, Failure> {
+    Ok(policy::load(&contract_path(path))?)
+}
+
+fn target(name: &str) -> Result<&'static TargetSpec, Failure> {
+    targets::find(name).ok_or_else(|| {
+        let known = targets::names().join(", ");
+        Failure(format!(
+            "unknown target\n   = found: {name}\n   = expected: one of {known}"
+        ))
+    })
+}
+
+/// Bytes as people read them.
+fn bytes(count: usize) -> String {
+    if count < 10_000 {
+        format!("{count} B")
+    } else {
+        format!("{:.1} kB", count as f64 / 1000.0)
+    }
+}
+
+/// Digits in groups of three.
+fn grouped(number: u64) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && (digits.len() - index) % 3 == 0 {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}

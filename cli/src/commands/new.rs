@@ -1,0 +1,13 @@
+//! `policyc new`
+
+use crate::arguments::New;
+use crate::{Failure, Outcome, output};
+
+/// Writes a contract skeleton next to the weights' shapes.
+pub fn run(options: &New) -> Result<Outcome, Failure> {
+    let text = policy::new_contract(&options.weights)?;
+    output::write_new(&options.out, &text)?;
+    let path = options.out.display();
+    println!("wrote {path}: fill in what says TODO, then\n  policyc inspect {path}");
+    Ok(Outcome::Done)
+}

@@ -1,0 +1,179 @@
+//! `policyc verify`
+
+use std::io::{IsTerminal, Write};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use codegen::{Language, manifest};
+use policy::Policy;
+use serde::{Deserialize, Serialize};
+use verify::drift::{self, Drift};
+use verify::traces::Recorded;
+use verify::{Files, Options, Progress, Report};
+
+use super::{compile, grouped};
+use crate::arguments::Verify;
+use crate::{Failure, Outcome};
+
+mod show;
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Answer {
+    equal: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    drift: Option<Drift>,
+    report: Report,
+}
+
+/// Compares and reports.
+pub fn run(options: &Verify) -> Result<Outcome, Failure> {
+    let policy = super::load(&options.policy)?;
+    let recorded = options
+        .trace
+        .iter()
+        .map(|path| recording(&policy, path))
+        .collect::<Result<Vec<_>, _>>()?;
+    let on_disk = options
+        .generated
+        .as_deref()
+        .map(|folder| checked_in(&policy, folder))
+        .transpose()?;
+    let mut progress = ProgressLine::new();
+    let mut tell = |news| progress.show(news);
+    let report = verify::run(
+        &policy,
+        Options {
+            steps: options.steps,
+            seed: options.seed,
+            generated: on_disk.as_ref().map(|(files, _)| files),
+            recorded,
+            progress: Some(&mut tell),
+            ..Options::default()
+        },
+    )?;
+    progress.clear();
+    let drift = on_disk.map(|(_, drift)| drift);
+    let equal = report.passed() && drift.as_ref().is_none_or(Drift::is_empty);
+    if options.json {
+        println!("{}", serde_json::to_string_pretty(&Answer { equal, drift, report })?);
+    } else {
+        print!("{}", show::report(&report, drift.as_ref(), equal)?);
+    }
+    Ok(if equal { Outcome::Done } else { Outcome::Different })
+}
+
+fn recording(policy: &Policy, path: &Path) -> Result<Recorded, Failure> {
+    let place = |error: &dyn std::fmt::Display| Failure(format!("{}: {error}", path.display()));
+    let text = std::fs::read_to_string(path).map_err(|error| place(&error))?;
+    Recorded::from_csv(policy, &text).map_err(|error| place(&error))
+}
+
+/// The parts of a manifest that say how the folder was generated.
+#[derive(Deserialize)]
+struct Origin {
+    target: String,
+    languages: Vec<String>,
+}
+
+/// The generated files of a folder, and how they differ from what the policy yields today.
+fn checked_in(policy: &Policy, folder: &Path) -> Result<(Files, Drift), Failure> {
+    let path = folder.join(manifest::FILE);
+    let shown = path.display();
+    let hint = format!(
+        "make the folder with `policyc compile POLICY --out {}`",
+        folder.display()
+    );
+    let text = std::fs::read_to_string(&path).map_err(|error| {
+        Failure(format!(
+            "{shown}: {error}\n   = expected: the manifest that compile wrote\n   = hint: {hint}"
+        ))
+    })?;
+    let origin: Origin = serde_json::from_str(&text).map_err(|error| {
+        Failure(format!(
+            "{shown}: not a manifest of policyc: {error}\n   = hint: {hint}"
+        ))
+    })?;
+    let target = super::target(&origin.target)?;
+    let languages: Vec<Language> = Language::ALL
+        .into_iter()
+        .filter(|language| origin.languages.iter().any(|name| name == language.name()))
+        .collect();
+    if languages.is_empty() || languages.len() != origin.languages.len() {
+        let known = Language::ALL.map(Language::name).join(", ");
+        return Err(Failure(format!(
+            "{shown}: unknown language\n   = found: {:?}\n   = expected: {known}",
+            origin.languages
+        )));
+    }
+    let mut drift = verify::drift(policy, target, &languages, folder)?;
+    let expected = compile::generate(policy, target, &languages)?;
+    let only_manifest = |files: &Files| {
+        files
+            .iter()
+            .filter(|(name, _)| *name == manifest::FILE)
+            .map(|(n, t)| (n.clone(), t.clone()))
+            .collect()
+    };
+    let manifest_now: Files = only_manifest(&expected.files);
+    let manifest_found = Files::from([(manifest::FILE.to_owned(), text)]);
+    drift
+        .changed
+        .extend(drift::compare(&manifest_now, &manifest_found).changed);
+    let mut files = Files::new();
+    for name in expected.files.keys().filter(|name| *name != manifest::FILE) {
+        // a missing file is already part of the drift
+        if let Ok(bytes) = std::fs::read(folder.join(name)) {
+            files.insert(name.clone(), String::from_utf8_lossy(&bytes).into_owned());
+        }
+    }
+    Ok((files, drift))
+}
+
+/// One line on the terminal; lines at intervals where the output is a log.
+struct ProgressLine {
+    terminal: bool,
+    last: Instant,
+    shown: bool,
+}
+
+impl ProgressLine {
+    fn new() -> Self {
+        Self {
+            terminal: std::io::stderr().is_terminal(),
+            last: Instant::now(),
+            shown: false,
+        }
+    }
+
+    fn show(&mut self, news: Progress) {
+        let interval = if self.terminal {
+            Duration::from_millis(100)
+        } else {
+            Duration::from_secs(10)
+        };
+        if self.last.elapsed() < interval {
+            return;
+        }
+        self.last = Instant::now();
+        let text = match news {
+            Progress::Compiling { builds } => format!("compiling {builds} builds"),
+            Progress::Running { steps, of } => format!("{} of {} steps", grouped(steps), grouped(of)),
+        };
+        let mut out = std::io::stderr();
+        // progress that cannot be shown is no reason to stop
+        let _ = if self.terminal {
+            write!(out, "\r\x1b[K{text}")
+        } else {
+            writeln!(out, "{text}")
+        };
+        let _ = out.flush();
+        self.shown = self.terminal;
+    }
+
+    fn clear(&mut self) {
+        if self.shown {
+            eprint!("\r\x1b[K");
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! A verification as text.
+
+use std::fmt::Write;
+
+use verify::drift::Drift;
+use verify::{BuildReport, Difference, GoldenResult, Outcome, Report};
+
+use crate::Failure;
+use crate::commands::grouped;
+
+/// The whole report.
+pub fn report(report: &Report, drift: Option<&Drift>, equal: bool) -> Result<String, Failure> {
+    let mut out = String::new();
+    if let Some(drift) = drift {
+        write_drift(&mut out, drift)?;
+    }
+    if let Some(golden) = &report.golden {
+        writeln!(out, "golden vectors   {}", golden_text(golden))?;
+    }
+    for build in &report.builds {
+        let (verdict, detail) = verdict(build);
+        writeln!(out, "{:12}  {verdict:9}  {detail}", build.build)?;
+    }
+    for build in &report.builds {
+        match &build.outcome {
+            Outcome::Different { difference } => write_difference(&mut out, &build.build, difference)?,
+            Outcome::Failed {
+                event,
+                reason,
+                measurement,
+                ..
+            } => {
+                writeln!(out, "\n{}: {reason}, in `{event}`", build.build)?;
+                for item in measurement {
+                    writeln!(out, "  {} = {} ({})", item.signal, item.sample.value, item.sample.bits)?;
+                }
+            }
+            Outcome::CompileError { message } => writeln!(out, "\n{}: does not compile\n{message}", build.build)?,
+            Outcome::Equal | Outcome::Skipped { .. } => {}
+        }
+    }
+    writeln!(
+        out,
+        "\nseed {}, checksum of all compared words {}",
+        report.seed, report.checksum
+    )?;
+    let word = if equal { "equal" } else { "DIFFERENT" };
+    writeln!(out, "{word}: {} against the interpreter", report.policy)?;
+    Ok(out)
+}
+
+fn golden_text(golden: &GoldenResult) -> String {
+    let mut parts = Vec::new();
+    if golden.actions_compared > 0 {
+        parts.push(format!(
+            "action equal in {} of {}",
+            golden.actions_equal, golden.actions_compared
+        ));
+    }
+    if let Some(error) = golden.worst_relative_error {
+        parts.push(format!(
+            "largest relative error of Q {error:.1e} (allowed {:.0e})",
+            golden.tolerance
+        ));
+    }
+    let word = if golden.passed() { "" } else { "DIFFERENT: " };
+    format!("{word}{}", parts.join(", "))
+}
+
+fn verdict(build: &BuildReport) -> (&'static str, String) {
+    let steps = grouped(build.steps_compared);
+    match &build.outcome {
+        Outcome::Equal => match build.golden.as_ref().filter(|golden| !golden.passed()) {
+            Some(golden) => ("DIFFERENT", golden_text(golden)),
+            None => ("equal", format!("{steps} steps   {}", build.compiler)),
+        },
+        Outcome::Different { .. } => ("DIFFERENT", format!("after {steps} equal steps")),
+        Outcome::Failed { .. } => ("FAILED", format!("after {steps} equal steps")),
+        Outcome::CompileError { .. } => ("REFUSED", "by the compiler".to_owned()),
+        Outcome::Skipped { reason, package } => {
+            let install = package
+                .as_ref()
+                .map(|package| format!(" (Debian package {package})"))
+                .unwrap_or_default();
+            ("skipped", format!("{reason}{install}"))
+        }
+    }
+}
+
+fn write_difference(out: &mut String, build: &str, difference: &Difference) -> Result<(), Failure> {
+    let Difference {
+        step,
+        event,
+        what,
+        expected,
+        got,
+        measurement,
+    } = difference;
+    writeln!(out, "\n{build}: first difference at step {step}, in `{event}`: {what}")?;
+    writeln!(out, "  interpreter     {} ({})", expected.value, expected.bits)?;
+    writeln!(out, "  generated code  {} ({})", got.value, got.bits)?;
+    for item in measurement {
+        writeln!(
+            out,
+            "  with {} = {} ({})",
+            item.signal, item.sample.value, item.sample.bits
+        )?;
+    }
+    Ok(())
+}
+
+fn write_drift(out: &mut String, drift: &Drift) -> Result<(), Failure> {
+    if drift.is_empty() {
+        writeln!(out, "files            as the policy yields them today")?;
+        return Ok(());
+    }
+    writeln!(out, "files            DIFFERENT from what the policy yields today")?;
+    for path in &drift.missing {
+        writeln!(out, "  {path}: missing")?;
+    }
+    for path in &drift.extra {
+        writeln!(out, "  {path}: the policy yields no such file")?;
+    }
+    for change in &drift.changed {
+        let text = |line: &Option<String>| line.clone().unwrap_or_else(|| "(end of file)".to_owned());
+        writeln!(out, "  {}:{}", change.path, change.line)?;
+        writeln!(
+            out,
+            "    today {}\n    found {}",
+            text(&change.expected),
+            text(&change.found)
+        )?;
+    }
+    writeln!(
+        out,
+        "  = hint: run `policyc compile` again if the policy was meant to change\n"
+    )?;
+    Ok(())
+}

@@ -1,0 +1,271 @@
+//! The only writer of files: all or nothing, under a lock, through temporary files in the same folder.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use crate::Failure;
+
+/// Start of the names of temporary files; leftovers of an interrupted run are removed by the next.
+const TEMPORARY: &str = ".policyc-tmp-";
+
+/// Writes files into a folder: either all of them are there afterwards or none has changed.
+///
+/// # Errors
+/// If the folder cannot be made or written, or a destination is a folder or a symbolic link.
+pub fn write_all(folder: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<(), Failure> {
+    let destinations: Vec<(PathBuf, &[u8])> = files
+        .iter()
+        .map(|(name, content)| (folder.join(name), content.as_slice()))
+        .collect();
+    for (path, _) in &destinations {
+        check_destination(path)?;
+    }
+    fs::create_dir_all(folder).map_err(|error| cannot("make the folder", folder, &error))?;
+    let _lock = lock(folder);
+    remove_leftovers(folder);
+    let mut staged = Staged { files: Vec::new() };
+    for (index, (path, content)) in destinations.iter().enumerate() {
+        staged
+            .stage(folder, index, path, content)
+            .map_err(|error| cannot("write", path, &error))?;
+    }
+    staged.publish()
+}
+
+/// [`write_all`] for text.
+///
+/// # Errors
+/// As [`write_all`].
+pub fn write_texts(folder: &Path, files: &BTreeMap<String, String>) -> Result<(), Failure> {
+    write_all(
+        folder,
+        &files
+            .iter()
+            .map(|(name, text)| (name.clone(), text.clone().into_bytes()))
+            .collect(),
+    )
+}
+
+/// Writes one file that must not exist yet.
+///
+/// # Errors
+/// If it exists or cannot be written.
+pub fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
+    if fs::symlink_metadata(path).is_ok() {
+        let hint = "move it away or choose another name with --out";
+        return Err(Failure(format!(
+            "{} exists already; nothing written\n   = hint: {hint}",
+            path.display()
+        )));
+    }
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    let Some(name) = path.file_name().and_then(|name| name.to_str()) else {
+        return Err(Failure(format!("{} is not a file name", path.display())));
+    };
+    write_texts(folder, &BTreeMap::from([(name.to_owned(), text.to_owned())]))
+}
+
+fn cannot(what: &str, path: &Path, error: &io::Error) -> Failure {
+    Failure(format!("cannot {what} {}: {error}; nothing written", path.display()))
+}
+
+fn check_destination(path: &Path) -> Result<(), Failure> {
+    let Ok(metadata) = fs::symlink_metadata(path) else {
+        return Ok(());
+    };
+    let kind = if metadata.is_symlink() {
+        "a symbolic link"
+    } else if metadata.is_dir() {
+        "a folder"
+    } else {
+        return Ok(());
+    };
+    let hint = "policyc replaces plain files only; choose another --out";
+    Err(Failure(format!(
+        "{} is {kind}; nothing written\n   = hint: {hint}",
+        path.display()
+    )))
+}
+
+/// Two runs into one folder take turns. Where folders cannot be locked, the renames alone keep each file whole.
+fn lock(folder: &Path) -> Option<File> {
+    let file = File::open(folder).ok()?;
+    file.lock().ok()?;
+    Some(file)
+}
+
+fn remove_leftovers(folder: &Path) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    for entry in entries.flatten() {
+        if entry.file_name().to_string_lossy().starts_with(TEMPORARY) {
+            // a leftover that cannot be removed does no harm
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+struct StagedFile {
+    temporary: PathBuf,
+    backup: PathBuf,
+    destination: PathBuf,
+    had_backup: bool,
+    published: bool,
+}
+
+/// Files written under temporary names; dropped without `publish` they vanish.
+struct Staged {
+    files: Vec<StagedFile>,
+}
+
+impl Staged {
+    fn stage(&mut self, folder: &Path, index: usize, destination: &Path, content: &[u8]) -> io::Result<()> {
+        let temporary = folder.join(format!("{TEMPORARY}{}-{index}", std::process::id()));
+        let backup = folder.join(format!("{TEMPORARY}{}-{index}-old", std::process::id()));
+        let mut file = OpenOptions::new().write(true).create_new(true).open(&temporary)?;
+        let destination = destination.to_owned();
+        self.files.push(StagedFile {
+            temporary,
+            backup,
+            destination,
+            had_backup: false,
+            published: false,
+        });
+        file.write_all(content)?;
+        file.sync_all()
+    }
+
+    fn publish(mut self) -> Result<(), Failure> {
+        for file in &mut self.files {
+            let result = file.publish();
+            result.map_err(|error| cannot("replace", &file.destination, &error))?;
+        }
+        for file in &mut self.files {
+            if file.had_backup {
+                let _ = fs::remove_file(&file.backup);
+            }
+        }
+        self.files.clear();
+        Ok(())
+    }
+}
+
+impl StagedFile {
+    fn publish(&mut self) -> io::Result<()> {
+        if fs::symlink_metadata(&self.destination).is_ok() {
+            // a second name for the old file: the destination is never missing, whenever the run is interrupted
+            fs::hard_link(&self.destination, &self.backup)
+                .or_else(|_| fs::copy(&self.destination, &self.backup).map(|_| ()))?;
+            self.had_backup = true;
+        }
+        fs::rename(&self.temporary, &self.destination)?;
+        self.published = true;
+        Ok(())
+    }
+}
+
+impl Drop for Staged {
+    /// Puts back what was there before.
+    fn drop(&mut self) {
+        for file in self.files.iter().rev() {
+            let spent = if file.published {
+                &file.destination
+            } else {
+                &file.temporary
+            };
+            let _ = fs::remove_file(spent);
+            if file.had_backup {
+                let _ = fs::rename(&file.backup, &file.destination);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn files(names: &[&str]) -> BTreeMap<String, Vec<u8>> {
+        names
+            .iter()
+            .map(|name| ((*name).to_owned(), format!("new {name}").into_bytes()))
+            .collect()
+    }
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<String> = fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn files_are_replaced_and_nothing_else_stays_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("a"), "old").unwrap();
+        fs::write(folder.path().join(".policyc-tmp-1-0"), "left by an interrupted run").unwrap();
+        write_all(folder.path(), &files(&["a", "b"])).unwrap();
+        assert_eq!(names(folder.path()), ["a", "b"]);
+        assert_eq!(fs::read_to_string(folder.path().join("a")).unwrap(), "new a");
+    }
+
+    #[test]
+    fn a_folder_in_the_place_of_a_file_leaves_everything_as_it_was() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("a"), "old").unwrap();
+        fs::create_dir(folder.path().join("b")).unwrap();
+        let Err(Failure(message)) = write_all(folder.path(), &files(&["a", "b"])) else {
+            panic!("must fail")
+        };
+        assert!(message.contains("is a folder; nothing written"), "{message}");
+        assert_eq!(fs::read_to_string(folder.path().join("a")).unwrap(), "old");
+        assert_eq!(names(folder.path()), ["a", "b"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_symbolic_link_is_not_followed() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("precious"), "old").unwrap();
+        std::os::unix::fs::symlink("precious", folder.path().join("a")).unwrap();
+        let Err(Failure(message)) = write_all(folder.path(), &files(&["a"])) else {
+            panic!("must fail")
+        };
+        assert!(message.contains("symbolic link"), "{message}");
+        assert_eq!(fs::read_to_string(folder.path().join("precious")).unwrap(), "old");
+    }
+
+    #[test]
+    fn a_failed_publication_puts_the_old_files_back() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("a"), "old a").unwrap();
+        fs::write(folder.path().join("b"), "old b").unwrap();
+        let mut staged = Staged { files: Vec::new() };
+        for (index, name) in ["a", "b"].iter().enumerate() {
+            staged
+                .stage(folder.path(), index, &folder.path().join(name), b"new")
+                .unwrap();
+        }
+        // the second rename cannot succeed any more
+        fs::remove_file(&staged.files[1].temporary).unwrap();
+        assert!(staged.publish().is_err());
+        assert_eq!(names(folder.path()), ["a", "b"]);
+        assert_eq!(fs::read_to_string(folder.path().join("a")).unwrap(), "old a");
+        assert_eq!(fs::read_to_string(folder.path().join("b")).unwrap(), "old b");
+    }
+
+    #[test]
+    fn an_existing_contract_is_never_overwritten() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("policy.toml");
+        write_new(&path, "mine").unwrap();
+        assert!(write_new(&path, "other").is_err());
+        assert_eq!(fs::read_to_string(path).unwrap(), "mine");
+    }
+}

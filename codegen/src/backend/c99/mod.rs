@@ -1,0 +1,343 @@
+//! C99 that also compiles as C90 with `stdint.h` and as C++: one header, one source.
+
+mod statements;
+mod tables;
+
+use std::collections::BTreeMap;
+
+use templates::Template;
+use templates::c::{Common, Constant, Header, Helpers, Member, PushView, Source};
+
+use crate::backend::{Backend, banner};
+use crate::lower::STATUS;
+use crate::program::{ActivationCode, Coefficient, Op, Program};
+use crate::{CodegenError, GeneratedFiles};
+use statements::{Printer, float, unsigned};
+
+/// The C99 backend.
+pub struct C99;
+
+impl Backend for C99 {
+    fn emit(&self, program: &Program) -> Result<GeneratedFiles, CodegenError> {
+        let render = |result: Result<String, templates::Error>| {
+            result
+                .map(|text| tidy(&text))
+                .map_err(|error| CodegenError::Template(error.to_string()))
+        };
+        let mut files = BTreeMap::new();
+        files.insert(format!("{}.h", program.name), render(header(program).render())?);
+        files.insert(format!("{}.c", program.name), render(source(program).render())?);
+        Ok(GeneratedFiles { files })
+    }
+}
+
+/// Optional parts of a template leave runs of empty lines behind; a file ends with one newline.
+fn tidy(text: &str) -> String {
+    let mut tidied = String::with_capacity(text.len());
+    let mut empty = false;
+    for line in text.lines().map(str::trim_end) {
+        if !(line.is_empty() && empty) {
+            tidied.push_str(line);
+            tidied.push('\n');
+        }
+        empty = line.is_empty();
+    }
+    tidied
+}
+
+fn common(program: &Program) -> Common {
+    let parameters = program.mapping.iter().flat_map(|mapping| &mapping.coefficients);
+    Common {
+        name: program.name.clone(),
+        upper: program.name.to_uppercase(),
+        banner: banner(
+            program,
+            &format!("Controller {}", program.name),
+            program.provenance.c_flags,
+        ),
+        mapping_parameters: parameters
+            .map(|(name, ..)| format!("float {}", coefficient_name(*name)))
+            .collect::<Vec<_>>()
+            .join(", "),
+    }
+}
+
+/// Name of a coefficient as parameter; the state member is `mapping_<name>`.
+fn coefficient_name(coefficient: Coefficient) -> &'static str {
+    match coefficient {
+        Coefficient::A => "a",
+        Coefficient::B => "b",
+        Coefficient::C => "c",
+        Coefficient::R => "r",
+    }
+}
+
+fn header(program: &Program) -> Header {
+    let constant = |name: &str, value: String| Constant {
+        name: name.to_owned(),
+        value,
+    };
+    let count = |name: &str, value: usize| constant(name, format!("{value}u"));
+    let period = format!("{:?}", program.sample_period);
+    Header {
+        common: common(program),
+        constants: vec![
+            count("SIGNALS", program.signals.len()),
+            count("FEATURES", program.feature_count()),
+            count("ACTIONS", program.duties.len()),
+            count("STATE_WORDS", program.state_words()),
+            constant("SAMPLE_PERIOD", period),
+        ],
+        status: STATUS
+            .iter()
+            .map(|(name, bit)| constant(name, unsigned(1 << bit)))
+            .collect(),
+        measurement: program.signals.iter().map(measurement_member).collect(),
+        state: state_members(program),
+        features: program.features.iter().map(|(_, formula)| formula.clone()).collect(),
+    }
+}
+
+fn measurement_member(signal: &crate::program::SignalPort) -> Member {
+    let (low, high) = signal.range;
+    let kind = if signal.is_code { "int32_t" } else { "float" };
+    let meaning = if signal.is_code { "ADC code, " } else { "" };
+    Member {
+        declaration: format!("{kind} {}", signal.name),
+        comment: format!(
+            "{meaning}plausible {:?} to {:?} {}",
+            low.value(),
+            high.value(),
+            signal.unit
+        )
+        .trim_end()
+        .to_owned(),
+    }
+}
+
+/// In the order of contract section 1.
+fn state_members(program: &Program) -> Vec<Member> {
+    let member = |declaration: String, comment: &str| Member {
+        declaration,
+        comment: comment.to_owned(),
+    };
+    let mut members = vec![member(
+        format!("float held[{}]", program.signals.len()),
+        "last good samples",
+    )];
+    if program.memory_words > 0 {
+        members.push(member(
+            format!("float memory[{}]", program.memory_words),
+            "filters, in feature order, oldest first",
+        ));
+    }
+    members.push(member("float previous_duty".into(), "duty of the last chosen action"));
+    members.push(member("float previous_command".into(), "last command"));
+    if program.soft_start_from.is_some() {
+        members.push(member("float soft_cap".into(), "rising upper limit"));
+    }
+    for (name, ..) in program.mapping.iter().flat_map(|mapping| &mapping.coefficients) {
+        members.push(member(
+            format!("float mapping_{}", coefficient_name(*name)),
+            "coefficient of the duty ratio mapping",
+        ));
+    }
+    members.push(member(
+        "uint32_t bad_count".into(),
+        "consecutive steps with an invalid sample",
+    ));
+    members.push(member("uint32_t primed".into(), "1 once the filters hold good samples"));
+    members
+}
+
+fn source(program: &Program) -> Source {
+    let mut sense = Printer::new(&program.name, program);
+    sense.block(&program.front.block);
+    let mut decide = Printer::new(&program.name, program);
+    decide.block(&program.decide.block);
+    let mut advance = Printer::new(&program.name, program);
+    advance.block(&program.advance.block);
+    let status_terms = program
+        .decide
+        .status
+        .iter()
+        .map(|(bit, flag)| format!("({} << {bit})", decide.operand(*flag)))
+        .collect();
+    let (sense_lines, sense_results) = sense_statements(program, &sense);
+    Source {
+        common: common(program),
+        tables: tables::tables(program),
+        layers: tables::layers(program),
+        helpers: helpers(program),
+        tanh: tables::tanh_steps(),
+        front_members: front_members(program),
+        sense: sense_lines,
+        sense_results,
+        duty: decide.operand(program.decide.duty),
+        status_terms,
+        decide: decide.lines,
+        soft_cap: program
+            .advance
+            .soft_cap
+            .map(|value| advance.operand(value))
+            .unwrap_or_default(),
+        advance: advance.lines,
+        signal_count: program.signals.len(),
+        pushes: pushes(program),
+        init: init(program),
+        reset: reset(program),
+        memory_words: program.memory_words,
+        mapping_conditions: mapping_conditions(program),
+        mapping_assignments: mapping_assignments(program),
+        hold: unsigned(program.hold),
+        fallback: float(program.fallback_duty.value()),
+        integrity: tables::integrity(program),
+        crc: unsigned(program.crc),
+        self_test: tables::self_test(),
+    }
+}
+
+fn front_members(program: &Program) -> Vec<Member> {
+    let member = |declaration: String, comment: &str| Member {
+        declaration,
+        comment: comment.to_owned(),
+    };
+    let mut members = vec![member(format!("float signal[{}]", program.signals.len()), "sanitised")];
+    members.push(member(
+        format!("float observation[{}]", program.feature_count()),
+        "network input",
+    ));
+    if !program.front.pushes.is_empty() {
+        members.push(member(
+            format!("float push[{}]", program.front.pushes.len()),
+            "what the filters will remember",
+        ));
+    }
+    members.push(member("uint32_t bad_count".into(), "including this step"));
+    members.push(member("uint32_t usable".into(), "1 if the network decides"));
+    members.push(member(
+        "uint32_t held".into(),
+        "1 if a held sample bridges an invalid one",
+    ));
+    members.push(member(
+        "uint32_t primed_now".into(),
+        "1 if this step primes the filters",
+    ));
+    if program.front.clipped.is_some() {
+        members.push(member("uint32_t clipped".into(), "1 if an observation was clipped"));
+    }
+    members
+}
+
+/// Declarations, then assignments, of `sense`.
+fn sense_statements(program: &Program, printer: &Printer<'_>) -> (Vec<String>, Vec<String>) {
+    let front = &program.front;
+    let valid = printer.operand(front.all_valid);
+    let hold = unsigned(program.hold);
+    let mut lines = printer.lines.clone();
+    lines.push(format!(
+        "const uint32_t counted = state->bad_count + (uint32_t)(state->bad_count <= {hold});"
+    ));
+    lines.push(format!("const uint32_t bad_count = counted & ({valid} - (uint32_t)1);"));
+    lines.push(format!(
+        "const uint32_t bridged = state->primed & (uint32_t)(bad_count <= {hold});"
+    ));
+    lines.push(format!("const uint32_t usable = {valid} | bridged;"));
+    let mut results = Vec::new();
+    let values = [("signal", &front.signals), ("observation", &front.observation)];
+    for (array, ids) in values {
+        results.extend(
+            ids.iter()
+                .enumerate()
+                .map(|(i, id)| format!("front->{array}[{i}] = {};", printer.operand(*id))),
+        );
+    }
+    let pushes = front.pushes.iter().enumerate();
+    results.extend(pushes.map(|(i, push)| format!("front->push[{i}] = {};", printer.operand(push.value))));
+    results.push("front->bad_count = bad_count;".into());
+    results.push("front->usable = usable;".into());
+    results.push(format!("front->held = usable & ({valid} ^ (uint32_t)1);"));
+    results.push("front->primed_now = usable & (state->primed ^ (uint32_t)1);".into());
+    if let Some(clipped) = front.clipped {
+        results.push(format!("front->clipped = {};", printer.operand(clipped)));
+    }
+    (lines, results)
+}
+
+fn pushes(program: &Program) -> Vec<PushView> {
+    let view = |(index, push): (usize, &crate::program::Push)| PushView {
+        word: push.word,
+        last: push.word + push.length - 1,
+        index,
+    };
+    program.front.pushes.iter().enumerate().map(view).collect()
+}
+
+fn reset(program: &Program) -> Vec<String> {
+    let signals = program.signals.iter().enumerate();
+    let mut lines: Vec<String> = signals
+        .map(|(i, signal)| format!("state->held[{i}] = {};", float(signal.initial.value())))
+        .collect();
+    let initial = float(program.initial_duty.value());
+    lines.push(format!("state->previous_duty = {initial};"));
+    lines.push(format!("state->previous_command = {initial};"));
+    lines.extend(
+        program
+            .soft_start_from
+            .map(|from| format!("state->soft_cap = {};", float(from.value()))),
+    );
+    lines.push("state->bad_count = 0u;".into());
+    lines.push("state->primed = 0u;".into());
+    lines
+}
+
+fn init(program: &Program) -> Vec<String> {
+    let coefficients = program.mapping.iter().flat_map(|mapping| &mapping.coefficients);
+    coefficients
+        .map(|(name, value, ..)| format!("state->mapping_{} = {};", coefficient_name(*name), float(value.value())))
+        .collect()
+}
+
+fn mapping_conditions(program: &Program) -> Vec<String> {
+    let Some(mapping) = &program.mapping else {
+        return Vec::new();
+    };
+    let within = |(name, _, low, high): &(Coefficient, _, crate::program::Literal, crate::program::Literal)| {
+        let (name, low, high) = (coefficient_name(*name), float(low.value()), float(high.value()));
+        format!("(uint32_t)({name} >= {low}) & (uint32_t)({name} <= {high})")
+    };
+    let mut conditions: Vec<String> = mapping.coefficients.iter().map(within).collect();
+    if mapping.coefficients.iter().any(|(name, ..)| *name == Coefficient::R) {
+        let (low, high) = mapping.valid_i_out;
+        for end in [low, high] {
+            conditions.push(format!("(uint32_t)(a + r * {} > 0.0f)", float(end.value())));
+        }
+    }
+    conditions
+}
+
+fn mapping_assignments(program: &Program) -> Vec<String> {
+    let coefficients = program.mapping.iter().flat_map(|mapping| &mapping.coefficients);
+    coefficients
+        .map(|(name, ..)| coefficient_name(*name))
+        .map(|name| format!("state->mapping_{name} = {name};"))
+        .collect()
+}
+
+fn helpers(program: &Program) -> Helpers {
+    let ops = || {
+        let blocks = [&program.front.block, &program.decide.block, &program.advance.block];
+        blocks.into_iter().flat_map(|block| &block.ops)
+    };
+    let layers = || program.layers.iter().map(|layer| layer.activation);
+    let tanh = layers().any(|activation| activation == ActivationCode::Tanh);
+    Helpers {
+        within: ops().any(|op| matches!(op, Op::Within { .. })),
+        outside: ops().any(|op| matches!(op, Op::Outside { .. })),
+        clamp: tanh || ops().any(|op| matches!(op, Op::Clamp { .. })),
+        line_sum: ops().any(|op| matches!(op, Op::LineSum { .. })),
+        relu: layers().any(|activation| activation == ActivationCode::Relu),
+        leaky_relu: layers().any(|activation| matches!(activation, ActivationCode::LeakyRelu(_))),
+        tanh,
+    }
+}

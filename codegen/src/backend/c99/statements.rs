@@ -1,0 +1,135 @@
+//! Straight-line blocks as C declarations.
+
+use super::coefficient_name;
+use crate::backend::literal::decimal;
+use crate::program::{Block, Op, Program, ValueId};
+
+/// A float literal.
+pub fn float(value: f32) -> String {
+    format!("{}f", decimal(value))
+}
+
+/// An unsigned 32-bit literal.
+pub fn unsigned(value: u32) -> String {
+    if value < 1 << 15 {
+        format!("{value}u")
+    } else {
+        format!("0x{value:08X}u")
+    }
+}
+
+/// Prints one block; leaves stand where they are used, everything computed gets a name.
+pub struct Printer<'p> {
+    prefix: &'p str,
+    program: &'p Program,
+    operands: Vec<String>,
+    named: usize,
+    /// Declarations in execution order.
+    pub lines: Vec<String>,
+}
+
+impl<'p> Printer<'p> {
+    /// For functions whose names start with `prefix`.
+    pub fn new(prefix: &'p str, program: &'p Program) -> Self {
+        Self {
+            prefix,
+            program,
+            operands: Vec::new(),
+            named: 0,
+            lines: Vec::new(),
+        }
+    }
+
+    /// Text of a value of the block printed last.
+    pub fn operand(&self, id: ValueId) -> String {
+        self.operands[id].clone()
+    }
+
+    /// Prints a block.
+    pub fn block(&mut self, block: &Block) {
+        for op in &block.ops {
+            let text = match self.leaf(op) {
+                Some(leaf) => leaf,
+                None => self.named(op),
+            };
+            self.operands.push(text);
+        }
+    }
+
+    fn named(&mut self, op: &Op) -> String {
+        let (kind, letter) = if op.is_flag() {
+            ("uint32_t", 'f')
+        } else {
+            ("float", 'v')
+        };
+        let name = format!("{letter}{}", self.named);
+        self.named += 1;
+        let line = format!("const {kind} {name} = {};", self.computed(op));
+        self.lines.push(line);
+        name
+    }
+
+    fn leaf(&self, op: &Op) -> Option<String> {
+        Some(match op {
+            Op::Measured(i) => format!("measured->{}", self.program.signals[*i].name),
+            Op::Code(i) => format!("(float)measured->{}", self.program.signals[*i].name),
+            Op::Held(i) => format!("state->held[{i}]"),
+            Op::Sanitised(i) => format!("front->signal[{i}]"),
+            Op::Memory(i) => format!("state->memory[{i}]"),
+            Op::PreviousDuty => "state->previous_duty".into(),
+            Op::PreviousCommand => "state->previous_command".into(),
+            Op::SoftCap => "state->soft_cap".into(),
+            Op::Coefficient(name) => format!("state->mapping_{}", coefficient_name(*name)),
+            Op::ChosenDuty => "chosen".into(),
+            Op::Constant(literal) => float(literal.value()),
+            Op::Primed => "state->primed".into(),
+            Op::Usable => "front->usable".into(),
+            Op::Clipped => "front->clipped".into(),
+            Op::HeldSample => "front->held".into(),
+            Op::PrimedNow => "front->primed_now".into(),
+            _ => return None,
+        })
+    }
+
+    fn computed(&self, op: &Op) -> String {
+        let p = self.prefix;
+        let v = |id: &ValueId| self.operands[*id].as_str();
+        match op {
+            Op::Neg(x) => format!("-({})", v(x)),
+            Op::Add(x, y) => format!("{} + {}", v(x), v(y)),
+            Op::Sub(x, y) => format!("{} - {}", v(x), parenthesised(v(y))),
+            Op::Mul(x, y) => format!("{} * {}", v(x), v(y)),
+            Op::Select { flag, then, otherwise } => {
+                format!("{p}_select({}, {}, {})", v(flag), v(then), v(otherwise))
+            }
+            Op::Clamp { x, low, high } => format!("{p}_clamp({}, {}, {})", v(x), v(low), v(high)),
+            Op::LineSum {
+                word,
+                length,
+                newest,
+                primed,
+            } => {
+                format!(
+                    "{p}_line_sum(&state->memory[{word}], {length}u, {}, {})",
+                    v(newest),
+                    v(primed)
+                )
+            }
+            Op::Within { x, low, high } => format!("{p}_within({}, {}, {})", v(x), v(low), v(high)),
+            Op::Outside { x, low, high } => format!("{p}_outside({}, {}, {})", v(x), v(low), v(high)),
+            Op::Above(x, limit) => format!("(uint32_t)({} > {})", v(x), v(limit)),
+            Op::And(x, y) => format!("{} & {}", v(x), v(y)),
+            Op::Or(x, y) => format!("{} | {}", v(x), v(y)),
+            leaf => self.leaf(leaf).unwrap_or_default(),
+        }
+    }
+}
+
+/// A negative literal after a minus sign would read as a decrement.
+fn parenthesised(text: &str) -> String {
+    if text.starts_with('-') {
+        format!("({text})")
+    } else {
+        text.to_owned()
+    }
+}

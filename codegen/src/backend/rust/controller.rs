@@ -1,0 +1,414 @@
+//! The controller type: state, step, checks.
+
+use proc_macro2::{Ident, TokenStream};
+use quote::quote;
+
+use super::statements::{Printer, coefficient_field};
+use super::{float, ident, network, size, word};
+use crate::lower::known_answers::{LCG, SEED, UNIT};
+use crate::program::{Coefficient, Literal, Program};
+
+/// Type and implementation.
+pub fn items(program: &Program, name: &Ident) -> TokenStream {
+    let fields = fields(program);
+    let (declared, initial): (Vec<_>, Vec<_>) = fields
+        .iter()
+        .map(|field| (field.declaration(), field.initial()))
+        .unzip();
+    let front = front(program);
+    let lifecycle = lifecycle(program, &fields);
+    let sense = sense(program);
+    let decide = decide(program);
+    let advance = advance(program);
+    let set_mapping = set_mapping(program);
+    let checks = checks(program);
+    quote! {
+        /// One controller: a policy with the memory of its filters. Several instances are independent.
+        #[derive(Clone)]
+        pub struct #name { #(#declared),* }
+        #front
+        impl #name {
+            /// Start-up state.
+            #[must_use]
+            pub const fn new() -> Self {
+                Self { #(#initial),* }
+            }
+            #lifecycle
+            /// Command for this measurement; changes nothing.
+            #[must_use]
+            pub fn eval(&self, measured: &Measurement) -> Command {
+                self.decide(&self.sense(measured))
+            }
+            /// Advances the filters by one sample period, with the command that `eval` gave for this measurement.
+            pub fn commit(&mut self, measured: &Measurement, command: &Command) {
+                let front = self.sense(measured);
+                self.advance(&front, command);
+            }
+            /// `eval` and `commit`.
+            pub fn step(&mut self, measured: &Measurement) -> Command {
+                let front = self.sense(measured);
+                let command = self.decide(&front);
+                self.advance(&front, &command);
+                command
+            }
+            /// Observation for this measurement; changes nothing.
+            #[must_use]
+            pub fn observe(&self, measured: &Measurement) -> [f32; FEATURES] {
+                self.sense(measured).observation
+            }
+            /// Q values of an observation.
+            #[must_use]
+            pub fn q_values(observation: &[f32; FEATURES]) -> [f32; ACTIONS] {
+                network(observation)
+            }
+            #set_mapping
+            #sense
+            #decide
+            #advance
+            #checks
+        }
+        impl Default for #name {
+            fn default() -> Self {
+                Self::new()
+            }
+        }
+    }
+}
+
+/// A state member in contract order.
+struct Field {
+    name: Ident,
+    kind: Kind,
+}
+
+enum Kind {
+    Floats(Vec<f32>),
+    Float(f32),
+    Coefficient(f32),
+    Word,
+}
+
+impl Field {
+    fn declaration(&self) -> TokenStream {
+        let name = &self.name;
+        match &self.kind {
+            Kind::Floats(values) => {
+                let length = size(values.len());
+                quote!(#name: [f32; #length])
+            }
+            Kind::Float(_) | Kind::Coefficient(_) => quote!(#name: f32),
+            Kind::Word => quote!(#name: u32),
+        }
+    }
+
+    fn initial(&self) -> TokenStream {
+        let name = &self.name;
+        match &self.kind {
+            Kind::Floats(values) if values.iter().all(|value| value.to_bits() == 0) => {
+                let length = size(values.len());
+                quote!(#name: [0.0; #length])
+            }
+            Kind::Floats(values) => {
+                let values = values.iter().map(|value| float(*value));
+                quote!(#name: [#(#values),*])
+            }
+            Kind::Float(value) | Kind::Coefficient(value) => {
+                let value = float(*value);
+                quote!(#name: #value)
+            }
+            Kind::Word => quote!(#name: 0),
+        }
+    }
+
+    /// Expression that appends the field's words to the iterator `next`.
+    fn words(&self) -> TokenStream {
+        let name = &self.name;
+        match &self.kind {
+            Kind::Floats(_) => quote!(.chain(self.#name.iter().map(|value| value.to_bits()))),
+            Kind::Float(_) | Kind::Coefficient(_) => quote!(.chain(core::iter::once(self.#name.to_bits()))),
+            Kind::Word => quote!(.chain(core::iter::once(self.#name))),
+        }
+    }
+}
+
+fn fields(program: &Program) -> Vec<Field> {
+    let field = |name: &str, kind| Field {
+        name: ident(name),
+        kind,
+    };
+    let held = program.signals.iter().map(|signal| signal.initial.value()).collect();
+    let initial = program.initial_duty.value();
+    let mut fields = vec![field("held", Kind::Floats(held))];
+    if program.memory_words > 0 {
+        fields.push(field("memory", Kind::Floats(vec![0.0; program.memory_words])));
+    }
+    fields.push(field("previous_duty", Kind::Float(initial)));
+    fields.push(field("previous_command", Kind::Float(initial)));
+    fields.extend(
+        program
+            .soft_start_from
+            .map(|from| field("soft_cap", Kind::Float(from.value()))),
+    );
+    for (name, value, ..) in program.mapping.iter().flat_map(|mapping| &mapping.coefficients) {
+        fields.push(Field {
+            name: coefficient_field(*name),
+            kind: Kind::Coefficient(value.value()),
+        });
+    }
+    fields.push(field("bad_count", Kind::Word));
+    fields.push(field("primed", Kind::Word));
+    fields
+}
+
+fn lifecycle(program: &Program, fields: &[Field]) -> TokenStream {
+    let kept: Vec<_> = program
+        .mapping
+        .iter()
+        .flat_map(|mapping| &mapping.coefficients)
+        .map(|(name, ..)| {
+            let name = coefficient_field(*name);
+            quote!(#name: self.#name)
+        })
+        .collect();
+    let fresh = if kept.is_empty() {
+        quote!(Self::new())
+    } else {
+        quote!(Self { #(#kept,)* ..Self::new() })
+    };
+    let words = fields.iter().map(Field::words);
+    quote! {
+        /// Start-up state, but coefficients set at run time stay.
+        pub fn reset(&mut self) {
+            *self = #fresh;
+        }
+        /// The state as words, for logging and comparison.
+        #[must_use]
+        pub fn state_words(&self) -> [u32; STATE_WORDS] {
+            let mut words = [0; STATE_WORDS];
+            let state = core::iter::empty() #(#words)*;
+            for (word, value) in words.iter_mut().zip(state) {
+                *word = value;
+            }
+            words
+        }
+    }
+}
+
+fn front(program: &Program) -> TokenStream {
+    let pushes = size(program.front.pushes.len());
+    let signals = quote!(SIGNALS);
+    quote! {
+        /// What a measurement means before the network sees it.
+        struct Front {
+            signal: [f32; #signals],
+            observation: [f32; FEATURES],
+            push: [f32; #pushes],
+            bad_count: u32,
+            usable: u32,
+            held: u32,
+            primed_now: u32,
+            clipped: u32,
+        }
+    }
+}
+
+fn sense(program: &Program) -> TokenStream {
+    let front = &program.front;
+    let printer = Printer::new(program, &front.block);
+    let statements = &printer.statements;
+    let list = |ids: &[usize]| {
+        let values = ids.iter().map(|id| printer.operand(*id));
+        quote!([#(#values),*])
+    };
+    let signal = list(&front.signals);
+    let observation = list(&front.observation);
+    let pushed: Vec<usize> = front.pushes.iter().map(|push| push.value).collect();
+    let push = list(&pushed);
+    let valid = printer.operand(front.all_valid);
+    let hold = word(program.hold);
+    let clipped = front.clipped.map_or(quote!(0), |id| printer.operand(id));
+    quote! {
+        /// Sanitise, filters, observation.
+        #[inline(always)]
+        fn sense(&self, measured: &Measurement) -> Front {
+            #(#statements)*
+            let counted = self.bad_count.wrapping_add(u32::from(self.bad_count <= #hold));
+            let bad_count = counted & #valid.wrapping_sub(1);
+            let usable = #valid | (self.primed & u32::from(bad_count <= #hold));
+            Front {
+                signal: #signal,
+                observation: #observation,
+                push: #push,
+                bad_count,
+                usable,
+                held: usable & (#valid ^ 1),
+                primed_now: usable & (self.primed ^ 1),
+                clipped: #clipped,
+            }
+        }
+    }
+}
+
+fn decide(program: &Program) -> TokenStream {
+    let decide = &program.decide;
+    let printer = Printer::new(program, &decide.block);
+    let statements = &printer.statements;
+    let duty = printer.operand(decide.duty);
+    let terms = decide.status.iter().map(|(bit, flag)| {
+        let (flag, bit) = (printer.operand(*flag), word(*bit));
+        quote!((#flag << #bit))
+    });
+    let fallback = float(program.fallback_duty.value());
+    quote! {
+        /// Network, argmax, mapping, limits, status.
+        #[inline(always)]
+        fn decide(&self, front: &Front) -> Command {
+            let mut best = f32::MIN;
+            let mut chosen = DUTIES[0];
+            let mut action_index = 0_u32;
+            let mut action = 0_u32;
+            // the lowest index wins among equals, a NaN never does
+            for (q, duty) in network(&front.observation).iter().zip(&DUTIES) {
+                let above = u32::from(*q > best);
+                let mask = 0_u32.wrapping_sub(above);
+                best = select(above, *q, best);
+                chosen = select(above, *duty, chosen);
+                action_index = (action & mask) | (action_index & !mask);
+                action = action.wrapping_add(1);
+            }
+            #(#statements)*
+            let usable = front.usable;
+            let status = #(#terms)|*;
+            Command {
+                duty: select(usable, #duty, #fallback),
+                duty_sim: select(usable, chosen, #fallback),
+                action_index,
+                status: (status & 0_u32.wrapping_sub(usable)) | (status::FALLBACK & usable.wrapping_sub(1)),
+            }
+        }
+    }
+}
+
+fn advance(program: &Program) -> TokenStream {
+    let printer = Printer::new(program, &program.advance.block);
+    let statements = &printer.statements;
+    let soft_cap = program.advance.soft_cap.map(|id| {
+        let value = printer.operand(id);
+        quote! { self.soft_cap = #value; }
+    });
+    let pushes = program.front.pushes.iter().enumerate().map(|(index, push)| {
+        let (first, last, length) = (size(push.word), size(push.word + push.length - 1), size(push.length));
+        let index = size(index);
+        if push.length == 1 {
+            return quote! { self.memory[#last] = front.push[#index]; };
+        }
+        quote! {
+            let mut moved = front.push[#index];
+            for word in self.memory.iter_mut().skip(#first).take(#length).rev() {
+                let before = select(self.primed, *word, front.push[#index]);
+                *word = moved;
+                moved = before;
+            }
+        }
+    });
+    quote! {
+        /// Filters, held samples and counters move on by one sample period.
+        #[inline(always)]
+        fn advance(&mut self, front: &Front, command: &Command) {
+            #(#statements)*
+            #(#pushes)*
+            #soft_cap
+            self.held = front.signal;
+            self.previous_duty = command.duty_sim;
+            self.previous_command = command.duty;
+            self.bad_count = front.bad_count;
+            self.primed = front.usable;
+        }
+    }
+}
+
+fn set_mapping(program: &Program) -> Option<TokenStream> {
+    let mapping = program.mapping.as_ref()?;
+    let parameter = |name: Coefficient| {
+        ident(match name {
+            Coefficient::A => "a",
+            Coefficient::B => "b",
+            Coefficient::C => "c",
+            Coefficient::R => "r",
+        })
+    };
+    let names: Vec<_> = mapping.coefficients.iter().map(|(name, ..)| parameter(*name)).collect();
+    let fields = mapping.coefficients.iter().map(|(name, ..)| coefficient_field(*name));
+    let mut conditions: Vec<TokenStream> = Vec::new();
+    for (name, _, low, high) in &mapping.coefficients {
+        let (name, low, high) = (parameter(*name), float(low.value()), float(high.value()));
+        conditions.push(quote!((#name >= #low) & (#name <= #high)));
+    }
+    if mapping.coefficients.iter().any(|(name, ..)| *name == Coefficient::R) {
+        let (low, high): (Literal, Literal) = mapping.valid_i_out;
+        for end in [low, high].map(|end| float(end.value())) {
+            conditions.push(quote!((a + r * #end > 0.0)));
+        }
+    }
+    Some(quote! {
+        /// Replaces the coefficients of the duty ratio mapping. False, changing nothing, if one is outside its
+        /// interval or the mapping would not increase with the duty.
+        #[must_use]
+        pub fn set_mapping(&mut self, #(#names: f32),*) -> bool {
+            let accepted = #(#conditions)&*;
+            if accepted {
+                #(self.#fields = #names;)*
+            }
+            accepted
+        }
+    })
+}
+
+fn checks(program: &Program) -> TokenStream {
+    let test = &program.self_test;
+    let column = |pick: fn(&(Literal, Literal)) -> Literal| {
+        let values = test.observation_box.iter().map(|range| float(pick(range).value()));
+        quote!([#(#values),*])
+    };
+    let low = column(|range| range.0);
+    let width = column(|range| range.1);
+    let answers = test.answers.iter().map(|answer| word(*answer));
+    let vectors = size(test.answers.len());
+    let (seed, multiplier, increment, unit) = (word(SEED), word(LCG.0), word(LCG.1), float(UNIT));
+    let integrity = network::integrity(program);
+    let crc = word(program.crc);
+    quote! {
+        /// Known answers: whether the arithmetic of this build is the policy's.
+        ///
+        /// # Errors
+        /// The number (from 1) of the first failing vector.
+        pub fn self_test() -> Result<(), u32> {
+            static BOX_LOW: [f32; FEATURES] = #low;
+            static BOX_WIDTH: [f32; FEATURES] = #width;
+            static ANSWERS: [u32; #vectors] = [#(#answers),*];
+            let mut random: u32 = #seed;
+            let mut failed = 0_u32;
+            let mut vector = 0_u32;
+            for answer in &ANSWERS {
+                vector = vector.wrapping_add(1);
+                let mut observation = [0.0_f32; FEATURES];
+                for ((value, low), width) in observation.iter_mut().zip(&BOX_LOW).zip(&BOX_WIDTH) {
+                    random = random.wrapping_mul(#multiplier).wrapping_add(#increment);
+                    *value = *low + *width * ((random >> 8) as f32 * #unit);
+                }
+                let crc = !crc_floats(u32::MAX, &network(&observation));
+                if failed == 0 && crc != *answer {
+                    failed = vector;
+                }
+            }
+            if failed == 0 { Ok(()) } else { Err(failed) }
+        }
+        /// CRC-32 over the tables: whether they are as generated.
+        #[must_use]
+        pub fn integrity() -> bool {
+            let mut crc = u32::MAX;
+            #integrity
+            !crc == #crc
+        }
+    }
+}

@@ -1,0 +1,185 @@
+//! Tables, layers and `q_values`.
+
+use proc_macro2::TokenStream;
+use quote::quote;
+
+use super::{float, ident, size};
+use crate::lower::network::{TANH_DENOMINATOR, TANH_NUMERATOR};
+use crate::program::{ActivationCode, LayerCode, Program};
+
+/// Everything between observation and Q values.
+pub fn items(program: &Program) -> TokenStream {
+    let layers = program
+        .layers
+        .iter()
+        .enumerate()
+        .map(|(index, layer)| layer_items(index, layer));
+    let duties = program.duties.iter().map(|duty| float(duty.value()));
+    let tanh = program
+        .layers
+        .iter()
+        .any(|layer| layer.activation == ActivationCode::Tanh)
+        .then(tanh);
+    let mut value = quote!(observation);
+    let mut calls = Vec::new();
+    for index in 0..program.layers.len() {
+        let (layer, sink) = (ident(&format!("layer{index}")), ident(&format!("hidden{index}")));
+        calls.push(quote! { let #sink = #layer(#value); });
+        value = quote!(&#sink);
+    }
+    let last = ident(&format!("hidden{}", program.layers.len() - 1));
+    quote! {
+        static DUTIES: [f32; ACTIONS] = [#(#duties),*];
+        #tanh
+        /// Sums of one block of outputs: from the bias, inputs in index order, every operation rounded.
+        #[inline(always)]
+        fn block<const INPUTS: usize, const ROWS: usize>(
+            weights: &[[f32; ROWS]; INPUTS],
+            bias: &[f32; ROWS],
+            x: &[f32; INPUTS],
+        ) -> [f32; ROWS] {
+            let mut sums = *bias;
+            for (column, x) in weights.iter().zip(x) {
+                for (sum, weight) in sums.iter_mut().zip(column) {
+                    *sum += *weight * *x;
+                }
+            }
+            sums
+        }
+        #(#layers)*
+        fn network(observation: &[f32; FEATURES]) -> [f32; ACTIONS] {
+            #(#calls)*
+            #last
+        }
+    }
+}
+
+fn layer_items(index: usize, layer: &LayerCode) -> TokenStream {
+    let name = ident(&format!("layer{index}"));
+    let doc = format!(" {}: {} -> {}", layer.name, layer.inputs, layer.outputs);
+    let (inputs, outputs) = (size(layer.inputs), size(layer.outputs));
+    let (rows, full) = (layer.block_rows, layer.full_blocks());
+    let split = full * rows;
+    let (weights, bias) = (ident(&format!("WEIGHTS{index}")), ident(&format!("BIAS{index}")));
+    let blocks = layer.table[..split * layer.inputs]
+        .chunks(rows * layer.inputs)
+        .map(|block| columns(block, rows));
+    let biases = layer.bias[..split].chunks(rows).map(row);
+    let (rows_size, full_size) = (size(rows), size(full));
+    let activated = activation(layer.activation);
+    let (tail_tables, tail_loop) = tail(index, layer);
+    quote! {
+        static #weights: [[[f32; #rows_size]; #inputs]; #full_size] = [#(#blocks),*];
+        static #bias: [[f32; #rows_size]; #full_size] = [#(#biases),*];
+        #tail_tables
+        #[doc = #doc]
+        #[inline(always)]
+        fn #name(x: &[f32; #inputs]) -> [f32; #outputs] {
+            let mut y = [0.0; #outputs];
+            for ((out, weights), bias) in y.chunks_exact_mut(#rows_size).zip(&#weights).zip(&#bias) {
+                for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+                    *y = #activated;
+                }
+            }
+            #tail_loop
+            y
+        }
+    }
+}
+
+/// The shorter last block, if there is one.
+fn tail(index: usize, layer: &LayerCode) -> (TokenStream, TokenStream) {
+    let rows = layer.tail_rows();
+    if rows == 0 {
+        return (TokenStream::new(), TokenStream::new());
+    }
+    let split = layer.outputs - rows;
+    let (weights, bias) = (
+        ident(&format!("TAIL_WEIGHTS{index}")),
+        ident(&format!("TAIL_BIAS{index}")),
+    );
+    let table = columns(&layer.table[split * layer.inputs..], rows);
+    let biases = row(&layer.bias[split..]);
+    let (inputs, rows, split) = (size(layer.inputs), size(rows), size(split));
+    let activated = activation(layer.activation);
+    let tables = quote! {
+        static #weights: [[f32; #rows]; #inputs] = #table;
+        static #bias: [f32; #rows] = #biases;
+    };
+    let code = quote! {
+        for (y, sum) in y.iter_mut().skip(#split).zip(block(&#weights, &#bias, x)) {
+            *y = #activated;
+        }
+    };
+    (tables, code)
+}
+
+fn columns(block: &[f32], rows: usize) -> TokenStream {
+    let columns = block.chunks(rows).map(row);
+    quote!([#(#columns),*])
+}
+
+fn row(values: &[f32]) -> TokenStream {
+    let values = values.iter().map(|value| float(*value));
+    quote!([#(#values),*])
+}
+
+fn activation(activation: ActivationCode) -> TokenStream {
+    match activation {
+        ActivationCode::Identity => quote!(sum),
+        ActivationCode::Relu => quote!(relu(sum)),
+        ActivationCode::LeakyRelu(slope) => {
+            let slope = float(slope.value());
+            quote!(leaky_relu(sum, #slope))
+        }
+        ActivationCode::Tanh => quote!(tanh(sum)),
+    }
+}
+
+fn tanh() -> TokenStream {
+    let steps = |letter: &str, terms: &[f32; 5]| {
+        let name = ident(letter);
+        let highest = float(terms[4]);
+        let lower = terms.iter().rev().skip(1).map(|term| float(*term));
+        quote! { let mut #name: f32 = #highest; #(#name = #name * z + #lower;)* }
+    };
+    let numerator = steps("p", &TANH_NUMERATOR);
+    let denominator = steps("q", &TANH_DENOMINATOR);
+    quote! {
+        /// Rational approximation, |error| < 4e-7.
+        #[inline(always)]
+        fn tanh(x: f32) -> f32 {
+            let t = clamp(x, -9.0, 9.0);
+            let z = t * t;
+            #numerator
+            #denominator
+            clamp((p * t) / q, -1.0, 1.0)
+        }
+    }
+}
+
+/// Statements of the integrity check: every table in the order of [`Program::table_words`]. `black_box`: the memory is
+/// read, the compiler does not answer in its place.
+pub fn integrity(program: &Program) -> TokenStream {
+    let layers = program.layers.iter().enumerate().map(|(index, layer)| {
+        let (weights, bias) = (ident(&format!("WEIGHTS{index}")), ident(&format!("BIAS{index}")));
+        let (tail_weights, tail_bias) = (
+            ident(&format!("TAIL_WEIGHTS{index}")),
+            ident(&format!("TAIL_BIAS{index}")),
+        );
+        let full_weights = quote! {
+            for column in core::hint::black_box(&#weights).iter().flatten() { crc = crc_floats(crc, column); }
+        };
+        let full_bias = quote! { for row in core::hint::black_box(&#bias) { crc = crc_floats(crc, row); } };
+        if layer.tail_rows() == 0 {
+            return quote! { #full_weights #full_bias };
+        }
+        quote! {
+            #full_weights
+            for column in core::hint::black_box(&#tail_weights) { crc = crc_floats(crc, column); }
+            #full_bias
+            crc = crc_floats(crc, core::hint::black_box(&#tail_bias));
+        }
+    });
+    quote! { #(#layers)* crc = crc_floats(crc, core::hint::black_box(&DUTIES)); }
+}

@@ -1,0 +1,209 @@
+//! Straight-line blocks as `let` statements, and the helpers they call.
+
+use proc_macro2::{Ident, TokenStream};
+use quote::quote;
+
+use super::{float, ident, size};
+use crate::program::{Block, Coefficient, Op, Program, ValueId};
+
+/// Field of the controller that holds a coefficient.
+pub fn coefficient_field(coefficient: Coefficient) -> Ident {
+    ident(match coefficient {
+        Coefficient::A => "mapping_a",
+        Coefficient::B => "mapping_b",
+        Coefficient::C => "mapping_c",
+        Coefficient::R => "mapping_r",
+    })
+}
+
+/// Prints one block inside a method of the controller; leaves stand where they are used.
+pub struct Printer<'p> {
+    program: &'p Program,
+    operands: Vec<TokenStream>,
+    named: usize,
+    /// `let` statements in execution order.
+    pub statements: Vec<TokenStream>,
+}
+
+impl<'p> Printer<'p> {
+    /// Prints `block`.
+    pub fn new(program: &'p Program, block: &Block) -> Self {
+        let mut printer = Self {
+            program,
+            operands: Vec::new(),
+            named: 0,
+            statements: Vec::new(),
+        };
+        for op in &block.ops {
+            let tokens = match printer.leaf(op) {
+                Some(leaf) => leaf,
+                None => printer.named(op),
+            };
+            printer.operands.push(tokens);
+        }
+        printer
+    }
+
+    /// Tokens of a value.
+    pub fn operand(&self, id: ValueId) -> TokenStream {
+        self.operands[id].clone()
+    }
+
+    fn named(&mut self, op: &Op) -> TokenStream {
+        let (kind, letter) = if op.is_flag() {
+            (quote!(u32), 'f')
+        } else {
+            (quote!(f32), 'v')
+        };
+        let name = ident(&format!("{letter}{}", self.named));
+        self.named += 1;
+        let value = self.computed(op);
+        self.statements.push(quote! { let #name: #kind = #value; });
+        quote!(#name)
+    }
+
+    fn leaf(&self, op: &Op) -> Option<TokenStream> {
+        Some(match op {
+            Op::Measured(i) => {
+                let name = ident(&self.program.signals[*i].name);
+                quote!(measured.#name)
+            }
+            Op::Code(i) => {
+                let name = ident(&self.program.signals[*i].name);
+                quote!((measured.#name as f32))
+            }
+            Op::Held(i) => indexed(quote!(self.held), *i),
+            Op::Sanitised(i) => indexed(quote!(front.signal), *i),
+            Op::Memory(i) => indexed(quote!(self.memory), *i),
+            Op::PreviousDuty => quote!(self.previous_duty),
+            Op::PreviousCommand => quote!(self.previous_command),
+            Op::SoftCap => quote!(self.soft_cap),
+            Op::Coefficient(name) => {
+                let name = coefficient_field(*name);
+                quote!(self.#name)
+            }
+            Op::ChosenDuty => quote!(chosen),
+            Op::Constant(literal) => float(literal.value()),
+            Op::Primed => quote!(self.primed),
+            Op::Usable => quote!(front.usable),
+            Op::Clipped => quote!(front.clipped),
+            Op::HeldSample => quote!(front.held),
+            Op::PrimedNow => quote!(front.primed_now),
+            _ => return None,
+        })
+    }
+
+    fn computed(&self, op: &Op) -> TokenStream {
+        let v = |id: &ValueId| &self.operands[*id];
+        match op {
+            Op::Neg(x) => unary(quote!(-), v(x)),
+            Op::Add(x, y) => binary(v(x), quote!(+), v(y)),
+            Op::Sub(x, y) => binary(v(x), quote!(-), v(y)),
+            Op::Mul(x, y) => binary(v(x), quote!(*), v(y)),
+            Op::Select { flag, then, otherwise } => call("select", &[v(flag), v(then), v(otherwise)]),
+            Op::Clamp { x, low, high } => call("clamp", &[v(x), v(low), v(high)]),
+            Op::LineSum {
+                word,
+                length,
+                newest,
+                primed,
+            } => {
+                let (first, skip, take) = (size(*word), size(word + 1), size(length - 1));
+                let (newest, primed) = (v(newest), v(primed));
+                quote!(line_sum(self.memory[#first], self.memory.iter().skip(#skip).take(#take), #newest, #primed))
+            }
+            Op::Within { x, low, high } => call("within", &[v(x), v(low), v(high)]),
+            Op::Outside { x, low, high } => call("outside", &[v(x), v(low), v(high)]),
+            Op::Above(x, limit) => {
+                let (x, limit) = (v(x), v(limit));
+                quote!(u32::from(#x > #limit))
+            }
+            Op::And(x, y) => binary(v(x), quote!(&), v(y)),
+            Op::Or(x, y) => binary(v(x), quote!(|), v(y)),
+            leaf => self.leaf(leaf).unwrap_or_default(),
+        }
+    }
+}
+
+fn indexed(array: TokenStream, index: usize) -> TokenStream {
+    let index = size(index);
+    quote!(#array[#index])
+}
+
+fn unary(operator: TokenStream, x: &TokenStream) -> TokenStream {
+    quote!(#operator #x)
+}
+
+fn binary(x: &TokenStream, operator: TokenStream, y: &TokenStream) -> TokenStream {
+    quote!(#x #operator #y)
+}
+
+fn call(function: &str, arguments: &[&TokenStream]) -> TokenStream {
+    let function = ident(function);
+    quote!(#function(#(#arguments),*))
+}
+
+/// Branch-free helpers; a policy need not use all of them.
+pub fn helpers() -> TokenStream {
+    quote! {
+        /// flag (0 or 1) ? then : otherwise, without a branch
+        #[inline(always)]
+        #[allow(dead_code)]
+        fn select(flag: u32, then: f32, otherwise: f32) -> f32 {
+            let mask = 0_u32.wrapping_sub(flag);
+            f32::from_bits((then.to_bits() & mask) | (otherwise.to_bits() & !mask))
+        }
+        #[inline(always)]
+        #[allow(dead_code)]
+        fn within(x: f32, low: f32, high: f32) -> u32 {
+            u32::from(x >= low) & u32::from(x <= high)
+        }
+        #[inline(always)]
+        #[allow(dead_code)]
+        fn outside(x: f32, low: f32, high: f32) -> u32 {
+            u32::from(x < low) | u32::from(x > high)
+        }
+        #[inline(always)]
+        #[allow(dead_code)]
+        fn clamp(x: f32, low: f32, high: f32) -> f32 {
+            let raised = select(u32::from(x < low), low, x);
+            select(u32::from(raised > high), high, raised)
+        }
+        /// Oldest first, newest last; a line that is not primed reads as newest throughout.
+        #[inline(always)]
+        #[allow(dead_code)]
+        fn line_sum<'a>(oldest: f32, rest: impl Iterator<Item = &'a f32>, newest: f32, primed: u32) -> f32 {
+            let mut sum = select(primed, oldest, newest);
+            for word in rest {
+                sum += select(primed, *word, newest);
+            }
+            sum + newest
+        }
+        /// x if x > 0 else +0, by the sign bit: no branch in the binary
+        #[inline(always)]
+        #[allow(dead_code)]
+        fn relu(x: f32) -> f32 {
+            let bits = x.to_bits();
+            f32::from_bits(bits & (bits >> 31).wrapping_sub(1))
+        }
+        #[inline(always)]
+        #[allow(dead_code)]
+        fn leaky_relu(x: f32, slope: f32) -> f32 {
+            select(x.to_bits() >> 31, slope * x, x)
+        }
+        /// CRC-32 (IEEE 802.3) of words taken little-endian, whatever the byte order of the machine.
+        #[inline(always)]
+        #[allow(dead_code)]
+        fn crc_word(mut crc: u32, word: u32) -> u32 {
+            crc ^= word;
+            for _ in 0..8 {
+                crc = (crc >> 4) ^ CRC_STEPS[(crc & 15) as usize];
+            }
+            crc
+        }
+        #[inline(never)]
+        fn crc_floats(crc: u32, words: &[f32]) -> u32 {
+            words.iter().fold(crc, |crc, word| crc_word(crc, word.to_bits()))
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! Contract sections 8 to 10: mapping, limits, status, and what the command path remembers.
+
+use policy::rounding::{down_f32, up_f32};
+use policy::{Mapping, Policy};
+
+use crate::program::{Advance, Block, Coefficient, Decide, Literal, Op, ValueId};
+
+/// Bit numbers of the status word (contract section 9) with the names used in generated code.
+pub const STATUS: [(&str, u32); 8] = [
+    ("HELD", 0),
+    ("FALLBACK", 1),
+    ("PRIMED", 2),
+    ("CLIPPED", 3),
+    ("MAPPING_RANGE", 4),
+    ("SLEW_LIMITED", 5),
+    ("SOFT_START", 6),
+    ("LIMITED", 7),
+];
+
+fn bit(name: &str) -> u32 {
+    STATUS
+        .iter()
+        .find(|(known, _)| *known == name)
+        .map_or(0, |(_, bit)| *bit)
+}
+
+/// Lowers the way from the chosen duty to the command.
+pub fn decide(policy: &Policy) -> Decide {
+    let mut block = Block::default();
+    let mut status = vec![
+        (bit("HELD"), block.value(Op::HeldSample)),
+        (bit("PRIMED"), block.value(Op::PrimedNow)),
+    ];
+    if policy.features.iter().any(|feature| feature.clip.is_some()) {
+        status.push((bit("CLIPPED"), block.value(Op::Clipped)));
+    }
+    let duty_sim = block.value(Op::ChosenDuty);
+    let mut duty = duty_sim;
+    if let Some(map) = &policy.mapping {
+        let outside;
+        (duty, outside) = mapping(&mut block, map, duty_sim);
+        status.push((bit("MAPPING_RANGE"), outside));
+    }
+    if let Some(slew) = policy.limits.slew {
+        let step = block.constant(down_f32(slew));
+        let before = block.value(Op::PreviousCommand);
+        let low = block.value(Op::Sub(before, step));
+        let high = block.value(Op::Add(before, step));
+        status.push((bit("SLEW_LIMITED"), block.value(Op::Outside { x: duty, low, high })));
+        duty = block.value(Op::Clamp { x: duty, low, high });
+    }
+    if policy.limits.soft_start.is_some() {
+        let cap = block.value(Op::SoftCap);
+        let above = block.value(Op::Above(duty, cap));
+        status.push((bit("SOFT_START"), above));
+        duty = block.value(Op::Select {
+            flag: above,
+            then: cap,
+            otherwise: duty,
+        });
+    }
+    let low = block.constant(up_f32(policy.limits.duty.low));
+    let high = block.constant(down_f32(policy.limits.duty.high));
+    status.push((bit("LIMITED"), block.value(Op::Outside { x: duty, low, high })));
+    duty = block.value(Op::Clamp { x: duty, low, high });
+    Decide {
+        block,
+        duty,
+        duty_sim,
+        status,
+    }
+}
+
+/// Mapped duty and the flag that it was extrapolated.
+fn mapping(block: &mut Block, map: &Mapping, duty: ValueId) -> (ValueId, ValueId) {
+    let current = block.value(Op::Sanitised(map.load_current));
+    let a = block.value(Op::Coefficient(Coefficient::A));
+    let b = block.value(Op::Coefficient(Coefficient::B));
+    let c = block.value(Op::Coefficient(Coefficient::C));
+    let gain = block.value(Op::Mul(a, duty));
+    let load = block.value(Op::Mul(b, current));
+    let sum = block.value(Op::Add(gain, load));
+    let mut mapped = block.value(Op::Add(sum, c));
+    if map.coefficients.r.is_some() {
+        let r = block.value(Op::Coefficient(Coefficient::R));
+        let scaled = block.value(Op::Mul(r, current));
+        let product = block.value(Op::Mul(scaled, duty));
+        mapped = block.value(Op::Add(mapped, product));
+    }
+    let mut outside = |x: ValueId, range: policy::Interval| {
+        let low = block.constant(up_f32(range.low));
+        let high = block.constant(down_f32(range.high));
+        block.value(Op::Outside { x, low, high })
+    };
+    let duty_outside = outside(duty, map.valid_d_sim);
+    let current_outside = outside(current, map.valid_i_out);
+    (mapped, block.value(Op::Or(duty_outside, current_outside)))
+}
+
+/// Lowers the next soft-start limit.
+pub fn advance(policy: &Policy) -> Advance {
+    let mut block = Block::default();
+    let soft_cap = policy.limits.soft_start.map(|soft| {
+        let increment = (policy.limits.duty.high - soft.from) / f64::from(soft.steps);
+        let cap = block.value(Op::SoftCap);
+        let increment = block.constant(Literal::nearest(increment));
+        let risen = block.value(Op::Add(cap, increment));
+        let max = block.constant(down_f32(policy.limits.duty.high));
+        // `c if c < max else max`: equal values have equal bits, duties are never -0 here
+        let above = block.value(Op::Above(risen, max));
+        let capped = block.value(Op::Select {
+            flag: above,
+            then: max,
+            otherwise: risen,
+        });
+        let usable = block.value(Op::Usable);
+        let from = block.constant(Literal::nearest(soft.from));
+        block.value(Op::Select {
+            flag: usable,
+            then: capped,
+            otherwise: from,
+        })
+    });
+    Advance { block, soft_cap }
+}

@@ -1,0 +1,221 @@
+//! Contract sections 2 to 5: sanitise, sources, filters, observation.
+
+use policy::rounding::{down_f32, up_f32};
+use policy::{Expr, Feature, Filter, Input, Policy};
+
+use crate::program::{Block, Front, Literal, Op, Push, ValueId};
+
+/// Lowers the front half of a step; also gives the number of filter memory words.
+pub fn lower(policy: &Policy) -> (Front, usize) {
+    let mut builder = Builder {
+        block: Block::default(),
+        signals: Vec::new(),
+        pushes: Vec::new(),
+        words: 0,
+    };
+    let all_valid = builder.sanitise(policy);
+    let mut clipped = Vec::new();
+    let mut observation = Vec::new();
+    for feature in &policy.features {
+        let (value, outside) = builder.feature(feature, policy.sample_period);
+        observation.push(value);
+        clipped.extend(outside);
+    }
+    let block = &mut builder.block;
+    let clipped = clipped.into_iter().reduce(|all, one| block.value(Op::Or(all, one)));
+    let front = Front {
+        block: builder.block,
+        signals: builder.signals,
+        all_valid,
+        clipped,
+        observation,
+        pushes: builder.pushes,
+    };
+    (front, builder.words)
+}
+
+struct Builder {
+    block: Block,
+    signals: Vec<ValueId>,
+    pushes: Vec<Push>,
+    words: usize,
+}
+
+impl Builder {
+    /// Fills `signals`; returns the flag that all are valid.
+    fn sanitise(&mut self, policy: &Policy) -> ValueId {
+        let block = &mut self.block;
+        let mut flags = Vec::new();
+        for (index, signal) in policy.signals.iter().enumerate() {
+            let x = match signal.adc {
+                None => block.value(Op::Measured(index)),
+                Some(adc) => {
+                    let code = block.value(Op::Code(index));
+                    let gain = block.constant(Literal::nearest(adc.gain));
+                    let offset = block.constant(Literal::nearest(adc.offset));
+                    let scaled = block.value(Op::Mul(gain, code));
+                    block.value(Op::Add(scaled, offset))
+                }
+            };
+            let low = block.constant(up_f32(signal.range.low));
+            let high = block.constant(down_f32(signal.range.high));
+            let valid = block.value(Op::Within { x, low, high });
+            let held = block.value(Op::Held(index));
+            self.signals.push(block.value(Op::Select {
+                flag: valid,
+                then: x,
+                otherwise: held,
+            }));
+            flags.push(valid);
+        }
+        let all = flags.into_iter().reduce(|all, one| block.value(Op::And(all, one)));
+        // a policy has at least one signal; without any, nothing could be invalid
+        all.unwrap_or_default()
+    }
+
+    /// Observation and, with a clip, the flag that it was active.
+    fn feature(&mut self, feature: &Feature, sample_period: f64) -> (ValueId, Option<ValueId>) {
+        let mut value = self.expression(&feature.source);
+        for filter in &feature.filters {
+            value = self.filter(*filter, value, sample_period);
+        }
+        let block = &mut self.block;
+        if feature.scale != 1.0 {
+            let scale = block.constant(Literal::nearest(feature.scale));
+            value = block.value(Op::Mul(value, scale));
+        }
+        if feature.offset != 0.0 {
+            let offset = block.constant(Literal::nearest(feature.offset));
+            value = block.value(Op::Add(value, offset));
+        }
+        match feature.clip {
+            None => (value, None),
+            Some(clip) => {
+                let low = block.constant(Literal::nearest(clip.low));
+                let high = block.constant(Literal::nearest(clip.high));
+                let outside = block.value(Op::Outside { x: value, low, high });
+                (block.value(Op::Clamp { x: value, low, high }), Some(outside))
+            }
+        }
+    }
+
+    fn expression(&mut self, expression: &Expr) -> ValueId {
+        let op = match expression {
+            Expr::Input(Input::Signal(index)) => return self.signals[*index],
+            Expr::Input(Input::PreviousDuty) => Op::PreviousDuty,
+            Expr::Input(Input::PreviousCommand) => Op::PreviousCommand,
+            Expr::Constant(value) => Op::Constant(Literal::nearest(*value)),
+            Expr::Neg(x) => Op::Neg(self.expression(x)),
+            Expr::Add(x, y) => Op::Add(self.expression(x), self.expression(y)),
+            Expr::Sub(x, y) => Op::Sub(self.expression(x), self.expression(y)),
+            Expr::Scale(by, x) => {
+                let x = self.expression(x);
+                Op::Mul(x, self.block.constant(Literal::nearest(*by)))
+            }
+        };
+        self.block.value(op)
+    }
+
+    fn filter(&mut self, filter: Filter, x: ValueId, period: f64) -> ValueId {
+        match filter {
+            Filter::Delay { samples } => {
+                let word = self.line(samples, x);
+                self.recall(word, x)
+            }
+            Filter::BackwardDifference => {
+                let word = self.line(1, x);
+                let before = self.recall(word, x);
+                let difference = self.block.value(Op::Sub(x, before));
+                self.scaled(difference, 1.0 / period)
+            }
+            Filter::LowPass { time_constant } => {
+                let word = self.reserve(1);
+                let before = self.recall(word, x);
+                let difference = self.block.value(Op::Sub(x, before));
+                let step = self.scaled(difference, period / (time_constant + period));
+                let y = self.block.value(Op::Add(before, step));
+                self.pushes.push(Push {
+                    word,
+                    length: 1,
+                    value: y,
+                });
+                y
+            }
+            Filter::FilteredDerivative { time_constant } => self.filtered_derivative(time_constant, x, period),
+            Filter::MovingAverage { samples } => {
+                let word = self.line(samples - 1, x);
+                let primed = self.block.value(Op::Primed);
+                let sum = self.block.value(Op::LineSum {
+                    word,
+                    length: samples - 1,
+                    newest: x,
+                    primed,
+                });
+                self.scaled(sum, 1.0 / samples as f64)
+            }
+            Filter::Integrator { min, max, initial } => {
+                let word = self.reserve(1);
+                let start = self.block.constant(Literal::nearest(initial));
+                let before = self.recall(word, start);
+                let step = self.scaled(x, period);
+                let sum = self.block.value(Op::Add(before, step));
+                let low = self.block.constant(Literal::nearest(min));
+                let high = self.block.constant(Literal::nearest(max));
+                let y = self.block.value(Op::Clamp { x: sum, low, high });
+                self.pushes.push(Push {
+                    word,
+                    length: 1,
+                    value: y,
+                });
+                y
+            }
+        }
+    }
+
+    fn filtered_derivative(&mut self, time_constant: f64, x: ValueId, period: f64) -> ValueId {
+        let x_word = self.line(1, x);
+        let y_word = self.reserve(1);
+        let x_before = self.recall(x_word, x);
+        let zero = self.block.constant(Literal::nearest(0.0));
+        let y_before = self.recall(y_word, zero);
+        let decayed = self.scaled(y_before, time_constant / (time_constant + period));
+        let difference = self.block.value(Op::Sub(x, x_before));
+        let step = self.scaled(difference, 1.0 / (time_constant + period));
+        let y = self.block.value(Op::Add(decayed, step));
+        self.pushes.push(Push {
+            word: y_word,
+            length: 1,
+            value: y,
+        });
+        y
+    }
+
+    fn scaled(&mut self, x: ValueId, by: f64) -> ValueId {
+        let by = self.block.constant(Literal::nearest(by));
+        self.block.value(Op::Mul(x, by))
+    }
+
+    fn reserve(&mut self, length: usize) -> usize {
+        let word = self.words;
+        self.words += length;
+        word
+    }
+
+    /// A new line of memory to which `value` is appended in every step.
+    fn line(&mut self, length: usize, value: ValueId) -> usize {
+        let word = self.reserve(length);
+        self.pushes.push(Push { word, length, value });
+        word
+    }
+
+    /// Oldest word of a line, or `unprimed` before the first good measurement.
+    fn recall(&mut self, word: usize, unprimed: ValueId) -> ValueId {
+        let primed = self.block.value(Op::Primed);
+        let memory = self.block.value(Op::Memory(word));
+        self.block.value(Op::Select {
+            flag: primed,
+            then: memory,
+            otherwise: unprimed,
+        })
+    }
+}

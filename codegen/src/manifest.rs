@@ -1,0 +1,118 @@
+//! `manifest.json`: what was generated, from what, and under which conditions its bits hold.
+
+use std::collections::BTreeMap;
+
+use policy::{Digests, Policy};
+use serde::Serialize;
+use targets::TargetSpec;
+
+use crate::crc::crc32_words;
+use crate::{GeneratedFiles, Language, TOOL};
+
+/// File name of the manifest in the output folder.
+pub const FILE: &str = "manifest.json";
+
+/// Content of `manifest.json`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Manifest {
+    /// Tool and version.
+    pub generator: String,
+    /// Policy name.
+    pub name: String,
+    /// Target name.
+    pub target: String,
+    /// Generated languages.
+    pub languages: Vec<Language>,
+    /// Numeric format.
+    pub numeric_format: policy::NumericFormat,
+    /// Control period in s.
+    pub sample_period: f64,
+    /// Digests of the inputs.
+    pub digests: Digests,
+    /// Compiler flags under which the bits hold, by language.
+    pub flags: BTreeMap<&'static str, Vec<&'static str>>,
+    /// Sizes of the controller.
+    pub sizes: Sizes,
+    /// Generated files with their CRC-32 (padded to words with zeros) and length.
+    pub files: BTreeMap<String, FileEntry>,
+}
+
+/// Sizes of the controller.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Sizes {
+    /// Signals in the measurement.
+    pub signals: usize,
+    /// Network inputs.
+    pub features: usize,
+    /// Outputs per layer.
+    pub layers: Vec<usize>,
+    /// Actions.
+    pub actions: usize,
+    /// Multiply-accumulates per step.
+    pub macs: usize,
+    /// Constant tables in bytes.
+    pub table_bytes: usize,
+    /// State struct in bytes.
+    pub state_bytes: usize,
+}
+
+/// One generated file.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct FileEntry {
+    /// Length in bytes.
+    pub bytes: usize,
+    /// CRC-32 in hexadecimal.
+    pub crc32: String,
+}
+
+/// Sizes of a policy's controller, the same in every language.
+#[must_use]
+pub fn sizes(policy: &Policy, target: &TargetSpec) -> Sizes {
+    let program = crate::lower(policy, target, Language::C);
+    Sizes {
+        signals: policy.signals.len(),
+        features: policy.features.len(),
+        layers: policy.layers.iter().map(|layer| layer.outputs).collect(),
+        actions: policy.actions.len(),
+        macs: program.macs(),
+        table_bytes: program.table_bytes(),
+        state_bytes: 4 * program.state_words(),
+    }
+}
+
+/// The manifest of a set of generated files.
+#[must_use]
+pub fn manifest(policy: &Policy, target: &TargetSpec, languages: &[Language], files: &GeneratedFiles) -> Manifest {
+    let flags = |language: &Language| match language {
+        Language::C => ("c", target.c_flags.to_vec()),
+        Language::Rust => ("rust", target.rust_flags.to_vec()),
+    };
+    Manifest {
+        generator: TOOL.to_owned(),
+        name: policy.name.clone(),
+        target: target.name.to_owned(),
+        languages: languages.to_vec(),
+        numeric_format: policy.numeric_format,
+        sample_period: policy.sample_period,
+        digests: policy.digests.clone(),
+        flags: languages.iter().map(flags).collect(),
+        sizes: sizes(policy, target),
+        files: files
+            .files
+            .iter()
+            .map(|(name, text)| (name.clone(), entry(text)))
+            .collect(),
+    }
+}
+
+fn entry(text: &str) -> FileEntry {
+    let words = text.as_bytes().chunks(4).map(|chunk| {
+        let mut word = [0; 4];
+        word[..chunk.len()].copy_from_slice(chunk);
+        u32::from_le_bytes(word)
+    });
+    FileEntry {
+        bytes: text.len(),
+        crc32: format!("{:08x}", crc32_words(words)),
+    }
+}

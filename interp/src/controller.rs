@@ -1,0 +1,376 @@
+//! The controller: `eval`, `commit` and what lies between (contract sections 1 and 10).
+
+use ndarray::{Array1, ArrayView1};
+use policy::Policy;
+
+use crate::feature::{Feature, Inputs};
+use crate::limits::Limits;
+use crate::mapping::Mapping;
+use crate::network::{Layer, argmax};
+use crate::real::Real;
+use crate::sanitise::{InputError, Sample, Signal};
+use crate::state::{Coefficients, State};
+use crate::status;
+use crate::trace::{Command, FeatureTrace, LayerTrace, Trace};
+
+/// A policy at work, in the number format `T`.
+#[derive(Debug, Clone)]
+pub struct Controller<T> {
+    signals: Vec<Signal<T>>,
+    features: Vec<Feature<T>>,
+    layers: Vec<Layer<T>>,
+    /// Duty per action.
+    table: Vec<T>,
+    mapping: Option<Mapping<T>>,
+    limits: Limits<T>,
+    initial_duty: T,
+    fallback: T,
+    /// K: bad steps bridged.
+    hold: u32,
+    state_names: Vec<String>,
+    state: State<T>,
+}
+
+impl<T: Real> Controller<T> {
+    /// Rounds the policy's constants to the format and initialises the state (section 1).
+    pub fn new(policy: &Policy) -> Self {
+        let mut words = 0;
+        let features: Vec<Feature<T>> = policy
+            .features
+            .iter()
+            .map(|feature| {
+                let feature = Feature::new(feature, policy.sample_period, words);
+                words += feature.words();
+                feature
+            })
+            .collect();
+        let signals: Vec<Signal<T>> = policy.signals.iter().map(Signal::new).collect();
+        let mapping = policy.mapping.as_ref().map(Mapping::new);
+        let limits = Limits::new(&policy.limits);
+        let initial_duty = T::nearest(policy.limits.initial_duty);
+        let state = State {
+            held: signals.iter().map(Signal::nearest_to_zero).collect(),
+            memory: vec![T::ZERO; words],
+            previous_duty: initial_duty,
+            previous_command: initial_duty,
+            soft_cap: limits.soft_start.map(|soft| soft.from),
+            mapping: mapping.as_ref().map(|mapping| mapping.initial),
+            bad_count: 0,
+            primed: false,
+        };
+        Self {
+            state_names: state_names(policy, &features, &state),
+            signals,
+            features,
+            layers: policy.layers.iter().map(Layer::new).collect(),
+            table: policy.actions.iter().map(|action| T::nearest(action.duty)).collect(),
+            mapping,
+            limits,
+            initial_duty,
+            fallback: T::nearest(policy.fallback.duty),
+            hold: policy.fallback.hold,
+            state,
+        }
+    }
+
+    /// The state of `new`, except that the mapping coefficients in use are kept.
+    pub fn reset(&mut self) {
+        self.state = State {
+            held: self.signals.iter().map(Signal::nearest_to_zero).collect(),
+            memory: vec![T::ZERO; self.state.memory.len()],
+            previous_duty: self.initial_duty,
+            previous_command: self.initial_duty,
+            soft_cap: self.limits.soft_start.map(|soft| soft.from),
+            mapping: self.state.mapping,
+            bad_count: 0,
+            primed: false,
+        };
+    }
+
+    /// What the controller remembers.
+    pub fn state(&self) -> &State<T> {
+        &self.state
+    }
+
+    /// One name per state word, in the order of section 1: `held.v_out`, `e_del.0.delay[0]`, `primed`, ...
+    pub fn state_names(&self) -> &[String] {
+        &self.state_names
+    }
+
+    /// Everything of one step without a change of state. One sample per signal, in the policy's order.
+    pub fn eval(&self, samples: &[Sample]) -> Result<Trace<T>, InputError> {
+        let mut trace = self.blank_trace();
+        self.eval_into(samples, &mut trace)?;
+        Ok(trace)
+    }
+
+    /// [`Controller::eval`] into a trace made by [`Controller::blank_trace`] of the same policy: allocates nothing.
+    pub fn eval_into(&self, samples: &[Sample], trace: &mut Trace<T>) -> Result<(), InputError> {
+        self.sense(samples, trace)?;
+        self.observe_into(trace);
+        trace.action_index = {
+            let mut input = trace.observation.view();
+            for (layer, layer_trace) in self.layers.iter().zip(&mut trace.layers) {
+                layer.run(input, layer_trace);
+                input = layer_trace.post_activation.view();
+            }
+            trace.q_values.assign(&input);
+            argmax(input) as u32
+        };
+        self.act(trace);
+        Ok(())
+    }
+
+    /// Advances the state by one step with the command that was applied (section 10).
+    ///
+    /// The sanitised signals and filter values are recomputed from state and samples; only `duty` and `duty_sim` are
+    /// taken from the command.
+    pub fn commit(&mut self, samples: &[Sample], command: &Command<T>) -> Result<(), InputError> {
+        let mut trace = self.blank_trace();
+        self.sense(samples, &mut trace)?;
+        self.absorb(&trace, command);
+        Ok(())
+    }
+
+    /// `eval`, then `commit` with its command.
+    pub fn step(&mut self, samples: &[Sample]) -> Result<Trace<T>, InputError> {
+        let mut trace = self.blank_trace();
+        self.step_into(samples, &mut trace)?;
+        Ok(trace)
+    }
+
+    /// [`Controller::step`] into a trace made by [`Controller::blank_trace`] of the same policy: allocates nothing.
+    pub fn step_into(&mut self, samples: &[Sample], trace: &mut Trace<T>) -> Result<(), InputError> {
+        self.eval_into(samples, trace)?;
+        self.absorb(trace, &trace.command);
+        Ok(())
+    }
+
+    /// The observation that the network would see, one value per feature (sections 2 to 5).
+    pub fn observe(&self, samples: &[Sample]) -> Result<Array1<T>, InputError> {
+        let mut trace = self.blank_trace();
+        self.sense(samples, &mut trace)?;
+        self.observe_into(&mut trace);
+        Ok(trace.observation)
+    }
+
+    /// Q values of an observation, one per action (section 6). Values need not lie within the observation's bounds.
+    pub fn q_values(&self, observation: &ArrayView1<'_, T>) -> Result<Array1<T>, InputError> {
+        let expected = self.features.len();
+        if observation.len() != expected {
+            return Err(InputError::ObservationLength {
+                expected,
+                found: observation.len(),
+            });
+        }
+        let mut x = observation.to_owned();
+        for layer in &self.layers {
+            let mut trace = blank_layer(layer);
+            layer.run(x.view(), &mut trace);
+            x = trace.post_activation;
+        }
+        Ok(x)
+    }
+
+    /// Replaces the mapping coefficients if the contract allows them (section 8); `false` and no change otherwise,
+    /// also without a mapping or with `r` against the mapping's form.
+    pub fn set_mapping(&mut self, a: T, b: T, c: T, r: Option<T>) -> bool {
+        let new = Coefficients { a, b, c, r };
+        let accepted = self.mapping.as_ref().is_some_and(|mapping| mapping.accepts(new));
+        if accepted {
+            self.state.mapping = Some(new);
+        }
+        accepted
+    }
+
+    /// A trace of the right shape with all values 0.
+    pub fn blank_trace(&self) -> Trace<T> {
+        let signals = self.signals.len();
+        Trace {
+            measured: vec![T::ZERO; signals],
+            valid: vec![false; signals],
+            signals: vec![T::ZERO; signals],
+            all_valid: false,
+            bad_count: 0,
+            expired: false,
+            usable: false,
+            primed: false,
+            features: self
+                .features
+                .iter()
+                .map(|feature| FeatureTrace {
+                    filtered: vec![T::ZERO; feature.filters.len()],
+                    ..FeatureTrace::default()
+                })
+                .collect(),
+            observation: Array1::from_elem(self.features.len(), T::ZERO),
+            layers: self.layers.iter().map(blank_layer).collect(),
+            q_values: Array1::from_elem(self.table.len(), T::ZERO),
+            action_index: 0,
+            duty_sim: T::ZERO,
+            mapped: T::ZERO,
+            slewed: T::ZERO,
+            soft_started: T::ZERO,
+            limited: T::ZERO,
+            computed_status: 0,
+            command: Command::default(),
+        }
+    }
+
+    /// Sections 2 to 4: sanitised signals, usability, filter values.
+    fn sense(&self, samples: &[Sample], trace: &mut Trace<T>) -> Result<(), InputError> {
+        let expected = self.signals.len();
+        if samples.len() != expected {
+            return Err(InputError::SampleCount {
+                expected,
+                found: samples.len(),
+            });
+        }
+        let state = &self.state;
+        trace.all_valid = true;
+        for (index, (signal, &sample)) in self.signals.iter().zip(samples).enumerate() {
+            let x = signal.physical(index, sample)?;
+            let valid = signal.plausible(x);
+            trace.measured[index] = x;
+            trace.valid[index] = valid;
+            trace.signals[index] = if valid { x } else { state.held[index] };
+            trace.all_valid &= valid;
+        }
+        trace.bad_count = if trace.all_valid {
+            0
+        } else {
+            state.bad_count.saturating_add(1).min(self.hold.saturating_add(1))
+        };
+        trace.expired = trace.bad_count > self.hold;
+        trace.primed = state.primed;
+        trace.usable = trace.all_valid || (state.primed && !trace.expired);
+
+        let inputs = Inputs {
+            signals: &trace.signals,
+            previous_duty: state.previous_duty,
+            previous_command: state.previous_command,
+        };
+        for (feature, feature_trace) in self.features.iter().zip(&mut trace.features) {
+            feature.filter(inputs, &state.memory, state.primed, feature_trace);
+        }
+        Ok(())
+    }
+
+    /// Section 5.
+    fn observe_into(&self, trace: &mut Trace<T>) {
+        for ((feature, feature_trace), o) in self
+            .features
+            .iter()
+            .zip(&mut trace.features)
+            .zip(&mut trace.observation)
+        {
+            feature.observe(feature_trace);
+            *o = feature_trace.observation;
+        }
+    }
+
+    /// Sections 8 and 9, from the action index to the command.
+    fn act(&self, trace: &mut Trace<T>) {
+        let state = &self.state;
+        let d = self.table[trace.action_index as usize];
+        let mut bits = if trace.features.iter().any(|feature| feature.clipped) {
+            status::CLIPPED
+        } else {
+            0
+        };
+        let mut t = d;
+        if let (Some(mapping), Some(coefficients)) = (&self.mapping, state.mapping) {
+            let i = trace.signals[mapping.load_current];
+            t = Mapping::apply(coefficients, d, i);
+            bits |= if mapping.outside(d, i) {
+                status::MAPPING_RANGE
+            } else {
+                0
+            };
+        }
+        let limited = self.limits.apply(t, state.previous_command, state.soft_cap);
+        bits |= limited.status;
+
+        trace.duty_sim = d;
+        trace.mapped = t;
+        trace.slewed = limited.slewed;
+        trace.soft_started = limited.soft_started;
+        trace.limited = limited.limited;
+        trace.computed_status = bits;
+        let action_index = trace.action_index;
+        trace.command = if trace.usable {
+            let held = if trace.all_valid { 0 } else { status::HELD };
+            let primes = if trace.primed { 0 } else { status::PRIMED };
+            Command {
+                duty: limited.limited,
+                duty_sim: d,
+                action_index,
+                status: bits | held | primes,
+            }
+        } else {
+            Command {
+                duty: self.fallback,
+                duty_sim: self.fallback,
+                action_index,
+                status: status::FALLBACK,
+            }
+        };
+    }
+
+    /// Section 10.
+    fn absorb(&mut self, trace: &Trace<T>, command: &Command<T>) {
+        let state = &mut self.state;
+        state.held.copy_from_slice(&trace.signals);
+        for (feature, feature_trace) in self.features.iter().zip(&trace.features) {
+            feature.push(&mut state.memory, trace.primed, feature_trace);
+        }
+        state.previous_duty = command.duty_sim;
+        state.previous_command = command.duty;
+        if let (Some(soft), Some(cap)) = (self.limits.soft_start, state.soft_cap) {
+            state.soft_cap = Some(self.limits.next_cap(soft, cap, trace.usable));
+        }
+        state.bad_count = trace.bad_count;
+        state.primed = trace.usable;
+    }
+}
+
+impl Controller<f32> {
+    /// The state as 32-bit words in the order of contract section 1, named by [`Controller::state_names`].
+    pub fn state_words(&self) -> Vec<u32> {
+        self.state.words()
+    }
+}
+
+fn blank_layer<T: Real>(layer: &Layer<T>) -> LayerTrace<T> {
+    let blank = Array1::from_elem(layer.outputs(), T::ZERO);
+    LayerTrace {
+        pre_activation: blank.clone(),
+        post_activation: blank,
+    }
+}
+
+fn state_names<T: Real>(policy: &Policy, features: &[Feature<T>], state: &State<T>) -> Vec<String> {
+    let mut names: Vec<String> = policy
+        .signals
+        .iter()
+        .map(|signal| format!("held.{}", signal.name))
+        .collect();
+    for (feature, spec) in features.iter().zip(&policy.features) {
+        for (n, filter) in feature.filters.iter().enumerate() {
+            names.extend(
+                filter
+                    .word_names()
+                    .iter()
+                    .map(|word| format!("{}.{n}.{word}", spec.name)),
+            );
+        }
+    }
+    names.extend(["previous_duty", "previous_command"].map(str::to_owned));
+    names.extend(state.soft_cap.map(|_| "soft_cap".to_owned()));
+    if let Some(coefficients) = &state.mapping {
+        names.extend(["mapping.a", "mapping.b", "mapping.c"].map(str::to_owned));
+        names.extend(coefficients.r.map(|_| "mapping.r".to_owned()));
+    }
+    names.extend(["bad_count", "primed"].map(str::to_owned));
+    names
+}

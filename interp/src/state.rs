@@ -1,0 +1,56 @@
+//! The memory of a controller (contract section 1).
+
+/// Coefficients of the duty ratio mapping in use: `d_real = a d_sim + b i_out + c (+ r i_out d_sim)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coefficients<T> {
+    /// Gain on the duty.
+    pub a: T,
+    /// Per ampere of load current.
+    pub b: T,
+    /// Constant.
+    pub c: T,
+    /// Product term per ampere; `None` in the three-term form.
+    pub r: Option<T>,
+}
+
+/// Everything a controller remembers from one step to the next, in the order of contract section 1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct State<T> {
+    /// Last good sample per signal, in units of the signal.
+    pub held: Vec<T>,
+    /// Filter memories by feature, then filter, oldest sample first.
+    pub memory: Vec<T>,
+    /// Duty of the chosen action of the last step, before the mapping.
+    pub previous_duty: T,
+    /// Duty that left the controller in the last step.
+    pub previous_command: T,
+    /// Upper limit of the duty during a soft start; `None` without one.
+    pub soft_cap: Option<T>,
+    /// `None` without a mapping.
+    pub mapping: Option<Coefficients<T>>,
+    /// Consecutive bad steps, saturating at K + 1.
+    pub bad_count: u32,
+    /// The filter memories hold samples.
+    pub primed: bool,
+}
+
+impl State<f32> {
+    /// The state as 32-bit words in the order of contract section 1, as generated code keeps it.
+    pub fn words(&self) -> Vec<u32> {
+        let mut words = Vec::new();
+        self.append_words(&mut words);
+        words
+    }
+
+    /// Appends [`State::words`] to a buffer.
+    pub fn append_words(&self, words: &mut Vec<u32>) {
+        words.extend(self.held.iter().chain(&self.memory).map(|x| x.to_bits()));
+        words.extend([self.previous_duty.to_bits(), self.previous_command.to_bits()]);
+        words.extend(self.soft_cap.map(f32::to_bits));
+        if let Some(Coefficients { a, b, c, r }) = self.mapping {
+            words.extend([a, b, c].map(f32::to_bits));
+            words.extend(r.map(f32::to_bits));
+        }
+        words.extend([self.bad_count, u32::from(self.primed)]);
+    }
+}

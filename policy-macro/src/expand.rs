@@ -1,0 +1,150 @@
+//! The stages of the macro: parse the call, load the policy, lower it, wrap the items.
+
+use std::path::{Path, PathBuf};
+
+use policy::{Faults, Policy, ReadOptions};
+use proc_macro2::{Ident, Span, TokenStream};
+use quote::quote;
+use syn::parse::{Parse, ParseStream};
+use syn::{LitStr, Token, Visibility};
+
+use codegen::Language;
+use codegen::backend::rust::{DEFAULT_TYPE, items};
+
+/// `[visibility] [Type =] "path"`
+struct Call {
+    visibility: Visibility,
+    type_name: Option<Ident>,
+    path: LitStr,
+}
+
+impl Parse for Call {
+    fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
+        let visibility = input.parse()?;
+        let type_name = if input.peek(syn::Ident) {
+            let name = input.parse()?;
+            input.parse::<Token![=]>()?;
+            Some(name)
+        } else {
+            None
+        };
+        let path = input.parse()?;
+        input.parse::<Option<Token![,]>>()?;
+        Ok(Self {
+            visibility,
+            type_name,
+            path,
+        })
+    }
+}
+
+/// The whole macro.
+pub fn expand(input: TokenStream) -> TokenStream {
+    let call: Call = match syn::parse2(input) {
+        Ok(call) => call,
+        Err(error) => return error.to_compile_error(),
+    };
+    let Some(root) = std::env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from) else {
+        return error_at(
+            &call,
+            "CARGO_MANIFEST_DIR is not set: include_policy! needs to run under cargo",
+        );
+    };
+    match load(&root, &call.path.value()) {
+        Ok(policy) => controller(&call, &root, &policy),
+        Err(faults) => rejected(&call, &root, &faults),
+    }
+}
+
+fn load(root: &Path, path: &str) -> Result<Policy, Faults> {
+    let options = ReadOptions {
+        root: Some(root.to_owned()),
+    };
+    policy::check(policy::read(&root.join(path), &options)?)
+}
+
+fn controller(call: &Call, root: &Path, policy: &Policy) -> TokenStream {
+    let Some(target) = targets::find("host") else {
+        return error_at(call, "internal fault: no host target");
+    };
+    let program = codegen::lower(policy, target, Language::Rust);
+    let type_name = call
+        .type_name
+        .as_ref()
+        .map_or_else(|| DEFAULT_TYPE.to_owned(), Ident::to_string);
+    let items = items(&program, &type_name);
+    let tracked = track(root, &policy.files);
+    module(call, &policy.name, &quote!(#tracked #items))
+}
+
+/// One error, and a stand-in for the module so that uses of it are no further errors.
+fn rejected(call: &Call, root: &Path, faults: &Faults) -> TokenStream {
+    // paths are shown as the user wrote them, relative to the crate
+    let prefix = format!("{}{}", root.display(), std::path::MAIN_SEPARATOR);
+    let error = error_at(call, &faults.to_string().replace(&prefix, ""));
+    let tracked = track(root, &faults.files);
+    let stand_in = faults.name.as_ref().map(|name| {
+        let fields = faults.signals.iter().map(|signal| {
+            let name = Ident::new(&signal.name, Span::call_site());
+            if signal.adc {
+                quote!(pub #name: i32)
+            } else {
+                quote!(pub #name: f32)
+            }
+        });
+        let type_name = call
+            .type_name
+            .clone()
+            .unwrap_or_else(|| Ident::new(DEFAULT_TYPE, Span::call_site()));
+        module(call, name, &stand_in(&type_name, &quote!(#(#fields),*)))
+    });
+    quote! { #error const _: () = { #tracked }; #stand_in }
+}
+
+fn module(call: &Call, name: &str, items: &TokenStream) -> TokenStream {
+    let visibility = &call.visibility;
+    let name = Ident::new(name, Span::call_site());
+    let doc = format!(" Controller generated from `{}`.", call.path.value());
+    quote! {
+        #[doc = #doc]
+        #[allow(clippy::all, clippy::pedantic, clippy::nursery, clippy::indexing_slicing, clippy::arithmetic_side_effects)]
+        #[allow(dead_code, unreachable_pub)]
+        #[forbid(unsafe_code)]
+        #visibility mod #name { #items }
+    }
+}
+
+/// Makes rustc rebuild the crate when one of the files changes.
+fn track(root: &Path, files: &[PathBuf]) -> TokenStream {
+    let paths = files
+        .iter()
+        .filter_map(|file| file.strip_prefix(root).ok()?.to_str())
+        .map(|path| format!("/{path}"));
+    quote! { #(const _: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), #paths));)* }
+}
+
+fn error_at(call: &Call, message: &str) -> TokenStream {
+    syn::Error::new(call.path.span(), message).to_compile_error()
+}
+
+/// The interface of a controller without behaviour.
+fn stand_in(type_name: &Ident, fields: &TokenStream) -> TokenStream {
+    quote! {
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct Measurement { #fields }
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct Command { pub duty: f32, pub duty_sim: f32, pub action_index: u32, pub status: u32 }
+        #[derive(Clone, Default)]
+        pub struct #type_name;
+        impl #type_name {
+            pub const fn new() -> Self { Self }
+            pub fn reset(&mut self) {}
+            pub fn eval(&self, _: &Measurement) -> Command { Self::NOTHING }
+            pub fn commit(&mut self, _: &Measurement, _: &Command) {}
+            pub fn step(&mut self, _: &Measurement) -> Command { Self::NOTHING }
+            pub fn self_test() -> Result<(), u32> { Err(0) }
+            pub fn integrity() -> bool { false }
+            const NOTHING: Command = Command { duty: 0.0, duty_sim: 0.0, action_index: 0, status: 0 };
+        }
+    }
+}

@@ -1,0 +1,305 @@
+//! Sound bounds of every value the controller computes, by interval arithmetic in binary32.
+//!
+//! Rounding to nearest is monotone, and so are sums, differences and products with a constant in each argument. The
+//! image of a box under one rounded operation is therefore enclosed by the rounded operation at its corners: the
+//! ends are computed in binary32 itself and need no slack. Only filters with feedback need an argument of their own.
+
+use crate::limits::MAX_MAGNITUDE;
+use crate::model::{Action, Activation, Expr, Fallback, Filter, Input, Interval, Limits, Signal};
+use crate::rounding::{inward_f32, nearest_f32};
+
+/// Closed interval of binary32 values.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Box32 {
+    pub low: f32,
+    pub high: f32,
+}
+
+/// A magnitude that could leave the format.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Overflow(pub f64);
+
+type Bounded = Result<Box32, Overflow>;
+
+/// Unit roundoff of binary32.
+const UNIT: f64 = 1.0 / 16_777_216.0;
+/// More than the rounding errors of a few operations in the subnormal range.
+const TINY: f64 = 1e-43;
+
+impl Box32 {
+    pub fn point(value: f32) -> Self {
+        Box32 {
+            low: value,
+            high: value,
+        }
+    }
+
+    pub fn nearest(interval: Interval) -> Self {
+        Box32 {
+            low: nearest_f32(interval.low),
+            high: nearest_f32(interval.high),
+        }
+    }
+
+    pub fn interval(self) -> Interval {
+        Interval {
+            low: f64::from(self.low),
+            high: f64::from(self.high),
+        }
+    }
+
+    fn hull(self, value: f32) -> Self {
+        Box32 {
+            low: self.low.min(value),
+            high: self.high.max(value),
+        }
+    }
+
+    fn magnitude(self) -> f64 {
+        f64::from(self.low.abs().max(self.high.abs()))
+    }
+
+    fn checked(low: f32, high: f32) -> Bounded {
+        let result = Box32 { low, high };
+        let magnitude = result.magnitude();
+        if magnitude <= MAX_MAGNITUDE {
+            Ok(result)
+        } else {
+            Err(Overflow(magnitude))
+        }
+    }
+
+    pub fn add(self, other: Box32) -> Bounded {
+        Box32::checked(self.low + other.low, self.high + other.high)
+    }
+
+    pub fn sub(self, other: Box32) -> Bounded {
+        Box32::checked(self.low - other.high, self.high - other.low)
+    }
+
+    pub fn times(self, other: Box32) -> Bounded {
+        let corners = [
+            self.low * other.low,
+            self.low * other.high,
+            self.high * other.low,
+            self.high * other.high,
+        ];
+        let (low, high) = corners
+            .iter()
+            .fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), &x| (l.min(x), h.max(x)));
+        Box32::checked(low, high)
+    }
+
+    pub fn scale(self, factor: f64) -> Bounded {
+        self.times(Box32::point(nearest_f32(factor)))
+    }
+
+    fn clamp(self, low: f32, high: f32) -> Self {
+        let one = |x: f32| {
+            if x < low {
+                low
+            } else if x > high {
+                high
+            } else {
+                x
+            }
+        };
+        Box32 {
+            low: one(self.low),
+            high: one(self.high),
+        }
+    }
+
+    /// Widened by `by` on both sides, outwards to the next binary32.
+    fn widened(self, by: f64) -> Bounded {
+        let low = nearest_f32(f64::from(self.low) - by).next_down();
+        Box32::checked(low, nearest_f32(f64::from(self.high) + by).next_up())
+    }
+}
+
+/// Ranges of everything an expression can read.
+pub(crate) struct Inputs {
+    signals: Vec<Box32>,
+    previous_duty: Box32,
+    previous_command: Box32,
+}
+
+impl Inputs {
+    /// Ranges after the sanitiser: signals inwards-rounded, remembered duties the hull of all they can be.
+    pub fn new(signals: &[Signal], actions: &[Action], limits: &Limits, fallback: &Fallback) -> Self {
+        let inward = |interval| {
+            let (low, high) = inward_f32(interval).unwrap_or((0.0, 0.0));
+            Box32 { low, high }
+        };
+        let start = Box32::point(nearest_f32(limits.initial_duty)).hull(nearest_f32(fallback.duty));
+        let limit = inward(limits.duty);
+        Inputs {
+            signals: signals.iter().map(|signal| inward(signal.range)).collect(),
+            previous_duty: actions
+                .iter()
+                .fold(start, |hull, action| hull.hull(nearest_f32(action.duty))),
+            previous_command: start.hull(limit.low).hull(limit.high),
+        }
+    }
+
+    pub fn signal(&self, index: usize) -> Option<Box32> {
+        self.signals.get(index).copied()
+    }
+}
+
+/// Bound of a source expression (contract section 3).
+pub(crate) fn expression(expr: &Expr, inputs: &Inputs) -> Bounded {
+    match expr {
+        Expr::Input(Input::Signal(index)) => inputs.signal(*index).ok_or(Overflow(f64::INFINITY)),
+        Expr::Input(Input::PreviousDuty) => Ok(inputs.previous_duty),
+        Expr::Input(Input::PreviousCommand) => Ok(inputs.previous_command),
+        Expr::Constant(value) => Ok(Box32::point(nearest_f32(*value))),
+        Expr::Neg(e) => expression(e, inputs).map(|x| Box32 {
+            low: -x.high,
+            high: -x.low,
+        }),
+        Expr::Add(a, b) => expression(a, inputs)?.add(expression(b, inputs)?),
+        Expr::Sub(a, b) => expression(a, inputs)?.sub(expression(b, inputs)?),
+        Expr::Scale(k, e) => expression(e, inputs)?.scale(*k),
+    }
+}
+
+/// Bound behind one filter (contract section 4), over all histories of inputs within `x`.
+pub(crate) fn filter(filter: &Filter, x: Box32, period: f64) -> Bounded {
+    match *filter {
+        Filter::Delay { .. } => Ok(x),
+        Filter::BackwardDifference => x.sub(x)?.scale(1.0 / period),
+        Filter::LowPass { .. } => low_pass(x),
+        Filter::FilteredDerivative { time_constant } => filtered_derivative(x, time_constant, period),
+        Filter::MovingAverage { samples } => {
+            let mut sum = x;
+            for _ in 1..samples {
+                sum = sum.add(x)?;
+            }
+            sum.scale(1.0 / samples as f64)
+        }
+        Filter::Integrator { min, max, .. } => {
+            let clamp = Box32::nearest(Interval { low: min, high: max });
+            Ok(clamp.add(x.scale(period)?)?.clamp(clamp.low, clamp.high))
+        }
+    }
+}
+
+/// With 0 < k <= 1 the state moves towards the input and passes it by rounding errors of the difference only:
+/// at most 3 units of the width plus one of the result, covered by 16 units of the largest magnitude.
+fn low_pass(x: Box32) -> Bounded {
+    let y = x.widened(16.0 * UNIT * x.magnitude() + TINY)?;
+    x.sub(y)?;
+    Ok(y)
+}
+
+/// Without rounding `y = k (x_n - (1 - p) sum p^j x_(n-1-j))`, a difference of two means of x, so |y| <= k width
+/// (Abel summation; holds for the rounded p and k too). The rounding error e of one step adds up to e / (1 - p).
+fn filtered_derivative(x: Box32, time_constant: f64, period: f64) -> Bounded {
+    let sum = time_constant + period;
+    let p = f64::from(nearest_f32(time_constant / sum));
+    let k = f64::from(nearest_f32(1.0 / sum));
+    let width = f64::from(x.high) - f64::from(x.low);
+    x.sub(x)?.scale(1.0 / sum)?;
+    let decay = 1.0 - p - 2.1 * UNIT;
+    if decay <= 0.0 {
+        return Err(Overflow(f64::INFINITY));
+    }
+    let error = (4.1 * UNIT * k * width + 4.0 * TINY * (1.0 + k)) / decay;
+    Box32::point(0.0).widened(k * width + error)
+}
+
+/// Bound of an observation from the bound behind the filters (contract section 5).
+pub(crate) fn observation(y: Box32, scale: f64, offset: f64, clip: Option<Interval>) -> Bounded {
+    let mut o = y;
+    if scale != 1.0 {
+        o = o.scale(scale)?;
+    }
+    if offset != 0.0 {
+        o = o.add(Box32::point(nearest_f32(offset)))?;
+    }
+    Ok(match clip.map(Box32::nearest) {
+        Some(clip) => o.clamp(clip.low, clip.high),
+        None => o,
+    })
+}
+
+/// Bounds of a dense layer's outputs behind the activation, whatever the order of the sum and with or without
+/// contraction: n products and n sums err by less than (n + 2) 2^-23 of the sum of magnitudes.
+pub(crate) fn layer(
+    inputs: &[Interval],
+    weights: &[f32],
+    bias: &[f32],
+    activation: Activation,
+) -> Result<Vec<Interval>, (usize, Overflow)> {
+    let rows = weights.chunks_exact(inputs.len().max(1));
+    let sums = rows.zip(bias).enumerate().map(|(output, (row, &bias))| {
+        let bias = f64::from(bias);
+        let (mut low, mut high, mut magnitude) = (bias, bias, bias.abs());
+        for (&w, x) in row.iter().zip(inputs) {
+            let (a, b) = (f64::from(w) * x.low, f64::from(w) * x.high);
+            low += a.min(b);
+            high += a.max(b);
+            magnitude += a.abs().max(b.abs());
+        }
+        let slack = 2.0 * UNIT * (inputs.len() + 2) as f64 * magnitude + TINY * inputs.len() as f64;
+        if magnitude + slack > MAX_MAGNITUDE {
+            return Err((output, Overflow(magnitude + slack)));
+        }
+        Ok(activated(
+            Interval {
+                low: low - slack,
+                high: high + slack,
+            },
+            activation,
+        ))
+    });
+    sums.collect()
+}
+
+fn activated(x: Interval, activation: Activation) -> Interval {
+    match activation {
+        Activation::Identity => x,
+        Activation::Relu => Interval {
+            low: x.low.max(0.0),
+            high: x.high.max(0.0),
+        },
+        Activation::LeakyRelu { slope } => {
+            let one = |x: f64, sign: f64| {
+                let y = slope * x;
+                if x > 0.0 {
+                    x
+                } else {
+                    y + sign * (4.0 * UNIT * y.abs() + TINY)
+                }
+            };
+            Interval {
+                low: one(x.low, -1.0),
+                high: one(x.high, 1.0),
+            }
+        }
+        Activation::Tanh => {
+            let (low, high) = (rational_tanh(x.low) - 1e-6, rational_tanh(x.high) + 1e-6);
+            Interval {
+                low: low.max(-1.0),
+                high: high.min(1.0),
+            }
+        }
+    }
+}
+
+/// The contract's tanh in binary64: within 4e-7 of tanh and, unlike a libm's, the same on every machine.
+fn rational_tanh(x: f64) -> f64 {
+    const N: [f64; 5] = [
+        1.318_444_4e-8,
+        2.047_200_7e-5,
+        0.003_486_593_3,
+        0.133_732_08,
+        0.999_999_9,
+    ];
+    const D: [f64; 5] = [7.702_759e-7, 0.000_327_140_35, 0.025_842_024, 0.467_065_04, 1.0];
+    let t = x.clamp(-9.0, 9.0);
+    let z = t * t;
+    let horner = |c: [f64; 5]| c.iter().fold(0.0, |sum, c| sum * z + c);
+    (t * horner(N) / horner(D)).clamp(-1.0, 1.0)
+}

@@ -1,0 +1,200 @@
+//! From files to a policy that holds: section by section, then what must fit between them.
+
+use crate::bounds::{self, Inputs, Overflow};
+use crate::catalogue;
+use crate::contract::{actions, features, head, mapping, network, protection, signals};
+use crate::digests;
+use crate::faults::{Fault, Faults};
+use crate::limits::MAX_FEATURES;
+use crate::model::{Action, Digests, Feature, Golden, Interval, Layer, Mapping, Policy, Signal};
+use crate::notes::{beyond_limits, unused};
+use crate::raw::RawPolicy;
+use crate::toml_reader::Section;
+use crate::weights::{self, Weights};
+
+/// Checks everything that can be checked before code is generated.
+///
+/// # Errors
+/// All faults of all files together: of form, of single values, and of parts that do not fit each other.
+pub fn check(raw: RawPolicy) -> Result<Policy, Faults> {
+    let mut faults = Vec::new();
+    let policy = whole(&raw, &mut faults);
+    faults.extend(raw.faults.iter().cloned());
+    match policy {
+        Some(policy) if faults.is_empty() => Ok(policy),
+        _ if faults.is_empty() => {
+            // every part that is missing has left a fault; if ever one did not, refuse all the same
+            let message = catalogue::incomplete();
+            Err(raw.faults(vec![raw.contract.source.name.fault(message)]))
+        }
+        _ => {
+            in_file_order(&mut faults);
+            Err(raw.faults(faults))
+        }
+    }
+}
+
+/// By file as first mentioned, then by line and column; each fault once.
+fn in_file_order(faults: &mut Vec<Fault>) {
+    let mut files = Vec::new();
+    for fault in faults.iter() {
+        if !files.contains(&fault.file) {
+            files.push(fault.file.clone());
+        }
+    }
+    let order = |fault: &Fault| (files.iter().position(|file| *file == fault.file), fault.line_column());
+    faults.sort_by_key(order);
+    faults.dedup();
+}
+
+fn whole(raw: &RawPolicy, faults: &mut Vec<Fault>) -> Option<Policy> {
+    let mut root = raw.contract.root();
+    let mut taken = Vec::new();
+    let head = head::read(&mut root, &mut taken, faults);
+    let signals = signals::read(&mut root, &mut taken, faults);
+    let around = features::Surroundings {
+        signals: &signals.names,
+        parameters: &head.parameters,
+        period: head.sample_period,
+    };
+    let features = features::read(&mut root, &around, faults);
+    let network = network::read(&mut root, faults);
+    let actions = actions::read(&mut root, faults);
+    let mapping = mapped(raw, &mut root, &signals.names, faults);
+    let fallback = protection::fallback(&mut root, faults);
+    let limits = protection::limits(&mut root, fallback, faults);
+    root.finish(faults);
+
+    let (feature_count, action_count) = (features.count, actions.count);
+    let sizes = (feature_count > 0 && action_count > 0).then_some((feature_count, action_count));
+    let mut weights = network
+        .as_ref()
+        .zip(raw.weights.as_ref())
+        .and_then(|(n, file)| weights::read(file, n, sizes, faults));
+    let signals: Option<Vec<Signal>> = signals.list.into_iter().collect();
+    let inputs = match (&signals, &limits, &fallback) {
+        (Some(signals), Some(limits), Some(fallback)) => Some(Inputs::new(signals, &actions.list, limits, fallback)),
+        _ => None,
+    };
+    let bounded = match (&inputs, head.sample_period) {
+        (Some(inputs), Some(period)) => features::bounded(features.list, inputs, period, faults),
+        _ => Vec::new(),
+    };
+    let complete = feature_count > 0 && bounded.len() == feature_count;
+    let known: &[Feature] = if complete { &bounded } else { &[] };
+    if let (true, Some(weights)) = (complete, weights.as_mut()) {
+        bound_layers(raw, known, &mut weights.layers, faults);
+    }
+    if let (Some(Some(mapping)), Some(inputs)) = (&mapping, &inputs) {
+        bound_mapping(raw, mapping, inputs, &actions.list, faults);
+    }
+    let golden = golden(raw, network.as_ref(), sizes, known, faults);
+    let Weights { layers, mut notes } = weights?;
+    notes.extend(unused(
+        &head.parameters,
+        signals.as_deref().unwrap_or_default(),
+        known,
+        mapping.as_ref().and_then(Option::as_ref),
+    ));
+    let limits = limits?;
+    notes.extend(beyond_limits(
+        &limits,
+        &actions.list,
+        mapping.as_ref().and_then(Option::as_ref),
+    ));
+    let mut policy = Policy {
+        name: head.name?,
+        sample_period: head.sample_period?,
+        numeric_format: head.numeric_format,
+        parameters: head.parameters,
+        signals: signals?,
+        features: complete.then_some(bounded)?,
+        layers,
+        actions: actions.list,
+        mapping: mapping?,
+        limits,
+        fallback: fallback?,
+        golden: golden?,
+        digests: Digests {
+            weights: String::new(),
+            contract: String::new(),
+            mapping: None,
+        },
+        notes,
+        files: raw.files.clone(),
+    };
+    policy.digests = digests::of(&policy);
+    Some(policy)
+}
+
+/// `None` if faulty, `Some(None)` without a mapping.
+fn mapped(
+    raw: &RawPolicy,
+    root: &mut Section<'_>,
+    signals: &[String],
+    faults: &mut Vec<Fault>,
+) -> Option<Option<Mapping>> {
+    let Some(value) = root.optional("mapping") else {
+        return Some(None);
+    };
+    let mut section = value.section("[mapping]", faults)?;
+    let hint = "the file with the coefficients: `file = \"drm.toml\"`";
+    if let Some(file) = section.required("file", hint, faults) {
+        file.text(faults);
+    }
+    let load_current = mapping::load_current(&mut section, signals, faults);
+    section.finish(faults);
+    let document = raw.mapping.as_ref()?;
+    let mapping = mapping::read(document, load_current.unwrap_or_default(), faults)?;
+    load_current.map(|_| Some(mapping))
+}
+
+/// `None` if faulty, `Some(None)` without golden vectors.
+fn golden(
+    raw: &RawPolicy,
+    network: Option<&network::Network<'_>>,
+    sizes: Option<(usize, usize)>,
+    features: &[Feature],
+    faults: &mut Vec<Fault>,
+) -> Option<Option<Golden>> {
+    let Some(file) = &raw.golden else { return Some(None) };
+    let (count, actions) = sizes?;
+    weights::golden::read(file, count, features, actions, network?.tolerance, faults).map(Some)
+}
+
+fn bound_layers(raw: &RawPolicy, features: &[Feature], layers: &mut [Layer], faults: &mut Vec<Fault>) {
+    let mut inputs: Vec<Interval> = Vec::with_capacity(MAX_FEATURES);
+    inputs.extend(features.iter().map(|feature| feature.bound));
+    for layer in layers {
+        match bounds::layer(&inputs, &layer.weights, &layer.bias, layer.activation) {
+            Ok(bounds) => layer.bounds = bounds,
+            Err((output, Overflow(magnitude))) => {
+                let what = format!("output {output} of layer `{}`", layer.name);
+                let file = raw
+                    .weights
+                    .as_ref()
+                    .map_or(&raw.contract.source.name, |file| &file.name);
+                faults.push(file.tensor_fault(&layer.name, catalogue::may_overflow(&what, magnitude)));
+                return;
+            }
+        }
+        inputs.clone_from(&layer.bounds);
+    }
+}
+
+fn bound_mapping(raw: &RawPolicy, mapping: &Mapping, inputs: &Inputs, actions: &[Action], faults: &mut Vec<Fault>) {
+    let Some(current) = inputs.signal(mapping.load_current) else {
+        return;
+    };
+    let duties = Interval {
+        low: 0.0,
+        high: actions.iter().fold(0.0, |high, action| action.duty.max(high)),
+    };
+    if let Err(magnitude) = mapping::magnitude_fits(mapping, current, duties) {
+        let file = raw
+            .mapping
+            .as_ref()
+            .map_or(&raw.contract.source.name, |document| &document.source.name);
+        faults.push(file.fault(catalogue::may_overflow("the mapped duty", magnitude)));
+    }
+}

@@ -1,0 +1,118 @@
+//! `[actions]`: the duty of each network output.
+
+use super::duty;
+use crate::catalogue;
+use crate::faults::Fault;
+use crate::limits::{MAX_ACTIONS, MIN_ACTIONS};
+use crate::model::{Action, Pair};
+use crate::toml_reader::{Section, Value};
+
+/// The actions and how many the contract lists, faulty ones included; `count` is 0 if that is unknown.
+#[derive(Default)]
+pub(crate) struct Actions {
+    pub list: Vec<Action>,
+    pub count: usize,
+}
+
+pub(crate) fn read(root: &mut Section<'_>, faults: &mut Vec<Fault>) -> Actions {
+    let hint = "give [actions] with `duties = [...]` or `pairs = [...]`, one per network output";
+    let Some(mut section) = root
+        .required("actions", hint, faults)
+        .and_then(|v| v.section("[actions]", faults))
+    else {
+        return Actions::default();
+    };
+    let (duties, pairs) = (section.optional("duties"), section.optional("pairs"));
+    let (value, actions) = match (duties, pairs) {
+        (Some(value), None) => (value.clone(), from_duties(&value, faults)),
+        (None, Some(value)) => (value.clone(), from_pairs(&value, faults)),
+        (both, _) => {
+            let count = if both.is_some() { 2 } else { 0 };
+            faults.push(section.fault(catalogue::exactly_one_of("[actions]", "`duties`, `pairs`", count)));
+            section.finish(faults);
+            return Actions::default();
+        }
+    };
+    section.finish(faults);
+    let Some(actions) = actions else {
+        return Actions::default();
+    };
+    if !(MIN_ACTIONS..=MAX_ACTIONS).contains(&actions.count) {
+        let message = catalogue::count("actions", actions.count, MIN_ACTIONS, MAX_ACTIONS);
+        faults.push(value.fault(message));
+    }
+    actions
+}
+
+fn from_duties(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Actions> {
+    let items = value.list("an array of duty ratios", faults)?;
+    let duties = items.iter().filter_map(|item| duty(item, faults));
+    let list: Vec<_> = duties.map(|duty| Action { duty, pair: None }).collect();
+    Some(Actions {
+        list,
+        count: items.len(),
+    })
+}
+
+fn from_pairs(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Actions> {
+    let items = value.list("an array of pairs: [{ xi = 0.5, phi = 0.05 }]", faults)?;
+    let mut actions = Actions::default();
+    let mut known = true;
+    for item in &items {
+        match pair(item, faults) {
+            Some(pairs) => {
+                actions.count += pairs.len();
+                for pair in pairs {
+                    actions.list.extend(action(item, pair, faults));
+                }
+            }
+            None => known = false,
+        }
+    }
+    known.then_some(actions)
+}
+
+fn pair(item: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<Pair>> {
+    let mut section = item.section("pairs", faults)?;
+    let hint = "a pair means duty = xi + c phi: { xi = 0.5, phi = 0.05, c = [-1, 0, 1] }";
+    let xi = section.required("xi", hint, faults).and_then(|v| duty(&v, faults));
+    let phi = section.required("phi", hint, faults).and_then(|v| duty(&v, faults));
+    let factors = section
+        .optional("c")
+        .map_or(Some(vec![-1, 0, 1]), |v| factors(&v, faults));
+    section.finish(faults);
+    let (xi, phi) = (xi?, phi?);
+    Some(factors?.into_iter().map(|c| Pair { xi, phi, c }).collect())
+}
+
+fn factors(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<i8>> {
+    let items = value.list("an array of -1, 0, 1", faults)?;
+    let mut list = Vec::new();
+    for item in &items {
+        let factor = i8::try_from(item.integer(-1, 1, faults)?.value).ok()?;
+        if list.contains(&factor) {
+            faults.push(item.fault(catalogue::out_of_range(
+                "c",
+                &format!("{factor} twice"),
+                "each of -1, 0, 1 once",
+            )));
+            return None;
+        }
+        list.push(factor);
+    }
+    if list.is_empty() {
+        faults.push(value.fault(catalogue::count("values of c", 0, 1, 3)));
+        return None;
+    }
+    Some(list)
+}
+
+fn action(item: &Value<'_>, pair: Pair, faults: &mut Vec<Fault>) -> Option<Action> {
+    let duty = pair.xi + f64::from(pair.c) * pair.phi;
+    if (0.0..=1.0).contains(&duty) {
+        return Some(Action { duty, pair: Some(pair) });
+    }
+    let label = format!("xi + c phi with c = {}", pair.c);
+    faults.push(item.fault(catalogue::duty_range(&label, duty)));
+    None
+}

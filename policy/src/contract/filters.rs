@@ -1,0 +1,151 @@
+//! `filters = [...]` of a feature (contract section 4).
+
+use std::f64::consts::PI;
+
+use super::number_f32;
+use crate::catalogue;
+use crate::faults::Fault;
+use crate::limits::{MAX_FILTERS, MAX_LINE, MAX_TIME_CONSTANT_PERIODS};
+use crate::model::Filter;
+use crate::model::Interval;
+use crate::rounding::inward_f32;
+use crate::toml_reader::{Node, Value};
+
+const KINDS: [&str; 6] = [
+    "delay",
+    "backward_difference",
+    "low_pass",
+    "filtered_derivative",
+    "moving_average",
+    "integrator",
+];
+
+/// The chain, first to last; `period` is `None` if the contract's is faulty.
+pub(crate) fn read(value: &Value<'_>, period: Option<f64>, faults: &mut Vec<Fault>) -> Option<Vec<Filter>> {
+    let items = value.list("an array of filters: [{ delay = 1 }]", faults)?;
+    if items.len() > MAX_FILTERS {
+        faults.push(value.fault(catalogue::count("filters", items.len(), 0, MAX_FILTERS)));
+        return None;
+    }
+    let filters: Vec<_> = items.iter().map(|item| one(item, period, faults)).collect();
+    filters.into_iter().collect()
+}
+
+fn one(value: &Value<'_>, period: Option<f64>, faults: &mut Vec<Fault>) -> Option<Filter> {
+    if let Node::Text(text) = &value.node.value {
+        return named(value, text, faults);
+    }
+    let mut section = value.section("filter", faults)?;
+    let mut found: Vec<_> = KINDS
+        .iter()
+        .filter_map(|kind| section.optional(kind).map(|value| (*kind, value)))
+        .collect();
+    let number = section.pairs().count();
+    let before = faults.len();
+    if number == 1 || found.is_empty() {
+        section.finish(faults);
+    }
+    let (Some((kind, inner)), 1) = (found.pop(), number) else {
+        if faults.len() == before {
+            faults.push(value.fault(catalogue::exactly_one_of("a filter", &KINDS.join(", "), number)));
+        }
+        return None;
+    };
+    let line = |low, faults: &mut Vec<Fault>| {
+        inner
+            .integer(low, MAX_LINE as i64, faults)
+            .and_then(|n| usize::try_from(n.value).ok())
+    };
+    match kind {
+        "delay" => line(1, faults).map(|samples| Filter::Delay { samples }),
+        "moving_average" => line(2, faults).map(|samples| Filter::MovingAverage { samples }),
+        "backward_difference" => match inner.boolean(faults)? {
+            true => Some(Filter::BackwardDifference),
+            false => {
+                faults.push(inner.fault(catalogue::out_of_range(kind, "false", "true").hint("leave the filter out")));
+                None
+            }
+        },
+        "low_pass" => time_constant(&inner, period, faults).map(|time_constant| Filter::LowPass { time_constant }),
+        "filtered_derivative" => {
+            time_constant(&inner, period, faults).map(|time_constant| Filter::FilteredDerivative { time_constant })
+        }
+        _ => integrator(&inner, faults),
+    }
+}
+
+fn named(value: &Value<'_>, text: &str, faults: &mut Vec<Fault>) -> Option<Filter> {
+    if text == "backward_difference" {
+        return Some(Filter::BackwardDifference);
+    }
+    value.text(faults)?;
+    faults.push(value.fault(match KINDS.contains(&text) {
+        true => catalogue::missing_key("value", &format!("the filter `{text}`"), "write it as { delay = 1 }"),
+        false => catalogue::not_one_of("filters", text, &KINDS),
+    }));
+    None
+}
+
+/// tau from `{ time_constant = s }` or `{ cutoff = Hz }`: tau = 1/(2 pi f).
+fn time_constant(value: &Value<'_>, period: Option<f64>, faults: &mut Vec<Fault>) -> Option<f64> {
+    let mut section = value.section(&value.label, faults)?;
+    let tau = section.optional("time_constant");
+    let cutoff = section.optional("cutoff");
+    section.finish(faults);
+    let (at, seconds) = match (tau, cutoff) {
+        (Some(tau), None) => (tau.clone(), tau.number(faults)?.value),
+        (None, Some(cutoff)) => {
+            let hertz = cutoff.number(faults)?.value;
+            if hertz <= 0.0 {
+                faults.push(cutoff.fault(catalogue::not_positive("cutoff", hertz)));
+                return None;
+            }
+            (cutoff, 1.0 / (2.0 * PI * hertz))
+        }
+        (both, _) => {
+            let count = if both.is_some() { 2 } else { 0 };
+            faults.push(value.fault(catalogue::exactly_one_of(&value.label, "time_constant, cutoff", count)));
+            return None;
+        }
+    };
+    let period = period?;
+    let longest = period * MAX_TIME_CONSTANT_PERIODS;
+    // shorter than this the coefficient k = T/(tau + T) is 1 in f32 and the filter does nothing
+    let shortest = period * 1e-6;
+    if seconds < shortest || seconds > longest {
+        faults.push(at.fault(catalogue::time_constant(seconds, longest)));
+        return None;
+    }
+    Some(seconds)
+}
+
+fn integrator(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Filter> {
+    let mut section = value.section("integrator", faults)?;
+    let hint = "an integrator needs both clamps: { min = -1.0, max = 1.0 }";
+    let min = section
+        .required("min", hint, faults)
+        .and_then(|v| number_f32(&v, faults));
+    let max = section
+        .required("max", hint, faults)
+        .and_then(|v| number_f32(&v, faults));
+    let start = section.optional("initial");
+    let initial = start.as_ref().map_or(Some(0.0), |v| number_f32(v, faults));
+    section.finish(faults);
+    let (min, max, initial) = (min?, max?, initial?);
+    if min > max || inward_f32(Interval { low: min, high: max }).is_none() {
+        faults.push(value.fault(catalogue::crossed("integrator", min, max).hint("min must lie below max")));
+        return None;
+    }
+    if !(min..=max).contains(&initial) {
+        let at = start.unwrap_or_else(|| value.clone());
+        faults.push(at.fault(catalogue::outside(
+            "initial",
+            initial,
+            "the integrator's clamps",
+            min,
+            max,
+        )));
+        return None;
+    }
+    Some(Filter::Integrator { min, max, initial })
+}

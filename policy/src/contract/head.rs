@@ -1,0 +1,95 @@
+//! Top level of `policy.toml`: name, sample period, numeric format, parameters.
+
+use std::collections::BTreeMap;
+
+use super::{Taken, name, taken_once};
+use crate::catalogue;
+use crate::faults::Fault;
+use crate::limits;
+use crate::model::NumericFormat;
+use crate::names::{self, Kind};
+use crate::toml_reader::{Section, Value};
+
+/// What stands at the top level.
+pub(crate) struct Head {
+    pub name: Option<String>,
+    pub sample_period: Option<f64>,
+    pub numeric_format: NumericFormat,
+    pub parameters: BTreeMap<String, f64>,
+}
+
+pub(crate) fn read(root: &mut Section<'_>, taken: &mut Taken, faults: &mut Vec<Fault>) -> Head {
+    let hint = "name the controller: `name = \"buck\"`; files and symbols begin with it";
+    let name = root
+        .required("name", hint, faults)
+        .and_then(|v| name(&v, Kind::Policy, &mut Vec::new(), faults));
+    let hint = "give the control period in seconds: `sample_period = 1e-4`";
+    let sample_period = root
+        .required("sample_period", hint, faults)
+        .and_then(|v| period(&v, faults));
+    let numeric_format = match root.optional("numeric_format") {
+        Some(value) => format(&value, faults),
+        None => NumericFormat::F32,
+    };
+    let parameters = root
+        .optional("parameters")
+        .map(|v| parameters(&v, taken, faults))
+        .unwrap_or_default();
+    Head {
+        name,
+        sample_period,
+        numeric_format,
+        parameters,
+    }
+}
+
+fn period(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<f64> {
+    let period = value.number(faults)?.value;
+    if (limits::MIN_SAMPLE_PERIOD..=limits::MAX_SAMPLE_PERIOD).contains(&period) {
+        return Some(period);
+    }
+    let mut message = catalogue::out_of_range("sample_period", &format!("{period} s"), "1e-9 s to 10 s");
+    if period > limits::MAX_SAMPLE_PERIOD {
+        message = message.hint("a frequency in Hz? write the period in seconds: 1e-4 for 10 kHz");
+    }
+    faults.push(value.fault(message));
+    None
+}
+
+fn format(value: &Value<'_>, faults: &mut Vec<Fault>) -> NumericFormat {
+    if let Some(text) = value.text(faults)
+        && text.value != "f32"
+    {
+        faults.push(value.fault(catalogue::not_supported_yet("numeric_format", text.value, &["f32"])));
+    }
+    NumericFormat::F32
+}
+
+fn parameters(value: &Value<'_>, taken: &mut Taken, faults: &mut Vec<Fault>) -> BTreeMap<String, f64> {
+    let Some(section) = value.section("[parameters]", faults) else {
+        return BTreeMap::new();
+    };
+    let mut parameters = BTreeMap::new();
+    for (key, value) in section.pairs() {
+        let kind = Kind::Parameter;
+        let objection =
+            names::objection(&key.value, kind).map(|hint| catalogue::bad_name(kind.word(), &key.value, &hint));
+        let named = match objection {
+            Some(message) => Err(message),
+            None => taken_once(&key.value, kind, taken),
+        };
+        faults.extend(named.err().map(|message| value.doc.fault(&key.span, message)));
+        // a faulty parameter keeps its name, lest every expression that uses it be reported too
+        let number = value.number(faults).map_or(1.0, |number| number.value);
+        parameters.insert(key.value.clone(), number);
+    }
+    if parameters.len() > limits::MAX_PARAMETERS {
+        faults.push(value.fault(catalogue::count(
+            "parameters",
+            parameters.len(),
+            0,
+            limits::MAX_PARAMETERS,
+        )));
+    }
+    parameters
+}

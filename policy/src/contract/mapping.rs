@@ -1,0 +1,163 @@
+//! `[mapping]` of `policy.toml` and the file it names (`drm.toml`).
+
+use super::{duty_interval, interval_f32, number_f32};
+use crate::bounds::Box32;
+use crate::catalogue;
+use crate::faults::Fault;
+use crate::model::{Coefficients, Interval, Mapping};
+use crate::names::nearest;
+use crate::rounding::{inward_f32, nearest_f32};
+use crate::toml_reader::{Document, Section};
+
+/// The section in `policy.toml`: the index of the load current; the coefficients stand in `drm.toml`.
+pub(crate) fn load_current(section: &mut Section<'_>, signals: &[String], faults: &mut Vec<Fault>) -> Option<usize> {
+    let hint = "name the signal that is i_out in the mapping: `load_current = \"i_out\"`";
+    let value = section.required("load_current", hint, faults)?;
+    let text = value.text(faults)?.value;
+    let index = signals.iter().position(|name| name == text);
+    if index.is_none() {
+        let names = signals.iter().map(String::as_str).filter(|name| !name.is_empty());
+        let hint = nearest(text, names.clone()).map(|name| format!("did you mean `{name}`?"));
+        let expected = format!("one of {}", names.collect::<Vec<_>>().join(", "));
+        faults.push(value.fault(catalogue::unknown_name("signal", text, hint, &expected)));
+    }
+    index
+}
+
+/// Reads `drm.toml`; `load_current` is entered as given.
+pub(crate) fn read(document: &Document, load_current: usize, faults: &mut Vec<Fault>) -> Option<Mapping> {
+    let before = faults.len();
+    let mut root = document.root();
+    let hint = "a mapping is d_real = a d_sim + b i_out + c (+ r i_out d_sim)";
+    let places = ["a", "b", "c"].map(|key| root.required(key, hint, faults));
+    let [a, b, c] = places.clone().map(|value| value.and_then(|v| number_f32(&v, faults)));
+    let product = root.optional("r");
+    let r = product.as_ref().map(|v| number_f32(v, faults));
+    let a = a.filter(|a| *a > 0.0).or_else(|| {
+        let value = places[0].as_ref().zip(a);
+        faults.extend(value.map(|(value, a)| value.fault(catalogue::not_positive("a", a))));
+        None
+    });
+    let hint = "where the fit holds: [valid] with `i_out = [low, high]` and `d_sim = [low, high]`";
+    let mut valid = root
+        .required("valid", hint, faults)
+        .and_then(|v| v.section("[valid]", faults));
+    let i_out = valid
+        .as_mut()
+        .and_then(|s| s.required("i_out", hint, faults))
+        .and_then(|v| interval_f32(&v, faults));
+    let d_sim = valid
+        .as_mut()
+        .and_then(|s| s.required("d_sim", hint, faults))
+        .and_then(|v| duty_interval(&v, faults));
+    if let Some(section) = valid {
+        section.finish(faults);
+    }
+    let mut adjust = root.optional("adjust").and_then(|v| v.section("[adjust]", faults));
+    let near = |value: f64, by: f64| Interval {
+        low: value - by,
+        high: value + by,
+    };
+    let a_default = a.map(|a| Interval {
+        low: 0.5 * a,
+        high: 2.0 * a,
+    });
+    let adjust_a = adjustable(&mut adjust, "a", a, a_default, faults);
+    let adjust_b = adjustable(&mut adjust, "b", b, b.map(|b| near(b, 0.05)), faults);
+    let adjust_c = adjustable(&mut adjust, "c", c, c.map(|c| near(c, 0.2)), faults);
+    let adjust_r = match r {
+        Some(r) => adjustable(&mut adjust, "r", r, r.map(|r| near(r, 0.05)), faults),
+        None => without_r(&mut adjust, faults).then_some(near(0.0, 0.05)),
+    };
+    if let Some(section) = adjust {
+        section.finish(faults);
+    }
+    root.finish(faults);
+    let mapping = Mapping {
+        coefficients: Coefficients {
+            a: a?,
+            b: b?,
+            c: c?,
+            r: r.flatten(),
+        },
+        load_current,
+        valid_i_out: i_out?,
+        valid_d_sim: d_sim?,
+        adjust_a: adjust_a?,
+        adjust_b: adjust_b?,
+        adjust_c: adjust_c?,
+        adjust_r: adjust_r?,
+    };
+    if faults.len() == before {
+        rising(&mapping, product.as_ref().or(places[0].as_ref()), faults);
+    }
+    (faults.len() == before).then_some(mapping)
+}
+
+/// `[adjust] key`, or the default; the coefficient must lie inside, in binary32 as well, and `a` stay above 0.
+fn adjustable(
+    adjust: &mut Option<Section<'_>>,
+    key: &'static str,
+    coefficient: Option<f64>,
+    default: Option<Interval>,
+    faults: &mut Vec<Fault>,
+) -> Option<Interval> {
+    let Some(value) = adjust.as_mut().and_then(|section| section.optional(key)) else {
+        return default;
+    };
+    let interval = interval_f32(&value, faults)?;
+    let (low, high) = inward_f32(interval)?;
+    if key == "a" && interval.low <= 0.0 {
+        faults.push(value.fault(catalogue::not_positive("the lower end of adjust a", interval.low)));
+        return None;
+    }
+    if let Some(x) = coefficient
+        && !(low..=high).contains(&nearest_f32(x))
+    {
+        let name = "its [adjust] interval";
+        faults.push(value.fault(catalogue::outside(key, x, name, interval.low, interval.high)));
+        return None;
+    }
+    Some(interval)
+}
+
+/// `adjust r` has no meaning in the three-term form.
+fn without_r(adjust: &mut Option<Section<'_>>, faults: &mut Vec<Fault>) -> bool {
+    match adjust.as_mut().and_then(|section| section.optional("r")) {
+        None => true,
+        Some(value) => {
+            faults.push(value.fault(catalogue::needs_other("adjust r", "r")));
+            false
+        }
+    }
+}
+
+/// The mapping must rise with d_sim at both ends of i_out, computed as the controller computes it.
+fn rising(mapping: &Mapping, at: Option<&crate::toml_reader::Value<'_>>, faults: &mut Vec<Fault>) {
+    let (Some(r), Some((low, high))) = (mapping.coefficients.r, inward_f32(mapping.valid_i_out)) else {
+        return;
+    };
+    for i_out in [low, high] {
+        let slope = nearest_f32(mapping.coefficients.a) + nearest_f32(r) * i_out;
+        if slope.is_nan() || slope <= 0.0 {
+            let message = catalogue::not_increasing(f64::from(i_out), f64::from(slope));
+            faults.extend(at.map(|value| value.fault(message)));
+            return;
+        }
+    }
+}
+
+/// Whether the mapped duty stays within the format for every adjustable coefficient and every sanitised current.
+pub(crate) fn magnitude_fits(mapping: &Mapping, current: Box32, duties: Interval) -> Result<(), f64> {
+    let d = Box32::nearest(duties);
+    let all = || {
+        let mut t = Box32::nearest(mapping.adjust_a).times(d)?;
+        t = t.add(Box32::nearest(mapping.adjust_b).times(current)?)?;
+        t = t.add(Box32::nearest(mapping.adjust_c))?;
+        if mapping.coefficients.r.is_some() {
+            t = t.add(Box32::nearest(mapping.adjust_r).times(current)?.times(d)?)?;
+        }
+        Ok(t)
+    };
+    all().map(drop).map_err(|crate::bounds::Overflow(magnitude)| magnitude)
+}

@@ -1,0 +1,187 @@
+//! `[network]`: which tensors, which activations.
+
+use crate::catalogue;
+use crate::faults::{Fault, Message};
+use crate::limits::MAX_LAYERS;
+use crate::model::Activation;
+use crate::toml_reader::{At, Node, Section, Value};
+
+const ACTIVATIONS: [&str; 3] = ["relu", "tanh", "identity"];
+const ACTIVATION_HINT: &str = "weights do not say it: hidden_activation = \"relu\", \"tanh\", \"identity\", \
+    { leaky_relu = 0.01 }, or an array with one per hidden layer";
+
+/// The activations behind the hidden layers, as given.
+pub(crate) enum Hidden<'a> {
+    /// Not given.
+    Missing,
+    /// Given, but faulty.
+    Faulty,
+    /// The same behind each hidden layer.
+    Same(Activation),
+    /// One per hidden layer.
+    Each(Vec<Activation>, Value<'a>),
+}
+
+/// What `[network]` says beside the file names.
+pub(crate) struct Network<'a> {
+    section: Value<'a>,
+    pub hidden: Hidden<'a>,
+    pub prefix: Option<At<String>>,
+    pub layers: Option<Vec<At<String>>>,
+    pub transpose: Option<bool>,
+    pub bias: bool,
+    pub tolerance: f64,
+}
+
+pub(crate) fn read<'a>(root: &mut Section<'a>, faults: &mut Vec<Fault>) -> Option<Network<'a>> {
+    let hint = "give [network] with `weights` and `hidden_activation`";
+    let at = root.required("network", hint, faults)?;
+    let mut section = at.section("[network]", faults)?;
+    let hint = "the network's tensors: `weights = \"weights.safetensors\"`";
+    if let Some(value) = section.required("weights", hint, faults) {
+        value.text(faults);
+    }
+    if let Some(value) = section.optional("golden") {
+        value.text(faults);
+    }
+    let hidden = section
+        .optional("hidden_activation")
+        .map_or(Hidden::Missing, |v| hidden(&v, faults));
+    let prefix = section.optional("prefix").and_then(|v| owned(&v, faults));
+    let layers = section.optional("layers").and_then(|v| layers(&v, faults));
+    let transpose = section.optional("transpose").and_then(|v| v.boolean(faults));
+    let bias = section
+        .optional("bias")
+        .is_none_or(|v| v.boolean(faults) != Some(false));
+    let tolerance = section
+        .optional("golden_tolerance")
+        .and_then(|v| tolerance(&v, faults))
+        .unwrap_or(1e-5);
+    section.finish(faults);
+    Some(Network {
+        section: at,
+        hidden,
+        prefix,
+        layers,
+        transpose,
+        bias,
+        tolerance,
+    })
+}
+
+impl Network<'_> {
+    /// A fault at a place in the contract.
+    pub fn fault<T>(&self, at: &At<T>, message: Message) -> Fault {
+        self.section.doc.fault(&at.span, message)
+    }
+
+    /// One activation per layer; the last is the identity.
+    pub fn activations(&self, layers: usize, faults: &mut Vec<Fault>) -> Option<Vec<Activation>> {
+        let hidden = layers.saturating_sub(1);
+        let mut list = match &self.hidden {
+            Hidden::Faulty => return None,
+            Hidden::Missing if hidden == 0 => Vec::new(),
+            Hidden::Missing => {
+                let message = catalogue::missing_key("hidden_activation", "[network]", ACTIVATION_HINT);
+                faults.push(self.section.fault(message));
+                return None;
+            }
+            Hidden::Same(activation) => vec![*activation; hidden],
+            Hidden::Each(list, at) if list.len() != hidden => {
+                let expected = format!("{hidden}, one per hidden layer");
+                faults.push(at.fault(catalogue::wrong_length("hidden_activation", list.len(), &expected)));
+                return None;
+            }
+            Hidden::Each(list, _) => list.clone(),
+        };
+        list.push(Activation::Identity);
+        Some(list)
+    }
+}
+
+fn hidden<'a>(value: &Value<'a>, faults: &mut Vec<Fault>) -> Hidden<'a> {
+    if !matches!(value.node.value, Node::List(_)) {
+        return activation(value, faults).map_or(Hidden::Faulty, Hidden::Same);
+    }
+    let items = value.list("an array of activations", faults).unwrap_or_default();
+    let list: Vec<_> = items.iter().map(|item| activation(item, faults)).collect();
+    match list.into_iter().collect() {
+        Some(list) => Hidden::Each(list, value.clone()),
+        None => Hidden::Faulty,
+    }
+}
+
+fn activation(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Activation> {
+    if let Node::Table(_) = value.node.value {
+        let mut section = value.section("hidden_activation", faults)?;
+        let slope = section.required(
+            "leaky_relu",
+            "the slope for negative values: { leaky_relu = 0.01 }",
+            faults,
+        );
+        section.finish(faults);
+        let slope = slope?;
+        let number = slope.number(faults)?.value;
+        // the slope must stay inside (0, 1) when rounded, or the activation would be another one
+        if (f32::MIN_POSITIVE..1.0).contains(&(number as f32)) {
+            return Some(Activation::LeakyRelu { slope: number });
+        }
+        faults.push(slope.fault(catalogue::out_of_range(
+            "leaky_relu",
+            &number.to_string(),
+            "more than 0, less than 1",
+        )));
+        return None;
+    }
+    let text = value.text(faults)?.value;
+    match text {
+        "relu" => Some(Activation::Relu),
+        "tanh" => Some(Activation::Tanh),
+        "identity" => Some(Activation::Identity),
+        "leaky_relu" => {
+            let message = catalogue::missing_key("slope", "leaky_relu", "write { leaky_relu = 0.01 }");
+            faults.push(value.fault(message));
+            None
+        }
+        _ => {
+            let lower = text.to_ascii_lowercase();
+            let shown = if ACTIVATIONS.contains(&lower.as_str()) {
+                &lower
+            } else {
+                text
+            };
+            faults.push(value.fault(catalogue::not_one_of("hidden_activation", shown, &ACTIVATIONS)));
+            None
+        }
+    }
+}
+
+fn owned(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<At<String>> {
+    value.text(faults).map(|text| At {
+        value: text.value.to_owned(),
+        span: text.span,
+    })
+}
+
+fn layers(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<At<String>>> {
+    let items = value.list("an array of layer names: [\"fc1\", \"fc2\", \"out\"]", faults)?;
+    if !(1..=MAX_LAYERS).contains(&items.len()) {
+        faults.push(value.fault(catalogue::count("layers", items.len(), 1, MAX_LAYERS)));
+        return None;
+    }
+    items.iter().map(|item| owned(item, faults)).collect()
+}
+
+fn tolerance(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<f64> {
+    let number = value.number(faults)?.value;
+    if number > 0.0 && number < 1.0 {
+        return Some(number);
+    }
+    let expected = "more than 0, less than 1: |Q - golden| relative to the largest |Q|";
+    faults.push(value.fault(catalogue::out_of_range(
+        "golden_tolerance",
+        &number.to_string(),
+        expected,
+    )));
+    None
+}

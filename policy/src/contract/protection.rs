@@ -1,0 +1,89 @@
+//! `[limits]` and `[fallback]`.
+
+use super::{duty, duty_interval};
+use crate::catalogue;
+use crate::faults::Fault;
+use crate::limits::{MAX_HOLD, MAX_SOFT_START_STEPS, MIN_SOFT_START_INCREMENT};
+use crate::model::{Fallback, Interval, Limits, SoftStart};
+use crate::rounding::down_f32;
+use crate::toml_reader::{Section, Value};
+
+pub(crate) fn fallback(root: &mut Section<'_>, faults: &mut Vec<Fault>) -> Option<Fallback> {
+    let hint = "say what happens without a usable measurement: [fallback] with `duty` and `hold`";
+    let mut section = root.required("fallback", hint, faults)?.section("[fallback]", faults)?;
+    let hint = "the duty commanded when no measurement is usable: `duty = 0.0`";
+    let duty = section.required("duty", hint, faults).and_then(|v| duty(&v, faults));
+    let hint = "how many bad samples are bridged with the last good one: `hold = 3`";
+    let hold = section
+        .required("hold", hint, faults)
+        .and_then(|v| v.integer(0, i64::from(MAX_HOLD), faults));
+    section.finish(faults);
+    Some(Fallback {
+        duty: duty?,
+        hold: u32::try_from(hold?.value).ok()?,
+    })
+}
+
+/// The limits; `initial_duty` is the fallback duty where the contract does not give it.
+pub(crate) fn limits(root: &mut Section<'_>, fallback: Option<Fallback>, faults: &mut Vec<Fault>) -> Option<Limits> {
+    let hint = "give [limits] with `duty = [low, high]`";
+    let mut section = root.required("limits", hint, faults)?.section("[limits]", faults)?;
+    let hint = "the smallest and largest duty the hardware may see: `duty = [0.05, 0.95]`";
+    let range = section
+        .required("duty", hint, faults)
+        .and_then(|v| duty_interval(&v, faults));
+    let slew = section
+        .optional("slew")
+        .map_or(Some(None), |v| slew(&v, faults).map(Some));
+    let soft = section
+        .optional("soft_start")
+        .map_or(Some(None), |v| soft_start(&v, range, faults).map(Some));
+    let initial = match section.optional("initial_duty") {
+        Some(value) => duty(&value, faults),
+        None => fallback.map(|fallback| fallback.duty),
+    };
+    section.finish(faults);
+    Some(Limits {
+        duty: range?,
+        slew: slew?,
+        soft_start: soft?,
+        initial_duty: initial?,
+    })
+}
+
+fn slew(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<f64> {
+    let number = value.number(faults)?.value;
+    if number > 0.0 && number <= 1.0 && down_f32(number) > 0.0 {
+        return Some(number);
+    }
+    let expected = "more than 0 (in f32), at most 1: the largest change of duty per sample period";
+    faults.push(value.fault(catalogue::out_of_range("slew", &number.to_string(), expected)));
+    None
+}
+
+fn soft_start(value: &Value<'_>, range: Option<Interval>, faults: &mut Vec<Fault>) -> Option<SoftStart> {
+    let mut section = value.section("soft_start", faults)?;
+    let hint = "a soft start is `{ from = 0.1, steps = 1000 }`";
+    let start = section.required("from", hint, faults);
+    let from = start.as_ref().and_then(|v| duty(v, faults));
+    let steps = section.required("steps", hint, faults);
+    let steps = steps.and_then(|v| v.integer(1, i64::from(MAX_SOFT_START_STEPS), faults));
+    section.finish(faults);
+    let (start, from, steps, range) = (start?, from?, u32::try_from(steps?.value).ok()?, range?);
+    if from > range.high {
+        faults.push(start.fault(catalogue::outside(
+            "from",
+            from,
+            "0 to the largest duty",
+            0.0,
+            range.high,
+        )));
+        return None;
+    }
+    let increment = (range.high - from) / f64::from(steps);
+    if increment < MIN_SOFT_START_INCREMENT {
+        faults.push(value.fault(catalogue::soft_start_too_slow(increment)));
+        return None;
+    }
+    Some(SoftStart { from, steps })
+}

@@ -1,0 +1,111 @@
+//! SHA-256 digests of canonical content: equal policies give equal digests, however their files are written.
+//!
+//! The contract's digest covers what decides the generated text: all numbers with defaults filled in, and the names,
+//! units and source texts that end up in it as identifiers and comments. It does not cover layout, comments, file
+//! names, golden vectors or their tolerance, and not the weights and the mapping, which have digests of their own.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use crate::model::{
+    Action, Activation, Digests, Expr, Fallback, Feature, Filter, Interval, Layer, Limits, Mapping, NumericFormat,
+    Policy, Signal,
+};
+
+#[derive(Serialize)]
+struct Contract<'a> {
+    version: u32,
+    name: &'a str,
+    sample_period: f64,
+    numeric_format: NumericFormat,
+    parameters: &'a BTreeMap<String, f64>,
+    signals: &'a [Signal],
+    features: Vec<Observed<'a>>,
+    activations: Vec<Activation>,
+    actions: &'a [Action],
+    limits: &'a Limits,
+    fallback: &'a Fallback,
+}
+
+/// A feature without its bound, which follows from the rest.
+#[derive(Serialize)]
+struct Observed<'a> {
+    name: &'a str,
+    source: &'a Expr,
+    source_text: &'a str,
+    filters: &'a [Filter],
+    scale: f64,
+    offset: f64,
+    clip: Option<Interval>,
+}
+
+impl<'a> Observed<'a> {
+    fn of(feature: &'a Feature) -> Self {
+        let Feature {
+            name,
+            source,
+            source_text,
+            filters,
+            scale,
+            offset,
+            clip,
+            bound: _,
+        } = feature;
+        Observed {
+            name,
+            source,
+            source_text,
+            filters,
+            scale: *scale,
+            offset: *offset,
+            clip: *clip,
+        }
+    }
+}
+
+/// Digests of a policy's content.
+pub(crate) fn of(policy: &Policy) -> Digests {
+    let contract = Contract {
+        version: 1,
+        name: &policy.name,
+        sample_period: policy.sample_period,
+        numeric_format: policy.numeric_format,
+        parameters: &policy.parameters,
+        signals: &policy.signals,
+        features: policy.features.iter().map(Observed::of).collect(),
+        activations: policy.layers.iter().map(|layer| layer.activation).collect(),
+        actions: &policy.actions,
+        limits: &policy.limits,
+        fallback: &policy.fallback,
+    };
+    Digests {
+        weights: weights(&policy.layers),
+        contract: json(&contract),
+        mapping: policy.mapping.as_ref().map(|mapping: &Mapping| json(mapping)),
+    }
+}
+
+fn weights(layers: &[Layer]) -> String {
+    let mut hash = Sha256::new();
+    for layer in layers {
+        hash.update((layer.outputs as u64).to_le_bytes());
+        hash.update((layer.inputs as u64).to_le_bytes());
+        for value in layer.weights.iter().chain(&layer.bias) {
+            hash.update(value.to_bits().to_le_bytes());
+        }
+    }
+    hex(&hash.finalize())
+}
+
+/// Compact JSON with fields in declaration order and floats in their shortest form.
+fn json(content: &impl Serialize) -> String {
+    // these structs hold no map with keys other than text and no fallible serialiser
+    let bytes = serde_json::to_vec(content).unwrap_or_default();
+    hex(&Sha256::digest(bytes))
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}

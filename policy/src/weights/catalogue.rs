@@ -1,0 +1,171 @@
+//! The texts of all faults of safetensors files, tensors and layer chains.
+
+use crate::faults::Message;
+use crate::limits;
+
+pub(crate) fn malformed(found: &str, hint: Option<&str>) -> Message {
+    Message::new("this is not a sound safetensors file")
+        .found(found.to_lowercase())
+        .expected("an 8-byte header length, a JSON header, and data that it covers without gaps")
+        .maybe_hint(hint.map(str::to_owned))
+}
+
+pub(crate) fn other_format(found: &str, hint: &str) -> Message {
+    Message::new("this is not a safetensors file")
+        .found(found)
+        .expected("a safetensors file")
+        .hint(hint)
+}
+
+pub(crate) fn duplicate_key(key: &str) -> Message {
+    Message::new("a key stands twice in the header")
+        .found(format!("`{}` twice", key.escape_debug()))
+        .expected("each key once")
+        .hint("readers disagree about which one counts: export the file again")
+}
+
+pub(crate) fn too_many_tensors(found: usize) -> Message {
+    Message::new("too many tensors")
+        .found(found.to_string())
+        .expected(format!("at most {}", limits::MAX_TENSORS))
+        .hint("export the policy network alone, without optimiser or replay buffer")
+}
+
+pub(crate) fn no_tensors() -> Message {
+    Message::new("the file holds no tensors")
+        .found("0")
+        .expected("weights and biases of the network")
+}
+
+pub(crate) fn odd_name(name: &str) -> Message {
+    let short: String = name.chars().take(limits::MAX_TENSOR_NAME_CHARS).collect();
+    Message::new("this tensor name is not safe to print or to use in a path")
+        .found(format!("\"{}\"", short.escape_debug()))
+        .expected("1 to 128 of A-Z, a-z, 0-9, _ . / : - without `..`")
+}
+
+pub(crate) fn empty_tensor(shape: &[usize]) -> Message {
+    Message::new("the tensor has no elements or no shape")
+        .found(format!("shape {shape:?}"))
+        .expected("at least one element along at least one axis")
+}
+
+pub(crate) fn wrong_dtype(found: &str, allowed: &str) -> Message {
+    let quantised = found.starts_with(['I', 'U']) || found.starts_with("F8");
+    let hint = quantised.then(|| "quantised weights are not read: export the float ones".to_owned());
+    Message::new("the tensor has a type that is not read here")
+        .found(found)
+        .expected(allowed)
+        .maybe_hint(hint)
+}
+
+pub(crate) fn not_finite(index: usize, value: f64) -> Message {
+    Message::new("the tensor holds a number that is not finite")
+        .found(format!("{} at index {index}", value.to_string().to_lowercase()))
+        .expected("finite numbers")
+        .hint("the training has diverged, or the file was damaged")
+}
+
+pub(crate) fn beyond_f32(index: usize, value: f64) -> Message {
+    Message::new("the tensor holds a number too large for f32")
+        .found(format!("{value:e} at index {index}"))
+        .expected("magnitudes up to 3.4e38")
+}
+
+pub(crate) fn wrong_shape(what: &str, found: &[usize], expected: &[usize], hint: Option<String>) -> Message {
+    Message::new(format!("the shape of {what} does not fit"))
+        .found(format!("shape {found:?}"))
+        .expected(format!("shape {expected:?}"))
+        .maybe_hint(hint)
+}
+
+pub(crate) fn missing_tensor(name: &str, hint: &str) -> Message {
+    Message::new(format!("the tensor `{name}` is missing"))
+        .found("no such tensor")
+        .expected(format!("`{name}`"))
+        .hint(hint)
+}
+
+pub(crate) fn extra_bias(name: &str) -> Message {
+    Message::new("there is a bias although the contract says `bias = false`")
+        .found(format!("`{name}`"))
+        .expected("no bias")
+        .hint("remove `bias = false` from [network]")
+}
+
+pub(crate) fn unknown_layer(name: &str, hint: Option<String>, all: &str) -> Message {
+    Message::new(format!("there is no layer `{}` in the weights", name.escape_debug()))
+        .found(format!("layers: {all}"))
+        .expected("a tensor name without `.weight`")
+        .maybe_hint(hint)
+}
+
+pub(crate) fn unknown_prefix(prefix: &str, all: &str) -> Message {
+    Message::new(format!("no layer begins with the prefix `{}`", prefix.escape_debug())).found(format!("layers: {all}"))
+}
+
+pub(crate) fn repeated_layer(name: &str) -> Message {
+    Message::new(format!("the layer `{}` is listed twice", name.escape_debug())).expected("each layer once")
+}
+
+pub(crate) fn several_chains(chains: &str) -> Message {
+    Message::new("more than one chain of layers fits the contract")
+        .found(chains)
+        .expected("exactly one")
+        .hint("choose one in [network]: `prefix = \"...\"`, or list the layers: `layers = [\"...\", \"...\"]`")
+}
+
+pub(crate) fn no_layers() -> Message {
+    Message::new("the file holds no dense layer")
+        .expected("tensors named <layer>.weight [out, in] and <layer>.bias [out] (or kernel [in, out])")
+        .hint("name them in this way when exporting: `save_file(model.state_dict(), \"weights.safetensors\")`")
+}
+
+pub(crate) fn too_deep(found: usize) -> Message {
+    Message::new("the network has too many layers")
+        .found(found.to_string())
+        .expected(format!("at most {}", limits::MAX_LAYERS))
+}
+
+pub(crate) fn too_wide(found: usize) -> Message {
+    Message::new("the layer is too wide")
+        .found(format!("{found} outputs"))
+        .expected(format!("at most {}", limits::MAX_WIDTH))
+}
+
+pub(crate) fn no_order(layers: &str) -> Message {
+    Message::new("the layers do not join up into a chain")
+        .found(layers)
+        .expected("each layer's inputs equal to the outputs of the one before")
+        .hint("list the layers in order: `layers = [\"...\", \"...\"]` in [network]")
+}
+
+// --- golden vectors ---
+
+pub(crate) fn golden_missing(name: &str, expected: &str) -> Message {
+    Message::new(format!("golden vectors need the tensor `{name}`")).expected(expected)
+}
+
+pub(crate) fn golden_outside(row: usize, feature: &str, value: f64, low: f64, high: f64) -> Message {
+    Message::new(format!(
+        "row {row} holds an observation that the controller can never see"
+    ))
+    .found(format!("`{feature}` = {value}"))
+    .expected(format!(
+        "{low} to {high}, from the signals' ranges, the filters and the clip"
+    ))
+    .hint("order, scale or clip of the features differ from the training")
+}
+
+pub(crate) fn golden_action(row: usize, found: &str, actions: usize) -> Message {
+    Message::new(format!("row {row} holds an action that does not exist"))
+        .found(found)
+        .expected(format!("0 to {}", actions.saturating_sub(1)))
+}
+
+pub(crate) fn golden_not_greedy(row: usize, action: u32, best: usize) -> Message {
+    Message::new(format!("row {row}: the action is not the one with the largest q value"))
+        .found(format!("action {action}"))
+        .expected(format!("action {best}"))
+        .hint("record the greedy action, without exploration")
+}

@@ -1,0 +1,117 @@
+//! Which layers in which order form the network: the chain of dense layers from features to actions.
+
+use std::collections::BTreeSet;
+
+use super::layers::{Dense, Place, ancestors, is_target};
+use crate::limits::MAX_LAYERS;
+
+/// Sizes the chain must have; `None` fits anything.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Ends {
+    pub inputs: Option<usize>,
+    pub outputs: Option<usize>,
+}
+
+/// Indices of layers, first to last.
+pub(crate) type Chain = Vec<usize>;
+
+/// All chains that use every layer of some natural group: numbered siblings, a folder, or the whole file. Target
+/// networks count only if nothing else fits; the second value lists those passed over.
+pub(crate) fn candidates(layers: &[Dense], ends: Ends) -> (Vec<Chain>, Vec<usize>) {
+    let (targets, own): (Vec<usize>, Vec<usize>) = (0..layers.len()).partition(|&i| is_target(&layers[i].stem));
+    let chains = chains_of(layers, &own, ends);
+    if !chains.is_empty() || targets.is_empty() {
+        return (chains, targets);
+    }
+    let all: Vec<usize> = (0..layers.len()).collect();
+    (chains_of(layers, &all, ends), Vec::new())
+}
+
+fn chains_of(layers: &[Dense], members: &[usize], ends: Ends) -> Vec<Chain> {
+    let mut chains: Vec<Chain> = Vec::new();
+    for group in groups(layers, members) {
+        for chain in orders(layers, &group, ends) {
+            if !chains.contains(&chain) {
+                chains.push(chain);
+            }
+        }
+    }
+    chains
+}
+
+/// Sets of layers that belong together by name, the narrow ones first.
+fn groups(layers: &[Dense], members: &[usize]) -> Vec<Vec<usize>> {
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    let mut add = |group: Vec<usize>| {
+        if !group.is_empty() && group.len() <= MAX_LAYERS && !groups.contains(&group) {
+            groups.push(group);
+        }
+    };
+    let families: BTreeSet<_> = members.iter().map(|&i| Place::of(&layers[i].stem).family).collect();
+    for family in families {
+        add(members
+            .iter()
+            .copied()
+            .filter(|&i| Place::of(&layers[i].stem).family == family)
+            .collect());
+    }
+    let folders: BTreeSet<_> = members.iter().flat_map(|&i| ancestors(&layers[i].stem)).collect();
+    for folder in folders.into_iter().rev() {
+        add(members
+            .iter()
+            .copied()
+            .filter(|&i| ancestors(&layers[i].stem).any(|a| a == folder))
+            .collect());
+    }
+    groups
+}
+
+/// Orders in which all of `group` join up; two are enough to know that shapes and numbers do not decide.
+pub(crate) fn orders(layers: &[Dense], group: &[usize], ends: Ends) -> Vec<Chain> {
+    let mut search = Search {
+        layers,
+        group,
+        ends,
+        path: Vec::new(),
+        found: Vec::new(),
+    };
+    search.extend(ends.inputs);
+    search.found
+}
+
+struct Search<'a> {
+    layers: &'a [Dense],
+    group: &'a [usize],
+    ends: Ends,
+    path: Chain,
+    found: Vec<Chain>,
+}
+
+impl Search<'_> {
+    fn extend(&mut self, inputs: Option<usize>) {
+        if self.path.len() == self.group.len() {
+            self.found.push(self.path.clone());
+            return;
+        }
+        let last = self.path.len() + 1 == self.group.len();
+        for &next in self.group {
+            let layer = &self.layers[next];
+            let joins = inputs.is_none_or(|n| n == layer.inputs);
+            let ends = !last || self.ends.outputs.is_none_or(|n| n == layer.outputs);
+            if self.found.len() < 2 && joins && ends && !self.path.contains(&next) && self.is_next_sibling(next) {
+                self.path.push(next);
+                self.extend(Some(layer.outputs));
+                self.path.pop();
+            }
+        }
+    }
+
+    /// Numbered siblings keep their order.
+    fn is_next_sibling(&self, next: usize) -> bool {
+        let place = Place::of(&self.layers[next].stem);
+        self.group.iter().filter(|i| !self.path.contains(i)).all(|&other| {
+            let rival = Place::of(&self.layers[other].stem);
+            rival.family != place.family || rival.number >= place.number
+        })
+    }
+}

@@ -1,0 +1,147 @@
+//! Known answers from the trainer: `obs` [n, features], `q` [n, actions], `action` [n].
+
+use safetensors::tensor::TensorView;
+use safetensors::{Dtype, SafeTensors};
+
+use super::{catalogue, header, tensors};
+use crate::faults::{Fault, Message};
+use crate::model::{Feature, Golden};
+use crate::raw::Binary;
+
+/// Reads and checks the vectors; `bounds` are checked only if every feature is known.
+pub(crate) fn read(
+    file: &Binary,
+    features: usize,
+    bounds: &[Feature],
+    actions: usize,
+    tolerance: f64,
+    faults: &mut Vec<Fault>,
+) -> Option<Golden> {
+    let opened = header::open(file, faults)?;
+    let before = faults.len();
+    for (name, view) in opened.iter() {
+        if let Err(message) = tensors::sound(name, view.shape()) {
+            faults.push(file.name.tensor_fault(name, message));
+        }
+    }
+    if faults.len() > before {
+        return None;
+    }
+    let view = |name: &str| opened.iter().find(|(found, _)| *found == name).map(|(_, view)| view);
+    let Some(observations) = view("obs") else {
+        let names = names(&opened);
+        let message = catalogue::golden_missing("obs", &format!("f32 [rows, {features}]")).found(names);
+        faults.push(file.name.fault(message));
+        return None;
+    };
+    let rows = observations.shape()[0];
+    let (q, action) = (view("q"), view("action"));
+    if q.is_none() && action.is_none() {
+        let expected = format!("`q` f32 [{rows}, {actions}] or `action` i32 [{rows}], or both");
+        faults.push(
+            file.name
+                .fault(catalogue::golden_missing("q", &expected).found(names(&opened))),
+        );
+        return None;
+    }
+    let obs = part(file, "obs", faults, floats(&observations, &[rows, features]));
+    let q_values = q.map(|view| part(file, "q", faults, floats(&view, &[rows, actions])));
+    let indices = action.map(|view| part(file, "action", faults, integers(&view, rows, actions)));
+    if let Some(obs) = &obs {
+        part(file, "obs", faults, inside(obs, bounds));
+    }
+    let (q_values, action_indices) = (
+        q_values.unwrap_or(Some(Vec::new())),
+        indices.unwrap_or(Some(Vec::new())),
+    );
+    if let (Some(q), Some(chosen)) = (&q_values, &action_indices) {
+        part(file, "action", faults, greedy(q, chosen, actions));
+    }
+    let golden = Golden {
+        count: rows,
+        observations: obs?,
+        q_values: q_values?,
+        action_indices: action_indices?,
+        tolerance,
+    };
+    (faults.len() == before).then_some(golden)
+}
+
+fn names(tensors: &SafeTensors<'_>) -> String {
+    let mut names: Vec<_> = tensors.iter().map(|(name, _)| format!("`{name}`")).collect();
+    names.sort();
+    names.join(", ")
+}
+
+fn part<T>(file: &Binary, tensor: &str, faults: &mut Vec<Fault>, result: Result<T, Message>) -> Option<T> {
+    result
+        .map_err(|message| faults.push(file.name.tensor_fault(tensor, message)))
+        .ok()
+}
+
+fn floats(view: &TensorView<'_>, shape: &[usize]) -> Result<Vec<f32>, Message> {
+    if view.shape() != shape {
+        return Err(catalogue::wrong_shape("this tensor", view.shape(), shape, None));
+    }
+    match view.dtype() {
+        dtype @ (Dtype::F32 | Dtype::F64) => tensors::values(dtype, view.data()),
+        other => Err(catalogue::wrong_dtype(&other.to_string(), "F32 or F64")),
+    }
+}
+
+fn integers(view: &TensorView<'_>, rows: usize, actions: usize) -> Result<Vec<u32>, Message> {
+    if view.shape() != [rows] {
+        return Err(catalogue::wrong_shape("this tensor", view.shape(), &[rows], None));
+    }
+    let data = view.data();
+    let numbers: Vec<i64> = match view.dtype() {
+        Dtype::I32 => tensors::chunks(data)
+            .map(|b| i64::from(i32::from_le_bytes(b)))
+            .collect(),
+        Dtype::U32 => tensors::chunks(data)
+            .map(|b| i64::from(u32::from_le_bytes(b)))
+            .collect(),
+        Dtype::I64 => tensors::chunks(data).map(i64::from_le_bytes).collect(),
+        Dtype::U8 => data.iter().map(|&b| i64::from(b)).collect(),
+        other => return Err(catalogue::wrong_dtype(&other.to_string(), "I32, I64, U8 or U32")),
+    };
+    let index = |(row, number): (usize, i64)| match u32::try_from(number) {
+        Ok(index) if (index as usize) < actions => Ok(index),
+        _ => Err(catalogue::golden_action(row, &number.to_string(), actions)),
+    };
+    numbers.into_iter().enumerate().map(index).collect()
+}
+
+/// Every observation lies within the bounds, give or take a few roundings of the trainer's own arithmetic.
+fn inside(observations: &[f32], features: &[Feature]) -> Result<(), Message> {
+    if features.is_empty() {
+        return Ok(());
+    }
+    for (row, values) in observations.chunks_exact(features.len()).enumerate() {
+        for (&value, feature) in values.iter().zip(features) {
+            let (low, high, value) = (feature.bound.low, feature.bound.high, f64::from(value));
+            let slack = 1e-6 * low.abs().max(high.abs());
+            if value < low - slack || value > high + slack {
+                return Err(catalogue::golden_outside(row, &feature.name, value, low, high));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Where both are given, the action has the largest Q value of its row.
+fn greedy(q_values: &[f32], chosen: &[u32], actions: usize) -> Result<(), Message> {
+    if q_values.is_empty() {
+        return Ok(());
+    }
+    for (row, (values, &action)) in q_values.chunks_exact(actions.max(1)).zip(chosen).enumerate() {
+        let best = values
+            .iter()
+            .enumerate()
+            .fold(0, |best, (i, q)| if *q > values[best] { i } else { best });
+        if values.get(action as usize).is_none_or(|q| *q < values[best]) {
+            return Err(catalogue::golden_not_greedy(row, action, best));
+        }
+    }
+    Ok(())
+}

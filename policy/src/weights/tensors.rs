@@ -1,0 +1,121 @@
+//! Tensors as finite binary32 numbers.
+
+use safetensors::{Dtype, SafeTensors};
+
+use super::catalogue;
+use crate::faults::{Fault, Message};
+use crate::limits::MAX_TENSOR_NAME_CHARS;
+use crate::raw::Binary;
+
+/// A tensor whose numbers are all finite.
+#[derive(Debug, Clone)]
+pub(crate) struct Tensor {
+    pub name: String,
+    pub shape: Vec<usize>,
+    pub values: Vec<f32>,
+}
+
+/// The readable tensors of a file, sorted by name, and what was converted or set aside.
+#[derive(Debug, Default)]
+pub(crate) struct Tensors {
+    pub list: Vec<Tensor>,
+    /// Names of tensors of integer type that cannot belong to a layer.
+    pub set_aside: Vec<String>,
+    pub notes: Vec<String>,
+}
+
+/// Converts every tensor; `None` if any is unfit.
+pub(crate) fn convert(file: &Binary, tensors: &SafeTensors<'_>, faults: &mut Vec<Fault>) -> Option<Tensors> {
+    let before = faults.len();
+    let mut result = Tensors::default();
+    let mut views = tensors.tensors();
+    views.sort_by(|(a, _), (b, _)| a.cmp(b));
+    let (mut rounded, mut widened) = (Vec::new(), Vec::new());
+    for (name, view) in &views {
+        if let Err(message) = sound(name, view.shape()) {
+            faults.push(file.name.tensor_fault(name, message));
+            continue;
+        }
+        match view.dtype() {
+            Dtype::F32 => {}
+            Dtype::F64 => rounded.push(name.as_str()),
+            Dtype::F16 | Dtype::BF16 => widened.push(name.as_str()),
+            _ if super::layers::role(name).is_none() => {
+                result.set_aside.push(name.clone());
+                continue;
+            }
+            other => {
+                let message = catalogue::wrong_dtype(&other.to_string(), "F32, F64, F16 or BF16");
+                faults.push(file.name.tensor_fault(name, message));
+                continue;
+            }
+        }
+        match values(view.dtype(), view.data()) {
+            Ok(values) => result.list.push(Tensor {
+                name: name.clone(),
+                shape: view.shape().to_vec(),
+                values,
+            }),
+            Err(message) => faults.push(file.name.tensor_fault(name, message)),
+        }
+    }
+    if !rounded.is_empty() {
+        result
+            .notes
+            .push(format!("64-bit tensors were rounded to f32: {}", rounded.join(", ")));
+    }
+    if !widened.is_empty() {
+        result.notes.push(format!(
+            "16-bit tensors were widened to f32 without loss: {}",
+            widened.join(", ")
+        ));
+    }
+    (faults.len() == before).then_some(result)
+}
+
+/// Whether a tensor's name can be printed and its shape holds anything.
+pub(crate) fn sound(name: &str, shape: &[usize]) -> Result<(), Message> {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '.' | '/' | ':' | '-');
+    if name.is_empty() || name.len() > MAX_TENSOR_NAME_CHARS || !name.chars().all(allowed) || name.contains("..") {
+        return Err(catalogue::odd_name(name));
+    }
+    if name.contains("//") {
+        return Err(catalogue::odd_name(name));
+    }
+    if shape.is_empty() || shape.contains(&0) {
+        return Err(catalogue::empty_tensor(shape));
+    }
+    Ok(())
+}
+
+/// Little-endian floats of `dtype` as finite binary32.
+pub(crate) fn values(dtype: Dtype, data: &[u8]) -> Result<Vec<f32>, Message> {
+    let wide = wide(dtype, data)?;
+    let narrow = wide.iter().enumerate().map(|(index, &value)| {
+        if !value.is_finite() {
+            return Err(catalogue::not_finite(index, value));
+        }
+        let rounded = value as f32;
+        if rounded.is_finite() {
+            Ok(rounded)
+        } else {
+            Err(catalogue::beyond_f32(index, value))
+        }
+    });
+    narrow.collect()
+}
+
+fn wide(dtype: Dtype, data: &[u8]) -> Result<Vec<f64>, Message> {
+    Ok(match dtype {
+        Dtype::F32 => chunks(data).map(|b| f64::from(f32::from_le_bytes(b))).collect(),
+        Dtype::F64 => chunks(data).map(f64::from_le_bytes).collect(),
+        Dtype::F16 => chunks(data).map(|b| half::f16::from_le_bytes(b).to_f64()).collect(),
+        Dtype::BF16 => chunks(data).map(|b| half::bf16::from_le_bytes(b).to_f64()).collect(),
+        other => return Err(catalogue::wrong_dtype(&other.to_string(), "F32, F64, F16 or BF16")),
+    })
+}
+
+/// The data in pieces of N bytes.
+pub(crate) fn chunks<const N: usize>(data: &[u8]) -> impl Iterator<Item = [u8; N]> + '_ {
+    data.as_chunks::<N>().0.iter().copied()
+}

@@ -1,0 +1,514 @@
+//! Faults of policy.toml: each with line, column, what was found and what to do.
+
+mod common;
+use common::*;
+use policy::Place;
+
+#[test]
+fn the_small_policy_is_accepted() {
+    let policy = Folder::new().policy();
+    assert_eq!(
+        (policy.features.len(), policy.layers.len(), policy.actions.len()),
+        (2, 2, 3)
+    );
+    assert_eq!(policy.files.len(), 3);
+}
+
+#[test]
+fn an_unknown_key_names_the_nearest_known_one() {
+    contract_fault(
+        "initial_duty = 0.5",
+        "¦intial_duty = 0.5",
+        &["unknown key `intial_duty` in [limits]", "initial_duty"],
+    );
+    contract_fault(
+        "unit = \"V\"\n",
+        "¦units = \"V\"\n",
+        &["[[signal]]", "did you mean `unit`?"],
+    );
+    contract_fault(
+        "name = \"buck\"",
+        "name = \"buck\"\n¦sample_time = 1.0",
+        &["at the top level"],
+    );
+}
+
+#[test]
+fn a_duplicate_key_is_refused_at_its_second_place() {
+    contract_fault("hold = 3", "hold = 3\n¦hold = 4", &["not valid TOML", "duplicate key"]);
+}
+
+#[test]
+fn a_decimal_comma_is_explained() {
+    contract_fault(
+        "scale = 0.2",
+        "scale = 1¦,5",
+        &["not valid TOML", "write 1.5 instead of 1,5"],
+    );
+    contract_fault("[0.40, 0.60]", "¦[0,40, 0,60]", &["4", "two numbers", "decimal comma"]);
+    contract_fault(
+        "scale = 0.2",
+        "scale = ¦\"1,5\"",
+        &["a number", "the text", "with a point"],
+    );
+}
+
+#[test]
+fn a_percentage_is_recognised() {
+    contract_fault(
+        "0.44, 0.50",
+        "¦44, 0.50",
+        &["not a duty ratio", "44", "0 to 1", "percentage: write 0.44"],
+    );
+    contract_fault("[0.40, 0.60]", "¦[40.0, 60.0]", &["percentage: write 0.4"]);
+    contract_fault("duty = 0.0", "duty = ¦-0.1", &["-0.1", "0 to 1"]);
+}
+
+#[test]
+fn numbers_that_are_not_finite_are_refused() {
+    contract_fault("scale = 0.2", "scale = ¦nan", &["not a finite number", "nan"]);
+    contract_fault("250.0", "¦inf", &["`range` is not a finite number", "inf"]);
+    contract_fault(
+        "sample_period = 1e-4",
+        "sample_period = ¦1e999",
+        &["not a finite number"],
+    );
+    contract_fault("v_ref = 100.0", "v_ref = ¦-inf", &["`v_ref`"])
+        .found
+        .unwrap();
+}
+
+#[test]
+fn crossed_limits_are_refused() {
+    contract_fault(
+        "[0.40, 0.60]",
+        "¦[0.60, 0.40]",
+        &["limits of `duty` are crossed", "low 0.6, high 0.4", "[0.4, 0.6]"],
+    );
+    contract_fault("[-20.0, 20.0]", "¦[20.0, -20.0]", &["`clip`", "crossed"]);
+    contract_fault("[0.0, 250.0]", "¦[5.0, 5.0]", &["single point", "low < high"]);
+}
+
+#[test]
+fn an_interval_without_an_f32_number_is_refused() {
+    contract_fault(
+        "[0.40, 0.60]",
+        "¦[0.4, 0.4]",
+        &["no f32 number lies inside `duty`", "[0.4, 0.4]", "wider"],
+    );
+    assert_eq!(
+        Folder::new()
+            .replace("[0.40, 0.60]", "[0.5, 0.5]")
+            .policy()
+            .limits
+            .duty
+            .low,
+        0.5
+    );
+}
+
+#[test]
+fn a_wrong_kind_of_value_is_named() {
+    contract_fault(
+        "hold = 3",
+        "hold = ¦3.0",
+        &[
+            "`hold` is of the wrong kind",
+            "the number 3",
+            "a whole number, 0 to 1000000",
+        ],
+    );
+    contract_fault(
+        "name = \"buck\"",
+        "name = ¦7",
+        &["the whole number 7", "a text in quotes"],
+    );
+    contract_fault("[0.40, 0.60]", "¦0.6", &["the number 0.6", "two numbers: [low, high]"]);
+    contract_fault("[{ delay = 1 }]", "¦{ delay = 1 }", &["a table", "an array of filters"]);
+    contract_fault("[{ delay = 1 }]", "[{ delay = ¦true }]", &["true", "1 to 256"]);
+}
+
+#[test]
+fn numbers_out_of_range_are_named() {
+    contract_fault(
+        "hold = 3",
+        "hold = ¦-1",
+        &["`hold` is out of range", "-1", "0 to 1000000"],
+    );
+    contract_fault(
+        "sample_period = 1e-4",
+        "sample_period = ¦10000",
+        &["period in seconds", "1e-9 s to 10 s"],
+    );
+    contract_fault("sample_period = 1e-4", "sample_period = ¦0", &["1e-9 s"]);
+    contract_fault("scale = 0.2", "scale = ¦1e-60", &["rounds to 0 in f32"]);
+    contract_fault("scale = 0.2", "scale = ¦0.0", &["`scale`", "0", "constant"]);
+    contract_fault("delay = 1 ", "delay = ¦257 ", &["257", "1 to 256"]);
+}
+
+#[test]
+fn a_missing_key_says_what_to_write() {
+    let fault = Folder::new().replace("name = \"buck\"\n", "").fault();
+    assert_whole_file(
+        &fault,
+        "policy.toml",
+        &["`name` is missing at the top level", "name = \"buck\""],
+    );
+    contract_fault(
+        "[limits]\nduty = [0.40, 0.60]\n",
+        "¦[limits]\n",
+        &["`duty` is missing in [limits]", "duty = [0.05, 0.95]"],
+    );
+    contract_fault(
+        "[[feature]]\nname = \"e\"\n",
+        "¦[[feature]]\n",
+        &["`name` is missing in [[feature]]"],
+    );
+    let fault = Folder::new().replace("[fallback]\nduty = 0.0\nhold = 3\n", "").fault();
+    assert_whole_file(&fault, "policy.toml", &["`fallback` is missing"]);
+    contract_fault(
+        "[network]\nweights = \"weights.safetensors\"\nhidden_activation = \"relu\"\n",
+        "¦[network]\nweights = \"weights.safetensors\"\n",
+        &["`hidden_activation` is missing", "weights do not say it"],
+    );
+}
+
+#[test]
+fn all_faults_of_all_files_come_together() {
+    let folder = Folder::new()
+        .replace("hold = 3", "hold = -3\ncolour = 1")
+        .replace("scale = 0.2", "scale = nan")
+        .replace("load_current = \"i_out\"", "load_current = \"i_oud\"")
+        .file(
+            "drm.toml",
+            MAPPING
+                .replace("a = 1.0", "a = -1.0")
+                .replace("i_out =", "i_o =")
+                .as_bytes(),
+        )
+        .tensors(&[dense("net.0", 4, 3), dense("net.2", 3, 4)].concat());
+    let faults = folder.faults();
+    let text = faults.to_string();
+    for word in [
+        "out of range",
+        "unknown key `colour`",
+        "not a finite",
+        "did you mean `i_out`?",
+        "`a` must be greater",
+        "unknown key `i_o`",
+        "`i_out` is missing in [valid]",
+        "shape [4, 3]",
+    ] {
+        assert!(text.contains(word), "{word}:\n{text}");
+    }
+    assert_eq!(faults.list.len(), 8, "{text}");
+    assert_eq!(faults.name.as_deref(), Some("buck"));
+    assert_eq!(
+        faults.signals,
+        [("v_out".to_owned(), false), ("i_out".to_owned(), false)]
+    );
+    assert_eq!(faults.files.len(), 3);
+}
+
+#[test]
+fn syntax_faults_are_collected_and_keep_name_and_signals() {
+    let folder = Folder::new()
+        .replace("scale = 0.2", "scale = = 1")
+        .replace("hold = 3", "hold = [1");
+    let faults = folder.faults();
+    let lines: Vec<_> = faults
+        .iter()
+        .filter_map(|f| f.line_column())
+        .map(|(line, _)| line)
+        .collect();
+    assert!(lines.contains(&21), "{faults}");
+    assert!(lines.len() >= 2, "{faults}");
+    assert_eq!(faults.name.as_deref(), Some("buck"));
+    assert_eq!(faults.signals.len(), 2);
+}
+
+#[test]
+fn a_fault_is_shown_with_its_line_and_carets() {
+    let fault = contract_fault("0.44, 0.50", "¦44, 0.50", &[]);
+    let text = fault.to_string();
+    assert!(
+        text.starts_with("error: `duties` is not a duty ratio\n  --> "),
+        "{text}"
+    );
+    assert!(text.contains("policy.toml:34:11\n   |\n34 | duties = [44, 0.50, 0.56]\n   |           ^^\n   = found: 44\n   = expected: 0 to 1\n   = hint: "), "{text}");
+}
+
+#[test]
+fn control_characters_of_a_file_do_not_reach_the_terminal() {
+    let faults = Folder::new()
+        .replace("name = \"buck\"", "name = \"b\u{1b}[31muck\"")
+        .faults();
+    assert!(!faults.to_string().contains('\u{1b}'), "{faults}");
+    let faults = Folder::new()
+        .replace("weights.safetensors", "w\\u001b.safetensors")
+        .faults();
+    assert!(!faults.to_string().contains('\u{1b}'), "{faults}");
+}
+
+#[test]
+fn crlf_and_a_byte_order_mark_are_accepted() {
+    let folder = Folder::new();
+    let plain = folder.policy().digests;
+    let text = format!("\u{feff}{}", CONTRACT.replace('\n', "\r\n"));
+    assert_eq!(folder.contract(&text).policy().digests, plain);
+    let (text, place) = unmark(&CONTRACT.replace("hold = 3", "hold = ¦-3"));
+    let fault = Folder::new()
+        .contract(&format!("\u{feff}{}", text.replace('\n', "\r\n")))
+        .fault();
+    assert_eq!(fault.line_column(), Some(place));
+    assert!(matches!(fault.place, Place::Span { text, .. } if text == "hold = -3"));
+}
+
+#[test]
+fn text_that_is_not_utf8_is_refused_with_its_place() {
+    let bytes = [b"name = \"b\"\nx = \"".as_slice(), &[0xe9], b"\"\n"].concat();
+    let fault = Folder::new().file("policy.toml", &bytes).fault();
+    assert_eq!(fault.line_column(), Some((2, 6)));
+    assert_says(&fault, &["not UTF-8", "0xe9"]);
+}
+
+#[test]
+fn a_contract_beyond_the_size_limit_is_refused() {
+    let fault = Folder::new().contract(&"#".repeat((1 << 20) + 1)).fault();
+    assert_whole_file(
+        &fault,
+        "policy.toml",
+        &["too large", "1048577 bytes", "at most 1048576"],
+    );
+}
+
+#[test]
+fn a_missing_file_a_folder_and_a_missing_companion_are_told_apart() {
+    let folder = Folder::new();
+    let missing = policy::load(&folder.path().join("nothing.toml")).unwrap_err();
+    assert_whole_file(&missing.list[0], "nothing.toml", &["cannot find the file"]);
+    let is_folder = policy::load(&folder.path()).unwrap_err();
+    assert_says(&is_folder.list[0], &["is a folder"]);
+    contract_fault(
+        "\"weights.safetensors\"",
+        "¦\"other.safetensors\"",
+        &["cannot find the file", "other.safetensors"],
+    );
+    contract_fault("file = \"drm.toml\"", "file = ¦\".\"", &["is a folder"]);
+}
+
+#[test]
+fn an_unsupported_numeric_format_lists_what_is() {
+    contract_fault(
+        "sample_period = 1e-4",
+        "sample_period = 1e-4\nnumeric_format = ¦\"i16\"",
+        &["not supported yet", "\"i16\"", "supported: f32"],
+    );
+}
+
+#[test]
+fn actions_are_two_to_256_duties_or_pairs() {
+    contract_fault("[0.44, 0.50, 0.56]", "¦[]", &["too few actions", "0", "2 to 256"]);
+    let faults = Folder::new().replace("[0.44, 0.50, 0.56]", "[0.5]").faults();
+    assert_says(&faults.list[0], &["too few actions", "1", "2 to 256"]);
+    let many = format!("[{}]", vec!["0.5"; 257].join(", "));
+    let faults = Folder::new().replace("[0.44, 0.50, 0.56]", &many).faults();
+    assert_says(&faults.list[0], &["too many actions", "257"]);
+    contract_fault(
+        "[actions]\n",
+        "¦[actions]\npairs = []\n",
+        &["exactly one of `duties`, `pairs`", "2"],
+    );
+}
+
+#[test]
+fn pairs_give_duties_pair_by_pair() {
+    let policy = Folder::new()
+        .replace("duties = [0.44, 0.50, 0.56]", "pairs = [{ xi = 0.5, phi = 0.05 }]")
+        .policy();
+    let duties: Vec<f64> = policy.actions.iter().map(|action| action.duty).collect();
+    assert_eq!(duties, [0.5 - 0.05, 0.5, 0.5 + 0.05]);
+    assert_eq!(policy.actions[2].pair.map(|pair| pair.c), Some(1));
+    let pairs = |text: &str| format!("pairs = [{text}]");
+    let duties = "duties = [0.44, 0.50, 0.56]";
+    contract_fault(
+        duties,
+        &pairs("¦{ xi = 0.98, phi = 0.05 }"),
+        &["xi + c phi with c = 1", "1.03"],
+    );
+    contract_fault(
+        duties,
+        &pairs("{ xi = 0.5, phi = 0.05, c = [¦2, 0, 1] }"),
+        &["`c`", "-1 to 1"],
+    );
+    contract_fault(duties, &pairs("{ xi = 0.5, phi = 0.05, c = [1, ¦1] }"), &["1 twice"]);
+    contract_fault(duties, &pairs("¦{ phi = 0.05 }"), &["`xi` is missing"]);
+}
+
+#[test]
+fn limits_slew_and_soft_start_must_work_in_f32() {
+    contract_fault("initial_duty = 0.5", "slew = ¦0.0", &["`slew`", "more than 0"]);
+    contract_fault("initial_duty = 0.5", "slew = ¦1e-50", &["`slew`"]);
+    contract_fault(
+        "initial_duty = 0.5",
+        "soft_start = { from = ¦0.7, steps = 10 }",
+        &["`from` lies outside", "0.7"],
+    );
+    contract_fault(
+        "initial_duty = 0.5",
+        "soft_start = ¦{ from = 0.59, steps = 1000000 }",
+        &["too slow for f32", "fewer steps"],
+    );
+    contract_fault(
+        "initial_duty = 0.5",
+        "soft_start = { from = 0.1, steps = ¦0 }",
+        &["`steps`", "1 to 1000000"],
+    );
+    let policy = Folder::new()
+        .replace(
+            "initial_duty = 0.5",
+            "slew = 0.01\nsoft_start = { from = 0.1, steps = 100 }",
+        )
+        .policy();
+    assert_eq!(policy.limits.initial_duty, 0.0, "the fallback duty by default");
+    assert_eq!(policy.limits.soft_start.map(|soft| soft.steps), Some(100));
+}
+
+#[test]
+fn adc_codes_must_be_able_to_say_the_range() {
+    let unit = "unit = \"V\"\n";
+    let with = |adc: &str| format!("{unit}adc = {adc}\n");
+    contract_fault(
+        unit,
+        &with("{ gain = ¦0.0, offset = 0.0 }"),
+        &["`gain`", "other than 0"],
+    );
+    contract_fault(
+        unit,
+        &with("¦{ gain = 1e-6, offset = 0.0 }"),
+        &["`v_out`", "250000000", "16777216"],
+    );
+    contract_fault(unit, &with("¦{ gain = 0.1 }"), &["`offset` is missing in adc"]);
+    let policy = Folder::new()
+        .replace(unit, &with("{ gain = -0.0625, offset = 0.5 }"))
+        .policy();
+    assert_eq!(
+        policy.signals[0].adc.map(|adc| (adc.gain, adc.offset)),
+        Some((-0.0625, 0.5))
+    );
+}
+
+#[test]
+fn filters_are_checked_one_by_one() {
+    let with = |filter: &str| format!("[{filter}]");
+    let one = "[{ delay = 1 }]";
+    contract_fault(
+        one,
+        &with("{ ¦dely = 1 }"),
+        &["unknown key `dely`", "did you mean `delay`?"],
+    );
+    contract_fault(one, &with("¦{ delay = 1, moving_average = 2 }"), &["exactly one", "2"]);
+    contract_fault(
+        one,
+        &with("¦\"backward_diference\""),
+        &["did you mean \"backward_difference\"?"],
+    );
+    contract_fault(
+        one,
+        &with("{ low_pass = { time_constant = ¦-1.0 } }"),
+        &["time constant", "-1"],
+    );
+    contract_fault(
+        one,
+        &with("{ low_pass = { time_constant = ¦1e3 } }"),
+        &["1e6 sample periods"],
+    );
+    contract_fault(
+        one,
+        &with("{ low_pass = ¦{} }"),
+        &["exactly one of time_constant, cutoff"],
+    );
+    contract_fault(one, &with("{ low_pass = { cutoff = ¦0 } }"), &["greater than 0"]);
+    contract_fault(one, &with("{ integrator = ¦{ min = 1.0, max = -1.0 } }"), &["crossed"]);
+    contract_fault(
+        one,
+        &with("{ integrator = { min = 1.0, max = 2.0, initial = ¦0.5 } }"),
+        &["outside the integrator's clamps"],
+    );
+    contract_fault(one, &with("{ moving_average = ¦1 }"), &["2 to 256"]);
+    let nine = vec!["{ delay = 1 }"; 9].join(", ");
+    contract_fault(one, &format!("¦[{nine}]"), &["too many filters", "9"]);
+}
+
+#[test]
+fn all_filters_of_the_contract_are_read() {
+    use policy::Filter::*;
+    let text = "[{ delay = 2 }, \"backward_difference\", { backward_difference = true }, { low_pass = { cutoff = 100.0 } }, \
+        { filtered_derivative = { time_constant = 1e-3 } }, { moving_average = 4 }, { integrator = { min = -1, max = 1 } }]";
+    let policy = Folder::new().replace("[{ delay = 1 }]", text).policy();
+    let tau = 1.0 / (2.0 * std::f64::consts::PI * 100.0);
+    assert_eq!(
+        policy.features[1].filters,
+        [
+            Delay { samples: 2 },
+            BackwardDifference,
+            BackwardDifference,
+            LowPass { time_constant: tau },
+            FilteredDerivative { time_constant: 1e-3 },
+            MovingAverage { samples: 4 },
+            Integrator {
+                min: -1.0,
+                max: 1.0,
+                initial: 0.0
+            }
+        ]
+    );
+}
+
+#[test]
+fn activations_are_never_guessed() {
+    use policy::Activation::*;
+    contract_fault(
+        "\"relu\"",
+        "¦\"ReLU\"",
+        &["hidden_activation", "did you mean \"relu\"?"],
+    );
+    contract_fault("\"relu\"", "¦\"sigmoid\"", &["\"sigmoid\"", "relu, tanh, identity"]);
+    contract_fault("\"relu\"", "¦[\"relu\", \"relu\"]", &["2", "1, one per hidden layer"]);
+    contract_fault("\"relu\"", "{ leaky_relu = ¦1.0 }", &["less than 1"]);
+    contract_fault("\"relu\"", "¦\"leaky_relu\"", &["{ leaky_relu = 0.01 }"]);
+    let with = |text: &str| Folder::new().replace("\"relu\"", text).policy().layers[0].activation;
+    assert_eq!(with("{ leaky_relu = 0.01 }"), LeakyRelu { slope: 0.01 });
+    assert_eq!(with("[\"tanh\"]"), Tanh);
+    let single = Folder::new()
+        .replace("hidden_activation = \"relu\"\n", "")
+        .tensors(&dense("out", 3, 2))
+        .policy();
+    assert_eq!(single.layers[0].activation, Identity);
+}
+
+#[test]
+fn a_feature_that_could_overflow_is_named() {
+    let folder = Folder::new().replace("scale = 0.2\nclip = [-20.0, 20.0]", "scale = 1e37");
+    assert_says(&folder.fault(), &["feature `e` could leave the range of f32", "narrow"]);
+}
+
+#[test]
+fn files_outside_the_root_are_refused() {
+    let root = Folder::new();
+    let options = policy::ReadOptions::within(root.path());
+    let load = |path: &str| policy::read(std::path::Path::new(path), &options).and_then(policy::check);
+    assert_eq!(load("policy.toml").unwrap().name, "buck");
+    let outside = load("../policy.toml").unwrap_err();
+    assert_says(&outside.list[0], &["outside the crate"]);
+    let root = root.replace("\"weights.safetensors\"", "\"../weights.safetensors\"");
+    let faults = load("policy.toml").unwrap_err();
+    assert_eq!(
+        faults.list[0].file.to_str(),
+        Some("policy.toml"),
+        "shown relative to the root"
+    );
+    assert_says(&faults.list[0], &["`../weights.safetensors` lies outside the crate"]);
+    assert_eq!(faults.list[0].line_column(), Some((30, 11)));
+    drop(root);
+}

@@ -1,0 +1,204 @@
+//! Views of the C99 backend.
+
+use askama::Template;
+
+/// A declaration with a trailing comment.
+#[derive(Debug, Clone)]
+pub struct Member {
+    /// Declaration without the semicolon.
+    pub declaration: String,
+    /// Text of the comment.
+    pub comment: String,
+}
+
+/// A macro `<PREFIX>_<name>` with its value.
+#[derive(Debug, Clone)]
+pub struct Constant {
+    /// Name without the prefix.
+    pub name: String,
+    /// Value as C text.
+    pub value: String,
+}
+
+/// A constant table.
+#[derive(Debug, Clone)]
+pub struct Table {
+    /// C type of an element.
+    pub element: &'static str,
+    /// Name without the prefix.
+    pub name: String,
+    /// Number of elements.
+    pub length: usize,
+    /// Lines of comma-separated literals.
+    pub lines: Vec<String>,
+}
+
+/// A dense layer.
+#[derive(Debug, Clone)]
+pub struct LayerView {
+    /// Number, from 0.
+    pub index: usize,
+    /// Tensor name and shape for the comment.
+    pub comment: String,
+    /// Inputs.
+    pub inputs: usize,
+    /// Outputs.
+    pub outputs: usize,
+    /// Loops over blocks of outputs, in order.
+    pub blocks: Vec<BlockView>,
+    /// Expression of the activation over `y[o]`; empty for none.
+    pub activation: String,
+    /// Name of the input array in `q_values`.
+    pub source: String,
+    /// Name of the output array in `q_values`.
+    pub sink: String,
+    /// Whether `sink` is a local buffer of `q_values`.
+    pub is_hidden: bool,
+}
+
+/// Blocks of equal height within a layer.
+#[derive(Debug, Clone)]
+pub struct BlockView {
+    /// Number of blocks.
+    pub count: usize,
+    /// Outputs per block.
+    pub rows: usize,
+    /// First output of the first block.
+    pub first_output: usize,
+    /// First table element of the first block.
+    pub first_weight: usize,
+    /// Table elements per block.
+    pub stride: usize,
+}
+
+/// A line of filter memory that `commit` pushes into.
+#[derive(Debug, Clone)]
+pub struct PushView {
+    /// First word.
+    pub word: usize,
+    /// Last word.
+    pub last: usize,
+    /// Index into `front->push`.
+    pub index: usize,
+}
+
+/// What both files need.
+#[derive(Debug, Clone)]
+pub struct Common {
+    /// Prefix of functions and types.
+    pub name: String,
+    /// Prefix of macros.
+    pub upper: String,
+    /// Lines of the banner.
+    pub banner: Vec<String>,
+    /// Parameters of `set_mapping` after the state; empty without a mapping.
+    pub mapping_parameters: String,
+}
+
+/// `<name>.h`
+#[derive(Debug, Template)]
+#[template(path = "c/header.h.jinja", escape = "none")]
+pub struct Header {
+    /// Names and banner.
+    pub common: Common,
+    /// Counts and limits.
+    pub constants: Vec<Constant>,
+    /// Status bits.
+    pub status: Vec<Constant>,
+    /// Members of the measurement.
+    pub measurement: Vec<Member>,
+    /// Members of the state, in contract order.
+    pub state: Vec<Member>,
+    /// One comment line per feature.
+    pub features: Vec<String>,
+}
+
+/// `<name>.c`
+#[derive(Debug, Template)]
+#[template(path = "c/source.c.jinja", escape = "none")]
+pub struct Source {
+    /// Names and banner.
+    pub common: Common,
+    /// Weights, biases, duties, CRC steps, self-test data.
+    pub tables: Vec<Table>,
+    /// Layers in order.
+    pub layers: Vec<LayerView>,
+    /// Which helper functions are used.
+    pub helpers: Helpers,
+    /// Numerator and denominator of tanh, highest power first.
+    pub tanh: Vec<Member>,
+    /// Members of the front struct that depend on the policy.
+    pub front_members: Vec<Member>,
+    /// Declarations of `sense`.
+    pub sense: Vec<String>,
+    /// Assignments at the end of `sense`.
+    pub sense_results: Vec<String>,
+    /// Declarations of `decide`.
+    pub decide: Vec<String>,
+    /// Value of the duty in a usable step.
+    pub duty: String,
+    /// Terms of the status word.
+    pub status_terms: Vec<String>,
+    /// Declarations of `advance`.
+    pub advance: Vec<String>,
+    /// Next soft-start limit; empty without.
+    pub soft_cap: String,
+    /// Number of sanitised signals.
+    pub signal_count: usize,
+    /// Filter memory updates.
+    pub pushes: Vec<PushView>,
+    /// Statements of `init`.
+    pub init: Vec<String>,
+    /// Statements of `reset`.
+    pub reset: Vec<String>,
+    /// Words of filter memory.
+    pub memory_words: usize,
+    /// Conditions of `set_mapping`.
+    pub mapping_conditions: Vec<String>,
+    /// Assignments of `set_mapping`.
+    pub mapping_assignments: Vec<String>,
+    /// Hold count.
+    pub hold: String,
+    /// Fallback duty.
+    pub fallback: String,
+    /// Tables of the integrity check: name without the prefix, length.
+    pub integrity: Vec<(String, usize)>,
+    /// Expected CRC-32.
+    pub crc: String,
+    /// Self test: number of vectors, seed, multiplier, increment, unit.
+    pub self_test: SelfTestView,
+}
+
+/// Which helpers the source needs.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Helpers {
+    /// `within`
+    pub within: bool,
+    /// `outside`
+    pub outside: bool,
+    /// `clamp`
+    pub clamp: bool,
+    /// `line_sum`
+    pub line_sum: bool,
+    /// `relu`
+    pub relu: bool,
+    /// `leaky_relu`
+    pub leaky_relu: bool,
+    /// `tanh`
+    pub tanh: bool,
+}
+
+/// Numbers of the self test.
+#[derive(Debug, Clone)]
+pub struct SelfTestView {
+    /// Number of vectors.
+    pub vectors: usize,
+    /// Seed.
+    pub seed: String,
+    /// Multiplier.
+    pub multiplier: String,
+    /// Increment.
+    pub increment: String,
+    /// Scale to 0..1.
+    pub unit: String,
+}

@@ -1,0 +1,242 @@
+//! Policies drawn at random from a seed: every kind of signal, feature, filter, activation, action, mapping and limit,
+//! with ties, zeros of both signs and subnormal weights.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use safetensors::Dtype;
+use safetensors::tensor::TensorView;
+use verify::traces::Rng;
+
+/// A policy folder.
+pub struct Folder {
+    /// Removed when dropped.
+    pub folder: tempfile::TempDir,
+    /// The contract as written.
+    pub contract: String,
+}
+
+impl Folder {
+    /// Path of `policy.toml`.
+    #[must_use]
+    pub fn path(&self) -> std::path::PathBuf {
+        self.folder.path().join("policy.toml")
+    }
+}
+
+/// Writes the policy of that seed into a temporary folder.
+///
+/// # Errors
+/// If the folder cannot be written.
+pub fn policy(seed: u64) -> std::io::Result<Folder> {
+    let folder = tempfile::tempdir()?;
+    let mut rng = Rng::new(seed);
+    let features = 1 + rng.below(9);
+    let actions = 2 + rng.below(32);
+    let hidden: Vec<usize> = (0..1 + rng.below(4)).map(|_| 1 + rng.below(40)).collect();
+    let contract = contract(&mut rng, seed, features, actions, hidden.len());
+    weights(&mut rng, folder.path(), features, &hidden, actions)?;
+    std::fs::write(folder.path().join("policy.toml"), &contract)?;
+    Ok(Folder { folder, contract })
+}
+
+fn contract(rng: &mut Rng, seed: u64, features: usize, actions: usize, hidden: usize) -> String {
+    let mut text = format!(
+        "name = \"random{seed}\"\nsample_period = {:?}\n\n",
+        rng.uniform(1e-5, 1e-3)
+    );
+    let signals = 1 + rng.below(5);
+    let _ = writeln!(
+        text,
+        "[parameters]\nk1 = {:?}\nk2 = {:?}\n",
+        rng.uniform(-3.0, 3.0),
+        rng.uniform(0.5, 2.0)
+    );
+    for index in 0..signals {
+        let _ = writeln!(text, "[[signal]]\nname = \"s{index}\"\nunit = \"V\"");
+        if rng.one_in(4) {
+            let (gain, offset) = (rng.uniform(0.01, 0.1), rng.uniform(-5.0, 5.0));
+            let high = offset + gain * 4095.0;
+            let _ = writeln!(
+                text,
+                "range = [{offset:?}, {high:?}]\nadc = {{ gain = {gain:?}, offset = {offset:?} }}\n"
+            );
+        } else {
+            let low = rng.uniform(-50.0, 10.0);
+            let _ = writeln!(text, "range = [{low:?}, {:?}]\n", low + rng.uniform(1.0, 200.0));
+        }
+    }
+    for index in 0..features {
+        feature(&mut text, rng, index, signals);
+    }
+    let _ = writeln!(text, "[network]\nweights = \"weights.safetensors\"");
+    let activations: Vec<&str> = (0..hidden)
+        .map(|_| {
+            rng.pick(
+                &["\"relu\"", "\"tanh\"", "{ leaky_relu = 0.01 }", "\"identity\""],
+                "\"relu\"",
+            )
+        })
+        .collect();
+    let _ = writeln!(text, "hidden_activation = [{}]\n", activations.join(", "));
+    action_table(&mut text, rng, actions);
+    protection(&mut text, rng, signals);
+    text
+}
+
+fn feature(text: &mut String, rng: &mut Rng, index: usize, signals: usize) {
+    let s = |rng: &mut Rng| format!("s{}", rng.below(signals));
+    let source = match rng.below(7) {
+        0 => s(rng),
+        1 => format!("k1 - {}", s(rng)),
+        2 => format!("({} - {}) / k2", s(rng), s(rng)),
+        3 => format!("-(2 * {} + k1) * 0.25 - {}", s(rng), s(rng)),
+        4 => "previous_duty".to_owned(),
+        5 => format!("previous_command - 0.01 * {}", s(rng)),
+        _ => format!("{} + k1 * k2 - 3 * {}", s(rng), s(rng)),
+    };
+    let _ = writeln!(text, "[[feature]]\nname = \"x{index}\"\nsource = \"{source}\"");
+    let filters: Vec<String> = (0..rng.below(3)).map(|_| filter(rng)).collect();
+    if !filters.is_empty() {
+        let _ = writeln!(text, "filters = [{}]", filters.join(", "));
+    }
+    if !rng.one_in(3) {
+        let _ = writeln!(text, "scale = {:?}", rng.uniform(-0.1, 0.1));
+    }
+    if rng.one_in(3) {
+        let _ = writeln!(text, "offset = {:?}", rng.uniform(-1.0, 1.0));
+    }
+    if !rng.one_in(4) {
+        let _ = writeln!(
+            text,
+            "clip = [{:?}, {:?}]",
+            rng.uniform(-4.0, -0.5),
+            rng.uniform(0.5, 4.0)
+        );
+    }
+    text.push('\n');
+}
+
+fn filter(rng: &mut Rng) -> String {
+    let tau = rng.uniform(1e-5, 1e-2);
+    match rng.below(6) {
+        0 => format!("{{ delay = {} }}", 1 + rng.below(4)),
+        1 => "\"backward_difference\"".to_owned(),
+        2 => format!("{{ low_pass = {{ time_constant = {tau:?} }} }}"),
+        3 => format!("{{ filtered_derivative = {{ time_constant = {tau:?} }} }}"),
+        4 => format!("{{ moving_average = {} }}", 2 + rng.below(6)),
+        _ => "{ integrator = { min = -0.5, max = 0.75, initial = 0.1 } }".to_owned(),
+    }
+}
+
+fn action_table(text: &mut String, rng: &mut Rng, actions: usize) {
+    // pairs give three duties each; what is left over becomes a shorter list of factors
+    if rng.one_in(2) {
+        let duties: Vec<String> = (0..actions).map(|_| format!("{:?}", rng.uniform(0.0, 1.0))).collect();
+        let _ = writeln!(text, "[actions]\nduties = [{}]\n", duties.join(", "));
+        return;
+    }
+    let mut pairs = Vec::new();
+    let mut left = actions;
+    while left > 0 {
+        let factors = ["", ", c = [0]", ", c = [-1, 1]", ""][left.min(3)];
+        left -= left.min(3);
+        pairs.push(format!(
+            "{{ xi = {:?}, phi = {:?}{factors} }}",
+            rng.uniform(0.3, 0.7),
+            rng.uniform(0.0, 0.3)
+        ));
+    }
+    let _ = writeln!(text, "[actions]\npairs = [{}]\n", pairs.join(", "));
+}
+
+fn protection(text: &mut String, rng: &mut Rng, signals: usize) {
+    if !rng.one_in(3) {
+        let _ = writeln!(
+            text,
+            "[mapping]\nfile = \"drm.toml\"\nload_current = \"s{}\"\n",
+            rng.below(signals)
+        );
+    }
+    let (low, high) = (rng.uniform(0.0, 0.4), rng.uniform(0.6, 1.0));
+    let _ = writeln!(text, "[limits]\nduty = [{low:?}, {high:?}]");
+    if rng.one_in(2) {
+        let _ = writeln!(text, "slew = {:?}", rng.uniform(0.001, 0.2));
+    }
+    if rng.one_in(2) {
+        let _ = writeln!(
+            text,
+            "soft_start = {{ from = {:?}, steps = {} }}",
+            rng.uniform(0.0, high),
+            1 + rng.below(200)
+        );
+    }
+    if rng.one_in(2) {
+        let _ = writeln!(text, "initial_duty = {:?}", rng.uniform(0.0, 1.0));
+    }
+    let _ = writeln!(
+        text,
+        "\n[fallback]\nduty = {:?}\nhold = {}",
+        rng.uniform(0.0, 1.0),
+        rng.below(6)
+    );
+}
+
+/// Weights and, used or not, a mapping.
+fn weights(rng: &mut Rng, folder: &Path, features: usize, hidden: &[usize], actions: usize) -> std::io::Result<()> {
+    let widths: Vec<usize> = std::iter::once(features)
+        .chain(hidden.iter().copied())
+        .chain([actions])
+        .collect();
+    let mut tensors = Vec::new();
+    for (layer, pair) in widths.windows(2).enumerate() {
+        let (inputs, outputs) = (pair[0], pair[1]);
+        let spread = 1.5 / (inputs as f64).sqrt();
+        let mut rows: Vec<Vec<f32>> = (0..outputs)
+            .map(|_| (0..=inputs).map(|_| weight(rng, spread)).collect())
+            .collect();
+        // equal rows give equal outputs: ties for argmax
+        if rng.one_in(2) {
+            let (from, to) = (rng.below(outputs), rng.below(outputs));
+            rows[to] = rows[from].clone();
+        }
+        let matrix: Vec<f32> = rows.iter().flat_map(|row| row[..inputs].to_vec()).collect();
+        let bias: Vec<f32> = rows.iter().map(|row| row[inputs]).collect();
+        tensors.push((format!("fc{layer}.weight"), vec![outputs, inputs], bytes(&matrix)));
+        tensors.push((format!("fc{layer}.bias"), vec![outputs], bytes(&bias)));
+    }
+    let views: Result<Vec<_>, _> = tensors
+        .iter()
+        .map(|(name, shape, data)| TensorView::new(Dtype::F32, shape.clone(), data).map(|view| (name.clone(), view)))
+        .collect();
+    let file = views
+        .and_then(|views| safetensors::serialize(views, None))
+        .map_err(std::io::Error::other)?;
+    std::fs::write(folder.join("weights.safetensors"), file)?;
+    let product = if rng.one_in(2) {
+        format!("r = {:?}\n", rng.uniform(-1e-3, 1e-3))
+    } else {
+        String::new()
+    };
+    let (a, b, c) = (
+        rng.uniform(0.7, 1.3),
+        rng.uniform(-0.003, 0.003),
+        rng.uniform(-0.05, 0.05),
+    );
+    let text = format!("a = {a:?}\nb = {b:?}\nc = {c:?}\n{product}[valid]\ni_out = [0.0, 20.0]\nd_sim = [0.2, 0.8]\n");
+    std::fs::write(folder.join("drm.toml"), text)
+}
+
+fn weight(rng: &mut Rng, spread: f64) -> f32 {
+    match rng.below(24) {
+        0 => 0.0,
+        1 => -0.0,
+        2 => f32::from_bits(1 + rng.below(1 << 22) as u32),
+        3 => -f32::from_bits(1 + rng.below(1 << 22) as u32),
+        _ => rng.uniform(-spread, spread) as f32,
+    }
+}
+
+fn bytes(values: &[f32]) -> Vec<u8> {
+    values.iter().flat_map(|value| value.to_le_bytes()).collect()
+}

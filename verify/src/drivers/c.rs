@@ -1,0 +1,223 @@
+//! The driver in C99.
+
+use std::fmt::Write;
+
+use policy::Policy;
+
+use super::mapping_terms;
+use crate::protocol::{MAGIC, kind, purity};
+
+/// Text of the driver for the generated `<name>.h`.
+pub fn text(policy: &Policy) -> String {
+    let name = &policy.name;
+    let macro_name = name.to_uppercase();
+    let measurement = measurement(policy);
+    let set_mapping = set_mapping(policy);
+    let (step, set, reset, init) = (kind::STEP, kind::SET_MAPPING, kind::RESET, kind::INIT);
+    let (network, flush) = (kind::NETWORK, kind::FLUSH);
+    let purity_tests = purity_tests(name);
+    format!(
+        r#"/* Driver of the differential check: events in, answers out, in words of the machine. */
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "{name}.h"
+
+#define STATE_WORDS (sizeof({name}_state) / 4u)
+
+static {name}_state state;       /* advanced by step */
+static {name}_state twin;        /* advanced by eval and commit */
+static {name}_state before;
+static {name}_measurement m;
+static {name}_command command;
+static float observation[{macro_name}_FEATURES];
+static float q[{macro_name}_ACTIONS];
+
+static void put(const void *words, size_t count)
+{{
+    if (fwrite(words, 4u, count, stdout) != count) {{
+        exit(4);
+    }}
+}}
+
+static void put_word(uint32_t word)
+{{
+    put(&word, 1u);
+}}
+
+/* 0 at the end of the stream */
+static int get(void *words, size_t count)
+{{
+    return fread(words, 4u, count, stdin) == count;
+}}
+
+static void put_state(void)
+{{
+    put(&state, STATE_WORDS);
+}}
+
+static void start(void)
+{{
+    /* garbage first: init must write every word */
+    memset(&state, 0xA5, sizeof state);
+    memset(&twin, 0x5A, sizeof twin);
+    {name}_init(&state);
+    {name}_init(&twin);
+}}
+
+static int read_measurement(void)
+{{
+    uint32_t words[{signals}];
+    if (!get(words, {signals}u)) {{
+        return 0;
+    }}
+{measurement}    return 1;
+}}
+
+static void step(void)
+{{
+    {name}_command first;
+    {name}_command second;
+    {name}_command third;
+    uint32_t purity = 0u;
+    memset(&first, 0, sizeof first);
+    memset(&second, 0xFF, sizeof second);
+    memset(&third, 0xFF, sizeof third);
+    memset(&command, 0xFF, sizeof command);
+    memcpy(&before, &state, sizeof state);
+{purity_tests}
+    put(observation, {macro_name}_FEATURES);
+    put(q, {macro_name}_ACTIONS);
+    put(&command.duty, 1u);
+    put(&command.duty_sim, 1u);
+    put_word(command.action_index);
+    put_word(command.status);
+    put_state();
+    put_word(purity);
+}}
+{set_mapping}
+int main(void)
+{{
+    static char in_buffer[1 << 16];
+    static char out_buffer[1 << 16];
+    uint32_t kind;
+    setvbuf(stdin, in_buffer, _IOFBF, sizeof in_buffer);
+    setvbuf(stdout, out_buffer, _IOFBF, sizeof out_buffer);
+    put_word({MAGIC}u);
+    put_word({name}_self_test());
+    put_word({name}_integrity());
+    put_word({macro_name}_SIGNALS);
+    put_word({macro_name}_FEATURES);
+    put_word({macro_name}_ACTIONS);
+    put_word((uint32_t)STATE_WORDS);
+    fflush(stdout);
+    start();
+    while (get(&kind, 1u)) {{
+        switch (kind) {{
+        case {step}u:
+            if (!read_measurement()) {{
+                return 2;
+            }}
+            step();
+            break;
+        case {set}u:
+            if (!set_mapping()) {{
+                return 2;
+            }}
+            break;
+        case {reset}u:
+            {name}_reset(&state);
+            {name}_reset(&twin);
+            put_state();
+            break;
+        case {init}u:
+            start();
+            put_state();
+            break;
+        case {network}u:
+            if (!get(observation, {macro_name}_FEATURES)) {{
+                return 2;
+            }}
+            {name}_q_values(observation, q);
+            put(q, {macro_name}_ACTIONS);
+            break;
+        case {flush}u:
+            fflush(stdout);
+            break;
+        default:
+            return 3;
+        }}
+    }}
+    return 0;
+}}
+"#,
+        signals = policy.signals.len(),
+    )
+}
+
+fn measurement(policy: &Policy) -> String {
+    let mut text = String::new();
+    for (n, signal) in policy.signals.iter().enumerate() {
+        // writing to a String cannot fail
+        let _ = writeln!(text, "    memcpy(&m.{}, &words[{n}], 4u);", signal.name);
+    }
+    text
+}
+
+fn purity_tests(name: &str) -> String {
+    let purity_bits = [
+        purity::OBSERVE_CHANGED_STATE,
+        purity::EVAL_CHANGED_STATE,
+        purity::EVAL_NOT_REPEATABLE,
+        purity::STEP_IS_NOT_EVAL,
+        purity::COMMIT_IS_NOT_STEP,
+    ];
+    let [observe, eval, repeat, step, commit] = purity_bits;
+    let same = |a: &str, b: &str| {
+        format!(
+            "memcmp(&{a}.duty, &{b}.duty, 4u) || memcmp(&{a}.duty_sim, &{b}.duty_sim, 4u)\n        \
+             || {a}.action_index != {b}.action_index || {a}.status != {b}.status"
+        )
+    };
+    let first_second = same("first", "second");
+    let first_command = same("first", "command");
+    format!(
+        "    {name}_observe(&state, &m, observation);
+    {name}_q_values(observation, q);
+    purity |= memcmp(&before, &state, sizeof state) ? {observe}u : 0u;
+    {name}_eval(&state, &m, &first);
+    {name}_eval(&state, &m, &second);
+    purity |= memcmp(&before, &state, sizeof state) ? {eval}u : 0u;
+    purity |= ({first_second}) ? {repeat}u : 0u;
+    {name}_step(&state, &m, &command);
+    purity |= ({first_command}) ? {step}u : 0u;
+    {name}_eval(&twin, &m, &third);
+    {name}_commit(&twin, &m, &third);
+    purity |= memcmp(&twin, &state, sizeof state) ? {commit}u : 0u;"
+    )
+}
+
+fn set_mapping(policy: &Policy) -> String {
+    let name = &policy.name;
+    let arguments = match mapping_terms(policy) {
+        Some(4) => "k[0], k[1], k[2], k[3]",
+        Some(_) => "k[0], k[1], k[2]",
+        None => return "\nstatic int set_mapping(void)\n{\n    return 0;\n}\n".to_owned(),
+    };
+    format!(
+        "
+static int set_mapping(void)
+{{
+    float k[4];
+    if (!get(k, 4u)) {{
+        return 0;
+    }}
+    (void){name}_set_mapping(&twin, {arguments});
+    put_word({name}_set_mapping(&state, {arguments}));
+    put_state();
+    return 1;
+}}
+"
+    )
+}

@@ -1,0 +1,202 @@
+//! The driver in Rust.
+
+use std::fmt::Write;
+
+use policy::Policy;
+
+use super::mapping_terms;
+use crate::protocol::{MAGIC, kind, purity};
+
+/// Text of the driver for the generated module in the file `path`, relative to the driver.
+pub fn text(policy: &Policy, path: &str) -> String {
+    let name = &policy.name;
+    let mut text = String::new();
+    // writing to a String cannot fail
+    let _ = write!(
+        text,
+        r#"// Driver of the differential check: events in, answers out, in words of the machine.
+#[path = "{path}"]
+#[allow(dead_code)]
+mod {name};
+
+use std::io::{{BufReader, BufWriter, ErrorKind, Read, Stdin, Stdout, Write}};
+
+use {name}::{{Command, Controller, Measurement}};
+
+struct Driver {{
+    input: BufReader<Stdin>,
+    output: BufWriter<Stdout>,
+    /// Advanced by step.
+    state: Controller,
+    /// Advanced by eval and commit.
+    twin: Controller,
+}}
+{HELPERS}
+{step}{set_mapping}{main}"#,
+        step = step(policy),
+        set_mapping = set_mapping(policy),
+        main = main(policy),
+    );
+    text
+}
+
+const HELPERS: &str = r#"
+impl Driver {
+    fn put(&mut self, words: impl IntoIterator<Item = u32>) {
+        for word in words {
+            self.output.write_all(&word.to_ne_bytes()).unwrap();
+        }
+    }
+
+    fn put_state(&mut self) {
+        let words = self.state.state_words();
+        self.put(words);
+    }
+
+    /// None at the end of the stream.
+    fn get<const N: usize>(&mut self) -> Option<[u32; N]> {
+        let mut words = [0; N];
+        for word in &mut words {
+            let mut bytes = [0; 4];
+            match self.input.read_exact(&mut bytes) {
+                Ok(()) => *word = u32::from_ne_bytes(bytes),
+                Err(error) if error.kind() == ErrorKind::UnexpectedEof => return None,
+                Err(error) => panic!("{}", error),
+            }
+        }
+        Some(words)
+    }
+}
+
+fn bits(command: &Command) -> [u32; 4] {
+    [command.duty.to_bits(), command.duty_sim.to_bits(), command.action_index, command.status]
+}
+"#;
+
+fn step(policy: &Policy) -> String {
+    let name = &policy.name;
+    let signals = policy.signals.len();
+    let mut fields = String::new();
+    for (n, signal) in policy.signals.iter().enumerate() {
+        let value = match signal.adc {
+            Some(_) => format!("words[{n}] as i32"),
+            None => format!("f32::from_bits(words[{n}])"),
+        };
+        let _ = writeln!(fields, "            {}: {value},", signal.name);
+    }
+    let [observe, eval, repeat, step, commit] = [
+        purity::OBSERVE_CHANGED_STATE,
+        purity::EVAL_CHANGED_STATE,
+        purity::EVAL_NOT_REPEATABLE,
+        purity::STEP_IS_NOT_EVAL,
+        purity::COMMIT_IS_NOT_STEP,
+    ];
+    format!(
+        r#"
+impl Driver {{
+    fn step(&mut self, words: [u32; {signals}]) {{
+        let m = Measurement {{
+{fields}        }};
+        let before = self.state.state_words();
+        let observation = self.state.observe(&m);
+        let q = Controller::q_values(&observation);
+        let mut purity = 0;
+        let flag = |wrong: bool, bit: u32| if wrong {{ bit }} else {{ 0 }};
+        purity |= flag(before != self.state.state_words(), {observe});
+        let first = self.state.eval(&m);
+        let second = self.state.eval(&m);
+        purity |= flag(before != self.state.state_words(), {eval});
+        purity |= flag(bits(&first) != bits(&second), {repeat});
+        let command = self.state.step(&m);
+        purity |= flag(bits(&first) != bits(&command), {step});
+        let third = self.twin.eval(&m);
+        self.twin.commit(&m, &third);
+        purity |= flag(self.twin.state_words() != self.state.state_words(), {commit});
+        let _: ([f32; {name}::FEATURES], [f32; {name}::ACTIONS]) = (observation, q);
+        self.put(observation.iter().map(|x| x.to_bits()));
+        self.put(q.iter().map(|x| x.to_bits()));
+        self.put(bits(&command));
+        self.put_state();
+        self.put([purity]);
+    }}
+}}
+"#
+    )
+}
+
+fn set_mapping(policy: &Policy) -> String {
+    let arguments = match mapping_terms(policy) {
+        Some(4) => "a, b, c, r",
+        Some(_) => "a, b, c",
+        None => return "\nimpl Driver {\n    fn set_mapping(&mut self, _: [u32; 4]) {\n        std::process::exit(3);\n    }\n}\n".to_owned(),
+    };
+    let unused = if arguments.ends_with('r') { "r" } else { "_" };
+    format!(
+        r#"
+impl Driver {{
+    fn set_mapping(&mut self, words: [u32; 4]) {{
+        let [a, b, c, {unused}] = words.map(f32::from_bits);
+        self.twin.set_mapping({arguments});
+        let accepted: bool = self.state.set_mapping({arguments});
+        self.put([accepted as u32]);
+        self.put_state();
+    }}
+}}
+"#
+    )
+}
+
+fn main(policy: &Policy) -> String {
+    let name = &policy.name;
+    let (step, set, reset, init) = (kind::STEP, kind::SET_MAPPING, kind::RESET, kind::INIT);
+    let (network, flush) = (kind::NETWORK, kind::FLUSH);
+    format!(
+        r#"
+fn main() {{
+    let mut driver = Driver {{
+        input: BufReader::with_capacity(1 << 16, std::io::stdin()),
+        output: BufWriter::with_capacity(1 << 16, std::io::stdout()),
+        state: Controller::new(),
+        twin: Controller::new(),
+    }};
+    let self_test: Result<(), u32> = Controller::self_test();
+    let integrity: bool = Controller::integrity();
+    let state_words = driver.state.state_words().len() as u32;
+    driver.put([{MAGIC}, self_test.err().unwrap_or(0), integrity as u32, {signals}]);
+    driver.put([{name}::FEATURES as u32, {name}::ACTIONS as u32, state_words]);
+    driver.output.flush().unwrap();
+    while let Some([kind]) = driver.get() {{
+        let truncated = "event ends early";
+        match kind {{
+            {step} => {{
+                let words = driver.get().expect(truncated);
+                driver.step(words);
+            }}
+            {set} => {{
+                let words = driver.get().expect(truncated);
+                driver.set_mapping(words);
+            }}
+            {reset} => {{
+                driver.state.reset();
+                driver.twin.reset();
+                driver.put_state();
+            }}
+            {init} => {{
+                driver.state = Controller::new();
+                driver.twin = Controller::new();
+                driver.put_state();
+            }}
+            {network} => {{
+                let words: [u32; {name}::FEATURES] = driver.get().expect(truncated);
+                let q = Controller::q_values(&words.map(f32::from_bits));
+                driver.put(q.iter().map(|x| x.to_bits()));
+            }}
+            {flush} => driver.output.flush().unwrap(),
+            _ => panic!("unknown event"),
+        }}
+    }}
+}}
+"#,
+        signals = policy.signals.len(),
+    )
+}

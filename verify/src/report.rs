@@ -1,0 +1,152 @@
+//! What came out, as data.
+
+use serde::Serialize;
+
+use crate::oracle::Coverage;
+
+/// Result of a verification.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// Name of the policy.
+    pub policy: String,
+    /// Seed of the stream.
+    pub seed: u64,
+    /// Control steps of the stream.
+    pub steps: u64,
+    /// CRC-32 over every word the interpreter expects of this stream: equal builds share it.
+    pub checksum: String,
+    /// What the stream has reached.
+    pub coverage: Coverage,
+    /// Known answers against the interpreter; `None` if the policy has none.
+    pub golden: Option<GoldenResult>,
+    /// One entry per build.
+    pub builds: Vec<BuildReport>,
+}
+
+impl Report {
+    /// At least one build was compared, all compared builds are equal, all known answers hold.
+    pub fn passed(&self) -> bool {
+        let golden = |result: &Option<GoldenResult>| result.as_ref().is_none_or(GoldenResult::passed);
+        let compared = self.builds.iter().any(|build| build.outcome == Outcome::Equal);
+        let sound = |build: &BuildReport| {
+            matches!(build.outcome, Outcome::Equal | Outcome::Skipped { .. }) && golden(&build.golden)
+        };
+        compared && golden(&self.golden) && self.builds.iter().all(sound)
+    }
+
+    /// The builds that could not be made here.
+    pub fn skipped(&self) -> impl Iterator<Item = &BuildReport> {
+        self.builds
+            .iter()
+            .filter(|build| matches!(build.outcome, Outcome::Skipped { .. }))
+    }
+}
+
+/// One compiler at one optimisation level.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BuildReport {
+    /// Such as `gcc -O2`.
+    pub build: String,
+    /// First line of the compiler's version text; empty if it is missing.
+    pub compiler: String,
+    /// Steps compared, all equal up to here.
+    pub steps_compared: u64,
+    /// Result.
+    pub outcome: Outcome,
+    /// Known answers against this build; `None` if the policy has none or the build did not run.
+    pub golden: Option<GoldenResult>,
+}
+
+/// Result of one build.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "result", rename_all = "snake_case")]
+pub enum Outcome {
+    /// Every word was equal.
+    Equal,
+    /// The first word that was not.
+    Different {
+        /// Where and what.
+        difference: Box<Difference>,
+    },
+    /// It crashed or hung.
+    Failed {
+        /// Step at which it happened.
+        step: u64,
+        /// The event it did not answer.
+        event: String,
+        /// What happened.
+        reason: String,
+        /// The measurement of that step.
+        measurement: Vec<Measured>,
+    },
+    /// The compiler refused the code.
+    CompileError {
+        /// The compiler's text.
+        message: String,
+    },
+    /// Not compared.
+    Skipped {
+        /// Why.
+        reason: String,
+        /// The Debian package that has the compiler, if that is what is missing.
+        package: Option<String>,
+    },
+}
+
+/// The first word of a build that is not the interpreter's.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Difference {
+    /// Control steps completed before; the step itself if `event` is a step.
+    pub step: u64,
+    /// `step`, `set_mapping`, `reset`, `init`, `network` or `start`.
+    pub event: String,
+    /// The word, such as `observation[2] (de_dt)`, `q[5]`, `state held.v_out`, `status`.
+    pub what: String,
+    /// What the interpreter says.
+    pub expected: Value,
+    /// What the build says.
+    pub got: Value,
+    /// The measurement of that step.
+    pub measurement: Vec<Measured>,
+}
+
+/// A word, read as what it is.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Value {
+    /// Number, or names of status bits.
+    pub value: String,
+    /// The bits, as `0x3f000000`.
+    pub bits: String,
+}
+
+/// One signal of a measurement.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Measured {
+    /// Name of the signal.
+    pub signal: String,
+    /// Value or ADC code.
+    pub sample: Value,
+}
+
+/// Known answers of the trainer against the interpreter or a build.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GoldenResult {
+    /// Number of vectors.
+    pub vectors: usize,
+    /// Vectors with an action to compare; 0 if the trainer gave Q values only.
+    pub actions_compared: usize,
+    /// Vectors with the trainer's action.
+    pub actions_equal: usize,
+    /// Largest |Q - golden| relative to the largest |Q| of its vector; `None` if the trainer gave actions only.
+    pub worst_relative_error: Option<f64>,
+    /// Allowed error.
+    pub tolerance: f64,
+}
+
+impl GoldenResult {
+    /// All actions equal, all Q values within the tolerance.
+    pub fn passed(&self) -> bool {
+        self.actions_equal == self.actions_compared
+            && self.worst_relative_error.is_none_or(|error| error <= self.tolerance)
+    }
+}

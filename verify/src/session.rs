@@ -1,0 +1,329 @@
+//! A whole verification: compile, feed, compare.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread;
+use std::time::Duration;
+
+use codegen::Language;
+use interp::InputError;
+use policy::Policy;
+use targets::TargetSpec;
+
+use crate::golden;
+use crate::lane::Lane;
+use crate::oracle::{Chunk, Oracle};
+use crate::protocol::Layout;
+use crate::report::{BuildReport, Outcome, Report};
+use crate::runner::ProcessRunner;
+use crate::toolchain::{self, Build, BuildError, Sources};
+use crate::traces::{Recorded, Stream};
+
+/// Generated files: relative path to text.
+pub type Files = BTreeMap<String, String>;
+
+/// What to verify and how.
+pub struct Options<'a> {
+    /// Control steps of the stream; recordings count.
+    pub steps: u64,
+    /// Seed of the stream.
+    pub seed: u64,
+    /// Files to verify; `None` generates them anew for the host, in C and Rust.
+    pub generated: Option<&'a Files>,
+    /// Names of the compilers to use; all if empty.
+    pub compilers: Vec<String>,
+    /// More flags for the C compilers, after all others.
+    pub extra_flags: Vec<String>,
+    /// Recordings to play before the random part.
+    pub recorded: Vec<Recorded>,
+    /// A build that sends nothing for so long has failed.
+    pub timeout: Duration,
+    /// Told how far it is.
+    pub progress: Option<&'a mut dyn FnMut(Progress)>,
+}
+
+impl Default for Options<'_> {
+    fn default() -> Self {
+        Self {
+            steps: 100_000,
+            seed: 1,
+            generated: None,
+            compilers: Vec::new(),
+            extra_flags: Vec::new(),
+            recorded: Vec::new(),
+            timeout: Duration::from_secs(60),
+            progress: None,
+        }
+    }
+}
+
+/// How far a verification is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Progress {
+    /// The builds are being compiled.
+    Compiling {
+        /// Number of builds.
+        builds: usize,
+    },
+    /// The stream is running.
+    Running {
+        /// Steps the interpreter has done; the builds follow closely.
+        steps: u64,
+        /// Steps of the whole stream.
+        of: u64,
+    },
+}
+
+/// Why there is no report. Differences are no errors: they are in the report.
+#[derive(Debug)]
+pub enum VerifyError {
+    /// The table of targets has no `host`.
+    NoHostTarget,
+    /// A name in [`Options::compilers`] is none of [`toolchain::COMPILERS`].
+    UnknownCompiler(String),
+    /// The code could not be generated.
+    Codegen(codegen::CodegenError),
+    /// The interpreter refused an event.
+    Interpreter(InputError),
+    /// A temporary folder could not be made or a folder not be read.
+    Io(PathBuf, std::io::Error),
+}
+
+impl fmt::Display for VerifyError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoHostTarget => write!(f, "internal fault: no target `host`"),
+            Self::UnknownCompiler(name) => {
+                let known: Vec<&str> = toolchain::COMPILERS.iter().map(|compiler| compiler.name).collect();
+                write!(f, "unknown compiler `{name}`: expected one of {}", known.join(", "))
+            }
+            Self::Codegen(error) => write!(f, "{error}"),
+            Self::Interpreter(error) => write!(f, "internal fault: interpreter: {error}"),
+            Self::Io(path, error) => write!(f, "{}: {error}", path.display()),
+        }
+    }
+}
+
+impl std::error::Error for VerifyError {}
+
+/// Steps per chunk.
+const CHUNK: u64 = 4096;
+/// Chunks a slow build may lag behind.
+const LAG: usize = 2;
+
+/// Compiles the policy's code with every compiler at hand and compares it with the interpreter.
+///
+/// # Errors
+/// If nothing could be compared for reasons other than the generated code; see [`VerifyError`].
+pub fn run(policy: &Policy, options: Options<'_>) -> Result<Report, VerifyError> {
+    let Options {
+        steps,
+        seed,
+        generated,
+        compilers,
+        extra_flags,
+        recorded,
+        timeout,
+        mut progress,
+    } = options;
+    let mut tell = |news: Progress| {
+        if let Some(progress) = &mut progress {
+            progress(news);
+        }
+    };
+    let unknown = compilers
+        .iter()
+        .find(|name| toolchain::COMPILERS.iter().all(|known| known.name != **name));
+    if let Some(name) = unknown {
+        return Err(VerifyError::UnknownCompiler(name.clone()));
+    }
+    let target = targets::find("host").ok_or(VerifyError::NoHostTarget)?;
+    let fresh;
+    let files = match generated {
+        Some(files) => files,
+        None => {
+            fresh = generate(policy, target, &Language::ALL)?;
+            &fresh
+        }
+    };
+    let builds = toolchain::builds(&compilers);
+    let temp = std::env::temp_dir();
+    let folder = tempfile::tempdir().map_err(|error| VerifyError::Io(temp, error))?;
+    tell(Progress::Compiling { builds: builds.len() });
+    let sources = Sources {
+        policy,
+        files,
+        target,
+        extra_flags: &extra_flags,
+    };
+    let compiled = compile_all(&builds, sources, folder.path());
+
+    let mut oracle = Oracle::new(policy);
+    let layout = oracle.layout().clone();
+    let known = oracle
+        .chunk_of(golden::events(policy))
+        .map_err(VerifyError::Interpreter)?;
+    let golden = policy
+        .golden
+        .as_ref()
+        .map(|golden| golden::judge(golden, policy.actions.len(), &known.expected));
+    let mut stream = Stream::new(policy, seed, &recorded);
+    let builds = thread::scope(|scope| {
+        let mut feeds = Vec::new();
+        let mut lanes = Vec::new();
+        for (build, compiled) in builds.iter().zip(compiled) {
+            let (feed, chunks) = sync_channel(LAG);
+            let (layout, known) = (&layout, &known);
+            feeds.push(Some(feed));
+            lanes.push(scope.spawn(move || lane(policy, layout, build, compiled, known, &chunks, timeout)));
+        }
+        while oracle.steps() < steps && feeds.iter().any(Option::is_some) {
+            let chunk = oracle.next_chunk(&mut stream, CHUNK.min(steps - oracle.steps()))?;
+            send(&mut feeds, &Arc::new(chunk));
+            tell(Progress::Running {
+                steps: oracle.steps(),
+                of: steps,
+            });
+        }
+        drop(feeds);
+        // a lane does not panic; if one does, that is a fault of ours and must not pass as equal
+        let reports = lanes.into_iter().zip(&builds).map(|(lane, build)| {
+            lane.join()
+                .unwrap_or_else(|_| entry(build, 0, failed("the comparison itself panicked")))
+        });
+        Ok(reports.collect())
+    })
+    .map_err(VerifyError::Interpreter)?;
+    Ok(Report {
+        policy: policy.name.clone(),
+        seed,
+        steps: oracle.steps(),
+        checksum: format!("{:08x}", oracle.checksum()),
+        coverage: oracle.coverage().clone(),
+        golden,
+        builds,
+    })
+}
+
+/// The policy's files for `target` in each of `languages`.
+pub(crate) fn generate(policy: &Policy, target: &TargetSpec, languages: &[Language]) -> Result<Files, VerifyError> {
+    let mut files = Files::new();
+    for &language in languages {
+        files.extend(
+            codegen::compile(policy, target, language)
+                .map_err(VerifyError::Codegen)?
+                .files,
+        );
+    }
+    Ok(files)
+}
+
+/// Sends a chunk to every build that is still in the race.
+fn send(feeds: &mut [Option<SyncSender<Arc<Chunk>>>], chunk: &Arc<Chunk>) {
+    for feed in feeds {
+        // a lane that has found a difference no longer listens
+        if feed.as_ref().is_some_and(|feed| feed.send(Arc::clone(chunk)).is_err()) {
+            *feed = None;
+        }
+    }
+}
+
+/// Compiles all builds, as many at a time as the machine has processors.
+fn compile_all(builds: &[Build], sources: Sources<'_>, folder: &Path) -> Vec<Result<PathBuf, Outcome>> {
+    let next = AtomicUsize::new(0);
+    let workers = thread::available_parallelism().map_or(1, usize::from).min(builds.len());
+    let work = || {
+        let mut done = Vec::new();
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(build) = builds.get(index) else { return done };
+            done.push((index, compile(build, sources, &folder.join(index.to_string()))));
+        }
+    };
+    let mut results: Vec<Result<PathBuf, Outcome>> = builds
+        .iter()
+        .map(|_| Err(failed("the compilation itself panicked")))
+        .collect();
+    thread::scope(|scope| {
+        let threads: Vec<_> = (0..workers).map(|_| scope.spawn(work)).collect();
+        for (index, result) in threads.into_iter().filter_map(|thread| thread.join().ok()).flatten() {
+            results[index] = result;
+        }
+    });
+    results
+}
+
+fn compile(build: &Build, sources: Sources<'_>, folder: &Path) -> Result<PathBuf, Outcome> {
+    let compiler = build.compiler;
+    let Some(program) = &build.program else {
+        let reason = format!("{} is not on PATH", compiler.name);
+        return Err(Outcome::Skipped {
+            reason,
+            package: Some(compiler.package.to_owned()),
+        });
+    };
+    let made = std::fs::create_dir_all(folder).map_err(BuildError::Io);
+    made.and_then(|()| toolchain::compile(build, program, sources, folder))
+        .map_err(|error| match error {
+            BuildError::NoFiles => {
+                let reason = format!("the files have no {} code", compiler.language.name());
+                Outcome::Skipped { reason, package: None }
+            }
+            BuildError::Io(error) => failed(&format!("could not compile: {error}")),
+            BuildError::Refused(message) => Outcome::CompileError { message },
+        })
+}
+
+/// One build from its start to its end or its first difference.
+fn lane(
+    policy: &Policy,
+    layout: &Layout,
+    build: &Build,
+    compiled: Result<PathBuf, Outcome>,
+    known: &Chunk,
+    chunks: &Receiver<Arc<Chunk>>,
+    timeout: Duration,
+) -> BuildReport {
+    let executable = match compiled {
+        Ok(executable) => executable,
+        Err(outcome) => return entry(build, 0, outcome),
+    };
+    let mut lane = Lane::new(
+        policy,
+        layout,
+        Box::new(ProcessRunner::new(Command::new(executable), timeout)),
+    );
+    let course = lane
+        .start()
+        .and_then(|()| lane.known_answers(known))
+        .and_then(|()| chunks.iter().try_for_each(|chunk| lane.follow(&chunk)));
+    let outcome = course.err().unwrap_or(Outcome::Equal);
+    BuildReport {
+        golden: lane.golden().cloned(),
+        ..entry(build, lane.steps_compared(), outcome)
+    }
+}
+
+fn entry(build: &Build, steps_compared: u64, outcome: Outcome) -> BuildReport {
+    BuildReport {
+        build: build.name(),
+        compiler: build.version.clone(),
+        steps_compared,
+        outcome,
+        golden: None,
+    }
+}
+
+fn failed(reason: &str) -> Outcome {
+    Outcome::Failed {
+        step: 0,
+        event: "build".to_owned(),
+        reason: reason.to_owned(),
+        measurement: Vec::new(),
+    }
+}

@@ -1,0 +1,325 @@
+//! The stream of events that the interpreter and all builds are put through: deterministic from a seed.
+//!
+//! Segments of random length follow each other: closed loop with a surrogate plant, uniform values, edge values,
+//! bursts of bad samples around the hold count, values at the ends of the clips. Attempts to replace the mapping
+//! coefficients, resets and fresh starts are strewn in.
+
+mod edges;
+mod plant;
+mod recorded;
+mod rng;
+
+use interp::{Controller, Sample};
+use policy::{Interval, Policy};
+
+use edges::Edges;
+use plant::Plant;
+pub use recorded::{Recorded, RecordedError};
+pub use rng::Rng;
+
+/// What happens to a controller in one move.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Event {
+    /// One control step with a sample per signal.
+    Step(Vec<Sample>),
+    /// An attempt to replace the mapping coefficients; `r` in the four-term form only.
+    SetMapping {
+        /// Gain on the duty.
+        a: f32,
+        /// Per ampere.
+        b: f32,
+        /// Constant.
+        c: f32,
+        /// Product term per ampere.
+        r: Option<f32>,
+    },
+    /// `reset`: keeps the mapping coefficients.
+    Reset,
+    /// `init`: a new controller.
+    Init,
+    /// The network alone on an observation (known answers).
+    Network(Vec<f32>),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Segment {
+    ClosedLoop,
+    Uniform,
+    Edges,
+    Bursts,
+    Clips,
+}
+
+const SEGMENTS: [Segment; 6] = [
+    Segment::ClosedLoop,
+    Segment::ClosedLoop,
+    Segment::Uniform,
+    Segment::Edges,
+    Segment::Bursts,
+    Segment::Clips,
+];
+
+/// Steps between two attempts to replace the mapping coefficients, on average.
+const STEPS_PER_SET_MAPPING: usize = 150;
+/// Steps between two resets, on average.
+const STEPS_PER_RESET: usize = 400;
+/// Steps between two fresh starts, on average.
+const STEPS_PER_INIT: usize = 1500;
+/// Longest part of a segment given to one burst cycle.
+const MAX_SEGMENT: usize = 20_000;
+
+/// Endless source of events for one policy.
+#[derive(Debug, Clone)]
+pub struct Stream<'a> {
+    policy: &'a Policy,
+    rng: Rng,
+    plant: Plant,
+    edges: Vec<Edges>,
+    segment: Segment,
+    /// Steps left in the segment.
+    left: usize,
+    /// Steps left in the burst of bad samples (positive) or in the gap after it.
+    bad_left: usize,
+    good_left: usize,
+    /// Events that come before anything random, last first.
+    queued: Vec<Event>,
+}
+
+impl<'a> Stream<'a> {
+    /// The stream of `seed`; recordings are played first, each after a reset.
+    pub fn new(policy: &'a Policy, seed: u64, recorded: &[Recorded]) -> Self {
+        let mut queued: Vec<Event> = Vec::new();
+        for recording in recorded {
+            queued.push(Event::Reset);
+            queued.extend(recording.steps().iter().cloned().map(Event::Step));
+        }
+        queued.reverse();
+        let mut rng = Rng::new(seed);
+        Self {
+            policy,
+            plant: Plant::new(policy, &mut rng),
+            edges: policy.signals.iter().map(Edges::new).collect(),
+            rng,
+            segment: Segment::ClosedLoop,
+            left: 300,
+            bad_left: 0,
+            good_left: 0,
+            queued,
+        }
+    }
+
+    /// The next event. `controller` is the interpreter in the state before it: the closed loop needs its duty, the
+    /// clip segments its filter memories.
+    pub fn next_event(&mut self, controller: &Controller<f32>) -> Event {
+        if let Some(event) = self.queued.pop() {
+            return event;
+        }
+        if self.policy.mapping.is_some() && self.rng.one_in(STEPS_PER_SET_MAPPING) {
+            return self.set_mapping();
+        }
+        if self.rng.one_in(STEPS_PER_RESET) {
+            return Event::Reset;
+        }
+        if self.rng.one_in(STEPS_PER_INIT) {
+            return Event::Init;
+        }
+        if self.left == 0 {
+            self.start_segment();
+        }
+        self.left -= 1;
+        Event::Step(match self.segment {
+            Segment::ClosedLoop => self.closed_loop(f64::from(controller.state().previous_command)),
+            Segment::Uniform => self.uniform(),
+            Segment::Edges => self.with_edges(),
+            Segment::Bursts => self.bursts(),
+            Segment::Clips => self.at_a_clip(controller),
+        })
+    }
+
+    fn start_segment(&mut self) {
+        self.segment = self.rng.pick(&SEGMENTS, Segment::Uniform);
+        self.left = 50 + self.rng.below(350);
+        match self.segment {
+            Segment::ClosedLoop => self.plant = Plant::new(self.policy, &mut self.rng),
+            Segment::Bursts => {
+                let hold = self.policy.fallback.hold as usize;
+                self.left = self.left.max(4 * (hold.saturating_add(4))).min(MAX_SEGMENT);
+            }
+            Segment::Uniform | Segment::Edges | Segment::Clips => {}
+        }
+    }
+
+    fn closed_loop(&mut self, duty: f64) -> Vec<Sample> {
+        let values = self.plant.advance(duty, &mut self.rng);
+        self.policy
+            .signals
+            .iter()
+            .zip(values)
+            .map(|(signal, x)| sample_of(signal, x))
+            .collect()
+    }
+
+    fn uniform(&mut self) -> Vec<Sample> {
+        let rng = &mut self.rng;
+        self.policy
+            .signals
+            .iter()
+            .map(|signal| sample_of(signal, rng.uniform(signal.range.low, signal.range.high)))
+            .collect()
+    }
+
+    /// Uniform values, one of them often replaced by an edge; sometimes all.
+    fn with_edges(&mut self) -> Vec<Sample> {
+        let mut samples = self.uniform();
+        let rng = &mut self.rng;
+        if rng.one_in(8) {
+            for (sample, edges) in samples.iter_mut().zip(&self.edges) {
+                *sample = edges.inside(rng, *sample);
+            }
+        } else {
+            let index = rng.below(samples.len());
+            if let (Some(sample), Some(edges)) = (samples.get_mut(index), self.edges.get(index)) {
+                *sample = if rng.one_in(2) {
+                    edges.inside(rng, *sample)
+                } else {
+                    edges.any(rng, *sample)
+                };
+            }
+        }
+        samples
+    }
+
+    /// Bad samples for about K steps, then good ones for a few.
+    fn bursts(&mut self) -> Vec<Sample> {
+        let hold = self.policy.fallback.hold as usize;
+        let mut samples = self.uniform();
+        if self.bad_left == 0 && self.good_left == 0 {
+            let around = [
+                1,
+                hold.max(1),
+                hold.saturating_add(1),
+                1 + self.rng.below(hold.saturating_mul(2) + 3),
+            ];
+            self.bad_left = self.rng.pick(&around, 1);
+            self.good_left = 1 + self.rng.below(5);
+        }
+        if self.bad_left == 0 {
+            self.good_left -= 1;
+            return samples;
+        }
+        self.bad_left -= 1;
+        let index = self.rng.below(samples.len());
+        if let (Some(sample), Some(edges)) = (samples.get_mut(index), self.edges.get(index)) {
+            *sample = edges.outside(&mut self.rng, *sample);
+        }
+        samples
+    }
+
+    /// Moves one signal so that one observation comes to lie within a few units in the last place of a clip's end.
+    ///
+    /// Every filter is affine in its input for a given state, so two evaluations give the place.
+    fn at_a_clip(&mut self, controller: &Controller<f32>) -> Vec<Sample> {
+        let mut samples = self.uniform();
+        let clipped: Vec<(usize, Interval)> = self
+            .policy
+            .features
+            .iter()
+            .enumerate()
+            .filter_map(|(n, f)| Some((n, f.clip?)))
+            .collect();
+        let index = self.rng.below(samples.len());
+        let (Some(signal), Some(&(feature, clip))) = (
+            self.policy.signals.get(index),
+            clipped.get(self.rng.below(clipped.len())),
+        ) else {
+            return samples;
+        };
+        let (low, high) = (signal.range.low, signal.range.high);
+        let mut unclipped_at = |x: f64| {
+            samples[index] = sample_of(signal, x);
+            controller
+                .eval(&samples)
+                .ok()
+                .map(|trace| f64::from(trace.features[feature].unclipped))
+        };
+        // stay off the ends, where rounding could leave the range
+        let (x0, x1) = (low + 0.25 * (high - low), low + 0.75 * (high - low));
+        let (Some(o0), Some(o1)) = (unclipped_at(x0), unclipped_at(x1)) else {
+            return samples;
+        };
+        let end = if self.rng.one_in(2) { clip.low } else { clip.high };
+        let x = x0 + (end - o0) / (o1 - o0) * (x1 - x0);
+        samples[index] = if x >= low && x <= high {
+            nudged(sample_of(signal, x), self.rng.below(7) as i32 - 3)
+        } else {
+            sample_of(signal, self.rng.uniform(low, high))
+        };
+        samples
+    }
+
+    /// Valid, at the ends, just outside, not a number, or the policy's own coefficients again.
+    fn set_mapping(&mut self) -> Event {
+        let Some(mapping) = &self.policy.mapping else {
+            return Event::Reset;
+        };
+        let rng = &mut self.rng;
+        let own = mapping.coefficients;
+        let mut values = [own.a as f32, own.b as f32, own.c as f32, own.r.unwrap_or(0.0) as f32];
+        let ranges = [mapping.adjust_a, mapping.adjust_b, mapping.adjust_c, mapping.adjust_r];
+        let style = rng.below(4);
+        if style != 0 {
+            for (value, range) in values.iter_mut().zip(ranges) {
+                *value = rng.uniform(range.low, range.high) as f32;
+            }
+        }
+        let index = rng.below(if own.r.is_some() { 4 } else { 3 });
+        if style >= 2 {
+            let end = (if rng.one_in(2) {
+                ranges[index].low
+            } else {
+                ranges[index].high
+            }) as f32;
+            values[index] = rng.pick(&[end, end.next_up(), end.next_down(), 0.0, -0.0], end);
+        }
+        if style == 3 && rng.one_in(2) {
+            let bad = [
+                f32::NAN,
+                -f32::NAN,
+                f32::INFINITY,
+                f32::NEG_INFINITY,
+                f32::MAX,
+                f32::MIN,
+            ];
+            values[index] = rng.pick(&bad, f32::NAN);
+        }
+        let [a, b, c, r] = values;
+        Event::SetMapping {
+            a,
+            b,
+            c,
+            r: own.r.map(|_| r),
+        }
+    }
+}
+
+/// `x` in the unit of the signal as the sample that arrives: rounded, or the nearest ADC code.
+pub fn sample_of(signal: &policy::Signal, x: f64) -> Sample {
+    match signal.adc {
+        None => Sample::Physical(x as f32),
+        // `as` saturates
+        Some(adc) => Sample::Code(((x - adc.offset) / adc.gain).round() as i32),
+    }
+}
+
+/// The sample `ulps` units in the last place (or codes) further.
+fn nudged(sample: Sample, ulps: i32) -> Sample {
+    match sample {
+        Sample::Code(code) => Sample::Code(code.saturating_add(ulps)),
+        Sample::Physical(mut x) => {
+            for _ in 0..ulps.abs() {
+                x = if ulps > 0 { x.next_up() } else { x.next_down() };
+            }
+            Sample::Physical(x)
+        }
+    }
+}

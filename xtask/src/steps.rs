@@ -1,0 +1,295 @@
+//! The steps of `cargo xtask test`, and the loop that runs them all and reports every failure.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
+
+use crate::process::{self, Output};
+use crate::rules::{self, Findings};
+use crate::tools;
+use crate::workspace::Workspace;
+
+/// Golden files are rewritten instead of compared when this is set.
+pub const BLESS: &str = "POLICYC_BLESS";
+
+const HEARTBEAT: Duration = Duration::from_secs(60);
+
+/// Switches of `cargo xtask test`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Options {
+    pub quick: bool,
+    pub skip_install: bool,
+}
+
+/// How a step that did not fail ended.
+enum Done {
+    /// Lines worth showing: warnings, counts.
+    Passed(Vec<String>),
+    /// There is nothing to do yet.
+    Skipped(String),
+}
+
+type Outcome = Result<Done, String>;
+
+struct Step {
+    name: &'static str,
+    in_quick: bool,
+    run: fn(&Context) -> Outcome,
+}
+
+const fn step(name: &'static str, in_quick: bool, run: fn(&Context) -> Outcome) -> Step {
+    Step { name, in_quick, run }
+}
+
+const STEPS: &[Step] = &[
+    step("tools", true, install),
+    step("layers", true, |c| judged(rules::layers(c.workspace))),
+    step("writers", true, |c| judged(rules::writers(c.workspace))),
+    step("lengths", true, |c| judged(rules::lengths(c.workspace))),
+    step("portable", true, |c| judged(rules::portable(c.workspace))),
+    step("fmt", true, fmt),
+    step("clippy", true, clippy),
+    step("test", true, test),
+    step("rustdoc", false, rustdoc),
+    step("firmware", false, firmware),
+    step("demo", false, demo),
+];
+
+struct Context<'a> {
+    workspace: &'a Workspace,
+    options: Options,
+    log: PathBuf,
+}
+
+impl Context<'_> {
+    fn cargo(&self, arguments: &[&str], environment: &[(&str, &str)]) -> Result<(), String> {
+        self.cargo_in(&self.workspace.root, arguments, environment)
+    }
+
+    fn cargo_in(&self, folder: &Path, arguments: &[&str], environment: &[(&str, &str)]) -> Result<(), String> {
+        let mut command = self.workspace.cargo(arguments);
+        command
+            .current_dir(folder)
+            .env_remove(BLESS)
+            .env("CARGO_TERM_COLOR", "never");
+        command.envs(environment.iter().copied());
+        process::run(&mut command, &Output::Log(self.log.clone()))
+    }
+}
+
+/// Runs every step, also after a failing one; true when none failed.
+pub fn run_all(workspace: &Workspace, options: Options) -> bool {
+    let steps: Vec<&Step> = STEPS.iter().filter(|step| step.in_quick || !options.quick).collect();
+    let mut passed = 0;
+    let mut failures = Vec::new();
+    let started = Instant::now();
+    for (index, step) in steps.iter().enumerate() {
+        let label = format!("[{}/{}] {}", index + 1, steps.len(), step.name);
+        match run_one(step, &label, workspace, options) {
+            Ok(Done::Passed(_)) => passed += 1,
+            Ok(Done::Skipped(_)) => {}
+            Err(message) => failures.push((step.name, message)),
+        }
+    }
+    for (name, message) in &failures {
+        println!("\n---- {name} failed ----\n{message}");
+    }
+    println!("\n{:.0} s in all", started.elapsed().as_secs_f64());
+    println!("{passed} passed, {} failed", failures.len());
+    failures.is_empty()
+}
+
+fn run_one(step: &Step, label: &str, workspace: &Workspace, options: Options) -> Outcome {
+    print!("{label} ... ");
+    flush();
+    let started = Instant::now();
+    let (outcome, beats) = match fresh_log(workspace, step.name) {
+        Ok(log) => {
+            let context = Context {
+                workspace,
+                options,
+                log,
+            };
+            with_heartbeat(&context.log, || (step.run)(&context))
+        }
+        Err(message) => (Err(message), 0),
+    };
+    if beats > 0 {
+        print!("\n{label} ... ");
+    }
+    let seconds = started.elapsed().as_secs_f64();
+    match &outcome {
+        Ok(Done::Passed(notes)) => {
+            println!("ok {seconds:.1} s");
+            notes.iter().for_each(|note| println!("    {note}"));
+        }
+        Ok(Done::Skipped(reason)) => println!("skipped: {reason}"),
+        Err(_) => println!("FAILED {seconds:.1} s"),
+    }
+    outcome
+}
+
+fn fresh_log(workspace: &Workspace, name: &str) -> Result<PathBuf, String> {
+    let folder = workspace.target_dir.join("xtask");
+    let log = folder.join(format!("{name}.log"));
+    std::fs::create_dir_all(&folder)
+        .and_then(|()| std::fs::write(&log, ""))
+        .map_err(|e| format!("cannot write the log {}: {e}", log.display()))?;
+    Ok(log)
+}
+
+/// Does the work and says every minute that it goes on; also returns how often it said so.
+fn with_heartbeat<T>(log: &Path, work: impl FnOnce() -> T) -> (T, usize) {
+    let (done, waiting) = mpsc::channel::<()>();
+    std::thread::scope(|scope| {
+        let beats = scope.spawn(move || {
+            let started = Instant::now();
+            let mut beats = 0;
+            while waiting.recv_timeout(HEARTBEAT) == Err(mpsc::RecvTimeoutError::Timeout) {
+                let line = process::last_line(log).unwrap_or_default();
+                print!("\n    {} s: {line}", started.elapsed().as_secs());
+                flush();
+                beats += 1;
+            }
+            beats
+        });
+        let result = work();
+        drop(done);
+        (result, beats.join().unwrap_or(0))
+    })
+}
+
+fn flush() {
+    // a closed terminal is no reason to stop the tests
+    let _ = std::io::stdout().flush();
+}
+
+fn judged(findings: Result<Findings, String>) -> Outcome {
+    let findings = findings?;
+    match findings.faults.is_empty() {
+        true => Ok(Done::Passed(findings.warnings)),
+        false => Err([findings.faults, findings.warnings].concat().join("\n")),
+    }
+}
+
+fn passed() -> Outcome {
+    Ok(Done::Passed(Vec::new()))
+}
+
+fn install(context: &Context) -> Outcome {
+    if context.options.skip_install {
+        tools::require()?;
+    } else {
+        tools::provide(&Output::Log(context.log.clone()))?;
+    }
+    passed()
+}
+
+fn fmt(context: &Context) -> Outcome {
+    context.cargo(&["fmt", "--all", "--check", "--", "--color", "never"], &[])?;
+    for folder in context.workspace.firmware()? {
+        context.cargo_in(&folder, &["fmt", "--check", "--", "--color", "never"], &[])?;
+    }
+    passed()
+}
+
+fn clippy(context: &Context) -> Outcome {
+    let arguments = ["clippy", "--workspace", "--all-targets"];
+    context.cargo(&[&arguments[..], &["--", "-D", "warnings"]].concat(), &[])?;
+    passed()
+}
+
+fn test(context: &Context) -> Outcome {
+    // the dev profile (opt-level 1) keeps overflow checks, which the integer formats are to pass
+    let mut arguments = vec!["test", "--workspace", "--no-fail-fast"];
+    if context.options.quick {
+        arguments.extend(["--exclude", "tests"]);
+    }
+    context.cargo(&arguments, &[])?;
+    let log = process::read_lossy(&context.log);
+    Ok(Done::Passed(vec![test_count(&log)]))
+}
+
+/// Sums the `test result:` lines of libtest.
+fn test_count(log: &str) -> String {
+    let (mut passed, mut ignored) = (0, 0);
+    for line in log.lines().filter(|l| l.starts_with("test result:")) {
+        for part in line.split(['.', ';']) {
+            let mut words = part.split_whitespace();
+            let count = words.next().and_then(|word| word.parse::<usize>().ok());
+            match (count, words.next()) {
+                (Some(count), Some("passed")) => passed += count,
+                (Some(count), Some("ignored")) => ignored += count,
+                _ => {}
+            }
+        }
+    }
+    format!("{passed} tests passed, {ignored} ignored")
+}
+
+fn rustdoc(context: &Context) -> Outcome {
+    let arguments = ["doc", "--workspace", "--no-deps"];
+    context.cargo(&arguments, &[("RUSTDOCFLAGS", "-D warnings")])?;
+    passed()
+}
+
+fn firmware(context: &Context) -> Outcome {
+    let folders = context.workspace.firmware()?;
+    if folders.is_empty() {
+        return Ok(Done::Skipped("no crate in firmware/ yet".into()));
+    }
+    let mut faults = Vec::new();
+    for folder in &folders {
+        let name = folder.file_name().unwrap_or_default();
+        let target_dir = context.workspace.target_dir.join("firmware").join(name);
+        let target_dir = target_dir.to_string_lossy();
+        let environment = [("CARGO_TARGET_DIR", target_dir.as_ref())];
+        if let Err(fault) = context.cargo_in(folder, &["build", "--release"], &environment) {
+            faults.push(format!("{}: {fault}", folder.display()));
+        }
+    }
+    match faults.is_empty() {
+        true => Ok(Done::Passed(vec![format!("{} crates", folders.len())])),
+        false => Err(faults.join("\n")),
+    }
+}
+
+fn demo(context: &Context) -> Outcome {
+    let policyc = ["run", "--release", "-p", "cli", "--"];
+    context.cargo(&[&policyc[..], &["--help"]].concat(), &[])?;
+    let help = process::read_lossy(&context.log);
+    if !help.lines().any(|line| line.trim_start().starts_with("demo")) {
+        return Ok(Done::Skipped("policyc has no command `demo` yet".into()));
+    }
+    context.cargo(&[&policyc[..], &["demo"]].concat(), &[])?;
+    passed()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn libtest_results_are_summed() {
+        let log = "\
+test result: ok. 12 passed; 0 failed; 1 ignored; 0 measured; 0 filtered out; finished in 0.00s
+test result: FAILED. 3 passed; 2 failed; 0 ignored; 0 measured; 0 filtered out; finished in 0.1s
+";
+        assert_eq!(test_count(log), "15 tests passed, 1 ignored");
+    }
+
+    #[test]
+    fn a_fault_fails_a_step_and_a_warning_does_not() {
+        let warning = Findings {
+            faults: Vec::new(),
+            warnings: vec!["long".into()],
+        };
+        assert!(matches!(judged(Ok(warning)), Ok(Done::Passed(notes)) if notes == ["long"]));
+        let fault = Findings {
+            faults: vec!["wrong".into()],
+            warnings: vec!["long".into()],
+        };
+        assert_eq!(judged(Ok(fault)).err().as_deref(), Some("wrong\nlong"));
+    }
+}

@@ -1,0 +1,165 @@
+//! Programs beyond Rust that the steps need, and how to get them.
+
+use std::process::{Command, Stdio};
+
+use crate::process::{self, Output};
+
+enum Source {
+    /// A Debian package.
+    Apt(&'static str),
+    /// A component of the Rust toolchain.
+    Rustup(&'static str),
+}
+use Source::{Apt, Rustup};
+
+/// A tool is there when its probe runs and ends with 0.
+struct Tool {
+    name: &'static str,
+    probe: &'static [&'static str],
+    source: Source,
+}
+
+const fn tool(name: &'static str, probe: &'static [&'static str], source: Source) -> Tool {
+    Tool { name, probe, source }
+}
+
+const CALLGRIND: &[&str] = &["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", "true"];
+const C_HEADERS: &[&str] = &["gcc", "-fsyntax-only", "-include", "math.h", "-xc", "/dev/null"];
+
+/// One row a tool. A Python package is probed by `["python3", "-c", "import it"]`.
+const TOOLS: &[Tool] = &[
+    tool("rustfmt", &["cargo-fmt", "--version"], Rustup("rustfmt")),
+    tool("clippy", &["cargo-clippy", "--version"], Rustup("clippy")),
+    tool("git", &["git", "--version"], Apt("git")),
+    tool("gcc", &["gcc", "--version"], Apt("gcc")),
+    tool("C headers", C_HEADERS, Apt("libc6-dev")),
+    tool("g++", &["g++", "--version"], Apt("g++")),
+    tool("clang", &["clang", "--version"], Apt("clang")),
+    tool("callgrind", CALLGRIND, Apt("valgrind")),
+];
+
+/// Sees to it that every tool is there; installs what is missing as root on Debian.
+///
+/// # Errors
+/// What is missing and the command to type.
+pub fn provide(output: &Output) -> Result<(), String> {
+    let missing = missing(TOOLS);
+    let plan = Plan::of(&missing);
+    if plan.packages.is_empty() || !may_install() {
+        return require();
+    }
+    for arguments in [&["update"][..], &plan.apt_install()] {
+        let mut apt = Command::new("apt-get");
+        apt.args(arguments).env("DEBIAN_FRONTEND", "noninteractive");
+        process::run(&mut apt, output).map_err(|e| format!("{}\n{e}", plan.message(&missing)))?;
+    }
+    require()
+}
+
+/// Looks only.
+///
+/// # Errors
+/// What is missing and the command to type.
+pub fn require() -> Result<(), String> {
+    let missing = missing(TOOLS);
+    match missing.is_empty() {
+        true => Ok(()),
+        false => Err(Plan::of(&missing).message(&missing)),
+    }
+}
+
+fn missing(tools: &[Tool]) -> Vec<&Tool> {
+    tools.iter().filter(|tool| !works(tool.probe)).collect()
+}
+
+fn works(probe: &[&str]) -> bool {
+    let Some((program, arguments)) = probe.split_first() else {
+        return false;
+    };
+    let mut command = Command::new(program);
+    command.args(arguments).stdin(Stdio::null());
+    command.stdout(Stdio::null()).stderr(Stdio::null());
+    command.status().is_ok_and(|status| status.success())
+}
+
+fn may_install() -> bool {
+    let id = Command::new("id").arg("-u").output();
+    let root = id.is_ok_and(|output| output.stdout.trim_ascii() == b"0");
+    root && works(&["apt-get", "--version"])
+}
+
+/// What to install, by source.
+struct Plan {
+    packages: Vec<&'static str>,
+    components: Vec<&'static str>,
+}
+
+impl Plan {
+    fn of(missing: &[&Tool]) -> Self {
+        let mut plan = Self {
+            packages: Vec::new(),
+            components: Vec::new(),
+        };
+        for tool in missing {
+            match tool.source {
+                Apt(package) => plan.packages.push(package),
+                Rustup(component) => plan.components.push(component),
+            }
+        }
+        plan.packages.sort_unstable();
+        plan.packages.dedup();
+        plan
+    }
+
+    fn apt_install(&self) -> Vec<&'static str> {
+        let mut arguments = vec!["install", "-y", "--no-install-recommends"];
+        arguments.extend(&self.packages);
+        arguments
+    }
+
+    fn message(&self, missing: &[&Tool]) -> String {
+        let names: Vec<_> = missing.iter().map(|tool| tool.name).collect();
+        let mut lines = vec![format!("not found: {}; type", names.join(", "))];
+        if !self.packages.is_empty() {
+            let install = self.apt_install().join(" ");
+            lines.push(format!("    sudo apt-get update && sudo apt-get {install}"));
+        }
+        if !self.components.is_empty() {
+            let components = self.components.join(" ");
+            lines.push(format!("    rustup component add {components}"));
+        }
+        lines.join("\n")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tool_without_a_working_probe_is_missing() {
+        let tools = [
+            tool("there", &["true"], Apt("coreutils")),
+            tool("fails", &["false"], Apt("fails-package")),
+            tool("absent", &["no-such-program-here"], Apt("absent-package")),
+        ];
+        let found = missing(&tools);
+        assert_eq!(found.iter().map(|t| t.name).collect::<Vec<_>>(), ["fails", "absent"]);
+    }
+
+    #[test]
+    fn message_gives_the_commands_to_type() {
+        let tools = [
+            tool("valgrind", &["false"], Apt("valgrind")),
+            tool("callgrind", &["false"], Apt("valgrind")),
+            tool("clippy", &["false"], Rustup("clippy")),
+        ];
+        let missing: Vec<_> = tools.iter().collect();
+        assert_eq!(
+            Plan::of(&missing).message(&missing),
+            "not found: valgrind, callgrind, clippy; type\n    \
+             sudo apt-get update && sudo apt-get install -y --no-install-recommends valgrind\n    \
+             rustup component add clippy"
+        );
+    }
+}

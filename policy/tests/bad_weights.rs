@@ -315,7 +315,7 @@ fn malformed_files_say_what_is_wrong() {
     let whole = encode(&network());
     file_fault(&whole[..whole.len() - 1], &["not a sound"]);
     file_fault(&whole[..40], &["cut off", "copy or download"]);
-    file_fault(&with_header("{not json", &[]), &["json"]);
+    file_fault(&with_header("{not json", &[]), &["JSON"]);
     file_fault(
         &with_header(
             r#"{"w.bias":{"dtype":"F32","shape":[9],"data_offsets":[0,16]}}"#,
@@ -359,8 +359,8 @@ fn golden_vectors_that_cannot_be_are_refused() {
     let q = f32_tensor("q", &[2, 3], &[0.0, 1.0, 0.5, 3.0, 1.0, 2.0]);
     let u8s = |values: &[u8]| raw_tensor("action", Dtype::U8, &[values.len()], values.to_vec());
     let fault = |tensors: &[Tensor]| Folder::new().golden(tensors).fault();
-    assert_whole_file(&fault(&[q.clone()]), GOLDEN, &["need the tensor `obs`"]);
-    assert_whole_file(&fault(&[obs.clone()]), GOLDEN, &["`q`", "`action`"]);
+    assert_whole_file(&fault(std::slice::from_ref(&q)), GOLDEN, &["need the tensor `obs`"]);
+    assert_whole_file(&fault(std::slice::from_ref(&obs)), GOLDEN, &["`q`", "`action`"]);
     assert_tensor(
         &fault(&[obs.clone(), tensor("q", &[2, 4])]),
         GOLDEN,

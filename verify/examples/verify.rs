@@ -14,9 +14,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let policy = policy::load(Path::new(&path)).map_err(|faults| format!("{faults:#?}"))?;
     let start = std::time::Instant::now();
     let mut progress = |news| eprintln!("{:6.1} s  {news:?}", start.elapsed().as_secs_f64());
+    let compilers = arguments.collect();
     let options = Options {
         steps,
         seed,
+        compilers,
         progress: Some(&mut progress),
         ..Options::default()
     };

@@ -7,8 +7,8 @@ use crate::bounds::{self, Box32, Inputs, Overflow};
 use crate::catalogue;
 use crate::expression::{self, Scope};
 use crate::faults::Fault;
-use crate::limits::{MAX_FEATURES, MAX_MAGNITUDE};
-use crate::model::{Expr, Feature, Filter, Interval};
+use crate::limits::MAX_FEATURES;
+use crate::model::{Expr, Feature, Interval};
 use crate::names::Kind;
 use crate::toml_reader::{Section, Value};
 
@@ -133,9 +133,6 @@ pub(crate) fn bounded(list: Vec<Unbounded<'_>>, inputs: &Inputs, period: f64, fa
 fn bound(feature: &Feature, inputs: &Inputs, period: f64) -> Result<Box32, Overflow> {
     let mut x = bounds::expression(&feature.source, inputs)?;
     for filter in &feature.filters {
-        if matches!(filter, Filter::BackwardDifference) && 1.0 / period > MAX_MAGNITUDE {
-            return Err(Overflow(1.0 / period));
-        }
         x = bounds::filter(filter, x, period)?;
     }
     bounds::observation(x, feature.scale, feature.offset, feature.clip)

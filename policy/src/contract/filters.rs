@@ -110,9 +110,7 @@ fn time_constant(value: &Value<'_>, period: Option<f64>, faults: &mut Vec<Fault>
     };
     let period = period?;
     let longest = period * MAX_TIME_CONSTANT_PERIODS;
-    // shorter than this the coefficient k = T/(tau + T) is 1 in f32 and the filter does nothing
-    let shortest = period * 1e-6;
-    if seconds < shortest || seconds > longest {
+    if seconds <= 0.0 || seconds > longest {
         faults.push(at.fault(catalogue::time_constant(seconds, longest)));
         return None;
     }

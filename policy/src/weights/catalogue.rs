@@ -5,7 +5,7 @@ use crate::limits;
 
 pub(crate) fn malformed(found: &str, hint: Option<&str>) -> Message {
     Message::new("this is not a sound safetensors file")
-        .found(found.to_lowercase())
+        .found(found)
         .expected("an 8-byte header length, a JSON header, and data that it covers without gaps")
         .maybe_hint(hint.map(str::to_owned))
 }

@@ -1,6 +1,6 @@
 //! Which layers in which order form the network: the chain of dense layers from features to actions.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::layers::{Dense, Place, ancestors, is_target};
 use crate::limits::MAX_LAYERS;
@@ -68,6 +68,9 @@ fn groups(layers: &[Dense], members: &[usize]) -> Vec<Vec<usize>> {
 
 /// Orders in which all of `group` join up; two are enough to know that shapes and numbers do not decide.
 pub(crate) fn orders(layers: &[Dense], group: &[usize], ends: Ends) -> Vec<Chain> {
+    if !balanced(layers, group, ends) {
+        return Vec::new();
+    }
     let mut search = Search {
         layers,
         group,
@@ -77,6 +80,24 @@ pub(crate) fn orders(layers: &[Dense], group: &[usize], ends: Ends) -> Vec<Chain
     };
     search.extend(ends.inputs);
     search.found
+}
+
+/// Whether widths match up as in a path: each is left as often as it is entered, the ends apart. Without this the
+/// search below would try all orders of layers that can never join.
+fn balanced(layers: &[Dense], group: &[usize], ends: Ends) -> bool {
+    let mut balance: BTreeMap<usize, i64> = BTreeMap::new();
+    for layer in group.iter().map(|&i| &layers[i]) {
+        *balance.entry(layer.outputs).or_default() += 1;
+        *balance.entry(layer.inputs).or_default() -= 1;
+    }
+    let open = ends.inputs.is_none() || ends.outputs.is_none();
+    ends.inputs
+        .into_iter()
+        .for_each(|n| *balance.entry(n).or_default() += 1);
+    ends.outputs
+        .into_iter()
+        .for_each(|n| *balance.entry(n).or_default() -= 1);
+    open || balance.values().all(|&n| n == 0)
 }
 
 struct Search<'a> {

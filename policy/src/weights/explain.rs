@@ -5,6 +5,7 @@ use super::chain::{Chain, Ends};
 use super::layers::{Dense, Layers, Place, is_target};
 use super::tensors::Tensor;
 use crate::faults::Fault;
+use crate::limits::MAX_LAYERS;
 use crate::source::FileName;
 
 /// Everything the explanation looks at.
@@ -40,6 +41,7 @@ impl Scene<'_> {
         let closest = self.closest(members);
         match self.mismatch(&closest) {
             Some(fault) => vec![fault],
+            None if closest.len() > MAX_LAYERS => vec![self.file.fault(catalogue::too_deep(closest.len()))],
             None => {
                 let names: Vec<_> = members.iter().map(|&i| self.describe(i)).collect();
                 vec![self.file.fault(catalogue::no_order(&names.join(", ")))]

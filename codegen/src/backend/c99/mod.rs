@@ -233,14 +233,14 @@ fn front_members(program: &Program) -> Vec<Member> {
 fn sense_statements(program: &Program, printer: &Printer<'_>) -> (Vec<String>, Vec<String>) {
     let front = &program.front;
     let valid = printer.operand(front.all_valid);
-    let hold = unsigned(program.hold);
+    let (n, hold) = (&program.name, unsigned(program.hold));
     let mut lines = printer.lines.clone();
     lines.push(format!(
-        "const uint32_t counted = state->bad_count + (uint32_t)(state->bad_count <= {hold});"
+        "const uint32_t counted = state->bad_count + {n}_flag(state->bad_count <= {hold});"
     ));
     lines.push(format!("const uint32_t bad_count = counted & ({valid} - (uint32_t)1);"));
     lines.push(format!(
-        "const uint32_t bridged = state->primed & (uint32_t)(bad_count <= {hold});"
+        "const uint32_t bridged = state->primed & {n}_flag(bad_count <= {hold});"
     ));
     lines.push(format!("const uint32_t usable = {valid} | bridged;"));
     let mut results = Vec::new();
@@ -334,7 +334,7 @@ fn helpers(program: &Program) -> Helpers {
     Helpers {
         within: ops().any(|op| matches!(op, Op::Within { .. })),
         outside: ops().any(|op| matches!(op, Op::Outside { .. })),
-        clamp: tanh || ops().any(|op| matches!(op, Op::Clamp { .. })),
+        clamp: ops().any(|op| matches!(op, Op::Clamp { .. })),
         line_sum: ops().any(|op| matches!(op, Op::LineSum { .. })),
         relu: layers().any(|activation| activation == ActivationCode::Relu),
         leaky_relu: layers().any(|activation| matches!(activation, ActivationCode::LeakyRelu(_))),

@@ -232,9 +232,9 @@ fn sense(program: &Program) -> TokenStream {
         #[inline(always)]
         fn sense(&self, measured: &Measurement) -> Front {
             #(#statements)*
-            let counted = self.bad_count.wrapping_add(u32::from(self.bad_count <= #hold));
+            let counted = self.bad_count.wrapping_add(flag(self.bad_count <= #hold));
             let bad_count = counted & #valid.wrapping_sub(1);
-            let usable = #valid | (self.primed & u32::from(bad_count <= #hold));
+            let usable = #valid | (self.primed & flag(bad_count <= #hold));
             Front {
                 signal: #signal,
                 observation: #observation,
@@ -269,7 +269,7 @@ fn decide(program: &Program) -> TokenStream {
             let mut action = 0_u32;
             // the lowest index wins among equals, a NaN never does
             for (q, duty) in network(&front.observation).iter().zip(&DUTIES) {
-                let above = u32::from(*q > best);
+                let above = flag(*q > best);
                 let mask = 0_u32.wrapping_sub(above);
                 best = select(above, *q, best);
                 chosen = select(above, *duty, chosen);

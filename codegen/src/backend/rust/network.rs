@@ -146,14 +146,21 @@ fn tanh() -> TokenStream {
     let numerator = steps("p", &TANH_NUMERATOR);
     let denominator = steps("q", &TANH_DENOMINATOR);
     quote! {
+        /// x limited to the magnitude with these bits, in integers so that loops over it can be vectorised
+        #[inline(always)]
+        fn limit(x: f32, limit: u32) -> f32 {
+            let magnitude = x.to_bits() & 0x7FFF_FFFF;
+            let below = 0_u32.wrapping_sub(magnitude.wrapping_sub(limit) >> 31);
+            f32::from_bits((x.to_bits() & 0x8000_0000) | (magnitude & below) | (limit & !below))
+        }
         /// Rational approximation, |error| < 4e-7.
         #[inline(always)]
         fn tanh(x: f32) -> f32 {
-            let t = clamp(x, -9.0, 9.0);
+            let t = limit(x, 0x4110_0000);
             let z = t * t;
             #numerator
             #denominator
-            clamp((p * t) / q, -1.0, 1.0)
+            limit((p * t) / q, 0x3F80_0000)
         }
     }
 }

@@ -116,7 +116,7 @@ impl<'p> Printer<'p> {
             Op::Outside { x, low, high } => call("outside", &[v(x), v(low), v(high)]),
             Op::Above(x, limit) => {
                 let (x, limit) = (v(x), v(limit));
-                quote!(u32::from(#x > #limit))
+                quote!(flag(#x > #limit))
             }
             Op::And(x, y) => binary(v(x), quote!(&), v(y)),
             Op::Or(x, y) => binary(v(x), quote!(|), v(y)),
@@ -146,6 +146,11 @@ fn call(function: &str, arguments: &[&TokenStream]) -> TokenStream {
 /// Branch-free helpers; a policy need not use all of them.
 pub fn helpers() -> TokenStream {
     quote! {
+        /// A condition as 0 or 1. The optimiser must not know that: it would turn selections back into branches.
+        #[inline(always)]
+        fn flag(condition: bool) -> u32 {
+            core::hint::black_box(u32::from(condition))
+        }
         /// flag (0 or 1) ? then : otherwise, without a branch
         #[inline(always)]
         #[allow(dead_code)]
@@ -156,18 +161,18 @@ pub fn helpers() -> TokenStream {
         #[inline(always)]
         #[allow(dead_code)]
         fn within(x: f32, low: f32, high: f32) -> u32 {
-            u32::from(x >= low) & u32::from(x <= high)
+            flag(x >= low) & flag(x <= high)
         }
         #[inline(always)]
         #[allow(dead_code)]
         fn outside(x: f32, low: f32, high: f32) -> u32 {
-            u32::from(x < low) | u32::from(x > high)
+            flag(x < low) | flag(x > high)
         }
         #[inline(always)]
         #[allow(dead_code)]
         fn clamp(x: f32, low: f32, high: f32) -> f32 {
-            let raised = select(u32::from(x < low), low, x);
-            select(u32::from(raised > high), high, raised)
+            let raised = select(flag(x < low), low, x);
+            select(flag(raised > high), high, raised)
         }
         /// Oldest first, newest last; a line that is not primed reads as newest throughout.
         #[inline(always)]

@@ -1,0 +1,200 @@
+//! Values of policy.toml that cannot work: actions, limits, ADC, filters, activations.
+
+mod common;
+use common::*;
+
+#[test]
+fn an_unsupported_numeric_format_lists_what_is() {
+    contract_fault(
+        "sample_period = 1e-4",
+        "sample_period = 1e-4\nnumeric_format = ¦\"i16\"",
+        &["not supported yet", "\"i16\"", "supported: f32"],
+    );
+}
+
+#[test]
+fn actions_are_two_to_256_duties_or_pairs() {
+    contract_fault("[0.44, 0.50, 0.56]", "¦[]", &["too few actions", "0", "2 to 256"]);
+    let faults = Folder::new().replace("[0.44, 0.50, 0.56]", "[0.5]").faults();
+    assert_says(&faults.list[0], &["too few actions", "1", "2 to 256"]);
+    let many = format!("[{}]", vec!["0.5"; 257].join(", "));
+    let faults = Folder::new().replace("[0.44, 0.50, 0.56]", &many).faults();
+    assert_says(&faults.list[0], &["too many actions", "257"]);
+    contract_fault(
+        "[actions]\n",
+        "¦[actions]\npairs = []\n",
+        &["exactly one of `duties`, `pairs`", "2"],
+    );
+}
+
+#[test]
+fn pairs_give_duties_pair_by_pair() {
+    let policy = Folder::new()
+        .replace("duties = [0.44, 0.50, 0.56]", "pairs = [{ xi = 0.5, phi = 0.05 }]")
+        .policy();
+    let duties: Vec<f64> = policy.actions.iter().map(|action| action.duty).collect();
+    assert_eq!(duties, [0.5 - 0.05, 0.5, 0.5 + 0.05]);
+    assert_eq!(policy.actions[2].pair.map(|pair| pair.c), Some(1));
+    let pairs = |text: &str| format!("pairs = [{text}]");
+    let duties = "duties = [0.44, 0.50, 0.56]";
+    contract_fault(
+        duties,
+        &pairs("¦{ xi = 0.98, phi = 0.05 }"),
+        &["xi + c phi with c = 1", "1.03"],
+    );
+    contract_fault(
+        duties,
+        &pairs("{ xi = 0.5, phi = 0.05, c = [¦2, 0, 1] }"),
+        &["`c`", "-1 to 1"],
+    );
+    contract_fault(duties, &pairs("{ xi = 0.5, phi = 0.05, c = [1, ¦1] }"), &["1 twice"]);
+    contract_fault(duties, &pairs("¦{ phi = 0.05 }"), &["`xi` is missing"]);
+}
+
+#[test]
+fn limits_slew_and_soft_start_must_work_in_f32() {
+    contract_fault("initial_duty = 0.5", "slew = ¦0.0", &["`slew`", "more than 0"]);
+    contract_fault("initial_duty = 0.5", "slew = ¦1e-50", &["`slew`"]);
+    contract_fault(
+        "initial_duty = 0.5",
+        "soft_start = { from = ¦0.7, steps = 10 }",
+        &["`from` lies outside", "0.7"],
+    );
+    contract_fault(
+        "initial_duty = 0.5",
+        "soft_start = ¦{ from = 0.59, steps = 1000000 }",
+        &["too slow for f32", "fewer steps"],
+    );
+    contract_fault(
+        "initial_duty = 0.5",
+        "soft_start = { from = 0.1, steps = ¦0 }",
+        &["`steps`", "1 to 1000000"],
+    );
+    let policy = Folder::new()
+        .replace(
+            "initial_duty = 0.5",
+            "slew = 0.01\nsoft_start = { from = 0.1, steps = 100 }",
+        )
+        .policy();
+    assert_eq!(policy.limits.initial_duty, 0.0, "the fallback duty by default");
+    assert_eq!(policy.limits.soft_start.map(|soft| soft.steps), Some(100));
+}
+
+#[test]
+fn adc_codes_must_be_able_to_say_the_range() {
+    let unit = "unit = \"V\"\n";
+    let with = |adc: &str| format!("{unit}adc = {adc}\n");
+    contract_fault(
+        unit,
+        &with("{ gain = ¦0.0, offset = 0.0 }"),
+        &["`gain`", "other than 0"],
+    );
+    contract_fault(
+        unit,
+        &with("¦{ gain = 1e-6, offset = 0.0 }"),
+        &["`v_out`", "250000000", "16777216"],
+    );
+    contract_fault(unit, &with("¦{ gain = 0.1 }"), &["`offset` is missing in adc"]);
+    let policy = Folder::new()
+        .replace(unit, &with("{ gain = -0.0625, offset = 0.5 }"))
+        .policy();
+    assert_eq!(
+        policy.signals[0].adc.map(|adc| (adc.gain, adc.offset)),
+        Some((-0.0625, 0.5))
+    );
+}
+
+#[test]
+fn filters_are_checked_one_by_one() {
+    let with = |filter: &str| format!("[{filter}]");
+    let one = "[{ delay = 1 }]";
+    contract_fault(
+        one,
+        &with("{ ¦dely = 1 }"),
+        &["unknown key `dely`", "did you mean `delay`?"],
+    );
+    contract_fault(one, &with("¦{ delay = 1, moving_average = 2 }"), &["exactly one", "2"]);
+    contract_fault(
+        one,
+        &with("¦\"backward_diference\""),
+        &["did you mean \"backward_difference\"?"],
+    );
+    contract_fault(
+        one,
+        &with("{ low_pass = { time_constant = ¦-1.0 } }"),
+        &["time constant", "-1"],
+    );
+    contract_fault(
+        one,
+        &with("{ low_pass = { time_constant = ¦1e3 } }"),
+        &["1e6 sample periods"],
+    );
+    contract_fault(
+        one,
+        &with("{ low_pass = ¦{} }"),
+        &["exactly one of time_constant, cutoff"],
+    );
+    contract_fault(one, &with("{ low_pass = { cutoff = ¦0 } }"), &["greater than 0"]);
+    contract_fault(one, &with("{ integrator = ¦{ min = 1.0, max = -1.0 } }"), &["crossed"]);
+    contract_fault(
+        one,
+        &with("{ integrator = { min = 1.0, max = 2.0, initial = ¦0.5 } }"),
+        &["outside the integrator's clamps"],
+    );
+    contract_fault(one, &with("{ moving_average = ¦1 }"), &["2 to 256"]);
+    let nine = ["{ delay = 1 }"; 9].join(", ");
+    contract_fault(one, &format!("¦[{nine}]"), &["too many filters", "9"]);
+}
+
+#[test]
+fn all_filters_of_the_contract_are_read() {
+    use policy::Filter::*;
+    let text = "[{ delay = 2 }, \"backward_difference\", { backward_difference = true }, { low_pass = { cutoff = 100.0 } }, \
+        { filtered_derivative = { time_constant = 1e-3 } }, { moving_average = 4 }, { integrator = { min = -1, max = 1 } }]";
+    let policy = Folder::new().replace("[{ delay = 1 }]", text).policy();
+    let tau = 1.0 / (2.0 * std::f64::consts::PI * 100.0);
+    assert_eq!(
+        policy.features[1].filters,
+        [
+            Delay { samples: 2 },
+            BackwardDifference,
+            BackwardDifference,
+            LowPass { time_constant: tau },
+            FilteredDerivative { time_constant: 1e-3 },
+            MovingAverage { samples: 4 },
+            Integrator {
+                min: -1.0,
+                max: 1.0,
+                initial: 0.0
+            }
+        ]
+    );
+}
+
+#[test]
+fn activations_are_never_guessed() {
+    use policy::Activation::*;
+    contract_fault(
+        "\"relu\"",
+        "¦\"ReLU\"",
+        &["hidden_activation", "did you mean \"relu\"?"],
+    );
+    contract_fault("\"relu\"", "¦\"sigmoid\"", &["\"sigmoid\"", "relu, tanh, identity"]);
+    contract_fault("\"relu\"", "¦[\"relu\", \"relu\"]", &["2", "1, one per hidden layer"]);
+    contract_fault("\"relu\"", "{ leaky_relu = ¦1.0 }", &["less than 1"]);
+    contract_fault("\"relu\"", "¦\"leaky_relu\"", &["{ leaky_relu = 0.01 }"]);
+    let with = |text: &str| Folder::new().replace("\"relu\"", text).policy().layers[0].activation;
+    assert_eq!(with("{ leaky_relu = 0.01 }"), LeakyRelu { slope: 0.01 });
+    assert_eq!(with("[\"tanh\"]"), Tanh);
+    let single = Folder::new()
+        .replace("hidden_activation = \"relu\"\n", "")
+        .tensors(&dense("out", 3, 2))
+        .policy();
+    assert_eq!(single.layers[0].activation, Identity);
+}
+
+#[test]
+fn a_feature_that_could_overflow_is_named() {
+    let folder = Folder::new().replace("scale = 0.2\nclip = [-20.0, 20.0]", "scale = 1e37");
+    assert_says(&folder.fault(), &["feature `e` could leave the range of f32", "narrow"]);
+}

@@ -70,6 +70,19 @@ pub fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
     write_texts(folder, &BTreeMap::from([(name.to_owned(), text.to_owned())]))
 }
 
+/// Prints a line or more on standard output. A reader that has seen enough (`policyc inspect policy | head -1`) is no fault.
+///
+/// # Errors
+/// If the text cannot be written.
+pub fn say(text: &str) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    match writeln!(out, "{text}").and_then(|()| out.flush()) {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        Err(error) => Err(Failure(format!("cannot write to standard output: {error}"))),
+        Ok(()) => Ok(()),
+    }
+}
+
 fn cannot(what: &str, path: &Path, error: &io::Error) -> Failure {
     Failure(format!("cannot {what} {}: {error}; nothing written", path.display()))
 }

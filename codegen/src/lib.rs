@@ -59,6 +59,8 @@ pub enum CodegenError {
     Template(String),
     /// Generated Rust did not parse.
     Rust(String),
+    /// The manifest could not be written as JSON.
+    Manifest(String),
     /// This build of the compiler lacks the backend.
     NotBuilt(Language),
 }
@@ -68,6 +70,7 @@ impl fmt::Display for CodegenError {
         match self {
             CodegenError::Template(message) => write!(f, "internal fault: template: {message}"),
             CodegenError::Rust(message) => write!(f, "internal fault: generated Rust: {message}"),
+            CodegenError::Manifest(message) => write!(f, "internal fault: manifest: {message}"),
             CodegenError::NotBuilt(language) => write!(f, "this build has no {} backend", language.name()),
         }
     }
@@ -82,6 +85,21 @@ impl std::error::Error for CodegenError {}
 pub fn compile(policy: &Policy, target: &TargetSpec, language: Language) -> Result<GeneratedFiles, CodegenError> {
     let program = lower(policy, target, language);
     backend_for(language)?.emit(&program)
+}
+
+/// Everything that `policyc compile` writes: the files of all languages and the manifest.
+///
+/// # Errors
+/// Only for a fault in the compiler itself.
+pub fn generate(policy: &Policy, target: &TargetSpec, languages: &[Language]) -> Result<GeneratedFiles, CodegenError> {
+    let mut all = GeneratedFiles::default();
+    for language in languages {
+        all.files.extend(compile(policy, target, *language)?.files);
+    }
+    let manifest = manifest::manifest(policy, target, languages, &all);
+    let text = serde_json::to_string_pretty(&manifest).map_err(|error| CodegenError::Manifest(error.to_string()))?;
+    all.files.insert(manifest::FILE.to_owned(), text + "\n");
+    Ok(all)
 }
 
 /// The backend of a language.

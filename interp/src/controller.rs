@@ -154,6 +154,39 @@ impl<T: Real> Controller<T> {
         Ok(trace.observation)
     }
 
+    /// Sections 2 to 5 into a trace made by [`Controller::blank_trace`]: everything that the network would see, without
+    /// running it. For a trainer, whose network is its own; allocates nothing.
+    pub fn sense_into(&self, samples: &[Sample], trace: &mut Trace<T>) -> Result<(), InputError> {
+        self.sense(samples, trace)?;
+        self.observe_into(trace);
+        Ok(())
+    }
+
+    /// Sections 8 and 9 for an action chosen elsewhere, behind [`Controller::sense_into`]: fills in the command. An index
+    /// beyond the last action counts as the last.
+    pub fn choose(&self, trace: &mut Trace<T>, action_index: u32) {
+        let last = self.table.len().saturating_sub(1);
+        trace.action_index = action_index.min(last as u32);
+        self.act(trace);
+    }
+
+    /// [`Controller::commit`] of a trace of this very step, with its command; allocates nothing.
+    pub fn commit_trace(&mut self, trace: &Trace<T>) {
+        self.absorb(trace, &trace.command);
+    }
+
+    /// Puts back a state that [`Controller::state`] gave; `false` and no change if it is of another shape.
+    pub fn restore(&mut self, state: &State<T>) -> bool {
+        let fits = state.held.len() == self.state.held.len()
+            && state.memory.len() == self.state.memory.len()
+            && state.soft_cap.is_some() == self.state.soft_cap.is_some()
+            && state.mapping.map(|m| m.r.is_some()) == self.state.mapping.map(|m| m.r.is_some());
+        if fits {
+            self.state.clone_from(state);
+        }
+        fits
+    }
+
     /// Q values of an observation, one per action (section 6). Values need not lie within the observation's bounds.
     pub fn q_values(&self, observation: &ArrayView1<'_, T>) -> Result<Array1<T>, InputError> {
         let expected = self.features.len();

@@ -24,8 +24,8 @@ impl<T: Real> Mapping<T> {
                 r: r.map(T::nearest),
             },
             load_current: mapping.load_current,
-            valid_i_out: Range::inwards(mapping.valid_i_out),
-            valid_d_sim: Range::inwards(mapping.valid_d_sim),
+            valid_i_out: Range::nearest(mapping.valid_i_out),
+            valid_d_sim: Range::nearest(mapping.valid_d_sim),
             adjust: [mapping.adjust_a, mapping.adjust_b, mapping.adjust_c, mapping.adjust_r].map(Range::inwards),
         }
     }

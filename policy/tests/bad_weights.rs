@@ -243,7 +243,7 @@ fn weights_that_are_not_finite_are_refused_with_their_index() {
         &[3],
         &[f32::NEG_INFINITY, 1.0, 0.0],
     )));
-    assert_tensor(&fault, FILE, "net.2.bias", &["-inf at index 0"]);
+    assert_tensor(&fault, FILE, "net.2.bias", &["not finite", "-inf at index 0"]);
 }
 
 #[test]

@@ -212,6 +212,21 @@ fn every_filter_stays_inside_its_bound() {
 }
 
 #[test]
+fn a_low_pass_may_pass_its_input_by_rounding_and_the_bound_knows() {
+    // from -250 to 1 the difference is rounded far more coarsely than the result
+    let filters = "filters = [{ low_pass = { time_constant = 1e-12 } }]";
+    let text = CONTRACT.replace(
+        "\"v_ref - v_out\"\nfilters = [{ delay = 1 }]",
+        &format!("\"v_out\"\n{filters}"),
+    );
+    let policy = Folder::new()
+        .contract(&text.replace("[0.0, 250.0]", "[-250.0, 1.0]"))
+        .policy();
+    assert!(policy.features[1].bound.high > 1.0);
+    exercise(&policy, 11, 20_000);
+}
+
+#[test]
 fn the_filtered_derivative_is_bounded_by_the_width_and_not_by_its_memory() {
     let policy = with_filters("[{ filtered_derivative = { time_constant = 1e-2 } }]");
     let bound = policy.features[1].bound;

@@ -64,6 +64,25 @@ fn numbers_are_ordered_as_numbers() {
 }
 
 #[test]
+fn equal_shapes_are_ordered_by_number_and_not_by_text() {
+    let stems = ["fc8", "fc9", "fc10", "fc11"];
+    let sizes = [(4, 2), (4, 4), (4, 4), (3, 4)];
+    let tensors: Vec<_> = stems
+        .iter()
+        .zip(sizes)
+        .flat_map(|(stem, (o, i))| dense(stem, o, i))
+        .collect();
+    assert_eq!(names(&tensors), stems);
+    let keras = ["dense", "dense_1", "dense_2", "dense_3"];
+    let tensors: Vec<_> = keras
+        .iter()
+        .zip(sizes)
+        .flat_map(|(stem, (o, i))| dense(stem, o, i))
+        .collect();
+    assert_eq!(names(&tensors), keras);
+}
+
+#[test]
 fn keras_and_flax_kernels_are_transposed() {
     for stems in [
         ["dense", "dense_1", "dense_2"],

@@ -1,6 +1,8 @@
 //! Shared by the tests: places, policies drawn at random, tool runs.
 
+pub mod fixture;
 pub mod random;
+pub mod tools;
 
 use std::path::{Path, PathBuf};
 

@@ -114,13 +114,148 @@ impl<'a> Lane<'a> {
         self.steps_compared = step;
         Outcome::Failed {
             step,
-            event: place
-                .map_or("flush", |place| compare::event_name(place.event))
-                .to_owned(),
+            event: place.map_or("end", |place| compare::event_name(place.event)).to_owned(),
             reason: reason.to_string(),
             measurement: place
                 .map(|place| compare::measurement(self.policy, place.event))
                 .unwrap_or_default(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use interp::Sample;
+
+    use super::*;
+    use crate::oracle::Oracle;
+
+    /// Answers a chunk rightly except for one word, or stops before it.
+    struct Fake {
+        hello: Vec<u32>,
+        answer: Vec<u32>,
+        fail: Option<RunFailure>,
+    }
+
+    impl Runner for Fake {
+        fn start(&mut self, _: usize) -> Result<Vec<u32>, RunError> {
+            Ok(self.hello.clone())
+        }
+
+        fn exchange(&mut self, _: &[u32], _: usize) -> Result<Vec<u32>, RunError> {
+            match self.fail.take() {
+                None => Ok(self.answer.clone()),
+                Some(reason) => Err(RunError {
+                    received: self.answer.clone(),
+                    reason,
+                }),
+            }
+        }
+    }
+
+    fn with_chunk(test: impl FnOnce(&Policy, &Layout, &Chunk)) {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/buck12/policy.toml");
+        let policy = policy::load(&path).unwrap_or_else(|faults| panic!("{faults:#?}"));
+        let mut oracle = Oracle::new(&policy);
+        let steps = (0..20).map(|n| Event::Step([99.0, 10.0 + n as f32, 9.5].map(Sample::Physical).to_vec()));
+        let chunk = oracle.chunk_of(steps.collect()).unwrap();
+        test(&policy, oracle.layout(), &chunk);
+    }
+
+    fn outcome(policy: &Policy, layout: &Layout, chunk: &Chunk, fake: Fake) -> (Result<(), Outcome>, u64) {
+        let mut lane = Lane::new(policy, layout, Box::new(fake));
+        let result = lane.start().and_then(|()| lane.follow(chunk));
+        (result, lane.steps_compared())
+    }
+
+    /// Words of a step's answer: 6 observations, 12 Q values, 4 of the command, 12 of the state, purity.
+    const STEP: usize = 6 + 12 + 4 + 12 + 1;
+
+    #[test]
+    fn equal_words_are_equal() {
+        with_chunk(|policy, layout, chunk| {
+            let fake = Fake {
+                hello: layout.hello().to_vec(),
+                answer: chunk.expected.clone(),
+                fail: None,
+            };
+            assert_eq!(outcome(policy, layout, chunk, fake), (Ok(()), 20));
+        });
+    }
+
+    #[test]
+    fn one_bit_in_one_word_is_found_and_named() {
+        with_chunk(|policy, layout, chunk| {
+            let names = [
+                (0, "observation[0] (e)"),
+                (6 + 5, "q[5]"),
+                (21, "status"),
+                (22 + 3, "state e_del.0.delay[0]"),
+            ];
+            for (word, name) in names {
+                let mut answer = chunk.expected.clone();
+                answer[7 * STEP + word] ^= 1;
+                let fake = Fake {
+                    hello: layout.hello().to_vec(),
+                    answer,
+                    fail: None,
+                };
+                let (Err(Outcome::Different { difference }), 7) = outcome(policy, layout, chunk, fake) else {
+                    panic!("{name}")
+                };
+                assert_eq!((difference.step, difference.what.as_str()), (7, name));
+                assert_ne!(difference.expected.bits, difference.got.bits);
+                assert_eq!(difference.measurement.len(), 3);
+            }
+        });
+    }
+
+    #[test]
+    fn a_failed_self_test_is_a_difference_at_the_start() {
+        with_chunk(|policy, layout, chunk| {
+            let mut hello = layout.hello().to_vec();
+            hello[1] = 4;
+            let fake = Fake {
+                hello,
+                answer: vec![],
+                fail: None,
+            };
+            let (Err(Outcome::Different { difference }), 0) = outcome(policy, layout, chunk, fake) else {
+                panic!()
+            };
+            assert_eq!(
+                (difference.event.as_str(), difference.what.as_str()),
+                ("start", "self_test")
+            );
+        });
+    }
+
+    #[test]
+    fn a_crash_names_the_step_it_happened_in() {
+        with_chunk(|policy, layout, chunk| {
+            let answer = chunk.expected[..3 * STEP + 10].to_vec();
+            let fail = Some(RunFailure::Ended {
+                status: "signal: 11".into(),
+                stderr: String::new(),
+            });
+            let fake = Fake {
+                hello: layout.hello().to_vec(),
+                answer,
+                fail,
+            };
+            let (
+                Err(Outcome::Failed {
+                    step, event, reason, ..
+                }),
+                3,
+            ) = outcome(policy, layout, chunk, fake)
+            else {
+                panic!()
+            };
+            assert_eq!((step, event.as_str()), (3, "step"));
+            assert!(reason.contains("signal: 11"));
+        });
     }
 }

@@ -5,7 +5,7 @@ use ndarray::aview1;
 use policy::Policy;
 use serde::Serialize;
 
-use crate::protocol::{Layout, encode, kind};
+use crate::protocol::{Layout, encode};
 use crate::traces::{Event, Stream};
 
 /// A piece of the stream with the answers expected to it.
@@ -15,7 +15,7 @@ pub struct Chunk {
     pub first_step: u64,
     /// The events in order.
     pub events: Vec<Event>,
-    /// The events as words, a flush at the end.
+    /// The events as words.
     pub input: Vec<u32>,
     /// All answers, one after the other.
     pub expected: Vec<u32>,
@@ -121,7 +121,6 @@ impl Oracle {
     }
 
     fn finish(&mut self, chunk: &mut Chunk) {
-        chunk.input.push(kind::FLUSH);
         self.checksum.update(&chunk.expected);
     }
 

@@ -9,7 +9,8 @@
 //! | [`kind::SET_MAPPING`] | a, b, c, r (r = 0 in the three-term form) | accepted, state |
 //! | [`kind::RESET`], [`kind::INIT`] | | state |
 //! | [`kind::NETWORK`] | observation | Q values |
-//! | [`kind::FLUSH`] | | nothing: the driver flushes its output |
+//!
+//! Each answer is flushed, so that a crash or a hang shows at the event that caused it.
 
 use interp::Sample;
 use policy::Policy;
@@ -28,8 +29,6 @@ pub mod kind {
     pub const INIT: u32 = 3;
     /// The network alone.
     pub const NETWORK: u32 = 4;
-    /// Flush the output.
-    pub const FLUSH: u32 = 5;
 }
 
 /// First word of a driver's prologue.

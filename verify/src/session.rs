@@ -212,15 +212,8 @@ pub fn run(policy: &Policy, options: Options<'_>) -> Result<Report, VerifyError>
 
 /// The policy's files for `target` in each of `languages`.
 pub(crate) fn generate(policy: &Policy, target: &TargetSpec, languages: &[Language]) -> Result<Files, VerifyError> {
-    let mut files = Files::new();
-    for &language in languages {
-        files.extend(
-            codegen::compile(policy, target, language)
-                .map_err(VerifyError::Codegen)?
-                .files,
-        );
-    }
-    Ok(files)
+    let generated = codegen::generate(policy, target, languages).map_err(VerifyError::Codegen)?;
+    Ok(generated.files)
 }
 
 /// Sends a chunk to every build that is still in the race.
@@ -273,6 +266,13 @@ fn compile(build: &Build, sources: Sources<'_>, folder: &Path) -> Result<PathBuf
             BuildError::NoFiles => {
                 let reason = format!("the files have no {} code", compiler.language.name());
                 Outcome::Skipped { reason, package: None }
+            }
+            BuildError::NoSanitiser => {
+                let reason = format!("{} has no sanitiser libraries", compiler.name);
+                Outcome::Skipped {
+                    reason,
+                    package: Some("libgcc-12-dev".to_owned()),
+                }
             }
             BuildError::Io(error) => failed(&format!("could not compile: {error}")),
             BuildError::Refused(message) => Outcome::CompileError { message },

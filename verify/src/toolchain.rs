@@ -25,13 +25,24 @@ pub struct Compiler {
 
 const C_LEVELS: &[(&str, &[&str])] = &[("-O0", &["-O0"]), ("-O2", &["-O2"]), ("-O3", &["-O3"])];
 
+/// The levels of gcc: one more with sanitisers, which end the driver at an access outside of an array.
+const GCC_LEVELS: &[(&str, &[&str])] = &[
+    ("-O0", &["-O0"]),
+    ("-O2", &["-O2"]),
+    ("-O3", &["-O3"]),
+    (
+        "sanitised",
+        &["-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"],
+    ),
+];
+
 /// All compilers, in report order. One entry per compiler.
 pub const COMPILERS: &[Compiler] = &[
     Compiler {
         name: "gcc",
         package: "gcc",
         language: Language::C,
-        levels: C_LEVELS,
+        levels: GCC_LEVELS,
     },
     Compiler {
         name: "clang",
@@ -130,6 +141,8 @@ pub enum BuildError {
     NoFiles,
     /// A file could not be written or the compiler not be started.
     Io(std::io::Error),
+    /// The run-time library of the sanitisers is not installed.
+    NoSanitiser,
     /// The compiler refused, with its text.
     Refused(String),
 }
@@ -197,6 +210,9 @@ pub fn compile(build: &Build, program: &Path, sources: Sources<'_>, folder: &Pat
     }
     // the folder is a random name: without it the same fault gives the same text
     let text = String::from_utf8_lossy(&output.stderr).replace(&folder.display().to_string(), ".");
+    if text.contains("cannot find") && text.contains("san") && build.flags.iter().any(|f| f.starts_with("-fsanitize")) {
+        return Err(BuildError::NoSanitiser);
+    }
     let first_lines: Vec<&str> = text.lines().take(40).collect();
     Err(BuildError::Refused(first_lines.join("\n")))
 }

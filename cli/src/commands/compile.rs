@@ -17,7 +17,7 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
     let mut languages: Vec<Language> = options.lang.iter().map(|lang| (*lang).into()).collect();
     languages.sort();
     languages.dedup();
-    let files = generate(&policy, target, &languages)?;
+    let files = codegen::generate(&policy, target, &languages)?;
     write(&policy, target, &options.out, &files)?;
     Ok(Outcome::Done)
 }
@@ -26,7 +26,7 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
 pub fn write(policy: &Policy, target: &TargetSpec, folder: &Path, files: &GeneratedFiles) -> Result<(), Failure> {
     output::write_texts(folder, &files.files)?;
     for note in &policy.notes {
-        println!("note: {note}");
+        output::say(&format!("note: {note}"))?;
     }
     let sizes = manifest::sizes(policy, target);
     let (macs, tables, state) = (
@@ -34,24 +34,12 @@ pub fn write(policy: &Policy, target: &TargetSpec, folder: &Path, files: &Genera
         bytes(sizes.table_bytes),
         bytes(sizes.state_bytes),
     );
-    println!(
+    output::say(&format!(
         "{}: {macs} MACs per step, {tables} of tables, {state} of state",
         policy.name
-    );
+    ))?;
     for (name, text) in &files.files {
-        println!("  {} ({})", folder.join(name).display(), bytes(text.len()));
+        output::say(&format!("  {} ({})", folder.join(name).display(), bytes(text.len())))?;
     }
     Ok(())
-}
-
-/// The files of all languages and the manifest.
-pub fn generate(policy: &Policy, target: &TargetSpec, languages: &[Language]) -> Result<GeneratedFiles, Failure> {
-    let mut all = GeneratedFiles::default();
-    for language in languages {
-        all.files.extend(codegen::compile(policy, target, *language)?.files);
-    }
-    let manifest = manifest::manifest(policy, target, languages, &all);
-    let text = serde_json::to_string_pretty(&manifest)? + "\n";
-    all.files.insert(manifest::FILE.to_owned(), text);
-    Ok(all)
 }

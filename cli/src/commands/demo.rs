@@ -30,7 +30,7 @@ pub fn run(options: &Demo) -> Result<Outcome, Failure> {
         .map(|(name, content)| ((*name).to_owned(), content.to_vec()))
         .collect();
     output::write_all(&policy_folder, &files)?;
-    heading("The policy", &format!("policyc inspect {}", policy_folder.display()));
+    heading("The policy", &format!("policyc inspect {}", policy_folder.display()))?;
     inspect::run(&Inspect {
         policy: policy_folder.clone(),
         json: false,
@@ -42,9 +42,9 @@ pub fn run(options: &Demo) -> Result<Outcome, Failure> {
         policy_folder.display(),
         generated.display()
     );
-    heading("The code", &command);
+    heading("The code", &command)?;
     let policy = super::load(&policy_folder)?;
-    let files = compile::generate(&policy, super::target("host")?, &Language::ALL)?;
+    let files = codegen::generate(&policy, super::target("host")?, &Language::ALL)?;
     compile::write(&policy, super::target("host")?, &generated, &files)?;
 
     let (policy, generated) = (policy_folder.display(), generated.display());
@@ -54,7 +54,7 @@ pub fn run(options: &Demo) -> Result<Outcome, Failure> {
             "policyc verify {policy} --generated {generated} --steps {}",
             options.steps
         ),
-    );
+    )?;
     let outcome = verify::run(&Verify {
         policy: policy_folder.clone(),
         steps: options.steps,
@@ -63,22 +63,22 @@ pub fn run(options: &Demo) -> Result<Outcome, Failure> {
         trace: Vec::new(),
         json: false,
     })?;
-    println!("\nfiles");
+    output::say("\nfiles")?;
     show(
         &policy_folder,
         "the policy: edit policy.toml and run the commands above again",
-    );
+    )?;
     show(
         &options.out.join("generated"),
         "the controller in C and Rust, and manifest.json",
-    );
+    )?;
     Ok(outcome)
 }
 
-fn heading(title: &str, command: &str) {
-    println!("\n== {title} ==   {command}\n");
+fn heading(title: &str, command: &str) -> Result<(), Failure> {
+    output::say(&format!("\n== {title} ==   {command}\n"))
 }
 
-fn show(folder: &Path, meaning: &str) {
-    println!("  {}   {meaning}", folder.display());
+fn show(folder: &Path, meaning: &str) -> Result<(), Failure> {
+    output::say(&format!("  {}   {meaning}", folder.display()))
 }

@@ -8,15 +8,15 @@ use serde::Serialize;
 
 use super::{bytes, grouped};
 use crate::arguments::Inspect;
-use crate::{Failure, Outcome};
+use crate::{Failure, Outcome, output};
 
 /// Prints the checked policy.
 pub fn run(options: &Inspect) -> Result<Outcome, Failure> {
     let policy = super::load(&options.policy)?;
     if options.json {
-        println!("{}", serde_json::to_string_pretty(&view(&policy)?)?);
+        output::say(&serde_json::to_string_pretty(&view(&policy)?)?)?;
     } else {
-        print!("{}", text(&policy)?);
+        output::say(text(&policy)?.trim_end())?;
     }
     Ok(Outcome::Done)
 }

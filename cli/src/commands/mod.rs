@@ -23,7 +23,15 @@ fn contract_path(path: &Path) -> PathBuf {
 }
 
 fn load(path: &Path) -> Result<Policy, Failure> {
-    Ok(policy::load(&contract_path(path))?)
+    policy::load(&contract_path(path)).map_err(|faults| {
+        let count = faults.iter().count();
+        let total = if count > 1 {
+            format!("\n{count} faults; nothing was written")
+        } else {
+            String::new()
+        };
+        Failure(format!("{}\n{total}", faults.to_string().trim_end()))
+    })
 }
 
 fn target(name: &str) -> Result<&'static TargetSpec, Failure> {

@@ -8,6 +8,8 @@ pub fn run(options: &New) -> Result<Outcome, Failure> {
     let text = policy::new_contract(&options.weights)?;
     output::write_new(&options.out, &text)?;
     let path = options.out.display();
-    println!("wrote {path}: fill in what says TODO, then\n  policyc inspect {path}");
+    output::say(&format!(
+        "wrote {path}: fill in what says TODO, then\n  policyc inspect {path}"
+    ))?;
     Ok(Outcome::Done)
 }

@@ -7,13 +7,13 @@ use std::time::{Duration, Instant};
 use codegen::{Language, manifest};
 use policy::Policy;
 use serde::{Deserialize, Serialize};
-use verify::drift::{self, Drift};
+use verify::drift::Drift;
 use verify::traces::Recorded;
 use verify::{Files, Options, Progress, Report};
 
-use super::{compile, grouped};
+use super::grouped;
 use crate::arguments::Verify;
-use crate::{Failure, Outcome};
+use crate::{Failure, Outcome, output};
 
 mod show;
 
@@ -56,9 +56,9 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
     let drift = on_disk.map(|(_, drift)| drift);
     let equal = report.passed() && drift.as_ref().is_none_or(Drift::is_empty);
     if options.json {
-        println!("{}", serde_json::to_string_pretty(&Answer { equal, drift, report })?);
+        output::say(&serde_json::to_string_pretty(&Answer { equal, drift, report })?)?;
     } else {
-        print!("{}", show::report(&report, drift.as_ref(), equal)?);
+        output::say(show::report(&report, drift.as_ref(), equal)?.trim_end())?;
     }
     Ok(if equal { Outcome::Done } else { Outcome::Different })
 }
@@ -106,25 +106,12 @@ fn checked_in(policy: &Policy, folder: &Path) -> Result<(Files, Drift), Failure>
             origin.languages
         )));
     }
-    let mut drift = verify::drift(policy, target, &languages, folder)?;
-    let expected = compile::generate(policy, target, &languages)?;
-    let only_manifest = |files: &Files| {
-        files
-            .iter()
-            .filter(|(name, _)| *name == manifest::FILE)
-            .map(|(n, t)| (n.clone(), t.clone()))
-            .collect()
-    };
-    let manifest_now: Files = only_manifest(&expected.files);
-    let manifest_found = Files::from([(manifest::FILE.to_owned(), text)]);
-    drift
-        .changed
-        .extend(drift::compare(&manifest_now, &manifest_found).changed);
+    let drift = verify::drift(policy, target, &languages, folder)?;
     let mut files = Files::new();
-    for name in expected.files.keys().filter(|name| *name != manifest::FILE) {
+    for name in codegen::generate(policy, target, &languages)?.files.into_keys() {
         // a missing file is already part of the drift
-        if let Ok(bytes) = std::fs::read(folder.join(name)) {
-            files.insert(name.clone(), String::from_utf8_lossy(&bytes).into_owned());
+        if let Ok(bytes) = std::fs::read(folder.join(&name)) {
+            files.insert(name, String::from_utf8_lossy(&bytes).into_owned());
         }
     }
     Ok((files, drift))

@@ -2,6 +2,7 @@
 
 #[cfg(feature = "c")]
 pub mod c99;
+#[cfg(feature = "c")]
 mod literal;
 pub mod rust;
 

@@ -88,8 +88,8 @@ fn mapping(block: &mut Block, map: &Mapping, duty: ValueId) -> (ValueId, ValueId
         mapped = block.value(Op::Add(mapped, product));
     }
     let mut outside = |x: ValueId, range: policy::Interval| {
-        let low = block.constant(up_f32(range.low));
-        let high = block.constant(down_f32(range.high));
+        let low = block.constant(Literal::nearest(range.low));
+        let high = block.constant(Literal::nearest(range.high));
         block.value(Op::Outside { x, low, high })
     };
     let duty_outside = outside(duty, map.valid_d_sim);

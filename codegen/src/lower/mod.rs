@@ -104,6 +104,9 @@ fn mapping(mapping: &policy::Mapping) -> MappingCode {
     };
     MappingCode {
         coefficients: coefficients.into_iter().map(lowered).collect(),
-        valid_i_out: inward(mapping.valid_i_out),
+        valid_i_out: (
+            Literal::nearest(mapping.valid_i_out.low),
+            Literal::nearest(mapping.valid_i_out.high),
+        ),
     }
 }

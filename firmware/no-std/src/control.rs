@@ -1,8 +1,9 @@
 //! What runs in the control interrupt. Safe code, `core` only.
+#![forbid(unsafe_code)]
 
 policy_macro::include_policy!(pub "policy/policy.toml");
 
-pub use buck12::{Command, Controller, Measurement};
+pub use buck12::{Controller, Measurement};
 
 /// Timer counts of one PWM period.
 pub const PERIOD_TICKS: u16 = 8400;

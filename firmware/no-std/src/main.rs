@@ -15,6 +15,11 @@ fn panic(_: &core::panic::PanicInfo) -> ! {
     loop {}
 }
 
+// the core library of a hosted system is built for unwinding and asks for this; unoptimised code does not lose the ask
+#[cfg(debug_assertions)]
+#[no_mangle]
+extern "C" fn rust_eh_personality() {}
+
 #[no_mangle]
 pub extern "C" fn main() -> i32 {
     if !is_trustworthy() {

@@ -9,13 +9,13 @@ use crate::protocol::{MAGIC, kind, purity};
 
 /// Text of the driver for the generated `<name>.h`.
 pub fn text(policy: &Policy) -> String {
+    [head(policy), step(policy), set_mapping(policy), main(policy)].concat()
+}
+
+/// Includes, memory, words in and out, start.
+fn head(policy: &Policy) -> String {
     let name = &policy.name;
     let macro_name = name.to_uppercase();
-    let measurement = measurement(policy);
-    let set_mapping = set_mapping(policy);
-    let (step, set, reset, init) = (kind::STEP, kind::SET_MAPPING, kind::RESET, kind::INIT);
-    let (network, flush) = (kind::NETWORK, kind::FLUSH);
-    let purity_tests = purity_tests(name);
     format!(
         r#"/* Driver of the differential check: events in, answers out, in words of the machine. */
 #include <stdint.h>
@@ -66,7 +66,17 @@ static void start(void)
     {name}_init(&twin);
 }}
 
-static int read_measurement(void)
+"#
+    )
+}
+
+fn step(policy: &Policy) -> String {
+    let name = &policy.name;
+    let macro_name = name.to_uppercase();
+    let measurement = measurement(policy);
+    let purity_tests = purity_tests(name);
+    format!(
+        r#"static int read_measurement(void)
 {{
     uint32_t words[{signals}];
     if (!get(words, {signals}u)) {{
@@ -96,7 +106,18 @@ static void step(void)
     put_state();
     put_word(purity);
 }}
-{set_mapping}
+"#,
+        signals = policy.signals.len(),
+    )
+}
+
+fn main(policy: &Policy) -> String {
+    let name = &policy.name;
+    let macro_name = name.to_uppercase();
+    let (step, set, reset, init) = (kind::STEP, kind::SET_MAPPING, kind::RESET, kind::INIT);
+    let network = kind::NETWORK;
+    format!(
+        r#"
 int main(void)
 {{
     static char in_buffer[1 << 16];
@@ -142,17 +163,15 @@ int main(void)
             {name}_q_values(observation, q);
             put(q, {macro_name}_ACTIONS);
             break;
-        case {flush}u:
-            fflush(stdout);
-            break;
         default:
             return 3;
         }}
+        /* each answer leaves at once: a crash then shows at its own event */
+        fflush(stdout);
     }}
     return 0;
 }}
-"#,
-        signals = policy.signals.len(),
+"#
     )
 }
 

@@ -1,7 +1,7 @@
 //! Values at which code goes wrong: ends of ranges, zeros, subnormals, NaN, infinities, extreme ADC codes.
 
 use interp::Sample;
-use policy::Signal;
+use policy::{Policy, Signal};
 
 use super::rng::Rng;
 use super::sample_of;
@@ -25,11 +25,20 @@ const NANS: [u32; 7] = [
 ];
 
 impl Edges {
-    pub fn new(signal: &Signal) -> Self {
+    /// The edges of signal `index`: its own, and those of the mapping's validity if it is the load current.
+    pub fn new(policy: &Policy, index: usize) -> Self {
+        let mapping = policy.mapping.as_ref().filter(|mapping| mapping.load_current == index);
+        let valid = mapping.map(|mapping| mapping.valid_i_out);
+        let ends: Vec<f64> = valid.iter().flat_map(|valid| [valid.low, valid.high]).collect();
+        Self::of_signal(&policy.signals[index], &ends)
+    }
+
+    fn of_signal(signal: &Signal, more_ends: &[f64]) -> Self {
+        let ends = [&[signal.range.low, signal.range.high], more_ends].concat();
         let all = if signal.adc.is_some() {
-            codes(signal)
+            codes(signal, &ends)
         } else {
-            floats(signal)
+            floats(&ends)
         };
         let plausible = |sample: &Sample| match (*sample, signal.adc) {
             (Sample::Physical(x), _) => {
@@ -68,7 +77,7 @@ impl Edges {
     }
 }
 
-fn floats(signal: &Signal) -> Vec<Sample> {
+fn floats(ends: &[f64]) -> Vec<Sample> {
     let mut values = vec![
         0.0,
         -0.0,
@@ -87,7 +96,7 @@ fn floats(signal: &Signal) -> Vec<Sample> {
         f32::INFINITY,
         f32::NEG_INFINITY,
     ];
-    for end in [signal.range.low as f32, signal.range.high as f32] {
+    for end in ends.iter().map(|end| *end as f32) {
         let up = end.next_up();
         let down = end.next_down();
         values.extend([end, up, down, up.next_up(), down.next_down(), -end]);
@@ -96,12 +105,12 @@ fn floats(signal: &Signal) -> Vec<Sample> {
     values.into_iter().map(Sample::Physical).collect()
 }
 
-fn codes(signal: &Signal) -> Vec<Sample> {
+fn codes(signal: &Signal, ends: &[f64]) -> Vec<Sample> {
     let mut codes = vec![0, 1, -1, i32::MIN, i32::MIN + 1, i32::MAX, i32::MAX - 1];
     for n in [8, 10, 12, 14, 16, 24] {
         codes.extend([(1 << n) - 1, 1 << n, (1 << n) + 1, -(1 << n), -(1 << n) - 1]);
     }
-    for end in [signal.range.low, signal.range.high] {
+    for &end in ends {
         if let Sample::Code(code) = sample_of(signal, end) {
             codes.extend((-2..=2).map(|n| code.saturating_add(n)));
         }
@@ -126,7 +135,7 @@ mod tests {
 
     #[test]
     fn edges_lie_on_both_sides_of_the_range() {
-        let edges = Edges::new(&signal(None));
+        let edges = Edges::of_signal(&signal(None), &[]);
         // 0.1_f32 is above 0.1, 0.9_f32 below 0.9
         assert!(edges.inside.contains(&Sample::Physical(0.1)) && edges.inside.contains(&Sample::Physical(0.9)));
         assert!(edges.outside.contains(&Sample::Physical(0.1_f32.next_down())));
@@ -146,10 +155,13 @@ mod tests {
 
     #[test]
     fn codes_reach_the_ends_of_the_range_and_of_the_type() {
-        let edges = Edges::new(&signal(Some(Adc {
-            gain: 1e-3,
-            offset: 0.0,
-        })));
+        let edges = Edges::of_signal(
+            &signal(Some(Adc {
+                gain: 1e-3,
+                offset: 0.0,
+            })),
+            &[],
+        );
         assert!(edges.inside.contains(&Sample::Code(101)) && edges.inside.contains(&Sample::Code(899)));
         assert!(edges.outside.contains(&Sample::Code(i32::MIN)) && edges.outside.contains(&Sample::Code(98)));
     }

@@ -1,13 +1,16 @@
 //! The stream of events that the interpreter and all builds are put through: deterministic from a seed.
 //!
 //! Segments of random length follow each other: closed loop with a surrogate plant, uniform values, edge values,
-//! bursts of bad samples around the hold count, values at the ends of the clips. Attempts to replace the mapping
+//! bursts of bad samples around the hold count, values at the ends of the clips, plateaus
+//! long enough for integrators to reach their clamps. Attempts to replace the mapping
 //! coefficients, resets and fresh starts are strewn in.
 
 mod edges;
 mod plant;
 mod recorded;
 mod rng;
+#[cfg(test)]
+mod tests;
 
 use interp::{Controller, Sample};
 use policy::{Interval, Policy};
@@ -48,23 +51,27 @@ enum Segment {
     Edges,
     Bursts,
     Clips,
+    Plateaus,
 }
 
-const SEGMENTS: [Segment; 6] = [
+const SEGMENTS: [Segment; 7] = [
     Segment::ClosedLoop,
     Segment::ClosedLoop,
     Segment::Uniform,
     Segment::Edges,
     Segment::Bursts,
     Segment::Clips,
+    Segment::Plateaus,
 ];
 
 /// Steps between two attempts to replace the mapping coefficients, on average.
-const STEPS_PER_SET_MAPPING: usize = 150;
+const STEPS_PER_SET_MAPPING: usize = 50;
 /// Steps between two resets, on average.
 const STEPS_PER_RESET: usize = 400;
 /// Steps between two fresh starts, on average.
 const STEPS_PER_INIT: usize = 1500;
+/// Steps of a plateau, on average.
+const STEPS_PER_PLATEAU: usize = 60;
 /// Longest part of a segment given to one burst cycle.
 const MAX_SEGMENT: usize = 20_000;
 
@@ -81,6 +88,8 @@ pub struct Stream<'a> {
     /// Steps left in the burst of bad samples (positive) or in the gap after it.
     bad_left: usize,
     good_left: usize,
+    /// Values kept for a while.
+    plateau: Vec<Sample>,
     /// Events that come before anything random, last first.
     queued: Vec<Event>,
 }
@@ -98,12 +107,15 @@ impl<'a> Stream<'a> {
         Self {
             policy,
             plant: Plant::new(policy, &mut rng),
-            edges: policy.signals.iter().map(Edges::new).collect(),
+            edges: (0..policy.signals.len())
+                .map(|index| Edges::new(policy, index))
+                .collect(),
             rng,
             segment: Segment::ClosedLoop,
             left: 300,
             bad_left: 0,
             good_left: 0,
+            plateau: Vec::new(),
             queued,
         }
     }
@@ -133,6 +145,7 @@ impl<'a> Stream<'a> {
             Segment::Edges => self.with_edges(),
             Segment::Bursts => self.bursts(),
             Segment::Clips => self.at_a_clip(controller),
+            Segment::Plateaus => self.plateau(),
         })
     }
 
@@ -145,7 +158,7 @@ impl<'a> Stream<'a> {
                 let hold = self.policy.fallback.hold as usize;
                 self.left = self.left.max(4 * (hold.saturating_add(4))).min(MAX_SEGMENT);
             }
-            Segment::Uniform | Segment::Edges | Segment::Clips => {}
+            Segment::Uniform | Segment::Edges | Segment::Clips | Segment::Plateaus => {}
         }
     }
 
@@ -215,6 +228,19 @@ impl<'a> Stream<'a> {
         samples
     }
 
+    /// The same values for many steps, some of them at an edge.
+    fn plateau(&mut self) -> Vec<Sample> {
+        if self.plateau.is_empty() || self.rng.one_in(STEPS_PER_PLATEAU) {
+            self.plateau = self.uniform();
+            for (sample, edges) in self.plateau.iter_mut().zip(&self.edges) {
+                if self.rng.one_in(3) {
+                    *sample = edges.inside(&mut self.rng, *sample);
+                }
+            }
+        }
+        self.plateau.clone()
+    }
+
     /// Moves one signal so that one observation comes to lie within a few units in the last place of a clip's end.
     ///
     /// Every filter is affine in its input for a given state, so two evaluations give the place.
@@ -266,20 +292,20 @@ impl<'a> Stream<'a> {
         let own = mapping.coefficients;
         let mut values = [own.a as f32, own.b as f32, own.c as f32, own.r.unwrap_or(0.0) as f32];
         let ranges = [mapping.adjust_a, mapping.adjust_b, mapping.adjust_c, mapping.adjust_r];
-        let style = rng.below(4);
+        let style = rng.below(5);
         if style != 0 {
             for (value, range) in values.iter_mut().zip(ranges) {
                 *value = rng.uniform(range.low, range.high) as f32;
             }
         }
         let index = rng.below(if own.r.is_some() { 4 } else { 3 });
-        if style >= 2 {
+        if style == 2 || style == 3 {
             let end = (if rng.one_in(2) {
                 ranges[index].low
             } else {
                 ranges[index].high
             }) as f32;
-            values[index] = rng.pick(&[end, end.next_up(), end.next_down(), 0.0, -0.0], end);
+            values[index] = rng.pick(&[end, end.next_up(), end.next_down()], end);
         }
         if style == 3 && rng.one_in(2) {
             let bad = [
@@ -289,8 +315,17 @@ impl<'a> Stream<'a> {
                 f32::NEG_INFINITY,
                 f32::MAX,
                 f32::MIN,
+                0.0,
+                -0.0,
             ];
             values[index] = rng.pick(&bad, f32::NAN);
+        }
+        if style == 4 && own.r.is_some() {
+            // a + r i close to 0 at one end of the current: where the mapping ceases to rise
+            let valid = mapping.valid_i_out;
+            let i = (if rng.one_in(2) { valid.low } else { valid.high }) as f32;
+            let a = -(values[3] * i);
+            values[0] = rng.pick(&[a, a.next_up(), a.next_down()], a);
         }
         let [a, b, c, r] = values;
         Event::SetMapping {

@@ -17,9 +17,15 @@ pub fn report(report: &Report, drift: Option<&Drift>, equal: bool) -> Result<Str
     if let Some(golden) = &report.golden {
         writeln!(out, "golden vectors   {}", golden_text(golden))?;
     }
+    let width = report
+        .builds
+        .iter()
+        .map(|build| build.build.len())
+        .max()
+        .unwrap_or_default();
     for build in &report.builds {
         let (verdict, detail) = verdict(build);
-        writeln!(out, "{:12}  {verdict:9}  {detail}", build.build)?;
+        writeln!(out, "{:width$}  {verdict:9}  {detail}", build.build)?;
     }
     for build in &report.builds {
         match &build.outcome {

@@ -302,15 +302,16 @@ fn mapping_conditions(program: &Program) -> Vec<String> {
     let Some(mapping) = &program.mapping else {
         return Vec::new();
     };
+    let p = &program.name;
     let within = |(name, _, low, high): &(Coefficient, _, crate::program::Literal, crate::program::Literal)| {
         let (name, low, high) = (coefficient_name(*name), float(low.value()), float(high.value()));
-        format!("(uint32_t)({name} >= {low}) & (uint32_t)({name} <= {high})")
+        format!("{p}_within({name}, {low}, {high})")
     };
     let mut conditions: Vec<String> = mapping.coefficients.iter().map(within).collect();
     if mapping.coefficients.iter().any(|(name, ..)| *name == Coefficient::R) {
         let (low, high) = mapping.valid_i_out;
         for end in [low, high] {
-            conditions.push(format!("(uint32_t)(a + r * {} > 0.0f)", float(end.value())));
+            conditions.push(format!("{p}_flag((a + (r * {})) > 0.0f)", float(end.value())));
         }
     }
     conditions

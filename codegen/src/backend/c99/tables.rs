@@ -131,7 +131,7 @@ pub fn tanh_steps() -> Vec<Member> {
         for (power, term) in terms.iter().enumerate().rev() {
             let value = match power {
                 4 => float(*term),
-                _ => format!("{letter}{} * z + {}", power + 1, float(*term)),
+                _ => format!("({letter}{} * z) + {}", power + 1, float(*term)),
             };
             steps.push(Member {
                 declaration: format!("{letter}{power}"),

@@ -1,0 +1,244 @@
+//! Exit codes, help, `new` and `inspect`.
+
+use serde_json::Value;
+
+use super::Desk;
+
+#[test]
+fn the_help_of_every_command_names_its_arguments() {
+    let desk = Desk::new("minimal");
+    let overview = desk.succeed("--help");
+    for (command, arguments) in [
+        ("new", &["<WEIGHTS>", "--out"][..]),
+        ("inspect", &["<POLICY>", "--json"]),
+        ("compile", &["<POLICY>", "--lang", "c, rust", "--target", "--out"]),
+        (
+            "verify",
+            &["<POLICY>", "--steps", "--seed", "--generated", "--trace", "--json"],
+        ),
+        ("demo", &["--out", "--steps"]),
+    ] {
+        assert!(overview.contains(&format!("\n  {command} ")), "{overview}");
+        // lines are broken where the terminal ends
+        let help = desk.succeed(&format!("{command} --help"));
+        let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
+        for argument in arguments {
+            assert!(help.contains(argument), "{command}: {argument}\n{help}");
+        }
+    }
+    assert!(overview.contains("Exit code 0"), "{overview}");
+    assert!(desk.succeed("--version").starts_with("policyc "));
+}
+
+#[test]
+fn a_command_line_that_cannot_be_read_ends_with_2() {
+    let desk = Desk::new("minimal");
+    for line in [
+        "compil policy",
+        "compile policy",
+        "compile --out out",
+        "compile policy --out out --lang cobol",
+        "verify policy --steps many",
+        "inspect policy --yaml",
+    ] {
+        desk.refuse(
+            line,
+            &["Usage:"]
+                .iter()
+                .filter(|_| !line.contains("cobol") && !line.contains("many"))
+                .copied()
+                .collect::<Vec<_>>(),
+        );
+    }
+    assert_eq!(desk.listing(), Desk::new("minimal").listing());
+}
+
+#[test]
+fn an_unknown_target_is_answered_with_the_known_ones() {
+    let desk = Desk::new("minimal");
+    desk.refuse(
+        "compile policy --target pdp-11 --out out",
+        &["unknown target", "pdp-11", &targets::names().join(", ")],
+    );
+    assert!(!desk.path("out").exists());
+}
+
+#[test]
+fn inspect_shows_formulas_layers_actions_and_sizes() {
+    let desk = Desk::new("paper");
+    let text = desk.succeed("inspect policy");
+    for word in [
+        "paper",
+        "v - v_ref",
+        "delay",
+        "difference",
+        "6",
+        "fc0",
+        "xi",
+        "drm",
+        "sha256",
+        "MACs",
+    ] {
+        assert!(text.contains(word), "{word}\n{text}");
+    }
+    assert_eq!(text, desk.succeed("inspect policy/policy.toml"));
+}
+
+#[test]
+fn inspect_json_is_json_with_the_numbers_of_the_policy() {
+    let desk = Desk::new("paper");
+    let view: Value = serde_json::from_str(&desk.succeed("inspect policy --json")).unwrap();
+    assert_eq!(view["name"], "paper");
+    assert_eq!(view["sample_period"], 1e-4);
+    assert_eq!(view["features"].as_array().unwrap().len(), 6);
+    assert_eq!(view["features"][1]["name"], "e_del");
+    assert_eq!(view["actions"].as_array().unwrap().len(), 9);
+    assert_eq!(view["mapping"]["load_current"], 1);
+    assert_eq!(view["layers"][0]["outputs"], 5);
+    assert_eq!(view["sizes"]["macs"], 6 * 5 + 5 * 4 + 4 * 9);
+    assert_eq!(view["digests"]["weights"].as_str().unwrap().len(), 64);
+}
+
+#[test]
+fn new_writes_a_skeleton_whose_gaps_inspect_names_one_by_one() {
+    let desk = Desk::new("paper");
+    assert!(
+        desk.succeed("new policy/weights.safetensors --out policy/fresh.toml")
+            .contains("policy/fresh.toml")
+    );
+    let skeleton = desk.read("policy/fresh.toml");
+    assert_eq!(skeleton.matches("[[feature]]\nname").count(), 6, "{skeleton}");
+    assert_eq!(skeleton.matches("# action ").count(), 9, "{skeleton}");
+    let faults = desk.refuse(
+        "inspect policy/fresh.toml",
+        &[
+            "TODO",
+            "`name`",
+            "`hidden_activation`",
+            "`hold`",
+            "--> policy/fresh.toml:",
+        ],
+    );
+    let gaps = skeleton
+        .lines()
+        .filter(|line| line.split('#').next().unwrap().contains("\"TODO\""))
+        .count();
+    assert!(
+        faults.matches("still says TODO").count() >= gaps,
+        "{gaps} gaps\n{faults}"
+    );
+}
+
+#[test]
+fn a_skeleton_filled_in_compiles() {
+    let desk = Desk::new("linear");
+    desk.succeed("new policy/weights.safetensors --out policy/filled.toml");
+    for (old, new) in [
+        ("name = \"TODO\"", "name = \"filled\""),
+        ("sample_period = \"TODO\"", "sample_period = 1e-4"),
+        ("name = \"TODO\"", "name = \"v_out\""),
+        ("unit = \"TODO\"", "unit = \"V\""),
+        ("[\"TODO\", \"TODO\"]", "[0.0, 250.0]"),
+        ("name = \"TODO\"\nsource = \"TODO\"", "name = \"a\"\nsource = \"v_out\""),
+        (
+            "name = \"TODO\"\nsource = \"TODO\"",
+            "name = \"b\"\nsource = \"100 - v_out\"",
+        ),
+        ("\"TODO\",   # action 0", "0.1,"),
+        ("\"TODO\",   # action 1", "0.2,"),
+        ("\"TODO\",   # action 2", "0.3,"),
+        ("\"TODO\",   # action 3", "0.4,"),
+        ("duty = [\"TODO\", \"TODO\"]", "duty = [0.0, 1.0]"),
+        ("duty = \"TODO\"", "duty = 0.0"),
+        ("hold = \"TODO\"", "hold = 3"),
+    ] {
+        desk.edit("policy/filled.toml", old, new);
+    }
+    desk.succeed("compile policy/filled.toml --out out");
+    assert!(desk.path("out/filled.c").is_file());
+}
+
+#[test]
+fn new_does_not_overwrite_a_contract_nor_describe_what_is_no_network() {
+    let desk = Desk::new("minimal");
+    let before = desk.read("policy/policy.toml");
+    desk.refuse(
+        "new policy/weights.safetensors --out policy/policy.toml",
+        &["exists already", "--out"],
+    );
+    assert_eq!(desk.read("policy/policy.toml"), before);
+    desk.write("text.safetensors", "no weights");
+    desk.refuse("new text.safetensors", &["text.safetensors"]);
+    desk.refuse(
+        "new missing.safetensors",
+        &["cannot find the file", "missing.safetensors"],
+    );
+    assert!(!desk.path("policy.toml").exists());
+}
+
+#[test]
+fn every_fault_of_a_policy_is_reported_in_one_run_with_file_and_line() {
+    let desk = Desk::new("paper");
+    desk.edit("policy/policy.toml", "duty = [0.3, 0.7]", "duty = [0.7, 0.3]");
+    desk.edit("policy/policy.toml", "hold = 3", "hlod = 3");
+    desk.edit("policy/drm.toml", "a = 0.97", "a = -0.97");
+    let before = desk.listing();
+    for command in ["inspect policy", "compile policy --out out", "verify policy"] {
+        let text = desk.refuse(
+            command,
+            &[
+                "limits of `duty` are crossed",
+                "unknown key `hlod`",
+                "`a` must be greater than 0",
+                "policy/drm.toml:1:",
+            ],
+        );
+        assert_eq!(
+            text.matches("\nerror: ").count() + 1,
+            text.matches("error: ").count(),
+            "{text}"
+        );
+    }
+    assert_eq!(desk.listing(), before, "nothing is written on bad input");
+    desk.refuse("inspect nowhere", &["cannot find the file", "nowhere"]);
+}
+
+/// `policyc inspect policy | head -1`: a reader that has gone away is no fault.
+#[test]
+fn a_closed_pipe_is_no_panic() {
+    let desk = Desk::new("paper");
+    for line in [
+        "inspect policy --json",
+        "inspect policy",
+        "compile policy --out out",
+        "new policy/weights.safetensors",
+    ] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let mut command = desk.command();
+        let child = command
+            .args(line.split(' '))
+            .stdout(writer)
+            .stderr(std::process::Stdio::piped())
+            .spawn();
+        let output = child.unwrap().wait_with_output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!((output.status.code(), said.as_str()), (Some(0), ""), "{line}");
+    }
+}
+
+/// A full disk behind `policyc inspect policy > file` is one.
+#[test]
+fn an_answer_that_cannot_be_written_ends_with_2() {
+    let desk = Desk::new("paper");
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let output = desk
+        .command()
+        .args(["inspect", "policy"])
+        .stdout(full)
+        .output()
+        .unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.starts_with("error: cannot write to standard output"), "{said}");
+}

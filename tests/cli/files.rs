@@ -1,0 +1,118 @@
+//! `policyc compile` and the folder it writes to.
+
+use serde_json::Value;
+use tests::tools::{policyc, run};
+
+use super::{Desk, assert_refused, contents};
+
+#[test]
+fn compile_writes_every_file_and_the_same_again() {
+    let desk = Desk::new("paper");
+    let said = desk.succeed("compile policy --lang c,rust --out a/b");
+    let first = contents(&desk.path("a/b"));
+    let names = ["manifest.json", "paper.c", "paper.h", "paper.rs"];
+    assert_eq!(first.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), names);
+    for name in names {
+        assert!(said.contains(name), "{name}\n{said}");
+    }
+    desk.succeed("compile policy/policy.toml --lang rust,c,c --out a/b");
+    assert!(contents(&desk.path("a/b")) == first);
+}
+
+#[test]
+fn the_manifest_names_the_files_that_were_written_and_their_lengths() {
+    let desk = Desk::new("linear");
+    desk.succeed("compile policy --out out");
+    let manifest: Value = serde_json::from_str(&desk.read("out/manifest.json")).unwrap();
+    let files = manifest["files"].as_object().unwrap();
+    assert_eq!(files.keys().collect::<Vec<_>>(), ["linear.c", "linear.h"]);
+    for (name, entry) in files {
+        assert_eq!(entry["bytes"], desk.read(&format!("out/{name}")).len());
+    }
+    assert_eq!(manifest["languages"], serde_json::json!(["c"]));
+}
+
+/// A second run leaves what is not its own alone.
+#[test]
+fn strangers_in_the_output_folder_are_kept() {
+    let desk = Desk::new("linear");
+    std::fs::create_dir(desk.path("out")).unwrap();
+    desk.write("out/README.md", "mine");
+    desk.write("out/linear.c", "old");
+    desk.succeed("compile policy --out out");
+    assert_eq!(desk.read("out/README.md"), "mine");
+    assert_ne!(desk.read("out/linear.c"), "old");
+}
+
+/// Whatever stands in the way, the run ends with 2 and every file and folder is as it was.
+fn nothing_written(desk: &Desk, out: &str, words: &[&str]) {
+    let (names, before) = (desk.listing(), plain_files(desk));
+    desk.refuse(&format!("compile policy --lang c,rust --out {out}"), words);
+    assert_eq!(desk.listing(), names);
+    assert!(plain_files(desk) == before, "{out}");
+}
+
+fn plain_files(desk: &Desk) -> Vec<(String, Vec<u8>)> {
+    let names = desk.listing().into_iter().filter(|name| desk.path(name).is_file());
+    names
+        .map(|name| (name.clone(), std::fs::read(desk.path(&name)).unwrap()))
+        .collect()
+}
+
+#[test]
+fn a_file_in_the_place_of_the_output_folder_is_kept() {
+    let desk = Desk::new("linear");
+    desk.write("out", "a file");
+    nothing_written(&desk, "out", &["out", "nothing written"]);
+    nothing_written(&desk, "out/below/it", &["out/below/it", "nothing written"]);
+}
+
+#[test]
+fn a_folder_in_the_place_of_an_output_is_kept_and_so_are_the_other_files() {
+    let desk = Desk::new("linear");
+    std::fs::create_dir_all(desk.path("out/linear.rs/inner")).unwrap();
+    desk.write("out/linear.c", "old");
+    nothing_written(&desk, "out", &["linear.rs is a folder", "nothing written"]);
+}
+
+#[test]
+fn a_symbolic_link_in_the_place_of_an_output_is_not_followed() {
+    let desk = Desk::new("linear");
+    std::fs::create_dir(desk.path("out")).unwrap();
+    desk.write("precious", "old");
+    std::os::unix::fs::symlink("../precious", desk.path("out/linear.h")).unwrap();
+    nothing_written(&desk, "out", &["linear.h is a symbolic link", "nothing written"]);
+    std::fs::remove_file(desk.path("out/linear.h")).unwrap();
+    std::os::unix::fs::symlink("nowhere", desk.path("out/linear.h")).unwrap();
+    nothing_written(&desk, "out", &["linear.h is a symbolic link", "nothing written"]);
+}
+
+/// A folder on a file system that nobody may write to, root included.
+#[test]
+fn a_folder_that_cannot_be_written_is_named() {
+    let desk = Desk::new("linear");
+    nothing_written(&desk, "/proc/policyc-out", &["/proc/policyc-out", "nothing written"]);
+}
+
+/// `ulimit -f` stands in for a full disk: the write of a larger file fails half-way.
+#[test]
+fn a_full_disk_leaves_the_old_files_and_no_fragments() {
+    let desk = Desk::new("linear");
+    for old_files in [false, true] {
+        if old_files {
+            desk.succeed("compile policy --lang c,rust --out out");
+            desk.edit("policy/policy.toml", "duty = [0.4, 0.6]", "duty = [0.41, 0.59]");
+        } else {
+            std::fs::create_dir(desk.path("out")).unwrap();
+        }
+        let before = contents(&desk.path("out"));
+        let script = format!(
+            "trap '' XFSZ; ulimit -f 8; exec '{}' compile policy --lang c,rust --out out",
+            policyc().display()
+        );
+        let mut shell = std::process::Command::new("sh");
+        let ran = run(shell.args(["-c", &script]).current_dir(desk.folder.path()));
+        assert_refused(&ran, &["linear", "nothing written", "File too large"]);
+        assert!(contents(&desk.path("out")) == before, "{:?}", desk.listing());
+    }
+}

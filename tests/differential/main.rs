@@ -1,0 +1,140 @@
+//! Generated code against the interpreter, step by step and bit by bit; and hostile edits that must be caught.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod macro_crate;
+mod mutations;
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use policy::Policy;
+use verify::traces::Recorded;
+use verify::{Options, Outcome, Report};
+
+/// Compiler names in the order in which random policies take turns.
+const COMPILERS: [&str; 3] = ["gcc", "clang", "rustc"];
+
+/// Every build was made and compared, and all are equal to the interpreter.
+fn assert_equal(report: &Report, what: &str) {
+    let text = serde_json::to_string_pretty(report).unwrap();
+    assert!(report.passed(), "{what}: {text}");
+    assert!(
+        report.builds.iter().all(|build| build.outcome == Outcome::Equal),
+        "{what}: a build is missing\n{text}"
+    );
+}
+
+fn run(policy: &Policy, steps: u64, seed: u64, compilers: &[&str]) -> Report {
+    let compilers = compilers.iter().map(|name| (*name).to_owned()).collect();
+    verify::run(
+        policy,
+        Options {
+            steps,
+            seed,
+            compilers,
+            ..Options::default()
+        },
+    )
+    .unwrap()
+}
+
+#[test]
+fn the_example_is_equal_in_every_build_and_gives_the_trainers_answers() {
+    let policy = policy::load(&tests::example()).unwrap();
+    let report = run(&policy, 50_000, 11, &[]);
+    assert_equal(&report, "buck12");
+    assert_eq!(
+        report.builds.len(),
+        9,
+        "gcc and clang at three levels, gcc with sanitisers, rustc at two"
+    );
+    let golden = report.golden.unwrap();
+    assert_eq!(
+        (golden.vectors, golden.actions_compared, golden.actions_equal),
+        (515, 515, 515)
+    );
+    assert!(golden.worst_relative_error.unwrap() <= 1e-5);
+}
+
+#[test]
+fn recorded_closed_loops_are_replayed() {
+    let policy = policy::load(&tests::example()).unwrap();
+    let text = std::fs::read_to_string(tests::root().join("tests/fixtures/buck12_200_1000.csv")).unwrap();
+    let recorded = Recorded::from_csv(&policy, &text).unwrap();
+    let steps = recorded.steps().len() as u64;
+    assert!(steps > 500);
+    let options = Options {
+        steps,
+        recorded: vec![recorded],
+        compilers: vec!["gcc".into()],
+        ..Options::default()
+    };
+    assert_equal(&verify::run(&policy, options).unwrap(), "recorded");
+}
+
+/// 200 policies, each with one compiler at all its levels; `POLICYC_ALL_COMPILERS=1` takes all for each.
+#[test]
+fn two_hundred_random_policies_are_equal() {
+    let next = AtomicU64::new(0);
+    let all = std::env::var_os("POLICYC_ALL_COMPILERS").is_some();
+    let work = || {
+        loop {
+            let seed = next.fetch_add(1, Ordering::Relaxed);
+            if seed >= 200 {
+                return;
+            }
+            let folder = tests::random::policy(seed).unwrap();
+            let policy = policy::load(&folder.path()).unwrap_or_else(|faults| panic!("{}\n{faults}", folder.contract));
+            let turn = [COMPILERS[(seed % 3) as usize]];
+            let compilers: &[&str] = if all { &[] } else { &turn };
+            let report = run(&policy, 3000, seed, compilers);
+            assert_equal(&report, &folder.contract);
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..2 {
+            scope.spawn(work);
+        }
+    });
+}
+
+#[test]
+fn random_policies_reach_every_status_bit_and_every_kind() {
+    let contracts: Vec<String> = (0..200)
+        .map(|seed| tests::random::policy(seed).unwrap().contract)
+        .collect();
+    let all = contracts.join("\n");
+    for word in [
+        "delay",
+        "backward_difference",
+        "low_pass",
+        "filtered_derivative",
+        "moving_average",
+        "integrator",
+        "adc",
+        "tanh",
+        "leaky_relu",
+        "relu",
+        "identity",
+        "pairs",
+        "duties",
+        "slew",
+        "soft_start",
+        "[mapping]",
+        "previous_duty",
+        "previous_command",
+    ] {
+        assert!(all.contains(word), "no random policy has {word}");
+    }
+    let layers: Vec<usize> = (0..60)
+        .map(|seed| {
+            policy::load(&tests::random::policy(seed).unwrap().path())
+                .unwrap()
+                .layers
+                .len()
+        })
+        .collect();
+    assert!(
+        (2..=5).all(|count| layers.contains(&count)),
+        "one to four hidden layers: {layers:?}"
+    );
+}

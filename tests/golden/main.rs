@@ -1,0 +1,196 @@
+//! Golden files. Every folder of `cases/` is a policy with the code it yields in `expected/`; files are compared byte by
+//! byte, `POLICYC_BLESS=1` rewrites them. So that no expected file is one that nobody has checked, the modules below
+//! build each of them with every compiler and dialect that is promised.
+
+mod c;
+mod determinism;
+mod rust;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use codegen::Language;
+use policy::Policy;
+use targets::TargetSpec;
+use tests::fixture::{Recipe, generate};
+use tests::tools::{bless, listing};
+
+/// A policy and the code that it yields today.
+struct Case {
+    name: String,
+    folder: PathBuf,
+    policy: Policy,
+    files: BTreeMap<String, String>,
+}
+
+fn host() -> &'static TargetSpec {
+    targets::find("host").unwrap()
+}
+
+fn case_folders() -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(tests::root().join("tests/golden/cases")).unwrap();
+    let mut folders: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+    folders.sort();
+    folders
+}
+
+fn case(folder: &Path) -> Case {
+    let policy = policy::load(&folder.join("policy.toml")).unwrap_or_else(|faults| panic!("{faults}"));
+    Case {
+        name: folder.file_name().unwrap().to_string_lossy().into_owned(),
+        folder: folder.to_owned(),
+        files: generate(&policy, host(), &Language::ALL).unwrap(),
+        policy,
+    }
+}
+
+/// The folders of `cases/` and the example of the README.
+fn cases() -> &'static [Case] {
+    static CASES: OnceLock<Vec<Case>> = OnceLock::new();
+    CASES.get_or_init(|| {
+        make_networks();
+        let example = tests::root().join("examples/buck12");
+        case_folders()
+            .iter()
+            .chain([&example])
+            .map(|folder| case(folder))
+            .collect()
+    })
+}
+
+/// With `POLICYC_BLESS=1`, draws the networks anew before anything reads them.
+fn make_networks() {
+    for folder in case_folders().iter().filter(|_| bless()) {
+        let contract = std::fs::read_to_string(folder.join("policy.toml")).unwrap();
+        if let Some(recipe) = Recipe::of(&contract) {
+            std::fs::write(folder.join("weights.safetensors"), recipe.network().unwrap()).unwrap();
+        }
+    }
+}
+
+/// Compares a folder with files, or rewrites it; the first difference of each file as one line.
+fn differences(folder: &Path, files: &BTreeMap<String, String>) -> Vec<String> {
+    if bless() {
+        if folder.exists() {
+            std::fs::remove_dir_all(folder).unwrap();
+        }
+        std::fs::create_dir_all(folder).unwrap();
+        for (name, text) in files {
+            std::fs::write(folder.join(name), text).unwrap();
+        }
+    }
+    let names = if folder.exists() { listing(folder) } else { Vec::new() };
+    let read = |name: String| (std::fs::read_to_string(folder.join(&name)).unwrap(), name);
+    let expected: BTreeMap<String, String> = names.into_iter().map(read).map(|(text, name)| (name, text)).collect();
+    let drift = verify::drift::compare(&expected, files);
+    let shown = folder.display();
+    let missing = drift
+        .missing
+        .iter()
+        .map(|name| format!("{shown}/{name}: is not generated any more"));
+    let extra = drift.extra.iter().map(|name| format!("{shown}/{name}: is missing"));
+    let changed = drift.changed.iter().map(|change| {
+        let line = |text: &Option<String>| text.clone().unwrap_or_else(|| "(end of file)".to_owned());
+        let (expected, found) = (line(&change.expected), line(&change.found));
+        format!(
+            "{shown}/{}:{}\n  expected  {expected}\n  generated {found}",
+            change.path, change.line
+        )
+    });
+    missing.chain(extra).chain(changed).collect()
+}
+
+const HINT: &str = "`cargo xtask bless` rewrites the golden files if the change is meant";
+
+#[test]
+fn every_case_yields_its_golden_files() {
+    let differing: Vec<String> = cases()
+        .iter()
+        .filter(|case| case.folder.ends_with(Path::new("cases").join(&case.name)))
+        .flat_map(|case| differences(&case.folder.join("expected"), &case.files))
+        .collect();
+    assert!(differing.is_empty(), "{}\n{HINT}", differing.join("\n"));
+}
+
+/// The example's code is long: its golden file is the manifest, which holds length and checksum of each file.
+#[test]
+fn the_example_yields_its_golden_manifest() {
+    let example = cases().iter().find(|case| case.name == "buck12").unwrap();
+    let manifest = BTreeMap::from([("manifest.json".to_owned(), example.files["manifest.json"].clone())]);
+    let differing = differences(&tests::root().join("tests/golden/buck12"), &manifest);
+    assert!(differing.is_empty(), "{}\n{HINT}", differing.join("\n"));
+}
+
+#[test]
+fn the_networks_can_be_made_again_from_their_seeds() {
+    for case in cases().iter().filter(|case| case.name != "buck12") {
+        let contract = std::fs::read_to_string(case.folder.join("policy.toml")).unwrap();
+        let recipe = Recipe::of(&contract).unwrap_or_else(|| panic!("{}: no `# network:` line", case.name));
+        let stored = std::fs::read(case.folder.join("weights.safetensors")).unwrap();
+        assert!(stored == recipe.network().unwrap(), "{}: other weights", case.name);
+    }
+}
+
+/// A set of cases that lost, say, its integrator would check less without anybody noticing.
+#[test]
+fn together_the_cases_hold_every_part_of_a_contract() {
+    let shown: String = cases().iter().map(|case| format!("{:?}\n", case.policy)).collect();
+    let parts = [
+        "Delay {",
+        "BackwardDifference",
+        "LowPass {",
+        "FilteredDerivative {",
+        "MovingAverage {",
+        "Integrator {",
+        "Relu",
+        "LeakyRelu {",
+        "Tanh",
+        "Identity",
+        "pair: Some(",
+        "adc: Some(",
+        "adc: None",
+        "mapping: Some(",
+        "mapping: None",
+        "r: Some(",
+        "r: None",
+        "slew: Some(",
+        "slew: None",
+        "soft_start: Some(",
+        "soft_start: None",
+        "clip: Some(",
+        "clip: None",
+        "PreviousDuty",
+        "PreviousCommand",
+    ];
+    let missing: Vec<_> = parts.iter().filter(|part| !shown.contains(**part)).collect();
+    assert!(missing.is_empty(), "{missing:?}\n{shown}");
+    assert!(cases().iter().any(|case| case.policy.layers.len() == 1));
+    let last = |case: &Case| case.policy.actions.len();
+    assert!(cases().iter().any(|case| last(case) > 16 && last(case) % 16 != 0));
+}
+
+#[test]
+fn a_changed_missing_or_additional_file_is_named_with_the_first_line_that_differs() {
+    if bless() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in [("a.c", "1\n2\n3\n"), ("b.c", "1\n"), ("c.c", "")] {
+        std::fs::write(folder.path().join(name), text).unwrap();
+    }
+    let files = |list: &[(&str, &str)]| list.iter().map(|(a, b)| ((*a).to_owned(), (*b).to_owned())).collect();
+    let found = differences(
+        folder.path(),
+        &files(&[("a.c", "1\n2\n4\n"), ("b.c", "1\n"), ("d.c", "")]),
+    );
+    assert_eq!(found.len(), 3, "{found:?}");
+    assert!(found[0].ends_with("/c.c: is not generated any more"), "{found:?}");
+    assert!(found[1].ends_with("/d.c: is missing"), "{found:?}");
+    assert!(found[2].ends_with("/a.c:3\n  expected  3\n  generated 4"), "{found:?}");
+    let same = differences(
+        folder.path(),
+        &files(&[("a.c", "1\n2\n3\n"), ("b.c", "1\n"), ("c.c", "")]),
+    );
+    assert!(same.is_empty(), "{same:?}");
+}

@@ -1,0 +1,131 @@
+//! Small networks from a seed, so that binary fixtures can be made again, and the code generated from a policy.
+
+use std::collections::BTreeMap;
+
+use codegen::{CodegenError, Language, manifest};
+use policy::Policy;
+use safetensors::tensor::TensorView;
+use safetensors::{Dtype, SafeTensorError};
+use targets::TargetSpec;
+use verify::traces::Rng;
+
+/// How a network is drawn: `# network: seed 7, widths 3-33-20`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Recipe {
+    /// Seed of the weights.
+    pub seed: u64,
+    /// Inputs, then outputs of each layer.
+    pub widths: Vec<usize>,
+}
+
+impl Recipe {
+    /// The recipe in a contract's text, if one stands there.
+    #[must_use]
+    pub fn of(contract: &str) -> Option<Self> {
+        let line = contract
+            .lines()
+            .find_map(|line| line.strip_prefix("# network: seed "))?;
+        let (seed, widths) = line.split_once(", widths ")?;
+        let widths: Result<Vec<usize>, _> = widths.trim().split('-').map(str::parse).collect();
+        Some(Self {
+            seed: seed.parse().ok()?,
+            widths: widths.ok()?,
+        })
+    }
+
+    /// The network as a safetensors file, tensors `fc0.weight`, `fc0.bias`, ...
+    ///
+    /// # Errors
+    /// If the widths make no network.
+    pub fn network(&self) -> Result<Vec<u8>, SafeTensorError> {
+        let mut rng = Rng::new(self.seed);
+        let mut tensors = Vec::new();
+        for (layer, pair) in self.widths.windows(2).enumerate() {
+            let (inputs, outputs) = (pair[0], pair[1]);
+            let spread = 1.5 / (inputs as f64).sqrt();
+            let mut draw = |count: usize| -> Vec<u8> {
+                let values = (0..count).map(|_| rng.uniform(-spread, spread) as f32);
+                values.flat_map(f32::to_le_bytes).collect()
+            };
+            tensors.push((
+                format!("fc{layer}.weight"),
+                vec![outputs, inputs],
+                draw(inputs * outputs),
+            ));
+            tensors.push((format!("fc{layer}.bias"), vec![outputs], draw(outputs)));
+        }
+        let views = tensors
+            .iter()
+            .map(|(name, shape, data)| Ok((name, TensorView::new(Dtype::F32, shape.clone(), data)?)))
+            .collect::<Result<Vec<_>, SafeTensorError>>()?;
+        safetensors::serialize(views, None)
+    }
+}
+
+/// Place of the first value of a tensor in a safetensors file.
+#[must_use]
+pub fn first_byte(file: &[u8], tensor: &str) -> Option<usize> {
+    let (length, rest) = file.split_first_chunk::<8>()?;
+    let length = usize::try_from(u64::from_le_bytes(*length)).ok()?;
+    let header: serde_json::Value = serde_json::from_slice(rest.get(..length)?).ok()?;
+    let offset = usize::try_from(header[tensor]["data_offsets"][0].as_u64()?).ok()?;
+    Some(8 + length + offset)
+}
+
+/// Everything that `policyc compile` writes for these languages: file name to text.
+///
+/// # Errors
+/// Only for a fault in the compiler.
+pub fn generate(
+    policy: &Policy,
+    target: &TargetSpec,
+    languages: &[Language],
+) -> Result<BTreeMap<String, String>, CodegenError> {
+    let mut all = codegen::GeneratedFiles::default();
+    for language in languages {
+        all.files.extend(codegen::compile(policy, target, *language)?.files);
+    }
+    let manifest = manifest::manifest(policy, target, languages, &all);
+    let text = serde_json::to_string_pretty(&manifest).unwrap_or_default() + "\n";
+    all.files.insert(manifest::FILE.to_owned(), text);
+    Ok(all.files)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_recipe_is_read_from_the_contract() {
+        let recipe = Recipe::of("# a\n# network: seed 12, widths 3-5-4\nname = 1\n").unwrap();
+        assert_eq!((recipe.seed, recipe.widths), (12, vec![3, 5, 4]));
+        assert_eq!(Recipe::of("name = 1\n"), None);
+    }
+
+    #[test]
+    fn a_value_is_found_in_the_file() {
+        let recipe = Recipe {
+            seed: 1,
+            widths: vec![2, 3, 2],
+        };
+        let file = recipe.network().unwrap();
+        let start = first_byte(&file, "fc1.bias").unwrap();
+        let tensors = safetensors::SafeTensors::deserialize(&file).unwrap();
+        assert_eq!(tensors.tensor("fc1.bias").unwrap().data(), &file[start..start + 8]);
+        assert_eq!(first_byte(&file, "fc2.bias"), None);
+    }
+
+    #[test]
+    fn equal_seeds_give_equal_networks_and_others_do_not() {
+        let network = |seed| {
+            Recipe {
+                seed,
+                widths: vec![2, 3],
+            }
+            .network()
+            .unwrap()
+        };
+        assert_eq!(network(1), network(1));
+        assert_ne!(network(1), network(2));
+    }
+}

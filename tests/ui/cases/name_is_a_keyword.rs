@@ -1,0 +1,2 @@
+//@ replace: name = "buck12" => name = "while"
+policy_macro::include_policy!("policy/policy.toml");

@@ -72,10 +72,10 @@ fn inspect_shows_formulas_layers_actions_and_sizes() {
         "v - v_ref",
         "delay",
         "difference",
-        "6",
+        "6 -> 5",
         "fc0",
-        "xi",
-        "drm",
+        "0.45 +1 * 0.1 = 0.55",
+        "0.97 d_sim",
         "sha256",
         "MACs",
     ] {

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::Desk;
 
-const VERIFY: &str = "verify policy --generated out --steps 300";
+const VERIFY: &str = "verify policy --generated out --steps 2000";
 
 /// A policy and its C code in `out/`.
 fn compiled() -> Desk {
@@ -32,7 +32,7 @@ fn code_as_generated_is_equal_and_ends_with_0() {
         "gcc -O2",
         "clang -O3",
         "equal",
-        "300 steps",
+        "2,000 steps",
         "as the policy yields them",
     ] {
         assert!(text.contains(word), "{word}\n{text}");

@@ -100,15 +100,19 @@ const COPYING: &[&str] = &["memcpy", "memset", "memmove"];
 
 #[test]
 fn optimised_code_holds_no_way_to_a_panic_and_calls_nothing_outside() {
+    let mut found = Vec::new();
     for case in cases() {
         let folder = tempfile::tempdir().unwrap();
         write(case, &probes(case), folder.path());
         for level in ["-Copt-level=2", "-Copt-level=3", "-Copt-level=s"] {
-            let calls = undefined(level, folder.path());
-            let foreign: Vec<_> = calls.iter().filter(|call| !COPYING.contains(&call.as_str())).collect();
-            assert!(foreign.is_empty(), "{} {level}: {foreign:?}", case.name);
+            let mut calls = undefined(level, folder.path());
+            calls.retain(|call| !COPYING.contains(&call.as_str()));
+            if !calls.is_empty() {
+                found.push(format!("{} {level}: {calls:?}", case.name));
+            }
         }
     }
+    assert!(found.is_empty(), "{}", found.join("\n"));
 }
 
 /// The measurement itself: an index that the compiler cannot bound must be found.

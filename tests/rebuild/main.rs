@@ -1,4 +1,5 @@
 //! cargo notices every edit of a policy that a crate includes, and nothing else.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use std::path::{Path, PathBuf};
 
@@ -71,6 +72,9 @@ impl Crate {
     }
 }
 
+/// A change of a crate's files.
+type Edit<'a> = &'a dyn Fn(&Crate);
+
 fn firmware_target() -> PathBuf {
     Path::new(env!("CARGO_TARGET_TMPDIR")).join("../firmware/no-std")
 }
@@ -87,7 +91,7 @@ fn each_edit_of_a_file_of_the_policy_rebuilds_the_crate_and_nothing_else_does() 
         bytes[start..start + 4].copy_from_slice(&0.625_f32.to_le_bytes());
         std::fs::write(path, bytes).unwrap();
     };
-    let edits: [(&str, &dyn Fn(&Crate)); 3] = [
+    let edits: [(&str, Edit<'_>); 3] = [
         ("weights.safetensors", &one_bias),
         ("drm.toml", &|rebuilt| {
             rebuilt.edit("drm.toml", "c = 0.013", "c = 0.014")
@@ -112,27 +116,27 @@ fn a_policy_broken_and_then_repaired_is_noticed_both_times() {
     let (_, before) = rebuilt.build();
     let weights = rebuilt.folder.path().join("policy/weights.safetensors");
     let elsewhere = rebuilt.folder.path().join("elsewhere");
-    let breaks: [(&str, &dyn Fn(), &dyn Fn()); 2] = [
+    let breaks: [(&str, Edit<'_>, Edit<'_>); 2] = [
         (
             "limits of `duty` are crossed",
-            &|| rebuilt.edit("policy.toml", "[0.3, 0.7]", "[0.7, 0.3]"),
-            &|| rebuilt.edit("policy.toml", "[0.7, 0.3]", "[0.3, 0.7]"),
+            &|rebuilt| rebuilt.edit("policy.toml", "[0.3, 0.7]", "[0.7, 0.3]"),
+            &|rebuilt| rebuilt.edit("policy.toml", "[0.7, 0.3]", "[0.3, 0.7]"),
         ),
         (
             "cannot find the file",
-            &|| std::fs::rename(&weights, &elsewhere).unwrap(),
+            &|_| std::fs::rename(&weights, &elsewhere).unwrap(),
             // with the old time stamp: nothing but the failed build tells cargo that there is work
-            &|| std::fs::rename(&elsewhere, &weights).unwrap(),
+            &|_| std::fs::rename(&elsewhere, &weights).unwrap(),
         ),
     ];
     for (message, spoil, repair) in breaks {
-        spoil();
+        spoil(&rebuilt);
         for _ in 0..2 {
             let ran = rebuilt.cargo_build();
             assert_ne!(ran.code, Some(0), "{message}");
             assert!(ran.stdout.contains(message), "{message}\n{}", ran.stdout);
         }
-        repair();
+        repair(&rebuilt);
         let (_, after) = rebuilt.build();
         assert_eq!(after, before);
         assert_eq!(rebuilt.build(), (false, before.clone()));

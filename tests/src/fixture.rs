@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use codegen::{CodegenError, Language, manifest};
+use codegen::{CodegenError, Language};
 use policy::Policy;
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensorError};
@@ -81,14 +81,7 @@ pub fn generate(
     target: &TargetSpec,
     languages: &[Language],
 ) -> Result<BTreeMap<String, String>, CodegenError> {
-    let mut all = codegen::GeneratedFiles::default();
-    for language in languages {
-        all.files.extend(codegen::compile(policy, target, *language)?.files);
-    }
-    let manifest = manifest::manifest(policy, target, languages, &all);
-    let text = serde_json::to_string_pretty(&manifest).unwrap_or_default() + "\n";
-    all.files.insert(manifest::FILE.to_owned(), text);
-    Ok(all.files)
+    Ok(codegen::generate(policy, target, languages)?.files)
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 //! The fixture crate holds `policy/` (a copy of `examples/buck12`), `linear/` (a golden case) and `text/linear.rs` (its
 //! generated code); a file of a policy lies in `../outside/`. Lines `//@` of a case change it:
 //! `replace: OLD => NEW` in `policy/policy.toml`, `write: FILE TEXT`, `grow: FILE BYTES`, `remove: FILE`.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

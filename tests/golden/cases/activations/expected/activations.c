@@ -213,15 +213,15 @@ static float activations_tanh(float x)
     const float t = activations_limit(x, 0x41100000u);
     const float z = t * t;
     const float p4 = 1.3184444e-8f;
-    const float p3 = p4 * z + 2.0472007e-5f;
-    const float p2 = p3 * z + 0.0034865933f;
-    const float p1 = p2 * z + 0.13373208f;
-    const float p0 = p1 * z + 0.9999999f;
+    const float p3 = (p4 * z) + 2.0472007e-5f;
+    const float p2 = (p3 * z) + 0.0034865933f;
+    const float p1 = (p2 * z) + 0.13373208f;
+    const float p0 = (p1 * z) + 0.9999999f;
     const float q4 = 7.702759e-7f;
-    const float q3 = q4 * z + 0.00032714035f;
-    const float q2 = q3 * z + 0.025842024f;
-    const float q1 = q2 * z + 0.46706504f;
-    const float q0 = q1 * z + 1.0f;
+    const float q3 = (q4 * z) + 0.00032714035f;
+    const float q2 = (q3 * z) + 0.025842024f;
+    const float q1 = (q2 * z) + 0.46706504f;
+    const float q0 = (q1 * z) + 1.0f;
     return activations_limit((p0 * t) / q0, 0x3F800000u);
 }
 
@@ -269,13 +269,13 @@ ACTIVATIONS_CODE static void activations_layer0(const float *ACTIVATIONS_RESTRIC
         const float *const bias = &activations_bias0[0];
         float *const sum = &y[0];
         for (o = 0u; o < 5u; ++o) {
-            sum[o] = bias[o] + w[o] * x[0];
+            sum[o] = bias[o] + (w[o] * x[0]);
         }
         for (i = 1u; i < 3u; ++i) {
             const float *const column = &w[i * 5u];
             const float input = x[i];
             for (o = 0u; o < 5u; ++o) {
-                sum[o] = sum[o] + column[o] * input;
+                sum[o] = sum[o] + (column[o] * input);
             }
         }
     }
@@ -294,13 +294,13 @@ ACTIVATIONS_CODE static void activations_layer1(const float *ACTIVATIONS_RESTRIC
         const float *const bias = &activations_bias1[0];
         float *const sum = &y[0];
         for (o = 0u; o < 4u; ++o) {
-            sum[o] = bias[o] + w[o] * x[0];
+            sum[o] = bias[o] + (w[o] * x[0]);
         }
         for (i = 1u; i < 5u; ++i) {
             const float *const column = &w[i * 4u];
             const float input = x[i];
             for (o = 0u; o < 4u; ++o) {
-                sum[o] = sum[o] + column[o] * input;
+                sum[o] = sum[o] + (column[o] * input);
             }
         }
     }
@@ -319,13 +319,13 @@ ACTIVATIONS_CODE static void activations_layer2(const float *ACTIVATIONS_RESTRIC
         const float *const bias = &activations_bias2[0];
         float *const sum = &y[0];
         for (o = 0u; o < 4u; ++o) {
-            sum[o] = bias[o] + w[o] * x[0];
+            sum[o] = bias[o] + (w[o] * x[0]);
         }
         for (i = 1u; i < 4u; ++i) {
             const float *const column = &w[i * 4u];
             const float input = x[i];
             for (o = 0u; o < 4u; ++o) {
-                sum[o] = sum[o] + column[o] * input;
+                sum[o] = sum[o] + (column[o] * input);
             }
         }
     }
@@ -344,13 +344,13 @@ ACTIVATIONS_CODE static void activations_layer3(const float *ACTIVATIONS_RESTRIC
         const float *const bias = &activations_bias3[0];
         float *const sum = &y[0];
         for (o = 0u; o < 6u; ++o) {
-            sum[o] = bias[o] + w[o] * x[0];
+            sum[o] = bias[o] + (w[o] * x[0]);
         }
         for (i = 1u; i < 4u; ++i) {
             const float *const column = &w[i * 6u];
             const float input = x[i];
             for (o = 0u; o < 6u; ++o) {
-                sum[o] = sum[o] + column[o] * input;
+                sum[o] = sum[o] + (column[o] * input);
             }
         }
     }
@@ -366,13 +366,13 @@ ACTIVATIONS_CODE static void activations_layer4(const float *ACTIVATIONS_RESTRIC
         const float *const bias = &activations_bias4[0];
         float *const sum = &y[0];
         for (o = 0u; o < 3u; ++o) {
-            sum[o] = bias[o] + w[o] * x[0];
+            sum[o] = bias[o] + (w[o] * x[0]);
         }
         for (i = 1u; i < 6u; ++i) {
             const float *const column = &w[i * 3u];
             const float input = x[i];
             for (o = 0u; o < 3u; ++o) {
-                sum[o] = sum[o] + column[o] * input;
+                sum[o] = sum[o] + (column[o] * input);
             }
         }
     }
@@ -488,8 +488,9 @@ void activations_init(activations_state *state)
  * CRC-32 (IEEE 802.3) of words taken little-endian, whatever the byte order of the machine.
  * volatile: the memory is read, the compiler does not answer in its place.
  */
-static uint32_t activations_crc(uint32_t crc, const volatile float *words, uint32_t length)
+static uint32_t activations_crc(uint32_t start, const volatile float *words, uint32_t length)
 {
+    uint32_t crc = start;
     uint32_t i;
     uint32_t nibble;
     for (i = 0u; i < length; ++i) {
@@ -515,7 +516,7 @@ uint32_t activations_integrity(void)
     crc = activations_crc(crc, activations_weights4, 18u);
     crc = activations_crc(crc, activations_bias4, 3u);
     crc = activations_crc(crc, activations_duties, 3u);
-    return (uint32_t)((crc ^ 0xFFFFFFFFu) == 0x74B6B656u);
+    return activations_flag((crc ^ 0xFFFFFFFFu) == 0x74B6B656u);
 }
 
 uint32_t activations_self_test(void)
@@ -528,8 +529,8 @@ uint32_t activations_self_test(void)
     uint32_t i;
     for (vector = 0u; vector < 16u; ++vector) {
         for (i = 0u; i < ACTIVATIONS_FEATURES; ++i) {
-            random = random * 0x0019660Du + 0x3C6EF35Fu;
-            observation[i] = activations_box_low[i] + activations_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f);
+            random = (random * 0x0019660Du) + 0x3C6EF35Fu;
+            observation[i] = activations_box_low[i] + (activations_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
         }
         activations_q_values(observation, q);
         if ((failed == 0u) && ((activations_crc(0xFFFFFFFFu, q, ACTIVATIONS_ACTIONS) ^ 0xFFFFFFFFu) != activations_answers[vector])) {

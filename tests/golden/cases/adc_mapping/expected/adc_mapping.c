@@ -180,15 +180,15 @@ static float adc_mapping_tanh(float x)
     const float t = adc_mapping_limit(x, 0x41100000u);
     const float z = t * t;
     const float p4 = 1.3184444e-8f;
-    const float p3 = p4 * z + 2.0472007e-5f;
-    const float p2 = p3 * z + 0.0034865933f;
-    const float p1 = p2 * z + 0.13373208f;
-    const float p0 = p1 * z + 0.9999999f;
+    const float p3 = (p4 * z) + 2.0472007e-5f;
+    const float p2 = (p3 * z) + 0.0034865933f;
+    const float p1 = (p2 * z) + 0.13373208f;
+    const float p0 = (p1 * z) + 0.9999999f;
     const float q4 = 7.702759e-7f;
-    const float q3 = q4 * z + 0.00032714035f;
-    const float q2 = q3 * z + 0.025842024f;
-    const float q1 = q2 * z + 0.46706504f;
-    const float q0 = q1 * z + 1.0f;
+    const float q3 = (q4 * z) + 0.00032714035f;
+    const float q2 = (q3 * z) + 0.025842024f;
+    const float q1 = (q2 * z) + 0.46706504f;
+    const float q0 = (q1 * z) + 1.0f;
     return adc_mapping_limit((p0 * t) / q0, 0x3F800000u);
 }
 
@@ -253,13 +253,13 @@ ADC_MAPPING_CODE static void adc_mapping_layer0(const float *ADC_MAPPING_RESTRIC
         const float *const bias = &adc_mapping_bias0[0];
         float *const sum = &y[0];
         for (o = 0u; o < 5u; ++o) {
-            sum[o] = bias[o] + w[o] * x[0];
+            sum[o] = bias[o] + (w[o] * x[0]);
         }
         for (i = 1u; i < 3u; ++i) {
             const float *const column = &w[i * 5u];
             const float input = x[i];
             for (o = 0u; o < 5u; ++o) {
-                sum[o] = sum[o] + column[o] * input;
+                sum[o] = sum[o] + (column[o] * input);
             }
         }
     }
@@ -278,13 +278,13 @@ ADC_MAPPING_CODE static void adc_mapping_layer1(const float *ADC_MAPPING_RESTRIC
         const float *const bias = &adc_mapping_bias1[0];
         float *const sum = &y[0];
         for (o = 0u; o < 4u; ++o) {
-            sum[o] = bias[o] + w[o] * x[0];
+            sum[o] = bias[o] + (w[o] * x[0]);
         }
         for (i = 1u; i < 5u; ++i) {
             const float *const column = &w[i * 4u];
             const float input = x[i];
             for (o = 0u; o < 4u; ++o) {
-                sum[o] = sum[o] + column[o] * input;
+                sum[o] = sum[o] + (column[o] * input);
             }
         }
     }
@@ -303,13 +303,13 @@ ADC_MAPPING_CODE static void adc_mapping_layer2(const float *ADC_MAPPING_RESTRIC
         const float *const bias = &adc_mapping_bias2[0];
         float *const sum = &y[0];
         for (o = 0u; o < 3u; ++o) {
-            sum[o] = bias[o] + w[o] * x[0];
+            sum[o] = bias[o] + (w[o] * x[0]);
         }
         for (i = 1u; i < 4u; ++i) {
             const float *const column = &w[i * 3u];
             const float input = x[i];
             for (o = 0u; o < 3u; ++o) {
-                sum[o] = sum[o] + column[o] * input;
+                sum[o] = sum[o] + (column[o] * input);
             }
         }
     }
@@ -350,7 +350,7 @@ ADC_MAPPING_CODE static void adc_mapping_decide(const adc_mapping_state *state, 
         const float v4 = state->mapping_r * front->signal[1];
         const float v5 = v4 * chosen;
         const float v6 = v3 + v5;
-        const uint32_t f7 = adc_mapping_outside(chosen, 0.2f, 0.79999995f);
+        const uint32_t f7 = adc_mapping_outside(chosen, 0.2f, 0.8f);
         const uint32_t f8 = adc_mapping_outside(front->signal[1], -1.0f, 14.0f);
         const uint32_t f9 = f7 | f8;
         const float v10 = state->previous_command - 0.02f;
@@ -449,12 +449,12 @@ void adc_mapping_init(adc_mapping_state *state)
 
 uint32_t adc_mapping_set_mapping(adc_mapping_state *state, float a, float b, float c, float r)
 {
-    const uint32_t accepted = (uint32_t)(a >= 0.8f) & (uint32_t)(a <= 1.25f)
-                            & (uint32_t)(b >= -0.02f) & (uint32_t)(b <= 0.02f)
-                            & (uint32_t)(c >= -0.099999994f) & (uint32_t)(c <= 0.099999994f)
-                            & (uint32_t)(r >= -0.01f) & (uint32_t)(r <= 0.01f)
-                            & (uint32_t)(a + r * -1.0f > 0.0f)
-                            & (uint32_t)(a + r * 14.0f > 0.0f);
+    const uint32_t accepted = adc_mapping_within(a, 0.8f, 1.25f)
+                            & adc_mapping_within(b, -0.02f, 0.02f)
+                            & adc_mapping_within(c, -0.099999994f, 0.099999994f)
+                            & adc_mapping_within(r, -0.01f, 0.01f)
+                            & adc_mapping_flag((a + (r * -1.0f)) > 0.0f)
+                            & adc_mapping_flag((a + (r * 14.0f)) > 0.0f);
 
     if (accepted != 0u) {
         state->mapping_a = a;
@@ -469,8 +469,9 @@ uint32_t adc_mapping_set_mapping(adc_mapping_state *state, float a, float b, flo
  * CRC-32 (IEEE 802.3) of words taken little-endian, whatever the byte order of the machine.
  * volatile: the memory is read, the compiler does not answer in its place.
  */
-static uint32_t adc_mapping_crc(uint32_t crc, const volatile float *words, uint32_t length)
+static uint32_t adc_mapping_crc(uint32_t start, const volatile float *words, uint32_t length)
 {
+    uint32_t crc = start;
     uint32_t i;
     uint32_t nibble;
     for (i = 0u; i < length; ++i) {
@@ -492,7 +493,7 @@ uint32_t adc_mapping_integrity(void)
     crc = adc_mapping_crc(crc, adc_mapping_weights2, 12u);
     crc = adc_mapping_crc(crc, adc_mapping_bias2, 3u);
     crc = adc_mapping_crc(crc, adc_mapping_duties, 3u);
-    return (uint32_t)((crc ^ 0xFFFFFFFFu) == 0x5F460CA8u);
+    return adc_mapping_flag((crc ^ 0xFFFFFFFFu) == 0x5F460CA8u);
 }
 
 uint32_t adc_mapping_self_test(void)
@@ -505,8 +506,8 @@ uint32_t adc_mapping_self_test(void)
     uint32_t i;
     for (vector = 0u; vector < 16u; ++vector) {
         for (i = 0u; i < ADC_MAPPING_FEATURES; ++i) {
-            random = random * 0x0019660Du + 0x3C6EF35Fu;
-            observation[i] = adc_mapping_box_low[i] + adc_mapping_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f);
+            random = (random * 0x0019660Du) + 0x3C6EF35Fu;
+            observation[i] = adc_mapping_box_low[i] + (adc_mapping_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
         }
         adc_mapping_q_values(observation, q);
         if ((failed == 0u) && ((adc_mapping_crc(0xFFFFFFFFu, q, ADC_MAPPING_ACTIONS) ^ 0xFFFFFFFFu) != adc_mapping_answers[vector])) {

@@ -411,7 +411,7 @@ impl Controller {
         let v4: f32 = self.mapping_r * front.signal[1];
         let v5: f32 = v4 * chosen;
         let v6: f32 = v3 + v5;
-        let f7: u32 = outside(chosen, 0.2, 0.79999995);
+        let f7: u32 = outside(chosen, 0.2, 0.8);
         let f8: u32 = outside(front.signal[1], -1.0, 14.0);
         let f9: u32 = f7 | f8;
         let v10: f32 = self.previous_command - 0.02;

@@ -299,13 +299,13 @@ FILTERS_CODE static void filters_layer0(const float *FILTERS_RESTRICT x, float *
         const float *const bias = &filters_bias0[0];
         float *const sum = &y[0];
         for (o = 0u; o < 5u; ++o) {
-            sum[o] = bias[o] + w[o] * x[0];
+            sum[o] = bias[o] + (w[o] * x[0]);
         }
         for (i = 1u; i < 8u; ++i) {
             const float *const column = &w[i * 5u];
             const float input = x[i];
             for (o = 0u; o < 5u; ++o) {
-                sum[o] = sum[o] + column[o] * input;
+                sum[o] = sum[o] + (column[o] * input);
             }
         }
     }
@@ -324,13 +324,13 @@ FILTERS_CODE static void filters_layer1(const float *FILTERS_RESTRICT x, float *
         const float *const bias = &filters_bias1[0];
         float *const sum = &y[0];
         for (o = 0u; o < 4u; ++o) {
-            sum[o] = bias[o] + w[o] * x[0];
+            sum[o] = bias[o] + (w[o] * x[0]);
         }
         for (i = 1u; i < 5u; ++i) {
             const float *const column = &w[i * 4u];
             const float input = x[i];
             for (o = 0u; o < 4u; ++o) {
-                sum[o] = sum[o] + column[o] * input;
+                sum[o] = sum[o] + (column[o] * input);
             }
         }
     }
@@ -349,13 +349,13 @@ FILTERS_CODE static void filters_layer2(const float *FILTERS_RESTRICT x, float *
         const float *const bias = &filters_bias2[0];
         float *const sum = &y[0];
         for (o = 0u; o < 3u; ++o) {
-            sum[o] = bias[o] + w[o] * x[0];
+            sum[o] = bias[o] + (w[o] * x[0]);
         }
         for (i = 1u; i < 4u; ++i) {
             const float *const column = &w[i * 3u];
             const float input = x[i];
             for (o = 0u; o < 3u; ++o) {
-                sum[o] = sum[o] + column[o] * input;
+                sum[o] = sum[o] + (column[o] * input);
             }
         }
     }
@@ -493,8 +493,9 @@ void filters_init(filters_state *state)
  * CRC-32 (IEEE 802.3) of words taken little-endian, whatever the byte order of the machine.
  * volatile: the memory is read, the compiler does not answer in its place.
  */
-static uint32_t filters_crc(uint32_t crc, const volatile float *words, uint32_t length)
+static uint32_t filters_crc(uint32_t start, const volatile float *words, uint32_t length)
 {
+    uint32_t crc = start;
     uint32_t i;
     uint32_t nibble;
     for (i = 0u; i < length; ++i) {
@@ -516,7 +517,7 @@ uint32_t filters_integrity(void)
     crc = filters_crc(crc, filters_weights2, 12u);
     crc = filters_crc(crc, filters_bias2, 3u);
     crc = filters_crc(crc, filters_duties, 3u);
-    return (uint32_t)((crc ^ 0xFFFFFFFFu) == 0x4ECCE7EDu);
+    return filters_flag((crc ^ 0xFFFFFFFFu) == 0x4ECCE7EDu);
 }
 
 uint32_t filters_self_test(void)
@@ -529,8 +530,8 @@ uint32_t filters_self_test(void)
     uint32_t i;
     for (vector = 0u; vector < 16u; ++vector) {
         for (i = 0u; i < FILTERS_FEATURES; ++i) {
-            random = random * 0x0019660Du + 0x3C6EF35Fu;
-            observation[i] = filters_box_low[i] + filters_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f);
+            random = (random * 0x0019660Du) + 0x3C6EF35Fu;
+            observation[i] = filters_box_low[i] + (filters_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
         }
         filters_q_values(observation, q);
         if ((failed == 0u) && ((filters_crc(0xFFFFFFFFu, q, FILTERS_ACTIONS) ^ 0xFFFFFFFFu) != filters_answers[vector])) {

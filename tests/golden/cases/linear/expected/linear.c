@@ -192,13 +192,13 @@ LINEAR_CODE static void linear_layer0(const float *LINEAR_RESTRICT x, float *LIN
         const float *const bias = &linear_bias0[0];
         float *const sum = &y[0];
         for (o = 0u; o < 4u; ++o) {
-            sum[o] = bias[o] + w[o] * x[0];
+            sum[o] = bias[o] + (w[o] * x[0]);
         }
         for (i = 1u; i < 2u; ++i) {
             const float *const column = &w[i * 4u];
             const float input = x[i];
             for (o = 0u; o < 4u; ++o) {
-                sum[o] = sum[o] + column[o] * input;
+                sum[o] = sum[o] + (column[o] * input);
             }
         }
     }
@@ -316,8 +316,9 @@ void linear_init(linear_state *state)
  * CRC-32 (IEEE 802.3) of words taken little-endian, whatever the byte order of the machine.
  * volatile: the memory is read, the compiler does not answer in its place.
  */
-static uint32_t linear_crc(uint32_t crc, const volatile float *words, uint32_t length)
+static uint32_t linear_crc(uint32_t start, const volatile float *words, uint32_t length)
 {
+    uint32_t crc = start;
     uint32_t i;
     uint32_t nibble;
     for (i = 0u; i < length; ++i) {
@@ -335,7 +336,7 @@ uint32_t linear_integrity(void)
     crc = linear_crc(crc, linear_weights0, 8u);
     crc = linear_crc(crc, linear_bias0, 4u);
     crc = linear_crc(crc, linear_duties, 4u);
-    return (uint32_t)((crc ^ 0xFFFFFFFFu) == 0x4E6B233Cu);
+    return linear_flag((crc ^ 0xFFFFFFFFu) == 0x4E6B233Cu);
 }
 
 uint32_t linear_self_test(void)
@@ -348,8 +349,8 @@ uint32_t linear_self_test(void)
     uint32_t i;
     for (vector = 0u; vector < 16u; ++vector) {
         for (i = 0u; i < LINEAR_FEATURES; ++i) {
-            random = random * 0x0019660Du + 0x3C6EF35Fu;
-            observation[i] = linear_box_low[i] + linear_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f);
+            random = (random * 0x0019660Du) + 0x3C6EF35Fu;
+            observation[i] = linear_box_low[i] + (linear_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
         }
         linear_q_values(observation, q);
         if ((failed == 0u) && ((linear_crc(0xFFFFFFFFu, q, LINEAR_ACTIONS) ^ 0xFFFFFFFFu) != linear_answers[vector])) {

@@ -204,13 +204,13 @@ MINIMAL_CODE static void minimal_layer0(const float *MINIMAL_RESTRICT x, float *
         const float *const bias = &minimal_bias0[0];
         float *const sum = &y[0];
         for (o = 0u; o < 4u; ++o) {
-            sum[o] = bias[o] + w[o] * x[0];
+            sum[o] = bias[o] + (w[o] * x[0]);
         }
         for (i = 1u; i < 2u; ++i) {
             const float *const column = &w[i * 4u];
             const float input = x[i];
             for (o = 0u; o < 4u; ++o) {
-                sum[o] = sum[o] + column[o] * input;
+                sum[o] = sum[o] + (column[o] * input);
             }
         }
     }
@@ -229,13 +229,13 @@ MINIMAL_CODE static void minimal_layer1(const float *MINIMAL_RESTRICT x, float *
         const float *const bias = &minimal_bias1[0];
         float *const sum = &y[0];
         for (o = 0u; o < 3u; ++o) {
-            sum[o] = bias[o] + w[o] * x[0];
+            sum[o] = bias[o] + (w[o] * x[0]);
         }
         for (i = 1u; i < 4u; ++i) {
             const float *const column = &w[i * 3u];
             const float input = x[i];
             for (o = 0u; o < 3u; ++o) {
-                sum[o] = sum[o] + column[o] * input;
+                sum[o] = sum[o] + (column[o] * input);
             }
         }
     }
@@ -346,8 +346,9 @@ void minimal_init(minimal_state *state)
  * CRC-32 (IEEE 802.3) of words taken little-endian, whatever the byte order of the machine.
  * volatile: the memory is read, the compiler does not answer in its place.
  */
-static uint32_t minimal_crc(uint32_t crc, const volatile float *words, uint32_t length)
+static uint32_t minimal_crc(uint32_t start, const volatile float *words, uint32_t length)
 {
+    uint32_t crc = start;
     uint32_t i;
     uint32_t nibble;
     for (i = 0u; i < length; ++i) {
@@ -367,7 +368,7 @@ uint32_t minimal_integrity(void)
     crc = minimal_crc(crc, minimal_weights1, 12u);
     crc = minimal_crc(crc, minimal_bias1, 3u);
     crc = minimal_crc(crc, minimal_duties, 3u);
-    return (uint32_t)((crc ^ 0xFFFFFFFFu) == 0x49D4A3C9u);
+    return minimal_flag((crc ^ 0xFFFFFFFFu) == 0x49D4A3C9u);
 }
 
 uint32_t minimal_self_test(void)
@@ -380,8 +381,8 @@ uint32_t minimal_self_test(void)
     uint32_t i;
     for (vector = 0u; vector < 16u; ++vector) {
         for (i = 0u; i < MINIMAL_FEATURES; ++i) {
-            random = random * 0x0019660Du + 0x3C6EF35Fu;
-            observation[i] = minimal_box_low[i] + minimal_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f);
+            random = (random * 0x0019660Du) + 0x3C6EF35Fu;
+            observation[i] = minimal_box_low[i] + (minimal_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
         }
         minimal_q_values(observation, q);
         if ((failed == 0u) && ((minimal_crc(0xFFFFFFFFu, q, MINIMAL_ACTIONS) ^ 0xFFFFFFFFu) != minimal_answers[vector])) {

@@ -264,13 +264,13 @@ PAPER_CODE static void paper_layer0(const float *PAPER_RESTRICT x, float *PAPER_
         const float *const bias = &paper_bias0[0];
         float *const sum = &y[0];
         for (o = 0u; o < 5u; ++o) {
-            sum[o] = bias[o] + w[o] * x[0];
+            sum[o] = bias[o] + (w[o] * x[0]);
         }
         for (i = 1u; i < 6u; ++i) {
             const float *const column = &w[i * 5u];
             const float input = x[i];
             for (o = 0u; o < 5u; ++o) {
-                sum[o] = sum[o] + column[o] * input;
+                sum[o] = sum[o] + (column[o] * input);
             }
         }
     }
@@ -289,13 +289,13 @@ PAPER_CODE static void paper_layer1(const float *PAPER_RESTRICT x, float *PAPER_
         const float *const bias = &paper_bias1[0];
         float *const sum = &y[0];
         for (o = 0u; o < 4u; ++o) {
-            sum[o] = bias[o] + w[o] * x[0];
+            sum[o] = bias[o] + (w[o] * x[0]);
         }
         for (i = 1u; i < 5u; ++i) {
             const float *const column = &w[i * 4u];
             const float input = x[i];
             for (o = 0u; o < 4u; ++o) {
-                sum[o] = sum[o] + column[o] * input;
+                sum[o] = sum[o] + (column[o] * input);
             }
         }
     }
@@ -314,13 +314,13 @@ PAPER_CODE static void paper_layer2(const float *PAPER_RESTRICT x, float *PAPER_
         const float *const bias = &paper_bias2[0];
         float *const sum = &y[0];
         for (o = 0u; o < 9u; ++o) {
-            sum[o] = bias[o] + w[o] * x[0];
+            sum[o] = bias[o] + (w[o] * x[0]);
         }
         for (i = 1u; i < 4u; ++i) {
             const float *const column = &w[i * 9u];
             const float input = x[i];
             for (o = 0u; o < 9u; ++o) {
-                sum[o] = sum[o] + column[o] * input;
+                sum[o] = sum[o] + (column[o] * input);
             }
         }
     }
@@ -358,7 +358,7 @@ PAPER_CODE static void paper_decide(const paper_state *state, const paper_front 
         const float v1 = state->mapping_b * front->signal[1];
         const float v2 = v0 + v1;
         const float v3 = v2 + state->mapping_c;
-        const uint32_t f4 = paper_outside(chosen, 0.35000002f, 0.65f);
+        const uint32_t f4 = paper_outside(chosen, 0.35f, 0.65f);
         const uint32_t f5 = paper_outside(front->signal[1], 0.0f, 12.0f);
         const uint32_t f6 = f4 | f5;
         const uint32_t f7 = paper_outside(v3, 0.3f, 0.7f);
@@ -450,9 +450,9 @@ void paper_init(paper_state *state)
 
 uint32_t paper_set_mapping(paper_state *state, float a, float b, float c)
 {
-    const uint32_t accepted = (uint32_t)(a >= 0.485f) & (uint32_t)(a <= 1.9399999f)
-                            & (uint32_t)(b >= -0.0479f) & (uint32_t)(b <= 0.0521f)
-                            & (uint32_t)(c >= -0.18699999f) & (uint32_t)(c <= 0.213f);
+    const uint32_t accepted = paper_within(a, 0.485f, 1.9399999f)
+                            & paper_within(b, -0.0479f, 0.0521f)
+                            & paper_within(c, -0.18699999f, 0.213f);
 
     if (accepted != 0u) {
         state->mapping_a = a;
@@ -466,8 +466,9 @@ uint32_t paper_set_mapping(paper_state *state, float a, float b, float c)
  * CRC-32 (IEEE 802.3) of words taken little-endian, whatever the byte order of the machine.
  * volatile: the memory is read, the compiler does not answer in its place.
  */
-static uint32_t paper_crc(uint32_t crc, const volatile float *words, uint32_t length)
+static uint32_t paper_crc(uint32_t start, const volatile float *words, uint32_t length)
 {
+    uint32_t crc = start;
     uint32_t i;
     uint32_t nibble;
     for (i = 0u; i < length; ++i) {
@@ -489,7 +490,7 @@ uint32_t paper_integrity(void)
     crc = paper_crc(crc, paper_weights2, 36u);
     crc = paper_crc(crc, paper_bias2, 9u);
     crc = paper_crc(crc, paper_duties, 9u);
-    return (uint32_t)((crc ^ 0xFFFFFFFFu) == 0x49E6DD07u);
+    return paper_flag((crc ^ 0xFFFFFFFFu) == 0x49E6DD07u);
 }
 
 uint32_t paper_self_test(void)
@@ -502,8 +503,8 @@ uint32_t paper_self_test(void)
     uint32_t i;
     for (vector = 0u; vector < 16u; ++vector) {
         for (i = 0u; i < PAPER_FEATURES; ++i) {
-            random = random * 0x0019660Du + 0x3C6EF35Fu;
-            observation[i] = paper_box_low[i] + paper_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f);
+            random = (random * 0x0019660Du) + 0x3C6EF35Fu;
+            observation[i] = paper_box_low[i] + (paper_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
         }
         paper_q_values(observation, q);
         if ((failed == 0u) && ((paper_crc(0xFFFFFFFFu, q, PAPER_ACTIONS) ^ 0xFFFFFFFFu) != paper_answers[vector])) {

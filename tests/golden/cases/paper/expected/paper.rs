@@ -450,7 +450,7 @@ impl Controller {
         let v1: f32 = self.mapping_b * front.signal[1];
         let v2: f32 = v0 + v1;
         let v3: f32 = v2 + self.mapping_c;
-        let f4: u32 = outside(chosen, 0.35000002, 0.65);
+        let f4: u32 = outside(chosen, 0.35, 0.65);
         let f5: u32 = outside(front.signal[1], 0.0, 12.0);
         let f6: u32 = f4 | f5;
         let f7: u32 = outside(v3, 0.3, 0.7);

@@ -321,13 +321,13 @@ TAIL_BLOCKS_CODE static void tail_blocks_layer0(const float *TAIL_BLOCKS_RESTRIC
         const float *const bias = &tail_blocks_bias0[0];
         float *const sum = &y[0];
         for (o = 0u; o < 33u; ++o) {
-            sum[o] = bias[o] + w[o] * x[0];
+            sum[o] = bias[o] + (w[o] * x[0]);
         }
         for (i = 1u; i < 3u; ++i) {
             const float *const column = &w[i * 33u];
             const float input = x[i];
             for (o = 0u; o < 33u; ++o) {
-                sum[o] = sum[o] + column[o] * input;
+                sum[o] = sum[o] + (column[o] * input);
             }
         }
     }
@@ -346,13 +346,13 @@ TAIL_BLOCKS_CODE static void tail_blocks_layer1(const float *TAIL_BLOCKS_RESTRIC
         const float *const bias = &tail_blocks_bias1[0];
         float *const sum = &y[0];
         for (o = 0u; o < 20u; ++o) {
-            sum[o] = bias[o] + w[o] * x[0];
+            sum[o] = bias[o] + (w[o] * x[0]);
         }
         for (i = 1u; i < 33u; ++i) {
             const float *const column = &w[i * 20u];
             const float input = x[i];
             for (o = 0u; o < 20u; ++o) {
-                sum[o] = sum[o] + column[o] * input;
+                sum[o] = sum[o] + (column[o] * input);
             }
         }
     }
@@ -481,8 +481,9 @@ void tail_blocks_init(tail_blocks_state *state)
  * CRC-32 (IEEE 802.3) of words taken little-endian, whatever the byte order of the machine.
  * volatile: the memory is read, the compiler does not answer in its place.
  */
-static uint32_t tail_blocks_crc(uint32_t crc, const volatile float *words, uint32_t length)
+static uint32_t tail_blocks_crc(uint32_t start, const volatile float *words, uint32_t length)
 {
+    uint32_t crc = start;
     uint32_t i;
     uint32_t nibble;
     for (i = 0u; i < length; ++i) {
@@ -502,7 +503,7 @@ uint32_t tail_blocks_integrity(void)
     crc = tail_blocks_crc(crc, tail_blocks_weights1, 660u);
     crc = tail_blocks_crc(crc, tail_blocks_bias1, 20u);
     crc = tail_blocks_crc(crc, tail_blocks_duties, 20u);
-    return (uint32_t)((crc ^ 0xFFFFFFFFu) == 0x82C7CB00u);
+    return tail_blocks_flag((crc ^ 0xFFFFFFFFu) == 0x82C7CB00u);
 }
 
 uint32_t tail_blocks_self_test(void)
@@ -515,8 +516,8 @@ uint32_t tail_blocks_self_test(void)
     uint32_t i;
     for (vector = 0u; vector < 16u; ++vector) {
         for (i = 0u; i < TAIL_BLOCKS_FEATURES; ++i) {
-            random = random * 0x0019660Du + 0x3C6EF35Fu;
-            observation[i] = tail_blocks_box_low[i] + tail_blocks_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f);
+            random = (random * 0x0019660Du) + 0x3C6EF35Fu;
+            observation[i] = tail_blocks_box_low[i] + (tail_blocks_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
         }
         tail_blocks_q_values(observation, q);
         if ((failed == 0u) && ((tail_blocks_crc(0xFFFFFFFFu, q, TAIL_BLOCKS_ACTIONS) ^ 0xFFFFFFFFu) != tail_blocks_answers[vector])) {

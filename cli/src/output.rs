@@ -185,15 +185,17 @@ impl Drop for Staged {
     /// Puts back what was there before.
     fn drop(&mut self) {
         for file in self.files.iter().rev() {
-            let spent = if file.published {
-                &file.destination
-            } else {
-                &file.temporary
+            // nothing more can be done where putting back fails, too
+            let _ = match (file.published, file.had_backup) {
+                (true, true) => fs::rename(&file.backup, &file.destination),
+                (true, false) => fs::remove_file(&file.destination),
+                (false, had_backup) => {
+                    if had_backup {
+                        let _ = fs::remove_file(&file.backup);
+                    }
+                    fs::remove_file(&file.temporary)
+                }
             };
-            let _ = fs::remove_file(spent);
-            if file.had_backup {
-                let _ = fs::rename(&file.backup, &file.destination);
-            }
         }
     }
 }

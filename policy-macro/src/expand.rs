@@ -23,8 +23,11 @@ impl Parse for Call {
     fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
         let visibility = input.parse()?;
         let type_name = if input.peek(syn::Ident) {
-            let name = input.parse()?;
+            let name: Ident = input.parse()?;
             input.parse::<Token![=]>()?;
+            if let Some(objection) = objection(&name.to_string()) {
+                return Err(syn::Error::new(name.span(), objection));
+            }
             Some(name)
         } else {
             None
@@ -36,6 +39,31 @@ impl Parse for Call {
             type_name,
             path,
         })
+    }
+}
+
+/// Why a name cannot be that of the controller's type; `None` if it can. The module holds other types and uses others.
+fn objection(name: &str) -> Option<&'static str> {
+    const TAKEN: [&str; 12] = [
+        "Measurement",
+        "Command",
+        "Front",
+        "Option",
+        "Result",
+        "Ok",
+        "Err",
+        "Some",
+        "None",
+        "Clone",
+        "Copy",
+        "Default",
+    ];
+    if TAKEN.contains(&name) {
+        Some("the module uses this name itself: choose another for the controller's type")
+    } else if !name.starts_with(|c: char| c.is_ascii_uppercase()) {
+        Some("the name of the controller's type begins with an upper-case letter")
+    } else {
+        None
     }
 }
 

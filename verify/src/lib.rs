@@ -14,7 +14,7 @@
 //! | what is expected | [`oracle`] |
 //! | who answers | [`runner`]: [`runner::Runner`] has one implementation per way of running a build |
 //! | what differs | [`compare`], [`report`] |
-//! | checked-in files against the policy | [`drift`] |
+//! | checked-in files against the policy | [`drift()`] |
 
 pub mod compare;
 pub mod drift;

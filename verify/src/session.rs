@@ -136,12 +136,7 @@ pub fn run(policy: &Policy, options: Options<'_>) -> Result<Report, VerifyError>
             progress(news);
         }
     };
-    let unknown = compilers
-        .iter()
-        .find(|name| toolchain::COMPILERS.iter().all(|known| known.name != **name));
-    if let Some(name) = unknown {
-        return Err(VerifyError::UnknownCompiler(name.clone()));
-    }
+    check_names(&compilers)?;
     let target = targets::find("host").ok_or(VerifyError::NoHostTarget)?;
     let fresh;
     let files = match generated {
@@ -173,32 +168,15 @@ pub fn run(policy: &Policy, options: Options<'_>) -> Result<Report, VerifyError>
         .as_ref()
         .map(|golden| golden::judge(golden, policy.actions.len(), &known.expected));
     let mut stream = Stream::new(policy, seed, &recorded);
-    let builds = thread::scope(|scope| {
-        let mut feeds = Vec::new();
-        let mut lanes = Vec::new();
-        for (build, compiled) in builds.iter().zip(compiled) {
-            let (feed, chunks) = sync_channel(LAG);
-            let (layout, known) = (&layout, &known);
-            feeds.push(Some(feed));
-            lanes.push(scope.spawn(move || lane(policy, layout, build, compiled, known, &chunks, timeout)));
-        }
-        while oracle.steps() < steps && feeds.iter().any(Option::is_some) {
-            let chunk = oracle.next_chunk(&mut stream, CHUNK.min(steps - oracle.steps()))?;
-            send(&mut feeds, &Arc::new(chunk));
-            tell(Progress::Running {
-                steps: oracle.steps(),
-                of: steps,
-            });
-        }
-        drop(feeds);
-        // a lane does not panic; if one does, that is a fault of ours and must not pass as equal
-        let reports = lanes.into_iter().zip(&builds).map(|(lane, build)| {
-            lane.join()
-                .unwrap_or_else(|_| entry(build, 0, failed("the comparison itself panicked")))
-        });
-        Ok(reports.collect())
-    })
-    .map_err(VerifyError::Interpreter)?;
+    let lanes = Lanes {
+        policy,
+        layout: &layout,
+        known: &known,
+        timeout,
+    };
+    let builds = lanes
+        .compare(&builds, compiled, steps, &mut oracle, &mut stream, &mut tell)
+        .map_err(VerifyError::Interpreter)?;
     Ok(Report {
         policy: policy.name.clone(),
         seed,
@@ -208,6 +186,70 @@ pub fn run(policy: &Policy, options: Options<'_>) -> Result<Report, VerifyError>
         golden,
         builds,
     })
+}
+
+fn check_names(compilers: &[String]) -> Result<(), VerifyError> {
+    let known = |name: &String| toolchain::COMPILERS.iter().any(|compiler| compiler.name == *name);
+    match compilers.iter().find(|name| !known(name)) {
+        Some(name) => Err(VerifyError::UnknownCompiler(name.clone())),
+        None => Ok(()),
+    }
+}
+
+/// What all builds are compared with.
+struct Lanes<'a> {
+    policy: &'a Policy,
+    layout: &'a Layout,
+    known: &'a Chunk,
+    timeout: Duration,
+}
+
+impl Lanes<'_> {
+    /// Runs the interpreter over the stream once and every build beside it.
+    fn compare(
+        &self,
+        builds: &[Build],
+        compiled: Vec<Result<PathBuf, Outcome>>,
+        steps: u64,
+        oracle: &mut Oracle,
+        stream: &mut Stream<'_>,
+        tell: &mut dyn FnMut(Progress),
+    ) -> Result<Vec<BuildReport>, InputError> {
+        thread::scope(|scope| {
+            let mut feeds = Vec::new();
+            let mut lanes = Vec::new();
+            for (build, compiled) in builds.iter().zip(compiled) {
+                let (feed, chunks) = sync_channel(LAG);
+                feeds.push(Some(feed));
+                lanes.push(scope.spawn(move || {
+                    lane(
+                        self.policy,
+                        self.layout,
+                        build,
+                        compiled,
+                        self.known,
+                        &chunks,
+                        self.timeout,
+                    )
+                }));
+            }
+            while oracle.steps() < steps && feeds.iter().any(Option::is_some) {
+                let chunk = oracle.next_chunk(stream, CHUNK.min(steps - oracle.steps()))?;
+                send(&mut feeds, &Arc::new(chunk));
+                tell(Progress::Running {
+                    steps: oracle.steps(),
+                    of: steps,
+                });
+            }
+            drop(feeds);
+            // a lane does not panic; if one does, that is a fault of ours and must not pass as equal
+            let reports = lanes.into_iter().zip(builds).map(|(lane, build)| {
+                lane.join()
+                    .unwrap_or_else(|_| entry(build, 0, failed("the comparison itself panicked")))
+            });
+            Ok(reports.collect())
+        })
+    }
 }
 
 /// The policy's files for `target` in each of `languages`.

@@ -28,13 +28,24 @@ pub extern "C" fn main() -> i32 {
     let mut controller = Controller::new();
     let mut v_out = 90.0_f32;
     for _ in 0..2000 {
-        let ticks = interrupt(&mut controller, &Measurement { v_out, i_l: 5.0, i_out: 5.0 });
+        let ticks = interrupt(
+            &mut controller,
+            &Measurement {
+                v_out,
+                i_l: 5.0,
+                i_out: 5.0,
+            },
+        );
         // a plant in one line: towards the mean voltage of the duty
         v_out += 0.02 * (200.0 * f32::from(ticks) / f32::from(PERIOD_TICKS) - v_out);
     }
     let settled = (98.0..102.0).contains(&v_out);
     // the switch opens when the sensors die
-    let blind = Measurement { v_out: f32::NAN, i_l: f32::NAN, i_out: f32::NAN };
+    let blind = Measurement {
+        v_out: f32::NAN,
+        i_l: f32::NAN,
+        i_out: f32::NAN,
+    };
     let mut last = 1;
     for _ in 0..8 {
         last = interrupt(&mut controller, &blind);

@@ -35,6 +35,15 @@ pub enum RecordedError {
         /// What was found.
         found: String,
     },
+    /// More cells than the header has: perhaps decimal commas.
+    TooManyCells {
+        /// Line in the file, the header is 1.
+        line: usize,
+        /// Number of cells.
+        found: usize,
+        /// Cells in the header.
+        expected: usize,
+    },
 }
 
 impl fmt::Display for RecordedError {
@@ -45,6 +54,10 @@ impl fmt::Display for RecordedError {
             Self::Cell { line, signal, found } => {
                 write!(f, "line {line}, column `{signal}`: expected a number, found `{found}`")
             }
+            Self::TooManyCells { line, found, expected } => write!(
+                f,
+                "line {line}: found {found} cells, expected {expected} as in the header (numbers take a decimal point)"
+            ),
         }
     }
 }
@@ -81,6 +94,13 @@ impl Recorded {
         let steps = lines
             .map(|(line, text)| {
                 let cells = cells(text);
+                if cells.len() > header.len() {
+                    return Err(RecordedError::TooManyCells {
+                        line: line + 1,
+                        found: cells.len(),
+                        expected: header.len(),
+                    });
+                }
                 let sample = |(signal, &column): (&policy::Signal, &usize)| {
                     let cell = cells.get(column).copied().unwrap_or_default();
                     let bad = || RecordedError::Cell {

@@ -195,19 +195,23 @@ fn lifecycle(program: &Program, fields: &[Field]) -> TokenStream {
 }
 
 fn front(program: &Program) -> TokenStream {
-    let pushes = size(program.front.pushes.len());
-    let signals = quote!(SIGNALS);
+    let pushes = program.front.pushes.len();
+    let push = (pushes > 0).then(|| {
+        let pushes = size(pushes);
+        quote!(push: [f32; #pushes],)
+    });
+    let clipped = program.front.clipped.map(|_| quote!(clipped: u32,));
     quote! {
         /// What a measurement means before the network sees it.
         struct Front {
-            signal: [f32; #signals],
+            signal: [f32; SIGNALS],
             observation: [f32; FEATURES],
-            push: [f32; #pushes],
+            #push
             bad_count: u32,
             usable: u32,
             held: u32,
             primed_now: u32,
-            clipped: u32,
+            #clipped
         }
     }
 }
@@ -223,10 +227,16 @@ fn sense(program: &Program) -> TokenStream {
     let signal = list(&front.signals);
     let observation = list(&front.observation);
     let pushed: Vec<usize> = front.pushes.iter().map(|push| push.value).collect();
-    let push = list(&pushed);
+    let push = (!pushed.is_empty()).then(|| {
+        let values = list(&pushed);
+        quote!(push: #values,)
+    });
     let valid = printer.operand(front.all_valid);
     let hold = word(program.hold);
-    let clipped = front.clipped.map_or(quote!(0), |id| printer.operand(id));
+    let clipped = front.clipped.map(|id| {
+        let value = printer.operand(id);
+        quote!(clipped: #value,)
+    });
     quote! {
         /// Sanitise, filters, observation.
         #[inline(always)]
@@ -238,12 +248,12 @@ fn sense(program: &Program) -> TokenStream {
             Front {
                 signal: #signal,
                 observation: #observation,
-                push: #push,
+                #push
                 bad_count,
                 usable,
                 held: usable & (#valid ^ 1),
                 primed_now: usable & (self.primed ^ 1),
-                clipped: #clipped,
+                #clipped
             }
         }
     }

@@ -76,9 +76,14 @@ fn layer_items(index: usize, layer: &LayerCode) -> TokenStream {
         #[inline(always)]
         fn #name(x: &[f32; #inputs]) -> [f32; #outputs] {
             let mut y = [0.0; #outputs];
-            for ((out, weights), bias) in y.chunks_exact_mut(#rows_size).zip(&#weights).zip(&#bias) {
-                for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-                    *y = #activated;
+            let mut rest: &mut [f32] = &mut y;
+            for (weights, bias) in #weights.iter().zip(&#bias) {
+                // no division and no slice index, so no way to a panic at any optimisation level
+                if let Some((out, after)) = core::mem::take(&mut rest).split_first_chunk_mut::<#rows_size>() {
+                    for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+                        *y = #activated;
+                    }
+                    rest = after;
                 }
             }
             #tail_loop
@@ -100,14 +105,14 @@ fn tail(index: usize, layer: &LayerCode) -> (TokenStream, TokenStream) {
     );
     let table = columns(&layer.table[split * layer.inputs..], rows);
     let biases = row(&layer.bias[split..]);
-    let (inputs, rows, split) = (size(layer.inputs), size(rows), size(split));
+    let (inputs, rows) = (size(layer.inputs), size(rows));
     let activated = activation(layer.activation);
     let tables = quote! {
         static #weights: [[f32; #rows]; #inputs] = #table;
         static #bias: [f32; #rows] = #biases;
     };
     let code = quote! {
-        for (y, sum) in y.iter_mut().skip(#split).zip(block(&#weights, &#bias, x)) {
+        for (y, sum) in rest.iter_mut().zip(block(&#weights, &#bias, x)) {
             *y = #activated;
         }
     };

@@ -182,9 +182,15 @@ static BIAS0: [[f32; 5]; 1] = [
 #[inline(always)]
 fn layer0(x: &[f32; 3]) -> [f32; 5] {
     let mut y = [0.0; 5];
-    for ((out, weights), bias) in y.chunks_exact_mut(5).zip(&WEIGHTS0).zip(&BIAS0) {
-        for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-            *y = relu(sum);
+    let mut rest: &mut [f32] = &mut y;
+    for (weights, bias) in WEIGHTS0.iter().zip(&BIAS0) {
+        if let Some((out, after)) = core::mem::take(&mut rest)
+            .split_first_chunk_mut::<5>()
+        {
+            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+                *y = relu(sum);
+            }
+            rest = after;
         }
     }
     y
@@ -203,9 +209,15 @@ static BIAS1: [[f32; 4]; 1] = [[-0.45988896, 0.010735092, 0.2773859, 0.4780439]]
 #[inline(always)]
 fn layer1(x: &[f32; 5]) -> [f32; 4] {
     let mut y = [0.0; 4];
-    for ((out, weights), bias) in y.chunks_exact_mut(4).zip(&WEIGHTS1).zip(&BIAS1) {
-        for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-            *y = tanh(sum);
+    let mut rest: &mut [f32] = &mut y;
+    for (weights, bias) in WEIGHTS1.iter().zip(&BIAS1) {
+        if let Some((out, after)) = core::mem::take(&mut rest)
+            .split_first_chunk_mut::<4>()
+        {
+            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+                *y = tanh(sum);
+            }
+            rest = after;
         }
     }
     y
@@ -223,9 +235,15 @@ static BIAS2: [[f32; 4]; 1] = [[-0.23947059, -0.4564435, 0.574685, -0.12704511]]
 #[inline(always)]
 fn layer2(x: &[f32; 4]) -> [f32; 4] {
     let mut y = [0.0; 4];
-    for ((out, weights), bias) in y.chunks_exact_mut(4).zip(&WEIGHTS2).zip(&BIAS2) {
-        for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-            *y = leaky_relu(sum, 0.01);
+    let mut rest: &mut [f32] = &mut y;
+    for (weights, bias) in WEIGHTS2.iter().zip(&BIAS2) {
+        if let Some((out, after)) = core::mem::take(&mut rest)
+            .split_first_chunk_mut::<4>()
+        {
+            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+                *y = leaky_relu(sum, 0.01);
+            }
+            rest = after;
         }
     }
     y
@@ -245,9 +263,15 @@ static BIAS3: [[f32; 6]; 1] = [
 #[inline(always)]
 fn layer3(x: &[f32; 4]) -> [f32; 6] {
     let mut y = [0.0; 6];
-    for ((out, weights), bias) in y.chunks_exact_mut(6).zip(&WEIGHTS3).zip(&BIAS3) {
-        for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-            *y = sum;
+    let mut rest: &mut [f32] = &mut y;
+    for (weights, bias) in WEIGHTS3.iter().zip(&BIAS3) {
+        if let Some((out, after)) = core::mem::take(&mut rest)
+            .split_first_chunk_mut::<6>()
+        {
+            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+                *y = sum;
+            }
+            rest = after;
         }
     }
     y
@@ -267,9 +291,15 @@ static BIAS4: [[f32; 3]; 1] = [[0.20621607, -0.40930614, -0.15501034]];
 #[inline(always)]
 fn layer4(x: &[f32; 6]) -> [f32; 3] {
     let mut y = [0.0; 3];
-    for ((out, weights), bias) in y.chunks_exact_mut(3).zip(&WEIGHTS4).zip(&BIAS4) {
-        for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-            *y = sum;
+    let mut rest: &mut [f32] = &mut y;
+    for (weights, bias) in WEIGHTS4.iter().zip(&BIAS4) {
+        if let Some((out, after)) = core::mem::take(&mut rest)
+            .split_first_chunk_mut::<3>()
+        {
+            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+                *y = sum;
+            }
+            rest = after;
         }
     }
     y
@@ -295,12 +325,10 @@ pub struct Controller {
 struct Front {
     signal: [f32; SIGNALS],
     observation: [f32; FEATURES],
-    push: [f32; 0],
     bad_count: u32,
     usable: u32,
     held: u32,
     primed_now: u32,
-    clipped: u32,
 }
 impl Controller {
     /// Start-up state.
@@ -375,12 +403,10 @@ impl Controller {
         Front {
             signal: [v1],
             observation: [v3, self.previous_duty, v5],
-            push: [],
             bad_count,
             usable,
             held: usable & (f0 ^ 1),
             primed_now: usable & (self.primed ^ 1),
-            clipped: 0,
         }
     }
     /// Network, argmax, mapping, limits, status.

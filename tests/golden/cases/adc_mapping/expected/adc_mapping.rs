@@ -184,9 +184,15 @@ static BIAS0: [[f32; 5]; 1] = [
 #[inline(always)]
 fn layer0(x: &[f32; 3]) -> [f32; 5] {
     let mut y = [0.0; 5];
-    for ((out, weights), bias) in y.chunks_exact_mut(5).zip(&WEIGHTS0).zip(&BIAS0) {
-        for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-            *y = tanh(sum);
+    let mut rest: &mut [f32] = &mut y;
+    for (weights, bias) in WEIGHTS0.iter().zip(&BIAS0) {
+        if let Some((out, after)) = core::mem::take(&mut rest)
+            .split_first_chunk_mut::<5>()
+        {
+            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+                *y = tanh(sum);
+            }
+            rest = after;
         }
     }
     y
@@ -205,9 +211,15 @@ static BIAS1: [[f32; 4]; 1] = [[0.03895329, 0.17294572, -0.045696143, -0.2901878
 #[inline(always)]
 fn layer1(x: &[f32; 5]) -> [f32; 4] {
     let mut y = [0.0; 4];
-    for ((out, weights), bias) in y.chunks_exact_mut(4).zip(&WEIGHTS1).zip(&BIAS1) {
-        for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-            *y = tanh(sum);
+    let mut rest: &mut [f32] = &mut y;
+    for (weights, bias) in WEIGHTS1.iter().zip(&BIAS1) {
+        if let Some((out, after)) = core::mem::take(&mut rest)
+            .split_first_chunk_mut::<4>()
+        {
+            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+                *y = tanh(sum);
+            }
+            rest = after;
         }
     }
     y
@@ -225,9 +237,15 @@ static BIAS2: [[f32; 3]; 1] = [[-0.14668381, 0.27096558, 0.56342345]];
 #[inline(always)]
 fn layer2(x: &[f32; 4]) -> [f32; 3] {
     let mut y = [0.0; 3];
-    for ((out, weights), bias) in y.chunks_exact_mut(3).zip(&WEIGHTS2).zip(&BIAS2) {
-        for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-            *y = sum;
+    let mut rest: &mut [f32] = &mut y;
+    for (weights, bias) in WEIGHTS2.iter().zip(&BIAS2) {
+        if let Some((out, after)) = core::mem::take(&mut rest)
+            .split_first_chunk_mut::<3>()
+        {
+            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+                *y = sum;
+            }
+            rest = after;
         }
     }
     y
@@ -256,7 +274,6 @@ pub struct Controller {
 struct Front {
     signal: [f32; SIGNALS],
     observation: [f32; FEATURES],
-    push: [f32; 0],
     bad_count: u32,
     usable: u32,
     held: u32,
@@ -381,7 +398,6 @@ impl Controller {
         Front {
             signal: [v3, v7],
             observation: [v12, v18, v19],
-            push: [],
             bad_count,
             usable,
             held: usable & (f8 ^ 1),

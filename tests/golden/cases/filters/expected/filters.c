@@ -4,7 +4,7 @@
  * Network 8-5-4-3, 72 MACs, numeric format f32 (exact order, no contraction).
  * Sample period 5e-5 s.
  * Weights  sha256 c96acff6c90209e8cfb3895c78d7f6d4b34d97a03d0540072d54c74e225ac351
- * Contract sha256 9c66eb62a987686da914cc1e609b1ea234232d97773ef95d0cc5135e2b18c5ed
+ * Contract sha256 57915aa84064203f19c98d8029697ad0e04fc7500433edd37214e748555fbe45
  * Mapping  sha256 none
  * Bits hold with: -std=c99 -ffp-contract=off
  */
@@ -212,42 +212,42 @@ FILTERS_CODE static void filters_sense(const filters_state *state, const filters
     const float v7 = v6 * 0.1f;
     const uint32_t f8 = filters_outside(v7, -5.0f, 5.0f);
     const float v9 = filters_clamp(v7, -5.0f, 5.0f);
-    const float v10 = filters_select(state->primed, state->memory[3], v1);
+    const float v10 = filters_select(state->primed, state->memory[20], v1);
     const float v11 = v1 - v10;
     const float v12 = v11 * 20000.0f;
     const float v13 = v12 * 1e-6f;
-    const float v14 = filters_select(state->primed, state->memory[4], v3);
+    const float v14 = filters_select(state->primed, state->memory[21], v3);
     const float v15 = v3 - v14;
     const float v16 = v15 * 0.04761905f;
     const float v17 = v14 + v16;
     const float v18 = v17 * 0.05f;
     const float v19 = v18 + -0.25f;
-    const float v20 = filters_select(state->primed, state->memory[5], v3);
+    const float v20 = filters_select(state->primed, state->memory[22], v3);
     const float v21 = v3 - v20;
     const float v22 = v21 * 0.13575524f;
     const float v23 = v20 + v22;
     const float v24 = v23 * 0.05f;
-    const float v25 = filters_select(state->primed, state->memory[6], v1);
-    const float v26 = filters_select(state->primed, state->memory[7], 0.0f);
+    const float v25 = filters_select(state->primed, state->memory[23], v1);
+    const float v26 = filters_select(state->primed, state->memory[24], 0.0f);
     const float v27 = v26 * 0.9756098f;
     const float v28 = v1 - v25;
     const float v29 = v28 * 487.80487f;
     const float v30 = v27 + v29;
     const float v31 = v30 * 0.001f;
-    const float v32 = filters_line_sum(&state->memory[8], 3u, v1, state->primed);
-    const float v33 = v32 * 0.25f;
+    const float v32 = filters_line_sum(&state->memory[25], 39u, v1, state->primed);
+    const float v33 = v32 * 0.025f;
     const float v34 = v33 * 0.02f;
-    const float v35 = filters_select(state->primed, state->memory[11], 0.1f);
+    const float v35 = filters_select(state->primed, state->memory[64], 0.1f);
     const float v36 = v5 * 5e-5f;
     const float v37 = v35 + v36;
     const float v38 = filters_clamp(v37, -0.5f, 0.75f);
-    const float v39 = filters_select(state->primed, state->memory[12], v3);
-    const float v40 = filters_line_sum(&state->memory[13], 1u, v39, state->primed);
+    const float v39 = filters_select(state->primed, state->memory[65], v3);
+    const float v40 = filters_line_sum(&state->memory[66], 1u, v39, state->primed);
     const float v41 = v40 * 0.5f;
-    const float v42 = filters_select(state->primed, state->memory[14], v41);
+    const float v42 = filters_select(state->primed, state->memory[67], v41);
     const float v43 = v41 - v42;
     const float v44 = v43 * 20000.0f;
-    const float v45 = filters_select(state->primed, state->memory[15], v44);
+    const float v45 = filters_select(state->primed, state->memory[68], v44);
     const float v46 = v44 - v45;
     const float v47 = v46 * 0.33333334f;
     const float v48 = v45 + v47;
@@ -410,25 +410,25 @@ FILTERS_CODE FILTERS_NO_LIBC static void filters_advance(filters_state *state, c
 {
     uint32_t i;
 
-    for (i = 0u; i < 2u; ++i) {
+    for (i = 0u; i < 19u; ++i) {
         state->memory[i] = filters_select(state->primed, state->memory[i + 1u], front->push[0]);
     }
-    state->memory[2] = front->push[0];
-    state->memory[3] = front->push[1];
-    state->memory[4] = front->push[2];
-    state->memory[5] = front->push[3];
-    state->memory[6] = front->push[4];
-    state->memory[7] = front->push[5];
+    state->memory[19] = front->push[0];
+    state->memory[20] = front->push[1];
+    state->memory[21] = front->push[2];
+    state->memory[22] = front->push[3];
+    state->memory[23] = front->push[4];
+    state->memory[24] = front->push[5];
 
-    for (i = 8u; i < 10u; ++i) {
+    for (i = 25u; i < 63u; ++i) {
         state->memory[i] = filters_select(state->primed, state->memory[i + 1u], front->push[6]);
     }
-    state->memory[10] = front->push[6];
-    state->memory[11] = front->push[7];
-    state->memory[12] = front->push[8];
-    state->memory[13] = front->push[9];
-    state->memory[14] = front->push[10];
-    state->memory[15] = front->push[11];
+    state->memory[63] = front->push[6];
+    state->memory[64] = front->push[7];
+    state->memory[65] = front->push[8];
+    state->memory[66] = front->push[9];
+    state->memory[67] = front->push[10];
+    state->memory[68] = front->push[11];
     for (i = 0u; i < FILTERS_SIGNALS; ++i) {
         state->held[i] = front->signal[i];
     }
@@ -473,7 +473,7 @@ FILTERS_CODE FILTERS_NO_LIBC void filters_observe(const filters_state *state, co
 FILTERS_NO_LIBC void filters_reset(filters_state *state)
 {
     uint32_t i;
-    for (i = 0u; i < 16u; ++i) {
+    for (i = 0u; i < 69u; ++i) {
         state->memory[i] = 0.0f;
     }
     state->held[0] = 0.0f;

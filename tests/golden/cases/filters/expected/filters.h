@@ -4,7 +4,7 @@
  * Network 8-5-4-3, 72 MACs, numeric format f32 (exact order, no contraction).
  * Sample period 5e-5 s.
  * Weights  sha256 c96acff6c90209e8cfb3895c78d7f6d4b34d97a03d0540072d54c74e225ac351
- * Contract sha256 9c66eb62a987686da914cc1e609b1ea234232d97773ef95d0cc5135e2b18c5ed
+ * Contract sha256 57915aa84064203f19c98d8029697ad0e04fc7500433edd37214e748555fbe45
  * Mapping  sha256 none
  * Bits hold with: -std=c99 -ffp-contract=off
  */
@@ -20,7 +20,7 @@ extern "C" {
 #define FILTERS_SIGNALS 2u
 #define FILTERS_FEATURES 8u
 #define FILTERS_ACTIONS 3u
-#define FILTERS_STATE_WORDS 22u
+#define FILTERS_STATE_WORDS 75u
 #define FILTERS_SAMPLE_PERIOD 5e-5
 
 /* Bits of the status word. */
@@ -50,18 +50,18 @@ typedef struct {
 /*
  * State of one controller, owned by the caller. Every member is one 32-bit word or an array of them.
  * Observation:
- *   delayed = clip(0.1 * delay3(v_ref - v_out), -5, 5)
+ *   delayed = clip(0.1 * delay20(v_ref - v_out), -5, 5)
  *   slope = 0.000001 * difference(v_out)
  *   smooth = 0.05 * low_pass[0.001 s](i_l) - 0.25
  *   cut = 0.05 * low_pass[0.0003183098861837907 s](i_l)
  *   slope_smooth = 0.001 * derivative[0.002 s](v_out)
- *   mean = 0.02 * average4(v_out)
+ *   mean = 0.02 * average40(v_out)
  *   sum = integral[-0.5, 0.75](v_ref - v_out)
  *   chain = clip(0.00001 * low_pass[0.0001 s](difference(average2(delay1(i_l)))), -1, 1)
  */
 typedef struct {
     float held[2]; /* last good samples */
-    float memory[16]; /* filters, in feature order, oldest first */
+    float memory[69]; /* filters, in feature order, oldest first */
     float previous_duty; /* duty of the last chosen action */
     float previous_command; /* last command */
     uint32_t bad_count; /* consecutive steps with an invalid sample */

@@ -3,7 +3,7 @@
 // Network 8-5-4-3, 72 MACs, numeric format f32 (exact order, no contraction).
 // Sample period 5e-5 s.
 // Weights  sha256 c96acff6c90209e8cfb3895c78d7f6d4b34d97a03d0540072d54c74e225ac351
-// Contract sha256 9c66eb62a987686da914cc1e609b1ea234232d97773ef95d0cc5135e2b18c5ed
+// Contract sha256 57915aa84064203f19c98d8029697ad0e04fc7500433edd37214e748555fbe45
 // Mapping  sha256 none
 // Bits hold with: --edition=2021
 
@@ -14,7 +14,7 @@ pub const FEATURES: usize = 8;
 /// Number of actions.
 pub const ACTIONS: usize = 3;
 /// Length of the state in words.
-pub const STATE_WORDS: usize = 22;
+pub const STATE_WORDS: usize = 75;
 /// Control period in seconds.
 pub const SAMPLE_PERIOD: f64 = 0.00005;
 /// Bits of [`Command::status`].
@@ -165,9 +165,15 @@ static BIAS0: [[f32; 5]; 1] = [
 #[inline(always)]
 fn layer0(x: &[f32; 8]) -> [f32; 5] {
     let mut y = [0.0; 5];
-    for ((out, weights), bias) in y.chunks_exact_mut(5).zip(&WEIGHTS0).zip(&BIAS0) {
-        for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-            *y = relu(sum);
+    let mut rest: &mut [f32] = &mut y;
+    for (weights, bias) in WEIGHTS0.iter().zip(&BIAS0) {
+        if let Some((out, after)) = core::mem::take(&mut rest)
+            .split_first_chunk_mut::<5>()
+        {
+            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+                *y = relu(sum);
+            }
+            rest = after;
         }
     }
     y
@@ -186,9 +192,15 @@ static BIAS1: [[f32; 4]; 1] = [[0.15470055, 0.13056146, -0.43318373, 0.10934106]
 #[inline(always)]
 fn layer1(x: &[f32; 5]) -> [f32; 4] {
     let mut y = [0.0; 4];
-    for ((out, weights), bias) in y.chunks_exact_mut(4).zip(&WEIGHTS1).zip(&BIAS1) {
-        for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-            *y = relu(sum);
+    let mut rest: &mut [f32] = &mut y;
+    for (weights, bias) in WEIGHTS1.iter().zip(&BIAS1) {
+        if let Some((out, after)) = core::mem::take(&mut rest)
+            .split_first_chunk_mut::<4>()
+        {
+            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+                *y = relu(sum);
+            }
+            rest = after;
         }
     }
     y
@@ -206,9 +218,15 @@ static BIAS2: [[f32; 3]; 1] = [[-0.19511996, -0.4913317, -0.638233]];
 #[inline(always)]
 fn layer2(x: &[f32; 4]) -> [f32; 3] {
     let mut y = [0.0; 3];
-    for ((out, weights), bias) in y.chunks_exact_mut(3).zip(&WEIGHTS2).zip(&BIAS2) {
-        for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-            *y = sum;
+    let mut rest: &mut [f32] = &mut y;
+    for (weights, bias) in WEIGHTS2.iter().zip(&BIAS2) {
+        if let Some((out, after)) = core::mem::take(&mut rest)
+            .split_first_chunk_mut::<3>()
+        {
+            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+                *y = sum;
+            }
+            rest = after;
         }
     }
     y
@@ -223,7 +241,7 @@ fn network(observation: &[f32; FEATURES]) -> [f32; ACTIONS] {
 #[derive(Clone)]
 pub struct Controller {
     held: [f32; 2],
-    memory: [f32; 16],
+    memory: [f32; 69],
     previous_duty: f32,
     previous_command: f32,
     bad_count: u32,
@@ -246,7 +264,7 @@ impl Controller {
     pub const fn new() -> Self {
         Self {
             held: [0.0; 2],
-            memory: [0.0; 16],
+            memory: [0.0; 69],
             previous_duty: 0.5,
             previous_command: 0.5,
             bad_count: 0,
@@ -313,52 +331,52 @@ impl Controller {
         let v7: f32 = v6 * 0.1;
         let f8: u32 = outside(v7, -5.0, 5.0);
         let v9: f32 = clamp(v7, -5.0, 5.0);
-        let v10: f32 = select(self.primed, self.memory[3], v1);
+        let v10: f32 = select(self.primed, self.memory[20], v1);
         let v11: f32 = v1 - v10;
         let v12: f32 = v11 * 20000.0;
         let v13: f32 = v12 * 0.000001;
-        let v14: f32 = select(self.primed, self.memory[4], v3);
+        let v14: f32 = select(self.primed, self.memory[21], v3);
         let v15: f32 = v3 - v14;
         let v16: f32 = v15 * 0.04761905;
         let v17: f32 = v14 + v16;
         let v18: f32 = v17 * 0.05;
         let v19: f32 = v18 + -0.25;
-        let v20: f32 = select(self.primed, self.memory[5], v3);
+        let v20: f32 = select(self.primed, self.memory[22], v3);
         let v21: f32 = v3 - v20;
         let v22: f32 = v21 * 0.13575524;
         let v23: f32 = v20 + v22;
         let v24: f32 = v23 * 0.05;
-        let v25: f32 = select(self.primed, self.memory[6], v1);
-        let v26: f32 = select(self.primed, self.memory[7], 0.0);
+        let v25: f32 = select(self.primed, self.memory[23], v1);
+        let v26: f32 = select(self.primed, self.memory[24], 0.0);
         let v27: f32 = v26 * 0.9756098;
         let v28: f32 = v1 - v25;
         let v29: f32 = v28 * 487.80487;
         let v30: f32 = v27 + v29;
         let v31: f32 = v30 * 0.001;
         let v32: f32 = line_sum(
-            self.memory[8],
-            self.memory.iter().skip(9).take(2),
+            self.memory[25],
+            self.memory.iter().skip(26).take(38),
             v1,
             self.primed,
         );
-        let v33: f32 = v32 * 0.25;
+        let v33: f32 = v32 * 0.025;
         let v34: f32 = v33 * 0.02;
-        let v35: f32 = select(self.primed, self.memory[11], 0.1);
+        let v35: f32 = select(self.primed, self.memory[64], 0.1);
         let v36: f32 = v5 * 0.00005;
         let v37: f32 = v35 + v36;
         let v38: f32 = clamp(v37, -0.5, 0.75);
-        let v39: f32 = select(self.primed, self.memory[12], v3);
+        let v39: f32 = select(self.primed, self.memory[65], v3);
         let v40: f32 = line_sum(
-            self.memory[13],
-            self.memory.iter().skip(14).take(0),
+            self.memory[66],
+            self.memory.iter().skip(67).take(0),
             v39,
             self.primed,
         );
         let v41: f32 = v40 * 0.5;
-        let v42: f32 = select(self.primed, self.memory[14], v41);
+        let v42: f32 = select(self.primed, self.memory[67], v41);
         let v43: f32 = v41 - v42;
         let v44: f32 = v43 * 20000.0;
-        let v45: f32 = select(self.primed, self.memory[15], v44);
+        let v45: f32 = select(self.primed, self.memory[68], v44);
         let v46: f32 = v44 - v45;
         let v47: f32 = v46 * 0.33333334;
         let v48: f32 = v45 + v47;
@@ -412,27 +430,27 @@ impl Controller {
     #[inline(always)]
     fn advance(&mut self, front: &Front, command: &Command) {
         let mut moved = front.push[0];
-        for word in self.memory.iter_mut().skip(0).take(3).rev() {
+        for word in self.memory.iter_mut().skip(0).take(20).rev() {
             let before = select(self.primed, *word, front.push[0]);
             *word = moved;
             moved = before;
         }
-        self.memory[3] = front.push[1];
-        self.memory[4] = front.push[2];
-        self.memory[5] = front.push[3];
-        self.memory[6] = front.push[4];
-        self.memory[7] = front.push[5];
+        self.memory[20] = front.push[1];
+        self.memory[21] = front.push[2];
+        self.memory[22] = front.push[3];
+        self.memory[23] = front.push[4];
+        self.memory[24] = front.push[5];
         let mut moved = front.push[6];
-        for word in self.memory.iter_mut().skip(8).take(3).rev() {
+        for word in self.memory.iter_mut().skip(25).take(39).rev() {
             let before = select(self.primed, *word, front.push[6]);
             *word = moved;
             moved = before;
         }
-        self.memory[11] = front.push[7];
-        self.memory[12] = front.push[8];
-        self.memory[13] = front.push[9];
-        self.memory[14] = front.push[10];
-        self.memory[15] = front.push[11];
+        self.memory[64] = front.push[7];
+        self.memory[65] = front.push[8];
+        self.memory[66] = front.push[9];
+        self.memory[67] = front.push[10];
+        self.memory[68] = front.push[11];
         self.held = front.signal;
         self.previous_duty = command.duty_sim;
         self.previous_command = command.duty;

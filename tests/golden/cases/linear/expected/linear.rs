@@ -155,9 +155,15 @@ static BIAS0: [[f32; 4]; 1] = [[-0.8106039, 0.867079, -0.79671407, -0.004069753]
 #[inline(always)]
 fn layer0(x: &[f32; 2]) -> [f32; 4] {
     let mut y = [0.0; 4];
-    for ((out, weights), bias) in y.chunks_exact_mut(4).zip(&WEIGHTS0).zip(&BIAS0) {
-        for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-            *y = sum;
+    let mut rest: &mut [f32] = &mut y;
+    for (weights, bias) in WEIGHTS0.iter().zip(&BIAS0) {
+        if let Some((out, after)) = core::mem::take(&mut rest)
+            .split_first_chunk_mut::<4>()
+        {
+            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+                *y = sum;
+            }
+            rest = after;
         }
     }
     y
@@ -185,7 +191,6 @@ struct Front {
     usable: u32,
     held: u32,
     primed_now: u32,
-    clipped: u32,
 }
 impl Controller {
     /// Start-up state.
@@ -269,7 +274,6 @@ impl Controller {
             usable,
             held: usable & (f0 ^ 1),
             primed_now: usable & (self.primed ^ 1),
-            clipped: 0,
         }
     }
     /// Network, argmax, mapping, limits, status.

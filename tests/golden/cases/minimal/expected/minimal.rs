@@ -157,9 +157,15 @@ static BIAS0: [[f32; 4]; 1] = [[-0.45500478, 0.623661, -0.20334516, 0.22363037]]
 #[inline(always)]
 fn layer0(x: &[f32; 2]) -> [f32; 4] {
     let mut y = [0.0; 4];
-    for ((out, weights), bias) in y.chunks_exact_mut(4).zip(&WEIGHTS0).zip(&BIAS0) {
-        for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-            *y = relu(sum);
+    let mut rest: &mut [f32] = &mut y;
+    for (weights, bias) in WEIGHTS0.iter().zip(&BIAS0) {
+        if let Some((out, after)) = core::mem::take(&mut rest)
+            .split_first_chunk_mut::<4>()
+        {
+            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+                *y = relu(sum);
+            }
+            rest = after;
         }
     }
     y
@@ -177,9 +183,15 @@ static BIAS1: [[f32; 3]; 1] = [[-0.31963298, -0.6781482, 0.023279844]];
 #[inline(always)]
 fn layer1(x: &[f32; 4]) -> [f32; 3] {
     let mut y = [0.0; 3];
-    for ((out, weights), bias) in y.chunks_exact_mut(3).zip(&WEIGHTS1).zip(&BIAS1) {
-        for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-            *y = sum;
+    let mut rest: &mut [f32] = &mut y;
+    for (weights, bias) in WEIGHTS1.iter().zip(&BIAS1) {
+        if let Some((out, after)) = core::mem::take(&mut rest)
+            .split_first_chunk_mut::<3>()
+        {
+            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+                *y = sum;
+            }
+            rest = after;
         }
     }
     y
@@ -202,12 +214,10 @@ pub struct Controller {
 struct Front {
     signal: [f32; SIGNALS],
     observation: [f32; FEATURES],
-    push: [f32; 0],
     bad_count: u32,
     usable: u32,
     held: u32,
     primed_now: u32,
-    clipped: u32,
 }
 impl Controller {
     /// Start-up state.
@@ -281,12 +291,10 @@ impl Controller {
         Front {
             signal: [v1, v3],
             observation: [v1, v3],
-            push: [],
             bad_count,
             usable,
             held: usable & (f4 ^ 1),
             primed_now: usable & (self.primed ^ 1),
-            clipped: 0,
         }
     }
     /// Network, argmax, mapping, limits, status.

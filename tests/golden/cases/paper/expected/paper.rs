@@ -163,9 +163,15 @@ static BIAS0: [[f32; 5]; 1] = [
 #[inline(always)]
 fn layer0(x: &[f32; 6]) -> [f32; 5] {
     let mut y = [0.0; 5];
-    for ((out, weights), bias) in y.chunks_exact_mut(5).zip(&WEIGHTS0).zip(&BIAS0) {
-        for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-            *y = relu(sum);
+    let mut rest: &mut [f32] = &mut y;
+    for (weights, bias) in WEIGHTS0.iter().zip(&BIAS0) {
+        if let Some((out, after)) = core::mem::take(&mut rest)
+            .split_first_chunk_mut::<5>()
+        {
+            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+                *y = relu(sum);
+            }
+            rest = after;
         }
     }
     y
@@ -184,9 +190,15 @@ static BIAS1: [[f32; 4]; 1] = [[0.4645241, 0.5204928, 0.23977381, -0.4841729]];
 #[inline(always)]
 fn layer1(x: &[f32; 5]) -> [f32; 4] {
     let mut y = [0.0; 4];
-    for ((out, weights), bias) in y.chunks_exact_mut(4).zip(&WEIGHTS1).zip(&BIAS1) {
-        for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-            *y = relu(sum);
+    let mut rest: &mut [f32] = &mut y;
+    for (weights, bias) in WEIGHTS1.iter().zip(&BIAS1) {
+        if let Some((out, after)) = core::mem::take(&mut rest)
+            .split_first_chunk_mut::<4>()
+        {
+            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+                *y = relu(sum);
+            }
+            rest = after;
         }
     }
     y
@@ -256,9 +268,15 @@ static BIAS2: [[f32; 9]; 1] = [
 #[inline(always)]
 fn layer2(x: &[f32; 4]) -> [f32; 9] {
     let mut y = [0.0; 9];
-    for ((out, weights), bias) in y.chunks_exact_mut(9).zip(&WEIGHTS2).zip(&BIAS2) {
-        for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-            *y = sum;
+    let mut rest: &mut [f32] = &mut y;
+    for (weights, bias) in WEIGHTS2.iter().zip(&BIAS2) {
+        if let Some((out, after)) = core::mem::take(&mut rest)
+            .split_first_chunk_mut::<9>()
+        {
+            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+                *y = sum;
+            }
+            rest = after;
         }
     }
     y

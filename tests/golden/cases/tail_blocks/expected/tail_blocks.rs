@@ -325,12 +325,18 @@ static TAIL_BIAS0: [f32; 1] = [0.5866333];
 #[inline(always)]
 fn layer0(x: &[f32; 3]) -> [f32; 33] {
     let mut y = [0.0; 33];
-    for ((out, weights), bias) in y.chunks_exact_mut(16).zip(&WEIGHTS0).zip(&BIAS0) {
-        for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-            *y = relu(sum);
+    let mut rest: &mut [f32] = &mut y;
+    for (weights, bias) in WEIGHTS0.iter().zip(&BIAS0) {
+        if let Some((out, after)) = core::mem::take(&mut rest)
+            .split_first_chunk_mut::<16>()
+        {
+            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+                *y = relu(sum);
+            }
+            rest = after;
         }
     }
-    for (y, sum) in y.iter_mut().skip(32).zip(block(&TAIL_WEIGHTS0, &TAIL_BIAS0, x)) {
+    for (y, sum) in rest.iter_mut().zip(block(&TAIL_WEIGHTS0, &TAIL_BIAS0, x)) {
         *y = relu(sum);
     }
     y
@@ -993,12 +999,18 @@ static TAIL_BIAS1: [f32; 4] = [0.12983459, -0.1913912, 0.22282268, 0.24120817];
 #[inline(always)]
 fn layer1(x: &[f32; 33]) -> [f32; 20] {
     let mut y = [0.0; 20];
-    for ((out, weights), bias) in y.chunks_exact_mut(16).zip(&WEIGHTS1).zip(&BIAS1) {
-        for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-            *y = sum;
+    let mut rest: &mut [f32] = &mut y;
+    for (weights, bias) in WEIGHTS1.iter().zip(&BIAS1) {
+        if let Some((out, after)) = core::mem::take(&mut rest)
+            .split_first_chunk_mut::<16>()
+        {
+            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+                *y = sum;
+            }
+            rest = after;
         }
     }
-    for (y, sum) in y.iter_mut().skip(16).zip(block(&TAIL_WEIGHTS1, &TAIL_BIAS1, x)) {
+    for (y, sum) in rest.iter_mut().zip(block(&TAIL_WEIGHTS1, &TAIL_BIAS1, x)) {
         *y = sum;
     }
     y

@@ -1,0 +1,1 @@
+policy_macro::include_policy!(f32 = "policy/policy.toml");

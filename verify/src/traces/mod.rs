@@ -75,6 +75,9 @@ const STEPS_PER_PLATEAU: usize = 60;
 /// Longest part of a segment given to one burst cycle.
 const MAX_SEGMENT: usize = 20_000;
 
+/// Longest first segment.
+const FIRST_SEGMENT: usize = 200;
+
 /// Endless source of events for one policy.
 #[derive(Debug, Clone)]
 pub struct Stream<'a> {
@@ -111,8 +114,9 @@ impl<'a> Stream<'a> {
                 .map(|index| Edges::new(policy, index))
                 .collect(),
             rng,
-            segment: Segment::ClosedLoop,
-            left: 300,
+            // hold and fallback first, so that short runs see them too
+            segment: Segment::Bursts,
+            left: (4 * (policy.fallback.hold as usize).saturating_add(4)).min(FIRST_SEGMENT),
             bad_left: 0,
             good_left: 0,
             plateau: Vec::new(),

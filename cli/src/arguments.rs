@@ -84,7 +84,7 @@ pub struct Verify {
     /// policy.toml or the folder that holds it
     pub policy: PathBuf,
     /// Control steps to compare per build
-    #[arg(long, default_value_t = 20_000)]
+    #[arg(long, default_value_t = 20_000, value_parser = clap::value_parser!(u64).range(1..))]
     pub steps: u64,
     /// Seed of the generated measurements
     #[arg(long, default_value_t = 1)]
@@ -92,7 +92,8 @@ pub struct Verify {
     /// Verify the generated code in this folder, and that it is what the policy yields today
     #[arg(long, value_name = "DIR")]
     pub generated: Option<PathBuf>,
-    /// Recorded measurements to replay first: CSV with one column per signal
+    /// Recorded measurements to replay first: CSV with one column per signal, in the signal's unit (ADC signals take
+    /// the nearest code)
     #[arg(long, value_name = "CSV")]
     pub trace: Vec<PathBuf>,
     /// Machine-readable
@@ -106,6 +107,6 @@ pub struct Demo {
     #[arg(long, value_name = "DIR", default_value = "policyc-demo")]
     pub out: PathBuf,
     /// Control steps to compare per build
-    #[arg(long, default_value_t = 20_000)]
+    #[arg(long, default_value_t = 20_000, value_parser = clap::value_parser!(u64).range(1..))]
     pub steps: u64,
 }

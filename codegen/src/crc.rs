@@ -25,11 +25,17 @@ pub const fn nibble_table() -> [u32; 16] {
 /// CRC-32 of words serialised little-endian, independent of the machine's byte order.
 #[must_use]
 pub fn crc32_words(words: impl IntoIterator<Item = u32>) -> u32 {
+    crc32_bytes(words.into_iter().flat_map(u32::to_le_bytes))
+}
+
+/// CRC-32 of bytes, as zlib's `crc32`.
+#[must_use]
+pub fn crc32_bytes(bytes: impl IntoIterator<Item = u8>) -> u32 {
     let table = nibble_table();
     let mut crc = u32::MAX;
-    for word in words {
-        crc ^= word;
-        for _ in 0..8 {
+    for byte in bytes {
+        crc ^= u32::from(byte);
+        for _ in 0..2 {
             crc = (crc >> 4) ^ table[(crc & 15) as usize];
         }
     }
@@ -38,11 +44,24 @@ pub fn crc32_words(words: impl IntoIterator<Item = u32>) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    use super::crc32_words;
+    use super::{crc32_bytes, crc32_words};
 
     #[test]
     fn check_value_of_the_catalogue_is_met() {
-        // "123456789" has CRC-32 0xCBF43926; padded to words it is the CRC of "12345678" here
+        assert_eq!(crc32_bytes(*b"123456789"), 0xCBF4_3926);
+    }
+
+    /// Values of zlib's `crc32`.
+    #[test]
+    fn every_length_is_counted_as_it_is() {
+        assert_eq!(crc32_bytes(*b"1"), 0x83DC_EFB7);
+        assert_eq!(crc32_bytes(*b"12"), 0x4F53_44CD);
+        assert_eq!(crc32_bytes(*b"123"), 0x8848_63D2);
+        assert_eq!(crc32_bytes(*b""), 0);
+    }
+
+    #[test]
+    fn words_count_as_their_little_endian_bytes() {
         let words = [u32::from_le_bytes(*b"1234"), u32::from_le_bytes(*b"5678")];
         assert_eq!(crc32_words(words), 0x9AE0_DAAF);
     }

@@ -6,7 +6,7 @@ use policy::{Digests, Policy};
 use serde::Serialize;
 use targets::TargetSpec;
 
-use crate::crc::crc32_words;
+use crate::crc::crc32_bytes;
 use crate::{GeneratedFiles, Language, TOOL};
 
 /// File name of the manifest in the output folder.
@@ -33,7 +33,7 @@ pub struct Manifest {
     pub flags: BTreeMap<&'static str, Vec<&'static str>>,
     /// Sizes of the controller.
     pub sizes: Sizes,
-    /// Generated files with their CRC-32 (padded to words with zeros) and length.
+    /// Generated files with their CRC-32 and length.
     pub files: BTreeMap<String, FileEntry>,
 }
 
@@ -106,13 +106,8 @@ pub fn manifest(policy: &Policy, target: &TargetSpec, languages: &[Language], fi
 }
 
 fn entry(text: &str) -> FileEntry {
-    let words = text.as_bytes().chunks(4).map(|chunk| {
-        let mut word = [0; 4];
-        word[..chunk.len()].copy_from_slice(chunk);
-        u32::from_le_bytes(word)
-    });
     FileEntry {
         bytes: text.len(),
-        crc32: format!("{:08x}", crc32_words(words)),
+        crc32: format!("{:08x}", crc32_bytes(text.bytes())),
     }
 }

@@ -53,7 +53,9 @@ fn pairs_give_duties_pair_by_pair() {
 
 #[test]
 fn limits_slew_and_soft_start_must_work_in_f32() {
-    contract_fault("initial_duty = 0.5", "slew = ¦0.0", &["`slew`", "more than 0"]);
+    contract_fault("initial_duty = 0.5", "slew = ¦0.0", &["`slew`", "1.2e-7"]);
+    // a smaller step is lost in the rounding of a duty near 1
+    contract_fault("initial_duty = 0.5", "slew = ¦1e-9", &["`slew`", "would not move"]);
     contract_fault("initial_duty = 0.5", "slew = ¦1e-50", &["`slew`"]);
     contract_fault(
         "initial_duty = 0.5",

@@ -134,6 +134,34 @@ fn a_second_network_that_does_not_fit_is_left_unused() {
 }
 
 #[test]
+fn numbered_layers_come_before_the_head_where_shapes_allow_a_rotation() {
+    // without a contract, as many outputs as inputs would let the head stand first as well
+    let tensors = all(&[("fc1", 8, 4), ("fc2", 8, 8), ("out", 4, 8)]);
+    let folder = Folder::new().tensors(&tensors);
+    let weights = folder.path().join("weights.safetensors");
+    let text = policy::new_contract(&weights).unwrap();
+    assert!(text.contains("first to last: fc1 > fc2 > out"), "{text}");
+}
+
+#[test]
+fn a_tensor_of_no_dense_layer_is_refused_unless_the_layers_are_named() {
+    let mut tensors = three(["fc1", "fc2", "fc3"]);
+    tensors.push(tensor("ln.weight", &[4]));
+    let folder = Folder::new().tensors(&tensors);
+    assert_tensor(
+        &folder.fault(),
+        "weights.safetensors",
+        "ln.weight",
+        &["no dense layer", "[4]", "layers = "],
+    );
+    let named = folder.replace(
+        "hidden_activation",
+        "layers = [\"fc1\", \"fc2\", \"fc3\"]\nhidden_activation",
+    );
+    assert!(named.policy().notes.join("\n").contains("left unused: ln.weight"));
+}
+
+#[test]
 fn several_fitting_chains_ask_for_a_prefix() {
     let tensors = [three(["a.0", "a.2", "a.4"]), three(["b.0", "b.2", "b.4"])].concat();
     let folder = Folder::new().tensors(&tensors);

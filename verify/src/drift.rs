@@ -91,6 +91,24 @@ fn changed(path: &str, expected: &str, found: &str) -> Changed {
     }
 }
 
+/// Largest text file that is read.
+const MAX_TEXT_BYTES: u64 = 256 << 20;
+
+/// Text of a regular file; bytes that are no UTF-8 become replacement characters.
+///
+/// # Errors
+/// As `std::fs::read`, and for pipes, devices and files of more than 256 MiB, which would block or fill the memory.
+pub fn read_text(path: &Path) -> std::io::Result<String> {
+    let data = std::fs::metadata(path)?;
+    if !data.is_file() {
+        return Err(std::io::Error::other("is not a regular file"));
+    }
+    if data.len() > MAX_TEXT_BYTES {
+        return Err(std::io::Error::other("is larger than 256 MiB"));
+    }
+    Ok(String::from_utf8_lossy(&std::fs::read(path)?).into_owned())
+}
+
 /// The expected files that exist, and files beside them that look generated for a policy of this name.
 fn read(expected: &Files, name: &str, folder: &Path) -> Result<Files, VerifyError> {
     let mut paths: BTreeSet<String> = expected.keys().cloned().collect();
@@ -114,8 +132,8 @@ fn read(expected: &Files, name: &str, folder: &Path) -> Result<Files, VerifyErro
     let mut files = Files::new();
     for path in paths {
         let place = folder.join(&path);
-        match std::fs::read(&place) {
-            Ok(bytes) => drop(files.insert(path, String::from_utf8_lossy(&bytes).into_owned())),
+        match read_text(&place) {
+            Ok(text) => drop(files.insert(path, text)),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
             Err(error) => return Err(VerifyError::Io(place, error)),
         }

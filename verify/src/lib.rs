@@ -29,6 +29,6 @@ mod session;
 pub mod toolchain;
 pub mod traces;
 
-pub use drift::drift;
+pub use drift::{drift, read_text};
 pub use report::{BuildReport, Difference, GoldenResult, Outcome, Report};
-pub use session::{Files, Options, Progress, VerifyError, run};
+pub use session::{Files, Options, Progress, VerifyError, golden_result, run};

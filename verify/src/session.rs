@@ -19,7 +19,7 @@ use crate::golden;
 use crate::lane::Lane;
 use crate::oracle::{Chunk, Oracle};
 use crate::protocol::Layout;
-use crate::report::{BuildReport, Outcome, Report};
+use crate::report::{BuildReport, GoldenResult, Outcome, Report};
 use crate::runner::ProcessRunner;
 use crate::toolchain::{self, Build, BuildError, Sources};
 use crate::traces::{Recorded, Stream};
@@ -160,13 +160,7 @@ pub fn run(policy: &Policy, options: Options<'_>) -> Result<Report, VerifyError>
 
     let mut oracle = Oracle::new(policy);
     let layout = oracle.layout().clone();
-    let known = oracle
-        .chunk_of(golden::events(policy))
-        .map_err(VerifyError::Interpreter)?;
-    let golden = policy
-        .golden
-        .as_ref()
-        .map(|golden| golden::judge(golden, policy.actions.len(), &known.expected));
+    let (known, golden) = known_answers(policy, &mut oracle)?;
     let mut stream = Stream::new(policy, seed, &recorded);
     let lanes = Lanes {
         policy,
@@ -250,6 +244,23 @@ impl Lanes<'_> {
             Ok(reports.collect())
         })
     }
+}
+
+/// The trainer's known answers against the interpreter alone; `None` if the policy has none.
+///
+/// # Errors
+/// If the interpreter refuses an observation, which the check of a policy rules out.
+pub fn golden_result(policy: &Policy) -> Result<Option<GoldenResult>, VerifyError> {
+    known_answers(policy, &mut Oracle::new(policy)).map(|(_, result)| result)
+}
+
+fn known_answers(policy: &Policy, oracle: &mut Oracle) -> Result<(Chunk, Option<GoldenResult>), VerifyError> {
+    let known = oracle
+        .chunk_of(golden::events(policy))
+        .map_err(VerifyError::Interpreter)?;
+    let judge = |golden| golden::judge(golden, policy.actions.len(), &known.expected);
+    let result = policy.golden.as_ref().map(judge);
+    Ok((known, result))
 }
 
 /// The policy's files for `target` in each of `languages`.

@@ -6,6 +6,7 @@ use codegen::{GeneratedFiles, Language, manifest};
 use policy::Policy;
 use targets::TargetSpec;
 
+use super::verify::golden_text;
 use super::{bytes, grouped};
 use crate::arguments::Compile;
 use crate::{Failure, Outcome, output};
@@ -14,6 +15,13 @@ use crate::{Failure, Outcome, output};
 pub fn run(options: &Compile) -> Result<Outcome, Failure> {
     let target = super::target(&options.target)?;
     let policy = super::load(&options.policy)?;
+    if let Some(golden) = verify::golden_result(&policy)?.filter(|golden| !golden.passed()) {
+        return Err(Failure(format!(
+            "the network does not give the trainer's golden answers; nothing was written\n   = found: {}\n   \
+             = hint: look at hidden_activation, the order of layers and features, transpose; `policyc verify` compares them too",
+            golden_text(&golden)
+        )));
+    }
     let mut languages: Vec<Language> = options.lang.iter().map(|lang| (*lang).into()).collect();
     languages.sort();
     languages.dedup();

@@ -203,8 +203,11 @@ fn network(out: &mut String, policy: &Policy) -> Result<(), Failure> {
             layer.name
         )?;
     }
-    match &policy.golden {
-        Some(golden) => writeln!(out, "  {} golden vectors from the trainer", golden.count)?,
+    match verify::golden_result(policy)? {
+        Some(golden) => {
+            let text = super::verify::golden_text(&golden);
+            writeln!(out, "  {} golden vectors from the trainer: {text}", golden.vectors)?;
+        }
         None => writeln!(
             out,
             "  no golden vectors: nothing shows that the weights were read as the trainer meant"

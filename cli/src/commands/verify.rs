@@ -17,6 +17,8 @@ use crate::{Failure, Outcome, output};
 
 mod show;
 
+pub use show::golden_text;
+
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Answer {
@@ -65,7 +67,10 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
 
 fn recording(policy: &Policy, path: &Path) -> Result<Recorded, Failure> {
     let place = |error: &dyn std::fmt::Display| Failure(format!("{}: {error}", path.display()));
-    let text = std::fs::read_to_string(path).map_err(|error| place(&error))?;
+    let text = verify::read_text(path).map_err(|error| place(&error))?;
+    if text.contains(char::REPLACEMENT_CHARACTER) {
+        return Err(place(&"is not UTF-8 text"));
+    }
     Recorded::from_csv(policy, &text).map_err(|error| place(&error))
 }
 
@@ -84,7 +89,7 @@ fn checked_in(policy: &Policy, folder: &Path) -> Result<(Files, Drift), Failure>
         "make the folder with `policyc compile POLICY --out {}`",
         folder.display()
     );
-    let text = std::fs::read_to_string(&path).map_err(|error| {
+    let text = verify::read_text(&path).map_err(|error| {
         Failure(format!(
             "{shown}: {error}\n   = expected: the manifest that compile wrote\n   = hint: {hint}"
         ))
@@ -110,8 +115,8 @@ fn checked_in(policy: &Policy, folder: &Path) -> Result<(Files, Drift), Failure>
     let mut files = Files::new();
     for name in codegen::generate(policy, target, &languages)?.files.into_keys() {
         // a missing file is already part of the drift
-        if let Ok(bytes) = std::fs::read(folder.join(&name)) {
-            files.insert(name, String::from_utf8_lossy(&bytes).into_owned());
+        if let Ok(text) = verify::read_text(&folder.join(&name)) {
+            files.insert(name, text);
         }
     }
     Ok((files, drift))

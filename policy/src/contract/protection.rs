@@ -5,7 +5,6 @@ use crate::catalogue;
 use crate::faults::Fault;
 use crate::limits::{MAX_HOLD, MAX_SOFT_START_STEPS, MIN_SOFT_START_INCREMENT};
 use crate::model::{Fallback, Interval, Limits, SoftStart};
-use crate::rounding::down_f32;
 use crate::toml_reader::{Section, Value};
 
 pub(crate) fn fallback(root: &mut Section<'_>, faults: &mut Vec<Fault>) -> Option<Fallback> {
@@ -53,10 +52,10 @@ pub(crate) fn limits(root: &mut Section<'_>, fallback: Option<Fallback>, faults:
 
 fn slew(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<f64> {
     let number = value.number(faults)?.value;
-    if number > 0.0 && number <= 1.0 && down_f32(number) > 0.0 {
+    if (MIN_SOFT_START_INCREMENT..=1.0).contains(&number) {
         return Some(number);
     }
-    let expected = "more than 0 (in f32), at most 1: the largest change of duty per sample period";
+    let expected = "1.2e-7 (below, f32 duties would not move) to 1: the largest change of duty per sample period";
     faults.push(value.fault(catalogue::out_of_range("slew", &number.to_string(), expected)));
     None
 }

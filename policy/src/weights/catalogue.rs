@@ -115,6 +115,13 @@ pub(crate) fn several_chains(chains: &str) -> Message {
         .hint("choose one in [network]: `prefix = \"...\"`, or list the layers: `layers = [\"...\", \"...\"]`")
 }
 
+pub(crate) fn no_dense_layer(shape: &[usize]) -> Message {
+    Message::new("this tensor belongs to no dense layer: left out, the network would compute something else")
+        .found(format!("shape {shape:?}"))
+        .expected("weights and biases of dense layers only")
+        .hint("fold it into the layers before exporting; if it is not part of the network, name the layers: layers = [...]")
+}
+
 pub(crate) fn no_layers() -> Message {
     Message::new("the file holds no dense layer")
         .expected("tensors named <layer>.weight [out, in] and <layer>.bias [out] (or kernel [in, out])")

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::layers::{Dense, Place, ancestors, is_target};
-use crate::limits::MAX_LAYERS;
+use crate::limits::{MAX_LAYERS, MIN_ACTIONS};
 
 /// Sizes the chain must have; `None` fits anything.
 #[derive(Debug, Clone, Copy)]
@@ -11,6 +11,9 @@ pub(crate) struct Ends {
     pub inputs: Option<usize>,
     pub outputs: Option<usize>,
 }
+
+/// Orders looked at before a group counts as undecided.
+const MOST_ORDERS: usize = 16;
 
 /// Indices of layers, first to last.
 pub(crate) type Chain = Vec<usize>;
@@ -31,7 +34,9 @@ fn chains_of(layers: &[Dense], members: &[usize], ends: Ends) -> Vec<Chain> {
     let mut chains: Vec<Chain> = Vec::new();
     for group in groups(layers, members) {
         for chain in orders(layers, &group, ends) {
-            if !chains.contains(&chain) {
+            // a single output leaves nothing to choose: a value net beside the policy
+            let chooses = chain.last().is_some_and(|&last| layers[last].outputs >= MIN_ACTIONS);
+            if chooses && !chains.contains(&chain) {
                 chains.push(chain);
             }
         }
@@ -79,7 +84,18 @@ pub(crate) fn orders(layers: &[Dense], group: &[usize], ends: Ends) -> Vec<Chain
         found: Vec::new(),
     };
     search.extend(ends.inputs);
-    search.found
+    let natural = |chain: &&Chain| numbered_first(layers, chain);
+    match search.found.iter().filter(natural).collect::<Vec<_>>().as_slice() {
+        [only] => vec![(*only).clone()],
+        _ => search.found,
+    }
+}
+
+/// Whether the order is the one that the names suggest: `fc1`, `fc2`, then `out`.
+fn numbered_first(layers: &[Dense], chain: &Chain) -> bool {
+    let numbered = chain.iter().map(|&i| Place::of(&layers[i].stem).number.is_some());
+    let numbered: Vec<bool> = numbered.collect();
+    numbered.iter().any(|&n| n) && numbered.is_sorted_by(|a, b| a >= b)
 }
 
 /// Whether widths match up as in a path: each is left as often as it is entered, the ends apart. Without this the
@@ -119,7 +135,12 @@ impl Search<'_> {
             let layer = &self.layers[next];
             let joins = inputs.is_none_or(|n| n == layer.inputs);
             let ends = !last || self.ends.outputs.is_none_or(|n| n == layer.outputs);
-            if self.found.len() < 2 && joins && ends && !self.path.contains(&next) && self.is_next_sibling(next) {
+            if self.found.len() < MOST_ORDERS
+                && joins
+                && ends
+                && !self.path.contains(&next)
+                && self.is_next_sibling(next)
+            {
                 self.path.push(next);
                 self.extend(Some(layer.outputs));
                 self.path.pop();

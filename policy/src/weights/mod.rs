@@ -59,6 +59,9 @@ pub(crate) fn read(
         .iter()
         .map(|&index| layer(file, &tensors, &grouped.dense[index], network.bias, faults))
         .collect();
+    if network.layers.is_none() {
+        faults.extend(strangers(file, &tensors, &grouped, network));
+    }
     let layers: Option<Vec<Layer>> = layers.into_iter().collect();
     let (mut layers, activations) = (layers?, activations?);
     for (layer, activation) in layers.iter_mut().zip(activations) {
@@ -242,6 +245,30 @@ fn layer(file: &Binary, tensors: &Tensors, dense: &Dense, bias: bool, faults: &m
         activation: Activation::Identity,
         bounds: Vec::new(),
     })
+}
+
+/// Tensors of the network's folder that belong to no dense layer, such as a norm layer's: without them the network
+/// computes something else.
+fn strangers(file: &Binary, tensors: &Tensors, layers: &Layers, network: &Network<'_>) -> Vec<Fault> {
+    let known = |index: usize| {
+        layers
+            .dense
+            .iter()
+            .any(|layer| layer.weight == index || layer.bias == Some(index))
+    };
+    let prefix = network.prefix.as_ref().map(|prefix| prefix.value.as_str());
+    let part = |name: &str| prefix.is_none_or(|prefix| layers::is_under(name, prefix)) && !layers::is_target(name);
+    let strange = tensors
+        .list
+        .iter()
+        .enumerate()
+        .filter(|(index, tensor)| !known(*index) && part(&tensor.name));
+    strange
+        .map(|(_, tensor)| {
+            file.name
+                .tensor_fault(&tensor.name, catalogue::no_dense_layer(&tensor.shape))
+        })
+        .collect()
 }
 
 /// `[inputs][outputs]` to `[outputs][inputs]`.

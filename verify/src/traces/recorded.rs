@@ -49,7 +49,12 @@ pub enum RecordedError {
 impl fmt::Display for RecordedError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::MissingColumn { signal } => write!(f, "no column for the signal `{signal}`"),
+            Self::MissingColumn { signal } => {
+                write!(
+                    f,
+                    "no column for the signal `{signal}`; columns are separated by commas and named as the signals"
+                )
+            }
             Self::DuplicateColumn { name } => write!(f, "two columns are called `{name}`"),
             Self::Cell { line, signal, found } => {
                 write!(f, "line {line}, column `{signal}`: expected a number, found `{found}`")

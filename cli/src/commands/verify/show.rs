@@ -55,7 +55,7 @@ pub fn report(report: &Report, drift: Option<&Drift>, equal: bool) -> Result<Str
     Ok(out)
 }
 
-fn golden_text(golden: &GoldenResult) -> String {
+pub fn golden_text(golden: &GoldenResult) -> String {
     let mut parts = Vec::new();
     if golden.actions_compared > 0 {
         parts.push(format!(
@@ -130,6 +130,14 @@ fn write_drift(out: &mut String, drift: &Drift) -> Result<(), Failure> {
     for change in &drift.changed {
         let text = |line: &Option<String>| line.clone().unwrap_or_else(|| "(end of file)".to_owned());
         writeln!(out, "  {}:{}", change.path, change.line)?;
+        let ends = |line: &Option<String>| line.as_deref().unwrap_or_default().trim_end().to_owned();
+        if change.found.is_some() && ends(&change.expected) == ends(&change.found) {
+            writeln!(
+                out,
+                "    differs in the white space or line ending at its end (LF is expected)"
+            )?;
+            continue;
+        }
         writeln!(
             out,
             "    today {}\n    found {}",

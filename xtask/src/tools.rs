@@ -36,6 +36,7 @@ const TOOLS: &[Tool] = &[
     tool("g++", &["g++", "--version"], Apt("g++")),
     tool("clang", &["clang", "--version"], Apt("clang")),
     tool("callgrind", CALLGRIND, Apt("valgrind")),
+    tool("ngspice", &["ngspice", "--version"], Apt("ngspice")),
 ];
 
 /// Sees to it that every tool is there; installs what is missing as root on Debian.

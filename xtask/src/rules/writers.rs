@@ -5,7 +5,7 @@ use std::path::Path;
 use super::source;
 
 /// `verify` compiles in temporary folders; `xtask`, `tests` and `bench` are the test side.
-const MAY_WRITE: &[&str] = &["cli", "verify", "xtask", "tests", "bench"];
+const MAY_WRITE: &[&str] = &["cli", "verify", "train", "xtask", "tests", "bench"];
 
 const WRITES: &[&str] = &[
     "fs::write",

@@ -1,0 +1,70 @@
+//! Control steps per second on one core: `cargo run --release -p plant --example speed`.
+
+use std::time::Instant;
+
+use plant::{Batch, Faults, Load, Parameters, Plant};
+
+fn main() -> Result<(), Faults> {
+    let sb3 = Parameters::from_toml(
+        "sb3-buck12.toml".as_ref(),
+        include_str!("../../examples/plants/sb3-buck12.toml"),
+    )?;
+    let mut esr = Parameters::paper_model();
+    esr.capacitor.esr = 0.03;
+    let mut cable = esr.clone();
+    (cable.cable.inductance, cable.cable.capacitance) = (1e-6, 10e-6);
+    single("ideal, 1.5 mF", &Parameters::paper_model(), 200.0)?;
+    single("ideal, 150 uF", &Parameters::paper_table(), 200.0)?;
+    single("sb3-buck12 (losses)", &sb3, 200.0)?;
+    single("ideal, 1.5 mF, DCM", &Parameters::paper_model(), 20.0)?;
+    single("with ESR", &esr, 200.0)?;
+    single("with ESR and cable", &cable, 200.0)?;
+    side_by_side("side by side, ideal", &Parameters::paper_model())?;
+    side_by_side("side by side, sb3-buck12", &sb3)
+}
+
+/// Fastest of many short runs, so that other programs on the machine do not count.
+fn fastest(mut run: impl FnMut() -> u32) -> f64 {
+    let rate = |_| {
+        let start = Instant::now();
+        f64::from(run()) / start.elapsed().as_secs_f64()
+    };
+    (0..100).map(rate).fold(0.0, f64::max)
+}
+
+fn single(name: &str, parameters: &Parameters, power: f64) -> Result<(), Faults> {
+    let mut plant = Plant::new(parameters)?;
+    let load = Load::power(power);
+    let duty = plant.settle(100.0, &load).duty;
+    let rate = fastest(|| {
+        const STEPS: u32 = 10_000;
+        for n in 0..STEPS {
+            if n % 100 == 0 {
+                plant.reset_at(100.0, 0.5, &load);
+            }
+            std::hint::black_box(plant.step(duty, &load));
+        }
+        STEPS
+    });
+    println!("{name:28} {:8.2} M steps/s", rate * 1e-6);
+    Ok(())
+}
+
+fn side_by_side(name: &str, parameters: &Parameters) -> Result<(), Faults> {
+    const COUNT: usize = 32;
+    let mut batch = Batch::new(&vec![parameters.clone(); COUNT])?;
+    let (duties, loads) = (vec![0.5; COUNT], vec![Load::power(200.0); COUNT]);
+    let rate = fastest(|| {
+        const STEPS: u32 = 2_000;
+        for n in 0..STEPS {
+            if n % 100 == 0 {
+                (0..COUNT).for_each(|index| batch.reset_at(index, 100.0, 1.0));
+            }
+            batch.step(&duties, &loads);
+            std::hint::black_box(batch.v_out());
+        }
+        STEPS * COUNT as u32
+    });
+    println!("{name:28} {:8.2} M steps/s", rate * 1e-6);
+    Ok(())
+}

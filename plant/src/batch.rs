@@ -1,0 +1,263 @@
+//! Many plain converters side by side: structure of arrays, so that the compiler works on several at once.
+
+use std::ops::{Add, Mul, Neg, Sub};
+
+use crate::effects::{duty_quantisation, load_setting, minimum_on_time};
+use crate::faults::{Fault, Faults};
+use crate::parameters::{LoadBox, Parameters, Pwm};
+use crate::plain::{LARGEST_CHANGE, LONGEST_STEP, Number, ORDER, TERM_BEFORE, series, sum};
+use crate::plant::Plant;
+use crate::signals::Load;
+
+/// Converters computed together in the lanes of the vector unit.
+const LANES: usize = 8;
+
+/// Converters without any effect that needs more than two states: what [`Plant::step`] computes, to the bit, without
+/// extremes and sensors. They may differ in every number, not in the rectifier.
+#[derive(Debug, Clone)]
+pub struct Batch {
+    plants: Vec<Plant>,
+    groups: Vec<Group>,
+    i_l: Vec<f64>,
+    v_out: Vec<f64>,
+}
+
+impl Batch {
+    /// One converter for each element of `parameters`, at rest.
+    ///
+    /// # Errors
+    /// Faults of the parameters; a converter that a batch cannot hold.
+    pub fn new(parameters: &[Parameters]) -> Result<Self, Faults> {
+        let plants = parameters.iter().map(Plant::new).collect::<Result<Vec<_>, _>>()?;
+        for (index, plant) in plants.iter().enumerate() {
+            if !plant.is_fast || plant.parameters().pwm.duty_delay > 0 {
+                let fault = Fault::new(format!("converter {index} does not fit into a batch"))
+                    .expected(
+                        "resistances, diode voltage, load and duty quantisation only; trailing carrier, sampled at 0",
+                    )
+                    .hint("step it as a `Plant`");
+                return Err(Faults(vec![fault]));
+            }
+        }
+        let count = plants.len();
+        let groups = plants.chunks_exact(LANES).map(Group::new).collect();
+        Ok(Batch {
+            plants,
+            groups,
+            i_l: vec![0.0; count],
+            v_out: vec![0.0; count],
+        })
+    }
+
+    /// Number of converters.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.plants.len()
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.plants.is_empty()
+    }
+
+    /// Output voltages at the sampling instant, V.
+    #[must_use]
+    pub fn v_out(&self) -> &[f64] {
+        &self.v_out
+    }
+
+    /// Inductor currents at the sampling instant, A.
+    #[must_use]
+    pub fn i_l(&self) -> &[f64] {
+        &self.i_l
+    }
+
+    /// Puts one converter to `v_out` V and `i_l` A.
+    pub fn reset_at(&mut self, index: usize, v_out: f64, i_l: f64) {
+        (self.v_out[index], self.i_l[index]) = (v_out, i_l);
+    }
+
+    /// One control period of every converter; `duties` and `loads` have one element each.
+    pub fn step(&mut self, duties: &[f64], loads: &[Load]) {
+        let whole = self.len() - self.len() % LANES;
+        for first in (0..whole).step_by(LANES) {
+            self.step_lanes(first, duties, loads);
+        }
+        for index in whole..self.len() {
+            self.step_one(index, duties[index], &loads[index]);
+        }
+    }
+
+    fn step_one(&mut self, index: usize, duty: f64, load: &Load) {
+        let plant = &mut self.plants[index];
+        (plant.state.x[0], plant.state.x[1]) = (self.i_l[index], self.v_out[index]);
+        let sample = plant.step(duty, load);
+        (self.i_l[index], self.v_out[index]) = (sample.i_l, sample.v_out);
+    }
+
+    fn step_lanes(&mut self, first: usize, duties: &[f64], loads: &[Load]) {
+        let (duties, loads) = (&duties[first..first + LANES], &loads[first..first + LANES]);
+        let group = &self.groups[first / LANES];
+        let mut lanes = Lanes::new(group, duties, loads);
+        lanes.i.0.copy_from_slice(&self.i_l[first..first + LANES]);
+        lanes.v.0.copy_from_slice(&self.v_out[first..first + LANES]);
+        let off = group.t_sw - lanes.on;
+        lanes.segment(group, lanes.on, [group.emf_on, group.r_on], Lane([0.0; LANES]));
+        lanes.segment(group, off, [group.emf_off, group.r_off], group.diode);
+        for n in 0..LANES {
+            if lanes.regular[n] {
+                (self.i_l[first + n], self.v_out[first + n]) = (lanes.i.0[n], lanes.v.0[n]);
+            } else {
+                self.step_one(first + n, duties[n], &loads[n]);
+            }
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Lane([f64; LANES]);
+
+impl Number for Lane {
+    #[inline(always)]
+    fn of(value: f64) -> Self {
+        Lane([value; LANES])
+    }
+}
+
+macro_rules! lane_by_lane {
+    ($operation:ident, $function:ident, $symbol:tt) => {
+        impl $operation for Lane {
+            type Output = Lane;
+            #[inline(always)]
+            fn $function(mut self, other: Lane) -> Lane {
+                for n in 0..LANES {
+                    self.0[n] $symbol other.0[n];
+                }
+                self
+            }
+        }
+    };
+}
+lane_by_lane!(Add, add, +=);
+lane_by_lane!(Sub, sub, -=);
+lane_by_lane!(Mul, mul, *=);
+
+impl Neg for Lane {
+    type Output = Lane;
+    #[inline(always)]
+    fn neg(self) -> Lane {
+        Lane(self.0.map(|x| -x))
+    }
+}
+
+/// The constants of `LANES` converters.
+#[derive(Debug, Clone)]
+struct Group {
+    t_sw: Lane,
+    inv_l: Lane,
+    inv_c: Lane,
+    longest: Lane,
+    last_term: Lane,
+    v_fold: Lane,
+    emf_on: Lane,
+    r_on: Lane,
+    emf_off: Lane,
+    r_off: Lane,
+    /// 1 where a diode ends the current.
+    diode: Lane,
+    load: [LoadBox; LANES],
+    pwm: [Pwm; LANES],
+}
+
+impl Group {
+    fn new(plants: &[Plant]) -> Self {
+        let lane = |of: &dyn Fn(&Plant) -> f64| Lane(std::array::from_fn(|n| of(&plants[n])));
+        let off = |p: &Plant| {
+            if p.legs.synchronous {
+                p.legs.lower
+            } else {
+                p.legs.lower_diode
+            }
+        };
+        Group {
+            t_sw: lane(&|p| p.t_sw),
+            inv_l: lane(&|p| p.plain.inv_l),
+            inv_c: lane(&|p| p.plain.inv_c),
+            longest: lane(&|p| p.plain.longest),
+            last_term: lane(&|p| p.plain.last_term),
+            v_fold: lane(&|p| p.plain.v_fold),
+            emf_on: lane(&|p| p.legs.upper.emf),
+            r_on: lane(&|p| p.legs.upper.r),
+            emf_off: lane(&|p| off(p).emf),
+            r_off: lane(&|p| off(p).r),
+            diode: lane(&|p| if p.legs.synchronous { 0.0 } else { 1.0 }),
+            load: std::array::from_fn(|n| plants[n].parameters().load.clone()),
+            pwm: std::array::from_fn(|n| plants[n].parameters().pwm.clone()),
+        }
+    }
+}
+
+/// One period of `LANES` converters. A lane that needs more than one series a segment is not regular.
+struct Lanes {
+    i: Lane,
+    v: Lane,
+    on: Lane,
+    conductance: Lane,
+    current: Lane,
+    power: Lane,
+    regular: [bool; LANES],
+}
+
+impl Lanes {
+    #[inline(always)]
+    fn new(group: &Group, duties: &[f64], loads: &[Load]) -> Self {
+        let zero = Lane([0.0; LANES]);
+        let mut lanes = Lanes {
+            i: zero,
+            v: zero,
+            on: zero,
+            conductance: zero,
+            current: zero,
+            power: zero,
+            regular: [true; LANES],
+        };
+        for n in 0..LANES {
+            let drawn = load_setting::drawn(&group.load[n], &loads[n]);
+            lanes.conductance.0[n] = drawn.conductance;
+            lanes.current.0[n] = drawn.current;
+            lanes.power.0[n] = drawn.power;
+            let (pwm, t_sw) = (&group.pwm[n], group.t_sw.0[n]);
+            let duty = if duties[n] > 0.0 { duties[n].min(1.0) } else { 0.0 };
+            lanes.on.0[n] = minimum_on_time::limit(duty_quantisation::round(duty, pwm.duty_lsb), pwm, t_sw) * t_sw;
+        }
+        lanes
+    }
+
+    #[inline(always)]
+    fn segment(&mut self, group: &Group, h: Lane, drive: [Lane; 2], diode: Lane) {
+        let (i0, v0, power) = (self.i, self.v, self.power);
+        let mut w0 = Lane([0.0; LANES]);
+        for n in 0..LANES {
+            w0.0[n] = if v0.0[n] < group.v_fold.0[n] {
+                0.0
+            } else {
+                1.0 / v0.0[n]
+            };
+        }
+        let (a, b) = (h * group.inv_l, h * group.inv_c);
+        let load = [self.conductance, self.current, power];
+        let (i, v) = series([i0, v0, w0], [a, b], drive, load);
+        (self.i, self.v) = (sum(&i), sum(&v));
+        let rate = b * self.conductance;
+        for n in 0..LANES {
+            let fold = group.v_fold.0[n];
+            let steady = v[1].0[n].abs() <= LARGEST_CHANGE * v0.0[n] && v0.0[n] >= fold && self.v.0[n] >= fold;
+            let smooth = (power.0[n] == 0.0) | steady;
+            let short = (h.0[n] <= group.longest.0[n]) & (rate.0[n] <= LONGEST_STEP);
+            let flows = (diode.0[n] == 0.0) | ((i0.0[n] > 0.0) & (self.i.0[n] > 0.0));
+            let last = v[ORDER].0[n].abs() + TERM_BEFORE * v[ORDER - 1].0[n].abs();
+            self.regular[n] &= smooth & short & flows & (last <= group.last_term.0[n]);
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! Whether parameters describe a plant.
+
+use crate::catalogue;
+use crate::effects::duty_delay;
+use crate::faults::{Fault, Faults};
+use crate::parameters::Parameters;
+use crate::sensing;
+
+/// All faults of the parameters, if any.
+///
+/// # Errors
+/// Parameters outside their allowed range, and effects that lack a partner.
+pub fn check(p: &Parameters) -> Result<(), Faults> {
+    let faults: Vec<Fault> = keyed(p).into_iter().map(|(_, fault)| fault).collect();
+    if faults.is_empty() { Ok(()) } else { Err(Faults(faults)) }
+}
+
+/// The faults, each with the key of the parameter it is about.
+pub(crate) fn keyed(p: &Parameters) -> Vec<(&'static str, Fault)> {
+    let mut faults = Vec::new();
+    for parameter in catalogue::parameters() {
+        let value = parameter.get(p);
+        let (low, high) = parameter.allowed;
+        if !(low <= value && value <= high) {
+            let unit = if parameter.unit == "1" { "" } else { parameter.unit };
+            let fault = Fault::new(format!("`{}` is out of range", parameter.key))
+                .found(format!("{value} {unit}").trim_end())
+                .expected(format!("{low} to {high} {unit}").trim_end())
+                .hint(format!("{}; SI units", parameter.meaning));
+            faults.push((parameter.key, fault));
+        }
+    }
+    if faults.is_empty() {
+        partners(p, &mut faults);
+    }
+    faults
+}
+
+fn partners(p: &Parameters, faults: &mut Vec<(&'static str, Fault)>) {
+    let mut require = |holds: bool, key: &'static str, problem: String, hint: &str| {
+        if !holds {
+            faults.push((key, Fault::new(problem).hint(hint)));
+        }
+    };
+    let cable = &p.cable;
+    require(
+        (cable.inductance > 0.0) == (cable.capacitance > 0.0),
+        if cable.inductance > 0.0 {
+            "cable.inductance"
+        } else {
+            "cable.capacitance"
+        },
+        "a cable needs `cable.inductance` and `cable.capacitance`".to_owned(),
+        "an inductance into a load without capacitor has no finite bandwidth; a capacitor without cable belongs to \
+         `converter.capacitance`",
+    );
+    require(
+        cable.resistance == 0.0 || cable.inductance > 0.0,
+        "cable.resistance",
+        "`cable.resistance` needs `cable.inductance` and `cable.capacitance`".to_owned(),
+        "give the cable about 1 uH a metre",
+    );
+    let source = &p.source;
+    require(
+        source.inductance == 0.0 || source.c_in > 0.0,
+        "source.inductance",
+        "`source.inductance` needs an input capacitor, `source.c_in`".to_owned(),
+        "without one the switch would interrupt the current of an inductance",
+    );
+    require(
+        source.esr_in == 0.0 || source.c_in > 0.0,
+        "source.esr_in",
+        "`source.esr_in` needs an input capacitor, `source.c_in`".to_owned(),
+        "set `source.c_in`, or leave `source.esr_in` at 0",
+    );
+    let t_sw = p.t_sw();
+    let s = &p.switch;
+    require(
+        s.dead_time + s.turn_on_delay < t_sw && s.turn_off_delay < t_sw,
+        if s.turn_off_delay < t_sw {
+            "switch.dead_time"
+        } else {
+            "switch.turn_off_delay"
+        },
+        "dead time and delays of the switch reach beyond a period".to_owned(),
+        "times are in seconds: 2 us is 2e-6",
+    );
+    let sensors = &p.sensors;
+    let delays = [
+        ("sensors.v_out.delay", sensors.v_out.delay),
+        ("sensors.i_l.delay", sensors.i_l.delay),
+        ("sensors.i_out.delay", sensors.i_out.delay),
+        ("sensors.v_in.delay", sensors.v_in.delay),
+    ];
+    for (key, delay) in delays {
+        let periods = sensing::LONGEST;
+        let problem = format!("`{key}` is {periods} periods or more");
+        require(
+            delay < periods as f64 * t_sw,
+            key,
+            problem,
+            "times are in seconds: 35 us is 35e-6",
+        );
+    }
+    debug_assert_eq!(duty_delay::LONGEST, sensing::LONGEST);
+}

@@ -1,0 +1,21 @@
+//! Core loss as a conductance across the inductance: the winding carries `i + g v_l`.
+//!
+//! A current step of `g v_in` at every edge, and slightly more damping. When the winding current ends (DCM), what the
+//! inductance still holds (`g v_out`, milliamperes) is lost in the core at once.
+
+use crate::catalogue::{Effect, number};
+
+/// Catalogue entry.
+pub const EFFECT: Effect = Effect {
+    name: "core_loss",
+    meaning: "loss in the inductor's core",
+    parameters: &[number!(
+        inductor.core_conductance,
+        "inductor.core_conductance",
+        "S",
+        "conductance across the inductance",
+        (0.0, 0.1),
+        (1e-5, 5e-4),
+        0.0
+    )],
+};

@@ -1,0 +1,21 @@
+//! Resistance of the inductor's winding: `v_sw - v_out = L di/dt + dcr i`.
+//!
+//! Lowers the output by `dcr i` (CCM) and damps the LC resonance. In steady state it cannot be told from equal
+//! changes of `r_ds_on` and `r_d`.
+
+use crate::catalogue::{Effect, number};
+
+/// Catalogue entry.
+pub const EFFECT: Effect = Effect {
+    name: "dcr",
+    meaning: "resistance of the inductor's winding",
+    parameters: &[number!(
+        inductor.dcr,
+        "inductor.dcr",
+        "ohm",
+        "winding resistance",
+        (0.0, 100.0),
+        (0.005, 0.5),
+        0.0
+    )],
+};

@@ -1,0 +1,31 @@
+//! The diode's drop: `v_sw = -(v_f + r_d i)` while it conducts; also the body diodes of a synchronous leg.
+//!
+//! Lowers the output by `(1 - d) (v_f + r_d i)` (CCM) and ends the conduction earlier (DCM).
+
+use crate::catalogue::{Effect, number};
+
+/// Catalogue entry.
+pub const EFFECT: Effect = Effect {
+    name: "diode",
+    meaning: "forward voltage and resistance of the diode",
+    parameters: &[
+        number!(
+            switch.v_f,
+            "switch.v_f",
+            "V",
+            "forward voltage",
+            (0.0, 100.0),
+            (0.3, 2.0),
+            0.0
+        ),
+        number!(
+            switch.r_d,
+            "switch.r_d",
+            "ohm",
+            "differential resistance",
+            (0.0, 100.0),
+            (0.001, 0.1),
+            0.0
+        ),
+    ],
+};

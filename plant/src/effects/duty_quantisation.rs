@@ -1,0 +1,27 @@
+//! The modulator counts: the duty is rounded to the nearest multiple of `duty_lsb`, half up.
+
+use crate::catalogue::{Effect, number};
+
+/// Catalogue entry.
+pub const EFFECT: Effect = Effect {
+    name: "duty_quantisation",
+    meaning: "step of the duty",
+    parameters: &[number!(
+        pwm.duty_lsb,
+        "pwm.duty_lsb",
+        "1",
+        "step of the duty",
+        (0.0, 0.5),
+        (1e-4, 5e-3),
+        0.0
+    )],
+};
+
+/// The duty the modulator makes of `duty`.
+#[inline(always)]
+pub(crate) fn round(duty: f64, lsb: f64) -> f64 {
+    if lsb == 0.0 {
+        return duty;
+    }
+    ((duty / lsb + 0.5).floor() * lsb).min(1.0)
+}

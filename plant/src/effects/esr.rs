@@ -1,0 +1,21 @@
+//! Equivalent series resistance of the output capacitor: `v_out = v_c + esr (i_l - i_out)`.
+//!
+//! Ripple in phase with the current, a step of `esr di` at a load step, a zero at `1/(esr C)`; damps a constant-power
+//! load only when in series with it. No trace in the mean.
+
+use crate::catalogue::{Effect, number};
+
+/// Catalogue entry.
+pub const EFFECT: Effect = Effect {
+    name: "esr",
+    meaning: "series resistance of the output capacitor",
+    parameters: &[number!(
+        capacitor.esr,
+        "capacitor.esr",
+        "ohm",
+        "series resistance",
+        (0.0, 10.0),
+        (0.002, 0.3),
+        0.0
+    )],
+};

@@ -1,0 +1,31 @@
+//! Pulses shorter than the minimum on-time are left out, or lengthened to it.
+
+use crate::catalogue::{Effect, number};
+use crate::parameters::{Pwm, ShortPulse};
+
+/// Catalogue entry.
+pub const EFFECT: Effect = Effect {
+    name: "minimum_on_time",
+    meaning: "shortest pulse of the switch",
+    parameters: &[number!(
+        pwm.min_on_time,
+        "pwm.min_on_time",
+        "s",
+        "shortest pulse of the switch",
+        (0.0, 1.0),
+        (1e-7, 3e-6),
+        0.0
+    )],
+};
+
+/// The duty that is left of `duty`.
+#[inline(always)]
+pub(crate) fn limit(duty: f64, pwm: &Pwm, t_sw: f64) -> f64 {
+    if pwm.min_on_time == 0.0 || duty * t_sw >= pwm.min_on_time || duty == 0.0 {
+        return duty;
+    }
+    match pwm.short_pulse {
+        ShortPulse::Drop => 0.0,
+        ShortPulse::Extend => (pwm.min_on_time / t_sw).min(1.0),
+    }
+}

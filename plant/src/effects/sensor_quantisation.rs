@@ -1,0 +1,56 @@
+//! The analog-digital converter: rounded to the nearest multiple of `lsb`, half up.
+
+use crate::catalogue::{Effect, number};
+
+/// Catalogue entry.
+pub const EFFECT: Effect = Effect {
+    name: "sensor_quantisation",
+    meaning: "step of the analog-digital converter",
+    parameters: &[
+        number!(
+            sensors.v_out.lsb,
+            "sensors.v_out.lsb",
+            "V",
+            "step of the converter",
+            (0.0, 1e4),
+            (1e-3, 0.1),
+            0.0
+        ),
+        number!(
+            sensors.i_l.lsb,
+            "sensors.i_l.lsb",
+            "A",
+            "step of the converter",
+            (0.0, 1e4),
+            (1e-3, 0.1),
+            0.0
+        ),
+        number!(
+            sensors.i_out.lsb,
+            "sensors.i_out.lsb",
+            "A",
+            "step of the converter",
+            (0.0, 1e4),
+            (1e-3, 0.1),
+            0.0
+        ),
+        number!(
+            sensors.v_in.lsb,
+            "sensors.v_in.lsb",
+            "V",
+            "step of the converter",
+            (0.0, 1e4),
+            (1e-3, 0.1),
+            0.0
+        ),
+    ],
+};
+
+/// The code of `value`, in the sensor's unit.
+#[inline]
+pub(crate) fn round(value: f64, lsb: f64) -> f64 {
+    if lsb == 0.0 {
+        return value;
+    }
+    (value / lsb + 0.5).floor() * lsb
+}

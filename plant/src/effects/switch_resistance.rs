@@ -1,0 +1,32 @@
+//! On-resistance of the switches: `v_sw = v_in - r_ds_on i` while the upper one is on, `-r_ds_on_low i` while the lower
+//! one of a synchronous leg is.
+//!
+//! Lowers the output by `d r_ds_on i` (CCM).
+
+use crate::catalogue::{Effect, number};
+
+/// Catalogue entry.
+pub const EFFECT: Effect = Effect {
+    name: "switch_resistance",
+    meaning: "on-resistance of the switches",
+    parameters: &[
+        number!(
+            switch.r_ds_on,
+            "switch.r_ds_on",
+            "ohm",
+            "on-resistance of the switch",
+            (0.0, 100.0),
+            (0.005, 0.5),
+            0.0
+        ),
+        number!(
+            switch.r_ds_on_low,
+            "switch.r_ds_on_low",
+            "ohm",
+            "on-resistance of the second switch of a synchronous leg",
+            (0.0, 100.0),
+            (0.005, 0.5),
+            0.0
+        ),
+    ],
+};

@@ -1,0 +1,376 @@
+//! The circuit with every effect between two switching edges, by Runge-Kutta steps of fourth order that are short
+//! against its fastest time constant.
+//!
+//! Two voltages are algebraic. At the output `v_out = v_c + esr (i_b - i_out) + esl d(i_b - i_out)/dt`, at the input the
+//! source as seen from the switch, `v_th - r_th i`. `i_b` is the winding current, `i_l` that of the inductance itself;
+//! the core conductance carries the difference.
+
+use serde::{Deserialize, Serialize};
+
+use crate::effects::{derating, input_ripple, saturation};
+use crate::parameters::Parameters;
+use crate::plain::Track;
+use crate::signals::{Load, Signals};
+
+/// Number of states.
+const STATES: usize = 11;
+const I_L: usize = 0;
+const V_C: usize = 1;
+const I_CABLE: usize = 2;
+const V_LOAD: usize = 3;
+const I_CPL: usize = 4;
+const V_CIN: usize = 5;
+const I_SOURCE: usize = 6;
+const SHOWN: usize = 7;
+
+/// Steps per time constant: of the LC filter, and of everything else.
+const FILTER_STEP: f64 = 0.05;
+const OTHER_STEP: f64 = 0.25;
+
+/// The states: inductance current, capacitor voltage, cable, load, source, four low-passes.
+pub(crate) type States = [f64; STATES];
+
+/// What the inductor is connected to: `v_sw = share v_in + emf - r i`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Path {
+    /// How much of the inductor current the source delivers: 1, 0, or the duty of the averaged model.
+    pub share: f64,
+    pub emf: f64,
+    pub r: f64,
+    /// The sign of current a diode lets through: 1 or -1; 0 for both.
+    pub only: f64,
+    /// No current.
+    pub open: bool,
+}
+
+/// The circuit's constants.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Full {
+    p: Parameters,
+    has_cable: bool,
+    has_c_in: bool,
+    has_lag: bool,
+    low_pass: [f64; 4],
+    /// Fastest rate that does not depend on the load, in steps per second.
+    rate: f64,
+}
+
+/// What follows from the states at once.
+#[derive(Debug, Clone, Copy, Default)]
+struct Algebra {
+    signals: Signals,
+    v_l: f64,
+    v_source: f64,
+    slopes: States,
+}
+
+impl Full {
+    pub fn new(p: &Parameters) -> Self {
+        let sensors = &p.sensors;
+        let low_pass = [&sensors.v_out, &sensors.i_l, &sensors.i_out, &sensors.v_in].map(|s| s.low_pass);
+        let has_c_in = p.source.c_in > 0.0 && (p.source.resistance > 0.0 || p.source.inductance > 0.0);
+        let mut full = Full {
+            p: p.clone(),
+            has_cable: p.cable.inductance > 0.0,
+            has_c_in,
+            has_lag: p.load.cpl_time_constant > 0.0,
+            low_pass,
+            rate: 0.0,
+        };
+        full.rate = full.fastest_rate();
+        full
+    }
+
+    fn fastest_rate(&self) -> f64 {
+        let p = &self.p;
+        let l = p.converter.inductance * (1.0 - p.inductor.saturation);
+        let c = p.converter.capacitance * (1.0 - p.capacitor.derating);
+        let r = p.inductor.dcr + p.switch.r_ds_on.max(p.switch.r_ds_on_low).max(p.switch.r_d) + p.source.resistance;
+        let filter = 1.0 / (l * c).sqrt() / FILTER_STEP;
+        let mut other = (r + p.capacitor.esr) / l;
+        for tau in self.low_pass.into_iter().chain([p.load.cpl_time_constant]) {
+            if tau > 0.0 {
+                other = other.max(1.0 / tau);
+            }
+        }
+        if self.has_cable {
+            let cable = &p.cable;
+            let series_c = 1.0 / (1.0 / cable.capacitance + 1.0 / c);
+            other = other.max(1.0 / (cable.inductance * series_c).sqrt());
+            other = other.max((cable.resistance + p.capacitor.esr) / cable.inductance);
+        }
+        if self.has_c_in {
+            let s = &p.source;
+            let r = s.resistance + s.esr_in;
+            other = other.max(match s.inductance > 0.0 {
+                true => (1.0 / (s.inductance * s.c_in).sqrt()).max(r / s.inductance),
+                false => 1.0 / (r * s.c_in),
+            });
+        }
+        if p.source.ripple > 0.0 {
+            other = other.max(p.source.ripple_frequency * std::f64::consts::TAU);
+        }
+        filter.max(other / OTHER_STEP)
+    }
+
+    /// States at rest around `v_out` and `i_l`.
+    pub fn initial(&self, v_out: f64, i_l: f64, load: &Load) -> States {
+        let mut x = [0.0; STATES];
+        let cpl = self.constant_power(load, v_out);
+        let i_out = load.conductance * v_out + load.current + cpl;
+        let v_in = self.p.converter.v_in;
+        let i_in = i_l * v_out / v_in;
+        let v_c = v_out - self.p.capacitor.esr * (i_l - i_out);
+        (x[I_L], x[V_C], x[V_LOAD], x[I_CPL]) = (i_l, v_c, v_out, cpl);
+        x[I_CABLE] = i_out;
+        x[V_CIN] = v_in - self.p.source.resistance * i_in;
+        x[I_SOURCE] = i_in;
+        let shown = [v_out, i_l, i_out, v_in];
+        x[SHOWN..].copy_from_slice(&shown);
+        x
+    }
+
+    /// The four low-passes.
+    pub fn filtered(x: &States) -> [f64; 4] {
+        [x[SHOWN], x[SHOWN + 1], x[SHOWN + 2], x[SHOWN + 3]]
+    }
+
+    /// The signals at one instant.
+    pub fn signals(&self, x: &States, path: &Path, load: &Load, t: f64) -> Signals {
+        self.algebra(x, path, load, t).signals
+    }
+
+    /// Advances by `h` seconds from time `t`, or until the current reaches 0 if the path stops there. Returns the time
+    /// used.
+    pub fn advance(&self, x: &mut States, path: &Path, load: &Load, span: (f64, f64), track: &mut Track) -> f64 {
+        let (t, h) = span;
+        let far = match self.has_cable {
+            true => load.conductance / self.p.cable.capacitance,
+            false => load.conductance / self.p.converter.capacitance,
+        };
+        let count = (h * self.rate.max(far / OTHER_STEP)).ceil().max(1.0);
+        let step = h / count;
+        let mut before = self.algebra(x, path, load, t);
+        extend(track, &before.signals, path);
+        let mut used = 0.0;
+        for _ in 0..count as u64 {
+            let start = *x;
+            *x = self.step(&start, &before, path, load, t + used, step);
+            let mut after = self.algebra(x, path, load, t + used + step);
+            let mut length = step;
+            let crossed = path.only != 0.0 && after.signals.i_l * path.only <= 0.0;
+            if crossed && before.signals.i_l * path.only <= 0.0 {
+                length = 0.0;
+                *x = start;
+                after = before;
+            } else if crossed {
+                length = self.crossing(&start, &before, path, load, (t + used, step), after.signals.i_l);
+                *x = self.step(&start, &before, path, load, t + used, length);
+                after = self.algebra(x, path, load, t + used + length);
+            }
+            let middle = between(&start, x, &before.slopes, &after.slopes, length);
+            let v_mid = self.algebra(&middle, path, load, t + used + 0.5 * length).signals.v_out;
+            if let Some(v) = vertex(before.signals.v_out, v_mid, after.signals.v_out) {
+                track.voltage(v);
+            }
+            used += length;
+            if crossed {
+                after.signals.i_l = 0.0;
+                x[I_L] = 0.0;
+            }
+            extend(track, &after.signals, path);
+            if crossed {
+                return used.min(h);
+            }
+            before = after;
+        }
+        h
+    }
+
+    /// When the winding current reaches 0, by the Illinois method.
+    fn crossing(&self, x: &States, a: &Algebra, path: &Path, load: &Load, span: (f64, f64), i_end: f64) -> f64 {
+        let (t, h) = span;
+        let (mut low, mut high) = ((0.0, a.signals.i_l), (h, i_end));
+        for _ in 0..40 {
+            let guess = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
+            let inside = guess > low.0.min(high.0) && guess < low.0.max(high.0);
+            if !inside || (high.0 - low.0).abs() < 1e-15 * h {
+                break;
+            }
+            let state = self.step(x, a, path, load, t, guess);
+            let i = self.algebra(&state, path, load, t + guess).signals.i_l;
+            if i * high.1 < 0.0 {
+                low = high;
+            } else {
+                low.1 *= 0.5;
+            }
+            high = (guess, i);
+            if i.abs() < 1e-13 {
+                break;
+            }
+        }
+        high.0
+    }
+
+    fn step(&self, x: &States, first: &Algebra, path: &Path, load: &Load, t: f64, h: f64) -> States {
+        let k1 = &first.slopes;
+        let k2 = self.algebra(&moved(x, k1, 0.5 * h), path, load, t + 0.5 * h).slopes;
+        let k3 = self.algebra(&moved(x, &k2, 0.5 * h), path, load, t + 0.5 * h).slopes;
+        let k4 = self.algebra(&moved(x, &k3, h), path, load, t + h).slopes;
+        std::array::from_fn(|n| x[n] + h / 6.0 * (k1[n] + 2.0 * (k2[n] + k3[n]) + k4[n]))
+    }
+
+    fn constant_power(&self, load: &Load, v: f64) -> f64 {
+        let fold = self.p.load.v_fold;
+        if v >= fold {
+            load.power / v
+        } else {
+            load.power * v / (fold * fold)
+        }
+    }
+
+    /// The source as the switch sees it: voltage and resistance.
+    fn thevenin(&self, x: &States, v_source: f64) -> (f64, f64) {
+        let s = &self.p.source;
+        if !self.has_c_in {
+            return (v_source, s.resistance);
+        }
+        if s.inductance > 0.0 {
+            return (x[V_CIN] + s.esr_in * x[I_SOURCE], s.esr_in);
+        }
+        let r = s.resistance + s.esr_in;
+        (
+            (v_source * s.esr_in + x[V_CIN] * s.resistance) / r,
+            s.resistance * s.esr_in / r,
+        )
+    }
+
+    fn algebra(&self, x: &States, path: &Path, load: &Load, t: f64) -> Algebra {
+        let p = &self.p;
+        let l = p.converter.inductance * saturation::relative_inductance(&p.inductor, x[I_L]);
+        let v_source = p.converter.v_in + input_ripple::voltage(&p.source, t);
+        let (v_th, r_th) = self.thevenin(x, v_source);
+        let r = path.r + path.share * r_th + p.inductor.dcr;
+        let core = p.inductor.core_conductance;
+        // v_l = (drive - v_out) / stretch, i_b = i_l + core v_l; nothing of it while no current flows
+        let i_l = if path.open { 0.0 } else { x[I_L] };
+        let drive = path.share * v_th + path.emf - r * i_l;
+        let stretch = 1.0 + r * core;
+        let reflected = match path.open {
+            true => 0.0,
+            false => (p.capacitor.esr * core + p.capacitor.esl / l) / stretch,
+        };
+        let (v_out, i_out) = self.output(x, load, i_l, reflected, drive);
+        let v_l = if path.open { 0.0 } else { (drive - v_out) / stretch };
+        let i_b = i_l + core * v_l;
+        let v_in = v_th - path.share * r_th * i_b;
+        let signals = Signals {
+            v_out,
+            i_l: i_b,
+            i_out,
+            v_in,
+        };
+        let mut algebra = Algebra {
+            signals,
+            v_l,
+            v_source,
+            slopes: [0.0; STATES],
+        };
+        self.slopes(x, path, load, l, &mut algebra);
+        algebra
+    }
+
+    /// Output voltage and current from
+    /// `v (1 + reflected) + esr i_out(v) = v_c + esr i_l + reflected drive - esl di_out/dt`.
+    fn output(&self, x: &States, load: &Load, i_l: f64, reflected: f64, drive: f64) -> (f64, f64) {
+        let c = &self.p.capacitor;
+        let mut slope = 1.0 + reflected;
+        let mut right = x[V_C] + c.esr * i_l + reflected * drive;
+        if self.has_cable {
+            let cable = &self.p.cable;
+            let divided = c.esl / cable.inductance;
+            slope += divided;
+            right += divided * (x[V_LOAD] + cable.resistance * x[I_CABLE]) - c.esr * x[I_CABLE];
+            return (right / slope, x[I_CABLE]);
+        }
+        let fixed = load.current + if self.has_lag { x[I_CPL] } else { 0.0 };
+        slope += c.esr * load.conductance;
+        right -= c.esr * fixed;
+        let mut v = right / slope;
+        if self.has_lag || load.power == 0.0 {
+            return (v, load.conductance * v + fixed);
+        }
+        if c.esr > 0.0 {
+            for _ in 0..4 {
+                let cpl = self.constant_power(load, v);
+                let turn = if v >= self.p.load.v_fold {
+                    -cpl / v
+                } else {
+                    cpl / v.max(1e-300)
+                };
+                v -= (slope * v + c.esr * cpl - right) / (slope + c.esr * turn).max(0.1 * slope);
+            }
+        }
+        (v, load.conductance * v + fixed + self.constant_power(load, v))
+    }
+
+    fn slopes(&self, x: &States, path: &Path, load: &Load, l: f64, a: &mut Algebra) {
+        let (p, s) = (&self.p, a.signals);
+        let c = p.converter.capacitance * derating::relative_capacitance(&p.capacitor, x[V_C]);
+        a.slopes[I_L] = a.v_l / l;
+        a.slopes[V_C] = (s.i_l - s.i_out) / c;
+        let mut v_load = s.v_out;
+        if self.has_cable {
+            v_load = x[V_LOAD];
+            let cpl = if self.has_lag {
+                x[I_CPL]
+            } else {
+                self.constant_power(load, v_load)
+            };
+            let drawn = load.conductance * v_load + load.current + cpl;
+            a.slopes[I_CABLE] = (s.v_out - p.cable.resistance * x[I_CABLE] - v_load) / p.cable.inductance;
+            a.slopes[V_LOAD] = (x[I_CABLE] - drawn) / p.cable.capacitance;
+        }
+        if self.has_lag {
+            a.slopes[I_CPL] = (self.constant_power(load, v_load) - x[I_CPL]) / p.load.cpl_time_constant;
+        }
+        if self.has_c_in {
+            let source = &p.source;
+            let i_source = match source.inductance > 0.0 {
+                true => x[I_SOURCE],
+                false => (a.v_source - s.v_in) / source.resistance,
+            };
+            a.slopes[V_CIN] = (i_source - path.share * s.i_l) / source.c_in;
+            if source.inductance > 0.0 {
+                a.slopes[I_SOURCE] = (a.v_source - source.resistance * i_source - s.v_in) / source.inductance;
+            }
+        }
+        for (n, value) in [s.v_out, s.i_l, s.i_out, s.v_in].into_iter().enumerate() {
+            if self.low_pass[n] > 0.0 {
+                a.slopes[SHOWN + n] = (value - x[SHOWN + n]) / self.low_pass[n];
+            }
+        }
+    }
+}
+
+fn moved(x: &States, slopes: &States, h: f64) -> States {
+    std::array::from_fn(|n| x[n] + h * slopes[n])
+}
+
+/// The cubic through both ends and slopes, at half way.
+fn between(x0: &States, x1: &States, k0: &States, k1: &States, h: f64) -> States {
+    std::array::from_fn(|n| 0.5 * (x0[n] + x1[n]) + h / 8.0 * (k0[n] - k1[n]))
+}
+
+fn extend(track: &mut Track, signals: &Signals, path: &Path) {
+    track.voltage(signals.v_out);
+    track.current(signals.i_l);
+    track.discontinuous |= path.open;
+}
+
+/// Extreme of the parabola through three equidistant values, if it lies between the first and the last.
+fn vertex(first: f64, middle: f64, last: f64) -> Option<f64> {
+    let (slope, bend) = (0.5 * (last - first), first - 2.0 * middle + last);
+    let at = -slope / bend;
+    (at.abs() < 1.0).then_some(middle + 0.5 * slope * at)
+}

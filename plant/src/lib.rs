@@ -1,0 +1,44 @@
+//! DC-DC buck converter: switched and averaged, with the effects that make a bench differ from a simulation.
+//!
+//! ```
+//! use plant::{Load, Parameters, Plant};
+//!
+//! let mut plant = Plant::new(&Parameters::paper_model())?;
+//! let load = Load::power(200.0);
+//! let settled = plant.settle(100.0, &load);
+//! let sample = plant.step(settled.duty, &load);
+//! assert!((sample.v_out - 100.0).abs() < 1e-3);
+//! # Ok::<(), plant::Faults>(())
+//! ```
+//!
+//! - [`Parameters`] say what the converter is made of, [`effects`] what each of them means and may be.
+//! - [`Plant::step`] goes from sampling instant to sampling instant, [`Batch`] does so for many ideal converters at once.
+//! - [`Parameters::from_toml`] reads a `plant.toml`.
+//!
+//! No function of libm is used but the square root, which is exact: equal input gives equal bits on every machine.
+
+mod batch;
+mod catalogue;
+mod check;
+mod effects;
+mod faults;
+mod full;
+mod gates;
+mod legs;
+mod parameters;
+mod plain;
+mod plant;
+mod reader;
+mod sensing;
+mod settle;
+mod signals;
+mod walk;
+
+pub use batch::Batch;
+pub use catalogue::{Effect, Parameter, effects, parameter, parameters};
+pub use check::check;
+pub use faults::{Fault, Faults, Place};
+pub use parameters::*;
+pub use plant::{Plant, PlantState};
+pub use settle::Settled;
+pub use signals::{Load, Sample, Signals};

@@ -1,0 +1,292 @@
+//! The circuit of two states (inductor current, capacitor voltage) between two switching edges, as a power series in time.
+//!
+//! With x = t/h the coefficients of i, v and w = 1/v follow from one another:
+//! `i' = (h/L) (emf - r i - v)`, `v' = (h/C) (i - g v - J - P w)`, `v w = 1`. Six orders leave less than 1e-6 V a period
+//! (a segment whose last term is too large is halved), cost one division, and give the interval as a polynomial in which the zero
+//! crossing of the current and the extremes of the voltage are found without another step.
+
+use std::ops::{Add, Mul, Neg, Sub};
+
+use serde::{Deserialize, Serialize};
+
+use crate::parameters::Converter;
+use crate::signals::Load;
+
+pub(crate) const ORDER: usize = 6;
+/// Longest step in units of the fastest time constant.
+pub(crate) const LONGEST_STEP: f64 = 0.2;
+/// Largest change of v under constant power in one series, relative.
+pub(crate) const LARGEST_CHANGE: f64 = 0.2;
+/// Largest last term of a series for v, relative to v_in, and how much larger the term before it may be. What is left out
+/// is smaller still.
+const LAST_TERM: f64 = 5e-9;
+pub(crate) const TERM_BEFORE: f64 = 0.03;
+const DEEPEST_SPLIT: u32 = 12;
+
+/// The constants of the circuit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Plain {
+    pub inv_l: f64,
+    pub inv_c: f64,
+    pub v_fold: f64,
+    pub inv_fold_squared: f64,
+    pub longest: f64,
+    /// Largest last term of a series, V.
+    pub last_term: f64,
+}
+
+/// What drives the inductor: `L di/dt = emf - r i - v`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Drive {
+    pub emf: f64,
+    pub r: f64,
+    /// The current may not change its sign.
+    pub stops_at_zero: bool,
+    /// The current is 0 and stays there.
+    pub open: bool,
+}
+
+impl Drive {
+    pub const OPEN: Drive = Drive {
+        emf: 0.0,
+        r: 0.0,
+        stops_at_zero: false,
+        open: true,
+    };
+}
+
+/// Current and voltage, and their extremes since the last sample.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Track {
+    pub v_min: f64,
+    pub v_max: f64,
+    pub i_min: f64,
+    pub i_max: f64,
+    pub discontinuous: bool,
+}
+
+impl Track {
+    pub fn at(i: f64, v: f64) -> Self {
+        Track {
+            v_min: v,
+            v_max: v,
+            i_min: i,
+            i_max: i,
+            discontinuous: false,
+        }
+    }
+
+    #[inline(always)]
+    pub fn voltage(&mut self, v: f64) {
+        self.v_min = if v < self.v_min { v } else { self.v_min };
+        self.v_max = if v > self.v_max { v } else { self.v_max };
+    }
+
+    #[inline(always)]
+    pub fn current(&mut self, i: f64) {
+        self.i_min = if i < self.i_min { i } else { self.i_min };
+        self.i_max = if i > self.i_max { i } else { self.i_max };
+    }
+}
+
+impl Plain {
+    /// `r` is the largest series resistance, ohm.
+    pub fn new(converter: &Converter, r: f64, v_fold: f64) -> Self {
+        let (inv_l, inv_c) = (1.0 / converter.inductance, 1.0 / converter.capacitance);
+        let rate = (inv_l * inv_c).sqrt().max(r * inv_l);
+        Plain {
+            inv_l,
+            inv_c,
+            v_fold,
+            inv_fold_squared: 1.0 / (v_fold * v_fold),
+            longest: LONGEST_STEP / rate,
+            last_term: LAST_TERM * converter.v_in,
+        }
+    }
+
+    /// The current the load draws at `v`.
+    #[inline(always)]
+    pub fn load_current(&self, load: &Load, v: f64) -> f64 {
+        let constant = if v >= self.v_fold {
+            load.power / v
+        } else {
+            load.power * v * self.inv_fold_squared
+        };
+        load.conductance * v + load.current + constant
+    }
+
+    /// Advances `(i, v)` by `h` seconds, or until the current reaches 0 if the drive stops there. Returns the time used.
+    #[inline(always)]
+    pub fn advance(&self, x: &mut (f64, f64), drive: &Drive, load: &Load, h: f64, track: &mut Track) -> f64 {
+        if h <= self.longest
+            && let Some(used) = self.leaf(x, drive, load, h, track, 0)
+        {
+            return used;
+        }
+        self.split(x, drive, load, h, track, 0)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn split(&self, x: &mut (f64, f64), drive: &Drive, load: &Load, h: f64, track: &mut Track, depth: u32) -> f64 {
+        let half = 0.5 * h;
+        let mut used = 0.0;
+        for _ in 0..2 {
+            let leaf = match half <= self.longest || depth >= DEEPEST_SPLIT {
+                true => self.leaf(x, drive, load, half, track, depth),
+                false => None,
+            };
+            let step = leaf.unwrap_or_else(|| self.split(x, drive, load, half, track, depth + 1));
+            used += step;
+            if step < half {
+                break;
+            }
+        }
+        used
+    }
+
+    /// One series; nothing if it would be too coarse.
+    #[inline(always)]
+    fn leaf(
+        &self,
+        x: &mut (f64, f64),
+        drive: &Drive,
+        load: &Load,
+        h: f64,
+        track: &mut Track,
+        depth: u32,
+    ) -> Option<f64> {
+        let (i0, v0) = *x;
+        let folded = v0 < self.v_fold;
+        let g = if folded {
+            load.conductance + load.power * self.inv_fold_squared
+        } else {
+            load.conductance
+        };
+        let (power, w0) = if folded { (0.0, 0.0) } else { (load.power, 1.0 / v0) };
+        let a = if drive.open { 0.0 } else { h * self.inv_l };
+        let b = h * self.inv_c;
+        let (i, v) = series([i0, v0, w0], [a, b], [drive.emf, drive.r], [g, load.current, power]);
+        let v_end = sum(&v);
+        let coarse = (power != 0.0 && v[1].abs() > LARGEST_CHANGE * v0)
+            || b * g > LONGEST_STEP
+            || v[ORDER].abs() + TERM_BEFORE * v[ORDER - 1].abs() > self.last_term
+            || (load.power != 0.0 && (v_end < self.v_fold) != folded);
+        if coarse && depth < DEEPEST_SPLIT {
+            return None;
+        }
+        let i_end = sum(&i);
+        if drive.stops_at_zero && i_end * i0 <= 0.0 {
+            let at = zero(&i, i0 / (i0 - i_end));
+            *x = (0.0, value(&v, at));
+            extremes(&v, at, x.1, track);
+            track.current(0.0);
+            // a crossing at the very end counts as reached, so that the caller always sees time go on
+            return Some(if at < 1.0 { at * h } else { h });
+        }
+        *x = (i_end, v_end);
+        extremes(&v, 1.0, v_end, track);
+        track.current(i_end);
+        Some(h)
+    }
+}
+
+/// What a series is made of: a number, or numbers side by side.
+pub(crate) trait Number:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
+{
+    fn of(value: f64) -> Self;
+}
+
+impl Number for f64 {
+    #[inline(always)]
+    fn of(value: f64) -> Self {
+        value
+    }
+}
+
+type Coefficients<T> = [T; ORDER + 1];
+type Series = Coefficients<f64>;
+
+/// Coefficients of i and v from `[i, v, 1/v]`, `[h/L, h/C]`, `[emf, r]` and `[g, J, P]`.
+#[inline(always)]
+pub(crate) fn series<T: Number>(
+    start: [T; 3],
+    step: [T; 2],
+    drive: [T; 2],
+    load: [T; 3],
+) -> (Coefficients<T>, Coefficients<T>) {
+    const OVER: Series = [0.0, 1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0, 1.0 / 5.0, 1.0 / 6.0];
+    let ([a, b], [emf, r], [g, current, power]) = (step, drive, load);
+    let zero = T::of(0.0);
+    let (mut i, mut v) = ([zero; ORDER + 1], [zero; ORDER + 1]);
+    // the load's constant-power current P w, and v / v0
+    let (mut cpl, mut relative) = ([zero; ORDER + 1], [zero; ORDER + 1]);
+    let w0;
+    [i[0], v[0], w0] = start;
+    cpl[0] = power * w0;
+    i[1] = a * (emf - r * i[0] - v[0]);
+    let rest = i[0] - g * v[0] - current - cpl[0];
+    v[1] = b * rest;
+    relative[1] = b * w0 * rest;
+    for k in 1..ORDER {
+        let mut product = relative[1] * cpl[k - 1];
+        for j in 2..=k {
+            product = product + relative[j] * cpl[k - j];
+        }
+        cpl[k] = -product;
+        let over = T::of(OVER[k + 1]);
+        i[k + 1] = a * over * (-r * i[k] - v[k]);
+        let rest = i[k] - g * v[k] - cpl[k];
+        v[k + 1] = b * over * rest;
+        relative[k + 1] = b * over * w0 * rest;
+    }
+    (i, v)
+}
+
+/// The value at the end.
+#[inline(always)]
+pub(crate) fn sum<T: Number>(c: &Coefficients<T>) -> T {
+    c[0] + (c[1] + (c[2] + (c[3] + (c[4] + (c[5] + c[6])))))
+}
+
+#[inline(always)]
+fn value(c: &Series, x: f64) -> f64 {
+    c[0] + x * (c[1] + x * (c[2] + x * (c[3] + x * (c[4] + x * (c[5] + x * c[6])))))
+}
+
+#[inline(always)]
+fn slope(c: &Series, x: f64) -> f64 {
+    c[1] + x * (2.0 * c[2] + x * (3.0 * c[3] + x * (4.0 * c[4] + x * (5.0 * c[5] + x * (6.0 * c[6])))))
+}
+
+/// Newton's iteration from a chord; the current is close to a straight line here.
+fn zero(c: &Series, guess: f64) -> f64 {
+    let mut x = if guess.is_finite() { guess } else { 0.0 };
+    for _ in 0..6 {
+        let step = value(c, x) / slope(c, x);
+        if !step.is_finite() {
+            break;
+        }
+        x -= step;
+        // the next step would be of the order of the square
+        if step.abs() < 1e-9 {
+            break;
+        }
+    }
+    if x > 0.0 { x.min(1.0) } else { 0.0 }
+}
+
+/// Extremes of v between 0 and `end`; inside, where the slope changes its sign.
+#[inline(always)]
+fn extremes(v: &Series, end: f64, v_end: f64, track: &mut Track) {
+    let (first, last) = (v[1], slope(v, end));
+    if first * last < 0.0 {
+        // the slope is close to a straight line: its chord, then once more with the chord's inclination
+        let reach = end / (first - last);
+        let chord = first * reach;
+        let x = chord + slope(v, chord) * reach;
+        track.voltage(value(v, x));
+    }
+    track.voltage(v_end);
+}

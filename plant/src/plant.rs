@@ -1,0 +1,257 @@
+//! A converter that runs: from sampling instant to sampling instant.
+
+use serde::{Deserialize, Serialize};
+
+use crate::check::check;
+use crate::effects::duty_delay::Queue;
+use crate::effects::{duty_quantisation, load_setting, minimum_on_time};
+use crate::faults::Faults;
+use crate::full::{Full, Path, States};
+use crate::gates::{GateTiming, Gates};
+use crate::legs::Legs;
+use crate::parameters::{Carrier, Model, Parameters};
+use crate::plain::{Drive, Plain, Track};
+use crate::sensing::{Memory, Sensing, array};
+use crate::signals::{Load, Sample, Signals};
+
+/// A converter with its state. Times count in control periods, which are switching periods.
+#[derive(Debug, Clone)]
+pub struct Plant {
+    pub(crate) parameters: Parameters,
+    pub(crate) t_sw: f64,
+    pub(crate) plain: Plain,
+    pub(crate) legs: Legs,
+    pub(crate) full: Full,
+    pub(crate) timing: GateTiming,
+    pub(crate) sensing: Sensing,
+    /// Two states and no effect beyond series resistances and voltages.
+    pub(crate) is_plain: bool,
+    /// Plain, on-interval first, sampled at the period's start, prompt gates and sensors.
+    pub(crate) is_fast: bool,
+    pub(crate) state: PlantState,
+}
+
+/// Everything about a plant that changes; restoring it continues to the bit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PlantState {
+    pub(crate) x: States,
+    pub(crate) path: Path,
+    pub(crate) time: f64,
+    pub(crate) gates: Gates,
+    pub(crate) queue: Queue,
+    pub(crate) applied: f64,
+    pub(crate) memory: Memory,
+    pub(crate) sample: Sample,
+}
+
+impl Plant {
+    /// A plant at rest: no voltage, no current.
+    ///
+    /// # Errors
+    /// All parameters outside their allowed range, and effects that lack a partner.
+    pub fn new(parameters: &Parameters) -> Result<Self, Faults> {
+        check(parameters)?;
+        let p = parameters;
+        let (timing, sensing) = (GateTiming::new(p), Sensing::new(p));
+        let is_plain = is_plain(p) && !sensing.filters;
+        let prompt = timing.is_prompt() && p.pwm.carrier == Carrier::Trailing && p.pwm.sampling_phase == 0.0;
+        let switch = &p.switch;
+        let r = p.inductor.dcr + p.source.resistance + switch.r_ds_on.max(switch.r_d).max(switch.r_ds_on_low);
+        let mut plant = Plant {
+            t_sw: p.t_sw(),
+            plain: Plain::new(&p.converter, r, p.load.v_fold),
+            legs: Legs::new(p),
+            full: Full::new(p),
+            is_plain,
+            is_fast: is_plain && prompt && !sensing.looks_back && p.converter.model == Model::Switched,
+            timing,
+            sensing,
+            parameters: p.clone(),
+            state: PlantState {
+                x: States::default(),
+                path: Path::OPEN,
+                time: 0.0,
+                gates: Gates::default(),
+                queue: Queue::default(),
+                applied: 0.0,
+                memory: Memory::new(p.sensors.seed, [0.0; 4]),
+                sample: Sample::default(),
+            },
+        };
+        plant.reset_at(0.0, 0.0, &Load::default());
+        Ok(plant)
+    }
+
+    /// What the plant is made of.
+    #[must_use]
+    pub fn parameters(&self) -> &Parameters {
+        &self.parameters
+    }
+
+    /// The control period, s.
+    #[must_use]
+    pub fn t_sample(&self) -> f64 {
+        self.t_sw
+    }
+
+    /// The latest sample.
+    #[must_use]
+    pub fn sample(&self) -> Sample {
+        self.state.sample
+    }
+
+    /// What the sensors showed at the latest sampling instant.
+    #[must_use]
+    pub fn measured(&self) -> Signals {
+        self.state.sample.measured
+    }
+
+    /// For a checkpoint.
+    #[must_use]
+    pub fn state(&self) -> &PlantState {
+        &self.state
+    }
+
+    /// Continues from a checkpoint of a plant with the same parameters.
+    pub fn restore(&mut self, state: &PlantState) {
+        self.state = *state;
+    }
+
+    /// Puts the plant to a sampling instant with `v_out` V and `i_l` A under `load`; delayed duties are those that would
+    /// hold the voltage, delayed sensors show it. Time starts at 0, the noise goes on.
+    pub fn reset_at(&mut self, v_out: f64, i_l: f64, load: &Load) -> Sample {
+        let drawn = load_setting::drawn(&self.parameters.load, load);
+        let duty = (v_out / self.parameters.converter.v_in).clamp(0.0, 1.0);
+        let state = &mut self.state;
+        state.x = self.full.initial(v_out, i_l, &drawn);
+        state.path = Path::OPEN;
+        state.time = 0.0;
+        state.queue = Queue::filled(duty);
+        state.applied = duty;
+        state.gates = Gates::default();
+        if self.parameters.pwm.sampling_phase > 0.0 {
+            state.gates.plan(&self.timing, duty);
+        }
+        let signals = Signals {
+            v_out,
+            i_l,
+            i_out: self.plain.load_current(&drawn, v_out),
+            v_in: self.parameters.converter.v_in,
+        };
+        state.memory.refill(array(&signals));
+        self.finish(signals, Track::at(i_l, v_out))
+    }
+
+    /// One control period with `duty` (commanded now, clamped to 0..1) under `load`.
+    ///
+    /// The duty acts from the next start of a PWM period, which is now if the plant is sampled there, plus
+    /// `pwm.duty_delay` periods.
+    #[inline]
+    pub fn step(&mut self, duty: f64, load: &Load) -> Sample {
+        let drawn = load_setting::drawn(&self.parameters.load, load);
+        if self.is_fast {
+            return self.step_fast(duty, &drawn);
+        }
+        self.walk(duty, &drawn, &drawn, 1.0)
+    }
+
+    /// A control period in which the load changes from `before` to `after` at the fraction `at` of the period.
+    pub fn step_with_change(&mut self, duty: f64, before: &Load, after: &Load, at: f64) -> Sample {
+        if at <= 0.0 {
+            return self.step(duty, after);
+        }
+        if at >= 1.0 {
+            return self.step(duty, before);
+        }
+        let draw = |load| load_setting::drawn(&self.parameters.load, load);
+        let (before, after) = (draw(before), draw(after));
+        self.walk(duty, &before, &after, at)
+    }
+
+    /// What the modulator makes of a commanded duty.
+    #[inline(always)]
+    pub(crate) fn modulate(&mut self, duty: f64) -> f64 {
+        let pwm = &self.parameters.pwm;
+        let clamped = if duty > 0.0 { duty.min(1.0) } else { 0.0 };
+        let queued = self.state.queue.pass(clamped, pwm.duty_delay);
+        minimum_on_time::limit(duty_quantisation::round(queued, pwm.duty_lsb), pwm, self.t_sw)
+    }
+
+    #[inline(always)]
+    fn step_fast(&mut self, duty: f64, load: &Load) -> Sample {
+        let duty = self.modulate(duty);
+        let mut x = (self.state.x[0], self.state.x[1]);
+        let mut track = Track::at(x.0, x.1);
+        let on = duty * self.t_sw;
+        if on > 0.0 {
+            self.plain.advance(&mut x, &self.legs.upper, load, on, &mut track);
+        }
+        let mut rest = self.t_sw - on;
+        if self.legs.synchronous {
+            if rest > 0.0 {
+                self.plain.advance(&mut x, &self.legs.lower, load, rest, &mut track);
+            }
+        } else {
+            if x.0 != 0.0 && rest > 0.0 {
+                let drive: &Drive = if x.0 > 0.0 {
+                    &self.legs.lower_diode
+                } else {
+                    &self.legs.upper_diode
+                };
+                rest -= self.plain.advance(&mut x, drive, load, rest, &mut track);
+            }
+            if rest > 0.0 {
+                self.plain.advance(&mut x, &Drive::OPEN, load, rest, &mut track);
+                track.discontinuous = true;
+            }
+        }
+        (self.state.x[0], self.state.x[1]) = x;
+        self.state.time += self.t_sw;
+        self.state.applied = duty;
+        let signals = Signals {
+            v_out: x.1,
+            i_l: x.0,
+            i_out: self.plain.load_current(load, x.1),
+            v_in: self.parameters.converter.v_in,
+        };
+        self.finish(signals, track)
+    }
+
+    /// Lets the sensors look and stores the sample.
+    #[inline(always)]
+    pub(crate) fn finish(&mut self, signals: Signals, track: Track) -> Sample {
+        let measured = match self.sensing.ideal {
+            true => signals,
+            false => {
+                let filtered = Full::filtered(&self.state.x);
+                self.sensing.show(&mut self.state.memory, &signals, filtered)
+            }
+        };
+        self.state.sample = Sample {
+            v_out: signals.v_out,
+            i_l: signals.i_l,
+            i_out: signals.i_out,
+            v_in: signals.v_in,
+            v_min: track.v_min,
+            v_max: track.v_max,
+            i_min: track.i_min,
+            i_max: track.i_max,
+            discontinuous: track.discontinuous,
+            measured,
+        };
+        self.state.sample
+    }
+}
+
+/// Nothing but series resistances and voltages in two states.
+fn is_plain(p: &Parameters) -> bool {
+    let (inductor, capacitor, source) = (&p.inductor, &p.capacitor, &p.source);
+    let linear = inductor.saturation == 0.0 && inductor.core_conductance == 0.0 && capacitor.derating == 0.0;
+    let two_states = p.cable.inductance == 0.0 && p.load.cpl_time_constant == 0.0 && source.c_in == 0.0;
+    linear
+        && two_states
+        && capacitor.esr == 0.0
+        && capacitor.esl == 0.0
+        && source.ripple == 0.0
+        && source.resistance == 0.0
+}

@@ -1,0 +1,135 @@
+//! A control period with anything in it: gate edges, the start of a PWM period, sensors that look earlier, a load step.
+
+use crate::full::Full;
+use crate::parameters::Model;
+use crate::plain::Track;
+use crate::plant::Plant;
+use crate::signals::{Load, Sample, Signals};
+
+/// Two instants closer than this fraction of a period are one.
+const SAME: f64 = 1e-12;
+
+impl Plant {
+    /// One control period in which `before` gives way to `after` at the fraction `at`.
+    pub(crate) fn walk(&mut self, duty: f64, before: &Load, after: &Load, at: f64) -> Sample {
+        let end = self.t_sw;
+        let change = at * end;
+        let start_of_pwm = if self.parameters.pwm.sampling_phase == 0.0 {
+            0.0
+        } else {
+            (1.0 - self.parameters.pwm.sampling_phase) * end
+        };
+        let same = SAME * end;
+        let mut track = Track::at(self.state.sample.i_l, self.state.sample.v_out);
+        let (mut s, mut started) = (0.0, false);
+        while s < end {
+            if !started && s >= start_of_pwm {
+                started = true;
+                self.start_period(duty);
+            }
+            let origin = if started { start_of_pwm } else { start_of_pwm - end };
+            let mut next = if started { end } else { start_of_pwm };
+            if s + same < change && change < next {
+                next = change;
+            }
+            next = self.sensing.next_capture(s + same, next);
+            next = origin + self.timing_edge(s + same - origin, next - origin);
+            if next > end - same {
+                next = end;
+            }
+            let load = if s + same < change { before } else { after };
+            self.conduct(s - origin, next - s, load, &mut track);
+            if self.sensing.looks_back {
+                let signals = self.signals(load);
+                let filtered = Full::filtered(&self.state.x);
+                self.sensing
+                    .capture(&mut self.state.memory, s + same, next + same, &signals, filtered);
+            }
+            s = next;
+        }
+        let load = if at < 1.0 { after } else { before };
+        let signals = self.signals(load);
+        self.finish(signals, track)
+    }
+
+    fn start_period(&mut self, duty: f64) {
+        self.state.applied = self.modulate(duty);
+        self.state.gates.plan(&self.timing, self.state.applied);
+    }
+
+    fn timing_edge(&self, t: f64, limit: f64) -> f64 {
+        match self.parameters.converter.model {
+            Model::Switched => self.state.gates.next_edge(&self.timing, t, limit),
+            Model::Averaged => limit,
+        }
+    }
+
+    /// Advances by `h` from `t` in the PWM period; the gates do not change meanwhile.
+    fn conduct(&mut self, t: f64, h: f64, load: &Load, track: &mut Track) {
+        let gate = self.state.gates.at(&self.timing, t + 0.5 * h);
+        let mut rest = h;
+        while rest > 0.0 {
+            let path = match self.parameters.converter.model {
+                Model::Switched => self.legs.path(gate, self.state.x[0]),
+                Model::Averaged => self.legs.averaged(self.state.applied),
+            };
+            let used = if self.is_plain {
+                let mut x = (self.state.x[0], self.state.x[1]);
+                let used = self.plain.advance(&mut x, &self.legs.drive(&path), load, rest, track);
+                (self.state.x[0], self.state.x[1]) = x;
+                track.discontinuous |= path.open;
+                used
+            } else {
+                let span = (self.state.time, rest);
+                self.full.advance(&mut self.state.x, &path, load, span, track)
+            };
+            self.state.path = path;
+            self.state.time += used;
+            rest = if path.only != 0.0 { rest - used } else { 0.0 };
+        }
+    }
+
+    /// What is true now, just before any edge that may come now.
+    fn signals(&self, load: &Load) -> Signals {
+        if self.is_plain {
+            let v_out = self.state.x[1];
+            return Signals {
+                v_out,
+                i_l: self.state.x[0],
+                i_out: self.plain.load_current(load, v_out),
+                v_in: self.parameters.converter.v_in,
+            };
+        }
+        // after a diode has stopped, no current flows
+        let stopped = self.state.path.only != 0.0 && self.state.x[0] == 0.0;
+        let path = if stopped {
+            crate::full::Path::OPEN
+        } else {
+            self.state.path
+        };
+        self.full.signals(&self.state.x, &path, load, self.state.time)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parameters::{Parameters, Rectifier};
+
+    #[test]
+    fn the_general_way_gives_the_bits_of_the_fast_one() {
+        for rectifier in [Rectifier::Diode, Rectifier::Synchronous] {
+            let mut p = Parameters::paper_table();
+            p.converter.rectifier = rectifier;
+            p.inductor.dcr = 0.1;
+            let load = Load::power(100.0);
+            let (mut fast, mut walk) = (Plant::new(&p).unwrap(), Plant::new(&p).unwrap());
+            fast.reset_at(100.0, 1.0, &load);
+            walk.reset_at(100.0, 1.0, &load);
+            for n in 0..300 {
+                let duty = [0.5, 0.31, 0.62, 0.0, 1.0, 0.513][n * 5 % 6];
+                assert_eq!(fast.step(duty, &load), walk.walk(duty, &load, &load, 1.0), "{n}");
+            }
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! Between the plant and the network: the policy's own controller turns measurements into observations and actions into
+//! duties. What is trained is what is compiled.
+
+use interp::{Controller, Sample, State, Trace};
+use plant::Signals;
+use policy::Policy;
+
+use crate::faults::Error;
+
+/// The names that a contract's signals may have.
+const SIGNALS: [&str; 4] = ["v_out", "i_l", "i_out", "v_in"];
+
+/// A policy's controller at a plant.
+#[derive(Debug, Clone)]
+pub struct Agent {
+    controller: Controller<f32>,
+    trace: Trace<f32>,
+    samples: Vec<Sample>,
+    inputs: Vec<Input>,
+}
+
+/// Where a signal comes from.
+#[derive(Debug, Clone, Copy)]
+struct Input {
+    /// Index into [`SIGNALS`].
+    signal: usize,
+    adc: Option<policy::Adc>,
+}
+
+impl Agent {
+    /// The controller of `policy` in its initial state.
+    ///
+    /// # Errors
+    /// If the contract measures something that the plant does not have.
+    pub fn new(policy: &Policy) -> Result<Self, Error> {
+        let input = |signal: &policy::Signal| match SIGNALS.iter().position(|name| *name == signal.name) {
+            Some(index) => Ok(Input {
+                signal: index,
+                adc: signal.adc,
+            }),
+            None => {
+                let known = SIGNALS.join(", ");
+                let name = &signal.name;
+                Err(Error::Mismatch(format!(
+                    "the plant has no signal `{name}`\n  = expected: {known}"
+                )))
+            }
+        };
+        let inputs = policy.signals.iter().map(input).collect::<Result<Vec<_>, _>>()?;
+        let controller = Controller::new(policy);
+        Ok(Self {
+            trace: controller.blank_trace(),
+            samples: vec![Sample::Code(0); inputs.len()],
+            controller,
+            inputs,
+        })
+    }
+
+    fn measure(&mut self, measured: &Signals) {
+        let values = [measured.v_out, measured.i_l, measured.i_out, measured.v_in];
+        for (sample, input) in self.samples.iter_mut().zip(&self.inputs) {
+            let x = values[input.signal];
+            *sample = match input.adc {
+                None => Sample::Physical(x as f32),
+                Some(adc) => Sample::Code(((x - adc.offset) / adc.gain).round() as i32),
+            };
+        }
+    }
+
+    /// Forgets everything, as a controller does that is switched on.
+    pub fn reset(&mut self) {
+        self.controller.reset();
+    }
+
+    /// Takes in a measurement; [`Agent::observation`] is what the network sees.
+    ///
+    /// # Errors
+    /// Never, unless the plant's signals do not fit the contract.
+    pub fn sense(&mut self, measured: &Signals) -> Result<(), Error> {
+        self.measure(measured);
+        Ok(self.controller.sense_into(&self.samples, &mut self.trace)?)
+    }
+
+    /// The observation of the last [`Agent::sense`].
+    #[must_use]
+    pub fn observation(&self) -> &[f32] {
+        self.trace.observation.as_slice().unwrap_or_default()
+    }
+
+    /// Takes an action on what was sensed last and moves the filters on. Returns the duty behind mapping and limits.
+    pub fn act(&mut self, action: u32) -> f64 {
+        self.controller.choose(&mut self.trace, action);
+        self.controller.commit_trace(&self.trace);
+        f64::from(self.trace.command.duty)
+    }
+
+    /// One step of the whole controller with its own network, as the compiled code makes it.
+    ///
+    /// # Errors
+    /// As [`Agent::sense`].
+    pub fn step(&mut self, measured: &Signals) -> Result<f64, Error> {
+        self.measure(measured);
+        self.controller.step_into(&self.samples, &mut self.trace)?;
+        Ok(f64::from(self.trace.command.duty))
+    }
+
+    /// Duty of the step before, 0..1.
+    #[must_use]
+    pub fn previous_duty(&self) -> f64 {
+        f64::from(self.controller.state().previous_command)
+    }
+
+    /// What the controller remembers.
+    #[must_use]
+    pub fn state(&self) -> &State<f32> {
+        self.controller.state()
+    }
+
+    /// Puts back a state; `false` and no change if it is of another contract.
+    pub fn restore(&mut self, state: &State<f32>) -> bool {
+        self.controller.restore(state)
+    }
+}

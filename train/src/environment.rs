@@ -1,0 +1,80 @@
+//! What a training and a scenario ask of a simulated converter.
+
+use plant::{Load, Sample};
+
+use crate::faults::Error;
+
+/// The load over one control period.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LoadPath {
+    /// At the start of the period.
+    pub before: Load,
+    /// Where in the period the load changes, above 0 up to 1, and what it is from there on. At 1 it changes at the
+    /// sampling instant that ends the period, and the sample taken there shows it.
+    pub change: Option<(f64, Load)>,
+}
+
+impl LoadPath {
+    /// A load that does not change.
+    #[must_use]
+    pub fn constant(load: Load) -> Self {
+        Self {
+            before: load,
+            change: None,
+        }
+    }
+
+    /// The load at the end of the period.
+    #[must_use]
+    pub fn end(&self) -> Load {
+        self.change.map_or(self.before, |(_, after)| after)
+    }
+}
+
+/// Where a converter starts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Start<'a> {
+    /// Output voltage, V.
+    pub v_out: f64,
+    /// Inductor current, A.
+    pub i_l: f64,
+    /// Load.
+    pub load: Load,
+    /// Seed of whatever is random in it.
+    pub seed: u64,
+    /// Parameters of the plant that differ from its file, by key.
+    pub varied: &'a [(&'a str, f64)],
+}
+
+/// A converter under control, one control period at a time.
+pub trait Environment: Clone + Send {
+    /// Control period, s.
+    fn t_sample(&self) -> f64;
+
+    /// The plant file's value of a number, by key (`switch.v_f`); nothing if there is none.
+    fn parameter(&self, key: &str) -> Option<f64>;
+
+    /// Bytes that stand for the plant's file: equal plants, equal bytes.
+    fn identity(&self) -> Vec<u8>;
+
+    /// Starts anew; the sample is the one the controller acts on first.
+    ///
+    /// # Errors
+    /// If the varied parameters are not those of a converter.
+    fn restart(&mut self, start: &Start<'_>) -> Result<Sample, Error>;
+
+    /// Applies a duty for one control period; the sample is taken at its end.
+    fn step(&mut self, duty: f64, load: &LoadPath) -> Sample;
+
+    /// Everything that changes from step to step, and the varied parameters.
+    ///
+    /// # Errors
+    /// If it cannot be written down.
+    fn save(&self) -> Result<Vec<u8>, Error>;
+
+    /// Puts back what [`Environment::save`] gave.
+    ///
+    /// # Errors
+    /// If it is not of this kind of plant.
+    fn load(&mut self, bytes: &[u8]) -> Result<(), Error>;
+}

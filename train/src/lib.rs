@@ -1,0 +1,40 @@
+//! DQN on a simulated converter: what is trained is what is compiled.
+//!
+//! ```text
+//! train.toml ──► Settings::load ──┐
+//! policy.toml ─► Contract::load ──┼─► Trainer::new ─► run ─► Outcome: policy folder, curve, report, checkpoint (data)
+//! plant.toml ──► Converter::load ─┘      ▲   │
+//!                                        └───┘ checkpoint / resume, bit for bit
+//! ```
+//!
+//! Observations come from [`interp`] running the contract's own features; the network is the only thing of the
+//! controller that a training has for itself. Nothing here writes files (a contract is checked in a temporary folder).
+//! docs/train.md describes the training file.
+
+pub mod agent;
+mod checkpoint;
+pub mod contract;
+pub mod converter;
+pub mod environment;
+mod faults;
+pub mod learner;
+pub mod network;
+pub mod optimiser;
+pub mod outcome;
+pub mod replay;
+mod resume;
+pub mod rng;
+pub mod scenario;
+pub mod score;
+pub mod seeds;
+pub mod settings;
+pub mod trainer;
+
+pub use contract::{Contract, Files};
+pub use converter::Converter;
+pub use environment::Environment;
+pub use faults::{Error, Fault, Faults, Place};
+pub use outcome::Outcome;
+pub use seeds::{SeedRun, train_all};
+pub use settings::Settings;
+pub use trainer::{Ended, Progress, Trainer};

@@ -1,0 +1,262 @@
+//! What a training leaves behind: a policy folder, a learning curve, a report. All of it as data.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use plant::Sample;
+
+use crate::agent::Agent;
+use crate::contract::{Files, GoldenVectors};
+use crate::environment::Environment;
+use crate::faults::Error;
+use crate::network::Network;
+use crate::scenario::{Finding, load_step};
+use crate::score::{Score, Scoring, figures};
+use crate::settings::Instants;
+use crate::trainer::{Best, Ended, Look, Trainer};
+
+/// Observations among the golden vectors at most.
+const GOLDEN: usize = 512;
+/// Rows whose two best Q values are closer than this share of the largest are left out: another order of summation may
+/// turn them round.
+const GAP: f32 = 1e-3;
+
+/// A finished training.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// Its seed.
+    pub seed: u64,
+    /// Why it ended.
+    pub ended: Ended,
+    /// Control periods after which the kept policy was found.
+    pub best_step: u64,
+    /// How the kept policy did on the selection scenarios; seeds are compared by this.
+    pub selected: Score,
+    /// How it did on the evaluation scenarios.
+    pub evaluated: Score,
+    /// The evaluation, load step by load step.
+    pub findings: Vec<Finding>,
+    /// The policy folder: contract, weights, golden vectors, `report.txt`, `evaluation.csv`, `learning-curve.csv`.
+    pub files: Files,
+}
+
+impl<E: Environment> Trainer<E> {
+    /// Evaluates the policy that did best and makes its folder.
+    ///
+    /// # Errors
+    /// If there has been no look yet, the plant cannot be started or the policy does not pass its own check.
+    pub fn finish(&self, ended: Ended) -> Result<Outcome, Error> {
+        let Some(best) = self.best() else {
+            let text = "no policy has been judged yet\n  = hint: train at least `every` control periods of [selection]";
+            return Err(Error::Mismatch(text.to_owned()));
+        };
+        let task = &self.settings.evaluation;
+        let findings = self.survey(&best.network, task, &task.all_instants())?;
+        let evaluated = Scoring::new(&task.load_steps, &self.settings.specification, 1.0).score(&findings);
+        let golden = self.golden(&best.network)?;
+        let (_, mut files) = self.contract.folder(&best.network, &golden)?;
+        let report = self.report(ended, best, &evaluated, &findings);
+        files.insert("report.txt".to_owned(), report.into_bytes());
+        files.insert("evaluation.csv".to_owned(), evaluation_csv(&findings).into_bytes());
+        files.insert("learning-curve.csv".to_owned(), curve_csv(self.curve()).into_bytes());
+        Ok(Outcome {
+            seed: self.seed,
+            ended,
+            best_step: best.step,
+            selected: best.score,
+            evaluated,
+            findings,
+            files,
+        })
+    }
+
+    /// Observations of the closed loop with the trainer's own Q values (matrices, another order of summation than the
+    /// compiled code's): a check of weights, order and activation that does not lean on the interpreter.
+    fn golden(&self, network: &Network) -> Result<GoldenVectors, Error> {
+        let task = &self.settings.evaluation;
+        let mut agent = Agent::new(&self.contract.with(network))?;
+        let mut observations = Vec::new();
+        let instants = task.all_instants();
+        for (n, &step) in task.load_steps.iter().enumerate() {
+            let mut controller = |sample: &Sample| {
+                let duty = agent.step(&sample.measured).unwrap_or(f64::NAN);
+                observations.push(agent.observation().to_vec());
+                duty
+            };
+            let v_ref = self.settings.reward.v_ref;
+            load_step(
+                self.nominal.clone(),
+                &mut controller,
+                v_ref,
+                task,
+                step,
+                instants[n % instants.len()],
+            )?;
+            agent.reset();
+        }
+        Ok(golden_vectors(network, &observations))
+    }
+
+    fn report(&self, ended: Ended, best: &Best, evaluated: &Score, findings: &[Finding]) -> String {
+        let mut out = String::new();
+        let ended = match ended {
+            Ended::Met => "the selection scenarios met the specification",
+            Ended::Budget => "the budget was used up",
+            Ended::Interrupted => "interrupted",
+        };
+        let steps = self.step_count();
+        let actions = network_shape(&best.network);
+        let lines = [
+            format!("policy      {}", self.contract.policy.name),
+            format!("seed        {}", self.seed),
+            format!("network     {actions}"),
+            format!("training    {steps} control periods: {ended}"),
+            format!(
+                "kept        the policy after {} control periods, cost {:.4}",
+                best.step, best.score.cost
+            ),
+            format!("train.toml  SHA-256 {}", self.settings.digest),
+        ];
+        out.push_str(&lines.join("\n"));
+        out.push_str("\n\nEvaluation: true voltages at the sampling instants; worst sampling instant / worst of all instants\n\n");
+        out.push_str(&table(findings));
+        if !self.settings.specification.is_empty() {
+            let verdict = if evaluated.met { "met" } else { "NOT met" };
+            // writing to a String cannot fail
+            let _ = write!(out, "\nSpecification: {verdict}\n{}", self.verdicts(findings));
+        }
+        out
+    }
+
+    /// One line per limit.
+    fn verdicts(&self, findings: &[Finding]) -> String {
+        let mut out = String::new();
+        let specification = &self.settings.specification;
+        let scoring = Scoring::new(&self.settings.evaluation.load_steps, specification, 1.0);
+        for requirement in specification {
+            for (_, finding) in findings
+                .iter()
+                .enumerate()
+                .filter(|(n, _)| scoring.concerns(requirement, *n))
+            {
+                let (metrics, instants) = match requirement.instants {
+                    Instants::Sample => (&finding.at_sample, "at sampling instants"),
+                    Instants::Worst => (&finding.worst, "at all instants"),
+                };
+                let [from, to] = finding.load_step;
+                for (value, limit) in figures(metrics, requirement) {
+                    let verdict = if value <= limit { "holds" } else { "FAILS" };
+                    let _ = writeln!(out, "  {verdict}  {from} -> {to} W {instants}: {value:.6} of {limit}");
+                }
+            }
+        }
+        out
+    }
+}
+
+fn network_shape(network: &Network) -> String {
+    let widths = network
+        .layers()
+        .iter()
+        .map(|layer| layer.inputs)
+        .chain([network.outputs()]);
+    widths.map(|width| width.to_string()).collect::<Vec<_>>().join("-")
+}
+
+/// Every n-th observation, without doubles and near ties, and what the network says to it.
+fn golden_vectors(network: &Network, observations: &[Vec<f32>]) -> GoldenVectors {
+    let mut distinct = BTreeMap::new();
+    for observation in observations {
+        let key: Vec<u32> = observation.iter().map(|x| x.to_bits()).collect();
+        distinct.entry(key).or_insert(observation);
+    }
+    let rows: Vec<&Vec<f32>> = distinct.into_values().collect();
+    let stride = rows.len().div_ceil(GOLDEN).max(1);
+    let chosen: Vec<f32> = rows
+        .iter()
+        .step_by(stride)
+        .flat_map(|row| row.iter().copied())
+        .collect();
+    let count = chosen.len() / network.inputs().max(1);
+    let mut activations = network.activations(count);
+    network.forward(&chosen, &mut activations);
+    let mut golden = GoldenVectors::default();
+    let outputs = activations.outputs().chunks_exact(network.outputs());
+    for (row, q) in chosen.chunks_exact(network.inputs()).zip(outputs) {
+        let best = crate::learner::greedy(q);
+        let largest = q.iter().fold(0.0_f32, |largest, x| largest.max(x.abs()));
+        let close = |(n, &x): (usize, &f32)| n != best && q[best] - x < GAP * largest;
+        if q.iter().enumerate().any(close) {
+            continue;
+        }
+        golden.observations.extend_from_slice(row);
+        golden.q_values.extend_from_slice(q);
+        golden.actions.push(best as u32);
+    }
+    golden
+}
+
+/// Findings as a table for people.
+#[must_use]
+pub fn table(findings: &[Finding]) -> String {
+    let mut out = String::from(
+        "load step W     deviation V     settling ms     tail max V      tail mean V     before V        ripple V\n",
+    );
+    for Finding {
+        load_step: [from, to],
+        at_sample: a,
+        worst: b,
+    } in findings
+    {
+        let pair = |x: f64, y: f64, digits: usize| format!("{x:.digits$} / {y:.digits$}");
+        let columns = [
+            format!("{from} -> {to}"),
+            pair(a.deviation, b.deviation, 2),
+            pair(1e3 * a.settling, 1e3 * b.settling, 2),
+            pair(a.tail_max, b.tail_max, 3),
+            pair(a.tail_mean, b.tail_mean, 3),
+            pair(a.pre_error, b.pre_error, 3),
+            pair(a.ripple, b.ripple, 3),
+        ];
+        let line: String = columns.iter().map(|column| format!("{column:<16}")).collect();
+        out.push_str(line.trim_end());
+        out.push('\n');
+    }
+    out
+}
+
+/// Findings as CSV; SI units.
+#[must_use]
+pub fn evaluation_csv(findings: &[Finding]) -> String {
+    let mut out =
+        String::from("from_W,to_W,instants,deviation_V,settling_s,tail_mean_V,tail_max_V,pre_error_V,ripple_V\n");
+    for finding in findings {
+        let [from, to] = finding.load_step;
+        for (name, m) in [("sample", &finding.at_sample), ("worst", &finding.worst)] {
+            let _ = writeln!(
+                out,
+                "{from},{to},{name},{},{},{},{},{},{}",
+                m.deviation, m.settling, m.tail_mean, m.tail_max, m.pre_error, m.ripple
+            );
+        }
+    }
+    out
+}
+
+/// The learning curve as CSV.
+#[must_use]
+pub fn curve_csv(curve: &[Look]) -> String {
+    let mut out = String::from("step,reward,error_V,loss,epsilon,cost\n");
+    for Look {
+        step,
+        reward,
+        error,
+        loss,
+        epsilon,
+        cost,
+    } in curve
+    {
+        let _ = writeln!(out, "{step},{reward},{error},{loss},{epsilon},{cost}");
+    }
+    out
+}

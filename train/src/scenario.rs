@@ -1,0 +1,348 @@
+//! Load steps in closed loop, and what is measured on them. The controller is any `FnMut(&Sample) -> duty`.
+//!
+//! All voltages are the true ones at the sampling instants; the ripple between them is reported apart. The instant of the
+//! load step matters: right behind a sampling instant the controller learns of it a whole period later, and a controller
+//! that dithers meets it with a shifted current. So a load step is repeated at several instants, each one whole period
+//! and a fraction later than the one before, and the worst counts.
+
+use plant::{Load, Sample};
+
+use crate::environment::{Environment, LoadPath, Start};
+use crate::faults::Error;
+
+/// Half width of the band that settling refers to, V.
+pub const SETTLED: f64 = 0.5;
+
+/// Load steps to be run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Task {
+    /// Constant power before and after, W.
+    pub load_steps: Vec<[f64; 2]>,
+    /// Instants per load step: instant k comes k periods and k/instants of a period after the lead.
+    pub instants: usize,
+    /// Sampling instants per load step, one control period after the other; the first is instant 0.
+    pub sampling_instants: usize,
+    /// Control periods before the first instant.
+    pub lead: usize,
+    /// Control periods after each step.
+    pub after: usize,
+    /// The last of them, over which the tail is measured.
+    pub tail: usize,
+}
+
+impl Default for Task {
+    /// The paper's six load steps, 24 instants, 30 ms before and after.
+    fn default() -> Self {
+        let pairs = [500.0, 800.0, 1000.0];
+        let up = pairs.iter().map(|&power| [200.0, power]);
+        let down = pairs.iter().map(|&power| [power, 200.0]);
+        Self {
+            load_steps: up.chain(down).collect(),
+            instants: 24,
+            sampling_instants: 6,
+            lead: 300,
+            after: 300,
+            tail: 100,
+        }
+    }
+}
+
+/// What is measured on one load step.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Metrics {
+    /// Largest |e| after the step, V.
+    pub deviation: f64,
+    /// From the step to the last sample outside +-0.5 V, s; 0 if none is.
+    pub settling: f64,
+    /// |mean e| over the tail, V.
+    pub tail_mean: f64,
+    /// Largest |e| over the tail, V.
+    pub tail_max: f64,
+    /// Largest |e| over as long a stretch before the step, V.
+    pub pre_error: f64,
+    /// Mean peak-to-peak voltage of a control period in the tail, V: switching ripple and what dithering adds.
+    pub ripple: f64,
+}
+
+impl Metrics {
+    /// Figure by figure the larger.
+    #[must_use]
+    pub fn worst(self, other: Self) -> Self {
+        Self {
+            deviation: self.deviation.max(other.deviation),
+            settling: self.settling.max(other.settling),
+            tail_mean: self.tail_mean.max(other.tail_mean),
+            tail_max: self.tail_max.max(other.tail_max),
+            pre_error: self.pre_error.max(other.pre_error),
+            ripple: self.ripple.max(other.ripple),
+        }
+    }
+}
+
+/// One load step over all its instants.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Finding {
+    /// Power before and after, W.
+    pub load_step: [f64; 2],
+    /// The worst of the sampling instants, figure by figure.
+    pub at_sample: Metrics,
+    /// The worst of all instants, figure by figure.
+    pub worst: Metrics,
+}
+
+/// One control period of a recorded run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Record {
+    /// Time of the sample that the controller acted on, from the load step, s.
+    pub time: f64,
+    /// That sample.
+    pub sample: Sample,
+    /// What the controller commanded.
+    pub duty: f64,
+    /// Load set at that instant, W.
+    pub power: f64,
+}
+
+/// A converter in closed loop with a controller, about to see a load step.
+#[derive(Debug, Clone)]
+pub struct Loop<E, C> {
+    environment: E,
+    controller: C,
+    sample: Sample,
+    load: Load,
+    v_ref: f64,
+    /// |e| of the latest samples before the step, as many as the tail has.
+    pre: Vec<f64>,
+    elapsed: usize,
+}
+
+impl<E: Environment, C: FnMut(&Sample) -> f64> Loop<E, C> {
+    /// Starts at `v_ref` with the load's current.
+    ///
+    /// # Errors
+    /// If the converter cannot be started.
+    pub fn start(mut environment: E, controller: C, v_ref: f64, power: f64) -> Result<Self, Error> {
+        let load = Load::power(power);
+        let sample = environment.restart(&Start {
+            v_out: v_ref,
+            i_l: power / v_ref,
+            load,
+            seed: 0,
+            varied: &[],
+        })?;
+        Ok(Self {
+            environment,
+            controller,
+            sample,
+            load,
+            v_ref,
+            pre: Vec::new(),
+            elapsed: 0,
+        })
+    }
+
+    /// One control period; returns the voltage error behind it.
+    fn period(&mut self, change: Option<(f64, Load)>) -> (f64, f64) {
+        let duty = (self.controller)(&self.sample);
+        let path = LoadPath {
+            before: self.load,
+            change,
+        };
+        self.sample = self.environment.step(duty, &path);
+        self.load = path.end();
+        self.elapsed += 1;
+        (self.sample.v_out - self.v_ref, duty)
+    }
+
+    /// Runs `periods` before the step, of which the last `watched` count for the error before it.
+    pub fn lead(&mut self, periods: usize, watched: usize, mut record: impl FnMut(Record)) {
+        for _ in 0..periods {
+            self.lead_period(None, watched, &mut record);
+        }
+    }
+
+    fn lead_period(&mut self, change: Option<(f64, Load)>, watched: usize, record: &mut impl FnMut(Record)) {
+        let (sample, power, time) = (self.sample, self.load.power, self.elapsed as f64);
+        let (error, duty) = self.period(change);
+        record(Record {
+            time,
+            sample,
+            duty,
+            power,
+        });
+        if self.pre.len() < watched.max(1) {
+            self.pre.push(error.abs());
+        } else {
+            let oldest = self.elapsed % self.pre.len();
+            self.pre[oldest] = error.abs();
+        }
+    }
+
+    /// The load changes to `power` at `phase` of the coming period, 0 meaning at the sampling instant that has just been.
+    /// Runs `after` periods from there; the last `tail` of them are the tail.
+    ///
+    /// [`Loop::last_before`] comes before it.
+    pub fn measure(
+        &mut self,
+        power: f64,
+        phase: f64,
+        after: usize,
+        tail: usize,
+        mut record: impl FnMut(Record),
+    ) -> Metrics {
+        let t_sample = self.environment.t_sample();
+        let mut metrics = Metrics {
+            pre_error: self.pre.iter().copied().fold(0.0, f64::max),
+            ..Metrics::default()
+        };
+        let tail = tail.clamp(1, after.max(1));
+        let (mut sum, mut ripple) = (0.0, 0.0);
+        for n in 0..after {
+            let (sample, before, time) = (self.sample, self.load.power, self.elapsed as f64);
+            let change = (n == 0 && phase > 0.0).then(|| (phase, Load::power(power)));
+            let (error, duty) = self.period(change);
+            record(Record {
+                time,
+                sample,
+                duty,
+                power: before,
+            });
+            let size = if error.is_finite() { error.abs() } else { f64::INFINITY };
+            metrics.deviation = metrics.deviation.max(size);
+            if size > SETTLED {
+                metrics.settling = ((n + 1) as f64 - phase) * t_sample;
+            }
+            if n + tail >= after {
+                sum += error;
+                metrics.tail_max = metrics.tail_max.max(size);
+                ripple += self.sample.v_max - self.sample.v_min;
+            }
+        }
+        metrics.tail_mean = (sum / tail as f64).abs();
+        metrics.ripple = ripple / tail as f64;
+        if metrics.deviation.is_infinite() {
+            metrics.tail_mean = f64::INFINITY;
+        }
+        metrics
+    }
+
+    /// The last period before the step; at phase 0 the load changes at the sampling instant that ends it.
+    pub fn last_before(&mut self, power: f64, phase: f64, watched: usize, mut record: impl FnMut(Record)) {
+        let change = (phase == 0.0).then(|| (1.0, Load::power(power)));
+        self.lead_period(change, watched, &mut record);
+    }
+}
+
+/// When a load changes: whole control periods after the lead, and a fraction of one, 0 meaning at a sampling instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Instant {
+    /// Whole periods.
+    pub periods: usize,
+    /// 0 to below 1.
+    pub phase: f64,
+}
+
+impl Task {
+    /// All instants at which a load step is tried, the sampling instants first.
+    #[must_use]
+    pub fn all_instants(&self) -> Vec<Instant> {
+        let sampling = (0..self.sampling_instants.max(1)).map(|periods| Instant { periods, phase: 0.0 });
+        let others = (1..self.instants).map(|k| Instant {
+            periods: k,
+            phase: k as f64 / self.instants as f64,
+        });
+        sampling.chain(others).collect()
+    }
+}
+
+/// Runs one load step at one instant from a fresh start and records every period; time 0 is the step.
+///
+/// # Errors
+/// If the converter cannot be started.
+pub fn load_step<E, C>(
+    environment: E,
+    controller: C,
+    v_ref: f64,
+    task: &Task,
+    load_step: [f64; 2],
+    instant: Instant,
+) -> Result<(Metrics, Vec<Record>), Error>
+where
+    E: Environment,
+    C: FnMut(&Sample) -> f64,
+{
+    let t_sample = environment.t_sample();
+    let mut run = Loop::start(environment, controller, v_ref, load_step[0])?;
+    let mut records = Vec::new();
+    let lead = task.lead + instant.periods;
+    run.lead(lead - 1, task.tail, |record| records.push(record));
+    run.last_before(load_step[1], instant.phase, task.tail, |record| records.push(record));
+    let metrics = run.measure(load_step[1], instant.phase, task.after, task.tail, |record| {
+        records.push(record)
+    });
+    let zero = lead as f64 + instant.phase;
+    for record in &mut records {
+        record.time = (record.time - zero) * t_sample;
+    }
+    Ok((metrics, records))
+}
+
+/// Runs one load step at the given instants of `task`; the lead is run once and every instant goes on from a copy.
+///
+/// # Errors
+/// If the converter cannot be started.
+pub fn survey<E, C>(
+    environment: &E,
+    controller: &C,
+    v_ref: f64,
+    task: &Task,
+    load_step: [f64; 2],
+    instants: &[Instant],
+) -> Result<Finding, Error>
+where
+    E: Environment,
+    C: FnMut(&Sample) -> f64 + Clone,
+{
+    let quiet = |_: Record| {};
+    let [from, to] = load_step;
+    let mut run = Loop::start(environment.clone(), controller.clone(), v_ref, from)?;
+    run.lead(task.lead - 1, task.tail, quiet);
+    let mut finding = Finding {
+        load_step,
+        at_sample: Metrics::default(),
+        worst: Metrics::default(),
+    };
+    let last = instants.iter().map(|instant| instant.periods).max().unwrap_or(0);
+    for period in 0..=last {
+        for instant in instants.iter().filter(|instant| instant.periods == period) {
+            let mut run = run.clone();
+            run.last_before(to, instant.phase, task.tail, quiet);
+            let metrics = run.measure(to, instant.phase, task.after, task.tail, quiet);
+            finding.worst = finding.worst.worst(metrics);
+            if instant.phase == 0.0 {
+                finding.at_sample = finding.at_sample.worst(metrics);
+            }
+        }
+        run.lead(1, task.tail, quiet);
+    }
+    Ok(finding)
+}
+
+/// All load steps of a task.
+///
+/// # Errors
+/// If the converter cannot be started.
+pub fn survey_all<E, C>(
+    environment: &E,
+    controller: &C,
+    v_ref: f64,
+    task: &Task,
+    instants: &[Instant],
+) -> Result<Vec<Finding>, Error>
+where
+    E: Environment,
+    C: FnMut(&Sample) -> f64 + Clone,
+{
+    let one = |&load_step| survey(environment, controller, v_ref, task, load_step, instants);
+    task.load_steps.iter().map(one).collect()
+}

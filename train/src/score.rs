@@ -1,0 +1,179 @@
+//! How far a policy is from its specification, as one number; smaller is better.
+
+use crate::scenario::{Finding, Metrics};
+use crate::settings::{Instants, Requirement};
+
+/// Weight of what exceeds a limit against what stays below it.
+const EXCESS: f64 = 1000.0;
+/// A diverged run is bad, but not so bad that all other figures vanish beside it.
+const WORST_RATIO: f64 = 1e3;
+
+/// Whether the specification is met, and how well.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Score {
+    /// Every limit holds.
+    pub met: bool,
+    /// Mean of figure over limit, plus a thousand times the mean excess; smaller is better. It only grows with more load
+    /// steps and instants, so that a part of them can rule a policy out.
+    pub cost: f64,
+}
+
+/// Which requirement speaks of which load step. One for a certain load step speaks of the step whose powers are closest.
+#[derive(Debug, Clone)]
+pub struct Scoring<'a> {
+    load_steps: &'a [[f64; 2]],
+    specification: &'a [Requirement],
+    margin: f64,
+    /// Number of figures that are limited.
+    count: f64,
+}
+
+impl<'a> Scoring<'a> {
+    /// Limits are multiplied by `margin`.
+    #[must_use]
+    pub fn new(load_steps: &'a [[f64; 2]], specification: &'a [Requirement], margin: f64) -> Self {
+        let mut scoring = Self {
+            load_steps,
+            specification,
+            margin,
+            count: 0.0,
+        };
+        let figures = |index| scoring.limited(index, &Metrics::default(), &Metrics::default()).len();
+        scoring.count = (0..load_steps.len()).map(figures).sum::<usize>().max(1) as f64;
+        scoring
+    }
+
+    /// The score of findings in the order of the load steps; the first few of them give a lower bound of the cost.
+    #[must_use]
+    pub fn score(&self, findings: &[Finding]) -> Score {
+        let (mut ratios, mut excess) = (0.0, 0.0);
+        for (index, finding) in findings.iter().enumerate() {
+            for (value, limit) in self.limited(index, &finding.at_sample, &finding.worst) {
+                let ratio = value / (limit * self.margin);
+                let ratio = if ratio < WORST_RATIO { ratio } else { WORST_RATIO };
+                ratios += ratio;
+                excess += f64::max(ratio - 1.0, 0.0);
+            }
+        }
+        let complete = findings.len() == self.load_steps.len();
+        Score {
+            met: complete && excess == 0.0 && !self.specification.is_empty(),
+            cost: (ratios + EXCESS * excess) / self.count,
+        }
+    }
+
+    /// Figures of load step `index` and their limits. Without a specification the worst deviation counts against 10 V,
+    /// settling against 10 ms and the tail against 1 V.
+    fn limited(&self, index: usize, at_sample: &Metrics, worst: &Metrics) -> Vec<(f64, f64)> {
+        if self.specification.is_empty() {
+            return vec![(worst.deviation, 10.0), (worst.settling, 1e-2), (worst.tail_max, 1.0)];
+        }
+        let concerned = self
+            .specification
+            .iter()
+            .filter(|requirement| self.concerns(requirement, index));
+        let pairs = concerned.flat_map(|requirement| match requirement.instants {
+            Instants::Sample => figures(at_sample, requirement),
+            Instants::Worst => figures(worst, requirement),
+        });
+        pairs.collect()
+    }
+
+    /// Whether a requirement speaks of load step `index`.
+    #[must_use]
+    pub fn concerns(&self, requirement: &Requirement, index: usize) -> bool {
+        let Some([from, to]) = requirement.load_step else {
+            return true;
+        };
+        let distance = |step: &[f64; 2]| (step[0] - from).abs() + (step[1] - to).abs();
+        let steps = self.load_steps.iter().enumerate();
+        let nearest = steps.min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)));
+        nearest.is_some_and(|(nearest, _)| nearest == index)
+    }
+}
+
+/// The figures a requirement limits, with their limits.
+#[must_use]
+pub fn figures(metrics: &Metrics, requirement: &Requirement) -> Vec<(f64, f64)> {
+    let pairs = [
+        (metrics.deviation, requirement.deviation),
+        (metrics.settling, requirement.settling),
+        (metrics.tail_max, requirement.tail),
+    ];
+    pairs
+        .into_iter()
+        .filter_map(|(value, limit)| Some((value, limit?)))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STEPS: [[f64; 2]; 2] = [[200.0, 500.0], [1000.0, 200.0]];
+
+    fn requirement(load_step: Option<[f64; 2]>, deviation: f64) -> Requirement {
+        Requirement {
+            load_step,
+            instants: Instants::Worst,
+            deviation: Some(deviation),
+            settling: None,
+            tail: None,
+        }
+    }
+
+    fn findings(deviations: [f64; 2]) -> Vec<Finding> {
+        let finding = |(load_step, deviation): (&[f64; 2], f64)| Finding {
+            load_step: *load_step,
+            at_sample: Metrics::default(),
+            worst: Metrics {
+                deviation,
+                ..Metrics::default()
+            },
+        };
+        STEPS.iter().zip(deviations).map(finding).collect()
+    }
+
+    #[test]
+    fn a_requirement_speaks_of_the_closest_load_step() {
+        let specification = [requirement(Some([205.0, 520.0]), 1.0)];
+        let scoring = Scoring::new(&STEPS, &specification, 1.0);
+        assert!(scoring.score(&findings([0.9, 50.0])).met);
+        assert!(!scoring.score(&findings([1.1, 0.0])).met);
+    }
+
+    #[test]
+    fn excess_outweighs_whatever_stays_within() {
+        let specification = [requirement(None, 1.0)];
+        let scoring = Scoring::new(&STEPS, &specification, 1.0);
+        let (good, bad) = (
+            scoring.score(&findings([1.0, 1.0])),
+            scoring.score(&findings([1.01, 0.0])),
+        );
+        assert!(good.met && !bad.met && good.cost < bad.cost);
+        assert!(
+            !Scoring::new(&STEPS, &specification, 0.9)
+                .score(&findings([1.0, 1.0]))
+                .met
+        );
+    }
+
+    #[test]
+    fn part_of_the_load_steps_gives_a_lower_bound() {
+        let specification = [requirement(None, 1.0)];
+        let scoring = Scoring::new(&STEPS, &specification, 1.0);
+        let all = findings([1.2, f64::INFINITY]);
+        let (part, whole) = (scoring.score(&all[..1]), scoring.score(&all));
+        assert!(part.cost < whole.cost && whole.cost.is_finite() && !part.met);
+    }
+
+    #[test]
+    fn without_a_specification_nothing_is_met_but_policies_compare() {
+        let scoring = Scoring::new(&STEPS, &[], 1.0);
+        let (a, b) = (
+            scoring.score(&findings([1.0, 1.0])),
+            scoring.score(&findings([1.0, 1.5])),
+        );
+        assert!(!a.met && a.cost < b.cost);
+    }
+}

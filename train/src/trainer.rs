@@ -1,0 +1,458 @@
+//! One training: the loop, what it says on its way, how it is judged.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant as Clock;
+
+use plant::{Load, Sample};
+
+use crate::agent::Agent;
+use crate::contract::Contract;
+use crate::environment::{Environment, LoadPath, Start};
+use crate::faults::Error;
+use crate::learner::{Learner, TargetUpdate, greedy};
+use crate::network::Network;
+use crate::replay::ReplayBuffer;
+use crate::rng::Rng;
+use crate::scenario::{Finding, Instant, Task, survey, survey_all};
+use crate::score::{Score, Scoring};
+use crate::settings::{Draw, Loads, Settings};
+
+/// Streams of a seed.
+const WEIGHTS: u64 = 0;
+const EXPLORATION: u64 = 1;
+const REPLAY: u64 = 2;
+const SCENARIO: u64 = 3;
+
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ended {
+    /// The selection scenarios meet the specification.
+    Met,
+    /// All control periods of the budget are used.
+    Budget,
+    /// The flag was raised; the training can go on from its checkpoint.
+    Interrupted,
+}
+
+/// What a training says at every look.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Progress {
+    /// Seed of the training.
+    pub seed: u64,
+    /// The row of the learning curve.
+    pub look: Look,
+    /// Best cost so far.
+    pub best: f64,
+    /// Control periods of the budget.
+    pub steps: u64,
+    /// Since the start or the resumption, s.
+    pub elapsed: f64,
+    /// Until the budget is used, s.
+    pub remaining: f64,
+}
+
+/// A row of the learning curve: what happened since the row before.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Look {
+    /// Control periods so far.
+    pub step: u64,
+    /// Mean reward per control period.
+    pub reward: f64,
+    /// Mean |e|, V.
+    pub error: f64,
+    /// Mean loss per update.
+    pub loss: f64,
+    /// Probability of a random action now.
+    pub epsilon: f64,
+    /// Cost on the selection scenarios ([`Score`]); a lower bound where it does not beat the best.
+    pub cost: f64,
+}
+
+/// The policy that did best on the selection scenarios.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Best {
+    /// Control periods after which it was found.
+    pub step: u64,
+    /// How well it did.
+    pub score: Score,
+    /// Its network.
+    pub network: Network,
+}
+
+/// A training in the middle of its work.
+#[derive(Debug, Clone)]
+pub struct Trainer<E> {
+    pub(crate) settings: Settings,
+    pub(crate) contract: Contract,
+    pub(crate) seed: u64,
+    pub(crate) nominal: E,
+    pub(crate) environment: E,
+    pub(crate) agent: Agent,
+    pub(crate) learner: Learner,
+    pub(crate) replay: ReplayBuffer,
+    pub(crate) exploration: Rng,
+    pub(crate) sampling: Rng,
+    pub(crate) scenario: Rng,
+    pub(crate) step: u64,
+    pub(crate) episode_step: u64,
+    pub(crate) sample: Sample,
+    pub(crate) load: Load,
+    pub(crate) sums: Sums,
+    pub(crate) curve: Vec<Look>,
+    pub(crate) best: Option<Best>,
+    pub(crate) met: bool,
+    before: Vec<f32>,
+    scratch: [Vec<f32>; 2],
+}
+
+/// Sums since the last look.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Sums {
+    pub periods: u64,
+    pub updates: u64,
+    pub reward: f64,
+    pub error: f64,
+    pub loss: f64,
+}
+
+impl<E: Environment> Trainer<E> {
+    /// A training that has not begun.
+    ///
+    /// # Errors
+    /// If contract, settings and plant do not fit together.
+    pub fn new(settings: &Settings, contract: &Contract, environment: &E, seed: u64) -> Result<Self, Error> {
+        check_fit(settings, contract, environment)?;
+        let mut network = contract.network();
+        network.initialise(&mut Rng::new(seed, WEIGHTS));
+        let agent = Agent::new(&contract.policy)?;
+        let mut trainer = Self {
+            replay: ReplayBuffer::new(network.inputs(), settings.learning.replay),
+            learner: Learner::new(network, settings.learning.learner),
+            settings: settings.clone(),
+            contract: contract.clone(),
+            seed,
+            nominal: environment.clone(),
+            environment: environment.clone(),
+            agent,
+            exploration: Rng::new(seed, EXPLORATION),
+            sampling: Rng::new(seed, REPLAY),
+            scenario: Rng::new(seed, SCENARIO),
+            step: 0,
+            episode_step: 0,
+            sample: Sample::default(),
+            load: Load::default(),
+            sums: Sums::default(),
+            curve: Vec::new(),
+            best: None,
+            met: false,
+            before: Vec::new(),
+            scratch: [Vec::new(), Vec::new()],
+        };
+        trainer.begin_episode()?;
+        Ok(trainer)
+    }
+
+    /// Control periods so far.
+    #[must_use]
+    pub fn step_count(&self) -> u64 {
+        self.step
+    }
+
+    /// Seed of the training.
+    #[must_use]
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// The learning curve so far.
+    #[must_use]
+    pub fn curve(&self) -> &[Look] {
+        &self.curve
+    }
+
+    /// The network that acts.
+    #[must_use]
+    pub fn network(&self) -> &Network {
+        &self.learner.online
+    }
+
+    /// The policy that did best so far; nothing before the first look.
+    #[must_use]
+    pub fn best(&self) -> Option<&Best> {
+        self.best.as_ref()
+    }
+
+    /// Trains until the specification is met, the budget is used or `stop` is raised; `progress` is called at every look.
+    /// Where it stopped it can go on, also from a checkpoint, as if it had not stopped.
+    ///
+    /// # Errors
+    /// If a drawn plant is not a converter.
+    pub fn run(&mut self, stop: &AtomicBool, progress: impl FnMut(&Progress)) -> Result<Ended, Error> {
+        self.run_until(self.settings.steps, stop, progress)
+    }
+
+    /// [`Trainer::run`] up to control period `last` only, where it counts as interrupted.
+    ///
+    /// # Errors
+    /// As [`Trainer::run`].
+    pub fn run_until(
+        &mut self,
+        last: u64,
+        stop: &AtomicBool,
+        mut progress: impl FnMut(&Progress),
+    ) -> Result<Ended, Error> {
+        let (started, first) = (Clock::now(), self.step);
+        while self.step < self.settings.steps && !self.met {
+            if stop.load(Ordering::Relaxed) || self.step >= last {
+                return Ok(Ended::Interrupted);
+            }
+            self.control_period()?;
+            if self.step.is_multiple_of(self.settings.selection.every) || self.step == self.settings.steps {
+                self.look()?;
+                let elapsed = started.elapsed().as_secs_f64();
+                let left = (self.settings.steps - self.step) as f64 / (self.step - first).max(1) as f64;
+                let look = self.curve.last().copied().unwrap_or_default();
+                progress(&Progress {
+                    seed: self.seed,
+                    look,
+                    best: self.best.as_ref().map_or(f64::INFINITY, |best| best.score.cost),
+                    steps: self.settings.steps,
+                    elapsed,
+                    remaining: elapsed * left,
+                });
+            }
+        }
+        Ok(if self.met { Ended::Met } else { Ended::Budget })
+    }
+
+    /// One control period: act, measure, remember, learn.
+    fn control_period(&mut self) -> Result<(), Error> {
+        let learning = &self.settings.learning;
+        let epsilon = learning.epsilon(self.step);
+        let action = if self.exploration.unit() < epsilon {
+            self.exploration.index(self.learner.online.outputs())
+        } else {
+            self.learner
+                .online
+                .q_values(self.agent.observation(), &mut self.scratch);
+            greedy(&self.scratch[0])
+        };
+        let action = action as u32;
+        self.before.clear();
+        self.before.extend_from_slice(self.agent.observation());
+        let before = self.agent.previous_duty();
+        let duty = self.agent.act(action);
+        let path = self.load_path();
+        self.sample = self.environment.step(duty, &path);
+        self.load = path.end();
+        self.agent.sense(&self.sample.measured)?;
+
+        let reward = self.settings.reward.of(self.sample.v_out, duty - before);
+        self.replay
+            .push(&self.before, action, reward as f32, self.agent.observation(), false);
+        self.step += 1;
+        self.episode_step += 1;
+        let error = (self.sample.v_out - self.settings.reward.v_ref).abs();
+        self.sums.periods += 1;
+        self.sums.reward += reward;
+        self.sums.error += error;
+        self.learn();
+        let lost = error.is_nan() || error > self.settings.episode.max_error;
+        if lost || self.episode_step >= self.settings.episode.steps {
+            self.begin_episode()?;
+        }
+        Ok(())
+    }
+
+    fn learn(&mut self) {
+        let learning = &self.settings.learning;
+        if self.step < learning.warm_up {
+            return;
+        }
+        let rate = learning.rate(self.step, self.settings.steps);
+        for _ in 0..learning.updates_per_step {
+            self.sums.loss += self.learner.update(&self.replay, rate, &mut self.sampling);
+            self.sums.updates += 1;
+        }
+    }
+
+    /// The load of the coming control period; it changes every so often.
+    fn load_path(&mut self) -> LoadPath {
+        let mut path = LoadPath::constant(self.load);
+        let episode = &self.settings.episode;
+        if (self.episode_step + 1).is_multiple_of(episode.load_every) {
+            let (loads, _) = self.settings.stage(self.step);
+            let power = draw_load(loads, &mut self.scenario);
+            let at = if episode.any_phase {
+                1.0 - self.scenario.unit()
+            } else {
+                1.0
+            };
+            path.change = Some((at, Load::power(power)));
+        }
+        path
+    }
+
+    /// A new converter, a new load, a new start; the episode before is cut short, not ended: its last transition says so.
+    fn begin_episode(&mut self) -> Result<(), Error> {
+        let (loads, share) = self.settings.stage(self.step);
+        let rng = &mut self.scenario;
+        let power = draw_load(loads, rng);
+        let episode = &self.settings.episode;
+        let v_out = rng.within(episode.initial_voltage[0], episode.initial_voltage[1]);
+        let beside = rng.within(episode.initial_current[0], episode.initial_current[1]);
+        let seed = rng.bits();
+        let mut varied = Vec::new();
+        for parameter in &self.settings.randomise {
+            let nominal = self.nominal.parameter(&parameter.key).unwrap_or_default();
+            let drawn = match parameter.draw {
+                Draw::Value([low, high]) => rng.within(low, high),
+                Draw::Factor([low, high]) => nominal * rng.within(low, high),
+            };
+            varied.push((parameter.key.as_str(), nominal + share * (drawn - nominal)));
+        }
+        self.load = Load::power(power);
+        self.agent.reset();
+        self.sample = self.environment.restart(&Start {
+            v_out,
+            i_l: (power / v_out.max(1.0) + beside).max(0.0),
+            load: self.load,
+            seed,
+            varied: &varied,
+        })?;
+        self.episode_step = 0;
+        self.agent.sense(&self.sample.measured)
+    }
+
+    /// Judges two candidates on the selection scenarios: the network that acts and, with a soft update, the target network,
+    /// its running mean, in which the noise of single updates has averaged out. Keeps the best of all looks.
+    fn look(&mut self) -> Result<(), Error> {
+        let mut cost = f64::INFINITY;
+        let soft = matches!(self.settings.learning.learner.target_update, TargetUpdate::Soft { .. });
+        let networks = [Some(&self.learner.online), soft.then_some(&self.learner.target_network)];
+        for network in networks.into_iter().flatten() {
+            let score = self.judge(network)?;
+            cost = cost.min(score.cost);
+            if self.best.as_ref().is_none_or(|best| score.cost < best.score.cost) {
+                self.best = Some(Best {
+                    step: self.step,
+                    score,
+                    network: network.clone(),
+                });
+                self.met = score.met && self.settings.early_stop;
+            }
+        }
+        let per = |sum: f64, count: u64| sum / count.max(1) as f64;
+        let sums = std::mem::take(&mut self.sums);
+        self.curve.push(Look {
+            step: self.step,
+            reward: per(sums.reward, sums.periods),
+            error: per(sums.error, sums.periods),
+            loss: per(sums.loss, sums.updates),
+            epsilon: self.settings.learning.epsilon(self.step),
+            cost,
+        });
+        Ok(())
+    }
+
+    /// The cost grows with load steps and instants: a policy that some of them rule out is not run through the rest, and
+    /// its cost is a lower bound.
+    fn judge(&self, network: &Network) -> Result<Score, Error> {
+        let selection = &self.settings.selection;
+        let task = &selection.task;
+        let scoring = Scoring::new(&task.load_steps, &self.settings.specification, selection.margin);
+        let controller = quick_controller(&self.contract, network)?;
+        let best = self.best.as_ref().map_or(f64::INFINITY, |best| best.score.cost);
+        let instants = task.all_instants();
+        let mut score = scoring.score(&[]);
+        for instants in [&instants[..1], &instants] {
+            let mut findings = Vec::new();
+            for &load_step in &task.load_steps {
+                let v_ref = self.settings.reward.v_ref;
+                findings.push(survey(&self.nominal, &controller, v_ref, task, load_step, instants)?);
+                score = scoring.score(&findings);
+                if score.cost >= best {
+                    return Ok(Score { met: false, ..score });
+                }
+            }
+        }
+        Ok(score)
+    }
+
+    /// Runs a network through scenarios on the plant as its file says, with the whole controller of the contract.
+    ///
+    /// # Errors
+    /// If the plant cannot be started.
+    pub fn survey(&self, network: &Network, task: &Task, instants: &[Instant]) -> Result<Vec<Finding>, Error> {
+        let controller = controller(&self.contract, network)?;
+        survey_all(&self.nominal, &controller, self.settings.reward.v_ref, task, instants)
+    }
+}
+
+/// A network at work in the controller of its contract, for [`crate::scenario`]: the whole interpreter.
+///
+/// # Errors
+/// If the contract measures something that the plant does not have.
+pub fn controller(
+    contract: &Contract,
+    network: &Network,
+) -> Result<impl FnMut(&Sample) -> f64 + Clone + use<>, Error> {
+    let mut agent = Agent::new(&contract.with(network))?;
+    // the signals fit the contract since `Agent::new`; a NaN would end the run as a divergence
+    Ok(move |sample: &Sample| agent.step(&sample.measured).unwrap_or(f64::NAN))
+}
+
+/// The same to the bit, three times as fast: the contract's controller around the trainer's network.
+///
+/// # Errors
+/// As [`controller`].
+pub fn quick_controller(
+    contract: &Contract,
+    network: &Network,
+) -> Result<impl FnMut(&Sample) -> f64 + Clone + use<>, Error> {
+    let mut agent = Agent::new(&contract.policy)?;
+    let network = network.clone();
+    let mut scratch = [Vec::new(), Vec::new()];
+    Ok(move |sample: &Sample| {
+        if agent.sense(&sample.measured).is_err() {
+            return f64::NAN;
+        }
+        network.q_values(agent.observation(), &mut scratch);
+        agent.act(greedy(&scratch[0]) as u32)
+    })
+}
+
+fn draw_load(loads: &Loads, rng: &mut Rng) -> f64 {
+    if !loads.values.is_empty() && rng.unit() < loads.share {
+        loads.values[rng.index(loads.values.len())]
+    } else {
+        rng.within(loads.range[0], loads.range[1])
+    }
+}
+
+fn check_fit<E: Environment>(settings: &Settings, contract: &Contract, environment: &E) -> Result<(), Error> {
+    let (policy, plant) = (contract.policy.sample_period, environment.t_sample());
+    if (policy / plant - 1.0).abs() > 1e-9 {
+        let text = format!(
+            "contract and plant have different control periods\n  = found: sample_period = {policy} s in the contract, \
+             {plant} s at the plant\n  = hint: f_sw of the plant is 1 / sample_period"
+        );
+        return Err(Error::Mismatch(text));
+    }
+    let unknown = settings
+        .randomise
+        .iter()
+        .find(|parameter| environment.parameter(&parameter.key).is_none());
+    match unknown {
+        None => Ok(()),
+        Some(parameter) => {
+            let text = format!(
+                "{}: [[randomise]] names `{}`, which is not a number of the plant\n  = hint: write it as in the plant's \
+                 file, `table.key`: `switch.v_f`",
+                settings.file.display(),
+                parameter.key
+            );
+            Err(Error::Mismatch(text))
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! Whole trainings, small ones: they learn, repeat themselves to the byte, and go on where they were interrupted.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod common;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use common::{Alarm, StandIn, tiny};
+use train::scenario::load_step;
+use train::trainer::{controller, quick_controller};
+use train::{Ended, Trainer, seeds, train_all};
+
+static NEVER: AtomicBool = AtomicBool::new(false);
+
+fn trainer(seed: u64) -> Trainer<StandIn> {
+    let (settings, contract) = tiny();
+    Trainer::new(&settings, &contract, &StandIn::new(1.5e-3, 1), seed).unwrap()
+}
+
+#[test]
+fn a_small_training_learns_to_hold_the_voltage() {
+    let mut trainer = trainer(3);
+    assert_eq!(trainer.run(&NEVER, |_| {}).unwrap(), Ended::Budget);
+    let (first, best) = (trainer.curve()[0], trainer.best().unwrap());
+    assert!(
+        best.score.cost < 0.25 * first.cost,
+        "first {}, best {}",
+        first.cost,
+        best.score.cost
+    );
+    let outcome = trainer.finish(Ended::Budget).unwrap();
+    for finding in &outcome.findings {
+        assert!(
+            finding.worst.deviation < 3.0 && finding.worst.tail_max < 1.0,
+            "{finding:?}"
+        );
+    }
+}
+
+#[test]
+fn the_trainer_sees_the_q_values_of_the_interpreter_to_the_bit() {
+    let trainer = trainer(3);
+    let (_, contract) = tiny();
+    let controller = interp::Controller::<f32>::new(&contract.with(trainer.network()));
+    let mut scratch = [Vec::new(), Vec::new()];
+    for n in 0..50 {
+        let observation: Vec<f32> = (0..4).map(|i| ((n * 7 + i * 13) % 31) as f32 * 0.13 - 2.0).collect();
+        trainer.network().q_values(&observation, &mut scratch);
+        let expected = controller.q_values(&ndarray::aview1(&observation)).unwrap();
+        let bits = |x: &f32| x.to_bits();
+        assert!(scratch[0].iter().map(bits).eq(expected.iter().map(bits)));
+    }
+}
+
+#[test]
+fn the_controller_of_the_looks_commands_what_the_interpreter_commands() {
+    let mut trainer = trainer(3);
+    trainer.run_until(1500, &NEVER, |_| {}).unwrap();
+    let (settings, contract) = tiny();
+    let network = trainer.network();
+    let task = &settings.evaluation;
+    for instant in task.all_instants() {
+        let run = |quick| {
+            let environment = StandIn::new(1.5e-3, 1);
+            let step = [200.0, 800.0];
+            if quick {
+                let controller = quick_controller(&contract, network).unwrap();
+                return load_step(environment, controller, 100.0, task, step, instant).unwrap().1;
+            }
+            load_step(environment, controller(&contract, network).unwrap(), 100.0, task, step, instant).unwrap().1
+        };
+        assert_eq!(run(true), run(false));
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes_alone_and_side_by_side() {
+    let (mut settings, contract) = tiny();
+    settings.steps = 500;
+    settings.seeds = vec![3, 4, 5];
+    let environment = StandIn::new(1.5e-3, 1);
+    let none = BTreeMap::new();
+    let run = |threads| train_all(&settings, &contract, &environment, threads, &none, &NEVER, &|_| {}).unwrap();
+    let (alone, together) = (run(1), run(3));
+    for (a, b) in alone.iter().zip(&together) {
+        assert!(a.checkpoint == b.checkpoint);
+        assert_eq!(a.outcome.as_ref().unwrap().files, b.outcome.as_ref().unwrap().files);
+    }
+    assert!(alone[0].checkpoint != alone[1].checkpoint);
+    let best = seeds::best(&alone).unwrap();
+    let costs = alone.iter().map(|run| run.outcome.as_ref().unwrap().selected.cost);
+    assert_eq!(best.selected.cost, costs.fold(f64::INFINITY, f64::min));
+}
+
+#[test]
+fn an_interrupted_training_goes_on_to_the_same_bytes() {
+    let (mut settings, contract) = tiny();
+    settings.steps = 760;
+    let mut whole = Trainer::new(&settings, &contract, &StandIn::new(1.5e-3, 1), 3).unwrap();
+    whole.run(&NEVER, |_| {}).unwrap();
+
+    let alarm = Arc::new(Alarm::default());
+    let mut environment = StandIn::new(1.5e-3, 1);
+    environment.alarm = Some(alarm.clone());
+    let mut trainer = Trainer::new(&settings, &contract, &environment, 3).unwrap();
+    let mut interruptions = 0;
+    // before the first update, inside episodes, behind looks
+    for steps in [13, 71, 180, 777, 5, 400, 1 << 40] {
+        alarm.steps.store(steps, Ordering::Relaxed);
+        alarm.flag.store(false, Ordering::Relaxed);
+        let ended = trainer.run(&alarm.flag, |_| {}).unwrap();
+        interruptions += u32::from(ended == Ended::Interrupted);
+        let bytes = trainer.checkpoint().unwrap();
+        // a fresh training, of another seed even, becomes the interrupted one
+        trainer = Trainer::new(&settings, &contract, &environment, 9).unwrap();
+        trainer.resume(&bytes).unwrap();
+        assert!(trainer.checkpoint().unwrap() == bytes);
+    }
+    assert!(interruptions >= 4, "{interruptions}");
+    assert_eq!(trainer.step_count(), 760);
+    assert!(trainer.checkpoint().unwrap() == whole.checkpoint().unwrap());
+    let (a, b) = (
+        trainer.finish(Ended::Budget).unwrap(),
+        whole.finish(Ended::Budget).unwrap(),
+    );
+    assert_eq!(a.files, b.files);
+}
+
+#[test]
+fn a_checkpoint_of_another_training_is_refused() {
+    let (mut settings, contract) = tiny();
+    let bytes = trainer(3).checkpoint().unwrap();
+    let environment = StandIn::new(150e-6, 1);
+    let mut other_plant = Trainer::new(&settings, &contract, &environment, 3).unwrap();
+    assert!(
+        other_plant
+            .resume(&bytes)
+            .unwrap_err()
+            .to_string()
+            .contains("another training")
+    );
+    settings.digest.push('0');
+    let mut other_file = Trainer::new(&settings, &contract, &StandIn::new(1.5e-3, 1), 3).unwrap();
+    assert!(other_file.resume(&bytes).is_err());
+    assert!(
+        trainer(3)
+            .resume(&bytes[1..])
+            .unwrap_err()
+            .to_string()
+            .contains("not a checkpoint")
+    );
+}
+
+#[test]
+fn training_stops_once_the_specification_is_met() {
+    let (mut settings, contract) = tiny();
+    let easy = "\n[[spec]]\ndeviation = 50.0\n";
+    let path = settings.file.clone();
+    let text = std::fs::read_to_string(&path).unwrap() + easy;
+    settings = train::Settings::parse(&text, &path).unwrap();
+    let mut trainer = Trainer::new(&settings, &contract, &StandIn::new(1.5e-3, 1), 3).unwrap();
+    assert_eq!(trainer.run(&NEVER, |_| {}).unwrap(), Ended::Met);
+    assert!(trainer.step_count() < 2500, "{}", trainer.step_count());
+    let report = trainer.finish(Ended::Met).unwrap().files.remove("report.txt").unwrap();
+    assert!(String::from_utf8(report).unwrap().contains("Specification: met"));
+}
+
+#[test]
+fn the_policy_folder_passes_the_check_and_its_golden_vectors_are_the_trainers() {
+    let mut trainer = trainer(4);
+    let calls = AtomicU64::new(0);
+    let ended = trainer.run(&NEVER, |progress| {
+        calls.fetch_add(1, Ordering::Relaxed);
+        assert_eq!((progress.seed, progress.steps), (4, 2500));
+    });
+    assert_eq!(calls.load(Ordering::Relaxed), 10);
+    let outcome = trainer.finish(ended.unwrap()).unwrap();
+    let names: Vec<&str> = outcome.files.keys().map(String::as_str).collect();
+    let expected = [
+        "evaluation.csv",
+        "golden.safetensors",
+        "learning-curve.csv",
+        "net.safetensors",
+        "policy.toml",
+        "report.txt",
+    ];
+    assert_eq!(names, expected);
+
+    let folder = tempfile::tempdir().unwrap();
+    for (name, bytes) in &outcome.files {
+        std::fs::write(folder.path().join(name), bytes).unwrap();
+    }
+    let policy = policy::load(&folder.path().join("policy.toml")).unwrap_or_else(|faults| panic!("{faults}"));
+    let golden = policy.golden.unwrap();
+    assert!(golden.count > 50, "{}", golden.count);
+    assert_eq!(
+        policy.layers.iter().map(|layer| layer.outputs).collect::<Vec<_>>(),
+        [24, 16, 5]
+    );
+    let best = &trainer.best().unwrap().network;
+    let mut scratch = [Vec::new(), Vec::new()];
+    best.q_values(&golden.observations[..4], &mut scratch);
+    for (a, b) in scratch[0].iter().zip(&golden.q_values) {
+        assert!((a - b).abs() < 1e-4, "{a} {b}");
+    }
+}

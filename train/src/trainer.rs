@@ -393,7 +393,10 @@ impl<E: Environment> Trainer<E> {
 ///
 /// # Errors
 /// If the contract measures something that the plant does not have.
-pub fn controller(contract: &Contract, network: &Network) -> Result<impl FnMut(&Sample) -> f64 + Clone + use<>, Error> {
+pub fn controller(
+    contract: &Contract,
+    network: &Network,
+) -> Result<impl FnMut(&Sample) -> f64 + Clone + use<>, Error> {
     let mut agent = Agent::new(&contract.with(network))?;
     // the signals fit the contract since `Agent::new`; a NaN would end the run as a divergence
     Ok(move |sample: &Sample| agent.step(&sample.measured).unwrap_or(f64::NAN))

@@ -68,20 +68,9 @@ fn the_controller_of_the_looks_commands_what_the_interpreter_commands() {
             let step = [200.0, 800.0];
             if quick {
                 let controller = quick_controller(&contract, network).unwrap();
-                return load_step(environment, controller, 100.0, task, step, instant)
-                    .unwrap()
-                    .1;
+                return load_step(environment, controller, 100.0, task, step, instant).unwrap().1;
             }
-            load_step(
-                environment,
-                controller(&contract, network).unwrap(),
-                100.0,
-                task,
-                step,
-                instant,
-            )
-            .unwrap()
-            .1
+            load_step(environment, controller(&contract, network).unwrap(), 100.0, task, step, instant).unwrap().1
         };
         assert_eq!(run(true), run(false));
     }

@@ -5,7 +5,7 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use train::scenario::Finding;
+use closed_loop::scenario::Finding;
 use train::{Contract, Converter, Error, Settings, Trainer, outcome};
 
 fn main() -> Result<(), Error> {

@@ -123,8 +123,8 @@ pub enum Error {
     Settings(Faults),
     /// The contract, or the policy made from it.
     Policy(policy::Faults),
-    /// The plant.
-    Plant(plant::Faults),
+    /// The plant, or what is made of it.
+    Loop(closed_loop::Error),
     /// A checkpoint that does not fit, is damaged or of another version.
     Checkpoint(String),
     /// The contract and the plant or the training do not fit together.
@@ -143,7 +143,7 @@ impl fmt::Display for Error {
         match self {
             Self::Settings(faults) => faults.fmt(f),
             Self::Policy(faults) => faults.fmt(f),
-            Self::Plant(faults) => faults.fmt(f),
+            Self::Loop(error) => error.fmt(f),
             Self::Checkpoint(text) => write!(f, "checkpoint: {text}"),
             Self::Mismatch(text) => f.write_str(text),
             Self::File { path, error } => write!(f, "{}: {error}", path.display()),
@@ -165,14 +165,8 @@ impl From<policy::Faults> for Error {
     }
 }
 
-impl From<plant::Faults> for Error {
-    fn from(faults: plant::Faults) -> Self {
-        Self::Plant(faults)
-    }
-}
-
-impl From<interp::InputError> for Error {
-    fn from(error: interp::InputError) -> Self {
-        Self::Mismatch(error.to_string())
+impl From<closed_loop::Error> for Error {
+    fn from(error: closed_loop::Error) -> Self {
+        Self::Loop(error)
     }
 }

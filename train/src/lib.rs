@@ -11,11 +11,8 @@
 //! controller that a training has for itself. Nothing here writes files (a contract is checked in a temporary folder).
 //! docs/train.md describes the training file.
 
-pub mod agent;
 mod checkpoint;
 pub mod contract;
-pub mod converter;
-pub mod environment;
 mod faults;
 pub mod learner;
 pub mod network;
@@ -24,15 +21,13 @@ pub mod outcome;
 pub mod replay;
 mod resume;
 pub mod rng;
-pub mod scenario;
 pub mod score;
 pub mod seeds;
 pub mod settings;
 pub mod trainer;
 
+pub use closed_loop::{Converter, Environment};
 pub use contract::{Contract, Files};
-pub use converter::Converter;
-pub use environment::Environment;
 pub use faults::{Error, Fault, Faults, Place};
 pub use outcome::Outcome;
 pub use seeds::{SeedRun, train_all};

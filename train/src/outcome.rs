@@ -5,15 +5,15 @@ use std::fmt::Write;
 
 use plant::Sample;
 
-use crate::agent::Agent;
 use crate::contract::{Files, GoldenVectors};
-use crate::environment::Environment;
 use crate::faults::Error;
 use crate::network::Network;
-use crate::scenario::{Finding, load_step};
 use crate::score::{Score, Scoring, figures};
 use crate::settings::Instants;
 use crate::trainer::{Best, Ended, Look, Trainer};
+use closed_loop::Agent;
+use closed_loop::environment::Environment;
+use closed_loop::scenario::{Finding, load_step};
 
 /// Observations among the golden vectors at most.
 const GOLDEN: usize = 512;

@@ -5,11 +5,11 @@ use plant::{Load, Sample, Signals};
 use sha2::{Digest, Sha256};
 
 use crate::checkpoint::{Reader, Writer, other};
-use crate::environment::Environment;
 use crate::faults::Error;
 use crate::rng::Rng;
 use crate::score::Score;
 use crate::trainer::{Best, Look, Sums, Trainer};
+use closed_loop::environment::Environment;
 
 impl<E: Environment> Trainer<E> {
     /// The whole training: networks, optimiser, replay, random numbers, plant, filters, curve, best policy.

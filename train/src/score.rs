@@ -1,7 +1,7 @@
 //! How far a policy is from its specification, as one number; smaller is better.
 
-use crate::scenario::{Finding, Metrics};
 use crate::settings::{Instants, Requirement};
+use closed_loop::scenario::{Finding, Metrics};
 
 /// Weight of what exceeds a limit against what stays below it.
 const EXCESS: f64 = 1000.0;

@@ -6,11 +6,11 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread;
 
 use crate::contract::Contract;
-use crate::environment::Environment;
 use crate::faults::Error;
 use crate::outcome::Outcome;
 use crate::settings::Settings;
 use crate::trainer::{Ended, Progress, Trainer};
+use closed_loop::environment::Environment;
 
 /// One seed's training after a run.
 #[derive(Debug)]

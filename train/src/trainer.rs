@@ -5,17 +5,17 @@ use std::time::Instant as Clock;
 
 use plant::{Load, Sample};
 
-use crate::agent::Agent;
 use crate::contract::Contract;
-use crate::environment::{Environment, LoadPath, Start};
 use crate::faults::Error;
 use crate::learner::{Learner, TargetUpdate, greedy};
 use crate::network::Network;
 use crate::replay::ReplayBuffer;
 use crate::rng::Rng;
-use crate::scenario::{Finding, Instant, Task, survey, survey_all};
 use crate::score::{Score, Scoring};
 use crate::settings::{Draw, Loads, Settings};
+use closed_loop::Agent;
+use closed_loop::environment::{Environment, LoadPath, Start};
+use closed_loop::scenario::{Finding, Instant, Task, survey, survey_all};
 
 /// Streams of a seed.
 const WEIGHTS: u64 = 0;
@@ -321,7 +321,7 @@ impl<E: Environment> Trainer<E> {
             varied: &varied,
         })?;
         self.episode_step = 0;
-        self.agent.sense(&self.sample.measured)
+        Ok(self.agent.sense(&self.sample.measured)?)
     }
 
     /// Judges two candidates on the selection scenarios: the network that acts and, with a soft update, the target network,
@@ -385,18 +385,16 @@ impl<E: Environment> Trainer<E> {
     /// If the plant cannot be started.
     pub fn survey(&self, network: &Network, task: &Task, instants: &[Instant]) -> Result<Vec<Finding>, Error> {
         let controller = controller(&self.contract, network)?;
-        survey_all(&self.nominal, &controller, self.settings.reward.v_ref, task, instants)
+        let v_ref = self.settings.reward.v_ref;
+        Ok(survey_all(&self.nominal, &controller, v_ref, task, instants)?)
     }
 }
 
-/// A network at work in the controller of its contract, for [`crate::scenario`]: the whole interpreter.
+/// A network at work in the controller of its contract, for [`closed_loop::scenario`]: the whole interpreter.
 ///
 /// # Errors
 /// If the contract measures something that the plant does not have.
-pub fn controller(
-    contract: &Contract,
-    network: &Network,
-) -> Result<impl FnMut(&Sample) -> f64 + Clone + use<>, Error> {
+pub fn controller(contract: &Contract, network: &Network) -> Result<impl FnMut(&Sample) -> f64 + Clone + use<>, Error> {
     let mut agent = Agent::new(&contract.with(network))?;
     // the signals fit the contract since `Agent::new`; a NaN would end the run as a divergence
     Ok(move |sample: &Sample| agent.step(&sample.measured).unwrap_or(f64::NAN))

@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
+use closed_loop::scenario::load_step;
 use common::{Alarm, StandIn, tiny};
-use train::scenario::load_step;
 use train::trainer::{controller, quick_controller};
 use train::{Ended, Trainer, seeds, train_all};
 
@@ -68,9 +68,20 @@ fn the_controller_of_the_looks_commands_what_the_interpreter_commands() {
             let step = [200.0, 800.0];
             if quick {
                 let controller = quick_controller(&contract, network).unwrap();
-                return load_step(environment, controller, 100.0, task, step, instant).unwrap().1;
+                return load_step(environment, controller, 100.0, task, step, instant)
+                    .unwrap()
+                    .1;
             }
-            load_step(environment, controller(&contract, network).unwrap(), 100.0, task, step, instant).unwrap().1
+            load_step(
+                environment,
+                controller(&contract, network).unwrap(),
+                100.0,
+                task,
+                step,
+                instant,
+            )
+            .unwrap()
+            .1
         };
         assert_eq!(run(true), run(false));
     }

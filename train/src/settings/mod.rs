@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use crate::faults::{Error, Fault, Faults};
 use crate::learner::LearnerSettings;
-use crate::scenario::Task;
+use closed_loop::scenario::Task;
 
 /// A training, as its file says. Defaults are those of the paper (arXiv 2110.10490) and its authors' code.
 #[derive(Debug, Clone, PartialEq)]

@@ -10,7 +10,7 @@ use super::{Draw, Episode, Instants, Learning, Loads, Randomised, Requirement, R
 use crate::faults::{Fault, Faults};
 use crate::learner::{LearnerSettings, Loss, TargetUpdate};
 use crate::optimiser::AdamSettings;
-use crate::scenario::Task;
+use closed_loop::scenario::Task;
 
 const ANY: [f64; 2] = [f64::MIN, f64::MAX];
 const POWER: [f64; 2] = [0.0, 1e7];

@@ -7,8 +7,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
+use closed_loop::environment::{Environment, LoadPath, Start};
 use plant::{Load, Sample, Signals};
-use train::environment::{Environment, LoadPath, Start};
 use train::{Contract, Settings};
 
 /// The training of `fixtures/tiny.toml`.
@@ -106,7 +106,7 @@ impl Environment for StandIn {
         format!("{} {} {}", self.capacitance, self.v_in, self.delay).into_bytes()
     }
 
-    fn restart(&mut self, start: &Start<'_>) -> Result<Sample, train::Error> {
+    fn restart(&mut self, start: &Start<'_>) -> Result<Sample, closed_loop::Error> {
         self.factor = start.varied.first().map_or(1.0, |(_, v_in)| v_in / self.v_in);
         (self.i, self.v) = (start.i_l, start.v_out);
         self.waiting = vec![start.v_out / self.v_in; self.delay];
@@ -135,14 +135,14 @@ impl Environment for StandIn {
         self.sample(load.end().power, range)
     }
 
-    fn save(&self) -> Result<Vec<u8>, train::Error> {
+    fn save(&self) -> Result<Vec<u8>, closed_loop::Error> {
         let words = [self.factor, self.i, self.v]
             .into_iter()
             .chain(self.waiting.iter().copied());
         Ok(words.flat_map(f64::to_le_bytes).collect())
     }
 
-    fn load(&mut self, bytes: &[u8]) -> Result<(), train::Error> {
+    fn load(&mut self, bytes: &[u8]) -> Result<(), closed_loop::Error> {
         let words: Vec<f64> = bytes
             .as_chunks::<8>()
             .0

@@ -9,6 +9,7 @@ const LAYERS: &[&[&str]] = &[
     &["targets", "templates", "plant", "report"],
     &["policy"],
     &["interp", "codegen", "drm"],
+    &["closed-loop"],
     &["policy-macro", "train", "diagnose", "verify"],
     &["cli"],
     &["tests", "bench", "xtask", "firmware"],
@@ -37,7 +38,7 @@ const FORBIDDEN: &[Forbidden] = &[
             "policy-macro",
             "verify",
         ],
-        to: &["plant", "drm", "train", "diagnose"],
+        to: &["plant", "drm", "closed-loop", "train", "diagnose"],
         why: "the compile side does not know the model side",
     },
 ];

@@ -92,12 +92,12 @@ impl Environment for Converter {
 
     fn save(&self) -> Result<Vec<u8>, Error> {
         let whole = (self.plant.parameters(), self.plant.state());
-        serde_json::to_vec(&whole).map_err(|error| Error::Checkpoint(format!("cannot write the plant down: {error}")))
+        serde_json::to_vec(&whole).map_err(|error| Error::Saved(format!("cannot write the plant down: {error}")))
     }
 
     fn load(&mut self, bytes: &[u8]) -> Result<(), Error> {
         let (parameters, state): (Parameters, PlantState) = serde_json::from_slice(bytes)
-            .map_err(|error| Error::Checkpoint(format!("the plant in it is of another version: {error}")))?;
+            .map_err(|error| Error::Saved(format!("the plant in it is of another version: {error}")))?;
         self.plant = Plant::new(&parameters)?;
         self.plant.restore(&state);
         Ok(())

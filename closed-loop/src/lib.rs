@@ -1,0 +1,18 @@
+//! A simulated converter under control.
+//!
+//! ```text
+//! plant.toml ──► Converter (an Environment) ──┐
+//! Policy ──────► Agent (observation, duty) ───┼─► scenario: load steps at many instants ─► Metrics, Finding, Record
+//! any FnMut(&Sample) -> duty ─────────────────┘
+//! ```
+
+pub mod agent;
+pub mod converter;
+pub mod environment;
+mod faults;
+pub mod scenario;
+
+pub use agent::Agent;
+pub use converter::Converter;
+pub use environment::{Environment, LoadPath, Start};
+pub use faults::Error;

@@ -5,7 +5,7 @@ use std::path::Path;
 use plant::{Parameters, Plant, PlantState, Sample};
 use sha2::{Digest, Sha256};
 
-use crate::environment::{Environment, LoadPath, Start};
+use crate::environment::{Environment, LoadPath, Start, varied};
 use crate::faults::Error;
 
 /// A load that changes at a sampling instant changes this much of a period before it, so that the sample shows it.
@@ -69,12 +69,7 @@ impl Environment for Converter {
     }
 
     fn restart(&mut self, start: &Start<'_>) -> Result<Sample, Error> {
-        let mut parameters = self.nominal.clone();
-        for (key, value) in start.varied {
-            if let Some(parameter) = plant::parameter(key) {
-                parameter.set(&mut parameters, *value);
-            }
-        }
+        let mut parameters = varied(&self.nominal, start.varied);
         parameters.sensors.seed ^= start.seed;
         self.plant = Plant::new(&parameters)?;
         Ok(self.plant.reset_at(start.v_out, start.i_l, &start.load))

@@ -28,8 +28,9 @@ pub mod trainer;
 
 pub use closed_loop::{Converter, Environment};
 pub use contract::{Contract, Files};
-pub use faults::{Error, Fault, Faults, Place};
+pub use faults::Error;
 pub use outcome::Outcome;
 pub use seeds::{SeedRun, train_all};
 pub use settings::Settings;
+pub use toml_input::{Fault, Faults, Place};
 pub use trainer::{Ended, Progress, Trainer};

@@ -35,11 +35,7 @@ impl Converter {
     /// # Errors
     /// If the file cannot be read, or is not a converter, or a key is not one of its numbers.
     pub fn load(path: &Path, set: &[(String, f64)]) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path).map_err(|error| Error::File {
-            path: path.to_owned(),
-            error,
-        })?;
-        let mut parameters = Parameters::from_toml(path, &text)?;
+        let mut parameters = Parameters::from_file(path)?;
         for (key, value) in set {
             let missing = || Error::Mismatch(format!("the plant has no number `{key}`"));
             let parameter = plant::parameter(key).ok_or_else(missing)?;

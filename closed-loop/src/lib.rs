@@ -8,6 +8,7 @@
 
 pub mod agent;
 pub mod baselines;
+pub mod controller;
 pub mod converter;
 pub mod environment;
 mod faults;
@@ -18,6 +19,7 @@ mod tables;
 pub mod time_optimal;
 
 pub use agent::Agent;
+pub use controller::{Answer, Call, Classical, Controller, External, Period, Trajectory, examine};
 pub use converter::Converter;
 pub use environment::{Environment, LoadPath, Start};
 pub use faults::Error;

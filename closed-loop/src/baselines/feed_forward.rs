@@ -9,7 +9,8 @@ use super::Design;
 ///
 /// The tuning rule: `i_ref = i_out + C/T (v_ref - v)/(2 (1+delay))`, the current loop deadbeat
 /// (`duty = (v + L/T (i_ref - i_l))/v_in`) on current and voltage predicted over the delay. For the losses that this leaves
-/// out, an integral of the voltage error with [`INTEGRAL_PERIODS`] as its time.
+/// out, an integral of the voltage error with [`INTEGRAL_PERIODS`] as its time, at rest only: while the correction is
+/// below the ripple.
 #[derive(Debug, Clone)]
 pub struct FeedForward {
     design: Design,
@@ -21,7 +22,7 @@ pub struct FeedForward {
 }
 
 /// Integral time in control periods, for each period that a duty takes.
-const INTEGRAL_PERIODS: f64 = 300.0;
+const INTEGRAL_PERIODS: f64 = 50.0;
 
 impl FeedForward {
     /// Designed by the rule above.
@@ -51,7 +52,7 @@ impl FeedForward {
         let i_ref = measured.i_out - half_ripple + self.gain * (v_ref - v) + self.sum;
         let wanted = (v + l / t * (i_ref - i)) / measured.v_in;
         let duty = wanted.clamp(0.0, 1.0);
-        if duty == wanted {
+        if duty == wanted && (self.gain * (v_ref - v)).abs() < half_ripple {
             self.sum += self.integral * (v_ref - v);
         }
         if !self.pending.is_empty() {

@@ -9,7 +9,7 @@ mod pid;
 
 use std::fmt;
 
-use plant::{Parameters, Sample};
+use plant::{Parameters, Sample, Signals};
 
 use crate::faults::Error;
 
@@ -124,9 +124,13 @@ impl Baseline {
         })
     }
 
-    /// The duty to command on a sample, 0..1.
+    /// The duty to command on a sample, 0..1; only what the sensors show is used.
     pub fn step(&mut self, sample: &Sample) -> f64 {
-        let measured = &sample.measured;
+        self.control(&sample.measured)
+    }
+
+    /// The duty to command on a measurement, 0..1.
+    pub fn control(&mut self, measured: &Signals) -> f64 {
         match self {
             Self::Pid(controller) => controller.step(measured),
             Self::Cascade(controller) => controller.step(measured),

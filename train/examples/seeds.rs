@@ -44,7 +44,7 @@ fn main() -> Result<(), Error> {
             worst(&outcome.findings),
         );
         if verbose {
-            println!("{}", outcome::table(&outcome.findings));
+            println!("{}", closed_loop::table(&outcome.findings));
         }
     }
     Ok(())

@@ -47,6 +47,10 @@ impl Axis {
         self
     }
 
+    pub(crate) fn is_log(&self) -> bool {
+        self.log
+    }
+
     /// Place of a value before scaling to pixels; `None` where it has none.
     pub(crate) fn place(&self, value: f64) -> Option<f64> {
         match (drawable(value), self.log) {
@@ -56,11 +60,12 @@ impl Axis {
         }
     }
 
-    /// Settles range and ticks. `data` may hold values without a place; `margin` is the free part at both ends.
+    /// Settles range and ticks. `data` may hold values without a place; `margin` is the free part at the low and the
+    /// high end.
     pub(crate) fn settle(
         &self,
         data: impl Iterator<Item = f64>,
-        margin: f64,
+        margin: [f64; 2],
         ticks: usize,
     ) -> Result<Settled, ReportError> {
         let (low, high) = match self.range {
@@ -73,21 +78,26 @@ impl Axis {
             },
             None => self.cover(data, margin)?,
         };
+        Ok(self.settle_between(low, high, ticks))
+    }
+
+    /// As [`settle`](Axis::settle) with both ends known, as places.
+    pub(crate) fn settle_between(&self, low: f64, high: f64, ticks: usize) -> Settled {
         let (label, ticks) = if self.log {
             self.log_ticks(low, high, ticks)
         } else {
             self.linear_ticks(low, high, ticks)
         };
-        Ok(Settled {
+        Settled {
             axis: self.clone(),
             low,
             high,
             label,
             ticks,
-        })
+        }
     }
 
-    fn cover(&self, data: impl Iterator<Item = f64>, margin: f64) -> Result<(f64, f64), ReportError> {
+    fn cover(&self, data: impl Iterator<Item = f64>, margin: [f64; 2]) -> Result<(f64, f64), ReportError> {
         let mut ends: Option<(f64, f64)> = None;
         for place in data.filter_map(|value| self.place(value)) {
             let (low, high) = ends.unwrap_or((place, place));
@@ -102,12 +112,17 @@ impl Axis {
             let half = if self.log || size < 1e-150 { 0.5 } else { size * 0.05 };
             return Ok((low - half, high + half));
         }
-        let free = (high - low) * margin;
-        Ok((low - free, high + free))
+        let span = high - low;
+        Ok((low - span * margin[0], high + span * margin[1]))
     }
 
     fn linear_ticks(&self, low: f64, high: f64, count: usize) -> (String, Vec<Tick>) {
-        let exponent = engineering_exponent(low.abs().max(high.abs()));
+        let size = low.abs().max(high.abs());
+        let exponent = match engineering_exponent(size) {
+            // 0 to 0.9 W reads better than 0 to 900 mW
+            small if small < 0 && shifted(size, -small) >= 500.0 => small + 3,
+            fitting => fitting,
+        };
         let (exponent, unit) = if takes_prefix(&self.unit) {
             (exponent, format!("{}{}", prefix(exponent), self.unit))
         } else if (-3..=3).contains(&exponent) {
@@ -129,6 +144,8 @@ impl Axis {
         let every = usize::try_from(last - first).unwrap_or(1).div_ceil(count.max(2)).max(1);
         // fewer than two decades would leave an axis with one labelled tick
         let labelled: &[u32] = if high - low < 1.5 { &[1, 2, 5] } else { &[1] };
+        // one way of writing along an axis
+        let plain = low >= -3.0 && high <= 4.0;
         let mut ticks = Vec::new();
         for exponent in first..=last {
             let whole = exponent.rem_euclid(every as i32) == 0;
@@ -138,7 +155,7 @@ impl Axis {
                 if !inside || digit > 1 && high - low > 5.0 {
                     continue;
                 }
-                let label = (whole && labelled.contains(&digit)).then(|| self.log_label(exponent, digit));
+                let label = (whole && labelled.contains(&digit)).then(|| self.log_label(exponent, digit, plain));
                 ticks.push(Tick { place, label });
             }
         }
@@ -149,13 +166,12 @@ impl Axis {
         }
     }
 
-    fn log_label(&self, exponent: i32, digit: u32) -> String {
+    fn log_label(&self, exponent: i32, digit: u32, plain: bool) -> String {
         let three = exponent.div_euclid(3) * 3;
         if takes_prefix(&self.unit) && (-15..=12).contains(&three) {
             let number = f64::from(digit) * power_of_ten(exponent - three);
             return format!("{number} {}{}", prefix(three), self.unit);
         }
-        let plain = (-2..=3).contains(&exponent);
         match (plain, digit) {
             (true, _) => fixed(
                 shifted(f64::from(digit), exponent),
@@ -175,8 +191,16 @@ fn titled(label: &str, unit: &str) -> String {
     }
 }
 
-/// Multiples of 1, 2 or 5 times a power of ten between `low` and `high`, about `count` of them, with their labels.
+/// Multiples of 1, 2 or 5 times a power of ten between `low` and `high`, about `count` of them but at least three, with
+/// their labels.
 fn nice(low: f64, high: f64, count: usize) -> Vec<(f64, String)> {
+    let mut denser = (count..count + 10).map(|count| spaced(low, high, count));
+    denser
+        .find(|ticks| ticks.len() > 2)
+        .unwrap_or_else(|| spaced(low, high, count))
+}
+
+fn spaced(low: f64, high: f64, count: usize) -> Vec<(f64, String)> {
     let rough = (high - low) / count.max(2) as f64;
     let exponent = decade(rough);
     let digit = match rough / power_of_ten(exponent) {

@@ -5,7 +5,8 @@ use crate::colour::Colour;
 use crate::error::ReportError;
 use crate::font::{SMALL, width};
 use crate::frame::{
-    Area, BAND_OPACITY, DASH, EDGE, Entry, Head, LINE, Svg, TICK_ROOM, WIDTH, border, grid, rectangle, sheet, widest,
+    Area, BAND_OPACITY, DASH, EDGE, Entry, Head, LINE, PANEL_TITLE, Svg, TICK_ROOM, WIDTH, border, grid, rectangle,
+    sheet, widest,
 };
 use crate::markup::{Markup, Px};
 use crate::path;
@@ -138,7 +139,9 @@ impl Chart {
             .iter()
             .flat_map(|p| &p.series)
             .all(|s| s.kind == Kind::Points);
-        let x = self.x.settle(all_x, if only_points { 0.03 } else { 0.0 }, 9)?;
+        let x = self
+            .x
+            .settle(all_x, if only_points { [0.03; 2] } else { [0.0; 2] }, 9)?;
         let ys = self.panels.iter().map(y_axis).collect::<Result<Vec<_>, _>>()?;
 
         let colours = Colours::new(&self.panels);
@@ -154,7 +157,7 @@ impl Chart {
         let mut areas = Vec::new();
         let mut top = head.height();
         for panel in &self.panels {
-            let y = top + LINE + 4.0;
+            let y = top + PANEL_TITLE;
             areas.push(Area {
                 x: left,
                 y,
@@ -169,7 +172,7 @@ impl Chart {
         head.draw(&mut out);
         let last = self.panels.len() - 1;
         for (n, ((panel, y), area)) in self.panels.iter().zip(&ys).zip(areas).enumerate() {
-            out.text("text", &[("x", &Px(EDGE)), ("y", &Px(area.y - 7.0))], &y.label);
+            out.text("text", &[("x", &Px(EDGE)), ("y", &Px(area.y - 11.0))], &y.label);
             let (xs, ys) = (x.onto(area.x, area.right()), y.onto(area.bottom(), area.y));
             grid(&mut out, area, Some((xs, n == last)), Some(ys));
             draw(&mut out, panel, &x, y, area, &colours)?;
@@ -197,7 +200,7 @@ fn y_axis(panel: &Panel) -> Result<Settled, ReportError> {
         .iter()
         .flat_map(|series| series.y.iter().chain(&series.high).copied());
     let ticks = (panel.height / 42.0).clamp(2.0, 8.0) as usize;
-    panel.y.settle(data.chain(panel.ends(false)), 0.06, ticks)
+    panel.y.settle(data.chain(panel.ends(false)), [0.06; 2], ticks)
 }
 
 /// Colour and dash by name, in order of appearance.

@@ -31,6 +31,8 @@ pub const EDGE: f64 = 12.0;
 pub const TICK_ROOM: f64 = 20.0;
 /// Room for one line of small text.
 pub const LINE: f64 = SMALL * LEADING;
+/// Room above a panel for the title of its vertical axis, clear of a tick label at the top.
+pub const PANEL_TITLE: f64 = LINE + 8.0;
 
 /// A rectangle of pixels.
 #[derive(Debug, Clone, Copy)]

@@ -11,11 +11,13 @@
 //! colour vision.
 
 mod axis;
+mod bars;
 mod chart;
 mod colour;
 mod error;
 mod font;
 mod frame;
+mod heat;
 mod markup;
 mod number;
 mod page;
@@ -24,10 +26,12 @@ mod series;
 mod table;
 
 pub use axis::Axis;
+pub use bars::{BarChart, BarPanel};
 pub use chart::{Chart, Panel};
 pub use colour::{Colour, Ramp};
 pub use error::ReportError;
 pub use frame::Svg;
+pub use heat::HeatMap;
 pub use number::quantity;
 pub use page::{Page, Section, Verdict};
 pub use series::Series;

@@ -117,25 +117,55 @@ impl Axis {
     }
 
     fn linear_ticks(&self, low: f64, high: f64, count: usize) -> (String, Vec<Tick>) {
-        let size = low.abs().max(high.abs());
-        let exponent = match engineering_exponent(size) {
-            // 0 to 0.9 W reads better than 0 to 900 mW
-            small if small < 0 && shifted(size, -small) >= 500.0 => small + 3,
-            fitting => fitting,
-        };
-        let (exponent, unit) = if takes_prefix(&self.unit) {
-            (exponent, format!("{}{}", prefix(exponent), self.unit))
-        } else if (-3..=3).contains(&exponent) {
-            (0, self.unit.clone())
-        } else {
-            (exponent, format!("{} {}", raised_power(exponent), self.unit))
-        };
+        let (exponent, unit) = self.scaled_unit(low, high);
         let ticks = nice(shifted(low, -exponent), shifted(high, -exponent), count);
         let ticks = ticks.into_iter().map(|(value, label)| Tick {
             place: shifted(value, exponent),
             label: Some(label),
         });
         (titled(&self.label, unit.trim()), ticks.collect())
+    }
+
+    /// Power of ten to divide by, and the unit that is left.
+    fn scaled_unit(&self, low: f64, high: f64) -> (i32, String) {
+        let size = low.abs().max(high.abs());
+        let exponent = match engineering_exponent(size) {
+            // 0 to 0.9 W reads better than 0 to 900 mW
+            small if small < 0 && shifted(size, -small) >= 500.0 => small + 3,
+            fitting => fitting,
+        };
+        if takes_prefix(&self.unit) {
+            (exponent, format!("{}{}", prefix(exponent), self.unit))
+        } else if (-3..=3).contains(&exponent) {
+            (0, self.unit.clone())
+        } else {
+            (exponent, format!("{} {}", raised_power(exponent), self.unit))
+        }
+    }
+
+    /// Labelled ticks at given values of a linear axis, all with as many decimals as one of them needs.
+    pub(crate) fn ticks_at(&self, values: &[f64]) -> Vec<Tick> {
+        let ends = (
+            values.first().copied().unwrap_or(0.0),
+            values.last().copied().unwrap_or(0.0),
+        );
+        let (exponent, _) = self.scaled_unit(ends.0, ends.1);
+        let close = |value: f64, decimals: usize| {
+            let read = format!("{value:.decimals$}").parse::<f64>().unwrap_or(value);
+            (read - value).abs() <= value.abs() * 1e-6
+        };
+        let scaled: Vec<f64> = values.iter().map(|value| shifted(*value, -exponent)).collect();
+        let decimals = (0..6)
+            .find(|n| scaled.iter().all(|value| close(*value, *n)))
+            .unwrap_or(6);
+        let ticks = values.iter().zip(scaled).filter_map(|(value, scaled)| {
+            let label = Some(fixed(scaled, decimals));
+            Some(Tick {
+                place: self.place(*value)?,
+                label,
+            })
+        });
+        ticks.collect()
     }
 
     /// `low` and `high` are decades here.

@@ -134,14 +134,14 @@ impl Chart {
             let series = panel.series.iter().flat_map(|series| series.x.iter().copied());
             series.chain(panel.ends(true))
         });
-        let only_points = self
-            .panels
-            .iter()
-            .flat_map(|p| &p.series)
-            .all(|s| s.kind == Kind::Points);
-        let x = self
-            .x
-            .settle(all_x, if only_points { [0.03; 2] } else { [0.0; 2] }, 9)?;
+        let series = || self.panels.iter().flat_map(|panel| &panel.series);
+        // a marker at the edge would be cut in half
+        let free = if series().any(|series| series.kind == Kind::Points) {
+            0.02
+        } else {
+            0.0
+        };
+        let x = self.x.settle(all_x, [free; 2], 9)?;
         let ys = self.panels.iter().map(y_axis).collect::<Result<Vec<_>, _>>()?;
 
         let colours = Colours::new(&self.panels);

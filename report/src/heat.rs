@@ -49,9 +49,11 @@ enum Colours {
 /// Colour of a cell without value.
 const MISSING: Colour = Colour(0xd0, 0xd3, 0xd8);
 /// Steps of a smooth ramp; more cannot be told apart.
-const STEPS: f64 = 96.0;
+const STEPS: f64 = 64.0;
 const HEIGHT: f64 = 380.0;
 const BAR: f64 = 16.0;
+/// Room between map and colour bar.
+const BESIDE: f64 = 28.0;
 
 impl HeatMap {
     /// Map without values.
@@ -140,15 +142,12 @@ impl HeatMap {
         let top = head.height() + PANEL_TITLE;
         let left = EDGE + widest(&y).max(24.0) + 6.0;
         let categories = matches!(self.colours, Colours::Categories(_));
-        let right = if categories {
-            EDGE + 8.0
-        } else {
-            (36.0 + BAR + widest(&value)).max(width(&value.label, SMALL)) + EDGE + 8.0
-        };
+        let bar = (BAR + 6.0 + widest(&value)).max(width(&value.label, SMALL));
+        let right = EDGE + if categories { 8.0 } else { BESIDE + bar };
         let area = Area {
-            x: left,
-            y: top,
-            width: WIDTH - left - right,
+            x: left.round(),
+            y: top.round(),
+            width: (WIDTH - left - right).floor(),
             height: HEIGHT,
         };
         let mut out = sheet(&self.title, WIDTH, area.bottom() + TICK_ROOM + LINE + EDGE);
@@ -201,7 +200,12 @@ impl HeatMap {
                 let ascending = levels.windows(2).all(|pair| pair[0] < pair[1]);
                 match (levels.first(), levels.last()) {
                     (Some(low), Some(high)) if ascending && levels.len() > 1 => {
-                        self.value.clone().range(*low, *high).settle(cells(), [0.0; 2], 7)
+                        let fixed = self.value.clone().range(*low, *high);
+                        let mut axis = fixed.settle(cells(), [0.0; 2], 7)?;
+                        if !fixed.is_log() {
+                            axis.ticks = fixed.ticks_at(levels);
+                        }
+                        Ok(axis)
                     }
                     _ => Err(ReportError::Order {
                         axis: self.value.label.clone(),
@@ -245,8 +249,9 @@ impl HeatMap {
     /// One path for each colour; equal neighbours of a row are one rectangle.
     fn cells(&self, out: &mut Markup, value: &Settled, area: Area, x: &[f64], y: &[f64]) {
         let mut paths: BTreeMap<Colour, String> = BTreeMap::new();
-        let across = |part: f64| Px(area.x + part * area.width);
-        let up = |part: f64| Px(area.bottom() - part * area.height);
+        // whole pixels: short, and neighbours meet without a seam
+        let across = |part: f64| Px((area.x + part * area.width).round());
+        let up = |part: f64| Px((area.bottom() - part * area.height).round());
         for (row, cells) in self.cells.chunks(self.columns.len()).enumerate() {
             let colours: Vec<Colour> = cells.iter().map(|cell| self.colour(*cell, value)).collect();
             let mut from = 0;
@@ -269,7 +274,7 @@ impl HeatMap {
     /// Colour bar to the right.
     fn bar(&self, out: &mut Markup, value: &Settled, area: Area) {
         let bar = Area {
-            x: area.right() + 28.0,
+            x: area.right() + BESIDE,
             width: BAR,
             ..area
         };

@@ -127,6 +127,7 @@ mod tests {
 
     fn findings(deviations: [f64; 2]) -> Vec<Finding> {
         let finding = |(load_step, deviation): (&[f64; 2], f64)| Finding {
+            kind: closed_loop::LoadKind::Power,
             load_step: *load_step,
             at_sample: Metrics::default(),
             worst: Metrics {

@@ -17,9 +17,11 @@
 //! | checked-in files against the policy | [`drift()`] |
 
 pub mod compare;
+pub mod doors;
 pub mod drift;
 pub mod drivers;
 mod golden;
+pub mod kit;
 pub mod lane;
 pub mod oracle;
 pub mod protocol;
@@ -29,6 +31,7 @@ mod session;
 pub mod toolchain;
 pub mod traces;
 
+pub use doors::Selection;
 pub use drift::{drift, read_text};
 pub use report::{BuildReport, Difference, GoldenResult, Outcome, Report};
 pub use session::{Files, Options, Progress, VerifyError, golden_result, run};

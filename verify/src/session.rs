@@ -90,6 +90,8 @@ pub enum VerifyError {
     Codegen(codegen::CodegenError),
     /// The interpreter refused an event.
     Interpreter(InputError),
+    /// The policy of the construct suite does not pass the check.
+    Constructs(String),
     /// A temporary folder could not be made or a folder not be read.
     Io(PathBuf, std::io::Error),
 }
@@ -104,6 +106,7 @@ impl fmt::Display for VerifyError {
             }
             Self::Codegen(error) => write!(f, "{error}"),
             Self::Interpreter(error) => write!(f, "internal fault: interpreter: {error}"),
+            Self::Constructs(faults) => write!(f, "internal fault: construct suite: {faults}"),
             Self::Io(path, error) => write!(f, "{}: {error}", path.display()),
         }
     }
@@ -264,7 +267,7 @@ fn known_answers(policy: &Policy, oracle: &mut Oracle) -> Result<(Chunk, Option<
 }
 
 /// The policy's files for `target` in each of `languages`.
-pub(crate) fn generate(policy: &Policy, target: &TargetSpec, languages: &[Language]) -> Result<Files, VerifyError> {
+fn generate(policy: &Policy, target: &TargetSpec, languages: &[Language]) -> Result<Files, VerifyError> {
     let generated = codegen::generate(policy, target, languages).map_err(VerifyError::Codegen)?;
     Ok(generated.files)
 }

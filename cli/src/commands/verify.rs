@@ -4,12 +4,12 @@ use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use codegen::{Language, manifest};
+use codegen::{Door, Language, manifest};
 use policy::Policy;
 use serde::{Deserialize, Serialize};
 use verify::drift::Drift;
 use verify::traces::Recorded;
-use verify::{Files, Options, Progress, Report};
+use verify::{Files, Options, Progress, Report, Selection};
 
 use super::grouped;
 use crate::arguments::Verify;
@@ -79,6 +79,10 @@ fn recording(policy: &Policy, path: &Path) -> Result<Recorded, Failure> {
 struct Origin {
     target: String,
     languages: Vec<String>,
+    #[serde(default)]
+    doors: Vec<String>,
+    #[serde(default)]
+    kit_steps: Option<u32>,
 }
 
 /// The generated files of a folder, and how they differ from what the policy yields today.
@@ -111,7 +115,20 @@ fn checked_in(policy: &Policy, folder: &Path) -> Result<(Files, Drift), Failure>
             origin.languages
         )));
     }
-    let drift = verify::drift(policy, target, &languages, folder)?;
+    let doors: Option<Vec<Door>> = origin.doors.iter().map(|name| Door::find(name)).collect();
+    let Some(doors) = doors else {
+        let known = Door::ALL.map(Door::name).join(", ");
+        return Err(Failure(format!(
+            "{shown}: unknown door\n   = found: {:?}\n   = expected: {known}",
+            origin.doors
+        )));
+    };
+    let selection = Selection {
+        doors,
+        kit_steps: origin.kit_steps.unwrap_or(verify::kit::DEFAULT_STEPS),
+        ..Selection::core(&languages)
+    };
+    let drift = verify::drift(policy, target, &selection, folder)?;
     let mut files = Files::new();
     for name in codegen::generate(policy, target, &languages)?.files.into_keys() {
         // a missing file is already part of the drift

@@ -3,6 +3,8 @@
 #[cfg(feature = "c")]
 pub mod c99;
 #[cfg(feature = "c")]
+pub mod kit;
+#[cfg(feature = "c")]
 mod literal;
 pub mod rust;
 

@@ -1,7 +1,7 @@
 //! C99 that also compiles as C90 with `stdint.h` and as C++: one header, one source.
 
-mod statements;
-mod tables;
+pub(super) mod statements;
+pub(super) mod tables;
 
 use std::collections::BTreeMap;
 
@@ -32,7 +32,7 @@ impl Backend for C99 {
 }
 
 /// Optional parts of a template leave runs of empty lines behind; a file ends with one newline.
-fn tidy(text: &str) -> String {
+pub(super) fn tidy(text: &str) -> String {
     let mut tidied = String::with_capacity(text.len());
     let mut empty = false;
     for line in text.lines().map(str::trim_end) {
@@ -63,7 +63,7 @@ fn common(program: &Program) -> Common {
 }
 
 /// Name of a coefficient as parameter; the state member is `mapping_<name>`.
-fn coefficient_name(coefficient: Coefficient) -> &'static str {
+pub(super) fn coefficient_name(coefficient: Coefficient) -> &'static str {
     match coefficient {
         Coefficient::A => "a",
         Coefficient::B => "b",

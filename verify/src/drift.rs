@@ -45,12 +45,7 @@ pub struct Changed {
 ///
 /// # Errors
 /// If code generation fails or a file is there but cannot be read. A missing folder lacks all files.
-pub fn drift(
-    policy: &Policy,
-    target: &TargetSpec,
-    selection: &Selection,
-    folder: &Path,
-) -> Result<Drift, VerifyError> {
+pub fn drift(policy: &Policy, target: &TargetSpec, selection: &Selection, folder: &Path) -> Result<Drift, VerifyError> {
     let expected = generate(policy, target, selection)?;
     let found = read(&expected, &policy.name, folder)?;
     Ok(compare(&expected, &found))

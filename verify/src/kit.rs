@@ -1,7 +1,7 @@
 //! What the back-to-back kit compares with: the interpreter's answers on the policy and on the construct suite.
 
-use codegen::backend::kit::{Material, Trace};
 use codegen::Language;
+use codegen::backend::kit::{Material, Trace};
 use policy::{Policy, ReadOptions};
 use targets::{RowBlock, TargetSpec};
 
@@ -11,8 +11,14 @@ use crate::traces::{Event, Stream};
 
 /// A small policy that uses every construct of the generated code.
 const CONSTRUCTS: &[(&str, &[u8])] = &[
-    ("policy.toml", include_bytes!("../../tests/golden/cases/constructs/policy.toml")),
-    ("drm.toml", include_bytes!("../../tests/golden/cases/constructs/drm.toml")),
+    (
+        "policy.toml",
+        include_bytes!("../../tests/golden/cases/constructs/policy.toml"),
+    ),
+    (
+        "drm.toml",
+        include_bytes!("../../tests/golden/cases/constructs/drm.toml"),
+    ),
     (
         "weights.safetensors",
         include_bytes!("../../tests/golden/cases/constructs/weights.safetensors"),
@@ -23,8 +29,8 @@ const CONSTRUCTS: &[(&str, &[u8])] = &[
 pub const DEFAULT_STEPS: u32 = 500;
 /// Control steps of each controller of the construct suite.
 const SUITE_STEPS: u32 = 300;
-/// Seed of the moves.
-const SEED: u64 = 1;
+/// Seed of the moves: one whose 300 steps on the suite reach all that a test below asks for.
+const SEED: u64 = 2;
 /// The block form of a layer, with a shorter last block.
 const BLOCK: RowBlock = RowBlock::Rows(4);
 
@@ -137,9 +143,18 @@ mod tests {
             Op::Add(0, 0),
             Op::Sub(0, 0),
             Op::Mul(0, 0),
-            Op::Select { flag: 0, then: 0, otherwise: 0 },
+            Op::Select {
+                flag: 0,
+                then: 0,
+                otherwise: 0,
+            },
             Op::Clamp { x: 0, low: 0, high: 0 },
-            Op::LineSum { word: 0, length: 0, newest: 0, primed: 0 },
+            Op::LineSum {
+                word: 0,
+                length: 0,
+                newest: 0,
+                primed: 0,
+            },
             Op::Primed,
             Op::Usable,
             Op::Clipped,
@@ -175,7 +190,9 @@ mod tests {
     #[test]
     fn the_suite_uses_every_operation_of_the_program() {
         let suite = suite();
-        let blocks = suite.iter().flat_map(|p| [&p.front.block, &p.decide.block, &p.advance.block]);
+        let blocks = suite
+            .iter()
+            .flat_map(|p| [&p.front.block, &p.decide.block, &p.advance.block]);
         let used: Vec<Discriminant<Op>> = blocks.flat_map(|block| &block.ops).map(discriminant).collect();
         let missing: Vec<Op> = all_operations()
             .into_iter()
@@ -211,7 +228,14 @@ mod tests {
         oracle.next_chunk(&mut stream, u64::from(SUITE_STEPS)).unwrap();
         let coverage = oracle.coverage();
         assert!(coverage.status_bits.iter().all(|count| *count > 0), "{coverage:?}");
-        assert!(coverage.actions.iter().filter(|count| **count > 0).count() >= 3, "{coverage:?}");
-        assert!(coverage.mappings_accepted > 0 && coverage.mappings_refused > 0, "{coverage:?}");
+        assert!(
+            coverage.actions.iter().filter(|count| **count > 0).count() >= 4,
+            "{coverage:?}"
+        );
+        assert!(coverage.resets > 0 && coverage.inits > 0, "{coverage:?}");
+        assert!(
+            coverage.mappings_accepted > 0 && coverage.mappings_refused > 0,
+            "{coverage:?}"
+        );
     }
 }

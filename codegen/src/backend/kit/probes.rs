@@ -53,7 +53,14 @@ const TERNARY: [fn(f32, f32, f32) -> f32; 9] = [
     |x, _, _| x / (1.0 / 3.0),
 ];
 
-const COMPARISONS: [fn(f32, f32) -> bool; 4] = [|x, y| x > y, |x, y| x >= y, |x, y| x < y, |x, y| x <= y];
+/// Operations from [`FIRST_COMPARISON`] on; the last asks whether the two can be compared at all.
+const COMPARISONS: [fn(f32, f32) -> bool; 5] = [
+    |x, y| x > y,
+    |x, y| x >= y,
+    |x, y| x < y,
+    |x, y| x <= y,
+    |x, y| x.partial_cmp(&y).is_some(),
+];
 const FIRST_COMPARISON: u32 = 16;
 const FROM_I32: u32 = 24;
 const FROM_U32: u32 = 25;
@@ -179,7 +186,8 @@ mod tests {
             let of_kind = all.iter().filter(|probe| probe.operation == operation);
             assert!(of_kind.clone().any(|probe| differs(&probe, answer)), "{operation}");
         }
-        let flushed = |probe: &&Probe| probe.operation == 2 && flush(f32::from_bits(probe.expected)).to_bits() != probe.expected;
+        let flushed =
+            |probe: &&Probe| probe.operation == 2 && flush(f32::from_bits(probe.expected)).to_bits() != probe.expected;
         assert!(all.iter().any(|probe| flushed(&probe)));
     }
 

@@ -85,7 +85,7 @@ pub struct Compile {
     #[arg(long, default_value = "host")]
     pub target: String,
     /// Also generate a way into a tool or onto a board, with the C core; may be repeated. kit: C test program with
-    /// expected bits for your compiler and board
+    /// expected bits for your compiler and board. sfunction: Simulink block, also for dSPACE RTI
     #[arg(long, value_name = "NAME", value_parser = door())]
     pub door: Vec<codegen::Door>,
     /// Control steps in the kit

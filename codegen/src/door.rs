@@ -9,17 +9,20 @@ use crate::{CodegenError, GeneratedFiles, Program, backend};
 pub enum Door {
     /// Back-to-back test program for the user's own compiler and board.
     Kit,
+    /// Simulink S-function, also for dSPACE RTI.
+    Sfunction,
 }
 
 impl Door {
     /// All doors in the order of the help text.
-    pub const ALL: [Door; 1] = [Door::Kit];
+    pub const ALL: [Door; 2] = [Door::Kit, Door::Sfunction];
 
     /// Name on the command line and in the manifest.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Door::Kit => "kit",
+            Door::Sfunction => "sfunction",
         }
     }
 
@@ -35,6 +38,7 @@ impl Door {
     /// For a fault in the compiler itself, or the kit without material.
     pub fn emit(self, program: &Program, material: Option<&Material>) -> Result<GeneratedFiles, CodegenError> {
         match self {
+            Door::Sfunction => backend::sfunction::emit(program),
             Door::Kit => match material {
                 Some(material) => backend::kit::emit(program, material),
                 None => Err(CodegenError::Door("the kit has no expected values")),

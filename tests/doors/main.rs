@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod kit;
+mod sfunction;
 
 use std::collections::BTreeMap;
 use std::path::Path;

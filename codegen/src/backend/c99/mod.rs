@@ -19,20 +19,23 @@ pub struct C99;
 
 impl Backend for C99 {
     fn emit(&self, program: &Program) -> Result<GeneratedFiles, CodegenError> {
-        let render = |result: Result<String, templates::Error>| {
-            result
-                .map(|text| tidy(&text))
-                .map_err(|error| CodegenError::Template(error.to_string()))
-        };
         let mut files = BTreeMap::new();
-        files.insert(format!("{}.h", program.name), render(header(program).render())?);
-        files.insert(format!("{}.c", program.name), render(source(program).render())?);
+        files.insert(format!("{}.h", program.name), render(&header(program))?);
+        files.insert(format!("{}.c", program.name), render(&source(program))?);
         Ok(GeneratedFiles { files })
     }
 }
 
+/// The text of a template.
+pub(super) fn render(view: &impl Template) -> Result<String, CodegenError> {
+    let text = view
+        .render()
+        .map_err(|error| CodegenError::Template(error.to_string()))?;
+    Ok(tidy(&text))
+}
+
 /// Optional parts of a template leave runs of empty lines behind; a file ends with one newline.
-pub(super) fn tidy(text: &str) -> String {
+fn tidy(text: &str) -> String {
     let mut tidied = String::with_capacity(text.len());
     let mut empty = false;
     for line in text.lines().map(str::trim_end) {

@@ -8,13 +8,12 @@ mod trace;
 
 use std::collections::BTreeMap;
 
-use templates::Template;
 use templates::c::{Common, Table};
 use templates::kit::{Kit, Subject};
 
 use super::c99::statements::{float, unsigned};
 use super::c99::tables::{floats, words};
-use super::c99::{C99, coefficient_name, tidy};
+use super::c99::{C99, coefficient_name, render};
 use crate::backend::{Backend, banner};
 use crate::{CodegenError, GeneratedFiles, Program};
 
@@ -57,11 +56,8 @@ pub fn emit(program: &Program, material: &Material) -> Result<GeneratedFiles, Co
         suite,
         subjects: controllers.chain([subject(program, &material.policy)]).collect(),
     };
-    let text = view
-        .render()
-        .map_err(|error| CodegenError::Template(error.to_string()))?;
     Ok(GeneratedFiles {
-        files: BTreeMap::from([(format!("{name}.c"), tidy(&text))]),
+        files: BTreeMap::from([(format!("{name}.c"), render(&view)?)]),
     })
 }
 

@@ -169,7 +169,8 @@ mod tests {
     #[test]
     fn contraction_reassociation_reciprocals_and_flushed_subnormals_are_told_apart() {
         let flush = |x: f32| if x.is_subnormal() { 0.0_f32.copysign(x) } else { x };
-        let faults: [(u32, fn(f32, f32, f32) -> f32); 6] = [
+        type Answer = fn(f32, f32, f32) -> f32;
+        let faults: [(u32, Answer); 6] = [
             (4, |x, y, z| x.mul_add(y, z)),
             (6, |x, y, z| x + (y + z)),
             (7, |_, y, _| y),
@@ -178,7 +179,7 @@ mod tests {
             (12, |x, _, _| x * (1.0 / (1.0 / 3.0))),
         ];
         let all = probes();
-        let differs = |probe: &&Probe, answer: fn(f32, f32, f32) -> f32| {
+        let differs = |probe: &&Probe, answer: Answer| {
             let [x, y, z] = probe.operands.map(f32::from_bits);
             answer(x, y, z).to_bits() != probe.expected
         };

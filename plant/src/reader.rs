@@ -74,7 +74,10 @@ impl<'a> Reader<'a> {
         let (before, mut hint) = (faults.len(), parameter.meaning.to_owned());
         let read = match parameter.field {
             Field::Number(_, set) => {
-                hint += &format!(" in {}; no unit and no quotes: 150 uF is 150e-6", parameter.unit);
+                if parameter.unit != "1" {
+                    hint = format!("{hint} in {}", parameter.unit);
+                }
+                hint += "; no unit and no quotes: 150 uF is 150e-6";
                 value.number(faults).map(|number| set(plant, number))
             }
             Field::Whole(_, set) => {

@@ -4,6 +4,7 @@ pub mod compile;
 pub mod demo;
 pub mod inspect;
 pub mod new;
+pub mod train;
 pub mod verify;
 
 use std::path::{Path, PathBuf};

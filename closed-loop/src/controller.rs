@@ -88,7 +88,7 @@ impl Controller for Classical {
 /// What is asked of a controller that runs elsewhere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Call<'a> {
-    /// Start anew; the answer does not count.
+    /// Start anew; there is nothing to answer.
     Restart,
     /// One control period with the contract's samples.
     Step(&'a [Word]),
@@ -100,7 +100,7 @@ pub struct External<F> {
     ask: F,
 }
 
-impl<F: FnMut(Call<'_>) -> Result<Answer, String>> External<F> {
+impl<F: FnMut(Call<'_>) -> Result<Option<Answer>, String>> External<F> {
     /// `ask` passes on calls; it fails with a text for the user.
     ///
     /// # Errors
@@ -113,14 +113,15 @@ impl<F: FnMut(Call<'_>) -> Result<Answer, String>> External<F> {
     }
 }
 
-impl<F: FnMut(Call<'_>) -> Result<Answer, String>> Controller for External<F> {
+impl<F: FnMut(Call<'_>) -> Result<Option<Answer>, String>> Controller for External<F> {
     fn restart(&mut self) -> Result<(), Error> {
         (self.ask)(Call::Restart).map(|_| ()).map_err(Error::Mismatch)
     }
 
     fn step(&mut self, measured: &Signals) -> Result<Answer, Error> {
         let samples = self.inputs.samples(measured);
-        (self.ask)(Call::Step(samples)).map_err(Error::Mismatch)
+        let answer = (self.ask)(Call::Step(samples)).map_err(Error::Mismatch)?;
+        answer.ok_or_else(|| Error::Mismatch("a control step was not answered".to_owned()))
     }
 }
 

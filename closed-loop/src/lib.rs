@@ -14,7 +14,9 @@ pub mod environment;
 mod faults;
 pub mod limit;
 mod load_step;
+pub mod read;
 pub mod scenario;
+mod scenario_file;
 mod tables;
 pub mod time_optimal;
 
@@ -24,4 +26,5 @@ pub use converter::Converter;
 pub use environment::{Environment, LoadPath, Start};
 pub use faults::Error;
 pub use load_step::{LoadKind, LoadStep};
-pub use tables::{evaluation_csv, metrics_csv, table};
+pub use scenario_file::Scenario;
+pub use tables::{comparison, evaluation_csv, metrics_csv, table, trajectory_csv};

@@ -9,6 +9,7 @@
 //! bleed, and the delay of the duty. Everything else a plant file may have is left out.
 
 use plant::{Load, Model, Parameters, Plant, Sample};
+use serde::Serialize;
 
 use crate::faults::Error;
 use crate::load_step::LoadStep;
@@ -16,7 +17,7 @@ use crate::scenario::SETTLED;
 use crate::time_optimal::{Target, TimeOptimal};
 
 /// The smallest figures that can be reached; each may need another sequence of duties.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Bound {
     /// Largest |e| at the sampling instants after the step, V.
     pub deviation: f64,
@@ -27,7 +28,7 @@ pub struct Bound {
 }
 
 /// The limits of one load step.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Limit {
     /// Load step at a sampling instant, which shows it.
     pub at_sample: Bound,

@@ -6,6 +6,7 @@
 //! and a fraction later than the one before, and the worst counts.
 
 use plant::{Load, Sample};
+use serde::Serialize;
 
 use crate::environment::{Environment, LoadPath, Start};
 use crate::faults::Error;
@@ -49,7 +50,7 @@ impl Default for Task {
 }
 
 /// What is measured on one load step.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Metrics {
     /// Largest |e| after the step, V.
     pub deviation: f64,

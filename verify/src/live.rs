@@ -70,7 +70,9 @@ impl Live {
             .start(layout.hello().len())
             .map_err(|error| format!("{name}: {}", error.reason))?;
         if hello != layout.hello() {
-            return Err(format!("{name}: self-test, integrity or sizes of the generated code are wrong"));
+            return Err(format!(
+                "{name}: self-test, integrity or sizes of the generated code are wrong"
+            ));
         }
         let step = layout.answer(&Event::Step(Vec::new()));
         let place = |name: &str| step.iter().position(|word| word.name == name);

@@ -4,6 +4,8 @@ pub mod compile;
 pub mod demo;
 pub mod inspect;
 pub mod new;
+mod progress_line;
+pub mod simulate;
 pub mod train;
 pub mod verify;
 

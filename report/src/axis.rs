@@ -171,7 +171,7 @@ impl Axis {
     /// `low` and `high` are decades here.
     fn log_ticks(&self, low: f64, high: f64, count: usize) -> (String, Vec<Tick>) {
         let (first, last) = (libm::floor(low) as i32, libm::ceil(high) as i32);
-        let every = usize::try_from(last - first).unwrap_or(1).div_ceil(count.max(2)).max(1);
+        let every = usize::try_from(last - first).unwrap_or(1).div_ceil(count.max(3)).max(1);
         // fewer than two decades would leave an axis with one labelled tick
         let labelled: &[u32] = if high - low < 1.5 { &[1, 2, 5] } else { &[1] };
         // one way of writing along an axis
@@ -207,6 +207,7 @@ impl Axis {
                 shifted(f64::from(digit), exponent),
                 usize::try_from(-exponent).unwrap_or(0),
             ),
+            (false, 1) if exponent == 0 => "1".to_owned(),
             (false, 1) => raised_power(exponent),
             (false, digit) => format!("{digit}·{}", raised_power(exponent)),
         }

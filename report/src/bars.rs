@@ -5,7 +5,8 @@ use crate::colour::Colour;
 use crate::error::ReportError;
 use crate::font::{LEADING, SMALL, width, wrap};
 use crate::frame::{
-    Area, EDGE, Entry, Head, LINE, PANEL_TITLE, Svg, TICK_ROOM, WIDTH, border, dot, grid, rectangle, sheet, widest,
+    Area, EDGE, Entry, Head, LINE, PANEL_TITLE, Svg, TICK_ROOM, WIDTH, below, border, dot, grid, rectangle, sheet,
+    widest,
 };
 use crate::markup::{Markup, Px};
 use crate::series::Kind;
@@ -195,12 +196,7 @@ impl BarChart {
             grid(&mut out, area, Some((scale, true)), None);
             self.draw(&mut out, panel, axis, area, &entries);
             border(&mut out, area);
-            let (middle, below) = (Px(area.x + wide / 2.0), Px(area.bottom() + TICK_ROOM + LINE - 2.0));
-            out.text(
-                "text",
-                &[("x", &middle), ("y", &below), ("text-anchor", &"middle")],
-                &axis.label,
-            );
+            below(&mut out, area, &axis.label);
         }
         out.close("svg");
         Ok(Svg(out.finish()))

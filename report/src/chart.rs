@@ -5,8 +5,8 @@ use crate::colour::Colour;
 use crate::error::ReportError;
 use crate::font::{SMALL, width};
 use crate::frame::{
-    Area, BAND_OPACITY, DASH, EDGE, Entry, Head, LINE, PANEL_TITLE, Svg, TICK_ROOM, WIDTH, border, grid, rectangle,
-    sheet, widest,
+    Area, BAND_OPACITY, DASH, EDGE, Entry, Head, LINE, PANEL_TITLE, Svg, TICK_ROOM, WIDTH, below, border, grid,
+    rectangle, sheet, widest,
 };
 use crate::markup::{Markup, Px};
 use crate::path;
@@ -178,15 +178,7 @@ impl Chart {
             draw(&mut out, panel, &x, y, area, &colours)?;
             border(&mut out, area);
             if n == last {
-                let (middle, below) = (
-                    Px(area.x + area.width / 2.0),
-                    Px(area.bottom() + TICK_ROOM + LINE - 2.0),
-                );
-                out.text(
-                    "text",
-                    &[("x", &middle), ("y", &below), ("text-anchor", &"middle")],
-                    &x.label,
-                );
+                below(&mut out, area, &x.label);
             }
         }
         out.close("svg");

@@ -278,6 +278,15 @@ pub fn border(out: &mut Markup, area: Area) {
     out.leaf("path", &[("d", &d), ("stroke", &Colour::GREY), ("fill", &"none")]);
 }
 
+/// Title of the horizontal axis, under its tick labels.
+pub fn below(out: &mut Markup, area: Area, label: &str) {
+    let (x, y) = (
+        Px(area.x + area.width / 2.0),
+        Px(area.bottom() + TICK_ROOM + LINE - 2.0),
+    );
+    out.text("text", &[("x", &x), ("y", &y), ("text-anchor", &"middle")], label);
+}
+
 /// Width of the widest tick label.
 pub fn widest(axis: &Settled) -> f64 {
     let labels = axis.ticks.iter().filter_map(|tick| tick.label.as_deref());

@@ -8,7 +8,7 @@ use crate::colour::{Colour, Ramp};
 use crate::error::ReportError;
 use crate::font::{SMALL, width};
 use crate::frame::{
-    Area, EDGE, Entry, Head, LINE, PANEL_TITLE, Svg, TICK_ROOM, WIDTH, border, grid, rectangle, sheet, widest,
+    Area, EDGE, Entry, Head, LINE, PANEL_TITLE, Svg, TICK_ROOM, WIDTH, below, border, grid, rectangle, sheet, widest,
 };
 use crate::markup::{Markup, Px};
 use crate::path;
@@ -175,15 +175,7 @@ impl HeatMap {
             }
         }
         border(&mut out, area);
-        let (middle, below) = (
-            Px(area.x + area.width / 2.0),
-            Px(area.bottom() + TICK_ROOM + LINE - 2.0),
-        );
-        out.text(
-            "text",
-            &[("x", &middle), ("y", &below), ("text-anchor", &"middle")],
-            &x.label,
-        );
+        below(&mut out, area, &x.label);
         if !categories {
             self.bar(&mut out, &value, area);
         }
@@ -281,7 +273,11 @@ impl HeatMap {
         out.text("text", &[("x", &Px(bar.x)), ("y", &Px(bar.y - 11.0))], &value.label);
         out.open("g", &[("shape-rendering", &"crispEdges")]);
         let piece = |out: &mut Markup, low: f64, high: f64, colour| {
-            let (y, height) = (bar.bottom() - high * bar.height, (high - low) * bar.height);
+            let (y, end) = (
+                (bar.bottom() - high * bar.height).round(),
+                (bar.bottom() - low * bar.height).round(),
+            );
+            let height = end - y;
             rectangle(out, Area { y, height, ..bar }, colour, 1.0);
         };
         match &self.colours {

@@ -94,26 +94,23 @@ pub fn quantity(value: f64, unit: &str, digits: usize) -> String {
     }
     // rounded first: 999.96 to three digits is 1.00 k
     let value: f64 = format!("{value:.*e}", digits - 1).parse().unwrap_or(value);
-    let places = |scaled: f64| match scaled {
-        0.0 => digits - 1,
-        scaled => usize::try_from(digits as i32 - 1 - decade(scaled.abs())).unwrap_or(0),
-    };
+    // from the value itself: scaling rounds, and could fall below a power of ten
+    let leading = if value == 0.0 { 0 } else { decade(value.abs()) };
+    let places = |exponent: i32| usize::try_from(digits as i32 - 1 - (leading - exponent)).unwrap_or(0);
     let (text, prefix) = if takes_prefix(unit) {
         let exponent = engineering_exponent(value);
-        let scaled = shifted(value, -exponent);
-        (fixed(scaled, places(scaled)), prefix(exponent))
-    } else if value != 0.0 && !(-4..6).contains(&decade(value.abs())) {
-        let exponent = decade(value.abs());
+        (fixed(shifted(value, -exponent), places(exponent)), prefix(exponent))
+    } else if !(-4..6).contains(&leading) {
         (
             format!(
                 "{}·{}",
-                fixed(shifted(value, -exponent), digits - 1),
-                raised_power(exponent)
+                fixed(shifted(value, -leading), digits - 1),
+                raised_power(leading)
             ),
             "",
         )
     } else {
-        (fixed(value, places(value)), "")
+        (fixed(value, places(0)), "")
     };
     if unit.is_empty() {
         text

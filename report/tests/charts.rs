@@ -216,7 +216,7 @@ fn ticks_carry_si_prefixes() {
         Axis::new("v").unit("V").log(),
     )
     .unwrap();
-    assert!(texts(log.as_str()).contains(&"100 µV".to_owned()));
+    assert!(texts(log.as_str()).contains(&"1 mV".to_owned()));
     let plain = one(Series::line("", [0.0, 1.0], [1e-9, 1.0]), Axis::new("loss").log()).unwrap();
     assert!(
         texts(plain.as_str()).contains(&"10⁻⁸".to_owned()),

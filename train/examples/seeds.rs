@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use closed_loop::scenario::Finding;
-use train::{Contract, Converter, Error, Settings, Trainer, outcome};
+use train::{Contract, Converter, Error, Settings, Trainer};
 
 fn main() -> Result<(), Error> {
     let mut arguments = std::env::args().skip(1);

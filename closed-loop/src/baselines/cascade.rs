@@ -6,7 +6,7 @@ use super::Design;
 
 /// PI on the output voltage that sets the current of a PI on the inductor current.
 ///
-/// The tuning rule: [`GAINS`], in units in which 1 is deadbeat (`L/(T v_in)` of duty per ampere, `C/T` of current per
+/// The tuning rule: `GAINS`, in units in which 1 is deadbeat (`L/(T v_in)` of duty per ampere, `C/T` of current per
 /// volt), so that they hold for any L, C and T.
 #[derive(Debug, Clone)]
 pub struct Cascade {

@@ -9,7 +9,7 @@ use crate::time_optimal::{Target, TimeOptimal};
 /// Predictive control on voltage, current and the load's power, with the ideal converter as model: over the delay by
 /// prediction, then [`TimeOptimal`]. What the plant loses beyond the model is learnt from the error of the predicted current.
 ///
-/// No gain is tuned but [`LEARNING`]. It takes any load for constant power, and the current for continuous.
+/// No gain is tuned but `LEARNING`. It takes any load for constant power, and the current for continuous.
 #[derive(Debug, Clone)]
 pub struct Deadbeat {
     design: Design,

@@ -9,7 +9,7 @@ use super::Design;
 ///
 /// The tuning rule: `i_ref = i_out + C/T (v_ref - v)/(2 (1+delay))`, the current loop deadbeat
 /// (`duty = (v + L/T (i_ref - i_l))/v_in`) on current and voltage predicted over the delay. For the losses that this leaves
-/// out, an integral of the voltage error with [`INTEGRAL_PERIODS`] as its time, at rest only: while the correction is
+/// out, an integral of the voltage error with `INTEGRAL_PERIODS` as its time, at rest only: while the correction is
 /// below the ripple.
 #[derive(Debug, Clone)]
 pub struct FeedForward {

@@ -7,7 +7,7 @@ use super::Design;
 /// PID on the output voltage with a backward difference, clamped, without windup.
 ///
 /// The tuning rule: to a voltage controller the converter is nearly a double integrator,
-/// `(z-1)^2 E = b (z+1)/2 D` with `b = v_in T^2/(L C)`; the gains are [`GAINS`] over b, so that they hold for any L, C
+/// `(z-1)^2 E = b (z+1)/2 D` with `b = v_in T^2/(L C)`; the gains are `GAINS` over b, so that they hold for any L, C
 /// and T.
 #[derive(Debug, Clone)]
 pub struct Pid {

@@ -21,10 +21,10 @@ mod tables;
 pub mod time_optimal;
 
 pub use agent::Agent;
-pub use controller::{Answer, Call, Classical, Controller, External, Period, Trajectory, examine};
+pub use controller::{Answer, Call, Classical, Controller, External, Period, Trajectory, follow};
 pub use converter::Converter;
 pub use environment::{Environment, LoadPath, Start};
 pub use faults::Error;
 pub use load_step::{LoadKind, LoadStep};
 pub use scenario_file::Scenario;
-pub use tables::{comparison, evaluation_csv, metrics_csv, table, trajectory_csv};
+pub use tables::{COLUMNS, MetricsCsv, cells, comparison, evaluation_csv, limit_cells, table, trajectory_csv};

@@ -275,6 +275,16 @@ impl Run {
     }
 }
 
+/// Keys of the plant's numbers that are not neutral but have no part in the limit.
+#[must_use]
+pub fn left_out(parameters: &Parameters) -> Vec<&'static str> {
+    let plain = plain(parameters);
+    plant::parameters()
+        .filter(|parameter| parameter.get(parameters) != parameter.get(&plain))
+        .map(|parameter| parameter.key)
+        .collect()
+}
+
 /// The circuit without what the limit leaves out.
 fn plain(parameters: &Parameters) -> Parameters {
     let p = parameters;

@@ -25,8 +25,8 @@ pub struct Scenario {
     pub task: Task,
     /// Classical controllers that run beside the policy.
     pub baselines: Vec<Kind>,
-    /// Duties the limit may use; nothing if there is to be no limit.
-    pub limit: Option<[f64; 2]>,
+    /// Duties that the limits may use, one limit each.
+    pub limits: Vec<[f64; 2]>,
 }
 
 const CURRENT: RangeInclusive<f64> = 0.0..=1e6;
@@ -98,7 +98,7 @@ fn top(folder: &Path, powers_given: bool, root: &mut Table<'_>, faults: &mut Vec
         load_steps,
         task,
         baselines: root.with_default("baselines", Kind::ALL.to_vec(), faults, baselines),
-        limit: root.with_default("limit", Some([0.0, 1.0]), faults, limit),
+        limits: root.with_default("limit", vec![[0.0, 1.0]], faults, limits),
     })
 }
 
@@ -128,11 +128,16 @@ fn baselines(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<Kind>> {
     Some(kinds)
 }
 
-/// `false`, or the duties it may use.
-fn limit(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Option<[f64; 2]>> {
-    if value.as_list().is_none() {
+/// `false`, the duties the limit may use, or several of them.
+fn limits(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<[f64; 2]>> {
+    let Some(items) = value.as_list() else {
         let wanted = value.boolean(faults)?;
-        return Some(wanted.then_some([0.0, 1.0]));
+        return Some(if wanted { vec![[0.0, 1.0]] } else { Vec::new() });
+    };
+    let one = |value: &Value<'_>, faults: &mut Vec<Fault>| value.interval_within(0.0..=1.0, faults);
+    if items.iter().all(|item| item.as_list().is_some()) {
+        value.each("pairs of duties: [[0.44, 0.55], [0, 1]]", faults, one)
+    } else {
+        one(value, faults).map(|range| vec![range])
     }
-    value.interval_within(0.0..=1.0, faults).map(Some)
 }

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use crate::controller::Trajectory;
 use crate::limit::Limit;
 use crate::load_step::{LoadKind, LoadStep};
-use crate::scenario::{Finding, Metrics};
+use crate::scenario::{Finding, Metrics, SETTLED};
 
 /// The columns of [`Metrics`] in a CSV file.
 const FIGURES: &str = "deviation_V,settling_s,tail_mean_V,tail_max_V,pre_error_V,ripple_V";
@@ -28,7 +28,7 @@ impl Finding {
 }
 
 /// The columns of a table for people, behind the first.
-const COLUMNS: [&str; 6] = [
+pub const COLUMNS: [&str; 6] = [
     "deviation V",
     "settling ms",
     "tail max V",
@@ -47,41 +47,52 @@ pub fn table(findings: &[Finding]) -> String {
     out
 }
 
-/// Several controllers on one load step, and its limit, as a table for people: worst sampling instant / worst of all
+/// Several controllers on one load step, and its limits, as a table for people: worst sampling instant / worst of all
 /// instants.
 #[must_use]
 pub fn comparison<'a>(
     step: LoadStep,
     controllers: impl IntoIterator<Item = (&'a str, &'a Finding)>,
-    limit: Option<&Limit>,
+    limits: impl IntoIterator<Item = (&'a str, &'a Limit)>,
 ) -> String {
     let mut out = line(&step.to_string(), &COLUMNS.map(str::to_owned));
     for (name, finding) in controllers {
         out.push_str(&line(name, &cells(finding)));
     }
-    if let Some(Limit {
-        at_sample: a, worst: b, ..
-    }) = limit
-    {
-        let cells = [
-            pair(a.deviation, b.deviation, 2),
-            pair(1e3 * a.settling, 1e3 * b.settling, 2),
-        ];
-        out.push_str(&line("limit", &cells));
+    for (name, limit) in limits {
+        out.push_str(&line(name, &limit_cells(limit)));
     }
     out
 }
 
-fn cells(finding: &Finding) -> [String; 6] {
-    let (a, b) = (&finding.at_sample, &finding.worst);
+/// A limit in the first two of [`COLUMNS`].
+#[must_use]
+pub fn limit_cells(limit: &Limit) -> [String; 2] {
+    let (a, b) = (&limit.at_sample, &limit.worst);
     [
         pair(a.deviation, b.deviation, 2),
         pair(1e3 * a.settling, 1e3 * b.settling, 2),
+    ]
+}
+
+/// A finding in [`COLUMNS`]: worst sampling instant / worst of all instants.
+#[must_use]
+pub fn cells(finding: &Finding) -> [String; 6] {
+    let (a, b) = (&finding.at_sample, &finding.worst);
+    [
+        pair(a.deviation, b.deviation, 2),
+        format!("{} / {}", settling(a), settling(b)),
         pair(a.tail_max, b.tail_max, 3),
         pair(a.tail_mean, b.tail_mean, 3),
         pair(a.pre_error, b.pre_error, 3),
         pair(a.ripple, b.ripple, 3),
     ]
+}
+
+/// In ms; `>` where the run ended outside of the band.
+fn settling(m: &Metrics) -> String {
+    let unsettled = if m.tail_max > SETTLED { ">" } else { "" };
+    format!("{unsettled}{:.2}", 1e3 * m.settling)
 }
 
 fn pair(x: f64, y: f64, digits: usize) -> String {
@@ -90,7 +101,7 @@ fn pair(x: f64, y: f64, digits: usize) -> String {
 
 fn line(first: &str, columns: &[String]) -> String {
     let padded = |out: String, column: &String| format!("{out} {column:<15}");
-    let row = columns.iter().fold(format!("{first:<15}"), padded);
+    let row = columns.iter().fold(format!("{first:<17}"), padded);
     format!("{}\n", row.trim_end())
 }
 
@@ -108,19 +119,43 @@ pub fn evaluation_csv(findings: &[Finding]) -> String {
     out
 }
 
-/// Findings of several controllers as CSV; SI units, the load in the unit of its column.
-#[must_use]
-pub fn metrics_csv<'a>(controllers: impl IntoIterator<Item = (&'a str, &'a [Finding])>) -> String {
-    let mut out = format!("controller,from,to,unit,instants,{FIGURES}\n");
-    for (controller, findings) in controllers {
-        for finding in findings {
-            let ([from, to], unit) = (finding.load_step, finding.kind.unit());
-            for (name, m) in finding.rows() {
-                let _ = writeln!(out, "{controller},{from},{to},{unit},{name},{}", figures(m));
-            }
+/// Findings of several controllers and limits on load steps as CSV: controller, load step, instants, figures in SI units,
+/// the load in the unit of its column. A limit has no tail, error before and ripple.
+#[derive(Debug, Clone)]
+pub struct MetricsCsv(String);
+
+impl Default for MetricsCsv {
+    fn default() -> Self {
+        Self(format!("controller,from,to,unit,instants,{FIGURES}\n"))
+    }
+}
+
+impl MetricsCsv {
+    /// Two rows of a controller.
+    pub fn controller(&mut self, name: &str, finding: &Finding) {
+        for (instants, m) in finding.rows() {
+            self.row(name, finding.step(), instants, &figures(m));
         }
     }
-    out
+
+    /// Two rows of a limit.
+    pub fn limit(&mut self, name: &str, step: LoadStep, limit: &Limit) {
+        for (instants, bound) in [("sample", &limit.at_sample), ("worst", &limit.worst)] {
+            let figures = format!("{},{},,,,", bound.deviation, bound.settling);
+            self.row(name, step, instants, &figures);
+        }
+    }
+
+    fn row(&mut self, name: &str, step: LoadStep, instants: &str, figures: &str) {
+        let ([from, to], unit) = (step.values, step.kind.unit());
+        let _ = writeln!(self.0, "{name},{from},{to},{unit},{instants},{figures}");
+    }
+
+    /// The file.
+    #[must_use]
+    pub fn finish(self) -> String {
+        self.0
+    }
 }
 
 fn figures(m: &Metrics) -> String {

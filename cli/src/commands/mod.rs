@@ -3,6 +3,7 @@
 pub mod compile;
 pub mod demo;
 pub mod inspect;
+mod interruption;
 pub mod new;
 mod progress_line;
 pub mod simulate;

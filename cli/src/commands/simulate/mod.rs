@@ -1,24 +1,22 @@
 //! `policyc simulate`
 
-use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-use closed_loop::baselines::Baseline;
-use closed_loop::environment::Environment;
-use closed_loop::limit::{Limit, Question};
+use closed_loop::limit::{Limit, left_out};
 use closed_loop::scenario::Finding;
-use closed_loop::{Classical, Controller, Converter, LoadStep, Scenario, Trajectory, examine};
+use closed_loop::{Converter, Environment, LoadStep, Scenario, Trajectory};
 use policy::Policy;
 
-use super::progress_line::ProgressLine;
-use crate::arguments::{ControllerKind, Simulate};
+use super::interruption;
+use crate::arguments::Simulate;
 use crate::{Failure, Outcome, output};
 
 mod controllers;
 mod files;
+mod page;
 mod pictures;
-
-use controllers::Named;
+mod runs;
 
 /// Name of the policy among the controllers.
 const POLICY: &str = "policy";
@@ -45,7 +43,8 @@ struct Course {
 struct Step {
     step: LoadStep,
     courses: Vec<Course>,
-    limit: Option<Limit>,
+    /// By name.
+    limits: Vec<(String, Limit)>,
 }
 
 /// The comparison of the controllers that should be one.
@@ -58,68 +57,47 @@ struct Check {
     differences: Vec<String>,
 }
 
-/// Simulates, writes, reports.
-pub fn run(options: &Simulate) -> Result<Outcome, Failure> {
-    let mut setting = prepare(options)?;
-    let mut named = vec![controllers::start(&setting.policy, options.controller)?];
-    if options.check {
-        use ControllerKind::{C, Interpreter, Rust};
-        for kind in [Interpreter, Rust, C]
-            .into_iter()
-            .filter(|kind| *kind != options.controller)
-        {
-            named.push(controllers::start(&setting.policy, kind)?);
-        }
-    }
-    let mut check = options.check.then(|| Check {
-        names: named.iter().map(|named| named.name.clone()).collect(),
-        periods: 0,
-        differences: Vec::new(),
-    });
-    let mut baselines = Vec::new();
-    for kind in &setting.scenario.baselines {
-        let design = Baseline::new(*kind, setting.converter.parameters(), setting.v_ref)?;
-        baselines.push((kind.name(), Classical::from(design)));
-    }
-    let mut progress = ProgressLine::new();
-    let mut steps = Vec::new();
-    for step in setting.scenario.load_steps.clone() {
-        let of = setting.scenario.load_steps.len();
-        let mut tell = |name: &str| progress.show(|| format!("{step} ({} of {of}): {name}", steps.len() + 1));
-        tell(POLICY);
-        let mut courses = vec![policy_course(&setting, &mut named, step, check.as_mut(), &mut tell)?];
-        for (name, baseline) in &mut baselines {
-            tell(name);
-            courses.push(course(&setting, name, baseline, step)?.0);
-        }
-        tell("limit");
-        let limit = limit(&mut setting, step);
-        steps.push(Step { step, courses, limit });
-    }
-    progress.clear();
-    write(options, &setting, &named[0].name, &steps, check.as_ref())
+/// What a simulation found.
+struct Findings {
+    setting: Setting,
+    /// What ran the policy.
+    controller: String,
+    steps: Vec<Step>,
+    check: Option<Check>,
 }
 
-fn write(
-    options: &Simulate,
-    setting: &Setting,
-    controller: &str,
-    steps: &[Step],
-    check: Option<&Check>,
-) -> Result<Outcome, Failure> {
-    let summary = files::summary(setting, controller, steps, check);
-    let mut all: BTreeMap<String, String> = files::tables(setting, controller, steps, check)?;
-    all.insert("summary.txt".to_owned(), summary.clone());
-    for step in steps {
-        all.insert(
-            format!("{}.svg", files::stem(step.step)),
-            pictures::picture(setting, step)?,
-        );
+/// Simulates, writes, reports.
+pub fn run(options: &Simulate) -> Result<Outcome, Failure> {
+    output::check_new_folder(&options.out)?;
+    let setting = prepare(options)?;
+    let stop = interruption::stop_on_signal()?;
+    let found = runs::all(options, setting, &stop);
+    if stop.load(Ordering::Relaxed) {
+        // what failed, failed because of the signal
+        output::say("Interrupted; nothing written")?;
+        return Ok(Outcome::Interrupted);
     }
-    output::write_texts(&options.out, &all)?;
-    output::say(&format!("{summary}\n{} files in {}", all.len(), options.out.display()))?;
-    let equal = check.is_none_or(|check| check.differences.is_empty());
+    let found = found?;
+    let files = files::all(&found)?;
+    output::check_new_folder(&options.out)?;
+    output::write_texts(&options.out, &files)?;
+    let out = options.out.display();
+    output::say(&format!(
+        "{}\n{} files in {out}; to look at: {out}/{}",
+        files::summary(&found),
+        files.len(),
+        files::PAGE
+    ))?;
+    let equal = found.check.is_none_or(|check| check.differences.is_empty());
     Ok(if equal { Outcome::Done } else { Outcome::Different })
+}
+
+/// An error where the user has had enough.
+fn go_on(stop: &AtomicBool) -> Result<(), Failure> {
+    if stop.load(Ordering::Relaxed) {
+        return Err(Failure("interrupted".to_owned()));
+    }
+    Ok(())
 }
 
 fn prepare(options: &Simulate) -> Result<Setting, Failure> {
@@ -157,6 +135,13 @@ fn prepare(options: &Simulate) -> Result<Setting, Failure> {
             "the policy holds {theirs} V, but errors are counted from {v_ref} V"
         ));
     }
+    let left_out = left_out(converter.parameters());
+    if !scenario.limits.is_empty() && !left_out.is_empty() {
+        notes.push(format!(
+            "the limit is that of the plain circuit; it leaves out {}",
+            left_out.join(", ")
+        ));
+    }
     Ok(Setting {
         scenario,
         policy,
@@ -165,79 +150,4 @@ fn prepare(options: &Simulate) -> Result<Setting, Failure> {
         v_ref,
         notes,
     })
-}
-
-fn course(
-    setting: &Setting,
-    name: &str,
-    controller: &mut dyn Controller,
-    step: LoadStep,
-) -> Result<(Course, Vec<Trajectory>), Failure> {
-    let (finding, trajectories) = examine(
-        &setting.converter,
-        controller,
-        setting.v_ref,
-        &setting.scenario.task,
-        step,
-    )?;
-    let Some(shown) = trajectories.first().cloned() else {
-        return Err(Failure("internal fault: a load step at no instant".to_owned()));
-    };
-    let name = name.to_owned();
-    Ok((Course { name, finding, shown }, trajectories))
-}
-
-/// The policy, by its first controller; the others are compared with it.
-fn policy_course(
-    setting: &Setting,
-    named: &mut [Named],
-    step: LoadStep,
-    mut check: Option<&mut Check>,
-    tell: &mut dyn FnMut(&str),
-) -> Result<Course, Failure> {
-    let mut first: Option<(Course, Vec<Trajectory>)> = None;
-    for Named { name, controller } in named {
-        tell(name);
-        let (found, trajectories) = course(setting, POLICY, controller.as_mut(), step)?;
-        let Some((_, reference)) = &first else {
-            if let Some(check) = &mut check {
-                check.periods += trajectories
-                    .iter()
-                    .map(|trajectory| trajectory.periods.len())
-                    .sum::<usize>();
-            }
-            first = Some((found, trajectories));
-            continue;
-        };
-        let pairs = reference.iter().zip(&trajectories);
-        let difference = pairs.filter_map(|(a, b)| Some((a, a.first_difference(b)?))).next();
-        if let (Some(check), Some((trajectory, period))) = (&mut check, difference) {
-            let when = trajectory
-                .periods
-                .get(period)
-                .map_or(0.0, |period| 1e3 * period.record.time);
-            check.differences.push(format!(
-                "{name}: {step} differs from period {period} on, {when:.2} ms from the step"
-            ));
-        }
-    }
-    first
-        .map(|(course, _)| course)
-        .ok_or_else(|| Failure("internal fault: no controller".to_owned()))
-}
-
-/// The limit; a reason why there is none becomes a note.
-fn limit(setting: &mut Setting, step: LoadStep) -> Option<Limit> {
-    let range = setting.scenario.limit?;
-    match Question::new(setting.converter.parameters(), setting.v_ref, step, range) {
-        Ok(question) => {
-            let instants = setting.scenario.task.all_instants();
-            let phases: Vec<f64> = instants.iter().map(|instant| instant.phase).collect();
-            Some(question.answer(&phases))
-        }
-        Err(error) => {
-            setting.notes.push(error.to_string());
-            None
-        }
-    }
 }

@@ -1,7 +1,8 @@
 //! Voltage, current and duty of a load step, controllers laid over each other.
 
+use closed_loop::baselines::Kind;
 use closed_loop::scenario::SETTLED;
-use report::{Axis, Chart, Panel, Series};
+use report::{Axis, Chart, Colour, Panel, Series, Svg};
 
 use super::{Course, POLICY, Setting, Step};
 use crate::Failure;
@@ -13,7 +14,7 @@ const BEFORE: f64 = 10.0;
 const AFTER: f64 = 40.0;
 
 /// The load step at its first sampling instant as SVG; a voltage between the samples is not drawn.
-pub fn picture(setting: &Setting, step: &Step) -> Result<String, Failure> {
+pub fn picture(setting: &Setting, step: &Step) -> Result<Svg, Failure> {
     let mut title = format!("{}: {}", setting.policy.name, step.step);
     let Some(policy) = step.courses.first() else {
         return Err(Failure("internal fault: a picture of no controller".to_owned()));
@@ -45,22 +46,34 @@ pub fn picture(setting: &Setting, step: &Step) -> Result<String, Failure> {
         };
         let time = of(|record| record.time);
         let name = course.name.as_str();
-        voltage = voltage.series(Series::line(name, time.clone(), of(|record| record.sample.v_out)));
-        current = current.series(Series::line(name, time.clone(), of(|record| record.sample.i_l)));
-        duty = duty.series(Series::step(name, time, of(|record| record.duty)));
+        let colour = colour(name);
+        let line = |y| Series::line(name, time.clone(), y).colour(colour);
+        voltage = voltage.series(line(of(|record| record.sample.v_out)));
+        current = current.series(line(of(|record| record.sample.i_l)));
+        duty = duty.series(Series::step(name, time.clone(), of(|record| record.duty)).colour(colour));
     }
     voltage = voltage.y_zone(setting.v_ref - SETTLED, setting.v_ref + SETTLED, "settled");
-    if let Some(limit) = &step.limit {
-        let [from, to] = step
-            .step
-            .loads()
-            .map(|load| load.conductance * setting.v_ref + load.current + load.power / setting.v_ref);
-        let side = if to >= from { -1.0 } else { 1.0 };
-        voltage = voltage.y_line(setting.v_ref + side * limit.at_sample.deviation, "limit");
+    let [from, to] = step
+        .step
+        .loads()
+        .map(|load| load.conductance * setting.v_ref + load.current + load.power / setting.v_ref);
+    let side = if to >= from { -1.0 } else { 1.0 };
+    for (name, limit) in &step.limits {
+        voltage = voltage.y_line(setting.v_ref + side * limit.at_sample.deviation, name.as_str());
     }
     let x = Axis::new("time from the load step")
         .unit("s")
         .range(window[0], window[1]);
     let chart = Chart::new(title, x).panel(voltage).panel(current).panel(duty);
-    Ok(chart.svg()?.as_str().to_owned())
+    Ok(chart.svg()?)
+}
+
+/// The same controller in the same colour in every picture, whichever are left out.
+fn colour(name: &str) -> Colour {
+    let classical = Kind::ALL.iter().position(|kind| kind.name() == name);
+    let colours = [Colour::ORANGE, Colour::GREEN, Colour::PURPLE, Colour::VERMILION];
+    classical
+        .and_then(|index| colours.get(index))
+        .copied()
+        .unwrap_or(Colour::BLUE)
 }

@@ -54,19 +54,18 @@ impl Scenario {
     fn read(document: &Document) -> Result<Self, Faults> {
         let path = &document.source().name.path;
         let folder = path.parent().unwrap_or(Path::new(""));
-        let powers_given = document.peek(&["load_steps"]).is_some();
-        document.read(|root, faults| top(folder, powers_given, root, faults))
+        document.read(|root, faults| top(document, folder, root, faults))
     }
 }
 
-fn top(folder: &Path, powers_given: bool, root: &mut Table<'_>, faults: &mut Vec<Fault>) -> Option<Scenario> {
+fn top(document: &Document, folder: &Path, root: &mut Table<'_>, faults: &mut Vec<Fault>) -> Option<Scenario> {
     let plant = root.optional("plant").and_then(|v| v.text(faults));
     let set = root.with_default("set", Vec::new(), faults, read::plant_numbers);
     let v_ref = root.optional("v_ref").and_then(|v| v.positive(faults));
     let (currents, resistances) = (root.optional("current_steps"), root.optional("resistance_steps"));
     let task = read::task(root, faults);
-    check(&task, root, faults);
-    let powers_meant = powers_given || (currents.is_none() && resistances.is_none());
+    check(&task, document, root, faults);
+    let powers_meant = document.peek(&["load_steps"]).is_some() || (currents.is_none() && resistances.is_none());
     let powers = if powers_meant {
         task.load_steps.clone()
     } else {
@@ -102,19 +101,32 @@ fn top(folder: &Path, powers_given: bool, root: &mut Table<'_>, faults: &mut Vec
     })
 }
 
-fn check(task: &Task, root: &Table<'_>, faults: &mut Vec<Fault>) {
+fn check(task: &Task, document: &Document, root: &Table<'_>, faults: &mut Vec<Fault>) {
+    // at the key that is there: the other one is the default
+    let fault = |keys: [&str; 2], message: Message| {
+        let value = keys.iter().find_map(|key| document.peek(&[key]));
+        match value {
+            Some(value) => value.fault(message),
+            None => root.fault(message),
+        }
+    };
     if task.tail > task.after {
         let message = Message::new("`tail` is longer than `after`")
             .found(format!("tail = {}, after = {}", task.tail, task.after))
             .expected("the tail is the last part of the periods after the step");
-        faults.push(root.fault(message));
+        faults.push(fault(["tail", "after"], message));
     }
     let longest = task.lead + task.after + task.instants.max(task.sampling_instants);
     if longest > LONGEST_RUN {
         let message = Message::new("a run is too long")
             .found(format!("{longest} control periods of `lead`, `after` and instants"))
             .expected(format!("at most {LONGEST_RUN}"));
-        faults.push(root.fault(message));
+        let longer = if task.lead > task.after {
+            ["lead", "after"]
+        } else {
+            ["after", "lead"]
+        };
+        faults.push(fault(longer, message));
     }
 }
 
@@ -131,7 +143,10 @@ fn baselines(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<Kind>> {
 /// `false`, the duties the limit may use, or several of them.
 fn limits(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<[f64; 2]>> {
     let Some(items) = value.as_list() else {
-        let wanted = value.boolean(faults)?;
+        let Some(wanted) = value.boolean(&mut Vec::new()) else {
+            value.list("`false`, duties [low, high], or several of them", faults);
+            return None;
+        };
         return Some(if wanted { vec![[0.0, 1.0]] } else { Vec::new() });
     };
     let one = |value: &Value<'_>, faults: &mut Vec<Fault>| value.interval_within(0.0..=1.0, faults);

@@ -65,7 +65,7 @@ impl Live {
             toolchain::compile(&build, program, sources, folder.path()).map_err(|error| refused(&name, error))?;
         let controller = Controller::<f32>::new(policy);
         let layout = Layout::new(policy, controller.state_names());
-        let mut runner = ProcessRunner::new(Command::new(executable), TIMEOUT);
+        let mut runner = ProcessRunner::new(apart(Command::new(executable)), TIMEOUT);
         let hello = runner
             .start(layout.hello().len())
             .map_err(|error| format!("{name}: {}", error.reason))?;
@@ -128,6 +128,13 @@ impl Live {
         let answer = self.runner.exchange(&self.words, expected);
         answer.map_err(|error| format!("{}: {}", self.name, error.reason))
     }
+}
+
+/// Ctrl-C is the caller's business, not the program's.
+fn apart(mut command: Command) -> Command {
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(&mut command, 0);
+    command
 }
 
 fn build_for(language: Language) -> Result<Build, String> {

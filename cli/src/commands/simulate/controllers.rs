@@ -16,18 +16,18 @@ pub struct Named {
 
 /// The policy's controller, started.
 pub fn start(policy: &Policy, kind: ControllerKind) -> Result<Named, Failure> {
-    let language = match kind {
+    let (language, name) = match kind {
         ControllerKind::Interpreter => {
             return Ok(Named {
                 name: "interpreter".to_owned(),
                 controller: Box::new(Agent::new(policy)?),
             });
         }
-        ControllerKind::Rust => Language::Rust,
-        ControllerKind::C => Language::C,
+        ControllerKind::Rust => (Language::Rust, "generated Rust"),
+        ControllerKind::C => (Language::C, "generated C"),
     };
     let mut live = Live::start(policy, language).map_err(Failure)?;
-    let name = format!("generated {}, {}", language.name(), live.name());
+    let name = format!("{name} ({})", live.name());
     let ask = move |call: Call<'_>| match call {
         Call::Restart => live.restart().map(|()| None),
         Call::Step(samples) => live.step(samples).map(|command| {

@@ -176,7 +176,7 @@ pub fn summary(found: &Findings) -> String {
 
 /// How the comparison of the controllers came out.
 pub fn check_text(check: &Check) -> String {
-    let names = check.names.join("; ");
+    let names = check.names.join(", ");
     let periods = grouped(check.periods as u64);
     if check.differences.is_empty() {
         return format!("equal to the bit over {periods} control periods: {names}");

@@ -33,7 +33,8 @@ pub fn picture(setting: &Setting, step: &Step) -> Result<Svg, Failure> {
         .iter()
         .map(|course| course.shown.metrics.settling)
         .fold(0.0, f64::max);
-    let window = [-BEFORE * t, (1.5 * longest).max(AFTER * t)];
+    let recorded = setting.scenario.task.after as f64 * t;
+    let window = [-BEFORE * t, (1.5 * longest).max(AFTER * t).min(recorded)];
     let mut voltage = Panel::new(Axis::new("output voltage").unit("V")).height(280.0);
     let mut current = Panel::new(Axis::new("inductor current").unit("A"));
     let mut duty = Panel::new(Axis::new("duty"));

@@ -4,6 +4,7 @@
 mod commands;
 mod files;
 mod interruption;
+mod simulate;
 mod traces;
 mod training;
 mod verify;

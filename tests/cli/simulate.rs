@@ -262,9 +262,7 @@ fn an_interrupted_simulation_ends_with_130_and_writes_nothing() {
             assert!(begun.elapsed() < Duration::from_secs(60) && child.try_wait().unwrap().is_none());
             std::thread::sleep(Duration::from_millis(5));
         }
-        let signalled = run(std::process::Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]));
-        assert_eq!(signalled.code, Some(0));
-        let ended = child.wait_with_output().unwrap();
+        let ended = super::interrupt(child);
         assert_eq!(ended.status.code(), Some(130));
         assert!(String::from_utf8_lossy(&ended.stdout).contains("nothing written"));
         assert!(!desk.path("out").exists());

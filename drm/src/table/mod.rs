@@ -1,0 +1,175 @@
+//! Tables of settled points: CSV with the columns `d_real`, `v_out`, `i_out`, `v_in`.
+//!
+//! [`Table::parse`] reads strictly: all faults at once, each with file, line, what was found, what was expected and what
+//! to do. What is read is in SI units and within the range of a buck converter.
+
+mod cells;
+mod columns;
+mod suspicion;
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::faults::{Fault, Faults};
+use cells::Sheet;
+pub use columns::Columns;
+use columns::{Located, Source};
+
+/// One settled point of a converter.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Point {
+    /// Line of the file, from 1.
+    pub line: usize,
+    /// Commanded duty ratio, 0..1.
+    pub d_real: f64,
+    /// Output voltage, V.
+    pub v_out: f64,
+    /// Load current, A.
+    pub i_out: f64,
+    /// Input voltage, V.
+    pub v_in: f64,
+    /// Whether the point had settled, as far as the table says so.
+    pub settled: bool,
+}
+
+impl Point {
+    /// The duty ratio with which the loss-free simulation has the same voltage.
+    #[must_use]
+    pub fn d_sim(&self) -> f64 {
+        self.v_out / self.v_in
+    }
+}
+
+/// The settled points of one converter.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Table {
+    /// At least one, in the order of the file.
+    pub points: Vec<Point>,
+    /// Lines whose measurement is still to come: `d_real`, `v_out`, `i_out` and `v_in` are all empty.
+    pub open: Vec<usize>,
+    /// What a reader of the table should know.
+    pub notes: Vec<String>,
+}
+
+/// How a table is read.
+#[derive(Debug, Clone, Default)]
+pub struct TableOptions {
+    /// Where the quantities stand.
+    pub columns: Columns,
+    /// Unsettled points are left out instead of refused.
+    pub skip_unsettled: bool,
+}
+
+/// More points than this are a record over time, not a table of settled points.
+const MOST_POINTS: usize = 2000;
+/// A standard deviation above this share of the voltage means that the point had not settled.
+const UNSETTLED: f64 = 0.005;
+
+impl Table {
+    /// Reads the text of a CSV file; `file` is for messages.
+    ///
+    /// Cells are separated by commas, numbers have a decimal point; empty lines and lines that start with `#` are
+    /// skipped, columns that nobody asked for are ignored.
+    ///
+    /// # Errors
+    /// All faults of the table.
+    pub fn parse(file: &Path, text: &str, options: &TableOptions) -> Result<Table, Faults> {
+        let place = |fault: Fault| fault.file(file);
+        let sheet = Sheet::parse(text).map_err(|faults| Faults(faults.into_iter().map(place).collect()))?;
+        let located = options.columns.locate(&sheet);
+        let located = located.map_err(|faults| Faults(faults.into_iter().map(place).collect()))?;
+        let mut faults = Vec::new();
+        let mut table = Table {
+            points: Vec::new(),
+            open: Vec::new(),
+            notes: Vec::new(),
+        };
+        for row in &sheet.rows {
+            match point(row, &located, &sheet, &mut faults) {
+                Some(Reading::Point(point)) => table.points.push(point),
+                Some(Reading::Open) => table.open.push(row.line),
+                None => {}
+            }
+        }
+        if faults.is_empty() {
+            suspicion::check(&mut table, &located, &mut faults);
+        }
+        if faults.is_empty() {
+            settled(&mut table, options, &mut faults);
+        }
+        if !faults.is_empty() {
+            return Err(Faults(faults.into_iter().map(place).collect()));
+        }
+        if table.points.len() > MOST_POINTS {
+            let fault = Fault::new("too many rows for a table of settled points")
+                .found(format!("{} rows", table.points.len()))
+                .expected(format!("at most {MOST_POINTS}, one for each settled point"))
+                .hint("average a record over the time in which the converter had settled");
+            return Err(place(fault).into());
+        }
+        Ok(table)
+    }
+}
+
+enum Reading {
+    Point(Point),
+    Open,
+}
+
+/// One row; `None` if it has faults.
+fn point(row: &cells::Row, located: &Located, sheet: &Sheet, faults: &mut Vec<Fault>) -> Option<Reading> {
+    let measured = [&located.d_real, &located.v_out, &located.i_out, &located.v_in];
+    let in_table = |source: &&&Source| matches!(source, Source::Column { .. });
+    if measured.iter().filter(in_table).all(|source| source.is_empty(row)) {
+        return Some(Reading::Open);
+    }
+    let before = faults.len();
+    let mut number = |source: &Source| source.number(row, sheet, faults);
+    let [d_real, v_out, i_out, v_in] = measured.map(&mut number);
+    let v_std = located.v_std.as_ref().filter(|source| !source.is_empty(row));
+    let v_std = v_std.and_then(&mut number);
+    let settled = located.settled.as_ref().filter(|source| !source.is_empty(row));
+    let settled = settled.and_then(|source| source.yes_or_no(row, sheet, faults));
+    if faults.len() > before {
+        return None;
+    }
+    let v_out = v_out?;
+    Some(Reading::Point(Point {
+        line: row.line,
+        d_real: d_real?,
+        v_out,
+        i_out: i_out?,
+        v_in: v_in?,
+        settled: settled.unwrap_or(true) && v_std.is_none_or(|v_std| v_std <= UNSETTLED * v_out.abs()),
+    }))
+}
+
+/// Unsettled points are refused, or left out if so wished.
+fn settled(table: &mut Table, options: &TableOptions, faults: &mut Vec<Fault>) {
+    let unsettled: Vec<usize> = table.points.iter().filter(|p| !p.settled).map(|p| p.line).collect();
+    if unsettled.is_empty() {
+        return;
+    }
+    if options.skip_unsettled {
+        table.notes.push(format!("left out as unsettled: {}", lines(&unsettled)));
+        table.points.retain(|point| point.settled);
+        return;
+    }
+    for line in unsettled {
+        let fault = Fault::new("the point had not settled").line(line);
+        let expected = format!(
+            "`settled` yes and `v_std` at most {} % of the voltage",
+            100.0 * UNSETTLED
+        );
+        let hint = "measure it again after a longer wait, or leave such points out with --skip-unsettled";
+        faults.push(fault.expected(expected).hint(hint));
+    }
+}
+
+/// `line 3` or `lines 3, 4`.
+pub(crate) fn lines(lines: &[usize]) -> String {
+    let list: Vec<String> = lines.iter().map(usize::to_string).collect();
+    let s = if lines.len() == 1 { "" } else { "s" };
+    format!("line{s} {}", list.join(", "))
+}

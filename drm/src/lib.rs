@@ -11,7 +11,6 @@
 //! the product `r i_out d_sim` that the losses bring about ([`formula`]).
 
 mod dcm;
-mod faults;
 mod fit;
 pub mod formula;
 mod mapping;
@@ -19,7 +18,6 @@ pub mod pls;
 mod table;
 
 pub use dcm::Conduction;
-pub use faults::{Fault, Faults};
 pub use fit::*;
 pub use mapping::DutyRatioMap;
 pub use table::{Columns, Point, Table, TableOptions};

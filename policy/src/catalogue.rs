@@ -1,42 +1,14 @@
 //! The texts of all faults of files, keys, values and names, side by side so that they speak with one voice.
 //!
-//! Faults of tensors and layer chains stand in [`crate::weights::catalogue`].
+//! Those that any TOML file can have come from [`toml_input::messages`], those of tensors and layer chains stand in
+//! [`crate::weights::catalogue`].
 
-use std::io;
-
-use crate::faults::Message;
-use crate::names::nearest;
+use toml_input::Message;
+pub(crate) use toml_input::messages::{
+    count, crossed, exactly_one_of, missing_key, not_finite, not_one_of, not_positive, out_of_range, wrong_length,
+};
 
 // --- files ---
-
-pub(crate) fn unreadable(file: &str, error: &io::Error) -> Message {
-    match error.kind() {
-        io::ErrorKind::NotFound => Message::new(format!("cannot find the file `{file}`"))
-            .hint("paths are relative to the folder of the file that names them"),
-        io::ErrorKind::PermissionDenied => Message::new(format!("may not read the file `{file}`")),
-        _ => Message::new(format!("cannot read the file `{file}`")).found(error.to_string()),
-    }
-}
-
-pub(crate) fn is_folder(file: &str) -> Message {
-    Message::new(format!("`{file}` is a folder")).expected("a file")
-}
-
-pub(crate) fn not_regular(file: &str) -> Message {
-    Message::new(format!("`{file}` is not a regular file"))
-}
-
-pub(crate) fn file_too_large(file: &str, found: u64, limit: u64) -> Message {
-    Message::new(format!("the file `{file}` is too large"))
-        .found(format!("{found} bytes"))
-        .expected(format!("at most {limit} bytes"))
-}
-
-pub(crate) fn not_utf8(byte: u8) -> Message {
-    Message::new("the file is not UTF-8 text")
-        .found(format!("byte 0x{byte:02x}"))
-        .hint("save it as UTF-8, or write ASCII only")
-}
 
 pub(crate) fn outside_root(file: &str) -> Message {
     Message::new(format!("`{file}` lies outside the crate"))
@@ -46,92 +18,10 @@ pub(crate) fn outside_root(file: &str) -> Message {
 
 // --- form ---
 
-pub(crate) fn syntax(message: &str, decimal_comma: bool) -> Message {
-    let text = Message::new("this is not valid TOML").found(message.to_lowercase());
-    if decimal_comma {
-        return text.expected("a decimal point").hint("write 1.5 instead of 1,5");
-    }
-    text
-}
-
-pub(crate) fn unknown_key(key: &str, title: &str, known: &[&str]) -> Message {
-    let place = if title.is_empty() {
-        "at the top level".to_owned()
-    } else {
-        format!("in {title}")
-    };
-    let hint = nearest(key, known.iter().copied()).map(|name| format!("did you mean `{name}`?"));
-    Message::new(format!("unknown key `{}` {place}", key.escape_debug()))
-        .expected(format!("one of {}", known.join(", ")))
-        .maybe_hint(hint)
-}
-
-pub(crate) fn missing_key(key: &str, title: &str, hint: &str) -> Message {
-    let place = if title.is_empty() {
-        "at the top level".to_owned()
-    } else {
-        format!("in {title}")
-    };
-    Message::new(format!("`{key}` is missing {place}")).hint(hint)
-}
-
-pub(crate) fn still_todo(label: &str, expected: &str) -> Message {
-    Message::new(format!("`{label}` still says TODO: fill in {expected}"))
-        .found("TODO")
-        .expected(expected)
-}
-
-pub(crate) fn wrong_type(label: &str, found: &str, expected: &str) -> Message {
-    let hint = decimal_comma_in_text(found).then(|| "write a number with a point and without quotes: 1.5".to_owned());
-    Message::new(format!("`{label}` is of the wrong kind"))
-        .found(found)
-        .expected(expected)
-        .maybe_hint(hint)
-}
-
-fn decimal_comma_in_text(found: &str) -> bool {
-    let text = found.trim_start_matches("the text \"").trim_end_matches('"');
-    text.split_once(',')
-        .is_some_and(|(a, b)| a.parse::<f64>().is_ok() && b.parse::<f64>().is_ok())
-}
-
-pub(crate) fn wrong_length(label: &str, found: usize, expected: &str) -> Message {
-    let hint = (found == 4).then(|| "a decimal comma? write 0.4 instead of 0,4".to_owned());
-    Message::new(format!("`{label}` has the wrong number of values"))
-        .found(found.to_string())
-        .expected(expected)
-        .maybe_hint(hint)
-}
-
-pub(crate) fn not_one_of(label: &str, found: &str, allowed: &[&str]) -> Message {
-    let hint = nearest(found, allowed.iter().copied()).map(|name| format!("did you mean \"{name}\"?"));
-    Message::new(format!("`{label}` has no such value"))
-        .found(format!("\"{}\"", found.escape_debug()))
-        .expected(allowed.join(", "))
-        .maybe_hint(hint)
-}
-
 pub(crate) fn not_supported_yet(label: &str, found: &str, supported: &[&str]) -> Message {
     Message::new(format!("`{label}` = \"{}\" is not supported yet", found.escape_debug()))
         .found(format!("\"{}\"", found.escape_debug()))
         .expected(format!("supported: {}", supported.join(", ")))
-}
-
-pub(crate) fn exactly_one_of(title: &str, keys: &str, found: usize) -> Message {
-    Message::new(format!("{title} needs exactly one of {keys}"))
-        .found(found.to_string())
-        .expected("1")
-}
-
-pub(crate) fn count(what: &str, found: usize, low: usize, high: usize) -> Message {
-    let problem = if found < low {
-        format!("too few {what}")
-    } else {
-        format!("too many {what}")
-    };
-    Message::new(problem)
-        .found(found.to_string())
-        .expected(format!("{low} to {high}"))
 }
 
 pub(crate) fn incomplete() -> Message {
@@ -139,18 +29,6 @@ pub(crate) fn incomplete() -> Message {
 }
 
 // --- values ---
-
-pub(crate) fn not_finite(label: &str, value: f64) -> Message {
-    Message::new(format!("`{label}` is not a finite number"))
-        .found(value.to_string().to_lowercase())
-        .expected("a finite number")
-}
-
-pub(crate) fn out_of_range(label: &str, found: &str, expected: &str) -> Message {
-    Message::new(format!("`{label}` is out of range"))
-        .found(found)
-        .expected(expected)
-}
 
 pub(crate) fn duty_range(label: &str, found: f64) -> Message {
     let percent = found > 1.0 && found <= 100.0;
@@ -164,13 +42,6 @@ pub(crate) fn duty_range(label: &str, found: f64) -> Message {
 /// A quotient by 100 without the binary noise (0.44 rather than 0.44000000000000006).
 fn tidy(x: f64) -> f64 {
     (x * 1e12).round() / 1e12
-}
-
-pub(crate) fn crossed(label: &str, low: f64, high: f64) -> Message {
-    Message::new(format!("the limits of `{label}` are crossed"))
-        .found(format!("low {low}, high {high}"))
-        .expected("low <= high")
-        .hint(format!("write [{high}, {low}]"))
 }
 
 pub(crate) fn empty_range(label: &str, at: f64) -> Message {
@@ -224,12 +95,6 @@ pub(crate) fn not_increasing(i_out: f64, slope: f64) -> Message {
         .found(format!("a + r i = {slope} at i_out = {i_out}"))
         .expected("a + r i > 0 over the valid range of i_out")
         .hint("a duty that falls while the policy asks for more turns the loop's sign: check the fit")
-}
-
-pub(crate) fn not_positive(label: &str, found: f64) -> Message {
-    Message::new(format!("`{label}` must be greater than 0"))
-        .found(found.to_string())
-        .expected("> 0")
 }
 
 pub(crate) fn needs_other(label: &str, other: &str) -> Message {

@@ -1,15 +1,16 @@
 //! From files to a policy that holds: section by section, then what must fit between them.
 
+use toml_input::{Fault, Table, in_file_order};
+
 use crate::bounds::{self, Inputs, Overflow};
 use crate::catalogue;
 use crate::contract::{actions, features, head, mapping, network, protection, signals};
 use crate::digests;
-use crate::faults::{Fault, Faults};
+use crate::faults::Faults;
 use crate::limits::MAX_FEATURES;
 use crate::model::{Action, Digests, Feature, Golden, Interval, Layer, Mapping, Policy, Signal};
 use crate::notes::{beyond_limits, unused};
 use crate::raw::RawPolicy;
-use crate::toml_reader::Section;
 use crate::weights::{self, Weights};
 
 /// Checks everything that can be checked before code is generated.
@@ -25,26 +26,13 @@ pub fn check(raw: RawPolicy) -> Result<Policy, Faults> {
         _ if faults.is_empty() => {
             // every part that is missing has left a fault; if ever one did not, refuse all the same
             let message = catalogue::incomplete();
-            Err(raw.faults(vec![raw.contract.source.name.fault(message)]))
+            Err(raw.faults(vec![raw.contract.source().name.fault(message)]))
         }
         _ => {
             in_file_order(&mut faults);
             Err(raw.faults(faults))
         }
     }
-}
-
-/// By file as first mentioned, then by line and column; each fault once.
-fn in_file_order(faults: &mut Vec<Fault>) {
-    let mut files = Vec::new();
-    for fault in faults.iter() {
-        if !files.contains(&fault.file) {
-            files.push(fault.file.clone());
-        }
-    }
-    let order = |fault: &Fault| (files.iter().position(|file| *file == fault.file), fault.line_column());
-    faults.sort_by_key(order);
-    faults.dedup();
 }
 
 fn whole(raw: &RawPolicy, faults: &mut Vec<Fault>) -> Option<Policy> {
@@ -130,14 +118,14 @@ fn whole(raw: &RawPolicy, faults: &mut Vec<Fault>) -> Option<Policy> {
 /// `None` if faulty, `Some(None)` without a mapping.
 fn mapped(
     raw: &RawPolicy,
-    root: &mut Section<'_>,
+    root: &mut Table<'_>,
     signals: &[String],
     faults: &mut Vec<Fault>,
 ) -> Option<Option<Mapping>> {
     let Some(value) = root.optional("mapping") else {
         return Some(None);
     };
-    let mut section = value.section("[mapping]", faults)?;
+    let mut section = value.table("[mapping]", faults)?;
     let hint = "the file with the coefficients: `file = \"drm.toml\"`";
     if let Some(file) = section.required("file", hint, faults) {
         file.text(faults);
@@ -173,7 +161,7 @@ fn bound_layers(raw: &RawPolicy, features: &[Feature], layers: &mut [Layer], fau
                 let file = raw
                     .weights
                     .as_ref()
-                    .map_or(&raw.contract.source.name, |file| &file.name);
+                    .map_or(&raw.contract.source().name, |file| &file.name);
                 faults.push(file.tensor_fault(&layer.name, catalogue::may_overflow(&what, magnitude)));
                 return;
             }
@@ -194,7 +182,7 @@ fn bound_mapping(raw: &RawPolicy, mapping: &Mapping, inputs: &Inputs, actions: &
         let file = raw
             .mapping
             .as_ref()
-            .map_or(&raw.contract.source.name, |document| &document.source.name);
+            .map_or(&raw.contract.source().name, |document| &document.source().name);
         faults.push(file.fault(catalogue::may_overflow("the mapped duty", magnitude)));
     }
 }

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use toml_input::{Message, Span, nearest};
+
 use crate::catalogue;
-use crate::faults::Message;
 use crate::limits;
 use crate::model::{Expr, Input};
-use crate::names::{REMEMBERED, nearest};
-use crate::source::Span;
+use crate::names::REMEMBERED;
 
 /// Names an expression may use.
 pub(crate) struct Scope<'a> {

@@ -25,15 +25,14 @@ mod notes;
 mod raw;
 pub mod rounding;
 mod scaffold;
-mod source;
-mod toml_reader;
 mod weights;
 
 pub use check::check;
-pub use faults::{Fault, Faults, Place};
+pub use faults::Faults;
 pub use model::*;
 pub use raw::{RawPolicy, ReadOptions, read};
 pub use scaffold::new_contract;
+pub use toml_input::{Fault, Place};
 
 /// Reads and checks the contract at `path`.
 ///

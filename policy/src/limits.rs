@@ -1,5 +1,7 @@
 //! Sizes beyond which input is refused, so that neither memory nor generated code can grow without bound.
 
+pub use toml_input::{MAX_SYNTAX_FAULTS, MAX_TOML_BYTES};
+
 /// Longest memory of a filter in samples (`delay`, `moving_average`).
 pub const MAX_LINE: usize = 256;
 /// Most dense layers of a network: eight hidden ones and the output.
@@ -24,8 +26,6 @@ pub const MAX_TENSORS: usize = 64;
 pub const MAX_WEIGHT_BYTES: u64 = 64 << 20;
 /// Largest header of a safetensors file in bytes (1 MiB).
 pub const MAX_HEADER_BYTES: u64 = 1 << 20;
-/// Largest TOML file in bytes (1 MiB).
-pub const MAX_TOML_BYTES: u64 = 1 << 20;
 /// Longest source expression in characters.
 pub const MAX_SOURCE_CHARS: usize = 500;
 /// Deepest nesting of parentheses and signs in a source expression.
@@ -52,5 +52,3 @@ pub const MIN_SOFT_START_INCREMENT: f64 = 1.2e-7;
 pub const MAX_ADC_CODE: f64 = 16_777_216.0;
 /// Largest magnitude of any value inside the controller; a factor of four below the binary32 overflow.
 pub const MAX_MAGNITUDE: f64 = (f32::MAX / 4.0) as f64;
-/// Faults shown at most for one file's syntax; what follows is mostly an echo.
-pub const MAX_SYNTAX_FAULTS: usize = 8;

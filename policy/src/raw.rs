@@ -1,13 +1,13 @@
 //! The files of a policy as they are, every value with its place.
 
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
+
+use toml_input::{Document, Fault, FileName, Message, Source, Value};
 
 use crate::catalogue;
-use crate::faults::{Fault, Faults, Message};
+use crate::faults::Faults;
 use crate::limits::{MAX_TOML_BYTES, MAX_WEIGHT_BYTES};
 use crate::names::{self, Kind};
-use crate::source::{FileName, Span, normalise, read_bytes, text_of};
-use crate::toml_reader::{At, Document, Node};
 
 /// How files are found.
 #[derive(Debug, Clone, Default)]
@@ -76,14 +76,13 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<RawPolicy, Faults> {
         name: None,
         signals: Vec::new(),
     };
-    let given = FileName {
-        path: path.to_path_buf(),
-        shown: path.to_path_buf(),
-    };
+    let given = FileName::new(path);
     let name = locate(path, options).map_err(|message| alone(given.fault(message), Vec::new()))?;
     let mut files = vec![name.path.clone()];
-    let bytes = read_bytes(&name, MAX_TOML_BYTES).map_err(|message| alone(name.fault(message), files.clone()))?;
-    let source = text_of(&name, bytes).map_err(|fault| alone(*fault, files.clone()))?;
+    let bytes = name
+        .read(MAX_TOML_BYTES)
+        .map_err(|message| alone(name.fault(message), files.clone()))?;
+    let source = Source::new(name.clone(), bytes).map_err(|fault| alone(*fault, files.clone()))?;
     let (contract, syntax) = Document::parse(source);
     if !syntax.is_empty() {
         let (name, signals) = skeleton(&contract);
@@ -95,26 +94,19 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<RawPolicy, Faults> {
         });
     }
     let mut faults = Vec::new();
-    let mut companion = |keys: &[&str], limit: u64| -> Option<(Binary, Span)> {
-        let At {
-            value: Node::Text(text),
-            span,
-        } = contract.peek(keys)?
-        else {
-            return None;
-        };
+    let mut companion = |keys: &[&str], limit: u64| -> Option<Binary> {
+        let value = contract.peek(keys)?;
+        let text = value.as_text()?;
         let read = beside(&name, text, options).and_then(|name| {
             files.push(name.path.clone());
-            read_bytes(&name, limit).map(|bytes| Binary { name, bytes })
+            name.read(limit).map(|bytes| Binary { name, bytes })
         });
-        read.map_err(|message| faults.push(contract.fault(span, message)))
-            .ok()
-            .map(|file| (file, span.clone()))
+        read.map_err(|message| faults.push(value.fault(message))).ok()
     };
-    let weights = companion(&["network", "weights"], MAX_WEIGHT_BYTES).map(|(file, _)| file);
-    let golden = companion(&["network", "golden"], MAX_WEIGHT_BYTES).map(|(file, _)| file);
+    let weights = companion(&["network", "weights"], MAX_WEIGHT_BYTES);
+    let golden = companion(&["network", "golden"], MAX_WEIGHT_BYTES);
     let mapping = companion(&["mapping", "file"], MAX_TOML_BYTES);
-    let mapping = mapping.and_then(|(file, _)| document(file, &mut faults));
+    let mapping = mapping.and_then(|file| document(file, &mut faults));
     Ok(RawPolicy {
         contract,
         mapping,
@@ -126,7 +118,7 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<RawPolicy, Faults> {
 }
 
 fn document(file: Binary, faults: &mut Vec<Fault>) -> Option<Document> {
-    let source = text_of(&file.name, file.bytes)
+    let source = Source::new(file.name, file.bytes)
         .map_err(|fault| faults.push(*fault))
         .ok()?;
     let (document, syntax) = Document::parse(source);
@@ -138,10 +130,7 @@ fn document(file: Binary, faults: &mut Vec<Fault>) -> Option<Document> {
 /// The contract's path, checked against the root.
 fn locate(path: &Path, options: &ReadOptions) -> Result<FileName, Message> {
     let Some(root) = &options.root else {
-        return Ok(FileName {
-            path: path.to_path_buf(),
-            shown: path.to_path_buf(),
-        });
+        return Ok(FileName::new(path));
     };
     let shown = path.strip_prefix(root).unwrap_or(path).display().to_string();
     inside(root, &root.join(path)).ok_or_else(|| catalogue::outside_root(&shown))
@@ -171,30 +160,36 @@ fn inside(root: &Path, path: &Path) -> Option<FileName> {
     Some(FileName { path, shown })
 }
 
+/// `path` without `.` and `..`, by text alone; `None` if it climbs above its start.
+fn normalise(path: &Path) -> Option<PathBuf> {
+    let mut parts: Vec<Component<'_>> = Vec::new();
+    for part in path.components() {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir => match parts.last() {
+                Some(Component::Normal(_)) => drop(parts.pop()),
+                _ => return None,
+            },
+            other => parts.push(other),
+        }
+    }
+    Some(parts.iter().collect())
+}
+
 /// Name and signals of a contract as far as they can be told.
 fn skeleton(contract: &Document) -> (Option<String>, Vec<(String, bool)>) {
-    let fit = |node: Option<&At<Node>>, kind| match node {
-        Some(At {
-            value: Node::Text(text),
-            ..
-        }) if names::objection(text, kind).is_none() => Some(text.clone()),
-        _ => None,
+    let fit = |value: Option<Value<'_>>, kind| {
+        let text = value?.as_text()?;
+        names::objection(text, kind).is_none().then(|| text.to_owned())
     };
     let name = fit(contract.peek(&["name"]), Kind::Policy);
     let mut signals: Vec<(String, bool)> = Vec::new();
-    if let Some(At {
-        value: Node::List(items),
-        ..
-    }) = contract.peek(&["signal"])
-    {
-        for item in items {
-            let Node::Table(entries) = &item.value else { continue };
-            let find = |key: &str| entries.iter().find(|(name, _)| name.value == key).map(|(_, node)| node);
-            if let Some(name) = fit(find("name"), Kind::Signal)
-                && signals.iter().all(|(known, _)| *known != name)
-            {
-                signals.push((name, find("adc").is_some()));
-            }
+    let items = contract.peek(&["signal"]).and_then(|value| value.as_list());
+    for item in items.unwrap_or_default() {
+        if let Some(name) = fit(item.peek("name"), Kind::Signal)
+            && signals.iter().all(|(known, _)| *known != name)
+        {
+            signals.push((name, item.peek("adc").is_some()));
         }
     }
     (name, signals)

@@ -4,10 +4,11 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use crate::faults::{Fault, Faults};
+use toml_input::{Fault, FileName};
+
+use crate::faults::Faults;
 use crate::limits::MAX_WEIGHT_BYTES;
 use crate::raw::Binary;
-use crate::source::{FileName, read_bytes};
 use crate::weights::{Outline, outline};
 
 /// Text of a commented `policy.toml` for the network in `weights`, to be written beside it.
@@ -18,12 +19,10 @@ use crate::weights::{Outline, outline};
 /// # Errors
 /// If the file is not a sound safetensors file or holds no single chain of dense layers.
 pub fn new_contract(weights: &Path) -> Result<String, Faults> {
-    let name = FileName {
-        path: weights.to_path_buf(),
-        shown: weights.to_path_buf(),
-    };
+    let name = FileName::new(weights);
     let mut faults: Vec<Fault> = Vec::new();
-    let outline = read_bytes(&name, MAX_WEIGHT_BYTES)
+    let outline = name
+        .read(MAX_WEIGHT_BYTES)
         .map_err(|message| faults.push(name.fault(message)))
         .ok()
         .and_then(|bytes| {

@@ -10,9 +10,9 @@ mod validation;
 
 use policy::Coefficients;
 use serde::Serialize;
+use toml_input::{Fault, Faults, Message};
 
 use crate::dcm::Conduction;
-use crate::faults::{Fault, Faults};
 use crate::mapping::DutyRatioMap;
 use crate::table::{Point, Table};
 pub use causes::{Cause, Explanation};
@@ -128,7 +128,7 @@ pub fn fit(table: &Table, options: &FitOptions) -> Result<Report, Faults> {
         constant_load,
         assumed_a: options.assumed_a,
     };
-    let forms = forms(&points, constant_load, options)?;
+    let forms = forms(&points, constant_load, options).map_err(|message| Faults::from(Fault::from(message)))?;
     let everything = points.clone();
     // outliers are judged by the better form: what the other lacks must not hide them
     let richest = model(match has_product(&points, constant_load, options) {
@@ -181,27 +181,27 @@ fn continuous(table: &Table, options: &FitOptions, notes: &mut Vec<String>) -> (
 }
 
 /// The forms to fit, the simplest first.
-fn forms(points: &[Point], constant_load: bool, options: &FitOptions) -> Result<Vec<Form>, Fault> {
+fn forms(points: &[Point], constant_load: bool, options: &FitOptions) -> Result<Vec<Form>, Message> {
     let least = options.form.unwrap_or(Form::ThreeTerm).fewest_points();
     if points.len() < least {
-        let fault = Fault::new("too few points in continuous conduction")
+        let message = Message::new("too few points in continuous conduction")
             .found(format!("{}", points.len()))
             .expected(format!("at least {least}"));
-        return Err(fault.hint("measure at more duties and loads; above the ripple the current never rests"));
+        return Err(message.hint("measure at more duties and loads; above the ripple the current never rests"));
     }
     let range = hull(points.iter().map(Point::d_sim));
     if range.high - range.low < separation::LEAST_D_SIM && options.assumed_a.is_none() {
-        let fault = Fault::new("the table does not determine a: the voltage hardly varies")
+        let message = Message::new("the table does not determine a: the voltage hardly varies")
             .found(format!("v_out / v_in from {:.5} to {:.5}", range.low, range.high))
             .expected(format!("a range of at least {}", separation::LEAST_D_SIM));
         let hint = "measure at voltages around the wanted one as well; or give a from a data sheet with --assume-a \
                     (1 if the diode's forward voltage is small against v_in): then b and c are fitted at this voltage";
-        return Err(fault.hint(hint));
+        return Err(message.hint(hint));
     }
     let product = has_product(points, constant_load, options);
     if options.form == Some(Form::FourTerm) && !product {
-        let fault = Fault::new("the four-term form needs a load and a voltage that vary, each on its own");
-        return Err(fault.hint("take the three-term form, or measure more points"));
+        let message = Message::new("the four-term form needs a load and a voltage that vary, each on its own");
+        return Err(message.hint("take the three-term form, or measure more points"));
     }
     Ok(match options.form {
         Some(form) => vec![form],
@@ -236,11 +236,11 @@ fn one(model: &Model, points: &[Point], options: &FitOptions) -> Result<Fit, Fau
     let map = model.map(points, &pls).rounded();
     if !map.rises() {
         let slope = map.slope(map.valid_i_out.low).min(map.slope(map.valid_i_out.high));
-        let fault = Fault::new(format!("the {} mapping does not rise with d_sim", model.form.name()))
+        let message = Message::new(format!("the {} mapping does not rise with d_sim", model.form.name()))
             .found(format!("slope {slope:.4} with {components} components"))
             .expected("a + r i_out > 0 over the measured load currents");
         let hint = "a larger duty must raise the voltage: look for swapped columns, a wrong unit or bad points";
-        return Err(fault.hint(hint).into());
+        return Err(Fault::from(message.hint(hint)).into());
     }
     let left_out = validation::leave_one_out(model, points, components);
     let rows: Vec<Row> = points

@@ -1,7 +1,8 @@
 //! Which column holds which quantity.
 
-use crate::faults::{Fault, Faults};
-use crate::table::cells::{Row, Sheet, clip};
+use toml_input::{Fault, Faults, Message, nearest};
+
+use crate::table::cells::{Row, Sheet};
 
 /// Where the quantities stand: a column of that name unless said otherwise.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -53,20 +54,20 @@ impl Columns {
         for entry in text.split(',').map(str::trim).filter(|entry| !entry.is_empty()) {
             match wish(entry) {
                 Ok((quantity, _)) if columns.get(&quantity).is_some() => {
-                    faults.push(Fault::new(format!("`{quantity}` is mapped twice")).found(clip(entry)));
+                    faults.push(Message::new(format!("`{quantity}` is mapped twice")).found(entry).into());
                 }
                 Ok(found) => columns.entries.push(found),
-                Err(fault) => faults.push(fault.found(clip(entry))),
+                Err(message) => faults.push(message.found(entry).into()),
             }
         }
-        if faults.is_empty() { Ok(columns) } else { Err(Faults(faults)) }
+        Faults::unless_empty(faults).map(|()| columns)
     }
 
     fn get(&self, quantity: &str) -> Option<&Wish> {
         self.entries.iter().find(|(name, _)| name == quantity).map(|(_, wish)| wish)
     }
 
-    pub(crate) fn locate(&self, sheet: &Sheet) -> Result<Located, Vec<Fault>> {
+    pub(crate) fn locate(&self, sheet: &Sheet<'_>) -> Result<Located, Vec<Fault>> {
         let mut faults = Vec::new();
         let mut find = |quantity: &str, needed: bool| -> Option<Source> {
             let plain = Wish::Column {
@@ -79,7 +80,7 @@ impl Columns {
                 Wish::Constant(value) => return Some(Source::Constant(*value)),
                 Wish::Column { name, factor, stated } => (name, *factor, *stated),
             };
-            let index = sheet.header.iter().position(|column| column == name);
+            let index = sheet.header().position(|column| column == name);
             if index.is_none() && (needed || wish.is_some()) {
                 faults.push(missing(quantity, name, sheet));
             }
@@ -104,16 +105,18 @@ impl Columns {
     }
 }
 
-fn wish(entry: &str) -> Result<(String, Wish), Fault> {
+fn wish(entry: &str) -> Result<(String, Wish), Message> {
     let form = || {
-        Fault::new("the column map cannot be read")
+        Message::new("the column map cannot be read")
             .expected("quantity=column, quantity=column*factor or quantity=number")
             .hint("for example --map d_real=duty_percent*0.01,v_in=24")
     };
     let (quantity, value) = entry.split_once('=').ok_or_else(form)?;
     let (quantity, value) = (quantity.trim(), value.trim());
     if !QUANTITIES.contains(&quantity) {
-        return Err(Fault::new(format!("no quantity `{quantity}`")).expected(format!("one of {}", QUANTITIES.join(", "))));
+        let hint = nearest(quantity, QUANTITIES).map(|name| format!("did you mean `{name}`?"));
+        let message = Message::new(format!("no quantity `{quantity}`")).maybe_hint(hint);
+        return Err(message.expected(format!("one of {}", QUANTITIES.join(", "))));
     }
     if let Some(number) = finite(value) {
         return Ok((quantity.to_owned(), Wish::Constant(number)));
@@ -129,17 +132,14 @@ fn wish(entry: &str) -> Result<(String, Wish), Fault> {
     Ok((quantity.to_owned(), Wish::Column { name, factor, stated }))
 }
 
-fn missing(quantity: &str, name: &str, sheet: &Sheet) -> Fault {
-    let header = sheet.header.join(", ");
-    let example = if quantity == "v_in" {
-        "say where it stands, --map v_in=COLUMN, or how high it was, --map v_in=24".to_owned()
-    } else {
-        format!("say where it stands: --map {quantity}=COLUMN")
+fn missing(quantity: &str, name: &str, sheet: &Sheet<'_>) -> Fault {
+    let near = nearest(name, sheet.header()).unwrap_or("COLUMN");
+    let hint = match quantity {
+        "v_in" => format!("say where it stands, --map v_in={near}, or how high it was, --map v_in=24"),
+        _ => format!("say where it stands: --map {quantity}={near}"),
     };
-    Fault::new(format!("no column `{name}`"))
-        .found(clip(&header))
-        .expected("the columns d_real, v_out, i_out, v_in")
-        .hint(example)
+    let message = Message::new(format!("no column `{name}`")).expected("the columns d_real, v_out, i_out, v_in");
+    sheet.header_fault(message.hint(hint))
 }
 
 fn finite(text: &str) -> Option<f64> {
@@ -147,10 +147,10 @@ fn finite(text: &str) -> Option<f64> {
 }
 
 impl Source {
-    pub fn is_empty(&self, row: &Row) -> bool {
+    pub fn is_empty(&self, row: &Row, sheet: &Sheet<'_>) -> bool {
         match self {
             Source::Constant(_) => false,
-            Source::Column { index, .. } => row.cells.get(*index).is_none_or(String::is_empty),
+            Source::Column { index, .. } => sheet.cell(row, *index).is_empty(),
         }
     }
 
@@ -162,42 +162,43 @@ impl Source {
         }
     }
 
-    pub fn number(&self, row: &Row, sheet: &Sheet, faults: &mut Vec<Fault>) -> Option<f64> {
+    /// The number in a row, in SI units.
+    pub fn number(&self, row: &Row, sheet: &Sheet<'_>, faults: &mut Vec<Fault>) -> Option<f64> {
         let (index, factor) = match self {
             Source::Constant(value) => return Some(*value),
             Source::Column { index, factor, .. } => (*index, *factor),
         };
-        let cell = row.cells.get(index).map(String::as_str).unwrap_or_default();
+        let cell = sheet.cell(row, index);
         if let Some(number) = finite(cell) {
             return Some(number * factor);
         }
-        let fault = Fault::new(if cell.is_empty() { "a cell is empty" } else { "a cell is not a number" })
-            .line(row.line)
-            .column(&sheet.header[index])
-            .expected("a finite number with a decimal point");
-        faults.push(if cell.is_empty() {
-            fault.hint("measure the point again or remove its row; a row of which nothing is measured yet may stay")
+        let (problem, hint) = if cell.is_empty() {
+            (
+                "a cell is empty",
+                "measure the point again or remove its row; a row of which nothing is measured yet may stay",
+            )
         } else if cell.contains('%') {
-            fault.found(clip(cell)).hint("duty ratios are fractions: write 0.5 instead of 50 %")
+            ("a cell is not a number", "duty ratios are fractions: write 0.5 instead of 50 %")
         } else {
-            fault.found(clip(cell)).hint("remove the row or measure the point again")
-        });
+            ("a cell is not a number", "remove the row or measure the point again")
+        };
+        let message = Message::new(problem).expected("a finite number with a decimal point").hint(hint);
+        faults.push(sheet.cell_fault(row, index, message));
         None
     }
 
-    pub fn yes_or_no(&self, row: &Row, sheet: &Sheet, faults: &mut Vec<Fault>) -> Option<bool> {
+    /// Yes or no in a row.
+    pub fn yes_or_no(&self, row: &Row, sheet: &Sheet<'_>, faults: &mut Vec<Fault>) -> Option<bool> {
         let index = match self {
             Source::Constant(value) => return Some(*value != 0.0),
             Source::Column { index, .. } => *index,
         };
-        let cell = row.cells.get(index).map(String::as_str).unwrap_or_default();
-        match cell.to_ascii_lowercase().as_str() {
+        match sheet.cell(row, index).to_ascii_lowercase().as_str() {
             "yes" | "true" | "1" => Some(true),
             "no" | "false" | "0" => Some(false),
             _ => {
-                let fault = Fault::new("a cell is neither yes nor no").line(row.line);
-                let fault = fault.column(&sheet.header[index]).found(clip(cell));
-                faults.push(fault.expected("yes or no"));
+                let message = Message::new("a cell is neither yes nor no").expected("yes or no");
+                faults.push(sheet.cell_fault(row, index, message));
                 None
             }
         }

@@ -7,11 +7,9 @@ mod cells;
 mod columns;
 mod suspicion;
 
-use std::path::Path;
-
 use serde::Serialize;
+use toml_input::{Fault, Faults, Message, Source as Text};
 
-use crate::faults::{Fault, Faults};
 use cells::Sheet;
 pub use columns::Columns;
 use columns::{Located, Source};
@@ -63,53 +61,64 @@ pub struct TableOptions {
 
 /// More points than this are a record over time, not a table of settled points.
 const MOST_POINTS: usize = 2000;
+/// More faults than this are counted, not listed.
+const MOST_FAULTS: usize = 12;
 /// A standard deviation above this share of the voltage means that the point had not settled.
 const UNSETTLED: f64 = 0.005;
 
 impl Table {
-    /// Reads the text of a CSV file; `file` is for messages.
+    /// Reads the text of a CSV file.
     ///
     /// Cells are separated by commas, numbers have a decimal point; empty lines and lines that start with `#` are
     /// skipped, columns that nobody asked for are ignored.
     ///
     /// # Errors
-    /// All faults of the table.
-    pub fn parse(file: &Path, text: &str, options: &TableOptions) -> Result<Table, Faults> {
-        let place = |fault: Fault| fault.file(file);
-        let sheet = Sheet::parse(text).map_err(|faults| Faults(faults.into_iter().map(place).collect()))?;
-        let located = options.columns.locate(&sheet);
-        let located = located.map_err(|faults| Faults(faults.into_iter().map(place).collect()))?;
-        let mut faults = Vec::new();
-        let mut table = Table {
-            points: Vec::new(),
-            open: Vec::new(),
-            notes: Vec::new(),
-        };
-        for row in &sheet.rows {
-            match point(row, &located, &sheet, &mut faults) {
-                Some(Reading::Point(point)) => table.points.push(point),
-                Some(Reading::Open) => table.open.push(row.line),
-                None => {}
+    /// All faults of the table; of very many the first.
+    pub fn parse(text: &Text, options: &TableOptions) -> Result<Table, Faults> {
+        read(text, options).map_err(|mut faults| {
+            let more = faults.len().saturating_sub(MOST_FAULTS);
+            faults.truncate(MOST_FAULTS);
+            if more > 0 {
+                faults.push(text.name.fault(Message::new(format!("{more} more faults of this kind"))));
             }
-        }
-        if faults.is_empty() {
-            suspicion::check(&mut table, &located, &mut faults);
-        }
-        if faults.is_empty() {
-            settled(&mut table, options, &mut faults);
-        }
-        if !faults.is_empty() {
-            return Err(Faults(faults.into_iter().map(place).collect()));
-        }
-        if table.points.len() > MOST_POINTS {
-            let fault = Fault::new("too many rows for a table of settled points")
-                .found(format!("{} rows", table.points.len()))
-                .expected(format!("at most {MOST_POINTS}, one for each settled point"))
-                .hint("average a record over the time in which the converter had settled");
-            return Err(place(fault).into());
-        }
-        Ok(table)
+            Faults::unless_empty(faults).err().unwrap_or_else(|| {
+                // a reader that gives nothing has left a fault
+                text.name.fault(Message::new("the table cannot be read")).into()
+            })
+        })
     }
+}
+
+fn read(text: &Text, options: &TableOptions) -> Result<Table, Vec<Fault>> {
+    let sheet = Sheet::parse(text)?;
+    let located = options.columns.locate(&sheet)?;
+    let mut faults = Vec::new();
+    let mut table = Table {
+        points: Vec::new(),
+        open: Vec::new(),
+        notes: Vec::new(),
+    };
+    for row in &sheet.rows {
+        match point(row, &located, &sheet, &mut faults) {
+            Some(Reading::Point(point)) => table.points.push(point),
+            Some(Reading::Open) => table.open.push(row.line),
+            None => {}
+        }
+    }
+    if faults.is_empty() {
+        suspicion::check(&mut table, &located, &sheet, &mut faults);
+    }
+    if faults.is_empty() {
+        settled(&mut table, options, &sheet, &mut faults);
+    }
+    if table.points.len() > MOST_POINTS {
+        let message = Message::new("too many rows for a table of settled points")
+            .found(format!("{} rows", table.points.len()))
+            .expected(format!("at most {MOST_POINTS}, one for each settled point"));
+        let hint = "average a record over the time in which the converter had settled";
+        faults.push(sheet.fault(message.hint(hint)));
+    }
+    if faults.is_empty() { Ok(table) } else { Err(faults) }
 }
 
 enum Reading {
@@ -118,18 +127,18 @@ enum Reading {
 }
 
 /// One row; `None` if it has faults.
-fn point(row: &cells::Row, located: &Located, sheet: &Sheet, faults: &mut Vec<Fault>) -> Option<Reading> {
+fn point(row: &cells::Row, located: &Located, sheet: &Sheet<'_>, faults: &mut Vec<Fault>) -> Option<Reading> {
     let measured = [&located.d_real, &located.v_out, &located.i_out, &located.v_in];
     let in_table = |source: &&&Source| matches!(source, Source::Column { .. });
-    if measured.iter().filter(in_table).all(|source| source.is_empty(row)) {
+    if measured.iter().filter(in_table).all(|source| source.is_empty(row, sheet)) {
         return Some(Reading::Open);
     }
     let before = faults.len();
     let mut number = |source: &Source| source.number(row, sheet, faults);
     let [d_real, v_out, i_out, v_in] = measured.map(&mut number);
-    let v_std = located.v_std.as_ref().filter(|source| !source.is_empty(row));
+    let v_std = located.v_std.as_ref().filter(|source| !source.is_empty(row, sheet));
     let v_std = v_std.and_then(&mut number);
-    let settled = located.settled.as_ref().filter(|source| !source.is_empty(row));
+    let settled = located.settled.as_ref().filter(|source| !source.is_empty(row, sheet));
     let settled = settled.and_then(|source| source.yes_or_no(row, sheet, faults));
     if faults.len() > before {
         return None;
@@ -146,7 +155,7 @@ fn point(row: &cells::Row, located: &Located, sheet: &Sheet, faults: &mut Vec<Fa
 }
 
 /// Unsettled points are refused, or left out if so wished.
-fn settled(table: &mut Table, options: &TableOptions, faults: &mut Vec<Fault>) {
+fn settled(table: &mut Table, options: &TableOptions, sheet: &Sheet<'_>, faults: &mut Vec<Fault>) {
     let unsettled: Vec<usize> = table.points.iter().filter(|p| !p.settled).map(|p| p.line).collect();
     if unsettled.is_empty() {
         return;
@@ -157,13 +166,13 @@ fn settled(table: &mut Table, options: &TableOptions, faults: &mut Vec<Fault>) {
         return;
     }
     for line in unsettled {
-        let fault = Fault::new("the point had not settled").line(line);
         let expected = format!(
             "`settled` yes and `v_std` at most {} % of the voltage",
             100.0 * UNSETTLED
         );
         let hint = "measure it again after a longer wait, or leave such points out with --skip-unsettled";
-        faults.push(fault.expected(expected).hint(hint));
+        let message = Message::new("the point had not settled").expected(expected).hint(hint);
+        faults.push(sheet.line_fault(line, message));
     }
 }
 

@@ -1,6 +1,8 @@
 //! Values that no buck converter has, and those that look like another unit.
 
-use crate::faults::Fault;
+use toml_input::{Fault, Message};
+
+use crate::table::cells::Sheet;
 use crate::table::columns::Located;
 use crate::table::{Point, Table};
 
@@ -14,32 +16,32 @@ const CURRENT: f64 = 1000.0;
 const POWER: f64 = 20e3;
 
 /// Faults of range and unit, and notes on what only looks odd.
-pub(crate) fn check(table: &mut Table, located: &Located, faults: &mut Vec<Fault>) {
+pub(crate) fn check(table: &mut Table, located: &Located, sheet: &Sheet<'_>, faults: &mut Vec<Fault>) {
     let points = &table.points;
     if points.is_empty() {
-        let fault = Fault::new("no point is measured yet").expected("numbers in d_real, v_out, i_out and v_in");
-        faults.push(fault.hint("fill in the rows of the plan"));
+        let message = Message::new("no point is measured yet").expected("numbers in d_real, v_out, i_out and v_in");
+        faults.push(sheet.fault(message.hint("fill in the rows of the plan")));
         return;
     }
     for point in points {
-        not_positive("v_in", point.v_in, point, faults);
+        not_positive("v_in", point.v_in, point, sheet, faults);
     }
-    duties(points, faults);
+    duties(points, sheet, faults);
     if !faults.is_empty() {
         return;
     }
-    voltages(points, faults);
+    voltages(points, sheet, faults);
     let most = points.iter().map(|p| p.i_out.abs()).fold(0.0, f64::max);
     let power = points.iter().map(|p| (p.i_out * p.v_out).abs()).fold(0.0, f64::max);
     if (most > CURRENT || power > POWER) && !located.i_out.is_stated() {
-        let fault = Fault::new("`i_out` looks like milliamperes")
+        let message = Message::new("`i_out` looks like milliamperes")
             .found(format!("up to {most} and {power:.0} W"))
             .expected("amperes")
             .hint("--map i_out=i_out*0.001 converts; if these are amperes, say so with --map i_out=i_out*1");
-        faults.push(fault);
+        faults.push(sheet.fault(message));
     }
     if faults.is_empty() {
-        variety(points, faults);
+        variety(points, sheet, faults);
     }
     let negative: Vec<usize> = points.iter().filter(|p| p.i_out < 0.0).map(|p| p.line).collect();
     if !negative.is_empty() {
@@ -48,33 +50,32 @@ pub(crate) fn check(table: &mut Table, located: &Located, faults: &mut Vec<Fault
     }
 }
 
-fn not_positive(name: &str, value: f64, point: &Point, faults: &mut Vec<Fault>) {
+fn not_positive(name: &str, value: f64, point: &Point, sheet: &Sheet<'_>, faults: &mut Vec<Fault>) {
     if value <= 0.0 {
-        let fault = Fault::new(format!("`{name}` is not positive")).line(point.line).column(name);
-        faults.push(fault.found(value.to_string()).expected("greater than 0"));
+        let message = Message::new(format!("`{name}` is not positive")).found(value.to_string());
+        faults.push(sheet.line_fault(point.line, message.expected("greater than 0")));
     }
 }
 
-fn duties(points: &[Point], faults: &mut Vec<Fault>) {
+fn duties(points: &[Point], sheet: &Sheet<'_>, faults: &mut Vec<Fault>) {
     let most = points.iter().map(|p| p.d_real).fold(0.0, f64::max);
     let above: Vec<&Point> = points.iter().filter(|p| !(0.0..=1.0).contains(&p.d_real)).collect();
     let Some(first) = above.first() else { return };
     let percent = most <= 100.0 && points.iter().all(|p| p.d_real >= 0.0) && above.len() * 2 > points.len();
     if percent {
         let lines: Vec<usize> = above.iter().map(|p| p.line).collect();
-        let fault = Fault::new("`d_real` looks like percent").line(first.line).column("d_real");
         let found = format!("{} in {}", first.d_real, super::lines(&lines));
-        let fault = fault.found(found).expected("a fraction of 1");
-        faults.push(fault.hint("--map d_real=d_real*0.01 converts"));
+        let message = Message::new("`d_real` looks like percent").found(found).expected("a fraction of 1");
+        faults.push(sheet.line_fault(first.line, message.hint("--map d_real=d_real*0.01 converts")));
         return;
     }
     for point in above {
-        let fault = Fault::new("`d_real` is no duty ratio").line(point.line).column("d_real");
-        faults.push(fault.found(point.d_real.to_string()).expected("0 to 1"));
+        let message = Message::new("`d_real` is no duty ratio").found(point.d_real.to_string());
+        faults.push(sheet.line_fault(point.line, message.expected("0 to 1")));
     }
 }
 
-fn voltages(points: &[Point], faults: &mut Vec<Fault>) {
+fn voltages(points: &[Point], sheet: &Sheet<'_>, faults: &mut Vec<Fault>) {
     let mut ratios: Vec<f64> = points
         .iter()
         .filter(|p| p.d_real > 0.0)
@@ -82,51 +83,55 @@ fn voltages(points: &[Point], faults: &mut Vec<Fault>) {
         .collect();
     ratios.sort_by(f64::total_cmp);
     let Some(middle) = ratios.get(ratios.len() / 2).copied() else {
-        faults.push(Fault::new("every duty ratio is 0").expected("points at different duty ratios"));
+        let message = Message::new("every duty ratio is 0").expected("points at different duty ratios");
+        faults.push(sheet.fault(message));
         return;
     };
     let unit = |name: &str, other: &str| {
-        Fault::new(format!("`{name}` looks like millivolts"))
+        Message::new(format!("`{name}` looks like millivolts"))
             .found(format!("v_out / (d_real v_in) is about {middle:.3e}"))
             .expected(format!("volts, as `{other}`; a buck converter has about 1"))
             .hint(format!("--map {name}={name}*0.001 converts"))
     };
     if middle > OTHER_UNIT {
-        faults.push(unit("v_out", "v_in"));
+        faults.push(sheet.fault(unit("v_out", "v_in")));
         return;
     }
     if middle < 1.0 / OTHER_UNIT {
-        faults.push(unit("v_in", "v_out"));
+        faults.push(sheet.fault(unit("v_in", "v_out")));
         return;
     }
     for point in points {
-        not_positive("v_out", point.v_out, point, faults);
+        not_positive("v_out", point.v_out, point, sheet, faults);
         if point.v_out > SENSOR * point.v_in {
-            let fault = Fault::new("`v_out` lies above `v_in`").line(point.line).column("v_out");
             let found = format!("{} V with v_in {} V", point.v_out, point.v_in);
-            let expected = "what a buck converter can yield";
-            faults.push(fault.found(found).expected(expected).hint("check units and columns"));
+            let message = Message::new("`v_out` lies above `v_in`").found(found);
+            let message = message.expected("what a buck converter can yield").hint("check units and columns");
+            faults.push(sheet.line_fault(point.line, message));
         }
     }
 }
 
 /// A regression needs points that differ.
-fn variety(points: &[Point], faults: &mut Vec<Fault>) {
+fn variety(points: &[Point], sheet: &Sheet<'_>, faults: &mut Vec<Fault>) {
     let first = &points[0];
-    if points.len() == 1 {
-        let fault = Fault::new("one point cannot say how the duty depends on anything").line(first.line);
-        let hint = "measure at several duties and loads: `policyc drm acquire --plan` writes a plan";
-        faults.push(fault.found("1 row").expected("at least 4 points").hint(hint));
-        return;
-    }
     let same = |p: &Point| (p.d_real, p.v_out, p.i_out, p.v_in) == (first.d_real, first.v_out, first.i_out, first.v_in);
-    if points.iter().all(same) {
-        let fault = Fault::new("all rows are equal").line(first.line);
-        let found = format!("{} rows", points.len());
-        faults.push(fault.found(found).expected("points at different duties and loads"));
+    let message = if points.len() == 1 {
+        Message::new("one point cannot say how the duty depends on anything")
+            .found("1 row")
+            .expected("at least 4 points")
+            .hint("measure at several duties and loads: `policyc drm acquire` writes a plan")
+    } else if points.iter().all(same) {
+        Message::new("all rows are equal")
+            .found(format!("{} rows", points.len()))
+            .expected("points at different duties and loads")
     } else if points.iter().all(|p| p.d_real == first.d_real) {
-        let fault = Fault::new("`d_real` is the same in all rows").line(first.line).column("d_real");
-        let fault = fault.found(first.d_real.to_string()).expected("several duty ratios");
-        faults.push(fault.hint("the mapping says how the duty must change: vary it"));
-    }
+        Message::new("`d_real` is the same in all rows")
+            .found(first.d_real.to_string())
+            .expected("several duty ratios")
+            .hint("the mapping says how the duty must change: vary it")
+    } else {
+        return;
+    };
+    faults.push(sheet.line_fault(first.line, message));
 }

@@ -1,11 +1,11 @@
 //! `[actions]`: the duty of each network output.
 
+use toml_input::{Fault, Table, Value};
+
 use super::duty;
 use crate::catalogue;
-use crate::faults::Fault;
 use crate::limits::{MAX_ACTIONS, MIN_ACTIONS};
 use crate::model::{Action, Pair};
-use crate::toml_reader::{Section, Value};
 
 /// The actions and how many the contract lists, faulty ones included; `count` is 0 if that is unknown.
 #[derive(Default)]
@@ -14,11 +14,11 @@ pub(crate) struct Actions {
     pub count: usize,
 }
 
-pub(crate) fn read(root: &mut Section<'_>, faults: &mut Vec<Fault>) -> Actions {
+pub(crate) fn read(root: &mut Table<'_>, faults: &mut Vec<Fault>) -> Actions {
     let hint = "give [actions] with `duties = [...]` or `pairs = [...]`, one per network output";
     let Some(mut section) = root
         .required("actions", hint, faults)
-        .and_then(|v| v.section("[actions]", faults))
+        .and_then(|v| v.table("[actions]", faults))
     else {
         return Actions::default();
     };
@@ -73,7 +73,7 @@ fn from_pairs(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Actions> {
 }
 
 fn pair(item: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<Pair>> {
-    let mut section = item.section("pairs", faults)?;
+    let mut section = item.table("pairs", faults)?;
     let hint = "a pair means duty = xi + c phi: { xi = 0.5, phi = 0.05, c = [-1, 0, 1] }";
     let xi = section.required("xi", hint, faults).and_then(|v| duty(&v, faults));
     let phi = section.required("phi", hint, faults).and_then(|v| duty(&v, faults));
@@ -89,7 +89,7 @@ fn factors(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<i8>> {
     let items = value.list("an array of -1, 0, 1", faults)?;
     let mut list = Vec::new();
     for item in &items {
-        let factor = i8::try_from(item.integer(-1, 1, faults)?.value).ok()?;
+        let factor = item.integer(-1..=1, faults)?;
         if list.contains(&factor) {
             faults.push(item.fault(catalogue::out_of_range(
                 "c",

@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 
+use toml_input::{Fault, Table, Value};
+
 use super::{Taken, filters, name, number_f32, range_f32};
 use crate::bounds::{self, Box32, Inputs, Overflow};
 use crate::catalogue;
 use crate::expression::{self, Scope};
-use crate::faults::Fault;
 use crate::limits::MAX_FEATURES;
 use crate::model::{Expr, Feature, Interval};
 use crate::names::Kind;
-use crate::toml_reader::{Section, Value};
 
 /// A feature whose bound is not known yet, with its place.
 pub(crate) struct Unbounded<'a> {
@@ -31,7 +31,7 @@ pub(crate) struct Surroundings<'a> {
     pub period: Option<f64>,
 }
 
-pub(crate) fn read<'a>(root: &mut Section<'a>, around: &Surroundings<'_>, faults: &mut Vec<Fault>) -> Features<'a> {
+pub(crate) fn read<'a>(root: &mut Table<'a>, around: &Surroundings<'_>, faults: &mut Vec<Fault>) -> Features<'a> {
     let mut features = Features {
         list: Vec::new(),
         count: 0,
@@ -58,7 +58,7 @@ pub(crate) fn read<'a>(root: &mut Section<'a>, around: &Surroundings<'_>, faults
 }
 
 fn one(item: &Value<'_>, around: &Surroundings<'_>, taken: &mut Taken, faults: &mut Vec<Fault>) -> Option<Feature> {
-    let mut section = item.section("[[feature]]", faults)?;
+    let mut section = item.table("[[feature]]", faults)?;
     let hint = "a feature needs a name: `name = \"e\"`";
     let name = section
         .required("name", hint, faults)
@@ -96,7 +96,7 @@ fn one(item: &Value<'_>, around: &Surroundings<'_>, taken: &mut Taken, faults: &
 }
 
 fn source(value: &Value<'_>, around: &Surroundings<'_>, faults: &mut Vec<Fault>) -> Option<(Expr, String)> {
-    let text = value.text(faults)?.value;
+    let text = value.text(faults)?;
     let scope = Scope {
         signals: around.signals,
         parameters: around.parameters,
@@ -105,8 +105,7 @@ fn source(value: &Value<'_>, around: &Surroundings<'_>, faults: &mut Vec<Fault>)
         // blanks collapse: the text ends in comments and in the digest, and a line break must not
         Ok(expr) => Some((expr, text.split_ascii_whitespace().collect::<Vec<_>>().join(" "))),
         Err((range, message)) => {
-            let span = value.inner_span(text, &range);
-            faults.push(value.doc.fault(&span, message));
+            faults.push(value.fault_within(&range, message));
             None
         }
     }

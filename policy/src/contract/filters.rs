@@ -2,14 +2,14 @@
 
 use std::f64::consts::PI;
 
+use toml_input::{Fault, Value};
+
 use super::number_f32;
 use crate::catalogue;
-use crate::faults::Fault;
 use crate::limits::{MAX_FILTERS, MAX_LINE, MAX_TIME_CONSTANT_PERIODS};
 use crate::model::Filter;
 use crate::model::Interval;
 use crate::rounding::inward_f32;
-use crate::toml_reader::{Node, Value};
 
 const KINDS: [&str; 6] = [
     "delay",
@@ -32,10 +32,10 @@ pub(crate) fn read(value: &Value<'_>, period: Option<f64>, faults: &mut Vec<Faul
 }
 
 fn one(value: &Value<'_>, period: Option<f64>, faults: &mut Vec<Fault>) -> Option<Filter> {
-    if let Node::Text(text) = &value.node.value {
+    if let Some(text) = value.as_text() {
         return named(value, text, faults);
     }
-    let mut section = value.section("filter", faults)?;
+    let mut section = value.table("filter", faults)?;
     let mut found: Vec<_> = KINDS
         .iter()
         .filter_map(|kind| section.optional(kind).map(|value| (*kind, value)))
@@ -51,14 +51,13 @@ fn one(value: &Value<'_>, period: Option<f64>, faults: &mut Vec<Fault>) -> Optio
         }
         return None;
     };
-    let line = |low, faults: &mut Vec<Fault>| {
-        inner
-            .integer(low, MAX_LINE as i64, faults)
-            .and_then(|n| usize::try_from(n.value).ok())
-    };
     match kind {
-        "delay" => line(1, faults).map(|samples| Filter::Delay { samples }),
-        "moving_average" => line(2, faults).map(|samples| Filter::MovingAverage { samples }),
+        "delay" => inner
+            .integer(1..=MAX_LINE, faults)
+            .map(|samples| Filter::Delay { samples }),
+        "moving_average" => inner
+            .integer(2..=MAX_LINE, faults)
+            .map(|samples| Filter::MovingAverage { samples }),
         "backward_difference" => match inner.boolean(faults)? {
             true => Some(Filter::BackwardDifference),
             false => {
@@ -88,14 +87,14 @@ fn named(value: &Value<'_>, text: &str, faults: &mut Vec<Fault>) -> Option<Filte
 
 /// tau from `{ time_constant = s }` or `{ cutoff = Hz }`: tau = 1/(2 pi f).
 fn time_constant(value: &Value<'_>, period: Option<f64>, faults: &mut Vec<Fault>) -> Option<f64> {
-    let mut section = value.section(&value.label, faults)?;
+    let mut section = value.table(value.label(), faults)?;
     let tau = section.optional("time_constant");
     let cutoff = section.optional("cutoff");
     section.finish(faults);
     let (at, seconds) = match (tau, cutoff) {
-        (Some(tau), None) => (tau.clone(), tau.number(faults)?.value),
+        (Some(tau), None) => (tau.clone(), tau.number(faults)?),
         (None, Some(cutoff)) => {
-            let hertz = cutoff.number(faults)?.value;
+            let hertz = cutoff.number(faults)?;
             if hertz <= 0.0 {
                 faults.push(cutoff.fault(catalogue::not_positive("cutoff", hertz)));
                 return None;
@@ -104,7 +103,7 @@ fn time_constant(value: &Value<'_>, period: Option<f64>, faults: &mut Vec<Fault>
         }
         (both, _) => {
             let count = if both.is_some() { 2 } else { 0 };
-            faults.push(value.fault(catalogue::exactly_one_of(&value.label, "time_constant, cutoff", count)));
+            faults.push(value.fault(catalogue::exactly_one_of(value.label(), "time_constant, cutoff", count)));
             return None;
         }
     };
@@ -118,7 +117,7 @@ fn time_constant(value: &Value<'_>, period: Option<f64>, faults: &mut Vec<Fault>
 }
 
 fn integrator(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Filter> {
-    let mut section = value.section("integrator", faults)?;
+    let mut section = value.table("integrator", faults)?;
     let hint = "an integrator needs both clamps: { min = -1.0, max = 1.0 }";
     let min = section
         .required("min", hint, faults)

@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use toml_input::{Fault, Table, Value};
+
 use super::{Taken, name, taken_once};
 use crate::catalogue;
-use crate::faults::Fault;
 use crate::limits;
 use crate::model::NumericFormat;
 use crate::names::{self, Kind};
-use crate::toml_reader::{Section, Value};
 
 /// What stands at the top level.
 pub(crate) struct Head {
@@ -18,7 +18,7 @@ pub(crate) struct Head {
     pub parameters: BTreeMap<String, f64>,
 }
 
-pub(crate) fn read(root: &mut Section<'_>, taken: &mut Taken, faults: &mut Vec<Fault>) -> Head {
+pub(crate) fn read(root: &mut Table<'_>, taken: &mut Taken, faults: &mut Vec<Fault>) -> Head {
     let hint = "name the controller: `name = \"buck\"`; files and symbols begin with it";
     let name = root
         .required("name", hint, faults)
@@ -44,7 +44,7 @@ pub(crate) fn read(root: &mut Section<'_>, taken: &mut Taken, faults: &mut Vec<F
 }
 
 fn period(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<f64> {
-    let period = value.number(faults)?.value;
+    let period = value.number(faults)?;
     if (limits::MIN_SAMPLE_PERIOD..=limits::MAX_SAMPLE_PERIOD).contains(&period) {
         return Some(period);
     }
@@ -58,15 +58,15 @@ fn period(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<f64> {
 
 fn format(value: &Value<'_>, faults: &mut Vec<Fault>) -> NumericFormat {
     if let Some(text) = value.text(faults)
-        && text.value != "f32"
+        && text != "f32"
     {
-        faults.push(value.fault(catalogue::not_supported_yet("numeric_format", text.value, &["f32"])));
+        faults.push(value.fault(catalogue::not_supported_yet("numeric_format", text, &["f32"])));
     }
     NumericFormat::F32
 }
 
 fn parameters(value: &Value<'_>, taken: &mut Taken, faults: &mut Vec<Fault>) -> BTreeMap<String, f64> {
-    let Some(section) = value.section("[parameters]", faults) else {
+    let Some(section) = value.table("[parameters]", faults) else {
         return BTreeMap::new();
     };
     let mut parameters = BTreeMap::new();
@@ -78,9 +78,9 @@ fn parameters(value: &Value<'_>, taken: &mut Taken, faults: &mut Vec<Fault>) -> 
             Some(message) => Err(message),
             None => taken_once(&key.value, kind, taken),
         };
-        faults.extend(named.err().map(|message| value.doc.fault(&key.span, message)));
+        faults.extend(named.err().map(|message| value.document().fault(&key.span, message)));
         // a faulty parameter keeps its name, lest every expression that uses it be reported too
-        let number = value.number(faults).map_or(1.0, |number| number.value);
+        let number = value.number(faults).unwrap_or(1.0);
         parameters.insert(key.value.clone(), number);
     }
     if parameters.len() > limits::MAX_PARAMETERS {

@@ -1,19 +1,18 @@
 //! `[mapping]` of `policy.toml` and the file it names (`drm.toml`).
 
+use toml_input::{Document, Fault, Table, nearest};
+
 use super::{duty_interval, interval_f32, number_f32};
 use crate::bounds::Box32;
 use crate::catalogue;
-use crate::faults::Fault;
 use crate::model::{Coefficients, Interval, Mapping};
-use crate::names::nearest;
 use crate::rounding::{inward_f32, nearest_f32};
-use crate::toml_reader::{Document, Section};
 
 /// The section in `policy.toml`: the index of the load current; the coefficients stand in `drm.toml`.
-pub(crate) fn load_current(section: &mut Section<'_>, signals: &[String], faults: &mut Vec<Fault>) -> Option<usize> {
+pub(crate) fn load_current(section: &mut Table<'_>, signals: &[String], faults: &mut Vec<Fault>) -> Option<usize> {
     let hint = "name the signal that is i_out in the mapping: `load_current = \"i_out\"`";
     let value = section.required("load_current", hint, faults)?;
-    let text = value.text(faults)?.value;
+    let text = value.text(faults)?;
     let index = signals.iter().position(|name| name == text);
     if index.is_none() {
         let names = signals.iter().map(String::as_str).filter(|name| !name.is_empty());
@@ -41,7 +40,7 @@ pub(crate) fn read(document: &Document, load_current: usize, faults: &mut Vec<Fa
     let hint = "where the fit holds: [valid] with `i_out = [low, high]` and `d_sim = [low, high]`";
     let mut valid = root
         .required("valid", hint, faults)
-        .and_then(|v| v.section("[valid]", faults));
+        .and_then(|v| v.table("[valid]", faults));
     let i_out = valid
         .as_mut()
         .and_then(|s| s.required("i_out", hint, faults))
@@ -53,7 +52,7 @@ pub(crate) fn read(document: &Document, load_current: usize, faults: &mut Vec<Fa
     if let Some(section) = valid {
         section.finish(faults);
     }
-    let mut adjust = root.optional("adjust").and_then(|v| v.section("[adjust]", faults));
+    let mut adjust = root.optional("adjust").and_then(|v| v.table("[adjust]", faults));
     let near = |value: f64, by: f64| Interval {
         low: value - by,
         high: value + by,
@@ -96,7 +95,7 @@ pub(crate) fn read(document: &Document, load_current: usize, faults: &mut Vec<Fa
 
 /// `[adjust] key`, or the default; the coefficient must lie inside, in binary32 as well, and `a` stay above 0.
 fn adjustable(
-    adjust: &mut Option<Section<'_>>,
+    adjust: &mut Option<Table<'_>>,
     key: &'static str,
     coefficient: Option<f64>,
     default: Option<Interval>,
@@ -122,7 +121,7 @@ fn adjustable(
 }
 
 /// `adjust r` has no meaning in the three-term form.
-fn without_r(adjust: &mut Option<Section<'_>>, faults: &mut Vec<Fault>) -> bool {
+fn without_r(adjust: &mut Option<Table<'_>>, faults: &mut Vec<Fault>) -> bool {
     match adjust.as_mut().and_then(|section| section.optional("r")) {
         None => true,
         Some(value) => {
@@ -133,7 +132,7 @@ fn without_r(adjust: &mut Option<Section<'_>>, faults: &mut Vec<Fault>) -> bool 
 }
 
 /// The mapping must rise with d_sim at both ends of i_out, computed as the controller computes it.
-fn rising(mapping: &Mapping, at: Option<&crate::toml_reader::Value<'_>>, faults: &mut Vec<Fault>) {
+fn rising(mapping: &Mapping, at: Option<&toml_input::Value<'_>>, faults: &mut Vec<Fault>) {
     let (Some(r), Some((low, high))) = (mapping.coefficients.r, inward_f32(mapping.valid_i_out)) else {
         return;
     };

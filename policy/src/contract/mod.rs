@@ -9,13 +9,13 @@ pub(crate) mod network;
 pub(crate) mod protection;
 pub(crate) mod signals;
 
+use toml_input::{Fault, Value};
+
 use crate::catalogue;
-use crate::faults::Fault;
 use crate::limits::MAX_MAGNITUDE;
 use crate::model::Interval;
 use crate::names::{self, Kind};
 use crate::rounding::inward_f32;
-use crate::toml_reader::{At, Value};
 
 /// Names given so far and what they are, so that clashes are found across sections.
 pub(crate) type Taken = Vec<(String, Kind)>;
@@ -23,17 +23,17 @@ pub(crate) type Taken = Vec<(String, Kind)>;
 /// A name that is fit for `kind` and not used by anything it could be confused with.
 pub(crate) fn name(value: &Value<'_>, kind: Kind, taken: &mut Taken, faults: &mut Vec<Fault>) -> Option<String> {
     let text = value.text(faults)?;
-    if let Some(hint) = names::objection(text.value, kind) {
-        faults.push(value.fault(catalogue::bad_name(kind.word(), text.value, &hint)));
+    if let Some(hint) = names::objection(text, kind) {
+        faults.push(value.fault(catalogue::bad_name(kind.word(), text, &hint)));
         return None;
     }
-    taken_once(text.value, kind, taken)
+    taken_once(text, kind, taken)
         .map_err(|message| faults.push(value.fault(message)))
         .ok()
 }
 
 /// Enters `name`; a fault if it is taken. Signals and parameters share one space, features have their own.
-pub(crate) fn taken_once(name: &str, kind: Kind, taken: &mut Taken) -> Result<String, crate::faults::Message> {
+pub(crate) fn taken_once(name: &str, kind: Kind, taken: &mut Taken) -> Result<String, toml_input::Message> {
     let clash = |other: Kind| (kind == Kind::Feature) == (other == Kind::Feature);
     if let Some((_, other)) = taken.iter().find(|(used, other)| used == name && clash(*other)) {
         return Err(catalogue::duplicate_name(kind.word(), name, other.word()));
@@ -44,11 +44,11 @@ pub(crate) fn taken_once(name: &str, kind: Kind, taken: &mut Taken) -> Result<St
 
 /// A number that is 0 or keeps its sign and size in binary32.
 pub(crate) fn number_f32(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<f64> {
-    let number = value.number(faults)?.value;
+    let number = value.number(faults)?;
     if fits_f32(number) {
         return Some(number);
     }
-    faults.push(value.fault(catalogue::not_in_f32(&value.label, number)));
+    faults.push(value.fault(catalogue::not_in_f32(value.label(), number)));
     None
 }
 
@@ -58,15 +58,16 @@ pub(crate) fn fits_f32(number: f64) -> bool {
 
 /// An interval whose ends fit binary32 and that still holds a binary32 number after rounding inwards.
 pub(crate) fn interval_f32(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Interval> {
-    let At { value: interval, .. } = value.interval(faults)?;
+    let [low, high] = value.interval(faults)?;
+    let interval = Interval { low, high };
     let widest = interval.low.abs().max(interval.high.abs());
     if widest > MAX_MAGNITUDE {
-        faults.push(value.fault(catalogue::not_in_f32(&value.label, widest)));
+        faults.push(value.fault(catalogue::not_in_f32(value.label(), widest)));
         return None;
     }
     if inward_f32(interval).is_none() {
         faults.push(value.fault(catalogue::empty_after_rounding(
-            &value.label,
+            value.label(),
             interval.low,
             interval.high,
         )));
@@ -81,17 +82,17 @@ pub(crate) fn range_f32(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<In
     if interval.low < interval.high {
         return Some(interval);
     }
-    faults.push(value.fault(catalogue::empty_range(&value.label, interval.low)));
+    faults.push(value.fault(catalogue::empty_range(value.label(), interval.low)));
     None
 }
 
 /// A duty ratio within 0..1.
 pub(crate) fn duty(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<f64> {
-    let number = value.number(faults)?.value;
+    let number = value.number(faults)?;
     if (0.0..=1.0).contains(&number) {
         return Some(number);
     }
-    faults.push(value.fault(catalogue::duty_range(&value.label, number)));
+    faults.push(value.fault(catalogue::duty_range(value.label(), number)));
     None
 }
 
@@ -104,7 +105,7 @@ pub(crate) fn duty_interval(value: &Value<'_>, faults: &mut Vec<Fault>) -> Optio
     {
         None => Some(interval),
         Some(end) => {
-            faults.push(value.fault(catalogue::duty_range(&value.label, *end)));
+            faults.push(value.fault(catalogue::duty_range(value.label(), *end)));
             None
         }
     }

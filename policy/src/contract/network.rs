@@ -1,10 +1,10 @@
 //! `[network]`: which tensors, which activations.
 
+use toml_input::{At, Fault, Message, Table, Value};
+
 use crate::catalogue;
-use crate::faults::{Fault, Message};
 use crate::limits::MAX_LAYERS;
 use crate::model::Activation;
-use crate::toml_reader::{At, Node, Section, Value};
 
 const ACTIVATIONS: [&str; 3] = ["relu", "tanh", "identity"];
 const ACTIVATION_HINT: &str = "weights do not say it: hidden_activation = \"relu\", \"tanh\", \"identity\", \
@@ -33,10 +33,10 @@ pub(crate) struct Network<'a> {
     pub tolerance: f64,
 }
 
-pub(crate) fn read<'a>(root: &mut Section<'a>, faults: &mut Vec<Fault>) -> Option<Network<'a>> {
+pub(crate) fn read<'a>(root: &mut Table<'a>, faults: &mut Vec<Fault>) -> Option<Network<'a>> {
     let hint = "give [network] with `weights` and `hidden_activation`";
     let at = root.required("network", hint, faults)?;
-    let mut section = at.section("[network]", faults)?;
+    let mut section = at.table("[network]", faults)?;
     let hint = "the network's tensors: `weights = \"weights.safetensors\"`";
     if let Some(value) = section.required("weights", hint, faults) {
         value.text(faults);
@@ -72,7 +72,7 @@ pub(crate) fn read<'a>(root: &mut Section<'a>, faults: &mut Vec<Fault>) -> Optio
 impl Network<'_> {
     /// A fault at a place in the contract.
     pub fn fault<T>(&self, at: &At<T>, message: Message) -> Fault {
-        self.section.doc.fault(&at.span, message)
+        self.section.document().fault(&at.span, message)
     }
 
     /// One activation per layer; the last is the identity.
@@ -100,10 +100,9 @@ impl Network<'_> {
 }
 
 fn hidden<'a>(value: &Value<'a>, faults: &mut Vec<Fault>) -> Hidden<'a> {
-    if !matches!(value.node.value, Node::List(_)) {
+    let Some(items) = value.as_list() else {
         return activation(value, faults).map_or(Hidden::Faulty, Hidden::Same);
-    }
-    let items = value.list("an array of activations", faults).unwrap_or_default();
+    };
     let list: Vec<_> = items.iter().map(|item| activation(item, faults)).collect();
     match list.into_iter().collect() {
         Some(list) => Hidden::Each(list, value.clone()),
@@ -112,8 +111,8 @@ fn hidden<'a>(value: &Value<'a>, faults: &mut Vec<Fault>) -> Hidden<'a> {
 }
 
 fn activation(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Activation> {
-    if let Node::Table(_) = value.node.value {
-        let mut section = value.section("hidden_activation", faults)?;
+    if value.is_table() {
+        let mut section = value.table("hidden_activation", faults)?;
         let slope = section.required(
             "leaky_relu",
             "the slope for negative values: { leaky_relu = 0.01 }",
@@ -121,7 +120,7 @@ fn activation(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Activation> 
         );
         section.finish(faults);
         let slope = slope?;
-        let number = slope.number(faults)?.value;
+        let number = slope.number(faults)?;
         // the slope must stay inside (0, 1) when rounded, or the activation would be another one
         if (f32::MIN_POSITIVE..1.0).contains(&(number as f32)) {
             return Some(Activation::LeakyRelu { slope: number });
@@ -133,7 +132,7 @@ fn activation(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Activation> 
         )));
         return None;
     }
-    let text = value.text(faults)?.value;
+    let text = value.text(faults)?;
     match text {
         "relu" => Some(Activation::Relu),
         "tanh" => Some(Activation::Tanh),
@@ -158,8 +157,8 @@ fn activation(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Activation> 
 
 fn owned(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<At<String>> {
     value.text(faults).map(|text| At {
-        value: text.value.to_owned(),
-        span: text.span,
+        value: text.to_owned(),
+        span: value.span().clone(),
     })
 }
 
@@ -173,7 +172,7 @@ fn layers(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<At<String>>>
 }
 
 fn tolerance(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<f64> {
-    let number = value.number(faults)?.value;
+    let number = value.number(faults)?;
     if number > 0.0 && number < 1.0 {
         return Some(number);
     }

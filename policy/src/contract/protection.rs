@@ -1,32 +1,32 @@
 //! `[limits]` and `[fallback]`.
 
+use toml_input::{Fault, Table, Value};
+
 use super::{duty, duty_interval};
 use crate::catalogue;
-use crate::faults::Fault;
 use crate::limits::{MAX_HOLD, MAX_SOFT_START_STEPS, MIN_SOFT_START_INCREMENT};
 use crate::model::{Fallback, Interval, Limits, SoftStart};
-use crate::toml_reader::{Section, Value};
 
-pub(crate) fn fallback(root: &mut Section<'_>, faults: &mut Vec<Fault>) -> Option<Fallback> {
+pub(crate) fn fallback(root: &mut Table<'_>, faults: &mut Vec<Fault>) -> Option<Fallback> {
     let hint = "say what happens without a usable measurement: [fallback] with `duty` and `hold`";
-    let mut section = root.required("fallback", hint, faults)?.section("[fallback]", faults)?;
+    let mut section = root.required("fallback", hint, faults)?.table("[fallback]", faults)?;
     let hint = "the duty commanded when no measurement is usable: `duty = 0.0`";
     let duty = section.required("duty", hint, faults).and_then(|v| duty(&v, faults));
     let hint = "how many bad samples are bridged with the last good one: `hold = 3`";
     let hold = section
         .required("hold", hint, faults)
-        .and_then(|v| v.integer(0, i64::from(MAX_HOLD), faults));
+        .and_then(|v| v.integer(0..=MAX_HOLD, faults));
     section.finish(faults);
     Some(Fallback {
         duty: duty?,
-        hold: u32::try_from(hold?.value).ok()?,
+        hold: hold?,
     })
 }
 
 /// The limits; `initial_duty` is the fallback duty where the contract does not give it.
-pub(crate) fn limits(root: &mut Section<'_>, fallback: Option<Fallback>, faults: &mut Vec<Fault>) -> Option<Limits> {
+pub(crate) fn limits(root: &mut Table<'_>, fallback: Option<Fallback>, faults: &mut Vec<Fault>) -> Option<Limits> {
     let hint = "give [limits] with `duty = [low, high]`";
-    let mut section = root.required("limits", hint, faults)?.section("[limits]", faults)?;
+    let mut section = root.required("limits", hint, faults)?.table("[limits]", faults)?;
     let hint = "the smallest and largest duty the hardware may see: `duty = [0.05, 0.95]`";
     let range = section
         .required("duty", hint, faults)
@@ -51,7 +51,7 @@ pub(crate) fn limits(root: &mut Section<'_>, fallback: Option<Fallback>, faults:
 }
 
 fn slew(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<f64> {
-    let number = value.number(faults)?.value;
+    let number = value.number(faults)?;
     if (MIN_SOFT_START_INCREMENT..=1.0).contains(&number) {
         return Some(number);
     }
@@ -61,14 +61,14 @@ fn slew(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<f64> {
 }
 
 fn soft_start(value: &Value<'_>, range: Option<Interval>, faults: &mut Vec<Fault>) -> Option<SoftStart> {
-    let mut section = value.section("soft_start", faults)?;
+    let mut section = value.table("soft_start", faults)?;
     let hint = "a soft start is `{ from = 0.1, steps = 1000 }`";
     let start = section.required("from", hint, faults);
     let from = start.as_ref().and_then(|v| duty(v, faults));
     let steps = section.required("steps", hint, faults);
-    let steps = steps.and_then(|v| v.integer(1, i64::from(MAX_SOFT_START_STEPS), faults));
+    let steps = steps.and_then(|v| v.integer(1..=MAX_SOFT_START_STEPS, faults));
     section.finish(faults);
-    let (start, from, steps, range) = (start?, from?, u32::try_from(steps?.value).ok()?, range?);
+    let (start, from, steps, range) = (start?, from?, steps?, range?);
     if from > range.high {
         faults.push(start.fault(catalogue::outside(
             "from",

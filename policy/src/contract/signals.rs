@@ -1,12 +1,12 @@
 //! `[[signal]]`: what is measured.
 
+use toml_input::{Fault, Table, Value};
+
 use super::{Taken, name, number_f32, range_f32};
 use crate::catalogue;
-use crate::faults::Fault;
 use crate::limits::{MAX_ADC_CODE, MAX_SIGNALS, MAX_UNIT_CHARS};
 use crate::model::{Adc, Interval, Signal};
 use crate::names::Kind;
-use crate::toml_reader::{Node, Section, Value};
 
 /// The signals in order; a faulty one leaves its name, lest every expression that uses it be reported too.
 pub(crate) struct Signals {
@@ -16,7 +16,7 @@ pub(crate) struct Signals {
     pub adc: Vec<bool>,
 }
 
-pub(crate) fn read(root: &mut Section<'_>, taken: &mut Taken, faults: &mut Vec<Fault>) -> Signals {
+pub(crate) fn read(root: &mut Table<'_>, taken: &mut Taken, faults: &mut Vec<Fault>) -> Signals {
     let mut signals = Signals {
         names: Vec::new(),
         list: Vec::new(),
@@ -34,7 +34,7 @@ pub(crate) fn read(root: &mut Section<'_>, taken: &mut Taken, faults: &mut Vec<F
         return signals;
     }
     for item in items {
-        let Some(mut section) = item.section("[[signal]]", faults) else {
+        let Some(mut section) = item.table("[[signal]]", faults) else {
             continue;
         };
         let hint = "a signal needs a name: `name = \"v_out\"`";
@@ -50,9 +50,9 @@ pub(crate) fn read(root: &mut Section<'_>, taken: &mut Taken, faults: &mut Vec<F
         let interval = range.as_ref().and_then(|v| range_f32(v, faults));
         let adc = adc_value.map(|v| adc(&v, interval, name.as_deref().unwrap_or("signal"), faults));
         section.finish(faults);
-        signals
-            .names
-            .push(name_value.as_ref().and_then(written).unwrap_or_default());
+        // the name as it stands there, fit or not
+        let written = name_value.as_ref().and_then(Value::as_text);
+        signals.names.push(written.unwrap_or_default().to_owned());
         let usable = name.zip(unit).zip(interval).filter(|_| adc != Some(None));
         signals.list.push(usable.map(|((name, unit), range)| Signal {
             name,
@@ -64,18 +64,9 @@ pub(crate) fn read(root: &mut Section<'_>, taken: &mut Taken, faults: &mut Vec<F
     signals
 }
 
-/// The name as it stands there, fit or not.
-fn written(value: &Value<'_>) -> Option<String> {
-    if let Node::Text(text) = &value.node.value {
-        Some(text.clone())
-    } else {
-        None
-    }
-}
-
 /// A unit as it may stand in a comment.
 fn unit(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<String> {
-    let text = value.text(faults)?.value;
+    let text = value.text(faults)?;
     let printable = |c: char| !c.is_control() && !matches!(c, '"' | '\'' | '\\' | '`') && is_visible(c);
     let fit = text.chars().count() <= MAX_UNIT_CHARS && text.chars().all(printable);
     if fit
@@ -95,7 +86,7 @@ fn is_visible(c: char) -> bool {
 }
 
 fn adc(value: &Value<'_>, range: Option<Interval>, name: &str, faults: &mut Vec<Fault>) -> Option<Adc> {
-    let mut section = value.section("adc", faults)?;
+    let mut section = value.table("adc", faults)?;
     let gain = section.required(
         "gain",
         "physical unit per code: `adc = { gain = 0.0625, offset = 0.0 }`",

@@ -1,6 +1,7 @@
 //! The texts of all faults of safetensors files, tensors and layer chains.
 
-use crate::faults::Message;
+use toml_input::Message;
+
 use crate::limits;
 
 pub(crate) fn malformed(found: &str, hint: Option<&str>) -> Message {

@@ -1,12 +1,12 @@
 //! Why no chain of layers fits: the closest one, and the first tensor in it that does not.
 
+use toml_input::{Fault, FileName};
+
 use super::catalogue;
 use super::chain::{Chain, Ends};
 use super::layers::{Dense, Layers, Place, is_target};
 use super::tensors::Tensor;
-use crate::faults::Fault;
 use crate::limits::MAX_LAYERS;
-use crate::source::FileName;
 
 /// Everything the explanation looks at.
 pub(crate) struct Scene<'a> {
@@ -21,7 +21,7 @@ impl Scene<'_> {
         &self.layers.dense[index]
     }
 
-    fn fault(&self, layer: &Dense, message: crate::faults::Message) -> Fault {
+    fn fault(&self, layer: &Dense, message: toml_input::Message) -> Fault {
         self.file.tensor_fault(&self.tensors[layer.weight].name, message)
     }
 

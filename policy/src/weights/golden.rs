@@ -2,9 +2,9 @@
 
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
+use toml_input::{Fault, Message};
 
 use super::{catalogue, header, tensors};
-use crate::faults::{Fault, Message};
 use crate::model::{Feature, Golden};
 use crate::raw::Binary;
 

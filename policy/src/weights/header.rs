@@ -5,9 +5,9 @@ use std::fmt;
 
 use safetensors::SafeTensors;
 use serde::de::{Deserialize, DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
+use toml_input::Fault;
 
 use super::catalogue;
-use crate::faults::Fault;
 use crate::limits::{MAX_HEADER_BYTES, MAX_TENSORS};
 use crate::raw::Binary;
 
@@ -60,7 +60,7 @@ pub(crate) fn open<'a>(file: &'a Binary, faults: &mut Vec<Fault>) -> Option<Safe
     }
 }
 
-fn header_text(bytes: &[u8]) -> Result<&str, crate::faults::Message> {
+fn header_text(bytes: &[u8]) -> Result<&str, toml_input::Message> {
     if let Some(message) = foreign(bytes) {
         return Err(message);
     }
@@ -84,7 +84,7 @@ fn header_text(bytes: &[u8]) -> Result<&str, crate::faults::Message> {
 }
 
 /// Files of other kinds that end up here.
-fn foreign(bytes: &[u8]) -> Option<crate::faults::Message> {
+fn foreign(bytes: &[u8]) -> Option<toml_input::Message> {
     let begins = |magic: &[u8]| bytes.starts_with(magic);
     if begins(b"PK\x03\x04") {
         return Some(catalogue::other_format(

@@ -8,11 +8,11 @@ pub(crate) mod header;
 pub(crate) mod layers;
 pub(crate) mod tensors;
 
+use toml_input::{Fault, nearest};
+
 use crate::contract::network::Network;
-use crate::faults::Fault;
 use crate::limits::{MAX_LAYERS, MAX_WIDTH};
 use crate::model::{Activation, Layer};
-use crate::names::nearest;
 use crate::raw::Binary;
 use chain::{Chain, Ends};
 use explain::Scene;

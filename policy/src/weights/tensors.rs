@@ -1,9 +1,9 @@
 //! Tensors as finite binary32 numbers.
 
 use safetensors::{Dtype, SafeTensors};
+use toml_input::{Fault, Message};
 
 use super::catalogue;
-use crate::faults::{Fault, Message};
 use crate::limits::MAX_TENSOR_NAME_CHARS;
 use crate::raw::Binary;
 

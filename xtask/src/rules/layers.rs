@@ -6,8 +6,8 @@ use crate::workspace::{Crate, Dependency, Kind};
 
 /// Lowest layer first; a crate depends on strictly lower layers only.
 const LAYERS: &[&[&str]] = &[
-    &["targets", "templates", "plant", "report"],
-    &["policy"],
+    &["toml-input", "targets", "templates", "report"],
+    &["policy", "plant"],
     &["interp", "codegen", "drm"],
     &["closed-loop"],
     &["policy-macro", "train", "diagnose", "verify"],

@@ -1,0 +1,175 @@
+//! A TOML file as a tree in which every key and value knows its place.
+
+use std::path::Path;
+
+use toml::de::{DeTable, DeValue};
+
+use crate::fault::{Fault, Faults, Message};
+use crate::messages;
+use crate::source::{FileName, Source, Span};
+use crate::table::Table;
+use crate::value::Value;
+
+/// Largest TOML file in bytes (1 MiB).
+pub const MAX_TOML_BYTES: u64 = 1 << 20;
+/// Faults shown at most for one file's syntax; what follows is mostly an echo.
+pub const MAX_SYNTAX_FAULTS: usize = 8;
+
+/// Something and where it stands.
+#[derive(Debug, Clone)]
+pub struct At<T> {
+    /// The thing.
+    pub value: T,
+    /// Its bytes in the text of the document.
+    pub span: Span,
+}
+
+/// Keys and values in the order of the file.
+pub(crate) type Entries = Vec<(At<String>, At<Node>)>;
+
+/// A TOML value; numbers are kept as far as they can be represented.
+#[derive(Debug, Clone)]
+pub(crate) enum Node {
+    Text(String),
+    Integer(Option<i64>),
+    Float(f64),
+    Boolean(bool),
+    Date,
+    List(Vec<At<Node>>),
+    Table(Entries),
+}
+
+/// A parsed TOML file.
+#[derive(Debug, Clone)]
+pub struct Document {
+    source: Source,
+    root: Entries,
+}
+
+impl Document {
+    /// Reads the file at `path`, at most [`MAX_TOML_BYTES`] long.
+    ///
+    /// # Errors
+    /// If it cannot be read, is no UTF-8 text or no valid TOML.
+    pub fn open(path: &Path) -> Result<Self, Faults> {
+        let name = FileName::new(path);
+        let bytes = name.read(MAX_TOML_BYTES).map_err(|message| name.fault(message))?;
+        Self::sound(Source::new(name, bytes).map_err(|fault| *fault)?)
+    }
+
+    /// Reads `text`; `file` only names it in faults.
+    ///
+    /// # Errors
+    /// If it is no valid TOML.
+    pub fn from_text(file: &Path, text: &str) -> Result<Self, Faults> {
+        Self::sound(Source {
+            name: FileName::new(file),
+            text: text.to_owned(),
+        })
+    }
+
+    fn sound(source: Source) -> Result<Self, Faults> {
+        let (document, faults) = Self::parse(source);
+        Faults::unless_empty(faults).map(|()| document)
+    }
+
+    /// Parses `source`; with faults of syntax the document holds what could be recovered.
+    #[must_use]
+    pub fn parse(source: Source) -> (Self, Vec<Fault>) {
+        let (tree, errors) = DeTable::parse_recoverable(&source.text);
+        let mut faults: Vec<Fault> = Vec::new();
+        for error in &errors {
+            let span = error.span().unwrap_or(0..0);
+            let fault = source.fault(&span, syntax(&source.text, &span, error.message()));
+            let line = |f: &Fault| f.line_column().map(|(line, _)| line);
+            if faults.iter().all(|known| line(known) != line(&fault)) {
+                faults.push(fault);
+            }
+        }
+        faults.truncate(MAX_SYNTAX_FAULTS);
+        let root = entries(tree.get_ref());
+        (Document { source, root }, faults)
+    }
+
+    /// The file by name and text.
+    #[must_use]
+    pub fn source(&self) -> &Source {
+        &self.source
+    }
+
+    /// The top level of the file.
+    #[must_use]
+    pub fn root(&self) -> Table<'_> {
+        Table::root(self, &self.root)
+    }
+
+    /// What `read` makes of the top level; keys it did not ask for are faults.
+    ///
+    /// # Errors
+    /// All faults, in the order of the file.
+    pub fn read<T>(&self, read: impl FnOnce(&mut Table<'_>, &mut Vec<Fault>) -> Option<T>) -> Result<T, Faults> {
+        let mut faults = Vec::new();
+        let mut root = self.root();
+        let value = read(&mut root, &mut faults);
+        root.finish(&mut faults);
+        self.conclude(value, faults)
+    }
+
+    /// `value` if nothing is wrong.
+    ///
+    /// # Errors
+    /// The faults in the order of the file; a fault as well if there is no value for no reason given.
+    pub fn conclude<T>(&self, value: Option<T>, faults: Vec<Fault>) -> Result<T, Faults> {
+        Faults::unless_empty(faults)?;
+        // a part that is missing has left a fault; if ever one did not, refuse all the same
+        value.ok_or_else(|| self.source.name.fault(messages::incomplete()).into())
+    }
+
+    /// A fault at `span` of the text.
+    #[must_use]
+    pub fn fault(&self, span: &Span, message: Message) -> Fault {
+        self.source.fault(span, message)
+    }
+
+    /// Looks up a path of keys without a fault and without recording it as read.
+    #[must_use]
+    pub fn peek(&self, path: &[&str]) -> Option<Value<'_>> {
+        let (first, rest) = path.split_first()?;
+        let value = Value::find(self, &self.root, first)?;
+        rest.iter().try_fold(value, |value, key| value.peek(key))
+    }
+}
+
+fn entries(table: &DeTable<'_>) -> Entries {
+    let mut list: Entries = table
+        .iter()
+        .map(|(key, value)| (at(key.get_ref().to_string(), key.span()), node(value)))
+        .collect();
+    list.sort_by_key(|(key, _)| key.span.start);
+    list
+}
+
+fn at<T>(value: T, span: Span) -> At<T> {
+    At { value, span }
+}
+
+fn node(value: &toml::Spanned<DeValue<'_>>) -> At<Node> {
+    let node = match value.get_ref() {
+        DeValue::String(text) => Node::Text(text.to_string()),
+        DeValue::Integer(number) => Node::Integer(i64::from_str_radix(number.as_str(), number.radix()).ok()),
+        DeValue::Float(number) => Node::Float(number.as_str().parse().unwrap_or(f64::NAN)),
+        DeValue::Boolean(value) => Node::Boolean(*value),
+        DeValue::Datetime(_) => Node::Date,
+        DeValue::Array(list) => Node::List(list.iter().map(node).collect()),
+        DeValue::Table(table) => Node::Table(entries(table)),
+    };
+    at(node, value.span())
+}
+
+fn syntax(text: &str, span: &Span, message: &str) -> Message {
+    let bytes = text.as_bytes();
+    let digit = |index: Option<usize>| index.and_then(|i| bytes.get(i)).is_some_and(u8::is_ascii_digit);
+    let comma = (span.start..=span.end).find(|&i| bytes.get(i) == Some(&b','));
+    let decimal = comma.is_some_and(|i| digit(i.checked_sub(1)) && digit(Some(i + 1)));
+    messages::syntax(message, decimal)
+}

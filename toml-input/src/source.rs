@@ -1,0 +1,125 @@
+//! Files: read once, within their limits, with the way from a byte back to line and column.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use crate::fault::{Fault, Message, Place};
+use crate::messages;
+
+/// Byte range in a text.
+pub type Span = Range<usize>;
+
+/// A file by two names: where to open it, and how to show it.
+#[derive(Debug, Clone)]
+pub struct FileName {
+    /// Path to open.
+    pub path: PathBuf,
+    /// Path as the user gave it, for messages.
+    pub shown: PathBuf,
+}
+
+impl FileName {
+    /// A file that is shown by the path it is opened with.
+    #[must_use]
+    pub fn new(path: &Path) -> Self {
+        FileName {
+            path: path.to_path_buf(),
+            shown: path.to_path_buf(),
+        }
+    }
+
+    /// A fault of the file as a whole.
+    #[must_use]
+    pub fn fault(&self, message: Message) -> Fault {
+        Fault::new(&self.shown, Place::File, message)
+    }
+
+    /// A fault of a tensor in the file.
+    #[must_use]
+    pub fn tensor_fault(&self, tensor: &str, message: Message) -> Fault {
+        Fault::new(&self.shown, Place::Tensor(tensor.to_owned()), message)
+    }
+
+    /// The whole content.
+    ///
+    /// # Errors
+    /// If it is no regular file, is larger than `limit` bytes, or cannot be read.
+    pub fn read(&self, limit: u64) -> Result<Vec<u8>, Message> {
+        let shown = self.shown.display().to_string();
+        let data = std::fs::metadata(&self.path).map_err(|e| messages::unreadable(&shown, &e))?;
+        if data.is_dir() {
+            return Err(messages::is_folder(&shown));
+        }
+        if !data.is_file() {
+            return Err(messages::not_regular(&shown));
+        }
+        if data.len() > limit {
+            return Err(messages::file_too_large(&shown, data.len(), limit));
+        }
+        std::fs::read(&self.path).map_err(|e| messages::unreadable(&shown, &e))
+    }
+}
+
+/// A text file with its name.
+#[derive(Debug, Clone)]
+pub struct Source {
+    /// The file.
+    pub name: FileName,
+    /// Its text, without a byte order mark.
+    pub text: String,
+}
+
+impl Source {
+    /// The text in `bytes`.
+    ///
+    /// # Errors
+    /// If it is not UTF-8; the fault shows the first byte that is not.
+    pub fn new(name: FileName, bytes: Vec<u8>) -> Result<Self, Box<Fault>> {
+        match String::from_utf8(bytes) {
+            Ok(text) => {
+                let text = text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text);
+                Ok(Source { name, text })
+            }
+            Err(error) => {
+                let at = error.utf8_error().valid_up_to();
+                let byte = error.as_bytes().get(at).copied().unwrap_or_default();
+                let text = String::from_utf8_lossy(error.as_bytes()).into_owned();
+                let source = Source { name, text };
+                Err(Box::new(source.fault(&(at..at + 1), messages::not_utf8(byte))))
+            }
+        }
+    }
+
+    /// A fault at `span` of this text; a span over several lines is shown on its first.
+    #[must_use]
+    pub fn fault(&self, span: &Span, message: Message) -> Fault {
+        Fault::new(&self.name.shown, self.place(span), message)
+    }
+
+    fn place(&self, span: &Span) -> Place {
+        let bytes = self.text.as_bytes();
+        let start = floor_boundary(&self.text, span.start);
+        let end = floor_boundary(&self.text, span.end.max(start));
+        let line_start = bytes[..start].iter().rposition(|&b| b == b'\n').map_or(0, |p| p + 1);
+        let line_end = bytes[start..]
+            .iter()
+            .position(|&b| b == b'\n')
+            .map_or(bytes.len(), |p| start + p);
+        let text = self.text[line_start..line_end].trim_end_matches('\r');
+        let line_end = (line_start + text.len()).max(start);
+        Place::Span {
+            line: bytes[..line_start].iter().filter(|&&b| b == b'\n').count() + 1,
+            column: self.text[line_start..start].chars().count() + 1,
+            text: text.to_owned(),
+            length: self.text[start..end.min(line_end).max(start)].chars().count().max(1),
+        }
+    }
+}
+
+fn floor_boundary(text: &str, index: usize) -> usize {
+    let mut index = index.min(text.len());
+    while !text.is_char_boundary(index) {
+        index -= 1;
+    }
+    index
+}

@@ -1,0 +1,129 @@
+//! A table that remembers which keys were asked for.
+
+use crate::document::{At, Document, Entries};
+use crate::fault::{Fault, Message};
+use crate::messages;
+use crate::source::Span;
+use crate::value::Value;
+
+/// A table being read: every key asked for is known, what is left over at the end is a fault.
+pub struct Table<'a> {
+    document: &'a Document,
+    entries: &'a [(At<String>, At<crate::document::Node>)],
+    /// Nothing for the top level and for a table that the file leaves out.
+    span: Option<Span>,
+    title: String,
+    known: Vec<&'static str>,
+}
+
+impl<'a> Table<'a> {
+    pub(crate) fn root(document: &'a Document, entries: &'a Entries) -> Self {
+        Self::new(document, entries, None, "")
+    }
+
+    pub(crate) fn new(
+        document: &'a Document,
+        entries: &'a [(At<String>, At<crate::document::Node>)],
+        span: Option<Span>,
+        title: &str,
+    ) -> Self {
+        Table {
+            document,
+            entries,
+            span,
+            title: title.to_owned(),
+            known: Vec::new(),
+        }
+    }
+
+    /// The value of `key`, if present.
+    pub fn optional(&mut self, key: &'static str) -> Option<Value<'a>> {
+        self.known.push(key);
+        Value::find(self.document, self.entries, key)
+    }
+
+    /// The value of `key`; a fault with `hint` if it is missing.
+    pub fn required(&mut self, key: &'static str, hint: &str, faults: &mut Vec<Fault>) -> Option<Value<'a>> {
+        let value = self.optional(key);
+        if value.is_none() {
+            faults.push(self.fault(messages::missing_key(key, &self.title, hint)));
+        }
+        value
+    }
+
+    /// What `read` makes of the value of `key`; `default` if it is missing, or faulty, which has left a fault.
+    pub fn with_default<T>(
+        &mut self,
+        key: &'static str,
+        default: T,
+        faults: &mut Vec<Fault>,
+        read: impl FnOnce(&Value<'a>, &mut Vec<Fault>) -> Option<T>,
+    ) -> T {
+        let value = self.optional(key);
+        value.and_then(|value| read(&value, faults)).unwrap_or(default)
+    }
+
+    /// What `read` makes of the table `[key]`; one that is left out reads as an empty one.
+    pub fn section<T>(
+        &mut self,
+        key: &'static str,
+        faults: &mut Vec<Fault>,
+        read: impl FnOnce(&mut Table<'a>, &mut Vec<Fault>) -> Option<T>,
+    ) -> Option<T> {
+        let title = format!("[{key}]");
+        let mut table = match self.optional(key) {
+            Some(value) => value.table(&title, faults)?,
+            None => Table::new(self.document, &[], None, &title),
+        };
+        let result = read(&mut table, faults);
+        table.finish(faults);
+        result
+    }
+
+    /// What `read` makes of each table of the array `[[key]]`, without the faulty ones; none if it is left out.
+    pub fn sections<T>(
+        &mut self,
+        key: &'static str,
+        faults: &mut Vec<Fault>,
+        read: impl Fn(&mut Table<'a>, &mut Vec<Fault>) -> Option<T>,
+    ) -> Vec<T> {
+        let title = format!("[[{key}]]");
+        let items = self
+            .optional(key)
+            .and_then(|value| value.list(&format!("{title} tables"), faults))
+            .unwrap_or_default();
+        let one = |item: &Value<'a>| item.read_table(&title, faults, &read);
+        items.iter().filter_map(one).collect()
+    }
+
+    /// A fault of the table as a whole.
+    #[must_use]
+    pub fn fault(&self, message: Message) -> Fault {
+        match &self.span {
+            Some(span) => self.document.fault(span, message),
+            None => self.document.source().name.fault(message),
+        }
+    }
+
+    /// All entries, for tables whose keys the user chooses; this makes none of them known.
+    pub fn pairs(&self) -> impl Iterator<Item = (&'a At<String>, Value<'a>)> + use<'a> {
+        let document = self.document;
+        let pair = move |(key, node): &'a (At<String>, _)| (key, Value::new(document, &key.value, node));
+        self.entries.iter().map(pair)
+    }
+
+    /// Reports keys nobody asked for.
+    pub fn finish(self, faults: &mut Vec<Fault>) {
+        self.finish_with(faults, |_| None);
+    }
+
+    /// Reports keys nobody asked for; `hint` may know better than the nearest key what is meant.
+    pub fn finish_with(self, faults: &mut Vec<Fault>, hint: impl Fn(&str) -> Option<String>) {
+        for (key, _) in self.entries {
+            if !self.known.contains(&key.value.as_str()) {
+                let message = messages::unknown_key(&key.value, &self.title, &self.known);
+                faults.push(self.document.fault(&key.span, message.maybe_hint(hint(&key.value))));
+            }
+        }
+    }
+}

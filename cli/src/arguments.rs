@@ -28,6 +28,9 @@ pub enum Command {
     Verify(Verify),
     /// Inspect, compile and verify the built-in example
     Demo(Demo),
+    /// Duty ratio mapping: acquire settled points, fit drm.toml, judge it
+    #[command(subcommand)]
+    Drm(crate::commands::drm::Drm),
 }
 
 #[derive(Debug, Args)]

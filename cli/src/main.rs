@@ -37,6 +37,7 @@ fn main() -> ExitCode {
         Command::Compile(options) => commands::compile::run(options),
         Command::Verify(options) => commands::verify::run(options),
         Command::Demo(options) => commands::demo::run(options),
+        Command::Drm(command) => commands::drm::run(command),
     };
     match result {
         Ok(outcome) => ExitCode::from(outcome as u8),

@@ -10,9 +10,11 @@
 //! `d_sim = v_out / v_in`, becomes `d_real = a d_sim + b i_out + c`, found by partial least squares; the four-term form adds
 //! the product `r i_out d_sim` that the losses bring about ([`formula`]).
 
+pub mod acquire;
 mod dcm;
 mod fit;
 pub mod formula;
+pub mod judge;
 mod mapping;
 pub mod pls;
 mod table;

@@ -40,5 +40,5 @@ pub use check::check;
 pub use faults::{Fault, Faults, Place};
 pub use parameters::*;
 pub use plant::{Plant, PlantState};
-pub use settle::Settled;
+pub use settle::{Regulator, Settled};
 pub use signals::{Load, Sample, Signals};

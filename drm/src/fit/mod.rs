@@ -18,8 +18,10 @@ use crate::table::{Point, Table};
 pub use causes::{Cause, Explanation};
 pub use outliers::Outlier;
 pub use regression::Form;
-use regression::{Model, error_v, hull};
+pub(crate) use regression::error_v;
+use regression::{Model, hull};
 pub use separation::Separation;
+pub(crate) use show::error_line;
 pub use show::text;
 pub(crate) use validation::rms;
 
@@ -32,6 +34,8 @@ pub struct FitOptions {
     pub components: Option<usize>,
     /// Points below the boundary of discontinuous conduction are left out.
     pub conduction: Option<Conduction>,
+    /// The current cannot rest (a synchronous leg): no boundary to look for.
+    pub always_continuous: bool,
     /// Outliers are named, but stay in the fit.
     pub keep_outliers: bool,
     /// `a` is taken as given: for a table whose voltage does not vary.
@@ -166,8 +170,10 @@ pub fn fit(table: &Table, options: &FitOptions) -> Result<Report, Faults> {
 /// The points in continuous conduction, and the lines of the others.
 fn continuous(table: &Table, options: &FitOptions, notes: &mut Vec<String>) -> (Vec<Point>, Vec<usize>) {
     let Some(conduction) = &options.conduction else {
-        let how = "give --plant, or --inductance and --f-sw";
-        notes.push(format!("discontinuous conduction was not looked for: {how}"));
+        if !options.always_continuous {
+            let how = "give --plant, or --inductance and --f-sw";
+            notes.push(format!("discontinuous conduction was not looked for: {how}"));
+        }
         return (table.points.clone(), Vec::new());
     };
     let share = |p: &Point| p.i_out / conduction.boundary(p.v_out, p.v_in);

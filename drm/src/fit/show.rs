@@ -34,11 +34,11 @@ pub fn text(report: &Report) -> Result<String, fmt::Error> {
         fit.map.slope(i.low).max(fit.map.slope(i.high))
     )?;
     writeln!(out, "\nvoltage error, measured - expected       mean       rms       max")?;
-    line(&mut out, "without a mapping", &fit.without)?;
-    line(&mut out, "with it, on its own points", &fit.with)?;
-    line(&mut out, "with it, leaving each point out", &fit.left_out)?;
+    error_line(&mut out, "without a mapping", &fit.without)?;
+    error_line(&mut out, "with it, on its own points", &fit.with)?;
+    error_line(&mut out, "with it, leaving each point out", &fit.left_out)?;
     if let Some(other) = &report.other {
-        line(&mut out, &format!("{} form, leaving each out", other.form.name()), &other.left_out)?;
+        error_line(&mut out, &format!("{} form, leaving each out", other.form.name()), &other.left_out)?;
     }
     writeln!(out, "\npartial least squares: {}", components(fit))?;
     writeln!(
@@ -68,7 +68,8 @@ pub fn text(report: &Report) -> Result<String, fmt::Error> {
     Ok(out)
 }
 
-pub(crate) fn line(out: &mut String, title: &str, errors: &Errors) -> fmt::Result {
+/// One line of a table of errors.
+pub(crate) fn error_line(out: &mut String, title: &str, errors: &Errors) -> fmt::Result {
     writeln!(
         out,
         "  {title:<32} {:>+10.4} {:>9.4} {:>9.4} V (line {})",

@@ -1,0 +1,107 @@
+//! `policyc drm`: the duty ratio mapping
+
+mod acquire;
+mod fit;
+mod judge;
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Subcommand};
+use drm::acquire::LoadSetting;
+use drm::{Columns, Table, TableOptions};
+use plant::Parameters;
+use policy::Interval;
+use toml_input::{FileName, Source};
+
+use crate::{Failure, Outcome};
+
+/// Largest table that is read, bytes.
+const MOST_BYTES: u64 = 4 << 20;
+
+#[derive(Debug, Subcommand)]
+pub enum Drm {
+    /// Measure settled points: by itself on a simulated converter, or as a plan to fill in at the bench
+    Acquire(acquire::Acquire),
+    /// Fit drm.toml to a table of settled points and say how far it can be trusted
+    Fit(fit::Fit),
+    /// Apply a mapping to a table or a converter, and say what no mapping repairs
+    Judge(judge::Judge),
+}
+
+/// Runs one of the commands.
+pub fn run(command: &Drm) -> Result<Outcome, Failure> {
+    match command {
+        Drm::Acquire(options) => acquire::run(options),
+        Drm::Fit(options) => fit::run(options),
+        Drm::Judge(options) => judge::run(options),
+    }
+}
+
+/// How a table is read.
+#[derive(Debug, Args)]
+pub struct Reading {
+    /// Where the quantities stand: quantity=column, quantity=column*factor or quantity=number, separated by commas;
+    /// quantities are d_real, v_out, i_out, v_in, v_std, settled
+    #[arg(long, value_name = "MAP", default_value = "")]
+    map: String,
+    /// Leave unsettled points out instead of refusing the table
+    #[arg(long)]
+    skip_unsettled: bool,
+}
+
+impl Reading {
+    fn table(&self, path: &Path) -> Result<Table, Failure> {
+        let options = TableOptions {
+            columns: Columns::parse(&self.map)?,
+            skip_unsettled: self.skip_unsettled,
+        };
+        Ok(Table::parse(&source(path)?, &options)?)
+    }
+}
+
+/// The loads on the command line.
+#[derive(Debug, Args)]
+pub struct Loads {
+    /// Constant power loads, W
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    powers: Vec<f64>,
+    /// Current loads, A
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    currents: Vec<f64>,
+    /// Resistors, ohm
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    resistors: Vec<f64>,
+}
+
+impl Loads {
+    fn settings(&self) -> Vec<LoadSetting> {
+        let resistors = self.resistors.iter().copied().map(LoadSetting::Resistor);
+        let currents = self.currents.iter().copied().map(LoadSetting::Current);
+        resistors.chain(currents).chain(self.powers.iter().copied().map(LoadSetting::Power)).collect()
+    }
+}
+
+fn source(path: &Path) -> Result<Source, Failure> {
+    let name = FileName::new(path);
+    let bytes = name.read(MOST_BYTES).map_err(|message| Failure(name.fault(message).to_string()))?;
+    Source::new(name, bytes).map_err(|fault| Failure(fault.to_string()))
+}
+
+fn plant_parameters(path: &PathBuf) -> Result<Parameters, Failure> {
+    Ok(Parameters::from_file(path)?)
+}
+
+/// `low,high` of duty ratios.
+fn duty_limits(text: &str) -> Result<Interval, String> {
+    let (low, high) = text.split_once(',').ok_or("expected LOW,HIGH, for example 0.05,0.95")?;
+    let number = |text: &str| text.trim().parse::<f64>().map_err(|_| format!("`{text}` is not a number"));
+    let interval = Interval {
+        low: number(low)?,
+        high: number(high)?,
+    };
+    if 0.0 <= interval.low && interval.low < interval.high && interval.high <= 1.0 {
+        Ok(interval)
+    } else {
+        Err("expected 0 <= LOW < HIGH <= 1".to_owned())
+    }
+}

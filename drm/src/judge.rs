@@ -7,7 +7,7 @@ use policy::Interval;
 use serde::Serialize;
 
 use crate::acquire::LoadSetting;
-use crate::fit::{Errors, error_v, errors, error_line, rms};
+use crate::fit::{Errors, error_line, error_v, errors, load_line, rms};
 use crate::mapping::DutyRatioMap;
 use crate::table::{Point, Table, lines};
 
@@ -37,7 +37,8 @@ struct CutOff {
 #[must_use]
 pub fn judge(table: &Table, map: &DutyRatioMap, limits: Option<Interval>) -> Judgement {
     let points = &table.points;
-    let with = |point: &Point| (point.line, error_v(map, point));
+    let line = load_line(points);
+    let with = |point: &Point| (point.line, error_v(map, point, line));
     let is_inside = |point: &&Point| map.covers(point.d_sim(), point.i_out);
     let (inside, outside): (Vec<&Point>, Vec<&Point>) = points.iter().partition(is_inside);
     let outside: Vec<usize> = outside.iter().map(|point| point.line).collect();
@@ -46,7 +47,7 @@ pub fn judge(table: &Table, map: &DutyRatioMap, limits: Option<Interval>) -> Jud
         remarks.push(format!("outside the mapping's valid range: {}", lines(&outside)));
     }
     remarks.extend(limits.and_then(|limits| cut_off(points, map, limits)));
-    remarks.extend(noise(points, map));
+    remarks.extend(noise(points, map, line));
     Judgement {
         without: errors(points.iter().map(|p| (p.line, p.v_out - p.d_real * p.v_in))),
         with: errors(points.iter().map(with)),
@@ -82,7 +83,7 @@ fn cut_off(points: &[Point], map: &DutyRatioMap, limits: Interval) -> Option<Str
 }
 
 /// Points at equal duty and load that differ in voltage: what scatters is not a matter of the mapping.
-fn noise(points: &[Point], map: &DutyRatioMap) -> Option<String> {
+fn noise(points: &[Point], map: &DutyRatioMap, line: f64) -> Option<String> {
     const EQUAL: f64 = 1e-3;
     let range = |of: &dyn Fn(&Point) -> f64| {
         let values: Vec<f64> = points.iter().map(of).collect();
@@ -93,7 +94,7 @@ fn noise(points: &[Point], map: &DutyRatioMap) -> Option<String> {
     for (index, one) in points.iter().enumerate() {
         for other in &points[index + 1..] {
             if (one.d_real - other.d_real).abs() <= duty && (one.i_out - other.i_out).abs() <= load {
-                differences.push(error_v(map, one) - error_v(map, other));
+                differences.push(error_v(map, one, line) - error_v(map, other, line));
             }
         }
     }

@@ -48,6 +48,15 @@ impl Cause {
         }
     }
 
+    /// Whether a converter can have it: nothing gives voltage for nothing, and a fifth of the duty or the gain is a fault of
+    /// another kind.
+    fn can_be(self, value: f64) -> bool {
+        match self {
+            Cause::Resistance | Cause::Diode => value >= 0.0,
+            Cause::LostDuty | Cause::Gain => value.abs() < 0.2,
+        }
+    }
+
     /// Its value with unit, for a reader.
     #[must_use]
     pub fn describe(self, value: f64) -> String {
@@ -60,7 +69,8 @@ impl Cause {
     }
 }
 
-/// Every single cause and every pair, the best first within each size; sets the table cannot solve are left out.
+/// Every single cause and every pair, the best first within each size; left out is what the table cannot solve and what
+/// no converter can have.
 pub(crate) fn explain(points: &[Point]) -> Vec<Explanation> {
     let mut sets: Vec<Vec<Cause>> = Cause::ALL.iter().map(|cause| vec![*cause]).collect();
     for (index, one) in Cause::ALL.iter().enumerate() {
@@ -76,6 +86,9 @@ fn explanation(set: &[Cause], points: &[Point]) -> Option<Explanation> {
         return None;
     }
     let values = solve(set, points)?;
+    if !set.iter().zip(&values).all(|(cause, value)| cause.can_be(*value)) {
+        return None;
+    }
     let errors: Vec<f64> = points.iter().map(|point| missing(set, &values, point)).collect();
     let left_out = points.iter().enumerate().map(|(index, point)| {
         let values = solve(set, &without(points, index))?;

@@ -28,8 +28,8 @@ pub(crate) fn of(fit: &Fit, points: &[Point], explanations: &[Explanation]) -> V
     gained(fit, &mut meaning);
     let ties = causes::ties(explanations);
     if ties.len() > 1 {
-        let list: Vec<String> = ties.iter().map(|tie| describe(tie)).collect();
-        meaning.push(format!("a tie: the table is explained as well by {}", list.join("; or by ")));
+        meaning.push("a tie: each of these explains the table as well, and it cannot say which is true:".to_owned());
+        meaning.extend(ties.iter().map(|tie| format!("  {}", describe(tie))));
     }
     meaning
 }

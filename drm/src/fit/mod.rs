@@ -21,6 +21,7 @@ pub use regression::Form;
 pub(crate) use regression::error_v;
 use regression::{Model, hull};
 pub use separation::Separation;
+pub(crate) use separation::load_line;
 pub(crate) use show::error_line;
 pub use show::text;
 pub(crate) use validation::rms;
@@ -127,10 +128,12 @@ pub fn fit(table: &Table, options: &FitOptions) -> Result<Report, Faults> {
     }
     let (mut points, discontinuous) = continuous(table, options, &mut notes);
     let constant_load = separation::is_constant_load(&points);
+    let load_line = separation::load_line(&points);
     let model = |form| Model {
         form,
         constant_load,
         assumed_a: options.assumed_a,
+        load_line: if options.assumed_a.is_some() { 0.0 } else { load_line },
     };
     let forms = forms(&points, constant_load, options).map_err(|message| Faults::from(Fault::from(message)))?;
     let everything = points.clone();
@@ -257,7 +260,7 @@ fn one(model: &Model, points: &[Point], options: &FitOptions) -> Result<Fit, Fau
             d_sim: point.d_sim(),
             d_mapped: map.apply(point.d_sim(), point.i_out),
             without_v: point.v_out - point.d_real * point.v_in,
-            with_v: error_v(&map, point),
+            with_v: error_v(&map, point, model.load_line),
             left_out_v: *left_out_v,
         })
         .collect();

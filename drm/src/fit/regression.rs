@@ -51,6 +51,8 @@ pub(crate) struct Model {
     pub constant_load: bool,
     /// `a` is not fitted but given.
     pub assumed_a: Option<f64>,
+    /// How i_out follows d_sim where the table cannot tell the two apart, A; 0 where it can.
+    pub load_line: f64,
 }
 
 impl Model {
@@ -95,8 +97,12 @@ impl Model {
 }
 
 /// Measured minus expected voltage, V.
-pub(crate) fn error_v(map: &DutyRatioMap, point: &Point) -> f64 {
-    point.v_out - map.v_out(point.d_real, point.i_out, point.v_in)
+///
+/// What is missing in duty is turned into volts at constant load current; where the table knows d_sim and i_out on one
+/// line only (slope `load_line`, A), along that line: a alone would be an arbitrary part of the slope there.
+pub(crate) fn error_v(map: &DutyRatioMap, point: &Point, load_line: f64) -> f64 {
+    let slope = map.slope(point.i_out) + load_line * map.coefficients.b;
+    (map.apply(point.d_sim(), point.i_out) - point.d_real) / slope * point.v_in
 }
 
 pub(crate) fn hull(values: impl Iterator<Item = f64>) -> Interval {

@@ -38,12 +38,7 @@ pub(crate) fn is_constant_load(points: &[Point]) -> bool {
 }
 
 pub(crate) fn examine(model: &Model, points: &[Point]) -> Separation {
-    let columns: Vec<Vec<f64>> = model.columns(points).iter().filter_map(|column| standardised(column)).collect();
-    let values = eigenvalues(&correlation(&columns));
-    let largest = values.first().copied().unwrap_or(0.0);
-    let smallest = values.last().copied().unwrap_or(0.0).max(0.0);
-    let directions = values.iter().filter(|value| **value * LOST * LOST > largest).count();
-    let condition = if smallest > 0.0 { (largest / smallest).sqrt() } else { f64::INFINITY };
+    let (condition, directions) = condition(model, points);
     let predictors = model.form.predictors();
     let mut findings = Vec::new();
     if model.constant_load {
@@ -53,7 +48,7 @@ pub(crate) fn examine(model: &Model, points: &[Point]) -> Separation {
                 .to_owned(),
         );
     } else if model.form == Form::ThreeTerm && model.assumed_a.is_none() {
-        line_of_load(points, condition, &mut findings);
+        on_a_line(points, condition, &mut findings);
     } else if condition > LOST {
         findings.push("the product i_out d_sim cannot be told from d_sim and i_out".to_owned());
     } else if condition > WEAK {
@@ -69,27 +64,65 @@ pub(crate) fn examine(model: &Model, points: &[Point]) -> Separation {
     }
 }
 
-/// i_out as a line in d_sim: what a single resistor does to a table.
-fn line_of_load(points: &[Point], condition: f64, findings: &mut Vec<String>) {
+/// Largest over smallest singular value of the predictors that vary, and how many directions are determined.
+fn condition(model: &Model, points: &[Point]) -> (f64, usize) {
+    let columns: Vec<Vec<f64>> = model.columns(points).iter().filter_map(|column| standardised(column)).collect();
+    let values = eigenvalues(&correlation(&columns));
+    let largest = values.first().copied().unwrap_or(0.0);
+    let smallest = values.last().copied().unwrap_or(0.0).max(0.0);
+    let directions = values.iter().filter(|value| **value * LOST * LOST > largest).count();
+    let condition = if smallest > 0.0 { (largest / smallest).sqrt() } else { f64::INFINITY };
+    (condition, directions)
+}
+
+/// i_out as a line in d_sim.
+struct LoadLine {
+    slope: f64,
+    offset: f64,
+}
+
+impl LoadLine {
+    fn of(points: &[Point]) -> Self {
+        let d: Vec<f64> = points.iter().map(Point::d_sim).collect();
+        let i: Vec<f64> = points.iter().map(|p| p.i_out).collect();
+        let ((d_mean, d_scale), (i_mean, i_scale)) = (centre_and_scale(&d), centre_and_scale(&i));
+        let together = dot(&d, &i) - d_mean * i_mean * d.len() as f64;
+        let slope = together.signum() * i_scale / d_scale;
+        LoadLine {
+            slope,
+            offset: i_mean - slope * d_mean,
+        }
+    }
+}
+
+/// The slope of i_out over d_sim, A, if a table knows the two on one line only; 0 if not.
+pub(crate) fn load_line(points: &[Point]) -> f64 {
+    let model = Model {
+        form: Form::ThreeTerm,
+        constant_load: is_constant_load(points),
+        assumed_a: None,
+        load_line: 0.0,
+    };
+    let apart = model.constant_load || points.len() < 3 || condition(&model, points).0 <= LOST;
+    if apart { 0.0 } else { LoadLine::of(points).slope }
+}
+
+/// What a single resistor does to a table.
+fn on_a_line(points: &[Point], condition: f64, findings: &mut Vec<String>) {
     if condition <= WEAK {
         return;
     }
-    let d: Vec<f64> = points.iter().map(Point::d_sim).collect();
-    let i: Vec<f64> = points.iter().map(|p| p.i_out).collect();
-    let ((d_mean, d_scale), (i_mean, i_scale)) = (centre_and_scale(&d), centre_and_scale(&i));
-    let sign = if dot(&d, &i) - d_mean * i_mean * d.len() as f64 >= 0.0 { 1.0 } else { -1.0 };
-    let slope = sign * i_scale / d_scale;
-    let offset = i_mean - slope * d_mean;
+    let LoadLine { slope, offset } = LoadLine::of(points);
     let v_in = points.iter().map(|p| p.v_in).sum::<f64>() / points.len() as f64;
-    let resistor = if offset.abs() < 0.02 * i_mean.abs() && slope > 0.0 {
-        format!(", as with one resistor of {:.3} ohm", v_in / slope)
-    } else {
-        String::new()
+    let resistor = match slope > 0.0 && offset.abs() < 0.01 * slope {
+        true => format!(", as with one resistor of {:.3} ohm", v_in / slope),
+        false => String::new(),
     };
     let how = if condition > LOST { "cannot" } else { "can hardly" };
     findings.push(format!(
-        "i_out = {slope:.4} d_sim {offset:+.4} A throughout{resistor}: a and b {how} be told apart (condition {condition:.0}), \
-         only a + {slope:.4} b; off this line the mapping is a guess: vary the load at equal duty"
+        "i_out = {slope:.4} d_sim {offset:+.4} A throughout{resistor}: a and b {how} be told apart, only a + {slope:.4} b \
+         is known, and off this line the mapping is a guess; vary the load at equal duty, or give a with --assume-a (the \
+         gain that the controller sees; 1 for small losses)"
     ));
 }
 

@@ -23,7 +23,7 @@ pub(crate) fn leave_one_out(model: &Model, points: &[Point], components: usize) 
     for (index, point) in points.iter().enumerate() {
         let rest = without(points, index);
         let pls = model.fit(&rest, components);
-        left_out.errors_v.push(error_v(&model.map(&rest, &pls), point));
+        left_out.errors_v.push(error_v(&model.map(&rest, &pls), point, model.load_line));
         left_out.coefficients.push(model.coefficients(&pls));
     }
     left_out
@@ -93,7 +93,7 @@ pub(crate) fn deleted(model: &Model, points: &[Point], index: usize, components:
     let expected = noise * (1.0 + pls.leverage(&model.row(point))).sqrt();
     let deleted = Deleted {
         studentised: deviation(point).abs() / expected.max(f64::MIN_POSITIVE),
-        error_v: error_v(&model.map(&rest, &pls), point),
+        error_v: error_v(&model.map(&rest, &pls), point, model.load_line),
     };
     Some((deleted, degrees))
 }

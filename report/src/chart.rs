@@ -1,0 +1,414 @@
+//! Panels with a shared x axis.
+
+use crate::axis::{Axis, Scale, Settled};
+use crate::colour::Colour;
+use crate::error::ReportError;
+use crate::font::{SMALL, width};
+use crate::frame::{
+    Area, BAND_OPACITY, DASH, EDGE, Entry, Head, LINE, PANEL_TITLE, Svg, TICK_ROOM, WIDTH, below, border, grid,
+    rectangle, sheet, widest,
+};
+use crate::markup::{Markup, Px};
+use crate::path;
+use crate::series::{Kind, Mark, Series};
+
+/// One or more panels below each other over the same x axis.
+///
+/// ```
+/// use report::{Axis, Chart, Panel, Series};
+/// let t = [0.0, 1e-3, 2e-3];
+/// let svg = Chart::new("Load step", Axis::new("time").unit("s"))
+///     .panel(Panel::new(Axis::new("output voltage").unit("V")).series(Series::line("plant", t, [5.0, 4.8, 5.0])))
+///     .panel(Panel::new(Axis::new("duty")).series(Series::step("plant", t, [0.4, 0.5, 0.45])))
+///     .svg()?;
+/// # Ok::<(), report::ReportError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Chart {
+    title: String,
+    x: Axis,
+    panels: Vec<Panel>,
+}
+
+/// One panel of a [`Chart`]: its y axis and what is drawn against it, in the order added (bands first).
+#[derive(Debug, Clone)]
+pub struct Panel {
+    y: Axis,
+    height: f64,
+    series: Vec<Series>,
+    marks: Vec<Mark>,
+}
+
+impl Panel {
+    /// Empty panel, 220 pixels high.
+    pub fn new(y: Axis) -> Self {
+        Self {
+            y,
+            height: 220.0,
+            series: Vec::new(),
+            marks: Vec::new(),
+        }
+    }
+
+    /// Height of the drawing area in pixels, at least 40.
+    #[must_use]
+    pub fn height(mut self, pixels: f64) -> Self {
+        self.height = pixels.clamp(40.0, 4000.0);
+        self
+    }
+
+    /// Adds a series.
+    #[must_use]
+    pub fn series(mut self, series: Series) -> Self {
+        self.series.push(series);
+        self
+    }
+
+    /// Dashed horizontal line with a label: a reference, a limit. The axis reaches it.
+    #[must_use]
+    pub fn y_line(self, value: f64, label: impl Into<String>) -> Self {
+        self.mark(false, value, value, label)
+    }
+
+    /// Dashed vertical line with a label: an event.
+    #[must_use]
+    pub fn x_line(self, value: f64, label: impl Into<String>) -> Self {
+        self.mark(true, value, value, label)
+    }
+
+    /// Shaded stripe between two y values: a tolerance, forbidden ground. The axis reaches it.
+    #[must_use]
+    pub fn y_zone(self, from: f64, to: f64, label: impl Into<String>) -> Self {
+        self.mark(false, from, to, label)
+    }
+
+    /// Shaded stripe between two x values.
+    #[must_use]
+    pub fn x_zone(self, from: f64, to: f64, label: impl Into<String>) -> Self {
+        self.mark(true, from, to, label)
+    }
+
+    fn mark(mut self, on_x: bool, from: f64, to: f64, label: impl Into<String>) -> Self {
+        let label = label.into();
+        self.marks.push(Mark { on_x, from, to, label });
+        self
+    }
+
+    fn ends(&self, on_x: bool) -> impl Iterator<Item = f64> {
+        let of = move |mark: &Mark| (mark.on_x == on_x).then_some([mark.from, mark.to]);
+        self.marks.iter().filter_map(of).flatten()
+    }
+}
+
+impl Chart {
+    /// Chart without panels.
+    pub fn new(title: impl Into<String>, x: Axis) -> Self {
+        Self {
+            title: title.into(),
+            x,
+            panels: Vec::new(),
+        }
+    }
+
+    /// Adds a panel below the others.
+    #[must_use]
+    pub fn panel(mut self, panel: Panel) -> Self {
+        self.panels.push(panel);
+        self
+    }
+
+    /// Draws the chart, 900 pixels wide.
+    ///
+    /// # Errors
+    /// No panel, a series without a value that can be drawn or with lists of different length, an impossible range.
+    pub fn svg(&self) -> Result<Svg, ReportError> {
+        if self.panels.is_empty() {
+            return Err(ReportError::Empty {
+                what: self.title.clone(),
+            });
+        }
+        for series in self.panels.iter().flat_map(|panel| &panel.series) {
+            series.check()?;
+        }
+        let all_x = self.panels.iter().flat_map(|panel| {
+            let series = panel.series.iter().flat_map(|series| series.x.iter().copied());
+            series.chain(panel.ends(true))
+        });
+        let series = || self.panels.iter().flat_map(|panel| &panel.series);
+        // a marker at the edge would be cut in half
+        let free = if series().any(|series| series.kind == Kind::Points) {
+            0.02
+        } else {
+            0.0
+        };
+        let x = self.x.settle(all_x, [free; 2], 9)?;
+        let ys = self.panels.iter().map(y_axis).collect::<Result<Vec<_>, _>>()?;
+
+        let colours = Colours::new(&self.panels);
+        let head = Head::new(&self.title, colours.entries.clone(), WIDTH);
+        let left = EDGE + ys.iter().map(widest).fold(24.0, f64::max) + 6.0;
+        let last_label = x
+            .ticks
+            .iter()
+            .rev()
+            .find_map(|tick| tick.label.as_deref())
+            .unwrap_or("");
+        let right = EDGE + (width(last_label, SMALL) / 2.0).max(4.0);
+        let mut areas = Vec::new();
+        let mut top = head.height();
+        for panel in &self.panels {
+            let y = top + PANEL_TITLE;
+            areas.push(Area {
+                x: left,
+                y,
+                width: WIDTH - left - right,
+                height: panel.height,
+            });
+            top = y + panel.height + 8.0;
+        }
+        let high = top + TICK_ROOM + LINE + EDGE - 8.0;
+
+        let mut out = sheet(&self.title, WIDTH, high);
+        head.draw(&mut out);
+        let last = self.panels.len() - 1;
+        for (n, ((panel, y), area)) in self.panels.iter().zip(&ys).zip(areas).enumerate() {
+            out.text("text", &[("x", &Px(EDGE)), ("y", &Px(area.y - 11.0))], &y.label);
+            let (xs, ys) = (x.onto(area.x, area.right()), y.onto(area.bottom(), area.y));
+            grid(&mut out, area, Some((xs, n == last)), Some(ys));
+            draw(&mut out, panel, &x, y, area, &colours)?;
+            border(&mut out, area);
+            if n == last {
+                below(&mut out, area, &x.label);
+            }
+        }
+        out.close("svg");
+        Ok(Svg(out.finish()))
+    }
+}
+
+fn y_axis(panel: &Panel) -> Result<Settled, ReportError> {
+    let data = panel
+        .series
+        .iter()
+        .flat_map(|series| series.y.iter().chain(&series.high).copied());
+    let ticks = (panel.height / 42.0).clamp(2.0, 8.0) as usize;
+    panel.y.settle(data.chain(panel.ends(false)), [0.06; 2], ticks)
+}
+
+/// Colour and dash by name, in order of appearance.
+struct Colours {
+    entries: Vec<Entry>,
+}
+
+impl Colours {
+    fn new(panels: &[Panel]) -> Self {
+        let mut entries: Vec<Entry> = Vec::new();
+        let mut taken = 0;
+        for series in panels.iter().flat_map(|panel| &panel.series) {
+            if series.name.is_empty() || entries.iter().any(|entry| entry.name == series.name) {
+                continue;
+            }
+            let (next, worn) = Colour::series(taken);
+            taken += usize::from(series.colour.is_none());
+            entries.push(Entry {
+                name: series.name.clone(),
+                colour: series.colour.unwrap_or(next),
+                dashed: series.kind != Kind::Band && (series.dashed || worn && series.colour.is_none()),
+                kind: series.kind,
+            });
+        }
+        Self { entries }
+    }
+
+    fn of(&self, series: &Series) -> (Colour, bool) {
+        let known = self.entries.iter().find(|entry| entry.name == series.name);
+        let (colour, dashed) = known.map_or((Colour::BLUE, false), |entry| (entry.colour, entry.dashed));
+        (series.colour.unwrap_or(colour), series.dashed || dashed)
+    }
+}
+
+/// Data and marks of a panel, cut off at its edge by a nested `svg` (a clip path would need an id, and ids of several
+/// charts on a page would clash).
+fn draw(
+    out: &mut Markup,
+    panel: &Panel,
+    x: &Settled,
+    y: &Settled,
+    area: Area,
+    colours: &Colours,
+) -> Result<(), ReportError> {
+    let (xs, ys) = (x.onto(0.0, area.width), y.onto(area.height, 0.0));
+    let (wide, high) = (Px(area.width), Px(area.height));
+    let place: [(&str, &dyn std::fmt::Display); 4] = [
+        ("x", &Px(area.x)),
+        ("y", &Px(area.y)),
+        ("width", &wide),
+        ("height", &high),
+    ];
+    out.open("svg", &place);
+    for mark in &panel.marks {
+        zone(out, mark, xs, ys);
+    }
+    let bands = panel.series.iter().filter(|series| series.kind == Kind::Band);
+    let others = panel.series.iter().filter(|series| series.kind != Kind::Band);
+    for series in bands.chain(others) {
+        let (colour, dashed) = colours.of(series);
+        trace(out, series, xs, ys, colour, dashed)?;
+    }
+    let mut taken: Vec<Area> = Vec::new();
+    for mark in &panel.marks {
+        label(out, mark, xs, ys, &mut taken);
+    }
+    out.close("svg");
+    Ok(())
+}
+
+fn trace(
+    out: &mut Markup,
+    series: &Series,
+    xs: Scale,
+    ys: Scale,
+    colour: Colour,
+    dashed: bool,
+) -> Result<(), ReportError> {
+    let points = |values: &[f64]| -> Vec<path::Point> {
+        let pairs = series.x.iter().zip(values);
+        pairs.map(|(x, y)| Some((xs.at(*x)?, ys.at(*y)?))).collect()
+    };
+    let low = points(&series.y);
+    let data = match series.kind {
+        Kind::Line => path::line(&path::thin(&low)),
+        Kind::Step => path::line(&path::thin(&path::stairs(&low))),
+        Kind::Band => path::area(&low, &points(&series.high)),
+        Kind::Points => path::dots(&low),
+    };
+    if data.is_empty() {
+        return Err(ReportError::Empty {
+            what: series.name.clone(),
+        });
+    }
+    match series.kind {
+        Kind::Band => out.leaf(
+            "path",
+            &[("d", &data), ("fill", &colour), ("fill-opacity", &BAND_OPACITY)],
+        ),
+        Kind::Points => out.leaf(
+            "path",
+            &[
+                ("d", &data),
+                ("stroke", &colour),
+                ("stroke-width", &7),
+                ("stroke-linecap", &"round"),
+                ("fill", &"none"),
+            ],
+        ),
+        Kind::Line | Kind::Step => {
+            let dash = if dashed { DASH } else { "none" };
+            out.leaf(
+                "path",
+                &[
+                    ("d", &data),
+                    ("stroke", &colour),
+                    ("stroke-width", &1.6),
+                    ("stroke-linejoin", &"round"),
+                    ("stroke-linecap", &if dashed { "butt" } else { "round" }),
+                    ("stroke-dasharray", &dash),
+                    ("fill", &"none"),
+                ],
+            );
+        }
+    }
+    Ok(())
+}
+
+fn zone(out: &mut Markup, mark: &Mark, xs: Scale, ys: Scale) {
+    let along = if mark.on_x { xs } else { ys };
+    let (Some(a), Some(b)) = (along.at(mark.from), along.at(mark.to)) else {
+        return;
+    };
+    let (start, size) = (a.min(b), (a - b).abs());
+    let (wide, high) = (xs.to, ys.from);
+    if mark.from == mark.to {
+        let d = if mark.on_x {
+            format!("M{},0V{}", Px(a), Px(high))
+        } else {
+            format!("M0,{}H{}", Px(a), Px(wide))
+        };
+        let pen: [(&str, &dyn std::fmt::Display); 3] =
+            [("d", &d), ("stroke", &Colour::DIM), ("stroke-dasharray", &"4 3")];
+        out.leaf("path", &pen);
+        return;
+    }
+    let area = if mark.on_x {
+        Area {
+            x: start,
+            y: 0.0,
+            width: size,
+            height: high,
+        }
+    } else {
+        Area {
+            x: 0.0,
+            y: start,
+            width: wide,
+            height: size,
+        }
+    };
+    rectangle(out, area, Colour::GREY, BAND_OPACITY);
+}
+
+/// Writes the label where no earlier label stands: beside the line, else on its other side, else further along.
+fn label(out: &mut Markup, mark: &Mark, xs: Scale, ys: Scale, taken: &mut Vec<Area>) {
+    let along = if mark.on_x { xs } else { ys };
+    let (Some(a), Some(b)) = (along.at(mark.from), along.at(mark.to)) else {
+        return;
+    };
+    if mark.label.is_empty() {
+        return;
+    }
+    let (wide, high) = (xs.to, ys.from);
+    let size = (width(&mark.label, SMALL), LINE);
+    let box_at = |x: f64, y: f64| Area {
+        x: x.clamp(4.0, (wide - size.0 - 4.0).max(4.0)),
+        y: y.clamp(1.0, (high - size.1).max(1.0)),
+        width: size.0,
+        height: size.1,
+    };
+    let (near, far) = (a.min(b), a.max(b));
+    let places: Vec<Area> = if mark.on_x {
+        let rows = (0..6).map(|row| f64::from(row) * LINE + 2.0);
+        rows.flat_map(|y| [box_at(near + 5.0, y), box_at(far - size.0 - 5.0, y)])
+            .collect()
+    } else {
+        let columns = [wide - size.0 - 6.0, 6.0, (wide - size.0) / 2.0];
+        let heights = if near == far {
+            [near - LINE, near + 2.0]
+        } else {
+            [near + 1.0, far - LINE]
+        };
+        columns.iter().flat_map(|x| heights.map(|y| box_at(*x, y))).collect()
+    };
+    let free = places
+        .iter()
+        .find(|place| !taken.iter().any(|other| overlap(place, other)));
+    let Some(place) = free.or(places.first()).copied() else {
+        return;
+    };
+    taken.push(place);
+    out.text(
+        "text",
+        &[
+            ("x", &Px(place.x)),
+            ("y", &Px(place.y + 12.0)),
+            ("fill", &Colour::DIM),
+            ("stroke", &Colour::PAPER),
+            ("stroke-width", &3),
+            ("paint-order", &"stroke"),
+        ],
+        &mark.label,
+    );
+}
+
+fn overlap(a: &Area, b: &Area) -> bool {
+    a.x < b.right() && b.x < a.right() && a.y < b.bottom() && b.y < a.bottom()
+}

@@ -1,0 +1,223 @@
+//! HTML pages: one file, no scripts, nothing loaded.
+
+use crate::error::ReportError;
+use crate::frame::Svg;
+use crate::markup::Markup;
+use crate::table::Table;
+
+/// How the verdict of a page came out; it is written as a word, not by colour alone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// As required.
+    Pass,
+    /// With reservations.
+    Warn,
+    /// Not as required.
+    Fail,
+    /// Nothing was judged.
+    Note,
+}
+
+impl Verdict {
+    fn class(self) -> &'static str {
+        match self {
+            Self::Pass => "pass",
+            Self::Warn => "warn",
+            Self::Fail => "fail",
+            Self::Note => "note",
+        }
+    }
+}
+
+/// A page: title, verdict, sections.
+///
+/// ```
+/// use report::{Page, Section, Verdict};
+/// let html = Page::new("Load step")
+///     .verdict(Verdict::Pass, "v_out stays within its limits.")
+///     .section(Section::new("Setup").pairs([("f_sw", "100 kHz")]).text("Measured at 25 °C."))
+///     .html()?;
+/// # Ok::<(), report::ReportError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Page {
+    title: String,
+    verdict: Option<(Verdict, String)>,
+    sections: Vec<Section>,
+}
+
+/// A heading and what stands below it, in the order added.
+#[derive(Debug, Clone)]
+pub struct Section {
+    heading: String,
+    blocks: Vec<Block>,
+}
+
+#[derive(Debug, Clone)]
+enum Block {
+    Text(String),
+    Chart(Svg, String),
+    Table(Table),
+    Pairs(Vec<(String, String)>),
+    Code(String),
+    Details(Section),
+}
+
+impl Page {
+    /// Page without sections.
+    pub fn new(title: impl Into<String>) -> Self {
+        Self {
+            title: title.into(),
+            verdict: None,
+            sections: Vec::new(),
+        }
+    }
+
+    /// The answer in one sentence, at the top.
+    #[must_use]
+    pub fn verdict(mut self, verdict: Verdict, sentence: impl Into<String>) -> Self {
+        self.verdict = Some((verdict, sentence.into()));
+        self
+    }
+
+    /// Adds a section.
+    #[must_use]
+    pub fn section(mut self, section: Section) -> Self {
+        self.sections.push(section);
+        self
+    }
+
+    /// The whole file.
+    ///
+    /// # Errors
+    /// A table whose row has another number of cells than the table has columns.
+    pub fn html(&self) -> Result<String, ReportError> {
+        let mut out = Markup::default();
+        out.raw("<!DOCTYPE html>\n");
+        out.open("html", &[("lang", &"en")]);
+        out.open("head", &[]);
+        out.leaf("meta", &[("charset", &"utf-8")]);
+        out.leaf(
+            "meta",
+            &[
+                ("name", &"viewport"),
+                ("content", &"width=device-width, initial-scale=1"),
+            ],
+        );
+        out.text("title", &[], &self.title);
+        out.open("style", &[]);
+        out.raw(include_str!("page.css"));
+        out.close("style");
+        out.close("head");
+        out.open("body", &[]);
+        out.open("main", &[]);
+        out.text("h1", &[], &self.title);
+        if let Some((verdict, sentence)) = &self.verdict {
+            let class = verdict.class();
+            out.open("p", &[("class", &format_args!("verdict {class}"))]);
+            if *verdict != Verdict::Note {
+                out.text("strong", &[], class);
+            }
+            out.text("span", &[], sentence);
+            out.close("p");
+        }
+        for section in &self.sections {
+            out.open("section", &[]);
+            if !section.heading.is_empty() {
+                out.text("h2", &[], &section.heading);
+            }
+            section.write(&mut out)?;
+            out.close("section");
+        }
+        for name in ["main", "body", "html"] {
+            out.close(name);
+        }
+        Ok(out.finish())
+    }
+}
+
+impl Section {
+    /// Empty section; an empty heading is left out.
+    pub fn new(heading: impl Into<String>) -> Self {
+        Self {
+            heading: heading.into(),
+            blocks: Vec::new(),
+        }
+    }
+
+    /// Paragraph.
+    #[must_use]
+    pub fn text(self, text: impl Into<String>) -> Self {
+        self.block(Block::Text(text.into()))
+    }
+
+    /// Chart with a caption; an empty one is left out.
+    #[must_use]
+    pub fn chart(self, svg: Svg, caption: impl Into<String>) -> Self {
+        self.block(Block::Chart(svg, caption.into()))
+    }
+
+    /// Table.
+    #[must_use]
+    pub fn table(self, table: Table) -> Self {
+        self.block(Block::Table(table))
+    }
+
+    /// Names with their values.
+    #[must_use]
+    pub fn pairs<K: Into<String>, V: Into<String>>(self, pairs: impl IntoIterator<Item = (K, V)>) -> Self {
+        let pairs = pairs.into_iter().map(|(key, value)| (key.into(), value.into()));
+        let pairs = pairs.collect();
+        self.block(Block::Pairs(pairs))
+    }
+
+    /// Text in a fixed-width font with its line breaks: a command, a file.
+    #[must_use]
+    pub fn code(self, code: impl Into<String>) -> Self {
+        self.block(Block::Code(code.into()))
+    }
+
+    /// Section that opens at a click on its heading.
+    #[must_use]
+    pub fn details(self, inner: Section) -> Self {
+        self.block(Block::Details(inner))
+    }
+
+    fn block(mut self, block: Block) -> Self {
+        self.blocks.push(block);
+        self
+    }
+
+    fn write(&self, out: &mut Markup) -> Result<(), ReportError> {
+        for block in &self.blocks {
+            match block {
+                Block::Text(text) => out.text("p", &[], text),
+                Block::Chart(svg, caption) => {
+                    out.open("figure", &[]);
+                    out.raw(svg.as_str());
+                    if !caption.is_empty() {
+                        out.text("figcaption", &[], caption);
+                    }
+                    out.close("figure");
+                }
+                Block::Table(table) => table.write(out)?,
+                Block::Pairs(pairs) => {
+                    out.open("dl", &[]);
+                    for (key, value) in pairs {
+                        out.text("dt", &[], key);
+                        out.text("dd", &[], value);
+                    }
+                    out.close("dl");
+                }
+                Block::Code(code) => out.text("pre", &[], code),
+                Block::Details(inner) => {
+                    out.open("details", &[]);
+                    out.text("summary", &[], &inner.heading);
+                    inner.write(out)?;
+                    out.close("details");
+                }
+            }
+        }
+        Ok(())
+    }
+}

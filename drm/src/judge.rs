@@ -7,14 +7,14 @@ use policy::Interval;
 use serde::Serialize;
 
 use crate::acquire::LoadSetting;
-use crate::fit::{Errors, error_line, error_v, errors, load_line, rms};
+use crate::fit::{Errors, error_head, error_line, error_v, errors, load_line, rms, wrapped};
 use crate::mapping::DutyRatioMap;
 use crate::table::{Point, Table, lines};
 
 /// A mapping applied to a table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Judgement {
-    /// `v_out - d_real v_in`, V.
+    /// Measured voltage minus that of the simulation at the same duty, V.
     pub without: Errors,
     /// Measured minus expected voltage, V.
     pub with: Errors,
@@ -49,7 +49,7 @@ pub fn judge(table: &Table, map: &DutyRatioMap, limits: Option<Interval>) -> Jud
     remarks.extend(limits.and_then(|limits| cut_off(points, map, limits)));
     remarks.extend(noise(points, map, line));
     Judgement {
-        without: errors(points.iter().map(|p| (p.line, p.v_out - p.d_real * p.v_in))),
+        without: errors(points.iter().map(|p| (p.line, p.without_v()))),
         with: errors(points.iter().map(with)),
         inside: (!inside.is_empty()).then(|| errors(inside.iter().map(|p| with(p)))),
         outside,
@@ -65,7 +65,7 @@ fn cut_off(points: &[Point], map: &DutyRatioMap, limits: Interval) -> Option<Str
         (missing != 0.0).then(|| CutOff {
             line: point.line,
             wanted,
-            missing_v: missing / map.slope(point.i_out) * point.v_in,
+            missing_v: missing / map.slope(point.i_out) * point.v_sim,
         })
     };
     let list: Vec<CutOff> = points.iter().filter_map(beyond).collect();
@@ -147,7 +147,7 @@ pub fn against_plant(
         let (seen, wanted) = (bench.sample(), simulation.sample());
         let mapped = map.apply(d_sim, seen.measured.i_out);
         let limited = limits.map_or(mapped, |limits| mapped.clamp(limits.low, limits.high));
-        let volts = |duty: f64| (duty - d_needed) / map.slope(seen.i_out) * seen.v_in;
+        let volts = |duty: f64| (duty - d_needed) / map.slope(seen.i_out) * nominal.converter.v_in;
         Steady {
             v_ref,
             i_out: seen.i_out,
@@ -207,14 +207,15 @@ pub fn beyond_repair(steady: &[Steady], v_ref: f64) -> Vec<String> {
 /// Never, in fact: writing to a text does not fail.
 pub fn table_text(judgement: &Judgement) -> Result<String, fmt::Error> {
     let mut out = String::new();
-    writeln!(out, "voltage error, measured - expected       mean       rms       max")?;
+    error_head(&mut out)?;
     error_line(&mut out, "without a mapping", &judgement.without)?;
     error_line(&mut out, "with it", &judgement.with)?;
     if let Some(inside) = judgement.inside.as_ref().filter(|_| !judgement.outside.is_empty()) {
         error_line(&mut out, "with it, inside its valid range", inside)?;
     }
     for remark in &judgement.remarks {
-        writeln!(out, "\nnote: {remark}")?;
+        writeln!(out)?;
+        wrapped(&mut out, "", &format!("note: {remark}"))?;
     }
     Ok(out)
 }
@@ -235,7 +236,8 @@ pub fn steady_text(steady: &[Steady], v_ref: f64) -> Result<String, fmt::Error> 
         )?;
     }
     for remark in beyond_repair(steady, v_ref) {
-        writeln!(out, "\nno mapping repairs: {remark}")?;
+        writeln!(out)?;
+        wrapped(&mut out, "", &format!("no mapping repairs: {remark}"))?;
     }
     Ok(out)
 }

@@ -16,10 +16,12 @@ mod fit;
 pub mod formula;
 pub mod judge;
 mod mapping;
+mod pictures;
 pub mod pls;
 mod table;
 
 pub use dcm::Conduction;
 pub use fit::*;
 pub use mapping::DutyRatioMap;
+pub use pictures::page;
 pub use table::{Columns, Point, Table, TableOptions};

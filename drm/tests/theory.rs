@@ -1,11 +1,11 @@
 //! Fits of noise-free tables of the exact steady state against what theory says they leave.
 #![allow(clippy::unwrap_used)]
 
-use std::path::Path;
+mod common;
 
 use drm::formula::Losses;
-use drm::{Cause, FitOptions, Form, Report, Table, TableOptions};
-use toml_input::{FileName, Source};
+use drm::{Cause, FitOptions, Form, Report, Table};
+
 
 const LOSSY: Losses = Losses {
     v_in: 195.0,
@@ -27,8 +27,7 @@ fn table(losses: &Losses, change: impl Fn(usize, &mut [f64; 4])) -> Table {
         let [d_real, v_out, i_out, v_in] = row;
         text += &format!("{d_real},{v_out},{i_out},{v_in}\n");
     }
-    let source = Source::new(FileName::new(Path::new("table.csv")), text.into_bytes()).unwrap();
-    Table::parse(&source, &TableOptions::default()).unwrap()
+    common::table(&text)
 }
 
 fn fitted(table: &Table, form: Form) -> Report {

@@ -47,13 +47,22 @@ pub struct Reading {
     /// Leave unsettled points out instead of refusing the table
     #[arg(long)]
     skip_unsettled: bool,
+    /// Input voltage of the simulation that the policy was trained on, in V: d_sim = v_out over this; without it v_in of
+    /// each point
+    #[arg(long, value_name = "V")]
+    v_in_sim: Option<f64>,
 }
 
 impl Reading {
     fn table(&self, path: &Path) -> Result<Table, Failure> {
+        if let Some(v) = self.v_in_sim.filter(|v| !(v.is_finite() && *v > 0.0)) {
+            return Err(Failure(format!("--v-in-sim must be greater than 0 V\n   = found: {v}")));
+        }
         let options = TableOptions {
             columns: Columns::parse(&self.map)?,
             skip_unsettled: self.skip_unsettled,
+            v_sim: self.v_in_sim,
+            partial: false,
         };
         Ok(Table::parse(&source(path)?, &options)?)
     }

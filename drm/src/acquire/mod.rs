@@ -149,7 +149,8 @@ impl Plan {
             duty,
             load,
             hold: match load {
-                LoadSetting::Power(_) => Hold::ClosedLoop(duty * v_in),
+                // to a microvolt: it is written down and read by people
+                LoadSetting::Power(_) => Hold::ClosedLoop((duty * v_in * 1e6).round() / 1e6),
                 LoadSetting::Resistor(_) | LoadSetting::Current(_) => Hold::OpenLoop,
             },
         };

@@ -11,11 +11,12 @@ const KNOWN: f64 = 2.0;
 pub(crate) fn of(fit: &Fit, points: &[Point], explanations: &[Explanation]) -> Vec<String> {
     let mut meaning = Vec::new();
     let apart = fit.separation.directions == fit.separation.predictors && fit.separation.condition <= 30.0;
-    let v_in = points.iter().map(|p| p.v_in).sum::<f64>() / points.len().max(1) as f64;
+    let mean = |of: &dyn Fn(&Point) -> f64| points.iter().map(of).sum::<f64>() / points.len().max(1) as f64;
+    let (v_in, v_sim) = (mean(&|p| p.v_in), mean(&|p| p.v_sim));
     if apart {
         match fit.form {
             Form::ThreeTerm => three(fit, v_in, &mut meaning),
-            Form::FourTerm => four(fit, v_in, &mut meaning),
+            Form::FourTerm => four(fit, v_in, v_sim, &mut meaning),
         }
         meaning.push(
             "ties of every steady state: R of inductor, switch and diode can be exchanged (RL - k, Ron + k, rd + k); lost \
@@ -62,12 +63,14 @@ fn three(fit: &Fit, v_in: f64, meaning: &mut Vec<String>) {
     ));
 }
 
-fn four(fit: &Fit, v_in: f64, meaning: &mut Vec<String>) {
+/// With `V = v_in + V_f`: a = v_sim / V, c = lost duty + V_f / V, r = (Ron - rd) v_sim / V^2 and
+/// b = [RL + rd + (Ron - rd) V_f / V] / V (see [`crate::formula`]).
+fn four(fit: &Fit, v_in: f64, v_sim: f64, meaning: &mut Vec<String>) {
     let (k, se) = (fit.map.coefficients, fit.standard_errors);
     let (r, se_r) = (k.r.unwrap_or(0.0), se.r.unwrap_or(0.0));
-    meaning.push("if v_out and v_in are measured without gain error:".to_owned());
-    let v_f = v_in * (1.0 - k.a) / k.a;
-    let se_v_f = v_in * se.a / (k.a * k.a);
+    meaning.push("if v_out, i_out and v_in are measured without gain error, to first order in R i / v_in:".to_owned());
+    let (v, se_v) = (v_sim / k.a, v_sim * se.a / (k.a * k.a));
+    let v_f = v - v_in;
     let claim = |name: &str, value: f64, error: f64, unit: &str| {
         if value.abs() > KNOWN * error {
             format!("  {name} = {value:.4} +- {error:.4}{unit}")
@@ -75,20 +78,17 @@ fn four(fit: &Fit, v_in: f64, meaning: &mut Vec<String>) {
             format!("  {name}: not different from 0 ({value:.4} +- {error:.4}{unit})")
         }
     };
-    meaning.push(claim("V_f = v_in (1 - a) / a", v_f, se_v_f, " V"));
-    let lost = k.c - (1.0 - k.a);
-    let se_lost = (se.c * se.c + se.a * se.a).sqrt();
-    meaning.push(claim("lost duty = c - (1 - a)", lost, se_lost, ""));
-    let v = v_in + v_f;
-    let rho = r * v / v_in;
-    meaning.push(claim("Ron - rd = r (v_in + V_f)^2 / v_in", rho * v, se_r * v * v / v_in, " ohm"));
-    let series = k.b * v - rho * v_f;
-    meaning.push(claim("RL + rd = b (v_in + V_f) - (Ron - rd) V_f / (v_in + V_f)", series, se.b * v, " ohm"));
+    meaning.push(claim("V_f", v_f, se_v, " V"));
+    let se_lost = (se.c * se.c + se_v * se_v / (v * v)).sqrt();
+    meaning.push(claim("lost duty", k.c - v_f / v, se_lost, ""));
+    let apart = r * v * v / v_sim;
+    meaning.push(claim("Ron - rd", apart, se_r * v * v / v_sim, " ohm"));
+    meaning.push(claim("RL + rd", k.b * v - apart * v_f / v, se.b * v, " ohm"));
 }
 
 /// Losses take voltage away: where there is more than `d v_in`, something else is at work.
 fn gained(fit: &Fit, meaning: &mut Vec<String>) {
-    let above = |row: &&Row| row.without_v > 1e-3 * row.point.v_in;
+    let above = |row: &&Row| row.point.v_out > (row.point.d_real + 1e-3) * row.point.v_in;
     let lines: Vec<usize> = fit.rows.iter().filter(above).map(|row| row.point.line).collect();
     if lines.is_empty() {
         return;

@@ -22,7 +22,7 @@ pub(crate) use regression::error_v;
 use regression::{Model, hull};
 pub use separation::Separation;
 pub(crate) use separation::load_line;
-pub(crate) use show::error_line;
+pub(crate) use show::{error_head, error_line, wrapped};
 pub use show::text;
 pub(crate) use validation::rms;
 
@@ -61,11 +61,11 @@ pub struct Errors {
 pub struct Row {
     /// As measured.
     pub point: Point,
-    /// `v_out / v_in`.
+    /// `v_out / v_sim`.
     pub d_sim: f64,
     /// Mapped duty ratio.
     pub d_mapped: f64,
-    /// Measured voltage minus `d_real v_in`: the error without a mapping, V.
+    /// Measured voltage minus `d_real v_sim`: the error without a mapping, V.
     pub without_v: f64,
     /// Measured voltage minus that which the mapping expects, V.
     pub with_v: f64,
@@ -259,7 +259,7 @@ fn one(model: &Model, points: &[Point], options: &FitOptions) -> Result<Fit, Fau
             point: *point,
             d_sim: point.d_sim(),
             d_mapped: map.apply(point.d_sim(), point.i_out),
-            without_v: point.v_out - point.d_real * point.v_in,
+            without_v: point.without_v(),
             with_v: error_v(&map, point, model.load_line),
             left_out_v: *left_out_v,
         })
@@ -295,6 +295,22 @@ fn remarks(fit: &Fit, points: &[Point], options: &FitOptions, notes: &mut Vec<St
     notes.extend(fit.separation.findings.iter().cloned());
     if let Some(a) = options.assumed_a {
         notes.push(format!("a = {a} is assumed, not measured"));
+    }
+    let (v_in, v_sim) = (hull(points.iter().map(|p| p.v_in)), hull(points.iter().map(|p| p.v_sim)));
+    if v_sim.low == v_sim.high && v_sim.low != v_in.low {
+        notes.push(format!("d_sim = v_out / {} V, the input voltage of the simulation", v_sim.low));
+    } else if v_in.high - v_in.low > 2e-3 * v_in.high {
+        notes.push(format!(
+            "v_in goes from {:.2} to {:.2} V and is divided out (d_sim = v_out / v_in): a controller does not do so; with \
+             --v-in-sim, the input voltage the policy was trained on, the mapping carries it",
+            v_in.low, v_in.high
+        ));
+    } else if v_sim.low == v_in.low {
+        notes.push(format!(
+            "d_sim = v_out / v_in with v_in about {:.2} V: right for a policy trained on that input voltage; else give it \
+             with --v-in-sim",
+            v_in.high
+        ));
     }
     let map = &fit.map;
     for corner in separation::unmeasured_corners(points, map.valid_i_out, map.valid_d_sim) {

@@ -33,7 +33,8 @@ pub fn text(report: &Report) -> Result<String, fmt::Error> {
         fit.map.slope(i.low).min(fit.map.slope(i.high)),
         fit.map.slope(i.low).max(fit.map.slope(i.high))
     )?;
-    writeln!(out, "\nvoltage error, measured - expected       mean       rms       max")?;
+    writeln!(out)?;
+    error_head(&mut out)?;
     error_line(&mut out, "without a mapping", &fit.without)?;
     error_line(&mut out, "with it, on its own points", &fit.with)?;
     error_line(&mut out, "with it, leaving each point out", &fit.left_out)?;
@@ -60,12 +61,39 @@ pub fn text(report: &Report) -> Result<String, fmt::Error> {
     }
     writeln!(out, "\nmeaning, as far as the table separates it")?;
     for sentence in &report.meaning {
-        writeln!(out, "  {sentence}")?;
+        wrapped(&mut out, "  ", sentence)?;
     }
     for note in &report.notes {
-        writeln!(out, "\nnote: {note}")?;
+        writeln!(out)?;
+        wrapped(&mut out, "", &format!("note: {note}"))?;
     }
     Ok(out)
+}
+
+/// Writes a sentence in lines of readable length, the second and later ones set in.
+pub(crate) fn wrapped(out: &mut String, indent: &str, sentence: &str) -> fmt::Result {
+    const WIDTH: usize = 100;
+    let lead = sentence.len() - sentence.trim_start().len();
+    let mut line = format!("{indent}{}", &sentence[..lead]);
+    let mut empty = true;
+    for word in sentence.split_whitespace() {
+        if !empty && line.chars().count() + 1 + word.chars().count() > WIDTH {
+            writeln!(out, "{line}")?;
+            line = format!("{indent}{}  ", &sentence[..lead]);
+            empty = true;
+        }
+        if !empty {
+            line.push(' ');
+        }
+        line.push_str(word);
+        empty = false;
+    }
+    writeln!(out, "{line}")
+}
+
+/// The head of a table of errors.
+pub(crate) fn error_head(out: &mut String) -> fmt::Result {
+    writeln!(out, "{:<34} {:>10} {:>9} {:>9}", "voltage error, measured - expected", "mean", "rms", "max")
 }
 
 /// One line of a table of errors.

@@ -27,6 +27,8 @@ pub struct Point {
     pub i_out: f64,
     /// Input voltage, V.
     pub v_in: f64,
+    /// Input voltage of the simulation that the policy was trained on, V.
+    pub v_sim: f64,
     /// Whether the point had settled, as far as the table says so.
     pub settled: bool,
 }
@@ -35,7 +37,13 @@ impl Point {
     /// The duty ratio with which the loss-free simulation has the same voltage.
     #[must_use]
     pub fn d_sim(&self) -> f64 {
-        self.v_out / self.v_in
+        self.v_out / self.v_sim
+    }
+
+    /// Measured voltage minus that of the simulation at the same duty ratio, V.
+    #[must_use]
+    pub fn without_v(&self) -> f64 {
+        self.v_out - self.d_real * self.v_sim
     }
 }
 
@@ -57,6 +65,10 @@ pub struct TableOptions {
     pub columns: Columns,
     /// Unsettled points are left out instead of refused.
     pub skip_unsettled: bool,
+    /// Input voltage of the simulation that the policy was trained on, V; without it that of each point, as in the paper.
+    pub v_sim: Option<f64>,
+    /// The table is still being filled in: too few points, or too equal ones, are no fault.
+    pub partial: bool,
 }
 
 /// More points than this are a record over time, not a table of settled points.
@@ -99,7 +111,7 @@ fn read(text: &Text, options: &TableOptions) -> Result<Table, Vec<Fault>> {
         notes: Vec::new(),
     };
     for row in &sheet.rows {
-        match point(row, &located, &sheet, &mut faults) {
+        match point(row, &located, options.v_sim, &sheet, &mut faults) {
             Some(Reading::Point(point)) => table.points.push(point),
             Some(Reading::Open) => table.open.push(row.line),
             None => {}
@@ -107,6 +119,9 @@ fn read(text: &Text, options: &TableOptions) -> Result<Table, Vec<Fault>> {
     }
     if faults.is_empty() {
         suspicion::check(&mut table, &located, &sheet, &mut faults);
+    }
+    if faults.is_empty() && !options.partial {
+        suspicion::variety(&table.points, &sheet, &mut faults);
     }
     if faults.is_empty() {
         settled(&mut table, options, &sheet, &mut faults);
@@ -127,7 +142,13 @@ enum Reading {
 }
 
 /// One row; `None` if it has faults.
-fn point(row: &cells::Row, located: &Located, sheet: &Sheet<'_>, faults: &mut Vec<Fault>) -> Option<Reading> {
+fn point(
+    row: &cells::Row,
+    located: &Located,
+    v_sim: Option<f64>,
+    sheet: &Sheet<'_>,
+    faults: &mut Vec<Fault>,
+) -> Option<Reading> {
     let measured = [&located.d_real, &located.v_out, &located.i_out, &located.v_in];
     let in_table = |source: &&&Source| matches!(source, Source::Column { .. });
     if measured.iter().filter(in_table).all(|source| source.is_empty(row, sheet)) {
@@ -143,13 +164,14 @@ fn point(row: &cells::Row, located: &Located, sheet: &Sheet<'_>, faults: &mut Ve
     if faults.len() > before {
         return None;
     }
-    let v_out = v_out?;
+    let (v_out, v_in) = (v_out?, v_in?);
     Some(Reading::Point(Point {
         line: row.line,
         d_real: d_real?,
         v_out,
         i_out: i_out?,
-        v_in: v_in?,
+        v_in,
+        v_sim: v_sim.unwrap_or(v_in),
         settled: settled.unwrap_or(true) && v_std.is_none_or(|v_std| v_std <= UNSETTLED * v_out.abs()),
     }))
 }

@@ -40,9 +40,6 @@ pub(crate) fn check(table: &mut Table, located: &Located, sheet: &Sheet<'_>, fau
             .hint("--map i_out=i_out*0.001 converts; if these are amperes, say so with --map i_out=i_out*1");
         faults.push(sheet.fault(message));
     }
-    if faults.is_empty() {
-        variety(points, sheet, faults);
-    }
     let negative: Vec<usize> = points.iter().filter(|p| p.i_out < 0.0).map(|p| p.line).collect();
     if !negative.is_empty() {
         let lines = super::lines(&negative);
@@ -113,8 +110,8 @@ fn voltages(points: &[Point], sheet: &Sheet<'_>, faults: &mut Vec<Fault>) {
 }
 
 /// A regression needs points that differ.
-fn variety(points: &[Point], sheet: &Sheet<'_>, faults: &mut Vec<Fault>) {
-    let first = &points[0];
+pub(crate) fn variety(points: &[Point], sheet: &Sheet<'_>, faults: &mut Vec<Fault>) {
+    let Some(first) = points.first() else { return };
     let same = |p: &Point| (p.d_real, p.v_out, p.i_out, p.v_in) == (first.d_real, first.v_out, first.i_out, first.v_in);
     let message = if points.len() == 1 {
         Message::new("one point cannot say how the duty depends on anything")

@@ -41,6 +41,9 @@ pub struct Fit {
     /// Take a as given, for a table whose voltage does not vary
     #[arg(long, value_name = "A")]
     pub assume_a: Option<f64>,
+    /// Write a page with pictures as well: errors, surface, leave-one-out
+    #[arg(long, value_name = "FILE.html")]
+    pub report: Option<PathBuf>,
     /// Machine-readable
     #[arg(long)]
     pub json: bool,
@@ -63,11 +66,18 @@ pub enum Terms {
 pub fn run(options: &Fit) -> Result<Outcome, Failure> {
     let table = options.reading.table(&options.table)?;
     let report = drm::fit(&table, &fit_options(options)?)?;
+    let text = drm::text(&report)?;
+    let title = format!("Duty ratio mapping of {}", options.table.display());
+    let page = options.report.as_ref().map(|path| Ok::<_, Failure>((path, drm::page(&report, &title, &text)?)));
+    let page = page.transpose()?;
     output::write_one(&options.out, &report.fit.map.to_toml(&comment(&report)))?;
+    if let Some((path, page)) = &page {
+        output::write_one(path, page)?;
+    }
     if options.json {
         output::say(&serde_json::to_string_pretty(&report)?)?;
     } else {
-        output::say(drm::text(&report)?.trim_end())?;
+        output::say(text.trim_end())?;
         output::say(&format!("\nwrote {}", options.out.display()))?;
     }
     Ok(Outcome::Done)

@@ -7,8 +7,9 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 /// From a trained policy to verified controller code.
 ///
 /// A policy is a folder with `policy.toml` (signals, features, actions, limits), the network's weights as safetensors
-/// and, if you map duties, `drm.toml`. Exit code 0: done or equal, 1: verify found a difference, 2: bad input or an
-/// output that cannot be written; then nothing was written.
+/// and, if you map duties, `drm.toml`. Exit code 0: done or equal, 1: verify found a difference or a
+/// training misses its specification, 2: bad input or an output that cannot be written; then nothing was written, 130:
+/// interrupted.
 #[derive(Debug, Parser)]
 #[command(name = "policyc", version, max_term_width = 100)]
 pub struct Arguments {
@@ -26,6 +27,8 @@ pub enum Command {
     Compile(Compile),
     /// Compile the generated code and compare it with the interpreter, bit by bit
     Verify(Verify),
+    /// Train a policy on a simulated converter and write its folder
+    Train(Train),
     /// Inspect, compile and verify the built-in example
     Demo(Demo),
     /// Duty ratio mapping: acquire settled points, fit drm.toml, judge it
@@ -102,6 +105,24 @@ pub struct Verify {
     /// Machine-readable
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct Train {
+    /// Training file: plant, contract, network, reward, scenarios, specification, seeds
+    pub settings: PathBuf,
+    /// Folder for the best seed's policy; those of all seeds go to `seeds` in it. Must not hold a policy yet
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Seeds in the place of the file's, separated by commas
+    #[arg(long, value_delimiter = ',', value_name = "N")]
+    pub seeds: Vec<u64>,
+    /// Cores used at most; all unless given
+    #[arg(long, default_value_t = 0, hide_default_value = true, value_name = "N")]
+    pub threads: usize,
+    /// Go on from the checkpoints that an interrupted training left in DIR, bit for bit
+    #[arg(long)]
+    pub resume: bool,
 }
 
 #[derive(Debug, Args)]

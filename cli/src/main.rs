@@ -15,8 +15,10 @@ use arguments::{Arguments, Command};
 enum Outcome {
     /// Done; for `verify`: everything equal.
     Done = 0,
-    /// `verify`: something differs.
+    /// `verify`: something differs; `train`: the specification is missed.
     Different = 1,
+    /// Ended by a signal; what was done so far is kept.
+    Interrupted = 130,
 }
 
 /// Why a run could not be done: bad input or an output that cannot be written. Exit code 2, nothing written.
@@ -36,6 +38,7 @@ fn main() -> ExitCode {
         Command::Inspect(options) => commands::inspect::run(options),
         Command::Compile(options) => commands::compile::run(options),
         Command::Verify(options) => commands::verify::run(options),
+        Command::Train(options) => commands::train::run(options),
         Command::Demo(options) => commands::demo::run(options),
         Command::Drm(command) => commands::drm::run(command),
     };

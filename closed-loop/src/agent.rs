@@ -1,7 +1,7 @@
 //! Between the plant and the network: the policy's own controller turns measurements into observations and actions into
 //! duties. What is trained is what is compiled.
 
-use interp::{Controller, Sample, State, Trace};
+use interp::{Command, Controller, Sample, State, Trace};
 use plant::Signals;
 use policy::Policy;
 
@@ -15,8 +15,14 @@ const SIGNALS: [&str; 4] = ["v_out", "i_l", "i_out", "v_in"];
 pub struct Agent {
     controller: Controller<f32>,
     trace: Trace<f32>,
-    samples: Vec<Sample>,
+    inputs: Inputs,
+}
+
+/// A plant's measurements in the words of a contract.
+#[derive(Debug, Clone)]
+pub struct Inputs {
     inputs: Vec<Input>,
+    samples: Vec<Sample>,
 }
 
 /// Where a signal comes from.
@@ -27,8 +33,8 @@ struct Input {
     adc: Option<policy::Adc>,
 }
 
-impl Agent {
-    /// The controller of `policy` in its initial state.
+impl Inputs {
+    /// The signals of `policy`.
     ///
     /// # Errors
     /// If the contract measures something that the plant does not have.
@@ -47,16 +53,14 @@ impl Agent {
             }
         };
         let inputs = policy.signals.iter().map(input).collect::<Result<Vec<_>, _>>()?;
-        let controller = Controller::new(policy);
         Ok(Self {
-            trace: controller.blank_trace(),
             samples: vec![Sample::Code(0); inputs.len()],
-            controller,
             inputs,
         })
     }
 
-    fn measure(&mut self, measured: &Signals) {
+    /// The samples of a measurement, in the order of the contract: numbers, or the codes of its converters.
+    pub fn samples(&mut self, measured: &Signals) -> &[Sample] {
         let values = [measured.v_out, measured.i_l, measured.i_out, measured.v_in];
         for (sample, input) in self.samples.iter_mut().zip(&self.inputs) {
             let x = values[input.signal];
@@ -65,6 +69,22 @@ impl Agent {
                 Some(adc) => Sample::Code(((x - adc.offset) / adc.gain).round() as i32),
             };
         }
+        &self.samples
+    }
+}
+
+impl Agent {
+    /// The controller of `policy` in its initial state.
+    ///
+    /// # Errors
+    /// If the contract measures something that the plant does not have.
+    pub fn new(policy: &Policy) -> Result<Self, Error> {
+        let controller = Controller::new(policy);
+        Ok(Self {
+            trace: controller.blank_trace(),
+            inputs: Inputs::new(policy)?,
+            controller,
+        })
     }
 
     /// Forgets everything, as a controller does that is switched on.
@@ -77,8 +97,8 @@ impl Agent {
     /// # Errors
     /// Never, unless the plant's signals do not fit the contract.
     pub fn sense(&mut self, measured: &Signals) -> Result<(), Error> {
-        self.measure(measured);
-        Ok(self.controller.sense_into(&self.samples, &mut self.trace)?)
+        let samples = self.inputs.samples(measured);
+        Ok(self.controller.sense_into(samples, &mut self.trace)?)
     }
 
     /// The observation of the last [`Agent::sense`].
@@ -99,9 +119,15 @@ impl Agent {
     /// # Errors
     /// As [`Agent::sense`].
     pub fn step(&mut self, measured: &Signals) -> Result<f64, Error> {
-        self.measure(measured);
-        self.controller.step_into(&self.samples, &mut self.trace)?;
+        let samples = self.inputs.samples(measured);
+        self.controller.step_into(samples, &mut self.trace)?;
         Ok(f64::from(self.trace.command.duty))
+    }
+
+    /// The command of the last step.
+    #[must_use]
+    pub fn command(&self) -> &Command<f32> {
+        &self.trace.command
     }
 
     /// Duty of the step before, 0..1.

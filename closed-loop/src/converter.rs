@@ -5,7 +5,7 @@ use std::path::Path;
 use plant::{Parameters, Plant, PlantState, Sample};
 use sha2::{Digest, Sha256};
 
-use crate::environment::{Environment, LoadPath, Start};
+use crate::environment::{Environment, LoadPath, Start, varied};
 use crate::faults::Error;
 
 /// A load that changes at a sampling instant changes this much of a period before it, so that the sample shows it.
@@ -35,11 +35,7 @@ impl Converter {
     /// # Errors
     /// If the file cannot be read, or is not a converter, or a key is not one of its numbers.
     pub fn load(path: &Path, set: &[(String, f64)]) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path).map_err(|error| Error::File {
-            path: path.to_owned(),
-            error,
-        })?;
-        let mut parameters = Parameters::from_toml(path, &text)?;
+        let mut parameters = Parameters::from_file(path)?;
         for (key, value) in set {
             let missing = || Error::Mismatch(format!("the plant has no number `{key}`"));
             let parameter = plant::parameter(key).ok_or_else(missing)?;
@@ -69,12 +65,7 @@ impl Environment for Converter {
     }
 
     fn restart(&mut self, start: &Start<'_>) -> Result<Sample, Error> {
-        let mut parameters = self.nominal.clone();
-        for (key, value) in start.varied {
-            if let Some(parameter) = plant::parameter(key) {
-                parameter.set(&mut parameters, *value);
-            }
-        }
+        let mut parameters = varied(&self.nominal, start.varied);
         parameters.sensors.seed ^= start.seed;
         self.plant = Plant::new(&parameters)?;
         Ok(self.plant.reset_at(start.v_out, start.i_l, &start.load))

@@ -1,6 +1,6 @@
 //! What a training and a scenario ask of a simulated converter.
 
-use plant::{Load, Sample};
+use plant::{Load, Parameters, Sample};
 
 use crate::faults::Error;
 
@@ -77,4 +77,16 @@ pub trait Environment: Clone + Send {
     /// # Errors
     /// If it is not of this kind of plant.
     fn load(&mut self, bytes: &[u8]) -> Result<(), Error>;
+}
+
+/// `nominal` with some of its numbers replaced, by key; keys that are none of its numbers change nothing.
+#[must_use]
+pub fn varied(nominal: &Parameters, varied: &[(&str, f64)]) -> Parameters {
+    let mut parameters = nominal.clone();
+    for (key, value) in varied {
+        if let Some(parameter) = plant::parameter(key) {
+            parameter.set(&mut parameters, *value);
+        }
+    }
+    parameters
 }

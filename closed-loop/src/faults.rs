@@ -1,7 +1,6 @@
 //! Why a loop could not be closed.
 
 use std::fmt;
-use std::path::PathBuf;
 
 /// Why a loop could not be closed or saved.
 #[derive(Debug)]
@@ -13,13 +12,6 @@ pub enum Error {
     Saved(String),
     /// Controller and plant do not fit together.
     Mismatch(String),
-    /// A file could not be read.
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        error: std::io::Error,
-    },
 }
 
 impl fmt::Display for Error {
@@ -27,7 +19,6 @@ impl fmt::Display for Error {
         match self {
             Self::Plant(faults) => faults.fmt(f),
             Self::Saved(text) | Self::Mismatch(text) => f.write_str(text),
-            Self::File { path, error } => write!(f, "{}: {error}", path.display()),
         }
     }
 }

@@ -7,12 +7,21 @@
 //! ```
 
 pub mod agent;
+pub mod baselines;
+pub mod controller;
 pub mod converter;
 pub mod environment;
 mod faults;
+pub mod limit;
+mod load_step;
 pub mod scenario;
+mod tables;
+pub mod time_optimal;
 
 pub use agent::Agent;
+pub use controller::{Answer, Call, Classical, Controller, External, Period, Trajectory, examine};
 pub use converter::Converter;
 pub use environment::{Environment, LoadPath, Start};
 pub use faults::Error;
+pub use load_step::{LoadKind, LoadStep};
+pub use tables::{evaluation_csv, metrics_csv, table};

@@ -9,6 +9,7 @@ use plant::{Load, Sample};
 
 use crate::environment::{Environment, LoadPath, Start};
 use crate::faults::Error;
+use crate::load_step::{LoadKind, LoadStep};
 
 /// Half width of the band that settling refers to, V.
 pub const SETTLED: f64 = 0.5;
@@ -82,7 +83,9 @@ impl Metrics {
 /// One load step over all its instants.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Finding {
-    /// Power before and after, W.
+    /// What the two values of the load step are.
+    pub kind: LoadKind,
+    /// Load before and after, in the unit of its kind: W, A or ohm.
     pub load_step: [f64; 2],
     /// The worst of the sampling instants, figure by figure.
     pub at_sample: Metrics,
@@ -99,8 +102,8 @@ pub struct Record {
     pub sample: Sample,
     /// What the controller commanded.
     pub duty: f64,
-    /// Load set at that instant, W.
-    pub power: f64,
+    /// Load set at that instant.
+    pub load: Load,
 }
 
 /// A converter in closed loop with a controller, about to see a load step.
@@ -121,11 +124,10 @@ impl<E: Environment, C: FnMut(&Sample) -> f64> Loop<E, C> {
     ///
     /// # Errors
     /// If the converter cannot be started.
-    pub fn start(mut environment: E, controller: C, v_ref: f64, power: f64) -> Result<Self, Error> {
-        let load = Load::power(power);
+    pub fn start(mut environment: E, controller: C, v_ref: f64, load: Load) -> Result<Self, Error> {
         let sample = environment.restart(&Start {
             v_out: v_ref,
-            i_l: power / v_ref,
+            i_l: load.conductance * v_ref + load.current + load.power / v_ref,
             load,
             seed: 0,
             varied: &[],
@@ -162,13 +164,13 @@ impl<E: Environment, C: FnMut(&Sample) -> f64> Loop<E, C> {
     }
 
     fn lead_period(&mut self, change: Option<(f64, Load)>, watched: usize, record: &mut impl FnMut(Record)) {
-        let (sample, power, time) = (self.sample, self.load.power, self.elapsed as f64);
+        let (sample, load, time) = (self.sample, self.load, self.elapsed as f64);
         let (error, duty) = self.period(change);
         record(Record {
             time,
             sample,
             duty,
-            power,
+            load,
         });
         if self.pre.len() < watched.max(1) {
             self.pre.push(error.abs());
@@ -178,13 +180,13 @@ impl<E: Environment, C: FnMut(&Sample) -> f64> Loop<E, C> {
         }
     }
 
-    /// The load changes to `power` at `phase` of the coming period, 0 meaning at the sampling instant that has just been.
+    /// The load changes to `to` at `phase` of the coming period, 0 meaning at the sampling instant that has just been.
     /// Runs `after` periods from there; the last `tail` of them are the tail.
     ///
     /// [`Loop::last_before`] comes before it.
     pub fn measure(
         &mut self,
-        power: f64,
+        to: Load,
         phase: f64,
         after: usize,
         tail: usize,
@@ -198,14 +200,14 @@ impl<E: Environment, C: FnMut(&Sample) -> f64> Loop<E, C> {
         let tail = tail.clamp(1, after.max(1));
         let (mut sum, mut ripple) = (0.0, 0.0);
         for n in 0..after {
-            let (sample, before, time) = (self.sample, self.load.power, self.elapsed as f64);
-            let change = (n == 0 && phase > 0.0).then(|| (phase, Load::power(power)));
+            let (sample, load, time) = (self.sample, self.load, self.elapsed as f64);
+            let change = (n == 0 && phase > 0.0).then_some((phase, to));
             let (error, duty) = self.period(change);
             record(Record {
                 time,
                 sample,
                 duty,
-                power: before,
+                load,
             });
             let size = if error.is_finite() { error.abs() } else { f64::INFINITY };
             metrics.deviation = metrics.deviation.max(size);
@@ -227,8 +229,8 @@ impl<E: Environment, C: FnMut(&Sample) -> f64> Loop<E, C> {
     }
 
     /// The last period before the step; at phase 0 the load changes at the sampling instant that ends it.
-    pub fn last_before(&mut self, power: f64, phase: f64, watched: usize, mut record: impl FnMut(Record)) {
-        let change = (phase == 0.0).then(|| (1.0, Load::power(power)));
+    pub fn last_before(&mut self, to: Load, phase: f64, watched: usize, mut record: impl FnMut(Record)) {
+        let change = (phase == 0.0).then_some((1.0, to));
         self.lead_period(change, watched, &mut record);
     }
 }
@@ -264,7 +266,7 @@ pub fn load_step<E, C>(
     controller: C,
     v_ref: f64,
     task: &Task,
-    load_step: [f64; 2],
+    load_step: impl Into<LoadStep>,
     instant: Instant,
 ) -> Result<(Metrics, Vec<Record>), Error>
 where
@@ -272,14 +274,13 @@ where
     C: FnMut(&Sample) -> f64,
 {
     let t_sample = environment.t_sample();
-    let mut run = Loop::start(environment, controller, v_ref, load_step[0])?;
+    let [from, to] = load_step.into().loads();
+    let mut run = Loop::start(environment, controller, v_ref, from)?;
     let mut records = Vec::new();
     let lead = task.lead + instant.periods;
     run.lead(lead - 1, task.tail, |record| records.push(record));
-    run.last_before(load_step[1], instant.phase, task.tail, |record| records.push(record));
-    let metrics = run.measure(load_step[1], instant.phase, task.after, task.tail, |record| {
-        records.push(record)
-    });
+    run.last_before(to, instant.phase, task.tail, |record| records.push(record));
+    let metrics = run.measure(to, instant.phase, task.after, task.tail, |record| records.push(record));
     let zero = lead as f64 + instant.phase;
     for record in &mut records {
         record.time = (record.time - zero) * t_sample;
@@ -296,7 +297,7 @@ pub fn survey<E, C>(
     controller: &C,
     v_ref: f64,
     task: &Task,
-    load_step: [f64; 2],
+    load_step: impl Into<LoadStep>,
     instants: &[Instant],
 ) -> Result<Finding, Error>
 where
@@ -304,11 +305,13 @@ where
     C: FnMut(&Sample) -> f64 + Clone,
 {
     let quiet = |_: Record| {};
-    let [from, to] = load_step;
+    let step = load_step.into();
+    let [from, to] = step.loads();
     let mut run = Loop::start(environment.clone(), controller.clone(), v_ref, from)?;
     run.lead(task.lead - 1, task.tail, quiet);
     let mut finding = Finding {
-        load_step,
+        kind: step.kind,
+        load_step: step.values,
         at_sample: Metrics::default(),
         worst: Metrics::default(),
     };

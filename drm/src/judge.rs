@@ -69,7 +69,9 @@ fn cut_off(points: &[Point], map: &DutyRatioMap, limits: Interval) -> Option<Str
         })
     };
     let list: Vec<CutOff> = points.iter().filter_map(beyond).collect();
-    let worst = list.iter().max_by(|a, b| a.missing_v.abs().total_cmp(&b.missing_v.abs()))?;
+    let worst = list
+        .iter()
+        .max_by(|a, b| a.missing_v.abs().total_cmp(&b.missing_v.abs()))?;
     let all: Vec<usize> = list.iter().map(|cut| cut.line).collect();
     Some(format!(
         "the duty range {} to {} ends too early for {}: line {} wants {:.4} and misses {:.2} V; no mapping repairs that",
@@ -187,7 +189,7 @@ pub fn beyond_repair(steady: &[Steady], v_ref: f64) -> Vec<String> {
     if shift.abs() > 0.02 * current {
         remarks.push(format!(
             "the sampled inductor current is off by up to {shift:+.3} A from the simulation's at the same point (sampling \
-             instant, ripple, sensor): a policy that observes it sees a shifted state; sample as in the simulation"
+             instant, dead time, ripple, sensor): a policy that observes it sees a shifted state; sample as in the simulation"
         ));
     }
     let short = most(&|s| s.limited_v - s.with_v);
@@ -227,7 +229,10 @@ pub fn table_text(judgement: &Judgement) -> Result<String, fmt::Error> {
 pub fn steady_text(steady: &[Steady], v_ref: f64) -> Result<String, fmt::Error> {
     let mut out = String::new();
     writeln!(out, "steady state at {v_ref} V, true voltage - wanted")?;
-    writeln!(out, "     i_out   duty needed      without         with   within limits")?;
+    writeln!(
+        out,
+        "     i_out   duty needed      without         with   within limits"
+    )?;
     for s in steady {
         writeln!(
             out,

@@ -41,7 +41,8 @@ pub fn page(report: &Report, title: &str, text: &str) -> Result<String, ReportEr
             .text("Far from every dot the surface is an extension, not a measurement."),
     );
     page = page.section(Section::new("Report").code(text));
-    page.section(Section::new("").details(Section::new("Points").table(table(fit)))).html()
+    page.section(Section::new("").details(Section::new("Points").table(table(fit))))
+        .html()
 }
 
 fn column(fit: &Fit, of: impl Fn(&Row) -> f64) -> Vec<f64> {
@@ -55,13 +56,19 @@ fn errors(fit: &Fit) -> Result<Svg, ReportError> {
         .panel(
             Panel::new(error())
                 .height(150.0)
-                .series(Series::points("without a mapping", v_out(), column(fit, |row| row.without_v)).colour(Colour::GREY))
+                .series(
+                    Series::points("without a mapping", v_out(), column(fit, |row| row.without_v)).colour(Colour::GREY),
+                )
                 .y_line(0.0, ""),
         )
         .panel(
             Panel::new(error())
                 .height(200.0)
-                .series(Series::points("with the mapping", v_out(), column(fit, |row| row.with_v)))
+                .series(Series::points(
+                    "with the mapping",
+                    v_out(),
+                    column(fit, |row| row.with_v),
+                ))
                 .y_line(0.0, ""),
         )
         .svg()
@@ -83,10 +90,15 @@ fn surface(fit: &Fit) -> Result<Svg, ReportError> {
     let (i, d) = (fit.map.valid_i_out, fit.map.valid_d_sim);
     let steps = |low: f64, high: f64| -> Vec<f64> {
         let (from, wide) = (low - MARGIN * (high - low), (1.0 + 2.0 * MARGIN) * (high - low));
-        (0..CELLS).map(|k| from + wide * (k as f64 + 0.5) / CELLS as f64).collect()
+        (0..CELLS)
+            .map(|k| from + wide * (k as f64 + 0.5) / CELLS as f64)
+            .collect()
     };
     let (x, y) = (steps(d.low, d.high), steps(i.low, i.high));
-    let added = y.iter().flat_map(|i| x.iter().map(|d| fit.map.apply(*d, *i) - d)).collect::<Vec<f64>>();
+    let added = y
+        .iter()
+        .flat_map(|i| x.iter().map(|d| fit.map.apply(*d, *i) - d))
+        .collect::<Vec<f64>>();
     let mut map = HeatMap::new(
         "Correction of the duty ratio",
         Axis::new("d_sim"),
@@ -96,7 +108,11 @@ fn surface(fit: &Fit) -> Result<Svg, ReportError> {
         map = map.ramp(Ramp::Diverging);
     }
     map.values(Axis::new("d_real - d_sim"), x, y, added)
-        .dots("measured", column(fit, |row| row.d_sim), column(fit, |row| row.point.i_out))
+        .dots(
+            "measured",
+            column(fit, |row| row.d_sim),
+            column(fit, |row| row.point.i_out),
+        )
         .svg()
 }
 

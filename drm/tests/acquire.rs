@@ -76,7 +76,10 @@ fn acquired_points_lie_on_the_exact_formula() {
     for (point, measurement) in acquired(&p, &currents(&[3.0, 9.0])).points {
         let m = measurement.unwrap();
         let d = losses.d_real(m.v_out / m.v_in, m.i_out);
-        assert!(m.settled && (d - m.d_real).abs() * 195.0 < 0.06, "{point:?}: {m:?}, formula {d}");
+        assert!(
+            m.settled && (d - m.d_real).abs() * 195.0 < 0.06,
+            "{point:?}: {m:?}, formula {d}"
+        );
     }
 }
 
@@ -109,7 +112,12 @@ fn a_constant_power_load_is_held_and_measures_the_same() {
             hold: Hold::OpenLoop,
         };
         let Ok(open) = measure(&mut Simulated::new(&p).unwrap(), &p, &same, &Protocol::default());
-        assert!((open.v_out - m.v_out).abs() < 2e-3, "{point:?}: {} and {}", open.v_out, m.v_out);
+        assert!(
+            (open.v_out - m.v_out).abs() < 2e-3,
+            "{point:?}: {} and {}",
+            open.v_out,
+            m.v_out
+        );
     }
 }
 
@@ -176,7 +184,11 @@ fn a_slow_bench_is_waited_for_until_what_is_to_come_is_small() {
         window: 100,
         most_windows: 10,
     };
-    assert!(!measure(&mut Lag(0.0), &nominal, &plan.points[0].0, &hasty).unwrap().settled);
+    assert!(
+        !measure(&mut Lag(0.0), &nominal, &plan.points[0].0, &hasty)
+            .unwrap()
+            .settled
+    );
 }
 
 #[test]
@@ -211,7 +223,13 @@ fn a_plan_is_filled_in_and_resumed_point_by_point() {
     let mut other = Plan::new(200.0, &[0.4, 0.55], &loads, 60.0).unwrap();
     assert_eq!(other.resume(&common::source(&filled)), Ok(0));
     let percent = filled.replace("0.4712,", "47.12,");
-    assert!(plan().resume(&common::source(&percent)).unwrap_err().to_string().contains("percent"));
+    assert!(
+        plan()
+            .resume(&common::source(&percent))
+            .unwrap_err()
+            .to_string()
+            .contains("percent")
+    );
 }
 
 #[test]
@@ -267,16 +285,23 @@ fn steady(real: &Parameters, map: &DutyRatioMap, limits: Option<Interval>) -> (V
 }
 
 fn own_mapping(real: &Parameters) -> DutyRatioMap {
-    fitted(real, &acquired(real, &currents(&[1.8, 5.0, 8.0, 11.0])), None).fit.map
+    fitted(real, &acquired(real, &currents(&[1.8, 5.0, 8.0, 11.0])), None)
+        .fit
+        .map
 }
 
 #[test]
 fn a_mapping_repairs_losses_and_nothing_is_left() {
-    let real = lossy();
-    let (steady, remarks) = steady(&real, &own_mapping(&real), None);
-    for s in &steady {
+    let mut real = lossy();
+    let (found, remarks) = steady(&real, &own_mapping(&real), None);
+    for s in &found {
         assert!(s.without_v < -9.0 && s.with_v.abs() < 0.05, "{s:?}");
     }
+    // at the sampling instant the current still falls for the dead time: 4 us (100 + 1.5 + 1.2) V / 2 mH = 0.205 A above
+    // the valley, which is itself higher by the ripple that a lower v_in takes away
+    assert!(remarks.contains("inductor current is off by up to +0.2"), "{remarks}");
+    real.switch.dead_time = 0.0;
+    let (_, remarks) = steady(&real, &own_mapping(&real), None);
     assert_eq!(remarks, "");
 }
 
@@ -312,8 +337,20 @@ fn a_duty_range_that_ends_too_early_is_found_at_a_plant_and_in_a_table() {
     assert!(worst.limited_v < -2.0 && worst.with_v.abs() < 0.05, "{worst:?}");
     let table = simulated_table(&acquired(&real, &currents(&[2.0, 10.0])));
     let judged = judge::judge(&table, &map, Some(limits));
-    assert!(judged.remarks.iter().any(|r| r.contains("ends too early for lines 8, 9, 13, 14")), "{:?}", judged.remarks);
-    assert!(judge::judge(&table, &map, None).remarks.iter().all(|r| !r.contains("too early")));
+    assert!(
+        judged
+            .remarks
+            .iter()
+            .any(|r| r.contains("ends too early for lines 8, 9, 13, 14")),
+        "{:?}",
+        judged.remarks
+    );
+    assert!(
+        judge::judge(&table, &map, None)
+            .remarks
+            .iter()
+            .all(|r| !r.contains("too early"))
+    );
 }
 
 #[test]
@@ -327,5 +364,12 @@ fn a_table_is_judged_with_and_without_and_outside_the_range() {
     let judged = judge::judge(&table, &map, None);
     assert_eq!(judged.outside, [10, 11, 12, 13, 14]);
     assert!(judged.without.rms_v > 9.0 && judged.with.rms_v < 0.05, "{judged:?}");
-    assert!(judged.remarks.iter().any(|r| r.contains("outside the mapping's valid range")), "{:?}", judged.remarks);
+    assert!(
+        judged
+            .remarks
+            .iter()
+            .any(|r| r.contains("outside the mapping's valid range")),
+        "{:?}",
+        judged.remarks
+    );
 }

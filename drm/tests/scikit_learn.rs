@@ -32,7 +32,9 @@ fn cases() -> Vec<Case> {
             columns,
             d_real: numbers(&case["d_real"]),
             fits: case["fits"].as_array().unwrap().clone(),
-            least_squares: case["least_squares"].is_array().then(|| numbers(&case["least_squares"])),
+            least_squares: case["least_squares"]
+                .is_array()
+                .then(|| numbers(&case["least_squares"])),
         }
     });
     cases.collect()
@@ -110,7 +112,9 @@ fn the_leverages_of_all_points_sum_to_the_number_of_coefficients() {
     for case in cases() {
         let components = case.fits.len();
         let pls = Pls::fit(&case.columns, &case.d_real, components);
-        let sum: f64 = (0..case.d_real.len()).map(|k| pls.leverage(&row(&case.columns, k))).sum();
+        let sum: f64 = (0..case.d_real.len())
+            .map(|k| pls.leverage(&row(&case.columns, k)))
+            .sum();
         near(sum, pls.components as f64 + 1.0, 1.0, &case.name);
     }
 }

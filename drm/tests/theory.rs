@@ -6,7 +6,6 @@ mod common;
 use drm::formula::Losses;
 use drm::{Cause, FitOptions, Form, Report, Table};
 
-
 const LOSSY: Losses = Losses {
     v_in: 195.0,
     v_f: 1.5,
@@ -39,7 +38,12 @@ fn fitted(table: &Table, form: Form) -> Report {
 }
 
 fn rms_duty(report: &Report) -> f64 {
-    let squares: f64 = report.fit.rows.iter().map(|r| (r.point.d_real - r.d_mapped).powi(2)).sum();
+    let squares: f64 = report
+        .fit
+        .rows
+        .iter()
+        .map(|r| (r.point.d_real - r.d_mapped).powi(2))
+        .sum();
     (squares / report.fit.rows.len() as f64).sqrt()
 }
 
@@ -51,7 +55,10 @@ fn a_table_of_the_form_itself_is_fitted_exactly() {
     let expected = losses.three_term(0.0, 0.0);
     let found = report.fit.map.coefficients;
     // nine digits in the file
-    assert!((found.a - expected.a).abs() < 1e-9 && (found.b - expected.b).abs() < 1e-11, "{found:?}");
+    assert!(
+        (found.a - expected.a).abs() < 1e-9 && (found.b - expected.b).abs() < 1e-11,
+        "{found:?}"
+    );
     assert!((found.c - expected.c).abs() < 1e-10 && report.fit.left_out.max_v < 1e-6);
 }
 
@@ -60,22 +67,42 @@ fn a_table_of_the_form_itself_is_fitted_exactly() {
 fn three_and_four_terms_leave_what_theory_says() {
     for losses in [
         LOSSY,
-        Losses { r_on: 0.2, r_d: 0.0, ..LOSSY },
-        Losses { v_f: 0.0, lost_duty: 0.0, ..LOSSY },
-        Losses { r_on: 0.0, r_d: 0.3, ..LOSSY },
+        Losses {
+            r_on: 0.2,
+            r_d: 0.0,
+            ..LOSSY
+        },
+        Losses {
+            v_f: 0.0,
+            lost_duty: 0.0,
+            ..LOSSY
+        },
+        Losses {
+            r_on: 0.0,
+            r_d: 0.3,
+            ..LOSSY
+        },
     ] {
         let table = table(&losses, |_, _| {});
         let (three, four) = losses.expected_errors(&D_SIM, &I_OUT);
         for (form, expected) in [(Form::ThreeTerm, three), (Form::FourTerm, four)] {
             let found = rms_duty(&fitted(&table, form));
-            assert!((found / expected - 1.0).abs() < 0.06, "{form:?} of {losses:?}: {found:.3e}, theory {expected:.3e}");
+            assert!(
+                (found / expected - 1.0).abs() < 0.06,
+                "{form:?} of {losses:?}: {found:.3e}, theory {expected:.3e}"
+            );
         }
     }
 }
 
 #[test]
 fn four_terms_are_taken_where_the_product_is_real_and_three_where_it_is_not() {
-    let chosen = |losses: &Losses| drm::fit(&table(losses, |_, _| {}), &FitOptions::default()).unwrap().fit.form;
+    let chosen = |losses: &Losses| {
+        drm::fit(&table(losses, |_, _| {}), &FitOptions::default())
+            .unwrap()
+            .fit
+            .form
+    };
     assert_eq!(chosen(&LOSSY), Form::FourTerm);
     let noisy = |index: usize, row: &mut [f64; 4]| row[1] += 0.02 * ((index * 7 % 11) as f64 - 5.0);
     let no_product = Losses { r_on: 0.02, ..LOSSY };
@@ -86,7 +113,11 @@ fn four_terms_are_taken_where_the_product_is_real_and_three_where_it_is_not() {
 
 #[test]
 fn four_terms_give_the_losses_back() {
-    let losses = Losses { r_on: 0.1, dcr: 0.2, ..LOSSY };
+    let losses = Losses {
+        r_on: 0.1,
+        dcr: 0.2,
+        ..LOSSY
+    };
     let k = fitted(&table(&losses, |_, _| {}), Form::FourTerm).fit.map.coefficients;
     let v = losses.v_in / k.a;
     assert!((v - losses.v_in - losses.v_f).abs() < 0.01, "V_f from a");
@@ -134,8 +165,16 @@ fn a_single_resistor_leaves_a_and_b_untold() {
     assert_eq!((report.fit.separation.directions, report.fit.components), (1, 1));
     let finding = report.fit.separation.findings.join(" ");
     assert!(finding.contains("one resistor of 20.000 ohm"), "{finding}");
-    assert!(report.meaning[0].contains("no meaning of their own"), "{:?}", report.meaning);
-    assert!(report.notes.iter().any(|note| note.contains("corner")), "{:?}", report.notes);
+    assert!(
+        report.meaning[0].contains("no meaning of their own"),
+        "{:?}",
+        report.meaning
+    );
+    assert!(
+        report.notes.iter().any(|note| note.contains("corner")),
+        "{:?}",
+        report.notes
+    );
     let found = report.fit.map;
     let at = |d: f64| found.apply(d, d * 195.0 / 20.0) - LOSSY.d_real(d, d * 195.0 / 20.0);
     assert!(at(0.5).abs() < 1e-3, "on the line it holds");
@@ -144,12 +183,25 @@ fn a_single_resistor_leaves_a_and_b_untold() {
 /// With one resistor the same three pairs fit equally well; a load that varies tells them apart.
 #[test]
 fn ties_are_said_and_vanish_with_a_better_table() {
-    let simple = Losses { r_on: 0.1, r_d: 0.1, dcr: 0.1, ..LOSSY };
+    let simple = Losses {
+        r_on: 0.1,
+        r_d: 0.1,
+        dcr: 0.1,
+        ..LOSSY
+    };
     let tied = |table: &Table| {
         let report = fitted(table, Form::ThreeTerm);
-        let best = report.explanations.iter().filter(|e| e.causes.len() == 2).map(|e| e.rms_v);
+        let best = report
+            .explanations
+            .iter()
+            .filter(|e| e.causes.len() == 2)
+            .map(|e| e.rms_v);
         let best = best.fold(f64::INFINITY, f64::min);
-        report.explanations.iter().filter(|e| e.causes.len() == 2 && e.rms_v < 1.2 * best + 1e-9).count()
+        report
+            .explanations
+            .iter()
+            .filter(|e| e.causes.len() == 2 && e.rms_v < 1.2 * best + 1e-9)
+            .count()
     };
     let resistor = |_: usize, row: &mut [f64; 4]| {
         row[2] = row[1] / 20.0;

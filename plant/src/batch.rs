@@ -2,8 +2,9 @@
 
 use std::ops::{Add, Mul, Neg, Sub};
 
+use toml_input::{Fault, Faults, Message};
+
 use crate::effects::{duty_quantisation, load_setting, minimum_on_time};
-use crate::faults::{Fault, Faults};
 use crate::parameters::{LoadBox, Parameters, Pwm};
 use crate::plain::{LARGEST_CHANGE, LONGEST_STEP, Number, ORDER, TERM_BEFORE, series, sum};
 use crate::plant::Plant;
@@ -31,12 +32,12 @@ impl Batch {
         let plants = parameters.iter().map(Plant::new).collect::<Result<Vec<_>, _>>()?;
         for (index, plant) in plants.iter().enumerate() {
             if !plant.is_fast || plant.parameters().pwm.duty_delay > 0 {
-                let fault = Fault::new(format!("converter {index} does not fit into a batch"))
+                let message = Message::new(format!("converter {index} does not fit into a batch"))
                     .expected(
                         "resistances, diode voltage, load and duty quantisation only; trailing carrier, sampled at 0",
                     )
                     .hint("step it as a `Plant`");
-                return Err(Faults(vec![fault]));
+                return Err(Fault::from(message).into());
             }
         }
         let count = plants.len();

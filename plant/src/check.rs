@@ -1,8 +1,9 @@
 //! Whether parameters describe a plant.
 
+use toml_input::{Fault, Faults, Message};
+
 use crate::catalogue;
 use crate::effects::duty_delay;
-use crate::faults::{Fault, Faults};
 use crate::parameters::Parameters;
 use crate::sensing;
 
@@ -11,23 +12,22 @@ use crate::sensing;
 /// # Errors
 /// Parameters outside their allowed range, and effects that lack a partner.
 pub fn check(p: &Parameters) -> Result<(), Faults> {
-    let faults: Vec<Fault> = keyed(p).into_iter().map(|(_, fault)| fault).collect();
-    if faults.is_empty() { Ok(()) } else { Err(Faults(faults)) }
+    Faults::unless_empty(keyed(p).into_iter().map(|(_, message)| Fault::from(message)).collect())
 }
 
 /// The faults, each with the key of the parameter it is about.
-pub(crate) fn keyed(p: &Parameters) -> Vec<(&'static str, Fault)> {
+pub(crate) fn keyed(p: &Parameters) -> Vec<(&'static str, Message)> {
     let mut faults = Vec::new();
     for parameter in catalogue::parameters() {
         let value = parameter.get(p);
         let (low, high) = parameter.allowed;
         if !(low <= value && value <= high) {
             let unit = if parameter.unit == "1" { "" } else { parameter.unit };
-            let fault = Fault::new(format!("`{}` is out of range", parameter.key))
+            let message = Message::new(format!("`{}` is out of range", parameter.key))
                 .found(format!("{value} {unit}").trim_end())
                 .expected(format!("{low} to {high} {unit}").trim_end())
                 .hint(format!("{}; SI units", parameter.meaning));
-            faults.push((parameter.key, fault));
+            faults.push((parameter.key, message));
         }
     }
     if faults.is_empty() {
@@ -36,10 +36,10 @@ pub(crate) fn keyed(p: &Parameters) -> Vec<(&'static str, Fault)> {
     faults
 }
 
-fn partners(p: &Parameters, faults: &mut Vec<(&'static str, Fault)>) {
+fn partners(p: &Parameters, faults: &mut Vec<(&'static str, Message)>) {
     let mut require = |holds: bool, key: &'static str, problem: String, hint: &str| {
         if !holds {
-            faults.push((key, Fault::new(problem).hint(hint)));
+            faults.push((key, Message::new(problem).hint(hint)));
         }
     };
     let cable = &p.cable;

@@ -2,10 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use toml_input::Faults;
+
 use crate::check::check;
 use crate::effects::duty_delay::Queue;
 use crate::effects::{duty_quantisation, load_setting, minimum_on_time};
-use crate::faults::Faults;
 use crate::full::{Full, Path, States};
 use crate::gates::{GateTiming, Gates};
 use crate::legs::Legs;

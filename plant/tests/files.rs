@@ -41,7 +41,8 @@ fn all_faults_come_at_once_with_place_and_hint() {
         "plant.toml:10:1",
         "did you mean `capacitor.esl`?",
         "plant.toml:12:11",
-        "\"trailing\" or \"leading\" or \"centre\"",
+        "trailing, leading, centre",
+        "did you mean \"centre\"?",
     ] {
         assert!(message.contains(part), "{part} in\n{message}");
     }

@@ -5,6 +5,7 @@ mod commands;
 mod files;
 mod interruption;
 mod traces;
+mod training;
 mod verify;
 
 use std::ffi::OsStr;
@@ -94,11 +95,12 @@ fn assert_refused(ran: &Ran, words: &[&str]) {
     }
 }
 
-/// Name and content of each file of a folder.
+/// Name and content of each file of a folder and its folders.
 fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let names = tests::tools::listing(folder);
     names
         .into_iter()
+        .filter(|name| folder.join(name).is_file())
         .map(|name| (name.clone(), std::fs::read(folder.join(name)).unwrap()))
         .collect()
 }

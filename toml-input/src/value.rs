@@ -276,6 +276,16 @@ impl<'a> Value<'a> {
         Some(Table::new(self.document, entries, Some(self.node.span.clone()), title))
     }
 
+    /// All keys and values of a table whose keys the user chooses.
+    pub fn pairs(&self, faults: &mut Vec<Fault>) -> Option<Vec<(&'a At<String>, Value<'a>)>> {
+        let Node::Table(entries) = &self.node.value else {
+            self.wrong("a table", faults);
+            return None;
+        };
+        let pair = |(key, node): &'a (At<String>, _)| (key, Value::new(self.document, &key.value, node));
+        Some(entries.iter().map(pair).collect())
+    }
+
     /// What `read` makes of the table; keys it did not ask for are faults.
     pub fn read_table<T>(
         &self,

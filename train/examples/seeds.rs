@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use closed_loop::scenario::Finding;
-use train::{Contract, Converter, Error, Settings, Trainer, outcome};
+use train::{Contract, Converter, Error, Settings, Trainer};
 
 fn main() -> Result<(), Error> {
     let mut arguments = std::env::args().skip(1);
@@ -44,7 +44,7 @@ fn main() -> Result<(), Error> {
             worst(&outcome.findings),
         );
         if verbose {
-            println!("{}", outcome::table(&outcome.findings));
+            println!("{}", closed_loop::table(&outcome.findings));
         }
     }
     Ok(())

@@ -1,9 +1,9 @@
 //! Whole control periods of training per second on one core: act, simulate, observe, store, one update.
 //!
-//!     cargo run --release -p train --example throughput
+//!     cargo run --release -p train --example throughput [TRAIN.toml [RUNS]]
 //!
-//! Plain DQN, 12 duties, batch 256, 6-64-64-12, one update per period (the conditions of the figure for
-//! Stable-Baselines3 in docs/train.md); looks at the policy are left out.
+//! Plain DQN, 12 duties, batch 256, 6-64-64-12, one update per period (`bench/training` sets it beside
+//! Stable-Baselines3); looks at the policy are left out.
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -15,13 +15,14 @@ fn main() -> Result<(), Error> {
     let path = std::env::args()
         .nth(1)
         .unwrap_or_else(|| "examples/train/paper12.toml".to_owned());
+    let runs: u64 = std::env::args().nth(2).and_then(|text| text.parse().ok()).unwrap_or(5);
     let mut settings = Settings::load(Path::new(&path))?;
     // the look at the end of the budget is not part of the figure
     settings.steps = 10_001;
     settings.selection.every = 1_000_000;
     let contract = Contract::load(&settings.contract, &settings.hidden)?;
     let converter = Converter::load(&settings.plant, &settings.set)?;
-    for seed in 0..5 {
+    for seed in 0..runs {
         let mut trainer = Trainer::new(&settings, &contract, &converter, seed)?;
         let stop = AtomicBool::new(false);
         let start = Instant::now();

@@ -26,10 +26,13 @@ pub mod seeds;
 pub mod settings;
 pub mod trainer;
 
+pub use closed_loop::scenario::Metrics;
+pub use closed_loop::table as scenario_table;
 pub use closed_loop::{Converter, Environment};
 pub use contract::{Contract, Files};
-pub use faults::{Error, Fault, Faults, Place};
+pub use faults::Error;
 pub use outcome::Outcome;
-pub use seeds::{SeedRun, train_all};
+pub use seeds::{Course, SeedRun, Unwatched, Watch, train_all};
 pub use settings::Settings;
+pub use toml_input::{Fault, Faults, Place};
 pub use trainer::{Ended, Progress, Trainer};

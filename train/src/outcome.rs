@@ -14,6 +14,7 @@ use crate::trainer::{Best, Ended, Look, Trainer};
 use closed_loop::Agent;
 use closed_loop::environment::Environment;
 use closed_loop::scenario::{Finding, load_step};
+use closed_loop::{evaluation_csv, table};
 
 /// Observations among the golden vectors at most.
 const GOLDEN: usize = 512;
@@ -194,53 +195,6 @@ fn golden_vectors(network: &Network, observations: &[Vec<f32>]) -> GoldenVectors
         golden.actions.push(best as u32);
     }
     golden
-}
-
-/// Findings as a table for people.
-#[must_use]
-pub fn table(findings: &[Finding]) -> String {
-    let mut out = String::from(
-        "load step W     deviation V     settling ms     tail max V      tail mean V     before V        ripple V\n",
-    );
-    for Finding {
-        load_step: [from, to],
-        at_sample: a,
-        worst: b,
-    } in findings
-    {
-        let pair = |x: f64, y: f64, digits: usize| format!("{x:.digits$} / {y:.digits$}");
-        let columns = [
-            format!("{from} -> {to}"),
-            pair(a.deviation, b.deviation, 2),
-            pair(1e3 * a.settling, 1e3 * b.settling, 2),
-            pair(a.tail_max, b.tail_max, 3),
-            pair(a.tail_mean, b.tail_mean, 3),
-            pair(a.pre_error, b.pre_error, 3),
-            pair(a.ripple, b.ripple, 3),
-        ];
-        let line: String = columns.iter().map(|column| format!("{column:<16}")).collect();
-        out.push_str(line.trim_end());
-        out.push('\n');
-    }
-    out
-}
-
-/// Findings as CSV; SI units.
-#[must_use]
-pub fn evaluation_csv(findings: &[Finding]) -> String {
-    let mut out =
-        String::from("from_W,to_W,instants,deviation_V,settling_s,tail_mean_V,tail_max_V,pre_error_V,ripple_V\n");
-    for finding in findings {
-        let [from, to] = finding.load_step;
-        for (name, m) in [("sample", &finding.at_sample), ("worst", &finding.worst)] {
-            let _ = writeln!(
-                out,
-                "{from},{to},{name},{},{},{},{},{},{}",
-                m.deviation, m.settling, m.tail_mean, m.tail_max, m.pre_error, m.ripple
-            );
-        }
-    }
-    out
 }
 
 /// The learning curve as CSV.

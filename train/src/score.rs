@@ -7,6 +7,8 @@ use closed_loop::scenario::{Finding, Metrics};
 const EXCESS: f64 = 1000.0;
 /// A diverged run is bad, but not so bad that all other figures vanish beside it.
 const WORST_RATIO: f64 = 1e3;
+/// A requirement for a load step speaks of all whose powers differ from its own by this share of the step.
+const NEIGHBOURS: f64 = 0.1;
 
 /// Whether the specification is met, and how well.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,7 +20,8 @@ pub struct Score {
     pub cost: f64,
 }
 
-/// Which requirement speaks of which load step. One for a certain load step speaks of the step whose powers are closest.
+/// Which requirement speaks of which load step. One for a certain load step speaks of the step whose powers are closest and
+/// of its neighbours.
 #[derive(Debug, Clone)]
 pub struct Scoring<'a> {
     load_steps: &'a [[f64; 2]],
@@ -86,9 +89,9 @@ impl<'a> Scoring<'a> {
             return true;
         };
         let distance = |step: &[f64; 2]| (step[0] - from).abs() + (step[1] - to).abs();
-        let steps = self.load_steps.iter().enumerate();
-        let nearest = steps.min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)));
-        nearest.is_some_and(|(nearest, _)| nearest == index)
+        let nearest = self.load_steps.iter().map(distance).fold(f64::INFINITY, f64::min);
+        let near = nearest.max(NEIGHBOURS * (from - to).abs());
+        self.load_steps.get(index).is_some_and(|step| distance(step) <= near)
     }
 }
 
@@ -124,6 +127,7 @@ mod tests {
 
     fn findings(deviations: [f64; 2]) -> Vec<Finding> {
         let finding = |(load_step, deviation): (&[f64; 2], f64)| Finding {
+            kind: closed_loop::LoadKind::Power,
             load_step: *load_step,
             at_sample: Metrics::default(),
             worst: Metrics {

@@ -5,6 +5,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread;
 
+use crate::checkpoint::other;
 use crate::contract::Contract;
 use crate::faults::Error;
 use crate::outcome::Outcome;
@@ -19,13 +20,47 @@ pub struct SeedRun {
     pub outcome: Option<Outcome>,
     /// Why it stopped.
     pub ended: Ended,
+    /// Control periods so far.
+    pub steps: u64,
     /// From which it goes on.
     pub checkpoint: Vec<u8>,
 }
 
-/// Trains every seed of `settings`, on at most `threads` cores at once (0: all). A seed with bytes in `checkpoints` goes on
-/// from there. `progress` is called from the threads. The results stand in the order of the seeds and depend on nothing
-/// but files, seeds and checkpoints.
+/// How several seeds are trained.
+#[derive(Debug, Clone, Default)]
+pub struct Course {
+    /// Cores used at most; 0: all.
+    pub threads: usize,
+    /// Seeds that go on from a checkpoint.
+    pub checkpoints: BTreeMap<u64, Vec<u8>>,
+    /// Control periods between two checkpoints on the way; 0: none.
+    pub checkpoint_every: u64,
+}
+
+/// Who follows a training; called from its threads.
+pub trait Watch: Sync {
+    /// At every look of every seed.
+    fn look(&self, progress: &Progress);
+
+    /// A checkpoint on the way, from which the seed could go on.
+    fn checkpoint(&self, seed: u64, bytes: &[u8]);
+
+    /// A seed has ended.
+    fn ended(&self, seed: u64, run: &SeedRun);
+}
+
+/// Nobody follows.
+#[derive(Debug, Clone, Copy)]
+pub struct Unwatched;
+
+impl Watch for Unwatched {
+    fn look(&self, _: &Progress) {}
+    fn checkpoint(&self, _: u64, _: &[u8]) {}
+    fn ended(&self, _: u64, _: &SeedRun) {}
+}
+
+/// Trains every seed of `settings`, one thread each, as many at once as `course` allows. The results stand in the order of
+/// the seeds and depend on nothing but files, seeds and checkpoints.
 ///
 /// # Errors
 /// The first of the errors, in the order of the seeds.
@@ -33,14 +68,13 @@ pub fn train_all<E: Environment + Sync>(
     settings: &Settings,
     contract: &Contract,
     environment: &E,
-    threads: usize,
-    checkpoints: &BTreeMap<u64, Vec<u8>>,
+    course: &Course,
     stop: &AtomicBool,
-    progress: &(dyn Fn(&Progress) + Sync),
+    watch: &dyn Watch,
 ) -> Result<Vec<SeedRun>, Error> {
     let seeds = &settings.seeds;
     let cores = thread::available_parallelism().map_or(1, usize::from);
-    let threads = if threads == 0 { cores } else { threads }.min(seeds.len());
+    let threads = if course.threads == 0 { cores } else { course.threads }.min(seeds.len());
     let results: Vec<Mutex<Option<Result<SeedRun, Error>>>> = seeds.iter().map(|_| Mutex::new(None)).collect();
     let next = AtomicUsize::new(0);
     let work = || {
@@ -49,8 +83,8 @@ pub fn train_all<E: Environment + Sync>(
             let (Some(&seed), Some(slot)) = (seeds.get(index), results.get(index)) else {
                 return;
             };
-            let checkpoint = checkpoints.get(&seed).map(Vec::as_slice);
-            let result = one(settings, contract, environment, seed, checkpoint, stop, progress);
+            let trainer = Trainer::new(settings, contract, environment, seed);
+            let result = trainer.and_then(|trainer| one(trainer, course, stop, watch));
             if let Ok(mut slot) = slot.lock() {
                 *slot = Some(result);
             }
@@ -67,24 +101,37 @@ pub fn train_all<E: Environment + Sync>(
 }
 
 fn one<E: Environment>(
-    settings: &Settings,
-    contract: &Contract,
-    environment: &E,
-    seed: u64,
-    checkpoint: Option<&[u8]>,
+    mut trainer: Trainer<E>,
+    course: &Course,
     stop: &AtomicBool,
-    progress: &(dyn Fn(&Progress) + Sync),
+    watch: &dyn Watch,
 ) -> Result<SeedRun, Error> {
-    let mut trainer = Trainer::new(settings, contract, environment, seed)?;
-    if let Some(bytes) = checkpoint {
+    let seed = trainer.seed();
+    if let Some(bytes) = course.checkpoints.get(&seed) {
         trainer.resume(bytes)?;
+        if trainer.seed() != seed {
+            return Err(other());
+        }
     }
-    let ended = trainer.run(stop, progress)?;
-    Ok(SeedRun {
+    let ended = loop {
+        let next = match course.checkpoint_every {
+            0 => u64::MAX,
+            every => (trainer.step_count() / every + 1) * every,
+        };
+        let ended = trainer.run_until(next, stop, |progress| watch.look(progress))?;
+        if ended != Ended::Interrupted || stop.load(Ordering::Relaxed) {
+            break ended;
+        }
+        watch.checkpoint(seed, &trainer.checkpoint()?);
+    };
+    let run = SeedRun {
         outcome: trainer.best().is_some().then(|| trainer.finish(ended)).transpose()?,
         ended,
+        steps: trainer.step_count(),
         checkpoint: trainer.checkpoint()?,
-    })
+    };
+    watch.ended(seed, &run);
+    Ok(run)
 }
 
 /// The run whose policy did best on the selection scenarios; the first among equals.

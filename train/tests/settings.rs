@@ -77,12 +77,17 @@ const FAULTS: &[(&str, usize, &[&str])] = &[
     (
         "[learning]\nlearning_rate = 0.0",
         5,
-        &["`learning_rate` is out of range", "found: 0", "more than 0"],
+        &["`learning_rate` must be greater than 0", "found: 0"],
     ),
     (
         "[learning]\nlearning_rate = \"0,001\"",
         5,
-        &["of the wrong kind", "the text \"0,001\"", "a number"],
+        &[
+            "of the wrong kind",
+            "the text \"0,001\"",
+            "a number",
+            "with a point and without quotes",
+        ],
     ),
     ("[learning]\nbatch = 2.5", 5, &["the number 2.5", "a whole number"]),
     ("[learning]\nbatch = 0", 5, &["found: 0", "1 to 65536"]),
@@ -94,7 +99,7 @@ const FAULTS: &[(&str, usize, &[&str])] = &[
     (
         "[learning]\ndiscount = nan",
         5,
-        &["`discount` is out of range", "found: NaN"],
+        &["`discount` is not a finite number", "found: nan"],
     ),
     (
         "[learning]\nalgorithm = \"doubledqn\"",
@@ -116,7 +121,11 @@ const FAULTS: &[(&str, usize, &[&str])] = &[
         5,
         &["`end` is out of range", "0 to 1"],
     ),
-    ("[network]\nhidden = []", 5, &["0 hidden layers", "1 to 8"]),
+    (
+        "[network]\nhidden = []",
+        5,
+        &["too few hidden layers", "found: 0", "1 to 8"],
+    ),
     (
         "[network]\nhidden = [64, 5000]",
         5,
@@ -193,6 +202,14 @@ fn every_fault_says_where_it_is_and_what_was_expected() {
         for part in parts.iter().copied().chain([place.as_str()]) {
             assert!(message.contains(part), "{text}\nlacks {part:?}:\n{message}");
         }
+    }
+}
+
+#[test]
+fn a_faulty_part_of_a_table_is_not_reported_as_missing() {
+    for text in ["{ values = [-1] }", "{ range = [5, 2] }"] {
+        let message = parse(&format!("{LEAST}[episode]\nloads = {text}\n")).unwrap_err();
+        assert_eq!(message.matches("error:").count(), 1, "{message}");
     }
 }
 

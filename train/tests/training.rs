@@ -4,14 +4,13 @@
 
 mod common;
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use closed_loop::scenario::load_step;
 use common::{Alarm, StandIn, tiny};
 use train::trainer::{controller, quick_controller};
-use train::{Ended, Trainer, seeds, train_all};
+use train::{Course, Ended, Trainer, Unwatched, seeds, train_all};
 
 static NEVER: AtomicBool = AtomicBool::new(false);
 
@@ -93,9 +92,15 @@ fn the_same_seed_gives_the_same_bytes_alone_and_side_by_side() {
     settings.steps = 500;
     settings.seeds = vec![3, 4, 5];
     let environment = StandIn::new(1.5e-3, 1);
-    let none = BTreeMap::new();
-    let run = |threads| train_all(&settings, &contract, &environment, threads, &none, &NEVER, &|_| {}).unwrap();
-    let (alone, together) = (run(1), run(3));
+    let run = |threads, checkpoint_every| {
+        let course = Course {
+            threads,
+            checkpoint_every,
+            ..Course::default()
+        };
+        train_all(&settings, &contract, &environment, &course, &NEVER, &Unwatched).unwrap()
+    };
+    let (alone, together) = (run(1, 0), run(3, 130));
     for (a, b) in alone.iter().zip(&together) {
         assert!(a.checkpoint == b.checkpoint);
         assert_eq!(a.outcome.as_ref().unwrap().files, b.outcome.as_ref().unwrap().files);

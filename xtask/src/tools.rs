@@ -26,6 +26,17 @@ const fn tool(name: &'static str, probe: &'static [&'static str], source: Source
 const CALLGRIND: &[&str] = &["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", "true"];
 const C_HEADERS: &[&str] = &["gcc", "-fsyntax-only", "-include", "math.h", "-xc", "/dev/null"];
 
+const NGSPICE_HEADER: &[&str] = &[
+    "gcc",
+    "-fsyntax-only",
+    "-include",
+    "stdbool.h",
+    "-include",
+    "ngspice/sharedspice.h",
+    "-xc",
+    "/dev/null",
+];
+
 /// One row a tool. A Python package is probed by `["python3", "-c", "import it"]`.
 const TOOLS: &[Tool] = &[
     tool("rustfmt", &["cargo-fmt", "--version"], Rustup("rustfmt")),
@@ -37,6 +48,7 @@ const TOOLS: &[Tool] = &[
     tool("clang", &["clang", "--version"], Apt("clang")),
     tool("callgrind", CALLGRIND, Apt("valgrind")),
     tool("ngspice", &["ngspice", "--version"], Apt("ngspice")),
+    tool("ngspice's library", NGSPICE_HEADER, Apt("libngspice0-dev")),
 ];
 
 /// Sees to it that every tool is there; installs what is missing as root on Debian.

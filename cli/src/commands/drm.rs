@@ -86,13 +86,18 @@ impl Loads {
     fn settings(&self) -> Vec<LoadSetting> {
         let resistors = self.resistors.iter().copied().map(LoadSetting::Resistor);
         let currents = self.currents.iter().copied().map(LoadSetting::Current);
-        resistors.chain(currents).chain(self.powers.iter().copied().map(LoadSetting::Power)).collect()
+        resistors
+            .chain(currents)
+            .chain(self.powers.iter().copied().map(LoadSetting::Power))
+            .collect()
     }
 }
 
 fn source(path: &Path) -> Result<Source, Failure> {
     let name = FileName::new(path);
-    let bytes = name.read(MOST_BYTES).map_err(|message| Failure(name.fault(message).to_string()))?;
+    let bytes = name
+        .read(MOST_BYTES)
+        .map_err(|message| Failure(name.fault(message).to_string()))?;
     Source::new(name, bytes).map_err(|fault| Failure(fault.to_string()))
 }
 
@@ -103,7 +108,11 @@ fn plant_parameters(path: &PathBuf) -> Result<Parameters, Failure> {
 /// `low,high` of duty ratios.
 fn duty_limits(text: &str) -> Result<Interval, String> {
     let (low, high) = text.split_once(',').ok_or("expected LOW,HIGH, for example 0.05,0.95")?;
-    let number = |text: &str| text.trim().parse::<f64>().map_err(|_| format!("`{text}` is not a number"));
+    let number = |text: &str| {
+        text.trim()
+            .parse::<f64>()
+            .map_err(|_| format!("`{text}` is not a number"))
+    };
     let interval = Interval {
         low: number(low)?,
         high: number(high)?,

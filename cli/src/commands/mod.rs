@@ -5,6 +5,7 @@ pub mod demo;
 pub mod drm;
 pub mod inspect;
 pub mod new;
+pub mod train;
 pub mod verify;
 
 use std::path::{Path, PathBuf};

@@ -130,10 +130,25 @@ impl Plan {
                 faults.push(message.expected(expected).into());
             }
         };
-        require(v_in > 0.0 && v_in.is_finite(), "the input voltage is", v_in, "greater than 0 V");
-        require(cool_down >= 0.0 && cool_down.is_finite(), "the cool-down is", cool_down, "0 s or more");
+        require(
+            v_in > 0.0 && v_in.is_finite(),
+            "the input voltage is",
+            v_in,
+            "greater than 0 V",
+        );
+        require(
+            cool_down >= 0.0 && cool_down.is_finite(),
+            "the cool-down is",
+            cool_down,
+            "0 s or more",
+        );
         for duty in duties {
-            require(*duty > 0.0 && *duty < 1.0, "a duty ratio is", *duty, "between 0 and 1, not percent");
+            require(
+                *duty > 0.0 && *duty < 1.0,
+                "a duty ratio is",
+                *duty,
+                "between 0 and 1, not percent",
+            );
         }
         for load in loads {
             let (LoadSetting::Resistor(x) | LoadSetting::Current(x) | LoadSetting::Power(x)) = *load;
@@ -141,7 +156,11 @@ impl Plan {
         }
         for (list, what) in [(duties.len(), "duties"), (loads.len(), "loads")] {
             if list == 0 {
-                faults.push(Message::new(format!("the plan has no {what}")).expected("at least two").into());
+                faults.push(
+                    Message::new(format!("the plan has no {what}"))
+                        .expected("at least two")
+                        .into(),
+                );
             }
         }
         Faults::unless_empty(faults)?;
@@ -154,7 +173,9 @@ impl Plan {
                 LoadSetting::Resistor(_) | LoadSetting::Current(_) => Hold::OpenLoop,
             },
         };
-        let points = loads.iter().flat_map(|load| duties.iter().map(move |duty| (point(*load, *duty), None)));
+        let points = loads
+            .iter()
+            .flat_map(|load| duties.iter().map(move |duty| (point(*load, *duty), None)));
         Ok(Plan {
             v_in,
             cool_down,
@@ -165,6 +186,9 @@ impl Plan {
     /// Number of points still to be measured.
     #[must_use]
     pub fn open(&self) -> usize {
-        self.points.iter().filter(|(_, measurement)| measurement.is_none()).count()
+        self.points
+            .iter()
+            .filter(|(_, measurement)| measurement.is_none())
+            .count()
     }
 }

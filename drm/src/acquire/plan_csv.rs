@@ -30,7 +30,11 @@ impl Plan {
             writeln!(out, "{HELP_CLOSED}")?;
         }
         if self.cool_down > 0.0 {
-            writeln!(out, "# after each point: switch off and cool down for {} s", self.cool_down)?;
+            writeln!(
+                out,
+                "# after each point: switch off and cool down for {} s",
+                self.cool_down
+            )?;
         }
         writeln!(out, "{HEADER}")?;
         for (index, (point, measurement)) in self.points.iter().enumerate() {
@@ -70,7 +74,11 @@ impl Plan {
         };
         if !text.text.contains(HEADER) || rows(text).all(|(_, row)| row.ends_with(",,,,,")) {
             // nothing is measured yet, or it is another table: say which columns are missing
-            return if text.text.contains(HEADER) { Ok(0) } else { Table::parse(text, &options).map(|_| 0) };
+            return if text.text.contains(HEADER) {
+                Ok(0)
+            } else {
+                Table::parse(text, &options).map(|_| 0)
+            };
         }
         let table = Table::parse(text, &options)?;
         let mut taken = 0;
@@ -79,8 +87,13 @@ impl Plan {
                 continue;
             };
             let cells: Vec<&str> = row.split(',').map(str::trim).collect();
-            let [number, duty, load, hold, ..] = cells[..] else { continue };
-            let entry = number.parse::<usize>().ok().and_then(|number| self.points.get_mut(number.wrapping_sub(1)));
+            let [number, duty, load, hold, ..] = cells[..] else {
+                continue;
+            };
+            let entry = number
+                .parse::<usize>()
+                .ok()
+                .and_then(|number| self.points.get_mut(number.wrapping_sub(1)));
             if let Some((point, measurement)) = entry
                 && duty.parse() == Ok(point.duty)
                 && load == point.load.to_string()
@@ -97,7 +110,11 @@ impl Plan {
 /// Rows below the header with their lines.
 fn rows(text: &Source) -> impl Iterator<Item = (usize, &str)> {
     let is_row = |(_, line): &(usize, &str)| line.starts_with(|c: char| c.is_ascii_digit());
-    text.text.lines().enumerate().map(|(index, line)| (index + 1, line.trim())).filter(is_row)
+    text.text
+        .lines()
+        .enumerate()
+        .map(|(index, line)| (index + 1, line.trim()))
+        .filter(is_row)
 }
 
 fn taken_over(point: &PlanPoint, measured: &Point, hold: &str, v_std: f64) -> Measurement {

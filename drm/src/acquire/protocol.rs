@@ -146,7 +146,13 @@ impl Window {
         }
         let n = window.samples;
         let mean = &mut window.mean;
-        for sum in [&mut window.duty, &mut mean.v_out, &mut mean.i_l, &mut mean.i_out, &mut mean.v_in] {
+        for sum in [
+            &mut window.duty,
+            &mut mean.v_out,
+            &mut mean.i_l,
+            &mut mean.i_out,
+            &mut mean.v_in,
+        ] {
             *sum /= n;
         }
         window.v_std = (squares / n - mean.v_out * mean.v_out).max(0.0).sqrt();

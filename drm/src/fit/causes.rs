@@ -103,7 +103,11 @@ fn explanation(set: &[Cause], points: &[Point]) -> Option<Explanation> {
 
 /// What the causes leave unexplained of a point, V.
 fn missing(set: &[Cause], values: &[f64], point: &Point) -> f64 {
-    let taken: f64 = set.iter().zip(values).map(|(cause, value)| value * cause.takes(point)).sum();
+    let taken: f64 = set
+        .iter()
+        .zip(values)
+        .map(|(cause, value)| value * cause.takes(point))
+        .sum();
     point.v_out - (point.d_real * point.v_in - taken)
 }
 
@@ -117,7 +121,10 @@ fn solve(set: &[Cause], points: &[Point]) -> Option<Vec<f64>> {
             (square > 0.0).then(|| vec![sum(&|p| one.takes(p) * gap(p)) / square])
         }
         [one, two] => {
-            let (a, c) = (sum(&|p| one.takes(p) * one.takes(p)), sum(&|p| two.takes(p) * two.takes(p)));
+            let (a, c) = (
+                sum(&|p| one.takes(p) * one.takes(p)),
+                sum(&|p| two.takes(p) * two.takes(p)),
+            );
             let b = sum(&|p| one.takes(p) * two.takes(p));
             let (x, y) = (sum(&|p| one.takes(p) * gap(p)), sum(&|p| two.takes(p) * gap(p)));
             let determinant = a * c - b * b;

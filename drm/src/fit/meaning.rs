@@ -36,7 +36,11 @@ pub(crate) fn of(fit: &Fit, points: &[Point], explanations: &[Explanation]) -> V
 }
 
 fn describe(explanation: &Explanation) -> String {
-    let causes: Vec<String> = explanation.causes.iter().map(|(cause, value)| cause.describe(*value)).collect();
+    let causes: Vec<String> = explanation
+        .causes
+        .iter()
+        .map(|(cause, value)| cause.describe(*value))
+        .collect();
     format!(
         "{} (leaves {:.3} V rms, {:.3} V leave-one-out)",
         causes.join(" with "),

@@ -22,8 +22,8 @@ pub(crate) use regression::error_v;
 use regression::{Model, hull};
 pub use separation::Separation;
 pub(crate) use separation::load_line;
-pub(crate) use show::{error_head, error_line, wrapped};
 pub use show::text;
+pub(crate) use show::{error_head, error_line, wrapped};
 pub(crate) use validation::rms;
 
 /// How a table is fitted.
@@ -296,9 +296,15 @@ fn remarks(fit: &Fit, points: &[Point], options: &FitOptions, notes: &mut Vec<St
     if let Some(a) = options.assumed_a {
         notes.push(format!("a = {a} is assumed, not measured"));
     }
-    let (v_in, v_sim) = (hull(points.iter().map(|p| p.v_in)), hull(points.iter().map(|p| p.v_sim)));
+    let (v_in, v_sim) = (
+        hull(points.iter().map(|p| p.v_in)),
+        hull(points.iter().map(|p| p.v_sim)),
+    );
     if v_sim.low == v_sim.high && v_sim.low != v_in.low {
-        notes.push(format!("d_sim = v_out / {} V, the input voltage of the simulation", v_sim.low));
+        notes.push(format!(
+            "d_sim = v_out / {} V, the input voltage of the simulation",
+            v_sim.low
+        ));
     } else if v_in.high - v_in.low > 2e-3 * v_in.high {
         notes.push(format!(
             "v_in goes from {:.2} to {:.2} V and is divided out (d_sim = v_out / v_in): a controller does not do so; with \
@@ -314,7 +320,9 @@ fn remarks(fit: &Fit, points: &[Point], options: &FitOptions, notes: &mut Vec<St
     }
     let map = &fit.map;
     for corner in separation::unmeasured_corners(points, map.valid_i_out, map.valid_d_sim) {
-        notes.push(format!("no point near the corner of the valid range with {corner}: the mapping is extended there"));
+        notes.push(format!(
+            "no point near the corner of the valid range with {corner}: the mapping is extended there"
+        ));
     }
     let range = map.duty_range();
     if range.low < 0.0 || range.high > 1.0 {

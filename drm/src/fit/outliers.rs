@@ -34,7 +34,9 @@ pub(crate) fn remove(model: &Model, points: &mut Vec<Point>, components: usize) 
     let most = ((points.len() as f64 * MOST) as usize).max(1);
     let mut outliers = Vec::new();
     while outliers.len() < most {
-        let Some((index, outlier)) = worst(model, points, components) else { break };
+        let Some((index, outlier)) = worst(model, points, components) else {
+            break;
+        };
         outliers.push(outlier);
         *points = without(points, index);
     }
@@ -48,7 +50,11 @@ fn worst(model: &Model, points: &[Point], components: usize) -> Option<(usize, O
         let (deleted, degrees) = deleted(model, points, index, components)?;
         let critical = CRITICAL.get(degrees - 1).copied().unwrap_or(CRITICAL_MANY);
         let beyond = deleted.studentised > critical && deleted.error_v.abs() > FLOOR * point.v_in;
-        if beyond && worst.as_ref().is_none_or(|(_, worst)| deleted.studentised > worst.sigmas) {
+        if beyond
+            && worst
+                .as_ref()
+                .is_none_or(|(_, worst)| deleted.studentised > worst.sigmas)
+        {
             let outlier = Outlier {
                 line: point.line,
                 error_v: deleted.error_v,

@@ -65,7 +65,11 @@ impl Model {
     pub fn row(&self, point: &Point) -> Vec<f64> {
         let d_sim = if self.assumed_a.is_some() { 0.0 } else { point.d_sim() };
         let i_out = if self.constant_load { 0.0 } else { point.i_out };
-        let product = if self.constant_load { 0.0 } else { point.i_out * point.d_sim() };
+        let product = if self.constant_load {
+            0.0
+        } else {
+            point.i_out * point.d_sim()
+        };
         [d_sim, i_out, product][..self.form.predictors()].to_vec()
     }
 

@@ -66,12 +66,20 @@ pub(crate) fn examine(model: &Model, points: &[Point]) -> Separation {
 
 /// Largest over smallest singular value of the predictors that vary, and how many directions are determined.
 fn condition(model: &Model, points: &[Point]) -> (f64, usize) {
-    let columns: Vec<Vec<f64>> = model.columns(points).iter().filter_map(|column| standardised(column)).collect();
+    let columns: Vec<Vec<f64>> = model
+        .columns(points)
+        .iter()
+        .filter_map(|column| standardised(column))
+        .collect();
     let values = eigenvalues(&correlation(&columns));
     let largest = values.first().copied().unwrap_or(0.0);
     let smallest = values.last().copied().unwrap_or(0.0).max(0.0);
     let directions = values.iter().filter(|value| **value * LOST * LOST > largest).count();
-    let condition = if smallest > 0.0 { (largest / smallest).sqrt() } else { f64::INFINITY };
+    let condition = if smallest > 0.0 {
+        (largest / smallest).sqrt()
+    } else {
+        f64::INFINITY
+    };
     (condition, directions)
 }
 
@@ -152,7 +160,10 @@ fn standardised(column: &[f64]) -> Option<Vec<f64>> {
 }
 
 fn correlation(columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    columns.iter().map(|a| columns.iter().map(|b| dot(a, b)).collect()).collect()
+    columns
+        .iter()
+        .map(|a| columns.iter().map(|b| dot(a, b)).collect())
+        .collect()
 }
 
 /// Eigenvalues of a small symmetric matrix, largest first, by Jacobi's rotations.

@@ -13,7 +13,11 @@ pub fn text(report: &Report) -> Result<String, fmt::Error> {
     let fit = &report.fit;
     let k = &fit.map.coefficients;
     let product = if k.r.is_some() { " + r i_out d_sim" } else { "" };
-    writeln!(out, "d_real = a d_sim + b i_out + c{product}   ({} points)", fit.rows.len())?;
+    writeln!(
+        out,
+        "d_real = a d_sim + b i_out + c{product}   ({} points)",
+        fit.rows.len()
+    )?;
     let se = &fit.standard_errors;
     let mut entries = vec![("a", k.a, se.a, ""), ("b", k.b, se.b, " 1/A"), ("c", k.c, se.c, "")];
     if let (Some(r), Some(se)) = (k.r, se.r) {
@@ -39,7 +43,11 @@ pub fn text(report: &Report) -> Result<String, fmt::Error> {
     error_line(&mut out, "with it, on its own points", &fit.with)?;
     error_line(&mut out, "with it, leaving each point out", &fit.left_out)?;
     if let Some(other) = &report.other {
-        error_line(&mut out, &format!("{} form, leaving each out", other.form.name()), &other.left_out)?;
+        error_line(
+            &mut out,
+            &format!("{} form, leaving each out", other.form.name()),
+            &other.left_out,
+        )?;
     }
     writeln!(out, "\npartial least squares: {}", components(fit))?;
     writeln!(
@@ -52,7 +60,11 @@ pub fn text(report: &Report) -> Result<String, fmt::Error> {
         writeln!(out, "left out as discontinuous conduction: {lines}")?;
     }
     for outlier in &report.outliers {
-        let sigmas = if outlier.sigmas < 1e4 { format!("{:.0}", outlier.sigmas) } else { "over 10,000".to_owned() };
+        let sigmas = if outlier.sigmas < 1e4 {
+            format!("{:.0}", outlier.sigmas)
+        } else {
+            "over 10,000".to_owned()
+        };
         writeln!(
             out,
             "outlier: line {}, {:+.3} V from what the others foretell ({sigmas} standard deviations)",
@@ -93,7 +105,11 @@ pub(crate) fn wrapped(out: &mut String, indent: &str, sentence: &str) -> fmt::Re
 
 /// The head of a table of errors.
 pub(crate) fn error_head(out: &mut String) -> fmt::Result {
-    writeln!(out, "{:<34} {:>10} {:>9} {:>9}", "voltage error, measured - expected", "mean", "rms", "max")
+    writeln!(
+        out,
+        "{:<34} {:>10} {:>9} {:>9}",
+        "voltage error, measured - expected", "mean", "rms", "max"
+    )
 }
 
 /// One line of a table of errors.
@@ -112,5 +128,9 @@ fn components(fit: &Fit) -> String {
         .enumerate()
         .map(|(index, error)| format!("{}: {error:.4} V", index + 1))
         .collect();
-    format!("{} components; leave-one-out rms with {}", fit.components, list.join(", "))
+    format!(
+        "{} components; leave-one-out rms with {}",
+        fit.components,
+        list.join(", ")
+    )
 }

@@ -23,7 +23,9 @@ pub(crate) fn leave_one_out(model: &Model, points: &[Point], components: usize) 
     for (index, point) in points.iter().enumerate() {
         let rest = without(points, index);
         let pls = model.fit(&rest, components);
-        left_out.errors_v.push(error_v(&model.map(&rest, &pls), point, model.load_line));
+        left_out
+            .errors_v
+            .push(error_v(&model.map(&rest, &pls), point, model.load_line));
         left_out.coefficients.push(model.coefficients(&pls));
     }
     left_out
@@ -61,7 +63,11 @@ pub(crate) fn standard_errors(left_out: &LeftOut) -> Coefficients {
     let n = left_out.coefficients.len() as f64;
     let spread = |of: &dyn Fn(&Coefficients) -> f64| {
         let mean = left_out.coefficients.iter().map(of).sum::<f64>() / n;
-        let squares: f64 = left_out.coefficients.iter().map(|k| (of(k) - mean) * (of(k) - mean)).sum();
+        let squares: f64 = left_out
+            .coefficients
+            .iter()
+            .map(|k| (of(k) - mean) * (of(k) - mean))
+            .sum();
         ((n - 1.0) / n * squares).sqrt()
     };
     let product = left_out.coefficients.iter().any(|k| k.r.is_some());
@@ -85,7 +91,10 @@ pub(crate) struct Deleted {
 pub(crate) fn deleted(model: &Model, points: &[Point], index: usize, components: usize) -> Option<(Deleted, usize)> {
     let rest = without(points, index);
     let pls: Pls = model.fit(&rest, components);
-    let degrees = rest.len().checked_sub(pls.components + 1).filter(|degrees| *degrees >= 2)?;
+    let degrees = rest
+        .len()
+        .checked_sub(pls.components + 1)
+        .filter(|degrees| *degrees >= 2)?;
     let deviation = |point: &Point| model.response(point) - pls.predict(&model.row(point));
     let squares: f64 = rest.iter().map(|point| deviation(point) * deviation(point)).sum();
     let noise = (squares / degrees as f64).sqrt();

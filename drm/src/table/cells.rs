@@ -48,7 +48,8 @@ impl<'a> Sheet<'a> {
             }
         }
         if sheet.rows.is_empty() && faults.is_empty() {
-            let message = Message::new("the table has no rows").expected("one row for each settled point below the header");
+            let message =
+                Message::new("the table has no rows").expected("one row for each settled point below the header");
             faults.push(source.fault(&header_span, message));
         }
         if faults.is_empty() { Ok(sheet) } else { Err(faults) }
@@ -81,7 +82,11 @@ impl<'a> Sheet<'a> {
 
     /// A fault of the names of the columns.
     pub fn header_fault(&self, message: Message) -> Fault {
-        let span = self.header.first().zip(self.header.last()).map(|(first, last)| first.start..last.end);
+        let span = self
+            .header
+            .first()
+            .zip(self.header.last())
+            .map(|(first, last)| first.start..last.end);
         self.source.fault(&span.unwrap_or(0..0), message)
     }
 
@@ -96,7 +101,8 @@ impl<'a> Sheet<'a> {
         let is_twin = |index: &usize| !names[*index].is_empty() && names[..*index].contains(&names[*index]);
         let fault = |index: usize| {
             let message = Message::new(format!("two columns are called `{}`", names[index]));
-            self.source.fault(&self.header[index], message.hint("remove or rename one"))
+            self.source
+                .fault(&self.header[index], message.hint("remove or rename one"))
         };
         (0..names.len()).filter(is_twin).map(fault).collect()
     }
@@ -161,5 +167,7 @@ fn uneven(found: usize, expected: usize) -> Message {
         )
     };
     let message = Message::new(problem).found(format!("{found} cells"));
-    message.expected(format!("{expected} cells as in the header")).hint(hint)
+    message
+        .expected(format!("{expected} cells as in the header"))
+        .hint(hint)
 }

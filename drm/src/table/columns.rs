@@ -54,7 +54,11 @@ impl Columns {
         for entry in text.split(',').map(str::trim).filter(|entry| !entry.is_empty()) {
             match wish(entry) {
                 Ok((quantity, _)) if columns.get(&quantity).is_some() => {
-                    faults.push(Message::new(format!("`{quantity}` is mapped twice")).found(entry).into());
+                    faults.push(
+                        Message::new(format!("`{quantity}` is mapped twice"))
+                            .found(entry)
+                            .into(),
+                    );
                 }
                 Ok(found) => columns.entries.push(found),
                 Err(message) => faults.push(message.found(entry).into()),
@@ -64,7 +68,10 @@ impl Columns {
     }
 
     fn get(&self, quantity: &str) -> Option<&Wish> {
-        self.entries.iter().find(|(name, _)| name == quantity).map(|(_, wish)| wish)
+        self.entries
+            .iter()
+            .find(|(name, _)| name == quantity)
+            .map(|(_, wish)| wish)
     }
 
     pub(crate) fn locate(&self, sheet: &Sheet<'_>) -> Result<Located, Vec<Fault>> {
@@ -178,11 +185,16 @@ impl Source {
                 "measure the point again or remove its row; a row of which nothing is measured yet may stay",
             )
         } else if cell.contains('%') {
-            ("a cell is not a number", "duty ratios are fractions: write 0.5 instead of 50 %")
+            (
+                "a cell is not a number",
+                "duty ratios are fractions: write 0.5 instead of 50 %",
+            )
         } else {
             ("a cell is not a number", "remove the row or measure the point again")
         };
-        let message = Message::new(problem).expected("a finite number with a decimal point").hint(hint);
+        let message = Message::new(problem)
+            .expected("a finite number with a decimal point")
+            .hint(hint);
         faults.push(sheet.cell_fault(row, index, message));
         None
     }

@@ -91,7 +91,10 @@ impl Table {
             let more = faults.len().saturating_sub(MOST_FAULTS);
             faults.truncate(MOST_FAULTS);
             if more > 0 {
-                faults.push(text.name.fault(Message::new(format!("{more} more faults of this kind"))));
+                faults.push(
+                    text.name
+                        .fault(Message::new(format!("{more} more faults of this kind"))),
+                );
             }
             Faults::unless_empty(faults).err().unwrap_or_else(|| {
                 // a reader that gives nothing has left a fault
@@ -151,7 +154,11 @@ fn point(
 ) -> Option<Reading> {
     let measured = [&located.d_real, &located.v_out, &located.i_out, &located.v_in];
     let in_table = |source: &&&Source| matches!(source, Source::Column { .. });
-    if measured.iter().filter(in_table).all(|source| source.is_empty(row, sheet)) {
+    if measured
+        .iter()
+        .filter(in_table)
+        .all(|source| source.is_empty(row, sheet))
+    {
         return Some(Reading::Open);
     }
     let before = faults.len();
@@ -183,7 +190,9 @@ fn settled(table: &mut Table, options: &TableOptions, sheet: &Sheet<'_>, faults:
         return;
     }
     if options.skip_unsettled {
-        table.notes.push(format!("left out as unsettled: {}", lines(&unsettled)));
+        table
+            .notes
+            .push(format!("left out as unsettled: {}", lines(&unsettled)));
         table.points.retain(|point| point.settled);
         return;
     }

@@ -62,7 +62,9 @@ fn duties(points: &[Point], sheet: &Sheet<'_>, faults: &mut Vec<Fault>) {
     if percent {
         let lines: Vec<usize> = above.iter().map(|p| p.line).collect();
         let found = format!("{} in {}", first.d_real, super::lines(&lines));
-        let message = Message::new("`d_real` looks like percent").found(found).expected("a fraction of 1");
+        let message = Message::new("`d_real` looks like percent")
+            .found(found)
+            .expected("a fraction of 1");
         faults.push(sheet.line_fault(first.line, message.hint("--map d_real=d_real*0.01 converts")));
         return;
     }
@@ -103,7 +105,9 @@ fn voltages(points: &[Point], sheet: &Sheet<'_>, faults: &mut Vec<Fault>) {
         if point.v_out > SENSOR * point.v_in {
             let found = format!("{} V with v_in {} V", point.v_out, point.v_in);
             let message = Message::new("`v_out` lies above `v_in`").found(found);
-            let message = message.expected("what a buck converter can yield").hint("check units and columns");
+            let message = message
+                .expected("what a buck converter can yield")
+                .hint("check units and columns");
             faults.push(sheet.line_fault(point.line, message));
         }
     }

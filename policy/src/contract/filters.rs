@@ -40,7 +40,7 @@ fn one(value: &Value<'_>, period: Option<f64>, faults: &mut Vec<Fault>) -> Optio
         .iter()
         .filter_map(|kind| section.optional(kind).map(|value| (*kind, value)))
         .collect();
-    let number = section.pairs().count();
+    let number = section.count();
     let before = faults.len();
     if number == 1 || found.is_empty() {
         section.finish(faults);

@@ -66,11 +66,8 @@ fn format(value: &Value<'_>, faults: &mut Vec<Fault>) -> NumericFormat {
 }
 
 fn parameters(value: &Value<'_>, taken: &mut Taken, faults: &mut Vec<Fault>) -> BTreeMap<String, f64> {
-    let Some(section) = value.table("[parameters]", faults) else {
-        return BTreeMap::new();
-    };
     let mut parameters = BTreeMap::new();
-    for (key, value) in section.pairs() {
+    for (key, value) in value.pairs(faults).unwrap_or_default() {
         let kind = Kind::Parameter;
         let objection =
             names::objection(&key.value, kind).map(|hint| catalogue::bad_name(kind.word(), &key.value, &hint));

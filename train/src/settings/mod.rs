@@ -1,13 +1,13 @@
 //! `train.toml`: everything a training needs to know, in one file.
 
 mod read;
-mod reader;
 
 use std::path::{Path, PathBuf};
 
-use crate::faults::{Error, Fault, Faults};
+use crate::faults::Error;
 use crate::learner::LearnerSettings;
 use closed_loop::scenario::Task;
+use toml_input::{Document, Faults};
 
 /// A training, as its file says. Defaults are those of the paper (arXiv 2110.10490) and its authors' code.
 #[derive(Debug, Clone, PartialEq)]
@@ -214,11 +214,7 @@ impl Settings {
     /// # Errors
     /// If the file cannot be read, or all its faults with their places.
     pub fn load(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path).map_err(|error| Error::File {
-            path: path.to_owned(),
-            error,
-        })?;
-        Ok(Self::parse(&text, path)?)
+        Ok(read::settings(&Document::open(path)?)?)
     }
 
     /// Checks the text of a training file; `path` names it in faults, and paths in it start from its folder.
@@ -226,7 +222,7 @@ impl Settings {
     /// # Errors
     /// All faults with their places.
     pub fn parse(text: &str, path: &Path) -> Result<Self, Faults> {
-        read::settings(text, path)
+        read::settings(&Document::from_text(path, text)?)
     }
 
     /// Loads and share of randomisation in control period `step`.
@@ -236,11 +232,5 @@ impl Settings {
             Some(stage) => (stage.loads.as_ref().unwrap_or(&self.episode.loads), stage.randomise),
             None => (&self.episode.loads, 1.0),
         }
-    }
-}
-
-impl From<Fault> for Faults {
-    fn from(fault: Fault) -> Self {
-        Faults(vec![fault])
     }
 }

@@ -10,7 +10,7 @@ const LAYERS: &[&[&str]] = &[
     &["policy", "plant"],
     &["interp", "codegen", "drm"],
     &["closed-loop"],
-    &["policy-macro", "train", "diagnose", "verify"],
+    &["policy-macro", "train", "spice", "diagnose", "verify"],
     &["cli"],
     &["tests", "bench", "xtask", "firmware"],
 ];

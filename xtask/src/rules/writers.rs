@@ -4,8 +4,8 @@ use std::path::Path;
 
 use super::source;
 
-/// `verify` compiles in temporary folders; `xtask`, `tests` and `bench` are the test side.
-const MAY_WRITE: &[&str] = &["cli", "verify", "train", "xtask", "tests", "bench"];
+/// `verify` and `spice` compile in temporary folders, `train` checks a contract in one; `xtask`, `tests` and `bench` are the test side.
+const MAY_WRITE: &[&str] = &["cli", "verify", "train", "spice", "xtask", "tests", "bench"];
 
 const WRITES: &[&str] = &[
     "fs::write",

@@ -59,7 +59,9 @@ fn duties(text: &str) -> Result<Duties, String> {
     }
     // in steps of 1e-9, so that 0.1 + 0.2 is written 0.3
     let tidy = |duty: f64| (duty * 1e9).round() / 1e9;
-    Ok(Duties((0..=count as u32).map(|k| tidy(from + f64::from(k) * step)).collect()))
+    Ok(Duties(
+        (0..=count as u32).map(|k| tidy(from + f64::from(k) * step)).collect(),
+    ))
 }
 
 /// Measures or plans.
@@ -104,9 +106,14 @@ fn summary(options: &Acquire, plan: &Plan, kept: usize, measured: usize) -> Stri
         .collect();
     if !unsettled.is_empty() {
         let list = unsettled.join(", ");
-        text += &format!("\nnot settled: point {list}; raise --most-windows, or leave them out with fit --skip-unsettled");
+        text +=
+            &format!("\nnot settled: point {list}; raise --most-windows, or leave them out with fit --skip-unsettled");
     }
-    let changed = plan.points.iter().filter(|(point, m)| m.is_some_and(|m| m.hold != point.hold)).count();
+    let changed = plan
+        .points
+        .iter()
+        .filter(|(point, m)| m.is_some_and(|m| m.hold != point.hold))
+        .count();
     if changed > 0 {
         text += &format!("\n{changed} points did not settle in open loop and were held in closed loop (column hold)");
     }

@@ -68,7 +68,10 @@ pub fn run(options: &Fit) -> Result<Outcome, Failure> {
     let report = drm::fit(&table, &fit_options(options)?)?;
     let text = drm::text(&report)?;
     let title = format!("Duty ratio mapping of {}", options.table.display());
-    let page = options.report.as_ref().map(|path| Ok::<_, Failure>((path, drm::page(&report, &title, &text)?)));
+    let page = options
+        .report
+        .as_ref()
+        .map(|path| Ok::<_, Failure>((path, drm::page(&report, &title, &text)?)));
     let page = page.transpose()?;
     output::write_one(&options.out, &report.fit.map.to_toml(&comment(&report)))?;
     if let Some((path, page)) = &page {
@@ -84,11 +87,14 @@ pub fn run(options: &Fit) -> Result<Outcome, Failure> {
 }
 
 fn fit_options(options: &Fit) -> Result<FitOptions, Failure> {
-    let given = options.inductance.zip(options.f_sw).map(|(inductance, f_sw)| Conduction {
-        inductance,
-        f_sw,
-        v_f: options.v_f,
-    });
+    let given = options
+        .inductance
+        .zip(options.f_sw)
+        .map(|(inductance, f_sw)| Conduction {
+            inductance,
+            f_sw,
+            v_f: options.v_f,
+        });
     for (name, value) in [("--inductance", options.inductance), ("--f-sw", options.f_sw)] {
         if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
             return Err(Failure(format!("{name} must be greater than 0\n   = found: {value}")));

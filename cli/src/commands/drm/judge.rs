@@ -53,7 +53,11 @@ struct Answer {
 /// Judges and reports.
 pub fn run(options: &Judge) -> Result<Outcome, Failure> {
     let map = DutyRatioMap::from(&policy::load_mapping(&options.mapping)?);
-    let table = options.table.as_ref().map(|path| options.reading.table(path)).transpose()?;
+    let table = options
+        .table
+        .as_ref()
+        .map(|path| options.reading.table(path))
+        .transpose()?;
     let judgement = table.map(|table| drm::judge::judge(&table, &map, options.duty_limits));
     let steady = steady(options, &map)?;
     let v_ref = options.v_ref.unwrap_or_default();
@@ -85,12 +89,18 @@ fn steady(options: &Judge, map: &DutyRatioMap) -> Result<Option<Vec<Steady>>, Fa
     let (real, nominal) = (super::plant_parameters(real)?, super::plant_parameters(nominal)?);
     if !(v_ref > 0.0 && v_ref < real.converter.v_in.min(nominal.converter.v_in)) {
         let expected = "above 0 and below the input voltages";
-        return Err(Failure(format!("--v-ref is out of reach\n   = found: {v_ref} V\n   = expected: {expected}")));
+        return Err(Failure(format!(
+            "--v-ref is out of reach\n   = found: {v_ref} V\n   = expected: {expected}"
+        )));
     }
     let loads = options.loads.settings();
     if loads.is_empty() {
-        return Err(Failure("no load\n   = hint: give --powers, --currents or --resistors".to_owned()));
+        return Err(Failure(
+            "no load\n   = hint: give --powers, --currents or --resistors".to_owned(),
+        ));
     }
     let limits = options.duty_limits;
-    Ok(Some(drm::judge::against_plant(map, &real, &nominal, v_ref, &loads, limits)?))
+    Ok(Some(drm::judge::against_plant(
+        map, &real, &nominal, v_ref, &loads, limits,
+    )?))
 }

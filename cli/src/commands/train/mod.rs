@@ -1,0 +1,232 @@
+//! `policyc train`
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Instant;
+
+use train::scenario_table as table;
+use train::seeds::best;
+use train::{Contract, Converter, Course, Ended, Outcome as Trained, SeedRun, Settings, train_all};
+
+use super::grouped;
+use crate::arguments::Train;
+use crate::{Failure, Outcome, output};
+
+mod progress;
+
+use progress::Watcher;
+
+/// Control periods between two checkpoints on the way: some seconds.
+const CHECKPOINT_EVERY: u64 = 20_000;
+const CHECKPOINTS: &str = "checkpoints";
+const SEEDS: &str = "seeds";
+
+/// Trains all seeds and writes the folders.
+pub fn run(options: &Train) -> Result<Outcome, Failure> {
+    let mut settings = Settings::load(&options.settings)?;
+    if !options.seeds.is_empty() {
+        settings.seeds = distinct(&options.seeds)?;
+    }
+    let contract = Contract::load(&settings.contract, &settings.hidden)?;
+    let converter = Converter::load(&settings.plant, &settings.set)?;
+    let kept = Kept::new(&options.out);
+    let course = Course {
+        threads: options.threads,
+        checkpoints: kept.prepare(&settings.seeds, options.resume)?,
+        checkpoint_every: CHECKPOINT_EVERY,
+    };
+    let stop = stop_on_signal()?;
+    let start = Instant::now();
+    let watcher = Watcher::new(&settings, &kept, &stop);
+    let result = train_all(&settings, &contract, &converter, &course, &stop, &watcher);
+    watcher.finish()?;
+    let runs = result?;
+    if runs.iter().any(|run| run.ended == Ended::Interrupted) {
+        return interrupted(options, &settings, &kept, &runs);
+    }
+    let Some(best) = best(&runs) else {
+        return Err(Failure("no seed was trained".to_owned()));
+    };
+    write(&options.out, &settings, &runs, best)?;
+    kept.remove();
+    report(options, &settings, &runs, best, start)
+}
+
+/// Writes the seeds' folders, the best one's last: a folder with a `policy.toml` is a whole training.
+fn write(out: &Path, settings: &Settings, runs: &[SeedRun], best: &Trained) -> Result<(), Failure> {
+    for outcome in runs.iter().filter_map(|run| run.outcome.as_ref()) {
+        output::write_all(&out.join(SEEDS).join(outcome.seed.to_string()), &outcome.files)?;
+    }
+    let mut files = best.files.clone();
+    files.insert("seeds.txt".to_owned(), seeds_table(settings, runs).into_bytes());
+    output::write_all(out, &files)
+}
+
+fn report(
+    options: &Train,
+    settings: &Settings,
+    runs: &[SeedRun],
+    best: &Trained,
+    start: Instant,
+) -> Result<Outcome, Failure> {
+    let steps: u64 = runs.iter().map(|run| run.steps).sum();
+    let seconds = start.elapsed().as_secs_f64();
+    let out = options.out.display();
+    let mut text = seeds_table(settings, runs);
+    text.push_str(&format!(
+        "\nSeed {}, best on the selection scenarios, in its evaluation (at sampling instants / worst of all instants):\n\n{}",
+        best.seed,
+        table(&best.findings)
+    ));
+    text.push_str(&format!(
+        "\n{} control periods in {seconds:.1} s; policy in {out}, all seeds in {out}/{SEEDS}\n\
+         next: policyc verify {out}",
+        grouped(steps)
+    ));
+    output::say(&text)?;
+    let missed = !settings.specification.is_empty() && !best.evaluated.met;
+    Ok(if missed { Outcome::Different } else { Outcome::Done })
+}
+
+/// One line per seed.
+fn seeds_table(settings: &Settings, runs: &[SeedRun]) -> String {
+    let verdict = |met: bool| match (settings.specification.is_empty(), met) {
+        (true, _) => "-",
+        (false, true) => "met",
+        (false, false) => "missed",
+    };
+    let mut text =
+        "seed  control periods  kept after  selection  evaluation  deviation V  settling ms  tail V   cost\n"
+            .to_owned();
+    for run in runs {
+        let Some(outcome) = &run.outcome else { continue };
+        let largest = |figure: fn(&train::Metrics) -> f64| {
+            let figures = outcome.findings.iter().map(|finding| figure(&finding.worst));
+            figures.fold(0.0, f64::max)
+        };
+        text.push_str(&format!(
+            "{:4}  {:>15}  {:>10}  {:<9}  {:<10}  {:>11.2}  {:>11.2}  {:>6.3}  {:>6.3}\n",
+            outcome.seed,
+            grouped(run.steps),
+            grouped(outcome.best_step),
+            verdict(outcome.selected.met),
+            verdict(outcome.evaluated.met),
+            largest(|metrics| metrics.deviation),
+            1e3 * largest(|metrics| metrics.settling),
+            largest(|metrics| metrics.tail_max),
+            outcome.selected.cost,
+        ));
+    }
+    text
+}
+
+fn interrupted(options: &Train, settings: &Settings, kept: &Kept, runs: &[SeedRun]) -> Result<Outcome, Failure> {
+    for (seed, run) in settings.seeds.iter().zip(runs) {
+        kept.write(*seed, &run.checkpoint)?;
+    }
+    let mut resume = format!(
+        "policyc train {} --out {}",
+        options.settings.display(),
+        options.out.display()
+    );
+    if !options.seeds.is_empty() {
+        let seeds: Vec<String> = options.seeds.iter().map(u64::to_string).collect();
+        resume.push_str(&format!(" --seeds {}", seeds.join(",")));
+    }
+    output::say(&format!(
+        "{}\nInterrupted; checkpoints in {}. To go on: {resume} --resume",
+        seeds_table(settings, runs),
+        kept.folder.display()
+    ))?;
+    Ok(Outcome::Interrupted)
+}
+
+fn distinct(seeds: &[u64]) -> Result<Vec<u64>, Failure> {
+    let mut seen = BTreeSet::new();
+    match seeds.iter().find(|seed| !seen.insert(**seed)) {
+        None => Ok(seeds.to_vec()),
+        Some(seed) => Err(Failure(format!(
+            "--seeds names a seed twice\n   = found: {seed}\n   = expected: different numbers"
+        ))),
+    }
+}
+
+/// The first signal asks the training to stop, the second ends the program as if it were not handled.
+fn stop_on_signal() -> Result<Arc<AtomicBool>, Failure> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let flag = stop.clone();
+    ctrlc::set_handler(move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(Outcome::Interrupted as i32);
+        }
+    })?;
+    Ok(stop)
+}
+
+/// Checkpoints of a training, one file per seed.
+pub struct Kept {
+    out: PathBuf,
+    folder: PathBuf,
+    failure: Mutex<Option<Failure>>,
+}
+
+impl Kept {
+    fn new(out: &Path) -> Self {
+        Self {
+            out: out.to_owned(),
+            folder: out.join(CHECKPOINTS),
+            failure: Mutex::new(None),
+        }
+    }
+
+    fn path(&self, seed: u64) -> PathBuf {
+        self.folder.join(format!("seed-{seed}.bin"))
+    }
+
+    /// The checkpoints to go on from. Hours of work are not overwritten by a command that was typed once too often.
+    fn prepare(&self, seeds: &[u64], resume: bool) -> Result<BTreeMap<u64, Vec<u8>>, Failure> {
+        let out = self.out.display();
+        if self.out.join("policy.toml").exists() {
+            return Err(Failure(format!(
+                "{out} holds a policy already; nothing written\n   = hint: choose another --out, or move it away"
+            )));
+        }
+        let found: Vec<u64> = seeds.iter().copied().filter(|seed| self.path(*seed).exists()).collect();
+        match (resume, found.is_empty()) {
+            (false, true) => Ok(BTreeMap::new()),
+            (false, false) => Err(Failure(format!(
+                "{out} holds an interrupted training; nothing written\n   = hint: --resume goes on with it; to begin \
+                 anew, remove {} or choose another --out",
+                self.folder.display()
+            ))),
+            (true, true) => Err(Failure(format!(
+                "nothing to resume\n   = found: no checkpoint of these seeds in {}\n   = hint: without --resume the \
+                 training begins",
+                self.folder.display()
+            ))),
+            (true, false) => found.into_iter().map(|seed| Ok((seed, self.read(seed)?))).collect(),
+        }
+    }
+
+    fn read(&self, seed: u64) -> Result<Vec<u8>, Failure> {
+        let path = self.path(seed);
+        std::fs::read(&path).map_err(|error| Failure(format!("cannot read {}: {error}", path.display())))
+    }
+
+    fn write(&self, seed: u64, bytes: &[u8]) -> Result<(), Failure> {
+        let name = self
+            .path(seed)
+            .file_name()
+            .map(|name| name.to_string_lossy().into_owned());
+        let files = BTreeMap::from([(name.unwrap_or_default(), bytes.to_vec())]);
+        output::write_all(&self.folder, &files)
+    }
+
+    /// They belong to a training that is whole now.
+    fn remove(&self) {
+        // what cannot be removed only takes room
+        let _ = std::fs::remove_dir_all(&self.folder);
+    }
+}

@@ -1,0 +1,139 @@
+//! What a training shows while it runs: a bar per seed on a terminal, lines at intervals in a log.
+
+use std::collections::BTreeMap;
+use std::io::IsTerminal;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressStyle};
+use train::{Ended, Progress, SeedRun, Settings, Watch};
+
+use super::super::grouped;
+use super::Kept;
+use crate::Failure;
+
+const LOG_EVERY: Duration = Duration::from_secs(5);
+
+/// Shows progress and keeps checkpoints.
+pub struct Watcher<'a> {
+    kept: &'a Kept,
+    stop: &'a AtomicBool,
+    steps: u64,
+    view: Mutex<View>,
+}
+
+enum View {
+    Bars(MultiProgress, BTreeMap<u64, ProgressBar>),
+    Log(BTreeMap<u64, Instant>),
+}
+
+impl<'a> Watcher<'a> {
+    pub fn new(settings: &Settings, kept: &'a Kept, stop: &'a AtomicBool) -> Self {
+        let view = if std::io::stderr().is_terminal() {
+            View::Bars(MultiProgress::new(), BTreeMap::new())
+        } else {
+            View::Log(BTreeMap::new())
+        };
+        Self {
+            kept,
+            stop,
+            steps: settings.steps,
+            view: Mutex::new(view),
+        }
+    }
+
+    /// Clears the bars.
+    ///
+    /// # Errors
+    /// If a checkpoint on the way could not be written.
+    pub fn finish(&self) -> Result<(), Failure> {
+        if let Ok(view) = self.view.lock()
+            && let View::Bars(all, _) = &*view
+        {
+            // progress that cannot be shown is no reason to stop
+            let _ = all.clear();
+        }
+        let failure = self.kept.failure.lock().ok().and_then(|mut failure| failure.take());
+        failure.map_or(Ok(()), Err)
+    }
+}
+
+/// Reward, error and how far the best policy is from the specification.
+fn text(progress: &Progress) -> String {
+    let look = &progress.look;
+    let best = if progress.best.is_finite() {
+        format!("{:.3}", progress.best)
+    } else {
+        "-".to_owned()
+    };
+    format!("reward {:7.2}  |e| {:6.3} V  best cost {best}", look.reward, look.error)
+}
+
+impl Watch for Watcher<'_> {
+    fn look(&self, progress: &Progress) {
+        let Ok(mut view) = self.view.lock() else { return };
+        let Progress { seed, look, .. } = *progress;
+        match &mut *view {
+            View::Bars(all, bars) => {
+                let bar = bars.entry(seed).or_insert_with(|| all.add(new_bar(seed, self.steps)));
+                bar.set_position(look.step);
+                bar.set_message(text(progress));
+            }
+            View::Log(shown) => {
+                let last = shown.entry(seed).or_insert_with(Instant::now);
+                if last.elapsed() >= LOG_EVERY {
+                    *last = Instant::now();
+                    eprintln!(
+                        "seed {seed}: {} of {}, {}, {} left at most",
+                        grouped(look.step),
+                        grouped(self.steps),
+                        text(progress),
+                        HumanDuration(Duration::from_secs_f64(progress.remaining.clamp(0.0, 1e9)))
+                    );
+                }
+            }
+        }
+    }
+
+    fn checkpoint(&self, seed: u64, bytes: &[u8]) {
+        if let Err(failure) = self.kept.write(seed, bytes) {
+            // a training that cannot be kept is stopped while it can be told
+            self.stop.store(true, Ordering::Relaxed);
+            if let Ok(mut first) = self.kept.failure.lock() {
+                first.get_or_insert(failure);
+            }
+        }
+    }
+
+    fn ended(&self, seed: u64, run: &SeedRun) {
+        let Ok(mut view) = self.view.lock() else { return };
+        let how = match run.ended {
+            Ended::Met => "meets the specification",
+            Ended::Budget => "has used its budget",
+            Ended::Interrupted => "is interrupted",
+        };
+        let line = format!("seed {seed} {how} after {} control periods", grouped(run.steps));
+        match &mut *view {
+            View::Bars(all, bars) => {
+                if let Some(bar) = bars.remove(&seed) {
+                    bar.finish_and_clear();
+                    all.remove(&bar);
+                }
+                let _ = all.println(line);
+            }
+            View::Log(_) => eprintln!("{line}"),
+        }
+    }
+}
+
+fn new_bar(seed: u64, steps: u64) -> ProgressBar {
+    let bar = ProgressBar::new(steps);
+    let template = "seed {prefix} [{bar:24}] {pos}/{len}  {msg}  {eta} left at most";
+    // a template that does not parse leaves the library's own
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style.progress_chars("=> "));
+    }
+    bar.set_prefix(seed.to_string());
+    bar
+}

@@ -1,0 +1,83 @@
+//! Predictive control with an exact model.
+
+use plant::{Load, Parameters, Signals};
+
+use super::Design;
+use crate::faults::Error;
+use crate::time_optimal::{Target, TimeOptimal};
+
+/// Predictive control on voltage, current and the load's power, with the ideal converter as model: over the delay by
+/// prediction, then [`TimeOptimal`]. What the plant loses beyond the model is learnt from the error of the predicted current.
+///
+/// No gain is tuned but `LEARNING`. It takes any load for constant power, and the current for continuous.
+#[derive(Debug, Clone)]
+pub struct Deadbeat {
+    design: Design,
+    planner: TimeOptimal,
+    /// Commanded, not yet in force; the oldest first.
+    pending: Vec<f64>,
+    /// Duty that makes up for losses.
+    correction: f64,
+    /// Current expected at the next sample, A.
+    expected: Option<f64>,
+}
+
+/// Share of the error of the predicted current that is learnt each period.
+const LEARNING: f64 = 0.05;
+
+impl Deadbeat {
+    /// For the plant with these parameters; its losses, delays and sensors stay unknown to the model.
+    ///
+    /// # Errors
+    /// If the parameters are not those of a converter.
+    pub fn new(parameters: &Parameters, v_ref: f64) -> Result<Self, Error> {
+        let design = Design::new(parameters, v_ref);
+        let mut model = Parameters::ideal(design.v_in, design.l, design.c, 1.0 / design.t);
+        model.converter.rectifier = parameters.converter.rectifier;
+        model.converter.model = parameters.converter.model;
+        model.converter.f_sw = parameters.converter.f_sw;
+        model.pwm.carrier = parameters.pwm.carrier;
+        model.pwm.sampling_phase = parameters.pwm.sampling_phase;
+        Ok(Self {
+            planner: TimeOptimal::new(&model, v_ref, [0.0, 1.0])?,
+            pending: vec![design.rest(); design.delay],
+            correction: 0.0,
+            expected: None,
+            design,
+        })
+    }
+
+    /// The duty for a measurement.
+    pub fn step(&mut self, measured: &Signals) -> f64 {
+        let (mut v, mut i) = (measured.v_out, measured.i_l);
+        let load = Load::power(v * measured.i_out);
+        let gain = self.design.v_in * self.design.t / self.design.l;
+        if let Some(expected) = self.expected
+            && i > 0.0
+        {
+            self.correction += LEARNING * (expected - i) / gain;
+        }
+        let mut expected = None;
+        for n in 0..self.pending.len() {
+            (v, i) = self.planner.predict(v, i, self.pending[n], &load);
+            expected = expected.or(Some(i));
+        }
+        let target = Target {
+            v_out: self.design.v_ref,
+            i_l: (load.power / self.design.v_ref - self.design.half_ripple()).max(0.0),
+        };
+        let planned = self.planner.duty(v, i, &load, target);
+        let duty = (planned + self.correction).clamp(0.0, 1.0);
+        // what the model is to believe: the duty less its correction
+        let believed = (duty - self.correction).clamp(0.0, 1.0);
+        if expected.is_none() {
+            expected = Some(self.planner.predict(v, i, believed, &load).1);
+        }
+        self.expected = expected;
+        if !self.pending.is_empty() {
+            self.pending.remove(0);
+            self.pending.push(believed);
+        }
+        duty
+    }
+}

@@ -1,0 +1,229 @@
+//! What can stand at the controller's place, and its run over all instants of a load step.
+
+use interp::Sample as Word;
+use plant::{Sample, Signals};
+use policy::Policy;
+
+use crate::agent::{Agent, Inputs};
+use crate::baselines::Baseline;
+use crate::environment::Environment;
+use crate::faults::Error;
+use crate::load_step::LoadStep;
+use crate::scenario::{Finding, Instant, Metrics, Record, Task, load_step};
+
+/// What a controller answers to a measurement.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Answer {
+    /// Commanded duty, 0..1.
+    pub duty: f64,
+    /// Index of the chosen action; nothing from a controller without actions.
+    pub action: Option<u32>,
+    /// Status bits of the contract; 0 from others.
+    pub status: u32,
+}
+
+/// A controller that can be switched on again and again.
+pub trait Controller {
+    /// As switched on.
+    ///
+    /// # Errors
+    /// If it cannot be started.
+    fn restart(&mut self) -> Result<(), Error>;
+
+    /// One control period.
+    ///
+    /// # Errors
+    /// If it does not answer.
+    fn step(&mut self, measured: &Signals) -> Result<Answer, Error>;
+}
+
+impl Controller for Agent {
+    fn restart(&mut self) -> Result<(), Error> {
+        self.reset();
+        Ok(())
+    }
+
+    fn step(&mut self, measured: &Signals) -> Result<Answer, Error> {
+        let duty = Agent::step(self, measured)?;
+        let command = self.command();
+        Ok(Answer {
+            duty,
+            action: Some(command.action_index),
+            status: command.status,
+        })
+    }
+}
+
+/// A classical controller that is started from its design.
+#[derive(Debug, Clone)]
+pub struct Classical {
+    design: Baseline,
+    running: Baseline,
+}
+
+impl From<Baseline> for Classical {
+    fn from(design: Baseline) -> Self {
+        Self {
+            running: design.clone(),
+            design,
+        }
+    }
+}
+
+impl Controller for Classical {
+    fn restart(&mut self) -> Result<(), Error> {
+        self.running = self.design.clone();
+        Ok(())
+    }
+
+    fn step(&mut self, measured: &Signals) -> Result<Answer, Error> {
+        Ok(Answer {
+            duty: self.running.control(measured),
+            action: None,
+            status: 0,
+        })
+    }
+}
+
+/// What is asked of a controller that runs elsewhere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Call<'a> {
+    /// Start anew; the answer does not count.
+    Restart,
+    /// One control period with the contract's samples.
+    Step(&'a [Word]),
+}
+
+/// A policy's controller outside of this program, such as compiled code in a process of its own.
+pub struct External<F> {
+    inputs: Inputs,
+    ask: F,
+}
+
+impl<F: FnMut(Call<'_>) -> Result<Answer, String>> External<F> {
+    /// `ask` passes on calls; it fails with a text for the user.
+    ///
+    /// # Errors
+    /// If the contract measures something that the plant does not have.
+    pub fn new(policy: &Policy, ask: F) -> Result<Self, Error> {
+        Ok(Self {
+            inputs: Inputs::new(policy)?,
+            ask,
+        })
+    }
+}
+
+impl<F: FnMut(Call<'_>) -> Result<Answer, String>> Controller for External<F> {
+    fn restart(&mut self) -> Result<(), Error> {
+        (self.ask)(Call::Restart).map(|_| ()).map_err(Error::Mismatch)
+    }
+
+    fn step(&mut self, measured: &Signals) -> Result<Answer, Error> {
+        let samples = self.inputs.samples(measured);
+        (self.ask)(Call::Step(samples)).map_err(Error::Mismatch)
+    }
+}
+
+/// One control period of a trajectory.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Period {
+    /// What the plant did.
+    pub record: Record,
+    /// What the controller said to `record.sample`.
+    pub answer: Answer,
+}
+
+/// A load step at one instant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trajectory {
+    /// When the load stepped.
+    pub instant: Instant,
+    /// Its figures.
+    pub metrics: Metrics,
+    /// Every control period from the start.
+    pub periods: Vec<Period>,
+}
+
+impl Trajectory {
+    /// The first period in which two trajectories differ in a bit.
+    #[must_use]
+    pub fn first_difference(&self, other: &Self) -> Option<usize> {
+        let bits = |period: &Period| {
+            let Record {
+                time,
+                sample,
+                duty,
+                load,
+            } = period.record;
+            let numbers = [
+                time,
+                duty,
+                sample.v_out,
+                sample.i_l,
+                sample.i_out,
+                sample.v_in,
+                sample.v_min,
+                sample.v_max,
+                sample.i_min,
+                sample.i_max,
+                load.power,
+                load.current,
+                load.conductance,
+            ];
+            (numbers.map(f64::to_bits), period.answer.action, period.answer.status)
+        };
+        let (a, b) = (&self.periods, &other.periods);
+        let differs = a.iter().zip(b).position(|(a, b)| bits(a) != bits(b));
+        differs.or((a.len() != b.len()).then_some(a.len().min(b.len())))
+    }
+}
+
+/// A load step over all instants of a task, every one from a fresh start of plant and controller. The finding is that of
+/// [`crate::scenario::survey`].
+///
+/// # Errors
+/// If plant or controller cannot be started, or the controller does not answer.
+pub fn examine<E: Environment>(
+    environment: &E,
+    controller: &mut dyn Controller,
+    v_ref: f64,
+    task: &Task,
+    step: LoadStep,
+) -> Result<(Finding, Vec<Trajectory>), Error> {
+    let mut finding = Finding {
+        kind: step.kind,
+        load_step: step.values,
+        at_sample: Metrics::default(),
+        worst: Metrics::default(),
+    };
+    let mut trajectories = Vec::new();
+    for instant in task.all_instants() {
+        controller.restart()?;
+        let (mut answers, mut failure) = (Vec::new(), None);
+        let ask = |sample: &Sample| match controller.step(&sample.measured) {
+            Ok(answer) => {
+                answers.push(answer);
+                answer.duty
+            }
+            Err(error) => {
+                failure.get_or_insert(error);
+                f64::NAN
+            }
+        };
+        let (metrics, records) = load_step(environment.clone(), ask, v_ref, task, step, instant)?;
+        if let Some(error) = failure {
+            return Err(error);
+        }
+        finding.worst = finding.worst.worst(metrics);
+        if instant.phase == 0.0 {
+            finding.at_sample = finding.at_sample.worst(metrics);
+        }
+        let periods = records.into_iter().zip(answers);
+        trajectories.push(Trajectory {
+            instant,
+            metrics,
+            periods: periods.map(|(record, answer)| Period { record, answer }).collect(),
+        });
+    }
+    Ok((finding, trajectories))
+}

@@ -1,0 +1,324 @@
+//! What no controller can beat: the smallest deviation and the shortest settling time that any sequence of duties reaches.
+//!
+//! The converter rests at `v_ref`, switching steadily, when the load steps. A controller that knows everything from the
+//! first sampling instant on which the step shows then plays many sequences: full effort for whole and broken periods, and
+//! from there the time-optimal way to rest ([`TimeOptimal`]), also by way of the far edge of the settling band. The best of
+//! them counts, figure by figure.
+//!
+//! The circuit is the plain one: source, switches with resistances and forward voltages, L with its resistance, C, load,
+//! bleed, and the delay of the duty. Everything else a plant file may have is left out.
+
+use plant::{Load, Model, Parameters, Plant, Sample};
+
+use crate::faults::Error;
+use crate::load_step::LoadStep;
+use crate::scenario::SETTLED;
+use crate::time_optimal::{Target, TimeOptimal};
+
+/// The smallest figures that can be reached; each may need another sequence of duties.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bound {
+    /// Largest |e| at the sampling instants after the step, V.
+    pub deviation: f64,
+    /// Largest error to the side of the step (dip where the load rises, else overshoot), between the samples too, V.
+    pub extreme: f64,
+    /// From the step to the last sample outside +-0.5 V, s.
+    pub settling: f64,
+}
+
+/// The limits of one load step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limit {
+    /// Load step at a sampling instant, which shows it.
+    pub at_sample: Bound,
+    /// Load step at the worst of the instants that are tried.
+    pub worst: Bound,
+    /// Load step just behind a sampling instant.
+    pub behind: Bound,
+}
+
+/// What may be done about a load step, and with what.
+#[derive(Debug, Clone)]
+pub struct Question {
+    from: Load,
+    to: Load,
+    v_ref: f64,
+    range: [f64; 2],
+    /// At rest under the load before.
+    resting: Plant,
+    duty: f64,
+    target: Target,
+    planner: TimeOptimal,
+}
+
+/// A sequence of duties that is tried.
+#[derive(Debug, Clone, Copy)]
+struct Strategy {
+    /// Periods of full effort; the last one may be broken.
+    effort: f64,
+    /// How far beyond `v_ref` to aim until the voltage is within the settling band, V.
+    beyond: f64,
+}
+
+/// Just behind a sampling instant, in periods.
+const BEHIND: f64 = 1e-6;
+/// Broken periods of full effort.
+const PARTS: usize = 16;
+/// Aims beyond `v_ref` for the settling time, V.
+const AIMS: [f64; 6] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.47];
+/// Periods that are looked at.
+const HORIZON: usize = 300;
+/// Periods at rest after which nothing more can come.
+const AT_REST: usize = 6;
+
+impl Question {
+    /// For a plant, with duties within `range`.
+    ///
+    /// # Errors
+    /// If the parameters are not those of a converter, or it cannot rest at `v_ref` with a duty within `range`.
+    pub fn new(parameters: &Parameters, v_ref: f64, step: LoadStep, range: [f64; 2]) -> Result<Self, Error> {
+        let parameters = plain(parameters);
+        let [from, to] = step.loads();
+        let rest = |load: &Load| -> Result<(Plant, f64), Error> {
+            let mut plant = Plant::new(&parameters)?;
+            let settled = plant.settle(v_ref, load);
+            if settled.converged && settled.duty > range[0] && settled.duty < range[1] {
+                return Ok((plant, settled.duty));
+            }
+            let [low, high] = range;
+            Err(Error::Mismatch(format!(
+                "there is no limit for {step}: the plant does not rest at {v_ref} V with a duty within {low}..{high}"
+            )))
+        };
+        let (resting, duty) = rest(&from)?;
+        let (after, _) = rest(&to)?;
+        let target = Target {
+            v_out: v_ref,
+            i_l: after.sample().i_l,
+        };
+        Ok(Self {
+            from,
+            to,
+            v_ref,
+            range,
+            resting,
+            duty,
+            target,
+            planner: TimeOptimal::new(&parameters, v_ref, range)?,
+        })
+    }
+
+    /// The limits over load steps at a sampling instant and at these phases of the period.
+    #[must_use]
+    pub fn answer(&self, phases: &[f64]) -> Limit {
+        let at_sample = self.bound(0.0);
+        let behind = self.bound(BEHIND);
+        // the sooner behind a sampling instant, the longer the step goes unseen
+        let first = phases.iter().copied().filter(|phase| *phase > 0.0).reduce(f64::min);
+        let worst = first.map_or(at_sample, |phase| {
+            let bound = self.bound(phase);
+            Bound {
+                deviation: bound.deviation.max(at_sample.deviation),
+                extreme: bound.extreme.max(at_sample.extreme),
+                settling: bound.settling.max(at_sample.settling),
+            }
+        });
+        Limit {
+            at_sample,
+            worst,
+            behind,
+        }
+    }
+
+    /// The limits of a load step at `phase` of a period, 0 meaning at a sampling instant that shows it.
+    #[must_use]
+    pub fn bound(&self, phase: f64) -> Bound {
+        let mut best: Option<Bound> = None;
+        let mut attempt = |strategy: Strategy| {
+            let tried = self.attempt(phase, strategy);
+            best = Some(best.map_or(tried, |best| Bound {
+                deviation: best.deviation.min(tried.deviation),
+                extreme: best.extreme.min(tried.extreme),
+                settling: best.settling.min(tried.settling),
+            }));
+            tried
+        };
+        for beyond in AIMS {
+            attempt(Strategy { effort: 0.0, beyond });
+        }
+        // more full effort first helps the deviation, then the swing to the other side grows beyond it
+        let mut least = f64::INFINITY;
+        for part in 1..PARTS * HORIZON {
+            let effort = part as f64 / PARTS as f64;
+            let tried = attempt(Strategy { effort, beyond: 0.0 });
+            least = least.min(tried.deviation);
+            if tried.deviation > 1.2 * least + 0.1 {
+                break;
+            }
+        }
+        best.unwrap_or(Bound {
+            deviation: f64::INFINITY,
+            extreme: f64::INFINITY,
+            settling: f64::INFINITY,
+        })
+    }
+
+    /// The direction of a step: 1 where the duty must rise.
+    fn direction(&self) -> f64 {
+        let i_out = |load: &Load| load.conductance * self.v_ref + load.current + load.power / self.v_ref;
+        if i_out(&self.to) >= i_out(&self.from) {
+            1.0
+        } else {
+            -1.0
+        }
+    }
+
+    fn full(&self) -> f64 {
+        if self.direction() > 0.0 {
+            self.range[1]
+        } else {
+            self.range[0]
+        }
+    }
+
+    fn attempt(&self, phase: f64, strategy: Strategy) -> Bound {
+        let (mut plant, mut planner) = (self.resting.clone(), self.planner.clone());
+        let mut run = Run::new(self, phase);
+        if phase > 0.0 {
+            run.note(&plant.step_with_change(self.duty, &self.from, &self.to, phase));
+        }
+        let delay = plant.parameters().pwm.duty_delay as usize;
+        let mut pending = vec![self.duty; delay];
+        let beyond = self.direction() * strategy.beyond;
+        let mut entered = strategy.beyond == 0.0;
+        for n in 0..HORIZON {
+            let sample = plant.sample();
+            let (mut v, mut i) = (sample.v_out, sample.i_l);
+            entered |= n > 0 && (v - self.v_ref).abs() < SETTLED && run.left;
+            for duty in &pending {
+                (v, i) = planner.predict(v, i, *duty, &self.to);
+            }
+            let aim = if entered { 0.0 } else { beyond };
+            let target = Target {
+                v_out: self.v_ref + aim,
+                ..self.target
+            };
+            let planned = planner.duty(v, i, &self.to, target);
+            let share = (strategy.effort - n as f64).clamp(0.0, 1.0);
+            let duty = share * self.full() + (1.0 - share) * planned;
+            if delay > 0 {
+                pending.remove(0);
+                pending.push(duty);
+            }
+            run.note(&plant.step(duty, &self.to));
+            if run.at_rest >= AT_REST {
+                break;
+            }
+        }
+        run.bound
+    }
+}
+
+/// What is seen of one attempt.
+struct Run {
+    v_ref: f64,
+    /// 1 where the voltage dips.
+    direction: f64,
+    t: f64,
+    phase: f64,
+    periods: usize,
+    at_rest: usize,
+    /// The voltage has been outside of the settling band.
+    left: bool,
+    bound: Bound,
+}
+
+impl Run {
+    fn new(question: &Question, phase: f64) -> Self {
+        let bound = Bound {
+            deviation: 0.0,
+            extreme: 0.0,
+            settling: 0.0,
+        };
+        Self {
+            v_ref: question.v_ref,
+            direction: question.direction(),
+            t: question.resting.t_sample(),
+            phase,
+            periods: 0,
+            at_rest: 0,
+            left: false,
+            bound,
+        }
+    }
+
+    fn note(&mut self, sample: &Sample) {
+        self.periods += 1;
+        let error = (sample.v_out - self.v_ref).abs();
+        let error = if error.is_finite() { error } else { f64::INFINITY };
+        self.bound.deviation = self.bound.deviation.max(error);
+        let swing = if self.direction > 0.0 {
+            self.v_ref - sample.v_min
+        } else {
+            sample.v_max - self.v_ref
+        };
+        self.bound.extreme = self
+            .bound
+            .extreme
+            .max(if swing.is_finite() { swing } else { f64::INFINITY });
+        if error > SETTLED {
+            self.left = true;
+            self.bound.settling = (self.periods as f64 - self.phase) * self.t;
+        }
+        self.at_rest = if error < 1e-6 * self.v_ref { self.at_rest + 1 } else { 0 };
+    }
+}
+
+/// The circuit without what the limit leaves out.
+fn plain(parameters: &Parameters) -> Parameters {
+    let p = parameters;
+    let mut plain = Parameters {
+        converter: p.converter.clone(),
+        ..Parameters::default()
+    };
+    plain.converter.model = Model::Switched;
+    plain.pwm.carrier = p.pwm.carrier;
+    plain.pwm.sampling_phase = p.pwm.sampling_phase;
+    plain.pwm.duty_delay = p.pwm.duty_delay;
+    plain.inductor.dcr = p.inductor.dcr;
+    plain.switch.r_ds_on = p.switch.r_ds_on;
+    plain.switch.r_ds_on_low = p.switch.r_ds_on_low;
+    plain.switch.v_f = p.switch.v_f;
+    plain.switch.r_d = p.switch.r_d;
+    plain.load.bleed = p.load.bleed;
+    plain.load.v_fold = p.load.v_fold;
+    plain
+}
+
+/// The first extreme of the voltage error (V, as a size) under full effort from the instant of the load step on, in the
+/// averaged model: a limit for a controller without sampling and modulator.
+///
+/// # Errors
+/// If the parameters are not those of a converter.
+pub fn averaged(parameters: &Parameters, v_ref: f64, step: LoadStep, range: [f64; 2]) -> Result<f64, Error> {
+    let mut averaged = plain(parameters);
+    averaged.converter.model = Model::Averaged;
+    averaged.pwm.duty_delay = 0;
+    averaged.pwm.sampling_phase = 0.0;
+    let mut plant = Plant::new(&averaged)?;
+    let [from, to] = step.loads();
+    plant.settle(v_ref, &from);
+    let rest = plant.sample();
+    let mut largest = 0.0_f64;
+    let up = to.conductance * v_ref + to.current + to.power / v_ref > rest.i_out;
+    for _ in 0..HORIZON {
+        let sample = plant.step(if up { range[1] } else { range[0] }, &to);
+        let swing = if up { v_ref - sample.v_min } else { sample.v_max - v_ref };
+        largest = largest.max(swing);
+        // the current has overtaken the load's
+        if (sample.i_l > sample.i_out) == up {
+            break;
+        }
+    }
+    Ok(largest)
+}

@@ -1,0 +1,178 @@
+//! A converter as an ngspice netlist, written from the circuit diagram, not from the plant's code.
+
+use std::fmt::Write;
+
+use plant::{Load, Parameters, Rectifier};
+
+/// Drop of the ideal diode at a few amperes, V; taken off `v_f`.
+const DIODE_DROP: f64 = 0.05 * 0.025_86 * 14.9;
+
+/// What a run reads: output voltage, inductor current, load current, input voltage, low-passed output voltage.
+pub const COLUMNS: &str = "v(out) i(vil) i(vout) v(nin) v(lp)";
+
+/// Sources that a run sets: gates (1 is on), power (W), current (A) and conductance (S) of the load. Each is a voltage source
+/// `V<name>` between the node `<name>` and ground.
+pub const SOURCES: [&str; 5] = ["gu", "gl", "pw", "cc", "gg"];
+
+/// A converter at its start.
+#[derive(Debug, Clone, Copy)]
+pub struct Circuit<'a> {
+    /// What it is made of.
+    pub parameters: &'a Parameters,
+    /// Output voltage, V.
+    pub v_out: f64,
+    /// Inductor current, A.
+    pub i_l: f64,
+    /// Load set at the start; its currents are the initial ones of cable and regulation.
+    pub load: &'a Load,
+}
+
+/// The netlist without its [`SOURCES`] and analysis.
+#[must_use]
+pub fn netlist(circuit: &Circuit<'_>) -> String {
+    let p = circuit.parameters;
+    let mut n = "* converter\n.model DI D(IS=1e-6 N=0.05 RS=1e-4)\n".to_owned();
+    source(&mut n, p, circuit.i_l * circuit.v_out / p.converter.v_in);
+    leg(&mut n, p);
+    inductor(&mut n, p, circuit.i_l);
+    capacitor(&mut n, circuit);
+    load(&mut n, circuit);
+    let tau = p.sensors.v_out.low_pass.max(1e-12);
+    let _ = writeln!(
+        n,
+        "Blp lp0 0 V=V(out)\nRlp lp0 lp 1k\nClp lp 0 {:e} ic={}\n\
+         .options reltol=1e-5 abstol=1e-9 vntol=1e-7 chgtol=1e-16",
+        tau / 1e3,
+        circuit.v_out
+    );
+    n
+}
+
+/// What the load draws when `load` is set: power W, current A, conductance S (the levels of `pw`, `cc`, `gg`).
+#[must_use]
+pub fn drawn(p: &Parameters, load: &Load) -> [f64; 3] {
+    let b = &p.load;
+    [
+        load.power * b.setting_gain,
+        load.current * b.setting_gain,
+        load.conductance * b.resistor_gain + b.bleed,
+    ]
+}
+
+fn source(n: &mut String, p: &Parameters, i_in: f64) {
+    let s = &p.source;
+    let v_in = p.converter.v_in;
+    let _ = writeln!(
+        n,
+        "Vs s0 0 SIN({v_in} {} {} 0 0 {})",
+        s.ripple,
+        s.ripple_frequency.max(1e-3),
+        s.ripple_phase * 360.0
+    );
+    let _ = writeln!(n, "Rs s0 s1 {:e}", s.resistance.max(1e-6));
+    match s.inductance > 0.0 {
+        true => writeln!(n, "Ls s1 nin {:e} ic={i_in}", s.inductance),
+        false => writeln!(n, "Vsj s1 nin 0"),
+    }
+    .unwrap_or_default();
+    if s.c_in > 0.0 {
+        let v = v_in - s.resistance * i_in;
+        let _ = writeln!(n, "Rci nin ci {:e}\nCi ci 0 {:e} ic={v}", s.esr_in.max(1e-6), s.c_in);
+    }
+}
+
+fn leg(n: &mut String, p: &Parameters) {
+    let s = &p.switch;
+    let diode = |n: &mut String, name: &str, from: &str, to: &str| {
+        let (v, r) = (s.v_f - DIODE_DROP, (s.r_d - 1e-4).max(1e-5));
+        let _ = writeln!(
+            n,
+            "D{name} {from} {name}1 DI\nV{name} {name}1 {name}2 {v}\nR{name} {name}2 {to} {r:e}"
+        );
+    };
+    let _ = writeln!(n, "Bu nin sw I=V(nin,sw)*(V(gu)/{:e}+1e-9)", s.r_ds_on.max(1e-4));
+    diode(n, "dl", "0", "sw");
+    diode(n, "du", "sw", "nin");
+    if p.converter.rectifier == Rectifier::Synchronous {
+        let _ = writeln!(n, "Bl sw 0 I=V(sw)*(V(gl)/{:e}+1e-9)", s.r_ds_on_low.max(1e-4));
+    }
+}
+
+fn inductor(n: &mut String, p: &Parameters, i_l: f64) {
+    let (l, i) = (p.converter.inductance, &p.inductor);
+    if i.saturation > 0.0 {
+        let x = format!("(V(fl)/{})", i.i_sat);
+        let value = format!("{l:e}*(1-{}*{x}*{x}/(1+{x}*{x}))", i.saturation);
+        let _ = writeln!(
+            n,
+            "Cfl fl 0 1 ic={i_l}\nBfl 0 fl I=V(sw,x1)/({value})\nBil sw x1 I=V(fl)"
+        );
+    } else {
+        let _ = writeln!(n, "L1 sw x1 {l:e} ic={i_l}");
+    }
+    if i.core_conductance > 0.0 {
+        let _ = writeln!(n, "Rcore sw x1 {:e}", 1.0 / i.core_conductance);
+    }
+    let _ = writeln!(n, "Vil x1 x2 0\nRl x2 out {:e}", i.dcr.max(1e-6));
+}
+
+fn capacitor(n: &mut String, circuit: &Circuit<'_>) {
+    let (p, v_out) = (circuit.parameters, circuit.v_out);
+    let (c, k) = (p.converter.capacitance, &p.capacitor);
+    // with the load gains at 1, as where there is an ESR or ESL
+    let set = circuit.load;
+    let i_c = circuit.i_l - p.load.bleed * v_out - set.conductance * v_out - set.current - set.power / v_out;
+    let v_c = v_out - k.esr * i_c;
+    let _ = writeln!(n, "Rc out c1 {:e}", k.esr.max(1e-6));
+    match k.esl > 0.0 {
+        true => writeln!(
+            n,
+            "Lc c1 c2 {:e} ic={i_c}\nRlc c1 c2 5\nCsn out 0 100p ic={v_out}",
+            k.esl
+        ),
+        false => writeln!(n, "Vcj c1 c2 0"),
+    }
+    .unwrap_or_default();
+    if k.derating > 0.0 {
+        let x = format!("(V(vc)/{})", k.v_half);
+        let value = format!("{c:e}*(1-{}*{x}*{x}/(1+{x}*{x}))", k.derating);
+        let _ = writeln!(
+            n,
+            "Vci c2 c3 0\nBc3 c3 0 V=V(vc)\nCvc vc 0 1 ic={v_c}\nBvc 0 vc I=I(Vci)/({value})"
+        );
+    } else {
+        let _ = writeln!(n, "C1 c2 0 {c:e} ic={v_c}");
+    }
+}
+
+fn load(n: &mut String, circuit: &Circuit<'_>) {
+    let (p, v_out) = (circuit.parameters, circuit.v_out);
+    let b = &p.load;
+    let _ = writeln!(n, "Vout out ld0 0");
+    let [power, current, conductance] = drawn(p, circuit.load);
+    if p.cable.inductance > 0.0 {
+        let i = conductance * v_out + current + power / v_out;
+        let c = &p.cable;
+        let _ = writeln!(
+            n,
+            "Rcab ld0 ld1 {:e}\nLcab ld1 ld {:e} ic={i}",
+            c.resistance.max(1e-6),
+            c.inductance
+        );
+        let _ = writeln!(n, "Ccab ld 0 {:e} ic={v_out}", c.capacitance);
+    } else {
+        let _ = writeln!(n, "Vcab ld0 ld 0");
+    }
+    let _ = writeln!(n, "Bg ld 0 I=V(gg)*V(ld)\nBcc ld 0 I=V(cc)");
+    if b.cpl_time_constant > 0.0 {
+        let _ = writeln!(n, "Bp0 p0 0 V=V(pw)/max(V(ld),{})", b.v_fold);
+        let _ = writeln!(
+            n,
+            "Rp p0 ip 1\nCp ip 0 {:e} ic={}\nBp ld 0 I=V(ip)",
+            b.cpl_time_constant,
+            power / v_out
+        );
+    } else {
+        let _ = writeln!(n, "Bp ld 0 I=V(pw)/max(V(ld),{})", b.v_fold);
+    }
+}

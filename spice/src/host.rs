@@ -1,0 +1,159 @@
+//! The program between ngspice's shared library and us: built once per process, one child per converter.
+
+use std::fmt::Write as _;
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::OnceLock;
+
+use closed_loop::Error;
+use tempfile::TempDir;
+
+/// What to type where ngspice's library is missing.
+pub const INSTALL: &str = "ngspice's shared library is needed; type\n    sudo apt-get update && sudo apt-get install -y \
+    --no-install-recommends libngspice0-dev gcc libc6-dev\nor `cargo xtask test`, which does so";
+
+const SOURCE: &str = include_str!("../host/host.c");
+
+/// The sources that a run sets, in the order of the host program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Source {
+    UpperGate = 0,
+    LowerGate = 1,
+    Power = 2,
+    Current = 3,
+    Conductance = 4,
+}
+
+/// A source goes to another level.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Edge {
+    pub source: Source,
+    /// s from the start of the control period; may lie before or behind it.
+    pub time: f64,
+    /// s
+    pub rise: f64,
+    pub level: f64,
+}
+
+/// What ngspice says at a sampling instant.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Row {
+    pub v_out: f64,
+    pub i_l: f64,
+    pub i_out: f64,
+    pub v_in: f64,
+    /// Lowest and highest output voltage, then inductor current, since the row before.
+    pub extremes: [f64; 4],
+}
+
+/// A netlist in the middle of its transient.
+#[derive(Debug)]
+pub struct Host {
+    child: Child,
+    input: Option<ChildStdin>,
+    output: BufReader<ChildStdout>,
+    _folder: TempDir,
+}
+
+impl Host {
+    /// Starts `netlist` and returns the start; `before` are the edges behind it.
+    pub(crate) fn start(netlist: &str, t_sample: f64, before: &[Edge]) -> Result<(Self, Row), Error> {
+        let folder = tempfile::tempdir().map_err(|error| failed("make a folder", &error))?;
+        let file = folder.path().join("circuit.cir");
+        std::fs::write(&file, netlist).map_err(|error| failed("write a netlist", &error))?;
+        let mut command = Command::new(program()?);
+        command.arg(&file).arg(format!("{t_sample:e}"));
+        command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::inherit());
+        let mut child = command.spawn().map_err(|error| failed("start ngspice", &error))?;
+        let (Some(input), Some(output)) = (child.stdin.take(), child.stdout.take()) else {
+            return Err(Error::Mismatch("ngspice has no pipes".to_owned()));
+        };
+        let mut host = Self {
+            child,
+            input: Some(input),
+            output: BufReader::new(output),
+            _folder: folder,
+        };
+        let row = host.period(before)?;
+        Ok((host, row))
+    }
+
+    /// The edges of a control period; returns its end.
+    pub(crate) fn period(&mut self, edges: &[Edge]) -> Result<Row, Error> {
+        let mut line = edges.len().to_string();
+        for edge in edges {
+            // writing to a String cannot fail
+            let _ = write!(
+                line,
+                " {} {:e} {:e} {:e}",
+                edge.source as u8, edge.time, edge.rise, edge.level
+            );
+        }
+        line.push('\n');
+        if let Some(input) = &mut self.input {
+            let sent = input.write_all(line.as_bytes()).and_then(|()| input.flush());
+            sent.map_err(|error| failed("talk to ngspice", &error))?;
+        }
+        self.row()
+    }
+
+    fn row(&mut self) -> Result<Row, Error> {
+        let mut line = String::new();
+        let read = self.output.read_line(&mut line);
+        read.map_err(|error| failed("hear ngspice", &error))?;
+        let numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+        match numbers[..] {
+            [_, v_out, i_l, i_out, v_in, a, b, c, d] => Ok(Row {
+                v_out,
+                i_l,
+                i_out,
+                v_in,
+                extremes: [a, b, c, d],
+            }),
+            _ => Err(Error::Mismatch("ngspice ended early; its words are above".to_owned())),
+        }
+    }
+}
+
+impl Drop for Host {
+    fn drop(&mut self) {
+        // the end of its input ends it
+        self.input = None;
+        let _ = self.child.wait();
+    }
+}
+
+fn failed(what: &str, error: &std::io::Error) -> Error {
+    Error::Mismatch(format!("cannot {what}: {error}"))
+}
+
+/// The built host program.
+fn program() -> Result<&'static Path, Error> {
+    static PROGRAM: OnceLock<Result<(TempDir, PathBuf), String>> = OnceLock::new();
+    match PROGRAM.get_or_init(build) {
+        Ok((_, path)) => Ok(path),
+        Err(text) => Err(Error::Mismatch(text.clone())),
+    }
+}
+
+fn build() -> Result<(TempDir, PathBuf), String> {
+    let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
+    let (source, program) = (folder.path().join("host.c"), folder.path().join("host"));
+    std::fs::write(&source, SOURCE).map_err(|error| error.to_string())?;
+    let mut command = Command::new("gcc");
+    command
+        .args(["-std=c99", "-O2", "-o"])
+        .arg(&program)
+        .arg(&source)
+        .arg("-lngspice");
+    let output = command.output().map_err(|error| format!("gcc: {error}\n{INSTALL}"))?;
+    if !output.status.success() {
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        return Err(format!("{INSTALL}\n\n{said}"));
+    }
+    Ok((folder, program))
+}

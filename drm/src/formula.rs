@@ -39,7 +39,7 @@ impl Losses {
     #[must_use]
     pub fn of(plant: &Parameters) -> Option<Self> {
         let switch = &plant.switch;
-        (plant.converter.rectifier == Rectifier::Diode).then(|| Losses {
+        (plant.converter.rectifier == Rectifier::Diode).then_some(Losses {
             v_in: plant.converter.v_in,
             v_f: switch.v_f,
             r_d: switch.r_d,

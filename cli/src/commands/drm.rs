@@ -1,6 +1,7 @@
 //! `policyc drm`: the duty ratio mapping
 
 mod acquire;
+mod bench;
 mod fit;
 mod judge;
 

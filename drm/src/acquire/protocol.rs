@@ -36,7 +36,7 @@ const STANDING: f64 = 0.95;
 ///
 /// # Errors
 /// Those of the bench.
-pub fn measure<B: Bench>(
+pub fn measure<B: Bench + ?Sized>(
     bench: &mut B,
     nominal: &Parameters,
     point: &PlanPoint,
@@ -50,7 +50,7 @@ pub fn measure<B: Bench>(
     held(bench, nominal, point, Hold::ClosedLoop(v_out), protocol)
 }
 
-fn held<B: Bench>(
+fn held<B: Bench + ?Sized>(
     bench: &mut B,
     nominal: &Parameters,
     point: &PlanPoint,
@@ -119,7 +119,7 @@ struct Window {
 }
 
 impl Window {
-    fn run<B: Bench>(
+    fn run<B: Bench + ?Sized>(
         bench: &mut B,
         drive: &mut Drive,
         load: &Load,

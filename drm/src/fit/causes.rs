@@ -69,16 +69,18 @@ impl Cause {
     }
 }
 
-/// Every single cause and every pair, the best first within each size; left out is what the table cannot solve and what
-/// no converter can have.
-pub(crate) fn explain(points: &[Point]) -> Vec<Explanation> {
+/// Every single cause and every pair, the best first within each size; left out is what the table cannot solve.
+///
+/// The second list has what no converter can have, such as a diode that lifts the voltage.
+pub(crate) fn explain(points: &[Point]) -> (Vec<Explanation>, Vec<Explanation>) {
     let mut sets: Vec<Vec<Cause>> = Cause::ALL.iter().map(|cause| vec![*cause]).collect();
     for (index, one) in Cause::ALL.iter().enumerate() {
         sets.extend(Cause::ALL[index + 1..].iter().map(|other| vec![*one, *other]));
     }
     let mut list: Vec<Explanation> = sets.iter().filter_map(|set| explanation(set, points)).collect();
     list.sort_by(|a, b| a.causes.len().cmp(&b.causes.len()).then(a.rms_v.total_cmp(&b.rms_v)));
-    list
+    let can_be = |e: &Explanation| e.causes.iter().all(|(cause, value)| cause.can_be(*value));
+    list.into_iter().partition(can_be)
 }
 
 fn explanation(set: &[Cause], points: &[Point]) -> Option<Explanation> {
@@ -86,9 +88,6 @@ fn explanation(set: &[Cause], points: &[Point]) -> Option<Explanation> {
         return None;
     }
     let values = solve(set, points)?;
-    if !set.iter().zip(&values).all(|(cause, value)| cause.can_be(*value)) {
-        return None;
-    }
     let errors: Vec<f64> = points.iter().map(|point| missing(set, &values, point)).collect();
     let left_out = points.iter().enumerate().map(|(index, point)| {
         let values = solve(set, &without(points, index))?;
@@ -134,9 +133,19 @@ fn solve(set: &[Cause], points: &[Point]) -> Option<Vec<f64>> {
     }
 }
 
+/// An explanation whose error is larger than the best one's by less than this factor fits as well.
+const AS_WELL: f64 = 1.2;
+
+/// Those of `list` that fit as well as the best of `ties` and are as simple.
+pub(crate) fn as_good<'a>(list: &'a [Explanation], ties: &[&Explanation]) -> Vec<&'a Explanation> {
+    let best = ties.iter().map(|e| e.rms_v).fold(f64::INFINITY, f64::min);
+    let size = ties.first().map_or(0, |e| e.causes.len());
+    let fits = |e: &&Explanation| e.causes.len() == size && e.rms_v <= AS_WELL * best + 1e-9;
+    list.iter().filter(fits).collect()
+}
+
 /// Explanations of the same size as the best that fit as well as it.
 pub(crate) fn ties(list: &[Explanation]) -> Vec<&Explanation> {
-    const AS_WELL: f64 = 1.2;
     let Some(size) = list.iter().map(|e| e.causes.len()).max() else {
         return Vec::new();
     };

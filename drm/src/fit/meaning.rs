@@ -8,7 +8,7 @@ use crate::table::Point;
 /// A coefficient counts as known if it is this many standard errors away from no effect.
 const KNOWN: f64 = 2.0;
 
-pub(crate) fn of(fit: &Fit, points: &[Point], explanations: &[Explanation]) -> Vec<String> {
+pub(crate) fn of(fit: &Fit, points: &[Point], explanations: &[Explanation], impossible: &[Explanation]) -> Vec<String> {
     let mut meaning = Vec::new();
     let apart = fit.separation.directions == fit.separation.predictors && fit.separation.condition <= 30.0;
     let mean = |of: &dyn Fn(&Point) -> f64| points.iter().map(of).sum::<f64>() / points.len().max(1) as f64;
@@ -31,6 +31,11 @@ pub(crate) fn of(fit: &Fit, points: &[Point], explanations: &[Explanation]) -> V
     if ties.len() > 1 {
         meaning.push("a tie: each of these explains the table as well, and it cannot say which is true:".to_owned());
         meaning.extend(ties.iter().map(|tie| format!("  {}", describe(tie))));
+        let beside = causes::as_good(impossible, &ties);
+        if !beside.is_empty() {
+            meaning.push("as good in figures, but no converter has it:".to_owned());
+            meaning.extend(beside.iter().map(|one| format!("  {}", describe(one))));
+        }
     }
     meaning
 }
@@ -72,7 +77,10 @@ fn three(fit: &Fit, v_in: f64, meaning: &mut Vec<String>) {
 fn four(fit: &Fit, v_in: f64, v_sim: f64, meaning: &mut Vec<String>) {
     let (k, se) = (fit.map.coefficients, fit.standard_errors);
     let (r, se_r) = (k.r.unwrap_or(0.0), se.r.unwrap_or(0.0));
-    meaning.push("if v_out, i_out and v_in are measured without gain error, to first order in R i / v_in:".to_owned());
+    meaning.push("if v_out, i_out and v_in have no gain error and are means over the period (samples at one instant of the ripple \
+         shift V_f and lost duty), to first order in R i / v_in; +- is the scatter alone:"
+            .to_owned(),
+    );
     let (v, se_v) = (v_sim / k.a, v_sim * se.a / (k.a * k.a));
     let v_f = v - v_in;
     let claim = |name: &str, value: f64, error: f64, unit: &str| {

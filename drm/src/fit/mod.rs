@@ -158,9 +158,9 @@ pub fn fit(table: &Table, options: &FitOptions) -> Result<Report, Faults> {
     let fit = fits.remove(chosen);
     let other = fits.pop();
     remarks(&fit, &points, options, &mut notes);
-    let explanations = causes::explain(&points);
+    let (explanations, impossible) = causes::explain(&points);
     Ok(Report {
-        meaning: meaning::of(&fit, &points, &explanations),
+        meaning: meaning::of(&fit, &points, &explanations, &impossible),
         fit,
         other,
         outliers,

@@ -194,9 +194,9 @@ fn rotate(a: &mut [Vec<f64>], p: usize, q: usize) {
     for row in a.iter_mut() {
         (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
     }
-    for k in 0..a.len() {
-        (a[p][k], a[q][k]) = (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
-    }
+    let (row_p, row_q) = (a[p].clone(), a[q].clone());
+    let turned = |x: f64, y: f64| row_p.iter().zip(&row_q).map(|(p, q)| x * p + y * q).collect();
+    (a[p], a[q]) = (turned(c, -s), turned(s, c));
 }
 
 #[cfg(test)]

@@ -1,12 +1,13 @@
 //! `policyc drm acquire`
 
-use std::convert::Infallible;
 use std::path::PathBuf;
 
 use clap::Args;
-use drm::acquire::{Plan, Protocol, Simulated, measure};
+use drm::acquire::{Plan, Protocol, measure};
+use plant::Parameters;
 
 use super::Loads;
+use super::bench::Simulator;
 use crate::{Failure, Outcome, output};
 
 #[derive(Debug, Args)]
@@ -14,6 +15,9 @@ pub struct Acquire {
     /// The converter to measure, simulated; without it a plan for the bench is written
     #[arg(long, value_name = "FILE")]
     pub plant: Option<PathBuf>,
+    /// What simulates it
+    #[arg(long, value_enum, default_value_t = Simulator::Plant, requires = "plant")]
+    pub simulator: Simulator,
     /// Nominal input voltage in V; with --plant the plant's unless given
     #[arg(long, value_name = "V", required_unless_present = "plant")]
     pub v_in: Option<f64>,
@@ -74,23 +78,33 @@ pub fn run(options: &Acquire) -> Result<Outcome, Failure> {
         Some(path) => plan.resume(&super::source(path)?)?,
         None => 0,
     };
-    let mut measured = 0;
-    if let Some(parameters) = &parameters {
-        let mut bench = Simulated::new(parameters)?;
-        let protocol = Protocol {
-            window: options.window as usize,
-            most_windows: options.most_windows as usize,
-        };
-        for (point, measurement) in plan.points.iter_mut().filter(|(_, measurement)| measurement.is_none()) {
-            let result: Result<_, Infallible> = measure(&mut bench, parameters, point, &protocol);
-            let Ok(result) = result;
-            *measurement = Some(result);
-            measured += 1;
-        }
-    }
+    let measured = match &parameters {
+        Some(parameters) => measure_open(options, parameters, &mut plan)?,
+        None => 0,
+    };
     output::write_one(&options.out, &plan.to_csv()?)?;
     output::say(&summary(options, &plan, kept, measured))?;
     Ok(Outcome::Done)
+}
+
+/// Measures what is open; in ngspice, where it takes long, the table is written after each point, so that an
+/// interrupted run can be resumed.
+fn measure_open(options: &Acquire, parameters: &Parameters, plan: &mut Plan) -> Result<usize, Failure> {
+    let mut bench = options.simulator.bench(parameters)?;
+    let protocol = Protocol {
+        window: options.window as usize,
+        most_windows: options.most_windows as usize,
+    };
+    let mut measured = 0;
+    for index in 0..plan.points.len() {
+        let (point, None) = plan.points[index] else { continue };
+        plan.points[index].1 = Some(measure(bench.as_mut(), parameters, &point, &protocol)?);
+        measured += 1;
+        if options.simulator == Simulator::Ngspice {
+            output::write_one(&options.out, &plan.to_csv()?)?;
+        }
+    }
+    Ok(measured)
 }
 
 fn summary(options: &Acquire, plan: &Plan, kept: usize, measured: usize) -> String {

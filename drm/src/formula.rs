@@ -13,12 +13,12 @@
 //! its error, `q = rho i^2 (dcr + r_d) / V + (rho i)^2 [d_sim v_in + v_f + i (dcr + r_d)] / [V (1 - rho i)]`. A fit over a
 //! balanced grid takes the part of q that is linear in i away, too; [`Losses::expected_errors`] says what stays.
 
-use policy::Coefficients;
-
 use plant::{Parameters, Rectifier};
+use policy::Coefficients;
+use serde::Serialize;
 
 /// What makes a converter differ from `v = d v_in`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Losses {
     /// Voltage at the switch, V.
     pub v_in: f64,
@@ -49,11 +49,36 @@ impl Losses {
         })
     }
 
+    /// A converter without any.
+    #[must_use]
+    pub fn none(v_in: f64) -> Self {
+        Losses {
+            v_in,
+            v_f: 0.0,
+            r_d: 0.0,
+            r_on: 0.0,
+            dcr: 0.0,
+            lost_duty: 0.0,
+        }
+    }
+
+    /// Whether it has none of these.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        *self == Losses::none(self.v_in)
+    }
+
+    /// What a unit of duty is worth at `i_out` A, V.
+    #[must_use]
+    pub fn v_per_duty(&self, i_out: f64) -> f64 {
+        self.v() * (1.0 - self.rho() * i_out)
+    }
+
     /// The duty that brings `d_sim v_in` V at `i_out` A.
     #[must_use]
     pub fn d_real(&self, d_sim: f64, i_out: f64) -> f64 {
         let wanted = d_sim * self.v_in + self.v_f + i_out * (self.dcr + self.r_d);
-        self.lost_duty + wanted / (self.v() * (1.0 - self.rho() * i_out))
+        self.lost_duty + wanted / self.v_per_duty(i_out)
     }
 
     /// The four-term form: exact up to terms in `i^2`.

@@ -65,7 +65,7 @@ fn cut_off(points: &[Point], map: &DutyRatioMap, limits: Interval) -> Option<Str
         (missing != 0.0).then(|| CutOff {
             line: point.line,
             wanted,
-            missing_v: missing / map.slope(point.i_out) * point.v_sim,
+            missing_v: missing / map.slope(point.i_out) * point.v_per_duty(),
         })
     };
     let list: Vec<CutOff> = points.iter().filter_map(beyond).collect();

@@ -44,7 +44,7 @@ fn fitted(parameters: &Parameters, plan: &Plan, form: Option<Form>) -> Report {
 /// The policy was trained on 200 V.
 fn simulated_table(plan: &Plan) -> Table {
     let options = TableOptions {
-        v_sim: Some(200.0),
+        simulation: Some(Losses::none(200.0)),
         ..TableOptions::default()
     };
     Table::parse(&common::source(&plan.to_csv().unwrap()), &options).unwrap()
@@ -303,6 +303,28 @@ fn a_mapping_repairs_losses_and_nothing_is_left() {
     real.switch.dead_time = 0.0;
     let (_, remarks) = steady(&real, &own_mapping(&real), None);
     assert_eq!(remarks, "");
+}
+
+/// Trained on a converter with losses, a policy needs the difference only; a mapping of all losses would count its own
+/// twice, here by about (0.8 + 0.1 * 6) / 2 V.
+#[test]
+fn losses_of_the_simulation_itself_are_not_mapped_twice() {
+    let (real, mut nominal) = (lossy(), Parameters::paper_model());
+    (nominal.switch.r_ds_on, nominal.switch.v_f) = (0.1, 0.8);
+    let csv = acquired(&real, &currents(&[1.8, 5.0, 8.0, 11.0])).to_csv().unwrap();
+    let steady = |simulation: Losses| {
+        let options = TableOptions {
+            simulation: Some(simulation),
+            ..TableOptions::default()
+        };
+        let table = Table::parse(&common::source(&csv), &options).unwrap();
+        let map = drm::fit(&table, &FitOptions::default()).unwrap().fit.map;
+        judge::against_plant(&map, &real, &nominal, 100.0, &[LoadSetting::Power(600.0)], None).unwrap()[0]
+    };
+    let once = steady(Losses::of(&nominal).unwrap());
+    assert!(once.with_v.abs() < 0.05, "{once:?}");
+    let twice = steady(Losses::none(200.0));
+    assert!((twice.with_v - 0.7).abs() < 0.05, "{twice:?}");
 }
 
 #[test]

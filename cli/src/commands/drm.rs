@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use drm::acquire::LoadSetting;
+use drm::formula::Losses;
 use drm::{Columns, Table, TableOptions};
 use plant::Parameters;
 use policy::Interval;
@@ -52,9 +53,19 @@ pub struct Reading {
     /// each point
     #[arg(long, value_name = "V")]
     v_in_sim: Option<f64>,
+    /// The converter that the policy was trained on, if it has losses: d_sim is the duty that it needs for v_out
+    #[arg(long, value_name = "FILE", conflicts_with = "v_in_sim")]
+    trained_on: Option<PathBuf>,
 }
 
 impl Reading {
+    fn simulation(&self) -> Result<Option<Losses>, Failure> {
+        match &self.trained_on {
+            None => Ok(self.v_in_sim.map(Losses::none)),
+            Some(path) => trained_on(&plant_parameters(path)?, path).map(Some),
+        }
+    }
+
     fn table(&self, path: &Path) -> Result<Table, Failure> {
         if let Some(v) = self.v_in_sim.filter(|v| !(v.is_finite() && *v > 0.0)) {
             return Err(Failure(format!("--v-in-sim must be greater than 0 V\n   = found: {v}")));
@@ -62,7 +73,7 @@ impl Reading {
         let options = TableOptions {
             columns: Columns::parse(&self.map)?,
             skip_unsettled: self.skip_unsettled,
-            v_sim: self.v_in_sim,
+            simulation: self.simulation()?,
             partial: false,
         };
         Ok(Table::parse(&source(path)?, &options)?)
@@ -102,8 +113,19 @@ fn source(path: &Path) -> Result<Source, Failure> {
     Source::new(name, bytes).map_err(|fault| Failure(fault.to_string()))
 }
 
-fn plant_parameters(path: &PathBuf) -> Result<Parameters, Failure> {
+fn plant_parameters(path: &Path) -> Result<Parameters, Failure> {
     Ok(Parameters::from_file(path)?)
+}
+
+/// The losses of the converter that a policy was trained on.
+fn trained_on(nominal: &Parameters, path: &Path) -> Result<Losses, Failure> {
+    Losses::of(nominal).ok_or_else(|| {
+        Failure(format!(
+            "{}: a synchronous leg has no formula of its steady state\n   = hint: give --v-in-sim instead, its input \
+             voltage, and count its losses to the mapping",
+            path.display()
+        ))
+    })
 }
 
 /// `low,high` of duty ratios.

@@ -12,8 +12,10 @@ pub(crate) fn of(fit: &Fit, points: &[Point], explanations: &[Explanation], impo
     let mut meaning = Vec::new();
     let apart = fit.separation.directions == fit.separation.predictors && fit.separation.condition <= 30.0;
     let mean = |of: &dyn Fn(&Point) -> f64| points.iter().map(of).sum::<f64>() / points.len().max(1) as f64;
-    let (v_in, v_sim) = (mean(&|p| p.v_in), mean(&|p| p.v_sim));
-    if apart {
+    let (v_in, v_sim) = (mean(&|p| p.v_in), mean(&|p| p.simulation.v_in));
+    if points.iter().any(|p| !p.simulation.is_none()) {
+        meaning.push("a, b and c are what the converter differs by from the nominal one, not its own parts".to_owned());
+    } else if apart {
         match fit.form {
             Form::ThreeTerm => three(fit, v_in, &mut meaning),
             Form::FourTerm => four(fit, v_in, v_sim, &mut meaning),

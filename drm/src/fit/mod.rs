@@ -61,11 +61,11 @@ pub struct Errors {
 pub struct Row {
     /// As measured.
     pub point: Point,
-    /// `v_out / v_sim`.
+    /// Duty ratio of the simulation at the same voltage and load current.
     pub d_sim: f64,
     /// Mapped duty ratio.
     pub d_mapped: f64,
-    /// Measured voltage minus `d_real v_sim`: the error without a mapping, V.
+    /// Measured voltage minus that of the simulation at `d_real`: the error without a mapping, V.
     pub without_v: f64,
     /// Measured voltage minus that which the mapping expects, V.
     pub with_v: f64,
@@ -296,30 +296,14 @@ fn remarks(fit: &Fit, points: &[Point], options: &FitOptions, notes: &mut Vec<St
     if let Some(a) = options.assumed_a {
         notes.push(format!("a = {a} is assumed, not measured"));
     }
-    let (v_in, v_sim) = (
-        hull(points.iter().map(|p| p.v_in)),
-        hull(points.iter().map(|p| p.v_sim)),
-    );
-    if v_sim.low == v_sim.high && v_sim.low != v_in.low {
-        notes.push(format!(
-            "d_sim = v_out / {} V, the input voltage of the simulation",
-            v_sim.low
-        ));
-    } else if v_in.high - v_in.low > 2e-3 * v_in.high {
-        notes.push(format!(
-            "v_in goes from {:.2} to {:.2} V and is divided out (d_sim = v_out / v_in): a controller does not do so; with \
-             --v-in-sim, the input voltage the policy was trained on, the mapping carries it",
-            v_in.low, v_in.high
-        ));
-    } else if v_sim.low == v_in.low {
-        notes.push(format!(
-            "d_sim = v_out / v_in with v_in about {:.2} V: right for a policy trained on that input voltage; else give it \
-             with --v-in-sim",
-            v_in.high
-        ));
-    }
+    notes.push(simulated_by(points));
     let map = &fit.map;
-    for corner in separation::unmeasured_corners(points, map.valid_i_out, map.valid_d_sim) {
+    let corners = match separation::is_constant_load(points) {
+        // what holds at one current has no corners
+        true => Vec::new(),
+        false => separation::unmeasured_corners(points, map.valid_i_out, map.valid_d_sim),
+    };
+    for corner in corners {
         notes.push(format!(
             "no point near the corner of the valid range with {corner}: the mapping is extended there"
         ));
@@ -331,4 +315,32 @@ fn remarks(fit: &Fit, points: &[Point], options: &FitOptions, notes: &mut Vec<St
             range.low, range.high
         ));
     }
+}
+
+/// What d_sim is here.
+fn simulated_by(points: &[Point]) -> String {
+    let v_in = hull(points.iter().map(|p| p.v_in));
+    let v_sim = hull(points.iter().map(|p| p.simulation.v_in));
+    if points.iter().any(|p| !p.simulation.is_none()) {
+        return format!(
+            "d_sim is the duty that the nominal converter needs, {} V and its losses: the mapping holds what the real one \
+             loses beyond them",
+            v_sim.low
+        );
+    }
+    if v_sim.low == v_sim.high && v_sim.low != v_in.low {
+        return format!("d_sim = v_out / {} V, the input voltage of the simulation", v_sim.low);
+    }
+    if v_in.high - v_in.low > 2e-3 * v_in.high {
+        return format!(
+            "v_in goes from {:.2} to {:.2} V and is divided out (d_sim = v_out / v_in): a controller does not do so; with \
+             --v-in-sim, the input voltage the policy was trained on, the mapping carries it",
+            v_in.low, v_in.high
+        );
+    }
+    format!(
+        "d_sim = v_out / v_in with v_in about {:.2} V: right for a policy trained on that input voltage; else give it with \
+         --v-in-sim",
+        v_in.high
+    )
 }

@@ -106,7 +106,7 @@ impl Model {
 /// line only (slope `load_line`, A), along that line: a alone would be an arbitrary part of the slope there.
 pub(crate) fn error_v(map: &DutyRatioMap, point: &Point, load_line: f64) -> f64 {
     let slope = map.slope(point.i_out) + load_line * map.coefficients.b;
-    (map.apply(point.d_sim(), point.i_out) - point.d_real) / slope * point.v_sim
+    (map.apply(point.d_sim(), point.i_out) - point.d_real) / slope * point.v_per_duty()
 }
 
 pub(crate) fn hull(values: impl Iterator<Item = f64>) -> Interval {

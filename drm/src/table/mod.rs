@@ -10,6 +10,7 @@ mod suspicion;
 use serde::Serialize;
 use toml_input::{Fault, Faults, Message, Source as Text};
 
+use crate::formula::Losses;
 use cells::Sheet;
 pub use columns::Columns;
 use columns::{Located, Source};
@@ -27,23 +28,29 @@ pub struct Point {
     pub i_out: f64,
     /// Input voltage, V.
     pub v_in: f64,
-    /// Input voltage of the simulation that the policy was trained on, V.
-    pub v_sim: f64,
+    /// The simulation that the policy was trained on.
+    pub simulation: Losses,
     /// Whether the point had settled, as far as the table says so.
     pub settled: bool,
 }
 
 impl Point {
-    /// The duty ratio with which the loss-free simulation has the same voltage.
+    /// The duty ratio with which the simulation has the same voltage at the same load current.
     #[must_use]
     pub fn d_sim(&self) -> f64 {
-        self.v_out / self.v_sim
+        self.simulation.d_real(self.v_out / self.simulation.v_in, self.i_out)
+    }
+
+    /// What a unit of d_sim is worth in the simulation at this load current, V.
+    #[must_use]
+    pub fn v_per_duty(&self) -> f64 {
+        self.simulation.v_per_duty(self.i_out)
     }
 
     /// Measured voltage minus that of the simulation at the same duty ratio, V.
     #[must_use]
     pub fn without_v(&self) -> f64 {
-        self.v_out - self.d_real * self.v_sim
+        (self.d_sim() - self.d_real) * self.v_per_duty()
     }
 }
 
@@ -65,8 +72,9 @@ pub struct TableOptions {
     pub columns: Columns,
     /// Unsettled points are left out instead of refused.
     pub skip_unsettled: bool,
-    /// Input voltage of the simulation that the policy was trained on, V; without it that of each point, as in the paper.
-    pub v_sim: Option<f64>,
+    /// The simulation that the policy was trained on; without it a loss-free one at the input voltage of each point, as in
+    /// the paper.
+    pub simulation: Option<Losses>,
     /// The table is still being filled in: too few points, or too equal ones, are no fault.
     pub partial: bool,
 }
@@ -114,7 +122,7 @@ fn read(text: &Text, options: &TableOptions) -> Result<Table, Vec<Fault>> {
         notes: Vec::new(),
     };
     for row in &sheet.rows {
-        match point(row, &located, options.v_sim, &sheet, &mut faults) {
+        match point(row, &located, options.simulation, &sheet, &mut faults) {
             Some(Reading::Point(point)) => table.points.push(point),
             Some(Reading::Open) => table.open.push(row.line),
             None => {}
@@ -148,7 +156,7 @@ enum Reading {
 fn point(
     row: &cells::Row,
     located: &Located,
-    v_sim: Option<f64>,
+    simulation: Option<Losses>,
     sheet: &Sheet<'_>,
     faults: &mut Vec<Fault>,
 ) -> Option<Reading> {
@@ -178,7 +186,7 @@ fn point(
         v_out,
         i_out: i_out?,
         v_in,
-        v_sim: v_sim.unwrap_or(v_in),
+        simulation: simulation.unwrap_or(Losses::none(v_in)),
         settled: settled.unwrap_or(true) && v_std.is_none_or(|v_std| v_std <= UNSETTLED * v_out.abs()),
     }))
 }

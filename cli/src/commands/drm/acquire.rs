@@ -70,7 +70,7 @@ fn duties(text: &str) -> Result<Duties, String> {
 
 /// Measures or plans.
 pub fn run(options: &Acquire) -> Result<Outcome, Failure> {
-    let parameters = options.plant.as_ref().map(super::plant_parameters).transpose()?;
+    let parameters = options.plant.as_deref().map(super::plant_parameters).transpose()?;
     let nominal = parameters.as_ref().map(|parameters| parameters.converter.v_in);
     let v_in = options.v_in.or(nominal).unwrap_or_default();
     let mut plan = Plan::new(v_in, &options.duties.0, &options.loads.settings(), options.cool_down)?;

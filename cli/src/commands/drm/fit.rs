@@ -100,7 +100,7 @@ fn fit_options(options: &Fit) -> Result<FitOptions, Failure> {
             return Err(Failure(format!("{name} must be greater than 0\n   = found: {value}")));
         }
     }
-    let plant = options.plant.as_ref().map(super::plant_parameters).transpose()?;
+    let plant = options.plant.as_deref().map(super::plant_parameters).transpose()?;
     let continuous = plant.as_ref().is_some_and(|plant| Conduction::of(plant).is_none());
     Ok(FitOptions {
         form: match options.terms {

@@ -114,9 +114,9 @@ pub struct Sensors {
     pub i_gain: f64,
     /// A
     pub i_offset: f64,
-    /// Time constant of the low-pass of all channels, s.
+    /// Time constant of the low-pass of output voltage and both currents, s.
     pub low_pass: f64,
-    /// Age of what all channels show, s.
+    /// How much later than stamped all channels are sampled, s; negative for earlier.
     pub delay: f64,
     /// Step of the voltages, V.
     pub v_lsb: f64,
@@ -191,4 +191,4 @@ impl Bench {
 }
 
 /// The nominal bench as the plant file that a diagnosis starts from.
-pub const PLANT: &str = include_str!("../plant.toml");
+pub const PLANT: &str = include_str!("../../../examples/blind/plant.toml");

@@ -51,7 +51,7 @@ pub struct Hidden {
     pub id: String,
     /// On the list of causes.
     pub listed: bool,
-    /// Hidden values by key.
+    /// Hidden values by name.
     pub parameters: BTreeMap<String, Value>,
 }
 
@@ -113,11 +113,12 @@ impl<'a> Runs<'a> {
     }
 }
 
-/// Runs the bench of the case and its nominal twin, and finds what else would explain the data.
+/// Runs the bench of the case and its nominal twin, and finds what else would explain the data if `with_rivals` (twenty
+/// times as long).
 ///
 /// # Errors
 /// If ngspice is missing or fails.
-pub fn measure(plan: &Plan) -> Result<Case, String> {
+pub fn measure(plan: &Plan, with_rivals: bool) -> Result<Case, String> {
     let nominal = Bench::nominal();
     let mut runs = Runs::new(plan);
     let mut files = vec![("plant.toml".to_owned(), PLANT.to_owned())];
@@ -146,7 +147,7 @@ pub fn measure(plan: &Plan) -> Result<Case, String> {
         chi2,
         chi2_listed,
         sets,
-    } = rivals::explanations(&mut runs, &training)?;
+    } = rivals::explanations(&mut runs, &training, with_rivals)?;
     let truth = Truth {
         seed: plan.seed,
         case: plan.index,
@@ -174,7 +175,7 @@ fn hidden(effect: &crate::effects::Effect, plan: &Plan) -> Hidden {
             nominal: parameter.get(&Bench::nominal()),
             unit: parameter.unit.to_owned(),
         };
-        (parameter.key.to_owned(), value)
+        (parameter.name.to_owned(), value)
     };
     Hidden {
         id: effect.id.to_owned(),

@@ -6,8 +6,8 @@ use crate::rng::Rng;
 /// A number of the bench that an effect changes.
 #[derive(Debug)]
 pub struct Parameter {
-    /// Key of the plant file, or a name for what the plant does not know.
-    pub key: &'static str,
+    /// Its name in `diagnosis.json`.
+    pub name: &'static str,
     /// Unit.
     pub unit: &'static str,
     /// How the size is drawn.
@@ -95,12 +95,16 @@ impl Effect {
         if self.id == "duty_delay" {
             self.parameters[0].set(bench, 1.0 + rng.below(2) as f64);
         }
+        if self.id == "duty_quantisation" {
+            // a counter has whole counts
+            bench.modulator.duty_lsb = 1.0 / (1.0 / bench.modulator.duty_lsb).round();
+        }
     }
 }
 
 macro_rules! number {
-    ($($field:ident).+, $key:literal, $unit:literal, $kind:ident $low:literal $high:literal) => {
-        Parameter { key: $key, unit: $unit, size: Size::$kind($low, $high), field: |bench| &mut bench.$($field).+ }
+    ($($field:ident).+, $name:literal, $unit:literal, $kind:ident $low:literal $high:literal) => {
+        Parameter { name: $name, unit: $unit, size: Size::$kind($low, $high), field: |bench| &mut bench.$($field).+ }
     };
 }
 
@@ -124,111 +128,90 @@ const fn unlisted(id: &'static str, parameters: &'static [Parameter]) -> Effect 
 
 /// The effects of the list of causes, then those of nobody's list.
 pub const EFFECTS: &[Effect] = &[
-    listed("dcr", &[number!(circuit.dcr, "inductor.dcr", "ohm", Plus 0.1 0.6)]),
-    listed(
-        "r_ds_on",
-        &[number!(circuit.r_ds_on, "switch.r_ds_on", "ohm", Plus 0.1 0.8)],
-    ),
+    listed("dcr", &[number!(circuit.dcr, "dcr", "ohm", Plus 0.1 0.6)]),
+    listed("r_ds_on", &[number!(circuit.r_ds_on, "r_ds_on", "ohm", Plus 0.1 0.8)]),
     listed(
         "diode",
         &[
-            number!(circuit.v_f, "switch.v_f", "V", Plus 0.3 1.5),
-            number!(circuit.r_d, "switch.r_d", "ohm", Plus 0.01 0.1),
+            number!(circuit.v_f, "v_f", "V", Plus 0.3 1.5),
+            number!(circuit.r_d, "r_d", "ohm", Plus 0.01 0.1),
         ],
     ),
     listed(
         "dead_time",
-        &[number!(modulator.dead_time, "switch.dead_time", "s", Plus 3e-7 3e-6)],
+        &[number!(modulator.dead_time, "dead_time", "s", Plus 3e-7 3e-6)],
     ),
     listed(
         "turn_on_delay",
-        &[number!(modulator.turn_on_delay, "switch.turn_on_delay", "s", Plus 2e-7 2e-6)],
+        &[number!(modulator.turn_on_delay, "turn_on_delay", "s", Plus 2e-7 2e-6)],
     ),
-    listed("esr", &[number!(circuit.esr, "capacitor.esr", "ohm", Plus 0.08 0.5)]),
-    listed("esl", &[number!(circuit.esl, "capacitor.esl", "H", Plus 3e-8 3e-7)]),
+    listed("esr", &[number!(circuit.esr, "esr", "ohm", Plus 0.08 0.5)]),
+    listed("esl", &[number!(circuit.esl, "esl", "H", Plus 3e-8 3e-7)]),
     listed(
         "l_wrong",
-        &[number!(circuit.inductance, "converter.inductance", "H", Share 0.06 0.3)],
+        &[number!(circuit.inductance, "inductance", "H", Share 0.06 0.3)],
     ),
     listed(
         "c_wrong",
-        &[number!(circuit.capacitance, "converter.capacitance", "F", Share 0.06 0.3)],
+        &[number!(circuit.capacitance, "capacitance", "F", Share 0.06 0.3)],
     ),
     listed(
         "l_saturation",
         &[
-            number!(circuit.saturation, "inductor.saturation", "1", Plus 0.2 0.6),
-            number!(circuit.i_sat, "inductor.i_sat", "A", Value 4.0 12.0),
+            number!(circuit.saturation, "saturation", "1", Plus 0.2 0.6),
+            number!(circuit.i_sat, "i_sat", "A", Value 4.0 12.0),
         ],
     ),
     listed(
         "c_derating",
         &[
-            number!(circuit.derating, "capacitor.derating", "1", Plus 0.15 0.6),
-            number!(circuit.v_half, "capacitor.v_half", "V", Value 60.0 150.0),
+            number!(circuit.derating, "derating", "1", Plus 0.15 0.6),
+            number!(circuit.v_half, "v_half", "V", Value 60.0 150.0),
         ],
     ),
     listed(
         "source_impedance",
-        &[number!(circuit.source_resistance, "source.resistance", "ohm", Plus 0.1 1.0)],
+        &[number!(circuit.source_resistance, "resistance", "ohm", Plus 0.1 1.0)],
     ),
     Effect {
         hides_v_in: true,
-        ..listed(
-            "v_in_wrong",
-            &[number!(circuit.v_in, "converter.v_in", "V", Either 1.5 8.0)],
-        )
+        ..listed("v_in_wrong", &[number!(circuit.v_in, "v_in", "V", Either 1.5 8.0)])
     },
     listed(
         "sensor_low_pass",
-        &[number!(sensors.low_pass, "sensors.*.low_pass", "s", Plus 2e-5 2e-4)],
+        &[number!(sensors.low_pass, "time_constant", "s", Plus 2e-5 2e-4)],
     ),
     listed(
         "sampling_delay",
-        &[number!(sensors.delay, "sensors.*.delay", "s", Plus 4e-6 4e-5)],
+        &[number!(sensors.delay, "delay", "s", Either 4e-6 3.5e-5)],
     ),
-    listed(
-        "v_gain",
-        &[number!(sensors.v_gain, "sensors.v_out.gain", "1", Either 0.006 0.03)],
-    ),
-    listed(
-        "v_offset",
-        &[number!(sensors.v_offset, "sensors.v_out.offset", "V", Either 0.3 1.5)],
-    ),
-    listed(
-        "i_gain",
-        &[number!(sensors.i_gain, "sensors.i_l.gain", "1", Either 0.01 0.05)],
-    ),
-    listed(
-        "i_offset",
-        &[number!(sensors.i_offset, "sensors.i_l.offset", "A", Either 0.05 0.3)],
-    ),
+    listed("v_gain", &[number!(sensors.v_gain, "gain", "1", Either 0.006 0.03)]),
+    listed("v_offset", &[number!(sensors.v_offset, "offset", "V", Either 0.3 1.5)]),
+    listed("i_gain", &[number!(sensors.i_gain, "gain", "1", Either 0.01 0.05)]),
+    listed("i_offset", &[number!(sensors.i_offset, "offset", "A", Either 0.05 0.3)]),
     listed(
         "adc_quantisation",
         &[
-            number!(sensors.v_lsb, "sensors.v_out.lsb", "V", Plus 0.3 1.5),
-            number!(sensors.i_lsb, "sensors.i_l.lsb", "A", Plus 0.15 0.6),
+            number!(sensors.v_lsb, "v_lsb", "V", Plus 0.3 1.5),
+            number!(sensors.i_lsb, "i_lsb", "A", Plus 0.15 0.6),
         ],
     ),
     listed(
         "duty_delay",
-        &[number!(modulator.duty_delay, "pwm.duty_delay", "1", Value 1.0 2.0)],
+        &[number!(modulator.duty_delay, "periods", "1", Value 1.0 2.0)],
     ),
     listed(
         "duty_quantisation",
-        &[number!(modulator.duty_lsb, "pwm.duty_lsb", "1", Plus 0.004 0.025)],
+        &[number!(modulator.duty_lsb, "duty_lsb", "1", Plus 0.004 0.025)],
     ),
     listed(
         "cpl_bandwidth",
-        &[number!(circuit.cpl_time_constant, "load.cpl_time_constant", "s", Plus 1.5e-4 1.5e-3)],
+        &[number!(circuit.cpl_time_constant, "time_constant", "s", Plus 1.5e-4 1.5e-3)],
     ),
-    listed(
-        "cpl_fold",
-        &[number!(circuit.v_fold, "load.v_fold", "V", Value 88.0 108.0)],
-    ),
+    listed("cpl_fold", &[number!(circuit.v_fold, "v_fold", "V", Value 88.0 108.0)]),
     listed(
         "load_gain",
-        &[number!(circuit.load_gain, "load.setting_gain", "1", Either 0.02 0.08)],
+        &[number!(circuit.load_gain, "gain", "1", Either 0.02 0.08)],
     ),
     unlisted(
         "slow_turn_off",
@@ -289,8 +272,8 @@ pub const EFFECTS: &[Effect] = &[
     unlisted(
         "load_cable",
         &[
-            number!(circuit.odd.cable_inductance, "cable.inductance", "H", Plus 3e-4 2e-3),
-            number!(circuit.odd.cable_capacitance, "cable.capacitance", "F", Value 2e-5 1e-4),
+            number!(circuit.odd.cable_inductance, "inductance", "H", Plus 3e-4 2e-3),
+            number!(circuit.odd.cable_capacitance, "capacitance", "F", Value 2e-5 1e-4),
         ],
     ),
     Effect {
@@ -298,8 +281,8 @@ pub const EFFECTS: &[Effect] = &[
         ..unlisted(
             "line_ripple",
             &[
-                number!(circuit.odd.line_ripple, "source.ripple", "V", Plus 1.0 6.0),
-                number!(circuit.odd.line_frequency, "source.ripple_frequency", "Hz", Value 100.0 360.0),
+                number!(circuit.odd.line_ripple, "ripple", "V", Plus 1.0 6.0),
+                number!(circuit.odd.line_frequency, "frequency", "Hz", Value 100.0 360.0),
             ],
         )
     },
@@ -327,7 +310,7 @@ mod tests {
             effect.hide(&mut bench, 1.0, &mut Rng::new(5, &[]));
             for parameter in effect.parameters {
                 let nominal = parameter.get(&Bench::nominal());
-                assert_ne!(parameter.get(&bench), nominal, "{} {}", effect.id, parameter.key);
+                assert_ne!(parameter.get(&bench), nominal, "{} {}", effect.id, parameter.name);
                 parameter.set(&mut bench, nominal);
             }
             assert_eq!(bench, Bench::nominal(), "{}", effect.id);

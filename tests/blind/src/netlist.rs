@@ -36,7 +36,7 @@ pub fn netlist(bench: &Bench, record: &Record, random: &mut Rng) -> String {
     inductor(&mut n, bench, i, record);
     capacitor(&mut n, bench, v);
     load(&mut n, bench, record, v);
-    let end = (record.lead + record.duty.len()) as f64 * T_SW;
+    let end = (record.lead + record.duty.len() + 1) as f64 * T_SW;
     let signals = "v(out) i(vil) i(vout) v(nin)";
     let _ = write!(
         n,
@@ -101,7 +101,7 @@ fn leg(n: &mut String, bench: &Bench) {
     let (v, r) = (c.v_f - drop, (c.r_d - SLOPE / I_TOUCH).max(1e-4));
     let _ = writeln!(n, ".model DX D(IS={I_S:e} N=0.5 RS={r:e})");
     let _ = writeln!(n, "Bu nin sw I=V(nin,sw)*(V(g)/{:e}+1e-9)", c.r_ds_on);
-    let _ = writeln!(n, "Vd 0 d1 {}\nDl d1 sw DX", -v);
+    let _ = writeln!(n, "Vd 0 d1 {v}\nDl d1 sw DX");
     if c.odd.switch_node_capacitance > 0.0 {
         let _ = writeln!(n, "Csw sw 0 {:e}", c.odd.switch_node_capacitance);
     }
@@ -169,7 +169,8 @@ fn capacitor(n: &mut String, bench: &Bench, v: f64) {
 
 fn load(n: &mut String, bench: &Bench, record: &Record, v: f64) {
     let c = &bench.circuit;
-    let settings: [(&str, fn(&Load) -> f64, f64); 3] = [
+    type Setting = (&'static str, fn(&Load) -> f64, f64);
+    let settings: [Setting; 3] = [
         ("gg", |load| load.conductance, 1.0),
         ("cc", |load| load.current, c.load_gain),
         ("pw", |load| load.power, c.load_gain),

@@ -41,13 +41,14 @@ struct Candidate {
     directions: Vec<Vec<f64>>,
 }
 
-/// Explanations of a case by its training records, each with the noise-free samples of hidden and nominal bench.
+/// Explanations of a case by its training records, each with the noise-free samples of hidden and nominal bench. Without `search` the truth alone.
 ///
 /// # Errors
 /// If ngspice fails.
 pub(crate) fn explanations(
     runs: &mut Runs<'_>,
     training: &[(&Record, Samples, Samples)],
+    search: bool,
 ) -> Result<Explanation, String> {
     let plan = runs.plan;
     let difference = scaled(plan, training.iter().map(|(_, hidden, twin)| (hidden, twin)));
@@ -60,7 +61,7 @@ pub(crate) fn explanations(
         });
     }
     let mut candidates = Vec::new();
-    for effect in listed_effects().filter(|effect| !NOT_LINEAR.contains(&effect.id)) {
+    for effect in listed_effects().filter(|effect| search && !NOT_LINEAR.contains(&effect.id)) {
         if effect.hides_v_in && plan.has_v_in {
             continue;
         }
@@ -75,6 +76,7 @@ pub(crate) fn explanations(
     }
     let limit = NOISE + CURVATURE * chi2;
     let (chi2_listed, mut sets) = explained(&candidates, &difference, limit);
+    let chi2_listed = chi2_listed.min(chi2);
     let truth: Vec<&str> = plan.effects.iter().map(|effect| effect.id).collect();
     let all_listed = plan.effects.iter().all(|effect| effect.listed);
     if all_listed && !sets.iter().any(|set| set.iter().all(|id| truth.contains(&id.as_str()))) {

@@ -1,4 +1,4 @@
-//! From true signals on the fine grid to recorded samples: low-pass, age, gain, offset, noise, converter.
+//! From true signals on the fine grid to recorded samples: low-pass, instant, gain, offset, noise, converter.
 
 use crate::bench::{Bench, Sensors, T_SW};
 use crate::experiment::Record;
@@ -16,13 +16,12 @@ pub type Samples = Vec<[f64; 4]>;
 #[must_use]
 pub fn exact(bench: &Bench, record: &Record, signals: &Signals, random: &mut Rng) -> Samples {
     let s = &bench.sensors;
-    let channels =
-        [&signals.v_o, &signals.i_l, &signals.i_o, &signals.v_in].map(|channel| low_pass(channel, s.low_pass));
+    let channels = [&signals.v_o, &signals.i_l, &signals.i_o].map(|channel| low_pass(channel, s.low_pass));
     let at = |row: usize, channel: &[f64]| {
-        let time = (record.lead as f64 + row as f64 + 0.5) * T_SW - s.delay;
+        let time = (record.lead as f64 + row as f64 + 0.5) * T_SW + s.delay;
         interpolate(channel, time / T_FINE)
     };
-    let [v_o, i_l, i_o, v_in] = &channels;
+    let [v_o, i_l, i_o] = &channels;
     let rows = 0..record.duty.len();
     let mut samples: Samples = rows
         .map(|row| {
@@ -30,7 +29,7 @@ pub fn exact(bench: &Bench, record: &Record, signals: &Signals, random: &mut Rng
                 s.v_gain * at(row, v_o) + s.v_offset,
                 s.i_gain * at(row, i_l) + s.i_offset,
                 at(row, i_o),
-                at(row, v_in),
+                at(row, &signals.v_in),
             ]
         })
         .collect();

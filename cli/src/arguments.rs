@@ -33,6 +33,9 @@ pub enum Command {
     Train(Train),
     /// Inspect, compile and verify the built-in example
     Demo(Demo),
+    /// Duty ratio mapping: acquire settled points, fit drm.toml, judge it
+    #[command(subcommand)]
+    Drm(crate::commands::drm::Drm),
 }
 
 #[derive(Debug, Args)]

@@ -41,6 +41,7 @@ fn main() -> ExitCode {
         Command::Train(options) => commands::train::run(options),
         Command::Simulate(options) => commands::simulate::run(options),
         Command::Demo(options) => commands::demo::run(options),
+        Command::Drm(command) => commands::drm::run(command),
     };
     match result {
         Ok(outcome) => ExitCode::from(outcome as u8),

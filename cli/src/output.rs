@@ -60,6 +60,14 @@ pub fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
             path.display()
         )));
     }
+    write_one(path, text)
+}
+
+/// Writes one file; an older one is replaced.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn write_one(path: &Path, text: &str) -> Result<(), Failure> {
     let folder = path
         .parent()
         .filter(|folder| !folder.as_os_str().is_empty())

@@ -2,6 +2,7 @@
 
 pub mod compile;
 pub mod demo;
+pub mod drm;
 pub mod inspect;
 mod interruption;
 pub mod new;

@@ -173,6 +173,18 @@ fn another_plant_takes_the_place_of_the_scenario_s() {
 }
 
 #[test]
+fn a_policy_that_loses_the_voltage_is_said_to() {
+    let desk = desk();
+    let settled = desk.succeed("simulate s.toml --policy policy --out a");
+    assert!(!settled.contains("does not settle"), "{settled}");
+    let said = desk.succeed("simulate s.toml --policy policy --out b --plant plants/paper-table.toml");
+    let words = "the policy does not settle within 0.5 V of 100 V before or after 200 -> 500 W, 500 -> 200 W";
+    assert!(said.contains(words), "{said}");
+    let page = desk.read("b/report.html");
+    assert!(page.contains("verdict warn") && page.contains("does not settle"));
+}
+
+#[test]
 fn results_are_not_overwritten() {
     let desk = desk();
     desk.succeed("simulate s.toml --policy policy --out out");

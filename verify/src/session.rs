@@ -267,7 +267,7 @@ fn known_answers(policy: &Policy, oracle: &mut Oracle) -> Result<(Chunk, Option<
 }
 
 /// The policy's files for `target` in each of `languages`.
-fn generate(policy: &Policy, target: &TargetSpec, languages: &[Language]) -> Result<Files, VerifyError> {
+pub(crate) fn generate(policy: &Policy, target: &TargetSpec, languages: &[Language]) -> Result<Files, VerifyError> {
     let generated = codegen::generate(policy, target, languages).map_err(VerifyError::Codegen)?;
     Ok(generated.files)
 }

@@ -5,6 +5,7 @@ mod commands;
 mod drm;
 mod files;
 mod interruption;
+mod simulate;
 mod traces;
 mod training;
 mod verify;

@@ -12,7 +12,7 @@ use super::interruption;
 use crate::arguments::Simulate;
 use crate::{Failure, Outcome, output};
 
-mod controllers;
+pub mod controllers;
 mod files;
 mod page;
 mod pictures;
@@ -93,7 +93,7 @@ pub fn run(options: &Simulate) -> Result<Outcome, Failure> {
 }
 
 /// An error where the user has had enough.
-fn go_on(stop: &AtomicBool) -> Result<(), Failure> {
+pub fn go_on(stop: &AtomicBool) -> Result<(), Failure> {
     if stop.load(Ordering::Relaxed) {
         return Err(Failure("interrupted".to_owned()));
     }

@@ -67,8 +67,21 @@ fn rows<'a>(found: &'a Findings, real: &'a Real) -> impl Iterator<Item = &'a Run
     std::iter::once(&found.simulation).chain(&real.runs)
 }
 
-/// The summary, also printed.
-pub fn summary(found: &Findings) -> String {
+/// The summary with the figures of every load step.
+fn summary(found: &Findings) -> String {
+    let mut out = said(found);
+    for real in &found.real {
+        out.push_str(&format!("\n{}\n", real.name));
+        for (index, course) in found.simulation.courses.iter().enumerate() {
+            let findings = rows(found, real).filter_map(|run| Some((run.name, &run.courses.get(index)?.finding)));
+            out.push_str(&format!("\n{}", comparison(course.step, findings, [])));
+        }
+    }
+    out
+}
+
+/// What is printed: the largest figures, the mappings and what none repairs.
+pub fn said(found: &Findings) -> String {
     let mut out = format!("{}\n\n{}", explanation(found), overview_text(found));
     for real in &found.real {
         let fit = &real.report.fit;
@@ -82,10 +95,6 @@ pub fn summary(found: &Findings) -> String {
         ));
         for remark in &real.remarks {
             out.push_str(&format!("  no mapping repairs: {remark}\n"));
-        }
-        for (index, course) in found.simulation.courses.iter().enumerate() {
-            let findings = rows(found, real).filter_map(|run| Some((run.name, &run.courses.get(index)?.finding)));
-            out.push_str(&format!("\n{}", comparison(course.step, findings, [])));
         }
     }
     out

@@ -112,7 +112,7 @@ pub fn run(options: &Transfer) -> Result<Outcome, Failure> {
     let out = options.out.display();
     output::say(&format!(
         "{}\n{} files in {out}; to look at: {out}/{}",
-        files::summary(&found),
+        files::said(&found),
         files.len(),
         files::PAGE
     ))?;

@@ -204,8 +204,8 @@ fn what_cannot_be_simulated_is_refused_and_nothing_is_written() {
     with("v_ref = 100.0\n", &["s.toml: no plant", "--plant"]);
     with("plant = \"plants/none.toml\"\n", &["plants/none.toml"]);
     with(
-        &SCENARIO.replace("tail", "tial"),
-        &["s.toml:7:1", "tial", "did you mean `tail`?"],
+        &SCENARIO.replace("lead", "leap"),
+        &["s.toml:5:1", "leap", "did you mean `lead`?"],
     );
     with(
         &format!("v_ref = 200.0\n{SCENARIO}"),

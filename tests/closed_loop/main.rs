@@ -104,7 +104,7 @@ fn included(policy: &Policy) -> Vec<Trajectory> {
         });
         Ok(Some(Answer {
             duty: f64::from(command.duty),
-            action: Some(u32::try_from(command.action_index).unwrap()),
+            action: Some(command.action_index),
             status: command.status,
         }))
     };

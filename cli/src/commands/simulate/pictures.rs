@@ -23,7 +23,7 @@ pub fn picture(setting: &Setting, step: &Step) -> Result<Svg, Failure> {
     let (drawn, left_out): (Vec<&Course>, Vec<&Course>) = step
         .courses
         .iter()
-        .partition(|course| !(course.shown.metrics.deviation > most) || course.name == POLICY);
+        .partition(|course| course.shown.metrics.deviation <= most || course.name == POLICY);
     if !left_out.is_empty() {
         let names: Vec<&str> = left_out.iter().map(|course| course.name.as_str()).collect();
         title.push_str(&format!(" (far off and not drawn: {})", names.join(", ")));

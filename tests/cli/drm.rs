@@ -217,6 +217,10 @@ fn a_bad_table_or_wish_is_answered_and_nothing_written() {
         "d_real,v_out,i_out,v_in\n45,90,4,200\n50,100,4,200\n45,89,8,200\n50,99,8,200\n",
     );
     desk.refuse("drm fit percent.csv", &["percent", "--map d_real=d_real*0.01"]);
+    desk.refuse(
+        "drm fit percent.csv --map d_real=d_real*0.01 --assume-a nan",
+        &["--assume-a", "greater than 0"],
+    );
     desk.refuse("drm fit missing.csv", &["missing.csv"]);
     desk.refuse(
         "drm acquire --plant real.toml --duties 45 --currents 2 --out p.csv",

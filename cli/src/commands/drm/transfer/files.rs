@@ -31,6 +31,9 @@ pub fn all(found: &Findings) -> Result<BTreeMap<String, String>, Failure> {
         for run in &real.runs {
             add(&mut metrics, &format!("{name}: {}", run.name), run);
         }
+        for note in &real.notes {
+            section = section.text(format!("Note: {note}."));
+        }
         for remark in &real.remarks {
             section = section.text(format!("No mapping repairs: {remark}."));
         }
@@ -93,6 +96,9 @@ pub fn said(found: &Findings) -> String {
             fit.left_out.max_v,
             formula(real)
         ));
+        for note in &real.notes {
+            out.push_str(&format!("  note: {note}\n"));
+        }
         for remark in &real.remarks {
             out.push_str(&format!("  no mapping repairs: {remark}\n"));
         }

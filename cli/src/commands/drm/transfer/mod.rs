@@ -82,7 +82,9 @@ struct Real {
     report: drm::Report,
     /// Without a mapping, with the fitted one, with the exact one if asked for.
     runs: Vec<Run>,
+    /// What no mapping repairs.
     remarks: Vec<String>,
+    notes: Vec<String>,
 }
 
 /// Everything found.

@@ -9,7 +9,7 @@ use drm::acquire::{Hold, LoadSetting, Plan, PlanPoint, Protocol, measure};
 use drm::formula::Losses;
 use drm::{Conduction, DutyRatioMap, FitOptions, Table, TableOptions};
 use plant::Parameters;
-use policy::Action;
+use policy::{Action, Interval};
 use spice::SpiceConverter;
 use toml_input::{FileName, Source};
 
@@ -92,7 +92,7 @@ fn one(
     let report = fit(setting, &points)?;
     let mut mapped = controllers::start(&setting.with(&report.fit.map)?, setting.controller)?;
     runs.push(at(setting, MAPPED, real, mapped.controller.as_mut(), progress)?);
-    let mut remarks = beyond_repair(setting, real, &report.fit.map)?;
+    let mut notes = report.notes.clone();
     match Losses::of(real).filter(|_| setting.ideal) {
         Some(losses) => {
             let mut ideal = Ideal {
@@ -103,16 +103,36 @@ fn one(
             };
             runs.push(at(setting, EXACT, real, &mut ideal, progress)?);
         }
-        None if setting.ideal => remarks.push("a synchronous leg has no exact mapping to compare with".to_owned()),
+        None if setting.ideal => notes.push("a synchronous leg has no exact mapping to compare with".to_owned()),
         None => {}
     }
+    notes.extend(runs.iter().flat_map(ended_early));
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     Ok(Real {
         name: stem.unwrap_or_default(),
         points,
+        remarks: beyond_repair(setting, real, &report.fit.map)?,
         report,
         runs,
-        remarks,
+        notes,
+    })
+}
+
+/// Load steps at which the voltage was not a number in the end.
+fn ended_early(run: &Run) -> Option<String> {
+    let lost = |course: &&Course| course.finding.worst.deviation.is_infinite();
+    let steps: Vec<String> = run
+        .courses
+        .iter()
+        .filter(lost)
+        .map(|course| course.step.to_string())
+        .collect();
+    let list = steps.join(", ");
+    (!steps.is_empty()).then(|| {
+        format!(
+            "{}: the simulator gave up, or the voltage ran away, at {list}",
+            run.name
+        )
     })
 }
 
@@ -231,5 +251,25 @@ fn beyond_repair(setting: &Setting, real: &Parameters, map: &DutyRatioMap) -> Re
     let limits = Some(setting.policy.limits.duty);
     let loads = loads(setting);
     let steady = drm::judge::against_plant(map, real, &setting.nominal, setting.v_ref, &loads, limits)?;
-    Ok(drm::judge::beyond_repair(&steady, setting.v_ref))
+    let mut remarks = drm::judge::beyond_repair(&steady, setting.v_ref);
+    remarks.extend(cut_off(setting, map));
+    Ok(remarks)
+}
+
+/// Whether the policy's duty limits cut off what the mapping makes of its actions.
+fn cut_off(setting: &Setting, map: &DutyRatioMap) -> Option<String> {
+    let (low, high) = duties(&setting.policy.actions);
+    let mapped = DutyRatioMap {
+        valid_d_sim: Interval { low, high },
+        ..*map
+    }
+    .duty_range();
+    let limits = setting.policy.limits.duty;
+    (mapped.low < limits.low || mapped.high > limits.high).then(|| {
+        format!(
+            "the policy's duties map to {:.4} .. {:.4}, but its limits are {} .. {}: what lies beyond is cut off in \
+             transients; widen them",
+            mapped.low, mapped.high, limits.low, limits.high
+        )
+    })
 }

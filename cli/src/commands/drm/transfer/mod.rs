@@ -18,7 +18,7 @@ use policy::{Coefficients, Interval, Policy};
 
 use super::bench::Simulator;
 use crate::arguments::ControllerKind;
-use crate::commands::interruption;
+use crate::commands::{interruption, simulate};
 use crate::{Failure, Outcome, output};
 
 #[derive(Debug, Args)]
@@ -143,10 +143,8 @@ fn prepare(options: &Transfer) -> Result<Setting, Failure> {
             parameter.set(&mut nominal, *value);
         }
     }
-    let Some(v_ref) = scenario.v_ref.or(policy.parameters.get("v_ref").copied()) else {
-        let hint = "v_ref = 100.0, as the policy has no parameter `v_ref`";
-        return Err(Failure(format!("{file}: no voltage to hold\n   = hint: {hint}")));
-    };
+    let v_ref = simulate::v_ref(&scenario, &policy, &file)?;
+    simulate::suits(&policy, &nominal, v_ref, &trained_on.display())?;
     Ok(Setting {
         trained_on: super::trained_on(&nominal, trained_on)?,
         scenario,
@@ -183,26 +181,5 @@ impl Setting {
         mapping.load_current = policy.mapping.map_or(0, |mapping| mapping.load_current);
         policy.mapping = Some(mapping);
         Ok(policy)
-    }
-
-    /// Checks what the runs at a converter need of it.
-    fn suits(&self, file: &std::path::Path, parameters: &Parameters) -> Result<(), Failure> {
-        let (ours, theirs) = (self.policy.sample_period, parameters.t_sw());
-        if (ours - theirs).abs() > 1e-9 * theirs {
-            return Err(Failure(format!(
-                "{}: policy and converter have different control periods\n   = found: sample_period = {ours} s in the \
-                 policy, {theirs} s at the converter\n   = hint: f_sw of the converter is 1 / sample_period",
-                file.display()
-            )));
-        }
-        if self.v_ref >= parameters.converter.v_in {
-            return Err(Failure(format!(
-                "{}: a buck converter cannot hold this voltage\n   = found: {} V from {} V",
-                file.display(),
-                self.v_ref,
-                parameters.converter.v_in
-            )));
-        }
-        Ok(())
     }
 }

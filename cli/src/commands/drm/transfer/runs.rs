@@ -18,7 +18,7 @@ use super::{Course, Findings, IDENTITY, Real, Run, Setting, Transfer};
 use crate::Failure;
 use crate::commands::drm::bench::Simulator;
 use crate::commands::progress_line::ProgressLine;
-use crate::commands::simulate::{controllers, go_on};
+use crate::commands::simulate::{self, controllers, go_on};
 
 /// Voltages that settled points are measured at, over the range of the policy's duties.
 const VOLTAGES: usize = 5;
@@ -49,7 +49,7 @@ pub fn all(options: &Transfer, setting: Setting, stop: &AtomicBool) -> Result<Fi
     let mut benches = Vec::new();
     for path in &options.real {
         let parameters = super::super::plant_parameters(path)?;
-        setting.suits(path, &parameters)?;
+        simulate::suits(&setting.policy, &parameters, setting.v_ref, &path.display())?;
         benches.push((path, parameters));
     }
     let mut progress = Progress {

@@ -27,6 +27,8 @@ pub enum Command {
     Compile(Compile),
     /// Compile the generated code and compare it with the interpreter, bit by bit
     Verify(Verify),
+    /// List the deployment targets: processor, compilers, where verify runs them
+    Targets(Targets),
     /// Train a policy on a simulated converter and write its folder
     Train(Train),
     /// Inspect, compile and verify the built-in example
@@ -74,7 +76,7 @@ pub struct Compile {
     /// Language; several separated by commas
     #[arg(long, value_enum, value_delimiter = ',', default_value = "c")]
     pub lang: Vec<Lang>,
-    /// Deployment target
+    /// Deployment target; `policyc targets` lists them
     #[arg(long, default_value = "host")]
     pub target: String,
     /// Folder for the generated files; made if missing
@@ -92,6 +94,10 @@ pub struct Verify {
     /// Seed of the generated measurements
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
+    /// Deployment target: its compilers and, where it is not this machine, its emulator. Unless given: the target of the
+    /// generated folder, else host
+    #[arg(long)]
+    pub target: Option<String>,
     /// Verify the generated code in this folder, and that it is what the policy yields today
     #[arg(long, value_name = "DIR")]
     pub generated: Option<PathBuf>,
@@ -100,6 +106,13 @@ pub struct Verify {
     #[arg(long, value_name = "CSV")]
     pub trace: Vec<PathBuf>,
     /// Machine-readable
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct Targets {
+    /// Machine-readable, with everything the compiler knows of a target
     #[arg(long)]
     pub json: bool,
 }

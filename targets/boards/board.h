@@ -31,4 +31,9 @@ void count_end(void);
 void stack_paint(void);
 uint32_t stack_depth(void);
 
+/* <string.h> is not there for every compiler of a bare board. */
+void *memcpy(void *to, const void *from, size_t size);
+void *memset(void *to, int value, size_t size);
+int memcmp(const void *a, const void *b, size_t size);
+
 #endif

@@ -4,13 +4,14 @@ pub mod compile;
 pub mod demo;
 pub mod inspect;
 pub mod new;
+pub mod targets;
 pub mod train;
 pub mod verify;
 
 use std::path::{Path, PathBuf};
 
+use ::targets::TargetSpec;
 use policy::Policy;
-use targets::TargetSpec;
 
 use crate::Failure;
 
@@ -36,8 +37,8 @@ fn load(path: &Path) -> Result<Policy, Failure> {
 }
 
 fn target(name: &str) -> Result<&'static TargetSpec, Failure> {
-    targets::find(name).ok_or_else(|| {
-        let known = targets::names().join(", ");
+    ::targets::find(name).ok_or_else(|| {
+        let known = ::targets::names().join(", ");
         Failure(format!(
             "unknown target\n   = found: {name}\n   = expected: one of {known}"
         ))

@@ -3,6 +3,9 @@
 //! `POLICYC_TARGET_STEPS=20000` sets the steps of every build.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod costs;
+mod counter;
+
 use std::collections::BTreeMap;
 
 use codegen::Language;

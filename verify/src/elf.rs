@@ -61,7 +61,10 @@ impl Elf {
     /// Address of a symbol.
     #[must_use]
     pub fn address(&self, name: &str) -> Option<u32> {
-        let symbol = self.symbols.iter().find(|symbol| symbol.is_defined && symbol.name == name);
+        let symbol = self
+            .symbols
+            .iter()
+            .find(|symbol| symbol.is_defined && symbol.name == name);
         symbol.map(|symbol| symbol.address)
     }
 
@@ -112,12 +115,20 @@ impl<'a> File<'a> {
 
     fn half(&self, at: usize) -> Option<u16> {
         let bytes = *self.bytes.get(at..)?.first_chunk()?;
-        Some(if self.is_big { u16::from_be_bytes(bytes) } else { u16::from_le_bytes(bytes) })
+        Some(if self.is_big {
+            u16::from_be_bytes(bytes)
+        } else {
+            u16::from_le_bytes(bytes)
+        })
     }
 
     fn word(&self, at: usize) -> Option<u32> {
         let bytes = *self.bytes.get(at..)?.first_chunk()?;
-        Some(if self.is_big { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) })
+        Some(if self.is_big {
+            u32::from_be_bytes(bytes)
+        } else {
+            u32::from_le_bytes(bytes)
+        })
     }
 
     fn section_headers(&self) -> Option<Vec<Header>> {

@@ -88,6 +88,31 @@ impl ProcessRunner {
     }
 }
 
+impl ProcessRunner {
+    /// Ends the stream and waits for the end of the driver.
+    ///
+    /// # Errors
+    /// If it does not end by itself.
+    pub fn finish(&mut self) -> Result<(), RunError> {
+        let error = |reason| RunError {
+            received: Vec::new(),
+            reason,
+        };
+        let Some(mut process) = self.process.take() else {
+            return Ok(());
+        };
+        process.to_child = None;
+        match process.from_child.recv_timeout(self.timeout) {
+            Err(RecvTimeoutError::Disconnected) => {}
+            Ok(_) | Err(RecvTimeoutError::Timeout) => return Err(error(RunFailure::Silent(self.timeout))),
+        }
+        match process.child.wait() {
+            Ok(status) if status.success() => Ok(()),
+            Ok(_) | Err(_) => Err(error(process.ended())),
+        }
+    }
+}
+
 impl Runner for ProcessRunner {
     fn start(&mut self, expected: usize) -> Result<Vec<u32>, RunError> {
         let start = |error: String| RunError {

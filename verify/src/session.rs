@@ -20,7 +20,7 @@ use crate::oracle::{Chunk, Oracle};
 use crate::protocol::Layout;
 use crate::report::{BuildReport, GoldenResult, Outcome, Report};
 use crate::runner::ProcessRunner;
-use crate::toolchain::{self, Build, BuildError, Install, Missing, Sources};
+use crate::toolchain::{self, Build, BuildError, Install, Missing, Purpose, Sources};
 use crate::traces::{Recorded, Stream};
 
 /// Generated files: relative path to text.
@@ -126,7 +126,7 @@ impl fmt::Display for VerifyError {
 impl std::error::Error for VerifyError {}
 
 /// A compiler that takes longer has failed; the largest policies take seconds.
-const COMPILER_TIMEOUT: Duration = Duration::from_secs(600);
+pub(crate) const COMPILER_TIMEOUT: Duration = Duration::from_secs(600);
 /// Steps per chunk.
 const CHUNK: u64 = 4096;
 /// Chunks a slow build may lag behind.
@@ -168,6 +168,7 @@ pub fn run(policy: &Policy, options: Options<'_>) -> Result<Report, VerifyError>
     let folder = tempfile::tempdir().map_err(|error| VerifyError::Io(temp, error))?;
     tell(Progress::Compiling { builds: builds.len() });
     let sources = Sources {
+        purpose: Purpose::Compare,
         policy,
         files,
         target,
@@ -266,7 +267,7 @@ impl Lanes<'_> {
             Ok(executable) => executable,
             Err(outcome) => return entry(build, 0, outcome),
         };
-        let Some(command) = toolchain::launch(self.target, executable) else {
+        let Some(command) = toolchain::launch(self.target, executable, &[]) else {
             return entry(build, 0, failed("the target runs nowhere here"));
         };
         let runner = ProcessRunner::new(command, self.timeout, self.target.endianness);

@@ -244,7 +244,8 @@ int main(void)
     )
 }
 
-fn measurement(policy: &Policy) -> String {
+/// Copies `words` into the measurement `m`.
+pub(super) fn measurement(policy: &Policy) -> String {
     let mut text = String::new();
     for (n, signal) in policy.signals.iter().enumerate() {
         // writing to a String cannot fail

@@ -153,18 +153,25 @@ fn bits(command: &Command) -> [u32; 4] {
 }
 "#;
 
-fn step(policy: &Policy, form: Form) -> String {
-    let mask = form.purity_mask();
-    let name = &policy.name;
-    let signals = policy.signals.len();
+/// The fields of a measurement from `words`.
+pub(super) fn measurement_fields(policy: &Policy) -> String {
     let mut fields = String::new();
     for (n, signal) in policy.signals.iter().enumerate() {
         let value = match signal.adc {
             Some(_) => format!("words[{n}] as i32"),
             None => format!("f32::from_bits(words[{n}])"),
         };
+        // writing to a String cannot fail
         let _ = writeln!(fields, "            {}: {value},", signal.name);
     }
+    fields
+}
+
+fn step(policy: &Policy, form: Form) -> String {
+    let mask = form.purity_mask();
+    let name = &policy.name;
+    let signals = policy.signals.len();
+    let fields = measurement_fields(policy);
     let [observe, eval, repeat, step, commit] = [
         purity::OBSERVE_CHANGED_STATE,
         purity::EVAL_CHANGED_STATE,

@@ -11,9 +11,20 @@ use targets::{Board, CCompiler, Runner, TargetSpec};
 use super::{Build, Tool, rust};
 use crate::drivers::{self, Form};
 
+/// What the program around the controller does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Purpose {
+    /// Answers events (see [`crate::protocol`]).
+    Compare,
+    /// Steps between the marks of the instruction counter (see [`mod@crate::measure`]); for boards only.
+    Measure,
+}
+
 /// What is compiled, the same for all builds.
 #[derive(Debug, Clone, Copy)]
 pub struct Sources<'a> {
+    /// Which driver.
+    pub purpose: Purpose,
     /// The policy, for the driver.
     pub policy: &'a Policy,
     /// Generated files: relative path, text.
@@ -76,6 +87,18 @@ pub fn compile(build: &Build, sources: Sources<'_>, folder: &Path) -> Result<Pat
     }
 }
 
+/// The object file of the controller alone, in a folder where [`compile`] has built it for a board.
+///
+/// # Errors
+/// See [`BuildError`].
+pub fn controller_object(build: &Build, sources: Sources<'_>, folder: &Path) -> Result<PathBuf, BuildError> {
+    let name = &sources.policy.name;
+    match build.tool {
+        Tool::C(_) => Ok(folder.join(format!("{name}.o"))),
+        Tool::Rust(_) => Job { build, sources, folder }.rust_object(),
+    }
+}
+
 /// One build in its folder.
 struct Job<'a> {
     build: &'a Build,
@@ -105,7 +128,10 @@ impl Job<'_> {
         }
         std::fs::write(
             self.folder.join("policyc_driver.c"),
-            drivers::c::text(self.sources.policy, form),
+            match self.sources.purpose {
+                Purpose::Compare => drivers::c::text(self.sources.policy, form),
+                Purpose::Measure => drivers::measure::c(self.sources.policy),
+            },
         )?;
         let mut command = self.command(compiler.program);
         command
@@ -139,7 +165,8 @@ impl Job<'_> {
             .collect())
     }
 
-    fn rust(&self, form: Form) -> Result<PathBuf, BuildError> {
+    /// The generated module and the compiler with all flags.
+    fn rust_command(&self) -> Result<(&String, Command), BuildError> {
         let name = format!("{}.rs", self.sources.policy.name);
         let unit = self
             .of_kind("rs")
@@ -147,16 +174,37 @@ impl Job<'_> {
         let (Some(unit), Some(toolchain)) = (unit, &self.build.rust) else {
             return Err(BuildError::NoFiles);
         };
-        std::fs::write(
-            self.folder.join("policyc_driver.rs"),
-            drivers::rust::text(self.sources.policy, unit, form),
-        )?;
         let mut command = toolchain.rustc();
         command.current_dir(self.folder).env("LC_ALL", "C");
         command.args(self.sources.target.rust_flags).args(self.build.flags);
         if let Tool::Rust(spec) = self.build.tool {
             command.args(rust::flags(spec));
         }
+        Ok((unit, command))
+    }
+
+    /// The generated module as a crate of its own.
+    fn rust_object(&self) -> Result<PathBuf, BuildError> {
+        let (unit, mut command) = self.rust_command()?;
+        std::fs::write(
+            self.folder.join("policyc_core.rs"),
+            format!("#![no_std]\n#[path = \"{unit}\"]\npub mod controller;\n"),
+        )?;
+        let object = self.folder.join("policyc_core.o");
+        command.args(["--crate-type=lib", "--emit=obj", "-Cpanic=abort", "-Ccodegen-units=1"]);
+        self.run(command.arg("policyc_core.rs").arg("-o").arg(&object))?;
+        Ok(object)
+    }
+
+    fn rust(&self, form: Form) -> Result<PathBuf, BuildError> {
+        let (unit, mut command) = self.rust_command()?;
+        std::fs::write(
+            self.folder.join("policyc_driver.rs"),
+            match self.sources.purpose {
+                Purpose::Compare => drivers::rust::text(self.sources.policy, unit, form),
+                Purpose::Measure => drivers::measure::rust(self.sources.policy, unit),
+            },
+        )?;
         let product = match form {
             Form::Hosted => self.folder.join("driver.exe"),
             Form::Board => {

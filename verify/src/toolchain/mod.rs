@@ -11,7 +11,7 @@ use codegen::Language;
 use serde::Serialize;
 use targets::{Board, CCompiler, Runner, RustTarget, TargetSpec};
 
-pub use compile::{BuildError, Sources, compile, run_for};
+pub use compile::{BuildError, Purpose, Sources, compile, controller_object, run_for};
 
 /// Optimisation levels that are built: name, flags.
 type Levels = &'static [(&'static str, &'static [&'static str])];
@@ -211,13 +211,13 @@ fn version(mut program: Command) -> String {
     text.lines().next().unwrap_or_default().to_owned()
 }
 
-/// The command that runs an executable of the target; `None` where nothing can.
-pub fn launch(target: &TargetSpec, executable: PathBuf) -> Option<Command> {
+/// The command that runs an executable of the target, with more arguments for the emulator; `None` where nothing can.
+pub fn launch(target: &TargetSpec, executable: PathBuf, emulator: &[String]) -> Option<Command> {
     match target.runner {
         Runner::Native => Some(Command::new(executable)),
         Runner::Emulated(board) => {
             let mut command = Command::new(board.emulator);
-            command.args(board.arguments).arg(executable);
+            command.args(emulator).args(board.arguments).arg(executable);
             Some(command)
         }
         Runner::None(_) => None,

@@ -68,17 +68,25 @@ impl Elf {
         symbol.map(|symbol| symbol.address)
     }
 
+    /// Sections without those of unwinding, which firmware does not link.
+    fn kept(&self) -> impl Iterator<Item = &Section> {
+        let unwinding = [".eh_frame", ".ARM.ex"];
+        self.sections
+            .iter()
+            .filter(move |section| !unwinding.iter().any(|start| section.name.starts_with(start)))
+    }
+
     /// Bytes of code and constants.
     #[must_use]
     pub fn flash_bytes(&self) -> u32 {
-        let sections = self.sections.iter().filter(|section| section.has_content);
+        let sections = self.kept().filter(|section| section.has_content);
         sections.map(|section| section.size).sum()
     }
 
     /// Bytes that can be written at run time.
     #[must_use]
     pub fn ram_bytes(&self) -> u32 {
-        let sections = self.sections.iter().filter(|section| section.is_writable);
+        let sections = self.kept().filter(|section| section.is_writable);
         sections.map(|section| section.size).sum()
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::boards::{MICROBIT, MPS2_AN385_BOARD, MPS2_AN386_BOARD, MPS2_AN500_BOARD, MPS2_AN505_BOARD};
 use crate::{
-    CCompiler, EXACT_C99, EXACT_RUST, Endianness, Fma, Fpu, GNU_SECTIONS, ILP32, RowBlock, Runner, RustTarget,
-    Sections, TargetSpec,
+    CCompiler, CycleModel, EXACT_C99, EXACT_RUST, Endianness, Fma, Fpu, GNU_SECTIONS, ILP32, RowBlock, Runner,
+    RustTarget, Sections, TargetSpec,
 };
 
 const fn gcc(machine_flags: &'static [&'static str]) -> CCompiler {
@@ -28,6 +28,12 @@ const SECTIONS: Sections = Sections {
     ..GNU_SECTIONS
 };
 
+/// Cortex-M3 and M4 technical reference manuals, instruction timing: LDR 2, pipelined 1; B 1 + 1 to 3.
+const M3_M4_CYCLES: CycleModel = CycleModel {
+    access: (0, 1),
+    jump: (1, 3),
+};
+
 const BASE: TargetSpec = TargetSpec {
     name: "",
     description: "",
@@ -36,6 +42,7 @@ const BASE: TargetSpec = TargetSpec {
     fpu: Fpu::None,
     fma: Fma::Absent,
     suitable_format: "i16",
+    cycles: None,
     sections: SECTIONS,
     clock_hz: None,
     c_row_block: RowBlock::Rows(4),
@@ -50,6 +57,11 @@ const BASE: TargetSpec = TargetSpec {
 pub const CORTEX_M0PLUS: TargetSpec = TargetSpec {
     name: "cortex-m0plus",
     description: "Arm Cortex-M0 and M0+ (Armv6-M): no FPU, no division",
+    // M0+ technical reference manual: LDR and STR 2, B 2; the M0's jump takes one more
+    cycles: Some(CycleModel {
+        access: (1, 1),
+        jump: (1, 2),
+    }),
     clock_hz: Some(48_000_000),
     c_compilers: &[
         gcc(&["-mthumb", "-mcpu=cortex-m0plus"]),
@@ -66,6 +78,7 @@ pub const CORTEX_M0PLUS: TargetSpec = TargetSpec {
 pub const CORTEX_M3: TargetSpec = TargetSpec {
     name: "cortex-m3",
     description: "Arm Cortex-M3 (Armv7-M): no FPU",
+    cycles: Some(M3_M4_CYCLES),
     clock_hz: Some(72_000_000),
     c_compilers: &[
         gcc(&["-mthumb", "-mcpu=cortex-m3"]),
@@ -93,6 +106,7 @@ pub const CORTEX_M4F: TargetSpec = TargetSpec {
     description: "Arm Cortex-M4 with FPU (Armv7E-M, FPv4-SP)",
     // Arm's timing table: VFMA 3 cycles, VMUL and VADD 1 each
     fma: Fma::Cycles { fused: 3, apart: 2 },
+    cycles: Some(M3_M4_CYCLES),
     clock_hz: Some(168_000_000),
     c_compilers: &[
         gcc(&["-mthumb", "-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard"]),

@@ -78,6 +78,17 @@ pub enum Fma {
     },
 }
 
+/// Cycles beyond one per instruction, at 0 wait states, from the processor's timing table: least and most.
+///
+/// A model, not a measurement. Divisions and fused operations are not in it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct CycleModel {
+    /// Per access to memory; the least where loads follow each other in the pipeline.
+    pub access: (u8, u8),
+    /// Per jump taken: refill of the pipeline.
+    pub jump: (u8, u8),
+}
+
 /// Where compilers of the target put things unless told otherwise, and where fast memory usually is.
 ///
 /// The generated C takes other places through its macros `<NAME>_TABLE` and `<NAME>_CODE`.
@@ -140,6 +151,8 @@ pub struct TargetSpec {
     pub fma: Fma,
     /// Numeric format that suits the processor, as `policy.toml` names it; the policy decides, not the target.
     pub suitable_format: &'static str,
+    /// Cycles of an instruction mix, where the processor's table is simple enough to say so.
+    pub cycles: Option<CycleModel>,
     /// Where things lie.
     pub sections: Sections,
     /// Clock in Hz of a usual device, for shares of the control period.

@@ -18,6 +18,7 @@ pub const HOST: TargetSpec = TargetSpec {
     fpu: Fpu::Native,
     fma: Fma::Unrated,
     suitable_format: "f32",
+    cycles: None,
     sections: GNU_SECTIONS,
     clock_hz: None,
     // gcc on x86 spills the accumulators of the block form; LLVM keeps them in registers
@@ -52,6 +53,7 @@ pub const DSPACE_DS1202: TargetSpec = TargetSpec {
     fpu: Fpu::Double,
     fma: Fma::Cycles { fused: 1, apart: 2 },
     suitable_format: "f32",
+    cycles: None,
     sections: GNU_SECTIONS,
     clock_hz: Some(2_000_000_000),
     c_row_block: RowBlock::Rows(16),
@@ -86,6 +88,7 @@ pub const C2000_C28X: TargetSpec = TargetSpec {
     fma: Fma::Absent,
     // the FPU flushes denormals: bits are promised for integers only
     suitable_format: "i16",
+    cycles: None,
     sections: Sections {
         tables: ".const",
         code: ".text",

@@ -30,6 +30,7 @@ pub const RISCV32IMC: TargetSpec = TargetSpec {
     fpu: Fpu::None,
     fma: Fma::Absent,
     suitable_format: "i16",
+    cycles: None,
     sections: GNU_SECTIONS,
     clock_hz: Some(160_000_000),
     c_row_block: RowBlock::Rows(8),

@@ -13,6 +13,7 @@
 //! | how it travels | [`protocol`] |
 //! | what is expected | [`oracle`] |
 //! | who answers | [`runner`]: [`runner::Runner`] has one implementation per way of running a build |
+//! | a loop closed around a build | [`live`] |
 //! | what differs | [`compare`], [`report`] |
 //! | what a step costs | [`mod@measure`], [`elf`] |
 //! | checked-in files against the policy | [`drift()`] |
@@ -23,6 +24,7 @@ pub mod drivers;
 pub mod elf;
 mod golden;
 pub mod lane;
+pub mod live;
 pub mod measure;
 pub mod oracle;
 pub mod protocol;
@@ -33,5 +35,6 @@ pub mod toolchain;
 pub mod traces;
 
 pub use drift::{drift, read_text};
+pub use live::{Live, LiveCommand};
 pub use report::{BuildReport, Difference, GoldenResult, Outcome, Report};
 pub use session::{Files, Options, Progress, VerifyError, golden_result, run};

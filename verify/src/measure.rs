@@ -37,6 +37,8 @@ pub struct Costs {
     pub instructions_min: u64,
     /// Executed instructions of a step, the most of all steps.
     pub instructions_max: u64,
+    /// Model of the cycles of a step at 0 wait states, least and most; `None` where the target has no model. Not measured.
+    pub model_cycles: Option<(u64, u64)>,
     /// Steps counted: inside the plausible ranges, anywhere among the floats, not a number.
     pub steps: usize,
     /// Functions that the controller calls and does not hold: the float library of a processor without FPU.
@@ -120,8 +122,13 @@ pub fn measure(policy: &Policy, target: &TargetSpec, files: &Files, build: &Buil
         flash_bytes: object.flash_bytes(),
         static_ram_bytes: object.ram_bytes(),
         stack_bytes: depths.iter().copied().max().unwrap_or_default(),
-        instructions_min: counts.iter().copied().min().unwrap_or_default(),
-        instructions_max: counts.iter().copied().max().unwrap_or_default(),
+        instructions_min: counts.iter().map(|count| count.instructions).min().unwrap_or_default(),
+        instructions_max: counts.iter().map(|count| count.instructions).max().unwrap_or_default(),
+        model_cycles: target.cycles.map(|model| {
+            let least = counts.iter().map(|count| count.cycles(model.access.0, model.jump.0));
+            let most = counts.iter().map(|count| count.cycles(model.access.1, model.jump.1));
+            (least.min().unwrap_or_default(), most.max().unwrap_or_default())
+        }),
         steps: counts.len(),
         library_calls: calls(&object),
     })
@@ -197,9 +204,32 @@ fn samples(policy: &Policy) -> Vec<u32> {
     words
 }
 
-fn read_counts(path: &Path) -> Result<Vec<u64>, MeasureError> {
+/// One passage, as the counter writes it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Count {
+    instructions: u64,
+    accesses: u64,
+    jumps: u64,
+}
+
+impl Count {
+    fn read(line: &str) -> Option<Self> {
+        let mut numbers = line.split_whitespace().map(str::parse);
+        Some(Self {
+            instructions: numbers.next()?.ok()?,
+            accesses: numbers.next()?.ok()?,
+            jumps: numbers.next()?.ok()?,
+        })
+    }
+
+    fn cycles(self, per_access: u8, per_jump: u8) -> u64 {
+        self.instructions + self.accesses * u64::from(per_access) + self.jumps * u64::from(per_jump)
+    }
+}
+
+fn read_counts(path: &Path) -> Result<Vec<Count>, MeasureError> {
     let text = std::fs::read_to_string(path)?;
-    let counts: Vec<u64> = text.lines().filter_map(|line| line.parse().ok()).collect();
+    let counts: Vec<Count> = text.lines().filter_map(Count::read).collect();
     if counts.len() == STEPS {
         Ok(counts)
     } else {
@@ -221,4 +251,51 @@ fn calls(object: &Elf) -> Vec<String> {
     names.sort();
     names.dedup();
     names
+}
+
+/// Measures the builds that firmware takes: the first C compiler at each level, and rustc; those that can be made here.
+///
+/// # Errors
+/// Of the first build that can be made and does not run; what is missing is no error but the second value.
+pub fn usual_builds(
+    policy: &Policy,
+    target: &TargetSpec,
+    files: &Files,
+    languages: &[codegen::Language],
+) -> Result<(Vec<Costs>, Vec<Missing>), MeasureError> {
+    let (mut costs, mut missing) = (Vec::new(), Vec::new());
+    if !matches!(target.runner, targets::Runner::Emulated(_)) {
+        return Ok((costs, missing));
+    }
+    let first = target.c_compilers.first().map(|compiler| compiler.program);
+    let usual = toolchain::builds(target, &[], &[]).into_iter().filter(|build| {
+        languages.contains(&build.language()) && (Some(build.compiler) == first || build.compiler == toolchain::RUSTC)
+    });
+    for build in usual {
+        match measure(policy, target, files, &build) {
+            Ok(cost) => costs.push(cost),
+            Err(MeasureError::Missing(what)) => missing.extend(what),
+            Err(error) => return Err(error),
+        }
+    }
+    missing.dedup();
+    Ok((costs, missing))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_of_the_counter_is_three_numbers() {
+        let count = Count {
+            instructions: 100,
+            accesses: 20,
+            jumps: 5,
+        };
+        assert_eq!(Count::read("100 20 5"), Some(count));
+        assert_eq!(Count::read("100 20"), None);
+        assert_eq!(count.cycles(0, 1), 105);
+        assert_eq!(count.cycles(1, 3), 135);
+    }
 }

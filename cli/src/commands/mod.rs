@@ -1,9 +1,14 @@
 //! One file per command.
 
 pub mod compile;
+mod costs;
 pub mod demo;
+pub mod drm;
 pub mod inspect;
+mod interruption;
 pub mod new;
+mod progress_line;
+pub mod simulate;
 pub mod targets;
 pub mod train;
 pub mod verify;

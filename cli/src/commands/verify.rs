@@ -1,8 +1,6 @@
 //! `policyc verify`
 
-use std::io::{IsTerminal, Write};
 use std::path::Path;
-use std::time::{Duration, Instant};
 
 use codegen::{Language, manifest};
 use policy::Policy;
@@ -13,12 +11,13 @@ use verify::traces::Recorded;
 use verify::{Files, Options, Progress, Report};
 
 use super::grouped;
+use super::progress_line::ProgressLine;
 use crate::arguments::Verify;
 use crate::{Failure, Outcome, output};
 
 mod show;
 
-pub use show::golden_text;
+pub use show::{golden_text, missing_text};
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -44,7 +43,12 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
         .transpose()?;
     let target = target(options, on_disk.as_ref().map(|folder| folder.target))?;
     let mut progress = ProgressLine::new();
-    let mut tell = |news| progress.show(news);
+    let mut tell = |news| {
+        progress.show(|| match news {
+            Progress::Compiling { builds } => format!("compiling {builds} builds"),
+            Progress::Running { steps, of } => format!("{} of {} steps", grouped(steps), grouped(of)),
+        });
+    };
     let report = verify::run(
         &policy,
         Options {
@@ -147,52 +151,4 @@ fn checked_in(policy: &Policy, folder: &Path) -> Result<Folder, Failure> {
         }
     }
     Ok(Folder { files, drift, target })
-}
-
-/// One line on the terminal; lines at intervals where the output is a log.
-struct ProgressLine {
-    terminal: bool,
-    last: Instant,
-    shown: bool,
-}
-
-impl ProgressLine {
-    fn new() -> Self {
-        Self {
-            terminal: std::io::stderr().is_terminal(),
-            last: Instant::now(),
-            shown: false,
-        }
-    }
-
-    fn show(&mut self, news: Progress) {
-        let interval = if self.terminal {
-            Duration::from_millis(100)
-        } else {
-            Duration::from_secs(10)
-        };
-        if self.last.elapsed() < interval {
-            return;
-        }
-        self.last = Instant::now();
-        let text = match news {
-            Progress::Compiling { builds } => format!("compiling {builds} builds"),
-            Progress::Running { steps, of } => format!("{} of {} steps", grouped(steps), grouped(of)),
-        };
-        let mut out = std::io::stderr();
-        // progress that cannot be shown is no reason to stop
-        let _ = if self.terminal {
-            write!(out, "\r\x1b[K{text}")
-        } else {
-            writeln!(out, "{text}")
-        };
-        let _ = out.flush();
-        self.shown = self.terminal;
-    }
-
-    fn clear(&mut self) {
-        if self.shown {
-            eprint!("\r\x1b[K");
-        }
-    }
 }

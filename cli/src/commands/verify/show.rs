@@ -91,7 +91,8 @@ fn verdict(build: &BuildReport) -> (&'static str, String) {
     }
 }
 
-fn missing_text(missing: &Missing) -> String {
+/// What is missing and how to get it.
+pub fn missing_text(missing: &Missing) -> String {
     let install = match &missing.install {
         Some(Install::Package(package)) => format!(" (Debian package {package})"),
         Some(Install::RustTarget(triple)) => format!(" (rustup target add {triple})"),

@@ -1,0 +1,10 @@
+//! What a simulation gets wrong, why, a better model, and the gain.
+
+pub mod columns;
+pub mod csv;
+pub mod record;
+pub mod causes;
+pub mod drive;
+pub mod fit;
+mod parallel;
+pub mod problem;

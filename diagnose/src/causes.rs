@@ -22,7 +22,7 @@ pub struct Bases {
 enum Reach {
     /// In shares of the model's own value.
     Own(f64, f64, f64),
-    /// In units of v / i.
+    /// In units of v / i: highest and step.
     Resistance(f64, f64),
     /// In units of i / v.
     Conductance(f64, f64),
@@ -69,12 +69,22 @@ impl Knob {
 
     /// Gives a model the value.
     pub fn set(&self, model: &mut Model, value: f64) {
+        let value = self.snapped(model, value);
         if self.keys.is_empty() {
             model.late = value;
         }
         for parameter in self.keys.iter().filter_map(|key| plant::parameter(key)) {
             parameter.set(&mut model.plant, value);
         }
+    }
+
+    /// A lag far shorter than a period is none: it would only cost steps of the integrator.
+    fn snapped(&self, model: &Model, value: f64) -> f64 {
+        let is_lag = self.name.starts_with("time_constant");
+        let is_source = self.name == "resistance" && model.plant.source.c_in > 0.0;
+        let shortest = NO_LAG * model.plant.t_sw();
+        let lag = if is_source { value * model.plant.source.c_in } else { value };
+        if (is_lag || is_source) && lag < shortest { 0.0 } else { value }
     }
 
     /// Lowest value, highest value, and step, for a converter of these magnitudes around `own`.
@@ -117,6 +127,9 @@ pub struct Cause {
     /// How to fit it.
     pub search: Search,
 }
+
+/// Lags shorter than this share of a period are left out.
+const NO_LAG: f64 = 0.01;
 
 const fn knob(name: &'static str, keys: &'static [&'static str], reach: Reach) -> Knob {
     Knob { name, keys, reach }
@@ -186,7 +199,7 @@ pub const CAUSES: &[Cause] = &[
         "resistance of the source before an input capacitor",
         &[
             knob("resistance", &["source.resistance"], OHMS),
-            knob("c_in", &["source.c_in"], Reach::Plain(1e-6, 2.0, 1e-4)),
+            knob("c_in", &["source.c_in"], Reach::Plain(1e-5, 2.0, 1e-4)),
         ],
         Search::From(&[&[4.0, 1.0], &[4.0, 20.0]]),
     ),

@@ -49,9 +49,9 @@ impl Model {
 /// What the sensors show at each row, from the given states at the start of each segment; NaN outside of segments and
 /// where the model is no plant.
 ///
-/// `starts` has an element for each segment.
+/// `starts` has an element for each segment; `trim` is duty that the gate's edges add.
 #[must_use]
-pub fn simulate(model: &Model, record: &Record, starts: &[Start]) -> Vec<[f64; CHANNELS]> {
+pub fn simulate(model: &Model, record: &Record, starts: &[Start], trim: f64) -> Vec<[f64; CHANNELS]> {
     let mut shown = vec![[f64::NAN; CHANNELS]; record.rows()];
     let stripped;
     let model = match record.duty_is {
@@ -66,6 +66,8 @@ pub fn simulate(model: &Model, record: &Record, starts: &[Start]) -> Vec<[f64; C
     for sensor in [&mut p.sensors.v_out, &mut p.sensors.i_l, &mut p.sensors.i_out, &mut p.sensors.v_in] {
         (sensor.noise, sensor.lsb) = (0.0, 0.0);
     }
+    p.switch.turn_off_delay += trim.max(0.0) * p.t_sw();
+    p.switch.turn_on_delay += (-trim).max(0.0) * p.t_sw();
     let instant = record.phase + model.late / p.t_sw();
     let mut whole = (instant + SAME).floor();
     let mut phase = instant - whole;

@@ -38,8 +38,13 @@ impl State {
     /// The model with the initial states fitted.
     #[must_use]
     pub fn settle(problem: &Problem, model: &Model, starts: &Starts, basis: Option<&Basis>) -> Self {
+        Self::settle_in(problem, model, starts, basis, 4)
+    }
+
+    /// The same in at most `rounds` steps.
+    fn settle_in(problem: &Problem, model: &Model, starts: &Starts, basis: Option<&Basis>, rounds: usize) -> Self {
         let mut state = Self::at(problem, model, starts.clone());
-        for _ in 0..4 {
+        for _ in 0..rounds {
             let own;
             let basis = match basis {
                 Some(basis) => basis,
@@ -126,28 +131,47 @@ impl Fitter<'_> {
                 .collect(),
             Search::Scan(list) => list.iter().map(|n| vec![n * candidate.ranges[0][2]]).collect(),
         };
-        let mut best: Option<Fit> = None;
-        for values in starts {
-            let fit = self.from(&[cause], &values, from);
-            if best.as_ref().is_none_or(|best| fit.state.chi2 < best.state.chi2) {
-                best = Some(fit);
-            }
+        if let [only] = starts.as_slice() {
+            return self.from(&[cause], only, from);
         }
-        best.unwrap_or_else(|| self.from(&[cause], &candidate.own.clone(), from))
+        // the best start, judged without further fitting
+        let looks = starts.iter().map(|values| (self.state_at(&[cause], values, from, 1).0.chi2, values));
+        let best = looks.min_by(|a, b| a.0.total_cmp(&b.0));
+        self.from(&[cause], best.map_or(&candidate.own, |(_, values)| values), from)
+    }
+
+    /// The candidate at the model's own values, as far as nothing speaks for more; it would gain `first_order`.
+    #[must_use]
+    pub fn unmoved(&self, cause: usize, first_order: f64) -> Fit {
+        let values = self.candidates[cause].own.clone();
+        let mut state = self.null.clone();
+        state.chi2 -= first_order.max(0.0);
+        Fit {
+            causes: vec![cause],
+            covariance: vec![vec![0.0; values.len()]; values.len()],
+            values,
+            state,
+        }
+    }
+
+    /// The model with these values, initial states fitted in `rounds`.
+    fn state_at(&self, causes: &[usize], values: &[f64], from: &State, rounds: usize) -> (State, Vec<f64>) {
+        let mut model = from.model.clone();
+        let mut values = values.to_vec();
+        for (place, value) in self.places(causes).iter().zip(&mut values) {
+            let [low, high, _] = self.range(*place);
+            *value = value.clamp(low, high);
+            self.set(&mut model, *place, *value);
+        }
+        let state = State::settle_in(self.problem, &model, &from.starts, Some(self.basis), rounds);
+        (state, values)
     }
 
     /// Fits a set from given values.
     #[must_use]
     pub fn from(&self, causes: &[usize], values: &[f64], from: &State) -> Fit {
         let places = self.places(causes);
-        let mut model = from.model.clone();
-        let mut values = values.to_vec();
-        for (place, value) in places.iter().zip(&mut values) {
-            let [low, high, _] = self.range(*place);
-            *value = value.clamp(low, high);
-            self.set(&mut model, *place, *value);
-        }
-        let mut state = State::settle(self.problem, &model, &from.starts, Some(self.basis));
+        let (mut state, mut values) = self.state_at(causes, values, from, 2);
         let smooth: Vec<usize> = (0..places.len()).filter(|n| self.is_smooth(places[*n])).collect();
         let mut covariance = vec![vec![0.0; places.len()]; places.len()];
         let mut damping = 1e-3;
@@ -164,7 +188,7 @@ impl Fitter<'_> {
             };
             let gain = state.chi2 - next.chi2;
             (state, values) = (next, moved);
-            if gain < SMALL_GAIN.max(1e-7 * state.chi2) {
+            if gain < SMALL_GAIN.max(1e-6 * state.chi2) {
                 break;
             }
         }

@@ -8,3 +8,6 @@ pub mod drive;
 pub mod fit;
 mod parallel;
 pub mod problem;
+pub mod attribute;
+pub mod noise;
+mod spectrum;

@@ -25,12 +25,24 @@ pub struct Problem {
     pub sigma: [f64; CHANNELS],
     /// Rows that are not scored, for each record and channel: outliers.
     pub masked: Vec<[Vec<bool>; CHANNELS]>,
-    /// Start of each record in the vectors.
+    /// Start of each record in the vectors; their last element is the trim over its accuracy.
     pub offsets: Vec<usize>,
+    /// The trim is not estimated.
+    pub trim_held: bool,
 }
 
-/// Initial states of all segments of all records.
-pub type Starts = Vec<Vec<Start>>;
+/// Standard deviation of what a model of ideal edges may be off in the duty, 1: rise and fall times of the gate. It is
+/// estimated beside every fit, so that nothing that small is called a cause.
+pub const DUTY_ACCURACY: f64 = 5e-4;
+
+/// What is estimated beside every fit.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Starts {
+    /// Initial states of all segments of all records.
+    pub states: Vec<Vec<Start>>,
+    /// Duty added by the edges of the gate, 1.
+    pub trim: f64,
+}
 
 /// An orthonormal basis of what initial states can explain, for each segment: two vectors and the triangle that leads
 /// from them back to states.
@@ -38,6 +50,8 @@ pub type Starts = Vec<Vec<Start>>;
 pub struct Basis {
     q: [Vec<f64>; 2],
     spans: Vec<Span>,
+    /// Sensitivity to the trim, as it is and without what initial states explain; empty if the trim is held.
+    trim: [Vec<f64>; 2],
 }
 
 #[derive(Debug, Clone)]
@@ -73,13 +87,14 @@ impl Problem {
             base,
             offsets,
             records,
+            trim_held: false,
         }
     }
 
     /// Length of the vectors.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.records.iter().map(|record| record.rows() * CHANNELS).sum()
+        self.records.iter().map(|record| record.rows() * CHANNELS).sum::<usize>() + 1
     }
 
     /// Whether there is no record.
@@ -92,7 +107,10 @@ impl Problem {
     #[must_use]
     pub fn first_starts(&self) -> Starts {
         let of = |record: &Record| record.segments.iter().map(|segment| self.guess(record, segment.start)).collect();
-        self.records.iter().map(of).collect()
+        Starts {
+            states: self.records.iter().map(of).collect(),
+            trim: 0.0,
+        }
     }
 
     fn guess(&self, record: &Record, row: usize) -> Start {
@@ -120,7 +138,7 @@ impl Problem {
     pub fn residual(&self, model: &Model, starts: &Starts) -> Vec<f64> {
         let mut out = vec![0.0; self.len()];
         for (index, record) in self.records.iter().enumerate() {
-            let shown = simulate(model, record, &starts[index]);
+            let shown = simulate(model, record, &starts.states[index], starts.trim);
             for segment in &record.segments {
                 let first = if record.settled { segment.start } else { segment.start + 1 };
                 for row in first..segment.end {
@@ -134,6 +152,9 @@ impl Problem {
                     }
                 }
             }
+        }
+        if let Some(last) = out.last_mut() {
+            *last = -starts.trim / DUTY_ACCURACY;
         }
         out
     }
@@ -156,7 +177,7 @@ impl Problem {
         let mut q: [Vec<f64>; 2] = std::array::from_fn(|state| {
             let step = NUDGE * [self.bases.v, self.bases.i][state];
             let mut moved = starts.clone();
-            for start in moved.iter_mut().flatten() {
+            for start in moved.states.iter_mut().flatten() {
                 start[state] += step;
             }
             let after = self.residual(model, &moved);
@@ -194,7 +215,21 @@ impl Problem {
                 }
             }
         }
-        Basis { q, spans }
+        let mut basis = Basis {
+            q,
+            spans,
+            trim: [Vec::new(), Vec::new()],
+        };
+        if !self.trim_held {
+            let mut moved = starts.clone();
+            moved.trim += DUTY_ACCURACY;
+            let after = self.residual(model, &moved);
+            let raw: Vec<f64> = residual.iter().zip(&after).map(|(a, b)| (a - b) / DUTY_ACCURACY).collect();
+            let mut own = raw.clone();
+            basis.project(&mut own);
+            basis.trim = [raw, own];
+        }
+        basis
     }
 }
 
@@ -209,17 +244,32 @@ impl Basis {
                 axpy(part, -share, q);
             }
         }
+        let own = &self.trim[1];
+        if !own.is_empty() {
+            axpy(u, -dot(own, u) / dot(own, own), own);
+        }
     }
 
     /// Moves `starts` to where they explain most of `u`, a residual.
     pub fn absorb(&self, u: &[f64], starts: &mut Starts) {
+        let [raw, own] = &self.trim;
+        let trimmed;
+        let mut u = u;
+        if !own.is_empty() {
+            let step = dot(own, u) / dot(own, own);
+            starts.trim += step;
+            let mut rest = u.to_vec();
+            axpy(&mut rest, -step, raw);
+            trimmed = rest;
+            u = &trimmed;
+        }
         for span in &self.spans {
             let [r11, r12, r22] = span.r;
             let part = &u[span.from..span.to];
             let (a, b) = (dot(&self.q[0][span.from..span.to], part), dot(&self.q[1][span.from..span.to], part));
             let i = if r22 > 0.0 { b / r22 } else { 0.0 };
             let v = if r11 > 0.0 { (a - r12 * i) / r11 } else { 0.0 };
-            let start = &mut starts[span.record][span.segment];
+            let start = &mut starts.states[span.record][span.segment];
             start[0] = (start[0] + v).max(0.0);
             start[1] += i;
         }

@@ -1,23 +1,22 @@
 use std::path::Path; use std::time::Instant;
-use diagnose::{columns::Columns, record::*, problem::*, fit::*, noise, attribute::*, drive::Model};
+use diagnose::{columns::Columns, record::*, diagnosis::*, noise};
 fn main() {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let p = plant::Parameters::from_file(Path::new("examples/blind/plant.toml")).unwrap();
-    let recs: Vec<Record> = args.iter().map(|f| Record::open(Path::new(f), &Columns::default(), &p).map_err(|e| println!("{e}")).unwrap()).collect();
-    let mut pb = Problem::new(recs, Model::new(&p));
+    let (mut tr, mut he) = (vec![], vec![]);
+    for f in &args { let r = Record::open(Path::new(f), &Columns::default(), &p).map_err(|e| println!("{e}")).unwrap(); if f.contains("heldout") { he.push(r) } else { tr.push(r) } }
     let t = Instant::now();
-    let mut null = State::settle(&pb, &pb.base, &pb.first_starts(), None);
-    for _ in 0..2 { pb.sigma = noise::sigma(&pb, &null.residual);
-    null = State::settle(&pb, &pb.base, &null.starts, None); }
-    println!("sigma {:?} null {:.1} of {} trim {:e} {:?}", pb.sigma, null.chi2, pb.count(), null.starts.trim, t.elapsed());
-    let a = attribute(&pb, null, &|s| println!("  {s}"));
+    let d = diagnose(&p, tr, &he, &|_| ());
+    let f = &d.findings;
+    println!("{:?} {} {:?}", f.verdict, f.sentence, t.elapsed());
+    for c in f.causes.iter().chain(&f.partial) { println!("  {} {:?} rivals {:?}", c.id, c.evidence, c.rivals); }
+    let a = &d.attribution;
     let mut v = a.singles.clone(); v.sort_by(|a,b| a.state.chi2.total_cmp(&b.state.chi2));
-    for f in v.iter().take(5) { println!("   {:10.1} {} {:?}", f.state.chi2, a.candidates[f.causes[0]].cause.id, f.values); }
-    println!("inflation {:.2} {:?}", a.inflation, t.elapsed());
-    if let Some(b) = &a.best {
-        println!("BEST {:.1} {:?} {:?} evidence {:?} trim {:e}", b.state.chi2, b.causes.iter().map(|c| a.candidates[*c].cause.id).collect::<Vec<_>>(), b.values, a.evidence, b.state.starts.trim);
-        for (n, r) in a.rivals.iter().enumerate() { println!(" rivals of {}: {:?}", n, r.iter().map(|f| (f.state.chi2, f.causes.iter().map(|c| a.candidates[*c].cause.id).collect::<Vec<_>>())).collect::<Vec<_>>()); }
-    } else { println!("NONE"); }
-    let r = a.best.as_ref().map_or(&a.null.residual, |b| &b.state.residual);
-    for (i, rec) in pb.records.iter().enumerate() { for c in 0..4 { let l = noise::left(&noise::channel(&pb, r, i, c)); print!(" {}:{} {:.2} {:.2};", rec.name, CHANNEL_NAMES[c], l.square, l.slow); } println!(); }
+    print!("  null {:.0} best {:.0} of {}:", a.null.chi2, a.state().chi2, d.problem.count());
+    for f in v.iter().take(6) { print!(" {:.0} {} {:.4e};", f.state.chi2, a.id(f.causes[0]), f.values[0]); } println!();
+    for h in f.gain.heldout.iter().filter(|h| h.regime=="all") { print!(" {}:{} {:.4}>{:.4} ({:.3});", h.record, h.channel, h.rmse_before, h.rmse_after, h.floor); }
+    println!("\n  noise {:?} remarks {:?}", f.noise.sigma, f.noise.repairs);
+    println!("  nd {:?}", f.not_detectable.iter().map(|h| (h.id, h.smallest)).collect::<Vec<_>>());
+    for e in &f.next_experiments { println!("  next {e:?}"); }
+    for (i, rec) in d.problem.records.iter().enumerate() { for c in 0..4 { let l = noise::left(&noise::channel(&d.problem, &d.attribution.state().residual, i, c)); print!(" {}:{} {:.2} {:.2};", rec.name, CHANNEL_NAMES[c], l.square, l.slow); } println!(); }
 }

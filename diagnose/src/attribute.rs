@@ -318,17 +318,35 @@ fn top(mut looks: Vec<(f64, usize)>, count: usize) -> Vec<usize> {
 }
 
 impl Attribution {
-    /// The size a cause must have to be seen beside the explanation found: for each candidate with a smooth first
-    /// parameter, the change of it that would reach the threshold, in SI.
+    /// To fit more.
     #[must_use]
-    pub fn smallest_sizes(&self, problem: &Problem) -> Vec<(usize, f64)> {
-        let fitter = Fitter {
+    pub fn fitter<'a>(&'a self, problem: &'a Problem) -> Fitter<'a> {
+        Fitter {
             problem,
             candidates: &self.candidates,
             basis: &self.basis,
             null: &self.null,
-        };
-        let state = self.best.as_ref().map_or(&self.null, |fit| &fit.state);
+        }
+    }
+
+    /// Where the best explanation ends, or the model as given.
+    #[must_use]
+    pub fn state(&self) -> &State {
+        self.best.as_ref().map_or(&self.null, |fit| &fit.state)
+    }
+
+    /// Id of a candidate.
+    #[must_use]
+    pub fn id(&self, cause: usize) -> &'static str {
+        self.candidates[cause].cause.id
+    }
+
+    /// The size a cause must have to be seen beside the explanation found: for each candidate with a smooth first
+    /// parameter, the change of it that would reach the threshold, in SI.
+    #[must_use]
+    pub fn smallest_sizes(&self, problem: &Problem) -> Vec<(usize, f64)> {
+        let fitter = self.fitter(problem);
+        let state = self.state();
         let own: Vec<Vec<f64>> = match &self.best {
             Some(fit) => fit.causes.iter().flat_map(|c| fitter.sensitivity(*c, state)).collect(),
             None => Vec::new(),

@@ -164,6 +164,14 @@ pub const CAUSES: &[Cause] = &[
     cause("r_ds_on", "on-resistance of the switch", &[knob("r_ds_on", &["switch.r_ds_on"], OHMS)]),
     cause("diode", "forward voltage of the diode", &[knob("v_f", &["switch.v_f"], Reach::Source(0.0, 0.1, 0.002))]),
     cause("diode", "differential resistance of the diode", &[knob("r_d", &["switch.r_d"], OHMS)]),
+    cause(
+        "diode",
+        "forward voltage and differential resistance of the diode",
+        &[
+            knob("v_f", &["switch.v_f"], Reach::Source(0.0, 0.1, 0.002)),
+            knob("r_d", &["switch.r_d"], OHMS),
+        ],
+    ),
     cause("dead_time", "dead time", &[knob("dead_time", &["switch.dead_time"], EDGE)]),
     cause("turn_on_delay", "turn-on delay of the switch", &[knob("turn_on_delay", &["switch.turn_on_delay"], EDGE)]),
     cause("turn_off_delay", "turn-off delay of the switch", &[knob("turn_off_delay", &["switch.turn_off_delay"], EDGE)]),
@@ -277,8 +285,8 @@ pub const CAUSES: &[Cause] = &[
     searched(
         "cpl_fold",
         "voltage below which constant power becomes a resistor",
-        &[knob("v_fold", &["load.v_fold"], Reach::Voltage(0.01, 1.5, 0.05))],
-        Search::Scan(&[6.0, 8.0, 10.0, 12.0, 14.0, 15.0, 16.0, 17.0, 18.0, 19.0, 20.0, 21.0, 22.0, 24.0]),
+        &[knob("v_fold", &["load.v_fold"], Reach::Voltage(0.01, 1.5, 0.01))],
+        Search::From(&[&[55.0], &[70.0], &[80.0], &[86.0], &[91.0], &[96.0], &[101.0]]),
     ),
     cause("load_gain", "drawn over set current and power", &[knob("gain", &["load.setting_gain"], GAIN)]),
     cause("load_gain", "real over set conductance", &[knob("resistor_gain", &["load.resistor_gain"], GAIN)]),

@@ -92,7 +92,7 @@ pub struct Fitter<'a> {
 }
 
 /// A knob of a set: candidate and place in it.
-type Place = (usize, usize);
+pub type Place = (usize, usize);
 
 impl Fitter<'_> {
     /// The parameters of a set of causes.
@@ -102,7 +102,9 @@ impl Fitter<'_> {
         causes.iter().flat_map(of).collect()
     }
 
-    fn range(&self, place: Place) -> [f64; 3] {
+    /// Lowest and highest value and step of a parameter.
+    #[must_use]
+    pub fn range(&self, place: Place) -> [f64; 3] {
         self.candidates[place.0].ranges[place.1]
     }
 
@@ -111,7 +113,8 @@ impl Fitter<'_> {
     }
 
     /// Whether a parameter is varied continuously.
-    fn is_smooth(&self, place: Place) -> bool {
+    #[must_use]
+    pub fn is_smooth(&self, place: Place) -> bool {
         !matches!(self.candidates[place.0].cause.search, Search::Scan(_)) || place.1 > 0
     }
 
@@ -170,9 +173,15 @@ impl Fitter<'_> {
     /// Fits a set from given values.
     #[must_use]
     pub fn from(&self, causes: &[usize], values: &[f64], from: &State) -> Fit {
+        self.holding(causes, values, from, None)
+    }
+
+    /// [`Fitter::from`] with one parameter held at its value.
+    #[must_use]
+    pub fn holding(&self, causes: &[usize], values: &[f64], from: &State, held: Option<usize>) -> Fit {
         let places = self.places(causes);
         let (mut state, mut values) = self.state_at(causes, values, from, 2);
-        let smooth: Vec<usize> = (0..places.len()).filter(|n| self.is_smooth(places[*n])).collect();
+        let smooth: Vec<usize> = (0..places.len()).filter(|n| held != Some(*n) && self.is_smooth(places[*n])).collect();
         let mut covariance = vec![vec![0.0; places.len()]; places.len()];
         let mut damping = 1e-3;
         for _ in 0..MOST_STEPS {

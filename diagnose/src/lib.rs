@@ -11,3 +11,8 @@ pub mod problem;
 pub mod attribute;
 pub mod noise;
 mod spectrum;
+pub mod diagnosis;
+pub mod gain;
+pub mod next;
+pub mod profile;
+pub mod shape;

@@ -2,6 +2,7 @@
 
 pub mod compile;
 pub mod demo;
+pub mod diagnose;
 pub mod inspect;
 pub mod new;
 pub mod train;

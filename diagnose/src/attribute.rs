@@ -74,7 +74,9 @@ pub fn attribute(problem: &Problem, null: State, say: &(dyn Fn(&str) + Sync)) ->
     let search = Searcher { inflation, ..search };
     let (best, evidence) = search.grow(&singles, say);
     say("rivals");
-    let rivals = best.as_ref().map_or_else(Vec::new, |fit| search.rivals(fit, &evidence, &singles));
+    let rivals = best
+        .as_ref()
+        .map_or_else(Vec::new, |fit| search.rivals(fit, &evidence, &singles));
     Attribution {
         null: null.clone(),
         singles,
@@ -108,7 +110,11 @@ impl<'a> Searcher<'a> {
     /// Every candidate alone. Those that explain next to nothing at first order are not followed further.
     fn singles(&self, all: &[usize]) -> Vec<Fit> {
         let null = self.fitter.null;
-        let first_order: Vec<f64> = self.at_null.iter().map(|columns| gained(columns, &null.residual)).collect();
+        let first_order: Vec<f64> = self
+            .at_null
+            .iter()
+            .map(|columns| gained(columns, &null.residual))
+            .collect();
         let most = first_order.iter().copied().fold(0.0, f64::max);
         parallel::map(all, |cause| {
             let smooth = self.fitter.candidates[*cause].cause.search == Search::Own;
@@ -181,13 +187,16 @@ impl<'a> Searcher<'a> {
     }
 
     fn forward(&self, best: &Fit) -> Option<Fit> {
-        let own: Vec<Vec<f64>> = best.causes.iter().flat_map(|c| self.fitter.sensitivity(*c, &best.state)).collect();
+        let own: Vec<Vec<f64>> = best
+            .causes
+            .iter()
+            .flat_map(|c| self.fitter.sensitivity(*c, &best.state))
+            .collect();
         let others = self.others(&best.causes);
         let looks = parallel::map(&others, |cause| {
             let candidate = &self.fitter.candidates[*cause];
             if candidate.cause.search != Search::Own {
-                let fit = self.added(&[], &[], *cause, &best.state);
-                return (best.state.chi2 - fit.state.chi2, *cause);
+                return (best.state.chi2 - self.fitter.look(*cause, &best.state), *cause);
             }
             let mut columns = own.clone();
             columns.extend(self.fitter.sensitivity(*cause, &best.state));
@@ -222,7 +231,13 @@ impl<'a> Searcher<'a> {
 
     /// Fits of the set with other causes in the place of one: those that look best linearly.
     fn replacements(&self, fit: &Fit, member: usize, count: usize) -> Vec<Fit> {
-        let kept: Vec<usize> = fit.causes.iter().enumerate().filter(|(n, _)| *n != member).map(|(_, c)| *c).collect();
+        let kept: Vec<usize> = fit
+            .causes
+            .iter()
+            .enumerate()
+            .filter(|(n, _)| *n != member)
+            .map(|(_, c)| *c)
+            .collect();
         let columns: Vec<Vec<f64>> = kept.iter().flat_map(|c| self.at_null[*c].clone()).collect();
         let looks = self
             .others(&fit.causes)
@@ -252,14 +267,22 @@ impl<'a> Searcher<'a> {
         loop {
             let members: Vec<usize> = (0..best.causes.len()).collect();
             let without: Vec<Option<Fit>> = parallel::map(&members, |member| {
-                let kept: Vec<usize> = best.causes.iter().enumerate().filter(|(n, _)| n != member).map(|(_, c)| *c).collect();
+                let kept: Vec<usize> = best
+                    .causes
+                    .iter()
+                    .enumerate()
+                    .filter(|(n, _)| n != member)
+                    .map(|(_, c)| *c)
+                    .collect();
                 let values = self.values_of(&best, &kept);
                 (!kept.is_empty()).then(|| self.fitter.from(&kept, &values, self.fitter.null))
             });
             let chi2 = |fit: &Option<Fit>| fit.as_ref().map_or(self.fitter.null.chi2, |fit| fit.state.chi2);
             let evidence: Vec<f64> = without.iter().map(|fit| chi2(fit) - best.state.chi2).collect();
             let weakest = members.iter().min_by(|a, b| evidence[**a].total_cmp(&evidence[**b]));
-            let Some(weakest) = weakest.copied() else { return (None, Vec::new()) };
+            let Some(weakest) = weakest.copied() else {
+                return (None, Vec::new());
+            };
             let needed = threshold(self.parameters(&best.causes[weakest..=weakest]), self.inflation);
             match (&without[weakest], evidence[weakest] < needed) {
                 (Some(fewer), true) => best = fewer.clone(),
@@ -306,7 +329,8 @@ fn gained(columns: &[Vec<f64>], residual: &[f64]) -> f64 {
         .enumerate()
         .map(|(n, a)| {
             let row = columns.iter().enumerate();
-            row.map(|(m, b)| dot(a, b) * if n == m { 1.0 + 1e-9 } else { 1.0 }).collect()
+            row.map(|(m, b)| dot(a, b) * if n == m { 1.0 + 1e-9 } else { 1.0 })
+                .collect()
         })
         .collect();
     dot(&solve(&matrix, &right), &right)

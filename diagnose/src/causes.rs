@@ -83,8 +83,16 @@ impl Knob {
         let is_lag = self.name.starts_with("time_constant");
         let is_source = self.name == "resistance" && model.plant.source.c_in > 0.0;
         let shortest = NO_LAG * model.plant.t_sw();
-        let lag = if is_source { value * model.plant.source.c_in } else { value };
-        if (is_lag || is_source) && lag < shortest { 0.0 } else { value }
+        let lag = if is_source {
+            value * model.plant.source.c_in
+        } else {
+            value
+        };
+        if (is_lag || is_source) && lag < shortest {
+            0.0
+        } else {
+            value
+        }
     }
 
     /// Lowest value, highest value, and step, for a converter of these magnitudes around `own`.
@@ -160,10 +168,26 @@ const FILTER: Reach = Reach::Time(0.0, 5.0, 0.1);
 
 /// All candidates.
 pub const CAUSES: &[Cause] = &[
-    cause("dcr", "resistance of the winding", &[knob("dcr", &["inductor.dcr"], OHMS)]),
-    cause("r_ds_on", "on-resistance of the switch", &[knob("r_ds_on", &["switch.r_ds_on"], OHMS)]),
-    cause("diode", "forward voltage of the diode", &[knob("v_f", &["switch.v_f"], Reach::Source(0.0, 0.1, 0.002))]),
-    cause("diode", "differential resistance of the diode", &[knob("r_d", &["switch.r_d"], OHMS)]),
+    cause(
+        "dcr",
+        "resistance of the winding",
+        &[knob("dcr", &["inductor.dcr"], OHMS)],
+    ),
+    cause(
+        "r_ds_on",
+        "on-resistance of the switch",
+        &[knob("r_ds_on", &["switch.r_ds_on"], OHMS)],
+    ),
+    cause(
+        "diode",
+        "forward voltage of the diode",
+        &[knob("v_f", &["switch.v_f"], Reach::Source(0.0, 0.1, 0.002))],
+    ),
+    cause(
+        "diode",
+        "differential resistance of the diode",
+        &[knob("r_d", &["switch.r_d"], OHMS)],
+    ),
     cause(
         "diode",
         "forward voltage and differential resistance of the diode",
@@ -172,36 +196,72 @@ pub const CAUSES: &[Cause] = &[
             knob("r_d", &["switch.r_d"], OHMS),
         ],
     ),
-    cause("dead_time", "dead time", &[knob("dead_time", &["switch.dead_time"], EDGE)]),
-    cause("turn_on_delay", "turn-on delay of the switch", &[knob("turn_on_delay", &["switch.turn_on_delay"], EDGE)]),
-    cause("turn_off_delay", "turn-off delay of the switch", &[knob("turn_off_delay", &["switch.turn_off_delay"], EDGE)]),
-    cause("esr", "series resistance of the output capacitor", &[knob("esr", &["capacitor.esr"], OHMS)]),
+    cause(
+        "dead_time",
+        "dead time",
+        &[knob("dead_time", &["switch.dead_time"], EDGE)],
+    ),
+    cause(
+        "turn_on_delay",
+        "turn-on delay of the switch",
+        &[knob("turn_on_delay", &["switch.turn_on_delay"], EDGE)],
+    ),
+    cause(
+        "turn_off_delay",
+        "turn-off delay of the switch",
+        &[knob("turn_off_delay", &["switch.turn_off_delay"], EDGE)],
+    ),
+    cause(
+        "esr",
+        "series resistance of the output capacitor",
+        &[knob("esr", &["capacitor.esr"], OHMS)],
+    ),
     cause(
         "esl",
         "series inductance of the output capacitor",
         &[knob("esl", &["capacitor.esl"], Reach::Plain(0.0, 1e-5, 2e-7))],
     ),
-    cause("l_wrong", "inductance", &[knob("inductance", &["converter.inductance"], Reach::Own(0.3, 3.0, 0.02))]),
-    cause("c_wrong", "capacitance", &[knob("capacitance", &["converter.capacitance"], Reach::Own(0.3, 3.0, 0.02))]),
+    cause(
+        "l_wrong",
+        "inductance",
+        &[knob(
+            "inductance",
+            &["converter.inductance"],
+            Reach::Own(0.3, 3.0, 0.02),
+        )],
+    ),
+    cause(
+        "c_wrong",
+        "capacitance",
+        &[knob(
+            "capacitance",
+            &["converter.capacitance"],
+            Reach::Own(0.3, 3.0, 0.02),
+        )],
+    ),
     searched(
         "l_saturation",
         "inductance that falls with current",
         &[
             knob("saturation", &["inductor.saturation"], Reach::Plain(0.0, 0.95, 0.1)),
-            knob("i_sat", &["inductor.i_sat"], Reach::Current(0.1, 5.0, 0.1)),
+            knob("i_sat", &["inductor.i_sat"], Reach::Current(0.5, 5.0, 0.1)),
         ],
-        Search::From(&[&[2.0, 4.0], &[4.0, 10.0], &[5.0, 25.0]]),
+        Search::From(&[&[2.0, 6.0], &[4.0, 12.0], &[5.0, 25.0]]),
     ),
     searched(
         "c_derating",
         "capacitance that falls with voltage",
         &[
             knob("derating", &["capacitor.derating"], Reach::Plain(0.0, 0.95, 0.1)),
-            knob("v_half", &["capacitor.v_half"], Reach::Voltage(0.1, 5.0, 0.1)),
+            knob("v_half", &["capacitor.v_half"], Reach::Voltage(0.5, 5.0, 0.1)),
         ],
-        Search::From(&[&[2.0, 5.0], &[4.0, 10.0], &[5.0, 25.0]]),
+        Search::From(&[&[2.0, 6.0], &[4.0, 12.0], &[5.0, 25.0]]),
     ),
-    cause("source_impedance", "resistance of the source", &[knob("resistance", &["source.resistance"], OHMS)]),
+    cause(
+        "source_impedance",
+        "resistance of the source",
+        &[knob("resistance", &["source.resistance"], OHMS)],
+    ),
     searched(
         "source_impedance",
         "resistance of the source before an input capacitor",
@@ -211,13 +271,21 @@ pub const CAUSES: &[Cause] = &[
         ],
         Search::From(&[&[4.0, 1.0], &[4.0, 20.0]]),
     ),
-    cause("v_in_wrong", "source voltage", &[knob("v_in", &["converter.v_in"], Reach::Own(0.7, 1.3, 0.005))]),
+    cause(
+        "v_in_wrong",
+        "source voltage",
+        &[knob("v_in", &["converter.v_in"], Reach::Own(0.7, 1.3, 0.005))],
+    ),
     cause(
         "sensor_low_pass",
         "low-pass of the sensors",
         &[knob(
             "time_constant",
-            &["sensors.v_out.low_pass", "sensors.i_l.low_pass", "sensors.i_out.low_pass"],
+            &[
+                "sensors.v_out.low_pass",
+                "sensors.i_l.low_pass",
+                "sensors.i_out.low_pass",
+            ],
             FILTER,
         )],
     ),
@@ -237,14 +305,30 @@ pub const CAUSES: &[Cause] = &[
         &[knob("delay", &[], Reach::Time(-1.9, 1.9, 0.02))],
         Search::From(&[&[0.0], &[-12.0], &[12.0], &[35.0]]),
     ),
-    cause("v_gain", "gain of the output voltage sensor", &[knob("gain", &["sensors.v_out.gain"], GAIN)]),
+    cause(
+        "v_gain",
+        "gain of the output voltage sensor",
+        &[knob("gain", &["sensors.v_out.gain"], GAIN)],
+    ),
     cause(
         "v_offset",
         "offset of the output voltage sensor",
-        &[knob("offset", &["sensors.v_out.offset"], Reach::Voltage(-0.3, 0.3, 0.002))],
+        &[knob(
+            "offset",
+            &["sensors.v_out.offset"],
+            Reach::Voltage(-0.3, 0.3, 0.002),
+        )],
     ),
-    cause("i_gain", "gain of the inductor current sensor", &[knob("gain", &["sensors.i_l.gain"], GAIN)]),
-    cause("i_gain", "gain of the load current sensor", &[knob("gain_o", &["sensors.i_out.gain"], GAIN)]),
+    cause(
+        "i_gain",
+        "gain of the inductor current sensor",
+        &[knob("gain", &["sensors.i_l.gain"], GAIN)],
+    ),
+    cause(
+        "i_gain",
+        "gain of the load current sensor",
+        &[knob("gain_o", &["sensors.i_out.gain"], GAIN)],
+    ),
     cause(
         "i_gain",
         "gain of both current sensors",
@@ -253,17 +337,29 @@ pub const CAUSES: &[Cause] = &[
     cause(
         "i_offset",
         "offset of the inductor current sensor",
-        &[knob("offset", &["sensors.i_l.offset"], Reach::Current(-1.0, 1.0, 0.005))],
+        &[knob(
+            "offset",
+            &["sensors.i_l.offset"],
+            Reach::Current(-1.0, 1.0, 0.005),
+        )],
     ),
     cause(
         "i_offset",
         "offset of the load current sensor",
-        &[knob("offset_o", &["sensors.i_out.offset"], Reach::Current(-1.0, 1.0, 0.005))],
+        &[knob(
+            "offset_o",
+            &["sensors.i_out.offset"],
+            Reach::Current(-1.0, 1.0, 0.005),
+        )],
     ),
     cause(
         "i_offset",
         "offset of both current sensors",
-        &[knob("offset", &["sensors.i_l.offset", "sensors.i_out.offset"], Reach::Current(-1.0, 1.0, 0.005))],
+        &[knob(
+            "offset",
+            &["sensors.i_l.offset", "sensors.i_out.offset"],
+            Reach::Current(-1.0, 1.0, 0.005),
+        )],
     ),
     searched(
         "duty_delay",
@@ -280,7 +376,11 @@ pub const CAUSES: &[Cause] = &[
     cause(
         "cpl_bandwidth",
         "time constant of the constant-power regulation",
-        &[knob("time_constant", &["load.cpl_time_constant"], Reach::Time(0.0, 50.0, 0.5))],
+        &[knob(
+            "time_constant",
+            &["load.cpl_time_constant"],
+            Reach::Time(0.0, 50.0, 0.5),
+        )],
     ),
     searched(
         "cpl_fold",
@@ -288,38 +388,91 @@ pub const CAUSES: &[Cause] = &[
         &[knob("v_fold", &["load.v_fold"], Reach::Voltage(0.01, 1.5, 0.01))],
         Search::From(&[&[55.0], &[70.0], &[80.0], &[86.0], &[91.0], &[96.0], &[101.0]]),
     ),
-    cause("load_gain", "drawn over set current and power", &[knob("gain", &["load.setting_gain"], GAIN)]),
-    cause("load_gain", "real over set conductance", &[knob("resistor_gain", &["load.resistor_gain"], GAIN)]),
+    cause(
+        "load_gain",
+        "drawn over set current and power",
+        &[knob("gain", &["load.setting_gain"], GAIN)],
+    ),
+    cause(
+        "load_gain",
+        "real over set conductance",
+        &[knob("resistor_gain", &["load.resistor_gain"], GAIN)],
+    ),
     cause(
         "load_gain",
         "drawn over set load",
         &[knob("gain", &["load.setting_gain", "load.resistor_gain"], GAIN)],
     ),
-    cause("bleed", "conductance that is always there", &[knob("bleed", &["load.bleed"], Reach::Conductance(0.3, 0.003))]),
+    cause(
+        "bleed",
+        "conductance that is always there",
+        &[knob("bleed", &["load.bleed"], Reach::Conductance(0.3, 0.003))],
+    ),
     cause(
         "core_loss",
         "conductance across the inductance",
-        &[knob("core_conductance", &["inductor.core_conductance"], Reach::Conductance(0.1, 0.001))],
+        &[knob(
+            "core_conductance",
+            &["inductor.core_conductance"],
+            Reach::Conductance(0.1, 0.001),
+        )],
     ),
     searched(
         "input_ripple",
         "line harmonic on the source",
         &[
             knob("ripple", &["source.ripple"], Reach::Source(0.0, 0.2, 0.002)),
-            knob("frequency", &["source.ripple_frequency"], Reach::Plain(10.0, 2000.0, 2.0)),
+            knob(
+                "frequency",
+                &["source.ripple_frequency"],
+                Reach::Plain(10.0, 2000.0, 2.0),
+            ),
             knob("phase", &["source.ripple_phase"], Reach::Plain(-1.0, 1.0, 0.02)),
         ],
         Search::From(&[]),
     ),
-    cause("v_in_gain", "gain of the input voltage sensor", &[knob("gain", &["sensors.v_in.gain"], GAIN)]),
+    cause(
+        "v_in_gain",
+        "gain of the input voltage sensor",
+        &[knob("gain", &["sensors.v_in.gain"], GAIN)],
+    ),
 ];
 
 /// Steps of a duty counter that are tried: whole counts of a period, and decimal ones.
 const DUTY_STEPS: [f64; 34] = [
-    1.0 / 20.0, 1.0 / 25.0, 1.0 / 32.0, 1.0 / 40.0, 1.0 / 50.0, 1.0 / 60.0, 1.0 / 64.0, 1.0 / 75.0, 1.0 / 80.0,
-    1.0 / 100.0, 1.0 / 110.0, 1.0 / 120.0, 1.0 / 125.0, 1.0 / 128.0, 1.0 / 140.0, 1.0 / 150.0, 1.0 / 160.0,
-    1.0 / 175.0, 1.0 / 180.0, 1.0 / 200.0, 1.0 / 225.0, 1.0 / 250.0, 1.0 / 256.0, 1.0 / 300.0, 1.0 / 333.0,
-    1.0 / 350.0, 1.0 / 400.0, 1.0 / 450.0, 1.0 / 500.0, 1.0 / 512.0, 1.0 / 600.0, 1.0 / 700.0, 1.0 / 800.0,
+    1.0 / 20.0,
+    1.0 / 25.0,
+    1.0 / 32.0,
+    1.0 / 40.0,
+    1.0 / 50.0,
+    1.0 / 60.0,
+    1.0 / 64.0,
+    1.0 / 75.0,
+    1.0 / 80.0,
+    1.0 / 100.0,
+    1.0 / 110.0,
+    1.0 / 120.0,
+    1.0 / 125.0,
+    1.0 / 128.0,
+    1.0 / 140.0,
+    1.0 / 150.0,
+    1.0 / 160.0,
+    1.0 / 175.0,
+    1.0 / 180.0,
+    1.0 / 200.0,
+    1.0 / 225.0,
+    1.0 / 250.0,
+    1.0 / 256.0,
+    1.0 / 300.0,
+    1.0 / 333.0,
+    1.0 / 350.0,
+    1.0 / 400.0,
+    1.0 / 450.0,
+    1.0 / 500.0,
+    1.0 / 512.0,
+    1.0 / 600.0,
+    1.0 / 700.0,
+    1.0 / 800.0,
     1.0 / 1000.0,
 ];
 
@@ -340,7 +493,12 @@ pub fn candidates(parameters: &Parameters, bases: &Bases) -> Vec<Candidate> {
     let model = Model::new(parameters);
     let candidate = |cause: &'static Cause| {
         let own: Vec<f64> = cause.knobs.iter().map(|knob| knob.get(&model)).collect();
-        let ranges = cause.knobs.iter().zip(&own).map(|(knob, own)| knob.range(*own, bases)).collect();
+        let ranges = cause
+            .knobs
+            .iter()
+            .zip(&own)
+            .map(|(knob, own)| knob.range(*own, bases))
+            .collect();
         Candidate { cause, own, ranges }
     };
     CAUSES.iter().map(candidate).collect()

@@ -34,6 +34,8 @@ pub enum DutyIs {
     Commanded,
     /// What the modulator did: delays and rounding of the duty lie before it.
     Applied,
+    /// The same, and the sensors show at once what is true: another measuring chain, or a simulator's.
+    Direct,
 }
 
 /// One signal in a file: its column and how to get to SI from it.
@@ -63,7 +65,7 @@ impl Columns {
     ///
     /// ```toml
     /// phase = 0.5                 # sampling instant in the PWM period; left out: from the time column
-    /// duty = "commanded"          # or "applied"
+    /// duty = "commanded"          # or "applied", "direct"
     /// [columns]
     /// v_o = "CH1 [V]"
     /// d = { name = "duty", scale = 0.01 }
@@ -80,7 +82,11 @@ impl Columns {
                 map.phase = value.number_within(0.0..=0.999_999, faults);
             }
             if let Some(value) = root.optional("duty") {
-                let choices = [("commanded", DutyIs::Commanded), ("applied", DutyIs::Applied)];
+                let choices = [
+                    ("commanded", DutyIs::Commanded),
+                    ("applied", DutyIs::Applied),
+                    ("direct", DutyIs::Direct),
+                ];
                 map.duty = value.choice(&choices, faults).unwrap_or_default();
             }
             let table = root.optional("columns").and_then(|v| v.table("[columns]", faults));
@@ -147,7 +153,9 @@ fn source(value: Value<'_>, faults: &mut Vec<Fault>) -> Option<Source> {
         });
     }
     let mut table = value.table("a column", faults)?;
-    let column = table.required("name", "the column's header", faults).and_then(|v| v.text(faults));
+    let column = table
+        .required("name", "the column's header", faults)
+        .and_then(|v| v.text(faults));
     let scale = table.with_default("scale", 1.0, faults, |v, faults| v.number(faults));
     let offset = table.with_default("offset", 0.0, faults, |v, faults| v.number(faults));
     table.finish(faults);

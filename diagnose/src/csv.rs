@@ -174,7 +174,9 @@ fn number(cell: &str, comma: bool) -> (Option<f64>, u32) {
     let text = if comma { cell.replace(',', ".") } else { cell.to_owned() };
     let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
     let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((&text, "0"));
-    let digits = mantissa.split_once('.').map_or(0, |(_, fraction)| fraction.len() as i64);
+    let digits = mantissa
+        .split_once('.')
+        .map_or(0, |(_, fraction)| fraction.len() as i64);
     let shifted = digits - exponent.parse::<i64>().unwrap_or(0);
     (value, u32::try_from(shifted).unwrap_or(0).min(12))
 }

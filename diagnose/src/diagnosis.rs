@@ -215,7 +215,9 @@ fn prepared(train: Vec<Record>, base: &Model) -> (Problem, State, Vec<Outlier>) 
 }
 
 fn named(problem: &Problem, attribution: &Attribution, profiles: &[Profile]) -> Vec<Named> {
-    let Some(best) = &attribution.best else { return Vec::new() };
+    let Some(best) = &attribution.best else {
+        return Vec::new();
+    };
     let _ = problem;
     let of = |(member, cause): (usize, &usize)| {
         let candidate = &attribution.candidates[*cause];
@@ -299,9 +301,20 @@ fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure]) -> Stri
         let words = causes.iter().map(|cause| {
             let values = cause.parameters.iter().map(|(name, v)| {
                 let unit = if v.unit == "1" { "" } else { v.unit };
-                format!("{name} {} (95 %: {} to {}; model {})", si(v.value, unit), si(v.low, unit), si(v.high, unit), si(v.model, unit))
+                format!(
+                    "{name} {} (95 %: {} to {}; model {})",
+                    si(v.value, unit),
+                    si(v.low, unit),
+                    si(v.high, unit),
+                    si(v.model, unit)
+                )
             });
-            format!("{} [{}]: {}", cause.words, cause.id, values.collect::<Vec<_>>().join(", "))
+            format!(
+                "{} [{}]: {}",
+                cause.words,
+                cause.id,
+                values.collect::<Vec<_>>().join(", ")
+            )
         });
         words.collect::<Vec<_>>().join("; ")
     };
@@ -313,11 +326,21 @@ fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure]) -> Stri
                 let rivals: Vec<String> = cause.rivals.iter().map(|ids| ids.join(" + ")).collect();
                 format!("{} cannot be told from {}", cause.id, rivals.join(", or "))
             });
-            format!("Best explanation: {}. But {}.", list(causes), ties.collect::<Vec<_>>().join("; "))
+            format!(
+                "Best explanation: {}. But {}.",
+                list(causes),
+                ties.collect::<Vec<_>>().join("; ")
+            )
         }
         Verdict::Unexplained => {
-            let shapes: Vec<String> = structure.iter().map(|s| format!("{} of {}: {}", s.channel, s.record, s.shape)).collect();
-            format!("None of the known causes explains the records; left is {}.", shapes.join("; "))
+            let shapes: Vec<String> = structure
+                .iter()
+                .map(|s| format!("{} of {}: {}", s.channel, s.record, s.shape))
+                .collect();
+            format!(
+                "None of the known causes explains the records; left is {}.",
+                shapes.join("; ")
+            )
         }
     }
 }
@@ -332,7 +355,11 @@ fn hidden(problem: &Problem, attribution: &Attribution) -> Vec<Hidden> {
     for (cause, smallest) in sizes {
         let candidate = &attribution.candidates[cause];
         let knob = &candidate.cause.knobs[0];
-        let typical = knob.keys.first().and_then(|key| plant::parameter(key)).map(|p| p.typical);
+        let typical = knob
+            .keys
+            .first()
+            .and_then(|key| plant::parameter(key))
+            .map(|p| p.typical);
         let size = typical.map_or(f64::INFINITY, |(low, high)| match knob.unit() {
             "1" => 0.5 * (high - low),
             _ => high,
@@ -358,12 +385,18 @@ fn noise_of(problem: &Problem, attribution: &Attribution, outliers: &[Outlier], 
         format!("{record}:{}:{}", one.row, CHANNEL_NAMES[one.channel])
     };
     let held = pair.map_or(&[][..], |pair| &pair.problem.records);
-    let repairs = problem.records.iter().chain(held).flat_map(|r| r.repairs.iter().map(|text| format!("{}: {text}", r.name)));
+    let repairs = problem
+        .records
+        .iter()
+        .chain(held)
+        .flat_map(|r| r.repairs.iter().map(|text| format!("{}: {text}", r.name)));
     Noise {
         sigma: measured.map(|n| (CHANNEL_NAMES[n], problem.sigma[n])).collect(),
         inflation: attribution.inflation,
         outliers: outliers.iter().map(outlier).collect(),
-        repairs: repairs.chain(pair.into_iter().flat_map(|pair| pair.remarks.clone())).collect(),
+        repairs: repairs
+            .chain(pair.into_iter().flat_map(|pair| pair.remarks.clone()))
+            .collect(),
         trim: attribution.state().starts.trim,
     }
 }

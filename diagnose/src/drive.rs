@@ -36,8 +36,11 @@ impl Model {
     }
 
     /// The same for a record whose duty column shows what the switch did.
-    fn without_chain(&self) -> Self {
+    fn without_chain(&self, direct: bool) -> Self {
         let mut model = self.clone();
+        for sensor in sensors(&mut model.plant).into_iter().filter(|_| direct) {
+            (sensor.low_pass, sensor.delay) = (0.0, 0.0);
+        }
         let p = &mut model.plant;
         (p.pwm.duty_delay, p.pwm.duty_lsb, p.pwm.min_on_time) = (0, 0.0, 0.0);
         (p.switch.dead_time, p.switch.turn_on_delay, p.switch.turn_off_delay) = (0.0, 0.0, 0.0);
@@ -55,15 +58,15 @@ pub fn simulate(model: &Model, record: &Record, starts: &[Start], trim: f64) -> 
     let mut shown = vec![[f64::NAN; CHANNELS]; record.rows()];
     let stripped;
     let model = match record.duty_is {
-        DutyIs::Applied => {
-            stripped = model.without_chain();
+        DutyIs::Applied | DutyIs::Direct => {
+            stripped = model.without_chain(record.duty_is == DutyIs::Direct);
             &stripped
         }
         _ => model,
     };
     let mut p = model.plant.clone();
     p.converter.v_in *= record.v_in_ratio;
-    for sensor in [&mut p.sensors.v_out, &mut p.sensors.i_l, &mut p.sensors.i_out, &mut p.sensors.v_in] {
+    for sensor in sensors(&mut p) {
         (sensor.noise, sensor.lsb) = (0.0, 0.0);
     }
     p.switch.turn_off_delay += trim.max(0.0) * p.t_sw();
@@ -151,6 +154,12 @@ impl Driver<'_> {
         }
         shown[row] = array(&last.measured);
     }
+}
+
+/// All sensors.
+pub(crate) fn sensors(p: &mut Parameters) -> [&mut plant::Sensor; CHANNELS] {
+    let all = &mut p.sensors;
+    [&mut all.v_out, &mut all.i_l, &mut all.i_out, &mut all.v_in]
 }
 
 fn array(s: &Signals) -> [f64; CHANNELS] {

@@ -22,7 +22,7 @@ pub fn as_plant(model: &Model, trim: f64) -> Parameters {
     if (0.0..1.0).contains(&phase) {
         p.pwm.sampling_phase = phase;
     } else if model.late < 0.0 {
-        for sensor in [&mut p.sensors.v_out, &mut p.sensors.i_l, &mut p.sensors.i_out, &mut p.sensors.v_in] {
+        for sensor in crate::drive::sensors(&mut p) {
             sensor.delay -= model.late;
         }
     } else {
@@ -45,7 +45,11 @@ pub fn extended_toml(diagnosis: &Diagnosis) -> String {
     let after = as_plant(&extended, trim);
     let before = &diagnosis.problem.base.plant;
     let mut notes: BTreeMap<&str, String> = BTreeMap::new();
-    let best = diagnosis.attribution.best.iter().flat_map(|fit| fit.causes.iter().enumerate());
+    let best = diagnosis
+        .attribution
+        .best
+        .iter()
+        .flat_map(|fit| fit.causes.iter().enumerate());
     for (member, cause) in best {
         for (knob, profile) in diagnosis.attribution.candidates[*cause]
             .cause
@@ -59,7 +63,10 @@ pub fn extended_toml(diagnosis: &Diagnosis) -> String {
             }
         }
     }
-    let mut text = format!("# The model with what was found. {}\n", findings.sentence.replace('\n', " "));
+    let mut text = format!(
+        "# The model with what was found. {}\n",
+        findings.sentence.replace('\n', " ")
+    );
     for cause in findings.causes.iter().filter(|cause| !cause.rivals.is_empty()) {
         let rivals: Vec<String> = cause.rivals.iter().map(|ids| ids.join(" + ")).collect();
         let _ = writeln!(text, "# {} stands for a tie with {}.", cause.id, rivals.join(", "));
@@ -78,13 +85,19 @@ pub fn extended_toml(diagnosis: &Diagnosis) -> String {
         if is == parameter.neutral && !needed && was == is {
             continue;
         }
-        let Some((table, key)) = parameter.key.rsplit_once('.') else { continue };
+        let Some((table, key)) = parameter.key.rsplit_once('.') else {
+            continue;
+        };
         let value = match parameter.choices().get(is as usize) {
             Some(word) => format!("\"{word}\""),
             None if WHOLE.contains(&parameter.key) => format!("{}", is as u64),
             None => format!("{is:?}"),
         };
-        let unit = if parameter.unit == "1" { String::new() } else { format!("  # {}", parameter.unit) };
+        let unit = if parameter.unit == "1" {
+            String::new()
+        } else {
+            format!("  # {}", parameter.unit)
+        };
         let note = match was == is {
             true => unit,
             false => {

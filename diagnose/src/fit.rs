@@ -121,26 +121,43 @@ impl Fitter<'_> {
     /// Fits one candidate on top of `from`, from each of its starts; the best.
     #[must_use]
     pub fn single(&self, cause: usize, from: &State) -> Fit {
+        let starts = self.starts(cause);
+        if let [only] = starts.as_slice() {
+            return self.from(&[cause], only, from);
+        }
+        let best = self.best_start(cause, &starts, from);
+        self.from(&[cause], best.map_or(&self.candidates[cause].own, |(_, values)| values), from)
+    }
+
+    /// Chi-square of the best start of a candidate, not fitted further.
+    #[must_use]
+    pub fn look(&self, cause: usize, from: &State) -> f64 {
+        let starts = self.starts(cause);
+        self.best_start(cause, &starts, from).map_or(f64::INFINITY, |(chi2, _)| chi2)
+    }
+
+    fn best_start<'v>(&self, cause: usize, starts: &'v [Vec<f64>], from: &State) -> Option<(f64, &'v Vec<f64>)> {
+        let looks = starts.iter().map(|values| (self.state_at(&[cause], values, from, 1).0.chi2, values));
+        looks.min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// Where the fit of a candidate may begin.
+    fn starts(&self, cause: usize) -> Vec<Vec<f64>> {
         let candidate = &self.candidates[cause];
-        let starts: Vec<Vec<f64>> = match candidate.cause.search {
+        match candidate.cause.search {
             Search::Own => vec![candidate.own.clone()],
             Search::From(list) => list
                 .iter()
                 .map(|steps| {
                     let values = steps.iter().zip(&candidate.ranges).zip(&candidate.own);
                     let absolute = candidate.own.len() > 1;
-                    values.map(|((n, range), own)| n * range[2] + if absolute { 0.0 } else { *own }).collect()
+                    values
+                        .map(|((n, range), own)| n * range[2] + if absolute { 0.0 } else { *own })
+                        .collect()
                 })
                 .collect(),
             Search::Scan(list) => list.iter().map(|n| vec![n * candidate.ranges[0][2]]).collect(),
-        };
-        if let [only] = starts.as_slice() {
-            return self.from(&[cause], only, from);
         }
-        // the best start, judged without further fitting
-        let looks = starts.iter().map(|values| (self.state_at(&[cause], values, from, 1).0.chi2, values));
-        let best = looks.min_by(|a, b| a.0.total_cmp(&b.0));
-        self.from(&[cause], best.map_or(&candidate.own, |(_, values)| values), from)
     }
 
     /// The candidate at the model's own values, as far as nothing speaks for more; it would gain `first_order`.
@@ -181,7 +198,9 @@ impl Fitter<'_> {
     pub fn holding(&self, causes: &[usize], values: &[f64], from: &State, held: Option<usize>) -> Fit {
         let places = self.places(causes);
         let (mut state, mut values) = self.state_at(causes, values, from, 2);
-        let smooth: Vec<usize> = (0..places.len()).filter(|n| held != Some(*n) && self.is_smooth(places[*n])).collect();
+        let smooth: Vec<usize> = (0..places.len())
+            .filter(|n| held != Some(*n) && self.is_smooth(places[*n]))
+            .collect();
         let mut covariance = vec![vec![0.0; places.len()]; places.len()];
         let mut damping = 1e-3;
         for _ in 0..MOST_STEPS {
@@ -219,7 +238,12 @@ impl Fitter<'_> {
             let (moved, step) = nudged(&state.model, knob, &range);
             let after = self.problem.residual(&moved, &state.starts);
             let share = range[2] / step;
-            let raw: Vec<f64> = state.residual.iter().zip(&after).map(|(a, b)| (a - b) * share).collect();
+            let raw: Vec<f64> = state
+                .residual
+                .iter()
+                .zip(&after)
+                .map(|(a, b)| (a - b) * share)
+                .collect();
             let mut projected = raw.clone();
             self.basis.project(&mut projected);
             jacobian.raw.push(raw);
@@ -291,7 +315,10 @@ impl Normal {
     #[must_use]
     pub fn new(columns: &[Vec<f64>], residual: &[f64]) -> Self {
         Normal {
-            matrix: columns.iter().map(|a| columns.iter().map(|b| dot(a, b)).collect()).collect(),
+            matrix: columns
+                .iter()
+                .map(|a| columns.iter().map(|b| dot(a, b)).collect())
+                .collect(),
             right: columns.iter().map(|a| dot(a, residual)).collect(),
         }
     }
@@ -339,12 +366,20 @@ pub fn solve(matrix: &[Vec<f64>], right: &[f64]) -> Vec<f64> {
             l[row][row] = 0.0;
         }
         let known: f64 = (0..row).map(|k| l[row][k] * y[k]).sum();
-        y[row] = if l[row][row] > 0.0 { (right[row] - known) / l[row][row] } else { 0.0 };
+        y[row] = if l[row][row] > 0.0 {
+            (right[row] - known) / l[row][row]
+        } else {
+            0.0
+        };
     }
     let mut x = vec![0.0; n];
     for row in (0..n).rev() {
         let known: f64 = (row + 1..n).map(|k| l[k][row] * x[k]).sum();
-        x[row] = if l[row][row] > 0.0 { (y[row] - known) / l[row][row] } else { 0.0 };
+        x[row] = if l[row][row] > 0.0 {
+            (y[row] - known) / l[row][row]
+        } else {
+            0.0
+        };
     }
     x
 }

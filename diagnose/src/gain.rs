@@ -63,8 +63,8 @@ pub fn hold(records: &[Record], base: &Model, extended: &Model, sigma: [f64; CHA
     }
 }
 
-/// A record sampled at another instant than the model's has another chain; whether its duties are commanded or applied
-/// is decided by which of the two fits.
+/// A record sampled at another instant than the model's has another chain; whether its duties are commanded or applied,
+/// and whether its sensors filter, is decided by what fits.
 fn other_chains(problem: &mut Problem, base: &Model, extended: &Model, trim: f64) -> Vec<String> {
     let mut remarks = Vec::new();
     let own = base.plant.pwm.sampling_phase;
@@ -84,17 +84,26 @@ fn other_chains(problem: &mut Problem, base: &Model, extended: &Model, trim: f64
             starts.trim = trim;
             State::settle(&alone, extended, &starts, None).chi2
         };
-        let (commanded, applied) = (chi2(DutyIs::Commanded), chi2(DutyIs::Applied));
+        let kinds = [DutyIs::Commanded, DutyIs::Applied, DutyIs::Direct];
+        let fits = kinds.map(|kind| (chi2(kind), kind));
+        let best = fits
+            .iter()
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map_or(DutyIs::Commanded, |(_, kind)| *kind);
         let record = &mut problem.records[index];
-        record.duty_is = DutyIs::Commanded;
-        if applied < commanded {
-            record.duty_is = DutyIs::Applied;
-            remarks.push(format!(
-                "{} is sampled at another instant than the model's; delays and rounding of the duty do not show in it, \
-                 so its duties are taken as applied",
-                record.name
-            ));
-        }
+        record.duty_is = best;
+        let words = match best {
+            DutyIs::Applied => "delays and rounding of the duty do not show in it: its duties are taken as applied",
+            DutyIs::Direct => {
+                "neither delays of the duty nor filters of the sensors show in it: taken as applied duties and direct \
+                 measurements"
+            }
+            _ => continue,
+        };
+        remarks.push(format!(
+            "{} is sampled at another instant than the model's; {words}",
+            record.name
+        ));
     }
     remarks
 }
@@ -119,12 +128,15 @@ impl Pair {
         let before = noise::channel(&self.problem, &self.before.residual, index, n);
         let after = noise::channel(&self.problem, &self.after.residual, index, n);
         let belongs = |row: &usize| regime == "all" || regimes(&self.problem, record, *row).contains(&regime);
-        let rows: Vec<usize> = (0..record.rows()).filter(|row| before[*row] != 0.0 && belongs(row)).collect();
+        let rows: Vec<usize> = (0..record.rows())
+            .filter(|row| before[*row] != 0.0 && belongs(row))
+            .collect();
         if rows.len() < 3 {
             return None;
         }
         let sigma = self.problem.sigma[n];
-        let square = |values: &[f64]| rows.iter().map(|row| values[*row] * values[*row]).sum::<f64>() / rows.len() as f64;
+        let square =
+            |values: &[f64]| rows.iter().map(|row| values[*row] * values[*row]).sum::<f64>() / rows.len() as f64;
         let (a, b) = (square(&before), square(&after));
         // the noise of a mean square, twice
         let above = 2.0 * (2.0 / rows.len() as f64).sqrt();
@@ -145,7 +157,10 @@ impl Pair {
     #[must_use]
     pub fn total(&self) -> (f64, f64) {
         let count = self.problem.count().max(1) as f64;
-        (self.before.chi2 / count, dot(&self.after.residual, &self.after.residual) / count)
+        (
+            self.before.chi2 / count,
+            dot(&self.after.residual, &self.after.residual) / count,
+        )
     }
 }
 
@@ -155,8 +170,14 @@ fn regimes(problem: &Problem, record: &Record, row: usize) -> [&'static str; 2] 
     let p = &problem.base.plant.converter;
     let d = record.duty[row];
     let ripple = p.v_in * d * (1.0 - d) / (p.inductance * p.f_sw);
-    let conduction = if noise::is_discontinuous(record, row, ripple) { "DCM" } else { "CCM" };
+    let conduction = if noise::is_discontinuous(record, row, ripple) {
+        "DCM"
+    } else {
+        "CCM"
+    };
     let recent = row.saturating_sub(30).max(1)..=row;
-    let moved = recent.clone().any(|n| n > 0 && (record.duty[n] != record.duty[n - 1] || record.load[n] != record.load[n - 1]));
+    let moved = recent
+        .clone()
+        .any(|n| n > 0 && (record.duty[n] != record.duty[n - 1] || record.load[n] != record.load[n - 1]));
     [conduction, if moved { "transient" } else { "steady" }]
 }

@@ -26,14 +26,22 @@ pub struct Experiment {
 /// For every tie the experiments by predicted separation, best first.
 #[must_use]
 pub fn experiments(problem: &Problem, attribution: &Attribution, say: &(dyn Fn(&str) + Sync)) -> Vec<Experiment> {
-    let Some(best) = &attribution.best else { return Vec::new() };
+    let Some(best) = &attribution.best else {
+        return Vec::new();
+    };
     let ties: Vec<_> = attribution.rivals.iter().flatten().take(6).collect();
     if ties.is_empty() {
         return Vec::new();
     }
     say("next experiment");
     let plans = plans(problem);
-    let name = |causes: &[usize]| causes.iter().map(|c| attribution.id(*c)).collect::<Vec<_>>().join(" + ");
+    let name = |causes: &[usize]| {
+        causes
+            .iter()
+            .map(|c| attribution.id(*c))
+            .collect::<Vec<_>>()
+            .join(" + ")
+    };
     let mut list = Vec::new();
     for rival in ties {
         let mut scored: Vec<Experiment> = crate::parallel::map(&plans, |(words, record)| Experiment {
@@ -64,8 +72,15 @@ fn separation(problem: &Problem, record: &Record, one: &Model, other: &Model) ->
 fn plans(problem: &Problem) -> Vec<(String, Record)> {
     let (v, i, v_in) = (problem.bases.v, problem.bases.i, problem.bases.v_in);
     let d = (v / v_in).clamp(0.1, 0.9);
-    let resistor = Load { conductance: i / v, ..Load::default() };
-    let current = |amperes: f64| Load { current: amperes, conductance: 0.2 * i / v, ..Load::default() };
+    let resistor = Load {
+        conductance: i / v,
+        ..Load::default()
+    };
+    let current = |amperes: f64| Load {
+        current: amperes,
+        conductance: 0.2 * i / v,
+        ..Load::default()
+    };
     let prbs = |n: usize| {
         // a maximum-length sequence of 7 bits, two periods a bit
         let mut state = 0x5bu32;
@@ -102,7 +117,12 @@ fn plans(problem: &Problem) -> Vec<(String, Record)> {
         &|_| resistor,
         1.0,
     );
-    add(format!("duty PRBS of 0.03 around {d:.2} at {:.1} ohm", v / i), &prbs, &|_| resistor, 1.0);
+    add(
+        format!("duty PRBS of 0.03 around {d:.2} at {:.1} ohm", v / i),
+        &prbs,
+        &|_| resistor,
+        1.0,
+    );
     add(
         format!("load current steps {:.1} to {:.1} A at duty {d:.2}", 0.3 * i, 2.0 * i),
         &|_| d,
@@ -115,11 +135,19 @@ fn plans(problem: &Problem) -> Vec<(String, Record)> {
         &|_| current(i),
         1.0,
     );
-    add(format!("duty PRBS at half the source voltage, {:.0} V", 0.5 * v_in), &prbs, &|_| resistor, 0.5);
+    add(
+        format!("duty PRBS at half the source voltage, {:.0} V", 0.5 * v_in),
+        &prbs,
+        &|_| resistor,
+        0.5,
+    );
     add(
         format!("light load: {:.0} ohm at duty {d:.2}, with duty steps", 10.0 * v / i),
         &|n| stair(n, 0.8 * d, 1.2 * d),
-        &|_| Load { conductance: 0.1 * i / v, ..Load::default() },
+        &|_| Load {
+            conductance: 0.1 * i / v,
+            ..Load::default()
+        },
         1.0,
     );
     add(
@@ -129,9 +157,18 @@ fn plans(problem: &Problem) -> Vec<(String, Record)> {
         1.0,
     );
     add(
-        format!("constant power steps {:.0} to {:.0} W beside {:.0} ohm", 0.3 * v * i, 1.2 * v * i, 2.0 * v / i),
+        format!(
+            "constant power steps {:.0} to {:.0} W beside {:.0} ohm",
+            0.3 * v * i,
+            1.2 * v * i,
+            2.0 * v / i
+        ),
         &|_| d,
-        &|n| Load { conductance: 0.5 * i / v, power: stair(n, 0.3 * v * i, 1.2 * v * i), current: 0.0 },
+        &|n| Load {
+            conductance: 0.5 * i / v,
+            power: stair(n, 0.3 * v * i, 1.2 * v * i),
+            current: 0.0,
+        },
         1.0,
     );
     list

@@ -14,7 +14,9 @@ const LAGS: usize = 20;
 #[must_use]
 pub fn channel(problem: &Problem, residual: &[f64], record: usize, channel: usize) -> Vec<f64> {
     let start = problem.offsets[record] + channel;
-    (0..problem.records[record].rows()).map(|row| residual[start + row * CHANNELS]).collect()
+    (0..problem.records[record].rows())
+        .map(|row| residual[start + row * CHANNELS])
+        .collect()
 }
 
 /// Standard deviation of each channel's noise: from second differences of the residual, which hardly see what is slow,
@@ -33,7 +35,10 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
         let lattice = problem.records.iter().map(|r| r.lattice[n]).fold(0.0, f64::max);
         let scale = [problem.bases.v, problem.bases.i, problem.bases.i, problem.bases.v_in][n];
         let least = (lattice / 12f64.sqrt()).max(1e-5 * scale);
-        let has = problem.records.iter().any(|r| r.measured[n].iter().any(|v| v.is_finite()));
+        let has = problem
+            .records
+            .iter()
+            .any(|r| r.measured[n].iter().any(|v| v.is_finite()));
         match (has, typical.is_finite()) {
             (false, _) => f64::INFINITY,
             (true, true) => (typical * problem.sigma[n]).max(least),
@@ -78,7 +83,9 @@ pub fn outliers(problem: &Problem, residual: &[f64]) -> Vec<Outlier> {
 
 fn leaps(values: &[f64], row: usize) -> bool {
     let near = [values[row - 2], values[row - 1], values[row + 1], values[row + 2]];
-    let (low, high) = near.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    let (low, high) = near
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
     let apart = (values[row] - high).max(low - values[row]);
     near.iter().all(|v| v.is_finite()) && apart > FAR + (high - low)
 }
@@ -90,7 +97,9 @@ pub fn inflation(problem: &Problem, residual: &[f64]) -> f64 {
     let (mut shared, mut pairs) = (0.0, 0.0);
     let (mut lagged, mut total) = (vec![0.0; LAGS], 0.0);
     for n in 0..CHANNELS {
-        let all: Vec<Vec<f64>> = (0..problem.records.len()).map(|record| channel(problem, residual, record, n)).collect();
+        let all: Vec<Vec<f64>> = (0..problem.records.len())
+            .map(|record| channel(problem, residual, record, n))
+            .collect();
         for (k, a) in all.iter().enumerate() {
             total += dot(a, a);
             for (lag, sum) in lagged.iter_mut().enumerate() {
@@ -109,7 +118,11 @@ pub fn inflation(problem: &Problem, residual: &[f64]) -> f64 {
     let rho = if pairs > 0.0 { shared / pairs } else { 0.0 };
     let records = problem.records.len() as f64;
     let same = if rho > 0.2 { 1.0 + rho * (records - 1.0) } else { 1.0 };
-    let slow: f64 = lagged.iter().map(|sum| sum / total.max(1e-300)).filter(|rho| *rho > 0.05).sum();
+    let slow: f64 = lagged
+        .iter()
+        .map(|sum| sum / total.max(1e-300))
+        .filter(|rho| *rho > 0.05)
+        .sum();
     same * (1.0 + 2.0 * slow).clamp(1.0, 4.0)
 }
 

@@ -45,19 +45,33 @@ fn unit(text: &str) -> &str {
 fn causes(diagnosis: &Diagnosis) -> Section {
     let findings = &diagnosis.findings;
     let table = |caption: &str, list: &[Named]| {
-        let mut table = Table::new(caption).text("cause").text("parameter").text("model").text("found").text("95 %");
+        let mut table = Table::new(caption)
+            .text("cause")
+            .text("parameter")
+            .text("model")
+            .text("found")
+            .text("95 %");
         table = table.number("evidence", 0).text("rivals");
         for cause in list {
             let rivals: Vec<String> = cause.rivals.iter().map(|ids| ids.join(" + ")).collect();
             for (name, v) in &cause.parameters {
                 let evidence = cause.evidence.delta_chi2;
-                let evidence = if evidence < 1e300 { evidence.into() } else { report::Cell::from("exact") };
+                let evidence = if evidence < 1e300 {
+                    evidence.into()
+                } else {
+                    report::Cell::from("exact")
+                };
                 table = table.row([
                     format!("{} ({})", cause.id, cause.words).into(),
                     (*name).into(),
                     quantity(v.model, unit(v.unit), 4).into(),
                     quantity(v.value, unit(v.unit), 4).into(),
-                    format!("{} to {}", quantity(v.low, unit(v.unit), 4), quantity(v.high, unit(v.unit), 4)).into(),
+                    format!(
+                        "{} to {}",
+                        quantity(v.low, unit(v.unit), 4),
+                        quantity(v.high, unit(v.unit), 4)
+                    )
+                    .into(),
                     evidence,
                     rivals.join(", ").into(),
                 ]);
@@ -67,7 +81,10 @@ fn causes(diagnosis: &Diagnosis) -> Section {
     };
     let mut section = Section::new("What changes in the model");
     if !findings.causes.is_empty() {
-        section = section.table(table("Evidence is the chi-square lost without the cause, over the scatter of the noise.", &findings.causes));
+        section = section.table(table(
+            "Evidence is the chi-square lost without the cause, over the scatter of the noise.",
+            &findings.causes,
+        ));
     } else if findings.verdict == Verdict::Consistent {
         section = section.text("Nothing.");
     }
@@ -85,13 +102,23 @@ fn causes(diagnosis: &Diagnosis) -> Section {
 fn simulated(problem: &Problem, state: &State, record: usize, n: usize) -> Vec<f64> {
     let values = channel(problem, &state.residual, record, n);
     let measured = &problem.records[record].measured[n];
-    let one = |(left, shown): (&f64, &f64)| if *left == 0.0 { f64::NAN } else { shown - left * problem.sigma[n] };
+    let one = |(left, shown): (&f64, &f64)| {
+        if *left == 0.0 {
+            f64::NAN
+        } else {
+            shown - left * problem.sigma[n]
+        }
+    };
     values.iter().zip(measured).map(one).collect()
 }
 
 fn panels(problem: &Problem, before: &State, after: &State, record: usize, same: bool) -> Result<Svg, ReportError> {
     let one = &problem.records[record];
-    let axis = if one.settled { Axis::new("point") } else { Axis::new("time").unit("s") };
+    let axis = if one.settled {
+        Axis::new("point")
+    } else {
+        Axis::new("time").unit("s")
+    };
     let mut chart = Chart::new(one.name.clone(), axis);
     for n in 0..2 {
         if !one.measured[n].iter().any(|v| v.is_finite()) {
@@ -100,8 +127,13 @@ fn panels(problem: &Problem, before: &State, after: &State, record: usize, same:
         let mut panel = Panel::new(Axis::new(CHANNEL_NAMES[n]).unit(CHANNEL_UNITS[n])).height(150.0);
         panel = panel
             .series(Series::points("measured", one.time.clone(), one.measured[n].clone()))
-            .series(Series::line("model", one.time.clone(), simulated(problem, before, record, n)));
-        let mut left = Panel::new(Axis::new(format!("error of {}", CHANNEL_NAMES[n])).unit(CHANNEL_UNITS[n])).height(110.0);
+            .series(Series::line(
+                "model",
+                one.time.clone(),
+                simulated(problem, before, record, n),
+            ));
+        let mut left =
+            Panel::new(Axis::new(format!("error of {}", CHANNEL_NAMES[n])).unit(CHANNEL_UNITS[n])).height(110.0);
         let errors = |state: &State| -> Vec<f64> {
             channel(problem, &state.residual, record, n)
                 .iter()
@@ -110,7 +142,11 @@ fn panels(problem: &Problem, before: &State, after: &State, record: usize, same:
         };
         left = left.series(Series::line("model", one.time.clone(), errors(before)));
         if !same {
-            panel = panel.series(Series::line("extended", one.time.clone(), simulated(problem, after, record, n)));
+            panel = panel.series(Series::line(
+                "extended",
+                one.time.clone(),
+                simulated(problem, after, record, n),
+            ));
             left = left.series(Series::line("extended", one.time.clone(), errors(after)));
         }
         chart = chart.panel(panel).panel(left);
@@ -120,11 +156,18 @@ fn panels(problem: &Problem, before: &State, after: &State, record: usize, same:
 
 fn training(diagnosis: &Diagnosis) -> Result<Section, ReportError> {
     let mut section = Section::new("Measured, simulated, extended");
-    let (problem, before, after) = (&diagnosis.problem, &diagnosis.attribution.null, diagnosis.attribution.state());
+    let (problem, before, after) = (
+        &diagnosis.problem,
+        &diagnosis.attribution.null,
+        diagnosis.attribution.state(),
+    );
     let same = diagnosis.attribution.best.is_none();
     for record in 0..problem.records.len() {
         let svg = panels(problem, before, after, record, same)?;
-        section = section.chart(svg, "Training record; initial states estimated for both models. Errors are measured minus simulated.");
+        section = section.chart(
+            svg,
+            "Training record; initial states estimated for both models. Errors are measured minus simulated.",
+        );
     }
     let mut chart = Chart::new("Error of v_o by operating point", Axis::new("duty"));
     for (name, state) in [("model", before), ("extended", after)] {
@@ -137,7 +180,11 @@ fn training(diagnosis: &Diagnosis) -> Result<Section, ReportError> {
             }
         }
         if !x.is_empty() && !(same && name == "extended") {
-            chart = chart.panel(Panel::new(Axis::new(name).unit("V")).height(120.0).series(Series::points(name, x, y)));
+            chart = chart.panel(
+                Panel::new(Axis::new(name).unit("V"))
+                    .height(120.0)
+                    .series(Series::points(name, x, y)),
+            );
         }
     }
     match problem.sigma[0].is_finite() {
@@ -150,11 +197,20 @@ fn profiles(diagnosis: &Diagnosis) -> Result<Section, ReportError> {
     let mut section = Section::new("How well the data hold the parameters");
     for profile in diagnosis.profiles.iter().filter(|profile| profile.curve.len() > 1) {
         let (x, y): (Vec<f64>, Vec<f64>) = profile.curve.iter().copied().unzip();
-        let cause = diagnosis.attribution.best.as_ref().map_or(0, |fit| fit.causes[profile.member]);
+        let cause = diagnosis
+            .attribution
+            .best
+            .as_ref()
+            .map_or(0, |fit| fit.causes[profile.member]);
         let id = diagnosis.attribution.id(cause);
         let panel = Panel::new(Axis::new("cost in chi-square")).height(120.0);
-        let panel = panel.series(Series::line("profile", x.clone(), y.clone())).series(Series::points("fitted", x, y));
-        let chart = Chart::new(format!("{id}: {}", profile.name), Axis::new(profile.name).unit(unit(profile.unit)));
+        let panel = panel
+            .series(Series::line("profile", x.clone(), y.clone()))
+            .series(Series::points("fitted", x, y));
+        let chart = Chart::new(
+            format!("{id}: {}", profile.name),
+            Axis::new(profile.name).unit(unit(profile.unit)),
+        );
         let svg = chart.panel(panel.y_line(3.84, "95 %")).svg()?;
         section = section.chart(svg, "All other parameters and initial states follow.");
     }
@@ -181,11 +237,20 @@ fn ties(diagnosis: &Diagnosis) -> Section {
 
 fn held_out(diagnosis: &Diagnosis) -> Result<Option<Section>, ReportError> {
     let Some(pair) = &diagnosis.held else { return Ok(None) };
-    let whole: Vec<_> = diagnosis.findings.gain.heldout.iter().filter(|held| held.regime == "all").collect();
+    let whole: Vec<_> = diagnosis
+        .findings
+        .gain
+        .heldout
+        .iter()
+        .filter(|held| held.regime == "all")
+        .collect();
     if whole.is_empty() {
         return Ok(None);
     }
-    let names: Vec<String> = whole.iter().map(|held| format!("{} {}", held.record, held.channel)).collect();
+    let names: Vec<String> = whole
+        .iter()
+        .map(|held| format!("{} {}", held.record, held.channel))
+        .collect();
     let ratio = |f: fn(&crate::gain::Held) -> f64| whole.iter().map(|held| f(held) / held.floor).collect::<Vec<_>>();
     let panel = BarPanel::new(Axis::new("error over noise"))
         .bars("model", ratio(|held| held.rmse_before))
@@ -193,7 +258,12 @@ fn held_out(diagnosis: &Diagnosis) -> Result<Option<Section>, ReportError> {
     let svg = BarChart::new("Held-out error", names).panel(panel).svg()?;
     let mut section = Section::new("Gain on held-out records").chart(svg, "1 is the noise: no model gets below it.");
     let mut table = Table::new("").text("record").text("channel").text("regime");
-    table = table.number("before", 4).number("after", 4).number("noise", 4).text("unit").text("reducible part removed");
+    table = table
+        .number("before", 4)
+        .number("after", 4)
+        .number("noise", 4)
+        .text("unit")
+        .text("reducible part removed");
     for held in &diagnosis.findings.gain.heldout {
         table = table.row([
             held.record.clone().into(),
@@ -203,7 +273,12 @@ fn held_out(diagnosis: &Diagnosis) -> Result<Option<Section>, ReportError> {
             held.rmse_after.into(),
             held.floor.into(),
             held.unit.into(),
-            held.removed.map_or_else(|| "nothing above the noise".to_owned(), |r| format!("{:.0} %", 100.0 * r)).into(),
+            held.removed
+                .map_or_else(
+                    || "nothing above the noise".to_owned(),
+                    |r| format!("{:.0} %", 100.0 * r),
+                )
+                .into(),
         ]);
     }
     section = section.table(table);
@@ -223,14 +298,20 @@ fn noise(diagnosis: &Diagnosis) -> Section {
             pairs.push((format!("noise of {name}"), quantity(*sigma, CHANNEL_UNITS[n], 3)));
         }
     }
-    pairs.push(("scatter over independent noise".to_owned(), format!("{:.2}", noise.inflation)));
+    pairs.push((
+        "scatter over independent noise".to_owned(),
+        format!("{:.2}", noise.inflation),
+    ));
     pairs.push(("duty added by the edges".to_owned(), format!("{:.1e}", noise.trim)));
     let mut section = Section::new("Noise and data").pairs(pairs);
     for text in &noise.repairs {
         section = section.text(text.clone());
     }
     if !noise.outliers.is_empty() {
-        section = section.text(format!("Outliers left out (record:row:channel): {}", noise.outliers.join(", ")));
+        section = section.text(format!(
+            "Outliers left out (record:row:channel): {}",
+            noise.outliers.join(", ")
+        ));
     }
     section
 }
@@ -239,7 +320,11 @@ fn detectable(diagnosis: &Diagnosis) -> Section {
     let mut table = Table::new("Causes that would have to be larger than usual to be seen in these records");
     table = table.text("cause").text("parameter").text("smallest change seen");
     for one in &diagnosis.findings.not_detectable {
-        table = table.row([one.id.into(), one.parameter.into(), quantity(one.smallest, unit(one.unit), 3).into()]);
+        table = table.row([
+            one.id.into(),
+            one.parameter.into(),
+            quantity(one.smallest, unit(one.unit), 3).into(),
+        ]);
     }
     Section::new("").details(Section::new("Not detectable").table(table))
 }

@@ -79,7 +79,9 @@ impl Problem {
             offsets.push(total);
             total += record.rows() * CHANNELS;
         }
-        let masked = records.iter().map(|record| std::array::from_fn(|_| vec![false; record.rows()]));
+        let masked = records
+            .iter()
+            .map(|record| std::array::from_fn(|_| vec![false; record.rows()]));
         Problem {
             masked: masked.collect(),
             sigma: [1.0; CHANNELS],
@@ -94,7 +96,11 @@ impl Problem {
     /// Length of the vectors.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.records.iter().map(|record| record.rows() * CHANNELS).sum::<usize>() + 1
+        self.records
+            .iter()
+            .map(|record| record.rows() * CHANNELS)
+            .sum::<usize>()
+            + 1
     }
 
     /// Whether there is no record.
@@ -106,7 +112,13 @@ impl Problem {
     /// States to begin with: what was measured in the first rows.
     #[must_use]
     pub fn first_starts(&self) -> Starts {
-        let of = |record: &Record| record.segments.iter().map(|segment| self.guess(record, segment.start)).collect();
+        let of = |record: &Record| {
+            record
+                .segments
+                .iter()
+                .map(|segment| self.guess(record, segment.start))
+                .collect()
+        };
         Starts {
             states: self.records.iter().map(of).collect(),
             trim: 0.0,
@@ -140,13 +152,21 @@ impl Problem {
         for (index, record) in self.records.iter().enumerate() {
             let shown = simulate(model, record, &starts.states[index], starts.trim);
             for segment in &record.segments {
-                let first = if record.settled { segment.start } else { segment.start + 1 };
+                let first = if record.settled {
+                    segment.start
+                } else {
+                    segment.start + 1
+                };
                 for row in first..segment.end {
                     for channel in 0..CHANNELS {
                         if self.counts(index, row, channel) {
                             let error = record.measured[channel][row] - shown[row][channel];
                             // a model that is no plant explains nothing
-                            let error = if error.is_finite() { error } else { 1e6 * self.sigma[channel] };
+                            let error = if error.is_finite() {
+                                error
+                            } else {
+                                1e6 * self.sigma[channel]
+                            };
                             out[self.offsets[index] + row * CHANNELS + channel] = error / self.sigma[channel];
                         }
                     }
@@ -166,7 +186,12 @@ impl Problem {
             let record = &self.records[index];
             let skip = usize::from(!record.settled);
             let rows = record.segments.iter().flat_map(|s| s.start + skip..s.end);
-            rows.map(|row| (0..CHANNELS).filter(|channel| self.counts(index, row, *channel)).count()).sum::<usize>()
+            rows.map(|row| {
+                (0..CHANNELS)
+                    .filter(|channel| self.counts(index, row, *channel))
+                    .count()
+            })
+            .sum::<usize>()
         };
         (0..self.records.len()).map(of).sum()
     }
@@ -181,7 +206,11 @@ impl Problem {
                 start[state] += step;
             }
             let after = self.residual(model, &moved);
-            residual.iter().zip(&after).map(|(before, after)| (before - after) / step).collect()
+            residual
+                .iter()
+                .zip(&after)
+                .map(|(before, after)| (before - after) / step)
+                .collect()
         });
         let mut spans = Vec::new();
         for (record, one) in self.records.iter().enumerate() {
@@ -224,7 +253,11 @@ impl Problem {
             let mut moved = starts.clone();
             moved.trim += DUTY_ACCURACY;
             let after = self.residual(model, &moved);
-            let raw: Vec<f64> = residual.iter().zip(&after).map(|(a, b)| (a - b) / DUTY_ACCURACY).collect();
+            let raw: Vec<f64> = residual
+                .iter()
+                .zip(&after)
+                .map(|(a, b)| (a - b) / DUTY_ACCURACY)
+                .collect();
             let mut own = raw.clone();
             basis.project(&mut own);
             basis.trim = [raw, own];
@@ -266,7 +299,10 @@ impl Basis {
         for span in &self.spans {
             let [r11, r12, r22] = span.r;
             let part = &u[span.from..span.to];
-            let (a, b) = (dot(&self.q[0][span.from..span.to], part), dot(&self.q[1][span.from..span.to], part));
+            let (a, b) = (
+                dot(&self.q[0][span.from..span.to], part),
+                dot(&self.q[1][span.from..span.to], part),
+            );
             let i = if r22 > 0.0 { b / r22 } else { 0.0 };
             let v = if r11 > 0.0 { (a - r12 * i) / r11 } else { 0.0 };
             let start = &mut starts.states[span.record][span.segment];
@@ -321,7 +357,10 @@ pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
 
 /// Records at clearly different source voltages were set so; a common deviation is the model's.
 fn share_source_voltage(records: &mut [Record], v_in: f64) {
-    let medians: Vec<f64> = records.iter().map(|r| median(r.measured[3].iter().copied()) / v_in).collect();
+    let medians: Vec<f64> = records
+        .iter()
+        .map(|r| median(r.measured[3].iter().copied()) / v_in)
+        .collect();
     let finite = || medians.iter().copied().filter(|m| m.is_finite());
     let (low, high) = (finite().fold(f64::INFINITY, f64::min), finite().fold(0.0, f64::max));
     let apart = high > 1.03 * low;
@@ -336,7 +375,17 @@ fn share_source_voltage(records: &mut [Record], v_in: f64) {
 
 fn bases(records: &[Record], base: &Model) -> Bases {
     let v_in = base.plant.converter.v_in;
-    let voltage = |r: &Record| (0..r.rows()).map(|n| if r.measured[0][n].is_finite() { r.measured[0][n] } else { r.duty[n] * v_in }).collect::<Vec<_>>();
+    let voltage = |r: &Record| {
+        (0..r.rows())
+            .map(|n| {
+                if r.measured[0][n].is_finite() {
+                    r.measured[0][n]
+                } else {
+                    r.duty[n] * v_in
+                }
+            })
+            .collect::<Vec<_>>()
+    };
     let v = median(records.iter().flat_map(voltage)).max(0.01 * v_in);
     let current = |r: &Record| {
         let drawn = |n: usize| r.load[n].conductance * v + r.load[n].current + r.load[n].power / v;

@@ -31,7 +31,9 @@ pub struct Profile {
 /// Profiles of all parameters of the best explanation.
 #[must_use]
 pub fn profiles(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
-    let Some(best) = &attribution.best else { return Vec::new() };
+    let Some(best) = &attribution.best else {
+        return Vec::new();
+    };
     let fitter = attribution.fitter(problem);
     let places = fitter.places(&best.causes);
     let numbers: Vec<usize> = (0..places.len()).collect();
@@ -68,9 +70,17 @@ pub fn profiles(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
         profile.curve.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (side, at) in [(0, -2.0), (1, 2.0)] {
             let far = (value + at * sigma).clamp(low, high);
-            let cost = profile.curve.iter().find(|(x, _)| *x == far).map_or(0.0, |(_, cost)| *cost);
+            let cost = profile
+                .curve
+                .iter()
+                .find(|(x, _)| *x == far)
+                .map_or(0.0, |(_, cost)| *cost);
             // a parabola through the far point; a flat profile is open up to the bound
-            let reach = if cost > 0.3 { (far - value) * (LEVEL / cost).sqrt() } else { at.signum() * (high - low) };
+            let reach = if cost > 0.3 {
+                (far - value) * (LEVEL / cost).sqrt()
+            } else {
+                at.signum() * (high - low)
+            };
             profile.interval[side] = (value + reach).clamp(low, high);
         }
         profile

@@ -72,7 +72,11 @@ impl Record {
     pub fn new(table: Table, columns: &Columns, parameters: &Parameters) -> Result<Self, Faults> {
         let mut raw = Raw::new(table, columns)?;
         raw.check_duty()?;
-        let name = raw.table.file.file_stem().map(|name| name.to_string_lossy().into_owned());
+        let name = raw
+            .table
+            .file
+            .file_stem()
+            .map(|name| name.to_string_lossy().into_owned());
         let settled = raw.signal("t").is_none();
         let t_sw = parameters.t_sw();
         let (rows, phase) = if settled {
@@ -92,20 +96,28 @@ impl Record {
         let duty = held(raw.pick("d", &rows, f64::NAN).unwrap_or_default());
         let mut record = Record {
             name: name.unwrap_or_else(|| "record".to_owned()),
-            time: (0..rows.len()).map(|n| raw.start + n as f64 * if settled { 1.0 } else { t_sw }).collect(),
+            time: (0..rows.len())
+                .map(|n| raw.start + n as f64 * if settled { 1.0 } else { t_sw })
+                .collect(),
             phase,
             duty,
             load: held_loads(&rows, &loads),
             measured,
             lattice,
-            v_in_ratio: columns.constant("v_in").map_or(1.0, |v_in| v_in / parameters.converter.v_in),
+            v_in_ratio: columns
+                .constant("v_in")
+                .map_or(1.0, |v_in| v_in / parameters.converter.v_in),
             duty_is: columns.duty,
             settled,
             segments: segments(&rows, settled),
             repairs: raw.table.repairs,
         };
         record.leave_out_stuck();
-        if record.measured.iter().all(|channel| channel.iter().all(|value| value.is_nan())) {
+        if record
+            .measured
+            .iter()
+            .all(|channel| channel.iter().all(|value| value.is_nan()))
+        {
             let message = Message::new("nothing is measured in this record")
                 .expected("a column v_o, i_l, i_o or v_in that is not constant");
             return Err(Fault::new(&raw.table.file, Place::File, message).into());
@@ -126,8 +138,10 @@ impl Record {
             let constant = finite.len() >= FEWEST && finite.iter().all(|v| *v == finite[0]);
             if constant {
                 let name = CHANNEL_NAMES[n];
-                self.repairs
-                    .push(format!("column {name} is constant at {}: not taken as measured", finite[0]));
+                self.repairs.push(format!(
+                    "column {name} is constant at {}: not taken as measured",
+                    finite[0]
+                ));
                 values.fill(f64::NAN);
             }
             if values.is_empty() {
@@ -160,7 +174,12 @@ impl Raw {
             found.push(place.map(|(index, source)| (index, source.scale, source.offset)));
         }
         let constants: Vec<_> = NAMES.iter().map(|name| columns.constant(name)).collect();
-        let has = |name: &str| NAMES.iter().position(|n| *n == name).is_some_and(|n| found[n].is_some() || constants[n].is_some());
+        let has = |name: &str| {
+            NAMES
+                .iter()
+                .position(|n| *n == name)
+                .is_some_and(|n| found[n].is_some() || constants[n].is_some())
+        };
         if !has("d") {
             let message = Message::new("no duty column `d`").found(headers.join(", "));
             faults.push(message.hint("name it in a map file: --columns MAP.toml with [columns] d = \"...\""));
@@ -175,7 +194,9 @@ impl Raw {
             faults.push(message.expected("at least one of v_o, i_l, i_o, v_in"));
         }
         let file = table.file.clone();
-        let faults = faults.into_iter().map(|message| Fault::new(&file, Place::File, message));
+        let faults = faults
+            .into_iter()
+            .map(|message| Fault::new(&file, Place::File, message));
         Faults::unless_empty(faults.collect())?;
         Ok(Raw {
             table,
@@ -221,7 +242,11 @@ impl Raw {
             return None;
         }
         let values = self.signal(name)?;
-        Some(rows.iter().map(|row| row.map_or(otherwise, |row| values[row])).collect())
+        Some(
+            rows.iter()
+                .map(|row| row.map_or(otherwise, |row| values[row]))
+                .collect(),
+        )
     }
 
     fn check_duty(&mut self) -> Result<(), Faults> {
@@ -248,14 +273,20 @@ impl Raw {
         }
         if let Some(row) = (1..time.len()).find(|n| time[*n] < time[*n - 1]) {
             let message = Message::new("time goes backward").found(format!("{} after {}", time[row], time[row - 1]));
-            return Err(self.at(row, message.hint("cut the file into one record for each run")).into());
+            return Err(self
+                .at(row, message.hint("cut the file into one record for each run"))
+                .into());
         }
         let twice = (1..time.len()).filter(|n| time[*n] == time[*n - 1]).count();
         if twice > 0 {
             let text = format!("{twice} rows repeat the time of the row before: the first of each is kept");
             self.table.repairs.push(text);
         }
-        let mut steps: Vec<f64> = time.windows(2).map(|t| t[1] - t[0]).filter(|step| *step > 0.0).collect();
+        let mut steps: Vec<f64> = time
+            .windows(2)
+            .map(|t| t[1] - t[0])
+            .filter(|step| *step > 0.0)
+            .collect();
         steps.sort_by(f64::total_cmp);
         let Some(step) = steps.get(steps.len() / 2).copied() else {
             return Err(self.whole(Message::new("too few rows").expected("20 or more")).into());
@@ -268,7 +299,9 @@ impl Raw {
         if !(faster || slower) {
             let message = Message::new("the sample rate does not fit the switching frequency")
                 .found(format!("a row every {step:e} s"))
-                .expected(format!("the period, {t_sw:e} s, a whole multiple or a whole part of it"))
+                .expected(format!(
+                    "the period, {t_sw:e} s, a whole multiple or a whole part of it"
+                ))
                 .hint("is the time in us or ms? name the column `t_us`; is `converter.f_sw` right?");
             return Err(self.whole(message).into());
         }
@@ -277,7 +310,11 @@ impl Raw {
 
     fn place(&mut self, time: &[f64], t_sw: f64, phase: Option<f64>, step: f64) -> (Vec<Option<usize>>, f64) {
         let fraction = (time[0] / t_sw).rem_euclid(1.0);
-        let phase = phase.unwrap_or(if fraction > 1.0 - 1e-3 || fraction < 1e-3 { 0.0 } else { fraction });
+        let phase = phase.unwrap_or(if fraction > 1.0 - 1e-3 || fraction < 1e-3 {
+            0.0
+        } else {
+            fraction
+        });
         let skip = match step < 0.75 * t_sw {
             true => (phase - fraction).rem_euclid(1.0) * t_sw,
             false => 0.0,
@@ -364,7 +401,11 @@ fn lattice(values: &[f64], decimals: u32) -> f64 {
     let digit = (0..decimals).fold(1.0, |digit, _| digit / 10.0);
     let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
-    let gaps: Vec<f64> = sorted.windows(2).map(|v| v[1] - v[0]).filter(|gap| *gap > 1.5 * digit).collect();
+    let gaps: Vec<f64> = sorted
+        .windows(2)
+        .map(|v| v[1] - v[0])
+        .filter(|gap| *gap > 1.5 * digit)
+        .collect();
     let smallest = gaps.iter().copied().fold(f64::INFINITY, f64::min);
     if sorted.len() < FEWEST || gaps.len() < 5 || smallest < 4.5 * digit {
         return 0.0;
@@ -382,7 +423,11 @@ fn lattice(values: &[f64], decimals: u32) -> f64 {
         let count = ((value - low) / step).round();
         (value - low - count * step).abs() <= 1.2 * digit
     };
-    if sorted.iter().all(near) && high > low { step } else { 0.0 }
+    if sorted.iter().all(near) && high > low {
+        step
+    } else {
+        0.0
+    }
 }
 
 /// Gaps are filled with the value before.

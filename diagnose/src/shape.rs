@@ -121,8 +121,14 @@ fn largest_step(values: &[f64]) -> (usize, f64) {
 
 fn correlation_with_time(values: &[f64]) -> f64 {
     let time: Vec<f64> = (0..values.len()).map(|n| n as f64).collect();
-    let means: Vec<f64> = values.chunks(BLOCK).map(|b| b.iter().sum::<f64>() / b.len() as f64).collect();
-    let times: Vec<f64> = time.chunks(BLOCK).map(|b| b.iter().sum::<f64>() / b.len() as f64).collect();
+    let means: Vec<f64> = values
+        .chunks(BLOCK)
+        .map(|b| b.iter().sum::<f64>() / b.len() as f64)
+        .collect();
+    let times: Vec<f64> = time
+        .chunks(BLOCK)
+        .map(|b| b.iter().sum::<f64>() / b.len() as f64)
+        .collect();
     correlation(&means, &times)
 }
 
@@ -137,5 +143,9 @@ pub fn correlation(a: &[f64], b: &[f64]) -> f64 {
         aa += (x - ma) * (x - ma);
         bb += (y - mb) * (y - mb);
     }
-    if aa > 0.0 && bb > 0.0 { ab / (aa * bb).sqrt() } else { 0.0 }
+    if aa > 0.0 && bb > 0.0 {
+        ab / (aa * bb).sqrt()
+    } else {
+        0.0
+    }
 }

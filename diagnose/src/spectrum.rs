@@ -29,7 +29,13 @@ pub fn strongest_line(problem: &Problem, residual: &[f64], n: usize) -> Option<L
     let (mut longest, t_sw) = (0.0f64, problem.bases.t_sw);
     for (index, record) in problem.records.iter().enumerate().filter(|(_, r)| !r.settled) {
         let values = channel(problem, residual, index, n);
-        samples.extend(values.iter().zip(&record.time).filter(|(v, _)| **v != 0.0).map(|(v, t)| (*t, *v)));
+        samples.extend(
+            values
+                .iter()
+                .zip(&record.time)
+                .filter(|(v, _)| **v != 0.0)
+                .map(|(v, t)| (*t, *v)),
+        );
         longest = longest.max(record.rows() as f64 * t_sw);
     }
     if samples.len() < 50 {

@@ -17,7 +17,10 @@ use crate::{Failure, Outcome, output};
 /// Reads the records, diagnoses, writes the three files.
 pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
     let model = Parameters::from_file(&options.model)?;
-    let columns = options.columns.as_deref().map_or_else(|| Ok(Columns::default()), Columns::open)?;
+    let columns = options
+        .columns
+        .as_deref()
+        .map_or_else(|| Ok(Columns::default()), Columns::open)?;
     let (train, heldout) = records(options, &columns, &model)?;
     let start = Instant::now();
     let say = |what: &str| eprintln!("{:6.1} s  {what}", start.elapsed().as_secs_f64());

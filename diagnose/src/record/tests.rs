@@ -14,7 +14,11 @@ fn read(text: &str) -> Result<Record, Faults> {
 fn rows(edit: impl Fn(usize, String) -> String) -> String {
     let mut text = String::from("t,d,v_o,r_load\n");
     for n in 0..30 {
-        let line = format!("{:.6},0.5,{:.3},20", (n as f64 + 0.5) * 1e-4, 100.0 + 0.137 * (n % 7) as f64);
+        let line = format!(
+            "{:.6},0.5,{:.3},20",
+            (n as f64 + 0.5) * 1e-4,
+            100.0 + 0.137 * (n % 7) as f64
+        );
         let _ = writeln!(text, "{}", edit(n, line));
     }
     text
@@ -32,7 +36,13 @@ fn the_phase_comes_from_the_time_column() {
 
 #[test]
 fn a_gap_makes_a_new_segment() {
-    let text = rows(|n, line| if (10..14).contains(&n) { "# lost".to_owned() } else { line });
+    let text = rows(|n, line| {
+        if (10..14).contains(&n) {
+            "# lost".to_owned()
+        } else {
+            line
+        }
+    });
     let record = read(&text).unwrap();
     assert_eq!(record.segments, [0..10, 14..30]);
 }
@@ -41,7 +51,10 @@ fn a_gap_makes_a_new_segment() {
 fn backward_time_a_percent_duty_and_another_rate_are_faults_with_a_place() {
     let swapped = rows(|n, line| if n == 8 { "0.0001,0.5,100,20".to_owned() } else { line });
     let fault = &read(&swapped).unwrap_err().list[0];
-    assert_eq!((fault.line_column().unwrap().0, fault.problem.as_str()), (10, "time goes backward"));
+    assert_eq!(
+        (fault.line_column().unwrap().0, fault.problem.as_str()),
+        (10, "time goes backward")
+    );
     let fault = &read(&rows(|_, line| line.replace(",0.5,", ",50,"))).unwrap_err().list[0];
     assert!(fault.hint.as_ref().unwrap().starts_with("percent?"));
     let slow = rows(|_, line| line).replace("t,", "t_ms,");
@@ -52,9 +65,23 @@ fn backward_time_a_percent_duty_and_another_rate_are_faults_with_a_place() {
 fn repairs_are_reported() {
     let repeated = rows(|n, line| if n == 5 { format!("{line}\n{line}") } else { line });
     let record = read(&repeated).unwrap();
-    assert!(record.repairs[0].contains("1 rows repeat the time"), "{:?}", record.repairs);
-    let stuck = rows(|_, line| line.split(',').take(2).chain(["7.0", "20"]).collect::<Vec<_>>().join(","));
-    assert!(read(&stuck).unwrap_err().list[0].problem.contains("nothing is measured"));
+    assert!(
+        record.repairs[0].contains("1 rows repeat the time"),
+        "{:?}",
+        record.repairs
+    );
+    let stuck = rows(|_, line| {
+        line.split(',')
+            .take(2)
+            .chain(["7.0", "20"])
+            .collect::<Vec<_>>()
+            .join(",")
+    });
+    assert!(
+        read(&stuck).unwrap_err().list[0]
+            .problem
+            .contains("nothing is measured")
+    );
 }
 
 #[test]
@@ -78,8 +105,12 @@ fn a_table_without_time_holds_settled_points() {
 
 #[test]
 fn a_converter_step_is_found_and_plain_digits_are_not() {
-    let on: Vec<f64> = (0..200).map(|n| ((n * 37 % 101) as f64 * 0.0488).mul_add(1000.0, 0.0).round() / 1000.0).collect();
+    let on: Vec<f64> = (0..200)
+        .map(|n| ((n * 37 % 101) as f64 * 0.0488).mul_add(1000.0, 0.0).round() / 1000.0)
+        .collect();
     assert!((lattice(&on, 3) - 0.0488).abs() < 1e-4);
-    let off: Vec<f64> = (0..200).map(|n| ((n * n * 37 % 7919) as f64 * 0.001_3).mul_add(1000.0, 0.0).round() / 1000.0).collect();
+    let off: Vec<f64> = (0..200)
+        .map(|n| ((n * n * 37 % 7919) as f64 * 0.001_3).mul_add(1000.0, 0.0).round() / 1000.0)
+        .collect();
     assert_eq!(lattice(&off, 3), 0.0);
 }

@@ -2,8 +2,10 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod commands;
+mod drm;
 mod files;
 mod interruption;
+mod simulate;
 mod traces;
 mod training;
 mod verify;
@@ -93,6 +95,14 @@ fn assert_refused(ran: &Ran, words: &[&str]) {
     for word in words {
         assert!(ran.stderr.contains(word), "{word}\n{}", ran.stderr);
     }
+}
+
+/// Ctrl-C for a child; how it ended.
+#[cfg(unix)]
+fn interrupt(child: std::process::Child) -> std::process::Output {
+    let signalled = run(Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]));
+    assert_eq!(signalled.code, Some(0));
+    child.wait_with_output().unwrap()
 }
 
 /// Name and content of each file of a folder and its folders.

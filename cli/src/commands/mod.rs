@@ -3,8 +3,12 @@
 pub mod compile;
 pub mod demo;
 pub mod diagnose;
+pub mod drm;
 pub mod inspect;
+mod interruption;
 pub mod new;
+mod progress_line;
+pub mod simulate;
 pub mod train;
 pub mod verify;
 

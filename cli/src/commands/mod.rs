@@ -3,6 +3,7 @@
 pub mod compile;
 mod costs;
 pub mod demo;
+pub mod diagnose;
 pub mod drm;
 pub mod inspect;
 mod interruption;

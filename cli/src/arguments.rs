@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 /// From a trained policy to verified controller code.
@@ -76,6 +77,12 @@ impl From<Lang> for codegen::Language {
     }
 }
 
+/// Reads the name of a door.
+fn door() -> impl TypedValueParser<Value = codegen::Door> {
+    let names = codegen::Door::ALL.map(codegen::Door::name);
+    PossibleValuesParser::new(names).try_map(|name| codegen::Door::find(&name).ok_or("unknown door"))
+}
+
 #[derive(Debug, Args)]
 pub struct Compile {
     /// policy.toml or the folder that holds it
@@ -89,6 +96,13 @@ pub struct Compile {
     /// Do not build and run the code under the target's emulator to report memory, stack and instructions of a step
     #[arg(long)]
     pub no_costs: bool,
+    /// Also generate a way into a tool or onto a board, with the C core; may be repeated. kit: C test program with
+    /// expected bits for your compiler and board. sfunction: Simulink block, also for dSPACE RTI
+    #[arg(long, value_name = "NAME", value_parser = door())]
+    pub door: Vec<codegen::Door>,
+    /// Control steps in the kit
+    #[arg(long, value_name = "N", default_value_t = verify::kit::DEFAULT_STEPS, value_parser = clap::value_parser!(u32).range(1..=200_000))]
+    pub kit_steps: u32,
     /// Folder for the generated files; made if missing
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,

@@ -46,6 +46,12 @@ pub struct Manifest {
     pub target: String,
     /// Generated languages.
     pub languages: Vec<Language>,
+    /// Doors beside the core, by name.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub doors: Vec<&'static str>,
+    /// Control steps in the back-to-back kit, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kit_steps: Option<u32>,
     /// Numeric format.
     pub numeric_format: policy::NumericFormat,
     /// Control period in s.
@@ -115,6 +121,8 @@ pub fn manifest(policy: &Policy, target: &TargetSpec, languages: &[Language], fi
         name: policy.name.clone(),
         target: target.name.to_owned(),
         languages: languages.to_vec(),
+        doors: Vec::new(),
+        kit_steps: None,
         numeric_format: policy.numeric_format,
         sample_period: policy.sample_period,
         digests: policy.digests.clone(),

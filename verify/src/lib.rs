@@ -19,10 +19,12 @@
 //! | checked-in files against the policy | [`drift()`] |
 
 pub mod compare;
+pub mod doors;
 pub mod drift;
 pub mod drivers;
 pub mod elf;
 mod golden;
+pub mod kit;
 pub mod lane;
 pub mod live;
 pub mod measure;
@@ -34,6 +36,7 @@ mod session;
 pub mod toolchain;
 pub mod traces;
 
+pub use doors::Selection;
 pub use drift::{drift, read_text};
 pub use live::{Live, LiveCommand};
 pub use report::{BuildReport, Difference, GoldenResult, Outcome, Report};

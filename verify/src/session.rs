@@ -100,6 +100,8 @@ pub enum VerifyError {
     Codegen(codegen::CodegenError),
     /// The interpreter refused an event.
     Interpreter(InputError),
+    /// The policy of the construct suite does not pass the check.
+    Constructs(String),
     /// A temporary folder could not be made or a folder not be read.
     Io(PathBuf, std::io::Error),
 }
@@ -118,6 +120,7 @@ impl fmt::Display for VerifyError {
             ),
             Self::Codegen(error) => write!(f, "{error}"),
             Self::Interpreter(error) => write!(f, "internal fault: interpreter: {error}"),
+            Self::Constructs(faults) => write!(f, "internal fault: construct suite: {faults}"),
             Self::Io(path, error) => write!(f, "{}: {error}", path.display()),
         }
     }

@@ -1,8 +1,9 @@
 //! What a control step costs on the target, measured under its emulator after `compile`.
 
 use ::targets::TargetSpec;
-use codegen::{GeneratedFiles, Language};
+use codegen::Language;
 use policy::Policy;
+use verify::Files;
 use verify::measure::{Costs, usual_builds};
 
 use super::verify::missing_text;
@@ -18,8 +19,8 @@ pub struct Measured {
 
 impl Measured {
     /// Builds and runs the files. The report is an extra: that it cannot be made is a note, not a failure.
-    pub fn of(policy: &Policy, target: &TargetSpec, languages: &[Language], files: &GeneratedFiles) -> Self {
-        match usual_builds(policy, target, &files.files, languages) {
+    pub fn of(policy: &Policy, target: &TargetSpec, languages: &[Language], files: &Files) -> Self {
+        match usual_builds(policy, target, files, languages) {
             Ok((costs, missing)) => Self {
                 costs,
                 notes: missing

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use codegen::{Language, manifest};
+use codegen::{Door, Language, manifest};
 use policy::Policy;
 use serde::{Deserialize, Serialize};
 use targets::TargetSpec;
 use verify::drift::Drift;
 use verify::traces::Recorded;
-use verify::{Files, Options, Progress, Report};
+use verify::{Files, Options, Progress, Report, Selection};
 
 use super::grouped;
 use super::progress_line::ProgressLine;
@@ -103,6 +103,10 @@ fn target(options: &Verify, generated_for: Option<&'static TargetSpec>) -> Resul
 struct Origin {
     target: String,
     languages: Vec<String>,
+    #[serde(default)]
+    doors: Vec<String>,
+    #[serde(default)]
+    kit_steps: Option<u32>,
 }
 
 /// A folder that compile wrote.
@@ -142,7 +146,20 @@ fn checked_in(policy: &Policy, folder: &Path) -> Result<Folder, Failure> {
             origin.languages
         )));
     }
-    let drift = verify::drift(policy, target, &languages, folder)?;
+    let doors: Option<Vec<Door>> = origin.doors.iter().map(|name| Door::find(name)).collect();
+    let Some(doors) = doors else {
+        let known = Door::ALL.map(Door::name).join(", ");
+        return Err(Failure(format!(
+            "{shown}: unknown door\n   = found: {:?}\n   = expected: {known}",
+            origin.doors
+        )));
+    };
+    let selection = Selection {
+        doors,
+        kit_steps: origin.kit_steps.unwrap_or(verify::kit::DEFAULT_STEPS),
+        ..Selection::core(&languages)
+    };
+    let drift = verify::drift(policy, target, &selection, folder)?;
     let mut files = Files::new();
     for name in codegen::generate(policy, target, &languages)?.files.into_keys() {
         // a missing file is already part of the drift

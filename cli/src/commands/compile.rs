@@ -7,6 +7,7 @@ use policy::Policy;
 use targets::TargetSpec;
 use verify::{Files, Selection};
 
+use super::costs::Measured;
 use super::verify::golden_text;
 use super::{bytes, grouped};
 use crate::arguments::Compile;
@@ -37,8 +38,17 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
         doors,
         kit_steps: options.kit_steps,
     };
-    let files = verify::doors::generate(&policy, target, &selection)?;
+    let mut files = verify::doors::generate(&policy, target, &selection)?;
+    let measured = if options.no_costs {
+        Measured::default()
+    } else {
+        Measured::of(&policy, target, &selection.languages, &files)
+    };
+    if let (false, Some(manifest)) = (measured.costs.is_empty(), files.get_mut(manifest::FILE)) {
+        *manifest = manifest::with_costs(manifest, &measured.costs)?;
+    }
     write(&policy, target, &options.out, &files)?;
+    measured.say(&policy, target)?;
     Ok(Outcome::Done)
 }
 

@@ -1,6 +1,6 @@
 //! Back-to-back kit: a C program with measurements and expected bits inside, for the user's compiler and board.
 //!
-//! Three parts: the arithmetic the contract rests on ([`probes`]), a construct suite (small controllers that together use
+//! Three parts: the arithmetic the contract rests on (`probes`), a construct suite (small controllers that together use
 //! everything the C backend can print), and the policy itself. Expected values come from outside as [`Material`].
 
 mod probes;

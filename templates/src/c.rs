@@ -162,6 +162,8 @@ pub struct IntegerBlockView {
     pub count: usize,
     /// Outputs per block.
     pub height: usize,
+    /// All inputs in assembly.
+    pub assembly: Vec<String>,
     /// Stretches of inputs.
     pub parts: Vec<IntegerPartView>,
     /// One entry per output of the block.

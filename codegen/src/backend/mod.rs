@@ -1,5 +1,6 @@
 //! Backends: [`Program`] -> [`GeneratedFiles`], as data.
 
+mod assembly;
 #[cfg(feature = "c")]
 pub mod c99;
 #[cfg(feature = "c")]

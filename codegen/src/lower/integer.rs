@@ -12,7 +12,7 @@ const PAIR: [usize; 2] = [0, 1];
 const QUAD: [usize; 4] = [0, 2, 1, 3];
 
 /// Outputs accumulated side by side: six sums, a weight, two inputs and three pointers fill an ARM core's registers.
-const ROWS: usize = 6;
+const ROWS: usize = 4;
 
 /// Rounds weights and biases and orders them in the blocks in which the generated code reads them.
 pub fn lower(policy: &Policy, scales: &Scales) -> IntegerNetwork {

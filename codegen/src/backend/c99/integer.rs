@@ -4,6 +4,7 @@ use templates::c::{IntegerBlockView, IntegerLayerView, IntegerPartView, IntegerV
 
 use super::statements::{float, unsigned};
 use super::tables::wrap;
+use crate::backend::assembly::Kernel;
 use crate::program::{ActivationCode, IntegerLayer, IntegerNetwork};
 
 /// C type of a weight.
@@ -101,6 +102,7 @@ fn blocks(prefix: &str, network: &IntegerNetwork, layer: &IntegerLayer, is_last:
     let block = |count: usize, height: usize| IntegerBlockView {
         count,
         height,
+        assembly: assembly(network, layer, height),
         parts: parts(prefix, network, layer, height),
         rows: (0..height)
             .map(|index| RowView {
@@ -118,7 +120,7 @@ fn blocks(prefix: &str, network: &IntegerNetwork, layer: &IntegerLayer, is_last:
 }
 
 /// Groups taken in one turn of the loop, so that its own instructions weigh less.
-const UNROLL: usize = 2;
+const UNROLL: usize = 4;
 
 fn parts(prefix: &str, network: &IntegerNetwork, layer: &IntegerLayer, height: usize) -> Vec<IntegerPartView> {
     let lanes = network.lanes.len();
@@ -166,6 +168,43 @@ fn dsp(prefix: &str, network: &IntegerNetwork, group: usize, height: usize) -> V
         }
     });
     braced(loads.chain(sums))
+}
+
+/// One asm statement over all groups of a block of up to four rows.
+fn assembly(network: &IntegerNetwork, layer: &IntegerLayer, height: usize) -> Vec<String> {
+    let operand = |name: &str| format!("%[{name}]");
+    let kernel = Kernel {
+        is_quad: network.weight_bytes == 1,
+        groups: network.groups(layer.inputs),
+        height,
+        registers: ["r4", "r5", "r6", "r8"],
+    };
+    let mut lines = vec![
+        format!("uint32_t turns = {}u;", kernel.turns()),
+        "int32_t x01;".to_owned(),
+    ];
+    if kernel.is_quad {
+        lines.extend(["int32_t x23;".to_owned(), "int32_t even;".to_owned()]);
+    }
+    lines.push("__asm__ volatile(".to_owned());
+    let text = kernel.text(&operand);
+    lines.extend(text.iter().map(|line| format!("    \"{line}\\n\\t\"")));
+    let mut outputs: Vec<String> = (0..height).map(|row| format!("[s{row}] \"+r\"(s{row})")).collect();
+    outputs.extend(["w", "in", "turns"].map(|name| format!("[{name}] \"+r\"({name})")));
+    let temporaries: &[&str] = if kernel.is_quad {
+        &["x01", "x23", "even"]
+    } else {
+        &["x01"]
+    };
+    outputs.extend(temporaries.iter().map(|name| format!("[{name}] \"=&r\"({name})")));
+    lines.push(format!("    : {}", outputs.join(", ")));
+    let clobbered: Vec<String> = kernel.clobbered().iter().map(|name| format!("\"{name}\"")).collect();
+    lines.push("    :".to_owned());
+    lines.push(format!("    : {}, \"cc\", \"memory\");", clobbered.join(", ")));
+    std::iter::once("{".to_owned())
+        .chain(lines.into_iter().map(|line| format!("    {line}")))
+        .chain(["}".to_owned()])
+        .collect()
 }
 
 fn portable(network: &IntegerNetwork, group: usize, height: usize) -> Vec<String> {

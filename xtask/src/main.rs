@@ -20,6 +20,7 @@ usage: cargo xtask <command>
   install                           only the tools: compilers, valgrind
   bless                             rewrite the golden files from what the code produces now
   layers                            only the layer rules
+  blind --seed S --out DIR ...      blind cases for the diagnosis and their score (docs/blind.md; --help)
 ";
 
 #[derive(Debug, PartialEq)]
@@ -28,6 +29,7 @@ enum Command {
     Install,
     Bless,
     Layers,
+    Blind(Vec<String>),
     Help,
 }
 
@@ -56,6 +58,7 @@ fn parse(arguments: &[String]) -> Result<Command, String> {
     };
     let command = match name.as_str() {
         "test" => return parse_test(rest),
+        "blind" => return Ok(Command::Blind(rest.to_vec())),
         "install" => Command::Install,
         "bless" => Command::Bless,
         "layers" => Command::Layers,
@@ -95,6 +98,7 @@ fn run(command: Command) -> Result<bool, String> {
         Command::Test(options) => Ok(steps::run_all(&Workspace::load()?, options)),
         Command::Bless => bless(&Workspace::load()?),
         Command::Layers => layers(&Workspace::load()?),
+        Command::Blind(arguments) => blind(&Workspace::load()?, &arguments),
     }
 }
 
@@ -104,6 +108,13 @@ fn bless(workspace: &Workspace) -> Result<bool, String> {
     process::run(&mut command, &process::Output::Terminal)?;
     println!("golden files are rewritten: read the difference before you commit it");
     Ok(true)
+}
+
+fn blind(workspace: &Workspace, arguments: &[String]) -> Result<bool, String> {
+    let mut command = workspace.cargo(&["run", "--release", "--quiet", "-p", "blind", "--"]);
+    // no limit of time: a large set takes an hour
+    let status = command.args(arguments).status();
+    Ok(status.map_err(|error| format!("cargo: {error}"))?.success())
 }
 
 fn layers(workspace: &Workspace) -> Result<bool, String> {

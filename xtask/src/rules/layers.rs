@@ -12,7 +12,7 @@ const LAYERS: &[&[&str]] = &[
     &["closed-loop"],
     &["policy-macro", "train", "spice", "diagnose", "verify"],
     &["cli"],
-    &["tests", "bench", "xtask", "firmware"],
+    &["tests", "blind", "bench", "xtask", "firmware"],
 ];
 
 /// No crate of `from` reaches one of `to`, by whatever way.

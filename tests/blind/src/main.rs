@@ -1,0 +1,134 @@
+//! Generates blind cases and scores a diagnosis of them.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use blind::case::{Truth, measure};
+use blind::experiment::Extent;
+use blind::plan::{Plan, plan, plan_of};
+use clap::Parser;
+
+/// Hides effects in data of an independent simulator. See docs/blind.md.
+#[derive(Debug, Parser)]
+#[command(name = "cargo xtask blind")]
+struct Arguments {
+    /// Everything follows from it.
+    #[arg(long)]
+    seed: u64,
+    /// How many.
+    #[arg(long, default_value_t = 48)]
+    cases: usize,
+    /// Folder of the set; cases that are there already are kept.
+    #[arg(long)]
+    out: PathBuf,
+    /// Short records, as in the test command.
+    #[arg(long)]
+    short: bool,
+    /// Do not look for rivals of the truth: twenty times as fast.
+    #[arg(long)]
+    no_rivals: bool,
+    /// Hide these effects in every case instead of drawing them: ids with commas, or "none".
+    #[arg(long)]
+    only: Option<String>,
+    /// Cases at a time.
+    #[arg(long, default_value_t = 2)]
+    jobs: usize,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    match generate(&arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("error: {message}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn planned(arguments: &Arguments, index: usize) -> Result<Plan, String> {
+    let extent = if arguments.short { Extent::Short } else { Extent::Full };
+    match &arguments.only {
+        None => Ok(plan(arguments.seed, index, extent)),
+        Some(text) => {
+            let ids: Vec<&str> = text.split(',').filter(|id| *id != "none").collect();
+            plan_of(arguments.seed, index, &ids, extent).ok_or_else(|| format!("--only {text}: no such effect"))
+        }
+    }
+}
+
+fn generate(arguments: &Arguments) -> Result<(), String> {
+    let cases = arguments.out.join("cases");
+    create(&cases)?;
+    println!(
+        "seed {}, {} cases in {}",
+        arguments.seed,
+        arguments.cases,
+        cases.display()
+    );
+    let (next, done, failed) = (AtomicUsize::new(0), AtomicUsize::new(0), Mutex::new(Vec::new()));
+    let work = || {
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            if index >= arguments.cases {
+                return;
+            }
+            let started = Instant::now();
+            let outcome = case(arguments, &cases, index);
+            let count = done.fetch_add(1, Ordering::Relaxed) + 1;
+            let seconds = started.elapsed().as_secs_f64();
+            match outcome {
+                Ok(line) => println!("[{count}/{}] case_{index:03} {line} ({seconds:.1} s)", arguments.cases),
+                Err(message) => {
+                    eprintln!("[{count}/{}] case_{index:03} failed: {message}", arguments.cases);
+                    if let Ok(mut failed) = failed.lock() {
+                        failed.push(index);
+                    }
+                }
+            }
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..arguments.jobs.max(1) {
+            scope.spawn(work);
+        }
+    });
+    let failed = failed.into_inner().unwrap_or_default();
+    match failed.is_empty() {
+        true => Ok(()),
+        false => Err(format!("{} cases failed: {failed:?}", failed.len())),
+    }
+}
+
+/// Measures a case unless it is there; what is hidden is not printed.
+fn case(arguments: &Arguments, cases: &Path, index: usize) -> Result<String, String> {
+    let folder = cases.join(format!("case_{index:03}"));
+    let plan = planned(arguments, index)?;
+    if let Ok(text) = std::fs::read_to_string(folder.join("truth.json")) {
+        let truth: Truth = serde_json::from_str(&text).map_err(|error| format!("{}: {error}", folder.display()))?;
+        let hidden: Vec<&str> = truth.effects.iter().map(|hidden| hidden.id.as_str()).collect();
+        let wanted: Vec<&str> = plan.effects.iter().map(|effect| effect.id).collect();
+        return match truth.seed == arguments.seed && hidden == wanted {
+            true => Ok("is there".to_owned()),
+            false => Err(format!("{} is a case of another set", folder.display())),
+        };
+    }
+    let measured = measure(&plan, !arguments.no_rivals)?;
+    // an interrupted run leaves no half case behind
+    let draft = cases.join(format!(".case_{index:03}"));
+    let _ = std::fs::remove_dir_all(&draft);
+    for (path, text) in &measured.files {
+        let path = draft.join(path);
+        create(path.parent().unwrap_or(&draft))?;
+        std::fs::write(&path, text).map_err(|error| format!("{}: {error}", path.display()))?;
+    }
+    std::fs::rename(&draft, &folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    Ok("measured".to_owned())
+}
+
+fn create(folder: &Path) -> Result<(), String> {
+    std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))
+}

@@ -2,7 +2,7 @@
 
 /// The integer sums of one block: `LDM` for the weights, `SMLAD` for two products at a time.
 ///
-/// Operands: sums `s0..`, pointers `w` and `in`, the counter `turns`, temporaries `x01` and, for 8-bit weights, `x23` and
+/// Operands: sums `s0..`, pointers `w` and `input`, the counter `turns`, temporaries `x01` and, for 8-bit weights, `x23` and
 /// `even`; weights go through the fixed `registers`, which `LDM` needs in ascending order.
 pub struct Kernel {
     /// 8-bit weights, four inputs a group, instead of 16-bit ones, two inputs a group.
@@ -41,7 +41,7 @@ impl Kernel {
 
     /// Lines, with `operand` giving the text of a named operand.
     pub fn text(&self, operand: &dyn Fn(&str) -> String) -> Vec<String> {
-        let (w, input, turns) = (operand("w"), operand("in"), operand("turns"));
+        let (w, input, turns) = (operand("w"), operand("input"), operand("turns"));
         let (x01, x23, even) = (operand("x01"), operand("x23"), operand("even"));
         let mut lines = vec!["2:".to_owned()];
         for _ in 0..self.unrolled() {

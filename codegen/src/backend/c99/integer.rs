@@ -190,7 +190,8 @@ fn assembly(network: &IntegerNetwork, layer: &IntegerLayer, height: usize) -> Ve
     let text = kernel.text(&operand);
     lines.extend(text.iter().map(|line| format!("    \"{line}\\n\\t\"")));
     let mut outputs: Vec<String> = (0..height).map(|row| format!("[s{row}] \"+r\"(s{row})")).collect();
-    outputs.extend(["w", "in", "turns"].map(|name| format!("[{name}] \"+r\"({name})")));
+    let pointers = [("w", "w"), ("input", "in"), ("turns", "turns")];
+    outputs.extend(pointers.map(|(name, variable)| format!("[{name}] \"+r\"({variable})")));
     let temporaries: &[&str] = if kernel.is_quad {
         &["x01", "x23", "even"]
     } else {

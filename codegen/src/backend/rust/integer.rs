@@ -5,6 +5,7 @@ use quote::quote;
 
 use super::network::calls;
 use super::{float, ident, size, word};
+use crate::backend::assembly::Kernel;
 use crate::program::{ActivationCode, IntegerLayer, IntegerNetwork};
 
 /// Tables, layers and `network`.
@@ -32,6 +33,7 @@ pub fn items(network: &IntegerNetwork) -> TokenStream {
         None => quote!(0),
     });
     let calls = calls(network.layers.len(), quote!(&input));
+    let kernels = kernels(network);
     let padded = size(padded);
     let doc = format!(
         " Sums of one block of outputs, within +-{} for every input.",
@@ -65,8 +67,12 @@ pub fn items(network: &IntegerNetwork) -> TokenStream {
             let mask = 0_u32.wrapping_sub(flag) as i32;
             (then & mask) | (otherwise & !mask)
         }
+        /// Aligned to words, as the loops in assembly load them.
+        #[repr(align(4))]
+        struct Words<T>(T);
         #[doc = #doc]
         #[inline(always)]
+        #[allow(dead_code)]
         fn block<const GROUPS: usize, const ROWS: usize>(
             weights: &[[[#weight; #lanes]; ROWS]; GROUPS],
             bias: &[i32; ROWS],
@@ -82,11 +88,13 @@ pub fn items(network: &IntegerNetwork) -> TokenStream {
             }
             sums
         }
+        #kernels
         #(#layers)*
         /// Outputs as integers.
         fn network(observation: &[f32; FEATURES]) -> [i32; ACTIONS] {
-            let input: [i16; #padded] = [#(#quantised),*];
-            #calls
+            let input: Words<[i16; #padded]> = Words([#(#quantised),*]);
+            let output = { #calls };
+            output.0
         }
     }
 }
@@ -103,7 +111,7 @@ pub fn integrity(network: &IntegerNetwork) -> TokenStream {
         let names = blocks(index, layer);
         let weights = names.iter().map(|(weights, ..)| {
             quote! {
-                for weight in core::hint::black_box(&#weights).iter().flatten().flatten().flatten() {
+                for weight in core::hint::black_box(&#weights.0).iter().flatten().flatten().flatten() {
                     crc = crc_word(crc, i32::from(*weight) as u32);
                 }
             }
@@ -163,14 +171,15 @@ fn layer_items(network: &IntegerNetwork, index: usize, layer: &IntegerLayer) -> 
         let (kind, lanes) = (weight(network), size(lanes));
         let (count, rows, groups) = (size((last - first) / height), size(*height), size(groups));
         let activated = activated(layer, is_last);
+        let sums = kernel_name(index, *height);
         tables.push(quote! {
-            static #weights: [[[[#kind; #lanes]; #rows]; #groups]; #count] = [#(#parts),*];
+            static #weights: Words<[[[[#kind; #lanes]; #rows]; #groups]; #count]> = Words([#(#parts),*]);
             static #bias: [[i32; #rows]; #count] = [#(#biases),*];
         });
         loops.push(quote! {
-            for (weights, bias) in #weights.iter().zip(&#bias) {
+            for (weights, bias) in #weights.0.iter().zip(&#bias) {
                 if let Some((out, after)) = core::mem::take(&mut rest).split_first_chunk_mut::<#rows>() {
-                    for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+                    for (y, sum) in out.iter_mut().zip(kernels::#sums(weights, bias, &x.0)) {
                         *y = #activated;
                     }
                     rest = after;
@@ -194,11 +203,88 @@ fn layer_items(network: &IntegerNetwork, index: usize, layer: &IntegerLayer) -> 
         #(#tables)*
         #[doc = #doc]
         #[inline(always)]
-        fn #name(x: &[i16; #inputs]) -> [#kind; #length] {
-            let mut y = [0; #length];
-            let mut rest: &mut [#kind] = &mut y;
+        fn #name(x: &Words<[i16; #inputs]>) -> Words<[#kind; #length]> {
+            let mut y = Words([0; #length]);
+            let mut rest: &mut [#kind] = &mut y.0;
             #(#loops)*
             y
+        }
+    }
+}
+
+fn kernel_name(index: usize, height: usize) -> proc_macro2::Ident {
+    ident(&format!("sums{index}_{height}"))
+}
+
+/// Sums of a block, per layer and height: in assembly on ARM cores with `SMLAD` if the build asks for it.
+fn kernels(network: &IntegerNetwork) -> TokenStream {
+    let functions = network.layers.iter().enumerate().flat_map(|(index, layer)| {
+        let heights = blocks(index, layer).into_iter().map(|(_, _, _, height)| height);
+        heights
+            .map(|height| kernel(network, index, layer, height))
+            .collect::<Vec<_>>()
+    });
+    quote! {
+        /// `--cfg policyc_assembly` takes the loops in assembly (Armv7E-M and Armv8-M with DSP); the bits are the same.
+        #[allow(unexpected_cfgs)]
+        mod kernels { #(#functions)* }
+    }
+}
+
+fn kernel(network: &IntegerNetwork, index: usize, layer: &IntegerLayer, height: usize) -> TokenStream {
+    let name = kernel_name(index, height);
+    let kernel = Kernel {
+        is_quad: network.weight_bytes == 1,
+        groups: network.groups(layer.inputs),
+        height,
+        registers: ["r2", "r3", "r4", "r5"],
+    };
+    let text = kernel.text(&|operand| format!("{{{operand}}}"));
+    // braces of a register list are doubled: single ones are operands
+    let text = text.iter().map(|line| match line.split_once(", {r") {
+        Some((head, registers)) => format!("{head}, {{{{r{registers}}}"),
+        None => line.clone(),
+    });
+    let sums: Vec<_> = (0..height).map(|row| ident(&format!("s{row}"))).collect();
+    let temporaries: &[&str] = if kernel.is_quad {
+        &["x01", "x23", "even"]
+    } else {
+        &["x01"]
+    };
+    let temporaries: Vec<_> = temporaries.iter().map(|name| ident(name)).collect();
+    let overwritten = kernel.clobbered();
+    // with one turn there is no loop and no counter
+    let counter = (kernel.turns() > 1).then(|| {
+        let turns = size(kernel.turns());
+        quote!(turns = inout(reg) #turns as u32 => _,)
+    });
+    let (kind, lanes, rows) = (weight(network), size(network.lanes.len()), size(height));
+    let (groups, inputs) = (size(kernel.groups), size(network.padded(layer.inputs)));
+    let (weights, x) = (quote!(&[[[#kind; #lanes]; #rows]; #groups]), quote!(&[i16; #inputs]));
+    quote! {
+        #[cfg(all(target_arch = "arm", policyc_assembly))]
+        #[inline(always)]
+        pub fn #name(weights: #weights, bias: &[i32; #rows], x: #x) -> [i32; #rows] {
+            let [#(mut #sums),*] = *bias;
+            // SAFETY: reads all of `weights` and of `x`, which are aligned to words, and writes registers only
+            unsafe {
+                core::arch::asm!(
+                    #(#text,)*
+                    #(#sums = inout(reg) #sums,)*
+                    w = inout(reg) weights.as_ptr() => _,
+                    input = inout(reg) x.as_ptr() => _,
+                    #counter
+                    #(#temporaries = out(reg) _,)*
+                    #(out(#overwritten) _,)*
+                    options(nostack, readonly)
+                );
+            }
+            [#(#sums),*]
+        }
+        #[cfg(not(all(target_arch = "arm", policyc_assembly)))]
+        #[inline(always)]
+        pub fn #name(weights: #weights, bias: &[i32; #rows], x: #x) -> [i32; #rows] {
+            super::block(weights, bias, x)
         }
     }
 }

@@ -52,6 +52,8 @@ pub struct LayerView {
     pub in_memory: bool,
     /// Whether a block is repeated.
     pub has_loop: bool,
+    /// Whether every block has a form in assembly.
+    pub has_assembly: bool,
     /// Sum after the first input.
     pub first: String,
     /// Sum after each further input.
@@ -77,6 +79,8 @@ pub struct BlockView {
     pub first_output: usize,
     /// First table element of the first block.
     pub first_weight: usize,
+    /// The whole block in assembly; empty if there is none.
+    pub assembly: Vec<String>,
     /// One entry per output of the block.
     pub row_views: Vec<RealRowView>,
 }
@@ -350,6 +354,8 @@ pub struct Helpers {
     pub tanh: bool,
     /// `fma`
     pub fused: bool,
+    /// Loops in assembly
+    pub assembly: bool,
 }
 
 /// Numbers of the self test.

@@ -368,6 +368,10 @@ fn helpers(program: &Program) -> Helpers {
         relu: real && network.activates(|activation| activation == ActivationCode::Relu),
         leaky_relu: real && network.activates(|activation| matches!(activation, ActivationCode::LeakyRelu(_))),
         tanh: network.activates(|activation| activation == ActivationCode::Tanh),
+        assembly: match network {
+            NetworkCode::Real { fused, layers } => layers.iter().any(|layer| tables::has_assembly(layer, *fused)),
+            NetworkCode::Integer(_) => false,
+        },
         fused: matches!(network, NetworkCode::Real { fused: true, .. }),
     }
 }

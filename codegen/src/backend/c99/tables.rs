@@ -4,6 +4,7 @@ use templates::c::{BlockView, CrcItem, CrcKind, LayerView, Member, RealRowView, 
 
 use super::integer;
 use super::statements::{float, unsigned};
+use crate::backend::assembly::RealKernel;
 use crate::crc::nibble_table;
 use crate::lower::known_answers::{LCG, SEED, UNIT, VECTORS};
 use crate::lower::network::{TANH_DENOMINATOR, TANH_NUMERATOR};
@@ -98,6 +99,7 @@ pub fn layers(name: &str, layers: &[LayerCode], fused: bool) -> Vec<LayerView> {
         outputs: layer.outputs,
         in_memory: layer.in_memory,
         has_loop: layer.full_blocks() > 1,
+        has_assembly: has_assembly(layer, fused),
         blocks: blocks(name, layer, fused),
         first: accumulated(name, fused, ["bias[o]", "w[o]", "x[0]"]),
         next: accumulated(name, fused, ["sum[o]", "column[o]", "input"]),
@@ -129,6 +131,11 @@ fn blocks(name: &str, layer: &LayerCode, fused: bool) -> Vec<BlockView> {
         rows,
         first_output,
         first_weight: first_output * layer.inputs,
+        assembly: if has_assembly(layer, fused) {
+            assembly(name, layer, rows)
+        } else {
+            Vec::new()
+        },
         row_views: (0..rows).map(|index| row(name, layer, index, fused)).collect(),
     };
     let tail = layer.tail_rows();
@@ -137,6 +144,52 @@ fn blocks(name: &str, layer: &LayerCode, fused: bool) -> Vec<BlockView> {
         views.push(block(1, tail, full * rows));
     }
     views
+}
+
+/// Whether the blocks of a layer have a form in assembly.
+pub fn has_assembly(layer: &LayerCode, fused: bool) -> bool {
+    !fused && !layer.in_memory && layer.block_rows <= RealKernel::MAX_HEIGHT
+}
+
+/// One asm statement for a block, then what it leaves of the activation.
+fn assembly(name: &str, layer: &LayerCode, height: usize) -> Vec<String> {
+    let kernel = RealKernel {
+        inputs: layer.inputs,
+        height,
+        relu: layer.activation == ActivationCode::Relu,
+    };
+    let activated = |row: usize| activation(name, layer.activation, &format!("done[{row}]"));
+    let applied = !kernel.relu && !activated(0).is_empty();
+    let mut lines = vec![
+        "const float *input = x;".to_owned(),
+        format!("uint32_t turns = {}u;", kernel.turns()),
+    ];
+    if kernel.relu {
+        lines.push("uint32_t low, high;".to_owned());
+    }
+    if applied {
+        lines.push("float *const done = out;".to_owned());
+    }
+    lines.push("__asm__ volatile(".to_owned());
+    let text = kernel.text(&|operand| format!("%[{operand}]"), &|list| format!("{{{list}}}"));
+    lines.extend(text.iter().map(|line| format!("    \"{line}\\n\\t\"")));
+    let advanced = ["w", "input", "bias", "out", "turns"].map(|name| format!("[{name}] \"+r\"({name})"));
+    let mut outputs = advanced.to_vec();
+    if kernel.relu {
+        outputs.extend(["low", "high"].map(|name| format!("[{name}] \"=&r\"({name})")));
+    }
+    lines.push(format!("    : {}", outputs.join(", ")));
+    lines.push("    :".to_owned());
+    let clobbered = RealKernel::clobbered().into_iter().map(|name| format!("\"{name}\""));
+    let clobbered: Vec<String> = clobbered.collect();
+    lines.push(format!("    : {}, \"cc\", \"memory\");", clobbered.join(", ")));
+    if applied {
+        lines.extend((0..height).map(|row| format!("done[{row}] = {};", activated(row))));
+    }
+    std::iter::once("{".to_owned())
+        .chain(lines.into_iter().map(|line| format!("    {line}")))
+        .chain(["}".to_owned()])
+        .collect()
 }
 
 fn row(name: &str, layer: &LayerCode, index: usize, fused: bool) -> RealRowView {

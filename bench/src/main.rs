@@ -49,7 +49,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// What the bench counts of a policy: format, row block of C and Rust in binary32, switches of the assembly loops.
+/// What the bench counts of a policy: format, and whether the loops in assembly are asked for.
 const VARIANTS: [(NumericFormat, bool); 7] = [
     (NumericFormat::F32, false),
     (NumericFormat::F32, true),

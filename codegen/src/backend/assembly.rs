@@ -81,8 +81,9 @@ impl Kernel {
 /// The binary32 sums of one block: `VLDM`, then products and sums apart, so every operation is rounded as the contract
 /// says. Cheaper than `VFMA` on a Cortex-M4, where that takes three cycles.
 ///
-/// Operands: pointers `w`, `input`, `bias`, `out` and the counter `turns`, all advanced; `r0`-like pair `low`, `high` for the
+/// Operands: pointers `w`, `input`, `bias`, `out` and the counter `turns`, all advanced; `low` and `high` for the
 /// rectified outputs; registers s0 to s27 are overwritten.
+#[cfg(feature = "c")]
 pub struct RealKernel {
     /// Inputs.
     pub inputs: usize,
@@ -92,6 +93,7 @@ pub struct RealKernel {
     pub relu: bool,
 }
 
+#[cfg(feature = "c")]
 impl RealKernel {
     /// Most outputs whose sums fit beside the weights in flight.
     pub const MAX_HEIGHT: usize = 16;

@@ -20,6 +20,7 @@ usage: cargo xtask <command>
   install                           only the tools: compilers, valgrind
   bless                             rewrite the golden files from what the code produces now
   layers                            only the layer rules
+  bench [--json]                    instruction counts and times of the generated network (docs/kernels.md)
   blind --seed S --out DIR ...      blind cases for the diagnosis and their score (docs/blind.md; --help)
 ";
 
@@ -30,6 +31,7 @@ enum Command {
     Bless,
     Layers,
     Blind(Vec<String>),
+    Bench(Vec<String>),
     Help,
 }
 
@@ -59,6 +61,7 @@ fn parse(arguments: &[String]) -> Result<Command, String> {
     let command = match name.as_str() {
         "test" => return parse_test(rest),
         "blind" => return Ok(Command::Blind(rest.to_vec())),
+        "bench" => return Ok(Command::Bench(rest.to_vec())),
         "install" => Command::Install,
         "bless" => Command::Bless,
         "layers" => Command::Layers,
@@ -98,7 +101,8 @@ fn run(command: Command) -> Result<bool, String> {
         Command::Test(options) => Ok(steps::run_all(&Workspace::load()?, options)),
         Command::Bless => bless(&Workspace::load()?),
         Command::Layers => layers(&Workspace::load()?),
-        Command::Blind(arguments) => blind(&Workspace::load()?, &arguments),
+        Command::Blind(arguments) => other_crate(&Workspace::load()?, "blind", &arguments),
+        Command::Bench(arguments) => other_crate(&Workspace::load()?, "bench", &arguments),
     }
 }
 
@@ -110,8 +114,8 @@ fn bless(workspace: &Workspace) -> Result<bool, String> {
     Ok(true)
 }
 
-fn blind(workspace: &Workspace, arguments: &[String]) -> Result<bool, String> {
-    let mut command = workspace.cargo(&["run", "--release", "--quiet", "-p", "blind", "--"]);
+fn other_crate(workspace: &Workspace, name: &str, arguments: &[String]) -> Result<bool, String> {
+    let mut command = workspace.cargo(&["run", "--release", "--quiet", "-p", name, "--"]);
     // no limit of time: a large set takes an hour
     let status = command.args(arguments).status();
     Ok(status.map_err(|error| format!("cargo: {error}"))?.success())

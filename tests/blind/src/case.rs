@@ -51,6 +51,8 @@ pub struct Hidden {
     pub id: String,
     /// On the list of causes.
     pub listed: bool,
+    /// Squared distance of the training records from those without this effect, in units of the noise.
+    pub chi2: f64,
     /// Hidden values by name.
     pub parameters: BTreeMap<String, Value>,
 }
@@ -148,11 +150,20 @@ pub fn measure(plan: &Plan, with_rivals: bool) -> Result<Case, String> {
         chi2_listed,
         sets,
     } = rivals::explanations(&mut runs, &training, with_rivals)?;
+    let mut effects = Vec::new();
+    for effect in &plan.effects {
+        let mut without = plan.bench.clone();
+        for parameter in effect.parameters {
+            parameter.set(&mut without, parameter.get(&nominal));
+        }
+        let chi2 = rivals::distance(&mut runs, &training, &without)?;
+        effects.push(hidden(effect, plan, chi2));
+    }
     let truth = Truth {
         seed: plan.seed,
         case: plan.index,
         kind: plan.kind,
-        effects: plan.effects.iter().map(|effect| hidden(effect, plan)).collect(),
+        effects,
         chi2: rounded(chi2),
         chi2_listed: rounded(chi2_listed),
         explanations: sets,
@@ -168,7 +179,7 @@ pub(crate) fn recorded(plan: &Plan, column: usize) -> bool {
     COLUMNS[column] != "v_in" || plan.has_v_in
 }
 
-fn hidden(effect: &crate::effects::Effect, plan: &Plan) -> Hidden {
+fn hidden(effect: &crate::effects::Effect, plan: &Plan, chi2: f64) -> Hidden {
     let value = |parameter: &crate::effects::Parameter| {
         let value = Value {
             value: parameter.get(&plan.bench),
@@ -180,6 +191,7 @@ fn hidden(effect: &crate::effects::Effect, plan: &Plan) -> Hidden {
     Hidden {
         id: effect.id.to_owned(),
         listed: effect.listed,
+        chi2: rounded(chi2),
         parameters: effect.parameters.iter().map(value).collect(),
     }
 }

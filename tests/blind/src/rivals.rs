@@ -89,6 +89,21 @@ pub(crate) fn explanations(
     })
 }
 
+/// Squared distance of the hidden records from those of another bench.
+pub(crate) fn distance(
+    runs: &mut Runs<'_>,
+    training: &[(&Record, Samples, Samples)],
+    other: &Bench,
+) -> Result<f64, String> {
+    let mut squares = 0.0;
+    for (record, hidden, _) in training {
+        let samples = runs.exact(other, record)?;
+        let apart = scaled(runs.plan, std::iter::once((hidden, &samples)));
+        squares += dot(&apart, &apart);
+    }
+    Ok(squares)
+}
+
 /// Smallest sets of one or two candidates that leave less than `limit`, and the least that is left.
 fn explained(candidates: &[Candidate], difference: &[f64], limit: f64) -> (f64, Vec<Vec<String>>) {
     let mut least = f64::INFINITY;

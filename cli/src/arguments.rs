@@ -27,10 +27,15 @@ pub enum Command {
     Compile(Compile),
     /// Compile the generated code and compare it with the interpreter, bit by bit
     Verify(Verify),
+    /// Close a policy's loop on a simulated converter: load steps, classical controllers and the limit beside it
+    Simulate(Simulate),
     /// Train a policy on a simulated converter and write its folder
     Train(Train),
     /// Inspect, compile and verify the built-in example
     Demo(Demo),
+    /// Duty ratio mapping: acquire settled points, fit drm.toml, judge it
+    #[command(subcommand)]
+    Drm(crate::commands::drm::Drm),
 }
 
 #[derive(Debug, Args)]
@@ -102,6 +107,39 @@ pub struct Verify {
     /// Machine-readable
     #[arg(long)]
     pub json: bool,
+}
+
+/// What runs the policy in a closed loop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ControllerKind {
+    /// The reference interpreter
+    Interpreter,
+    /// The generated Rust, built with rustc
+    Rust,
+    /// The generated C, built with gcc or clang
+    C,
+}
+
+#[derive(Debug, Args)]
+pub struct Simulate {
+    /// Scenario file: plant, load steps, instants, classical controllers
+    pub scenario: PathBuf,
+    /// policy.toml or the folder that holds it
+    #[arg(long, value_name = "POLICY")]
+    pub policy: PathBuf,
+    /// Plant file in the place of the scenario's
+    #[arg(long, value_name = "PLANT")]
+    pub plant: Option<PathBuf>,
+    /// Folder for metrics, trajectories and pictures; made if missing
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// What runs the policy
+    #[arg(long, value_enum, default_value = "interpreter")]
+    pub controller: ControllerKind,
+    /// Also close the loop with the interpreter, the generated Rust and the generated C, and compare all trajectories
+    /// bit by bit
+    #[arg(long)]
+    pub check: bool,
 }
 
 #[derive(Debug, Args)]

@@ -60,6 +60,14 @@ pub fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
             path.display()
         )));
     }
+    write_one(path, text)
+}
+
+/// Writes one file; an older one is replaced.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn write_one(path: &Path, text: &str) -> Result<(), Failure> {
     let folder = path
         .parent()
         .filter(|folder| !folder.as_os_str().is_empty())
@@ -68,6 +76,30 @@ pub fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
         return Err(Failure(format!("{} is not a file name", path.display())));
     };
     write_texts(folder, &BTreeMap::from([(name.to_owned(), text.to_owned())]))
+}
+
+/// Refuses a folder that holds something: results of two runs are not mixed, and none are lost.
+///
+/// # Errors
+/// If it is there and not empty, or cannot be read.
+pub fn check_new_folder(folder: &Path) -> Result<(), Failure> {
+    let entries = match fs::read_dir(folder) {
+        Ok(entries) => entries,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+        Err(error) => return Err(cannot("read", folder, &error)),
+    };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if !name.starts_with(TEMPORARY) {
+            return Err(Failure(format!(
+                "{} is not empty; nothing written\n   = found: {}\n   = hint: choose another --out, or move it away",
+                folder.display(),
+                name.escape_debug()
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// Prints a line or more on standard output. A reader that has seen enough (`policyc inspect policy | head -1`) is no fault.

@@ -1,4 +1,4 @@
-//! What can stand at the controller's place, and its run over all instants of a load step.
+//! What can stand at the controller's place, and its run over a load step.
 
 use interp::Sample as Word;
 use plant::{Sample, Signals};
@@ -9,7 +9,7 @@ use crate::baselines::Baseline;
 use crate::environment::Environment;
 use crate::faults::Error;
 use crate::load_step::LoadStep;
-use crate::scenario::{Finding, Instant, Metrics, Record, Task, load_step};
+use crate::scenario::{Instant, Metrics, Record, Task, load_step};
 
 /// What a controller answers to a measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,7 +88,7 @@ impl Controller for Classical {
 /// What is asked of a controller that runs elsewhere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Call<'a> {
-    /// Start anew; the answer does not count.
+    /// Start anew; there is nothing to answer.
     Restart,
     /// One control period with the contract's samples.
     Step(&'a [Word]),
@@ -100,7 +100,7 @@ pub struct External<F> {
     ask: F,
 }
 
-impl<F: FnMut(Call<'_>) -> Result<Answer, String>> External<F> {
+impl<F: FnMut(Call<'_>) -> Result<Option<Answer>, String>> External<F> {
     /// `ask` passes on calls; it fails with a text for the user.
     ///
     /// # Errors
@@ -113,14 +113,15 @@ impl<F: FnMut(Call<'_>) -> Result<Answer, String>> External<F> {
     }
 }
 
-impl<F: FnMut(Call<'_>) -> Result<Answer, String>> Controller for External<F> {
+impl<F: FnMut(Call<'_>) -> Result<Option<Answer>, String>> Controller for External<F> {
     fn restart(&mut self) -> Result<(), Error> {
         (self.ask)(Call::Restart).map(|_| ()).map_err(Error::Mismatch)
     }
 
     fn step(&mut self, measured: &Signals) -> Result<Answer, Error> {
         let samples = self.inputs.samples(measured);
-        (self.ask)(Call::Step(samples)).map_err(Error::Mismatch)
+        let answer = (self.ask)(Call::Step(samples)).map_err(Error::Mismatch)?;
+        answer.ok_or_else(|| Error::Mismatch("a control step was not answered".to_owned()))
     }
 }
 
@@ -178,52 +179,46 @@ impl Trajectory {
     }
 }
 
-/// A load step over all instants of a task, every one from a fresh start of plant and controller. The finding is that of
-/// [`crate::scenario::survey`].
+/// A load step at one instant, from a fresh start of plant and controller.
 ///
 /// # Errors
 /// If plant or controller cannot be started, or the controller does not answer.
-pub fn examine<E: Environment>(
+pub fn follow<E: Environment>(
     environment: &E,
     controller: &mut dyn Controller,
     v_ref: f64,
     task: &Task,
     step: LoadStep,
-) -> Result<(Finding, Vec<Trajectory>), Error> {
-    let mut finding = Finding {
-        kind: step.kind,
-        load_step: step.values,
-        at_sample: Metrics::default(),
-        worst: Metrics::default(),
-    };
-    let mut trajectories = Vec::new();
-    for instant in task.all_instants() {
-        controller.restart()?;
-        let (mut answers, mut failure) = (Vec::new(), None);
-        let ask = |sample: &Sample| match controller.step(&sample.measured) {
-            Ok(answer) => {
-                answers.push(answer);
-                answer.duty
-            }
-            Err(error) => {
-                failure.get_or_insert(error);
-                f64::NAN
-            }
+    instant: Instant,
+) -> Result<Trajectory, Error> {
+    controller.restart()?;
+    let (mut answers, mut failure) = (Vec::new(), None);
+    let ask = |sample: &Sample| {
+        let blank = Answer {
+            duty: f64::NAN,
+            action: None,
+            status: 0,
         };
-        let (metrics, records) = load_step(environment.clone(), ask, v_ref, task, step, instant)?;
-        if let Some(error) = failure {
-            return Err(error);
-        }
-        finding.worst = finding.worst.worst(metrics);
-        if instant.phase == 0.0 {
-            finding.at_sample = finding.at_sample.worst(metrics);
-        }
-        let periods = records.into_iter().zip(answers);
-        trajectories.push(Trajectory {
-            instant,
-            metrics,
-            periods: periods.map(|(record, answer)| Period { record, answer }).collect(),
-        });
+        // the run goes to its end, but a controller that has failed is not asked again
+        let answer = if failure.is_some() {
+            blank
+        } else {
+            controller.step(&sample.measured).unwrap_or_else(|error| {
+                failure = Some(error);
+                blank
+            })
+        };
+        answers.push(answer);
+        answer.duty
+    };
+    let (metrics, records) = load_step(environment.clone(), ask, v_ref, task, step, instant)?;
+    if let Some(error) = failure {
+        return Err(error);
     }
-    Ok((finding, trajectories))
+    let periods = records.into_iter().zip(answers);
+    Ok(Trajectory {
+        instant,
+        metrics,
+        periods: periods.map(|(record, answer)| Period { record, answer }).collect(),
+    })
 }

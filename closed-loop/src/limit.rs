@@ -9,6 +9,7 @@
 //! bleed, and the delay of the duty. Everything else a plant file may have is left out.
 
 use plant::{Load, Model, Parameters, Plant, Sample};
+use serde::Serialize;
 
 use crate::faults::Error;
 use crate::load_step::LoadStep;
@@ -16,7 +17,7 @@ use crate::scenario::SETTLED;
 use crate::time_optimal::{Target, TimeOptimal};
 
 /// The smallest figures that can be reached; each may need another sequence of duties.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Bound {
     /// Largest |e| at the sampling instants after the step, V.
     pub deviation: f64,
@@ -27,7 +28,7 @@ pub struct Bound {
 }
 
 /// The limits of one load step.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Limit {
     /// Load step at a sampling instant, which shows it.
     pub at_sample: Bound,
@@ -272,6 +273,16 @@ impl Run {
         }
         self.at_rest = if error < 1e-6 * self.v_ref { self.at_rest + 1 } else { 0 };
     }
+}
+
+/// Keys of the plant's numbers that are not neutral but have no part in the limit.
+#[must_use]
+pub fn left_out(parameters: &Parameters) -> Vec<&'static str> {
+    let plain = plain(parameters);
+    plant::parameters()
+        .filter(|parameter| parameter.get(parameters) != parameter.get(&plain))
+        .map(|parameter| parameter.key)
+        .collect()
 }
 
 /// The circuit without what the limit leaves out.

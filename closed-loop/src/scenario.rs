@@ -6,6 +6,7 @@
 //! and a fraction later than the one before, and the worst counts.
 
 use plant::{Load, Sample};
+use serde::Serialize;
 
 use crate::environment::{Environment, LoadPath, Start};
 use crate::faults::Error;
@@ -49,7 +50,7 @@ impl Default for Task {
 }
 
 /// What is measured on one load step.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Metrics {
     /// Largest |e| after the step, V.
     pub deviation: f64,
@@ -91,6 +92,27 @@ pub struct Finding {
     pub at_sample: Metrics,
     /// The worst of all instants, figure by figure.
     pub worst: Metrics,
+}
+
+impl Finding {
+    /// Of a load step that has not been run yet.
+    #[must_use]
+    pub fn new(step: LoadStep) -> Self {
+        Self {
+            kind: step.kind,
+            load_step: step.values,
+            at_sample: Metrics::default(),
+            worst: Metrics::default(),
+        }
+    }
+
+    /// Takes in one instant.
+    pub fn add(&mut self, instant: Instant, metrics: Metrics) {
+        self.worst = self.worst.worst(metrics);
+        if instant.phase == 0.0 {
+            self.at_sample = self.at_sample.worst(metrics);
+        }
+    }
 }
 
 /// One control period of a recorded run.
@@ -309,22 +331,14 @@ where
     let [from, to] = step.loads();
     let mut run = Loop::start(environment.clone(), controller.clone(), v_ref, from)?;
     run.lead(task.lead - 1, task.tail, quiet);
-    let mut finding = Finding {
-        kind: step.kind,
-        load_step: step.values,
-        at_sample: Metrics::default(),
-        worst: Metrics::default(),
-    };
+    let mut finding = Finding::new(step);
     let last = instants.iter().map(|instant| instant.periods).max().unwrap_or(0);
     for period in 0..=last {
         for instant in instants.iter().filter(|instant| instant.periods == period) {
             let mut run = run.clone();
             run.last_before(to, instant.phase, task.tail, quiet);
             let metrics = run.measure(to, instant.phase, task.after, task.tail, quiet);
-            finding.worst = finding.worst.worst(metrics);
-            if instant.phase == 0.0 {
-                finding.at_sample = finding.at_sample.worst(metrics);
-            }
+            finding.add(*instant, metrics);
         }
         run.lead(1, task.tail, quiet);
     }

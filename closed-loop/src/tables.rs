@@ -2,8 +2,10 @@
 
 use std::fmt::Write;
 
-use crate::load_step::LoadStep;
-use crate::scenario::{Finding, Metrics};
+use crate::controller::Trajectory;
+use crate::limit::Limit;
+use crate::load_step::{LoadKind, LoadStep};
+use crate::scenario::{Finding, Metrics, SETTLED};
 
 /// The columns of [`Metrics`] in a CSV file.
 const FIGURES: &str = "deviation_V,settling_s,tail_mean_V,tail_max_V,pre_error_V,ripple_V";
@@ -25,38 +27,82 @@ impl Finding {
     }
 }
 
+/// The columns of a table for people, behind the first.
+pub const COLUMNS: [&str; 6] = [
+    "deviation V",
+    "settling ms",
+    "tail max V",
+    "tail mean V",
+    "before V",
+    "ripple V",
+];
+
 /// Findings as a table for people: worst sampling instant / worst of all instants.
 #[must_use]
 pub fn table(findings: &[Finding]) -> String {
-    let header = [
-        "load step",
-        "deviation V",
-        "settling ms",
-        "tail max V",
-        "tail mean V",
-        "before V",
-        "ripple V",
-    ];
-    let mut out = line(&header.map(str::to_owned));
+    let mut out = line("load step", &COLUMNS.map(str::to_owned));
     for finding in findings {
-        let (a, b) = (&finding.at_sample, &finding.worst);
-        let pair = |x: f64, y: f64, digits: usize| format!("{x:.digits$} / {y:.digits$}");
-        out.push_str(&line(&[
-            finding.step().to_string(),
-            pair(a.deviation, b.deviation, 2),
-            pair(1e3 * a.settling, 1e3 * b.settling, 2),
-            pair(a.tail_max, b.tail_max, 3),
-            pair(a.tail_mean, b.tail_mean, 3),
-            pair(a.pre_error, b.pre_error, 3),
-            pair(a.ripple, b.ripple, 3),
-        ]));
+        out.push_str(&line(&finding.step().to_string(), &cells(finding)));
     }
     out
 }
 
-fn line(columns: &[String]) -> String {
-    let padded: String = columns.iter().map(|column| format!("{column:<16}")).collect();
-    format!("{}\n", padded.trim_end())
+/// Several controllers on one load step, and its limits, as a table for people: worst sampling instant / worst of all
+/// instants.
+#[must_use]
+pub fn comparison<'a>(
+    step: LoadStep,
+    controllers: impl IntoIterator<Item = (&'a str, &'a Finding)>,
+    limits: impl IntoIterator<Item = (&'a str, &'a Limit)>,
+) -> String {
+    let mut out = line(&step.to_string(), &COLUMNS.map(str::to_owned));
+    for (name, finding) in controllers {
+        out.push_str(&line(name, &cells(finding)));
+    }
+    for (name, limit) in limits {
+        out.push_str(&line(name, &limit_cells(limit)));
+    }
+    out
+}
+
+/// A limit in the first two of [`COLUMNS`].
+#[must_use]
+pub fn limit_cells(limit: &Limit) -> [String; 2] {
+    let (a, b) = (&limit.at_sample, &limit.worst);
+    [
+        pair(a.deviation, b.deviation, 2),
+        pair(1e3 * a.settling, 1e3 * b.settling, 2),
+    ]
+}
+
+/// A finding in [`COLUMNS`]: worst sampling instant / worst of all instants.
+#[must_use]
+pub fn cells(finding: &Finding) -> [String; 6] {
+    let (a, b) = (&finding.at_sample, &finding.worst);
+    [
+        pair(a.deviation, b.deviation, 2),
+        format!("{} / {}", settling(a), settling(b)),
+        pair(a.tail_max, b.tail_max, 3),
+        pair(a.tail_mean, b.tail_mean, 3),
+        pair(a.pre_error, b.pre_error, 3),
+        pair(a.ripple, b.ripple, 3),
+    ]
+}
+
+/// In ms; `>` where the run ended outside of the band.
+fn settling(m: &Metrics) -> String {
+    let unsettled = if m.tail_max > SETTLED { ">" } else { "" };
+    format!("{unsettled}{:.2}", 1e3 * m.settling)
+}
+
+fn pair(x: f64, y: f64, digits: usize) -> String {
+    format!("{x:.digits$} / {y:.digits$}")
+}
+
+fn line(first: &str, columns: &[String]) -> String {
+    let padded = |out: String, column: &String| format!("{out} {column:<15}");
+    let row = columns.iter().fold(format!("{first:<17}"), padded);
+    format!("{}\n", row.trim_end())
 }
 
 /// Findings under constant power as CSV; SI units.
@@ -73,19 +119,43 @@ pub fn evaluation_csv(findings: &[Finding]) -> String {
     out
 }
 
-/// Findings of several controllers as CSV; SI units, the load in the unit of its column.
-#[must_use]
-pub fn metrics_csv<'a>(controllers: impl IntoIterator<Item = (&'a str, &'a [Finding])>) -> String {
-    let mut out = format!("controller,from,to,unit,instants,{FIGURES}\n");
-    for (controller, findings) in controllers {
-        for finding in findings {
-            let ([from, to], unit) = (finding.load_step, finding.kind.unit());
-            for (name, m) in finding.rows() {
-                let _ = writeln!(out, "{controller},{from},{to},{unit},{name},{}", figures(m));
-            }
+/// Findings of several controllers and limits on load steps as CSV: controller, load step, instants, figures in SI units,
+/// the load in the unit of its column. A limit has no tail, error before and ripple.
+#[derive(Debug, Clone)]
+pub struct MetricsCsv(String);
+
+impl Default for MetricsCsv {
+    fn default() -> Self {
+        Self(format!("controller,from,to,unit,instants,{FIGURES}\n"))
+    }
+}
+
+impl MetricsCsv {
+    /// Two rows of a controller.
+    pub fn controller(&mut self, name: &str, finding: &Finding) {
+        for (instants, m) in finding.rows() {
+            self.row(name, finding.step(), instants, &figures(m));
         }
     }
-    out
+
+    /// Two rows of a limit.
+    pub fn limit(&mut self, name: &str, step: LoadStep, limit: &Limit) {
+        for (instants, bound) in [("sample", &limit.at_sample), ("worst", &limit.worst)] {
+            let figures = format!("{},{},,,,", bound.deviation, bound.settling);
+            self.row(name, step, instants, &figures);
+        }
+    }
+
+    fn row(&mut self, name: &str, step: LoadStep, instants: &str, figures: &str) {
+        let ([from, to], unit) = (step.values, step.kind.unit());
+        let _ = writeln!(self.0, "{name},{from},{to},{unit},{instants},{figures}");
+    }
+
+    /// The file.
+    #[must_use]
+    pub fn finish(self) -> String {
+        self.0
+    }
 }
 
 fn figures(m: &Metrics) -> String {
@@ -93,4 +163,37 @@ fn figures(m: &Metrics) -> String {
         "{},{},{},{},{},{}",
         m.deviation, m.settling, m.tail_mean, m.tail_max, m.pre_error, m.ripple
     )
+}
+
+/// A trajectory as CSV: one line per control period, what the controller saw at its start (true signals), the extremes of
+/// the voltage since the sample before, and what it commanded. SI units, time from the load step.
+#[must_use]
+pub fn trajectory_csv(trajectory: &Trajectory, kind: LoadKind) -> String {
+    let mut out = format!(
+        "t_s,load_{},v_out_V,i_l_A,i_out_A,v_in_V,v_min_V,v_max_V,duty,action,status\n",
+        kind.unit()
+    );
+    for period in &trajectory.periods {
+        let (record, sample) = (&period.record, &period.record.sample);
+        let action = period
+            .answer
+            .action
+            .map(|action| action.to_string())
+            .unwrap_or_default();
+        let _ = writeln!(
+            out,
+            "{:.9},{},{},{},{},{},{},{},{},{action},{}",
+            record.time,
+            kind.value(&record.load),
+            sample.v_out,
+            sample.i_l,
+            sample.i_out,
+            sample.v_in,
+            sample.v_min,
+            sample.v_max,
+            record.duty,
+            period.answer.status,
+        );
+    }
+    out
 }

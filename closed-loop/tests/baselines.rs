@@ -4,7 +4,7 @@
 
 use closed_loop::baselines::{Baseline, Kind};
 use closed_loop::scenario::{Finding, Task, survey_all};
-use closed_loop::{Classical, Converter, LoadKind, LoadStep, examine};
+use closed_loop::{Classical, Converter, LoadKind, LoadStep, Trajectory, follow};
 use plant::{Parameters, Sample};
 
 fn task() -> Task {
@@ -20,6 +20,20 @@ fn findings(kind: Kind, parameters: &Parameters) -> Vec<Finding> {
     let controller = move |sample: &Sample| baseline.step(sample);
     let environment = Converter::new(parameters).unwrap();
     survey_all(&environment, &controller, 100.0, &task, &task.all_instants()).unwrap()
+}
+
+/// Every instant from a fresh start.
+fn examine(kind: Kind, parameters: &Parameters, step: LoadStep) -> (Finding, Vec<Trajectory>) {
+    let environment = Converter::new(parameters).unwrap();
+    let mut controller = Classical::from(Baseline::new(kind, parameters, 100.0).unwrap());
+    let (task, mut finding) = (task(), Finding::new(step));
+    let run = |instant| {
+        let trajectory = follow(&environment, &mut controller, 100.0, &task, step, instant).unwrap();
+        finding.add(instant, trajectory.metrics);
+        trajectory
+    };
+    let trajectories = task.all_instants().into_iter().map(run).collect();
+    (finding, trajectories)
 }
 
 /// Without and with delay: deviation of the step up and down, V.
@@ -75,16 +89,13 @@ fn losses_that_the_designs_do_not_know_leave_no_error_behind() {
 #[test]
 fn resistors_and_current_sinks_are_load_steps_too() {
     let parameters = Parameters::paper_model();
-    let environment = Converter::new(&parameters).unwrap();
     let steps = [
         (LoadKind::Current, [2.0, 10.0]),
         (LoadKind::Resistance, [50.0, 10.0]),
         (LoadKind::Power, [200.0, 1000.0]),
     ];
     let deviations = steps.map(|(kind, values)| {
-        let mut controller = Classical::from(Baseline::new(Kind::Deadbeat, &parameters, 100.0).unwrap());
-        let (finding, trajectories) =
-            examine(&environment, &mut controller, 100.0, &task(), LoadStep { kind, values }).unwrap();
+        let (finding, trajectories) = examine(Kind::Deadbeat, &parameters, LoadStep { kind, values });
         let load = trajectories[0].periods.last().unwrap().record.load;
         assert!((kind.value(&load) - values[1]).abs() < 1e-9 * values[1]);
         assert!(finding.worst.tail_max < 0.01, "{finding:?}");
@@ -98,12 +109,9 @@ fn resistors_and_current_sinks_are_load_steps_too() {
 }
 
 #[test]
-fn examination_finds_what_the_survey_finds() {
+fn runs_from_the_start_find_what_the_survey_finds() {
     let mut parameters = Parameters::paper_model();
     parameters.sensors.v_out.noise = 0.05;
-    let environment = Converter::new(&parameters).unwrap();
-    let mut controller = Classical::from(Baseline::new(Kind::Cascade, &parameters, 100.0).unwrap());
-    let step = LoadStep::from([200.0, 1000.0]);
-    let (finding, _) = examine(&environment, &mut controller, 100.0, &task(), step).unwrap();
+    let (finding, _) = examine(Kind::Cascade, &parameters, LoadStep::from([200.0, 1000.0]));
     assert_eq!(finding, findings(Kind::Cascade, &parameters)[0]);
 }

@@ -38,6 +38,6 @@ pub use catalogue::{Effect, Parameter, effects, parameter, parameters};
 pub use check::check;
 pub use parameters::*;
 pub use plant::{Plant, PlantState};
-pub use settle::Settled;
+pub use settle::{Regulator, Settled};
 pub use signals::{Load, Sample, Signals};
 pub use toml_input::{Fault, Faults, Place};

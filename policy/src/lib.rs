@@ -41,3 +41,14 @@ pub use toml_input::{Fault, Place};
 pub fn load(path: &Path) -> Result<Policy, Faults> {
     check(read(path, &ReadOptions::default())?)
 }
+
+/// Reads a `drm.toml` alone; [`Mapping::load_current`] is 0, for no signals are known.
+///
+/// # Errors
+/// All faults of the file.
+pub fn load_mapping(path: &Path) -> Result<Mapping, toml_input::Faults> {
+    let document = toml_input::Document::open(path)?;
+    let mut faults = Vec::new();
+    let mapping = contract::mapping::read(&document, 0, &mut faults);
+    document.conclude(mapping, faults)
+}

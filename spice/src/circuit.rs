@@ -90,6 +90,8 @@ fn leg(n: &mut String, p: &Parameters) {
             "D{name} {from} {name}1 DI\nV{name} {name}1 {name}2 {v}\nR{name} {name}2 {to} {r:e}"
         );
     };
+    // without it the node hangs in the air while the current rests, and the step of the transient shrinks to nothing
+    let _ = writeln!(n, "Rsw sw 0 3e6");
     let _ = writeln!(n, "Bu nin sw I=V(nin,sw)*(V(gu)/{:e}+1e-9)", s.r_ds_on.max(1e-4));
     diode(n, "dl", "0", "sw");
     diode(n, "du", "sw", "nin");

@@ -2,8 +2,10 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod commands;
+mod drm;
 mod files;
 mod interruption;
+mod simulate;
 mod traces;
 mod training;
 mod verify;

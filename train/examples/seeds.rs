@@ -1,6 +1,8 @@
 //! Trains every seed of a training file, one after the other on one core, and prints what came out as a table.
 //!
-//!     cargo run --release -p train --example seeds -- examples/train/paper12.toml [verbose]
+//!     cargo run --release -p train --example seeds -- FILE [tables] [looks] [SEED ...]
+//!
+//! `tables` adds the evaluation of every seed, `looks` the learning curve; seeds replace those of the file.
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -13,8 +15,14 @@ fn main() -> Result<(), Error> {
     let path = arguments
         .next()
         .unwrap_or_else(|| "examples/train/paper12.toml".to_owned());
-    let verbose = arguments.next().is_some();
-    let settings = Settings::load(Path::new(&path))?;
+    let words: Vec<String> = arguments.collect();
+    let has = |word: &str| words.iter().any(|given| given == word);
+    let (tables, looks) = (has("tables"), has("looks"));
+    let mut settings = Settings::load(Path::new(&path))?;
+    let seeds: Vec<u64> = words.iter().filter_map(|word| word.parse().ok()).collect();
+    if !seeds.is_empty() {
+        settings.seeds = seeds;
+    }
     let contract = Contract::load(&settings.contract, &settings.hidden)?;
     let converter = Converter::load(&settings.plant, &settings.set)?;
     println!(
@@ -25,7 +33,7 @@ fn main() -> Result<(), Error> {
         let mut trainer = Trainer::new(&settings, &contract, &converter, seed)?;
         let ended = trainer.run(&AtomicBool::new(false), |progress| {
             let look = progress.look;
-            if verbose {
+            if looks {
                 println!(
                     "{:6} {:8.3} {:7.3} V  cost {:9.3}  best {:9.3}",
                     look.step, look.reward, look.error, look.cost, progress.best
@@ -43,7 +51,7 @@ fn main() -> Result<(), Error> {
             met(outcome.evaluated.met),
             worst(&outcome.findings),
         );
-        if verbose {
+        if tables {
             println!("{}", closed_loop::table(&outcome.findings));
         }
     }

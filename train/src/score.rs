@@ -147,6 +147,15 @@ mod tests {
     }
 
     #[test]
+    fn a_requirement_speaks_of_neighbours_as_well() {
+        let specification = [requirement(Some([1000.0, 200.0]), 1.0)];
+        let load_steps = [[1000.0, 200.0], [985.0, 201.0], [799.0, 199.0], [200.0, 1000.0]];
+        let scoring = Scoring::new(&load_steps, &specification, 1.0);
+        let concerned: Vec<bool> = (0..4).map(|n| scoring.concerns(&specification[0], n)).collect();
+        assert_eq!(concerned, [true, true, false, false]);
+    }
+
+    #[test]
     fn excess_outweighs_whatever_stays_within() {
         let specification = [requirement(None, 1.0)];
         let scoring = Scoring::new(&STEPS, &specification, 1.0);

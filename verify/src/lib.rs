@@ -13,6 +13,7 @@
 //! | how it travels | [`protocol`] |
 //! | what is expected | [`oracle`] |
 //! | who answers | [`runner`]: [`runner::Runner`] has one implementation per way of running a build |
+//! | a loop closed around a build | [`live`] |
 //! | what differs | [`compare`], [`report`] |
 //! | checked-in files against the policy | [`drift()`] |
 
@@ -21,6 +22,7 @@ pub mod drift;
 pub mod drivers;
 mod golden;
 pub mod lane;
+pub mod live;
 pub mod oracle;
 pub mod protocol;
 pub mod report;
@@ -30,5 +32,6 @@ pub mod toolchain;
 pub mod traces;
 
 pub use drift::{drift, read_text};
+pub use live::{Live, LiveCommand};
 pub use report::{BuildReport, Difference, GoldenResult, Outcome, Report};
 pub use session::{Files, Options, Progress, VerifyError, golden_result, run};

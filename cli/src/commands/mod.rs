@@ -2,8 +2,12 @@
 
 pub mod compile;
 pub mod demo;
+pub mod drm;
 pub mod inspect;
+mod interruption;
 pub mod new;
+mod progress_line;
+pub mod simulate;
 pub mod train;
 pub mod verify;
 

@@ -1,8 +1,6 @@
 //! `policyc verify`
 
-use std::io::{IsTerminal, Write};
 use std::path::Path;
-use std::time::{Duration, Instant};
 
 use codegen::{Language, manifest};
 use policy::Policy;
@@ -12,6 +10,7 @@ use verify::traces::Recorded;
 use verify::{Files, Options, Progress, Report};
 
 use super::grouped;
+use super::progress_line::ProgressLine;
 use crate::arguments::Verify;
 use crate::{Failure, Outcome, output};
 
@@ -42,7 +41,12 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
         .map(|folder| checked_in(&policy, folder))
         .transpose()?;
     let mut progress = ProgressLine::new();
-    let mut tell = |news| progress.show(news);
+    let mut tell = |news| {
+        progress.show(|| match news {
+            Progress::Compiling { builds } => format!("compiling {builds} builds"),
+            Progress::Running { steps, of } => format!("{} of {} steps", grouped(steps), grouped(of)),
+        });
+    };
     let report = verify::run(
         &policy,
         Options {
@@ -120,52 +124,4 @@ fn checked_in(policy: &Policy, folder: &Path) -> Result<(Files, Drift), Failure>
         }
     }
     Ok((files, drift))
-}
-
-/// One line on the terminal; lines at intervals where the output is a log.
-struct ProgressLine {
-    terminal: bool,
-    last: Instant,
-    shown: bool,
-}
-
-impl ProgressLine {
-    fn new() -> Self {
-        Self {
-            terminal: std::io::stderr().is_terminal(),
-            last: Instant::now(),
-            shown: false,
-        }
-    }
-
-    fn show(&mut self, news: Progress) {
-        let interval = if self.terminal {
-            Duration::from_millis(100)
-        } else {
-            Duration::from_secs(10)
-        };
-        if self.last.elapsed() < interval {
-            return;
-        }
-        self.last = Instant::now();
-        let text = match news {
-            Progress::Compiling { builds } => format!("compiling {builds} builds"),
-            Progress::Running { steps, of } => format!("{} of {} steps", grouped(steps), grouped(of)),
-        };
-        let mut out = std::io::stderr();
-        // progress that cannot be shown is no reason to stop
-        let _ = if self.terminal {
-            write!(out, "\r\x1b[K{text}")
-        } else {
-            writeln!(out, "{text}")
-        };
-        let _ = out.flush();
-        self.shown = self.terminal;
-    }
-
-    fn clear(&mut self) {
-        if self.shown {
-            eprint!("\r\x1b[K");
-        }
-    }
 }

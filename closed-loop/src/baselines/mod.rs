@@ -1,6 +1,9 @@
 //! Classical controllers on the same signals, the measured ones, as a scale for a policy.
 //!
-//! Every gain follows by formula from the plant's L, C, T and the periods of delay; nothing is tuned to a load step.
+//! The gains scale by formula with the plant's L, C, T and the periods of delay. The constants in the formulas of [`Pid`] and
+//! [`Cascade`] were found by random search for little deviation and settling time on the paper's plants and load steps, so
+//! these two are tuned to what they are shown on; [`FeedForward`] and [`Deadbeat`] follow from the circuit, but for how fast
+//! they learn its losses.
 
 mod cascade;
 mod deadbeat;

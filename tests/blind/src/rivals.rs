@@ -66,7 +66,8 @@ pub(crate) fn explanations(
             continue;
         }
         let mut directions = Vec::new();
-        for bench in variants(effect) {
+        let hidden = plan.effects.iter().find(|hidden| hidden.id == effect.id);
+        for bench in hidden.map(|hidden| alone(hidden, plan)).into_iter().chain(variants(effect)) {
             directions.push(direction(runs, training, &bench)?);
         }
         candidates.push(Candidate {
@@ -79,6 +80,8 @@ pub(crate) fn explanations(
     let chi2_listed = chi2_listed.min(chi2);
     let truth: Vec<&str> = plan.effects.iter().map(|effect| effect.id).collect();
     let all_listed = plan.effects.iter().all(|effect| effect.listed);
+    let beyond = |set: &Vec<String>| truth.len() < set.len() && truth.iter().all(|id| set.iter().any(|own| own == id));
+    sets.retain(|set| !(all_listed && beyond(set)));
     if all_listed && !sets.iter().any(|set| set.iter().all(|id| truth.contains(&id.as_str()))) {
         sets.insert(0, truth.iter().map(|id| (*id).to_owned()).collect());
     }
@@ -153,6 +156,15 @@ fn variants(effect: &Effect) -> Vec<Bench> {
         },
         _ => Vec::new(),
     }
+}
+
+/// The nominal bench with this hidden effect only.
+fn alone(effect: &Effect, plan: &Plan) -> Bench {
+    let mut bench = Bench::nominal();
+    for parameter in effect.parameters {
+        parameter.set(&mut bench, parameter.get(&plan.bench));
+    }
+    bench
 }
 
 fn direction(runs: &mut Runs<'_>, training: &[(&Record, Samples, Samples)], bench: &Bench) -> Result<Vec<f64>, String> {

@@ -4,16 +4,15 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 
 use sha2::{Digest, Sha256};
-use toml_input::{Document, Fault, Faults, Message, Table, Value, messages, nearest};
+use toml_input::{Document, Fault, Faults, Message, Table, Value, messages};
 
 use super::{Draw, Episode, Instants, Learning, Loads, Randomised, Requirement, Reward, Selection, Settings, Stage};
 use crate::learner::{LearnerSettings, Loss, TargetUpdate};
 use crate::optimiser::AdamSettings;
-use closed_loop::scenario::Task;
+use closed_loop::read;
 
 type FaultList = Vec<Fault>;
 
-const POWER: RangeInclusive<f64> = 0.0..=1e7;
 const ANY: RangeInclusive<f64> = f64::MIN..=f64::MAX;
 
 pub(super) fn settings(document: &Document) -> Result<Settings, Faults> {
@@ -31,7 +30,7 @@ fn top(document: &Document, root: &mut Table<'_>, faults: &mut FaultList) -> Opt
     let plant = file("plant", hint, faults);
     let hint = "a policy.toml: `contract = \"paper12/policy.toml\"`";
     let contract = file("contract", hint, faults);
-    let set = root.with_default("set", Vec::new(), faults, set);
+    let set = root.with_default("set", Vec::new(), faults, read::plant_numbers);
     let hint = "control periods of training at most: `steps = 20000`";
     let steps = root.required("steps", hint, faults).and_then(|v| periods(&v, faults));
     let seeds = root.with_default("seeds", vec![0], faults, seeds);
@@ -47,7 +46,7 @@ fn top(document: &Document, root: &mut Table<'_>, faults: &mut FaultList) -> Opt
     let curriculum = root.sections("curriculum", faults, stage);
     let randomise = root.sections("randomise", faults, randomised);
     let selection = root.section("selection", faults, selection);
-    let evaluation = root.section("evaluation", faults, task);
+    let evaluation = root.section("evaluation", faults, |table, faults| Some(read::task(table, faults)));
     let specification = root.sections("spec", faults, requirement);
     let digest = Sha256::digest(document.source().text.as_bytes());
     Some(Settings {
@@ -83,27 +82,6 @@ fn share(value: &Value<'_>, faults: &mut FaultList) -> Option<f64> {
 /// A factor that makes a sum over the past converge.
 fn below_one(value: &Value<'_>, faults: &mut FaultList) -> Option<f64> {
     value.number_within(0.0..=0.999_999, faults)
-}
-
-fn set(value: &Value<'_>, faults: &mut FaultList) -> Option<Vec<(String, f64)>> {
-    let mut list = Vec::new();
-    for (key, value) in value.pairs(faults)? {
-        known_parameter(&key.value, &value, faults);
-        list.extend(value.number(faults).map(|number| (key.value.clone(), number)));
-    }
-    Some(list)
-}
-
-/// A fault at `value` if the plant has no number `key`.
-fn known_parameter(key: &str, value: &Value<'_>, faults: &mut FaultList) {
-    if plant::parameter(key).is_none() {
-        let message = Message::new(format!("the plant has no number `{}`", key.escape_debug()));
-        let hint = match nearest(key, plant::parameters().map(|parameter| parameter.key)) {
-            Some(near) => format!("did you mean `{near}`?"),
-            None => "write it as in the plant's file, `table.key`: \"switch.v_f\"".to_owned(),
-        };
-        faults.push(value.fault(message.hint(hint)));
-    }
 }
 
 fn seeds(value: &Value<'_>, faults: &mut FaultList) -> Option<Vec<u64>> {
@@ -243,12 +221,12 @@ fn loads(value: &Value<'_>, faults: &mut FaultList) -> Option<Loads> {
     value.read_table("loads", faults, |table, faults| {
         let values = table.optional("values").map_or(Some(Vec::new()), |v| {
             v.each("powers in W: [200, 500]", faults, |item, faults| {
-                item.number_within(POWER, faults)
+                item.number_within(read::POWER, faults)
             })
         });
         let range = table
             .optional("range")
-            .map_or(Some(None), |v| v.interval_within(POWER, faults).map(Some));
+            .map_or(Some(None), |v| v.interval_within(read::POWER, faults).map(Some));
         let share = table.with_default("share", 0.5, faults, share);
         let (values, range) = (values?, range?);
         let (range, share) = match (values.first(), range) {
@@ -300,7 +278,7 @@ fn randomised(table: &mut Table<'_>, faults: &mut FaultList) -> Option<Randomise
     let hint = "a number of the plant's file: `key = \"switch.v_f\"`";
     let key = table.required("key", hint, faults).and_then(|v| {
         let key = v.text(faults)?;
-        known_parameter(key, &v, faults);
+        read::known_parameter(key, &v, faults);
         Some(key)
     });
     let draw = match (table.optional("value"), table.optional("factor")) {
@@ -322,30 +300,12 @@ fn randomised(table: &mut Table<'_>, faults: &mut FaultList) -> Option<Randomise
 fn selection(table: &mut Table<'_>, faults: &mut FaultList) -> Option<Selection> {
     let every = table.with_default("every", 500, faults, periods);
     let margin = table.with_default("margin", 1.0, faults, Value::positive);
-    let task = task(table, faults)?;
+    let task = read::task(table, faults);
     Some(Selection { every, margin, task })
 }
 
-fn task(table: &mut Table<'_>, faults: &mut FaultList) -> Option<Task> {
-    let default = Task::default();
-    let steps = |v: &Value<'_>, faults: &mut FaultList| {
-        v.each("pairs of powers in W: [[200, 500]]", faults, |item, faults| {
-            item.pair(POWER, faults)
-        })
-    };
-    let count = |v: &Value<'_>, faults: &mut FaultList| v.integer(1..=1_000_000, faults);
-    Some(Task {
-        load_steps: table.with_default("load_steps", default.load_steps, faults, steps),
-        instants: table.with_default("instants", default.instants, faults, count),
-        sampling_instants: table.with_default("sampling_instants", default.sampling_instants, faults, count),
-        lead: table.with_default("lead", default.lead, faults, count),
-        after: table.with_default("after", default.after, faults, count),
-        tail: table.with_default("tail", default.tail, faults, count),
-    })
-}
-
 fn requirement(table: &mut Table<'_>, faults: &mut FaultList) -> Option<Requirement> {
-    let load_step = table.optional("load_step").and_then(|v| v.pair(POWER, faults));
+    let load_step = table.optional("load_step").and_then(|v| v.pair(read::POWER, faults));
     let instants = table.with_default("instants", Instants::Worst, faults, |v, faults| {
         v.choice(&[("worst", Instants::Worst), ("sample", Instants::Sample)], faults)
     });

@@ -2,15 +2,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::Mutex;
 use std::time::Instant;
 
 use train::scenario_table as table;
 use train::seeds::best;
 use train::{Contract, Converter, Course, Ended, Outcome as Trained, SeedRun, Settings, train_all};
 
-use super::grouped;
+use super::{grouped, interruption};
 use crate::arguments::Train;
 use crate::{Failure, Outcome, output};
 
@@ -37,7 +36,7 @@ pub fn run(options: &Train) -> Result<Outcome, Failure> {
         checkpoints: kept.prepare(&settings.seeds, options.resume)?,
         checkpoint_every: CHECKPOINT_EVERY,
     };
-    let stop = stop_on_signal()?;
+    let stop = interruption::stop_on_signal()?;
     let start = Instant::now();
     let watcher = Watcher::new(&settings, &kept, &stop);
     let result = train_all(&settings, &contract, &converter, &course, &stop, &watcher);
@@ -151,18 +150,6 @@ fn distinct(seeds: &[u64]) -> Result<Vec<u64>, Failure> {
             "--seeds names a seed twice\n   = found: {seed}\n   = expected: different numbers"
         ))),
     }
-}
-
-/// The first signal asks the training to stop, the second ends the program as if it were not handled.
-fn stop_on_signal() -> Result<Arc<AtomicBool>, Failure> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = stop.clone();
-    ctrlc::set_handler(move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(Outcome::Interrupted as i32);
-        }
-    })?;
-    Ok(stop)
 }
 
 /// Checkpoints of a training, one file per seed.

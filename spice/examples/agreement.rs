@@ -1,16 +1,16 @@
 //! Draws how well plant and ngspice agree, effect by effect, from the cases of the test:
-//! `cargo run --release -p plant --example agreement` writes `docs/pictures/plant-vs-ngspice.svg`.
+//! `cargo run --release -p spice --example agreement` writes `docs/pictures/plant-vs-ngspice.svg`.
 
 use std::error::Error;
 use std::path::Path;
 
 use report::{Axis, BarChart, BarPanel, Colour, ReportError, Svg};
 
-#[path = "../tests/ngspice/cases.rs"]
+#[path = "../tests/agreement/cases.rs"]
 mod cases;
-#[path = "../tests/ngspice/compare.rs"]
+#[path = "../tests/agreement/compare.rs"]
 mod compare;
-#[path = "../tests/ngspice/netlist.rs"]
+#[path = "../tests/agreement/netlist.rs"]
 mod netlist;
 
 const PICTURE: &str = "docs/pictures/plant-vs-ngspice.svg";

@@ -1,0 +1,148 @@
+//! `policyc drm`: the duty ratio mapping
+
+mod acquire;
+mod bench;
+mod fit;
+mod judge;
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Subcommand};
+use drm::acquire::LoadSetting;
+use drm::formula::Losses;
+use drm::{Columns, Table, TableOptions};
+use plant::Parameters;
+use policy::Interval;
+use toml_input::{FileName, Source};
+
+use crate::{Failure, Outcome};
+
+/// Largest table that is read, bytes.
+const MOST_BYTES: u64 = 4 << 20;
+
+#[derive(Debug, Subcommand)]
+pub enum Drm {
+    /// Measure settled points: by itself on a simulated converter, or as a plan to fill in at the bench
+    Acquire(acquire::Acquire),
+    /// Fit drm.toml to a table of settled points and say how far it can be trusted
+    Fit(fit::Fit),
+    /// Apply a mapping to a table or a converter, and say what no mapping repairs
+    Judge(judge::Judge),
+}
+
+/// Runs one of the commands.
+pub fn run(command: &Drm) -> Result<Outcome, Failure> {
+    match command {
+        Drm::Acquire(options) => acquire::run(options),
+        Drm::Fit(options) => fit::run(options),
+        Drm::Judge(options) => judge::run(options),
+    }
+}
+
+/// How a table is read.
+#[derive(Debug, Args)]
+pub struct Reading {
+    /// Where the quantities stand: quantity=column, quantity=column*factor or quantity=number, separated by commas;
+    /// quantities are d_real, v_out, i_out, v_in, v_std, settled
+    #[arg(long, value_name = "MAP", default_value = "")]
+    map: String,
+    /// Leave unsettled points out instead of refusing the table
+    #[arg(long)]
+    skip_unsettled: bool,
+    /// Input voltage of the simulation that the policy was trained on, in V: d_sim = v_out over this; without it v_in of
+    /// each point
+    #[arg(long, value_name = "V")]
+    v_in_sim: Option<f64>,
+    /// The converter that the policy was trained on, if it has losses: d_sim is the duty that it needs for v_out
+    #[arg(long, value_name = "FILE", conflicts_with = "v_in_sim")]
+    trained_on: Option<PathBuf>,
+}
+
+impl Reading {
+    fn simulation(&self) -> Result<Option<Losses>, Failure> {
+        match &self.trained_on {
+            None => Ok(self.v_in_sim.map(Losses::none)),
+            Some(path) => trained_on(&plant_parameters(path)?, path).map(Some),
+        }
+    }
+
+    fn table(&self, path: &Path) -> Result<Table, Failure> {
+        if let Some(v) = self.v_in_sim.filter(|v| !(v.is_finite() && *v > 0.0)) {
+            return Err(Failure(format!("--v-in-sim must be greater than 0 V\n   = found: {v}")));
+        }
+        let options = TableOptions {
+            columns: Columns::parse(&self.map)?,
+            skip_unsettled: self.skip_unsettled,
+            simulation: self.simulation()?,
+            partial: false,
+        };
+        Ok(Table::parse(&source(path)?, &options)?)
+    }
+}
+
+/// The loads on the command line.
+#[derive(Debug, Args)]
+pub struct Loads {
+    /// Constant power loads, W
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    powers: Vec<f64>,
+    /// Current loads, A
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    currents: Vec<f64>,
+    /// Resistors, ohm
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    resistors: Vec<f64>,
+}
+
+impl Loads {
+    fn settings(&self) -> Vec<LoadSetting> {
+        let resistors = self.resistors.iter().copied().map(LoadSetting::Resistor);
+        let currents = self.currents.iter().copied().map(LoadSetting::Current);
+        resistors
+            .chain(currents)
+            .chain(self.powers.iter().copied().map(LoadSetting::Power))
+            .collect()
+    }
+}
+
+fn source(path: &Path) -> Result<Source, Failure> {
+    let name = FileName::new(path);
+    let bytes = name
+        .read(MOST_BYTES)
+        .map_err(|message| Failure(name.fault(message).to_string()))?;
+    Source::new(name, bytes).map_err(|fault| Failure(fault.to_string()))
+}
+
+fn plant_parameters(path: &Path) -> Result<Parameters, Failure> {
+    Ok(Parameters::from_file(path)?)
+}
+
+/// The losses of the converter that a policy was trained on.
+fn trained_on(nominal: &Parameters, path: &Path) -> Result<Losses, Failure> {
+    Losses::of(nominal).ok_or_else(|| {
+        Failure(format!(
+            "{}: a synchronous leg has no formula of its steady state\n   = hint: give --v-in-sim instead, its input \
+             voltage, and count its losses to the mapping",
+            path.display()
+        ))
+    })
+}
+
+/// `low,high` of duty ratios.
+fn duty_limits(text: &str) -> Result<Interval, String> {
+    let (low, high) = text.split_once(',').ok_or("expected LOW,HIGH, for example 0.05,0.95")?;
+    let number = |text: &str| {
+        text.trim()
+            .parse::<f64>()
+            .map_err(|_| format!("`{text}` is not a number"))
+    };
+    let interval = Interval {
+        low: number(low)?,
+        high: number(high)?,
+    };
+    if 0.0 <= interval.low && interval.low < interval.high && interval.high <= 1.0 {
+        Ok(interval)
+    } else {
+        Err("expected 0 <= LOW < HIGH <= 1".to_owned())
+    }
+}

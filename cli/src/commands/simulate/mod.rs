@@ -1,0 +1,153 @@
+//! `policyc simulate`
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use closed_loop::limit::{Limit, left_out};
+use closed_loop::scenario::Finding;
+use closed_loop::{Converter, Environment, LoadStep, Scenario, Trajectory};
+use policy::Policy;
+
+use super::interruption;
+use crate::arguments::Simulate;
+use crate::{Failure, Outcome, output};
+
+mod controllers;
+mod files;
+mod page;
+mod pictures;
+mod runs;
+
+/// Name of the policy among the controllers.
+const POLICY: &str = "policy";
+
+/// A scenario with everything it needs, all of it sound.
+struct Setting {
+    scenario: Scenario,
+    policy: Policy,
+    plant: PathBuf,
+    converter: Converter,
+    v_ref: f64,
+    notes: Vec<String>,
+}
+
+/// One controller on one load step.
+struct Course {
+    name: String,
+    finding: Finding,
+    /// At the first sampling instant.
+    shown: Trajectory,
+}
+
+/// Everything found on one load step; the policy comes first.
+struct Step {
+    step: LoadStep,
+    courses: Vec<Course>,
+    /// By name.
+    limits: Vec<(String, Limit)>,
+}
+
+/// The comparison of the controllers that should be one.
+struct Check {
+    /// Each of them.
+    names: Vec<String>,
+    /// Control periods of each, over all load steps and instants.
+    periods: usize,
+    /// The first difference of each that has one, in words.
+    differences: Vec<String>,
+}
+
+/// What a simulation found.
+struct Findings {
+    setting: Setting,
+    /// What ran the policy.
+    controller: String,
+    steps: Vec<Step>,
+    check: Option<Check>,
+}
+
+/// Simulates, writes, reports.
+pub fn run(options: &Simulate) -> Result<Outcome, Failure> {
+    output::check_new_folder(&options.out)?;
+    let setting = prepare(options)?;
+    let stop = interruption::stop_on_signal()?;
+    let found = runs::all(options, setting, &stop);
+    if stop.load(Ordering::Relaxed) {
+        // what failed, failed because of the signal
+        output::say("Interrupted; nothing written")?;
+        return Ok(Outcome::Interrupted);
+    }
+    let found = found?;
+    let files = files::all(&found)?;
+    output::check_new_folder(&options.out)?;
+    output::write_texts(&options.out, &files)?;
+    let out = options.out.display();
+    output::say(&format!(
+        "{}\n{} files in {out}; to look at: {out}/{}",
+        files::summary(&found),
+        files.len(),
+        files::PAGE
+    ))?;
+    let equal = found.check.is_none_or(|check| check.differences.is_empty());
+    Ok(if equal { Outcome::Done } else { Outcome::Different })
+}
+
+/// An error where the user has had enough.
+fn go_on(stop: &AtomicBool) -> Result<(), Failure> {
+    if stop.load(Ordering::Relaxed) {
+        return Err(Failure("interrupted".to_owned()));
+    }
+    Ok(())
+}
+
+fn prepare(options: &Simulate) -> Result<Setting, Failure> {
+    let scenario = Scenario::load(&options.scenario)?;
+    let policy = super::load(&options.policy)?;
+    let file = options.scenario.display();
+    let Some(plant) = options.plant.clone().or(scenario.plant.clone()) else {
+        return Err(Failure(format!(
+            "{file}: no plant\n   = hint: plant = \"../plants/paper-model.toml\", or --plant PLANT"
+        )));
+    };
+    let converter = Converter::load(&plant, &scenario.set)?;
+    let of_policy = policy.parameters.get("v_ref").copied();
+    let Some(v_ref) = scenario.v_ref.or(of_policy) else {
+        return Err(Failure(format!(
+            "{file}: no voltage to hold\n   = hint: v_ref = 100.0, as the policy has no parameter `v_ref`"
+        )));
+    };
+    let v_in = converter.parameters().converter.v_in;
+    if v_ref >= v_in {
+        return Err(Failure(format!(
+            "{file}: a buck converter cannot hold this voltage\n   = found: v_ref = {v_ref} V, v_in = {v_in} V at the plant"
+        )));
+    }
+    let (ours, theirs) = (policy.sample_period, converter.t_sample());
+    if (ours - theirs).abs() > 1e-9 * theirs {
+        return Err(Failure(format!(
+            "policy and plant have different control periods\n   = found: sample_period = {ours} s in the policy, \
+             {theirs} s at the plant\n   = hint: f_sw of the plant is 1 / sample_period"
+        )));
+    }
+    let mut notes = Vec::new();
+    if let Some(theirs) = of_policy.filter(|theirs| *theirs != v_ref) {
+        notes.push(format!(
+            "the policy holds {theirs} V, but errors are counted from {v_ref} V"
+        ));
+    }
+    let left_out = left_out(converter.parameters());
+    if !scenario.limits.is_empty() && !left_out.is_empty() {
+        notes.push(format!(
+            "the limit is that of the plain circuit; it leaves out {}",
+            left_out.join(", ")
+        ));
+    }
+    Ok(Setting {
+        scenario,
+        policy,
+        plant,
+        converter,
+        v_ref,
+        notes,
+    })
+}

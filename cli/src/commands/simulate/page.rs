@@ -1,0 +1,78 @@
+//! The page with all tables and pictures.
+
+use closed_loop::scenario::Metrics;
+use report::{Cell, Page, Section, Svg, Table, Verdict};
+
+use super::{Findings, Step, files};
+use crate::Failure;
+
+/// One HTML file; `drawn` are the pictures of the load steps in their order.
+pub fn page(found: &Findings, drawn: Vec<Svg>) -> Result<String, Failure> {
+    let setting = &found.setting;
+    let (verdict, sentence) = match &found.check {
+        None => (Verdict::Note, worst(found)),
+        Some(check) if check.differences.is_empty() => (Verdict::Pass, files::check_text(check)),
+        Some(check) => (Verdict::Fail, files::check_text(check)),
+    };
+    let setup = [
+        ("policy", setting.policy.name.clone()),
+        ("run by", found.controller.clone()),
+        ("plant", files::plant_text(setting)),
+    ];
+    let mut about = Section::new("").pairs(setup).text(files::explanation(setting));
+    for note in &setting.notes {
+        about = about.text(format!("Note: {note}."));
+    }
+    let mut page = Page::new(format!("{} in closed loop", setting.policy.name))
+        .verdict(verdict, sentence)
+        .section(about);
+    for (step, picture) in found.steps.iter().zip(drawn) {
+        let section = Section::new(step.step.to_string()).chart(picture, CAPTION);
+        page = page.section(section.table(table(step)));
+    }
+    Ok(page.html()?)
+}
+
+const CAPTION: &str = "The first sampling instant. Voltages and currents are samples, one per control period. The dashed lines \
+    are the smallest deviation that any sequence of duties of the range reaches from rest; a policy that dithers meets the step \
+    with another current and can stay within it at one instant. The table is of all instants.";
+
+/// The policy's largest deviation.
+fn worst(found: &Findings) -> String {
+    let of_policy = found
+        .steps
+        .iter()
+        .filter_map(|step| Some((step, step.courses.first()?)));
+    let largest = of_policy.max_by(|(_, a), (_, b)| {
+        let [a, b] = [a, b].map(|course| course.finding.worst.deviation);
+        a.total_cmp(&b)
+    });
+    largest.map_or(String::new(), |(step, course)| {
+        let Metrics {
+            deviation, settling, ..
+        } = course.finding.worst;
+        format!(
+            "Largest deviation: {deviation:.2} V, at {}, settled after {:.2} ms.",
+            step.step,
+            1e3 * settling
+        )
+    })
+}
+
+fn table(step: &Step) -> Table {
+    let mut table = Table::new("").text("");
+    for heading in closed_loop::COLUMNS {
+        table = table.text(heading);
+    }
+    for course in &step.courses {
+        let cells = closed_loop::cells(&course.finding).into_iter().map(Cell::from);
+        table = table.row([Cell::from(course.name.as_str())].into_iter().chain(cells));
+    }
+    for (name, limit) in &step.limits {
+        let [deviation, settling] = closed_loop::limit_cells(limit).map(Cell::from);
+        let blank = std::iter::repeat_n(Cell::from("-"), closed_loop::COLUMNS.len() - 2);
+        let cells = [Cell::from(name.as_str()), deviation, settling];
+        table = table.row(cells.into_iter().chain(blank));
+    }
+    table
+}

@@ -1,0 +1,67 @@
+//! What a scenario and a training file share, read from TOML.
+
+use std::ops::RangeInclusive;
+
+use toml_input::{Fault, Message, Table, Value, messages, nearest};
+
+use crate::scenario::Task;
+
+/// Powers a load step may have, W.
+pub const POWER: RangeInclusive<f64> = 0.0..=1e7;
+
+/// The load steps and how they are run; what is left out is as in [`Task::default`].
+pub fn task(table: &mut Table<'_>, faults: &mut Vec<Fault>) -> Task {
+    let default = Task::default();
+    let count = |v: &Value<'_>, faults: &mut Vec<Fault>| v.integer(1..=1_000_000, faults);
+    Task {
+        load_steps: table.with_default("load_steps", default.load_steps, faults, |v, faults| {
+            pairs(v, "powers in W: [[200, 500]]", POWER, faults)
+        }),
+        instants: table.with_default("instants", default.instants, faults, count),
+        sampling_instants: table.with_default("sampling_instants", default.sampling_instants, faults, count),
+        lead: table.with_default("lead", default.lead, faults, count),
+        after: table.with_default("after", default.after, faults, count),
+        tail: table.with_default("tail", default.tail, faults, count),
+    }
+}
+
+/// Pairs of numbers within `range`; `of` says of what.
+pub fn pairs(
+    value: &Value<'_>,
+    of: &str,
+    range: RangeInclusive<f64>,
+    faults: &mut Vec<Fault>,
+) -> Option<Vec<[f64; 2]>> {
+    let one = |item: &Value<'_>, faults: &mut Vec<Fault>| item.pair(range.clone(), faults);
+    value.each(&format!("pairs of {of}"), faults, one)
+}
+
+/// Numbers of a plant that take the place of its file's: `[set]`.
+pub fn plant_numbers(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<(String, f64)>> {
+    let mut list = Vec::new();
+    for (key, value) in value.pairs(faults)? {
+        known_parameter(&key.value, &value, faults);
+        let Some(number) = value.number(faults) else { continue };
+        let allowed = plant::parameter(&key.value).map(|parameter| parameter.allowed);
+        if let Some((low, high)) = allowed
+            && !(low..=high).contains(&number)
+        {
+            let expected = format!("{low} to {high}");
+            faults.push(value.fault(messages::out_of_range(value.label(), &number.to_string(), &expected)));
+        }
+        list.push((key.value.clone(), number));
+    }
+    Some(list)
+}
+
+/// A fault at `value` if the plant has no number `key`.
+pub fn known_parameter(key: &str, value: &Value<'_>, faults: &mut Vec<Fault>) {
+    if plant::parameter(key).is_none() {
+        let message = Message::new(format!("the plant has no number `{}`", key.escape_debug()));
+        let hint = match nearest(key, plant::parameters().map(|parameter| parameter.key)) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => "write it as in the plant's file, `table.key`: \"switch.v_f\"".to_owned(),
+        };
+        faults.push(value.fault(message.hint(hint)));
+    }
+}

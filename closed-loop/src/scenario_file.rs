@@ -1,0 +1,158 @@
+//! A scenario: which converter, which load steps, which classical controllers beside the policy.
+
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+
+use toml_input::{Document, Fault, Faults, Message, Table, Value};
+
+use crate::baselines::Kind;
+use crate::load_step::{LoadKind, LoadStep};
+use crate::read;
+use crate::scenario::Task;
+
+/// What a scenario file says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scenario {
+    /// The plant's file, from the scenario's folder; nothing if the scenario leaves it open.
+    pub plant: Option<PathBuf>,
+    /// Numbers of the plant that take the place of its file's, by key.
+    pub set: Vec<(String, f64)>,
+    /// Voltage to hold, V; nothing if it is the policy's parameter `v_ref`.
+    pub v_ref: Option<f64>,
+    /// Load steps in the order of the file: powers, currents, resistances.
+    pub load_steps: Vec<LoadStep>,
+    /// Instants and periods; its own load steps are not used.
+    pub task: Task,
+    /// Classical controllers that run beside the policy.
+    pub baselines: Vec<Kind>,
+    /// Duties that the limits may use, one limit each.
+    pub limits: Vec<[f64; 2]>,
+}
+
+const CURRENT: RangeInclusive<f64> = 0.0..=1e6;
+const RESISTANCE: RangeInclusive<f64> = 1e-6..=1e12;
+/// Control periods of one run at most, so that a slip of the pen does not run for hours.
+const LONGEST_RUN: usize = 100_000;
+
+impl Scenario {
+    /// Reads a scenario file.
+    ///
+    /// # Errors
+    /// All faults of the file with their places, or that it cannot be read.
+    pub fn load(path: &Path) -> Result<Self, Faults> {
+        Self::read(&Document::open(path)?)
+    }
+
+    /// Reads the text of a scenario; `file` names it in messages, and paths are from its folder.
+    ///
+    /// # Errors
+    /// All faults of the text with their places.
+    pub fn from_toml(file: &Path, text: &str) -> Result<Self, Faults> {
+        Self::read(&Document::from_text(file, text)?)
+    }
+
+    fn read(document: &Document) -> Result<Self, Faults> {
+        let path = &document.source().name.path;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        document.read(|root, faults| top(document, folder, root, faults))
+    }
+}
+
+fn top(document: &Document, folder: &Path, root: &mut Table<'_>, faults: &mut Vec<Fault>) -> Option<Scenario> {
+    let plant = root.optional("plant").and_then(|v| v.text(faults));
+    let set = root.with_default("set", Vec::new(), faults, read::plant_numbers);
+    let v_ref = root.optional("v_ref").and_then(|v| v.positive(faults));
+    let (currents, resistances) = (root.optional("current_steps"), root.optional("resistance_steps"));
+    let task = read::task(root, faults);
+    check(&task, document, root, faults);
+    let powers_meant = document.peek(&["load_steps"]).is_some() || (currents.is_none() && resistances.is_none());
+    let powers = if powers_meant {
+        task.load_steps.clone()
+    } else {
+        Vec::new()
+    };
+    let read_steps = |value: Option<Value<'_>>, of, range, faults: &mut Vec<Fault>| {
+        value
+            .and_then(|v| read::pairs(&v, of, range, faults))
+            .unwrap_or_default()
+    };
+    let currents = read_steps(currents, "currents in A: [[2, 10]]", CURRENT, faults);
+    let resistances = read_steps(resistances, "resistances in ohm: [[50, 10]]", RESISTANCE, faults);
+    let kinds = [
+        (LoadKind::Power, powers),
+        (LoadKind::Current, currents),
+        (LoadKind::Resistance, resistances),
+    ];
+    let of_kind =
+        |(kind, pairs): (LoadKind, Vec<[f64; 2]>)| pairs.into_iter().map(move |values| LoadStep { kind, values });
+    let load_steps: Vec<LoadStep> = kinds.into_iter().flat_map(of_kind).collect();
+    if load_steps.is_empty() && faults.is_empty() {
+        let hint = "load_steps = [[200, 500], [500, 200]]  # W";
+        faults.push(root.fault(Message::new("a scenario without a load step").hint(hint)));
+    }
+    Some(Scenario {
+        plant: plant.map(|text| folder.join(text)),
+        set,
+        v_ref,
+        load_steps,
+        task,
+        baselines: root.with_default("baselines", Kind::ALL.to_vec(), faults, baselines),
+        limits: root.with_default("limit", vec![[0.0, 1.0]], faults, limits),
+    })
+}
+
+fn check(task: &Task, document: &Document, root: &Table<'_>, faults: &mut Vec<Fault>) {
+    // at the key that is there: the other one is the default
+    let fault = |keys: [&str; 2], message: Message| {
+        let value = keys.iter().find_map(|key| document.peek(&[key]));
+        match value {
+            Some(value) => value.fault(message),
+            None => root.fault(message),
+        }
+    };
+    if task.tail > task.after {
+        let message = Message::new("`tail` is longer than `after`")
+            .found(format!("tail = {}, after = {}", task.tail, task.after))
+            .expected("the tail is the last part of the periods after the step");
+        faults.push(fault(["tail", "after"], message));
+    }
+    let longest = task.lead + task.after + task.instants.max(task.sampling_instants);
+    if longest > LONGEST_RUN {
+        let message = Message::new("a run is too long")
+            .found(format!("{longest} control periods of `lead`, `after` and instants"))
+            .expected(format!("at most {LONGEST_RUN}"));
+        let longer = if task.lead > task.after {
+            ["lead", "after"]
+        } else {
+            ["after", "lead"]
+        };
+        faults.push(fault(longer, message));
+    }
+}
+
+fn baselines(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<Kind>> {
+    let choices = Kind::ALL.map(|kind| (kind.name(), kind));
+    let mut kinds = value.each("names: [\"pid\", \"deadbeat\"]", faults, |item, faults| {
+        item.choice(&choices, faults)
+    })?;
+    kinds.sort();
+    kinds.dedup();
+    Some(kinds)
+}
+
+/// `false`, the duties the limit may use, or several of them.
+fn limits(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<[f64; 2]>> {
+    let Some(items) = value.as_list() else {
+        let Some(wanted) = value.boolean(&mut Vec::new()) else {
+            value.list("`false`, duties [low, high], or several of them", faults);
+            return None;
+        };
+        return Some(if wanted { vec![[0.0, 1.0]] } else { Vec::new() });
+    };
+    let one = |value: &Value<'_>, faults: &mut Vec<Fault>| value.interval_within(0.0..=1.0, faults);
+    if items.iter().all(|item| item.as_list().is_some()) {
+        value.each("pairs of duties: [[0.44, 0.55], [0, 1]]", faults, one)
+    } else {
+        one(value, faults).map(|range| vec![range])
+    }
+}

@@ -1,0 +1,183 @@
+//! Settle, detect the steady state, measure.
+
+use plant::{Load, Parameters, Regulator, Signals};
+
+use crate::acquire::{Bench, Hold, Measurement, PlanPoint};
+
+/// How long is waited and measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Protocol {
+    /// Periods whose mean is one figure. Should span several periods of the output filter's resonance.
+    pub window: usize,
+    /// After so many windows a point counts as unsettled.
+    pub most_windows: usize,
+}
+
+impl Default for Protocol {
+    fn default() -> Self {
+        Protocol {
+            window: 500,
+            most_windows: 40,
+        }
+    }
+}
+
+/// Means of two windows that differ by less than this share of the input voltage are equal.
+const AT_REST: f64 = 5e-6;
+/// Standard errors of a mean that noise may move it by.
+const NOISE: f64 = 3.0;
+/// An oscillation that keeps this share of its size from window to window is there to stay.
+const STANDING: f64 = 0.95;
+
+/// Measures one point of a plan.
+///
+/// `nominal` tells the regulator of a closed-loop point what it regulates. A point that does not settle in open loop
+/// (a load or filter with too little damping) is tried once more in closed loop.
+///
+/// # Errors
+/// Those of the bench.
+pub fn measure<B: Bench + ?Sized>(
+    bench: &mut B,
+    nominal: &Parameters,
+    point: &PlanPoint,
+    protocol: &Protocol,
+) -> Result<Measurement, B::Error> {
+    let first = held(bench, nominal, point, point.hold, protocol)?;
+    if first.settled || point.hold != Hold::OpenLoop {
+        return Ok(first);
+    }
+    let v_out = point.duty * nominal.converter.v_in;
+    held(bench, nominal, point, Hold::ClosedLoop(v_out), protocol)
+}
+
+fn held<B: Bench + ?Sized>(
+    bench: &mut B,
+    nominal: &Parameters,
+    point: &PlanPoint,
+    hold: Hold,
+    protocol: &Protocol,
+) -> Result<Measurement, B::Error> {
+    let load = point.load.load();
+    let v_out = match hold {
+        Hold::OpenLoop => point.duty * nominal.converter.v_in,
+        Hold::ClosedLoop(v_out) => v_out,
+    };
+    let mut now = bench.start(v_out, &load)?;
+    let mut drive = match hold {
+        Hold::OpenLoop => Drive::Fixed(point.duty),
+        Hold::ClosedLoop(v_out) => Drive::Regulated(Regulator::new(nominal, v_out, &now)),
+    };
+    let at_rest = AT_REST * nominal.converter.v_in;
+    let mut windows: Vec<Window> = Vec::new();
+    let mut settled = false;
+    for _ in 0..protocol.most_windows.max(1) {
+        let window = Window::run(bench, &mut drive, &load, &mut now, protocol.window.max(2))?;
+        windows.push(window);
+        if let [.., before, last, this] = &windows[..]
+            && rests(before, last, this, at_rest)
+        {
+            settled = true;
+            break;
+        }
+    }
+    let last = windows.last().copied().unwrap_or_default();
+    Ok(Measurement {
+        d_real: last.duty,
+        v_out: last.mean.v_out,
+        i_out: last.mean.i_out,
+        v_in: last.mean.v_in,
+        v_std: last.v_std,
+        settled,
+        hold,
+    })
+}
+
+enum Drive {
+    Fixed(f64),
+    Regulated(Regulator),
+}
+
+impl Drive {
+    fn duty(&mut self, now: &Signals) -> f64 {
+        match self {
+            Drive::Fixed(duty) => *duty,
+            Drive::Regulated(regulator) => regulator.duty(now),
+        }
+    }
+}
+
+/// What was seen in a row of periods.
+#[derive(Debug, Clone, Copy, Default)]
+struct Window {
+    duty: f64,
+    mean: Signals,
+    /// Standard deviation of v_out, V.
+    v_std: f64,
+    /// The part of it that changes from sample to sample: noise, not drift or ringing, V.
+    v_noise: f64,
+    samples: f64,
+}
+
+impl Window {
+    fn run<B: Bench + ?Sized>(
+        bench: &mut B,
+        drive: &mut Drive,
+        load: &Load,
+        now: &mut Signals,
+        periods: usize,
+    ) -> Result<Self, B::Error> {
+        let mut window = Window {
+            samples: periods as f64,
+            ..Window::default()
+        };
+        let (mut squares, mut steps) = (0.0, 0.0);
+        let origin = now.v_out;
+        for _ in 0..periods {
+            let duty = drive.duty(now);
+            let next = bench.step(duty, load)?;
+            window.duty += duty;
+            window.mean.v_out += next.v_out - origin;
+            window.mean.i_l += next.i_l;
+            window.mean.i_out += next.i_out;
+            window.mean.v_in += next.v_in;
+            squares += (next.v_out - origin) * (next.v_out - origin);
+            steps += (next.v_out - now.v_out) * (next.v_out - now.v_out);
+            *now = next;
+        }
+        let n = window.samples;
+        let mean = &mut window.mean;
+        for sum in [
+            &mut window.duty,
+            &mut mean.v_out,
+            &mut mean.i_l,
+            &mut mean.i_out,
+            &mut mean.v_in,
+        ] {
+            *sum /= n;
+        }
+        window.v_std = (squares / n - mean.v_out * mean.v_out).max(0.0).sqrt();
+        window.v_noise = (0.5 * steps / n).sqrt();
+        mean.v_out += origin;
+        Ok(window)
+    }
+}
+
+/// Whether three windows in a row show a steady state: the mean stands still, also where it would end if it went on in
+/// geometric steps, and what oscillates is noise or there to stay.
+fn rests(before: &Window, last: &Window, this: &Window, at_rest: f64) -> bool {
+    let noise = NOISE * (2.0 / this.samples).sqrt() * this.v_noise;
+    let enough = at_rest.max(noise);
+    let step = |from: &Window, to: &Window| {
+        let voltage = (to.mean.v_out - from.mean.v_out).abs();
+        voltage.max((to.duty - from.duty).abs() * to.mean.v_in)
+    };
+    let (earlier, later) = (step(before, last), step(last, this));
+    if later > enough {
+        return false;
+    }
+    let shrinks = if earlier > later { later / earlier } else { 0.0 };
+    let to_come = later * shrinks / (1.0 - shrinks).max(1e-3);
+    let oscillation = this.v_std > (1.5 * this.v_noise).max(at_rest);
+    let dies_out = this.v_std < STANDING * last.v_std;
+    to_come <= enough && !(oscillation && dies_out)
+}

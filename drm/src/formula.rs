@@ -1,0 +1,191 @@
+//! The exact steady state of a buck converter with losses, and what the mapping's two forms can make of it.
+//!
+//! In continuous conduction, with `lost_duty` the lost share of the period, `v_f + r_d i` the diode's path, `r_on` the
+//! switch and `dcr` the inductor:
+//!
+//! `v = (d - lost_duty) (v_in - r_on i) - (1 - d + lost_duty) (v_f + r_d i) - dcr i`, and the simulator says `v = d_sim v_in`.
+//!
+//! Solved for d, with `V = v_in + v_f` and `rho = (r_on - r_d) / V`:
+//!
+//! `d_real = lost_duty + [d_sim v_in + v_f + i (dcr + r_d)] / [V (1 - rho i)]`.
+//!
+//! `1 / (1 - rho i) = 1 + rho i + (rho i)^2 / (1 - rho i)`: the first two terms are the four-term form, what is left is
+//! its error, `q = rho i^2 (dcr + r_d) / V + (rho i)^2 [d_sim v_in + v_f + i (dcr + r_d)] / [V (1 - rho i)]`. A fit over a
+//! balanced grid takes the part of q that is linear in i away, too; [`Losses::expected_errors`] says what stays.
+
+use plant::{Parameters, Rectifier};
+use policy::Coefficients;
+use serde::Serialize;
+
+/// What makes a converter differ from `v = d v_in`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Losses {
+    /// Voltage at the switch, V.
+    pub v_in: f64,
+    /// Forward voltage of the diode, V.
+    pub v_f: f64,
+    /// Differential resistance of the diode, or of the second switch, ohm.
+    pub r_d: f64,
+    /// On-resistance of the switch, ohm.
+    pub r_on: f64,
+    /// Resistance of the inductor, ohm.
+    pub dcr: f64,
+    /// Share of the period that the switch is on for less than commanded: dead time plus turn-on minus turn-off delay.
+    pub lost_duty: f64,
+}
+
+impl Losses {
+    /// The losses of a plant with a diode rectifier; `None` for a synchronous leg, whose body diodes conduct only at times.
+    #[must_use]
+    pub fn of(plant: &Parameters) -> Option<Self> {
+        let switch = &plant.switch;
+        (plant.converter.rectifier == Rectifier::Diode).then_some(Losses {
+            v_in: plant.converter.v_in,
+            v_f: switch.v_f,
+            r_d: switch.r_d,
+            r_on: switch.r_ds_on,
+            dcr: plant.inductor.dcr,
+            lost_duty: (switch.dead_time + switch.turn_on_delay - switch.turn_off_delay) * plant.converter.f_sw,
+        })
+    }
+
+    /// A converter without any.
+    #[must_use]
+    pub fn none(v_in: f64) -> Self {
+        Losses {
+            v_in,
+            v_f: 0.0,
+            r_d: 0.0,
+            r_on: 0.0,
+            dcr: 0.0,
+            lost_duty: 0.0,
+        }
+    }
+
+    /// Whether it has none of these.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        *self == Losses::none(self.v_in)
+    }
+
+    /// What a unit of duty is worth at `i_out` A, V.
+    #[must_use]
+    pub fn v_per_duty(&self, i_out: f64) -> f64 {
+        self.v() * (1.0 - self.rho() * i_out)
+    }
+
+    /// The duty that brings `d_sim v_in` V at `i_out` A.
+    #[must_use]
+    pub fn d_real(&self, d_sim: f64, i_out: f64) -> f64 {
+        let wanted = d_sim * self.v_in + self.v_f + i_out * (self.dcr + self.r_d);
+        self.lost_duty + wanted / self.v_per_duty(i_out)
+    }
+
+    /// The four-term form: exact up to terms in `i^2`.
+    #[must_use]
+    pub fn four_term(&self) -> Coefficients {
+        let v = self.v();
+        Coefficients {
+            a: self.v_in / v,
+            b: (self.dcr + self.r_d + self.rho() * self.v_f) / v,
+            c: self.lost_duty + self.v_f / v,
+            r: Some(self.rho() * self.v_in / v),
+        }
+    }
+
+    /// The three-term form, the tangent at the load current `i_m` A and `d_m` = d_sim there.
+    #[must_use]
+    pub fn three_term(&self, i_m: f64, d_m: f64) -> Coefficients {
+        let four = self.four_term();
+        let r = self.rho() * self.v_in / self.v();
+        Coefficients {
+            a: four.a + r * i_m,
+            b: four.b + r * d_m,
+            c: four.c - r * i_m * d_m,
+            r: None,
+        }
+    }
+
+    /// What a least-squares fit of the three- and of the four-term form leaves on a full grid of `d_sim` and `i_out`, rms
+    /// of d_real, to first order in `rho i`.
+    ///
+    /// The four-term form lacks `rho i^2 [dcr + r_d + rho (d_sim v_in + v_f)] / V`, of which the part beyond a line in i
+    /// stays. The three-term form lacks `r (d_sim - mean) (i - mean)` as well; on a full grid the two are orthogonal.
+    #[must_use]
+    pub fn expected_errors(&self, d_sim: &[f64], i_out: &[f64]) -> (f64, f64) {
+        let mean = |x: &mut dyn Iterator<Item = f64>, n: usize| x.sum::<f64>() / n as f64;
+        let spread = |x: &[f64]| {
+            let centre = mean(&mut x.iter().copied(), x.len());
+            mean(&mut x.iter().map(|x| (x - centre) * (x - centre)), x.len()).sqrt()
+        };
+        let bent = beyond_a_line(i_out);
+        let factor = |d: &f64| {
+            let one = self.rho() * (self.dcr + self.r_d + self.rho() * (d * self.v_in + self.v_f)) / self.v();
+            one * one
+        };
+        let four = bent * mean(&mut d_sim.iter().map(factor), d_sim.len()).sqrt();
+        let product = self.rho() * self.v_in / self.v() * spread(d_sim) * spread(i_out);
+        ((product * product + four * four).sqrt(), four)
+    }
+
+    fn v(&self) -> f64 {
+        self.v_in + self.v_f
+    }
+
+    fn rho(&self) -> f64 {
+        (self.r_on - self.r_d) / self.v()
+    }
+}
+
+/// Rms of what is left of `x^2` after its best line in `x`.
+fn beyond_a_line(x: &[f64]) -> f64 {
+    let n = x.len() as f64;
+    let centre = x.iter().sum::<f64>() / n;
+    let centred: Vec<f64> = x.iter().map(|x| x - centre).collect();
+    let moment = |power: i32| centred.iter().map(|x| x.powi(power)).sum::<f64>() / n;
+    let (second, third) = (moment(2), moment(3));
+    if second == 0.0 {
+        return 0.0;
+    }
+    // x^2 = centred^2 + a line in x, so only centred^2 counts
+    (moment(4) - second * second - third * third / second).max(0.0).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LOSSY: Losses = Losses {
+        v_in: 195.0,
+        v_f: 1.5,
+        r_d: 0.02,
+        r_on: 0.5,
+        dcr: 0.1,
+        lost_duty: 0.04,
+    };
+
+    #[test]
+    fn the_formula_solves_the_balance_of_the_circuit() {
+        let (d_sim, i) = (0.5, 8.0);
+        let d = LOSSY.d_real(d_sim, i);
+        let on = d - LOSSY.lost_duty;
+        let v = on * (195.0 - 0.5 * i) - (1.0 - on) * (1.5 + 0.02 * i) - 0.1 * i;
+        assert!((v - d_sim * 195.0).abs() < 1e-12, "{v}");
+    }
+
+    #[test]
+    fn the_forms_touch_the_formula_where_they_should() {
+        let at = |k: Coefficients, d: f64, i: f64| k.a * d + k.b * i + k.c + k.r.unwrap_or(0.0) * d * i;
+        assert!((at(LOSSY.four_term(), 0.5, 0.0) - LOSSY.d_real(0.5, 0.0)).abs() < 1e-15);
+        let three = at(LOSSY.three_term(6.0, 0.5), 0.5, 6.0);
+        assert!((three - at(LOSSY.four_term(), 0.5, 6.0)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn what_lies_beyond_a_line_is_the_second_orthogonal_polynomial() {
+        // n equidistant points of step h: sum of squares n (n^2 - 1) (n^2 - 4) h^4 / 180
+        let x = [2.0, 4.0, 6.0, 8.0, 10.0];
+        let expected = (24.0_f64 * 21.0 / 180.0 * 16.0).sqrt();
+        assert!((beyond_a_line(&x) - expected).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,160 @@
+//! A build that answers one event at a time, for a loop that is closed around it.
+
+use std::process::Command;
+use std::time::Duration;
+
+use codegen::Language;
+use interp::{Controller, Sample};
+use policy::Policy;
+
+use crate::protocol::{self, Layout};
+use crate::runner::{ProcessRunner, Runner};
+use crate::session::generate;
+use crate::toolchain::{self, Build, BuildError, Sources};
+use crate::traces::Event;
+
+/// What a build commands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LiveCommand {
+    /// Duty, 0..1.
+    pub duty: f32,
+    /// Index of the chosen action.
+    pub action_index: u32,
+    /// Bits of [`interp::status`].
+    pub status: u32,
+}
+
+/// The generated code of a policy as a running program.
+#[derive(Debug)]
+pub struct Live {
+    name: String,
+    runner: ProcessRunner,
+    layout: Layout,
+    words: Vec<u32>,
+    /// Places of duty, action, status and purity in the answer to a step.
+    places: [usize; 4],
+    /// Holds the program until it has ended.
+    _folder: tempfile::TempDir,
+}
+
+/// A build that is silent for so long has failed.
+const TIMEOUT: Duration = Duration::from_secs(20);
+/// The level that is built of each compiler.
+const LEVELS: [&str; 2] = ["-O2", "-O"];
+
+impl Live {
+    /// Generates the policy's code for this machine, builds it optimised with the first compiler of `language` on `PATH`
+    /// and starts it.
+    ///
+    /// # Errors
+    /// If there is no compiler, it refuses the code, or the program does not start as it should; text for a user.
+    pub fn start(policy: &Policy, language: Language) -> Result<Self, String> {
+        let target = targets::find("host").ok_or("internal fault: no target `host`")?;
+        let files = generate(policy, target, &[language]).map_err(|error| error.to_string())?;
+        let build = build_for(language)?;
+        let folder = tempfile::tempdir().map_err(|error| format!("cannot make a temporary folder: {error}"))?;
+        let sources = Sources {
+            policy,
+            files: &files,
+            target,
+            extra_flags: &[],
+        };
+        let name = build.name();
+        let program = build.program.as_deref().ok_or("internal fault: no compiler")?;
+        let executable =
+            toolchain::compile(&build, program, sources, folder.path()).map_err(|error| refused(&name, error))?;
+        let controller = Controller::<f32>::new(policy);
+        let layout = Layout::new(policy, controller.state_names());
+        let mut runner = ProcessRunner::new(apart(Command::new(executable)), TIMEOUT);
+        let hello = runner
+            .start(layout.hello().len())
+            .map_err(|error| format!("{name}: {}", error.reason))?;
+        if hello != layout.hello() {
+            return Err(format!(
+                "{name}: self-test, integrity or sizes of the generated code are wrong"
+            ));
+        }
+        let step = layout.answer(&Event::Step(Vec::new()));
+        let place = |name: &str| step.iter().position(|word| word.name == name);
+        let places = match ["duty", "action_index", "status", "purity of eval"].map(place) {
+            [Some(a), Some(b), Some(c), Some(d)] => [a, b, c, d],
+            _ => return Err("internal fault: the answer to a step lacks a word".to_owned()),
+        };
+        Ok(Self {
+            name,
+            runner,
+            layout,
+            words: Vec::new(),
+            places,
+            _folder: folder,
+        })
+    }
+
+    /// Compiler and level, such as `gcc -O2`.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// A new controller.
+    ///
+    /// # Errors
+    /// If the program does not answer.
+    pub fn restart(&mut self) -> Result<(), String> {
+        self.ask(&Event::Init).map(|_| ())
+    }
+
+    /// One control step; one sample per signal.
+    ///
+    /// # Errors
+    /// If the program does not answer, or its `eval` and `commit` contradict its `step`.
+    pub fn step(&mut self, samples: &[Sample]) -> Result<LiveCommand, String> {
+        let answer = self.ask(&Event::Step(samples.to_vec()))?;
+        let [duty, action, status, purity] = self.places.map(|place| answer[place]);
+        if purity != 0 {
+            return Err(format!("{}: eval and commit contradict step", self.name));
+        }
+        Ok(LiveCommand {
+            duty: f32::from_bits(duty),
+            action_index: action,
+            status,
+        })
+    }
+
+    fn ask(&mut self, event: &Event) -> Result<Vec<u32>, String> {
+        self.words.clear();
+        protocol::encode(event, &mut self.words);
+        let expected = self.layout.answer_len(event);
+        let answer = self.runner.exchange(&self.words, expected);
+        answer.map_err(|error| format!("{}: {}", self.name, error.reason))
+    }
+}
+
+/// Ctrl-C is the caller's business, not the program's.
+fn apart(mut command: Command) -> Command {
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(&mut command, 0);
+    command
+}
+
+fn build_for(language: Language) -> Result<Build, String> {
+    let builds = toolchain::builds(&[]);
+    let suits = |build: &&Build| build.compiler.language == language && LEVELS.contains(&build.level);
+    let found = builds.iter().filter(suits).find(|build| build.program.is_some());
+    found.cloned().ok_or_else(|| {
+        let names: Vec<&str> = builds.iter().filter(suits).map(|build| build.compiler.name).collect();
+        format!(
+            "no compiler for {} on PATH\n   = expected: {}",
+            language.name(),
+            names.join(" or ")
+        )
+    })
+}
+
+fn refused(name: &str, error: BuildError) -> String {
+    match error {
+        BuildError::NoFiles | BuildError::NoSanitiser => format!("{name}: nothing to build"),
+        BuildError::Io(error) => format!("{name}: could not compile: {error}"),
+        BuildError::Refused(text) => format!("{name} refused the generated code:\n{text}"),
+    }
+}

@@ -67,7 +67,11 @@ pub(crate) fn explanations(
         }
         let mut directions = Vec::new();
         let hidden = plan.effects.iter().find(|hidden| hidden.id == effect.id);
-        for bench in hidden.map(|hidden| alone(hidden, plan)).into_iter().chain(variants(effect)) {
+        for bench in hidden
+            .map(|hidden| alone(hidden, plan))
+            .into_iter()
+            .chain(variants(effect))
+        {
             directions.push(direction(runs, training, &bench)?);
         }
         candidates.push(Candidate {

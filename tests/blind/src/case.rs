@@ -1,6 +1,7 @@
 //! Measures a planned case: ngspice runs, sensors, files and the truth about it.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::fmt::Write;
 
 use serde::{Deserialize, Serialize};
@@ -40,7 +41,7 @@ pub struct Truth {
     pub chi2_listed: f64,
     /// Every smallest set of at most two listed causes that leaves no more than noise: the truth and its rivals.
     pub explanations: Vec<Vec<String>>,
-    /// What a perfect model could gain, for each record and column.
+    /// What a perfect model could gain, for each record in open loop and column.
     pub records: Vec<Reducible>,
 }
 
@@ -95,23 +96,36 @@ impl<'a> Runs<'a> {
         }
     }
 
-    /// The noise-free record.
-    pub fn exact(&mut self, bench: &Bench, record: &Record) -> Result<Samples, String> {
+    /// True signals of a record.
+    fn signals(&mut self, bench: &Bench, record: &Record) -> Result<&Signals, String> {
         let plan = self.plan;
         let periods = record.lead + record.duty.len();
         let rows = (periods as f64 * T_SW / T_FINE) as usize - 1;
-        let number = plan.records.iter().position(|other| other.name == record.name);
-        let path = [5, plan.index as u64, number.unwrap_or(0) as u64];
-        let text = netlist(bench, record, &mut Rng::new(plan.seed, &path));
-        if !self.done.contains_key(&text) {
-            let signals = ngspice::run(&text, rows)?;
-            self.done.insert(text.clone(), signals);
-        }
-        let random = &mut Rng::new(plan.seed, &path);
-        Ok(match self.done.get(&text) {
-            Some(signals) => sensing::exact(bench, record, signals, random),
-            None => Samples::new(),
+        let text = netlist(bench, record, &mut self.random(record));
+        Ok(match self.done.entry(text) {
+            Entry::Occupied(entry) => entry.into_mut(),
+            Entry::Vacant(entry) => {
+                let signals =
+                    ngspice::run(entry.key(), rows).map_err(|error| format!("seed {}: {error}", plan.seed))?;
+                entry.insert(signals)
+            }
         })
+    }
+
+    fn random(&self, record: &Record) -> Rng {
+        let number = self.plan.records.iter().position(|other| other.name == record.name);
+        Rng::new(self.plan.seed, &[5, self.plan.index as u64, number.unwrap_or(0) as u64])
+    }
+
+    /// The noise-free record.
+    pub fn exact(&mut self, bench: &Bench, record: &Record) -> Result<Samples, String> {
+        let mut random = self.random(record);
+        Ok(sensing::exact(bench, record, self.signals(bench, record)?, &mut random))
+    }
+
+    /// The column of the duty.
+    fn duty(&mut self, bench: &Bench, record: &Record) -> Result<Vec<f64>, String> {
+        Ok(sensing::duty(record, self.signals(bench, record)?))
     }
 }
 
@@ -127,11 +141,17 @@ pub fn measure(plan: &Plan, with_rivals: bool) -> Result<Case, String> {
     let (mut reducible, mut training) = (Vec::new(), Vec::new());
     for (number, record) in plan.records.iter().enumerate() {
         let hidden = runs.exact(&plan.bench, record)?;
-        let twin = runs.exact(&nominal, record)?;
+        let duty = runs.duty(&plan.bench, record)?;
         let mut noise = Rng::new(plan.seed, &[6, plan.index as u64, number as u64]);
         let shown = sensing::recorded(&plan.bench, &hidden, &mut noise);
         let folder = if record.heldout { "heldout" } else { "train" };
         let path = format!("{folder}/{}.csv", record.name);
+        files.push((path.clone(), csv(plan, record, &duty, &shown)));
+        if record.closed {
+            // a nominal twin would be driven to other duties
+            continue;
+        }
+        let twin = runs.exact(&nominal, record)?;
         for (column, name) in COLUMNS.iter().enumerate().filter(|&(column, _)| recorded(plan, column)) {
             reducible.push(Reducible {
                 record: path.clone(),
@@ -140,7 +160,6 @@ pub fn measure(plan: &Plan, with_rivals: bool) -> Result<Case, String> {
                 reducible: rounded(distance(&hidden, &twin, column)),
             });
         }
-        files.push((path, csv(plan, record, &shown)));
         if !record.heldout {
             training.push((record, hidden, twin));
         }
@@ -206,12 +225,14 @@ fn rounded(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }
 
-fn csv(plan: &Plan, record: &Record, samples: &Samples) -> String {
+fn csv(plan: &Plan, record: &Record, duty: &[f64], samples: &Samples) -> String {
     let columns = if plan.has_v_in { 4 } else { 3 };
     let mut text = format!("t,d,{},r_load,i_load,p_load\n", COLUMNS[..columns].join(","));
     for (row, sample) in samples.iter().enumerate() {
-        let (duty, load) = (record.duty[row], record.load[row]);
-        let _ = write!(text, "{:.5},{duty:.4}", (row as f64 + 0.5) * T_SW);
+        let load = record.load[row];
+        let phase = if record.closed { 0.0 } else { 0.5 };
+        let time = (row as f64 + phase) * T_SW;
+        let _ = write!(text, "{time:.5},{:.6}", duty[row]);
         for value in &sample[..columns] {
             let _ = write!(text, ",{value:.5}");
         }

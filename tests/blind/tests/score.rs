@@ -129,13 +129,18 @@ fn an_unlisted_effect_is_unexplained_or_the_same_thing_by_another_name() {
         .unexplained
     );
     assert!(judge(&odd("mains_pickup"), &answer("unexplained", &json!([]))).knowable);
+    let mut named = answer("consistent", &json!([]));
+    assert!(!judge(&odd("outlier_burst"), &named).unexplained);
+    named.noise.outliers = vec![json!("a:3:v_o")];
+    assert!(judge(&odd("outlier_burst"), &named).unexplained);
 }
 
 #[test]
 fn the_gain_is_measured_from_the_true_floor() {
     let mut diagnosis = answer("explained", &json!([{"id": "dcr"}]));
     let line = |before, after, record: &str| json!({"record": record, "rmse_before": before, "rmse_after": after, "floor": 0.0, "unit": "V"});
-    let heldout = json!([line(1.0, 0.28, "heldout/a.csv"), line(0.1, 0.12, "b.csv")]);
+    let heldout = json!([line(1.0, 0.28, "heldout/a.csv"), line(0.1, 0.12, "b.csv"),
+        {"record": "a", "channel": "v_o", "regime": "DCM", "rmse_before": 1.0, "rmse_after": 2.0, "unit": "V"}]);
     diagnosis.gain.heldout = serde_json::from_value(heldout).unwrap();
     let judged = judge(&dcr(&[&["dcr"]]), &diagnosis);
     // (1.0 - 0.28) / (1.0 - 0.1); record b is not known to have anything reducible

@@ -29,6 +29,9 @@ pub struct Diagnosis {
     /// What the extended model gains.
     #[serde(default)]
     pub gain: Gain,
+    /// Noise and outliers.
+    #[serde(default)]
+    pub noise: Noise,
 }
 
 /// A named cause.
@@ -78,6 +81,14 @@ impl Rival {
     }
 }
 
+/// What was found about the data themselves.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+pub struct Noise {
+    /// Rows taken for wrong.
+    #[serde(default)]
+    pub outliers: Vec<serde_json::Value>,
+}
+
 /// Errors before and after.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 pub struct Gain {
@@ -101,7 +112,14 @@ pub struct Heldout {
     /// V, A, or another for a scaled error.
     #[serde(default)]
     pub unit: String,
-    /// Column, where one record has several lines of the same unit.
+    /// Column; from the unit where missing.
     #[serde(default)]
-    pub column: Option<String>,
+    pub channel: Option<String>,
+    /// Which rows: `all`, or a regime. The score takes all.
+    #[serde(default = "all")]
+    pub regime: String,
+}
+
+fn all() -> String {
+    "all".to_owned()
 }

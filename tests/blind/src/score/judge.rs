@@ -49,7 +49,7 @@ pub struct Judgement {
     pub worst_ratio: f64,
     /// The data show that no listed cause explains them.
     pub knowable: bool,
-    /// Called unexplained, or a cause of the diagnosis' own that is right.
+    /// Called unexplained, or a right answer of the diagnosis' own: the same cause by its name, wrong samples left out.
     pub unexplained: bool,
 }
 
@@ -79,6 +79,8 @@ pub fn judge(truth: &Truth, diagnosis: &Diagnosis) -> Judgement {
     let wanted = || truth.effects.iter().filter(|effect| must_be_found(effect, truth));
     let found = wanted().filter(|effect| causes.iter().any(|cause| covers(cause, &[&effect.id], truth)));
     let quiet = diagnosis.verdict == Verdict::Consistent && causes.is_empty();
+    // wrong samples that were named are an answer
+    let left_out = hidden == ["outlier_burst"] && causes.is_empty() && !diagnosis.noise.outliers.is_empty();
     let (removed, worst_ratio) = gains(truth, diagnosis);
     Judgement {
         kind,
@@ -96,7 +98,7 @@ pub fn judge(truth: &Truth, diagnosis: &Diagnosis) -> Judgement {
         removed,
         worst_ratio,
         knowable: truth.chi2_listed >= KNOWABLE,
-        unexplained: diagnosis.verdict == Verdict::Unexplained || (kind == Kind::Unlisted && right > 0),
+        unexplained: diagnosis.verdict == Verdict::Unexplained || (kind == Kind::Unlisted && (right > 0 || left_out)),
         verdict: diagnosis.verdict,
         hidden: hidden.iter().map(|id| (*id).to_owned()).collect(),
         named: causes.iter().map(shown).collect(),
@@ -187,10 +189,10 @@ fn bound(id: &str, name: &str, value: f64) -> Option<f64> {
 /// Shares of the reducible error removed, and the worst ratio of error after to before.
 fn gains(truth: &Truth, diagnosis: &Diagnosis) -> (Vec<f64>, f64) {
     let (mut removed, mut worst) = (Vec::new(), 0.0_f64);
-    for line in &diagnosis.gain.heldout {
+    for line in diagnosis.gain.heldout.iter().filter(|line| line.regime == "all") {
         worst = worst.max(line.rmse_after / line.rmse_before.max(1e-12));
-        let column = match (&line.column, line.unit.as_str()) {
-            (Some(column), _) => column.as_str(),
+        let column = match (&line.channel, line.unit.as_str()) {
+            (Some(channel), _) => channel.as_str(),
             (None, "V") => "v_o",
             (None, "A") => "i_l",
             _ => continue,

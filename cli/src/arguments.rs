@@ -31,6 +31,8 @@ pub enum Command {
     Simulate(Simulate),
     /// Train a policy on a simulated converter and write its folder
     Train(Train),
+    /// Compare a plant file with measured records, name what it gets wrong, and write a better one
+    Diagnose(Diagnose),
     /// Inspect, compile and verify the built-in example
     Demo(Demo),
     /// Duty ratio mapping: acquire settled points, fit drm.toml, judge it
@@ -158,6 +160,26 @@ pub struct Train {
     /// Go on from the checkpoints that an interrupted training left in DIR, bit for bit
     #[arg(long)]
     pub resume: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct Diagnose {
+    /// The model: plant.toml
+    #[arg(long, value_name = "PLANT")]
+    pub model: PathBuf,
+    /// Measured records to find causes in: CSV with the columns t,d,v_o,i_l,i_o,v_in,r_load,i_load,p_load, as far as
+    /// there are any; without t: settled points
+    #[arg(long, value_name = "CSV", num_args = 1.., required = true)]
+    pub train: Vec<PathBuf>,
+    /// Measured records that only judge the extended model
+    #[arg(long, value_name = "CSV", num_args = 1..)]
+    pub heldout: Vec<PathBuf>,
+    /// Names, units and constants of other tables
+    #[arg(long, value_name = "MAP")]
+    pub columns: Option<PathBuf>,
+    /// Folder for diagnosis.json, plant.extended.toml and report.html
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
 }
 
 #[derive(Debug, Args)]

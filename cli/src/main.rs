@@ -39,6 +39,7 @@ fn main() -> ExitCode {
         Command::Compile(options) => commands::compile::run(options),
         Command::Verify(options) => commands::verify::run(options),
         Command::Train(options) => commands::train::run(options),
+        Command::Diagnose(options) => commands::diagnose::run(options),
         Command::Simulate(options) => commands::simulate::run(options),
         Command::Demo(options) => commands::demo::run(options),
         Command::Drm(command) => commands::drm::run(command),

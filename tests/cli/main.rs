@@ -97,6 +97,14 @@ fn assert_refused(ran: &Ran, words: &[&str]) {
     }
 }
 
+/// Ctrl-C for a child; how it ended.
+#[cfg(unix)]
+fn interrupt(child: std::process::Child) -> std::process::Output {
+    let signalled = run(Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]));
+    assert_eq!(signalled.code, Some(0));
+    child.wait_with_output().unwrap()
+}
+
 /// Name and content of each file of a folder and its folders.
 fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let names = tests::tools::listing(folder);

@@ -173,6 +173,18 @@ fn another_plant_takes_the_place_of_the_scenario_s() {
 }
 
 #[test]
+fn a_policy_that_loses_the_voltage_is_said_to() {
+    let desk = desk();
+    let settled = desk.succeed("simulate s.toml --policy policy --out a");
+    assert!(!settled.contains("does not settle"), "{settled}");
+    let said = desk.succeed("simulate s.toml --policy policy --out b --plant plants/paper-table.toml");
+    let words = "the policy does not settle within 0.5 V of 100 V before or after 200 -> 500 W, 500 -> 200 W";
+    assert!(said.contains(words), "{said}");
+    let page = desk.read("b/report.html");
+    assert!(page.contains("verdict warn") && page.contains("does not settle"));
+}
+
+#[test]
 fn results_are_not_overwritten() {
     let desk = desk();
     desk.succeed("simulate s.toml --policy policy --out out");
@@ -262,9 +274,7 @@ fn an_interrupted_simulation_ends_with_130_and_writes_nothing() {
             assert!(begun.elapsed() < Duration::from_secs(60) && child.try_wait().unwrap().is_none());
             std::thread::sleep(Duration::from_millis(5));
         }
-        let signalled = run(std::process::Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]));
-        assert_eq!(signalled.code, Some(0));
-        let ended = child.wait_with_output().unwrap();
+        let ended = super::interrupt(child);
         assert_eq!(ended.status.code(), Some(130));
         assert!(String::from_utf8_lossy(&ended.stdout).contains("nothing written"));
         assert!(!desk.path("out").exists());

@@ -3,7 +3,7 @@
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use tests::tools::{Ran, copy_folder, run};
+use tests::tools::{Ran, copy_folder};
 
 use super::{Desk, contents};
 
@@ -111,9 +111,7 @@ fn an_interrupted_training_goes_on_to_the_same_bytes() {
         assert!(begun.elapsed() < Duration::from_secs(120) && child.try_wait().unwrap().is_none());
         std::thread::sleep(Duration::from_millis(5));
     }
-    let signalled = run(std::process::Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]));
-    assert_eq!(signalled.code, Some(0));
-    let ended = child.wait_with_output().unwrap();
+    let ended = super::interrupt(child);
     assert_eq!(ended.status.code(), Some(130));
     let text = String::from_utf8(ended.stdout).unwrap();
     assert!(text.contains("--resume"), "{text}");

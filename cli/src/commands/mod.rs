@@ -2,6 +2,7 @@
 
 pub mod compile;
 pub mod demo;
+pub mod diagnose;
 pub mod drm;
 pub mod inspect;
 mod interruption;

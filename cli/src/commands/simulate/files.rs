@@ -146,6 +146,27 @@ pub fn explanation(setting: &Setting) -> String {
     )
 }
 
+/// The load steps before or after which the policy does not stay within the settling band, in words.
+pub fn unsettled(found: &Findings) -> Option<String> {
+    let lost = |step: &&Step| {
+        let policy = step.courses.first();
+        policy.is_some_and(|policy| policy.finding.worst.tail_max.max(policy.finding.worst.pre_error) > SETTLED)
+    };
+    let steps: Vec<String> = found
+        .steps
+        .iter()
+        .filter(lost)
+        .map(|step| step.step.to_string())
+        .collect();
+    (!steps.is_empty()).then(|| {
+        format!(
+            "the policy does not settle within {SETTLED} V of {} V before or after {}",
+            found.setting.v_ref,
+            steps.join(", ")
+        )
+    })
+}
+
 /// The summary, also printed.
 pub fn summary(found: &Findings) -> String {
     let setting = &found.setting;
@@ -168,7 +189,7 @@ pub fn summary(found: &Findings) -> String {
     if let Some(check) = &found.check {
         out.push_str(&format!("\n{}\n", check_text(check)));
     }
-    for note in &setting.notes {
+    for note in unsettled(found).iter().chain(&setting.notes) {
         out.push_str(&format!("\nnote: {note}\n"));
     }
     out

@@ -9,11 +9,7 @@ use crate::Failure;
 /// One HTML file; `drawn` are the pictures of the load steps in their order.
 pub fn page(found: &Findings, drawn: Vec<Svg>) -> Result<String, Failure> {
     let setting = &found.setting;
-    let (verdict, sentence) = match &found.check {
-        None => (Verdict::Note, worst(found)),
-        Some(check) if check.differences.is_empty() => (Verdict::Pass, files::check_text(check)),
-        Some(check) => (Verdict::Fail, files::check_text(check)),
-    };
+    let (verdict, sentence) = verdict(found);
     let setup = [
         ("policy", setting.policy.name.clone()),
         ("run by", found.controller.clone()),
@@ -37,6 +33,25 @@ const CAPTION: &str = "The first sampling instant. Voltages and currents are sam
     are the smallest deviation that any sequence of duties of the range reaches from rest; a policy that dithers meets the step \
     with another current and can stay within it at one instant. The table is of all instants.";
 
+fn verdict(found: &Findings) -> (Verdict, String) {
+    let compared = found.check.as_ref().map(files::check_text);
+    let different = found.check.as_ref().is_some_and(|check| !check.differences.is_empty());
+    let sentences = |first: String| {
+        [Some(first), compared]
+            .into_iter()
+            .flatten()
+            .collect::<Vec<_>>()
+            .join("; ")
+    };
+    match files::unsettled(found) {
+        Some(text) if different => (Verdict::Fail, sentences(text)),
+        Some(text) => (Verdict::Warn, sentences(text)),
+        None if different => (Verdict::Fail, sentences(worst(found))),
+        None if found.check.is_some() => (Verdict::Pass, sentences(worst(found))),
+        None => (Verdict::Note, worst(found)),
+    }
+}
+
 /// The policy's largest deviation.
 fn worst(found: &Findings) -> String {
     let of_policy = found
@@ -52,7 +67,7 @@ fn worst(found: &Findings) -> String {
             deviation, settling, ..
         } = course.finding.worst;
         format!(
-            "Largest deviation: {deviation:.2} V, at {}, settled after {:.2} ms.",
+            "the policy's largest deviation is {deviation:.2} V, at {}, settled after {:.2} ms",
             step.step,
             1e3 * settling
         )

@@ -27,6 +27,8 @@ pub enum Command {
     Compile(Compile),
     /// Compile the generated code and compare it with the interpreter, bit by bit
     Verify(Verify),
+    /// List the deployment targets: processor, compilers, where verify runs them
+    Targets(Targets),
     /// Close a policy's loop on a simulated converter: load steps, classical controllers and the limit beside it
     Simulate(Simulate),
     /// Train a policy on a simulated converter and write its folder
@@ -81,9 +83,12 @@ pub struct Compile {
     /// Language; several separated by commas
     #[arg(long, value_enum, value_delimiter = ',', default_value = "c")]
     pub lang: Vec<Lang>,
-    /// Deployment target
+    /// Deployment target; `policyc targets` lists them
     #[arg(long, default_value = "host")]
     pub target: String,
+    /// Do not build and run the code under the target's emulator to report memory, stack and instructions of a step
+    #[arg(long)]
+    pub no_costs: bool,
     /// Folder for the generated files; made if missing
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
@@ -99,6 +104,10 @@ pub struct Verify {
     /// Seed of the generated measurements
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
+    /// Deployment target: its compilers and, where it is not this machine, its emulator. Unless given: the target of the
+    /// generated folder, else host
+    #[arg(long)]
+    pub target: Option<String>,
     /// Verify the generated code in this folder, and that it is what the policy yields today
     #[arg(long, value_name = "DIR")]
     pub generated: Option<PathBuf>,
@@ -142,6 +151,13 @@ pub struct Simulate {
     /// bit by bit
     #[arg(long)]
     pub check: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct Targets {
+    /// Machine-readable, with everything the compiler knows of a target
+    #[arg(long)]
+    pub json: bool,
 }
 
 #[derive(Debug, Args)]

@@ -157,9 +157,9 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     say("intervals");
     let profiles = profiles(&problem, &attribution);
     let structure = structures(&problem, attribution.state(), attribution.inflation);
-    let named = named(&problem, &attribution, &profiles);
+    let named = named(&attribution, &profiles);
     let lattice = quantised(&problem);
-    let verdict = verdict(&attribution, &named, &lattice, &structure);
+    let verdict = verdict(&named, &lattice, &structure);
     let explained = verdict != Verdict::Unexplained;
     say("held-out records");
     let extended = attribution.state().model.clone();
@@ -214,11 +214,10 @@ fn prepared(train: Vec<Record>, base: &Model) -> (Problem, State, Vec<Outlier>) 
     (problem, null, outliers)
 }
 
-fn named(problem: &Problem, attribution: &Attribution, profiles: &[Profile]) -> Vec<Named> {
+fn named(attribution: &Attribution, profiles: &[Profile]) -> Vec<Named> {
     let Some(best) = &attribution.best else {
         return Vec::new();
     };
-    let _ = problem;
     let of = |(member, cause): (usize, &usize)| {
         let candidate = &attribution.candidates[*cause];
         let own = profiles.iter().filter(|profile| profile.member == member);
@@ -282,11 +281,10 @@ fn quantised(problem: &Problem) -> Option<Named> {
     })
 }
 
-fn verdict(attribution: &Attribution, named: &[Named], lattice: &Option<Named>, structure: &[Structure]) -> Verdict {
+fn verdict(named: &[Named], lattice: &Option<Named>, structure: &[Structure]) -> Verdict {
     if !structure.is_empty() {
         return Verdict::Unexplained;
     }
-    let _ = attribution;
     if named.iter().any(|cause| !cause.rivals.is_empty()) {
         return Verdict::Ambiguous;
     }

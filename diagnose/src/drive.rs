@@ -126,7 +126,7 @@ impl Driver<'_> {
         }
         let sample = plant.reset_within(start[0], start[1], &load[first], &history);
         shown[segment.start] = array(&sample.measured);
-        for n in segment.start + 1..segment.end {
+        for (n, place) in (segment.start + 1..).zip(&mut shown[segment.start + 1..segment.end]) {
             let now = self.period(n);
             let before = self.period(n - 1);
             let sample = if self.phase > 0.0 {
@@ -134,7 +134,7 @@ impl Driver<'_> {
             } else {
                 plant.step(duty[before], &load[before])
             };
-            shown[n] = array(&sample.measured);
+            *place = array(&sample.measured);
         }
     }
 

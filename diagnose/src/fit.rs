@@ -126,18 +126,25 @@ impl Fitter<'_> {
             return self.from(&[cause], only, from);
         }
         let best = self.best_start(cause, &starts, from);
-        self.from(&[cause], best.map_or(&self.candidates[cause].own, |(_, values)| values), from)
+        self.from(
+            &[cause],
+            best.map_or(&self.candidates[cause].own, |(_, values)| values),
+            from,
+        )
     }
 
     /// Chi-square of the best start of a candidate, not fitted further.
     #[must_use]
     pub fn look(&self, cause: usize, from: &State) -> f64 {
         let starts = self.starts(cause);
-        self.best_start(cause, &starts, from).map_or(f64::INFINITY, |(chi2, _)| chi2)
+        self.best_start(cause, &starts, from)
+            .map_or(f64::INFINITY, |(chi2, _)| chi2)
     }
 
     fn best_start<'v>(&self, cause: usize, starts: &'v [Vec<f64>], from: &State) -> Option<(f64, &'v Vec<f64>)> {
-        let looks = starts.iter().map(|values| (self.state_at(&[cause], values, from, 1).0.chi2, values));
+        let looks = starts
+            .iter()
+            .map(|values| (self.state_at(&[cause], values, from, 1).0.chi2, values));
         looks.min_by(|a, b| a.0.total_cmp(&b.0))
     }
 

@@ -179,7 +179,7 @@ fn training(diagnosis: &Diagnosis) -> Result<Section, ReportError> {
                 y.push(value * problem.sigma[0]);
             }
         }
-        if !x.is_empty() && !(same && name == "extended") {
+        if !(x.is_empty() || same && name == "extended") {
             chart = chart.panel(
                 Panel::new(Axis::new(name).unit("V"))
                     .height(120.0)

@@ -128,8 +128,7 @@ impl Problem {
     fn guess(&self, record: &Record, row: usize) -> Start {
         let near = |channel: usize| {
             let values = &record.measured[channel];
-            let found = values.iter().skip(row).take(3).copied().find(|v| v.is_finite());
-            found
+            values.iter().skip(row).take(3).copied().find(|v| v.is_finite())
         };
         let v_in = self.base.plant.converter.v_in * record.v_in_ratio;
         let v = near(0).unwrap_or(record.duty[row] * v_in);

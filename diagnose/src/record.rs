@@ -310,7 +310,7 @@ impl Raw {
 
     fn place(&mut self, time: &[f64], t_sw: f64, phase: Option<f64>, step: f64) -> (Vec<Option<usize>>, f64) {
         let fraction = (time[0] / t_sw).rem_euclid(1.0);
-        let phase = phase.unwrap_or(if fraction > 1.0 - 1e-3 || fraction < 1e-3 {
+        let phase = phase.unwrap_or(if !(1e-3..=1.0 - 1e-3).contains(&fraction) {
             0.0
         } else {
             fraction

@@ -3,7 +3,7 @@
 use crate::fit::State;
 use crate::noise::{self, BLOCK, channel};
 use crate::problem::Problem;
-use crate::record::{CHANNEL_NAMES, CHANNELS};
+use crate::record::CHANNEL_NAMES;
 use crate::spectrum::strongest_line;
 
 /// Structure is seen where block means scatter this much more than white noise of the same size would let them.
@@ -35,7 +35,7 @@ pub struct Structure {
 pub fn structures(problem: &Problem, state: &State, inflation: f64) -> Vec<Structure> {
     let mut found = Vec::new();
     for (index, record) in problem.records.iter().enumerate() {
-        for n in 0..CHANNELS {
+        for (n, name) in CHANNEL_NAMES.iter().enumerate() {
             let values = channel(problem, &state.residual, index, n);
             let left = noise::left(&values);
             if left.blocks < 5 {
@@ -49,7 +49,7 @@ pub fn structures(problem: &Problem, state: &State, inflation: f64) -> Vec<Struc
             if (slow || wild) && !coarse {
                 found.push(Structure {
                     record: record.name.clone(),
-                    channel: CHANNEL_NAMES[n],
+                    channel: name,
                     mean_square: left.square,
                     slow: left.slow,
                     correlation: left.lag1,

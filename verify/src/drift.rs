@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use codegen::Language;
+use codegen::{Language, manifest};
 use policy::Policy;
 use serde::Serialize;
 use targets::TargetSpec;
@@ -133,6 +133,8 @@ fn read(expected: &Files, name: &str, folder: &Path) -> Result<Files, VerifyErro
     for path in paths {
         let place = folder.join(&path);
         match read_text(&place) {
+            // what a step costs depends on the compilers of a machine
+            Ok(text) if path == manifest::FILE => drop(files.insert(path, manifest::without_costs(&text))),
             Ok(text) => drop(files.insert(path, text)),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
             Err(error) => return Err(VerifyError::Io(place, error)),

@@ -15,14 +15,17 @@
 //! | who answers | [`runner`]: [`runner::Runner`] has one implementation per way of running a build |
 //! | a loop closed around a build | [`live`] |
 //! | what differs | [`compare`], [`report`] |
+//! | what a step costs | [`mod@measure`], [`elf`] |
 //! | checked-in files against the policy | [`drift()`] |
 
 pub mod compare;
 pub mod drift;
 pub mod drivers;
+pub mod elf;
 mod golden;
 pub mod lane;
 pub mod live;
+pub mod measure;
 pub mod oracle;
 pub mod protocol;
 pub mod report;

@@ -6,6 +6,7 @@ use codegen::{GeneratedFiles, Language, manifest};
 use policy::Policy;
 use targets::TargetSpec;
 
+use super::costs::Measured;
 use super::verify::golden_text;
 use super::{bytes, grouped};
 use crate::arguments::Compile;
@@ -25,8 +26,17 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
     let mut languages: Vec<Language> = options.lang.iter().map(|lang| (*lang).into()).collect();
     languages.sort();
     languages.dedup();
-    let files = codegen::generate(&policy, target, &languages)?;
+    let mut files = codegen::generate(&policy, target, &languages)?;
+    let measured = if options.no_costs {
+        Measured::default()
+    } else {
+        Measured::of(&policy, target, &languages, &files)
+    };
+    if let (false, Some(manifest)) = (measured.costs.is_empty(), files.files.get_mut(manifest::FILE)) {
+        *manifest = manifest::with_costs(manifest, &measured.costs)?;
+    }
     write(&policy, target, &options.out, &files)?;
+    measured.say(&policy, target)?;
     Ok(Outcome::Done)
 }
 

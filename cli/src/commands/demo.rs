@@ -59,6 +59,7 @@ pub fn run(options: &Demo) -> Result<Outcome, Failure> {
         policy: policy_folder.clone(),
         steps: options.steps,
         seed: 1,
+        target: None,
         generated: Some(options.out.join("generated")),
         trace: Vec::new(),
         json: false,

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 /// From a trained policy to verified controller code.
@@ -27,10 +28,14 @@ pub enum Command {
     Compile(Compile),
     /// Compile the generated code and compare it with the interpreter, bit by bit
     Verify(Verify),
+    /// List the deployment targets: processor, compilers, where verify runs them
+    Targets(Targets),
     /// Close a policy's loop on a simulated converter: load steps, classical controllers and the limit beside it
     Simulate(Simulate),
     /// Train a policy on a simulated converter and write its folder
     Train(Train),
+    /// Compare a plant file with measured records, name what it gets wrong, and write a better one
+    Diagnose(Diagnose),
     /// Inspect, compile and verify the built-in example
     Demo(Demo),
     /// Duty ratio mapping: acquire settled points, fit drm.toml, judge it
@@ -72,6 +77,12 @@ impl From<Lang> for codegen::Language {
     }
 }
 
+/// Reads the name of a door.
+fn door() -> impl TypedValueParser<Value = codegen::Door> {
+    let names = codegen::Door::ALL.map(codegen::Door::name);
+    PossibleValuesParser::new(names).try_map(|name| codegen::Door::find(&name).ok_or("unknown door"))
+}
+
 #[derive(Debug, Args)]
 pub struct Compile {
     /// policy.toml or the folder that holds it
@@ -79,9 +90,19 @@ pub struct Compile {
     /// Language; several separated by commas
     #[arg(long, value_enum, value_delimiter = ',', default_value = "c")]
     pub lang: Vec<Lang>,
-    /// Deployment target
+    /// Deployment target; `policyc targets` lists them
     #[arg(long, default_value = "host")]
     pub target: String,
+    /// Do not build and run the code under the target's emulator to report memory, stack and instructions of a step
+    #[arg(long)]
+    pub no_costs: bool,
+    /// Also generate a way into a tool or onto a board, with the C core; may be repeated. kit: C test program with
+    /// expected bits for your compiler and board. sfunction: Simulink block, also for dSPACE RTI
+    #[arg(long, value_name = "NAME", value_parser = door())]
+    pub door: Vec<codegen::Door>,
+    /// Control steps in the kit
+    #[arg(long, value_name = "N", default_value_t = verify::kit::DEFAULT_STEPS, value_parser = clap::value_parser!(u32).range(1..=200_000))]
+    pub kit_steps: u32,
     /// Folder for the generated files; made if missing
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
@@ -97,6 +118,10 @@ pub struct Verify {
     /// Seed of the generated measurements
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
+    /// Deployment target: its compilers and, where it is not this machine, its emulator. Unless given: the target of the
+    /// generated folder, else host
+    #[arg(long)]
+    pub target: Option<String>,
     /// Verify the generated code in this folder, and that it is what the policy yields today
     #[arg(long, value_name = "DIR")]
     pub generated: Option<PathBuf>,
@@ -143,6 +168,13 @@ pub struct Simulate {
 }
 
 #[derive(Debug, Args)]
+pub struct Targets {
+    /// Machine-readable, with everything the compiler knows of a target
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
 pub struct Train {
     /// Training file: plant, contract, network, reward, scenarios, specification, seeds
     pub settings: PathBuf,
@@ -158,6 +190,26 @@ pub struct Train {
     /// Go on from the checkpoints that an interrupted training left in DIR, bit for bit
     #[arg(long)]
     pub resume: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct Diagnose {
+    /// The model: plant.toml
+    #[arg(long, value_name = "PLANT")]
+    pub model: PathBuf,
+    /// Measured records to find causes in: CSV with the columns t,d,v_o,i_l,i_o,v_in,r_load,i_load,p_load, as far as
+    /// there are any; without t: settled points
+    #[arg(long, value_name = "CSV", num_args = 1.., required = true)]
+    pub train: Vec<PathBuf>,
+    /// Measured records that only judge the extended model
+    #[arg(long, value_name = "CSV", num_args = 1..)]
+    pub heldout: Vec<PathBuf>,
+    /// Names, units and constants of other tables
+    #[arg(long, value_name = "MAP")]
+    pub columns: Option<PathBuf>,
+    /// Folder for diagnosis.json, plant.extended.toml and report.html
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
 }
 
 #[derive(Debug, Args)]

@@ -143,6 +143,20 @@ impl Plant {
         self.finish(signals, Track::at(i_l, v_out))
     }
 
+    /// [`Plant::reset_at`] in the middle of a run: `commanded` are the duties given before, the latest last. The one in
+    /// force and those that wait are taken from its end; where it is too short they are as after [`Plant::reset_at`].
+    pub fn reset_within(&mut self, v_out: f64, i_l: f64, load: &Load, commanded: &[f64]) -> Sample {
+        let sample = self.reset_at(v_out, i_l, load);
+        let waits = self.parameters.pwm.duty_delay as usize;
+        for duty in &commanded[commanded.len().saturating_sub(waits + 1)..] {
+            self.state.applied = self.modulate(*duty);
+        }
+        if self.parameters.pwm.sampling_phase > 0.0 {
+            self.state.gates.plan(&self.timing, self.state.applied);
+        }
+        sample
+    }
+
     /// One control period with `duty` (commanded now, clamped to 0..1) under `load`.
     ///
     /// The duty acts from the next start of a PWM period, which is now if the plant is sampled there, plus

@@ -1,20 +1,23 @@
 //! One file per command.
 
 pub mod compile;
+mod costs;
 pub mod demo;
+pub mod diagnose;
 pub mod drm;
 pub mod inspect;
 mod interruption;
 pub mod new;
 mod progress_line;
 pub mod simulate;
+pub mod targets;
 pub mod train;
 pub mod verify;
 
 use std::path::{Path, PathBuf};
 
+use ::targets::TargetSpec;
 use policy::Policy;
-use targets::TargetSpec;
 
 use crate::Failure;
 
@@ -40,8 +43,8 @@ fn load(path: &Path) -> Result<Policy, Failure> {
 }
 
 fn target(name: &str) -> Result<&'static TargetSpec, Failure> {
-    targets::find(name).ok_or_else(|| {
-        let known = targets::names().join(", ");
+    ::targets::find(name).ok_or_else(|| {
+        let known = ::targets::names().join(", ");
         Failure(format!(
             "unknown target\n   = found: {name}\n   = expected: one of {known}"
         ))

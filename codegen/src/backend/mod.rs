@@ -1,10 +1,16 @@
 //! Backends: [`Program`] -> [`GeneratedFiles`], as data.
 
 #[cfg(feature = "c")]
+mod block;
+#[cfg(feature = "c")]
 pub mod c99;
+#[cfg(feature = "c")]
+pub mod kit;
 #[cfg(feature = "c")]
 mod literal;
 pub mod rust;
+#[cfg(feature = "c")]
+pub mod sfunction;
 
 use crate::{CodegenError, GeneratedFiles, Program};
 

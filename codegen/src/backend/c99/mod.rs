@@ -1,7 +1,7 @@
 //! C99 that also compiles as C90 with `stdint.h` and as C++: one header, one source.
 
-mod statements;
-mod tables;
+pub(super) mod statements;
+pub(super) mod tables;
 
 use std::collections::BTreeMap;
 
@@ -19,16 +19,19 @@ pub struct C99;
 
 impl Backend for C99 {
     fn emit(&self, program: &Program) -> Result<GeneratedFiles, CodegenError> {
-        let render = |result: Result<String, templates::Error>| {
-            result
-                .map(|text| tidy(&text))
-                .map_err(|error| CodegenError::Template(error.to_string()))
-        };
         let mut files = BTreeMap::new();
-        files.insert(format!("{}.h", program.name), render(header(program).render())?);
-        files.insert(format!("{}.c", program.name), render(source(program).render())?);
+        files.insert(format!("{}.h", program.name), render(&header(program))?);
+        files.insert(format!("{}.c", program.name), render(&source(program))?);
         Ok(GeneratedFiles { files })
     }
+}
+
+/// The text of a template.
+pub(super) fn render(view: &impl Template) -> Result<String, CodegenError> {
+    let text = view
+        .render()
+        .map_err(|error| CodegenError::Template(error.to_string()))?;
+    Ok(tidy(&text))
 }
 
 /// Optional parts of a template leave runs of empty lines behind; a file ends with one newline.
@@ -63,7 +66,7 @@ fn common(program: &Program) -> Common {
 }
 
 /// Name of a coefficient as parameter; the state member is `mapping_<name>`.
-fn coefficient_name(coefficient: Coefficient) -> &'static str {
+pub(super) fn coefficient_name(coefficient: Coefficient) -> &'static str {
     match coefficient {
         Coefficient::A => "a",
         Coefficient::B => "b",

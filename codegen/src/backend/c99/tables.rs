@@ -35,7 +35,8 @@ pub fn tables(program: &Program) -> Vec<Table> {
     all
 }
 
-fn floats(name: String, values: &[f32]) -> Table {
+/// A table of floats.
+pub fn floats(name: String, values: &[f32]) -> Table {
     Table {
         element: "float",
         name,
@@ -44,7 +45,8 @@ fn floats(name: String, values: &[f32]) -> Table {
     }
 }
 
-fn words(name: &str, values: &[u32]) -> Table {
+/// A table of 32-bit words.
+pub fn words(name: &str, values: &[u32]) -> Table {
     let literals = values.iter().map(|word| format!("0x{word:08X}u"));
     Table {
         element: "uint32_t",

@@ -1,0 +1,400 @@
+//! From records to a verdict.
+
+use std::collections::BTreeMap;
+
+use plant::Parameters;
+use serde::Serialize;
+
+use crate::attribute::{Attribution, attribute};
+use crate::drive::Model;
+use crate::fit::State;
+use crate::gain::{self, Held, Pair};
+use crate::noise::{self, Outlier};
+use crate::problem::Problem;
+use crate::profile::{Profile, profiles};
+use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
+use crate::shape::{Structure, structures};
+
+/// The answer in a word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// The model explains the data.
+    Consistent,
+    /// Named causes explain the rest, and nothing else does.
+    Explained,
+    /// Causes explain the rest, and others would as well.
+    Ambiguous,
+    /// None of the known causes does.
+    Unexplained,
+}
+
+/// A value with its 95 % interval.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Value {
+    /// Best value.
+    pub value: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// SI unit.
+    pub unit: &'static str,
+    /// The model's own value.
+    pub model: f64,
+}
+
+/// How sure a cause is.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Evidence {
+    /// Chi-square lost without it, over the scatter of the noise.
+    pub delta_chi2: f64,
+    /// What noise alone reaches in less than 1 % of records.
+    pub threshold: f64,
+}
+
+/// A named cause.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Named {
+    /// Which.
+    pub id: &'static str,
+    /// In words.
+    pub words: &'static str,
+    /// Its parameters.
+    pub parameters: BTreeMap<&'static str, Value>,
+    /// How sure.
+    pub evidence: Evidence,
+    /// What would explain the data as well in its place; each a set of ids.
+    pub rivals: Vec<Vec<&'static str>>,
+}
+
+/// A cause that the records cannot show unless it is large.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Hidden {
+    /// Which.
+    pub id: &'static str,
+    /// Parameter.
+    pub parameter: &'static str,
+    /// Smallest change that would be seen.
+    pub smallest: f64,
+    /// SI unit.
+    pub unit: &'static str,
+}
+
+/// Noise and what was left out.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Noise {
+    /// Standard deviation of each measured channel.
+    pub sigma: BTreeMap<&'static str, f64>,
+    /// Scatter of sums over that of independent noise: noise shared among records or correlated in time.
+    pub inflation: f64,
+    /// Rows left out, as `record:row:channel`.
+    pub outliers: Vec<String>,
+    /// What was repaired or assumed in each record.
+    pub repairs: Vec<String>,
+    /// Duty that the gate's edges seem to add, 1: within the accuracy of a model of ideal edges, no cause.
+    pub trim: f64,
+}
+
+/// What the extension is worth.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Gain {
+    /// Held-out errors.
+    pub heldout: Vec<Held>,
+    /// Mean square over that of the noise, all held-out records: before and after.
+    pub mean_square: [f64; 2],
+    /// Closed loop with a policy, if one was given.
+    pub closed_loop: Option<serde_json::Value>,
+}
+
+/// What is written to `diagnosis.json`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Findings {
+    /// The answer.
+    pub verdict: Verdict,
+    /// The same in a sentence.
+    pub sentence: String,
+    /// Named causes; empty if none is needed or none explains the data.
+    pub causes: Vec<Named>,
+    /// What explains part of it where the verdict is `unexplained`.
+    pub partial: Vec<Named>,
+    /// Structure that is left.
+    pub structure: Vec<Structure>,
+    /// Causes that would have to be large to be seen.
+    pub not_detectable: Vec<Hidden>,
+    /// Experiments that would separate what is tied.
+    pub next_experiments: Vec<crate::next::Experiment>,
+    /// Noise.
+    pub noise: Noise,
+    /// Held-out gain.
+    pub gain: Gain,
+}
+
+/// Everything a report shows.
+#[derive(Debug)]
+pub struct Diagnosis {
+    /// For `diagnosis.json`.
+    pub findings: Findings,
+    /// Training records.
+    pub problem: Problem,
+    /// What was fitted.
+    pub attribution: Attribution,
+    /// Profiles of the parameters.
+    pub profiles: Vec<Profile>,
+    /// Held-out records.
+    pub held: Option<Pair>,
+    /// The extended model.
+    pub extended: Model,
+}
+
+/// Diagnoses `model` by the records `train`; `heldout` only judges. `say` hears how far it is.
+#[must_use]
+pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say: &(dyn Fn(&str) + Sync)) -> Diagnosis {
+    let base = Model::new(model);
+    say("noise and initial states");
+    let (problem, null, outliers) = prepared(train, &base);
+    let attribution = attribute(&problem, null, say);
+    say("intervals");
+    let profiles = profiles(&problem, &attribution);
+    let structure = structures(&problem, attribution.state(), attribution.inflation);
+    let named = named(&attribution, &profiles);
+    let lattice = quantised(&problem);
+    let verdict = verdict(&named, &lattice, &structure);
+    let explained = verdict != Verdict::Unexplained;
+    say("held-out records");
+    let extended = attribution.state().model.clone();
+    let trim = attribution.state().starts.trim;
+    let pair = (!heldout.is_empty()).then(|| gain::hold(heldout, &base, &extended, problem.sigma, trim));
+    let next_experiments = match explained {
+        true => crate::next::experiments(&problem, &attribution, say),
+        false => Vec::new(),
+    };
+    let mut causes = if explained { named.clone() } else { Vec::new() };
+    if explained {
+        causes.extend(lattice);
+    }
+    let findings = Findings {
+        sentence: sentence(verdict, &causes, &structure),
+        verdict,
+        partial: if explained { Vec::new() } else { named },
+        causes,
+        structure,
+        not_detectable: hidden(&problem, &attribution),
+        next_experiments,
+        noise: noise_of(&problem, &attribution, &outliers, pair.as_ref()),
+        gain: Gain {
+            heldout: pair.as_ref().map_or_else(Vec::new, Pair::errors),
+            mean_square: pair.as_ref().map_or([f64::NAN; 2], |pair| pair.total().into()),
+            closed_loop: None,
+        },
+    };
+    Diagnosis {
+        findings,
+        problem,
+        attribution,
+        profiles,
+        held: pair,
+        extended,
+    }
+}
+
+/// Noise estimated, outliers masked, initial states fitted.
+fn prepared(train: Vec<Record>, base: &Model) -> (Problem, State, Vec<Outlier>) {
+    let mut problem = Problem::new(train, base.clone());
+    let mut null = State::settle(&problem, base, &problem.first_starts(), None);
+    problem.sigma = noise::sigma(&problem, &null.residual);
+    null = State::settle(&problem, base, &null.starts, None);
+    let outliers = noise::outliers(&problem, &null.residual);
+    for one in &outliers {
+        problem.masked[one.record][one.channel][one.row] = true;
+    }
+    null = State::settle(&problem, base, &null.starts, None);
+    problem.sigma = noise::sigma(&problem, &null.residual);
+    null = State::settle(&problem, base, &null.starts, None);
+    (problem, null, outliers)
+}
+
+fn named(attribution: &Attribution, profiles: &[Profile]) -> Vec<Named> {
+    let Some(best) = &attribution.best else {
+        return Vec::new();
+    };
+    let of = |(member, cause): (usize, &usize)| {
+        let candidate = &attribution.candidates[*cause];
+        let own = profiles.iter().filter(|profile| profile.member == member);
+        let parameters = own.map(|p| {
+            let value = Value {
+                value: p.value,
+                low: p.interval[0],
+                high: p.interval[1],
+                unit: p.unit,
+                model: p.own,
+            };
+            (p.name, value)
+        });
+        let rivals = attribution.rivals[member].iter().map(|fit| {
+            let mut ids: Vec<&str> = fit.causes.iter().map(|cause| attribution.id(*cause)).collect();
+            ids.dedup();
+            ids
+        });
+        Named {
+            id: candidate.cause.id,
+            words: candidate.cause.words,
+            parameters: parameters.collect(),
+            evidence: Evidence {
+                delta_chi2: attribution.evidence[member] / attribution.inflation,
+                threshold: crate::attribute::threshold(candidate.own.len(), 1.0),
+            },
+            rivals: rivals.collect(),
+        }
+    };
+    best.causes.iter().enumerate().map(of).collect()
+}
+
+/// Channels whose values lie on the steps of a converter that the model does not have.
+fn quantised(problem: &Problem) -> Option<Named> {
+    let sensors = &problem.base.plant.sensors;
+    let known = [sensors.v_out.lsb, sensors.i_l.lsb, sensors.i_out.lsb, sensors.v_in.lsb];
+    let names = ["v_lsb", "i_lsb", "i_o_lsb", "v_in_lsb"];
+    let mut parameters = BTreeMap::new();
+    for n in 0..CHANNELS {
+        let step = problem.records.iter().map(|r| r.lattice[n]).fold(0.0, f64::max);
+        if step > 0.0 && (known[n] - step).abs() > 0.02 * step {
+            let value = Value {
+                value: step,
+                low: 0.999 * step,
+                high: 1.001 * step,
+                unit: crate::record::CHANNEL_UNITS[n],
+                model: known[n],
+            };
+            parameters.insert(names[n], value);
+        }
+    }
+    (!parameters.is_empty()).then(|| Named {
+        id: "adc_quantisation",
+        words: "step of the converter",
+        parameters,
+        evidence: Evidence {
+            delta_chi2: f64::MAX,
+            threshold: 0.0,
+        },
+        rivals: Vec::new(),
+    })
+}
+
+fn verdict(named: &[Named], lattice: &Option<Named>, structure: &[Structure]) -> Verdict {
+    if !structure.is_empty() {
+        return Verdict::Unexplained;
+    }
+    if named.iter().any(|cause| !cause.rivals.is_empty()) {
+        return Verdict::Ambiguous;
+    }
+    match named.is_empty() && lattice.is_none() {
+        true => Verdict::Consistent,
+        false => Verdict::Explained,
+    }
+}
+
+fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure]) -> String {
+    let list = |causes: &[Named]| {
+        let words = causes.iter().map(|cause| {
+            let values = cause.parameters.iter().map(|(name, v)| {
+                let unit = if v.unit == "1" { "" } else { v.unit };
+                format!(
+                    "{name} {} (95 %: {} to {}; model {})",
+                    si(v.value, unit),
+                    si(v.low, unit),
+                    si(v.high, unit),
+                    si(v.model, unit)
+                )
+            });
+            format!(
+                "{} [{}]: {}",
+                cause.words,
+                cause.id,
+                values.collect::<Vec<_>>().join(", ")
+            )
+        });
+        words.collect::<Vec<_>>().join("; ")
+    };
+    match verdict {
+        Verdict::Consistent => "The model explains the records within their noise: nothing to correct.".to_owned(),
+        Verdict::Explained => format!("What the model gets wrong is {}.", list(causes)),
+        Verdict::Ambiguous => {
+            let ties = causes.iter().filter(|cause| !cause.rivals.is_empty()).map(|cause| {
+                let rivals: Vec<String> = cause.rivals.iter().map(|ids| ids.join(" + ")).collect();
+                format!("{} cannot be told from {}", cause.id, rivals.join(", or "))
+            });
+            format!(
+                "Best explanation: {}. But {}.",
+                list(causes),
+                ties.collect::<Vec<_>>().join("; ")
+            )
+        }
+        Verdict::Unexplained => {
+            let shapes: Vec<String> = structure
+                .iter()
+                .map(|s| format!("{} of {}: {}", s.channel, s.record, s.shape))
+                .collect();
+            format!(
+                "None of the known causes explains the records; left is {}.",
+                shapes.join("; ")
+            )
+        }
+    }
+}
+
+fn si(value: f64, unit: &str) -> String {
+    report::quantity(value, unit, 4)
+}
+
+fn hidden(problem: &Problem, attribution: &Attribution) -> Vec<Hidden> {
+    let sizes = attribution.smallest_sizes(problem);
+    let mut list: Vec<Hidden> = Vec::new();
+    for (cause, smallest) in sizes {
+        let candidate = &attribution.candidates[cause];
+        let knob = &candidate.cause.knobs[0];
+        let typical = knob
+            .keys
+            .first()
+            .and_then(|key| plant::parameter(key))
+            .map(|p| p.typical);
+        let size = typical.map_or(f64::INFINITY, |(low, high)| match knob.unit() {
+            "1" => 0.5 * (high - low),
+            _ => high,
+        });
+        let own_scaled = matches!(candidate.cause.id, "l_wrong" | "c_wrong" | "v_in_wrong");
+        let size = if own_scaled { 0.3 * candidate.own[0] } else { size };
+        if smallest > size {
+            list.push(Hidden {
+                id: candidate.cause.id,
+                parameter: knob.name,
+                smallest,
+                unit: knob.unit(),
+            });
+        }
+    }
+    list
+}
+
+fn noise_of(problem: &Problem, attribution: &Attribution, outliers: &[Outlier], pair: Option<&Pair>) -> Noise {
+    let measured = (0..CHANNELS).filter(|n| problem.sigma[*n].is_finite());
+    let outlier = |one: &Outlier| {
+        let record = &problem.records[one.record].name;
+        format!("{record}:{}:{}", one.row, CHANNEL_NAMES[one.channel])
+    };
+    let held = pair.map_or(&[][..], |pair| &pair.problem.records);
+    let repairs = problem
+        .records
+        .iter()
+        .chain(held)
+        .flat_map(|r| r.repairs.iter().map(|text| format!("{}: {text}", r.name)));
+    Noise {
+        sigma: measured.map(|n| (CHANNEL_NAMES[n], problem.sigma[n])).collect(),
+        inflation: attribution.inflation,
+        outliers: outliers.iter().map(outlier).collect(),
+        repairs: repairs
+            .chain(pair.into_iter().flat_map(|pair| pair.remarks.clone()))
+            .collect(),
+        trim: attribution.state().starts.trim,
+    }
+}

@@ -1,0 +1,167 @@
+//! Drives the plant by a record: its duties, set loads and sampling instants.
+
+use plant::{Parameters, Plant, Signals};
+
+use crate::columns::DutyIs;
+use crate::record::{CHANNELS, Record, Segment};
+
+/// Duties before a segment that the plant is given: more than it can delay.
+const HISTORY: usize = 9;
+/// A settled point is reached when a period moves voltage and current by less than this share.
+const AT_REST: f64 = 1e-8;
+const MOST_PERIODS: usize = 20_000;
+/// Two instants closer than this share of a period are one.
+const SAME: f64 = 1e-9;
+
+/// Output voltage and inductor current at the first row of a segment.
+pub type Start = [f64; 2];
+
+/// What is simulated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Model {
+    /// The converter.
+    pub plant: Parameters,
+    /// How much later than stamped the samples were taken, s; negative for earlier.
+    pub late: f64,
+}
+
+impl Model {
+    /// The model as the file says.
+    #[must_use]
+    pub fn new(plant: &Parameters) -> Self {
+        Model {
+            plant: plant.clone(),
+            late: 0.0,
+        }
+    }
+
+    /// The same for a record whose duty column shows what the switch did.
+    fn without_chain(&self, direct: bool) -> Self {
+        let mut model = self.clone();
+        for sensor in sensors(&mut model.plant).into_iter().filter(|_| direct) {
+            (sensor.low_pass, sensor.delay) = (0.0, 0.0);
+        }
+        let p = &mut model.plant;
+        (p.pwm.duty_delay, p.pwm.duty_lsb, p.pwm.min_on_time) = (0, 0.0, 0.0);
+        (p.switch.dead_time, p.switch.turn_on_delay, p.switch.turn_off_delay) = (0.0, 0.0, 0.0);
+        model.late = 0.0;
+        model
+    }
+}
+
+/// What the sensors show at each row, from the given states at the start of each segment; NaN outside of segments and
+/// where the model is no plant.
+///
+/// `starts` has an element for each segment; `trim` is duty that the gate's edges add.
+#[must_use]
+pub fn simulate(model: &Model, record: &Record, starts: &[Start], trim: f64) -> Vec<[f64; CHANNELS]> {
+    let mut shown = vec![[f64::NAN; CHANNELS]; record.rows()];
+    let stripped;
+    let model = match record.duty_is {
+        DutyIs::Applied | DutyIs::Direct => {
+            stripped = model.without_chain(record.duty_is == DutyIs::Direct);
+            &stripped
+        }
+        _ => model,
+    };
+    let mut p = model.plant.clone();
+    p.converter.v_in *= record.v_in_ratio;
+    for sensor in sensors(&mut p) {
+        (sensor.noise, sensor.lsb) = (0.0, 0.0);
+    }
+    p.switch.turn_off_delay += trim.max(0.0) * p.t_sw();
+    p.switch.turn_on_delay += (-trim).max(0.0) * p.t_sw();
+    let instant = record.phase + model.late / p.t_sw();
+    let mut whole = (instant + SAME).floor();
+    let mut phase = instant - whole;
+    if phase.abs() < SAME {
+        phase = 0.0;
+    }
+    if record.settled {
+        // the middle of a centred pulse shows the mean of the current
+        p.pwm.carrier = plant::Carrier::Centre;
+        (phase, whole) = (0.5, 0.0);
+    }
+    p.pwm.sampling_phase = phase;
+    let driver = Driver {
+        record,
+        whole: whole as isize,
+        phase,
+    };
+    for (segment, start) in record.segments.iter().zip(starts) {
+        if p.source.ripple > 0.0 {
+            let turns = model.plant.source.ripple_phase + p.source.ripple_frequency * record.time[segment.start];
+            p.source.ripple_phase = turns - turns.floor();
+        }
+        let Ok(mut plant) = Plant::new(&p) else { return shown };
+        match record.settled {
+            true => driver.settle(&mut plant, segment.start, start, &mut shown),
+            false => driver.run(&mut plant, segment, start, &mut shown),
+        }
+    }
+    shown
+}
+
+struct Driver<'a> {
+    record: &'a Record,
+    /// Periods by which the sampling instants lie later than the rows say.
+    whole: isize,
+    phase: f64,
+}
+
+impl Driver<'_> {
+    /// Row of the PWM period in which row `n` is sampled.
+    fn period(&self, n: usize) -> usize {
+        n.saturating_add_signed(self.whole).min(self.record.rows() - 1)
+    }
+
+    fn run(&self, plant: &mut Plant, segment: &Segment, start: &Start, shown: &mut [[f64; CHANNELS]]) {
+        let (duty, load) = (&self.record.duty, &self.record.load);
+        let first = self.period(segment.start);
+        // at the start of a period its own duty is still to be commanded
+        let given = if self.phase > 0.0 { first + 1 } else { first };
+        let mut history = [duty[first.min(segment.start)]; HISTORY];
+        for (place, row) in (0..HISTORY).rev().zip((0..given).rev()) {
+            history[place] = duty[row];
+        }
+        let sample = plant.reset_within(start[0], start[1], &load[first], &history);
+        shown[segment.start] = array(&sample.measured);
+        for (n, place) in (segment.start + 1..).zip(&mut shown[segment.start + 1..segment.end]) {
+            let now = self.period(n);
+            let before = self.period(n - 1);
+            let sample = if self.phase > 0.0 {
+                plant.step_with_change(duty[now], &load[before], &load[now], 1.0 - self.phase)
+            } else {
+                plant.step(duty[before], &load[before])
+            };
+            *place = array(&sample.measured);
+        }
+    }
+
+    fn settle(&self, plant: &mut Plant, row: usize, start: &Start, shown: &mut [[f64; CHANNELS]]) {
+        let (duty, load) = (self.record.duty[row], &self.record.load[row]);
+        let mut last = plant.reset_within(start[0], start[1], load, &[duty; HISTORY]);
+        let mut rests = 0;
+        for _ in 0..MOST_PERIODS {
+            let sample = plant.step(duty, load);
+            let moved = (sample.v_out - last.v_out).abs() / start[0].abs().max(1e-3)
+                + (sample.i_l - last.i_l).abs() / start[1].abs().max(1e-3);
+            last = sample;
+            rests = if moved < AT_REST { rests + 1 } else { 0 };
+            if rests > 20 {
+                break;
+            }
+        }
+        shown[row] = array(&last.measured);
+    }
+}
+
+/// All sensors.
+pub(crate) fn sensors(p: &mut Parameters) -> [&mut plant::Sensor; CHANNELS] {
+    let all = &mut p.sensors;
+    [&mut all.v_out, &mut all.i_l, &mut all.i_out, &mut all.v_in]
+}
+
+fn array(s: &Signals) -> [f64; CHANNELS] {
+    [s.v_out, s.i_l, s.i_out, s.v_in]
+}

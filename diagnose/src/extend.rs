@@ -1,0 +1,114 @@
+//! The extended model as a plant file.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use plant::Parameters;
+
+use crate::diagnosis::{Diagnosis, Verdict};
+use crate::drive::Model;
+
+/// Numbers that are written without a point.
+const WHOLE: [&str; 2] = ["pwm.duty_delay", "sensors.seed"];
+
+/// The extended model as one plant: the sampling instant and the trim of the edges are among its parameters.
+#[must_use]
+pub fn as_plant(model: &Model, trim: f64) -> Parameters {
+    let mut p = model.plant.clone();
+    let t_sw = p.t_sw();
+    p.switch.turn_off_delay += trim.max(0.0) * t_sw;
+    p.switch.turn_on_delay += (-trim).max(0.0) * t_sw;
+    let phase = p.pwm.sampling_phase + model.late / t_sw;
+    if (0.0..1.0).contains(&phase) {
+        p.pwm.sampling_phase = phase;
+    } else if model.late < 0.0 {
+        for sensor in crate::drive::sensors(&mut p) {
+            sensor.delay -= model.late;
+        }
+    } else {
+        // sampled in the next period: the duty commanded then acts a period later
+        p.pwm.sampling_phase = phase - phase.floor();
+        p.pwm.duty_delay += phase.floor() as u32;
+    }
+    p
+}
+
+/// Text of `plant.extended.toml`; changed numbers carry what they were and their 95 % interval.
+#[must_use]
+pub fn extended_toml(diagnosis: &Diagnosis) -> String {
+    let findings = &diagnosis.findings;
+    let trim = diagnosis.attribution.state().starts.trim;
+    let extended = match findings.verdict {
+        Verdict::Consistent | Verdict::Unexplained => Model::new(&diagnosis.problem.base.plant),
+        _ => diagnosis.extended.clone(),
+    };
+    let after = as_plant(&extended, trim);
+    let before = &diagnosis.problem.base.plant;
+    let mut notes: BTreeMap<&str, String> = BTreeMap::new();
+    let best = diagnosis
+        .attribution
+        .best
+        .iter()
+        .flat_map(|fit| fit.causes.iter().enumerate());
+    for (member, cause) in best {
+        for (knob, profile) in diagnosis.attribution.candidates[*cause]
+            .cause
+            .knobs
+            .iter()
+            .zip(diagnosis.profiles.iter().filter(|p| p.member == member))
+        {
+            for key in knob.keys {
+                let [low, high] = profile.interval;
+                notes.insert(key, format!("95 %: {low:.5e} to {high:.5e}; "));
+            }
+        }
+    }
+    let mut text = format!(
+        "# The model with what was found. {}\n",
+        findings.sentence.replace('\n', " ")
+    );
+    for cause in findings.causes.iter().filter(|cause| !cause.rivals.is_empty()) {
+        let rivals: Vec<String> = cause.rivals.iter().map(|ids| ids.join(" + ")).collect();
+        let _ = writeln!(text, "# {} stands for a tie with {}.", cause.id, rivals.join(", "));
+    }
+    if trim != 0.0 {
+        let _ = writeln!(
+            text,
+            "# The switch's delays hold {:.1} ns of duty that the gate's edges seem to add; not a cause.",
+            1e9 * trim * before.t_sw()
+        );
+    }
+    let mut tables: BTreeMap<&str, String> = BTreeMap::new();
+    for parameter in plant::parameters() {
+        let (was, is) = (parameter.get(before), parameter.get(&after));
+        let needed = parameter.key.starts_with("converter.") && parameter.choices().is_empty();
+        if is == parameter.neutral && !needed && was == is {
+            continue;
+        }
+        let Some((table, key)) = parameter.key.rsplit_once('.') else {
+            continue;
+        };
+        let value = match parameter.choices().get(is as usize) {
+            Some(word) => format!("\"{word}\""),
+            None if WHOLE.contains(&parameter.key) => format!("{}", is as u64),
+            None => format!("{is:?}"),
+        };
+        let unit = if parameter.unit == "1" {
+            String::new()
+        } else {
+            format!("  # {}", parameter.unit)
+        };
+        let note = match was == is {
+            true => unit,
+            false => {
+                let interval = notes.get(parameter.key).map_or("", String::as_str);
+                format!("  # {}; {interval}was {was:?}", parameter.unit)
+            }
+        };
+        let _ = writeln!(tables.entry(table).or_default(), "{key} = {value}{note}");
+    }
+    for (table, lines) in tables {
+        let _ = write!(text, "\n[{table}]\n{lines}");
+    }
+    text
+}

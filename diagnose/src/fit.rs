@@ -1,0 +1,405 @@
+//! Damped least squares (Levenberg-Marquardt) of a few parameters on the switched model, initial states beside them.
+
+use crate::causes::{Candidate, Search};
+use crate::drive::Model;
+use crate::problem::{Basis, Problem, Starts, axpy, dot, nudged};
+
+const MOST_STEPS: usize = 12;
+/// A step that gains less than this ends the fit.
+const SMALL_GAIN: f64 = 0.02;
+
+/// A place in the space of models with the initial states that fit best.
+#[derive(Debug, Clone)]
+pub struct State {
+    /// The model.
+    pub model: Model,
+    /// Initial states.
+    pub starts: Starts,
+    /// Measured minus simulated over noise.
+    pub residual: Vec<f64>,
+    /// Sum of its squares.
+    pub chi2: f64,
+}
+
+/// A fitted set of causes.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// Indices of the candidates.
+    pub causes: Vec<usize>,
+    /// Values of all their parameters, in order.
+    pub values: Vec<f64>,
+    /// Where it ended.
+    pub state: State,
+    /// Covariance of the parameters for the noise assumed.
+    pub covariance: Vec<Vec<f64>>,
+}
+
+impl State {
+    /// The model with the initial states fitted.
+    #[must_use]
+    pub fn settle(problem: &Problem, model: &Model, starts: &Starts, basis: Option<&Basis>) -> Self {
+        Self::settle_in(problem, model, starts, basis, 4)
+    }
+
+    /// The same in at most `rounds` steps.
+    fn settle_in(problem: &Problem, model: &Model, starts: &Starts, basis: Option<&Basis>, rounds: usize) -> Self {
+        let mut state = Self::at(problem, model, starts.clone());
+        for _ in 0..rounds {
+            let own;
+            let basis = match basis {
+                Some(basis) => basis,
+                None => {
+                    own = problem.basis(model, &state.starts, &state.residual);
+                    &own
+                }
+            };
+            let mut starts = state.starts.clone();
+            basis.absorb(&state.residual, &mut starts);
+            let next = Self::at(problem, model, starts);
+            let gain = state.chi2 - next.chi2;
+            if gain > 0.0 {
+                state = next;
+            }
+            if gain < SMALL_GAIN {
+                break;
+            }
+        }
+        state
+    }
+
+    fn at(problem: &Problem, model: &Model, starts: Starts) -> Self {
+        let residual = problem.residual(model, &starts);
+        State {
+            model: model.clone(),
+            chi2: dot(&residual, &residual),
+            starts,
+            residual,
+        }
+    }
+}
+
+/// All that a fit needs.
+#[derive(Debug, Clone, Copy)]
+pub struct Fitter<'a> {
+    /// Records and noise.
+    pub problem: &'a Problem,
+    /// All candidates.
+    pub candidates: &'a [Candidate],
+    /// What initial states explain.
+    pub basis: &'a Basis,
+    /// The model without causes.
+    pub null: &'a State,
+}
+
+/// A knob of a set: candidate and place in it.
+pub type Place = (usize, usize);
+
+impl Fitter<'_> {
+    /// The parameters of a set of causes.
+    #[must_use]
+    pub fn places(&self, causes: &[usize]) -> Vec<Place> {
+        let of = |c: &usize| (0..self.candidates[*c].own.len()).map(|k| (*c, k)).collect::<Vec<_>>();
+        causes.iter().flat_map(of).collect()
+    }
+
+    /// Lowest and highest value and step of a parameter.
+    #[must_use]
+    pub fn range(&self, place: Place) -> [f64; 3] {
+        self.candidates[place.0].ranges[place.1]
+    }
+
+    fn set(&self, model: &mut Model, place: Place, value: f64) {
+        self.candidates[place.0].cause.knobs[place.1].set(model, value);
+    }
+
+    /// Whether a parameter is varied continuously.
+    #[must_use]
+    pub fn is_smooth(&self, place: Place) -> bool {
+        !matches!(self.candidates[place.0].cause.search, Search::Scan(_)) || place.1 > 0
+    }
+
+    /// Fits one candidate on top of `from`, from each of its starts; the best.
+    #[must_use]
+    pub fn single(&self, cause: usize, from: &State) -> Fit {
+        let starts = self.starts(cause);
+        if let [only] = starts.as_slice() {
+            return self.from(&[cause], only, from);
+        }
+        let best = self.best_start(cause, &starts, from);
+        self.from(
+            &[cause],
+            best.map_or(&self.candidates[cause].own, |(_, values)| values),
+            from,
+        )
+    }
+
+    /// Chi-square of the best start of a candidate, not fitted further.
+    #[must_use]
+    pub fn look(&self, cause: usize, from: &State) -> f64 {
+        let starts = self.starts(cause);
+        self.best_start(cause, &starts, from)
+            .map_or(f64::INFINITY, |(chi2, _)| chi2)
+    }
+
+    fn best_start<'v>(&self, cause: usize, starts: &'v [Vec<f64>], from: &State) -> Option<(f64, &'v Vec<f64>)> {
+        let looks = starts
+            .iter()
+            .map(|values| (self.state_at(&[cause], values, from, 1).0.chi2, values));
+        looks.min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// Where the fit of a candidate may begin.
+    fn starts(&self, cause: usize) -> Vec<Vec<f64>> {
+        let candidate = &self.candidates[cause];
+        match candidate.cause.search {
+            Search::Own => vec![candidate.own.clone()],
+            Search::From(list) => list
+                .iter()
+                .map(|steps| {
+                    let values = steps.iter().zip(&candidate.ranges).zip(&candidate.own);
+                    let absolute = candidate.own.len() > 1;
+                    values
+                        .map(|((n, range), own)| n * range[2] + if absolute { 0.0 } else { *own })
+                        .collect()
+                })
+                .collect(),
+            Search::Scan(list) => list.iter().map(|n| vec![n * candidate.ranges[0][2]]).collect(),
+        }
+    }
+
+    /// The candidate at the model's own values, as far as nothing speaks for more; it would gain `first_order`.
+    #[must_use]
+    pub fn unmoved(&self, cause: usize, first_order: f64) -> Fit {
+        let values = self.candidates[cause].own.clone();
+        let mut state = self.null.clone();
+        state.chi2 -= first_order.max(0.0);
+        Fit {
+            causes: vec![cause],
+            covariance: vec![vec![0.0; values.len()]; values.len()],
+            values,
+            state,
+        }
+    }
+
+    /// The model with these values, initial states fitted in `rounds`.
+    fn state_at(&self, causes: &[usize], values: &[f64], from: &State, rounds: usize) -> (State, Vec<f64>) {
+        let mut model = from.model.clone();
+        let mut values = values.to_vec();
+        for (place, value) in self.places(causes).iter().zip(&mut values) {
+            let [low, high, _] = self.range(*place);
+            *value = value.clamp(low, high);
+            self.set(&mut model, *place, *value);
+        }
+        let state = State::settle_in(self.problem, &model, &from.starts, Some(self.basis), rounds);
+        (state, values)
+    }
+
+    /// Fits a set from given values.
+    #[must_use]
+    pub fn from(&self, causes: &[usize], values: &[f64], from: &State) -> Fit {
+        self.holding(causes, values, from, None)
+    }
+
+    /// [`Fitter::from`] with one parameter held at its value.
+    #[must_use]
+    pub fn holding(&self, causes: &[usize], values: &[f64], from: &State, held: Option<usize>) -> Fit {
+        let places = self.places(causes);
+        let (mut state, mut values) = self.state_at(causes, values, from, 2);
+        let smooth: Vec<usize> = (0..places.len())
+            .filter(|n| held != Some(*n) && self.is_smooth(places[*n]))
+            .collect();
+        let mut covariance = vec![vec![0.0; places.len()]; places.len()];
+        let mut damping = 1e-3;
+        for _ in 0..MOST_STEPS {
+            if smooth.is_empty() {
+                break;
+            }
+            let jacobian = self.jacobian(&places, &smooth, &state);
+            let normal = Normal::new(&jacobian.projected, &state.residual);
+            normal.covariance(&smooth, &jacobian.scale, &mut covariance);
+            let Some((next, moved)) = self.improve(&places, &smooth, &values, &state, &jacobian, &normal, &mut damping)
+            else {
+                break;
+            };
+            let gain = state.chi2 - next.chi2;
+            (state, values) = (next, moved);
+            if gain < SMALL_GAIN.max(1e-6 * state.chi2) {
+                break;
+            }
+        }
+        Fit {
+            causes: causes.to_vec(),
+            values,
+            state,
+            covariance,
+        }
+    }
+
+    /// Change of the simulated signals for a step of each smooth parameter, raw and without what initial states explain.
+    fn jacobian(&self, places: &[Place], smooth: &[usize], state: &State) -> Jacobian {
+        let mut jacobian = Jacobian::default();
+        for n in smooth {
+            let (candidate, knob) = places[*n];
+            let knob = &self.candidates[candidate].cause.knobs[knob];
+            let range = self.range(places[*n]);
+            let (moved, step) = nudged(&state.model, knob, &range);
+            let after = self.problem.residual(&moved, &state.starts);
+            let share = range[2] / step;
+            let raw: Vec<f64> = state
+                .residual
+                .iter()
+                .zip(&after)
+                .map(|(a, b)| (a - b) * share)
+                .collect();
+            let mut projected = raw.clone();
+            self.basis.project(&mut projected);
+            jacobian.raw.push(raw);
+            jacobian.projected.push(projected);
+            jacobian.scale.push(range[2]);
+        }
+        jacobian
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn improve(
+        &self,
+        places: &[Place],
+        smooth: &[usize],
+        values: &[f64],
+        state: &State,
+        jacobian: &Jacobian,
+        normal: &Normal,
+        damping: &mut f64,
+    ) -> Option<(State, Vec<f64>)> {
+        for _ in 0..5 {
+            let step = normal.step(*damping);
+            let mut moved = values.to_vec();
+            let mut model = state.model.clone();
+            let mut left = state.residual.clone();
+            for (k, n) in smooth.iter().enumerate() {
+                let [low, high, unit] = self.range(places[*n]);
+                moved[*n] = (values[*n] + step[k] * unit).clamp(low, high);
+                axpy(&mut left, -(moved[*n] - values[*n]) / unit, &jacobian.raw[k]);
+                self.set(&mut model, places[*n], moved[*n]);
+            }
+            let mut starts = state.starts.clone();
+            self.basis.absorb(&left, &mut starts);
+            let next = State::at(self.problem, &model, starts);
+            if next.chi2 < state.chi2 {
+                *damping = (*damping * 0.1).max(1e-9);
+                return Some((next, moved));
+            }
+            *damping *= 10.0;
+        }
+        None
+    }
+
+    /// Sensitivities of all smooth parameters at `state`, projected, in units of their steps.
+    #[must_use]
+    pub fn sensitivity(&self, cause: usize, state: &State) -> Vec<Vec<f64>> {
+        let places = self.places(&[cause]);
+        let smooth: Vec<usize> = (0..places.len()).filter(|n| self.is_smooth(places[*n])).collect();
+        self.jacobian(&places, &smooth, state).projected
+    }
+}
+
+#[derive(Default)]
+struct Jacobian {
+    raw: Vec<Vec<f64>>,
+    projected: Vec<Vec<f64>>,
+    scale: Vec<f64>,
+}
+
+/// Normal equations.
+#[derive(Debug, Clone)]
+pub struct Normal {
+    matrix: Vec<Vec<f64>>,
+    right: Vec<f64>,
+}
+
+impl Normal {
+    /// Of columns and a right side.
+    #[must_use]
+    pub fn new(columns: &[Vec<f64>], residual: &[f64]) -> Self {
+        Normal {
+            matrix: columns
+                .iter()
+                .map(|a| columns.iter().map(|b| dot(a, b)).collect())
+                .collect(),
+            right: columns.iter().map(|a| dot(a, residual)).collect(),
+        }
+    }
+
+    fn step(&self, damping: f64) -> Vec<f64> {
+        let mut matrix = self.matrix.clone();
+        for (n, row) in matrix.iter_mut().enumerate() {
+            row[n] = row[n] * (1.0 + damping) + 1e-12;
+        }
+        solve(&matrix, &self.right)
+    }
+
+    fn covariance(&self, smooth: &[usize], scale: &[f64], out: &mut [Vec<f64>]) {
+        let n = self.right.len();
+        let mut matrix = self.matrix.clone();
+        for (k, row) in matrix.iter_mut().enumerate() {
+            row[k] = row[k] * (1.0 + 1e-9) + 1e-12;
+        }
+        for column in 0..n {
+            let unit: Vec<f64> = (0..n).map(|k| if k == column { 1.0 } else { 0.0 }).collect();
+            for (row, value) in solve(&matrix, &unit).into_iter().enumerate() {
+                out[smooth[row]][smooth[column]] = value * scale[row] * scale[column];
+            }
+        }
+    }
+}
+
+/// Solves a symmetric positive system by Cholesky's method; a direction without weight gets 0.
+#[must_use]
+pub fn solve(matrix: &[Vec<f64>], right: &[f64]) -> Vec<f64> {
+    let n = right.len();
+    let mut l = vec![vec![0.0; n]; n];
+    let mut y = vec![0.0; n];
+    for row in 0..n {
+        for column in 0..=row {
+            let known: f64 = (0..column).map(|k| l[row][k] * l[column][k]).sum();
+            let rest = matrix[row][column] - known;
+            l[row][column] = match row == column {
+                true => rest.max(0.0).sqrt(),
+                false if l[column][column] > 0.0 => rest / l[column][column],
+                false => 0.0,
+            };
+        }
+        if l[row][row] * l[row][row] < 1e-13 * matrix[row][row] {
+            l[row][row] = 0.0;
+        }
+        let known: f64 = (0..row).map(|k| l[row][k] * y[k]).sum();
+        y[row] = if l[row][row] > 0.0 {
+            (right[row] - known) / l[row][row]
+        } else {
+            0.0
+        };
+    }
+    let mut x = vec![0.0; n];
+    for row in (0..n).rev() {
+        let known: f64 = (row + 1..n).map(|k| l[k][row] * x[k]).sum();
+        x[row] = if l[row][row] > 0.0 {
+            (y[row] - known) / l[row][row]
+        } else {
+            0.0
+        };
+    }
+    x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::solve;
+
+    #[test]
+    fn a_system_is_solved_and_a_direction_without_weight_stays_at_0() {
+        let x = solve(&[vec![4.0, 2.0], vec![2.0, 3.0]], &[2.0, 5.0]);
+        assert!((x[0] + 0.5).abs() < 1e-12 && (x[1] - 2.0).abs() < 1e-12, "{x:?}");
+        let x = solve(&[vec![1.0, 1.0], vec![1.0, 1.0]], &[3.0, 3.0]);
+        assert!((x[0] + x[1] - 3.0).abs() < 1e-9, "{x:?}");
+    }
+}

@@ -1,0 +1,36 @@
+//! What a simulation gets wrong: measured records in, the cause of the discrepancy named, a better model out.
+//!
+//! ```no_run
+//! use std::path::Path;
+//! use diagnose::{columns::Columns, diagnosis::diagnose, extend::extended_toml, record::Record};
+//!
+//! let model = plant::Parameters::from_file(Path::new("plant.toml"))?;
+//! let open = |file: &str| Record::open(Path::new(file), &Columns::default(), &model);
+//! let found = diagnose(&model, vec![open("a.csv")?], &[open("b.csv")?], &|what| eprintln!("{what}"));
+//! println!("{}\n{}", found.findings.sentence, extended_toml(&found));
+//! # Ok::<(), plant::Faults>(())
+//! ```
+//!
+//! The way: [`record`] (from [`csv`] and [`columns`]) and [`drive`] make simulated rows of a model, [`problem`] a
+//! least-squares problem with initial states as unknowns, [`fit`] moves the parameters of [`causes`], [`attribute`]
+//! chooses among them, [`profile`], [`shape`], [`gain`] and [`next`] say how sure that is, [`diagnosis`] holds the
+//! answer and [`extend`] and [`page`] write it down. See docs/diagnose.md.
+
+pub mod attribute;
+pub mod causes;
+pub mod columns;
+pub mod csv;
+pub mod diagnosis;
+pub mod drive;
+pub mod extend;
+pub mod fit;
+pub mod gain;
+pub mod next;
+pub mod noise;
+pub mod page;
+mod parallel;
+pub mod problem;
+pub mod profile;
+pub mod record;
+pub mod shape;
+mod spectrum;

@@ -1,0 +1,178 @@
+//! Noise of each channel, outliers, and what is left in a residual that noise would not leave.
+
+use crate::problem::{Problem, dot, median};
+use crate::record::{CHANNELS, Record};
+
+/// An outlier differs from its neighbours by more than this many standard deviations.
+const FAR: f64 = 8.0;
+/// Rows averaged to look for slow structure.
+pub const BLOCK: usize = 10;
+/// Lags over which a residual's correlation is summed.
+const LAGS: usize = 20;
+
+/// One channel of a residual: `residual[row]` for each row, 0 where nothing counts.
+#[must_use]
+pub fn channel(problem: &Problem, residual: &[f64], record: usize, channel: usize) -> Vec<f64> {
+    let start = problem.offsets[record] + channel;
+    (0..problem.records[record].rows())
+        .map(|row| residual[start + row * CHANNELS])
+        .collect()
+}
+
+/// Standard deviation of each channel's noise: from second differences of the residual, which hardly see what is slow,
+/// by their median, which hardly sees what is rare. Infinite for a channel that no record has.
+#[must_use]
+pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
+    std::array::from_fn(|n| {
+        let of = |record: usize| -> Vec<f64> {
+            let values = channel(problem, residual, record, n);
+            let triples = values.windows(3).filter(|w| w.iter().all(|v| *v != 0.0));
+            triples.map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect()
+        };
+        let estimates = (0..problem.records.len()).map(of).filter(|list| list.len() >= 5);
+        // median of |x| over sigma, and three independent terms with weights 1, -2, 1
+        let typical = median(estimates.map(|list| median(list) / 0.674_49 / 6f64.sqrt()));
+        let lattice = problem.records.iter().map(|r| r.lattice[n]).fold(0.0, f64::max);
+        let scale = [problem.bases.v, problem.bases.i, problem.bases.i, problem.bases.v_in][n];
+        let least = (lattice / 12f64.sqrt()).max(1e-5 * scale);
+        let has = problem
+            .records
+            .iter()
+            .any(|r| r.measured[n].iter().any(|v| v.is_finite()));
+        match (has, typical.is_finite()) {
+            (false, _) => f64::INFINITY,
+            (true, true) => (typical * problem.sigma[n]).max(least),
+            // too few points to tell noise from anything: a share of what is measured
+            (true, false) => 2e-3 * scale,
+        }
+    })
+}
+
+/// An outlier.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outlier {
+    /// Which record.
+    pub record: usize,
+    /// Which row.
+    pub row: usize,
+    /// Which channel.
+    pub channel: usize,
+}
+
+/// Rows that leap out of the measured signal and of the residual alike.
+#[must_use]
+pub fn outliers(problem: &Problem, residual: &[f64]) -> Vec<Outlier> {
+    let mut found = Vec::new();
+    for (index, record) in problem.records.iter().enumerate().filter(|(_, r)| !r.settled) {
+        for n in 0..CHANNELS {
+            let left = channel(problem, residual, index, n);
+            let raw: Vec<f64> = record.measured[n].iter().map(|v| v / problem.sigma[n]).collect();
+            for row in 2..record.rows().saturating_sub(2) {
+                if leaps(&left, row) && leaps(&raw, row) {
+                    found.push(Outlier {
+                        record: index,
+                        row,
+                        channel: n,
+                    });
+                }
+            }
+        }
+    }
+    found
+}
+
+fn leaps(values: &[f64], row: usize) -> bool {
+    let near = [values[row - 2], values[row - 1], values[row + 1], values[row + 2]];
+    let (low, high) = near
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+    let apart = (values[row] - high).max(low - values[row]);
+    near.iter().all(|v| v.is_finite()) && apart > FAR + (high - low)
+}
+
+/// How much more a sum over the records scatters than independent white noise would: noise that is the same in several
+/// records, and noise that is correlated in time.
+#[must_use]
+pub fn inflation(problem: &Problem, residual: &[f64]) -> f64 {
+    let (mut shared, mut pairs) = (0.0, 0.0);
+    let (mut lagged, mut total) = (vec![0.0; LAGS], 0.0);
+    for n in 0..CHANNELS {
+        let all: Vec<Vec<f64>> = (0..problem.records.len())
+            .map(|record| channel(problem, residual, record, n))
+            .collect();
+        for (k, a) in all.iter().enumerate() {
+            total += dot(a, a);
+            for (lag, sum) in lagged.iter_mut().enumerate() {
+                *sum += a.iter().zip(a.iter().skip(lag + 1)).map(|(x, y)| x * y).sum::<f64>();
+            }
+            for b in &all[..k] {
+                let (da, db) = (differences(a), differences(b));
+                let scale = (dot(&da, &da) * dot(&db, &db)).sqrt();
+                if scale > 0.0 {
+                    shared += dot(&da, &db) / scale;
+                    pairs += 1.0;
+                }
+            }
+        }
+    }
+    let rho = if pairs > 0.0 { shared / pairs } else { 0.0 };
+    let records = problem.records.len() as f64;
+    let same = if rho > 0.2 { 1.0 + rho * (records - 1.0) } else { 1.0 };
+    let slow: f64 = lagged
+        .iter()
+        .map(|sum| sum / total.max(1e-300))
+        .filter(|rho| *rho > 0.05)
+        .sum();
+    same * (1.0 + 2.0 * slow).clamp(1.0, 4.0)
+}
+
+fn differences(values: &[f64]) -> Vec<f64> {
+    values.windows(2).map(|w| w[1] - w[0]).collect()
+}
+
+/// What is left in a residual, for each channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Left {
+    /// Mean square; 1 for noise.
+    pub square: f64,
+    /// Mean square of block means times the block's length; 1 for white noise.
+    pub slow: f64,
+    /// Number of blocks.
+    pub blocks: usize,
+    /// Correlation of neighbours.
+    pub lag1: f64,
+    /// Mean.
+    pub mean: f64,
+}
+
+/// What is left in one channel of one record.
+#[must_use]
+pub fn left(values: &[f64]) -> Left {
+    let counted: Vec<f64> = values.iter().copied().filter(|v| *v != 0.0).collect();
+    let n = counted.len().max(1) as f64;
+    let square = dot(&counted, &counted) / n;
+    let blocks: Vec<f64> = counted
+        .chunks_exact(BLOCK)
+        .map(|block| {
+            let mean = block.iter().sum::<f64>() / BLOCK as f64;
+            mean * mean * BLOCK as f64
+        })
+        .collect();
+    let neighbours: f64 = counted.windows(2).map(|w| w[0] * w[1]).sum();
+    Left {
+        square,
+        slow: blocks.iter().sum::<f64>() / blocks.len().max(1) as f64,
+        blocks: blocks.len(),
+        lag1: neighbours / dot(&counted, &counted).max(1e-300),
+        mean: counted.iter().sum::<f64>() / n,
+    }
+}
+
+/// Whether a row runs in DCM, as far as the sampled current says.
+#[must_use]
+pub fn is_discontinuous(record: &Record, row: usize, ripple: f64) -> bool {
+    let load = &record.load[row];
+    let v = record.measured[0][row];
+    let drawn = v * load.conductance + load.current + if v > 0.0 { load.power / v } else { 0.0 };
+    drawn.is_finite() && drawn < 0.5 * ripple
+}

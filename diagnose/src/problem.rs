@@ -1,0 +1,430 @@
+//! Records, noise and model as one least-squares problem. The initial states are unknowns of no interest: they are
+//! estimated beside every fit, and the part of a signal that they can explain is projected out.
+
+use crate::causes::{Bases, Knob};
+use crate::drive::{Model, Start, simulate};
+use crate::record::{CHANNELS, Record};
+
+/// Growth of a state over a segment of an unstable record, in time constants.
+const MOST_GROWTH: f64 = 2.0;
+/// Shortest segment of an unstable record, rows.
+const SHORTEST: usize = 30;
+/// Change of the initial voltage (in units of the output voltage) and current (of the current) for a sensitivity.
+const NUDGE: f64 = 1e-3;
+
+/// The problem.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    /// The records.
+    pub records: Vec<Record>,
+    /// The model to begin with.
+    pub base: Model,
+    /// Magnitudes.
+    pub bases: Bases,
+    /// Standard deviation of the noise of each channel; infinite for one that no record has.
+    pub sigma: [f64; CHANNELS],
+    /// Rows that are not scored, for each record and channel: outliers.
+    pub masked: Vec<[Vec<bool>; CHANNELS]>,
+    /// Start of each record in the vectors; their last element is the trim over its accuracy.
+    pub offsets: Vec<usize>,
+    /// The trim is not estimated.
+    pub trim_held: bool,
+}
+
+/// Standard deviation of what a model of ideal edges may be off in the duty, 1: rise and fall times of the gate. It is
+/// estimated beside every fit, so that nothing that small is called a cause.
+pub const DUTY_ACCURACY: f64 = 5e-4;
+
+/// What is estimated beside every fit.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Starts {
+    /// Initial states of all segments of all records.
+    pub states: Vec<Vec<Start>>,
+    /// Duty added by the edges of the gate, 1.
+    pub trim: f64,
+}
+
+/// An orthonormal basis of what initial states can explain, for each segment: two vectors and the triangle that leads
+/// from them back to states.
+#[derive(Debug, Clone)]
+pub struct Basis {
+    q: [Vec<f64>; 2],
+    spans: Vec<Span>,
+    /// Sensitivity to the trim, as it is and without what initial states explain; empty if the trim is held.
+    trim: [Vec<f64>; 2],
+}
+
+#[derive(Debug, Clone)]
+struct Span {
+    record: usize,
+    segment: usize,
+    from: usize,
+    to: usize,
+    /// r11, r12, r22; 0 where a direction is not seen.
+    r: [f64; 3],
+}
+
+impl Problem {
+    /// Sets the problem up; noise and outliers are those of [`crate::noise`].
+    #[must_use]
+    pub fn new(mut records: Vec<Record>, base: Model) -> Self {
+        share_source_voltage(&mut records, base.plant.converter.v_in);
+        let bases = bases(&records, &base);
+        for record in &mut records {
+            cut_unstable(record, &base, bases.v);
+        }
+        let mut offsets = Vec::with_capacity(records.len());
+        let mut total = 0;
+        for record in &records {
+            offsets.push(total);
+            total += record.rows() * CHANNELS;
+        }
+        let masked = records
+            .iter()
+            .map(|record| std::array::from_fn(|_| vec![false; record.rows()]));
+        Problem {
+            masked: masked.collect(),
+            sigma: [1.0; CHANNELS],
+            bases,
+            base,
+            offsets,
+            records,
+            trim_held: false,
+        }
+    }
+
+    /// Length of the vectors.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.records
+            .iter()
+            .map(|record| record.rows() * CHANNELS)
+            .sum::<usize>()
+            + 1
+    }
+
+    /// Whether there is no record.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.records.is_empty()
+    }
+
+    /// States to begin with: what was measured in the first rows.
+    #[must_use]
+    pub fn first_starts(&self) -> Starts {
+        let of = |record: &Record| {
+            record
+                .segments
+                .iter()
+                .map(|segment| self.guess(record, segment.start))
+                .collect()
+        };
+        Starts {
+            states: self.records.iter().map(of).collect(),
+            trim: 0.0,
+        }
+    }
+
+    fn guess(&self, record: &Record, row: usize) -> Start {
+        let near = |channel: usize| {
+            let values = &record.measured[channel];
+            values.iter().skip(row).take(3).copied().find(|v| v.is_finite())
+        };
+        let v_in = self.base.plant.converter.v_in * record.v_in_ratio;
+        let v = near(0).unwrap_or(record.duty[row] * v_in);
+        let load = &record.load[row];
+        let drawn = v * load.conductance + load.current + if v > 0.0 { load.power / v } else { 0.0 };
+        let i = near(1).or(near(2)).unwrap_or(drawn);
+        [v.max(0.0), if record.settled { drawn } else { i }]
+    }
+
+    /// Whether a value counts.
+    fn counts(&self, record: usize, row: usize, channel: usize) -> bool {
+        self.records[record].measured[channel][row].is_finite() && !self.masked[record][channel][row]
+    }
+
+    /// Measured minus simulated, over the noise; 0 where nothing counts. The first row of a segment does not count: no
+    /// period leads to it.
+    #[must_use]
+    pub fn residual(&self, model: &Model, starts: &Starts) -> Vec<f64> {
+        let mut out = vec![0.0; self.len()];
+        for (index, record) in self.records.iter().enumerate() {
+            let shown = simulate(model, record, &starts.states[index], starts.trim);
+            for segment in &record.segments {
+                let first = if record.settled {
+                    segment.start
+                } else {
+                    segment.start + 1
+                };
+                for row in first..segment.end {
+                    for channel in 0..CHANNELS {
+                        if self.counts(index, row, channel) {
+                            let error = record.measured[channel][row] - shown[row][channel];
+                            // a model that is no plant explains nothing
+                            let error = if error.is_finite() {
+                                error
+                            } else {
+                                1e6 * self.sigma[channel]
+                            };
+                            out[self.offsets[index] + row * CHANNELS + channel] = error / self.sigma[channel];
+                        }
+                    }
+                }
+            }
+        }
+        if let Some(last) = out.last_mut() {
+            *last = -starts.trim / DUTY_ACCURACY;
+        }
+        out
+    }
+
+    /// Number of values that count.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        let of = |index: usize| {
+            let record = &self.records[index];
+            let skip = usize::from(!record.settled);
+            let rows = record.segments.iter().flat_map(|s| s.start + skip..s.end);
+            rows.map(|row| {
+                (0..CHANNELS)
+                    .filter(|channel| self.counts(index, row, *channel))
+                    .count()
+            })
+            .sum::<usize>()
+        };
+        (0..self.records.len()).map(of).sum()
+    }
+
+    /// What initial states can explain, around `starts`; `residual` is that of the model there.
+    #[must_use]
+    pub fn basis(&self, model: &Model, starts: &Starts, residual: &[f64]) -> Basis {
+        let mut q: [Vec<f64>; 2] = std::array::from_fn(|state| {
+            let step = NUDGE * [self.bases.v, self.bases.i][state];
+            let mut moved = starts.clone();
+            for start in moved.states.iter_mut().flatten() {
+                start[state] += step;
+            }
+            let after = self.residual(model, &moved);
+            residual
+                .iter()
+                .zip(&after)
+                .map(|(before, after)| (before - after) / step)
+                .collect()
+        });
+        let mut spans = Vec::new();
+        for (record, one) in self.records.iter().enumerate() {
+            if one.settled {
+                continue;
+            }
+            for (segment, rows) in one.segments.iter().enumerate() {
+                let from = self.offsets[record] + rows.start * CHANNELS;
+                let to = self.offsets[record] + rows.end * CHANNELS;
+                let [first, second] = &mut q;
+                let (first, second) = (&mut first[from..to], &mut second[from..to]);
+                let r11 = normalise(first, 1e-6);
+                let r12 = dot(first, second);
+                axpy(second, -r12, first);
+                let r22 = normalise(second, 1e-6);
+                spans.push(Span {
+                    record,
+                    segment,
+                    from,
+                    to,
+                    r: [r11, r12, r22],
+                });
+            }
+        }
+        if self.records.iter().any(|record| record.settled) {
+            for (record, one) in self.records.iter().enumerate().filter(|(_, one)| one.settled) {
+                let from = self.offsets[record];
+                let to = from + one.rows() * CHANNELS;
+                for q in &mut q {
+                    q[from..to].fill(0.0);
+                }
+            }
+        }
+        let mut basis = Basis {
+            q,
+            spans,
+            trim: [Vec::new(), Vec::new()],
+        };
+        if !self.trim_held {
+            let mut moved = starts.clone();
+            moved.trim += DUTY_ACCURACY;
+            let after = self.residual(model, &moved);
+            let raw: Vec<f64> = residual
+                .iter()
+                .zip(&after)
+                .map(|(a, b)| (a - b) / DUTY_ACCURACY)
+                .collect();
+            let mut own = raw.clone();
+            basis.project(&mut own);
+            basis.trim = [raw, own];
+        }
+        basis
+    }
+}
+
+impl Basis {
+    /// Takes out of `u` what initial states explain.
+    pub fn project(&self, u: &mut [f64]) {
+        for span in &self.spans {
+            let part = &mut u[span.from..span.to];
+            for q in &self.q {
+                let q = &q[span.from..span.to];
+                let share = dot(q, part);
+                axpy(part, -share, q);
+            }
+        }
+        let own = &self.trim[1];
+        if !own.is_empty() {
+            axpy(u, -dot(own, u) / dot(own, own), own);
+        }
+    }
+
+    /// Moves `starts` to where they explain most of `u`, a residual.
+    pub fn absorb(&self, u: &[f64], starts: &mut Starts) {
+        let [raw, own] = &self.trim;
+        let trimmed;
+        let mut u = u;
+        if !own.is_empty() {
+            let step = dot(own, u) / dot(own, own);
+            starts.trim += step;
+            let mut rest = u.to_vec();
+            axpy(&mut rest, -step, raw);
+            trimmed = rest;
+            u = &trimmed;
+        }
+        for span in &self.spans {
+            let [r11, r12, r22] = span.r;
+            let part = &u[span.from..span.to];
+            let (a, b) = (
+                dot(&self.q[0][span.from..span.to], part),
+                dot(&self.q[1][span.from..span.to], part),
+            );
+            let i = if r22 > 0.0 { b / r22 } else { 0.0 };
+            let v = if r11 > 0.0 { (a - r12 * i) / r11 } else { 0.0 };
+            let start = &mut starts.states[span.record][span.segment];
+            start[0] = (start[0] + v).max(0.0);
+            start[1] += i;
+        }
+    }
+}
+
+/// Scalar product.
+#[must_use]
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// `a += k b`.
+pub fn axpy(a: &mut [f64], k: f64, b: &[f64]) {
+    for (a, b) in a.iter_mut().zip(b) {
+        *a += k * b;
+    }
+}
+
+/// Scales to length 1 and returns the length; a vector shorter than `least` becomes 0.
+fn normalise(a: &mut [f64], least: f64) -> f64 {
+    let length = dot(a, a).sqrt();
+    let scale = if length > least { 1.0 / length } else { 0.0 };
+    for value in a.iter_mut() {
+        *value *= scale;
+    }
+    if length > least { length } else { 0.0 }
+}
+
+/// Change of the residual for a step of a knob.
+#[must_use]
+pub fn nudged(model: &Model, knob: &Knob, range: &[f64; 3]) -> (Model, f64) {
+    let value = knob.get(model);
+    let step = 0.2 * range[2];
+    // inwards at the upper bound
+    let step = if value + step > range[1] { -step } else { step };
+    let mut moved = model.clone();
+    knob.set(&mut moved, value + step);
+    (moved, step)
+}
+
+/// The median of what is finite; NaN if nothing is.
+#[must_use]
+pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+/// Records at clearly different source voltages were set so; a common deviation is the model's.
+fn share_source_voltage(records: &mut [Record], v_in: f64) {
+    let medians: Vec<f64> = records
+        .iter()
+        .map(|r| median(r.measured[3].iter().copied()) / v_in)
+        .collect();
+    let finite = || medians.iter().copied().filter(|m| m.is_finite());
+    let (low, high) = (finite().fold(f64::INFINITY, f64::min), finite().fold(0.0, f64::max));
+    let apart = high > 1.03 * low;
+    for (record, ratio) in records.iter_mut().zip(&medians) {
+        if apart && ratio.is_finite() && record.v_in_ratio == 1.0 && !(0.97..1.03).contains(ratio) {
+            record.v_in_ratio = *ratio;
+            let text = format!("source voltage taken as set to {:.1} V in this record", ratio * v_in);
+            record.repairs.push(text);
+        }
+    }
+}
+
+fn bases(records: &[Record], base: &Model) -> Bases {
+    let v_in = base.plant.converter.v_in;
+    let voltage = |r: &Record| {
+        (0..r.rows())
+            .map(|n| {
+                if r.measured[0][n].is_finite() {
+                    r.measured[0][n]
+                } else {
+                    r.duty[n] * v_in
+                }
+            })
+            .collect::<Vec<_>>()
+    };
+    let v = median(records.iter().flat_map(voltage)).max(0.01 * v_in);
+    let current = |r: &Record| {
+        let drawn = |n: usize| r.load[n].conductance * v + r.load[n].current + r.load[n].power / v;
+        (0..r.rows()).map(drawn).collect::<Vec<_>>()
+    };
+    let i = median(records.iter().flat_map(current));
+    Bases {
+        v,
+        i: if i > 0.0 { i } else { 1.0 },
+        v_in,
+        t_sw: base.plant.t_sw(),
+    }
+}
+
+/// A constant-power load in open loop may be unstable: such a record is simulated in short pieces.
+fn cut_unstable(record: &mut Record, base: &Model, v: f64) {
+    if record.settled {
+        return;
+    }
+    let p = &base.plant;
+    let (c, l) = (p.converter.capacitance, p.converter.inductance);
+    let r = p.inductor.dcr + 0.5 * (p.switch.r_ds_on + p.switch.r_d);
+    let rate = |n: &usize| {
+        let load = &record.load[*n];
+        0.5 * (load.power / (c * v * v) - load.conductance / c - r / l)
+    };
+    let fastest = (0..record.rows()).map(|n| rate(&n)).fold(0.0, f64::max);
+    if fastest <= 0.0 {
+        return;
+    }
+    let longest = ((MOST_GROWTH / (fastest * p.t_sw())) as usize).max(SHORTEST);
+    let mut pieces = Vec::new();
+    for segment in &record.segments {
+        let count = segment.len().div_ceil(longest);
+        let length = segment.len().div_ceil(count.max(1));
+        for piece in 0..count {
+            let start = segment.start + piece * length;
+            // the first row is the last of the piece before, which scores it
+            pieces.push(start.saturating_sub(usize::from(piece > 0))..(start + length).min(segment.end));
+        }
+    }
+    record.segments = pieces;
+}

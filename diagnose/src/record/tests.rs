@@ -1,0 +1,116 @@
+use std::fmt::Write as _;
+use std::path::Path;
+
+use plant::Parameters;
+
+use super::*;
+
+fn read(text: &str) -> Result<Record, Faults> {
+    let table = Table::parse(Path::new("run.csv"), text.as_bytes())?;
+    Record::new(table, &Columns::default(), &Parameters::paper_table())
+}
+
+/// 30 rows at the middle of the period; `edit` may change the line of a row.
+fn rows(edit: impl Fn(usize, String) -> String) -> String {
+    let mut text = String::from("t,d,v_o,r_load\n");
+    for n in 0..30 {
+        let line = format!(
+            "{:.6},0.5,{:.3},20",
+            (n as f64 + 0.5) * 1e-4,
+            100.0 + 0.137 * (n % 7) as f64
+        );
+        let _ = writeln!(text, "{}", edit(n, line));
+    }
+    text
+}
+
+#[test]
+fn the_phase_comes_from_the_time_column() {
+    let record = read(&rows(|_, line| line)).unwrap();
+    assert!((record.phase - 0.5).abs() < 1e-9);
+    assert_eq!((record.rows(), record.segments.len()), (30, 1));
+    assert!((record.load[3].conductance - 0.05).abs() < 1e-15);
+    assert!(record.measured[1].iter().all(|i| i.is_nan()), "no current was recorded");
+    assert_eq!(record.repairs, [""; 0]);
+}
+
+#[test]
+fn a_gap_makes_a_new_segment() {
+    let text = rows(|n, line| {
+        if (10..14).contains(&n) {
+            "# lost".to_owned()
+        } else {
+            line
+        }
+    });
+    let record = read(&text).unwrap();
+    assert_eq!(record.segments, [0..10, 14..30]);
+}
+
+#[test]
+fn backward_time_a_percent_duty_and_another_rate_are_faults_with_a_place() {
+    let swapped = rows(|n, line| if n == 8 { "0.0001,0.5,100,20".to_owned() } else { line });
+    let fault = &read(&swapped).unwrap_err().list[0];
+    assert_eq!(
+        (fault.line_column().unwrap().0, fault.problem.as_str()),
+        (10, "time goes backward")
+    );
+    let fault = &read(&rows(|_, line| line.replace(",0.5,", ",50,"))).unwrap_err().list[0];
+    assert!(fault.hint.as_ref().unwrap().starts_with("percent?"));
+    let slow = rows(|_, line| line).replace("t,", "t_ms,");
+    assert!(read(&slow).unwrap_err().list[0].problem.contains("sample rate"));
+}
+
+#[test]
+fn repairs_are_reported() {
+    let repeated = rows(|n, line| if n == 5 { format!("{line}\n{line}") } else { line });
+    let record = read(&repeated).unwrap();
+    assert!(
+        record.repairs[0].contains("1 rows repeat the time"),
+        "{:?}",
+        record.repairs
+    );
+    let stuck = rows(|_, line| {
+        line.split(',')
+            .take(2)
+            .chain(["7.0", "20"])
+            .collect::<Vec<_>>()
+            .join(",")
+    });
+    assert!(
+        read(&stuck).unwrap_err().list[0]
+            .problem
+            .contains("nothing is measured")
+    );
+}
+
+#[test]
+fn ten_times_faster_records_are_thinned_to_the_period() {
+    let mut text = String::from("t,d,v_o,r_load\n");
+    for n in 0..400 {
+        let _ = writeln!(text, "{:.7},0.5,{}.25,20", n as f64 * 1e-5, n);
+    }
+    let record = read(&text).unwrap();
+    assert_eq!((record.rows(), record.phase), (40, 0.0));
+    assert_eq!(record.measured[0][3], 30.25);
+    assert_eq!(record.repairs.len(), 1);
+}
+
+#[test]
+fn a_table_without_time_holds_settled_points() {
+    let record = read("d,v_o,r_load\n0.3,60.1,10\n0.5,99.2,10\n0.6,119.5,10\n").unwrap();
+    assert!(record.settled);
+    assert_eq!(record.segments.len(), 3);
+}
+
+#[test]
+fn a_converter_step_is_found_and_plain_digits_are_not() {
+    let on: Vec<f64> = (0..200)
+        .map(|n| ((n * 37 % 101) as f64 * 0.0488).mul_add(1000.0, 0.0).round() / 1000.0)
+        .collect();
+    assert!((lattice(&on, 3) - 0.0488).abs() < 1e-4);
+    let off: Vec<f64> = (0..200)
+        .map(|n| ((n * n * 37 % 7919) as f64 * 0.001_3).mul_add(1000.0, 0.0).round() / 1000.0)
+        .collect();
+    assert_eq!(lattice(&off, 3), 0.0);
+}

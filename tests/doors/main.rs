@@ -2,6 +2,7 @@
 //! made for. Each check has a planted fault beside it.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod c2000;
 mod kit;
 mod sfunction;
 

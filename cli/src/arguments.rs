@@ -61,6 +61,30 @@ pub struct Inspect {
     pub json: bool,
 }
 
+/// Numeric format on the command line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// binary32, exact order
+    F32,
+    /// binary32 with fused multiply-add in the network
+    F32Fma,
+    /// 16-bit integer network
+    I16,
+    /// 8-bit weights, 16-bit activations
+    I8,
+}
+
+impl From<Format> for policy::NumericFormat {
+    fn from(format: Format) -> Self {
+        match format {
+            Format::F32 => policy::NumericFormat::F32,
+            Format::F32Fma => policy::NumericFormat::F32Fma,
+            Format::I16 => policy::NumericFormat::I16,
+            Format::I8 => policy::NumericFormat::I8,
+        }
+    }
+}
+
 /// Language on the command line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Lang {
@@ -103,6 +127,9 @@ pub struct Compile {
     /// Control steps in the kit
     #[arg(long, value_name = "N", default_value_t = verify::kit::DEFAULT_STEPS, value_parser = clap::value_parser!(u32).range(1..=200_000))]
     pub kit_steps: u32,
+    /// Numeric format in the place of the contract's
+    #[arg(long, value_enum)]
+    pub format: Option<Format>,
     /// Folder for the generated files; made if missing
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
@@ -112,6 +139,9 @@ pub struct Compile {
 pub struct Verify {
     /// policy.toml or the folder that holds it
     pub policy: PathBuf,
+    /// Numeric format in the place of the contract's; with --generated, of the code in that folder unless given
+    #[arg(long, value_enum)]
+    pub format: Option<Format>,
     /// Control steps to compare per build
     #[arg(long, default_value_t = 20_000, value_parser = clap::value_parser!(u64).range(1..))]
     pub steps: u64,

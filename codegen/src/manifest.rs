@@ -7,6 +7,7 @@ use serde::Serialize;
 use targets::TargetSpec;
 
 use crate::crc::crc32_bytes;
+use crate::program::NetworkCode;
 use crate::{GeneratedFiles, Language, TOOL};
 
 /// File name of the manifest in the output folder.
@@ -83,6 +84,10 @@ pub struct Sizes {
     pub table_bytes: usize,
     /// State struct in bytes.
     pub state_bytes: usize,
+    /// Integer formats: largest magnitude that any 32-bit sum of the network can reach over the clamped box of
+    /// observations, in any order of the additions; below 2^31.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accumulator_bound: Option<i64>,
 }
 
 /// One generated file.
@@ -106,6 +111,10 @@ pub fn sizes(policy: &Policy, target: &TargetSpec) -> Sizes {
         macs: program.macs(),
         table_bytes: program.table_bytes(),
         state_bytes: 4 * program.state_words(),
+        accumulator_bound: match &program.network {
+            NetworkCode::Integer(network) => Some(network.accumulator_bound),
+            NetworkCode::Real { .. } => None,
+        },
     }
 }
 

@@ -169,6 +169,16 @@ fn a_transfer_takes_the_steady_state_error_away() {
     assert_eq!(coefficients("drm.toml"), coefficients("out/real-drm.toml"));
 }
 
+/// 0.55, the largest duty of the policy, maps beyond its limit of 0.60: 0.55 * 1.02 + 0.04 + 0.02 at 8 A.
+#[test]
+fn limits_that_cut_mapped_duties_off_are_named() {
+    let desk = desk();
+    desk.write("cases.toml", &CASES.replace(", [800, 200]", ""));
+    let said =
+        desk.succeed("drm transfer cases.toml --policy buck12 --real real.toml --controller interpreter --out out");
+    assert!(said.contains("its limits are 0.4 .. 0.6"), "{said}");
+}
+
 #[test]
 fn a_transfer_that_cannot_be_is_answered_before_it_runs() {
     let desk = desk();

@@ -121,7 +121,7 @@ mod tests {
     use std::collections::BTreeSet;
     use std::mem::{Discriminant, discriminant};
 
-    use codegen::program::{ActivationCode, Op};
+    use codegen::program::{ActivationCode, NetworkCode, Op};
 
     use super::*;
 
@@ -204,7 +204,12 @@ mod tests {
     #[test]
     fn the_suite_uses_every_activation_and_every_form_of_a_layer() {
         let suite = suite();
-        let layers = || suite.iter().flat_map(|program| &program.layers);
+        let layers = || {
+            suite.iter().flat_map(|program| match &program.network {
+                NetworkCode::Real { layers, .. } => layers.as_slice(),
+                NetworkCode::Integer(_) => &[],
+            })
+        };
         let kinds: BTreeSet<u8> = layers()
             .map(|layer| match layer.activation {
                 ActivationCode::Identity => 0,

@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use codegen::Language;
 use interp::InputError;
-use policy::Policy;
+use policy::{NumericFormat, Policy};
 use targets::TargetSpec;
 
 use crate::golden;
@@ -299,9 +299,20 @@ fn known_answers(policy: &Policy, oracle: &mut Oracle) -> Result<(Chunk, Option<
     let known = oracle
         .chunk_of(golden::events(policy))
         .map_err(VerifyError::Interpreter)?;
-    let judge = |golden| golden::judge(golden, policy.actions.len(), &known.expected);
-    let result = policy.golden.as_ref().map(judge);
-    Ok((known, result))
+    let judge = |golden, chunk: &Chunk| golden::judge(golden, policy.actions.len(), &chunk.expected);
+    let Some(golden) = policy.golden.as_ref() else {
+        return Ok((known, None));
+    };
+    if !policy::scales::is_integer(policy.numeric_format) {
+        let result = judge(golden, &known);
+        return Ok((known, Some(result)));
+    }
+    // the trainer's answers judge how the network was read; what rounding it costs is another question
+    let exact = policy.clone().with_format(NumericFormat::F32);
+    let answers = Oracle::new(&exact)
+        .chunk_of(golden::events(&exact))
+        .map_err(VerifyError::Interpreter)?;
+    Ok((known, Some(judge(golden, &answers))))
 }
 
 /// The policy's files for `target` in each of `languages`.

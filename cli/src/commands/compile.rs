@@ -16,7 +16,7 @@ use crate::{Failure, Outcome, output};
 /// Generates, then writes everything at once.
 pub fn run(options: &Compile) -> Result<Outcome, Failure> {
     let target = super::target(&options.target)?;
-    let policy = super::load(&options.policy)?;
+    let policy = super::load_as(&options.policy, options.format.map(Into::into))?;
     if let Some(golden) = verify::golden_result(&policy)?.filter(|golden| !golden.passed()) {
         return Err(Failure(format!(
             "the network does not give the trainer's golden answers; nothing was written\n   = found: {}\n   \
@@ -59,6 +59,13 @@ pub fn write(policy: &Policy, target: &TargetSpec, folder: &Path, files: &Files)
         output::say(&format!("note: {note}"))?;
     }
     let sizes = manifest::sizes(policy, target);
+    if let Some(bound) = sizes.accumulator_bound {
+        output::say(&format!(
+            "note: integer network: no 32-bit sum can overflow, the largest is {} of {} over the whole box of observations",
+            grouped(bound.unsigned_abs()),
+            grouped(u64::from(i32::MAX.unsigned_abs()))
+        ))?;
+    }
     let (macs, tables, state) = (
         grouped(sizes.macs as u64),
         bytes(sizes.table_bytes),

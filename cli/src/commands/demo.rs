@@ -60,6 +60,7 @@ pub fn run(options: &Demo) -> Result<Outcome, Failure> {
         steps: options.steps,
         seed: 1,
         target: None,
+        format: None,
         generated: Some(options.out.join("generated")),
         trace: Vec::new(),
         json: false,

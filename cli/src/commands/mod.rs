@@ -17,7 +17,7 @@ pub mod verify;
 use std::path::{Path, PathBuf};
 
 use ::targets::TargetSpec;
-use policy::Policy;
+use policy::{NumericFormat, Policy};
 
 use crate::Failure;
 
@@ -39,6 +39,15 @@ fn load(path: &Path) -> Result<Policy, Failure> {
             String::new()
         };
         Failure(format!("{}\n{total}", faults.to_string().trim_end()))
+    })
+}
+
+/// [`load`], in another numeric format if one is asked for.
+fn load_as(path: &Path, format: Option<NumericFormat>) -> Result<Policy, Failure> {
+    let policy = load(path)?;
+    Ok(match format {
+        Some(format) => policy.with_format(format),
+        None => policy,
     })
 }
 

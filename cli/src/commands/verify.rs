@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use codegen::{Door, Language, manifest};
-use policy::Policy;
+use policy::{NumericFormat, Policy};
 use serde::{Deserialize, Serialize};
 use targets::TargetSpec;
 use verify::drift::Drift;
@@ -30,7 +30,12 @@ struct Answer {
 
 /// Compares and reports.
 pub fn run(options: &Verify) -> Result<Outcome, Failure> {
-    let policy = super::load(&options.policy)?;
+    let written = match (options.format, &options.generated) {
+        (Some(format), _) => Some(format.into()),
+        (None, Some(folder)) => written_format(folder),
+        (None, None) => None,
+    };
+    let policy = super::load_as(&options.policy, written)?;
     let recorded = options
         .trace
         .iter()
@@ -73,6 +78,17 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
         output::say(show::report(&report, drift.as_ref(), equal)?.trim_end())?;
     }
     Ok(if equal { Outcome::Done } else { Outcome::Different })
+}
+
+/// The numeric format that the folder's manifest names; a manifest that cannot be read is reported later.
+fn written_format(folder: &Path) -> Option<NumericFormat> {
+    #[derive(Deserialize)]
+    struct Written {
+        numeric_format: String,
+    }
+    let text = verify::read_text(&folder.join(manifest::FILE)).ok()?;
+    let written: Written = serde_json::from_str(&text).ok()?;
+    NumericFormat::find(&written.numeric_format)
 }
 
 fn recording(policy: &Policy, path: &Path) -> Result<Recorded, Failure> {

@@ -230,7 +230,7 @@ fn set_mapping(policy: &Policy) -> String {
     let arguments = match mapping_terms(policy) {
         Some(4) => "a, b, c, r",
         Some(_) => "a, b, c",
-        None => return "\nimpl Driver {\n    fn set_mapping(&mut self, _: [u32; 4]) {\n        std::process::exit(3);\n    }\n}\n".to_owned(),
+        None => return "\nimpl Driver {\n    fn set_mapping(&mut self, _: [u32; 4]) {\n        panic!(\"no mapping\");\n    }\n}\n".to_owned(),
     };
     let unused = if arguments.ends_with('r') { "r" } else { "_" };
     format!(

@@ -223,7 +223,7 @@ static float constructs_line_sum(const float *line, uint32_t length, float newes
 static float constructs_relu(float x)
 {
     const uint32_t bits = constructs_bits(x);
-    return constructs_from_bits(bits & ((bits >> 31) - (uint32_t)1));
+    return constructs_from_bits(bits & ~((uint32_t)0 - (bits >> 31)));
 }
 
 static float constructs_leaky_relu(float x, float slope)
@@ -504,7 +504,6 @@ CONSTRUCTS_CODE void constructs_q_values(const float *observation, float *q)
     constructs_layer3(hidden2, hidden3);
     constructs_layer4(hidden3, q);
 }
-
 /* Network, argmax, mapping, limits, status. */
 CONSTRUCTS_CODE static void constructs_decide(const constructs_state *state, const constructs_front *front, constructs_command *command)
 {

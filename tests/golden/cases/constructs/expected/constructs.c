@@ -223,7 +223,7 @@ static float constructs_line_sum(const float *line, uint32_t length, float newes
 static float constructs_relu(float x)
 {
     const uint32_t bits = constructs_bits(x);
-    return constructs_from_bits(bits & ((bits >> 31) - (uint32_t)1));
+    return constructs_from_bits(bits & ~((uint32_t)0 - (bits >> 31)));
 }
 
 static float constructs_leaky_relu(float x, float slope)

@@ -119,7 +119,7 @@ fn a_branch_a_static_variable_and_a_library_call_are_seen() {
     let target = targets::find("cortex-m4f").unwrap();
     let mut files = codegen::generate(&policy, target, &[Language::C]).unwrap().files;
     let text = files.get_mut("buck12.c").unwrap();
-    let honest = "return buck12_from_bits(bits & ((bits >> 31) - (uint32_t)1));";
+    let honest = "return buck12_from_bits(bits & ~((uint32_t)0 - (bits >> 31)));";
     assert!(text.contains(honest), "the place of the ReLU");
     *text = text.replace(
         honest,

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 /// From a trained policy to verified controller code.
@@ -27,6 +28,8 @@ pub enum Command {
     Compile(Compile),
     /// Compile the generated code and compare it with the interpreter, bit by bit
     Verify(Verify),
+    /// List the deployment targets: processor, compilers, where verify runs them
+    Targets(Targets),
     /// Close a policy's loop on a simulated converter: load steps, classical controllers and the limit beside it
     Simulate(Simulate),
     /// Train a policy on a simulated converter and write its folder
@@ -58,6 +61,30 @@ pub struct Inspect {
     pub json: bool,
 }
 
+/// Numeric format on the command line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// binary32, exact order
+    F32,
+    /// binary32 with fused multiply-add in the network
+    F32Fma,
+    /// 16-bit integer network
+    I16,
+    /// 8-bit weights, 16-bit activations
+    I8,
+}
+
+impl From<Format> for policy::NumericFormat {
+    fn from(format: Format) -> Self {
+        match format {
+            Format::F32 => policy::NumericFormat::F32,
+            Format::F32Fma => policy::NumericFormat::F32Fma,
+            Format::I16 => policy::NumericFormat::I16,
+            Format::I8 => policy::NumericFormat::I8,
+        }
+    }
+}
+
 /// Language on the command line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Lang {
@@ -74,6 +101,12 @@ impl From<Lang> for codegen::Language {
     }
 }
 
+/// Reads the name of a door.
+fn door() -> impl TypedValueParser<Value = codegen::Door> {
+    let names = codegen::Door::ALL.map(codegen::Door::name);
+    PossibleValuesParser::new(names).try_map(|name| codegen::Door::find(&name).ok_or("unknown door"))
+}
+
 #[derive(Debug, Args)]
 pub struct Compile {
     /// policy.toml or the folder that holds it
@@ -81,9 +114,22 @@ pub struct Compile {
     /// Language; several separated by commas
     #[arg(long, value_enum, value_delimiter = ',', default_value = "c")]
     pub lang: Vec<Lang>,
-    /// Deployment target
+    /// Deployment target; `policyc targets` lists them
     #[arg(long, default_value = "host")]
     pub target: String,
+    /// Do not build and run the code under the target's emulator to report memory, stack and instructions of a step
+    #[arg(long)]
+    pub no_costs: bool,
+    /// Also generate a way into a tool or onto a board, with the C core; may be repeated. kit: C test program with
+    /// expected bits for your compiler and board. sfunction: Simulink block, also for dSPACE RTI
+    #[arg(long, value_name = "NAME", value_parser = door())]
+    pub door: Vec<codegen::Door>,
+    /// Control steps in the kit
+    #[arg(long, value_name = "N", default_value_t = verify::kit::DEFAULT_STEPS, value_parser = clap::value_parser!(u32).range(1..=200_000))]
+    pub kit_steps: u32,
+    /// Numeric format in the place of the contract's
+    #[arg(long, value_enum)]
+    pub format: Option<Format>,
     /// Folder for the generated files; made if missing
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
@@ -93,12 +139,19 @@ pub struct Compile {
 pub struct Verify {
     /// policy.toml or the folder that holds it
     pub policy: PathBuf,
+    /// Numeric format in the place of the contract's; with --generated, of the code in that folder unless given
+    #[arg(long, value_enum)]
+    pub format: Option<Format>,
     /// Control steps to compare per build
     #[arg(long, default_value_t = 20_000, value_parser = clap::value_parser!(u64).range(1..))]
     pub steps: u64,
     /// Seed of the generated measurements
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
+    /// Deployment target: its compilers and, where it is not this machine, its emulator. Unless given: the target of the
+    /// generated folder, else host
+    #[arg(long)]
+    pub target: Option<String>,
     /// Verify the generated code in this folder, and that it is what the policy yields today
     #[arg(long, value_name = "DIR")]
     pub generated: Option<PathBuf>,
@@ -142,6 +195,13 @@ pub struct Simulate {
     /// bit by bit
     #[arg(long)]
     pub check: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct Targets {
+    /// Machine-readable, with everything the compiler knows of a target
+    #[arg(long)]
+    pub json: bool,
 }
 
 #[derive(Debug, Args)]

@@ -4,6 +4,8 @@
 
 pub mod backend;
 pub mod crc;
+#[cfg(feature = "c")]
+pub mod door;
 pub mod lower;
 pub mod manifest;
 pub mod program;
@@ -15,6 +17,8 @@ use policy::Policy;
 use targets::TargetSpec;
 
 pub use backend::Backend;
+#[cfg(feature = "c")]
+pub use door::Door;
 pub use lower::lower;
 pub use program::Program;
 
@@ -61,6 +65,8 @@ pub enum CodegenError {
     Rust(String),
     /// The manifest could not be written as JSON.
     Manifest(String),
+    /// A door lacks what it needs.
+    Door(&'static str),
     /// This build of the compiler lacks the backend.
     NotBuilt(Language),
 }
@@ -71,6 +77,7 @@ impl fmt::Display for CodegenError {
             CodegenError::Template(message) => write!(f, "internal fault: template: {message}"),
             CodegenError::Rust(message) => write!(f, "internal fault: generated Rust: {message}"),
             CodegenError::Manifest(message) => write!(f, "internal fault: manifest: {message}"),
+            CodegenError::Door(message) => write!(f, "internal fault: door: {message}"),
             CodegenError::NotBuilt(language) => write!(f, "this build has no {} backend", language.name()),
         }
     }
@@ -97,7 +104,40 @@ pub fn generate(policy: &Policy, target: &TargetSpec, languages: &[Language]) ->
         all.files.extend(compile(policy, target, *language)?.files);
     }
     let manifest = manifest::manifest(policy, target, languages, &all);
-    let text = serde_json::to_string_pretty(&manifest).map_err(|error| CodegenError::Manifest(error.to_string()))?;
+    with_manifest(all, &manifest)
+}
+
+/// [`generate`] with the files of `doors`; `material` is what the kit compares with.
+///
+/// # Errors
+/// Only for a fault in the compiler itself.
+#[cfg(feature = "c")]
+pub fn generate_with_doors(
+    policy: &Policy,
+    target: &TargetSpec,
+    languages: &[Language],
+    doors: &[Door],
+    material: Option<&backend::kit::Material>,
+) -> Result<GeneratedFiles, CodegenError> {
+    if doors.is_empty() {
+        return generate(policy, target, languages);
+    }
+    let mut all = GeneratedFiles::default();
+    for language in languages {
+        all.files.extend(compile(policy, target, *language)?.files);
+    }
+    let program = lower(policy, target, Language::C);
+    for door in doors {
+        all.files.extend(door.emit(&program, material)?.files);
+    }
+    let mut manifest = manifest::manifest(policy, target, languages, &all);
+    manifest.doors = doors.iter().map(|door| door.name()).collect();
+    manifest.kit_steps = material.map(|material| material.policy.steps());
+    with_manifest(all, &manifest)
+}
+
+fn with_manifest(mut all: GeneratedFiles, manifest: &manifest::Manifest) -> Result<GeneratedFiles, CodegenError> {
+    let text = serde_json::to_string_pretty(manifest).map_err(|error| CodegenError::Manifest(error.to_string()))?;
     all.files.insert(manifest::FILE.to_owned(), text + "\n");
     Ok(all)
 }

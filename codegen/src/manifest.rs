@@ -7,10 +7,34 @@ use serde::Serialize;
 use targets::TargetSpec;
 
 use crate::crc::crc32_bytes;
+use crate::program::NetworkCode;
 use crate::{GeneratedFiles, Language, TOOL};
 
 /// File name of the manifest in the output folder.
 pub const FILE: &str = "manifest.json";
+
+/// Start of the entry that [`with_costs`] adds.
+const COSTS: &str = ",\n  \"costs\": ";
+
+/// A manifest with the costs of builds as its last entry. They come from the compilers of a machine, all else does not.
+///
+/// # Errors
+/// If the costs cannot be written as JSON.
+pub fn with_costs(text: &str, costs: &impl Serialize) -> Result<String, crate::CodegenError> {
+    let costs =
+        serde_json::to_string_pretty(costs).map_err(|error| crate::CodegenError::Manifest(error.to_string()))?;
+    let body = text.trim_end().strip_suffix("\n}").unwrap_or_default();
+    Ok(format!("{body}{COSTS}{}\n}}\n", costs.replace('\n', "\n  ")))
+}
+
+/// The manifest without what [`with_costs`] added: the same on every machine.
+#[must_use]
+pub fn without_costs(text: &str) -> String {
+    match text.split_once(COSTS) {
+        Some((body, _)) => format!("{body}\n}}\n"),
+        None => text.to_owned(),
+    }
+}
 
 /// Content of `manifest.json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -23,6 +47,12 @@ pub struct Manifest {
     pub target: String,
     /// Generated languages.
     pub languages: Vec<Language>,
+    /// Doors beside the core, by name.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub doors: Vec<&'static str>,
+    /// Control steps in the back-to-back kit, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kit_steps: Option<u32>,
     /// Numeric format.
     pub numeric_format: policy::NumericFormat,
     /// Control period in s.
@@ -54,6 +84,10 @@ pub struct Sizes {
     pub table_bytes: usize,
     /// State struct in bytes.
     pub state_bytes: usize,
+    /// Integer formats: largest magnitude that any 32-bit sum of the network can reach over the clamped box of
+    /// observations, in any order of the additions; below 2^31.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accumulator_bound: Option<i64>,
 }
 
 /// One generated file.
@@ -77,6 +111,10 @@ pub fn sizes(policy: &Policy, target: &TargetSpec) -> Sizes {
         macs: program.macs(),
         table_bytes: program.table_bytes(),
         state_bytes: 4 * program.state_words(),
+        accumulator_bound: match &program.network {
+            NetworkCode::Integer(network) => Some(network.accumulator_bound),
+            NetworkCode::Real { .. } => None,
+        },
     }
 }
 
@@ -92,6 +130,8 @@ pub fn manifest(policy: &Policy, target: &TargetSpec, languages: &[Language], fi
         name: policy.name.clone(),
         target: target.name.to_owned(),
         languages: languages.to_vec(),
+        doors: Vec::new(),
+        kit_steps: None,
         numeric_format: policy.numeric_format,
         sample_period: policy.sample_period,
         digests: policy.digests.clone(),
@@ -109,5 +149,25 @@ fn entry(text: &str) -> FileEntry {
     FileEntry {
         bytes: text.len(),
         crc32: format!("{:08x}", crc32_bytes(text.bytes())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn costs_are_the_last_entry_and_come_off_again() {
+        let plain = "{\n  \"name\": \"a\"\n}\n";
+        let Ok(text) = with_costs(plain, &[BTreeMap::from([("stack_bytes", 5)])]) else {
+            panic!("costs are JSON")
+        };
+        let read: Result<serde_json::Value, _> = serde_json::from_str(&text);
+        assert!(
+            read.is_ok_and(|value| value["name"] == "a" && value["costs"][0]["stack_bytes"] == 5),
+            "{text}"
+        );
+        assert_eq!(without_costs(&text), plain);
+        assert_eq!(without_costs(plain), plain);
     }
 }

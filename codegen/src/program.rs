@@ -3,7 +3,11 @@
 //! A step is three straight-line [`Block`]s around the network: `front` (measurement to observation), `decide`
 //! (chosen duty to command) and `advance` (what `commit` remembers). A backend prints values one after the other.
 
+mod network;
+
 use policy::{Digests, NumericFormat};
+
+pub use network::{ActivationCode, IntegerInput, IntegerLayer, IntegerNetwork, LayerCode, NetworkCode};
 
 /// A binary32 constant by its bits, so that -0 and +0 differ and programs can be compared and ordered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -253,52 +257,6 @@ pub struct Advance {
     pub soft_cap: Option<ValueId>,
 }
 
-/// Activation with its literals.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ActivationCode {
-    /// None.
-    Identity,
-    /// Clears negative values by their sign bit.
-    Relu,
-    /// Multiplies negative values.
-    LeakyRelu(Literal),
-    /// The contract's rational function.
-    Tanh,
-}
-
-/// Dense layer with its table in the order in which it is read.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LayerCode {
-    /// Tensor name, for the comment.
-    pub name: String,
-    /// Inputs.
-    pub inputs: usize,
-    /// Outputs.
-    pub outputs: usize,
-    /// Outputs accumulated side by side, `1..=outputs`.
-    pub block_rows: usize,
-    /// Weights: blocks of `block_rows` outputs (the last may be shorter), within a block by input, then by output.
-    pub table: Vec<f32>,
-    /// `[outputs]`.
-    pub bias: Vec<f32>,
-    /// Behind the layer.
-    pub activation: ActivationCode,
-}
-
-impl LayerCode {
-    /// Number of full blocks.
-    #[must_use]
-    pub fn full_blocks(&self) -> usize {
-        self.outputs / self.block_rows
-    }
-
-    /// Outputs in the shorter last block, 0 if there is none.
-    #[must_use]
-    pub fn tail_rows(&self) -> usize {
-        self.outputs % self.block_rows
-    }
-}
-
 /// Coefficients, their run-time intervals and the condition that keeps the mapping increasing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MappingCode {
@@ -352,7 +310,7 @@ pub struct Program {
     /// Measurement to observation.
     pub front: Front,
     /// Network.
-    pub layers: Vec<LayerCode>,
+    pub network: NetworkCode,
     /// Duty per action.
     pub duties: Vec<Literal>,
     /// Mapping, if any.
@@ -393,26 +351,19 @@ impl Program {
     /// Multiply-accumulates of the network.
     #[must_use]
     pub fn macs(&self) -> usize {
-        self.layers.iter().map(|layer| layer.inputs * layer.outputs).sum()
+        let layers = self.network.shape();
+        layers.iter().map(|(_, inputs, outputs)| inputs * outputs).sum()
     }
 
     /// Bytes of constant tables.
     #[must_use]
     pub fn table_bytes(&self) -> usize {
-        let words: usize = self
-            .layers
-            .iter()
-            .map(|layer| layer.table.len() + layer.bias.len())
-            .sum();
-        4 * (words + self.duties.len())
+        self.network.table_bytes() + 4 * self.duties.len()
     }
 
     /// All table words in the order of the integrity check.
     pub fn table_words(&self) -> impl Iterator<Item = u32> + '_ {
-        let layers = self
-            .layers
-            .iter()
-            .flat_map(|layer| layer.table.iter().chain(&layer.bias).map(|w| w.to_bits()));
-        layers.chain(self.duties.iter().map(|duty| duty.0))
+        let network = self.network.table_words().into_iter();
+        network.chain(self.duties.iter().map(|duty| duty.0))
     }
 }

@@ -74,6 +74,12 @@ impl Losses {
         self.v() * (1.0 - self.rho() * i_out)
     }
 
+    /// The voltage at `duty` and `i_out` A, V.
+    #[must_use]
+    pub fn v_out(&self, duty: f64, i_out: f64) -> f64 {
+        (duty - self.d_real(0.0, i_out)) * self.v_per_duty(i_out)
+    }
+
     /// The duty that brings `d_sim v_in` V at `i_out` A.
     #[must_use]
     pub fn d_real(&self, d_sim: f64, i_out: f64) -> f64 {
@@ -171,6 +177,7 @@ mod tests {
         let on = d - LOSSY.lost_duty;
         let v = on * (195.0 - 0.5 * i) - (1.0 - on) * (1.5 + 0.02 * i) - 0.1 * i;
         assert!((v - d_sim * 195.0).abs() < 1e-12, "{v}");
+        assert!((LOSSY.v_out(d, i) - v).abs() < 1e-12);
     }
 
     #[test]

@@ -5,7 +5,8 @@ mod common;
 
 use std::path::Path;
 
-use drm::acquire::{Bench, Hold, LoadSetting, Measurement, Plan, Protocol, Simulated, measure};
+use common::Simulated;
+use drm::acquire::{Bench, Hold, LoadSetting, Measurement, Plan, Protocol, measure};
 use drm::formula::Losses;
 use drm::{Conduction, DutyRatioMap, FitOptions, Form, Report, Table, TableOptions, judge};
 use plant::{Load, Parameters, Plant, Rectifier, Signals};

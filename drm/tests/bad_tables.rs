@@ -45,6 +45,22 @@ fn the_good_table_is_read() {
 }
 
 #[test]
+fn millivolts_in_both_columns_are_refused_unless_they_are_volts() {
+    let both =
+        "d_real,v_out,i_out,v_in\n0.4,78100,2,200000\n0.5,97800,2,200000\n0.4,76000,8,200000\n0.5,95600,8,200000\n";
+    refused(
+        both,
+        &[
+            "`v_in` and `v_out` look like millivolts",
+            "--map v_in=v_in*0.001,v_out=v_out*0.001",
+        ],
+    );
+    let options = mapped("v_in=v_in*0.001,v_out=v_out*0.001");
+    let v_out = Table::parse(&source(both), &options).unwrap().points[0].v_out;
+    assert!((v_out - 78.1).abs() < 1e-12, "{v_out}");
+}
+
+#[test]
 fn a_missing_cell_is_refused() {
     let empty = GOOD.replace("78.1", "");
     refused(&empty, &["a cell is empty", "table.csv:2:6", "measure the point again"]);

@@ -208,6 +208,14 @@ fn ties_are_said_and_vanish_with_a_better_table() {
         row[0] = simple.d_real(row[1] / row[3], row[2]);
     };
     assert!(tied(&table(&simple, resistor)) >= 3);
+    let said = fitted(&table(&simple, resistor), Form::ThreeTerm).meaning.join("\n");
+    let (_, impossible) = said
+        .split_once("no converter has it")
+        .unwrap_or_else(|| panic!("{said}"));
+    assert!(
+        !impossible.contains("-100"),
+        "no gain that explains v_out by itself: {said}"
+    );
     let no_diode = Losses { v_f: 0.0, ..simple };
     assert_eq!(tied(&table(&no_diode, |_, _| {})), 1);
     let report = fitted(&table(&no_diode, |_, _| {}), Form::ThreeTerm);

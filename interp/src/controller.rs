@@ -4,6 +4,7 @@ use ndarray::{Array1, ArrayView1};
 use policy::Policy;
 
 use crate::feature::{Feature, Inputs};
+use crate::integer;
 use crate::limits::Limits;
 use crate::mapping::Mapping;
 use crate::network::{Layer, argmax};
@@ -18,7 +19,7 @@ use crate::trace::{Command, FeatureTrace, LayerTrace, Trace};
 pub struct Controller<T> {
     signals: Vec<Signal<T>>,
     features: Vec<Feature<T>>,
-    layers: Vec<Layer<T>>,
+    network: Network<T>,
     /// Duty per action.
     table: Vec<T>,
     mapping: Option<Mapping<T>>,
@@ -62,7 +63,7 @@ impl<T: Real> Controller<T> {
             state_names: state_names(policy, &features, &state),
             signals,
             features,
-            layers: policy.layers.iter().map(Layer::new).collect(),
+            network: Network::new(policy),
             table: policy.actions.iter().map(|action| T::nearest(action.duty)).collect(),
             mapping,
             limits,
@@ -109,13 +110,11 @@ impl<T: Real> Controller<T> {
         self.sense(samples, trace)?;
         self.observe_into(trace);
         trace.action_index = {
-            let mut input = trace.observation.view();
-            for (layer, layer_trace) in self.layers.iter().zip(&mut trace.layers) {
-                layer.run(input, layer_trace);
-                input = layer_trace.post_activation.view();
+            self.network.run(trace.observation.view(), &mut trace.layers);
+            if let Some(last) = trace.layers.last() {
+                trace.q_values.assign(&last.post_activation);
             }
-            trace.q_values.assign(&input);
-            argmax(input) as u32
+            argmax(trace.q_values.view()) as u32
         };
         self.act(trace);
         Ok(())
@@ -196,13 +195,9 @@ impl<T: Real> Controller<T> {
                 found: observation.len(),
             });
         }
-        let mut x = observation.to_owned();
-        for layer in &self.layers {
-            let mut trace = blank_layer(layer);
-            layer.run(x.view(), &mut trace);
-            x = trace.post_activation;
-        }
-        Ok(x)
+        let mut layers = self.network.blank();
+        self.network.run(observation.view(), &mut layers);
+        Ok(layers.pop().map(|last| last.post_activation).unwrap_or_default())
     }
 
     /// Replaces the mapping coefficients if the contract allows them (section 8); `false` and no change otherwise,
@@ -237,7 +232,7 @@ impl<T: Real> Controller<T> {
                 })
                 .collect(),
             observation: Array1::from_elem(self.features.len(), T::ZERO),
-            layers: self.layers.iter().map(blank_layer).collect(),
+            layers: self.network.blank(),
             q_values: Array1::from_elem(self.table.len(), T::ZERO),
             action_index: 0,
             duty_sim: T::ZERO,
@@ -374,11 +369,49 @@ impl Controller<f32> {
     }
 }
 
-fn blank_layer<T: Real>(layer: &Layer<T>) -> LayerTrace<T> {
-    let blank = Array1::from_elem(layer.outputs(), T::ZERO);
-    LayerTrace {
-        pre_activation: blank.clone(),
-        post_activation: blank,
+/// The network in the policy's numeric format.
+#[derive(Debug, Clone)]
+enum Network<T> {
+    /// In the format of the controller (section 6).
+    Real(Vec<Layer<T>>),
+    /// In integers (section 6b).
+    Integer(integer::Network),
+}
+
+impl<T: Real> Network<T> {
+    fn new(policy: &Policy) -> Self {
+        let fused = policy.numeric_format == policy::NumericFormat::F32Fma;
+        match integer::Network::new(policy) {
+            Some(network) => Self::Integer(network),
+            None => Self::Real(policy.layers.iter().map(|layer| Layer::new(layer, fused)).collect()),
+        }
+    }
+
+    /// Traces of the right shape.
+    fn blank(&self) -> Vec<LayerTrace<T>> {
+        let blank = |outputs: usize| {
+            let zeros = Array1::from_elem(outputs, T::ZERO);
+            LayerTrace {
+                pre_activation: zeros.clone(),
+                post_activation: zeros,
+            }
+        };
+        match self {
+            Self::Real(layers) => layers.iter().map(|layer| blank(layer.outputs())).collect(),
+            Self::Integer(network) => network.outputs().map(blank).collect(),
+        }
+    }
+
+    fn run(&self, observation: ArrayView1<'_, T>, traces: &mut [LayerTrace<T>]) {
+        let layers = match self {
+            Self::Integer(network) => return network.run(observation, traces),
+            Self::Real(layers) => layers,
+        };
+        let mut input = observation;
+        for (layer, trace) in layers.iter().zip(traces) {
+            layer.run(input, trace);
+            input = trace.post_activation.view();
+        }
     }
 }
 

@@ -8,7 +8,7 @@
 //! | 1 state | [`state`] |
 //! | 2 sanitise | `sanitise` |
 //! | 3, 4, 5 source, filters, observation | `feature`, `filter` |
-//! | 6, 7 network, argmax | `network` |
+//! | 6, 7 network, argmax | `network`; in integers `integer` |
 //! | 8 action, mapping | `mapping` |
 //! | 9 limits and status | `limits`, [`status`] |
 //! | 10 commit | [`controller`] |
@@ -26,6 +26,7 @@
 pub mod controller;
 mod feature;
 mod filter;
+mod integer;
 mod limits;
 mod mapping;
 mod network;

@@ -12,6 +12,8 @@ pub(crate) struct Layer<T> {
     weights: Array2<T>,
     bias: Array1<T>,
     activation: Activation<T>,
+    /// Products are added with one rounding (`f32-fma`).
+    fused: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -23,7 +25,7 @@ enum Activation<T> {
 }
 
 impl<T: Real> Layer<T> {
-    pub fn new(layer: &policy::Layer) -> Self {
+    pub fn new(layer: &policy::Layer, fused: bool) -> Self {
         let activation = match layer.activation {
             policy::Activation::Identity => Activation::Identity,
             policy::Activation::Relu => Activation::Relu,
@@ -38,6 +40,7 @@ impl<T: Real> Layer<T> {
             }),
             bias: layer.bias.iter().map(|&b| T::widen(b)).collect(),
             activation,
+            fused,
         }
     }
 
@@ -48,7 +51,8 @@ impl<T: Real> Layer<T> {
     /// Runs the layer; the result is `trace.post_activation`.
     pub fn run(&self, input: ArrayView1<'_, T>, trace: &mut LayerTrace<T>) {
         trace.pre_activation.assign(&self.bias);
-        T::accumulate(self.weights.view(), input, trace.pre_activation.view_mut());
+        let accumulate = if self.fused { T::accumulate_fused } else { T::accumulate };
+        accumulate(self.weights.view(), input, trace.pre_activation.view_mut());
         trace.post_activation.assign(&trace.pre_activation);
         let post = &mut trace.post_activation;
         match self.activation {
@@ -134,7 +138,7 @@ mod tests {
             pre_activation: Array1::from_elem(layer.outputs, T::ZERO),
             post_activation: Array1::from_elem(layer.outputs, T::ZERO),
         };
-        Layer::<T>::new(layer).run(aview1(input), &mut trace);
+        Layer::<T>::new(layer, false).run(aview1(input), &mut trace);
         trace
     }
 

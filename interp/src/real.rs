@@ -13,7 +13,8 @@ mod sealed {
 
 /// A number format in which a whole controller computes; `f32` and `f64` only.
 ///
-/// Every operator is one rounding to nearest, ties to even. Nothing here or in its users calls `mul_add`.
+/// Every operator is one rounding to nearest, ties to even. Only `accumulate_fused`, the network of `f32-fma`,
+/// rounds product and sum together.
 pub trait Real:
     sealed::Sealed
     + Copy
@@ -57,6 +58,9 @@ pub trait Real:
     ///
     /// A method of the trait so that it is compiled in this crate, for concrete types.
     fn accumulate(weights: ArrayView2<'_, Self>, input: ArrayView1<'_, Self>, acc: ArrayViewMut1<'_, Self>);
+
+    /// [`Real::accumulate`] with one rounding per product and sum: `acc_o = fl(acc_o + w_io * x_i)`.
+    fn accumulate_fused(weights: ArrayView2<'_, Self>, input: ArrayView1<'_, Self>, acc: ArrayViewMut1<'_, Self>);
 }
 
 macro_rules! accumulate {
@@ -64,6 +68,16 @@ macro_rules! accumulate {
         fn accumulate(weights: ArrayView2<'_, Self>, input: ArrayView1<'_, Self>, mut acc: ArrayViewMut1<'_, Self>) {
             for (row, &x) in weights.rows().into_iter().zip(input.iter()) {
                 acc.zip_mut_with(&row, |acc, &w| *acc += w * x);
+            }
+        }
+
+        fn accumulate_fused(
+            weights: ArrayView2<'_, Self>,
+            input: ArrayView1<'_, Self>,
+            mut acc: ArrayViewMut1<'_, Self>,
+        ) {
+            for (row, &x) in weights.rows().into_iter().zip(input.iter()) {
+                acc.zip_mut_with(&row, |acc, &w| *acc = w.mul_add(x, *acc));
             }
         }
     };

@@ -86,9 +86,7 @@ pub fn expand(input: TokenStream) -> TokenStream {
 }
 
 fn load(root: &Path, path: &str) -> Result<Policy, Faults> {
-    let options = ReadOptions {
-        root: Some(root.to_owned()),
-    };
+    let options = ReadOptions::within(root);
     policy::check(policy::read(&root.join(path), &options)?)
 }
 

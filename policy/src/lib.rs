@@ -25,6 +25,7 @@ mod notes;
 mod raw;
 pub mod rounding;
 mod scaffold;
+pub mod scales;
 mod weights;
 
 pub use check::check;

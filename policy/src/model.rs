@@ -23,6 +23,49 @@ pub struct Interval {
 pub enum NumericFormat {
     /// IEEE 754 binary32, fixed order, never contracted.
     F32,
+    /// As `F32`, but every product of the network is added with one rounding (fused multiply-add).
+    F32Fma,
+    /// Integer network: 16-bit weights and activations, 32-bit accumulators; binary32 around it.
+    I16,
+    /// Integer network: 8-bit weights, 16-bit activations, 32-bit accumulators; binary32 around it.
+    I8,
+}
+
+impl NumericFormat {
+    /// All formats.
+    pub const ALL: [NumericFormat; 4] = [
+        NumericFormat::F32,
+        NumericFormat::F32Fma,
+        NumericFormat::I16,
+        NumericFormat::I8,
+    ];
+
+    /// Name in `policy.toml` and on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            NumericFormat::F32 => "f32",
+            NumericFormat::F32Fma => "f32-fma",
+            NumericFormat::I16 => "i16",
+            NumericFormat::I8 => "i8",
+        }
+    }
+
+    /// The format of that name.
+    #[must_use]
+    pub fn find(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|format| format.name() == name)
+    }
+
+    /// Largest magnitude of a weight of the integer network; `None` for the others.
+    #[must_use]
+    pub fn weight_limit(self) -> Option<i32> {
+        match self {
+            NumericFormat::F32 | NumericFormat::F32Fma => None,
+            NumericFormat::I16 => Some(32_767),
+            NumericFormat::I8 => Some(127),
+        }
+    }
 }
 
 /// A trained controller, whole: signals, features, network, actions, mapping, limits.
@@ -59,6 +102,16 @@ pub struct Policy {
     pub notes: Vec<String>,
     /// Every file that was read, the contract first; for rebuild tracking.
     pub files: Vec<PathBuf>,
+}
+
+impl Policy {
+    /// The same policy in another numeric format; its contract's digest changes with it.
+    #[must_use]
+    pub fn with_format(mut self, format: NumericFormat) -> Self {
+        self.numeric_format = format;
+        self.digests = crate::digests::of(&self);
+        self
+    }
 }
 
 /// A measured quantity.

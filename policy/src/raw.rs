@@ -15,14 +15,31 @@ pub struct ReadOptions {
     /// Folder that every file must lie in, by its path alone (links are not followed); a relative path of the
     /// contract is then taken from here, and messages name files relative to it.
     pub root: Option<PathBuf>,
+    /// Files that a program carries inside: name and content. A file named here is not looked for on disk.
+    pub embedded: &'static [(&'static str, &'static [u8])],
 }
 
 impl ReadOptions {
+    /// Options for a policy that a program carries inside.
+    #[must_use]
+    pub fn embedded(files: &'static [(&'static str, &'static [u8])]) -> Self {
+        ReadOptions {
+            embedded: files,
+            ..ReadOptions::default()
+        }
+    }
+
+    fn content(&self, name: &FileName, limit: u64) -> Result<Vec<u8>, Message> {
+        let inside = self.embedded.iter().find(|(known, _)| name.path == Path::new(known));
+        inside.map_or_else(|| name.read(limit), |(_, bytes)| Ok(bytes.to_vec()))
+    }
+
     /// Options with [`ReadOptions::root`] set.
     #[must_use]
     pub fn within(root: impl Into<PathBuf>) -> Self {
         ReadOptions {
             root: Some(root.into()),
+            ..ReadOptions::default()
         }
     }
 }
@@ -79,8 +96,8 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<RawPolicy, Faults> {
     let given = FileName::new(path);
     let name = locate(path, options).map_err(|message| alone(given.fault(message), Vec::new()))?;
     let mut files = vec![name.path.clone()];
-    let bytes = name
-        .read(MAX_TOML_BYTES)
+    let bytes = options
+        .content(&name, MAX_TOML_BYTES)
         .map_err(|message| alone(name.fault(message), files.clone()))?;
     let source = Source::new(name.clone(), bytes).map_err(|fault| alone(*fault, files.clone()))?;
     let (contract, syntax) = Document::parse(source);
@@ -99,7 +116,7 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<RawPolicy, Faults> {
         let text = value.as_text()?;
         let read = beside(&name, text, options).and_then(|name| {
             files.push(name.path.clone());
-            name.read(limit).map(|bytes| Binary { name, bytes })
+            options.content(&name, limit).map(|bytes| Binary { name, bytes })
         });
         read.map_err(|message| faults.push(value.fault(message))).ok()
     };

@@ -1,8 +1,16 @@
 //! What differs between deployment targets, as data.
 //!
 //! One entry of [`TARGETS`] per target; the compiler and the verifier read it, nothing else knows a target by name.
+//! How to add one: `docs/targets.md`.
+
+mod arm;
+pub mod boards;
+mod others;
+mod riscv;
 
 use serde::Serialize;
+
+pub use boards::{Board, BoardFile};
 
 /// Byte order of a target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -28,6 +36,104 @@ pub enum RowBlock {
     Rows(usize),
 }
 
+/// Widths of C's types in bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Widths {
+    /// `char`, the smallest addressable unit.
+    pub char_bits: u8,
+    /// `int`.
+    pub int_bits: u8,
+    /// A data pointer.
+    pub pointer_bits: u8,
+}
+
+/// Floating point in hardware.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Fpu {
+    /// None: floats are library calls whose instruction count depends on the data.
+    None,
+    /// binary32.
+    Single,
+    /// binary32 and binary64.
+    Double,
+    /// Decided by the machine the code is compiled for.
+    Native,
+}
+
+/// Fused multiply-add in hardware, as cycles from which the next dependent-free operation can issue.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Fma {
+    /// The processor has none.
+    Absent,
+    /// It has one, its cost is not documented.
+    Unrated,
+    /// Cycles of the fused operation, and of product and sum apart.
+    Cycles {
+        /// Fused.
+        fused: u8,
+        /// Product, then sum.
+        apart: u8,
+    },
+}
+
+/// Cycles beyond one per instruction, at 0 wait states, from the processor's timing table: least and most.
+///
+/// A model, not a measurement. Divisions and fused operations are not in it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct CycleModel {
+    /// Per access to memory; the least where loads follow each other in the pipeline.
+    pub access: (u8, u8),
+    /// Per jump taken: refill of the pipeline.
+    pub jump: (u8, u8),
+}
+
+/// Where compilers of the target put things unless told otherwise, and where fast memory usually is.
+///
+/// The generated C takes other places through its macros `<NAME>_TABLE` and `<NAME>_CODE`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Sections {
+    /// Constant tables.
+    pub tables: &'static str,
+    /// Code.
+    pub code: &'static str,
+    /// Usual name for code in fast memory, if that is common practice on the target.
+    pub fast_code: Option<&'static str>,
+}
+
+/// A C compiler of a target.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct CCompiler {
+    /// Program name, also the name in filters.
+    pub program: &'static str,
+    /// Debian package that has it; empty where no distribution has it.
+    pub package: &'static str,
+    /// Flags that choose the processor.
+    pub machine_flags: &'static [&'static str],
+}
+
+/// Rust on a target.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct RustTarget {
+    /// Target triple; empty for the machine of the compiler.
+    pub triple: &'static str,
+    /// Flags that choose the processor.
+    pub machine_flags: &'static [&'static str],
+}
+
+/// Where a build of the target runs under `policyc verify`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Runner {
+    /// On this machine.
+    Native,
+    /// Under an emulator.
+    Emulated(Board),
+    /// Nowhere here; why.
+    None(&'static str),
+}
+
 /// A deployment target.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct TargetSpec {
@@ -37,31 +143,76 @@ pub struct TargetSpec {
     pub description: &'static str,
     /// Byte order.
     pub endianness: Endianness,
+    /// Widths of C's types.
+    pub widths: Widths,
+    /// Floats in hardware.
+    pub fpu: Fpu,
+    /// Fused multiply-add.
+    pub fma: Fma,
+    /// Numeric format that suits the processor, as `policy.toml` names it; the policy decides, not the target.
+    pub suitable_format: &'static str,
+    /// Cycles of an instruction mix, where the processor's table is simple enough to say so.
+    pub cycles: Option<CycleModel>,
+    /// Where things lie.
+    pub sections: Sections,
+    /// Clock in Hz of a usual device, for shares of the control period.
+    pub clock_hz: Option<u32>,
     /// Row block of the generated C, chosen for the C compilers of the target.
     pub c_row_block: RowBlock,
     /// Row block of the generated Rust, chosen for LLVM.
     pub rust_row_block: RowBlock,
-    /// C compilers in the order in which they are tried.
-    pub c_compilers: &'static [&'static str],
-    /// Flags under which the bits hold, besides the optimisation level.
+    /// C compilers in the order in which they are tried. The first also links what the others compile.
+    pub c_compilers: &'static [CCompiler],
+    /// Flags under which the bits hold, besides the processor and the optimisation level.
     pub c_flags: &'static [&'static str],
+    /// Rust, where the target has it.
+    pub rust: Option<RustTarget>,
     /// rustc flags under which the bits hold, besides the optimisation level.
     pub rust_flags: &'static [&'static str],
+    /// Where `policyc verify` runs a build.
+    pub runner: Runner,
 }
 
+/// C flags under which the bits hold with every compiler that knows them.
+const EXACT_C99: &[&str] = &["-std=c99", "-ffp-contract=off"];
+
+/// rustc never contracts and has no fast-math switch.
+const EXACT_RUST: &[&str] = &["--edition=2021"];
+
+/// Widths of a 32-bit processor.
+const ILP32: Widths = Widths {
+    char_bits: 8,
+    int_bits: 32,
+    pointer_bits: 32,
+};
+
+/// What GNU compilers do.
+const GNU_SECTIONS: Sections = Sections {
+    tables: ".rodata",
+    code: ".text",
+    fast_code: None,
+};
+
 /// All targets, in the order of `policyc targets`.
-pub const TARGETS: &[TargetSpec] = &[TargetSpec {
-    name: "host",
-    description: "the machine policyc runs on, any C99 compiler or rustc",
-    endianness: Endianness::Native,
-    // gcc on x86 spills the accumulators of the block form; LLVM keeps them in registers
-    c_row_block: RowBlock::All,
-    rust_row_block: RowBlock::Rows(16),
-    c_compilers: &["gcc", "clang"],
-    c_flags: &["-std=c99", "-ffp-contract=off"],
-    // rustc never contracts and has no fast-math switch
-    rust_flags: &["--edition=2021"],
-}];
+pub const TARGETS: &[TargetSpec] = &[
+    others::HOST,
+    arm::CORTEX_M0PLUS,
+    arm::CORTEX_M3,
+    arm::CORTEX_M4F,
+    arm::CORTEX_M7,
+    arm::CORTEX_M33,
+    riscv::RISCV32IMC,
+    riscv::RISCV32IMFC,
+    others::DSPACE_DS1202,
+    others::C2000_C28X,
+    others::GENERIC_C99,
+];
+
+/// The machine policyc runs on.
+#[must_use]
+pub fn host() -> &'static TargetSpec {
+    const { &others::HOST }
+}
 
 /// The target of that name.
 #[must_use]
@@ -86,5 +237,30 @@ mod tests {
             assert_eq!(TARGETS.iter().filter(|t| t.name == target.name).count(), 1);
         }
         assert_eq!(find("pdp-11"), None);
+    }
+
+    #[test]
+    fn an_emulated_target_knows_its_byte_order_and_a_linker() {
+        for target in TARGETS {
+            if matches!(target.runner, Runner::Emulated(_)) {
+                assert_ne!(target.endianness, Endianness::Native, "{}", target.name);
+                assert!(!target.c_compilers.is_empty(), "{}", target.name);
+            }
+        }
+    }
+
+    #[test]
+    fn the_files_of_a_board_are_named_once_and_its_script_is_among_them() {
+        for target in TARGETS {
+            let Runner::Emulated(board) = target.runner else {
+                continue;
+            };
+            for file in board.files {
+                assert_eq!(board.files.iter().filter(|f| f.name == file.name).count(), 1);
+            }
+            if let Some(script) = board.linker_script {
+                assert!(board.files.iter().any(|file| file.name == script), "{}", board.name);
+            }
+        }
     }
 }

@@ -31,6 +31,8 @@ pub struct Table {
     pub length: usize,
     /// Lines of comma-separated literals.
     pub lines: Vec<String>,
+    /// Whether it must be aligned to words although its elements are smaller.
+    pub aligned: bool,
 }
 
 /// A dense layer.
@@ -46,6 +48,16 @@ pub struct LayerView {
     pub outputs: usize,
     /// Loops over blocks of outputs, in order.
     pub blocks: Vec<BlockView>,
+    /// Whether the sums stand in the output array (axpy form) instead of in variables.
+    pub in_memory: bool,
+    /// Whether a block is repeated.
+    pub has_loop: bool,
+    /// Whether every block has a form in assembly.
+    pub has_assembly: bool,
+    /// Sum after the first input.
+    pub first: String,
+    /// Sum after each further input.
+    pub next: String,
     /// Expression of the activation over `y[o]`; empty for none.
     pub activation: String,
     /// Name of the input array in `q_values`.
@@ -67,8 +79,158 @@ pub struct BlockView {
     pub first_output: usize,
     /// First table element of the first block.
     pub first_weight: usize,
-    /// Table elements per block.
-    pub stride: usize,
+    /// The whole block in assembly; empty if there is none.
+    pub assembly: Vec<String>,
+    /// One entry per output of the block.
+    pub row_views: Vec<RealRowView>,
+}
+
+/// One output of a block in binary32.
+#[derive(Debug, Clone)]
+pub struct RealRowView {
+    /// Number within the block.
+    pub index: usize,
+    /// Sum after the next input.
+    pub next: String,
+    /// Output from the sum.
+    pub result: String,
+}
+
+/// The network in its numeric format.
+#[derive(Debug, Clone)]
+pub enum NetworkView {
+    /// Layers in binary32.
+    Real(Vec<LayerView>),
+    /// Layers in integers.
+    Integer(IntegerView),
+}
+
+/// A network in integers.
+#[derive(Debug, Clone)]
+pub struct IntegerView {
+    /// Largest magnitude of a sum.
+    pub bound: i64,
+    /// C type of a weight.
+    pub weight: &'static str,
+    /// Whether a group has four inputs.
+    pub is_quad: bool,
+    /// Integers in the input vector, padded to whole groups.
+    pub input_length: usize,
+    /// Statements that fill the input vector.
+    pub quantise: Vec<String>,
+    /// What one integer of the output is worth.
+    pub q_unit: String,
+    /// Layers in order.
+    pub layers: Vec<IntegerLayerView>,
+    /// Which activations occur.
+    pub relu: bool,
+    /// A leaky ReLU occurs.
+    pub leaky_relu: bool,
+    /// A tanh occurs.
+    pub tanh: bool,
+}
+
+/// A dense layer in integers.
+#[derive(Debug, Clone)]
+pub struct IntegerLayerView {
+    /// Number, from 0.
+    pub index: usize,
+    /// Tensor name and shape for the comment.
+    pub comment: String,
+    /// Bits cut off a sum.
+    pub shift: u32,
+    /// Loops over blocks of outputs, in order.
+    pub blocks: Vec<IntegerBlockView>,
+    /// Whether a block is repeated.
+    pub has_loop: bool,
+    /// Whether a part of a block is repeated.
+    pub has_turns: bool,
+    /// Name of the input array.
+    pub source: String,
+    /// Name of the output array.
+    pub sink: String,
+    /// Type of an output.
+    pub sink_element: &'static str,
+    /// Length of the output array, padded to whole groups.
+    pub sink_length: usize,
+    /// Statements that fill the padding.
+    pub padding: Vec<String>,
+    /// Whether `sink` is a local buffer.
+    pub is_hidden: bool,
+}
+
+/// Blocks of equal height within an integer layer.
+#[derive(Debug, Clone)]
+pub struct IntegerBlockView {
+    /// Number of blocks.
+    pub count: usize,
+    /// Outputs per block.
+    pub height: usize,
+    /// All inputs in assembly.
+    pub assembly: Vec<String>,
+    /// Stretches of inputs.
+    pub parts: Vec<IntegerPartView>,
+    /// One entry per output of the block.
+    pub rows: Vec<RowView>,
+}
+
+/// A stretch of inputs of a block: some groups, taken several times.
+#[derive(Debug, Clone)]
+pub struct IntegerPartView {
+    /// Times.
+    pub turns: usize,
+    /// Inputs per turn.
+    pub inputs: usize,
+    /// Weights per turn.
+    pub weights: usize,
+    /// Statements with the core's dot product instruction.
+    pub dsp: Vec<String>,
+    /// Statements in portable C.
+    pub portable: Vec<String>,
+}
+
+/// One output of a block.
+#[derive(Debug, Clone)]
+pub struct RowView {
+    /// Number within the block.
+    pub index: usize,
+    /// Output from the sum.
+    pub result: String,
+}
+
+/// A CRC function over one type of table.
+#[derive(Debug, Clone)]
+pub struct CrcKind {
+    /// Name without the prefix.
+    pub name: &'static str,
+    /// C type of an element.
+    pub element: &'static str,
+    /// Element `i` as a word.
+    pub word: String,
+}
+
+/// A table of the integrity check.
+#[derive(Debug, Clone)]
+pub struct CrcItem {
+    /// CRC function, without the prefix.
+    pub function: &'static str,
+    /// Table, without the prefix.
+    pub table: String,
+    /// Elements.
+    pub length: usize,
+}
+
+/// How the greedy action is found.
+#[derive(Debug, Clone)]
+pub struct Argmax {
+    /// C type of an output of the network.
+    pub element: &'static str,
+    /// Below every output.
+    pub lowest: &'static str,
+    /// Function that gives the outputs, without the prefix.
+    pub network: &'static str,
+    /// The larger of `best` and `q[action]`, by the flag `above`.
+    pub select: String,
 }
 
 /// A line of filter memory that `commit` pushes into.
@@ -122,7 +284,11 @@ pub struct Source {
     /// Weights, biases, duties, CRC steps, self-test data.
     pub tables: Vec<Table>,
     /// Layers in order.
-    pub layers: Vec<LayerView>,
+    pub network: NetworkView,
+    /// Greedy action.
+    pub argmax: Argmax,
+    /// CRC functions, the one for floats first.
+    pub crc_kinds: Vec<CrcKind>,
     /// Which helper functions are used.
     pub helpers: Helpers,
     /// Numerator and denominator of tanh, highest power first.
@@ -161,8 +327,8 @@ pub struct Source {
     pub hold: String,
     /// Fallback duty.
     pub fallback: String,
-    /// Tables of the integrity check: name without the prefix, length.
-    pub integrity: Vec<(String, usize)>,
+    /// Tables of the integrity check.
+    pub integrity: Vec<CrcItem>,
     /// Expected CRC-32.
     pub crc: String,
     /// Self test: number of vectors, seed, multiplier, increment, unit.
@@ -186,6 +352,10 @@ pub struct Helpers {
     pub leaky_relu: bool,
     /// `tanh`
     pub tanh: bool,
+    /// `fma`
+    pub fused: bool,
+    /// Loops in assembly
+    pub assembly: bool,
 }
 
 /// Numbers of the self test.

@@ -17,6 +17,7 @@ fn the_help_of_every_command_names_its_arguments() {
             &["<POLICY>", "--steps", "--seed", "--generated", "--trace", "--json"],
         ),
         ("demo", &["--out", "--steps"]),
+        ("drm", &["acquire", "fit", "judge", "transfer"]),
     ] {
         assert!(overview.contains(&format!("\n  {command} ")), "{overview}");
         // lines are broken where the terminal ends

@@ -78,6 +78,123 @@ fn a_judgement_says_what_is_repaired_and_what_not() {
     assert!(said.contains("without a mapping"), "{said}");
 }
 
+/// ngspice shares no code with the plant; both measure the same steady state (docs/plant.md: samples agree within 1.5 mV).
+#[test]
+fn ngspice_is_measured_as_the_plant_is() {
+    let desk = desk();
+    let points = |simulator: &str| -> Vec<[f64; 3]> {
+        let protocol = "--window 100 --most-windows 12";
+        desk.succeed(&format!(
+            "drm acquire --plant real.toml --simulator {simulator} --duties 0.5 --powers 500,900 {protocol} --out {simulator}.csv"
+        ));
+        let text = desk.read(&format!("{simulator}.csv"));
+        let rows = text
+            .lines()
+            .filter(|line| line.starts_with(|c: char| c.is_ascii_digit()));
+        rows.map(|row| {
+            let cells: Vec<&str> = row.split(',').collect();
+            assert_eq!(cells[9], "yes", "{row}");
+            [4, 5, 6].map(|column: usize| cells[column].parse().unwrap())
+        })
+        .collect()
+    };
+    let (ours, theirs) = (points("plant"), points("ngspice"));
+    assert_eq!((ours.len(), theirs.len()), (2, 2));
+    for ([d, v, i], [d_spice, v_spice, i_spice]) in ours.into_iter().zip(theirs) {
+        let off = (v - v_spice) - (d - d_spice) * 195.0;
+        assert!(
+            off.abs() < 3e-3 && (i - i_spice).abs() < 1e-3,
+            "{v} V at {d}, {v_spice} V at {d_spice}"
+        );
+    }
+}
+
+const CASES: &str = "\
+plant = \"plants/sb3-buck12.toml\"
+load_steps = [[200, 800], [800, 200]]
+instants = 1
+sampling_instants = 1
+lead = 200
+after = 250
+tail = 50
+";
+
+/// What the paper reports: more than 1 V without a mapping, less than 0.3 V with it, and as good as the exact mapping.
+#[test]
+fn a_transfer_takes_the_steady_state_error_away() {
+    let desk = desk();
+    desk.write("cases.toml", CASES);
+    let wide = desk
+        .read("buck12/policy.toml")
+        .replace("duty = [0.40, 0.60]", "duty = [0.05, 0.95]");
+    desk.write("buck12/policy.toml", &wide);
+    let said = desk.succeed("drm transfer cases.toml --policy buck12 --real real.toml --ideal --out out");
+    assert!(
+        said.contains("generated C") && said.contains("7 files in out"),
+        "{said}"
+    );
+    let metrics = desk.read("out/metrics.csv");
+    let tails = |run: &str| -> Vec<f64> {
+        let rows = metrics
+            .lines()
+            .filter(|row| row.starts_with(&format!("{run},")) && row.contains(",worst,"));
+        rows.map(|row| row.split(',').nth(7).unwrap().parse().unwrap())
+            .collect()
+    };
+    let [simulation, without, with, exact] =
+        ["simulation", "real: no mapping", "real: mapped", "real: exact mapping"].map(tails);
+    assert_eq!(
+        [&simulation, &without, &with, &exact].map(Vec::len),
+        [2; 4],
+        "{metrics}"
+    );
+    assert!(without.iter().all(|v| *v > 1.0), "{without:?}");
+    for ((with, exact), simulation) in with.iter().zip(&exact).zip(&simulation) {
+        assert!(
+            *with < 0.3 && (with - exact).abs() < 0.05 && *simulation < 0.1,
+            "{metrics}"
+        );
+    }
+    let page = desk.read("out/report.html");
+    assert!(page.contains("200 -&gt; 800 W") || page.contains("200 -> 800 W"));
+    // the files fit together: the mapping written is that of the points written
+    desk.succeed("drm fit out/real-points.csv --trained-on plants/sb3-buck12.toml --plant plants/sb3-buck12.toml");
+    let coefficients = |name: &str| -> Vec<String> {
+        let text = desk.read(name);
+        text.lines()
+            .filter(|line| !line.starts_with('#'))
+            .map(str::to_owned)
+            .collect()
+    };
+    assert_eq!(coefficients("drm.toml"), coefficients("out/real-drm.toml"));
+}
+
+/// 0.55, the largest duty of the policy, maps beyond its limit of 0.60: 0.55 * 1.02 + 0.04 + 0.02 at 8 A.
+#[test]
+fn limits_that_cut_mapped_duties_off_are_named() {
+    let desk = desk();
+    desk.write("cases.toml", &CASES.replace(", [800, 200]", ""));
+    let said =
+        desk.succeed("drm transfer cases.toml --policy buck12 --real real.toml --controller interpreter --out out");
+    assert!(said.contains("its limits are 0.4 .. 0.6"), "{said}");
+}
+
+#[test]
+fn a_transfer_that_cannot_be_is_answered_before_it_runs() {
+    let desk = desk();
+    desk.write("cases.toml", CASES);
+    let line = "drm transfer cases.toml --real real.toml --out out --policy";
+    desk.refuse(&format!("{line} policy"), &["no mapping", "[mapping]"]);
+    desk.write("fast.toml", &REAL.replace("f_sw = 10e3", "f_sw = 20e3"));
+    desk.refuse(
+        "drm transfer cases.toml --policy buck12 --real real.toml,fast.toml --out out",
+        &["fast.toml", "different control periods"],
+    );
+    desk.write("cases.toml", &CASES.replace("plant = ", "# "));
+    desk.refuse(&format!("{line} buck12"), &["cases.toml: no plant", "trained on"]);
+    assert!(!desk.path("out").exists());
+}
+
 #[test]
 fn a_plan_for_the_bench_is_filled_in_and_resumed() {
     let desk = desk();
@@ -110,6 +227,10 @@ fn a_bad_table_or_wish_is_answered_and_nothing_written() {
         "d_real,v_out,i_out,v_in\n45,90,4,200\n50,100,4,200\n45,89,8,200\n50,99,8,200\n",
     );
     desk.refuse("drm fit percent.csv", &["percent", "--map d_real=d_real*0.01"]);
+    desk.refuse(
+        "drm fit percent.csv --map d_real=d_real*0.01 --assume-a nan",
+        &["--assume-a", "greater than 0"],
+    );
     desk.refuse("drm fit missing.csv", &["missing.csv"]);
     desk.refuse(
         "drm acquire --plant real.toml --duties 45 --currents 2 --out p.csv",

@@ -119,6 +119,33 @@ fn an_edited_manifest_is_drift() {
 }
 
 #[test]
+fn doors_are_generated_with_the_c_core_and_compared() {
+    let desk = Desk::new("linear");
+    desk.succeed("compile policy --lang rust --door kit --door sfunction --kit-steps 20 --out out");
+    let text = desk.succeed("verify policy --generated out --steps 200");
+    assert!(text.contains("as the policy yields them"), "{text}");
+    desk.edit("out/sf_linear.c", "#define MDL_UPDATE", "#define MDL_OTHER");
+    let text = different(&desk, "verify policy --generated out --steps 200", &["sf_linear.c:"]);
+    // the core itself is still right
+    assert!(text.contains("equal"), "{text}");
+    desk.edit("out/manifest.json", "\"sfunction\"", "\"barn\"");
+    desk.refuse(VERIFY, &["unknown door", "barn", "kit, sfunction"]);
+}
+
+#[test]
+fn an_unknown_door_is_refused_and_nothing_written() {
+    let desk = Desk::new("linear");
+    let ran = desk.type_in("compile policy --door barn --out out");
+    assert_eq!(ran.code, Some(2), "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("barn") && ran.stderr.contains("sfunction"),
+        "{}",
+        ran.stderr
+    );
+    assert!(!desk.path("out").exists());
+}
+
+#[test]
 fn a_manifest_that_is_missing_or_none_is_answered_with_what_to_do() {
     let desk = compiled();
     desk.write("out/manifest.json", "{}");

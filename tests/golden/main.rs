@@ -123,6 +123,25 @@ fn the_example_yields_its_golden_manifest() {
     assert!(differing.is_empty(), "{}\n{HINT}", differing.join("\n"));
 }
 
+/// Files of the doors for a case without mapping and one with ADC codes and the four-term mapping; of the kit, which is
+/// long, the entry in the manifest.
+#[test]
+fn the_doors_yield_their_golden_files() {
+    for name in ["minimal", "adc_mapping"] {
+        let case = cases().iter().find(|case| case.name == name).unwrap();
+        let selection = verify::Selection {
+            doors: codegen::Door::ALL.to_vec(),
+            kit_steps: 20,
+            ..verify::Selection::core(&[Language::C])
+        };
+        let mut files = verify::doors::generate(&case.policy, host(), &selection).unwrap();
+        files.retain(|file, _| !case.files.contains_key(file) || file == "manifest.json");
+        files.remove(&format!("{name}_kit.c")).unwrap();
+        let differing = differences(&tests::root().join("tests/golden/doors").join(name), &files);
+        assert!(differing.is_empty(), "{}\n{HINT}", differing.join("\n"));
+    }
+}
+
 #[test]
 fn the_networks_can_be_made_again_from_their_seeds() {
     for case in cases().iter().filter(|case| case.name != "buck12") {

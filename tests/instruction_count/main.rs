@@ -44,7 +44,7 @@ fn a_branch_on_the_data_is_seen() {
     let folder = tempfile::tempdir().unwrap();
     let text = generate(&policy, codegen::Language::C, folder.path());
     let branchy = text.replace(
-        "return buck12_from_bits(bits & ((bits >> 31) - (uint32_t)1));",
+        "return buck12_from_bits(bits & ~((uint32_t)0 - (bits >> 31)));",
         "if (bits >> 31) { return 0.0f; } __asm__ volatile(\"nop\"); return x;",
     );
     assert_ne!(text, branchy, "the planted branch has found its place");

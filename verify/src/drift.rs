@@ -3,12 +3,13 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use codegen::Language;
+use codegen::manifest;
 use policy::Policy;
 use serde::Serialize;
 use targets::TargetSpec;
 
-use crate::session::{Files, VerifyError, generate};
+use crate::doors::{Selection, generate};
+use crate::session::{Files, VerifyError};
 
 /// How a folder differs from what the policy yields; all lists empty if it does not.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
@@ -41,17 +42,12 @@ pub struct Changed {
     pub found: Option<String>,
 }
 
-/// Compares `folder` with what the policy yields for `target` in `languages`.
+/// Compares `folder` with what the policy yields for `target`.
 ///
 /// # Errors
 /// If code generation fails or a file is there but cannot be read. A missing folder lacks all files.
-pub fn drift(
-    policy: &Policy,
-    target: &TargetSpec,
-    languages: &[Language],
-    folder: &Path,
-) -> Result<Drift, VerifyError> {
-    let expected = generate(policy, target, languages)?;
+pub fn drift(policy: &Policy, target: &TargetSpec, selection: &Selection, folder: &Path) -> Result<Drift, VerifyError> {
+    let expected = generate(policy, target, selection)?;
     let found = read(&expected, &policy.name, folder)?;
     Ok(compare(&expected, &found))
 }
@@ -133,6 +129,8 @@ fn read(expected: &Files, name: &str, folder: &Path) -> Result<Files, VerifyErro
     for path in paths {
         let place = folder.join(&path);
         match read_text(&place) {
+            // what a step costs depends on the compilers of a machine
+            Ok(text) if path == manifest::FILE => drop(files.insert(path, manifest::without_costs(&text))),
             Ok(text) => drop(files.insert(path, text)),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
             Err(error) => return Err(VerifyError::Io(place, error)),

@@ -42,6 +42,7 @@ pub(crate) fn judge(golden: &Golden, actions: usize, words: &[u32]) -> GoldenRes
         actions_equal,
         worst_relative_error: (!golden.q_values.is_empty()).then_some(worst),
         tolerance: golden.tolerance,
+        rounded: false,
     }
 }
 

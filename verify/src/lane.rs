@@ -70,7 +70,10 @@ impl<'a> Lane<'a> {
             Err(error) => &error.received,
         };
         if let Some(known) = &self.policy.golden {
-            self.golden = Some(golden::judge(known, self.policy.actions.len(), words));
+            self.golden = Some(GoldenResult {
+                rounded: policy::scales::is_integer(self.policy.numeric_format),
+                ..golden::judge(known, self.policy.actions.len(), words)
+            });
         }
         self.judge(chunk, answer)
     }

@@ -15,14 +15,19 @@
 //! | who answers | [`runner`]: [`runner::Runner`] has one implementation per way of running a build |
 //! | a loop closed around a build | [`live`] |
 //! | what differs | [`compare`], [`report`] |
+//! | what a step costs | [`mod@measure`], [`elf`] |
 //! | checked-in files against the policy | [`drift()`] |
 
 pub mod compare;
+pub mod doors;
 pub mod drift;
 pub mod drivers;
+pub mod elf;
 mod golden;
+pub mod kit;
 pub mod lane;
 pub mod live;
+pub mod measure;
 pub mod oracle;
 pub mod protocol;
 pub mod report;
@@ -31,6 +36,7 @@ mod session;
 pub mod toolchain;
 pub mod traces;
 
+pub use doors::Selection;
 pub use drift::{drift, read_text};
 pub use live::{Live, LiveCommand};
 pub use report::{BuildReport, Difference, GoldenResult, Outcome, Report};

@@ -9,8 +9,8 @@ use policy::Policy;
 
 use crate::protocol::{self, Layout};
 use crate::runner::{ProcessRunner, Runner};
-use crate::session::generate;
-use crate::toolchain::{self, Build, BuildError, Sources};
+use crate::session::{COMPILER_TIMEOUT, generate};
+use crate::toolchain::{self, Build, BuildError, Purpose, Sources};
 use crate::traces::Event;
 
 /// What a build commands.
@@ -49,23 +49,23 @@ impl Live {
     /// # Errors
     /// If there is no compiler, it refuses the code, or the program does not start as it should; text for a user.
     pub fn start(policy: &Policy, language: Language) -> Result<Self, String> {
-        let target = targets::find("host").ok_or("internal fault: no target `host`")?;
+        let target = targets::host();
         let files = generate(policy, target, &[language]).map_err(|error| error.to_string())?;
         let build = build_for(language)?;
         let folder = tempfile::tempdir().map_err(|error| format!("cannot make a temporary folder: {error}"))?;
         let sources = Sources {
+            purpose: Purpose::Compare,
             policy,
             files: &files,
             target,
             extra_flags: &[],
+            timeout: COMPILER_TIMEOUT,
         };
         let name = build.name();
-        let program = build.program.as_deref().ok_or("internal fault: no compiler")?;
-        let executable =
-            toolchain::compile(&build, program, sources, folder.path()).map_err(|error| refused(&name, error))?;
+        let executable = toolchain::compile(&build, sources, folder.path()).map_err(|error| refused(&name, error))?;
         let controller = Controller::<f32>::new(policy);
         let layout = Layout::new(policy, controller.state_names());
-        let mut runner = ProcessRunner::new(apart(Command::new(executable)), TIMEOUT);
+        let mut runner = ProcessRunner::new(apart(Command::new(executable)), TIMEOUT, target.endianness);
         let hello = runner
             .start(layout.hello().len())
             .map_err(|error| format!("{name}: {}", error.reason))?;
@@ -138,11 +138,11 @@ fn apart(mut command: Command) -> Command {
 }
 
 fn build_for(language: Language) -> Result<Build, String> {
-    let builds = toolchain::builds(&[]);
-    let suits = |build: &&Build| build.compiler.language == language && LEVELS.contains(&build.level);
-    let found = builds.iter().filter(suits).find(|build| build.program.is_some());
+    let builds = toolchain::builds(targets::host(), &[], &[]);
+    let suits = |build: &&Build| build.language() == language && LEVELS.contains(&build.level);
+    let found = builds.iter().filter(suits).find(|build| build.missing.is_empty());
     found.cloned().ok_or_else(|| {
-        let names: Vec<&str> = builds.iter().filter(suits).map(|build| build.compiler.name).collect();
+        let names: Vec<&str> = builds.iter().filter(suits).map(|build| build.compiler).collect();
         format!(
             "no compiler for {} on PATH\n   = expected: {}",
             language.name(),
@@ -155,6 +155,6 @@ fn refused(name: &str, error: BuildError) -> String {
     match error {
         BuildError::NoFiles | BuildError::NoSanitiser => format!("{name}: nothing to build"),
         BuildError::Io(error) => format!("{name}: could not compile: {error}"),
-        BuildError::Refused(text) => format!("{name} refused the generated code:\n{text}"),
+        BuildError::Refused(text) | BuildError::TooLarge(text) => format!("{name} refused the generated code:\n{text}"),
     }
 }

@@ -3,12 +3,15 @@
 use serde::Serialize;
 
 use crate::oracle::Coverage;
+use crate::toolchain::{Install, Missing};
 
 /// Result of a verification.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
     /// Name of the policy.
     pub policy: String,
+    /// Name of the target.
+    pub target: &'static str,
     /// Seed of the stream.
     pub seed: u64,
     /// Control steps of the stream.
@@ -32,6 +35,28 @@ impl Report {
             matches!(build.outcome, Outcome::Equal | Outcome::Skipped { .. }) && golden(&build.golden)
         };
         compared && golden(&self.golden) && self.builds.iter().all(sound)
+    }
+
+    /// Whether a build was started, whatever came of it.
+    pub fn compared(&self) -> bool {
+        self.builds
+            .iter()
+            .any(|build| !matches!(build.outcome, Outcome::Skipped { .. }))
+    }
+
+    /// What to install so that no build is skipped, in order, once each.
+    pub fn to_install(&self) -> Vec<&Install> {
+        let all: std::collections::BTreeSet<&Install> = self
+            .builds
+            .iter()
+            .filter_map(|build| match &build.outcome {
+                Outcome::Skipped { missing } => Some(missing),
+                _ => None,
+            })
+            .flatten()
+            .filter_map(|missing| missing.install.as_ref())
+            .collect();
+        all.into_iter().collect()
     }
 
     /// The builds that could not be made here.
@@ -86,10 +111,8 @@ pub enum Outcome {
     },
     /// Not compared.
     Skipped {
-        /// Why.
-        reason: String,
-        /// The Debian package that has the compiler, if that is what is missing.
-        package: Option<String>,
+        /// What is not on this machine or not among the files.
+        missing: Vec<Missing>,
     },
 }
 
@@ -141,12 +164,17 @@ pub struct GoldenResult {
     pub worst_relative_error: Option<f64>,
     /// Allowed error.
     pub tolerance: f64,
+    /// The answers are those of a network that was rounded to integers: told, not judged. The trainer's network is judged
+    /// in binary32 then.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub rounded: bool,
 }
 
 impl GoldenResult {
-    /// All actions equal, all Q values within the tolerance.
+    /// All actions equal, all Q values within the tolerance; or rounded.
     pub fn passed(&self) -> bool {
-        self.actions_equal == self.actions_compared
-            && self.worst_relative_error.is_none_or(|error| error <= self.tolerance)
+        let equal = self.actions_equal == self.actions_compared
+            && self.worst_relative_error.is_none_or(|error| error <= self.tolerance);
+        self.rounded || equal
     }
 }

@@ -7,6 +7,8 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use targets::Endianness;
+
 /// A build that answers events.
 pub trait Runner: Send {
     /// Starts the build anew; the prologue is `expected` words long.
@@ -57,6 +59,7 @@ impl fmt::Display for RunFailure {
 pub struct ProcessRunner {
     command: Command,
     timeout: Duration,
+    order: Endianness,
     process: Option<Process>,
 }
 
@@ -74,12 +77,38 @@ struct Process {
 const STDERR_KEPT: u64 = 4096;
 
 impl ProcessRunner {
-    /// `command` starts the driver; a driver that is silent for `timeout` is ended.
-    pub fn new(command: Command, timeout: Duration) -> Self {
+    /// `command` starts the driver, whose words have that byte order; a driver that is silent for `timeout` is ended.
+    pub fn new(command: Command, timeout: Duration, order: Endianness) -> Self {
         Self {
             command,
             timeout,
+            order,
             process: None,
+        }
+    }
+}
+
+impl ProcessRunner {
+    /// Ends the stream and waits for the end of the driver.
+    ///
+    /// # Errors
+    /// If it does not end by itself.
+    pub fn finish(&mut self) -> Result<(), RunError> {
+        let error = |reason| RunError {
+            received: Vec::new(),
+            reason,
+        };
+        let Some(mut process) = self.process.take() else {
+            return Ok(());
+        };
+        process.to_child = None;
+        match process.from_child.recv_timeout(self.timeout) {
+            Err(RecvTimeoutError::Disconnected) => {}
+            Ok(_) | Err(RecvTimeoutError::Timeout) => return Err(error(RunFailure::Silent(self.timeout))),
+        }
+        match process.child.wait() {
+            Ok(status) if status.success() => Ok(()),
+            Ok(_) | Err(_) => Err(error(process.ended())),
         }
     }
 }
@@ -91,7 +120,7 @@ impl Runner for ProcessRunner {
             reason: RunFailure::Start(error),
         };
         let process = Process::spawn(&mut self.command).map_err(|error| start(error.to_string()))?;
-        self.process.insert(process).receive(expected, self.timeout)
+        self.process.insert(process).receive(expected, self.timeout, self.order)
     }
 
     fn exchange(&mut self, input: &[u32], expected: usize) -> Result<Vec<u32>, RunError> {
@@ -104,9 +133,9 @@ impl Runner for ProcessRunner {
         };
         if let Some(to_child) = &process.to_child {
             // a send fails only if the driver is gone: `receive` says how
-            let _ = to_child.send(input.iter().flat_map(|word| word.to_ne_bytes()).collect());
+            let _ = to_child.send(input.iter().flat_map(|word| bytes(*word, self.order)).collect());
         }
-        process.receive(expected, self.timeout)
+        process.receive(expected, self.timeout, self.order)
     }
 }
 
@@ -155,7 +184,7 @@ impl Process {
         })
     }
 
-    fn receive(&mut self, expected: usize, timeout: Duration) -> Result<Vec<u32>, RunError> {
+    fn receive(&mut self, expected: usize, timeout: Duration, order: Endianness) -> Result<Vec<u32>, RunError> {
         let bytes = expected * 4;
         let mut deadline = Instant::now() + timeout;
         while self.pending.len() < bytes {
@@ -173,12 +202,12 @@ impl Process {
                 Err(RecvTimeoutError::Disconnected) => self.ended(),
             };
             return Err(RunError {
-                received: words(&std::mem::take(&mut self.pending)),
+                received: words(&std::mem::take(&mut self.pending), order),
                 reason,
             });
         }
         let rest = self.pending.split_off(bytes);
-        Ok(words(&std::mem::replace(&mut self.pending, rest)))
+        Ok(words(&std::mem::replace(&mut self.pending, rest), order))
     }
 
     fn ended(&mut self) -> RunFailure {
@@ -209,13 +238,21 @@ impl Drop for Process {
     }
 }
 
-fn words(bytes: &[u8]) -> Vec<u32> {
-    bytes
-        .as_chunks()
-        .0
-        .iter()
-        .map(|word| u32::from_ne_bytes(*word))
-        .collect()
+fn bytes(word: u32, order: Endianness) -> [u8; 4] {
+    match order {
+        Endianness::Little => word.to_le_bytes(),
+        Endianness::Big => word.to_be_bytes(),
+        Endianness::Native => word.to_ne_bytes(),
+    }
+}
+
+fn words(bytes: &[u8], order: Endianness) -> Vec<u32> {
+    let word = |bytes: &[u8; 4]| match order {
+        Endianness::Little => u32::from_le_bytes(*bytes),
+        Endianness::Big => u32::from_be_bytes(*bytes),
+        Endianness::Native => u32::from_ne_bytes(*bytes),
+    };
+    bytes.as_chunks().0.iter().map(word).collect()
 }
 
 #[cfg(test)]
@@ -225,7 +262,7 @@ mod tests {
     fn shell(script: &str, timeout_ms: u64) -> ProcessRunner {
         let mut command = Command::new("sh");
         command.args(["-c", script]);
-        ProcessRunner::new(command, Duration::from_millis(timeout_ms))
+        ProcessRunner::new(command, Duration::from_millis(timeout_ms), Endianness::Native)
     }
 
     #[test]
@@ -236,6 +273,15 @@ mod tests {
         assert_eq!(cat.exchange(&chunk, chunk.len()).as_deref(), Ok(chunk.as_slice()));
         assert_eq!(cat.exchange(&[7, 8], 1), Ok(vec![7]));
         assert_eq!(cat.exchange(&[9], 2), Ok(vec![8, 9]));
+    }
+
+    #[test]
+    fn words_travel_in_the_byte_order_of_the_target() {
+        let mut command = Command::new("sh");
+        command.args(["-c", "printf abcd; exec cat"]);
+        let mut big = ProcessRunner::new(command, Duration::from_secs(10), Endianness::Big);
+        assert_eq!(big.start(1), Ok(vec![0x6162_6364]));
+        assert_eq!(big.exchange(&[1, 0x0203_0405], 2), Ok(vec![1, 0x0203_0405]));
     }
 
     #[test]
@@ -258,7 +304,11 @@ mod tests {
 
     #[test]
     fn a_program_that_does_not_exist_cannot_be_started() {
-        let mut none = ProcessRunner::new(Command::new("/nonexistent/driver"), Duration::from_secs(1));
+        let mut none = ProcessRunner::new(
+            Command::new("/nonexistent/driver"),
+            Duration::from_secs(1),
+            Endianness::Native,
+        );
         assert!(matches!(none.start(1).unwrap_err().reason, RunFailure::Start(_)));
     }
 }

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -12,7 +11,7 @@ use std::time::Duration;
 
 use codegen::Language;
 use interp::InputError;
-use policy::Policy;
+use policy::{NumericFormat, Policy};
 use targets::TargetSpec;
 
 use crate::golden;
@@ -21,7 +20,7 @@ use crate::oracle::{Chunk, Oracle};
 use crate::protocol::Layout;
 use crate::report::{BuildReport, GoldenResult, Outcome, Report};
 use crate::runner::ProcessRunner;
-use crate::toolchain::{self, Build, BuildError, Sources};
+use crate::toolchain::{self, Build, BuildError, Install, Missing, Purpose, Sources};
 use crate::traces::{Recorded, Stream};
 
 /// Generated files: relative path to text.
@@ -33,10 +32,14 @@ pub struct Options<'a> {
     pub steps: u64,
     /// Seed of the stream.
     pub seed: u64,
-    /// Files to verify; `None` generates them anew for the host, in C and Rust.
+    /// Whose compilers, flags and emulator are used.
+    pub target: &'static TargetSpec,
+    /// Files to verify; `None` generates them anew for the target, in C and Rust.
     pub generated: Option<&'a Files>,
     /// Names of the compilers to use; all if empty.
     pub compilers: Vec<String>,
+    /// Names of the optimisation levels to build; all if empty.
+    pub levels: Vec<String>,
     /// More flags for the C compilers, after all others.
     pub extra_flags: Vec<String>,
     /// Recordings to play before the random part.
@@ -52,8 +55,10 @@ impl Default for Options<'_> {
         Self {
             steps: 100_000,
             seed: 1,
+            target: targets::host(),
             generated: None,
             compilers: Vec::new(),
+            levels: Vec::new(),
             extra_flags: Vec::new(),
             recorded: Vec::new(),
             timeout: Duration::from_secs(60),
@@ -82,14 +87,21 @@ pub enum Progress {
 /// Why there is no report. Differences are no errors: they are in the report.
 #[derive(Debug)]
 pub enum VerifyError {
-    /// The table of targets has no `host`.
-    NoHostTarget,
-    /// A name in [`Options::compilers`] is none of [`toolchain::COMPILERS`].
-    UnknownCompiler(String),
+    /// A name in [`Options::compilers`] is none of the target's.
+    UnknownCompiler {
+        /// The name.
+        found: String,
+        /// The target.
+        target: &'static str,
+        /// Its compilers.
+        expected: Vec<&'static str>,
+    },
     /// The code could not be generated.
     Codegen(codegen::CodegenError),
     /// The interpreter refused an event.
     Interpreter(InputError),
+    /// The policy of the construct suite does not pass the check.
+    Constructs(String),
     /// A temporary folder could not be made or a folder not be read.
     Io(PathBuf, std::io::Error),
 }
@@ -97,13 +109,18 @@ pub enum VerifyError {
 impl fmt::Display for VerifyError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NoHostTarget => write!(f, "internal fault: no target `host`"),
-            Self::UnknownCompiler(name) => {
-                let known: Vec<&str> = toolchain::COMPILERS.iter().map(|compiler| compiler.name).collect();
-                write!(f, "unknown compiler `{name}`: expected one of {}", known.join(", "))
-            }
+            Self::UnknownCompiler {
+                found,
+                target,
+                expected,
+            } => write!(
+                f,
+                "unknown compiler `{found}` for target {target}: expected one of {}",
+                expected.join(", ")
+            ),
             Self::Codegen(error) => write!(f, "{error}"),
             Self::Interpreter(error) => write!(f, "internal fault: interpreter: {error}"),
+            Self::Constructs(faults) => write!(f, "internal fault: construct suite: {faults}"),
             Self::Io(path, error) => write!(f, "{}: {error}", path.display()),
         }
     }
@@ -111,6 +128,8 @@ impl fmt::Display for VerifyError {
 
 impl std::error::Error for VerifyError {}
 
+/// A compiler that takes longer has failed; the largest policies take seconds.
+pub(crate) const COMPILER_TIMEOUT: Duration = Duration::from_secs(600);
 /// Steps per chunk.
 const CHUNK: u64 = 4096;
 /// Chunks a slow build may lag behind.
@@ -124,8 +143,10 @@ pub fn run(policy: &Policy, options: Options<'_>) -> Result<Report, VerifyError>
     let Options {
         steps,
         seed,
+        target,
         generated,
         compilers,
+        levels,
         extra_flags,
         recorded,
         timeout,
@@ -136,8 +157,7 @@ pub fn run(policy: &Policy, options: Options<'_>) -> Result<Report, VerifyError>
             progress(news);
         }
     };
-    check_names(&compilers)?;
-    let target = targets::find("host").ok_or(VerifyError::NoHostTarget)?;
+    check_names(target, &compilers)?;
     let fresh;
     let files = match generated {
         Some(files) => files,
@@ -146,15 +166,17 @@ pub fn run(policy: &Policy, options: Options<'_>) -> Result<Report, VerifyError>
             &fresh
         }
     };
-    let builds = toolchain::builds(&compilers);
+    let builds = toolchain::builds(target, &compilers, &levels);
     let temp = std::env::temp_dir();
     let folder = tempfile::tempdir().map_err(|error| VerifyError::Io(temp, error))?;
     tell(Progress::Compiling { builds: builds.len() });
     let sources = Sources {
+        purpose: Purpose::Compare,
         policy,
         files,
         target,
         extra_flags: &extra_flags,
+        timeout: COMPILER_TIMEOUT,
     };
     let compiled = compile_all(&builds, sources, folder.path());
 
@@ -164,6 +186,7 @@ pub fn run(policy: &Policy, options: Options<'_>) -> Result<Report, VerifyError>
     let mut stream = Stream::new(policy, seed, &recorded);
     let lanes = Lanes {
         policy,
+        target,
         layout: &layout,
         known: &known,
         timeout,
@@ -173,6 +196,7 @@ pub fn run(policy: &Policy, options: Options<'_>) -> Result<Report, VerifyError>
         .map_err(VerifyError::Interpreter)?;
     Ok(Report {
         policy: policy.name.clone(),
+        target: target.name,
         seed,
         steps: oracle.steps(),
         checksum: format!("{:08x}", oracle.checksum()),
@@ -182,10 +206,14 @@ pub fn run(policy: &Policy, options: Options<'_>) -> Result<Report, VerifyError>
     })
 }
 
-fn check_names(compilers: &[String]) -> Result<(), VerifyError> {
-    let known = |name: &String| toolchain::COMPILERS.iter().any(|compiler| compiler.name == *name);
-    match compilers.iter().find(|name| !known(name)) {
-        Some(name) => Err(VerifyError::UnknownCompiler(name.clone())),
+fn check_names(target: &TargetSpec, compilers: &[String]) -> Result<(), VerifyError> {
+    let expected = toolchain::compilers(target);
+    match compilers.iter().find(|name| !expected.contains(&name.as_str())) {
+        Some(name) => Err(VerifyError::UnknownCompiler {
+            found: name.clone(),
+            target: target.name,
+            expected,
+        }),
         None => Ok(()),
     }
 }
@@ -193,6 +221,7 @@ fn check_names(compilers: &[String]) -> Result<(), VerifyError> {
 /// What all builds are compared with.
 struct Lanes<'a> {
     policy: &'a Policy,
+    target: &'a TargetSpec,
     layout: &'a Layout,
     known: &'a Chunk,
     timeout: Duration,
@@ -215,17 +244,7 @@ impl Lanes<'_> {
             for (build, compiled) in builds.iter().zip(compiled) {
                 let (feed, chunks) = sync_channel(LAG);
                 feeds.push(Some(feed));
-                lanes.push(scope.spawn(move || {
-                    lane(
-                        self.policy,
-                        self.layout,
-                        build,
-                        compiled,
-                        self.known,
-                        &chunks,
-                        self.timeout,
-                    )
-                }));
+                lanes.push(scope.spawn(move || self.lane(build, compiled, &chunks)));
             }
             while oracle.steps() < steps && feeds.iter().any(Option::is_some) {
                 let chunk = oracle.next_chunk(stream, CHUNK.min(steps - oracle.steps()))?;
@@ -244,6 +263,28 @@ impl Lanes<'_> {
             Ok(reports.collect())
         })
     }
+
+    /// One build from its start to its end or its first difference.
+    fn lane(&self, build: &Build, compiled: Result<PathBuf, Outcome>, chunks: &Receiver<Arc<Chunk>>) -> BuildReport {
+        let executable = match compiled {
+            Ok(executable) => executable,
+            Err(outcome) => return entry(build, 0, outcome),
+        };
+        let Some(command) = toolchain::launch(self.target, executable, &[]) else {
+            return entry(build, 0, failed("the target runs nowhere here"));
+        };
+        let runner = ProcessRunner::new(command, self.timeout, self.target.endianness);
+        let mut lane = Lane::new(self.policy, self.layout, Box::new(runner));
+        let course = lane
+            .start()
+            .and_then(|()| lane.known_answers(self.known))
+            .and_then(|()| chunks.iter().try_for_each(|chunk| lane.follow(&chunk)));
+        let outcome = course.err().unwrap_or(Outcome::Equal);
+        BuildReport {
+            golden: lane.golden().cloned(),
+            ..entry(build, lane.steps_compared(), outcome)
+        }
+    }
 }
 
 /// The trainer's known answers against the interpreter alone; `None` if the policy has none.
@@ -258,9 +299,20 @@ fn known_answers(policy: &Policy, oracle: &mut Oracle) -> Result<(Chunk, Option<
     let known = oracle
         .chunk_of(golden::events(policy))
         .map_err(VerifyError::Interpreter)?;
-    let judge = |golden| golden::judge(golden, policy.actions.len(), &known.expected);
-    let result = policy.golden.as_ref().map(judge);
-    Ok((known, result))
+    let judge = |golden, chunk: &Chunk| golden::judge(golden, policy.actions.len(), &chunk.expected);
+    let Some(golden) = policy.golden.as_ref() else {
+        return Ok((known, None));
+    };
+    if !policy::scales::is_integer(policy.numeric_format) {
+        let result = judge(golden, &known);
+        return Ok((known, Some(result)));
+    }
+    // the trainer's answers judge how the network was read; what rounding it costs is another question
+    let exact = policy.clone().with_format(NumericFormat::F32);
+    let answers = Oracle::new(&exact)
+        .chunk_of(golden::events(&exact))
+        .map_err(VerifyError::Interpreter)?;
+    Ok((known, Some(judge(golden, &answers))))
 }
 
 /// The policy's files for `target` in each of `languages`.
@@ -305,61 +357,25 @@ fn compile_all(builds: &[Build], sources: Sources<'_>, folder: &Path) -> Vec<Res
 }
 
 fn compile(build: &Build, sources: Sources<'_>, folder: &Path) -> Result<PathBuf, Outcome> {
-    let compiler = build.compiler;
-    let Some(program) = &build.program else {
-        let reason = format!("{} is not on PATH", compiler.name);
-        return Err(Outcome::Skipped {
-            reason,
-            package: Some(compiler.package.to_owned()),
-        });
+    if !build.missing.is_empty() {
+        let missing = build.missing.clone();
+        return Err(Outcome::Skipped { missing });
+    }
+    let skipped = |reason: String, install: Option<Install>| Outcome::Skipped {
+        missing: vec![Missing { reason, install }],
     };
     let made = std::fs::create_dir_all(folder).map_err(BuildError::Io);
-    made.and_then(|()| toolchain::compile(build, program, sources, folder))
+    made.and_then(|()| toolchain::compile(build, sources, folder))
         .map_err(|error| match error {
-            BuildError::NoFiles => {
-                let reason = format!("the files have no {} code", compiler.language.name());
-                Outcome::Skipped { reason, package: None }
-            }
-            BuildError::NoSanitiser => {
-                let reason = format!("{} has no sanitiser libraries", compiler.name);
-                Outcome::Skipped {
-                    reason,
-                    package: Some("libgcc-12-dev".to_owned()),
-                }
-            }
+            BuildError::NoFiles => skipped(format!("the files have no {} code", build.language().name()), None),
+            BuildError::NoSanitiser => skipped(
+                format!("{} has no sanitiser libraries", build.compiler),
+                Some(Install::Package("libgcc-12-dev".to_owned())),
+            ),
             BuildError::Io(error) => failed(&format!("could not compile: {error}")),
+            BuildError::TooLarge(text) => failed(&format!("it does not fit the emulated board: {text}")),
             BuildError::Refused(message) => Outcome::CompileError { message },
         })
-}
-
-/// One build from its start to its end or its first difference.
-fn lane(
-    policy: &Policy,
-    layout: &Layout,
-    build: &Build,
-    compiled: Result<PathBuf, Outcome>,
-    known: &Chunk,
-    chunks: &Receiver<Arc<Chunk>>,
-    timeout: Duration,
-) -> BuildReport {
-    let executable = match compiled {
-        Ok(executable) => executable,
-        Err(outcome) => return entry(build, 0, outcome),
-    };
-    let mut lane = Lane::new(
-        policy,
-        layout,
-        Box::new(ProcessRunner::new(Command::new(executable), timeout)),
-    );
-    let course = lane
-        .start()
-        .and_then(|()| lane.known_answers(known))
-        .and_then(|()| chunks.iter().try_for_each(|chunk| lane.follow(&chunk)));
-    let outcome = course.err().unwrap_or(Outcome::Equal);
-    BuildReport {
-        golden: lane.golden().cloned(),
-        ..entry(build, lane.steps_compared(), outcome)
-    }
 }
 
 fn entry(build: &Build, steps_compared: u64, outcome: Outcome) -> BuildReport {

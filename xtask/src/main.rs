@@ -15,11 +15,12 @@ const USAGE: &str = "\
 usage: cargo xtask <command>
 
   test [--quick] [--skip-install]   everything CI asks for; the last line counts the steps
-         --quick          without the crate `tests`, rustdoc, firmware and the demo
+         --quick          without the crates `tests` and `blind`, rustdoc, firmware and the demo
          --skip-install   look for the tools, install none
   install                           only the tools: compilers, valgrind
   bless                             rewrite the golden files from what the code produces now
   layers                            only the layer rules
+  bench [--json]                    instruction counts and times of the generated network (docs/kernels.md)
   blind --seed S --out DIR ...      blind cases for the diagnosis and their score (docs/blind.md; --help)
 ";
 
@@ -30,6 +31,7 @@ enum Command {
     Bless,
     Layers,
     Blind(Vec<String>),
+    Bench(Vec<String>),
     Help,
 }
 
@@ -59,6 +61,7 @@ fn parse(arguments: &[String]) -> Result<Command, String> {
     let command = match name.as_str() {
         "test" => return parse_test(rest),
         "blind" => return Ok(Command::Blind(rest.to_vec())),
+        "bench" => return Ok(Command::Bench(rest.to_vec())),
         "install" => Command::Install,
         "bless" => Command::Bless,
         "layers" => Command::Layers,
@@ -99,6 +102,7 @@ fn run(command: Command) -> Result<bool, String> {
         Command::Bless => bless(&Workspace::load()?),
         Command::Layers => layers(&Workspace::load()?),
         Command::Blind(arguments) => blind(&Workspace::load()?, &arguments),
+        Command::Bench(arguments) => other_crate(&Workspace::load()?, "bench", &arguments),
     }
 }
 
@@ -111,7 +115,15 @@ fn bless(workspace: &Workspace) -> Result<bool, String> {
 }
 
 fn blind(workspace: &Workspace, arguments: &[String]) -> Result<bool, String> {
-    let mut command = workspace.cargo(&["run", "--release", "--quiet", "-p", "blind", "--"]);
+    if arguments.iter().any(|argument| argument == "--score") {
+        let mut build = workspace.cargo(&["build", "--release", "--quiet", "--bin", "policyc"]);
+        process::run(&mut build, &process::Output::Terminal)?;
+    }
+    other_crate(workspace, "blind", arguments)
+}
+
+fn other_crate(workspace: &Workspace, name: &str, arguments: &[String]) -> Result<bool, String> {
+    let mut command = workspace.cargo(&["run", "--release", "--quiet", "-p", name, "--"]);
     // no limit of time: a large set takes an hour
     let status = command.args(arguments).status();
     Ok(status.map_err(|error| format!("cargo: {error}"))?.success())

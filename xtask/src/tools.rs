@@ -9,8 +9,10 @@ enum Source {
     Apt(&'static str),
     /// A component of the Rust toolchain.
     Rustup(&'static str),
+    /// A target of the Rust toolchain.
+    RustTarget(&'static str),
 }
-use Source::{Apt, Rustup};
+use Source::{Apt, RustTarget, Rustup};
 
 /// A tool is there when its probe runs and ends with 0.
 struct Tool {
@@ -25,6 +27,37 @@ const fn tool(name: &'static str, probe: &'static [&'static str], source: Source
 
 const CALLGRIND: &[&str] = &["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null", "true"];
 const C_HEADERS: &[&str] = &["gcc", "-fsyntax-only", "-include", "math.h", "-xc", "/dev/null"];
+const ARM_HEADERS: &[&str] = &[
+    "arm-none-eabi-gcc",
+    "-fsyntax-only",
+    "-include",
+    "stdint.h",
+    "-xc",
+    "/dev/null",
+];
+const POWERPC_HEADERS: &[&str] = &[
+    "powerpc-linux-gnu-gcc",
+    "-fsyntax-only",
+    "-include",
+    "math.h",
+    "-xc",
+    "/dev/null",
+];
+
+/// The library `core` of a Rust target lies where the compiler looks for it.
+macro_rules! rust_target {
+    ($triple:literal) => {
+        tool(
+            $triple,
+            &[
+                "sh",
+                "-c",
+                concat!("ls \"$(rustc --print target-libdir --target ", $triple, ")\"/libcore-*"),
+            ],
+            RustTarget($triple),
+        )
+    };
+}
 
 const NGSPICE_HEADER: &[&str] = &[
     "gcc",
@@ -33,6 +66,15 @@ const NGSPICE_HEADER: &[&str] = &[
     "stdbool.h",
     "-include",
     "ngspice/sharedspice.h",
+    "-xc",
+    "/dev/null",
+];
+const POWERPC: &[&str] = &["powerpc-linux-gnu-gcc", "--version"];
+const POWERPC_LIBC: &[&str] = &[
+    "powerpc-linux-gnu-gcc",
+    "-fsyntax-only",
+    "-include",
+    "math.h",
     "-xc",
     "/dev/null",
 ];
@@ -46,7 +88,45 @@ const TOOLS: &[Tool] = &[
     tool("C headers", C_HEADERS, Apt("libc6-dev")),
     tool("g++", &["g++", "--version"], Apt("g++")),
     tool("clang", &["clang", "--version"], Apt("clang")),
+    tool("gcc for PowerPC", POWERPC, Apt("gcc-powerpc-linux-gnu")),
+    tool("C library for PowerPC", POWERPC_LIBC, Apt("libc6-dev-powerpc-cross")),
+    tool("QEMU for programs", &["qemu-ppc", "--version"], Apt("qemu-user")),
     tool("callgrind", CALLGRIND, Apt("valgrind")),
+    tool(
+        "arm-none-eabi-gcc",
+        &["arm-none-eabi-gcc", "--version"],
+        Apt("gcc-arm-none-eabi"),
+    ),
+    tool("newlib for arm-none-eabi", ARM_HEADERS, Apt("libnewlib-arm-none-eabi")),
+    tool(
+        "riscv64-unknown-elf-gcc",
+        &["riscv64-unknown-elf-gcc", "--version"],
+        Apt("gcc-riscv64-unknown-elf"),
+    ),
+    tool(
+        "powerpc-linux-gnu-gcc",
+        &["powerpc-linux-gnu-gcc", "--version"],
+        Apt("gcc-powerpc-linux-gnu"),
+    ),
+    tool("C library for PowerPC", POWERPC_HEADERS, Apt("libc6-dev-powerpc-cross")),
+    tool(
+        "qemu-system-arm",
+        &["qemu-system-arm", "--version"],
+        Apt("qemu-system-arm"),
+    ),
+    tool(
+        "qemu-system-riscv32",
+        &["qemu-system-riscv32", "--version"],
+        Apt("qemu-system-misc"),
+    ),
+    tool("qemu-ppc", &["qemu-ppc", "--version"], Apt("qemu-user")),
+    rust_target!("thumbv6m-none-eabi"),
+    rust_target!("thumbv7m-none-eabi"),
+    rust_target!("thumbv7em-none-eabihf"),
+    rust_target!("thumbv8m.main-none-eabihf"),
+    rust_target!("riscv32imc-unknown-none-elf"),
+    rust_target!("riscv32imafc-unknown-none-elf"),
+    rust_target!("powerpc-unknown-linux-gnu"),
     tool("ngspice", &["ngspice", "--version"], Apt("ngspice")),
     tool("ngspice's library", NGSPICE_HEADER, Apt("libngspice0-dev")),
 ];
@@ -58,6 +138,11 @@ const TOOLS: &[Tool] = &[
 pub fn provide(output: &Output) -> Result<(), String> {
     let missing = missing(TOOLS);
     let plan = Plan::of(&missing);
+    if !plan.targets.is_empty() && works(&["rustup", "--version"]) {
+        let mut rustup = Command::new("rustup");
+        rustup.args(["target", "add"]).args(&plan.targets);
+        process::run(&mut rustup, output).map_err(|e| format!("{}\n{e}", plan.message(&missing)))?;
+    }
     if plan.packages.is_empty() || !may_install() {
         return require();
     }
@@ -105,6 +190,7 @@ fn may_install() -> bool {
 struct Plan {
     packages: Vec<&'static str>,
     components: Vec<&'static str>,
+    targets: Vec<&'static str>,
 }
 
 impl Plan {
@@ -112,11 +198,13 @@ impl Plan {
         let mut plan = Self {
             packages: Vec::new(),
             components: Vec::new(),
+            targets: Vec::new(),
         };
         for tool in missing {
             match tool.source {
                 Apt(package) => plan.packages.push(package),
                 Rustup(component) => plan.components.push(component),
+                RustTarget(triple) => plan.targets.push(triple),
             }
         }
         plan.packages.sort_unstable();
@@ -140,6 +228,10 @@ impl Plan {
         if !self.components.is_empty() {
             let components = self.components.join(" ");
             lines.push(format!("    rustup component add {components}"));
+        }
+        if !self.targets.is_empty() {
+            let targets = self.targets.join(" ");
+            lines.push(format!("    rustup target add {targets}"));
         }
         lines.join("\n")
     }
@@ -166,13 +258,14 @@ mod tests {
             tool("valgrind", &["false"], Apt("valgrind")),
             tool("callgrind", &["false"], Apt("valgrind")),
             tool("clippy", &["false"], Rustup("clippy")),
+            tool("thumbv7m", &["false"], RustTarget("thumbv7m-none-eabi")),
         ];
         let missing: Vec<_> = tools.iter().collect();
         assert_eq!(
             Plan::of(&missing).message(&missing),
-            "not found: valgrind, callgrind, clippy; type\n    \
+            "not found: valgrind, callgrind, clippy, thumbv7m; type\n    \
              sudo apt-get update && sudo apt-get install -y --no-install-recommends valgrind\n    \
-             rustup component add clippy"
+             rustup component add clippy\n    rustup target add thumbv7m-none-eabi"
         );
     }
 }

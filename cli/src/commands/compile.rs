@@ -2,10 +2,12 @@
 
 use std::path::Path;
 
-use codegen::{GeneratedFiles, Language, manifest};
+use codegen::{Language, manifest};
 use policy::Policy;
 use targets::TargetSpec;
+use verify::{Files, Selection};
 
+use super::costs::Measured;
 use super::verify::golden_text;
 use super::{bytes, grouped};
 use crate::arguments::Compile;
@@ -14,7 +16,7 @@ use crate::{Failure, Outcome, output};
 /// Generates, then writes everything at once.
 pub fn run(options: &Compile) -> Result<Outcome, Failure> {
     let target = super::target(&options.target)?;
-    let policy = super::load(&options.policy)?;
+    let policy = super::load_as(&options.policy, options.format.map(Into::into))?;
     if let Some(golden) = verify::golden_result(&policy)?.filter(|golden| !golden.passed()) {
         return Err(Failure(format!(
             "the network does not give the trainer's golden answers; nothing was written\n   = found: {}\n   \
@@ -23,20 +25,47 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
         )));
     }
     let mut languages: Vec<Language> = options.lang.iter().map(|lang| (*lang).into()).collect();
+    let mut doors = options.door.clone();
+    if !doors.is_empty() {
+        languages.push(Language::C);
+    }
     languages.sort();
     languages.dedup();
-    let files = codegen::generate(&policy, target, &languages)?;
+    doors.sort();
+    doors.dedup();
+    let selection = Selection {
+        languages,
+        doors,
+        kit_steps: options.kit_steps,
+    };
+    let mut files = verify::doors::generate(&policy, target, &selection)?;
+    let measured = if options.no_costs {
+        Measured::default()
+    } else {
+        Measured::of(&policy, target, &selection.languages, &files)
+    };
+    if let (false, Some(manifest)) = (measured.costs.is_empty(), files.get_mut(manifest::FILE)) {
+        *manifest = manifest::with_costs(manifest, &measured.costs)?;
+    }
     write(&policy, target, &options.out, &files)?;
+    measured.say(&policy, target)?;
     Ok(Outcome::Done)
 }
 
 /// Writes the files and says what they are.
-pub fn write(policy: &Policy, target: &TargetSpec, folder: &Path, files: &GeneratedFiles) -> Result<(), Failure> {
-    output::write_texts(folder, &files.files)?;
+pub fn write(policy: &Policy, target: &TargetSpec, folder: &Path, files: &Files) -> Result<(), Failure> {
+    output::write_texts(folder, files)?;
     for note in &policy.notes {
         output::say(&format!("note: {note}"))?;
     }
     let sizes = manifest::sizes(policy, target);
+    if let Some(bound) = sizes.accumulator_bound {
+        output::say(&format!(
+            "note: integer network: no 32-bit sum can overflow, the largest is {} of {} over the whole box of observations",
+            grouped(bound.unsigned_abs()),
+            grouped(u64::from(i32::MAX.unsigned_abs()))
+        ))?;
+    }
     let (macs, tables, state) = (
         grouped(sizes.macs as u64),
         bytes(sizes.table_bytes),
@@ -46,7 +75,7 @@ pub fn write(policy: &Policy, target: &TargetSpec, folder: &Path, files: &Genera
         "{}: {macs} MACs per step, {tables} of tables, {state} of state",
         policy.name
     ))?;
-    for (name, text) in &files.files {
+    for (name, text) in files {
         output::say(&format!("  {} ({})", folder.join(name).display(), bytes(text.len())))?;
     }
     Ok(())

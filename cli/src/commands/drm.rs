@@ -4,6 +4,7 @@ mod acquire;
 mod bench;
 mod fit;
 mod judge;
+mod transfer;
 
 use std::path::{Path, PathBuf};
 
@@ -28,6 +29,8 @@ pub enum Drm {
     Fit(fit::Fit),
     /// Apply a mapping to a table or a converter, and say what no mapping repairs
     Judge(judge::Judge),
+    /// The paper's procedure: control real converters without a mapping, acquire, fit, control them with it
+    Transfer(transfer::Transfer),
 }
 
 /// Runs one of the commands.
@@ -36,6 +39,7 @@ pub fn run(command: &Drm) -> Result<Outcome, Failure> {
         Drm::Acquire(options) => acquire::run(options),
         Drm::Fit(options) => fit::run(options),
         Drm::Judge(options) => judge::run(options),
+        Drm::Transfer(options) => transfer::run(options),
     }
 }
 

@@ -1,6 +1,7 @@
 //! One file per command.
 
 pub mod compile;
+mod costs;
 pub mod demo;
 pub mod diagnose;
 pub mod drm;
@@ -9,13 +10,14 @@ mod interruption;
 pub mod new;
 mod progress_line;
 pub mod simulate;
+pub mod targets;
 pub mod train;
 pub mod verify;
 
 use std::path::{Path, PathBuf};
 
-use policy::Policy;
-use targets::TargetSpec;
+use ::targets::TargetSpec;
+use policy::{NumericFormat, Policy};
 
 use crate::Failure;
 
@@ -40,9 +42,18 @@ fn load(path: &Path) -> Result<Policy, Failure> {
     })
 }
 
+/// [`load`], in another numeric format if one is asked for.
+fn load_as(path: &Path, format: Option<NumericFormat>) -> Result<Policy, Failure> {
+    let policy = load(path)?;
+    Ok(match format {
+        Some(format) => policy.with_format(format),
+        None => policy,
+    })
+}
+
 fn target(name: &str) -> Result<&'static TargetSpec, Failure> {
-    targets::find(name).ok_or_else(|| {
-        let known = targets::names().join(", ");
+    ::targets::find(name).ok_or_else(|| {
+        let known = ::targets::names().join(", ");
         Failure(format!(
             "unknown target\n   = found: {name}\n   = expected: one of {known}"
         ))

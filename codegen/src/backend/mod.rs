@@ -1,11 +1,19 @@
 //! Backends: [`Program`] -> [`GeneratedFiles`], as data.
 
+mod assembly;
+#[cfg(feature = "c")]
+mod block;
 #[cfg(feature = "c")]
 pub mod c99;
 #[cfg(feature = "c")]
+pub mod kit;
+#[cfg(feature = "c")]
 mod literal;
 pub mod rust;
+#[cfg(feature = "c")]
+pub mod sfunction;
 
+use crate::program::NetworkCode;
 use crate::{CodegenError, GeneratedFiles, Program};
 
 /// Prints a program in one language.
@@ -25,7 +33,7 @@ pub fn banner(program: &Program, title: &str, flags: &[&str]) -> Vec<String> {
     let digests = &origin.digests;
     let mapping = digests.mapping.as_deref().unwrap_or("none");
     let shape: Vec<String> = std::iter::once(program.feature_count())
-        .chain(program.layers.iter().map(|layer| layer.outputs))
+        .chain(program.network.shape().iter().map(|(_, _, outputs)| *outputs))
         .map(|width| width.to_string())
         .collect();
     vec![
@@ -35,9 +43,10 @@ pub fn banner(program: &Program, title: &str, flags: &[&str]) -> Vec<String> {
             origin.tool, origin.target
         ),
         format!(
-            "Network {}, {} MACs, numeric format f32 (exact order, no contraction).",
+            "Network {}, {} MACs, numeric format {}.",
             shape.join("-"),
-            program.macs()
+            program.macs(),
+            format_text(program)
         ),
         format!("Sample period {:?} s.", program.sample_period),
         format!("Weights  sha256 {}", digests.weights),
@@ -45,4 +54,18 @@ pub fn banner(program: &Program, title: &str, flags: &[&str]) -> Vec<String> {
         format!("Mapping  sha256 {mapping}"),
         format!("Bits hold with: {}", flags.join(" ")),
     ]
+}
+
+/// The numeric format with what it promises.
+fn format_text(program: &Program) -> String {
+    let name = program.numeric_format.name();
+    match &program.network {
+        NetworkCode::Real { fused: false, .. } => format!("{name} (exact order, no contraction)"),
+        NetworkCode::Real { fused: true, .. } => format!("{name} (exact order, fused multiply-add in the network)"),
+        NetworkCode::Integer(network) => format!(
+            "{name} ({}-bit weights, 16-bit activations, sums within +-{} < 2^31)",
+            8 * network.weight_bytes,
+            network.accumulator_bound
+        ),
+    }
 }

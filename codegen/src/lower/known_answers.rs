@@ -7,7 +7,7 @@ use policy::Policy;
 
 use crate::crc::crc32_words;
 use crate::lower::network::{TANH_DENOMINATOR, TANH_NUMERATOR, TANH_RANGE};
-use crate::program::{ActivationCode, LayerCode, Literal, SelfTest};
+use crate::program::{ActivationCode, IntegerLayer, IntegerNetwork, LayerCode, Literal, NetworkCode, SelfTest};
 
 /// Number of vectors.
 pub const VECTORS: usize = 16;
@@ -19,7 +19,7 @@ pub const LCG: (u32, u32) = (1_664_525, 1_013_904_223);
 pub const UNIT: f32 = 1.0 / 16_777_216.0;
 
 /// Draws the observations as `self_test` will and computes the answers.
-pub fn lower(policy: &Policy, layers: &[LayerCode]) -> SelfTest {
+pub fn lower(policy: &Policy, network: &NetworkCode) -> SelfTest {
     let observation_box: Vec<(Literal, Literal)> = policy
         .features
         .iter()
@@ -36,9 +36,10 @@ pub fn lower(policy: &Policy, layers: &[LayerCode]) -> SelfTest {
             random = random.wrapping_mul(LCG.0).wrapping_add(LCG.1);
             values.push(low.value() + width.value() * ((random >> 8) as f32 * UNIT));
         }
-        for layer in layers {
-            values = dense(layer, &values);
-        }
+        values = match network {
+            NetworkCode::Real { fused, layers } => layers.iter().fold(values, |x, layer| dense(layer, &x, *fused)),
+            NetworkCode::Integer(network) => integer_q(network, &values),
+        };
         answers.push(crc32_words(values.iter().map(|q| q.to_bits())));
     }
     SelfTest {
@@ -47,18 +48,70 @@ pub fn lower(policy: &Policy, layers: &[LayerCode]) -> SelfTest {
     }
 }
 
-fn dense(layer: &LayerCode, x: &[f32]) -> Vec<f32> {
+fn dense(layer: &LayerCode, x: &[f32], fused: bool) -> Vec<f32> {
     let mut y = layer.bias.clone();
     let mut table = layer.table.iter();
     for block in y.chunks_mut(layer.block_rows) {
         for input in x {
             for accumulator in block.iter_mut() {
-                *accumulator += table.next().copied().unwrap_or_default() * input;
+                let weight = table.next().copied().unwrap_or_default();
+                *accumulator = if fused {
+                    weight.mul_add(*input, *accumulator)
+                } else {
+                    *accumulator + weight * input
+                };
             }
         }
     }
     for value in &mut y {
         *value = activate(layer.activation, *value);
+    }
+    y
+}
+
+/// The network in integers; sums wrap nowhere, as the scales prove.
+fn integer_q(network: &IntegerNetwork, observation: &[f32]) -> Vec<f32> {
+    let inputs = network.inputs.iter().zip(observation);
+    let mut values: Vec<i32> = inputs
+        .map(|(input, o)| {
+            let shifted = o * input.factor.value() + 32_768.5;
+            shifted.clamp(input.low.value(), input.high.value()) as i32 - 32_768
+        })
+        .collect();
+    for layer in &network.layers {
+        values.resize(network.padded(layer.inputs), 0);
+        values = integer_dense(network, layer, &values);
+    }
+    values.iter().map(|q| *q as f32 * network.q_unit.value()).collect()
+}
+
+fn integer_dense(network: &IntegerNetwork, layer: &IntegerLayer, x: &[i32]) -> Vec<i32> {
+    let mut y = layer.bias.clone();
+    let mut table = layer.table.iter();
+    for block in y.chunks_mut(layer.block_rows) {
+        for group in x.chunks(network.lanes.len()) {
+            for sum in block.iter_mut() {
+                for lane in &network.lanes {
+                    let weight = i32::from(table.next().copied().unwrap_or_default());
+                    *sum = sum.wrapping_add(weight.wrapping_mul(group[*lane]));
+                }
+            }
+        }
+    }
+    for value in &mut y {
+        *value = match layer.activation {
+            ActivationCode::Identity => *value >> layer.shift,
+            ActivationCode::Relu => (*value >> layer.shift).max(0),
+            ActivationCode::LeakyRelu(_) => {
+                let shifted = *value >> layer.shift;
+                if shifted > 0 {
+                    shifted
+                } else {
+                    (shifted * layer.slope + (1 << 14)) >> 15
+                }
+            }
+            ActivationCode::Tanh => (tanh(*value as f32 * layer.unit.value()) * 16_384.0 + 32_768.5) as i32 - 32_768,
+        };
     }
     y
 }

@@ -2,6 +2,7 @@
 
 pub mod command;
 mod front;
+mod integer;
 pub mod known_answers;
 pub mod network;
 
@@ -22,11 +23,7 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
         Language::Rust => target.rust_row_block,
     };
     let (front, memory_words) = front::lower(policy);
-    let layers: Vec<_> = policy
-        .layers
-        .iter()
-        .map(|layer| network::lower(layer, row_block))
-        .collect();
+    let network = network::lower(policy, row_block);
     let duties: Vec<_> = policy
         .actions
         .iter()
@@ -56,8 +53,8 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
             .collect(),
         memory_words,
         front,
-        self_test: known_answers::lower(policy, &layers),
-        layers,
+        self_test: known_answers::lower(policy, &network),
+        network,
         duties,
         mapping: policy.mapping.as_ref().map(mapping),
         decide: command::decide(policy),

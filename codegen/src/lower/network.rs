@@ -1,9 +1,10 @@
 //! Contract section 6: layers with their tables in reading order.
 
-use policy::{Activation, Layer};
+use policy::{Activation, Layer, NumericFormat, Policy};
 use targets::RowBlock;
 
-use crate::program::{ActivationCode, LayerCode, Literal};
+use super::integer;
+use crate::program::{ActivationCode, LayerCode, Literal, NetworkCode};
 
 /// Numerator of the tanh approximation, lowest power first (contract section 6).
 pub const TANH_NUMERATOR: [f32; 5] = [
@@ -18,8 +19,19 @@ pub const TANH_DENOMINATOR: [f32; 5] = [1.0, 0.467_065_04, 0.025_842_024, 0.000_
 /// Beyond this magnitude the approximation is evaluated at the end of its range.
 pub const TANH_RANGE: f32 = 9.0;
 
+/// The network in the policy's numeric format.
+pub fn lower(policy: &Policy, row_block: RowBlock) -> NetworkCode {
+    match policy::scales::of(policy) {
+        Some(scales) => NetworkCode::Integer(integer::lower(policy, &scales)),
+        None => NetworkCode::Real {
+            fused: policy.numeric_format == NumericFormat::F32Fma,
+            layers: policy.layers.iter().map(|layer| real(layer, row_block)).collect(),
+        },
+    }
+}
+
 /// Orders the weights in the blocks in which the generated code reads them.
-pub fn lower(layer: &Layer, row_block: RowBlock) -> LayerCode {
+fn real(layer: &Layer, row_block: RowBlock) -> LayerCode {
     let block_rows = match row_block {
         RowBlock::All => layer.outputs,
         RowBlock::Rows(rows) => rows.clamp(1, layer.outputs),
@@ -36,13 +48,19 @@ pub fn lower(layer: &Layer, row_block: RowBlock) -> LayerCode {
         inputs: layer.inputs,
         outputs: layer.outputs,
         block_rows,
+        in_memory: row_block == RowBlock::All,
         table,
         bias: layer.bias.clone(),
-        activation: match layer.activation {
-            Activation::Identity => ActivationCode::Identity,
-            Activation::Relu => ActivationCode::Relu,
-            Activation::LeakyRelu { slope } => ActivationCode::LeakyRelu(Literal::nearest(slope)),
-            Activation::Tanh => ActivationCode::Tanh,
-        },
+        activation: activation(layer),
+    }
+}
+
+/// Activation with its literals.
+pub fn activation(layer: &Layer) -> ActivationCode {
+    match layer.activation {
+        Activation::Identity => ActivationCode::Identity,
+        Activation::Relu => ActivationCode::Relu,
+        Activation::LeakyRelu { slope } => ActivationCode::LeakyRelu(Literal::nearest(slope)),
+        Activation::Tanh => ActivationCode::Tanh,
     }
 }

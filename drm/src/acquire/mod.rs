@@ -9,7 +9,7 @@ use std::fmt;
 use plant::Load;
 use toml_input::{Fault, Faults, Message};
 
-pub use bench::{Bench, Simulated};
+pub use bench::Bench;
 pub use protocol::{Protocol, measure};
 
 /// What hangs at the output.

@@ -79,8 +79,15 @@ pub(crate) fn explain(points: &[Point]) -> (Vec<Explanation>, Vec<Explanation>) 
     }
     let mut list: Vec<Explanation> = sets.iter().filter_map(|set| explanation(set, points)).collect();
     list.sort_by(|a, b| a.causes.len().cmp(&b.causes.len()).then(a.rms_v.total_cmp(&b.rms_v)));
-    let can_be = |e: &Explanation| e.causes.iter().all(|(cause, value)| cause.can_be(*value));
-    list.into_iter().partition(can_be)
+    let all =
+        |e: &Explanation, holds: fn(Cause, f64) -> bool| e.causes.iter().all(|(cause, value)| holds(*cause, *value));
+    // a gain of nothing at all explains everything: v_out = v_out
+    list.retain(|e| {
+        all(e, |cause, value| {
+            matches!(cause, Cause::Resistance | Cause::Diode) || cause.can_be(value)
+        })
+    });
+    list.into_iter().partition(|e| all(e, Cause::can_be))
 }
 
 fn explanation(set: &[Cause], points: &[Point]) -> Option<Explanation> {

@@ -12,6 +12,8 @@ const OTHER_UNIT: f64 = 20.0;
 const SENSOR: f64 = 1.05;
 /// A load current beyond this is more likely in milliamperes, A.
 const CURRENT: f64 = 1000.0;
+/// An input voltage beyond this is more likely in millivolts, V.
+const VOLTAGE: f64 = 3000.0;
 /// A power beyond this is more likely one of milliamperes, W.
 const POWER: f64 = 20e3;
 
@@ -31,6 +33,10 @@ pub(crate) fn check(table: &mut Table, located: &Located, sheet: &Sheet<'_>, fau
         return;
     }
     voltages(points, sheet, faults);
+    both_in_millivolts(points, located, sheet, faults);
+    if !faults.is_empty() {
+        return;
+    }
     let most = points.iter().map(|p| p.i_out.abs()).fold(0.0, f64::max);
     let power = points.iter().map(|p| (p.i_out * p.v_out).abs()).fold(0.0, f64::max);
     if (most > CURRENT || power > POWER) && !located.i_out.is_stated() {
@@ -44,6 +50,20 @@ pub(crate) fn check(table: &mut Table, located: &Located, sheet: &Sheet<'_>, fau
     if !negative.is_empty() {
         let lines = super::lines(&negative);
         table.notes.push(format!("the load delivers current in {lines}"));
+    }
+}
+
+/// Ratios of voltages do not show a unit that both share.
+fn both_in_millivolts(points: &[Point], located: &Located, sheet: &Sheet<'_>, faults: &mut Vec<Fault>) {
+    let most = points.iter().map(|p| p.v_in).fold(0.0, f64::max);
+    if most > VOLTAGE && !located.v_in.is_stated() {
+        let message = Message::new("`v_in` and `v_out` look like millivolts")
+            .found(format!("v_in up to {most}"))
+            .expected("volts")
+            .hint(
+                "--map v_in=v_in*0.001,v_out=v_out*0.001 converts; if these are volts, say so with --map v_in=v_in*1",
+            );
+        faults.push(sheet.fault(message));
     }
 }
 

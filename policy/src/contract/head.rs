@@ -57,12 +57,14 @@ fn period(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<f64> {
 }
 
 fn format(value: &Value<'_>, faults: &mut Vec<Fault>) -> NumericFormat {
-    if let Some(text) = value.text(faults)
-        && text != "f32"
-    {
-        faults.push(value.fault(catalogue::not_supported_yet("numeric_format", text, &["f32"])));
-    }
-    NumericFormat::F32
+    let Some(text) = value.text(faults) else {
+        return NumericFormat::F32;
+    };
+    NumericFormat::find(text).unwrap_or_else(|| {
+        let known = NumericFormat::ALL.map(NumericFormat::name);
+        faults.push(value.fault(catalogue::not_supported_yet("numeric_format", text, &known)));
+        NumericFormat::F32
+    })
 }
 
 fn parameters(value: &Value<'_>, taken: &mut Taken, faults: &mut Vec<Fault>) -> BTreeMap<String, f64> {

@@ -1,6 +1,7 @@
 //! Measures a planned case: ngspice runs, sensors, files and the truth about it.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::fmt::Write;
 
 use serde::{Deserialize, Serialize};
@@ -40,7 +41,7 @@ pub struct Truth {
     pub chi2_listed: f64,
     /// Every smallest set of at most two listed causes that leaves no more than noise: the truth and its rivals.
     pub explanations: Vec<Vec<String>>,
-    /// What a perfect model could gain, for each record and column.
+    /// What a perfect model could gain, for each record in open loop and column.
     pub records: Vec<Reducible>,
 }
 
@@ -51,6 +52,8 @@ pub struct Hidden {
     pub id: String,
     /// On the list of causes.
     pub listed: bool,
+    /// Squared distance of the training records from those without this effect, in units of the noise.
+    pub chi2: f64,
     /// Hidden values by name.
     pub parameters: BTreeMap<String, Value>,
 }
@@ -93,23 +96,36 @@ impl<'a> Runs<'a> {
         }
     }
 
-    /// The noise-free record.
-    pub fn exact(&mut self, bench: &Bench, record: &Record) -> Result<Samples, String> {
+    /// True signals of a record.
+    fn signals(&mut self, bench: &Bench, record: &Record) -> Result<&Signals, String> {
         let plan = self.plan;
         let periods = record.lead + record.duty.len();
         let rows = (periods as f64 * T_SW / T_FINE) as usize - 1;
-        let number = plan.records.iter().position(|other| other.name == record.name);
-        let path = [5, plan.index as u64, number.unwrap_or(0) as u64];
-        let text = netlist(bench, record, &mut Rng::new(plan.seed, &path));
-        if !self.done.contains_key(&text) {
-            let signals = ngspice::run(&text, rows)?;
-            self.done.insert(text.clone(), signals);
-        }
-        let random = &mut Rng::new(plan.seed, &path);
-        Ok(match self.done.get(&text) {
-            Some(signals) => sensing::exact(bench, record, signals, random),
-            None => Samples::new(),
+        let text = netlist(bench, record, &mut self.random(record));
+        Ok(match self.done.entry(text) {
+            Entry::Occupied(entry) => entry.into_mut(),
+            Entry::Vacant(entry) => {
+                let signals =
+                    ngspice::run(entry.key(), rows).map_err(|error| format!("seed {}: {error}", plan.seed))?;
+                entry.insert(signals)
+            }
         })
+    }
+
+    fn random(&self, record: &Record) -> Rng {
+        let number = self.plan.records.iter().position(|other| other.name == record.name);
+        Rng::new(self.plan.seed, &[5, self.plan.index as u64, number.unwrap_or(0) as u64])
+    }
+
+    /// The noise-free record.
+    pub fn exact(&mut self, bench: &Bench, record: &Record) -> Result<Samples, String> {
+        let mut random = self.random(record);
+        Ok(sensing::exact(bench, record, self.signals(bench, record)?, &mut random))
+    }
+
+    /// The column of the duty.
+    fn duty(&mut self, bench: &Bench, record: &Record) -> Result<Vec<f64>, String> {
+        Ok(sensing::duty(record, self.signals(bench, record)?))
     }
 }
 
@@ -125,11 +141,17 @@ pub fn measure(plan: &Plan, with_rivals: bool) -> Result<Case, String> {
     let (mut reducible, mut training) = (Vec::new(), Vec::new());
     for (number, record) in plan.records.iter().enumerate() {
         let hidden = runs.exact(&plan.bench, record)?;
-        let twin = runs.exact(&nominal, record)?;
+        let duty = runs.duty(&plan.bench, record)?;
         let mut noise = Rng::new(plan.seed, &[6, plan.index as u64, number as u64]);
         let shown = sensing::recorded(&plan.bench, &hidden, &mut noise);
         let folder = if record.heldout { "heldout" } else { "train" };
         let path = format!("{folder}/{}.csv", record.name);
+        files.push((path.clone(), csv(plan, record, &duty, &shown)));
+        if record.closed {
+            // a nominal twin would be driven to other duties
+            continue;
+        }
+        let twin = runs.exact(&nominal, record)?;
         for (column, name) in COLUMNS.iter().enumerate().filter(|&(column, _)| recorded(plan, column)) {
             reducible.push(Reducible {
                 record: path.clone(),
@@ -138,7 +160,6 @@ pub fn measure(plan: &Plan, with_rivals: bool) -> Result<Case, String> {
                 reducible: rounded(distance(&hidden, &twin, column)),
             });
         }
-        files.push((path, csv(plan, record, &shown)));
         if !record.heldout {
             training.push((record, hidden, twin));
         }
@@ -148,11 +169,20 @@ pub fn measure(plan: &Plan, with_rivals: bool) -> Result<Case, String> {
         chi2_listed,
         sets,
     } = rivals::explanations(&mut runs, &training, with_rivals)?;
+    let mut effects = Vec::new();
+    for effect in &plan.effects {
+        let mut without = plan.bench.clone();
+        for parameter in effect.parameters {
+            parameter.set(&mut without, parameter.get(&nominal));
+        }
+        let chi2 = rivals::distance(&mut runs, &training, &without)?;
+        effects.push(hidden(effect, plan, chi2));
+    }
     let truth = Truth {
         seed: plan.seed,
         case: plan.index,
         kind: plan.kind,
-        effects: plan.effects.iter().map(|effect| hidden(effect, plan)).collect(),
+        effects,
         chi2: rounded(chi2),
         chi2_listed: rounded(chi2_listed),
         explanations: sets,
@@ -168,7 +198,7 @@ pub(crate) fn recorded(plan: &Plan, column: usize) -> bool {
     COLUMNS[column] != "v_in" || plan.has_v_in
 }
 
-fn hidden(effect: &crate::effects::Effect, plan: &Plan) -> Hidden {
+fn hidden(effect: &crate::effects::Effect, plan: &Plan, chi2: f64) -> Hidden {
     let value = |parameter: &crate::effects::Parameter| {
         let value = Value {
             value: parameter.get(&plan.bench),
@@ -180,6 +210,7 @@ fn hidden(effect: &crate::effects::Effect, plan: &Plan) -> Hidden {
     Hidden {
         id: effect.id.to_owned(),
         listed: effect.listed,
+        chi2: rounded(chi2),
         parameters: effect.parameters.iter().map(value).collect(),
     }
 }
@@ -194,12 +225,14 @@ fn rounded(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }
 
-fn csv(plan: &Plan, record: &Record, samples: &Samples) -> String {
+fn csv(plan: &Plan, record: &Record, duty: &[f64], samples: &Samples) -> String {
     let columns = if plan.has_v_in { 4 } else { 3 };
     let mut text = format!("t,d,{},r_load,i_load,p_load\n", COLUMNS[..columns].join(","));
     for (row, sample) in samples.iter().enumerate() {
-        let (duty, load) = (record.duty[row], record.load[row]);
-        let _ = write!(text, "{:.5},{duty:.4}", (row as f64 + 0.5) * T_SW);
+        let load = record.load[row];
+        let phase = if record.closed { 0.0 } else { 0.5 };
+        let time = (row as f64 + phase) * T_SW;
+        let _ = write!(text, "{time:.5},{:.6}", duty[row]);
         for value in &sample[..columns] {
             let _ = write!(text, ",{value:.5}");
         }

@@ -1,5 +1,5 @@
 //! What is done at the bench: records of duties and set loads, drawn at random in the form of real identification
-//! experiments. All are stable: constant power only beside a resistor.
+//! experiments. All are stable: constant power alone only under control.
 
 use crate::rng::Rng;
 
@@ -25,6 +25,8 @@ pub struct Record {
     pub duty: Vec<f64>,
     /// Set load of each period.
     pub load: Vec<Load>,
+    /// Under control: the duties come out of the run, and rows are samples at the start of the period.
+    pub closed: bool,
     /// Periods run before the first recorded one, so that a record starts neither at rest nor at a round value.
     pub lead: usize,
 }
@@ -36,6 +38,7 @@ impl Record {
             heldout,
             duty: Vec::new(),
             load: Vec::new(),
+            closed: false,
             lead: 30 + rng.below(30),
         }
     }
@@ -49,7 +52,7 @@ impl Record {
 /// How much is recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Extent {
-    /// Four records for training of 25 ms, two held out.
+    /// Four records for training of 25 ms, three held out.
     Full,
     /// Two records for training of 15 ms, one held out: for tests that have to be fast.
     Short,
@@ -66,6 +69,7 @@ pub fn draw(extent: Extent, rng: &mut Rng) -> Vec<Record> {
             load_steps(rng, "lstep_R_10k", false, 50),
             current_steps(rng, 50),
             cpl(rng, "mixed_10k", true, 40),
+            closed(rng, 60),
         ],
         Extent::Short => vec![
             duty_steps(rng, "dstep_R_10k", false, 30),
@@ -163,6 +167,20 @@ fn current_steps(rng: &mut Rng, hold: usize) -> Record {
             ..Load::default()
         };
         record.push(hold, duty, load);
+    }
+    record
+}
+
+/// Steps of constant power alone, held at 100 V by a controller.
+fn closed(rng: &mut Rng, hold: usize) -> Record {
+    let mut record = Record::new("closed_10k", true, rng);
+    record.closed = true;
+    for centre in [200.0, 500.0, 800.0, 350.0] {
+        let load = Load {
+            power: (centre + rng.uniform(-100.0_f64, 150.0)).round(),
+            ..Load::default()
+        };
+        record.push(hold, 0.5, load);
     }
     record
 }

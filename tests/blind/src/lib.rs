@@ -10,4 +10,5 @@ pub mod ngspice;
 pub mod plan;
 pub mod rivals;
 pub mod rng;
+pub mod score;
 pub mod sensing;

@@ -1,7 +1,7 @@
 //! Generates blind cases and scores a diagnosis of them.
 
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
+use std::process::{Command, ExitCode};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
@@ -9,6 +9,7 @@ use std::time::Instant;
 use blind::case::{Truth, measure};
 use blind::experiment::Extent;
 use blind::plan::{Plan, plan, plan_of};
+use blind::score::{Diagnosis, judge, table};
 use clap::Parser;
 
 /// Hides effects in data of an independent simulator. See docs/blind.md.
@@ -33,6 +34,12 @@ struct Arguments {
     /// Hide these effects in every case instead of drawing them: ids with commas, or "none".
     #[arg(long)]
     only: Option<String>,
+    /// Diagnose each case and write DIR/score.md.
+    #[arg(long)]
+    score: bool,
+    /// The program that diagnoses; by default the one built beside this.
+    #[arg(long)]
+    policyc: Option<PathBuf>,
     /// Cases at a time.
     #[arg(long, default_value_t = 2)]
     jobs: usize,
@@ -40,7 +47,11 @@ struct Arguments {
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    match generate(&arguments) {
+    let outcome = generate(&arguments).and_then(|()| match arguments.score {
+        true => score(&arguments),
+        false => Ok(()),
+    });
+    match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(message) => {
             eprintln!("error: {message}");
@@ -127,6 +138,74 @@ fn case(arguments: &Arguments, cases: &Path, index: usize) -> Result<String, Str
     }
     std::fs::rename(&draft, &folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     Ok("measured".to_owned())
+}
+
+/// Diagnoses every case, one after the other, and writes the score.
+fn score(arguments: &Arguments) -> Result<(), String> {
+    let beside = || Some(std::env::current_exe().ok()?.with_file_name("policyc"));
+    let policyc = arguments
+        .policyc
+        .clone()
+        .or_else(beside)
+        .unwrap_or_else(|| "policyc".into());
+    let mut judged = Vec::new();
+    for index in 0..arguments.cases {
+        let name = format!("case_{index:03}");
+        let started = Instant::now();
+        let case = arguments.out.join("cases").join(&name);
+        let answers = arguments.out.join("diagnoses").join(&name);
+        if !answers.join("diagnosis.json").exists() {
+            diagnose(&policyc, &case, &answers)?;
+        }
+        let truth: Truth = json(&case.join("truth.json"))?;
+        let diagnosis: Diagnosis = json(&answers.join("diagnosis.json"))?;
+        println!(
+            "[{}/{}] {name} diagnosed ({:.1} s)",
+            index + 1,
+            arguments.cases,
+            started.elapsed().as_secs_f64()
+        );
+        judged.push((name, judge(&truth, &diagnosis)));
+    }
+    let text = table(arguments.seed, &judged);
+    let path = arguments.out.join("score.md");
+    std::fs::write(&path, &text).map_err(|error| format!("{}: {error}", path.display()))?;
+    println!("\n{text}");
+    Ok(())
+}
+
+fn diagnose(policyc: &Path, case: &Path, answers: &Path) -> Result<(), String> {
+    create(answers)?;
+    let mut command = Command::new(policyc);
+    command.arg("diagnose").arg("--model").arg(case.join("plant.toml"));
+    for (option, folder) in [("--train", "train"), ("--heldout", "heldout")] {
+        command.arg(option).args(records(&case.join(folder))?);
+    }
+    command.arg("--out").arg(answers);
+    let output = command
+        .output()
+        .map_err(|error| format!("{}: {error}", policyc.display()))?;
+    match answers.join("diagnosis.json").exists() {
+        true => Ok(()),
+        false => Err(format!(
+            "{} of {} wrote no diagnosis.json:\n{}",
+            policyc.display(),
+            case.display(),
+            String::from_utf8_lossy(&output.stderr)
+        )),
+    }
+}
+
+fn records(folder: &Path) -> Result<Vec<PathBuf>, String> {
+    let entries = std::fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    let mut files: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    files.sort();
+    Ok(files)
+}
+
+fn json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, String> {
+    let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
+    serde_json::from_str(&text).map_err(|error| format!("{}: {error}", path.display()))
 }
 
 fn create(folder: &Path) -> Result<(), String> {

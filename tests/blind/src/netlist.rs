@@ -30,18 +30,27 @@ pub fn netlist(bench: &Bench, record: &Record, random: &mut Rng) -> String {
     let first = record.load[0];
     let v = bench.circuit.v_in * record.duty[0];
     let i = first.current + v * first.conductance + first.power / v;
-    gates(&mut n, bench, record, random);
+    match record.closed {
+        true => control(&mut n, bench),
+        false => gates(&mut n, bench, record, random),
+    }
     source(&mut n, bench);
     leg(&mut n, bench);
     inductor(&mut n, bench, i, record);
     capacitor(&mut n, bench, v);
     load(&mut n, bench, record, v);
     let end = (record.lead + record.duty.len() + 1) as f64 * T_SW;
-    let signals = "v(out) i(vil) i(vout) v(nin)";
+    let signals = "v(out) i(vil) i(vout) v(nin) v(hold)";
+    // edges that no source announces are found by short steps only
+    let (longest, method) = match record.closed {
+        // trapezoids turn off up to 4 us late here
+        true => (0.2 * T_FINE, "method=gear "),
+        false => (T_FINE, ""),
+    };
     let _ = write!(
         n,
-        ".options reltol=1e-4 abstol=1e-9 vntol=1e-6 chgtol=1e-16\n.save {signals}\n\
-         .tran {T_FINE:e} {end:e} 0 {T_FINE:e} uic\n.control\nrun\nlinearize {signals}\nset wr_singlescale\n\
+        ".options {method}reltol=1e-4 abstol=1e-9 vntol=1e-6 chgtol=1e-16\n.save {signals}\n\
+         .tran {T_FINE:e} {end:e} 0 {longest:e} uic\n.control\nrun\nlinearize {signals}\nset wr_singlescale\n\
          set numdgt=12\nwrdata out.txt {signals}\nquit\n.endc\n.end\n"
     );
     n
@@ -85,6 +94,27 @@ fn gates(n: &mut String, bench: &Bench, record: &Record, random: &mut Rng) {
         }
     }
     pwl(n, "g", &corners);
+    n.push_str("Vhold hold 0 0\n");
+}
+
+/// A controller of the measured voltage: proportional and integral, with the capacitor's current against the negative
+/// resistance of constant power. Sampled and held at the start of the period, compared with a triangle.
+fn control(n: &mut String, bench: &Bench) {
+    let s = &bench.sensors;
+    let half = 0.5 * T_SW;
+    let _ = writeln!(n, "Be e 0 V=100-({}*V(out)+{})", s.v_gain, s.v_offset);
+    let _ = writeln!(n, "Bint 0 int I=3*V(e)\nCint int 0 1 ic=0.5");
+    let _ = writeln!(
+        n,
+        "Bcm cm 0 V=min(max(V(int)+0.0015*V(e)-0.03*(I(Vil)-I(Vout)),0.1),0.9)"
+    );
+    let _ = writeln!(n, "Vck ck 0 PULSE(0 1 {:e} 10n 10n 1u {T_SW:e})", T_SW - 1.1e-6);
+    let _ = writeln!(n, "Bsh cm hold I=(V(cm)-V(hold))*V(ck)/100\nChold hold 0 1n ic=0.5");
+    let _ = writeln!(n, "Vtr tr 0 PULSE(1 0 0 {half:e} {half:e} 1p {T_SW:e})");
+    let _ = writeln!(
+        n,
+        "Bg0 g0 0 V=0.5+0.5*tanh((V(hold)-V(tr))*2e4)\nRg g0 g 10\nCg g 0 100p"
+    );
 }
 
 fn source(n: &mut String, bench: &Bench) {
@@ -180,7 +210,9 @@ fn load(n: &mut String, bench: &Bench, record: &Record, v: f64) {
         for (row, pair) in record.load.windows(2).enumerate() {
             let (before, after) = (gain * level(&pair[0]), gain * level(&pair[1]));
             if before != after {
-                let time = (record.lead + row + 1) as f64 * T_SW;
+                let start = (record.lead + row + 1) as f64 * T_SW;
+                // what is sampled at a step is what was true before it
+                let time = if record.closed { start + LOAD_RISE } else { start };
                 corners.extend([(time - LOAD_RISE, before), (time, after)]);
             }
         }

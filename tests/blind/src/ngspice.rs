@@ -16,6 +16,8 @@ pub struct Signals {
     pub i_o: Vec<f64>,
     /// Input voltage, V.
     pub v_in: Vec<f64>,
+    /// Duty that a controller holds; 0 without one.
+    pub duty: Vec<f64>,
 }
 
 /// Runs it in a folder of its own.
@@ -57,13 +59,14 @@ fn read(text: &str) -> Result<Signals, String> {
         let mut numbers = line.split_ascii_whitespace().map(str::parse::<f64>);
         let mut next = || match numbers.next() {
             Some(Ok(number)) if number.is_finite() => Ok(number),
-            _ => Err(format!("ngspice wrote a line without five numbers: {line}")),
+            _ => Err(format!("ngspice wrote a line without six numbers: {line}")),
         };
         next()?;
         signals.v_o.push(next()?);
         signals.i_l.push(next()?);
         signals.i_o.push(next()?);
         signals.v_in.push(next()?);
+        signals.duty.push(next()?);
     }
     Ok(signals)
 }

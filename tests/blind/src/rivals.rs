@@ -66,7 +66,12 @@ pub(crate) fn explanations(
             continue;
         }
         let mut directions = Vec::new();
-        for bench in variants(effect) {
+        let hidden = plan.effects.iter().find(|hidden| hidden.id == effect.id);
+        for bench in hidden
+            .map(|hidden| alone(hidden, plan))
+            .into_iter()
+            .chain(variants(effect))
+        {
             directions.push(direction(runs, training, &bench)?);
         }
         candidates.push(Candidate {
@@ -79,6 +84,8 @@ pub(crate) fn explanations(
     let chi2_listed = chi2_listed.min(chi2);
     let truth: Vec<&str> = plan.effects.iter().map(|effect| effect.id).collect();
     let all_listed = plan.effects.iter().all(|effect| effect.listed);
+    let beyond = |set: &Vec<String>| truth.len() < set.len() && truth.iter().all(|id| set.iter().any(|own| own == id));
+    sets.retain(|set| !(all_listed && beyond(set)));
     if all_listed && !sets.iter().any(|set| set.iter().all(|id| truth.contains(&id.as_str()))) {
         sets.insert(0, truth.iter().map(|id| (*id).to_owned()).collect());
     }
@@ -87,6 +94,21 @@ pub(crate) fn explanations(
         chi2_listed: if all_listed { 0.0 } else { chi2_listed },
         sets,
     })
+}
+
+/// Squared distance of the hidden records from those of another bench.
+pub(crate) fn distance(
+    runs: &mut Runs<'_>,
+    training: &[(&Record, Samples, Samples)],
+    other: &Bench,
+) -> Result<f64, String> {
+    let mut squares = 0.0;
+    for (record, hidden, _) in training {
+        let samples = runs.exact(other, record)?;
+        let apart = scaled(runs.plan, std::iter::once((hidden, &samples)));
+        squares += dot(&apart, &apart);
+    }
+    Ok(squares)
 }
 
 /// Smallest sets of one or two candidates that leave less than `limit`, and the least that is left.
@@ -138,6 +160,15 @@ fn variants(effect: &Effect) -> Vec<Bench> {
         },
         _ => Vec::new(),
     }
+}
+
+/// The nominal bench with this hidden effect only.
+fn alone(effect: &Effect, plan: &Plan) -> Bench {
+    let mut bench = Bench::nominal();
+    for parameter in effect.parameters {
+        parameter.set(&mut bench, parameter.get(&plan.bench));
+    }
+    bench
 }
 
 fn direction(runs: &mut Runs<'_>, training: &[(&Record, Samples, Samples)], bench: &Bench) -> Result<Vec<f64>, String> {

@@ -17,10 +17,7 @@ pub type Samples = Vec<[f64; 4]>;
 pub fn exact(bench: &Bench, record: &Record, signals: &Signals, random: &mut Rng) -> Samples {
     let s = &bench.sensors;
     let channels = [&signals.v_o, &signals.i_l, &signals.i_o].map(|channel| low_pass(channel, s.low_pass));
-    let at = |row: usize, channel: &[f64]| {
-        let time = (record.lead as f64 + row as f64 + 0.5) * T_SW + s.delay;
-        interpolate(channel, time / T_FINE)
-    };
+    let at = |row: usize, channel: &[f64]| interpolate(channel, instant(record, row, s.delay) / T_FINE);
     let [v_o, i_l, i_o] = &channels;
     let rows = 0..record.duty.len();
     let mut samples: Samples = rows
@@ -35,6 +32,27 @@ pub fn exact(bench: &Bench, record: &Record, signals: &Signals, random: &mut Rng
         .collect();
     oddities(s, &mut samples, random);
     samples
+}
+
+/// When a row is sampled, s from the start of the run. A controller's own samples are not late.
+fn instant(record: &Record, row: usize, late: f64) -> f64 {
+    let start = (record.lead + row) as f64 * T_SW;
+    match record.closed {
+        true => start,
+        false => start + 0.5 * T_SW + late,
+    }
+}
+
+/// The duty in force in the period of each row, as far as the bench knows it: commanded, or held by the controller.
+#[must_use]
+pub fn duty(record: &Record, signals: &Signals) -> Vec<f64> {
+    let middle = |row: usize| ((record.lead + row) as f64 + 0.5) * T_SW / T_FINE;
+    match record.closed {
+        true => (0..record.duty.len())
+            .map(|row| interpolate(&signals.duty, middle(row)))
+            .collect(),
+        false => record.duty.clone(),
+    }
 }
 
 /// Adds noise and rounds to the steps of the converter.

@@ -4,25 +4,94 @@ use std::fmt::Write;
 
 use policy::Policy;
 
-use super::mapping_terms;
+use super::{Form, mapping_terms};
 use crate::protocol::{MAGIC, kind, purity};
 
 /// Text of the driver for the generated `<name>.h`.
-pub fn text(policy: &Policy) -> String {
-    [head(policy), step(policy), set_mapping(policy), main(policy)].concat()
+pub fn text(policy: &Policy, form: Form) -> String {
+    let words = match form {
+        Form::Hosted => HOSTED_WORDS,
+        Form::Board => BOARD_WORDS,
+    };
+    [
+        words,
+        &head(policy),
+        &step(policy, form),
+        &set_mapping(policy),
+        &main(policy),
+    ]
+    .concat()
 }
 
-/// Includes, memory, words in and out, start.
-fn head(policy: &Policy) -> String {
-    let name = &policy.name;
-    let macro_name = name.to_uppercase();
-    format!(
-        r#"/* Driver of the differential check: events in, answers out, in words of the machine. */
+/// Words through the C library.
+const HOSTED_WORDS: &str = r"/* Driver of the differential check: events in, answers out, in words of the machine. */
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "{name}.h"
+
+static void start_words(void)
+{
+    static char in_buffer[1 << 16];
+    static char out_buffer[1 << 16];
+    setvbuf(stdin, in_buffer, _IOFBF, sizeof in_buffer);
+    setvbuf(stdout, out_buffer, _IOFBF, sizeof out_buffer);
+}
+
+static void put(const void *words, size_t count)
+{
+    if (fwrite(words, 4u, count, stdout) != count) {
+        exit(4);
+    }
+}
+
+/* 0 at the end of the stream */
+static int get(void *words, size_t count)
+{
+    return fread(words, 4u, count, stdin) == count;
+}
+
+/* each answer leaves at once: a crash then shows at its own event */
+static void flush(void)
+{
+    fflush(stdout);
+}
+
+";
+
+/// Words through a board.
+const BOARD_WORDS: &str = r"/* Driver of the differential check: events in, answers out, in words of the target. */
+#include <stdint.h>
+#include <board.h>
+
+static void start_words(void)
+{
+}
+
+static void put(const void *words, size_t count)
+{
+    words_put(words, count);
+}
+
+/* 0 at the end of the stream */
+static int get(void *words, size_t count)
+{
+    return words_get(words, count);
+}
+
+/* the board sends before it waits and in a fault */
+static void flush(void)
+{
+}
+
+";
+
+/// Memory, states, start.
+fn head(policy: &Policy) -> String {
+    let name = &policy.name;
+    let macro_name = name.to_uppercase();
+    format!(
+        r#"#include "{name}.h"
 
 #define STATE_WORDS (sizeof({name}_state) / 4u)
 
@@ -34,22 +103,9 @@ static {name}_command command;
 static float observation[{macro_name}_FEATURES];
 static float q[{macro_name}_ACTIONS];
 
-static void put(const void *words, size_t count)
-{{
-    if (fwrite(words, 4u, count, stdout) != count) {{
-        exit(4);
-    }}
-}}
-
 static void put_word(uint32_t word)
 {{
     put(&word, 1u);
-}}
-
-/* 0 at the end of the stream */
-static int get(void *words, size_t count)
-{{
-    return fread(words, 4u, count, stdin) == count;
 }}
 
 static void put_state(void)
@@ -70,11 +126,12 @@ static void start(void)
     )
 }
 
-fn step(policy: &Policy) -> String {
+fn step(policy: &Policy, form: Form) -> String {
     let name = &policy.name;
     let macro_name = name.to_uppercase();
     let measurement = measurement(policy);
     let purity_tests = purity_tests(name);
+    let mask = form.purity_mask();
     format!(
         r#"static int read_measurement(void)
 {{
@@ -85,7 +142,8 @@ fn step(policy: &Policy) -> String {
 {measurement}    return 1;
 }}
 
-static void step(void)
+/* `step` with a look at what must leave the state alone, and at `eval` and `commit` beside it */
+static uint32_t watched_step(void)
 {{
     {name}_command first;
     {name}_command second;
@@ -97,6 +155,21 @@ static void step(void)
     memset(&command, 0xFF, sizeof command);
     memcpy(&before, &state, sizeof state);
 {purity_tests}
+    return purity;
+}}
+
+static void step(void)
+{{
+    static uint32_t steps;
+    uint32_t purity = 0u;
+    if ((steps++ & {mask}u) == 0u) {{
+        purity = watched_step();
+    }} else {{
+        {name}_observe(&state, &m, observation);
+        {name}_q_values(observation, q);
+        {name}_step(&state, &m, &command);
+        memcpy(&twin, &state, sizeof twin);
+    }}
     put(observation, {macro_name}_FEATURES);
     put(q, {macro_name}_ACTIONS);
     put(&command.duty, 1u);
@@ -120,11 +193,8 @@ fn main(policy: &Policy) -> String {
         r#"
 int main(void)
 {{
-    static char in_buffer[1 << 16];
-    static char out_buffer[1 << 16];
     uint32_t kind;
-    setvbuf(stdin, in_buffer, _IOFBF, sizeof in_buffer);
-    setvbuf(stdout, out_buffer, _IOFBF, sizeof out_buffer);
+    start_words();
     put_word({MAGIC}u);
     put_word({name}_self_test());
     put_word({name}_integrity());
@@ -132,7 +202,7 @@ int main(void)
     put_word({macro_name}_FEATURES);
     put_word({macro_name}_ACTIONS);
     put_word((uint32_t)STATE_WORDS);
-    fflush(stdout);
+    flush();
     start();
     while (get(&kind, 1u)) {{
         switch (kind) {{
@@ -166,8 +236,7 @@ int main(void)
         default:
             return 3;
         }}
-        /* each answer leaves at once: a crash then shows at its own event */
-        fflush(stdout);
+        flush();
     }}
     return 0;
 }}
@@ -175,7 +244,8 @@ int main(void)
     )
 }
 
-fn measurement(policy: &Policy) -> String {
+/// Copies `words` into the measurement `m`.
+pub(super) fn measurement(policy: &Policy) -> String {
     let mut text = String::new();
     for (n, signal) in policy.signals.iter().enumerate() {
         // writing to a String cannot fail

@@ -4,47 +4,132 @@ use std::fmt::Write;
 
 use policy::Policy;
 
-use super::mapping_terms;
+use super::{Form, mapping_terms};
 use crate::protocol::{MAGIC, kind, purity};
 
 /// Text of the driver for the generated module in the file `path`, relative to the driver.
-pub fn text(policy: &Policy, path: &str) -> String {
+pub fn text(policy: &Policy, path: &str, form: Form) -> String {
     let name = &policy.name;
+    let (attributes, words) = match form {
+        Form::Hosted => ("", HOSTED_WORDS),
+        Form::Board => ("#![no_std]\n#![no_main]\n", BOARD_WORDS),
+    };
     let mut text = String::new();
     // writing to a String cannot fail
     let _ = write!(
         text,
         r#"// Driver of the differential check: events in, answers out, in words of the machine.
-#[path = "{path}"]
+{attributes}#[path = "{path}"]
 #[allow(dead_code)]
 mod {name};
 
-use std::io::{{BufReader, BufWriter, ErrorKind, Read, Stdin, Stdout, Write}};
-
 use {name}::{{Command, Controller, Measurement}};
-
-struct Driver {{
-    input: BufReader<Stdin>,
-    output: BufWriter<Stdout>,
-    /// Advanced by step.
-    state: Controller,
-    /// Advanced by eval and commit.
-    twin: Controller,
-}}
-{HELPERS}
+{words}{HELPERS}
 {step}{set_mapping}{main}"#,
-        step = step(policy),
+        step = step(policy, form),
         set_mapping = set_mapping(policy),
         main = main(policy),
     );
     text
 }
 
+/// Words through the standard library.
+const HOSTED_WORDS: &str = r#"
+use std::io::{BufReader, BufWriter, ErrorKind, Read, Stdin, Stdout, Write};
+
+struct Words {
+    input: BufReader<Stdin>,
+    output: BufWriter<Stdout>,
+}
+
+impl Words {
+    fn new() -> Self {
+        Words {
+            input: BufReader::with_capacity(1 << 16, std::io::stdin()),
+            output: BufWriter::with_capacity(1 << 16, std::io::stdout()),
+        }
+    }
+
+    fn put(&mut self, word: u32) {
+        self.output.write_all(&word.to_ne_bytes()).unwrap();
+    }
+
+    /// None at the end of the stream.
+    fn get(&mut self) -> Option<u32> {
+        let mut bytes = [0; 4];
+        match self.input.read_exact(&mut bytes) {
+            Ok(()) => Some(u32::from_ne_bytes(bytes)),
+            Err(error) if error.kind() == ErrorKind::UnexpectedEof => None,
+            Err(error) => panic!("{}", error),
+        }
+    }
+
+    /// Each answer leaves at once: a crash then shows at its own event.
+    fn flush(&mut self) {
+        self.output.flush().unwrap();
+    }
+}
+
+fn main() {
+    run();
+}
+"#;
+
+/// Words through a board.
+const BOARD_WORDS: &str = r#"
+extern "C" {
+    fn words_get(words: *mut u32, count: usize) -> i32;
+    fn words_put(words: *const u32, count: usize);
+    fn board_exit(code: i32) -> !;
+}
+
+struct Words;
+
+impl Words {
+    fn new() -> Self {
+        Words
+    }
+
+    fn put(&mut self, word: u32) {
+        unsafe { words_put(&word, 1) }
+    }
+
+    /// None at the end of the stream.
+    fn get(&mut self) -> Option<u32> {
+        let mut word = 0;
+        if unsafe { words_get(&mut word, 1) } != 0 { Some(word) } else { None }
+    }
+
+    /// The board sends before it waits and in a fault.
+    fn flush(&mut self) {}
+}
+
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo) -> ! {
+    unsafe { board_exit(97) }
+}
+
+#[no_mangle]
+pub extern "C" fn main() -> i32 {
+    run();
+    0
+}
+"#;
+
 const HELPERS: &str = r#"
+struct Driver {
+    words: Words,
+    /// Advanced by step.
+    state: Controller,
+    /// Advanced by eval and commit.
+    twin: Controller,
+    steps: u32,
+}
+
 impl Driver {
     fn put(&mut self, words: impl IntoIterator<Item = u32>) {
         for word in words {
-            self.output.write_all(&word.to_ne_bytes()).unwrap();
+            self.words.put(word);
         }
     }
 
@@ -57,12 +142,7 @@ impl Driver {
     fn get<const N: usize>(&mut self) -> Option<[u32; N]> {
         let mut words = [0; N];
         for word in &mut words {
-            let mut bytes = [0; 4];
-            match self.input.read_exact(&mut bytes) {
-                Ok(()) => *word = u32::from_ne_bytes(bytes),
-                Err(error) if error.kind() == ErrorKind::UnexpectedEof => return None,
-                Err(error) => panic!("{}", error),
-            }
+            *word = self.words.get()?;
         }
         Some(words)
     }
@@ -73,17 +153,25 @@ fn bits(command: &Command) -> [u32; 4] {
 }
 "#;
 
-fn step(policy: &Policy) -> String {
-    let name = &policy.name;
-    let signals = policy.signals.len();
+/// The fields of a measurement from `words`.
+pub(super) fn measurement_fields(policy: &Policy) -> String {
     let mut fields = String::new();
     for (n, signal) in policy.signals.iter().enumerate() {
         let value = match signal.adc {
             Some(_) => format!("words[{n}] as i32"),
             None => format!("f32::from_bits(words[{n}])"),
         };
+        // writing to a String cannot fail
         let _ = writeln!(fields, "            {}: {value},", signal.name);
     }
+    fields
+}
+
+fn step(policy: &Policy, form: Form) -> String {
+    let mask = form.purity_mask();
+    let name = &policy.name;
+    let signals = policy.signals.len();
+    let fields = measurement_fields(policy);
     let [observe, eval, repeat, step, commit] = [
         purity::OBSERVE_CHANGED_STATE,
         purity::EVAL_CHANGED_STATE,
@@ -94,24 +182,38 @@ fn step(policy: &Policy) -> String {
     format!(
         r#"
 impl Driver {{
+    /// `step` with a look at what must leave the state alone, and at `eval` and `commit` beside it.
+    fn watch(&mut self, m: &Measurement, purity: &mut u32) -> Command {{
+        let before = self.state.state_words();
+        let flag = |wrong: bool, bit: u32| if wrong {{ bit }} else {{ 0 }};
+        let _ = self.state.observe(m);
+        *purity |= flag(before != self.state.state_words(), {observe});
+        let first = self.state.eval(m);
+        let second = self.state.eval(m);
+        *purity |= flag(before != self.state.state_words(), {eval});
+        *purity |= flag(bits(&first) != bits(&second), {repeat});
+        let command = self.state.step(m);
+        *purity |= flag(bits(&first) != bits(&command), {step});
+        let third = self.twin.eval(m);
+        self.twin.commit(m, &third);
+        *purity |= flag(self.twin.state_words() != self.state.state_words(), {commit});
+        command
+    }}
+
     fn step(&mut self, words: [u32; {signals}]) {{
         let m = Measurement {{
 {fields}        }};
-        let before = self.state.state_words();
         let observation = self.state.observe(&m);
         let q = Controller::q_values(&observation);
         let mut purity = 0;
-        let flag = |wrong: bool, bit: u32| if wrong {{ bit }} else {{ 0 }};
-        purity |= flag(before != self.state.state_words(), {observe});
-        let first = self.state.eval(&m);
-        let second = self.state.eval(&m);
-        purity |= flag(before != self.state.state_words(), {eval});
-        purity |= flag(bits(&first) != bits(&second), {repeat});
-        let command = self.state.step(&m);
-        purity |= flag(bits(&first) != bits(&command), {step});
-        let third = self.twin.eval(&m);
-        self.twin.commit(&m, &third);
-        purity |= flag(self.twin.state_words() != self.state.state_words(), {commit});
+        let command = if self.steps & {mask} == 0 {{
+            self.watch(&m, &mut purity)
+        }} else {{
+            let command = self.state.step(&m);
+            self.twin = self.state.clone();
+            command
+        }};
+        self.steps = self.steps.wrapping_add(1);
         let _: ([f32; {name}::FEATURES], [f32; {name}::ACTIONS]) = (observation, q);
         self.put(observation.iter().map(|x| x.to_bits()));
         self.put(q.iter().map(|x| x.to_bits()));
@@ -128,7 +230,7 @@ fn set_mapping(policy: &Policy) -> String {
     let arguments = match mapping_terms(policy) {
         Some(4) => "a, b, c, r",
         Some(_) => "a, b, c",
-        None => return "\nimpl Driver {\n    fn set_mapping(&mut self, _: [u32; 4]) {\n        std::process::exit(3);\n    }\n}\n".to_owned(),
+        None => return "\nimpl Driver {\n    fn set_mapping(&mut self, _: [u32; 4]) {\n        panic!(\"no mapping\");\n    }\n}\n".to_owned(),
     };
     let unused = if arguments.ends_with('r') { "r" } else { "_" };
     format!(
@@ -152,19 +254,19 @@ fn main(policy: &Policy) -> String {
     let network = kind::NETWORK;
     format!(
         r#"
-fn main() {{
+fn run() {{
     let mut driver = Driver {{
-        input: BufReader::with_capacity(1 << 16, std::io::stdin()),
-        output: BufWriter::with_capacity(1 << 16, std::io::stdout()),
+        words: Words::new(),
         state: Controller::new(),
         twin: Controller::new(),
+        steps: 0,
     }};
     let self_test: Result<(), u32> = Controller::self_test();
     let integrity: bool = Controller::integrity();
     let state_words = driver.state.state_words().len() as u32;
     driver.put([{MAGIC}, self_test.err().unwrap_or(0), integrity as u32, {signals}]);
     driver.put([{name}::FEATURES as u32, {name}::ACTIONS as u32, state_words]);
-    driver.output.flush().unwrap();
+    driver.words.flush();
     while let Some([kind]) = driver.get() {{
         let truncated = "event ends early";
         match kind {{
@@ -193,8 +295,7 @@ fn main() {{
             }}
             _ => panic!("unknown event"),
         }}
-        // each answer leaves at once: a crash then shows at its own event
-        driver.output.flush().unwrap();
+        driver.words.flush();
     }}
 }}
 "#,

@@ -8,6 +8,7 @@ use plant::Parameters;
 
 use super::Loads;
 use super::bench::Simulator;
+use crate::commands::progress_line::ProgressLine;
 use crate::{Failure, Outcome, output};
 
 #[derive(Debug, Args)]
@@ -95,15 +96,18 @@ fn measure_open(options: &Acquire, parameters: &Parameters, plan: &mut Plan) -> 
         window: options.window as usize,
         most_windows: options.most_windows as usize,
     };
+    let mut progress = ProgressLine::new();
     let mut measured = 0;
     for index in 0..plan.points.len() {
         let (point, None) = plan.points[index] else { continue };
+        progress.show(|| format!("point {} of {}: {}", index + 1, plan.points.len(), point.load));
         plan.points[index].1 = Some(measure(bench.as_mut(), parameters, &point, &protocol)?);
         measured += 1;
         if options.simulator == Simulator::Ngspice {
             output::write_one(&options.out, &plan.to_csv()?)?;
         }
     }
+    progress.clear();
     Ok(measured)
 }
 

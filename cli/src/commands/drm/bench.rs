@@ -11,7 +11,7 @@ use spice::SpiceConverter;
 pub enum Simulator {
     /// The plant of this program
     Plant,
-    /// ngspice's shared library: shares no code with the plant, about 1 ms for each control period
+    /// ngspice's shared library: shares no code with the plant, 1 ms and more for each control period
     Ngspice,
 }
 

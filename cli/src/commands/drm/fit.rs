@@ -21,8 +21,8 @@ pub struct Fit {
     #[arg(long, value_enum, default_value_t = Terms::Auto)]
     pub terms: Terms,
     /// Components of the partial least squares, instead of cross-validation
-    #[arg(long, value_name = "N")]
-    pub components: Option<usize>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=3))]
+    pub components: Option<u8>,
     /// The converter, for its boundary of discontinuous conduction
     #[arg(long, value_name = "FILE", conflicts_with_all = ["inductance", "f_sw", "v_f"])]
     pub plant: Option<PathBuf>,
@@ -95,7 +95,12 @@ fn fit_options(options: &Fit) -> Result<FitOptions, Failure> {
             f_sw,
             v_f: options.v_f,
         });
-    for (name, value) in [("--inductance", options.inductance), ("--f-sw", options.f_sw)] {
+    let numbers = [
+        ("--inductance", options.inductance),
+        ("--f-sw", options.f_sw),
+        ("--assume-a", options.assume_a),
+    ];
+    for (name, value) in numbers {
         if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
             return Err(Failure(format!("{name} must be greater than 0\n   = found: {value}")));
         }
@@ -108,7 +113,7 @@ fn fit_options(options: &Fit) -> Result<FitOptions, Failure> {
             Terms::Three => Some(Form::ThreeTerm),
             Terms::Four => Some(Form::FourTerm),
         },
-        components: options.components.map(|components| components.max(1)),
+        components: options.components.map(usize::from),
         conduction: plant.as_ref().and_then(Conduction::of).or(given),
         always_continuous: continuous,
         keep_outliers: options.keep_outliers,

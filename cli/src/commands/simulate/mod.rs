@@ -1,18 +1,20 @@
 //! `policyc simulate`
 
+use std::fmt::Display;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use closed_loop::limit::{Limit, left_out};
 use closed_loop::scenario::Finding;
-use closed_loop::{Converter, Environment, LoadStep, Scenario, Trajectory};
+use closed_loop::{Converter, LoadStep, Scenario, Trajectory};
+use plant::Parameters;
 use policy::Policy;
 
 use super::interruption;
 use crate::arguments::Simulate;
 use crate::{Failure, Outcome, output};
 
-mod controllers;
+pub mod controllers;
 mod files;
 mod page;
 mod pictures;
@@ -93,7 +95,7 @@ pub fn run(options: &Simulate) -> Result<Outcome, Failure> {
 }
 
 /// An error where the user has had enough.
-fn go_on(stop: &AtomicBool) -> Result<(), Failure> {
+pub fn go_on(stop: &AtomicBool) -> Result<(), Failure> {
     if stop.load(Ordering::Relaxed) {
         return Err(Failure("interrupted".to_owned()));
     }
@@ -110,27 +112,10 @@ fn prepare(options: &Simulate) -> Result<Setting, Failure> {
         )));
     };
     let converter = Converter::load(&plant, &scenario.set)?;
-    let of_policy = policy.parameters.get("v_ref").copied();
-    let Some(v_ref) = scenario.v_ref.or(of_policy) else {
-        return Err(Failure(format!(
-            "{file}: no voltage to hold\n   = hint: v_ref = 100.0, as the policy has no parameter `v_ref`"
-        )));
-    };
-    let v_in = converter.parameters().converter.v_in;
-    if v_ref >= v_in {
-        return Err(Failure(format!(
-            "{file}: a buck converter cannot hold this voltage\n   = found: v_ref = {v_ref} V, v_in = {v_in} V at the plant"
-        )));
-    }
-    let (ours, theirs) = (policy.sample_period, converter.t_sample());
-    if (ours - theirs).abs() > 1e-9 * theirs {
-        return Err(Failure(format!(
-            "policy and plant have different control periods\n   = found: sample_period = {ours} s in the policy, \
-             {theirs} s at the plant\n   = hint: f_sw of the plant is 1 / sample_period"
-        )));
-    }
+    let v_ref = v_ref(&scenario, &policy, &file)?;
+    suits(&policy, converter.parameters(), v_ref, &file)?;
     let mut notes = Vec::new();
-    if let Some(theirs) = of_policy.filter(|theirs| *theirs != v_ref) {
+    if let Some(theirs) = held_by(&policy).filter(|theirs| *theirs != v_ref) {
         notes.push(format!(
             "the policy holds {theirs} V, but errors are counted from {v_ref} V"
         ));
@@ -150,4 +135,42 @@ fn prepare(options: &Simulate) -> Result<Setting, Failure> {
         v_ref,
         notes,
     })
+}
+
+/// The voltage that the policy says it holds, V.
+fn held_by(policy: &Policy) -> Option<f64> {
+    policy.parameters.get("v_ref").copied()
+}
+
+/// The voltage to hold, V; `file` is the scenario's.
+///
+/// # Errors
+/// If neither scenario nor policy names one.
+pub fn v_ref(scenario: &Scenario, policy: &Policy, file: &dyn Display) -> Result<f64, Failure> {
+    scenario.v_ref.or(held_by(policy)).ok_or_else(|| {
+        Failure(format!(
+            "{file}: no voltage to hold\n   = hint: v_ref = 100.0, as the policy has no parameter `v_ref`"
+        ))
+    })
+}
+
+/// Whether a policy can control a converter; `file` is where the converter was named.
+///
+/// # Errors
+/// If the voltage is out of reach or the control periods differ.
+pub fn suits(policy: &Policy, converter: &Parameters, v_ref: f64, file: &dyn Display) -> Result<(), Failure> {
+    let v_in = converter.converter.v_in;
+    if v_ref >= v_in {
+        return Err(Failure(format!(
+            "{file}: a buck converter cannot hold this voltage\n   = found: v_ref = {v_ref} V, v_in = {v_in} V at the plant"
+        )));
+    }
+    let (ours, theirs) = (policy.sample_period, converter.t_sw());
+    if (ours - theirs).abs() > 1e-9 * theirs {
+        return Err(Failure(format!(
+            "{file}: policy and plant have different control periods\n   = found: sample_period = {ours} s in the policy, \
+             {theirs} s at the plant\n   = hint: f_sw of the plant is 1 / sample_period"
+        )));
+    }
+    Ok(())
 }

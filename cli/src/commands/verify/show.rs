@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use verify::drift::Drift;
+use verify::toolchain::{Install, Missing};
 use verify::{BuildReport, Difference, GoldenResult, Outcome, Report};
 
 use crate::Failure;
@@ -83,14 +84,46 @@ fn verdict(build: &BuildReport) -> (&'static str, String) {
         Outcome::Different { .. } => ("DIFFERENT", format!("after {steps} equal steps")),
         Outcome::Failed { .. } => ("FAILED", format!("after {steps} equal steps")),
         Outcome::CompileError { .. } => ("REFUSED", "by the compiler".to_owned()),
-        Outcome::Skipped { reason, package } => {
-            let install = package
-                .as_ref()
-                .map(|package| format!(" (Debian package {package})"))
-                .unwrap_or_default();
-            ("skipped", format!("{reason}{install}"))
+        Outcome::Skipped { missing } => (
+            "skipped",
+            missing.iter().map(missing_text).collect::<Vec<_>>().join(", "),
+        ),
+    }
+}
+
+/// What is missing and how to get it.
+pub fn missing_text(missing: &Missing) -> String {
+    let install = match &missing.install {
+        Some(Install::Package(package)) => format!(" (Debian package {package})"),
+        Some(Install::RustTarget(triple)) => format!(" (rustup target add {triple})"),
+        None => String::new(),
+    };
+    format!("{}{install}", missing.reason)
+}
+
+/// Why no build was compared, and what to type.
+pub fn nothing_compared(report: &Report) -> Result<String, Failure> {
+    let mut out = format!("nothing could be compared for target {}\n", report.target);
+    for build in report.skipped() {
+        writeln!(out, "   = {}: {}", build.build, verdict(build).1)?;
+    }
+    let install = report.to_install();
+    let packages: Vec<&str> = install
+        .iter()
+        .filter_map(|install| match install {
+            Install::Package(package) => Some(package.as_str()),
+            Install::RustTarget(_) => None,
+        })
+        .collect();
+    if !packages.is_empty() {
+        writeln!(out, "   = hint: sudo apt-get install {}", packages.join(" "))?;
+    }
+    for install in install {
+        if let Install::RustTarget(triple) = install {
+            writeln!(out, "   = hint: rustup target add {triple}")?;
         }
     }
+    Ok(out)
 }
 
 fn write_difference(out: &mut String, build: &str, difference: &Difference) -> Result<(), Failure> {

@@ -1,16 +1,17 @@
 //! C99 that also compiles as C90 with `stdint.h` and as C++: one header, one source.
 
-mod statements;
-mod tables;
+mod integer;
+pub(super) mod statements;
+pub(super) mod tables;
 
 use std::collections::BTreeMap;
 
 use templates::Template;
-use templates::c::{Common, Constant, Header, Helpers, Member, PushView, Source};
+use templates::c::{Argmax, Common, Constant, Header, Helpers, Member, NetworkView, PushView, Source};
 
 use crate::backend::{Backend, banner};
 use crate::lower::STATUS;
-use crate::program::{ActivationCode, Coefficient, Op, Program};
+use crate::program::{ActivationCode, Coefficient, NetworkCode, Op, Program};
 use crate::{CodegenError, GeneratedFiles};
 use statements::{Printer, float, unsigned};
 
@@ -19,16 +20,19 @@ pub struct C99;
 
 impl Backend for C99 {
     fn emit(&self, program: &Program) -> Result<GeneratedFiles, CodegenError> {
-        let render = |result: Result<String, templates::Error>| {
-            result
-                .map(|text| tidy(&text))
-                .map_err(|error| CodegenError::Template(error.to_string()))
-        };
         let mut files = BTreeMap::new();
-        files.insert(format!("{}.h", program.name), render(header(program).render())?);
-        files.insert(format!("{}.c", program.name), render(source(program).render())?);
+        files.insert(format!("{}.h", program.name), render(&header(program))?);
+        files.insert(format!("{}.c", program.name), render(&source(program))?);
         Ok(GeneratedFiles { files })
     }
+}
+
+/// The text of a template.
+pub(super) fn render(view: &impl Template) -> Result<String, CodegenError> {
+    let text = view
+        .render()
+        .map_err(|error| CodegenError::Template(error.to_string()))?;
+    Ok(tidy(&text))
 }
 
 /// Optional parts of a template leave runs of empty lines behind; a file ends with one newline.
@@ -63,7 +67,7 @@ fn common(program: &Program) -> Common {
 }
 
 /// Name of a coefficient as parameter; the state member is `mapping_<name>`.
-fn coefficient_name(coefficient: Coefficient) -> &'static str {
+pub(super) fn coefficient_name(coefficient: Coefficient) -> &'static str {
     match coefficient {
         Coefficient::A => "a",
         Coefficient::B => "b",
@@ -167,7 +171,9 @@ fn source(program: &Program) -> Source {
     Source {
         common: common(program),
         tables: tables::tables(program),
-        layers: tables::layers(program),
+        network: network(program),
+        argmax: argmax(program),
+        crc_kinds: tables::crc_kinds(program),
         helpers: helpers(program),
         tanh: tables::tanh_steps(),
         front_members: front_members(program),
@@ -194,6 +200,31 @@ fn source(program: &Program) -> Source {
         integrity: tables::integrity(program),
         crc: unsigned(program.crc),
         self_test: tables::self_test(),
+    }
+}
+
+fn network(program: &Program) -> NetworkView {
+    match &program.network {
+        NetworkCode::Real { fused, layers } => NetworkView::Real(tables::layers(&program.name, layers, *fused)),
+        NetworkCode::Integer(network) => NetworkView::Integer(integer::view(&program.name, network)),
+    }
+}
+
+fn argmax(program: &Program) -> Argmax {
+    let n = &program.name;
+    match program.network {
+        NetworkCode::Real { .. } => Argmax {
+            element: "float",
+            lowest: "-3.40282347e+38f",
+            network: "q_values",
+            select: format!("{n}_select(above, q[action], best)"),
+        },
+        NetworkCode::Integer(_) => Argmax {
+            element: "int32_t",
+            lowest: "(-2147483647 - 1)",
+            network: "network",
+            select: format!("{n}_select_integer(above, q[action], best)"),
+        },
     }
 }
 
@@ -330,15 +361,20 @@ fn helpers(program: &Program) -> Helpers {
         let blocks = [&program.front.block, &program.decide.block, &program.advance.block];
         blocks.into_iter().flat_map(|block| &block.ops)
     };
-    let layers = || program.layers.iter().map(|layer| layer.activation);
-    let tanh = layers().any(|activation| activation == ActivationCode::Tanh);
+    let real = matches!(program.network, NetworkCode::Real { .. });
+    let network = &program.network;
     Helpers {
         within: ops().any(|op| matches!(op, Op::Within { .. })),
         outside: ops().any(|op| matches!(op, Op::Outside { .. })),
         clamp: ops().any(|op| matches!(op, Op::Clamp { .. })),
         line_sum: ops().any(|op| matches!(op, Op::LineSum { .. })),
-        relu: layers().any(|activation| activation == ActivationCode::Relu),
-        leaky_relu: layers().any(|activation| matches!(activation, ActivationCode::LeakyRelu(_))),
-        tanh,
+        relu: real && network.activates(|activation| activation == ActivationCode::Relu),
+        leaky_relu: real && network.activates(|activation| matches!(activation, ActivationCode::LeakyRelu(_))),
+        tanh: network.activates(|activation| activation == ActivationCode::Tanh),
+        assembly: match network {
+            NetworkCode::Real { fused, layers } => layers.iter().any(|layer| tables::has_assembly(layer, *fused)),
+            NetworkCode::Integer(_) => false,
+        },
+        fused: matches!(network, NetworkCode::Real { fused: true, .. }),
     }
 }

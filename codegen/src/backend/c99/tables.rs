@@ -1,23 +1,24 @@
 //! Tables, layers and the data of the checks.
 
-use templates::c::{BlockView, LayerView, Member, SelfTestView, Table};
+use templates::c::{BlockView, CrcItem, CrcKind, LayerView, Member, RealRowView, SelfTestView, Table};
 
+use super::integer;
 use super::statements::{float, unsigned};
+use crate::backend::assembly::RealKernel;
 use crate::crc::nibble_table;
 use crate::lower::known_answers::{LCG, SEED, UNIT, VECTORS};
 use crate::lower::network::{TANH_DENOMINATOR, TANH_NUMERATOR};
-use crate::program::{ActivationCode, LayerCode, Literal, Program};
+use crate::program::{ActivationCode, LayerCode, Literal, NetworkCode, Program};
 
 /// Columns up to which literals of a table are gathered in a line.
 const LINE: usize = 108;
 
 /// All constant tables in the order of the file.
 pub fn tables(program: &Program) -> Vec<Table> {
-    let mut all = Vec::new();
-    for (index, layer) in program.layers.iter().enumerate() {
-        all.push(floats(format!("weights{index}"), &layer.table));
-        all.push(floats(format!("bias{index}"), &layer.bias));
-    }
+    let mut all = match &program.network {
+        NetworkCode::Real { layers, .. } => real_tables(layers),
+        NetworkCode::Integer(network) => integer::tables(network),
+    };
     let duties: Vec<f32> = program.duties.iter().map(|duty| duty.value()).collect();
     all.push(floats("duties".into(), &duties));
     all.push(words("crc_steps", &nibble_table()));
@@ -35,26 +36,40 @@ pub fn tables(program: &Program) -> Vec<Table> {
     all
 }
 
-fn floats(name: String, values: &[f32]) -> Table {
+fn real_tables(layers: &[LayerCode]) -> Vec<Table> {
+    let tables = layers.iter().enumerate().map(|(index, layer)| {
+        [
+            floats(format!("weights{index}"), &layer.table),
+            floats(format!("bias{index}"), &layer.bias),
+        ]
+    });
+    tables.flatten().collect()
+}
+
+/// A table of floats.
+pub fn floats(name: String, values: &[f32]) -> Table {
     Table {
         element: "float",
         name,
         length: values.len(),
         lines: wrap(values.iter().map(|value| float(*value))),
+        aligned: false,
     }
 }
 
-fn words(name: &str, values: &[u32]) -> Table {
+/// A table of 32-bit words.
+pub fn words(name: &str, values: &[u32]) -> Table {
     let literals = values.iter().map(|word| format!("0x{word:08X}u"));
     Table {
         element: "uint32_t",
         name: name.to_owned(),
         length: values.len(),
         lines: wrap(literals),
+        aligned: false,
     }
 }
 
-fn wrap(literals: impl Iterator<Item = String>) -> Vec<String> {
+pub(super) fn wrap(literals: impl Iterator<Item = String>) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for literal in literals {
         match lines.last_mut() {
@@ -70,8 +85,8 @@ fn wrap(literals: impl Iterator<Item = String>) -> Vec<String> {
 }
 
 /// Layers with their loops and buffers.
-pub fn layers(program: &Program) -> Vec<LayerView> {
-    let last = program.layers.len() - 1;
+pub fn layers(name: &str, layers: &[LayerCode], fused: bool) -> Vec<LayerView> {
+    let last = layers.len() - 1;
     let buffer = |index: usize| {
         if index == last {
             "q".to_owned()
@@ -84,8 +99,13 @@ pub fn layers(program: &Program) -> Vec<LayerView> {
         comment: format!("{}: {} -> {}", layer.name, layer.inputs, layer.outputs),
         inputs: layer.inputs,
         outputs: layer.outputs,
-        blocks: blocks(layer),
-        activation: activation(&program.name, layer.activation),
+        in_memory: layer.in_memory,
+        has_loop: layer.full_blocks() > 1,
+        has_assembly: has_assembly(layer, fused),
+        blocks: blocks(name, layer, fused),
+        first: accumulated(name, fused, ["bias[o]", "w[o]", "x[0]"]),
+        next: accumulated(name, fused, ["sum[o]", "column[o]", "input"]),
+        activation: activation(name, layer.activation, "y[o]"),
         source: if index == 0 {
             "observation".to_owned()
         } else {
@@ -94,10 +114,18 @@ pub fn layers(program: &Program) -> Vec<LayerView> {
         sink: buffer(index),
         is_hidden: index != last,
     };
-    program.layers.iter().enumerate().map(view).collect()
+    layers.iter().enumerate().map(view).collect()
 }
 
-fn blocks(layer: &LayerCode) -> Vec<BlockView> {
+fn accumulated(prefix: &str, fused: bool, [sum, weight, input]: [&str; 3]) -> String {
+    if fused {
+        format!("{prefix}_fma({weight}, {input}, {sum})")
+    } else {
+        format!("{sum} + ({weight} * {input})")
+    }
+}
+
+fn blocks(name: &str, layer: &LayerCode, fused: bool) -> Vec<BlockView> {
     let full = layer.full_blocks();
     let rows = layer.block_rows;
     let block = |count, rows, first_output| BlockView {
@@ -105,7 +133,12 @@ fn blocks(layer: &LayerCode) -> Vec<BlockView> {
         rows,
         first_output,
         first_weight: first_output * layer.inputs,
-        stride: rows * layer.inputs,
+        assembly: if has_assembly(layer, fused) {
+            assembly(name, layer, rows)
+        } else {
+            Vec::new()
+        },
+        row_views: (0..rows).map(|index| row(name, layer, index, fused)).collect(),
     };
     let tail = layer.tail_rows();
     let mut views = vec![block(full, rows, 0)];
@@ -115,12 +148,69 @@ fn blocks(layer: &LayerCode) -> Vec<BlockView> {
     views
 }
 
-fn activation(name: &str, activation: ActivationCode) -> String {
+/// Whether the blocks of a layer have a form in assembly.
+pub fn has_assembly(layer: &LayerCode, fused: bool) -> bool {
+    !fused && !layer.in_memory && layer.block_rows <= RealKernel::MAX_HEIGHT
+}
+
+/// One asm statement for a block, then what it leaves of the activation.
+fn assembly(name: &str, layer: &LayerCode, height: usize) -> Vec<String> {
+    let kernel = RealKernel {
+        inputs: layer.inputs,
+        height,
+        relu: layer.activation == ActivationCode::Relu,
+    };
+    let activated = |row: usize| activation(name, layer.activation, &format!("done[{row}]"));
+    let applied = !kernel.relu && !activated(0).is_empty();
+    let mut lines = vec![
+        "const float *input = x;".to_owned(),
+        format!("uint32_t turns = {}u;", kernel.turns()),
+    ];
+    if kernel.relu {
+        lines.push("uint32_t low, high;".to_owned());
+    }
+    if applied {
+        lines.push("float *const done = out;".to_owned());
+    }
+    lines.push("__asm__ volatile(".to_owned());
+    let text = kernel.text(&|operand| format!("%[{operand}]"), &|list| format!("{{{list}}}"));
+    lines.extend(text.iter().map(|line| format!("    \"{line}\\n\\t\"")));
+    let advanced = ["w", "input", "bias", "out", "turns"].map(|name| format!("[{name}] \"+r\"({name})"));
+    let mut outputs = advanced.to_vec();
+    if kernel.relu {
+        outputs.extend(["low", "high"].map(|name| format!("[{name}] \"=&r\"({name})")));
+    }
+    lines.push(format!("    : {}", outputs.join(", ")));
+    lines.push("    :".to_owned());
+    let clobbered = RealKernel::clobbered().into_iter().map(|name| format!("\"{name}\""));
+    let clobbered: Vec<String> = clobbered.collect();
+    lines.push(format!("    : {}, \"cc\", \"memory\");", clobbered.join(", ")));
+    if applied {
+        lines.extend((0..height).map(|row| format!("done[{row}] = {};", activated(row))));
+    }
+    std::iter::once("{".to_owned())
+        .chain(lines.into_iter().map(|line| format!("    {line}")))
+        .chain(["}".to_owned()])
+        .collect()
+}
+
+fn row(name: &str, layer: &LayerCode, index: usize, fused: bool) -> RealRowView {
+    let sum = format!("s{index}");
+    let activated = activation(name, layer.activation, &sum);
+    RealRowView {
+        index,
+        next: accumulated(name, fused, [sum.as_str(), &format!("w[{index}]"), "input"]),
+        result: if activated.is_empty() { sum } else { activated },
+    }
+}
+
+/// Expression of the activation over `x`; empty for none.
+fn activation(name: &str, activation: ActivationCode, x: &str) -> String {
     match activation {
         ActivationCode::Identity => String::new(),
-        ActivationCode::Relu => format!("{name}_relu(y[o])"),
-        ActivationCode::LeakyRelu(slope) => format!("{name}_leaky_relu(y[o], {})", float(slope.value())),
-        ActivationCode::Tanh => format!("{name}_tanh(y[o])"),
+        ActivationCode::Relu => format!("{name}_relu({x})"),
+        ActivationCode::LeakyRelu(slope) => format!("{name}_leaky_relu({x}, {})", float(slope.value())),
+        ActivationCode::Tanh => format!("{name}_tanh({x})"),
     }
 }
 
@@ -143,14 +233,54 @@ pub fn tanh_steps() -> Vec<Member> {
 }
 
 /// Tables that the CRC covers, in the order of [`Program::table_words`].
-pub fn integrity(program: &Program) -> Vec<(String, usize)> {
-    let mut items = Vec::new();
-    for (index, layer) in program.layers.iter().enumerate() {
-        items.push((format!("weights{index}"), layer.table.len()));
-        items.push((format!("bias{index}"), layer.bias.len()));
-    }
-    items.push(("duties".into(), program.duties.len()));
+pub fn integrity(program: &Program) -> Vec<CrcItem> {
+    let (weights, bias) = match program.network {
+        NetworkCode::Real { .. } => ("crc", "crc"),
+        NetworkCode::Integer(_) => ("crc_weights", "crc_bias"),
+    };
+    let mut items: Vec<CrcItem> = tables(program)
+        .into_iter()
+        .filter_map(|table| {
+            let function = if table.name.starts_with("weights") {
+                weights
+            } else if table.name.starts_with("bias") {
+                bias
+            } else {
+                return None;
+            };
+            Some(CrcItem {
+                function,
+                table: table.name,
+                length: table.length,
+            })
+        })
+        .collect();
+    items.push(CrcItem {
+        function: "crc",
+        table: "duties".into(),
+        length: program.duties.len(),
+    });
     items
+}
+
+/// CRC functions that [`integrity`] and the self test call.
+pub fn crc_kinds(program: &Program) -> Vec<CrcKind> {
+    let mut kinds = vec![CrcKind {
+        name: "crc",
+        element: "float",
+        word: format!("{}_bits(words[i])", program.name),
+    }];
+    if let NetworkCode::Integer(network) = &program.network {
+        let word = "(uint32_t)(int32_t)words[i]";
+        for (name, element) in [("crc_weights", integer::element(network)), ("crc_bias", "int32_t")] {
+            kinds.push(CrcKind {
+                name,
+                element,
+                word: word.into(),
+            });
+        }
+    }
+    kinds
 }
 
 /// Constants of the self test.

@@ -22,6 +22,7 @@ pub fn items(program: &Program, name: &Ident) -> TokenStream {
     let advance = advance(program);
     let set_mapping = set_mapping(program);
     let checks = checks(program);
+    let q_values = network::q_values(program);
     quote! {
         /// One controller: a policy with the memory of its filters. Several instances are independent.
         #[derive(Clone)]
@@ -59,7 +60,7 @@ pub fn items(program: &Program, name: &Ident) -> TokenStream {
             /// Q values of an observation.
             #[must_use]
             pub fn q_values(observation: &[f32; FEATURES]) -> [f32; ACTIONS] {
-                network(observation)
+                #q_values
             }
             #set_mapping
             #sense
@@ -269,11 +270,12 @@ fn decide(program: &Program) -> TokenStream {
         quote!((#flag << #bit))
     });
     let fallback = float(program.fallback_duty.value());
+    let (lowest, greater) = network::argmax(program);
     quote! {
         /// Network, argmax, mapping, limits, status.
         #[inline(always)]
         fn decide(&self, front: &Front) -> Command {
-            let mut best = f32::MIN;
+            let mut best = #lowest;
             let mut chosen = DUTIES[0];
             let mut action_index = 0_u32;
             let mut action = 0_u32;
@@ -281,7 +283,7 @@ fn decide(program: &Program) -> TokenStream {
             for (q, duty) in network(&front.observation).iter().zip(&DUTIES) {
                 let above = flag(*q > best);
                 let mask = 0_u32.wrapping_sub(above);
-                best = select(above, *q, best);
+                best = #greater(above, *q, best);
                 chosen = select(above, *duty, chosen);
                 action_index = (action & mask) | (action_index & !mask);
                 action = action.wrapping_add(1);
@@ -406,7 +408,7 @@ fn checks(program: &Program) -> TokenStream {
                     random = random.wrapping_mul(#multiplier).wrapping_add(#increment);
                     *value = *low + *width * ((random >> 8) as f32 * #unit);
                 }
-                let crc = !crc_floats(u32::MAX, &network(&observation));
+                let crc = !crc_floats(u32::MAX, &Self::q_values(&observation));
                 if failed == 0 && crc != *answer {
                     failed = vector;
                 }

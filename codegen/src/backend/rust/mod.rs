@@ -1,6 +1,7 @@
 //! `no_std` Rust without unsafe code, from `quote`: tokens for the macro, formatted text for the command line.
 
 mod controller;
+mod integer;
 mod network;
 mod statements;
 

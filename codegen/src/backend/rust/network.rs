@@ -3,34 +3,70 @@
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use super::{float, ident, size};
+use super::{float, ident, integer, size};
 use crate::lower::network::{TANH_DENOMINATOR, TANH_NUMERATOR};
-use crate::program::{ActivationCode, LayerCode, Program};
+use crate::program::{ActivationCode, LayerCode, NetworkCode, Program};
 
 /// Everything between observation and Q values.
 pub fn items(program: &Program) -> TokenStream {
-    let layers = program
-        .layers
-        .iter()
-        .enumerate()
-        .map(|(index, layer)| layer_items(index, layer));
     let duties = program.duties.iter().map(|duty| float(duty.value()));
     let tanh = program
-        .layers
-        .iter()
-        .any(|layer| layer.activation == ActivationCode::Tanh)
+        .network
+        .activates(|activation| activation == ActivationCode::Tanh)
         .then(tanh);
-    let mut value = quote!(observation);
+    let network = match &program.network {
+        NetworkCode::Real { fused, layers } => real(layers, *fused),
+        NetworkCode::Integer(network) => integer::items(network),
+    };
+    quote! {
+        static DUTIES: [f32; ACTIONS] = [#(#duties),*];
+        #tanh
+        #network
+    }
+}
+
+/// What argmax compares: type, value below all others, name of the selection.
+pub fn argmax(program: &Program) -> (TokenStream, TokenStream) {
+    match program.network {
+        NetworkCode::Real { .. } => (quote!(f32::MIN), quote!(select)),
+        NetworkCode::Integer(_) => (quote!(i32::MIN), quote!(select_integer)),
+    }
+}
+
+/// Body of `q_values`.
+pub fn q_values(program: &Program) -> TokenStream {
+    match &program.network {
+        NetworkCode::Real { .. } => quote!(network(observation)),
+        NetworkCode::Integer(network) => integer::q_values(network),
+    }
+}
+
+/// Calls of the layers one after the other, from `value` to the result.
+pub fn calls(layers: usize, mut value: TokenStream) -> TokenStream {
     let mut calls = Vec::new();
-    for index in 0..program.layers.len() {
+    for index in 0..layers {
         let (layer, sink) = (ident(&format!("layer{index}")), ident(&format!("hidden{index}")));
         calls.push(quote! { let #sink = #layer(#value); });
         value = quote!(&#sink);
     }
-    let last = ident(&format!("hidden{}", program.layers.len() - 1));
+    let last = ident(&format!("hidden{}", layers - 1));
+    quote! { #(#calls)* #last }
+}
+
+fn real(layers: &[LayerCode], fused: bool) -> TokenStream {
+    let calls = calls(layers.len(), quote!(observation));
+    let items = layers
+        .iter()
+        .enumerate()
+        .map(|(index, layer)| layer_items(index, layer));
+    let fma = fused.then(fma);
+    let accumulate = if fused {
+        quote!(*sum = fma(*weight, *x, *sum);)
+    } else {
+        quote!(*sum += *weight * *x;)
+    };
     quote! {
-        static DUTIES: [f32; ACTIONS] = [#(#duties),*];
-        #tanh
+        #fma
         /// Sums of one block of outputs: from the bias, inputs in index order, every operation rounded.
         #[inline(always)]
         fn block<const INPUTS: usize, const ROWS: usize>(
@@ -41,15 +77,30 @@ pub fn items(program: &Program) -> TokenStream {
             let mut sums = *bias;
             for (column, x) in weights.iter().zip(x) {
                 for (sum, weight) in sums.iter_mut().zip(column) {
-                    *sum += *weight * *x;
+                    #accumulate
                 }
             }
             sums
         }
-        #(#layers)*
+        #(#items)*
         fn network(observation: &[f32; FEATURES]) -> [f32; ACTIONS] {
-            #(#calls)*
-            #last
+            #calls
+        }
+    }
+}
+
+fn fma() -> TokenStream {
+    quote! {
+        /// x * y + z, rounded once: `core` has no fused multiply-add, so through binary64 rounded to odd.
+        #[inline(always)]
+        fn fma(x: f32, y: f32, z: f32) -> f32 {
+            let (product, z) = (f64::from(x) * f64::from(y), f64::from(z));
+            let sum = product + z;
+            let back = sum - product;
+            let error = (product - (sum - back)) + (z - back);
+            let odd = (u64::from(error < 0.0) | u64::from(error > 0.0)) & !sum.to_bits();
+            let towards = 1_u64.wrapping_sub(((error.to_bits() ^ sum.to_bits()) >> 63) << 1);
+            f64::from_bits(sum.to_bits().wrapping_add(odd.wrapping_mul(towards))) as f32
         }
     }
 }
@@ -173,25 +224,36 @@ fn tanh() -> TokenStream {
 /// Statements of the integrity check: every table in the order of [`Program::table_words`]. `black_box`: the memory is
 /// read, the compiler does not answer in its place.
 pub fn integrity(program: &Program) -> TokenStream {
-    let layers = program.layers.iter().enumerate().map(|(index, layer)| {
-        let (weights, bias) = (ident(&format!("WEIGHTS{index}")), ident(&format!("BIAS{index}")));
-        let (tail_weights, tail_bias) = (
-            ident(&format!("TAIL_WEIGHTS{index}")),
-            ident(&format!("TAIL_BIAS{index}")),
-        );
-        let full_weights = quote! {
-            for column in core::hint::black_box(&#weights).iter().flatten() { crc = crc_floats(crc, column); }
-        };
-        let full_bias = quote! { for row in core::hint::black_box(&#bias) { crc = crc_floats(crc, row); } };
-        if layer.tail_rows() == 0 {
-            return quote! { #full_weights #full_bias };
+    let network = match &program.network {
+        NetworkCode::Real { layers, .. } => {
+            let layers = layers
+                .iter()
+                .enumerate()
+                .map(|(index, layer)| layer_integrity(index, layer.tail_rows() > 0));
+            quote!(#(#layers)*)
         }
-        quote! {
-            #full_weights
-            for column in core::hint::black_box(&#tail_weights) { crc = crc_floats(crc, column); }
-            #full_bias
-            crc = crc_floats(crc, core::hint::black_box(&#tail_bias));
-        }
-    });
-    quote! { #(#layers)* crc = crc_floats(crc, core::hint::black_box(&DUTIES)); }
+        NetworkCode::Integer(network) => integer::integrity(network),
+    };
+    quote! { #network crc = crc_floats(crc, core::hint::black_box(&DUTIES)); }
+}
+
+fn layer_integrity(index: usize, has_tail: bool) -> TokenStream {
+    let (weights, bias) = (ident(&format!("WEIGHTS{index}")), ident(&format!("BIAS{index}")));
+    let (tail_weights, tail_bias) = (
+        ident(&format!("TAIL_WEIGHTS{index}")),
+        ident(&format!("TAIL_BIAS{index}")),
+    );
+    let full_weights = quote! {
+        for column in core::hint::black_box(&#weights).iter().flatten() { crc = crc_floats(crc, column); }
+    };
+    let full_bias = quote! { for row in core::hint::black_box(&#bias) { crc = crc_floats(crc, row); } };
+    if !has_tail {
+        return quote! { #full_weights #full_bias };
+    }
+    quote! {
+        #full_weights
+        for column in core::hint::black_box(&#tail_weights) { crc = crc_floats(crc, column); }
+        #full_bias
+        crc = crc_floats(crc, core::hint::black_box(&#tail_bias));
+    }
 }

@@ -190,7 +190,7 @@ static float activations_clamp(float x, float low, float high)
 static float activations_relu(float x)
 {
     const uint32_t bits = activations_bits(x);
-    return activations_from_bits(bits & ((bits >> 31) - (uint32_t)1));
+    return activations_from_bits(bits & ~((uint32_t)0 - (bits >> 31)));
 }
 
 static float activations_leaky_relu(float x, float slope)
@@ -390,7 +390,6 @@ ACTIVATIONS_CODE void activations_q_values(const float *observation, float *q)
     activations_layer3(hidden2, hidden3);
     activations_layer4(hidden3, q);
 }
-
 /* Network, argmax, mapping, limits, status. */
 ACTIVATIONS_CODE static void activations_decide(const activations_state *state, const activations_front *front, activations_command *command)
 {

@@ -323,7 +323,6 @@ ADC_MAPPING_CODE void adc_mapping_q_values(const float *observation, float *q)
     adc_mapping_layer1(hidden0, hidden1);
     adc_mapping_layer2(hidden1, q);
 }
-
 /* Network, argmax, mapping, limits, status. */
 ADC_MAPPING_CODE static void adc_mapping_decide(const adc_mapping_state *state, const adc_mapping_front *front, adc_mapping_command *command)
 {

@@ -184,7 +184,7 @@ static float filters_line_sum(const float *line, uint32_t length, float newest, 
 static float filters_relu(float x)
 {
     const uint32_t bits = filters_bits(x);
-    return filters_from_bits(bits & ((bits >> 31) - (uint32_t)1));
+    return filters_from_bits(bits & ~((uint32_t)0 - (bits >> 31)));
 }
 
 /* What a measurement means before the network sees it. */
@@ -369,7 +369,6 @@ FILTERS_CODE void filters_q_values(const float *observation, float *q)
     filters_layer1(hidden0, hidden1);
     filters_layer2(hidden1, q);
 }
-
 /* Network, argmax, mapping, limits, status. */
 FILTERS_CODE static void filters_decide(const filters_state *state, const filters_front *front, filters_command *command)
 {

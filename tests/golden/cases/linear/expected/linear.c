@@ -208,7 +208,6 @@ LINEAR_CODE void linear_q_values(const float *observation, float *q)
 {
     linear_layer0(observation, q);
 }
-
 /* Network, argmax, mapping, limits, status. */
 LINEAR_CODE static void linear_decide(const linear_state *state, const linear_front *front, linear_command *command)
 {

@@ -158,7 +158,7 @@ static float minimal_clamp(float x, float low, float high)
 static float minimal_relu(float x)
 {
     const uint32_t bits = minimal_bits(x);
-    return minimal_from_bits(bits & ((bits >> 31) - (uint32_t)1));
+    return minimal_from_bits(bits & ~((uint32_t)0 - (bits >> 31)));
 }
 
 /* What a measurement means before the network sees it. */
@@ -247,7 +247,6 @@ MINIMAL_CODE void minimal_q_values(const float *observation, float *q)
     minimal_layer0(observation, hidden0);
     minimal_layer1(hidden0, q);
 }
-
 /* Network, argmax, mapping, limits, status. */
 MINIMAL_CODE static void minimal_decide(const minimal_state *state, const minimal_front *front, minimal_command *command)
 {

@@ -175,7 +175,7 @@ static float paper_clamp(float x, float low, float high)
 static float paper_relu(float x)
 {
     const uint32_t bits = paper_bits(x);
-    return paper_from_bits(bits & ((bits >> 31) - (uint32_t)1));
+    return paper_from_bits(bits & ~((uint32_t)0 - (bits >> 31)));
 }
 
 /* What a measurement means before the network sees it. */
@@ -334,7 +334,6 @@ PAPER_CODE void paper_q_values(const float *observation, float *q)
     paper_layer1(hidden0, hidden1);
     paper_layer2(hidden1, q);
 }
-
 /* Network, argmax, mapping, limits, status. */
 PAPER_CODE static void paper_decide(const paper_state *state, const paper_front *front, paper_command *command)
 {

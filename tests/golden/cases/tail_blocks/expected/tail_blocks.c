@@ -263,7 +263,7 @@ static float tail_blocks_clamp(float x, float low, float high)
 static float tail_blocks_relu(float x)
 {
     const uint32_t bits = tail_blocks_bits(x);
-    return tail_blocks_from_bits(bits & ((bits >> 31) - (uint32_t)1));
+    return tail_blocks_from_bits(bits & ~((uint32_t)0 - (bits >> 31)));
 }
 
 /* What a measurement means before the network sees it. */
@@ -364,7 +364,6 @@ TAIL_BLOCKS_CODE void tail_blocks_q_values(const float *observation, float *q)
     tail_blocks_layer0(observation, hidden0);
     tail_blocks_layer1(hidden0, q);
 }
-
 /* Network, argmax, mapping, limits, status. */
 TAIL_BLOCKS_CODE static void tail_blocks_decide(const tail_blocks_state *state, const tail_blocks_front *front, tail_blocks_command *command)
 {

@@ -1,0 +1,258 @@
+//! Programs around the code that is counted: 64 observations, then 64 steps, then a few words to the host.
+
+use std::fmt::Write;
+
+use policy::Policy;
+
+/// Observations and steps per program.
+pub const CALLS: usize = 64;
+
+/// Program in C for a board.
+pub fn c(policy: &Policy) -> String {
+    let name = &policy.name;
+    let (features, actions) = (policy.features.len(), policy.actions.len());
+    let mut fields = String::new();
+    for signal in &policy.signals {
+        let kind = if signal.adc.is_some() { "int32_t" } else { "float" };
+        // writing to a String cannot fail
+        let _ = write!(fields, "m.{} = ({kind})draw(0.0f, 60.0f); ", signal.name);
+    }
+    format!(
+        r#"#include "board.h"
+#include "{name}.h"
+static float o[{features}], q[{actions}];
+static {name}_state s;
+static {name}_measurement m;
+static {name}_command c;
+{C_HELPERS}
+int main(void)
+{{
+    uint32_t out[3], depth = 0u;
+    int i, k;
+    for (k = 0; k < {CALLS}; ++k) {{
+        for (i = 0; i < {features}; ++i) {{ o[i] = draw(-1.0f, 1.0f); }}
+        count_begin(); {name}_q_values(o, q); count_end();
+        for (i = 0; i < {actions}; ++i) {{ add(q[i]); }}
+    }}
+    {name}_init(&s);
+    for (k = 0; k < {CALLS}; ++k) {{
+        {fields}
+        stack_paint();
+        count_begin(); {name}_step(&s, &m, &c); count_end();
+        depth = stack_depth();
+    }}
+    out[0] = {name}_self_test(); out[1] = crc; out[2] = depth;
+    words_put(out, 3u); words_flush();
+    return 0;
+}}
+"#
+    )
+}
+
+const C_HELPERS: &str = r#"static uint32_t random = 1u, crc = 0xFFFFFFFFu;
+static float draw(float low, float high)
+{
+    random = random * 1664525u + 1013904223u;
+    return low + (high - low) * ((float)(random >> 8) / 16777216.0f);
+}
+static void add(float x)
+{
+    uint32_t bits;
+    int i;
+    __builtin_memcpy(&bits, &x, 4u);
+    crc ^= bits;
+    for (i = 0; i < 32; ++i) { crc = (crc >> 1) ^ (0xEDB88320u & (0u - (crc & 1u))); }
+}
+"#;
+
+/// The network as most people write it, with the functions of a controller that [`c`] calls; row-major weights.
+pub fn naive(policy: &Policy) -> (String, String) {
+    let header = "#ifndef NAIVE_H\n#define NAIVE_H\nvoid naive_q_values(const float *o, float *q);\n#endif\n";
+    let mut text = String::from("#include \"naive.h\"\n");
+    let row = |values: &[f32]| {
+        let values: Vec<String> = values.iter().map(|value| format!("{value:e}f")).collect();
+        values.join(", ")
+    };
+    let mut calls = String::new();
+    let mut source = "o".to_owned();
+    for (index, layer) in policy.layers.iter().enumerate() {
+        let last = index + 1 == policy.layers.len();
+        let sink = if last { "q".to_owned() } else { format!("h{index}") };
+        let (inputs, outputs) = (layer.inputs, layer.outputs);
+        let activated = if last { "sum" } else { "sum > 0.0f ? sum : 0.0f" };
+        let _ = writeln!(
+            text,
+            "static const float w{index}[{outputs}][{inputs}] = {{ {} }};\nstatic const float b{index}[{outputs}] = {{ {} }};",
+            layer
+                .weights
+                .chunks(inputs)
+                .map(|weights| format!("{{ {} }}", row(weights)))
+                .collect::<Vec<_>>()
+                .join(", "),
+            row(&layer.bias)
+        );
+        if !last {
+            let _ = writeln!(calls, "    float {sink}[{outputs}];");
+        }
+        let _ = writeln!(
+            calls,
+            "    for (int r = 0; r < {outputs}; ++r) {{ float sum = b{index}[r]; \
+             for (int i = 0; i < {inputs}; ++i) {{ sum += w{index}[r][i] * {source}[i]; }} {sink}[r] = {activated}; }}"
+        );
+        source = sink;
+    }
+    let _ = writeln!(text, "void naive_q_values(const float *o, float *q)\n{{\n{calls}}}");
+    (header.to_owned(), text)
+}
+
+/// Program in C for a board around [`naive`].
+pub fn naive_main(policy: &Policy) -> String {
+    let (features, actions) = (policy.features.len(), policy.actions.len());
+    format!(
+        r#"#include "board.h"
+#include "naive.h"
+static float o[{features}], q[{actions}];
+{C_HELPERS}
+int main(void)
+{{
+    uint32_t out[3], depth = 0u;
+    int i, k;
+    for (k = 0; k < 2 * {CALLS}; ++k) {{
+        for (i = 0; i < {features}; ++i) {{ o[i] = draw(-1.0f, 1.0f); }}
+        stack_paint();
+        count_begin(); naive_q_values(o, q); count_end();
+        depth = stack_depth();
+        if (k < {CALLS}) {{ for (i = 0; i < {actions}; ++i) {{ add(q[i]); }} }}
+    }}
+    out[0] = 0u; out[1] = crc; out[2] = depth;
+    words_put(out, 3u); words_flush();
+    return 0;
+}}
+"#
+    )
+}
+
+/// Library in Rust with the same `main` for a board.
+pub fn rust(policy: &Policy) -> String {
+    let name = &policy.name;
+    let (features, actions) = (policy.features.len(), policy.actions.len());
+    let fields: Vec<String> = policy
+        .signals
+        .iter()
+        .map(|signal| {
+            let kind = if signal.adc.is_some() { "i32" } else { "f32" };
+            format!("{}: draw(&mut random, 0.0, 60.0) as {kind}", signal.name)
+        })
+        .collect();
+    let fields = fields.join(", ");
+    format!(
+        r#"#![no_std]
+#[path = "{name}.rs"]
+#[allow(dead_code)]
+mod {name};
+use {name}::{{Controller, Measurement}};
+use core::hint::black_box;
+extern "C" {{
+    fn count_begin();
+    fn count_end();
+    fn words_put(words: *const u32, count: usize);
+    fn words_flush();
+    fn stack_paint();
+    fn stack_depth() -> u32;
+    fn board_exit(code: i32);
+}}
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo) -> ! {{
+    unsafe {{ board_exit(9) }}
+    loop {{}}
+}}
+#[inline(never)]
+fn q_values(o: &[f32; {features}]) -> [f32; {actions}] {{
+    Controller::q_values(o)
+}}
+fn draw(random: &mut u32, low: f32, high: f32) -> f32 {{
+    *random = random.wrapping_mul(1664525).wrapping_add(1013904223);
+    low + (high - low) * ((*random >> 8) as f32 / 16777216.0)
+}}
+#[no_mangle]
+pub extern "C" fn main() -> i32 {{
+    let mut random = 1u32;
+    let mut crc = !0u32;
+    for _ in 0..{CALLS} {{
+        let mut o = [0f32; {features}];
+        for x in &mut o {{ *x = draw(&mut random, -1.0, 1.0); }}
+        unsafe {{ count_begin() }};
+        let q = q_values(black_box(&o));
+        unsafe {{ count_end() }};
+        for x in &q {{
+            crc ^= x.to_bits();
+            for _ in 0..32 {{ crc = (crc >> 1) ^ (0xEDB88320 & 0u32.wrapping_sub(crc & 1)); }}
+        }}
+    }}
+    let mut controller = Controller::new();
+    let mut depth = 0;
+    for _ in 0..{CALLS} {{
+        let m = Measurement {{ {fields} }};
+        unsafe {{ stack_paint(); count_begin() }};
+        black_box(controller.step(black_box(&m)));
+        unsafe {{ count_end(); depth = stack_depth() }};
+    }}
+    let out = [Controller::self_test().err().unwrap_or(0), crc, depth];
+    unsafe {{ words_put(out.as_ptr(), 3); words_flush() }};
+    0
+}}
+"#
+    )
+}
+
+/// Program for the host: times ours and the naive loop in turns, prints the ratio of the shortest times.
+pub fn host(policy: &Policy) -> String {
+    let name = &policy.name;
+    let (features, actions) = (policy.features.len(), policy.actions.len());
+    format!(
+        r#"#define _POSIX_C_SOURCE 199309L
+#include <stdio.h>
+#include <stdint.h>
+#include <time.h>
+#include "naive.h"
+void {name}_q_values(const float *observation, float *q);
+static float o[256][{features}], q[{actions}];
+static double now(void) {{ struct timespec t; clock_gettime(CLOCK_MONOTONIC, &t); return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec; }}
+{C_HELPERS}
+int main(void)
+{{
+    double best[2] = {{ 1e9, 1e9 }};
+    int turn, k, i;
+    for (k = 0; k < 256; ++k) {{ for (i = 0; i < {features}; ++i) {{ o[k][i] = draw(-1.0f, 1.0f); }} }}
+    for (turn = 0; turn < 400; ++turn) {{
+        double start = now(), middle, end;
+        for (k = 0; k < 256; ++k) {{ naive_q_values(o[k], q); __asm__ volatile("" : : "r"(q) : "memory"); }}
+        middle = now();
+        for (k = 0; k < 256; ++k) {{ {name}_q_values(o[k], q); __asm__ volatile("" : : "r"(q) : "memory"); }}
+        end = now();
+        if (middle - start < best[0]) {{ best[0] = middle - start; }}
+        if (end - middle < best[1]) {{ best[1] = end - middle; }}
+    }}
+    for (k = 0; k < 64; ++k) {{ {name}_q_values(o[k], q); for (i = 0; i < {actions}; ++i) {{ add(q[i]); }} }}
+    printf("%.6f %08x\n", best[1] / best[0], (unsigned)crc);
+    return 0;
+}}
+"#
+    )
+}
+
+/// The Rust controller as a C function for [`host`].
+pub fn host_rust(policy: &Policy) -> String {
+    let name = &policy.name;
+    let (features, actions) = (policy.features.len(), policy.actions.len());
+    format!(
+        r#"#[path = "{name}.rs"]
+#[allow(dead_code)]
+mod {name};
+#[no_mangle]
+pub unsafe extern "C" fn {name}_q_values(o: *const [f32; {features}], q: *mut [f32; {actions}]) {{
+    *q = {name}::Controller::q_values(&*o);
+}}
+"#
+    )
+}

@@ -1,0 +1,136 @@
+//! Rows and their text.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use serde::Serialize;
+
+use crate::build::Failure;
+
+/// One measured line.
+#[derive(Debug, Clone, Serialize)]
+pub struct Row {
+    /// Policy.
+    pub policy: String,
+    /// Processor.
+    pub core: String,
+    /// Compiler with its level.
+    pub compiler: String,
+    /// Numeric format or what the code is.
+    pub variant: String,
+    /// Fewest and most instructions of `q_values` over 64 observations.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub q_values: Option<(u64, u64)>,
+    /// Fewest and most instructions of a whole step.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub step: Option<(u64, u64)>,
+    /// Bytes of code and tables of the whole controller with all its functions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub flash: Option<u64>,
+    /// Bytes of stack of a step.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stack: Option<u64>,
+    /// CRC-32 over the Q values' bits: one per policy and format.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub checksum: Option<String>,
+    /// Time as a ratio to the naive loop in the same run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time_ratio: Option<f64>,
+}
+
+/// Equal policies in equal formats have given equal bits, on every core, in every language, portable or not.
+///
+/// # Errors
+/// The rows that differ.
+pub fn one_checksum_per_format(rows: &[Row]) -> Result<(), Failure> {
+    let ours = rows.iter().filter(|row| !row.variant.starts_with("naive"));
+    let mut known: BTreeMap<(&str, &str), &Row> = BTreeMap::new();
+    for row in ours {
+        let format = row.variant.split(',').next().unwrap_or_default();
+        let first = known.entry((row.policy.as_str(), format)).or_insert(row);
+        if first.checksum != row.checksum {
+            return Err(Failure(format!("the bits differ:\n{first:?}\n{row:?}")));
+        }
+    }
+    Ok(())
+}
+
+/// JSON, or a Markdown table.
+///
+/// # Errors
+/// If the rows cannot be written as JSON.
+pub fn text(rows: &[Row], json: bool) -> Result<String, Failure> {
+    if json {
+        let text = serde_json::to_string_pretty(rows).map_err(|error| Failure(error.to_string()))?;
+        return Ok(text + "\n");
+    }
+    let mut text = String::from(
+        "| policy | core | compiler | variant | q_values | step | flash B | stack B | checksum | time / naive |\n\
+         |---|---|---|---|---|---|---|---|---|---|\n",
+    );
+    for row in rows {
+        let number = |value: Option<u64>| value.map(|value| value.to_string()).unwrap_or_default();
+        // writing to a String cannot fail
+        let _ = writeln!(
+            text,
+            "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+            row.policy,
+            row.core,
+            row.compiler,
+            row.variant,
+            range(row.q_values),
+            range(row.step),
+            number(row.flash),
+            number(row.stack),
+            row.checksum.as_deref().unwrap_or_default(),
+            row.time_ratio.map(|ratio| format!("{ratio:.3}")).unwrap_or_default()
+        );
+    }
+    Ok(text)
+}
+
+fn range(counts: Option<(u64, u64)>) -> String {
+    match counts {
+        None => String::new(),
+        Some((low, high)) if low == high => low.to_string(),
+        Some((low, high)) => format!("{low}..{high}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(variant: &str, checksum: &str) -> Row {
+        Row {
+            policy: "bench".into(),
+            core: "m".into(),
+            compiler: "c".into(),
+            variant: variant.into(),
+            q_values: Some((7, 9)),
+            step: Some((8, 8)),
+            flash: None,
+            stack: None,
+            checksum: Some(checksum.into()),
+            time_ratio: None,
+        }
+    }
+
+    #[test]
+    fn other_bits_in_the_same_format_are_an_error() {
+        let equal = [
+            row("i16", "a"),
+            row("i16, assembly", "a"),
+            row("i8", "b"),
+            row("naive C", "c"),
+        ];
+        assert!(one_checksum_per_format(&equal).is_ok());
+        assert!(one_checksum_per_format(&[row("i16", "a"), row("i16, assembly", "b")]).is_err());
+    }
+
+    #[test]
+    fn a_count_that_varies_is_shown_as_a_range() {
+        let text = text(&[row("i16", "a")], false).unwrap_or_default();
+        assert!(text.contains("| 7..9 | 8 |"), "{text}");
+    }
+}

@@ -1,0 +1,85 @@
+//! What a control step costs on the target, measured under its emulator after `compile`.
+
+use ::targets::TargetSpec;
+use codegen::Language;
+use policy::Policy;
+use verify::Files;
+use verify::measure::{Costs, usual_builds};
+
+use super::verify::missing_text;
+use super::{bytes, grouped};
+use crate::{Failure, output};
+
+/// Costs of the builds that could be made here, and what was not possible.
+#[derive(Default)]
+pub struct Measured {
+    pub costs: Vec<Costs>,
+    notes: Vec<String>,
+}
+
+impl Measured {
+    /// Builds and runs the files. The report is an extra: that it cannot be made is a note, not a failure.
+    pub fn of(policy: &Policy, target: &TargetSpec, languages: &[Language], files: &Files) -> Self {
+        match usual_builds(policy, target, files, languages) {
+            Ok((costs, missing)) => Self {
+                costs,
+                notes: missing
+                    .iter()
+                    .map(|missing| format!("costs on {} not measured: {}", target.name, missing_text(missing)))
+                    .collect(),
+            },
+            Err(error) => Self {
+                costs: Vec::new(),
+                notes: vec![format!("costs on {} not measured: {error}", target.name)],
+            },
+        }
+    }
+
+    /// Prints a block per build.
+    pub fn say(&self, policy: &Policy, target: &TargetSpec) -> Result<(), Failure> {
+        for costs in &self.costs {
+            output::say(&text(costs, policy, target))?;
+        }
+        for note in &self.notes {
+            output::say(&format!("note: {note}"))?;
+        }
+        Ok(())
+    }
+}
+
+fn text(costs: &Costs, policy: &Policy, target: &TargetSpec) -> String {
+    let (fewest, most) = (costs.instructions_min, costs.instructions_max);
+    let instructions = if fewest == most {
+        format!("{} for every input", grouped(most))
+    } else {
+        format!("{} to {}, depends on the input", grouped(fewest), grouped(most))
+    };
+    let mut lines = vec![
+        format!("{} on {}", costs.build, target.name),
+        format!(
+            "  flash {}, static RAM {}, stack {} (painted under the emulator)",
+            bytes(costs.flash_bytes as usize),
+            bytes(costs.static_ram_bytes as usize),
+            bytes(costs.stack_bytes as usize)
+        ),
+        format!("  instructions per step: {instructions} (counted under the emulator)"),
+    ];
+    if let Some((least, most)) = costs.model_cycles {
+        let mut line = format!(
+            "  model, not measured: {} to {} cycles at 0 wait states",
+            grouped(least),
+            grouped(most)
+        );
+        if let Some(clock) = target.clock_hz {
+            let share = |cycles: u64| 100.0 * cycles as f64 / f64::from(clock) / policy.sample_period;
+            line += &format!(
+                ", {:.0} to {:.0} % of the control period at {} MHz",
+                share(least),
+                share(most),
+                clock / 1_000_000
+            );
+        }
+        lines.push(line);
+    }
+    lines.join("\n")
+}

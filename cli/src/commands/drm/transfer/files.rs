@@ -1,0 +1,226 @@
+//! What a transfer leaves behind.
+
+use std::collections::BTreeMap;
+
+use closed_loop::scenario::{Metrics, SETTLED};
+use closed_loop::{LoadStep, MetricsCsv, comparison};
+use report::{Cell, Page, Section, Table, Verdict};
+
+use super::{Findings, Real, Run, pictures, runs};
+use crate::Failure;
+use crate::commands::drm::bench::Simulator;
+
+/// The page with everything on it.
+pub const PAGE: &str = "report.html";
+
+/// Name and text of every file.
+pub fn all(found: &Findings) -> Result<BTreeMap<String, String>, Failure> {
+    let mut files = BTreeMap::new();
+    let mut metrics = MetricsCsv::default();
+    add(&mut metrics, found.simulation.name, &found.simulation);
+    let sentence = sentence(found);
+    let mut page = Page::new(format!("Transfer of {}", found.setting.policy.name))
+        .verdict(Verdict::Note, sentence)
+        .section(Section::new("").text(explanation(found)).table(overview(found)));
+    for real in &found.real {
+        let name = &real.name;
+        files.insert(format!("{name}-points.csv"), real.points.clone());
+        files.insert(format!("{name}-drm.toml"), real.report.fit.map.to_toml(""));
+        let text = drm::text(&real.report)?;
+        let mut section = Section::new(name.as_str());
+        for run in &real.runs {
+            add(&mut metrics, &format!("{name}: {}", run.name), run);
+        }
+        for note in &real.notes {
+            section = section.text(format!("Note: {note}."));
+        }
+        for remark in &real.remarks {
+            section = section.text(format!("No mapping repairs: {remark}."));
+        }
+        for (index, course) in found.simulation.courses.iter().enumerate() {
+            let picture = pictures::picture(found, real, index)?;
+            files.insert(format!("{name}-{}.svg", stem(course.step)), picture.as_str().to_owned());
+            section = section.chart(picture, CAPTION).table(table(found, real, index));
+        }
+        page = page.section(section.details(Section::new("Fit").code(text)));
+    }
+    files.insert("metrics.csv".to_owned(), metrics.finish());
+    files.insert("summary.txt".to_owned(), summary(found));
+    files.insert(PAGE.to_owned(), page.html()?);
+    Ok(files)
+}
+
+const CAPTION: &str =
+    "The first sampling instant; voltages are samples, one per control period. The table is of all instants.";
+
+fn add(metrics: &mut MetricsCsv, name: &str, run: &Run) {
+    for course in &run.courses {
+        metrics.controller(name, &course.finding);
+    }
+}
+
+/// Start of the names of a load step's files: `200-500W`.
+fn stem(step: LoadStep) -> String {
+    let [from, to] = step.values;
+    format!("{from}-{to}{}", step.kind.unit())
+}
+
+/// The runs at a converter, that in simulation first.
+fn rows<'a>(found: &'a Findings, real: &'a Real) -> impl Iterator<Item = &'a Run> {
+    std::iter::once(&found.simulation).chain(&real.runs)
+}
+
+/// The summary with the figures of every load step.
+fn summary(found: &Findings) -> String {
+    let mut out = said(found);
+    for real in &found.real {
+        out.push_str(&format!("\n{}\n", real.name));
+        for (index, course) in found.simulation.courses.iter().enumerate() {
+            let findings = rows(found, real).filter_map(|run| Some((run.name, &run.courses.get(index)?.finding)));
+            out.push_str(&format!("\n{}", comparison(course.step, findings, [])));
+        }
+    }
+    out
+}
+
+/// What is printed: the largest figures, the mappings and what none repairs.
+pub fn said(found: &Findings) -> String {
+    let mut out = format!("{}\n\n{}", explanation(found), overview_text(found));
+    for real in &found.real {
+        let fit = &real.report.fit;
+        out.push_str(&format!(
+            "\n{}: {} points, leave-one-out {:.4} V rms, {:.4} V at most; {}\n",
+            real.name,
+            fit.rows.len(),
+            fit.left_out.rms_v,
+            fit.left_out.max_v,
+            formula(real)
+        ));
+        for note in &real.notes {
+            out.push_str(&format!("  note: {note}\n"));
+        }
+        for remark in &real.remarks {
+            out.push_str(&format!("  no mapping repairs: {remark}\n"));
+        }
+    }
+    out
+}
+
+fn formula(real: &Real) -> String {
+    let k = real.report.fit.map.coefficients;
+    let product = k.r.map_or(String::new(), |r| format!(" {r:+.6} i_out d_sim"));
+    format!("d_real = {:.6} d_sim {:+.6} i_out {:+.6}{product}", k.a, k.b, k.c)
+}
+
+fn explanation(found: &Findings) -> String {
+    let setting = &found.setting;
+    let by = match setting.simulator {
+        Simulator::Plant => "the plant of this program",
+        Simulator::Ngspice => "ngspice",
+    };
+    let task = &setting.scenario.task;
+    format!(
+        "Policy {} ({}) at real converters simulated by {by}. True voltages at the sampling instants, errors from {} V, \
+         settled within {SETTLED} V; worst of {} sampling instants / of {} instants and phases. Steady state: the last {} \
+         of {} control periods after the step.",
+        setting.policy.name,
+        found.controller,
+        setting.v_ref,
+        task.sampling_instants,
+        task.all_instants().len(),
+        task.tail,
+        task.after,
+    )
+}
+
+/// Figure by figure the largest of all load steps.
+fn largest(run: &Run) -> Metrics {
+    let all = run.courses.iter().map(|course| course.finding.worst);
+    all.fold(Metrics::default(), Metrics::worst)
+}
+
+const HEADINGS: [&str; 6] = [
+    "converter",
+    "run",
+    "steady mean V",
+    "steady max V",
+    "deviation V",
+    "settling ms",
+];
+
+/// One line for each run: the largest figures over all load steps.
+fn lines(found: &Findings) -> Vec<[String; 6]> {
+    let line = |converter: &str, run: &Run| {
+        let m = largest(run);
+        let unsettled = if m.tail_max > SETTLED { ">" } else { "" };
+        [
+            converter.to_owned(),
+            run.name.to_owned(),
+            format!("{:.3}", m.tail_mean),
+            format!("{:.3}", m.tail_max),
+            format!("{:.2}", m.deviation),
+            format!("{unsettled}{:.2}", 1e3 * m.settling),
+        ]
+    };
+    let real = found
+        .real
+        .iter()
+        .flat_map(|real| real.runs.iter().map(move |run| line(&real.name, run)));
+    std::iter::once(line("that of the training", &found.simulation))
+        .chain(real)
+        .collect()
+}
+
+fn overview(found: &Findings) -> Table {
+    let table = HEADINGS
+        .into_iter()
+        .fold(Table::new("Largest of all load steps"), Table::text);
+    lines(found)
+        .into_iter()
+        .fold(table, |table, line| table.row(line.map(Cell::from)))
+}
+
+fn overview_text(found: &Findings) -> String {
+    let line = |cells: &[&str]| {
+        let (first, rest) = cells.split_at(1);
+        let start = format!("{:<21}", first.join(""));
+        let row = rest.iter().fold(start, |row, cell| format!("{row} {cell:<14}"));
+        format!("{}\n", row.trim_end())
+    };
+    let body = lines(found)
+        .iter()
+        .map(|cells| line(&cells.each_ref().map(String::as_str)))
+        .collect::<String>();
+    format!("Largest of all load steps\n{}{body}", line(&HEADINGS))
+}
+
+/// The answer in one sentence: the converter on which the mapping gains most.
+fn sentence(found: &Findings) -> String {
+    let gained = |real: &&Real| {
+        let before = real.runs.first().map(largest)?;
+        let after = real.runs.iter().find(|run| run.name == runs::MAPPED).map(largest)?;
+        Some((real.name.clone(), before.tail_mean, after.tail_mean))
+    };
+    let all = found.real.iter().filter_map(|real| gained(&real));
+    let most = all.max_by(|(_, a, b), (_, c, d)| (a - b).total_cmp(&(c - d)));
+    most.map_or(String::new(), |(name, before, after)| {
+        format!(
+            "Steady-state mean error on {name}, the worst load step: {before:.3} V without a mapping, {after:.3} V with it; \
+             in simulation {:.3} V.",
+            largest(&found.simulation).tail_mean
+        )
+    })
+}
+
+fn table(found: &Findings, real: &Real, index: usize) -> Table {
+    let mut table = Table::new("").text("");
+    for heading in closed_loop::COLUMNS {
+        table = table.text(heading);
+    }
+    for run in rows(found, real) {
+        let Some(course) = run.courses.get(index) else { continue };
+        let cells = closed_loop::cells(&course.finding).into_iter().map(Cell::from);
+        table = table.row([Cell::from(run.name)].into_iter().chain(cells));
+    }
+    table
+}

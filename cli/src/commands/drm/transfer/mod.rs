@@ -1,0 +1,185 @@
+//! `policyc drm transfer`: the paper's procedure, from the simulation to converters that are not the simulated one
+
+mod files;
+mod ideal;
+mod pictures;
+mod runs;
+
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+
+use clap::Args;
+use closed_loop::scenario::Finding;
+use closed_loop::{LoadStep, Scenario, Trajectory};
+use drm::DutyRatioMap;
+use drm::formula::Losses;
+use plant::Parameters;
+use policy::{Coefficients, Interval, Policy};
+
+use super::bench::Simulator;
+use crate::arguments::ControllerKind;
+use crate::commands::{interruption, simulate};
+use crate::{Failure, Outcome, output};
+
+#[derive(Debug, Args)]
+pub struct Transfer {
+    /// Scenario file, as for `simulate`: load steps, instants; its plant is the converter that the policy was trained on
+    pub scenario: PathBuf,
+    /// policy.toml with a mapping, or the folder that holds it
+    #[arg(long, value_name = "POLICY")]
+    pub policy: PathBuf,
+    /// "Real" converters; several separated by commas
+    #[arg(long, value_name = "FILE", required = true, value_delimiter = ',')]
+    pub real: Vec<PathBuf>,
+    /// What simulates the real converters
+    #[arg(long, value_enum, default_value_t = Simulator::Plant)]
+    pub simulator: Simulator,
+    /// What controls them
+    #[arg(long, value_enum, default_value_t = ControllerKind::C)]
+    pub controller: ControllerKind,
+    /// Beside the fitted mapping, run the exact one: the formula of the real converter's losses (diode rectifier)
+    #[arg(long)]
+    pub ideal: bool,
+    /// Folder to write; must be empty or not exist yet
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+}
+
+/// A transfer with everything it needs.
+struct Setting {
+    scenario: Scenario,
+    policy: Policy,
+    /// What the policy was trained on.
+    nominal: Parameters,
+    /// Its steady state.
+    trained_on: Losses,
+    v_ref: f64,
+    simulator: Simulator,
+    controller: ControllerKind,
+    ideal: bool,
+}
+
+/// A controller on one load step at one converter.
+struct Course {
+    step: LoadStep,
+    finding: Finding,
+    /// At the first sampling instant.
+    shown: Trajectory,
+}
+
+/// A controller on all load steps at one converter.
+struct Run {
+    name: &'static str,
+    courses: Vec<Course>,
+}
+
+/// What was found at one real converter.
+struct Real {
+    /// Name of its file without ending.
+    name: String,
+    /// Settled points as CSV.
+    points: String,
+    report: drm::Report,
+    /// Without a mapping, with the fitted one, with the exact one if asked for.
+    runs: Vec<Run>,
+    /// What no mapping repairs.
+    remarks: Vec<String>,
+    notes: Vec<String>,
+}
+
+/// Everything found.
+struct Findings {
+    setting: Setting,
+    /// What ran the policy.
+    controller: String,
+    /// The policy on the converter of its training.
+    simulation: Run,
+    real: Vec<Real>,
+}
+
+/// Transfers, writes, reports.
+pub fn run(options: &Transfer) -> Result<Outcome, Failure> {
+    output::check_new_folder(&options.out)?;
+    let setting = prepare(options)?;
+    let stop = interruption::stop_on_signal()?;
+    let found = runs::all(options, setting, &stop);
+    if stop.load(Ordering::Relaxed) {
+        output::say("Interrupted; nothing written")?;
+        return Ok(Outcome::Interrupted);
+    }
+    let found = found?;
+    let files = files::all(&found)?;
+    output::check_new_folder(&options.out)?;
+    output::write_texts(&options.out, &files)?;
+    let out = options.out.display();
+    output::say(&format!(
+        "{}\n{} files in {out}; to look at: {out}/{}",
+        files::said(&found),
+        files.len(),
+        files::PAGE
+    ))?;
+    Ok(Outcome::Done)
+}
+
+fn prepare(options: &Transfer) -> Result<Setting, Failure> {
+    let scenario = Scenario::load(&options.scenario)?;
+    let policy = crate::commands::load(&options.policy)?;
+    let file = options.scenario.display();
+    if policy.mapping.is_none() {
+        let hint = "add [mapping] with file = \"drm.toml\" and load_current, and an identity a = 1, b = 0, c = 0";
+        return Err(Failure(format!(
+            "the policy has no mapping to transfer with\n   = hint: {hint}"
+        )));
+    }
+    let Some(trained_on) = &scenario.plant else {
+        return Err(Failure(format!(
+            "{file}: no plant\n   = expected: the converter that the policy was trained on\n   = hint: plant = \
+             \"../plants/paper-model.toml\""
+        )));
+    };
+    let mut nominal = super::plant_parameters(trained_on)?;
+    for (key, value) in &scenario.set {
+        if let Some(parameter) = plant::parameter(key) {
+            parameter.set(&mut nominal, *value);
+        }
+    }
+    let v_ref = simulate::v_ref(&scenario, &policy, &file)?;
+    simulate::suits(&policy, &nominal, v_ref, &trained_on.display())?;
+    Ok(Setting {
+        trained_on: super::trained_on(&nominal, trained_on)?,
+        scenario,
+        policy,
+        nominal,
+        v_ref,
+        simulator: options.simulator,
+        controller: options.controller,
+        ideal: options.ideal,
+    })
+}
+
+/// The mapping that maps nothing, valid everywhere.
+const IDENTITY: DutyRatioMap = DutyRatioMap {
+    coefficients: Coefficients {
+        a: 1.0,
+        b: 0.0,
+        c: 0.0,
+        r: None,
+    },
+    valid_i_out: Interval { low: -1e3, high: 1e3 },
+    valid_d_sim: Interval { low: 0.0, high: 1.0 },
+};
+
+impl Setting {
+    /// The policy with another mapping, read from a drm.toml as any other.
+    fn with(&self, map: &DutyRatioMap) -> Result<Policy, Failure> {
+        let folder =
+            tempfile::tempdir().map_err(|error| Failure(format!("cannot make a temporary folder: {error}")))?;
+        let path = folder.path().join("drm.toml");
+        std::fs::write(&path, map.to_toml("")).map_err(|error| Failure(format!("cannot write a mapping: {error}")))?;
+        let mut mapping = policy::load_mapping(&path)?;
+        let mut policy = self.policy.clone();
+        mapping.load_current = policy.mapping.map_or(0, |mapping| mapping.load_current);
+        policy.mapping = Some(mapping);
+        Ok(policy)
+    }
+}

@@ -1,0 +1,80 @@
+//! The core behind ports of `double`: what the doors into block diagrams share.
+
+use templates::block::{BlockHeader, BlockSource, BlockView, InputView, ParameterView};
+use templates::c::Common;
+
+use super::c99::{coefficient_name, render};
+use crate::backend::banner;
+use crate::backend::literal::decimal;
+use crate::program::{Coefficient, Literal, SignalPort};
+use crate::{CodegenError, GeneratedFiles, Program};
+
+/// `<name>_block.h` and `<name>_block.c`.
+///
+/// # Errors
+/// Only for a fault in the compiler itself.
+pub fn emit(program: &Program) -> Result<GeneratedFiles, CodegenError> {
+    let title = format!("Controller {} behind ports of double", program.name);
+    let header = BlockHeader {
+        b: view(program, &title),
+    };
+    let source = BlockSource {
+        b: view(program, &title),
+    };
+    Ok(GeneratedFiles {
+        files: [
+            (format!("{}_block.h", program.name), render(&header)?),
+            (format!("{}_block.c", program.name), render(&source)?),
+        ]
+        .into(),
+    })
+}
+
+/// The view of a file of that title.
+pub fn view(program: &Program, title: &str) -> BlockView {
+    let mapping = program.mapping.as_ref();
+    let coefficients = || mapping.iter().flat_map(|mapping| &mapping.coefficients);
+    let parameter = |(name, value, low, high): &(Coefficient, Literal, Literal, Literal)| ParameterView {
+        name: coefficient_name(*name).to_owned(),
+        value: decimal(value.value()),
+        low: decimal(low.value()),
+        high: decimal(high.value()),
+    };
+    BlockView {
+        common: Common {
+            name: program.name.clone(),
+            upper: program.name.to_uppercase(),
+            banner: banner(program, title, program.provenance.c_flags),
+            mapping_parameters: String::new(),
+        },
+        inputs: program.signals.iter().map(input).collect(),
+        has_codes: program.signals.iter().any(|signal| signal.is_code),
+        input_count: program.signals.len() + 1,
+        parameters: coefficients().map(parameter).collect(),
+        mapping_arguments: coefficients()
+            .map(|(name, ..)| coefficient_name(*name))
+            .collect::<Vec<_>>()
+            .join(", "),
+        fallback: decimal(program.fallback_duty.value()),
+        sample_period: format!("{:?}", program.sample_period),
+        // the state and one word
+        work: (program.state_words() + 1).div_ceil(2),
+        features: program.feature_count(),
+        actions: program.duties.len(),
+    }
+}
+
+fn input(signal: &SignalPort) -> InputView {
+    let (low, high) = signal.range;
+    let kind = if signal.is_code {
+        "ADC code, plausible"
+    } else {
+        "plausible"
+    };
+    let meaning = format!("{kind} {:?} to {:?} {}", low.value(), high.value(), signal.unit);
+    InputView {
+        name: signal.name.clone(),
+        meaning: meaning.trim_end().to_owned(),
+        is_code: signal.is_code,
+    }
+}

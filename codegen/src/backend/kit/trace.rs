@@ -1,0 +1,93 @@
+//! Moves of a controller with the expected answers, as the words the kit reads.
+
+use crate::crc::crc32_words;
+
+/// First word of a move; the kit's C program reads the same numbers.
+mod kind {
+    pub const STEP: u32 = 0;
+    pub const SET_MAPPING: u32 = 1;
+    pub const RESET: u32 = 2;
+    pub const INIT: u32 = 3;
+}
+
+/// Moves and answers, one after the other.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Trace {
+    words: Vec<u32>,
+    events: u32,
+    steps: u32,
+}
+
+impl Trace {
+    /// All words.
+    #[must_use]
+    pub fn words(&self) -> &[u32] {
+        &self.words
+    }
+
+    /// Number of moves.
+    #[must_use]
+    pub fn events(&self) -> u32 {
+        self.events
+    }
+
+    /// Number of control steps among them.
+    #[must_use]
+    pub fn steps(&self) -> u32 {
+        self.steps
+    }
+
+    /// A control step: bits of the measurement, then bits of duty, duty_sim, action index, status; of `rest`
+    /// (observation, Q values, state afterwards) the checksum alone is kept.
+    pub fn step(&mut self, measurement: &[u32], command: &[u32], rest: impl IntoIterator<Item = u32>) {
+        self.open(kind::STEP);
+        self.words.extend_from_slice(measurement);
+        self.words.extend_from_slice(command);
+        self.words.push(crc32_words(rest));
+        self.steps += 1;
+    }
+
+    /// An attempt to replace the mapping's coefficients.
+    pub fn set_mapping(&mut self, coefficients: &[u32], accepted: u32, state: impl IntoIterator<Item = u32>) {
+        self.open(kind::SET_MAPPING);
+        self.words.extend_from_slice(coefficients);
+        self.words.extend([accepted, crc32_words(state)]);
+    }
+
+    /// `reset`: the mapping's coefficients stay.
+    pub fn reset(&mut self, state: impl IntoIterator<Item = u32>) {
+        self.open(kind::RESET);
+        self.words.push(crc32_words(state));
+    }
+
+    /// `init`.
+    pub fn init(&mut self, state: impl IntoIterator<Item = u32>) {
+        self.open(kind::INIT);
+        self.words.push(crc32_words(state));
+    }
+
+    fn open(&mut self, kind: u32) {
+        self.words.push(kind);
+        self.events += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Trace;
+
+    #[test]
+    fn moves_follow_each_other_with_kind_input_and_answer() {
+        let mut trace = Trace::default();
+        trace.init([]);
+        // the check value of the CRC-32 catalogue, over eight digits: 0x9AE0DAAF
+        let rest = [u32::from_le_bytes(*b"1234"), u32::from_le_bytes(*b"5678")];
+        trace.step(&[7, 8], &[1, 2, 3, 4], rest);
+        trace.set_mapping(&[5, 6, 7], 1, []);
+        assert_eq!(
+            trace.words(),
+            [3, 0, 0, 7, 8, 1, 2, 3, 4, 0x9AE0_DAAF, 1, 5, 6, 7, 1, 0]
+        );
+        assert_eq!((trace.events(), trace.steps()), (3, 1));
+    }
+}

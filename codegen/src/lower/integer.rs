@@ -1,0 +1,83 @@
+//! Contract section 6b: integer layers with their tables in reading order.
+
+use policy::scales::{self, LayerScale, Scales, power_of_two, round_half_up};
+use policy::{Layer, NumericFormat, Policy};
+
+use super::network::activation;
+use crate::program::{ActivationCode, IntegerInput, IntegerLayer, IntegerNetwork, Literal};
+
+/// Two 16-bit weights of a word, in memory order.
+const PAIR: [usize; 2] = [0, 1];
+/// Four 8-bit weights of a word: the even bytes, then the odd ones, widen to two pairs (ARM `SXTB16`).
+const QUAD: [usize; 4] = [0, 2, 1, 3];
+
+/// Outputs accumulated side by side: six sums, a weight, two inputs and three pointers fill an ARM core's registers.
+const ROWS: usize = 4;
+
+/// Rounds weights and biases and orders them in the blocks in which the generated code reads them.
+pub fn lower(policy: &Policy, scales: &Scales) -> IntegerNetwork {
+    let lanes: &[usize] = if policy.numeric_format == NumericFormat::I8 {
+        &QUAD
+    } else {
+        &PAIR
+    };
+    let shifted = |integer: i32| Literal::from(integer as f32 + 32_768.5);
+    let input = |input: &scales::InputScale| IntegerInput {
+        factor: Literal::nearest(power_of_two(input.exponent)),
+        low: shifted(input.low),
+        high: shifted(input.high),
+    };
+    let layers = policy.layers.iter().zip(&scales.layers);
+    IntegerNetwork {
+        weight_bytes: 4 / lanes.len(),
+        lanes: lanes.to_vec(),
+        inputs: scales.inputs.iter().map(input).collect(),
+        layers: layers
+            .map(|(layer, scale)| self::layer(layer, scale, lanes, ROWS.clamp(1, layer.outputs)))
+            .collect(),
+        q_unit: Literal::nearest(power_of_two(-scales.layers.last().map_or(0, |layer| layer.output))),
+        accumulator_bound: scales.accumulator_bound(),
+    }
+}
+
+fn layer(layer: &Layer, scale: &LayerScale, lanes: &[usize], block_rows: usize) -> IntegerLayer {
+    // the scales were chosen so that every weight fits
+    let weight = |output: usize, input: usize| match scale.inputs.get(input) {
+        Some(exponent) => {
+            let weight = f64::from(layer.weights[output * layer.inputs + input]);
+            round_half_up(weight * power_of_two(scale.accumulator - exponent)) as i16
+        }
+        None => 0,
+    };
+    let mut table = Vec::with_capacity(layer.weights.len());
+    for first in (0..layer.outputs).step_by(block_rows) {
+        let last = (first + block_rows).min(layer.outputs);
+        for group in (0..layer.inputs).step_by(lanes.len()) {
+            for output in first..last {
+                table.extend(lanes.iter().map(|lane| weight(output, group + lane)));
+            }
+        }
+    }
+    let bias = |bias: &f32| {
+        let integer = round_half_up(f64::from(*bias) * power_of_two(scale.accumulator));
+        (integer + scales::half(scale.shift)) as i32
+    };
+    let activation = activation(layer);
+    IntegerLayer {
+        name: layer.name.clone(),
+        inputs: layer.inputs,
+        outputs: layer.outputs,
+        block_rows,
+        table,
+        bias: layer.bias.iter().map(bias).collect(),
+        shift: scale.shift,
+        unit: Literal::nearest(power_of_two(-scale.accumulator)),
+        slope: match (activation, layer.activation) {
+            (ActivationCode::LeakyRelu(_), policy::Activation::LeakyRelu { slope }) => {
+                scales::slope_integer(slope) as i32
+            }
+            _ => 0,
+        },
+        activation,
+    }
+}

@@ -1,0 +1,189 @@
+//! The network in integers (contract section 6b): 16- or 8-bit weights, 16-bit activations, 32-bit sums.
+//!
+//! Computed in 64 bits: a sum that left 32 bits would differ from the generated code and be found.
+
+use ndarray::{Array1, Array2, ArrayView1};
+use policy::Policy;
+use policy::scales::{LayerScale, SLOPE_BITS, Scales, TANH_EXPONENT, power_of_two};
+
+use crate::network::tanh;
+use crate::real::Real;
+use crate::trace::LayerTrace;
+
+/// An integer network with its scales.
+#[derive(Debug, Clone)]
+pub(crate) struct Network {
+    inputs: Vec<Input>,
+    layers: Vec<Layer>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Input {
+    factor: f32,
+    low: i64,
+    high: i64,
+}
+
+#[derive(Debug, Clone)]
+struct Layer {
+    /// `[inputs][outputs]`
+    weights: Array2<i64>,
+    bias: Array1<i64>,
+    activation: Activation,
+    accumulator: i32,
+    shift: u32,
+    output: i32,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Activation {
+    Identity,
+    Relu,
+    LeakyRelu { slope: i64 },
+    Tanh,
+}
+
+impl Network {
+    /// Rounds weights and biases; `None` unless the policy's format is an integer one.
+    pub fn new(policy: &Policy) -> Option<Self> {
+        let Scales { inputs, layers } = policy::scales::of(policy)?;
+        let input = |input: &policy::scales::InputScale| Input {
+            factor: power_of_two(input.exponent) as f32,
+            low: i64::from(input.low),
+            high: i64::from(input.high),
+        };
+        Some(Self {
+            inputs: inputs.iter().map(input).collect(),
+            layers: policy
+                .layers
+                .iter()
+                .zip(&layers)
+                .map(|(layer, scale)| Layer::new(layer, scale))
+                .collect(),
+        })
+    }
+
+    /// Outputs of each layer.
+    pub fn outputs(&self) -> impl Iterator<Item = usize> + '_ {
+        self.layers.iter().map(|layer| layer.bias.len())
+    }
+
+    /// Runs all layers; the traces hold the integers' values.
+    pub fn run<T: Real>(&self, observation: ArrayView1<'_, T>, traces: &mut [LayerTrace<T>]) {
+        let inputs = self.inputs.iter().zip(observation);
+        let mut x: Array1<i64> = inputs.map(|(input, o)| input.integer(o.to_f64() as f32)).collect();
+        for (layer, trace) in self.layers.iter().zip(traces) {
+            x = layer.run(&x, trace);
+        }
+    }
+}
+
+impl Input {
+    /// `trunc(fl(fl(o * 2^e) + 32768.5)) - 32768`, clamped to the box; a NaN by its sign to one end.
+    fn integer(self, observation: f32) -> i64 {
+        let shifted = observation * self.factor + 32_768.5;
+        if shifted.is_nan() {
+            return if shifted.is_sign_negative() {
+                self.low
+            } else {
+                self.high
+            };
+        }
+        // `as` saturates, far outside of the clamp
+        (shifted.trunc() as i64)
+            .saturating_sub(32_768)
+            .clamp(self.low, self.high)
+    }
+}
+
+/// Round half up.
+fn rounded(x: f64) -> i64 {
+    (x + 0.5).floor() as i64
+}
+
+/// `floor(x / 2^bits + 1/2)`.
+fn shifted(x: i64, bits: u32) -> i64 {
+    if bits == 0 {
+        x
+    } else {
+        (x + (1 << (bits - 1))).div_euclid(1 << bits)
+    }
+}
+
+impl Layer {
+    fn new(layer: &policy::Layer, scale: &LayerScale) -> Self {
+        let weight = |(i, o): (usize, usize)| {
+            let weight = f64::from(layer.weights[o * layer.inputs + i]);
+            rounded(weight * power_of_two(scale.accumulator - scale.inputs[i]))
+        };
+        let bias = |bias: &f32| rounded(f64::from(*bias) * power_of_two(scale.accumulator));
+        Self {
+            weights: Array2::from_shape_fn((layer.inputs, layer.outputs), weight),
+            bias: layer.bias.iter().map(bias).collect(),
+            activation: match layer.activation {
+                policy::Activation::Identity => Activation::Identity,
+                policy::Activation::Relu => Activation::Relu,
+                policy::Activation::LeakyRelu { slope } => Activation::LeakyRelu {
+                    slope: rounded(slope * power_of_two(SLOPE_BITS.cast_signed())).min(32_767),
+                },
+                policy::Activation::Tanh => Activation::Tanh,
+            },
+            accumulator: scale.accumulator,
+            shift: scale.shift,
+            output: scale.output,
+        }
+    }
+
+    fn run<T: Real>(&self, x: &Array1<i64>, trace: &mut LayerTrace<T>) -> Array1<i64> {
+        let mut sums = self.bias.clone();
+        for (row, &x) in self.weights.rows().into_iter().zip(x) {
+            sums.zip_mut_with(&row, |sum, &w| *sum += w * x);
+        }
+        let y = sums.mapv(|sum| self.activate(sum));
+        let value = |exponent: i32| move |x: &i64| T::nearest(*x as f64 * power_of_two(-exponent));
+        trace.pre_activation = sums.iter().map(value(self.accumulator)).collect();
+        trace.post_activation = y.iter().map(value(self.output)).collect();
+        y
+    }
+
+    fn activate(&self, sum: i64) -> i64 {
+        match self.activation {
+            Activation::Identity => shifted(sum, self.shift),
+            Activation::Relu => shifted(sum, self.shift).max(0),
+            Activation::LeakyRelu { slope } => {
+                let y = shifted(sum, self.shift);
+                if y > 0 { y } else { shifted(y * slope, SLOPE_BITS) }
+            }
+            Activation::Tanh => {
+                let x = sum as f32 * (power_of_two(-self.accumulator) as f32);
+                let y = tanh(x) * (power_of_two(TANH_EXPONENT) as f32);
+                (y + 32_768.5).trunc() as i64 - 32_768
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halves_are_rounded_up_on_both_sides_of_zero() {
+        let halves = [-3, -1, 1, 3].map(|x| shifted(x, 1));
+        assert_eq!(halves, [-1, 0, 1, 2]);
+        assert_eq!([-0.5, 0.5, 1.5, -1.5].map(rounded), [0, 1, 2, -1]);
+        assert_eq!(shifted(-7, 0), -7);
+    }
+
+    #[test]
+    fn an_observation_is_rounded_half_up_and_clamped() {
+        let input = Input {
+            factor: 16.0,
+            low: -100,
+            high: 100,
+        };
+        assert_eq!([0.0, 0.03125, -0.03125, 1.0].map(|x| input.integer(x)), [0, 1, 0, 16]);
+        let far = [1e30, -1e30, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, -f32::NAN];
+        assert_eq!(far.map(|x| input.integer(x)), [100, -100, 100, -100, 100, -100]);
+    }
+}

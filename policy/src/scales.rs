@@ -1,0 +1,267 @@
+//! Scales of the integer network (contract section 6b): powers of two, chosen from the weights over the box of
+//! observations so that no 32-bit accumulator can overflow. Both the interpreter and the compiler read them from here;
+//! each rounds the weights itself.
+//!
+//! The proof is exact: integer intervals of every activation, from the clamped inputs on, and for every output the sum
+//! of all positive and of all negative terms. Whatever the order of the additions, every partial sum lies between.
+
+use crate::model::{Activation, Layer, NumericFormat, Policy};
+
+/// Fractional bits of an activation behind a tanh: 1.0 is 2^14.
+pub const TANH_EXPONENT: i32 = 14;
+/// Fractional bits of the slope of a leaky ReLU.
+pub const SLOPE_BITS: u32 = 15;
+/// Largest magnitude of an activation.
+pub const ACTIVATION_LIMIT: i64 = 32_767;
+/// Largest magnitude of an output of the network: up to here an integer is a binary32 number.
+pub const OUTPUT_LIMIT: i64 = 1 << 24;
+/// Largest magnitude of an exponent: 2^e and its reciprocal are normal binary32 numbers.
+const MAX_EXPONENT: i32 = 100;
+
+/// How an observation becomes an integer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct InputScale {
+    /// Integer / 2^exponent is the observation.
+    pub exponent: i32,
+    /// Smallest integer over the box of observations; smaller ones are clamped.
+    pub low: i32,
+    /// Largest integer over the box of observations; larger ones are clamped.
+    pub high: i32,
+}
+
+/// How a layer computes in integers.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LayerScale {
+    /// Exponent of each input: integer / 2^exponent is the activation.
+    pub inputs: Vec<i32>,
+    /// Accumulator / 2^exponent is the sum.
+    pub accumulator: i32,
+    /// Bits that are rounded off the accumulator; not used behind a tanh.
+    pub shift: u32,
+    /// Exponent of each output.
+    pub output: i32,
+    /// Lowest and highest value that any partial sum of any output can take, over the whole box.
+    pub bound: (i64, i64),
+    /// Range of each output over the whole box.
+    pub outputs: Vec<(i64, i64)>,
+}
+
+/// Scales of all layers.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Scales {
+    /// Per feature.
+    pub inputs: Vec<InputScale>,
+    /// Per layer.
+    pub layers: Vec<LayerScale>,
+}
+
+impl Scales {
+    /// Largest magnitude that any partial sum of the network can take; below 2^31.
+    #[must_use]
+    pub fn accumulator_bound(&self) -> i64 {
+        let ends = self.layers.iter().flat_map(|layer| [-layer.bound.0, layer.bound.1]);
+        ends.max().unwrap_or_default()
+    }
+}
+
+/// Scales of a policy in an integer format; `None` in the others.
+#[must_use]
+pub fn of(policy: &Policy) -> Option<Scales> {
+    let limit = policy.numeric_format.weight_limit()?;
+    let inputs = inputs(policy);
+    let mut exponents: Vec<i32> = inputs.iter().map(|input| input.exponent).collect();
+    let mut ranges: Vec<(i64, i64)> = inputs
+        .iter()
+        .map(|input| (i64::from(input.low), i64::from(input.high)))
+        .collect();
+    let mut layers = Vec::with_capacity(policy.layers.len());
+    for (index, layer) in policy.layers.iter().enumerate() {
+        let output_limit = if index + 1 == policy.layers.len() {
+            OUTPUT_LIMIT
+        } else {
+            ACTIVATION_LIMIT
+        };
+        let scale = self::layer(layer, &exponents, &ranges, i64::from(limit), output_limit);
+        exponents = vec![scale.output; layer.outputs];
+        ranges.clone_from(&scale.outputs);
+        layers.push(scale);
+    }
+    Some(Scales { inputs, layers })
+}
+
+/// 2^exponent, exactly; `exponent` within the normal numbers.
+#[must_use]
+pub fn power_of_two(exponent: i32) -> f64 {
+    f64::from_bits(u64::from((1023 + exponent.clamp(-1022, 1023)).unsigned_abs()) << 52)
+}
+
+/// `floor(x + 1/2)`: round half up, for magnitudes below 2^51.
+#[must_use]
+pub fn round_half_up(x: f64) -> i64 {
+    (x + 0.5).floor() as i64
+}
+
+/// An observation as integer, before the clamp: `trunc(fl(fl(o * 2^e) + 32768.5)) - 32768` in binary32.
+#[must_use]
+pub fn quantised(observation: f32, exponent: i32) -> i32 {
+    let shifted = observation * (power_of_two(exponent) as f32) + 32_768.5;
+    shifted as i32 - 32_768
+}
+
+/// The finest exponent at which every observation fits in 16 bits; a feature of small range meets the coarsest one half
+/// way, because its column of weights is scaled down by what the feature is scaled up.
+fn inputs(policy: &Policy) -> Vec<InputScale> {
+    let finest = |bound: crate::model::Interval| {
+        let magnitude = bound.low.abs().max(bound.high.abs());
+        let fits = |exponent: &i32| magnitude * power_of_two(*exponent) <= ACTIVATION_LIMIT as f64;
+        (-MAX_EXPONENT..=24).rev().find(fits).unwrap_or(-MAX_EXPONENT)
+    };
+    let finest: Vec<i32> = policy.features.iter().map(|feature| finest(feature.bound)).collect();
+    let coarsest = finest.iter().copied().min().unwrap_or_default();
+    let scale = |(feature, finest): (&crate::model::Feature, &i32)| {
+        let exponent = coarsest + (finest - coarsest) / 2;
+        InputScale {
+            exponent,
+            low: quantised(feature.bound.low as f32, exponent),
+            high: quantised(feature.bound.high as f32, exponent),
+        }
+    };
+    policy.features.iter().zip(&finest).map(scale).collect()
+}
+
+/// The finest accumulator at which all weights fit and no partial sum can leave 32 bits, then the smallest shift after
+/// which every output fits.
+fn layer(layer: &Layer, inputs: &[i32], ranges: &[(i64, i64)], weight_limit: i64, output_limit: i64) -> LayerScale {
+    let trial = |accumulator: i32| sums(layer, inputs, ranges, accumulator, weight_limit);
+    let candidates = (-MAX_EXPONENT..=MAX_EXPONENT).rev();
+    let found = candidates.filter_map(|accumulator| Some((accumulator, trial(accumulator)?)));
+    let usable = found.map(|(accumulator, sums)| {
+        let shift = shift(&sums, layer.activation, output_limit);
+        let half = half(shift);
+        let bound = (
+            sums.iter().map(|sum| sum.lowest).min().unwrap_or_default(),
+            sums.iter().map(|sum| sum.highest).max().unwrap_or_default() + half,
+        );
+        let outputs = sums
+            .iter()
+            .map(|sum| activated(layer.activation, *sum, shift))
+            .collect();
+        LayerScale {
+            inputs: inputs.to_vec(),
+            accumulator,
+            shift,
+            output: match layer.activation {
+                Activation::Tanh => TANH_EXPONENT,
+                _ => accumulator - shift.cast_signed(),
+            },
+            bound,
+            outputs,
+        }
+    });
+    let fits = |scale: &LayerScale| scale.bound.1 <= i64::from(i32::MAX) && scale.bound.0 >= -i64::from(i32::MAX);
+    // with a small enough exponent every weight and bias rounds to 0: there always is one
+    usable.into_iter().find(fits).unwrap_or(LayerScale {
+        inputs: inputs.to_vec(),
+        accumulator: -MAX_EXPONENT,
+        shift: 0,
+        output: -MAX_EXPONENT,
+        bound: (0, 0),
+        outputs: vec![(0, 0); layer.outputs],
+    })
+}
+
+/// Extremes of one output's accumulator.
+#[derive(Debug, Clone, Copy)]
+struct Sum {
+    /// Smallest and largest full sum.
+    range: (i64, i64),
+    /// Smallest and largest partial sum in any order.
+    lowest: i64,
+    highest: i64,
+}
+
+/// `None` if a weight does not fit or a sum is far too large.
+fn sums(layer: &Layer, inputs: &[i32], ranges: &[(i64, i64)], accumulator: i32, weight_limit: i64) -> Option<Vec<Sum>> {
+    let rows = layer.weights.chunks_exact(layer.inputs.max(1));
+    let unit = power_of_two(accumulator);
+    let factors: Vec<f64> = inputs.iter().map(|input| power_of_two(accumulator - input)).collect();
+    let sum = |(row, bias): (&[f32], &f32)| {
+        let bias = f64::from(*bias) * unit;
+        if bias.abs() >= f64::from(i32::MAX) {
+            return None;
+        }
+        let bias = round_half_up(bias);
+        let mut sum = Sum {
+            range: (bias, bias),
+            lowest: bias.min(0),
+            highest: bias.max(0),
+        };
+        for ((weight, factor), (low, high)) in row.iter().zip(&factors).zip(ranges) {
+            let weight = f64::from(*weight) * factor;
+            if weight.abs() > (weight_limit + 1) as f64 {
+                return None;
+            }
+            let weight = round_half_up(weight);
+            if weight.abs() > weight_limit {
+                return None;
+            }
+            let (a, b) = (weight * low, weight * high);
+            sum.range = (sum.range.0 + a.min(b), sum.range.1 + a.max(b));
+            sum.lowest += a.min(b).min(0);
+            sum.highest += a.max(b).max(0);
+        }
+        Some(sum)
+    };
+    rows.zip(&layer.bias).map(sum).collect()
+}
+
+/// What is added before `shift` bits are cut off: half of the last bit kept.
+#[must_use]
+pub fn half(shift: u32) -> i64 {
+    (1_i64 << shift) >> 1
+}
+
+fn shift(sums: &[Sum], activation: Activation, limit: i64) -> u32 {
+    if activation == Activation::Tanh {
+        return 0;
+    }
+    let fits = |shift: &u32| {
+        let rounded = |x: i64| (x + half(*shift)) >> shift;
+        sums.iter().all(|sum| {
+            let low_fits = activation == Activation::Relu || rounded(sum.range.0) >= -limit;
+            low_fits && rounded(sum.range.1) <= limit
+        })
+    };
+    (0..40).find(fits).unwrap_or(40)
+}
+
+fn activated(activation: Activation, sum: Sum, shift: u32) -> (i64, i64) {
+    let rounded = |x: i64| (x + half(shift)) >> shift;
+    let (low, high) = (rounded(sum.range.0), rounded(sum.range.1));
+    match activation {
+        Activation::Identity => (low, high),
+        Activation::Relu => (low.max(0), high.max(0)),
+        Activation::LeakyRelu { slope } => {
+            let slope = slope_integer(slope);
+            let one = |x: i64| if x > 0 { x } else { leaky(x, slope) };
+            (one(low), one(high))
+        }
+        Activation::Tanh => (-(1 << TANH_EXPONENT), 1 << TANH_EXPONENT),
+    }
+}
+
+/// Slope of a leaky ReLU as integer: round half up of slope * 2^15, below 2^15.
+#[must_use]
+pub fn slope_integer(slope: f64) -> i64 {
+    round_half_up(slope * power_of_two(SLOPE_BITS.cast_signed())).min(ACTIVATION_LIMIT)
+}
+
+fn leaky(x: i64, slope: i64) -> i64 {
+    (x * slope + half(SLOPE_BITS)) >> SLOPE_BITS
+}
+
+/// Whether the format has an integer network.
+#[must_use]
+pub fn is_integer(format: NumericFormat) -> bool {
+    format.weight_limit().is_some()
+}

@@ -1,0 +1,81 @@
+//! RISC-V with 32 bits.
+
+use crate::boards::{VIRT_RV32IMC, VIRT_RV32IMFC};
+use crate::{
+    CCompiler, EXACT_C99, EXACT_RUST, Endianness, Fma, Fpu, GNU_SECTIONS, ILP32, RowBlock, Runner, RustTarget,
+    TargetSpec,
+};
+
+const fn gcc(machine_flags: &'static [&'static str]) -> CCompiler {
+    CCompiler {
+        program: "riscv64-unknown-elf-gcc",
+        package: "gcc-riscv64-unknown-elf",
+        machine_flags,
+    }
+}
+
+const fn clang(machine_flags: &'static [&'static str]) -> CCompiler {
+    CCompiler {
+        program: "clang",
+        package: "clang",
+        machine_flags,
+    }
+}
+
+pub const RISCV32IMC: TargetSpec = TargetSpec {
+    name: "riscv32imc",
+    description: "RISC-V RV32IMC: no FPU",
+    endianness: Endianness::Little,
+    widths: ILP32,
+    fpu: Fpu::None,
+    fma: Fma::Absent,
+    suitable_format: "i16",
+    cycles: None,
+    sections: GNU_SECTIONS,
+    clock_hz: Some(160_000_000),
+    c_row_block: RowBlock::Rows(8),
+    rust_row_block: RowBlock::Rows(8),
+    // the bare compiler has no C library, so <stdint.h> is there in freestanding mode only
+    c_compilers: &[
+        gcc(&["-march=rv32imc", "-mabi=ilp32", "-ffreestanding"]),
+        clang(&[
+            "--target=riscv32-none-elf",
+            "-march=rv32imc",
+            "-mabi=ilp32",
+            "-ffreestanding",
+        ]),
+    ],
+    c_flags: EXACT_C99,
+    rust: Some(RustTarget {
+        triple: "riscv32imc-unknown-none-elf",
+        machine_flags: &[],
+    }),
+    rust_flags: EXACT_RUST,
+    runner: Runner::Emulated(VIRT_RV32IMC),
+};
+
+pub const RISCV32IMFC: TargetSpec = TargetSpec {
+    name: "riscv32imfc",
+    description: "RISC-V RV32IMFC: FPU for binary32",
+    fpu: Fpu::Single,
+    fma: Fma::Unrated,
+    suitable_format: "f32",
+    c_row_block: RowBlock::Rows(16),
+    rust_row_block: RowBlock::Rows(16),
+    c_compilers: &[
+        gcc(&["-march=rv32imfc", "-mabi=ilp32f", "-ffreestanding"]),
+        clang(&[
+            "--target=riscv32-none-elf",
+            "-march=rv32imfc",
+            "-mabi=ilp32f",
+            "-ffreestanding",
+        ]),
+    ],
+    // the nearest triple; the controller has no atomic operation, so the `a` in it changes nothing
+    rust: Some(RustTarget {
+        triple: "riscv32imafc-unknown-none-elf",
+        machine_flags: &[],
+    }),
+    runner: Runner::Emulated(VIRT_RV32IMFC),
+    ..RISCV32IMC
+};

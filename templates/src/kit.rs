@@ -1,0 +1,52 @@
+//! View of the back-to-back kit.
+
+use askama::Template;
+
+use crate::c::{Common, Table};
+
+/// A controller that the kit drives.
+#[derive(Debug, Clone)]
+pub struct Subject {
+    /// Prefix of its functions and types.
+    pub name: String,
+    /// Prefix of its macros.
+    pub upper: String,
+    /// Moves and expected answers.
+    pub events: Table,
+    /// Number of moves as C text.
+    pub event_count: String,
+    /// Number of control steps.
+    pub steps: u32,
+    /// Members of the measurement in order.
+    pub signals: Vec<String>,
+    /// Number of coefficients of the mapping; 0 without.
+    pub coefficients: usize,
+    /// Declarations of locals that hold them.
+    pub coefficient_locals: Vec<String>,
+    /// The same as arguments.
+    pub mapping_arguments: String,
+}
+
+/// `<name>_kit.c`
+#[derive(Debug, Template)]
+#[template(path = "kit/kit.c.jinja", escape = "none")]
+pub struct Kit {
+    /// Names of the kit itself and banner.
+    pub common: Common,
+    /// Name of the controller under test.
+    pub controller: String,
+    /// Rows of the table of arithmetic.
+    pub probe_lines: Vec<String>,
+    /// Number of rows.
+    pub probe_count: usize,
+    /// A third, as the probes divide by it.
+    pub third: String,
+    /// Constants as literals.
+    pub literals: Table,
+    /// The same as bits.
+    pub literal_bits: Table,
+    /// Whole text of each controller of the construct suite.
+    pub suite: Vec<String>,
+    /// Controllers in the order in which they are driven; the policy's is the last.
+    pub subjects: Vec<Subject>,
+}

@@ -1,0 +1,98 @@
+//! Does `policyc diagnose` find what ngspice hid? A few short cases; `cargo xtask blind --score` runs many full ones.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use std::path::Path;
+use std::process::Command;
+use std::sync::OnceLock;
+
+use blind::case::{Case, measure};
+use blind::experiment::Extent;
+use blind::plan::plan_of;
+use blind::score::{Diagnosis, Judgement, judge};
+use tests::tools::{policyc, run};
+
+/// What is hidden: sizes and experiments follow from the seed.
+const HIDDEN: [(u64, &[&str]); 5] = [
+    (101, &[]),
+    (102, &["c_wrong"]),
+    (103, &["dcr"]),
+    (104, &["v_offset"]),
+    (105, &["mains_pickup"]),
+];
+
+struct Answered {
+    case: Case,
+    diagnosis: Diagnosis,
+}
+
+fn answered() -> &'static [Answered] {
+    static ANSWERED: OnceLock<Vec<Answered>> = OnceLock::new();
+    ANSWERED.get_or_init(|| HIDDEN.iter().map(|(seed, ids)| answer(*seed, ids)).collect())
+}
+
+fn answer(seed: u64, ids: &[&str]) -> Answered {
+    let case = measure(&plan_of(seed, 0, ids, Extent::Short).unwrap(), false).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    for (path, text) in &case.files {
+        let path = folder.path().join(path);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, text).unwrap();
+    }
+    let out = folder.path().join("out");
+    let mut command = Command::new(policyc());
+    command
+        .args(["diagnose", "--model", "plant.toml"])
+        .current_dir(folder.path());
+    for (option, part) in [("--train", "train/"), ("--heldout", "heldout/")] {
+        let files = case
+            .files
+            .iter()
+            .map(|(path, _)| path)
+            .filter(|path| path.starts_with(part));
+        command.arg(option).args(files);
+    }
+    let ran = run(command.arg("--out").arg(&out));
+    assert_eq!(ran.code, Some(0), "seed {seed}, {ids:?}\n{}{}", ran.stdout, ran.stderr);
+    Answered {
+        case,
+        diagnosis: read(&out.join("diagnosis.json")),
+    }
+}
+
+fn read(path: &Path) -> Diagnosis {
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+fn judged(answered: &Answered) -> Judgement {
+    judge(&answered.case.truth, &answered.diagnosis)
+}
+
+#[test]
+fn hidden_effects_are_found_and_nothing_is_found_where_nothing_is_hidden() {
+    let all = answered();
+    let none = judged(&all[0]);
+    assert!(!none.false_alarm, "{none:#?}");
+    for single in &all[1..4] {
+        let judged = judged(single);
+        assert!(judged.right_first && judged.nothing_wrong, "{judged:#?}");
+        assert!(judged.worst_ratio <= 1.05, "{judged:#?}");
+    }
+    let unlisted = judged(&all[4]);
+    assert!(unlisted.unexplained && unlisted.knowable, "{unlisted:#?}");
+}
+
+/// The same answers against exchanged truths: the judge does not nod at everything.
+#[test]
+fn exchanged_truths_are_noticed() {
+    let all = answered();
+    for (number, (_, ids)) in HIDDEN.iter().enumerate() {
+        let other = &all[(number + 1) % all.len()];
+        let judged = judge(&other.case.truth, &all[number].diagnosis);
+        let passes = !judged.false_alarm && judged.right_first && judged.nothing_wrong || judged.unexplained;
+        assert!(
+            !passes || *ids == ["mains_pickup"] && judged.false_alarm,
+            "{ids:?}: {judged:#?}"
+        );
+    }
+}

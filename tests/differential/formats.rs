@@ -1,0 +1,120 @@
+//! The other numeric formats: generated code against the interpreter, bit by bit.
+
+use interp::Controller;
+use policy::{NumericFormat, Policy, scales};
+use verify::{Files, Options};
+
+use super::{COMPILERS, assert_equal, run};
+
+const OTHERS: [NumericFormat; 3] = [NumericFormat::F32Fma, NumericFormat::I16, NumericFormat::I8];
+
+fn example(format: NumericFormat) -> Policy {
+    policy::load(&tests::example()).unwrap().with_format(format)
+}
+
+#[test]
+fn the_example_is_equal_in_every_format_and_build() {
+    for format in OTHERS {
+        let report = run(&example(format), 20_000, 5, &[]);
+        assert_equal(&report, format.name());
+        let golden = report.golden.unwrap();
+        assert_eq!(
+            golden.actions_equal, golden.actions_compared,
+            "the network was read rightly"
+        );
+    }
+}
+
+#[test]
+fn random_policies_are_equal_in_every_format() {
+    for seed in 300..306 {
+        let folder = tests::random::policy(seed).unwrap();
+        let policy = policy::load(&folder.path()).unwrap();
+        for (turn, format) in OTHERS.into_iter().enumerate() {
+            let compiler = COMPILERS[(seed as usize + turn) % 3];
+            let report = run(&policy.clone().with_format(format), 1000, seed, &[compiler]);
+            assert_equal(&report, &format!("{} {compiler}\n{}", format.name(), folder.contract));
+        }
+    }
+}
+
+/// A change to a source text.
+type Edit<'a> = &'a dyn Fn(&str) -> String;
+
+/// Defects of the integer network: one bit of a weight, of a bias, of the shift, the clamp of the input.
+#[test]
+fn planted_defects_in_the_integer_network_are_caught() {
+    let policy = example(NumericFormat::I16);
+    let host = targets::find("host").unwrap();
+    let clean: Files = codegen::compile(&policy, host, codegen::Language::C).unwrap().files;
+    let shift = scales::of(&policy).unwrap().layers[1].shift;
+    let edits: [(&str, Edit<'_>); 4] = [
+        ("weight", &|text| flipped(text, "buck12_weights1[4096] = {")),
+        ("bias", &|text| flipped(text, "buck12_bias1[64] = {")),
+        ("shift", &|text| {
+            text.replacen(&format!(">> {shift})"), &format!(">> {})", shift - 1), 1)
+        }),
+        ("order", &|text| {
+            text.replacen("((int32_t)w[0] * x0)", "((int32_t)w[0] * x1)", 1)
+        }),
+    ];
+    for (name, edit) in edits {
+        let mut files = clean.clone();
+        let text = files.get_mut("buck12.c").unwrap();
+        let edited = edit(text);
+        assert_ne!(*text, edited, "{name}: the edit has found its place");
+        *text = edited;
+        let options = Options {
+            steps: 5000,
+            generated: Some(&files),
+            compilers: vec!["gcc".into()],
+            ..Options::default()
+        };
+        let report = verify::run(&policy, options).unwrap();
+        assert!(!report.passed(), "{name}");
+    }
+}
+
+/// The first literal of a table with its last bit inverted.
+fn flipped(text: &str, table: &str) -> String {
+    let start = text.find(table).unwrap() + table.len();
+    let end = start + text[start..].find(',').unwrap();
+    let value: i32 = text[start..end].trim().parse().unwrap();
+    format!("{}{}{}", &text[..start], value ^ 1, &text[end..])
+}
+
+/// Largest |Q_int - Q_real| over pseudo-random observations of the box, relative to the range of the real Q values.
+fn worst_error(policy: &Policy, format: NumericFormat) -> f64 {
+    let real = Controller::<f64>::new(policy);
+    let integer = Controller::<f32>::new(&policy.clone().with_format(format));
+    let mut rng = verify::traces::Rng::new(3);
+    let (mut worst, mut low, mut high) = (0.0_f64, f64::INFINITY, f64::NEG_INFINITY);
+    for _ in 0..4000 {
+        let o: Vec<f32> = policy
+            .features
+            .iter()
+            .map(|feature| rng.uniform(feature.bound.low, feature.bound.high) as f32)
+            .collect();
+        let wide: Vec<f64> = o.iter().map(|o| f64::from(*o)).collect();
+        let exact = real.q_values(&ndarray::aview1(&wide)).unwrap();
+        let rounded = integer.q_values(&ndarray::aview1(&o)).unwrap();
+        for (exact, rounded) in exact.iter().zip(&rounded) {
+            worst = worst.max((exact - f64::from(*rounded)).abs());
+            (low, high) = (low.min(*exact), high.max(*exact));
+        }
+    }
+    worst / (high - low)
+}
+
+/// i16: a tenth of TensorFlow Lite's int8 (1.8e-2 of the range). i8 has one weight scale a layer, and one weight of the
+/// example's second layer is fifty times the mean.
+#[test]
+fn the_integer_networks_stay_near_the_real_one() {
+    let policy = policy::load(&tests::example()).unwrap();
+    let (i16, i8) = (
+        worst_error(&policy, NumericFormat::I16),
+        worst_error(&policy, NumericFormat::I8),
+    );
+    assert!(i16 <= 1.8e-3, "{i16}");
+    assert!(i8 <= 4e-2, "{i8}");
+}

@@ -1,0 +1,12 @@
+# Part for <model>_usr.mk of dSPACE RTI. RTI compiles sf_minimal.c itself: it must not stand here.
+# SFCN_DIR is the folder of these files, relative to the model's; no blanks in it.
+SFCN_DIR = .
+
+USER_SRCS = \
+    minimal.c \
+    minimal_block.c
+
+USER_SRCS_DIR = $(SFCN_DIR)
+USER_INCLUDES_PATH = $(SFCN_DIR)
+USER_OBJS =
+USER_LIBS =

@@ -1,0 +1,134 @@
+//! What a step costs: the count of executed instructions does not depend on the data, no library, little stack.
+
+use codegen::Language;
+use policy::Policy;
+use targets::{Fpu, Runner, TargetSpec};
+use verify::measure::{Costs, STEPS, measure};
+use verify::toolchain;
+
+fn example() -> Policy {
+    policy::load(&tests::example()).unwrap()
+}
+
+fn emulated(has_fpu: bool) -> impl Iterator<Item = &'static TargetSpec> {
+    targets::TARGETS
+        .iter()
+        .filter(move |target| matches!(target.runner, Runner::Emulated(_)) && (target.fpu != Fpu::None) == has_fpu)
+}
+
+/// Costs of every build of the target.
+fn costs(policy: &Policy, target: &'static TargetSpec) -> Vec<Costs> {
+    let files = codegen::generate(policy, target, &Language::ALL).unwrap().files;
+    let builds = toolchain::builds(target, &[], &[]);
+    let costs = builds.iter().map(|build| {
+        let costs = measure(policy, target, &files, build);
+        costs.unwrap_or_else(|error| panic!("{} {}: {error}", target.name, build.name()))
+    });
+    costs.collect()
+}
+
+/// Helpers of the compilers' libraries for processors without FPU: floats and wide products. No C library.
+fn is_compiler_helper(name: &str) -> bool {
+    let arithmetic = ["sf2", "sf3", "sisf", "sfsi", "si3", "di3"];
+    name.starts_with("__aeabi_f")
+        || name.starts_with("__aeabi_cf")
+        || ["__aeabi_i2f", "__aeabi_ui2f", "__aeabi_lmul", "__aeabi_uidiv"].contains(&name)
+        || (name.starts_with("__") && arithmetic.iter().any(|end| name.ends_with(end)))
+}
+
+/// rustc brings its own functions for clearing and copying memory with every target.
+fn is_memory_helper(name: &str) -> bool {
+    ["memset", "memcpy", "memmove"].contains(&name) || name.starts_with("__aeabi_mem")
+}
+
+fn check_core(target: &TargetSpec, costs: &Costs) {
+    let what = format!("{} {costs:?}", target.name);
+    assert_eq!(costs.static_ram_bytes, 0, "{what}");
+    assert_eq!(costs.steps, STEPS, "{what}");
+    assert!(costs.instructions_min > 1000, "the step itself was counted: {what}");
+    assert!(costs.flash_bytes > 21_000 && costs.flash_bytes < 64_000, "{what}");
+    assert!(costs.stack_bytes >= 64 && costs.stack_bytes < 2048, "{what}");
+    let is_rust = costs.build.starts_with(toolchain::RUSTC);
+    let is_allowed =
+        |name: &String| (target.fpu == Fpu::None && is_compiler_helper(name)) || (is_rust && is_memory_helper(name));
+    assert!(costs.library_calls.iter().all(is_allowed), "{what}");
+}
+
+#[test]
+fn the_instruction_count_does_not_depend_on_the_data_where_floats_are_hardware() {
+    for target in emulated(true) {
+        for costs in costs(&example(), target) {
+            check_core(target, &costs);
+            println!("{} {costs:?}", target.name);
+            assert_eq!(
+                costs.instructions_min, costs.instructions_max,
+                "{} {costs:?}",
+                target.name
+            );
+        }
+    }
+}
+
+/// Filters, limits and activations of other policies, in one build per target.
+#[test]
+fn nor_does_that_of_random_policies() {
+    for (seed, target) in (9000..).zip(emulated(true)) {
+        let folder = tests::random::policy(seed).unwrap();
+        let policy = policy::load(&folder.path()).unwrap();
+        let files = codegen::generate(&policy, target, &Language::ALL).unwrap().files;
+        let build = &toolchain::builds(target, &[], &[])[0];
+        let costs = measure(&policy, target, &files, build).unwrap();
+        assert_eq!(
+            costs.instructions_min, costs.instructions_max,
+            "{} {costs:?}\n{}",
+            target.name, folder.contract
+        );
+    }
+}
+
+/// The float library's count does depend on the data; `docs/targets.md` states by how much.
+#[test]
+fn without_fpu_only_the_float_library_is_called_and_its_count_varies() {
+    for target in emulated(false) {
+        for costs in costs(&example(), target) {
+            check_core(target, &costs);
+            println!("{} {costs:?}", target.name);
+            assert!(
+                costs.instructions_min < costs.instructions_max,
+                "{} {costs:?}",
+                target.name
+            );
+            assert!(!costs.library_calls.is_empty(), "{} {costs:?}", target.name);
+        }
+    }
+}
+
+/// Two hidden layers of 64 floats are 512 of them.
+#[test]
+fn the_example_takes_less_than_800_bytes_of_stack_on_a_cortex_m4f() {
+    let target = targets::find("cortex-m4f").unwrap();
+    for costs in costs(&example(), target) {
+        assert!(costs.stack_bytes > 512 && costs.stack_bytes < 800, "{costs:?}");
+    }
+}
+
+/// The measurement itself: a branch on the data, a static variable and a call of the C library must show.
+#[test]
+fn a_branch_a_static_variable_and_a_library_call_are_seen() {
+    let policy = example();
+    let target = targets::find("cortex-m4f").unwrap();
+    let mut files = codegen::generate(&policy, target, &[Language::C]).unwrap().files;
+    let text = files.get_mut("buck12.c").unwrap();
+    let honest = "return buck12_from_bits(bits & ((bits >> 31) - (uint32_t)1));";
+    assert!(text.contains(honest), "the place of the ReLU");
+    *text = text.replace(
+        honest,
+        "if (bits >> 31) { return 0.0f; } __asm__ volatile(\"nop\"); planted = (planted * 5u) + 1u; return x;",
+    );
+    let place = text.find("BUCK12_TABLE static const float").unwrap();
+    text.insert_str(place, "static uint32_t planted;\n");
+    let build = &toolchain::builds(target, &["arm-none-eabi-gcc".to_owned()], &["-O2".to_owned()])[0];
+    let costs = measure(&policy, target, &files, build).unwrap();
+    assert!(costs.instructions_min < costs.instructions_max, "{costs:?}");
+    assert_eq!(costs.static_ram_bytes, 4, "{costs:?}");
+}

@@ -1,0 +1,153 @@
+//! Generated code on every emulated processor against the interpreter, bit by bit.
+//!
+//! `POLICYC_TARGET_STEPS=20000` sets the steps of every build.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod costs;
+mod counter;
+
+use std::collections::BTreeMap;
+
+use codegen::Language;
+use policy::Policy;
+use targets::{Fpu, TargetSpec};
+use verify::{Options, Outcome, Report};
+
+/// Policies drawn at random beside the example.
+const RANDOM_POLICIES: u64 = 20;
+/// Seed of the first.
+const FIRST_SEED: u64 = 5000;
+
+/// Steps of a build with floats in hardware; emulating float libraries takes ten times as long.
+const STEPS: u64 = 20_000;
+const STEPS_WITHOUT_FPU: u64 = 2_000;
+
+fn target(name: &str) -> &'static TargetSpec {
+    targets::find(name).unwrap()
+}
+
+fn steps(target: &TargetSpec) -> u64 {
+    let asked = std::env::var("POLICYC_TARGET_STEPS").ok();
+    asked.map_or(
+        if target.fpu == Fpu::None {
+            STEPS_WITHOUT_FPU
+        } else {
+            STEPS
+        },
+        |text| text.parse().expect("POLICYC_TARGET_STEPS is a number"),
+    )
+}
+
+fn assert_equal(report: &Report, what: &str) {
+    let text = serde_json::to_string_pretty(report).unwrap();
+    assert!(report.passed(), "{what}: {text}");
+    assert!(
+        report.builds.iter().all(|build| build.outcome == Outcome::Equal),
+        "{what}: a build is missing\n{text}"
+    );
+}
+
+fn run(policy: &Policy, target: &'static TargetSpec, compilers: &[&str], levels: &[&str]) -> Report {
+    let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+    verify::run(
+        policy,
+        Options {
+            steps: steps(target),
+            seed: 3,
+            target,
+            compilers: owned(compilers),
+            levels: owned(levels),
+            ..Options::default()
+        },
+    )
+    .unwrap()
+}
+
+/// The example in every build of the target; the random policies in Rust and in one build of the C each, in turn.
+fn check(name: &str) {
+    let target = target(name);
+    let example = policy::load(&tests::example()).unwrap();
+    let report = run(&example, target, &[], &[]);
+    assert_equal(&report, name);
+    let builds = report.builds.iter().map(|build| build.build.rsplit_once(' ').unwrap());
+    let (rust, c): (Vec<_>, Vec<_>) = builds.partition(|(compiler, _)| *compiler == verify::toolchain::RUSTC);
+    let (rust_compiler, rust_level) = rust[0];
+    for (seed, (compiler, level)) in (FIRST_SEED..FIRST_SEED + RANDOM_POLICIES).zip(c.iter().cycle()) {
+        let folder = tests::random::policy(seed).unwrap();
+        let policy = policy::load(&folder.path()).unwrap_or_else(|faults| panic!("{}\n{faults}", folder.contract));
+        let report = run(&policy, target, &[rust_compiler, compiler], &[rust_level, level]);
+        assert_eq!(report.builds.len(), 2, "{report:?}");
+        assert_equal(&report, &format!("{name}, {compiler} {level}\n{}", folder.contract));
+    }
+}
+
+macro_rules! equal_on {
+    ($($test:ident: $target:literal,)*) => {
+        $(
+            #[test]
+            fn $test() {
+                check($target);
+            }
+        )*
+
+        #[test]
+        fn every_emulated_target_has_its_test() {
+            let emulated = targets::TARGETS.iter().filter(|t| matches!(t.runner, targets::Runner::Emulated(_)));
+            assert_eq!(emulated.map(|t| t.name).collect::<Vec<_>>(), [$($target),*]);
+        }
+    };
+}
+
+equal_on! {
+    equal_on_cortex_m0plus: "cortex-m0plus",
+    equal_on_cortex_m3: "cortex-m3",
+    equal_on_cortex_m4f: "cortex-m4f",
+    equal_on_cortex_m7: "cortex-m7",
+    equal_on_cortex_m33: "cortex-m33",
+    equal_on_riscv32imc: "riscv32imc",
+    equal_on_riscv32imfc: "riscv32imfc",
+    equal_on_powerpc_big_endian: "dspace-ds1202",
+}
+
+/// The comparison itself: one flipped bit of one weight must be found, on both byte orders.
+#[test]
+fn a_flipped_weight_bit_is_found() {
+    let policy = policy::load(&tests::example()).unwrap();
+    for name in ["cortex-m4f", "dspace-ds1202"] {
+        let target = target(name);
+        let files = codegen::generate(&policy, target, &[Language::C]).unwrap().files;
+        let spoilt = with_flipped_weight(&files, &policy.name);
+        let report = verify::run(
+            &policy,
+            Options {
+                steps: 50,
+                target,
+                generated: Some(&spoilt),
+                compilers: vec![target.c_compilers[0].program.to_owned()],
+                levels: vec!["-O2".to_owned()],
+                ..Options::default()
+            },
+        )
+        .unwrap();
+        let Outcome::Different { difference } = &report.builds[0].outcome else {
+            panic!("{name}: {report:?}")
+        };
+        assert_eq!(
+            (difference.event.as_str(), difference.what.as_str()),
+            ("start", "self_test")
+        );
+    }
+}
+
+/// The lowest bit of the first weight, changed in the text.
+fn with_flipped_weight(files: &BTreeMap<String, String>, name: &str) -> BTreeMap<String, String> {
+    let mut files = files.clone();
+    let text = files.get_mut(&format!("{name}.c")).unwrap();
+    let table = text.find(&format!("{name}_weights0[")).unwrap();
+    let start = table + text[table..].find("{\n").unwrap() + 2;
+    let end = start + text[start..].find("f,").unwrap();
+    let weight: f32 = text[start..end].trim().parse().unwrap();
+    let flipped = f32::from_bits(weight.to_bits() ^ 1);
+    text.replace_range(start..end, &format!("    {flipped:?}"));
+    files
+}

@@ -1,0 +1,246 @@
+//! What the back-to-back kit compares with: the interpreter's answers on the policy and on the construct suite.
+
+use codegen::Language;
+use codegen::backend::kit::{Material, Trace};
+use policy::{Policy, ReadOptions};
+use targets::{RowBlock, TargetSpec};
+
+use crate::oracle::{Chunk, Oracle};
+use crate::session::VerifyError;
+use crate::traces::{Event, Stream};
+
+/// A small policy that uses every construct of the generated code.
+const CONSTRUCTS: &[(&str, &[u8])] = &[
+    (
+        "policy.toml",
+        include_bytes!("../../tests/golden/cases/constructs/policy.toml"),
+    ),
+    (
+        "drm.toml",
+        include_bytes!("../../tests/golden/cases/constructs/drm.toml"),
+    ),
+    (
+        "weights.safetensors",
+        include_bytes!("../../tests/golden/cases/constructs/weights.safetensors"),
+    ),
+];
+
+/// Control steps of the policy in a kit unless the user asks for another number.
+pub const DEFAULT_STEPS: u32 = 500;
+/// Control steps of each controller of the construct suite.
+const SUITE_STEPS: u32 = 300;
+/// Seed of the moves: one whose 300 steps on the suite reach all that a test below asks for.
+const SEED: u64 = 2;
+/// The block form of a layer, with a shorter last block.
+const BLOCK: RowBlock = RowBlock::Rows(4);
+
+/// Moves and expected answers for the kit of `policy`, `steps` of them control steps.
+///
+/// # Errors
+/// Only for a fault in the compiler itself.
+pub fn material(policy: &Policy, target: &TargetSpec, steps: u32) -> Result<Material, VerifyError> {
+    let constructs = constructs()?;
+    let suite = [("suite", target.c_row_block), ("blocks", BLOCK)].map(|(name, block)| {
+        let mut part = constructs.clone();
+        // the user may link several kits into one program
+        part.name = format!("{}_kit_{name}", policy.name);
+        let target = TargetSpec {
+            c_row_block: block,
+            ..target.clone()
+        };
+        let program = codegen::lower(&part, &target, Language::C);
+        trace(&part, SUITE_STEPS).map(|trace| (program, trace))
+    });
+    Ok(Material {
+        policy: trace(policy, steps)?,
+        suite: suite.into_iter().collect::<Result<_, _>>()?,
+    })
+}
+
+/// The policy of the construct suite.
+///
+/// # Errors
+/// If it does not pass the check: a fault of this program.
+pub fn constructs() -> Result<Policy, VerifyError> {
+    let options = ReadOptions::embedded(CONSTRUCTS);
+    let raw = policy::read("policy.toml".as_ref(), &options);
+    raw.and_then(policy::check)
+        .map_err(|faults| VerifyError::Constructs(faults.to_string()))
+}
+
+fn trace(policy: &Policy, steps: u32) -> Result<Trace, VerifyError> {
+    let mut oracle = Oracle::new(policy);
+    let mut stream = Stream::new(policy, SEED, &[]);
+    let chunk = oracle
+        .next_chunk(&mut stream, u64::from(steps))
+        .map_err(VerifyError::Interpreter)?;
+    Ok(packed(policy, &oracle, &chunk))
+}
+
+/// The words of a chunk in the form of the kit: its layout is that of [`crate::protocol`].
+fn packed(policy: &Policy, oracle: &Oracle, chunk: &Chunk) -> Trace {
+    let values = policy.features.len() + policy.actions.len();
+    let mut trace = Trace::default();
+    let (mut input, mut expected) = (chunk.input.as_slice(), chunk.expected.as_slice());
+    for event in &chunk.events {
+        let answer = take(&mut expected, oracle.layout().answer(event).len());
+        // the kind comes first
+        take(&mut input, 1);
+        match event {
+            Event::Step(_) => {
+                let (before, rest) = answer.split_at(values);
+                let (command, state) = rest.split_at(4);
+                // the last word is the driver's verdict on purity
+                let state = &state[..state.len() - 1];
+                let rest = before.iter().chain(state).copied();
+                trace.step(take(&mut input, policy.signals.len()), command, rest);
+            }
+            Event::SetMapping { r, .. } => {
+                let coefficients = take(&mut input, 4);
+                let given = if r.is_some() { coefficients } else { &coefficients[..3] };
+                trace.set_mapping(given, answer[0], answer[1..].iter().copied());
+            }
+            Event::Reset => trace.reset(answer.iter().copied()),
+            Event::Init => trace.init(answer.iter().copied()),
+            Event::Network(observation) => {
+                take(&mut input, observation.len());
+            }
+        }
+    }
+    trace
+}
+
+fn take<'a>(words: &mut &'a [u32], count: usize) -> &'a [u32] {
+    let (first, rest) = words.split_at(count.min(words.len()));
+    *words = rest;
+    first
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+    use std::mem::{Discriminant, discriminant};
+
+    use codegen::program::{ActivationCode, NetworkCode, Op};
+
+    use super::*;
+
+    /// Every operation of the program; the match makes the compiler ask for new ones.
+    fn all_operations() -> Vec<Op> {
+        let all = [
+            Op::Measured(0),
+            Op::Code(0),
+            Op::Held(0),
+            Op::Sanitised(0),
+            Op::Memory(0),
+            Op::PreviousDuty,
+            Op::PreviousCommand,
+            Op::SoftCap,
+            Op::Coefficient(codegen::program::Coefficient::A),
+            Op::ChosenDuty,
+            Op::Constant(1.0.into()),
+            Op::Neg(0),
+            Op::Add(0, 0),
+            Op::Sub(0, 0),
+            Op::Mul(0, 0),
+            Op::Select {
+                flag: 0,
+                then: 0,
+                otherwise: 0,
+            },
+            Op::Clamp { x: 0, low: 0, high: 0 },
+            Op::LineSum {
+                word: 0,
+                length: 0,
+                newest: 0,
+                primed: 0,
+            },
+            Op::Primed,
+            Op::Usable,
+            Op::Clipped,
+            Op::HeldSample,
+            Op::PrimedNow,
+            Op::Within { x: 0, low: 0, high: 0 },
+            Op::Outside { x: 0, low: 0, high: 0 },
+            Op::Above(0, 0),
+            Op::And(0, 0),
+            Op::Or(0, 0),
+        ];
+        for op in &all {
+            match op {
+                Op::Measured(_) | Op::Code(_) | Op::Held(_) | Op::Sanitised(_) | Op::Memory(_) => {}
+                Op::PreviousDuty | Op::PreviousCommand | Op::SoftCap | Op::Coefficient(_) | Op::ChosenDuty => {}
+                Op::Constant(_) | Op::Neg(_) | Op::Add(..) | Op::Sub(..) | Op::Mul(..) | Op::Select { .. } => {}
+                Op::Clamp { .. } | Op::LineSum { .. } | Op::Primed | Op::Usable | Op::Clipped => {}
+                Op::HeldSample | Op::PrimedNow | Op::Within { .. } | Op::Outside { .. } => {}
+                Op::Above(..) | Op::And(..) | Op::Or(..) => {}
+            }
+        }
+        all.to_vec()
+    }
+
+    fn suite() -> Vec<Program> {
+        let target = targets::find("host").unwrap();
+        let material = material(&constructs().unwrap(), target, 10).unwrap();
+        material.suite.into_iter().map(|(program, _)| program).collect()
+    }
+
+    use codegen::Program;
+
+    #[test]
+    fn the_suite_uses_every_operation_of_the_program() {
+        let suite = suite();
+        let blocks = suite
+            .iter()
+            .flat_map(|p| [&p.front.block, &p.decide.block, &p.advance.block]);
+        let used: Vec<Discriminant<Op>> = blocks.flat_map(|block| &block.ops).map(discriminant).collect();
+        let missing: Vec<Op> = all_operations()
+            .into_iter()
+            .filter(|op| !used.contains(&discriminant(op)))
+            .collect();
+        assert_eq!(missing, []);
+    }
+
+    #[test]
+    fn the_suite_uses_every_activation_and_every_form_of_a_layer() {
+        let suite = suite();
+        let layers = || {
+            suite.iter().flat_map(|program| match &program.network {
+                NetworkCode::Real { layers, .. } => layers.as_slice(),
+                NetworkCode::Integer(_) => &[],
+            })
+        };
+        let kinds: BTreeSet<u8> = layers()
+            .map(|layer| match layer.activation {
+                ActivationCode::Identity => 0,
+                ActivationCode::Relu => 1,
+                ActivationCode::LeakyRelu(_) => 2,
+                ActivationCode::Tanh => 3,
+            })
+            .collect();
+        assert_eq!(kinds.len(), 4);
+        assert!(layers().any(|layer| layer.full_blocks() == 1 && layer.tail_rows() == 0));
+        assert!(layers().any(|layer| layer.full_blocks() > 1 && layer.tail_rows() == 0));
+        assert!(layers().any(|layer| layer.full_blocks() > 1 && layer.tail_rows() > 0));
+    }
+
+    /// A trace that never clips or falls back would check less than it says.
+    #[test]
+    fn the_moves_of_the_suite_reach_every_status_and_action() {
+        let constructs = constructs().unwrap();
+        let mut oracle = Oracle::new(&constructs);
+        let mut stream = Stream::new(&constructs, SEED, &[]);
+        oracle.next_chunk(&mut stream, u64::from(SUITE_STEPS)).unwrap();
+        let coverage = oracle.coverage();
+        assert!(coverage.status_bits.iter().all(|count| *count > 0), "{coverage:?}");
+        assert!(
+            coverage.actions.iter().filter(|count| **count > 0).count() >= 4,
+            "{coverage:?}"
+        );
+        assert!(coverage.resets > 0 && coverage.inits > 0, "{coverage:?}");
+        assert!(
+            coverage.mappings_accepted > 0 && coverage.mappings_refused > 0,
+            "{coverage:?}"
+        );
+    }
+}

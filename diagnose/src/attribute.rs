@@ -18,7 +18,7 @@ const LEAST_SHARE: f64 = 0.004;
 /// An explanation within this of the best is as good, in chi-square ...
 const TIE: f64 = 9.0;
 /// ... or within this share of what the cause explains: two simulators agree no better.
-const TIE_SHARE: f64 = 0.015;
+const TIE_SHARE: f64 = 0.005;
 /// A candidate is fitted if it explains this share of the most that one explains, and this much, both at first order.
 const FOLLOWED: f64 = 0.2;
 const LEAST_FOLLOWED: f64 = 6.0;

@@ -24,6 +24,10 @@ enum Reach {
     Own(f64, f64, f64),
     /// In units of v / i: highest and step.
     Resistance(f64, f64),
+    /// In units of v / i: lowest, highest and step.
+    ResistanceFrom(f64, f64, f64),
+    /// In units of t_sw i / v.
+    Capacitance(f64, f64, f64),
     /// In units of i / v.
     Conductance(f64, f64),
     /// In units of v_in.
@@ -81,18 +85,8 @@ impl Knob {
     /// A lag far shorter than a period is none: it would only cost steps of the integrator.
     fn snapped(&self, model: &Model, value: f64) -> f64 {
         let is_lag = self.name.starts_with("time_constant");
-        let is_source = self.name == "resistance" && model.plant.source.c_in > 0.0;
         let shortest = NO_LAG * model.plant.t_sw();
-        let lag = if is_source {
-            value * model.plant.source.c_in
-        } else {
-            value
-        };
-        if (is_lag || is_source) && lag < shortest {
-            0.0
-        } else {
-            value
-        }
+        if is_lag && value < shortest { 0.0 } else { value }
     }
 
     /// Lowest value, highest value, and step, for a converter of these magnitudes around `own`.
@@ -102,6 +96,8 @@ impl Knob {
         match self.reach {
             Reach::Own(low, high, step) => by(own, low, high, step),
             Reach::Resistance(high, step) => by(bases.v / bases.i, 0.0, high, step),
+            Reach::ResistanceFrom(low, high, step) => by(bases.v / bases.i, low, high, step),
+            Reach::Capacitance(low, high, step) => by(bases.t_sw * bases.i / bases.v, low, high, step),
             Reach::Conductance(high, step) => by(bases.i / bases.v, 0.0, high, step),
             Reach::Source(low, high, step) => by(bases.v_in, low, high, step),
             Reach::Voltage(low, high, step) => by(bases.v, low, high, step),
@@ -266,8 +262,13 @@ pub const CAUSES: &[Cause] = &[
         "source_impedance",
         "resistance of the source before an input capacitor",
         &[
-            knob("resistance", &["source.resistance"], OHMS),
-            knob("c_in", &["source.c_in"], Reach::Plain(1e-5, 2.0, 1e-4)),
+            // bounds keep their time constant above NO_LAG periods
+            knob(
+                "resistance",
+                &["source.resistance"],
+                Reach::ResistanceFrom(0.002, 0.5, 0.005),
+            ),
+            knob("c_in", &["source.c_in"], Reach::Capacitance(10.0, 1e6, 20.0)),
         ],
         Search::From(&[&[4.0, 1.0], &[4.0, 20.0]]),
     ),

@@ -23,7 +23,8 @@ impl Plant {
         let mut track = Track::at(self.state.sample.i_l, self.state.sample.v_out);
         let (mut s, mut started) = (0.0, false);
         while s < end {
-            if !started && s >= start_of_pwm {
+            // a sum of differences may end an ulp before the start
+            if !started && s + same >= start_of_pwm {
                 started = true;
                 self.start_period(duty);
             }

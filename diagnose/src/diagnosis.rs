@@ -49,7 +49,7 @@ pub struct Value {
 pub struct Evidence {
     /// Chi-square lost without it, over the scatter of the noise.
     pub delta_chi2: f64,
-    /// What noise alone reaches in less than 1 % of records.
+    /// What one cause must reach.
     pub threshold: f64,
 }
 

@@ -145,5 +145,5 @@ pub const LINUX_PPC: Board = Board {
     arguments: &["-cpu", "e500mc"],
     files: &[HEADER, WORDS, LINUX],
     linker_script: None,
-    link_flags: &["-std=gnu99", "-O2", "-static"],
+    link_flags: &["-std=gnu99", "-O2", "-static", "-no-pie"],
 };

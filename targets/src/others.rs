@@ -61,15 +61,15 @@ pub const DSPACE_DS1202: TargetSpec = TargetSpec {
     c_compilers: &[CCompiler {
         program: "powerpc-linux-gnu-gcc",
         package: "gcc-powerpc-linux-gnu",
-        // what the e5500 and the emulated e500mc share
-        machine_flags: &["-m32", "-mcpu=e500mc"],
+        // what the e5500 and the emulated e500mc share; a box has fixed addresses, Linux compilers think otherwise
+        machine_flags: &["-m32", "-mcpu=e500mc", "-fno-pie"],
     }],
     // the box's compiler takes C90; it contracts unless told otherwise
     c_flags: &["-std=c90", "-ffp-contract=off"],
     // the box itself takes C only: this is the same processor with another language
     rust: Some(RustTarget {
         triple: "powerpc-unknown-linux-gnu",
-        machine_flags: &[],
+        machine_flags: &["-Crelocation-model=static"],
     }),
     rust_flags: EXACT_RUST,
     runner: Runner::Emulated(LINUX_PPC),

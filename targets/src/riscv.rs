@@ -35,6 +35,7 @@ pub const RISCV32IMC: TargetSpec = TargetSpec {
     clock_hz: Some(160_000_000),
     c_row_block: RowBlock::Rows(8),
     rust_row_block: RowBlock::Rows(8),
+    // clang puts float constants into the writable .sdata unless the limit is 0
     // the bare compiler has no C library, so <stdint.h> is there in freestanding mode only
     c_compilers: &[
         gcc(&["-march=rv32imc", "-mabi=ilp32", "-ffreestanding"]),
@@ -42,6 +43,7 @@ pub const RISCV32IMC: TargetSpec = TargetSpec {
             "--target=riscv32-none-elf",
             "-march=rv32imc",
             "-mabi=ilp32",
+            "-msmall-data-limit=0",
             "-ffreestanding",
         ]),
     ],
@@ -68,6 +70,7 @@ pub const RISCV32IMFC: TargetSpec = TargetSpec {
             "--target=riscv32-none-elf",
             "-march=rv32imfc",
             "-mabi=ilp32f",
+            "-msmall-data-limit=0",
             "-ffreestanding",
         ]),
     ],

@@ -19,7 +19,8 @@ fn emulated(has_fpu: bool) -> impl Iterator<Item = &'static TargetSpec> {
 /// Costs of every build of the target.
 fn costs(policy: &Policy, target: &'static TargetSpec) -> Vec<Costs> {
     let files = codegen::generate(policy, target, &Language::ALL).unwrap().files;
-    let builds = toolchain::builds(target, &[], &[]);
+    let compilers: Vec<String> = super::compilers(target).into_iter().map(str::to_owned).collect();
+    let builds = toolchain::builds(target, &compilers, &[]);
     let costs = builds.iter().map(|build| {
         let costs = measure(policy, target, &files, build);
         costs.unwrap_or_else(|error| panic!("{} {}: {error}", target.name, build.name()))

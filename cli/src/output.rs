@@ -48,6 +48,22 @@ pub fn write_texts(folder: &Path, files: &BTreeMap<String, String>) -> Result<()
     )
 }
 
+/// Writes the results of a run to a folder that holds nothing yet, then says `summary` and what to look at.
+///
+/// # Errors
+/// If the folder holds something by now; else as [`write_all`].
+pub fn write_results(
+    folder: &Path,
+    files: &BTreeMap<String, String>,
+    summary: &str,
+    page: &str,
+) -> Result<(), Failure> {
+    check_new_folder(folder)?;
+    write_texts(folder, files)?;
+    let (count, out) = (files.len(), folder.display());
+    say(&format!("{summary}\n{count} files in {out}; to look at: {out}/{page}"))
+}
+
 /// Writes one file that must not exist yet.
 ///
 /// # Errors

@@ -69,15 +69,6 @@ const NGSPICE_HEADER: &[&str] = &[
     "-xc",
     "/dev/null",
 ];
-const POWERPC: &[&str] = &["powerpc-linux-gnu-gcc", "--version"];
-const POWERPC_LIBC: &[&str] = &[
-    "powerpc-linux-gnu-gcc",
-    "-fsyntax-only",
-    "-include",
-    "math.h",
-    "-xc",
-    "/dev/null",
-];
 
 /// One row a tool. A Python package is probed by `["python3", "-c", "import it"]`.
 const TOOLS: &[Tool] = &[
@@ -88,9 +79,6 @@ const TOOLS: &[Tool] = &[
     tool("C headers", C_HEADERS, Apt("libc6-dev")),
     tool("g++", &["g++", "--version"], Apt("g++")),
     tool("clang", &["clang", "--version"], Apt("clang")),
-    tool("gcc for PowerPC", POWERPC, Apt("gcc-powerpc-linux-gnu")),
-    tool("C library for PowerPC", POWERPC_LIBC, Apt("libc6-dev-powerpc-cross")),
-    tool("QEMU for programs", &["qemu-ppc", "--version"], Apt("qemu-user")),
     tool("callgrind", CALLGRIND, Apt("valgrind")),
     tool(
         "arm-none-eabi-gcc",

@@ -81,15 +81,7 @@ pub fn run(options: &Simulate) -> Result<Outcome, Failure> {
     }
     let found = found?;
     let files = files::all(&found)?;
-    output::check_new_folder(&options.out)?;
-    output::write_texts(&options.out, &files)?;
-    let out = options.out.display();
-    output::say(&format!(
-        "{}\n{} files in {out}; to look at: {out}/{}",
-        files::summary(&found),
-        files.len(),
-        files::PAGE
-    ))?;
+    output::write_results(&options.out, &files, &files::summary(&found), files::PAGE)?;
     let equal = found.check.is_none_or(|check| check.differences.is_empty());
     Ok(if equal { Outcome::Done } else { Outcome::Different })
 }

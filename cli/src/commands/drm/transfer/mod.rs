@@ -109,15 +109,7 @@ pub fn run(options: &Transfer) -> Result<Outcome, Failure> {
     }
     let found = found?;
     let files = files::all(&found)?;
-    output::check_new_folder(&options.out)?;
-    output::write_texts(&options.out, &files)?;
-    let out = options.out.display();
-    output::say(&format!(
-        "{}\n{} files in {out}; to look at: {out}/{}",
-        files::said(&found),
-        files.len(),
-        files::PAGE
-    ))?;
+    output::write_results(&options.out, &files, &files::said(&found), files::PAGE)?;
     Ok(Outcome::Done)
 }
 

@@ -29,6 +29,7 @@ pub mod scales;
 mod weights;
 
 pub use check::check;
+pub use digests::sha256;
 pub use faults::Faults;
 pub use model::*;
 pub use raw::{RawPolicy, ReadOptions, read};

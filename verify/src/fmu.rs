@@ -92,7 +92,10 @@ type Binary = (&'static str, &'static str, Vec<u8>);
 
 fn binary(name: &str, target: &TargetSpec, fmi: Fmi, files: &Files) -> Result<Binary, Absence> {
     if !matches!(target.runner, Runner::Native) {
-        return Err(Absence::Told(format!("the code is for {}, not for this machine", target.name)));
+        return Err(Absence::Told(format!(
+            "the code is for {}, not for this machine",
+            target.name
+        )));
     }
     let Some(folder) = platform(fmi) else {
         return Err(Absence::Told("binaries are made on Linux for x86-64 only".to_owned()));
@@ -104,14 +107,20 @@ fn binary(name: &str, target: &TargetSpec, fmi: Fmi, files: &Files) -> Result<Bi
     };
     let temporary = tempfile::tempdir()?;
     for (_, file) in fmu::layout(name, fmi) {
-        std::fs::write(temporary.path().join(&file), files.get(&file).map_or("", String::as_str))?;
+        std::fs::write(
+            temporary.path().join(&file),
+            files.get(&file).map_or("", String::as_str),
+        )?;
     }
     let mut command = Command::new(compiler);
     command.current_dir(temporary.path()).env("LC_ALL", "C");
     command.args(target.c_flags).args(FLAGS);
     command.arg(format!("-D{}_OVERRIDE_FUNCTION_PREFIX", fmi.name().to_uppercase()));
     command.arg(format!("-D{}_FMI_OWN_HEADER", name.to_uppercase()));
-    let output = run_for(command.args(fmu::sources(name, fmi)).args(["-o", LIBRARY]), COMPILER_TIMEOUT)?;
+    let output = run_for(
+        command.args(fmu::sources(name, fmi)).args(["-o", LIBRARY]),
+        COMPILER_TIMEOUT,
+    )?;
     if !output.status.success() {
         let text = String::from_utf8_lossy(&output.stderr);
         let first = text.lines().find(|line| line.contains("error")).unwrap_or("no message");

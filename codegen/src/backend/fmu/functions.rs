@@ -51,7 +51,11 @@ const ABSENT_2: [Absent; 4] = [
         "const fmi2ValueReference references[], size_t count, const fmi2Integer orders[], fmi2Real values[]",
         NOT_INTERPOLATED,
     ),
-    ("CancelStep", "", "no step is under way: fmi2DoStep ends before it returns"),
+    (
+        "CancelStep",
+        "",
+        "no step is under way: fmi2DoStep ends before it returns",
+    ),
 ];
 
 const REFERENCES: &str = "const fmi3ValueReference references[], size_t count, ";
@@ -62,14 +66,22 @@ const DERIVATIVE: &str = "const fmi3ValueReference unknowns[], size_t unknown_co
 const ABSENT_3: [Absent; 32] = [
     ("GetClock", "*fmi3Clock values[]", NO_CLOCKS),
     ("SetClock", "*const fmi3Clock values[]", NO_CLOCKS),
-    ("GetIntervalDecimal", "*fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[]", NO_CLOCKS),
+    (
+        "GetIntervalDecimal",
+        "*fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[]",
+        NO_CLOCKS,
+    ),
     (
         "GetIntervalFraction",
         "*fmi3UInt64 counters[], fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[]",
         NO_CLOCKS,
     ),
     ("GetShiftDecimal", "*fmi3Float64 shifts[]", NO_CLOCKS),
-    ("GetShiftFraction", "*fmi3UInt64 counters[], fmi3UInt64 resolutions[]", NO_CLOCKS),
+    (
+        "GetShiftFraction",
+        "*fmi3UInt64 counters[], fmi3UInt64 resolutions[]",
+        NO_CLOCKS,
+    ),
     ("SetIntervalDecimal", "*const fmi3Float64 intervals[]", NO_CLOCKS),
     (
         "SetIntervalFraction",
@@ -123,11 +135,23 @@ const ABSENT_3: [Absent; 32] = [
         CONTINUOUS,
     ),
     ("SetTime", "fmi3Float64 time", CONTINUOUS),
-    ("SetContinuousStates", "const fmi3Float64 states[], size_t count", CONTINUOUS),
-    ("GetContinuousStateDerivatives", "fmi3Float64 values[], size_t count", CONTINUOUS),
+    (
+        "SetContinuousStates",
+        "const fmi3Float64 states[], size_t count",
+        CONTINUOUS,
+    ),
+    (
+        "GetContinuousStateDerivatives",
+        "fmi3Float64 values[], size_t count",
+        CONTINUOUS,
+    ),
     ("GetEventIndicators", "fmi3Float64 values[], size_t count", CONTINUOUS),
     ("GetContinuousStates", "fmi3Float64 values[], size_t count", CONTINUOUS),
-    ("GetNominalsOfContinuousStates", "fmi3Float64 values[], size_t count", CONTINUOUS),
+    (
+        "GetNominalsOfContinuousStates",
+        "fmi3Float64 values[], size_t count",
+        CONTINUOUS,
+    ),
     ("GetNumberOfEventIndicators", "size_t *count", CONTINUOUS),
     ("GetNumberOfContinuousStates", "size_t *count", CONTINUOUS),
 ];
@@ -149,7 +173,9 @@ pub fn all(fmi: Fmi) -> Vec<String> {
         Fmi::Two => &[][..],
         Fmi::Three => &ACCESSED,
     };
-    let access = access.iter().flat_map(|name| ["Get", "Set"].map(|verb| format!("{verb}{name}")));
+    let access = access
+        .iter()
+        .flat_map(|name| ["Get", "Set"].map(|verb| format!("{verb}{name}")));
     let absent = table(fmi).iter().map(|(name, ..)| (*name).to_owned());
     let names = common.split_ascii_whitespace().map(str::to_owned);
     let names = names.chain(access).chain(absent);

@@ -75,10 +75,7 @@ pub fn layout(name: &str, fmi: Fmi) -> Vec<(String, String)> {
 #[must_use]
 pub fn sources(name: &str, fmi: Fmi) -> Vec<String> {
     let parts = ["", "_block", "_fmu"].map(|part| format!("{name}{part}.c"));
-    parts
-        .into_iter()
-        .chain([format!("{name}_{}.c", fmi.name())])
-        .collect()
+    parts.into_iter().chain([format!("{name}_{}.c", fmi.name())]).collect()
 }
 
 /// The files around the core; [`layout`] says where they stand in the archive.

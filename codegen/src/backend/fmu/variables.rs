@@ -11,7 +11,9 @@ use crate::program::SignalPort;
 /// Inputs, `enable`, outputs, parameters; and a name for the time that none of them has.
 pub fn of(program: &Program, block: &BlockView) -> (Vec<VariableView>, String) {
     let inputs = program.signals.iter().zip(&block.inputs).enumerate();
-    let mut all: Vec<VariableView> = inputs.map(|(index, (signal, port))| input(index, signal, &port.meaning)).collect();
+    let mut all: Vec<VariableView> = inputs
+        .map(|(index, (signal, port))| input(index, signal, &port.meaning))
+        .collect();
     all.push(VariableView {
         name: "enable".to_owned(),
         kind: Kind::Boolean,
@@ -21,9 +23,17 @@ pub fn of(program: &Program, block: &BlockView) -> (Vec<VariableView>, String) {
             .meaning("true: works; false: fallback duty, state as after start")
     });
     for (index, (name, kind, meaning)) in [
-        ("duty", Kind::Real, "commanded duty, 0 to 1, for the control period that begins with the step"),
+        (
+            "duty",
+            Kind::Real,
+            "commanded duty, 0 to 1, for the control period that begins with the step",
+        ),
         ("action", Kind::Integer, "index of the greedy action, from 0"),
-        ("status", Kind::Integer, "status bits; 65536 is added while the coefficients are refused"),
+        (
+            "status",
+            Kind::Integer,
+            "status bits; 65536 is added while the coefficients are refused",
+        ),
     ]
     .into_iter()
     .enumerate()
@@ -127,7 +137,11 @@ fn input(index: usize, signal: &SignalPort, meaning: &str) -> VariableView {
 /// Units of the inputs, each once, with base units as far as they are known here.
 pub fn units(program: &Program) -> Vec<UnitView> {
     let mut all: Vec<UnitView> = Vec::new();
-    for signal in program.signals.iter().filter(|signal| !signal.is_code && !signal.unit.is_empty()) {
+    for signal in program
+        .signals
+        .iter()
+        .filter(|signal| !signal.is_code && !signal.unit.is_empty())
+    {
         let unit = UnitView {
             name: xml(&signal.unit),
             base: base(&signal.unit),

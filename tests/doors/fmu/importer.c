@@ -210,7 +210,8 @@ static void variables(const api *f)
     double x;
 
     check(set(f, c, DUTY, 'r', 0.3) == ERROR, "an output cannot be set");
-    check(get(f, c, 0u, 'r', &x) == ERROR && get(f, c, 99u, 'r', &x) == ERROR, "what is no variable is refused");
+    check(get(f, c, 0u, 'r', &x) == OK && x == 2.0, "the time can be read");
+    check(get(f, c, 0u, 'i', &x) == ERROR && get(f, c, 99u, 'r', &x) == ERROR, "what is no variable is refused");
     check(set(f, c, 0u, 'r', 1.0) == ERROR && set(f, c, FIRST_PARAMETER + PARAMETERS, 'r', 1.0) == ERROR,
           "what is no variable cannot be set");
     check(get(f, c, DUTY, 'i', &x) == ERROR && get(f, c, ACTION, 'r', &x) == ERROR, "another type is refused");

@@ -1,10 +1,8 @@
 //! Planted faults: each must be seen by the importing program or by FMPy.
 
 use super::super::golden_case;
-use super::VALIDATE;
-use super::unit::{Unit, VERSIONS, python};
+use super::unit::{Descriptions, Unit, VERSIONS};
 use codegen::Door;
-use tests::tools::run;
 
 /// Ending of the file, text, its replacement, what is said of it: anything where nothing is given.
 type Fault = (&'static str, &'static str, &'static str, &'static str);
@@ -103,12 +101,7 @@ const FAULTS: &[Fault] = &[
         "ends the initialisation",
     ),
     // modes
-    (
-        "_fmu.c",
-        "if ((fmu->state.mode & modes) != 0u)",
-        "if (1)",
-        "no step without initialisation",
-    ),
+    ("_fmu.c", "if ((fmu->state.mode & modes) != 0u)", "if (1)", "no step"),
 ];
 
 #[test]
@@ -227,17 +220,14 @@ fn fmpy_sees_faults_of_the_description() {
         ("causality=\"independent\"", "causality=\"local\""),
         ("instantiationToken=", "guid="),
     ];
+    let (mut descriptions, mut edits) = (Descriptions::default(), Vec::new());
     for (door, own) in VERSIONS.into_iter().zip([two, three]) {
-        let ending = format!("_{}.xml", door.fmi().unwrap().name());
         for (from, to) in common.into_iter().chain(own) {
-            let unit = Unit::edited(&policy, door, &ending, from, to);
-            let ran = run(python()
-                .args(["-c", VALIDATE])
-                .arg(unit.path().join(&unit.archive.file)));
-            assert!(
-                ran.code == Some(0) && ran.stdout != "[]\n",
-                "not seen: {from} -> {to} {ran:?}"
-            );
+            descriptions.add(&policy, door, from, to);
+            edits.push((from, to));
         }
+    }
+    for (problem, edit) in descriptions.problems().iter().zip(edits) {
+        assert!(!problem.is_empty(), "not seen: {edit:?}");
     }
 }

@@ -51,6 +51,52 @@ pub fn standard_headers() -> &'static Path {
     })
 }
 
+/// The files of an FMU with the first `from` of the file with that ending in the place of `to`.
+#[track_caller]
+fn edited(policy: &Policy, door: Door, ending: &str, from: &str, to: &str) -> BTreeMap<String, String> {
+    let mut files = files(policy, door, 1);
+    if !from.is_empty() {
+        let text = files.get_mut(&format!("{}{ending}", policy.name)).unwrap();
+        assert!(text.contains(from), "{from}");
+        *text = text.replacen(from, to, 1);
+    }
+    files
+}
+
+/// FMUs without binary, as folders, for FMPy to look at their descriptions.
+#[derive(Default)]
+pub struct Descriptions {
+    folders: Vec<tempfile::TempDir>,
+}
+
+impl Descriptions {
+    /// One more; returns its description.
+    #[track_caller]
+    pub fn add(&mut self, policy: &Policy, door: Door, from: &str, to: &str) -> String {
+        let fmi = door.fmi().unwrap();
+        let files = edited(policy, door, &format!("_{}.xml", fmi.name()), from, to);
+        let folder = tempfile::tempdir().unwrap();
+        let layout = codegen::backend::fmu::layout(&policy.name, fmi);
+        let members = layout.iter().map(|(path, file)| (path.clone(), files[file].clone()));
+        write(&members.collect(), folder.path());
+        self.folders.push(folder);
+        files[&layout[0].1].clone()
+    }
+
+    /// The problems of each.
+    pub fn problems(&self) -> Vec<String> {
+        let script = "import sys; from fmpy.validation import validate_fmu\n\
+                      for path in sys.argv[1:]: print('; '.join(validate_fmu(path)).replace('\\n', ' '))";
+        let ran = run(python()
+            .args(["-c", script])
+            .args(self.folders.iter().map(tempfile::TempDir::path)));
+        assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+        let lines: Vec<String> = ran.stdout.lines().map(str::to_owned).collect();
+        assert_eq!(lines.len(), self.folders.len(), "{lines:?}");
+        lines
+    }
+}
+
 /// An FMU with its files and its archive in a folder.
 pub struct Unit {
     folder: tempfile::TempDir,
@@ -68,12 +114,7 @@ impl Unit {
     /// With the first `from` of the file with that ending in the place of `to`.
     #[track_caller]
     pub fn edited(policy: &Policy, door: Door, ending: &str, from: &str, to: &str) -> Self {
-        let mut files = files(policy, door, 1);
-        if !from.is_empty() {
-            let text = files.get_mut(&format!("{}{ending}", policy.name)).unwrap();
-            assert!(text.contains(from), "{from}");
-            *text = text.replacen(from, to, 1);
-        }
+        let files = edited(policy, door, ending, from, to);
         let target = targets::find("host").unwrap();
         let archive = verify::fmu::archives(policy, target, &[door], &files)
             .unwrap()

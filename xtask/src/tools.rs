@@ -127,6 +127,11 @@ const TOOLS: &[Tool] = &[
     tool("make", &["make", "--version"], Apt("make")),
     tool("venv", VENV, Apt("python3-venv")),
     tool("FMPy", FMPY, Python("fmpy==0.3.32")),
+    tool(
+        "libcosim",
+        &["python3", "-c", "import libcosimpy"],
+        Python("libcosimpy==0.0.6"),
+    ),
 ];
 
 /// Tests leave out Rust on the targets that this names, by triple and separated by commas.

@@ -8,6 +8,7 @@ use crate::workspace::{Crate, Dependency, Kind};
 const LAYERS: &[&[&str]] = &[
     &["toml-input", "targets", "templates", "report"],
     &["policy", "plant"],
+    &["certify"],
     &["interp", "codegen", "drm"],
     &["closed-loop"],
     &["policy-macro", "train", "spice", "diagnose", "verify"],
@@ -31,6 +32,7 @@ const FORBIDDEN: &[Forbidden] = &[
     Forbidden {
         from: &[
             "policy",
+            "certify",
             "interp",
             "codegen",
             "targets",

@@ -124,7 +124,9 @@ impl Certifier {
         let mut slice = slice.clone();
         // a coarse grid sees the region, finer ones its edges
         for _ in 0..3 {
-            let Some((x, y)) = self.changing(domain, &slice) else { break };
+            let Some((x, y)) = self.changing(domain, &slice) else {
+                break;
+            };
             slice.x.1 = x;
             slice.y.1 = y;
         }

@@ -129,7 +129,9 @@ impl Certifier {
     /// ([`Domain::draw`]), follows the tree of halved boxes to a proven one, `depth` halvings at most.
     #[must_use]
     pub fn share(&self, domain: &Domain, points: &[Vec<f64>], depth: usize) -> Share {
-        let proven = points.iter().filter(|point| self.is_in_proven_box(domain, point, depth));
+        let proven = points
+            .iter()
+            .filter(|point| self.is_in_proven_box(domain, point, depth));
         Share::of(proven.count(), points.len())
     }
 
@@ -220,7 +222,14 @@ impl Painter<'_> {
         let x = part(self.map.slice.x.1, column, size, self.map.columns);
         let y = part(self.map.slice.y.1, row, size, self.map.rows);
         let slice = &self.map.slice;
-        let mut cell: Cell = slice.at.iter().map(|&value| Interval { low: value, high: value }).collect();
+        let mut cell: Cell = slice
+            .at
+            .iter()
+            .map(|&value| Interval {
+                low: value,
+                high: value,
+            })
+            .collect();
         cell[slice.x.0] = x;
         cell[slice.y.0] = y;
         self.map.boxes += 1;
@@ -248,7 +257,11 @@ fn part(range: Interval, index: usize, size: usize, count: usize) -> Interval {
     let at = |index: usize| range.low + (range.high - range.low) * (index as f64 / count as f64);
     Interval {
         low: at(index),
-        high: if index + size == count { range.high } else { at(index + size) },
+        high: if index + size == count {
+            range.high
+        } else {
+            at(index + size)
+        },
     }
 }
 

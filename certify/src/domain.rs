@@ -122,9 +122,11 @@ impl Domain {
             .iter()
             .enumerate()
             .map(|(index, range)| self.influence(index) * (range.high - range.low));
-        let (widest, _) = effects.enumerate().fold((0, f64::NEG_INFINITY), |best, (index, effect)| {
-            if effect > best.1 { (index, effect) } else { best }
-        });
+        let (widest, _) = effects
+            .enumerate()
+            .fold((0, f64::NEG_INFINITY), |best, (index, effect)| {
+                if effect > best.1 { (index, effect) } else { best }
+            });
         let (mut lower, mut upper) = (cell.to_vec(), cell.to_vec());
         if let Some(range) = cell.get(widest) {
             let middle = 0.5 * (range.low + range.high);

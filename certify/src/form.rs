@@ -169,9 +169,7 @@ impl Form {
             shared: self
                 .shared
                 .widened(shared_columns.max(self.shared.columns + if is_shared { fresh } else { 0 })),
-            own: self
-                .own
-                .widened(self.own.columns + if is_shared { 0 } else { fresh }),
+            own: self.own.widened(self.own.columns + if is_shared { 0 } else { fresh }),
             slack: vec![0.0; self.len()],
         };
         let mut column = if is_shared {

@@ -76,14 +76,20 @@ impl Certifier {
     #[must_use]
     pub fn bound_over(&self, domain: &Domain, cell: &[Interval]) -> Bound {
         let enclosure = self.enclose(domain, cell);
-        Bound::of((0..enclosure.real.len()).map(|action| enclosure.error_bound(action)).collect())
+        Bound::of(
+            (0..enclosure.real.len())
+                .map(|action| enclosure.error_bound(action))
+                .collect(),
+        )
     }
 
     /// Enclosures of the real Q values over a cell of a domain.
     #[must_use]
     pub fn q_values_over(&self, domain: &Domain, cell: &[Interval]) -> Vec<Interval> {
         let enclosure = self.enclose(domain, cell);
-        (0..enclosure.real.len()).map(|action| enclosure.q_value(action)).collect()
+        (0..enclosure.real.len())
+            .map(|action| enclosure.q_value(action))
+            .collect()
     }
 
     /// The greedy action of a cell, if it is proven to be the same everywhere in it, in real arithmetic and in the format.

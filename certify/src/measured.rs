@@ -21,6 +21,8 @@ pub struct Measured {
     pub mean_spread: f64,
     /// Observations whose greedy action in the format is not that of real arithmetic.
     pub changed_actions: usize,
+    /// Largest real Q value less that of the action chosen in the format: what the worst change gives up.
+    pub largest_loss: f64,
 }
 
 impl Certifier {
@@ -61,11 +63,16 @@ impl Certifier {
         let (low, high) = real
             .centre
             .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| (low.min(*q), high.max(*q)));
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| {
+                (low.min(*q), high.max(*q))
+            });
         let before = measured.observations as f64;
         measured.mean_spread = (measured.mean_spread * before + (high - low)) / (before + 1.0);
         measured.observations += 1;
         let chosen = argmax(&held);
+        measured.largest_loss = measured
+            .largest_loss
+            .max(high - real.centre.get(chosen).copied().unwrap_or(high));
         // real arithmetic must prefer another action by more than binary64 can err
         let is_changed = (0..real.len()).any(|other| other != chosen && real.difference(None, other, chosen).low > 0.0);
         measured.changed_actions += usize::from(is_changed);

@@ -96,9 +96,8 @@ impl Layer {
         };
         if let Some(scale) = scale {
             // an integer times a power of two: exact in binary64
-            let grid = |x: f64, exponent: i32| {
-                round_half_up(x * power_of_two(exponent)) as f64 * power_of_two(-exponent)
-            };
+            let grid =
+                |x: f64, exponent: i32| round_half_up(x * power_of_two(exponent)) as f64 * power_of_two(-exponent);
             for row in 0..held.rows {
                 for (w, input) in held.row_mut(row).iter_mut().zip(&scale.inputs) {
                     *w = grid(*w, scale.accumulator - input);

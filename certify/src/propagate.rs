@@ -34,9 +34,12 @@ impl Enclosure {
     pub fn candidate(&self) -> usize {
         let centres = self.real.centre.iter().enumerate();
         centres
-            .fold((0, f64::NEG_INFINITY), |best, (index, &q)| {
-                if q > best.1 { (index, q) } else { best }
-            })
+            .fold(
+                (0, f64::NEG_INFINITY),
+                |best, (index, &q)| {
+                    if q > best.1 { (index, q) } else { best }
+                },
+            )
             .0
     }
 
@@ -207,14 +210,31 @@ mod tests {
 
     #[test]
     fn relaxations_enclose_the_activations() {
-        for (low, high) in [(-3.0, 2.0), (-0.1, 5.0), (0.0, 1.0), (-2.0, 0.0), (0.5, 0.7), (-9.0, 12.0)] {
+        for (low, high) in [
+            (-3.0, 2.0),
+            (-0.1, 5.0),
+            (0.0, 1.0),
+            (-2.0, 0.0),
+            (0.5, 0.7),
+            (-9.0, 12.0),
+        ] {
             let interval = Interval { low, high };
             for n in 0..=1000 {
                 let x = low + (high - low) * f64::from(n) / 1000.0;
-                assert!(encloses(relaxed(Activation::Relu, interval), x, x.max(0.0)), "{interval:?} {x}");
+                assert!(
+                    encloses(relaxed(Activation::Relu, interval), x, x.max(0.0)),
+                    "{interval:?} {x}"
+                );
                 let leaky = if x > 0.0 { x } else { 0.3 * x };
-                assert!(encloses(relaxed(Activation::LeakyRelu { slope: 0.3 }, interval), x, leaky));
-                assert!(encloses(relaxed(Activation::Tanh, interval), x, x.tanh()), "{interval:?} {x}");
+                assert!(encloses(
+                    relaxed(Activation::LeakyRelu { slope: 0.3 }, interval),
+                    x,
+                    leaky
+                ));
+                assert!(
+                    encloses(relaxed(Activation::Tanh, interval), x, x.tanh()),
+                    "{interval:?} {x}"
+                );
             }
         }
     }

@@ -34,14 +34,20 @@ pub fn run(options: &Certify) -> Result<Outcome, Failure> {
     let map = page::map(&policy, &certificate)?;
     let mut files = BTreeMap::from([
         ("certificate.json".to_owned(), json),
-        ("certificate.html".to_owned(), page::page(&policy, &certificate, map.clone())?),
+        (
+            "certificate.html".to_owned(),
+            page::page(&policy, &certificate, map.clone())?,
+        ),
     ]);
     if let Some(map) = map {
         files.insert("map.svg".to_owned(), map.to_string());
     }
     output::write_texts(&options.out, &files)?;
     output::say(&page::summary(&certificate))?;
-    output::say(&format!("to look at: {}", options.out.join("certificate.html").display()))?;
+    output::say(&format!(
+        "to look at: {}",
+        options.out.join("certificate.html").display()
+    ))?;
     Ok(Outcome::Done)
 }
 
@@ -63,7 +69,9 @@ fn slice(policy: &Policy, options: &Certify) -> Result<Option<Slice>, Failure> {
     };
     let mut asked = Vec::new();
     for axis in &options.axis {
-        let (name, range) = axis.split_once('=').map_or((axis.as_str(), None), |(name, range)| (name, Some(range)));
+        let (name, range) = axis
+            .split_once('=')
+            .map_or((axis.as_str(), None), |(name, range)| (name, Some(range)));
         let index = find(name)?;
         let whole = coordinates[index].range;
         asked.push((index, range.map(|range| within(range, name, whole)).transpose()?));
@@ -102,7 +110,11 @@ fn slice(policy: &Policy, options: &Certify) -> Result<Option<Slice>, Failure> {
 /// The `n`-th coordinate in the order of the policy's signals, then the others.
 fn first(policy: &Policy, domain: &Domain, n: usize) -> Option<usize> {
     let position = |name: &str| domain.coordinates().iter().position(|c| c.name == name);
-    let mut order: Vec<usize> = policy.signals.iter().filter_map(|signal| position(&signal.name)).collect();
+    let mut order: Vec<usize> = policy
+        .signals
+        .iter()
+        .filter_map(|signal| position(&signal.name))
+        .collect();
     let others = (0..domain.coordinates().len()).filter(|index| !order.contains(index));
     let others: Vec<usize> = others.collect();
     order.extend(others);

@@ -1,8 +1,10 @@
 //! The page of a certificate.
 
+use std::collections::BTreeSet;
+
 use ::certify::{Certificate, Coordinate, Domain, Map, Measured, Memory, Share};
 use policy::Policy;
-use report::{Axis, Cell, HeatMap, Page, Ramp, ReportError, Section, Svg, Table, Verdict};
+use report::{Axis, Cell, HeatMap, Page, Ramp, ReportError, Section, Svg, Table, Verdict, quantity};
 
 use crate::commands::grouped;
 
@@ -12,17 +14,17 @@ pub fn summary(certificate: &Certificate) -> String {
     let measured = &certificate.measured;
     let mut lines = vec![
         format!(
-            "{} in {}: |Q - real Q| <= {:.3e} for every state, {:.3e} for every observation of the clamped box (proven)",
+            "{} in {}: |Q - real Q| <= {} for every state, {} for every observation of the clamped box (proven)",
             certificate.name,
             certificate.numeric_format.name(),
-            bound,
-            certificate.box_bound.largest
+            digits(bound),
+            digits(certificate.box_bound.largest)
         ),
         format!(
-            "  largest seen: {:.3e} at {} states; real Q values of a state are {:.3e} apart on average",
-            measured.largest_error,
+            "  largest seen: {} at {} states; real Q values of a state are {} apart on average",
+            digits(measured.largest_error),
             grouped(measured.observations as u64),
-            measured.mean_spread
+            digits(measured.mean_spread)
         ),
         format!(
             "  action provably unchanged: {} of the states; seen to change at {}",
@@ -32,9 +34,11 @@ pub fn summary(certificate: &Certificate) -> String {
     ];
     if let Some(golden) = &certificate.golden {
         lines.push(format!(
-            "  golden observations: largest error {:.3e}, action changed at {}",
-            golden.measured.largest_error,
-            changed_text(&golden.measured)
+            "  golden observations: largest error {}, action changed at {}; the worst change gives up {} of {} between real Q values",
+            digits(golden.measured.largest_error),
+            changed_text(&golden.measured),
+            digits(golden.measured.largest_loss),
+            digits(golden.measured.mean_spread)
         ));
     }
     if let Some(map) = &certificate.map {
@@ -45,6 +49,11 @@ pub fn summary(certificate: &Certificate) -> String {
         ));
     }
     lines.join("\n")
+}
+
+/// Three significant digits.
+fn digits(value: f64) -> String {
+    quantity(value, "", 3)
 }
 
 fn share_text(share: &Share) -> String {
@@ -67,7 +76,7 @@ pub fn map(policy: &Policy, certificate: &Certificate) -> Result<Option<Svg>, Re
     let domain = Domain::of(policy, Memory::Settled);
     let axis = |index: usize| {
         let coordinate = &domain.coordinates()[index];
-        Axis::new(coordinate.name.replace('_', " ")).unit(&coordinate.unit)
+        Axis::new(coordinate.name.as_str()).unit(&coordinate.unit)
     };
     let centres = |range: policy::Interval, count: usize| -> Vec<f64> {
         (0..count)
@@ -79,7 +88,11 @@ pub fn map(policy: &Policy, certificate: &Certificate) -> Result<Option<Svg>, Re
         None => f64::NAN,
     };
     let cells: Vec<f64> = map.actions.iter().map(duty).collect();
-    let title = format!("{} in {}: proven actions", certificate.name, certificate.numeric_format.name());
+    let title = format!(
+        "{} in {}: proven actions",
+        certificate.name,
+        certificate.numeric_format.name()
+    );
     let mut picture = HeatMap::new(title, axis(map.slice.x.0), axis(map.slice.y.0))
         .values(
             Axis::new("duty of the proven action"),
@@ -89,7 +102,7 @@ pub fn map(policy: &Policy, certificate: &Certificate) -> Result<Option<Svg>, Re
         )
         .ramp(Ramp::Sequential);
     if !map.changes.is_empty() {
-        let (x, y): (Vec<f64>, Vec<f64>) = map.changes.iter().copied().unzip();
+        let (x, y): (Vec<f64>, Vec<f64>) = thinned(map).into_iter().unzip();
         picture = picture.dots("action seen to change", x, y);
     }
     match picture.svg() {
@@ -100,16 +113,36 @@ pub fn map(policy: &Policy, certificate: &Certificate) -> Result<Option<Svg>, Re
     }
 }
 
+/// One point for each square of finest cells, so that dots stay dots.
+fn thinned(map: &Map) -> Vec<(f64, f64)> {
+    const SQUARES: f64 = 72.0;
+    let square = |x: f64, range: policy::Interval| (SQUARES * (x - range.low) / (range.high - range.low)) as i64;
+    let mut seen = BTreeSet::new();
+    let is_first = |&(x, y): &(f64, f64)| seen.insert((square(x, map.slice.x.1), square(y, map.slice.y.1)));
+    map.changes.iter().copied().filter(is_first).collect()
+}
+
 /// The whole page.
 pub fn page(policy: &Policy, certificate: &Certificate, picture: Option<Svg>) -> Result<String, ReportError> {
     let format = certificate.numeric_format.name();
     let sentence = format!(
-        "In {format} no Q value differs from real arithmetic by more than {:.3e} in any state; the action provably stays the same in {} of the states.",
-        certificate.state_bound.bound.largest,
+        "In {format} no Q value differs from real arithmetic by more than {} in any state; the action provably stays the same in {} of the states.",
+        digits(certificate.state_bound.bound.largest),
         share_text(&certificate.proven_share)
     );
+    let golden = certificate.golden.as_ref().map(|golden| &golden.measured);
+    let (verdict, sentence) = match golden {
+        Some(golden) if golden.changed_actions > 0 => (
+            Verdict::Warn,
+            format!(
+                "{sentence} At the golden observations it changes at {}.",
+                changed_text(golden)
+            ),
+        ),
+        _ => (Verdict::Note, sentence),
+    };
     let mut page = Page::new(format!("{}: what {format} does to the decision", certificate.name))
-        .verdict(Verdict::Note, sentence)
+        .verdict(verdict, sentence)
         .section(bounds(policy, certificate))
         .section(shares(certificate));
     if let Some(map) = &certificate.map {
@@ -125,7 +158,7 @@ fn bounds(policy: &Policy, certificate: &Certificate) -> Section {
         .text("every state")
         .text("every observation of the box");
     for (index, action) in policy.actions.iter().enumerate() {
-        let bound = |bounds: &[f64]| Cell::Text(bounds.get(index).map(|b| format!("{b:.3e}")).unwrap_or_default());
+        let bound = |bounds: &[f64]| Cell::Text(bounds.get(index).map(|b| digits(*b)).unwrap_or_default());
         table = table.row([
             Cell::Text(index.to_string()),
             Cell::Number(action.duty),
@@ -136,13 +169,23 @@ fn bounds(policy: &Policy, certificate: &Certificate) -> Section {
     let measured = &certificate.measured;
     Section::new("Error of the Q values")
         .pairs([
-            ("proven for every state", format!("{:.3e}", certificate.state_bound.bound.largest)),
-            ("proven for every observation of the clamped box", format!("{:.3e}", certificate.box_bound.largest)),
+            ("proven for every state", digits(certificate.state_bound.bound.largest)),
+            (
+                "proven for every observation of the clamped box",
+                digits(certificate.box_bound.largest),
+            ),
             (
                 "largest seen",
-                format!("{:.3e} at {} random states", measured.largest_error, grouped(measured.observations as u64)),
+                format!(
+                    "{} at {} random states",
+                    digits(measured.largest_error),
+                    grouped(measured.observations as u64)
+                ),
             ),
-            ("real Q values of a state, largest less smallest, mean", format!("{:.3e}", measured.mean_spread)),
+            (
+                "real Q values of a state, largest less smallest, mean",
+                digits(measured.mean_spread),
+            ),
         ])
         .details(Section::new("Per action").table(table))
 }
@@ -162,14 +205,19 @@ fn shares(certificate: &Certificate) -> Section {
         pairs.push((
             "golden observations at which it was seen to change".to_owned(),
             format!(
-                "{}; largest error {:.3e}",
+                "{}; largest error {}; the worst change gives up {} of {} between the real Q values",
                 changed_text(&golden.measured),
-                golden.measured.largest_error
+                digits(golden.measured.largest_error),
+                digits(golden.measured.largest_loss),
+                digits(golden.measured.mean_spread)
             ),
         ));
         for near in &golden.neighbourhoods {
             pairs.push((
-                format!("boxes of +-{} % around golden observations that are proven", 100.0 * near.radius),
+                format!(
+                    "boxes of +-{} % around golden observations that are proven",
+                    100.0 * near.radius
+                ),
                 share_text(&near.share),
             ));
         }
@@ -194,8 +242,11 @@ fn map_section(policy: &Policy, map: &Map, picture: Option<Svg>) -> Section {
     );
     let section = Section::new("Where on the map").pairs([
         ("proven share of the area", format!("{:.1} %", 100.0 * map.proven_share)),
-        ("points at which the action was seen to change", changed_text(&map.measured)),
-        ("largest error seen on the map", format!("{:.3e}", map.measured.largest_error)),
+        (
+            "points at which the action was seen to change",
+            changed_text(&map.measured),
+        ),
+        ("largest error seen on the map", digits(map.measured.largest_error)),
     ]);
     match picture {
         Some(picture) => section.chart(picture, caption),
@@ -211,7 +262,12 @@ fn meaning(certificate: &Certificate) -> Section {
         .text("unit");
     for Coordinate { name, unit, range, .. } in &certificate.coordinates {
         let text = |text: &str| Cell::Text(text.to_owned());
-        table = table.row([text(name), text(&range.low.to_string()), text(&range.high.to_string()), text(unit)]);
+        table = table.row([
+            text(name),
+            text(&range.low.to_string()),
+            text(&range.high.to_string()),
+            text(unit),
+        ]);
     }
     Section::new("What is meant")
         .text(

@@ -52,7 +52,7 @@ pub struct Certificate {
     pub measured: Measured,
     /// Around and at the golden observations, if the policy has them.
     pub golden: Option<Golden>,
-    /// A slice of the settled states; `None` with fewer than two coordinates.
+    /// A slice of the states; `None` with fewer than two coordinates.
     pub map: Option<Map>,
 }
 
@@ -98,7 +98,7 @@ impl Certificate {
             proven_share: certifier.share(&domain, &points, effort.depth),
             measured: certifier.measure(observations.iter().map(Vec::as_slice), q_values),
             golden: golden(policy, &certifier, q_values),
-            map: slice.map(|slice| certifier.map(&Domain::of(policy, Memory::Settled), slice, q_values)),
+            map: slice.map(|slice| certifier.map(&Domain::of(policy, slice.memory), slice, q_values)),
         }
     }
 }

@@ -6,7 +6,7 @@ use policy::Interval;
 use serde::Serialize;
 
 use crate::measured::{Measured, QValues};
-use crate::{Bound, Cell, Certifier, Domain};
+use crate::{Bound, Cell, Certifier, Domain, Memory};
 
 /// Bound over all states, tightened by splitting.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -33,6 +33,8 @@ pub struct Share {
 /// A plane through the states: two coordinates vary, the others stand still.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Slice {
+    /// Which states.
+    pub memory: Memory,
     /// Coordinate along x, and its range.
     pub x: (usize, Interval),
     /// Coordinate along y, and its range.

@@ -36,7 +36,8 @@ enum Key {
 }
 
 /// How far the past of a state is free.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Memory {
     /// Delayed samples are coordinates of their own.
     Free,

@@ -139,7 +139,7 @@ impl Form {
             // a neuron that is 0 everywhere adds nothing
             let live: Vec<usize> = (0..x.len()).filter(|i| !x.is_zero(*i)).collect();
             let sizes: Vec<f64> = (0..x.len()).map(|i| x.magnitude(i)).collect();
-            for output in 0..outputs {
+            for (output, total) in magnitudes.iter_mut().enumerate() {
                 let row = weights.row(output);
                 for &i in &live {
                     let w = row[i];
@@ -150,7 +150,7 @@ impl Form {
                     add(y.shared.row_mut(output), w, x.shared.row(i));
                     add(y.own.row_mut(output), w, x.own.row(i));
                     y.slack[output] += w.abs() * x.slack[i];
-                    magnitudes[output] += w.abs() * sizes[i];
+                    *total += w.abs() * sizes[i];
                 }
             }
         }

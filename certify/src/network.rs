@@ -98,11 +98,11 @@ impl Layer {
             // an integer times a power of two: exact in binary64
             let grid =
                 |x: f64, exponent: i32| round_half_up(x * power_of_two(exponent)) as f64 * power_of_two(-exponent);
-            for row in 0..held.rows {
+            for (row, bias) in held_bias.iter_mut().enumerate() {
                 for (w, input) in held.row_mut(row).iter_mut().zip(&scale.inputs) {
                     *w = grid(*w, scale.accumulator - input);
                 }
-                held_bias[row] = grid(held_bias[row], scale.accumulator);
+                *bias = grid(*bias, scale.accumulator);
             }
             step = Step::Integer {
                 accumulator: scale.accumulator,

@@ -12,50 +12,61 @@ import sys
 from maraboupy import MarabouCore
 
 
-def network(layers, box):
-    query = MarabouCore.InputQuery()
-    widths = [len(box)] + [len(layer["bias"]) for layer in layers]
-    count = len(box) + sum(len(layer["bias"]) * (2 if layer["relu"] else 1) for layer in layers)
-    query.setNumberOfVariables(count)
-    for index, (low, high) in enumerate(box):
-        query.setLowerBound(index, low)
-        query.setUpperBound(index, high)
-        query.markInputVariable(index, index)
-    inputs, free = list(range(len(box))), len(box)
-    for layer, width in zip(layers, widths[1:]):
-        sums = list(range(free, free + width))
-        free += width
-        for row, bias, output in zip(layer["weights"], layer["bias"], sums):
-            equation = MarabouCore.Equation(MarabouCore.Equation.EQ)
-            for weight, variable in zip(row, inputs):
-                if weight != 0.0:
-                    equation.addAddend(weight, variable)
-            equation.addAddend(-1.0, output)
-            equation.setScalar(-bias)
+class Network:
+    """Equations and pairs of ReLUs, made once."""
+
+    def __init__(self, layers):
+        self.inputs = list(range(len(layers[0]["weights"][0])))
+        self.equations, self.relus = [], []
+        values, self.count = self.inputs, len(self.inputs)
+        for layer in layers:
+            sums = self.fresh(len(layer["bias"]))
+            for row, bias, output in zip(layer["weights"], layer["bias"], sums):
+                equation = MarabouCore.Equation(MarabouCore.Equation.EQ)
+                for weight, variable in zip(row, values):
+                    if weight != 0.0:
+                        equation.addAddend(weight, variable)
+                equation.addAddend(-1.0, output)
+                equation.setScalar(-bias)
+                self.equations.append(equation)
+            values = sums
+            if layer["relu"]:
+                values = self.fresh(len(sums))
+                self.relus += zip(sums, values)
+        self.outputs = values
+
+    def fresh(self, count):
+        self.count += count
+        return list(range(self.count - count, self.count))
+
+    def query(self, box):
+        query = MarabouCore.InputQuery()
+        query.setNumberOfVariables(self.count)
+        for index, (low, high) in zip(self.inputs, box):
+            query.setLowerBound(index, low)
+            query.setUpperBound(index, high)
+            query.markInputVariable(index, index)
+        for equation in self.equations:
             query.addEquation(equation)
-        inputs = sums
-        if layer["relu"]:
-            inputs = list(range(free, free + width))
-            free += width
-            for before, after in zip(sums, inputs):
-                MarabouCore.addReluConstraint(query, before, after)
-    return query, inputs
+        for before, after in self.relus:
+            MarabouCore.addReluConstraint(query, before, after)
+        for index, output in enumerate(self.outputs):
+            query.markOutputVariable(output, index)
+        return query
 
 
-def answer(layers, task, options):
-    query, outputs = network(layers, task["box"])
-    for index, output in enumerate(outputs):
-        query.markOutputVariable(output, index)
+def answer(network, task, options):
+    query = network.query(task["box"])
     equation = MarabouCore.Equation(MarabouCore.Equation.GE)
     for output, factor in task["terms"]:
-        equation.addAddend(factor, outputs[output])
+        equation.addAddend(factor, network.outputs[output])
     equation.setScalar(task["at_least"])
     query.addEquation(equation)
     code, values, _ = MarabouCore.solve(query, options, "")
     if code == "unsat":
         return {"found": None}
     if code == "sat":
-        return {"found": [values[index] for index in range(len(task["box"]))]}
+        return {"found": [values[index] for index in network.inputs]}
     return {"unknown": code}
 
 
@@ -66,9 +77,9 @@ def main():
     options = MarabouCore.Options()
     options._verbosity = 0
     options._timeoutInSeconds = 60
-    layers = json.loads(sys.stdin.readline())
+    network = Network(json.loads(sys.stdin.readline()))
     for line in sys.stdin:
-        print(json.dumps(answer(layers, json.loads(line), options)), file=answers, flush=True)
+        print(json.dumps(answer(network, json.loads(line), options)), file=answers, flush=True)
 
 
 main()

@@ -85,12 +85,12 @@ fn marabou_contradicts_no_bound_and_no_decision_on_200_boxes() {
     let policy = super::example(NumericFormat::I16);
     let score = score(&policy, &Certifier::new(&policy), BOXES);
     println!(
-        "{} of {BOXES} boxes decided, {} upper bounds within 10 %",
+        "{} of {BOXES} boxes decided, {} of 50 bounds within 10 %",
         score.decided, score.tight
     );
     assert!(score.decided > 40, "claims were put to the test: {}", score.decided);
     assert!(
-        score.tight > 40,
+        score.tight > 25,
         "bounds that are nowhere near the truth would pass, too: {}",
         score.tight
     );
@@ -101,21 +101,23 @@ fn score(policy: &Policy, certifier: &Certifier, boxes: usize) -> Score {
     let mut rng = Rng::new(4);
     let domain = certifier.observations().clone();
     let mut score = Score::default();
-    for _ in 0..boxes {
+    for turn in 0..boxes {
         let cell = small_cell(&mut rng, &domain.whole());
         let ranges = certifier.q_values_over(&domain, &cell);
         let n = rng.below(ranges.len());
         let Interval { low, high } = ranges[n];
         let slack = 1e-6 * low.abs().max(high.abs());
-        for (factor, end) in [(1.0, high), (-1.0, -low)] {
-            let found = marabou.find(&cell, &[(n, factor)], end + slack);
-            assert!(
-                found.is_none(),
-                "Q of action {n} leaves [{low}, {high}] in {cell:?} at {found:?}"
-            );
+        let (factor, end) = if turn % 2 == 0 { (1.0, high) } else { (-1.0, -low) };
+        let found = marabou.find(&cell, &[(n, factor)], end + slack);
+        assert!(
+            found.is_none(),
+            "Q of action {n} leaves [{low}, {high}] in {cell:?} at {found:?}"
+        );
+        if turn % 4 == 0 {
+            // a value in the last tenth: the bound is no empty claim
+            let near = end - 0.1 * (high - low);
+            score.tight += usize::from(marabou.find(&cell, &[(n, factor)], near).is_some());
         }
-        // a value in the last tenth: the bound is no empty claim
-        score.tight += usize::from(marabou.find(&cell, &[(n, 1.0)], high - 0.1 * (high - low)).is_some());
         let Some(action) = certifier.decided(&domain, &cell) else {
             continue;
         };

@@ -51,21 +51,21 @@ pub fn run(options: &Certify) -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
-/// The slice that is asked for; `None` if the settled states have fewer than two coordinates.
+/// The slice that is asked for, of settled states unless those have fewer than two coordinates; `None` if all have.
 fn slice(policy: &Policy, options: &Certify) -> Result<Option<Slice>, Failure> {
-    let domain = Domain::of(policy, Memory::Settled);
+    let memories = [Memory::Settled, Memory::Free].into_iter();
+    let mut domains = memories.map(|memory| (memory, Domain::of(policy, memory)));
+    let found = domains.find(|(_, domain)| domain.coordinates().len() > 1);
+    let (memory, domain) = found.unwrap_or_else(|| (Memory::Free, Domain::of(policy, Memory::Free)));
     let coordinates = domain.coordinates();
     let find = |name: &str| {
         coordinates.iter().position(|c| c.name == name).ok_or_else(|| {
             let names: Vec<&str> = coordinates.iter().map(|c| c.name.as_str()).collect();
             Failure(format!(
-                "no such coordinate of the settled states\n   = found: {name}\n   = expected: one of {}",
+                "no such coordinate of the states\n   = found: {name}\n   = expected: one of {}",
                 names.join(", ")
             ))
         })
-    };
-    let (Some(mut x), Some(mut y)) = (first(policy, &domain, 0), first(policy, &domain, 1)) else {
-        return Ok(None);
     };
     let mut asked = Vec::new();
     for axis in &options.axis {
@@ -77,11 +77,14 @@ fn slice(policy: &Policy, options: &Certify) -> Result<Option<Slice>, Failure> {
         asked.push((index, range.map(|range| within(range, name, whole)).transpose()?));
     }
     let expected = "   = expected: two different axes, or none";
-    match asked.as_slice() {
-        [] => {}
-        [first, second] if first.0 != second.0 => (x, y) = (first.0, second.0),
+    let axes = match asked.as_slice() {
+        [] => (first(policy, &domain, 0), first(policy, &domain, 1)),
+        [x, y] if x.0 != y.0 => (Some(x.0), Some(y.0)),
         _ => return Err(Failure(format!("--axis: {} axes found\n{expected}", asked.len()))),
-    }
+    };
+    let (Some(x), Some(y)) = axes else {
+        return Ok(None);
+    };
     let mut at: Vec<f64> = coordinates.iter().map(|c| 0.5 * (c.range.low + c.range.high)).collect();
     for text in &options.at {
         let (name, value) = text.split_once('=').unwrap_or((text, ""));
@@ -95,12 +98,14 @@ fn slice(policy: &Policy, options: &Certify) -> Result<Option<Slice>, Failure> {
     let ranges: Vec<Option<Interval>> = asked.iter().map(|(_, range)| *range).collect();
     let given = |n: usize| ranges.get(n).copied().flatten();
     let whole = Slice {
+        memory,
         x: (x, given(0).unwrap_or(coordinates[x].range)),
         y: (y, given(1).unwrap_or(coordinates[y].range)),
         at,
     };
     let zoomed = Certifier::new(policy).zoomed(&domain, &whole);
     Ok(Some(Slice {
+        memory,
         x: (x, given(0).unwrap_or(zoomed.x.1)),
         y: (y, given(1).unwrap_or(zoomed.y.1)),
         at: whole.at,

@@ -73,7 +73,7 @@ fn changed_text(measured: &Measured) -> String {
 /// The slice as a picture.
 pub fn map(policy: &Policy, certificate: &Certificate) -> Result<Option<Svg>, ReportError> {
     let Some(map) = &certificate.map else { return Ok(None) };
-    let domain = Domain::of(policy, Memory::Settled);
+    let domain = Domain::of(policy, map.slice.memory);
     let axis = |index: usize| {
         let coordinate = &domain.coordinates()[index];
         Axis::new(coordinate.name.as_str()).unit(&coordinate.unit)
@@ -226,7 +226,7 @@ fn shares(certificate: &Certificate) -> Section {
 }
 
 fn map_section(policy: &Policy, map: &Map, picture: Option<Svg>) -> Section {
-    let domain = Domain::of(policy, Memory::Settled);
+    let domain = Domain::of(policy, map.slice.memory);
     let fixed: Vec<String> = domain
         .coordinates()
         .iter()
@@ -237,7 +237,11 @@ fn map_section(policy: &Policy, map: &Map, picture: Option<Svg>) -> Section {
         .collect();
     let caption = format!(
         "Colour: the action that is proven for the whole cell, in real arithmetic and in the format. Grey: not proven; the borders \
-         between two actions are always in it. Dots: the action was seen to change there. Delayed samples equal the present ones. {}",
+         between two actions are always in it. Dots: the action was seen to change there. {}{}",
+        match map.slice.memory {
+            Memory::Settled => "Delayed samples equal the present ones. ",
+            Memory::Free => "",
+        },
         fixed.join(", ")
     );
     let section = Section::new("Where on the map").pairs([

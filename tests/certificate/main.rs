@@ -130,6 +130,21 @@ fn random_policies_stay_within_their_bounds() {
     }
 }
 
+/// An output without weights: the rounding of its bias is all that is wrong with it.
+#[test]
+fn the_rounding_of_a_bias_is_in_the_bound() {
+    let path = tests::root().join("tests/golden/cases/minimal/policy.toml");
+    let mut policy = policy::load(&path).unwrap().with_format(NumericFormat::I8);
+    let last = policy.layers.last_mut().unwrap();
+    last.weights[last.inputs..2 * last.inputs].fill(0.0);
+    last.bias[1] = 0.3;
+    let held = held(&Controller::<f32>::new(&policy), &[100.0, 5.0])[1];
+    let error = (held - f64::from(0.3_f32)).abs();
+    assert!(error > 0.0, "0.3 lies on no grid");
+    let bound = Certifier::new(&policy).box_bound().per_action[1];
+    assert!(error <= bound && bound <= 1.001 * error, "{error} {bound}");
+}
+
 /// States are described by coordinates; the controller's own observation must be what they say.
 #[test]
 fn the_observation_of_a_controller_lies_where_its_coordinates_say() {

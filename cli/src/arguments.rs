@@ -123,7 +123,8 @@ pub struct Compile {
     #[arg(long)]
     pub no_costs: bool,
     /// Also generate a way into a tool or onto a board, with the C core; may be repeated. kit: C test program with
-    /// expected bits for your compiler and board. sfunction: Simulink block, also for dSPACE RTI
+    /// expected bits for your compiler and board. sfunction: Simulink block, also for dSPACE RTI. fmu2, fmu3: unit for
+    /// co-simulation, FMI 2.0 or 3.0, sources and a binary for this machine
     #[arg(long, value_name = "NAME", value_parser = door())]
     pub door: Vec<codegen::Door>,
     /// Control steps in the kit

@@ -30,6 +30,7 @@ mod weights;
 
 pub use bounds::rational_tanh;
 pub use check::check;
+pub use digests::sha256;
 pub use faults::Faults;
 pub use model::*;
 pub use raw::{RawPolicy, ReadOptions, read};

@@ -11,7 +11,7 @@ use closed_loop::{Agent, Answer, Call, External};
 use codegen::Door;
 use interp::Sample;
 use policy::Policy;
-use tests::tools::{run, run_silently};
+use tests::tools::{is_without, run, run_silently};
 
 use super::{example, files, golden_case};
 use unit::{Descriptions, Unit, VERSIONS, closed_loop, line, standard_headers};
@@ -33,6 +33,10 @@ const FMPY_FROM_SOURCES: &[&str] = &["simulate.py", "--compile"];
 /// Every duty, action and status has the interpreter's bits.
 #[track_caller]
 fn agrees(policy: &Policy, periods: usize, doors: &[Door], script: &[&str]) {
+    // both scripts read descriptions with it
+    if is_without("FMPy") {
+        return;
+    }
     let trajectory = interpreted(policy, periods);
     let expected = lines(&trajectory);
     for door in doors {
@@ -67,6 +71,9 @@ fn fmpy_takes_codes_filters_and_policies_without_mapping() {
 /// It does not take FMI 3.
 #[test]
 fn libcosim_steps_half_a_second_of_closed_loop() {
+    if is_without("libcosim") {
+        return;
+    }
     agrees(&example(), PERIODS, &[Door::Fmu2], &["libcosim.py"]);
     agrees(&golden_case("adc_mapping"), 500, &[Door::Fmu2], &["libcosim.py"]);
 }
@@ -74,6 +81,9 @@ fn libcosim_steps_half_a_second_of_closed_loop() {
 /// The plant steps the FMU: what it answers to a sample is what the converter does until the next one.
 #[test]
 fn the_plant_as_importing_program_sees_the_duties_of_the_interpreter() {
+    if is_without("FMPy") {
+        return;
+    }
     for (policy, periods) in [(example(), PERIODS), (golden_case("adc_mapping"), 1000)] {
         let expected = interpreted(&policy, periods);
         for door in VERSIONS {
@@ -95,6 +105,9 @@ fn the_plant_as_importing_program_sees_the_duties_of_the_interpreter() {
 
 #[test]
 fn instances_states_times_and_refusals_are_as_the_standard_says() {
+    if is_without("FMPy") {
+        return;
+    }
     for policy in [example(), golden_case("constructs"), golden_case("minimal")] {
         for door in VERSIONS {
             let unit = Unit::new(&policy, door);
@@ -135,6 +148,9 @@ fn link(units: &[&Unit], more: &[&str]) -> Result<Vec<String>, String> {
 /// All four: two policies in both versions of FMI, under sanitisers.
 #[test]
 fn several_fmus_link_into_one_program_with_the_standard_headers() {
+    if is_without("FMPy") {
+        return;
+    }
     let sanitised = ["-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
     let mut units = Vec::new();
     for policy in [golden_case("constructs"), golden_case("minimal")] {
@@ -149,6 +165,9 @@ fn several_fmus_link_into_one_program_with_the_standard_headers() {
 
 #[test]
 fn without_the_prefix_two_fmus_do_not_link() {
+    if is_without("FMPy") {
+        return;
+    }
     for door in VERSIONS {
         let version = door.fmi().unwrap().name();
         let define = format!("#define {}_FUNCTION_PREFIX", version.to_uppercase());
@@ -169,6 +188,9 @@ fn without_the_prefix_two_fmus_do_not_link() {
 /// The library offers what the standard's headers declare and nothing of the core.
 #[test]
 fn the_binary_exports_the_functions_of_the_standard_and_no_others() {
+    if is_without("FMPy") {
+        return;
+    }
     for (door, count) in [(Door::Fmu2, 34), (Door::Fmu3, 75)] {
         let unit = Unit::new(&golden_case("minimal"), door);
         let version = unit.version();
@@ -200,6 +222,9 @@ fn the_binary_exports_the_functions_of_the_standard_and_no_others() {
 
 #[test]
 fn the_sources_are_strict_c_with_and_without_the_standard_headers() {
+    if is_without("FMPy") {
+        return;
+    }
     let strict = "-pedantic -Wall -Wextra -Wconversion -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Werror";
     let headers = format!("-isystem{}", standard_headers().display());
     for (door, dialect) in [(Door::Fmu2, "-std=c90"), (Door::Fmu3, "-std=c99")] {
@@ -218,6 +243,9 @@ fn the_sources_are_strict_c_with_and_without_the_standard_headers() {
 
 #[test]
 fn signals_may_have_the_names_of_outputs_parameters_and_time() {
+    if is_without("FMPy") {
+        return;
+    }
     let mut descriptions = Descriptions::default();
     for taken in ["duty", "enable", "status", "time", "a"] {
         let mut policy = golden_case("adc_mapping");
@@ -238,6 +266,9 @@ fn signals_may_have_the_names_of_outputs_parameters_and_time() {
 /// A unit is free text in the contract.
 #[test]
 fn units_are_escaped_and_defined_whatever_they_are() {
+    if is_without("FMPy") {
+        return;
+    }
     let mut descriptions = Descriptions::default();
     for unit in ["V", "", "ohm", "A & \"B\" <°C>", "µWb·turn"] {
         let mut policy = golden_case("minimal");

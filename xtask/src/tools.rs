@@ -74,6 +74,7 @@ const NGSPICE_HEADER: &[&str] = &[
 ];
 
 const VENV: &[&str] = &["python3", "-c", "import venv, ensurepip"];
+const MARABOU: &[&str] = &["python3", "-c", "from maraboupy import MarabouCore"];
 const FMPY: &[&str] = &["python3", "-c", "import fmpy; assert fmpy.__version__ == '0.3.32'"];
 
 /// One row a tool. A Python package is probed by `["python3", "-c", "import it"]` in the environment of [`python`].
@@ -132,6 +133,7 @@ const TOOLS: &[Tool] = &[
         &["python3", "-c", "import libcosimpy"],
         Python("libcosimpy==0.0.6"),
     ),
+    tool("Marabou", MARABOU, Python("maraboupy==2.0.0")),
 ];
 
 /// Tests leave out Rust on the targets that this names, by triple and separated by commas.
@@ -142,13 +144,22 @@ fn python(target_dir: &Path) -> PathBuf {
     target_dir.join("python")
 }
 
-/// Targets of the Rust toolchain that are not here.
-pub fn absent_rust_targets(target_dir: &Path) -> Vec<&'static str> {
-    Plan::of(&missing(TOOLS, &python(target_dir))).targets
+/// Tests leave out what needs the Python packages that this names, separated by commas.
+pub const WITHOUT_PYTHON_PACKAGES: &str = "POLICYC_WITHOUT_PYTHON_PACKAGES";
+
+/// What tests must do without: names and values of environment variables.
+pub fn absent(target_dir: &Path) -> [(&'static str, String); 2] {
+    let missing = missing(TOOLS, &python(target_dir));
+    let packages = missing.iter().filter(|tool| matches!(tool.source, Python(_)));
+    let packages: Vec<&str> = packages.map(|tool| tool.name).collect();
+    [
+        (WITHOUT_RUST_TARGETS, Plan::of(&missing).targets.join(",")),
+        (WITHOUT_PYTHON_PACKAGES, packages.join(",")),
+    ]
 }
 
-/// Sees to it that every tool is there; installs what is missing as root on Debian. A target of the Rust toolchain that
-/// cannot be had is no error: the C is tested on it all the same. Returned is what to say about that.
+/// Sees to it that every tool is there; installs what is missing as root on Debian. A target of the Rust toolchain or a
+/// Python package that cannot be had is no error: all else is tested. Returned is what to say about that.
 ///
 /// # Errors
 /// What is missing and the command to type.
@@ -171,8 +182,11 @@ pub fn provide(target_dir: &Path, output: &Output) -> Result<Vec<String>, String
         }
     }
     if !plan.python.is_empty() && works(VENV) {
-        for mut command in plan.python_install(&python) {
-            process::run(&mut command, output).map_err(explained)?;
+        let (mut environment, packages) = plan.python_install(&python);
+        process::run(&mut environment, output).map_err(explained)?;
+        for mut package in packages {
+            // offline or refused: said at the end
+            let _ = process::run(&mut package, output);
         }
     }
     require(target_dir)
@@ -184,19 +198,20 @@ pub fn provide(target_dir: &Path, output: &Output) -> Result<Vec<String>, String
 /// What is missing and the command to type.
 pub fn require(target_dir: &Path) -> Result<Vec<String>, String> {
     let python = python(target_dir);
-    let (targets, others): (Vec<_>, Vec<_>) = missing(TOOLS, &python)
+    let (optional, others): (Vec<_>, Vec<_>) = missing(TOOLS, &python)
         .into_iter()
-        .partition(|tool| matches!(tool.source, RustTarget(_)));
+        .partition(|tool| matches!(tool.source, RustTarget(_) | Python(_)));
     if !others.is_empty() {
         return Err(Plan::of(&others).message(&others, &python));
     }
-    Ok(match targets.is_empty() {
-        true => Vec::new(),
-        false => vec![format!(
-            "Rust is NOT tested there: {}",
-            Plan::of(&targets).message(&targets, &python)
-        )],
-    })
+    let (targets, packages): (Vec<_>, Vec<_>) = optional
+        .into_iter()
+        .partition(|tool| matches!(tool.source, RustTarget(_)));
+    let said = [("Rust is NOT tested there", targets), ("NOT tested with", packages)];
+    let said = said.into_iter().filter(|(_, tools)| !tools.is_empty());
+    Ok(said
+        .map(|(what, tools)| format!("{what}: {}", Plan::of(&tools).message(&tools, &python)))
+        .collect())
 }
 
 fn missing<'a>(tools: &'a [Tool], python: &Path) -> Vec<&'a Tool> {
@@ -266,14 +281,16 @@ impl Plan {
         arguments
     }
 
-    /// Makes the environment and fills it.
-    fn python_install(&self, python: &Path) -> [Command; 2] {
+    /// Makes the environment and fills it, package by package: one that is not made for this Python keeps none from coming.
+    fn python_install(&self, python: &Path) -> (Command, Vec<Command>) {
         let mut environment = Command::new("python3");
         environment.args(["-m", "venv"]).arg(python);
-        let mut packages = Command::new(interpreter(python));
-        packages.args(["-m", "pip", "install", "--disable-pip-version-check"]);
-        packages.args(&self.python);
-        [environment, packages]
+        let install = |package: &&str| {
+            let mut command = Command::new(interpreter(python));
+            command.args(["-m", "pip", "install", "--disable-pip-version-check", package]);
+            command
+        };
+        (environment, self.python.iter().map(install).collect())
     }
 
     fn message(&self, missing: &[&Tool], python: &Path) -> String {

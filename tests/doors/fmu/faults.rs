@@ -1,6 +1,8 @@
 //! Planted faults: each must be seen by the importing program or by FMPy.
 
 use super::super::golden_case;
+use tests::tools::is_without;
+
 use super::unit::{Descriptions, Unit, VERSIONS};
 use codegen::Door;
 
@@ -106,6 +108,9 @@ const FAULTS: &[Fault] = &[
 
 #[test]
 fn planted_faults_are_seen_by_the_importing_program() {
+    if is_without("FMPy") {
+        return;
+    }
     let policy = golden_case("constructs");
     let good = VERSIONS.map(|door| Unit::new(&policy, door));
     good.iter().for_each(Unit::build_importer);
@@ -126,6 +131,9 @@ fn planted_faults_are_seen_by_the_importing_program() {
 /// The same in the shells.
 #[test]
 fn planted_faults_of_the_shells_are_seen() {
+    if is_without("FMPy") {
+        return;
+    }
     let policy = golden_case("minimal");
     let faults: &[(Door, Fault)] = &[
         (
@@ -204,6 +212,9 @@ fn planted_faults_of_the_shells_are_seen() {
 
 #[test]
 fn fmpy_sees_faults_of_the_description() {
+    if is_without("FMPy") {
+        return;
+    }
     let policy = golden_case("adc_mapping");
     let common: [(&str, &str); 3] = [
         (" start=\"true\"", ""),

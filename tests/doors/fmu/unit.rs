@@ -20,16 +20,9 @@ use crate::{build, files, write};
 
 pub const VERSIONS: [Door; 2] = [Door::Fmu2, Door::Fmu3];
 
-/// The Python of `cargo xtask install`.
+/// Python with FMPy.
 pub fn python() -> Command {
-    let environment = Path::new(env!("CARGO_TARGET_TMPDIR"))
-        .with_file_name("python")
-        .join("bin");
-    let path = std::env::var("PATH").unwrap_or_default();
-    let mut command = Command::new(environment.join("python3"));
-    // FMPy looks for cmake there
-    command.env("PATH", format!("{}:{path}", environment.display()));
-    command
+    tests::tools::python(env!("CARGO_TARGET_TMPDIR"))
 }
 
 /// The standard headers as FMPy brings them, but with the prefix of FMI 2 that its copy leaves out.

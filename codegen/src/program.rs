@@ -49,6 +49,19 @@ pub enum Coefficient {
     R,
 }
 
+impl Coefficient {
+    /// Name of the parameter that sets it; the state member is `mapping_<name>`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Coefficient::A => "a",
+            Coefficient::B => "b",
+            Coefficient::C => "c",
+            Coefficient::R => "r",
+        }
+    }
+}
+
 /// One operation; its result is a number of the format or, where the name says so, a flag (0 or 1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Op {

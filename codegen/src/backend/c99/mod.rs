@@ -60,19 +60,9 @@ fn common(program: &Program) -> Common {
             program.provenance.c_flags,
         ),
         mapping_parameters: parameters
-            .map(|(name, ..)| format!("float {}", coefficient_name(*name)))
+            .map(|(name, ..)| format!("float {}", name.name()))
             .collect::<Vec<_>>()
             .join(", "),
-    }
-}
-
-/// Name of a coefficient as parameter; the state member is `mapping_<name>`.
-pub(super) fn coefficient_name(coefficient: Coefficient) -> &'static str {
-    match coefficient {
-        Coefficient::A => "a",
-        Coefficient::B => "b",
-        Coefficient::C => "c",
-        Coefficient::R => "r",
     }
 }
 
@@ -142,7 +132,7 @@ fn state_members(program: &Program) -> Vec<Member> {
     }
     for (name, ..) in program.mapping.iter().flat_map(|mapping| &mapping.coefficients) {
         members.push(member(
-            format!("float mapping_{}", coefficient_name(*name)),
+            format!("float mapping_{}", name.name()),
             "coefficient of the duty ratio mapping",
         ));
     }
@@ -325,7 +315,7 @@ fn reset(program: &Program) -> Vec<String> {
 fn init(program: &Program) -> Vec<String> {
     let coefficients = program.mapping.iter().flat_map(|mapping| &mapping.coefficients);
     coefficients
-        .map(|(name, value, ..)| format!("state->mapping_{} = {};", coefficient_name(*name), float(value.value())))
+        .map(|(name, value, ..)| format!("state->mapping_{} = {};", name.name(), float(value.value())))
         .collect()
 }
 
@@ -335,7 +325,7 @@ fn mapping_conditions(program: &Program) -> Vec<String> {
     };
     let p = &program.name;
     let within = |(name, _, low, high): &(Coefficient, _, crate::program::Literal, crate::program::Literal)| {
-        let (name, low, high) = (coefficient_name(*name), float(low.value()), float(high.value()));
+        let (name, low, high) = (name.name(), float(low.value()), float(high.value()));
         format!("{p}_within({name}, {low}, {high})")
     };
     let mut conditions: Vec<String> = mapping.coefficients.iter().map(within).collect();
@@ -351,7 +341,7 @@ fn mapping_conditions(program: &Program) -> Vec<String> {
 fn mapping_assignments(program: &Program) -> Vec<String> {
     let coefficients = program.mapping.iter().flat_map(|mapping| &mapping.coefficients);
     coefficients
-        .map(|(name, ..)| coefficient_name(*name))
+        .map(|(name, ..)| name.name())
         .map(|name| format!("state->mapping_{name} = {name};"))
         .collect()
 }

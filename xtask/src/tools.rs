@@ -119,11 +119,29 @@ const TOOLS: &[Tool] = &[
     tool("ngspice's library", NGSPICE_HEADER, Apt("libngspice0-dev")),
 ];
 
+/// Debian's Rust with the sources of `core`, which stands in where rustup has no target.
+const DEBIAN_RUST: &[Tool] = &[
+    tool("Debian's rustc", &["/usr/bin/rustc", "--version"], Apt("rustc-web")),
+    tool("Debian's cargo", &["/usr/bin/cargo", "--version"], Apt("cargo-web")),
+    tool(
+        "sources of Rust's libraries",
+        &[
+            "sh",
+            "-c",
+            "test -d \"$(/usr/bin/rustc --print sysroot)/lib/rustlib/src/rust/library/core\"",
+        ],
+        Apt("rust-web-src"),
+    ),
+];
+
 /// Tests leave out Rust on the targets that this names, by triple and separated by commas.
 pub const WITHOUT_RUST_TARGETS: &str = "POLICYC_WITHOUT_RUST_TARGETS";
 
 /// Targets of the Rust toolchain that are not here.
 pub fn absent_rust_targets() -> Vec<&'static str> {
+    if missing(DEBIAN_RUST).is_empty() {
+        return Vec::new();
+    }
     Plan::of(&missing(TOOLS)).targets
 }
 
@@ -138,18 +156,26 @@ pub fn provide(output: &Output) -> Result<Vec<String>, String> {
     if !plan.targets.is_empty() && works(&["rustup", "--version"]) {
         let mut rustup = Command::new("rustup");
         rustup.args(["target", "add"]).args(&plan.targets);
-        // offline or refused: said at the end
+        // offline or refused: Debian's Rust is next
         let _ = process::run(&mut rustup, output);
     }
-    if plan.packages.is_empty() || !may_install() {
-        return require();
+    if !plan.packages.is_empty() && may_install() {
+        install(&plan, output).map_err(|e| format!("{}\n{e}", plan.message(&missing)))?;
     }
+    if !absent_rust_targets().is_empty() && may_install() {
+        // other names in this distribution, or no network: said at the end
+        let _ = install(&Plan::of(&self::missing(DEBIAN_RUST)), output);
+    }
+    require()
+}
+
+fn install(plan: &Plan, output: &Output) -> Result<(), String> {
     for arguments in [&["update"][..], &plan.apt_install()] {
         let mut apt = Command::new("apt-get");
         apt.args(arguments).env("DEBIAN_FRONTEND", "noninteractive");
-        process::run(&mut apt, output).map_err(|e| format!("{}\n{e}", plan.message(&missing)))?;
+        process::run(&mut apt, output)?;
     }
-    require()
+    Ok(())
 }
 
 /// Looks only.
@@ -163,13 +189,15 @@ pub fn require() -> Result<Vec<String>, String> {
     if !others.is_empty() {
         return Err(Plan::of(&others).message(&others));
     }
-    Ok(match targets.is_empty() {
-        true => Vec::new(),
-        false => vec![format!(
-            "Rust is NOT tested there: {}",
-            Plan::of(&targets).message(&targets)
-        )],
-    })
+    let debian = missing(DEBIAN_RUST);
+    let said = match (targets.is_empty(), debian.is_empty()) {
+        (true, true) => return Ok(Vec::new()),
+        (true, false) => "not tested: Debian's Rust in place of a missing target of rustup",
+        (false, true) => "rustup lacks targets, so that Debian's Rust is tested there",
+        (false, false) => "Rust is NOT tested there",
+    };
+    let missing = [targets, debian].concat();
+    Ok(vec![format!("{said}: {}", Plan::of(&missing).message(&missing))])
 }
 
 fn missing(tools: &[Tool]) -> Vec<&Tool> {

@@ -6,6 +6,7 @@
 mod network;
 
 use policy::{Digests, NumericFormat};
+use targets::Widths;
 
 pub use network::{ActivationCode, IntegerInput, IntegerLayer, IntegerNetwork, LayerCode, NetworkCode};
 
@@ -297,6 +298,8 @@ pub struct Provenance {
     pub digests: Digests,
     /// Target name.
     pub target: &'static str,
+    /// Widths of the target's C types.
+    pub widths: Widths,
     /// C flags of the target.
     pub c_flags: &'static [&'static str],
     /// rustc flags of the target.

@@ -7,7 +7,7 @@ pub(super) mod tables;
 use std::collections::BTreeMap;
 
 use templates::Template;
-use templates::c::{Argmax, Common, Constant, Header, Helpers, Member, NetworkView, PushView, Source};
+use templates::c::{Argmax, Common, Constant, Header, Helpers, Member, NetworkView, PushView, Source, WideChar};
 
 use crate::backend::{Backend, banner};
 use crate::lower::STATUS;
@@ -64,6 +64,15 @@ fn common(program: &Program) -> Common {
             .collect::<Vec<_>>()
             .join(", "),
     }
+}
+
+fn wide_char(program: &Program) -> Option<WideChar> {
+    let widths = program.provenance.widths;
+    (widths.char_bits != 8).then_some(WideChar {
+        char_bits: widths.char_bits,
+        int_bits: widths.int_bits,
+        int_max: (1 << (widths.int_bits - 1)) - 1,
+    })
 }
 
 fn header(program: &Program) -> Header {
@@ -160,6 +169,7 @@ fn source(program: &Program) -> Source {
     let (sense_lines, sense_results) = sense_statements(program, &sense);
     Source {
         common: common(program),
+        wide_char: wide_char(program),
         tables: tables::tables(program),
         network: network(program),
         argmax: argmax(program),

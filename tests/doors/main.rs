@@ -4,6 +4,7 @@
 
 mod boards;
 mod c2000;
+mod fmu;
 mod kit;
 mod rust;
 mod sfunction;

@@ -1,0 +1,8 @@
+//! A controller that a build script has generated.
+#![no_std]
+#![forbid(unsafe_code)]
+
+pub mod buck12 {
+    //! The policy of `examples/buck12`.
+    include!(concat!(env!("OUT_DIR"), "/buck12.rs"));
+}

@@ -8,6 +8,7 @@
 //! ```
 //! ```ignore
 //! // src/lib.rs
+//! #[allow(clippy::all)]
 //! mod buck12 {
 //!     include!(concat!(env!("OUT_DIR"), "/buck12.rs"));
 //! }

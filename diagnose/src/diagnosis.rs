@@ -9,7 +9,7 @@ use crate::attribute::{Attribution, attribute};
 use crate::control::Request;
 use crate::drive::Model;
 use crate::fit::State;
-use crate::gain::{self, Held, Pair};
+use crate::gain::{self, Held, Pair, Shift};
 use crate::noise::{self, Outlier};
 use crate::problem::Problem;
 use crate::profile::{Profile, profiles};
@@ -104,6 +104,8 @@ pub struct Gain {
     pub heldout: Vec<Held>,
     /// Mean square over that of the noise, all held-out records: before and after.
     pub mean_square: [f64; 2],
+    /// Held-out records that the extended model fits much worse than the training records.
+    pub shifts: Vec<Shift>,
     /// Closed loop with a policy, if one was given.
     pub closed_loop: Option<crate::control::ClosedLoop>,
 }
@@ -180,8 +182,11 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     if explained {
         causes.extend(lattice);
     }
+    let shifts = pair
+        .as_ref()
+        .map_or_else(Vec::new, |pair| pair.shifts(&problem, attribution.state()));
     let findings = Findings {
-        sentence: sentence(verdict, &causes, &structure),
+        sentence: sentence(verdict, &causes, &structure) + &shifted(&shifts),
         verdict,
         partial: if explained { Vec::new() } else { named },
         causes,
@@ -192,6 +197,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         gain: Gain {
             heldout: pair.as_ref().map_or_else(Vec::new, Pair::errors),
             mean_square: pair.as_ref().map_or([f64::NAN; 2], |pair| pair.total().into()),
+            shifts,
             closed_loop: None,
         },
     };
@@ -365,6 +371,32 @@ fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure]) -> Stri
             )
         }
     }
+}
+
+/// Said behind the verdict: what no fit to the training records can know.
+fn shifted(shifts: &[Shift]) -> String {
+    let one = |shift: &Shift| {
+        let place = match shift.throughout {
+            true => format!(
+                "lies {} {} the extended model throughout (training records: {})",
+                si(shift.mean.abs(), shift.unit),
+                if shift.mean > 0.0 { "above" } else { "below" },
+                si(shift.training, shift.unit)
+            ),
+            false => format!(
+                "is {:.1} times as far from the extended model as the training records, and lies {} beside it on average \
+                 (these: {})",
+                shift.ratio,
+                si(shift.mean, shift.unit),
+                si(shift.training, shift.unit)
+            ),
+        };
+        format!(
+            " In {} the held-out record {} {place}: something shifted between them.",
+            shift.channel, shift.record
+        )
+    };
+    shifts.iter().map(one).collect()
 }
 
 fn si(value: f64, unit: &str) -> String {

@@ -140,6 +140,8 @@ pub struct Diagnosis {
     pub findings: Findings,
     /// Training records.
     pub problem: Problem,
+    /// The training records at the model exactly as given.
+    pub given: State,
     /// What was fitted.
     pub attribution: Attribution,
     /// Profiles of the parameters.
@@ -203,6 +205,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     };
     Diagnosis {
         findings,
+        given: as_given(&problem, &base),
         problem,
         attribution,
         profiles,
@@ -226,6 +229,13 @@ impl Diagnosis {
         self.control = Some(control);
         Ok(())
     }
+}
+
+/// The model without the trim of the edges that stands beside every fit.
+fn as_given(problem: &Problem, base: &Model) -> State {
+    let mut held = problem.clone();
+    held.trim_held = true;
+    State::settle(&held, base, &held.first_starts(), None)
 }
 
 /// Noise estimated, outliers masked, initial states fitted.
@@ -324,13 +334,21 @@ fn verdict(named: &[Named], lattice: &Option<Named>, structure: &[Structure]) ->
     }
 }
 
+/// Rivals of a cause that the sentence names.
+const MOST_SAID: usize = 3;
+
 fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure]) -> String {
     let list = |causes: &[Named]| {
         let words = causes.iter().map(|cause| {
             let values = cause.parameters.iter().map(|(name, v)| {
                 let unit = if v.unit == "1" { "" } else { v.unit };
+                let name = if *name == cause.id {
+                    String::new()
+                } else {
+                    format!("{name} ")
+                };
                 format!(
-                    "{name} {} (95 %: {} to {}; model {})",
+                    "{name}{} (95 %: {} to {}; model {})",
                     si(v.value, unit),
                     si(v.low, unit),
                     si(v.high, unit),
@@ -352,7 +370,12 @@ fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure]) -> Stri
         Verdict::Ambiguous => {
             let ties = causes.iter().filter(|cause| !cause.rivals.is_empty()).map(|cause| {
                 let rivals: Vec<String> = cause.rivals.iter().map(|ids| ids.join(" + ")).collect();
-                format!("{} cannot be told from {}", cause.id, rivals.join(", or "))
+                let more = match rivals.len().saturating_sub(MOST_SAID) {
+                    0 => String::new(),
+                    more => format!(", or {more} others"),
+                };
+                let said = rivals[..rivals.len().min(MOST_SAID)].join(", or ");
+                format!("{} cannot be told from {said}{more}", cause.id)
             });
             format!(
                 "Best explanation: {}. But {}.",
@@ -374,7 +397,7 @@ fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure]) -> Stri
 }
 
 /// Said behind the verdict: what no fit to the training records can know.
-fn shifted(shifts: &[Shift]) -> String {
+pub(crate) fn shifted(shifts: &[Shift]) -> String {
     let one = |shift: &Shift| {
         let place = match shift.throughout {
             true => format!(
@@ -399,7 +422,15 @@ fn shifted(shifts: &[Shift]) -> String {
     shifts.iter().map(one).collect()
 }
 
-fn si(value: f64, unit: &str) -> String {
+/// A quantity with four digits.
+pub(crate) fn si(value: f64, unit: &str) -> String {
+    if value == 0.0 {
+        return if unit.is_empty() {
+            "0".to_owned()
+        } else {
+            format!("0 {unit}")
+        };
+    }
     report::quantity(value, unit, 4)
 }
 

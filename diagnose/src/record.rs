@@ -95,8 +95,14 @@ impl Record {
         };
         let fewest = if settled { FEWEST_SETTLED } else { FEWEST };
         if rows.iter().flatten().count() < fewest {
-            let message = Message::new("too few rows").found(raw.rows().to_string());
-            return Err(raw.whole(message.expected(format!("{fewest} or more"))).into());
+            let used = rows.iter().flatten().count();
+            let message = Message::new("too few rows").found(match raw.rows() > used {
+                true => format!("{used} switching periods in {} rows", raw.rows()),
+                false => used.to_string(),
+            });
+            let message = message.expected(format!("{fewest} or more"));
+            let hint = "a capture of a settled point is one row of a table without `t`: note its means there";
+            return Err(raw.whole(if settled { message } else { message.hint(hint) }).into());
         }
         let loads = raw.loads()?;
         let measured: [Vec<f64>; CHANNELS] =

@@ -9,7 +9,7 @@ use crate::attribute::{Attribution, attribute};
 use crate::control::Request;
 use crate::drive::Model;
 use crate::fit::State;
-use crate::gain::{self, Held, Pair};
+use crate::gain::{self, Held, Pair, Shift};
 use crate::noise::{self, Outlier};
 use crate::problem::Problem;
 use crate::profile::{Profile, profiles};
@@ -104,6 +104,8 @@ pub struct Gain {
     pub heldout: Vec<Held>,
     /// Mean square over that of the noise, all held-out records: before and after.
     pub mean_square: [f64; 2],
+    /// Held-out records that the extended model fits much worse than the training records.
+    pub shifts: Vec<Shift>,
     /// Closed loop with a policy, if one was given.
     pub closed_loop: Option<crate::control::ClosedLoop>,
 }
@@ -138,6 +140,8 @@ pub struct Diagnosis {
     pub findings: Findings,
     /// Training records.
     pub problem: Problem,
+    /// The training records at the model exactly as given.
+    pub given: State,
     /// What was fitted.
     pub attribution: Attribution,
     /// Profiles of the parameters.
@@ -180,8 +184,11 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     if explained {
         causes.extend(lattice);
     }
+    let shifts = pair
+        .as_ref()
+        .map_or_else(Vec::new, |pair| pair.shifts(&problem, attribution.state()));
     let findings = Findings {
-        sentence: sentence(verdict, &causes, &structure),
+        sentence: sentence(verdict, &causes, &structure) + &shifted(&shifts),
         verdict,
         partial: if explained { Vec::new() } else { named },
         causes,
@@ -192,11 +199,13 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         gain: Gain {
             heldout: pair.as_ref().map_or_else(Vec::new, Pair::errors),
             mean_square: pair.as_ref().map_or([f64::NAN; 2], |pair| pair.total().into()),
+            shifts,
             closed_loop: None,
         },
     };
     Diagnosis {
         findings,
+        given: as_given(&problem, &base),
         problem,
         attribution,
         profiles,
@@ -220,6 +229,13 @@ impl Diagnosis {
         self.control = Some(control);
         Ok(())
     }
+}
+
+/// The model without the trim of the edges that stands beside every fit.
+fn as_given(problem: &Problem, base: &Model) -> State {
+    let mut held = problem.clone();
+    held.trim_held = true;
+    State::settle(&held, base, &held.first_starts(), None)
 }
 
 /// Noise estimated, outliers masked, initial states fitted.
@@ -318,13 +334,21 @@ fn verdict(named: &[Named], lattice: &Option<Named>, structure: &[Structure]) ->
     }
 }
 
+/// Rivals of a cause that the sentence names.
+const MOST_SAID: usize = 3;
+
 fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure]) -> String {
     let list = |causes: &[Named]| {
         let words = causes.iter().map(|cause| {
             let values = cause.parameters.iter().map(|(name, v)| {
                 let unit = if v.unit == "1" { "" } else { v.unit };
+                let name = if *name == cause.id {
+                    String::new()
+                } else {
+                    format!("{name} ")
+                };
                 format!(
-                    "{name} {} (95 %: {} to {}; model {})",
+                    "{name}{} (95 %: {} to {}; model {})",
                     si(v.value, unit),
                     si(v.low, unit),
                     si(v.high, unit),
@@ -346,7 +370,12 @@ fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure]) -> Stri
         Verdict::Ambiguous => {
             let ties = causes.iter().filter(|cause| !cause.rivals.is_empty()).map(|cause| {
                 let rivals: Vec<String> = cause.rivals.iter().map(|ids| ids.join(" + ")).collect();
-                format!("{} cannot be told from {}", cause.id, rivals.join(", or "))
+                let more = match rivals.len().saturating_sub(MOST_SAID) {
+                    0 => String::new(),
+                    more => format!(", or {more} others"),
+                };
+                let said = rivals[..rivals.len().min(MOST_SAID)].join(", or ");
+                format!("{} cannot be told from {said}{more}", cause.id)
             });
             format!(
                 "Best explanation: {}. But {}.",
@@ -367,7 +396,41 @@ fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure]) -> Stri
     }
 }
 
-fn si(value: f64, unit: &str) -> String {
+/// Said behind the verdict: what no fit to the training records can know.
+pub(crate) fn shifted(shifts: &[Shift]) -> String {
+    let one = |shift: &Shift| {
+        let place = match shift.throughout {
+            true => format!(
+                "lies {} {} the extended model throughout (training records: {})",
+                si(shift.mean.abs(), shift.unit),
+                if shift.mean > 0.0 { "above" } else { "below" },
+                si(shift.training, shift.unit)
+            ),
+            false => format!(
+                "is {:.1} times as far from the extended model as the training records, and lies {} beside it on average \
+                 (these: {})",
+                shift.ratio,
+                si(shift.mean, shift.unit),
+                si(shift.training, shift.unit)
+            ),
+        };
+        format!(
+            " In {} the held-out record {} {place}: something shifted between them.",
+            shift.channel, shift.record
+        )
+    };
+    shifts.iter().map(one).collect()
+}
+
+/// A quantity with four digits.
+pub(crate) fn si(value: f64, unit: &str) -> String {
+    if value == 0.0 {
+        return if unit.is_empty() {
+            "0".to_owned()
+        } else {
+            format!("0 {unit}")
+        };
+    }
     report::quantity(value, unit, 4)
 }
 

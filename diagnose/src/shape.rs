@@ -43,7 +43,8 @@ pub fn structures(problem: &Problem, state: &State, inflation: f64) -> Vec<Struc
             }
             let scatter = (2.0 / left.blocks as f64).sqrt() * inflation.sqrt().min(1.5);
             // a coarse converter leaves patterns that are none of the plant's
-            let coarse = record.lattice[n] > 1.5 * problem.sigma[n];
+            let step = record.lattice[n];
+            let coarse = step > 1.5 * problem.sigma[n] && left.square.sqrt() * problem.sigma[n] < step;
             let slow = left.slow > 1.0 + SLOW.max(SIGMAS * scatter);
             let wild = left.square > 2.5;
             if (slow || wild) && !coarse {

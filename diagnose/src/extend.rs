@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use plant::Parameters;
 
-use crate::diagnosis::{Diagnosis, Verdict};
+use crate::diagnosis::Diagnosis;
 use crate::drive::Model;
 
 /// Numbers that are written without a point.
@@ -37,12 +37,8 @@ pub fn as_plant(model: &Model, trim: f64) -> Parameters {
 #[must_use]
 pub fn extended_toml(diagnosis: &Diagnosis) -> String {
     let findings = &diagnosis.findings;
-    let trim = diagnosis.attribution.state().starts.trim;
-    let extended = match findings.verdict {
-        Verdict::Consistent | Verdict::Unexplained => Model::new(&diagnosis.problem.base.plant),
-        _ => diagnosis.extended.clone(),
-    };
-    let after = as_plant(&extended, trim);
+    let trim = diagnosis.trim;
+    let after = as_plant(&diagnosis.extended, trim);
     let before = &diagnosis.problem.base.plant;
     let mut notes: BTreeMap<&str, String> = BTreeMap::new();
     let best = diagnosis

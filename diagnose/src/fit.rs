@@ -4,7 +4,7 @@ use crate::causes::{Candidate, Search};
 use crate::drive::Model;
 use crate::problem::{Basis, Problem, Starts, axpy, dot, nudged};
 
-const MOST_STEPS: usize = 12;
+const MOST_STEPS: usize = 20;
 /// A step that gains less than this ends the fit.
 const SMALL_GAIN: f64 = 0.02;
 
@@ -118,14 +118,13 @@ impl Fitter<'_> {
         !matches!(self.candidates[place.0].cause.search, Search::Scan(_)) || place.1 > 0
     }
 
-    /// Fits one candidate on top of `from`, from each of its starts; the best.
+    /// Fits one candidate on top of `from`, from the best of `starts`.
     #[must_use]
-    pub fn single(&self, cause: usize, from: &State) -> Fit {
-        let starts = self.starts(cause);
-        if let [only] = starts.as_slice() {
+    pub fn single(&self, cause: usize, starts: &[Vec<f64>], from: &State) -> Fit {
+        if let [only] = starts {
             return self.from(&[cause], only, from);
         }
-        let best = self.best_start(cause, &starts, from);
+        let best = self.best_start(cause, starts, from);
         self.from(
             &[cause],
             best.map_or(&self.candidates[cause].own, |(_, values)| values),
@@ -135,9 +134,8 @@ impl Fitter<'_> {
 
     /// Chi-square of the best start of a candidate, not fitted further.
     #[must_use]
-    pub fn look(&self, cause: usize, from: &State) -> f64 {
-        let starts = self.starts(cause);
-        self.best_start(cause, &starts, from)
+    pub fn look(&self, cause: usize, starts: &[Vec<f64>], from: &State) -> f64 {
+        self.best_start(cause, starts, from)
             .map_or(f64::INFINITY, |(chi2, _)| chi2)
     }
 
@@ -149,7 +147,8 @@ impl Fitter<'_> {
     }
 
     /// Where the fit of a candidate may begin.
-    fn starts(&self, cause: usize) -> Vec<Vec<f64>> {
+    #[must_use]
+    pub fn starts(&self, cause: usize) -> Vec<Vec<f64>> {
         let candidate = &self.candidates[cause];
         match candidate.cause.search {
             Search::Own => vec![candidate.own.clone()],

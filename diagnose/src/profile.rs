@@ -1,11 +1,15 @@
 //! Profile likelihood: how well the data hold each parameter when all others may follow.
 
-use crate::attribute::Attribution;
+use crate::attribute::{ACCURACY, Attribution};
 use crate::parallel;
 use crate::problem::Problem;
 
 /// 95 % of a chi-square of one degree of freedom.
 const LEVEL: f64 = 3.841;
+/// The same in standard deviations.
+const TWO_SIDED: f64 = 1.96;
+/// How often the reach of a flat curve is doubled.
+const FURTHER: usize = 3;
 /// Places of the profile, in standard deviations.
 const PLACES: [f64; 4] = [-2.0, -1.0, 1.0, 2.0];
 
@@ -28,7 +32,15 @@ pub struct Profile {
     pub curve: Vec<(f64, f64)>,
 }
 
-/// Profiles of all parameters of the best explanation.
+impl Profile {
+    /// Cost of a value that was tried.
+    fn cost(&self, value: f64) -> f64 {
+        let tried = self.curve.iter().find(|(x, _)| *x == value);
+        tried.map_or(0.0, |(_, cost)| *cost)
+    }
+}
+
+/// Profiles of all parameters of the best explanation. The intervals allow for the accuracy of the plant too.
 #[must_use]
 pub fn profiles(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
     let Some(best) = &attribution.best else {
@@ -56,33 +68,37 @@ pub fn profiles(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
             return profile;
         }
         let [low, high, _] = fitter.range(place);
-        let others = places.len() > 1;
-        for at in PLACES {
+        let at_value = |x: f64| {
             let mut values = best.values.clone();
-            values[*number] = (value + at * sigma).clamp(low, high);
-            let fit = match others {
-                true => fitter.holding(&best.causes, &values, &best.state, Some(*number)),
-                false => fitter.holding(&best.causes, &values, &best.state, Some(0)),
-            };
-            let cost = ((fit.state.chi2 - best.state.chi2) / attribution.inflation).max(0.0);
-            profile.curve.push((values[*number], cost));
+            values[*number] = x;
+            let fit = fitter.holding(&best.causes, &values, &best.state, Some(*number));
+            ((fit.state.chi2 - best.state.chi2) / attribution.inflation).max(0.0)
+        };
+        for at in PLACES {
+            let x = (value + at * sigma).clamp(low, high);
+            profile.curve.push((x, at_value(x)));
         }
-        profile.curve.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (side, at) in [(0, -2.0), (1, 2.0)] {
-            let far = (value + at * sigma).clamp(low, high);
-            let cost = profile
-                .curve
-                .iter()
-                .find(|(x, _)| *x == far)
-                .map_or(0.0, |(_, cost)| *cost);
-            // a parabola through the far point; a flat profile is open up to the bound
-            let reach = if cost > 0.3 {
-                (far - value) * (LEVEL / cost).sqrt()
-            } else {
-                at.signum() * (high - low)
+            let mut far = (value + at * sigma).clamp(low, high);
+            let mut cost = profile.cost(far);
+            // the curve may be flatter than at its lowest point
+            for _ in 0..FURTHER {
+                if cost >= 1.0 || far <= low || far >= high {
+                    break;
+                }
+                far = (value + 2.0 * (far - value)).clamp(low, high);
+                cost = at_value(far);
+                profile.curve.push((far, cost));
+            }
+            let statistical = match cost > 0.3 {
+                true => (far - value) * (LEVEL / cost).sqrt(),
+                false => at.signum() * (high - low),
             };
+            let systematic = TWO_SIDED * ACCURACY * (value - profile.own);
+            let reach = at.signum() * statistical.hypot(systematic);
             profile.interval[side] = (value + reach).clamp(low, high);
         }
+        profile.curve.sort_by(|a, b| a.0.total_cmp(&b.0));
         profile
     })
 }

@@ -1,6 +1,8 @@
 //! Which steps of a duty counter could have made a residual: the response to the rounding of the duty, by the averaged
 //! circuit linearised around each row, for thousands of steps.
 
+use std::ops::Range;
+
 use crate::parallel;
 use crate::problem::{Basis, Problem, dot};
 use crate::record::{CHANNELS, Record};
@@ -9,10 +11,13 @@ use crate::record::{CHANNELS, Record};
 const FEWEST: f64 = 8.0;
 const MOST: f64 = 1000.0;
 const APART: f64 = 0.1;
+/// The averaged circuit may be off in the size of the response by as much.
+const LEAST_SHARE: f64 = 0.7;
+const MOST_SHARE: f64 = 1.3;
 /// Steps of the integration in a period.
 const FINE: usize = 4;
 
-/// The counts per period (whole or not) whose rounding looks most like `residual`, best first.
+/// Counts per period (whole or not) whose rounding looks most like `residual`: ends and middles of the `count` best pieces.
 pub(crate) fn likely(problem: &Problem, basis: &Basis, residual: &[f64], count: usize) -> Vec<f64> {
     let numbers: Vec<f64> = (0..=((MOST - FEWEST) / APART) as usize)
         .map(|n| FEWEST + n as f64 * APART)
@@ -27,15 +32,45 @@ pub(crate) fn likely(problem: &Problem, basis: &Basis, residual: &[f64], count: 
         }
         basis.project(&mut column);
         let (along, length) = (dot(&column, residual), dot(&column, &column));
-        if along > 0.0 && length > 0.0 {
-            along * along / length
-        } else {
-            0.0
-        }
+        let share = (along / length.max(1e-300)).clamp(LEAST_SHARE, MOST_SHARE);
+        2.0 * share * along - share * share * length
     });
-    let mut order: Vec<usize> = (0..numbers.len()).collect();
-    order.sort_by(|a, b| gains[*b].total_cmp(&gains[*a]).then(a.cmp(b)));
-    order.into_iter().take(count).map(|n| numbers[n]).collect()
+    let mut pieces: Vec<(f64, Range<usize>)> = pieces(problem, &numbers)
+        .into_iter()
+        .map(|piece| (gains[piece.clone()].iter().copied().fold(0.0, f64::max), piece))
+        .collect();
+    pieces.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.start.cmp(&b.1.start)));
+    let mut found: Vec<f64> = Vec::new();
+    for (_, piece) in pieces.into_iter().take(count) {
+        let (first, last) = (piece.start, piece.end - 1);
+        for n in [first, (first + last) / 2, last] {
+            if !found.contains(&numbers[n]) {
+                found.push(numbers[n]);
+            }
+        }
+    }
+    found
+}
+
+/// Stretches of numbers that round every duty to the same count: what they make of a record changes smoothly within.
+fn pieces(problem: &Problem, numbers: &[f64]) -> Vec<Range<usize>> {
+    let mut duties: Vec<f64> = problem.records.iter().flat_map(|r| r.duty.iter().copied()).collect();
+    duties.sort_by(f64::total_cmp);
+    duties.dedup();
+    let count = |duty: f64, counts: f64| libm::floor(duty * counts + 0.5);
+    let mut list = Vec::new();
+    let mut start = 0;
+    for n in 1..=numbers.len() {
+        let ends = n == numbers.len()
+            || duties
+                .iter()
+                .any(|d| count(*d, numbers[n - 1]) != count(*d, numbers[n]));
+        if ends {
+            list.push(start..n);
+            start = n;
+        }
+    }
+    list
 }
 
 /// Change of the signals over their noise when the duty is rounded to `counts` per period.

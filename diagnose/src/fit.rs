@@ -118,34 +118,6 @@ impl Fitter<'_> {
         !matches!(self.candidates[place.0].cause.search, Search::Scan(_)) || place.1 > 0
     }
 
-    /// Fits one candidate on top of `from`, from the best of `starts`.
-    #[must_use]
-    pub fn single(&self, cause: usize, starts: &[Vec<f64>], from: &State) -> Fit {
-        if let [only] = starts {
-            return self.from(&[cause], only, from);
-        }
-        let best = self.best_start(cause, starts, from);
-        self.from(
-            &[cause],
-            best.map_or(&self.candidates[cause].own, |(_, values)| values),
-            from,
-        )
-    }
-
-    /// Chi-square of the best start of a candidate, not fitted further.
-    #[must_use]
-    pub fn look(&self, cause: usize, starts: &[Vec<f64>], from: &State) -> f64 {
-        self.best_start(cause, starts, from)
-            .map_or(f64::INFINITY, |(chi2, _)| chi2)
-    }
-
-    fn best_start<'v>(&self, cause: usize, starts: &'v [Vec<f64>], from: &State) -> Option<(f64, &'v Vec<f64>)> {
-        let looks = starts
-            .iter()
-            .map(|values| (self.state_at(&[cause], values, from, 1).0.chi2, values));
-        looks.min_by(|a, b| a.0.total_cmp(&b.0))
-    }
-
     /// Where the fit of a candidate may begin.
     #[must_use]
     pub fn starts(&self, cause: usize) -> Vec<Vec<f64>> {
@@ -181,7 +153,7 @@ impl Fitter<'_> {
     }
 
     /// The model with these values, initial states fitted in `rounds`.
-    fn state_at(&self, causes: &[usize], values: &[f64], from: &State, rounds: usize) -> (State, Vec<f64>) {
+    pub(crate) fn state_at(&self, causes: &[usize], values: &[f64], from: &State, rounds: usize) -> (State, Vec<f64>) {
         let mut model = from.model.clone();
         let mut values = values.to_vec();
         for (place, value) in self.places(causes).iter().zip(&mut values) {
@@ -213,11 +185,9 @@ impl Fitter<'_> {
             if smooth.is_empty() {
                 break;
             }
-            let jacobian = self.jacobian(&places, &smooth, &state);
-            let normal = Normal::new(&jacobian.projected, &state.residual);
-            normal.covariance(&smooth, &jacobian.scale, &mut covariance);
-            let Some((next, moved)) = self.improve(&places, &smooth, &values, &state, &jacobian, &normal, &mut damping)
-            else {
+            let round = self.round(&places, &smooth, &state);
+            round.normal.covariance(&smooth, &round.jacobian.scale, &mut covariance);
+            let Some((next, moved)) = self.improve(&round, &values, &state, &mut damping) else {
                 break;
             };
             let gain = state.chi2 - next.chi2;
@@ -231,6 +201,17 @@ impl Fitter<'_> {
             values,
             state,
             covariance,
+        }
+    }
+
+    /// Sensitivities and normal equations at a state.
+    fn round<'r>(&self, places: &'r [Place], smooth: &'r [usize], state: &State) -> Round<'r> {
+        let jacobian = self.jacobian(places, smooth, state);
+        Round {
+            places,
+            smooth,
+            normal: Normal::new(&jacobian.projected, &state.residual),
+            jacobian,
         }
     }
 
@@ -259,27 +240,25 @@ impl Fitter<'_> {
         jacobian
     }
 
-    #[allow(clippy::too_many_arguments)]
+    /// The next state and values, if a step leads to less chi-square; `damping` follows.
     fn improve(
         &self,
-        places: &[Place],
-        smooth: &[usize],
+        round: &Round<'_>,
         values: &[f64],
         state: &State,
-        jacobian: &Jacobian,
-        normal: &Normal,
         damping: &mut f64,
     ) -> Option<(State, Vec<f64>)> {
         for _ in 0..5 {
-            let step = normal.step(*damping);
+            let step = round.normal.step(*damping);
             let mut moved = values.to_vec();
             let mut model = state.model.clone();
             let mut left = state.residual.clone();
-            for (k, n) in smooth.iter().enumerate() {
-                let [low, high, unit] = self.range(places[*n]);
+            for (k, n) in round.smooth.iter().enumerate() {
+                let place = round.places[*n];
+                let [low, high, unit] = self.range(place);
                 moved[*n] = (values[*n] + step[k] * unit).clamp(low, high);
-                axpy(&mut left, -(moved[*n] - values[*n]) / unit, &jacobian.raw[k]);
-                self.set(&mut model, places[*n], moved[*n]);
+                axpy(&mut left, -(moved[*n] - values[*n]) / unit, &round.jacobian.raw[k]);
+                self.set(&mut model, place, moved[*n]);
             }
             let mut starts = state.starts.clone();
             self.basis.absorb(&left, &mut starts);
@@ -300,6 +279,15 @@ impl Fitter<'_> {
         let smooth: Vec<usize> = (0..places.len()).filter(|n| self.is_smooth(places[*n])).collect();
         self.jacobian(&places, &smooth, state).projected
     }
+}
+
+/// What a step of the fit is made of.
+struct Round<'a> {
+    places: &'a [Place],
+    /// Which of them move.
+    smooth: &'a [usize],
+    jacobian: Jacobian,
+    normal: Normal,
 }
 
 #[derive(Default)]

@@ -10,6 +10,9 @@ const LEVEL: f64 = 3.841;
 const TWO_SIDED: f64 = 1.96;
 /// How often the reach of a flat curve is doubled.
 const FURTHER: usize = 3;
+/// How far beside the best the counts of a duty counter are tried.
+const LEAST_COUNTS: f64 = 5e-3;
+const MOST_COUNTS: f64 = 10.0;
 /// Places of the profile, in standard deviations.
 const PLACES: [f64; 4] = [-2.0, -1.0, 1.0, 2.0];
 
@@ -64,9 +67,6 @@ pub fn profiles(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
             curve: vec![(value, 0.0)],
         };
         let sigma = (best.covariance[*number][*number] * attribution.inflation).sqrt();
-        if !fitter.is_smooth(place) || sigma.is_nan() || sigma <= 0.0 {
-            return profile;
-        }
         let [low, high, _] = fitter.range(place);
         let at_value = |x: f64| {
             let mut values = best.values.clone();
@@ -74,6 +74,12 @@ pub fn profiles(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
             let fit = fitter.holding(&best.causes, &values, &best.state, Some(*number));
             ((fit.state.chi2 - best.state.chi2) / attribution.inflation).max(0.0)
         };
+        if knob.name == "duty_lsb" {
+            profile.interval = [-1.0, 1.0].map(|side| alike(value, side, &at_value));
+        }
+        if !fitter.is_smooth(place) || sigma.is_nan() || sigma <= 0.0 {
+            return profile;
+        }
         for at in PLACES {
             let x = (value + at * sigma).clamp(low, high);
             profile.curve.push((x, at_value(x)));
@@ -101,4 +107,21 @@ pub fn profiles(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
         profile.curve.sort_by(|a, b| a.0.total_cmp(&b.0));
         profile
     })
+}
+
+/// How far a step of a duty counter may be off on one side: within a piece of equal counts the cost grows smoothly, at its end
+/// it jumps.
+fn alike(step: f64, side: f64, cost: &dyn Fn(f64) -> f64) -> f64 {
+    let moved = |counts: f64| (step.recip() - side * counts).recip();
+    let (mut reached, mut counts) = (0.0, LEAST_COUNTS);
+    while counts < MOST_COUNTS && moved(counts) > 0.0 {
+        let cost = cost(moved(counts));
+        if cost > LEVEL {
+            let within = counts * (LEVEL / cost).sqrt();
+            return moved(within.max(reached));
+        }
+        reached = counts;
+        counts *= 2.0;
+    }
+    moved(reached)
 }

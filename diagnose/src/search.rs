@@ -23,8 +23,10 @@ const SWAP: f64 = 2.0;
 const MOST: usize = 3;
 /// Candidates that are fitted after a linear look at all.
 const LOOKED_AT: usize = 5;
-/// Steps of the duty that are simulated after a linear look at all.
-const COUNTS: usize = 10;
+/// Kinds of rounding that are simulated after a linear look at all.
+const COUNTS: usize = 8;
+/// First step of the refinement, counts.
+const COUNT_STEP: f64 = 0.2;
 /// Further sets that are tried as the start of a larger one, and candidates that are fitted beside each.
 const LEADERS: usize = 2;
 const LOOKED_AT_BY_LEADERS: usize = 3;
@@ -33,6 +35,29 @@ const LOOKED_AT_BY_LEADERS: usize = 3;
 pub(crate) struct Searcher<'a> {
     /// Fits one set.
     pub fitter: Fitter<'a>,
+}
+
+/// A fitted set, and the sensitivities of its parameters where it ends.
+struct Set<'a> {
+    causes: &'a [usize],
+    values: &'a [f64],
+    columns: &'a [Vec<f64>],
+}
+
+impl<'a> Set<'a> {
+    const NONE: Set<'static> = Set {
+        causes: &[],
+        values: &[],
+        columns: &[],
+    };
+
+    fn of(fit: &'a Fit, columns: &'a [Vec<f64>]) -> Self {
+        Set {
+            causes: &fit.causes,
+            values: &fit.values,
+            columns,
+        }
+    }
 }
 
 impl Searcher<'_> {
@@ -62,7 +87,7 @@ impl Searcher<'_> {
             if self.is_smooth(*cause) && !follow {
                 return self.fitter.unmoved(*cause, first_order[*cause]);
             }
-            self.added(&[], &[], *cause, null)
+            self.added(&Set::NONE, *cause, null)
         })
     }
 
@@ -81,15 +106,59 @@ impl Searcher<'_> {
         fits.sort_by(|a, b| self.score(a).total_cmp(&self.score(b)));
     }
 
-    /// `causes` and `cause`, fitted from `values`, and from where `cause` alone starts.
-    fn added(&self, causes: &[usize], values: &[f64], cause: usize, from: &State) -> Fit {
-        let alone = self.fitter.single(cause, &self.starts(cause, from), from);
-        if causes.is_empty() {
-            return alone;
+    /// `set` and `cause`, fitted from where it begins best.
+    fn added(&self, set: &Set<'_>, cause: usize, from: &State) -> Fit {
+        let (_, start) = self.begin(set, cause, from);
+        let values = [set.values, &start].concat();
+        self.fitter.from(&[set.causes, &[cause]].concat(), &values, from)
+    }
+
+    /// Chi-square that `set` with `cause` would have at first order, from the best start of `cause`, and that start.
+    fn begin(&self, set: &Set<'_>, cause: usize, from: &State) -> (f64, Vec<f64>) {
+        let starts = self.starts(cause, from);
+        if self.is_smooth(cause) {
+            let mut columns = set.columns.to_vec();
+            columns.extend(self.fitter.sensitivity(cause, from));
+            let own = self.fitter.candidates[cause].own.clone();
+            return (from.chi2 - gained(&columns, &from.residual), own);
         }
-        let set = [causes, &[cause]].concat();
-        let start = [values, &alone.values].concat();
-        self.fitter.from(&set, &start, &alone.state)
+        let looks = starts.into_iter().map(|start| {
+            let state = self.fitter.state_at(&[cause], &start, from, 1).0;
+            // the others may have to follow before it shows what it is worth
+            let mut columns = self.sensitivities(set.causes, &state);
+            columns.extend(self.fitter.sensitivity(cause, &state));
+            (state.chi2 - gained(&columns, &state.residual), start)
+        });
+        let best = looks.min_by(|a, b| a.0.total_cmp(&b.0));
+        match (best, self.id(cause)) {
+            (Some((_, step)), "duty_quantisation") => self.refined(set, cause, from, step[0].recip()),
+            (Some(best), _) => best,
+            (None, _) => (f64::INFINITY, self.fitter.candidates[cause].own.clone()),
+        }
+    }
+
+    /// A duty counter near `counts` that fits better, and the chi-square expected with it.
+    fn refined(&self, set: &Set<'_>, cause: usize, from: &State, counts: f64) -> (f64, Vec<f64>) {
+        let look = |counts: f64| {
+            let state = self.fitter.state_at(&[cause], &[counts.recip()], from, 1).0;
+            state.chi2 - gained(&self.sensitivities(set.causes, &state), &state.residual)
+        };
+        let (mut best, mut at, mut step) = (look(counts), counts, COUNT_STEP);
+        while step > COUNT_STEP / 20.0 {
+            let next = [at - step, at + step].map(|counts| (look(counts), counts));
+            let next = if next[0].0 < next[1].0 { next[0] } else { next[1] };
+            match next.0 < best {
+                true => (best, at) = next,
+                false => step *= 0.5,
+            }
+        }
+        // counters have whole counts
+        let whole = libm::round(at);
+        let of_whole = look(whole);
+        if of_whole < best + TIE {
+            (best, at) = (of_whole, whole);
+        }
+        (best, vec![at.recip()])
     }
 
     /// Where the fit of a candidate may begin; what the residual itself tells is read off it.
@@ -174,13 +243,12 @@ impl Searcher<'_> {
 
     /// Sets that are one cause larger: those of the candidates that look best at first order.
     fn forward(&self, best: &Fit, count: usize) -> Vec<Fit> {
-        let own = self.sensitivities(&best.causes, &best.state);
-        let looks = self.looks(&own, &self.others(&best.causes), &best.state);
+        let columns = self.sensitivities(&best.causes, &best.state);
+        let set = Set::of(best, &columns);
+        let looks = self.looks(&set, &self.others(&best.causes), &best.state);
         let least = 0.3 * threshold(1, 1.0);
         let looks = looks.into_iter().filter(|(gain, _)| *gain > least).collect();
-        parallel::map(&top(looks, count), |cause| {
-            self.added(&best.causes, &best.values, *cause, &best.state)
-        })
+        parallel::map(&top(looks, count), |cause| self.added(&set, *cause, &best.state))
     }
 
     fn sensitivities(&self, causes: &[usize], state: &State) -> Vec<Vec<f64>> {
@@ -190,17 +258,9 @@ impl Searcher<'_> {
             .collect()
     }
 
-    /// What each of `causes` would gain beside the columns `own` at first order, or from the best of its starts.
-    fn looks(&self, own: &[Vec<f64>], causes: &[usize], state: &State) -> Vec<(f64, usize)> {
-        parallel::map(causes, |cause| {
-            if !self.is_smooth(*cause) {
-                let starts = self.starts(*cause, state);
-                return (state.chi2 - self.fitter.look(*cause, &starts, state), *cause);
-            }
-            let mut columns = own.to_vec();
-            columns.extend(self.fitter.sensitivity(*cause, state));
-            (gained(&columns, &state.residual), *cause)
-        })
+    /// What each of `causes` would gain beside a set, at first order.
+    fn looks(&self, set: &Set<'_>, causes: &[usize], state: &State) -> Vec<(f64, usize)> {
+        parallel::map(causes, |cause| (state.chi2 - self.begin(set, *cause, state).0, *cause))
     }
 
     /// Candidates of other ids.
@@ -229,13 +289,12 @@ impl Searcher<'_> {
     fn replacements(&self, fit: &Fit, member: usize, count: usize) -> Vec<Fit> {
         let kept = without(&fit.causes, member);
         let kept = self.fitter.from(&kept, &self.values_of(fit, &kept), self.fitter.null);
-        let own = self.sensitivities(&kept.causes, &kept.state);
-        let looks = self.looks(&own, &self.others(&fit.causes), &kept.state);
+        let columns = self.sensitivities(&kept.causes, &kept.state);
+        let set = Set::of(&kept, &columns);
+        let looks = self.looks(&set, &self.others(&fit.causes), &kept.state);
         let most = looks.iter().map(|look| look.0).fold(0.0, f64::max);
         let looks = looks.into_iter().filter(|look| look.0 > FOLLOWED * most).collect();
-        parallel::map(&top(looks, count), |cause| {
-            self.added(&kept.causes, &kept.values, *cause, &kept.state)
-        })
+        parallel::map(&top(looks, count), |cause| self.added(&set, *cause, &kept.state))
     }
 
     fn values_of(&self, fit: &Fit, kept: &[usize]) -> Vec<f64> {

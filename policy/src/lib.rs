@@ -28,7 +28,9 @@ mod scaffold;
 pub mod scales;
 mod weights;
 
+pub use bounds::rational_tanh;
 pub use check::check;
+pub use digests::sha256;
 pub use faults::Faults;
 pub use model::*;
 pub use raw::{RawPolicy, ReadOptions, read};

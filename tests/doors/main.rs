@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod c2000;
+mod fmu;
 mod kit;
 mod sfunction;
 

@@ -178,10 +178,11 @@ fn passed() -> Outcome {
 }
 
 fn install(context: &Context) -> Outcome {
+    let target_dir = &context.workspace.target_dir;
     let notes = if context.options.skip_install {
-        tools::require()?
+        tools::require(target_dir)?
     } else {
-        tools::provide(&Output::Log(context.log.clone()))?
+        tools::provide(target_dir, &Output::Log(context.log.clone()))?
     };
     Ok(Done::Passed(notes))
 }
@@ -206,8 +207,9 @@ fn test(context: &Context) -> Outcome {
     if context.options.quick {
         arguments.extend(["--exclude", "tests", "--exclude", "blind"]);
     }
-    let absent = tools::absent_rust_targets().join(",");
-    context.cargo(&arguments, &[(tools::WITHOUT_RUST_TARGETS, &absent)])?;
+    let absent = tools::absent(&context.workspace.target_dir);
+    let absent = absent.each_ref().map(|(name, value)| (*name, value.as_str()));
+    context.cargo(&arguments, &absent)?;
     let log = process::read_lossy(&context.log);
     Ok(Done::Passed(vec![test_count(&log)]))
 }

@@ -2,7 +2,7 @@
 //! as well beside them.
 
 use crate::causes::{Candidate, Search, candidates};
-use crate::fit::{Fit, Fitter, State};
+use crate::fit::{FINE, Fit, Fitter, ROUGH, State};
 use crate::noise;
 use crate::parallel;
 use crate::problem::{Basis, Problem, dot};
@@ -54,6 +54,7 @@ pub fn attribute(problem: &Problem, null: State, say: &(dyn Fn(&str) + Sync)) ->
         candidates: &candidates,
         basis: &basis,
         null: &null,
+        effort: ROUGH,
     };
     let search = Searcher { fitter };
     say("each cause alone");
@@ -88,6 +89,7 @@ impl Attribution {
             candidates: &self.candidates,
             basis: &self.basis,
             null: &self.null,
+            effort: FINE,
         }
     }
 

@@ -243,7 +243,7 @@ pub const CAUSES: &[Cause] = &[
             knob("saturation", &["inductor.saturation"], Reach::Plain(0.0, 0.95, 0.1)),
             knob("i_sat", &["inductor.i_sat"], Reach::Current(0.5, 5.0, 0.1)),
         ],
-        Search::From(&[&[2.0, 6.0], &[4.0, 12.0], &[5.0, 25.0]]),
+        Search::From(&[&[0.3, 6.0], &[0.3, 12.0], &[0.3, 25.0], &[4.0, 12.0]]),
     ),
     searched(
         "c_derating",
@@ -252,7 +252,7 @@ pub const CAUSES: &[Cause] = &[
             knob("derating", &["capacitor.derating"], Reach::Plain(0.0, 0.95, 0.1)),
             knob("v_half", &["capacitor.v_half"], Reach::Voltage(0.5, 5.0, 0.1)),
         ],
-        Search::From(&[&[2.0, 6.0], &[4.0, 12.0], &[5.0, 25.0]]),
+        Search::From(&[&[0.3, 6.0], &[0.3, 12.0], &[0.3, 25.0], &[4.0, 12.0]]),
     ),
     cause(
         "source_impedance",

@@ -4,9 +4,28 @@ use crate::causes::{Candidate, Search};
 use crate::drive::Model;
 use crate::problem::{Basis, Problem, Starts, axpy, dot, nudged};
 
-const MOST_STEPS: usize = 20;
-/// A step that gains less than this ends the fit.
+/// A step that gains less than this ends the settling of initial states.
 const SMALL_GAIN: f64 = 0.02;
+
+/// When a fit ends.
+#[derive(Debug, Clone, Copy)]
+pub struct Effort {
+    /// Most steps.
+    steps: usize,
+    /// A step that gains less than this is the last.
+    small_gain: f64,
+}
+
+/// To compare.
+pub const ROUGH: Effort = Effort {
+    steps: 8,
+    small_gain: 0.5,
+};
+/// To report.
+pub const FINE: Effort = Effort {
+    steps: 20,
+    small_gain: 0.02,
+};
 
 /// A place in the space of models with the initial states that fit best.
 #[derive(Debug, Clone)]
@@ -89,6 +108,8 @@ pub struct Fitter<'a> {
     pub basis: &'a Basis,
     /// The model without causes.
     pub null: &'a State,
+    /// When fits end.
+    pub effort: Effort,
 }
 
 /// A knob of a set: candidate and place in it.
@@ -181,7 +202,7 @@ impl Fitter<'_> {
             .collect();
         let mut covariance = vec![vec![0.0; places.len()]; places.len()];
         let mut damping = 1e-3;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..self.effort.steps {
             if smooth.is_empty() {
                 break;
             }
@@ -192,7 +213,7 @@ impl Fitter<'_> {
             };
             let gain = state.chi2 - next.chi2;
             (state, values) = (next, moved);
-            if gain < SMALL_GAIN.max(1e-6 * state.chi2) {
+            if gain < self.effort.small_gain.max(1e-6 * state.chi2) {
                 break;
             }
         }

@@ -3,7 +3,7 @@
 use crate::attribute::{ACCURACY, threshold};
 use crate::causes::Search;
 use crate::duty_steps;
-use crate::fit::{Fit, Fitter, State, solve};
+use crate::fit::{FINE, Fit, Fitter, State, solve};
 use crate::noise;
 use crate::parallel;
 use crate::problem::dot;
@@ -14,6 +14,8 @@ use crate::spectrum;
 const TIE: f64 = 9.0;
 /// ... or within this share of what the cause explains.
 const TIE_SHARE: f64 = 0.005;
+/// What is this many times as far off may come within it when its fit is brought to an end.
+const NEAR: f64 = 5.0;
 /// A candidate is fitted if it explains this share of the most that one explains, and this much, both at first order.
 const FOLLOWED: f64 = 0.2;
 const LEAST_FOLLOWED: f64 = 6.0;
@@ -123,11 +125,13 @@ impl Searcher<'_> {
             return (from.chi2 - gained(&columns, &from.residual), own);
         }
         let looks = starts.into_iter().map(|start| {
-            let state = self.fitter.state_at(&[cause], &start, from, 1).0;
-            // the others may have to follow before it shows what it is worth
-            let mut columns = self.sensitivities(set.causes, &state);
+            let state = self.fitter.state_at(&[cause], &start, from, 0).0;
+            // the initial states and the others may have to follow before it shows what it is worth
+            let mut left = state.residual.clone();
+            self.fitter.basis.project(&mut left);
+            let mut columns = set.columns.to_vec();
             columns.extend(self.fitter.sensitivity(cause, &state));
-            (state.chi2 - gained(&columns, &state.residual), start)
+            (dot(&left, &left) - gained(&columns, &left), start)
         });
         let best = looks.min_by(|a, b| a.0.total_cmp(&b.0));
         match (best, self.id(cause)) {
@@ -140,8 +144,9 @@ impl Searcher<'_> {
     /// A duty counter near `counts` that fits better, and the chi-square expected with it.
     fn refined(&self, set: &Set<'_>, cause: usize, from: &State, counts: f64) -> (f64, Vec<f64>) {
         let look = |counts: f64| {
-            let state = self.fitter.state_at(&[cause], &[counts.recip()], from, 1).0;
-            state.chi2 - gained(&self.sensitivities(set.causes, &state), &state.residual)
+            let mut left = self.fitter.state_at(&[cause], &[counts.recip()], from, 0).0.residual;
+            self.fitter.basis.project(&mut left);
+            dot(&left, &left) - gained(set.columns, &left)
         };
         let (mut best, mut at, mut step) = (look(counts), counts, COUNT_STEP);
         while step > COUNT_STEP / 20.0 {
@@ -192,7 +197,7 @@ impl Searcher<'_> {
         if null.chi2 - first.state.chi2 < threshold(first.values.len(), self.inflation(first)) {
             return (None, Vec::new());
         }
-        let mut best = first.clone();
+        let mut best = self.polished(first);
         while best.causes.len() < MOST {
             say(&format!("more than {}", self.names(&best)));
             let mut larger = self.forward(&best, LOOKED_AT);
@@ -207,9 +212,18 @@ impl Searcher<'_> {
             if !self.is_worth(&best, next) {
                 break;
             }
-            (best, leaders) = (self.swapped(next.clone()), larger);
+            (best, leaders) = (self.swapped(self.polished(next)), larger);
         }
         self.backward(best)
+    }
+
+    /// The fit brought to its end.
+    fn polished(&self, fit: &Fit) -> Fit {
+        let fitter = Fitter {
+            effort: FINE,
+            ..self.fitter
+        };
+        fitter.from(&fit.causes, &fit.values, &fit.state)
     }
 
     /// The first fit of each set of ids.
@@ -276,7 +290,7 @@ impl Searcher<'_> {
         for member in 0..best.causes.len() {
             for other in self.replacements(&best, member, 3) {
                 if self.score(&other) < self.score(&best) - SWAP {
-                    best = other;
+                    best = self.polished(&other);
                     break;
                 }
             }
@@ -342,7 +356,11 @@ impl Searcher<'_> {
                     let other = fit.causes.last().is_some_and(|cause| self.id(*cause) != self.id(*own));
                     other && fit.state.chi2 <= best.state.chi2 + tolerance
                 };
-                let mut list: Vec<Fit> = all.into_iter().filter(is_rival).collect();
+                let near = |fit: &Fit| fit.state.chi2 <= best.state.chi2 + NEAR * tolerance;
+                let all = all
+                    .iter()
+                    .map(|fit| if near(fit) { self.polished(fit) } else { fit.clone() });
+                let mut list: Vec<Fit> = all.filter(is_rival).collect();
                 list.sort_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
                 let mut seen = Vec::new();
                 list.retain(|fit| {

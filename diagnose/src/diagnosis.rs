@@ -170,7 +170,8 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     } else {
         &attribution.null
     };
-    let (extended, trim) = (state.model.clone(), state.starts.trim_or_none());
+    let trim = if explained { state.starts.trim_or_none() } else { 0.0 };
+    let extended = state.model.clone();
     let pair = (!heldout.is_empty()).then(|| gain::hold(heldout, &base, &extended, problem.sigma, trim));
     let next_experiments = match explained {
         true => crate::next::experiments(&problem, &attribution, say),

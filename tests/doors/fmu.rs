@@ -10,7 +10,7 @@ use std::process::Command;
 use closed_loop::{Agent, Answer, Call, External};
 use codegen::Door;
 use interp::Sample;
-use policy::Policy;
+use policy::{NumericFormat, Policy};
 use tests::tools::{is_without, run, run_silently};
 
 use super::{example, files, golden_case};
@@ -84,7 +84,10 @@ fn the_plant_as_importing_program_sees_the_duties_of_the_interpreter() {
     if is_without("FMPy") {
         return;
     }
-    for (policy, periods) in [(example(), PERIODS), (golden_case("adc_mapping"), 1000)] {
+    let formats = [NumericFormat::F32Fma, NumericFormat::I16, NumericFormat::I8];
+    let others = formats.map(|format| (example().with_format(format), 1000));
+    let exact = [(example(), PERIODS), (golden_case("adc_mapping"), 1000)];
+    for (policy, periods) in exact.into_iter().chain(others) {
         let expected = interpreted(&policy, periods);
         for door in VERSIONS {
             let unit = Unit::new(&policy, door);

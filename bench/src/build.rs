@@ -279,7 +279,10 @@ impl Bench {
             )));
         }
         let counts = std::fs::read_to_string(&counts).map_err(|error| Failure(error.to_string()))?;
-        let counts: Vec<u64> = counts.lines().filter_map(|line| line.parse().ok()).collect();
+        let counts: Vec<u64> = counts
+            .lines()
+            .filter_map(|line| line.split(' ').next()?.parse().ok())
+            .collect();
         let (q_values, step) = counts.split_at_checked(CALLS).unwrap_or_default();
         Ok(Row {
             q_values: extremes(q_values),

@@ -348,6 +348,8 @@ pub struct Helpers {
     pub line_sum: bool,
     /// `relu`
     pub relu: bool,
+    /// `relu` from a sum and a product, for processors that have them
+    pub relu_by_sum: bool,
     /// `leaky_relu`
     pub leaky_relu: bool,
     /// `tanh`

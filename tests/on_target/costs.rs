@@ -55,9 +55,9 @@ fn check_core(target: &TargetSpec, costs: &Costs) {
     assert!(costs.library_calls.iter().all(is_allowed), "{what}");
 }
 
-/// Target, compiler and largest spread where LLVM turns the masks of the rectifier back into a selection and has none
-/// without a branch: docs/targets.md says so.
-const BRANCHES: [(&str, &str, u64); 2] = [("dspace-ds1202", "rustc", 32), ("riscv32imfc", "clang", 64)];
+/// Target, compiler and largest spread where LLVM makes a number of a comparison by a jump over one instruction:
+/// docs/targets.md says so.
+const BRANCHES: [(&str, &str, u64); 1] = [("dspace-ds1202", "rustc", 16)];
 
 #[test]
 fn the_instruction_count_does_not_depend_on_the_data_where_floats_are_hardware() {
@@ -125,11 +125,11 @@ fn a_branch_a_static_variable_and_a_library_call_are_seen() {
     let target = targets::find("cortex-m4f").unwrap();
     let mut files = codegen::generate(&policy, target, &[Language::C]).unwrap().files;
     let text = files.get_mut("buck12.c").unwrap();
-    let honest = "return buck12_from_bits(bits & ~((uint32_t)0 - (bits >> 31)));";
+    let honest = "return (x + __builtin_fabsf(x)) * 0.5f;";
     assert!(text.contains(honest), "the place of the ReLU");
     *text = text.replace(
         honest,
-        "if (bits >> 31) { return 0.0f; } __asm__ volatile(\"nop\"); planted = (planted * 5u) + 1u; return x;",
+        "if (x < 0.0f) { return 0.0f; } __asm__ volatile(\"nop\"); planted = (planted * 5u) + 1u; return x;",
     );
     let place = text.find("BUCK12_TABLE static const float").unwrap();
     text.insert_str(place, "static uint32_t planted;\n");

@@ -9,7 +9,7 @@ pub mod network;
 pub use command::STATUS;
 use policy::Policy;
 use policy::rounding::{down_f32, nearest_f32, up_f32};
-use targets::TargetSpec;
+use targets::{Fpu, TargetSpec};
 
 use crate::crc::crc32_words;
 use crate::program::{Coefficient, Literal, MappingCode, Program, Provenance, SignalPort};
@@ -33,6 +33,7 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
         name: policy.name.clone(),
         sample_period: policy.sample_period,
         numeric_format: policy.numeric_format,
+        has_fpu: target.fpu != Fpu::None,
         provenance: Provenance {
             tool: TOOL.to_owned(),
             digests: policy.digests.clone(),

@@ -369,6 +369,7 @@ fn helpers(program: &Program) -> Helpers {
         clamp: ops().any(|op| matches!(op, Op::Clamp { .. })),
         line_sum: ops().any(|op| matches!(op, Op::LineSum { .. })),
         relu: real && network.activates(|activation| activation == ActivationCode::Relu),
+        relu_by_sum: program.has_fpu,
         leaky_relu: real && network.activates(|activation| matches!(activation, ActivationCode::LeakyRelu(_))),
         tanh: network.activates(|activation| activation == ActivationCode::Tanh),
         assembly: match network {

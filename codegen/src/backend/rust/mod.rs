@@ -40,7 +40,7 @@ impl crate::Backend for RustText {
 pub fn items(program: &Program, type_name: &str) -> TokenStream {
     let constants = constants(program);
     let types = types(program);
-    let helpers = statements::helpers();
+    let helpers = statements::helpers(program);
     let network = network::items(program);
     let controller = controller::items(program, &ident(type_name));
     quote! { #constants #types #helpers #network #controller }

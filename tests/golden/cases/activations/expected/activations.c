@@ -186,11 +186,15 @@ static float activations_clamp(float x, float low, float high)
     return activations_select(activations_flag(raised > high), high, raised);
 }
 
-/* x if x > 0 else +0, by the sign bit: no branch in the binary */
+/* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
 static float activations_relu(float x)
 {
+#if defined(__GNUC__)
+    return (x + __builtin_fabsf(x)) * 0.5f;
+#else
     const uint32_t bits = activations_bits(x);
     return activations_from_bits(bits & ~((uint32_t)0 - (bits >> 31)));
+#endif
 }
 
 static float activations_leaky_relu(float x, float slope)

@@ -259,11 +259,15 @@ static float tail_blocks_clamp(float x, float low, float high)
     return tail_blocks_select(tail_blocks_flag(raised > high), high, raised);
 }
 
-/* x if x > 0 else +0, by the sign bit: no branch in the binary */
+/* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
 static float tail_blocks_relu(float x)
 {
+#if defined(__GNUC__)
+    return (x + __builtin_fabsf(x)) * 0.5f;
+#else
     const uint32_t bits = tail_blocks_bits(x);
     return tail_blocks_from_bits(bits & ~((uint32_t)0 - (bits >> 31)));
+#endif
 }
 
 /* What a measurement means before the network sees it. */

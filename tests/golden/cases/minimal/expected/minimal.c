@@ -24,8 +24,8 @@
 #pragma STDC FP_CONTRACT OFF
 #define MINIMAL_NO_LIBC __attribute__((no_builtin))
 #elif defined(__GNUC__)
-/* no fused multiply-add, and no call to memset in place of a loop */
-#pragma GCC optimize("fp-contract=off", "no-tree-loop-distribute-patterns")
+/* no fused multiply-add, no call to memset in place of a loop, no loads ahead of the sums that take their registers */
+#pragma GCC optimize("fp-contract=off", "no-tree-loop-distribute-patterns", "no-schedule-insns")
 #define MINIMAL_NO_LIBC
 #else
 #define MINIMAL_NO_LIBC

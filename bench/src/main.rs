@@ -94,7 +94,7 @@ fn host(bench: &Bench) -> Result<Vec<Row>, Failure> {
     let formats = [NumericFormat::F32, NumericFormat::I16, NumericFormat::I8];
     let mut rows = Vec::new();
     for format in formats {
-        rows.extend(bench.times(&policy.clone().with_format(format), &spec(RowBlock::All))?);
+        rows.extend(bench.times(&policy.clone().with_format(format), &spec(RowBlock::Vectors(32)))?);
     }
     Ok(rows)
 }

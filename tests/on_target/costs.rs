@@ -109,12 +109,12 @@ fn without_fpu_only_the_float_library_is_called_and_its_count_varies() {
     }
 }
 
-/// Two hidden layers of 64 floats are 512 of them.
+/// One hidden layer of 64 floats is 256 of them; the other is never there as a whole.
 #[test]
-fn the_example_takes_less_than_832_bytes_of_stack_on_a_cortex_m4f() {
+fn the_example_takes_less_than_640_bytes_of_stack_on_a_cortex_m4f() {
     let target = targets::find("cortex-m4f").unwrap();
     for costs in costs(&example(), target) {
-        assert!(costs.stack_bytes > 512 && costs.stack_bytes < 832, "{costs:?}");
+        assert!(costs.stack_bytes > 256 && costs.stack_bytes < 640, "{costs:?}");
     }
 }
 

@@ -4,6 +4,7 @@ mod controller;
 mod integer;
 mod network;
 mod statements;
+mod streamed;
 
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::quote;

@@ -28,6 +28,8 @@ pub enum Command {
     Compile(Compile),
     /// Compile the generated code and compare it with the interpreter, bit by bit
     Verify(Verify),
+    /// Bound what the numeric format does to the Q values, and map where it can change an action
+    Certify(Certify),
     /// List the deployment targets: processor, compilers, where verify runs them
     Targets(Targets),
     /// Close a policy's loop on a simulated converter: load steps, classical controllers and the limit beside it
@@ -162,6 +164,34 @@ pub struct Verify {
     /// Machine-readable
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct Certify {
+    /// policy.toml or the folder that holds it
+    pub policy: PathBuf,
+    /// Numeric format in the place of the contract's
+    #[arg(long, value_enum)]
+    pub format: Option<Format>,
+    /// Axis of the map, twice: a signal, or a feature with a memory of its own. Without a range: where the action
+    /// changes. Without axes: the first two signals
+    #[arg(long, value_name = "NAME[=LOW:HIGH]")]
+    pub axis: Vec<String>,
+    /// Value of another coordinate of the map; without it the middle of its range
+    #[arg(long, value_name = "NAME=VALUE")]
+    pub at: Vec<String>,
+    /// States drawn for the shares
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub samples: u32,
+    /// Boxes into which the states are split for the bound
+    #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub boxes: u32,
+    /// Seed of the draws
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Folder for certificate.json, certificate.html and map.svg; made if missing
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
 }
 
 /// What runs the policy in a closed loop.

@@ -38,6 +38,7 @@ fn main() -> ExitCode {
         Command::Inspect(options) => commands::inspect::run(options),
         Command::Compile(options) => commands::compile::run(options),
         Command::Verify(options) => commands::verify::run(options),
+        Command::Certify(options) => commands::certify::run(options),
         Command::Targets(options) => commands::targets::run(options),
         Command::Train(options) => commands::train::run(options),
         Command::Diagnose(options) => commands::diagnose::run(options),

@@ -68,7 +68,7 @@ pub struct Manifest {
 }
 
 /// Sizes of the controller.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Sizes {
     /// Signals in the measurement.
     pub signals: usize,
@@ -88,6 +88,9 @@ pub struct Sizes {
     /// observations, in any order of the additions; below 2^31.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accumulator_bound: Option<i64>,
+    /// Integer formats: proven bound of |Q - Q in real arithmetic| over the clamped box of observations.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub q_error_bound: Option<f64>,
 }
 
 /// One generated file.
@@ -115,6 +118,8 @@ pub fn sizes(policy: &Policy, target: &TargetSpec) -> Sizes {
             NetworkCode::Integer(network) => Some(network.accumulator_bound),
             NetworkCode::Real { .. } => None,
         },
+        q_error_bound: policy::scales::is_integer(policy.numeric_format)
+            .then(|| certify::Certifier::new(policy).box_bound().largest),
     }
 }
 

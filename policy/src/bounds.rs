@@ -289,7 +289,8 @@ fn activated(x: Interval, activation: Activation) -> Interval {
 }
 
 /// The contract's tanh in binary64: within 4e-7 of tanh and, unlike a libm's, the same on every machine.
-fn rational_tanh(x: f64) -> f64 {
+#[must_use]
+pub fn rational_tanh(x: f64) -> f64 {
     const N: [f64; 5] = [
         1.318_444_4e-8,
         2.047_200_7e-5,

@@ -28,6 +28,7 @@ mod scaffold;
 pub mod scales;
 mod weights;
 
+pub use bounds::rational_tanh;
 pub use check::check;
 pub use faults::Faults;
 pub use model::*;

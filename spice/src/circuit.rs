@@ -166,15 +166,17 @@ fn load(n: &mut String, circuit: &Circuit<'_>) {
         let _ = writeln!(n, "Vcab ld0 ld 0");
     }
     let _ = writeln!(n, "Bg ld 0 I=V(gg)*V(ld)\nBcc ld 0 I=V(cc)");
+    // a resistor v_fold^2 / P below v_fold
+    let current = format!("V(pw)*V(ld)/max(V(ld),{0})^2", b.v_fold);
     if b.cpl_time_constant > 0.0 {
-        let _ = writeln!(n, "Bp0 p0 0 V=V(pw)/max(V(ld),{})", b.v_fold);
+        let _ = writeln!(n, "Bp0 p0 0 V={current}");
         let _ = writeln!(
             n,
             "Rp p0 ip 1\nCp ip 0 {:e} ic={}\nBp ld 0 I=V(ip)",
             b.cpl_time_constant,
-            power / v_out
+            power * v_out / v_out.max(b.v_fold).powi(2)
         );
     } else {
-        let _ = writeln!(n, "Bp ld 0 I=V(pw)/max(V(ld),{})", b.v_fold);
+        let _ = writeln!(n, "Bp ld 0 I={current}");
     }
 }

@@ -74,6 +74,9 @@ fn ngspice_follows_the_same_commands_to_the_same_samples() {
     (p.pwm.sampling_phase, p.pwm.carrier) = (0.3, Carrier::Centre);
     (p.sensors.v_out.gain, p.sensors.v_out.offset) = (1.005, -0.2);
     assert_agreement("sampled later", &p);
+    let mut p = lossy();
+    p.load.v_fold = 130.0;
+    assert_agreement("below the fold", &p);
 }
 
 #[test]

@@ -16,6 +16,7 @@ fn the_help_of_every_command_names_its_arguments() {
             "verify",
             &["<POLICY>", "--steps", "--seed", "--generated", "--trace", "--json"],
         ),
+        ("certify", &["<POLICY>", "--format", "--axis", "--at", "--out"]),
         ("demo", &["--out", "--steps"]),
         ("drm", &["acquire", "fit", "judge", "transfer"]),
     ] {

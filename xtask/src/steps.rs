@@ -206,8 +206,9 @@ fn test(context: &Context) -> Outcome {
     if context.options.quick {
         arguments.extend(["--exclude", "tests", "--exclude", "blind"]);
     }
-    let absent = tools::absent_rust_targets().join(",");
-    context.cargo(&arguments, &[(tools::WITHOUT_RUST_TARGETS, &absent)])?;
+    let absent = tools::absent();
+    let absent = absent.each_ref().map(|(name, value)| (*name, value.as_str()));
+    context.cargo(&arguments, &absent)?;
     let log = process::read_lossy(&context.log);
     Ok(Done::Passed(vec![test_count(&log)]))
 }

@@ -11,8 +11,10 @@ enum Source {
     Rustup(&'static str),
     /// A target of the Rust toolchain.
     RustTarget(&'static str),
+    /// A package of PyPI with its version.
+    Pip(&'static str),
 }
-use Source::{Apt, RustTarget, Rustup};
+use Source::{Apt, Pip, RustTarget, Rustup};
 
 /// A tool is there when its probe runs and ends with 0.
 struct Tool {
@@ -117,18 +119,33 @@ const TOOLS: &[Tool] = &[
     rust_target!("powerpc-unknown-linux-gnu"),
     tool("ngspice", &["ngspice", "--version"], Apt("ngspice")),
     tool("ngspice's library", NGSPICE_HEADER, Apt("libngspice0-dev")),
+    tool("pip", &["python3", "-m", "pip", "--version"], Apt("python3-pip")),
+    tool(
+        "maraboupy",
+        &["python3", "-c", "from maraboupy import MarabouCore"],
+        Pip("maraboupy==2.0.0"),
+    ),
 ];
 
 /// Tests leave out Rust on the targets that this names, by triple and separated by commas.
 pub const WITHOUT_RUST_TARGETS: &str = "POLICYC_WITHOUT_RUST_TARGETS";
 
-/// Targets of the Rust toolchain that are not here.
-pub fn absent_rust_targets() -> Vec<&'static str> {
-    Plan::of(&missing(TOOLS)).targets
+/// Tests leave out what needs the Python packages that this names, separated by commas.
+pub const WITHOUT_PYTHON_PACKAGES: &str = "POLICYC_WITHOUT_PYTHON_PACKAGES";
+
+/// What tests must do without: names and values of environment variables.
+pub fn absent() -> [(&'static str, String); 2] {
+    let missing = missing(TOOLS);
+    let packages = missing.iter().filter(|tool| matches!(tool.source, Pip(_)));
+    let packages: Vec<&str> = packages.map(|tool| tool.name).collect();
+    [
+        (WITHOUT_RUST_TARGETS, Plan::of(&missing).targets.join(",")),
+        (WITHOUT_PYTHON_PACKAGES, packages.join(",")),
+    ]
 }
 
-/// Sees to it that every tool is there; installs what is missing as root on Debian. A target of the Rust toolchain that
-/// cannot be had is no error: the C is tested on it all the same. Returned is what to say about that.
+/// Sees to it that every tool is there; installs what is missing as root on Debian. A target of the Rust toolchain or a
+/// Python package that cannot be had is no error: all else is tested. Returned is what to say about that.
 ///
 /// # Errors
 /// What is missing and the command to type.
@@ -141,13 +158,20 @@ pub fn provide(output: &Output) -> Result<Vec<String>, String> {
         // offline or refused: said at the end
         let _ = process::run(&mut rustup, output);
     }
-    if plan.packages.is_empty() || !may_install() {
-        return require();
+    if !plan.packages.is_empty() && may_install() {
+        for arguments in [&["update"][..], &plan.apt_install()] {
+            let mut apt = Command::new("apt-get");
+            apt.args(arguments).env("DEBIAN_FRONTEND", "noninteractive");
+            process::run(&mut apt, output).map_err(|e| format!("{}\n{e}", plan.message(&missing)))?;
+        }
     }
-    for arguments in [&["update"][..], &plan.apt_install()] {
-        let mut apt = Command::new("apt-get");
-        apt.args(arguments).env("DEBIAN_FRONTEND", "noninteractive");
-        process::run(&mut apt, output).map_err(|e| format!("{}\n{e}", plan.message(&missing)))?;
+    if !plan.python.is_empty() && may_install() {
+        let mut pip = Command::new("python3");
+        pip.args(PIP_INSTALL).args(&plan.python);
+        // Debian's Python asks for a virtual environment otherwise; a machine that installs by itself has one user
+        pip.env("PIP_BREAK_SYSTEM_PACKAGES", "1");
+        // offline or refused: said at the end
+        let _ = process::run(&mut pip, output);
     }
     require()
 }
@@ -157,19 +181,20 @@ pub fn provide(output: &Output) -> Result<Vec<String>, String> {
 /// # Errors
 /// What is missing and the command to type.
 pub fn require() -> Result<Vec<String>, String> {
-    let (targets, others): (Vec<_>, Vec<_>) = missing(TOOLS)
+    let (optional, others): (Vec<_>, Vec<_>) = missing(TOOLS)
         .into_iter()
-        .partition(|tool| matches!(tool.source, RustTarget(_)));
+        .partition(|tool| matches!(tool.source, RustTarget(_) | Pip(_)));
     if !others.is_empty() {
         return Err(Plan::of(&others).message(&others));
     }
-    Ok(match targets.is_empty() {
-        true => Vec::new(),
-        false => vec![format!(
-            "Rust is NOT tested there: {}",
-            Plan::of(&targets).message(&targets)
-        )],
-    })
+    let (targets, packages): (Vec<_>, Vec<_>) = optional
+        .into_iter()
+        .partition(|tool| matches!(tool.source, RustTarget(_)));
+    let said = [("Rust is NOT tested there", targets), ("NOT compared with", packages)];
+    let said = said.into_iter().filter(|(_, tools)| !tools.is_empty());
+    Ok(said
+        .map(|(what, tools)| format!("{what}: {}", Plan::of(&tools).message(&tools)))
+        .collect())
 }
 
 fn missing(tools: &[Tool]) -> Vec<&Tool> {
@@ -197,7 +222,10 @@ struct Plan {
     packages: Vec<&'static str>,
     components: Vec<&'static str>,
     targets: Vec<&'static str>,
+    python: Vec<&'static str>,
 }
+
+const PIP_INSTALL: [&str; 4] = ["-m", "pip", "install", "--disable-pip-version-check"];
 
 impl Plan {
     fn of(missing: &[&Tool]) -> Self {
@@ -205,12 +233,14 @@ impl Plan {
             packages: Vec::new(),
             components: Vec::new(),
             targets: Vec::new(),
+            python: Vec::new(),
         };
         for tool in missing {
             match tool.source {
                 Apt(package) => plan.packages.push(package),
                 Rustup(component) => plan.components.push(component),
                 RustTarget(triple) => plan.targets.push(triple),
+                Pip(package) => plan.python.push(package),
             }
         }
         plan.packages.sort_unstable();
@@ -238,6 +268,13 @@ impl Plan {
         if !self.targets.is_empty() {
             let targets = self.targets.join(" ");
             lines.push(format!("    rustup target add {targets}"));
+        }
+        if !self.python.is_empty() {
+            lines.push(format!(
+                "    python3 {} {}",
+                PIP_INSTALL.join(" "),
+                self.python.join(" ")
+            ));
         }
         lines.join("\n")
     }

@@ -66,6 +66,12 @@ pub fn write(policy: &Policy, target: &TargetSpec, folder: &Path, files: &Files)
             grouped(u64::from(i32::MAX.unsigned_abs()))
         ))?;
     }
+    if let Some(bound) = sizes.q_error_bound {
+        output::say(&format!(
+            "note: no Q value is further than {} from real arithmetic, for every observation; `policyc certify` says more",
+            report::quantity(bound, "", 3)
+        ))?;
+    }
     let (macs, tables, state) = (
         grouped(sizes.macs as u64),
         bytes(sizes.table_bytes),

@@ -8,6 +8,7 @@ use crate::workspace::{Crate, Dependency, Kind};
 const LAYERS: &[&[&str]] = &[
     &["toml-input", "targets", "templates", "report"],
     &["policy", "plant"],
+    &["certify"],
     &["interp", "codegen", "drm"],
     &["closed-loop"],
     &["policy-macro", "train", "spice", "diagnose", "verify"],
@@ -31,6 +32,7 @@ const FORBIDDEN: &[Forbidden] = &[
     Forbidden {
         from: &[
             "policy",
+            "certify",
             "interp",
             "codegen",
             "targets",
@@ -181,14 +183,14 @@ mod tests {
         let fault = only_fault(&[member("policy", &[("codegen", Kind::Normal)])]);
         assert_eq!(
             fault,
-            "`policy` (layer 1) depends on `codegen` (layer 2): only lower layers are allowed"
+            "`policy` (layer 1) depends on `codegen` (layer 3): only lower layers are allowed"
         );
     }
 
     #[test]
     fn a_crate_depends_on_no_equal_layer_even_to_build() {
         let fault = only_fault(&[member("codegen", &[("interp", Kind::Build)])]);
-        assert!(fault.contains("`codegen` (layer 2) depends on `interp` (layer 2)"));
+        assert!(fault.contains("`codegen` (layer 3) depends on `interp` (layer 3)"));
     }
 
     #[test]

@@ -1,0 +1,166 @@
+//! Everything that is said about a policy in a numeric format.
+
+use policy::{Digests, Interval, NumericFormat, Policy};
+use serde::Serialize;
+
+use crate::cover::{Map, Share, Slice, StateBound};
+use crate::measured::{Measured, QValues};
+use crate::{Bound, Certifier, Coordinate, Domain, Memory};
+
+/// How much is looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Effort {
+    /// Boxes into which the states are split for the bound.
+    pub boxes: usize,
+    /// States drawn for the shares.
+    pub samples: usize,
+    /// Largest number of halvings on the way to a proven box.
+    pub depth: usize,
+}
+
+impl Default for Effort {
+    fn default() -> Self {
+        Self {
+            boxes: 2000,
+            samples: 1000,
+            depth: 48,
+        }
+    }
+}
+
+/// Half widths of the boxes around golden observations, relative to the width of the features' bounds.
+const RADII: [f64; 3] = [1e-2, 1e-3, 1e-4];
+
+/// A policy's numeric format against real arithmetic. `docs/certificate.md` defines every entry.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Certificate {
+    /// Name of the policy.
+    pub name: String,
+    /// Format that was bounded.
+    pub numeric_format: NumericFormat,
+    /// Digests of the policy.
+    pub digests: Digests,
+    /// Proven for every observation of the clamped box, features independent of each other.
+    pub box_bound: Bound,
+    /// Axes of the set of states.
+    pub coordinates: Vec<Coordinate>,
+    /// Proven for every state.
+    pub state_bound: StateBound,
+    /// Share of the states in proven boxes, estimated.
+    pub proven_share: Share,
+    /// At the states drawn for the share.
+    pub measured: Measured,
+    /// Around and at the golden observations, if the policy has them.
+    pub golden: Option<Golden>,
+    /// A slice of the states; `None` with fewer than two coordinates.
+    pub map: Option<Map>,
+}
+
+/// What holds at and around golden observations.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Golden {
+    /// At the observations.
+    pub measured: Measured,
+    /// Share of boxes around them that have one proven action.
+    pub neighbourhoods: Vec<Neighbourhood>,
+}
+
+/// Boxes of one size around observations.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Neighbourhood {
+    /// Half width, relative to the width of each feature's bound.
+    pub radius: f64,
+    /// Proven ones.
+    pub share: Share,
+}
+
+impl Certificate {
+    /// Bounds, shares and map of a policy; `uniform` draws from 0..1.
+    #[must_use]
+    pub fn new(
+        policy: &Policy,
+        effort: Effort,
+        slice: Option<&Slice>,
+        q_values: &QValues<'_>,
+        uniform: &mut dyn FnMut() -> f64,
+    ) -> Self {
+        let certifier = Certifier::new(policy);
+        let domain = Domain::of(policy, Memory::Free);
+        let points: Vec<Vec<f64>> = (0..effort.samples).map(|_| domain.draw(uniform)).collect();
+        let observations: Vec<Vec<f32>> = points.iter().map(|point| domain.observation(point)).collect();
+        Self {
+            name: policy.name.clone(),
+            numeric_format: policy.numeric_format,
+            digests: policy.digests.clone(),
+            box_bound: certifier.box_bound(),
+            coordinates: domain.coordinates().to_vec(),
+            state_bound: certifier.state_bound(&domain, effort.boxes),
+            proven_share: certifier.share(&domain, &points, effort.depth),
+            measured: certifier.measure(observations.iter().map(Vec::as_slice), q_values),
+            golden: golden(policy, &certifier, q_values),
+            map: slice.map(|slice| certifier.map(&Domain::of(policy, slice.memory), slice, q_values)),
+        }
+    }
+}
+
+fn golden(policy: &Policy, certifier: &Certifier, q_values: &QValues<'_>) -> Option<Golden> {
+    let golden = policy.golden.as_ref()?;
+    let width = policy.features.len().max(1);
+    let observations = || golden.observations.chunks_exact(width);
+    let neighbourhood = |radius: f64| Neighbourhood {
+        radius,
+        share: certifier.share_around(observations(), radius),
+    };
+    Some(Golden {
+        measured: certifier.measure(observations(), q_values),
+        neighbourhoods: RADII.map(neighbourhood).to_vec(),
+    })
+}
+
+impl Certifier {
+    /// The part of a slice in which the real network's action changes, with a margin; the slice itself if it does not.
+    #[must_use]
+    pub fn zoomed(&self, domain: &Domain, slice: &Slice) -> Slice {
+        let mut slice = slice.clone();
+        // a coarse grid sees the region, finer ones its edges
+        for _ in 0..3 {
+            let Some((x, y)) = self.changing(domain, &slice) else {
+                break;
+            };
+            slice.x.1 = x;
+            slice.y.1 = y;
+        }
+        slice
+    }
+
+    fn changing(&self, domain: &Domain, slice: &Slice) -> Option<(Interval, Interval)> {
+        const GRID: usize = 96;
+        let at = |range: Interval, n: usize| range.low + (range.high - range.low) * (n as f64 / (GRID - 1) as f64);
+        let action = |column: usize, row: usize| {
+            let mut point = slice.at.clone();
+            point[slice.x.0] = at(slice.x.1, column);
+            point[slice.y.0] = at(slice.y.1, row);
+            self.real_action(&domain.observation(&point))
+        };
+        let grid: Vec<usize> = (0..GRID * GRID).map(|n| action(n % GRID, n / GRID)).collect();
+        let mut ends: Option<[usize; 4]> = None;
+        for n in 0..GRID * GRID {
+            let (column, row) = (n % GRID, n / GRID);
+            let right = column + 1 < GRID && grid[n] != grid[n + 1];
+            let up = row + 1 < GRID && grid[n] != grid[n + GRID];
+            if right || up {
+                let [left, last, bottom, top] = ends.unwrap_or([column, column, row, row]);
+                ends = Some([left.min(column), last.max(column), bottom.min(row), top.max(row)]);
+            }
+        }
+        let [left, last, bottom, top] = ends?;
+        let widened = |range: Interval, low: usize, high: usize| {
+            let margin = 1 + (high - low) / 10;
+            Interval {
+                low: at(range, low.saturating_sub(margin)),
+                high: at(range, (high + 1 + margin).min(GRID - 1)),
+            }
+        };
+        Some((widened(slice.x.1, left, last), widened(slice.y.1, bottom, top)))
+    }
+}

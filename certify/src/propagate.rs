@@ -1,0 +1,259 @@
+//! Through the network: the real values, and the error of the format beside them, as forms over the same symbols.
+//!
+//! With a(x) the activation, x the real sum and e the error before it, the error behind is `a(x + e) - a(x) = l e`
+//! for some slope l of a between x and x + e (mean value): where both lie on one side of a ReLU, l is known; elsewhere
+//! it lies in `[l0, l1]`, and `l e` is within `(l1 - l0) / 2 * max |e|` of `(l0 + l1) / 2 * e`.
+
+use policy::{Activation, Interval, rational_tanh};
+
+use crate::form::{Form, Replacement};
+use crate::network::{Layer, Network, TANH_ERROR};
+
+/// Real Q values over a set of observations, and what the format adds.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Enclosure {
+    pub real: Form,
+    pub error: Form,
+}
+
+impl Enclosure {
+    /// Largest |Q in the format - real Q| of an action.
+    pub fn error_bound(&self, action: usize) -> f64 {
+        self.error.magnitude(action)
+    }
+
+    /// Whether the greedy action of the real network and that of the format are this one everywhere.
+    pub fn decides(&self, action: usize) -> bool {
+        let beats = |other: usize, error: Option<&Form>| self.real.difference(error, action, other).low > 0.0;
+        (0..self.real.len())
+            .filter(|other| *other != action)
+            .all(|other| beats(other, Some(&self.error)) && beats(other, None))
+    }
+
+    /// The action with the largest centre.
+    pub fn candidate(&self) -> usize {
+        let centres = self.real.centre.iter().enumerate();
+        centres
+            .fold(
+                (0, f64::NEG_INFINITY),
+                |best, (index, &q)| {
+                    if q > best.1 { (index, q) } else { best }
+                },
+            )
+            .0
+    }
+
+    /// Enclosure of the real Q value of an action.
+    pub fn q_value(&self, action: usize) -> Interval {
+        self.real.bounds(action)
+    }
+}
+
+impl Network {
+    /// Real Q values alone.
+    pub fn real(&self, observation: Form) -> Form {
+        self.layers.iter().fold(observation, |x, layer| {
+            let sums = layer.real(&x);
+            let steps: Vec<Replacement> = (0..sums.len())
+                .map(|output| relaxed(layer.activation, sums.bounds(output)))
+                .collect();
+            sums.replaced(&steps, true, 0)
+        })
+    }
+}
+
+/// Runs the network over a set of observations.
+pub(crate) fn run(network: &Network, observation: Form) -> Enclosure {
+    let shared = observation.shared.columns;
+    let steps: Vec<Replacement> = network
+        .input_rounding
+        .iter()
+        .map(|radius| Replacement::scaled(0.0, *radius))
+        .collect();
+    let error = Form::zeros(observation.len(), shared).replaced(&steps, false, shared);
+    let mut state = Enclosure {
+        real: observation,
+        error,
+    };
+    for layer in &network.layers {
+        state = self::layer(layer, &state);
+    }
+    state
+}
+
+fn layer(layer: &Layer, input: &Enclosure) -> Enclosure {
+    let magnitudes: Vec<f64> = (0..input.real.len())
+        .map(|i| input.real.magnitude(i) + input.error.magnitude(i))
+        .collect();
+    let real = layer.real(&input.real);
+    let error = layer.error(&input.error, &input.real);
+    let mut real_steps = Vec::with_capacity(real.len());
+    let mut error_steps = Vec::with_capacity(real.len());
+    for output in 0..real.len() {
+        let (x, e) = (real.bounds(output), error.bounds(output));
+        let magnitude = x.low.abs().max(x.high.abs()) + e.low.abs().max(e.high.abs());
+        let rounding = layer.rounding(output, &magnitudes, magnitude);
+        let before = rounding.before;
+        let e = Interval {
+            low: e.low - before,
+            high: e.high + before,
+        };
+        // in the format, before the activation
+        let y = Interval {
+            low: (x.low + e.low).next_down(),
+            high: (x.high + e.high).next_up(),
+        };
+        real_steps.push(relaxed(layer.activation, x));
+        let (low, high) = slopes(layer.activation, x, y);
+        let spread = 0.5 * (high - low) * e.low.abs().max(e.high.abs());
+        let factor = 0.5 * (low + high);
+        let after = rounding.after + rounding.after_relative * (magnitude + before);
+        error_steps.push(Replacement::scaled(
+            factor,
+            (factor * before + spread + after) * (1.0 + 1e-12),
+        ));
+    }
+    let real = real.replaced(&real_steps, true, 0);
+    let error = error.replaced(&error_steps, false, real.shared.columns);
+    Enclosure { real, error }
+}
+
+/// Line and radius around an activation over an interval.
+fn relaxed(activation: Activation, x: Interval) -> Replacement {
+    match activation {
+        Activation::Identity => Replacement::IDENTITY,
+        Activation::Relu => convex(x, 0.0),
+        Activation::LeakyRelu { slope } => convex(x, slope),
+        Activation::Tanh => tanh(x),
+    }
+}
+
+/// `x` above 0, `slope * x` below: never below the line through 0 of the chord's slope, and never above the chord.
+fn convex(x: Interval, slope: f64) -> Replacement {
+    if x.low >= 0.0 {
+        return Replacement::IDENTITY;
+    }
+    if x.high <= 0.0 {
+        return Replacement::scaled(slope, 0.0);
+    }
+    // any slope between is sound with the gap of both ends
+    let factor = ((x.high - slope * x.low) / (x.high - x.low)).clamp(slope, 1.0);
+    let gap = ((factor - slope) * -x.low).max((1.0 - factor) * x.high) * (1.0 + 1e-12);
+    Replacement {
+        factor,
+        shift: 0.5 * gap,
+        radius: 0.5 * gap,
+    }
+}
+
+/// tanh less a line with its least slope over the interval does not fall: the ends enclose it.
+fn tanh(x: Interval) -> Replacement {
+    let (low, high) = (rational_tanh(x.low), rational_tanh(x.high));
+    let factor = tanh_slopes(x).0;
+    let (start, end) = (low - factor * x.low, high - factor * x.high);
+    Replacement {
+        factor,
+        shift: 0.5 * (start + end),
+        radius: 0.5 * (end - start).abs() + 2.0 * TANH_NEAR + 1e-12 * (x.low.abs() + x.high.abs()),
+    }
+}
+
+/// Least and largest slope between a point of `x` and one of `y`.
+fn slopes(activation: Activation, x: Interval, y: Interval) -> (f64, f64) {
+    let hull = Interval {
+        low: x.low.min(y.low),
+        high: x.high.max(y.high),
+    };
+    let sides = |below: f64| {
+        if hull.low >= 0.0 {
+            (1.0, 1.0)
+        } else if hull.high <= 0.0 {
+            (below, below)
+        } else {
+            (below, 1.0)
+        }
+    };
+    match activation {
+        Activation::Identity => (1.0, 1.0),
+        Activation::Relu => sides(0.0),
+        Activation::LeakyRelu { slope } => sides(slope),
+        Activation::Tanh => tanh_slopes(hull),
+    }
+}
+
+/// Distance of [`rational_tanh`] from tanh.
+const TANH_NEAR: f64 = TANH_ERROR + 1e-7;
+
+/// tanh' = 1 - tanh^2 falls with the magnitude.
+fn tanh_slopes(x: Interval) -> (f64, f64) {
+    let far = x.low.abs().max(x.high.abs());
+    let near = if x.low <= 0.0 && x.high >= 0.0 {
+        0.0
+    } else {
+        x.low.abs().min(x.high.abs())
+    };
+    let slope = |x: f64| {
+        let y = rational_tanh(x);
+        1.0 - y * y
+    };
+    let slack = 2.5 * TANH_NEAR;
+    ((slope(far) - slack).max(0.0), (slope(near) + slack).min(1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn encloses(step: Replacement, x: f64, y: f64) -> bool {
+        (y - step.factor * x - step.shift).abs() <= step.radius + 1e-15
+    }
+
+    #[test]
+    fn relaxations_enclose_the_activations() {
+        for (low, high) in [
+            (-3.0, 2.0),
+            (-0.1, 5.0),
+            (0.0, 1.0),
+            (-2.0, 0.0),
+            (0.5, 0.7),
+            (-9.0, 12.0),
+        ] {
+            let interval = Interval { low, high };
+            for n in 0..=1000 {
+                let x = low + (high - low) * f64::from(n) / 1000.0;
+                assert!(
+                    encloses(relaxed(Activation::Relu, interval), x, x.max(0.0)),
+                    "{interval:?} {x}"
+                );
+                let leaky = if x > 0.0 { x } else { 0.3 * x };
+                assert!(encloses(
+                    relaxed(Activation::LeakyRelu { slope: 0.3 }, interval),
+                    x,
+                    leaky
+                ));
+                assert!(
+                    encloses(relaxed(Activation::Tanh, interval), x, x.tanh()),
+                    "{interval:?} {x}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn slopes_enclose_difference_quotients() {
+        let (x, y) = (Interval { low: -1.0, high: 0.5 }, Interval { low: -1.2, high: 0.9 });
+        for activation in [Activation::Relu, Activation::LeakyRelu { slope: 0.2 }, Activation::Tanh] {
+            let (low, high) = slopes(activation, x, y);
+            let a = |x: f64| match activation {
+                Activation::Tanh => x.tanh(),
+                Activation::LeakyRelu { slope } if x < 0.0 => slope * x,
+                Activation::Relu => x.max(0.0),
+                _ => x,
+            };
+            for (p, q) in [(-1.0, -1.2), (-0.3, 0.9), (0.5, 0.6), (0.1, -1.1)] {
+                let slope = (a(q) - a(p)) / (q - p);
+                assert!(low <= slope + 1e-12 && slope <= high + 1e-12, "{activation:?} {slope}");
+            }
+        }
+    }
+}

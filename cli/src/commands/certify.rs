@@ -1,0 +1,158 @@
+//! `policyc certify`
+
+mod page;
+
+use std::collections::BTreeMap;
+
+use ::certify::{Certificate, Certifier, Domain, Effort, Memory, Slice};
+use interp::Controller;
+use ndarray::aview1;
+use policy::{Interval, Policy};
+use verify::traces::Rng;
+
+use crate::arguments::Certify;
+use crate::{Failure, Outcome, output};
+
+/// Proves, measures, draws, writes.
+pub fn run(options: &Certify) -> Result<Outcome, Failure> {
+    let policy = super::load_as(&options.policy, options.format.map(Into::into))?;
+    let slice = slice(&policy, options)?;
+    let controller = Controller::<f32>::new(&policy);
+    let q_values = |observation: &[f32]| match controller.q_values(&aview1(observation)) {
+        Ok(q_values) => q_values.iter().map(|q| f64::from(*q)).collect(),
+        Err(_) => Vec::new(),
+    };
+    let mut rng = Rng::new(options.seed);
+    let effort = Effort {
+        boxes: options.boxes as usize,
+        samples: options.samples as usize,
+        ..Effort::default()
+    };
+    let certificate = Certificate::new(&policy, effort, slice.as_ref(), &q_values, &mut || rng.unit());
+    let mut json = serde_json::to_string_pretty(&certificate)?;
+    json.push('\n');
+    let map = page::map(&policy, &certificate)?;
+    let mut files = BTreeMap::from([
+        ("certificate.json".to_owned(), json),
+        (
+            "certificate.html".to_owned(),
+            page::page(&policy, &certificate, map.clone())?,
+        ),
+    ]);
+    if let Some(map) = map {
+        files.insert("map.svg".to_owned(), map.to_string());
+    }
+    output::write_texts(&options.out, &files)?;
+    output::say(&page::summary(&certificate))?;
+    output::say(&format!(
+        "to look at: {}",
+        options.out.join("certificate.html").display()
+    ))?;
+    Ok(Outcome::Done)
+}
+
+/// The slice that is asked for, of settled states unless those have fewer than two coordinates; `None` if all have.
+fn slice(policy: &Policy, options: &Certify) -> Result<Option<Slice>, Failure> {
+    let memories = [Memory::Settled, Memory::Free].into_iter();
+    let mut domains = memories.map(|memory| (memory, Domain::of(policy, memory)));
+    let found = domains.find(|(_, domain)| domain.coordinates().len() > 1);
+    let (memory, domain) = found.unwrap_or_else(|| (Memory::Free, Domain::of(policy, Memory::Free)));
+    let coordinates = domain.coordinates();
+    let find = |name: &str| {
+        coordinates.iter().position(|c| c.name == name).ok_or_else(|| {
+            let names: Vec<&str> = coordinates.iter().map(|c| c.name.as_str()).collect();
+            Failure(format!(
+                "no such coordinate of the states\n   = found: {name}\n   = expected: one of {}",
+                names.join(", ")
+            ))
+        })
+    };
+    let mut asked = Vec::new();
+    for axis in &options.axis {
+        let (name, range) = axis
+            .split_once('=')
+            .map_or((axis.as_str(), None), |(name, range)| (name, Some(range)));
+        let index = find(name)?;
+        let whole = coordinates[index].range;
+        asked.push((index, range.map(|range| within(range, name, whole)).transpose()?));
+    }
+    let expected = "   = expected: two different axes, or none";
+    let axes = match asked.as_slice() {
+        [] => (first(policy, &domain, 0), first(policy, &domain, 1)),
+        [x, y] if x.0 != y.0 => (Some(x.0), Some(y.0)),
+        _ => return Err(Failure(format!("--axis: {} axes found\n{expected}", asked.len()))),
+    };
+    let (Some(x), Some(y)) = axes else {
+        return Ok(None);
+    };
+    let mut at: Vec<f64> = coordinates.iter().map(|c| 0.5 * (c.range.low + c.range.high)).collect();
+    for text in &options.at {
+        let (name, value) = text.split_once('=').unwrap_or((text, ""));
+        let index = find(name)?;
+        at[index] = number(value, text)?;
+        let range = coordinates[index].range;
+        if !(at[index] >= range.low && at[index] <= range.high) {
+            return Err(outside(text, range));
+        }
+    }
+    let ranges: Vec<Option<Interval>> = asked.iter().map(|(_, range)| *range).collect();
+    let given = |n: usize| ranges.get(n).copied().flatten();
+    let whole = Slice {
+        memory,
+        x: (x, given(0).unwrap_or(coordinates[x].range)),
+        y: (y, given(1).unwrap_or(coordinates[y].range)),
+        at,
+    };
+    let zoomed = Certifier::new(policy).zoomed(&domain, &whole);
+    Ok(Some(Slice {
+        memory,
+        x: (x, given(0).unwrap_or(zoomed.x.1)),
+        y: (y, given(1).unwrap_or(zoomed.y.1)),
+        at: whole.at,
+    }))
+}
+
+/// The `n`-th coordinate in the order of the policy's signals, then the others.
+fn first(policy: &Policy, domain: &Domain, n: usize) -> Option<usize> {
+    let position = |name: &str| domain.coordinates().iter().position(|c| c.name == name);
+    let mut order: Vec<usize> = policy
+        .signals
+        .iter()
+        .filter_map(|signal| position(&signal.name))
+        .collect();
+    let others = (0..domain.coordinates().len()).filter(|index| !order.contains(index));
+    let others: Vec<usize> = others.collect();
+    order.extend(others);
+    order.get(n).copied()
+}
+
+/// `LOW:HIGH` inside of a range.
+fn within(text: &str, name: &str, whole: Interval) -> Result<Interval, Failure> {
+    let (low, high) = text.split_once(':').unwrap_or((text, ""));
+    let place = format!("{name}={text}");
+    let range = Interval {
+        low: number(low, &place)?,
+        high: number(high, &place)?,
+    };
+    if range.low >= whole.low && range.low < range.high && range.high <= whole.high {
+        Ok(range)
+    } else {
+        Err(outside(&place, whole))
+    }
+}
+
+fn number(text: &str, place: &str) -> Result<f64, Failure> {
+    let number = text.trim().parse::<f64>().ok().filter(|number| number.is_finite());
+    number.ok_or_else(|| {
+        Failure(format!(
+            "a number is missing\n   = found: {place}\n   = expected: NAME=LOW:HIGH for --axis, NAME=VALUE for --at"
+        ))
+    })
+}
+
+fn outside(place: &str, range: Interval) -> Failure {
+    Failure(format!(
+        "outside of the plausible range\n   = found: {place}\n   = expected: ascending, within {}:{}",
+        range.low, range.high
+    ))
+}

@@ -1,0 +1,207 @@
+//! Bounds of the numeric formats against what is seen, and against another verifier.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod exact;
+mod marabou;
+
+use certify::{Certifier, Domain, Memory};
+use interp::{Controller, Sample};
+use ndarray::aview1;
+use policy::{Interval, NumericFormat, Policy};
+use verify::traces::Rng;
+
+fn example(format: NumericFormat) -> Policy {
+    policy::load(&tests::example()).unwrap().with_format(format)
+}
+
+/// Q values as the interpreter computes them in the format.
+fn held(controller: &Controller<f32>, observation: &[f32]) -> Vec<f64> {
+    let q_values = controller.q_values(&aview1(observation)).unwrap();
+    q_values.iter().map(|q| f64::from(*q)).collect()
+}
+
+/// A box inside a domain, of a random size in each direction.
+fn cell(rng: &mut Rng, domain: &Domain) -> Vec<Interval> {
+    let size = 10_f64.powf(rng.uniform(-5.0, 0.0));
+    let one = |range: Interval| {
+        let width = size * rng.uniform(0.0, 1.0) * (range.high - range.low);
+        let low = rng.uniform(range.low, range.high - width);
+        Interval {
+            low,
+            high: (low + width).min(range.high),
+        }
+    };
+    domain.whole().into_iter().map(one).collect()
+}
+
+/// A point of a box: a corner as often as not.
+fn point(rng: &mut Rng, cell: &[Interval]) -> Vec<f64> {
+    let is_corner = rng.one_in(2);
+    let one = |range: &Interval| match (is_corner, rng.below(2)) {
+        (true, 0) => range.low,
+        (true, _) => range.high,
+        (false, _) => rng.uniform(range.low, range.high),
+    };
+    cell.iter().map(one).collect()
+}
+
+fn argmax(q_values: &[f64]) -> usize {
+    let largest = q_values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    q_values.iter().position(|q| *q == largest).unwrap()
+}
+
+/// Boxes and points of a policy's observations: how near the bounds come, or what contradicts them.
+fn check(policy: &Policy, rng: &mut Rng, boxes: usize) -> (f64, usize) {
+    let certifier = Certifier::new(policy);
+    let controller = Controller::<f32>::new(policy);
+    let domain = certifier.observations().clone();
+    let whole = certifier.box_bound();
+    let (mut nearest, mut decided) = (0.0_f64, 0);
+    for _ in 0..boxes {
+        let cell = cell(rng, &domain);
+        let bound = certifier.bound_over(&domain, &cell);
+        let q_ranges = certifier.q_values_over(&domain, &cell);
+        let action = certifier.decided(&domain, &cell);
+        decided += usize::from(action.is_some());
+        for _ in 0..12 {
+            let point = point(rng, &cell);
+            // the nearest binary32 may lie just outside of the box
+            let inside =
+                |(x, range): (f64, &Interval)| f64::from(x as f32) >= range.low && f64::from(x as f32) <= range.high;
+            if !point.iter().copied().zip(&cell).all(inside) {
+                continue;
+            }
+            let observation: Vec<f32> = point.iter().map(|x| *x as f32).collect();
+            let (real, held) = (exact::q_values(policy, &observation), held(&controller, &observation));
+            for n in 0..real.len() {
+                let place = format!(
+                    "{} {:?} action {n} at {observation:?}",
+                    policy.name, policy.numeric_format
+                );
+                let error = (held[n] - real[n]).abs();
+                assert!(
+                    error <= bound.per_action[n],
+                    "{place}: {error} > {}",
+                    bound.per_action[n]
+                );
+                assert!(
+                    bound.per_action[n] <= whole.per_action[n] * 1.000_001,
+                    "{place}: a part beyond the whole"
+                );
+                assert!(
+                    q_ranges[n].low <= real[n] && real[n] <= q_ranges[n].high,
+                    "{place}: real Q outside"
+                );
+                nearest = nearest.max(error / bound.per_action[n]);
+            }
+            if let Some(action) = action {
+                assert_eq!((argmax(&real), argmax(&held)), (action, action), "{}", policy.name);
+            }
+        }
+    }
+    (nearest, decided)
+}
+
+#[test]
+fn the_examples_error_stays_within_its_bound() {
+    for format in NumericFormat::ALL {
+        let policy = example(format);
+        let (nearest, decided) = check(&policy, &mut Rng::new(1), 150);
+        println!("{format:?}: nearest {nearest:.3} of the bound, {decided} of 150 boxes decided");
+        // roundings of single operations hardly ever add up as they could
+        let is_integer = policy::scales::is_integer(format);
+        assert!(
+            nearest > if is_integer { 0.2 } else { 0.02 },
+            "{format:?}: a bound that is never approached: {nearest}"
+        );
+        assert!(decided > 10, "{format:?}: no claim was tested");
+    }
+}
+
+#[test]
+fn random_policies_stay_within_their_bounds() {
+    let mut rng = Rng::new(2);
+    for seed in 500..530 {
+        let folder = tests::random::policy(seed).unwrap();
+        let policy = policy::load(&folder.path()).unwrap();
+        for format in NumericFormat::ALL {
+            check(&policy.clone().with_format(format), &mut rng, 10);
+        }
+    }
+}
+
+/// An output without weights: the rounding of its bias is all that is wrong with it.
+#[test]
+fn the_rounding_of_a_bias_is_in_the_bound() {
+    let path = tests::root().join("tests/golden/cases/minimal/policy.toml");
+    let mut policy = policy::load(&path).unwrap().with_format(NumericFormat::I8);
+    let last = policy.layers.last_mut().unwrap();
+    last.weights[last.inputs..2 * last.inputs].fill(0.0);
+    last.bias[1] = 0.3;
+    let held = held(&Controller::<f32>::new(&policy), &[100.0, 5.0])[1];
+    let error = (held - f64::from(0.3_f32)).abs();
+    assert!(error > 0.0, "0.3 lies on no grid");
+    let bound = Certifier::new(&policy).box_bound().per_action[1];
+    assert!(error <= bound && bound <= 1.001 * error, "{error} {bound}");
+}
+
+/// States are described by coordinates; the controller's own observation must be what they say.
+#[test]
+fn the_observation_of_a_controller_lies_where_its_coordinates_say() {
+    let mut rng = Rng::new(3);
+    for seed in 600..640 {
+        let folder = tests::random::policy(seed).unwrap();
+        let policy = policy::load(&folder.path()).unwrap();
+        let certifier = Certifier::new(&policy);
+        let domain = Domain::of(&policy, Memory::Free);
+        let mut controller = Controller::<f32>::new(&policy);
+        let mut past: Vec<(Vec<f64>, [f64; 2])> = Vec::new();
+        for _ in 0..30 {
+            let values: Vec<f64> = policy
+                .signals
+                .iter()
+                .map(|signal| rng.uniform(signal.range.low, signal.range.high))
+                .collect();
+            let samples: Vec<Sample> = policy
+                .signals
+                .iter()
+                .zip(&values)
+                .map(|(signal, value)| verify::traces::sample_of(signal, *value))
+                .collect();
+            let state = controller.state();
+            let duties = [f64::from(state.previous_duty), f64::from(state.previous_command)];
+            let trace = controller.step(&samples).unwrap();
+            past.push((trace.signals.iter().map(|x| f64::from(*x)).collect(), duties));
+            let observation = trace.observation.to_vec();
+            let point: Vec<f64> = domain
+                .coordinates()
+                .iter()
+                .map(|coordinate| coordinate_value(&policy, &coordinate.name, &past, &observation))
+                .collect();
+            let cell: Vec<Interval> = point.iter().map(|&x| Interval { low: x, high: x }).collect();
+            let real = exact::q_values(&policy, &observation);
+            for (range, q) in certifier.q_values_over(&domain, &cell).iter().zip(&real) {
+                assert!(
+                    range.low <= *q && *q <= range.high,
+                    "{range:?} {q}\n{}",
+                    folder.contract
+                );
+            }
+        }
+    }
+}
+
+/// A coordinate by its name, from what the controller has seen; before the first sample everything was as then.
+fn coordinate_value(policy: &Policy, name: &str, past: &[(Vec<f64>, [f64; 2])], observation: &[f32]) -> f64 {
+    if let Some(index) = policy.features.iter().position(|feature| feature.name == name) {
+        return f64::from(observation[index]);
+    }
+    let (name, ago) = name.split_once(", ").unwrap_or((name, "0 "));
+    let ago: usize = ago.split(' ').next().unwrap().parse().unwrap();
+    let (signals, duties) = &past[past.len().saturating_sub(1 + ago)];
+    match name {
+        "previous_duty" => duties[0],
+        "previous_command" => duties[1],
+        _ => signals[policy.signals.iter().position(|signal| signal.name == name).unwrap()],
+    }
+}

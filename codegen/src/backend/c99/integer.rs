@@ -60,7 +60,7 @@ pub fn view(prefix: &str, network: &IntegerNetwork, has_fpu: bool) -> IntegerVie
         q_field: network.q_field,
         has_fpu,
         special: special(network),
-        has_assembly: network.layers.iter().any(|layer| has_assembly(network, layer)),
+        has_assembly: is_in_assembly(network),
         layers: layers(prefix, network),
         relu: has(|activation| *activation == ActivationCode::Relu),
         leaky_relu: has(|activation| matches!(activation, ActivationCode::LeakyRelu(_))),
@@ -75,6 +75,11 @@ fn special(network: &IntegerNetwork) -> &'static str {
         IntegerLoop::Halves if network.weight_bytes == 2 => "HALVES",
         IntegerLoop::Halves | IntegerLoop::Plain => "",
     }
+}
+
+/// Whether any layer is there in assembly, too.
+pub fn is_in_assembly(network: &IntegerNetwork) -> bool {
+    network.layers.iter().any(|layer| has_assembly(network, layer))
 }
 
 fn has_assembly(network: &IntegerNetwork, layer: &IntegerLayer) -> bool {

@@ -375,7 +375,7 @@ fn helpers(program: &Program) -> Helpers {
         tanh: network.activates(|activation| activation == ActivationCode::Tanh),
         assembly: match network {
             NetworkCode::Real { fused, layers } => layers.iter().any(|layer| real::has_assembly(layer, *fused)),
-            NetworkCode::Integer(_) => false,
+            NetworkCode::Integer(network) => integer::is_in_assembly(network),
         },
         vectors: match network {
             NetworkCode::Real { layers, .. } => layers.iter().any(|layer| layer.has_vectors),

@@ -6,10 +6,9 @@ use std::process::{Command, Stdio};
 
 use codegen::Language;
 use policy::Policy;
-use targets::TargetSpec;
+use targets::{Board, CCompiler, Endianness, Runner, TargetSpec};
 use tempfile::TempDir;
 
-use crate::cores::Core;
 use crate::format_name;
 use crate::sources::{self, CALLS};
 use crate::table::Row;
@@ -24,30 +23,49 @@ impl fmt::Display for Failure {
     }
 }
 
-/// Compilers and emulators with the boards' files.
+/// Compilers and emulators with a folder to work in.
 pub struct Bench {
-    boards: PathBuf,
     folder: TempDir,
 }
 
 /// Flags of every C build.
 const EXACT: [&str; 2] = ["-std=c99", "-ffp-contract=off"];
-const C_LEVELS: [(&str, &str); 4] = [("gcc", "-O2"), ("gcc", "-O3"), ("clang", "-O2"), ("clang", "-O3")];
+
+/// The emulated board of a target.
+fn board(target: &TargetSpec) -> Result<Board, Failure> {
+    match target.runner {
+        Runner::Emulated(board) => Ok(board),
+        _ => Err(Failure(format!("{} has no emulator", target.name))),
+    }
+}
+
+/// The compiler that also links.
+fn linker(target: &TargetSpec) -> Result<CCompiler, Failure> {
+    let first = target.c_compilers.first();
+    first
+        .copied()
+        .ok_or_else(|| Failure(format!("{} has no compiler", target.name)))
+}
 
 impl Bench {
-    /// With the boards of the source tree; builds the instruction counter.
+    /// Builds the instruction counter.
     ///
     /// # Errors
     /// If the counter cannot be built.
-    pub fn new(root: &Path) -> Result<Self, Failure> {
+    pub fn new() -> Result<Self, Failure> {
         let folder = tempfile::tempdir().map_err(|error| Failure(error.to_string()))?;
-        let boards = root.join("targets/boards");
-        let counter = folder.path().join("counter.so");
-        run(Command::new("gcc")
-            .args(["-shared", "-fPIC", "-O2", "-o"])
-            .arg(&counter)
-            .arg(boards.join("counter/counter.c")))?;
-        Ok(Self { boards, folder })
+        let bench = Self { folder };
+        let counter = targets::boards::COUNTER;
+        bench.put(counter.name, counter.text)?;
+        run(Command::new("gcc").current_dir(bench.folder.path()).args([
+            "-shared",
+            "-fPIC",
+            "-O2",
+            "-o",
+            "counter.so",
+            counter.name,
+        ]))?;
+        Ok(bench)
     }
 
     /// Our controller on a core: each C compiler, then rustc.
@@ -59,7 +77,7 @@ impl Bench {
         name: &str,
         policy: &Policy,
         target: &TargetSpec,
-        core: &Core,
+        levels: &[&str],
         assembly: bool,
     ) -> Result<Vec<Row>, Failure> {
         self.write(policy, target)?;
@@ -68,17 +86,20 @@ impl Bench {
         let define = format!("-D{}_ASSEMBLY", policy.name.to_uppercase());
         let extra: &[&str] = if assembly { &[&define] } else { &[] };
         let mut rows = Vec::new();
-        for (compiler, level) in C_LEVELS {
-            self.object(core, compiler, level, &format!("{}.c", policy.name), extra)?;
-            let mut row = self.counted(core, "unit.o", &["main.c"])?;
-            row.flash = Some(size(&self.path("unit.o"))?);
-            row.compiler = format!("{compiler} {level}");
-            rows.push(row);
+        for compiler in target.c_compilers {
+            for level in levels {
+                self.object(compiler, level, &format!("{}.c", policy.name), extra)?;
+                let mut row = self.counted(target, "unit.o", &["main.c"])?;
+                row.flash = Some(size(target, &self.path("unit.o"))?);
+                let family = if compiler.program == "clang" { "clang" } else { "gcc" };
+                row.compiler = format!("{family} {level}");
+                rows.push(row);
+            }
         }
         // Rust has loops in assembly for integers only
         if !assembly || policy::scales::is_integer(policy.numeric_format) {
-            self.rust_archive(core, assembly)?;
-            let mut row = self.counted(core, "unit.a", &[])?;
+            self.rust_archive(target, assembly)?;
+            let mut row = self.counted(target, "unit.a", &[])?;
             row.compiler = "rustc -O3".to_owned();
             rows.push(row);
         }
@@ -93,7 +114,7 @@ impl Bench {
     ///
     /// # Errors
     /// As [`Bench::counts`].
-    pub fn naive(&self, policy: &Policy, core: &Core) -> Result<Vec<Row>, Failure> {
+    pub fn naive(&self, policy: &Policy, target: &TargetSpec) -> Result<Vec<Row>, Failure> {
         self.put_naive(policy)?;
         self.put("main.c", &sources::naive_main(policy))?;
         let mut rows = Vec::new();
@@ -101,9 +122,9 @@ impl Bench {
             ("naive C", &[][..]),
             ("naive C, contracted", &["-ffp-contract=fast"][..]),
         ] {
-            self.object(core, "gcc", "-O2", "naive.c", extra)?;
-            let mut row = self.counted(core, "unit.o", &["main.c"])?;
-            row.flash = Some(size(&self.path("unit.o"))?);
+            self.object(&linker(target)?, "-O2", "naive.c", extra)?;
+            let mut row = self.counted(target, "unit.o", &["main.c"])?;
+            row.flash = Some(size(target, &self.path("unit.o"))?);
             row.compiler = "gcc -O2".to_owned();
             row.policy = "bench".to_owned();
             row.variant = variant.to_owned();
@@ -113,11 +134,11 @@ impl Bench {
         Ok(rows)
     }
 
-    /// Times on this machine: gcc -O3 and rustc beside the naive loop under gcc -O3.
+    /// Times on this machine, compiled for `machine`: gcc -O3 and rustc beside the naive loop under gcc -O3.
     ///
     /// # Errors
     /// If a program cannot be built or run.
-    pub fn times(&self, policy: &Policy, target: &TargetSpec) -> Result<Vec<Row>, Failure> {
+    pub fn times(&self, policy: &Policy, target: &TargetSpec, machine: &str) -> Result<Vec<Row>, Failure> {
         self.write(policy, target)?;
         self.put_naive(policy)?;
         self.put("host.c", &sources::host(policy))?;
@@ -126,6 +147,7 @@ impl Bench {
             "--edition=2021",
             "-Copt-level=3",
             "-Cpanic=abort",
+            &format!("-Ctarget-cpu={machine}"),
             "--crate-type=staticlib",
             "-Aunsafe_op_in_unsafe_fn",
             "host.rs",
@@ -136,16 +158,19 @@ impl Bench {
         let mut rows = Vec::new();
         for (compiler, unit) in [("gcc -O3", unit.as_str()), ("rustc -O3", "host.a")] {
             let mut command = Command::new("gcc");
-            command
-                .current_dir(self.folder.path())
-                .args(EXACT)
-                .args(["-O3", "host.c", "naive.c", unit]);
+            command.current_dir(self.folder.path()).args(EXACT).args([
+                "-O3",
+                &format!("-march={machine}"),
+                "host.c",
+                "naive.c",
+                unit,
+            ]);
             run(command.args(["-lpthread", "-ldl", "-o", "host"]))?;
             let text = run(&mut Command::new(self.path("host")))?;
             let text = String::from_utf8_lossy(&text).into_owned();
             let (ratio, checksum) = text.trim().split_once(' ').unwrap_or_default();
             rows.push(Row {
-                compiler: compiler.to_owned(),
+                compiler: format!("{compiler} {machine}"),
                 policy: "bench".to_owned(),
                 variant: policy.numeric_format.name().to_owned(),
                 checksum: Some(checksum.to_owned()),
@@ -175,29 +200,25 @@ impl Bench {
         files.files.iter().try_for_each(|(name, text)| self.put(name, text))
     }
 
-    fn object(&self, core: &Core, compiler: &str, level: &str, unit: &str, extra: &[&str]) -> Result<(), Failure> {
-        let mut command = if compiler == "gcc" {
-            Command::new("arm-none-eabi-gcc")
-        } else {
-            let mut clang = Command::new("clang");
-            clang.args(["-ffreestanding", &format!("--target={}", core.triple)]);
-            clang
-        };
-        command
-            .current_dir(self.folder.path())
-            .args(core.gcc)
-            .args(EXACT)
-            .arg(level)
-            .args(extra);
+    fn object(&self, compiler: &CCompiler, level: &str, unit: &str, extra: &[&str]) -> Result<(), Failure> {
+        let mut command = Command::new(compiler.program);
+        command.current_dir(self.folder.path()).args(compiler.machine_flags);
+        if compiler.program == "clang" {
+            command.arg("-ffreestanding");
+        }
+        command.args(EXACT).arg(level).args(extra);
         run(command.args(["-c", unit, "-o", "unit.o"])).map(|_| ())
     }
 
-    fn rust_archive(&self, core: &Core, assembly: bool) -> Result<(), Failure> {
+    fn rust_archive(&self, target: &TargetSpec, assembly: bool) -> Result<(), Failure> {
+        let rust = target
+            .rust
+            .ok_or_else(|| Failure(format!("{} has no Rust", target.name)))?;
         let mut command = Command::new("rustc");
         command
             .current_dir(self.folder.path())
-            .args(["--edition=2021", "--target", core.triple]);
-        command.arg(format!("-Ctarget-cpu={}", core.cpu));
+            .args(["--edition=2021", "--target", rust.triple])
+            .args(rust.machine_flags);
         command.args([
             "-Copt-level=3",
             "-Cpanic=abort",
@@ -211,29 +232,22 @@ impl Bench {
     }
 
     /// Links with the board, runs, reads counts and words.
-    fn counted(&self, core: &Core, unit: &str, mains: &[&str]) -> Result<Row, Failure> {
-        let board = |name: &str| self.boards.join(name);
-        let mut link = Command::new("arm-none-eabi-gcc");
+    fn counted(&self, target: &TargetSpec, unit: &str, mains: &[&str]) -> Result<Row, Failure> {
+        let (board, linker) = (board(target)?, linker(target)?);
+        board.files.iter().try_for_each(|file| self.put(file.name, file.text))?;
+        let sources = board.files.iter().map(|file| file.name);
+        let sources = sources.filter(|name| name.ends_with(".c") || name.ends_with(".S"));
+        let mut link = Command::new(linker.program);
         link.current_dir(self.folder.path())
-            .args(core.gcc)
-            .args([
-                "-std=gnu99",
-                "-O2",
-                "-ffreestanding",
-                "-fno-tree-loop-distribute-patterns",
-                "-nostdlib",
-            ])
-            .args(["-Wl,--gc-sections", "-I"])
-            .arg(&self.boards)
-            .arg("-L")
-            .arg(&self.boards)
-            .arg("-T")
-            .arg(board("arm").join(core.script))
+            .args(linker.machine_flags)
+            .args(board.link_flags)
+            .args(["-I.", "-L."])
+            .args(board.linker_script.into_iter().flat_map(|script| ["-T", script]))
             .args(mains)
-            .args(["arm/start.c", "memory.c", "reset.c", "semihosting.c", "words.c"].map(board))
+            .args(sources)
             .args([unit, "-lgcc", "-o", "program.elf"]);
         run(&mut link)?;
-        let symbols = run(Command::new("arm-none-eabi-nm").arg(self.path("program.elf")))?;
+        let symbols = run(Command::new(tool(target, "nm")?).arg(self.path("program.elf")))?;
         let symbols = String::from_utf8_lossy(&symbols).into_owned();
         let (begin, end) = (address(&symbols, "count_begin")?, address(&symbols, "count_end")?);
         let (counter, counts) = (self.path("counter.so"), self.path("counts"));
@@ -242,51 +256,44 @@ impl Bench {
             counter.display(),
             counts.display()
         );
-        let mut emulator = Command::new("qemu-system-arm");
-        emulator.args([
-            "-machine",
-            core.machine,
-            "-display",
-            "none",
-            "-serial",
-            "none",
-            "-monitor",
-            "none",
-        ]);
-        emulator.args([
-            "-semihosting-config",
-            "enable=on,target=native",
-            "-plugin",
-            &plugin,
-            "-kernel",
-        ]);
+        let mut emulator = Command::new(board.emulator);
+        emulator.args(["-plugin", &plugin]).args(board.arguments);
         let words = run(emulator.arg(self.path("program.elf")))?;
         let words: Vec<u32> = words
             .chunks_exact(4)
-            .map(|bytes| bytes.iter().rev().fold(0, |word, byte| word << 8 | u32::from(*byte)))
+            .map(|bytes| {
+                let append = |word: u32, byte: &u8| word << 8 | u32::from(*byte);
+                match target.endianness {
+                    Endianness::Big => bytes.iter().fold(0, append),
+                    _ => bytes.iter().rev().fold(0, append),
+                }
+            })
             .collect();
         let [self_test, checksum, stack] = words.as_slice() else {
             return Err(Failure(format!(
                 "{}: expected three words, found {}",
-                core.name,
+                target.name,
                 words.len()
             )));
         };
         if *self_test != 0 {
             return Err(Failure(format!(
                 "{}: the self test failed at vector {self_test}",
-                core.name
+                target.name
             )));
         }
         let counts = std::fs::read_to_string(&counts).map_err(|error| Failure(error.to_string()))?;
-        let counts: Vec<u64> = counts.lines().filter_map(|line| line.parse().ok()).collect();
+        let counts: Vec<u64> = counts
+            .lines()
+            .filter_map(|line| line.split(' ').next()?.parse().ok())
+            .collect();
         let (q_values, step) = counts.split_at_checked(CALLS).unwrap_or_default();
         Ok(Row {
             q_values: extremes(q_values),
             step: extremes(step),
             stack: Some(u64::from(*stack)),
             checksum: Some(format!("{checksum:08x}")),
-            ..blank(core.name)
+            ..blank(target.name)
         })
     }
 }
@@ -319,14 +326,20 @@ fn address<'a>(symbols: &'a str, name: &str) -> Result<&'a str, Failure> {
         .ok_or_else(|| Failure(format!("no symbol `{name}`")))
 }
 
+/// A tool of the target's binary utilities.
+fn tool(target: &TargetSpec, name: &str) -> Result<String, Failure> {
+    Ok(linker(target)?.program.replace("gcc", name))
+}
+
 /// Code and constant tables of an object file.
-fn size(object: &Path) -> Result<u64, Failure> {
-    let text = run(Command::new("arm-none-eabi-size").arg(object))?;
+fn size(target: &TargetSpec, object: &Path) -> Result<u64, Failure> {
+    let tool = tool(target, "size")?;
+    let text = run(Command::new(&tool).arg(object))?;
     let text = String::from_utf8_lossy(&text).into_owned();
     let first = text.lines().nth(1).and_then(|line| line.split_whitespace().next());
     first
         .and_then(|bytes| bytes.parse().ok())
-        .ok_or_else(|| Failure("arm-none-eabi-size: no size".to_owned()))
+        .ok_or_else(|| Failure(format!("{tool}: no size")))
 }
 
 fn run(command: &mut Command) -> Result<Vec<u8>, Failure> {

@@ -5,7 +5,6 @@
 //! `docs/kernels.md` by the figures others stated.
 
 mod build;
-mod cores;
 mod sources;
 mod table;
 
@@ -13,10 +12,9 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use policy::{NumericFormat, Policy};
-use targets::{RowBlock, TargetSpec};
+use targets::{Fma, Fpu, IntegerLoop, Runner, TargetSpec};
 
 use build::{Bench, Failure};
-use cores::CORES;
 use table::Row;
 
 fn main() -> ExitCode {
@@ -31,6 +29,7 @@ fn main() -> ExitCode {
     };
     let text = rows().and_then(|rows| {
         table::one_checksum_per_format(&rows)?;
+        table::one_count_per_kernel(&rows)?;
         table::text(&rows, json)
     });
     match text {
@@ -60,26 +59,41 @@ const VARIANTS: [(NumericFormat, bool); 7] = [
     (NumericFormat::I8, true),
 ];
 
+/// Whether a variant is counted on a target.
+fn is_counted(target: &TargetSpec, name: &str, format: NumericFormat, assembly: bool) -> bool {
+    let has_assembly = target.integer_block.inner == IntegerLoop::Dual;
+    let is_whole_controller = name == "buck12" && target.name != "cortex-m4f";
+    match format {
+        _ if (assembly && !has_assembly) || is_whole_controller => false,
+        NumericFormat::F32 => target.fpu != Fpu::None,
+        NumericFormat::F32Fma => target.fma != Fma::Absent,
+        NumericFormat::I16 | NumericFormat::I8 => true,
+    }
+}
+
 fn rows() -> Result<Vec<Row>, Failure> {
-    let bench = Bench::new(&root())?;
+    let bench = Bench::new()?;
     let mut rows = Vec::new();
     for (name, path) in [
         ("bench", "bench/policy/policy.toml"),
         ("buck12", "examples/buck12/policy.toml"),
     ] {
         let policy = policy::load(&root().join(path)).map_err(|faults| Failure(faults.to_string()))?;
-        for core in CORES {
+        let emulated = targets::TARGETS.iter();
+        for target in emulated.filter(|target| matches!(target.runner, Runner::Emulated(_))) {
+            let levels: &[&str] = if target.name == "cortex-m4f" {
+                &["-O2", "-O3"]
+            } else {
+                &["-O2"]
+            };
             for (format, assembly) in VARIANTS {
-                let skipped = (assembly && !core.has_dsp) || (name == "buck12" && core.name != "cortex-m4f");
-                let fused_without_core = format == NumericFormat::F32Fma && !core.has_fma;
-                if skipped || fused_without_core || (format == NumericFormat::F32 && !core.has_fpu) {
-                    continue;
+                if is_counted(target, name, format, assembly) {
+                    let policy = policy.clone().with_format(format);
+                    rows.extend(bench.counts(name, &policy, target, levels, assembly)?);
                 }
-                let policy = policy.clone().with_format(format);
-                rows.extend(bench.counts(name, &policy, &spec(RowBlock::Rows(16)), core, assembly)?);
             }
-            if core.has_fpu && name == "bench" {
-                rows.extend(bench.naive(&policy, core)?);
+            if target.fpu != Fpu::None && name == "bench" {
+                rows.extend(bench.naive(&policy, target)?);
             }
         }
     }
@@ -87,23 +101,35 @@ fn rows() -> Result<Vec<Row>, Failure> {
     Ok(rows)
 }
 
+/// Instruction sets of the x86-64 family that are timed where this machine has them: SSE2, AVX2, its own.
+const MACHINES: [&str; 3] = ["x86-64", "x86-64-v3", "native"];
+
 /// Times on this machine.
 fn host(bench: &Bench) -> Result<Vec<Row>, Failure> {
     let policy =
         policy::load(&root().join("bench/policy/policy.toml")).map_err(|faults| Failure(faults.to_string()))?;
-    let formats = [NumericFormat::F32, NumericFormat::I16, NumericFormat::I8];
+    let machines = if cfg!(target_arch = "x86_64") {
+        &MACHINES[..]
+    } else {
+        &["native"]
+    };
     let mut rows = Vec::new();
-    for format in formats {
-        rows.extend(bench.times(&policy.clone().with_format(format), &spec(RowBlock::All))?);
+    for machine in machines.iter().filter(|machine| **machine != "x86-64-v3" || has_avx2()) {
+        for format in [NumericFormat::F32, NumericFormat::I16, NumericFormat::I8] {
+            rows.extend(bench.times(&policy.clone().with_format(format), targets::host(), machine)?);
+        }
     }
     Ok(rows)
 }
 
-/// The host's target with the row block of the cores that are counted.
-fn spec(c_row_block: RowBlock) -> TargetSpec {
-    let mut spec = targets::TARGETS[0].clone();
-    spec.c_row_block = c_row_block;
-    spec
+#[cfg(target_arch = "x86_64")]
+fn has_avx2() -> bool {
+    is_x86_feature_detected!("avx2")
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn has_avx2() -> bool {
+    false
 }
 
 /// Name of a policy's format as the table shows it.

@@ -55,6 +55,22 @@ pub fn one_checksum_per_format(rows: &[Row]) -> Result<(), Failure> {
     Ok(())
 }
 
+/// `q_values` takes as many instructions for every observation. Not asked of `f32-fma` in Rust, which goes through
+/// functions of the library.
+///
+/// # Errors
+/// The row that varies.
+pub fn one_count_per_kernel(rows: &[Row]) -> Result<(), Failure> {
+    let asked = rows
+        .iter()
+        .filter(|row| row.variant != "f32-fma" || !row.compiler.starts_with("rustc"));
+    let mut varying = asked.filter(|row| row.q_values.is_some_and(|(low, high)| low != high));
+    match varying.next() {
+        Some(row) => Err(Failure(format!("the count depends on the data:\n{row:?}"))),
+        None => Ok(()),
+    }
+}
+
 /// JSON, or a Markdown table.
 ///
 /// # Errors
@@ -126,6 +142,14 @@ mod tests {
         ];
         assert!(one_checksum_per_format(&equal).is_ok());
         assert!(one_checksum_per_format(&[row("i16", "a"), row("i16, assembly", "b")]).is_err());
+    }
+
+    #[test]
+    fn a_kernel_whose_count_varies_is_an_error() {
+        let mut steady = row("i16", "a");
+        assert!(one_count_per_kernel(std::slice::from_ref(&steady)).is_err());
+        steady.q_values = Some((7, 7));
+        assert!(one_count_per_kernel(&[steady]).is_ok());
     }
 
     #[test]

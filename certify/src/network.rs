@@ -11,7 +11,8 @@ const UNIT_32: f64 = 1.0 / 16_777_216.0;
 const TINY_32: f64 = 1e-40;
 /// Error of the contract's tanh in binary32 (contract section 6).
 pub(crate) const TANH_ERROR: f64 = 4e-7;
-/// `trunc(fl(x + 32768.5)) - 32768` is at most this far from x: one half, and half of the last bit below 2^16.
+/// An observation becomes an integer by rounding half up; `trunc(fl(x + 32768.5)) - 32768` behind a tanh is at most this
+/// far from x: one half, and half of the last bit below 2^16.
 const TO_INTEGER: f64 = 0.5 + 1.0 / 512.0;
 
 /// A layer with the weights of the policy and with those of the format.

@@ -315,6 +315,8 @@ pub struct Program {
     pub sample_period: f64,
     /// Format of all arithmetic.
     pub numeric_format: NumericFormat,
+    /// Whether the target has floats in hardware.
+    pub has_fpu: bool,
     /// Origin.
     pub provenance: Provenance,
     /// Measurement fields.

@@ -19,7 +19,7 @@ pub(crate) struct Network {
 
 #[derive(Debug, Clone, Copy)]
 struct Input {
-    factor: f32,
+    factor: f64,
     low: i64,
     high: i64,
 }
@@ -48,7 +48,7 @@ impl Network {
     pub fn new(policy: &Policy) -> Option<Self> {
         let Scales { inputs, layers } = policy::scales::of(policy)?;
         let input = |input: &policy::scales::InputScale| Input {
-            factor: power_of_two(input.exponent) as f32,
+            factor: power_of_two(input.exponent),
             low: i64::from(input.low),
             high: i64::from(input.high),
         };
@@ -79,20 +79,17 @@ impl Network {
 }
 
 impl Input {
-    /// `trunc(fl(fl(o * 2^e) + 32768.5)) - 32768`, clamped to the box; a NaN by its sign to one end.
+    /// `hu(o * 2^e)`, clamped to the box; a NaN by its sign to one end.
     fn integer(self, observation: f32) -> i64 {
-        let shifted = observation * self.factor + 32_768.5;
-        if shifted.is_nan() {
-            return if shifted.is_sign_negative() {
+        if observation.is_nan() {
+            return if observation.is_sign_negative() {
                 self.low
             } else {
                 self.high
             };
         }
-        // `as` saturates, far outside of the clamp
-        (shifted.trunc() as i64)
-            .saturating_sub(32_768)
-            .clamp(self.low, self.high)
+        // exact: 24 bits and a power of two; `as` saturates, far outside of the clamp
+        rounded(f64::from(observation) * self.factor).clamp(self.low, self.high)
     }
 }
 
@@ -183,6 +180,9 @@ mod tests {
             high: 100,
         };
         assert_eq!([0.0, 0.03125, -0.03125, 1.0].map(|x| input.integer(x)), [0, 1, 0, 16]);
+        // one step below and above a half, where a sum in binary32 would round
+        let near = [0.03125_f32.next_down(), (-0.03125_f32).next_down(), 0.03125, -0.03125];
+        assert_eq!(near.map(|x| input.integer(x)), [0, -1, 1, 0]);
         let far = [1e30, -1e30, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, -f32::NAN];
         assert_eq!(far.map(|x| input.integer(x)), [100, -100, 100, -100, 100, -100]);
     }

@@ -101,11 +101,10 @@ pub fn round_half_up(x: f64) -> i64 {
     (x + 0.5).floor() as i64
 }
 
-/// An observation as integer, before the clamp: `trunc(fl(fl(o * 2^e) + 32768.5)) - 32768` in binary32.
+/// An observation as integer, before the clamp: round half up of `o * 2^e`.
 #[must_use]
 pub fn quantised(observation: f32, exponent: i32) -> i32 {
-    let shifted = observation * (power_of_two(exponent) as f32) + 32_768.5;
-    shifted as i32 - 32_768
+    round_half_up(f64::from(observation) * power_of_two(exponent)) as i32
 }
 
 /// The finest exponent at which every observation fits in 16 bits; a feature of small range meets the coarsest one half

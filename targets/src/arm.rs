@@ -2,8 +2,8 @@
 
 use crate::boards::{MICROBIT, MPS2_AN385_BOARD, MPS2_AN386_BOARD, MPS2_AN500_BOARD, MPS2_AN505_BOARD};
 use crate::{
-    CCompiler, CycleModel, EXACT_C99, EXACT_RUST, Endianness, Fma, Fpu, GNU_SECTIONS, ILP32, RowBlock, Runner,
-    RustTarget, Sections, TargetSpec,
+    CCompiler, CycleModel, EXACT_C99, EXACT_RUST, Endianness, Fma, Fpu, GNU_SECTIONS, ILP32, IntegerBlock, IntegerLoop,
+    RowBlock, Runner, RustTarget, Sections, TargetSpec,
 };
 
 const fn gcc(machine_flags: &'static [&'static str]) -> CCompiler {
@@ -47,6 +47,11 @@ const BASE: TargetSpec = TargetSpec {
     clock_hz: None,
     c_row_block: RowBlock::Rows(4),
     rust_row_block: RowBlock::Rows(4),
+    integer_block: IntegerBlock {
+        rows: 6,
+        unrolled: 1,
+        inner: IntegerLoop::Plain,
+    },
     c_compilers: &[],
     c_flags: EXACT_C99,
     rust: None,
@@ -63,6 +68,11 @@ pub const CORTEX_M0PLUS: TargetSpec = TargetSpec {
         jump: (1, 2),
     }),
     clock_hz: Some(48_000_000),
+    integer_block: IntegerBlock {
+        rows: 6,
+        unrolled: 1,
+        inner: IntegerLoop::Halves,
+    },
     c_compilers: &[
         gcc(&["-mthumb", "-mcpu=cortex-m0plus"]),
         clang(&["--target=thumbv6m-none-eabi", "-mcpu=cortex-m0plus"]),
@@ -98,6 +108,7 @@ const FPU_BASE: TargetSpec = TargetSpec {
     // 32 single registers: 16 accumulators, one input, loads in flight
     c_row_block: RowBlock::Rows(16),
     rust_row_block: RowBlock::Rows(16),
+    integer_block: IntegerBlock::DUAL,
     ..BASE
 };
 

@@ -34,6 +34,41 @@ pub enum RowBlock {
     All,
     /// At most this many; a shorter last block, no padding.
     Rows(usize),
+    /// At most this many, as vectors of the compiler where machine and compiler (GNU) have them, else as [`RowBlock::All`]
+    /// within a block.
+    Vectors(usize),
+}
+
+/// How the loops of an integer layer are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum IntegerLoop {
+    /// Two products and their sum in one instruction where the compiled core has it (Arm `SMLAD`), else plain.
+    Dual,
+    /// Weights of 16 bits are loaded by words and split, where the core loads halves of a word with an index only.
+    Halves,
+    /// One product after the other.
+    Plain,
+}
+
+/// Blocks of an integer layer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct IntegerBlock {
+    /// Outputs accumulated side by side at most; [`IntegerLoop::Dual`] has registers for 4.
+    pub rows: usize,
+    /// Groups of inputs (one word of weights each) in one turn of the loop.
+    pub unrolled: usize,
+    /// Inner loop.
+    pub inner: IntegerLoop,
+}
+
+impl IntegerBlock {
+    /// Where nothing is known of the core, and on those with `SMLAD`: four sums, four weights, an input, four pointers.
+    pub const DUAL: IntegerBlock = IntegerBlock {
+        rows: 4,
+        unrolled: 4,
+        inner: IntegerLoop::Dual,
+    };
 }
 
 /// Widths of C's types in bits.
@@ -161,6 +196,8 @@ pub struct TargetSpec {
     pub c_row_block: RowBlock,
     /// Row block of the generated Rust, chosen for LLVM.
     pub rust_row_block: RowBlock,
+    /// Blocks of the integer formats; Rust takes 4 rows at most.
+    pub integer_block: IntegerBlock,
     /// C compilers in the order in which they are tried. The first also links what the others compile.
     pub c_compilers: &'static [CCompiler],
     /// Flags under which the bits hold, besides the processor and the optimisation level.

@@ -2,8 +2,8 @@
 
 use crate::boards::LINUX_PPC;
 use crate::{
-    CCompiler, EXACT_C99, EXACT_RUST, Endianness, Fma, Fpu, GNU_SECTIONS, ILP32, RowBlock, Runner, RustTarget,
-    Sections, TargetSpec, Widths,
+    CCompiler, EXACT_C99, EXACT_RUST, Endianness, Fma, Fpu, GNU_SECTIONS, ILP32, IntegerBlock, IntegerLoop, RowBlock,
+    Runner, RustTarget, Sections, TargetSpec, Widths,
 };
 
 pub const HOST: TargetSpec = TargetSpec {
@@ -21,9 +21,10 @@ pub const HOST: TargetSpec = TargetSpec {
     cycles: None,
     sections: GNU_SECTIONS,
     clock_hz: None,
-    // gcc on x86 spills the accumulators of the block form; LLVM keeps them in registers
-    c_row_block: RowBlock::All,
-    rust_row_block: RowBlock::Rows(16),
+    // eight vectors of four lanes; gcc spills them as scalars
+    c_row_block: RowBlock::Vectors(32),
+    rust_row_block: RowBlock::Rows(32),
+    integer_block: IntegerBlock::DUAL,
     c_compilers: &[
         CCompiler {
             program: "gcc",
@@ -58,6 +59,11 @@ pub const DSPACE_DS1202: TargetSpec = TargetSpec {
     clock_hz: Some(2_000_000_000),
     c_row_block: RowBlock::Rows(16),
     rust_row_block: RowBlock::Rows(16),
+    integer_block: IntegerBlock {
+        rows: 8,
+        unrolled: 2,
+        inner: IntegerLoop::Plain,
+    },
     c_compilers: &[CCompiler {
         program: "powerpc-linux-gnu-gcc",
         package: "gcc-powerpc-linux-gnu",
@@ -97,6 +103,11 @@ pub const C2000_C28X: TargetSpec = TargetSpec {
     clock_hz: Some(200_000_000),
     c_row_block: RowBlock::Rows(4),
     rust_row_block: RowBlock::Rows(4),
+    integer_block: IntegerBlock {
+        rows: 4,
+        unrolled: 2,
+        inner: IntegerLoop::Plain,
+    },
     c_compilers: &[CCompiler {
         program: "cl2000",
         package: "",
@@ -113,5 +124,6 @@ pub const GENERIC_C99: TargetSpec = TargetSpec {
     description: "any C99 compiler with IEEE 754 binary32; verified on this machine",
     fma: Fma::Unrated,
     rust_row_block: RowBlock::All,
+    integer_block: IntegerBlock::DUAL,
     ..HOST
 };

@@ -2,8 +2,8 @@
 
 use crate::boards::{VIRT_RV32IMC, VIRT_RV32IMFC};
 use crate::{
-    CCompiler, EXACT_C99, EXACT_RUST, Endianness, Fma, Fpu, GNU_SECTIONS, ILP32, RowBlock, Runner, RustTarget,
-    TargetSpec,
+    CCompiler, EXACT_C99, EXACT_RUST, Endianness, Fma, Fpu, GNU_SECTIONS, ILP32, IntegerBlock, IntegerLoop, RowBlock,
+    Runner, RustTarget, TargetSpec,
 };
 
 const fn gcc(machine_flags: &'static [&'static str]) -> CCompiler {
@@ -35,6 +35,11 @@ pub const RISCV32IMC: TargetSpec = TargetSpec {
     clock_hz: Some(160_000_000),
     c_row_block: RowBlock::Rows(8),
     rust_row_block: RowBlock::Rows(8),
+    integer_block: IntegerBlock {
+        rows: 8,
+        unrolled: 2,
+        inner: IntegerLoop::Plain,
+    },
     // clang puts float constants into the writable .sdata unless the limit is 0
     // the bare compiler has no C library, so <stdint.h> is there in freestanding mode only
     c_compilers: &[

@@ -35,11 +35,24 @@ pub struct Table {
     pub aligned: bool,
 }
 
-/// A dense layer.
+/// The network in floats.
+#[derive(Debug, Clone)]
+pub struct RealView {
+    /// Functions, in the order of the layers.
+    pub layers: Vec<LayerView>,
+    /// Statements of `q_values`.
+    pub calls: Vec<String>,
+}
+
+/// A dense layer, or a piece of one.
 #[derive(Debug, Clone)]
 pub struct LayerView {
     /// Number, from 0.
     pub index: usize,
+    /// Name of the function without the prefix.
+    pub function: String,
+    /// Whether the function is given its weights and first sums: a block of outputs, or the sums over a chunk of inputs.
+    pub is_piece: bool,
     /// Tensor name and shape for the comment.
     pub comment: String,
     /// Inputs.
@@ -50,6 +63,8 @@ pub struct LayerView {
     pub blocks: Vec<BlockView>,
     /// Whether the sums stand in the output array (axpy form) instead of in variables.
     pub in_memory: bool,
+    /// Whether the accumulators are vectors where the compiler has them.
+    pub has_vectors: bool,
     /// Whether a block is repeated.
     pub has_loop: bool,
     /// Whether every block has a form in assembly.
@@ -60,12 +75,6 @@ pub struct LayerView {
     pub next: String,
     /// Expression of the activation over `y[o]`; empty for none.
     pub activation: String,
-    /// Name of the input array in `q_values`.
-    pub source: String,
-    /// Name of the output array in `q_values`.
-    pub sink: String,
-    /// Whether `sink` is a local buffer of `q_values`.
-    pub is_hidden: bool,
 }
 
 /// Blocks of equal height within a layer.
@@ -75,14 +84,12 @@ pub struct BlockView {
     pub count: usize,
     /// Outputs per block.
     pub rows: usize,
-    /// First output of the first block.
-    pub first_output: usize,
-    /// First table element of the first block.
-    pub first_weight: usize,
     /// The whole block in assembly; empty if there is none.
     pub assembly: Vec<String>,
     /// One entry per output of the block.
     pub row_views: Vec<RealRowView>,
+    /// The block in vectors, per width of the machine's; empty without.
+    pub vectors: Vec<VectorView>,
 }
 
 /// One output of a block in binary32.
@@ -96,11 +103,24 @@ pub struct RealRowView {
     pub result: String,
 }
 
+/// A block of outputs whose sums are vectors.
+#[derive(Debug, Clone)]
+pub struct VectorView {
+    /// Floats in the machine's vector.
+    pub lanes: usize,
+    /// Declarations of the sums, from the biases.
+    pub start: Vec<String>,
+    /// Sums after the next input.
+    pub turn: Vec<String>,
+    /// Stores.
+    pub end: Vec<String>,
+}
+
 /// The network in its numeric format.
 #[derive(Debug, Clone)]
 pub enum NetworkView {
     /// Layers in binary32.
-    Real(Vec<LayerView>),
+    Real(RealView),
     /// Layers in integers.
     Integer(IntegerView),
 }
@@ -122,6 +142,14 @@ pub struct IntegerView {
     pub q_unit: String,
     /// Layers in order.
     pub layers: Vec<IntegerLayerView>,
+    /// Macro under which the special form is taken: `DSP`, `HALVES`, or none.
+    pub special: &'static str,
+    /// Whether there are functions in assembly.
+    pub has_assembly: bool,
+    /// Whether Q values are made of integers by floats in hardware.
+    pub has_fpu: bool,
+    /// Exponent field of an output with 25 significant bits as a Q value.
+    pub q_field: i32,
     /// Which activations occur.
     pub relu: bool,
     /// A leaky ReLU occurs.
@@ -139,6 +167,8 @@ pub struct IntegerLayerView {
     pub comment: String,
     /// Bits cut off a sum.
     pub shift: u32,
+    /// Whether its blocks are there in assembly, too.
+    pub has_assembly: bool,
     /// Loops over blocks of outputs, in order.
     pub blocks: Vec<IntegerBlockView>,
     /// Whether a block is repeated.
@@ -166,10 +196,14 @@ pub struct IntegerBlockView {
     pub count: usize,
     /// Outputs per block.
     pub height: usize,
-    /// All inputs in assembly.
+    /// First output and first weight of the blocks.
+    pub first: (usize, usize),
+    /// All blocks as the body of a function in assembly.
     pub assembly: Vec<String>,
-    /// Stretches of inputs.
-    pub parts: Vec<IntegerPartView>,
+    /// Stretches of inputs in the form that suits the target, if it has one of its own.
+    pub special: Vec<IntegerPartView>,
+    /// Stretches of inputs in portable C.
+    pub portable: Vec<IntegerPartView>,
     /// One entry per output of the block.
     pub rows: Vec<RowView>,
 }
@@ -183,10 +217,8 @@ pub struct IntegerPartView {
     pub inputs: usize,
     /// Weights per turn.
     pub weights: usize,
-    /// Statements with the core's dot product instruction.
-    pub dsp: Vec<String>,
-    /// Statements in portable C.
-    pub portable: Vec<String>,
+    /// Statements.
+    pub lines: Vec<String>,
 }
 
 /// One output of a block.
@@ -361,6 +393,8 @@ pub struct Helpers {
     pub line_sum: bool,
     /// `relu`
     pub relu: bool,
+    /// `relu` from a sum and a product, for processors that have them
+    pub relu_by_sum: bool,
     /// `leaky_relu`
     pub leaky_relu: bool,
     /// `tanh`
@@ -369,6 +403,8 @@ pub struct Helpers {
     pub fused: bool,
     /// Loops in assembly
     pub assembly: bool,
+    /// Vectors of the compiler
+    pub vectors: bool,
 }
 
 /// Numbers of the self test.

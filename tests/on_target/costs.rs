@@ -1,7 +1,7 @@
 //! What a step costs: the count of executed instructions does not depend on the data, no library, little stack.
 
 use codegen::Language;
-use policy::Policy;
+use policy::{NumericFormat, Policy};
 use targets::{Fpu, Runner, TargetSpec};
 use verify::measure::{Costs, STEPS, measure};
 use verify::toolchain;
@@ -55,9 +55,9 @@ fn check_core(target: &TargetSpec, costs: &Costs) {
     assert!(costs.library_calls.iter().all(is_allowed), "{what}");
 }
 
-/// Target, compiler and largest spread where LLVM turns the masks of the rectifier back into a selection and has none
-/// without a branch: docs/targets.md says so.
-const BRANCHES: [(&str, &str, u64); 2] = [("dspace-ds1202", "rustc", 32), ("riscv32imfc", "clang", 64)];
+/// Target, compiler and largest spread where LLVM makes a number of a comparison by a jump over one instruction:
+/// docs/targets.md says so.
+const BRANCHES: [(&str, &str, u64); 1] = [("dspace-ds1202", "rustc", 16)];
 
 #[test]
 fn the_instruction_count_does_not_depend_on_the_data_where_floats_are_hardware() {
@@ -66,11 +66,11 @@ fn the_instruction_count_does_not_depend_on_the_data_where_floats_are_hardware()
             check_core(target, &costs);
             println!("{} {costs:?}", target.name);
             let spread = costs.instructions_max - costs.instructions_min;
-            let branches = BRANCHES
-                .iter()
-                .find(|(name, compiler, _)| *name == target.name && costs.build.starts_with(compiler));
-            let allowed = branches.map_or(0, |(_, _, largest)| *largest);
-            assert!(spread <= allowed, "{} {costs:?}", target.name);
+            assert!(
+                spread <= allowed_spread(target, &costs.build),
+                "{} {costs:?}",
+                target.name
+            );
         }
     }
 }
@@ -92,6 +92,33 @@ fn nor_does_that_of_random_policies() {
     }
 }
 
+/// Largest spread of a build of the target.
+fn allowed_spread(target: &TargetSpec, build: &str) -> u64 {
+    let exception = BRANCHES
+        .iter()
+        .find(|(name, compiler, _)| *name == target.name && build.starts_with(compiler));
+    exception.map_or(0, |(_, _, largest)| *largest)
+}
+
+/// The integer network takes one count everywhere; without FPU the few floats around it are library calls.
+#[test]
+fn nor_does_that_of_the_integer_formats() {
+    for format in [NumericFormat::I16, NumericFormat::I8] {
+        let policy = example().with_format(format);
+        for (target, around) in emulated(true).map(|t| (t, 0)).chain(emulated(false).map(|t| (t, 320))) {
+            let files = codegen::generate(&policy, target, &Language::ALL).unwrap().files;
+            let compilers: Vec<String> = super::compilers(target).into_iter().map(str::to_owned).collect();
+            for build in toolchain::builds(target, &compilers, &["-O2".to_owned(), "-O".to_owned()]) {
+                let costs = measure(&policy, target, &files, &build).unwrap();
+                println!("{} {} {costs:?}", target.name, format.name());
+                let spread = costs.instructions_max - costs.instructions_min;
+                let allowed = allowed_spread(target, &costs.build) + around;
+                assert!(spread <= allowed, "{} {} {costs:?}", target.name, format.name());
+            }
+        }
+    }
+}
+
 /// The float library's count does depend on the data; `docs/targets.md` states by how much.
 #[test]
 fn without_fpu_only_the_float_library_is_called_and_its_count_varies() {
@@ -109,12 +136,12 @@ fn without_fpu_only_the_float_library_is_called_and_its_count_varies() {
     }
 }
 
-/// Two hidden layers of 64 floats are 512 of them.
+/// One hidden layer of 64 floats is 256 of them; the other is never there as a whole.
 #[test]
-fn the_example_takes_less_than_832_bytes_of_stack_on_a_cortex_m4f() {
+fn the_example_takes_less_than_640_bytes_of_stack_on_a_cortex_m4f() {
     let target = targets::find("cortex-m4f").unwrap();
     for costs in costs(&example(), target) {
-        assert!(costs.stack_bytes > 512 && costs.stack_bytes < 832, "{costs:?}");
+        assert!(costs.stack_bytes > 256 && costs.stack_bytes < 640, "{costs:?}");
     }
 }
 
@@ -125,11 +152,11 @@ fn a_branch_a_static_variable_and_a_library_call_are_seen() {
     let target = targets::find("cortex-m4f").unwrap();
     let mut files = codegen::generate(&policy, target, &[Language::C]).unwrap().files;
     let text = files.get_mut("buck12.c").unwrap();
-    let honest = "return buck12_from_bits(bits & ~((uint32_t)0 - (bits >> 31)));";
+    let honest = "return (x + __builtin_fabsf(x)) * 0.5f;";
     assert!(text.contains(honest), "the place of the ReLU");
     *text = text.replace(
         honest,
-        "if (bits >> 31) { return 0.0f; } __asm__ volatile(\"nop\"); planted = (planted * 5u) + 1u; return x;",
+        "if (x < 0.0f) { return 0.0f; } __asm__ volatile(\"nop\"); planted = (planted * 5u) + 1u; return x;",
     );
     let place = text.find("BUCK12_TABLE static const float").unwrap();
     text.insert_str(place, "static uint32_t planted;\n");

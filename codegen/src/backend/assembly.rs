@@ -1,22 +1,57 @@
-//! Inner loops in ARM assembly (Armv7E-M), the same text for C and Rust.
+//! Inner loops in ARM assembly, the same text for C and Rust.
 
-/// The integer sums of one block: `LDM` for the weights, `SMLAD` for two products at a time.
+use crate::program::{ActivationCode, IntegerLayer};
+
+/// What a kernel leaves of a sum.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Store {
+    /// Shifted and rectified, 16 bits.
+    Rectified,
+    /// Shifted, 16 bits.
+    Half,
+    /// Shifted, 32 bits.
+    Word,
+}
+
+/// What the kernels of a layer store; `None` if they lack its activation.
+pub fn store(layer: &IntegerLayer, is_last: bool) -> Option<Store> {
+    match layer.activation {
+        ActivationCode::Relu => Some(Store::Rectified),
+        ActivationCode::Identity if is_last => Some(Store::Word),
+        ActivationCode::Identity => Some(Store::Half),
+        ActivationCode::LeakyRelu(_) | ActivationCode::Tanh => None,
+    }
+}
+
+/// The integer blocks of one height of a layer (Armv7E-M, Armv8-M with DSP): `LDM` for the weights, `SMLAD` for two
+/// products at a time, shift and rectifier in one `USAT`.
 ///
-/// Operands: sums `s0..`, pointers `w` and `input`, the counter `turns`, temporaries `x01` and, for 8-bit weights, `x23` and
-/// `even`; weights go through the fixed `registers`, which `LDM` needs in ascending order.
+/// The body of a naked function `(inputs, outputs, weights, biases)` of four pointers to words, which none of them may
+/// leave: it uses every register, so no compiler could place the loop among its own code.
 pub struct Kernel {
     /// 8-bit weights, four inputs a group, instead of 16-bit ones, two inputs a group.
     pub is_quad: bool,
     /// Groups of inputs.
     pub groups: usize,
-    /// Outputs, 1 to 4.
+    /// Blocks.
+    pub count: usize,
+    /// Outputs of a block, 1 to 4.
     pub height: usize,
-    /// Registers of the weights.
-    pub registers: [&'static str; 4],
+    /// Bits cut off a sum.
+    pub shift: u32,
+    /// What is stored.
+    pub store: Store,
 }
 
 /// Groups per turn of the loop at most.
 const UNROLL: usize = 8;
+const SUMS: [&str; 4] = ["r4", "r5", "r6", "r7"];
+const LOADED: [&str; 4] = ["r8", "r9", "r10", "r11"];
+const INPUT: &str = "r0";
+const OUTPUT: &str = "r1";
+const WEIGHTS: &str = "r2";
+const BIAS: &str = "r3";
+const COUNTER: &str = "lr";
 
 impl Kernel {
     /// Groups per turn: the largest divisor that is not too large.
@@ -24,57 +59,108 @@ impl Kernel {
         (1..=UNROLL).rev().find(|n| self.groups.is_multiple_of(*n)).unwrap_or(1)
     }
 
-    /// Turns of the loop.
-    pub fn turns(&self) -> usize {
+    fn turns(&self) -> usize {
         self.groups / self.unrolled()
     }
 
-    /// Weights that one `LDM` loads: two at a time leave registers for widening bytes.
-    fn loaded(&self) -> usize {
-        if self.is_quad { 2 } else { 4 }
-    }
-
-    /// Registers that are overwritten.
-    pub fn clobbered(&self) -> &[&'static str] {
-        &self.registers[..self.loaded().min(self.height)]
-    }
-
-    /// Lines, with `operand` giving the text of a named operand.
-    pub fn text(&self, operand: &dyn Fn(&str) -> String) -> Vec<String> {
-        let (w, input, turns) = (operand("w"), operand("input"), operand("turns"));
-        let (x01, x23, even) = (operand("x01"), operand("x23"), operand("even"));
-        let mut lines = vec!["2:".to_owned()];
+    /// Lines, with `list` giving the text of a register list. On the stack: the end of the outputs, then, where bytes are
+    /// widened in the registers of their pointers, outputs and biases.
+    pub fn text(&self, list: &dyn Fn(&str) -> String) -> Vec<String> {
+        let mut lines = vec![format!("push {}", list("r4-r11, lr"))];
+        let is_repeated = self.count > 1;
+        if is_repeated {
+            let bytes = if self.store == Store::Word { 4 } else { 2 };
+            lines.push(format!("movw {COUNTER}, #{}", bytes * self.count * self.height));
+            lines.push(format!("add {COUNTER}, {COUNTER}, {OUTPUT}"));
+        }
+        lines.push(format!("push {}", list(&format!("{OUTPUT}, {BIAS}, {COUNTER}"))));
+        if is_repeated {
+            lines.push("3:".to_owned());
+            lines.extend(self.kept(format!("ldr {BIAS}, [sp, #4]")));
+        }
+        lines.push(self.several("ldmia", "ldr", BIAS, &SUMS[..self.height], list));
+        lines.extend(self.kept(format!("str {BIAS}, [sp, #4]")));
+        if self.turns() > 1 {
+            lines.push(format!("mov {COUNTER}, #{}", self.turns()));
+            lines.push("2:".to_owned());
+        }
         for _ in 0..self.unrolled() {
-            lines.push(if self.is_quad {
-                format!("ldrd {x01}, {x23}, [{input}], #8")
-            } else {
-                format!("ldr {x01}, [{input}], #4")
-            });
-            let rows: Vec<usize> = (0..self.height).collect();
-            for rows in rows.chunks(self.loaded()) {
-                let registers = &self.registers[..rows.len()];
-                lines.push(match registers {
-                    [one] => format!("ldr {one}, [{w}], #4"),
-                    several => format!("ldmia {w}!, {{{}}}", several.join(", ")),
-                });
-                for (row, weight) in rows.iter().zip(registers) {
-                    let sum = operand(&format!("s{row}"));
-                    if self.is_quad {
-                        lines.push(format!("sxtb16 {even}, {weight}"));
-                        lines.push(format!("sxtb16 {weight}, {weight}, ror #8"));
-                        lines.push(format!("smlad {sum}, {even}, {x01}, {sum}"));
-                        lines.push(format!("smlad {sum}, {weight}, {x23}, {sum}"));
-                    } else {
-                        lines.push(format!("smlad {sum}, {weight}, {x01}, {sum}"));
-                    }
-                }
-            }
+            self.group(&mut lines, list);
         }
         if self.turns() > 1 {
-            lines.push(format!("subs {turns}, {turns}, #1"));
+            lines.push(format!("subs {COUNTER}, {COUNTER}, #1"));
             lines.push("bne 2b".to_owned());
         }
+        lines.extend(self.kept(format!("ldr {OUTPUT}, [sp]")));
+        self.stored(&mut lines, list);
+        if is_repeated {
+            lines.extend(self.kept(format!("str {OUTPUT}, [sp]")));
+            let bytes = self.groups * if self.is_quad { 8 } else { 4 };
+            lines.push(format!("subw {INPUT}, {INPUT}, #{bytes}"));
+            lines.push(format!("ldr {COUNTER}, [sp, #8]"));
+            lines.push(format!("cmp {OUTPUT}, {COUNTER}"));
+            lines.push("bne 3b".to_owned());
+        }
+        lines.push("add sp, sp, #12".to_owned());
+        lines.push(format!("pop {}", list("r4-r11, pc")));
         lines
+    }
+
+    /// A line that only bytes need.
+    fn kept(&self, line: String) -> Option<String> {
+        self.is_quad.then_some(line)
+    }
+
+    /// Moves several registers, or one.
+    fn several(&self, many: &str, one: &str, pointer: &str, names: &[&str], list: &dyn Fn(&str) -> String) -> String {
+        match names {
+            [name] => format!("{one} {name}, [{pointer}], #4"),
+            _ => format!("{many} {pointer}!, {}", list(&names.join(", "))),
+        }
+    }
+
+    /// One group of inputs.
+    fn group(&self, lines: &mut Vec<String>, list: &dyn Fn(&str) -> String) {
+        let loaded = &LOADED[..self.height];
+        let load = self.several("ldmia", "ldr", WEIGHTS, loaded, list);
+        let rows = || SUMS.iter().zip(loaded);
+        if !self.is_quad {
+            lines.extend([format!("ldr r12, [{INPUT}], #4"), load]);
+            lines.extend(rows().map(|(sum, weight)| format!("smlad {sum}, {weight}, r12, {sum}")));
+            return;
+        }
+        lines.extend([format!("ldrd {OUTPUT}, r12, [{INPUT}], #8"), load]);
+        for (sum, weight) in rows() {
+            lines.push(format!("sxtb16 {BIAS}, {weight}"));
+            lines.push(format!("sxtb16 {weight}, {weight}, ror #8"));
+            lines.push(format!("smlad {sum}, {BIAS}, {OUTPUT}, {sum}"));
+            lines.push(format!("smlad {sum}, {weight}, r12, {sum}"));
+        }
+    }
+
+    fn stored(&self, lines: &mut Vec<String>, list: &dyn Fn(&str) -> String) {
+        let sums = &SUMS[..self.height];
+        for sum in sums {
+            match (self.store, self.shift) {
+                (Store::Rectified, 0) => lines.push(format!("usat {sum}, #15, {sum}")),
+                (Store::Rectified, shift) => lines.push(format!("usat {sum}, #15, {sum}, asr #{shift}")),
+                (_, 0) => {}
+                (_, shift) => lines.push(format!("asr {sum}, {sum}, #{shift}")),
+            }
+        }
+        if self.store == Store::Word {
+            lines.push(self.several("stmia", "str", OUTPUT, sums, list));
+            return;
+        }
+        for pair in sums.chunks(2) {
+            match pair {
+                [low, high] => {
+                    lines.push(format!("pkhbt {low}, {low}, {high}, lsl #16"));
+                    lines.push(format!("str {low}, [{OUTPUT}], #4"));
+                }
+                _ => lines.extend(pair.iter().map(|one| format!("strh {one}, [{OUTPUT}], #2"))),
+            }
+        }
     }
 }
 

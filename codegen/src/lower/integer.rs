@@ -2,6 +2,7 @@
 
 use policy::scales::{self, LayerScale, Scales, power_of_two, round_half_up};
 use policy::{Layer, NumericFormat, Policy};
+use targets::IntegerBlock;
 
 use super::network::activation;
 use crate::program::{ActivationCode, IntegerInput, IntegerLayer, IntegerNetwork, Literal};
@@ -11,31 +12,33 @@ const PAIR: [usize; 2] = [0, 1];
 /// Four 8-bit weights of a word: the even bytes, then the odd ones, widen to two pairs (ARM `SXTB16`).
 const QUAD: [usize; 4] = [0, 2, 1, 3];
 
-/// Outputs accumulated side by side: six sums, a weight, two inputs and three pointers fill an ARM core's registers.
-const ROWS: usize = 4;
+/// Exponent field of binary32 of a number whose mantissa of 24 bits is an integer.
+const MANTISSA_FIELD: i32 = 150;
 
 /// Rounds weights and biases and orders them in the blocks in which the generated code reads them.
-pub fn lower(policy: &Policy, scales: &Scales) -> IntegerNetwork {
+pub fn lower(policy: &Policy, scales: &Scales, block: IntegerBlock) -> IntegerNetwork {
     let lanes: &[usize] = if policy.numeric_format == NumericFormat::I8 {
         &QUAD
     } else {
         &PAIR
     };
-    let shifted = |integer: i32| Literal::from(integer as f32 + 32_768.5);
     let input = |input: &scales::InputScale| IntegerInput {
-        factor: Literal::nearest(power_of_two(input.exponent)),
-        low: shifted(input.low),
-        high: shifted(input.high),
+        unshifted: MANTISSA_FIELD - input.exponent,
+        low: input.low,
+        high: input.high,
     };
+    let q_exponent = scales.layers.last().map_or(0, |layer| layer.output);
     let layers = policy.layers.iter().zip(&scales.layers);
     IntegerNetwork {
         weight_bytes: 4 / lanes.len(),
+        block,
         lanes: lanes.to_vec(),
         inputs: scales.inputs.iter().map(input).collect(),
         layers: layers
-            .map(|(layer, scale)| self::layer(layer, scale, lanes, ROWS.clamp(1, layer.outputs)))
+            .map(|(layer, scale)| self::layer(layer, scale, lanes, block.rows.clamp(1, layer.outputs)))
             .collect(),
-        q_unit: Literal::nearest(power_of_two(-scales.layers.last().map_or(0, |layer| layer.output))),
+        q_unit: Literal::nearest(power_of_two(-q_exponent)),
+        q_field: MANTISSA_FIELD + 1 - q_exponent,
         accumulator_bound: scales.accumulator_bound(),
     }
 }

@@ -4,6 +4,7 @@
 //! right is shown elsewhere, against the interpreter.
 
 use policy::Policy;
+use policy::scales::{power_of_two, round_half_up};
 
 use crate::crc::crc32_words;
 use crate::lower::network::{TANH_DENOMINATOR, TANH_NUMERATOR, TANH_RANGE};
@@ -51,15 +52,17 @@ pub fn lower(policy: &Policy, network: &NetworkCode) -> SelfTest {
 fn dense(layer: &LayerCode, x: &[f32], fused: bool) -> Vec<f32> {
     let mut y = layer.bias.clone();
     let mut table = layer.table.iter();
-    for block in y.chunks_mut(layer.block_rows) {
-        for input in x {
-            for accumulator in block.iter_mut() {
-                let weight = table.next().copied().unwrap_or_default();
-                *accumulator = if fused {
-                    weight.mul_add(*input, *accumulator)
-                } else {
-                    *accumulator + weight * input
-                };
+    for x in x.chunks(layer.chunk) {
+        for block in y.chunks_mut(layer.block_rows) {
+            for input in x {
+                for accumulator in block.iter_mut() {
+                    let weight = table.next().copied().unwrap_or_default();
+                    *accumulator = if fused {
+                        weight.mul_add(*input, *accumulator)
+                    } else {
+                        *accumulator + weight * input
+                    };
+                }
             }
         }
     }
@@ -74,8 +77,9 @@ fn integer_q(network: &IntegerNetwork, observation: &[f32]) -> Vec<f32> {
     let inputs = network.inputs.iter().zip(observation);
     let mut values: Vec<i32> = inputs
         .map(|(input, o)| {
-            let shifted = o * input.factor.value() + 32_768.5;
-            shifted.clamp(input.low.value(), input.high.value()) as i32 - 32_768
+            let exponent = 150 - input.unshifted;
+            let integer = round_half_up(f64::from(*o) * power_of_two(exponent)) as i32;
+            integer.clamp(input.low, input.high)
         })
         .collect();
     for layer in &network.layers {

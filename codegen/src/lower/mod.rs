@@ -9,7 +9,7 @@ pub mod network;
 pub use command::STATUS;
 use policy::Policy;
 use policy::rounding::{down_f32, nearest_f32, up_f32};
-use targets::TargetSpec;
+use targets::{Fpu, TargetSpec};
 
 use crate::crc::crc32_words;
 use crate::program::{Coefficient, Literal, MappingCode, Program, Provenance, SignalPort};
@@ -18,12 +18,17 @@ use crate::{Language, TOOL};
 /// Lowers a policy for a target; the row block of the layers is the target's for that language.
 #[must_use]
 pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Program {
+    let mut integer_block = target.integer_block;
     let row_block = match language {
         Language::C => target.c_row_block,
-        Language::Rust => target.rust_row_block,
+        Language::Rust => {
+            // LLVM unrolls the loops over a block and runs out of registers with more
+            integer_block.rows = integer_block.rows.min(4);
+            target.rust_row_block
+        }
     };
     let (front, memory_words) = front::lower(policy);
-    let network = network::lower(policy, row_block);
+    let network = network::lower(policy, row_block, integer_block);
     let duties: Vec<_> = policy
         .actions
         .iter()
@@ -33,6 +38,7 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
         name: policy.name.clone(),
         sample_period: policy.sample_period,
         numeric_format: policy.numeric_format,
+        has_fpu: target.fpu != Fpu::None,
         provenance: Provenance {
             tool: TOOL.to_owned(),
             digests: policy.digests.clone(),

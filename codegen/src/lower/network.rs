@@ -1,7 +1,7 @@
 //! Contract section 6: layers with their tables in reading order.
 
 use policy::{Activation, Layer, NumericFormat, Policy};
-use targets::RowBlock;
+use targets::{IntegerBlock, RowBlock};
 
 use super::integer;
 use crate::program::{ActivationCode, LayerCode, Literal, NetworkCode};
@@ -20,27 +20,48 @@ pub const TANH_DENOMINATOR: [f32; 5] = [1.0, 0.467_065_04, 0.025_842_024, 0.000_
 pub const TANH_RANGE: f32 = 9.0;
 
 /// The network in the policy's numeric format.
-pub fn lower(policy: &Policy, row_block: RowBlock) -> NetworkCode {
+pub fn lower(policy: &Policy, row_block: RowBlock, integer_block: IntegerBlock) -> NetworkCode {
     match policy::scales::of(policy) {
-        Some(scales) => NetworkCode::Integer(integer::lower(policy, &scales)),
+        Some(scales) => NetworkCode::Integer(integer::lower(policy, &scales, integer_block)),
         None => NetworkCode::Real {
             fused: policy.numeric_format == NumericFormat::F32Fma,
-            layers: policy.layers.iter().map(|layer| real(layer, row_block)).collect(),
+            layers: layers(policy, row_block),
         },
     }
 }
 
+/// The last layer takes the outputs of the one before block by block where blocks are variables: half of the stack.
+fn layers(policy: &Policy, row_block: RowBlock) -> Vec<LayerCode> {
+    let row_block = match (row_block, policy.numeric_format) {
+        // the fused operation is a function of scalars
+        (RowBlock::Vectors(_), NumericFormat::F32Fma) => RowBlock::All,
+        _ => row_block,
+    };
+    let last = policy.layers.len().saturating_sub(1);
+    let chunk = |index: usize, layer: &Layer| match row_block {
+        RowBlock::Rows(rows) if index == last && index > 0 => rows.clamp(1, layer.inputs),
+        _ => layer.inputs,
+    };
+    let layers = policy.layers.iter().enumerate();
+    layers
+        .map(|(index, layer)| real(layer, row_block, chunk(index, layer)))
+        .collect()
+}
+
 /// Orders the weights in the blocks in which the generated code reads them.
-fn real(layer: &Layer, row_block: RowBlock) -> LayerCode {
+fn real(layer: &Layer, row_block: RowBlock, chunk: usize) -> LayerCode {
     let block_rows = match row_block {
         RowBlock::All => layer.outputs,
-        RowBlock::Rows(rows) => rows.clamp(1, layer.outputs),
+        RowBlock::Rows(rows) | RowBlock::Vectors(rows) => rows.clamp(1, layer.outputs),
     };
     let mut table = Vec::with_capacity(layer.weights.len());
-    for first in (0..layer.outputs).step_by(block_rows) {
-        let last = (first + block_rows).min(layer.outputs);
-        for input in 0..layer.inputs {
-            table.extend((first..last).map(|output| layer.weights[output * layer.inputs + input]));
+    let inputs: Vec<usize> = (0..layer.inputs).collect();
+    for inputs in inputs.chunks(chunk) {
+        for first in (0..layer.outputs).step_by(block_rows) {
+            let last = (first + block_rows).min(layer.outputs);
+            for input in inputs {
+                table.extend((first..last).map(|output| layer.weights[output * layer.inputs + input]));
+            }
         }
     }
     LayerCode {
@@ -48,7 +69,9 @@ fn real(layer: &Layer, row_block: RowBlock) -> LayerCode {
         inputs: layer.inputs,
         outputs: layer.outputs,
         block_rows,
-        in_memory: row_block == RowBlock::All,
+        chunk,
+        in_memory: !matches!(row_block, RowBlock::Rows(_)),
+        has_vectors: matches!(row_block, RowBlock::Vectors(_)),
         table,
         bias: layer.bias.clone(),
         activation: activation(layer),

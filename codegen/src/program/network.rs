@@ -1,5 +1,7 @@
 //! The network of a lowered controller, in its numeric format.
 
+use targets::IntegerBlock;
+
 use super::Literal;
 
 /// Activation with its literals.
@@ -28,7 +30,13 @@ pub struct LayerCode {
     pub block_rows: usize,
     /// Whether the accumulators are the output buffer (axpy form), not registers.
     pub in_memory: bool,
-    /// Weights: blocks of `block_rows` outputs (the last may be shorter), within a block by input, then by output.
+    /// Whether vectors of the compiler are taken where it has them; else what `in_memory` says.
+    pub has_vectors: bool,
+    /// Inputs taken at a time: all, or the block of outputs that the layer before has just made. Then the sums stand in the
+    /// output buffer in between.
+    pub chunk: usize,
+    /// Weights: chunks of inputs (the last may be shorter), within a chunk blocks of `block_rows` outputs (the last may be
+    /// shorter), within a block by input, then by output.
     pub table: Vec<f32>,
     /// `[outputs]`.
     pub bias: Vec<f32>,
@@ -37,6 +45,12 @@ pub struct LayerCode {
 }
 
 impl LayerCode {
+    /// Whether the layer takes the outputs of the one before block by block, so that those are never there all at once.
+    #[must_use]
+    pub fn is_streamed(&self) -> bool {
+        self.chunk < self.inputs
+    }
+
     /// Number of full blocks.
     #[must_use]
     pub fn full_blocks(&self) -> usize {
@@ -121,15 +135,15 @@ impl NetworkCode {
     }
 }
 
-/// How an observation becomes an integer: scaled, shifted to the positive numbers, clamped by its bits, truncated.
+/// How an observation becomes an integer: its mantissa shifted and rounded, then clamped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct IntegerInput {
-    /// Power of two.
-    pub factor: Literal,
-    /// Lower end of the clamp, shifted.
-    pub low: Literal,
-    /// Upper end of the clamp, shifted.
-    pub high: Literal,
+    /// Exponent field of the binary32 number whose mantissa, as an integer, needs no shift.
+    pub unshifted: i32,
+    /// Lower end of the clamp.
+    pub low: i32,
+    /// Upper end of the clamp.
+    pub high: i32,
 }
 
 /// Dense layer in integers. Every partial sum fits in 32 bits, in any order.
@@ -163,6 +177,8 @@ pub struct IntegerLayer {
 pub struct IntegerNetwork {
     /// Bytes of a weight in the tables: 2 or 1.
     pub weight_bytes: usize,
+    /// Blocks and inner loop that suit the target.
+    pub block: IntegerBlock,
     /// Inputs of a group in the order of the table: a group is one 32-bit word.
     pub lanes: Vec<usize>,
     /// Per feature.
@@ -171,6 +187,8 @@ pub struct IntegerNetwork {
     pub layers: Vec<IntegerLayer>,
     /// Power of two that makes an output of the network a Q value.
     pub q_unit: Literal,
+    /// Exponent field of an output with 25 significant bits as a Q value.
+    pub q_field: i32,
     /// Largest magnitude of any partial sum.
     pub accumulator_bound: i64,
 }

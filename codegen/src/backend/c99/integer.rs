@@ -2,9 +2,11 @@
 
 use templates::c::{IntegerBlockView, IntegerLayerView, IntegerPartView, IntegerView, RowView, Table};
 
-use super::statements::{float, unsigned};
+use targets::IntegerLoop;
+
+use super::statements::float;
 use super::tables::wrap;
-use crate::backend::assembly::Kernel;
+use crate::backend::assembly::{self, Kernel};
 use crate::program::{ActivationCode, IntegerLayer, IntegerNetwork};
 
 /// C type of a weight.
@@ -35,17 +37,15 @@ pub fn tables(network: &IntegerNetwork) -> Vec<Table> {
 }
 
 /// The network of a controller whose functions start with `prefix`.
-pub fn view(prefix: &str, network: &IntegerNetwork) -> IntegerView {
+pub fn view(prefix: &str, network: &IntegerNetwork, has_fpu: bool) -> IntegerView {
     let lanes = network.lanes.len();
     let inputs = network.inputs.len();
     let padded = network.padded(inputs);
     let mut quantise: Vec<String> = Vec::new();
     for (i, input) in network.inputs.iter().enumerate() {
         quantise.push(format!(
-            "input[{i}] = {prefix}_integer((observation[{i}] * {}) + 32768.5f, {}, {});",
-            float(input.factor.value()),
-            unsigned(input.low.0),
-            unsigned(input.high.0)
+            "input[{i}] = {prefix}_integer(observation[{i}], {}, {}, {});",
+            input.unshifted, input.low, input.high
         ));
     }
     quantise.extend((inputs..padded).map(|i| format!("input[{i}] = 0;")));
@@ -57,11 +57,33 @@ pub fn view(prefix: &str, network: &IntegerNetwork) -> IntegerView {
         input_length: padded,
         quantise,
         q_unit: float(network.q_unit.value()),
+        q_field: network.q_field,
+        has_fpu,
+        special: special(network),
+        has_assembly: is_in_assembly(network),
         layers: layers(prefix, network),
         relu: has(|activation| *activation == ActivationCode::Relu),
         leaky_relu: has(|activation| matches!(activation, ActivationCode::LeakyRelu(_))),
         tanh: has(|activation| *activation == ActivationCode::Tanh),
     }
+}
+
+/// Macro of the inner loop that suits the target.
+fn special(network: &IntegerNetwork) -> &'static str {
+    match network.block.inner {
+        IntegerLoop::Dual => "DSP",
+        IntegerLoop::Halves if network.weight_bytes == 2 => "HALVES",
+        IntegerLoop::Halves | IntegerLoop::Plain => "",
+    }
+}
+
+/// Whether any layer is there in assembly, too.
+pub fn is_in_assembly(network: &IntegerNetwork) -> bool {
+    network.layers.iter().any(|layer| has_assembly(network, layer))
+}
+
+fn has_assembly(network: &IntegerNetwork, layer: &IntegerLayer) -> bool {
+    network.block.inner == IntegerLoop::Dual && assembly::store(layer, false).is_some()
 }
 
 fn layers(prefix: &str, network: &IntegerNetwork) -> Vec<IntegerLayerView> {
@@ -80,8 +102,12 @@ fn layers(prefix: &str, network: &IntegerNetwork) -> Vec<IntegerLayerView> {
             index,
             comment: format!("{}: {} -> {}", layer.name, layer.inputs, layer.outputs),
             shift: layer.shift,
+            has_assembly: has_assembly(network, layer),
             has_loop: blocks.iter().any(|block| block.count > 1),
-            has_turns: blocks.iter().flat_map(|block| &block.parts).any(|part| part.turns > 1),
+            has_turns: blocks
+                .iter()
+                .flat_map(|block| block.special.iter().chain(&block.portable))
+                .any(|part| part.turns > 1),
             blocks,
             source: if index == 0 {
                 "input".to_owned()
@@ -99,11 +125,20 @@ fn layers(prefix: &str, network: &IntegerNetwork) -> Vec<IntegerLayerView> {
 }
 
 fn blocks(prefix: &str, network: &IntegerNetwork, layer: &IntegerLayer, is_last: bool) -> Vec<IntegerBlockView> {
-    let block = |count: usize, height: usize| IntegerBlockView {
+    let weights = network.padded(layer.inputs);
+    let block = |count: usize, height: usize, first: usize| IntegerBlockView {
         count,
         height,
-        assembly: assembly(network, layer, height),
-        parts: parts(prefix, network, layer, height),
+        first: (first, first * weights),
+        assembly: assembly(network, layer, count, height, is_last),
+        special: match special(network) {
+            "" => Vec::new(),
+            macro_name => parts(network, layer, height, &|group| match macro_name {
+                "DSP" => dsp(prefix, network, group, height),
+                _ => halves(prefix, group, height),
+            }),
+        },
+        portable: parts(network, layer, height, &|group| portable(network, group, height)),
         rows: (0..height)
             .map(|index| RowView {
                 index,
@@ -112,34 +147,34 @@ fn blocks(prefix: &str, network: &IntegerNetwork, layer: &IntegerLayer, is_last:
             .collect(),
     };
     let (full, tail) = (layer.outputs / layer.block_rows, layer.outputs % layer.block_rows);
-    let mut views = vec![block(full, layer.block_rows)];
+    let mut views = vec![block(full, layer.block_rows, 0)];
     if tail > 0 {
-        views.push(block(1, tail));
+        views.push(block(1, tail, full * layer.block_rows));
     }
     views
 }
 
-/// Groups taken in one turn of the loop, so that its own instructions weigh less.
-const UNROLL: usize = 4;
-
-fn parts(prefix: &str, network: &IntegerNetwork, layer: &IntegerLayer, height: usize) -> Vec<IntegerPartView> {
+fn parts(
+    network: &IntegerNetwork,
+    layer: &IntegerLayer,
+    height: usize,
+    lines: &dyn Fn(usize) -> Vec<String>,
+) -> Vec<IntegerPartView> {
     let lanes = network.lanes.len();
+    let unrolled = network.block.unrolled;
     let groups = network.groups(layer.inputs);
     let part = |turns: usize, groups: usize| IntegerPartView {
         turns,
         inputs: groups * lanes,
         weights: groups * lanes * height,
-        dsp: (0..groups)
-            .flat_map(|group| dsp(prefix, network, group, height))
-            .collect(),
-        portable: (0..groups).flat_map(|group| portable(network, group, height)).collect(),
+        lines: (0..groups).flat_map(lines).collect(),
     };
     let mut parts = Vec::new();
-    if groups >= UNROLL {
-        parts.push(part(groups / UNROLL, UNROLL));
+    if groups >= unrolled {
+        parts.push(part(groups / unrolled, unrolled));
     }
-    if !groups.is_multiple_of(UNROLL) {
-        parts.push(part(1, groups % UNROLL));
+    if !groups.is_multiple_of(unrolled) {
+        parts.push(part(1, groups % unrolled));
     }
     parts
 }
@@ -170,42 +205,35 @@ fn dsp(prefix: &str, network: &IntegerNetwork, group: usize, height: usize) -> V
     braced(loads.chain(sums))
 }
 
-/// One asm statement over all groups of a block of up to four rows.
-fn assembly(network: &IntegerNetwork, layer: &IntegerLayer, height: usize) -> Vec<String> {
-    let operand = |name: &str| format!("%[{name}]");
+fn halves(prefix: &str, group: usize, height: usize) -> Vec<String> {
+    let at = 2 * group;
+    let loads = [
+        format!("const int32_t x01 = {prefix}_word_at(&in[{at}]);"),
+        "const int32_t x0 = (int16_t)x01;".to_owned(),
+        "const int32_t x1 = x01 >> 16;".to_owned(),
+    ];
+    let sums = (0..height).map(|row| {
+        let at = 2 * (group * height + row);
+        format!("s{row} = {prefix}_halves({prefix}_word_at(&w[{at}]), x0, x1, s{row});")
+    });
+    braced(loads.into_iter().chain(sums))
+}
+
+/// Literals of the body of a function over all blocks of a height; empty where there is none.
+fn assembly(network: &IntegerNetwork, layer: &IntegerLayer, count: usize, height: usize, is_last: bool) -> Vec<String> {
+    let Some(store) = assembly::store(layer, is_last).filter(|_| has_assembly(network, layer)) else {
+        return Vec::new();
+    };
     let kernel = Kernel {
         is_quad: network.weight_bytes == 1,
         groups: network.groups(layer.inputs),
+        count,
         height,
-        registers: ["r4", "r5", "r6", "r8"],
+        shift: layer.shift,
+        store,
     };
-    let mut lines = vec![
-        format!("uint32_t turns = {}u;", kernel.turns()),
-        "int32_t x01;".to_owned(),
-    ];
-    if kernel.is_quad {
-        lines.extend(["int32_t x23;".to_owned(), "int32_t even;".to_owned()]);
-    }
-    lines.push("__asm__ volatile(".to_owned());
-    let text = kernel.text(&operand);
-    lines.extend(text.iter().map(|line| format!("    \"{line}\\n\\t\"")));
-    let mut outputs: Vec<String> = (0..height).map(|row| format!("[s{row}] \"+r\"(s{row})")).collect();
-    let pointers = [("w", "w"), ("input", "in"), ("turns", "turns")];
-    outputs.extend(pointers.map(|(name, variable)| format!("[{name}] \"+r\"({variable})")));
-    let temporaries: &[&str] = if kernel.is_quad {
-        &["x01", "x23", "even"]
-    } else {
-        &["x01"]
-    };
-    outputs.extend(temporaries.iter().map(|name| format!("[{name}] \"=&r\"({name})")));
-    lines.push(format!("    : {}", outputs.join(", ")));
-    let clobbered: Vec<String> = kernel.clobbered().iter().map(|name| format!("\"{name}\"")).collect();
-    lines.push("    :".to_owned());
-    lines.push(format!("    : {}, \"cc\", \"memory\");", clobbered.join(", ")));
-    std::iter::once("{".to_owned())
-        .chain(lines.into_iter().map(|line| format!("    {line}")))
-        .chain(["}".to_owned()])
-        .collect()
+    let text = kernel.text(&|registers| format!("{{{registers}}}"));
+    text.iter().map(|line| format!("\"{line}\\n\\t\"")).collect()
 }
 
 fn portable(network: &IntegerNetwork, group: usize, height: usize) -> Vec<String> {

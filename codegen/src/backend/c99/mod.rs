@@ -1,6 +1,7 @@
 //! C99 that also compiles as C90 with `stdint.h` and as C++: one header, one source.
 
 mod integer;
+mod real;
 pub(super) mod statements;
 pub(super) mod tables;
 
@@ -205,8 +206,8 @@ fn source(program: &Program) -> Source {
 
 fn network(program: &Program) -> NetworkView {
     match &program.network {
-        NetworkCode::Real { fused, layers } => NetworkView::Real(tables::layers(&program.name, layers, *fused)),
-        NetworkCode::Integer(network) => NetworkView::Integer(integer::view(&program.name, network)),
+        NetworkCode::Real { fused, layers } => NetworkView::Real(real::view(&program.name, layers, *fused)),
+        NetworkCode::Integer(network) => NetworkView::Integer(integer::view(&program.name, network, program.has_fpu)),
     }
 }
 
@@ -369,10 +370,15 @@ fn helpers(program: &Program) -> Helpers {
         clamp: ops().any(|op| matches!(op, Op::Clamp { .. })),
         line_sum: ops().any(|op| matches!(op, Op::LineSum { .. })),
         relu: real && network.activates(|activation| activation == ActivationCode::Relu),
+        relu_by_sum: program.has_fpu,
         leaky_relu: real && network.activates(|activation| matches!(activation, ActivationCode::LeakyRelu(_))),
         tanh: network.activates(|activation| activation == ActivationCode::Tanh),
         assembly: match network {
-            NetworkCode::Real { fused, layers } => layers.iter().any(|layer| tables::has_assembly(layer, *fused)),
+            NetworkCode::Real { fused, layers } => layers.iter().any(|layer| real::has_assembly(layer, *fused)),
+            NetworkCode::Integer(network) => integer::is_in_assembly(network),
+        },
+        vectors: match network {
+            NetworkCode::Real { layers, .. } => layers.iter().any(|layer| layer.has_vectors),
             NetworkCode::Integer(_) => false,
         },
         fused: matches!(network, NetworkCode::Real { fused: true, .. }),

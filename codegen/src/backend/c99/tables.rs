@@ -1,14 +1,13 @@
 //! Tables, layers and the data of the checks.
 
-use templates::c::{BlockView, CrcItem, CrcKind, LayerView, Member, RealRowView, SelfTestView, Table};
+use templates::c::{CrcItem, CrcKind, Member, SelfTestView, Table};
 
 use super::integer;
 use super::statements::{float, unsigned};
-use crate::backend::assembly::RealKernel;
 use crate::crc::nibble_table;
 use crate::lower::known_answers::{LCG, SEED, UNIT, VECTORS};
 use crate::lower::network::{TANH_DENOMINATOR, TANH_NUMERATOR};
-use crate::program::{ActivationCode, LayerCode, Literal, NetworkCode, Program};
+use crate::program::{LayerCode, Literal, NetworkCode, Program};
 
 /// Columns up to which literals of a table are gathered in a line.
 const LINE: usize = 108;
@@ -82,136 +81,6 @@ pub(super) fn wrap(literals: impl Iterator<Item = String>) -> Vec<String> {
         }
     }
     lines
-}
-
-/// Layers with their loops and buffers.
-pub fn layers(name: &str, layers: &[LayerCode], fused: bool) -> Vec<LayerView> {
-    let last = layers.len() - 1;
-    let buffer = |index: usize| {
-        if index == last {
-            "q".to_owned()
-        } else {
-            format!("hidden{index}")
-        }
-    };
-    let view = |(index, layer): (usize, &LayerCode)| LayerView {
-        index,
-        comment: format!("{}: {} -> {}", layer.name, layer.inputs, layer.outputs),
-        inputs: layer.inputs,
-        outputs: layer.outputs,
-        in_memory: layer.in_memory,
-        has_loop: layer.full_blocks() > 1,
-        has_assembly: has_assembly(layer, fused),
-        blocks: blocks(name, layer, fused),
-        first: accumulated(name, fused, ["bias[o]", "w[o]", "x[0]"]),
-        next: accumulated(name, fused, ["sum[o]", "column[o]", "input"]),
-        activation: activation(name, layer.activation, "y[o]"),
-        source: if index == 0 {
-            "observation".to_owned()
-        } else {
-            buffer(index - 1)
-        },
-        sink: buffer(index),
-        is_hidden: index != last,
-    };
-    layers.iter().enumerate().map(view).collect()
-}
-
-fn accumulated(prefix: &str, fused: bool, [sum, weight, input]: [&str; 3]) -> String {
-    if fused {
-        format!("{prefix}_fma({weight}, {input}, {sum})")
-    } else {
-        format!("{sum} + ({weight} * {input})")
-    }
-}
-
-fn blocks(name: &str, layer: &LayerCode, fused: bool) -> Vec<BlockView> {
-    let full = layer.full_blocks();
-    let rows = layer.block_rows;
-    let block = |count, rows, first_output| BlockView {
-        count,
-        rows,
-        first_output,
-        first_weight: first_output * layer.inputs,
-        assembly: if has_assembly(layer, fused) {
-            assembly(name, layer, rows)
-        } else {
-            Vec::new()
-        },
-        row_views: (0..rows).map(|index| row(name, layer, index, fused)).collect(),
-    };
-    let tail = layer.tail_rows();
-    let mut views = vec![block(full, rows, 0)];
-    if tail > 0 {
-        views.push(block(1, tail, full * rows));
-    }
-    views
-}
-
-/// Whether the blocks of a layer have a form in assembly.
-pub fn has_assembly(layer: &LayerCode, fused: bool) -> bool {
-    !fused && !layer.in_memory && layer.block_rows <= RealKernel::MAX_HEIGHT
-}
-
-/// One asm statement for a block, then what it leaves of the activation.
-fn assembly(name: &str, layer: &LayerCode, height: usize) -> Vec<String> {
-    let kernel = RealKernel {
-        inputs: layer.inputs,
-        height,
-        relu: layer.activation == ActivationCode::Relu,
-    };
-    let activated = |row: usize| activation(name, layer.activation, &format!("done[{row}]"));
-    let applied = !kernel.relu && !activated(0).is_empty();
-    let mut lines = vec![
-        "const float *input = x;".to_owned(),
-        format!("uint32_t turns = {}u;", kernel.turns()),
-    ];
-    if kernel.relu {
-        lines.push("uint32_t low, high;".to_owned());
-    }
-    if applied {
-        lines.push("float *const done = out;".to_owned());
-    }
-    lines.push("__asm__ volatile(".to_owned());
-    let text = kernel.text(&|operand| format!("%[{operand}]"), &|list| format!("{{{list}}}"));
-    lines.extend(text.iter().map(|line| format!("    \"{line}\\n\\t\"")));
-    let advanced = ["w", "input", "bias", "out", "turns"].map(|name| format!("[{name}] \"+r\"({name})"));
-    let mut outputs = advanced.to_vec();
-    if kernel.relu {
-        outputs.extend(["low", "high"].map(|name| format!("[{name}] \"=&r\"({name})")));
-    }
-    lines.push(format!("    : {}", outputs.join(", ")));
-    lines.push("    :".to_owned());
-    let clobbered = RealKernel::clobbered().into_iter().map(|name| format!("\"{name}\""));
-    let clobbered: Vec<String> = clobbered.collect();
-    lines.push(format!("    : {}, \"cc\", \"memory\");", clobbered.join(", ")));
-    if applied {
-        lines.extend((0..height).map(|row| format!("done[{row}] = {};", activated(row))));
-    }
-    std::iter::once("{".to_owned())
-        .chain(lines.into_iter().map(|line| format!("    {line}")))
-        .chain(["}".to_owned()])
-        .collect()
-}
-
-fn row(name: &str, layer: &LayerCode, index: usize, fused: bool) -> RealRowView {
-    let sum = format!("s{index}");
-    let activated = activation(name, layer.activation, &sum);
-    RealRowView {
-        index,
-        next: accumulated(name, fused, [sum.as_str(), &format!("w[{index}]"), "input"]),
-        result: if activated.is_empty() { sum } else { activated },
-    }
-}
-
-/// Expression of the activation over `x`; empty for none.
-fn activation(name: &str, activation: ActivationCode, x: &str) -> String {
-    match activation {
-        ActivationCode::Identity => String::new(),
-        ActivationCode::Relu => format!("{name}_relu({x})"),
-        ActivationCode::LeakyRelu(slope) => format!("{name}_leaky_relu({x}, {})", float(slope.value())),
-        ActivationCode::Tanh => format!("{name}_tanh({x})"),
-    }
 }
 
 /// Horner steps of numerator and denominator, each one rounding per operation.

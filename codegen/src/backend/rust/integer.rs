@@ -2,14 +2,14 @@
 
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
+use targets::IntegerLoop;
 
-use super::network::calls;
 use super::{float, ident, size, word};
-use crate::backend::assembly::Kernel;
+use crate::backend::assembly::{self, Kernel};
 use crate::program::{ActivationCode, IntegerLayer, IntegerNetwork};
 
 /// Tables, layers and `network`.
-pub fn items(network: &IntegerNetwork) -> TokenStream {
+pub fn items(network: &IntegerNetwork, has_fpu: bool) -> TokenStream {
     let weight = weight(network);
     let lanes = size(network.lanes.len());
     let layers = network
@@ -26,31 +26,35 @@ pub fn items(network: &IntegerNetwork) -> TokenStream {
     let padded = network.padded(inputs);
     let quantised = (0..padded).map(|i| match network.inputs.get(i) {
         Some(input) => {
-            let (i, factor) = (size(i), float(input.factor.value()));
-            let (low, high) = (word(input.low.0), word(input.high.0));
-            quote!(integer(observation[#i] * #factor + 32_768.5, #low, #high))
+            let i = size(i);
+            let [unshifted, low, high] = [input.unshifted, input.low, input.high].map(|value| signed(i64::from(value)));
+            quote!(integer(observation[#i], #unshifted, #low, #high))
         }
         None => quote!(0),
     });
-    let calls = calls(network.layers.len(), quote!(&input));
-    let kernels = kernels(network);
+    let (buffers, calls) = calls(network);
+    let extremes = extremes(network);
+    let q_value = (!has_fpu).then(|| q_value(network));
     let padded = size(padded);
     let doc = format!(
         " Sums of one block of outputs, within +-{} for every input.",
         network.accumulator_bound
     );
     quote! {
-        /// Shifted to the positive numbers, clamped by its bits (a positive float's bits ascend with it), truncated.
+        #extremes
+        /// x in the units of an input, rounded half up, from low to high. The mantissa is shifted by what x's exponent is
+        /// below the one that needs no shift; a shift below 8 is beyond 16 bits, one above 30 leaves nothing.
         #[inline(always)]
-        fn integer(shifted: f32, low: u32, high: u32) -> i16 {
-            let bits = shifted.to_bits();
-            let positive = bits & (bits >> 31).wrapping_sub(1);
-            let over = positive.wrapping_sub(low);
-            let raised = low.wrapping_add(over & (over >> 31).wrapping_sub(1));
-            let under = high.wrapping_sub(raised);
-            let clamped = high.wrapping_sub(under & (under >> 31).wrapping_sub(1));
-            ((f32::from_bits(clamped) as i32).wrapping_sub(32_768)) as i16
+        fn integer(x: f32, unshifted: i32, low: i32, high: i32) -> i16 {
+            let bits = x.to_bits();
+            let sign = (bits as i32) >> 31;
+            let mantissa = ((bits & 0x007F_FFFF) | 0x0080_0000) as i32;
+            let shift = least(most(unshifted.wrapping_sub(((bits >> 23) & 255) as i32), 8), 30);
+            let half = 1_i32.wrapping_shl((shift as u32).wrapping_sub(1));
+            let rounded = (mantissa ^ sign).wrapping_sub(sign).wrapping_add(half).wrapping_shr(shift as u32);
+            least(most(rounded, low), high) as i16
         }
+        #q_value
         #[inline(always)]
         #[allow(dead_code)]
         fn positive(x: i32) -> i16 {
@@ -88,19 +92,92 @@ pub fn items(network: &IntegerNetwork) -> TokenStream {
             }
             sums
         }
-        #kernels
         #(#layers)*
         /// Outputs as integers.
         fn network(observation: &[f32; FEATURES]) -> [i32; ACTIONS] {
             let input: Words<[i16; #padded]> = Words([#(#quantised),*]);
-            let output = { #calls };
-            output.0
+            #buffers
+            #calls
+        }
+    }
+}
+
+/// The larger and the smaller of two numbers: a selection where the cores have one, else by masks.
+fn extremes(network: &IntegerNetwork) -> TokenStream {
+    let (most, least) = if network.block.inner == IntegerLoop::Dual {
+        (quote!(x.max(y)), quote!(x.min(y)))
+    } else {
+        (
+            quote!(x.wrapping_sub(x.wrapping_sub(y) & core::hint::black_box(x.wrapping_sub(y) >> 31))),
+            quote!(x.wrapping_add(y.wrapping_sub(x) & core::hint::black_box(y.wrapping_sub(x) >> 31))),
+        )
+    };
+    quote! {
+        /// The larger of two numbers whose difference fits.
+        #[inline(always)]
+        fn most(x: i32, y: i32) -> i32 {
+            #most
+        }
+        /// The smaller of two numbers whose difference fits.
+        #[inline(always)]
+        fn least(x: i32, y: i32) -> i32 {
+            #least
+        }
+    }
+}
+
+/// Output buffers of all layers, and the calls that fill them.
+fn calls(network: &IntegerNetwork) -> (TokenStream, TokenStream) {
+    let mut buffers = Vec::new();
+    let mut calls = Vec::new();
+    let mut source = ident("input");
+    for (index, layer) in network.layers.iter().enumerate() {
+        let (kind, length) = sink(network, index, layer);
+        let (sink, function) = (ident(&format!("hidden{index}")), ident(&format!("layer{index}")));
+        buffers.push(quote! { let mut #sink: Words<[#kind; #length]> = Words([0; #length]); });
+        calls.push(quote! { #function(&#source, &mut #sink); });
+        source = sink;
+    }
+    (quote!(#(#buffers)*), quote!(#(#calls)* #source.0))
+}
+
+/// Type and length of a layer's output.
+fn sink(network: &IntegerNetwork, index: usize, layer: &IntegerLayer) -> (TokenStream, Literal) {
+    if index + 1 == network.layers.len() {
+        (quote!(i32), size(layer.outputs))
+    } else {
+        (quote!(i16), size(network.padded(layer.outputs)))
+    }
+}
+
+/// An output as Q value by its bits: a library of floats would take longer for one than for another.
+fn q_value(network: &IntegerNetwork) -> TokenStream {
+    let field = signed(i64::from(network.q_field));
+    quote! {
+        /// An output as Q value, its bits put together: a library of floats would take longer for one than for another.
+        #[inline(always)]
+        fn q_value(output: i32) -> f32 {
+            let sign = output >> 31;
+            let mut mantissa = (output ^ sign).wrapping_sub(sign) as u32;
+            let mut exponent = #field as u32;
+            let mut step = 16_u32;
+            while step != 0 {
+                let small = flag(mantissa.wrapping_sub(1_u32.wrapping_shl(25_u32.wrapping_sub(step))) as i32 & i32::MIN != 0);
+                mantissa = mantissa.wrapping_shl(small.wrapping_mul(step));
+                exponent = exponent.wrapping_sub(small.wrapping_mul(step));
+                step >>= 1;
+            }
+            let bits = ((sign as u32) << 31) | (exponent << 23) | ((mantissa >> 1) & 0x007F_FFFF);
+            f32::from_bits(bits & 0_u32.wrapping_sub(mantissa >> 24))
         }
     }
 }
 
 /// Body of `q_values`.
-pub fn q_values(network: &IntegerNetwork) -> TokenStream {
+pub fn q_values(network: &IntegerNetwork, has_fpu: bool) -> TokenStream {
+    if !has_fpu {
+        return quote!(network(observation).map(q_value));
+    }
     let unit = float(network.q_unit.value());
     quote!(network(observation).map(|q| q as f32 * #unit))
 }
@@ -158,6 +235,8 @@ fn layer_items(network: &IntegerNetwork, index: usize, layer: &IntegerLayer) -> 
     });
     let mut tables = Vec::new();
     let mut loops = Vec::new();
+    let mut kernels = Vec::new();
+    let mut kernel_calls = Vec::new();
     for (weights, bias, first, height) in &names {
         let last = if *first == 0 { split } else { layer.outputs };
         let part = &layer.table[first * groups * lanes..last * groups * lanes];
@@ -171,7 +250,6 @@ fn layer_items(network: &IntegerNetwork, index: usize, layer: &IntegerLayer) -> 
         let (kind, lanes) = (weight(network), size(lanes));
         let (count, rows, groups) = (size((last - first) / height), size(*height), size(groups));
         let activated = activated(layer, is_last);
-        let sums = kernel_name(index, *height);
         tables.push(quote! {
             static #weights: Words<[[[[#kind; #lanes]; #rows]; #groups]; #count]> = Words([#(#parts),*]);
             static #bias: [[i32; #rows]; #count] = [#(#biases),*];
@@ -179,13 +257,20 @@ fn layer_items(network: &IntegerNetwork, index: usize, layer: &IntegerLayer) -> 
         loops.push(quote! {
             for (weights, bias) in #weights.0.iter().zip(&#bias) {
                 if let Some((out, after)) = core::mem::take(&mut rest).split_first_chunk_mut::<#rows>() {
-                    for (y, sum) in out.iter_mut().zip(kernels::#sums(weights, bias, &x.0)) {
+                    for (y, sum) in out.iter_mut().zip(block(weights, bias, &x.0)) {
                         *y = #activated;
                     }
                     rest = after;
                 }
             }
         });
+        if let Some(kernel) = kernel(network, index, layer, (last - first) / height, *height) {
+            let (name, first) = (kernel_name(index, *height), size(*first));
+            kernels.push(kernel);
+            kernel_calls.push(quote! {
+                #name(x.0.as_ptr(), y.0.as_mut_ptr().add(#first), #weights.0.as_ptr().cast(), #bias.as_ptr().cast());
+            });
+        }
     }
     let name = ident(&format!("layer{index}"));
     let doc = format!(
@@ -193,100 +278,71 @@ fn layer_items(network: &IntegerNetwork, index: usize, layer: &IntegerLayer) -> 
         layer.name, layer.inputs, layer.outputs, layer.shift
     );
     let inputs = size(network.padded(layer.inputs));
-    let (kind, length) = if is_last {
-        (quote!(i32), layer.outputs)
-    } else {
-        (quote!(i16), network.padded(layer.outputs))
+    let (kind, length) = sink(network, index, layer);
+    let head = quote!(fn #name(x: &Words<[i16; #inputs]>, y: &mut Words<[#kind; #length]>));
+    let portable = quote! {
+        let mut rest: &mut [#kind] = &mut y.0;
+        #(#loops)*
     };
-    let length = size(length);
+    if kernels.is_empty() {
+        return quote! { #(#tables)* #[doc = #doc] #[inline(always)] #head { #portable } };
+    }
     quote! {
         #(#tables)*
+        #(#kernels)*
         #[doc = #doc]
+        #[cfg(all(target_arch = "arm", policyc_assembly))]
+        #[allow(unexpected_cfgs)]
         #[inline(always)]
-        fn #name(x: &Words<[i16; #inputs]>) -> Words<[#kind; #length]> {
-            let mut y = Words([0; #length]);
-            let mut rest: &mut [#kind] = &mut y.0;
-            #(#loops)*
-            y
+        #head {
+            // SAFETY: reads all of `x` and of the tables, writes outputs of `y`; all are aligned to words
+            unsafe { #(#kernel_calls)* }
         }
+        #[doc = #doc]
+        #[cfg(not(all(target_arch = "arm", policyc_assembly)))]
+        #[allow(unexpected_cfgs)]
+        #[inline(always)]
+        #head { #portable }
     }
 }
 
 fn kernel_name(index: usize, height: usize) -> proc_macro2::Ident {
-    ident(&format!("sums{index}_{height}"))
+    ident(&format!("kernel{index}_{height}"))
 }
 
-/// Sums of a block, per layer and height: in assembly on ARM cores with `SMLAD` if the build asks for it.
-fn kernels(network: &IntegerNetwork) -> TokenStream {
-    let functions = network.layers.iter().enumerate().flat_map(|(index, layer)| {
-        let heights = blocks(index, layer).into_iter().map(|(_, _, _, height)| height);
-        heights
-            .map(|height| kernel(network, index, layer, height))
-            .collect::<Vec<_>>()
-    });
-    quote! {
-        /// `--cfg policyc_assembly` takes the loops in assembly (Armv7E-M and Armv8-M with DSP); the bits are the same.
-        #[allow(unexpected_cfgs)]
-        mod kernels { #(#functions)* }
+/// All blocks of a height in assembly, for ARM cores with `SMLAD` if the build asks for it.
+fn kernel(
+    network: &IntegerNetwork,
+    index: usize,
+    layer: &IntegerLayer,
+    count: usize,
+    height: usize,
+) -> Option<TokenStream> {
+    let store = assembly::store(layer, index + 1 == network.layers.len())?;
+    if network.block.inner != IntegerLoop::Dual {
+        return None;
     }
-}
-
-fn kernel(network: &IntegerNetwork, index: usize, layer: &IntegerLayer, height: usize) -> TokenStream {
-    let name = kernel_name(index, height);
     let kernel = Kernel {
         is_quad: network.weight_bytes == 1,
         groups: network.groups(layer.inputs),
+        count,
         height,
-        registers: ["r2", "r3", "r4", "r5"],
+        shift: layer.shift,
+        store,
     };
-    let text = kernel.text(&|operand| format!("{{{operand}}}"));
     // braces of a register list are doubled: single ones are operands
-    let text = text.iter().map(|line| match line.split_once(", {r") {
-        Some((head, registers)) => format!("{head}, {{{{r{registers}}}"),
-        None => line.clone(),
-    });
-    let sums: Vec<_> = (0..height).map(|row| ident(&format!("s{row}"))).collect();
-    let temporaries: &[&str] = if kernel.is_quad {
-        &["x01", "x23", "even"]
-    } else {
-        &["x01"]
-    };
-    let temporaries: Vec<_> = temporaries.iter().map(|name| ident(name)).collect();
-    let overwritten = kernel.clobbered();
-    // with one turn there is no loop and no counter
-    let counter = (kernel.turns() > 1).then(|| {
-        let turns = size(kernel.turns());
-        quote!(turns = inout(reg) #turns as u32 => _,)
-    });
-    let (kind, lanes, rows) = (weight(network), size(network.lanes.len()), size(height));
-    let (groups, inputs) = (size(kernel.groups), size(network.padded(layer.inputs)));
-    let (weights, x) = (quote!(&[[[#kind; #lanes]; #rows]; #groups]), quote!(&[i16; #inputs]));
-    quote! {
+    let text = kernel.text(&|registers| format!("{{{{{registers}}}}}"));
+    let (name, weight) = (kernel_name(index, height), weight(network));
+    let (sink, _) = sink(network, index, layer);
+    Some(quote! {
+        /// `--cfg policyc_assembly` takes the loops in assembly (Armv7E-M and Armv8-M with DSP); the bits are the same.
         #[cfg(all(target_arch = "arm", policyc_assembly))]
-        #[inline(always)]
-        pub fn #name(weights: #weights, bias: &[i32; #rows], x: #x) -> [i32; #rows] {
-            let [#(mut #sums),*] = *bias;
-            // SAFETY: reads all of `weights` and of `x`, which are aligned to words, and writes registers only
-            unsafe {
-                core::arch::asm!(
-                    #(#text,)*
-                    #(#sums = inout(reg) #sums,)*
-                    w = inout(reg) weights.as_ptr() => _,
-                    input = inout(reg) x.as_ptr() => _,
-                    #counter
-                    #(#temporaries = out(reg) _,)*
-                    #(out(#overwritten) _,)*
-                    options(nostack, readonly)
-                );
-            }
-            [#(#sums),*]
+        #[allow(unexpected_cfgs)]
+        #[unsafe(naked)]
+        unsafe extern "C" fn #name(x: *const i16, y: *mut #sink, weights: *const #weight, bias: *const i32) {
+            core::arch::naked_asm!(#(#text),*)
         }
-        #[cfg(not(all(target_arch = "arm", policyc_assembly)))]
-        #[inline(always)]
-        pub fn #name(weights: #weights, bias: &[i32; #rows], x: #x) -> [i32; #rows] {
-            super::block(weights, bias, x)
-        }
-    }
+    })
 }
 
 fn nested(block: &[i16], rows: usize, lanes: usize) -> TokenStream {

@@ -6,6 +6,7 @@ mod controller;
 mod integer;
 mod network;
 mod statements;
+mod streamed;
 
 use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::quote;
@@ -46,7 +47,7 @@ pub fn items(program: &Program, type_name: &str) -> TokenStream {
     let constants = constants(program);
     let crc_steps = crate::crc::nibble_table().map(word);
     let types = types(program, &TokenStream::new());
-    let helpers = statements::helpers();
+    let helpers = statements::helpers(program);
     let network = network::items(program);
     let controller = controller::items(program, &ident(type_name));
     quote! {

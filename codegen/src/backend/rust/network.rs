@@ -3,7 +3,7 @@
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use super::{float, ident, integer, size};
+use super::{float, ident, integer, size, streamed};
 use crate::lower::network::{TANH_DENOMINATOR, TANH_NUMERATOR};
 use crate::program::{ActivationCode, LayerCode, NetworkCode, Program};
 
@@ -16,7 +16,7 @@ pub fn items(program: &Program) -> TokenStream {
         .then(tanh);
     let network = match &program.network {
         NetworkCode::Real { fused, layers } => real(layers, *fused),
-        NetworkCode::Integer(network) => integer::items(network),
+        NetworkCode::Integer(network) => integer::items(network, program.has_fpu),
     };
     quote! {
         static DUTIES: [f32; ACTIONS] = [#(#duties),*];
@@ -37,28 +37,12 @@ pub fn argmax(program: &Program) -> (TokenStream, TokenStream) {
 pub fn q_values(program: &Program) -> TokenStream {
     match &program.network {
         NetworkCode::Real { .. } => quote!(network(observation)),
-        NetworkCode::Integer(network) => integer::q_values(network),
+        NetworkCode::Integer(network) => integer::q_values(network, program.has_fpu),
     }
-}
-
-/// Calls of the layers one after the other, from `value` to the result.
-pub fn calls(layers: usize, mut value: TokenStream) -> TokenStream {
-    let mut calls = Vec::new();
-    for index in 0..layers {
-        let (layer, sink) = (ident(&format!("layer{index}")), ident(&format!("hidden{index}")));
-        calls.push(quote! { let #sink = #layer(#value); });
-        value = quote!(&#sink);
-    }
-    let last = ident(&format!("hidden{}", layers - 1));
-    quote! { #(#calls)* #last }
 }
 
 fn real(layers: &[LayerCode], fused: bool) -> TokenStream {
-    let calls = calls(layers.len(), quote!(observation));
-    let items = layers
-        .iter()
-        .enumerate()
-        .map(|(index, layer)| layer_items(index, layer));
+    let (items, body) = streamed::network(layers);
     let fma = fused.then(fma);
     let accumulate = if fused {
         quote!(*sum = fma(*weight, *x, *sum);)
@@ -82,9 +66,9 @@ fn real(layers: &[LayerCode], fused: bool) -> TokenStream {
             }
             sums
         }
-        #(#items)*
+        #items
         fn network(observation: &[f32; FEATURES]) -> [f32; ACTIONS] {
-            #calls
+            #body
         }
     }
 }
@@ -105,7 +89,8 @@ fn fma() -> TokenStream {
     }
 }
 
-fn layer_items(index: usize, layer: &LayerCode) -> TokenStream {
+/// Tables, and the function of the whole layer.
+pub(super) fn layer_items(index: usize, layer: &LayerCode) -> (TokenStream, TokenStream) {
     let name = ident(&format!("layer{index}"));
     let doc = format!(" {}: {} -> {}", layer.name, layer.inputs, layer.outputs);
     let (inputs, outputs) = (size(layer.inputs), size(layer.outputs));
@@ -119,10 +104,12 @@ fn layer_items(index: usize, layer: &LayerCode) -> TokenStream {
     let (rows_size, full_size) = (size(rows), size(full));
     let activated = activation(layer.activation);
     let (tail_tables, tail_loop) = tail(index, layer);
-    quote! {
+    let tables = quote! {
         static #weights: [[[f32; #rows_size]; #inputs]; #full_size] = [#(#blocks),*];
         static #bias: [[f32; #rows_size]; #full_size] = [#(#biases),*];
         #tail_tables
+    };
+    let function = quote! {
         #[doc = #doc]
         #[inline(always)]
         fn #name(x: &[f32; #inputs]) -> [f32; #outputs] {
@@ -140,7 +127,8 @@ fn layer_items(index: usize, layer: &LayerCode) -> TokenStream {
             #tail_loop
             y
         }
-    }
+    };
+    (tables, function)
 }
 
 /// The shorter last block, if there is one.
@@ -170,17 +158,17 @@ fn tail(index: usize, layer: &LayerCode) -> (TokenStream, TokenStream) {
     (tables, code)
 }
 
-fn columns(block: &[f32], rows: usize) -> TokenStream {
+pub(super) fn columns(block: &[f32], rows: usize) -> TokenStream {
     let columns = block.chunks(rows).map(row);
     quote!([#(#columns),*])
 }
 
-fn row(values: &[f32]) -> TokenStream {
+pub(super) fn row(values: &[f32]) -> TokenStream {
     let values = values.iter().map(|value| float(*value));
     quote!([#(#values),*])
 }
 
-fn activation(activation: ActivationCode) -> TokenStream {
+pub(super) fn activation(activation: ActivationCode) -> TokenStream {
     match activation {
         ActivationCode::Identity => quote!(sum),
         ActivationCode::Relu => quote!(relu(sum)),
@@ -229,7 +217,10 @@ pub fn integrity(program: &Program) -> TokenStream {
             let layers = layers
                 .iter()
                 .enumerate()
-                .map(|(index, layer)| layer_integrity(index, layer.tail_rows() > 0));
+                .map(|(index, layer)| match layer.is_streamed() {
+                    true => streamed::integrity(index, layer),
+                    false => layer_integrity(index, layer.tail_rows() > 0),
+                });
             quote!(#(#layers)*)
         }
         NetworkCode::Integer(network) => integer::integrity(network),

@@ -139,7 +139,13 @@ fn call(function: &str, arguments: &[&TokenStream]) -> TokenStream {
 }
 
 /// Branch-free helpers; a policy need not use all of them.
-pub fn helpers() -> TokenStream {
+pub fn helpers(program: &Program) -> TokenStream {
+    let rectified = if program.has_fpu {
+        // both operations are exact: no value comes near the end of the format
+        quote!((x + f32::from_bits(x.to_bits() & 0x7FFF_FFFF)) * 0.5)
+    } else {
+        quote!(f32::from_bits(x.to_bits() & (x.to_bits() >> 31).wrapping_sub(1)))
+    };
     quote! {
         /// A condition as 0 or 1. The optimiser must not know that: it would turn selections back into branches.
         #[inline(always)]
@@ -179,12 +185,11 @@ pub fn helpers() -> TokenStream {
             }
             sum + newest
         }
-        /// x if x > 0 else +0, by the sign bit: no branch in the binary
+        /// x if x > 0 else +0, no branch in the binary
         #[inline(always)]
         #[allow(dead_code)]
         fn relu(x: f32) -> f32 {
-            let bits = x.to_bits();
-            f32::from_bits(bits & (bits >> 31).wrapping_sub(1))
+            #rectified
         }
         #[inline(always)]
         #[allow(dead_code)]

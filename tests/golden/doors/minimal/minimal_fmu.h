@@ -25,7 +25,7 @@
  *   6 status (output): status bits; 65536 is added while the coefficients are refused
  */
 #define MINIMAL_FMU_VARIABLES 6u
-#define MINIMAL_FMU_TOKEN "{85d091ad-0e79-d98f-44df-8611622031a2}"
+#define MINIMAL_FMU_TOKEN "{e9be45ae-df18-8375-f3ff-c83b6977407b}"
 #define MINIMAL_FMU_PERIOD 0.0001
 
 /* Types of variables. */

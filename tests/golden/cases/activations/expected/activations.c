@@ -24,8 +24,8 @@
 #pragma STDC FP_CONTRACT OFF
 #define ACTIVATIONS_NO_LIBC __attribute__((no_builtin))
 #elif defined(__GNUC__)
-/* no fused multiply-add, and no call to memset in place of a loop */
-#pragma GCC optimize("fp-contract=off", "no-tree-loop-distribute-patterns")
+/* no fused multiply-add, no call to memset in place of a loop, no loads ahead of the sums that take their registers */
+#pragma GCC optimize("fp-contract=off", "no-tree-loop-distribute-patterns", "no-schedule-insns")
 #define ACTIVATIONS_NO_LIBC
 #else
 #define ACTIVATIONS_NO_LIBC
@@ -186,11 +186,15 @@ static float activations_clamp(float x, float low, float high)
     return activations_select(activations_flag(raised > high), high, raised);
 }
 
-/* x if x > 0 else +0, by the sign bit: no branch in the binary */
+/* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
 static float activations_relu(float x)
 {
+#if defined(__GNUC__)
+    return (x + __builtin_fabsf(x)) * 0.5f;
+#else
     const uint32_t bits = activations_bits(x);
     return activations_from_bits(bits & ~((uint32_t)0 - (bits >> 31)));
+#endif
 }
 
 static float activations_leaky_relu(float x, float slope)
@@ -259,25 +263,77 @@ ACTIVATIONS_CODE static void activations_sense(const activations_state *state, c
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
 }
 
+/* Sums side by side in vectors, each one in the order written; the width is that of the machine the compiler is told of. */
+#if defined(__GNUC__) && (defined(__SSE2__) || defined(__aarch64__)) && !defined(__FRAMAC__)
+#if defined(__AVX512F__)
+#define ACTIVATIONS_LANES 16
+typedef float __attribute__((vector_size(64), aligned(4), may_alias)) activations_lanes16;
+#elif defined(__AVX__)
+#define ACTIVATIONS_LANES 8
+typedef float __attribute__((vector_size(32), aligned(4), may_alias)) activations_lanes8;
+#else
+#define ACTIVATIONS_LANES 4
+#endif
+typedef float __attribute__((vector_size(16), aligned(4), may_alias)) activations_lanes4;
+#endif
+
 /* fc0: 3 -> 5 */
 ACTIVATIONS_CODE static void activations_layer0(const float *ACTIVATIONS_RESTRICT x, float *ACTIVATIONS_RESTRICT y)
 {
+    const float *w = activations_weights0;
+    const float *bias = activations_bias0;
+    float *out = y;
     uint32_t i;
     uint32_t o;
     {
-        const float *const w = &activations_weights0[0];
-        const float *const bias = &activations_bias0[0];
-        float *const sum = &y[0];
-        for (o = 0u; o < 5u; ++o) {
-            sum[o] = bias[o] + (w[o] * x[0]);
+#if defined(ACTIVATIONS_LANES) && (ACTIVATIONS_LANES == 4)
+        activations_lanes4 s0 = *(const activations_lanes4 *)&bias[0];
+        float s4 = bias[4];
+        for (i = 0u; i < 3u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const activations_lanes4 *)&w[0] * input);
+            s4 = s4 + (w[4] * input);
+            w = &w[5];
         }
+        *(activations_lanes4 *)&out[0] = s0;
+        out[4] = s4;
+#elif defined(ACTIVATIONS_LANES) && (ACTIVATIONS_LANES == 8)
+        activations_lanes4 s0 = *(const activations_lanes4 *)&bias[0];
+        float s4 = bias[4];
+        for (i = 0u; i < 3u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const activations_lanes4 *)&w[0] * input);
+            s4 = s4 + (w[4] * input);
+            w = &w[5];
+        }
+        *(activations_lanes4 *)&out[0] = s0;
+        out[4] = s4;
+#elif defined(ACTIVATIONS_LANES) && (ACTIVATIONS_LANES == 16)
+        activations_lanes4 s0 = *(const activations_lanes4 *)&bias[0];
+        float s4 = bias[4];
+        for (i = 0u; i < 3u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const activations_lanes4 *)&w[0] * input);
+            s4 = s4 + (w[4] * input);
+            w = &w[5];
+        }
+        *(activations_lanes4 *)&out[0] = s0;
+        out[4] = s4;
+#else
+        for (o = 0u; o < 5u; ++o) {
+            out[o] = bias[o] + (w[o] * x[0]);
+        }
+        w = &w[5];
         for (i = 1u; i < 3u; ++i) {
-            const float *const column = &w[i * 5u];
             const float input = x[i];
             for (o = 0u; o < 5u; ++o) {
-                sum[o] = sum[o] + (column[o] * input);
+                out[o] = out[o] + (w[o] * input);
             }
+            w = &w[5];
         }
+#endif
+        bias = &bias[5];
+        out = &out[5];
     }
     for (o = 0u; o < 5u; ++o) {
         y[o] = activations_relu(y[o]);
@@ -287,22 +343,51 @@ ACTIVATIONS_CODE static void activations_layer0(const float *ACTIVATIONS_RESTRIC
 /* fc1: 5 -> 4 */
 ACTIVATIONS_CODE static void activations_layer1(const float *ACTIVATIONS_RESTRICT x, float *ACTIVATIONS_RESTRICT y)
 {
+    const float *w = activations_weights1;
+    const float *bias = activations_bias1;
+    float *out = y;
     uint32_t i;
     uint32_t o;
     {
-        const float *const w = &activations_weights1[0];
-        const float *const bias = &activations_bias1[0];
-        float *const sum = &y[0];
-        for (o = 0u; o < 4u; ++o) {
-            sum[o] = bias[o] + (w[o] * x[0]);
+#if defined(ACTIVATIONS_LANES) && (ACTIVATIONS_LANES == 4)
+        activations_lanes4 s0 = *(const activations_lanes4 *)&bias[0];
+        for (i = 0u; i < 5u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const activations_lanes4 *)&w[0] * input);
+            w = &w[4];
         }
+        *(activations_lanes4 *)&out[0] = s0;
+#elif defined(ACTIVATIONS_LANES) && (ACTIVATIONS_LANES == 8)
+        activations_lanes4 s0 = *(const activations_lanes4 *)&bias[0];
+        for (i = 0u; i < 5u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const activations_lanes4 *)&w[0] * input);
+            w = &w[4];
+        }
+        *(activations_lanes4 *)&out[0] = s0;
+#elif defined(ACTIVATIONS_LANES) && (ACTIVATIONS_LANES == 16)
+        activations_lanes4 s0 = *(const activations_lanes4 *)&bias[0];
+        for (i = 0u; i < 5u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const activations_lanes4 *)&w[0] * input);
+            w = &w[4];
+        }
+        *(activations_lanes4 *)&out[0] = s0;
+#else
+        for (o = 0u; o < 4u; ++o) {
+            out[o] = bias[o] + (w[o] * x[0]);
+        }
+        w = &w[4];
         for (i = 1u; i < 5u; ++i) {
-            const float *const column = &w[i * 4u];
             const float input = x[i];
             for (o = 0u; o < 4u; ++o) {
-                sum[o] = sum[o] + (column[o] * input);
+                out[o] = out[o] + (w[o] * input);
             }
+            w = &w[4];
         }
+#endif
+        bias = &bias[4];
+        out = &out[4];
     }
     for (o = 0u; o < 4u; ++o) {
         y[o] = activations_tanh(y[o]);
@@ -312,22 +397,51 @@ ACTIVATIONS_CODE static void activations_layer1(const float *ACTIVATIONS_RESTRIC
 /* fc2: 4 -> 4 */
 ACTIVATIONS_CODE static void activations_layer2(const float *ACTIVATIONS_RESTRICT x, float *ACTIVATIONS_RESTRICT y)
 {
+    const float *w = activations_weights2;
+    const float *bias = activations_bias2;
+    float *out = y;
     uint32_t i;
     uint32_t o;
     {
-        const float *const w = &activations_weights2[0];
-        const float *const bias = &activations_bias2[0];
-        float *const sum = &y[0];
-        for (o = 0u; o < 4u; ++o) {
-            sum[o] = bias[o] + (w[o] * x[0]);
+#if defined(ACTIVATIONS_LANES) && (ACTIVATIONS_LANES == 4)
+        activations_lanes4 s0 = *(const activations_lanes4 *)&bias[0];
+        for (i = 0u; i < 4u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const activations_lanes4 *)&w[0] * input);
+            w = &w[4];
         }
+        *(activations_lanes4 *)&out[0] = s0;
+#elif defined(ACTIVATIONS_LANES) && (ACTIVATIONS_LANES == 8)
+        activations_lanes4 s0 = *(const activations_lanes4 *)&bias[0];
+        for (i = 0u; i < 4u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const activations_lanes4 *)&w[0] * input);
+            w = &w[4];
+        }
+        *(activations_lanes4 *)&out[0] = s0;
+#elif defined(ACTIVATIONS_LANES) && (ACTIVATIONS_LANES == 16)
+        activations_lanes4 s0 = *(const activations_lanes4 *)&bias[0];
+        for (i = 0u; i < 4u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const activations_lanes4 *)&w[0] * input);
+            w = &w[4];
+        }
+        *(activations_lanes4 *)&out[0] = s0;
+#else
+        for (o = 0u; o < 4u; ++o) {
+            out[o] = bias[o] + (w[o] * x[0]);
+        }
+        w = &w[4];
         for (i = 1u; i < 4u; ++i) {
-            const float *const column = &w[i * 4u];
             const float input = x[i];
             for (o = 0u; o < 4u; ++o) {
-                sum[o] = sum[o] + (column[o] * input);
+                out[o] = out[o] + (w[o] * input);
             }
+            w = &w[4];
         }
+#endif
+        bias = &bias[4];
+        out = &out[4];
     }
     for (o = 0u; o < 4u; ++o) {
         y[o] = activations_leaky_relu(y[o], 0.01f);
@@ -337,44 +451,142 @@ ACTIVATIONS_CODE static void activations_layer2(const float *ACTIVATIONS_RESTRIC
 /* fc3: 4 -> 6 */
 ACTIVATIONS_CODE static void activations_layer3(const float *ACTIVATIONS_RESTRICT x, float *ACTIVATIONS_RESTRICT y)
 {
+    const float *w = activations_weights3;
+    const float *bias = activations_bias3;
+    float *out = y;
     uint32_t i;
+#if !defined(ACTIVATIONS_LANES)
     uint32_t o;
+#endif
     {
-        const float *const w = &activations_weights3[0];
-        const float *const bias = &activations_bias3[0];
-        float *const sum = &y[0];
-        for (o = 0u; o < 6u; ++o) {
-            sum[o] = bias[o] + (w[o] * x[0]);
+#if defined(ACTIVATIONS_LANES) && (ACTIVATIONS_LANES == 4)
+        activations_lanes4 s0 = *(const activations_lanes4 *)&bias[0];
+        float s4 = bias[4];
+        float s5 = bias[5];
+        for (i = 0u; i < 4u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const activations_lanes4 *)&w[0] * input);
+            s4 = s4 + (w[4] * input);
+            s5 = s5 + (w[5] * input);
+            w = &w[6];
         }
+        *(activations_lanes4 *)&out[0] = s0;
+        out[4] = s4;
+        out[5] = s5;
+#elif defined(ACTIVATIONS_LANES) && (ACTIVATIONS_LANES == 8)
+        activations_lanes4 s0 = *(const activations_lanes4 *)&bias[0];
+        float s4 = bias[4];
+        float s5 = bias[5];
+        for (i = 0u; i < 4u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const activations_lanes4 *)&w[0] * input);
+            s4 = s4 + (w[4] * input);
+            s5 = s5 + (w[5] * input);
+            w = &w[6];
+        }
+        *(activations_lanes4 *)&out[0] = s0;
+        out[4] = s4;
+        out[5] = s5;
+#elif defined(ACTIVATIONS_LANES) && (ACTIVATIONS_LANES == 16)
+        activations_lanes4 s0 = *(const activations_lanes4 *)&bias[0];
+        float s4 = bias[4];
+        float s5 = bias[5];
+        for (i = 0u; i < 4u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const activations_lanes4 *)&w[0] * input);
+            s4 = s4 + (w[4] * input);
+            s5 = s5 + (w[5] * input);
+            w = &w[6];
+        }
+        *(activations_lanes4 *)&out[0] = s0;
+        out[4] = s4;
+        out[5] = s5;
+#else
+        for (o = 0u; o < 6u; ++o) {
+            out[o] = bias[o] + (w[o] * x[0]);
+        }
+        w = &w[6];
         for (i = 1u; i < 4u; ++i) {
-            const float *const column = &w[i * 6u];
             const float input = x[i];
             for (o = 0u; o < 6u; ++o) {
-                sum[o] = sum[o] + (column[o] * input);
+                out[o] = out[o] + (w[o] * input);
             }
+            w = &w[6];
         }
+#endif
+        bias = &bias[6];
+        out = &out[6];
     }
 }
 
 /* fc4: 6 -> 3 */
 ACTIVATIONS_CODE static void activations_layer4(const float *ACTIVATIONS_RESTRICT x, float *ACTIVATIONS_RESTRICT y)
 {
+    const float *w = activations_weights4;
+    const float *bias = activations_bias4;
+    float *out = y;
     uint32_t i;
+#if !defined(ACTIVATIONS_LANES)
     uint32_t o;
+#endif
     {
-        const float *const w = &activations_weights4[0];
-        const float *const bias = &activations_bias4[0];
-        float *const sum = &y[0];
-        for (o = 0u; o < 3u; ++o) {
-            sum[o] = bias[o] + (w[o] * x[0]);
+#if defined(ACTIVATIONS_LANES) && (ACTIVATIONS_LANES == 4)
+        float s0 = bias[0];
+        float s1 = bias[1];
+        float s2 = bias[2];
+        for (i = 0u; i < 6u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (w[0] * input);
+            s1 = s1 + (w[1] * input);
+            s2 = s2 + (w[2] * input);
+            w = &w[3];
         }
+        out[0] = s0;
+        out[1] = s1;
+        out[2] = s2;
+#elif defined(ACTIVATIONS_LANES) && (ACTIVATIONS_LANES == 8)
+        float s0 = bias[0];
+        float s1 = bias[1];
+        float s2 = bias[2];
+        for (i = 0u; i < 6u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (w[0] * input);
+            s1 = s1 + (w[1] * input);
+            s2 = s2 + (w[2] * input);
+            w = &w[3];
+        }
+        out[0] = s0;
+        out[1] = s1;
+        out[2] = s2;
+#elif defined(ACTIVATIONS_LANES) && (ACTIVATIONS_LANES == 16)
+        float s0 = bias[0];
+        float s1 = bias[1];
+        float s2 = bias[2];
+        for (i = 0u; i < 6u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (w[0] * input);
+            s1 = s1 + (w[1] * input);
+            s2 = s2 + (w[2] * input);
+            w = &w[3];
+        }
+        out[0] = s0;
+        out[1] = s1;
+        out[2] = s2;
+#else
+        for (o = 0u; o < 3u; ++o) {
+            out[o] = bias[o] + (w[o] * x[0]);
+        }
+        w = &w[3];
         for (i = 1u; i < 6u; ++i) {
-            const float *const column = &w[i * 3u];
             const float input = x[i];
             for (o = 0u; o < 3u; ++o) {
-                sum[o] = sum[o] + (column[o] * input);
+                out[o] = out[o] + (w[o] * input);
             }
+            w = &w[3];
         }
+#endif
+        bias = &bias[3];
+        out = &out[3];
     }
 }
 

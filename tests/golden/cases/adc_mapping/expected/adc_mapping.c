@@ -24,8 +24,8 @@
 #pragma STDC FP_CONTRACT OFF
 #define ADC_MAPPING_NO_LIBC __attribute__((no_builtin))
 #elif defined(__GNUC__)
-/* no fused multiply-add, and no call to memset in place of a loop */
-#pragma GCC optimize("fp-contract=off", "no-tree-loop-distribute-patterns")
+/* no fused multiply-add, no call to memset in place of a loop, no loads ahead of the sums that take their registers */
+#pragma GCC optimize("fp-contract=off", "no-tree-loop-distribute-patterns", "no-schedule-insns")
 #define ADC_MAPPING_NO_LIBC
 #else
 #define ADC_MAPPING_NO_LIBC
@@ -243,25 +243,77 @@ ADC_MAPPING_CODE static void adc_mapping_sense(const adc_mapping_state *state, c
     front->clipped = f11;
 }
 
+/* Sums side by side in vectors, each one in the order written; the width is that of the machine the compiler is told of. */
+#if defined(__GNUC__) && (defined(__SSE2__) || defined(__aarch64__)) && !defined(__FRAMAC__)
+#if defined(__AVX512F__)
+#define ADC_MAPPING_LANES 16
+typedef float __attribute__((vector_size(64), aligned(4), may_alias)) adc_mapping_lanes16;
+#elif defined(__AVX__)
+#define ADC_MAPPING_LANES 8
+typedef float __attribute__((vector_size(32), aligned(4), may_alias)) adc_mapping_lanes8;
+#else
+#define ADC_MAPPING_LANES 4
+#endif
+typedef float __attribute__((vector_size(16), aligned(4), may_alias)) adc_mapping_lanes4;
+#endif
+
 /* fc0: 3 -> 5 */
 ADC_MAPPING_CODE static void adc_mapping_layer0(const float *ADC_MAPPING_RESTRICT x, float *ADC_MAPPING_RESTRICT y)
 {
+    const float *w = adc_mapping_weights0;
+    const float *bias = adc_mapping_bias0;
+    float *out = y;
     uint32_t i;
     uint32_t o;
     {
-        const float *const w = &adc_mapping_weights0[0];
-        const float *const bias = &adc_mapping_bias0[0];
-        float *const sum = &y[0];
-        for (o = 0u; o < 5u; ++o) {
-            sum[o] = bias[o] + (w[o] * x[0]);
+#if defined(ADC_MAPPING_LANES) && (ADC_MAPPING_LANES == 4)
+        adc_mapping_lanes4 s0 = *(const adc_mapping_lanes4 *)&bias[0];
+        float s4 = bias[4];
+        for (i = 0u; i < 3u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const adc_mapping_lanes4 *)&w[0] * input);
+            s4 = s4 + (w[4] * input);
+            w = &w[5];
         }
+        *(adc_mapping_lanes4 *)&out[0] = s0;
+        out[4] = s4;
+#elif defined(ADC_MAPPING_LANES) && (ADC_MAPPING_LANES == 8)
+        adc_mapping_lanes4 s0 = *(const adc_mapping_lanes4 *)&bias[0];
+        float s4 = bias[4];
+        for (i = 0u; i < 3u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const adc_mapping_lanes4 *)&w[0] * input);
+            s4 = s4 + (w[4] * input);
+            w = &w[5];
+        }
+        *(adc_mapping_lanes4 *)&out[0] = s0;
+        out[4] = s4;
+#elif defined(ADC_MAPPING_LANES) && (ADC_MAPPING_LANES == 16)
+        adc_mapping_lanes4 s0 = *(const adc_mapping_lanes4 *)&bias[0];
+        float s4 = bias[4];
+        for (i = 0u; i < 3u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const adc_mapping_lanes4 *)&w[0] * input);
+            s4 = s4 + (w[4] * input);
+            w = &w[5];
+        }
+        *(adc_mapping_lanes4 *)&out[0] = s0;
+        out[4] = s4;
+#else
+        for (o = 0u; o < 5u; ++o) {
+            out[o] = bias[o] + (w[o] * x[0]);
+        }
+        w = &w[5];
         for (i = 1u; i < 3u; ++i) {
-            const float *const column = &w[i * 5u];
             const float input = x[i];
             for (o = 0u; o < 5u; ++o) {
-                sum[o] = sum[o] + (column[o] * input);
+                out[o] = out[o] + (w[o] * input);
             }
+            w = &w[5];
         }
+#endif
+        bias = &bias[5];
+        out = &out[5];
     }
     for (o = 0u; o < 5u; ++o) {
         y[o] = adc_mapping_tanh(y[o]);
@@ -271,22 +323,51 @@ ADC_MAPPING_CODE static void adc_mapping_layer0(const float *ADC_MAPPING_RESTRIC
 /* fc1: 5 -> 4 */
 ADC_MAPPING_CODE static void adc_mapping_layer1(const float *ADC_MAPPING_RESTRICT x, float *ADC_MAPPING_RESTRICT y)
 {
+    const float *w = adc_mapping_weights1;
+    const float *bias = adc_mapping_bias1;
+    float *out = y;
     uint32_t i;
     uint32_t o;
     {
-        const float *const w = &adc_mapping_weights1[0];
-        const float *const bias = &adc_mapping_bias1[0];
-        float *const sum = &y[0];
-        for (o = 0u; o < 4u; ++o) {
-            sum[o] = bias[o] + (w[o] * x[0]);
+#if defined(ADC_MAPPING_LANES) && (ADC_MAPPING_LANES == 4)
+        adc_mapping_lanes4 s0 = *(const adc_mapping_lanes4 *)&bias[0];
+        for (i = 0u; i < 5u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const adc_mapping_lanes4 *)&w[0] * input);
+            w = &w[4];
         }
+        *(adc_mapping_lanes4 *)&out[0] = s0;
+#elif defined(ADC_MAPPING_LANES) && (ADC_MAPPING_LANES == 8)
+        adc_mapping_lanes4 s0 = *(const adc_mapping_lanes4 *)&bias[0];
+        for (i = 0u; i < 5u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const adc_mapping_lanes4 *)&w[0] * input);
+            w = &w[4];
+        }
+        *(adc_mapping_lanes4 *)&out[0] = s0;
+#elif defined(ADC_MAPPING_LANES) && (ADC_MAPPING_LANES == 16)
+        adc_mapping_lanes4 s0 = *(const adc_mapping_lanes4 *)&bias[0];
+        for (i = 0u; i < 5u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const adc_mapping_lanes4 *)&w[0] * input);
+            w = &w[4];
+        }
+        *(adc_mapping_lanes4 *)&out[0] = s0;
+#else
+        for (o = 0u; o < 4u; ++o) {
+            out[o] = bias[o] + (w[o] * x[0]);
+        }
+        w = &w[4];
         for (i = 1u; i < 5u; ++i) {
-            const float *const column = &w[i * 4u];
             const float input = x[i];
             for (o = 0u; o < 4u; ++o) {
-                sum[o] = sum[o] + (column[o] * input);
+                out[o] = out[o] + (w[o] * input);
             }
+            w = &w[4];
         }
+#endif
+        bias = &bias[4];
+        out = &out[4];
     }
     for (o = 0u; o < 4u; ++o) {
         y[o] = adc_mapping_tanh(y[o]);
@@ -296,22 +377,71 @@ ADC_MAPPING_CODE static void adc_mapping_layer1(const float *ADC_MAPPING_RESTRIC
 /* fc2: 4 -> 3 */
 ADC_MAPPING_CODE static void adc_mapping_layer2(const float *ADC_MAPPING_RESTRICT x, float *ADC_MAPPING_RESTRICT y)
 {
+    const float *w = adc_mapping_weights2;
+    const float *bias = adc_mapping_bias2;
+    float *out = y;
     uint32_t i;
+#if !defined(ADC_MAPPING_LANES)
     uint32_t o;
+#endif
     {
-        const float *const w = &adc_mapping_weights2[0];
-        const float *const bias = &adc_mapping_bias2[0];
-        float *const sum = &y[0];
-        for (o = 0u; o < 3u; ++o) {
-            sum[o] = bias[o] + (w[o] * x[0]);
+#if defined(ADC_MAPPING_LANES) && (ADC_MAPPING_LANES == 4)
+        float s0 = bias[0];
+        float s1 = bias[1];
+        float s2 = bias[2];
+        for (i = 0u; i < 4u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (w[0] * input);
+            s1 = s1 + (w[1] * input);
+            s2 = s2 + (w[2] * input);
+            w = &w[3];
         }
+        out[0] = s0;
+        out[1] = s1;
+        out[2] = s2;
+#elif defined(ADC_MAPPING_LANES) && (ADC_MAPPING_LANES == 8)
+        float s0 = bias[0];
+        float s1 = bias[1];
+        float s2 = bias[2];
+        for (i = 0u; i < 4u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (w[0] * input);
+            s1 = s1 + (w[1] * input);
+            s2 = s2 + (w[2] * input);
+            w = &w[3];
+        }
+        out[0] = s0;
+        out[1] = s1;
+        out[2] = s2;
+#elif defined(ADC_MAPPING_LANES) && (ADC_MAPPING_LANES == 16)
+        float s0 = bias[0];
+        float s1 = bias[1];
+        float s2 = bias[2];
+        for (i = 0u; i < 4u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (w[0] * input);
+            s1 = s1 + (w[1] * input);
+            s2 = s2 + (w[2] * input);
+            w = &w[3];
+        }
+        out[0] = s0;
+        out[1] = s1;
+        out[2] = s2;
+#else
+        for (o = 0u; o < 3u; ++o) {
+            out[o] = bias[o] + (w[o] * x[0]);
+        }
+        w = &w[3];
         for (i = 1u; i < 4u; ++i) {
-            const float *const column = &w[i * 3u];
             const float input = x[i];
             for (o = 0u; o < 3u; ++o) {
-                sum[o] = sum[o] + (column[o] * input);
+                out[o] = out[o] + (w[o] * input);
             }
+            w = &w[3];
         }
+#endif
+        bias = &bias[3];
+        out = &out[3];
     }
 }
 

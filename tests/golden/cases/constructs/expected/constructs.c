@@ -24,8 +24,8 @@
 #pragma STDC FP_CONTRACT OFF
 #define CONSTRUCTS_NO_LIBC __attribute__((no_builtin))
 #elif defined(__GNUC__)
-/* no fused multiply-add, and no call to memset in place of a loop */
-#pragma GCC optimize("fp-contract=off", "no-tree-loop-distribute-patterns")
+/* no fused multiply-add, no call to memset in place of a loop, no loads ahead of the sums that take their registers */
+#pragma GCC optimize("fp-contract=off", "no-tree-loop-distribute-patterns", "no-schedule-insns")
 #define CONSTRUCTS_NO_LIBC
 #else
 #define CONSTRUCTS_NO_LIBC
@@ -219,11 +219,15 @@ static float constructs_line_sum(const float *line, uint32_t length, float newes
     return sum + newest;
 }
 
-/* x if x > 0 else +0, by the sign bit: no branch in the binary */
+/* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
 static float constructs_relu(float x)
 {
+#if defined(__GNUC__)
+    return (x + __builtin_fabsf(x)) * 0.5f;
+#else
     const uint32_t bits = constructs_bits(x);
     return constructs_from_bits(bits & ~((uint32_t)0 - (bits >> 31)));
+#endif
 }
 
 static float constructs_leaky_relu(float x, float slope)
@@ -373,25 +377,83 @@ CONSTRUCTS_CODE static void constructs_sense(const constructs_state *state, cons
     front->clipped = f62;
 }
 
+/* Sums side by side in vectors, each one in the order written; the width is that of the machine the compiler is told of. */
+#if defined(__GNUC__) && (defined(__SSE2__) || defined(__aarch64__)) && !defined(__FRAMAC__)
+#if defined(__AVX512F__)
+#define CONSTRUCTS_LANES 16
+typedef float __attribute__((vector_size(64), aligned(4), may_alias)) constructs_lanes16;
+#elif defined(__AVX__)
+#define CONSTRUCTS_LANES 8
+typedef float __attribute__((vector_size(32), aligned(4), may_alias)) constructs_lanes8;
+#else
+#define CONSTRUCTS_LANES 4
+#endif
+typedef float __attribute__((vector_size(16), aligned(4), may_alias)) constructs_lanes4;
+#endif
+
 /* fc0: 12 -> 9 */
 CONSTRUCTS_CODE static void constructs_layer0(const float *CONSTRUCTS_RESTRICT x, float *CONSTRUCTS_RESTRICT y)
 {
+    const float *w = constructs_weights0;
+    const float *bias = constructs_bias0;
+    float *out = y;
     uint32_t i;
     uint32_t o;
     {
-        const float *const w = &constructs_weights0[0];
-        const float *const bias = &constructs_bias0[0];
-        float *const sum = &y[0];
-        for (o = 0u; o < 9u; ++o) {
-            sum[o] = bias[o] + (w[o] * x[0]);
+#if defined(CONSTRUCTS_LANES) && (CONSTRUCTS_LANES == 4)
+        constructs_lanes4 s0 = *(const constructs_lanes4 *)&bias[0];
+        constructs_lanes4 s4 = *(const constructs_lanes4 *)&bias[4];
+        float s8 = bias[8];
+        for (i = 0u; i < 12u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const constructs_lanes4 *)&w[0] * input);
+            s4 = s4 + (*(const constructs_lanes4 *)&w[4] * input);
+            s8 = s8 + (w[8] * input);
+            w = &w[9];
         }
+        *(constructs_lanes4 *)&out[0] = s0;
+        *(constructs_lanes4 *)&out[4] = s4;
+        out[8] = s8;
+#elif defined(CONSTRUCTS_LANES) && (CONSTRUCTS_LANES == 8)
+        constructs_lanes8 s0 = *(const constructs_lanes8 *)&bias[0];
+        float s8 = bias[8];
+        for (i = 0u; i < 12u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const constructs_lanes8 *)&w[0] * input);
+            s8 = s8 + (w[8] * input);
+            w = &w[9];
+        }
+        *(constructs_lanes8 *)&out[0] = s0;
+        out[8] = s8;
+#elif defined(CONSTRUCTS_LANES) && (CONSTRUCTS_LANES == 16)
+        constructs_lanes4 s0 = *(const constructs_lanes4 *)&bias[0];
+        constructs_lanes4 s4 = *(const constructs_lanes4 *)&bias[4];
+        float s8 = bias[8];
+        for (i = 0u; i < 12u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const constructs_lanes4 *)&w[0] * input);
+            s4 = s4 + (*(const constructs_lanes4 *)&w[4] * input);
+            s8 = s8 + (w[8] * input);
+            w = &w[9];
+        }
+        *(constructs_lanes4 *)&out[0] = s0;
+        *(constructs_lanes4 *)&out[4] = s4;
+        out[8] = s8;
+#else
+        for (o = 0u; o < 9u; ++o) {
+            out[o] = bias[o] + (w[o] * x[0]);
+        }
+        w = &w[9];
         for (i = 1u; i < 12u; ++i) {
-            const float *const column = &w[i * 9u];
             const float input = x[i];
             for (o = 0u; o < 9u; ++o) {
-                sum[o] = sum[o] + (column[o] * input);
+                out[o] = out[o] + (w[o] * input);
             }
+            w = &w[9];
         }
+#endif
+        bias = &bias[9];
+        out = &out[9];
     }
     for (o = 0u; o < 9u; ++o) {
         y[o] = constructs_relu(y[o]);
@@ -401,22 +463,69 @@ CONSTRUCTS_CODE static void constructs_layer0(const float *CONSTRUCTS_RESTRICT x
 /* fc1: 9 -> 6 */
 CONSTRUCTS_CODE static void constructs_layer1(const float *CONSTRUCTS_RESTRICT x, float *CONSTRUCTS_RESTRICT y)
 {
+    const float *w = constructs_weights1;
+    const float *bias = constructs_bias1;
+    float *out = y;
     uint32_t i;
     uint32_t o;
     {
-        const float *const w = &constructs_weights1[0];
-        const float *const bias = &constructs_bias1[0];
-        float *const sum = &y[0];
-        for (o = 0u; o < 6u; ++o) {
-            sum[o] = bias[o] + (w[o] * x[0]);
+#if defined(CONSTRUCTS_LANES) && (CONSTRUCTS_LANES == 4)
+        constructs_lanes4 s0 = *(const constructs_lanes4 *)&bias[0];
+        float s4 = bias[4];
+        float s5 = bias[5];
+        for (i = 0u; i < 9u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const constructs_lanes4 *)&w[0] * input);
+            s4 = s4 + (w[4] * input);
+            s5 = s5 + (w[5] * input);
+            w = &w[6];
         }
+        *(constructs_lanes4 *)&out[0] = s0;
+        out[4] = s4;
+        out[5] = s5;
+#elif defined(CONSTRUCTS_LANES) && (CONSTRUCTS_LANES == 8)
+        constructs_lanes4 s0 = *(const constructs_lanes4 *)&bias[0];
+        float s4 = bias[4];
+        float s5 = bias[5];
+        for (i = 0u; i < 9u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const constructs_lanes4 *)&w[0] * input);
+            s4 = s4 + (w[4] * input);
+            s5 = s5 + (w[5] * input);
+            w = &w[6];
+        }
+        *(constructs_lanes4 *)&out[0] = s0;
+        out[4] = s4;
+        out[5] = s5;
+#elif defined(CONSTRUCTS_LANES) && (CONSTRUCTS_LANES == 16)
+        constructs_lanes4 s0 = *(const constructs_lanes4 *)&bias[0];
+        float s4 = bias[4];
+        float s5 = bias[5];
+        for (i = 0u; i < 9u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const constructs_lanes4 *)&w[0] * input);
+            s4 = s4 + (w[4] * input);
+            s5 = s5 + (w[5] * input);
+            w = &w[6];
+        }
+        *(constructs_lanes4 *)&out[0] = s0;
+        out[4] = s4;
+        out[5] = s5;
+#else
+        for (o = 0u; o < 6u; ++o) {
+            out[o] = bias[o] + (w[o] * x[0]);
+        }
+        w = &w[6];
         for (i = 1u; i < 9u; ++i) {
-            const float *const column = &w[i * 6u];
             const float input = x[i];
             for (o = 0u; o < 6u; ++o) {
-                sum[o] = sum[o] + (column[o] * input);
+                out[o] = out[o] + (w[o] * input);
             }
+            w = &w[6];
         }
+#endif
+        bias = &bias[6];
+        out = &out[6];
     }
     for (o = 0u; o < 6u; ++o) {
         y[o] = constructs_tanh(y[o]);
@@ -426,22 +535,57 @@ CONSTRUCTS_CODE static void constructs_layer1(const float *CONSTRUCTS_RESTRICT x
 /* fc2: 6 -> 8 */
 CONSTRUCTS_CODE static void constructs_layer2(const float *CONSTRUCTS_RESTRICT x, float *CONSTRUCTS_RESTRICT y)
 {
+    const float *w = constructs_weights2;
+    const float *bias = constructs_bias2;
+    float *out = y;
     uint32_t i;
     uint32_t o;
     {
-        const float *const w = &constructs_weights2[0];
-        const float *const bias = &constructs_bias2[0];
-        float *const sum = &y[0];
-        for (o = 0u; o < 8u; ++o) {
-            sum[o] = bias[o] + (w[o] * x[0]);
+#if defined(CONSTRUCTS_LANES) && (CONSTRUCTS_LANES == 4)
+        constructs_lanes4 s0 = *(const constructs_lanes4 *)&bias[0];
+        constructs_lanes4 s4 = *(const constructs_lanes4 *)&bias[4];
+        for (i = 0u; i < 6u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const constructs_lanes4 *)&w[0] * input);
+            s4 = s4 + (*(const constructs_lanes4 *)&w[4] * input);
+            w = &w[8];
         }
+        *(constructs_lanes4 *)&out[0] = s0;
+        *(constructs_lanes4 *)&out[4] = s4;
+#elif defined(CONSTRUCTS_LANES) && (CONSTRUCTS_LANES == 8)
+        constructs_lanes8 s0 = *(const constructs_lanes8 *)&bias[0];
+        for (i = 0u; i < 6u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const constructs_lanes8 *)&w[0] * input);
+            w = &w[8];
+        }
+        *(constructs_lanes8 *)&out[0] = s0;
+#elif defined(CONSTRUCTS_LANES) && (CONSTRUCTS_LANES == 16)
+        constructs_lanes4 s0 = *(const constructs_lanes4 *)&bias[0];
+        constructs_lanes4 s4 = *(const constructs_lanes4 *)&bias[4];
+        for (i = 0u; i < 6u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const constructs_lanes4 *)&w[0] * input);
+            s4 = s4 + (*(const constructs_lanes4 *)&w[4] * input);
+            w = &w[8];
+        }
+        *(constructs_lanes4 *)&out[0] = s0;
+        *(constructs_lanes4 *)&out[4] = s4;
+#else
+        for (o = 0u; o < 8u; ++o) {
+            out[o] = bias[o] + (w[o] * x[0]);
+        }
+        w = &w[8];
         for (i = 1u; i < 6u; ++i) {
-            const float *const column = &w[i * 8u];
             const float input = x[i];
             for (o = 0u; o < 8u; ++o) {
-                sum[o] = sum[o] + (column[o] * input);
+                out[o] = out[o] + (w[o] * input);
             }
+            w = &w[8];
         }
+#endif
+        bias = &bias[8];
+        out = &out[8];
     }
     for (o = 0u; o < 8u; ++o) {
         y[o] = constructs_leaky_relu(y[o], 0.01f);
@@ -451,44 +595,115 @@ CONSTRUCTS_CODE static void constructs_layer2(const float *CONSTRUCTS_RESTRICT x
 /* fc3: 8 -> 4 */
 CONSTRUCTS_CODE static void constructs_layer3(const float *CONSTRUCTS_RESTRICT x, float *CONSTRUCTS_RESTRICT y)
 {
+    const float *w = constructs_weights3;
+    const float *bias = constructs_bias3;
+    float *out = y;
     uint32_t i;
+#if !defined(CONSTRUCTS_LANES)
     uint32_t o;
+#endif
     {
-        const float *const w = &constructs_weights3[0];
-        const float *const bias = &constructs_bias3[0];
-        float *const sum = &y[0];
-        for (o = 0u; o < 4u; ++o) {
-            sum[o] = bias[o] + (w[o] * x[0]);
+#if defined(CONSTRUCTS_LANES) && (CONSTRUCTS_LANES == 4)
+        constructs_lanes4 s0 = *(const constructs_lanes4 *)&bias[0];
+        for (i = 0u; i < 8u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const constructs_lanes4 *)&w[0] * input);
+            w = &w[4];
         }
+        *(constructs_lanes4 *)&out[0] = s0;
+#elif defined(CONSTRUCTS_LANES) && (CONSTRUCTS_LANES == 8)
+        constructs_lanes4 s0 = *(const constructs_lanes4 *)&bias[0];
+        for (i = 0u; i < 8u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const constructs_lanes4 *)&w[0] * input);
+            w = &w[4];
+        }
+        *(constructs_lanes4 *)&out[0] = s0;
+#elif defined(CONSTRUCTS_LANES) && (CONSTRUCTS_LANES == 16)
+        constructs_lanes4 s0 = *(const constructs_lanes4 *)&bias[0];
+        for (i = 0u; i < 8u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const constructs_lanes4 *)&w[0] * input);
+            w = &w[4];
+        }
+        *(constructs_lanes4 *)&out[0] = s0;
+#else
+        for (o = 0u; o < 4u; ++o) {
+            out[o] = bias[o] + (w[o] * x[0]);
+        }
+        w = &w[4];
         for (i = 1u; i < 8u; ++i) {
-            const float *const column = &w[i * 4u];
             const float input = x[i];
             for (o = 0u; o < 4u; ++o) {
-                sum[o] = sum[o] + (column[o] * input);
+                out[o] = out[o] + (w[o] * input);
             }
+            w = &w[4];
         }
+#endif
+        bias = &bias[4];
+        out = &out[4];
     }
 }
 
 /* fc4: 4 -> 5 */
 CONSTRUCTS_CODE static void constructs_layer4(const float *CONSTRUCTS_RESTRICT x, float *CONSTRUCTS_RESTRICT y)
 {
+    const float *w = constructs_weights4;
+    const float *bias = constructs_bias4;
+    float *out = y;
     uint32_t i;
+#if !defined(CONSTRUCTS_LANES)
     uint32_t o;
+#endif
     {
-        const float *const w = &constructs_weights4[0];
-        const float *const bias = &constructs_bias4[0];
-        float *const sum = &y[0];
-        for (o = 0u; o < 5u; ++o) {
-            sum[o] = bias[o] + (w[o] * x[0]);
+#if defined(CONSTRUCTS_LANES) && (CONSTRUCTS_LANES == 4)
+        constructs_lanes4 s0 = *(const constructs_lanes4 *)&bias[0];
+        float s4 = bias[4];
+        for (i = 0u; i < 4u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const constructs_lanes4 *)&w[0] * input);
+            s4 = s4 + (w[4] * input);
+            w = &w[5];
         }
+        *(constructs_lanes4 *)&out[0] = s0;
+        out[4] = s4;
+#elif defined(CONSTRUCTS_LANES) && (CONSTRUCTS_LANES == 8)
+        constructs_lanes4 s0 = *(const constructs_lanes4 *)&bias[0];
+        float s4 = bias[4];
+        for (i = 0u; i < 4u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const constructs_lanes4 *)&w[0] * input);
+            s4 = s4 + (w[4] * input);
+            w = &w[5];
+        }
+        *(constructs_lanes4 *)&out[0] = s0;
+        out[4] = s4;
+#elif defined(CONSTRUCTS_LANES) && (CONSTRUCTS_LANES == 16)
+        constructs_lanes4 s0 = *(const constructs_lanes4 *)&bias[0];
+        float s4 = bias[4];
+        for (i = 0u; i < 4u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const constructs_lanes4 *)&w[0] * input);
+            s4 = s4 + (w[4] * input);
+            w = &w[5];
+        }
+        *(constructs_lanes4 *)&out[0] = s0;
+        out[4] = s4;
+#else
+        for (o = 0u; o < 5u; ++o) {
+            out[o] = bias[o] + (w[o] * x[0]);
+        }
+        w = &w[5];
         for (i = 1u; i < 4u; ++i) {
-            const float *const column = &w[i * 5u];
             const float input = x[i];
             for (o = 0u; o < 5u; ++o) {
-                sum[o] = sum[o] + (column[o] * input);
+                out[o] = out[o] + (w[o] * input);
             }
+            w = &w[5];
         }
+#endif
+        bias = &bias[5];
+        out = &out[5];
     }
 }
 

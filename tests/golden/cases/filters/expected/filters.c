@@ -24,8 +24,8 @@
 #pragma STDC FP_CONTRACT OFF
 #define FILTERS_NO_LIBC __attribute__((no_builtin))
 #elif defined(__GNUC__)
-/* no fused multiply-add, and no call to memset in place of a loop */
-#pragma GCC optimize("fp-contract=off", "no-tree-loop-distribute-patterns")
+/* no fused multiply-add, no call to memset in place of a loop, no loads ahead of the sums that take their registers */
+#pragma GCC optimize("fp-contract=off", "no-tree-loop-distribute-patterns", "no-schedule-insns")
 #define FILTERS_NO_LIBC
 #else
 #define FILTERS_NO_LIBC
@@ -180,11 +180,15 @@ static float filters_line_sum(const float *line, uint32_t length, float newest, 
     return sum + newest;
 }
 
-/* x if x > 0 else +0, by the sign bit: no branch in the binary */
+/* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
 static float filters_relu(float x)
 {
+#if defined(__GNUC__)
+    return (x + __builtin_fabsf(x)) * 0.5f;
+#else
     const uint32_t bits = filters_bits(x);
     return filters_from_bits(bits & ~((uint32_t)0 - (bits >> 31)));
+#endif
 }
 
 /* What a measurement means before the network sees it. */
@@ -289,25 +293,77 @@ FILTERS_CODE static void filters_sense(const filters_state *state, const filters
     front->clipped = f52;
 }
 
+/* Sums side by side in vectors, each one in the order written; the width is that of the machine the compiler is told of. */
+#if defined(__GNUC__) && (defined(__SSE2__) || defined(__aarch64__)) && !defined(__FRAMAC__)
+#if defined(__AVX512F__)
+#define FILTERS_LANES 16
+typedef float __attribute__((vector_size(64), aligned(4), may_alias)) filters_lanes16;
+#elif defined(__AVX__)
+#define FILTERS_LANES 8
+typedef float __attribute__((vector_size(32), aligned(4), may_alias)) filters_lanes8;
+#else
+#define FILTERS_LANES 4
+#endif
+typedef float __attribute__((vector_size(16), aligned(4), may_alias)) filters_lanes4;
+#endif
+
 /* fc0: 8 -> 5 */
 FILTERS_CODE static void filters_layer0(const float *FILTERS_RESTRICT x, float *FILTERS_RESTRICT y)
 {
+    const float *w = filters_weights0;
+    const float *bias = filters_bias0;
+    float *out = y;
     uint32_t i;
     uint32_t o;
     {
-        const float *const w = &filters_weights0[0];
-        const float *const bias = &filters_bias0[0];
-        float *const sum = &y[0];
-        for (o = 0u; o < 5u; ++o) {
-            sum[o] = bias[o] + (w[o] * x[0]);
+#if defined(FILTERS_LANES) && (FILTERS_LANES == 4)
+        filters_lanes4 s0 = *(const filters_lanes4 *)&bias[0];
+        float s4 = bias[4];
+        for (i = 0u; i < 8u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const filters_lanes4 *)&w[0] * input);
+            s4 = s4 + (w[4] * input);
+            w = &w[5];
         }
+        *(filters_lanes4 *)&out[0] = s0;
+        out[4] = s4;
+#elif defined(FILTERS_LANES) && (FILTERS_LANES == 8)
+        filters_lanes4 s0 = *(const filters_lanes4 *)&bias[0];
+        float s4 = bias[4];
+        for (i = 0u; i < 8u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const filters_lanes4 *)&w[0] * input);
+            s4 = s4 + (w[4] * input);
+            w = &w[5];
+        }
+        *(filters_lanes4 *)&out[0] = s0;
+        out[4] = s4;
+#elif defined(FILTERS_LANES) && (FILTERS_LANES == 16)
+        filters_lanes4 s0 = *(const filters_lanes4 *)&bias[0];
+        float s4 = bias[4];
+        for (i = 0u; i < 8u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const filters_lanes4 *)&w[0] * input);
+            s4 = s4 + (w[4] * input);
+            w = &w[5];
+        }
+        *(filters_lanes4 *)&out[0] = s0;
+        out[4] = s4;
+#else
+        for (o = 0u; o < 5u; ++o) {
+            out[o] = bias[o] + (w[o] * x[0]);
+        }
+        w = &w[5];
         for (i = 1u; i < 8u; ++i) {
-            const float *const column = &w[i * 5u];
             const float input = x[i];
             for (o = 0u; o < 5u; ++o) {
-                sum[o] = sum[o] + (column[o] * input);
+                out[o] = out[o] + (w[o] * input);
             }
+            w = &w[5];
         }
+#endif
+        bias = &bias[5];
+        out = &out[5];
     }
     for (o = 0u; o < 5u; ++o) {
         y[o] = filters_relu(y[o]);
@@ -317,22 +373,51 @@ FILTERS_CODE static void filters_layer0(const float *FILTERS_RESTRICT x, float *
 /* fc1: 5 -> 4 */
 FILTERS_CODE static void filters_layer1(const float *FILTERS_RESTRICT x, float *FILTERS_RESTRICT y)
 {
+    const float *w = filters_weights1;
+    const float *bias = filters_bias1;
+    float *out = y;
     uint32_t i;
     uint32_t o;
     {
-        const float *const w = &filters_weights1[0];
-        const float *const bias = &filters_bias1[0];
-        float *const sum = &y[0];
-        for (o = 0u; o < 4u; ++o) {
-            sum[o] = bias[o] + (w[o] * x[0]);
+#if defined(FILTERS_LANES) && (FILTERS_LANES == 4)
+        filters_lanes4 s0 = *(const filters_lanes4 *)&bias[0];
+        for (i = 0u; i < 5u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const filters_lanes4 *)&w[0] * input);
+            w = &w[4];
         }
+        *(filters_lanes4 *)&out[0] = s0;
+#elif defined(FILTERS_LANES) && (FILTERS_LANES == 8)
+        filters_lanes4 s0 = *(const filters_lanes4 *)&bias[0];
+        for (i = 0u; i < 5u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const filters_lanes4 *)&w[0] * input);
+            w = &w[4];
+        }
+        *(filters_lanes4 *)&out[0] = s0;
+#elif defined(FILTERS_LANES) && (FILTERS_LANES == 16)
+        filters_lanes4 s0 = *(const filters_lanes4 *)&bias[0];
+        for (i = 0u; i < 5u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const filters_lanes4 *)&w[0] * input);
+            w = &w[4];
+        }
+        *(filters_lanes4 *)&out[0] = s0;
+#else
+        for (o = 0u; o < 4u; ++o) {
+            out[o] = bias[o] + (w[o] * x[0]);
+        }
+        w = &w[4];
         for (i = 1u; i < 5u; ++i) {
-            const float *const column = &w[i * 4u];
             const float input = x[i];
             for (o = 0u; o < 4u; ++o) {
-                sum[o] = sum[o] + (column[o] * input);
+                out[o] = out[o] + (w[o] * input);
             }
+            w = &w[4];
         }
+#endif
+        bias = &bias[4];
+        out = &out[4];
     }
     for (o = 0u; o < 4u; ++o) {
         y[o] = filters_relu(y[o]);
@@ -342,22 +427,71 @@ FILTERS_CODE static void filters_layer1(const float *FILTERS_RESTRICT x, float *
 /* fc2: 4 -> 3 */
 FILTERS_CODE static void filters_layer2(const float *FILTERS_RESTRICT x, float *FILTERS_RESTRICT y)
 {
+    const float *w = filters_weights2;
+    const float *bias = filters_bias2;
+    float *out = y;
     uint32_t i;
+#if !defined(FILTERS_LANES)
     uint32_t o;
+#endif
     {
-        const float *const w = &filters_weights2[0];
-        const float *const bias = &filters_bias2[0];
-        float *const sum = &y[0];
-        for (o = 0u; o < 3u; ++o) {
-            sum[o] = bias[o] + (w[o] * x[0]);
+#if defined(FILTERS_LANES) && (FILTERS_LANES == 4)
+        float s0 = bias[0];
+        float s1 = bias[1];
+        float s2 = bias[2];
+        for (i = 0u; i < 4u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (w[0] * input);
+            s1 = s1 + (w[1] * input);
+            s2 = s2 + (w[2] * input);
+            w = &w[3];
         }
+        out[0] = s0;
+        out[1] = s1;
+        out[2] = s2;
+#elif defined(FILTERS_LANES) && (FILTERS_LANES == 8)
+        float s0 = bias[0];
+        float s1 = bias[1];
+        float s2 = bias[2];
+        for (i = 0u; i < 4u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (w[0] * input);
+            s1 = s1 + (w[1] * input);
+            s2 = s2 + (w[2] * input);
+            w = &w[3];
+        }
+        out[0] = s0;
+        out[1] = s1;
+        out[2] = s2;
+#elif defined(FILTERS_LANES) && (FILTERS_LANES == 16)
+        float s0 = bias[0];
+        float s1 = bias[1];
+        float s2 = bias[2];
+        for (i = 0u; i < 4u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (w[0] * input);
+            s1 = s1 + (w[1] * input);
+            s2 = s2 + (w[2] * input);
+            w = &w[3];
+        }
+        out[0] = s0;
+        out[1] = s1;
+        out[2] = s2;
+#else
+        for (o = 0u; o < 3u; ++o) {
+            out[o] = bias[o] + (w[o] * x[0]);
+        }
+        w = &w[3];
         for (i = 1u; i < 4u; ++i) {
-            const float *const column = &w[i * 3u];
             const float input = x[i];
             for (o = 0u; o < 3u; ++o) {
-                sum[o] = sum[o] + (column[o] * input);
+                out[o] = out[o] + (w[o] * input);
             }
+            w = &w[3];
         }
+#endif
+        bias = &bias[3];
+        out = &out[3];
     }
 }
 

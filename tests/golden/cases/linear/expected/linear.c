@@ -24,8 +24,8 @@
 #pragma STDC FP_CONTRACT OFF
 #define LINEAR_NO_LIBC __attribute__((no_builtin))
 #elif defined(__GNUC__)
-/* no fused multiply-add, and no call to memset in place of a loop */
-#pragma GCC optimize("fp-contract=off", "no-tree-loop-distribute-patterns")
+/* no fused multiply-add, no call to memset in place of a loop, no loads ahead of the sums that take their registers */
+#pragma GCC optimize("fp-contract=off", "no-tree-loop-distribute-patterns", "no-schedule-insns")
 #define LINEAR_NO_LIBC
 #else
 #define LINEAR_NO_LIBC
@@ -182,25 +182,70 @@ LINEAR_CODE static void linear_sense(const linear_state *state, const linear_mea
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
 }
 
+/* Sums side by side in vectors, each one in the order written; the width is that of the machine the compiler is told of. */
+#if defined(__GNUC__) && (defined(__SSE2__) || defined(__aarch64__)) && !defined(__FRAMAC__)
+#if defined(__AVX512F__)
+#define LINEAR_LANES 16
+typedef float __attribute__((vector_size(64), aligned(4), may_alias)) linear_lanes16;
+#elif defined(__AVX__)
+#define LINEAR_LANES 8
+typedef float __attribute__((vector_size(32), aligned(4), may_alias)) linear_lanes8;
+#else
+#define LINEAR_LANES 4
+#endif
+typedef float __attribute__((vector_size(16), aligned(4), may_alias)) linear_lanes4;
+#endif
+
 /* fc0: 2 -> 4 */
 LINEAR_CODE static void linear_layer0(const float *LINEAR_RESTRICT x, float *LINEAR_RESTRICT y)
 {
+    const float *w = linear_weights0;
+    const float *bias = linear_bias0;
+    float *out = y;
     uint32_t i;
+#if !defined(LINEAR_LANES)
     uint32_t o;
+#endif
     {
-        const float *const w = &linear_weights0[0];
-        const float *const bias = &linear_bias0[0];
-        float *const sum = &y[0];
-        for (o = 0u; o < 4u; ++o) {
-            sum[o] = bias[o] + (w[o] * x[0]);
+#if defined(LINEAR_LANES) && (LINEAR_LANES == 4)
+        linear_lanes4 s0 = *(const linear_lanes4 *)&bias[0];
+        for (i = 0u; i < 2u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const linear_lanes4 *)&w[0] * input);
+            w = &w[4];
         }
+        *(linear_lanes4 *)&out[0] = s0;
+#elif defined(LINEAR_LANES) && (LINEAR_LANES == 8)
+        linear_lanes4 s0 = *(const linear_lanes4 *)&bias[0];
+        for (i = 0u; i < 2u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const linear_lanes4 *)&w[0] * input);
+            w = &w[4];
+        }
+        *(linear_lanes4 *)&out[0] = s0;
+#elif defined(LINEAR_LANES) && (LINEAR_LANES == 16)
+        linear_lanes4 s0 = *(const linear_lanes4 *)&bias[0];
+        for (i = 0u; i < 2u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const linear_lanes4 *)&w[0] * input);
+            w = &w[4];
+        }
+        *(linear_lanes4 *)&out[0] = s0;
+#else
+        for (o = 0u; o < 4u; ++o) {
+            out[o] = bias[o] + (w[o] * x[0]);
+        }
+        w = &w[4];
         for (i = 1u; i < 2u; ++i) {
-            const float *const column = &w[i * 4u];
             const float input = x[i];
             for (o = 0u; o < 4u; ++o) {
-                sum[o] = sum[o] + (column[o] * input);
+                out[o] = out[o] + (w[o] * input);
             }
+            w = &w[4];
         }
+#endif
+        bias = &bias[4];
+        out = &out[4];
     }
 }
 

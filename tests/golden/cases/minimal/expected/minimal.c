@@ -24,8 +24,8 @@
 #pragma STDC FP_CONTRACT OFF
 #define MINIMAL_NO_LIBC __attribute__((no_builtin))
 #elif defined(__GNUC__)
-/* no fused multiply-add, and no call to memset in place of a loop */
-#pragma GCC optimize("fp-contract=off", "no-tree-loop-distribute-patterns")
+/* no fused multiply-add, no call to memset in place of a loop, no loads ahead of the sums that take their registers */
+#pragma GCC optimize("fp-contract=off", "no-tree-loop-distribute-patterns", "no-schedule-insns")
 #define MINIMAL_NO_LIBC
 #else
 #define MINIMAL_NO_LIBC
@@ -154,11 +154,15 @@ static float minimal_clamp(float x, float low, float high)
     return minimal_select(minimal_flag(raised > high), high, raised);
 }
 
-/* x if x > 0 else +0, by the sign bit: no branch in the binary */
+/* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
 static float minimal_relu(float x)
 {
+#if defined(__GNUC__)
+    return (x + __builtin_fabsf(x)) * 0.5f;
+#else
     const uint32_t bits = minimal_bits(x);
     return minimal_from_bits(bits & ~((uint32_t)0 - (bits >> 31)));
+#endif
 }
 
 /* What a measurement means before the network sees it. */
@@ -194,25 +198,68 @@ MINIMAL_CODE static void minimal_sense(const minimal_state *state, const minimal
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
 }
 
+/* Sums side by side in vectors, each one in the order written; the width is that of the machine the compiler is told of. */
+#if defined(__GNUC__) && (defined(__SSE2__) || defined(__aarch64__)) && !defined(__FRAMAC__)
+#if defined(__AVX512F__)
+#define MINIMAL_LANES 16
+typedef float __attribute__((vector_size(64), aligned(4), may_alias)) minimal_lanes16;
+#elif defined(__AVX__)
+#define MINIMAL_LANES 8
+typedef float __attribute__((vector_size(32), aligned(4), may_alias)) minimal_lanes8;
+#else
+#define MINIMAL_LANES 4
+#endif
+typedef float __attribute__((vector_size(16), aligned(4), may_alias)) minimal_lanes4;
+#endif
+
 /* fc0: 2 -> 4 */
 MINIMAL_CODE static void minimal_layer0(const float *MINIMAL_RESTRICT x, float *MINIMAL_RESTRICT y)
 {
+    const float *w = minimal_weights0;
+    const float *bias = minimal_bias0;
+    float *out = y;
     uint32_t i;
     uint32_t o;
     {
-        const float *const w = &minimal_weights0[0];
-        const float *const bias = &minimal_bias0[0];
-        float *const sum = &y[0];
-        for (o = 0u; o < 4u; ++o) {
-            sum[o] = bias[o] + (w[o] * x[0]);
+#if defined(MINIMAL_LANES) && (MINIMAL_LANES == 4)
+        minimal_lanes4 s0 = *(const minimal_lanes4 *)&bias[0];
+        for (i = 0u; i < 2u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const minimal_lanes4 *)&w[0] * input);
+            w = &w[4];
         }
+        *(minimal_lanes4 *)&out[0] = s0;
+#elif defined(MINIMAL_LANES) && (MINIMAL_LANES == 8)
+        minimal_lanes4 s0 = *(const minimal_lanes4 *)&bias[0];
+        for (i = 0u; i < 2u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const minimal_lanes4 *)&w[0] * input);
+            w = &w[4];
+        }
+        *(minimal_lanes4 *)&out[0] = s0;
+#elif defined(MINIMAL_LANES) && (MINIMAL_LANES == 16)
+        minimal_lanes4 s0 = *(const minimal_lanes4 *)&bias[0];
+        for (i = 0u; i < 2u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const minimal_lanes4 *)&w[0] * input);
+            w = &w[4];
+        }
+        *(minimal_lanes4 *)&out[0] = s0;
+#else
+        for (o = 0u; o < 4u; ++o) {
+            out[o] = bias[o] + (w[o] * x[0]);
+        }
+        w = &w[4];
         for (i = 1u; i < 2u; ++i) {
-            const float *const column = &w[i * 4u];
             const float input = x[i];
             for (o = 0u; o < 4u; ++o) {
-                sum[o] = sum[o] + (column[o] * input);
+                out[o] = out[o] + (w[o] * input);
             }
+            w = &w[4];
         }
+#endif
+        bias = &bias[4];
+        out = &out[4];
     }
     for (o = 0u; o < 4u; ++o) {
         y[o] = minimal_relu(y[o]);
@@ -222,22 +269,71 @@ MINIMAL_CODE static void minimal_layer0(const float *MINIMAL_RESTRICT x, float *
 /* fc1: 4 -> 3 */
 MINIMAL_CODE static void minimal_layer1(const float *MINIMAL_RESTRICT x, float *MINIMAL_RESTRICT y)
 {
+    const float *w = minimal_weights1;
+    const float *bias = minimal_bias1;
+    float *out = y;
     uint32_t i;
+#if !defined(MINIMAL_LANES)
     uint32_t o;
+#endif
     {
-        const float *const w = &minimal_weights1[0];
-        const float *const bias = &minimal_bias1[0];
-        float *const sum = &y[0];
-        for (o = 0u; o < 3u; ++o) {
-            sum[o] = bias[o] + (w[o] * x[0]);
+#if defined(MINIMAL_LANES) && (MINIMAL_LANES == 4)
+        float s0 = bias[0];
+        float s1 = bias[1];
+        float s2 = bias[2];
+        for (i = 0u; i < 4u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (w[0] * input);
+            s1 = s1 + (w[1] * input);
+            s2 = s2 + (w[2] * input);
+            w = &w[3];
         }
+        out[0] = s0;
+        out[1] = s1;
+        out[2] = s2;
+#elif defined(MINIMAL_LANES) && (MINIMAL_LANES == 8)
+        float s0 = bias[0];
+        float s1 = bias[1];
+        float s2 = bias[2];
+        for (i = 0u; i < 4u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (w[0] * input);
+            s1 = s1 + (w[1] * input);
+            s2 = s2 + (w[2] * input);
+            w = &w[3];
+        }
+        out[0] = s0;
+        out[1] = s1;
+        out[2] = s2;
+#elif defined(MINIMAL_LANES) && (MINIMAL_LANES == 16)
+        float s0 = bias[0];
+        float s1 = bias[1];
+        float s2 = bias[2];
+        for (i = 0u; i < 4u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (w[0] * input);
+            s1 = s1 + (w[1] * input);
+            s2 = s2 + (w[2] * input);
+            w = &w[3];
+        }
+        out[0] = s0;
+        out[1] = s1;
+        out[2] = s2;
+#else
+        for (o = 0u; o < 3u; ++o) {
+            out[o] = bias[o] + (w[o] * x[0]);
+        }
+        w = &w[3];
         for (i = 1u; i < 4u; ++i) {
-            const float *const column = &w[i * 3u];
             const float input = x[i];
             for (o = 0u; o < 3u; ++o) {
-                sum[o] = sum[o] + (column[o] * input);
+                out[o] = out[o] + (w[o] * input);
             }
+            w = &w[3];
         }
+#endif
+        bias = &bias[3];
+        out = &out[3];
     }
 }
 

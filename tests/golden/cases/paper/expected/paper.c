@@ -24,8 +24,8 @@
 #pragma STDC FP_CONTRACT OFF
 #define PAPER_NO_LIBC __attribute__((no_builtin))
 #elif defined(__GNUC__)
-/* no fused multiply-add, and no call to memset in place of a loop */
-#pragma GCC optimize("fp-contract=off", "no-tree-loop-distribute-patterns")
+/* no fused multiply-add, no call to memset in place of a loop, no loads ahead of the sums that take their registers */
+#pragma GCC optimize("fp-contract=off", "no-tree-loop-distribute-patterns", "no-schedule-insns")
 #define PAPER_NO_LIBC
 #else
 #define PAPER_NO_LIBC
@@ -171,11 +171,15 @@ static float paper_clamp(float x, float low, float high)
     return paper_select(paper_flag(raised > high), high, raised);
 }
 
-/* x if x > 0 else +0, by the sign bit: no branch in the binary */
+/* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
 static float paper_relu(float x)
 {
+#if defined(__GNUC__)
+    return (x + __builtin_fabsf(x)) * 0.5f;
+#else
     const uint32_t bits = paper_bits(x);
     return paper_from_bits(bits & ~((uint32_t)0 - (bits >> 31)));
+#endif
 }
 
 /* What a measurement means before the network sees it. */
@@ -254,25 +258,77 @@ PAPER_CODE static void paper_sense(const paper_state *state, const paper_measure
     front->clipped = f36;
 }
 
+/* Sums side by side in vectors, each one in the order written; the width is that of the machine the compiler is told of. */
+#if defined(__GNUC__) && (defined(__SSE2__) || defined(__aarch64__)) && !defined(__FRAMAC__)
+#if defined(__AVX512F__)
+#define PAPER_LANES 16
+typedef float __attribute__((vector_size(64), aligned(4), may_alias)) paper_lanes16;
+#elif defined(__AVX__)
+#define PAPER_LANES 8
+typedef float __attribute__((vector_size(32), aligned(4), may_alias)) paper_lanes8;
+#else
+#define PAPER_LANES 4
+#endif
+typedef float __attribute__((vector_size(16), aligned(4), may_alias)) paper_lanes4;
+#endif
+
 /* fc0: 6 -> 5 */
 PAPER_CODE static void paper_layer0(const float *PAPER_RESTRICT x, float *PAPER_RESTRICT y)
 {
+    const float *w = paper_weights0;
+    const float *bias = paper_bias0;
+    float *out = y;
     uint32_t i;
     uint32_t o;
     {
-        const float *const w = &paper_weights0[0];
-        const float *const bias = &paper_bias0[0];
-        float *const sum = &y[0];
-        for (o = 0u; o < 5u; ++o) {
-            sum[o] = bias[o] + (w[o] * x[0]);
+#if defined(PAPER_LANES) && (PAPER_LANES == 4)
+        paper_lanes4 s0 = *(const paper_lanes4 *)&bias[0];
+        float s4 = bias[4];
+        for (i = 0u; i < 6u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const paper_lanes4 *)&w[0] * input);
+            s4 = s4 + (w[4] * input);
+            w = &w[5];
         }
+        *(paper_lanes4 *)&out[0] = s0;
+        out[4] = s4;
+#elif defined(PAPER_LANES) && (PAPER_LANES == 8)
+        paper_lanes4 s0 = *(const paper_lanes4 *)&bias[0];
+        float s4 = bias[4];
+        for (i = 0u; i < 6u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const paper_lanes4 *)&w[0] * input);
+            s4 = s4 + (w[4] * input);
+            w = &w[5];
+        }
+        *(paper_lanes4 *)&out[0] = s0;
+        out[4] = s4;
+#elif defined(PAPER_LANES) && (PAPER_LANES == 16)
+        paper_lanes4 s0 = *(const paper_lanes4 *)&bias[0];
+        float s4 = bias[4];
+        for (i = 0u; i < 6u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const paper_lanes4 *)&w[0] * input);
+            s4 = s4 + (w[4] * input);
+            w = &w[5];
+        }
+        *(paper_lanes4 *)&out[0] = s0;
+        out[4] = s4;
+#else
+        for (o = 0u; o < 5u; ++o) {
+            out[o] = bias[o] + (w[o] * x[0]);
+        }
+        w = &w[5];
         for (i = 1u; i < 6u; ++i) {
-            const float *const column = &w[i * 5u];
             const float input = x[i];
             for (o = 0u; o < 5u; ++o) {
-                sum[o] = sum[o] + (column[o] * input);
+                out[o] = out[o] + (w[o] * input);
             }
+            w = &w[5];
         }
+#endif
+        bias = &bias[5];
+        out = &out[5];
     }
     for (o = 0u; o < 5u; ++o) {
         y[o] = paper_relu(y[o]);
@@ -282,22 +338,51 @@ PAPER_CODE static void paper_layer0(const float *PAPER_RESTRICT x, float *PAPER_
 /* fc1: 5 -> 4 */
 PAPER_CODE static void paper_layer1(const float *PAPER_RESTRICT x, float *PAPER_RESTRICT y)
 {
+    const float *w = paper_weights1;
+    const float *bias = paper_bias1;
+    float *out = y;
     uint32_t i;
     uint32_t o;
     {
-        const float *const w = &paper_weights1[0];
-        const float *const bias = &paper_bias1[0];
-        float *const sum = &y[0];
-        for (o = 0u; o < 4u; ++o) {
-            sum[o] = bias[o] + (w[o] * x[0]);
+#if defined(PAPER_LANES) && (PAPER_LANES == 4)
+        paper_lanes4 s0 = *(const paper_lanes4 *)&bias[0];
+        for (i = 0u; i < 5u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const paper_lanes4 *)&w[0] * input);
+            w = &w[4];
         }
+        *(paper_lanes4 *)&out[0] = s0;
+#elif defined(PAPER_LANES) && (PAPER_LANES == 8)
+        paper_lanes4 s0 = *(const paper_lanes4 *)&bias[0];
+        for (i = 0u; i < 5u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const paper_lanes4 *)&w[0] * input);
+            w = &w[4];
+        }
+        *(paper_lanes4 *)&out[0] = s0;
+#elif defined(PAPER_LANES) && (PAPER_LANES == 16)
+        paper_lanes4 s0 = *(const paper_lanes4 *)&bias[0];
+        for (i = 0u; i < 5u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const paper_lanes4 *)&w[0] * input);
+            w = &w[4];
+        }
+        *(paper_lanes4 *)&out[0] = s0;
+#else
+        for (o = 0u; o < 4u; ++o) {
+            out[o] = bias[o] + (w[o] * x[0]);
+        }
+        w = &w[4];
         for (i = 1u; i < 5u; ++i) {
-            const float *const column = &w[i * 4u];
             const float input = x[i];
             for (o = 0u; o < 4u; ++o) {
-                sum[o] = sum[o] + (column[o] * input);
+                out[o] = out[o] + (w[o] * input);
             }
+            w = &w[4];
         }
+#endif
+        bias = &bias[4];
+        out = &out[4];
     }
     for (o = 0u; o < 4u; ++o) {
         y[o] = paper_relu(y[o]);
@@ -307,22 +392,68 @@ PAPER_CODE static void paper_layer1(const float *PAPER_RESTRICT x, float *PAPER_
 /* fc2: 4 -> 9 */
 PAPER_CODE static void paper_layer2(const float *PAPER_RESTRICT x, float *PAPER_RESTRICT y)
 {
+    const float *w = paper_weights2;
+    const float *bias = paper_bias2;
+    float *out = y;
     uint32_t i;
+#if !defined(PAPER_LANES)
     uint32_t o;
+#endif
     {
-        const float *const w = &paper_weights2[0];
-        const float *const bias = &paper_bias2[0];
-        float *const sum = &y[0];
-        for (o = 0u; o < 9u; ++o) {
-            sum[o] = bias[o] + (w[o] * x[0]);
+#if defined(PAPER_LANES) && (PAPER_LANES == 4)
+        paper_lanes4 s0 = *(const paper_lanes4 *)&bias[0];
+        paper_lanes4 s4 = *(const paper_lanes4 *)&bias[4];
+        float s8 = bias[8];
+        for (i = 0u; i < 4u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const paper_lanes4 *)&w[0] * input);
+            s4 = s4 + (*(const paper_lanes4 *)&w[4] * input);
+            s8 = s8 + (w[8] * input);
+            w = &w[9];
         }
+        *(paper_lanes4 *)&out[0] = s0;
+        *(paper_lanes4 *)&out[4] = s4;
+        out[8] = s8;
+#elif defined(PAPER_LANES) && (PAPER_LANES == 8)
+        paper_lanes8 s0 = *(const paper_lanes8 *)&bias[0];
+        float s8 = bias[8];
+        for (i = 0u; i < 4u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const paper_lanes8 *)&w[0] * input);
+            s8 = s8 + (w[8] * input);
+            w = &w[9];
+        }
+        *(paper_lanes8 *)&out[0] = s0;
+        out[8] = s8;
+#elif defined(PAPER_LANES) && (PAPER_LANES == 16)
+        paper_lanes4 s0 = *(const paper_lanes4 *)&bias[0];
+        paper_lanes4 s4 = *(const paper_lanes4 *)&bias[4];
+        float s8 = bias[8];
+        for (i = 0u; i < 4u; ++i) {
+            const float input = x[i];
+            s0 = s0 + (*(const paper_lanes4 *)&w[0] * input);
+            s4 = s4 + (*(const paper_lanes4 *)&w[4] * input);
+            s8 = s8 + (w[8] * input);
+            w = &w[9];
+        }
+        *(paper_lanes4 *)&out[0] = s0;
+        *(paper_lanes4 *)&out[4] = s4;
+        out[8] = s8;
+#else
+        for (o = 0u; o < 9u; ++o) {
+            out[o] = bias[o] + (w[o] * x[0]);
+        }
+        w = &w[9];
         for (i = 1u; i < 4u; ++i) {
-            const float *const column = &w[i * 9u];
             const float input = x[i];
             for (o = 0u; o < 9u; ++o) {
-                sum[o] = sum[o] + (column[o] * input);
+                out[o] = out[o] + (w[o] * input);
             }
+            w = &w[9];
         }
+#endif
+        bias = &bias[9];
+        out = &out[9];
     }
 }
 

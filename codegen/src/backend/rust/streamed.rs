@@ -1,0 +1,188 @@
+//! The layers one after the other; the last one takes the outputs of the one before block by block.
+
+use proc_macro2::{Ident, TokenStream};
+use quote::quote;
+
+use super::network::{activation, columns, layer_items, row};
+use super::{ident, size};
+use crate::program::LayerCode;
+
+/// Tables and functions of all layers, and the body of `network`.
+pub fn network(layers: &[LayerCode]) -> (TokenStream, TokenStream) {
+    let (before, streamed) = match layers {
+        [before @ .., block, last] if last.is_streamed() => (before, Some((block, last))),
+        _ => (layers, None),
+    };
+    let mut items = Vec::new();
+    let mut calls = Vec::new();
+    let mut value = quote!(observation);
+    let mut result = quote!(observation);
+    for (index, layer) in before.iter().enumerate() {
+        let (tables, function) = layer_items(index, layer);
+        items.push(quote!(#tables #function));
+        let (name, sink) = (ident(&format!("layer{index}")), ident(&format!("hidden{index}")));
+        calls.push(quote! { let #sink = #name(#value); });
+        value = quote!(&#sink);
+        result = quote!(#sink);
+    }
+    let Some((block, last)) = streamed else {
+        return (quote!(#(#items)*), quote!(#(#calls)* #result));
+    };
+    let index = before.len();
+    let (tables, _) = layer_items(index, block);
+    let (last_items, chunks) = (last_layer(index + 1, last), chunks(index, block, last, &value));
+    items.push(quote!(#tables #last_items));
+    (quote!(#(#items)*), quote!(#(#calls)* #chunks))
+}
+
+/// Names of the tables of a streamed layer: blocks and shorter last block for the full chunks, then for the shorter last
+/// chunk.
+fn names(index: usize) -> [Ident; 4] {
+    ["WEIGHTS", "TAIL_WEIGHTS", "LAST_WEIGHTS", "LAST_TAIL_WEIGHTS"].map(|name| ident(&format!("{name}{index}")))
+}
+
+/// Tables, and the function that adds a chunk of inputs to the sums.
+fn last_layer(index: usize, layer: &LayerCode) -> TokenStream {
+    let [weights, tail_weights, last_weights, last_tail_weights] = names(index);
+    let (rows, full, tail) = (layer.block_rows, layer.full_blocks(), layer.tail_rows());
+    let (rest, count) = (layer.inputs % layer.chunk, layer.inputs / layer.chunk);
+    // a chunk is its blocks, then its shorter last block
+    let split = |chunk: &[f32], inputs: usize| {
+        let (blocks, last) = chunk.split_at(full * rows * inputs);
+        let blocks = blocks.chunks(rows * inputs).map(|block| columns(block, rows));
+        (quote!([#(#blocks),*]), columns(last, tail.max(1)))
+    };
+    let (whole, shorter) = layer.table.split_at(count * layer.chunk * layer.outputs);
+    let (blocks, tails): (Vec<_>, Vec<_>) = whole
+        .chunks(layer.chunk * layer.outputs)
+        .map(|chunk| split(chunk, layer.chunk))
+        .unzip();
+    let bias = ident(&format!("BIAS{index}"));
+    let biases = row(&layer.bias);
+    let outputs = size(layer.outputs);
+    let [rows, full, tail_rows, chunk, count, rest_size] = [rows, full, tail, layer.chunk, count, rest].map(size);
+    let mut tables = vec![quote! {
+        static #weights: [[[[f32; #rows]; #chunk]; #full]; #count] = [#(#blocks),*];
+        static #bias: [f32; #outputs] = #biases;
+    }];
+    if tail > 0 {
+        tables.push(quote! { static #tail_weights: [[[f32; #tail_rows]; #chunk]; #count] = [#(#tails),*]; });
+    }
+    if rest > 0 {
+        let (blocks, last) = split(shorter, rest);
+        tables.push(quote! { static #last_weights: [[[f32; #rows]; #rest_size]; #full] = #blocks; });
+        if tail > 0 {
+            tables.push(quote! { static #last_tail_weights: [[f32; #tail_rows]; #rest_size] = #last; });
+        }
+    }
+    let (parameter, tail_code) = if tail > 0 {
+        (
+            quote!(tail: &[[f32; #tail_rows]; INPUTS],),
+            quote! {
+                if let Some((out, _)) = rest.split_first_chunk_mut::<#tail_rows>() {
+                    *out = block(tail, out, x);
+                }
+            },
+        )
+    } else {
+        (TokenStream::new(), quote!(let _ = rest;))
+    };
+    let name = ident(&format!("layer{index}"));
+    let doc = format!(
+        " {}: {} -> {}, what a chunk of its inputs adds",
+        layer.name, layer.inputs, layer.outputs
+    );
+    quote! {
+        #(#tables)*
+        #[doc = #doc]
+        #[inline(always)]
+        fn #name<const INPUTS: usize>(
+            weights: &[[[f32; #rows]; INPUTS]; #full],
+            #parameter
+            x: &[f32; INPUTS],
+            sums: &mut [f32; #outputs],
+        ) {
+            let mut rest: &mut [f32] = sums;
+            for weights in weights {
+                if let Some((out, after)) = core::mem::take(&mut rest).split_first_chunk_mut::<#rows>() {
+                    *out = block(weights, out, x);
+                    rest = after;
+                }
+            }
+            #tail_code
+        }
+    }
+}
+
+/// Body of `network` from the outputs `value` of the layers before.
+fn chunks(index: usize, layer: &LayerCode, last: &LayerCode, value: &TokenStream) -> TokenStream {
+    let next = index + 1;
+    let [weights, tail_weights, last_weights, last_tail_weights] = names(next);
+    let (before, bias) = (ident(&format!("WEIGHTS{index}")), ident(&format!("BIAS{index}")));
+    let (before_tail, bias_tail) = (
+        ident(&format!("TAIL_WEIGHTS{index}")),
+        ident(&format!("TAIL_BIAS{index}")),
+    );
+    let (name, sums) = (ident(&format!("layer{next}")), ident(&format!("BIAS{next}")));
+    let activated = activation(layer.activation);
+    let has_tail = last.tail_rows() > 0;
+    let (iterator, pattern, argument, last_argument) = if has_tail {
+        (
+            quote!(#before.iter().zip(&#bias).zip(#weights.iter().zip(&#tail_weights))),
+            quote!(((weights, bias), (next, tail))),
+            quote!(tail,),
+            quote!(&#last_tail_weights,),
+        )
+    } else {
+        (
+            quote!(#before.iter().zip(&#bias).zip(&#weights)),
+            quote!(((weights, bias), next)),
+            TokenStream::new(),
+            TokenStream::new(),
+        )
+    };
+    let shorter = (!last.inputs.is_multiple_of(last.chunk)).then(|| {
+        quote! {
+            let part = block(&#before_tail, &#bias_tail, #value).map(|sum| #activated);
+            #name(&#last_weights, #last_argument &part, &mut q);
+        }
+    });
+    quote! {
+        let mut q = #sums;
+        for #pattern in #iterator {
+            let part = block(weights, bias, #value).map(|sum| #activated);
+            #name(next, #argument &part, &mut q);
+        }
+        #shorter
+        q
+    }
+}
+
+/// Statements of the integrity check, in the order of the table.
+pub fn integrity(index: usize, layer: &LayerCode) -> TokenStream {
+    let [weights, tail_weights, last_weights, last_tail_weights] = names(index);
+    let bias = ident(&format!("BIAS{index}"));
+    let has_tail = layer.tail_rows() > 0;
+    let full = if has_tail {
+        quote! {
+            for (blocks, tail) in core::hint::black_box(&#weights).iter().zip(core::hint::black_box(&#tail_weights)) {
+                for column in blocks.iter().flatten() { crc = crc_floats(crc, column); }
+                for column in tail { crc = crc_floats(crc, column); }
+            }
+        }
+    } else {
+        quote! {
+            for column in core::hint::black_box(&#weights).iter().flatten().flatten() { crc = crc_floats(crc, column); }
+        }
+    };
+    let shorter = (!layer.inputs.is_multiple_of(layer.chunk)).then(|| {
+        let tail = has_tail.then(|| {
+            quote! { for column in core::hint::black_box(&#last_tail_weights) { crc = crc_floats(crc, column); } }
+        });
+        quote! {
+            for column in core::hint::black_box(&#last_weights).iter().flatten() { crc = crc_floats(crc, column); }
+            #tail
+        }
+    });
+    quote! { #full #shorter crc = crc_floats(crc, core::hint::black_box(&#bias)); }
+}

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use plant::Parameters;
 
-use crate::diagnosis::{Diagnosis, Verdict};
+use crate::diagnosis::Diagnosis;
 use crate::drive::Model;
 
 /// Numbers that are written without a point.
@@ -33,16 +33,18 @@ pub fn as_plant(model: &Model, trim: f64) -> Parameters {
     p
 }
 
+/// The model with what was found; where nothing was named, the model as it is with the trim of the edges.
+#[must_use]
+pub fn extended_plant(diagnosis: &Diagnosis) -> Parameters {
+    as_plant(&diagnosis.extended, diagnosis.trim)
+}
+
 /// Text of `plant.extended.toml`; changed numbers carry what they were and their 95 % interval.
 #[must_use]
 pub fn extended_toml(diagnosis: &Diagnosis) -> String {
     let findings = &diagnosis.findings;
-    let trim = diagnosis.attribution.state().starts.trim;
-    let extended = match findings.verdict {
-        Verdict::Consistent | Verdict::Unexplained => Model::new(&diagnosis.problem.base.plant),
-        _ => diagnosis.extended.clone(),
-    };
-    let after = as_plant(&extended, trim);
+    let trim = diagnosis.trim;
+    let after = extended_plant(diagnosis);
     let before = &diagnosis.problem.base.plant;
     let mut notes: BTreeMap<&str, String> = BTreeMap::new();
     let best = diagnosis

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 
 use codegen::Language;
 use policy::Policy;
-use targets::{Fpu, TargetSpec};
+use targets::TargetSpec;
 use verify::{Options, Outcome, Report};
 
 /// Policies drawn at random beside the example.
@@ -20,24 +20,16 @@ const RANDOM_POLICIES: u64 = 20;
 /// Seed of the first.
 const FIRST_SEED: u64 = 5000;
 
-/// Steps of a build with floats in hardware; emulating float libraries takes ten times as long.
+/// Steps of a build.
 const STEPS: u64 = 20_000;
-const STEPS_WITHOUT_FPU: u64 = 2_000;
 
 fn target(name: &str) -> &'static TargetSpec {
     targets::find(name).unwrap()
 }
 
-fn steps(target: &TargetSpec) -> u64 {
+fn steps() -> u64 {
     let asked = std::env::var("POLICYC_TARGET_STEPS").ok();
-    asked.map_or(
-        if target.fpu == Fpu::None {
-            STEPS_WITHOUT_FPU
-        } else {
-            STEPS
-        },
-        |text| text.parse().expect("POLICYC_TARGET_STEPS is a number"),
-    )
+    asked.map_or(STEPS, |text| text.parse().expect("POLICYC_TARGET_STEPS is a number"))
 }
 
 fn assert_equal(report: &Report, what: &str) {
@@ -54,7 +46,7 @@ fn run(policy: &Policy, target: &'static TargetSpec, compilers: &[&str], levels:
     verify::run(
         policy,
         Options {
-            steps: steps(target),
+            steps: steps(),
             seed: 3,
             target,
             compilers: owned(compilers),

@@ -3,6 +3,7 @@
 use codegen::Language;
 use policy::{NumericFormat, Policy};
 use targets::{Fpu, Runner, TargetSpec};
+use verify::estimate::estimate;
 use verify::measure::{Costs, STEPS, measure};
 use verify::toolchain;
 
@@ -134,6 +135,51 @@ fn without_fpu_only_the_float_library_is_called_and_its_count_varies() {
             assert!(!costs.library_calls.is_empty(), "{} {costs:?}", target.name);
         }
     }
+}
+
+/// Where floats are hardware, nothing but the controller's own frames is on the stack; the painted depth has the return
+/// addresses of the call and steps of 16 bytes in it.
+#[test]
+fn the_estimated_stack_is_near_the_painted_one() {
+    let policy = example();
+    for target in emulated(true) {
+        let files = codegen::generate(&policy, target, &[Language::C]).unwrap().files;
+        let compiler = [target.c_compilers[0].program.to_owned()];
+        for build in toolchain::builds(target, &compiler, &[]) {
+            let painted = measure(&policy, target, &files, &build).unwrap().stack_bytes;
+            let estimated = estimate(&policy, target, &files, &build).unwrap().estimated_stack_bytes;
+            println!(
+                "{} {}: estimated {estimated}, painted {painted}",
+                target.name,
+                build.name()
+            );
+            assert!(estimated.abs_diff(painted) <= 32, "{} {}", target.name, build.name());
+        }
+    }
+}
+
+/// A machine with the cross compiler and without the emulator.
+#[test]
+fn without_the_emulator_compile_says_what_it_estimates() {
+    let folder = tempfile::tempdir().unwrap();
+    let compiler = toolchain::find("arm-none-eabi-gcc").unwrap();
+    std::os::unix::fs::symlink(compiler, folder.path().join("arm-none-eabi-gcc")).unwrap();
+    let mut command = std::process::Command::new(tests::tools::policyc());
+    command
+        .arg("compile")
+        .arg(tests::example())
+        .args(["--target", "cortex-m4f", "--out"]);
+    command.arg(folder.path().join("out")).env("PATH", folder.path());
+    let ran = tests::tools::run(&mut command);
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    for text in [
+        "estimated from the compiler's frames, nothing was run",
+        "not measured: qemu-system-arm",
+    ] {
+        assert!(ran.stdout.contains(text), "{text}\n{}", ran.stdout);
+    }
+    let manifest = std::fs::read_to_string(folder.path().join("out/manifest.json")).unwrap();
+    assert!(manifest.contains("\"estimated_stack_bytes\"") && !manifest.contains("\"stack_bytes\""));
 }
 
 /// One hidden layer of 64 floats is 256 of them; the other is never there as a whole.

@@ -24,6 +24,7 @@ pub mod doors;
 pub mod drift;
 pub mod drivers;
 pub mod elf;
+pub mod estimate;
 pub mod fmu;
 mod golden;
 pub mod kit;

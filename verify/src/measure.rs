@@ -14,6 +14,7 @@ use serde::Serialize;
 use targets::TargetSpec;
 
 use crate::elf::Elf;
+use crate::estimate::{Estimate, estimate};
 use crate::runner::{ProcessRunner, Runner as _};
 use crate::session::{COMPILER_TIMEOUT, Files};
 use crate::toolchain::{self, Build, BuildError, Install, Missing, Purpose, Sources};
@@ -43,6 +44,17 @@ pub struct Costs {
     pub steps: usize,
     /// Functions that the controller calls and does not hold: the float library of a processor without FPU.
     pub library_calls: Vec<String>,
+}
+
+/// What [`usual_builds`] has found out.
+#[derive(Debug, Default)]
+pub struct UsualBuilds {
+    /// Builds that ran.
+    pub measured: Vec<Costs>,
+    /// Builds that could not run, because the emulator is not on this machine.
+    pub estimated: Vec<Estimate>,
+    /// What was not on this machine.
+    pub missing: Vec<Missing>,
 }
 
 /// Why nothing was measured.
@@ -141,7 +153,7 @@ const PLUGIN_COMPILER: &str = "gcc";
 /// A step under the emulator takes milliseconds.
 const RUN_TIMEOUT: Duration = Duration::from_secs(120);
 
-fn read_elf(path: &Path) -> Result<Elf, MeasureError> {
+pub(crate) fn read_elf(path: &Path) -> Result<Elf, MeasureError> {
     let bytes = std::fs::read(path)?;
     Elf::read(&bytes).ok_or_else(|| MeasureError::Run("the compiler wrote no ELF file of 32 bits".to_owned()))
 }
@@ -254,33 +266,40 @@ fn calls(object: &Elf) -> Vec<String> {
     names
 }
 
-/// Measures the builds that firmware takes: the first C compiler at each level, and rustc; those that can be made here.
+/// Measures the builds that firmware takes: the first C compiler at each level, and rustc; those that can be made here. Builds
+/// in C are estimated if there is no emulator to run them.
 ///
 /// # Errors
-/// Of the first build that can be made and does not run; what is missing is no error but the second value.
+/// Of the first build that can be made and does not run; what is missing is no error.
 pub fn usual_builds(
     policy: &Policy,
     target: &TargetSpec,
     files: &Files,
     languages: &[codegen::Language],
-) -> Result<(Vec<Costs>, Vec<Missing>), MeasureError> {
-    let (mut costs, mut missing) = (Vec::new(), Vec::new());
-    if !matches!(target.runner, targets::Runner::Emulated(_)) {
-        return Ok((costs, missing));
-    }
+) -> Result<UsualBuilds, MeasureError> {
+    let mut usual_builds = UsualBuilds::default();
+    let targets::Runner::Emulated(board) = target.runner else {
+        return Ok(usual_builds);
+    };
     let first = target.c_compilers.first().map(|compiler| compiler.program);
     let usual = toolchain::builds(target, &[], &[]).into_iter().filter(|build| {
         languages.contains(&build.language()) && (Some(build.compiler) == first || build.compiler == toolchain::RUSTC)
     });
     for build in usual {
         match measure(policy, target, files, &build) {
-            Ok(cost) => costs.push(cost),
-            Err(MeasureError::Missing(what)) => missing.extend(what),
+            Ok(costs) => usual_builds.measured.push(costs),
+            Err(MeasureError::Missing(what)) => {
+                let compiles = toolchain::find(build.compiler).is_some() && build.language() == codegen::Language::C;
+                if compiles && toolchain::find(board.emulator).is_none() {
+                    usual_builds.estimated.push(estimate(policy, target, files, &build)?);
+                }
+                usual_builds.missing.extend(what);
+            }
             Err(error) => return Err(error),
         }
     }
-    missing.dedup();
-    Ok((costs, missing))
+    usual_builds.missing.dedup();
+    Ok(usual_builds)
 }
 
 #[cfg(test)]

@@ -4,16 +4,25 @@ use ::targets::TargetSpec;
 use codegen::Language;
 use policy::Policy;
 use verify::Files;
+use verify::estimate::Estimate;
 use verify::measure::{Costs, usual_builds};
 
 use super::verify::missing_text;
 use super::{bytes, grouped};
 use crate::{Failure, output};
 
+/// Costs of one build, as they stand in the manifest.
+#[derive(serde::Serialize)]
+#[serde(untagged)]
+pub enum Entry {
+    Measured(Costs),
+    Estimated(Estimate),
+}
+
 /// Costs of the builds that could be made here, and what was not possible.
 #[derive(Default)]
 pub struct Measured {
-    pub costs: Vec<Costs>,
+    pub costs: Vec<Entry>,
     notes: Vec<String>,
 }
 
@@ -21,9 +30,15 @@ impl Measured {
     /// Builds and runs the files. The report is an extra: that it cannot be made is a note, not a failure.
     pub fn of(policy: &Policy, target: &TargetSpec, languages: &[Language], files: &Files) -> Self {
         match usual_builds(policy, target, files, languages) {
-            Ok((costs, missing)) => Self {
-                costs,
-                notes: missing
+            Ok(usual) => Self {
+                costs: usual
+                    .measured
+                    .into_iter()
+                    .map(Entry::Measured)
+                    .chain(usual.estimated.into_iter().map(Entry::Estimated))
+                    .collect(),
+                notes: usual
+                    .missing
                     .iter()
                     .map(|missing| format!("costs on {} not measured: {}", target.name, missing_text(missing)))
                     .collect(),
@@ -37,14 +52,28 @@ impl Measured {
 
     /// Prints a block per build.
     pub fn say(&self, policy: &Policy, target: &TargetSpec) -> Result<(), Failure> {
-        for costs in &self.costs {
-            output::say(&text(costs, policy, target))?;
+        for entry in &self.costs {
+            output::say(&match entry {
+                Entry::Measured(costs) => text(costs, policy, target),
+                Entry::Estimated(estimate) => estimated(estimate, target),
+            })?;
         }
         for note in &self.notes {
             output::say(&format!("note: {note}"))?;
         }
         Ok(())
     }
+}
+
+fn estimated(estimate: &Estimate, target: &TargetSpec) -> String {
+    format!(
+        "{} on {}\n  flash {}, static RAM {}, stack about {} (estimated from the compiler's frames, nothing was run)",
+        estimate.build,
+        target.name,
+        bytes(estimate.flash_bytes as usize),
+        bytes(estimate.static_ram_bytes as usize),
+        bytes(estimate.estimated_stack_bytes as usize)
+    )
 }
 
 fn text(costs: &Costs, policy: &Policy, target: &TargetSpec) -> String {

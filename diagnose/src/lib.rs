@@ -36,3 +36,4 @@ pub mod record;
 pub mod shape;
 mod spectrum;
 pub mod ties;
+mod words;

@@ -149,8 +149,10 @@ pub struct Diagnosis {
     pub profiles: Vec<Profile>,
     /// Held-out records.
     pub held: Option<Pair>,
-    /// The extended model.
+    /// The extended model; the model as given where no cause explains the records.
     pub extended: Model,
+    /// Duty that its edges add, 1.
+    pub trim: f64,
     /// The loop closed with a policy, if one was given.
     pub control: Option<crate::control::Control>,
 }
@@ -168,14 +170,20 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     }
     say("intervals");
     let profiles = profiles(&problem, &attribution);
-    let structure = structures(&problem, attribution.state(), attribution.inflation);
+    let structure = structures(&problem, &attribution.null, attribution.state(), attribution.inflation);
     let named = named(&attribution, &profiles);
     let lattice = quantised(&problem);
     let verdict = verdict(&named, &lattice, &structure);
     let explained = verdict != Verdict::Unexplained;
     say("held-out records");
-    let extended = attribution.state().model.clone();
-    let trim = attribution.state().starts.trim;
+    // what does not explain the records is no better model
+    let state = if explained {
+        attribution.state()
+    } else {
+        &attribution.null
+    };
+    let trim = if explained { state.starts.trim_or_none() } else { 0.0 };
+    let extended = state.model.clone();
     let pair = (!heldout.is_empty()).then(|| gain::hold(heldout, &base, &extended, problem.sigma, trim));
     let next_experiments = match explained {
         true => crate::next::experiments(&problem, &attribution, say),
@@ -196,7 +204,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         structure,
         not_detectable: hidden(&problem, &attribution),
         next_experiments,
-        noise: noise_of(&problem, &attribution, &outliers, pair.as_ref()),
+        noise: noise_of(&problem, &attribution, &outliers, pair.as_ref(), trim),
         gain: Gain {
             heldout: pair.as_ref().map_or_else(Vec::new, Pair::errors),
             mean_square: pair.as_ref().map_or([f64::NAN; 2], |pair| pair.total().into()),
@@ -212,6 +220,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         profiles,
         held: pair,
         extended,
+        trim,
         control: None,
     }
 }
@@ -364,7 +373,13 @@ fn hidden(problem: &Problem, attribution: &Attribution) -> Vec<Hidden> {
     list
 }
 
-fn noise_of(problem: &Problem, attribution: &Attribution, outliers: &[Outlier], pair: Option<&Pair>) -> Noise {
+fn noise_of(
+    problem: &Problem,
+    attribution: &Attribution,
+    outliers: &[Outlier],
+    pair: Option<&Pair>,
+    trim: f64,
+) -> Noise {
     let measured = (0..CHANNELS).filter(|n| problem.sigma[*n].is_finite());
     let outlier = |one: &Outlier| {
         let record = &problem.records[one.record].name;
@@ -383,6 +398,6 @@ fn noise_of(problem: &Problem, attribution: &Attribution, outliers: &[Outlier], 
         repairs: repairs
             .chain(pair.into_iter().flat_map(|pair| pair.remarks.clone()))
             .collect(),
-        trim: attribution.state().starts.trim,
+        trim,
     }
 }

@@ -1,9 +1,10 @@
 //! Explanations that share no cause with the leading one and fit as well.
 
-use crate::attribute::{Attribution, gained};
+use crate::attribute::Attribution;
 use crate::fit::Fit;
 use crate::parallel;
 use crate::problem::Problem;
+use crate::search::gained;
 
 /// As for rivals of one cause: chi-square within this, times the scatter, or this share of what is explained.
 const TIE: f64 = 9.0;

@@ -193,9 +193,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     if explained {
         causes.extend(lattice);
     }
-    let shifts = pair
-        .as_ref()
-        .map_or_else(Vec::new, |pair| pair.shifts(&problem, attribution.state()));
+    let shifts = pair.as_ref().map_or_else(Vec::new, |pair| pair.shifts(&problem, state));
     let findings = Findings {
         sentence: sentence(verdict, &causes, &structure) + &shifted(&shifts),
         verdict,

@@ -38,3 +38,4 @@ mod search;
 pub mod shape;
 mod spectrum;
 pub mod ties;
+mod words;

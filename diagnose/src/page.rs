@@ -5,8 +5,9 @@ mod records;
 
 use report::{Axis, BarChart, BarPanel, Chart, Colour, Page, Panel, ReportError, Section, Series, Table, quantity};
 
-use crate::diagnosis::{Diagnosis, Named, Verdict, si};
+use crate::diagnosis::{Diagnosis, Named, Verdict};
 use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS};
+use crate::words::si;
 
 /// Colours of the same things in all pictures.
 const MEASURED: Colour = Colour::GREY;
@@ -177,7 +178,7 @@ fn held_out(diagnosis: &Diagnosis) -> Result<Option<Section>, ReportError> {
     let svg = BarChart::new("Held-out error", names).panel(panel).svg()?;
     let mut section = Section::new("Gain on held-out records").chart(svg, "1 is the noise: no model gets below it.");
     for shift in &diagnosis.findings.gain.shifts {
-        section = section.text(crate::diagnosis::shifted(std::slice::from_ref(shift)).trim().to_owned());
+        section = section.text(crate::words::shifted(std::slice::from_ref(shift)).trim().to_owned());
     }
     let mut table = Table::new("Root mean square errors")
         .text("record")

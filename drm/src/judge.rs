@@ -125,7 +125,7 @@ pub struct Steady {
     pub limited_v: f64,
     /// What the sensors show minus what is true: v_out V, i_l A, i_out A, v_in V.
     pub sensors: Signals,
-    /// Sampled inductor current minus that of the simulation at the same point, true values, A.
+    /// Sampled inductor current minus that of the simulation at the same point, both as their sensors show it, A.
     pub i_l_shift: f64,
 }
 
@@ -163,7 +163,7 @@ pub fn against_plant(
                 i_out: seen.measured.i_out - seen.i_out,
                 v_in: seen.measured.v_in - seen.v_in,
             },
-            i_l_shift: seen.i_l - wanted.i_l,
+            i_l_shift: seen.measured.i_l - wanted.measured.i_l,
         }
     });
     Ok(steady.collect())
@@ -184,7 +184,7 @@ pub fn beyond_repair(steady: &[Steady], v_ref: f64) -> Vec<String> {
              whatever the mapping; calibrate the sensor"
         ));
     }
-    let shift = most(&|s| s.i_l_shift + s.sensors.i_l);
+    let shift = most(&|s| s.i_l_shift);
     let current = most(&|s| s.i_out);
     if shift.abs() > 0.02 * current {
         remarks.push(format!(

@@ -1,0 +1,106 @@
+//! The verdict for a reader.
+
+use crate::diagnosis::{Named, Verdict};
+use crate::gain::Shift;
+use crate::shape::Structure;
+
+/// Rivals of a cause that the sentence names.
+const MOST_SAID: usize = 3;
+
+/// The verdict in a sentence.
+pub fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure]) -> String {
+    let list = |causes: &[Named]| {
+        let words = causes.iter().map(|cause| {
+            let values = cause.parameters.iter().map(|(name, v)| {
+                let unit = if v.unit == "1" { "" } else { v.unit };
+                let name = if *name == cause.id {
+                    String::new()
+                } else {
+                    format!("{name} ")
+                };
+                format!(
+                    "{name}{} (95 %: {} to {}; model {})",
+                    si(v.value, unit),
+                    si(v.low, unit),
+                    si(v.high, unit),
+                    si(v.model, unit)
+                )
+            });
+            format!(
+                "{} [{}]: {}",
+                cause.words,
+                cause.id,
+                values.collect::<Vec<_>>().join(", ")
+            )
+        });
+        words.collect::<Vec<_>>().join("; ")
+    };
+    match verdict {
+        Verdict::Consistent => "The model explains the records within their noise: nothing to correct.".to_owned(),
+        Verdict::Explained => format!("What the model gets wrong is {}.", list(causes)),
+        Verdict::Ambiguous => {
+            let ties = causes.iter().filter(|cause| !cause.rivals.is_empty()).map(|cause| {
+                let rivals: Vec<String> = cause.rivals.iter().map(|ids| ids.join(" + ")).collect();
+                let more = match rivals.len().saturating_sub(MOST_SAID) {
+                    0 => String::new(),
+                    more => format!(", or {more} others"),
+                };
+                let said = rivals[..rivals.len().min(MOST_SAID)].join(", or ");
+                format!("{} cannot be told from {said}{more}", cause.id)
+            });
+            format!(
+                "Best explanation: {}. But {}.",
+                list(causes),
+                ties.collect::<Vec<_>>().join("; ")
+            )
+        }
+        Verdict::Unexplained => {
+            let shapes: Vec<String> = structure
+                .iter()
+                .map(|s| format!("{} of {}: {}", s.channel, s.record, s.shape))
+                .collect();
+            format!(
+                "None of the known causes explains the records; left is {}.",
+                shapes.join("; ")
+            )
+        }
+    }
+}
+
+/// Said behind the verdict: what no fit to the training records can know.
+pub fn shifted(shifts: &[Shift]) -> String {
+    let one = |shift: &Shift| {
+        let place = match shift.throughout {
+            true => format!(
+                "lies {} {} the extended model throughout (training records: {})",
+                si(shift.mean.abs(), shift.unit),
+                if shift.mean > 0.0 { "above" } else { "below" },
+                si(shift.training, shift.unit)
+            ),
+            false => format!(
+                "is {:.1} times as far from the extended model as the training records, and lies {} beside it on average \
+                 (these: {})",
+                shift.ratio,
+                si(shift.mean, shift.unit),
+                si(shift.training, shift.unit)
+            ),
+        };
+        format!(
+            " In {} the held-out record {} {place}: something shifted between them.",
+            shift.channel, shift.record
+        )
+    };
+    shifts.iter().map(one).collect()
+}
+
+/// A quantity with four digits.
+pub fn si(value: f64, unit: &str) -> String {
+    if value == 0.0 {
+        return if unit.is_empty() {
+            "0".to_owned()
+        } else {
+            format!("0 {unit}")
+        };
+    }
+    report::quantity(value, unit, 4)
+}

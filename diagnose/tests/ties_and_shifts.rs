@@ -1,0 +1,110 @@
+//! Settled points that several explanations fit equally, and a held-out record of another bench.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use diagnose::columns::Columns;
+use diagnose::csv::Table;
+use diagnose::diagnosis::{Diagnosis, Verdict, diagnose};
+use diagnose::record::Record;
+use plant::{Load, Parameters, Plant};
+
+fn record(name: &str, text: &str, parameters: &Parameters) -> Record {
+    let table = Table::parse(Path::new(name), text.as_bytes()).unwrap();
+    Record::new(table, &Columns::default(), parameters).unwrap()
+}
+
+/// Nine duties of a small converter at 10 ohm, from the loop equation with a winding of 0.35 ohm and a diode of 0.6 V.
+fn duty_sweep() -> Diagnosis {
+    let mut parameters = Parameters::paper_table();
+    let converter = &mut parameters.converter;
+    (
+        converter.v_in,
+        converter.inductance,
+        converter.capacitance,
+        converter.f_sw,
+    ) = (24.0, 1e-4, 1e-4, 1e5);
+    let (dcr, v_f, load) = (0.35, 0.6, 10.0);
+    let scatter = [3.0, -7.0, 5.0, 1.0, -4.0, 8.0, -6.0, 2.0, -2.0];
+    let mut text = "d,v_o,r_load\n".to_owned();
+    for (n, millivolts) in scatter.into_iter().enumerate() {
+        let d = 0.1 * (n + 1) as f64;
+        let v = (24.0 * d - v_f * (1.0 - d)) / (1.0 + dcr / load);
+        let _ = writeln!(text, "{d:.1},{:.5},{load}", v + 1e-3 * millivolts);
+    }
+    diagnose(&parameters, vec![record("sweep.csv", &text, &parameters)], &[], &|_| {})
+}
+
+#[test]
+fn a_duty_sweep_at_one_resistor_ends_in_a_tie_that_is_said_in_full() {
+    let findings = duty_sweep().findings;
+    assert_eq!(findings.verdict, Verdict::Ambiguous, "{}", findings.sentence);
+    let mut explanations: Vec<Vec<&str>> = vec![findings.causes.iter().map(|cause| cause.id).collect()];
+    explanations.extend(findings.causes.iter().flat_map(|cause| cause.rivals.clone()));
+    for set in &mut explanations {
+        set.sort_unstable();
+    }
+    // resistance with a forward voltage, with a lost duty, with an offset of the sensor: all one line over the duty
+    for wanted in [
+        ["dcr", "diode"],
+        ["dcr", "dead_time"],
+        ["dcr", "v_offset"],
+        ["diode", "v_gain"],
+    ] {
+        assert!(
+            explanations.iter().any(|set| set[..] == wanted),
+            "{wanted:?} {explanations:?}"
+        );
+    }
+    assert!(!findings.next_experiments.is_empty());
+}
+
+/// A record of the converter itself with noise of 0.1 V, and `shift` V added to what is measured.
+fn run(parameters: &Parameters, duties: [f64; 4], seed: u64, shift: f64) -> String {
+    let mut noisy = parameters.clone();
+    (noisy.sensors.v_out.noise, noisy.sensors.seed) = (0.1, seed);
+    let mut plant = Plant::new(&noisy).unwrap();
+    let load = Load::resistor(20.0);
+    plant.reset_at(100.0, 5.0, &load);
+    let mut text = "t,d,v_o,r_load\n".to_owned();
+    for n in 0..200 {
+        let duty = duties[n / 50];
+        let _ = writeln!(
+            text,
+            "{:.4},{duty},{:.4},20",
+            n as f64 * 1e-4,
+            plant.measured().v_out + shift
+        );
+        plant.step(duty, &load);
+    }
+    text
+}
+
+#[test]
+fn a_held_out_record_of_another_bench_is_noticed_and_one_of_the_same_is_not() {
+    let mut parameters = Parameters::paper_table();
+    parameters.inductor.dcr = 0.3;
+    let train = || {
+        vec![record(
+            "train.csv",
+            &run(&parameters, [0.5, 0.55, 0.45, 0.5], 1, 0.0),
+            &parameters,
+        )]
+    };
+    for (shift, noticed) in [(0.0, false), (0.5, true)] {
+        let held = record(
+            "held.csv",
+            &run(&parameters, [0.48, 0.52, 0.56, 0.5], 2, shift),
+            &parameters,
+        );
+        let findings = diagnose(&parameters, train(), &[held], &|_| {}).findings;
+        let shifts = &findings.gain.shifts;
+        assert_eq!(!shifts.is_empty(), noticed, "{shift} V: {shifts:?}");
+        assert_eq!(findings.sentence.contains("held"), noticed, "{}", findings.sentence);
+        if let Some(found) = shifts.first() {
+            assert!(found.throughout && (found.mean - shift).abs() < 0.1, "{found:?}");
+        }
+    }
+}

@@ -125,6 +125,8 @@ impl Driver<'_> {
             history[place] = duty[row];
         }
         let sample = plant.reset_within(start[0], start[1], &load[first], &history);
+        // a slow sensor begins where it was, not at the signal of this instant
+        plant.shows(std::array::from_fn(|n| self.record.measured[n][segment.start]));
         shown[segment.start] = array(&sample.measured);
         for (n, place) in (segment.start + 1..).zip(&mut shown[segment.start + 1..segment.end]) {
             let now = self.period(n);

@@ -21,6 +21,8 @@ const FOLLOWED: f64 = 0.2;
 const LEAST_FOLLOWED: f64 = 6.0;
 /// A cause gives way to another that is better by this.
 const SWAP: f64 = 2.0;
+/// Starts of one cause that are followed.
+const BEGUN: usize = 2;
 /// Most causes named.
 const MOST: usize = 3;
 /// Candidates that are fitted after a linear look at all.
@@ -110,21 +112,23 @@ impl Searcher<'_> {
 
     /// `set` and `cause`, fitted from where it begins best.
     fn added(&self, set: &Set<'_>, cause: usize, from: &State) -> Fit {
-        let (_, start) = self.begin(set, cause, from);
-        let values = [set.values, &start].concat();
-        self.fitter.from(&[set.causes, &[cause]].concat(), &values, from)
+        let causes = [set.causes, &[cause]].concat();
+        // what looks best at first order is not always where the fit ends best
+        let begins = self.begins(set, cause, from).into_iter().take(BEGUN);
+        let fits = begins.map(|(_, start)| self.fitter.from(&causes, &[set.values, &start].concat(), from));
+        let best = fits.min_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
+        best.unwrap_or_else(|| self.fitter.unmoved(cause, 0.0))
     }
 
-    /// Chi-square that `set` with `cause` would have at first order, from the best start of `cause`, and that start.
-    fn begin(&self, set: &Set<'_>, cause: usize, from: &State) -> (f64, Vec<f64>) {
-        let starts = self.starts(cause, from);
+    /// Starts of `cause`, and the chi-square that `set` with it would have from each at first order, best first.
+    fn begins(&self, set: &Set<'_>, cause: usize, from: &State) -> Vec<(f64, Vec<f64>)> {
         if self.is_smooth(cause) {
             let mut columns = set.columns.to_vec();
             columns.extend(self.fitter.sensitivity(cause, from));
             let own = self.fitter.candidates[cause].own.clone();
-            return (from.chi2 - gained(&columns, &from.residual), own);
+            return vec![(from.chi2 - gained(&columns, &from.residual), own)];
         }
-        let looks = starts.into_iter().map(|start| {
+        let looks = self.starts(cause, from).into_iter().map(|start| {
             let state = self.fitter.state_at(&[cause], &start, from, 0).0;
             // the initial states and the others may have to follow before it shows what it is worth
             let mut left = state.residual.clone();
@@ -133,11 +137,11 @@ impl Searcher<'_> {
             columns.extend(self.fitter.sensitivity(cause, &state));
             (dot(&left, &left) - gained(&columns, &left), start)
         });
-        let best = looks.min_by(|a, b| a.0.total_cmp(&b.0));
-        match (best, self.id(cause)) {
-            (Some((_, step)), "duty_quantisation") => self.refined(set, cause, from, step[0].recip()),
-            (Some(best), _) => best,
-            (None, _) => (f64::INFINITY, self.fitter.candidates[cause].own.clone()),
+        let mut looks: Vec<_> = looks.collect();
+        looks.sort_by(|a, b| a.0.total_cmp(&b.0));
+        match (looks.first(), self.id(cause)) {
+            (Some((_, step)), "duty_quantisation") => vec![self.refined(set, cause, from, step[0].recip())],
+            _ => looks,
         }
     }
 
@@ -186,7 +190,7 @@ impl Searcher<'_> {
     }
 
     /// Forward: the cause that helps most, as long as one helps; where structure is left, from several leaders; backward:
-    /// without each that no longer helps, and with each replaced by a better one.
+    /// without each that no longer helps, and where structure is left with each replaced by a better one.
     pub fn grow(&self, singles: &[Fit], say: &(dyn Fn(&str) + Sync)) -> (Option<Fit>, Vec<f64>) {
         let null = self.fitter.null;
         let mut leaders = singles.to_vec();
@@ -212,7 +216,11 @@ impl Searcher<'_> {
             if !self.is_worth(&best, next) {
                 break;
             }
-            (best, leaders) = (self.swapped(self.polished(next)), larger);
+            best = self.polished(next);
+            if self.structure(&best) > 0.0 {
+                best = self.swapped(best);
+            }
+            leaders = larger;
         }
         self.backward(best)
     }
@@ -223,7 +231,44 @@ impl Searcher<'_> {
             effort: FINE,
             ..self.fitter
         };
-        fitter.from(&fit.causes, &fit.values, &fit.state)
+        let fine = fitter.from(&fit.causes, &fit.values, &fit.state);
+        let is_step = |place: &(usize, usize)| self.id(place.0) == "duty_quantisation";
+        match fitter.places(&fit.causes).iter().position(is_step) {
+            Some(place) => self.counted(fine, place),
+            None => fine,
+        }
+    }
+
+    /// The fit with the duty counter that is best beside the other causes.
+    fn counted(&self, fit: Fit, place: usize) -> Fit {
+        let counts = fit.values[place].recip();
+        let whole = libm::round(counts);
+        let tried = [
+            whole,
+            whole - 1.0,
+            whole + 1.0,
+            counts - COUNT_STEP,
+            counts + COUNT_STEP,
+        ];
+        let fits = parallel::map(&tried, |counts| {
+            let mut values = fit.values.clone();
+            values[place] = counts.recip();
+            self.fitter.from(&fit.causes, &values, &fit.state)
+        });
+        // counters have whole counts
+        let score = |fit: &Fit| {
+            fit.state.chi2
+                - if fit.values[place].recip().fract() < 1e-9 {
+                    TIE
+                } else {
+                    0.0
+                }
+        };
+        let best = fits
+            .into_iter()
+            .chain([fit])
+            .min_by(|a, b| score(a).total_cmp(&score(b)));
+        best.unwrap_or_else(|| unreachable!())
     }
 
     /// The first fit of each set of ids.
@@ -274,7 +319,13 @@ impl Searcher<'_> {
 
     /// What each of `causes` would gain beside a set, at first order.
     fn looks(&self, set: &Set<'_>, causes: &[usize], state: &State) -> Vec<(f64, usize)> {
-        parallel::map(causes, |cause| (state.chi2 - self.begin(set, *cause, state).0, *cause))
+        parallel::map(causes, |cause| {
+            let expected = self
+                .begins(set, *cause, state)
+                .first()
+                .map_or(f64::INFINITY, |look| look.0);
+            (state.chi2 - expected, *cause)
+        })
     }
 
     /// Candidates of other ids.

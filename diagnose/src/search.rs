@@ -264,11 +264,10 @@ impl Searcher<'_> {
                     0.0
                 }
         };
-        let best = fits
-            .into_iter()
-            .chain([fit])
-            .min_by(|a, b| score(a).total_cmp(&score(b)));
-        best.unwrap_or_else(|| unreachable!())
+        fits.into_iter().fold(
+            fit,
+            |best, other| if score(&other) < score(&best) { other } else { best },
+        )
     }
 
     /// The first fit of each set of ids.

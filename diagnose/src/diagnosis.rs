@@ -6,9 +6,10 @@ use plant::Parameters;
 use serde::Serialize;
 
 use crate::attribute::{Attribution, attribute};
+use crate::control::Request;
 use crate::drive::Model;
 use crate::fit::State;
-use crate::gain::{self, Held, Pair};
+use crate::gain::{self, Held, Pair, Shift};
 use crate::noise::{self, Outlier};
 use crate::problem::Problem;
 use crate::profile::{Profile, profiles};
@@ -103,8 +104,10 @@ pub struct Gain {
     pub heldout: Vec<Held>,
     /// Mean square over that of the noise, all held-out records: before and after.
     pub mean_square: [f64; 2],
+    /// Held-out records that the extended model fits much worse than the training records.
+    pub shifts: Vec<Shift>,
     /// Closed loop with a policy, if one was given.
-    pub closed_loop: Option<serde_json::Value>,
+    pub closed_loop: Option<crate::control::ClosedLoop>,
 }
 
 /// What is written to `diagnosis.json`.
@@ -137,6 +140,8 @@ pub struct Diagnosis {
     pub findings: Findings,
     /// Training records.
     pub problem: Problem,
+    /// The training records at the model exactly as given.
+    pub given: State,
     /// What was fitted.
     pub attribution: Attribution,
     /// Profiles of the parameters.
@@ -147,6 +152,8 @@ pub struct Diagnosis {
     pub extended: Model,
     /// Duty that its edges add, 1.
     pub trim: f64,
+    /// The loop closed with a policy, if one was given.
+    pub control: Option<crate::control::Control>,
 }
 
 /// Diagnoses `model` by the records `train`; `heldout` only judges. `say` hears how far it is.
@@ -155,7 +162,11 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     let base = Model::new(model);
     say("noise and initial states");
     let (problem, null, outliers) = prepared(train, &base);
-    let attribution = attribute(&problem, null, say);
+    let mut attribution = attribute(&problem, null, say);
+    let others = crate::ties::other_pairs(&problem, &attribution);
+    for rivals in attribution.rivals.iter_mut().take(1) {
+        rivals.extend(others.iter().cloned());
+    }
     say("intervals");
     let profiles = profiles(&problem, &attribution);
     let structure = structures(&problem, &attribution.null, attribution.state(), attribution.inflation);
@@ -181,8 +192,11 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     if explained {
         causes.extend(lattice);
     }
+    let shifts = pair
+        .as_ref()
+        .map_or_else(Vec::new, |pair| pair.shifts(&problem, attribution.state()));
     let findings = Findings {
-        sentence: sentence(verdict, &causes, &structure),
+        sentence: sentence(verdict, &causes, &structure) + &shifted(&shifts),
         verdict,
         partial: if explained { Vec::new() } else { named },
         causes,
@@ -193,18 +207,44 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         gain: Gain {
             heldout: pair.as_ref().map_or_else(Vec::new, Pair::errors),
             mean_square: pair.as_ref().map_or([f64::NAN; 2], |pair| pair.total().into()),
+            shifts,
             closed_loop: None,
         },
     };
     Diagnosis {
         findings,
+        given: as_given(&problem, &base),
         problem,
         attribution,
         profiles,
         held: pair,
         extended,
         trim,
+        control: None,
     }
+}
+
+impl Diagnosis {
+    /// Closes the loop with a policy on the extended model; without load steps asked for, over the records' loads.
+    ///
+    /// # Errors
+    /// Those of [`crate::control::control`].
+    pub fn close_the_loop(&mut self, mut request: Request) -> Result<(), closed_loop::Error> {
+        if request.load_steps.is_empty() {
+            request.load_steps = crate::control::load_steps(self.problem.records.iter(), request.v_ref);
+        }
+        let control = crate::control::control(&request, &crate::extend::extended_plant(self))?;
+        self.findings.gain.closed_loop = Some(control.findings.clone());
+        self.control = Some(control);
+        Ok(())
+    }
+}
+
+/// The model without the trim of the edges that stands beside every fit.
+fn as_given(problem: &Problem, base: &Model) -> State {
+    let mut held = problem.clone();
+    held.trim_held = true;
+    State::settle(&held, base, &held.first_starts(), None)
 }
 
 /// Noise estimated, outliers masked, initial states fitted.
@@ -303,13 +343,21 @@ fn verdict(named: &[Named], lattice: &Option<Named>, structure: &[Structure]) ->
     }
 }
 
+/// Rivals of a cause that the sentence names.
+const MOST_SAID: usize = 3;
+
 fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure]) -> String {
     let list = |causes: &[Named]| {
         let words = causes.iter().map(|cause| {
             let values = cause.parameters.iter().map(|(name, v)| {
                 let unit = if v.unit == "1" { "" } else { v.unit };
+                let name = if *name == cause.id {
+                    String::new()
+                } else {
+                    format!("{name} ")
+                };
                 format!(
-                    "{name} {} (95 %: {} to {}; model {})",
+                    "{name}{} (95 %: {} to {}; model {})",
                     si(v.value, unit),
                     si(v.low, unit),
                     si(v.high, unit),
@@ -331,7 +379,12 @@ fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure]) -> Stri
         Verdict::Ambiguous => {
             let ties = causes.iter().filter(|cause| !cause.rivals.is_empty()).map(|cause| {
                 let rivals: Vec<String> = cause.rivals.iter().map(|ids| ids.join(" + ")).collect();
-                format!("{} cannot be told from {}", cause.id, rivals.join(", or "))
+                let more = match rivals.len().saturating_sub(MOST_SAID) {
+                    0 => String::new(),
+                    more => format!(", or {more} others"),
+                };
+                let said = rivals[..rivals.len().min(MOST_SAID)].join(", or ");
+                format!("{} cannot be told from {said}{more}", cause.id)
             });
             format!(
                 "Best explanation: {}. But {}.",
@@ -352,7 +405,41 @@ fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure]) -> Stri
     }
 }
 
-fn si(value: f64, unit: &str) -> String {
+/// Said behind the verdict: what no fit to the training records can know.
+pub(crate) fn shifted(shifts: &[Shift]) -> String {
+    let one = |shift: &Shift| {
+        let place = match shift.throughout {
+            true => format!(
+                "lies {} {} the extended model throughout (training records: {})",
+                si(shift.mean.abs(), shift.unit),
+                if shift.mean > 0.0 { "above" } else { "below" },
+                si(shift.training, shift.unit)
+            ),
+            false => format!(
+                "is {:.1} times as far from the extended model as the training records, and lies {} beside it on average \
+                 (these: {})",
+                shift.ratio,
+                si(shift.mean, shift.unit),
+                si(shift.training, shift.unit)
+            ),
+        };
+        format!(
+            " In {} the held-out record {} {place}: something shifted between them.",
+            shift.channel, shift.record
+        )
+    };
+    shifts.iter().map(one).collect()
+}
+
+/// A quantity with four digits.
+pub(crate) fn si(value: f64, unit: &str) -> String {
+    if value == 0.0 {
+        return if unit.is_empty() {
+            "0".to_owned()
+        } else {
+            format!("0 {unit}")
+        };
+    }
     report::quantity(value, unit, 4)
 }
 

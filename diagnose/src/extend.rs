@@ -33,12 +33,18 @@ pub fn as_plant(model: &Model, trim: f64) -> Parameters {
     p
 }
 
+/// The model with what was found, or as it is, with the trim of the edges.
+#[must_use]
+pub fn extended_plant(diagnosis: &Diagnosis) -> Parameters {
+    as_plant(&diagnosis.extended, diagnosis.trim)
+}
+
 /// Text of `plant.extended.toml`; changed numbers carry what they were and their 95 % interval.
 #[must_use]
 pub fn extended_toml(diagnosis: &Diagnosis) -> String {
     let findings = &diagnosis.findings;
     let trim = diagnosis.trim;
-    let after = as_plant(&diagnosis.extended, trim);
+    let after = extended_plant(diagnosis);
     let before = &diagnosis.problem.base.plant;
     let mut notes: BTreeMap<&str, String> = BTreeMap::new();
     let best = diagnosis

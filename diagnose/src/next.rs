@@ -191,9 +191,12 @@ fn planned(problem: &Problem, plan: Plan) -> (String, Record) {
         load: (0..ROWS).map(load).collect(),
         measured: std::array::from_fn(|_| vec![f64::NAN; ROWS]),
         lattice: [0.0; CHANNELS],
+        resolution: [0.0; CHANNELS],
         v_in_ratio: plan.v_in_ratio,
         duty_is: crate::columns::DutyIs::Commanded,
+        is_true: [false; CHANNELS],
         settled: false,
+        dense: true,
         segments: std::iter::once(0..ROWS).collect(),
         repairs: Vec::new(),
     };

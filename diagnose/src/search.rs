@@ -450,3 +450,22 @@ fn top(mut looks: Vec<(f64, usize)>, count: usize) -> Vec<usize> {
     looks.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     looks.into_iter().take(count).map(|(_, cause)| cause).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{gained, top, without};
+
+    #[test]
+    fn columns_gain_what_lies_in_their_span() {
+        let columns = [vec![1.0, 0.0, 0.0], vec![1.0, 1.0, 0.0]];
+        assert!((gained(&columns, &[1.0, 2.0, 3.0]) - 5.0).abs() < 1e-6);
+        assert!((gained(&columns[..1], &[1.0, 2.0, 3.0]) - 1.0).abs() < 1e-6);
+        assert_eq!(gained(&[], &[1.0, 2.0, 3.0]), 0.0);
+    }
+
+    #[test]
+    fn the_best_looks_come_first_and_a_member_is_taken_out() {
+        assert_eq!(top(vec![(1.0, 4), (3.0, 7), (3.0, 5), (2.0, 6)], 3), [5, 7, 6]);
+        assert_eq!(without(&[4, 5, 6], 1), [4, 6]);
+    }
+}

@@ -45,7 +45,8 @@ pub fn structures(problem: &Problem, null: &State, state: &State, inflation: f64
             }
             let scatter = (2.0 / left.blocks as f64).sqrt() * inflation.sqrt().min(1.5);
             // a coarse converter leaves patterns that are none of the plant's
-            let coarse = record.lattice[n] > 1.5 * problem.sigma[n];
+            let step = record.lattice[n];
+            let coarse = step > 1.5 * problem.sigma[n] && left.square.sqrt() * problem.sigma[n] < step;
             let before = noise::left(&channel(problem, &null.residual, index, n));
             let slow = left.slow > 1.0 + SLOW.max(SIGMAS * scatter) + ACCURACY * ACCURACY * before.slow;
             let wild = left.square > 2.5 + ACCURACY * ACCURACY * before.square;

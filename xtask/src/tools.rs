@@ -62,6 +62,12 @@ macro_rules! rust_target {
     };
 }
 
+const CORE_SOURCES: &[&str] = &[
+    "sh",
+    "-c",
+    "test -d \"$(/usr/bin/rustc --print sysroot)/lib/rustlib/src/rust/library/core\"",
+];
+
 const NGSPICE_HEADER: &[&str] = &[
     "gcc",
     "-fsyntax-only",
@@ -128,7 +134,19 @@ const TOOLS: &[Tool] = &[
     tool("make", &["make", "--version"], Apt("make")),
     tool("venv", VENV, Apt("python3-venv")),
     tool("FMPy", FMPY, Python("fmpy==0.3.32")),
+    tool(
+        "libcosim",
+        &["python3", "-c", "import libcosimpy"],
+        Python("libcosimpy==0.0.6"),
+    ),
     tool("Marabou", MARABOU, Python("maraboupy==2.0.0")),
+];
+
+/// Debian's Rust with the sources of `core`, which stands in where rustup has no target.
+const DEBIAN_RUST: &[Tool] = &[
+    tool("Debian's rustc", &["/usr/bin/rustc", "--version"], Apt("rustc-web")),
+    tool("Debian's cargo", &["/usr/bin/cargo", "--version"], Apt("cargo-web")),
+    tool("the sources of core", CORE_SOURCES, Apt("rust-web-src")),
 ];
 
 /// Tests leave out Rust on the targets that this names, by triple and separated by commas.
@@ -147,8 +165,14 @@ pub fn absent(target_dir: &Path) -> [(&'static str, String); 2] {
     let missing = missing(TOOLS, &python(target_dir));
     let packages = missing.iter().filter(|tool| matches!(tool.source, Python(_)));
     let packages: Vec<&str> = packages.map(|tool| tool.name).collect();
+    let stand_in = self::missing(DEBIAN_RUST, Path::new("")).is_empty();
+    let targets = if stand_in {
+        Vec::new()
+    } else {
+        Plan::of(&missing).targets
+    };
     [
-        (WITHOUT_RUST_TARGETS, Plan::of(&missing).targets.join(",")),
+        (WITHOUT_RUST_TARGETS, targets.join(",")),
         (WITHOUT_PYTHON_PACKAGES, packages.join(",")),
     ]
 }
@@ -165,24 +189,37 @@ pub fn provide(target_dir: &Path, output: &Output) -> Result<Vec<String>, String
     if !plan.targets.is_empty() && works(&["rustup", "--version"]) {
         let mut rustup = Command::new("rustup");
         rustup.args(["target", "add"]).args(&plan.targets);
-        // offline or refused: said at the end
+        // offline or refused: Debian's Rust is next
         let _ = process::run(&mut rustup, output);
     }
     let explained = |error| format!("{}\n{error}", plan.message(&missing, &python));
     if !plan.packages.is_empty() && may_install() {
-        for arguments in [&["update"][..], &plan.apt_install()] {
-            let mut apt = Command::new("apt-get");
-            apt.args(arguments).env("DEBIAN_FRONTEND", "noninteractive");
-            process::run(&mut apt, output).map_err(explained)?;
-        }
+        install(&plan, output).map_err(explained)?;
+    }
+    let debian = self::missing(DEBIAN_RUST, &python);
+    let targets = Plan::of(&self::missing(TOOLS, &python)).targets;
+    if !targets.is_empty() && !debian.is_empty() && may_install() {
+        // other names in this distribution, or no network: said at the end
+        let _ = install(&Plan::of(&debian), output);
     }
     if !plan.python.is_empty() && works(VENV) {
-        let [mut environment, mut packages] = plan.python_install(&python);
+        let (mut environment, packages) = plan.python_install(&python);
         process::run(&mut environment, output).map_err(explained)?;
-        // offline or refused: said at the end
-        let _ = process::run(&mut packages, output);
+        for mut package in packages {
+            // offline or refused: said at the end
+            let _ = process::run(&mut package, output);
+        }
     }
     require(target_dir)
+}
+
+fn install(plan: &Plan, output: &Output) -> Result<(), String> {
+    for arguments in [&["update"][..], &plan.apt_install()] {
+        let mut apt = Command::new("apt-get");
+        apt.args(arguments).env("DEBIAN_FRONTEND", "noninteractive");
+        process::run(&mut apt, output)?;
+    }
+    Ok(())
 }
 
 /// Looks only.
@@ -200,7 +237,13 @@ pub fn require(target_dir: &Path) -> Result<Vec<String>, String> {
     let (targets, packages): (Vec<_>, Vec<_>) = optional
         .into_iter()
         .partition(|tool| matches!(tool.source, RustTarget(_)));
-    let said = [("Rust is NOT tested there", targets), ("NOT tested with", packages)];
+    let debian = missing(DEBIAN_RUST, &python);
+    let about_rust = match (targets.is_empty(), debian.is_empty()) {
+        (true, _) => "NOT tested: Debian's Rust in the place of a target of rustup",
+        (false, true) => "tested with Debian's Rust, for want of rustup's targets",
+        (false, false) => "Rust is NOT tested there",
+    };
+    let said = [(about_rust, [targets, debian].concat()), ("NOT tested with", packages)];
     let said = said.into_iter().filter(|(_, tools)| !tools.is_empty());
     Ok(said
         .map(|(what, tools)| format!("{what}: {}", Plan::of(&tools).message(&tools, &python)))
@@ -274,14 +317,16 @@ impl Plan {
         arguments
     }
 
-    /// Makes the environment and fills it.
-    fn python_install(&self, python: &Path) -> [Command; 2] {
+    /// Makes the environment and fills it, package by package: one that is not made for this Python keeps none from coming.
+    fn python_install(&self, python: &Path) -> (Command, Vec<Command>) {
         let mut environment = Command::new("python3");
         environment.args(["-m", "venv"]).arg(python);
-        let mut packages = Command::new(interpreter(python));
-        packages.args(["-m", "pip", "install", "--disable-pip-version-check"]);
-        packages.args(&self.python);
-        [environment, packages]
+        let install = |package: &&str| {
+            let mut command = Command::new(interpreter(python));
+            command.args(["-m", "pip", "install", "--disable-pip-version-check", package]);
+            command
+        };
+        (environment, self.python.iter().map(install).collect())
     }
 
     fn message(&self, missing: &[&Tool], python: &Path) -> String {

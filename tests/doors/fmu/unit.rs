@@ -248,8 +248,8 @@ impl Unit {
         Running { child, answers }
     }
 
-    /// What FMPy says of the FMU and how it simulates it with these samples.
-    pub fn simulate(&self, trajectory: &[(Vec<Sample>, Answer)], compile: bool) -> (Ran, Vec<String>) {
+    /// What an importer in Python, a script with its options, says of the FMU and how it simulates it with these samples.
+    pub fn simulate(&self, trajectory: &[(Vec<Sample>, Answer)], script: &[&str]) -> (Ran, Vec<String>) {
         let mut table = "time".to_owned();
         for signal in &self.policy.signals {
             let _ = write!(table, ",{}", signal.name);
@@ -263,8 +263,8 @@ impl Unit {
         std::fs::write(self.path().join("signals.csv"), table).unwrap();
         let mut command = python();
         command.current_dir(self.path());
-        command.args(["simulate.py", &self.archive.file, "signals.csv", "answers.txt"]);
-        let ran = run(command.args(compile.then_some("--compile")));
+        command.args([script[0], &self.archive.file, "signals.csv", "answers.txt"]);
+        let ran = run(command.args(&script[1..]));
         let answers = std::fs::read_to_string(self.path().join("answers.txt")).unwrap_or_default();
         (ran, answers.lines().map(str::to_owned).collect())
     }

@@ -4,7 +4,6 @@ use templates::block::BlockView;
 use templates::fmu::{Kind, UnitView, VariableView};
 
 use crate::Program;
-use crate::backend::c99::coefficient_name;
 use crate::backend::literal::decimal;
 use crate::program::SignalPort;
 
@@ -49,7 +48,7 @@ pub fn of(program: &Program, block: &BlockView) -> (Vec<VariableView>, String) {
     for (index, (name, value, low, high)) in coefficients.enumerate() {
         let [value, low, high] = [value, low, high].map(|literal| decimal(literal.value()));
         all.push(VariableView {
-            name: coefficient_name(*name).to_owned(),
+            name: name.name().to_owned(),
             initial: Some("exact"),
             attributes: format!(" min=\"{low}\" max=\"{high}\" start=\"{value}\""),
             start_c: Some(value),

@@ -75,7 +75,7 @@ fn typical(values: &[f64]) -> Option<f64> {
     let middle = if sizes.is_empty() {
         0.0
     } else {
-        median(sizes.into_iter())
+        median(sizes)
     };
     (middle > 0.0).then_some(middle)
 }

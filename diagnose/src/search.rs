@@ -12,8 +12,8 @@ use crate::spectrum;
 
 /// An explanation within this of the best is as good, in chi-square ...
 const TIE: f64 = 9.0;
-/// ... or within this share of what the cause explains.
-const TIE_SHARE: f64 = 0.005;
+/// ... or within this share of what the cause explains: twice the accuracy, squared.
+const TIE_SHARE: f64 = 4.0 * ACCURACY * ACCURACY;
 /// What is this many times as far off may come within it when its fit is brought to an end.
 const NEAR: f64 = 5.0;
 /// A candidate is fitted if it explains this share of the most that one explains, and this much, both at first order.

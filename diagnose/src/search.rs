@@ -23,6 +23,9 @@ const LEAST_FOLLOWED: f64 = 6.0;
 const SWAP: f64 = 2.0;
 /// Starts of one cause that are followed.
 const BEGUN: usize = 2;
+/// A cause beside others that moves its parameters by less than this share of their steps (0.1 % of an inductance, 5e-4 of a
+/// gain) is left out.
+const TINY: f64 = 0.05;
 /// Most causes named.
 const MOST: usize = 3;
 /// Candidates that are fitted after a linear look at all.
@@ -380,16 +383,26 @@ impl Searcher<'_> {
             let chi2 = |fit: &Option<Fit>| fit.as_ref().map_or(self.fitter.null.chi2, |fit| fit.state.chi2);
             let evidence: Vec<f64> = fewer.iter().map(|fit| chi2(fit) - best.state.chi2).collect();
             let weakest = members.iter().min_by(|a, b| evidence[**a].total_cmp(&evidence[**b]));
-            let Some(weakest) = weakest.copied() else {
+            let tiny = members.iter().find(|member| self.is_tiny(&best, **member));
+            let Some(weakest) = tiny.or(weakest).copied() else {
                 return (None, Vec::new());
             };
             let parameters = self.fitter.places(&best.causes[weakest..=weakest]).len();
             let needed = threshold(parameters, self.inflation(&best));
-            match (&fewer[weakest], evidence[weakest] < needed) {
+            match (&fewer[weakest], tiny.is_some() || evidence[weakest] < needed) {
                 (Some(fewer), true) => best = fewer.clone(),
                 _ => return (Some(best), evidence),
             }
         }
+    }
+
+    /// Whether a cause beside others is so small that the difference of two simulators may look like it.
+    fn is_tiny(&self, fit: &Fit, member: usize) -> bool {
+        let cause = fit.causes[member];
+        let candidate = &self.fitter.candidates[cause];
+        let values = self.values_of(fit, &[cause]);
+        let mut knobs = values.iter().zip(&candidate.own).zip(&candidate.ranges);
+        self.is_smooth(cause) && knobs.all(|((value, own), range)| (value - own).abs() < TINY * range[2])
     }
 
     /// For each cause of a set, what explains the data as well in its place.

@@ -246,6 +246,24 @@ fn with_the_voltage_alone_the_cause_is_in_the_tie() {
     assert_eq!(bench.diagnosed(&model(), 10).findings.verdict, Verdict::Consistent);
 }
 
+/// A source voltage of 199.6 V on steps of 1.4 V is shown as 198.8 V but for a few rows.
+#[test]
+fn a_coarse_converter_that_shows_one_value_is_no_wrong_source() {
+    let mut records = LARGE.records(&model(), 12);
+    for record in &mut records {
+        for (n, value) in record.measured[3].iter_mut().enumerate() {
+            *value = if n % 60 == 7 { 200.2 } else { 198.8 };
+        }
+    }
+    let problem = Problem::new(records, Model::new(&model()));
+    let base = problem.base.clone();
+    let state = State::settle(&problem, &base, &problem.first_starts(), None);
+    let sigma = diagnose::noise::sigma(&problem, &state.residual)[3];
+    let rows = problem.records.iter().map(|r| r.rows()).sum::<usize>() as f64;
+    // all rows together say about as much as one
+    assert!(1.2 * rows.sqrt() < 5.0 * sigma, "{sigma}");
+}
+
 #[test]
 fn a_slow_sensor_costs_nothing_where_a_record_begins() {
     let mut slow = model();

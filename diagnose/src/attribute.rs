@@ -130,3 +130,15 @@ impl Attribution {
         sizes.into_iter().flatten().collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::threshold;
+
+    #[test]
+    fn more_parameters_and_coloured_noise_need_more() {
+        assert_eq!(threshold(1, 1.0), 16.0);
+        assert_eq!(threshold(3, 1.0), 24.0);
+        assert_eq!(threshold(2, 3.0), 60.0);
+    }
+}

@@ -65,8 +65,11 @@ pub fn simulate(model: &Model, record: &Record, starts: &[Start], trim: f64) -> 
     };
     let mut p = model.plant.clone();
     p.converter.v_in *= record.v_in_ratio;
-    for sensor in sensors(&mut p) {
+    for (sensor, is_true) in sensors(&mut p).into_iter().zip(record.is_true) {
         (sensor.noise, sensor.lsb) = (0.0, 0.0);
+        if is_true {
+            *sensor = plant::Sensor::default();
+        }
     }
     p.switch.turn_off_delay += trim.max(0.0) * p.t_sw();
     p.switch.turn_on_delay += (-trim).max(0.0) * p.t_sw();
@@ -127,6 +130,8 @@ impl Driver<'_> {
             history[place] = duty[row];
         }
         let sample = plant.reset_within(start[0], start[1], &load[first], &history);
+        // a slow sensor begins where it was, not at the signal of this instant
+        plant.shows(std::array::from_fn(|n| self.record.measured[n][segment.start]));
         shown[segment.start] = array(&sample.measured);
         for (n, place) in (segment.start + 1..).zip(&mut shown[segment.start + 1..segment.end]) {
             let now = self.period(n);

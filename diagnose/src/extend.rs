@@ -33,7 +33,7 @@ pub fn as_plant(model: &Model, trim: f64) -> Parameters {
     p
 }
 
-/// The model with what was found; where nothing was named, the model as it is with the trim of the edges.
+/// The model with what was found, or as it is, with the trim of the edges.
 #[must_use]
 pub fn extended_plant(diagnosis: &Diagnosis) -> Parameters {
     as_plant(&diagnosis.extended, diagnosis.trim)

@@ -90,6 +90,9 @@ pub fn hold(records: &[Record], base: &Model, extended: &Model, sigma: [f64; CHA
     }
 }
 
+/// A channel is taken as another instrument's if that lowers chi-square by this.
+const ANOTHER_SENSOR: f64 = 25.0;
+
 /// A record sampled at another instant than the model's has another chain; whether its duties are commanded or applied,
 /// and whether its sensors filter, is decided by what fits.
 fn other_chains(problem: &mut Problem, base: &Model, extended: &Model, trim: f64) -> Vec<String> {
@@ -100,10 +103,11 @@ fn other_chains(problem: &mut Problem, base: &Model, extended: &Model, trim: f64
         if record.duty_is != DutyIs::Unknown || record.settled || (record.phase - own).abs() < 0.02 {
             continue;
         }
-        let chi2 = |duty_is: DutyIs| {
+        let chi2 = |duty_is: DutyIs, is_true: [bool; CHANNELS]| {
             let mut alone = problem.clone();
             alone.records = vec![Record {
                 duty_is,
+                is_true,
                 ..record.clone()
             }];
             (alone.offsets, alone.masked) = (vec![0], vec![problem.masked[index].clone()]);
@@ -112,13 +116,26 @@ fn other_chains(problem: &mut Problem, base: &Model, extended: &Model, trim: f64
             State::settle(&alone, extended, &starts, None).chi2
         };
         let kinds = [DutyIs::Commanded, DutyIs::Applied, DutyIs::Direct];
-        let fits = kinds.map(|kind| (chi2(kind), kind));
-        let best = fits
-            .iter()
+        let fits = kinds.map(|kind| (chi2(kind, record.is_true), kind));
+        let (mut least, best) = fits
+            .into_iter()
             .min_by(|a, b| a.0.total_cmp(&b.0))
-            .map_or(DutyIs::Commanded, |(_, kind)| *kind);
+            .unwrap_or((f64::INFINITY, DutyIs::Commanded));
+        let mut is_true = record.is_true;
+        for n in 0..CHANNELS {
+            let mut tried = is_true;
+            tried[n] = true;
+            let with = chi2(best, tried);
+            if with < least - ANOTHER_SENSOR {
+                (least, is_true) = (with, tried);
+                remarks.push(format!(
+                    "{} of {} shows none of the sensor's errors",
+                    CHANNEL_NAMES[n], record.name
+                ));
+            }
+        }
         let record = &mut problem.records[index];
-        record.duty_is = best;
+        (record.duty_is, record.is_true) = (best, is_true);
         let words = match best {
             DutyIs::Applied => "delays and rounding of the duty do not show in it: its duties are taken as applied",
             DutyIs::Direct => {

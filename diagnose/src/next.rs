@@ -194,6 +194,7 @@ fn planned(problem: &Problem, plan: Plan) -> (String, Record) {
         resolution: [0.0; CHANNELS],
         v_in_ratio: plan.v_in_ratio,
         duty_is: crate::columns::DutyIs::Commanded,
+        is_true: [false; CHANNELS],
         settled: false,
         dense: true,
         segments: std::iter::once(0..ROWS).collect(),

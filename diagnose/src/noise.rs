@@ -5,6 +5,8 @@ use crate::record::{CHANNELS, Record};
 
 /// An outlier differs from its neighbours by more than this many standard deviations.
 const FAR: f64 = 8.0;
+/// A channel is stuck on one value if this share of neighbours are equal.
+const STUCK: f64 = 0.8;
 /// Rows averaged to look for slow structure.
 pub const BLOCK: usize = 10;
 /// Lags over which a residual's correlation is summed.
@@ -35,7 +37,7 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
         let steps = problem.records.iter().map(|r| r.lattice[n].max(r.resolution[n]));
         let lattice = steps.fold(0.0, f64::max);
         let scale = [problem.bases.v, problem.bases.i, problem.bases.i, problem.bases.v_in][n];
-        let least = (lattice / 12f64.sqrt()).max(1e-5 * scale);
+        let least = (lattice / 12f64.sqrt()).max(1e-5 * scale).max(stuck(problem, n));
         let has = problem
             .records
             .iter()
@@ -47,6 +49,30 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
             (true, false) => 2e-3 * scale,
         }
     })
+}
+
+/// A converter coarser than the noise shows one value nearly always: its rounding error is then the same in all rows, which
+/// together say no more than one. The standard deviation that gives them that weight; 0 for any other channel.
+fn stuck(problem: &Problem, n: usize) -> f64 {
+    let (mut pairs, mut equal, mut gap) = (0, 0, f64::INFINITY);
+    for record in problem.records.iter().filter(|record| !record.settled) {
+        for pair in record.measured[n]
+            .windows(2)
+            .filter(|pair| pair.iter().all(|v| v.is_finite()))
+        {
+            pairs += 1;
+            match (pair[1] - pair[0]).abs() {
+                0.0 => equal += 1,
+                step => gap = gap.min(step),
+            }
+        }
+    }
+    let is_stuck = gap.is_finite() && f64::from(equal) > STUCK * f64::from(pairs);
+    if is_stuck {
+        gap / 12f64.sqrt() * f64::from(pairs).sqrt()
+    } else {
+        0.0
+    }
 }
 
 /// An outlier.

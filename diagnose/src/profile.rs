@@ -125,3 +125,19 @@ fn alike(step: f64, side: f64, cost: &dyn Fn(f64) -> f64) -> f64 {
     }
     moved(reached)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::alike;
+
+    #[test]
+    fn a_counter_may_be_off_to_where_the_cost_is_reached_or_jumps() {
+        // a count of 50 with a standard deviation of 0.1
+        let smooth = |step: f64| ((step.recip() - 50.0) / 0.1).powi(2);
+        let low = alike(1.0 / 50.0, -1.0, &smooth);
+        assert!((low.recip() - 50.196).abs() < 0.01, "{}", low.recip());
+        let jump = |step: f64| if step.recip() < 49.9 { 1e3 } else { 0.0 };
+        let high = alike(1.0 / 50.0, 1.0, &jump).recip();
+        assert!((49.9..49.95).contains(&high), "{high}");
+    }
+}

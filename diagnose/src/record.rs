@@ -56,6 +56,8 @@ pub struct Record {
     pub v_in_ratio: f64,
     /// What the duty is.
     pub duty_is: DutyIs,
+    /// Channels that another instrument measured: what is true, not what the model's sensor shows.
+    pub is_true: [bool; CHANNELS],
     /// Rows are settled operating points.
     pub settled: bool,
     /// There is a row in each period, gaps apart.
@@ -127,6 +129,7 @@ impl Record {
                 .constant("v_in")
                 .map_or(1.0, |v_in| v_in / parameters.converter.v_in),
             duty_is: columns.duty,
+            is_true: [false; CHANNELS],
             settled,
             dense: settled || 2 * rows.iter().flatten().count() > rows.len(),
             segments: segments(&rows, settled),

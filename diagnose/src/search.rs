@@ -12,8 +12,8 @@ use crate::spectrum;
 
 /// An explanation within this of the best is as good, in chi-square ...
 const TIE: f64 = 9.0;
-/// ... or within this share of what the cause explains.
-const TIE_SHARE: f64 = 0.005;
+/// ... or within this share of what the cause explains: twice the accuracy, squared.
+const TIE_SHARE: f64 = 4.0 * ACCURACY * ACCURACY;
 /// What is this many times as far off may come within it when its fit is brought to an end.
 const NEAR: f64 = 5.0;
 /// A candidate is fitted if it explains this share of the most that one explains, and this much, both at first order.
@@ -21,6 +21,11 @@ const FOLLOWED: f64 = 0.2;
 const LEAST_FOLLOWED: f64 = 6.0;
 /// A cause gives way to another that is better by this.
 const SWAP: f64 = 2.0;
+/// Starts of one cause that are followed.
+const BEGUN: usize = 2;
+/// A cause beside others that moves its parameters by less than this share of their steps (0.1 % of an inductance, 5e-4 of a
+/// gain) is left out.
+const TINY: f64 = 0.05;
 /// Most causes named.
 const MOST: usize = 3;
 /// Candidates that are fitted after a linear look at all.
@@ -110,21 +115,23 @@ impl Searcher<'_> {
 
     /// `set` and `cause`, fitted from where it begins best.
     fn added(&self, set: &Set<'_>, cause: usize, from: &State) -> Fit {
-        let (_, start) = self.begin(set, cause, from);
-        let values = [set.values, &start].concat();
-        self.fitter.from(&[set.causes, &[cause]].concat(), &values, from)
+        let causes = [set.causes, &[cause]].concat();
+        // what looks best at first order is not always where the fit ends best
+        let begins = self.begins(set, cause, from).into_iter().take(BEGUN);
+        let fits = begins.map(|(_, start)| self.fitter.from(&causes, &[set.values, &start].concat(), from));
+        let best = fits.min_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
+        best.unwrap_or_else(|| self.fitter.unmoved(cause, 0.0))
     }
 
-    /// Chi-square that `set` with `cause` would have at first order, from the best start of `cause`, and that start.
-    fn begin(&self, set: &Set<'_>, cause: usize, from: &State) -> (f64, Vec<f64>) {
-        let starts = self.starts(cause, from);
+    /// Starts of `cause`, and the chi-square that `set` with it would have from each at first order, best first.
+    fn begins(&self, set: &Set<'_>, cause: usize, from: &State) -> Vec<(f64, Vec<f64>)> {
         if self.is_smooth(cause) {
             let mut columns = set.columns.to_vec();
             columns.extend(self.fitter.sensitivity(cause, from));
             let own = self.fitter.candidates[cause].own.clone();
-            return (from.chi2 - gained(&columns, &from.residual), own);
+            return vec![(from.chi2 - gained(&columns, &from.residual), own)];
         }
-        let looks = starts.into_iter().map(|start| {
+        let looks = self.starts(cause, from).into_iter().map(|start| {
             let state = self.fitter.state_at(&[cause], &start, from, 0).0;
             // the initial states and the others may have to follow before it shows what it is worth
             let mut left = state.residual.clone();
@@ -133,11 +140,11 @@ impl Searcher<'_> {
             columns.extend(self.fitter.sensitivity(cause, &state));
             (dot(&left, &left) - gained(&columns, &left), start)
         });
-        let best = looks.min_by(|a, b| a.0.total_cmp(&b.0));
-        match (best, self.id(cause)) {
-            (Some((_, step)), "duty_quantisation") => self.refined(set, cause, from, step[0].recip()),
-            (Some(best), _) => best,
-            (None, _) => (f64::INFINITY, self.fitter.candidates[cause].own.clone()),
+        let mut looks: Vec<_> = looks.collect();
+        looks.sort_by(|a, b| a.0.total_cmp(&b.0));
+        match (looks.first(), self.id(cause)) {
+            (Some((_, step)), "duty_quantisation") => vec![self.refined(set, cause, from, step[0].recip())],
+            _ => looks,
         }
     }
 
@@ -186,7 +193,7 @@ impl Searcher<'_> {
     }
 
     /// Forward: the cause that helps most, as long as one helps; where structure is left, from several leaders; backward:
-    /// without each that no longer helps, and with each replaced by a better one.
+    /// without each that no longer helps, and where structure is left with each replaced by a better one.
     pub fn grow(&self, singles: &[Fit], say: &(dyn Fn(&str) + Sync)) -> (Option<Fit>, Vec<f64>) {
         let null = self.fitter.null;
         let mut leaders = singles.to_vec();
@@ -212,7 +219,11 @@ impl Searcher<'_> {
             if !self.is_worth(&best, next) {
                 break;
             }
-            (best, leaders) = (self.swapped(self.polished(next)), larger);
+            best = self.polished(next);
+            if self.structure(&best) > 0.0 {
+                best = self.swapped(best);
+            }
+            leaders = larger;
         }
         self.backward(best)
     }
@@ -223,7 +234,43 @@ impl Searcher<'_> {
             effort: FINE,
             ..self.fitter
         };
-        fitter.from(&fit.causes, &fit.values, &fit.state)
+        let fine = fitter.from(&fit.causes, &fit.values, &fit.state);
+        let is_step = |place: &(usize, usize)| self.id(place.0) == "duty_quantisation";
+        match fitter.places(&fit.causes).iter().position(is_step) {
+            Some(place) => self.counted(fine, place),
+            None => fine,
+        }
+    }
+
+    /// The fit with the duty counter that is best beside the other causes.
+    fn counted(&self, fit: Fit, place: usize) -> Fit {
+        let counts = fit.values[place].recip();
+        let whole = libm::round(counts);
+        let tried = [
+            whole,
+            whole - 1.0,
+            whole + 1.0,
+            counts - COUNT_STEP,
+            counts + COUNT_STEP,
+        ];
+        let fits = parallel::map(&tried, |counts| {
+            let mut values = fit.values.clone();
+            values[place] = counts.recip();
+            self.fitter.from(&fit.causes, &values, &fit.state)
+        });
+        // counters have whole counts
+        let score = |fit: &Fit| {
+            fit.state.chi2
+                - if fit.values[place].recip().fract() < 1e-9 {
+                    TIE
+                } else {
+                    0.0
+                }
+        };
+        fits.into_iter().fold(
+            fit,
+            |best, other| if score(&other) < score(&best) { other } else { best },
+        )
     }
 
     /// The first fit of each set of ids.
@@ -274,7 +321,13 @@ impl Searcher<'_> {
 
     /// What each of `causes` would gain beside a set, at first order.
     fn looks(&self, set: &Set<'_>, causes: &[usize], state: &State) -> Vec<(f64, usize)> {
-        parallel::map(causes, |cause| (state.chi2 - self.begin(set, *cause, state).0, *cause))
+        parallel::map(causes, |cause| {
+            let expected = self
+                .begins(set, *cause, state)
+                .first()
+                .map_or(f64::INFINITY, |look| look.0);
+            (state.chi2 - expected, *cause)
+        })
     }
 
     /// Candidates of other ids.
@@ -330,16 +383,26 @@ impl Searcher<'_> {
             let chi2 = |fit: &Option<Fit>| fit.as_ref().map_or(self.fitter.null.chi2, |fit| fit.state.chi2);
             let evidence: Vec<f64> = fewer.iter().map(|fit| chi2(fit) - best.state.chi2).collect();
             let weakest = members.iter().min_by(|a, b| evidence[**a].total_cmp(&evidence[**b]));
-            let Some(weakest) = weakest.copied() else {
+            let tiny = members.iter().find(|member| self.is_tiny(&best, **member));
+            let Some(weakest) = tiny.or(weakest).copied() else {
                 return (None, Vec::new());
             };
             let parameters = self.fitter.places(&best.causes[weakest..=weakest]).len();
             let needed = threshold(parameters, self.inflation(&best));
-            match (&fewer[weakest], evidence[weakest] < needed) {
+            match (&fewer[weakest], tiny.is_some() || evidence[weakest] < needed) {
                 (Some(fewer), true) => best = fewer.clone(),
                 _ => return (Some(best), evidence),
             }
         }
+    }
+
+    /// Whether a cause beside others is so small that the difference of two simulators may look like it.
+    fn is_tiny(&self, fit: &Fit, member: usize) -> bool {
+        let cause = fit.causes[member];
+        let candidate = &self.fitter.candidates[cause];
+        let values = self.values_of(fit, &[cause]);
+        let mut knobs = values.iter().zip(&candidate.own).zip(&candidate.ranges);
+        self.is_smooth(cause) && knobs.all(|((value, own), range)| (value - own).abs() < TINY * range[2])
     }
 
     /// For each cause of a set, what explains the data as well in its place.
@@ -399,4 +462,23 @@ pub(crate) fn gained(columns: &[Vec<f64>], residual: &[f64]) -> f64 {
 fn top(mut looks: Vec<(f64, usize)>, count: usize) -> Vec<usize> {
     looks.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     looks.into_iter().take(count).map(|(_, cause)| cause).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{gained, top, without};
+
+    #[test]
+    fn columns_gain_what_lies_in_their_span() {
+        let columns = [vec![1.0, 0.0, 0.0], vec![1.0, 1.0, 0.0]];
+        assert!((gained(&columns, &[1.0, 2.0, 3.0]) - 5.0).abs() < 1e-6);
+        assert!((gained(&columns[..1], &[1.0, 2.0, 3.0]) - 1.0).abs() < 1e-6);
+        assert_eq!(gained(&[], &[1.0, 2.0, 3.0]), 0.0);
+    }
+
+    #[test]
+    fn the_best_looks_come_first_and_a_member_is_taken_out() {
+        assert_eq!(top(vec![(1.0, 4), (3.0, 7), (3.0, 5), (2.0, 6)], 3), [5, 7, 6]);
+        assert_eq!(without(&[4, 5, 6], 1), [4, 6]);
+    }
 }

@@ -130,6 +130,15 @@ impl Full {
         x
     }
 
+    /// Lets the low-passes of the sensors hold these outputs; those that are no number stay.
+    pub fn hold_filtered(x: &mut States, outputs: [f64; 4]) {
+        for (state, output) in x[SHOWN..].iter_mut().zip(outputs) {
+            if output.is_finite() {
+                *state = output;
+            }
+        }
+    }
+
     /// The four low-passes.
     pub fn filtered(x: &States) -> [f64; 4] {
         [x[SHOWN], x[SHOWN + 1], x[SHOWN + 2], x[SHOWN + 3]]

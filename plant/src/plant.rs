@@ -157,6 +157,15 @@ impl Plant {
         sample
     }
 
+    /// After [`Plant::reset_within`]: what the sensors of output voltage, inductor current, load current and input voltage
+    /// show at that instant, as far as they have a low-pass. Values that are no number leave it as it is.
+    pub fn shows(&mut self, measured: [f64; 4]) {
+        let all = &self.parameters.sensors;
+        let sensors = [&all.v_out, &all.i_l, &all.i_out, &all.v_in];
+        let before = |n: usize| (measured[n] - sensors[n].offset) / sensors[n].gain;
+        Full::hold_filtered(&mut self.state.x, std::array::from_fn(before));
+    }
+
     /// One control period with `duty` (commanded now, clamped to 0..1) under `load`.
     ///
     /// The duty acts from the next start of a PWM period, which is now if the plant is sampled there, plus

@@ -7,6 +7,7 @@ use policy::Policy;
 use targets::TargetSpec;
 use verify::{Files, Selection};
 
+use super::budget;
 use super::costs::Measured;
 use super::verify::golden_text;
 use super::{bytes, grouped};
@@ -45,10 +46,13 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
         Measured::of(&policy, target, &selection.languages, &files)
     };
     if let (false, Some(manifest)) = (measured.costs.is_empty(), files.get_mut(manifest::FILE)) {
-        *manifest = manifest::with_costs(manifest, &measured.costs)?;
+        *manifest = manifest::with_costs(manifest, &measured.entries(&policy, options.clock))?;
     }
     write(&policy, target, &options.out, &files)?;
-    measured.say(&policy, target)?;
+    measured.say(&policy, target, options.clock)?;
+    if let Some(clock) = options.clock {
+        output::say(&budget::lines(&policy, target, &selection, &measured, clock)?.join("\n"))?;
+    }
     Ok(Outcome::Done)
 }
 

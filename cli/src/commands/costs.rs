@@ -3,9 +3,11 @@
 use ::targets::TargetSpec;
 use codegen::Language;
 use policy::Policy;
+use serde::Serialize;
 use verify::Files;
 use verify::measure::{Costs, usual_builds};
 
+use super::budget::{Budget, Clock};
 use super::verify::missing_text;
 use super::{bytes, grouped};
 use crate::{Failure, output};
@@ -15,6 +17,15 @@ use crate::{Failure, output};
 pub struct Measured {
     pub costs: Vec<Costs>,
     notes: Vec<String>,
+}
+
+/// Costs of a build in the manifest.
+#[derive(Serialize)]
+pub struct Entry<'a> {
+    #[serde(flatten)]
+    costs: &'a Costs,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    budget: Option<Budget>,
 }
 
 impl Measured {
@@ -35,10 +46,21 @@ impl Measured {
         }
     }
 
+    /// As the manifest has them, with the budget at a clock.
+    pub fn entries(&self, policy: &Policy, clock: Option<Clock>) -> Vec<Entry<'_>> {
+        let budget = |costs| Budget::of(costs, clock?, policy.sample_period);
+        let entry = |costs| Entry {
+            costs,
+            budget: budget(costs),
+        };
+        self.costs.iter().map(entry).collect()
+    }
+
     /// Prints a block per build.
-    pub fn say(&self, policy: &Policy, target: &TargetSpec) -> Result<(), Failure> {
+    pub fn say(&self, policy: &Policy, target: &TargetSpec, clock: Option<Clock>) -> Result<(), Failure> {
+        let clock = clock.map(|clock| clock.hz).or(target.clock_hz.map(f64::from));
         for costs in &self.costs {
-            output::say(&text(costs, policy, target))?;
+            output::say(&text(costs, policy, target, clock))?;
         }
         for note in &self.notes {
             output::say(&format!("note: {note}"))?;
@@ -47,7 +69,7 @@ impl Measured {
     }
 }
 
-fn text(costs: &Costs, policy: &Policy, target: &TargetSpec) -> String {
+fn text(costs: &Costs, policy: &Policy, target: &TargetSpec, clock: Option<f64>) -> String {
     let (fewest, most) = (costs.instructions_min, costs.instructions_max);
     let instructions = if fewest == most {
         format!("{} for every input", grouped(most))
@@ -70,13 +92,13 @@ fn text(costs: &Costs, policy: &Policy, target: &TargetSpec) -> String {
             grouped(least),
             grouped(most)
         );
-        if let Some(clock) = target.clock_hz {
-            let share = |cycles: u64| 100.0 * cycles as f64 / f64::from(clock) / policy.sample_period;
+        if let Some(hz) = clock {
+            let share = |cycles: u64| 100.0 * cycles as f64 / hz / policy.sample_period;
             line += &format!(
-                ", {:.0} to {:.0} % of the control period at {} MHz",
+                ", {:.0} to {:.0} % of the control period at {}",
                 share(least),
                 share(most),
-                clock / 1_000_000
+                Clock { hz }
             );
         }
         lines.push(line);

@@ -70,6 +70,15 @@ pub fn write(policy: &Policy, target: &TargetSpec, folder: &Path, files: &Files)
             grouped(u64::from(i32::MAX.unsigned_abs()))
         ))?;
     }
+    let removed: usize = sizes.removed_neurons.iter().sum();
+    if removed > 0 {
+        let whole: usize = policy.layers.iter().map(|layer| layer.inputs * layer.outputs).sum();
+        output::say(&format!(
+            "note: {removed} neurons are 0 for every observation and left out: {} of {} MACs, the same bits",
+            grouped(sizes.macs as u64),
+            grouped(whole as u64)
+        ))?;
+    }
     if let Some(bound) = sizes.q_error_bound {
         output::say(&format!(
             "note: no Q value is further than {} from real arithmetic, for every observation; `policyc certify` says more",

@@ -4,6 +4,7 @@ use policy::{Activation, Layer, NumericFormat, Policy};
 use targets::RowBlock;
 
 use super::integer;
+use super::simplify::{self, Simplified};
 use crate::program::{ActivationCode, LayerCode, Literal, NetworkCode};
 
 /// Numerator of the tanh approximation, lowest power first (contract section 6).
@@ -21,8 +22,9 @@ pub const TANH_RANGE: f32 = 9.0;
 
 /// The network in the policy's numeric format.
 pub fn lower(policy: &Policy, row_block: RowBlock) -> NetworkCode {
-    match policy::scales::of(policy) {
-        Some(scales) => NetworkCode::Integer(integer::lower(policy, &scales)),
+    let Simplified { policy, scales } = simplify::simplified(policy);
+    match scales {
+        Some(scales) => NetworkCode::Integer(integer::lower(&policy, &scales)),
         None => NetworkCode::Real {
             fused: policy.numeric_format == NumericFormat::F32Fma,
             layers: policy.layers.iter().map(|layer| real(layer, row_block)).collect(),

@@ -129,7 +129,8 @@ pub struct Compile {
     #[arg(long, value_name = "FREQUENCY", value_parser = Clock::parse, conflicts_with = "no_costs")]
     pub clock: Option<Clock>,
     /// Also generate a way into a tool or onto a board, with the C core; may be repeated. kit: C test program with
-    /// expected bits for your compiler and board. sfunction: Simulink block, also for dSPACE RTI
+    /// expected bits for your compiler and board. sfunction: Simulink block, also for dSPACE RTI. fmu2, fmu3: unit for
+    /// co-simulation, FMI 2.0 or 3.0, sources and a binary for this machine
     #[arg(long, value_name = "NAME", value_parser = door())]
     pub door: Vec<codegen::Door>,
     /// Control steps in the kit
@@ -273,7 +274,17 @@ pub struct Diagnose {
     /// Names, units and constants of other tables
     #[arg(long, value_name = "MAP")]
     pub columns: Option<PathBuf>,
-    /// Folder for diagnosis.json, plant.extended.toml and report.html
+    /// policy.toml with a mapping, or the folder that holds it: its mapping is refitted from the extended model, and the
+    /// loop closed on that model with both
+    #[arg(long, value_name = "POLICY")]
+    pub policy: Option<PathBuf>,
+    /// Load steps of the closed loop, as for `simulate`; without it from the records' loads
+    #[arg(long, value_name = "FILE", requires = "policy")]
+    pub scenario: Option<PathBuf>,
+    /// The converter that the policy was trained on; without it the model
+    #[arg(long, value_name = "PLANT", requires = "policy")]
+    pub trained_on: Option<PathBuf>,
+    /// Folder for diagnosis.json, plant.extended.toml, report.html and, with a policy, drm.toml
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
 }

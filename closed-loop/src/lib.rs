@@ -15,6 +15,7 @@ mod faults;
 pub mod limit;
 mod load_step;
 pub mod read;
+pub mod refit;
 pub mod scenario;
 mod scenario_file;
 mod tables;

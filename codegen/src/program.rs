@@ -6,6 +6,7 @@
 mod network;
 
 use policy::{Digests, NumericFormat};
+use targets::Widths;
 
 pub use network::{ActivationCode, IntegerInput, IntegerLayer, IntegerNetwork, LayerCode, NetworkCode};
 
@@ -47,6 +48,19 @@ pub enum Coefficient {
     C,
     /// Product term.
     R,
+}
+
+impl Coefficient {
+    /// Name of the parameter that sets it; the state member is `mapping_<name>`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Coefficient::A => "a",
+            Coefficient::B => "b",
+            Coefficient::C => "c",
+            Coefficient::R => "r",
+        }
+    }
 }
 
 /// One operation; its result is a number of the format or, where the name says so, a flag (0 or 1).
@@ -284,6 +298,8 @@ pub struct Provenance {
     pub digests: Digests,
     /// Target name.
     pub target: &'static str,
+    /// Widths of the target's C types.
+    pub widths: Widths,
     /// C flags of the target.
     pub c_flags: &'static [&'static str],
     /// rustc flags of the target.

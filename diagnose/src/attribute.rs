@@ -322,7 +322,7 @@ impl<'a> Searcher<'a> {
 }
 
 /// What columns explain of a residual, linearly.
-fn gained(columns: &[Vec<f64>], residual: &[f64]) -> f64 {
+pub(crate) fn gained(columns: &[Vec<f64>], residual: &[f64]) -> f64 {
     let right: Vec<f64> = columns.iter().map(|column| dot(column, residual)).collect();
     let matrix: Vec<Vec<f64>> = columns
         .iter()

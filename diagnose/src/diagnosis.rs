@@ -6,6 +6,7 @@ use plant::Parameters;
 use serde::Serialize;
 
 use crate::attribute::{Attribution, attribute};
+use crate::control::Request;
 use crate::drive::Model;
 use crate::fit::State;
 use crate::gain::{self, Held, Pair};
@@ -104,7 +105,7 @@ pub struct Gain {
     /// Mean square over that of the noise, all held-out records: before and after.
     pub mean_square: [f64; 2],
     /// Closed loop with a policy, if one was given.
-    pub closed_loop: Option<serde_json::Value>,
+    pub closed_loop: Option<crate::control::ClosedLoop>,
 }
 
 /// What is written to `diagnosis.json`.
@@ -145,6 +146,8 @@ pub struct Diagnosis {
     pub held: Option<Pair>,
     /// The extended model.
     pub extended: Model,
+    /// The loop closed with a policy, if one was given.
+    pub control: Option<crate::control::Control>,
 }
 
 /// Diagnoses `model` by the records `train`; `heldout` only judges. `say` hears how far it is.
@@ -153,7 +156,11 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     let base = Model::new(model);
     say("noise and initial states");
     let (problem, null, outliers) = prepared(train, &base);
-    let attribution = attribute(&problem, null, say);
+    let mut attribution = attribute(&problem, null, say);
+    let others = crate::ties::other_pairs(&problem, &attribution);
+    for rivals in attribution.rivals.iter_mut().take(1) {
+        rivals.extend(others.iter().cloned());
+    }
     say("intervals");
     let profiles = profiles(&problem, &attribution);
     let structure = structures(&problem, attribution.state(), attribution.inflation);
@@ -195,6 +202,23 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         profiles,
         held: pair,
         extended,
+        control: None,
+    }
+}
+
+impl Diagnosis {
+    /// Closes the loop with a policy on the extended model; without load steps asked for, over the records' loads.
+    ///
+    /// # Errors
+    /// Those of [`crate::control::control`].
+    pub fn close_the_loop(&mut self, mut request: Request) -> Result<(), closed_loop::Error> {
+        if request.load_steps.is_empty() {
+            request.load_steps = crate::control::load_steps(self.problem.records.iter(), request.v_ref);
+        }
+        let control = crate::control::control(&request, &crate::extend::extended_plant(self))?;
+        self.findings.gain.closed_loop = Some(control.findings.clone());
+        self.control = Some(control);
+        Ok(())
     }
 }
 

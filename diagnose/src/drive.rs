@@ -7,9 +7,8 @@ use crate::record::{CHANNELS, Record, Segment};
 
 /// Duties before a segment that the plant is given: more than it can delay.
 const HISTORY: usize = 9;
-/// A settled point is reached when a period moves voltage and current by less than this share.
-const AT_REST: f64 = 1e-8;
-const MOST_PERIODS: usize = 20_000;
+/// Time constant that stands for the mean over a settled point, periods.
+const AVERAGED: f64 = 100.0;
 /// Two instants closer than this share of a period are one.
 const SAME: f64 = 1e-9;
 
@@ -78,9 +77,11 @@ pub fn simulate(model: &Model, record: &Record, starts: &[Start], trim: f64) -> 
         phase = 0.0;
     }
     if record.settled {
-        // the middle of a centred pulse shows the mean of the current
-        p.pwm.carrier = plant::Carrier::Centre;
-        (phase, whole) = (0.5, 0.0);
+        // what is noted of a settled point is a mean over many periods
+        for sensor in sensors(&mut p) {
+            (sensor.low_pass, sensor.delay) = (AVERAGED * model.plant.t_sw(), 0.0);
+        }
+        (phase, whole) = (0.0, 0.0);
     }
     p.pwm.sampling_phase = phase;
     let driver = Driver {
@@ -140,18 +141,8 @@ impl Driver<'_> {
 
     fn settle(&self, plant: &mut Plant, row: usize, start: &Start, shown: &mut [[f64; CHANNELS]]) {
         let (duty, load) = (self.record.duty[row], &self.record.load[row]);
-        let mut last = plant.reset_within(start[0], start[1], load, &[duty; HISTORY]);
-        let mut rests = 0;
-        for _ in 0..MOST_PERIODS {
-            let sample = plant.step(duty, load);
-            let moved = (sample.v_out - last.v_out).abs() / start[0].abs().max(1e-3)
-                + (sample.i_l - last.i_l).abs() / start[1].abs().max(1e-3);
-            last = sample;
-            rests = if moved < AT_REST { rests + 1 } else { 0 };
-            if rests > 20 {
-                break;
-            }
-        }
+        plant.reset_within(start[0], start[1], load, &[duty; HISTORY]);
+        let (last, _) = plant.rest(duty, load);
         shown[row] = array(&last.measured);
     }
 }

@@ -13,12 +13,13 @@
 //!
 //! The way: [`record`] (from [`csv`] and [`columns`]) and [`drive`] make simulated rows of a model, [`problem`] a
 //! least-squares problem with initial states as unknowns, [`fit`] moves the parameters of [`causes`], [`attribute`]
-//! chooses among them, [`profile`], [`shape`], [`gain`] and [`next`] say how sure that is, [`diagnosis`] holds the
+//! chooses among them, [`profile`], [`shape`], [`gain`] and [`next`] say how sure that is, [`control`] what it is worth under control, [`diagnosis`] holds the
 //! answer and [`extend`] and [`page`] write it down. See docs/diagnose.md.
 
 pub mod attribute;
 pub mod causes;
 pub mod columns;
+pub mod control;
 pub mod csv;
 pub mod diagnosis;
 pub mod drive;
@@ -34,3 +35,4 @@ pub mod profile;
 pub mod record;
 pub mod shape;
 mod spectrum;
+pub mod ties;

@@ -1,5 +1,7 @@
 //! The report: one page.
 
+mod control;
+
 use report::{Axis, BarChart, BarPanel, Chart, Page, Panel, ReportError, Section, Series, Svg, Table, quantity};
 
 use crate::diagnosis::{Diagnosis, Named, Verdict};
@@ -34,6 +36,9 @@ pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
     page = page.section(ties(diagnosis));
     if let Some(section) = held_out(diagnosis)? {
         page = page.section(section);
+    }
+    if let Some(control) = &diagnosis.control {
+        page = page.section(control::section(control)?);
     }
     page.section(noise(diagnosis)).section(detectable(diagnosis)).html()
 }

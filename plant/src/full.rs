@@ -13,7 +13,7 @@ use crate::plain::Track;
 use crate::signals::{Load, Signals};
 
 /// Number of states.
-const STATES: usize = 11;
+pub(crate) const STATES: usize = 11;
 const I_L: usize = 0;
 const V_C: usize = 1;
 const I_CABLE: usize = 2;

@@ -1,8 +1,9 @@
 //! The steady state in which the plant runs at a given sampled voltage.
 
+use crate::full::{STATES, States};
 use crate::parameters::Parameters;
-use crate::plant::Plant;
-use crate::signals::{Load, Signals};
+use crate::plant::{Plant, PlantState};
+use crate::signals::{Load, Sample, Signals};
 
 /// How [`Plant::settle`] ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,6 +61,14 @@ impl Regulator {
 
 const MOST_PERIODS: u32 = 20_000;
 const AT_REST: u32 = 20;
+/// Periods in which delays forget what was before.
+const WARM_UP: u32 = 10;
+/// Periods between two attempts that did not get nearer.
+const BETWEEN: u32 = 40;
+const MOST_NEWTON: usize = 40;
+/// At rest a period moves no state by this share.
+const AT_REST_1: f64 = 1e-9;
+const NUDGE: f64 = 1e-6;
 
 impl Plant {
     /// Runs the plant under `load` until its sampled output voltage rests at `v_out` V, held by a [`Regulator`] on the
@@ -95,6 +104,153 @@ impl Plant {
             duty,
             converged: false,
             periods: MOST_PERIODS,
+        }
+    }
+
+    /// Runs the plant at a duty that stands still until it repeats itself, and returns that state's sample; whether it came
+    /// to rest is said beside it.
+    ///
+    /// The state at the start of a period is sought by Newton's method on the map of a period: a filter without losses,
+    /// which would ring for ever, and a load that is unstable in open loop have a steady state as well. Where there is none
+    /// (ripple of the source, a duty that jumps between two steps) the plant is only run.
+    pub fn rest(&mut self, duty: f64, load: &Load) -> (Sample, bool) {
+        self.run(WARM_UP, duty, load);
+        for _ in 0..MOST_NEWTON {
+            let before = *self.state();
+            let (after, distance) = self.moved(duty, load);
+            if distance < AT_REST_1 {
+                return (self.run(WARM_UP, duty, load), true);
+            }
+            let mut jacobian = [[0.0; STATES]; STATES];
+            for column in 0..STATES {
+                let mut nudged = before;
+                let step = NUDGE * (1.0 + nudged.x[column].abs());
+                nudged.x[column] += step;
+                self.restore(&nudged);
+                self.step(duty, load);
+                for (row, line) in jacobian.iter_mut().enumerate() {
+                    line[column] = (self.state().x[row] - after[row]) / step;
+                }
+            }
+            let mut right: States = std::array::from_fn(|n| before.x[n] - after[n]);
+            for (n, line) in jacobian.iter_mut().enumerate() {
+                line[n] -= 1.0;
+            }
+            eliminate(&mut jacobian, &mut right);
+            if !self.improve(&before, &right, distance, duty, load) {
+                self.restore(&before);
+                self.run(BETWEEN, duty, load);
+            }
+        }
+        let mut last = self.run(1, duty, load);
+        for _ in 0..MOST_PERIODS / 4 {
+            let now = self.step(duty, load);
+            let moved = (now.v_out - last.v_out).abs() + (now.i_l - last.i_l).abs();
+            last = now;
+            if moved < AT_REST_1 * (1.0 + now.v_out.abs()) {
+                return (last, true);
+            }
+        }
+        (last, false)
+    }
+
+    fn run(&mut self, periods: u32, duty: f64, load: &Load) -> Sample {
+        (0..periods).fold(self.sample(), |_, _| self.step(duty, load))
+    }
+
+    /// The state after a period, and how far it is from that before.
+    fn moved(&mut self, duty: f64, load: &Load) -> (States, f64) {
+        let before = self.state().x;
+        self.step(duty, load);
+        let after = self.state().x;
+        let share = |(a, b): (&f64, &f64)| (a - b).abs() / (1.0 + b.abs());
+        (after, after.iter().zip(&before).map(share).fold(0.0, f64::max))
+    }
+
+    /// Takes as much of a Newton step as brings the plant nearer to rest; `false` if none does.
+    fn improve(&mut self, before: &PlantState, step: &States, distance: f64, duty: f64, load: &Load) -> bool {
+        for share in [1.0, 0.5, 0.25, 0.05] {
+            let mut tried = *before;
+            for (x, change) in tried.x.iter_mut().zip(step) {
+                *x += share * change;
+            }
+            self.restore(&tried);
+            let next = self.moved(duty, load).1;
+            if next < distance {
+                return true;
+            }
+        }
+        false
+    }
+}
+
+/// Solves a small system in place; what has no equation of its own stays 0.
+fn eliminate(matrix: &mut [States; STATES], right: &mut States) {
+    let mut row_of = [None; STATES];
+    let mut free = [true; STATES];
+    for column in 0..STATES {
+        let rows = (0..STATES).filter(|row| free[*row]);
+        let pivot = rows.max_by(|a, b| matrix[*a][column].abs().total_cmp(&matrix[*b][column].abs()));
+        let Some(pivot) = pivot.filter(|row| matrix[*row][column].abs() > 1e-12) else {
+            continue;
+        };
+        free[pivot] = false;
+        row_of[column] = Some(pivot);
+        let line = matrix[pivot];
+        for row in (0..STATES).filter(|row| *row != pivot) {
+            let factor = matrix[row][column] / line[column];
+            for (cell, above) in matrix[row].iter_mut().zip(&line) {
+                *cell -= factor * above;
+            }
+            right[row] -= factor * right[pivot];
+        }
+    }
+    let solved = |column: usize| row_of[column].map_or(0.0, |row| right[row] / matrix[row][column]);
+    *right = std::array::from_fn(solved);
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Load, Parameters, Plant};
+
+    #[test]
+    fn a_filter_without_losses_has_a_steady_state() {
+        let mut parameters = Parameters::paper_model();
+        parameters.converter.capacitance = 150e-6;
+        let mut plant = Plant::new(&parameters).unwrap();
+        for (duty, load) in [
+            (0.4, Load::current(5.0)),
+            (0.5, Load::resistor(20.0)),
+            (0.5, Load::power(800.0)),
+        ] {
+            let wanted = duty * 200.0;
+            plant.reset_at(0.8 * wanted, 0.0, &load);
+            let (sample, rests) = plant.rest(duty, &load);
+            assert!(
+                rests && (sample.v_out - wanted).abs() < 0.05,
+                "{duty} {load:?}: {}",
+                sample.v_out
+            );
+        }
+    }
+
+    #[test]
+    fn discontinuous_points_follow_the_formula_of_the_resting_current() {
+        let parameters = Parameters::paper_model();
+        let (l, f, v_in) = (2e-3, 1e4, 200.0);
+        let mut plant = Plant::new(&parameters).unwrap();
+        for i in [0.1, 0.4] {
+            let load = Load::current(i);
+            let d: f64 = 0.3;
+            // charge of a triangle: i = d^2 (v_in - v) v_in / (2 l f v)
+            let v = v_in / (1.0 + 2.0 * l * f * i / (d * d * v_in));
+            plant.reset_at(60.0, 1.0, &load);
+            let (sample, rests) = plant.rest(d, &load);
+            assert!(
+                rests && (sample.v_out - v).abs() < 0.2,
+                "{i} A: {} V, {v} V",
+                sample.v_out
+            );
         }
     }
 }

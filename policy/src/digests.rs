@@ -103,6 +103,12 @@ fn weights(layers: &[Layer]) -> String {
 fn json(content: &impl Serialize) -> String {
     // these structs hold no map with keys other than text and no fallible serialiser
     let bytes = serde_json::to_vec(content).unwrap_or_default();
+    sha256(&bytes)
+}
+
+/// SHA-256 as 64 hexadecimal digits.
+#[must_use]
+pub fn sha256(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }
 

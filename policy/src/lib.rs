@@ -30,6 +30,7 @@ mod weights;
 
 pub use bounds::rational_tanh;
 pub use check::check;
+pub use digests::sha256;
 pub use faults::Faults;
 pub use model::*;
 pub use raw::{RawPolicy, ReadOptions, read};
@@ -49,8 +50,19 @@ pub fn load(path: &Path) -> Result<Policy, Faults> {
 /// # Errors
 /// All faults of the file.
 pub fn load_mapping(path: &Path) -> Result<Mapping, toml_input::Faults> {
-    let document = toml_input::Document::open(path)?;
+    mapping(&toml_input::Document::open(path)?)
+}
+
+/// [`load_mapping`] of a text; `file` only names it in messages.
+///
+/// # Errors
+/// All faults of the text.
+pub fn read_mapping(file: &Path, text: &str) -> Result<Mapping, toml_input::Faults> {
+    mapping(&toml_input::Document::from_text(file, text)?)
+}
+
+fn mapping(document: &toml_input::Document) -> Result<Mapping, toml_input::Faults> {
     let mut faults = Vec::new();
-    let mapping = contract::mapping::read(&document, 0, &mut faults);
+    let mapping = contract::mapping::read(document, 0, &mut faults);
     document.conclude(mapping, faults)
 }

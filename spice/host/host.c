@@ -1,6 +1,6 @@
 /* ngspice as a converter under control: one control period after the other.
  *
- * usage: host NETLIST T_SAMPLE
+ * usage: host NETLIST T_SAMPLE [VECTOR ...]
  *
  * The netlist has sources `external`, whose levels this program says. It reads lines
  *     COUNT { SOURCE TIME RISE LEVEL } ...
@@ -8,7 +8,7 @@
  * was before the start, each other one about a control period and later. For the start and for the sampling instant that
  * ends each control period it writes one line
  *     T V_OUT I_L I_OUT V_IN V_MIN V_MAX I_MIN I_MAX
- * with 17 digits. It ends where the input does.
+ * with 17 digits, and behind them the other vectors that were asked for. It ends where the input does.
  */
 #include <stdbool.h>
 #include <stdio.h>
@@ -17,7 +17,7 @@
 
 #include <ngspice/sharedspice.h>
 
-enum { SOURCES = 5, EDGES = 32, COLUMNS = 4 };
+enum { SOURCES = 5, EDGES = 32, FIXED = 4, COLUMNS = 12 };
 
 struct edge {
     double time, rise, level;
@@ -31,7 +31,8 @@ struct source {
 };
 
 static struct source sources[SOURCES] = {{.name = "vgu"}, {.name = "vgl"}, {.name = "vpw"}, {.name = "vcc"}, {.name = "vgg"}};
-static const char *const columns[COLUMNS] = {"out", "vil#branch", "vout#branch", "nin"};
+static const char *columns[COLUMNS] = {"out", "vil#branch", "vout#branch", "nin"};
+static int column_count = FIXED;
 
 static double t_sample;
 static double next_sample = -1.0;
@@ -185,7 +186,7 @@ static int point(pvecvaluesall all, int count, int id, void *user)
         const pvecvalues vector = all->vecsa[n];
         if (strcmp(vector->name, "time") == 0)
             t = vector->creal;
-        for (int k = 0; k < COLUMNS; k++)
+        for (int k = 0; k < column_count; k++)
             if (strcmp(vector->name, columns[k]) == 0)
                 x[k] = vector->creal;
     }
@@ -197,7 +198,10 @@ static int point(pvecvaluesall all, int count, int id, void *user)
     widen(&extremes[2], x[1]);
     if (t >= next_sample - 1e-13) {
         printf("%.17g %.17g %.17g %.17g %.17g", t, x[0], x[1], x[2], x[3]);
-        printf(" %.17g %.17g %.17g %.17g\n", extremes[0], extremes[1], extremes[2], extremes[3]);
+        printf(" %.17g %.17g %.17g %.17g", extremes[0], extremes[1], extremes[2], extremes[3]);
+        for (int k = FIXED; k < column_count; k++)
+            printf(" %.17g", x[k]);
+        printf("\n");
         fflush(stdout);
         extremes[0] = extremes[1] = x[0];
         extremes[2] = extremes[3] = x[1];
@@ -210,9 +214,11 @@ int main(int argc, char **argv)
 {
     char line[4096];
     int id = 0;
-    if (argc != 3)
+    if (argc < 3 || argc - 3 > COLUMNS - FIXED)
         return 2;
     t_sample = atof(argv[2]);
+    for (int n = 3; n < argc; n++)
+        columns[column_count++] = argv[n];
     ngSpice_Init(say, NULL, leave, point, names, running, NULL);
     ngSpice_Init_Sync(voltage, current, time_step, &id, NULL);
     read_edges(0.0);

@@ -123,7 +123,7 @@ impl SpiceConverter {
         };
         let mut row = None;
         if self.host.is_none() {
-            let (mut host, first) = Host::start(&begin.netlist, begin.parameters.t_sw(), &begin.before)?;
+            let (mut host, first) = Host::start(&begin.netlist, begin.parameters.t_sw(), &begin.before, &[])?;
             row = Some(first);
             for edges in &self.history {
                 row = Some(host.period(edges)?);

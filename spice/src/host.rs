@@ -15,36 +15,49 @@ pub const INSTALL: &str = "ngspice's shared library is needed; type\n    sudo ap
 
 const SOURCE: &str = include_str!("../host/host.c");
 
-/// The sources that a run sets, in the order of the host program.
+/// The sources that a run sets, in the order of the host program: the netlist's `external` ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Source {
+pub enum Source {
+    /// `gu`: 1 is on.
     UpperGate = 0,
+    /// `gl`: 1 is on.
     LowerGate = 1,
+    /// `pw`, W.
     Power = 2,
+    /// `cc`, A.
     Current = 3,
+    /// `gg`, S.
     Conductance = 4,
 }
 
 /// A source goes to another level.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Edge {
+pub struct Edge {
+    /// Which source.
     pub source: Source,
     /// s from the start of the control period; may lie before or behind it.
     pub time: f64,
     /// s
     pub rise: f64,
+    /// What it goes to.
     pub level: f64,
 }
 
 /// What ngspice says at a sampling instant.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Row {
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Row {
+    /// V, `v(out)`
     pub v_out: f64,
+    /// A, `i(vil)`
     pub i_l: f64,
+    /// A, `i(vout)`
     pub i_out: f64,
+    /// V, `v(nin)`
     pub v_in: f64,
     /// Lowest and highest output voltage, then inductor current, since the row before.
     pub extremes: [f64; 4],
+    /// The other vectors that were asked for.
+    pub others: Vec<f64>,
 }
 
 /// A netlist in the middle of its transient.
@@ -57,13 +70,17 @@ pub struct Host {
 }
 
 impl Host {
-    /// Starts `netlist` and returns the start; `before` are the edges behind it.
-    pub(crate) fn start(netlist: &str, t_sample: f64, before: &[Edge]) -> Result<(Self, Row), Error> {
+    /// Starts `netlist` and returns the start; `before` are the edges behind it, `others` vectors to be read beside those of
+    /// every [`Row`].
+    ///
+    /// # Errors
+    /// If the library is missing or does not take the netlist.
+    pub fn start(netlist: &str, t_sample: f64, before: &[Edge], others: &[&str]) -> Result<(Self, Row), Error> {
         let folder = tempfile::tempdir().map_err(|error| failed("make a folder", &error))?;
         let file = folder.path().join("circuit.cir");
         std::fs::write(&file, netlist).map_err(|error| failed("write a netlist", &error))?;
         let mut command = Command::new(program()?);
-        command.arg(&file).arg(format!("{t_sample:e}"));
+        command.arg(&file).arg(format!("{t_sample:e}")).args(others);
         command
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -83,7 +100,10 @@ impl Host {
     }
 
     /// The edges of a control period; returns its end.
-    pub(crate) fn period(&mut self, edges: &[Edge]) -> Result<Row, Error> {
+    ///
+    /// # Errors
+    /// If ngspice gave up.
+    pub fn period(&mut self, edges: &[Edge]) -> Result<Row, Error> {
         let mut line = edges.len().to_string();
         for edge in edges {
             // writing to a String cannot fail
@@ -106,13 +126,14 @@ impl Host {
         let read = self.output.read_line(&mut line);
         read.map_err(|error| failed("hear ngspice", &error))?;
         let numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
-        match numbers[..] {
-            [_, v_out, i_l, i_out, v_in, a, b, c, d] => Ok(Row {
+        match &numbers[..] {
+            &[_, v_out, i_l, i_out, v_in, a, b, c, d, ref others @ ..] => Ok(Row {
                 v_out,
                 i_l,
                 i_out,
                 v_in,
                 extremes: [a, b, c, d],
+                others: others.to_vec(),
             }),
             _ => Err(Error::Mismatch("ngspice ended early; its words are above".to_owned())),
         }

@@ -7,7 +7,7 @@
 pub mod circuit;
 mod converter;
 mod gates;
-mod host;
+pub mod host;
 
 pub use converter::SpiceConverter;
-pub use host::{Host, INSTALL};
+pub use host::INSTALL;

@@ -257,6 +257,17 @@ pub struct Common {
     pub mapping_parameters: String,
 }
 
+/// Widths of a processor without 8-bit types, asserted when the core is compiled.
+#[derive(Debug, Clone, Copy)]
+pub struct WideChar {
+    /// Bits of `char`.
+    pub char_bits: u8,
+    /// Bits of `int`.
+    pub int_bits: u8,
+    /// `INT_MAX` of that width.
+    pub int_max: u64,
+}
+
 /// `<name>.h`
 #[derive(Debug, Template)]
 #[template(path = "c/header.h.jinja", escape = "none")]
@@ -281,6 +292,8 @@ pub struct Header {
 pub struct Source {
     /// Names and banner.
     pub common: Common,
+    /// Set where `char` has other than 8 bits.
+    pub wide_char: Option<WideChar>,
     /// Weights, biases, duties, CRC steps, self-test data.
     pub tables: Vec<Table>,
     /// Layers in order.

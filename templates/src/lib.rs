@@ -2,6 +2,7 @@
 
 pub mod block;
 pub mod c;
+pub mod fmu;
 pub mod kit;
 pub mod sfunction;
 

@@ -2,15 +2,13 @@
 //! simplex and case splits.
 
 use std::io::{BufRead, BufReader, Write};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 
 use certify::Certifier;
 use policy::{Activation, Interval, NumericFormat, Policy};
 use serde_json::{Value, json};
 use verify::traces::Rng;
 
-/// Names Python packages that are not here; the tests that need them are left out.
-const WITHOUT: &str = "POLICYC_WITHOUT_PYTHON_PACKAGES";
 const BOXES: usize = 200;
 
 struct Marabou {
@@ -21,7 +19,7 @@ struct Marabou {
 impl Marabou {
     fn start(policy: &Policy) -> Self {
         let script = tests::root().join("tests/certificate/marabou.py");
-        let mut process = Command::new("python3")
+        let mut process = tests::tools::python(env!("CARGO_TARGET_TMPDIR"))
             .arg(script)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
@@ -44,7 +42,7 @@ impl Marabou {
 
     fn say(&mut self, value: &Value) {
         writeln!(self.process.stdin.as_mut().unwrap(), "{value}")
-            .expect("Marabou listens (python3 -m pip install maraboupy==2.0.0)");
+            .expect("Marabou listens (`cargo xtask install` installs it)");
     }
 
     /// An input of the box with a sum of outputs of at least this, if there is one.
@@ -53,9 +51,8 @@ impl Marabou {
         self.say(&json!({"box": cell, "terms": terms, "at_least": at_least}));
         let mut line = String::new();
         self.answers.read_line(&mut line).unwrap();
-        let answer: Value = serde_json::from_str(&line).unwrap_or_else(|error| {
-            panic!("Marabou does not answer: {error} (python3 -m pip install maraboupy==2.0.0)")
-        });
+        let answer: Value = serde_json::from_str(&line)
+            .unwrap_or_else(|error| panic!("Marabou does not answer: {error} (`cargo xtask install` installs it)"));
         assert!(answer.get("unknown").is_none(), "Marabou gives up: {line}");
         let found = answer["found"].as_array()?;
         Some(found.iter().map(|x| x.as_f64().unwrap()).collect())
@@ -78,8 +75,7 @@ struct Score {
 
 #[test]
 fn marabou_contradicts_no_bound_and_no_decision_on_200_boxes() {
-    if std::env::var(WITHOUT).is_ok_and(|names| names.split(',').any(|name| name == "maraboupy")) {
-        eprintln!("maraboupy cannot be installed here: NOT compared with Marabou");
+    if tests::tools::is_without("Marabou") {
         return;
     }
     let policy = super::example(NumericFormat::I16);

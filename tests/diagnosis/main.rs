@@ -21,9 +21,14 @@ const HIDDEN: [(u64, &[&str]); 5] = [
     (105, &["mains_pickup"]),
 ];
 
+/// A policy trained on the nominal converter of all cases.
+const POLICY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/blind/policy");
+
 struct Answered {
     case: Case,
     diagnosis: Diagnosis,
+    /// The refitted mapping.
+    mapping: policy::Mapping,
 }
 
 fn answered() -> &'static [Answered] {
@@ -52,11 +57,12 @@ fn answer(seed: u64, ids: &[&str]) -> Answered {
             .filter(|path| path.starts_with(part));
         command.arg(option).args(files);
     }
-    let ran = run(command.arg("--out").arg(&out));
+    let ran = run(command.args(["--policy", POLICY, "--out"]).arg(&out));
     assert_eq!(ran.code, Some(0), "seed {seed}, {ids:?}\n{}{}", ran.stdout, ran.stderr);
     Answered {
         case,
         diagnosis: read(&out.join("diagnosis.json")),
+        mapping: policy::load_mapping(&out.join("drm.toml")).unwrap(),
     }
 }
 
@@ -95,4 +101,27 @@ fn exchanged_truths_are_noticed() {
             "{ids:?}: {judged:#?}"
         );
     }
+}
+
+/// The loop is closed in ngspice on the converter that the records come from.
+#[test]
+fn the_refitted_mapping_is_better_at_the_hidden_converter_and_the_same_where_nothing_is_hidden() {
+    let policy = policy::load(&Path::new(POLICY).join("policy.toml")).unwrap();
+    let all = answered();
+    let close = |answered: &Answered, (seed, ids): (u64, &[&str])| {
+        let bench = plan_of(seed, 0, ids, Extent::Short).unwrap().bench;
+        let mut refitted = policy.clone();
+        let load_current = policy.mapping.as_ref().unwrap().load_current;
+        refitted.mapping = Some(policy::Mapping {
+            load_current,
+            ..answered.mapping
+        });
+        [&policy, &refitted].map(|policy| blind::control::close(&bench, policy).unwrap())
+    };
+    let [before, after] = close(&all[0], HIDDEN[0]);
+    assert_eq!(before, after, "nothing is hidden: the mapping is kept");
+    assert!(before.mean_abs < 0.3, "{before:?}");
+    let [before, after] = close(&all[2], HIDDEN[2]);
+    assert!(after.mean_abs < before.mean_abs, "{before:?} {after:?}");
+    assert!(after.tail_mean < before.tail_mean, "{before:?} {after:?}");
 }

@@ -37,8 +37,8 @@ const FORBIDDEN: &[&str] = &[
 ];
 
 fn core(policy: &Policy) -> BTreeMap<String, String> {
-    let mut files =
-        verify::doors::generate(policy, targets::find("host").unwrap(), &Selection::core(&[Language::C])).unwrap();
+    let target = targets::find("c2000-c28x").unwrap();
+    let mut files = verify::doors::generate(policy, target, &Selection::core(&[Language::C])).unwrap();
     files.remove("manifest.json");
     files
 }
@@ -75,13 +75,14 @@ fn the_lint_finds_what_it_looks_for() {
     assert_eq!(forbidden(text), ["uint8_t", "double"]);
 }
 
-/// `-nostdinc`: the stand-in is the only header there is.
+/// `-nostdinc`: the stand-ins are the only headers there are. With 16 bits a byte, this machine's types have half the bytes.
 const COMPILER: &[&str] = &[
     "gcc",
     "-std=c99",
     "-nostdinc",
     "-isystem",
     "c2000",
+    "-Dsizeof(x)=(sizeof(x)/2u)",
     "-O2",
     "-Wall",
     "-Wextra",
@@ -125,6 +126,42 @@ fn an_8_bit_type_does_not_build_with_these_headers() {
     *files.get_mut("minimal.c").unwrap() += "static uint8_t planted;\n";
     let built = build(COMPILER, &["minimal.c"], bench(&files).path());
     assert!(built.code == Some(1) && built.stderr.contains("uint8_t"), "{built:?}");
+}
+
+/// On a machine with bytes of 8 bits, the core for the C28x does not build, and says why.
+#[test]
+fn the_core_asserts_widths_at_compile_time() {
+    let policy = golden_case("minimal");
+    let files = core(&policy);
+    let folder = bench(&files);
+    let built = build(&["gcc", "-c"], &["minimal.c"], folder.path());
+    for name in ["bytes_have_16_bits", "int_has_16_bits"] {
+        assert!(
+            built.code == Some(1) && built.stderr.contains(name),
+            "{name}: {built:?}"
+        );
+    }
+    // bytes of 16 bits, but types that do not have 32
+    let without: Vec<&str> = COMPILER
+        .iter()
+        .copied()
+        .filter(|flag| !flag.contains("sizeof"))
+        .collect();
+    let built = build(&without, &["minimal.c"], folder.path());
+    let types = [
+        "uint32_has_32_bits",
+        "int32_has_32_bits",
+        "float_has_32_bits",
+        "state_is_32_bit_words",
+    ];
+    for name in types {
+        assert!(
+            built.code == Some(1) && built.stderr.contains(name),
+            "{name}: {built:?}"
+        );
+    }
+    let host = verify::doors::generate(&policy, targets::host(), &Selection::core(&[Language::C])).unwrap();
+    assert!(!host["minimal.c"].contains("limits.h"), "nothing of that elsewhere");
 }
 
 /// The kit checks widths when it is compiled, in bits and not in bytes: `sizeof(uint32_t) * CHAR_BIT`.

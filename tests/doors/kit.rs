@@ -97,10 +97,16 @@ fn edited(policy: &Policy, edits: &[(&str, &str)]) -> Vec<Ran> {
     edits.iter().map(run_one).collect()
 }
 
-fn first_literal(text: &str, table: &str) -> String {
+pub fn first_literal(text: &str, table: &str) -> String {
     let start = text.find(table).unwrap();
     let open = start + text[start..].find("{\n").unwrap() + 1;
     text[open..].split(',').next().unwrap().trim().to_owned()
+}
+
+/// The literal with its lowest bit changed.
+pub fn flipped(literal: &str) -> String {
+    let value: f32 = literal.trim_end_matches('f').parse().unwrap();
+    format!("{:e}f", f32::from_bits(value.to_bits() ^ 1))
 }
 
 /// The lowest bit of the first weight.
@@ -109,9 +115,7 @@ fn a_flipped_weight_bit_fails() {
     let policy = example();
     let text = files(&policy, Door::Kit, STEPS)["buck12.c"].clone();
     let literal = first_literal(&text, "buck12_weights0[");
-    let value: f32 = literal.trim_end_matches('f').parse().unwrap();
-    let flipped = format!("{:e}f", f32::from_bits(value.to_bits() ^ 1));
-    let ran = edited(&policy, &[(&literal, &flipped)]).remove(0);
+    let ran = edited(&policy, &[(&literal, &flipped(&literal))]).remove(0);
     assert_eq!(ran.code, Some(1), "{ran:?}");
     assert!(ran.stdout.starts_with("buck12: FAIL: "), "{ran:?}");
     let failed = ran.stdout.split(' ').nth(2).unwrap().parse::<u32>().unwrap();

@@ -2,8 +2,11 @@
 //! made for. Each check has a planted fault beside it.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod boards;
 mod c2000;
+mod fmu;
 mod kit;
+mod rust;
 mod sfunction;
 
 use std::collections::BTreeMap;

@@ -1,6 +1,14 @@
 //! The example firmware builds, runs, and holds no way to a panic.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod qemu;
+
+// what the image of `firmware/qemu-m4` runs beside its controller
+#[path = "../../firmware/qemu-m4/src/converter.rs"]
+mod converter;
+#[path = "../../firmware/qemu-m4/src/run.rs"]
+mod run;
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Mutex, MutexGuard};
@@ -20,6 +28,11 @@ fn firmware() -> PathBuf {
 
 const NAME: &str = "firmware-no-std";
 
+/// Where `cargo xtask test` builds it, too.
+fn target_folder() -> PathBuf {
+    Path::new(env!("CARGO_TARGET_TMPDIR")).join("../firmware/no-std")
+}
+
 /// The program of that name that cargo builds in this folder.
 fn build(folder: &Path, name: &str, flags: &[&str]) -> PathBuf {
     let mut command = cargo();
@@ -27,9 +40,7 @@ fn build(folder: &Path, name: &str, flags: &[&str]) -> PathBuf {
         .args(["build", "--message-format=json-render-diagnostics"])
         .args(flags)
         .current_dir(folder);
-    // where `cargo xtask test` builds it, too
-    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("../firmware/no-std");
-    let ran = run(command.env("CARGO_TARGET_DIR", target));
+    let ran = run(command.env("CARGO_TARGET_DIR", target_folder()));
     assert_eq!(ran.code, Some(0), "{}", ran.stderr);
     let artifacts = artifacts(&ran.stdout);
     let own = artifacts.iter().find(|artifact| artifact.name == name).unwrap();

@@ -5,6 +5,8 @@
 
 mod costs;
 mod counter;
+mod fallback;
+mod included;
 
 use std::collections::BTreeMap;
 

@@ -67,6 +67,29 @@ pub fn rustc() -> Command {
     Command::new(std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into()))
 }
 
+/// The Python of `cargo xtask install`, with the packages that tests need; `tmp` is `env!("CARGO_TARGET_TMPDIR")`.
+#[must_use]
+pub fn python(tmp: &str) -> Command {
+    let folder = Path::new(tmp).with_file_name("python").join("bin");
+    let path = std::env::var("PATH").unwrap_or_default();
+    let mut command = Command::new(folder.join("python3"));
+    // programs that packages bring along, FMPy's cmake
+    command.env("PATH", format!("{}:{path}", folder.display()));
+    command
+}
+
+/// Whether the test command says that this Python package cannot be had here: tests that need it are left out, and the
+/// command's last lines name it.
+#[must_use]
+pub fn is_without(package: &str) -> bool {
+    let is_left_out = std::env::var("POLICYC_WITHOUT_PYTHON_PACKAGES")
+        .is_ok_and(|names| names.split(',').any(|name| name == package));
+    if is_left_out {
+        eprintln!("{package} cannot be had here: NOT tested");
+    }
+    is_left_out
+}
+
 /// Whether expected files are rewritten instead of compared.
 #[must_use]
 pub fn bless() -> bool {

@@ -16,6 +16,7 @@
 //! | a loop closed around a build | [`live`] |
 //! | what differs | [`compare`], [`report`] |
 //! | what a step costs | [`mod@measure`], [`elf`] |
+//! | archives of FMUs | [`fmu`] |
 //! | checked-in files against the policy | [`drift()`] |
 
 pub mod compare;
@@ -23,6 +24,7 @@ pub mod doors;
 pub mod drift;
 pub mod drivers;
 pub mod elf;
+pub mod fmu;
 mod golden;
 pub mod kit;
 pub mod lane;
@@ -35,6 +37,7 @@ pub mod runner;
 mod session;
 pub mod toolchain;
 pub mod traces;
+mod zip;
 
 pub use doors::Selection;
 pub use drift::{drift, read_text};

@@ -59,6 +59,7 @@ impl Live {
             files: &files,
             target,
             extra_flags: &[],
+            extra_rust_flags: &[],
             timeout: COMPILER_TIMEOUT,
         };
         let name = build.name();

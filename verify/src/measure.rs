@@ -104,6 +104,7 @@ pub fn measure(policy: &Policy, target: &TargetSpec, files: &Files, build: &Buil
         files,
         target,
         extra_flags: &[],
+        extra_rust_flags: &[],
         timeout: COMPILER_TIMEOUT,
     };
     let image = toolchain::compile(build, sources, folder).map_err(MeasureError::Build)?;

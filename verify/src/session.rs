@@ -42,6 +42,8 @@ pub struct Options<'a> {
     pub levels: Vec<String>,
     /// More flags for the C compilers, after all others.
     pub extra_flags: Vec<String>,
+    /// More flags for rustc, after all others.
+    pub extra_rust_flags: Vec<String>,
     /// Recordings to play before the random part.
     pub recorded: Vec<Recorded>,
     /// A build that sends nothing for so long has failed.
@@ -60,6 +62,7 @@ impl Default for Options<'_> {
             compilers: Vec::new(),
             levels: Vec::new(),
             extra_flags: Vec::new(),
+            extra_rust_flags: Vec::new(),
             recorded: Vec::new(),
             timeout: Duration::from_secs(60),
             progress: None,
@@ -148,6 +151,7 @@ pub fn run(policy: &Policy, options: Options<'_>) -> Result<Report, VerifyError>
         compilers,
         levels,
         extra_flags,
+        extra_rust_flags,
         recorded,
         timeout,
         mut progress,
@@ -176,6 +180,7 @@ pub fn run(policy: &Policy, options: Options<'_>) -> Result<Report, VerifyError>
         files,
         target,
         extra_flags: &extra_flags,
+        extra_rust_flags: &extra_rust_flags,
         timeout: COMPILER_TIMEOUT,
     };
     let compiled = compile_all(&builds, sources, folder.path());

@@ -94,7 +94,7 @@ fn run(command: Command) -> Result<bool, String> {
             Ok(true)
         }
         Command::Install => {
-            tools::provide(&process::Output::Terminal)?;
+            tools::provide(&Workspace::load()?.target_dir, &process::Output::Terminal)?;
             println!("all tools are there");
             Ok(true)
         }

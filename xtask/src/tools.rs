@@ -1,5 +1,6 @@
 //! Programs beyond Rust that the steps need, and how to get them.
 
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use crate::process::{self, Output};
@@ -11,10 +12,10 @@ enum Source {
     Rustup(&'static str),
     /// A target of the Rust toolchain.
     RustTarget(&'static str),
-    /// A package of PyPI with its version.
-    Pip(&'static str),
+    /// A Python package with its version, for the environment of [`python`].
+    Python(&'static str),
 }
-use Source::{Apt, Pip, RustTarget, Rustup};
+use Source::{Apt, Python, RustTarget, Rustup};
 
 /// A tool is there when its probe runs and ends with 0.
 struct Tool {
@@ -61,6 +62,12 @@ macro_rules! rust_target {
     };
 }
 
+const CORE_SOURCES: &[&str] = &[
+    "sh",
+    "-c",
+    "test -d \"$(/usr/bin/rustc --print sysroot)/lib/rustlib/src/rust/library/core\"",
+];
+
 const NGSPICE_HEADER: &[&str] = &[
     "gcc",
     "-fsyntax-only",
@@ -72,7 +79,11 @@ const NGSPICE_HEADER: &[&str] = &[
     "/dev/null",
 ];
 
-/// One row a tool. A Python package is probed by `["python3", "-c", "import it"]`.
+const VENV: &[&str] = &["python3", "-c", "import venv, ensurepip"];
+const MARABOU: &[&str] = &["python3", "-c", "from maraboupy import MarabouCore"];
+const FMPY: &[&str] = &["python3", "-c", "import fmpy; assert fmpy.__version__ == '0.3.32'"];
+
+/// One row a tool. A Python package is probed by `["python3", "-c", "import it"]` in the environment of [`python`].
 const TOOLS: &[Tool] = &[
     tool("rustfmt", &["cargo-fmt", "--version"], Rustup("rustfmt")),
     tool("clippy", &["cargo-clippy", "--version"], Rustup("clippy")),
@@ -119,27 +130,44 @@ const TOOLS: &[Tool] = &[
     rust_target!("powerpc-unknown-linux-gnu"),
     tool("ngspice", &["ngspice", "--version"], Apt("ngspice")),
     tool("ngspice's library", NGSPICE_HEADER, Apt("libngspice0-dev")),
-    tool("pip", &["python3", "-m", "pip", "--version"], Apt("python3-pip")),
-    tool(
-        "maraboupy",
-        &["python3", "-c", "from maraboupy import MarabouCore"],
-        Pip("maraboupy==2.0.0"),
-    ),
+    // FMPy builds an FMU's sources with the cmake that it brings along
+    tool("make", &["make", "--version"], Apt("make")),
+    tool("venv", VENV, Apt("python3-venv")),
+    tool("FMPy", FMPY, Python("fmpy==0.3.32")),
+    tool("Marabou", MARABOU, Python("maraboupy==2.0.0")),
+];
+
+/// Debian's Rust with the sources of `core`, which stands in where rustup has no target.
+const DEBIAN_RUST: &[Tool] = &[
+    tool("Debian's rustc", &["/usr/bin/rustc", "--version"], Apt("rustc-web")),
+    tool("Debian's cargo", &["/usr/bin/cargo", "--version"], Apt("cargo-web")),
+    tool("the sources of core", CORE_SOURCES, Apt("rust-web-src")),
 ];
 
 /// Tests leave out Rust on the targets that this names, by triple and separated by commas.
 pub const WITHOUT_RUST_TARGETS: &str = "POLICYC_WITHOUT_RUST_TARGETS";
 
+/// The folder of the Python environment: beside what cargo builds, so that no package gets into the system's Python.
+fn python(target_dir: &Path) -> PathBuf {
+    target_dir.join("python")
+}
+
 /// Tests leave out what needs the Python packages that this names, separated by commas.
 pub const WITHOUT_PYTHON_PACKAGES: &str = "POLICYC_WITHOUT_PYTHON_PACKAGES";
 
 /// What tests must do without: names and values of environment variables.
-pub fn absent() -> [(&'static str, String); 2] {
-    let missing = missing(TOOLS);
-    let packages = missing.iter().filter(|tool| matches!(tool.source, Pip(_)));
+pub fn absent(target_dir: &Path) -> [(&'static str, String); 2] {
+    let missing = missing(TOOLS, &python(target_dir));
+    let packages = missing.iter().filter(|tool| matches!(tool.source, Python(_)));
     let packages: Vec<&str> = packages.map(|tool| tool.name).collect();
+    let stand_in = self::missing(DEBIAN_RUST, Path::new("")).is_empty();
+    let targets = if stand_in {
+        Vec::new()
+    } else {
+        Plan::of(&missing).targets
+    };
     [
-        (WITHOUT_RUST_TARGETS, Plan::of(&missing).targets.join(",")),
+        (WITHOUT_RUST_TARGETS, targets.join(",")),
         (WITHOUT_PYTHON_PACKAGES, packages.join(",")),
     ]
 }
@@ -149,62 +177,92 @@ pub fn absent() -> [(&'static str, String); 2] {
 ///
 /// # Errors
 /// What is missing and the command to type.
-pub fn provide(output: &Output) -> Result<Vec<String>, String> {
-    let missing = missing(TOOLS);
+pub fn provide(target_dir: &Path, output: &Output) -> Result<Vec<String>, String> {
+    let python = python(target_dir);
+    let missing = missing(TOOLS, &python);
     let plan = Plan::of(&missing);
     if !plan.targets.is_empty() && works(&["rustup", "--version"]) {
         let mut rustup = Command::new("rustup");
         rustup.args(["target", "add"]).args(&plan.targets);
-        // offline or refused: said at the end
+        // offline or refused: Debian's Rust is next
         let _ = process::run(&mut rustup, output);
     }
+    let explained = |error| format!("{}\n{error}", plan.message(&missing, &python));
     if !plan.packages.is_empty() && may_install() {
-        for arguments in [&["update"][..], &plan.apt_install()] {
-            let mut apt = Command::new("apt-get");
-            apt.args(arguments).env("DEBIAN_FRONTEND", "noninteractive");
-            process::run(&mut apt, output).map_err(|e| format!("{}\n{e}", plan.message(&missing)))?;
-        }
+        install(&plan, output).map_err(explained)?;
     }
-    if !plan.python.is_empty() && may_install() {
-        let mut pip = Command::new("python3");
-        pip.args(PIP_INSTALL).args(&plan.python);
-        // Debian's Python asks for a virtual environment otherwise; a machine that installs by itself has one user
-        pip.env("PIP_BREAK_SYSTEM_PACKAGES", "1");
+    let debian = self::missing(DEBIAN_RUST, &python);
+    let targets = Plan::of(&self::missing(TOOLS, &python)).targets;
+    if !targets.is_empty() && !debian.is_empty() && may_install() {
+        // other names in this distribution, or no network: said at the end
+        let _ = install(&Plan::of(&debian), output);
+    }
+    if !plan.python.is_empty() && works(VENV) {
+        let [mut environment, mut packages] = plan.python_install(&python);
+        process::run(&mut environment, output).map_err(explained)?;
         // offline or refused: said at the end
-        let _ = process::run(&mut pip, output);
+        let _ = process::run(&mut packages, output);
     }
-    require()
+    require(target_dir)
+}
+
+fn install(plan: &Plan, output: &Output) -> Result<(), String> {
+    for arguments in [&["update"][..], &plan.apt_install()] {
+        let mut apt = Command::new("apt-get");
+        apt.args(arguments).env("DEBIAN_FRONTEND", "noninteractive");
+        process::run(&mut apt, output)?;
+    }
+    Ok(())
 }
 
 /// Looks only.
 ///
 /// # Errors
 /// What is missing and the command to type.
-pub fn require() -> Result<Vec<String>, String> {
-    let (optional, others): (Vec<_>, Vec<_>) = missing(TOOLS)
+pub fn require(target_dir: &Path) -> Result<Vec<String>, String> {
+    let python = python(target_dir);
+    let (optional, others): (Vec<_>, Vec<_>) = missing(TOOLS, &python)
         .into_iter()
-        .partition(|tool| matches!(tool.source, RustTarget(_) | Pip(_)));
+        .partition(|tool| matches!(tool.source, RustTarget(_) | Python(_)));
     if !others.is_empty() {
-        return Err(Plan::of(&others).message(&others));
+        return Err(Plan::of(&others).message(&others, &python));
     }
     let (targets, packages): (Vec<_>, Vec<_>) = optional
         .into_iter()
         .partition(|tool| matches!(tool.source, RustTarget(_)));
-    let said = [("Rust is NOT tested there", targets), ("NOT compared with", packages)];
+    let debian = missing(DEBIAN_RUST, &python);
+    let about_rust = match (targets.is_empty(), debian.is_empty()) {
+        (true, _) => "NOT tested: Debian's Rust in the place of a target of rustup",
+        (false, true) => "tested with Debian's Rust, for want of rustup's targets",
+        (false, false) => "Rust is NOT tested there",
+    };
+    let said = [(about_rust, [targets, debian].concat()), ("NOT tested with", packages)];
     let said = said.into_iter().filter(|(_, tools)| !tools.is_empty());
     Ok(said
-        .map(|(what, tools)| format!("{what}: {}", Plan::of(&tools).message(&tools)))
+        .map(|(what, tools)| format!("{what}: {}", Plan::of(&tools).message(&tools, &python)))
         .collect())
 }
 
-fn missing(tools: &[Tool]) -> Vec<&Tool> {
-    tools.iter().filter(|tool| !works(tool.probe)).collect()
+fn missing<'a>(tools: &'a [Tool], python: &Path) -> Vec<&'a Tool> {
+    let is_there = |tool: &&Tool| match tool.source {
+        Python(_) => works_as(&interpreter(python), tool.probe),
+        _ => works(tool.probe),
+    };
+    tools.iter().filter(|tool| !is_there(tool)).collect()
+}
+
+/// The Python program of an environment.
+fn interpreter(python: &Path) -> PathBuf {
+    python.join("bin/python3")
 }
 
 fn works(probe: &[&str]) -> bool {
-    let Some((program, arguments)) = probe.split_first() else {
-        return false;
-    };
+    probe.first().is_some_and(|program| works_as(Path::new(program), probe))
+}
+
+/// Whether a probe ends with 0 when it is `program` that runs.
+fn works_as(program: &Path, probe: &[&str]) -> bool {
+    let arguments = probe.iter().skip(1);
     let mut command = Command::new(program);
     command.args(arguments).stdin(Stdio::null());
     command.stdout(Stdio::null()).stderr(Stdio::null());
@@ -225,8 +283,6 @@ struct Plan {
     python: Vec<&'static str>,
 }
 
-const PIP_INSTALL: [&str; 4] = ["-m", "pip", "install", "--disable-pip-version-check"];
-
 impl Plan {
     fn of(missing: &[&Tool]) -> Self {
         let mut plan = Self {
@@ -240,7 +296,7 @@ impl Plan {
                 Apt(package) => plan.packages.push(package),
                 Rustup(component) => plan.components.push(component),
                 RustTarget(triple) => plan.targets.push(triple),
-                Pip(package) => plan.python.push(package),
+                Python(package) => plan.python.push(package),
             }
         }
         plan.packages.sort_unstable();
@@ -254,7 +310,17 @@ impl Plan {
         arguments
     }
 
-    fn message(&self, missing: &[&Tool]) -> String {
+    /// Makes the environment and fills it.
+    fn python_install(&self, python: &Path) -> [Command; 2] {
+        let mut environment = Command::new("python3");
+        environment.args(["-m", "venv"]).arg(python);
+        let mut packages = Command::new(interpreter(python));
+        packages.args(["-m", "pip", "install", "--disable-pip-version-check"]);
+        packages.args(&self.python);
+        [environment, packages]
+    }
+
+    fn message(&self, missing: &[&Tool], python: &Path) -> String {
         let names: Vec<_> = missing.iter().map(|tool| tool.name).collect();
         let mut lines = vec![format!("not found: {}; type", names.join(", "))];
         if !self.packages.is_empty() {
@@ -270,10 +336,11 @@ impl Plan {
             lines.push(format!("    rustup target add {targets}"));
         }
         if !self.python.is_empty() {
+            let (folder, program) = (python.display(), interpreter(python));
+            let packages = self.python.join(" ");
             lines.push(format!(
-                "    python3 {} {}",
-                PIP_INSTALL.join(" "),
-                self.python.join(" ")
+                "    python3 -m venv {folder} && {} -m pip install {packages}",
+                program.display()
             ));
         }
         lines.join("\n")
@@ -291,7 +358,7 @@ mod tests {
             tool("fails", &["false"], Apt("fails-package")),
             tool("absent", &["no-such-program-here"], Apt("absent-package")),
         ];
-        let found = missing(&tools);
+        let found = missing(&tools, Path::new("/nonexistent"));
         assert_eq!(found.iter().map(|t| t.name).collect::<Vec<_>>(), ["fails", "absent"]);
     }
 
@@ -302,13 +369,15 @@ mod tests {
             tool("callgrind", &["false"], Apt("valgrind")),
             tool("clippy", &["false"], Rustup("clippy")),
             tool("thumbv7m", &["false"], RustTarget("thumbv7m-none-eabi")),
+            tool("FMPy", &["false"], Python("fmpy==1")),
         ];
         let missing: Vec<_> = tools.iter().collect();
         assert_eq!(
-            Plan::of(&missing).message(&missing),
-            "not found: valgrind, callgrind, clippy, thumbv7m; type\n    \
+            Plan::of(&missing).message(&missing, Path::new("t/python")),
+            "not found: valgrind, callgrind, clippy, thumbv7m, FMPy; type\n    \
              sudo apt-get update && sudo apt-get install -y --no-install-recommends valgrind\n    \
-             rustup component add clippy\n    rustup target add thumbv7m-none-eabi"
+             rustup component add clippy\n    rustup target add thumbv7m-none-eabi\n    \
+             python3 -m venv t/python && t/python/bin/python3 -m pip install fmpy==1"
         );
     }
 }

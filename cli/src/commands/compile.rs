@@ -1,10 +1,12 @@
 //! `policyc compile`
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use codegen::{Language, manifest};
 use policy::Policy;
 use targets::TargetSpec;
+use verify::fmu::Archive;
 use verify::{Files, Selection};
 
 use super::budget;
@@ -48,7 +50,8 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
     if let (false, Some(manifest)) = (measured.costs.is_empty(), files.get_mut(manifest::FILE)) {
         *manifest = manifest::with_costs(manifest, &measured.entries(&policy, options.clock))?;
     }
-    write(&policy, target, &options.out, &files)?;
+    let archives = verify::fmu::archives(&policy, target, &selection.doors, &files)?;
+    write(&policy, target, &options.out, &files, &archives)?;
     measured.say(&policy, target, options.clock)?;
     if let Some(clock) = options.clock {
         output::say(&budget::lines(&policy, target, &selection, &measured, clock)?.join("\n"))?;
@@ -57,8 +60,20 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
 }
 
 /// Writes the files and says what they are.
-pub fn write(policy: &Policy, target: &TargetSpec, folder: &Path, files: &Files) -> Result<(), Failure> {
-    output::write_texts(folder, files)?;
+pub fn write(
+    policy: &Policy,
+    target: &TargetSpec,
+    folder: &Path,
+    files: &Files,
+    archives: &[Archive],
+) -> Result<(), Failure> {
+    let texts = files.iter().map(|(name, text)| (name, text.as_bytes()));
+    let packed = archives.iter().map(|archive| (&archive.file, archive.bytes.as_slice()));
+    let all: BTreeMap<String, Vec<u8>> = texts
+        .chain(packed)
+        .map(|(name, bytes)| (name.clone(), bytes.to_vec()))
+        .collect();
+    output::write_all(folder, &all)?;
     for note in &policy.notes {
         output::say(&format!("note: {note}"))?;
     }
@@ -94,8 +109,14 @@ pub fn write(policy: &Policy, target: &TargetSpec, folder: &Path, files: &Files)
         "{}: {macs} MACs per step, {tables} of tables, {state} of state",
         policy.name
     ))?;
-    for (name, text) in files {
-        output::say(&format!("  {} ({})", folder.join(name).display(), bytes(text.len())))?;
+    for (name, content) in &all {
+        output::say(&format!("  {} ({})", folder.join(name).display(), bytes(content.len())))?;
+    }
+    for Archive { file, binary, .. } in archives {
+        output::say(&match binary {
+            Ok((platform, compiler)) => format!("{file}: sources and a binary for {platform}, built with {compiler}"),
+            Err(reason) => format!("note: {file}: sources only, no binary: {reason}"),
+        })?;
     }
     Ok(())
 }

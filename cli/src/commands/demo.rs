@@ -45,7 +45,7 @@ pub fn run(options: &Demo) -> Result<Outcome, Failure> {
     heading("The code", &command)?;
     let policy = super::load(&policy_folder)?;
     let files = codegen::generate(&policy, super::target("host")?, &Language::ALL)?;
-    compile::write(&policy, super::target("host")?, &generated, &files.files)?;
+    compile::write(&policy, super::target("host")?, &generated, &files.files, &[])?;
 
     let (policy, generated) = (policy_folder.display(), generated.display());
     heading(

@@ -5,12 +5,16 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use ::diagnose::columns::Columns;
+use ::diagnose::control::Request;
 use ::diagnose::diagnosis::diagnose;
 use ::diagnose::extend::extended_toml;
 use ::diagnose::page::page;
 use ::diagnose::record::Record;
+use closed_loop::Scenario;
+use closed_loop::scenario::Task;
 use plant::{Fault, Faults, Parameters};
 
+use super::simulate;
 use crate::arguments::Diagnose;
 use crate::{Failure, Outcome, output};
 
@@ -21,17 +25,29 @@ pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
         .columns
         .as_deref()
         .map_or_else(|| Ok(Columns::default()), Columns::open)?;
+    let closed_loop = options
+        .policy
+        .as_deref()
+        .map(|policy| request(options, policy, &model))
+        .transpose()?;
     let (train, heldout) = records(options, &columns, &model)?;
     let start = Instant::now();
     let say = |what: &str| eprintln!("{:6.1} s  {what}", start.elapsed().as_secs_f64());
-    let diagnosis = diagnose(&model, train, &heldout, &say);
+    let mut diagnosis = diagnose(&model, train, &heldout, &say);
+    if let Some(request) = closed_loop {
+        say("closed loop");
+        diagnosis.close_the_loop(request)?;
+    }
     let mut json = serde_json::to_string_pretty(&diagnosis.findings)?;
     json.push('\n');
-    let files = BTreeMap::from([
+    let mut files = BTreeMap::from([
         ("diagnosis.json".to_owned(), json),
         ("plant.extended.toml".to_owned(), extended_toml(&diagnosis)),
         ("report.html".to_owned(), page(&diagnosis)?),
     ]);
+    if let Some(control) = &diagnosis.control {
+        files.insert("drm.toml".to_owned(), control.mapping.clone());
+    }
     output::write_texts(&options.out, &files)?;
     let out = options.out.display();
     for repair in &diagnosis.findings.noise.repairs {
@@ -39,6 +55,45 @@ pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
     }
     output::say(&format!("{}\n\nreport: {out}/report.html", diagnosis.findings.sentence))?;
     Ok(Outcome::Done)
+}
+
+/// The policy and what is asked of it.
+fn request(options: &Diagnose, path: &Path, model: &Parameters) -> Result<Request, Failure> {
+    let policy = super::load(path)?;
+    super::drm::needs_mapping(&policy)?;
+    let (trained_on, file) = match &options.trained_on {
+        Some(path) => (Parameters::from_file(path)?, path),
+        None => (model.clone(), &options.model),
+    };
+    let scenario = options.scenario.as_deref().map(Scenario::load).transpose()?;
+    let given = scenario.as_ref().and_then(|scenario| scenario.v_ref);
+    let v_ref = simulate::v_ref(
+        given,
+        &policy,
+        &options.scenario.as_ref().unwrap_or(&options.model).display(),
+    )?;
+    for (converter, file) in [(&trained_on, file), (model, &options.model)] {
+        simulate::suits(&policy, converter, v_ref, &file.display())?;
+    }
+    Ok(Request {
+        losses: super::drm::trained_on(&trained_on, file)?,
+        policy,
+        trained_on,
+        v_ref,
+        load_steps: scenario
+            .as_ref()
+            .map_or_else(Vec::new, |scenario| scenario.load_steps.clone()),
+        task: scenario.map_or_else(short_task, |scenario| scenario.task),
+    })
+}
+
+/// Eight instants are enough to compare two mappings.
+fn short_task() -> Task {
+    Task {
+        instants: 6,
+        sampling_instants: 3,
+        ..Task::default()
+    }
 }
 
 /// All records, or all their faults.

@@ -13,7 +13,7 @@ use drm::acquire::LoadSetting;
 use drm::formula::Losses;
 use drm::{Columns, Table, TableOptions};
 use plant::Parameters;
-use policy::Interval;
+use policy::{Interval, Policy};
 use toml_input::{FileName, Source};
 
 use crate::{Failure, Outcome};
@@ -121,8 +121,19 @@ fn plant_parameters(path: &Path) -> Result<Parameters, Failure> {
     Ok(Parameters::from_file(path)?)
 }
 
+/// Refuses a policy whose duties no mapping can follow.
+pub fn needs_mapping(policy: &Policy) -> Result<(), Failure> {
+    if policy.mapping.is_none() {
+        let hint = "add [mapping] with file = \"drm.toml\" and load_current, and an identity a = 1, b = 0, c = 0";
+        return Err(Failure(format!(
+            "the policy has no mapping to transfer with\n   = hint: {hint}"
+        )));
+    }
+    Ok(())
+}
+
 /// The losses of the converter that a policy was trained on.
-fn trained_on(nominal: &Parameters, path: &Path) -> Result<Losses, Failure> {
+pub fn trained_on(nominal: &Parameters, path: &Path) -> Result<Losses, Failure> {
     Losses::of(nominal).ok_or_else(|| {
         Failure(format!(
             "{}: a synchronous leg has no formula of its steady state\n   = hint: give --v-in-sim instead, its input \

@@ -3,7 +3,7 @@
 use templates::block::{BlockHeader, BlockSource, BlockView, InputView, ParameterView};
 use templates::c::Common;
 
-use super::c99::{coefficient_name, render};
+use super::c99::render;
 use crate::backend::banner;
 use crate::backend::literal::decimal;
 use crate::program::{Coefficient, Literal, SignalPort};
@@ -35,7 +35,7 @@ pub fn view(program: &Program, title: &str) -> BlockView {
     let mapping = program.mapping.as_ref();
     let coefficients = || mapping.iter().flat_map(|mapping| &mapping.coefficients);
     let parameter = |(name, value, low, high): &(Coefficient, Literal, Literal, Literal)| ParameterView {
-        name: coefficient_name(*name).to_owned(),
+        name: name.name().to_owned(),
         value: decimal(value.value()),
         low: decimal(low.value()),
         high: decimal(high.value()),
@@ -52,7 +52,7 @@ pub fn view(program: &Program, title: &str) -> BlockView {
         input_count: program.signals.len() + 1,
         parameters: coefficients().map(parameter).collect(),
         mapping_arguments: coefficients()
-            .map(|(name, ..)| coefficient_name(*name))
+            .map(|(name, ..)| name.name())
             .collect::<Vec<_>>()
             .join(", "),
         fallback: decimal(program.fallback_duty.value()),

@@ -6,6 +6,8 @@ mod block;
 #[cfg(feature = "c")]
 pub mod c99;
 #[cfg(feature = "c")]
+pub mod fmu;
+#[cfg(feature = "c")]
 pub mod kit;
 #[cfg(feature = "c")]
 mod literal;

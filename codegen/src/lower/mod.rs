@@ -38,6 +38,7 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
             tool: TOOL.to_owned(),
             digests: policy.digests.clone(),
             target: target.name,
+            widths: target.widths,
             c_flags: target.c_flags,
             rust_flags: target.rust_flags,
         },

@@ -3,6 +3,7 @@
 
 pub mod bench;
 pub mod case;
+pub mod control;
 pub mod effects;
 pub mod experiment;
 pub mod netlist;

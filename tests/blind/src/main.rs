@@ -9,7 +9,7 @@ use std::time::Instant;
 use blind::case::{Truth, measure};
 use blind::experiment::Extent;
 use blind::plan::{Plan, plan, plan_of};
-use blind::score::{Diagnosis, judge, table};
+use blind::score::{Closed, Diagnosis, closed_table, judge, table};
 use clap::Parser;
 
 /// Hides effects in data of an independent simulator. See docs/blind.md.
@@ -37,6 +37,9 @@ struct Arguments {
     /// Diagnose each case and write DIR/score.md.
     #[arg(long)]
     score: bool,
+    /// With --score: the mapping of this policy is refitted in each diagnosis, and the hidden converter judges it.
+    #[arg(long, requires = "score")]
+    closed_loop: Option<PathBuf>,
     /// The program that diagnoses; by default the one built beside this.
     #[arg(long)]
     policyc: Option<PathBuf>,
@@ -148,14 +151,14 @@ fn score(arguments: &Arguments) -> Result<(), String> {
         .clone()
         .or_else(beside)
         .unwrap_or_else(|| "policyc".into());
-    let mut judged = Vec::new();
+    let (mut judged, mut loops) = (Vec::new(), Vec::new());
     for index in 0..arguments.cases {
         let name = format!("case_{index:03}");
         let started = Instant::now();
         let case = arguments.out.join("cases").join(&name);
         let answers = arguments.out.join("diagnoses").join(&name);
         if !answers.join("diagnosis.json").exists() {
-            diagnose(&policyc, &case, &answers)?;
+            diagnose(&policyc, &case, &answers, arguments.closed_loop.as_deref())?;
         }
         let truth: Truth = json(&case.join("truth.json"))?;
         let diagnosis: Diagnosis = json(&answers.join("diagnosis.json"))?;
@@ -165,21 +168,55 @@ fn score(arguments: &Arguments) -> Result<(), String> {
             arguments.cases,
             started.elapsed().as_secs_f64()
         );
+        if let Some(policy) = &arguments.closed_loop {
+            loops.push((name.clone(), closed(arguments, index, policy, &answers)?));
+        }
         judged.push((name, judge(&truth, &diagnosis)));
     }
-    let text = table(arguments.seed, &judged);
+    let mut text = table(arguments.seed, &judged);
+    if !loops.is_empty() {
+        text.push_str(&closed_table(&loops));
+    }
     let path = arguments.out.join("score.md");
     std::fs::write(&path, &text).map_err(|error| format!("{}: {error}", path.display()))?;
     println!("\n{text}");
     Ok(())
 }
 
-fn diagnose(policyc: &Path, case: &Path, answers: &Path) -> Result<(), String> {
+/// The policy at the hidden bench of a case, with its own mapping and with that of the diagnosis.
+fn closed(arguments: &Arguments, index: usize, policy: &Path, answers: &Path) -> Result<Closed, String> {
+    let plan = planned(arguments, index)?;
+    let contract = if policy.is_dir() {
+        policy.join("policy.toml")
+    } else {
+        policy.to_owned()
+    };
+    let before = policy::load(&contract).map_err(|faults| faults.to_string())?;
+    let mapping = policy::load_mapping(&answers.join("drm.toml")).map_err(|faults| faults.to_string())?;
+    let mut after = before.clone();
+    after.mapping = before.mapping.as_ref().map(|own| policy::Mapping {
+        load_current: own.load_current,
+        ..mapping
+    });
+    let close = |policy| blind::control::close(&plan.bench, policy).map_err(|error| error.to_string());
+    Ok(Closed {
+        kind: plan.kind,
+        hidden: plan.effects.iter().map(|effect| effect.id.to_owned()).collect(),
+        duty: blind::control::repairable(&plan.bench),
+        before: close(&before)?,
+        after: close(&after)?,
+    })
+}
+
+fn diagnose(policyc: &Path, case: &Path, answers: &Path, policy: Option<&Path>) -> Result<(), String> {
     create(answers)?;
     let mut command = Command::new(policyc);
     command.arg("diagnose").arg("--model").arg(case.join("plant.toml"));
     for (option, folder) in [("--train", "train"), ("--heldout", "heldout")] {
         command.arg(option).args(records(&case.join(folder))?);
+    }
+    if let Some(policy) = policy {
+        command.arg("--policy").arg(policy);
     }
     command.arg("--out").arg(answers);
     let output = command

@@ -34,11 +34,9 @@ pub fn netlist(bench: &Bench, record: &Record, random: &mut Rng) -> String {
         true => control(&mut n, bench),
         false => gates(&mut n, bench, record, random),
     }
-    source(&mut n, bench);
-    leg(&mut n, bench);
-    inductor(&mut n, bench, i, record);
-    capacitor(&mut n, bench, v);
-    load(&mut n, bench, record, v);
+    stage(&mut n, bench, record.lead, v, i);
+    set_loads(&mut n, bench, record);
+    load(&mut n, bench, &record.load[0], v);
     let end = (record.lead + record.duty.len() + 1) as f64 * T_SW;
     let signals = "v(out) i(vil) i(vout) v(nin) v(hold)";
     // edges that no source announces are found by short steps only
@@ -56,6 +54,47 @@ pub fn netlist(bench: &Bench, record: &Record, random: &mut Rng) -> String {
     n
 }
 
+/// Names of the sensors' low-passes in [`under_control`].
+pub const SHOWN: [&str; 3] = ["lpv", "lpi", "lpo"];
+
+/// The circuit for a controller outside: its gate is the external source `gu`, its load is set by `pw`, `cc` and `gg`. It
+/// starts at `v` V and `i` A; [`SHOWN`] hold what the sensors have of output voltage, inductor and load current.
+#[must_use]
+pub fn under_control(bench: &Bench, v: f64, i: f64, first: &Load) -> String {
+    let mut n = "* buck converter\n".to_owned();
+    for name in ["gu", "gl", "pw", "cc", "gg"] {
+        let _ = writeln!(n, "V{name} {name} 0 external");
+    }
+    n.push_str("Eg g 0 gu 0 1\n");
+    stage(&mut n, bench, 0, v, i);
+    load(&mut n, bench, first, v);
+    let i_o = first.current + v * first.conductance + first.power / v;
+    let tau = bench.sensors.low_pass.max(1e-9);
+    for (name, signal, start) in [
+        (SHOWN[0], "V(out)", v),
+        (SHOWN[1], "I(Vil)", i),
+        (SHOWN[2], "I(Vout)", i_o),
+    ] {
+        let _ = writeln!(n, "B{name} {name}0 0 V={signal}\nR{name} {name}0 {name} 1");
+        let _ = writeln!(n, "C{name} {name} 0 {tau:e} ic={start}");
+    }
+    let _ = write!(
+        n,
+        ".options reltol=1e-4 abstol=1e-9 vntol=1e-6 chgtol=1e-16\n.save v(out) i(vil) i(vout) v(nin) {}\n\
+         .tran {T_FINE:e} 10 0 {T_FINE:e} uic\n.end\n",
+        SHOWN.map(|name| format!("v({name})")).join(" ")
+    );
+    n
+}
+
+/// Source, switches and filter.
+fn stage(n: &mut String, bench: &Bench, lead: usize, v: f64, i: f64) {
+    source(n, bench);
+    leg(n, bench);
+    inductor(n, bench, i, lead);
+    capacitor(n, bench, v);
+}
+
 /// Corners of a piecewise linear source, continued over lines.
 fn pwl(n: &mut String, name: &str, corners: &[(f64, f64)]) {
     let _ = write!(n, "V{name} {name} 0 PWL(");
@@ -69,26 +108,34 @@ fn pwl(n: &mut String, name: &str, corners: &[(f64, f64)]) {
     n.push_str(")\n");
 }
 
+/// When the switch conducts in a period, s from its start; nothing if the pulse is lost, which happens with the probability
+/// `missing`.
+pub fn pulse(bench: &Bench, duty: f64, load: &Load, missing: f64, random: &mut Rng) -> Option<[f64; 2]> {
+    let m = &bench.modulator;
+    let duty = match m.duty_lsb > 0.0 {
+        true => (duty / m.duty_lsb).round() * m.duty_lsb,
+        false => duty,
+    };
+    let amperes = load.current + 100.0 * load.conductance + load.power / 100.0;
+    let jitter = m.jitter_per_ampere * amperes;
+    let (early, tail, lost) = (random.normal(), random.normal(), random.unit());
+    let (middle, half) = (0.5 * T_SW, 0.5 * duty * T_SW);
+    let on = middle - half + m.dead_time + m.turn_on_delay + jitter * early;
+    (lost >= missing).then_some([on, middle + half + jitter * tail])
+}
+
 fn gates(n: &mut String, bench: &Bench, record: &Record, random: &mut Rng) {
     let m = &bench.modulator;
     let mut corners = vec![(0.0, 0.0)];
     for period in 0..record.lead + record.duty.len() {
         let row = period.saturating_sub(record.lead);
         let delayed = row.saturating_sub(m.duty_delay as usize);
-        let mut duty = record.duty[delayed];
-        if m.duty_lsb > 0.0 {
-            duty = (duty / m.duty_lsb).round() * m.duty_lsb;
-        }
-        let drawn = record.load[row];
-        let amperes = drawn.current + 100.0 * drawn.conductance + drawn.power / 100.0;
-        let jitter = m.jitter_per_ampere * amperes;
-        let (early, tail, lost) = (random.normal(), random.normal(), random.unit());
-        if lost < m.missing && period >= record.lead {
+        let lost = if period >= record.lead { m.missing } else { 0.0 };
+        let Some([on, off]) = pulse(bench, record.duty[delayed], &record.load[row], lost, random) else {
             continue;
-        }
-        let middle = (period as f64 + 0.5) * T_SW;
-        let on = middle - 0.5 * duty * T_SW + m.dead_time + m.turn_on_delay + jitter * early;
-        let off = middle + 0.5 * duty * T_SW + jitter * tail;
+        };
+        let start = period as f64 * T_SW;
+        let (on, off) = (start + on, start + off);
         if off > on + 2.0 * RISE {
             corners.extend([(on, 0.0), (on + RISE, 1.0), (off - RISE, 1.0), (off, 0.0)]);
         }
@@ -137,7 +184,7 @@ fn leg(n: &mut String, bench: &Bench) {
     }
 }
 
-fn inductor(n: &mut String, bench: &Bench, i: f64, record: &Record) {
+fn inductor(n: &mut String, bench: &Bench, i: f64, lead: usize) {
     let c = &bench.circuit;
     let inductance = c.inductance * (1.0 - c.odd.eddy_share);
     if c.saturation > 0.0 {
@@ -159,7 +206,7 @@ fn inductor(n: &mut String, bench: &Bench, i: f64, record: &Record) {
     }
     let _ = writeln!(n, "Vil x2 x3 0");
     if c.odd.drift_resistance > 0.0 {
-        let lead = record.lead as f64 * T_SW;
+        let lead = lead as f64 * T_SW;
         let _ = writeln!(
             n,
             "Vdr dr 0 EXP(0 {} {lead:e} {:e} 1e3 1)",
@@ -197,18 +244,19 @@ fn capacitor(n: &mut String, bench: &Bench, v: f64) {
     }
 }
 
-fn load(n: &mut String, bench: &Bench, record: &Record, v: f64) {
-    let c = &bench.circuit;
-    type Setting = (&'static str, fn(&Load) -> f64, f64);
-    let settings: [Setting; 3] = [
-        ("gg", |load| load.conductance, 1.0),
-        ("cc", |load| load.current, c.load_gain),
-        ("pw", |load| load.power, c.load_gain),
-    ];
-    for (name, level, gain) in settings {
-        let mut corners = vec![(0.0, gain * level(&record.load[0]))];
+/// What the load draws when it is set: power W, current A, conductance S (the levels of `pw`, `cc` and `gg`).
+#[must_use]
+pub fn drawn(bench: &Bench, load: &Load) -> [f64; 3] {
+    let gain = bench.circuit.load_gain;
+    [gain * load.power, gain * load.current, load.conductance]
+}
+
+fn set_loads(n: &mut String, bench: &Bench, record: &Record) {
+    for (index, name) in ["pw", "cc", "gg"].into_iter().enumerate() {
+        let level = |load: &Load| drawn(bench, load)[index];
+        let mut corners = vec![(0.0, level(&record.load[0]))];
         for (row, pair) in record.load.windows(2).enumerate() {
-            let (before, after) = (gain * level(&pair[0]), gain * level(&pair[1]));
+            let (before, after) = (level(&pair[0]), level(&pair[1]));
             if before != after {
                 let start = (record.lead + row + 1) as f64 * T_SW;
                 // what is sampled at a step is what was true before it
@@ -218,6 +266,10 @@ fn load(n: &mut String, bench: &Bench, record: &Record, v: f64) {
         }
         pwl(n, name, &corners);
     }
+}
+
+fn load(n: &mut String, bench: &Bench, first: &Load, v: f64) {
+    let c = &bench.circuit;
     let _ = writeln!(n, "Vout out ld0 0");
     if c.odd.cable_inductance > 0.0 {
         let _ = writeln!(n, "Rcab ld0 ld1 0.02\nLcab ld1 ld {:e}", c.odd.cable_inductance);
@@ -225,7 +277,7 @@ fn load(n: &mut String, bench: &Bench, record: &Record, v: f64) {
     } else {
         let _ = writeln!(n, "Vcab ld0 ld 0");
     }
-    let power = record.load[0].power * c.load_gain / v;
+    let power = first.power * c.load_gain / v;
     let _ = writeln!(n, "Bg ld 0 I=V(gg)*V(ld)\nBcc ld 0 I=V(cc)");
     let _ = writeln!(
         n,

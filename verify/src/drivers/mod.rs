@@ -1,6 +1,7 @@
 //! Driver programs: read events, call the generated code, write what it answers (see [`crate::protocol`]).
 
 pub mod c;
+pub mod kit;
 pub mod measure;
 pub mod rust;
 

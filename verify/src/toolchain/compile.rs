@@ -18,6 +18,8 @@ pub enum Purpose {
     Compare,
     /// Steps between the marks of the instruction counter (see [`mod@crate::measure`]); for boards only.
     Measure,
+    /// Runs the back-to-back kit, which is among the files; in C, for boards only.
+    Kit,
 }
 
 /// What is compiled, the same for all builds.
@@ -33,6 +35,8 @@ pub struct Sources<'a> {
     pub target: &'a TargetSpec,
     /// More flags for the C compilers, after all others.
     pub extra_flags: &'a [String],
+    /// More flags for rustc, after all others.
+    pub extra_rust_flags: &'a [String],
     /// A compiler that takes longer has failed.
     pub timeout: Duration,
 }
@@ -131,6 +135,7 @@ impl Job<'_> {
             match self.sources.purpose {
                 Purpose::Compare => drivers::c::text(self.sources.policy, form),
                 Purpose::Measure => drivers::measure::c(self.sources.policy),
+                Purpose::Kit => drivers::kit::c(self.sources.policy),
             },
         )?;
         let mut command = self.command(compiler.program);
@@ -171,15 +176,16 @@ impl Job<'_> {
         let unit = self
             .of_kind("rs")
             .find(|path| Path::new(path).file_name().is_some_and(|file| *file == *name));
-        let (Some(unit), Some(toolchain)) = (unit, &self.build.rust) else {
+        let (Some(unit), Some(toolchain)) = (unit, self.build.rust) else {
             return Err(BuildError::NoFiles);
         };
-        let mut command = toolchain.rustc();
+        let mut command = toolchain.rustc().map_err(BuildError::Refused)?;
         command.current_dir(self.folder).env("LC_ALL", "C");
         command.args(self.sources.target.rust_flags).args(self.build.flags);
         if let Tool::Rust(spec) = self.build.tool {
             command.args(rust::flags(spec));
         }
+        command.args(self.sources.extra_rust_flags);
         Ok((unit, command))
     }
 
@@ -203,6 +209,7 @@ impl Job<'_> {
             match self.sources.purpose {
                 Purpose::Compare => drivers::rust::text(self.sources.policy, unit, form),
                 Purpose::Measure => drivers::measure::rust(self.sources.policy, unit),
+                Purpose::Kit => return Err(BuildError::NoFiles),
             },
         )?;
         let product = match form {

@@ -1,6 +1,7 @@
 //! Compilers of this machine and what is built with them for a target.
 
 mod compile;
+pub mod debian;
 mod rust;
 
 use std::path::PathBuf;
@@ -12,6 +13,7 @@ use serde::Serialize;
 use targets::{Board, CCompiler, Runner, RustTarget, TargetSpec};
 
 pub use compile::{BuildError, Purpose, Sources, compile, controller_object, run_for};
+pub use rust::{Toolchain, toolchain};
 
 /// Optimisation levels that are built: name, flags.
 type Levels = &'static [(&'static str, &'static [&'static str])];
@@ -84,8 +86,8 @@ pub struct Build {
     pub missing: Vec<Missing>,
     tool: Tool,
     flags: &'static [&'static str],
-    /// Of `rustc`, when it is not the one on `PATH`.
-    rust: Option<rust::Toolchain>,
+    /// Which `rustc`; of a build in Rust whose compiler is there.
+    rust: Option<Toolchain>,
 }
 
 impl Build {
@@ -135,7 +137,7 @@ fn of_tool(target: &TargetSpec, tool: Tool) -> Vec<Build> {
     let mut rust = None;
     match tool {
         Tool::C(compiler) => missing.extend(absent(compiler.program, compiler.package)),
-        Tool::Rust(spec) => match rust::toolchain(spec) {
+        Tool::Rust(spec) => match toolchain(spec) {
             Ok(found) => rust = Some(found),
             Err(what) => missing.push(what),
         },
@@ -159,7 +161,7 @@ fn of_tool(target: &TargetSpec, tool: Tool) -> Vec<Build> {
     };
     let version = match (tool, &rust) {
         (Tool::C(compiler), _) => find(compiler.program).map(|program| version(Command::new(program))),
-        (Tool::Rust(_), Some(toolchain)) => Some(version(toolchain.rustc())),
+        (Tool::Rust(_), Some(toolchain)) => Some(version(toolchain.program())),
         (Tool::Rust(_), None) => None,
     }
     .unwrap_or_default();
@@ -172,7 +174,7 @@ fn of_tool(target: &TargetSpec, tool: Tool) -> Vec<Build> {
             missing: missing.clone(),
             tool,
             flags,
-            rust: rust.clone(),
+            rust,
         })
         .collect()
 }

@@ -1,4 +1,4 @@
-//! The Rust compiler for a target: the one on `PATH` with the target added.
+//! The Rust compiler for a target: the one on `PATH` if it has the target's library, else Debian's.
 
 use std::path::Path;
 use std::process::Command;
@@ -6,18 +6,36 @@ use std::time::Duration;
 
 use targets::RustTarget;
 
-use super::{Install, Missing, RUSTC, find, run_for};
+use super::{Install, Missing, RUSTC, debian, find, run_for};
 
-/// A `rustc` with the library `core` of a target.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Toolchain {
-    program: &'static str,
+/// A `rustc` for a target.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Toolchain {
+    /// The one on `PATH`.
+    OnPath,
+    /// Debian's, with a library that is built at its first use for this triple.
+    Debian(&'static str),
 }
 
 impl Toolchain {
-    /// The compiler, without arguments for the source.
-    pub fn rustc(&self) -> Command {
-        Command::new(self.program)
+    /// The compiler, without arguments; enough to ask for its version.
+    pub fn program(self) -> Command {
+        Command::new(match self {
+            Self::OnPath => RUSTC,
+            Self::Debian(_) => debian::RUSTC,
+        })
+    }
+
+    /// The compiler with the library of the target.
+    ///
+    /// # Errors
+    /// If the library could not be built; text for a user.
+    pub fn rustc(self) -> Result<Command, String> {
+        let mut command = self.program();
+        if let Self::Debian(triple) = self {
+            command.arg("--sysroot").arg(debian::sysroot(triple)?);
+        }
+        Ok(command)
     }
 }
 
@@ -40,7 +58,10 @@ pub fn toolchain(spec: RustTarget) -> Result<Toolchain, Missing> {
         });
     }
     if spec.triple.is_empty() || has_core(RUSTC, spec.triple) {
-        return Ok(Toolchain { program: RUSTC });
+        return Ok(Toolchain::OnPath);
+    }
+    if debian::cargo().is_some() {
+        return Ok(Toolchain::Debian(spec.triple));
     }
     Err(Missing {
         reason: format!("{RUSTC} has no library for {}", spec.triple),

@@ -11,8 +11,8 @@ const LAYERS: &[&[&str]] = &[
     &["certify"],
     &["interp", "codegen", "drm"],
     &["closed-loop"],
-    &["policy-macro", "train", "spice", "diagnose", "verify"],
-    &["cli"],
+    &["policy-macro", "policy-build", "train", "spice", "diagnose", "verify"],
+    &["cli", "example-build-rust", "example-build-c", "example-embedded-hal"],
     &["tests", "blind", "bench", "xtask", "firmware"],
 ];
 

@@ -4,8 +4,17 @@ use std::path::Path;
 
 use super::source;
 
-/// `verify` and `spice` compile in temporary folders, `train` checks a contract in one; `xtask`, `tests` and `bench` are the test side.
-const MAY_WRITE: &[&str] = &["cli", "verify", "train", "spice", "xtask", "tests", "bench"];
+/// `policy-build` writes into the folder that cargo gives a build script, `verify` and `spice` compile in temporary folders, `train` checks a contract in one; `xtask`, `tests` and `bench` are the test side.
+const MAY_WRITE: &[&str] = &[
+    "cli",
+    "policy-build",
+    "verify",
+    "train",
+    "spice",
+    "xtask",
+    "tests",
+    "bench",
+];
 
 const WRITES: &[&str] = &[
     "fs::write",

@@ -104,7 +104,7 @@ fn prepare(options: &Simulate) -> Result<Setting, Failure> {
         )));
     };
     let converter = Converter::load(&plant, &scenario.set)?;
-    let v_ref = v_ref(&scenario, &policy, &file)?;
+    let v_ref = v_ref(scenario.v_ref, &policy, &file)?;
     suits(&policy, converter.parameters(), v_ref, &file)?;
     let mut notes = Vec::new();
     if let Some(theirs) = held_by(&policy).filter(|theirs| *theirs != v_ref) {
@@ -134,12 +134,12 @@ fn held_by(policy: &Policy) -> Option<f64> {
     policy.parameters.get("v_ref").copied()
 }
 
-/// The voltage to hold, V; `file` is the scenario's.
+/// The voltage to hold, V: `given` by a scenario, whose `file` it is, or by the policy.
 ///
 /// # Errors
 /// If neither scenario nor policy names one.
-pub fn v_ref(scenario: &Scenario, policy: &Policy, file: &dyn Display) -> Result<f64, Failure> {
-    scenario.v_ref.or(held_by(policy)).ok_or_else(|| {
+pub fn v_ref(given: Option<f64>, policy: &Policy, file: &dyn Display) -> Result<f64, Failure> {
+    given.or(held_by(policy)).ok_or_else(|| {
         Failure(format!(
             "{file}: no voltage to hold\n   = hint: v_ref = 100.0, as the policy has no parameter `v_ref`"
         ))

@@ -7,7 +7,7 @@ pub(super) mod tables;
 use std::collections::BTreeMap;
 
 use templates::Template;
-use templates::c::{Argmax, Common, Constant, Header, Helpers, Member, NetworkView, PushView, Source};
+use templates::c::{Argmax, Common, Constant, Header, Helpers, Member, NetworkView, PushView, Source, WideChar};
 
 use crate::backend::{Backend, banner};
 use crate::lower::STATUS;
@@ -60,20 +60,19 @@ fn common(program: &Program) -> Common {
             program.provenance.c_flags,
         ),
         mapping_parameters: parameters
-            .map(|(name, ..)| format!("float {}", coefficient_name(*name)))
+            .map(|(name, ..)| format!("float {}", name.name()))
             .collect::<Vec<_>>()
             .join(", "),
     }
 }
 
-/// Name of a coefficient as parameter; the state member is `mapping_<name>`.
-pub(super) fn coefficient_name(coefficient: Coefficient) -> &'static str {
-    match coefficient {
-        Coefficient::A => "a",
-        Coefficient::B => "b",
-        Coefficient::C => "c",
-        Coefficient::R => "r",
-    }
+fn wide_char(program: &Program) -> Option<WideChar> {
+    let widths = program.provenance.widths;
+    (widths.char_bits != 8).then_some(WideChar {
+        char_bits: widths.char_bits,
+        int_bits: widths.int_bits,
+        int_max: (1 << (widths.int_bits - 1)) - 1,
+    })
 }
 
 fn header(program: &Program) -> Header {
@@ -142,7 +141,7 @@ fn state_members(program: &Program) -> Vec<Member> {
     }
     for (name, ..) in program.mapping.iter().flat_map(|mapping| &mapping.coefficients) {
         members.push(member(
-            format!("float mapping_{}", coefficient_name(*name)),
+            format!("float mapping_{}", name.name()),
             "coefficient of the duty ratio mapping",
         ));
     }
@@ -170,6 +169,7 @@ fn source(program: &Program) -> Source {
     let (sense_lines, sense_results) = sense_statements(program, &sense);
     Source {
         common: common(program),
+        wide_char: wide_char(program),
         tables: tables::tables(program),
         network: network(program),
         argmax: argmax(program),
@@ -325,7 +325,7 @@ fn reset(program: &Program) -> Vec<String> {
 fn init(program: &Program) -> Vec<String> {
     let coefficients = program.mapping.iter().flat_map(|mapping| &mapping.coefficients);
     coefficients
-        .map(|(name, value, ..)| format!("state->mapping_{} = {};", coefficient_name(*name), float(value.value())))
+        .map(|(name, value, ..)| format!("state->mapping_{} = {};", name.name(), float(value.value())))
         .collect()
 }
 
@@ -335,7 +335,7 @@ fn mapping_conditions(program: &Program) -> Vec<String> {
     };
     let p = &program.name;
     let within = |(name, _, low, high): &(Coefficient, _, crate::program::Literal, crate::program::Literal)| {
-        let (name, low, high) = (coefficient_name(*name), float(low.value()), float(high.value()));
+        let (name, low, high) = (name.name(), float(low.value()), float(high.value()));
         format!("{p}_within({name}, {low}, {high})")
     };
     let mut conditions: Vec<String> = mapping.coefficients.iter().map(within).collect();
@@ -351,7 +351,7 @@ fn mapping_conditions(program: &Program) -> Vec<String> {
 fn mapping_assignments(program: &Program) -> Vec<String> {
     let coefficients = program.mapping.iter().flat_map(|mapping| &mapping.coefficients);
     coefficients
-        .map(|(name, ..)| coefficient_name(*name))
+        .map(|(name, ..)| name.name())
         .map(|name| format!("state->mapping_{name} = {name};"))
         .collect()
 }

@@ -1,6 +1,5 @@
 //! Straight-line blocks as C declarations.
 
-use super::coefficient_name;
 use crate::backend::literal::decimal;
 use crate::program::{Block, Op, Program, ValueId};
 
@@ -79,7 +78,7 @@ impl<'p> Printer<'p> {
             Op::PreviousDuty => "state->previous_duty".into(),
             Op::PreviousCommand => "state->previous_command".into(),
             Op::SoftCap => "state->soft_cap".into(),
-            Op::Coefficient(name) => format!("state->mapping_{}", coefficient_name(*name)),
+            Op::Coefficient(name) => format!("state->mapping_{}", name.name()),
             Op::ChosenDuty => "chosen".into(),
             Op::Constant(literal) => float(literal.value()),
             Op::Primed => "state->primed".into(),

@@ -13,7 +13,7 @@ use templates::kit::{Kit, Subject};
 
 use super::c99::statements::{float, unsigned};
 use super::c99::tables::{floats, words};
-use super::c99::{C99, coefficient_name, render};
+use super::c99::{C99, render};
 use crate::backend::{Backend, banner};
 use crate::{CodegenError, GeneratedFiles, Program};
 
@@ -73,7 +73,7 @@ fn core(program: &Program) -> Result<String, CodegenError> {
 
 fn subject(program: &Program, trace: &Trace) -> Subject {
     let coefficients = program.mapping.iter().flat_map(|mapping| &mapping.coefficients);
-    let coefficients: Vec<&str> = coefficients.map(|(name, ..)| coefficient_name(*name)).collect();
+    let coefficients: Vec<&str> = coefficients.map(|(name, ..)| name.name()).collect();
     Subject {
         name: program.name.clone(),
         upper: program.name.to_uppercase(),

@@ -341,19 +341,15 @@ fn advance(program: &Program) -> TokenStream {
 
 fn set_mapping(program: &Program) -> Option<TokenStream> {
     let mapping = program.mapping.as_ref()?;
-    let parameter = |name: Coefficient| {
-        ident(match name {
-            Coefficient::A => "a",
-            Coefficient::B => "b",
-            Coefficient::C => "c",
-            Coefficient::R => "r",
-        })
-    };
-    let names: Vec<_> = mapping.coefficients.iter().map(|(name, ..)| parameter(*name)).collect();
+    let names: Vec<_> = mapping
+        .coefficients
+        .iter()
+        .map(|(name, ..)| ident(name.name()))
+        .collect();
     let fields = mapping.coefficients.iter().map(|(name, ..)| coefficient_field(*name));
     let mut conditions: Vec<TokenStream> = Vec::new();
     for (name, _, low, high) in &mapping.coefficients {
-        let (name, low, high) = (parameter(*name), float(low.value()), float(high.value()));
+        let (name, low, high) = (ident(name.name()), float(low.value()), float(high.value()));
         conditions.push(quote!((#name >= #low) & (#name <= #high)));
     }
     if mapping.coefficients.iter().any(|(name, ..)| *name == Coefficient::R) {

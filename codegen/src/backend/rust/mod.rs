@@ -1,5 +1,7 @@
 //! `no_std` Rust without unsafe code, from `quote`: tokens for the macro, formatted text for the command line.
 
+#[cfg(all(feature = "c", feature = "rust-text"))]
+pub mod bindings;
 mod controller;
 mod integer;
 mod network;
@@ -21,29 +23,40 @@ pub struct RustText;
 #[cfg(feature = "rust-text")]
 impl crate::Backend for RustText {
     fn emit(&self, program: &Program) -> Result<crate::GeneratedFiles, crate::CodegenError> {
-        let tokens = items(program, DEFAULT_TYPE);
-        let file = syn::parse2(tokens).map_err(|error| crate::CodegenError::Rust(error.to_string()))?;
-        let mut text = String::new();
         let title = format!("Controller {}", program.name);
-        for line in crate::backend::banner(program, &title, program.provenance.rust_flags) {
-            text.push_str(&format!("// {line}\n"));
-        }
-        text.push('\n');
-        text.push_str(&prettyplease::unparse(&file));
-        let files = std::iter::once((format!("{}.rs", program.name), text)).collect();
-        Ok(crate::GeneratedFiles { files })
+        let banner = crate::backend::banner(program, &title, program.provenance.rust_flags);
+        file(format!("{}.rs", program.name), &banner, items(program, DEFAULT_TYPE))
     }
+}
+
+/// One file: the banner, then the items.
+#[cfg(feature = "rust-text")]
+fn file(path: String, banner: &[String], items: TokenStream) -> Result<crate::GeneratedFiles, crate::CodegenError> {
+    let file = syn::parse2(items).map_err(|error| crate::CodegenError::Rust(error.to_string()))?;
+    let mut text: String = banner.iter().map(|line| format!("// {line}\n")).collect();
+    text.push('\n');
+    text.push_str(&prettyplease::unparse(&file));
+    let files = std::iter::once((path, text)).collect();
+    Ok(crate::GeneratedFiles { files })
 }
 
 /// All items of a controller; `type_name` must be an identifier.
 #[must_use]
 pub fn items(program: &Program, type_name: &str) -> TokenStream {
     let constants = constants(program);
-    let types = types(program);
+    let crc_steps = crate::crc::nibble_table().map(word);
+    let types = types(program, &TokenStream::new());
     let helpers = statements::helpers();
     let network = network::items(program);
     let controller = controller::items(program, &ident(type_name));
-    quote! { #constants #types #helpers #network #controller }
+    quote! {
+        #constants
+        static CRC_STEPS: [u32; 16] = [#(#crc_steps),*];
+        #types
+        #helpers
+        #network
+        #controller
+    }
 }
 
 fn ident(name: &str) -> Ident {
@@ -79,7 +92,6 @@ fn constants(program: &Program) -> TokenStream {
         let meaning = status_meaning(*bit);
         quote! { #[doc = #meaning] pub const #name: u32 = #value; }
     });
-    let crc_steps = crate::crc::nibble_table().map(word);
     quote! {
         /// Number of measured signals.
         pub const SIGNALS: usize = #signals;
@@ -93,7 +105,6 @@ fn constants(program: &Program) -> TokenStream {
         pub const SAMPLE_PERIOD: f64 = #period;
         /// Bits of [`Command::status`].
         pub mod status { #(#bits)* }
-        static CRC_STEPS: [u32; 16] = [#(#crc_steps),*];
     }
 }
 
@@ -110,7 +121,8 @@ fn status_meaning(bit: u32) -> &'static str {
     }
 }
 
-fn types(program: &Program) -> TokenStream {
+/// `layout` is an attribute for both types, or nothing.
+fn types(program: &Program, layout: &TokenStream) -> TokenStream {
     let fields = program.signals.iter().map(|signal| {
         let name = ident(&signal.name);
         let (low, high) = (signal.range.0.value(), signal.range.1.value());
@@ -123,9 +135,11 @@ fn types(program: &Program) -> TokenStream {
     quote! {
         /// One sample of every signal.
         #[derive(Debug, Clone, Copy, PartialEq)]
+        #layout
         pub struct Measurement { #(#fields),* }
         /// What the controller answers.
         #[derive(Debug, Clone, Copy, PartialEq)]
+        #layout
         pub struct Command {
             /// Commanded duty, 0..1: mapped and limited.
             pub duty: f32,

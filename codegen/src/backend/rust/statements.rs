@@ -8,12 +8,7 @@ use crate::program::{Block, Coefficient, Op, Program, ValueId};
 
 /// Field of the controller that holds a coefficient.
 pub fn coefficient_field(coefficient: Coefficient) -> Ident {
-    ident(match coefficient {
-        Coefficient::A => "mapping_a",
-        Coefficient::B => "mapping_b",
-        Coefficient::C => "mapping_c",
-        Coefficient::R => "mapping_r",
-    })
+    ident(&format!("mapping_{}", coefficient.name()))
 }
 
 /// Prints one block inside a method of the controller; leaves stand where they are used.

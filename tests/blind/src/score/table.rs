@@ -7,21 +7,21 @@ use crate::score::judge::Judgement;
 use crate::score::statistics::{interval, median};
 
 /// A counted share and what is asked of it.
-struct Line {
-    what: &'static str,
-    hits: usize,
-    of: usize,
-    asked: Asked,
+pub(crate) struct Line {
+    pub what: &'static str,
+    pub hits: usize,
+    pub of: usize,
+    pub asked: Asked,
 }
 
-enum Asked {
+pub(crate) enum Asked {
     AtLeast(f64),
     Between(f64, f64),
     AtMost(usize),
 }
 
 impl Line {
-    fn text(&self) -> String {
+    pub fn text(&self) -> String {
         let (low, high) = interval(self.hits, self.of);
         let share = self.hits as f64 / self.of.max(1) as f64;
         let (asked, met) = match self.asked {

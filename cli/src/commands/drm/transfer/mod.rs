@@ -9,6 +9,7 @@ use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
 use clap::Args;
+use closed_loop::refit::Refit;
 use closed_loop::scenario::Finding;
 use closed_loop::{LoadStep, Scenario, Trajectory};
 use drm::DutyRatioMap;
@@ -117,12 +118,7 @@ fn prepare(options: &Transfer) -> Result<Setting, Failure> {
     let scenario = Scenario::load(&options.scenario)?;
     let policy = crate::commands::load(&options.policy)?;
     let file = options.scenario.display();
-    if policy.mapping.is_none() {
-        let hint = "add [mapping] with file = \"drm.toml\" and load_current, and an identity a = 1, b = 0, c = 0";
-        return Err(Failure(format!(
-            "the policy has no mapping to transfer with\n   = hint: {hint}"
-        )));
-    }
+    super::needs_mapping(&policy)?;
     let Some(trained_on) = &scenario.plant else {
         return Err(Failure(format!(
             "{file}: no plant\n   = expected: the converter that the policy was trained on\n   = hint: plant = \
@@ -135,7 +131,7 @@ fn prepare(options: &Transfer) -> Result<Setting, Failure> {
             parameter.set(&mut nominal, *value);
         }
     }
-    let v_ref = simulate::v_ref(&scenario, &policy, &file)?;
+    let v_ref = simulate::v_ref(scenario.v_ref, &policy, &file)?;
     simulate::suits(&policy, &nominal, v_ref, &trained_on.display())?;
     Ok(Setting {
         trained_on: super::trained_on(&nominal, trained_on)?,
@@ -162,16 +158,14 @@ const IDENTITY: DutyRatioMap = DutyRatioMap {
 };
 
 impl Setting {
-    /// The policy with another mapping, read from a drm.toml as any other.
-    fn with(&self, map: &DutyRatioMap) -> Result<Policy, Failure> {
-        let folder =
-            tempfile::tempdir().map_err(|error| Failure(format!("cannot make a temporary folder: {error}")))?;
-        let path = folder.path().join("drm.toml");
-        std::fs::write(&path, map.to_toml("")).map_err(|error| Failure(format!("cannot write a mapping: {error}")))?;
-        let mut mapping = policy::load_mapping(&path)?;
-        let mut policy = self.policy.clone();
-        mapping.load_current = policy.mapping.map_or(0, |mapping| mapping.load_current);
-        policy.mapping = Some(mapping);
-        Ok(policy)
+    /// What the policy is to do where.
+    fn refit(&self) -> Refit<'_> {
+        Refit {
+            policy: &self.policy,
+            nominal: &self.nominal,
+            trained_on: self.trained_on,
+            v_ref: self.v_ref,
+            load_steps: &self.scenario.load_steps,
+        }
     }
 }

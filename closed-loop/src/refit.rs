@@ -1,0 +1,191 @@
+//! The mapping of a converter for a policy that is to control it: which points, the fit, the policy with it.
+
+use std::path::Path;
+
+use drm::acquire::{Bench, Hold, LoadSetting, Plan, PlanPoint, Protocol, measure};
+use drm::formula::Losses;
+use drm::{Conduction, DutyRatioMap, FitOptions, Table, TableOptions};
+use plant::{Load, Parameters, Signals};
+use policy::{Action, Interval, Policy};
+use toml_input::{FileName, Source};
+
+use crate::environment::{Environment, LoadPath, Start};
+use crate::faults::Error;
+use crate::load_step::{LoadKind, LoadStep};
+
+/// Voltages that settled points are measured at, over the range of the policy's duties.
+const VOLTAGES: usize = 5;
+
+/// Share of the held voltage within which points are measured: a policy may have all duties, but stays near it.
+const BESIDE: f64 = 0.15;
+
+/// An environment as a bench that settled points are measured at.
+#[derive(Debug, Clone)]
+pub struct AtEnvironment<E>(pub E);
+
+impl<E: Environment> Bench for AtEnvironment<E> {
+    type Error = Error;
+
+    fn start(&mut self, v_out: f64, load: &Load) -> Result<Signals, Error> {
+        let start = Start {
+            v_out,
+            i_l: load.conductance * v_out + load.current + load.power / v_out,
+            load: *load,
+            seed: 0,
+            varied: &[],
+        };
+        Ok(self.0.restart(&start)?.measured)
+    }
+
+    fn step(&mut self, duty: f64, load: &Load) -> Result<Signals, Error> {
+        let sample = self.0.step(duty, &LoadPath::constant(*load));
+        match sample.v_out.is_finite() {
+            true => Ok(sample.measured),
+            false => Err(Error::Mismatch("the simulation of the converter failed".to_owned())),
+        }
+    }
+}
+
+/// A policy, what it was trained on, and what it is to hold.
+#[derive(Debug, Clone, Copy)]
+pub struct Refit<'a> {
+    /// The policy.
+    pub policy: &'a Policy,
+    /// What it was trained on.
+    pub nominal: &'a Parameters,
+    /// The steady state of that.
+    pub trained_on: Losses,
+    /// Voltage to hold, V.
+    pub v_ref: f64,
+    /// Load steps it is to master.
+    pub load_steps: &'a [LoadStep],
+}
+
+impl Refit<'_> {
+    /// Every load of the load steps, once.
+    #[must_use]
+    pub fn loads(&self) -> Vec<LoadSetting> {
+        let mut loads = Vec::new();
+        for step in self.load_steps {
+            for value in step.values {
+                let load = match step.kind {
+                    LoadKind::Power => LoadSetting::Power(value),
+                    LoadKind::Current => LoadSetting::Current(value),
+                    LoadKind::Resistance => LoadSetting::Resistor(value),
+                };
+                if !loads.contains(&load) {
+                    loads.push(load);
+                }
+            }
+        }
+        loads
+    }
+
+    /// Points to be measured at a converter with `v_in` V: every load at voltages around that to be held, as far as the
+    /// policy's duties reach on the converter of its training.
+    ///
+    /// # Errors
+    /// If a load or voltage makes no sense.
+    pub fn plan(&self, v_in: f64) -> Result<Plan, Error> {
+        let own = self.nominal.converter.v_in;
+        let (low, high) = duties(&self.policy.actions);
+        let low = (low * own).max((1.0 - BESIDE) * self.v_ref);
+        let high = (high * own).min((1.0 + BESIDE) * self.v_ref).min(0.97 * v_in.min(own));
+        let mut plan = Plan::new(own, &[0.5], &[LoadSetting::Current(1.0)], 0.0)?;
+        plan.points.clear();
+        for load in self.loads() {
+            for k in 0..VOLTAGES {
+                let v_out = low + (high - low) * k as f64 / (VOLTAGES - 1) as f64;
+                let point = PlanPoint {
+                    duty: v_out / own,
+                    load,
+                    hold: Hold::ClosedLoop(v_out),
+                };
+                plan.points.push((point, None));
+            }
+        }
+        Ok(plan)
+    }
+
+    /// Measures a point of the plan.
+    ///
+    /// # Errors
+    /// Those of the bench.
+    pub fn measure<B: Bench + ?Sized>(
+        &self,
+        bench: &mut B,
+        entry: &mut (PlanPoint, Option<drm::acquire::Measurement>),
+    ) -> Result<(), B::Error> {
+        entry.1 = Some(measure(bench, self.nominal, &entry.0, &Protocol::default())?);
+        Ok(())
+    }
+
+    /// Fits a mapping to a measured plan. What is known at the bench beside the table is the converter of the training.
+    ///
+    /// # Errors
+    /// If the points do not determine a mapping.
+    pub fn fit(&self, points: &str) -> Result<drm::Report, Error> {
+        let name = FileName::new(Path::new("points.csv"));
+        let source =
+            Source::new(name, points.as_bytes().to_vec()).map_err(|fault| Error::Mismatch(fault.to_string()))?;
+        let options = TableOptions {
+            simulation: Some(self.trained_on),
+            skip_unsettled: true,
+            ..TableOptions::default()
+        };
+        let table = Table::parse(&source, &options)?;
+        let options = FitOptions {
+            conduction: Conduction::of(self.nominal),
+            ..FitOptions::default()
+        };
+        Ok(drm::fit(&table, &options)?)
+    }
+
+    /// The policy with another mapping, read from the text of a drm.toml as any other.
+    ///
+    /// # Errors
+    /// If the contract does not allow such a mapping.
+    pub fn with(&self, map: &DutyRatioMap) -> Result<Policy, Error> {
+        let mut mapping = policy::read_mapping(Path::new("drm.toml"), &map.to_toml(""))?;
+        let mut policy = self.policy.clone();
+        mapping.load_current = policy.mapping.map_or(0, |mapping| mapping.load_current);
+        policy.mapping = Some(mapping);
+        Ok(policy)
+    }
+
+    /// What no mapping repairs at `real`, in words.
+    ///
+    /// # Errors
+    /// If either converter is none.
+    pub fn beyond_repair(&self, real: &Parameters, map: &DutyRatioMap) -> Result<Vec<String>, Error> {
+        let limits = Some(self.policy.limits.duty);
+        let steady = drm::judge::against_plant(map, real, self.nominal, self.v_ref, &self.loads(), limits)?;
+        let mut remarks = drm::judge::beyond_repair(&steady, self.v_ref);
+        remarks.extend(self.cut_off(map));
+        Ok(remarks)
+    }
+
+    /// Whether the policy's duty limits cut off what the mapping makes of its actions.
+    fn cut_off(&self, map: &DutyRatioMap) -> Option<String> {
+        let (low, high) = duties(&self.policy.actions);
+        let mapped = DutyRatioMap {
+            valid_d_sim: Interval { low, high },
+            ..*map
+        }
+        .duty_range();
+        let limits = self.policy.limits.duty;
+        (mapped.low < limits.low || mapped.high > limits.high).then(|| {
+            format!(
+                "the policy's duties map to {:.4} .. {:.4}, but its limits are {} .. {}: what lies beyond is cut off in \
+                 transients; widen them",
+                mapped.low, mapped.high, limits.low, limits.high
+            )
+        })
+    }
+}
+
+/// Smallest and largest duty of the actions.
+fn duties(actions: &[Action]) -> (f64, f64) {
+    let all = actions.iter().map(|action| action.duty);
+    all.fold((1.0, 0.0), |(low, high), duty| (duty.min(low), duty.max(high)))
+}

@@ -1,0 +1,167 @@
+//! Rust declarations of the C core, with the controller type of the Rust backend in front of them.
+
+use proc_macro2::TokenStream;
+use quote::quote;
+
+use super::{DEFAULT_TYPE, constants, ident, types};
+use crate::program::Program;
+
+/// `<name>_ffi.rs`: `Measurement`, `Command`, `status` and `Controller` as in the Rust backend's file, over the C core.
+pub struct Bindings;
+
+impl crate::Backend for Bindings {
+    fn emit(&self, program: &Program) -> Result<crate::GeneratedFiles, crate::CodegenError> {
+        let title = format!("Controller {} in C, from Rust", program.name);
+        let banner = crate::backend::banner(program, &title, program.provenance.c_flags);
+        super::file(format!("{}_ffi.rs", program.name), &banner, items(program))
+    }
+}
+
+fn items(program: &Program) -> TokenStream {
+    let constants = constants(program);
+    let types = types(program, &quote!(#[repr(C)]));
+    let name = ident(DEFAULT_TYPE);
+    let symbol = |function: &str| format!("{}_{function}", program.name);
+    let [init, reset, eval, commit, step, observe, q_values, self_test, integrity] = [
+        "init",
+        "reset",
+        "eval",
+        "commit",
+        "step",
+        "observe",
+        "q_values",
+        "self_test",
+        "integrity",
+    ]
+    .map(symbol);
+    let (declare_mapping, set_mapping) = mapping(program);
+    quote! {
+        #constants
+        #types
+        /// One controller: the C core's state, one 32-bit word per member. Several instances are independent.
+        #[derive(Clone)]
+        #[repr(C)]
+        pub struct #name { words: [u32; STATE_WORDS] }
+        mod c {
+            use super::{Command, Measurement, #name};
+            unsafe extern "C" {
+                #[link_name = #init]
+                pub fn init(state: *mut #name);
+                #[link_name = #reset]
+                pub fn reset(state: *mut #name);
+                #[link_name = #eval]
+                pub fn eval(state: *const #name, measured: *const Measurement, command: *mut Command);
+                #[link_name = #commit]
+                pub fn commit(state: *mut #name, measured: *const Measurement, command: *const Command);
+                #[link_name = #step]
+                pub fn step(state: *mut #name, measured: *const Measurement, command: *mut Command);
+                #[link_name = #observe]
+                pub fn observe(state: *const #name, measured: *const Measurement, observation: *mut f32);
+                #[link_name = #q_values]
+                pub fn q_values(observation: *const f32, q: *mut f32);
+                #declare_mapping
+                #[link_name = #self_test]
+                pub fn self_test() -> u32;
+                #[link_name = #integrity]
+                pub fn integrity() -> u32;
+            }
+        }
+        // Every call hands over references or arrays of the lengths in the C header, which the C core reads and writes
+        // within these lengths and does not keep.
+        impl #name {
+            const NOTHING: Command = Command { duty: 0.0, duty_sim: 0.0, action_index: 0, status: 0 };
+            /// Start-up state.
+            #[must_use]
+            pub fn new() -> Self {
+                let mut new = Self { words: [0; STATE_WORDS] };
+                unsafe { c::init(&mut new) };
+                new
+            }
+            /// Start-up state, but coefficients set at run time stay.
+            pub fn reset(&mut self) {
+                unsafe { c::reset(self) }
+            }
+            /// The state, word by word in the order of the numeric contract.
+            #[must_use]
+            pub fn state_words(&self) -> [u32; STATE_WORDS] {
+                self.words
+            }
+            /// Command for this measurement; changes nothing.
+            #[must_use]
+            pub fn eval(&self, measured: &Measurement) -> Command {
+                let mut command = Self::NOTHING;
+                unsafe { c::eval(self, measured, &mut command) };
+                command
+            }
+            /// Advances the filters by one sample period, with the command that `eval` gave for this measurement.
+            pub fn commit(&mut self, measured: &Measurement, command: &Command) {
+                unsafe { c::commit(self, measured, command) }
+            }
+            /// `eval` and `commit`.
+            pub fn step(&mut self, measured: &Measurement) -> Command {
+                let mut command = Self::NOTHING;
+                unsafe { c::step(self, measured, &mut command) };
+                command
+            }
+            /// Observation for this measurement; changes nothing.
+            #[must_use]
+            pub fn observe(&self, measured: &Measurement) -> [f32; FEATURES] {
+                let mut observation = [0.0; FEATURES];
+                unsafe { c::observe(self, measured, observation.as_mut_ptr()) };
+                observation
+            }
+            /// Q values of an observation.
+            #[must_use]
+            pub fn q_values(observation: &[f32; FEATURES]) -> [f32; ACTIONS] {
+                let mut q = [0.0; ACTIONS];
+                unsafe { c::q_values(observation.as_ptr(), q.as_mut_ptr()) };
+                q
+            }
+            #set_mapping
+            /// Known answers: the number of the first failing vector if the arithmetic of this build is not the policy's.
+            pub fn self_test() -> Result<(), u32> {
+                match unsafe { c::self_test() } {
+                    0 => Ok(()),
+                    vector => Err(vector),
+                }
+            }
+            /// CRC-32 over the tables: whether they are as generated.
+            #[must_use]
+            pub fn integrity() -> bool {
+                unsafe { c::integrity() == 1 }
+            }
+        }
+        impl Default for #name {
+            fn default() -> Self {
+                Self::new()
+            }
+        }
+    }
+}
+
+/// Declaration and method that set the mapping's coefficients; nothing if the policy has no mapping.
+fn mapping(program: &Program) -> (TokenStream, TokenStream) {
+    let Some(mapping) = &program.mapping else {
+        return (TokenStream::new(), TokenStream::new());
+    };
+    let symbol = format!("{}_set_mapping", program.name);
+    let name = ident(DEFAULT_TYPE);
+    let names: Vec<_> = mapping
+        .coefficients
+        .iter()
+        .map(|(name, ..)| ident(name.name()))
+        .collect();
+    let declaration = quote! {
+        #[link_name = #symbol]
+        pub fn set_mapping(state: *mut #name, #(#names: f32),*) -> u32;
+    };
+    let method = quote! {
+        /// Replaces the coefficients of the duty ratio mapping. False, changing nothing, if one is outside its
+        /// interval or the mapping would not increase with the duty.
+        #[must_use]
+        pub fn set_mapping(&mut self, #(#names: f32),*) -> bool {
+            unsafe { c::set_mapping(self, #(#names),*) == 1 }
+        }
+    };
+    (declaration, method)
+}

@@ -1,0 +1,55 @@
+//! Explanations that share no cause with the leading one and fit as well.
+
+use crate::attribute::{Attribution, gained};
+use crate::fit::Fit;
+use crate::parallel;
+use crate::problem::Problem;
+
+/// As for rivals of one cause: chi-square within this, times the scatter, or this share of what is explained.
+const TIE: f64 = 9.0;
+const TIE_SHARE: f64 = 0.005;
+/// A pair is fitted if at first order it explains this share of what the best pair explains.
+const LOOKS_AS_GOOD: f64 = 0.97;
+/// Pairs that are fitted at most.
+const MOST: usize = 8;
+
+/// Pairs of causes beside a leading pair with which they have nothing in common; the best first.
+#[must_use]
+pub fn other_pairs(problem: &Problem, attribution: &Attribution) -> Vec<Fit> {
+    let Some(best) = attribution.best.as_ref().filter(|best| best.causes.len() == 2) else {
+        return Vec::new();
+    };
+    let fitter = attribution.fitter(problem);
+    let own: Vec<&str> = best.causes.iter().map(|cause| attribution.id(*cause)).collect();
+    let all: Vec<usize> = (0..attribution.candidates.len()).collect();
+    let columns = parallel::map(&all, |cause| fitter.sensitivity(*cause, &attribution.null));
+    let gain_of = |a: usize, b: usize| gained(&[&columns[a][..], &columns[b][..]].concat(), &attribution.null.residual);
+    let reached = gain_of(best.causes[0], best.causes[1]);
+    let others: Vec<usize> = all
+        .into_iter()
+        .filter(|cause| !own.contains(&attribution.id(*cause)) && !columns[*cause].is_empty())
+        .collect();
+    let mut looks = Vec::new();
+    for (n, a) in others.iter().enumerate() {
+        for b in &others[n + 1..] {
+            let gain = gain_of(*a, *b);
+            if attribution.id(*a) != attribution.id(*b) && gain >= LOOKS_AS_GOOD * reached {
+                looks.push((gain, [*a, *b]));
+            }
+        }
+    }
+    looks.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    looks.truncate(MOST);
+    let explained = attribution.null.chi2 - best.state.chi2;
+    let worst = best.state.chi2 + (TIE * attribution.inflation).max(TIE_SHARE * explained);
+    let mut fits = parallel::map(&looks, |(_, pair)| {
+        let values: Vec<f64> = pair
+            .iter()
+            .flat_map(|cause| attribution.candidates[*cause].own.clone())
+            .collect();
+        fitter.from(pair, &values, &attribution.null)
+    });
+    fits.retain(|fit| fit.state.chi2 <= worst);
+    fits.sort_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
+    fits
+}

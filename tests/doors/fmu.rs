@@ -1,0 +1,341 @@
+//! FMUs in FMPy and in a program of our own that imports them with the standard headers, as shared libraries and linked with
+//! their prefix.
+
+mod faults;
+mod unit;
+
+use std::collections::BTreeSet;
+use std::process::Command;
+
+use closed_loop::{Agent, Answer, Call, External};
+use codegen::Door;
+use interp::Sample;
+use policy::Policy;
+use tests::tools::{is_without, run, run_silently};
+
+use super::{example, files, golden_case};
+use unit::{Descriptions, Unit, VERSIONS, closed_loop, line, standard_headers};
+
+/// 500 ms of the example.
+const PERIODS: usize = 5000;
+
+fn interpreted(policy: &Policy, periods: usize) -> Vec<(Vec<Sample>, Answer)> {
+    closed_loop(policy, &mut Agent::new(policy).unwrap(), periods)
+}
+
+fn lines(trajectory: &[(Vec<Sample>, Answer)]) -> Vec<String> {
+    trajectory.iter().map(|(_, answer)| line(answer)).collect()
+}
+
+#[track_caller]
+fn fmpy_agrees(policy: &Policy, periods: usize, compile: bool) {
+    let trajectory = interpreted(policy, periods);
+    for door in VERSIONS {
+        let unit = Unit::new(policy, door);
+        let (ran, answers) = unit.simulate(&trajectory, compile);
+        let name = &policy.name;
+        assert_eq!(ran.code, Some(0), "{name} {door:?}\n{}{}", ran.stdout, ran.stderr);
+        assert!(!ran.stderr.contains("warning:"), "{name} {door:?}\n{}", ran.stderr);
+        let expected = lines(&trajectory);
+        assert_eq!(answers.len(), periods);
+        let different = answers.iter().zip(&expected).filter(|(a, b)| a != b).count();
+        assert_eq!(different, 0, "{name} {door:?}");
+    }
+}
+
+#[test]
+fn fmpy_validates_and_simulates_half_a_second_of_closed_loop() {
+    if is_without("FMPy") {
+        return;
+    }
+    fmpy_agrees(&example(), PERIODS, false);
+}
+
+#[test]
+fn fmpy_compiles_the_sources_and_simulates_them() {
+    if is_without("FMPy") {
+        return;
+    }
+    fmpy_agrees(&example(), PERIODS, true);
+    fmpy_agrees(&golden_case("adc_mapping"), 500, true);
+}
+
+#[test]
+fn fmpy_takes_codes_filters_and_policies_without_mapping() {
+    if is_without("FMPy") {
+        return;
+    }
+    for name in ["adc_mapping", "filters", "activations", "linear"] {
+        fmpy_agrees(&golden_case(name), 500, false);
+    }
+}
+
+/// The plant steps the FMU: what it answers to a sample is what the converter does until the next one.
+#[test]
+fn the_plant_as_importing_program_sees_the_duties_of_the_interpreter() {
+    if is_without("FMPy") {
+        return;
+    }
+    for (policy, periods) in [(example(), PERIODS), (golden_case("adc_mapping"), 1000)] {
+        let expected = interpreted(&policy, periods);
+        for door in VERSIONS {
+            let unit = Unit::new(&policy, door);
+            unit.build_importer();
+            let mut running = unit.run();
+            let ask = |call: Call<'_>| match call {
+                Call::Restart => Ok(None),
+                Call::Step(samples) => running.step(samples).map(Some),
+            };
+            let found = closed_loop(&policy, &mut External::new(&policy, ask).unwrap(), periods);
+            assert_eq!(lines(&found), lines(&expected), "{} {door:?}", policy.name);
+        }
+        // a loop that rests would say nothing
+        let moved = lines(&expected).iter().collect::<BTreeSet<_>>().len();
+        assert!(moved > 2, "{moved}");
+    }
+}
+
+#[test]
+fn instances_states_times_and_refusals_are_as_the_standard_says() {
+    if is_without("FMPy") {
+        return;
+    }
+    for policy in [example(), golden_case("constructs"), golden_case("minimal")] {
+        for door in VERSIONS {
+            let unit = Unit::new(&policy, door);
+            unit.build_importer();
+            let ran = unit.check();
+            assert_eq!(ran.stdout, "PASS\n", "{} {door:?}\n{}", policy.name, ran.stderr);
+        }
+    }
+}
+
+/// Links FMUs with their prefix into one program that looks at each of them.
+fn link(units: &[&Unit], more: &[&str]) -> Result<Vec<String>, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = Command::new("gcc");
+    command.args(more).arg("main.c").current_dir(folder.path());
+    let (mut declarations, mut calls) = (String::new(), String::new());
+    for (index, unit) in units.iter().enumerate() {
+        let main = format!("main_{index}");
+        let built = unit.build_objects(&main, more);
+        assert_eq!((built.code, built.stderr.as_str()), (Some(0), ""), "{main}");
+        command.args(unit.objects());
+        declarations += &format!("int {main}(int, char **);\n");
+        calls += &format!(" || {main}(count, arguments)");
+    }
+    let text = format!("{declarations}int main(int count, char **arguments) {{ return 0{calls}; }}\n");
+    std::fs::write(folder.path().join("main.c"), text).unwrap();
+    let linked = run(command.args(["-o", "program"]));
+    if linked.code != Some(0) {
+        return Err(linked.stderr);
+    }
+    let ran = run(Command::new(folder.path().join("program")).args(["linked", "check"]));
+    match ran.code {
+        Some(0) => Ok(ran.stdout.lines().map(str::to_owned).collect()),
+        _ => Err(ran.stdout + &ran.stderr),
+    }
+}
+
+/// All four: two policies in both versions of FMI, under sanitisers.
+#[test]
+fn several_fmus_link_into_one_program_with_the_standard_headers() {
+    if is_without("FMPy") {
+        return;
+    }
+    let sanitised = ["-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
+    let mut units = Vec::new();
+    for policy in [golden_case("constructs"), golden_case("minimal")] {
+        units.extend(VERSIONS.map(|door| Unit::new(&policy, door)));
+    }
+    // core, block and unit are the same for both versions: each version is a program
+    for version in 0..2 {
+        let units = [&units[version], &units[version + 2]];
+        assert_eq!(link(&units, &sanitised), Ok(vec!["PASS".to_owned(); 2]));
+    }
+}
+
+#[test]
+fn without_the_prefix_two_fmus_do_not_link() {
+    if is_without("FMPy") {
+        return;
+    }
+    for door in VERSIONS {
+        let version = door.fmi().unwrap().name();
+        let define = format!("#define {}_FUNCTION_PREFIX", version.to_uppercase());
+        let strip = |name: &str| {
+            let policy = golden_case(name);
+            let unit = Unit::edited(&policy, door, &format!("_{version}.h"), &define, "#define NO_PREFIX");
+            // the importing program must find the plain names
+            let config = std::fs::read_to_string(unit.path().join("config.h")).unwrap();
+            let plain = config.replace(&format!("#define NAME {name}_"), "#define NAME");
+            std::fs::write(unit.path().join("config.h"), plain).unwrap();
+            unit
+        };
+        let error = link(&[&strip("constructs"), &strip("minimal")], &["-O1"]).unwrap_err();
+        assert!(error.contains("multiple definition"), "{error}");
+    }
+}
+
+/// The library offers what the standard's headers declare and nothing of the core.
+#[test]
+fn the_binary_exports_the_functions_of_the_standard_and_no_others() {
+    if is_without("FMPy") {
+        return;
+    }
+    for (door, count) in [(Door::Fmu2, 34), (Door::Fmu3, 75)] {
+        let unit = Unit::new(&golden_case("minimal"), door);
+        let version = unit.version();
+        let header = std::fs::read_to_string(standard_headers().join(format!("{version}Functions.h"))).unwrap();
+        // FMI 2 asks for the functions of model exchange only where it is offered
+        let skipped = |line: &str| line.contains("for Model Exchange") && door == Door::Fmu2;
+        let mut declared = BTreeSet::new();
+        let mut skipping = false;
+        let declarations = header.split("/* Inquire version numbers").last().unwrap();
+        for line in declarations.lines() {
+            skipping = skipped(line) || (skipping && !line.contains("for Co-Simulation"));
+            if let Some(rest) = line
+                .trim_start()
+                .strip_prefix(&format!("{}_Export", version.to_uppercase()))
+            {
+                let name = rest.split_whitespace().nth(1).unwrap().trim_end_matches(';');
+                declared.extend((!skipping).then(|| name.to_owned()));
+            }
+        }
+        let symbols = run_silently(Command::new("nm").args(["-D", "--defined-only"]).arg(unit.library()));
+        let exported: BTreeSet<String> = symbols
+            .lines()
+            .map(|l| l.rsplit(' ').next().unwrap().to_owned())
+            .collect();
+        assert_eq!(exported.len(), count);
+        assert_eq!(exported, declared);
+    }
+}
+
+#[test]
+fn the_sources_are_strict_c_with_and_without_the_standard_headers() {
+    if is_without("FMPy") {
+        return;
+    }
+    let strict = "-pedantic -Wall -Wextra -Wconversion -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Werror";
+    let headers = format!("-isystem{}", standard_headers().display());
+    for (door, dialect) in [(Door::Fmu2, "-std=c90"), (Door::Fmu3, "-std=c99")] {
+        for policy in ["constructs", "minimal"] {
+            let unit = Unit::new(&golden_case(policy), door);
+            for compiler in ["gcc", "clang"] {
+                for more in ["-O2", &headers] {
+                    let mut command = Command::new(compiler);
+                    command.arg(dialect).args(strict.split(' ')).args([more, "-c"]);
+                    run_silently(command.args(unit.sources()).current_dir(unit.path()));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn signals_may_have_the_names_of_outputs_parameters_and_time() {
+    if is_without("FMPy") {
+        return;
+    }
+    let mut descriptions = Descriptions::default();
+    for taken in ["duty", "enable", "status", "time", "a"] {
+        let mut policy = golden_case("adc_mapping");
+        policy.signals[0].name = taken.to_owned();
+        for door in VERSIONS {
+            let text = descriptions.add(&policy, door, "", "");
+            let quoted = |name: &str| format!(" name=\"{name}\"");
+            assert_eq!(text.matches(&quoted(taken)).count(), 1, "{text}");
+            // FMI 2 does without the time
+            if (taken, door) != ("time", Door::Fmu2) {
+                assert!(text.contains(&quoted(&format!("{taken}_"))), "{text}");
+            }
+        }
+    }
+    assert_eq!(descriptions.problems(), [""; 10]);
+}
+
+/// A unit is free text in the contract.
+#[test]
+fn units_are_escaped_and_defined_whatever_they_are() {
+    if is_without("FMPy") {
+        return;
+    }
+    let mut descriptions = Descriptions::default();
+    for unit in ["V", "", "ohm", "A & \"B\" <°C>", "µWb·turn"] {
+        let mut policy = golden_case("minimal");
+        policy.signals[0].unit = unit.to_owned();
+        for door in VERSIONS {
+            descriptions.add(&policy, door, "", "");
+        }
+    }
+    assert_eq!(descriptions.problems(), [""; 10]);
+}
+
+/// Code for another processor is not built here: the importer does that.
+#[test]
+fn an_fmu_for_another_target_has_sources_only_and_says_so() {
+    let policy = golden_case("minimal");
+    let target = targets::find("dspace-ds1202").unwrap();
+    let selection = verify::Selection {
+        doors: VERSIONS.to_vec(),
+        ..verify::Selection::core(&[codegen::Language::C])
+    };
+    let files = verify::doors::generate(&policy, target, &selection).unwrap();
+    for archive in verify::fmu::archives(&policy, target, &VERSIONS, &files).unwrap() {
+        let reason = archive.binary.unwrap_err();
+        assert!(reason.contains("dspace-ds1202"), "{reason}");
+        let find = |text: &str| {
+            archive
+                .bytes
+                .windows(text.len())
+                .any(|window| window == text.as_bytes())
+        };
+        assert!(find("sources/minimal.c") && !find("binaries/"));
+    }
+}
+
+/// Another controller is another FMU; the same one is the same, bytes and all, apart from what compilers add.
+#[test]
+fn the_token_follows_the_controller() {
+    let token = |policy: &Policy, door: Door| {
+        let all = files(policy, door, 1);
+        let text = &all[&format!("{}_{}.xml", policy.name, door.fmi().unwrap().name())];
+        let start = text.find('{').unwrap();
+        text[start..start + 38].to_owned()
+    };
+    let policy = golden_case("minimal");
+    let own = token(&policy, Door::Fmu2);
+    assert_eq!(own, token(&policy, Door::Fmu2));
+    assert_eq!(own, token(&policy, Door::Fmu3));
+    let mut other = policy.clone();
+    other.limits.duty.high -= 0.01;
+    assert_ne!(own, token(&other, Door::Fmu2));
+}
+
+#[test]
+fn compile_writes_the_archives_and_verify_finds_the_files_as_generated() {
+    let folder = tempfile::tempdir().unwrap();
+    let policy = tests::root().join("tests/golden/cases/minimal");
+    let out = folder.path().join("out");
+    let mut command = Command::new(tests::tools::policyc());
+    command
+        .arg("compile")
+        .arg(&policy)
+        .args(["--no-costs", "--door", "fmu2", "--door", "fmu3", "--out"]);
+    let said = run_silently(command.arg(&out));
+    for (file, platform) in [("minimal_fmi2.fmu", "linux64"), ("minimal_fmi3.fmu", "x86_64-linux")] {
+        assert!(
+            said.contains(&format!("{file}: sources and a binary for {platform}, built with")),
+            "{said}"
+        );
+        assert!(std::fs::read(out.join(file)).unwrap().starts_with(b"PK\x03\x04"));
+    }
+    let mut command = Command::new(tests::tools::policyc());
+    command
+        .arg("verify")
+        .arg(&policy)
+        .args(["--steps", "100", "--generated"]);
+    let ran = run(command.arg(&out));
+    assert_eq!(ran.code, Some(0), "{}{}", ran.stdout, ran.stderr);
+}

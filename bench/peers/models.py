@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes the network of a safetensors file as peers read it: network.tflite (int8) for MicroFlow, emlearn.h for emlearn.
+"""Writes the network of a safetensors file as peers read it: network.tflite (int8) for MicroFlow, and emlearn's C.
 
 usage: models.py WEIGHTS.safetensors FOLDER
 
@@ -13,6 +13,7 @@ from pathlib import Path
 import flatbuffers
 import numpy as np
 import tflite
+from emlearn.net import c_generate_net_loadable
 
 
 def layers(path):
@@ -146,6 +147,9 @@ def int8(network):
 def main():
     network, folder = layers(sys.argv[1]), Path(sys.argv[2])
     (folder / "network.tflite").write_bytes(int8(network))
+    activations = ["relu"] * (len(network) - 1) + ["identity"]
+    weights, biases = [w.T for w, _ in network], [b for _, b in network]
+    (folder / "emlearn.h").write_text(c_generate_net_loadable(activations, weights, biases, "network"))
 
 
 main()

@@ -70,7 +70,7 @@ impl Bench {
         let mut rows = Vec::new();
         for (compiler, level) in C_LEVELS {
             self.object(core, compiler, level, &format!("{}.c", policy.name), extra)?;
-            let mut row = self.counted(core, "unit.o", &["main.c"])?;
+            let mut row = self.counted(core, &["unit.o"], &["main.c"])?;
             row.flash = Some(size(&self.path("unit.o"))?);
             row.compiler = format!("{compiler} {level}");
             rows.push(row);
@@ -78,7 +78,7 @@ impl Bench {
         // Rust has loops in assembly for integers only
         if !assembly || policy::scales::is_integer(policy.numeric_format) {
             self.rust_archive(core, assembly)?;
-            let mut row = self.counted(core, "unit.a", &[])?;
+            let mut row = self.counted(core, &["unit.a"], &[])?;
             row.compiler = "rustc -O3".to_owned();
             rows.push(row);
         }
@@ -102,7 +102,7 @@ impl Bench {
             ("naive C, contracted", &["-ffp-contract=fast"][..]),
         ] {
             self.object(core, "gcc", "-O2", "naive.c", extra)?;
-            let mut row = self.counted(core, "unit.o", &["main.c"])?;
+            let mut row = self.counted(core, &["unit.o"], &["main.c"])?;
             row.flash = Some(size(&self.path("unit.o"))?);
             row.compiler = "gcc -O2".to_owned();
             row.policy = "bench".to_owned();
@@ -160,11 +160,11 @@ impl Bench {
         self.folder.path().join(name)
     }
 
-    fn put(&self, name: &str, text: &str) -> Result<(), Failure> {
+    pub(crate) fn put(&self, name: &str, text: &str) -> Result<(), Failure> {
         std::fs::write(self.path(name), text).map_err(|error| Failure(format!("{name}: {error}")))
     }
 
-    fn put_naive(&self, policy: &Policy) -> Result<(), Failure> {
+    pub(crate) fn put_naive(&self, policy: &Policy) -> Result<(), Failure> {
         let (header, text) = sources::naive(policy);
         self.put("naive.h", &header)?;
         self.put("naive.c", &text)
@@ -175,7 +175,14 @@ impl Bench {
         files.files.iter().try_for_each(|(name, text)| self.put(name, text))
     }
 
-    fn object(&self, core: &Core, compiler: &str, level: &str, unit: &str, extra: &[&str]) -> Result<(), Failure> {
+    pub(crate) fn object(
+        &self,
+        core: &Core,
+        compiler: &str,
+        level: &str,
+        unit: &str,
+        extra: &[&str],
+    ) -> Result<(), Failure> {
         let mut command = if compiler == "gcc" {
             Command::new("arm-none-eabi-gcc")
         } else {
@@ -210,8 +217,13 @@ impl Bench {
         run(command.args(["lib.rs", "-o", "unit.a"])).map(|_| ())
     }
 
+    /// Code and tables of the last linked program, with the board's.
+    pub(crate) fn linked_flash(&self) -> Result<u64, Failure> {
+        size(&self.path("program.elf"))
+    }
+
     /// Links with the board, runs, reads counts and words.
-    fn counted(&self, core: &Core, unit: &str, mains: &[&str]) -> Result<Row, Failure> {
+    pub(crate) fn counted(&self, core: &Core, unit: &[&str], mains: &[&str]) -> Result<Row, Failure> {
         let board = |name: &str| self.boards.join(name);
         let mut link = Command::new("arm-none-eabi-gcc");
         link.current_dir(self.folder.path())
@@ -231,7 +243,8 @@ impl Bench {
             .arg(board("arm").join(core.script))
             .args(mains)
             .args(["arm/start.c", "memory.c", "reset.c", "semihosting.c", "words.c"].map(board))
-            .args([unit, "-lgcc", "-o", "program.elf"]);
+            .args(unit)
+            .args(["-lgcc", "-o", "program.elf"]);
         run(&mut link)?;
         let symbols = run(Command::new("arm-none-eabi-nm").arg(self.path("program.elf")))?;
         let symbols = String::from_utf8_lossy(&symbols).into_owned();
@@ -291,7 +304,7 @@ impl Bench {
     }
 }
 
-fn blank(core: &str) -> Row {
+pub(crate) fn blank(core: &str) -> Row {
     Row {
         policy: String::new(),
         core: core.to_owned(),
@@ -329,7 +342,7 @@ fn size(object: &Path) -> Result<u64, Failure> {
         .ok_or_else(|| Failure("arm-none-eabi-size: no size".to_owned()))
 }
 
-fn run(command: &mut Command) -> Result<Vec<u8>, Failure> {
+pub(crate) fn run(command: &mut Command) -> Result<Vec<u8>, Failure> {
     let output = command.stdin(Stdio::null()).env("LC_ALL", "C").output();
     let program = command.get_program().to_string_lossy().into_owned();
     let output = output.map_err(|error| Failure(format!("{program}: {error}")))?;

@@ -292,7 +292,9 @@ impl Bench {
             )));
         }
         let counts = std::fs::read_to_string(&counts).map_err(|error| Failure(error.to_string()))?;
-        let counts: Vec<u64> = counts.lines().filter_map(|line| line.parse().ok()).collect();
+        // instructions, accesses to memory, jumps
+        let instructions = |line: &str| line.split_whitespace().next()?.parse().ok();
+        let counts: Vec<u64> = counts.lines().filter_map(instructions).collect();
         let (q_values, step) = counts.split_at_checked(CALLS).unwrap_or_default();
         Ok(Row {
             q_values: extremes(q_values),

@@ -25,7 +25,7 @@ use serde::Serialize;
 
 pub use certificate::{Certificate, Effort, Golden, Neighbourhood};
 pub use cover::{Map, Share, Slice, StateBound};
-pub use domain::{Cell, Coordinate, Domain, Memory};
+pub use domain::{AffineCopy, Cell, Coordinate, Domain, Memory};
 pub use measured::{Measured, QValues};
 pub use neurons::Neurons;
 

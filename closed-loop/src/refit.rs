@@ -159,7 +159,10 @@ impl Refit<'_> {
     /// If either converter is none.
     pub fn beyond_repair(&self, real: &Parameters, map: &DutyRatioMap) -> Result<Vec<String>, Error> {
         let limits = Some(self.policy.limits.duty);
-        let steady = drm::judge::against_plant(map, real, self.nominal, self.v_ref, &self.loads(), limits)?;
+        // equal currents, for constant power may not come to rest
+        let at_rest = |load: LoadSetting| LoadSetting::Current(load.current(self.v_ref));
+        let loads: Vec<LoadSetting> = self.loads().into_iter().map(at_rest).collect();
+        let steady = drm::judge::against_plant(map, real, self.nominal, self.v_ref, &loads, limits)?;
         let mut remarks = drm::judge::beyond_repair(&steady, self.v_ref);
         remarks.extend(self.cut_off(map));
         Ok(remarks)
@@ -174,7 +177,9 @@ impl Refit<'_> {
         }
         .duty_range();
         let limits = self.policy.limits.duty;
-        (mapped.low < limits.low || mapped.high > limits.high).then(|| {
+        let (too_low, too_high) = (mapped.low < limits.low, mapped.high > limits.high);
+        // 0 and 1 are the ends of any modulator
+        (too_low && limits.low > 0.0 || too_high && limits.high < 1.0).then(|| {
             format!(
                 "the policy's duties map to {:.4} .. {:.4}, but its limits are {} .. {}: what lies beyond is cut off in \
                  transients; widen them",

@@ -115,7 +115,8 @@ pub enum Search {
     Own,
     /// From each of these starts, in steps of the parameters' own steps above the model's value.
     From(&'static [&'static [f64]]),
-    /// Its first parameter takes each of these values (times its step) and is not smooth in between.
+    /// Its first parameter takes each of these values (times its step), or without any those that the residual suggests, and is
+    /// not smooth in between.
     Scan(&'static [f64]),
 }
 
@@ -242,7 +243,7 @@ pub const CAUSES: &[Cause] = &[
             knob("saturation", &["inductor.saturation"], Reach::Plain(0.0, 0.95, 0.1)),
             knob("i_sat", &["inductor.i_sat"], Reach::Current(0.5, 5.0, 0.1)),
         ],
-        Search::From(&[&[2.0, 6.0], &[4.0, 12.0], &[5.0, 25.0]]),
+        Search::From(&[&[0.3, 6.0], &[0.3, 12.0], &[0.3, 25.0], &[4.0, 12.0]]),
     ),
     searched(
         "c_derating",
@@ -251,7 +252,7 @@ pub const CAUSES: &[Cause] = &[
             knob("derating", &["capacitor.derating"], Reach::Plain(0.0, 0.95, 0.1)),
             knob("v_half", &["capacitor.v_half"], Reach::Voltage(0.5, 5.0, 0.1)),
         ],
-        Search::From(&[&[2.0, 6.0], &[4.0, 12.0], &[5.0, 25.0]]),
+        Search::From(&[&[0.3, 6.0], &[0.3, 12.0], &[0.3, 25.0], &[4.0, 12.0]]),
     ),
     cause(
         "source_impedance",
@@ -372,7 +373,7 @@ pub const CAUSES: &[Cause] = &[
         "duty_quantisation",
         "step of the duty",
         &[knob("duty_lsb", &["pwm.duty_lsb"], Reach::Plain(0.0, 0.1, 1.0))],
-        Search::Scan(&DUTY_STEPS),
+        Search::Scan(&[]),
     ),
     cause(
         "cpl_bandwidth",
@@ -437,44 +438,6 @@ pub const CAUSES: &[Cause] = &[
         "gain of the input voltage sensor",
         &[knob("gain", &["sensors.v_in.gain"], GAIN)],
     ),
-];
-
-/// Steps of a duty counter that are tried: whole counts of a period, and decimal ones.
-const DUTY_STEPS: [f64; 34] = [
-    1.0 / 20.0,
-    1.0 / 25.0,
-    1.0 / 32.0,
-    1.0 / 40.0,
-    1.0 / 50.0,
-    1.0 / 60.0,
-    1.0 / 64.0,
-    1.0 / 75.0,
-    1.0 / 80.0,
-    1.0 / 100.0,
-    1.0 / 110.0,
-    1.0 / 120.0,
-    1.0 / 125.0,
-    1.0 / 128.0,
-    1.0 / 140.0,
-    1.0 / 150.0,
-    1.0 / 160.0,
-    1.0 / 175.0,
-    1.0 / 180.0,
-    1.0 / 200.0,
-    1.0 / 225.0,
-    1.0 / 250.0,
-    1.0 / 256.0,
-    1.0 / 300.0,
-    1.0 / 333.0,
-    1.0 / 350.0,
-    1.0 / 400.0,
-    1.0 / 450.0,
-    1.0 / 500.0,
-    1.0 / 512.0,
-    1.0 / 600.0,
-    1.0 / 700.0,
-    1.0 / 800.0,
-    1.0 / 1000.0,
 ];
 
 /// A candidate with the numbers it has for one converter.

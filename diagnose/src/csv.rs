@@ -51,11 +51,20 @@ impl Table {
     /// No header, a cell that is no number, a line with too many or too few cells.
     pub fn parse(file: &Path, bytes: &[u8]) -> Result<Self, Faults> {
         let Ok(text) = std::str::from_utf8(bytes) else {
-            return Err(Fault::new(file, Place::File, Message::new("the file is not UTF-8 text")).into());
+            let message = Message::new("the file is not UTF-8 text").hint("save it as CSV in UTF-8");
+            return Err(Fault::new(file, Place::File, message).into());
         };
         let mut repairs = Vec::new();
         let unmarked = text.strip_prefix('\u{feff}').unwrap_or(text);
-        let whole = unmarked.ends_with('\n');
+        let whole = unmarked.ends_with(['\n', '\r']);
+        let unix;
+        let unmarked = if unmarked.contains('\n') {
+            unmarked
+        } else {
+            // line ends of old systems
+            unix = unmarked.replace('\r', "\n");
+            &unix
+        };
         let mut lines = unmarked
             .lines()
             .enumerate()
@@ -66,8 +75,9 @@ impl Table {
             return Err(Fault::new(file, Place::File, message).into());
         };
         let separator = [';', '\t', ','].into_iter().find(|mark| header.contains(*mark));
-        let separator = separator.unwrap_or(',');
-        let names: Vec<&str> = header.split(separator).map(clean).collect();
+        let spaced = separator.is_none() && header.split_whitespace().count() > 1;
+        let separator = separator.unwrap_or(if spaced { ' ' } else { ',' });
+        let names: Vec<&str> = cells(header, separator).into_iter().map(clean).collect();
         let mut reader = Reader {
             file,
             separator,
@@ -76,11 +86,16 @@ impl Table {
             rows: Vec::new(),
             faults: Vec::new(),
         };
-        let rows: Vec<(usize, &str)> = lines.collect();
+        let mut rows: Vec<(usize, &str)> = lines.collect();
+        if let Some((line, units)) = rows.first().filter(|(_, row)| names_units(row, separator)) {
+            check_units(file, *line, units, separator)?;
+            repairs.push(format!("line {line} holds units: left out"));
+            rows.remove(0);
+        }
         reader.comma = separator != ',' && rows.iter().take(20).any(|(_, row)| row.contains(','));
         for (index, (line, row)) in rows.iter().enumerate() {
             let last = index + 1 == rows.len();
-            if last && !whole && row.split(separator).count() < names.len() {
+            if last && !whole && cells(row, separator).len() < names.len() {
                 repairs.push(format!("line {line} is cut off: left out"));
             } else {
                 reader.row(*line, row);
@@ -97,6 +112,46 @@ impl Table {
             repairs,
         })
     }
+}
+
+/// The cells of a line; several blanks are one.
+fn cells(line: &str, separator: char) -> Vec<&str> {
+    match separator {
+        ' ' => line.split_whitespace().collect(),
+        _ => line.split(separator).collect(),
+    }
+}
+
+/// Whether a line holds words throughout: units, as oscilloscopes write them below the names.
+fn names_units(line: &str, separator: char) -> bool {
+    let words = cells(line, separator);
+    words.iter().all(|cell| {
+        let cell = clean(cell);
+        cell.chars().all(|c| c.is_alphabetic() || "%/[]()Ωµ".contains(c)) && !cell.eq_ignore_ascii_case("nan")
+    }) && words.iter().any(|cell| !clean(cell).is_empty())
+}
+
+/// Units below the names are SI; others belong to the names, where they are heeded.
+fn check_units(file: &Path, line: usize, text: &str, separator: char) -> Result<(), Faults> {
+    const SI: [&str; 13] = [
+        "", "s", "second", "seconds", "v", "volt", "volts", "a", "ampere", "amperes", "ohm", "w", "watt",
+    ];
+    let other = cells(text, separator)
+        .into_iter()
+        .map(|cell| clean(cell).trim_matches(|c| "[]()".contains(c)))
+        .find(|unit| !SI.contains(&unit.to_ascii_lowercase().as_str()));
+    let Some(unit) = other else { return Ok(()) };
+    let message = Message::new("a line of units that are not SI")
+        .found(unit.to_owned())
+        .expected("s, V, A, ohm, W")
+        .hint("put the unit behind the name, `v_o [mV]`, and remove this line");
+    let place = Place::Span {
+        line,
+        column: 1,
+        text: text.to_owned(),
+        length: 1,
+    };
+    Err(Fault::new(file, place, message).into())
 }
 
 fn clean(cell: &str) -> &str {
@@ -122,7 +177,7 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     fn row(&mut self, line: usize, text: &str) {
-        let cells: Vec<&str> = text.split(self.separator).collect();
+        let cells = cells(text, self.separator);
         let expected = self.table.len();
         if cells.len() != expected {
             let message = Message::new("a line with another number of cells than the header")

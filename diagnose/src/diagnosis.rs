@@ -9,7 +9,7 @@ use crate::attribute::{Attribution, attribute};
 use crate::control::Request;
 use crate::drive::Model;
 use crate::fit::State;
-use crate::gain::{self, Held, Pair};
+use crate::gain::{self, Held, Pair, Shift};
 use crate::noise::{self, Outlier};
 use crate::problem::Problem;
 use crate::profile::{Profile, profiles};
@@ -104,6 +104,8 @@ pub struct Gain {
     pub heldout: Vec<Held>,
     /// Mean square over that of the noise, all held-out records: before and after.
     pub mean_square: [f64; 2],
+    /// Held-out records that the extended model fits much worse than the training records.
+    pub shifts: Vec<Shift>,
     /// Closed loop with a policy, if one was given.
     pub closed_loop: Option<crate::control::ClosedLoop>,
 }
@@ -138,14 +140,18 @@ pub struct Diagnosis {
     pub findings: Findings,
     /// Training records.
     pub problem: Problem,
+    /// The training records at the model exactly as given.
+    pub given: State,
     /// What was fitted.
     pub attribution: Attribution,
     /// Profiles of the parameters.
     pub profiles: Vec<Profile>,
     /// Held-out records.
     pub held: Option<Pair>,
-    /// The extended model.
+    /// The extended model; the model as given where no cause explains the records.
     pub extended: Model,
+    /// Duty that its edges add, 1.
+    pub trim: f64,
     /// The loop closed with a policy, if one was given.
     pub control: Option<crate::control::Control>,
 }
@@ -163,14 +169,20 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     }
     say("intervals");
     let profiles = profiles(&problem, &attribution);
-    let structure = structures(&problem, attribution.state(), attribution.inflation);
+    let structure = structures(&problem, &attribution.null, attribution.state(), attribution.inflation);
     let named = named(&attribution, &profiles);
     let lattice = quantised(&problem);
     let verdict = verdict(&named, &lattice, &structure);
     let explained = verdict != Verdict::Unexplained;
     say("held-out records");
-    let extended = attribution.state().model.clone();
-    let trim = attribution.state().starts.trim;
+    // what does not explain the records is no better model
+    let state = if explained {
+        attribution.state()
+    } else {
+        &attribution.null
+    };
+    let trim = if explained { state.starts.trim_or_none() } else { 0.0 };
+    let extended = state.model.clone();
     let pair = (!heldout.is_empty()).then(|| gain::hold(heldout, &base, &extended, problem.sigma, trim));
     let next_experiments = match explained {
         true => crate::next::experiments(&problem, &attribution, say),
@@ -180,28 +192,34 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     if explained {
         causes.extend(lattice);
     }
+    let shifts = pair
+        .as_ref()
+        .map_or_else(Vec::new, |pair| pair.shifts(&problem, attribution.state()));
     let findings = Findings {
-        sentence: sentence(verdict, &causes, &structure),
+        sentence: sentence(verdict, &causes, &structure) + &shifted(&shifts),
         verdict,
         partial: if explained { Vec::new() } else { named },
         causes,
         structure,
         not_detectable: hidden(&problem, &attribution),
         next_experiments,
-        noise: noise_of(&problem, &attribution, &outliers, pair.as_ref()),
+        noise: noise_of(&problem, &attribution, &outliers, pair.as_ref(), trim),
         gain: Gain {
             heldout: pair.as_ref().map_or_else(Vec::new, Pair::errors),
             mean_square: pair.as_ref().map_or([f64::NAN; 2], |pair| pair.total().into()),
+            shifts,
             closed_loop: None,
         },
     };
     Diagnosis {
         findings,
+        given: as_given(&problem, &base),
         problem,
         attribution,
         profiles,
         held: pair,
         extended,
+        trim,
         control: None,
     }
 }
@@ -220,6 +238,13 @@ impl Diagnosis {
         self.control = Some(control);
         Ok(())
     }
+}
+
+/// The model without the trim of the edges that stands beside every fit.
+fn as_given(problem: &Problem, base: &Model) -> State {
+    let mut held = problem.clone();
+    held.trim_held = true;
+    State::settle(&held, base, &held.first_starts(), None)
 }
 
 /// Noise estimated, outliers masked, initial states fitted.
@@ -318,13 +343,21 @@ fn verdict(named: &[Named], lattice: &Option<Named>, structure: &[Structure]) ->
     }
 }
 
+/// Rivals of a cause that the sentence names.
+const MOST_SAID: usize = 3;
+
 fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure]) -> String {
     let list = |causes: &[Named]| {
         let words = causes.iter().map(|cause| {
             let values = cause.parameters.iter().map(|(name, v)| {
                 let unit = if v.unit == "1" { "" } else { v.unit };
+                let name = if *name == cause.id {
+                    String::new()
+                } else {
+                    format!("{name} ")
+                };
                 format!(
-                    "{name} {} (95 %: {} to {}; model {})",
+                    "{name}{} (95 %: {} to {}; model {})",
                     si(v.value, unit),
                     si(v.low, unit),
                     si(v.high, unit),
@@ -346,7 +379,12 @@ fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure]) -> Stri
         Verdict::Ambiguous => {
             let ties = causes.iter().filter(|cause| !cause.rivals.is_empty()).map(|cause| {
                 let rivals: Vec<String> = cause.rivals.iter().map(|ids| ids.join(" + ")).collect();
-                format!("{} cannot be told from {}", cause.id, rivals.join(", or "))
+                let more = match rivals.len().saturating_sub(MOST_SAID) {
+                    0 => String::new(),
+                    more => format!(", or {more} others"),
+                };
+                let said = rivals[..rivals.len().min(MOST_SAID)].join(", or ");
+                format!("{} cannot be told from {said}{more}", cause.id)
             });
             format!(
                 "Best explanation: {}. But {}.",
@@ -367,7 +405,41 @@ fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure]) -> Stri
     }
 }
 
-fn si(value: f64, unit: &str) -> String {
+/// Said behind the verdict: what no fit to the training records can know.
+pub(crate) fn shifted(shifts: &[Shift]) -> String {
+    let one = |shift: &Shift| {
+        let place = match shift.throughout {
+            true => format!(
+                "lies {} {} the extended model throughout (training records: {})",
+                si(shift.mean.abs(), shift.unit),
+                if shift.mean > 0.0 { "above" } else { "below" },
+                si(shift.training, shift.unit)
+            ),
+            false => format!(
+                "is {:.1} times as far from the extended model as the training records, and lies {} beside it on average \
+                 (these: {})",
+                shift.ratio,
+                si(shift.mean, shift.unit),
+                si(shift.training, shift.unit)
+            ),
+        };
+        format!(
+            " In {} the held-out record {} {place}: something shifted between them.",
+            shift.channel, shift.record
+        )
+    };
+    shifts.iter().map(one).collect()
+}
+
+/// A quantity with four digits.
+pub(crate) fn si(value: f64, unit: &str) -> String {
+    if value == 0.0 {
+        return if unit.is_empty() {
+            "0".to_owned()
+        } else {
+            format!("0 {unit}")
+        };
+    }
     report::quantity(value, unit, 4)
 }
 
@@ -400,7 +472,13 @@ fn hidden(problem: &Problem, attribution: &Attribution) -> Vec<Hidden> {
     list
 }
 
-fn noise_of(problem: &Problem, attribution: &Attribution, outliers: &[Outlier], pair: Option<&Pair>) -> Noise {
+fn noise_of(
+    problem: &Problem,
+    attribution: &Attribution,
+    outliers: &[Outlier],
+    pair: Option<&Pair>,
+    trim: f64,
+) -> Noise {
     let measured = (0..CHANNELS).filter(|n| problem.sigma[*n].is_finite());
     let outlier = |one: &Outlier| {
         let record = &problem.records[one.record].name;
@@ -419,6 +497,6 @@ fn noise_of(problem: &Problem, attribution: &Attribution, outliers: &[Outlier], 
         repairs: repairs
             .chain(pair.into_iter().flat_map(|pair| pair.remarks.clone()))
             .collect(),
-        trim: attribution.state().starts.trim,
+        trim,
     }
 }

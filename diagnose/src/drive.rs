@@ -81,6 +81,7 @@ pub fn simulate(model: &Model, record: &Record, starts: &[Start], trim: f64) -> 
         for sensor in sensors(&mut p) {
             (sensor.low_pass, sensor.delay) = (AVERAGED * model.plant.t_sw(), 0.0);
         }
+        p.source.ripple = 0.0;
         (phase, whole) = (0.0, 0.0);
     }
     p.pwm.sampling_phase = phase;

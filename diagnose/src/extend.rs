@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use plant::Parameters;
 
-use crate::diagnosis::{Diagnosis, Verdict};
+use crate::diagnosis::Diagnosis;
 use crate::drive::Model;
 
 /// Numbers that are written without a point.
@@ -36,18 +36,14 @@ pub fn as_plant(model: &Model, trim: f64) -> Parameters {
 /// The model with what was found; where nothing was named, the model as it is with the trim of the edges.
 #[must_use]
 pub fn extended_plant(diagnosis: &Diagnosis) -> Parameters {
-    let trim = diagnosis.attribution.state().starts.trim;
-    match diagnosis.findings.verdict {
-        Verdict::Consistent | Verdict::Unexplained => as_plant(&Model::new(&diagnosis.problem.base.plant), trim),
-        _ => as_plant(&diagnosis.extended, trim),
-    }
+    as_plant(&diagnosis.extended, diagnosis.trim)
 }
 
 /// Text of `plant.extended.toml`; changed numbers carry what they were and their 95 % interval.
 #[must_use]
 pub fn extended_toml(diagnosis: &Diagnosis) -> String {
     let findings = &diagnosis.findings;
-    let trim = diagnosis.attribution.state().starts.trim;
+    let trim = diagnosis.trim;
     let after = extended_plant(diagnosis);
     let before = &diagnosis.problem.base.plant;
     let mut notes: BTreeMap<&str, String> = BTreeMap::new();

@@ -4,9 +4,28 @@ use crate::causes::{Candidate, Search};
 use crate::drive::Model;
 use crate::problem::{Basis, Problem, Starts, axpy, dot, nudged};
 
-const MOST_STEPS: usize = 12;
-/// A step that gains less than this ends the fit.
+/// A step that gains less than this ends the settling of initial states.
 const SMALL_GAIN: f64 = 0.02;
+
+/// When a fit ends.
+#[derive(Debug, Clone, Copy)]
+pub struct Effort {
+    /// Most steps.
+    steps: usize,
+    /// A step that gains less than this is the last.
+    small_gain: f64,
+}
+
+/// To compare.
+pub const ROUGH: Effort = Effort {
+    steps: 8,
+    small_gain: 0.5,
+};
+/// To report.
+pub const FINE: Effort = Effort {
+    steps: 20,
+    small_gain: 0.02,
+};
 
 /// A place in the space of models with the initial states that fit best.
 #[derive(Debug, Clone)]
@@ -89,6 +108,8 @@ pub struct Fitter<'a> {
     pub basis: &'a Basis,
     /// The model without causes.
     pub null: &'a State,
+    /// When fits end.
+    pub effort: Effort,
 }
 
 /// A knob of a set: candidate and place in it.
@@ -118,38 +139,9 @@ impl Fitter<'_> {
         !matches!(self.candidates[place.0].cause.search, Search::Scan(_)) || place.1 > 0
     }
 
-    /// Fits one candidate on top of `from`, from each of its starts; the best.
-    #[must_use]
-    pub fn single(&self, cause: usize, from: &State) -> Fit {
-        let starts = self.starts(cause);
-        if let [only] = starts.as_slice() {
-            return self.from(&[cause], only, from);
-        }
-        let best = self.best_start(cause, &starts, from);
-        self.from(
-            &[cause],
-            best.map_or(&self.candidates[cause].own, |(_, values)| values),
-            from,
-        )
-    }
-
-    /// Chi-square of the best start of a candidate, not fitted further.
-    #[must_use]
-    pub fn look(&self, cause: usize, from: &State) -> f64 {
-        let starts = self.starts(cause);
-        self.best_start(cause, &starts, from)
-            .map_or(f64::INFINITY, |(chi2, _)| chi2)
-    }
-
-    fn best_start<'v>(&self, cause: usize, starts: &'v [Vec<f64>], from: &State) -> Option<(f64, &'v Vec<f64>)> {
-        let looks = starts
-            .iter()
-            .map(|values| (self.state_at(&[cause], values, from, 1).0.chi2, values));
-        looks.min_by(|a, b| a.0.total_cmp(&b.0))
-    }
-
     /// Where the fit of a candidate may begin.
-    fn starts(&self, cause: usize) -> Vec<Vec<f64>> {
+    #[must_use]
+    pub fn starts(&self, cause: usize) -> Vec<Vec<f64>> {
         let candidate = &self.candidates[cause];
         match candidate.cause.search {
             Search::Own => vec![candidate.own.clone()],
@@ -182,7 +174,7 @@ impl Fitter<'_> {
     }
 
     /// The model with these values, initial states fitted in `rounds`.
-    fn state_at(&self, causes: &[usize], values: &[f64], from: &State, rounds: usize) -> (State, Vec<f64>) {
+    pub(crate) fn state_at(&self, causes: &[usize], values: &[f64], from: &State, rounds: usize) -> (State, Vec<f64>) {
         let mut model = from.model.clone();
         let mut values = values.to_vec();
         for (place, value) in self.places(causes).iter().zip(&mut values) {
@@ -210,20 +202,18 @@ impl Fitter<'_> {
             .collect();
         let mut covariance = vec![vec![0.0; places.len()]; places.len()];
         let mut damping = 1e-3;
-        for _ in 0..MOST_STEPS {
+        for _ in 0..self.effort.steps {
             if smooth.is_empty() {
                 break;
             }
-            let jacobian = self.jacobian(&places, &smooth, &state);
-            let normal = Normal::new(&jacobian.projected, &state.residual);
-            normal.covariance(&smooth, &jacobian.scale, &mut covariance);
-            let Some((next, moved)) = self.improve(&places, &smooth, &values, &state, &jacobian, &normal, &mut damping)
-            else {
+            let round = self.round(&places, &smooth, &state);
+            round.normal.covariance(&smooth, &round.jacobian.scale, &mut covariance);
+            let Some((next, moved)) = self.improve(&round, &values, &state, &mut damping) else {
                 break;
             };
             let gain = state.chi2 - next.chi2;
             (state, values) = (next, moved);
-            if gain < SMALL_GAIN.max(1e-6 * state.chi2) {
+            if gain < self.effort.small_gain.max(1e-6 * state.chi2) {
                 break;
             }
         }
@@ -232,6 +222,17 @@ impl Fitter<'_> {
             values,
             state,
             covariance,
+        }
+    }
+
+    /// Sensitivities and normal equations at a state.
+    fn round<'r>(&self, places: &'r [Place], smooth: &'r [usize], state: &State) -> Round<'r> {
+        let jacobian = self.jacobian(places, smooth, state);
+        Round {
+            places,
+            smooth,
+            normal: Normal::new(&jacobian.projected, &state.residual),
+            jacobian,
         }
     }
 
@@ -260,27 +261,25 @@ impl Fitter<'_> {
         jacobian
     }
 
-    #[allow(clippy::too_many_arguments)]
+    /// The next state and values, if a step leads to less chi-square; `damping` follows.
     fn improve(
         &self,
-        places: &[Place],
-        smooth: &[usize],
+        round: &Round<'_>,
         values: &[f64],
         state: &State,
-        jacobian: &Jacobian,
-        normal: &Normal,
         damping: &mut f64,
     ) -> Option<(State, Vec<f64>)> {
         for _ in 0..5 {
-            let step = normal.step(*damping);
+            let step = round.normal.step(*damping);
             let mut moved = values.to_vec();
             let mut model = state.model.clone();
             let mut left = state.residual.clone();
-            for (k, n) in smooth.iter().enumerate() {
-                let [low, high, unit] = self.range(places[*n]);
+            for (k, n) in round.smooth.iter().enumerate() {
+                let place = round.places[*n];
+                let [low, high, unit] = self.range(place);
                 moved[*n] = (values[*n] + step[k] * unit).clamp(low, high);
-                axpy(&mut left, -(moved[*n] - values[*n]) / unit, &jacobian.raw[k]);
-                self.set(&mut model, places[*n], moved[*n]);
+                axpy(&mut left, -(moved[*n] - values[*n]) / unit, &round.jacobian.raw[k]);
+                self.set(&mut model, place, moved[*n]);
             }
             let mut starts = state.starts.clone();
             self.basis.absorb(&left, &mut starts);
@@ -301,6 +300,15 @@ impl Fitter<'_> {
         let smooth: Vec<usize> = (0..places.len()).filter(|n| self.is_smooth(places[*n])).collect();
         self.jacobian(&places, &smooth, state).projected
     }
+}
+
+/// What a step of the fit is made of.
+struct Round<'a> {
+    places: &'a [Place],
+    /// Which of them move.
+    smooth: &'a [usize],
+    jacobian: Jacobian,
+    normal: Normal,
 }
 
 #[derive(Default)]

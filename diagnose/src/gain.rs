@@ -30,6 +30,33 @@ pub struct Held {
     pub rows: usize,
 }
 
+/// A held-out record that the extended model fits much worse than the training records: something else was different there.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Shift {
+    /// Record.
+    pub record: String,
+    /// Channel.
+    pub channel: &'static str,
+    /// Mean of measured minus simulated.
+    pub mean: f64,
+    /// The same over the training records.
+    pub training: f64,
+    /// Root mean square error over that of the training records, 1.
+    pub ratio: f64,
+    /// Whether the record lies beside the model throughout; if not, its error is only larger.
+    pub throughout: bool,
+    /// Unit.
+    pub unit: &'static str,
+}
+
+/// A shift makes at least this share of the squared error ...
+const SHIFT_SHARE: f64 = 0.3;
+/// ... and lies so many standard errors from 0, of the means of so many stretches.
+const SHIFT_ERRORS: f64 = 4.0;
+const STRETCHES: usize = 8;
+/// Mean square error over that of the training records from which on a record is another bench's.
+const MUCH_WORSE: f64 = 2.5;
+
 /// A held-out record with both simulations, for pictures.
 #[derive(Debug, Clone)]
 pub struct Pair {
@@ -151,6 +178,54 @@ impl Pair {
             unit: CHANNEL_UNITS[n],
             rows: rows.len(),
         })
+    }
+
+    /// Records that the extended model does not fit as it fits the training records; `training` are the training records at that model.
+    #[must_use]
+    pub fn shifts(&self, training: &Problem, at: &State) -> Vec<Shift> {
+        let mut list = Vec::new();
+        let v_in = self.problem.base.plant.converter.v_in;
+        for (index, record) in self.problem.records.iter().enumerate() {
+            // where power alone is drawn, small errors grow: they say nothing about the bench
+            let unstable = record.load.iter().zip(&record.duty).any(|(load, d)| {
+                let v = d * v_in;
+                load.power > load.conductance * v * v
+            });
+            if record.settled || unstable {
+                continue;
+            }
+            for n in 0..CHANNELS {
+                let used = |values: Vec<f64>| values.into_iter().filter(|v| *v != 0.0).collect::<Vec<f64>>();
+                let values = used(noise::channel(&self.problem, &self.after.residual, index, n));
+                if values.len() < 5 * STRETCHES {
+                    continue;
+                }
+                let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
+                let (whole, square) = (mean(&values), dot(&values, &values) / values.len() as f64);
+                let parts: Vec<f64> = values.chunks(values.len().div_ceil(STRETCHES)).map(mean).collect();
+                let scatter = parts.iter().map(|part| (part - whole) * (part - whole)).sum::<f64>();
+                let error = (scatter / (parts.len() * (parts.len() - 1)).max(1) as f64).sqrt();
+                let all = (0..training.records.len()).flat_map(|r| used(noise::channel(training, &at.residual, r, n)));
+                let all: Vec<f64> = all.collect();
+                let own = mean(&all);
+                let usual = (dot(&all, &all) / all.len().max(1) as f64).max(1.0);
+                let apart = (whole - own).abs() > SHIFT_ERRORS * error && whole.abs() > 3.0 * own.abs();
+                // below the noise a shift is no matter
+                let throughout = apart && whole * whole > SHIFT_SHARE * square && whole.abs() > 1.0;
+                if throughout || square > MUCH_WORSE * usual {
+                    list.push(Shift {
+                        record: record.name.clone(),
+                        channel: CHANNEL_NAMES[n],
+                        mean: whole * self.problem.sigma[n],
+                        training: own * self.problem.sigma[n],
+                        ratio: (square / usual).sqrt(),
+                        throughout,
+                        unit: CHANNEL_UNITS[n],
+                    });
+                }
+            }
+        }
+        list
     }
 
     /// Chi-square over the number of values, before and after.

@@ -69,107 +69,135 @@ fn separation(problem: &Problem, record: &Record, one: &Model, other: &Model) ->
     State::settle(&made, other, &starts, None).chi2.sqrt()
 }
 
+/// How something that is set runs over an experiment.
+#[derive(Clone, Copy)]
+enum Course {
+    Still(f64),
+    /// The first half and the second.
+    Halves(f64, f64),
+    /// Four levels.
+    Stair(f64, f64),
+    /// 0.03 up and down, pseudo-random.
+    Trembling(f64),
+}
+
+impl Course {
+    fn at(self, n: usize) -> f64 {
+        match self {
+            Course::Still(level) => level,
+            Course::Halves(first, second) => [first, second][usize::from(n >= ROWS / 2)],
+            Course::Stair(low, high) => low + (high - low) * (n / (ROWS / 4)) as f64 / 3.0,
+            Course::Trembling(centre) => centre + if prbs(n) { 0.03 } else { -0.03 },
+        }
+    }
+}
+
+/// A maximum-length sequence of 7 bits, two periods a bit.
+fn prbs(n: usize) -> bool {
+    let mut state = 0x5bu32;
+    for _ in 0..n / 2 {
+        state = (state >> 1) ^ if state & 1 == 1 { 0x60 } else { 0 };
+    }
+    state & 1 == 1
+}
+
+/// An experiment that the bench can run.
+struct Plan {
+    words: String,
+    duty: Course,
+    /// Conductance over the typical one, current, power.
+    load: (f64, Course, Course),
+    /// Source voltage over that of the model.
+    v_in_ratio: f64,
+}
+
 fn plans(problem: &Problem) -> Vec<(String, Record)> {
+    use Course::{Halves, Stair, Still, Trembling};
     let (v, i, v_in) = (problem.bases.v, problem.bases.i, problem.bases.v_in);
     let d = (v / v_in).clamp(0.1, 0.9);
-    let resistor = Load {
-        conductance: i / v,
-        ..Load::default()
-    };
-    let current = |amperes: f64| Load {
-        current: amperes,
-        conductance: 0.2 * i / v,
-        ..Load::default()
-    };
-    let prbs = |n: usize| {
-        // a maximum-length sequence of 7 bits, two periods a bit
-        let mut state = 0x5bu32;
-        for _ in 0..n / 2 {
-            state = (state >> 1) ^ if state & 1 == 1 { 0x60 } else { 0 };
-        }
-        if state & 1 == 1 { d + 0.03 } else { d - 0.03 }
-    };
-    let stair = |n: usize, low: f64, high: f64| low + (high - low) * (n / (ROWS / 4)) as f64 / 3.0;
-    let mut list: Vec<(String, Record)> = Vec::new();
-    let mut add = |words: String, duty: &dyn Fn(usize) -> f64, load: &dyn Fn(usize) -> Load, ratio: f64| {
-        let phase = problem.base.plant.pwm.sampling_phase;
-        list.push((
-            words,
-            Record {
-                name: "planned".to_owned(),
-                time: (0..ROWS).map(|n| (n as f64 + phase) * problem.bases.t_sw).collect(),
-                phase,
-                duty: (0..ROWS).map(|n| duty(n).clamp(0.0, 1.0)).collect(),
-                load: (0..ROWS).map(load).collect(),
-                measured: std::array::from_fn(|_| vec![f64::NAN; ROWS]),
-                lattice: [0.0; CHANNELS],
-                v_in_ratio: ratio,
-                duty_is: crate::columns::DutyIs::Commanded,
-                settled: false,
-                segments: std::iter::once(0..ROWS).collect(),
-                repairs: Vec::new(),
-            },
-        ));
-    };
-    add(
-        format!("duty steps {:.2} to {:.2} at {:.1} ohm", 0.6 * d, 1.4 * d, v / i),
-        &|n| stair(n, 0.6 * d, 1.4 * d),
-        &|_| resistor,
-        1.0,
-    );
-    add(
-        format!("duty PRBS of 0.03 around {d:.2} at {:.1} ohm", v / i),
-        &prbs,
-        &|_| resistor,
-        1.0,
-    );
-    add(
-        format!("load current steps {:.1} to {:.1} A at duty {d:.2}", 0.3 * i, 2.0 * i),
-        &|_| d,
-        &|n| current(stair(n, 0.3 * i, 2.0 * i)),
-        1.0,
-    );
-    add(
-        format!("duty {:.2} and {:.2} at the same current of {i:.1} A", 0.6 * d, 1.4 * d),
-        &|n| if n < ROWS / 2 { 0.6 * d } else { 1.4 * d },
-        &|_| current(i),
-        1.0,
-    );
-    add(
-        format!("duty PRBS at half the source voltage, {:.0} V", 0.5 * v_in),
-        &prbs,
-        &|_| resistor,
-        0.5,
-    );
-    add(
-        format!("light load: {:.0} ohm at duty {d:.2}, with duty steps", 10.0 * v / i),
-        &|n| stair(n, 0.8 * d, 1.2 * d),
-        &|_| Load {
-            conductance: 0.1 * i / v,
-            ..Load::default()
-        },
-        1.0,
-    );
-    add(
-        "zero reading: duty 0 without load current".to_owned(),
-        &|_| 0.0,
-        &|_| resistor,
-        1.0,
-    );
-    add(
-        format!(
-            "constant power steps {:.0} to {:.0} W beside {:.0} ohm",
-            0.3 * v * i,
-            1.2 * v * i,
-            2.0 * v / i
+    let (low, high, ohms) = (0.6 * d, 1.4 * d, v / i);
+    let (few, many) = (0.3 * v * i, 1.2 * v * i);
+    let none = Still(0.0);
+    let rows = [
+        (
+            format!("duty steps {low:.2} to {high:.2} at {ohms:.1} ohm"),
+            Stair(low, high),
+            (1.0, none, none),
         ),
-        &|_| d,
-        &|n| Load {
-            conductance: 0.5 * i / v,
-            power: stair(n, 0.3 * v * i, 1.2 * v * i),
-            current: 0.0,
-        },
-        1.0,
-    );
-    list
+        (
+            format!("duty PRBS of 0.03 around {d:.2} at {ohms:.1} ohm"),
+            Trembling(d),
+            (1.0, none, none),
+        ),
+        (
+            format!("load current steps {:.1} to {:.1} A at duty {d:.2}", 0.3 * i, 2.0 * i),
+            Still(d),
+            (0.2, Stair(0.3 * i, 2.0 * i), none),
+        ),
+        (
+            format!("duty {low:.2} and {high:.2} at the same current of {i:.1} A"),
+            Halves(low, high),
+            (0.2, Still(i), none),
+        ),
+        (
+            format!("light load: {:.0} ohm at duty {d:.2}, with duty steps", 10.0 * ohms),
+            Stair(0.8 * d, 1.2 * d),
+            (0.1, none, none),
+        ),
+        (
+            "zero reading: duty 0 without load current".to_owned(),
+            none,
+            (1.0, none, none),
+        ),
+        (
+            format!(
+                "constant power steps {few:.0} to {many:.0} W beside {:.0} ohm",
+                2.0 * ohms
+            ),
+            Still(d),
+            (0.5, none, Stair(few, many)),
+        ),
+    ];
+    let mut list: Vec<Plan> = Vec::new();
+    list.extend(rows.map(|(words, duty, load)| Plan {
+        words,
+        duty,
+        load,
+        v_in_ratio: 1.0,
+    }));
+    list.push(Plan {
+        words: format!("duty PRBS at half the source voltage, {:.0} V", 0.5 * v_in),
+        duty: Trembling(d),
+        load: (1.0, none, none),
+        v_in_ratio: 0.5,
+    });
+    list.into_iter().map(|plan| planned(problem, plan)).collect()
+}
+
+/// The record that a plan would give, without measured values.
+fn planned(problem: &Problem, plan: Plan) -> (String, Record) {
+    let phase = problem.base.plant.pwm.sampling_phase;
+    let (conductance, current, power) = plan.load;
+    let load = |n: usize| Load {
+        conductance: conductance * problem.bases.i / problem.bases.v,
+        current: current.at(n),
+        power: power.at(n),
+    };
+    let record = Record {
+        name: "planned".to_owned(),
+        time: (0..ROWS).map(|n| (n as f64 + phase) * problem.bases.t_sw).collect(),
+        phase,
+        duty: (0..ROWS).map(|n| plan.duty.at(n).clamp(0.0, 1.0)).collect(),
+        load: (0..ROWS).map(load).collect(),
+        measured: std::array::from_fn(|_| vec![f64::NAN; ROWS]),
+        lattice: [0.0; CHANNELS],
+        resolution: [0.0; CHANNELS],
+        v_in_ratio: plan.v_in_ratio,
+        duty_is: crate::columns::DutyIs::Commanded,
+        settled: false,
+        dense: true,
+        segments: std::iter::once(0..ROWS).collect(),
+        repairs: Vec::new(),
+    };
+    (plan.words, record)
 }

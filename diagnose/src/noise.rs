@@ -32,7 +32,8 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
         let estimates = (0..problem.records.len()).map(of).filter(|list| list.len() >= 5);
         // median of |x| over sigma, and three independent terms with weights 1, -2, 1
         let typical = median(estimates.map(|list| median(list) / 0.674_49 / 6f64.sqrt()));
-        let lattice = problem.records.iter().map(|r| r.lattice[n]).fold(0.0, f64::max);
+        let steps = problem.records.iter().map(|r| r.lattice[n].max(r.resolution[n]));
+        let lattice = steps.fold(0.0, f64::max);
         let scale = [problem.bases.v, problem.bases.i, problem.bases.i, problem.bases.v_in][n];
         let least = (lattice / 12f64.sqrt()).max(1e-5 * scale);
         let has = problem

@@ -1,14 +1,17 @@
 //! The report: one page.
 
 mod control;
+mod records;
 
-use report::{Axis, BarChart, BarPanel, Chart, Page, Panel, ReportError, Section, Series, Svg, Table, quantity};
+use report::{Axis, BarChart, BarPanel, Chart, Colour, Page, Panel, ReportError, Section, Series, Table, quantity};
 
-use crate::diagnosis::{Diagnosis, Named, Verdict};
-use crate::fit::State;
-use crate::noise::channel;
-use crate::problem::Problem;
+use crate::diagnosis::{Diagnosis, Named, Verdict, si};
 use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS};
+
+/// Colours of the same things in all pictures.
+const MEASURED: Colour = Colour::GREY;
+const MODEL: Colour = Colour::VERMILION;
+const EXTENDED: Colour = Colour::BLUE;
 
 /// The page as HTML.
 ///
@@ -29,20 +32,21 @@ pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
     };
     let mut page = Page::new(format!("Diagnosis: {word}")).verdict(mark, findings.sentence.clone());
     page = page.section(causes(diagnosis));
-    page = page.section(training(diagnosis)?);
-    if !diagnosis.profiles.is_empty() {
-        page = page.section(profiles(diagnosis)?);
-    }
-    page = page.section(ties(diagnosis));
     if let Some(section) = held_out(diagnosis)? {
         page = page.section(section);
     }
     if let Some(control) = &diagnosis.control {
         page = page.section(control::section(control)?);
     }
+    page = page.section(records::training(diagnosis)?);
+    if !diagnosis.profiles.is_empty() && findings.verdict != Verdict::Unexplained {
+        page = page.section(profiles(diagnosis)?);
+    }
+    page = page.section(ties(diagnosis));
     page.section(noise(diagnosis)).section(detectable(diagnosis)).html()
 }
 
+/// The unit of a number, nothing for a pure one.
 fn unit(text: &str) -> &str {
     if text == "1" { "" } else { text }
 }
@@ -69,14 +73,9 @@ fn causes(diagnosis: &Diagnosis) -> Section {
                 table = table.row([
                     format!("{} ({})", cause.id, cause.words).into(),
                     (*name).into(),
-                    quantity(v.model, unit(v.unit), 4).into(),
-                    quantity(v.value, unit(v.unit), 4).into(),
-                    format!(
-                        "{} to {}",
-                        quantity(v.low, unit(v.unit), 4),
-                        quantity(v.high, unit(v.unit), 4)
-                    )
-                    .into(),
+                    si(v.model, unit(v.unit)).into(),
+                    si(v.value, unit(v.unit)).into(),
+                    format!("{} to {}", si(v.low, unit(v.unit)), si(v.high, unit(v.unit))).into(),
                     evidence,
                     rivals.join(", ").into(),
                 ]);
@@ -103,103 +102,11 @@ fn causes(diagnosis: &Diagnosis) -> Section {
     section
 }
 
-/// Simulated values from measured ones and a residual.
-fn simulated(problem: &Problem, state: &State, record: usize, n: usize) -> Vec<f64> {
-    let values = channel(problem, &state.residual, record, n);
-    let measured = &problem.records[record].measured[n];
-    let one = |(left, shown): (&f64, &f64)| {
-        if *left == 0.0 {
-            f64::NAN
-        } else {
-            shown - left * problem.sigma[n]
-        }
-    };
-    values.iter().zip(measured).map(one).collect()
-}
-
-fn panels(problem: &Problem, before: &State, after: &State, record: usize, same: bool) -> Result<Svg, ReportError> {
-    let one = &problem.records[record];
-    let axis = if one.settled {
-        Axis::new("point")
-    } else {
-        Axis::new("time").unit("s")
-    };
-    let mut chart = Chart::new(one.name.clone(), axis);
-    for n in 0..2 {
-        if !one.measured[n].iter().any(|v| v.is_finite()) {
-            continue;
-        }
-        let mut panel = Panel::new(Axis::new(CHANNEL_NAMES[n]).unit(CHANNEL_UNITS[n])).height(150.0);
-        panel = panel
-            .series(Series::points("measured", one.time.clone(), one.measured[n].clone()))
-            .series(Series::line(
-                "model",
-                one.time.clone(),
-                simulated(problem, before, record, n),
-            ));
-        let mut left =
-            Panel::new(Axis::new(format!("error of {}", CHANNEL_NAMES[n])).unit(CHANNEL_UNITS[n])).height(110.0);
-        let errors = |state: &State| -> Vec<f64> {
-            channel(problem, &state.residual, record, n)
-                .iter()
-                .map(|v| if *v == 0.0 { f64::NAN } else { v * problem.sigma[n] })
-                .collect()
-        };
-        left = left.series(Series::line("model", one.time.clone(), errors(before)));
-        if !same {
-            panel = panel.series(Series::line(
-                "extended",
-                one.time.clone(),
-                simulated(problem, after, record, n),
-            ));
-            left = left.series(Series::line("extended", one.time.clone(), errors(after)));
-        }
-        chart = chart.panel(panel).panel(left);
-    }
-    chart.svg()
-}
-
-fn training(diagnosis: &Diagnosis) -> Result<Section, ReportError> {
-    let mut section = Section::new("Measured, simulated, extended");
-    let (problem, before, after) = (
-        &diagnosis.problem,
-        &diagnosis.attribution.null,
-        diagnosis.attribution.state(),
-    );
-    let same = diagnosis.attribution.best.is_none();
-    for record in 0..problem.records.len() {
-        let svg = panels(problem, before, after, record, same)?;
-        section = section.chart(
-            svg,
-            "Training record; initial states estimated for both models. Errors are measured minus simulated.",
-        );
-    }
-    let mut chart = Chart::new("Error of v_o by operating point", Axis::new("duty"));
-    for (name, state) in [("model", before), ("extended", after)] {
-        let (mut x, mut y) = (Vec::new(), Vec::new());
-        for (index, record) in problem.records.iter().enumerate() {
-            let values = channel(problem, &state.residual, index, 0);
-            for (duty, value) in record.duty.iter().zip(values).filter(|(_, v)| *v != 0.0) {
-                x.push(*duty);
-                y.push(value * problem.sigma[0]);
-            }
-        }
-        if !(x.is_empty() || same && name == "extended") {
-            chart = chart.panel(
-                Panel::new(Axis::new(name).unit("V"))
-                    .height(120.0)
-                    .series(Series::points(name, x, y)),
-            );
-        }
-    }
-    match problem.sigma[0].is_finite() {
-        true => Ok(section.chart(chart.svg()?, "")),
-        false => Ok(section),
-    }
-}
-
 fn profiles(diagnosis: &Diagnosis) -> Result<Section, ReportError> {
-    let mut section = Section::new("How well the data hold the parameters");
+    let mut section = Section::new("How well the data hold the parameters").text(
+        "Cost of holding a parameter at a value while all others and the initial states follow; below the line are the values \
+         that the data allow at 95 %.",
+    );
     for profile in diagnosis.profiles.iter().filter(|profile| profile.curve.len() > 1) {
         let (x, y): (Vec<f64>, Vec<f64>) = profile.curve.iter().copied().unzip();
         let cause = diagnosis
@@ -208,7 +115,7 @@ fn profiles(diagnosis: &Diagnosis) -> Result<Section, ReportError> {
             .as_ref()
             .map_or(0, |fit| fit.causes[profile.member]);
         let id = diagnosis.attribution.id(cause);
-        let panel = Panel::new(Axis::new("cost in chi-square")).height(120.0);
+        let panel = Panel::new(Axis::new("cost in chi-square")).height(90.0);
         let panel = panel
             .series(Series::line("profile", x.clone(), y.clone()))
             .series(Series::points("fitted", x, y));
@@ -217,7 +124,7 @@ fn profiles(diagnosis: &Diagnosis) -> Result<Section, ReportError> {
             Axis::new(profile.name).unit(unit(profile.unit)),
         );
         let svg = chart.panel(panel.y_line(3.84, "95 %")).svg()?;
-        section = section.chart(svg, "All other parameters and initial states follow.");
+        section = section.chart(svg, "");
     }
     Ok(section)
 }
@@ -228,9 +135,16 @@ fn ties(diagnosis: &Diagnosis) -> Section {
     if findings.next_experiments.is_empty() {
         return section.text("No tie to be broken.");
     }
-    let mut table = Table::new("Separation: standard deviations between the two explanations, initial states free.");
+    let heading = "Separation: standard deviations between the two explanations, initial states free. The best experiment of \
+                   each tie; all are in diagnosis.json.";
+    let mut table = Table::new(heading);
     table = table.text("to separate").text("do").number("separation", 1);
+    let mut shown = Vec::new();
     for next in &findings.next_experiments {
+        if shown.contains(&&next.separates) {
+            continue;
+        }
+        shown.push(&next.separates);
         table = table.row([
             next.separates.join(" from ").into(),
             next.experiment.clone().into(),
@@ -258,11 +172,17 @@ fn held_out(diagnosis: &Diagnosis) -> Result<Option<Section>, ReportError> {
         .collect();
     let ratio = |f: fn(&crate::gain::Held) -> f64| whole.iter().map(|held| f(held) / held.floor).collect::<Vec<_>>();
     let panel = BarPanel::new(Axis::new("error over noise"))
-        .bars("model", ratio(|held| held.rmse_before))
-        .bars("extended", ratio(|held| held.rmse_after));
+        .bars_in(MODEL, "model", ratio(|held| held.rmse_before))
+        .bars_in(EXTENDED, "extended", ratio(|held| held.rmse_after));
     let svg = BarChart::new("Held-out error", names).panel(panel).svg()?;
     let mut section = Section::new("Gain on held-out records").chart(svg, "1 is the noise: no model gets below it.");
-    let mut table = Table::new("").text("record").text("channel").text("regime");
+    for shift in &diagnosis.findings.gain.shifts {
+        section = section.text(crate::diagnosis::shifted(std::slice::from_ref(shift)).trim().to_owned());
+    }
+    let mut table = Table::new("Root mean square errors")
+        .text("record")
+        .text("channel")
+        .text("regime");
     table = table
         .number("before", 4)
         .number("after", 4)
@@ -286,11 +206,14 @@ fn held_out(diagnosis: &Diagnosis) -> Result<Option<Section>, ReportError> {
                 .into(),
         ]);
     }
-    section = section.table(table);
-    let same = diagnosis.attribution.best.is_none();
-    let mut inner = Section::new("Held-out records");
+    section = section.details(Section::new("By record and regime").table(table));
+    let second = records::second(diagnosis);
+    let mut inner = Section::new("Pictures of the held-out records");
     for record in 0..pair.problem.records.len() {
-        inner = inner.chart(panels(&pair.problem, &pair.before, &pair.after, record, same)?, "");
+        inner = inner.chart(
+            records::panels(&pair.problem, &pair.before, &pair.after, record, second)?,
+            "",
+        );
     }
     Ok(Some(section.details(inner)))
 }

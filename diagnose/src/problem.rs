@@ -34,6 +34,8 @@ pub struct Problem {
 /// Standard deviation of what a model of ideal edges may be off in the duty, 1: rise and fall times of the gate. It is
 /// estimated beside every fit, so that nothing that small is called a cause.
 pub const DUTY_ACCURACY: f64 = 5e-4;
+/// Largest trim that is put into a model.
+const MOST_TRIM: f64 = 3.0 * DUTY_ACCURACY;
 
 /// What is estimated beside every fit.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -42,6 +44,14 @@ pub struct Starts {
     pub states: Vec<Vec<Start>>,
     /// Duty added by the edges of the gate, 1.
     pub trim: f64,
+}
+
+impl Starts {
+    /// The trim; 0 where it is so large that it must stand for something else.
+    #[must_use]
+    pub fn trim_or_none(&self) -> f64 {
+        if self.trim.abs() <= MOST_TRIM { self.trim } else { 0.0 }
+    }
 }
 
 /// An orthonormal basis of what initial states can explain, for each segment: two vectors and the triangle that leads

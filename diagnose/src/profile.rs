@@ -1,11 +1,18 @@
 //! Profile likelihood: how well the data hold each parameter when all others may follow.
 
-use crate::attribute::Attribution;
+use crate::attribute::{ACCURACY, Attribution};
 use crate::parallel;
 use crate::problem::Problem;
 
 /// 95 % of a chi-square of one degree of freedom.
 const LEVEL: f64 = 3.841;
+/// The same in standard deviations.
+const TWO_SIDED: f64 = 1.96;
+/// How often the reach of a flat curve is doubled.
+const FURTHER: usize = 3;
+/// How far beside the best the counts of a duty counter are tried.
+const LEAST_COUNTS: f64 = 5e-3;
+const MOST_COUNTS: f64 = 10.0;
 /// Places of the profile, in standard deviations.
 const PLACES: [f64; 4] = [-2.0, -1.0, 1.0, 2.0];
 
@@ -28,7 +35,15 @@ pub struct Profile {
     pub curve: Vec<(f64, f64)>,
 }
 
-/// Profiles of all parameters of the best explanation.
+impl Profile {
+    /// Cost of a value that was tried.
+    fn cost(&self, value: f64) -> f64 {
+        let tried = self.curve.iter().find(|(x, _)| *x == value);
+        tried.map_or(0.0, |(_, cost)| *cost)
+    }
+}
+
+/// Profiles of all parameters of the best explanation. The intervals allow for the accuracy of the plant too.
 #[must_use]
 pub fn profiles(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
     let Some(best) = &attribution.best else {
@@ -52,37 +67,61 @@ pub fn profiles(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
             curve: vec![(value, 0.0)],
         };
         let sigma = (best.covariance[*number][*number] * attribution.inflation).sqrt();
+        let [low, high, _] = fitter.range(place);
+        let at_value = |x: f64| {
+            let mut values = best.values.clone();
+            values[*number] = x;
+            let fit = fitter.holding(&best.causes, &values, &best.state, Some(*number));
+            ((fit.state.chi2 - best.state.chi2) / attribution.inflation).max(0.0)
+        };
+        if knob.name == "duty_lsb" {
+            profile.interval = [-1.0, 1.0].map(|side| alike(value, side, &at_value));
+        }
         if !fitter.is_smooth(place) || sigma.is_nan() || sigma <= 0.0 {
             return profile;
         }
-        let [low, high, _] = fitter.range(place);
-        let others = places.len() > 1;
         for at in PLACES {
-            let mut values = best.values.clone();
-            values[*number] = (value + at * sigma).clamp(low, high);
-            let fit = match others {
-                true => fitter.holding(&best.causes, &values, &best.state, Some(*number)),
-                false => fitter.holding(&best.causes, &values, &best.state, Some(0)),
-            };
-            let cost = ((fit.state.chi2 - best.state.chi2) / attribution.inflation).max(0.0);
-            profile.curve.push((values[*number], cost));
+            let x = (value + at * sigma).clamp(low, high);
+            profile.curve.push((x, at_value(x)));
         }
-        profile.curve.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (side, at) in [(0, -2.0), (1, 2.0)] {
-            let far = (value + at * sigma).clamp(low, high);
-            let cost = profile
-                .curve
-                .iter()
-                .find(|(x, _)| *x == far)
-                .map_or(0.0, |(_, cost)| *cost);
-            // a parabola through the far point; a flat profile is open up to the bound
-            let reach = if cost > 0.3 {
-                (far - value) * (LEVEL / cost).sqrt()
-            } else {
-                at.signum() * (high - low)
+            let mut far = (value + at * sigma).clamp(low, high);
+            let mut cost = profile.cost(far);
+            // the curve may be flatter than at its lowest point
+            for _ in 0..FURTHER {
+                if cost >= 1.0 || far <= low || far >= high {
+                    break;
+                }
+                far = (value + 2.0 * (far - value)).clamp(low, high);
+                cost = at_value(far);
+                profile.curve.push((far, cost));
+            }
+            let statistical = match cost > 0.3 {
+                true => (far - value) * (LEVEL / cost).sqrt(),
+                false => at.signum() * (high - low),
             };
+            let systematic = TWO_SIDED * ACCURACY * (value - profile.own);
+            let reach = at.signum() * statistical.hypot(systematic);
             profile.interval[side] = (value + reach).clamp(low, high);
         }
+        profile.curve.sort_by(|a, b| a.0.total_cmp(&b.0));
         profile
     })
+}
+
+/// How far a step of a duty counter may be off on one side: within a piece of equal counts the cost grows smoothly, at its end
+/// it jumps.
+fn alike(step: f64, side: f64, cost: &dyn Fn(f64) -> f64) -> f64 {
+    let moved = |counts: f64| (step.recip() - side * counts).recip();
+    let (mut reached, mut counts) = (0.0, LEAST_COUNTS);
+    while counts < MOST_COUNTS && moved(counts) > 0.0 {
+        let cost = cost(moved(counts));
+        if cost > LEVEL {
+            let within = counts * (LEVEL / cost).sqrt();
+            return moved(within.max(reached));
+        }
+        reached = counts;
+        counts *= 2.0;
+    }
+    moved(reached)
 }

@@ -1,12 +1,16 @@
 //! A measured record as the plant can be driven by it: one row a control period, or settled points.
 
+mod digits;
+mod suspicion;
+
 use std::path::Path;
 
 use plant::{Load, Parameters};
 use toml_input::{Fault, Faults, Message, Place};
 
 use crate::columns::{Columns, DutyIs, NAMES};
-use crate::csv::Table;
+use crate::csv::{Column, Table};
+use digits::{last_digit, lattice};
 
 /// Channels: `v_o`, `i_l`, `i_o`, `v_in`.
 pub const CHANNELS: usize = 4;
@@ -44,12 +48,16 @@ pub struct Record {
     pub measured: [Vec<f64>; CHANNELS],
     /// Step on whose multiples all values of a channel lie, if that is coarser than the digits written; else 0.
     pub lattice: [f64; CHANNELS],
+    /// The last digit written of each channel: nothing finer is known.
+    pub resolution: [f64; CHANNELS],
     /// Source voltage set for this record over that of the model, 1.
     pub v_in_ratio: f64,
     /// What the duty is.
     pub duty_is: DutyIs,
     /// Rows are settled operating points.
     pub settled: bool,
+    /// There is a row in each period, gaps apart.
+    pub dense: bool,
     /// Stretches to simulate.
     pub segments: Vec<Segment>,
     /// What was repaired or left out, in plain words.
@@ -72,6 +80,7 @@ impl Record {
     pub fn new(table: Table, columns: &Columns, parameters: &Parameters) -> Result<Self, Faults> {
         let mut raw = Raw::new(table, columns)?;
         raw.check_duty()?;
+        raw.report_missing_duty();
         let name = raw
             .table
             .file
@@ -86,13 +95,20 @@ impl Record {
         };
         let fewest = if settled { FEWEST_SETTLED } else { FEWEST };
         if rows.iter().flatten().count() < fewest {
-            let message = Message::new("too few rows").found(raw.rows().to_string());
-            return Err(raw.whole(message.expected(format!("{fewest} or more"))).into());
+            let used = rows.iter().flatten().count();
+            let message = Message::new("too few rows").found(match raw.rows() > used {
+                true => format!("{used} switching periods in {} rows", raw.rows()),
+                false => used.to_string(),
+            });
+            let message = message.expected(format!("{fewest} or more"));
+            let hint = "a capture of a settled point is one row of a table without `t`: note its means there";
+            return Err(raw.whole(if settled { message } else { message.hint(hint) }).into());
         }
         let loads = raw.loads()?;
         let measured: [Vec<f64>; CHANNELS] =
             std::array::from_fn(|n| raw.pick(CHANNEL_NAMES[n], &rows, f64::NAN).unwrap_or_default());
         let lattice = std::array::from_fn(|n| raw.lattice(CHANNEL_NAMES[n]));
+        let resolution = std::array::from_fn(|n| raw.resolution(CHANNEL_NAMES[n]));
         let duty = held(raw.pick("d", &rows, f64::NAN).unwrap_or_default());
         let mut record = Record {
             name: name.unwrap_or_else(|| "record".to_owned()),
@@ -104,14 +120,17 @@ impl Record {
             load: held_loads(&rows, &loads),
             measured,
             lattice,
+            resolution,
             v_in_ratio: columns
                 .constant("v_in")
                 .map_or(1.0, |v_in| v_in / parameters.converter.v_in),
             duty_is: columns.duty,
             settled,
+            dense: settled || 2 * rows.iter().flatten().count() > rows.len(),
             segments: segments(&rows, settled),
             repairs: raw.table.repairs,
         };
+        record.report_holes();
         record.leave_out_stuck();
         if record
             .measured
@@ -122,6 +141,9 @@ impl Record {
                 .expected("a column v_o, i_l, i_o or v_in that is not constant");
             return Err(Fault::new(&raw.table.file, Place::File, message).into());
         }
+        let odd = suspicion::of(&record, parameters);
+        let place = |message| Fault::new(&raw.table.file, Place::File, message);
+        Faults::unless_empty(odd.into_iter().map(place).collect())?;
         Ok(record)
     }
 
@@ -129,6 +151,31 @@ impl Record {
     #[must_use]
     pub fn rows(&self) -> usize {
         self.duty.len()
+    }
+
+    /// Gaps and empty cells are filled or left out, but said.
+    fn report_holes(&mut self) {
+        if !self.settled && self.segments.len() > 1 {
+            let at = |segment: &Segment| format!("{:.6} s", self.time[segment.start]);
+            let list: Vec<String> = self.segments.iter().skip(1).take(5).map(at).collect();
+            self.repairs.push(format!(
+                "{} gaps: simulated anew behind each, from {}",
+                self.segments.len() - 1,
+                list.join(", ")
+            ));
+        }
+        for (n, values) in self.measured.iter().enumerate() {
+            let inside = self
+                .segments
+                .iter()
+                .flat_map(|segment| values.get(segment.clone()).unwrap_or_default());
+            let (empty, all) = inside.fold((0, 0), |(empty, all), v| (empty + usize::from(v.is_nan()), all + 1));
+            if empty > 0 && empty < all && self.dense {
+                let name = CHANNEL_NAMES[n];
+                self.repairs
+                    .push(format!("{empty} of {all} rows without {name}: not used"));
+            }
+        }
     }
 
     /// A channel that never moves is a setting or a dead sensor, not a measurement.
@@ -163,7 +210,7 @@ struct Raw {
 impl Raw {
     fn new(table: Table, columns: &Columns) -> Result<Self, Faults> {
         let headers: Vec<&str> = table.columns.iter().map(|column| column.name.as_str()).collect();
-        let mut faults = Vec::new();
+        let mut faults = header_faults(&headers);
         let mut found = Vec::new();
         for name in NAMES {
             let place = columns.find(name, &headers);
@@ -215,10 +262,12 @@ impl Raw {
     }
 
     fn at(&self, row: usize, message: Message) -> Fault {
+        let columns = self.table.columns.iter();
+        let cells: Vec<String> = columns.map(|column| column.values[row].to_string()).collect();
         let place = Place::Span {
             line: self.table.lines[row],
             column: 1,
-            text: String::new(),
+            text: cells.join(","),
             length: 1,
         };
         Fault::new(&self.table.file, place, message)
@@ -265,11 +314,26 @@ impl Raw {
         Ok(())
     }
 
+    /// A row without duty has that of the row before.
+    fn report_missing_duty(&mut self) {
+        let missing = self
+            .signal("d")
+            .unwrap_or_default()
+            .iter()
+            .filter(|d| d.is_nan())
+            .count();
+        if missing > 0 {
+            let text = format!("{missing} rows without duty: that of the row before is held");
+            self.table.repairs.push(text);
+        }
+    }
+
     /// Rows for each control period in order (nothing in a gap), and the sampling phase.
     fn align(&mut self, t_sw: f64, phase: Option<f64>) -> Result<(Vec<Option<usize>>, f64), Faults> {
         let time = self.signal("t").unwrap_or_default();
         if let Some(row) = time.iter().position(|t| t.is_nan()) {
-            return Err(self.at(row, Message::new("a row without time")).into());
+            let hint = "leave the row out, or fill in its time";
+            return Err(self.at(row, Message::new("a row without time").hint(hint)).into());
         }
         if let Some(row) = (1..time.len()).find(|n| time[*n] < time[*n - 1]) {
             let message = Message::new("time goes backward").found(format!("{} after {}", time[row], time[row - 1]));
@@ -384,50 +448,36 @@ impl Raw {
         Ok(loads)
     }
 
+    /// The column of a signal and its scale to SI.
+    fn column(&self, name: &str) -> Option<(&Column, f64)> {
+        let n = NAMES.iter().position(|known| *known == name)?;
+        let (column, scale, _) = self.found[n]?;
+        Some((&self.table.columns[column], scale.abs()))
+    }
+
     fn lattice(&self, name: &str) -> f64 {
-        let Some(n) = NAMES.iter().position(|known| *known == name) else {
-            return 0.0;
-        };
-        let Some((column, scale, _)) = self.found[n] else {
-            return 0.0;
-        };
-        let column = &self.table.columns[column];
-        scale * lattice(&column.values, column.decimals)
+        self.column(name)
+            .map_or(0.0, |(column, scale)| scale * lattice(&column.values, column.decimals))
+    }
+
+    fn resolution(&self, name: &str) -> f64 {
+        self.column(name)
+            .map_or(0.0, |(column, scale)| scale * last_digit(column.decimals))
     }
 }
 
-/// The step of which all values are multiples, if it is at least five times the last digit written.
-fn lattice(values: &[f64], decimals: u32) -> f64 {
-    let digit = (0..decimals).fold(1.0, |digit, _| digit / 10.0);
-    let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
-    sorted.sort_by(f64::total_cmp);
-    let gaps: Vec<f64> = sorted
-        .windows(2)
-        .map(|v| v[1] - v[0])
-        .filter(|gap| *gap > 1.5 * digit)
-        .collect();
-    let smallest = gaps.iter().copied().fold(f64::INFINITY, f64::min);
-    if sorted.len() < FEWEST || gaps.len() < 5 || smallest < 4.5 * digit {
-        return 0.0;
+/// A table without a header, and names that stand in it twice.
+fn header_faults(headers: &[&str]) -> Vec<Message> {
+    if headers.iter().all(|header| header.parse::<f64>().is_ok()) {
+        let message = Message::new("the first line holds numbers, not the names of the columns");
+        let hint = "put a first line above such as t,d,v_o,i_l,i_o,v_in,r_load";
+        return vec![message.found(headers.join(", ")).expected("a header").hint(hint)];
     }
-    let (low, high) = (sorted[0], sorted[sorted.len() - 1]);
-    // rounding of the written digits: the step is known ever better over a longer span
-    let mut step = smallest;
-    for gap in &sorted {
-        let count = ((gap - low) / step).round();
-        if count >= 1.0 && (gap - low - count * step).abs() <= 1.01 * digit * 2.0 {
-            step = (gap - low) / count;
-        }
-    }
-    let near = |value: &f64| {
-        let count = ((value - low) / step).round();
-        (value - low - count * step).abs() <= 1.2 * digit
+    let twice = |(n, header): (usize, &&str)| {
+        let again = !header.is_empty() && headers[..n].contains(header);
+        again.then(|| Message::new(format!("two columns are called `{header}`")).hint("rename or remove one"))
     };
-    if sorted.iter().all(near) && high > low {
-        step
-    } else {
-        0.0
-    }
+    headers.iter().enumerate().filter_map(twice).collect()
 }
 
 /// Gaps are filled with the value before.

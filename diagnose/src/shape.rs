@@ -1,5 +1,6 @@
 //! What a residual looks like that no cause explains.
 
+use crate::attribute::ACCURACY;
 use crate::fit::State;
 use crate::noise::{self, BLOCK, channel};
 use crate::problem::Problem;
@@ -30,9 +31,10 @@ pub struct Structure {
     pub shape: String,
 }
 
-/// All channels in which a state leaves structure.
+/// All channels in which a state leaves structure. What the model as given, `null`, leaves tells how much the accuracy of a
+/// simulator may leave.
 #[must_use]
-pub fn structures(problem: &Problem, state: &State, inflation: f64) -> Vec<Structure> {
+pub fn structures(problem: &Problem, null: &State, state: &State, inflation: f64) -> Vec<Structure> {
     let mut found = Vec::new();
     for (index, record) in problem.records.iter().enumerate() {
         for (n, name) in CHANNEL_NAMES.iter().enumerate() {
@@ -43,9 +45,11 @@ pub fn structures(problem: &Problem, state: &State, inflation: f64) -> Vec<Struc
             }
             let scatter = (2.0 / left.blocks as f64).sqrt() * inflation.sqrt().min(1.5);
             // a coarse converter leaves patterns that are none of the plant's
-            let coarse = record.lattice[n] > 1.5 * problem.sigma[n];
-            let slow = left.slow > 1.0 + SLOW.max(SIGMAS * scatter);
-            let wild = left.square > 2.5;
+            let step = record.lattice[n];
+            let coarse = step > 1.5 * problem.sigma[n] && left.square.sqrt() * problem.sigma[n] < step;
+            let before = noise::left(&channel(problem, &null.residual, index, n));
+            let slow = left.slow > 1.0 + SLOW.max(SIGMAS * scatter) + ACCURACY * ACCURACY * before.slow;
+            let wild = left.square > 2.5 + ACCURACY * ACCURACY * before.square;
             if (slow || wild) && !coarse {
                 found.push(Structure {
                     record: record.name.clone(),

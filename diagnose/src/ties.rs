@@ -1,16 +1,18 @@
 //! Explanations that share no cause with the leading one and fit as well.
 
-use crate::attribute::{Attribution, gained};
+use crate::attribute::Attribution;
 use crate::fit::Fit;
 use crate::parallel;
 use crate::problem::Problem;
+use crate::search::gained;
 
 /// As for rivals of one cause: chi-square within this, times the scatter, or this share of what is explained.
 const TIE: f64 = 9.0;
 const TIE_SHARE: f64 = 0.005;
 /// A pair is fitted if at first order it explains this share of what the best pair explains.
 const LOOKS_AS_GOOD: f64 = 0.97;
-/// Pairs that are fitted at most.
+/// Pairs that are fitted at most, of settled points and of records.
+const MOST_SETTLED: usize = 80;
 const MOST: usize = 8;
 
 /// Pairs of causes beside a leading pair with which they have nothing in common; the best first.
@@ -39,7 +41,8 @@ pub fn other_pairs(problem: &Problem, attribution: &Attribution) -> Vec<Fit> {
         }
     }
     looks.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    looks.truncate(MOST);
+    let settled = problem.records.iter().all(|record| record.settled);
+    looks.truncate(if settled { MOST_SETTLED } else { MOST });
     let explained = attribution.null.chi2 - best.state.chi2;
     let worst = best.state.chi2 + (TIE * attribution.inflation).max(TIE_SHARE * explained);
     let mut fits = parallel::map(&looks, |(_, pair)| {

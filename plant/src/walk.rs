@@ -133,4 +133,28 @@ mod tests {
             }
         }
     }
+
+    /// The pieces of a period are sums of differences and may end an ulp before the instant they should.
+    #[test]
+    fn every_sampling_phase_and_edge_comes_to_the_end_of_the_period() {
+        let (done, ended) = std::sync::mpsc::channel();
+        std::thread::spawn(move || {
+            let load = Load::resistor(20.0);
+            for n in 1..400 {
+                let mut p = Parameters::paper_table();
+                p.pwm.sampling_phase = f64::from(n) / 400.0;
+                p.switch.turn_on_delay = 1e-5 / 3.0 * f64::from(n % 7);
+                p.sensors.v_out.delay = 1e-4 / 7.0 * f64::from(n % 11);
+                let mut plant = Plant::new(&p).unwrap();
+                plant.reset_at(100.0, 5.0, &load);
+                for step in 0..20 {
+                    let at = 1.0 - p.pwm.sampling_phase;
+                    plant.step_with_change(0.1 + 0.037 * f64::from(step), &load, &Load::resistor(10.0), at);
+                }
+            }
+            done.send(()).unwrap();
+        });
+        let waited = ended.recv_timeout(std::time::Duration::from_secs(60));
+        assert!(waited.is_ok(), "a period did not end");
+    }
 }

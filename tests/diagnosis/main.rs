@@ -29,6 +29,8 @@ struct Answered {
     diagnosis: Diagnosis,
     /// The refitted mapping.
     mapping: policy::Mapping,
+    /// Text of the extended plant file.
+    extended: String,
 }
 
 fn answered() -> &'static [Answered] {
@@ -62,6 +64,7 @@ fn answer(seed: u64, ids: &[&str]) -> Answered {
     Answered {
         case,
         diagnosis: read(&out.join("diagnosis.json")),
+        extended: std::fs::read_to_string(out.join("plant.extended.toml")).unwrap(),
         mapping: policy::load_mapping(&out.join("drm.toml")).unwrap(),
     }
 }
@@ -124,4 +127,53 @@ fn the_refitted_mapping_is_better_at_the_hidden_converter_and_the_same_where_not
     let [before, after] = close(&all[2], HIDDEN[2]);
     assert!(after.mean_abs < before.mean_abs, "{before:?} {after:?}");
     assert!(after.tail_mean < before.tail_mean, "{before:?} {after:?}");
+}
+
+#[test]
+fn the_extended_file_is_a_plant_for_simulate_train_and_drm_acquire() {
+    let answered = &answered()[2];
+    assert!(answered.extended.contains("dcr = "), "{}", answered.extended);
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("extended.toml", &answered.extended);
+    write(
+        "scenario.toml",
+        "plant = \"extended.toml\"\nload_steps = [[200, 500]]\ninstants = 1\nsampling_instants = 1\nlead = 40\nafter = 40\n\
+         tail = 10\n",
+    );
+    let contract = format!("{POLICY}/policy.toml");
+    write(
+        "train.toml",
+        &format!(
+            "plant = \"extended.toml\"\ncontract = \"{contract}\"\nsteps = 300\n[network]\nhidden = [8]\n[selection]\n\
+             every = 300\nload_steps = [[200, 500]]\ninstants = 1\nsampling_instants = 1\nlead = 20\nafter = 20\ntail = 5\n\
+             [evaluation]\nload_steps = [[200, 500]]\ninstants = 1\nsampling_instants = 1\nlead = 20\nafter = 20\ntail = 5\n"
+        ),
+    );
+    let commands: [&[&str]; 3] = [
+        &["simulate", "scenario.toml", "--policy", POLICY, "--out", "simulated"],
+        &["train", "train.toml", "--out", "trained"],
+        &[
+            "drm",
+            "acquire",
+            "--plant",
+            "extended.toml",
+            "--duties",
+            "0.5",
+            "--currents",
+            "5",
+            "--out",
+            "points.csv",
+        ],
+    ];
+    for arguments in commands {
+        let ran = run(Command::new(policyc()).args(arguments).current_dir(folder.path()));
+        assert_eq!(ran.code, Some(0), "{arguments:?}\n{}{}", ran.stdout, ran.stderr);
+    }
+    // the winding of the file is in the settled point: a duty of 0.5 yields less than with the nominal 0.1 ohm
+    let points = std::fs::read_to_string(folder.path().join("points.csv")).unwrap();
+    let row = points.lines().last().unwrap();
+    let v_out: f64 = row.split(',').nth(5).unwrap().parse().unwrap();
+    let nominal = 0.5 * (200.0 - 0.05 * 5.0) - 0.5 * (0.8 + 0.02 * 5.0) - 0.1 * 5.0;
+    assert!(v_out < nominal - 0.3, "{row}");
 }

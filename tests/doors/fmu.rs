@@ -10,7 +10,7 @@ use std::process::Command;
 use closed_loop::{Agent, Answer, Call, External};
 use codegen::Door;
 use interp::Sample;
-use policy::Policy;
+use policy::{NumericFormat, Policy};
 use tests::tools::{is_without, run, run_silently};
 
 use super::{example, files, golden_case};
@@ -27,16 +27,24 @@ fn lines(trajectory: &[(Vec<Sample>, Answer)]) -> Vec<String> {
     trajectory.iter().map(|(_, answer)| line(answer)).collect()
 }
 
+const FMPY: &[&str] = &["simulate.py"];
+const FMPY_FROM_SOURCES: &[&str] = &["simulate.py", "--compile"];
+
+/// Every duty, action and status has the interpreter's bits.
 #[track_caller]
-fn fmpy_agrees(policy: &Policy, periods: usize, compile: bool) {
+fn agrees(policy: &Policy, periods: usize, doors: &[Door], script: &[&str]) {
+    // both scripts read descriptions with it
+    if is_without("FMPy") {
+        return;
+    }
     let trajectory = interpreted(policy, periods);
-    for door in VERSIONS {
-        let unit = Unit::new(policy, door);
-        let (ran, answers) = unit.simulate(&trajectory, compile);
+    let expected = lines(&trajectory);
+    for door in doors {
+        let unit = Unit::new(policy, *door);
+        let (ran, answers) = unit.simulate(&trajectory, script);
         let name = &policy.name;
         assert_eq!(ran.code, Some(0), "{name} {door:?}\n{}{}", ran.stdout, ran.stderr);
         assert!(!ran.stderr.contains("warning:"), "{name} {door:?}\n{}", ran.stderr);
-        let expected = lines(&trajectory);
         assert_eq!(answers.len(), periods);
         let different = answers.iter().zip(&expected).filter(|(a, b)| a != b).count();
         assert_eq!(different, 0, "{name} {door:?}");
@@ -45,29 +53,29 @@ fn fmpy_agrees(policy: &Policy, periods: usize, compile: bool) {
 
 #[test]
 fn fmpy_validates_and_simulates_half_a_second_of_closed_loop() {
-    if is_without("FMPy") {
-        return;
-    }
-    fmpy_agrees(&example(), PERIODS, false);
+    agrees(&example(), PERIODS, &VERSIONS, FMPY);
 }
 
 #[test]
 fn fmpy_compiles_the_sources_and_simulates_them() {
-    if is_without("FMPy") {
-        return;
-    }
-    fmpy_agrees(&example(), PERIODS, true);
-    fmpy_agrees(&golden_case("adc_mapping"), 500, true);
+    agrees(&example(), PERIODS, &VERSIONS, FMPY_FROM_SOURCES);
 }
 
 #[test]
 fn fmpy_takes_codes_filters_and_policies_without_mapping() {
-    if is_without("FMPy") {
+    for name in ["adc_mapping", "filters", "activations", "linear"] {
+        agrees(&golden_case(name), 500, &VERSIONS, FMPY);
+    }
+}
+
+/// It does not take FMI 3.
+#[test]
+fn libcosim_steps_half_a_second_of_closed_loop() {
+    if is_without("libcosim") {
         return;
     }
-    for name in ["adc_mapping", "filters", "activations", "linear"] {
-        fmpy_agrees(&golden_case(name), 500, false);
-    }
+    agrees(&example(), PERIODS, &[Door::Fmu2], &["libcosim.py"]);
+    agrees(&golden_case("adc_mapping"), 500, &[Door::Fmu2], &["libcosim.py"]);
 }
 
 /// The plant steps the FMU: what it answers to a sample is what the converter does until the next one.
@@ -76,7 +84,10 @@ fn the_plant_as_importing_program_sees_the_duties_of_the_interpreter() {
     if is_without("FMPy") {
         return;
     }
-    for (policy, periods) in [(example(), PERIODS), (golden_case("adc_mapping"), 1000)] {
+    let formats = [NumericFormat::F32Fma, NumericFormat::I16, NumericFormat::I8];
+    let others = formats.map(|format| (example().with_format(format), 1000));
+    let exact = [(example(), PERIODS), (golden_case("adc_mapping"), 1000)];
+    for (policy, periods) in exact.into_iter().chain(others) {
         let expected = interpreted(&policy, periods);
         for door in VERSIONS {
             let unit = Unit::new(&policy, door);

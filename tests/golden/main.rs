@@ -137,6 +137,12 @@ fn the_doors_yield_their_golden_files() {
         let mut files = verify::doors::generate(&case.policy, host(), &selection).unwrap();
         files.retain(|file, _| !case.files.contains_key(file) || file == "manifest.json");
         files.remove(&format!("{name}_kit.c")).unwrap();
+        if name == "minimal" {
+            // these differ from the other case's in the name only
+            for shell in ["fmi2.c", "fmi2.h", "fmi3.c", "fmi3.h"] {
+                files.remove(&format!("{name}_{shell}")).unwrap();
+            }
+        }
         let differing = differences(&tests::root().join("tests/golden/doors").join(name), &files);
         assert!(differing.is_empty(), "{}\n{HINT}", differing.join("\n"));
     }

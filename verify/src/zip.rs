@@ -1,4 +1,5 @@
-//! Archives in the zip format, enough of it for an FMU: no dependency, and the same bytes on every machine.
+//! Archives in the zip format, enough of it for an FMU: the same bytes on every machine, and fewer lines than a crate would
+//! need around it to leave out times and attributes.
 //!
 //! Every member is a deflate stream (RFC 1951) of stored blocks, because FMI 2.0 asks for that method. Nothing is compressed.
 

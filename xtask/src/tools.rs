@@ -134,6 +134,11 @@ const TOOLS: &[Tool] = &[
     tool("make", &["make", "--version"], Apt("make")),
     tool("venv", VENV, Apt("python3-venv")),
     tool("FMPy", FMPY, Python("fmpy==0.3.32")),
+    tool(
+        "libcosim",
+        &["python3", "-c", "import libcosimpy"],
+        Python("libcosimpy==0.0.6"),
+    ),
     tool("Marabou", MARABOU, Python("maraboupy==2.0.0")),
 ];
 
@@ -198,10 +203,12 @@ pub fn provide(target_dir: &Path, output: &Output) -> Result<Vec<String>, String
         let _ = install(&Plan::of(&debian), output);
     }
     if !plan.python.is_empty() && works(VENV) {
-        let [mut environment, mut packages] = plan.python_install(&python);
+        let (mut environment, packages) = plan.python_install(&python);
         process::run(&mut environment, output).map_err(explained)?;
-        // offline or refused: said at the end
-        let _ = process::run(&mut packages, output);
+        for mut package in packages {
+            // offline or refused: said at the end
+            let _ = process::run(&mut package, output);
+        }
     }
     require(target_dir)
 }
@@ -310,14 +317,16 @@ impl Plan {
         arguments
     }
 
-    /// Makes the environment and fills it.
-    fn python_install(&self, python: &Path) -> [Command; 2] {
+    /// Makes the environment and fills it, package by package: one that is not made for this Python keeps none from coming.
+    fn python_install(&self, python: &Path) -> (Command, Vec<Command>) {
         let mut environment = Command::new("python3");
         environment.args(["-m", "venv"]).arg(python);
-        let mut packages = Command::new(interpreter(python));
-        packages.args(["-m", "pip", "install", "--disable-pip-version-check"]);
-        packages.args(&self.python);
-        [environment, packages]
+        let install = |package: &&str| {
+            let mut command = Command::new(interpreter(python));
+            command.args(["-m", "pip", "install", "--disable-pip-version-check", package]);
+            command
+        };
+        (environment, self.python.iter().map(install).collect())
     }
 
     fn message(&self, missing: &[&Tool], python: &Path) -> String {

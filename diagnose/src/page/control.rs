@@ -2,8 +2,9 @@
 
 use closed_loop::controller::Period;
 use closed_loop::scenario::{Metrics, SETTLED};
-use report::{Axis, Chart, Colour, Panel, ReportError, Section, Series, Svg, Table};
+use report::{Axis, Chart, Panel, ReportError, Section, Series, Svg, Table};
 
+use super::{EXTENDED, MEASURED, MODEL};
 use crate::control::{ClosedLoop, Control, Course};
 
 /// Shown before and after the step, in control periods.
@@ -24,7 +25,7 @@ pub(super) fn section(control: &Control) -> Result<Section, ReportError> {
             picture(control)?,
             "The load step with the largest error, at its first instant; true voltage at the sampling instants.",
         )
-        .table(table(found));
+        .details(Section::new("Figures of every load step").table(table(found)));
     for remark in &found.beyond_repair {
         section = section.text(format!("No mapping repairs: {remark}."));
     }
@@ -49,11 +50,7 @@ pub(super) fn sentence(found: &ClosedLoop) -> String {
 fn picture(control: &Control) -> Result<Svg, ReportError> {
     let mut voltage = Panel::new(Axis::new("output voltage").unit("V")).height(220.0);
     let mut duty = Panel::new(Axis::new("duty")).height(110.0);
-    for ((name, run), colour) in
-        RUNS.into_iter()
-            .zip(&control.shown)
-            .zip([Colour::GREY, Colour::VERMILION, Colour::BLUE])
-    {
+    for ((name, run), colour) in RUNS.into_iter().zip(&control.shown).zip([MEASURED, MODEL, EXTENDED]) {
         if !control.findings.refitted && name == RUNS[2] {
             continue;
         }
@@ -85,7 +82,8 @@ fn table(found: &ClosedLoop) -> Table {
     }
     table = table.text("settled within ms");
     for step in &found.steps {
-        for (name, m) in RUNS.into_iter().zip([&step.simulation, &step.before, &step.after]) {
+        let runs = RUNS.into_iter().zip([&step.simulation, &step.before, &step.after]);
+        for (name, m) in runs.take(if found.refitted { 3 } else { 2 }) {
             let settled = match m.tail_max > SETTLED {
                 true => "not".to_owned(),
                 false => format!("{:.1}", 1e3 * m.settling),

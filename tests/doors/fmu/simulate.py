@@ -4,6 +4,7 @@ SIGNALS is a CSV file with a header: time and inputs, a row per communication po
 control period: the bits of duty, then action and status. Exit code 1 if FMPy finds a problem.
 """
 
+import os
 import shutil
 import struct
 import sys
@@ -27,7 +28,7 @@ def signals(path, description):
 def main(fmu, inputs, trajectory, *options):
     problems = validate_fmu(fmu)
     description = fmpy.read_model_description(fmu)
-    folder = str(fmpy.extract(fmu))
+    folder = str(fmpy.extract(fmu, unzipdir=os.path.abspath("extracted")))
     if "--compile" in options:
         # the binary must come from the sources
         shutil.rmtree(folder + "/binaries", ignore_errors=True)

@@ -29,19 +29,33 @@ pub fn python() -> Command {
 pub fn standard_headers() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     FOLDER.get_or_init(|| {
-        let ran = run(python().args(["-c", "import fmpy; print(fmpy.__path__[0])"]));
-        assert_eq!(ran.code, Some(0), "{}", ran.stderr);
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("fmi-headers-{}", std::process::id()));
-        tests::tools::copy_folder(&Path::new(ran.stdout.trim()).join("c-code"), &folder);
-        let file = folder.join("fmi2Functions.h");
-        let text = std::fs::read_to_string(&file).unwrap();
-        let stripped = "#define fmi2FullName(name) name";
-        assert!(text.contains(stripped));
-        let whole = "#ifdef FMI2_FUNCTION_PREFIX\n#define fmi2Paste(a, b) a##b\n#define fmi2PasteB(a, b) fmi2Paste(a, b)\n\
-                     #define fmi2FullName(name) fmi2PasteB(FMI2_FUNCTION_PREFIX, name)\n#else\n#define fmi2FullName(name) name\n#endif";
-        std::fs::write(file, text.replace(stripped, whole)).unwrap();
+        let script = "import fmpy; print(fmpy.__path__[0], fmpy.__version__, sep='\\n')";
+        let ran = run(python().args(["-c", script]));
+        let [package, version] = ran.stdout.lines().collect::<Vec<_>>()[..] else {
+            panic!("{}", ran.stderr);
+        };
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("fmi-headers-{version}"));
+        if !folder.exists() {
+            // whole or not at all, as tests may run twice at a time
+            let made = folder.with_extension(std::process::id().to_string());
+            copy_headers(&Path::new(package).join("c-code"), &made);
+            if std::fs::rename(&made, &folder).is_err() {
+                std::fs::remove_dir_all(made).unwrap();
+            }
+        }
         folder
     })
+}
+
+fn copy_headers(from: &Path, to: &Path) {
+    tests::tools::copy_folder(from, to);
+    let file = to.join("fmi2Functions.h");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let stripped = "#define fmi2FullName(name) name";
+    assert!(text.contains(stripped));
+    let whole = "#ifdef FMI2_FUNCTION_PREFIX\n#define fmi2Paste(a, b) a##b\n#define fmi2PasteB(a, b) fmi2Paste(a, b)\n\
+                 #define fmi2FullName(name) fmi2PasteB(FMI2_FUNCTION_PREFIX, name)\n#else\n#define fmi2FullName(name) name\n#endif";
+    std::fs::write(file, text.replace(stripped, whole)).unwrap();
 }
 
 /// The files of an FMU with the first `from` of the file with that ending in the place of `to`.
@@ -248,8 +262,8 @@ impl Unit {
         Running { child, answers }
     }
 
-    /// What FMPy says of the FMU and how it simulates it with these samples.
-    pub fn simulate(&self, trajectory: &[(Vec<Sample>, Answer)], compile: bool) -> (Ran, Vec<String>) {
+    /// What an importer in Python, a script with its options, says of the FMU and how it simulates it with these samples.
+    pub fn simulate(&self, trajectory: &[(Vec<Sample>, Answer)], script: &[&str]) -> (Ran, Vec<String>) {
         let mut table = "time".to_owned();
         for signal in &self.policy.signals {
             let _ = write!(table, ",{}", signal.name);
@@ -263,8 +277,8 @@ impl Unit {
         std::fs::write(self.path().join("signals.csv"), table).unwrap();
         let mut command = python();
         command.current_dir(self.path());
-        command.args(["simulate.py", &self.archive.file, "signals.csv", "answers.txt"]);
-        let ran = run(command.args(compile.then_some("--compile")));
+        command.args([script[0], &self.archive.file, "signals.csv", "answers.txt"]);
+        let ran = run(command.args(&script[1..]));
         let answers = std::fs::read_to_string(self.path().join("answers.txt")).unwrap_or_default();
         (ran, answers.lines().map(str::to_owned).collect())
     }

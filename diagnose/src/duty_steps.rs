@@ -1,0 +1,117 @@
+//! Which steps of a duty counter could have made a residual: the response to the rounding of the duty, by the averaged
+//! circuit linearised around each row, for thousands of steps.
+
+use std::ops::Range;
+
+use crate::parallel;
+use crate::problem::{Basis, Problem, dot};
+use crate::record::{CHANNELS, Record};
+
+/// Counts per period that are looked at, and how far apart: half a count of the duty moves by less than a tenth.
+const FEWEST: f64 = 8.0;
+const MOST: f64 = 1000.0;
+const APART: f64 = 0.1;
+/// The averaged circuit may be off in the size of the response by as much.
+const LEAST_SHARE: f64 = 0.7;
+const MOST_SHARE: f64 = 1.3;
+/// Steps of the integration in a period.
+const FINE: usize = 4;
+
+/// Counts per period (whole or not) whose rounding looks most like `residual`: ends and middles of the `count` best pieces.
+pub(crate) fn likely(problem: &Problem, basis: &Basis, residual: &[f64], count: usize) -> Vec<f64> {
+    let numbers: Vec<f64> = (0..=((MOST - FEWEST) / APART) as usize)
+        .map(|n| FEWEST + n as f64 * APART)
+        .collect();
+    let gains = parallel::map(&numbers, |counts| {
+        let mut column = response(problem, *counts);
+        for (value, left) in column.iter_mut().zip(residual) {
+            // where nothing counts
+            if *left == 0.0 {
+                *value = 0.0;
+            }
+        }
+        basis.project(&mut column);
+        let (along, length) = (dot(&column, residual), dot(&column, &column));
+        let share = (along / length.max(1e-300)).clamp(LEAST_SHARE, MOST_SHARE);
+        2.0 * share * along - share * share * length
+    });
+    let mut pieces: Vec<(f64, Range<usize>)> = pieces(problem, &numbers)
+        .into_iter()
+        .map(|piece| (gains[piece.clone()].iter().copied().fold(0.0, f64::max), piece))
+        .collect();
+    pieces.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.start.cmp(&b.1.start)));
+    let mut found: Vec<f64> = Vec::new();
+    for (_, piece) in pieces.into_iter().take(count) {
+        let (first, last) = (piece.start, piece.end - 1);
+        for n in [first, (first + last) / 2, last] {
+            if !found.contains(&numbers[n]) {
+                found.push(numbers[n]);
+            }
+        }
+    }
+    found
+}
+
+/// Stretches of numbers that round every duty to the same count: what they make of a record changes smoothly within.
+fn pieces(problem: &Problem, numbers: &[f64]) -> Vec<Range<usize>> {
+    let mut duties: Vec<f64> = problem.records.iter().flat_map(|r| r.duty.iter().copied()).collect();
+    duties.sort_by(f64::total_cmp);
+    duties.dedup();
+    let count = |duty: f64, counts: f64| libm::floor(duty * counts + 0.5);
+    let mut list = Vec::new();
+    let mut start = 0;
+    for n in 1..=numbers.len() {
+        let ends = n == numbers.len()
+            || duties
+                .iter()
+                .any(|d| count(*d, numbers[n - 1]) != count(*d, numbers[n]));
+        if ends {
+            list.push(start..n);
+            start = n;
+        }
+    }
+    list
+}
+
+/// Change of the signals over their noise when the duty is rounded to `counts` per period.
+fn response(problem: &Problem, counts: f64) -> Vec<f64> {
+    let mut out = vec![0.0; problem.len()];
+    for (record, offset) in problem.records.iter().zip(&problem.offsets).filter(|(r, _)| !r.settled) {
+        for segment in &record.segments {
+            let (mut v, mut i) = (0.0, 0.0);
+            for row in segment.clone() {
+                out[offset + row * CHANNELS] = v / problem.sigma[0];
+                out[offset + row * CHANNELS + 1] = i / problem.sigma[1];
+                let next = (row + 1).min(record.rows() - 1);
+                for (row, share) in [(row, 1.0 - record.phase), (next, record.phase)] {
+                    (v, i) = advanced(problem, record, row, counts, share, (v, i));
+                }
+            }
+        }
+    }
+    out
+}
+
+/// A share of the period of `row`.
+fn advanced(
+    problem: &Problem,
+    record: &Record,
+    row: usize,
+    counts: f64,
+    share: f64,
+    (mut v, mut i): (f64, f64),
+) -> (f64, f64) {
+    let p = &problem.base.plant;
+    let duty = record.duty[row];
+    let rounded = (libm::floor(duty * counts + 0.5) / counts).min(1.0);
+    let pushed = p.converter.v_in * record.v_in_ratio * (rounded - duty);
+    let r = p.inductor.dcr + 0.5 * (p.switch.r_ds_on + p.switch.r_d);
+    let load = &record.load[row];
+    let g = load.conductance - load.power / (problem.bases.v * problem.bases.v);
+    let h = share * problem.bases.t_sw / FINE as f64;
+    for _ in 0..FINE {
+        i += h / p.converter.inductance * (pushed - v - r * i);
+        v += h / p.converter.capacitance * (i - g * v);
+    }
+    (v, i)
+}

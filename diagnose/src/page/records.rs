@@ -1,0 +1,139 @@
+//! Pictures of records: measured, simulated, and the difference over time and operating point.
+
+use report::{Axis, Chart, Panel, ReportError, Section, Series, Svg};
+
+use super::{EXTENDED, MEASURED, MODEL};
+use crate::diagnosis::{Diagnosis, Verdict};
+use crate::fit::State;
+use crate::noise::channel;
+use crate::problem::Problem;
+use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS};
+
+/// Groups of equal size in a picture by operating point.
+const GROUPS: usize = 12;
+
+/// Measured minus simulated in the channel's unit; NaN where nothing counts.
+fn errors(problem: &Problem, state: &State, record: usize, n: usize) -> Vec<f64> {
+    let values = channel(problem, &state.residual, record, n).into_iter();
+    values
+        .map(|v| if v == 0.0 { f64::NAN } else { v * problem.sigma[n] })
+        .collect()
+}
+
+/// Voltage and current of a record with both simulations, and their errors.
+pub(super) fn panels(
+    problem: &Problem,
+    before: &State,
+    after: &State,
+    record: usize,
+    second: Option<&str>,
+) -> Result<Svg, ReportError> {
+    let one = &problem.records[record];
+    let axis = if one.settled {
+        Axis::new("point")
+    } else {
+        Axis::new("time").unit("s")
+    };
+    let mut chart = Chart::new(one.name.clone(), axis);
+    let first = ("model", before, MODEL);
+    let states: Vec<_> = std::iter::once(first)
+        .chain(second.map(|name| (name, after, EXTENDED)))
+        .collect();
+    for n in 0..2 {
+        if !one.measured[n].iter().any(|v| v.is_finite()) {
+            continue;
+        }
+        let measured = &one.measured[n];
+        let points = Series::points("measured", one.time.clone(), measured.clone()).colour(MEASURED);
+        let mut panel = Panel::new(Axis::new(CHANNEL_NAMES[n]).unit(CHANNEL_UNITS[n]))
+            .height(150.0)
+            .series(points);
+        let axis = Axis::new(format!("measured minus simulated {}", CHANNEL_NAMES[n])).unit(CHANNEL_UNITS[n]);
+        let mut left = Panel::new(axis).height(100.0);
+        for (name, state, colour) in states.iter().copied() {
+            let error = errors(problem, state, record, n);
+            let simulated: Vec<f64> = measured
+                .iter()
+                .zip(&error)
+                .map(|(shown, error)| shown - error)
+                .collect();
+            panel = panel.series(Series::line(name, one.time.clone(), simulated).colour(colour));
+            left = left.series(Series::line(name, one.time.clone(), error).colour(colour));
+        }
+        chart = chart.panel(panel).panel(left);
+    }
+    chart.svg()
+}
+
+/// What the second simulation is, if there is one.
+pub(super) fn second(diagnosis: &Diagnosis) -> Option<&'static str> {
+    diagnosis.attribution.best.as_ref()?;
+    Some(match diagnosis.findings.verdict {
+        Verdict::Unexplained => "best of the known causes",
+        _ => "extended",
+    })
+}
+
+pub(super) fn training(diagnosis: &Diagnosis) -> Result<Section, ReportError> {
+    let (problem, before, after) = (&diagnosis.problem, &diagnosis.given, diagnosis.attribution.state());
+    let second = second(diagnosis);
+    let square = |record: usize| {
+        let own = (0..crate::record::CHANNELS).flat_map(|n| channel(problem, &before.residual, record, n));
+        own.map(|v| v * v).sum::<f64>() / problem.records[record].rows().max(1) as f64
+    };
+    let all = 0..problem.records.len();
+    let worst = all
+        .clone()
+        .max_by(|a, b| square(*a).total_cmp(&square(*b)))
+        .unwrap_or(0);
+    let caption =
+        "The training record that the model as given misses most. Initial states are estimated for both models.";
+    let mut section =
+        Section::new("Measured, simulated, extended").chart(panels(problem, before, after, worst, second)?, caption);
+    if problem.records.len() > 1 {
+        let mut inner = Section::new("The other training records");
+        for record in all.filter(|record| *record != worst) {
+            inner = inner.chart(panels(problem, before, after, record, second)?, "");
+        }
+        section = section.details(inner);
+    }
+    match problem.sigma[0].is_finite() {
+        true => Ok(section.chart(
+            by_operating_point(diagnosis)?,
+            "Means of groups of equal size over all training records.",
+        )),
+        false => Ok(section),
+    }
+}
+
+/// Mean error of the output voltage over duty and set load.
+fn by_operating_point(diagnosis: &Diagnosis) -> Result<Svg, ReportError> {
+    let problem = &diagnosis.problem;
+    let mut panel = Panel::new(Axis::new("mean error of v_o").unit("V")).height(130.0);
+    let first = ("model", &diagnosis.given, MODEL);
+    let after = second(diagnosis).map(|name| (name, diagnosis.attribution.state(), EXTENDED));
+    for (name, state, colour) in std::iter::once(first).chain(after) {
+        let mut points: Vec<(f64, f64)> = Vec::new();
+        for (index, record) in problem.records.iter().enumerate() {
+            let errors = errors(problem, state, index, 0);
+            let drawn = record.measured[0].iter().zip(&record.load);
+            let drawn = drawn.map(|(v, load)| load.current + load.conductance * v + load.power / v.max(1e-3));
+            points.extend(drawn.zip(errors).filter(|(i, e)| i.is_finite() && e.is_finite()));
+        }
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let group = points.len().div_ceil(GROUPS).max(1);
+        let mean = |of: fn(&(f64, f64)) -> f64| {
+            points
+                .chunks(group)
+                .map(|part| part.iter().map(of).sum::<f64>() / part.len() as f64)
+                .collect::<Vec<f64>>()
+        };
+        let (x, y) = (mean(|p| p.0), mean(|p| p.1));
+        panel = panel
+            .series(Series::line(name, x.clone(), y.clone()).colour(colour))
+            .series(Series::points(format!("{name}, groups"), x, y).colour(colour));
+    }
+    Chart::new("Error by operating point", Axis::new("load current").unit("A"))
+        .panel(panel)
+        .svg()
+}

@@ -1,0 +1,66 @@
+//! The steps of a converter, from the digits of its values.
+
+use super::FEWEST;
+
+/// The last digit written.
+pub fn last_digit(decimals: u32) -> f64 {
+    (0..decimals).fold(1.0, |digit, _| digit / 10.0)
+}
+
+/// The whole number of last digits of which all values are multiples apart, if it is more than one and enough values say so.
+fn whole_step(values: &[f64], digit: f64) -> Option<f64> {
+    let counts: Vec<i64> = values
+        .iter()
+        .filter(|v| v.is_finite())
+        .map(|v| (v / digit).round() as i64)
+        .collect();
+    let first = *counts.first()?;
+    let common = counts
+        .iter()
+        .fold(0, |common, count| divisor(common, (count - first).abs()));
+    let mut distinct = counts.clone();
+    distinct.sort_unstable();
+    distinct.dedup();
+    (common > 1 && distinct.len() >= 5 && counts.len() >= FEWEST).then_some(common as f64 * digit)
+}
+
+fn divisor(a: i64, b: i64) -> i64 {
+    if b == 0 { a } else { divisor(b, a % b) }
+}
+
+/// The step of which all values are multiples: a whole number of the last digit written, or at least five times it.
+pub fn lattice(values: &[f64], decimals: u32) -> f64 {
+    let digit = last_digit(decimals);
+    if let Some(step) = whole_step(values, digit) {
+        return step;
+    }
+    let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    let gaps: Vec<f64> = sorted
+        .windows(2)
+        .map(|v| v[1] - v[0])
+        .filter(|gap| *gap > 1.5 * digit)
+        .collect();
+    let smallest = gaps.iter().copied().fold(f64::INFINITY, f64::min);
+    if sorted.len() < FEWEST || gaps.len() < 5 || smallest < 4.5 * digit {
+        return 0.0;
+    }
+    let (low, high) = (sorted[0], sorted[sorted.len() - 1]);
+    // rounding of the written digits: the step is known ever better over a longer span
+    let mut step = smallest;
+    for gap in &sorted {
+        let count = ((gap - low) / step).round();
+        if count >= 1.0 && (gap - low - count * step).abs() <= 1.01 * digit * 2.0 {
+            step = (gap - low) / count;
+        }
+    }
+    let near = |value: &f64| {
+        let count = ((value - low) / step).round();
+        (value - low - count * step).abs() <= 1.2 * digit
+    };
+    if sorted.iter().all(near) && high > low {
+        step
+    } else {
+        0.0
+    }
+}

@@ -1,0 +1,402 @@
+//! The search for a set of causes: forward with several leaders, exchange, backward, and what would do as well.
+
+use crate::attribute::{ACCURACY, threshold};
+use crate::causes::Search;
+use crate::duty_steps;
+use crate::fit::{FINE, Fit, Fitter, State, solve};
+use crate::noise;
+use crate::parallel;
+use crate::problem::dot;
+use crate::shape::structures;
+use crate::spectrum;
+
+/// An explanation within this of the best is as good, in chi-square ...
+const TIE: f64 = 9.0;
+/// ... or within this share of what the cause explains.
+const TIE_SHARE: f64 = 0.005;
+/// What is this many times as far off may come within it when its fit is brought to an end.
+const NEAR: f64 = 5.0;
+/// A candidate is fitted if it explains this share of the most that one explains, and this much, both at first order.
+const FOLLOWED: f64 = 0.2;
+const LEAST_FOLLOWED: f64 = 6.0;
+/// A cause gives way to another that is better by this.
+const SWAP: f64 = 2.0;
+/// Most causes named.
+const MOST: usize = 3;
+/// Candidates that are fitted after a linear look at all.
+const LOOKED_AT: usize = 5;
+/// Kinds of rounding that are simulated after a linear look at all.
+const COUNTS: usize = 8;
+/// First step of the refinement, counts.
+const COUNT_STEP: f64 = 0.2;
+/// Further sets that are tried as the start of a larger one, and candidates that are fitted beside each.
+const LEADERS: usize = 2;
+const LOOKED_AT_BY_LEADERS: usize = 3;
+
+/// Fits sets of causes.
+pub(crate) struct Searcher<'a> {
+    /// Fits one set.
+    pub fitter: Fitter<'a>,
+}
+
+/// A fitted set, and the sensitivities of its parameters where it ends.
+struct Set<'a> {
+    causes: &'a [usize],
+    values: &'a [f64],
+    columns: &'a [Vec<f64>],
+}
+
+impl<'a> Set<'a> {
+    const NONE: Set<'static> = Set {
+        causes: &[],
+        values: &[],
+        columns: &[],
+    };
+
+    fn of(fit: &'a Fit, columns: &'a [Vec<f64>]) -> Self {
+        Set {
+            causes: &fit.causes,
+            values: &fit.values,
+            columns,
+        }
+    }
+}
+
+impl Searcher<'_> {
+    fn id(&self, cause: usize) -> &'static str {
+        self.fitter.candidates[cause].cause.id
+    }
+
+    fn is_smooth(&self, cause: usize) -> bool {
+        self.fitter.candidates[cause].cause.search == Search::Own
+    }
+
+    fn names(&self, fit: &Fit) -> String {
+        let names: Vec<&str> = fit.causes.iter().map(|cause| self.id(*cause)).collect();
+        names.join(" + ")
+    }
+
+    /// Every candidate alone. Those that explain next to nothing at first order are not followed further.
+    pub fn singles(&self) -> Vec<Fit> {
+        let null = self.fitter.null;
+        let all: Vec<usize> = (0..self.fitter.candidates.len()).collect();
+        let first_order = parallel::map(&all, |cause| {
+            gained(&self.fitter.sensitivity(*cause, null), &null.residual)
+        });
+        let most = first_order.iter().copied().fold(0.0, f64::max);
+        parallel::map(&all, |cause| {
+            let follow = first_order[*cause] > (FOLLOWED * most).max(LEAST_FOLLOWED);
+            if self.is_smooth(*cause) && !follow {
+                return self.fitter.unmoved(*cause, first_order[*cause]);
+            }
+            self.added(&Set::NONE, *cause, null)
+        })
+    }
+
+    /// Chi-square with a price for each parameter.
+    fn score(&self, fit: &Fit) -> f64 {
+        let price = libm::log(self.fitter.problem.count() as f64);
+        fit.state.chi2 + price * fit.values.len() as f64
+    }
+
+    /// Scatter over that of independent noise, where a fit ends.
+    pub fn inflation(&self, fit: &Fit) -> f64 {
+        noise::inflation(self.fitter.problem, &fit.state.residual)
+    }
+
+    fn sort(&self, fits: &mut [Fit]) {
+        fits.sort_by(|a, b| self.score(a).total_cmp(&self.score(b)));
+    }
+
+    /// `set` and `cause`, fitted from where it begins best.
+    fn added(&self, set: &Set<'_>, cause: usize, from: &State) -> Fit {
+        let (_, start) = self.begin(set, cause, from);
+        let values = [set.values, &start].concat();
+        self.fitter.from(&[set.causes, &[cause]].concat(), &values, from)
+    }
+
+    /// Chi-square that `set` with `cause` would have at first order, from the best start of `cause`, and that start.
+    fn begin(&self, set: &Set<'_>, cause: usize, from: &State) -> (f64, Vec<f64>) {
+        let starts = self.starts(cause, from);
+        if self.is_smooth(cause) {
+            let mut columns = set.columns.to_vec();
+            columns.extend(self.fitter.sensitivity(cause, from));
+            let own = self.fitter.candidates[cause].own.clone();
+            return (from.chi2 - gained(&columns, &from.residual), own);
+        }
+        let looks = starts.into_iter().map(|start| {
+            let state = self.fitter.state_at(&[cause], &start, from, 0).0;
+            // the initial states and the others may have to follow before it shows what it is worth
+            let mut left = state.residual.clone();
+            self.fitter.basis.project(&mut left);
+            let mut columns = set.columns.to_vec();
+            columns.extend(self.fitter.sensitivity(cause, &state));
+            (dot(&left, &left) - gained(&columns, &left), start)
+        });
+        let best = looks.min_by(|a, b| a.0.total_cmp(&b.0));
+        match (best, self.id(cause)) {
+            (Some((_, step)), "duty_quantisation") => self.refined(set, cause, from, step[0].recip()),
+            (Some(best), _) => best,
+            (None, _) => (f64::INFINITY, self.fitter.candidates[cause].own.clone()),
+        }
+    }
+
+    /// A duty counter near `counts` that fits better, and the chi-square expected with it.
+    fn refined(&self, set: &Set<'_>, cause: usize, from: &State, counts: f64) -> (f64, Vec<f64>) {
+        let look = |counts: f64| {
+            let mut left = self.fitter.state_at(&[cause], &[counts.recip()], from, 0).0.residual;
+            self.fitter.basis.project(&mut left);
+            dot(&left, &left) - gained(set.columns, &left)
+        };
+        let (mut best, mut at, mut step) = (look(counts), counts, COUNT_STEP);
+        while step > COUNT_STEP / 20.0 {
+            let next = [at - step, at + step].map(|counts| (look(counts), counts));
+            let next = if next[0].0 < next[1].0 { next[0] } else { next[1] };
+            match next.0 < best {
+                true => (best, at) = next,
+                false => step *= 0.5,
+            }
+        }
+        // counters have whole counts
+        let whole = libm::round(at);
+        let of_whole = look(whole);
+        if of_whole < best + TIE {
+            (best, at) = (of_whole, whole);
+        }
+        (best, vec![at.recip()])
+    }
+
+    /// Where the fit of a candidate may begin; what the residual itself tells is read off it.
+    fn starts(&self, cause: usize, from: &State) -> Vec<Vec<f64>> {
+        let (problem, residual) = (self.fitter.problem, &from.residual);
+        match self.id(cause) {
+            "input_ripple" => {
+                let line = spectrum::strongest_line(problem, residual, 3)
+                    .or_else(|| spectrum::strongest_line(problem, residual, 0));
+                vec![line.map_or(vec![0.0, 100.0, 0.0], |line| {
+                    vec![line.amplitude, line.frequency, line.phase]
+                })]
+            }
+            "duty_quantisation" => {
+                let counts = duty_steps::likely(problem, self.fitter.basis, residual, COUNTS);
+                counts.into_iter().map(|counts| vec![counts.recip()]).collect()
+            }
+            _ => self.fitter.starts(cause),
+        }
+    }
+
+    /// Forward: the cause that helps most, as long as one helps; where structure is left, from several leaders; backward:
+    /// without each that no longer helps, and with each replaced by a better one.
+    pub fn grow(&self, singles: &[Fit], say: &(dyn Fn(&str) + Sync)) -> (Option<Fit>, Vec<f64>) {
+        let null = self.fitter.null;
+        let mut leaders = singles.to_vec();
+        self.sort(&mut leaders);
+        let Some(first) = leaders.first() else {
+            return (None, Vec::new());
+        };
+        if null.chi2 - first.state.chi2 < threshold(first.values.len(), self.inflation(first)) {
+            return (None, Vec::new());
+        }
+        let mut best = self.polished(first);
+        while best.causes.len() < MOST {
+            say(&format!("more than {}", self.names(&best)));
+            let mut larger = self.forward(&best, LOOKED_AT);
+            // two causes that resemble each other are best found from the one that explains less alone
+            if self.structure(&best) > 0.0 || larger.iter().any(|fit| self.is_worth(&best, fit)) {
+                for leader in self.distinct(&leaders).into_iter().skip(1).take(LEADERS) {
+                    larger.extend(self.forward(leader, LOOKED_AT_BY_LEADERS));
+                }
+            }
+            self.sort(&mut larger);
+            let Some(next) = larger.first() else { break };
+            if !self.is_worth(&best, next) {
+                break;
+            }
+            (best, leaders) = (self.swapped(self.polished(next)), larger);
+        }
+        self.backward(best)
+    }
+
+    /// The fit brought to its end.
+    fn polished(&self, fit: &Fit) -> Fit {
+        let fitter = Fitter {
+            effort: FINE,
+            ..self.fitter
+        };
+        fitter.from(&fit.causes, &fit.values, &fit.state)
+    }
+
+    /// The first fit of each set of ids.
+    fn distinct<'f>(&self, fits: &'f [Fit]) -> Vec<&'f Fit> {
+        let mut seen = Vec::new();
+        let is_new = |fit: &&Fit| {
+            let mut ids: Vec<&str> = fit.causes.iter().map(|cause| self.id(*cause)).collect();
+            ids.sort_unstable();
+            let new = !seen.contains(&ids);
+            seen.push(ids);
+            new
+        };
+        fits.iter().filter(is_new).collect()
+    }
+
+    /// How much structure a fit leaves.
+    fn structure(&self, fit: &Fit) -> f64 {
+        let left = structures(self.fitter.problem, self.fitter.null, &fit.state, 1.0);
+        left.iter().map(|one| one.slow.max(one.mean_square) - 1.0).sum()
+    }
+
+    /// Whether a larger set is worth its parameters: more than noise would gain, and more than the model's accuracy could
+    /// make it gain, unless it is that which takes away structure.
+    fn is_worth(&self, smaller: &Fit, larger: &Fit) -> bool {
+        let gain = smaller.state.chi2 - larger.state.chi2;
+        let more = larger.values.len().saturating_sub(smaller.values.len());
+        let explained = self.fitter.null.chi2 - larger.state.chi2;
+        gain >= threshold(more, self.inflation(larger))
+            && (gain >= ACCURACY * ACCURACY * explained || self.structure(larger) < 0.5 * self.structure(smaller))
+    }
+
+    /// Sets that are one cause larger: those of the candidates that look best at first order.
+    fn forward(&self, best: &Fit, count: usize) -> Vec<Fit> {
+        let columns = self.sensitivities(&best.causes, &best.state);
+        let set = Set::of(best, &columns);
+        let looks = self.looks(&set, &self.others(&best.causes), &best.state);
+        let least = 0.3 * threshold(1, 1.0);
+        let looks = looks.into_iter().filter(|(gain, _)| *gain > least).collect();
+        parallel::map(&top(looks, count), |cause| self.added(&set, *cause, &best.state))
+    }
+
+    fn sensitivities(&self, causes: &[usize], state: &State) -> Vec<Vec<f64>> {
+        causes
+            .iter()
+            .flat_map(|cause| self.fitter.sensitivity(*cause, state))
+            .collect()
+    }
+
+    /// What each of `causes` would gain beside a set, at first order.
+    fn looks(&self, set: &Set<'_>, causes: &[usize], state: &State) -> Vec<(f64, usize)> {
+        parallel::map(causes, |cause| (state.chi2 - self.begin(set, *cause, state).0, *cause))
+    }
+
+    /// Candidates of other ids.
+    fn others(&self, causes: &[usize]) -> Vec<usize> {
+        let all = 0..self.fitter.candidates.len();
+        all.filter(|c| causes.iter().all(|known| self.id(*known) != self.id(*c)))
+            .collect()
+    }
+
+    /// The set with one cause replaced, if that is clearly better.
+    fn swapped(&self, fit: Fit) -> Fit {
+        let mut best = fit;
+        for member in 0..best.causes.len() {
+            for other in self.replacements(&best, member, 3) {
+                if self.score(&other) < self.score(&best) - SWAP {
+                    best = self.polished(&other);
+                    break;
+                }
+            }
+        }
+        best
+    }
+
+    /// Fits of the set with other causes in the place of one: those that look best at first order where the kept ones alone
+    /// end.
+    fn replacements(&self, fit: &Fit, member: usize, count: usize) -> Vec<Fit> {
+        let kept = without(&fit.causes, member);
+        let kept = self.fitter.from(&kept, &self.values_of(fit, &kept), self.fitter.null);
+        let columns = self.sensitivities(&kept.causes, &kept.state);
+        let set = Set::of(&kept, &columns);
+        let looks = self.looks(&set, &self.others(&fit.causes), &kept.state);
+        let most = looks.iter().map(|look| look.0).fold(0.0, f64::max);
+        let looks = looks.into_iter().filter(|look| look.0 > FOLLOWED * most).collect();
+        parallel::map(&top(looks, count), |cause| self.added(&set, *cause, &kept.state))
+    }
+
+    fn values_of(&self, fit: &Fit, kept: &[usize]) -> Vec<f64> {
+        let places = self.fitter.places(&fit.causes);
+        let of = |(place, value): (&(usize, usize), &f64)| kept.contains(&place.0).then_some(*value);
+        places.iter().zip(&fit.values).filter_map(of).collect()
+    }
+
+    /// Drops what is not needed; the evidence of what is.
+    fn backward(&self, fit: Fit) -> (Option<Fit>, Vec<f64>) {
+        let mut best = fit;
+        loop {
+            let members: Vec<usize> = (0..best.causes.len()).collect();
+            let fewer: Vec<Option<Fit>> = parallel::map(&members, |member| {
+                let kept = without(&best.causes, *member);
+                let values = self.values_of(&best, &kept);
+                (!kept.is_empty()).then(|| self.fitter.from(&kept, &values, self.fitter.null))
+            });
+            let chi2 = |fit: &Option<Fit>| fit.as_ref().map_or(self.fitter.null.chi2, |fit| fit.state.chi2);
+            let evidence: Vec<f64> = fewer.iter().map(|fit| chi2(fit) - best.state.chi2).collect();
+            let weakest = members.iter().min_by(|a, b| evidence[**a].total_cmp(&evidence[**b]));
+            let Some(weakest) = weakest.copied() else {
+                return (None, Vec::new());
+            };
+            let parameters = self.fitter.places(&best.causes[weakest..=weakest]).len();
+            let needed = threshold(parameters, self.inflation(&best));
+            match (&fewer[weakest], evidence[weakest] < needed) {
+                (Some(fewer), true) => best = fewer.clone(),
+                _ => return (Some(best), evidence),
+            }
+        }
+    }
+
+    /// For each cause of a set, what explains the data as well in its place.
+    pub fn rivals(&self, best: &Fit, evidence: &[f64], singles: &[Fit]) -> Vec<Vec<Fit>> {
+        let members = best.causes.iter().enumerate();
+        members
+            .map(|(member, own)| {
+                let tolerance = (TIE * self.inflation(best)).max(TIE_SHARE * evidence[member]);
+                let all: Vec<Fit> = match best.causes.len() {
+                    1 => singles.to_vec(),
+                    _ => self.replacements(best, member, 8),
+                };
+                let is_rival = |fit: &Fit| {
+                    let other = fit.causes.last().is_some_and(|cause| self.id(*cause) != self.id(*own));
+                    other && fit.state.chi2 <= best.state.chi2 + tolerance
+                };
+                let near = |fit: &Fit| fit.state.chi2 <= best.state.chi2 + NEAR * tolerance;
+                let all = all
+                    .iter()
+                    .map(|fit| if near(fit) { self.polished(fit) } else { fit.clone() });
+                let mut list: Vec<Fit> = all.filter(is_rival).collect();
+                list.sort_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
+                let mut seen = Vec::new();
+                list.retain(|fit| {
+                    let name = fit.causes.last().map(|cause| self.id(*cause));
+                    let new = !seen.contains(&name);
+                    seen.push(name);
+                    new
+                });
+                list
+            })
+            .collect()
+    }
+}
+
+fn without(causes: &[usize], member: usize) -> Vec<usize> {
+    let mut kept = causes.to_vec();
+    kept.remove(member);
+    kept
+}
+
+/// What columns explain of a residual, linearly.
+pub(crate) fn gained(columns: &[Vec<f64>], residual: &[f64]) -> f64 {
+    let right: Vec<f64> = columns.iter().map(|column| dot(column, residual)).collect();
+    let matrix: Vec<Vec<f64>> = columns
+        .iter()
+        .enumerate()
+        .map(|(n, a)| {
+            let row = columns.iter().enumerate();
+            row.map(|(m, b)| dot(a, b) * if n == m { 1.0 + 1e-9 } else { 1.0 })
+                .collect()
+        })
+        .collect();
+    dot(&solve(&matrix, &right), &right)
+}
+
+fn top(mut looks: Vec<(f64, usize)>, count: usize) -> Vec<usize> {
+    looks.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    looks.into_iter().take(count).map(|(_, cause)| cause).collect()
+}

@@ -1,0 +1,303 @@
+//! What is wrong with a table is either an error with its place, or a repair that is reported: one line for each.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use diagnose::columns::Columns;
+use diagnose::csv::Table;
+use diagnose::record::Record;
+use plant::{Faults, Parameters};
+
+const HEADER: &str = "t,d,v_o,i_l,v_in,r_load";
+
+/// Forty rows at the middle of the period, at 100 V and 5 A.
+fn good() -> Vec<String> {
+    let row = |n: usize| {
+        let (v, i) = (100.0 + 0.137 * (n % 7) as f64, 5.0 + 0.061 * (n % 5) as f64);
+        let v_in = 200.0 + 0.11 * (n % 3) as f64;
+        format!("{:.6},0.5,{v:.3},{i:.3},{v_in:.2},20", (n as f64 + 0.5) * 1e-4)
+    };
+    std::iter::once(HEADER.to_owned()).chain((0..40).map(row)).collect()
+}
+
+fn text(lines: &[String]) -> String {
+    lines.iter().fold(String::new(), |mut text, line| {
+        let _ = writeln!(text, "{line}");
+        text
+    })
+}
+
+fn read(bytes: &[u8]) -> Result<Record, Faults> {
+    let table = Table::parse(Path::new("run.csv"), bytes)?;
+    Record::new(table, &Columns::default(), &Parameters::paper_table())
+}
+
+/// The good table with one line changed (0 is the header).
+fn with(line: usize, change: impl Fn(&str) -> String) -> String {
+    let mut lines = good();
+    lines[line] = change(&lines[line]);
+    text(&lines)
+}
+
+/// The good table with a cell of every row changed.
+fn column(index: usize, change: impl Fn(&str) -> String) -> String {
+    let mut lines = good();
+    for line in &mut lines[1..] {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        cells[index] = change(&cells[index]);
+        *line = cells.join(",");
+    }
+    text(&lines)
+}
+
+fn times(factor: f64) -> impl Fn(&str) -> String {
+    move |cell| format!("{}", factor * cell.parse::<f64>().unwrap())
+}
+
+fn header(from: &str, to: &str) -> String {
+    with(0, |line| line.replace(from, to))
+}
+
+#[test]
+fn the_good_table_is_good() {
+    let record = read(text(&good()).as_bytes()).unwrap();
+    assert_eq!((record.rows(), record.repairs.len()), (40, 0), "{:?}", record.repairs);
+}
+
+#[test]
+fn what_cannot_be_used_is_an_error_that_says_where_and_what_to_do() {
+    let rows = good();
+    let mut unsorted = rows.clone();
+    unsorted.swap(10, 11);
+    let cases: Vec<(&str, Vec<u8>, &str, Option<usize>)> = vec![
+        ("empty", Vec::new(), "the table is empty", None),
+        ("header only", text(&rows[..1]).into_bytes(), "too few rows", None),
+        ("one row", text(&rows[..2]).into_bytes(), "too few rows", None),
+        (
+            "no header",
+            text(&rows[1..]).into_bytes(),
+            "the first line holds numbers",
+            None,
+        ),
+        (
+            "a word",
+            with(7, |l| l.replace("0.5", "half")).into_bytes(),
+            "`d` holds no number",
+            Some(8),
+        ),
+        (
+            "infinity",
+            with(7, |l| l.replace("0.5", "inf")).into_bytes(),
+            "`d` holds no number",
+            Some(8),
+        ),
+        (
+            "short line",
+            with(9, |l| l[..12].to_owned()).into_bytes(),
+            "another number of cells",
+            Some(10),
+        ),
+        (
+            "long line",
+            with(9, |l| format!("{l},1")).into_bytes(),
+            "another number of cells",
+            Some(10),
+        ),
+        (
+            "thousands",
+            with(9, |l| l.replace(",20", ",1,000")).into_bytes(),
+            "another number of cells",
+            Some(10),
+        ),
+        ("unsorted", text(&unsorted).into_bytes(), "time goes backward", Some(12)),
+        (
+            "no time in a row",
+            with(4, |l| l.replacen("0.000350", "NaN", 1)).into_bytes(),
+            "without time",
+            Some(5),
+        ),
+        ("time in us", column(0, times(1e6)).into_bytes(), "sample rate", None),
+        ("time in ms", column(0, times(1e3)).into_bytes(), "sample rate", None),
+        (
+            "duty in percent",
+            column(1, times(100.0)).into_bytes(),
+            "a duty outside 0 to 1",
+            Some(2),
+        ),
+        (
+            "negative duty",
+            with(3, |l| l.replace(",0.5,", ",-0.5,")).into_bytes(),
+            "a duty outside 0 to 1",
+            Some(4),
+        ),
+        (
+            "millivolts",
+            column(2, times(1e3)).into_bytes(),
+            "v_o is not in V",
+            None,
+        ),
+        (
+            "kilovolts",
+            column(2, times(1e-3)).into_bytes(),
+            "v_o is not in V",
+            None,
+        ),
+        (
+            "milliamperes",
+            column(3, times(1e3)).into_bytes(),
+            "i_l is not in A",
+            None,
+        ),
+        (
+            "input in millivolts",
+            column(4, times(1e3)).into_bytes(),
+            "v_in is not in V",
+            None,
+        ),
+        (
+            "exchanged",
+            header("v_o,i_l", "i_l,v_o").into_bytes(),
+            "v_o and i_l look exchanged",
+            None,
+        ),
+        (
+            "exchanged voltages",
+            header("v_o,i_l,v_in", "v_in,i_l,v_o").into_bytes(),
+            "v_o and v_in look exchanged",
+            None,
+        ),
+        (
+            "twice",
+            header("i_l", "v_o").into_bytes(),
+            "two columns are called `v_o`",
+            None,
+        ),
+        ("no duty", header(",d,", ",x,").into_bytes(), "no duty column", None),
+        ("no load", header("r_load", "r").into_bytes(), "what the load is", None),
+        (
+            "negative load",
+            column(5, times(-1.0)).into_bytes(),
+            "a negative load",
+            Some(2),
+        ),
+        (
+            "nothing measured",
+            header("v_o,i_l,v_in", "a,b,c").into_bytes(),
+            "nothing is measured",
+            None,
+        ),
+        (
+            "all stuck",
+            "t,d,v_o,r_load\n"
+                .chars()
+                .chain((0..40).flat_map(|n| {
+                    format!("{:.6},0.5,99.5,20\n", (n as f64 + 0.5) * 1e-4)
+                        .chars()
+                        .collect::<Vec<_>>()
+                }))
+                .collect::<String>()
+                .into_bytes(),
+            "nothing is measured",
+            None,
+        ),
+        ("UTF-16", vec![0xff, 0xfe, b't', 0, b',', 0], "not UTF-8", None),
+        (
+            "units of another kind",
+            {
+                let mut lines = rows.clone();
+                lines.insert(1, "ms,,mV,A,V,ohm".to_owned());
+                text(&lines).into_bytes()
+            },
+            "units that are not SI",
+            Some(2),
+        ),
+    ];
+    for (name, bytes, problem, line) in cases {
+        let faults = read(&bytes).expect_err(name);
+        let fault = &faults.list[0];
+        assert!(fault.problem.contains(problem), "{name}: {}", fault.problem);
+        assert_eq!(fault.line_column().map(|(line, _)| line), line, "{name}");
+        assert!(faults.to_string().contains("run.csv"), "{name}: {faults}");
+        let helps = fault.hint.is_some() || fault.expected.is_some() || fault.found.is_some();
+        assert!(helps, "{name}: {faults}");
+    }
+}
+
+#[test]
+fn what_can_be_repaired_is_repaired_and_said() {
+    let rows = good();
+    let semicolons = text(&rows).replace(',', ";").replace('.', ",");
+    let mut repeated = rows.clone();
+    repeated.insert(6, rows[5].clone());
+    let mut gap = rows.clone();
+    gap.drain(15..22);
+    let mut units = rows.clone();
+    units.insert(1, "second,,Volt,Ampere,V,ohm".to_owned());
+    let jitter = column(0, |cell| {
+        let t: f64 = cell.parse().unwrap();
+        format!("{:.7}", t + if (t * 1e4) as usize % 3 == 1 { 5e-6 } else { 0.0 })
+    });
+    let cut = text(&rows);
+    let cases: Vec<(&str, String, &str)> = vec![
+        ("semicolons", semicolons, "decimal commas"),
+        ("repeated time", text(&repeated), "1 rows repeat the time"),
+        ("gap", text(&gap), "1 gaps"),
+        ("cut", cut[..cut.len() - 12].to_owned(), "is cut off"),
+        ("jitter", jitter, "jitter by up to"),
+        (
+            "empty cells",
+            with(5, |l| {
+                l.replacen(",100.", ",,", 1).replace(",,548", ",").replace(",,411", ",")
+            }),
+            "rows without v_o",
+        ),
+        ("stuck column", column(3, |_| "7.0".to_owned()), "i_l is constant"),
+        (
+            "missing duty",
+            with(6, |l| l.replace(",0.5,", ",,")),
+            "1 rows without duty",
+        ),
+        ("units", text(&units), "holds units"),
+    ];
+    for (name, text, repair) in cases {
+        let record = read(text.as_bytes()).unwrap_or_else(|faults| panic!("{name}: {faults}\n{text}"));
+        let found = record.repairs.iter().any(|said| said.contains(repair));
+        assert!(found, "{name}: {:?}", record.repairs);
+    }
+}
+
+#[test]
+fn what_is_only_another_way_of_writing_it_changes_nothing() {
+    let plain = read(text(&good()).as_bytes()).unwrap();
+    let marked = format!("\u{feff}{}", text(&good()));
+    let carriage = text(&good()).replace('\n', "\r\n");
+    let old = text(&good()).replace('\n', "\r");
+    let tabs = text(&good()).replace(',', "\t");
+    let blanks = text(&good()).replace(',', "  ");
+    let quoted = header("v_o", "\"v_o\"");
+    let millivolts = {
+        let mut lines: Vec<String> = column(2, times(1e3)).lines().map(str::to_owned).collect();
+        lines[0] = lines[0].replace("v_o", "v_o [mV]");
+        text(&lines)
+    };
+    for (name, other) in [
+        ("mark", marked),
+        ("carriage returns", carriage),
+        ("old line ends", old),
+        ("tabs", tabs),
+        ("blanks", blanks),
+        ("quotes", quoted),
+        ("unit in the name", millivolts),
+    ] {
+        let record = read(other.as_bytes()).unwrap_or_else(|faults| panic!("{name}: {faults}"));
+        let same = |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9);
+        assert!(same(&record.measured[0], &plain.measured[0]), "{name}");
+        assert!(
+            same(&record.duty, &plain.duty) && record.repairs.is_empty(),
+            "{name}: {:?}",
+            record.repairs
+        );
+    }
+}

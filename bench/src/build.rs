@@ -89,7 +89,7 @@ impl Bench {
         for compiler in target.c_compilers {
             for level in levels {
                 self.object(compiler, level, &format!("{}.c", policy.name), extra)?;
-                let mut row = self.counted(target, "unit.o", &["main.c"])?;
+                let mut row = self.counted(target, &["unit.o"], &["main.c"])?;
                 row.flash = Some(size(target, &self.path("unit.o"))?);
                 let family = if compiler.program == "clang" { "clang" } else { "gcc" };
                 row.compiler = format!("{family} {level}");
@@ -99,7 +99,7 @@ impl Bench {
         // Rust has loops in assembly for integers only
         if !assembly || policy::scales::is_integer(policy.numeric_format) {
             self.rust_archive(target, assembly)?;
-            let mut row = self.counted(target, "unit.a", &[])?;
+            let mut row = self.counted(target, &["unit.a"], &[])?;
             row.compiler = "rustc -O3".to_owned();
             rows.push(row);
         }
@@ -123,7 +123,7 @@ impl Bench {
             ("naive C, contracted", &["-ffp-contract=fast"][..]),
         ] {
             self.object(&linker(target)?, "-O2", "naive.c", extra)?;
-            let mut row = self.counted(target, "unit.o", &["main.c"])?;
+            let mut row = self.counted(target, &["unit.o"], &["main.c"])?;
             row.flash = Some(size(target, &self.path("unit.o"))?);
             row.compiler = "gcc -O2".to_owned();
             row.policy = "bench".to_owned();
@@ -185,11 +185,11 @@ impl Bench {
         self.folder.path().join(name)
     }
 
-    fn put(&self, name: &str, text: &str) -> Result<(), Failure> {
+    pub(crate) fn put(&self, name: &str, text: &str) -> Result<(), Failure> {
         std::fs::write(self.path(name), text).map_err(|error| Failure(format!("{name}: {error}")))
     }
 
-    fn put_naive(&self, policy: &Policy) -> Result<(), Failure> {
+    pub(crate) fn put_naive(&self, policy: &Policy) -> Result<(), Failure> {
         let (header, text) = sources::naive(policy);
         self.put("naive.h", &header)?;
         self.put("naive.c", &text)
@@ -200,7 +200,7 @@ impl Bench {
         files.files.iter().try_for_each(|(name, text)| self.put(name, text))
     }
 
-    fn object(&self, compiler: &CCompiler, level: &str, unit: &str, extra: &[&str]) -> Result<(), Failure> {
+    pub(crate) fn object(&self, compiler: &CCompiler, level: &str, unit: &str, extra: &[&str]) -> Result<(), Failure> {
         let mut command = Command::new(compiler.program);
         command.current_dir(self.folder.path()).args(compiler.machine_flags);
         if compiler.program == "clang" {
@@ -231,8 +231,13 @@ impl Bench {
         run(command.args(["lib.rs", "-o", "unit.a"])).map(|_| ())
     }
 
+    /// Code and tables of the last linked program, with the board's.
+    pub(crate) fn linked_flash(&self, target: &TargetSpec) -> Result<u64, Failure> {
+        size(target, &self.path("program.elf"))
+    }
+
     /// Links with the board, runs, reads counts and words.
-    fn counted(&self, target: &TargetSpec, unit: &str, mains: &[&str]) -> Result<Row, Failure> {
+    pub(crate) fn counted(&self, target: &TargetSpec, units: &[&str], mains: &[&str]) -> Result<Row, Failure> {
         let (board, linker) = (board(target)?, linker(target)?);
         board.files.iter().try_for_each(|file| self.put(file.name, file.text))?;
         let sources = board.files.iter().map(|file| file.name);
@@ -245,7 +250,8 @@ impl Bench {
             .args(board.linker_script.into_iter().flat_map(|script| ["-T", script]))
             .args(mains)
             .args(sources)
-            .args([unit, "-lgcc", "-o", "program.elf"]);
+            .args(units)
+            .args(["-lgcc", "-o", "program.elf"]);
         run(&mut link)?;
         let symbols = run(Command::new(tool(target, "nm")?).arg(self.path("program.elf")))?;
         let symbols = String::from_utf8_lossy(&symbols).into_owned();
@@ -283,10 +289,9 @@ impl Bench {
             )));
         }
         let counts = std::fs::read_to_string(&counts).map_err(|error| Failure(error.to_string()))?;
-        let counts: Vec<u64> = counts
-            .lines()
-            .filter_map(|line| line.split(' ').next()?.parse().ok())
-            .collect();
+        // instructions, accesses to memory, jumps
+        let instructions = |line: &str| line.split_whitespace().next()?.parse().ok();
+        let counts: Vec<u64> = counts.lines().filter_map(instructions).collect();
         let (q_values, step) = counts.split_at_checked(CALLS).unwrap_or_default();
         Ok(Row {
             q_values: extremes(q_values),
@@ -298,7 +303,7 @@ impl Bench {
     }
 }
 
-fn blank(core: &str) -> Row {
+pub(crate) fn blank(core: &str) -> Row {
     Row {
         policy: String::new(),
         core: core.to_owned(),
@@ -342,7 +347,7 @@ fn size(target: &TargetSpec, object: &Path) -> Result<u64, Failure> {
         .ok_or_else(|| Failure(format!("{tool}: no size")))
 }
 
-fn run(command: &mut Command) -> Result<Vec<u8>, Failure> {
+pub(crate) fn run(command: &mut Command) -> Result<Vec<u8>, Failure> {
     let output = command.stdin(Stdio::null()).env("LC_ALL", "C").output();
     let program = command.get_program().to_string_lossy().into_owned();
     let output = output.map_err(|error| Failure(format!("{program}: {error}")))?;

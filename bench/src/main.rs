@@ -1,10 +1,11 @@
 //! `cargo xtask bench [--json]`: counts instructions of the bench network's controllers, ours and naive code.
 //!
 //! Microcontrollers are emulated by QEMU: instructions and their number are those of the processor, time is not. The
-//! host is timed, ours beside the naive loop in the same process. Peers that are not built here stand in
-//! `docs/kernels.md` by the figures others stated.
+//! host is timed, ours beside the naive loop in the same process. Peers are built and counted in the same run where a
+//! registry has them; the others stand by the figures their measurers stated.
 
 mod build;
+mod peers;
 mod sources;
 mod table;
 
@@ -19,17 +20,26 @@ use table::Row;
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let json = match arguments.as_slice() {
-        [] => false,
-        [flag] if flag == "--json" => true,
+    let (json, only_peers, picture) = match arguments.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
+        [] => (false, false, None),
+        ["--json"] => (true, false, None),
+        ["--peers"] => (false, true, None),
+        ["--picture", path] => (false, true, Some(PathBuf::from(path))),
         _ => {
-            eprintln!("error: `bench` takes --json or nothing");
+            eprintln!(
+                "error: `bench` takes --json, --peers (Cortex-M4F alone), --picture FILE.svg (of that), or nothing"
+            );
             return ExitCode::from(2);
         }
     };
-    let text = rows().and_then(|rows| {
+    let text = rows(only_peers).and_then(|rows| {
         table::one_checksum_per_format(&rows)?;
         table::one_count_per_kernel(&rows)?;
+        if let Some(path) = picture {
+            let picture = peers::picture(&rows).map_err(|error| Failure(error.to_string()))?;
+            std::fs::write(&path, picture.to_string())
+                .map_err(|error| Failure(format!("{}: {error}", path.display())))?;
+        }
         table::text(&rows, json)
     });
     match text {
@@ -47,6 +57,9 @@ fn main() -> ExitCode {
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
+
+/// Where peers are counted.
+const PEERS_CORE: &str = "cortex-m4f";
 
 /// What the bench counts of a policy: format, and whether the loops in assembly are asked for.
 const VARIANTS: [(NumericFormat, bool); 7] = [
@@ -71,7 +84,8 @@ fn is_counted(target: &TargetSpec, name: &str, format: NumericFormat, assembly: 
     }
 }
 
-fn rows() -> Result<Vec<Row>, Failure> {
+/// With `only_peers` what stands beside the peers alone: the bench network on the core that they are counted on.
+fn rows(only_peers: bool) -> Result<Vec<Row>, Failure> {
     let bench = Bench::new()?;
     let mut rows = Vec::new();
     for (name, path) in [
@@ -79,8 +93,10 @@ fn rows() -> Result<Vec<Row>, Failure> {
         ("buck12", "examples/buck12/policy.toml"),
     ] {
         let policy = policy::load(&root().join(path)).map_err(|faults| Failure(faults.to_string()))?;
+        let is_wanted = |target: &&TargetSpec| !only_peers || name == "bench" && target.name == PEERS_CORE;
         let emulated = targets::TARGETS.iter();
-        for target in emulated.filter(|target| matches!(target.runner, Runner::Emulated(_))) {
+        let emulated = emulated.filter(|target| matches!(target.runner, Runner::Emulated(_)));
+        for target in emulated.filter(is_wanted) {
             let levels: &[&str] = if target.name == "cortex-m4f" {
                 &["-O2", "-O3"]
             } else {
@@ -95,9 +111,14 @@ fn rows() -> Result<Vec<Row>, Failure> {
             if target.fpu != Fpu::None && name == "bench" {
                 rows.extend(bench.naive(&policy, target)?);
             }
+            if target.name == PEERS_CORE && name == "bench" {
+                rows.extend(peers::rows(&bench, &policy, target, &root()));
+            }
         }
     }
-    rows.extend(host(&bench)?);
+    if !only_peers {
+        rows.extend(host(&bench)?);
+    }
     Ok(rows)
 }
 

@@ -6,6 +6,7 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use crate::build::Failure;
+use crate::peers::{self, PEER};
 
 /// One measured line.
 #[derive(Debug, Clone, Serialize)]
@@ -43,7 +44,9 @@ pub struct Row {
 /// # Errors
 /// The rows that differ.
 pub fn one_checksum_per_format(rows: &[Row]) -> Result<(), Failure> {
-    let ours = rows.iter().filter(|row| !row.variant.starts_with("naive"));
+    let ours = rows
+        .iter()
+        .filter(|row| !row.variant.starts_with("naive") && !row.variant.starts_with(PEER));
     let mut known: BTreeMap<(&str, &str), &Row> = BTreeMap::new();
     for row in ours {
         let format = row.variant.split(',').next().unwrap_or_default();
@@ -84,7 +87,7 @@ pub fn text(rows: &[Row], json: bool) -> Result<String, Failure> {
         "| policy | core | compiler | variant | q_values | step | flash B | stack B | checksum | time / naive |\n\
          |---|---|---|---|---|---|---|---|---|---|\n",
     );
-    for row in rows {
+    for row in rows.iter().filter(|row| !row.variant.starts_with(PEER)) {
         let number = |value: Option<u64>| value.map(|value| value.to_string()).unwrap_or_default();
         // writing to a String cannot fail
         let _ = writeln!(
@@ -102,6 +105,7 @@ pub fn text(rows: &[Row], json: bool) -> Result<String, Failure> {
             row.time_ratio.map(|ratio| format!("{ratio:.3}")).unwrap_or_default()
         );
     }
+    text += &peers::table(rows);
     Ok(text)
 }
 

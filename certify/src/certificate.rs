@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::cover::{Map, Share, Slice, StateBound};
 use crate::measured::{Measured, QValues};
-use crate::{Bound, Certifier, Coordinate, Domain, Memory};
+use crate::{AffineCopy, Bound, Certifier, Coordinate, Domain, Memory};
 
 /// How much is looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,6 +44,8 @@ pub struct Certificate {
     pub box_bound: Bound,
     /// Axes of the set of states.
     pub coordinates: Vec<Coordinate>,
+    /// Features that say nothing new.
+    pub copies: Vec<AffineCopy>,
     /// Proven for every state.
     pub state_bound: StateBound,
     /// Share of the states in proven boxes, estimated.
@@ -94,6 +96,7 @@ impl Certificate {
             digests: policy.digests.clone(),
             box_bound: certifier.box_bound(),
             coordinates: domain.coordinates().to_vec(),
+            copies: domain.copies(),
             state_bound: certifier.state_bound(&domain, effort.boxes),
             proven_share: certifier.share(&domain, &points, effort.depth),
             measured: certifier.measure(observations.iter().map(Vec::as_slice), q_values),

@@ -52,6 +52,19 @@ pub struct Domain {
     features: Vec<Affine>,
 }
 
+/// A feature that says nothing new: before the clips it is `factor * other + offset`, up to rounding.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct AffineCopy {
+    /// Index of the feature.
+    pub feature: usize,
+    /// Index of an earlier feature.
+    pub of: usize,
+    /// Factor.
+    pub factor: f64,
+    /// Offset.
+    pub offset: f64,
+}
+
 /// A box of coordinates, one interval each.
 pub type Cell = Vec<Interval>;
 
@@ -104,6 +117,26 @@ impl Domain {
     #[must_use]
     pub fn coordinates(&self) -> &[Coordinate] {
         &self.coordinates
+    }
+
+    /// Features that are affine copies of an earlier one.
+    #[must_use]
+    pub fn copies(&self) -> Vec<AffineCopy> {
+        let found = self.features.iter().enumerate().filter_map(|(feature, affine)| {
+            self.features[..feature].iter().enumerate().find_map(|(of, earlier)| {
+                let factor = affine.ratio(earlier)?;
+                let offset = affine.constant - factor * earlier.constant;
+                // an offset below the rounding of both is none
+                let is_rounding = offset.abs() <= affine.error + factor.abs() * earlier.error;
+                Some(AffineCopy {
+                    feature,
+                    of,
+                    factor,
+                    offset: if is_rounding { 0.0 } else { offset },
+                })
+            })
+        });
+        found.collect()
     }
 
     /// How much a coordinate moves the observation, per unit of its own: in widths of the features' bounds.
@@ -312,6 +345,18 @@ impl Affine {
         // the factor and the product are rounded
         self.error = (scale.abs() * self.error + 2.0 * UNIT_32 * self.magnitude) * 1.001 + TINY_32;
         self
+    }
+
+    /// The factor from another function's slopes to these, if there is one.
+    fn ratio(&self, other: &Self) -> Option<f64> {
+        let (first, slope) = self.factors.first()?;
+        let at =
+            |function: &Self, index: usize| function.factors.iter().find(|(found, _)| *found == index).map(|f| f.1);
+        let factor = slope / at(other, *first)?;
+        let is_copy = self.factors.iter().all(|(index, slope)| {
+            at(other, *index).is_some_and(|theirs| (slope - factor * theirs).abs() <= 1e-12 * slope.abs())
+        });
+        (is_copy && self.factors.len() == other.factors.len() && factor.is_finite() && factor != 0.0).then_some(factor)
     }
 
     /// Behind the clip, and within what the check has bounded.

@@ -17,6 +17,7 @@ mod domain;
 mod form;
 mod measured;
 mod network;
+mod neurons;
 mod propagate;
 
 use policy::{Interval, Policy};
@@ -24,8 +25,9 @@ use serde::Serialize;
 
 pub use certificate::{Certificate, Effort, Golden, Neighbourhood};
 pub use cover::{Map, Share, Slice, StateBound};
-pub use domain::{Cell, Coordinate, Domain, Memory};
+pub use domain::{AffineCopy, Cell, Coordinate, Domain, Memory};
 pub use measured::{Measured, QValues};
+pub use neurons::Neurons;
 
 use network::Network;
 use propagate::Enclosure;

@@ -64,6 +64,15 @@ impl Network {
 
 /// Runs the network over a set of observations.
 pub(crate) fn run(network: &Network, observation: Form) -> Enclosure {
+    let mut state = start(network, observation);
+    for layer in &network.layers {
+        state = self::layer(layer, &state).0;
+    }
+    state
+}
+
+/// The observation in the format.
+fn start(network: &Network, observation: Form) -> Enclosure {
     let shared = observation.shared.columns;
     let steps: Vec<Replacement> = network
         .input_rounding
@@ -71,17 +80,25 @@ pub(crate) fn run(network: &Network, observation: Form) -> Enclosure {
         .map(|radius| Replacement::scaled(0.0, *radius))
         .collect();
     let error = Form::zeros(observation.len(), shared).replaced(&steps, false, shared);
-    let mut state = Enclosure {
+    Enclosure {
         real: observation,
         error,
-    };
-    for layer in &network.layers {
-        state = self::layer(layer, &state);
     }
-    state
 }
 
-fn layer(layer: &Layer, input: &Enclosure) -> Enclosure {
+/// What the format adds up before each activation, layer by layer.
+pub(crate) fn sums(network: &Network, observation: Form) -> Vec<Vec<Interval>> {
+    let mut state = start(network, observation);
+    let step = |layer| {
+        let (next, sums) = self::layer(layer, &state);
+        state = next;
+        sums
+    };
+    network.layers.iter().map(step).collect()
+}
+
+/// Behind a layer, and the format's sums before its activation.
+fn layer(layer: &Layer, input: &Enclosure) -> (Enclosure, Vec<Interval>) {
     let magnitudes: Vec<f64> = (0..input.real.len())
         .map(|i| input.real.magnitude(i) + input.error.magnitude(i))
         .collect();
@@ -89,6 +106,7 @@ fn layer(layer: &Layer, input: &Enclosure) -> Enclosure {
     let error = layer.error(&input.error, &input.real);
     let mut real_steps = Vec::with_capacity(real.len());
     let mut error_steps = Vec::with_capacity(real.len());
+    let mut sums = Vec::with_capacity(real.len());
     for output in 0..real.len() {
         let (x, e) = (real.bounds(output), error.bounds(output));
         let magnitude = x.low.abs().max(x.high.abs()) + e.low.abs().max(e.high.abs());
@@ -103,6 +121,7 @@ fn layer(layer: &Layer, input: &Enclosure) -> Enclosure {
             low: (x.low + e.low).next_down(),
             high: (x.high + e.high).next_up(),
         };
+        sums.push(y);
         real_steps.push(relaxed(layer.activation, x));
         let (low, high) = slopes(layer.activation, x, y);
         let spread = 0.5 * (high - low) * e.low.abs().max(e.high.abs());
@@ -115,7 +134,7 @@ fn layer(layer: &Layer, input: &Enclosure) -> Enclosure {
     }
     let real = real.replaced(&real_steps, true, 0);
     let error = error.replaced(&error_steps, false, real.shared.columns);
-    Enclosure { real, error }
+    (Enclosure { real, error }, sums)
 }
 
 /// Line and radius around an activation over an interval.

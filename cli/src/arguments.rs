@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::commands::budget::Clock;
+
 /// From a trained policy to verified controller code.
 ///
 /// A policy is a folder with `policy.toml` (signals, features, actions, limits), the network's weights as safetensors
@@ -122,6 +124,10 @@ pub struct Compile {
     /// Do not build and run the code under the target's emulator to report memory, stack and instructions of a step
     #[arg(long)]
     pub no_costs: bool,
+    /// Clock of the processor, such as 168MHz: says whether a control step fits into its period (a model, never measured),
+    /// and which numeric format would
+    #[arg(long, value_name = "FREQUENCY", value_parser = Clock::parse, conflicts_with = "no_costs")]
+    pub clock: Option<Clock>,
     /// Also generate a way into a tool or onto a board, with the C core; may be repeated. kit: C test program with
     /// expected bits for your compiler and board. sfunction: Simulink block, also for dSPACE RTI. fmu2, fmu3: unit for
     /// co-simulation, FMI 2.0 or 3.0, sources and a binary for this machine

@@ -88,6 +88,9 @@ pub struct Sizes {
     /// observations, in any order of the additions; below 2^31.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accumulator_bound: Option<i64>,
+    /// Neurons left out per layer, because they are 0 for every observation; Q values keep their bits.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub removed_neurons: Vec<usize>,
     /// Integer formats: proven bound of |Q - Q in real arithmetic| over the clamped box of observations.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub q_error_bound: Option<f64>,
@@ -106,6 +109,10 @@ pub struct FileEntry {
 #[must_use]
 pub fn sizes(policy: &Policy, target: &TargetSpec) -> Sizes {
     let program = crate::lower(policy, target, Language::C);
+    let mut removed: Vec<usize> = crate::lower::simplify::removable(policy).iter().map(Vec::len).collect();
+    if removed.iter().all(|count| *count == 0) {
+        removed.clear();
+    }
     Sizes {
         signals: policy.signals.len(),
         features: policy.features.len(),
@@ -118,6 +125,7 @@ pub fn sizes(policy: &Policy, target: &TargetSpec) -> Sizes {
             NetworkCode::Integer(network) => Some(network.accumulator_bound),
             NetworkCode::Real { .. } => None,
         },
+        removed_neurons: removed,
         q_error_bound: policy::scales::is_integer(policy.numeric_format)
             .then(|| certify::Certifier::new(policy).box_bound().largest),
     }

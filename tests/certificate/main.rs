@@ -145,6 +145,16 @@ fn the_rounding_of_a_bias_is_in_the_bound() {
     assert!(error <= bound && bound <= 1.001 * error, "{error} {bound}");
 }
 
+#[test]
+fn the_examples_features_come_in_pairs_of_opposite_sign() {
+    let copies = Domain::of(&example(NumericFormat::F32), Memory::Free).copies();
+    let found: Vec<_> = copies
+        .iter()
+        .map(|copy| (copy.feature, copy.of, copy.factor, copy.offset))
+        .collect();
+    assert_eq!(found, [(3, 0, -1.0, 0.0), (4, 1, -1.0, 0.0), (5, 2, -1.0, 0.0)]);
+}
+
 /// States are described by coordinates; the controller's own observation must be what they say.
 #[test]
 fn the_observation_of_a_controller_lies_where_its_coordinates_say() {

@@ -4,6 +4,7 @@
 mod formats;
 mod macro_crate;
 mod mutations;
+mod simplified;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 

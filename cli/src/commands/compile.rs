@@ -9,6 +9,7 @@ use targets::TargetSpec;
 use verify::fmu::Archive;
 use verify::{Files, Selection};
 
+use super::budget;
 use super::costs::Measured;
 use super::verify::golden_text;
 use super::{bytes, grouped};
@@ -47,11 +48,14 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
         Measured::of(&policy, target, &selection.languages, &files)
     };
     if let (false, Some(manifest)) = (measured.costs.is_empty(), files.get_mut(manifest::FILE)) {
-        *manifest = manifest::with_costs(manifest, &measured.costs)?;
+        *manifest = manifest::with_costs(manifest, &measured.entries(&policy, options.clock))?;
     }
     let archives = verify::fmu::archives(&policy, target, &selection.doors, &files)?;
     write(&policy, target, &options.out, &files, &archives)?;
-    measured.say(&policy, target)?;
+    measured.say(&policy, target, options.clock)?;
+    if let Some(clock) = options.clock {
+        output::say(&budget::lines(&policy, target, &selection, &measured, clock)?.join("\n"))?;
+    }
     Ok(Outcome::Done)
 }
 
@@ -79,6 +83,15 @@ pub fn write(
             "note: integer network: no 32-bit sum can overflow, the largest is {} of {} over the whole box of observations",
             grouped(bound.unsigned_abs()),
             grouped(u64::from(i32::MAX.unsigned_abs()))
+        ))?;
+    }
+    let removed: usize = sizes.removed_neurons.iter().sum();
+    if removed > 0 {
+        let whole: usize = policy.layers.iter().map(|layer| layer.inputs * layer.outputs).sum();
+        output::say(&format!(
+            "note: {removed} neurons are 0 for every observation and left out: {} of {} MACs, the same bits",
+            grouped(sizes.macs as u64),
+            grouped(whole as u64)
         ))?;
     }
     if let Some(bound) = sizes.q_error_bound {

@@ -3,27 +3,47 @@
 use ::targets::TargetSpec;
 use codegen::Language;
 use policy::Policy;
+use serde::Serialize;
 use verify::Files;
 use verify::estimate::Estimate;
 use verify::measure::{Costs, usual_builds};
 
+use super::budget::{Budget, Clock};
 use super::verify::missing_text;
 use super::{bytes, grouped};
 use crate::{Failure, output};
 
-/// Costs of one build, as they stand in the manifest.
-#[derive(serde::Serialize)]
+/// Costs of one build.
+#[derive(Serialize)]
 #[serde(untagged)]
-pub enum Entry {
+pub enum Report {
     Measured(Costs),
     Estimated(Estimate),
+}
+
+impl Report {
+    fn measured(&self) -> Option<&Costs> {
+        match self {
+            Report::Measured(costs) => Some(costs),
+            Report::Estimated(_) => None,
+        }
+    }
 }
 
 /// Costs of the builds that could be made here, and what was not possible.
 #[derive(Default)]
 pub struct Measured {
-    pub costs: Vec<Entry>,
+    pub costs: Vec<Report>,
     notes: Vec<String>,
+}
+
+/// Costs of a build in the manifest.
+#[derive(Serialize)]
+pub struct Entry<'a> {
+    #[serde(flatten)]
+    costs: &'a Report,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    budget: Option<Budget>,
 }
 
 impl Measured {
@@ -34,8 +54,8 @@ impl Measured {
                 costs: usual
                     .measured
                     .into_iter()
-                    .map(Entry::Measured)
-                    .chain(usual.estimated.into_iter().map(Entry::Estimated))
+                    .map(Report::Measured)
+                    .chain(usual.estimated.into_iter().map(Report::Estimated))
                     .collect(),
                 notes: usual
                     .missing
@@ -50,12 +70,28 @@ impl Measured {
         }
     }
 
+    /// Costs of the builds that ran.
+    pub fn measured(&self) -> impl Iterator<Item = &Costs> {
+        self.costs.iter().filter_map(Report::measured)
+    }
+
+    /// As the manifest has them, with the budget at a clock.
+    pub fn entries(&self, policy: &Policy, clock: Option<Clock>) -> Vec<Entry<'_>> {
+        let budget = |report: &Report| Budget::of(report.measured()?, clock?, policy.sample_period);
+        let entry = |costs| Entry {
+            costs,
+            budget: budget(costs),
+        };
+        self.costs.iter().map(entry).collect()
+    }
+
     /// Prints a block per build.
-    pub fn say(&self, policy: &Policy, target: &TargetSpec) -> Result<(), Failure> {
-        for entry in &self.costs {
-            output::say(&match entry {
-                Entry::Measured(costs) => text(costs, policy, target),
-                Entry::Estimated(estimate) => estimated(estimate, target),
+    pub fn say(&self, policy: &Policy, target: &TargetSpec, clock: Option<Clock>) -> Result<(), Failure> {
+        let clock = clock.map(|clock| clock.hz).or(target.clock_hz.map(f64::from));
+        for report in &self.costs {
+            output::say(&match report {
+                Report::Measured(costs) => text(costs, policy, target, clock),
+                Report::Estimated(estimate) => estimated(estimate, target),
             })?;
         }
         for note in &self.notes {
@@ -76,7 +112,7 @@ fn estimated(estimate: &Estimate, target: &TargetSpec) -> String {
     )
 }
 
-fn text(costs: &Costs, policy: &Policy, target: &TargetSpec) -> String {
+fn text(costs: &Costs, policy: &Policy, target: &TargetSpec, clock: Option<f64>) -> String {
     let (fewest, most) = (costs.instructions_min, costs.instructions_max);
     let instructions = if fewest == most {
         format!("{} for every input", grouped(most))
@@ -99,13 +135,13 @@ fn text(costs: &Costs, policy: &Policy, target: &TargetSpec) -> String {
             grouped(least),
             grouped(most)
         );
-        if let Some(clock) = target.clock_hz {
-            let share = |cycles: u64| 100.0 * cycles as f64 / f64::from(clock) / policy.sample_period;
+        if let Some(hz) = clock {
+            let share = |cycles: u64| 100.0 * cycles as f64 / hz / policy.sample_period;
             line += &format!(
-                ", {:.0} to {:.0} % of the control period at {} MHz",
+                ", {:.0} to {:.0} % of the control period at {}",
                 share(least),
                 share(most),
-                clock / 1_000_000
+                Clock { hz }
             );
         }
         lines.push(line);

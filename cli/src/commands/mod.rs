@@ -1,5 +1,6 @@
 //! One file per command.
 
+pub mod budget;
 pub mod certify;
 pub mod compile;
 mod costs;

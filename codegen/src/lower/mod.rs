@@ -5,6 +5,7 @@ mod front;
 mod integer;
 pub mod known_answers;
 pub mod network;
+pub mod simplify;
 
 pub use command::STATUS;
 use policy::Policy;

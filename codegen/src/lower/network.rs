@@ -4,6 +4,7 @@ use policy::{Activation, Layer, NumericFormat, Policy};
 use targets::{IntegerBlock, RowBlock};
 
 use super::integer;
+use super::simplify::{self, Simplified};
 use crate::program::{ActivationCode, LayerCode, Literal, NetworkCode};
 
 /// Numerator of the tanh approximation, lowest power first (contract section 6).
@@ -21,11 +22,12 @@ pub const TANH_RANGE: f32 = 9.0;
 
 /// The network in the policy's numeric format.
 pub fn lower(policy: &Policy, row_block: RowBlock, integer_block: IntegerBlock) -> NetworkCode {
-    match policy::scales::of(policy) {
-        Some(scales) => NetworkCode::Integer(integer::lower(policy, &scales, integer_block)),
+    let Simplified { policy, scales } = simplify::simplified(policy);
+    match scales {
+        Some(scales) => NetworkCode::Integer(integer::lower(&policy, &scales, integer_block)),
         None => NetworkCode::Real {
             fused: policy.numeric_format == NumericFormat::F32Fma,
-            layers: layers(policy, row_block),
+            layers: layers(&policy, row_block),
         },
     }
 }

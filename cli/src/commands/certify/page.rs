@@ -148,7 +148,7 @@ pub fn page(policy: &Policy, certificate: &Certificate, picture: Option<Svg>) ->
     if let Some(map) = &certificate.map {
         page = page.section(map_section(policy, map, picture));
     }
-    page.section(meaning(certificate)).html()
+    page.section(meaning(policy, certificate)).html()
 }
 
 fn bounds(policy: &Policy, certificate: &Certificate) -> Section {
@@ -258,7 +258,7 @@ fn map_section(policy: &Policy, map: &Map, picture: Option<Svg>) -> Section {
     }
 }
 
-fn meaning(certificate: &Certificate) -> Section {
+fn meaning(policy: &Policy, certificate: &Certificate) -> Section {
     let mut table = Table::new("Coordinates of a state")
         .text("coordinate")
         .text("from")
@@ -283,4 +283,13 @@ fn meaning(certificate: &Certificate) -> Section {
              format. What is not proven may still be unchanged.",
         )
         .table(table)
+        .pairs(certificate.copies.iter().map(|copy| {
+            let name = |index: usize| policy.features[index].name.as_str();
+            let offset = match copy.offset {
+                0.0 => String::new(),
+                offset => format!(" + ({})", digits(offset)),
+            };
+            let formula = format!("{} = {} * {}{offset}, before the clip", name(copy.feature), copy.factor, name(copy.of));
+            ("a feature that says nothing new", formula)
+        }))
 }

@@ -292,10 +292,20 @@ fn named(attribution: &Attribution, profiles: &[Profile]) -> Vec<Named> {
                 delta_chi2: attribution.evidence[member] / attribution.inflation,
                 threshold: crate::attribute::threshold(candidate.own.len(), 1.0),
             },
-            rivals: rivals.collect(),
+            rivals: each_once(rivals),
         }
     };
     best.causes.iter().enumerate().map(of).collect()
+}
+
+/// The same ids may come from two forms of a cause.
+fn each_once(sets: impl Iterator<Item = Vec<&'static str>>) -> Vec<Vec<&'static str>> {
+    sets.fold(Vec::new(), |mut list, set| {
+        if !list.contains(&set) {
+            list.push(set);
+        }
+        list
+    })
 }
 
 /// Channels whose values lie on the steps of a converter that the model does not have.

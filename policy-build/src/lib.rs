@@ -14,7 +14,7 @@
 //! }
 //! ```
 //!
-//! [`Build::c`] does the same with the C core, for which the included file is `buck12_ffi.rs`. Both files offer the
+//! `Build::c` (feature `cc`) does the same with the C core, for which the included file is `buck12_ffi.rs`. Both files offer the
 //! same types and methods. Cargo runs the script again when one of the policy's files changes.
 
 mod error;

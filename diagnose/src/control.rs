@@ -126,7 +126,6 @@ pub fn load_steps<'a>(records: impl Iterator<Item = &'a Record>, v_ref: f64) -> 
 /// # Errors
 /// If the policy does not fit the converter, or the settled points determine no mapping.
 pub fn control(request: &Request, extended: &Parameters) -> Result<Control, Error> {
-    // noise would only have to be averaged away
     let (nominal, real) = (quiet(&request.trained_on), quiet(extended));
     let refit = Refit {
         policy: &request.policy,
@@ -190,8 +189,10 @@ pub fn control(request: &Request, extended: &Parameters) -> Result<Control, Erro
     })
 }
 
+/// A mapping is one of settled points: noise would only have to be averaged away, and under a ripple nothing settles.
 fn quiet(converter: &Parameters) -> Parameters {
     let mut quiet = converter.clone();
+    quiet.source.ripple = 0.0;
     for sensor in crate::drive::sensors(&mut quiet) {
         sensor.noise = 0.0;
     }

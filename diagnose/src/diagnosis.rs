@@ -109,6 +109,9 @@ pub struct Gain {
     pub shifts: Vec<Shift>,
     /// Closed loop with a policy, if one was given.
     pub closed_loop: Option<crate::control::ClosedLoop>,
+    /// Why it is missing although one was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub closed_loop_missing: Option<String>,
 }
 
 /// What is written to `diagnosis.json`.
@@ -208,6 +211,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
             mean_square: pair.as_ref().map_or([f64::NAN; 2], |pair| pair.total().into()),
             shifts,
             closed_loop: None,
+            closed_loop_missing: None,
         },
     };
     Diagnosis {
@@ -224,18 +228,19 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
 }
 
 impl Diagnosis {
-    /// Closes the loop with a policy on the extended model; without load steps asked for, over the records' loads.
-    ///
-    /// # Errors
-    /// Those of [`crate::control::control`].
-    pub fn close_the_loop(&mut self, mut request: Request) -> Result<(), closed_loop::Error> {
+    /// Closes the loop with a policy on the extended model; without load steps asked for, over the records' loads. Where
+    /// that cannot be done the reason is noted, and the diagnosis stands.
+    pub fn close_the_loop(&mut self, mut request: Request) {
         if request.load_steps.is_empty() {
             request.load_steps = crate::control::load_steps(self.problem.records.iter(), request.v_ref);
         }
-        let control = crate::control::control(&request, &crate::extend::extended_plant(self))?;
-        self.findings.gain.closed_loop = Some(control.findings.clone());
-        self.control = Some(control);
-        Ok(())
+        match crate::control::control(&request, &crate::extend::extended_plant(self)) {
+            Ok(control) => {
+                self.findings.gain.closed_loop = Some(control.findings.clone());
+                self.control = Some(control);
+            }
+            Err(error) => self.findings.gain.closed_loop_missing = Some(error.to_string()),
+        }
     }
 }
 

@@ -36,6 +36,9 @@ pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
     if let Some(section) = held_out(diagnosis)? {
         page = page.section(section);
     }
+    if let Some(reason) = &diagnosis.findings.gain.closed_loop_missing {
+        page = page.section(control::missing(reason));
+    }
     if let Some(control) = &diagnosis.control {
         page = page.section(control::section(control)?);
     }

@@ -36,7 +36,7 @@ pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
     let mut diagnosis = diagnose(&model, train, &heldout, &say);
     if let Some(request) = closed_loop {
         say("closed loop");
-        diagnosis.close_the_loop(request)?;
+        diagnosis.close_the_loop(request);
     }
     let mut json = serde_json::to_string_pretty(&diagnosis.findings)?;
     json.push('\n');
@@ -52,6 +52,11 @@ pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
     let out = options.out.display();
     for repair in &diagnosis.findings.noise.repairs {
         output::say(&format!("note: {repair}"))?;
+    }
+    if let Some(reason) = &diagnosis.findings.gain.closed_loop_missing {
+        output::say(&format!(
+            "note: no mapping and no closed loop on the extended model: {reason}"
+        ))?;
     }
     output::say(&format!("{}\n\nreport: {out}/report.html", diagnosis.findings.sentence))?;
     Ok(Outcome::Done)

@@ -32,6 +32,11 @@ pub(super) fn section(control: &Control) -> Result<Section, ReportError> {
     Ok(section)
 }
 
+/// In its place where the loop could not be closed.
+pub(super) fn missing(reason: &str) -> Section {
+    Section::new("Under control").text(format!("No mapping and no closed loop on the extended model: {reason}"))
+}
+
 /// What the refit is worth, in words.
 pub(super) fn sentence(found: &ClosedLoop) -> String {
     if !found.refitted {

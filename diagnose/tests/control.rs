@@ -1,0 +1,46 @@
+//! The mapping that is refitted to an extended model, and the loop closed with it.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use std::path::Path;
+
+use closed_loop::scenario::Task;
+use closed_loop::{LoadKind, LoadStep};
+use diagnose::control::{Control, Request, control};
+use drm::formula::Losses;
+use plant::Parameters;
+
+/// The policy of the blind cases on a converter that differs from the one of its training.
+fn controlled(change: impl Fn(&mut Parameters)) -> Control {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/blind");
+    let trained_on = Parameters::from_file(&folder.join("plant.toml")).unwrap();
+    let mut extended = trained_on.clone();
+    change(&mut extended);
+    let request = Request {
+        policy: policy::load(&folder.join("policy/policy.toml")).unwrap(),
+        losses: Losses::of(&trained_on).unwrap(),
+        trained_on,
+        v_ref: 100.0,
+        load_steps: vec![LoadStep {
+            kind: LoadKind::Power,
+            values: [200.0, 600.0],
+        }],
+        task: Task {
+            instants: 1,
+            sampling_instants: 1,
+            ..Task::default()
+        },
+    };
+    control(&request, &extended).unwrap()
+}
+
+#[test]
+fn a_weaker_source_gets_another_mapping_and_a_ripple_none() {
+    // 195 V for 200 V: the same voltage needs 200/195 of the duty
+    let weaker = controlled(|p| p.converter.v_in = 195.0).findings;
+    assert!(weaker.refitted);
+    assert!((weaker.mapping_after.a - 200.0 / 195.0).abs() < 2e-3, "{weaker:?}");
+    // under a ripple of the source nothing settles, and its mean asks for no other duty
+    let ripple = controlled(|p| (p.source.ripple, p.source.ripple_frequency) = (3.0, 160.0)).findings;
+    assert!(!ripple.refitted && ripple.largest_change < 1e-3, "{ripple:?}");
+}

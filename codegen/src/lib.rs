@@ -13,7 +13,7 @@ pub mod program;
 use std::collections::BTreeMap;
 use std::fmt;
 
-use policy::Policy;
+use policy::{NumericFormat, Policy};
 use targets::TargetSpec;
 
 pub use backend::Backend;
@@ -69,6 +69,13 @@ pub enum CodegenError {
     Door(&'static str),
     /// This build of the compiler lacks the backend.
     NotBuilt(Language),
+    /// The processor lacks a type that the numeric format stores.
+    NoType {
+        /// The format.
+        format: NumericFormat,
+        /// Name of the target.
+        target: &'static str,
+    },
 }
 
 impl fmt::Display for CodegenError {
@@ -79,6 +86,12 @@ impl fmt::Display for CodegenError {
             CodegenError::Manifest(message) => write!(f, "internal fault: manifest: {message}"),
             CodegenError::Door(message) => write!(f, "internal fault: door: {message}"),
             CodegenError::NotBuilt(language) => write!(f, "this build has no {} backend", language.name()),
+            CodegenError::NoType { format, target } => write!(
+                f,
+                "the processor has no type for the numeric format\n  = found: {}, whose weights have 8 bits, for {target}\n  \
+                 = expected: a format of 16 bits or more\n  = hint: --format i16",
+                format.name()
+            ),
         }
     }
 }
@@ -88,8 +101,14 @@ impl std::error::Error for CodegenError {}
 /// Lowers and emits one language.
 ///
 /// # Errors
-/// Only for a fault in the compiler itself.
+/// If the target has no type for the numeric format; else only for a fault in the compiler itself.
 pub fn compile(policy: &Policy, target: &TargetSpec, language: Language) -> Result<GeneratedFiles, CodegenError> {
+    if policy.numeric_format == NumericFormat::I8 && target.widths.char_bits > 8 {
+        return Err(CodegenError::NoType {
+            format: policy.numeric_format,
+            target: target.name,
+        });
+    }
     let program = lower(policy, target, language);
     backend_for(language)?.emit(&program)
 }

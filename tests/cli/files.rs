@@ -116,3 +116,12 @@ fn a_full_disk_leaves_the_old_files_and_no_fragments() {
         assert!(contents(&desk.path("out")) == before, "{:?}", desk.listing());
     }
 }
+
+#[test]
+fn a_format_without_a_type_on_the_target_is_refused() {
+    let desk = Desk::new("paper");
+    let ran = desk.run("compile policy --target c2000-c28x --format i8 --no-costs --out out".split(" "));
+    assert_refused(&ran, &["c2000-c28x", "8 bits", "--format i16"]);
+    assert!(!desk.path("out").exists());
+    desk.succeed("compile policy --target c2000-c28x --format i16 --no-costs --out out");
+}

@@ -239,7 +239,8 @@ fn contraction_on_fma_hardware_flags_is_caught_with_clang() {
     let policy = example();
     let report = verify_files(&policy, &generated(&policy, Language::C), "clang", &FUSED);
     assert!(!report.passed());
-    assert_eq!(caught(&report), ["clang -O2", "clang -O3"], "-O0 fuses nothing");
+    // sums are vectors, which clang fuses without optimisation, too
+    assert_eq!(caught(&report), ["clang -O0", "clang -O2", "clang -O3"]);
 }
 
 #[test]

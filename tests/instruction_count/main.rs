@@ -44,8 +44,8 @@ fn a_branch_on_the_data_is_seen() {
     let folder = tempfile::tempdir().unwrap();
     let text = generate(&policy, codegen::Language::C, folder.path());
     let branchy = text.replace(
-        "return buck12_from_bits(bits & ~((uint32_t)0 - (bits >> 31)));",
-        "if (bits >> 31) { return 0.0f; } __asm__ volatile(\"nop\"); return x;",
+        "return (x + __builtin_fabsf(x)) * 0.5f;",
+        "if (x < 0.0f) { return 0.0f; } __asm__ volatile(\"nop\\n nop\\n nop\\n nop\"); return x;",
     );
     assert_ne!(text, branchy, "the planted branch has found its place");
     std::fs::write(folder.path().join("buck12.c"), branchy).unwrap();

@@ -22,14 +22,16 @@ const FIRST_SEED: u64 = 5000;
 
 /// Steps of a build.
 const STEPS: u64 = 20_000;
+/// Steps of a random policy where every float operation is a call of a library.
+const RANDOM_STEPS_WITHOUT_FPU: u64 = 4_000;
 
 fn target(name: &str) -> &'static TargetSpec {
     targets::find(name).unwrap()
 }
 
-fn steps() -> u64 {
+fn steps(usual: u64) -> u64 {
     let asked = std::env::var("POLICYC_TARGET_STEPS").ok();
-    asked.map_or(STEPS, |text| text.parse().expect("POLICYC_TARGET_STEPS is a number"))
+    asked.map_or(usual, |text| text.parse().expect("POLICYC_TARGET_STEPS is a number"))
 }
 
 fn assert_equal(report: &Report, what: &str) {
@@ -41,12 +43,12 @@ fn assert_equal(report: &Report, what: &str) {
     );
 }
 
-fn run(policy: &Policy, target: &'static TargetSpec, compilers: &[&str], levels: &[&str]) -> Report {
+fn run(policy: &Policy, target: &'static TargetSpec, compilers: &[&str], levels: &[&str], usual_steps: u64) -> Report {
     let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
     verify::run(
         policy,
         Options {
-            steps: steps(),
+            steps: steps(usual_steps),
             seed: 3,
             target,
             compilers: owned(compilers),
@@ -72,10 +74,14 @@ fn compilers(target: &TargetSpec) -> Vec<&'static str> {
 fn check(name: &str) {
     let target = target(name);
     let example = policy::load(&tests::example()).unwrap();
-    let report = run(&example, target, &compilers(target), &[]);
+    let report = run(&example, target, &compilers(target), &[], STEPS);
     assert_equal(&report, name);
     let builds = report.builds.iter().map(|build| build.build.rsplit_once(' ').unwrap());
     let (rust, c): (Vec<_>, Vec<_>) = builds.partition(|(compiler, _)| *compiler == verify::toolchain::RUSTC);
+    let random_steps = match target.fpu {
+        Fpu::None => RANDOM_STEPS_WITHOUT_FPU,
+        _ => STEPS,
+    };
     for (seed, (compiler, level)) in (FIRST_SEED..FIRST_SEED + RANDOM_POLICIES).zip(c.iter().cycle()) {
         let folder = tests::random::policy(seed).unwrap();
         let policy = policy::load(&folder.path()).unwrap_or_else(|faults| panic!("{}\n{faults}", folder.contract));
@@ -84,7 +90,7 @@ fn check(name: &str) {
             builds.swap_remove((seed % 2) as usize);
         }
         let (compilers, levels): (Vec<_>, Vec<_>) = builds.into_iter().unzip();
-        let report = run(&policy, target, &compilers, &levels);
+        let report = run(&policy, target, &compilers, &levels, random_steps);
         assert_eq!(report.builds.len(), compilers.len(), "{report:?}");
         assert_equal(&report, &format!("{name}, {compiler} {level}\n{}", folder.contract));
     }

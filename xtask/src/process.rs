@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-const LIMIT: Duration = Duration::from_secs(20 * 60);
+const LIMIT: Duration = Duration::from_secs(35 * 60);
 const POLL: Duration = Duration::from_millis(50);
 const TAIL_LINES: usize = 60;
 const TELLING_LINES: usize = 40;

@@ -9,7 +9,7 @@ use drm::DutyRatioMap;
 use drm::acquire::{Hold, LoadSetting};
 use drm::formula::Losses;
 use plant::Parameters;
-use policy::{Coefficients, Interval, Policy};
+use policy::{Coefficients, Policy};
 use serde::Serialize;
 
 use crate::record::Record;
@@ -87,18 +87,6 @@ pub struct Request {
     pub task: Task,
 }
 
-/// The mapping that maps nothing.
-const IDENTITY: DutyRatioMap = DutyRatioMap {
-    coefficients: Coefficients {
-        a: 1.0,
-        b: 0.0,
-        c: 0.0,
-        r: None,
-    },
-    valid_i_out: Interval { low: -1e3, high: 1e3 },
-    valid_d_sim: Interval { low: 0.0, high: 1.0 },
-};
-
 /// Load steps over the loads that the records have: from a fifth of the largest to half of it and to all of it, and back.
 /// Constant power if any record has it, else current.
 #[must_use]
@@ -135,12 +123,16 @@ pub fn control(request: &Request, extended: &Parameters) -> Result<Control, Erro
         load_steps: &request.load_steps,
     };
     let report = refit.fit(&acquire(&refit, &real)?)?;
-    let own = request.policy.mapping.as_ref().map_or(IDENTITY, DutyRatioMap::from);
+    let own = request
+        .policy
+        .mapping
+        .as_ref()
+        .map_or(DutyRatioMap::IDENTITY, DutyRatioMap::from);
     let fitted = report.fit.map.rounded();
     let largest_change = furthest(&own, &fitted);
     let refitted = largest_change > SAME_DUTY;
     let map = if refitted { fitted } else { own };
-    let (unmapped, after) = (refit.with(&IDENTITY)?, refit.with(&map)?);
+    let (unmapped, after) = (refit.with(&DutyRatioMap::IDENTITY)?, refit.with(&map)?);
     let runs = [
         run(request, &unmapped, &request.trained_on)?,
         run(request, &request.policy, extended)?,

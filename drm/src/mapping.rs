@@ -28,6 +28,18 @@ impl From<&policy::Mapping> for DutyRatioMap {
 }
 
 impl DutyRatioMap {
+    /// The mapping that maps nothing, valid for every duty and any plausible current.
+    pub const IDENTITY: DutyRatioMap = DutyRatioMap {
+        coefficients: Coefficients {
+            a: 1.0,
+            b: 0.0,
+            c: 0.0,
+            r: None,
+        },
+        valid_i_out: Interval { low: -1e3, high: 1e3 },
+        valid_d_sim: Interval { low: 0.0, high: 1.0 },
+    };
+
     /// The duty ratio for the converter from `d_sim` at the load current `i_out` A.
     #[must_use]
     pub fn apply(&self, d_sim: f64, i_out: f64) -> f64 {

@@ -10,7 +10,7 @@ use drm::acquire::{Bench, Hold, LoadSetting, Measurement, Plan, Protocol, measur
 use drm::formula::Losses;
 use drm::{Conduction, DutyRatioMap, FitOptions, Form, Report, Table, TableOptions, judge};
 use plant::{Load, Parameters, Plant, Rectifier, Signals};
-use policy::{Coefficients, Interval};
+use policy::Interval;
 
 /// 200 V to about 100 V with every loss: dead time, diode, switch, winding.
 fn lossy() -> Parameters {
@@ -267,17 +267,6 @@ fn the_written_mapping_is_what_a_policy_reads() {
     }
 }
 
-const IDENTITY: DutyRatioMap = DutyRatioMap {
-    coefficients: Coefficients {
-        a: 1.0,
-        b: 0.0,
-        c: 0.0,
-        r: None,
-    },
-    valid_i_out: Interval { low: 1.0, high: 12.0 },
-    valid_d_sim: Interval { low: 0.4, high: 0.6 },
-};
-
 fn steady(real: &Parameters, map: &DutyRatioMap, limits: Option<Interval>) -> (Vec<judge::Steady>, String) {
     let loads = [200.0, 600.0, 1000.0].map(LoadSetting::Power);
     let steady = judge::against_plant(map, real, &Parameters::paper_model(), 100.0, &loads, limits).unwrap();
@@ -343,9 +332,9 @@ fn a_sampling_instant_off_the_valley_is_not_repaired_and_found() {
     let mut real = Parameters::paper_model();
     real.pwm.sampling_phase = 0.25;
     // a quarter of the period into the on-interval the current is half its ripple of 2.5 A above the valley
-    let (_, remarks) = steady(&real, &IDENTITY, None);
+    let (_, remarks) = steady(&real, &DutyRatioMap::IDENTITY, None);
     assert!(remarks.contains("inductor current is off by up to +1.2"), "{remarks}");
-    let (_, remarks) = steady(&Parameters::paper_model(), &IDENTITY, None);
+    let (_, remarks) = steady(&Parameters::paper_model(), &DutyRatioMap::IDENTITY, None);
     assert_eq!(remarks, "", "the plant itself");
 }
 

@@ -1,6 +1,8 @@
 //! Inner loops in ARM assembly, the same text for C and Rust.
 
-use crate::program::{ActivationCode, IntegerLayer};
+use targets::IntegerLoop;
+
+use crate::program::{ActivationCode, IntegerLayer, IntegerNetwork};
 
 /// What a kernel leaves of a sum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,7 +16,7 @@ pub enum Store {
 }
 
 /// What the kernels of a layer store; `None` if they lack its activation.
-pub fn store(layer: &IntegerLayer, is_last: bool) -> Option<Store> {
+fn store(layer: &IntegerLayer, is_last: bool) -> Option<Store> {
     match layer.activation {
         ActivationCode::Relu => Some(Store::Rectified),
         ActivationCode::Identity if is_last => Some(Store::Word),
@@ -53,7 +55,31 @@ const WEIGHTS: &str = "r2";
 const BIAS: &str = "r3";
 const COUNTER: &str = "lr";
 
+/// Whether the blocks of a layer have kernels: the core has `SMLAD`, and they have its activation.
+pub fn has_kernels(network: &IntegerNetwork, layer: &IntegerLayer) -> bool {
+    network.block.inner == IntegerLoop::Dual && store(layer, false).is_some()
+}
+
 impl Kernel {
+    /// The kernel of a layer's `count` blocks of a height; `None` where [`has_kernels`] says so.
+    pub fn of(
+        network: &IntegerNetwork,
+        layer: &IntegerLayer,
+        count: usize,
+        height: usize,
+        is_last: bool,
+    ) -> Option<Self> {
+        let store = store(layer, is_last).filter(|_| has_kernels(network, layer))?;
+        Some(Self {
+            is_quad: network.weight_bytes == 1,
+            groups: network.groups(layer.inputs),
+            count,
+            height,
+            shift: layer.shift,
+            store,
+        })
+    }
+
     /// Groups per turn: the largest divisor that is not too large.
     fn unrolled(&self) -> usize {
         (1..=UNROLL).rev().find(|n| self.groups.is_multiple_of(*n)).unwrap_or(1)

@@ -6,7 +6,7 @@ use targets::IntegerLoop;
 
 use super::statements::float;
 use super::tables::wrap;
-use crate::backend::assembly::{self, Kernel};
+use crate::backend::assembly::{Kernel, has_kernels};
 use crate::program::{ActivationCode, IntegerLayer, IntegerNetwork};
 
 /// C type of a weight.
@@ -79,11 +79,7 @@ fn special(network: &IntegerNetwork) -> &'static str {
 
 /// Whether any layer is there in assembly, too.
 pub fn is_in_assembly(network: &IntegerNetwork) -> bool {
-    network.layers.iter().any(|layer| has_assembly(network, layer))
-}
-
-fn has_assembly(network: &IntegerNetwork, layer: &IntegerLayer) -> bool {
-    network.block.inner == IntegerLoop::Dual && assembly::store(layer, false).is_some()
+    network.layers.iter().any(|layer| has_kernels(network, layer))
 }
 
 fn layers(prefix: &str, network: &IntegerNetwork) -> Vec<IntegerLayerView> {
@@ -102,7 +98,7 @@ fn layers(prefix: &str, network: &IntegerNetwork) -> Vec<IntegerLayerView> {
             index,
             comment: format!("{}: {} -> {}", layer.name, layer.inputs, layer.outputs),
             shift: layer.shift,
-            has_assembly: has_assembly(network, layer),
+            has_assembly: has_kernels(network, layer),
             has_loop: blocks.iter().any(|block| block.count > 1),
             has_turns: blocks
                 .iter()
@@ -221,16 +217,8 @@ fn halves(prefix: &str, group: usize, height: usize) -> Vec<String> {
 
 /// Literals of the body of a function over all blocks of a height; empty where there is none.
 fn assembly(network: &IntegerNetwork, layer: &IntegerLayer, count: usize, height: usize, is_last: bool) -> Vec<String> {
-    let Some(store) = assembly::store(layer, is_last).filter(|_| has_assembly(network, layer)) else {
+    let Some(kernel) = Kernel::of(network, layer, count, height, is_last) else {
         return Vec::new();
-    };
-    let kernel = Kernel {
-        is_quad: network.weight_bytes == 1,
-        groups: network.groups(layer.inputs),
-        count,
-        height,
-        shift: layer.shift,
-        store,
     };
     let text = kernel.text(&|registers| format!("{{{registers}}}"));
     text.iter().map(|line| format!("\"{line}\\n\\t\"")).collect()

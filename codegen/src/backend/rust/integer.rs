@@ -5,7 +5,7 @@ use quote::quote;
 use targets::IntegerLoop;
 
 use super::{float, ident, size, word};
-use crate::backend::assembly::{self, Kernel};
+use crate::backend::assembly::Kernel;
 use crate::program::{ActivationCode, IntegerLayer, IntegerNetwork};
 
 /// Tables, layers and `network`.
@@ -318,18 +318,7 @@ fn kernel(
     count: usize,
     height: usize,
 ) -> Option<TokenStream> {
-    let store = assembly::store(layer, index + 1 == network.layers.len())?;
-    if network.block.inner != IntegerLoop::Dual {
-        return None;
-    }
-    let kernel = Kernel {
-        is_quad: network.weight_bytes == 1,
-        groups: network.groups(layer.inputs),
-        count,
-        height,
-        shift: layer.shift,
-        store,
-    };
+    let kernel = Kernel::of(network, layer, count, height, index + 1 == network.layers.len())?;
     // braces of a register list are doubled: single ones are operands
     let text = kernel.text(&|registers| format!("{{{{{registers}}}}}"));
     let (name, weight) = (kernel_name(index, height), weight(network));

@@ -12,10 +12,9 @@ use clap::Args;
 use closed_loop::refit::Refit;
 use closed_loop::scenario::Finding;
 use closed_loop::{LoadStep, Scenario, Trajectory};
-use drm::DutyRatioMap;
 use drm::formula::Losses;
 use plant::Parameters;
-use policy::{Coefficients, Interval, Policy};
+use policy::Policy;
 
 use super::bench::Simulator;
 use crate::arguments::ControllerKind;
@@ -144,18 +143,6 @@ fn prepare(options: &Transfer) -> Result<Setting, Failure> {
         ideal: options.ideal,
     })
 }
-
-/// The mapping that maps nothing, valid everywhere.
-const IDENTITY: DutyRatioMap = DutyRatioMap {
-    coefficients: Coefficients {
-        a: 1.0,
-        b: 0.0,
-        c: 0.0,
-        r: None,
-    },
-    valid_i_out: Interval { low: -1e3, high: 1e3 },
-    valid_d_sim: Interval { low: 0.0, high: 1.0 },
-};
 
 impl Setting {
     /// What the policy is to do where.

@@ -10,7 +10,7 @@ use plant::Parameters;
 use spice::SpiceConverter;
 
 use super::ideal::Ideal;
-use super::{Course, Findings, IDENTITY, Real, Run, Setting, Transfer};
+use super::{Course, Findings, Real, Run, Setting, Transfer};
 use crate::Failure;
 use crate::commands::drm::bench::Simulator;
 use crate::commands::progress_line::ProgressLine;
@@ -51,7 +51,7 @@ pub fn all(options: &Transfer, setting: Setting, stop: &AtomicBool) -> Result<Fi
         stop,
         at: SIMULATION.to_owned(),
     };
-    let unmapped = controllers::start(&setting.refit().with(&IDENTITY)?, setting.controller)?;
+    let unmapped = controllers::start(&setting.refit().with(&drm::DutyRatioMap::IDENTITY)?, setting.controller)?;
     let (controller, mut unmapped) = (unmapped.name, unmapped.controller);
     let simulation = Converter::new(&setting.nominal)?;
     let courses = courses(&setting, &simulation, unmapped.as_mut(), &mut progress)?;

@@ -111,6 +111,7 @@ fn worst_error(policy: &Policy, format: NumericFormat) -> f64 {
 fn assert_accurate(policy: &Policy, case: &str) {
     for (format, limit) in [(NumericFormat::I16, 1.8e-3), (NumericFormat::I8, 2.5e-2)] {
         let error = worst_error(policy, format);
+        println!("{case}, {}: {error:.1e} of the range", format.name());
         assert!(error <= limit, "{case}, {}: {error}", format.name());
     }
 }
@@ -118,7 +119,9 @@ fn assert_accurate(policy: &Policy, case: &str) {
 /// One weight of the example's second layer is fifty times the mean.
 #[test]
 fn the_integer_networks_stay_near_the_real_one() {
-    assert_accurate(&policy::load(&tests::example()).unwrap(), "as trained");
+    assert_accurate(&policy::load(&tests::example()).unwrap(), "buck12");
+    let bench = tests::root().join("bench/policy/policy.toml");
+    assert_accurate(&policy::load(&bench).unwrap(), "bench");
 }
 
 /// A ReLU neuron may count in other units than its neighbours without changing the function: row times z, column over z.

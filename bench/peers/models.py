@@ -147,7 +147,7 @@ def int8(network):
 
 
 def real(network):
-    """Gemm and Relu with the attributes that PyTorch's exporter writes."""
+    """Gemm and Relu. Factors of 1 are not written out: where they are, burn-onnx takes its Linear layers, which are slower."""
     helper, kind = onnx.helper, onnx.TensorProto.FLOAT
     nodes, tensors, values = [], [], "observation"
     for index, (weights, bias) in enumerate(network):
@@ -155,7 +155,7 @@ def real(network):
         is_last = index + 1 == len(network)
         sink = "q" if is_last else f"sums{index}"
         inputs = [values, f"w{index}", f"b{index}"]
-        nodes.append(helper.make_node("Gemm", inputs, [sink], f"gemm{index}", alpha=1.0, beta=1.0, transB=1))
+        nodes.append(helper.make_node("Gemm", inputs, [sink], f"gemm{index}", transB=1))
         values = sink
         if not is_last:
             values = f"x{index}"

@@ -217,14 +217,30 @@ fn argmax(program: &Program) -> Argmax {
         NetworkCode::Real { .. } => Argmax {
             element: "float",
             lowest: "-3.40282347e+38f",
-            network: "q_values",
-            select: format!("{n}_select(above, q[action], best)"),
+            declarations: vec![
+                format!("float observation[{}];", program.feature_count()),
+                format!("float q[{}];", program.duties.len()),
+            ],
+            calls: vec![
+                format!("{n}_observe(state, measured, observation);"),
+                format!("{n}_q_values(observation, q);"),
+            ],
+            output: "q[action]".to_owned(),
+            select: format!("{n}_select(above, output, best)"),
         },
-        NetworkCode::Integer(_) => Argmax {
+        NetworkCode::Integer(ref network) => Argmax {
             element: "int32_t",
             lowest: "(-2147483647 - 1)",
-            network: "network",
-            select: format!("{n}_select_integer(above, q[action], best)"),
+            declarations: vec![
+                format!("{n}_values values;"),
+                "const int32_t *const q = values.q;".to_owned(),
+            ],
+            calls: vec![
+                format!("{n}_inputs(state, measured, values.input);"),
+                format!("{n}_network(&values);"),
+            ],
+            output: integer::output(network, "action"),
+            select: format!("{n}_select_integer(above, output, best)"),
         },
     }
 }

@@ -153,6 +153,8 @@ pub enum Op {
         /// Upper end.
         high: ValueId,
     },
+    /// Flag: the two have different bits. Of a number and what a clamp has made of it: the number was outside.
+    Changed(ValueId, ValueId),
     /// Flag: `x > limit`.
     Above(ValueId, ValueId),
     /// Flag: both.
@@ -174,6 +176,7 @@ impl Op {
                 | Op::PrimedNow
                 | Op::Within { .. }
                 | Op::Outside { .. }
+                | Op::Changed(..)
                 | Op::Above(..)
                 | Op::And(..)
                 | Op::Or(..)

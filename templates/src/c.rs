@@ -419,6 +419,8 @@ pub struct Helpers {
     pub outside: bool,
     /// `clamp`
     pub clamp: bool,
+    /// `changed`
+    pub changed: bool,
     /// `line_sum`
     pub line_sum: bool,
     /// `relu`

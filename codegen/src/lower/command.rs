@@ -46,8 +46,9 @@ pub fn decide(policy: &Policy) -> Decide {
         let before = block.value(Op::PreviousCommand);
         let low = block.value(Op::Sub(before, step));
         let high = block.value(Op::Add(before, step));
-        status.push((bit("SLEW_LIMITED"), block.value(Op::Outside { x: duty, low, high })));
-        duty = block.value(Op::Clamp { x: duty, low, high });
+        let limited = block.value(Op::Clamp { x: duty, low, high });
+        status.push((bit("SLEW_LIMITED"), block.value(Op::Changed(duty, limited))));
+        duty = limited;
     }
     if policy.limits.soft_start.is_some() {
         let cap = block.value(Op::SoftCap);
@@ -61,8 +62,9 @@ pub fn decide(policy: &Policy) -> Decide {
     }
     let low = block.constant(up_f32(policy.limits.duty.low));
     let high = block.constant(down_f32(policy.limits.duty.high));
-    status.push((bit("LIMITED"), block.value(Op::Outside { x: duty, low, high })));
-    duty = block.value(Op::Clamp { x: duty, low, high });
+    let limited = block.value(Op::Clamp { x: duty, low, high });
+    status.push((bit("LIMITED"), block.value(Op::Changed(duty, limited))));
+    duty = limited;
     Decide {
         block,
         duty,

@@ -93,8 +93,8 @@ impl Builder {
             Some(clip) => {
                 let low = block.constant(Literal::nearest(clip.low));
                 let high = block.constant(Literal::nearest(clip.high));
-                let outside = block.value(Op::Outside { x: value, low, high });
-                (block.value(Op::Clamp { x: value, low, high }), Some(outside))
+                let clamped = block.value(Op::Clamp { x: value, low, high });
+                (clamped, Some(block.value(Op::Changed(value, clamped))))
             }
         }
     }

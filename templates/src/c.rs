@@ -138,8 +138,8 @@ pub struct IntegerView {
     pub input_length: usize,
     /// Whether the input has been read before the first output is written.
     pub shares: bool,
-    /// Statements that fill the input vector.
-    pub quantise: Vec<String>,
+    /// Statements that fill the padding of the input vector.
+    pub padding: Vec<String>,
     /// Output `i` of `integers` as the contract has it, where the network leaves the last shift to its callers.
     pub output: String,
     /// What one integer of the output is worth.
@@ -419,8 +419,6 @@ pub struct Helpers {
     pub outside: bool,
     /// `clamp`
     pub clamp: bool,
-    /// `changed`
-    pub changed: bool,
     /// `line_sum`
     pub line_sum: bool,
     /// `relu`

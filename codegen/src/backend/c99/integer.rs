@@ -16,7 +16,7 @@ pub fn element(network: &IntegerNetwork) -> &'static str {
     if network.weight_bytes == 1 { "int8_t" } else { "int16_t" }
 }
 
-/// Weights and biases.
+/// Weights and biases, and how the inputs are rounded.
 pub fn tables(network: &IntegerNetwork) -> Vec<Table> {
     let layers = network.layers.iter().enumerate().map(|(index, layer)| {
         let weights = Table {
@@ -35,7 +35,18 @@ pub fn tables(network: &IntegerNetwork) -> Vec<Table> {
         };
         [weights, bias]
     });
-    layers.flatten().collect()
+    let ranges = network
+        .inputs
+        .iter()
+        .flat_map(|input| [input.unshifted, input.low, input.high]);
+    let ranges = Table {
+        element: "int16_t",
+        name: "ranges".to_owned(),
+        length: 3 * network.inputs.len(),
+        lines: wrap(ranges.map(|number| number.to_string())),
+        aligned: false,
+    };
+    layers.flatten().chain([ranges]).collect()
 }
 
 /// The network of a controller whose functions start with `prefix`.
@@ -43,21 +54,13 @@ pub fn view(prefix: &str, network: &IntegerNetwork, has_fpu: bool) -> IntegerVie
     let lanes = network.lanes.len();
     let inputs = network.inputs.len();
     let padded = network.padded(inputs);
-    let mut quantise: Vec<String> = Vec::new();
-    for (i, input) in network.inputs.iter().enumerate() {
-        quantise.push(format!(
-            "input[{i}] = {prefix}_integer(observation[{i}], {}, {}, {});",
-            input.unshifted, input.low, input.high
-        ));
-    }
-    quantise.extend((inputs..padded).map(|i| format!("input[{i}] = 0;")));
     let has = |wanted: fn(&ActivationCode) -> bool| network.layers.iter().any(|layer| wanted(&layer.activation));
     IntegerView {
         bound: network.accumulator_bound,
         weight: element(network),
         is_quad: lanes == 4,
         input_length: padded,
-        quantise,
+        padding: (inputs..padded).map(|i| format!("input[{i}] = 0;")).collect(),
         output: output(network, "i"),
         q_unit: float(network.q_unit.value()),
         q_field: network.q_field,

@@ -384,7 +384,6 @@ fn helpers(program: &Program) -> Helpers {
         within: ops().any(|op| matches!(op, Op::Within { .. })),
         outside: ops().any(|op| matches!(op, Op::Outside { .. })),
         clamp: ops().any(|op| matches!(op, Op::Clamp { .. })),
-        changed: ops().any(|op| matches!(op, Op::Changed(..))),
         line_sum: ops().any(|op| matches!(op, Op::LineSum { .. })),
         relu: real && network.activates(|activation| activation == ActivationCode::Relu),
         relu_by_sum: program.has_fpu,

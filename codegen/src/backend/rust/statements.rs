@@ -109,7 +109,14 @@ impl<'p> Printer<'p> {
             }
             Op::Within { x, low, high } => call("within", &[v(x), v(low), v(high)]),
             Op::Outside { x, low, high } => call("outside", &[v(x), v(low), v(high)]),
-            Op::Changed(x, y) => call("changed", &[v(x), v(y)]),
+            Op::Difference(x, y) => {
+                let (x, y) = (v(x), v(y));
+                quote!(#x.to_bits() ^ #y.to_bits())
+            }
+            Op::NotZero(x) => {
+                let x = v(x);
+                quote!(flag(#x != 0))
+            }
             Op::Above(x, limit) => {
                 let (x, limit) = (v(x), v(limit));
                 quote!(flag(#x > #limit))
@@ -175,12 +182,6 @@ pub fn helpers(program: &Program) -> TokenStream {
         fn clamp(x: f32, low: f32, high: f32) -> f32 {
             let raised = select(flag(x < low), low, x);
             select(flag(raised > high), high, raised)
-        }
-        /// 1 if the numbers have different bits
-        #[inline(always)]
-        #[allow(dead_code)]
-        fn changed(x: f32, y: f32) -> u32 {
-            flag(x.to_bits() != y.to_bits())
         }
         /// Oldest first, newest last; a line that is not primed reads as newest throughout.
         #[inline(always)]

@@ -291,6 +291,8 @@ pub struct Argmax {
     pub calls: Vec<String>,
     /// Output `action` of the network.
     pub output: String,
+    /// Whether cores with dual products may occur, and their conditional moves.
+    pub dual: bool,
     /// The larger of `best` and `output`, by the flag `above`.
     pub select: String,
 }

@@ -231,13 +231,17 @@ impl Kernel {
         // the fifth argument, behind nine registers
         let argument = format!("[sp, #{}]", self.kept_bytes() + 36);
         lines.push(format!("ldr {NEXT}, {argument}"));
-        let (turns, rest) = (sums / SUMS.len(), sums % SUMS.len());
+        // as few turns as possible, each of an even number of sums
+        let least = sums.div_ceil(UNROLL + 1).max(1);
+        let width = sums / least / 2 * 2;
+        let turns = if width > 0 { sums / width } else { 0 };
+        let rest = sums - turns * width;
         if turns > 1 {
             lines.push(format!("mov {COUNTER}, #{turns}"));
             lines.push("4:".to_owned());
         }
         if turns > 0 {
-            self.some_added(SUMS.len(), lines, list);
+            self.some_added(width, lines, list);
         }
         if turns > 1 {
             lines.push(format!("subs {COUNTER}, {COUNTER}, #1"));

@@ -191,7 +191,7 @@ fn blocks(
                     result: result(prefix, layer, row),
                 })
                 .collect(),
-            added: last.map(|last| added(prefix, network, last, first, height)),
+            added: last.map(|last| added(prefix, network, layer, last, first, height)),
         });
         first += count * height;
     }
@@ -220,21 +220,28 @@ fn parts(
     parts
 }
 
-/// Sums of a last layer that are taken at a time at most.
-const SUMS: usize = 4;
+/// Sums of a last layer that are taken at a time, where that leaves none over; else the last number of these.
+const SUMS: [usize; 2] = [3, 4];
 
 /// Turns and sums of the loops over the sums of a last layer.
 fn stretches(last: &IntegerLayer) -> Vec<(usize, usize)> {
-    let even = [SUMS, SUMS - 1].into_iter().find(|n| last.outputs.is_multiple_of(*n));
-    let width = even.unwrap_or(SUMS.min(last.outputs));
+    let even = SUMS.into_iter().find(|n| last.outputs.is_multiple_of(*n));
+    let width = even.unwrap_or(SUMS[1].min(last.outputs));
     [(last.outputs / width, width), (1, last.outputs % width)]
         .into_iter()
         .filter(|(_, width)| *width > 0)
         .collect()
 }
 
-/// What a block of `height` outputs from `first` adds to the sums of the last layer.
-fn added(prefix: &str, network: &IntegerNetwork, last: &IntegerLayer, first: usize, height: usize) -> AddedView {
+/// What a block of `height` outputs from `first` of `layer` adds to the sums of the last layer.
+fn added(
+    prefix: &str,
+    network: &IntegerNetwork,
+    layer: &IntegerLayer,
+    last: &IntegerLayer,
+    first: usize,
+    height: usize,
+) -> AddedView {
     let lanes = network.lanes.len();
     let part = |(turns, sums), lines: Vec<String>| IntegerPartView {
         turns,
@@ -272,7 +279,12 @@ fn added(prefix: &str, network: &IntegerNetwork, last: &IntegerLayer, first: usi
             .iter()
             .map(|at| {
                 let (low, high) = (output(*at), output(at + 1));
-                format!("const int32_t y{at}{} = {prefix}_pair({low}, {high});", at + 1)
+                // a rectified one has no sign that would reach into the upper half
+                let pair = match layer.activation {
+                    ActivationCode::Relu => format!("{low} | (int32_t)((uint32_t){high} << 16)"),
+                    _ => format!("{prefix}_pair({low}, {high})"),
+                };
+                format!("const int32_t y{at}{} = {pair};", at + 1)
             })
             .collect(),
         special: match special(network) {

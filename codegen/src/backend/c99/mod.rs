@@ -7,6 +7,7 @@ pub(super) mod tables;
 
 use std::collections::BTreeMap;
 
+use targets::IntegerLoop;
 use templates::Template;
 use templates::c::{Argmax, Common, Constant, Header, Helpers, Member, NetworkView, PushView, Source, WideChar};
 
@@ -226,6 +227,7 @@ fn argmax(program: &Program) -> Argmax {
                 format!("{n}_q_values(observation, q);"),
             ],
             output: "q[action]".to_owned(),
+            dual: false,
             select: format!("{n}_select(above, output, best)"),
         },
         NetworkCode::Integer(ref network) => Argmax {
@@ -240,6 +242,7 @@ fn argmax(program: &Program) -> Argmax {
                 format!("{n}_network(&values);"),
             ],
             output: integer::output(network, "action"),
+            dual: network.block.inner == IntegerLoop::Dual,
             select: format!("{n}_select_integer(above, output, best)"),
         },
     }

@@ -252,7 +252,9 @@ impl Bench {
             let mut command = Command::new(linker.program);
             command.current_dir(self.folder.path()).args(linker.machine_flags);
             command.args(["-nostdlib", "-r", "-Wl,--gc-sections"]);
-            let roots = functions.iter().map(|function| format!("-Wl,-u,{}_{function}", policy.name));
+            let roots = functions
+                .iter()
+                .map(|function| format!("-Wl,-u,{}_{function}", policy.name));
             run(command.args(roots).args(["unit.o", "-o", "kept.o"]))?;
             size(target, &self.path("kept.o"))
         };

@@ -234,7 +234,7 @@ impl Kernel {
         // as few turns as possible, each of an even number of sums
         let least = sums.div_ceil(UNROLL + 1).max(1);
         let width = sums / least / 2 * 2;
-        let turns = if width > 0 { sums / width } else { 0 };
+        let turns = sums.checked_div(width).unwrap_or_default();
         let rest = sums - turns * width;
         if turns > 1 {
             lines.push(format!("mov {COUNTER}, #{turns}"));

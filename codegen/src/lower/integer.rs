@@ -96,9 +96,7 @@ fn layer(layer: &Layer, scale: &LayerScale, lanes: &[usize], (block_rows, chunk)
         // of a layer with tanh and of the last: there all rows have one exponent
         unit: Literal::nearest(power_of_two(-scale.accumulators.first().copied().unwrap_or_default())),
         slope: match (activation, layer.activation) {
-            (ActivationCode::LeakyRelu(_), Activation::LeakyRelu { slope }) => {
-                scales::slope_integer(slope) as i32
-            }
+            (ActivationCode::LeakyRelu(_), Activation::LeakyRelu { slope }) => scales::slope_integer(slope) as i32,
             _ => 0,
         },
         activation,

@@ -199,11 +199,7 @@ fn blocks(
 }
 
 /// Turns and groups of the loops over the inputs of a block.
-fn parts(
-    network: &IntegerNetwork,
-    layer: &IntegerLayer,
-    lines: &dyn Fn(usize) -> Vec<String>,
-) -> Vec<IntegerPartView> {
+fn parts(network: &IntegerNetwork, layer: &IntegerLayer, lines: &dyn Fn(usize) -> Vec<String>) -> Vec<IntegerPartView> {
     let unrolled = network.block.unrolled;
     let groups = network.groups(layer.inputs);
     let part = |turns: usize, groups: usize| IntegerPartView {
@@ -245,10 +241,7 @@ fn added(
     let lanes = network.lanes.len();
     let part = |(turns, sums), lines: Vec<String>| IntegerPartView {
         turns,
-        lines: lines
-            .into_iter()
-            .chain([format!("sum = &sum[{sums}];")])
-            .collect(),
+        lines: lines.into_iter().chain([format!("sum = &sum[{sums}];")]).collect(),
     };
     let output = |at: usize| if at < height { format!("y{at}") } else { "0".to_owned() };
     let pairs: Vec<usize> = (0..network.padded(height)).step_by(2).collect();
@@ -257,7 +250,11 @@ fn added(
         let uses = (0..sums).flat_map(|row| (0..words).map(move |word| (row, word)));
         let lines = uses.map(|(row, word)| match lanes {
             4 => format!("sum[{row}] = {prefix}_quad({WORD}, y01, y23, sum[{row}]);"),
-            _ => format!("sum[{row}] = __smlad({WORD}, y{}{}, sum[{row}]);", 2 * word, 2 * word + 1),
+            _ => format!(
+                "sum[{row}] = __smlad({WORD}, y{}{}, sum[{row}]);",
+                2 * word,
+                2 * word + 1
+            ),
         });
         by_twos(prefix, "next", "v", &lines.collect::<Vec<_>>())
     };
@@ -320,7 +317,10 @@ fn by_twos(prefix: &str, pointer: &str, name: &str, uses: &[String]) -> Vec<Stri
         } else {
             vec![format!("const int32_t {name}0 = {prefix}_one(&{pointer});")]
         };
-        braced(load.into_iter().chain(chunk.iter().enumerate().map(|(at, line)| taken(at, line))))
+        braced(
+            load.into_iter()
+                .chain(chunk.iter().enumerate().map(|(at, line)| taken(at, line))),
+        )
     });
     lines.collect()
 }

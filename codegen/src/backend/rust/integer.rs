@@ -279,7 +279,12 @@ fn last_integrity(index: usize, layer: &IntegerLayer) -> TokenStream {
 }
 
 /// The loop over blocks of `height` outputs that adds each to the sums of the streamed layer.
-fn added(network: &IntegerNetwork, layer: &IntegerLayer, names: [&proc_macro2::Ident; 3], height: usize) -> TokenStream {
+fn added(
+    network: &IntegerNetwork,
+    layer: &IntegerLayer,
+    names: [&proc_macro2::Ident; 3],
+    height: usize,
+) -> TokenStream {
     let [weights, bias, next] = names;
     let lanes = &network.lanes;
     let outputs: Vec<_> = (0..height).map(|i| ident(&format!("y{i}"))).collect();
@@ -368,7 +373,10 @@ fn layer_items(
         });
         let blocks = ((last - first) / height, *height);
         if let Some(kernel) = kernel(network, index, layer, blocks, streamed) {
-            let (name, first) = (kernel_name(index, *height), size(if next.is_some() { 0 } else { *first }));
+            let (name, first) = (
+                kernel_name(index, *height),
+                size(if next.is_some() { 0 } else { *first }),
+            );
             let next = next.map(|next| quote!(, #next.0.as_ptr().cast()));
             kernels.push(kernel);
             kernel_calls.push(quote! {
@@ -387,7 +395,9 @@ fn layer_items(
         None => sink(network, index, layer),
     };
     let head = quote!(fn #name(x: &Words<[i16; #inputs]>, y: &mut Words<[#kind; #length]>));
-    let rest = streamed.is_none().then(|| quote! { let mut rest: &mut [#kind] = &mut y.0; });
+    let rest = streamed
+        .is_none()
+        .then(|| quote! { let mut rest: &mut [#kind] = &mut y.0; });
     let portable = quote! { #rest #(#loops)* };
     if kernels.is_empty() {
         return quote! { #(#tables)* #[doc = #doc] #[inline(always)] #head { #portable } };

@@ -362,6 +362,8 @@ pub struct Source {
     pub tables: Vec<Table>,
     /// Layers in order.
     pub network: NetworkView,
+    /// Whether a step senses its measurement again after the network instead of keeping it on the stack.
+    pub senses_again: bool,
     /// Greedy action.
     pub argmax: Argmax,
     /// CRC functions, the one for floats first.

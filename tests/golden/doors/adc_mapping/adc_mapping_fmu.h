@@ -29,7 +29,7 @@
  *   10 r (parameter): coefficient of the duty ratio mapping; set before a step, it counts from the one after it
  */
 #define ADC_MAPPING_FMU_VARIABLES 10u
-#define ADC_MAPPING_FMU_TOKEN "{e6c5b379-3332-9888-5525-97a727a61d7a}"
+#define ADC_MAPPING_FMU_TOKEN "{ad08f8b1-9d81-21a5-01c0-e01a25ec8ee7}"
 #define ADC_MAPPING_FMU_PERIOD 2e-5
 
 /* Types of variables. */

@@ -48,6 +48,7 @@ const BASE: TargetSpec = TargetSpec {
     c_row_block: RowBlock::Rows(4),
     rust_row_block: RowBlock::Rows(4),
     weights_alignment: None,
+    has_float_assembly: false,
     integer_block: IntegerBlock {
         rows: 6,
         unrolled: 1,
@@ -109,7 +110,7 @@ const FPU_BASE: TargetSpec = TargetSpec {
     // 32 single registers: 16 accumulators, one input, loads in flight
     c_row_block: RowBlock::Rows(16),
     rust_row_block: RowBlock::Rows(16),
-    weights_alignment: None,
+    has_float_assembly: true,
     integer_block: IntegerBlock::DUAL,
     ..BASE
 };

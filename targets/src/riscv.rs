@@ -36,6 +36,7 @@ pub const RISCV32IMC: TargetSpec = TargetSpec {
     c_row_block: RowBlock::Rows(8),
     rust_row_block: RowBlock::Rows(8),
     weights_alignment: None,
+    has_float_assembly: false,
     integer_block: IntegerBlock {
         rows: 8,
         unrolled: 2,
@@ -70,7 +71,6 @@ pub const RISCV32IMFC: TargetSpec = TargetSpec {
     suitable_format: "f32",
     c_row_block: RowBlock::Rows(16),
     rust_row_block: RowBlock::Rows(16),
-    weights_alignment: None,
     c_compilers: &[
         gcc(&["-march=rv32imfc", "-mabi=ilp32f", "-ffreestanding"]),
         clang(&[

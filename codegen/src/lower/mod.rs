@@ -8,8 +8,8 @@ pub mod network;
 pub mod simplify;
 
 pub use command::STATUS;
-use policy::Policy;
 use policy::rounding::{down_f32, nearest_f32, up_f32};
+use policy::{NumericFormat, Policy};
 use targets::{Fpu, TargetSpec};
 
 use crate::crc::crc32_words;
@@ -29,7 +29,12 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
         }
     };
     let (front, memory_words) = front::lower(policy);
-    let network = network::lower(policy, row_block, target.weights_alignment, integer_block);
+    let loops = network::FloatLoops {
+        row_block,
+        alignment: target.weights_alignment,
+        has_assembly: target.has_float_assembly && policy.numeric_format == NumericFormat::F32,
+    };
+    let network = network::lower(policy, loops, integer_block);
     let duties: Vec<_> = policy
         .actions
         .iter()

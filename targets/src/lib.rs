@@ -157,6 +157,15 @@ pub struct RustTarget {
     pub machine_flags: &'static [&'static str],
 }
 
+impl RustTarget {
+    /// The processor, as its flag names it.
+    #[must_use]
+    pub fn processor(&self) -> Option<&'static str> {
+        let flags = self.machine_flags.iter();
+        flags.filter_map(|flag| flag.strip_prefix("-Ctarget-cpu=")).next()
+    }
+}
+
 /// Where a build of the target runs under `policyc verify`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]

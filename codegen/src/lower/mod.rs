@@ -45,6 +45,7 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
         sample_period: policy.sample_period,
         numeric_format: policy.numeric_format,
         has_fpu: target.fpu != Fpu::None,
+        processor: target.rust.and_then(|rust| rust.processor()),
         provenance: Provenance {
             tool: TOOL.to_owned(),
             digests: policy.digests.clone(),

@@ -7,19 +7,19 @@ use quote::{format_ident, quote};
 
 use super::{ident, size};
 use crate::backend::assembly::RealKernel;
-use crate::program::{ActivationCode, LayerCode};
+use crate::program::{ActivationCode, LayerCode, Program};
 
 /// Types and functions that the layers are made of, generic over the sizes of a block.
 ///
 /// `accumulate` is the statement that adds `weight * x` to `sum`.
-pub fn items(layers: &[LayerCode], accumulate: &TokenStream) -> TokenStream {
+pub fn items(program: &Program, layers: &[LayerCode], accumulate: &TokenStream) -> TokenStream {
     let sizes = sizes(layers);
     let (portable, assembly) = if sizes.is_empty() {
         (TokenStream::new(), TokenStream::new())
     } else {
         let is_assembly = quote!(all(target_arch = "arm", target_abi = "eabihf", policyc_assembly));
         let guard = quote!(#[cfg(#is_assembly)] #[allow(unexpected_cfgs)]);
-        let kernels = sizes.iter().map(|size| kernel(*size, &guard));
+        let kernels = sizes.iter().map(|size| kernel(*size, &processor(program), &guard));
         let forms = FORMS.map(|form| form.assembly(&sizes)).into_iter();
         let items = slots_in_assembly().into_iter().chain(forms);
         (
@@ -208,7 +208,7 @@ impl Size {
 }
 
 /// A naked function `(weights, bias, x, out)`: no frame, and once in the binary however often a loop over blocks is unrolled.
-fn kernel(size: Size, guard: &TokenStream) -> TokenStream {
+fn kernel(size: Size, processor: &str, guard: &TokenStream) -> TokenStream {
     let Size { inputs, height, relu } = size;
     let kernel = RealKernel { inputs, height, relu };
     // the pointers to weights and biases are done with when the halves are needed
@@ -230,10 +230,16 @@ fn kernel(size: Size, guard: &TokenStream) -> TokenStream {
         #guard
         #[unsafe(naked)]
         unsafe extern "C" fn #name(weights: *const f32, bias: *const f32, x: *const f32, out: *mut f32) {
-            // naked functions are assembled without the features of the target
-            core::arch::naked_asm!(".fpu fpv4-sp-d16", "vpush {{s16-s27}}", #turns, #(#text,)* "vpop {{s16-s27}}", "bx lr")
+            core::arch::naked_asm!(#processor, "vpush {{s16-s27}}", #turns, #(#text,)* "vpop {{s16-s27}}", "bx lr")
         }
     }
+}
+
+/// First line of a naked function: it is assembled without the features that rustc's flags give to all others.
+pub fn processor(program: &Program) -> String {
+    program
+        .processor
+        .map_or_else(String::new, |name| format!(".cpu {name}"))
 }
 
 /// Statement that puts the outputs of a block into `out`, an expression of a mutable reference to slots.

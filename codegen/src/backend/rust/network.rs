@@ -15,7 +15,7 @@ pub fn items(program: &Program) -> TokenStream {
         .activates(|activation| activation == ActivationCode::Tanh)
         .then(tanh);
     let network = match &program.network {
-        NetworkCode::Real { fused, layers } => real(layers, *fused),
+        NetworkCode::Real { fused, layers } => real(program, layers, *fused),
         NetworkCode::Integer(network) => integer::items(network, program.has_fpu),
     };
     quote! {
@@ -41,7 +41,7 @@ pub fn q_values(program: &Program) -> TokenStream {
     }
 }
 
-fn real(layers: &[LayerCode], fused: bool) -> TokenStream {
+fn real(program: &Program, layers: &[LayerCode], fused: bool) -> TokenStream {
     let (items, body) = streamed::network(layers);
     let aligned = layers.iter().find_map(|layer| layer.alignment).map(aligned);
     let fma = fused.then(fma);
@@ -50,7 +50,7 @@ fn real(layers: &[LayerCode], fused: bool) -> TokenStream {
     } else {
         quote!(*sum += *weight * *x;)
     };
-    let blocks = kernels::items(layers, &accumulate);
+    let blocks = kernels::items(program, layers, &accumulate);
     quote! {
         #fma
         #aligned

@@ -76,8 +76,8 @@ fn instructions(row: &Row) -> Option<u64> {
     row.q_values.map(|(_, most)| most)
 }
 
-/// Each peer beside our best row of the same kind (8-bit integers or binary32), as a Markdown table; empty without peers. Our
-/// flash is that of the whole controller, theirs that of the network.
+/// Each peer beside our best row of the same kind (8-bit integers or binary32), as a Markdown table; empty without peers. Flash
+/// is that of the network alone, as linked.
 pub fn table(rows: &[Row]) -> String {
     let peers: Vec<&Row> = rows.iter().filter(|row| row.variant.starts_with(PEER)).collect();
     if peers.is_empty() {
@@ -90,7 +90,7 @@ pub fn table(rows: &[Row]) -> String {
     for peer in peers {
         let format = if is_integer(peer) { "i8" } else { "f32" };
         let same: Vec<&Row> = ours(rows, &peer.core)
-            .filter(|row| row.variant.split(',').next() == Some(format) && row.flash.is_some())
+            .filter(|row| row.variant.split(',').next() == Some(format) && row.network_flash.is_some())
             .collect();
         // of the fastest ones, less than 2 % apart, the smallest
         let fewest = same
@@ -101,7 +101,7 @@ pub fn table(rows: &[Row]) -> String {
         let fast = same
             .iter()
             .filter(|row| instructions(row).is_some_and(|count| count <= fewest + fewest / 50));
-        let Some(best) = fast.min_by_key(|row| row.flash) else {
+        let Some(best) = fast.min_by_key(|row| row.network_flash) else {
             continue;
         };
         let ratio = |ours: Option<u64>, theirs: Option<u64>| match (ours, theirs) {
@@ -120,9 +120,9 @@ pub fn table(rows: &[Row]) -> String {
             best.variant,
             best.compiler,
             number(instructions(best)),
-            number(best.flash),
+            number(best.network_flash),
             ratio(instructions(best), instructions(peer)),
-            ratio(best.flash, peer.flash),
+            ratio(best.network_flash, peer.flash),
         );
     }
     text

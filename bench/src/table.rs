@@ -28,6 +28,12 @@ pub struct Row {
     /// Bytes of code and tables of the whole controller with all its functions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flash: Option<u64>,
+    /// Of these what a linker keeps for a firmware that uses `q_values` alone: the network, as peers are counted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub network_flash: Option<u64>,
+    /// What it keeps for a firmware that calls `init`, `step` and `integrity`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub step_flash: Option<u64>,
     /// Bytes of stack of a step.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stack: Option<u64>,
@@ -86,15 +92,15 @@ pub fn text(rows: &[Row], json: bool) -> Result<String, Failure> {
         return Ok(text + "\n");
     }
     let mut text = String::from(
-        "| policy | core | compiler | variant | q_values | step | flash B | stack B | checksum | time / naive |\n\
-         |---|---|---|---|---|---|---|---|---|---|\n",
+        "| policy | core | compiler | variant | q_values | step | flash B | network linked B | step linked B | stack B | checksum | time / naive |\n\
+         |---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for row in rows.iter().filter(|row| !row.variant.starts_with(PEER)) {
         let number = |value: Option<u64>| value.map(|value| value.to_string()).unwrap_or_default();
         // writing to a String cannot fail
         let _ = writeln!(
             text,
-            "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+            "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
             row.policy,
             row.core,
             row.compiler,
@@ -102,6 +108,8 @@ pub fn text(rows: &[Row], json: bool) -> Result<String, Failure> {
             range(row.q_values),
             range(row.step),
             number(row.flash),
+            number(row.network_flash),
+            number(row.step_flash),
             number(row.stack),
             row.checksum.as_deref().unwrap_or_default(),
             row.time_ratio.map(|ratio| format!("{ratio:.3}")).unwrap_or_default()
@@ -132,6 +140,8 @@ mod tests {
             q_values: Some((7, 9)),
             step: Some((8, 8)),
             flash: None,
+            network_flash: None,
+            step_flash: None,
             stack: None,
             checksum: Some(checksum.into()),
             time_ratio: None,

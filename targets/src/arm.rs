@@ -53,6 +53,7 @@ const BASE: TargetSpec = TargetSpec {
         rows: 6,
         unrolled: 1,
         inner: IntegerLoop::Plain,
+        streams: false,
     },
     c_compilers: &[],
     c_flags: EXACT_C99,
@@ -74,6 +75,7 @@ pub const CORTEX_M0PLUS: TargetSpec = TargetSpec {
         rows: 6,
         unrolled: 1,
         inner: IntegerLoop::Halves,
+        streams: false,
     },
     c_compilers: &[
         gcc(&["-mthumb", "-mcpu=cortex-m0plus"]),

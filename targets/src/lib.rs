@@ -60,6 +60,9 @@ pub struct IntegerBlock {
     pub unrolled: usize,
     /// Inner loop.
     pub inner: IntegerLoop,
+    /// Whether the last layer takes the outputs of the one before block by block, so that those are never in memory: less
+    /// stack and, where a block and its sums fit into registers, no more instructions.
+    pub streams: bool,
 }
 
 impl IntegerBlock {
@@ -68,6 +71,7 @@ impl IntegerBlock {
         rows: 4,
         unrolled: 4,
         inner: IntegerLoop::Dual,
+        streams: true,
     };
 }
 

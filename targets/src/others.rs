@@ -68,6 +68,7 @@ pub const DSPACE_DS1202: TargetSpec = TargetSpec {
         rows: 8,
         unrolled: 2,
         inner: IntegerLoop::Plain,
+        streams: false,
     },
     c_compilers: &[CCompiler {
         program: "powerpc-linux-gnu-gcc",
@@ -114,6 +115,7 @@ pub const C2000_C28X: TargetSpec = TargetSpec {
         rows: 4,
         unrolled: 2,
         inner: IntegerLoop::Plain,
+        streams: false,
     },
     c_compilers: &[CCompiler {
         program: "cl2000",

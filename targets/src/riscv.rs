@@ -41,6 +41,7 @@ pub const RISCV32IMC: TargetSpec = TargetSpec {
         rows: 8,
         unrolled: 2,
         inner: IntegerLoop::Plain,
+        streams: false,
     },
     // clang puts float constants into the writable .sdata unless the limit is 0
     // the bare compiler has no C library, so <stdint.h> is there in freestanding mode only

@@ -116,6 +116,8 @@ impl<'p> Printer<'p> {
             }
             Op::Within { x, low, high } => format!("{p}_within({}, {}, {})", v(x), v(low), v(high)),
             Op::Outside { x, low, high } => format!("{p}_outside({}, {}, {})", v(x), v(low), v(high)),
+            Op::Difference(x, y) => format!("{p}_bits({}) ^ {p}_bits({})", v(x), v(y)),
+            Op::NotZero(x) => format!("{p}_flag({} != 0u)", v(x)),
             Op::Above(x, limit) => format!("{p}_flag({} > {})", v(x), v(limit)),
             Op::And(x, y) => format!("{} & {}", v(x), v(y)),
             Op::Or(x, y) => format!("{} | {}", v(x), v(y)),

@@ -109,6 +109,14 @@ impl<'p> Printer<'p> {
             }
             Op::Within { x, low, high } => call("within", &[v(x), v(low), v(high)]),
             Op::Outside { x, low, high } => call("outside", &[v(x), v(low), v(high)]),
+            Op::Difference(x, y) => {
+                let (x, y) = (v(x), v(y));
+                quote!(#x.to_bits() ^ #y.to_bits())
+            }
+            Op::NotZero(x) => {
+                let x = v(x);
+                quote!(flag(#x != 0))
+            }
             Op::Above(x, limit) => {
                 let (x, limit) = (v(x), v(limit));
                 quote!(flag(#x > #limit))

@@ -423,8 +423,8 @@ impl Controller {
         let f8: u32 = f2 & f6;
         let v9: f32 = 12.0 - v3;
         let v10: f32 = v9 * 0.5;
-        let f11: u32 = outside(v10, -4.0, 4.0);
-        let v12: f32 = clamp(v10, -4.0, 4.0);
+        let v11: f32 = clamp(v10, -4.0, 4.0);
+        let f12: u32 = v10.to_bits() ^ v11.to_bits();
         let v13: f32 = v7 * 2.0;
         let v14: f32 = v3 * 0.083333336;
         let v15: f32 = v13 + v14;
@@ -432,17 +432,18 @@ impl Controller {
         let v17: f32 = v16 * 0.25;
         let v18: f32 = v17 * 0.1;
         let v19: f32 = self.previous_command - 0.5;
+        let f20: u32 = flag(f12 != 0);
         let counted = self.bad_count.wrapping_add(flag(self.bad_count <= 4));
         let bad_count = counted & f8.wrapping_sub(1);
         let usable = f8 | (self.primed & flag(bad_count <= 4));
         Front {
             signal: [v3, v7],
-            observation: [v12, v18, v19],
+            observation: [v11, v18, v19],
             bad_count,
             usable,
             held: usable & (f8 ^ 1),
             primed_now: usable & (self.primed ^ 1),
-            clipped: f11,
+            clipped: f20,
         }
     }
     /// Network, argmax, mapping, limits, status.
@@ -472,15 +473,17 @@ impl Controller {
         let f9: u32 = f7 | f8;
         let v10: f32 = self.previous_command - 0.02;
         let v11: f32 = self.previous_command + 0.02;
-        let f12: u32 = outside(v6, v10, v11);
-        let v13: f32 = clamp(v6, v10, v11);
-        let f14: u32 = flag(v13 > self.soft_cap);
-        let v15: f32 = select(f14, self.soft_cap, v13);
-        let f16: u32 = outside(v15, 0.05, 0.9);
-        let v17: f32 = clamp(v15, 0.05, 0.9);
+        let v12: f32 = clamp(v6, v10, v11);
+        let f13: u32 = v6.to_bits() ^ v12.to_bits();
+        let f14: u32 = flag(f13 != 0);
+        let f15: u32 = flag(v12 > self.soft_cap);
+        let v16: f32 = select(f15, self.soft_cap, v12);
+        let v17: f32 = clamp(v16, 0.05, 0.9);
+        let f18: u32 = v16.to_bits() ^ v17.to_bits();
+        let f19: u32 = flag(f18 != 0);
         let usable = front.usable;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
-            | (f9 << 4) | (f12 << 5) | (f14 << 6) | (f16 << 7);
+            | (f9 << 4) | (f14 << 5) | (f15 << 6) | (f19 << 7);
         Command {
             duty: select(usable, v17, 0.0),
             duty_sim: select(usable, chosen, 0.0),

@@ -703,8 +703,8 @@ impl Controller {
         let f9: u32 = f8 & f6;
         let v10: f32 = 48.0 - v1;
         let v11: f32 = v10 * 0.1;
-        let f12: u32 = outside(v11, -2.0, 2.0);
-        let v13: f32 = clamp(v11, -2.0, 2.0);
+        let v12: f32 = clamp(v11, -2.0, 2.0);
+        let f13: u32 = v11.to_bits() ^ v12.to_bits();
         let v14: f32 = v1 - 48.0;
         let v15: f32 = select(self.primed, self.memory[0], v14);
         let v16: f32 = v15 * 0.05;
@@ -713,8 +713,8 @@ impl Controller {
         let v19: f32 = v1 - v18;
         let v20: f32 = v19 * 10000.0;
         let v21: f32 = v20 * 0.00001;
-        let f22: u32 = outside(v21, -1.0, 1.0);
-        let v23: f32 = clamp(v21, -1.0, 1.0);
+        let v22: f32 = clamp(v21, -1.0, 1.0);
+        let f23: u32 = v21.to_bits() ^ v22.to_bits();
         let v24: f32 = select(self.primed, self.memory[4], v5);
         let v25: f32 = v5 - v24;
         let v26: f32 = v25 * 0.09090909;
@@ -763,16 +763,17 @@ impl Controller {
         let v59: f32 = self.previous_command * 2.0;
         let v60: f32 = v59 - 1.0;
         let v61: f32 = v7 * 0.0625;
-        let f62: u32 = f12 | f22;
+        let f62: u32 = f13 | f23;
+        let f63: u32 = flag(f62 != 0);
         let counted = self.bad_count.wrapping_add(flag(self.bad_count <= 3));
         let bad_count = counted & f9.wrapping_sub(1);
         let usable = f9 | (self.primed & flag(bad_count <= 3));
         Front {
             signal: [v1, v5, v7],
             observation: [
-                v13,
+                v12,
                 v17,
-                v23,
+                v22,
                 v29,
                 v37,
                 v40,
@@ -788,7 +789,7 @@ impl Controller {
             usable,
             held: usable & (f9 ^ 1),
             primed_now: usable & (self.primed ^ 1),
-            clipped: f62,
+            clipped: f63,
         }
     }
     /// Network, argmax, mapping, limits, status.
@@ -818,15 +819,17 @@ impl Controller {
         let f9: u32 = f7 | f8;
         let v10: f32 = self.previous_command - 0.06;
         let v11: f32 = self.previous_command + 0.06;
-        let f12: u32 = outside(v6, v10, v11);
-        let v13: f32 = clamp(v6, v10, v11);
-        let f14: u32 = flag(v13 > self.soft_cap);
-        let v15: f32 = select(f14, self.soft_cap, v13);
-        let f16: u32 = outside(v15, 0.3, 0.67999995);
-        let v17: f32 = clamp(v15, 0.3, 0.67999995);
+        let v12: f32 = clamp(v6, v10, v11);
+        let f13: u32 = v6.to_bits() ^ v12.to_bits();
+        let f14: u32 = flag(f13 != 0);
+        let f15: u32 = flag(v12 > self.soft_cap);
+        let v16: f32 = select(f15, self.soft_cap, v12);
+        let v17: f32 = clamp(v16, 0.3, 0.67999995);
+        let f18: u32 = v16.to_bits() ^ v17.to_bits();
+        let f19: u32 = flag(f18 != 0);
         let usable = front.usable;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
-            | (f9 << 4) | (f12 << 5) | (f14 << 6) | (f16 << 7);
+            | (f9 << 4) | (f14 << 5) | (f15 << 6) | (f19 << 7);
         Command {
             duty: select(usable, v17, 0.02),
             duty_sim: select(usable, chosen, 0.02),

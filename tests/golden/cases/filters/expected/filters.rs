@@ -367,8 +367,8 @@ impl Controller {
         let v5: f32 = 48.0 - v1;
         let v6: f32 = select(self.primed, self.memory[0], v5);
         let v7: f32 = v6 * 0.1;
-        let f8: u32 = outside(v7, -5.0, 5.0);
-        let v9: f32 = clamp(v7, -5.0, 5.0);
+        let v8: f32 = clamp(v7, -5.0, 5.0);
+        let f9: u32 = v7.to_bits() ^ v8.to_bits();
         let v10: f32 = select(self.primed, self.memory[20], v1);
         let v11: f32 = v1 - v10;
         let v12: f32 = v11 * 20000.0;
@@ -419,21 +419,22 @@ impl Controller {
         let v47: f32 = v46 * 0.33333334;
         let v48: f32 = v45 + v47;
         let v49: f32 = v48 * 0.00001;
-        let f50: u32 = outside(v49, -1.0, 1.0);
-        let v51: f32 = clamp(v49, -1.0, 1.0);
-        let f52: u32 = f8 | f50;
+        let v50: f32 = clamp(v49, -1.0, 1.0);
+        let f51: u32 = v49.to_bits() ^ v50.to_bits();
+        let f52: u32 = f9 | f51;
+        let f53: u32 = flag(f52 != 0);
         let counted = self.bad_count.wrapping_add(flag(self.bad_count <= 2));
         let bad_count = counted & f4.wrapping_sub(1);
         let usable = f4 | (self.primed & flag(bad_count <= 2));
         Front {
             signal: [v1, v3],
-            observation: [v9, v13, v19, v24, v31, v34, v38, v51],
+            observation: [v8, v13, v19, v24, v31, v34, v38, v50],
             push: [v5, v1, v17, v23, v1, v30, v1, v38, v3, v39, v41, v48],
             bad_count,
             usable,
             held: usable & (f4 ^ 1),
             primed_now: usable & (self.primed ^ 1),
-            clipped: f52,
+            clipped: f53,
         }
     }
     /// Network, argmax, mapping, limits, status.
@@ -451,13 +452,14 @@ impl Controller {
             action_index = (action & mask) | (action_index & !mask);
             action = action.wrapping_add(1);
         }
-        let f0: u32 = outside(chosen, 0.05, 0.95);
-        let v1: f32 = clamp(chosen, 0.05, 0.95);
+        let v0: f32 = clamp(chosen, 0.05, 0.95);
+        let f1: u32 = chosen.to_bits() ^ v0.to_bits();
+        let f2: u32 = flag(f1 != 0);
         let usable = front.usable;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
-            | (f0 << 7);
+            | (f2 << 7);
         Command {
-            duty: select(usable, v1, 0.05),
+            duty: select(usable, v0, 0.05),
             duty_sim: select(usable, chosen, 0.05),
             action_index,
             status: (status & 0_u32.wrapping_sub(usable))

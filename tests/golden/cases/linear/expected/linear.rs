@@ -337,12 +337,14 @@ impl Controller {
         }
         let v0: f32 = self.previous_command - 0.049999997;
         let v1: f32 = self.previous_command + 0.049999997;
-        let f2: u32 = outside(chosen, v0, v1);
-        let v3: f32 = clamp(chosen, v0, v1);
-        let f4: u32 = outside(v3, 0.4, 0.59999996);
-        let v5: f32 = clamp(v3, 0.4, 0.59999996);
+        let v2: f32 = clamp(chosen, v0, v1);
+        let f3: u32 = chosen.to_bits() ^ v2.to_bits();
+        let f4: u32 = flag(f3 != 0);
+        let v5: f32 = clamp(v2, 0.4, 0.59999996);
+        let f6: u32 = v2.to_bits() ^ v5.to_bits();
+        let f7: u32 = flag(f6 != 0);
         let usable = front.usable;
-        let status = (front.held << 0) | (front.primed_now << 2) | (f2 << 5) | (f4 << 7);
+        let status = (front.held << 0) | (front.primed_now << 2) | (f4 << 5) | (f7 << 7);
         Command {
             duty: select(usable, v5, 0.4),
             duty_sim: select(usable, chosen, 0.4),

@@ -353,12 +353,13 @@ impl Controller {
             action_index = (action & mask) | (action_index & !mask);
             action = action.wrapping_add(1);
         }
-        let f0: u32 = outside(chosen, 0.1, 0.9);
-        let v1: f32 = clamp(chosen, 0.1, 0.9);
+        let v0: f32 = clamp(chosen, 0.1, 0.9);
+        let f1: u32 = chosen.to_bits() ^ v0.to_bits();
+        let f2: u32 = flag(f1 != 0);
         let usable = front.usable;
-        let status = (front.held << 0) | (front.primed_now << 2) | (f0 << 7);
+        let status = (front.held << 0) | (front.primed_now << 2) | (f2 << 7);
         Command {
-            duty: select(usable, v1, 0.0),
+            duty: select(usable, v0, 0.0),
             duty_sim: select(usable, chosen, 0.0),
             action_index,
             status: (status & 0_u32.wrapping_sub(usable))

@@ -443,48 +443,49 @@ impl Controller {
         let f4: u32 = f0 & f2;
         let v5: f32 = v1 - 100.0;
         let v6: f32 = v5 * 0.01;
-        let f7: u32 = outside(v6, -2.0, 2.0);
-        let v8: f32 = clamp(v6, -2.0, 2.0);
+        let v7: f32 = clamp(v6, -2.0, 2.0);
+        let f8: u32 = v6.to_bits() ^ v7.to_bits();
         let v9: f32 = select(self.primed, self.memory[0], v5);
         let v10: f32 = v9 * 0.01;
-        let f11: u32 = outside(v10, -2.0, 2.0);
-        let v12: f32 = clamp(v10, -2.0, 2.0);
+        let v11: f32 = clamp(v10, -2.0, 2.0);
+        let f12: u32 = v10.to_bits() ^ v11.to_bits();
         let v13: f32 = select(self.primed, self.memory[1], v5);
         let v14: f32 = v5 - v13;
         let v15: f32 = v14 * 10000.0;
         let v16: f32 = v15 * 0.00001;
-        let f17: u32 = outside(v16, -2.0, 2.0);
-        let v18: f32 = clamp(v16, -2.0, 2.0);
+        let v17: f32 = clamp(v16, -2.0, 2.0);
+        let f18: u32 = v16.to_bits() ^ v17.to_bits();
         let v19: f32 = v1 * 0.01;
-        let f20: u32 = outside(v19, 0.0, 2.5);
-        let v21: f32 = clamp(v19, 0.0, 2.5);
+        let v20: f32 = clamp(v19, 0.0, 2.5);
+        let f21: u32 = v19.to_bits() ^ v20.to_bits();
         let v22: f32 = select(self.primed, self.memory[2], v1);
         let v23: f32 = v22 * 0.01;
-        let f24: u32 = outside(v23, 0.0, 2.5);
-        let v25: f32 = clamp(v23, 0.0, 2.5);
+        let v24: f32 = clamp(v23, 0.0, 2.5);
+        let f25: u32 = v23.to_bits() ^ v24.to_bits();
         let v26: f32 = select(self.primed, self.memory[3], v1);
         let v27: f32 = v1 - v26;
         let v28: f32 = v27 * 10000.0;
         let v29: f32 = v28 * 0.00001;
-        let f30: u32 = outside(v29, -2.0, 2.0);
-        let v31: f32 = clamp(v29, -2.0, 2.0);
-        let f32: u32 = f7 | f11;
-        let f33: u32 = f32 | f17;
-        let f34: u32 = f33 | f20;
-        let f35: u32 = f34 | f24;
-        let f36: u32 = f35 | f30;
+        let v30: f32 = clamp(v29, -2.0, 2.0);
+        let f31: u32 = v29.to_bits() ^ v30.to_bits();
+        let f32: u32 = f8 | f12;
+        let f33: u32 = f32 | f18;
+        let f34: u32 = f33 | f21;
+        let f35: u32 = f34 | f25;
+        let f36: u32 = f35 | f31;
+        let f37: u32 = flag(f36 != 0);
         let counted = self.bad_count.wrapping_add(flag(self.bad_count <= 3));
         let bad_count = counted & f4.wrapping_sub(1);
         let usable = f4 | (self.primed & flag(bad_count <= 3));
         Front {
             signal: [v1, v3],
-            observation: [v8, v12, v18, v21, v25, v31],
+            observation: [v7, v11, v17, v20, v24, v30],
             push: [v5, v5, v1, v1],
             bad_count,
             usable,
             held: usable & (f4 ^ 1),
             primed_now: usable & (self.primed ^ 1),
-            clipped: f36,
+            clipped: f37,
         }
     }
     /// Network, argmax, mapping, limits, status.
@@ -509,13 +510,14 @@ impl Controller {
         let f4: u32 = outside(chosen, 0.35, 0.65);
         let f5: u32 = outside(front.signal[1], 0.0, 12.0);
         let f6: u32 = f4 | f5;
-        let f7: u32 = outside(v3, 0.3, 0.7);
-        let v8: f32 = clamp(v3, 0.3, 0.7);
+        let v7: f32 = clamp(v3, 0.3, 0.7);
+        let f8: u32 = v3.to_bits() ^ v7.to_bits();
+        let f9: u32 = flag(f8 != 0);
         let usable = front.usable;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
-            | (f6 << 4) | (f7 << 7);
+            | (f6 << 4) | (f9 << 7);
         Command {
-            duty: select(usable, v8, 0.0),
+            duty: select(usable, v7, 0.0),
             duty_sim: select(usable, chosen, 0.0),
             action_index,
             status: (status & 0_u32.wrapping_sub(usable))

@@ -1244,23 +1244,24 @@ impl Controller {
         let f4: u32 = f0 & f2;
         let v5: f32 = 100.0 - v1;
         let v6: f32 = v5 * 0.05;
-        let f7: u32 = outside(v6, -5.0, 5.0);
-        let v8: f32 = clamp(v6, -5.0, 5.0);
+        let v7: f32 = clamp(v6, -5.0, 5.0);
+        let f8: u32 = v6.to_bits() ^ v7.to_bits();
         let v9: f32 = select(self.primed, self.memory[0], v1);
         let v10: f32 = v9 * 0.01;
         let v11: f32 = v3 * 0.02;
+        let f12: u32 = flag(f8 != 0);
         let counted = self.bad_count.wrapping_add(flag(self.bad_count <= 3));
         let bad_count = counted & f4.wrapping_sub(1);
         let usable = f4 | (self.primed & flag(bad_count <= 3));
         Front {
             signal: [v1, v3],
-            observation: [v8, v10, v11],
+            observation: [v7, v10, v11],
             push: [v1],
             bad_count,
             usable,
             held: usable & (f4 ^ 1),
             primed_now: usable & (self.primed ^ 1),
-            clipped: f7,
+            clipped: f12,
         }
     }
     /// Network, argmax, mapping, limits, status.
@@ -1280,13 +1281,14 @@ impl Controller {
         }
         let f0: u32 = flag(chosen > self.soft_cap);
         let v1: f32 = select(f0, self.soft_cap, chosen);
-        let f2: u32 = outside(v1, 0.3, 0.7);
-        let v3: f32 = clamp(v1, 0.3, 0.7);
+        let v2: f32 = clamp(v1, 0.3, 0.7);
+        let f3: u32 = v1.to_bits() ^ v2.to_bits();
+        let f4: u32 = flag(f3 != 0);
         let usable = front.usable;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
-            | (f0 << 6) | (f2 << 7);
+            | (f0 << 6) | (f4 << 7);
         Command {
-            duty: select(usable, v3, 0.0),
+            duty: select(usable, v2, 0.0),
             duty_sim: select(usable, chosen, 0.0),
             action_index,
             status: (status & 0_u32.wrapping_sub(usable))

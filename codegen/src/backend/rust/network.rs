@@ -16,7 +16,7 @@ pub fn items(program: &Program) -> TokenStream {
         .then(tanh);
     let network = match &program.network {
         NetworkCode::Real { fused, layers } => real(program, layers, *fused),
-        NetworkCode::Integer(network) => integer::items(network, program.has_fpu),
+        NetworkCode::Integer(network) => integer::items(program, network),
     };
     quote! {
         static DUTIES: [f32; ACTIONS] = [#(#duties),*];

@@ -54,6 +54,7 @@ const BASE: TargetSpec = TargetSpec {
         unrolled: 1,
         inner: IntegerLoop::Plain,
         streams: false,
+        rust_rows: (4, 4),
     },
     c_compilers: &[],
     c_flags: EXACT_C99,
@@ -76,6 +77,7 @@ pub const CORTEX_M0PLUS: TargetSpec = TargetSpec {
         unrolled: 1,
         inner: IntegerLoop::Halves,
         streams: false,
+        rust_rows: (8, 8),
     },
     c_compilers: &[
         gcc(&["-mthumb", "-mcpu=cortex-m0plus"]),

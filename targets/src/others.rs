@@ -69,6 +69,7 @@ pub const DSPACE_DS1202: TargetSpec = TargetSpec {
         unrolled: 2,
         inner: IntegerLoop::Plain,
         streams: false,
+        rust_rows: (4, 4),
     },
     c_compilers: &[CCompiler {
         program: "powerpc-linux-gnu-gcc",
@@ -116,6 +117,7 @@ pub const C2000_C28X: TargetSpec = TargetSpec {
         unrolled: 2,
         inner: IntegerLoop::Plain,
         streams: false,
+        rust_rows: (4, 4),
     },
     c_compilers: &[CCompiler {
         program: "cl2000",

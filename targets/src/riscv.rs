@@ -42,6 +42,7 @@ pub const RISCV32IMC: TargetSpec = TargetSpec {
         unrolled: 2,
         inner: IntegerLoop::Plain,
         streams: false,
+        rust_rows: (8, 4),
     },
     // clang puts float constants into the writable .sdata unless the limit is 0
     // the bare compiler has no C library, so <stdint.h> is there in freestanding mode only

@@ -23,8 +23,12 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
     let row_block = match language {
         Language::C => target.c_row_block,
         Language::Rust => {
-            // LLVM unrolls the loops over a block and runs out of registers with more
-            integer_block.rows = integer_block.rows.min(4);
+            let (of_16, of_8) = integer_block.rust_rows;
+            integer_block.rows = if policy.numeric_format == NumericFormat::I8 {
+                of_8
+            } else {
+                of_16
+            };
             target.rust_row_block
         }
     };

@@ -60,8 +60,13 @@
 #define ACTIVATIONS_COLD
 #define ACTIVATIONS_SPARE
 #endif
+#if defined(__GNUC__)
+#define ACTIVATIONS_ALIGNED __attribute__((aligned(64)))
+#else
+#define ACTIVATIONS_ALIGNED
+#endif
 
-ACTIVATIONS_TABLE static const float activations_weights0[15] = {
+ACTIVATIONS_TABLE ACTIVATIONS_ALIGNED static const float activations_weights0[15] = {
     -0.66952366f, -0.7398165f, -0.6319459f, 0.67295265f, -0.034356087f, 0.34691855f, -0.4911419f, 0.67328006f,
     0.34370148f, -0.2840553f, 0.19567789f, 0.23594397f, -0.015480282f, 0.36699778f, 0.37652034f,
 };
@@ -70,7 +75,7 @@ ACTIVATIONS_TABLE static const float activations_bias0[5] = {
     0.5176931f, -0.33592403f, -0.68605596f, -0.5663371f, 0.15240872f,
 };
 
-ACTIVATIONS_TABLE static const float activations_weights1[20] = {
+ACTIVATIONS_TABLE ACTIVATIONS_ALIGNED static const float activations_weights1[20] = {
     0.42855382f, 0.5234264f, 0.2618374f, -0.38638666f, 0.58455324f, -0.38130954f, 0.30133802f, -0.035650283f,
     0.22760227f, -0.50857f, -0.41723394f, 0.22755377f, -0.41442758f, 0.18946423f, 0.53505427f, -0.16319028f,
     0.1642641f, 0.49899754f, -0.096169695f, -0.17483032f,
@@ -80,7 +85,7 @@ ACTIVATIONS_TABLE static const float activations_bias1[4] = {
     -0.45988896f, 0.010735092f, 0.2773859f, 0.4780439f,
 };
 
-ACTIVATIONS_TABLE static const float activations_weights2[16] = {
+ACTIVATIONS_TABLE ACTIVATIONS_ALIGNED static const float activations_weights2[16] = {
     -0.27396908f, 0.06737489f, 0.051376466f, -0.52944064f, 0.10959469f, -0.5173111f, 0.06072989f, 0.25279346f,
     0.5918048f, 0.2764698f, -0.12671135f, 0.14612873f, -0.72398895f, 0.29526362f, -0.108687595f, -0.19487545f,
 };
@@ -89,7 +94,7 @@ ACTIVATIONS_TABLE static const float activations_bias2[4] = {
     -0.23947059f, -0.4564435f, 0.574685f, -0.12704511f,
 };
 
-ACTIVATIONS_TABLE static const float activations_weights3[24] = {
+ACTIVATIONS_TABLE ACTIVATIONS_ALIGNED static const float activations_weights3[24] = {
     0.013508355f, 0.33501947f, 0.0902141f, 0.025489926f, 0.45241624f, 0.32662106f, -0.1865374f, -0.08763165f,
     -0.0641898f, -0.42394468f, -0.26295507f, 0.58041805f, 0.024629207f, -0.29540873f, -0.25176185f,
     -0.15361814f, -0.26693493f, -0.73974955f, 0.5669602f, -0.66072786f, -0.63333917f, 0.42041382f, -0.41981456f,
@@ -100,7 +105,7 @@ ACTIVATIONS_TABLE static const float activations_bias3[6] = {
     -0.15602386f, -0.45747477f, 0.6958889f, 0.7013742f, -0.17114484f, 0.35093158f,
 };
 
-ACTIVATIONS_TABLE static const float activations_weights4[18] = {
+ACTIVATIONS_TABLE ACTIVATIONS_ALIGNED static const float activations_weights4[18] = {
     -0.5757741f, 0.19295122f, -0.20319027f, 0.53849894f, -0.51970714f, 0.2549364f, 0.45058882f, 0.43425247f,
     0.59359163f, -0.14257342f, -0.22855392f, -0.31710756f, 0.4763667f, 0.097509444f, -0.06392977f, -0.09927162f,
     -0.5195287f, -0.08348909f,

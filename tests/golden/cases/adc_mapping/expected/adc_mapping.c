@@ -60,8 +60,13 @@
 #define ADC_MAPPING_COLD
 #define ADC_MAPPING_SPARE
 #endif
+#if defined(__GNUC__)
+#define ADC_MAPPING_ALIGNED __attribute__((aligned(64)))
+#else
+#define ADC_MAPPING_ALIGNED
+#endif
 
-ADC_MAPPING_TABLE static const float adc_mapping_weights0[15] = {
+ADC_MAPPING_TABLE ADC_MAPPING_ALIGNED static const float adc_mapping_weights0[15] = {
     -0.1961235f, -0.6939645f, 0.8410207f, 0.17916429f, 0.6482211f, 0.43700856f, -0.54046893f, 0.019228343f,
     -0.08577966f, -0.081913486f, -0.46296132f, -0.2067914f, -0.12739001f, -0.62925005f, 0.7875268f,
 };
@@ -70,7 +75,7 @@ ADC_MAPPING_TABLE static const float adc_mapping_bias0[5] = {
     0.76032734f, 0.5734856f, -0.067461744f, -0.593548f, -0.07754058f,
 };
 
-ADC_MAPPING_TABLE static const float adc_mapping_weights1[20] = {
+ADC_MAPPING_TABLE ADC_MAPPING_ALIGNED static const float adc_mapping_weights1[20] = {
     -0.51671344f, 0.28526354f, -0.3059797f, 0.28003576f, 0.65400296f, 0.58544844f, -0.40991333f, -0.17074497f,
     -0.4292169f, -0.50707585f, 0.64055115f, -0.06991531f, 0.5039906f, -0.055592805f, -0.14603908f, -0.50607836f,
     -0.46147773f, 0.4618804f, 0.6315803f, -0.6685655f,
@@ -80,7 +85,7 @@ ADC_MAPPING_TABLE static const float adc_mapping_bias1[4] = {
     0.03895329f, 0.17294572f, -0.045696143f, -0.29018784f,
 };
 
-ADC_MAPPING_TABLE static const float adc_mapping_weights2[12] = {
+ADC_MAPPING_TABLE ADC_MAPPING_ALIGNED static const float adc_mapping_weights2[12] = {
     0.22726555f, -0.53449565f, -0.17750779f, 0.39302084f, -0.1294609f, 0.40427762f, -0.42653167f, -0.04249952f,
     0.6194601f, 0.71884036f, -0.6573097f, -0.11717094f,
 };

@@ -60,8 +60,13 @@
 #define FILTERS_COLD
 #define FILTERS_SPARE
 #endif
+#if defined(__GNUC__)
+#define FILTERS_ALIGNED __attribute__((aligned(64)))
+#else
+#define FILTERS_ALIGNED
+#endif
 
-FILTERS_TABLE static const float filters_weights0[40] = {
+FILTERS_TABLE FILTERS_ALIGNED static const float filters_weights0[40] = {
     0.09672132f, -0.26483372f, -0.31805533f, 0.4414412f, -0.24736558f, 0.26426315f, 0.24142319f, -0.14400415f,
     0.25481847f, -0.16662619f, 0.101439506f, -0.17025544f, -0.12958555f, 0.026766503f, 0.40682873f, 0.28151953f,
     -0.065945275f, -0.3073913f, 0.12703674f, -0.16032785f, -0.19984038f, 0.059175737f, -0.4792068f,
@@ -74,7 +79,7 @@ FILTERS_TABLE static const float filters_bias0[5] = {
     0.31085488f, -0.35127667f, -0.5216126f, 0.18891609f, 0.35936192f,
 };
 
-FILTERS_TABLE static const float filters_weights1[20] = {
+FILTERS_TABLE FILTERS_ALIGNED static const float filters_weights1[20] = {
     -0.08560874f, -0.038688105f, -0.36041594f, 0.53292054f, 0.64349246f, 0.33757457f, 0.1287781f, -0.17905018f,
     0.47089255f, -0.24448837f, -0.1930977f, 0.54904443f, -0.43568444f, 0.12696421f, -0.13106312f, -0.23561998f,
     0.06658507f, 0.1337705f, -0.44409302f, -0.66318005f,
@@ -84,7 +89,7 @@ FILTERS_TABLE static const float filters_bias1[4] = {
     0.15470055f, 0.13056146f, -0.43318373f, 0.10934106f,
 };
 
-FILTERS_TABLE static const float filters_weights2[12] = {
+FILTERS_TABLE FILTERS_ALIGNED static const float filters_weights2[12] = {
     0.47400886f, 0.6136332f, -0.18726744f, -0.38012767f, 0.29138902f, 0.073357865f, -0.5681304f, -0.42602634f,
     0.38877392f, 0.038003378f, -0.108863495f, 0.46920913f,
 };

@@ -60,8 +60,13 @@
 #define LINEAR_COLD
 #define LINEAR_SPARE
 #endif
+#if defined(__GNUC__)
+#define LINEAR_ALIGNED __attribute__((aligned(64)))
+#else
+#define LINEAR_ALIGNED
+#endif
 
-LINEAR_TABLE static const float linear_weights0[8] = {
+LINEAR_TABLE LINEAR_ALIGNED static const float linear_weights0[8] = {
     0.5087287f, -0.9411388f, 0.10764045f, -0.6520509f, -0.1138858f, -0.83677846f, 0.686646f, -0.63075453f,
 };
 

@@ -60,8 +60,13 @@
 #define MINIMAL_COLD
 #define MINIMAL_SPARE
 #endif
+#if defined(__GNUC__)
+#define MINIMAL_ALIGNED __attribute__((aligned(64)))
+#else
+#define MINIMAL_ALIGNED
+#endif
 
-MINIMAL_TABLE static const float minimal_weights0[8] = {
+MINIMAL_TABLE MINIMAL_ALIGNED static const float minimal_weights0[8] = {
     0.14119843f, 0.9991477f, -0.11823242f, 0.80047745f, 0.52138186f, -0.11803193f, 0.5576832f, 0.048932876f,
 };
 
@@ -69,7 +74,7 @@ MINIMAL_TABLE static const float minimal_bias0[4] = {
     -0.45500478f, 0.623661f, -0.20334516f, 0.22363037f,
 };
 
-MINIMAL_TABLE static const float minimal_weights1[12] = {
+MINIMAL_TABLE MINIMAL_ALIGNED static const float minimal_weights1[12] = {
     -0.06759314f, 0.21800196f, -0.6510597f, 0.045118496f, 0.4730259f, -0.627878f, -0.0960519f, 0.27255747f,
     -0.0061800727f, -0.49944752f, 0.5764868f, -0.56533664f,
 };

@@ -60,8 +60,13 @@
 #define PAPER_COLD
 #define PAPER_SPARE
 #endif
+#if defined(__GNUC__)
+#define PAPER_ALIGNED __attribute__((aligned(64)))
+#else
+#define PAPER_ALIGNED
+#endif
 
-PAPER_TABLE static const float paper_weights0[30] = {
+PAPER_TABLE PAPER_ALIGNED static const float paper_weights0[30] = {
     -0.083949134f, 0.5152256f, 0.05293614f, 0.3202631f, 0.045309745f, 0.48059827f, -0.062781304f, 0.22072285f,
     -0.44776168f, 0.49864838f, 0.43982688f, -0.38973126f, 0.43016052f, -0.16406411f, 0.07861266f, -0.010074428f,
     0.046137735f, 0.3606652f, -0.5990139f, 0.45288f, -0.129112f, 0.36013362f, 0.13209343f, 0.13926542f,
@@ -72,7 +77,7 @@ PAPER_TABLE static const float paper_bias0[5] = {
     0.53400356f, -0.5470866f, -0.20673445f, -0.38793066f, 0.47392866f,
 };
 
-PAPER_TABLE static const float paper_weights1[20] = {
+PAPER_TABLE PAPER_ALIGNED static const float paper_weights1[20] = {
     0.49237937f, 0.32990912f, 0.0060609784f, 0.35716778f, 0.15229064f, 0.64166796f, 0.6272719f, -0.048858866f,
     0.6512296f, -0.6673276f, -0.077718474f, 0.033921782f, 0.45540097f, -0.32111973f, 0.56115896f, -0.3166257f,
     -0.40354934f, -0.45383662f, -0.17826565f, 0.2969881f,
@@ -82,7 +87,7 @@ PAPER_TABLE static const float paper_bias1[4] = {
     0.4645241f, 0.5204928f, 0.23977381f, -0.4841729f,
 };
 
-PAPER_TABLE static const float paper_weights2[36] = {
+PAPER_TABLE PAPER_ALIGNED static const float paper_weights2[36] = {
     -0.49332172f, -0.6726512f, -0.19417818f, -0.49696803f, -0.6998952f, 0.6764457f, -0.3352394f, 0.3008154f,
     -0.039866902f, 0.060929023f, -0.2515212f, 0.3508664f, -0.19253542f, -0.21910845f, -0.19269665f, 0.3976336f,
     -0.707273f, -0.601249f, -0.08923574f, -0.46304578f, -0.17179532f, -0.3861085f, 0.5107591f, 0.06570055f,

@@ -60,8 +60,13 @@
 #define TAIL_BLOCKS_COLD
 #define TAIL_BLOCKS_SPARE
 #endif
+#if defined(__GNUC__)
+#define TAIL_BLOCKS_ALIGNED __attribute__((aligned(64)))
+#else
+#define TAIL_BLOCKS_ALIGNED
+#endif
 
-TAIL_BLOCKS_TABLE static const float tail_blocks_weights0[99] = {
+TAIL_BLOCKS_TABLE TAIL_BLOCKS_ALIGNED static const float tail_blocks_weights0[99] = {
     0.11528803f, -0.096372664f, 0.6535871f, 0.5092171f, -0.07804983f, -0.5767123f, 0.31472224f, -0.7250111f,
     -0.36908036f, 0.37026188f, 0.16948493f, -0.10567808f, 0.07564002f, 0.2919778f, -0.45663694f, 0.5877391f,
     0.68232244f, -0.6381136f, -0.18418254f, -0.5967305f, 0.0458231f, 0.05900489f, -0.8011879f, -0.6581506f,
@@ -85,7 +90,7 @@ TAIL_BLOCKS_TABLE static const float tail_blocks_bias0[33] = {
     -0.44670686f, 0.03500506f,
 };
 
-TAIL_BLOCKS_TABLE static const float tail_blocks_weights1[660] = {
+TAIL_BLOCKS_TABLE TAIL_BLOCKS_ALIGNED static const float tail_blocks_weights1[660] = {
     0.045305483f, -0.07668916f, -0.06552902f, -0.23365569f, -0.08872247f, 0.21112412f, 0.12776072f, 0.14726588f,
     0.24475951f, -0.22377498f, -0.20629086f, 0.12559305f, 0.22725558f, 0.018472366f, -0.13164838f, -0.10814866f,
     0.25530362f, -0.0690635f, 0.0555048f, 0.08497643f, -0.22029951f, 0.1869565f, -0.03811518f, 0.06781671f,

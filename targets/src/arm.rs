@@ -47,6 +47,7 @@ const BASE: TargetSpec = TargetSpec {
     clock_hz: None,
     c_row_block: RowBlock::Rows(4),
     rust_row_block: RowBlock::Rows(4),
+    weights_alignment: None,
     integer_block: IntegerBlock {
         rows: 6,
         unrolled: 1,
@@ -110,6 +111,7 @@ const FPU_BASE: TargetSpec = TargetSpec {
     // 32 single registers: 16 accumulators, one input, loads in flight
     c_row_block: RowBlock::Rows(16),
     rust_row_block: RowBlock::Rows(16),
+    weights_alignment: None,
     integer_block: IntegerBlock::DUAL,
     ..BASE
 };

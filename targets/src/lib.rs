@@ -200,6 +200,8 @@ pub struct TargetSpec {
     pub c_row_block: RowBlock,
     /// Row block of the generated Rust, chosen for LLVM.
     pub rust_row_block: RowBlock,
+    /// Bytes to a multiple of which the weights of a network in floats are aligned, where loads of whole vectors gain by it.
+    pub weights_alignment: Option<u32>,
     /// Blocks of the integer formats; Rust takes 4 rows at most.
     pub integer_block: IntegerBlock,
     /// C compilers in the order in which they are tried. The first also links what the others compile.

@@ -35,6 +35,7 @@ pub const RISCV32IMC: TargetSpec = TargetSpec {
     clock_hz: Some(160_000_000),
     c_row_block: RowBlock::Rows(8),
     rust_row_block: RowBlock::Rows(8),
+    weights_alignment: None,
     integer_block: IntegerBlock {
         rows: 8,
         unrolled: 2,
@@ -70,6 +71,7 @@ pub const RISCV32IMFC: TargetSpec = TargetSpec {
     suitable_format: "f32",
     c_row_block: RowBlock::Rows(16),
     rust_row_block: RowBlock::Rows(16),
+    weights_alignment: None,
     c_compilers: &[
         gcc(&["-march=rv32imfc", "-mabi=ilp32f", "-ffreestanding"]),
         clang(&[

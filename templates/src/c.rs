@@ -31,7 +31,7 @@ pub struct Table {
     pub length: usize,
     /// Lines of comma-separated literals.
     pub lines: Vec<String>,
-    /// Whether it must be aligned to words although its elements are smaller.
+    /// Whether it is aligned to more than its elements are.
     pub aligned: bool,
 }
 
@@ -439,6 +439,8 @@ pub struct Helpers {
     pub assembly: bool,
     /// Vectors of the compiler
     pub vectors: bool,
+    /// Bytes to which tables are aligned that are so to more than their elements.
+    pub alignment: Option<u32>,
 }
 
 /// Numbers of the self test.

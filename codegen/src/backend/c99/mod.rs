@@ -413,6 +413,11 @@ fn helpers(program: &Program) -> Helpers {
             NetworkCode::Real { layers, .. } => layers.iter().any(|layer| layer.has_vectors),
             NetworkCode::Integer(_) => false,
         },
+        alignment: match network {
+            NetworkCode::Real { layers, .. } => layers.iter().find_map(|layer| layer.alignment),
+            // words, although the elements are smaller
+            NetworkCode::Integer(_) => Some(4),
+        },
         fused: matches!(network, NetworkCode::Real { fused: true, .. }),
     }
 }

@@ -1,6 +1,6 @@
 //! Tables, layers and `q_values`.
 
-use proc_macro2::TokenStream;
+use proc_macro2::{Ident, TokenStream};
 use quote::quote;
 
 use super::{float, ident, integer, size, streamed};
@@ -43,6 +43,7 @@ pub fn q_values(program: &Program) -> TokenStream {
 
 fn real(layers: &[LayerCode], fused: bool) -> TokenStream {
     let (items, body) = streamed::network(layers);
+    let aligned = layers.iter().find_map(|layer| layer.alignment).map(aligned);
     let fma = fused.then(fma);
     let accumulate = if fused {
         quote!(*sum = fma(*weight, *x, *sum);)
@@ -51,6 +52,7 @@ fn real(layers: &[LayerCode], fused: bool) -> TokenStream {
     };
     quote! {
         #fma
+        #aligned
         /// Sums of one block of outputs: from the bias, inputs in index order, every operation rounded.
         #[inline(always)]
         fn block<const INPUTS: usize, const ROWS: usize>(
@@ -70,6 +72,31 @@ fn real(layers: &[LayerCode], fused: bool) -> TokenStream {
         fn network(observation: &[f32; FEATURES]) -> [f32; ACTIONS] {
             #body
         }
+    }
+}
+
+fn aligned(bytes: u32) -> TokenStream {
+    let bytes = size(bytes as usize);
+    quote! {
+        /// So that no vector of weights lies across two lines of the cache.
+        #[repr(align(#bytes))]
+        struct Aligned<T>(T);
+    }
+}
+
+/// Table of weights of a layer.
+pub(super) fn table(layer: &LayerCode, name: &Ident, kind: &TokenStream, value: &TokenStream) -> TokenStream {
+    match layer.alignment {
+        Some(_) => quote! { static #name: Aligned<#kind> = Aligned(#value); },
+        None => quote! { static #name: #kind = #value; },
+    }
+}
+
+/// What [`table`] holds.
+pub(super) fn held(layer: &LayerCode, name: &Ident) -> TokenStream {
+    match layer.alignment {
+        Some(_) => quote!(#name.0),
+        None => quote!(#name),
     }
 }
 
@@ -104,8 +131,13 @@ pub(super) fn layer_items(index: usize, layer: &LayerCode) -> (TokenStream, Toke
     let (rows_size, full_size) = (size(rows), size(full));
     let activated = activation(layer.activation);
     let (tail_tables, tail_loop) = tail(index, layer);
+    let kind = quote!([[[f32; #rows_size]; #inputs]; #full_size]);
+    let (held, table) = (
+        held(layer, &weights),
+        table(layer, &weights, &kind, &quote!([#(#blocks),*])),
+    );
     let tables = quote! {
-        static #weights: [[[f32; #rows_size]; #inputs]; #full_size] = [#(#blocks),*];
+        #table
         static #bias: [[f32; #rows_size]; #full_size] = [#(#biases),*];
         #tail_tables
     };
@@ -115,7 +147,7 @@ pub(super) fn layer_items(index: usize, layer: &LayerCode) -> (TokenStream, Toke
         fn #name(x: &[f32; #inputs]) -> [f32; #outputs] {
             let mut y = [0.0; #outputs];
             let mut rest: &mut [f32] = &mut y;
-            for (weights, bias) in #weights.iter().zip(&#bias) {
+            for (weights, bias) in #held.iter().zip(&#bias) {
                 // no division and no slice index, so no way to a panic at any optimisation level
                 if let Some((out, after)) = core::mem::take(&mut rest).split_first_chunk_mut::<#rows_size>() {
                     for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
@@ -142,16 +174,18 @@ fn tail(index: usize, layer: &LayerCode) -> (TokenStream, TokenStream) {
         ident(&format!("TAIL_WEIGHTS{index}")),
         ident(&format!("TAIL_BIAS{index}")),
     );
-    let table = columns(&layer.table[split * layer.inputs..], rows);
+    let values = columns(&layer.table[split * layer.inputs..], rows);
     let biases = row(&layer.bias[split..]);
     let (inputs, rows) = (size(layer.inputs), size(rows));
     let activated = activation(layer.activation);
+    let table = table(layer, &weights, &quote!([[f32; #rows]; #inputs]), &values);
+    let held = held(layer, &weights);
     let tables = quote! {
-        static #weights: [[f32; #rows]; #inputs] = #table;
+        #table
         static #bias: [f32; #rows] = #biases;
     };
     let code = quote! {
-        for (y, sum) in rest.iter_mut().zip(block(&#weights, &#bias, x)) {
+        for (y, sum) in rest.iter_mut().zip(block(&#held, &#bias, x)) {
             *y = #activated;
         }
     };
@@ -219,7 +253,7 @@ pub fn integrity(program: &Program) -> TokenStream {
                 .enumerate()
                 .map(|(index, layer)| match layer.is_streamed() {
                     true => streamed::integrity(index, layer),
-                    false => layer_integrity(index, layer.tail_rows() > 0),
+                    false => layer_integrity(index, layer),
                 });
             quote!(#(#layers)*)
         }
@@ -228,17 +262,18 @@ pub fn integrity(program: &Program) -> TokenStream {
     quote! { #network crc = crc_floats(crc, core::hint::black_box(&DUTIES)); }
 }
 
-fn layer_integrity(index: usize, has_tail: bool) -> TokenStream {
+fn layer_integrity(index: usize, layer: &LayerCode) -> TokenStream {
     let (weights, bias) = (ident(&format!("WEIGHTS{index}")), ident(&format!("BIAS{index}")));
     let (tail_weights, tail_bias) = (
         ident(&format!("TAIL_WEIGHTS{index}")),
         ident(&format!("TAIL_BIAS{index}")),
     );
+    let [weights, tail_weights] = [weights, tail_weights].map(|name| held(layer, &name));
     let full_weights = quote! {
         for column in core::hint::black_box(&#weights).iter().flatten() { crc = crc_floats(crc, column); }
     };
     let full_bias = quote! { for row in core::hint::black_box(&#bias) { crc = crc_floats(crc, row); } };
-    if !has_tail {
+    if layer.tail_rows() == 0 {
         return quote! { #full_weights #full_bias };
     }
     quote! {

@@ -3,7 +3,7 @@
 use proc_macro2::{Ident, TokenStream};
 use quote::quote;
 
-use super::network::{activation, columns, layer_items, row};
+use super::network::{activation, columns, held, layer_items, row, table};
 use super::{ident, size};
 use crate::program::LayerCode;
 
@@ -61,18 +61,23 @@ fn last_layer(index: usize, layer: &LayerCode) -> TokenStream {
     let biases = row(&layer.bias);
     let outputs = size(layer.outputs);
     let [rows, full, tail_rows, chunk, count, rest_size] = [rows, full, tail, layer.chunk, count, rest].map(size);
+    let kind = quote!([[[[f32; #rows]; #chunk]; #full]; #count]);
+    let of_blocks = table(layer, &weights, &kind, &quote!([#(#blocks),*]));
     let mut tables = vec![quote! {
-        static #weights: [[[[f32; #rows]; #chunk]; #full]; #count] = [#(#blocks),*];
+        #of_blocks
         static #bias: [f32; #outputs] = #biases;
     }];
     if tail > 0 {
-        tables.push(quote! { static #tail_weights: [[[f32; #tail_rows]; #chunk]; #count] = [#(#tails),*]; });
+        let kind = quote!([[[f32; #tail_rows]; #chunk]; #count]);
+        tables.push(table(layer, &tail_weights, &kind, &quote!([#(#tails),*])));
     }
     if rest > 0 {
         let (blocks, last) = split(shorter, rest);
-        tables.push(quote! { static #last_weights: [[[f32; #rows]; #rest_size]; #full] = #blocks; });
+        let kind = quote!([[[f32; #rows]; #rest_size]; #full]);
+        tables.push(table(layer, &last_weights, &kind, &blocks));
         if tail > 0 {
-            tables.push(quote! { static #last_tail_weights: [[f32; #tail_rows]; #rest_size] = #last; });
+            let kind = quote!([[f32; #tail_rows]; #rest_size]);
+            tables.push(table(layer, &last_tail_weights, &kind, &last));
         }
     }
     let (parameter, tail_code) = if tail > 0 {
@@ -117,13 +122,14 @@ fn last_layer(index: usize, layer: &LayerCode) -> TokenStream {
 /// Body of `network` from the outputs `value` of the layers before.
 fn chunks(index: usize, layer: &LayerCode, last: &LayerCode, value: &TokenStream) -> TokenStream {
     let next = index + 1;
-    let [weights, tail_weights, last_weights, last_tail_weights] = names(next);
+    let [weights, tail_weights, last_weights, last_tail_weights] = names(next).map(|name| held(last, &name));
     let (before, bias) = (ident(&format!("WEIGHTS{index}")), ident(&format!("BIAS{index}")));
     let (before_tail, bias_tail) = (
         ident(&format!("TAIL_WEIGHTS{index}")),
         ident(&format!("TAIL_BIAS{index}")),
     );
     let (name, sums) = (ident(&format!("layer{next}")), ident(&format!("BIAS{next}")));
+    let [before, before_tail] = [before, before_tail].map(|name| held(layer, &name));
     let activated = activation(layer.activation);
     let has_tail = last.tail_rows() > 0;
     let (iterator, pattern, argument, last_argument) = if has_tail {
@@ -160,7 +166,7 @@ fn chunks(index: usize, layer: &LayerCode, last: &LayerCode, value: &TokenStream
 
 /// Statements of the integrity check, in the order of the table.
 pub fn integrity(index: usize, layer: &LayerCode) -> TokenStream {
-    let [weights, tail_weights, last_weights, last_tail_weights] = names(index);
+    let [weights, tail_weights, last_weights, last_tail_weights] = names(index).map(|name| held(layer, &name));
     let bias = ident(&format!("BIAS{index}"));
     let has_tail = layer.tail_rows() > 0;
     let full = if has_tail {

@@ -130,6 +130,9 @@ fn crc_floats(crc: u32, words: &[f32]) -> u32 {
     words.iter().fold(crc, |crc, word| crc_word(crc, word.to_bits()))
 }
 static DUTIES: [f32; ACTIONS] = [0.25, 0.5, 0.75];
+/// So that no vector of weights lies across two lines of the cache.
+#[repr(align(64))]
+struct Aligned<T>(T);
 /// Sums of one block of outputs: from the bias, inputs in index order, every operation rounded.
 #[inline(always)]
 fn block<const INPUTS: usize, const ROWS: usize>(
@@ -145,7 +148,7 @@ fn block<const INPUTS: usize, const ROWS: usize>(
     }
     sums
 }
-static WEIGHTS0: [[[f32; 5]; 8]; 1] = [
+static WEIGHTS0: Aligned<[[[f32; 5]; 8]; 1]> = Aligned([
     [
         [0.09672132, -0.26483372, -0.31805533, 0.4414412, -0.24736558],
         [0.26426315, 0.24142319, -0.14400415, 0.25481847, -0.16662619],
@@ -156,7 +159,7 @@ static WEIGHTS0: [[[f32; 5]; 8]; 1] = [
         [0.24008426, 0.45820633, -0.1262112, 0.38941014, 0.42648548],
         [0.2535904, -0.31460136, -0.1795818, 0.10970836, -0.2936991],
     ],
-];
+]);
 static BIAS0: [[f32; 5]; 1] = [
     [0.31085488, -0.35127667, -0.5216126, 0.18891609, 0.35936192],
 ];
@@ -165,7 +168,7 @@ static BIAS0: [[f32; 5]; 1] = [
 fn layer0(x: &[f32; 8]) -> [f32; 5] {
     let mut y = [0.0; 5];
     let mut rest: &mut [f32] = &mut y;
-    for (weights, bias) in WEIGHTS0.iter().zip(&BIAS0) {
+    for (weights, bias) in WEIGHTS0.0.iter().zip(&BIAS0) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<5>()
         {
@@ -177,7 +180,7 @@ fn layer0(x: &[f32; 8]) -> [f32; 5] {
     }
     y
 }
-static WEIGHTS1: [[[f32; 4]; 5]; 1] = [
+static WEIGHTS1: Aligned<[[[f32; 4]; 5]; 1]> = Aligned([
     [
         [-0.08560874, -0.038688105, -0.36041594, 0.53292054],
         [0.64349246, 0.33757457, 0.1287781, -0.17905018],
@@ -185,14 +188,14 @@ static WEIGHTS1: [[[f32; 4]; 5]; 1] = [
         [-0.43568444, 0.12696421, -0.13106312, -0.23561998],
         [0.06658507, 0.1337705, -0.44409302, -0.66318005],
     ],
-];
+]);
 static BIAS1: [[f32; 4]; 1] = [[0.15470055, 0.13056146, -0.43318373, 0.10934106]];
 /// fc1: 5 -> 4
 #[inline(always)]
 fn layer1(x: &[f32; 5]) -> [f32; 4] {
     let mut y = [0.0; 4];
     let mut rest: &mut [f32] = &mut y;
-    for (weights, bias) in WEIGHTS1.iter().zip(&BIAS1) {
+    for (weights, bias) in WEIGHTS1.0.iter().zip(&BIAS1) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<4>()
         {
@@ -204,21 +207,21 @@ fn layer1(x: &[f32; 5]) -> [f32; 4] {
     }
     y
 }
-static WEIGHTS2: [[[f32; 3]; 4]; 1] = [
+static WEIGHTS2: Aligned<[[[f32; 3]; 4]; 1]> = Aligned([
     [
         [0.47400886, 0.6136332, -0.18726744],
         [-0.38012767, 0.29138902, 0.073357865],
         [-0.5681304, -0.42602634, 0.38877392],
         [0.038003378, -0.108863495, 0.46920913],
     ],
-];
+]);
 static BIAS2: [[f32; 3]; 1] = [[-0.19511996, -0.4913317, -0.638233]];
 /// fc2: 4 -> 3
 #[inline(always)]
 fn layer2(x: &[f32; 4]) -> [f32; 3] {
     let mut y = [0.0; 3];
     let mut rest: &mut [f32] = &mut y;
-    for (weights, bias) in WEIGHTS2.iter().zip(&BIAS2) {
+    for (weights, bias) in WEIGHTS2.0.iter().zip(&BIAS2) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<3>()
         {
@@ -513,19 +516,19 @@ impl Controller {
     #[must_use]
     pub fn integrity() -> bool {
         let mut crc = u32::MAX;
-        for column in core::hint::black_box(&WEIGHTS0).iter().flatten() {
+        for column in core::hint::black_box(&WEIGHTS0.0).iter().flatten() {
             crc = crc_floats(crc, column);
         }
         for row in core::hint::black_box(&BIAS0) {
             crc = crc_floats(crc, row);
         }
-        for column in core::hint::black_box(&WEIGHTS1).iter().flatten() {
+        for column in core::hint::black_box(&WEIGHTS1.0).iter().flatten() {
             crc = crc_floats(crc, column);
         }
         for row in core::hint::black_box(&BIAS1) {
             crc = crc_floats(crc, row);
         }
-        for column in core::hint::black_box(&WEIGHTS2).iter().flatten() {
+        for column in core::hint::black_box(&WEIGHTS2.0).iter().flatten() {
             crc = crc_floats(crc, column);
         }
         for row in core::hint::black_box(&BIAS2) {

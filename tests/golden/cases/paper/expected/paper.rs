@@ -130,6 +130,9 @@ fn crc_floats(crc: u32, words: &[f32]) -> u32 {
     words.iter().fold(crc, |crc, word| crc_word(crc, word.to_bits()))
 }
 static DUTIES: [f32; ACTIONS] = [0.45, 0.5, 0.55, 0.35, 0.45, 0.55, 0.525, 0.575, 0.6];
+/// So that no vector of weights lies across two lines of the cache.
+#[repr(align(64))]
+struct Aligned<T>(T);
 /// Sums of one block of outputs: from the bias, inputs in index order, every operation rounded.
 #[inline(always)]
 fn block<const INPUTS: usize, const ROWS: usize>(
@@ -145,7 +148,7 @@ fn block<const INPUTS: usize, const ROWS: usize>(
     }
     sums
 }
-static WEIGHTS0: [[[f32; 5]; 6]; 1] = [
+static WEIGHTS0: Aligned<[[[f32; 5]; 6]; 1]> = Aligned([
     [
         [-0.083949134, 0.5152256, 0.05293614, 0.3202631, 0.045309745],
         [0.48059827, -0.062781304, 0.22072285, -0.44776168, 0.49864838],
@@ -154,7 +157,7 @@ static WEIGHTS0: [[[f32; 5]; 6]; 1] = [
         [-0.129112, 0.36013362, 0.13209343, 0.13926542, -0.30651703],
         [0.10620785, 0.24103938, -0.40540197, -0.44985646, 0.19977015],
     ],
-];
+]);
 static BIAS0: [[f32; 5]; 1] = [
     [0.53400356, -0.5470866, -0.20673445, -0.38793066, 0.47392866],
 ];
@@ -163,7 +166,7 @@ static BIAS0: [[f32; 5]; 1] = [
 fn layer0(x: &[f32; 6]) -> [f32; 5] {
     let mut y = [0.0; 5];
     let mut rest: &mut [f32] = &mut y;
-    for (weights, bias) in WEIGHTS0.iter().zip(&BIAS0) {
+    for (weights, bias) in WEIGHTS0.0.iter().zip(&BIAS0) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<5>()
         {
@@ -175,7 +178,7 @@ fn layer0(x: &[f32; 6]) -> [f32; 5] {
     }
     y
 }
-static WEIGHTS1: [[[f32; 4]; 5]; 1] = [
+static WEIGHTS1: Aligned<[[[f32; 4]; 5]; 1]> = Aligned([
     [
         [0.49237937, 0.32990912, 0.0060609784, 0.35716778],
         [0.15229064, 0.64166796, 0.6272719, -0.048858866],
@@ -183,14 +186,14 @@ static WEIGHTS1: [[[f32; 4]; 5]; 1] = [
         [0.45540097, -0.32111973, 0.56115896, -0.3166257],
         [-0.40354934, -0.45383662, -0.17826565, 0.2969881],
     ],
-];
+]);
 static BIAS1: [[f32; 4]; 1] = [[0.4645241, 0.5204928, 0.23977381, -0.4841729]];
 /// fc1: 5 -> 4
 #[inline(always)]
 fn layer1(x: &[f32; 5]) -> [f32; 4] {
     let mut y = [0.0; 4];
     let mut rest: &mut [f32] = &mut y;
-    for (weights, bias) in WEIGHTS1.iter().zip(&BIAS1) {
+    for (weights, bias) in WEIGHTS1.0.iter().zip(&BIAS1) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<4>()
         {
@@ -202,7 +205,7 @@ fn layer1(x: &[f32; 5]) -> [f32; 4] {
     }
     y
 }
-static WEIGHTS2: [[[f32; 9]; 4]; 1] = [
+static WEIGHTS2: Aligned<[[[f32; 9]; 4]; 1]> = Aligned([
     [
         [
             -0.49332172,
@@ -249,7 +252,7 @@ static WEIGHTS2: [[[f32; 9]; 4]; 1] = [
             -0.052966118,
         ],
     ],
-];
+]);
 static BIAS2: [[f32; 9]; 1] = [
     [
         0.17496303,
@@ -268,7 +271,7 @@ static BIAS2: [[f32; 9]; 1] = [
 fn layer2(x: &[f32; 4]) -> [f32; 9] {
     let mut y = [0.0; 9];
     let mut rest: &mut [f32] = &mut y;
-    for (weights, bias) in WEIGHTS2.iter().zip(&BIAS2) {
+    for (weights, bias) in WEIGHTS2.0.iter().zip(&BIAS2) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<9>()
         {
@@ -535,19 +538,19 @@ impl Controller {
     #[must_use]
     pub fn integrity() -> bool {
         let mut crc = u32::MAX;
-        for column in core::hint::black_box(&WEIGHTS0).iter().flatten() {
+        for column in core::hint::black_box(&WEIGHTS0.0).iter().flatten() {
             crc = crc_floats(crc, column);
         }
         for row in core::hint::black_box(&BIAS0) {
             crc = crc_floats(crc, row);
         }
-        for column in core::hint::black_box(&WEIGHTS1).iter().flatten() {
+        for column in core::hint::black_box(&WEIGHTS1.0).iter().flatten() {
             crc = crc_floats(crc, column);
         }
         for row in core::hint::black_box(&BIAS1) {
             crc = crc_floats(crc, row);
         }
-        for column in core::hint::black_box(&WEIGHTS2).iter().flatten() {
+        for column in core::hint::black_box(&WEIGHTS2.0).iter().flatten() {
             crc = crc_floats(crc, column);
         }
         for row in core::hint::black_box(&BIAS2) {

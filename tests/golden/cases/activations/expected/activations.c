@@ -46,6 +46,20 @@
 #ifndef ACTIVATIONS_CODE
 #define ACTIVATIONS_CODE
 #endif
+
+/*
+ * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
+ * fast; helpers that this build may not need.
+ */
+#if defined(__GNUC__)
+#define ACTIVATIONS_APART __attribute__((noinline))
+#define ACTIVATIONS_COLD __attribute__((cold))
+#define ACTIVATIONS_SPARE __attribute__((unused))
+#else
+#define ACTIVATIONS_APART
+#define ACTIVATIONS_COLD
+#define ACTIVATIONS_SPARE
+#endif
 #if defined(__GNUC__)
 #define ACTIVATIONS_ALIGNED __attribute__((aligned(64)))
 #else
@@ -131,7 +145,7 @@ static uint32_t activations_bits(float x)
     return bits;
 }
 
-static float activations_from_bits(uint32_t bits)
+ACTIVATIONS_SPARE static float activations_from_bits(uint32_t bits)
 {
     float x;
     (void)__builtin_memcpy(&x, &bits, sizeof(x));
@@ -150,7 +164,7 @@ static uint32_t activations_bits(float x)
     return word.bits;
 }
 
-static float activations_from_bits(uint32_t bits)
+ACTIVATIONS_SPARE static float activations_from_bits(uint32_t bits)
 {
     activations_word word;
     word.bits = bits;
@@ -168,27 +182,48 @@ static uint32_t activations_flag(int condition)
     return flag;
 }
 
+#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__)
+/* conditional moves: each is executed, or skipped, in the same time */
+#define ACTIVATIONS_MOVES 1
+#endif
+
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float activations_select(uint32_t flag, float then, float otherwise)
 {
+#if defined(ACTIVATIONS_MOVES)
+    float chosen = otherwise;
+    __asm__("cmp %1, #0\n\tit ne\n\tvmovne.f32 %0, %2" : "+t"(chosen) : "r"(flag), "t"(then) : "cc");
+    return chosen;
+#else
     const uint32_t mask = (uint32_t)0 - flag;
     return activations_from_bits((activations_bits(then) & mask) | (activations_bits(otherwise) & ~mask));
+#endif
 }
 
-static uint32_t activations_within(float x, float low, float high)
+ACTIVATIONS_CODE ACTIVATIONS_APART static uint32_t activations_within(float x, float low, float high)
 {
+#if defined(ACTIVATIONS_MOVES)
+    uint32_t flag;
+    __asm__("vcmp.f32 %2, %1\n\tvmrs APSR_nzcv, fpscr\n\titt ge\n\tvcmpge.f32 %1, %3\n\tvmrsge APSR_nzcv, fpscr\n\t"
+            "ite ge\n\tmovge %0, #1\n\tmovlt %0, #0" : "=r"(flag) : "t"(x), "t"(high), "t"(low) : "cc");
+    return flag;
+#else
     return activations_flag(x >= low) & activations_flag(x <= high);
+#endif
 }
 
-static uint32_t activations_outside(float x, float low, float high)
+ACTIVATIONS_CODE ACTIVATIONS_APART static float activations_clamp(float x, float low, float high)
 {
-    return activations_flag(x < low) | activations_flag(x > high);
-}
-
-static float activations_clamp(float x, float low, float high)
-{
+#if defined(ACTIVATIONS_MOVES)
+    float clamped = x;
+    __asm__("vcmp.f32 %0, %1\n\tvmrs APSR_nzcv, fpscr\n\tit mi\n\tvmovmi.f32 %0, %1\n\t"
+            "vcmp.f32 %0, %2\n\tvmrs APSR_nzcv, fpscr\n\tit gt\n\tvmovgt.f32 %0, %2"
+            : "+&t"(clamped) : "t"(low), "t"(high) : "cc");
+    return clamped;
+#else
     const float raised = activations_select(activations_flag(x < low), low, x);
     return activations_select(activations_flag(raised > high), high, raised);
+#endif
 }
 
 /* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
@@ -245,7 +280,7 @@ typedef struct {
 } activations_front;
 
 /* Sanitise, filters, observation. */
-ACTIVATIONS_CODE static void activations_sense(const activations_state *state, const activations_measurement *measured, activations_front *front)
+ACTIVATIONS_CODE ACTIVATIONS_APART static void activations_sense(const activations_state *state, const activations_measurement *measured, activations_front *front)
 {
     const uint32_t f0 = activations_within(measured->v_out, 0.0f, 24.0f);
     const float v1 = activations_select(f0, measured->v_out, state->held[0]);
@@ -607,37 +642,44 @@ ACTIVATIONS_CODE void activations_q_values(const float *observation, float *q)
     activations_layer3(hidden2, hidden3);
     activations_layer4(hidden3, q);
 }
-/* Network, argmax, mapping, limits, status. */
-ACTIVATIONS_CODE static void activations_decide(const activations_state *state, const activations_front *front, activations_command *command)
+/* Network and argmax: the greedy action. */
+ACTIVATIONS_CODE ACTIVATIONS_APART static uint32_t activations_choose(const activations_state *state, const activations_measurement *measured)
 {
-    float q[ACTIVATIONS_ACTIONS];
+    float observation[3];
+    float q[3];
     float best = -3.40282347e+38f;
-    float chosen = activations_duties[0];
     uint32_t index = 0u;
     uint32_t action;
 
-    activations_q_values(front->observation, q);
+    activations_observe(state, measured, observation);
+    activations_q_values(observation, q);
     /* the lowest index wins among equals, a NaN never does */
     for (action = 0u; action < ACTIVATIONS_ACTIONS; ++action) {
-        const uint32_t above = activations_flag(q[action] > best);
+        const float output = q[action];
+        const uint32_t above = activations_flag(output > best);
         const uint32_t mask = (uint32_t)0 - above;
-        best = activations_select(above, q[action], best);
-        chosen = activations_select(above, activations_duties[action], chosen);
+        best = activations_select(above, output, best);
         index = (action & mask) | (index & ~mask);
     }
-    {
-        const uint32_t f0 = activations_outside(chosen, 0.0f, 1.0f);
-        const float v1 = activations_clamp(chosen, 0.0f, 1.0f);
-        const uint32_t usable = front->usable;
-        const uint32_t status = (front->held << 0)
-                              | (front->primed_now << 2)
-                              | (f0 << 7);
+    return index;
+}
 
-        command->duty = activations_select(usable, v1, 0.0f);
-        command->duty_sim = activations_select(usable, chosen, 0.0f);
-        command->action_index = index;
-        command->status = (status & ((uint32_t)0 - usable)) | (ACTIVATIONS_STATUS_FALLBACK & (usable - (uint32_t)1));
-    }
+/* Mapping, limits, status. */
+ACTIVATIONS_CODE static void activations_decide(const activations_state *state, const activations_front *front, uint32_t index, activations_command *command)
+{
+    const float chosen = activations_duties[index];
+    const float v0 = activations_clamp(chosen, 0.0f, 1.0f);
+    const uint32_t f1 = activations_bits(chosen) ^ activations_bits(v0);
+    const uint32_t f2 = activations_flag(f1 != 0u);
+    const uint32_t usable = front->usable;
+    const uint32_t status = (front->held << 0)
+                          | (front->primed_now << 2)
+                          | (f2 << 7);
+
+    command->duty = activations_select(usable, v0, 0.0f);
+    command->duty_sim = activations_select(usable, chosen, 0.0f);
+    command->action_index = index;
+    command->status = (status & ((uint32_t)0 - usable)) | (ACTIVATIONS_STATUS_FALLBACK & (usable - (uint32_t)1));
     (void)state;
 }
 
@@ -654,11 +696,29 @@ ACTIVATIONS_CODE ACTIVATIONS_NO_LIBC static void activations_advance(activations
     state->primed = front->usable;
 }
 
-ACTIVATIONS_CODE void activations_eval(const activations_state *state, const activations_measurement *measured, activations_command *command)
+/*
+ * A measurement is sensed again after the network, in a function of its own: what the network does not need is not on the
+ * stack while it runs.
+ */
+ACTIVATIONS_CODE ACTIVATIONS_APART static void activations_answer(const activations_state *state, const activations_measurement *measured, uint32_t index, activations_command *command)
 {
     activations_front front;
     activations_sense(state, measured, &front);
-    activations_decide(state, &front, command);
+    activations_decide(state, &front, index, command);
+}
+
+ACTIVATIONS_CODE ACTIVATIONS_APART static void activations_settle(activations_state *state, const activations_measurement *measured, uint32_t index, activations_command *command)
+{
+    activations_front front;
+    activations_sense(state, measured, &front);
+    activations_decide(state, &front, index, command);
+    activations_advance(state, &front, command);
+}
+
+ACTIVATIONS_CODE void activations_eval(const activations_state *state, const activations_measurement *measured, activations_command *command)
+{
+    const uint32_t index = activations_choose(state, measured);
+    activations_answer(state, measured, index, command);
 }
 
 ACTIVATIONS_CODE void activations_commit(activations_state *state, const activations_measurement *measured, const activations_command *command)
@@ -670,13 +730,11 @@ ACTIVATIONS_CODE void activations_commit(activations_state *state, const activat
 
 ACTIVATIONS_CODE void activations_step(activations_state *state, const activations_measurement *measured, activations_command *command)
 {
-    activations_front front;
-    activations_sense(state, measured, &front);
-    activations_decide(state, &front, command);
-    activations_advance(state, &front, command);
+    const uint32_t index = activations_choose(state, measured);
+    activations_settle(state, measured, index, command);
 }
 
-ACTIVATIONS_CODE ACTIVATIONS_NO_LIBC void activations_observe(const activations_state *state, const activations_measurement *measured, float *observation)
+ACTIVATIONS_CODE ACTIVATIONS_APART ACTIVATIONS_NO_LIBC void activations_observe(const activations_state *state, const activations_measurement *measured, float *observation)
 {
     activations_front front;
     uint32_t i;
@@ -686,7 +744,7 @@ ACTIVATIONS_CODE ACTIVATIONS_NO_LIBC void activations_observe(const activations_
     }
 }
 
-ACTIVATIONS_NO_LIBC void activations_reset(activations_state *state)
+ACTIVATIONS_COLD ACTIVATIONS_NO_LIBC void activations_reset(activations_state *state)
 {
     state->held[0] = 0.0f;
     state->previous_duty = 0.0f;
@@ -695,7 +753,7 @@ ACTIVATIONS_NO_LIBC void activations_reset(activations_state *state)
     state->primed = 0u;
 }
 
-void activations_init(activations_state *state)
+ACTIVATIONS_COLD void activations_init(activations_state *state)
 {
     activations_reset(state);
 }
@@ -704,21 +762,27 @@ void activations_init(activations_state *state)
  * CRC-32 (IEEE 802.3) of words taken little-endian, whatever the byte order of the machine.
  * volatile: the memory is read, the compiler does not answer in its place.
  */
-static uint32_t activations_crc(uint32_t start, const volatile float *words, uint32_t length)
+ACTIVATIONS_COLD ACTIVATIONS_APART static uint32_t activations_crc_word(uint32_t start, uint32_t word)
 {
-    uint32_t crc = start;
-    uint32_t i;
+    uint32_t crc = start ^ word;
     uint32_t nibble;
-    for (i = 0u; i < length; ++i) {
-        crc ^= activations_bits(words[i]);
-        for (nibble = 0u; nibble < 8u; ++nibble) {
-            crc = (crc >> 4) ^ activations_crc_steps[crc & 15u];
-        }
+    for (nibble = 0u; nibble < 8u; ++nibble) {
+        crc = (crc >> 4) ^ activations_crc_steps[crc & 15u];
     }
     return crc;
 }
 
-uint32_t activations_integrity(void)
+ACTIVATIONS_COLD ACTIVATIONS_APART static uint32_t activations_crc(uint32_t start, const volatile float *words, uint32_t length)
+{
+    uint32_t crc = start;
+    uint32_t i;
+    for (i = 0u; i < length; ++i) {
+        crc = activations_crc_word(crc, activations_bits(words[i]));
+    }
+    return crc;
+}
+
+ACTIVATIONS_COLD uint32_t activations_integrity(void)
 {
     uint32_t crc = 0xFFFFFFFFu;
     crc = activations_crc(crc, activations_weights0, 15u);
@@ -735,7 +799,7 @@ uint32_t activations_integrity(void)
     return activations_flag((crc ^ 0xFFFFFFFFu) == 0x74B6B656u);
 }
 
-uint32_t activations_self_test(void)
+ACTIVATIONS_COLD uint32_t activations_self_test(void)
 {
     float observation[ACTIVATIONS_FEATURES];
     float q[ACTIVATIONS_ACTIONS];

@@ -46,6 +46,20 @@
 #ifndef FILTERS_CODE
 #define FILTERS_CODE
 #endif
+
+/*
+ * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
+ * fast; helpers that this build may not need.
+ */
+#if defined(__GNUC__)
+#define FILTERS_APART __attribute__((noinline))
+#define FILTERS_COLD __attribute__((cold))
+#define FILTERS_SPARE __attribute__((unused))
+#else
+#define FILTERS_APART
+#define FILTERS_COLD
+#define FILTERS_SPARE
+#endif
 #if defined(__GNUC__)
 #define FILTERS_ALIGNED __attribute__((aligned(64)))
 #else
@@ -114,7 +128,7 @@ static uint32_t filters_bits(float x)
     return bits;
 }
 
-static float filters_from_bits(uint32_t bits)
+FILTERS_SPARE static float filters_from_bits(uint32_t bits)
 {
     float x;
     (void)__builtin_memcpy(&x, &bits, sizeof(x));
@@ -133,7 +147,7 @@ static uint32_t filters_bits(float x)
     return word.bits;
 }
 
-static float filters_from_bits(uint32_t bits)
+FILTERS_SPARE static float filters_from_bits(uint32_t bits)
 {
     filters_word word;
     word.bits = bits;
@@ -151,27 +165,48 @@ static uint32_t filters_flag(int condition)
     return flag;
 }
 
+#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__)
+/* conditional moves: each is executed, or skipped, in the same time */
+#define FILTERS_MOVES 1
+#endif
+
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float filters_select(uint32_t flag, float then, float otherwise)
 {
+#if defined(FILTERS_MOVES)
+    float chosen = otherwise;
+    __asm__("cmp %1, #0\n\tit ne\n\tvmovne.f32 %0, %2" : "+t"(chosen) : "r"(flag), "t"(then) : "cc");
+    return chosen;
+#else
     const uint32_t mask = (uint32_t)0 - flag;
     return filters_from_bits((filters_bits(then) & mask) | (filters_bits(otherwise) & ~mask));
+#endif
 }
 
-static uint32_t filters_within(float x, float low, float high)
+FILTERS_CODE FILTERS_APART static uint32_t filters_within(float x, float low, float high)
 {
+#if defined(FILTERS_MOVES)
+    uint32_t flag;
+    __asm__("vcmp.f32 %2, %1\n\tvmrs APSR_nzcv, fpscr\n\titt ge\n\tvcmpge.f32 %1, %3\n\tvmrsge APSR_nzcv, fpscr\n\t"
+            "ite ge\n\tmovge %0, #1\n\tmovlt %0, #0" : "=r"(flag) : "t"(x), "t"(high), "t"(low) : "cc");
+    return flag;
+#else
     return filters_flag(x >= low) & filters_flag(x <= high);
+#endif
 }
 
-static uint32_t filters_outside(float x, float low, float high)
+FILTERS_CODE FILTERS_APART static float filters_clamp(float x, float low, float high)
 {
-    return filters_flag(x < low) | filters_flag(x > high);
-}
-
-static float filters_clamp(float x, float low, float high)
-{
+#if defined(FILTERS_MOVES)
+    float clamped = x;
+    __asm__("vcmp.f32 %0, %1\n\tvmrs APSR_nzcv, fpscr\n\tit mi\n\tvmovmi.f32 %0, %1\n\t"
+            "vcmp.f32 %0, %2\n\tvmrs APSR_nzcv, fpscr\n\tit gt\n\tvmovgt.f32 %0, %2"
+            : "+&t"(clamped) : "t"(low), "t"(high) : "cc");
+    return clamped;
+#else
     const float raised = filters_select(filters_flag(x < low), low, x);
     return filters_select(filters_flag(raised > high), high, raised);
+#endif
 }
 
 /* oldest first, newest last; a line that is not primed reads as newest throughout */
@@ -209,7 +244,7 @@ typedef struct {
 } filters_front;
 
 /* Sanitise, filters, observation. */
-FILTERS_CODE static void filters_sense(const filters_state *state, const filters_measurement *measured, filters_front *front)
+FILTERS_CODE FILTERS_APART static void filters_sense(const filters_state *state, const filters_measurement *measured, filters_front *front)
 {
     const uint32_t f0 = filters_within(measured->v_out, 0.0f, 80.0f);
     const float v1 = filters_select(f0, measured->v_out, state->held[0]);
@@ -219,8 +254,8 @@ FILTERS_CODE static void filters_sense(const filters_state *state, const filters
     const float v5 = 48.0f - v1;
     const float v6 = filters_select(state->primed, state->memory[0], v5);
     const float v7 = v6 * 0.1f;
-    const uint32_t f8 = filters_outside(v7, -5.0f, 5.0f);
-    const float v9 = filters_clamp(v7, -5.0f, 5.0f);
+    const float v8 = filters_clamp(v7, -5.0f, 5.0f);
+    const uint32_t f9 = filters_bits(v7) ^ filters_bits(v8);
     const float v10 = filters_select(state->primed, state->memory[20], v1);
     const float v11 = v1 - v10;
     const float v12 = v11 * 20000.0f;
@@ -261,9 +296,10 @@ FILTERS_CODE static void filters_sense(const filters_state *state, const filters
     const float v47 = v46 * 0.33333334f;
     const float v48 = v45 + v47;
     const float v49 = v48 * 1e-5f;
-    const uint32_t f50 = filters_outside(v49, -1.0f, 1.0f);
-    const float v51 = filters_clamp(v49, -1.0f, 1.0f);
-    const uint32_t f52 = f8 | f50;
+    const float v50 = filters_clamp(v49, -1.0f, 1.0f);
+    const uint32_t f51 = filters_bits(v49) ^ filters_bits(v50);
+    const uint32_t f52 = f9 | f51;
+    const uint32_t f53 = filters_flag(f52 != 0u);
     const uint32_t counted = state->bad_count + filters_flag(state->bad_count <= 2u);
     const uint32_t bad_count = counted & (f4 - (uint32_t)1);
     const uint32_t bridged = state->primed & filters_flag(bad_count <= 2u);
@@ -271,14 +307,14 @@ FILTERS_CODE static void filters_sense(const filters_state *state, const filters
 
     front->signal[0] = v1;
     front->signal[1] = v3;
-    front->observation[0] = v9;
+    front->observation[0] = v8;
     front->observation[1] = v13;
     front->observation[2] = v19;
     front->observation[3] = v24;
     front->observation[4] = v31;
     front->observation[5] = v34;
     front->observation[6] = v38;
-    front->observation[7] = v51;
+    front->observation[7] = v50;
     front->push[0] = v5;
     front->push[1] = v1;
     front->push[2] = v17;
@@ -295,7 +331,7 @@ FILTERS_CODE static void filters_sense(const filters_state *state, const filters
     front->usable = usable;
     front->held = usable & (f4 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
-    front->clipped = f52;
+    front->clipped = f53;
 }
 
 /* Sums side by side in vectors, each one in the order written; the width is that of the machine the compiler is told of. */
@@ -508,38 +544,45 @@ FILTERS_CODE void filters_q_values(const float *observation, float *q)
     filters_layer1(hidden0, hidden1);
     filters_layer2(hidden1, q);
 }
-/* Network, argmax, mapping, limits, status. */
-FILTERS_CODE static void filters_decide(const filters_state *state, const filters_front *front, filters_command *command)
+/* Network and argmax: the greedy action. */
+FILTERS_CODE FILTERS_APART static uint32_t filters_choose(const filters_state *state, const filters_measurement *measured)
 {
-    float q[FILTERS_ACTIONS];
+    float observation[8];
+    float q[3];
     float best = -3.40282347e+38f;
-    float chosen = filters_duties[0];
     uint32_t index = 0u;
     uint32_t action;
 
-    filters_q_values(front->observation, q);
+    filters_observe(state, measured, observation);
+    filters_q_values(observation, q);
     /* the lowest index wins among equals, a NaN never does */
     for (action = 0u; action < FILTERS_ACTIONS; ++action) {
-        const uint32_t above = filters_flag(q[action] > best);
+        const float output = q[action];
+        const uint32_t above = filters_flag(output > best);
         const uint32_t mask = (uint32_t)0 - above;
-        best = filters_select(above, q[action], best);
-        chosen = filters_select(above, filters_duties[action], chosen);
+        best = filters_select(above, output, best);
         index = (action & mask) | (index & ~mask);
     }
-    {
-        const uint32_t f0 = filters_outside(chosen, 0.05f, 0.95f);
-        const float v1 = filters_clamp(chosen, 0.05f, 0.95f);
-        const uint32_t usable = front->usable;
-        const uint32_t status = (front->held << 0)
-                              | (front->primed_now << 2)
-                              | (front->clipped << 3)
-                              | (f0 << 7);
+    return index;
+}
 
-        command->duty = filters_select(usable, v1, 0.05f);
-        command->duty_sim = filters_select(usable, chosen, 0.05f);
-        command->action_index = index;
-        command->status = (status & ((uint32_t)0 - usable)) | (FILTERS_STATUS_FALLBACK & (usable - (uint32_t)1));
-    }
+/* Mapping, limits, status. */
+FILTERS_CODE static void filters_decide(const filters_state *state, const filters_front *front, uint32_t index, filters_command *command)
+{
+    const float chosen = filters_duties[index];
+    const float v0 = filters_clamp(chosen, 0.05f, 0.95f);
+    const uint32_t f1 = filters_bits(chosen) ^ filters_bits(v0);
+    const uint32_t f2 = filters_flag(f1 != 0u);
+    const uint32_t usable = front->usable;
+    const uint32_t status = (front->held << 0)
+                          | (front->primed_now << 2)
+                          | (front->clipped << 3)
+                          | (f2 << 7);
+
+    command->duty = filters_select(usable, v0, 0.05f);
+    command->duty_sim = filters_select(usable, chosen, 0.05f);
+    command->action_index = index;
+    command->status = (status & ((uint32_t)0 - usable)) | (FILTERS_STATUS_FALLBACK & (usable - (uint32_t)1));
     (void)state;
 }
 
@@ -576,11 +619,29 @@ FILTERS_CODE FILTERS_NO_LIBC static void filters_advance(filters_state *state, c
     state->primed = front->usable;
 }
 
-FILTERS_CODE void filters_eval(const filters_state *state, const filters_measurement *measured, filters_command *command)
+/*
+ * A measurement is sensed again after the network, in a function of its own: what the network does not need is not on the
+ * stack while it runs.
+ */
+FILTERS_CODE FILTERS_APART static void filters_answer(const filters_state *state, const filters_measurement *measured, uint32_t index, filters_command *command)
 {
     filters_front front;
     filters_sense(state, measured, &front);
-    filters_decide(state, &front, command);
+    filters_decide(state, &front, index, command);
+}
+
+FILTERS_CODE FILTERS_APART static void filters_settle(filters_state *state, const filters_measurement *measured, uint32_t index, filters_command *command)
+{
+    filters_front front;
+    filters_sense(state, measured, &front);
+    filters_decide(state, &front, index, command);
+    filters_advance(state, &front, command);
+}
+
+FILTERS_CODE void filters_eval(const filters_state *state, const filters_measurement *measured, filters_command *command)
+{
+    const uint32_t index = filters_choose(state, measured);
+    filters_answer(state, measured, index, command);
 }
 
 FILTERS_CODE void filters_commit(filters_state *state, const filters_measurement *measured, const filters_command *command)
@@ -592,13 +653,11 @@ FILTERS_CODE void filters_commit(filters_state *state, const filters_measurement
 
 FILTERS_CODE void filters_step(filters_state *state, const filters_measurement *measured, filters_command *command)
 {
-    filters_front front;
-    filters_sense(state, measured, &front);
-    filters_decide(state, &front, command);
-    filters_advance(state, &front, command);
+    const uint32_t index = filters_choose(state, measured);
+    filters_settle(state, measured, index, command);
 }
 
-FILTERS_CODE FILTERS_NO_LIBC void filters_observe(const filters_state *state, const filters_measurement *measured, float *observation)
+FILTERS_CODE FILTERS_APART FILTERS_NO_LIBC void filters_observe(const filters_state *state, const filters_measurement *measured, float *observation)
 {
     filters_front front;
     uint32_t i;
@@ -608,7 +667,7 @@ FILTERS_CODE FILTERS_NO_LIBC void filters_observe(const filters_state *state, co
     }
 }
 
-FILTERS_NO_LIBC void filters_reset(filters_state *state)
+FILTERS_COLD FILTERS_NO_LIBC void filters_reset(filters_state *state)
 {
     uint32_t i;
     for (i = 0u; i < 69u; ++i) {
@@ -622,7 +681,7 @@ FILTERS_NO_LIBC void filters_reset(filters_state *state)
     state->primed = 0u;
 }
 
-void filters_init(filters_state *state)
+FILTERS_COLD void filters_init(filters_state *state)
 {
     filters_reset(state);
 }
@@ -631,21 +690,27 @@ void filters_init(filters_state *state)
  * CRC-32 (IEEE 802.3) of words taken little-endian, whatever the byte order of the machine.
  * volatile: the memory is read, the compiler does not answer in its place.
  */
-static uint32_t filters_crc(uint32_t start, const volatile float *words, uint32_t length)
+FILTERS_COLD FILTERS_APART static uint32_t filters_crc_word(uint32_t start, uint32_t word)
 {
-    uint32_t crc = start;
-    uint32_t i;
+    uint32_t crc = start ^ word;
     uint32_t nibble;
-    for (i = 0u; i < length; ++i) {
-        crc ^= filters_bits(words[i]);
-        for (nibble = 0u; nibble < 8u; ++nibble) {
-            crc = (crc >> 4) ^ filters_crc_steps[crc & 15u];
-        }
+    for (nibble = 0u; nibble < 8u; ++nibble) {
+        crc = (crc >> 4) ^ filters_crc_steps[crc & 15u];
     }
     return crc;
 }
 
-uint32_t filters_integrity(void)
+FILTERS_COLD FILTERS_APART static uint32_t filters_crc(uint32_t start, const volatile float *words, uint32_t length)
+{
+    uint32_t crc = start;
+    uint32_t i;
+    for (i = 0u; i < length; ++i) {
+        crc = filters_crc_word(crc, filters_bits(words[i]));
+    }
+    return crc;
+}
+
+FILTERS_COLD uint32_t filters_integrity(void)
 {
     uint32_t crc = 0xFFFFFFFFu;
     crc = filters_crc(crc, filters_weights0, 40u);
@@ -658,7 +723,7 @@ uint32_t filters_integrity(void)
     return filters_flag((crc ^ 0xFFFFFFFFu) == 0x4ECCE7EDu);
 }
 
-uint32_t filters_self_test(void)
+FILTERS_COLD uint32_t filters_self_test(void)
 {
     float observation[FILTERS_FEATURES];
     float q[FILTERS_ACTIONS];

@@ -1,7 +1,7 @@
 //! Contract section 6b: integer layers with their tables in reading order.
 
 use policy::scales::{self, LayerScale, Scales, power_of_two, round_half_up};
-use policy::{Layer, NumericFormat, Policy};
+use policy::{Layer, NumericFormat, Policy, Scalar};
 use targets::IntegerBlock;
 
 use super::network::activation;
@@ -37,7 +37,7 @@ pub fn lower(policy: &Policy, scales: &Scales, block: IntegerBlock) -> IntegerNe
         layers: layers
             .map(|(layer, scale)| self::layer(layer, scale, lanes, block.rows.clamp(1, layer.outputs)))
             .collect(),
-        q_unit: Literal::nearest(power_of_two(-q_exponent)),
+        q_unit: Literal::nearest(Scalar::F32, power_of_two(-q_exponent)),
         q_field: MANTISSA_FIELD + 1 - q_exponent,
         accumulator_bound: scales.accumulator_bound(),
     }
@@ -65,7 +65,7 @@ fn layer(layer: &Layer, scale: &LayerScale, lanes: &[usize], block_rows: usize) 
         let integer = round_half_up(f64::from(*bias) * power_of_two(scale.accumulator));
         (integer + scales::half(scale.shift)) as i32
     };
-    let activation = activation(layer);
+    let activation = activation(Scalar::F32, layer);
     IntegerLayer {
         name: layer.name.clone(),
         inputs: layer.inputs,
@@ -74,7 +74,7 @@ fn layer(layer: &Layer, scale: &LayerScale, lanes: &[usize], block_rows: usize) 
         table,
         bias: layer.bias.iter().map(bias).collect(),
         shift: scale.shift,
-        unit: Literal::nearest(power_of_two(-scale.accumulator)),
+        unit: Literal::nearest(Scalar::F32, power_of_two(-scale.accumulator)),
         slope: match (activation, layer.activation) {
             (ActivationCode::LeakyRelu(_), policy::Activation::LeakyRelu { slope }) => {
                 scales::slope_integer(slope) as i32

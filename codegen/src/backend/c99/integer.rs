@@ -56,7 +56,7 @@ pub fn view(prefix: &str, network: &IntegerNetwork, has_fpu: bool) -> IntegerVie
         is_quad: lanes == 4,
         input_length: padded,
         quantise,
-        q_unit: float(network.q_unit.value()),
+        q_unit: float(network.q_unit.single()),
         q_field: network.q_field,
         has_fpu,
         special: special(network),
@@ -249,6 +249,6 @@ fn result(prefix: &str, layer: &IntegerLayer, index: usize, is_last: bool) -> St
         ActivationCode::Identity => format!("(int16_t)({cut})"),
         ActivationCode::Relu => format!("{prefix}_positive({cut})"),
         ActivationCode::LeakyRelu(_) => format!("{prefix}_leaky_integer({cut}, {})", layer.slope),
-        ActivationCode::Tanh => format!("{prefix}_tanh_integer(s{index}, {})", float(layer.unit.value())),
+        ActivationCode::Tanh => format!("{prefix}_tanh_integer(s{index}, {})", float(layer.unit.single())),
     }
 }

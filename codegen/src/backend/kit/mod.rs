@@ -45,6 +45,7 @@ pub fn emit(program: &Program, material: &Material) -> Result<GeneratedFiles, Co
             upper: name.to_uppercase(),
             banner: banner(program, &title, program.provenance.c_flags),
             mapping_parameters: String::new(),
+            number: super::c99::number::kind(program.scalar()),
             name: name.clone(),
         },
         controller: program.name.clone(),

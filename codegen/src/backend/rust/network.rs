@@ -1,25 +1,29 @@
 //! Tables, layers and `q_values`.
 
+use policy::Scalar;
 use proc_macro2::TokenStream;
 use quote::quote;
 
+use super::number::{self, number};
 use super::{float, ident, integer, size, streamed};
 use crate::lower::network::{TANH_DENOMINATOR, TANH_NUMERATOR};
-use crate::program::{ActivationCode, LayerCode, NetworkCode, Program};
+use crate::program::{ActivationCode, LayerCode, Literal, NetworkCode, Program};
 
 /// Everything between observation and Q values.
 pub fn items(program: &Program) -> TokenStream {
-    let duties = program.duties.iter().map(|duty| float(duty.value()));
+    let scalar = program.scalar();
+    let kind = number::kind(scalar);
+    let duties = program.duties.iter().map(|duty| number(scalar, *duty));
     let tanh = program
         .network
         .activates(|activation| activation == ActivationCode::Tanh)
-        .then(tanh);
+        .then(|| tanh(scalar));
     let network = match &program.network {
-        NetworkCode::Real { fused, layers } => real(layers, *fused),
+        NetworkCode::Real { scalar, fused, layers } => real(*scalar, layers, *fused),
         NetworkCode::Integer(network) => integer::items(network, program.has_fpu),
     };
     quote! {
-        static DUTIES: [f32; ACTIONS] = [#(#duties),*];
+        static DUTIES: [#kind; ACTIONS] = [#(#duties),*];
         #tanh
         #network
     }
@@ -28,7 +32,10 @@ pub fn items(program: &Program) -> TokenStream {
 /// What argmax compares: type, value below all others, name of the selection.
 pub fn argmax(program: &Program) -> (TokenStream, TokenStream) {
     match program.network {
-        NetworkCode::Real { .. } => (quote!(f32::MIN), quote!(select)),
+        NetworkCode::Real { scalar, .. } => {
+            let kind = number::kind(scalar);
+            (quote!(#kind::MIN), quote!(select))
+        }
         NetworkCode::Integer(_) => (quote!(i32::MIN), quote!(select_integer)),
     }
 }
@@ -41,13 +48,15 @@ pub fn q_values(program: &Program) -> TokenStream {
     }
 }
 
-fn real(layers: &[LayerCode], fused: bool) -> TokenStream {
-    let (items, body) = streamed::network(layers);
+fn real(scalar: Scalar, layers: &[LayerCode], fused: bool) -> TokenStream {
+    let (items, body) = streamed::network(scalar, layers);
+    let kind = number::kind(scalar);
     let fma = fused.then(fma);
-    let accumulate = if fused {
-        quote!(*sum = fma(*weight, *x, *sum);)
-    } else {
-        quote!(*sum += *weight * *x;)
+    let accumulate = match (scalar, fused) {
+        (Scalar::F32, true) => quote!(*sum = fma(*weight, *x, *sum);),
+        (Scalar::F32, false) => quote!(*sum += *weight * *x;),
+        // weights are binary32
+        (Scalar::F64, _) => quote!(*sum += *weight as f64 * *x;),
     };
     quote! {
         #fma
@@ -55,9 +64,9 @@ fn real(layers: &[LayerCode], fused: bool) -> TokenStream {
         #[inline(always)]
         fn block<const INPUTS: usize, const ROWS: usize>(
             weights: &[[f32; ROWS]; INPUTS],
-            bias: &[f32; ROWS],
-            x: &[f32; INPUTS],
-        ) -> [f32; ROWS] {
+            bias: &[#kind; ROWS],
+            x: &[#kind; INPUTS],
+        ) -> [#kind; ROWS] {
             let mut sums = *bias;
             for (column, x) in weights.iter().zip(x) {
                 for (sum, weight) in sums.iter_mut().zip(column) {
@@ -67,7 +76,7 @@ fn real(layers: &[LayerCode], fused: bool) -> TokenStream {
             sums
         }
         #items
-        fn network(observation: &[f32; FEATURES]) -> [f32; ACTIONS] {
+        fn network(observation: &[#kind; FEATURES]) -> [#kind; ACTIONS] {
             #body
         }
     }
@@ -90,7 +99,8 @@ fn fma() -> TokenStream {
 }
 
 /// Tables, and the function of the whole layer.
-pub(super) fn layer_items(index: usize, layer: &LayerCode) -> (TokenStream, TokenStream) {
+pub(super) fn layer_items(scalar: Scalar, index: usize, layer: &LayerCode) -> (TokenStream, TokenStream) {
+    let kind = number::kind(scalar);
     let name = ident(&format!("layer{index}"));
     let doc = format!(" {}: {} -> {}", layer.name, layer.inputs, layer.outputs);
     let (inputs, outputs) = (size(layer.inputs), size(layer.outputs));
@@ -100,21 +110,21 @@ pub(super) fn layer_items(index: usize, layer: &LayerCode) -> (TokenStream, Toke
     let blocks = layer.table[..split * layer.inputs]
         .chunks(rows * layer.inputs)
         .map(|block| columns(block, rows));
-    let biases = layer.bias[..split].chunks(rows).map(row);
+    let biases = layer.bias[..split].chunks(rows).map(|biases| sums(scalar, biases));
     let (rows_size, full_size) = (size(rows), size(full));
-    let activated = activation(layer.activation);
-    let (tail_tables, tail_loop) = tail(index, layer);
+    let activated = activation(scalar, layer.activation);
+    let (tail_tables, tail_loop) = tail(scalar, index, layer);
     let tables = quote! {
         static #weights: [[[f32; #rows_size]; #inputs]; #full_size] = [#(#blocks),*];
-        static #bias: [[f32; #rows_size]; #full_size] = [#(#biases),*];
+        static #bias: [[#kind; #rows_size]; #full_size] = [#(#biases),*];
         #tail_tables
     };
     let function = quote! {
         #[doc = #doc]
         #[inline(always)]
-        fn #name(x: &[f32; #inputs]) -> [f32; #outputs] {
+        fn #name(x: &[#kind; #inputs]) -> [#kind; #outputs] {
             let mut y = [0.0; #outputs];
-            let mut rest: &mut [f32] = &mut y;
+            let mut rest: &mut [#kind] = &mut y;
             for (weights, bias) in #weights.iter().zip(&#bias) {
                 // no division and no slice index, so no way to a panic at any optimisation level
                 if let Some((out, after)) = core::mem::take(&mut rest).split_first_chunk_mut::<#rows_size>() {
@@ -132,7 +142,8 @@ pub(super) fn layer_items(index: usize, layer: &LayerCode) -> (TokenStream, Toke
 }
 
 /// The shorter last block, if there is one.
-fn tail(index: usize, layer: &LayerCode) -> (TokenStream, TokenStream) {
+fn tail(scalar: Scalar, index: usize, layer: &LayerCode) -> (TokenStream, TokenStream) {
+    let kind = number::kind(scalar);
     let rows = layer.tail_rows();
     if rows == 0 {
         return (TokenStream::new(), TokenStream::new());
@@ -143,12 +154,12 @@ fn tail(index: usize, layer: &LayerCode) -> (TokenStream, TokenStream) {
         ident(&format!("TAIL_BIAS{index}")),
     );
     let table = columns(&layer.table[split * layer.inputs..], rows);
-    let biases = row(&layer.bias[split..]);
+    let biases = sums(scalar, &layer.bias[split..]);
     let (inputs, rows) = (size(layer.inputs), size(rows));
-    let activated = activation(layer.activation);
+    let activated = activation(scalar, layer.activation);
     let tables = quote! {
         static #weights: [[f32; #rows]; #inputs] = #table;
-        static #bias: [f32; #rows] = #biases;
+        static #bias: [#kind; #rows] = #biases;
     };
     let code = quote! {
         for (y, sum) in rest.iter_mut().zip(block(&#weights, &#bias, x)) {
@@ -168,44 +179,57 @@ pub(super) fn row(values: &[f32]) -> TokenStream {
     quote!([#(#values),*])
 }
 
-pub(super) fn activation(activation: ActivationCode) -> TokenStream {
+/// Biases: sums start with them, so they have their type.
+pub(super) fn sums(scalar: Scalar, values: &[f32]) -> TokenStream {
+    let literal = |value: &f32| Literal::nearest(scalar, f64::from(*value));
+    let values = values.iter().map(|value| number(scalar, literal(value)));
+    quote!([#(#values),*])
+}
+
+pub(super) fn activation(scalar: Scalar, activation: ActivationCode) -> TokenStream {
     match activation {
         ActivationCode::Identity => quote!(sum),
         ActivationCode::Relu => quote!(relu(sum)),
         ActivationCode::LeakyRelu(slope) => {
-            let slope = float(slope.value());
+            let slope = number(scalar, slope);
             quote!(leaky_relu(sum, #slope))
         }
         ActivationCode::Tanh => quote!(tanh(sum)),
     }
 }
 
-fn tanh() -> TokenStream {
-    let steps = |letter: &str, terms: &[f32; 5]| {
+fn tanh(scalar: Scalar) -> TokenStream {
+    let kind = number::kind(scalar);
+    let (limit, nine, one) = number::limit(scalar);
+    let steps = |letter: &str, terms: &[f64; 5]| {
         let name = ident(letter);
-        let highest = float(terms[4]);
-        let lower = terms.iter().rev().skip(1).map(|term| float(*term));
-        quote! { let mut #name: f32 = #highest; #(#name = #name * z + #lower;)* }
+        let [lower @ .., highest] = terms.map(|term| number(scalar, Literal::nearest(scalar, term)));
+        let lower = lower.iter().rev();
+        quote! { let mut #name: #kind = #highest; #(#name = #name * z + #lower;)* }
     };
     let numerator = steps("p", &TANH_NUMERATOR);
     let denominator = steps("q", &TANH_DENOMINATOR);
     quote! {
         /// x limited to the magnitude with these bits, in integers so that loops over it can be vectorised
         #[inline(always)]
-        fn limit(x: f32, limit: u32) -> f32 {
-            let magnitude = x.to_bits() & 0x7FFF_FFFF;
-            let below = 0_u32.wrapping_sub(magnitude.wrapping_sub(limit) >> 31);
-            f32::from_bits((x.to_bits() & 0x8000_0000) | (magnitude & below) | (limit & !below))
-        }
+        #limit
         /// Rational approximation, |error| < 4e-7.
         #[inline(always)]
-        fn tanh(x: f32) -> f32 {
-            let t = limit(x, 0x4110_0000);
+        fn tanh(x: #kind) -> #kind {
+            let t = limit(x, #nine);
             let z = t * t;
             #numerator
             #denominator
-            limit((p * t) / q, 0x3F80_0000)
+            limit((p * t) / q, #one)
         }
+    }
+}
+
+/// Function of the checksum over numbers.
+pub fn checksum(scalar: Scalar) -> TokenStream {
+    match scalar {
+        Scalar::F32 => quote!(crc_floats),
+        Scalar::F64 => quote!(crc_numbers),
     }
 }
 
@@ -213,22 +237,24 @@ fn tanh() -> TokenStream {
 /// read, the compiler does not answer in its place.
 pub fn integrity(program: &Program) -> TokenStream {
     let network = match &program.network {
-        NetworkCode::Real { layers, .. } => {
+        NetworkCode::Real { scalar, layers, .. } => {
             let layers = layers
                 .iter()
                 .enumerate()
                 .map(|(index, layer)| match layer.is_streamed() {
-                    true => streamed::integrity(index, layer),
-                    false => layer_integrity(index, layer.tail_rows() > 0),
+                    true => streamed::integrity(*scalar, index, layer),
+                    false => layer_integrity(*scalar, index, layer.tail_rows() > 0),
                 });
             quote!(#(#layers)*)
         }
         NetworkCode::Integer(network) => integer::integrity(network),
     };
-    quote! { #network crc = crc_floats(crc, core::hint::black_box(&DUTIES)); }
+    let checksum = checksum(program.scalar());
+    quote! { #network crc = #checksum(crc, core::hint::black_box(&DUTIES)); }
 }
 
-fn layer_integrity(index: usize, has_tail: bool) -> TokenStream {
+fn layer_integrity(scalar: Scalar, index: usize, has_tail: bool) -> TokenStream {
+    let checksum = checksum(scalar);
     let (weights, bias) = (ident(&format!("WEIGHTS{index}")), ident(&format!("BIAS{index}")));
     let (tail_weights, tail_bias) = (
         ident(&format!("TAIL_WEIGHTS{index}")),
@@ -237,7 +263,7 @@ fn layer_integrity(index: usize, has_tail: bool) -> TokenStream {
     let full_weights = quote! {
         for column in core::hint::black_box(&#weights).iter().flatten() { crc = crc_floats(crc, column); }
     };
-    let full_bias = quote! { for row in core::hint::black_box(&#bias) { crc = crc_floats(crc, row); } };
+    let full_bias = quote! { for row in core::hint::black_box(&#bias) { crc = #checksum(crc, row); } };
     if !has_tail {
         return quote! { #full_weights #full_bias };
     }
@@ -245,6 +271,6 @@ fn layer_integrity(index: usize, has_tail: bool) -> TokenStream {
         #full_weights
         for column in core::hint::black_box(&#tail_weights) { crc = crc_floats(crc, column); }
         #full_bias
-        crc = crc_floats(crc, core::hint::black_box(&#tail_bias));
+        crc = #checksum(crc, core::hint::black_box(&#tail_bias));
     }
 }

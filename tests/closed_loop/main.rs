@@ -95,6 +95,7 @@ fn included(policy: &Policy) -> Vec<Trajectory> {
         };
         let value = |index: usize| match samples[index] {
             Sample::Physical(x) => x,
+            Sample::Wide(x) => x as f32,
             Sample::Code(code) => code as f32,
         };
         let command = controller.step(&buck12::Measurement {

@@ -42,6 +42,7 @@ macro_rules! first_difference {
                     different = (!equal).then_some(steps);
                 }
                 Event::SetMapping { a, b, c, r } => {
+                    let ([a, b, c], r) = ([a, b, c].map(|x| x as f32), r.map(|r| r as f32));
                     assert_eq!(generated.set_mapping(a, b, c), expected.set_mapping(a, b, c, r));
                 }
                 Event::Reset => {
@@ -62,6 +63,7 @@ macro_rules! first_difference {
 fn physical(samples: &[Sample]) -> [f32; 3] {
     let values = samples.iter().map(|sample| match sample {
         Sample::Physical(value) => *value,
+        Sample::Wide(value) => *value as f32,
         Sample::Code(code) => panic!("the example measures in volts and amperes, not in codes ({code})"),
     });
     values.collect::<Vec<_>>().try_into().unwrap()

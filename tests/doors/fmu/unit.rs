@@ -288,6 +288,7 @@ impl Unit {
 fn value(sample: Sample) -> f64 {
     match sample {
         Sample::Physical(x) => f64::from(x),
+        Sample::Wide(x) => x,
         Sample::Code(code) => f64::from(code),
     }
 }

@@ -76,7 +76,7 @@ fn every_kind_of_bad_sample_occurs() {
         .flatten()
         .filter_map(|sample| match sample {
             Sample::Physical(x) => Some(*x),
-            Sample::Code(_) => None,
+            Sample::Wide(_) | Sample::Code(_) => None,
         })
         .collect();
     type Kind = (&'static str, fn(&f32) -> bool);
@@ -102,7 +102,7 @@ fn bursts_end_around_the_hold_count() {
     let (chunk, _) = chunk(&policy, 1, 20_000, &[]);
     let inside = |(sample, signal): (&Sample, &policy::Signal)| match sample {
         Sample::Physical(x) => (signal.range.low..=signal.range.high).contains(&f64::from(*x)),
-        Sample::Code(_) => false,
+        Sample::Wide(_) | Sample::Code(_) => false,
     };
     let mut lengths = vec![0; 64];
     let mut run = 0;

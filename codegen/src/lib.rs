@@ -67,6 +67,13 @@ pub enum CodegenError {
     Manifest(String),
     /// A door lacks what it needs.
     Door(&'static str),
+    /// A door does not exist in the numeric format.
+    NoDoor {
+        /// Name of the door.
+        door: &'static str,
+        /// The format.
+        format: NumericFormat,
+    },
     /// This build of the compiler lacks the backend.
     NotBuilt(Language),
     /// The processor lacks a type that the numeric format stores.
@@ -85,13 +92,30 @@ impl fmt::Display for CodegenError {
             CodegenError::Rust(message) => write!(f, "internal fault: generated Rust: {message}"),
             CodegenError::Manifest(message) => write!(f, "internal fault: manifest: {message}"),
             CodegenError::Door(message) => write!(f, "internal fault: door: {message}"),
-            CodegenError::NotBuilt(language) => write!(f, "this build has no {} backend", language.name()),
-            CodegenError::NoType { format, target } => write!(
+            CodegenError::NoDoor { door, format } => write!(
                 f,
-                "the processor has no type for the numeric format\n  = found: {}, whose weights have 8 bits, for {target}\n  \
-                 = expected: a format of 16 bits or more\n  = hint: --format i16",
+                "the door does not exist in the numeric format\n  = found: --door {door} in {}\n  \
+                 = expected: another format, its table of arithmetic is about binary32\n  \
+                 = hint: `policyc verify --format {}` compares the code with the interpreter on the targets that run here",
+                format.name(),
                 format.name()
             ),
+            CodegenError::NotBuilt(language) => write!(f, "this build has no {} backend", language.name()),
+            CodegenError::NoType { format, target } => {
+                let (needed, expected) = match format {
+                    NumericFormat::F64 => (
+                        "whose numbers are a double of 64 bits, which there depends on the compiler's settings",
+                        "f32 or i16",
+                    ),
+                    _ => ("whose weights have 8 bits", "a format of 16 bits or more"),
+                };
+                write!(
+                    f,
+                    "the processor has no type for the numeric format\n  = found: {}, {needed}, for {target}\n  \
+                     = expected: {expected}\n  = hint: --format i16",
+                    format.name()
+                )
+            }
         }
     }
 }
@@ -103,7 +127,8 @@ impl std::error::Error for CodegenError {}
 /// # Errors
 /// If the target has no type for the numeric format; else only for a fault in the compiler itself.
 pub fn compile(policy: &Policy, target: &TargetSpec, language: Language) -> Result<GeneratedFiles, CodegenError> {
-    if policy.numeric_format == NumericFormat::I8 && target.widths.char_bits > 8 {
+    let needs_bytes = matches!(policy.numeric_format, NumericFormat::I8 | NumericFormat::F64);
+    if needs_bytes && target.widths.char_bits > 8 {
         return Err(CodegenError::NoType {
             format: policy.numeric_format,
             target: target.name,

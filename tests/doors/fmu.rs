@@ -7,7 +7,7 @@ mod unit;
 use std::collections::BTreeSet;
 use std::process::Command;
 
-use closed_loop::{Agent, Answer, Call, External};
+use closed_loop::{Answer, Call, External, interpreter};
 use codegen::Door;
 use interp::Sample;
 use policy::{NumericFormat, Policy};
@@ -20,7 +20,7 @@ use unit::{Descriptions, Unit, VERSIONS, closed_loop, line, standard_headers};
 const PERIODS: usize = 5000;
 
 fn interpreted(policy: &Policy, periods: usize) -> Vec<(Vec<Sample>, Answer)> {
-    closed_loop(policy, &mut Agent::new(policy).unwrap(), periods)
+    closed_loop(policy, interpreter(policy).unwrap().as_mut(), periods)
 }
 
 fn lines(trajectory: &[(Vec<Sample>, Answer)]) -> Vec<String> {
@@ -84,7 +84,12 @@ fn the_plant_as_importing_program_sees_the_duties_of_the_interpreter() {
     if is_without("FMPy") {
         return;
     }
-    let formats = [NumericFormat::F32Fma, NumericFormat::I16, NumericFormat::I8];
+    let formats = [
+        NumericFormat::F32Fma,
+        NumericFormat::F64,
+        NumericFormat::I16,
+        NumericFormat::I8,
+    ];
     let others = formats.map(|format| (example().with_format(format), 1000));
     let exact = [(example(), PERIODS), (golden_case("adc_mapping"), 1000)];
     for (policy, periods) in exact.into_iter().chain(others) {

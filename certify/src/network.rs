@@ -30,14 +30,14 @@ pub(crate) struct Layer {
 }
 
 /// Where a format rounds within a layer.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 enum Step {
     Float {
         is_fused: bool,
     },
     Integer {
-        /// Of the sum: `sum / 2^accumulator`.
-        accumulator: i32,
+        /// Per output: integer / 2^exponent is the sum.
+        accumulators: Vec<i32>,
         shift: u32,
     },
 }
@@ -99,14 +99,14 @@ impl Layer {
             // an integer times a power of two: exact in binary64
             let grid =
                 |x: f64, exponent: i32| round_half_up(x * power_of_two(exponent)) as f64 * power_of_two(-exponent);
-            for (row, bias) in held_bias.iter_mut().enumerate() {
+            for (row, (bias, accumulator)) in held_bias.iter_mut().zip(&scale.accumulators).enumerate() {
                 for (w, input) in held.row_mut(row).iter_mut().zip(&scale.inputs) {
-                    *w = grid(*w, scale.accumulator - input);
+                    *w = grid(*w, accumulator - input);
                 }
-                *bias = grid(*bias, scale.accumulator);
+                *bias = grid(*bias, *accumulator);
             }
             step = Step::Integer {
-                accumulator: scale.accumulator,
+                accumulators: scale.accumulators.clone(),
                 shift: scale.shift,
             };
         }
@@ -128,9 +128,9 @@ impl Layer {
     /// What the format rounds at an output, given the real inputs, their errors and the magnitude before the activation
     /// in the format.
     pub fn rounding(&self, output: usize, inputs: &[f64], magnitude: f64) -> Rounding {
-        match self.step {
-            Step::Float { is_fused } => self.float_rounding(output, inputs, is_fused),
-            Step::Integer { accumulator, shift } => self.integer_rounding(accumulator, shift, magnitude),
+        match &self.step {
+            Step::Float { is_fused } => self.float_rounding(output, inputs, *is_fused),
+            Step::Integer { accumulators, shift } => self.integer_rounding(accumulators[output], *shift, magnitude),
         }
     }
 

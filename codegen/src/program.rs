@@ -25,7 +25,10 @@ impl Literal {
     /// Both ends rounded inwards.
     #[must_use]
     pub fn inward(scalar: Scalar, interval: Interval) -> (Self, Self) {
-        (Self(scalar.up(interval.low).to_bits()), Self::down(scalar, interval.high))
+        (
+            Self(scalar.up(interval.low).to_bits()),
+            Self::down(scalar, interval.high),
+        )
     }
 
     /// The constant rounded down.

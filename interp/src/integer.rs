@@ -30,9 +30,10 @@ struct Layer {
     weights: Array2<i64>,
     bias: Array1<i64>,
     activation: Activation,
-    accumulator: i32,
+    /// Exponents `[outputs]` of the sums and behind the activation.
+    accumulators: Vec<i32>,
     shift: u32,
-    output: i32,
+    exponents: Vec<i32>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -111,12 +112,12 @@ impl Layer {
     fn new(layer: &policy::Layer, scale: &LayerScale) -> Self {
         let weight = |(i, o): (usize, usize)| {
             let weight = f64::from(layer.weights[o * layer.inputs + i]);
-            rounded(weight * power_of_two(scale.accumulator - scale.inputs[i]))
+            rounded(weight * power_of_two(scale.accumulators[o] - scale.inputs[i]))
         };
-        let bias = |bias: &f32| rounded(f64::from(*bias) * power_of_two(scale.accumulator));
+        let bias = |(bias, exponent): (&f32, &i32)| rounded(f64::from(*bias) * power_of_two(*exponent));
         Self {
             weights: Array2::from_shape_fn((layer.inputs, layer.outputs), weight),
-            bias: layer.bias.iter().map(bias).collect(),
+            bias: layer.bias.iter().zip(&scale.accumulators).map(bias).collect(),
             activation: match layer.activation {
                 policy::Activation::Identity => Activation::Identity,
                 policy::Activation::Relu => Activation::Relu,
@@ -125,9 +126,9 @@ impl Layer {
                 },
                 policy::Activation::Tanh => Activation::Tanh,
             },
-            accumulator: scale.accumulator,
+            accumulators: scale.accumulators.clone(),
             shift: scale.shift,
-            output: scale.output,
+            exponents: scale.outputs.clone(),
         }
     }
 
@@ -136,14 +137,17 @@ impl Layer {
         for (row, &x) in self.weights.rows().into_iter().zip(x) {
             sums.zip_mut_with(&row, |sum, &w| *sum += w * x);
         }
-        let y = sums.mapv(|sum| self.activate(sum));
-        let value = |exponent: i32| move |x: &i64| T::nearest(*x as f64 * power_of_two(-exponent));
-        trace.pre_activation = sums.iter().map(value(self.accumulator)).collect();
-        trace.post_activation = y.iter().map(value(self.output)).collect();
+        let activated = sums.iter().zip(&self.accumulators);
+        let y: Array1<i64> = activated
+            .map(|(sum, exponent)| self.activate(*sum, *exponent))
+            .collect();
+        let value = |(x, exponent): (&i64, &i32)| T::nearest(*x as f64 * power_of_two(-exponent));
+        trace.pre_activation = sums.iter().zip(&self.accumulators).map(value).collect();
+        trace.post_activation = y.iter().zip(&self.exponents).map(value).collect();
         y
     }
 
-    fn activate(&self, sum: i64) -> i64 {
+    fn activate(&self, sum: i64, accumulator: i32) -> i64 {
         match self.activation {
             Activation::Identity => shifted(sum, self.shift),
             Activation::Relu => shifted(sum, self.shift).max(0),
@@ -152,7 +156,7 @@ impl Layer {
                 if y > 0 { y } else { shifted(y * slope, SLOPE_BITS) }
             }
             Activation::Tanh => {
-                let x = sum as f32 * (power_of_two(-self.accumulator) as f32);
+                let x = sum as f32 * (power_of_two(-accumulator) as f32);
                 let y = tanh(x) * (power_of_two(TANH_EXPONENT) as f32);
                 (y + 32_768.5).trunc() as i64 - 32_768
             }

@@ -47,7 +47,10 @@ impl<T: Real> State<T> {
     /// Appends [`State::words`] to a buffer.
     pub fn append_words(&self, words: &mut Vec<u32>) {
         let duties = [self.previous_duty, self.previous_command];
-        let mapping = self.mapping.iter().flat_map(|own| [Some(own.a), Some(own.b), Some(own.c), own.r]);
+        let mapping = self
+            .mapping
+            .iter()
+            .flat_map(|own| [Some(own.a), Some(own.b), Some(own.c), own.r]);
         let numbers = self.held.iter().chain(&self.memory).copied().chain(duties);
         for number in numbers.chain(self.soft_cap).chain(mapping.flatten()) {
             number.append_words(words);

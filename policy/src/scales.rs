@@ -5,6 +5,8 @@
 //! The proof is exact: integer intervals of every activation, from the clamped inputs on, and for every output the sum
 //! of all positive and of all negative terms. Whatever the order of the additions, every partial sum lies between.
 
+mod rows;
+
 use crate::model::{Activation, Layer, NumericFormat, Policy};
 
 /// Fractional bits of an activation behind a tanh: 1.0 is 2^14.
@@ -34,16 +36,16 @@ pub struct InputScale {
 pub struct LayerScale {
     /// Exponent of each input: integer / 2^exponent is the activation.
     pub inputs: Vec<i32>,
-    /// Accumulator / 2^exponent is the sum.
-    pub accumulator: i32,
-    /// Bits that are rounded off the accumulator; not used behind a tanh.
+    /// Exponent of each accumulator: integer / 2^exponent is the sum.
+    pub accumulators: Vec<i32>,
+    /// Bits that are rounded off the accumulators; not used behind a tanh.
     pub shift: u32,
-    /// Exponent of each output.
-    pub output: i32,
+    /// Exponent of each output: integer / 2^exponent is the activation. The same for all outputs of the last layer.
+    pub outputs: Vec<i32>,
     /// Lowest and highest value that any partial sum of any output can take, over the whole box.
     pub bound: (i64, i64),
     /// Range of each output over the whole box.
-    pub outputs: Vec<(i64, i64)>,
+    pub ranges: Vec<(i64, i64)>,
 }
 
 /// Scales of all layers.
@@ -74,16 +76,17 @@ pub fn of(policy: &Policy) -> Option<Scales> {
         .iter()
         .map(|input| (i64::from(input.low), i64::from(input.high)))
         .collect();
+    let rows = rows::balanced(policy, &exponents);
     let mut layers = Vec::with_capacity(policy.layers.len());
-    for (index, layer) in policy.layers.iter().enumerate() {
+    for (index, (layer, rows)) in policy.layers.iter().zip(&rows).enumerate() {
         let output_limit = if index + 1 == policy.layers.len() {
             OUTPUT_LIMIT
         } else {
             ACTIVATION_LIMIT
         };
-        let scale = self::layer(layer, &exponents, &ranges, i64::from(limit), output_limit);
-        exponents = vec![scale.output; layer.outputs];
-        ranges.clone_from(&scale.outputs);
+        let scale = self::layer(layer, rows, &exponents, &ranges, i64::from(limit), output_limit);
+        exponents.clone_from(&scale.outputs);
+        ranges.clone_from(&scale.ranges);
         layers.push(scale);
     }
     Some(Scales { inputs, layers })
@@ -128,45 +131,44 @@ fn inputs(policy: &Policy) -> Vec<InputScale> {
     policy.features.iter().zip(&finest).map(scale).collect()
 }
 
-/// The finest accumulator at which all weights fit and no partial sum can leave 32 bits, then the smallest shift after
+/// The finest accumulators at which all weights fit and no partial sum can leave 32 bits, then the smallest shift after
 /// which every output fits.
-fn layer(layer: &Layer, inputs: &[i32], ranges: &[(i64, i64)], weight_limit: i64, output_limit: i64) -> LayerScale {
-    let trial = |accumulator: i32| sums(layer, inputs, ranges, accumulator, weight_limit);
-    let candidates = (-MAX_EXPONENT..=MAX_EXPONENT).rev();
-    let found = candidates.filter_map(|accumulator| Some((accumulator, trial(accumulator)?)));
-    let usable = found.map(|(accumulator, sums)| {
-        let shift = shift(&sums, layer.activation, output_limit);
-        let half = half(shift);
-        let bound = (
-            sums.iter().map(|sum| sum.lowest).min().unwrap_or_default(),
-            sums.iter().map(|sum| sum.highest).max().unwrap_or_default() + half,
-        );
-        let outputs = sums
-            .iter()
-            .map(|sum| activated(layer.activation, *sum, shift))
-            .collect();
+fn layer(
+    layer: &Layer,
+    rows: &[i32],
+    inputs: &[i32],
+    ranges: &[(i64, i64)],
+    weight_limit: i64,
+    output_limit: i64,
+) -> LayerScale {
+    let scale = |accumulator: i32, shift: u32, bound: (i64, i64), ranges: Vec<(i64, i64)>| {
+        let accumulators: Vec<i32> = rows.iter().map(|row| accumulator + row).collect();
+        let output = |exponent: &i32| match layer.activation {
+            Activation::Tanh => TANH_EXPONENT,
+            _ => exponent - shift.cast_signed(),
+        };
         LayerScale {
             inputs: inputs.to_vec(),
-            accumulator,
+            outputs: accumulators.iter().map(output).collect(),
+            accumulators,
             shift,
-            output: match layer.activation {
-                Activation::Tanh => TANH_EXPONENT,
-                _ => accumulator - shift.cast_signed(),
-            },
             bound,
-            outputs,
+            ranges,
         }
+    };
+    let candidates = (-MAX_EXPONENT..=MAX_EXPONENT).rev();
+    let usable = candidates.filter_map(|accumulator| {
+        let sums = sums(layer, rows, inputs, ranges, accumulator, weight_limit)?;
+        let shift = shift(&sums, layer.activation, output_limit);
+        let low = sums.iter().map(|sum| sum.lowest).min().unwrap_or_default();
+        let high = sums.iter().map(|sum| sum.highest).max().unwrap_or_default() + half(shift);
+        let limit = i64::from(i32::MAX);
+        let outputs = sums.iter().map(|sum| activated(layer.activation, *sum, shift));
+        (high <= limit && low >= -limit).then(|| scale(accumulator, shift, (low, high), outputs.collect()))
     });
-    let fits = |scale: &LayerScale| scale.bound.1 <= i64::from(i32::MAX) && scale.bound.0 >= -i64::from(i32::MAX);
     // with a small enough exponent every weight and bias rounds to 0: there always is one
-    usable.into_iter().find(fits).unwrap_or(LayerScale {
-        inputs: inputs.to_vec(),
-        accumulator: -MAX_EXPONENT,
-        shift: 0,
-        output: -MAX_EXPONENT,
-        bound: (0, 0),
-        outputs: vec![(0, 0); layer.outputs],
-    })
+    let nothing = || scale(-MAX_EXPONENT, 0, (0, 0), vec![(0, 0); layer.outputs]);
+    usable.into_iter().next().unwrap_or_else(nothing)
 }
 
 /// Extremes of one output's accumulator.
@@ -180,12 +182,19 @@ struct Sum {
 }
 
 /// `None` if a weight does not fit or a sum is far too large.
-fn sums(layer: &Layer, inputs: &[i32], ranges: &[(i64, i64)], accumulator: i32, weight_limit: i64) -> Option<Vec<Sum>> {
-    let rows = layer.weights.chunks_exact(layer.inputs.max(1));
-    let unit = power_of_two(accumulator);
+fn sums(
+    layer: &Layer,
+    rows: &[i32],
+    inputs: &[i32],
+    ranges: &[(i64, i64)],
+    accumulator: i32,
+    weight_limit: i64,
+) -> Option<Vec<Sum>> {
+    let weights = layer.weights.chunks_exact(layer.inputs.max(1));
     let factors: Vec<f64> = inputs.iter().map(|input| power_of_two(accumulator - input)).collect();
-    let sum = |(row, bias): (&[f32], &f32)| {
-        let bias = f64::from(*bias) * unit;
+    let sum = |((weights, bias), row): ((&[f32], &f32), &i32)| {
+        let scaled = power_of_two(*row);
+        let bias = f64::from(*bias) * power_of_two(accumulator + row);
         if bias.abs() >= f64::from(i32::MAX) {
             return None;
         }
@@ -195,8 +204,8 @@ fn sums(layer: &Layer, inputs: &[i32], ranges: &[(i64, i64)], accumulator: i32, 
             lowest: bias.min(0),
             highest: bias.max(0),
         };
-        for ((weight, factor), (low, high)) in row.iter().zip(&factors).zip(ranges) {
-            let weight = f64::from(*weight) * factor;
+        for ((weight, factor), (low, high)) in weights.iter().zip(&factors).zip(ranges) {
+            let weight = f64::from(*weight) * factor * scaled;
             if weight.abs() > (weight_limit + 1) as f64 {
                 return None;
             }
@@ -211,7 +220,7 @@ fn sums(layer: &Layer, inputs: &[i32], ranges: &[(i64, i64)], accumulator: i32, 
         }
         Some(sum)
     };
-    rows.zip(&layer.bias).map(sum).collect()
+    weights.zip(&layer.bias).zip(rows).map(sum).collect()
 }
 
 /// What is added before `shift` bits are cut off: half of the last bit kept.

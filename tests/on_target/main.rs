@@ -134,7 +134,14 @@ fn a_format_has_one_checksum_on_every_target_and_in_every_language() {
     for format in NumericFormat::ALL {
         let policy = example.clone().with_format(format);
         let mut checksums = BTreeMap::new();
-        for name in ["host", "cortex-m0plus", "cortex-m4f", "cortex-m7", "riscv32imfc", "dspace-ds1202"] {
+        for name in [
+            "host",
+            "cortex-m0plus",
+            "cortex-m4f",
+            "cortex-m7",
+            "riscv32imfc",
+            "dspace-ds1202",
+        ] {
             let target = target(name);
             let report = run(&policy, target, &compilers(target), &["-O2", "-O"], CHECKSUM_STEPS);
             assert_equal(&report, &format!("{name} {}", format.name()));

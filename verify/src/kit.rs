@@ -107,7 +107,11 @@ fn packed(policy: &Policy, layout: &Layout, chunk: &Chunk) -> Trace {
             }
             Event::SetMapping { r, .. } => {
                 let coefficients = take(&mut input, 4 * number);
-                let given = if r.is_some() { coefficients } else { &coefficients[..3 * number] };
+                let given = if r.is_some() {
+                    coefficients
+                } else {
+                    &coefficients[..3 * number]
+                };
                 trace.set_mapping(given, answer[0], answer[1..].iter().copied());
             }
             Event::Reset => trace.reset(answer.iter().copied()),

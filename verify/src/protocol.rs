@@ -114,7 +114,9 @@ impl Layout {
                 _ => number(format!("state {name}")),
             })
             .collect();
-        let duties = ["duty", "duty_sim"].into_iter().flat_map(|name| number(name.to_owned()));
+        let duties = ["duty", "duty_sim"]
+            .into_iter()
+            .flat_map(|name| number(name.to_owned()));
         let integers = [("action_index", WordKind::Integer), ("status", WordKind::Status)];
         let command = duties.chain(integers.map(|(name, kind)| word(name.to_owned(), kind)));
         let step = observation

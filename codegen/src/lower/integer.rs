@@ -27,7 +27,8 @@ pub fn lower(policy: &Policy, scales: &Scales, block: IntegerBlock) -> IntegerNe
         low: input.low,
         high: input.high,
     };
-    let q_exponent = scales.layers.last().map_or(0, |layer| layer.output);
+    let q_exponent = scales.layers.last().and_then(|layer| layer.outputs.first());
+    let q_exponent = q_exponent.copied().unwrap_or_default();
     let layers = policy.layers.iter().zip(&scales.layers);
     IntegerNetwork {
         weight_bytes: 4 / lanes.len(),
@@ -48,7 +49,7 @@ fn layer(layer: &Layer, scale: &LayerScale, lanes: &[usize], block_rows: usize) 
     let weight = |output: usize, input: usize| match scale.inputs.get(input) {
         Some(exponent) => {
             let weight = f64::from(layer.weights[output * layer.inputs + input]);
-            round_half_up(weight * power_of_two(scale.accumulator - exponent)) as i16
+            round_half_up(weight * power_of_two(scale.accumulators[output] - exponent)) as i16
         }
         None => 0,
     };
@@ -61,8 +62,8 @@ fn layer(layer: &Layer, scale: &LayerScale, lanes: &[usize], block_rows: usize) 
             }
         }
     }
-    let bias = |bias: &f32| {
-        let integer = round_half_up(f64::from(*bias) * power_of_two(scale.accumulator));
+    let bias = |(bias, exponent): (&f32, &i32)| {
+        let integer = round_half_up(f64::from(*bias) * power_of_two(*exponent));
         (integer + scales::half(scale.shift)) as i32
     };
     let activation = activation(Scalar::F32, layer);
@@ -72,9 +73,13 @@ fn layer(layer: &Layer, scale: &LayerScale, lanes: &[usize], block_rows: usize) 
         outputs: layer.outputs,
         block_rows,
         table,
-        bias: layer.bias.iter().map(bias).collect(),
+        bias: layer.bias.iter().zip(&scale.accumulators).map(bias).collect(),
         shift: scale.shift,
-        unit: Literal::nearest(Scalar::F32, power_of_two(-scale.accumulator)),
+        // of a layer with tanh and of the last: there all rows have one exponent
+        unit: Literal::nearest(
+            Scalar::F32,
+            power_of_two(-scale.accumulators.first().copied().unwrap_or_default()),
+        ),
         slope: match (activation, layer.activation) {
             (ActivationCode::LeakyRelu(_), policy::Activation::LeakyRelu { slope }) => {
                 scales::slope_integer(slope) as i32

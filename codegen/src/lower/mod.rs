@@ -48,7 +48,11 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
             c_flags: target.c_flags,
             rust_flags: target.rust_flags,
         },
-        signals: policy.signals.iter().map(|signal| signal_port(scalar, signal)).collect(),
+        signals: policy
+            .signals
+            .iter()
+            .map(|signal| signal_port(scalar, signal))
+            .collect(),
         features: policy
             .features
             .iter()

@@ -74,7 +74,9 @@ pub fn simplified(policy: &Policy) -> Simplified<'_> {
         without(&mut smaller.layers[index], gone, outputs);
         if let Some(scale) = scales.as_mut().and_then(|scales| scales.layers.get_mut(index)) {
             retain(&mut scale.inputs, gone);
+            retain(&mut scale.accumulators, outputs);
             retain(&mut scale.outputs, outputs);
+            retain(&mut scale.ranges, outputs);
         }
         gone = outputs;
     }

@@ -131,7 +131,9 @@ impl NetworkCode {
         match self {
             NetworkCode::Real { scalar, layers, .. } => {
                 let layers = layers.iter();
-                layers.map(|l| 4 * (l.table.len() + scalar.words() * l.bias.len())).sum()
+                layers
+                    .map(|l| 4 * (l.table.len() + scalar.words() * l.bias.len()))
+                    .sum()
             }
             NetworkCode::Integer(network) => {
                 let layers = network.layers.iter();

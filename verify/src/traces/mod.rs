@@ -366,7 +366,11 @@ fn physical(scalar: Scalar, x: f64) -> Sample {
 fn nudged(sample: Sample, ulps: i32) -> Sample {
     let moved = |scalar: Scalar, mut x: f64| {
         for _ in 0..ulps.abs() {
-            x = if ulps > 0 { scalar.next_up(x) } else { scalar.next_down(x) };
+            x = if ulps > 0 {
+                scalar.next_up(x)
+            } else {
+                scalar.next_down(x)
+            };
         }
         physical(scalar, x)
     };

@@ -114,7 +114,9 @@ impl Recorded {
                         signal: signal.name.clone(),
                         found: cell.to_owned(),
                     };
-                    cell.parse().map(|x: f64| sample_of(scalar, signal, x)).map_err(|_| bad())
+                    cell.parse()
+                        .map(|x: f64| sample_of(scalar, signal, x))
+                        .map_err(|_| bad())
                 };
                 policy.signals.iter().zip(&columns).map(sample).collect()
             })

@@ -100,7 +100,11 @@ fn header(program: &Program) -> Header {
             .iter()
             .map(|(name, bit)| constant(name, unsigned(1 << bit)))
             .collect(),
-        measurement: program.signals.iter().map(|signal| measurement_member(program, signal)).collect(),
+        measurement: program
+            .signals
+            .iter()
+            .map(|signal| measurement_member(program, signal))
+            .collect(),
         state: state_members(program),
         features: program.features.iter().map(|(_, formula)| formula.clone()).collect(),
     }
@@ -109,7 +113,11 @@ fn header(program: &Program) -> Header {
 fn measurement_member(program: &Program, signal: &crate::program::SignalPort) -> Member {
     let scalar = program.scalar();
     let (low, high) = signal.range;
-    let kind = if signal.is_code { "int32_t" } else { number::kind(scalar).name };
+    let kind = if signal.is_code {
+        "int32_t"
+    } else {
+        number::kind(scalar).name
+    };
     let meaning = if signal.is_code { "ADC code, " } else { "" };
     Member {
         declaration: format!("{kind} {}", signal.name),
@@ -141,7 +149,10 @@ fn state_members(program: &Program) -> Vec<Member> {
             "filters, in feature order, oldest first",
         ));
     }
-    members.push(member(format!("{kind} previous_duty"), "duty of the last chosen action"));
+    members.push(member(
+        format!("{kind} previous_duty"),
+        "duty of the last chosen action",
+    ));
     members.push(member(format!("{kind} previous_command"), "last command"));
     if program.soft_start_from.is_some() {
         members.push(member(format!("{kind} soft_cap"), "rising upper limit"));

@@ -4,9 +4,9 @@ use templates::c::{CrcItem, CrcKind, Member, SelfTestView, Table};
 
 use policy::Scalar;
 
+use super::integer;
 use super::number::{self, number};
 use super::statements::{float, unsigned};
-use super::integer;
 use crate::crc::nibble_table;
 use crate::lower::known_answers::{LCG, SEED, UNIT, VECTORS};
 use crate::lower::network::{TANH_DENOMINATOR, TANH_NUMERATOR};
@@ -168,7 +168,9 @@ pub fn crc_kinds(program: &Program) -> Vec<CrcKind> {
         words: vec![word],
     };
     match &program.network {
-        NetworkCode::Real { scalar: Scalar::F64, .. } => {
+        NetworkCode::Real {
+            scalar: Scalar::F64, ..
+        } => {
             kinds.push(of_type("crc_weights", "float", format!("{n}_weight_bits(words[i])")));
         }
         NetworkCode::Real { .. } => {}

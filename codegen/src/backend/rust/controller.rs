@@ -4,8 +4,8 @@ use policy::Scalar;
 use proc_macro2::{Ident, TokenStream};
 use quote::quote;
 
-use super::statements::{Printer, coefficient_field};
 use super::number::{self, number};
+use super::statements::{Printer, coefficient_field};
 use super::{ident, network, size, word};
 use crate::lower::known_answers::{LCG, SEED, UNIT};
 use crate::program::{Coefficient, Literal, Program};
@@ -153,7 +153,10 @@ fn fields(program: &Program) -> Vec<Field> {
     let initial = program.initial_duty;
     let mut fields = vec![field("held", Kind::Numbers(held))];
     if program.memory_words > 0 {
-        fields.push(field("memory", Kind::Numbers(vec![Literal::nearest(program.scalar(), 0.0); program.memory_words])));
+        fields.push(field(
+            "memory",
+            Kind::Numbers(vec![Literal::nearest(program.scalar(), 0.0); program.memory_words]),
+        ));
     }
     fields.push(field("previous_duty", Kind::Number(initial)));
     fields.push(field("previous_command", Kind::Number(initial)));
@@ -400,7 +403,12 @@ fn checks(program: &Program) -> TokenStream {
     let width = column(|range| range.1);
     let answers = test.answers.iter().map(|answer| word(*answer));
     let vectors = size(test.answers.len());
-    let (seed, multiplier, increment, unit) = (word(SEED), word(LCG.0), word(LCG.1), number(scalar, Literal::nearest(scalar, UNIT)));
+    let (seed, multiplier, increment, unit) = (
+        word(SEED),
+        word(LCG.0),
+        word(LCG.1),
+        number(scalar, Literal::nearest(scalar, UNIT)),
+    );
     let zero = match scalar {
         Scalar::F32 => quote!(0.0_f32),
         Scalar::F64 => quote!(0.0_f64),

@@ -63,7 +63,7 @@ fn fmpy_compiles_the_sources_and_simulates_them() {
 
 #[test]
 fn fmpy_takes_codes_filters_and_policies_without_mapping() {
-    for name in ["adc_mapping", "filters", "activations", "linear"] {
+    for name in ["adc_mapping", "filters", "activations", "linear", "wide"] {
         agrees(&golden_case(name), 500, &VERSIONS, FMPY);
     }
 }
@@ -116,7 +116,12 @@ fn instances_states_times_and_refusals_are_as_the_standard_says() {
     if is_without("FMPy") {
         return;
     }
-    for policy in [example(), golden_case("constructs"), golden_case("minimal")] {
+    for policy in [
+        example(),
+        golden_case("constructs"),
+        golden_case("wide"),
+        golden_case("minimal"),
+    ] {
         for door in VERSIONS {
             let unit = Unit::new(&policy, door);
             unit.build_importer();

@@ -195,7 +195,7 @@ impl Unit {
             self.policy.sample_period,
             list(|range| range.low),
             list(|range| range.high),
-            self.policy.fallback.duty
+            self.policy.numeric_format.scalar().nearest(self.policy.fallback.duty)
         )
     }
 

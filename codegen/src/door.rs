@@ -1,7 +1,5 @@
 //! Doors: what `compile` can put beside the core so that it gets into a tool or onto a board of the user.
 
-use policy::Scalar;
-
 use crate::backend::fmu::Fmi;
 use crate::backend::kit::Material;
 use crate::{CodegenError, GeneratedFiles, Program, backend};
@@ -60,10 +58,6 @@ impl Door {
             Door::Sfunction => backend::sfunction::emit(program),
             Door::Fmu2 => backend::fmu::emit(program, Fmi::Two),
             Door::Fmu3 => backend::fmu::emit(program, Fmi::Three),
-            Door::Kit if program.scalar() == Scalar::F64 => Err(CodegenError::NoDoor {
-                door: self.name(),
-                format: program.numeric_format,
-            }),
             Door::Kit => match material {
                 Some(material) => backend::kit::emit(program, material),
                 None => Err(CodegenError::Door("the kit has no expected values")),

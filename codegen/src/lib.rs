@@ -67,13 +67,6 @@ pub enum CodegenError {
     Manifest(String),
     /// A door lacks what it needs.
     Door(&'static str),
-    /// A door does not exist in the numeric format.
-    NoDoor {
-        /// Name of the door.
-        door: &'static str,
-        /// The format.
-        format: NumericFormat,
-    },
     /// This build of the compiler lacks the backend.
     NotBuilt(Language),
     /// The processor lacks a type that the numeric format stores.
@@ -92,14 +85,6 @@ impl fmt::Display for CodegenError {
             CodegenError::Rust(message) => write!(f, "internal fault: generated Rust: {message}"),
             CodegenError::Manifest(message) => write!(f, "internal fault: manifest: {message}"),
             CodegenError::Door(message) => write!(f, "internal fault: door: {message}"),
-            CodegenError::NoDoor { door, format } => write!(
-                f,
-                "the door does not exist in the numeric format\n  = found: --door {door} in {}\n  \
-                 = expected: another format, its table of arithmetic is about binary32\n  \
-                 = hint: `policyc verify --format {}` compares the code with the interpreter on the targets that run here",
-                format.name(),
-                format.name()
-            ),
             CodegenError::NotBuilt(language) => write!(f, "this build has no {} backend", language.name()),
             CodegenError::NoType { format, target } => {
                 let (needed, expected) = match format {

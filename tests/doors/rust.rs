@@ -109,7 +109,9 @@ fn the_c_core_answers_through_its_declarations_as_rust_does_in_both_widths() {
     for name in ["constructs", "wide"] {
         let policy = golden_case(name);
         let folder = tempfile::tempdir().unwrap();
-        let mut all = codegen::generate(&policy, targets::host(), &Language::ALL).unwrap().files;
+        let mut all = codegen::generate(&policy, targets::host(), &Language::ALL)
+            .unwrap()
+            .files;
         let program = codegen::lower(&policy, targets::host(), Language::C);
         all.extend(Bindings.emit(&program).unwrap().files);
         let text = BOTH.replace("NAME", name).replace(

@@ -3,7 +3,7 @@
 use codegen::Language;
 use codegen::backend::kit::{Material, Trace};
 use interp::Real;
-use policy::{Policy, ReadOptions, Scalar};
+use policy::{NumericFormat, Policy, ReadOptions, Scalar};
 use targets::{RowBlock, TargetSpec};
 
 use crate::oracle::{Chunk, Oracle};
@@ -41,7 +41,10 @@ const BLOCK: RowBlock = RowBlock::Rows(4);
 /// # Errors
 /// Only for a fault in the compiler itself.
 pub fn material(policy: &Policy, target: &TargetSpec, steps: u32) -> Result<Material, VerifyError> {
-    let constructs = constructs()?;
+    let constructs = match policy.numeric_format.scalar() {
+        Scalar::F32 => constructs()?,
+        Scalar::F64 => constructs()?.with_format(NumericFormat::F64),
+    };
     let suite = [("suite", target.c_row_block), ("blocks", BLOCK)].map(|(name, block)| {
         let mut part = constructs.clone();
         // the user may link several kits into one program

@@ -47,7 +47,7 @@ fn real_tables(scalar: Scalar, layers: &[LayerCode]) -> Vec<Table> {
 }
 
 /// A table of numbers of the format.
-fn numbers(name: String, scalar: Scalar, values: impl ExactSizeIterator<Item = Literal>) -> Table {
+pub fn numbers(name: String, scalar: Scalar, values: impl ExactSizeIterator<Item = Literal>) -> Table {
     Table {
         element: number::kind(scalar).name,
         name,

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Writes the network of a safetensors file as peers read it: network.tflite (int8) for MicroFlow, and emlearn's C.
+"""Writes the network of a safetensors file as peers read it: network.tflite (int8) for MicroFlow, network.onnx for burn-onnx,
+and emlearn's C.
 
 usage: models.py WEIGHTS.safetensors FOLDER
 
-Packages: emlearn, flatbuffers, numpy, tflite; versions in bench/src/peers.rs.
+Packages: emlearn, flatbuffers, numpy, onnx, tflite; versions in bench/src/peers/built.rs.
 """
 import json
 import struct
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import flatbuffers
 import numpy as np
+import onnx
 import tflite
 from emlearn.net import c_generate_net_loadable
 
@@ -144,9 +146,32 @@ def int8(network):
     return model.file(source, values)
 
 
+def real(network):
+    """Gemm and Relu. Factors of 1 are not written out: where they are, burn-onnx takes its Linear layers, which are slower."""
+    helper, kind = onnx.helper, onnx.TensorProto.FLOAT
+    nodes, tensors, values = [], [], "observation"
+    for index, (weights, bias) in enumerate(network):
+        tensors += [onnx.numpy_helper.from_array(weights, f"w{index}"), onnx.numpy_helper.from_array(bias, f"b{index}")]
+        is_last = index + 1 == len(network)
+        sink = "q" if is_last else f"sums{index}"
+        inputs = [values, f"w{index}", f"b{index}"]
+        nodes.append(helper.make_node("Gemm", inputs, [sink], f"gemm{index}", transB=1))
+        values = sink
+        if not is_last:
+            values = f"x{index}"
+            nodes.append(helper.make_node("Relu", [sink], [values], f"relu{index}"))
+    source = helper.make_tensor_value_info("observation", kind, [1, network[0][0].shape[1]])
+    result = helper.make_tensor_value_info("q", kind, [1, network[-1][0].shape[0]])
+    graph = helper.make_graph(nodes, "network", [source], [result], tensors)
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
+    onnx.checker.check_model(model)
+    return model.SerializeToString()
+
+
 def main():
     network, folder = layers(sys.argv[1]), Path(sys.argv[2])
     (folder / "network.tflite").write_bytes(int8(network))
+    (folder / "network.onnx").write_bytes(real(network))
     activations = ["relu"] * (len(network) - 1) + ["identity"]
     weights, biases = [w.T for w, _ in network], [b for _, b in network]
     (folder / "emlearn.h").write_text(c_generate_net_loadable(activations, weights, biases, "network"))

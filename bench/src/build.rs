@@ -91,6 +91,7 @@ impl Bench {
                 self.object(compiler, level, &format!("{}.c", policy.name), extra)?;
                 let mut row = self.counted(target, &["unit.o"], &["main.c"])?;
                 row.flash = Some(size(target, &self.path("unit.o"))?);
+                self.linked(target, compiler, level, policy, extra, &mut row)?;
                 let family = if compiler.program == "clang" { "clang" } else { "gcc" };
                 row.compiler = format!("{family} {level}");
                 rows.push(row);
@@ -125,6 +126,7 @@ impl Bench {
             self.object(&linker(target)?, "-O2", "naive.c", extra)?;
             let mut row = self.counted(target, &["unit.o"], &["main.c"])?;
             row.flash = Some(size(target, &self.path("unit.o"))?);
+            row.network_flash = row.flash;
             row.compiler = "gcc -O2".to_owned();
             row.policy = "bench".to_owned();
             row.variant = variant.to_owned();
@@ -231,6 +233,36 @@ impl Bench {
         run(command.args(["lib.rs", "-o", "unit.a"])).map(|_| ())
     }
 
+    /// What a linker keeps of the controller: for a firmware that asks for Q values alone, and for one that calls start-up,
+    /// step and integrity check, but neither self test nor setters.
+    fn linked(
+        &self,
+        target: &TargetSpec,
+        compiler: &CCompiler,
+        level: &str,
+        policy: &Policy,
+        extra: &[&str],
+        row: &mut Row,
+    ) -> Result<(), Failure> {
+        let sections = ["-ffunction-sections", "-fdata-sections"];
+        let flags: Vec<&str> = extra.iter().copied().chain(sections).collect();
+        self.object(compiler, level, &format!("{}.c", policy.name), &flags)?;
+        let linker = linker(target)?;
+        let kept = |functions: &[&str]| {
+            let mut command = Command::new(linker.program);
+            command.current_dir(self.folder.path()).args(linker.machine_flags);
+            command.args(["-nostdlib", "-r", "-Wl,--gc-sections"]);
+            let roots = functions
+                .iter()
+                .map(|function| format!("-Wl,-u,{}_{function}", policy.name));
+            run(command.args(roots).args(["unit.o", "-o", "kept.o"]))?;
+            size(target, &self.path("kept.o"))
+        };
+        row.network_flash = Some(kept(&["q_values"])?);
+        row.step_flash = Some(kept(&["init", "step", "integrity"])?);
+        Ok(())
+    }
+
     /// Code and tables of the last linked program, with the board's.
     pub(crate) fn linked_flash(&self, target: &TargetSpec) -> Result<u64, Failure> {
         size(target, &self.path("program.elf"))
@@ -312,6 +344,8 @@ pub(crate) fn blank(core: &str) -> Row {
         q_values: None,
         step: None,
         flash: None,
+        network_flash: None,
+        step_flash: None,
         stack: None,
         checksum: None,
         time_ratio: None,

@@ -18,21 +18,33 @@ use targets::{Fma, Fpu, IntegerLoop, Runner, TargetSpec};
 use build::{Bench, Failure};
 use table::Row;
 
+/// What is measured.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Part {
+    All,
+    /// What stands beside the peers: the bench network on the core that they are counted on.
+    Peers,
+    /// Times on this machine.
+    Host,
+}
+
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let (json, only_peers, picture) = match arguments.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
-        [] => (false, false, None),
-        ["--json"] => (true, false, None),
-        ["--peers"] => (false, true, None),
-        ["--picture", path] => (false, true, Some(PathBuf::from(path))),
+    let (json, part, picture) = match arguments.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
+        [] => (false, Part::All, None),
+        ["--json"] => (true, Part::All, None),
+        ["--peers"] => (false, Part::Peers, None),
+        ["--host"] => (false, Part::Host, None),
+        ["--picture", path] => (false, Part::Peers, Some(PathBuf::from(path))),
         _ => {
             eprintln!(
-                "error: `bench` takes --json, --peers (Cortex-M4F alone), --picture FILE.svg (of that), or nothing"
+                "error: `bench` takes --json, --peers (Cortex-M4F alone), --picture FILE.svg (of that), --host (times on this \
+                 machine alone), or nothing"
             );
             return ExitCode::from(2);
         }
     };
-    let text = rows(only_peers).and_then(|rows| {
+    let text = rows(part).and_then(|rows| {
         table::one_checksum_per_format(&rows)?;
         table::one_count_per_kernel(&rows)?;
         if let Some(path) = picture {
@@ -86,9 +98,17 @@ fn is_counted(target: &TargetSpec, name: &str, format: NumericFormat, assembly: 
     }
 }
 
-/// With `only_peers` what stands beside the peers alone: the bench network on the core that they are counted on.
-fn rows(only_peers: bool) -> Result<Vec<Row>, Failure> {
+fn rows(part: Part) -> Result<Vec<Row>, Failure> {
     let bench = Bench::new()?;
+    match part {
+        Part::All => Ok([counts(&bench, false)?, host(&bench)?].concat()),
+        Part::Peers => counts(&bench, true),
+        Part::Host => host(&bench),
+    }
+}
+
+/// Instructions on the emulated cores; with `only_peers` on that of the peers.
+fn counts(bench: &Bench, only_peers: bool) -> Result<Vec<Row>, Failure> {
     let mut rows = Vec::new();
     for (name, path) in [
         ("bench", "bench/policy/policy.toml"),
@@ -114,12 +134,9 @@ fn rows(only_peers: bool) -> Result<Vec<Row>, Failure> {
                 rows.extend(bench.naive(&policy, target)?);
             }
             if target.name == PEERS_CORE && name == "bench" {
-                rows.extend(peers::rows(&bench, &policy, target, &root()));
+                rows.extend(peers::rows(bench, &policy, target, &root()));
             }
         }
-    }
-    if !only_peers {
-        rows.extend(host(&bench)?);
     }
     Ok(rows)
 }

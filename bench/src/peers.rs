@@ -1,30 +1,22 @@
 //! Other people's kernels on the same network, Cortex-M4F: built here as far as a registry has them, else by the figures
 //! others stated. No package of theirs is a dependency of the workspace: they are built in a folder of their own.
 
+mod built;
+
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::Path;
 
 use policy::Policy;
 use report::{Axis, BarChart, BarPanel, ReportError, Svg};
-use targets::{RustTarget, TargetSpec};
+use targets::TargetSpec;
 
-use crate::build::{Bench, Failure, blank, run};
-use crate::sources;
+use crate::build::{Bench, blank};
 use crate::table::Row;
 
 /// Start of the variant of a peer's row.
 pub const PEER: &str = "peer: ";
 /// What stands for a compiler in the row of a figure that was not measured here.
 pub const STATED: &str = "stated";
-
-/// Python packages that write the network for the peers.
-const PACKAGES: [&str; 4] = [
-    "emlearn==0.23.2",
-    "flatbuffers==25.12.19",
-    "numpy==2.4.6",
-    "tflite==2.18.0",
-];
 
 /// Name with numeric format, instructions of an inference, flash in bytes: arm-none-eabi-gcc 12.2 or rustc, the same network and
 /// emulator, measured by others.
@@ -39,19 +31,23 @@ const OTHERS: [(&str, u64, u64); 8] = [
     ("TFLM int8 with CMSIS-NN", 18_062, 42_032),
 ];
 
-/// All peers; a peer that cannot be built here is said on standard error.
+/// All peers: measured, else as stated.
 pub fn rows(bench: &Bench, policy: &Policy, target: &TargetSpec, root: &Path) -> Vec<Row> {
-    let mut rows: Vec<Row> = Vec::new();
-    match built(bench, policy, target, root) {
-        Ok(found) => rows.extend(found),
-        Err(failure) => eprintln!("note: MicroFlow and emlearn are not measured: {failure}"),
-    }
-    rows.extend(OTHERS.map(|(name, instructions, flash)| Row {
-        compiler: STATED.to_owned(),
-        q_values: Some((instructions, instructions)),
-        flash: Some(flash),
-        ..row(name, target)
-    }));
+    let mut rows = built::rows(bench, policy, target, root);
+    let project = |name: &str| name.split(' ').next().map(|word| format!("{PEER}{word} "));
+    let stated = OTHERS.iter().filter(|(name, _, _)| {
+        let is_same = |row: &Row| project(name).is_some_and(|start| row.variant.starts_with(&start));
+        !rows.iter().any(is_same)
+    });
+    let stated: Vec<Row> = stated
+        .map(|(name, instructions, flash)| Row {
+            compiler: STATED.to_owned(),
+            q_values: Some((*instructions, *instructions)),
+            flash: Some(*flash),
+            ..row(name, target)
+        })
+        .collect();
+    rows.extend(stated);
     rows
 }
 
@@ -62,148 +58,6 @@ fn row(name: &str, target: &TargetSpec) -> Row {
         ..blank(target.name)
     }
 }
-
-fn built(bench: &Bench, policy: &Policy, target: &TargetSpec, root: &Path) -> Result<Vec<Row>, Failure> {
-    let (Some(gcc), Some(rust)) = (target.c_compilers.first(), target.rust) else {
-        return Err(Failure(format!("{} has no compilers", target.name)));
-    };
-    let folder = folder()?;
-    let python = environment(&folder)?;
-    run(Command::new(&python)
-        .arg(root.join("bench/peers/models.py"))
-        .arg(root.join("bench/policy/weights.safetensors"))
-        .arg(&folder))?;
-    bench.put_naive(policy)?;
-    bench.put("main.c", &sources::naive_main(policy))?;
-    // what board and counting take is not the network's
-    bench.put(
-        "null.c",
-        "void naive_q_values(const float *o, float *q) { (void)o; q[0] = 0.0f; }\n",
-    )?;
-    bench.object(gcc, "-O2", "null.c", &[])?;
-    bench.counted(target, &["unit.o"], &["main.c"])?;
-    let board = bench.linked_flash(target)?;
-
-    let microflow = micro_flow(&folder, policy, rust)?;
-    let mut micro_flow = bench.counted(target, &[&microflow], &["main.c"])?;
-    micro_flow.flash = Some(bench.linked_flash(target)?.saturating_sub(board));
-    let headers = python_headers(&python)?;
-    bench.put("emlearn.c", &emlearn(&folder.join("emlearn.h"), policy))?;
-    let include = format!("-I{headers}");
-    bench.object(gcc, "-O2", "emlearn.c", &["-ffunction-sections", &include])?;
-    let mut emlearn = bench.counted(target, &["unit.o", "-lm", "-lc"], &["main.c"])?;
-    emlearn.flash = Some(bench.linked_flash(target)?.saturating_sub(board));
-    let named = |found: Row, name: &str, compiler: &str| Row {
-        compiler: compiler.to_owned(),
-        step: None,
-        policy: "bench".to_owned(),
-        variant: format!("{PEER}{name}"),
-        ..found
-    };
-    Ok(vec![
-        named(micro_flow, "MicroFlow 0.1.3 int8", "rustc -O3, LTO"),
-        named(emlearn, "emlearn 0.23.2 f32", "gcc -O2"),
-    ])
-}
-
-/// Beside the programs of the workspace.
-fn folder() -> Result<PathBuf, Failure> {
-    let program = std::env::current_exe().map_err(|error| Failure(error.to_string()))?;
-    let folder = program.ancestors().nth(2).unwrap_or(Path::new(".")).join("peers");
-    std::fs::create_dir_all(folder.join("microflow/src")).map_err(|error| Failure(error.to_string()))?;
-    Ok(folder)
-}
-
-/// A virtual environment with [`PACKAGES`]; returns its Python.
-fn environment(folder: &Path) -> Result<PathBuf, Failure> {
-    let environment = folder.join("python");
-    let python = environment.join("bin/python");
-    if !python.exists() {
-        run(Command::new("python3").args(["-m", "venv"]).arg(&environment))?;
-    }
-    let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
-    run(Command::new(&python).args(pip).args(PACKAGES))?;
-    Ok(python)
-}
-
-/// Folder of emlearn's C headers.
-fn python_headers(python: &Path) -> Result<String, Failure> {
-    let code = "import emlearn, os; print(os.path.dirname(emlearn.__file__))";
-    let text = run(Command::new(python).args(["-c", code]))?;
-    Ok(String::from_utf8_lossy(&text).trim().to_owned())
-}
-
-fn emlearn(generated: &Path, policy: &Policy) -> String {
-    format!(
-        "#include \"{}\"\nvoid naive_q_values(const float *o, float *q)\n{{\n    (void)network_regress(o, {}, q, {});\n}}\n",
-        generated.display(),
-        policy.features.len(),
-        policy.actions.len()
-    )
-}
-
-/// Builds MicroFlow around the network; returns the library.
-fn micro_flow(folder: &Path, policy: &Policy, rust: RustTarget) -> Result<String, Failure> {
-    let package = folder.join("microflow");
-    let put = |name: &str, text: &str| {
-        std::fs::write(package.join(name), text).map_err(|error| Failure(format!("{name}: {error}")))
-    };
-    put("Cargo.toml", MICROFLOW_PACKAGE)?;
-    let (features, actions) = (policy.features.len(), policy.actions.len());
-    put(
-        "src/lib.rs",
-        &format!(
-            r#"#![no_std]
-use microflow::buffer::Buffer2D;
-use microflow::model;
-#[model("{}")]
-struct Network;
-extern "C" {{
-    fn board_exit(code: i32);
-}}
-#[panic_handler]
-fn panic(_: &core::panic::PanicInfo) -> ! {{
-    unsafe {{ board_exit(9) }}
-    loop {{}}
-}}
-#[no_mangle]
-pub unsafe extern "C" fn naive_q_values(o: *const [f32; {features}], q: *mut [f32; {actions}]) {{
-    let o = &*o;
-    let y = Network::predict(Buffer2D::from_fn(|_, i| o[i]));
-    *q = core::array::from_fn(|n| y[n]);
-}}
-"#,
-            folder.join("network.tflite").display()
-        ),
-    )?;
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let target = folder.join("target");
-    run(Command::new(cargo)
-        .current_dir(&package)
-        .args(["build", "--quiet", "--release", "--target", rust.triple])
-        .env("RUSTFLAGS", rust.machine_flags.join(" "))
-        .env("CARGO_TARGET_DIR", &target))?;
-    let library = target.join(rust.triple).join("release/libpeer.a");
-    Ok(library.display().to_string())
-}
-
-/// Not a member of the workspace.
-const MICROFLOW_PACKAGE: &str = r#"[package]
-name = "peer"
-version = "0.0.0"
-edition = "2021"
-[workspace]
-[lib]
-crate-type = ["staticlib"]
-[dependencies]
-microflow = "=0.1.3"
-nalgebra = { version = "=0.32.6", default-features = false, features = ["macros"] }
-[profile.release]
-opt-level = 3
-lto = true
-panic = "abort"
-codegen-units = 1
-"#;
 
 /// Whether a row computes in integers.
 fn is_integer(row: &Row) -> bool {
@@ -222,8 +76,8 @@ fn instructions(row: &Row) -> Option<u64> {
     row.q_values.map(|(_, most)| most)
 }
 
-/// Each peer beside our best row of the same kind (8-bit integers or binary32), as a Markdown table; empty without peers. Our
-/// flash is that of the whole controller, theirs that of the network.
+/// Each peer beside our best row of the same kind (8-bit integers or binary32), as a Markdown table; empty without peers. Flash
+/// is that of the network alone, as linked.
 pub fn table(rows: &[Row]) -> String {
     let peers: Vec<&Row> = rows.iter().filter(|row| row.variant.starts_with(PEER)).collect();
     if peers.is_empty() {
@@ -236,7 +90,7 @@ pub fn table(rows: &[Row]) -> String {
     for peer in peers {
         let format = if is_integer(peer) { "i8" } else { "f32" };
         let same: Vec<&Row> = ours(rows, &peer.core)
-            .filter(|row| row.variant.split(',').next() == Some(format) && row.flash.is_some())
+            .filter(|row| row.variant.split(',').next() == Some(format) && row.network_flash.is_some())
             .collect();
         // of the fastest ones, less than 2 % apart, the smallest
         let fewest = same
@@ -247,7 +101,7 @@ pub fn table(rows: &[Row]) -> String {
         let fast = same
             .iter()
             .filter(|row| instructions(row).is_some_and(|count| count <= fewest + fewest / 50));
-        let Some(best) = fast.min_by_key(|row| row.flash) else {
+        let Some(best) = fast.min_by_key(|row| row.network_flash) else {
             continue;
         };
         let ratio = |ours: Option<u64>, theirs: Option<u64>| match (ours, theirs) {
@@ -266,9 +120,9 @@ pub fn table(rows: &[Row]) -> String {
             best.variant,
             best.compiler,
             number(instructions(best)),
-            number(best.flash),
+            number(best.network_flash),
             ratio(instructions(best), instructions(peer)),
-            ratio(best.flash, peer.flash),
+            ratio(best.network_flash, peer.flash),
         );
     }
     text

@@ -150,6 +150,46 @@ int main(void)
     )
 }
 
+/// Program in C for a board around the function `peer_q_values` of a peer, compared with [`naive`]: the first of the words out
+/// is the number, from 1, of an observation with a Q value further off than `limit` times its largest; 0 if there is none.
+pub fn peer_main(policy: &Policy, start: &str, limit: f64) -> String {
+    let helpers = c_helpers(Scalar::F32);
+    let (features, actions) = (policy.features.len(), policy.actions.len());
+    format!(
+        r#"#include "board.h"
+#include "naive.h"
+void peer_q_values(const float *o, float *q);
+static float o[{features}], q[{actions}], known[{actions}];
+{helpers}
+static float magnitude(float x) {{ return x < 0.0f ? -x : x; }}
+int main(void)
+{{
+    uint32_t out[3], depth = 0u;
+    int i, k;
+    {start}
+    out[0] = 0u;
+    for (k = 0; k < {CALLS}; ++k) {{
+        float largest = 0.0f, error = 0.0f;
+        for (i = 0; i < {features}; ++i) {{ o[i] = draw(-1.0f, 1.0f); }}
+        stack_paint();
+        count_begin(); peer_q_values(o, q); count_end();
+        depth = stack_depth();
+        naive_q_values(o, known);
+        for (i = 0; i < {actions}; ++i) {{
+            largest = magnitude(known[i]) > largest ? magnitude(known[i]) : largest;
+            error = magnitude(known[i] - q[i]) > error ? magnitude(known[i] - q[i]) : error;
+            add(q[i]);
+        }}
+        if (!(error <= {limit:e}f * largest)) {{ out[0] = (uint32_t)k + 1u; }}
+    }}
+    out[1] = crc; out[2] = depth;
+    words_put(out, 3u); words_flush();
+    return 0;
+}}
+"#
+    )
+}
+
 /// Library in Rust with the same `main` for a board.
 pub fn rust(policy: &Policy) -> String {
     let number = rust_number(policy);

@@ -28,6 +28,12 @@ pub struct Row {
     /// Bytes of code and tables of the whole controller with all its functions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flash: Option<u64>,
+    /// Of these what a linker keeps for a firmware that uses `q_values` alone: the network, as peers are counted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub network_flash: Option<u64>,
+    /// What it keeps for a firmware that calls `init`, `step` and `integrity`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub step_flash: Option<u64>,
     /// Bytes of stack of a step.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stack: Option<u64>,
@@ -59,15 +65,16 @@ pub fn one_checksum_per_format(rows: &[Row]) -> Result<(), Failure> {
 }
 
 /// `q_values` takes as many instructions for every observation. Not asked of `f32-fma` in Rust, which goes through
-/// functions of the library, nor of the naive loop, which branches where the core does not select.
+/// functions of the library, of peers, nor of the naive loop, which branches where the core does not select.
 ///
 /// # Errors
 /// The row that varies.
 pub fn one_count_per_kernel(rows: &[Row]) -> Result<(), Failure> {
-    let asked = rows
-        .iter()
-        .filter(|row| row.variant != "f32-fma" || !row.compiler.starts_with("rustc"))
-        .filter(|row| !row.variant.starts_with("naive"));
+    let is_asked = |row: &&Row| {
+        let is_fma_in_rust = row.variant == "f32-fma" && row.compiler.starts_with("rustc");
+        !is_fma_in_rust && !row.variant.starts_with(PEER) && !row.variant.starts_with("naive")
+    };
+    let asked = rows.iter().filter(is_asked);
     let mut varying = asked.filter(|row| row.q_values.is_some_and(|(low, high)| low != high));
     match varying.next() {
         Some(row) => Err(Failure(format!("the count depends on the data:\n{row:?}"))),
@@ -85,15 +92,15 @@ pub fn text(rows: &[Row], json: bool) -> Result<String, Failure> {
         return Ok(text + "\n");
     }
     let mut text = String::from(
-        "| policy | core | compiler | variant | q_values | step | flash B | stack B | checksum | time / naive |\n\
-         |---|---|---|---|---|---|---|---|---|---|\n",
+        "| policy | core | compiler | variant | q_values | step | flash B | network linked B | step linked B | stack B | checksum | time / naive |\n\
+         |---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for row in rows.iter().filter(|row| !row.variant.starts_with(PEER)) {
         let number = |value: Option<u64>| value.map(|value| value.to_string()).unwrap_or_default();
         // writing to a String cannot fail
         let _ = writeln!(
             text,
-            "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+            "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
             row.policy,
             row.core,
             row.compiler,
@@ -101,6 +108,8 @@ pub fn text(rows: &[Row], json: bool) -> Result<String, Failure> {
             range(row.q_values),
             range(row.step),
             number(row.flash),
+            number(row.network_flash),
+            number(row.step_flash),
             number(row.stack),
             row.checksum.as_deref().unwrap_or_default(),
             row.time_ratio.map(|ratio| format!("{ratio:.3}")).unwrap_or_default()
@@ -131,6 +140,8 @@ mod tests {
             q_values: Some((7, 9)),
             step: Some((8, 8)),
             flash: None,
+            network_flash: None,
+            step_flash: None,
             stack: None,
             checksum: Some(checksum.into()),
             time_ratio: None,

@@ -187,16 +187,20 @@ pub enum Op {
         /// Upper end.
         high: ValueId,
     },
+    /// Word: the bits in which two numbers differ. Of a number and what a clamp has made of it: 0 if it was inside.
+    Difference(ValueId, ValueId),
+    /// Flag: a word is not 0.
+    NotZero(ValueId),
     /// Flag: `x > limit`.
     Above(ValueId, ValueId),
     /// Flag: both.
     And(ValueId, ValueId),
-    /// Flag: either.
+    /// Flag: either. Of words, bit by bit.
     Or(ValueId, ValueId),
 }
 
 impl Op {
-    /// Whether the result is a flag.
+    /// Whether the result is a flag or a word.
     #[must_use]
     pub fn is_flag(&self) -> bool {
         matches!(
@@ -208,6 +212,8 @@ impl Op {
                 | Op::PrimedNow
                 | Op::Within { .. }
                 | Op::Outside { .. }
+                | Op::Difference(..)
+                | Op::NotZero(..)
                 | Op::Above(..)
                 | Op::And(..)
                 | Op::Or(..)

@@ -47,10 +47,12 @@ const BASE: TargetSpec = TargetSpec {
     clock_hz: None,
     c_row_block: RowBlock::Rows(4),
     rust_row_block: RowBlock::Rows(4),
+    weights_alignment: None,
     integer_block: IntegerBlock {
         rows: 6,
         unrolled: 1,
         inner: IntegerLoop::Plain,
+        streams: false,
     },
     c_compilers: &[],
     c_flags: EXACT_C99,
@@ -72,6 +74,7 @@ pub const CORTEX_M0PLUS: TargetSpec = TargetSpec {
         rows: 6,
         unrolled: 1,
         inner: IntegerLoop::Halves,
+        streams: false,
     },
     c_compilers: &[
         gcc(&["-mthumb", "-mcpu=cortex-m0plus"]),
@@ -108,6 +111,7 @@ const FPU_BASE: TargetSpec = TargetSpec {
     // 32 single registers: 16 accumulators, one input, loads in flight
     c_row_block: RowBlock::Rows(16),
     rust_row_block: RowBlock::Rows(16),
+    weights_alignment: None,
     integer_block: IntegerBlock::DUAL,
     ..BASE
 };

@@ -60,6 +60,9 @@ pub struct IntegerBlock {
     pub unrolled: usize,
     /// Inner loop.
     pub inner: IntegerLoop,
+    /// Whether the last layer takes the outputs of the one before block by block, so that those are never in memory: less
+    /// stack and, where a block and its sums fit into registers, no more instructions.
+    pub streams: bool,
 }
 
 impl IntegerBlock {
@@ -68,6 +71,7 @@ impl IntegerBlock {
         rows: 4,
         unrolled: 4,
         inner: IntegerLoop::Dual,
+        streams: true,
     };
 }
 
@@ -208,6 +212,8 @@ pub struct TargetSpec {
     pub c_row_block: RowBlock,
     /// Row block of the generated Rust, chosen for LLVM.
     pub rust_row_block: RowBlock,
+    /// Bytes to a multiple of which the weights of a network in floats are aligned, where loads of whole vectors gain by it.
+    pub weights_alignment: Option<u32>,
     /// Blocks of the integer formats; Rust takes 4 rows at most.
     pub integer_block: IntegerBlock,
     /// C compilers in the order in which they are tried. The first also links what the others compile.

@@ -24,6 +24,8 @@ pub const HOST: TargetSpec = TargetSpec {
     // eight vectors of four lanes; gcc spills them as scalars
     c_row_block: RowBlock::Vectors(32),
     rust_row_block: RowBlock::Rows(32),
+    // a line of the cache: no vector lies across two
+    weights_alignment: Some(64),
     integer_block: IntegerBlock::DUAL,
     c_compilers: &[
         CCompiler {
@@ -59,10 +61,12 @@ pub const DSPACE_DS1202: TargetSpec = TargetSpec {
     clock_hz: Some(2_000_000_000),
     c_row_block: RowBlock::Rows(16),
     rust_row_block: RowBlock::Rows(16),
+    weights_alignment: None,
     integer_block: IntegerBlock {
         rows: 8,
         unrolled: 2,
         inner: IntegerLoop::Plain,
+        streams: false,
     },
     c_compilers: &[CCompiler {
         program: "powerpc-linux-gnu-gcc",
@@ -103,10 +107,12 @@ pub const C2000_C28X: TargetSpec = TargetSpec {
     clock_hz: Some(200_000_000),
     c_row_block: RowBlock::Rows(4),
     rust_row_block: RowBlock::Rows(4),
+    weights_alignment: None,
     integer_block: IntegerBlock {
         rows: 4,
         unrolled: 2,
         inner: IntegerLoop::Plain,
+        streams: false,
     },
     c_compilers: &[CCompiler {
         program: "cl2000",
@@ -124,6 +130,7 @@ pub const GENERIC_C99: TargetSpec = TargetSpec {
     description: "any C99 compiler with IEEE 754 binary32; verified on this machine",
     fma: Fma::Unrated,
     rust_row_block: RowBlock::All,
+    weights_alignment: None,
     integer_block: IntegerBlock::DUAL,
     ..HOST
 };

@@ -35,10 +35,12 @@ pub const RISCV32IMC: TargetSpec = TargetSpec {
     clock_hz: Some(160_000_000),
     c_row_block: RowBlock::Rows(8),
     rust_row_block: RowBlock::Rows(8),
+    weights_alignment: None,
     integer_block: IntegerBlock {
         rows: 8,
         unrolled: 2,
         inner: IntegerLoop::Plain,
+        streams: false,
     },
     // clang puts float constants into the writable .sdata unless the limit is 0
     // the bare compiler has no C library, so <stdint.h> is there in freestanding mode only
@@ -69,6 +71,7 @@ pub const RISCV32IMFC: TargetSpec = TargetSpec {
     suitable_format: "f32",
     c_row_block: RowBlock::Rows(16),
     rust_row_block: RowBlock::Rows(16),
+    weights_alignment: None,
     c_compilers: &[
         gcc(&["-march=rv32imfc", "-mabi=ilp32f", "-ffreestanding"]),
         clang(&[

@@ -31,7 +31,7 @@ pub struct Table {
     pub length: usize,
     /// Lines of comma-separated literals.
     pub lines: Vec<String>,
-    /// Whether it must be aligned to words although its elements are smaller.
+    /// Whether it is aligned to more than its elements are.
     pub aligned: bool,
 }
 
@@ -136,8 +136,12 @@ pub struct IntegerView {
     pub is_quad: bool,
     /// Integers in the input vector, padded to whole groups.
     pub input_length: usize,
-    /// Statements that fill the input vector.
-    pub quantise: Vec<String>,
+    /// Whether the input has been read before the first output is written.
+    pub shares: bool,
+    /// Statements that fill the padding of the input vector.
+    pub padding: Vec<String>,
+    /// Output `i` of `integers` as the contract has it, where the network leaves the last shift to its callers.
+    pub output: String,
     /// What one integer of the output is worth.
     pub q_unit: String,
     /// Layers in order.
@@ -163,10 +167,8 @@ pub struct IntegerView {
 pub struct IntegerLayerView {
     /// Number, from 0.
     pub index: usize,
-    /// Tensor name and shape for the comment.
+    /// Tensor name, shape and shift for the comment.
     pub comment: String,
-    /// Bits cut off a sum.
-    pub shift: u32,
     /// Whether its blocks are there in assembly, too.
     pub has_assembly: bool,
     /// Loops over blocks of outputs, in order.
@@ -187,6 +189,19 @@ pub struct IntegerLayerView {
     pub padding: Vec<String>,
     /// Whether `sink` is a local buffer.
     pub is_hidden: bool,
+    /// The last layer, if it takes the outputs of this one block by block.
+    pub next: Option<NextView>,
+}
+
+/// The last layer where it takes the outputs of the one before block by block.
+#[derive(Debug, Clone)]
+pub struct NextView {
+    /// Number, from 0.
+    pub index: usize,
+    /// Outputs.
+    pub outputs: usize,
+    /// Whether a stretch of its outputs is repeated.
+    pub has_turns: bool,
 }
 
 /// Blocks of equal height within an integer layer.
@@ -206,17 +221,28 @@ pub struct IntegerBlockView {
     pub portable: Vec<IntegerPartView>,
     /// One entry per output of the block.
     pub rows: Vec<RowView>,
+    /// What the block adds to the sums of the last layer, if that takes it.
+    pub added: Option<AddedView>,
 }
 
-/// A stretch of inputs of a block: some groups, taken several times.
+/// What a block of outputs adds to the sums of the last layer.
+#[derive(Debug, Clone)]
+pub struct AddedView {
+    /// First weight.
+    pub first: usize,
+    /// Declarations of the special form: pairs of outputs as words.
+    pub pairs: Vec<String>,
+    /// Stretches of sums in the form that suits the target, if it has one of its own.
+    pub special: Vec<IntegerPartView>,
+    /// Stretches of sums in portable C.
+    pub portable: Vec<IntegerPartView>,
+}
+
+/// A stretch of inputs of a block, or of sums: some groups, taken several times.
 #[derive(Debug, Clone)]
 pub struct IntegerPartView {
     /// Times.
     pub turns: usize,
-    /// Inputs per turn.
-    pub inputs: usize,
-    /// Weights per turn.
-    pub weights: usize,
     /// Statements.
     pub lines: Vec<String>,
 }
@@ -259,9 +285,15 @@ pub struct Argmax {
     pub element: &'static str,
     /// Below every output.
     pub lowest: &'static str,
-    /// Function that gives the outputs, without the prefix.
-    pub network: &'static str,
-    /// The larger of `best` and `q[action]`, by the flag `above`.
+    /// Declarations, then calls that give the outputs of a measurement.
+    pub declarations: Vec<String>,
+    /// The calls.
+    pub calls: Vec<String>,
+    /// Output `action` of the network.
+    pub output: String,
+    /// Whether cores with dual products may occur, and their conditional moves.
+    pub dual: bool,
+    /// The larger of `best` and `output`, by the flag `above`.
     pub select: String,
 }
 
@@ -357,6 +389,8 @@ pub struct Source {
     pub tables: Vec<Table>,
     /// Layers in order.
     pub network: NetworkView,
+    /// Whether a step senses its measurement again after the network instead of keeping it on the stack.
+    pub senses_again: bool,
     /// Greedy action.
     pub argmax: Argmax,
     /// CRC functions, the one for floats first.
@@ -432,6 +466,8 @@ pub struct Helpers {
     pub assembly: bool,
     /// Vectors of the compiler
     pub vectors: bool,
+    /// Bytes to which tables are aligned that are so to more than their elements.
+    pub alignment: Option<u32>,
 }
 
 /// Numbers of the self test.

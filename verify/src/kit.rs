@@ -179,6 +179,8 @@ mod tests {
             Op::PrimedNow,
             Op::Within { x: 0, low: 0, high: 0 },
             Op::Outside { x: 0, low: 0, high: 0 },
+            Op::Difference(0, 0),
+            Op::NotZero(0),
             Op::Above(0, 0),
             Op::And(0, 0),
             Op::Or(0, 0),
@@ -190,7 +192,7 @@ mod tests {
                 Op::Constant(_) | Op::Neg(_) | Op::Add(..) | Op::Sub(..) | Op::Mul(..) | Op::Select { .. } => {}
                 Op::Clamp { .. } | Op::LineSum { .. } | Op::Primed | Op::Usable | Op::Clipped => {}
                 Op::HeldSample | Op::PrimedNow | Op::Within { .. } | Op::Outside { .. } => {}
-                Op::Above(..) | Op::And(..) | Op::Or(..) => {}
+                Op::Difference(..) | Op::NotZero(_) | Op::Above(..) | Op::And(..) | Op::Or(..) => {}
             }
         }
         all.to_vec()

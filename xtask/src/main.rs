@@ -20,7 +20,7 @@ usage: cargo xtask <command>
   install                           only the tools: compilers, valgrind
   bless                             rewrite the golden files from what the code produces now
   layers                            only the layer rules
-  bench [--json|--peers]            instruction counts and times of the generated network (docs/kernels.md)
+  bench [--json|--peers|--host]     instruction counts and times of the generated network (docs/kernels.md)
   blind --seed S --out DIR ...      blind cases for the diagnosis and their score (docs/blind.md; --help)
 ";
 

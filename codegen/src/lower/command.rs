@@ -46,8 +46,9 @@ pub fn decide(policy: &Policy) -> Decide {
         let before = block.value(Op::PreviousCommand);
         let low = block.value(Op::Sub(before, step));
         let high = block.value(Op::Add(before, step));
-        status.push((bit("SLEW_LIMITED"), block.value(Op::Outside { x: duty, low, high })));
-        duty = block.value(Op::Clamp { x: duty, low, high });
+        let limited = block.value(Op::Clamp { x: duty, low, high });
+        status.push((bit("SLEW_LIMITED"), changed(&mut block, duty, limited)));
+        duty = limited;
     }
     if policy.limits.soft_start.is_some() {
         let cap = block.value(Op::SoftCap);
@@ -61,14 +62,21 @@ pub fn decide(policy: &Policy) -> Decide {
     }
     let (low, high) = Literal::inward(scalar, policy.limits.duty);
     let (low, high) = (block.constant(low), block.constant(high));
-    status.push((bit("LIMITED"), block.value(Op::Outside { x: duty, low, high })));
-    duty = block.value(Op::Clamp { x: duty, low, high });
+    let limited = block.value(Op::Clamp { x: duty, low, high });
+    status.push((bit("LIMITED"), changed(&mut block, duty, limited)));
+    duty = limited;
     Decide {
         block,
         duty,
         duty_sim,
         status,
     }
+}
+
+/// The flag that a clamp has changed a value.
+fn changed(block: &mut Block, value: ValueId, clamped: ValueId) -> ValueId {
+    let difference = block.value(Op::Difference(value, clamped));
+    block.value(Op::NotZero(difference))
 }
 
 /// Mapped duty and the flag that it was extrapolated.

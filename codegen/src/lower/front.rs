@@ -23,6 +23,7 @@ pub fn lower(policy: &Policy) -> (Front, usize) {
     }
     let block = &mut builder.block;
     let clipped = clipped.into_iter().reduce(|all, one| block.value(Op::Or(all, one)));
+    let clipped = clipped.map(|differences| block.value(Op::NotZero(differences)));
     let front = Front {
         block: builder.block,
         signals: builder.signals,
@@ -74,7 +75,7 @@ impl Builder {
         all.unwrap_or_default()
     }
 
-    /// Observation and, with a clip, the flag that it was active.
+    /// Observation and, with a clip, what it changed.
     fn feature(&mut self, feature: &Feature, sample_period: f64) -> (ValueId, Option<ValueId>) {
         let mut value = self.expression(&feature.source);
         for filter in &feature.filters {
@@ -94,8 +95,8 @@ impl Builder {
             Some(clip) => {
                 let low = block.constant(Literal::nearest(scalar, clip.low));
                 let high = block.constant(Literal::nearest(scalar, clip.high));
-                let outside = block.value(Op::Outside { x: value, low, high });
-                (block.value(Op::Clamp { x: value, low, high }), Some(outside))
+                let clamped = block.value(Op::Clamp { x: value, low, high });
+                (clamped, Some(block.value(Op::Difference(value, clamped))))
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Contract section 6b: integer layers with their tables in reading order.
 
 use policy::scales::{self, LayerScale, Scales, power_of_two, round_half_up};
-use policy::{Layer, NumericFormat, Policy, Scalar};
+use policy::{Activation, Layer, NumericFormat, Policy, Scalar};
 use targets::IntegerBlock;
 
 use super::network::activation;
@@ -30,21 +30,36 @@ pub fn lower(policy: &Policy, scales: &Scales, block: IntegerBlock) -> IntegerNe
     let q_exponent = scales.layers.last().and_then(|layer| layer.outputs.first());
     let q_exponent = q_exponent.copied().unwrap_or_default();
     let layers = policy.layers.iter().zip(&scales.layers);
+    let split = |(index, (layer, scale))| {
+        let split = split(policy, index, lanes.len(), block);
+        self::layer(layer, scale, lanes, split)
+    };
     IntegerNetwork {
         weight_bytes: 4 / lanes.len(),
         block,
         lanes: lanes.to_vec(),
         inputs: scales.inputs.iter().map(input).collect(),
-        layers: layers
-            .map(|(layer, scale)| self::layer(layer, scale, lanes, block.rows.clamp(1, layer.outputs)))
-            .collect(),
+        layers: layers.enumerate().map(split).collect(),
         q_unit: Literal::nearest(Scalar::F32, power_of_two(-q_exponent)),
         q_field: MANTISSA_FIELD + 1 - q_exponent,
         accumulator_bound: scales.accumulator_bound(),
     }
 }
 
-fn layer(layer: &Layer, scale: &LayerScale, lanes: &[usize], block_rows: usize) -> IntegerLayer {
+/// Outputs side by side and inputs at a time of a layer. A last layer that is streamed takes blocks of the layer before.
+fn split(policy: &Policy, index: usize, lanes: usize, block: IntegerBlock) -> (usize, usize) {
+    let layer = &policy.layers[index];
+    let is_plain_last = index + 1 == policy.layers.len() && layer.activation == Activation::Identity;
+    // a group of inputs must not lie in two blocks
+    let streams = block.streams && is_plain_last && index > 0 && block.rows.is_multiple_of(lanes);
+    if streams && block.rows < layer.inputs {
+        (1, block.rows)
+    } else {
+        (block.rows.clamp(1, layer.outputs), layer.inputs)
+    }
+}
+
+fn layer(layer: &Layer, scale: &LayerScale, lanes: &[usize], (block_rows, chunk): (usize, usize)) -> IntegerLayer {
     // the scales were chosen so that every weight fits
     let weight = |output: usize, input: usize| match scale.inputs.get(input) {
         Some(exponent) => {
@@ -54,11 +69,13 @@ fn layer(layer: &Layer, scale: &LayerScale, lanes: &[usize], block_rows: usize) 
         None => 0,
     };
     let mut table = Vec::with_capacity(layer.weights.len());
-    for first in (0..layer.outputs).step_by(block_rows) {
-        let last = (first + block_rows).min(layer.outputs);
-        for group in (0..layer.inputs).step_by(lanes.len()) {
-            for output in first..last {
-                table.extend(lanes.iter().map(|lane| weight(output, group + lane)));
+    for input in (0..layer.inputs).step_by(chunk) {
+        for first in (0..layer.outputs).step_by(block_rows) {
+            let last = (first + block_rows).min(layer.outputs);
+            for group in (input..(input + chunk).min(layer.inputs)).step_by(lanes.len()) {
+                for output in first..last {
+                    table.extend(lanes.iter().map(|lane| weight(output, group + lane)));
+                }
             }
         }
     }
@@ -72,6 +89,7 @@ fn layer(layer: &Layer, scale: &LayerScale, lanes: &[usize], block_rows: usize) 
         inputs: layer.inputs,
         outputs: layer.outputs,
         block_rows,
+        chunk,
         table,
         bias: layer.bias.iter().zip(&scale.accumulators).map(bias).collect(),
         shift: scale.shift,
@@ -81,9 +99,7 @@ fn layer(layer: &Layer, scale: &LayerScale, lanes: &[usize], block_rows: usize) 
             power_of_two(-scale.accumulators.first().copied().unwrap_or_default()),
         ),
         slope: match (activation, layer.activation) {
-            (ActivationCode::LeakyRelu(_), policy::Activation::LeakyRelu { slope }) => {
-                scales::slope_integer(slope) as i32
-            }
+            (ActivationCode::LeakyRelu(_), Activation::LeakyRelu { slope }) => scales::slope_integer(slope) as i32,
             _ => 0,
         },
         activation,

@@ -146,12 +146,14 @@ fn integer_q(network: &IntegerNetwork, observation: &[f32]) -> Vec<f32> {
 fn integer_dense(network: &IntegerNetwork, layer: &IntegerLayer, x: &[i32]) -> Vec<i32> {
     let mut y = layer.bias.clone();
     let mut table = layer.table.iter();
-    for block in y.chunks_mut(layer.block_rows) {
-        for group in x.chunks(network.lanes.len()) {
-            for sum in block.iter_mut() {
-                for lane in &network.lanes {
-                    let weight = i32::from(table.next().copied().unwrap_or_default());
-                    *sum = sum.wrapping_add(weight.wrapping_mul(group[*lane]));
+    for x in x.chunks(network.padded(layer.chunk)) {
+        for block in y.chunks_mut(layer.block_rows) {
+            for group in x.chunks(network.lanes.len()) {
+                for sum in block.iter_mut() {
+                    for lane in &network.lanes {
+                        let weight = i32::from(table.next().copied().unwrap_or_default());
+                        *sum = sum.wrapping_add(weight.wrapping_mul(group[*lane]));
+                    }
                 }
             }
         }

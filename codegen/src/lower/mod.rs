@@ -29,7 +29,7 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
     };
     let scalar = policy.numeric_format.scalar();
     let (front, memory_words) = front::lower(policy);
-    let network = network::lower(policy, row_block, integer_block);
+    let network = network::lower(policy, row_block, target.weights_alignment, integer_block);
     let duties: Vec<_> = policy
         .actions
         .iter()

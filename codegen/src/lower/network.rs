@@ -21,20 +21,20 @@ pub const TANH_DENOMINATOR: [f64; 5] = [1.0, 0.467_065_04, 0.025_842_024, 0.000_
 pub const TANH_RANGE: f64 = 9.0;
 
 /// The network in the policy's numeric format.
-pub fn lower(policy: &Policy, row_block: RowBlock, integer_block: IntegerBlock) -> NetworkCode {
+pub fn lower(policy: &Policy, row_block: RowBlock, alignment: Option<u32>, integer_block: IntegerBlock) -> NetworkCode {
     let Simplified { policy, scales } = simplify::simplified(policy);
     match scales {
         Some(scales) => NetworkCode::Integer(integer::lower(&policy, &scales, integer_block)),
         None => NetworkCode::Real {
             scalar: policy.numeric_format.scalar(),
             fused: policy.numeric_format == NumericFormat::F32Fma,
-            layers: layers(&policy, row_block),
+            layers: layers(&policy, row_block, alignment),
         },
     }
 }
 
 /// The last layer takes the outputs of the one before block by block where blocks are variables: half of the stack.
-fn layers(policy: &Policy, row_block: RowBlock) -> Vec<LayerCode> {
+fn layers(policy: &Policy, row_block: RowBlock, alignment: Option<u32>) -> Vec<LayerCode> {
     let row_block = match (row_block, policy.numeric_format) {
         // the fused operation is a function of scalars, and weights of another width than the sums need a conversion
         (RowBlock::Vectors(_), NumericFormat::F32Fma | NumericFormat::F64) => RowBlock::All,
@@ -48,12 +48,12 @@ fn layers(policy: &Policy, row_block: RowBlock) -> Vec<LayerCode> {
     let scalar = policy.numeric_format.scalar();
     let layers = policy.layers.iter().enumerate();
     layers
-        .map(|(index, layer)| real(scalar, layer, row_block, chunk(index, layer)))
+        .map(|(index, layer)| real(scalar, layer, row_block, chunk(index, layer), alignment))
         .collect()
 }
 
 /// Orders the weights in the blocks in which the generated code reads them.
-fn real(scalar: Scalar, layer: &Layer, row_block: RowBlock, chunk: usize) -> LayerCode {
+fn real(scalar: Scalar, layer: &Layer, row_block: RowBlock, chunk: usize, alignment: Option<u32>) -> LayerCode {
     let block_rows = match row_block {
         RowBlock::All => layer.outputs,
         RowBlock::Rows(rows) | RowBlock::Vectors(rows) => rows.clamp(1, layer.outputs),
@@ -74,6 +74,7 @@ fn real(scalar: Scalar, layer: &Layer, row_block: RowBlock, chunk: usize) -> Lay
         outputs: layer.outputs,
         block_rows,
         chunk,
+        alignment,
         in_memory: !matches!(row_block, RowBlock::Rows(_)),
         has_vectors: matches!(row_block, RowBlock::Vectors(_)),
         table,

@@ -33,6 +33,8 @@ pub struct LayerCode {
     pub in_memory: bool,
     /// Whether vectors of the compiler are taken where it has them; else what `in_memory` says.
     pub has_vectors: bool,
+    /// Bytes to which the table of weights is aligned, if to more than its elements.
+    pub alignment: Option<u32>,
     /// Inputs taken at a time: all, or the block of outputs that the layer before has just made. Then the sums stand in the
     /// output buffer in between.
     pub chunk: usize,
@@ -165,10 +167,13 @@ pub struct IntegerLayer {
     pub inputs: usize,
     /// Outputs.
     pub outputs: usize,
-    /// Outputs accumulated side by side, `1..=outputs`.
+    /// Outputs accumulated side by side, `1..=outputs`; 1 if the layer is streamed.
     pub block_rows: usize,
-    /// Weights: blocks of outputs (the last may be shorter), within a block by group of inputs, then by output; within a
-    /// group in the order of [`IntegerNetwork::lanes`]. Inputs that the last group lacks have weight 0.
+    /// Inputs taken at a time: all, or the block of outputs that the layer before has just made.
+    pub chunk: usize,
+    /// Weights: chunks of inputs (the last may be shorter), within a chunk blocks of outputs (the last may be shorter), within
+    /// a block by group of inputs, then by output; within a group in the order of [`IntegerNetwork::lanes`]. Inputs that the
+    /// last group lacks have weight 0.
     pub table: Vec<i16>,
     /// `[outputs]`, half of the last bit kept included.
     pub bias: Vec<i32>,
@@ -180,6 +185,23 @@ pub struct IntegerLayer {
     pub activation: ActivationCode,
     /// Slope of a leaky ReLU in 2^-15.
     pub slope: i32,
+}
+
+impl IntegerLayer {
+    /// Whether the layer takes the outputs of the one before block by block, so that those are never there all at once.
+    #[must_use]
+    pub fn is_streamed(&self) -> bool {
+        self.chunk < self.inputs
+    }
+
+    /// Count and height of the blocks of outputs, full ones first.
+    #[must_use]
+    pub fn blocks(&self) -> Vec<(usize, usize)> {
+        let (full, tail) = (self.outputs / self.block_rows, self.outputs % self.block_rows);
+        std::iter::once((full, self.block_rows))
+            .chain((tail > 0).then_some((1, tail)))
+            .collect()
+    }
 }
 
 /// A network in integers.
@@ -208,6 +230,15 @@ impl IntegerNetwork {
     #[must_use]
     pub fn groups(&self, inputs: usize) -> usize {
         inputs.div_ceil(self.lanes.len())
+    }
+
+    /// The layers computed one after the other, and the last two where the very last is streamed.
+    #[must_use]
+    pub fn pieces(&self) -> (&[IntegerLayer], Option<(&IntegerLayer, &IntegerLayer)>) {
+        match self.layers.as_slice() {
+            [before @ .., block, last] if last.is_streamed() => (before, Some((block, last))),
+            layers => (layers, None),
+        }
     }
 
     /// Integers that hold an activation vector: inputs, rounded up to whole groups.

@@ -8,6 +8,7 @@ pub(super) mod tables;
 
 use std::collections::BTreeMap;
 
+use targets::IntegerLoop;
 use templates::Template;
 use templates::c::{Argmax, Common, Constant, Header, Helpers, Member, NetworkView, PushView, Source, WideChar};
 
@@ -190,6 +191,7 @@ fn source(program: &Program) -> Source {
         wide_char: wide_char(program),
         tables: tables::tables(program),
         network: network(program),
+        senses_again: senses_again(program),
         argmax: argmax(program),
         crc_kinds: tables::crc_kinds(program),
         helpers: helpers(program),
@@ -235,20 +237,51 @@ fn network(program: &Program) -> NetworkView {
     }
 }
 
+/// To sense is a few per cent of the network where floats are hardware, and a tenth of it where they are a library.
+fn senses_again(program: &Program) -> bool {
+    program.has_fpu
+}
+
 fn argmax(program: &Program) -> Argmax {
     let n = &program.name;
+    let again = senses_again(program);
+    let kind = number::kind(program.scalar()).name;
     match program.network {
         NetworkCode::Real { .. } => Argmax {
-            element: number::kind(program.scalar()).name,
+            element: kind,
             lowest: number::lowest(program.scalar()),
-            network: "q_values",
-            select: format!("{n}_select(above, q[action], best)"),
+            declarations: again
+                .then(|| format!("{kind} observation[{}];", program.feature_count()))
+                .into_iter()
+                .chain([format!("{kind} q[{}];", program.duties.len())])
+                .collect(),
+            calls: again
+                .then(|| format!("{n}_observe(state, measured, observation);"))
+                .into_iter()
+                .chain([format!("{n}_q_values(observation, q);")])
+                .collect(),
+            output: "q[action]".to_owned(),
+            dual: false,
+            select: format!("{n}_select(above, output, best)"),
         },
-        NetworkCode::Integer(_) => Argmax {
+        NetworkCode::Integer(ref network) => Argmax {
             element: "int32_t",
             lowest: "(-2147483647 - 1)",
-            network: "network",
-            select: format!("{n}_select_integer(above, q[action], best)"),
+            declarations: vec![
+                format!("{n}_values values;"),
+                "const int32_t *const q = values.q;".to_owned(),
+            ],
+            calls: vec![
+                if again {
+                    format!("{n}_inputs(state, measured, values.input);")
+                } else {
+                    format!("{n}_quantise(observation, values.input);")
+                },
+                format!("{n}_network(&values);"),
+            ],
+            output: integer::output(network, "action"),
+            dual: network.block.inner == IntegerLoop::Dual,
+            select: format!("{n}_select_integer(above, output, best)"),
         },
     }
 }
@@ -412,6 +445,11 @@ fn helpers(program: &Program) -> Helpers {
         vectors: match network {
             NetworkCode::Real { layers, .. } => layers.iter().any(|layer| layer.has_vectors),
             NetworkCode::Integer(_) => false,
+        },
+        alignment: match network {
+            NetworkCode::Real { layers, .. } => layers.iter().find_map(|layer| layer.alignment),
+            // words, although the elements are smaller
+            NetworkCode::Integer(_) => Some(4),
         },
         fused: matches!(network, NetworkCode::Real { fused: true, .. }),
     }

@@ -1,5 +1,7 @@
 //! Straight-line blocks as C declarations.
 
+use policy::Scalar;
+
 use super::number;
 use crate::backend::literal::decimal;
 use crate::program::{Block, Op, Program, ValueId};
@@ -121,6 +123,11 @@ impl<'p> Printer<'p> {
             }
             Op::Within { x, low, high } => format!("{p}_within({}, {}, {})", v(x), v(low), v(high)),
             Op::Outside { x, low, high } => format!("{p}_outside({}, {}, {})", v(x), v(low), v(high)),
+            Op::Difference(x, y) => match self.program.scalar() {
+                Scalar::F32 => format!("{p}_bits({}) ^ {p}_bits({})", v(x), v(y)),
+                Scalar::F64 => format!("{p}_differing({}, {})", v(x), v(y)),
+            },
+            Op::NotZero(x) => format!("{p}_flag({} != 0u)", v(x)),
             Op::Above(x, limit) => format!("{p}_flag({} > {})", v(x), v(limit)),
             Op::And(x, y) => format!("{} & {}", v(x), v(y)),
             Op::Or(x, y) => format!("{} | {}", v(x), v(y)),

@@ -35,7 +35,10 @@ pub fn tables(program: &Program) -> Vec<Table> {
 fn real_tables(scalar: Scalar, layers: &[LayerCode]) -> Vec<Table> {
     let tables = layers.iter().enumerate().map(|(index, layer)| {
         [
-            floats(format!("weights{index}"), &layer.table),
+            Table {
+                aligned: layer.alignment.is_some(),
+                ..floats(format!("weights{index}"), &layer.table)
+            },
             numbers(
                 format!("bias{index}"),
                 scalar,

@@ -12,11 +12,15 @@ use crate::program::{ActivationCode, IntegerLayer, IntegerNetwork};
 pub fn items(network: &IntegerNetwork, has_fpu: bool) -> TokenStream {
     let weight = weight(network);
     let lanes = size(network.lanes.len());
-    let layers = network
-        .layers
-        .iter()
-        .enumerate()
-        .map(|(index, layer)| layer_items(network, index, layer));
+    let (before, streamed) = network.pieces();
+    let whole = before.iter().enumerate();
+    let mut layers: Vec<TokenStream> = whole
+        .map(|(index, layer)| layer_items(network, index, layer, None))
+        .collect();
+    if let Some((block, last)) = streamed {
+        layers.push(last_tables(network, before.len() + 1, last));
+        layers.push(layer_items(network, before.len(), block, Some(last)));
+    }
     let names: Vec<_> = (0..network.lanes.len()).map(|i| ident(&format!("x{i}"))).collect();
     let products = network.lanes.iter().enumerate().map(|(at, lane)| {
         let (at, x) = (size(at), &names[*lane]);
@@ -131,14 +135,25 @@ fn calls(network: &IntegerNetwork) -> (TokenStream, TokenStream) {
     let mut buffers = Vec::new();
     let mut calls = Vec::new();
     let mut source = ident("input");
-    for (index, layer) in network.layers.iter().enumerate() {
+    let (before, streamed) = network.pieces();
+    for (index, layer) in before.iter().enumerate() {
         let (kind, length) = sink(network, index, layer);
         let (sink, function) = (ident(&format!("hidden{index}")), ident(&format!("layer{index}")));
         buffers.push(quote! { let mut #sink: Words<[#kind; #length]> = Words([0; #length]); });
         calls.push(quote! { #function(&#source, &mut #sink); });
         source = sink;
     }
-    (quote!(#(#buffers)*), quote!(#(#calls)* #source.0))
+    let Some((_, last)) = streamed else {
+        return (quote!(#(#buffers)*), quote!(#(#calls)* #source.0));
+    };
+    let (function, bias) = (
+        ident(&format!("layer{}", before.len())),
+        ident(&format!("BIAS{}", before.len() + 1)),
+    );
+    buffers.push(quote! { let mut sums = Words(#bias); });
+    calls.push(quote! { #function(&#source, &mut sums); });
+    let cut = cut(last);
+    (quote!(#(#buffers)*), quote!(#(#calls)* sums.0.map(|sum| #cut)))
 }
 
 /// Type and length of a layer's output.
@@ -185,6 +200,9 @@ pub fn q_values(network: &IntegerNetwork, has_fpu: bool) -> TokenStream {
 /// Statements of the integrity check.
 pub fn integrity(network: &IntegerNetwork) -> TokenStream {
     let layers = network.layers.iter().enumerate().map(|(index, layer)| {
+        if layer.is_streamed() {
+            return last_integrity(index, layer);
+        }
         let names = blocks(index, layer);
         let weights = names.iter().map(|(weights, ..)| {
             quote! {
@@ -209,6 +227,83 @@ fn weight(network: &IntegerNetwork) -> TokenStream {
     }
 }
 
+/// Names of the weights of a streamed layer, inputs of a chunk and number of chunks: the full ones, then the shorter last one.
+fn chunks(index: usize, layer: &IntegerLayer) -> Vec<(proc_macro2::Ident, usize, usize)> {
+    let (full, rest) = (layer.inputs / layer.chunk, layer.inputs % layer.chunk);
+    let mut all = vec![(ident(&format!("WEIGHTS{index}")), layer.chunk, full)];
+    if rest > 0 {
+        all.push((ident(&format!("TAIL_WEIGHTS{index}")), rest, 1));
+    }
+    all
+}
+
+/// Tables of a streamed layer: for each chunk of inputs the weights of every sum.
+fn last_tables(network: &IntegerNetwork, index: usize, layer: &IntegerLayer) -> TokenStream {
+    let kind = weight(network);
+    let outputs = size(layer.outputs);
+    let mut rest = layer.table.as_slice();
+    let tables = chunks(index, layer).into_iter().map(|(name, inputs, count)| {
+        let width = network.padded(inputs);
+        let (part, after) = rest.split_at(count * layer.outputs * width);
+        rest = after;
+        let parts = part.chunks(layer.outputs * width).map(|chunk| {
+            let rows = chunk.chunks(width).map(|row| {
+                let row = row.iter().map(|weight| signed(i64::from(*weight)));
+                quote!([#(#row),*])
+            });
+            quote!([#(#rows),*])
+        });
+        let (count, width) = (size(count), size(width));
+        quote! { static #name: Words<[[[#kind; #width]; #outputs]; #count]> = Words([#(#parts),*]); }
+    });
+    let tables: Vec<TokenStream> = tables.collect();
+    let name = ident(&format!("BIAS{index}"));
+    let bias = layer.bias.iter().map(|bias| signed(i64::from(*bias)));
+    quote! { #(#tables)* static #name: [i32; #outputs] = [#(#bias),*]; }
+}
+
+/// Statements of the integrity check of a streamed layer.
+fn last_integrity(index: usize, layer: &IntegerLayer) -> TokenStream {
+    let weights = chunks(index, layer).into_iter().map(|(weights, ..)| {
+        quote! {
+            for weight in core::hint::black_box(&#weights.0).iter().flatten().flatten() {
+                crc = crc_word(crc, i32::from(*weight) as u32);
+            }
+        }
+    });
+    let bias = ident(&format!("BIAS{index}"));
+    quote! {
+        #(#weights)*
+        for bias in core::hint::black_box(&#bias) { crc = crc_word(crc, *bias as u32); }
+    }
+}
+
+/// The loop over blocks of `height` outputs that adds each to the sums of the streamed layer.
+fn added(
+    network: &IntegerNetwork,
+    layer: &IntegerLayer,
+    names: [&proc_macro2::Ident; 3],
+    height: usize,
+) -> TokenStream {
+    let [weights, bias, next] = names;
+    let lanes = &network.lanes;
+    let outputs: Vec<_> = (0..height).map(|i| ident(&format!("y{i}"))).collect();
+    let products = (0..network.padded(height)).filter_map(|at| {
+        let output = outputs.get(at / lanes.len() * lanes.len() + lanes[at % lanes.len()])?;
+        let at = size(at);
+        Some(quote!(.wrapping_add(i32::from(weight[#at]).wrapping_mul(i32::from(#output)))))
+    });
+    let activated = activated(layer, false);
+    quote! {
+        for ((weights, bias), next) in #weights.0.iter().zip(&#bias).zip(&#next.0) {
+            let [#(#outputs),*] = block(weights, bias, &x.0).map(|sum| #activated);
+            for (sum, weight) in y.0.iter_mut().zip(next) {
+                *sum = sum #(#products)*;
+            }
+        }
+    }
+}
+
 /// Names of weights and bias, first output and height of the full blocks and of the shorter last one.
 fn blocks(index: usize, layer: &IntegerLayer) -> Vec<(proc_macro2::Ident, proc_macro2::Ident, usize, usize)> {
     let name = |kind: &str| ident(&format!("{kind}{index}"));
@@ -221,7 +316,13 @@ fn blocks(index: usize, layer: &IntegerLayer) -> Vec<(proc_macro2::Ident, proc_m
     all
 }
 
-fn layer_items(network: &IntegerNetwork, index: usize, layer: &IntegerLayer) -> TokenStream {
+/// Tables and function of a layer; with `last` its blocks go into the sums of that streamed layer.
+fn layer_items(
+    network: &IntegerNetwork,
+    index: usize,
+    layer: &IntegerLayer,
+    streamed: Option<&IntegerLayer>,
+) -> TokenStream {
     let is_last = index + 1 == network.layers.len();
     let lanes = network.lanes.len();
     let groups = network.groups(layer.inputs);
@@ -237,7 +338,8 @@ fn layer_items(network: &IntegerNetwork, index: usize, layer: &IntegerLayer) -> 
     let mut loops = Vec::new();
     let mut kernels = Vec::new();
     let mut kernel_calls = Vec::new();
-    for (weights, bias, first, height) in &names {
+    let next = streamed.map(|last| chunks(index + 1, last));
+    for (at, (weights, bias, first, height)) in names.iter().enumerate() {
         let last = if *first == 0 { split } else { layer.outputs };
         let part = &layer.table[first * groups * lanes..last * groups * lanes];
         let parts = part
@@ -254,7 +356,8 @@ fn layer_items(network: &IntegerNetwork, index: usize, layer: &IntegerLayer) -> 
             static #weights: Words<[[[[#kind; #lanes]; #rows]; #groups]; #count]> = Words([#(#parts),*]);
             static #bias: [[i32; #rows]; #count] = [#(#biases),*];
         });
-        loops.push(quote! {
+        let next = next.as_ref().and_then(|next| next.get(at)).map(|(next, ..)| next);
+        let whole = quote! {
             for (weights, bias) in #weights.0.iter().zip(&#bias) {
                 if let Some((out, after)) = core::mem::take(&mut rest).split_first_chunk_mut::<#rows>() {
                     for (y, sum) in out.iter_mut().zip(block(weights, bias, &x.0)) {
@@ -263,12 +366,21 @@ fn layer_items(network: &IntegerNetwork, index: usize, layer: &IntegerLayer) -> 
                     rest = after;
                 }
             }
+        };
+        loops.push(match next {
+            Some(next) => added(network, layer, [weights, bias, next], *height),
+            None => whole,
         });
-        if let Some(kernel) = kernel(network, index, layer, (last - first) / height, *height) {
-            let (name, first) = (kernel_name(index, *height), size(*first));
+        let blocks = ((last - first) / height, *height);
+        if let Some(kernel) = kernel(network, index, layer, blocks, streamed) {
+            let (name, first) = (
+                kernel_name(index, *height),
+                size(if next.is_some() { 0 } else { *first }),
+            );
+            let next = next.map(|next| quote!(, #next.0.as_ptr().cast()));
             kernels.push(kernel);
             kernel_calls.push(quote! {
-                #name(x.0.as_ptr(), y.0.as_mut_ptr().add(#first), #weights.0.as_ptr().cast(), #bias.as_ptr().cast());
+                #name(x.0.as_ptr(), y.0.as_mut_ptr().add(#first), #weights.0.as_ptr().cast(), #bias.as_ptr().cast() #next);
             });
         }
     }
@@ -278,12 +390,15 @@ fn layer_items(network: &IntegerNetwork, index: usize, layer: &IntegerLayer) -> 
         layer.name, layer.inputs, layer.outputs, layer.shift
     );
     let inputs = size(network.padded(layer.inputs));
-    let (kind, length) = sink(network, index, layer);
-    let head = quote!(fn #name(x: &Words<[i16; #inputs]>, y: &mut Words<[#kind; #length]>));
-    let portable = quote! {
-        let mut rest: &mut [#kind] = &mut y.0;
-        #(#loops)*
+    let (kind, length) = match streamed {
+        Some(last) => (quote!(i32), size(last.outputs)),
+        None => sink(network, index, layer),
     };
+    let head = quote!(fn #name(x: &Words<[i16; #inputs]>, y: &mut Words<[#kind; #length]>));
+    let rest = streamed
+        .is_none()
+        .then(|| quote! { let mut rest: &mut [#kind] = &mut y.0; });
+    let portable = quote! { #rest #(#loops)* };
     if kernels.is_empty() {
         return quote! { #(#tables)* #[doc = #doc] #[inline(always)] #head { #portable } };
     }
@@ -315,20 +430,22 @@ fn kernel(
     network: &IntegerNetwork,
     index: usize,
     layer: &IntegerLayer,
-    count: usize,
-    height: usize,
+    blocks: (usize, usize),
+    streamed: Option<&IntegerLayer>,
 ) -> Option<TokenStream> {
-    let kernel = Kernel::of(network, layer, count, height, index + 1 == network.layers.len())?;
+    let kernel = Kernel::of(network, layer, blocks, index + 1 == network.layers.len(), streamed)?;
     // braces of a register list are doubled: single ones are operands
     let text = kernel.text(&|registers| format!("{{{{{registers}}}}}"));
-    let (name, weight) = (kernel_name(index, height), weight(network));
+    let (name, weight) = (kernel_name(index, blocks.1), weight(network));
     let (sink, _) = sink(network, index, layer);
+    let sink = if streamed.is_some() { quote!(i32) } else { sink };
+    let next = streamed.map(|_| quote!(, next: *const #weight));
     Some(quote! {
         /// `--cfg policyc_assembly` takes the loops in assembly (Armv7E-M and Armv8-M with DSP); the bits are the same.
         #[cfg(all(target_arch = "arm", policyc_assembly))]
         #[allow(unexpected_cfgs)]
         #[unsafe(naked)]
-        unsafe extern "C" fn #name(x: *const i16, y: *mut #sink, weights: *const #weight, bias: *const i32) {
+        unsafe extern "C" fn #name(x: *const i16, y: *mut #sink, weights: *const #weight, bias: *const i32 #next) {
             core::arch::naked_asm!(#(#text),*)
         }
     })
@@ -355,13 +472,17 @@ fn signed(value: i64) -> TokenStream {
     }
 }
 
-fn activated(layer: &IntegerLayer, is_last: bool) -> TokenStream {
+fn cut(layer: &IntegerLayer) -> TokenStream {
     let shift = word(layer.shift);
-    let cut = if layer.shift == 0 {
+    if layer.shift == 0 {
         quote!(sum)
     } else {
         quote!((sum >> #shift))
-    };
+    }
+}
+
+fn activated(layer: &IntegerLayer, is_last: bool) -> TokenStream {
+    let cut = cut(layer);
     match layer.activation {
         ActivationCode::Identity if is_last => cut,
         ActivationCode::Identity => quote!(#cut as i16),

@@ -1,7 +1,7 @@
 //! Tables, layers and `q_values`.
 
 use policy::Scalar;
-use proc_macro2::TokenStream;
+use proc_macro2::{Ident, TokenStream};
 use quote::quote;
 
 use super::number::{self, number};
@@ -51,6 +51,7 @@ pub fn q_values(program: &Program) -> TokenStream {
 fn real(scalar: Scalar, layers: &[LayerCode], fused: bool) -> TokenStream {
     let (items, body) = streamed::network(scalar, layers);
     let kind = number::kind(scalar);
+    let aligned = layers.iter().find_map(|layer| layer.alignment).map(aligned);
     let fma = fused.then(fma);
     let accumulate = match (scalar, fused) {
         (Scalar::F32, true) => quote!(*sum = fma(*weight, *x, *sum);),
@@ -60,6 +61,7 @@ fn real(scalar: Scalar, layers: &[LayerCode], fused: bool) -> TokenStream {
     };
     quote! {
         #fma
+        #aligned
         /// Sums of one block of outputs: from the bias, inputs in index order, every operation rounded.
         #[inline(always)]
         fn block<const INPUTS: usize, const ROWS: usize>(
@@ -79,6 +81,31 @@ fn real(scalar: Scalar, layers: &[LayerCode], fused: bool) -> TokenStream {
         fn network(observation: &[#kind; FEATURES]) -> [#kind; ACTIONS] {
             #body
         }
+    }
+}
+
+fn aligned(bytes: u32) -> TokenStream {
+    let bytes = size(bytes as usize);
+    quote! {
+        /// So that no vector of weights lies across two lines of the cache.
+        #[repr(align(#bytes))]
+        struct Aligned<T>(T);
+    }
+}
+
+/// Table of weights of a layer.
+pub(super) fn table(layer: &LayerCode, name: &Ident, kind: &TokenStream, value: &TokenStream) -> TokenStream {
+    match layer.alignment {
+        Some(_) => quote! { static #name: Aligned<#kind> = Aligned(#value); },
+        None => quote! { static #name: #kind = #value; },
+    }
+}
+
+/// What [`table`] holds.
+pub(super) fn held(layer: &LayerCode, name: &Ident) -> TokenStream {
+    match layer.alignment {
+        Some(_) => quote!(#name.0),
+        None => quote!(#name),
     }
 }
 
@@ -114,8 +141,13 @@ pub(super) fn layer_items(scalar: Scalar, index: usize, layer: &LayerCode) -> (T
     let (rows_size, full_size) = (size(rows), size(full));
     let activated = activation(scalar, layer.activation);
     let (tail_tables, tail_loop) = tail(scalar, index, layer);
+    let type_of_weights = quote!([[[f32; #rows_size]; #inputs]; #full_size]);
+    let (held, table) = (
+        held(layer, &weights),
+        table(layer, &weights, &type_of_weights, &quote!([#(#blocks),*])),
+    );
     let tables = quote! {
-        static #weights: [[[f32; #rows_size]; #inputs]; #full_size] = [#(#blocks),*];
+        #table
         static #bias: [[#kind; #rows_size]; #full_size] = [#(#biases),*];
         #tail_tables
     };
@@ -125,7 +157,7 @@ pub(super) fn layer_items(scalar: Scalar, index: usize, layer: &LayerCode) -> (T
         fn #name(x: &[#kind; #inputs]) -> [#kind; #outputs] {
             let mut y = [0.0; #outputs];
             let mut rest: &mut [#kind] = &mut y;
-            for (weights, bias) in #weights.iter().zip(&#bias) {
+            for (weights, bias) in #held.iter().zip(&#bias) {
                 // no division and no slice index, so no way to a panic at any optimisation level
                 if let Some((out, after)) = core::mem::take(&mut rest).split_first_chunk_mut::<#rows_size>() {
                     for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
@@ -153,16 +185,18 @@ fn tail(scalar: Scalar, index: usize, layer: &LayerCode) -> (TokenStream, TokenS
         ident(&format!("TAIL_WEIGHTS{index}")),
         ident(&format!("TAIL_BIAS{index}")),
     );
-    let table = columns(&layer.table[split * layer.inputs..], rows);
+    let values = columns(&layer.table[split * layer.inputs..], rows);
     let biases = sums(scalar, &layer.bias[split..]);
     let (inputs, rows) = (size(layer.inputs), size(rows));
     let activated = activation(scalar, layer.activation);
+    let table = table(layer, &weights, &quote!([[f32; #rows]; #inputs]), &values);
+    let held = held(layer, &weights);
     let tables = quote! {
-        static #weights: [[f32; #rows]; #inputs] = #table;
+        #table
         static #bias: [#kind; #rows] = #biases;
     };
     let code = quote! {
-        for (y, sum) in rest.iter_mut().zip(block(&#weights, &#bias, x)) {
+        for (y, sum) in rest.iter_mut().zip(block(&#held, &#bias, x)) {
             *y = #activated;
         }
     };
@@ -243,7 +277,7 @@ pub fn integrity(program: &Program) -> TokenStream {
                 .enumerate()
                 .map(|(index, layer)| match layer.is_streamed() {
                     true => streamed::integrity(*scalar, index, layer),
-                    false => layer_integrity(*scalar, index, layer.tail_rows() > 0),
+                    false => layer_integrity(*scalar, index, layer),
                 });
             quote!(#(#layers)*)
         }
@@ -253,18 +287,19 @@ pub fn integrity(program: &Program) -> TokenStream {
     quote! { #network crc = #checksum(crc, core::hint::black_box(&DUTIES)); }
 }
 
-fn layer_integrity(scalar: Scalar, index: usize, has_tail: bool) -> TokenStream {
+fn layer_integrity(scalar: Scalar, index: usize, layer: &LayerCode) -> TokenStream {
     let checksum = checksum(scalar);
     let (weights, bias) = (ident(&format!("WEIGHTS{index}")), ident(&format!("BIAS{index}")));
     let (tail_weights, tail_bias) = (
         ident(&format!("TAIL_WEIGHTS{index}")),
         ident(&format!("TAIL_BIAS{index}")),
     );
+    let [weights, tail_weights] = [weights, tail_weights].map(|name| held(layer, &name));
     let full_weights = quote! {
         for column in core::hint::black_box(&#weights).iter().flatten() { crc = crc_floats(crc, column); }
     };
     let full_bias = quote! { for row in core::hint::black_box(&#bias) { crc = #checksum(crc, row); } };
-    if !has_tail {
+    if layer.tail_rows() == 0 {
         return quote! { #full_weights #full_bias };
     }
     quote! {

@@ -112,6 +112,20 @@ impl<'p> Printer<'p> {
             }
             Op::Within { x, low, high } => call("within", &[v(x), v(low), v(high)]),
             Op::Outside { x, low, high } => call("outside", &[v(x), v(low), v(high)]),
+            Op::Difference(x, y) => {
+                let (x, y) = (v(x), v(y));
+                match self.program.scalar() {
+                    Scalar::F32 => quote!(#x.to_bits() ^ #y.to_bits()),
+                    // folded to a word
+                    Scalar::F64 => {
+                        quote!((#x.to_bits() ^ #y.to_bits()) as u32 | ((#x.to_bits() ^ #y.to_bits()) >> 32) as u32)
+                    }
+                }
+            }
+            Op::NotZero(x) => {
+                let x = v(x);
+                quote!(flag(#x != 0))
+            }
             Op::Above(x, limit) => {
                 let (x, limit) = (v(x), v(limit));
                 quote!(flag(#x > #limit))

@@ -4,7 +4,7 @@ use policy::Scalar;
 use proc_macro2::{Ident, TokenStream};
 use quote::quote;
 
-use super::network::{activation, checksum, columns, layer_items, sums};
+use super::network::{activation, checksum, columns, held, layer_items, sums, table};
 use super::{ident, number, size};
 use crate::program::LayerCode;
 
@@ -47,7 +47,7 @@ fn names(index: usize) -> [Ident; 4] {
 
 /// Tables, and the function that adds a chunk of inputs to the sums.
 fn last_layer(scalar: Scalar, index: usize, layer: &LayerCode) -> TokenStream {
-    let kind = number::kind(scalar);
+    let number = number::kind(scalar);
     let [weights, tail_weights, last_weights, last_tail_weights] = names(index);
     let (rows, full, tail) = (layer.block_rows, layer.full_blocks(), layer.tail_rows());
     let (rest, count) = (layer.inputs % layer.chunk, layer.inputs / layer.chunk);
@@ -66,18 +66,23 @@ fn last_layer(scalar: Scalar, index: usize, layer: &LayerCode) -> TokenStream {
     let biases = sums(scalar, &layer.bias);
     let outputs = size(layer.outputs);
     let [rows, full, tail_rows, chunk, count, rest_size] = [rows, full, tail, layer.chunk, count, rest].map(size);
+    let kind = quote!([[[[f32; #rows]; #chunk]; #full]; #count]);
+    let of_blocks = table(layer, &weights, &kind, &quote!([#(#blocks),*]));
     let mut tables = vec![quote! {
-        static #weights: [[[[f32; #rows]; #chunk]; #full]; #count] = [#(#blocks),*];
-        static #bias: [#kind; #outputs] = #biases;
+        #of_blocks
+        static #bias: [#number; #outputs] = #biases;
     }];
     if tail > 0 {
-        tables.push(quote! { static #tail_weights: [[[f32; #tail_rows]; #chunk]; #count] = [#(#tails),*]; });
+        let kind = quote!([[[f32; #tail_rows]; #chunk]; #count]);
+        tables.push(table(layer, &tail_weights, &kind, &quote!([#(#tails),*])));
     }
     if rest > 0 {
         let (blocks, last) = split(shorter, rest);
-        tables.push(quote! { static #last_weights: [[[f32; #rows]; #rest_size]; #full] = #blocks; });
+        let kind = quote!([[[f32; #rows]; #rest_size]; #full]);
+        tables.push(table(layer, &last_weights, &kind, &blocks));
         if tail > 0 {
-            tables.push(quote! { static #last_tail_weights: [[f32; #tail_rows]; #rest_size] = #last; });
+            let kind = quote!([[f32; #tail_rows]; #rest_size]);
+            tables.push(table(layer, &last_tail_weights, &kind, &last));
         }
     }
     let (parameter, tail_code) = if tail > 0 {
@@ -104,10 +109,10 @@ fn last_layer(scalar: Scalar, index: usize, layer: &LayerCode) -> TokenStream {
         fn #name<const INPUTS: usize>(
             weights: &[[[f32; #rows]; INPUTS]; #full],
             #parameter
-            x: &[#kind; INPUTS],
-            sums: &mut [#kind; #outputs],
+            x: &[#number; INPUTS],
+            sums: &mut [#number; #outputs],
         ) {
-            let mut rest: &mut [#kind] = sums;
+            let mut rest: &mut [#number] = sums;
             for weights in weights {
                 if let Some((out, after)) = core::mem::take(&mut rest).split_first_chunk_mut::<#rows>() {
                     *out = block(weights, out, x);
@@ -122,13 +127,14 @@ fn last_layer(scalar: Scalar, index: usize, layer: &LayerCode) -> TokenStream {
 /// Body of `network` from the outputs `value` of the layers before.
 fn chunks(scalar: Scalar, index: usize, layer: &LayerCode, last: &LayerCode, value: &TokenStream) -> TokenStream {
     let next = index + 1;
-    let [weights, tail_weights, last_weights, last_tail_weights] = names(next);
+    let [weights, tail_weights, last_weights, last_tail_weights] = names(next).map(|name| held(last, &name));
     let (before, bias) = (ident(&format!("WEIGHTS{index}")), ident(&format!("BIAS{index}")));
     let (before_tail, bias_tail) = (
         ident(&format!("TAIL_WEIGHTS{index}")),
         ident(&format!("TAIL_BIAS{index}")),
     );
     let (name, sums) = (ident(&format!("layer{next}")), ident(&format!("BIAS{next}")));
+    let [before, before_tail] = [before, before_tail].map(|name| held(layer, &name));
     let activated = activation(scalar, layer.activation);
     let has_tail = last.tail_rows() > 0;
     let (iterator, pattern, argument, last_argument) = if has_tail {
@@ -166,7 +172,7 @@ fn chunks(scalar: Scalar, index: usize, layer: &LayerCode, last: &LayerCode, val
 /// Statements of the integrity check, in the order of the table.
 pub fn integrity(scalar: Scalar, index: usize, layer: &LayerCode) -> TokenStream {
     let checksum = checksum(scalar);
-    let [weights, tail_weights, last_weights, last_tail_weights] = names(index);
+    let [weights, tail_weights, last_weights, last_tail_weights] = names(index).map(|name| held(layer, &name));
     let bias = ident(&format!("BIAS{index}"));
     let has_tail = layer.tail_rows() > 0;
     let full = if has_tail {

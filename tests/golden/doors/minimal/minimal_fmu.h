@@ -25,7 +25,7 @@
  *   6 status (output): status bits; 65536 is added while the coefficients are refused
  */
 #define MINIMAL_FMU_VARIABLES 6u
-#define MINIMAL_FMU_TOKEN "{e9be45ae-df18-8375-f3ff-c83b6977407b}"
+#define MINIMAL_FMU_TOKEN "{529d0476-3438-d12b-8b92-51819274fdc5}"
 #define MINIMAL_FMU_PERIOD 0.0001
 
 /* Types of variables. */

@@ -47,7 +47,26 @@
 #define ACTIVATIONS_CODE
 #endif
 
-ACTIVATIONS_TABLE static const float activations_weights0[15] = {
+/*
+ * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
+ * fast; helpers that this build may not need.
+ */
+#if defined(__GNUC__)
+#define ACTIVATIONS_APART __attribute__((noinline))
+#define ACTIVATIONS_COLD __attribute__((cold))
+#define ACTIVATIONS_SPARE __attribute__((unused))
+#else
+#define ACTIVATIONS_APART
+#define ACTIVATIONS_COLD
+#define ACTIVATIONS_SPARE
+#endif
+#if defined(__GNUC__)
+#define ACTIVATIONS_ALIGNED __attribute__((aligned(64)))
+#else
+#define ACTIVATIONS_ALIGNED
+#endif
+
+ACTIVATIONS_TABLE ACTIVATIONS_ALIGNED static const float activations_weights0[15] = {
     -0.66952366f, -0.7398165f, -0.6319459f, 0.67295265f, -0.034356087f, 0.34691855f, -0.4911419f, 0.67328006f,
     0.34370148f, -0.2840553f, 0.19567789f, 0.23594397f, -0.015480282f, 0.36699778f, 0.37652034f,
 };
@@ -56,7 +75,7 @@ ACTIVATIONS_TABLE static const float activations_bias0[5] = {
     0.5176931f, -0.33592403f, -0.68605596f, -0.5663371f, 0.15240872f,
 };
 
-ACTIVATIONS_TABLE static const float activations_weights1[20] = {
+ACTIVATIONS_TABLE ACTIVATIONS_ALIGNED static const float activations_weights1[20] = {
     0.42855382f, 0.5234264f, 0.2618374f, -0.38638666f, 0.58455324f, -0.38130954f, 0.30133802f, -0.035650283f,
     0.22760227f, -0.50857f, -0.41723394f, 0.22755377f, -0.41442758f, 0.18946423f, 0.53505427f, -0.16319028f,
     0.1642641f, 0.49899754f, -0.096169695f, -0.17483032f,
@@ -66,7 +85,7 @@ ACTIVATIONS_TABLE static const float activations_bias1[4] = {
     -0.45988896f, 0.010735092f, 0.2773859f, 0.4780439f,
 };
 
-ACTIVATIONS_TABLE static const float activations_weights2[16] = {
+ACTIVATIONS_TABLE ACTIVATIONS_ALIGNED static const float activations_weights2[16] = {
     -0.27396908f, 0.06737489f, 0.051376466f, -0.52944064f, 0.10959469f, -0.5173111f, 0.06072989f, 0.25279346f,
     0.5918048f, 0.2764698f, -0.12671135f, 0.14612873f, -0.72398895f, 0.29526362f, -0.108687595f, -0.19487545f,
 };
@@ -75,7 +94,7 @@ ACTIVATIONS_TABLE static const float activations_bias2[4] = {
     -0.23947059f, -0.4564435f, 0.574685f, -0.12704511f,
 };
 
-ACTIVATIONS_TABLE static const float activations_weights3[24] = {
+ACTIVATIONS_TABLE ACTIVATIONS_ALIGNED static const float activations_weights3[24] = {
     0.013508355f, 0.33501947f, 0.0902141f, 0.025489926f, 0.45241624f, 0.32662106f, -0.1865374f, -0.08763165f,
     -0.0641898f, -0.42394468f, -0.26295507f, 0.58041805f, 0.024629207f, -0.29540873f, -0.25176185f,
     -0.15361814f, -0.26693493f, -0.73974955f, 0.5669602f, -0.66072786f, -0.63333917f, 0.42041382f, -0.41981456f,
@@ -86,7 +105,7 @@ ACTIVATIONS_TABLE static const float activations_bias3[6] = {
     -0.15602386f, -0.45747477f, 0.6958889f, 0.7013742f, -0.17114484f, 0.35093158f,
 };
 
-ACTIVATIONS_TABLE static const float activations_weights4[18] = {
+ACTIVATIONS_TABLE ACTIVATIONS_ALIGNED static const float activations_weights4[18] = {
     -0.5757741f, 0.19295122f, -0.20319027f, 0.53849894f, -0.51970714f, 0.2549364f, 0.45058882f, 0.43425247f,
     0.59359163f, -0.14257342f, -0.22855392f, -0.31710756f, 0.4763667f, 0.097509444f, -0.06392977f, -0.09927162f,
     -0.5195287f, -0.08348909f,
@@ -126,7 +145,7 @@ static uint32_t activations_bits(float x)
     return bits;
 }
 
-static float activations_from_bits(uint32_t bits)
+ACTIVATIONS_SPARE static float activations_from_bits(uint32_t bits)
 {
     float x;
     (void)__builtin_memcpy(&x, &bits, sizeof(x));
@@ -145,7 +164,7 @@ static uint32_t activations_bits(float x)
     return word.bits;
 }
 
-static float activations_from_bits(uint32_t bits)
+ACTIVATIONS_SPARE static float activations_from_bits(uint32_t bits)
 {
     activations_word word;
     word.bits = bits;
@@ -163,27 +182,48 @@ static uint32_t activations_flag(int condition)
     return flag;
 }
 
+#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__)
+/* conditional moves: each is executed, or skipped, in the same time */
+#define ACTIVATIONS_MOVES 1
+#endif
+
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float activations_select(uint32_t flag, float then, float otherwise)
 {
+#if defined(ACTIVATIONS_MOVES)
+    float chosen = otherwise;
+    __asm__("cmp %1, #0\n\tit ne\n\tvmovne.f32 %0, %2" : "+t"(chosen) : "r"(flag), "t"(then) : "cc");
+    return chosen;
+#else
     const uint32_t mask = (uint32_t)0 - flag;
     return activations_from_bits((activations_bits(then) & mask) | (activations_bits(otherwise) & ~mask));
+#endif
 }
 
-static uint32_t activations_within(float x, float low, float high)
+ACTIVATIONS_CODE ACTIVATIONS_APART static uint32_t activations_within(float x, float low, float high)
 {
+#if defined(ACTIVATIONS_MOVES)
+    uint32_t flag;
+    __asm__("vcmp.f32 %2, %1\n\tvmrs APSR_nzcv, fpscr\n\titt ge\n\tvcmpge.f32 %1, %3\n\tvmrsge APSR_nzcv, fpscr\n\t"
+            "ite ge\n\tmovge %0, #1\n\tmovlt %0, #0" : "=r"(flag) : "t"(x), "t"(high), "t"(low) : "cc");
+    return flag;
+#else
     return activations_flag(x >= low) & activations_flag(x <= high);
+#endif
 }
 
-static uint32_t activations_outside(float x, float low, float high)
+ACTIVATIONS_CODE ACTIVATIONS_APART static float activations_clamp(float x, float low, float high)
 {
-    return activations_flag(x < low) | activations_flag(x > high);
-}
-
-static float activations_clamp(float x, float low, float high)
-{
+#if defined(ACTIVATIONS_MOVES)
+    float clamped = x;
+    __asm__("vcmp.f32 %0, %1\n\tvmrs APSR_nzcv, fpscr\n\tit mi\n\tvmovmi.f32 %0, %1\n\t"
+            "vcmp.f32 %0, %2\n\tvmrs APSR_nzcv, fpscr\n\tit gt\n\tvmovgt.f32 %0, %2"
+            : "+&t"(clamped) : "t"(low), "t"(high) : "cc");
+    return clamped;
+#else
     const float raised = activations_select(activations_flag(x < low), low, x);
     return activations_select(activations_flag(raised > high), high, raised);
+#endif
 }
 
 /* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
@@ -240,7 +280,7 @@ typedef struct {
 } activations_front;
 
 /* Sanitise, filters, observation. */
-ACTIVATIONS_CODE static void activations_sense(const activations_state *state, const activations_measurement *measured, activations_front *front)
+ACTIVATIONS_CODE ACTIVATIONS_APART static void activations_sense(const activations_state *state, const activations_measurement *measured, activations_front *front)
 {
     const uint32_t f0 = activations_within(measured->v_out, 0.0f, 24.0f);
     const float v1 = activations_select(f0, measured->v_out, state->held[0]);
@@ -602,37 +642,44 @@ ACTIVATIONS_CODE void activations_q_values(const float *observation, float *q)
     activations_layer3(hidden2, hidden3);
     activations_layer4(hidden3, q);
 }
-/* Network, argmax, mapping, limits, status. */
-ACTIVATIONS_CODE static void activations_decide(const activations_state *state, const activations_front *front, activations_command *command)
+/* Network and argmax: the greedy action. */
+ACTIVATIONS_CODE ACTIVATIONS_APART static uint32_t activations_choose(const activations_state *state, const activations_measurement *measured)
 {
-    float q[ACTIVATIONS_ACTIONS];
+    float observation[3];
+    float q[3];
     float best = -3.40282347e+38f;
-    float chosen = activations_duties[0];
     uint32_t index = 0u;
     uint32_t action;
 
-    activations_q_values(front->observation, q);
+    activations_observe(state, measured, observation);
+    activations_q_values(observation, q);
     /* the lowest index wins among equals, a NaN never does */
     for (action = 0u; action < ACTIVATIONS_ACTIONS; ++action) {
-        const uint32_t above = activations_flag(q[action] > best);
+        const float output = q[action];
+        const uint32_t above = activations_flag(output > best);
         const uint32_t mask = (uint32_t)0 - above;
-        best = activations_select(above, q[action], best);
-        chosen = activations_select(above, activations_duties[action], chosen);
+        best = activations_select(above, output, best);
         index = (action & mask) | (index & ~mask);
     }
-    {
-        const uint32_t f0 = activations_outside(chosen, 0.0f, 1.0f);
-        const float v1 = activations_clamp(chosen, 0.0f, 1.0f);
-        const uint32_t usable = front->usable;
-        const uint32_t status = (front->held << 0)
-                              | (front->primed_now << 2)
-                              | (f0 << 7);
+    return index;
+}
 
-        command->duty = activations_select(usable, v1, 0.0f);
-        command->duty_sim = activations_select(usable, chosen, 0.0f);
-        command->action_index = index;
-        command->status = (status & ((uint32_t)0 - usable)) | (ACTIVATIONS_STATUS_FALLBACK & (usable - (uint32_t)1));
-    }
+/* Mapping, limits, status. */
+ACTIVATIONS_CODE static void activations_decide(const activations_state *state, const activations_front *front, uint32_t index, activations_command *command)
+{
+    const float chosen = activations_duties[index];
+    const float v0 = activations_clamp(chosen, 0.0f, 1.0f);
+    const uint32_t f1 = activations_bits(chosen) ^ activations_bits(v0);
+    const uint32_t f2 = activations_flag(f1 != 0u);
+    const uint32_t usable = front->usable;
+    const uint32_t status = (front->held << 0)
+                          | (front->primed_now << 2)
+                          | (f2 << 7);
+
+    command->duty = activations_select(usable, v0, 0.0f);
+    command->duty_sim = activations_select(usable, chosen, 0.0f);
+    command->action_index = index;
+    command->status = (status & ((uint32_t)0 - usable)) | (ACTIVATIONS_STATUS_FALLBACK & (usable - (uint32_t)1));
     (void)state;
 }
 
@@ -649,11 +696,29 @@ ACTIVATIONS_CODE ACTIVATIONS_NO_LIBC static void activations_advance(activations
     state->primed = front->usable;
 }
 
-ACTIVATIONS_CODE void activations_eval(const activations_state *state, const activations_measurement *measured, activations_command *command)
+/*
+ * A measurement is sensed again after the network, in a function of its own: what the network does not need is not on the
+ * stack while it runs.
+ */
+ACTIVATIONS_CODE ACTIVATIONS_APART static void activations_answer(const activations_state *state, const activations_measurement *measured, uint32_t index, activations_command *command)
 {
     activations_front front;
     activations_sense(state, measured, &front);
-    activations_decide(state, &front, command);
+    activations_decide(state, &front, index, command);
+}
+
+ACTIVATIONS_CODE ACTIVATIONS_APART static void activations_settle(activations_state *state, const activations_measurement *measured, uint32_t index, activations_command *command)
+{
+    activations_front front;
+    activations_sense(state, measured, &front);
+    activations_decide(state, &front, index, command);
+    activations_advance(state, &front, command);
+}
+
+ACTIVATIONS_CODE void activations_eval(const activations_state *state, const activations_measurement *measured, activations_command *command)
+{
+    const uint32_t index = activations_choose(state, measured);
+    activations_answer(state, measured, index, command);
 }
 
 ACTIVATIONS_CODE void activations_commit(activations_state *state, const activations_measurement *measured, const activations_command *command)
@@ -665,13 +730,11 @@ ACTIVATIONS_CODE void activations_commit(activations_state *state, const activat
 
 ACTIVATIONS_CODE void activations_step(activations_state *state, const activations_measurement *measured, activations_command *command)
 {
-    activations_front front;
-    activations_sense(state, measured, &front);
-    activations_decide(state, &front, command);
-    activations_advance(state, &front, command);
+    const uint32_t index = activations_choose(state, measured);
+    activations_settle(state, measured, index, command);
 }
 
-ACTIVATIONS_CODE ACTIVATIONS_NO_LIBC void activations_observe(const activations_state *state, const activations_measurement *measured, float *observation)
+ACTIVATIONS_CODE ACTIVATIONS_APART ACTIVATIONS_NO_LIBC void activations_observe(const activations_state *state, const activations_measurement *measured, float *observation)
 {
     activations_front front;
     uint32_t i;
@@ -681,7 +744,7 @@ ACTIVATIONS_CODE ACTIVATIONS_NO_LIBC void activations_observe(const activations_
     }
 }
 
-ACTIVATIONS_NO_LIBC void activations_reset(activations_state *state)
+ACTIVATIONS_COLD ACTIVATIONS_NO_LIBC void activations_reset(activations_state *state)
 {
     state->held[0] = 0.0f;
     state->previous_duty = 0.0f;
@@ -690,7 +753,7 @@ ACTIVATIONS_NO_LIBC void activations_reset(activations_state *state)
     state->primed = 0u;
 }
 
-void activations_init(activations_state *state)
+ACTIVATIONS_COLD void activations_init(activations_state *state)
 {
     activations_reset(state);
 }
@@ -699,21 +762,27 @@ void activations_init(activations_state *state)
  * CRC-32 (IEEE 802.3) of words taken little-endian, whatever the byte order of the machine.
  * volatile: the memory is read, the compiler does not answer in its place.
  */
-static uint32_t activations_crc(uint32_t start, const volatile float *words, uint32_t length)
+ACTIVATIONS_COLD ACTIVATIONS_APART static uint32_t activations_crc_word(uint32_t start, uint32_t word)
 {
-    uint32_t crc = start;
-    uint32_t i;
+    uint32_t crc = start ^ word;
     uint32_t nibble;
-    for (i = 0u; i < length; ++i) {
-        crc ^= activations_bits(words[i]);
-        for (nibble = 0u; nibble < 8u; ++nibble) {
-            crc = (crc >> 4) ^ activations_crc_steps[crc & 15u];
-        }
+    for (nibble = 0u; nibble < 8u; ++nibble) {
+        crc = (crc >> 4) ^ activations_crc_steps[crc & 15u];
     }
     return crc;
 }
 
-uint32_t activations_integrity(void)
+ACTIVATIONS_COLD ACTIVATIONS_APART static uint32_t activations_crc(uint32_t start, const volatile float *words, uint32_t length)
+{
+    uint32_t crc = start;
+    uint32_t i;
+    for (i = 0u; i < length; ++i) {
+        crc = activations_crc_word(crc, activations_bits(words[i]));
+    }
+    return crc;
+}
+
+ACTIVATIONS_COLD uint32_t activations_integrity(void)
 {
     uint32_t crc = 0xFFFFFFFFu;
     crc = activations_crc(crc, activations_weights0, 15u);
@@ -730,7 +799,7 @@ uint32_t activations_integrity(void)
     return activations_flag((crc ^ 0xFFFFFFFFu) == 0x74B6B656u);
 }
 
-uint32_t activations_self_test(void)
+ACTIVATIONS_COLD uint32_t activations_self_test(void)
 {
     float observation[ACTIVATIONS_FEATURES];
     float q[ACTIVATIONS_ACTIONS];

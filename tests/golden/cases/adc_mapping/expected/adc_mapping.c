@@ -47,7 +47,26 @@
 #define ADC_MAPPING_CODE
 #endif
 
-ADC_MAPPING_TABLE static const float adc_mapping_weights0[15] = {
+/*
+ * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
+ * fast; helpers that this build may not need.
+ */
+#if defined(__GNUC__)
+#define ADC_MAPPING_APART __attribute__((noinline))
+#define ADC_MAPPING_COLD __attribute__((cold))
+#define ADC_MAPPING_SPARE __attribute__((unused))
+#else
+#define ADC_MAPPING_APART
+#define ADC_MAPPING_COLD
+#define ADC_MAPPING_SPARE
+#endif
+#if defined(__GNUC__)
+#define ADC_MAPPING_ALIGNED __attribute__((aligned(64)))
+#else
+#define ADC_MAPPING_ALIGNED
+#endif
+
+ADC_MAPPING_TABLE ADC_MAPPING_ALIGNED static const float adc_mapping_weights0[15] = {
     -0.1961235f, -0.6939645f, 0.8410207f, 0.17916429f, 0.6482211f, 0.43700856f, -0.54046893f, 0.019228343f,
     -0.08577966f, -0.081913486f, -0.46296132f, -0.2067914f, -0.12739001f, -0.62925005f, 0.7875268f,
 };
@@ -56,7 +75,7 @@ ADC_MAPPING_TABLE static const float adc_mapping_bias0[5] = {
     0.76032734f, 0.5734856f, -0.067461744f, -0.593548f, -0.07754058f,
 };
 
-ADC_MAPPING_TABLE static const float adc_mapping_weights1[20] = {
+ADC_MAPPING_TABLE ADC_MAPPING_ALIGNED static const float adc_mapping_weights1[20] = {
     -0.51671344f, 0.28526354f, -0.3059797f, 0.28003576f, 0.65400296f, 0.58544844f, -0.40991333f, -0.17074497f,
     -0.4292169f, -0.50707585f, 0.64055115f, -0.06991531f, 0.5039906f, -0.055592805f, -0.14603908f, -0.50607836f,
     -0.46147773f, 0.4618804f, 0.6315803f, -0.6685655f,
@@ -66,7 +85,7 @@ ADC_MAPPING_TABLE static const float adc_mapping_bias1[4] = {
     0.03895329f, 0.17294572f, -0.045696143f, -0.29018784f,
 };
 
-ADC_MAPPING_TABLE static const float adc_mapping_weights2[12] = {
+ADC_MAPPING_TABLE ADC_MAPPING_ALIGNED static const float adc_mapping_weights2[12] = {
     0.22726555f, -0.53449565f, -0.17750779f, 0.39302084f, -0.1294609f, 0.40427762f, -0.42653167f, -0.04249952f,
     0.6194601f, 0.71884036f, -0.6573097f, -0.11717094f,
 };
@@ -105,7 +124,7 @@ static uint32_t adc_mapping_bits(float x)
     return bits;
 }
 
-static float adc_mapping_from_bits(uint32_t bits)
+ADC_MAPPING_SPARE static float adc_mapping_from_bits(uint32_t bits)
 {
     float x;
     (void)__builtin_memcpy(&x, &bits, sizeof(x));
@@ -124,7 +143,7 @@ static uint32_t adc_mapping_bits(float x)
     return word.bits;
 }
 
-static float adc_mapping_from_bits(uint32_t bits)
+ADC_MAPPING_SPARE static float adc_mapping_from_bits(uint32_t bits)
 {
     adc_mapping_word word;
     word.bits = bits;
@@ -142,27 +161,60 @@ static uint32_t adc_mapping_flag(int condition)
     return flag;
 }
 
+#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__)
+/* conditional moves: each is executed, or skipped, in the same time */
+#define ADC_MAPPING_MOVES 1
+#endif
+
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float adc_mapping_select(uint32_t flag, float then, float otherwise)
 {
+#if defined(ADC_MAPPING_MOVES)
+    float chosen = otherwise;
+    __asm__("cmp %1, #0\n\tit ne\n\tvmovne.f32 %0, %2" : "+t"(chosen) : "r"(flag), "t"(then) : "cc");
+    return chosen;
+#else
     const uint32_t mask = (uint32_t)0 - flag;
     return adc_mapping_from_bits((adc_mapping_bits(then) & mask) | (adc_mapping_bits(otherwise) & ~mask));
+#endif
 }
 
-static uint32_t adc_mapping_within(float x, float low, float high)
+ADC_MAPPING_CODE ADC_MAPPING_APART static uint32_t adc_mapping_within(float x, float low, float high)
 {
+#if defined(ADC_MAPPING_MOVES)
+    uint32_t flag;
+    __asm__("vcmp.f32 %2, %1\n\tvmrs APSR_nzcv, fpscr\n\titt ge\n\tvcmpge.f32 %1, %3\n\tvmrsge APSR_nzcv, fpscr\n\t"
+            "ite ge\n\tmovge %0, #1\n\tmovlt %0, #0" : "=r"(flag) : "t"(x), "t"(high), "t"(low) : "cc");
+    return flag;
+#else
     return adc_mapping_flag(x >= low) & adc_mapping_flag(x <= high);
+#endif
 }
 
-static uint32_t adc_mapping_outside(float x, float low, float high)
+ADC_MAPPING_CODE ADC_MAPPING_APART static uint32_t adc_mapping_outside(float x, float low, float high)
 {
+#if defined(ADC_MAPPING_MOVES)
+    uint32_t flag;
+    __asm__("vcmp.f32 %1, %3\n\tvmrs APSR_nzcv, fpscr\n\titt pl\n\tvcmppl.f32 %2, %1\n\tvmrspl APSR_nzcv, fpscr\n\t"
+            "ite mi\n\tmovmi %0, #1\n\tmovpl %0, #0" : "=r"(flag) : "t"(x), "t"(high), "t"(low) : "cc");
+    return flag;
+#else
     return adc_mapping_flag(x < low) | adc_mapping_flag(x > high);
+#endif
 }
 
-static float adc_mapping_clamp(float x, float low, float high)
+ADC_MAPPING_CODE ADC_MAPPING_APART static float adc_mapping_clamp(float x, float low, float high)
 {
+#if defined(ADC_MAPPING_MOVES)
+    float clamped = x;
+    __asm__("vcmp.f32 %0, %1\n\tvmrs APSR_nzcv, fpscr\n\tit mi\n\tvmovmi.f32 %0, %1\n\t"
+            "vcmp.f32 %0, %2\n\tvmrs APSR_nzcv, fpscr\n\tit gt\n\tvmovgt.f32 %0, %2"
+            : "+&t"(clamped) : "t"(low), "t"(high) : "cc");
+    return clamped;
+#else
     const float raised = adc_mapping_select(adc_mapping_flag(x < low), low, x);
     return adc_mapping_select(adc_mapping_flag(raised > high), high, raised);
+#endif
 }
 
 /* x limited to the magnitude with these bits, in integers so that loops over it can be vectorised */
@@ -204,7 +256,7 @@ typedef struct {
 } adc_mapping_front;
 
 /* Sanitise, filters, observation. */
-ADC_MAPPING_CODE static void adc_mapping_sense(const adc_mapping_state *state, const adc_mapping_measurement *measured, adc_mapping_front *front)
+ADC_MAPPING_CODE ADC_MAPPING_APART static void adc_mapping_sense(const adc_mapping_state *state, const adc_mapping_measurement *measured, adc_mapping_front *front)
 {
     const float v0 = 0.0048828125f * (float)measured->v_out;
     const float v1 = v0 + 0.0f;
@@ -217,8 +269,8 @@ ADC_MAPPING_CODE static void adc_mapping_sense(const adc_mapping_state *state, c
     const uint32_t f8 = f2 & f6;
     const float v9 = 12.0f - v3;
     const float v10 = v9 * 0.5f;
-    const uint32_t f11 = adc_mapping_outside(v10, -4.0f, 4.0f);
-    const float v12 = adc_mapping_clamp(v10, -4.0f, 4.0f);
+    const float v11 = adc_mapping_clamp(v10, -4.0f, 4.0f);
+    const uint32_t f12 = adc_mapping_bits(v10) ^ adc_mapping_bits(v11);
     const float v13 = v7 * 2.0f;
     const float v14 = v3 * 0.083333336f;
     const float v15 = v13 + v14;
@@ -226,6 +278,7 @@ ADC_MAPPING_CODE static void adc_mapping_sense(const adc_mapping_state *state, c
     const float v17 = v16 * 0.25f;
     const float v18 = v17 * 0.1f;
     const float v19 = state->previous_command - 0.5f;
+    const uint32_t f20 = adc_mapping_flag(f12 != 0u);
     const uint32_t counted = state->bad_count + adc_mapping_flag(state->bad_count <= 4u);
     const uint32_t bad_count = counted & (f8 - (uint32_t)1);
     const uint32_t bridged = state->primed & adc_mapping_flag(bad_count <= 4u);
@@ -233,14 +286,14 @@ ADC_MAPPING_CODE static void adc_mapping_sense(const adc_mapping_state *state, c
 
     front->signal[0] = v3;
     front->signal[1] = v7;
-    front->observation[0] = v12;
+    front->observation[0] = v11;
     front->observation[1] = v18;
     front->observation[2] = v19;
     front->bad_count = bad_count;
     front->usable = usable;
     front->held = usable & (f8 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
-    front->clipped = f11;
+    front->clipped = f20;
 }
 
 /* Sums side by side in vectors, each one in the order written; the width is that of the machine the compiler is told of. */
@@ -453,57 +506,65 @@ ADC_MAPPING_CODE void adc_mapping_q_values(const float *observation, float *q)
     adc_mapping_layer1(hidden0, hidden1);
     adc_mapping_layer2(hidden1, q);
 }
-/* Network, argmax, mapping, limits, status. */
-ADC_MAPPING_CODE static void adc_mapping_decide(const adc_mapping_state *state, const adc_mapping_front *front, adc_mapping_command *command)
+/* Network and argmax: the greedy action. */
+ADC_MAPPING_CODE ADC_MAPPING_APART static uint32_t adc_mapping_choose(const adc_mapping_state *state, const adc_mapping_measurement *measured)
 {
-    float q[ADC_MAPPING_ACTIONS];
+    float observation[3];
+    float q[3];
     float best = -3.40282347e+38f;
-    float chosen = adc_mapping_duties[0];
     uint32_t index = 0u;
     uint32_t action;
 
-    adc_mapping_q_values(front->observation, q);
+    adc_mapping_observe(state, measured, observation);
+    adc_mapping_q_values(observation, q);
     /* the lowest index wins among equals, a NaN never does */
     for (action = 0u; action < ADC_MAPPING_ACTIONS; ++action) {
-        const uint32_t above = adc_mapping_flag(q[action] > best);
+        const float output = q[action];
+        const uint32_t above = adc_mapping_flag(output > best);
         const uint32_t mask = (uint32_t)0 - above;
-        best = adc_mapping_select(above, q[action], best);
-        chosen = adc_mapping_select(above, adc_mapping_duties[action], chosen);
+        best = adc_mapping_select(above, output, best);
         index = (action & mask) | (index & ~mask);
     }
-    {
-        const float v0 = state->mapping_a * chosen;
-        const float v1 = state->mapping_b * front->signal[1];
-        const float v2 = v0 + v1;
-        const float v3 = v2 + state->mapping_c;
-        const float v4 = state->mapping_r * front->signal[1];
-        const float v5 = v4 * chosen;
-        const float v6 = v3 + v5;
-        const uint32_t f7 = adc_mapping_outside(chosen, 0.2f, 0.8f);
-        const uint32_t f8 = adc_mapping_outside(front->signal[1], -1.0f, 14.0f);
-        const uint32_t f9 = f7 | f8;
-        const float v10 = state->previous_command - 0.02f;
-        const float v11 = state->previous_command + 0.02f;
-        const uint32_t f12 = adc_mapping_outside(v6, v10, v11);
-        const float v13 = adc_mapping_clamp(v6, v10, v11);
-        const uint32_t f14 = adc_mapping_flag(v13 > state->soft_cap);
-        const float v15 = adc_mapping_select(f14, state->soft_cap, v13);
-        const uint32_t f16 = adc_mapping_outside(v15, 0.05f, 0.9f);
-        const float v17 = adc_mapping_clamp(v15, 0.05f, 0.9f);
-        const uint32_t usable = front->usable;
-        const uint32_t status = (front->held << 0)
-                              | (front->primed_now << 2)
-                              | (front->clipped << 3)
-                              | (f9 << 4)
-                              | (f12 << 5)
-                              | (f14 << 6)
-                              | (f16 << 7);
+    return index;
+}
 
-        command->duty = adc_mapping_select(usable, v17, 0.0f);
-        command->duty_sim = adc_mapping_select(usable, chosen, 0.0f);
-        command->action_index = index;
-        command->status = (status & ((uint32_t)0 - usable)) | (ADC_MAPPING_STATUS_FALLBACK & (usable - (uint32_t)1));
-    }
+/* Mapping, limits, status. */
+ADC_MAPPING_CODE static void adc_mapping_decide(const adc_mapping_state *state, const adc_mapping_front *front, uint32_t index, adc_mapping_command *command)
+{
+    const float chosen = adc_mapping_duties[index];
+    const float v0 = state->mapping_a * chosen;
+    const float v1 = state->mapping_b * front->signal[1];
+    const float v2 = v0 + v1;
+    const float v3 = v2 + state->mapping_c;
+    const float v4 = state->mapping_r * front->signal[1];
+    const float v5 = v4 * chosen;
+    const float v6 = v3 + v5;
+    const uint32_t f7 = adc_mapping_outside(chosen, 0.2f, 0.8f);
+    const uint32_t f8 = adc_mapping_outside(front->signal[1], -1.0f, 14.0f);
+    const uint32_t f9 = f7 | f8;
+    const float v10 = state->previous_command - 0.02f;
+    const float v11 = state->previous_command + 0.02f;
+    const float v12 = adc_mapping_clamp(v6, v10, v11);
+    const uint32_t f13 = adc_mapping_bits(v6) ^ adc_mapping_bits(v12);
+    const uint32_t f14 = adc_mapping_flag(f13 != 0u);
+    const uint32_t f15 = adc_mapping_flag(v12 > state->soft_cap);
+    const float v16 = adc_mapping_select(f15, state->soft_cap, v12);
+    const float v17 = adc_mapping_clamp(v16, 0.05f, 0.9f);
+    const uint32_t f18 = adc_mapping_bits(v16) ^ adc_mapping_bits(v17);
+    const uint32_t f19 = adc_mapping_flag(f18 != 0u);
+    const uint32_t usable = front->usable;
+    const uint32_t status = (front->held << 0)
+                          | (front->primed_now << 2)
+                          | (front->clipped << 3)
+                          | (f9 << 4)
+                          | (f14 << 5)
+                          | (f15 << 6)
+                          | (f19 << 7);
+
+    command->duty = adc_mapping_select(usable, v17, 0.0f);
+    command->duty_sim = adc_mapping_select(usable, chosen, 0.0f);
+    command->action_index = index;
+    command->status = (status & ((uint32_t)0 - usable)) | (ADC_MAPPING_STATUS_FALLBACK & (usable - (uint32_t)1));
 }
 
 /* Filters, held samples and counters move on by one sample period. */
@@ -524,11 +585,29 @@ ADC_MAPPING_CODE ADC_MAPPING_NO_LIBC static void adc_mapping_advance(adc_mapping
     state->primed = front->usable;
 }
 
-ADC_MAPPING_CODE void adc_mapping_eval(const adc_mapping_state *state, const adc_mapping_measurement *measured, adc_mapping_command *command)
+/*
+ * A measurement is sensed again after the network, in a function of its own: what the network does not need is not on the
+ * stack while it runs.
+ */
+ADC_MAPPING_CODE ADC_MAPPING_APART static void adc_mapping_answer(const adc_mapping_state *state, const adc_mapping_measurement *measured, uint32_t index, adc_mapping_command *command)
 {
     adc_mapping_front front;
     adc_mapping_sense(state, measured, &front);
-    adc_mapping_decide(state, &front, command);
+    adc_mapping_decide(state, &front, index, command);
+}
+
+ADC_MAPPING_CODE ADC_MAPPING_APART static void adc_mapping_settle(adc_mapping_state *state, const adc_mapping_measurement *measured, uint32_t index, adc_mapping_command *command)
+{
+    adc_mapping_front front;
+    adc_mapping_sense(state, measured, &front);
+    adc_mapping_decide(state, &front, index, command);
+    adc_mapping_advance(state, &front, command);
+}
+
+ADC_MAPPING_CODE void adc_mapping_eval(const adc_mapping_state *state, const adc_mapping_measurement *measured, adc_mapping_command *command)
+{
+    const uint32_t index = adc_mapping_choose(state, measured);
+    adc_mapping_answer(state, measured, index, command);
 }
 
 ADC_MAPPING_CODE void adc_mapping_commit(adc_mapping_state *state, const adc_mapping_measurement *measured, const adc_mapping_command *command)
@@ -540,13 +619,11 @@ ADC_MAPPING_CODE void adc_mapping_commit(adc_mapping_state *state, const adc_map
 
 ADC_MAPPING_CODE void adc_mapping_step(adc_mapping_state *state, const adc_mapping_measurement *measured, adc_mapping_command *command)
 {
-    adc_mapping_front front;
-    adc_mapping_sense(state, measured, &front);
-    adc_mapping_decide(state, &front, command);
-    adc_mapping_advance(state, &front, command);
+    const uint32_t index = adc_mapping_choose(state, measured);
+    adc_mapping_settle(state, measured, index, command);
 }
 
-ADC_MAPPING_CODE ADC_MAPPING_NO_LIBC void adc_mapping_observe(const adc_mapping_state *state, const adc_mapping_measurement *measured, float *observation)
+ADC_MAPPING_CODE ADC_MAPPING_APART ADC_MAPPING_NO_LIBC void adc_mapping_observe(const adc_mapping_state *state, const adc_mapping_measurement *measured, float *observation)
 {
     adc_mapping_front front;
     uint32_t i;
@@ -556,7 +633,7 @@ ADC_MAPPING_CODE ADC_MAPPING_NO_LIBC void adc_mapping_observe(const adc_mapping_
     }
 }
 
-ADC_MAPPING_NO_LIBC void adc_mapping_reset(adc_mapping_state *state)
+ADC_MAPPING_COLD ADC_MAPPING_NO_LIBC void adc_mapping_reset(adc_mapping_state *state)
 {
     state->held[0] = 0.0f;
     state->held[1] = 0.0f;
@@ -567,7 +644,7 @@ ADC_MAPPING_NO_LIBC void adc_mapping_reset(adc_mapping_state *state)
     state->primed = 0u;
 }
 
-void adc_mapping_init(adc_mapping_state *state)
+ADC_MAPPING_COLD void adc_mapping_init(adc_mapping_state *state)
 {
     adc_mapping_reset(state);
     state->mapping_a = 1.02f;
@@ -576,7 +653,7 @@ void adc_mapping_init(adc_mapping_state *state)
     state->mapping_r = 0.0007f;
 }
 
-uint32_t adc_mapping_set_mapping(adc_mapping_state *state, float a, float b, float c, float r)
+ADC_MAPPING_COLD uint32_t adc_mapping_set_mapping(adc_mapping_state *state, float a, float b, float c, float r)
 {
     const uint32_t accepted = adc_mapping_within(a, 0.8f, 1.25f)
                             & adc_mapping_within(b, -0.02f, 0.02f)
@@ -598,21 +675,27 @@ uint32_t adc_mapping_set_mapping(adc_mapping_state *state, float a, float b, flo
  * CRC-32 (IEEE 802.3) of words taken little-endian, whatever the byte order of the machine.
  * volatile: the memory is read, the compiler does not answer in its place.
  */
-static uint32_t adc_mapping_crc(uint32_t start, const volatile float *words, uint32_t length)
+ADC_MAPPING_COLD ADC_MAPPING_APART static uint32_t adc_mapping_crc_word(uint32_t start, uint32_t word)
 {
-    uint32_t crc = start;
-    uint32_t i;
+    uint32_t crc = start ^ word;
     uint32_t nibble;
-    for (i = 0u; i < length; ++i) {
-        crc ^= adc_mapping_bits(words[i]);
-        for (nibble = 0u; nibble < 8u; ++nibble) {
-            crc = (crc >> 4) ^ adc_mapping_crc_steps[crc & 15u];
-        }
+    for (nibble = 0u; nibble < 8u; ++nibble) {
+        crc = (crc >> 4) ^ adc_mapping_crc_steps[crc & 15u];
     }
     return crc;
 }
 
-uint32_t adc_mapping_integrity(void)
+ADC_MAPPING_COLD ADC_MAPPING_APART static uint32_t adc_mapping_crc(uint32_t start, const volatile float *words, uint32_t length)
+{
+    uint32_t crc = start;
+    uint32_t i;
+    for (i = 0u; i < length; ++i) {
+        crc = adc_mapping_crc_word(crc, adc_mapping_bits(words[i]));
+    }
+    return crc;
+}
+
+ADC_MAPPING_COLD uint32_t adc_mapping_integrity(void)
 {
     uint32_t crc = 0xFFFFFFFFu;
     crc = adc_mapping_crc(crc, adc_mapping_weights0, 15u);
@@ -625,7 +708,7 @@ uint32_t adc_mapping_integrity(void)
     return adc_mapping_flag((crc ^ 0xFFFFFFFFu) == 0x5F460CA8u);
 }
 
-uint32_t adc_mapping_self_test(void)
+ADC_MAPPING_COLD uint32_t adc_mapping_self_test(void)
 {
     float observation[ADC_MAPPING_FEATURES];
     float q[ADC_MAPPING_ACTIONS];

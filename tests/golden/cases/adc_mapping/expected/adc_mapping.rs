@@ -154,6 +154,9 @@ fn tanh(x: f32) -> f32 {
     q = q * z + 1.0;
     limit((p * t) / q, 0x3F80_0000)
 }
+/// So that no vector of weights lies across two lines of the cache.
+#[repr(align(64))]
+struct Aligned<T>(T);
 /// Sums of one block of outputs: from the bias, inputs in index order, every operation rounded.
 #[inline(always)]
 fn block<const INPUTS: usize, const ROWS: usize>(
@@ -169,13 +172,13 @@ fn block<const INPUTS: usize, const ROWS: usize>(
     }
     sums
 }
-static WEIGHTS0: [[[f32; 5]; 3]; 1] = [
+static WEIGHTS0: Aligned<[[[f32; 5]; 3]; 1]> = Aligned([
     [
         [-0.1961235, -0.6939645, 0.8410207, 0.17916429, 0.6482211],
         [0.43700856, -0.54046893, 0.019228343, -0.08577966, -0.081913486],
         [-0.46296132, -0.2067914, -0.12739001, -0.62925005, 0.7875268],
     ],
-];
+]);
 static BIAS0: [[f32; 5]; 1] = [
     [0.76032734, 0.5734856, -0.067461744, -0.593548, -0.07754058],
 ];
@@ -184,7 +187,7 @@ static BIAS0: [[f32; 5]; 1] = [
 fn layer0(x: &[f32; 3]) -> [f32; 5] {
     let mut y = [0.0; 5];
     let mut rest: &mut [f32] = &mut y;
-    for (weights, bias) in WEIGHTS0.iter().zip(&BIAS0) {
+    for (weights, bias) in WEIGHTS0.0.iter().zip(&BIAS0) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<5>()
         {
@@ -196,7 +199,7 @@ fn layer0(x: &[f32; 3]) -> [f32; 5] {
     }
     y
 }
-static WEIGHTS1: [[[f32; 4]; 5]; 1] = [
+static WEIGHTS1: Aligned<[[[f32; 4]; 5]; 1]> = Aligned([
     [
         [-0.51671344, 0.28526354, -0.3059797, 0.28003576],
         [0.65400296, 0.58544844, -0.40991333, -0.17074497],
@@ -204,14 +207,14 @@ static WEIGHTS1: [[[f32; 4]; 5]; 1] = [
         [0.5039906, -0.055592805, -0.14603908, -0.50607836],
         [-0.46147773, 0.4618804, 0.6315803, -0.6685655],
     ],
-];
+]);
 static BIAS1: [[f32; 4]; 1] = [[0.03895329, 0.17294572, -0.045696143, -0.29018784]];
 /// fc1: 5 -> 4
 #[inline(always)]
 fn layer1(x: &[f32; 5]) -> [f32; 4] {
     let mut y = [0.0; 4];
     let mut rest: &mut [f32] = &mut y;
-    for (weights, bias) in WEIGHTS1.iter().zip(&BIAS1) {
+    for (weights, bias) in WEIGHTS1.0.iter().zip(&BIAS1) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<4>()
         {
@@ -223,21 +226,21 @@ fn layer1(x: &[f32; 5]) -> [f32; 4] {
     }
     y
 }
-static WEIGHTS2: [[[f32; 3]; 4]; 1] = [
+static WEIGHTS2: Aligned<[[[f32; 3]; 4]; 1]> = Aligned([
     [
         [0.22726555, -0.53449565, -0.17750779],
         [0.39302084, -0.1294609, 0.40427762],
         [-0.42653167, -0.04249952, 0.6194601],
         [0.71884036, -0.6573097, -0.11717094],
     ],
-];
+]);
 static BIAS2: [[f32; 3]; 1] = [[-0.14668381, 0.27096558, 0.56342345]];
 /// fc2: 4 -> 3
 #[inline(always)]
 fn layer2(x: &[f32; 4]) -> [f32; 3] {
     let mut y = [0.0; 3];
     let mut rest: &mut [f32] = &mut y;
-    for (weights, bias) in WEIGHTS2.iter().zip(&BIAS2) {
+    for (weights, bias) in WEIGHTS2.0.iter().zip(&BIAS2) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<3>()
         {
@@ -382,8 +385,8 @@ impl Controller {
         let f8: u32 = f2 & f6;
         let v9: f32 = 12.0 - v3;
         let v10: f32 = v9 * 0.5;
-        let f11: u32 = outside(v10, -4.0, 4.0);
-        let v12: f32 = clamp(v10, -4.0, 4.0);
+        let v11: f32 = clamp(v10, -4.0, 4.0);
+        let f12: u32 = v10.to_bits() ^ v11.to_bits();
         let v13: f32 = v7 * 2.0;
         let v14: f32 = v3 * 0.083333336;
         let v15: f32 = v13 + v14;
@@ -391,17 +394,18 @@ impl Controller {
         let v17: f32 = v16 * 0.25;
         let v18: f32 = v17 * 0.1;
         let v19: f32 = self.previous_command - 0.5;
+        let f20: u32 = flag(f12 != 0);
         let counted = self.bad_count.wrapping_add(flag(self.bad_count <= 4));
         let bad_count = counted & f8.wrapping_sub(1);
         let usable = f8 | (self.primed & flag(bad_count <= 4));
         Front {
             signal: [v3, v7],
-            observation: [v12, v18, v19],
+            observation: [v11, v18, v19],
             bad_count,
             usable,
             held: usable & (f8 ^ 1),
             primed_now: usable & (self.primed ^ 1),
-            clipped: f11,
+            clipped: f20,
         }
     }
     /// Network, argmax, mapping, limits, status.
@@ -431,15 +435,17 @@ impl Controller {
         let f9: u32 = f7 | f8;
         let v10: f32 = self.previous_command - 0.02;
         let v11: f32 = self.previous_command + 0.02;
-        let f12: u32 = outside(v6, v10, v11);
-        let v13: f32 = clamp(v6, v10, v11);
-        let f14: u32 = flag(v13 > self.soft_cap);
-        let v15: f32 = select(f14, self.soft_cap, v13);
-        let f16: u32 = outside(v15, 0.05, 0.9);
-        let v17: f32 = clamp(v15, 0.05, 0.9);
+        let v12: f32 = clamp(v6, v10, v11);
+        let f13: u32 = v6.to_bits() ^ v12.to_bits();
+        let f14: u32 = flag(f13 != 0);
+        let f15: u32 = flag(v12 > self.soft_cap);
+        let v16: f32 = select(f15, self.soft_cap, v12);
+        let v17: f32 = clamp(v16, 0.05, 0.9);
+        let f18: u32 = v16.to_bits() ^ v17.to_bits();
+        let f19: u32 = flag(f18 != 0);
         let usable = front.usable;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
-            | (f9 << 4) | (f12 << 5) | (f14 << 6) | (f16 << 7);
+            | (f9 << 4) | (f14 << 5) | (f15 << 6) | (f19 << 7);
         Command {
             duty: select(usable, v17, 0.0),
             duty_sim: select(usable, chosen, 0.0),
@@ -499,19 +505,19 @@ impl Controller {
     #[must_use]
     pub fn integrity() -> bool {
         let mut crc = u32::MAX;
-        for column in core::hint::black_box(&WEIGHTS0).iter().flatten() {
+        for column in core::hint::black_box(&WEIGHTS0.0).iter().flatten() {
             crc = crc_floats(crc, column);
         }
         for row in core::hint::black_box(&BIAS0) {
             crc = crc_floats(crc, row);
         }
-        for column in core::hint::black_box(&WEIGHTS1).iter().flatten() {
+        for column in core::hint::black_box(&WEIGHTS1.0).iter().flatten() {
             crc = crc_floats(crc, column);
         }
         for row in core::hint::black_box(&BIAS1) {
             crc = crc_floats(crc, row);
         }
-        for column in core::hint::black_box(&WEIGHTS2).iter().flatten() {
+        for column in core::hint::black_box(&WEIGHTS2.0).iter().flatten() {
             crc = crc_floats(crc, column);
         }
         for row in core::hint::black_box(&BIAS2) {

@@ -47,7 +47,26 @@
 #define CONSTRUCTS_CODE
 #endif
 
-CONSTRUCTS_TABLE static const float constructs_weights0[108] = {
+/*
+ * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
+ * fast; helpers that this build may not need.
+ */
+#if defined(__GNUC__)
+#define CONSTRUCTS_APART __attribute__((noinline))
+#define CONSTRUCTS_COLD __attribute__((cold))
+#define CONSTRUCTS_SPARE __attribute__((unused))
+#else
+#define CONSTRUCTS_APART
+#define CONSTRUCTS_COLD
+#define CONSTRUCTS_SPARE
+#endif
+#if defined(__GNUC__)
+#define CONSTRUCTS_ALIGNED __attribute__((aligned(64)))
+#else
+#define CONSTRUCTS_ALIGNED
+#endif
+
+CONSTRUCTS_TABLE CONSTRUCTS_ALIGNED static const float constructs_weights0[108] = {
     -0.2890473f, 0.2623314f, 0.12399545f, 0.06753233f, 0.12811123f, -0.42773548f, -0.16124086f, 0.28192547f,
     -0.41727853f, -0.36491963f, 0.21450166f, -0.0019668099f, 0.107698746f, 0.3642376f, 0.11700938f, 0.30197826f,
     -0.14795284f, 0.1829554f, -0.20511481f, -0.14548326f, 0.4177838f, 0.43180084f, -0.14997897f, -0.23883492f,
@@ -69,7 +88,7 @@ CONSTRUCTS_TABLE static const float constructs_bias0[9] = {
     -0.059021622f, 0.02005651f,
 };
 
-CONSTRUCTS_TABLE static const float constructs_weights1[54] = {
+CONSTRUCTS_TABLE CONSTRUCTS_ALIGNED static const float constructs_weights1[54] = {
     -0.46162906f, -0.4118392f, 0.49024832f, 0.17969948f, -0.43285444f, -0.04651492f, -0.301166f, -0.20371401f,
     -0.31117725f, -0.2645746f, 0.14537662f, 0.21733014f, 0.032274734f, -0.34682554f, -0.29536712f, 0.2057699f,
     -0.08262533f, 0.16575785f, 0.30389136f, -0.04951195f, 0.35005307f, -0.3868738f, -0.23487647f, -0.27599818f,
@@ -83,7 +102,7 @@ CONSTRUCTS_TABLE static const float constructs_bias1[6] = {
     -0.09968751f, -0.14792047f, 0.41826826f, 0.2690265f, -0.34609967f, 0.18519673f,
 };
 
-CONSTRUCTS_TABLE static const float constructs_weights2[48] = {
+CONSTRUCTS_TABLE CONSTRUCTS_ALIGNED static const float constructs_weights2[48] = {
     0.06612995f, -0.5513904f, 0.12477361f, -0.53932893f, -0.14131317f, 0.27207845f, 0.39474764f, -0.35738608f,
     0.2371962f, -0.3721907f, 0.15467523f, 0.11194802f, -0.47444165f, 0.56951857f, 0.36244503f, 0.06328388f,
     -0.5031771f, -0.37005705f, 0.5698544f, -0.10729386f, 0.40414566f, -0.21555854f, 0.18828857f, 0.039983906f,
@@ -96,7 +115,7 @@ CONSTRUCTS_TABLE static const float constructs_bias2[8] = {
     -0.15951712f, -0.15347701f, 0.20028456f, -0.53676015f, 0.23656093f, 0.28088528f, -0.31649512f, -0.24683188f,
 };
 
-CONSTRUCTS_TABLE static const float constructs_weights3[32] = {
+CONSTRUCTS_TABLE CONSTRUCTS_ALIGNED static const float constructs_weights3[32] = {
     -0.3693163f, 0.49342284f, -0.13025324f, 0.47386476f, -0.011683343f, 0.4360078f, 0.026798882f, -0.5033685f,
     -0.40493017f, 0.07288008f, -0.51671314f, 0.2205132f, 0.24677335f, -0.3475253f, 0.06562441f, -0.51451564f,
     0.26024187f, 0.27533436f, -0.041697074f, 0.19813882f, 0.07377921f, -0.28323567f, -0.4139842f, 0.013909706f,
@@ -107,7 +126,7 @@ CONSTRUCTS_TABLE static const float constructs_bias3[4] = {
     0.106001504f, 0.002868658f, 0.48848695f, 0.21319786f,
 };
 
-CONSTRUCTS_TABLE static const float constructs_weights4[20] = {
+CONSTRUCTS_TABLE CONSTRUCTS_ALIGNED static const float constructs_weights4[20] = {
     0.57987595f, -0.73622173f, 0.59012467f, -0.3709103f, 0.638856f, -0.38510552f, 0.24224047f, -0.17162855f,
     -0.14159504f, -0.20233878f, -0.46244648f, -0.3800277f, -0.2374773f, -0.46703035f, -0.32386443f, -0.3878174f,
     0.30647114f, 0.50535136f, -0.62270683f, -0.3333227f,
@@ -148,7 +167,7 @@ static uint32_t constructs_bits(float x)
     return bits;
 }
 
-static float constructs_from_bits(uint32_t bits)
+CONSTRUCTS_SPARE static float constructs_from_bits(uint32_t bits)
 {
     float x;
     (void)__builtin_memcpy(&x, &bits, sizeof(x));
@@ -167,7 +186,7 @@ static uint32_t constructs_bits(float x)
     return word.bits;
 }
 
-static float constructs_from_bits(uint32_t bits)
+CONSTRUCTS_SPARE static float constructs_from_bits(uint32_t bits)
 {
     constructs_word word;
     word.bits = bits;
@@ -185,27 +204,60 @@ static uint32_t constructs_flag(int condition)
     return flag;
 }
 
+#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__)
+/* conditional moves: each is executed, or skipped, in the same time */
+#define CONSTRUCTS_MOVES 1
+#endif
+
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float constructs_select(uint32_t flag, float then, float otherwise)
 {
+#if defined(CONSTRUCTS_MOVES)
+    float chosen = otherwise;
+    __asm__("cmp %1, #0\n\tit ne\n\tvmovne.f32 %0, %2" : "+t"(chosen) : "r"(flag), "t"(then) : "cc");
+    return chosen;
+#else
     const uint32_t mask = (uint32_t)0 - flag;
     return constructs_from_bits((constructs_bits(then) & mask) | (constructs_bits(otherwise) & ~mask));
+#endif
 }
 
-static uint32_t constructs_within(float x, float low, float high)
+CONSTRUCTS_CODE CONSTRUCTS_APART static uint32_t constructs_within(float x, float low, float high)
 {
+#if defined(CONSTRUCTS_MOVES)
+    uint32_t flag;
+    __asm__("vcmp.f32 %2, %1\n\tvmrs APSR_nzcv, fpscr\n\titt ge\n\tvcmpge.f32 %1, %3\n\tvmrsge APSR_nzcv, fpscr\n\t"
+            "ite ge\n\tmovge %0, #1\n\tmovlt %0, #0" : "=r"(flag) : "t"(x), "t"(high), "t"(low) : "cc");
+    return flag;
+#else
     return constructs_flag(x >= low) & constructs_flag(x <= high);
+#endif
 }
 
-static uint32_t constructs_outside(float x, float low, float high)
+CONSTRUCTS_CODE CONSTRUCTS_APART static uint32_t constructs_outside(float x, float low, float high)
 {
+#if defined(CONSTRUCTS_MOVES)
+    uint32_t flag;
+    __asm__("vcmp.f32 %1, %3\n\tvmrs APSR_nzcv, fpscr\n\titt pl\n\tvcmppl.f32 %2, %1\n\tvmrspl APSR_nzcv, fpscr\n\t"
+            "ite mi\n\tmovmi %0, #1\n\tmovpl %0, #0" : "=r"(flag) : "t"(x), "t"(high), "t"(low) : "cc");
+    return flag;
+#else
     return constructs_flag(x < low) | constructs_flag(x > high);
+#endif
 }
 
-static float constructs_clamp(float x, float low, float high)
+CONSTRUCTS_CODE CONSTRUCTS_APART static float constructs_clamp(float x, float low, float high)
 {
+#if defined(CONSTRUCTS_MOVES)
+    float clamped = x;
+    __asm__("vcmp.f32 %0, %1\n\tvmrs APSR_nzcv, fpscr\n\tit mi\n\tvmovmi.f32 %0, %1\n\t"
+            "vcmp.f32 %0, %2\n\tvmrs APSR_nzcv, fpscr\n\tit gt\n\tvmovgt.f32 %0, %2"
+            : "+&t"(clamped) : "t"(low), "t"(high) : "cc");
+    return clamped;
+#else
     const float raised = constructs_select(constructs_flag(x < low), low, x);
     return constructs_select(constructs_flag(raised > high), high, raised);
+#endif
 }
 
 /* oldest first, newest last; a line that is not primed reads as newest throughout */
@@ -275,7 +327,7 @@ typedef struct {
 } constructs_front;
 
 /* Sanitise, filters, observation. */
-CONSTRUCTS_CODE static void constructs_sense(const constructs_state *state, const constructs_measurement *measured, constructs_front *front)
+CONSTRUCTS_CODE CONSTRUCTS_APART static void constructs_sense(const constructs_state *state, const constructs_measurement *measured, constructs_front *front)
 {
     const uint32_t f0 = constructs_within(measured->v_out, 0.0f, 80.0f);
     const float v1 = constructs_select(f0, measured->v_out, state->held[0]);
@@ -289,8 +341,8 @@ CONSTRUCTS_CODE static void constructs_sense(const constructs_state *state, cons
     const uint32_t f9 = f8 & f6;
     const float v10 = 48.0f - v1;
     const float v11 = v10 * 0.1f;
-    const uint32_t f12 = constructs_outside(v11, -2.0f, 2.0f);
-    const float v13 = constructs_clamp(v11, -2.0f, 2.0f);
+    const float v12 = constructs_clamp(v11, -2.0f, 2.0f);
+    const uint32_t f13 = constructs_bits(v11) ^ constructs_bits(v12);
     const float v14 = v1 - 48.0f;
     const float v15 = constructs_select(state->primed, state->memory[0], v14);
     const float v16 = v15 * 0.05f;
@@ -299,8 +351,8 @@ CONSTRUCTS_CODE static void constructs_sense(const constructs_state *state, cons
     const float v19 = v1 - v18;
     const float v20 = v19 * 10000.0f;
     const float v21 = v20 * 1e-5f;
-    const uint32_t f22 = constructs_outside(v21, -1.0f, 1.0f);
-    const float v23 = constructs_clamp(v21, -1.0f, 1.0f);
+    const float v22 = constructs_clamp(v21, -1.0f, 1.0f);
+    const uint32_t f23 = constructs_bits(v21) ^ constructs_bits(v22);
     const float v24 = constructs_select(state->primed, state->memory[4], v5);
     const float v25 = v5 - v24;
     const float v26 = v25 * 0.09090909f;
@@ -339,7 +391,8 @@ CONSTRUCTS_CODE static void constructs_sense(const constructs_state *state, cons
     const float v59 = state->previous_command * 2.0f;
     const float v60 = v59 - 1.0f;
     const float v61 = v7 * 0.0625f;
-    const uint32_t f62 = f12 | f22;
+    const uint32_t f62 = f13 | f23;
+    const uint32_t f63 = constructs_flag(f62 != 0u);
     const uint32_t counted = state->bad_count + constructs_flag(state->bad_count <= 3u);
     const uint32_t bad_count = counted & (f9 - (uint32_t)1);
     const uint32_t bridged = state->primed & constructs_flag(bad_count <= 3u);
@@ -348,9 +401,9 @@ CONSTRUCTS_CODE static void constructs_sense(const constructs_state *state, cons
     front->signal[0] = v1;
     front->signal[1] = v5;
     front->signal[2] = v7;
-    front->observation[0] = v13;
+    front->observation[0] = v12;
     front->observation[1] = v17;
-    front->observation[2] = v23;
+    front->observation[2] = v22;
     front->observation[3] = v29;
     front->observation[4] = v37;
     front->observation[5] = v40;
@@ -374,7 +427,7 @@ CONSTRUCTS_CODE static void constructs_sense(const constructs_state *state, cons
     front->usable = usable;
     front->held = usable & (f9 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
-    front->clipped = f62;
+    front->clipped = f63;
 }
 
 /* Sums side by side in vectors, each one in the order written; the width is that of the machine the compiler is told of. */
@@ -719,57 +772,65 @@ CONSTRUCTS_CODE void constructs_q_values(const float *observation, float *q)
     constructs_layer3(hidden2, hidden3);
     constructs_layer4(hidden3, q);
 }
-/* Network, argmax, mapping, limits, status. */
-CONSTRUCTS_CODE static void constructs_decide(const constructs_state *state, const constructs_front *front, constructs_command *command)
+/* Network and argmax: the greedy action. */
+CONSTRUCTS_CODE CONSTRUCTS_APART static uint32_t constructs_choose(const constructs_state *state, const constructs_measurement *measured)
 {
-    float q[CONSTRUCTS_ACTIONS];
+    float observation[12];
+    float q[5];
     float best = -3.40282347e+38f;
-    float chosen = constructs_duties[0];
     uint32_t index = 0u;
     uint32_t action;
 
-    constructs_q_values(front->observation, q);
+    constructs_observe(state, measured, observation);
+    constructs_q_values(observation, q);
     /* the lowest index wins among equals, a NaN never does */
     for (action = 0u; action < CONSTRUCTS_ACTIONS; ++action) {
-        const uint32_t above = constructs_flag(q[action] > best);
+        const float output = q[action];
+        const uint32_t above = constructs_flag(output > best);
         const uint32_t mask = (uint32_t)0 - above;
-        best = constructs_select(above, q[action], best);
-        chosen = constructs_select(above, constructs_duties[action], chosen);
+        best = constructs_select(above, output, best);
         index = (action & mask) | (index & ~mask);
     }
-    {
-        const float v0 = state->mapping_a * chosen;
-        const float v1 = state->mapping_b * front->signal[2];
-        const float v2 = v0 + v1;
-        const float v3 = v2 + state->mapping_c;
-        const float v4 = state->mapping_r * front->signal[2];
-        const float v5 = v4 * chosen;
-        const float v6 = v3 + v5;
-        const uint32_t f7 = constructs_outside(chosen, 0.3f, 0.68f);
-        const uint32_t f8 = constructs_outside(front->signal[2], -0.5f, 12.0f);
-        const uint32_t f9 = f7 | f8;
-        const float v10 = state->previous_command - 0.06f;
-        const float v11 = state->previous_command + 0.06f;
-        const uint32_t f12 = constructs_outside(v6, v10, v11);
-        const float v13 = constructs_clamp(v6, v10, v11);
-        const uint32_t f14 = constructs_flag(v13 > state->soft_cap);
-        const float v15 = constructs_select(f14, state->soft_cap, v13);
-        const uint32_t f16 = constructs_outside(v15, 0.3f, 0.67999995f);
-        const float v17 = constructs_clamp(v15, 0.3f, 0.67999995f);
-        const uint32_t usable = front->usable;
-        const uint32_t status = (front->held << 0)
-                              | (front->primed_now << 2)
-                              | (front->clipped << 3)
-                              | (f9 << 4)
-                              | (f12 << 5)
-                              | (f14 << 6)
-                              | (f16 << 7);
+    return index;
+}
 
-        command->duty = constructs_select(usable, v17, 0.02f);
-        command->duty_sim = constructs_select(usable, chosen, 0.02f);
-        command->action_index = index;
-        command->status = (status & ((uint32_t)0 - usable)) | (CONSTRUCTS_STATUS_FALLBACK & (usable - (uint32_t)1));
-    }
+/* Mapping, limits, status. */
+CONSTRUCTS_CODE static void constructs_decide(const constructs_state *state, const constructs_front *front, uint32_t index, constructs_command *command)
+{
+    const float chosen = constructs_duties[index];
+    const float v0 = state->mapping_a * chosen;
+    const float v1 = state->mapping_b * front->signal[2];
+    const float v2 = v0 + v1;
+    const float v3 = v2 + state->mapping_c;
+    const float v4 = state->mapping_r * front->signal[2];
+    const float v5 = v4 * chosen;
+    const float v6 = v3 + v5;
+    const uint32_t f7 = constructs_outside(chosen, 0.3f, 0.68f);
+    const uint32_t f8 = constructs_outside(front->signal[2], -0.5f, 12.0f);
+    const uint32_t f9 = f7 | f8;
+    const float v10 = state->previous_command - 0.06f;
+    const float v11 = state->previous_command + 0.06f;
+    const float v12 = constructs_clamp(v6, v10, v11);
+    const uint32_t f13 = constructs_bits(v6) ^ constructs_bits(v12);
+    const uint32_t f14 = constructs_flag(f13 != 0u);
+    const uint32_t f15 = constructs_flag(v12 > state->soft_cap);
+    const float v16 = constructs_select(f15, state->soft_cap, v12);
+    const float v17 = constructs_clamp(v16, 0.3f, 0.67999995f);
+    const uint32_t f18 = constructs_bits(v16) ^ constructs_bits(v17);
+    const uint32_t f19 = constructs_flag(f18 != 0u);
+    const uint32_t usable = front->usable;
+    const uint32_t status = (front->held << 0)
+                          | (front->primed_now << 2)
+                          | (front->clipped << 3)
+                          | (f9 << 4)
+                          | (f14 << 5)
+                          | (f15 << 6)
+                          | (f19 << 7);
+
+    command->duty = constructs_select(usable, v17, 0.02f);
+    command->duty_sim = constructs_select(usable, chosen, 0.02f);
+    command->action_index = index;
+    command->status = (status & ((uint32_t)0 - usable)) | (CONSTRUCTS_STATUS_FALLBACK & (usable - (uint32_t)1));
 }
 
 /* Filters, held samples and counters move on by one sample period. */
@@ -808,11 +869,29 @@ CONSTRUCTS_CODE CONSTRUCTS_NO_LIBC static void constructs_advance(constructs_sta
     state->primed = front->usable;
 }
 
-CONSTRUCTS_CODE void constructs_eval(const constructs_state *state, const constructs_measurement *measured, constructs_command *command)
+/*
+ * A measurement is sensed again after the network, in a function of its own: what the network does not need is not on the
+ * stack while it runs.
+ */
+CONSTRUCTS_CODE CONSTRUCTS_APART static void constructs_answer(const constructs_state *state, const constructs_measurement *measured, uint32_t index, constructs_command *command)
 {
     constructs_front front;
     constructs_sense(state, measured, &front);
-    constructs_decide(state, &front, command);
+    constructs_decide(state, &front, index, command);
+}
+
+CONSTRUCTS_CODE CONSTRUCTS_APART static void constructs_settle(constructs_state *state, const constructs_measurement *measured, uint32_t index, constructs_command *command)
+{
+    constructs_front front;
+    constructs_sense(state, measured, &front);
+    constructs_decide(state, &front, index, command);
+    constructs_advance(state, &front, command);
+}
+
+CONSTRUCTS_CODE void constructs_eval(const constructs_state *state, const constructs_measurement *measured, constructs_command *command)
+{
+    const uint32_t index = constructs_choose(state, measured);
+    constructs_answer(state, measured, index, command);
 }
 
 CONSTRUCTS_CODE void constructs_commit(constructs_state *state, const constructs_measurement *measured, const constructs_command *command)
@@ -824,13 +903,11 @@ CONSTRUCTS_CODE void constructs_commit(constructs_state *state, const constructs
 
 CONSTRUCTS_CODE void constructs_step(constructs_state *state, const constructs_measurement *measured, constructs_command *command)
 {
-    constructs_front front;
-    constructs_sense(state, measured, &front);
-    constructs_decide(state, &front, command);
-    constructs_advance(state, &front, command);
+    const uint32_t index = constructs_choose(state, measured);
+    constructs_settle(state, measured, index, command);
 }
 
-CONSTRUCTS_CODE CONSTRUCTS_NO_LIBC void constructs_observe(const constructs_state *state, const constructs_measurement *measured, float *observation)
+CONSTRUCTS_CODE CONSTRUCTS_APART CONSTRUCTS_NO_LIBC void constructs_observe(const constructs_state *state, const constructs_measurement *measured, float *observation)
 {
     constructs_front front;
     uint32_t i;
@@ -840,7 +917,7 @@ CONSTRUCTS_CODE CONSTRUCTS_NO_LIBC void constructs_observe(const constructs_stat
     }
 }
 
-CONSTRUCTS_NO_LIBC void constructs_reset(constructs_state *state)
+CONSTRUCTS_COLD CONSTRUCTS_NO_LIBC void constructs_reset(constructs_state *state)
 {
     uint32_t i;
     for (i = 0u; i < 15u; ++i) {
@@ -856,7 +933,7 @@ CONSTRUCTS_NO_LIBC void constructs_reset(constructs_state *state)
     state->primed = 0u;
 }
 
-void constructs_init(constructs_state *state)
+CONSTRUCTS_COLD void constructs_init(constructs_state *state)
 {
     constructs_reset(state);
     state->mapping_a = 1.03f;
@@ -865,7 +942,7 @@ void constructs_init(constructs_state *state)
     state->mapping_r = 0.0009f;
 }
 
-uint32_t constructs_set_mapping(constructs_state *state, float a, float b, float c, float r)
+CONSTRUCTS_COLD uint32_t constructs_set_mapping(constructs_state *state, float a, float b, float c, float r)
 {
     const uint32_t accepted = constructs_within(a, 0.8f, 1.25f)
                             & constructs_within(b, -0.02f, 0.02f)
@@ -887,21 +964,27 @@ uint32_t constructs_set_mapping(constructs_state *state, float a, float b, float
  * CRC-32 (IEEE 802.3) of words taken little-endian, whatever the byte order of the machine.
  * volatile: the memory is read, the compiler does not answer in its place.
  */
-static uint32_t constructs_crc(uint32_t start, const volatile float *words, uint32_t length)
+CONSTRUCTS_COLD CONSTRUCTS_APART static uint32_t constructs_crc_word(uint32_t start, uint32_t word)
 {
-    uint32_t crc = start;
-    uint32_t i;
+    uint32_t crc = start ^ word;
     uint32_t nibble;
-    for (i = 0u; i < length; ++i) {
-        crc ^= constructs_bits(words[i]);
-        for (nibble = 0u; nibble < 8u; ++nibble) {
-            crc = (crc >> 4) ^ constructs_crc_steps[crc & 15u];
-        }
+    for (nibble = 0u; nibble < 8u; ++nibble) {
+        crc = (crc >> 4) ^ constructs_crc_steps[crc & 15u];
     }
     return crc;
 }
 
-uint32_t constructs_integrity(void)
+CONSTRUCTS_COLD CONSTRUCTS_APART static uint32_t constructs_crc(uint32_t start, const volatile float *words, uint32_t length)
+{
+    uint32_t crc = start;
+    uint32_t i;
+    for (i = 0u; i < length; ++i) {
+        crc = constructs_crc_word(crc, constructs_bits(words[i]));
+    }
+    return crc;
+}
+
+CONSTRUCTS_COLD uint32_t constructs_integrity(void)
 {
     uint32_t crc = 0xFFFFFFFFu;
     crc = constructs_crc(crc, constructs_weights0, 108u);
@@ -918,7 +1001,7 @@ uint32_t constructs_integrity(void)
     return constructs_flag((crc ^ 0xFFFFFFFFu) == 0xDE8E81BEu);
 }
 
-uint32_t constructs_self_test(void)
+CONSTRUCTS_COLD uint32_t constructs_self_test(void)
 {
     float observation[CONSTRUCTS_FEATURES];
     float q[CONSTRUCTS_ACTIONS];

@@ -156,6 +156,9 @@ fn tanh(x: f32) -> f32 {
     q = q * z + 1.0;
     limit((p * t) / q, 0x3F80_0000)
 }
+/// So that no vector of weights lies across two lines of the cache.
+#[repr(align(64))]
+struct Aligned<T>(T);
 /// Sums of one block of outputs: from the bias, inputs in index order, every operation rounded.
 #[inline(always)]
 fn block<const INPUTS: usize, const ROWS: usize>(
@@ -171,7 +174,7 @@ fn block<const INPUTS: usize, const ROWS: usize>(
     }
     sums
 }
-static WEIGHTS0: [[[f32; 9]; 12]; 1] = [
+static WEIGHTS0: Aligned<[[[f32; 9]; 12]; 1]> = Aligned([
     [
         [
             -0.2890473,
@@ -306,7 +309,7 @@ static WEIGHTS0: [[[f32; 9]; 12]; 1] = [
             0.10527261,
         ],
     ],
-];
+]);
 static BIAS0: [[f32; 9]; 1] = [
     [
         0.24240299,
@@ -325,7 +328,7 @@ static BIAS0: [[f32; 9]; 1] = [
 fn layer0(x: &[f32; 12]) -> [f32; 9] {
     let mut y = [0.0; 9];
     let mut rest: &mut [f32] = &mut y;
-    for (weights, bias) in WEIGHTS0.iter().zip(&BIAS0) {
+    for (weights, bias) in WEIGHTS0.0.iter().zip(&BIAS0) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<9>()
         {
@@ -337,7 +340,7 @@ fn layer0(x: &[f32; 12]) -> [f32; 9] {
     }
     y
 }
-static WEIGHTS1: [[[f32; 6]; 9]; 1] = [
+static WEIGHTS1: Aligned<[[[f32; 6]; 9]; 1]> = Aligned([
     [
         [-0.46162906, -0.4118392, 0.49024832, 0.17969948, -0.43285444, -0.04651492],
         [-0.301166, -0.20371401, -0.31117725, -0.2645746, 0.14537662, 0.21733014],
@@ -356,7 +359,7 @@ static WEIGHTS1: [[[f32; 6]; 9]; 1] = [
             -0.00081380503,
         ],
     ],
-];
+]);
 static BIAS1: [[f32; 6]; 1] = [
     [-0.09968751, -0.14792047, 0.41826826, 0.2690265, -0.34609967, 0.18519673],
 ];
@@ -365,7 +368,7 @@ static BIAS1: [[f32; 6]; 1] = [
 fn layer1(x: &[f32; 9]) -> [f32; 6] {
     let mut y = [0.0; 6];
     let mut rest: &mut [f32] = &mut y;
-    for (weights, bias) in WEIGHTS1.iter().zip(&BIAS1) {
+    for (weights, bias) in WEIGHTS1.0.iter().zip(&BIAS1) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<6>()
         {
@@ -377,7 +380,7 @@ fn layer1(x: &[f32; 9]) -> [f32; 6] {
     }
     y
 }
-static WEIGHTS2: [[[f32; 8]; 6]; 1] = [
+static WEIGHTS2: Aligned<[[[f32; 8]; 6]; 1]> = Aligned([
     [
         [
             0.06612995,
@@ -440,7 +443,7 @@ static WEIGHTS2: [[[f32; 8]; 6]; 1] = [
             0.31572044,
         ],
     ],
-];
+]);
 static BIAS2: [[f32; 8]; 1] = [
     [
         -0.15951712,
@@ -458,7 +461,7 @@ static BIAS2: [[f32; 8]; 1] = [
 fn layer2(x: &[f32; 6]) -> [f32; 8] {
     let mut y = [0.0; 8];
     let mut rest: &mut [f32] = &mut y;
-    for (weights, bias) in WEIGHTS2.iter().zip(&BIAS2) {
+    for (weights, bias) in WEIGHTS2.0.iter().zip(&BIAS2) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<8>()
         {
@@ -470,7 +473,7 @@ fn layer2(x: &[f32; 6]) -> [f32; 8] {
     }
     y
 }
-static WEIGHTS3: [[[f32; 4]; 8]; 1] = [
+static WEIGHTS3: Aligned<[[[f32; 4]; 8]; 1]> = Aligned([
     [
         [-0.3693163, 0.49342284, -0.13025324, 0.47386476],
         [-0.011683343, 0.4360078, 0.026798882, -0.5033685],
@@ -481,14 +484,14 @@ static WEIGHTS3: [[[f32; 4]; 8]; 1] = [
         [-0.4697089, -0.122537896, -0.51602036, -0.17218672],
         [0.004127234, 0.08711334, 0.4600474, -0.12041387],
     ],
-];
+]);
 static BIAS3: [[f32; 4]; 1] = [[0.106001504, 0.002868658, 0.48848695, 0.21319786]];
 /// fc3: 8 -> 4
 #[inline(always)]
 fn layer3(x: &[f32; 8]) -> [f32; 4] {
     let mut y = [0.0; 4];
     let mut rest: &mut [f32] = &mut y;
-    for (weights, bias) in WEIGHTS3.iter().zip(&BIAS3) {
+    for (weights, bias) in WEIGHTS3.0.iter().zip(&BIAS3) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<4>()
         {
@@ -500,14 +503,14 @@ fn layer3(x: &[f32; 8]) -> [f32; 4] {
     }
     y
 }
-static WEIGHTS4: [[[f32; 5]; 4]; 1] = [
+static WEIGHTS4: Aligned<[[[f32; 5]; 4]; 1]> = Aligned([
     [
         [0.57987595, -0.73622173, 0.59012467, -0.3709103, 0.638856],
         [-0.38510552, 0.24224047, -0.17162855, -0.14159504, -0.20233878],
         [-0.46244648, -0.3800277, -0.2374773, -0.46703035, -0.32386443],
         [-0.3878174, 0.30647114, 0.50535136, -0.62270683, -0.3333227],
     ],
-];
+]);
 static BIAS4: [[f32; 5]; 1] = [
     [0.51659197, 0.121376626, 0.15311292, 0.6308084, 0.40875843],
 ];
@@ -516,7 +519,7 @@ static BIAS4: [[f32; 5]; 1] = [
 fn layer4(x: &[f32; 4]) -> [f32; 5] {
     let mut y = [0.0; 5];
     let mut rest: &mut [f32] = &mut y;
-    for (weights, bias) in WEIGHTS4.iter().zip(&BIAS4) {
+    for (weights, bias) in WEIGHTS4.0.iter().zip(&BIAS4) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<5>()
         {
@@ -668,8 +671,8 @@ impl Controller {
         let f9: u32 = f8 & f6;
         let v10: f32 = 48.0 - v1;
         let v11: f32 = v10 * 0.1;
-        let f12: u32 = outside(v11, -2.0, 2.0);
-        let v13: f32 = clamp(v11, -2.0, 2.0);
+        let v12: f32 = clamp(v11, -2.0, 2.0);
+        let f13: u32 = v11.to_bits() ^ v12.to_bits();
         let v14: f32 = v1 - 48.0;
         let v15: f32 = select(self.primed, self.memory[0], v14);
         let v16: f32 = v15 * 0.05;
@@ -678,8 +681,8 @@ impl Controller {
         let v19: f32 = v1 - v18;
         let v20: f32 = v19 * 10000.0;
         let v21: f32 = v20 * 0.00001;
-        let f22: u32 = outside(v21, -1.0, 1.0);
-        let v23: f32 = clamp(v21, -1.0, 1.0);
+        let v22: f32 = clamp(v21, -1.0, 1.0);
+        let f23: u32 = v21.to_bits() ^ v22.to_bits();
         let v24: f32 = select(self.primed, self.memory[4], v5);
         let v25: f32 = v5 - v24;
         let v26: f32 = v25 * 0.09090909;
@@ -728,16 +731,17 @@ impl Controller {
         let v59: f32 = self.previous_command * 2.0;
         let v60: f32 = v59 - 1.0;
         let v61: f32 = v7 * 0.0625;
-        let f62: u32 = f12 | f22;
+        let f62: u32 = f13 | f23;
+        let f63: u32 = flag(f62 != 0);
         let counted = self.bad_count.wrapping_add(flag(self.bad_count <= 3));
         let bad_count = counted & f9.wrapping_sub(1);
         let usable = f9 | (self.primed & flag(bad_count <= 3));
         Front {
             signal: [v1, v5, v7],
             observation: [
-                v13,
+                v12,
                 v17,
-                v23,
+                v22,
                 v29,
                 v37,
                 v40,
@@ -753,7 +757,7 @@ impl Controller {
             usable,
             held: usable & (f9 ^ 1),
             primed_now: usable & (self.primed ^ 1),
-            clipped: f62,
+            clipped: f63,
         }
     }
     /// Network, argmax, mapping, limits, status.
@@ -783,15 +787,17 @@ impl Controller {
         let f9: u32 = f7 | f8;
         let v10: f32 = self.previous_command - 0.06;
         let v11: f32 = self.previous_command + 0.06;
-        let f12: u32 = outside(v6, v10, v11);
-        let v13: f32 = clamp(v6, v10, v11);
-        let f14: u32 = flag(v13 > self.soft_cap);
-        let v15: f32 = select(f14, self.soft_cap, v13);
-        let f16: u32 = outside(v15, 0.3, 0.67999995);
-        let v17: f32 = clamp(v15, 0.3, 0.67999995);
+        let v12: f32 = clamp(v6, v10, v11);
+        let f13: u32 = v6.to_bits() ^ v12.to_bits();
+        let f14: u32 = flag(f13 != 0);
+        let f15: u32 = flag(v12 > self.soft_cap);
+        let v16: f32 = select(f15, self.soft_cap, v12);
+        let v17: f32 = clamp(v16, 0.3, 0.67999995);
+        let f18: u32 = v16.to_bits() ^ v17.to_bits();
+        let f19: u32 = flag(f18 != 0);
         let usable = front.usable;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
-            | (f9 << 4) | (f12 << 5) | (f14 << 6) | (f16 << 7);
+            | (f9 << 4) | (f14 << 5) | (f15 << 6) | (f19 << 7);
         Command {
             duty: select(usable, v17, 0.02),
             duty_sim: select(usable, chosen, 0.02),
@@ -897,31 +903,31 @@ impl Controller {
     #[must_use]
     pub fn integrity() -> bool {
         let mut crc = u32::MAX;
-        for column in core::hint::black_box(&WEIGHTS0).iter().flatten() {
+        for column in core::hint::black_box(&WEIGHTS0.0).iter().flatten() {
             crc = crc_floats(crc, column);
         }
         for row in core::hint::black_box(&BIAS0) {
             crc = crc_floats(crc, row);
         }
-        for column in core::hint::black_box(&WEIGHTS1).iter().flatten() {
+        for column in core::hint::black_box(&WEIGHTS1.0).iter().flatten() {
             crc = crc_floats(crc, column);
         }
         for row in core::hint::black_box(&BIAS1) {
             crc = crc_floats(crc, row);
         }
-        for column in core::hint::black_box(&WEIGHTS2).iter().flatten() {
+        for column in core::hint::black_box(&WEIGHTS2.0).iter().flatten() {
             crc = crc_floats(crc, column);
         }
         for row in core::hint::black_box(&BIAS2) {
             crc = crc_floats(crc, row);
         }
-        for column in core::hint::black_box(&WEIGHTS3).iter().flatten() {
+        for column in core::hint::black_box(&WEIGHTS3.0).iter().flatten() {
             crc = crc_floats(crc, column);
         }
         for row in core::hint::black_box(&BIAS3) {
             crc = crc_floats(crc, row);
         }
-        for column in core::hint::black_box(&WEIGHTS4).iter().flatten() {
+        for column in core::hint::black_box(&WEIGHTS4.0).iter().flatten() {
             crc = crc_floats(crc, column);
         }
         for row in core::hint::black_box(&BIAS4) {

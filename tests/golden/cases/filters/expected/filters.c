@@ -47,7 +47,26 @@
 #define FILTERS_CODE
 #endif
 
-FILTERS_TABLE static const float filters_weights0[40] = {
+/*
+ * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
+ * fast; helpers that this build may not need.
+ */
+#if defined(__GNUC__)
+#define FILTERS_APART __attribute__((noinline))
+#define FILTERS_COLD __attribute__((cold))
+#define FILTERS_SPARE __attribute__((unused))
+#else
+#define FILTERS_APART
+#define FILTERS_COLD
+#define FILTERS_SPARE
+#endif
+#if defined(__GNUC__)
+#define FILTERS_ALIGNED __attribute__((aligned(64)))
+#else
+#define FILTERS_ALIGNED
+#endif
+
+FILTERS_TABLE FILTERS_ALIGNED static const float filters_weights0[40] = {
     0.09672132f, -0.26483372f, -0.31805533f, 0.4414412f, -0.24736558f, 0.26426315f, 0.24142319f, -0.14400415f,
     0.25481847f, -0.16662619f, 0.101439506f, -0.17025544f, -0.12958555f, 0.026766503f, 0.40682873f, 0.28151953f,
     -0.065945275f, -0.3073913f, 0.12703674f, -0.16032785f, -0.19984038f, 0.059175737f, -0.4792068f,
@@ -60,7 +79,7 @@ FILTERS_TABLE static const float filters_bias0[5] = {
     0.31085488f, -0.35127667f, -0.5216126f, 0.18891609f, 0.35936192f,
 };
 
-FILTERS_TABLE static const float filters_weights1[20] = {
+FILTERS_TABLE FILTERS_ALIGNED static const float filters_weights1[20] = {
     -0.08560874f, -0.038688105f, -0.36041594f, 0.53292054f, 0.64349246f, 0.33757457f, 0.1287781f, -0.17905018f,
     0.47089255f, -0.24448837f, -0.1930977f, 0.54904443f, -0.43568444f, 0.12696421f, -0.13106312f, -0.23561998f,
     0.06658507f, 0.1337705f, -0.44409302f, -0.66318005f,
@@ -70,7 +89,7 @@ FILTERS_TABLE static const float filters_bias1[4] = {
     0.15470055f, 0.13056146f, -0.43318373f, 0.10934106f,
 };
 
-FILTERS_TABLE static const float filters_weights2[12] = {
+FILTERS_TABLE FILTERS_ALIGNED static const float filters_weights2[12] = {
     0.47400886f, 0.6136332f, -0.18726744f, -0.38012767f, 0.29138902f, 0.073357865f, -0.5681304f, -0.42602634f,
     0.38877392f, 0.038003378f, -0.108863495f, 0.46920913f,
 };
@@ -109,7 +128,7 @@ static uint32_t filters_bits(float x)
     return bits;
 }
 
-static float filters_from_bits(uint32_t bits)
+FILTERS_SPARE static float filters_from_bits(uint32_t bits)
 {
     float x;
     (void)__builtin_memcpy(&x, &bits, sizeof(x));
@@ -128,7 +147,7 @@ static uint32_t filters_bits(float x)
     return word.bits;
 }
 
-static float filters_from_bits(uint32_t bits)
+FILTERS_SPARE static float filters_from_bits(uint32_t bits)
 {
     filters_word word;
     word.bits = bits;
@@ -146,27 +165,48 @@ static uint32_t filters_flag(int condition)
     return flag;
 }
 
+#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__)
+/* conditional moves: each is executed, or skipped, in the same time */
+#define FILTERS_MOVES 1
+#endif
+
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float filters_select(uint32_t flag, float then, float otherwise)
 {
+#if defined(FILTERS_MOVES)
+    float chosen = otherwise;
+    __asm__("cmp %1, #0\n\tit ne\n\tvmovne.f32 %0, %2" : "+t"(chosen) : "r"(flag), "t"(then) : "cc");
+    return chosen;
+#else
     const uint32_t mask = (uint32_t)0 - flag;
     return filters_from_bits((filters_bits(then) & mask) | (filters_bits(otherwise) & ~mask));
+#endif
 }
 
-static uint32_t filters_within(float x, float low, float high)
+FILTERS_CODE FILTERS_APART static uint32_t filters_within(float x, float low, float high)
 {
+#if defined(FILTERS_MOVES)
+    uint32_t flag;
+    __asm__("vcmp.f32 %2, %1\n\tvmrs APSR_nzcv, fpscr\n\titt ge\n\tvcmpge.f32 %1, %3\n\tvmrsge APSR_nzcv, fpscr\n\t"
+            "ite ge\n\tmovge %0, #1\n\tmovlt %0, #0" : "=r"(flag) : "t"(x), "t"(high), "t"(low) : "cc");
+    return flag;
+#else
     return filters_flag(x >= low) & filters_flag(x <= high);
+#endif
 }
 
-static uint32_t filters_outside(float x, float low, float high)
+FILTERS_CODE FILTERS_APART static float filters_clamp(float x, float low, float high)
 {
-    return filters_flag(x < low) | filters_flag(x > high);
-}
-
-static float filters_clamp(float x, float low, float high)
-{
+#if defined(FILTERS_MOVES)
+    float clamped = x;
+    __asm__("vcmp.f32 %0, %1\n\tvmrs APSR_nzcv, fpscr\n\tit mi\n\tvmovmi.f32 %0, %1\n\t"
+            "vcmp.f32 %0, %2\n\tvmrs APSR_nzcv, fpscr\n\tit gt\n\tvmovgt.f32 %0, %2"
+            : "+&t"(clamped) : "t"(low), "t"(high) : "cc");
+    return clamped;
+#else
     const float raised = filters_select(filters_flag(x < low), low, x);
     return filters_select(filters_flag(raised > high), high, raised);
+#endif
 }
 
 /* oldest first, newest last; a line that is not primed reads as newest throughout */
@@ -204,7 +244,7 @@ typedef struct {
 } filters_front;
 
 /* Sanitise, filters, observation. */
-FILTERS_CODE static void filters_sense(const filters_state *state, const filters_measurement *measured, filters_front *front)
+FILTERS_CODE FILTERS_APART static void filters_sense(const filters_state *state, const filters_measurement *measured, filters_front *front)
 {
     const uint32_t f0 = filters_within(measured->v_out, 0.0f, 80.0f);
     const float v1 = filters_select(f0, measured->v_out, state->held[0]);
@@ -214,8 +254,8 @@ FILTERS_CODE static void filters_sense(const filters_state *state, const filters
     const float v5 = 48.0f - v1;
     const float v6 = filters_select(state->primed, state->memory[0], v5);
     const float v7 = v6 * 0.1f;
-    const uint32_t f8 = filters_outside(v7, -5.0f, 5.0f);
-    const float v9 = filters_clamp(v7, -5.0f, 5.0f);
+    const float v8 = filters_clamp(v7, -5.0f, 5.0f);
+    const uint32_t f9 = filters_bits(v7) ^ filters_bits(v8);
     const float v10 = filters_select(state->primed, state->memory[20], v1);
     const float v11 = v1 - v10;
     const float v12 = v11 * 20000.0f;
@@ -256,9 +296,10 @@ FILTERS_CODE static void filters_sense(const filters_state *state, const filters
     const float v47 = v46 * 0.33333334f;
     const float v48 = v45 + v47;
     const float v49 = v48 * 1e-5f;
-    const uint32_t f50 = filters_outside(v49, -1.0f, 1.0f);
-    const float v51 = filters_clamp(v49, -1.0f, 1.0f);
-    const uint32_t f52 = f8 | f50;
+    const float v50 = filters_clamp(v49, -1.0f, 1.0f);
+    const uint32_t f51 = filters_bits(v49) ^ filters_bits(v50);
+    const uint32_t f52 = f9 | f51;
+    const uint32_t f53 = filters_flag(f52 != 0u);
     const uint32_t counted = state->bad_count + filters_flag(state->bad_count <= 2u);
     const uint32_t bad_count = counted & (f4 - (uint32_t)1);
     const uint32_t bridged = state->primed & filters_flag(bad_count <= 2u);
@@ -266,14 +307,14 @@ FILTERS_CODE static void filters_sense(const filters_state *state, const filters
 
     front->signal[0] = v1;
     front->signal[1] = v3;
-    front->observation[0] = v9;
+    front->observation[0] = v8;
     front->observation[1] = v13;
     front->observation[2] = v19;
     front->observation[3] = v24;
     front->observation[4] = v31;
     front->observation[5] = v34;
     front->observation[6] = v38;
-    front->observation[7] = v51;
+    front->observation[7] = v50;
     front->push[0] = v5;
     front->push[1] = v1;
     front->push[2] = v17;
@@ -290,7 +331,7 @@ FILTERS_CODE static void filters_sense(const filters_state *state, const filters
     front->usable = usable;
     front->held = usable & (f4 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
-    front->clipped = f52;
+    front->clipped = f53;
 }
 
 /* Sums side by side in vectors, each one in the order written; the width is that of the machine the compiler is told of. */
@@ -503,38 +544,45 @@ FILTERS_CODE void filters_q_values(const float *observation, float *q)
     filters_layer1(hidden0, hidden1);
     filters_layer2(hidden1, q);
 }
-/* Network, argmax, mapping, limits, status. */
-FILTERS_CODE static void filters_decide(const filters_state *state, const filters_front *front, filters_command *command)
+/* Network and argmax: the greedy action. */
+FILTERS_CODE FILTERS_APART static uint32_t filters_choose(const filters_state *state, const filters_measurement *measured)
 {
-    float q[FILTERS_ACTIONS];
+    float observation[8];
+    float q[3];
     float best = -3.40282347e+38f;
-    float chosen = filters_duties[0];
     uint32_t index = 0u;
     uint32_t action;
 
-    filters_q_values(front->observation, q);
+    filters_observe(state, measured, observation);
+    filters_q_values(observation, q);
     /* the lowest index wins among equals, a NaN never does */
     for (action = 0u; action < FILTERS_ACTIONS; ++action) {
-        const uint32_t above = filters_flag(q[action] > best);
+        const float output = q[action];
+        const uint32_t above = filters_flag(output > best);
         const uint32_t mask = (uint32_t)0 - above;
-        best = filters_select(above, q[action], best);
-        chosen = filters_select(above, filters_duties[action], chosen);
+        best = filters_select(above, output, best);
         index = (action & mask) | (index & ~mask);
     }
-    {
-        const uint32_t f0 = filters_outside(chosen, 0.05f, 0.95f);
-        const float v1 = filters_clamp(chosen, 0.05f, 0.95f);
-        const uint32_t usable = front->usable;
-        const uint32_t status = (front->held << 0)
-                              | (front->primed_now << 2)
-                              | (front->clipped << 3)
-                              | (f0 << 7);
+    return index;
+}
 
-        command->duty = filters_select(usable, v1, 0.05f);
-        command->duty_sim = filters_select(usable, chosen, 0.05f);
-        command->action_index = index;
-        command->status = (status & ((uint32_t)0 - usable)) | (FILTERS_STATUS_FALLBACK & (usable - (uint32_t)1));
-    }
+/* Mapping, limits, status. */
+FILTERS_CODE static void filters_decide(const filters_state *state, const filters_front *front, uint32_t index, filters_command *command)
+{
+    const float chosen = filters_duties[index];
+    const float v0 = filters_clamp(chosen, 0.05f, 0.95f);
+    const uint32_t f1 = filters_bits(chosen) ^ filters_bits(v0);
+    const uint32_t f2 = filters_flag(f1 != 0u);
+    const uint32_t usable = front->usable;
+    const uint32_t status = (front->held << 0)
+                          | (front->primed_now << 2)
+                          | (front->clipped << 3)
+                          | (f2 << 7);
+
+    command->duty = filters_select(usable, v0, 0.05f);
+    command->duty_sim = filters_select(usable, chosen, 0.05f);
+    command->action_index = index;
+    command->status = (status & ((uint32_t)0 - usable)) | (FILTERS_STATUS_FALLBACK & (usable - (uint32_t)1));
     (void)state;
 }
 
@@ -571,11 +619,29 @@ FILTERS_CODE FILTERS_NO_LIBC static void filters_advance(filters_state *state, c
     state->primed = front->usable;
 }
 
-FILTERS_CODE void filters_eval(const filters_state *state, const filters_measurement *measured, filters_command *command)
+/*
+ * A measurement is sensed again after the network, in a function of its own: what the network does not need is not on the
+ * stack while it runs.
+ */
+FILTERS_CODE FILTERS_APART static void filters_answer(const filters_state *state, const filters_measurement *measured, uint32_t index, filters_command *command)
 {
     filters_front front;
     filters_sense(state, measured, &front);
-    filters_decide(state, &front, command);
+    filters_decide(state, &front, index, command);
+}
+
+FILTERS_CODE FILTERS_APART static void filters_settle(filters_state *state, const filters_measurement *measured, uint32_t index, filters_command *command)
+{
+    filters_front front;
+    filters_sense(state, measured, &front);
+    filters_decide(state, &front, index, command);
+    filters_advance(state, &front, command);
+}
+
+FILTERS_CODE void filters_eval(const filters_state *state, const filters_measurement *measured, filters_command *command)
+{
+    const uint32_t index = filters_choose(state, measured);
+    filters_answer(state, measured, index, command);
 }
 
 FILTERS_CODE void filters_commit(filters_state *state, const filters_measurement *measured, const filters_command *command)
@@ -587,13 +653,11 @@ FILTERS_CODE void filters_commit(filters_state *state, const filters_measurement
 
 FILTERS_CODE void filters_step(filters_state *state, const filters_measurement *measured, filters_command *command)
 {
-    filters_front front;
-    filters_sense(state, measured, &front);
-    filters_decide(state, &front, command);
-    filters_advance(state, &front, command);
+    const uint32_t index = filters_choose(state, measured);
+    filters_settle(state, measured, index, command);
 }
 
-FILTERS_CODE FILTERS_NO_LIBC void filters_observe(const filters_state *state, const filters_measurement *measured, float *observation)
+FILTERS_CODE FILTERS_APART FILTERS_NO_LIBC void filters_observe(const filters_state *state, const filters_measurement *measured, float *observation)
 {
     filters_front front;
     uint32_t i;
@@ -603,7 +667,7 @@ FILTERS_CODE FILTERS_NO_LIBC void filters_observe(const filters_state *state, co
     }
 }
 
-FILTERS_NO_LIBC void filters_reset(filters_state *state)
+FILTERS_COLD FILTERS_NO_LIBC void filters_reset(filters_state *state)
 {
     uint32_t i;
     for (i = 0u; i < 69u; ++i) {
@@ -617,7 +681,7 @@ FILTERS_NO_LIBC void filters_reset(filters_state *state)
     state->primed = 0u;
 }
 
-void filters_init(filters_state *state)
+FILTERS_COLD void filters_init(filters_state *state)
 {
     filters_reset(state);
 }
@@ -626,21 +690,27 @@ void filters_init(filters_state *state)
  * CRC-32 (IEEE 802.3) of words taken little-endian, whatever the byte order of the machine.
  * volatile: the memory is read, the compiler does not answer in its place.
  */
-static uint32_t filters_crc(uint32_t start, const volatile float *words, uint32_t length)
+FILTERS_COLD FILTERS_APART static uint32_t filters_crc_word(uint32_t start, uint32_t word)
 {
-    uint32_t crc = start;
-    uint32_t i;
+    uint32_t crc = start ^ word;
     uint32_t nibble;
-    for (i = 0u; i < length; ++i) {
-        crc ^= filters_bits(words[i]);
-        for (nibble = 0u; nibble < 8u; ++nibble) {
-            crc = (crc >> 4) ^ filters_crc_steps[crc & 15u];
-        }
+    for (nibble = 0u; nibble < 8u; ++nibble) {
+        crc = (crc >> 4) ^ filters_crc_steps[crc & 15u];
     }
     return crc;
 }
 
-uint32_t filters_integrity(void)
+FILTERS_COLD FILTERS_APART static uint32_t filters_crc(uint32_t start, const volatile float *words, uint32_t length)
+{
+    uint32_t crc = start;
+    uint32_t i;
+    for (i = 0u; i < length; ++i) {
+        crc = filters_crc_word(crc, filters_bits(words[i]));
+    }
+    return crc;
+}
+
+FILTERS_COLD uint32_t filters_integrity(void)
 {
     uint32_t crc = 0xFFFFFFFFu;
     crc = filters_crc(crc, filters_weights0, 40u);
@@ -653,7 +723,7 @@ uint32_t filters_integrity(void)
     return filters_flag((crc ^ 0xFFFFFFFFu) == 0x4ECCE7EDu);
 }
 
-uint32_t filters_self_test(void)
+FILTERS_COLD uint32_t filters_self_test(void)
 {
     float observation[FILTERS_FEATURES];
     float q[FILTERS_ACTIONS];

@@ -130,6 +130,9 @@ fn crc_floats(crc: u32, words: &[f32]) -> u32 {
     words.iter().fold(crc, |crc, word| crc_word(crc, word.to_bits()))
 }
 static DUTIES: [f32; ACTIONS] = [0.25, 0.5, 0.75];
+/// So that no vector of weights lies across two lines of the cache.
+#[repr(align(64))]
+struct Aligned<T>(T);
 /// Sums of one block of outputs: from the bias, inputs in index order, every operation rounded.
 #[inline(always)]
 fn block<const INPUTS: usize, const ROWS: usize>(
@@ -145,7 +148,7 @@ fn block<const INPUTS: usize, const ROWS: usize>(
     }
     sums
 }
-static WEIGHTS0: [[[f32; 5]; 8]; 1] = [
+static WEIGHTS0: Aligned<[[[f32; 5]; 8]; 1]> = Aligned([
     [
         [0.09672132, -0.26483372, -0.31805533, 0.4414412, -0.24736558],
         [0.26426315, 0.24142319, -0.14400415, 0.25481847, -0.16662619],
@@ -156,7 +159,7 @@ static WEIGHTS0: [[[f32; 5]; 8]; 1] = [
         [0.24008426, 0.45820633, -0.1262112, 0.38941014, 0.42648548],
         [0.2535904, -0.31460136, -0.1795818, 0.10970836, -0.2936991],
     ],
-];
+]);
 static BIAS0: [[f32; 5]; 1] = [
     [0.31085488, -0.35127667, -0.5216126, 0.18891609, 0.35936192],
 ];
@@ -165,7 +168,7 @@ static BIAS0: [[f32; 5]; 1] = [
 fn layer0(x: &[f32; 8]) -> [f32; 5] {
     let mut y = [0.0; 5];
     let mut rest: &mut [f32] = &mut y;
-    for (weights, bias) in WEIGHTS0.iter().zip(&BIAS0) {
+    for (weights, bias) in WEIGHTS0.0.iter().zip(&BIAS0) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<5>()
         {
@@ -177,7 +180,7 @@ fn layer0(x: &[f32; 8]) -> [f32; 5] {
     }
     y
 }
-static WEIGHTS1: [[[f32; 4]; 5]; 1] = [
+static WEIGHTS1: Aligned<[[[f32; 4]; 5]; 1]> = Aligned([
     [
         [-0.08560874, -0.038688105, -0.36041594, 0.53292054],
         [0.64349246, 0.33757457, 0.1287781, -0.17905018],
@@ -185,14 +188,14 @@ static WEIGHTS1: [[[f32; 4]; 5]; 1] = [
         [-0.43568444, 0.12696421, -0.13106312, -0.23561998],
         [0.06658507, 0.1337705, -0.44409302, -0.66318005],
     ],
-];
+]);
 static BIAS1: [[f32; 4]; 1] = [[0.15470055, 0.13056146, -0.43318373, 0.10934106]];
 /// fc1: 5 -> 4
 #[inline(always)]
 fn layer1(x: &[f32; 5]) -> [f32; 4] {
     let mut y = [0.0; 4];
     let mut rest: &mut [f32] = &mut y;
-    for (weights, bias) in WEIGHTS1.iter().zip(&BIAS1) {
+    for (weights, bias) in WEIGHTS1.0.iter().zip(&BIAS1) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<4>()
         {
@@ -204,21 +207,21 @@ fn layer1(x: &[f32; 5]) -> [f32; 4] {
     }
     y
 }
-static WEIGHTS2: [[[f32; 3]; 4]; 1] = [
+static WEIGHTS2: Aligned<[[[f32; 3]; 4]; 1]> = Aligned([
     [
         [0.47400886, 0.6136332, -0.18726744],
         [-0.38012767, 0.29138902, 0.073357865],
         [-0.5681304, -0.42602634, 0.38877392],
         [0.038003378, -0.108863495, 0.46920913],
     ],
-];
+]);
 static BIAS2: [[f32; 3]; 1] = [[-0.19511996, -0.4913317, -0.638233]];
 /// fc2: 4 -> 3
 #[inline(always)]
 fn layer2(x: &[f32; 4]) -> [f32; 3] {
     let mut y = [0.0; 3];
     let mut rest: &mut [f32] = &mut y;
-    for (weights, bias) in WEIGHTS2.iter().zip(&BIAS2) {
+    for (weights, bias) in WEIGHTS2.0.iter().zip(&BIAS2) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<3>()
         {
@@ -328,8 +331,8 @@ impl Controller {
         let v5: f32 = 48.0 - v1;
         let v6: f32 = select(self.primed, self.memory[0], v5);
         let v7: f32 = v6 * 0.1;
-        let f8: u32 = outside(v7, -5.0, 5.0);
-        let v9: f32 = clamp(v7, -5.0, 5.0);
+        let v8: f32 = clamp(v7, -5.0, 5.0);
+        let f9: u32 = v7.to_bits() ^ v8.to_bits();
         let v10: f32 = select(self.primed, self.memory[20], v1);
         let v11: f32 = v1 - v10;
         let v12: f32 = v11 * 20000.0;
@@ -380,21 +383,22 @@ impl Controller {
         let v47: f32 = v46 * 0.33333334;
         let v48: f32 = v45 + v47;
         let v49: f32 = v48 * 0.00001;
-        let f50: u32 = outside(v49, -1.0, 1.0);
-        let v51: f32 = clamp(v49, -1.0, 1.0);
-        let f52: u32 = f8 | f50;
+        let v50: f32 = clamp(v49, -1.0, 1.0);
+        let f51: u32 = v49.to_bits() ^ v50.to_bits();
+        let f52: u32 = f9 | f51;
+        let f53: u32 = flag(f52 != 0);
         let counted = self.bad_count.wrapping_add(flag(self.bad_count <= 2));
         let bad_count = counted & f4.wrapping_sub(1);
         let usable = f4 | (self.primed & flag(bad_count <= 2));
         Front {
             signal: [v1, v3],
-            observation: [v9, v13, v19, v24, v31, v34, v38, v51],
+            observation: [v8, v13, v19, v24, v31, v34, v38, v50],
             push: [v5, v1, v17, v23, v1, v30, v1, v38, v3, v39, v41, v48],
             bad_count,
             usable,
             held: usable & (f4 ^ 1),
             primed_now: usable & (self.primed ^ 1),
-            clipped: f52,
+            clipped: f53,
         }
     }
     /// Network, argmax, mapping, limits, status.
@@ -412,13 +416,14 @@ impl Controller {
             action_index = (action & mask) | (action_index & !mask);
             action = action.wrapping_add(1);
         }
-        let f0: u32 = outside(chosen, 0.05, 0.95);
-        let v1: f32 = clamp(chosen, 0.05, 0.95);
+        let v0: f32 = clamp(chosen, 0.05, 0.95);
+        let f1: u32 = chosen.to_bits() ^ v0.to_bits();
+        let f2: u32 = flag(f1 != 0);
         let usable = front.usable;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
-            | (f0 << 7);
+            | (f2 << 7);
         Command {
-            duty: select(usable, v1, 0.05),
+            duty: select(usable, v0, 0.05),
             duty_sim: select(usable, chosen, 0.05),
             action_index,
             status: (status & 0_u32.wrapping_sub(usable))
@@ -511,19 +516,19 @@ impl Controller {
     #[must_use]
     pub fn integrity() -> bool {
         let mut crc = u32::MAX;
-        for column in core::hint::black_box(&WEIGHTS0).iter().flatten() {
+        for column in core::hint::black_box(&WEIGHTS0.0).iter().flatten() {
             crc = crc_floats(crc, column);
         }
         for row in core::hint::black_box(&BIAS0) {
             crc = crc_floats(crc, row);
         }
-        for column in core::hint::black_box(&WEIGHTS1).iter().flatten() {
+        for column in core::hint::black_box(&WEIGHTS1.0).iter().flatten() {
             crc = crc_floats(crc, column);
         }
         for row in core::hint::black_box(&BIAS1) {
             crc = crc_floats(crc, row);
         }
-        for column in core::hint::black_box(&WEIGHTS2).iter().flatten() {
+        for column in core::hint::black_box(&WEIGHTS2.0).iter().flatten() {
             crc = crc_floats(crc, column);
         }
         for row in core::hint::black_box(&BIAS2) {

@@ -47,7 +47,26 @@
 #define LINEAR_CODE
 #endif
 
-LINEAR_TABLE static const float linear_weights0[8] = {
+/*
+ * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
+ * fast; helpers that this build may not need.
+ */
+#if defined(__GNUC__)
+#define LINEAR_APART __attribute__((noinline))
+#define LINEAR_COLD __attribute__((cold))
+#define LINEAR_SPARE __attribute__((unused))
+#else
+#define LINEAR_APART
+#define LINEAR_COLD
+#define LINEAR_SPARE
+#endif
+#if defined(__GNUC__)
+#define LINEAR_ALIGNED __attribute__((aligned(64)))
+#else
+#define LINEAR_ALIGNED
+#endif
+
+LINEAR_TABLE LINEAR_ALIGNED static const float linear_weights0[8] = {
     0.5087287f, -0.9411388f, 0.10764045f, -0.6520509f, -0.1138858f, -0.83677846f, 0.686646f, -0.63075453f,
 };
 
@@ -85,7 +104,7 @@ static uint32_t linear_bits(float x)
     return bits;
 }
 
-static float linear_from_bits(uint32_t bits)
+LINEAR_SPARE static float linear_from_bits(uint32_t bits)
 {
     float x;
     (void)__builtin_memcpy(&x, &bits, sizeof(x));
@@ -104,7 +123,7 @@ static uint32_t linear_bits(float x)
     return word.bits;
 }
 
-static float linear_from_bits(uint32_t bits)
+LINEAR_SPARE static float linear_from_bits(uint32_t bits)
 {
     linear_word word;
     word.bits = bits;
@@ -122,27 +141,48 @@ static uint32_t linear_flag(int condition)
     return flag;
 }
 
+#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__)
+/* conditional moves: each is executed, or skipped, in the same time */
+#define LINEAR_MOVES 1
+#endif
+
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float linear_select(uint32_t flag, float then, float otherwise)
 {
+#if defined(LINEAR_MOVES)
+    float chosen = otherwise;
+    __asm__("cmp %1, #0\n\tit ne\n\tvmovne.f32 %0, %2" : "+t"(chosen) : "r"(flag), "t"(then) : "cc");
+    return chosen;
+#else
     const uint32_t mask = (uint32_t)0 - flag;
     return linear_from_bits((linear_bits(then) & mask) | (linear_bits(otherwise) & ~mask));
+#endif
 }
 
-static uint32_t linear_within(float x, float low, float high)
+LINEAR_CODE LINEAR_APART static uint32_t linear_within(float x, float low, float high)
 {
+#if defined(LINEAR_MOVES)
+    uint32_t flag;
+    __asm__("vcmp.f32 %2, %1\n\tvmrs APSR_nzcv, fpscr\n\titt ge\n\tvcmpge.f32 %1, %3\n\tvmrsge APSR_nzcv, fpscr\n\t"
+            "ite ge\n\tmovge %0, #1\n\tmovlt %0, #0" : "=r"(flag) : "t"(x), "t"(high), "t"(low) : "cc");
+    return flag;
+#else
     return linear_flag(x >= low) & linear_flag(x <= high);
+#endif
 }
 
-static uint32_t linear_outside(float x, float low, float high)
+LINEAR_CODE LINEAR_APART static float linear_clamp(float x, float low, float high)
 {
-    return linear_flag(x < low) | linear_flag(x > high);
-}
-
-static float linear_clamp(float x, float low, float high)
-{
+#if defined(LINEAR_MOVES)
+    float clamped = x;
+    __asm__("vcmp.f32 %0, %1\n\tvmrs APSR_nzcv, fpscr\n\tit mi\n\tvmovmi.f32 %0, %1\n\t"
+            "vcmp.f32 %0, %2\n\tvmrs APSR_nzcv, fpscr\n\tit gt\n\tvmovgt.f32 %0, %2"
+            : "+&t"(clamped) : "t"(low), "t"(high) : "cc");
+    return clamped;
+#else
     const float raised = linear_select(linear_flag(x < low), low, x);
     return linear_select(linear_flag(raised > high), high, raised);
+#endif
 }
 
 /* What a measurement means before the network sees it. */
@@ -157,7 +197,7 @@ typedef struct {
 } linear_front;
 
 /* Sanitise, filters, observation. */
-LINEAR_CODE static void linear_sense(const linear_state *state, const linear_measurement *measured, linear_front *front)
+LINEAR_CODE LINEAR_APART static void linear_sense(const linear_state *state, const linear_measurement *measured, linear_front *front)
 {
     const uint32_t f0 = linear_within(measured->v_out, 0.0f, 250.0f);
     const float v1 = linear_select(f0, measured->v_out, state->held[0]);
@@ -253,42 +293,50 @@ LINEAR_CODE void linear_q_values(const float *observation, float *q)
 {
     linear_layer0(observation, q);
 }
-/* Network, argmax, mapping, limits, status. */
-LINEAR_CODE static void linear_decide(const linear_state *state, const linear_front *front, linear_command *command)
+/* Network and argmax: the greedy action. */
+LINEAR_CODE LINEAR_APART static uint32_t linear_choose(const linear_state *state, const linear_measurement *measured)
 {
-    float q[LINEAR_ACTIONS];
+    float observation[2];
+    float q[4];
     float best = -3.40282347e+38f;
-    float chosen = linear_duties[0];
     uint32_t index = 0u;
     uint32_t action;
 
-    linear_q_values(front->observation, q);
+    linear_observe(state, measured, observation);
+    linear_q_values(observation, q);
     /* the lowest index wins among equals, a NaN never does */
     for (action = 0u; action < LINEAR_ACTIONS; ++action) {
-        const uint32_t above = linear_flag(q[action] > best);
+        const float output = q[action];
+        const uint32_t above = linear_flag(output > best);
         const uint32_t mask = (uint32_t)0 - above;
-        best = linear_select(above, q[action], best);
-        chosen = linear_select(above, linear_duties[action], chosen);
+        best = linear_select(above, output, best);
         index = (action & mask) | (index & ~mask);
     }
-    {
-        const float v0 = state->previous_command - 0.049999997f;
-        const float v1 = state->previous_command + 0.049999997f;
-        const uint32_t f2 = linear_outside(chosen, v0, v1);
-        const float v3 = linear_clamp(chosen, v0, v1);
-        const uint32_t f4 = linear_outside(v3, 0.4f, 0.59999996f);
-        const float v5 = linear_clamp(v3, 0.4f, 0.59999996f);
-        const uint32_t usable = front->usable;
-        const uint32_t status = (front->held << 0)
-                              | (front->primed_now << 2)
-                              | (f2 << 5)
-                              | (f4 << 7);
+    return index;
+}
 
-        command->duty = linear_select(usable, v5, 0.4f);
-        command->duty_sim = linear_select(usable, chosen, 0.4f);
-        command->action_index = index;
-        command->status = (status & ((uint32_t)0 - usable)) | (LINEAR_STATUS_FALLBACK & (usable - (uint32_t)1));
-    }
+/* Mapping, limits, status. */
+LINEAR_CODE static void linear_decide(const linear_state *state, const linear_front *front, uint32_t index, linear_command *command)
+{
+    const float chosen = linear_duties[index];
+    const float v0 = state->previous_command - 0.049999997f;
+    const float v1 = state->previous_command + 0.049999997f;
+    const float v2 = linear_clamp(chosen, v0, v1);
+    const uint32_t f3 = linear_bits(chosen) ^ linear_bits(v2);
+    const uint32_t f4 = linear_flag(f3 != 0u);
+    const float v5 = linear_clamp(v2, 0.4f, 0.59999996f);
+    const uint32_t f6 = linear_bits(v2) ^ linear_bits(v5);
+    const uint32_t f7 = linear_flag(f6 != 0u);
+    const uint32_t usable = front->usable;
+    const uint32_t status = (front->held << 0)
+                          | (front->primed_now << 2)
+                          | (f4 << 5)
+                          | (f7 << 7);
+
+    command->duty = linear_select(usable, v5, 0.4f);
+    command->duty_sim = linear_select(usable, chosen, 0.4f);
+    command->action_index = index;
+    command->status = (status & ((uint32_t)0 - usable)) | (LINEAR_STATUS_FALLBACK & (usable - (uint32_t)1));
     (void)state;
 }
 
@@ -306,11 +354,29 @@ LINEAR_CODE LINEAR_NO_LIBC static void linear_advance(linear_state *state, const
     state->primed = front->usable;
 }
 
-LINEAR_CODE void linear_eval(const linear_state *state, const linear_measurement *measured, linear_command *command)
+/*
+ * A measurement is sensed again after the network, in a function of its own: what the network does not need is not on the
+ * stack while it runs.
+ */
+LINEAR_CODE LINEAR_APART static void linear_answer(const linear_state *state, const linear_measurement *measured, uint32_t index, linear_command *command)
 {
     linear_front front;
     linear_sense(state, measured, &front);
-    linear_decide(state, &front, command);
+    linear_decide(state, &front, index, command);
+}
+
+LINEAR_CODE LINEAR_APART static void linear_settle(linear_state *state, const linear_measurement *measured, uint32_t index, linear_command *command)
+{
+    linear_front front;
+    linear_sense(state, measured, &front);
+    linear_decide(state, &front, index, command);
+    linear_advance(state, &front, command);
+}
+
+LINEAR_CODE void linear_eval(const linear_state *state, const linear_measurement *measured, linear_command *command)
+{
+    const uint32_t index = linear_choose(state, measured);
+    linear_answer(state, measured, index, command);
 }
 
 LINEAR_CODE void linear_commit(linear_state *state, const linear_measurement *measured, const linear_command *command)
@@ -322,13 +388,11 @@ LINEAR_CODE void linear_commit(linear_state *state, const linear_measurement *me
 
 LINEAR_CODE void linear_step(linear_state *state, const linear_measurement *measured, linear_command *command)
 {
-    linear_front front;
-    linear_sense(state, measured, &front);
-    linear_decide(state, &front, command);
-    linear_advance(state, &front, command);
+    const uint32_t index = linear_choose(state, measured);
+    linear_settle(state, measured, index, command);
 }
 
-LINEAR_CODE LINEAR_NO_LIBC void linear_observe(const linear_state *state, const linear_measurement *measured, float *observation)
+LINEAR_CODE LINEAR_APART LINEAR_NO_LIBC void linear_observe(const linear_state *state, const linear_measurement *measured, float *observation)
 {
     linear_front front;
     uint32_t i;
@@ -338,7 +402,7 @@ LINEAR_CODE LINEAR_NO_LIBC void linear_observe(const linear_state *state, const 
     }
 }
 
-LINEAR_NO_LIBC void linear_reset(linear_state *state)
+LINEAR_COLD LINEAR_NO_LIBC void linear_reset(linear_state *state)
 {
     uint32_t i;
     for (i = 0u; i < 1u; ++i) {
@@ -351,7 +415,7 @@ LINEAR_NO_LIBC void linear_reset(linear_state *state)
     state->primed = 0u;
 }
 
-void linear_init(linear_state *state)
+LINEAR_COLD void linear_init(linear_state *state)
 {
     linear_reset(state);
 }
@@ -360,21 +424,27 @@ void linear_init(linear_state *state)
  * CRC-32 (IEEE 802.3) of words taken little-endian, whatever the byte order of the machine.
  * volatile: the memory is read, the compiler does not answer in its place.
  */
-static uint32_t linear_crc(uint32_t start, const volatile float *words, uint32_t length)
+LINEAR_COLD LINEAR_APART static uint32_t linear_crc_word(uint32_t start, uint32_t word)
 {
-    uint32_t crc = start;
-    uint32_t i;
+    uint32_t crc = start ^ word;
     uint32_t nibble;
-    for (i = 0u; i < length; ++i) {
-        crc ^= linear_bits(words[i]);
-        for (nibble = 0u; nibble < 8u; ++nibble) {
-            crc = (crc >> 4) ^ linear_crc_steps[crc & 15u];
-        }
+    for (nibble = 0u; nibble < 8u; ++nibble) {
+        crc = (crc >> 4) ^ linear_crc_steps[crc & 15u];
     }
     return crc;
 }
 
-uint32_t linear_integrity(void)
+LINEAR_COLD LINEAR_APART static uint32_t linear_crc(uint32_t start, const volatile float *words, uint32_t length)
+{
+    uint32_t crc = start;
+    uint32_t i;
+    for (i = 0u; i < length; ++i) {
+        crc = linear_crc_word(crc, linear_bits(words[i]));
+    }
+    return crc;
+}
+
+LINEAR_COLD uint32_t linear_integrity(void)
 {
     uint32_t crc = 0xFFFFFFFFu;
     crc = linear_crc(crc, linear_weights0, 8u);
@@ -383,7 +453,7 @@ uint32_t linear_integrity(void)
     return linear_flag((crc ^ 0xFFFFFFFFu) == 0x4E6B233Cu);
 }
 
-uint32_t linear_self_test(void)
+LINEAR_COLD uint32_t linear_self_test(void)
 {
     float observation[LINEAR_FEATURES];
     float q[LINEAR_ACTIONS];

@@ -47,7 +47,26 @@
 #define MINIMAL_CODE
 #endif
 
-MINIMAL_TABLE static const float minimal_weights0[8] = {
+/*
+ * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
+ * fast; helpers that this build may not need.
+ */
+#if defined(__GNUC__)
+#define MINIMAL_APART __attribute__((noinline))
+#define MINIMAL_COLD __attribute__((cold))
+#define MINIMAL_SPARE __attribute__((unused))
+#else
+#define MINIMAL_APART
+#define MINIMAL_COLD
+#define MINIMAL_SPARE
+#endif
+#if defined(__GNUC__)
+#define MINIMAL_ALIGNED __attribute__((aligned(64)))
+#else
+#define MINIMAL_ALIGNED
+#endif
+
+MINIMAL_TABLE MINIMAL_ALIGNED static const float minimal_weights0[8] = {
     0.14119843f, 0.9991477f, -0.11823242f, 0.80047745f, 0.52138186f, -0.11803193f, 0.5576832f, 0.048932876f,
 };
 
@@ -55,7 +74,7 @@ MINIMAL_TABLE static const float minimal_bias0[4] = {
     -0.45500478f, 0.623661f, -0.20334516f, 0.22363037f,
 };
 
-MINIMAL_TABLE static const float minimal_weights1[12] = {
+MINIMAL_TABLE MINIMAL_ALIGNED static const float minimal_weights1[12] = {
     -0.06759314f, 0.21800196f, -0.6510597f, 0.045118496f, 0.4730259f, -0.627878f, -0.0960519f, 0.27255747f,
     -0.0061800727f, -0.49944752f, 0.5764868f, -0.56533664f,
 };
@@ -94,7 +113,7 @@ static uint32_t minimal_bits(float x)
     return bits;
 }
 
-static float minimal_from_bits(uint32_t bits)
+MINIMAL_SPARE static float minimal_from_bits(uint32_t bits)
 {
     float x;
     (void)__builtin_memcpy(&x, &bits, sizeof(x));
@@ -113,7 +132,7 @@ static uint32_t minimal_bits(float x)
     return word.bits;
 }
 
-static float minimal_from_bits(uint32_t bits)
+MINIMAL_SPARE static float minimal_from_bits(uint32_t bits)
 {
     minimal_word word;
     word.bits = bits;
@@ -131,27 +150,48 @@ static uint32_t minimal_flag(int condition)
     return flag;
 }
 
+#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__)
+/* conditional moves: each is executed, or skipped, in the same time */
+#define MINIMAL_MOVES 1
+#endif
+
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float minimal_select(uint32_t flag, float then, float otherwise)
 {
+#if defined(MINIMAL_MOVES)
+    float chosen = otherwise;
+    __asm__("cmp %1, #0\n\tit ne\n\tvmovne.f32 %0, %2" : "+t"(chosen) : "r"(flag), "t"(then) : "cc");
+    return chosen;
+#else
     const uint32_t mask = (uint32_t)0 - flag;
     return minimal_from_bits((minimal_bits(then) & mask) | (minimal_bits(otherwise) & ~mask));
+#endif
 }
 
-static uint32_t minimal_within(float x, float low, float high)
+MINIMAL_CODE MINIMAL_APART static uint32_t minimal_within(float x, float low, float high)
 {
+#if defined(MINIMAL_MOVES)
+    uint32_t flag;
+    __asm__("vcmp.f32 %2, %1\n\tvmrs APSR_nzcv, fpscr\n\titt ge\n\tvcmpge.f32 %1, %3\n\tvmrsge APSR_nzcv, fpscr\n\t"
+            "ite ge\n\tmovge %0, #1\n\tmovlt %0, #0" : "=r"(flag) : "t"(x), "t"(high), "t"(low) : "cc");
+    return flag;
+#else
     return minimal_flag(x >= low) & minimal_flag(x <= high);
+#endif
 }
 
-static uint32_t minimal_outside(float x, float low, float high)
+MINIMAL_CODE MINIMAL_APART static float minimal_clamp(float x, float low, float high)
 {
-    return minimal_flag(x < low) | minimal_flag(x > high);
-}
-
-static float minimal_clamp(float x, float low, float high)
-{
+#if defined(MINIMAL_MOVES)
+    float clamped = x;
+    __asm__("vcmp.f32 %0, %1\n\tvmrs APSR_nzcv, fpscr\n\tit mi\n\tvmovmi.f32 %0, %1\n\t"
+            "vcmp.f32 %0, %2\n\tvmrs APSR_nzcv, fpscr\n\tit gt\n\tvmovgt.f32 %0, %2"
+            : "+&t"(clamped) : "t"(low), "t"(high) : "cc");
+    return clamped;
+#else
     const float raised = minimal_select(minimal_flag(x < low), low, x);
     return minimal_select(minimal_flag(raised > high), high, raised);
+#endif
 }
 
 /* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
@@ -176,7 +216,7 @@ typedef struct {
 } minimal_front;
 
 /* Sanitise, filters, observation. */
-MINIMAL_CODE static void minimal_sense(const minimal_state *state, const minimal_measurement *measured, minimal_front *front)
+MINIMAL_CODE MINIMAL_APART static void minimal_sense(const minimal_state *state, const minimal_measurement *measured, minimal_front *front)
 {
     const uint32_t f0 = minimal_within(measured->v_out, 0.0f, 250.0f);
     const float v1 = minimal_select(f0, measured->v_out, state->held[0]);
@@ -343,37 +383,44 @@ MINIMAL_CODE void minimal_q_values(const float *observation, float *q)
     minimal_layer0(observation, hidden0);
     minimal_layer1(hidden0, q);
 }
-/* Network, argmax, mapping, limits, status. */
-MINIMAL_CODE static void minimal_decide(const minimal_state *state, const minimal_front *front, minimal_command *command)
+/* Network and argmax: the greedy action. */
+MINIMAL_CODE MINIMAL_APART static uint32_t minimal_choose(const minimal_state *state, const minimal_measurement *measured)
 {
-    float q[MINIMAL_ACTIONS];
+    float observation[2];
+    float q[3];
     float best = -3.40282347e+38f;
-    float chosen = minimal_duties[0];
     uint32_t index = 0u;
     uint32_t action;
 
-    minimal_q_values(front->observation, q);
+    minimal_observe(state, measured, observation);
+    minimal_q_values(observation, q);
     /* the lowest index wins among equals, a NaN never does */
     for (action = 0u; action < MINIMAL_ACTIONS; ++action) {
-        const uint32_t above = minimal_flag(q[action] > best);
+        const float output = q[action];
+        const uint32_t above = minimal_flag(output > best);
         const uint32_t mask = (uint32_t)0 - above;
-        best = minimal_select(above, q[action], best);
-        chosen = minimal_select(above, minimal_duties[action], chosen);
+        best = minimal_select(above, output, best);
         index = (action & mask) | (index & ~mask);
     }
-    {
-        const uint32_t f0 = minimal_outside(chosen, 0.1f, 0.9f);
-        const float v1 = minimal_clamp(chosen, 0.1f, 0.9f);
-        const uint32_t usable = front->usable;
-        const uint32_t status = (front->held << 0)
-                              | (front->primed_now << 2)
-                              | (f0 << 7);
+    return index;
+}
 
-        command->duty = minimal_select(usable, v1, 0.0f);
-        command->duty_sim = minimal_select(usable, chosen, 0.0f);
-        command->action_index = index;
-        command->status = (status & ((uint32_t)0 - usable)) | (MINIMAL_STATUS_FALLBACK & (usable - (uint32_t)1));
-    }
+/* Mapping, limits, status. */
+MINIMAL_CODE static void minimal_decide(const minimal_state *state, const minimal_front *front, uint32_t index, minimal_command *command)
+{
+    const float chosen = minimal_duties[index];
+    const float v0 = minimal_clamp(chosen, 0.1f, 0.9f);
+    const uint32_t f1 = minimal_bits(chosen) ^ minimal_bits(v0);
+    const uint32_t f2 = minimal_flag(f1 != 0u);
+    const uint32_t usable = front->usable;
+    const uint32_t status = (front->held << 0)
+                          | (front->primed_now << 2)
+                          | (f2 << 7);
+
+    command->duty = minimal_select(usable, v0, 0.0f);
+    command->duty_sim = minimal_select(usable, chosen, 0.0f);
+    command->action_index = index;
+    command->status = (status & ((uint32_t)0 - usable)) | (MINIMAL_STATUS_FALLBACK & (usable - (uint32_t)1));
     (void)state;
 }
 
@@ -390,11 +437,29 @@ MINIMAL_CODE MINIMAL_NO_LIBC static void minimal_advance(minimal_state *state, c
     state->primed = front->usable;
 }
 
-MINIMAL_CODE void minimal_eval(const minimal_state *state, const minimal_measurement *measured, minimal_command *command)
+/*
+ * A measurement is sensed again after the network, in a function of its own: what the network does not need is not on the
+ * stack while it runs.
+ */
+MINIMAL_CODE MINIMAL_APART static void minimal_answer(const minimal_state *state, const minimal_measurement *measured, uint32_t index, minimal_command *command)
 {
     minimal_front front;
     minimal_sense(state, measured, &front);
-    minimal_decide(state, &front, command);
+    minimal_decide(state, &front, index, command);
+}
+
+MINIMAL_CODE MINIMAL_APART static void minimal_settle(minimal_state *state, const minimal_measurement *measured, uint32_t index, minimal_command *command)
+{
+    minimal_front front;
+    minimal_sense(state, measured, &front);
+    minimal_decide(state, &front, index, command);
+    minimal_advance(state, &front, command);
+}
+
+MINIMAL_CODE void minimal_eval(const minimal_state *state, const minimal_measurement *measured, minimal_command *command)
+{
+    const uint32_t index = minimal_choose(state, measured);
+    minimal_answer(state, measured, index, command);
 }
 
 MINIMAL_CODE void minimal_commit(minimal_state *state, const minimal_measurement *measured, const minimal_command *command)
@@ -406,13 +471,11 @@ MINIMAL_CODE void minimal_commit(minimal_state *state, const minimal_measurement
 
 MINIMAL_CODE void minimal_step(minimal_state *state, const minimal_measurement *measured, minimal_command *command)
 {
-    minimal_front front;
-    minimal_sense(state, measured, &front);
-    minimal_decide(state, &front, command);
-    minimal_advance(state, &front, command);
+    const uint32_t index = minimal_choose(state, measured);
+    minimal_settle(state, measured, index, command);
 }
 
-MINIMAL_CODE MINIMAL_NO_LIBC void minimal_observe(const minimal_state *state, const minimal_measurement *measured, float *observation)
+MINIMAL_CODE MINIMAL_APART MINIMAL_NO_LIBC void minimal_observe(const minimal_state *state, const minimal_measurement *measured, float *observation)
 {
     minimal_front front;
     uint32_t i;
@@ -422,7 +485,7 @@ MINIMAL_CODE MINIMAL_NO_LIBC void minimal_observe(const minimal_state *state, co
     }
 }
 
-MINIMAL_NO_LIBC void minimal_reset(minimal_state *state)
+MINIMAL_COLD MINIMAL_NO_LIBC void minimal_reset(minimal_state *state)
 {
     state->held[0] = 0.0f;
     state->held[1] = 0.0f;
@@ -432,7 +495,7 @@ MINIMAL_NO_LIBC void minimal_reset(minimal_state *state)
     state->primed = 0u;
 }
 
-void minimal_init(minimal_state *state)
+MINIMAL_COLD void minimal_init(minimal_state *state)
 {
     minimal_reset(state);
 }
@@ -441,21 +504,27 @@ void minimal_init(minimal_state *state)
  * CRC-32 (IEEE 802.3) of words taken little-endian, whatever the byte order of the machine.
  * volatile: the memory is read, the compiler does not answer in its place.
  */
-static uint32_t minimal_crc(uint32_t start, const volatile float *words, uint32_t length)
+MINIMAL_COLD MINIMAL_APART static uint32_t minimal_crc_word(uint32_t start, uint32_t word)
 {
-    uint32_t crc = start;
-    uint32_t i;
+    uint32_t crc = start ^ word;
     uint32_t nibble;
-    for (i = 0u; i < length; ++i) {
-        crc ^= minimal_bits(words[i]);
-        for (nibble = 0u; nibble < 8u; ++nibble) {
-            crc = (crc >> 4) ^ minimal_crc_steps[crc & 15u];
-        }
+    for (nibble = 0u; nibble < 8u; ++nibble) {
+        crc = (crc >> 4) ^ minimal_crc_steps[crc & 15u];
     }
     return crc;
 }
 
-uint32_t minimal_integrity(void)
+MINIMAL_COLD MINIMAL_APART static uint32_t minimal_crc(uint32_t start, const volatile float *words, uint32_t length)
+{
+    uint32_t crc = start;
+    uint32_t i;
+    for (i = 0u; i < length; ++i) {
+        crc = minimal_crc_word(crc, minimal_bits(words[i]));
+    }
+    return crc;
+}
+
+MINIMAL_COLD uint32_t minimal_integrity(void)
 {
     uint32_t crc = 0xFFFFFFFFu;
     crc = minimal_crc(crc, minimal_weights0, 8u);
@@ -466,7 +535,7 @@ uint32_t minimal_integrity(void)
     return minimal_flag((crc ^ 0xFFFFFFFFu) == 0x49D4A3C9u);
 }
 
-uint32_t minimal_self_test(void)
+MINIMAL_COLD uint32_t minimal_self_test(void)
 {
     float observation[MINIMAL_FEATURES];
     float q[MINIMAL_ACTIONS];

@@ -47,7 +47,26 @@
 #define PAPER_CODE
 #endif
 
-PAPER_TABLE static const float paper_weights0[30] = {
+/*
+ * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
+ * fast; helpers that this build may not need.
+ */
+#if defined(__GNUC__)
+#define PAPER_APART __attribute__((noinline))
+#define PAPER_COLD __attribute__((cold))
+#define PAPER_SPARE __attribute__((unused))
+#else
+#define PAPER_APART
+#define PAPER_COLD
+#define PAPER_SPARE
+#endif
+#if defined(__GNUC__)
+#define PAPER_ALIGNED __attribute__((aligned(64)))
+#else
+#define PAPER_ALIGNED
+#endif
+
+PAPER_TABLE PAPER_ALIGNED static const float paper_weights0[30] = {
     -0.083949134f, 0.5152256f, 0.05293614f, 0.3202631f, 0.045309745f, 0.48059827f, -0.062781304f, 0.22072285f,
     -0.44776168f, 0.49864838f, 0.43982688f, -0.38973126f, 0.43016052f, -0.16406411f, 0.07861266f, -0.010074428f,
     0.046137735f, 0.3606652f, -0.5990139f, 0.45288f, -0.129112f, 0.36013362f, 0.13209343f, 0.13926542f,
@@ -58,7 +77,7 @@ PAPER_TABLE static const float paper_bias0[5] = {
     0.53400356f, -0.5470866f, -0.20673445f, -0.38793066f, 0.47392866f,
 };
 
-PAPER_TABLE static const float paper_weights1[20] = {
+PAPER_TABLE PAPER_ALIGNED static const float paper_weights1[20] = {
     0.49237937f, 0.32990912f, 0.0060609784f, 0.35716778f, 0.15229064f, 0.64166796f, 0.6272719f, -0.048858866f,
     0.6512296f, -0.6673276f, -0.077718474f, 0.033921782f, 0.45540097f, -0.32111973f, 0.56115896f, -0.3166257f,
     -0.40354934f, -0.45383662f, -0.17826565f, 0.2969881f,
@@ -68,7 +87,7 @@ PAPER_TABLE static const float paper_bias1[4] = {
     0.4645241f, 0.5204928f, 0.23977381f, -0.4841729f,
 };
 
-PAPER_TABLE static const float paper_weights2[36] = {
+PAPER_TABLE PAPER_ALIGNED static const float paper_weights2[36] = {
     -0.49332172f, -0.6726512f, -0.19417818f, -0.49696803f, -0.6998952f, 0.6764457f, -0.3352394f, 0.3008154f,
     -0.039866902f, 0.060929023f, -0.2515212f, 0.3508664f, -0.19253542f, -0.21910845f, -0.19269665f, 0.3976336f,
     -0.707273f, -0.601249f, -0.08923574f, -0.46304578f, -0.17179532f, -0.3861085f, 0.5107591f, 0.06570055f,
@@ -111,7 +130,7 @@ static uint32_t paper_bits(float x)
     return bits;
 }
 
-static float paper_from_bits(uint32_t bits)
+PAPER_SPARE static float paper_from_bits(uint32_t bits)
 {
     float x;
     (void)__builtin_memcpy(&x, &bits, sizeof(x));
@@ -130,7 +149,7 @@ static uint32_t paper_bits(float x)
     return word.bits;
 }
 
-static float paper_from_bits(uint32_t bits)
+PAPER_SPARE static float paper_from_bits(uint32_t bits)
 {
     paper_word word;
     word.bits = bits;
@@ -148,27 +167,60 @@ static uint32_t paper_flag(int condition)
     return flag;
 }
 
+#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__)
+/* conditional moves: each is executed, or skipped, in the same time */
+#define PAPER_MOVES 1
+#endif
+
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float paper_select(uint32_t flag, float then, float otherwise)
 {
+#if defined(PAPER_MOVES)
+    float chosen = otherwise;
+    __asm__("cmp %1, #0\n\tit ne\n\tvmovne.f32 %0, %2" : "+t"(chosen) : "r"(flag), "t"(then) : "cc");
+    return chosen;
+#else
     const uint32_t mask = (uint32_t)0 - flag;
     return paper_from_bits((paper_bits(then) & mask) | (paper_bits(otherwise) & ~mask));
+#endif
 }
 
-static uint32_t paper_within(float x, float low, float high)
+PAPER_CODE PAPER_APART static uint32_t paper_within(float x, float low, float high)
 {
+#if defined(PAPER_MOVES)
+    uint32_t flag;
+    __asm__("vcmp.f32 %2, %1\n\tvmrs APSR_nzcv, fpscr\n\titt ge\n\tvcmpge.f32 %1, %3\n\tvmrsge APSR_nzcv, fpscr\n\t"
+            "ite ge\n\tmovge %0, #1\n\tmovlt %0, #0" : "=r"(flag) : "t"(x), "t"(high), "t"(low) : "cc");
+    return flag;
+#else
     return paper_flag(x >= low) & paper_flag(x <= high);
+#endif
 }
 
-static uint32_t paper_outside(float x, float low, float high)
+PAPER_CODE PAPER_APART static uint32_t paper_outside(float x, float low, float high)
 {
+#if defined(PAPER_MOVES)
+    uint32_t flag;
+    __asm__("vcmp.f32 %1, %3\n\tvmrs APSR_nzcv, fpscr\n\titt pl\n\tvcmppl.f32 %2, %1\n\tvmrspl APSR_nzcv, fpscr\n\t"
+            "ite mi\n\tmovmi %0, #1\n\tmovpl %0, #0" : "=r"(flag) : "t"(x), "t"(high), "t"(low) : "cc");
+    return flag;
+#else
     return paper_flag(x < low) | paper_flag(x > high);
+#endif
 }
 
-static float paper_clamp(float x, float low, float high)
+PAPER_CODE PAPER_APART static float paper_clamp(float x, float low, float high)
 {
+#if defined(PAPER_MOVES)
+    float clamped = x;
+    __asm__("vcmp.f32 %0, %1\n\tvmrs APSR_nzcv, fpscr\n\tit mi\n\tvmovmi.f32 %0, %1\n\t"
+            "vcmp.f32 %0, %2\n\tvmrs APSR_nzcv, fpscr\n\tit gt\n\tvmovgt.f32 %0, %2"
+            : "+&t"(clamped) : "t"(low), "t"(high) : "cc");
+    return clamped;
+#else
     const float raised = paper_select(paper_flag(x < low), low, x);
     return paper_select(paper_flag(raised > high), high, raised);
+#endif
 }
 
 /* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
@@ -195,7 +247,7 @@ typedef struct {
 } paper_front;
 
 /* Sanitise, filters, observation. */
-PAPER_CODE static void paper_sense(const paper_state *state, const paper_measurement *measured, paper_front *front)
+PAPER_CODE PAPER_APART static void paper_sense(const paper_state *state, const paper_measurement *measured, paper_front *front)
 {
     const uint32_t f0 = paper_within(measured->v, 0.0f, 250.0f);
     const float v1 = paper_select(f0, measured->v, state->held[0]);
@@ -204,36 +256,37 @@ PAPER_CODE static void paper_sense(const paper_state *state, const paper_measure
     const uint32_t f4 = f0 & f2;
     const float v5 = v1 - 100.0f;
     const float v6 = v5 * 0.01f;
-    const uint32_t f7 = paper_outside(v6, -2.0f, 2.0f);
-    const float v8 = paper_clamp(v6, -2.0f, 2.0f);
+    const float v7 = paper_clamp(v6, -2.0f, 2.0f);
+    const uint32_t f8 = paper_bits(v6) ^ paper_bits(v7);
     const float v9 = paper_select(state->primed, state->memory[0], v5);
     const float v10 = v9 * 0.01f;
-    const uint32_t f11 = paper_outside(v10, -2.0f, 2.0f);
-    const float v12 = paper_clamp(v10, -2.0f, 2.0f);
+    const float v11 = paper_clamp(v10, -2.0f, 2.0f);
+    const uint32_t f12 = paper_bits(v10) ^ paper_bits(v11);
     const float v13 = paper_select(state->primed, state->memory[1], v5);
     const float v14 = v5 - v13;
     const float v15 = v14 * 10000.0f;
     const float v16 = v15 * 1e-5f;
-    const uint32_t f17 = paper_outside(v16, -2.0f, 2.0f);
-    const float v18 = paper_clamp(v16, -2.0f, 2.0f);
+    const float v17 = paper_clamp(v16, -2.0f, 2.0f);
+    const uint32_t f18 = paper_bits(v16) ^ paper_bits(v17);
     const float v19 = v1 * 0.01f;
-    const uint32_t f20 = paper_outside(v19, 0.0f, 2.5f);
-    const float v21 = paper_clamp(v19, 0.0f, 2.5f);
+    const float v20 = paper_clamp(v19, 0.0f, 2.5f);
+    const uint32_t f21 = paper_bits(v19) ^ paper_bits(v20);
     const float v22 = paper_select(state->primed, state->memory[2], v1);
     const float v23 = v22 * 0.01f;
-    const uint32_t f24 = paper_outside(v23, 0.0f, 2.5f);
-    const float v25 = paper_clamp(v23, 0.0f, 2.5f);
+    const float v24 = paper_clamp(v23, 0.0f, 2.5f);
+    const uint32_t f25 = paper_bits(v23) ^ paper_bits(v24);
     const float v26 = paper_select(state->primed, state->memory[3], v1);
     const float v27 = v1 - v26;
     const float v28 = v27 * 10000.0f;
     const float v29 = v28 * 1e-5f;
-    const uint32_t f30 = paper_outside(v29, -2.0f, 2.0f);
-    const float v31 = paper_clamp(v29, -2.0f, 2.0f);
-    const uint32_t f32 = f7 | f11;
-    const uint32_t f33 = f32 | f17;
-    const uint32_t f34 = f33 | f20;
-    const uint32_t f35 = f34 | f24;
-    const uint32_t f36 = f35 | f30;
+    const float v30 = paper_clamp(v29, -2.0f, 2.0f);
+    const uint32_t f31 = paper_bits(v29) ^ paper_bits(v30);
+    const uint32_t f32 = f8 | f12;
+    const uint32_t f33 = f32 | f18;
+    const uint32_t f34 = f33 | f21;
+    const uint32_t f35 = f34 | f25;
+    const uint32_t f36 = f35 | f31;
+    const uint32_t f37 = paper_flag(f36 != 0u);
     const uint32_t counted = state->bad_count + paper_flag(state->bad_count <= 3u);
     const uint32_t bad_count = counted & (f4 - (uint32_t)1);
     const uint32_t bridged = state->primed & paper_flag(bad_count <= 3u);
@@ -241,12 +294,12 @@ PAPER_CODE static void paper_sense(const paper_state *state, const paper_measure
 
     front->signal[0] = v1;
     front->signal[1] = v3;
-    front->observation[0] = v8;
-    front->observation[1] = v12;
-    front->observation[2] = v18;
-    front->observation[3] = v21;
-    front->observation[4] = v25;
-    front->observation[5] = v31;
+    front->observation[0] = v7;
+    front->observation[1] = v11;
+    front->observation[2] = v17;
+    front->observation[3] = v20;
+    front->observation[4] = v24;
+    front->observation[5] = v30;
     front->push[0] = v5;
     front->push[1] = v5;
     front->push[2] = v1;
@@ -255,7 +308,7 @@ PAPER_CODE static void paper_sense(const paper_state *state, const paper_measure
     front->usable = usable;
     front->held = usable & (f4 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
-    front->clipped = f36;
+    front->clipped = f37;
 }
 
 /* Sums side by side in vectors, each one in the order written; the width is that of the machine the compiler is told of. */
@@ -465,46 +518,53 @@ PAPER_CODE void paper_q_values(const float *observation, float *q)
     paper_layer1(hidden0, hidden1);
     paper_layer2(hidden1, q);
 }
-/* Network, argmax, mapping, limits, status. */
-PAPER_CODE static void paper_decide(const paper_state *state, const paper_front *front, paper_command *command)
+/* Network and argmax: the greedy action. */
+PAPER_CODE PAPER_APART static uint32_t paper_choose(const paper_state *state, const paper_measurement *measured)
 {
-    float q[PAPER_ACTIONS];
+    float observation[6];
+    float q[9];
     float best = -3.40282347e+38f;
-    float chosen = paper_duties[0];
     uint32_t index = 0u;
     uint32_t action;
 
-    paper_q_values(front->observation, q);
+    paper_observe(state, measured, observation);
+    paper_q_values(observation, q);
     /* the lowest index wins among equals, a NaN never does */
     for (action = 0u; action < PAPER_ACTIONS; ++action) {
-        const uint32_t above = paper_flag(q[action] > best);
+        const float output = q[action];
+        const uint32_t above = paper_flag(output > best);
         const uint32_t mask = (uint32_t)0 - above;
-        best = paper_select(above, q[action], best);
-        chosen = paper_select(above, paper_duties[action], chosen);
+        best = paper_select(above, output, best);
         index = (action & mask) | (index & ~mask);
     }
-    {
-        const float v0 = state->mapping_a * chosen;
-        const float v1 = state->mapping_b * front->signal[1];
-        const float v2 = v0 + v1;
-        const float v3 = v2 + state->mapping_c;
-        const uint32_t f4 = paper_outside(chosen, 0.35f, 0.65f);
-        const uint32_t f5 = paper_outside(front->signal[1], 0.0f, 12.0f);
-        const uint32_t f6 = f4 | f5;
-        const uint32_t f7 = paper_outside(v3, 0.3f, 0.7f);
-        const float v8 = paper_clamp(v3, 0.3f, 0.7f);
-        const uint32_t usable = front->usable;
-        const uint32_t status = (front->held << 0)
-                              | (front->primed_now << 2)
-                              | (front->clipped << 3)
-                              | (f6 << 4)
-                              | (f7 << 7);
+    return index;
+}
 
-        command->duty = paper_select(usable, v8, 0.0f);
-        command->duty_sim = paper_select(usable, chosen, 0.0f);
-        command->action_index = index;
-        command->status = (status & ((uint32_t)0 - usable)) | (PAPER_STATUS_FALLBACK & (usable - (uint32_t)1));
-    }
+/* Mapping, limits, status. */
+PAPER_CODE static void paper_decide(const paper_state *state, const paper_front *front, uint32_t index, paper_command *command)
+{
+    const float chosen = paper_duties[index];
+    const float v0 = state->mapping_a * chosen;
+    const float v1 = state->mapping_b * front->signal[1];
+    const float v2 = v0 + v1;
+    const float v3 = v2 + state->mapping_c;
+    const uint32_t f4 = paper_outside(chosen, 0.35f, 0.65f);
+    const uint32_t f5 = paper_outside(front->signal[1], 0.0f, 12.0f);
+    const uint32_t f6 = f4 | f5;
+    const float v7 = paper_clamp(v3, 0.3f, 0.7f);
+    const uint32_t f8 = paper_bits(v3) ^ paper_bits(v7);
+    const uint32_t f9 = paper_flag(f8 != 0u);
+    const uint32_t usable = front->usable;
+    const uint32_t status = (front->held << 0)
+                          | (front->primed_now << 2)
+                          | (front->clipped << 3)
+                          | (f6 << 4)
+                          | (f9 << 7);
+
+    command->duty = paper_select(usable, v7, 0.0f);
+    command->duty_sim = paper_select(usable, chosen, 0.0f);
+    command->action_index = index;
+    command->status = (status & ((uint32_t)0 - usable)) | (PAPER_STATUS_FALLBACK & (usable - (uint32_t)1));
 }
 
 /* Filters, held samples and counters move on by one sample period. */
@@ -524,11 +584,29 @@ PAPER_CODE PAPER_NO_LIBC static void paper_advance(paper_state *state, const pap
     state->primed = front->usable;
 }
 
-PAPER_CODE void paper_eval(const paper_state *state, const paper_measurement *measured, paper_command *command)
+/*
+ * A measurement is sensed again after the network, in a function of its own: what the network does not need is not on the
+ * stack while it runs.
+ */
+PAPER_CODE PAPER_APART static void paper_answer(const paper_state *state, const paper_measurement *measured, uint32_t index, paper_command *command)
 {
     paper_front front;
     paper_sense(state, measured, &front);
-    paper_decide(state, &front, command);
+    paper_decide(state, &front, index, command);
+}
+
+PAPER_CODE PAPER_APART static void paper_settle(paper_state *state, const paper_measurement *measured, uint32_t index, paper_command *command)
+{
+    paper_front front;
+    paper_sense(state, measured, &front);
+    paper_decide(state, &front, index, command);
+    paper_advance(state, &front, command);
+}
+
+PAPER_CODE void paper_eval(const paper_state *state, const paper_measurement *measured, paper_command *command)
+{
+    const uint32_t index = paper_choose(state, measured);
+    paper_answer(state, measured, index, command);
 }
 
 PAPER_CODE void paper_commit(paper_state *state, const paper_measurement *measured, const paper_command *command)
@@ -540,13 +618,11 @@ PAPER_CODE void paper_commit(paper_state *state, const paper_measurement *measur
 
 PAPER_CODE void paper_step(paper_state *state, const paper_measurement *measured, paper_command *command)
 {
-    paper_front front;
-    paper_sense(state, measured, &front);
-    paper_decide(state, &front, command);
-    paper_advance(state, &front, command);
+    const uint32_t index = paper_choose(state, measured);
+    paper_settle(state, measured, index, command);
 }
 
-PAPER_CODE PAPER_NO_LIBC void paper_observe(const paper_state *state, const paper_measurement *measured, float *observation)
+PAPER_CODE PAPER_APART PAPER_NO_LIBC void paper_observe(const paper_state *state, const paper_measurement *measured, float *observation)
 {
     paper_front front;
     uint32_t i;
@@ -556,7 +632,7 @@ PAPER_CODE PAPER_NO_LIBC void paper_observe(const paper_state *state, const pape
     }
 }
 
-PAPER_NO_LIBC void paper_reset(paper_state *state)
+PAPER_COLD PAPER_NO_LIBC void paper_reset(paper_state *state)
 {
     uint32_t i;
     for (i = 0u; i < 4u; ++i) {
@@ -570,7 +646,7 @@ PAPER_NO_LIBC void paper_reset(paper_state *state)
     state->primed = 0u;
 }
 
-void paper_init(paper_state *state)
+PAPER_COLD void paper_init(paper_state *state)
 {
     paper_reset(state);
     state->mapping_a = 0.97f;
@@ -578,7 +654,7 @@ void paper_init(paper_state *state)
     state->mapping_c = 0.013f;
 }
 
-uint32_t paper_set_mapping(paper_state *state, float a, float b, float c)
+PAPER_COLD uint32_t paper_set_mapping(paper_state *state, float a, float b, float c)
 {
     const uint32_t accepted = paper_within(a, 0.485f, 1.9399999f)
                             & paper_within(b, -0.0479f, 0.0521f)
@@ -596,21 +672,27 @@ uint32_t paper_set_mapping(paper_state *state, float a, float b, float c)
  * CRC-32 (IEEE 802.3) of words taken little-endian, whatever the byte order of the machine.
  * volatile: the memory is read, the compiler does not answer in its place.
  */
-static uint32_t paper_crc(uint32_t start, const volatile float *words, uint32_t length)
+PAPER_COLD PAPER_APART static uint32_t paper_crc_word(uint32_t start, uint32_t word)
 {
-    uint32_t crc = start;
-    uint32_t i;
+    uint32_t crc = start ^ word;
     uint32_t nibble;
-    for (i = 0u; i < length; ++i) {
-        crc ^= paper_bits(words[i]);
-        for (nibble = 0u; nibble < 8u; ++nibble) {
-            crc = (crc >> 4) ^ paper_crc_steps[crc & 15u];
-        }
+    for (nibble = 0u; nibble < 8u; ++nibble) {
+        crc = (crc >> 4) ^ paper_crc_steps[crc & 15u];
     }
     return crc;
 }
 
-uint32_t paper_integrity(void)
+PAPER_COLD PAPER_APART static uint32_t paper_crc(uint32_t start, const volatile float *words, uint32_t length)
+{
+    uint32_t crc = start;
+    uint32_t i;
+    for (i = 0u; i < length; ++i) {
+        crc = paper_crc_word(crc, paper_bits(words[i]));
+    }
+    return crc;
+}
+
+PAPER_COLD uint32_t paper_integrity(void)
 {
     uint32_t crc = 0xFFFFFFFFu;
     crc = paper_crc(crc, paper_weights0, 30u);
@@ -623,7 +705,7 @@ uint32_t paper_integrity(void)
     return paper_flag((crc ^ 0xFFFFFFFFu) == 0x49E6DD07u);
 }
 
-uint32_t paper_self_test(void)
+PAPER_COLD uint32_t paper_self_test(void)
 {
     float observation[PAPER_FEATURES];
     float q[PAPER_ACTIONS];

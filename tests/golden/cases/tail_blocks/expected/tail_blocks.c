@@ -47,7 +47,26 @@
 #define TAIL_BLOCKS_CODE
 #endif
 
-TAIL_BLOCKS_TABLE static const float tail_blocks_weights0[99] = {
+/*
+ * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
+ * fast; helpers that this build may not need.
+ */
+#if defined(__GNUC__)
+#define TAIL_BLOCKS_APART __attribute__((noinline))
+#define TAIL_BLOCKS_COLD __attribute__((cold))
+#define TAIL_BLOCKS_SPARE __attribute__((unused))
+#else
+#define TAIL_BLOCKS_APART
+#define TAIL_BLOCKS_COLD
+#define TAIL_BLOCKS_SPARE
+#endif
+#if defined(__GNUC__)
+#define TAIL_BLOCKS_ALIGNED __attribute__((aligned(64)))
+#else
+#define TAIL_BLOCKS_ALIGNED
+#endif
+
+TAIL_BLOCKS_TABLE TAIL_BLOCKS_ALIGNED static const float tail_blocks_weights0[99] = {
     0.11528803f, -0.096372664f, 0.6535871f, 0.5092171f, -0.07804983f, -0.5767123f, 0.31472224f, -0.7250111f,
     -0.36908036f, 0.37026188f, 0.16948493f, -0.10567808f, 0.07564002f, 0.2919778f, -0.45663694f, 0.5877391f,
     0.68232244f, -0.6381136f, -0.18418254f, -0.5967305f, 0.0458231f, 0.05900489f, -0.8011879f, -0.6581506f,
@@ -71,7 +90,7 @@ TAIL_BLOCKS_TABLE static const float tail_blocks_bias0[33] = {
     -0.44670686f, 0.03500506f,
 };
 
-TAIL_BLOCKS_TABLE static const float tail_blocks_weights1[660] = {
+TAIL_BLOCKS_TABLE TAIL_BLOCKS_ALIGNED static const float tail_blocks_weights1[660] = {
     0.045305483f, -0.07668916f, -0.06552902f, -0.23365569f, -0.08872247f, 0.21112412f, 0.12776072f, 0.14726588f,
     0.24475951f, -0.22377498f, -0.20629086f, 0.12559305f, 0.22725558f, 0.018472366f, -0.13164838f, -0.10814866f,
     0.25530362f, -0.0690635f, 0.0555048f, 0.08497643f, -0.22029951f, 0.1869565f, -0.03811518f, 0.06781671f,
@@ -200,7 +219,7 @@ static uint32_t tail_blocks_bits(float x)
     return bits;
 }
 
-static float tail_blocks_from_bits(uint32_t bits)
+TAIL_BLOCKS_SPARE static float tail_blocks_from_bits(uint32_t bits)
 {
     float x;
     (void)__builtin_memcpy(&x, &bits, sizeof(x));
@@ -219,7 +238,7 @@ static uint32_t tail_blocks_bits(float x)
     return word.bits;
 }
 
-static float tail_blocks_from_bits(uint32_t bits)
+TAIL_BLOCKS_SPARE static float tail_blocks_from_bits(uint32_t bits)
 {
     tail_blocks_word word;
     word.bits = bits;
@@ -237,27 +256,48 @@ static uint32_t tail_blocks_flag(int condition)
     return flag;
 }
 
+#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__)
+/* conditional moves: each is executed, or skipped, in the same time */
+#define TAIL_BLOCKS_MOVES 1
+#endif
+
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float tail_blocks_select(uint32_t flag, float then, float otherwise)
 {
+#if defined(TAIL_BLOCKS_MOVES)
+    float chosen = otherwise;
+    __asm__("cmp %1, #0\n\tit ne\n\tvmovne.f32 %0, %2" : "+t"(chosen) : "r"(flag), "t"(then) : "cc");
+    return chosen;
+#else
     const uint32_t mask = (uint32_t)0 - flag;
     return tail_blocks_from_bits((tail_blocks_bits(then) & mask) | (tail_blocks_bits(otherwise) & ~mask));
+#endif
 }
 
-static uint32_t tail_blocks_within(float x, float low, float high)
+TAIL_BLOCKS_CODE TAIL_BLOCKS_APART static uint32_t tail_blocks_within(float x, float low, float high)
 {
+#if defined(TAIL_BLOCKS_MOVES)
+    uint32_t flag;
+    __asm__("vcmp.f32 %2, %1\n\tvmrs APSR_nzcv, fpscr\n\titt ge\n\tvcmpge.f32 %1, %3\n\tvmrsge APSR_nzcv, fpscr\n\t"
+            "ite ge\n\tmovge %0, #1\n\tmovlt %0, #0" : "=r"(flag) : "t"(x), "t"(high), "t"(low) : "cc");
+    return flag;
+#else
     return tail_blocks_flag(x >= low) & tail_blocks_flag(x <= high);
+#endif
 }
 
-static uint32_t tail_blocks_outside(float x, float low, float high)
+TAIL_BLOCKS_CODE TAIL_BLOCKS_APART static float tail_blocks_clamp(float x, float low, float high)
 {
-    return tail_blocks_flag(x < low) | tail_blocks_flag(x > high);
-}
-
-static float tail_blocks_clamp(float x, float low, float high)
-{
+#if defined(TAIL_BLOCKS_MOVES)
+    float clamped = x;
+    __asm__("vcmp.f32 %0, %1\n\tvmrs APSR_nzcv, fpscr\n\tit mi\n\tvmovmi.f32 %0, %1\n\t"
+            "vcmp.f32 %0, %2\n\tvmrs APSR_nzcv, fpscr\n\tit gt\n\tvmovgt.f32 %0, %2"
+            : "+&t"(clamped) : "t"(low), "t"(high) : "cc");
+    return clamped;
+#else
     const float raised = tail_blocks_select(tail_blocks_flag(x < low), low, x);
     return tail_blocks_select(tail_blocks_flag(raised > high), high, raised);
+#endif
 }
 
 /* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
@@ -284,7 +324,7 @@ typedef struct {
 } tail_blocks_front;
 
 /* Sanitise, filters, observation. */
-TAIL_BLOCKS_CODE static void tail_blocks_sense(const tail_blocks_state *state, const tail_blocks_measurement *measured, tail_blocks_front *front)
+TAIL_BLOCKS_CODE TAIL_BLOCKS_APART static void tail_blocks_sense(const tail_blocks_state *state, const tail_blocks_measurement *measured, tail_blocks_front *front)
 {
     const uint32_t f0 = tail_blocks_within(measured->v_out, 0.0f, 250.0f);
     const float v1 = tail_blocks_select(f0, measured->v_out, state->held[0]);
@@ -293,11 +333,12 @@ TAIL_BLOCKS_CODE static void tail_blocks_sense(const tail_blocks_state *state, c
     const uint32_t f4 = f0 & f2;
     const float v5 = 100.0f - v1;
     const float v6 = v5 * 0.05f;
-    const uint32_t f7 = tail_blocks_outside(v6, -5.0f, 5.0f);
-    const float v8 = tail_blocks_clamp(v6, -5.0f, 5.0f);
+    const float v7 = tail_blocks_clamp(v6, -5.0f, 5.0f);
+    const uint32_t f8 = tail_blocks_bits(v6) ^ tail_blocks_bits(v7);
     const float v9 = tail_blocks_select(state->primed, state->memory[0], v1);
     const float v10 = v9 * 0.01f;
     const float v11 = v3 * 0.02f;
+    const uint32_t f12 = tail_blocks_flag(f8 != 0u);
     const uint32_t counted = state->bad_count + tail_blocks_flag(state->bad_count <= 3u);
     const uint32_t bad_count = counted & (f4 - (uint32_t)1);
     const uint32_t bridged = state->primed & tail_blocks_flag(bad_count <= 3u);
@@ -305,7 +346,7 @@ TAIL_BLOCKS_CODE static void tail_blocks_sense(const tail_blocks_state *state, c
 
     front->signal[0] = v1;
     front->signal[1] = v3;
-    front->observation[0] = v8;
+    front->observation[0] = v7;
     front->observation[1] = v10;
     front->observation[2] = v11;
     front->push[0] = v1;
@@ -313,7 +354,7 @@ TAIL_BLOCKS_CODE static void tail_blocks_sense(const tail_blocks_state *state, c
     front->usable = usable;
     front->held = usable & (f4 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
-    front->clipped = f7;
+    front->clipped = f12;
 }
 
 /* Sums side by side in vectors, each one in the order written; the width is that of the machine the compiler is told of. */
@@ -538,41 +579,48 @@ TAIL_BLOCKS_CODE void tail_blocks_q_values(const float *observation, float *q)
     tail_blocks_layer0(observation, hidden0);
     tail_blocks_layer1(hidden0, q);
 }
-/* Network, argmax, mapping, limits, status. */
-TAIL_BLOCKS_CODE static void tail_blocks_decide(const tail_blocks_state *state, const tail_blocks_front *front, tail_blocks_command *command)
+/* Network and argmax: the greedy action. */
+TAIL_BLOCKS_CODE TAIL_BLOCKS_APART static uint32_t tail_blocks_choose(const tail_blocks_state *state, const tail_blocks_measurement *measured)
 {
-    float q[TAIL_BLOCKS_ACTIONS];
+    float observation[3];
+    float q[20];
     float best = -3.40282347e+38f;
-    float chosen = tail_blocks_duties[0];
     uint32_t index = 0u;
     uint32_t action;
 
-    tail_blocks_q_values(front->observation, q);
+    tail_blocks_observe(state, measured, observation);
+    tail_blocks_q_values(observation, q);
     /* the lowest index wins among equals, a NaN never does */
     for (action = 0u; action < TAIL_BLOCKS_ACTIONS; ++action) {
-        const uint32_t above = tail_blocks_flag(q[action] > best);
+        const float output = q[action];
+        const uint32_t above = tail_blocks_flag(output > best);
         const uint32_t mask = (uint32_t)0 - above;
-        best = tail_blocks_select(above, q[action], best);
-        chosen = tail_blocks_select(above, tail_blocks_duties[action], chosen);
+        best = tail_blocks_select(above, output, best);
         index = (action & mask) | (index & ~mask);
     }
-    {
-        const uint32_t f0 = tail_blocks_flag(chosen > state->soft_cap);
-        const float v1 = tail_blocks_select(f0, state->soft_cap, chosen);
-        const uint32_t f2 = tail_blocks_outside(v1, 0.3f, 0.7f);
-        const float v3 = tail_blocks_clamp(v1, 0.3f, 0.7f);
-        const uint32_t usable = front->usable;
-        const uint32_t status = (front->held << 0)
-                              | (front->primed_now << 2)
-                              | (front->clipped << 3)
-                              | (f0 << 6)
-                              | (f2 << 7);
+    return index;
+}
 
-        command->duty = tail_blocks_select(usable, v3, 0.0f);
-        command->duty_sim = tail_blocks_select(usable, chosen, 0.0f);
-        command->action_index = index;
-        command->status = (status & ((uint32_t)0 - usable)) | (TAIL_BLOCKS_STATUS_FALLBACK & (usable - (uint32_t)1));
-    }
+/* Mapping, limits, status. */
+TAIL_BLOCKS_CODE static void tail_blocks_decide(const tail_blocks_state *state, const tail_blocks_front *front, uint32_t index, tail_blocks_command *command)
+{
+    const float chosen = tail_blocks_duties[index];
+    const uint32_t f0 = tail_blocks_flag(chosen > state->soft_cap);
+    const float v1 = tail_blocks_select(f0, state->soft_cap, chosen);
+    const float v2 = tail_blocks_clamp(v1, 0.3f, 0.7f);
+    const uint32_t f3 = tail_blocks_bits(v1) ^ tail_blocks_bits(v2);
+    const uint32_t f4 = tail_blocks_flag(f3 != 0u);
+    const uint32_t usable = front->usable;
+    const uint32_t status = (front->held << 0)
+                          | (front->primed_now << 2)
+                          | (front->clipped << 3)
+                          | (f0 << 6)
+                          | (f4 << 7);
+
+    command->duty = tail_blocks_select(usable, v2, 0.0f);
+    command->duty_sim = tail_blocks_select(usable, chosen, 0.0f);
+    command->action_index = index;
+    command->status = (status & ((uint32_t)0 - usable)) | (TAIL_BLOCKS_STATUS_FALLBACK & (usable - (uint32_t)1));
 }
 
 /* Filters, held samples and counters move on by one sample period. */
@@ -598,11 +646,29 @@ TAIL_BLOCKS_CODE TAIL_BLOCKS_NO_LIBC static void tail_blocks_advance(tail_blocks
     state->primed = front->usable;
 }
 
-TAIL_BLOCKS_CODE void tail_blocks_eval(const tail_blocks_state *state, const tail_blocks_measurement *measured, tail_blocks_command *command)
+/*
+ * A measurement is sensed again after the network, in a function of its own: what the network does not need is not on the
+ * stack while it runs.
+ */
+TAIL_BLOCKS_CODE TAIL_BLOCKS_APART static void tail_blocks_answer(const tail_blocks_state *state, const tail_blocks_measurement *measured, uint32_t index, tail_blocks_command *command)
 {
     tail_blocks_front front;
     tail_blocks_sense(state, measured, &front);
-    tail_blocks_decide(state, &front, command);
+    tail_blocks_decide(state, &front, index, command);
+}
+
+TAIL_BLOCKS_CODE TAIL_BLOCKS_APART static void tail_blocks_settle(tail_blocks_state *state, const tail_blocks_measurement *measured, uint32_t index, tail_blocks_command *command)
+{
+    tail_blocks_front front;
+    tail_blocks_sense(state, measured, &front);
+    tail_blocks_decide(state, &front, index, command);
+    tail_blocks_advance(state, &front, command);
+}
+
+TAIL_BLOCKS_CODE void tail_blocks_eval(const tail_blocks_state *state, const tail_blocks_measurement *measured, tail_blocks_command *command)
+{
+    const uint32_t index = tail_blocks_choose(state, measured);
+    tail_blocks_answer(state, measured, index, command);
 }
 
 TAIL_BLOCKS_CODE void tail_blocks_commit(tail_blocks_state *state, const tail_blocks_measurement *measured, const tail_blocks_command *command)
@@ -614,13 +680,11 @@ TAIL_BLOCKS_CODE void tail_blocks_commit(tail_blocks_state *state, const tail_bl
 
 TAIL_BLOCKS_CODE void tail_blocks_step(tail_blocks_state *state, const tail_blocks_measurement *measured, tail_blocks_command *command)
 {
-    tail_blocks_front front;
-    tail_blocks_sense(state, measured, &front);
-    tail_blocks_decide(state, &front, command);
-    tail_blocks_advance(state, &front, command);
+    const uint32_t index = tail_blocks_choose(state, measured);
+    tail_blocks_settle(state, measured, index, command);
 }
 
-TAIL_BLOCKS_CODE TAIL_BLOCKS_NO_LIBC void tail_blocks_observe(const tail_blocks_state *state, const tail_blocks_measurement *measured, float *observation)
+TAIL_BLOCKS_CODE TAIL_BLOCKS_APART TAIL_BLOCKS_NO_LIBC void tail_blocks_observe(const tail_blocks_state *state, const tail_blocks_measurement *measured, float *observation)
 {
     tail_blocks_front front;
     uint32_t i;
@@ -630,7 +694,7 @@ TAIL_BLOCKS_CODE TAIL_BLOCKS_NO_LIBC void tail_blocks_observe(const tail_blocks_
     }
 }
 
-TAIL_BLOCKS_NO_LIBC void tail_blocks_reset(tail_blocks_state *state)
+TAIL_BLOCKS_COLD TAIL_BLOCKS_NO_LIBC void tail_blocks_reset(tail_blocks_state *state)
 {
     uint32_t i;
     for (i = 0u; i < 2u; ++i) {
@@ -645,7 +709,7 @@ TAIL_BLOCKS_NO_LIBC void tail_blocks_reset(tail_blocks_state *state)
     state->primed = 0u;
 }
 
-void tail_blocks_init(tail_blocks_state *state)
+TAIL_BLOCKS_COLD void tail_blocks_init(tail_blocks_state *state)
 {
     tail_blocks_reset(state);
 }
@@ -654,21 +718,27 @@ void tail_blocks_init(tail_blocks_state *state)
  * CRC-32 (IEEE 802.3) of words taken little-endian, whatever the byte order of the machine.
  * volatile: the memory is read, the compiler does not answer in its place.
  */
-static uint32_t tail_blocks_crc(uint32_t start, const volatile float *words, uint32_t length)
+TAIL_BLOCKS_COLD TAIL_BLOCKS_APART static uint32_t tail_blocks_crc_word(uint32_t start, uint32_t word)
 {
-    uint32_t crc = start;
-    uint32_t i;
+    uint32_t crc = start ^ word;
     uint32_t nibble;
-    for (i = 0u; i < length; ++i) {
-        crc ^= tail_blocks_bits(words[i]);
-        for (nibble = 0u; nibble < 8u; ++nibble) {
-            crc = (crc >> 4) ^ tail_blocks_crc_steps[crc & 15u];
-        }
+    for (nibble = 0u; nibble < 8u; ++nibble) {
+        crc = (crc >> 4) ^ tail_blocks_crc_steps[crc & 15u];
     }
     return crc;
 }
 
-uint32_t tail_blocks_integrity(void)
+TAIL_BLOCKS_COLD TAIL_BLOCKS_APART static uint32_t tail_blocks_crc(uint32_t start, const volatile float *words, uint32_t length)
+{
+    uint32_t crc = start;
+    uint32_t i;
+    for (i = 0u; i < length; ++i) {
+        crc = tail_blocks_crc_word(crc, tail_blocks_bits(words[i]));
+    }
+    return crc;
+}
+
+TAIL_BLOCKS_COLD uint32_t tail_blocks_integrity(void)
 {
     uint32_t crc = 0xFFFFFFFFu;
     crc = tail_blocks_crc(crc, tail_blocks_weights0, 99u);
@@ -679,7 +749,7 @@ uint32_t tail_blocks_integrity(void)
     return tail_blocks_flag((crc ^ 0xFFFFFFFFu) == 0xC3C979FCu);
 }
 
-uint32_t tail_blocks_self_test(void)
+TAIL_BLOCKS_COLD uint32_t tail_blocks_self_test(void)
 {
     float observation[TAIL_BLOCKS_FEATURES];
     float q[TAIL_BLOCKS_ACTIONS];

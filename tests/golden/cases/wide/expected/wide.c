@@ -50,7 +50,26 @@
 #define WIDE_CODE
 #endif
 
-WIDE_TABLE static const float wide_weights0[108] = {
+/*
+ * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
+ * fast; helpers that this build may not need.
+ */
+#if defined(__GNUC__)
+#define WIDE_APART __attribute__((noinline))
+#define WIDE_COLD __attribute__((cold))
+#define WIDE_SPARE __attribute__((unused))
+#else
+#define WIDE_APART
+#define WIDE_COLD
+#define WIDE_SPARE
+#endif
+#if defined(__GNUC__)
+#define WIDE_ALIGNED __attribute__((aligned(64)))
+#else
+#define WIDE_ALIGNED
+#endif
+
+WIDE_TABLE WIDE_ALIGNED static const float wide_weights0[108] = {
     -0.2890473f, 0.2623314f, 0.12399545f, 0.06753233f, 0.12811123f, -0.42773548f, -0.16124086f, 0.28192547f,
     -0.41727853f, -0.36491963f, 0.21450166f, -0.0019668099f, 0.107698746f, 0.3642376f, 0.11700938f, 0.30197826f,
     -0.14795284f, 0.1829554f, -0.20511481f, -0.14548326f, 0.4177838f, 0.43180084f, -0.14997897f, -0.23883492f,
@@ -72,7 +91,7 @@ WIDE_TABLE static const double wide_bias0[9] = {
     -0.3440820872783661, -0.07342381775379181, -0.05902162194252014, 0.020056510344147682,
 };
 
-WIDE_TABLE static const float wide_weights1[54] = {
+WIDE_TABLE WIDE_ALIGNED static const float wide_weights1[54] = {
     -0.46162906f, -0.4118392f, 0.49024832f, 0.17969948f, -0.43285444f, -0.04651492f, -0.301166f, -0.20371401f,
     -0.31117725f, -0.2645746f, 0.14537662f, 0.21733014f, 0.032274734f, -0.34682554f, -0.29536712f, 0.2057699f,
     -0.08262533f, 0.16575785f, 0.30389136f, -0.04951195f, 0.35005307f, -0.3868738f, -0.23487647f, -0.27599818f,
@@ -87,7 +106,7 @@ WIDE_TABLE static const double wide_bias1[6] = {
     0.18519672751426697,
 };
 
-WIDE_TABLE static const float wide_weights2[48] = {
+WIDE_TABLE WIDE_ALIGNED static const float wide_weights2[48] = {
     0.06612995f, -0.5513904f, 0.12477361f, -0.53932893f, -0.14131317f, 0.27207845f, 0.39474764f, -0.35738608f,
     0.2371962f, -0.3721907f, 0.15467523f, 0.11194802f, -0.47444165f, 0.56951857f, 0.36244503f, 0.06328388f,
     -0.5031771f, -0.37005705f, 0.5698544f, -0.10729386f, 0.40414566f, -0.21555854f, 0.18828857f, 0.039983906f,
@@ -101,7 +120,7 @@ WIDE_TABLE static const double wide_bias2[8] = {
     0.2808852791786194, -0.3164951205253601, -0.24683187901973724,
 };
 
-WIDE_TABLE static const float wide_weights3[32] = {
+WIDE_TABLE WIDE_ALIGNED static const float wide_weights3[32] = {
     -0.3693163f, 0.49342284f, -0.13025324f, 0.47386476f, -0.011683343f, 0.4360078f, 0.026798882f, -0.5033685f,
     -0.40493017f, 0.07288008f, -0.51671314f, 0.2205132f, 0.24677335f, -0.3475253f, 0.06562441f, -0.51451564f,
     0.26024187f, 0.27533436f, -0.041697074f, 0.19813882f, 0.07377921f, -0.28323567f, -0.4139842f, 0.013909706f,
@@ -112,7 +131,7 @@ WIDE_TABLE static const double wide_bias3[4] = {
     0.10600150376558304, 0.0028686579316854477, 0.4884869456291199, 0.21319785714149475,
 };
 
-WIDE_TABLE static const float wide_weights4[20] = {
+WIDE_TABLE WIDE_ALIGNED static const float wide_weights4[20] = {
     0.57987595f, -0.73622173f, 0.59012467f, -0.3709103f, 0.638856f, -0.38510552f, 0.24224047f, -0.17162855f,
     -0.14159504f, -0.20233878f, -0.46244648f, -0.3800277f, -0.2374773f, -0.46703035f, -0.32386443f, -0.3878174f,
     0.30647114f, 0.50535136f, -0.62270683f, -0.3333227f,
@@ -154,18 +173,18 @@ static uint64_t wide_bits(double x)
     return bits;
 }
 
-static double wide_from_bits(uint64_t bits)
-{
-    double x;
-    (void)__builtin_memcpy(&x, &bits, sizeof(x));
-    return x;
-}
-
 static uint32_t wide_weight_bits(float x)
 {
     uint32_t bits;
     (void)__builtin_memcpy(&bits, &x, sizeof(bits));
     return bits;
+}
+
+WIDE_SPARE static double wide_from_bits(uint64_t bits)
+{
+    double x;
+    (void)__builtin_memcpy(&x, &bits, sizeof(x));
+    return x;
 }
 #else
 typedef union {
@@ -180,7 +199,7 @@ static uint64_t wide_bits(double x)
     return word.bits;
 }
 
-static double wide_from_bits(uint64_t bits)
+WIDE_SPARE static double wide_from_bits(uint64_t bits)
 {
     wide_word word;
     word.bits = bits;
@@ -208,6 +227,13 @@ static uint32_t wide_flag(int condition)
     return flag;
 }
 
+/* the bits in which two numbers differ, folded to a word */
+WIDE_SPARE static uint32_t wide_differing(double x, double y)
+{
+    const uint64_t bits = wide_bits(x) ^ wide_bits(y);
+    return (uint32_t)bits | (uint32_t)(bits >> 32);
+}
+
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static double wide_select(uint32_t flag, double then, double otherwise)
 {
@@ -215,17 +241,17 @@ static double wide_select(uint32_t flag, double then, double otherwise)
     return wide_from_bits((wide_bits(then) & mask) | (wide_bits(otherwise) & ~mask));
 }
 
-static uint32_t wide_within(double x, double low, double high)
+WIDE_CODE WIDE_APART static uint32_t wide_within(double x, double low, double high)
 {
     return wide_flag(x >= low) & wide_flag(x <= high);
 }
 
-static uint32_t wide_outside(double x, double low, double high)
+WIDE_CODE WIDE_APART static uint32_t wide_outside(double x, double low, double high)
 {
     return wide_flag(x < low) | wide_flag(x > high);
 }
 
-static double wide_clamp(double x, double low, double high)
+WIDE_CODE WIDE_APART static double wide_clamp(double x, double low, double high)
 {
     const double raised = wide_select(wide_flag(x < low), low, x);
     return wide_select(wide_flag(raised > high), high, raised);
@@ -298,7 +324,7 @@ typedef struct {
 } wide_front;
 
 /* Sanitise, filters, observation. */
-WIDE_CODE static void wide_sense(const wide_state *state, const wide_measurement *measured, wide_front *front)
+WIDE_CODE WIDE_APART static void wide_sense(const wide_state *state, const wide_measurement *measured, wide_front *front)
 {
     const uint32_t f0 = wide_within(measured->v_out, 0.0, 80.0);
     const double v1 = wide_select(f0, measured->v_out, state->held[0]);
@@ -312,8 +338,8 @@ WIDE_CODE static void wide_sense(const wide_state *state, const wide_measurement
     const uint32_t f9 = f8 & f6;
     const double v10 = 48.0 - v1;
     const double v11 = v10 * 0.1;
-    const uint32_t f12 = wide_outside(v11, -2.0, 2.0);
-    const double v13 = wide_clamp(v11, -2.0, 2.0);
+    const double v12 = wide_clamp(v11, -2.0, 2.0);
+    const uint32_t f13 = wide_differing(v11, v12);
     const double v14 = v1 - 48.0;
     const double v15 = wide_select(state->primed, state->memory[0], v14);
     const double v16 = v15 * 0.05;
@@ -322,8 +348,8 @@ WIDE_CODE static void wide_sense(const wide_state *state, const wide_measurement
     const double v19 = v1 - v18;
     const double v20 = v19 * 10000.0;
     const double v21 = v20 * 1e-5;
-    const uint32_t f22 = wide_outside(v21, -1.0, 1.0);
-    const double v23 = wide_clamp(v21, -1.0, 1.0);
+    const double v22 = wide_clamp(v21, -1.0, 1.0);
+    const uint32_t f23 = wide_differing(v21, v22);
     const double v24 = wide_select(state->primed, state->memory[4], v5);
     const double v25 = v5 - v24;
     const double v26 = v25 * 0.09090909090909091;
@@ -362,7 +388,8 @@ WIDE_CODE static void wide_sense(const wide_state *state, const wide_measurement
     const double v59 = state->previous_command * 2.0;
     const double v60 = v59 - 1.0;
     const double v61 = v7 * 0.0625;
-    const uint32_t f62 = f12 | f22;
+    const uint32_t f62 = f13 | f23;
+    const uint32_t f63 = wide_flag(f62 != 0u);
     const uint32_t counted = state->bad_count + wide_flag(state->bad_count <= 3u);
     const uint32_t bad_count = counted & (f9 - (uint32_t)1);
     const uint32_t bridged = state->primed & wide_flag(bad_count <= 3u);
@@ -371,9 +398,9 @@ WIDE_CODE static void wide_sense(const wide_state *state, const wide_measurement
     front->signal[0] = v1;
     front->signal[1] = v5;
     front->signal[2] = v7;
-    front->observation[0] = v13;
+    front->observation[0] = v12;
     front->observation[1] = v17;
-    front->observation[2] = v23;
+    front->observation[2] = v22;
     front->observation[3] = v29;
     front->observation[4] = v37;
     front->observation[5] = v40;
@@ -397,7 +424,7 @@ WIDE_CODE static void wide_sense(const wide_state *state, const wide_measurement
     front->usable = usable;
     front->held = usable & (f9 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
-    front->clipped = f62;
+    front->clipped = f63;
 }
 
 /* fc0: 12 -> 9 */
@@ -546,57 +573,65 @@ WIDE_CODE void wide_q_values(const double *observation, double *q)
     wide_layer3(hidden2, hidden3);
     wide_layer4(hidden3, q);
 }
-/* Network, argmax, mapping, limits, status. */
-WIDE_CODE static void wide_decide(const wide_state *state, const wide_front *front, wide_command *command)
+/* Network and argmax: the greedy action. */
+WIDE_CODE WIDE_APART static uint32_t wide_choose(const wide_state *state, const wide_measurement *measured)
 {
-    double q[WIDE_ACTIONS];
+    double observation[12];
+    double q[5];
     double best = -1.7976931348623157e+308;
-    double chosen = wide_duties[0];
     uint32_t index = 0u;
     uint32_t action;
 
-    wide_q_values(front->observation, q);
+    wide_observe(state, measured, observation);
+    wide_q_values(observation, q);
     /* the lowest index wins among equals, a NaN never does */
     for (action = 0u; action < WIDE_ACTIONS; ++action) {
-        const uint32_t above = wide_flag(q[action] > best);
+        const double output = q[action];
+        const uint32_t above = wide_flag(output > best);
         const uint32_t mask = (uint32_t)0 - above;
-        best = wide_select(above, q[action], best);
-        chosen = wide_select(above, wide_duties[action], chosen);
+        best = wide_select(above, output, best);
         index = (action & mask) | (index & ~mask);
     }
-    {
-        const double v0 = state->mapping_a * chosen;
-        const double v1 = state->mapping_b * front->signal[2];
-        const double v2 = v0 + v1;
-        const double v3 = v2 + state->mapping_c;
-        const double v4 = state->mapping_r * front->signal[2];
-        const double v5 = v4 * chosen;
-        const double v6 = v3 + v5;
-        const uint32_t f7 = wide_outside(chosen, 0.3, 0.68);
-        const uint32_t f8 = wide_outside(front->signal[2], -0.5, 12.0);
-        const uint32_t f9 = f7 | f8;
-        const double v10 = state->previous_command - 0.06;
-        const double v11 = state->previous_command + 0.06;
-        const uint32_t f12 = wide_outside(v6, v10, v11);
-        const double v13 = wide_clamp(v6, v10, v11);
-        const uint32_t f14 = wide_flag(v13 > state->soft_cap);
-        const double v15 = wide_select(f14, state->soft_cap, v13);
-        const uint32_t f16 = wide_outside(v15, 0.3, 0.68);
-        const double v17 = wide_clamp(v15, 0.3, 0.68);
-        const uint32_t usable = front->usable;
-        const uint32_t status = (front->held << 0)
-                              | (front->primed_now << 2)
-                              | (front->clipped << 3)
-                              | (f9 << 4)
-                              | (f12 << 5)
-                              | (f14 << 6)
-                              | (f16 << 7);
+    return index;
+}
 
-        command->duty = wide_select(usable, v17, 0.02);
-        command->duty_sim = wide_select(usable, chosen, 0.02);
-        command->action_index = index;
-        command->status = (status & ((uint32_t)0 - usable)) | (WIDE_STATUS_FALLBACK & (usable - (uint32_t)1));
-    }
+/* Mapping, limits, status. */
+WIDE_CODE static void wide_decide(const wide_state *state, const wide_front *front, uint32_t index, wide_command *command)
+{
+    const double chosen = wide_duties[index];
+    const double v0 = state->mapping_a * chosen;
+    const double v1 = state->mapping_b * front->signal[2];
+    const double v2 = v0 + v1;
+    const double v3 = v2 + state->mapping_c;
+    const double v4 = state->mapping_r * front->signal[2];
+    const double v5 = v4 * chosen;
+    const double v6 = v3 + v5;
+    const uint32_t f7 = wide_outside(chosen, 0.3, 0.68);
+    const uint32_t f8 = wide_outside(front->signal[2], -0.5, 12.0);
+    const uint32_t f9 = f7 | f8;
+    const double v10 = state->previous_command - 0.06;
+    const double v11 = state->previous_command + 0.06;
+    const double v12 = wide_clamp(v6, v10, v11);
+    const uint32_t f13 = wide_differing(v6, v12);
+    const uint32_t f14 = wide_flag(f13 != 0u);
+    const uint32_t f15 = wide_flag(v12 > state->soft_cap);
+    const double v16 = wide_select(f15, state->soft_cap, v12);
+    const double v17 = wide_clamp(v16, 0.3, 0.68);
+    const uint32_t f18 = wide_differing(v16, v17);
+    const uint32_t f19 = wide_flag(f18 != 0u);
+    const uint32_t usable = front->usable;
+    const uint32_t status = (front->held << 0)
+                          | (front->primed_now << 2)
+                          | (front->clipped << 3)
+                          | (f9 << 4)
+                          | (f14 << 5)
+                          | (f15 << 6)
+                          | (f19 << 7);
+
+    command->duty = wide_select(usable, v17, 0.02);
+    command->duty_sim = wide_select(usable, chosen, 0.02);
+    command->action_index = index;
+    command->status = (status & ((uint32_t)0 - usable)) | (WIDE_STATUS_FALLBACK & (usable - (uint32_t)1));
 }
 
 /* Filters, held samples and counters move on by one sample period. */
@@ -635,11 +670,29 @@ WIDE_CODE WIDE_NO_LIBC static void wide_advance(wide_state *state, const wide_fr
     state->primed = front->usable;
 }
 
-WIDE_CODE void wide_eval(const wide_state *state, const wide_measurement *measured, wide_command *command)
+/*
+ * A measurement is sensed again after the network, in a function of its own: what the network does not need is not on the
+ * stack while it runs.
+ */
+WIDE_CODE WIDE_APART static void wide_answer(const wide_state *state, const wide_measurement *measured, uint32_t index, wide_command *command)
 {
     wide_front front;
     wide_sense(state, measured, &front);
-    wide_decide(state, &front, command);
+    wide_decide(state, &front, index, command);
+}
+
+WIDE_CODE WIDE_APART static void wide_settle(wide_state *state, const wide_measurement *measured, uint32_t index, wide_command *command)
+{
+    wide_front front;
+    wide_sense(state, measured, &front);
+    wide_decide(state, &front, index, command);
+    wide_advance(state, &front, command);
+}
+
+WIDE_CODE void wide_eval(const wide_state *state, const wide_measurement *measured, wide_command *command)
+{
+    const uint32_t index = wide_choose(state, measured);
+    wide_answer(state, measured, index, command);
 }
 
 WIDE_CODE void wide_commit(wide_state *state, const wide_measurement *measured, const wide_command *command)
@@ -651,13 +704,11 @@ WIDE_CODE void wide_commit(wide_state *state, const wide_measurement *measured, 
 
 WIDE_CODE void wide_step(wide_state *state, const wide_measurement *measured, wide_command *command)
 {
-    wide_front front;
-    wide_sense(state, measured, &front);
-    wide_decide(state, &front, command);
-    wide_advance(state, &front, command);
+    const uint32_t index = wide_choose(state, measured);
+    wide_settle(state, measured, index, command);
 }
 
-WIDE_CODE WIDE_NO_LIBC void wide_observe(const wide_state *state, const wide_measurement *measured, double *observation)
+WIDE_CODE WIDE_APART WIDE_NO_LIBC void wide_observe(const wide_state *state, const wide_measurement *measured, double *observation)
 {
     wide_front front;
     uint32_t i;
@@ -667,7 +718,7 @@ WIDE_CODE WIDE_NO_LIBC void wide_observe(const wide_state *state, const wide_mea
     }
 }
 
-WIDE_NO_LIBC void wide_reset(wide_state *state)
+WIDE_COLD WIDE_NO_LIBC void wide_reset(wide_state *state)
 {
     uint32_t i;
     for (i = 0u; i < 15u; ++i) {
@@ -683,7 +734,7 @@ WIDE_NO_LIBC void wide_reset(wide_state *state)
     state->primed = 0u;
 }
 
-void wide_init(wide_state *state)
+WIDE_COLD void wide_init(wide_state *state)
 {
     wide_reset(state);
     state->mapping_a = 1.03;
@@ -692,7 +743,7 @@ void wide_init(wide_state *state)
     state->mapping_r = 0.0009;
 }
 
-uint32_t wide_set_mapping(wide_state *state, double a, double b, double c, double r)
+WIDE_COLD uint32_t wide_set_mapping(wide_state *state, double a, double b, double c, double r)
 {
     const uint32_t accepted = wide_within(a, 0.8, 1.25)
                             & wide_within(b, -0.02, 0.02)
@@ -714,39 +765,38 @@ uint32_t wide_set_mapping(wide_state *state, double a, double b, double c, doubl
  * CRC-32 (IEEE 802.3) of words taken little-endian, whatever the byte order of the machine.
  * volatile: the memory is read, the compiler does not answer in its place.
  */
-static uint32_t wide_crc(uint32_t start, const volatile double *words, uint32_t length)
+WIDE_COLD WIDE_APART static uint32_t wide_crc_word(uint32_t start, uint32_t word)
 {
-    uint32_t crc = start;
-    uint32_t i;
+    uint32_t crc = start ^ word;
     uint32_t nibble;
-    for (i = 0u; i < length; ++i) {
-        crc ^= (uint32_t)wide_bits(words[i]);
-        for (nibble = 0u; nibble < 8u; ++nibble) {
-            crc = (crc >> 4) ^ wide_crc_steps[crc & 15u];
-        }
-        crc ^= (uint32_t)(wide_bits(words[i]) >> 32);
-        for (nibble = 0u; nibble < 8u; ++nibble) {
-            crc = (crc >> 4) ^ wide_crc_steps[crc & 15u];
-        }
+    for (nibble = 0u; nibble < 8u; ++nibble) {
+        crc = (crc >> 4) ^ wide_crc_steps[crc & 15u];
     }
     return crc;
 }
 
-static uint32_t wide_crc_weights(uint32_t start, const volatile float *words, uint32_t length)
+WIDE_COLD WIDE_APART static uint32_t wide_crc(uint32_t start, const volatile double *words, uint32_t length)
 {
     uint32_t crc = start;
     uint32_t i;
-    uint32_t nibble;
     for (i = 0u; i < length; ++i) {
-        crc ^= wide_weight_bits(words[i]);
-        for (nibble = 0u; nibble < 8u; ++nibble) {
-            crc = (crc >> 4) ^ wide_crc_steps[crc & 15u];
-        }
+        crc = wide_crc_word(crc, (uint32_t)wide_bits(words[i]));
+        crc = wide_crc_word(crc, (uint32_t)(wide_bits(words[i]) >> 32));
     }
     return crc;
 }
 
-uint32_t wide_integrity(void)
+WIDE_COLD WIDE_APART static uint32_t wide_crc_weights(uint32_t start, const volatile float *words, uint32_t length)
+{
+    uint32_t crc = start;
+    uint32_t i;
+    for (i = 0u; i < length; ++i) {
+        crc = wide_crc_word(crc, wide_weight_bits(words[i]));
+    }
+    return crc;
+}
+
+WIDE_COLD uint32_t wide_integrity(void)
 {
     uint32_t crc = 0xFFFFFFFFu;
     crc = wide_crc_weights(crc, wide_weights0, 108u);
@@ -763,7 +813,7 @@ uint32_t wide_integrity(void)
     return wide_flag((crc ^ 0xFFFFFFFFu) == 0x94BC9EE0u);
 }
 
-uint32_t wide_self_test(void)
+WIDE_COLD uint32_t wide_self_test(void)
 {
     double observation[WIDE_FEATURES];
     double q[WIDE_ACTIONS];

@@ -172,6 +172,9 @@ fn tanh(x: f64) -> f64 {
     q = q * z + 1.0;
     limit((p * t) / q, 0x3FF0_0000_0000_0000)
 }
+/// So that no vector of weights lies across two lines of the cache.
+#[repr(align(64))]
+struct Aligned<T>(T);
 /// Sums of one block of outputs: from the bias, inputs in index order, every operation rounded.
 #[inline(always)]
 fn block<const INPUTS: usize, const ROWS: usize>(
@@ -187,7 +190,7 @@ fn block<const INPUTS: usize, const ROWS: usize>(
     }
     sums
 }
-static WEIGHTS0: [[[f32; 9]; 12]; 1] = [
+static WEIGHTS0: Aligned<[[[f32; 9]; 12]; 1]> = Aligned([
     [
         [
             -0.2890473,
@@ -322,7 +325,7 @@ static WEIGHTS0: [[[f32; 9]; 12]; 1] = [
             0.10527261,
         ],
     ],
-];
+]);
 static BIAS0: [[f64; 9]; 1] = [
     [
         0.24240298569202423,
@@ -341,7 +344,7 @@ static BIAS0: [[f64; 9]; 1] = [
 fn layer0(x: &[f64; 12]) -> [f64; 9] {
     let mut y = [0.0; 9];
     let mut rest: &mut [f64] = &mut y;
-    for (weights, bias) in WEIGHTS0.iter().zip(&BIAS0) {
+    for (weights, bias) in WEIGHTS0.0.iter().zip(&BIAS0) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<9>()
         {
@@ -353,7 +356,7 @@ fn layer0(x: &[f64; 12]) -> [f64; 9] {
     }
     y
 }
-static WEIGHTS1: [[[f32; 6]; 9]; 1] = [
+static WEIGHTS1: Aligned<[[[f32; 6]; 9]; 1]> = Aligned([
     [
         [-0.46162906, -0.4118392, 0.49024832, 0.17969948, -0.43285444, -0.04651492],
         [-0.301166, -0.20371401, -0.31117725, -0.2645746, 0.14537662, 0.21733014],
@@ -372,7 +375,7 @@ static WEIGHTS1: [[[f32; 6]; 9]; 1] = [
             -0.00081380503,
         ],
     ],
-];
+]);
 static BIAS1: [[f64; 6]; 1] = [
     [
         -0.09968750923871994,
@@ -388,7 +391,7 @@ static BIAS1: [[f64; 6]; 1] = [
 fn layer1(x: &[f64; 9]) -> [f64; 6] {
     let mut y = [0.0; 6];
     let mut rest: &mut [f64] = &mut y;
-    for (weights, bias) in WEIGHTS1.iter().zip(&BIAS1) {
+    for (weights, bias) in WEIGHTS1.0.iter().zip(&BIAS1) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<6>()
         {
@@ -400,7 +403,7 @@ fn layer1(x: &[f64; 9]) -> [f64; 6] {
     }
     y
 }
-static WEIGHTS2: [[[f32; 8]; 6]; 1] = [
+static WEIGHTS2: Aligned<[[[f32; 8]; 6]; 1]> = Aligned([
     [
         [
             0.06612995,
@@ -463,7 +466,7 @@ static WEIGHTS2: [[[f32; 8]; 6]; 1] = [
             0.31572044,
         ],
     ],
-];
+]);
 static BIAS2: [[f64; 8]; 1] = [
     [
         -0.15951712429523468,
@@ -481,7 +484,7 @@ static BIAS2: [[f64; 8]; 1] = [
 fn layer2(x: &[f64; 6]) -> [f64; 8] {
     let mut y = [0.0; 8];
     let mut rest: &mut [f64] = &mut y;
-    for (weights, bias) in WEIGHTS2.iter().zip(&BIAS2) {
+    for (weights, bias) in WEIGHTS2.0.iter().zip(&BIAS2) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<8>()
         {
@@ -493,7 +496,7 @@ fn layer2(x: &[f64; 6]) -> [f64; 8] {
     }
     y
 }
-static WEIGHTS3: [[[f32; 4]; 8]; 1] = [
+static WEIGHTS3: Aligned<[[[f32; 4]; 8]; 1]> = Aligned([
     [
         [-0.3693163, 0.49342284, -0.13025324, 0.47386476],
         [-0.011683343, 0.4360078, 0.026798882, -0.5033685],
@@ -504,7 +507,7 @@ static WEIGHTS3: [[[f32; 4]; 8]; 1] = [
         [-0.4697089, -0.122537896, -0.51602036, -0.17218672],
         [0.004127234, 0.08711334, 0.4600474, -0.12041387],
     ],
-];
+]);
 static BIAS3: [[f64; 4]; 1] = [
     [0.10600150376558304, 0.0028686579316854477, 0.4884869456291199, 0.21319785714149475],
 ];
@@ -513,7 +516,7 @@ static BIAS3: [[f64; 4]; 1] = [
 fn layer3(x: &[f64; 8]) -> [f64; 4] {
     let mut y = [0.0; 4];
     let mut rest: &mut [f64] = &mut y;
-    for (weights, bias) in WEIGHTS3.iter().zip(&BIAS3) {
+    for (weights, bias) in WEIGHTS3.0.iter().zip(&BIAS3) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<4>()
         {
@@ -525,14 +528,14 @@ fn layer3(x: &[f64; 8]) -> [f64; 4] {
     }
     y
 }
-static WEIGHTS4: [[[f32; 5]; 4]; 1] = [
+static WEIGHTS4: Aligned<[[[f32; 5]; 4]; 1]> = Aligned([
     [
         [0.57987595, -0.73622173, 0.59012467, -0.3709103, 0.638856],
         [-0.38510552, 0.24224047, -0.17162855, -0.14159504, -0.20233878],
         [-0.46244648, -0.3800277, -0.2374773, -0.46703035, -0.32386443],
         [-0.3878174, 0.30647114, 0.50535136, -0.62270683, -0.3333227],
     ],
-];
+]);
 static BIAS4: [[f64; 5]; 1] = [
     [
         0.5165919661521912,
@@ -547,7 +550,7 @@ static BIAS4: [[f64; 5]; 1] = [
 fn layer4(x: &[f64; 4]) -> [f64; 5] {
     let mut y = [0.0; 5];
     let mut rest: &mut [f64] = &mut y;
-    for (weights, bias) in WEIGHTS4.iter().zip(&BIAS4) {
+    for (weights, bias) in WEIGHTS4.0.iter().zip(&BIAS4) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<5>()
         {
@@ -736,8 +739,9 @@ impl Controller {
         let f9: u32 = f8 & f6;
         let v10: f64 = 48.0 - v1;
         let v11: f64 = v10 * 0.1;
-        let f12: u32 = outside(v11, -2.0, 2.0);
-        let v13: f64 = clamp(v11, -2.0, 2.0);
+        let v12: f64 = clamp(v11, -2.0, 2.0);
+        let f13: u32 = (v11.to_bits() ^ v12.to_bits()) as u32
+            | ((v11.to_bits() ^ v12.to_bits()) >> 32) as u32;
         let v14: f64 = v1 - 48.0;
         let v15: f64 = select(self.primed, self.memory[0], v14);
         let v16: f64 = v15 * 0.05;
@@ -746,8 +750,9 @@ impl Controller {
         let v19: f64 = v1 - v18;
         let v20: f64 = v19 * 10000.0;
         let v21: f64 = v20 * 0.00001;
-        let f22: u32 = outside(v21, -1.0, 1.0);
-        let v23: f64 = clamp(v21, -1.0, 1.0);
+        let v22: f64 = clamp(v21, -1.0, 1.0);
+        let f23: u32 = (v21.to_bits() ^ v22.to_bits()) as u32
+            | ((v21.to_bits() ^ v22.to_bits()) >> 32) as u32;
         let v24: f64 = select(self.primed, self.memory[4], v5);
         let v25: f64 = v5 - v24;
         let v26: f64 = v25 * 0.09090909090909091;
@@ -796,16 +801,17 @@ impl Controller {
         let v59: f64 = self.previous_command * 2.0;
         let v60: f64 = v59 - 1.0;
         let v61: f64 = v7 * 0.0625;
-        let f62: u32 = f12 | f22;
+        let f62: u32 = f13 | f23;
+        let f63: u32 = flag(f62 != 0);
         let counted = self.bad_count.wrapping_add(flag(self.bad_count <= 3));
         let bad_count = counted & f9.wrapping_sub(1);
         let usable = f9 | (self.primed & flag(bad_count <= 3));
         Front {
             signal: [v1, v5, v7],
             observation: [
-                v13,
+                v12,
                 v17,
-                v23,
+                v22,
                 v29,
                 v37,
                 v40,
@@ -821,7 +827,7 @@ impl Controller {
             usable,
             held: usable & (f9 ^ 1),
             primed_now: usable & (self.primed ^ 1),
-            clipped: f62,
+            clipped: f63,
         }
     }
     /// Network, argmax, mapping, limits, status.
@@ -851,15 +857,19 @@ impl Controller {
         let f9: u32 = f7 | f8;
         let v10: f64 = self.previous_command - 0.06;
         let v11: f64 = self.previous_command + 0.06;
-        let f12: u32 = outside(v6, v10, v11);
-        let v13: f64 = clamp(v6, v10, v11);
-        let f14: u32 = flag(v13 > self.soft_cap);
-        let v15: f64 = select(f14, self.soft_cap, v13);
-        let f16: u32 = outside(v15, 0.3, 0.68);
-        let v17: f64 = clamp(v15, 0.3, 0.68);
+        let v12: f64 = clamp(v6, v10, v11);
+        let f13: u32 = (v6.to_bits() ^ v12.to_bits()) as u32
+            | ((v6.to_bits() ^ v12.to_bits()) >> 32) as u32;
+        let f14: u32 = flag(f13 != 0);
+        let f15: u32 = flag(v12 > self.soft_cap);
+        let v16: f64 = select(f15, self.soft_cap, v12);
+        let v17: f64 = clamp(v16, 0.3, 0.68);
+        let f18: u32 = (v16.to_bits() ^ v17.to_bits()) as u32
+            | ((v16.to_bits() ^ v17.to_bits()) >> 32) as u32;
+        let f19: u32 = flag(f18 != 0);
         let usable = front.usable;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
-            | (f9 << 4) | (f12 << 5) | (f14 << 6) | (f16 << 7);
+            | (f9 << 4) | (f14 << 5) | (f15 << 6) | (f19 << 7);
         Command {
             duty: select(usable, v17, 0.02),
             duty_sim: select(usable, chosen, 0.02),
@@ -966,31 +976,31 @@ impl Controller {
     #[must_use]
     pub fn integrity() -> bool {
         let mut crc = u32::MAX;
-        for column in core::hint::black_box(&WEIGHTS0).iter().flatten() {
+        for column in core::hint::black_box(&WEIGHTS0.0).iter().flatten() {
             crc = crc_floats(crc, column);
         }
         for row in core::hint::black_box(&BIAS0) {
             crc = crc_numbers(crc, row);
         }
-        for column in core::hint::black_box(&WEIGHTS1).iter().flatten() {
+        for column in core::hint::black_box(&WEIGHTS1.0).iter().flatten() {
             crc = crc_floats(crc, column);
         }
         for row in core::hint::black_box(&BIAS1) {
             crc = crc_numbers(crc, row);
         }
-        for column in core::hint::black_box(&WEIGHTS2).iter().flatten() {
+        for column in core::hint::black_box(&WEIGHTS2.0).iter().flatten() {
             crc = crc_floats(crc, column);
         }
         for row in core::hint::black_box(&BIAS2) {
             crc = crc_numbers(crc, row);
         }
-        for column in core::hint::black_box(&WEIGHTS3).iter().flatten() {
+        for column in core::hint::black_box(&WEIGHTS3.0).iter().flatten() {
             crc = crc_floats(crc, column);
         }
         for row in core::hint::black_box(&BIAS3) {
             crc = crc_numbers(crc, row);
         }
-        for column in core::hint::black_box(&WEIGHTS4).iter().flatten() {
+        for column in core::hint::black_box(&WEIGHTS4.0).iter().flatten() {
             crc = crc_floats(crc, column);
         }
         for row in core::hint::black_box(&BIAS4) {

@@ -12,6 +12,7 @@ use targets::IntegerLoop;
 use templates::Template;
 use templates::c::{Argmax, Common, Constant, Header, Helpers, Member, NetworkView, PushView, Source, WideChar};
 
+use crate::backend::assembly::RealKernel;
 use crate::backend::{Backend, banner};
 use crate::lower::STATUS;
 use crate::program::{ActivationCode, Coefficient, Literal, NetworkCode, Op, Program};
@@ -436,10 +437,7 @@ fn helpers(program: &Program) -> Helpers {
         leaky_relu: real && network.activates(|activation| matches!(activation, ActivationCode::LeakyRelu(_))),
         tanh: network.activates(|activation| activation == ActivationCode::Tanh),
         assembly: match network {
-            NetworkCode::Real { scalar, fused, layers } => {
-                let has_assembly = |layer| real::has_assembly(layer, *scalar, *fused);
-                layers.iter().any(has_assembly)
-            }
+            NetworkCode::Real { layers, .. } => layers.iter().any(RealKernel::is_for),
             NetworkCode::Integer(network) => integer::is_in_assembly(network),
         },
         vectors: match network {

@@ -5,7 +5,7 @@ use proc_macro2::{Ident, TokenStream};
 use quote::quote;
 
 use super::number::{self, number};
-use super::{float, ident, integer, size, streamed};
+use super::{float, ident, integer, kernels, size, streamed};
 use crate::lower::network::{TANH_DENOMINATOR, TANH_NUMERATOR};
 use crate::program::{ActivationCode, LayerCode, Literal, NetworkCode, Program};
 
@@ -19,8 +19,8 @@ pub fn items(program: &Program) -> TokenStream {
         .activates(|activation| activation == ActivationCode::Tanh)
         .then(|| tanh(scalar));
     let network = match &program.network {
-        NetworkCode::Real { scalar, fused, layers } => real(*scalar, layers, *fused),
-        NetworkCode::Integer(network) => integer::items(network, program.has_fpu),
+        NetworkCode::Real { fused, layers, .. } => real(program, layers, *fused),
+        NetworkCode::Integer(network) => integer::items(program, network),
     };
     quote! {
         static DUTIES: [#kind; ACTIONS] = [#(#duties),*];
@@ -48,7 +48,8 @@ pub fn q_values(program: &Program) -> TokenStream {
     }
 }
 
-fn real(scalar: Scalar, layers: &[LayerCode], fused: bool) -> TokenStream {
+fn real(program: &Program, layers: &[LayerCode], fused: bool) -> TokenStream {
+    let scalar = program.scalar();
     let (items, body) = streamed::network(scalar, layers);
     let kind = number::kind(scalar);
     let aligned = layers.iter().find_map(|layer| layer.alignment).map(aligned);
@@ -59,24 +60,11 @@ fn real(scalar: Scalar, layers: &[LayerCode], fused: bool) -> TokenStream {
         // weights are binary32
         (Scalar::F64, _) => quote!(*sum += *weight as f64 * *x;),
     };
+    let blocks = kernels::items(program, layers, &accumulate);
     quote! {
         #fma
         #aligned
-        /// Sums of one block of outputs: from the bias, inputs in index order, every operation rounded.
-        #[inline(always)]
-        fn block<const INPUTS: usize, const ROWS: usize>(
-            weights: &[[f32; ROWS]; INPUTS],
-            bias: &[#kind; ROWS],
-            x: &[#kind; INPUTS],
-        ) -> [#kind; ROWS] {
-            let mut sums = *bias;
-            for (column, x) in weights.iter().zip(x) {
-                for (sum, weight) in sums.iter_mut().zip(column) {
-                    #accumulate
-                }
-            }
-            sums
-        }
+        #blocks
         #items
         fn network(observation: &[#kind; FEATURES]) -> [#kind; ACTIONS] {
             #body
@@ -139,7 +127,7 @@ pub(super) fn layer_items(scalar: Scalar, index: usize, layer: &LayerCode) -> (T
         .map(|block| columns(block, rows));
     let biases = layer.bias[..split].chunks(rows).map(|biases| sums(scalar, biases));
     let (rows_size, full_size) = (size(rows), size(full));
-    let activated = activation(scalar, layer.activation);
+    let stored = kernels::store(scalar, layer.activation, &quote!(weights, bias, x), &quote!(out));
     let (tail_tables, tail_loop) = tail(scalar, index, layer);
     let type_of_weights = quote!([[[f32; #rows_size]; #inputs]; #full_size]);
     let (held, table) = (
@@ -154,20 +142,16 @@ pub(super) fn layer_items(scalar: Scalar, index: usize, layer: &LayerCode) -> (T
     let function = quote! {
         #[doc = #doc]
         #[inline(always)]
-        fn #name(x: &[#kind; #inputs]) -> [#kind; #outputs] {
-            let mut y = [0.0; #outputs];
-            let mut rest: &mut [#kind] = &mut y;
+        fn #name(x: &[#kind; #inputs], y: &mut [Slot; #outputs]) {
+            let mut rest: &mut [Slot] = y;
             for (weights, bias) in #held.iter().zip(&#bias) {
                 // no division and no slice index, so no way to a panic at any optimisation level
                 if let Some((out, after)) = core::mem::take(&mut rest).split_first_chunk_mut::<#rows_size>() {
-                    for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-                        *y = #activated;
-                    }
+                    #stored
                     rest = after;
                 }
             }
             #tail_loop
-            y
         }
     };
     (tables, function)
@@ -188,16 +172,16 @@ fn tail(scalar: Scalar, index: usize, layer: &LayerCode) -> (TokenStream, TokenS
     let values = columns(&layer.table[split * layer.inputs..], rows);
     let biases = sums(scalar, &layer.bias[split..]);
     let (inputs, rows) = (size(layer.inputs), size(rows));
-    let activated = activation(scalar, layer.activation);
     let table = table(layer, &weights, &quote!([[f32; #rows]; #inputs]), &values);
     let held = held(layer, &weights);
+    let stored = kernels::store(scalar, layer.activation, &quote!(&#held, &#bias, x), &quote!(out));
     let tables = quote! {
         #table
         static #bias: [#kind; #rows] = #biases;
     };
     let code = quote! {
-        for (y, sum) in rest.iter_mut().zip(block(&#held, &#bias, x)) {
-            *y = #activated;
+        if let Some((out, _)) = rest.split_first_chunk_mut::<#rows>() {
+            #stored
         }
     };
     (tables, code)

@@ -29,7 +29,7 @@
  *   10 r (parameter): coefficient of the duty ratio mapping; set before a step, it counts from the one after it
  */
 #define ADC_MAPPING_FMU_VARIABLES 10u
-#define ADC_MAPPING_FMU_TOKEN "{f33151eb-3e1d-f91b-871a-8efc6afe24b7}"
+#define ADC_MAPPING_FMU_TOKEN "{547504b2-b136-79ad-cf2b-d059a3bd8081}"
 #define ADC_MAPPING_FMU_PERIOD 2e-5
 
 /* Types of variables. */

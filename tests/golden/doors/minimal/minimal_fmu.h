@@ -25,7 +25,7 @@
  *   6 status (output): status bits; 65536 is added while the coefficients are refused
  */
 #define MINIMAL_FMU_VARIABLES 6u
-#define MINIMAL_FMU_TOKEN "{529d0476-3438-d12b-8b92-51819274fdc5}"
+#define MINIMAL_FMU_TOKEN "{e3824cc5-9ca5-a569-358d-e3dcc3ecc033}"
 #define MINIMAL_FMU_PERIOD 0.0001
 
 /* Types of variables. */

@@ -177,6 +177,7 @@ fn tanh(x: f64) -> f64 {
 struct Aligned<T>(T);
 /// Sums of one block of outputs: from the bias, inputs in index order, every operation rounded.
 #[inline(always)]
+#[allow(dead_code)]
 fn block<const INPUTS: usize, const ROWS: usize>(
     weights: &[[f32; ROWS]; INPUTS],
     bias: &[f64; ROWS],
@@ -189,6 +190,50 @@ fn block<const INPUTS: usize, const ROWS: usize>(
         }
     }
     sums
+}
+/// What an activation is kept in.
+type Slot = f64;
+const EMPTY: Slot = 0.0;
+#[inline(always)]
+fn filled<const N: usize>(slots: &[Slot; N]) -> &[f64; N] {
+    slots
+}
+#[inline(always)]
+#[allow(dead_code)]
+fn activate<const N: usize>(slots: &mut [Slot; N], activation: impl Fn(f64) -> f64) {
+    *slots = slots.map(activation);
+}
+/// Sums of a block.
+#[inline(always)]
+#[allow(dead_code)]
+fn plain<const INPUTS: usize, const ROWS: usize>(
+    weights: &[[f32; ROWS]; INPUTS],
+    bias: &[f64; ROWS],
+    x: &[f64; INPUTS],
+    out: &mut [Slot; ROWS],
+) {
+    *out = block(weights, bias, x);
+}
+/// Sums of a block behind a ReLU.
+#[inline(always)]
+#[allow(dead_code)]
+fn rectified<const INPUTS: usize, const ROWS: usize>(
+    weights: &[[f32; ROWS]; INPUTS],
+    bias: &[f64; ROWS],
+    x: &[f64; INPUTS],
+    out: &mut [Slot; ROWS],
+) {
+    *out = block(weights, bias, x).map(relu);
+}
+/// Sums of a block that go on from `out`.
+#[inline(always)]
+#[allow(dead_code)]
+fn added<const INPUTS: usize, const ROWS: usize>(
+    weights: &[[f32; ROWS]; INPUTS],
+    x: &[f64; INPUTS],
+    out: &mut [f64; ROWS],
+) {
+    *out = block(weights, out, x);
 }
 static WEIGHTS0: Aligned<[[[f32; 9]; 12]; 1]> = Aligned([
     [
@@ -341,20 +386,16 @@ static BIAS0: [[f64; 9]; 1] = [
 ];
 /// fc0: 12 -> 9
 #[inline(always)]
-fn layer0(x: &[f64; 12]) -> [f64; 9] {
-    let mut y = [0.0; 9];
-    let mut rest: &mut [f64] = &mut y;
+fn layer0(x: &[f64; 12], y: &mut [Slot; 9]) {
+    let mut rest: &mut [Slot] = y;
     for (weights, bias) in WEIGHTS0.0.iter().zip(&BIAS0) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<9>()
         {
-            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-                *y = relu(sum);
-            }
+            rectified(weights, bias, x, out);
             rest = after;
         }
     }
-    y
 }
 static WEIGHTS1: Aligned<[[[f32; 6]; 9]; 1]> = Aligned([
     [
@@ -388,20 +429,17 @@ static BIAS1: [[f64; 6]; 1] = [
 ];
 /// fc1: 9 -> 6
 #[inline(always)]
-fn layer1(x: &[f64; 9]) -> [f64; 6] {
-    let mut y = [0.0; 6];
-    let mut rest: &mut [f64] = &mut y;
+fn layer1(x: &[f64; 9], y: &mut [Slot; 6]) {
+    let mut rest: &mut [Slot] = y;
     for (weights, bias) in WEIGHTS1.0.iter().zip(&BIAS1) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<6>()
         {
-            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-                *y = tanh(sum);
-            }
+            plain(weights, bias, x, out);
+            activate(out, |sum| tanh(sum));
             rest = after;
         }
     }
-    y
 }
 static WEIGHTS2: Aligned<[[[f32; 8]; 6]; 1]> = Aligned([
     [
@@ -481,20 +519,17 @@ static BIAS2: [[f64; 8]; 1] = [
 ];
 /// fc2: 6 -> 8
 #[inline(always)]
-fn layer2(x: &[f64; 6]) -> [f64; 8] {
-    let mut y = [0.0; 8];
-    let mut rest: &mut [f64] = &mut y;
+fn layer2(x: &[f64; 6], y: &mut [Slot; 8]) {
+    let mut rest: &mut [Slot] = y;
     for (weights, bias) in WEIGHTS2.0.iter().zip(&BIAS2) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<8>()
         {
-            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-                *y = leaky_relu(sum, 0.01);
-            }
+            plain(weights, bias, x, out);
+            activate(out, |sum| leaky_relu(sum, 0.01));
             rest = after;
         }
     }
-    y
 }
 static WEIGHTS3: Aligned<[[[f32; 4]; 8]; 1]> = Aligned([
     [
@@ -513,20 +548,16 @@ static BIAS3: [[f64; 4]; 1] = [
 ];
 /// fc3: 8 -> 4
 #[inline(always)]
-fn layer3(x: &[f64; 8]) -> [f64; 4] {
-    let mut y = [0.0; 4];
-    let mut rest: &mut [f64] = &mut y;
+fn layer3(x: &[f64; 8], y: &mut [Slot; 4]) {
+    let mut rest: &mut [Slot] = y;
     for (weights, bias) in WEIGHTS3.0.iter().zip(&BIAS3) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<4>()
         {
-            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-                *y = sum;
-            }
+            plain(weights, bias, x, out);
             rest = after;
         }
     }
-    y
 }
 static WEIGHTS4: Aligned<[[[f32; 5]; 4]; 1]> = Aligned([
     [
@@ -547,28 +578,29 @@ static BIAS4: [[f64; 5]; 1] = [
 ];
 /// fc4: 4 -> 5
 #[inline(always)]
-fn layer4(x: &[f64; 4]) -> [f64; 5] {
-    let mut y = [0.0; 5];
-    let mut rest: &mut [f64] = &mut y;
+fn layer4(x: &[f64; 4], y: &mut [Slot; 5]) {
+    let mut rest: &mut [Slot] = y;
     for (weights, bias) in WEIGHTS4.0.iter().zip(&BIAS4) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<5>()
         {
-            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-                *y = sum;
-            }
+            plain(weights, bias, x, out);
             rest = after;
         }
     }
-    y
 }
 fn network(observation: &[f64; FEATURES]) -> [f64; ACTIONS] {
-    let hidden0 = layer0(observation);
-    let hidden1 = layer1(&hidden0);
-    let hidden2 = layer2(&hidden1);
-    let hidden3 = layer3(&hidden2);
-    let hidden4 = layer4(&hidden3);
-    hidden4
+    let mut hidden0 = [EMPTY; 9];
+    layer0(observation, &mut hidden0);
+    let mut hidden1 = [EMPTY; 6];
+    layer1(filled(&hidden0), &mut hidden1);
+    let mut hidden2 = [EMPTY; 8];
+    layer2(filled(&hidden1), &mut hidden2);
+    let mut hidden3 = [EMPTY; 4];
+    layer3(filled(&hidden2), &mut hidden3);
+    let mut hidden4 = [EMPTY; 5];
+    layer4(filled(&hidden3), &mut hidden4);
+    *filled(&hidden4)
 }
 /// One controller: a policy with the memory of its filters. Several instances are independent.
 #[derive(Clone)]

@@ -74,10 +74,11 @@ fn root() -> PathBuf {
 const PEERS_CORE: &str = "cortex-m4f";
 
 /// What the bench counts of a policy: format, and whether the loops in assembly are asked for.
-const VARIANTS: [(NumericFormat, bool); 7] = [
+const VARIANTS: [(NumericFormat, bool); 8] = [
     (NumericFormat::F32, false),
     (NumericFormat::F32, true),
     (NumericFormat::F32Fma, false),
+    (NumericFormat::F64, false),
     (NumericFormat::I16, false),
     (NumericFormat::I16, true),
     (NumericFormat::I8, false),
@@ -92,6 +93,7 @@ fn is_counted(target: &TargetSpec, name: &str, format: NumericFormat, assembly: 
         _ if (assembly && !has_assembly) || is_whole_controller => false,
         NumericFormat::F32 => target.fpu != Fpu::None,
         NumericFormat::F32Fma => target.fma != Fma::Absent,
+        NumericFormat::F64 => target.fpu.has(true),
         NumericFormat::I16 | NumericFormat::I8 => true,
     }
 }
@@ -153,7 +155,12 @@ fn host(bench: &Bench) -> Result<Vec<Row>, Failure> {
     };
     let mut rows = Vec::new();
     for machine in machines.iter().filter(|machine| **machine != "x86-64-v3" || has_avx2()) {
-        for format in [NumericFormat::F32, NumericFormat::I16, NumericFormat::I8] {
+        for format in [
+            NumericFormat::F32,
+            NumericFormat::F64,
+            NumericFormat::I16,
+            NumericFormat::I8,
+        ] {
             rows.extend(bench.times(&policy.clone().with_format(format), targets::host(), machine)?);
         }
     }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use policy::Policy;
+use policy::{Policy, Scalar};
 
 /// Observations and steps per program.
 pub const CALLS: usize = 64;
@@ -11,26 +11,27 @@ pub const CALLS: usize = 64;
 pub fn c(policy: &Policy) -> String {
     let name = &policy.name;
     let (features, actions) = (policy.features.len(), policy.actions.len());
+    let helpers = c_helpers(policy.numeric_format.scalar());
     let mut fields = String::new();
     for signal in &policy.signals {
-        let kind = if signal.adc.is_some() { "int32_t" } else { "float" };
+        let kind = if signal.adc.is_some() { "int32_t" } else { "number" };
         // writing to a String cannot fail
         let _ = write!(fields, "m.{} = ({kind})draw(0.0f, 60.0f); ", signal.name);
     }
     format!(
         r#"#include "board.h"
 #include "{name}.h"
-static float o[{features}], q[{actions}];
+{helpers}
+static number o[{features}], q[{actions}];
 static {name}_state s;
 static {name}_measurement m;
 static {name}_command c;
-{C_HELPERS}
 int main(void)
 {{
     uint32_t out[3], depth = 0u;
     int i, k;
     for (k = 0; k < {CALLS}; ++k) {{
-        for (i = 0; i < {features}; ++i) {{ o[i] = draw(-1.0f, 1.0f); }}
+        for (i = 0; i < {features}; ++i) {{ o[i] = (number)draw(-1.0f, 1.0f); }}
         count_begin(); {name}_q_values(o, q); count_end();
         for (i = 0; i < {actions}; ++i) {{ add(q[i]); }}
     }}
@@ -49,21 +50,37 @@ int main(void)
     )
 }
 
-const C_HELPERS: &str = r#"static uint32_t random = 1u, crc = 0xFFFFFFFFu;
+/// The type of the numbers, pseudo-random ones, and the checksum over their words, the low one first.
+fn c_helpers(scalar: Scalar) -> String {
+    let (number, words) = match scalar {
+        Scalar::F32 => ("float", 1),
+        Scalar::F64 => ("double", 2),
+    };
+    format!(
+        r#"typedef {number} number;
+static uint32_t random = 1u, crc = 0xFFFFFFFFu;
 static float draw(float low, float high)
-{
+{{
     random = random * 1664525u + 1013904223u;
     return low + (high - low) * ((float)(random >> 8) / 16777216.0f);
-}
-static void add(float x)
-{
-    uint32_t bits;
+}}
+static void add_word(uint32_t word)
+{{
     int i;
-    __builtin_memcpy(&bits, &x, 4u);
-    crc ^= bits;
-    for (i = 0; i < 32; ++i) { crc = (crc >> 1) ^ (0xEDB88320u & (0u - (crc & 1u))); }
+    crc ^= word;
+    for (i = 0; i < 32; ++i) {{ crc = (crc >> 1) ^ (0xEDB88320u & (0u - (crc & 1u))); }}
+}}
+static void add(number x)
+{{
+    uint{bits}_t bits;
+    int i;
+    __builtin_memcpy(&bits, &x, sizeof(bits));
+    for (i = 0; i < {words}; ++i) {{ add_word((uint32_t)((uint64_t)bits >> (32 * i))); }}
+}}
+"#,
+        bits = 32 * words
+    )
 }
-"#;
 
 /// The network as most people write it, with the functions of a controller that [`c`] calls; row-major weights.
 pub fn naive(policy: &Policy) -> (String, String) {
@@ -107,12 +124,13 @@ pub fn naive(policy: &Policy) -> (String, String) {
 
 /// Program in C for a board around [`naive`].
 pub fn naive_main(policy: &Policy) -> String {
+    let helpers = c_helpers(Scalar::F32);
     let (features, actions) = (policy.features.len(), policy.actions.len());
     format!(
         r#"#include "board.h"
 #include "naive.h"
 static float o[{features}], q[{actions}];
-{C_HELPERS}
+{helpers}
 int main(void)
 {{
     uint32_t out[3], depth = 0u;
@@ -135,13 +153,14 @@ int main(void)
 /// Program in C for a board around the function `peer_q_values` of a peer, compared with [`naive`]: the first of the words out
 /// is the number, from 1, of an observation with a Q value further off than `limit` times its largest; 0 if there is none.
 pub fn peer_main(policy: &Policy, start: &str, limit: f64) -> String {
+    let helpers = c_helpers(Scalar::F32);
     let (features, actions) = (policy.features.len(), policy.actions.len());
     format!(
         r#"#include "board.h"
 #include "naive.h"
 void peer_q_values(const float *o, float *q);
 static float o[{features}], q[{actions}], known[{actions}];
-{C_HELPERS}
+{helpers}
 static float magnitude(float x) {{ return x < 0.0f ? -x : x; }}
 int main(void)
 {{
@@ -173,13 +192,14 @@ int main(void)
 
 /// Library in Rust with the same `main` for a board.
 pub fn rust(policy: &Policy) -> String {
+    let number = rust_number(policy);
     let name = &policy.name;
     let (features, actions) = (policy.features.len(), policy.actions.len());
     let fields: Vec<String> = policy
         .signals
         .iter()
         .map(|signal| {
-            let kind = if signal.adc.is_some() { "i32" } else { "f32" };
+            let kind = if signal.adc.is_some() { "i32" } else { number };
             format!("{}: draw(&mut random, 0.0, 60.0) as {kind}", signal.name)
         })
         .collect();
@@ -206,7 +226,7 @@ fn panic(_: &core::panic::PanicInfo) -> ! {{
     loop {{}}
 }}
 #[inline(never)]
-fn q_values(o: &[f32; {features}]) -> [f32; {actions}] {{
+fn q_values(o: &[{number}; {features}]) -> [{number}; {actions}] {{
     Controller::q_values(o)
 }}
 fn draw(random: &mut u32, low: f32, high: f32) -> f32 {{
@@ -218,14 +238,16 @@ pub extern "C" fn main() -> i32 {{
     let mut random = 1u32;
     let mut crc = !0u32;
     for _ in 0..{CALLS} {{
-        let mut o = [0f32; {features}];
-        for x in &mut o {{ *x = draw(&mut random, -1.0, 1.0); }}
+        let mut o = [0.0; {features}];
+        for x in &mut o {{ *x = draw(&mut random, -1.0, 1.0) as {number}; }}
         unsafe {{ count_begin() }};
         let q = q_values(black_box(&o));
         unsafe {{ count_end() }};
         for x in &q {{
-            crc ^= x.to_bits();
-            for _ in 0..32 {{ crc = (crc >> 1) ^ (0xEDB88320 & 0u32.wrapping_sub(crc & 1)); }}
+            for word in 0..core::mem::size_of::<{number}>() / 4 {{
+                crc ^= (x.to_bits() as u64 >> (32 * word)) as u32;
+                for _ in 0..32 {{ crc = (crc >> 1) ^ (0xEDB88320 & 0u32.wrapping_sub(crc & 1)); }}
+            }}
         }}
     }}
     let mut controller = Controller::new();
@@ -244,8 +266,16 @@ pub extern "C" fn main() -> i32 {{
     )
 }
 
+fn rust_number(policy: &Policy) -> &'static str {
+    match policy.numeric_format.scalar() {
+        Scalar::F32 => "f32",
+        Scalar::F64 => "f64",
+    }
+}
+
 /// Program for the host: times ours and the naive loop in turns, prints the ratio of the shortest times.
 pub fn host(policy: &Policy) -> String {
+    let helpers = c_helpers(policy.numeric_format.scalar());
     let name = &policy.name;
     let (features, actions) = (policy.features.len(), policy.actions.len());
     format!(
@@ -254,25 +284,26 @@ pub fn host(policy: &Policy) -> String {
 #include <stdint.h>
 #include <time.h>
 #include "naive.h"
-void {name}_q_values(const float *observation, float *q);
+{helpers}
+void {name}_q_values(const number *observation, number *q);
 static float o[256][{features}], q[{actions}];
+static number own[256][{features}], answer[{actions}];
 static double now(void) {{ struct timespec t; clock_gettime(CLOCK_MONOTONIC, &t); return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec; }}
-{C_HELPERS}
 int main(void)
 {{
     double best[2] = {{ 1e9, 1e9 }};
     int turn, k, i;
-    for (k = 0; k < 256; ++k) {{ for (i = 0; i < {features}; ++i) {{ o[k][i] = draw(-1.0f, 1.0f); }} }}
+    for (k = 0; k < 256; ++k) {{ for (i = 0; i < {features}; ++i) {{ o[k][i] = draw(-1.0f, 1.0f); own[k][i] = (number)o[k][i]; }} }}
     for (turn = 0; turn < 400; ++turn) {{
         double start = now(), middle, end;
         for (k = 0; k < 256; ++k) {{ naive_q_values(o[k], q); __asm__ volatile("" : : "r"(q) : "memory"); }}
         middle = now();
-        for (k = 0; k < 256; ++k) {{ {name}_q_values(o[k], q); __asm__ volatile("" : : "r"(q) : "memory"); }}
+        for (k = 0; k < 256; ++k) {{ {name}_q_values(own[k], answer); __asm__ volatile("" : : "r"(answer) : "memory"); }}
         end = now();
         if (middle - start < best[0]) {{ best[0] = middle - start; }}
         if (end - middle < best[1]) {{ best[1] = end - middle; }}
     }}
-    for (k = 0; k < 64; ++k) {{ {name}_q_values(o[k], q); for (i = 0; i < {actions}; ++i) {{ add(q[i]); }} }}
+    for (k = 0; k < 64; ++k) {{ {name}_q_values(own[k], answer); for (i = 0; i < {actions}; ++i) {{ add(answer[i]); }} }}
     printf("%.6f %08x\n", best[1] / best[0], (unsigned)crc);
     return 0;
 }}
@@ -282,6 +313,7 @@ int main(void)
 
 /// The Rust controller as a C function for [`host`].
 pub fn host_rust(policy: &Policy) -> String {
+    let number = rust_number(policy);
     let name = &policy.name;
     let (features, actions) = (policy.features.len(), policy.actions.len());
     format!(
@@ -289,7 +321,7 @@ pub fn host_rust(policy: &Policy) -> String {
 #[allow(dead_code)]
 mod {name};
 #[no_mangle]
-pub unsafe extern "C" fn {name}_q_values(o: *const [f32; {features}], q: *mut [f32; {actions}]) {{
+pub unsafe extern "C" fn {name}_q_values(o: *const [{number}; {features}], q: *mut [{number}; {actions}]) {{
     *q = {name}::Controller::q_values(&*o);
 }}
 "#

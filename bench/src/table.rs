@@ -65,7 +65,7 @@ pub fn one_checksum_per_format(rows: &[Row]) -> Result<(), Failure> {
 }
 
 /// `q_values` takes as many instructions for every observation. Not asked of `f32-fma` in Rust, which goes through
-/// functions of the library, nor of peers and naive loops.
+/// functions of the library, of peers, nor of the naive loop, which branches where the core does not select.
 ///
 /// # Errors
 /// The row that varies.

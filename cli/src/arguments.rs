@@ -72,6 +72,8 @@ pub enum Format {
     F32,
     /// binary32 with fused multiply-add in the network
     F32Fma,
+    /// binary64, exact order
+    F64,
     /// 16-bit integer network
     I16,
     /// 8-bit weights, 16-bit activations
@@ -83,6 +85,7 @@ impl From<Format> for policy::NumericFormat {
         match format {
             Format::F32 => policy::NumericFormat::F32,
             Format::F32Fma => policy::NumericFormat::F32Fma,
+            Format::F64 => policy::NumericFormat::F64,
             Format::I16 => policy::NumericFormat::I16,
             Format::I8 => policy::NumericFormat::I8,
         }

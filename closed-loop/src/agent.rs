@@ -1,26 +1,28 @@
 //! Between the plant and the network: the policy's own controller turns measurements into observations and actions into
 //! duties. What is trained is what is compiled.
 
-use interp::{Command, Controller, Sample, State, Trace};
+use interp::{Command, Controller, Real, Sample, State, Trace};
 use plant::Signals;
-use policy::Policy;
+use policy::{Policy, Scalar};
 
 use crate::faults::Error;
 
 /// The names that a contract's signals may have.
 const SIGNALS: [&str; 4] = ["v_out", "i_l", "i_out", "v_in"];
 
-/// A policy's controller at a plant.
+/// A policy's controller at a plant, in the floats `T`: those of the policy's format, or binary32 where the last bit does
+/// not matter.
 #[derive(Debug, Clone)]
-pub struct Agent {
-    controller: Controller<f32>,
-    trace: Trace<f32>,
+pub struct Agent<T> {
+    controller: Controller<T>,
+    trace: Trace<T>,
     inputs: Inputs,
 }
 
 /// A plant's measurements in the words of a contract.
 #[derive(Debug, Clone)]
 pub struct Inputs {
+    scalar: Scalar,
     inputs: Vec<Input>,
     samples: Vec<Sample>,
 }
@@ -54,6 +56,7 @@ impl Inputs {
         };
         let inputs = policy.signals.iter().map(input).collect::<Result<Vec<_>, _>>()?;
         Ok(Self {
+            scalar: policy.numeric_format.scalar(),
             samples: vec![Sample::Code(0); inputs.len()],
             inputs,
         })
@@ -64,16 +67,17 @@ impl Inputs {
         let values = [measured.v_out, measured.i_l, measured.i_out, measured.v_in];
         for (sample, input) in self.samples.iter_mut().zip(&self.inputs) {
             let x = values[input.signal];
-            *sample = match input.adc {
-                None => Sample::Physical(x as f32),
-                Some(adc) => Sample::Code(((x - adc.offset) / adc.gain).round() as i32),
+            *sample = match (input.adc, self.scalar) {
+                (None, Scalar::F32) => Sample::Physical(x as f32),
+                (None, Scalar::F64) => Sample::Wide(x),
+                (Some(adc), _) => Sample::Code(((x - adc.offset) / adc.gain).round() as i32),
             };
         }
         &self.samples
     }
 }
 
-impl Agent {
+impl<T: Real> Agent<T> {
     /// The controller of `policy` in its initial state.
     ///
     /// # Errors
@@ -103,7 +107,7 @@ impl Agent {
 
     /// The observation of the last [`Agent::sense`].
     #[must_use]
-    pub fn observation(&self) -> &[f32] {
+    pub fn observation(&self) -> &[T] {
         self.trace.observation.as_slice().unwrap_or_default()
     }
 
@@ -111,7 +115,7 @@ impl Agent {
     pub fn act(&mut self, action: u32) -> f64 {
         self.controller.choose(&mut self.trace, action);
         self.controller.commit_trace(&self.trace);
-        f64::from(self.trace.command.duty)
+        self.trace.command.duty.to_f64()
     }
 
     /// One step of the whole controller with its own network, as the compiled code makes it.
@@ -121,29 +125,29 @@ impl Agent {
     pub fn step(&mut self, measured: &Signals) -> Result<f64, Error> {
         let samples = self.inputs.samples(measured);
         self.controller.step_into(samples, &mut self.trace)?;
-        Ok(f64::from(self.trace.command.duty))
+        Ok(self.trace.command.duty.to_f64())
     }
 
     /// The command of the last step.
     #[must_use]
-    pub fn command(&self) -> &Command<f32> {
+    pub fn command(&self) -> &Command<T> {
         &self.trace.command
     }
 
     /// Duty of the step before, 0..1.
     #[must_use]
     pub fn previous_duty(&self) -> f64 {
-        f64::from(self.controller.state().previous_command)
+        self.controller.state().previous_command.to_f64()
     }
 
     /// What the controller remembers.
     #[must_use]
-    pub fn state(&self) -> &State<f32> {
+    pub fn state(&self) -> &State<T> {
         self.controller.state()
     }
 
     /// Puts back a state; `false` and no change if it is of another contract.
-    pub fn restore(&mut self, state: &State<f32>) -> bool {
+    pub fn restore(&mut self, state: &State<T>) -> bool {
         self.controller.restore(state)
     }
 }

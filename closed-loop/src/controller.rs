@@ -1,8 +1,8 @@
 //! What can stand at the controller's place, and its run over a load step.
 
-use interp::Sample as Word;
+use interp::{Real, Sample as Word};
 use plant::{Sample, Signals};
-use policy::Policy;
+use policy::{Policy, Scalar};
 
 use crate::agent::{Agent, Inputs};
 use crate::baselines::Baseline;
@@ -37,7 +37,7 @@ pub trait Controller {
     fn step(&mut self, measured: &Signals) -> Result<Answer, Error>;
 }
 
-impl Controller for Agent {
+impl<T: Real> Controller for Agent<T> {
     fn restart(&mut self) -> Result<(), Error> {
         self.reset();
         Ok(())
@@ -52,6 +52,17 @@ impl Controller for Agent {
             status: command.status,
         })
     }
+}
+
+/// The interpreter of `policy` in the floats of its format.
+///
+/// # Errors
+/// If the contract measures something that the plant does not have.
+pub fn interpreter(policy: &Policy) -> Result<Box<dyn Controller>, Error> {
+    Ok(match policy.numeric_format.scalar() {
+        Scalar::F32 => Box::new(Agent::<f32>::new(policy)?),
+        Scalar::F64 => Box::new(Agent::<f64>::new(policy)?),
+    })
 }
 
 /// A classical controller that is started from its design.

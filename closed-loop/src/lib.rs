@@ -22,7 +22,7 @@ mod tables;
 pub mod time_optimal;
 
 pub use agent::Agent;
-pub use controller::{Answer, Call, Classical, Controller, External, Period, Trajectory, follow};
+pub use controller::{Answer, Call, Classical, Controller, External, Period, Trajectory, follow, interpreter};
 pub use converter::Converter;
 pub use environment::{Environment, LoadPath, Start};
 pub use faults::Error;

@@ -49,7 +49,7 @@ fn example_policy_repeats_the_closed_loop_stable_baselines_recorded() {
     let task = Task::default();
     let at_sample = Instant { periods: 0, phase: 0.0 };
     for (recorded, same_actions) in recorded().into_iter().zip(SAME_ACTIONS) {
-        let mut agent = Agent::new(&policy).unwrap();
+        let mut agent = Agent::<f32>::new(&policy).unwrap();
         let mut actions = Vec::new();
         let controller = |sample: &plant::Sample| {
             let duty = agent.step(&sample.measured).unwrap();

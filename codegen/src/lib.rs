@@ -86,12 +86,21 @@ impl fmt::Display for CodegenError {
             CodegenError::Manifest(message) => write!(f, "internal fault: manifest: {message}"),
             CodegenError::Door(message) => write!(f, "internal fault: door: {message}"),
             CodegenError::NotBuilt(language) => write!(f, "this build has no {} backend", language.name()),
-            CodegenError::NoType { format, target } => write!(
-                f,
-                "the processor has no type for the numeric format\n  = found: {}, whose weights have 8 bits, for {target}\n  \
-                 = expected: a format of 16 bits or more\n  = hint: --format i16",
-                format.name()
-            ),
+            CodegenError::NoType { format, target } => {
+                let (needed, expected) = match format {
+                    NumericFormat::F64 => (
+                        "whose numbers are a double of 64 bits, which there depends on the compiler's settings",
+                        "f32 or i16",
+                    ),
+                    _ => ("whose weights have 8 bits", "a format of 16 bits or more"),
+                };
+                write!(
+                    f,
+                    "the processor has no type for the numeric format\n  = found: {}, {needed}, for {target}\n  \
+                     = expected: {expected}\n  = hint: --format i16",
+                    format.name()
+                )
+            }
         }
     }
 }
@@ -103,7 +112,8 @@ impl std::error::Error for CodegenError {}
 /// # Errors
 /// If the target has no type for the numeric format; else only for a fault in the compiler itself.
 pub fn compile(policy: &Policy, target: &TargetSpec, language: Language) -> Result<GeneratedFiles, CodegenError> {
-    if policy.numeric_format == NumericFormat::I8 && target.widths.char_bits > 8 {
+    let needs_bytes = matches!(policy.numeric_format, NumericFormat::I8 | NumericFormat::F64);
+    if needs_bytes && target.widths.char_bits > 8 {
         return Err(CodegenError::NoType {
             format: policy.numeric_format,
             target: target.name,

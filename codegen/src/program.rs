@@ -5,33 +5,67 @@
 
 mod network;
 
-use policy::{Digests, NumericFormat};
+use policy::{Digests, Interval, NumericFormat, Scalar};
 use targets::Widths;
 
 pub use network::{ActivationCode, IntegerInput, IntegerLayer, IntegerNetwork, LayerCode, NetworkCode};
 
-/// A binary32 constant by its bits, so that -0 and +0 differ and programs can be compared and ordered.
+/// A constant of the program's format by the bits of its value in binary64, which holds every binary32 number: -0 and +0
+/// differ, and programs can be compared and ordered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Literal(pub u32);
+pub struct Literal(u64);
 
 impl Literal {
     /// The constant rounded to nearest.
     #[must_use]
-    pub fn nearest(value: f64) -> Self {
-        Self((value as f32).to_bits())
+    pub fn nearest(scalar: Scalar, value: f64) -> Self {
+        Self(scalar.nearest(value).to_bits())
+    }
+
+    /// Both ends rounded inwards.
+    #[must_use]
+    pub fn inward(scalar: Scalar, interval: Interval) -> (Self, Self) {
+        (
+            Self(scalar.up(interval.low).to_bits()),
+            Self::down(scalar, interval.high),
+        )
+    }
+
+    /// The constant rounded down.
+    #[must_use]
+    pub fn down(scalar: Scalar, value: f64) -> Self {
+        Self(scalar.down(value).to_bits())
     }
 
     /// The constant itself.
     #[must_use]
-    pub fn value(self) -> f32 {
-        f32::from_bits(self.0)
+    pub fn value(self) -> f64 {
+        f64::from_bits(self.0)
+    }
+
+    /// The shortest digits that give the constant again in the format.
+    #[must_use]
+    pub fn shortest(self, scalar: Scalar) -> String {
+        match scalar {
+            Scalar::F32 => format!("{:?}", self.single()),
+            Scalar::F64 => format!("{:?}", self.value()),
+        }
+    }
+
+    /// The constant of a binary32 program.
+    #[must_use]
+    pub fn single(self) -> f32 {
+        self.value() as f32
     }
 }
 
-impl From<f32> for Literal {
-    fn from(value: f32) -> Self {
-        Self(value.to_bits())
-    }
+/// The words of a number: the low one of a binary64 number first.
+pub(crate) fn words(scalar: Scalar, value: f64) -> impl Iterator<Item = u32> {
+    let bits = match scalar {
+        Scalar::F32 => u64::from((value as f32).to_bits()),
+        Scalar::F64 => value.to_bits(),
+    };
+    [bits as u32, (bits >> 32) as u32].into_iter().take(scalar.words())
 }
 
 /// Index of a value within its block.
@@ -207,8 +241,8 @@ impl Block {
     }
 
     /// A constant.
-    pub fn constant(&mut self, literal: impl Into<Literal>) -> ValueId {
-        self.value(Op::Constant(literal.into()))
+    pub fn constant(&mut self, literal: Literal) -> ValueId {
+        self.value(Op::Constant(literal))
     }
 }
 
@@ -321,7 +355,7 @@ pub struct Program {
     pub sample_period: f64,
     /// Format of all arithmetic.
     pub numeric_format: NumericFormat,
-    /// Whether the target has floats in hardware.
+    /// Whether the target has the floats of the format in hardware.
     pub has_fpu: bool,
     /// The target's processor, as assemblers name it.
     pub processor: Option<&'static str>,
@@ -360,18 +394,24 @@ pub struct Program {
 }
 
 impl Program {
+    /// Format of the numbers around the network, and of a network that is not in integers.
+    #[must_use]
+    pub fn scalar(&self) -> Scalar {
+        self.numeric_format.scalar()
+    }
+
     /// Number of features.
     #[must_use]
     pub fn feature_count(&self) -> usize {
         self.features.len()
     }
 
-    /// Words of the state struct (contract section 1).
+    /// Words of 32 bits in the state struct (contract section 1).
     #[must_use]
     pub fn state_words(&self) -> usize {
         let soft_cap = usize::from(self.soft_start_from.is_some());
         let coefficients = self.mapping.as_ref().map_or(0, |m| m.coefficients.len());
-        self.signals.len() + self.memory_words + 2 + soft_cap + coefficients + 2
+        self.scalar().words() * (self.signals.len() + self.memory_words + 2 + soft_cap + coefficients) + 2
     }
 
     /// Multiply-accumulates of the network.
@@ -384,12 +424,13 @@ impl Program {
     /// Bytes of constant tables.
     #[must_use]
     pub fn table_bytes(&self) -> usize {
-        self.network.table_bytes() + 4 * self.duties.len()
+        self.network.table_bytes() + 4 * self.scalar().words() * self.duties.len()
     }
 
     /// All table words in the order of the integrity check.
     pub fn table_words(&self) -> impl Iterator<Item = u32> + '_ {
         let network = self.network.table_words().into_iter();
-        network.chain(self.duties.iter().map(|duty| duty.0))
+        let duties = self.duties.iter();
+        network.chain(duties.flat_map(|duty| words(self.scalar(), duty.value())))
     }
 }

@@ -217,7 +217,7 @@ fn furthest(own: &DutyRatioMap, fitted: &DutyRatioMap) -> f64 {
 /// The policy over all load steps at a converter: figures, and the periods of each step's first instant.
 fn run(request: &Request, policy: &Policy, converter: &Parameters) -> Result<Vec<(Metrics, Vec<Period>)>, Error> {
     let environment = Converter::new(converter)?;
-    let mut agent = Agent::new(policy)?;
+    let mut agent = Agent::<f32>::new(policy)?;
     let mut one = |step: &LoadStep| {
         let mut finding = Finding::new(*step);
         let mut shown = None;

@@ -93,7 +93,12 @@ impl<T: Real> Controller<T> {
         &self.state
     }
 
-    /// One name per state word, in the order of section 1: `held.v_out`, `e_del.0.delay[0]`, `primed`, ...
+    /// The state as 32-bit words in the order of section 1; see [`State::words`].
+    pub fn state_words(&self) -> Vec<u32> {
+        self.state.words()
+    }
+
+    /// One name per number or counter of the state, in the order of section 1: `held.v_out`, `e_del.0.delay[0]`, `primed`, ...
     pub fn state_names(&self) -> &[String] {
         &self.state_names
     }
@@ -359,13 +364,6 @@ impl<T: Real> Controller<T> {
         }
         state.bad_count = trace.bad_count;
         state.primed = trace.usable;
-    }
-}
-
-impl Controller<f32> {
-    /// The state as 32-bit words in the order of contract section 1, named by [`Controller::state_names`].
-    pub fn state_words(&self) -> Vec<u32> {
-        self.state.words()
     }
 }
 

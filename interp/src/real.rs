@@ -53,6 +53,9 @@ pub trait Real:
     /// The same number as binary64, exact in both formats.
     fn to_f64(self) -> f64;
 
+    /// Appends the bits as 32-bit words, the low one of a binary64 number first.
+    fn append_words(self, words: &mut Vec<u32>);
+
     /// `acc_o = fl(acc_o + fl(w_io * x_i))` for i = 0, 1, ...: the order within one output is that of contract
     /// section 6, outputs advance side by side. `weights` is `[inputs][outputs]`, `acc` enters as the bias.
     ///
@@ -121,6 +124,10 @@ impl Real for f32 {
         f64::from(self)
     }
 
+    fn append_words(self, words: &mut Vec<u32>) {
+        words.push(self.to_bits());
+    }
+
     accumulate!();
 }
 
@@ -150,6 +157,11 @@ impl Real for f64 {
 
     fn to_f64(self) -> f64 {
         self
+    }
+
+    fn append_words(self, words: &mut Vec<u32>) {
+        let bits = self.to_bits();
+        words.extend([bits as u32, (bits >> 32) as u32]);
     }
 
     accumulate!();

@@ -7,8 +7,10 @@ use crate::real::{Range, Real};
 /// One measured value as it arrives at the controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Sample {
-    /// Value in the unit of the signal.
+    /// Value in the unit of the signal, a binary32 number.
     Physical(f32),
+    /// Value in the unit of the signal, a binary64 number: as it arrives in `f64`, rounded to nearest elsewhere.
+    Wide(f64),
     /// ADC code of a signal with gain and offset.
     Code(i32),
 }
@@ -91,9 +93,10 @@ impl<T: Real> Signal<T> {
     pub fn physical(&self, index: usize, sample: Sample) -> Result<T, InputError> {
         match (self.adc, sample) {
             (None, Sample::Physical(x)) => Ok(T::widen(x)),
+            (None, Sample::Wide(x)) => Ok(T::nearest(x)),
             (Some((gain, offset)), Sample::Code(n)) => Ok(gain * T::from_code(n) + offset),
             (None, Sample::Code(_)) => Err(InputError::PhysicalExpected { signal: index }),
-            (Some(_), Sample::Physical(_)) => Err(InputError::CodeExpected { signal: index }),
+            (Some(_), Sample::Physical(_) | Sample::Wide(_)) => Err(InputError::CodeExpected { signal: index }),
         }
     }
 

@@ -1,5 +1,7 @@
 //! The memory of a controller (contract section 1).
 
+use crate::real::Real;
+
 /// Coefficients of the duty ratio mapping in use: `d_real = a d_sim + b i_out + c (+ r i_out d_sim)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coefficients<T> {
@@ -34,8 +36,8 @@ pub struct State<T> {
     pub primed: bool,
 }
 
-impl State<f32> {
-    /// The state as 32-bit words in the order of contract section 1, as generated code keeps it.
+impl<T: Real> State<T> {
+    /// The state as 32-bit words in the order of contract section 1, a number of two words with the low one first.
     pub fn words(&self) -> Vec<u32> {
         let mut words = Vec::new();
         self.append_words(&mut words);
@@ -44,12 +46,14 @@ impl State<f32> {
 
     /// Appends [`State::words`] to a buffer.
     pub fn append_words(&self, words: &mut Vec<u32>) {
-        words.extend(self.held.iter().chain(&self.memory).map(|x| x.to_bits()));
-        words.extend([self.previous_duty.to_bits(), self.previous_command.to_bits()]);
-        words.extend(self.soft_cap.map(f32::to_bits));
-        if let Some(Coefficients { a, b, c, r }) = self.mapping {
-            words.extend([a, b, c].map(f32::to_bits));
-            words.extend(r.map(f32::to_bits));
+        let duties = [self.previous_duty, self.previous_command];
+        let mapping = self
+            .mapping
+            .iter()
+            .flat_map(|own| [Some(own.a), Some(own.b), Some(own.c), own.r]);
+        let numbers = self.held.iter().chain(&self.memory).copied().chain(duties);
+        for number in numbers.chain(self.soft_cap).chain(mapping.flatten()) {
+            number.append_words(words);
         }
         words.extend([self.bad_count, u32::from(self.primed)]);
     }

@@ -25,6 +25,8 @@ pub enum NumericFormat {
     F32,
     /// As `F32`, but every product of the network is added with one rounding (fused multiply-add).
     F32Fma,
+    /// IEEE 754 binary64, fixed order, never contracted; the weights are the binary32 numbers of the file.
+    F64,
     /// Integer network: 16-bit weights and activations, 32-bit accumulators; binary32 around it.
     I16,
     /// Integer network: 8-bit weights, 16-bit activations, 32-bit accumulators; binary32 around it.
@@ -33,9 +35,10 @@ pub enum NumericFormat {
 
 impl NumericFormat {
     /// All formats.
-    pub const ALL: [NumericFormat; 4] = [
+    pub const ALL: [NumericFormat; 5] = [
         NumericFormat::F32,
         NumericFormat::F32Fma,
+        NumericFormat::F64,
         NumericFormat::I16,
         NumericFormat::I8,
     ];
@@ -46,6 +49,7 @@ impl NumericFormat {
         match self {
             NumericFormat::F32 => "f32",
             NumericFormat::F32Fma => "f32-fma",
+            NumericFormat::F64 => "f64",
             NumericFormat::I16 => "i16",
             NumericFormat::I8 => "i8",
         }
@@ -61,9 +65,40 @@ impl NumericFormat {
     #[must_use]
     pub fn weight_limit(self) -> Option<i32> {
         match self {
-            NumericFormat::F32 | NumericFormat::F32Fma => None,
+            NumericFormat::F32 | NumericFormat::F32Fma | NumericFormat::F64 => None,
             NumericFormat::I16 => Some(32_767),
             NumericFormat::I8 => Some(127),
+        }
+    }
+
+    /// Format of everything that is not an integer network: measurement, state, observation, command.
+    #[must_use]
+    pub fn scalar(self) -> Scalar {
+        match self {
+            NumericFormat::F64 => Scalar::F64,
+            NumericFormat::F32 | NumericFormat::F32Fma | NumericFormat::I16 | NumericFormat::I8 => Scalar::F32,
+        }
+    }
+}
+
+/// Floating-point format of the numbers around the network (`docs/numeric-contract.md`); how it rounds is in
+/// [`crate::rounding`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scalar {
+    /// IEEE 754 binary32.
+    F32,
+    /// IEEE 754 binary64.
+    F64,
+}
+
+impl Scalar {
+    /// Words of 32 bits in a number. Two follow each other with the low one first.
+    #[must_use]
+    pub fn words(self) -> usize {
+        match self {
+            Scalar::F32 => 1,
+            Scalar::F64 => 2,
         }
     }
 }

@@ -1,6 +1,51 @@
-//! The one rounding from binary64 to binary32, to nearest or inwards.
+//! The one rounding from binary64 to the format, to nearest or inwards.
 
-use crate::model::Interval;
+use crate::model::{Interval, Scalar};
+
+/// Numbers of the format are given as binary64, which holds every binary32 number exactly.
+impl Scalar {
+    /// Nearest number of the format, ties to even; infinite beyond the largest finite one.
+    #[must_use]
+    pub fn nearest(self, x: f64) -> f64 {
+        match self {
+            Scalar::F32 => f64::from(nearest_f32(x)),
+            Scalar::F64 => x,
+        }
+    }
+
+    /// Smallest number of the format that is not below `x`: rounds a lower limit inwards.
+    #[must_use]
+    pub fn up(self, x: f64) -> f64 {
+        match self {
+            Scalar::F32 => f64::from(up_f32(x)),
+            Scalar::F64 => x,
+        }
+    }
+
+    /// Largest number of the format that is not above `x`: rounds an upper limit inwards.
+    #[must_use]
+    pub fn down(self, x: f64) -> f64 {
+        match self {
+            Scalar::F32 => f64::from(down_f32(x)),
+            Scalar::F64 => x,
+        }
+    }
+
+    /// The number of the format after `x`, which is one.
+    #[must_use]
+    pub fn next_up(self, x: f64) -> f64 {
+        match self {
+            Scalar::F32 => f64::from((x as f32).next_up()),
+            Scalar::F64 => x.next_up(),
+        }
+    }
+
+    /// The number of the format before `x`, which is one.
+    #[must_use]
+    pub fn next_down(self, x: f64) -> f64 {
+        -self.next_up(-x)
+    }
+}
 
 /// Nearest binary32, ties to even; infinite if `x` lies beyond the largest finite one.
 #[must_use]

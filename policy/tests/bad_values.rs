@@ -8,7 +8,7 @@ fn an_unsupported_numeric_format_lists_what_is() {
     contract_fault(
         "sample_period = 1e-4",
         "sample_period = 1e-4\nnumeric_format = ¦\"i4\"",
-        &["not supported yet", "\"i4\"", "supported: f32, f32-fma, i16, i8"],
+        &["not supported yet", "\"i4\"", "supported: f32, f32-fma, f64, i16, i8"],
     );
 }
 

@@ -100,8 +100,20 @@ pub enum Fpu {
     Single,
     /// binary32 and binary64.
     Double,
-    /// Decided by the machine the code is compiled for.
+    /// Decided by the machine the code is compiled for: both, on every usual one.
     Native,
+}
+
+impl Fpu {
+    /// Whether binary32, or binary64 if `double`, is computed in hardware.
+    #[must_use]
+    pub fn has(self, double: bool) -> bool {
+        match self {
+            Fpu::None => false,
+            Fpu::Single => !double,
+            Fpu::Double | Fpu::Native => true,
+        }
+    }
 }
 
 /// Fused multiply-add in hardware, as cycles from which the next dependent-free operation can issue.

@@ -20,7 +20,7 @@ pub struct InputView {
 pub struct ParameterView {
     /// Name.
     pub name: String,
-    /// Value after `init`: a decimal that gives the binary32 value also through binary64.
+    /// Value after `init`: a decimal that gives the value also through binary64.
     pub value: String,
     /// Lowest accepted value.
     pub low: String,

@@ -263,8 +263,8 @@ pub struct CrcKind {
     pub name: &'static str,
     /// C type of an element.
     pub element: &'static str,
-    /// Element `i` as a word.
-    pub word: String,
+    /// Element `i` as words, the low one first.
+    pub words: Vec<String>,
 }
 
 /// A table of the integrity check.
@@ -308,6 +308,31 @@ pub struct PushView {
     pub index: usize,
 }
 
+/// The C type of the numbers and what goes with its width.
+#[derive(Debug, Clone, Copy)]
+pub struct NumberType {
+    /// `float` or `double`.
+    pub name: &'static str,
+    /// What IEEE 754 calls it.
+    pub format: &'static str,
+    /// Whether it has 64 bits.
+    pub is_wide: bool,
+    /// Of its literals and of the functions that take it.
+    pub suffix: &'static str,
+    /// Unsigned integer of its width.
+    pub word: &'static str,
+    /// All bits but the sign.
+    pub magnitude: &'static str,
+    /// The sign alone.
+    pub sign: &'static str,
+    /// Number of the sign bit.
+    pub top: u32,
+    /// Bits of 9.
+    pub nine: &'static str,
+    /// Bits of 1.
+    pub one: &'static str,
+}
+
 /// What both files need.
 #[derive(Debug, Clone)]
 pub struct Common {
@@ -319,6 +344,8 @@ pub struct Common {
     pub banner: Vec<String>,
     /// Parameters of `set_mapping` after the state; empty without a mapping.
     pub mapping_parameters: String,
+    /// Type of the numbers.
+    pub number: NumberType,
 }
 
 /// Widths of a processor without 8-bit types, asserted when the core is compiled.

@@ -17,10 +17,18 @@ pub struct Subject {
     pub event_count: String,
     /// Number of control steps.
     pub steps: u32,
-    /// Members of the measurement in order.
-    pub signals: Vec<String>,
-    /// Number of coefficients of the mapping; 0 without.
-    pub coefficients: usize,
+    /// Assignments that fill the measurement.
+    pub measurement: Vec<String>,
+    /// Words that they read.
+    pub measurement_words: usize,
+    /// Comparisons of the command.
+    pub answer: Vec<String>,
+    /// Comparison of the rest of the answer, and the way to the next move.
+    pub rest: Vec<String>,
+    /// Checksum over the state.
+    pub state_crc: String,
+    /// Words of the mapping's coefficients; 0 without.
+    pub coefficient_words: usize,
     /// Declarations of locals that hold them.
     pub coefficient_locals: Vec<String>,
     /// The same as arguments.

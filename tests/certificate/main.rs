@@ -176,7 +176,7 @@ fn the_observation_of_a_controller_lies_where_its_coordinates_say() {
                 .signals
                 .iter()
                 .zip(&values)
-                .map(|(signal, value)| verify::traces::sample_of(signal, *value))
+                .map(|(signal, value)| verify::traces::sample_of(policy::Scalar::F32, signal, *value))
                 .collect();
             let state = controller.state();
             let duties = [f64::from(state.previous_duty), f64::from(state.previous_command)];

@@ -67,7 +67,7 @@ fn trajectories(controller: &mut dyn Controller) -> Vec<Trajectory> {
 }
 
 fn interpreted(policy: &Policy) -> Vec<Trajectory> {
-    trajectories(&mut Agent::new(policy).unwrap())
+    trajectories(&mut Agent::<f32>::new(policy).unwrap())
 }
 
 fn compiled(policy: &Policy, language: Language) -> Vec<Trajectory> {
@@ -76,7 +76,7 @@ fn compiled(policy: &Policy, language: Language) -> Vec<Trajectory> {
         Call::Restart => live.restart().map(|()| None),
         Call::Step(samples) => live.step(samples).map(|command| {
             Some(Answer {
-                duty: f64::from(command.duty),
+                duty: command.duty,
                 action: Some(command.action_index),
                 status: command.status,
             })
@@ -95,6 +95,7 @@ fn included(policy: &Policy) -> Vec<Trajectory> {
         };
         let value = |index: usize| match samples[index] {
             Sample::Physical(x) => x,
+            Sample::Wide(x) => x as f32,
             Sample::Code(code) => code as f32,
         };
         let command = controller.step(&buck12::Measurement {

@@ -1,12 +1,19 @@
 //! The other numeric formats: generated code against the interpreter, bit by bit.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use interp::Controller;
 use policy::{NumericFormat, Policy, scales};
 use verify::{Files, Options};
 
 use super::{COMPILERS, assert_equal, run};
 
-const OTHERS: [NumericFormat; 3] = [NumericFormat::F32Fma, NumericFormat::I16, NumericFormat::I8];
+const OTHERS: [NumericFormat; 4] = [
+    NumericFormat::F32Fma,
+    NumericFormat::F64,
+    NumericFormat::I16,
+    NumericFormat::I8,
+];
 
 fn example(format: NumericFormat) -> Policy {
     policy::load(&tests::example()).unwrap().with_format(format)
@@ -35,6 +42,85 @@ fn random_policies_are_equal_in_every_format() {
             let report = run(&policy.clone().with_format(format), 1000, seed, &[compiler]);
             assert_equal(&report, &format!("{} {compiler}\n{}", format.name(), folder.contract));
         }
+    }
+}
+
+/// Each with one compiler at all its levels, as `two_hundred_random_policies_are_equal` in binary32.
+#[test]
+fn sixty_random_policies_are_equal_in_binary64() {
+    let next = AtomicU64::new(400);
+    let work = || {
+        loop {
+            let seed = next.fetch_add(1, Ordering::Relaxed);
+            if seed >= 460 {
+                return;
+            }
+            let folder = tests::random::policy(seed).unwrap();
+            let policy = policy::load(&folder.path()).unwrap().with_format(NumericFormat::F64);
+            let report = run(&policy, 2000, seed, &[COMPILERS[seed as usize % 3]]);
+            assert_equal(&report, &folder.contract);
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..2 {
+            scope.spawn(work);
+        }
+    });
+}
+
+/// Else a verification that took the wrong interpreter would not be seen.
+#[test]
+fn binary64_gives_other_q_values_than_binary32() {
+    let policy = policy::load(&tests::example()).unwrap();
+    let (wide, single) = (Controller::<f64>::new(&policy), Controller::<f32>::new(&policy));
+    let observation = [0.3, -0.7, 0.1, 0.2, -0.4, 0.9];
+    let q = wide.q_values(&ndarray::aview1(&observation)).unwrap();
+    let near = single
+        .q_values(&ndarray::aview1(&observation.map(|o| o as f32)))
+        .unwrap();
+    let distances = q.iter().zip(&near).map(|(q, near)| (q - f64::from(*near)).abs());
+    let worst = distances.fold(0.0, f64::max);
+    assert!(worst > 1e-9 && worst < 1e-3, "{worst}");
+}
+
+/// A number that is rounded to binary32 on its way.
+#[test]
+fn planted_defects_in_binary64_are_caught() {
+    let policy = example(NumericFormat::F64);
+    let host = targets::find("host").unwrap();
+    let clean: Files = codegen::compile(&policy, host, codegen::Language::C).unwrap().files;
+    let edits = [
+        (
+            "select(f0, measured->v_out",
+            "select(f0, (double)(float)measured->v_out",
+        ),
+        (
+            "out[o] = out[o] + ((double)w[o] * input)",
+            "out[o] = (double)(float)(out[o] + ((double)w[o] * input))",
+        ),
+        ("front->observation[0] = ", "front->observation[0] = (double)(float)"),
+        (
+            "buck12_duties[action], chosen",
+            "(double)(float)buck12_duties[action], chosen",
+        ),
+        (
+            "state->previous_command = ",
+            "state->previous_command = (double)(float)",
+        ),
+    ];
+    for (from, to) in edits {
+        let mut files = clean.clone();
+        let text = files.get_mut("buck12.c").unwrap();
+        let edited = text.replacen(from, to, 1);
+        assert_ne!(*text, edited, "{from}: the edit has found its place");
+        *text = edited;
+        let options = Options {
+            steps: 5000,
+            generated: Some(&files),
+            compilers: vec!["gcc".into()],
+            ..Options::default()
+        };
+        assert!(!verify::run(&policy, options).unwrap().passed(), "{from}");
     }
 }
 

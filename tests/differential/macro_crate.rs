@@ -26,6 +26,7 @@ fn the_macro_is_equal_to_the_interpreter_in_q_state_and_duty() {
                 let trace = oracle.step(&samples).unwrap();
                 let value = |index: usize| match samples[index] {
                     Sample::Physical(x) => x,
+                    Sample::Wide(x) => x as f32,
                     Sample::Code(code) => code as f32,
                 };
                 let measured = buck12::Measurement {
@@ -61,6 +62,7 @@ fn the_macro_is_equal_to_the_interpreter_in_q_state_and_duty() {
                 controller.reset();
             }
             Event::SetMapping { a, b, c, .. } => {
+                let [a, b, c] = [a, b, c].map(|x| x as f32);
                 assert_eq!(controller.set_mapping(a, b, c), oracle.set_mapping(a, b, c, None));
             }
             Event::Init => {

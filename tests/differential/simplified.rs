@@ -32,6 +32,10 @@ fn dead_neurons_are_left_out_and_no_bit_changes() {
     let host = targets::find("host").unwrap();
     for format in NumericFormat::ALL {
         let policy = with_dead_neurons(format);
+        if format == NumericFormat::F64 {
+            assert!(removed(&policy).is_empty(), "the box of the proof is that of binary32");
+            continue;
+        }
         let last = if format == NumericFormat::F32Fma { 0 } else { 4 };
         assert_eq!(removed(&policy), [4, last, 0], "{format:?}");
         let (all, fewer) = (manifest::sizes(&before, host).macs, manifest::sizes(&policy, host).macs);
@@ -88,7 +92,7 @@ fn random_policies_with_pruned_neurons_keep_their_bits() {
             layer.weights[half * layer.inputs..].fill(-0.0);
             layer.bias[half..].fill(-0.0);
         }
-        let policy = policy.with_format(NumericFormat::ALL[seed as usize % 4]);
+        let policy = policy.with_format(NumericFormat::ALL[seed as usize % 5]);
         count += removed(&policy).iter().sum::<usize>();
         assert_equal(&run(&policy, 500, seed, &["gcc"]), &folder.contract);
     }

@@ -7,7 +7,7 @@ mod unit;
 use std::collections::BTreeSet;
 use std::process::Command;
 
-use closed_loop::{Agent, Answer, Call, External};
+use closed_loop::{Answer, Call, External, interpreter};
 use codegen::Door;
 use interp::Sample;
 use policy::{NumericFormat, Policy};
@@ -20,7 +20,7 @@ use unit::{Descriptions, Unit, VERSIONS, closed_loop, line, standard_headers};
 const PERIODS: usize = 5000;
 
 fn interpreted(policy: &Policy, periods: usize) -> Vec<(Vec<Sample>, Answer)> {
-    closed_loop(policy, &mut Agent::new(policy).unwrap(), periods)
+    closed_loop(policy, interpreter(policy).unwrap().as_mut(), periods)
 }
 
 fn lines(trajectory: &[(Vec<Sample>, Answer)]) -> Vec<String> {
@@ -63,7 +63,7 @@ fn fmpy_compiles_the_sources_and_simulates_them() {
 
 #[test]
 fn fmpy_takes_codes_filters_and_policies_without_mapping() {
-    for name in ["adc_mapping", "filters", "activations", "linear"] {
+    for name in ["adc_mapping", "filters", "activations", "linear", "wide"] {
         agrees(&golden_case(name), 500, &VERSIONS, FMPY);
     }
 }
@@ -84,7 +84,12 @@ fn the_plant_as_importing_program_sees_the_duties_of_the_interpreter() {
     if is_without("FMPy") {
         return;
     }
-    let formats = [NumericFormat::F32Fma, NumericFormat::I16, NumericFormat::I8];
+    let formats = [
+        NumericFormat::F32Fma,
+        NumericFormat::F64,
+        NumericFormat::I16,
+        NumericFormat::I8,
+    ];
     let others = formats.map(|format| (example().with_format(format), 1000));
     let exact = [(example(), PERIODS), (golden_case("adc_mapping"), 1000)];
     for (policy, periods) in exact.into_iter().chain(others) {
@@ -111,7 +116,12 @@ fn instances_states_times_and_refusals_are_as_the_standard_says() {
     if is_without("FMPy") {
         return;
     }
-    for policy in [example(), golden_case("constructs"), golden_case("minimal")] {
+    for policy in [
+        example(),
+        golden_case("constructs"),
+        golden_case("wide"),
+        golden_case("minimal"),
+    ] {
         for door in VERSIONS {
             let unit = Unit::new(&policy, door);
             unit.build_importer();

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use codegen::Door;
-use policy::Policy;
+use policy::{NumericFormat, Policy};
 use tests::tools::Ran;
 
 use super::{build, build_silently, example, files, golden_case, run_program, write};
@@ -56,23 +56,25 @@ fn run_kit(policy: &Policy, files: &BTreeMap<String, String>, compiler: &Compile
 }
 
 #[test]
-fn the_kit_of_the_example_passes_under_every_compiler() {
-    let policy = example();
-    let files = files(&policy, Door::Kit, STEPS);
-    for compiler in COMPILERS {
-        let ran = run_kit(&policy, &files, compiler);
-        let (command, line) = (compiler.command, &ran.stdout);
-        assert_eq!((ran.code, line.lines().count()), (Some(0), 1), "{command:?}: {ran:?}");
-        assert!(
-            line.starts_with("buck12: PASS: ") && line.contains("buck12 200 steps"),
-            "{line}"
-        );
+fn the_kit_of_the_example_passes_under_every_compiler_in_both_widths() {
+    for format in [NumericFormat::F32, NumericFormat::F64] {
+        let policy = example().with_format(format);
+        let files = files(&policy, Door::Kit, STEPS);
+        for compiler in COMPILERS {
+            let ran = run_kit(&policy, &files, compiler);
+            let (command, line) = (compiler.command, &ran.stdout);
+            assert_eq!((ran.code, line.lines().count()), (Some(0), 1), "{command:?}: {ran:?}");
+            assert!(
+                line.starts_with("buck12: PASS: ") && line.contains("buck12 200 steps"),
+                "{line}"
+            );
+        }
     }
 }
 
 #[test]
 fn the_kit_passes_for_codes_filters_activations_and_policies_without_mapping() {
-    for name in ["adc_mapping", "filters", "activations", "minimal", "linear"] {
+    for name in ["adc_mapping", "filters", "activations", "minimal", "linear", "wide"] {
         let policy = golden_case(name);
         let ran = run_kit(&policy, &files(&policy, Door::Kit, STEPS), &COMPILERS[0]);
         assert_eq!(ran.code, Some(0), "{name}: {ran:?}");
@@ -110,6 +112,23 @@ pub fn flipped(literal: &str) -> String {
 }
 
 /// The lowest bit of the first weight.
+/// A number that a core in binary64 rounds to binary32 on its way.
+#[test]
+fn a_number_of_half_the_width_fails() {
+    let policy = golden_case("wide");
+    for ran in edited(
+        &policy,
+        &[
+            ("front->observation[0] = ", "front->observation[0] = (double)(float)"),
+            ("command->duty_sim = ", "command->duty_sim = (double)(float)"),
+            ("state->held[i] = ", "state->held[i] = (double)(float)"),
+        ],
+    ) {
+        assert_eq!(ran.code, Some(1), "{ran:?}");
+        assert!(ran.stdout.contains("FAIL"), "{ran:?}");
+    }
+}
+
 #[test]
 fn a_flipped_weight_bit_fails() {
     let policy = example();

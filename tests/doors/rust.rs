@@ -1,12 +1,16 @@
 //! The build script's door: the example crates, whose build scripts have generated a controller in Rust and one in C, answer
 //! as the interpreter does.
 
+use std::process::Command;
+
+use codegen::backend::rust::bindings::Bindings;
+use codegen::{Backend, Language};
 use interp::{Controller, Sample};
-use policy::Policy;
-use tests::tools::copy_folder;
+use policy::{Policy, Scalar};
+use tests::tools::{copy_folder, run_silently, rustc};
 use verify::traces::{Event, Stream};
 
-use super::example;
+use super::{example, golden_case, write};
 
 const STEPS: u32 = 20_000;
 
@@ -42,6 +46,7 @@ macro_rules! first_difference {
                     different = (!equal).then_some(steps);
                 }
                 Event::SetMapping { a, b, c, r } => {
+                    let ([a, b, c], r) = ([a, b, c].map(|x| x as f32), r.map(|r| r as f32));
                     assert_eq!(generated.set_mapping(a, b, c), expected.set_mapping(a, b, c, r));
                 }
                 Event::Reset => {
@@ -62,6 +67,7 @@ macro_rules! first_difference {
 fn physical(samples: &[Sample]) -> [f32; 3] {
     let values = samples.iter().map(|sample| match sample {
         Sample::Physical(value) => *value,
+        Sample::Wide(value) => *value as f32,
         Sample::Code(code) => panic!("the example measures in volts and amperes, not in codes ({code})"),
     });
     values.collect::<Vec<_>>().try_into().unwrap()
@@ -96,3 +102,62 @@ fn another_policy_is_told_apart_in_both_languages() {
     assert!(first_difference!(example_build_rust::buck12, &other).is_some());
     assert!(first_difference!(example_build_c::buck12, &other).is_some());
 }
+
+/// The declarations of the C core in Rust, against the Rust backend: every word of state, command, observation and Q values.
+#[test]
+fn the_c_core_answers_through_its_declarations_as_rust_does_in_both_widths() {
+    for name in ["constructs", "wide"] {
+        let policy = golden_case(name);
+        let folder = tempfile::tempdir().unwrap();
+        let mut all = codegen::generate(&policy, targets::host(), &Language::ALL)
+            .unwrap()
+            .files;
+        let program = codegen::lower(&policy, targets::host(), Language::C);
+        all.extend(Bindings.emit(&program).unwrap().files);
+        let text = BOTH.replace("NAME", name).replace(
+            "NUMBER",
+            match policy.numeric_format.scalar() {
+                Scalar::F32 => "f32",
+                Scalar::F64 => "f64",
+            },
+        );
+        all.insert("both.rs".to_owned(), text);
+        write(&all, folder.path());
+        let object = ["-O1", "-ffp-contract=off", "-c", "-o", "core.o", &format!("{name}.c")].map(str::to_owned);
+        run_silently(Command::new("gcc").args(object).current_dir(folder.path()));
+        let flags = ["--edition=2021", "-O", "-Clink-arg=core.o", "both.rs"];
+        run_silently(rustc().args(flags).current_dir(folder.path()));
+        run_silently(&mut Command::new(folder.path().join("both")));
+    }
+}
+
+const BOTH: &str = r#"
+#[allow(dead_code)]
+#[path = "NAME.rs"]
+mod rust;
+#[allow(dead_code)]
+#[path = "NAME_ffi.rs"]
+mod core;
+
+fn main() {
+    let (mut one, mut two) = (rust::Controller::new(), core::Controller::new());
+    assert!(core::Controller::integrity() && core::Controller::self_test() == Ok(()));
+    let mut random = 1_u32;
+    let mut draw = || {
+        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (random >> 8) as NUMBER / 3.0e5
+    };
+    for step in 0..2000 {
+        let (v_out, i_l, i_out) = (draw() + 20.0, draw() as i32 * 40, draw() * 0.3);
+        let (a, b) = (rust::Measurement { v_out, i_l, i_out }, core::Measurement { v_out, i_l, i_out });
+        assert_eq!(one.observe(&a), two.observe(&b));
+        assert_eq!(rust::Controller::q_values(&one.observe(&a)), core::Controller::q_values(&two.observe(&b)));
+        let (x, y) = (one.step(&a), two.step(&b));
+        assert_eq!((x.duty, x.duty_sim, x.action_index, x.status), (y.duty, y.duty_sim, y.action_index, y.status));
+        assert_eq!(one.state_words(), two.state_words(), "{step}");
+        if step % 100 == 50 {
+            assert_eq!(one.set_mapping(1.03, -0.0025, 0.006, 0.0009), two.set_mapping(1.03, -0.0025, 0.006, 0.0009));
+        }
+    }
+}
+"#;

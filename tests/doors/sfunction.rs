@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use codegen::Door;
-use policy::{Interval, Policy};
+use policy::{Interval, Policy, Scalar};
 use tests::tools::Ran;
 
 use super::{build, build_silently, example, files, golden_case, run_program, write};
@@ -54,15 +54,22 @@ fn config(policy: &Policy) -> String {
         list(policy.signals.iter().map(value).collect())
     };
     let arguments: String = (0..coefficients.len())
-        .map(|i| format!(", single(values[{i}])"))
+        .map(|i| format!(", arriving(values[{i}])"))
         .collect();
     let set_mapping = match coefficients.is_empty() {
         true => "(void)state; (void)values; return 1u;".to_owned(),
         false => format!("return {n}_set_mapping(state{arguments});"),
     };
+    let arriving = match policy.numeric_format.scalar() {
+        Scalar::F32 => {
+            "typedef float number;\nstatic number arriving(double x)\n{\n    \
+             return (x > FLT_MAX) ? FLT_MAX : ((x < -FLT_MAX) ? -FLT_MAX : (float)x);\n}"
+        }
+        Scalar::F64 => "typedef double number;\nstatic number arriving(double x)\n{\n    return x;\n}",
+    };
     let mut measure = String::new();
     for (i, signal) in policy.signals.iter().enumerate() {
-        let convert = if signal.adc.is_some() { "code" } else { "single" };
+        let convert = if signal.adc.is_some() { "code" } else { "arriving" };
         let _ = writeln!(measure, "    measured->{} = {convert}(inputs[{i}]);", signal.name);
     }
     format!(
@@ -73,7 +80,7 @@ fn config(policy: &Policy) -> String {
 #define FEATURES {features}
 #define ACTIONS {actions}
 #define PERIOD {period:?}
-#define FALLBACK ((float){fallback:?})
+#define FALLBACK ((number){fallback:?})
 #define NAN_VALUE (HUGE_VAL - HUGE_VAL)
 #define CONTROLLER(type) {n}_##type
 #define CONTROLLER_CALL(function) {n}_##function
@@ -83,17 +90,14 @@ static const double coefficient_values[COEFFICIENTS + 1] = {values};
 static const double coefficient_lows[COEFFICIENTS + 1] = {coefficient_lows};
 static const double coefficient_highs[COEFFICIENTS + 1] = {coefficient_highs};
 static const double coefficient_zero = 0.0;
-static float single(double x)
-{{
-    return (x > FLT_MAX) ? FLT_MAX : ((x < -FLT_MAX) ? -FLT_MAX : (float)x);
-}}
+{arriving}
 static int32_t code(double x)
 {{
     return isnan(x) ? INT32_MIN : ((fabs(x) > 2.0e9) ? ((x > 0.0) ? INT32_MAX : INT32_MIN) : (int32_t)lround(x));
 }}
 static void measure(const double *inputs, {n}_measurement *measured)
 {{
-    (void)single;
+    (void)arriving;
     (void)code;
 {measure}}}
 static uint32_t set_mapping({n}_state *state, const double *values)
@@ -198,6 +202,7 @@ fn passes(policy: &Policy, compiler: &[&str], emulator: Option<&str>) {
 fn twenty_thousand_steps_of_two_instances_equal_the_core() {
     passes(&example(), &["gcc", "-O2"], None);
     passes(&golden_case("constructs"), &["clang", "-O1"], None);
+    passes(&golden_case("wide"), &["gcc", "-O2"], None);
 }
 
 #[test]
@@ -213,11 +218,13 @@ fn sanitisers_have_nothing_to_say_about_codes_and_the_four_term_mapping() {
 
 #[test]
 fn the_steps_equal_the_core_on_a_big_endian_machine() {
-    passes(
-        &golden_case("constructs"),
-        &["powerpc-linux-gnu-gcc", "-static", "-O2"],
-        Some("qemu-ppc"),
-    );
+    for name in ["constructs", "wide"] {
+        passes(
+            &golden_case(name),
+            &["powerpc-linux-gnu-gcc", "-static", "-O2"],
+            Some("qemu-ppc"),
+        );
+    }
 }
 
 #[test]

@@ -4,6 +4,7 @@
 use std::path::Path;
 use std::process::Command;
 
+use policy::Scalar;
 use tests::tools::{run, run_silently, rustc};
 
 use super::{Case, cases};
@@ -48,26 +49,30 @@ fn the_code_is_a_no_std_library_without_unsafe_code_or_warning_in_every_edition(
 
 /// What a firmware calls, not inlined away and with nothing known about the arguments.
 fn probes(case: &Case) -> String {
+    let number = match case.policy.numeric_format.scalar() {
+        Scalar::F32 => "f32",
+        Scalar::F64 => "f64",
+    };
     let mapping = match case.policy.mapping.map(|mapping| mapping.coefficients.r) {
         None => "",
         Some(None) => {
-            "#[inline(never)] pub fn probe_mapping(x: &mut Controller, a: f32, b: f32, c: f32) -> bool \
+            "#[inline(never)] pub fn probe_mapping(x: &mut Controller, a: Number, b: Number, c: Number) -> bool \
              { x.set_mapping(a, b, c) }"
         }
         Some(Some(_)) => {
-            "#[inline(never)] pub fn probe_mapping(x: &mut Controller, a: f32, b: f32, c: f32, r: f32) -> bool \
+            "#[inline(never)] pub fn probe_mapping(x: &mut Controller, a: Number, b: Number, c: Number, r: Number) -> bool \
              { x.set_mapping(a, b, c, r) }"
         }
     };
     format!(
-        "#![no_std]\n#![forbid(unsafe_code)]\ninclude!(\"FILE\");
+        "#![no_std]\n#![forbid(unsafe_code)]\ninclude!(\"FILE\");\ntype Number = {number};
          #[inline(never)] pub fn probe_new() -> Controller {{ Controller::new() }}
          #[inline(never)] pub fn probe_reset(x: &mut Controller) {{ x.reset() }}
          #[inline(never)] pub fn probe_eval(x: &Controller, m: &Measurement) -> Command {{ x.eval(m) }}
          #[inline(never)] pub fn probe_commit(x: &mut Controller, m: &Measurement, c: &Command) {{ x.commit(m, c) }}
          #[inline(never)] pub fn probe_step(x: &mut Controller, m: &Measurement) -> Command {{ x.step(m) }}
-         #[inline(never)] pub fn probe_observe(x: &Controller, m: &Measurement) -> [f32; FEATURES] {{ x.observe(m) }}
-         #[inline(never)] pub fn probe_q(o: &[f32; FEATURES]) -> [f32; ACTIONS] {{ Controller::q_values(o) }}
+         #[inline(never)] pub fn probe_observe(x: &Controller, m: &Measurement) -> [Number; FEATURES] {{ x.observe(m) }}
+         #[inline(never)] pub fn probe_q(o: &[Number; FEATURES]) -> [Number; ACTIONS] {{ Controller::q_values(o) }}
          #[inline(never)] pub fn probe_words(x: &Controller) -> [u32; STATE_WORDS] {{ x.state_words() }}
          #[inline(never)] pub fn probe_self_test() -> Result<(), u32> {{ Controller::self_test() }}
          #[inline(never)] pub fn probe_integrity() -> bool {{ Controller::integrity() }}

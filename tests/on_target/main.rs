@@ -12,7 +12,7 @@ mod included;
 use std::collections::BTreeMap;
 
 use codegen::Language;
-use policy::Policy;
+use policy::{NumericFormat, Policy};
 use targets::{Fpu, TargetSpec};
 use verify::{Options, Outcome, Report};
 
@@ -23,6 +23,8 @@ const FIRST_SEED: u64 = 5000;
 
 /// Steps of a build.
 const STEPS: u64 = 20_000;
+/// Steps of a build in every format.
+const CHECKSUM_STEPS: u64 = 500;
 /// Steps of a random policy where every float operation is a call of a library.
 const RANDOM_STEPS_WITHOUT_FPU: u64 = 4_000;
 
@@ -123,6 +125,43 @@ equal_on! {
     equal_on_riscv32imc: "riscv32imc",
     equal_on_riscv32imfc: "riscv32imfc",
     equal_on_powerpc_big_endian: "dspace-ds1202",
+}
+
+/// Every format on a target of each byte order and on this machine, in every language: one checksum of all words per format.
+/// Binary64 also where it is a library.
+#[test]
+fn a_format_has_one_checksum_on_every_target_and_in_every_language() {
+    let example = policy::load(&tests::example()).unwrap();
+    for format in NumericFormat::ALL {
+        let policy = example.clone().with_format(format);
+        let mut checksums = BTreeMap::new();
+        for name in [
+            "host",
+            "cortex-m0plus",
+            "cortex-m4f",
+            "cortex-m7",
+            "riscv32imfc",
+            "dspace-ds1202",
+        ] {
+            let target = target(name);
+            let report = run(&policy, target, &compilers(target), &["-O2", "-O"], CHECKSUM_STEPS);
+            assert_equal(&report, &format!("{name} {}", format.name()));
+            checksums.insert(report.checksum, name);
+        }
+        assert_eq!(checksums.len(), 1, "{}: {checksums:?}", format.name());
+    }
+}
+
+/// Random policies in binary64 where it is in hardware: C and Rust, big-endian.
+#[test]
+fn random_policies_are_equal_in_binary64_on_powerpc() {
+    let target = target("dspace-ds1202");
+    for seed in FIRST_SEED..FIRST_SEED + RANDOM_POLICIES {
+        let folder = tests::random::policy(seed).unwrap();
+        let policy = policy::load(&folder.path()).unwrap().with_format(NumericFormat::F64);
+        let report = run(&policy, target, &compilers(target), &["-O2", "-O"], 2_000);
+        assert_equal(&report, &folder.contract);
+    }
 }
 
 /// The comparison itself: one flipped bit of one weight must be found, on both byte orders.

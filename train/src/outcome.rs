@@ -75,7 +75,7 @@ impl<E: Environment> Trainer<E> {
     /// compiled code's): a check of weights, order and activation that does not lean on the interpreter.
     fn golden(&self, network: &Network) -> Result<GoldenVectors, Error> {
         let task = &self.settings.evaluation;
-        let mut agent = Agent::new(&self.contract.with(network))?;
+        let mut agent = Agent::<f32>::new(&self.contract.with(network))?;
         let mut observations = Vec::new();
         let instants = task.all_instants();
         for (n, &step) in task.load_steps.iter().enumerate() {

@@ -87,7 +87,7 @@ pub struct Trainer<E> {
     pub(crate) seed: u64,
     pub(crate) nominal: E,
     pub(crate) environment: E,
-    pub(crate) agent: Agent,
+    pub(crate) agent: Agent<f32>,
     pub(crate) learner: Learner,
     pub(crate) replay: ReplayBuffer,
     pub(crate) exploration: Rng,
@@ -124,7 +124,7 @@ impl<E: Environment> Trainer<E> {
         check_fit(settings, contract, environment)?;
         let mut network = contract.network();
         network.initialise(&mut Rng::new(seed, WEIGHTS));
-        let agent = Agent::new(&contract.policy)?;
+        let agent = Agent::<f32>::new(&contract.policy)?;
         let mut trainer = Self {
             replay: ReplayBuffer::new(network.inputs(), settings.learning.replay),
             learner: Learner::new(network, settings.learning.learner),
@@ -395,7 +395,7 @@ impl<E: Environment> Trainer<E> {
 /// # Errors
 /// If the contract measures something that the plant does not have.
 pub fn controller(contract: &Contract, network: &Network) -> Result<impl FnMut(&Sample) -> f64 + Clone + use<>, Error> {
-    let mut agent = Agent::new(&contract.with(network))?;
+    let mut agent = Agent::<f32>::new(&contract.with(network))?;
     // the signals fit the contract since `Agent::new`; a NaN would end the run as a divergence
     Ok(move |sample: &Sample| agent.step(&sample.measured).unwrap_or(f64::NAN))
 }
@@ -408,7 +408,7 @@ pub fn quick_controller(
     contract: &Contract,
     network: &Network,
 ) -> Result<impl FnMut(&Sample) -> f64 + Clone + use<>, Error> {
-    let mut agent = Agent::new(&contract.policy)?;
+    let mut agent = Agent::<f32>::new(&contract.policy)?;
     let network = network.clone();
     let mut scratch = [Vec::new(), Vec::new()];
     Ok(move |sample: &Sample| {

@@ -1,10 +1,10 @@
 //! The first difference between what was expected and what came.
 
 use interp::{Sample, status};
-use policy::Policy;
+use policy::{Policy, Scalar};
 
 use crate::oracle::Chunk;
-use crate::protocol::{HELLO_NAMES, Layout, WordKind, sample_word};
+use crate::protocol::{HELLO_NAMES, Layout, WordKind, encode_sample, numbers};
 use crate::report::{Difference, Measured, Value};
 use crate::traces::Event;
 
@@ -43,16 +43,16 @@ pub fn place<'a>(chunk: &'a Chunk, layout: &Layout, index: usize) -> Option<Plac
     None
 }
 
-/// Describes the difference at word `index` of a chunk.
-pub fn describe(policy: &Policy, chunk: &Chunk, layout: &Layout, index: usize, got: u32) -> Option<Difference> {
+/// Describes the difference at word `index` of a chunk; `got` is all that came, at least up to there.
+pub fn describe(policy: &Policy, chunk: &Chunk, layout: &Layout, index: usize, got: &[u32]) -> Option<Difference> {
     let place = place(chunk, layout, index)?;
     let word = &layout.answer(place.event)[place.word];
     Some(Difference {
         step: place.step,
         event: event_name(place.event).to_owned(),
         what: word.name.clone(),
-        expected: value(word.kind, chunk.expected[index]),
-        got: value(word.kind, got),
+        expected: value_at(word.kind, &chunk.expected, index),
+        got: value_at(word.kind, got, index),
         measurement: measurement(policy, place.event),
     })
 }
@@ -84,13 +84,17 @@ pub fn event_name(event: &Event) -> &'static str {
 
 /// The samples of a step, or the coefficients or the observation of another event, by name.
 pub fn measurement(policy: &Policy, event: &Event) -> Vec<Measured> {
-    let floats = |names: Vec<&str>, values: &[f32]| {
+    let scalar = policy.numeric_format.scalar();
+    let floats = |names: Vec<&str>, values: &[f64]| {
         names
             .into_iter()
             .zip(values)
             .map(|(name, x)| Measured {
                 signal: name.to_owned(),
-                sample: value(WordKind::Float, x.to_bits()),
+                sample: match scalar {
+                    Scalar::F32 => value(WordKind::Float, (*x as f32).to_bits()),
+                    Scalar::F64 => wide(*x),
+                },
             })
             .collect()
     };
@@ -101,7 +105,7 @@ pub fn measurement(policy: &Policy, event: &Event) -> Vec<Measured> {
             .zip(samples)
             .map(|(signal, &sample)| Measured {
                 signal: signal.name.clone(),
-                sample: sample_value(sample),
+                sample: sample_value(sample, scalar),
             })
             .collect(),
         Event::SetMapping { a, b, c, r } => floats(vec!["a", "b", "c", "r"], &[*a, *b, *c, r.unwrap_or(0.0)]),
@@ -113,17 +117,35 @@ pub fn measurement(policy: &Policy, event: &Event) -> Vec<Measured> {
     }
 }
 
-fn sample_value(sample: Sample) -> Value {
-    let bits = format!("{:#010x}", sample_word(sample));
-    match sample {
-        Sample::Physical(x) => Value {
-            value: format!("{x:?}"),
-            bits,
+fn sample_value(sample: Sample, scalar: Scalar) -> Value {
+    let mut words = Vec::new();
+    encode_sample(sample, scalar, &mut words);
+    match (sample, words.as_slice()) {
+        (Sample::Code(n), [word]) => Value {
+            value: n.to_string(),
+            bits: format!("{word:#010x}"),
         },
-        Sample::Code(n) => Value {
-            value: format!("{n}"),
-            bits,
-        },
+        (_, [word]) => value(WordKind::Float, *word),
+        (_, words) => wide(numbers(scalar, words).first().copied().unwrap_or_default()),
+    }
+}
+
+/// The word at `index`, or the number that it is a half of.
+fn value_at(kind: WordKind, words: &[u32], index: usize) -> Value {
+    let first = match kind {
+        WordKind::Low => index,
+        WordKind::High => index.saturating_sub(1),
+        WordKind::Float | WordKind::Integer | WordKind::Status => return value(kind, words[index]),
+    };
+    // the program may have ended within the number
+    let high = words.get(first + 1).copied().unwrap_or_default();
+    wide(f64::from_bits(u64::from(words[first]) | u64::from(high) << 32))
+}
+
+fn wide(x: f64) -> Value {
+    Value {
+        value: format!("{x:?}"),
+        bits: format!("{:#018x}", x.to_bits()),
     }
 }
 
@@ -132,7 +154,7 @@ pub fn value(kind: WordKind, word: u32) -> Value {
     let value = match kind {
         // the shortest decimal that gives these bits again
         WordKind::Float => format!("{:?}", f32::from_bits(word)),
-        WordKind::Integer => word.to_string(),
+        WordKind::Integer | WordKind::Low | WordKind::High => word.to_string(),
         WordKind::Status => status::names(word),
     };
     Value {

@@ -2,8 +2,9 @@
 
 use interp::argmax;
 use ndarray::aview1;
-use policy::{Golden, Policy};
+use policy::{Golden, Policy, Scalar};
 
+use crate::protocol::numbers;
 use crate::report::GoldenResult;
 use crate::traces::Event;
 
@@ -14,15 +15,15 @@ pub(crate) fn events(policy: &Policy) -> Vec<Event> {
         golden
             .observations
             .chunks_exact(features)
-            .map(|o| Event::Network(o.to_vec()))
+            .map(|o| Event::Network(o.iter().copied().map(f64::from).collect()))
             .collect()
     })
 }
 
 /// Judges the Q values, given as bits, that answer [`events`]; values that are missing count as wrong.
-pub(crate) fn judge(golden: &Golden, actions: usize, words: &[u32]) -> GoldenResult {
-    let q_values: Vec<f32> = words.iter().map(|word| f32::from_bits(*word)).collect();
-    let answers: Vec<&[f32]> = q_values.chunks_exact(actions).collect();
+pub(crate) fn judge(golden: &Golden, scalar: Scalar, actions: usize, words: &[u32]) -> GoldenResult {
+    let q_values = numbers(scalar, words);
+    let answers: Vec<&[f64]> = q_values.chunks_exact(actions).collect();
     let actions_equal = golden
         .action_indices
         .iter()
@@ -47,7 +48,7 @@ pub(crate) fn judge(golden: &Golden, actions: usize, words: &[u32]) -> GoldenRes
 }
 
 /// Largest difference relative to the largest expected |Q|; infinite if a value is no number.
-fn relative_error(expected: &[f32], got: &[f32]) -> f64 {
+fn relative_error(expected: &[f32], got: &[f64]) -> f64 {
     let largest = expected
         .iter()
         .map(|q| f64::from(q.abs()))
@@ -55,7 +56,7 @@ fn relative_error(expected: &[f32], got: &[f32]) -> f64 {
     expected
         .iter()
         .zip(got)
-        .map(|(e, g)| (f64::from(*e) - f64::from(*g)).abs() / largest)
+        .map(|(e, g)| (f64::from(*e) - g).abs() / largest)
         .map(|error| if error.is_nan() { f64::INFINITY } else { error })
         .fold(0.0, f64::max)
 }
@@ -75,7 +76,7 @@ mod tests {
     }
 
     fn judged(q: [f32; 4]) -> GoldenResult {
-        judge(&golden(), 2, &q.map(f32::to_bits))
+        judge(&golden(), Scalar::F32, 2, &q.map(f32::to_bits))
     }
 
     #[test]
@@ -93,7 +94,7 @@ mod tests {
     #[test]
     fn nan_and_missing_answers_do_not_pass() {
         assert!(!judged([f32::NAN, -4.0, 2.0, 3.0]).passed());
-        assert!(!judge(&golden(), 2, &[1.0_f32.to_bits(), (-4.0_f32).to_bits()]).passed());
+        assert!(!judge(&golden(), Scalar::F32, 2, &[1.0_f32.to_bits(), (-4.0_f32).to_bits()]).passed());
     }
 
     #[test]

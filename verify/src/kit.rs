@@ -2,10 +2,12 @@
 
 use codegen::Language;
 use codegen::backend::kit::{Material, Trace};
-use policy::{Policy, ReadOptions};
+use interp::Real;
+use policy::{NumericFormat, Policy, ReadOptions, Scalar};
 use targets::{RowBlock, TargetSpec};
 
 use crate::oracle::{Chunk, Oracle};
+use crate::protocol::{Layout, sample_words};
 use crate::session::VerifyError;
 use crate::traces::{Event, Stream};
 
@@ -39,7 +41,10 @@ const BLOCK: RowBlock = RowBlock::Rows(4);
 /// # Errors
 /// Only for a fault in the compiler itself.
 pub fn material(policy: &Policy, target: &TargetSpec, steps: u32) -> Result<Material, VerifyError> {
-    let constructs = constructs()?;
+    let constructs = match policy.numeric_format.scalar() {
+        Scalar::F32 => constructs()?,
+        Scalar::F64 => constructs()?.with_format(NumericFormat::F64),
+    };
     let suite = [("suite", target.c_row_block), ("blocks", BLOCK)].map(|(name, block)| {
         let mut part = constructs.clone();
         // the user may link several kits into one program
@@ -69,41 +74,53 @@ pub fn constructs() -> Result<Policy, VerifyError> {
 }
 
 fn trace(policy: &Policy, steps: u32) -> Result<Trace, VerifyError> {
-    let mut oracle = Oracle::new(policy);
+    match policy.numeric_format.scalar() {
+        Scalar::F32 => trace_in::<f32>(policy, steps),
+        Scalar::F64 => trace_in::<f64>(policy, steps),
+    }
+}
+
+fn trace_in<T: Real>(policy: &Policy, steps: u32) -> Result<Trace, VerifyError> {
+    let mut oracle = Oracle::<T>::new(policy);
     let mut stream = Stream::new(policy, SEED, &[]);
     let chunk = oracle
         .next_chunk(&mut stream, u64::from(steps))
         .map_err(VerifyError::Interpreter)?;
-    Ok(packed(policy, &oracle, &chunk))
+    Ok(packed(policy, oracle.layout(), &chunk))
 }
 
 /// The words of a chunk in the form of the kit: its layout is that of [`crate::protocol`].
-fn packed(policy: &Policy, oracle: &Oracle, chunk: &Chunk) -> Trace {
-    let values = policy.features.len() + policy.actions.len();
+fn packed(policy: &Policy, layout: &Layout, chunk: &Chunk) -> Trace {
+    let number = layout.scalar().words();
+    let values = number * (policy.features.len() + policy.actions.len());
     let mut trace = Trace::default();
     let (mut input, mut expected) = (chunk.input.as_slice(), chunk.expected.as_slice());
     for event in &chunk.events {
-        let answer = take(&mut expected, oracle.layout().answer(event).len());
+        let answer = take(&mut expected, layout.answer(event).len());
         // the kind comes first
         take(&mut input, 1);
         match event {
             Event::Step(_) => {
                 let (before, rest) = answer.split_at(values);
-                let (command, state) = rest.split_at(4);
+                let (command, state) = rest.split_at(2 * number + 2);
                 // the last word is the driver's verdict on purity
                 let state = &state[..state.len() - 1];
                 let rest = before.iter().chain(state).copied();
-                trace.step(take(&mut input, policy.signals.len()), command, rest);
+                trace.step(take(&mut input, sample_words(policy)), command, rest);
             }
             Event::SetMapping { r, .. } => {
-                let coefficients = take(&mut input, 4);
-                let given = if r.is_some() { coefficients } else { &coefficients[..3] };
+                let coefficients = take(&mut input, 4 * number);
+                let given = if r.is_some() {
+                    coefficients
+                } else {
+                    &coefficients[..3 * number]
+                };
                 trace.set_mapping(given, answer[0], answer[1..].iter().copied());
             }
             Event::Reset => trace.reset(answer.iter().copied()),
             Event::Init => trace.init(answer.iter().copied()),
             Event::Network(observation) => {
-                take(&mut input, observation.len());
+                take(&mut input, number * observation.len());
             }
         }
     }
@@ -121,7 +138,7 @@ mod tests {
     use std::collections::BTreeSet;
     use std::mem::{Discriminant, discriminant};
 
-    use codegen::program::{ActivationCode, NetworkCode, Op};
+    use codegen::program::{ActivationCode, Literal, NetworkCode, Op};
 
     use super::*;
 
@@ -138,7 +155,7 @@ mod tests {
             Op::SoftCap,
             Op::Coefficient(codegen::program::Coefficient::A),
             Op::ChosenDuty,
-            Op::Constant(1.0.into()),
+            Op::Constant(Literal::nearest(Scalar::F32, 1.0)),
             Op::Neg(0),
             Op::Add(0, 0),
             Op::Sub(0, 0),
@@ -230,7 +247,7 @@ mod tests {
     #[test]
     fn the_moves_of_the_suite_reach_every_status_and_action() {
         let constructs = constructs().unwrap();
-        let mut oracle = Oracle::new(&constructs);
+        let mut oracle = Oracle::<f32>::new(&constructs);
         let mut stream = Stream::new(&constructs, SEED, &[]);
         oracle.next_chunk(&mut stream, u64::from(SUITE_STEPS)).unwrap();
         let coverage = oracle.coverage();

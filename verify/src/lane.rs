@@ -72,7 +72,7 @@ impl<'a> Lane<'a> {
         if let Some(known) = &self.policy.golden {
             self.golden = Some(GoldenResult {
                 rounded: policy::scales::is_integer(self.policy.numeric_format),
-                ..golden::judge(known, self.policy.actions.len(), words)
+                ..golden::judge(known, self.layout.scalar(), self.policy.actions.len(), words)
             });
         }
         self.judge(chunk, answer)
@@ -90,7 +90,7 @@ impl<'a> Lane<'a> {
             Err(error) => (error.received, Some(error.reason)),
         };
         if let Some(index) = compare::first_difference(&chunk.expected, &words)
-            && let Some(difference) = compare::describe(self.policy, chunk, self.layout, index, words[index])
+            && let Some(difference) = compare::describe(self.policy, chunk, self.layout, index, &words)
         {
             self.steps_compared = difference.step;
             return Err(Outcome::Different {
@@ -161,7 +161,7 @@ mod tests {
     fn with_chunk(test: impl FnOnce(&Policy, &Layout, &Chunk)) {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/buck12/policy.toml");
         let policy = policy::load(&path).unwrap_or_else(|faults| panic!("{faults:#?}"));
-        let mut oracle = Oracle::new(&policy);
+        let mut oracle = Oracle::<f32>::new(&policy);
         let steps = (0..20).map(|n| Event::Step([99.0, 10.0 + n as f32, 9.5].map(Sample::Physical).to_vec()));
         let chunk = oracle.chunk_of(steps.collect()).unwrap();
         test(&policy, oracle.layout(), &chunk);

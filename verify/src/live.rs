@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use codegen::Language;
 use interp::{Controller, Sample};
-use policy::Policy;
+use policy::{Policy, Scalar};
 
 use crate::protocol::{self, Layout};
 use crate::runner::{ProcessRunner, Runner};
@@ -17,7 +17,7 @@ use crate::traces::Event;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LiveCommand {
     /// Duty, 0..1.
-    pub duty: f32,
+    pub duty: f64,
     /// Index of the chosen action.
     pub action_index: u32,
     /// Bits of [`interp::status`].
@@ -64,8 +64,10 @@ impl Live {
         };
         let name = build.name();
         let executable = toolchain::compile(&build, sources, folder.path()).map_err(|error| refused(&name, error))?;
-        let controller = Controller::<f32>::new(policy);
-        let layout = Layout::new(policy, controller.state_names());
+        let layout = match policy.numeric_format.scalar() {
+            Scalar::F32 => Layout::new(policy, Controller::<f32>::new(policy).state_names()),
+            Scalar::F64 => Layout::new(policy, Controller::<f64>::new(policy).state_names()),
+        };
         let mut runner = ProcessRunner::new(apart(Command::new(executable)), TIMEOUT, target.endianness);
         let hello = runner
             .start(layout.hello().len())
@@ -111,12 +113,14 @@ impl Live {
     /// If the program does not answer, or its `eval` and `commit` contradict its `step`.
     pub fn step(&mut self, samples: &[Sample]) -> Result<LiveCommand, String> {
         let answer = self.ask(&Event::Step(samples.to_vec()))?;
-        let [duty, action, status, purity] = self.places.map(|place| answer[place]);
+        let [duty, action, status, purity] = self.places;
+        let number = protocol::numbers(self.layout.scalar(), &answer[duty..action]);
+        let [action, status, purity] = [action, status, purity].map(|place| answer[place]);
         if purity != 0 {
             return Err(format!("{}: eval and commit contradict step", self.name));
         }
         Ok(LiveCommand {
-            duty: f32::from_bits(duty),
+            duty: number.first().copied().unwrap_or_default(),
             action_index: action,
             status,
         })
@@ -124,7 +128,7 @@ impl Live {
 
     fn ask(&mut self, event: &Event) -> Result<Vec<u32>, String> {
         self.words.clear();
-        protocol::encode(event, &mut self.words);
+        protocol::encode(event, self.layout.scalar(), &mut self.words);
         let expected = self.layout.answer_len(event);
         let answer = self.runner.exchange(&self.words, expected);
         answer.map_err(|error| format!("{}: {}", self.name, error.reason))

@@ -9,12 +9,14 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 
-use policy::Policy;
+use interp::Sample;
+use policy::{Policy, Scalar};
 use serde::Serialize;
 use targets::TargetSpec;
 
 use crate::elf::Elf;
 use crate::estimate::{Estimate, estimate};
+use crate::protocol::encode_sample;
 use crate::runner::{ProcessRunner, Runner as _};
 use crate::session::{COMPILER_TIMEOUT, Files};
 use crate::toolchain::{self, Build, BuildError, Install, Missing, Purpose, Sources};
@@ -199,19 +201,25 @@ fn answers(policy: &Policy, target: &TargetSpec, command: Command) -> Result<Vec
 /// Samples as words per step and signal: half of the steps inside the plausible ranges, a quarter anywhere, a quarter with
 /// one that is not a number or at the end of the codes.
 fn samples(policy: &Policy) -> Vec<u32> {
+    let scalar = policy.numeric_format.scalar();
     let mut rng = Rng::new(7);
     let mut words = Vec::new();
     for _ in 0..STEPS {
         let kind = rng.below(4);
         let bad = rng.below(policy.signals.len());
         for (index, signal) in policy.signals.iter().enumerate() {
-            let inside = sample_of(signal, rng.uniform(signal.range.low, signal.range.high));
-            words.push(match (kind, signal.adc) {
-                (0, _) => rng.bits() as u32,
-                (1, None) if index == bad => f32::NAN.to_bits(),
-                (1, Some(_)) if index == bad => i32::MAX.cast_unsigned(),
-                _ => crate::protocol::sample_word(inside),
-            });
+            let inside = sample_of(scalar, signal, rng.uniform(signal.range.low, signal.range.high));
+            let sample = match (kind, signal.adc) {
+                (0, Some(_)) => Sample::Code(rng.bits() as i32),
+                (0, None) => match scalar {
+                    Scalar::F32 => Sample::Physical(f32::from_bits(rng.bits() as u32)),
+                    Scalar::F64 => Sample::Wide(f64::from_bits(rng.bits())),
+                },
+                (1, None) if index == bad => Sample::Physical(f32::NAN),
+                (1, Some(_)) if index == bad => Sample::Code(i32::MAX),
+                _ => inside,
+            };
+            encode_sample(sample, scalar, &mut words);
         }
     }
     words

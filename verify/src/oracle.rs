@@ -1,7 +1,7 @@
 //! What the interpreter answers, chunk by chunk, in the words of the protocol.
 
-use interp::{Controller, InputError, Trace};
-use ndarray::aview1;
+use interp::{Controller, InputError, Real, Trace};
+use ndarray::Array1;
 use policy::Policy;
 use serde::Serialize;
 
@@ -38,22 +38,22 @@ pub struct Coverage {
     pub inits: u64,
 }
 
-/// The interpreter at work on the stream.
+/// The interpreter at work on the stream, in the floats of the policy's format.
 #[derive(Debug, Clone)]
-pub struct Oracle {
-    fresh: Controller<f32>,
-    controller: Controller<f32>,
-    trace: Trace<f32>,
+pub struct Oracle<T> {
+    fresh: Controller<T>,
+    controller: Controller<T>,
+    trace: Trace<T>,
     layout: Layout,
     steps: u64,
     checksum: Crc32,
     coverage: Coverage,
 }
 
-impl Oracle {
+impl<T: Real> Oracle<T> {
     /// An oracle at the start of a stream.
     pub fn new(policy: &Policy) -> Self {
-        let fresh = Controller::<f32>::new(policy);
+        let fresh = Controller::<T>::new(policy);
         Self {
             trace: fresh.blank_trace(),
             layout: Layout::new(policy, fresh.state_names()),
@@ -89,7 +89,7 @@ impl Oracle {
     }
 
     /// The interpreter in its present state.
-    pub fn controller(&self) -> &Controller<f32> {
+    pub fn controller(&self) -> &Controller<T> {
         &self.controller
     }
 
@@ -125,15 +125,17 @@ impl Oracle {
     }
 
     fn answer(&mut self, event: Event, chunk: &mut Chunk) -> Result<(), InputError> {
-        encode(&event, &mut chunk.input);
+        encode(&event, self.layout.scalar(), &mut chunk.input);
         let words = &mut chunk.expected;
         match &event {
             Event::Step(samples) => {
                 self.controller.step_into(samples, &mut self.trace)?;
                 let trace = &self.trace;
-                words.extend(trace.observation.iter().chain(&trace.q_values).map(|x| x.to_bits()));
                 let command = trace.command;
-                words.extend([command.duty, command.duty_sim].map(f32::to_bits));
+                let values = trace.observation.iter().chain(&trace.q_values).copied();
+                for number in values.chain([command.duty, command.duty_sim]) {
+                    number.append_words(words);
+                }
                 words.extend([command.action_index, command.status]);
                 self.controller.state().append_words(words);
                 words.push(0);
@@ -144,7 +146,8 @@ impl Oracle {
                 self.coverage.actions[command.action_index as usize] += 1;
             }
             Event::SetMapping { a, b, c, r } => {
-                let accepted = self.controller.set_mapping(*a, *b, *c, *r);
+                let [a, b, c] = [*a, *b, *c].map(T::nearest);
+                let accepted = self.controller.set_mapping(a, b, c, r.map(T::nearest));
                 words.push(u32::from(accepted));
                 self.controller.state().append_words(words);
                 self.coverage.mappings_accepted += u64::from(accepted);
@@ -161,8 +164,10 @@ impl Oracle {
                 self.coverage.inits += 1;
             }
             Event::Network(observation) => {
-                let q_values = self.controller.q_values(&aview1(observation))?;
-                words.extend(q_values.iter().map(|x| x.to_bits()));
+                let observation: Array1<T> = observation.iter().map(|x| T::nearest(*x)).collect();
+                for q in self.controller.q_values(&observation.view())? {
+                    q.append_words(words);
+                }
             }
         }
         chunk.events.push(event);

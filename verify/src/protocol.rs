@@ -5,15 +5,15 @@
 //!
 //! | event | payload | answer |
 //! |---|---|---|
-//! | [`kind::STEP`] | one word per signal: f32 bits or i32 code | observation, Q values, duty, duty_sim, action_index, status, state, purity |
+//! | [`kind::STEP`] | per signal: a number or an i32 code | observation, Q values, duty, duty_sim, action_index, status, state, purity |
 //! | [`kind::SET_MAPPING`] | a, b, c, r (r = 0 in the three-term form) | accepted, state |
 //! | [`kind::RESET`], [`kind::INIT`] | | state |
 //! | [`kind::NETWORK`] | observation | Q values |
 //!
-//! Each answer is flushed, so that a crash or a hang shows at the event that caused it.
+//! A number is the bits of a binary32 number, or in `f64` two words, the low one first. Each answer is flushed, so that a crash or a hang shows at the event that caused it.
 
-use interp::Sample;
-use policy::Policy;
+use interp::{Real, Sample};
+use policy::{Policy, Scalar};
 
 use crate::traces::Event;
 
@@ -56,6 +56,10 @@ pub mod purity {
 pub enum WordKind {
     /// binary32 bits.
     Float,
+    /// Low half of binary64 bits; the high one follows.
+    Low,
+    /// High half of binary64 bits.
+    High,
     /// Unsigned integer.
     Integer,
     /// Bits of [`interp::status`].
@@ -74,6 +78,7 @@ pub struct Word {
 /// The words of each answer, by name.
 #[derive(Debug, Clone)]
 pub struct Layout {
+    scalar: Scalar,
     signals: usize,
     features: usize,
     four_terms: bool,
@@ -86,32 +91,34 @@ pub struct Layout {
 impl Layout {
     /// The layout of a policy's answers; `state_names` as [`interp::Controller::state_names`] gives them.
     pub fn new(policy: &Policy, state_names: &[String]) -> Self {
+        let scalar = policy.numeric_format.scalar();
         let word = |name: String, kind| Word { name, kind };
+        let number = |name: String| -> Vec<Word> {
+            match scalar {
+                Scalar::F32 => vec![word(name, WordKind::Float)],
+                Scalar::F64 => vec![word(name.clone(), WordKind::Low), word(name, WordKind::High)],
+            }
+        };
         let observation = policy
             .features
             .iter()
             .enumerate()
-            .map(|(n, feature)| word(format!("observation[{n}] ({})", feature.name), WordKind::Float));
+            .flat_map(|(n, feature)| number(format!("observation[{n}] ({})", feature.name)));
         let network: Vec<Word> = (0..policy.actions.len())
-            .map(|n| word(format!("q[{n}]"), WordKind::Float))
+            .flat_map(|n| number(format!("q[{n}]")))
             .collect();
         let state: Vec<Word> = state_names
             .iter()
-            .map(|name| {
-                let integer = name == "bad_count" || name == "primed";
-                word(
-                    format!("state {name}"),
-                    if integer { WordKind::Integer } else { WordKind::Float },
-                )
+            .flat_map(|name| match name.as_str() {
+                "bad_count" | "primed" => vec![word(format!("state {name}"), WordKind::Integer)],
+                _ => number(format!("state {name}")),
             })
             .collect();
-        let command = [
-            ("duty", WordKind::Float),
-            ("duty_sim", WordKind::Float),
-            ("action_index", WordKind::Integer),
-            ("status", WordKind::Status),
-        ]
-        .map(|(name, kind)| word(name.to_owned(), kind));
+        let duties = ["duty", "duty_sim"]
+            .into_iter()
+            .flat_map(|name| number(name.to_owned()));
+        let integers = [("action_index", WordKind::Integer), ("status", WordKind::Status)];
+        let command = duties.chain(integers.map(|(name, kind)| word(name.to_owned(), kind)));
         let step = observation
             .chain(network.iter().cloned())
             .chain(command)
@@ -120,6 +127,7 @@ impl Layout {
             .collect();
         let accepted = word("set_mapping accepted".to_owned(), WordKind::Integer);
         Self {
+            scalar,
             signals: policy.signals.len(),
             features: policy.features.len(),
             four_terms: policy
@@ -156,9 +164,14 @@ impl Layout {
             1,
             self.signals as u32,
             self.features as u32,
-            self.network.len() as u32,
+            (self.network.len() / self.scalar.words()) as u32,
             self.state.len() as u32,
         ]
+    }
+
+    /// Format of the numbers.
+    pub fn scalar(&self) -> Scalar {
+        self.scalar
     }
 
     /// Whether the mapping has four terms: `set_mapping` then takes `r`.
@@ -178,30 +191,63 @@ pub const HELLO_NAMES: [&str; HELLO_WORDS] = [
     "number of state words",
 ];
 
-/// Appends the words of an event.
-pub fn encode(event: &Event, words: &mut Vec<u32>) {
+/// Appends the words of an event whose numbers travel in `scalar`.
+pub fn encode(event: &Event, scalar: Scalar, words: &mut Vec<u32>) {
     match event {
         Event::Step(samples) => {
             words.push(kind::STEP);
-            words.extend(samples.iter().map(|sample| sample_word(*sample)));
+            for sample in samples {
+                encode_sample(*sample, scalar, words);
+            }
         }
         Event::SetMapping { a, b, c, r } => {
             words.push(kind::SET_MAPPING);
-            words.extend([*a, *b, *c, r.unwrap_or(0.0)].map(f32::to_bits));
+            for number in [*a, *b, *c, r.unwrap_or(0.0)] {
+                encode_number(number, scalar, words);
+            }
         }
         Event::Reset => words.push(kind::RESET),
         Event::Init => words.push(kind::INIT),
         Event::Network(observation) => {
             words.push(kind::NETWORK);
-            words.extend(observation.iter().map(|x| x.to_bits()));
+            for number in observation {
+                encode_number(*number, scalar, words);
+            }
         }
     }
 }
 
-/// The word in which a sample travels.
-pub fn sample_word(sample: Sample) -> u32 {
-    match sample {
-        Sample::Physical(x) => x.to_bits(),
-        Sample::Code(n) => n.cast_unsigned(),
+fn encode_number(number: f64, scalar: Scalar, words: &mut Vec<u32>) {
+    match scalar {
+        Scalar::F32 => (number as f32).append_words(words),
+        Scalar::F64 => number.append_words(words),
     }
+}
+
+/// Appends the words in which a sample travels.
+pub fn encode_sample(sample: Sample, scalar: Scalar, words: &mut Vec<u32>) {
+    match (sample, scalar) {
+        // a NaN keeps all of its bits
+        (Sample::Physical(x), Scalar::F32) => x.append_words(words),
+        (Sample::Physical(x), Scalar::F64) => f64::from(x).append_words(words),
+        (Sample::Wide(x), _) => encode_number(x, scalar, words),
+        (Sample::Code(n), _) => words.push(n.cast_unsigned()),
+    }
+}
+
+/// Words in which the samples of a step travel.
+pub fn sample_words(policy: &Policy) -> usize {
+    let number = policy.numeric_format.scalar().words();
+    let words = |signal: &policy::Signal| if signal.adc.is_some() { 1 } else { number };
+    policy.signals.iter().map(words).sum()
+}
+
+/// The numbers that words stand for; half a number at the end is left out.
+pub fn numbers(scalar: Scalar, words: &[u32]) -> Vec<f64> {
+    let number = |words: &[u32]| match *words {
+        [low, high] => f64::from_bits(u64::from(low) | u64::from(high) << 32),
+        [bits] => f64::from(f32::from_bits(bits)),
+        _ => f64::NAN,
+    };
+    words.chunks_exact(scalar.words()).map(number).collect()
 }

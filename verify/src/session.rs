@@ -10,8 +10,8 @@ use std::thread;
 use std::time::Duration;
 
 use codegen::Language;
-use interp::InputError;
-use policy::{NumericFormat, Policy};
+use interp::{InputError, Real};
+use policy::{NumericFormat, Policy, Scalar};
 use targets::TargetSpec;
 
 use crate::golden;
@@ -143,6 +143,14 @@ const LAG: usize = 2;
 /// # Errors
 /// If nothing could be compared for reasons other than the generated code; see [`VerifyError`].
 pub fn run(policy: &Policy, options: Options<'_>) -> Result<Report, VerifyError> {
+    match policy.numeric_format.scalar() {
+        Scalar::F32 => run_in::<f32>(policy, options),
+        Scalar::F64 => run_in::<f64>(policy, options),
+    }
+}
+
+/// [`run`] with the interpreter in the floats `T`.
+fn run_in<T: Real>(policy: &Policy, options: Options<'_>) -> Result<Report, VerifyError> {
     let Options {
         steps,
         seed,
@@ -185,7 +193,7 @@ pub fn run(policy: &Policy, options: Options<'_>) -> Result<Report, VerifyError>
     };
     let compiled = compile_all(&builds, sources, folder.path());
 
-    let mut oracle = Oracle::new(policy);
+    let mut oracle = Oracle::<T>::new(policy);
     let layout = oracle.layout().clone();
     let (known, golden) = known_answers(policy, &mut oracle)?;
     let mut stream = Stream::new(policy, seed, &recorded);
@@ -234,12 +242,12 @@ struct Lanes<'a> {
 
 impl Lanes<'_> {
     /// Runs the interpreter over the stream once and every build beside it.
-    fn compare(
+    fn compare<T: Real>(
         &self,
         builds: &[Build],
         compiled: Vec<Result<PathBuf, Outcome>>,
         steps: u64,
-        oracle: &mut Oracle,
+        oracle: &mut Oracle<T>,
         stream: &mut Stream<'_>,
         tell: &mut dyn FnMut(Progress),
     ) -> Result<Vec<BuildReport>, InputError> {
@@ -297,14 +305,22 @@ impl Lanes<'_> {
 /// # Errors
 /// If the interpreter refuses an observation, which the check of a policy rules out.
 pub fn golden_result(policy: &Policy) -> Result<Option<GoldenResult>, VerifyError> {
-    known_answers(policy, &mut Oracle::new(policy)).map(|(_, result)| result)
+    let answers = match policy.numeric_format.scalar() {
+        Scalar::F32 => known_answers(policy, &mut Oracle::<f32>::new(policy)),
+        Scalar::F64 => known_answers(policy, &mut Oracle::<f64>::new(policy)),
+    };
+    answers.map(|(_, result)| result)
 }
 
-fn known_answers(policy: &Policy, oracle: &mut Oracle) -> Result<(Chunk, Option<GoldenResult>), VerifyError> {
+fn known_answers<T: Real>(
+    policy: &Policy,
+    oracle: &mut Oracle<T>,
+) -> Result<(Chunk, Option<GoldenResult>), VerifyError> {
     let known = oracle
         .chunk_of(golden::events(policy))
         .map_err(VerifyError::Interpreter)?;
-    let judge = |golden, chunk: &Chunk| golden::judge(golden, policy.actions.len(), &chunk.expected);
+    let scalar = policy.numeric_format.scalar();
+    let judge = |golden, chunk: &Chunk| golden::judge(golden, scalar, policy.actions.len(), &chunk.expected);
     let Some(golden) = policy.golden.as_ref() else {
         return Ok((known, None));
     };
@@ -314,7 +330,7 @@ fn known_answers(policy: &Policy, oracle: &mut Oracle) -> Result<(Chunk, Option<
     }
     // the trainer's answers judge how the network was read; what rounding it costs is another question
     let exact = policy.clone().with_format(NumericFormat::F32);
-    let answers = Oracle::new(&exact)
+    let answers = Oracle::<f32>::new(&exact)
         .chunk_of(golden::events(&exact))
         .map_err(VerifyError::Interpreter)?;
     Ok((known, Some(judge(golden, &answers))))

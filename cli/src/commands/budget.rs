@@ -181,6 +181,14 @@ pub fn lines(
     Ok(lines)
 }
 
+/// What may be proposed, the most exact first; the cycle models do not know fused operations.
+const EXACT_FIRST: [NumericFormat; 4] = [
+    NumericFormat::F64,
+    NumericFormat::F32,
+    NumericFormat::I16,
+    NumericFormat::I8,
+];
+
 /// The most exact of the other formats that fits in every build that can be made here.
 fn proposal(
     policy: &Policy,
@@ -193,11 +201,10 @@ fn proposal(
         doors: Vec::new(),
         kit_steps: selection.kit_steps,
     };
-    // the cycle models do not know fused operations
-    let modelled = |format: &NumericFormat| *format != NumericFormat::F32Fma;
-    let others = NumericFormat::ALL.into_iter().filter(modelled);
-    let others = others.filter(|format| *format != policy.numeric_format);
-    for format in others {
+    // binary64 from a library takes longer than anything else; whether it does, the target knows
+    let natural = |format: &NumericFormat| *format != NumericFormat::F64 || target.fpu.has(true);
+    let others = EXACT_FIRST.into_iter().filter(natural);
+    for format in others.filter(|format| *format != policy.numeric_format) {
         let policy = policy.clone().with_format(format);
         let files = verify::doors::generate(&policy, target, &core)?;
         let measured = Measured::of(&policy, target, &core.languages, &files);

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use ::certify::{Certificate, Certifier, Domain, Effort, Memory, Slice};
 use interp::Controller;
 use ndarray::aview1;
-use policy::{Interval, Policy};
+use policy::{Interval, NumericFormat, Policy};
 use verify::traces::Rng;
 
 use crate::arguments::Certify;
@@ -16,6 +16,13 @@ use crate::{Failure, Outcome, output};
 /// Proves, measures, draws, writes.
 pub fn run(options: &Certify) -> Result<Outcome, Failure> {
     let policy = super::load_as(&options.policy, options.format.map(Into::into))?;
+    if policy.numeric_format == NumericFormat::F64 {
+        return Err(Failure(
+            "the certificate is about binary32 and integers: its box holds the observations as binary32 rounds them\n   \
+             = found: f64\n   = expected: one of f32, f32-fma, i16, i8\n   = hint: --format f32"
+                .to_owned(),
+        ));
+    }
     let slice = slice(&policy, options)?;
     let controller = Controller::<f32>::new(&policy);
     let q_values = |observation: &[f32]| match controller.q_values(&aview1(observation)) {

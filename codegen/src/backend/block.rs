@@ -1,11 +1,12 @@
 //! The core behind ports of `double`: what the doors into block diagrams share.
 
+use policy::Scalar;
 use templates::block::{BlockHeader, BlockSource, BlockView, InputView, ParameterView};
 use templates::c::Common;
 
 use super::c99::render;
 use crate::backend::banner;
-use crate::backend::literal::decimal;
+use crate::backend::literal::number;
 use crate::program::{Coefficient, Literal, SignalPort};
 use crate::{CodegenError, GeneratedFiles, Program};
 
@@ -32,13 +33,14 @@ pub fn emit(program: &Program) -> Result<GeneratedFiles, CodegenError> {
 
 /// The view of a file of that title.
 pub fn view(program: &Program, title: &str) -> BlockView {
+    let scalar = program.scalar();
     let mapping = program.mapping.as_ref();
     let coefficients = || mapping.iter().flat_map(|mapping| &mapping.coefficients);
     let parameter = |(name, value, low, high): &(Coefficient, Literal, Literal, Literal)| ParameterView {
         name: name.name().to_owned(),
-        value: decimal(value.value()),
-        low: decimal(low.value()),
-        high: decimal(high.value()),
+        value: number(scalar, *value),
+        low: number(scalar, *low),
+        high: number(scalar, *high),
     };
     BlockView {
         common: Common {
@@ -46,8 +48,9 @@ pub fn view(program: &Program, title: &str) -> BlockView {
             upper: program.name.to_uppercase(),
             banner: banner(program, title, program.provenance.c_flags),
             mapping_parameters: String::new(),
+            number: super::c99::number::kind(scalar),
         },
-        inputs: program.signals.iter().map(input).collect(),
+        inputs: program.signals.iter().map(|signal| input(scalar, signal)).collect(),
         has_codes: program.signals.iter().any(|signal| signal.is_code),
         input_count: program.signals.len() + 1,
         parameters: coefficients().map(parameter).collect(),
@@ -55,7 +58,7 @@ pub fn view(program: &Program, title: &str) -> BlockView {
             .map(|(name, ..)| name.name())
             .collect::<Vec<_>>()
             .join(", "),
-        fallback: decimal(program.fallback_duty.value()),
+        fallback: number(scalar, program.fallback_duty),
         sample_period: format!("{:?}", program.sample_period),
         // the state and one word
         work: (program.state_words() + 1).div_ceil(2),
@@ -64,14 +67,19 @@ pub fn view(program: &Program, title: &str) -> BlockView {
     }
 }
 
-fn input(signal: &SignalPort) -> InputView {
+fn input(scalar: Scalar, signal: &SignalPort) -> InputView {
     let (low, high) = signal.range;
     let kind = if signal.is_code {
         "ADC code, plausible"
     } else {
         "plausible"
     };
-    let meaning = format!("{kind} {:?} to {:?} {}", low.value(), high.value(), signal.unit);
+    let meaning = format!(
+        "{kind} {} to {} {}",
+        low.shortest(scalar),
+        high.shortest(scalar),
+        signal.unit
+    );
     InputView {
         name: signal.name.clone(),
         meaning: meaning.trim_end().to_owned(),

@@ -1,6 +1,19 @@
 //! Decimal literals that survive the round trip to the bit.
 
-/// Decimal text of a finite binary32 value with at least one of `.` and `e`, as C and Rust read it.
+use policy::Scalar;
+
+use crate::program::Literal;
+
+/// Decimal text of a finite constant of the format with at least one of `.` and `e`, as C and Rust read it.
+pub fn number(scalar: Scalar, literal: Literal) -> String {
+    match scalar {
+        Scalar::F32 => decimal(literal.single()),
+        // the shortest digits that round-trip; nothing lies between them and the value
+        Scalar::F64 => literal.shortest(scalar),
+    }
+}
+
+/// [`number`] of a binary32 value.
 ///
 /// The shortest digits that round-trip, unless a compiler that reads them through binary64 would round twice to a
 /// neighbour; then nine significant digits, which are too close to the value for that.

@@ -1,7 +1,6 @@
 //! Contract sections 8 to 10: mapping, limits, status, and what the command path remembers.
 
-use policy::rounding::{down_f32, up_f32};
-use policy::{Mapping, Policy};
+use policy::{Mapping, Policy, Scalar};
 
 use crate::program::{Advance, Block, Coefficient, Decide, Literal, Op, ValueId};
 
@@ -26,6 +25,7 @@ fn bit(name: &str) -> u32 {
 
 /// Lowers the way from the chosen duty to the command.
 pub fn decide(policy: &Policy) -> Decide {
+    let scalar = policy.numeric_format.scalar();
     let mut block = Block::default();
     let mut status = vec![
         (bit("HELD"), block.value(Op::HeldSample)),
@@ -38,11 +38,11 @@ pub fn decide(policy: &Policy) -> Decide {
     let mut duty = duty_sim;
     if let Some(map) = &policy.mapping {
         let outside;
-        (duty, outside) = mapping(&mut block, map, duty_sim);
+        (duty, outside) = mapping(scalar, &mut block, map, duty_sim);
         status.push((bit("MAPPING_RANGE"), outside));
     }
     if let Some(slew) = policy.limits.slew {
-        let step = block.constant(down_f32(slew));
+        let step = block.constant(Literal::down(scalar, slew));
         let before = block.value(Op::PreviousCommand);
         let low = block.value(Op::Sub(before, step));
         let high = block.value(Op::Add(before, step));
@@ -60,8 +60,8 @@ pub fn decide(policy: &Policy) -> Decide {
             otherwise: duty,
         });
     }
-    let low = block.constant(up_f32(policy.limits.duty.low));
-    let high = block.constant(down_f32(policy.limits.duty.high));
+    let (low, high) = Literal::inward(scalar, policy.limits.duty);
+    let (low, high) = (block.constant(low), block.constant(high));
     let limited = block.value(Op::Clamp { x: duty, low, high });
     status.push((bit("LIMITED"), changed(&mut block, duty, limited)));
     duty = limited;
@@ -80,7 +80,7 @@ fn changed(block: &mut Block, value: ValueId, clamped: ValueId) -> ValueId {
 }
 
 /// Mapped duty and the flag that it was extrapolated.
-fn mapping(block: &mut Block, map: &Mapping, duty: ValueId) -> (ValueId, ValueId) {
+fn mapping(scalar: Scalar, block: &mut Block, map: &Mapping, duty: ValueId) -> (ValueId, ValueId) {
     let current = block.value(Op::Sanitised(map.load_current));
     let a = block.value(Op::Coefficient(Coefficient::A));
     let b = block.value(Op::Coefficient(Coefficient::B));
@@ -96,8 +96,8 @@ fn mapping(block: &mut Block, map: &Mapping, duty: ValueId) -> (ValueId, ValueId
         mapped = block.value(Op::Add(mapped, product));
     }
     let mut outside = |x: ValueId, range: policy::Interval| {
-        let low = block.constant(Literal::nearest(range.low));
-        let high = block.constant(Literal::nearest(range.high));
+        let low = block.constant(Literal::nearest(scalar, range.low));
+        let high = block.constant(Literal::nearest(scalar, range.high));
         block.value(Op::Outside { x, low, high })
     };
     let duty_outside = outside(duty, map.valid_d_sim);
@@ -107,13 +107,14 @@ fn mapping(block: &mut Block, map: &Mapping, duty: ValueId) -> (ValueId, ValueId
 
 /// Lowers the next soft-start limit.
 pub fn advance(policy: &Policy) -> Advance {
+    let scalar = policy.numeric_format.scalar();
     let mut block = Block::default();
     let soft_cap = policy.limits.soft_start.map(|soft| {
         let increment = (policy.limits.duty.high - soft.from) / f64::from(soft.steps);
         let cap = block.value(Op::SoftCap);
-        let increment = block.constant(Literal::nearest(increment));
+        let increment = block.constant(Literal::nearest(scalar, increment));
         let risen = block.value(Op::Add(cap, increment));
-        let max = block.constant(down_f32(policy.limits.duty.high));
+        let max = block.constant(Literal::down(scalar, policy.limits.duty.high));
         // `c if c < max else max`: equal values have equal bits, duties are never -0 here
         let above = block.value(Op::Above(risen, max));
         let capped = block.value(Op::Select {
@@ -122,7 +123,7 @@ pub fn advance(policy: &Policy) -> Advance {
             otherwise: risen,
         });
         let usable = block.value(Op::Usable);
-        let from = block.constant(Literal::nearest(soft.from));
+        let from = block.constant(Literal::nearest(scalar, soft.from));
         block.value(Op::Select {
             flag: usable,
             then: capped,

@@ -1,13 +1,13 @@
 //! Contract sections 2 to 5: sanitise, sources, filters, observation.
 
-use policy::rounding::{down_f32, up_f32};
-use policy::{Expr, Feature, Filter, Input, Policy};
+use policy::{Expr, Feature, Filter, Input, Policy, Scalar};
 
 use crate::program::{Block, Front, Literal, Op, Push, ValueId};
 
 /// Lowers the front half of a step; also gives the number of filter memory words.
 pub fn lower(policy: &Policy) -> (Front, usize) {
     let mut builder = Builder {
+        scalar: policy.numeric_format.scalar(),
         block: Block::default(),
         signals: Vec::new(),
         pushes: Vec::new(),
@@ -36,6 +36,7 @@ pub fn lower(policy: &Policy) -> (Front, usize) {
 }
 
 struct Builder {
+    scalar: Scalar,
     block: Block,
     signals: Vec<ValueId>,
     pushes: Vec<Push>,
@@ -45,21 +46,21 @@ struct Builder {
 impl Builder {
     /// Fills `signals`; returns the flag that all are valid.
     fn sanitise(&mut self, policy: &Policy) -> ValueId {
-        let block = &mut self.block;
+        let (scalar, block) = (self.scalar, &mut self.block);
         let mut flags = Vec::new();
         for (index, signal) in policy.signals.iter().enumerate() {
             let x = match signal.adc {
                 None => block.value(Op::Measured(index)),
                 Some(adc) => {
                     let code = block.value(Op::Code(index));
-                    let gain = block.constant(Literal::nearest(adc.gain));
-                    let offset = block.constant(Literal::nearest(adc.offset));
+                    let gain = block.constant(Literal::nearest(scalar, adc.gain));
+                    let offset = block.constant(Literal::nearest(scalar, adc.offset));
                     let scaled = block.value(Op::Mul(gain, code));
                     block.value(Op::Add(scaled, offset))
                 }
             };
-            let low = block.constant(up_f32(signal.range.low));
-            let high = block.constant(down_f32(signal.range.high));
+            let (low, high) = Literal::inward(scalar, signal.range);
+            let (low, high) = (block.constant(low), block.constant(high));
             let valid = block.value(Op::Within { x, low, high });
             let held = block.value(Op::Held(index));
             self.signals.push(block.value(Op::Select {
@@ -80,20 +81,20 @@ impl Builder {
         for filter in &feature.filters {
             value = self.filter(*filter, value, sample_period);
         }
-        let block = &mut self.block;
+        let (scalar, block) = (self.scalar, &mut self.block);
         if feature.scale != 1.0 {
-            let scale = block.constant(Literal::nearest(feature.scale));
+            let scale = block.constant(Literal::nearest(scalar, feature.scale));
             value = block.value(Op::Mul(value, scale));
         }
         if feature.offset != 0.0 {
-            let offset = block.constant(Literal::nearest(feature.offset));
+            let offset = block.constant(Literal::nearest(scalar, feature.offset));
             value = block.value(Op::Add(value, offset));
         }
         match feature.clip {
             None => (value, None),
             Some(clip) => {
-                let low = block.constant(Literal::nearest(clip.low));
-                let high = block.constant(Literal::nearest(clip.high));
+                let low = block.constant(Literal::nearest(scalar, clip.low));
+                let high = block.constant(Literal::nearest(scalar, clip.high));
                 let clamped = block.value(Op::Clamp { x: value, low, high });
                 (clamped, Some(block.value(Op::Difference(value, clamped))))
             }
@@ -105,13 +106,13 @@ impl Builder {
             Expr::Input(Input::Signal(index)) => return self.signals[*index],
             Expr::Input(Input::PreviousDuty) => Op::PreviousDuty,
             Expr::Input(Input::PreviousCommand) => Op::PreviousCommand,
-            Expr::Constant(value) => Op::Constant(Literal::nearest(*value)),
+            Expr::Constant(value) => Op::Constant(Literal::nearest(self.scalar, *value)),
             Expr::Neg(x) => Op::Neg(self.expression(x)),
             Expr::Add(x, y) => Op::Add(self.expression(x), self.expression(y)),
             Expr::Sub(x, y) => Op::Sub(self.expression(x), self.expression(y)),
             Expr::Scale(by, x) => {
                 let x = self.expression(x);
-                Op::Mul(x, self.block.constant(Literal::nearest(*by)))
+                Op::Mul(x, self.constant(*by))
             }
         };
         self.block.value(op)
@@ -156,12 +157,12 @@ impl Builder {
             }
             Filter::Integrator { min, max, initial } => {
                 let word = self.reserve(1);
-                let start = self.block.constant(Literal::nearest(initial));
+                let start = self.constant(initial);
                 let before = self.recall(word, start);
                 let step = self.scaled(x, period);
                 let sum = self.block.value(Op::Add(before, step));
-                let low = self.block.constant(Literal::nearest(min));
-                let high = self.block.constant(Literal::nearest(max));
+                let low = self.constant(min);
+                let high = self.constant(max);
                 let y = self.block.value(Op::Clamp { x: sum, low, high });
                 self.pushes.push(Push {
                     word,
@@ -177,7 +178,7 @@ impl Builder {
         let x_word = self.line(1, x);
         let y_word = self.reserve(1);
         let x_before = self.recall(x_word, x);
-        let zero = self.block.constant(Literal::nearest(0.0));
+        let zero = self.constant(0.0);
         let y_before = self.recall(y_word, zero);
         let decayed = self.scaled(y_before, time_constant / (time_constant + period));
         let difference = self.block.value(Op::Sub(x, x_before));
@@ -191,8 +192,12 @@ impl Builder {
         y
     }
 
+    fn constant(&mut self, value: f64) -> ValueId {
+        self.block.constant(Literal::nearest(self.scalar, value))
+    }
+
     fn scaled(&mut self, x: ValueId, by: f64) -> ValueId {
-        let by = self.block.constant(Literal::nearest(by));
+        let by = self.constant(by);
         self.block.value(Op::Mul(x, by))
     }
 

@@ -1,7 +1,7 @@
 //! Contract section 6b: integer layers with their tables in reading order.
 
 use policy::scales::{self, LayerScale, Scales, power_of_two, round_half_up};
-use policy::{Activation, Layer, NumericFormat, Policy};
+use policy::{Activation, Layer, NumericFormat, Policy, Scalar};
 use targets::IntegerBlock;
 
 use super::network::activation;
@@ -40,7 +40,7 @@ pub fn lower(policy: &Policy, scales: &Scales, block: IntegerBlock) -> IntegerNe
         lanes: lanes.to_vec(),
         inputs: scales.inputs.iter().map(input).collect(),
         layers: layers.enumerate().map(split).collect(),
-        q_unit: Literal::nearest(power_of_two(-q_exponent)),
+        q_unit: Literal::nearest(Scalar::F32, power_of_two(-q_exponent)),
         q_field: MANTISSA_FIELD + 1 - q_exponent,
         accumulator_bound: scales.accumulator_bound(),
     }
@@ -83,7 +83,7 @@ fn layer(layer: &Layer, scale: &LayerScale, lanes: &[usize], (block_rows, chunk)
         let integer = round_half_up(f64::from(*bias) * power_of_two(*exponent));
         (integer + scales::half(scale.shift)) as i32
     };
-    let activation = activation(layer);
+    let activation = activation(Scalar::F32, layer);
     IntegerLayer {
         name: layer.name.clone(),
         inputs: layer.inputs,
@@ -94,7 +94,10 @@ fn layer(layer: &Layer, scale: &LayerScale, lanes: &[usize], (block_rows, chunk)
         bias: layer.bias.iter().zip(&scale.accumulators).map(bias).collect(),
         shift: scale.shift,
         // of a layer with tanh and of the last: there all rows have one exponent
-        unit: Literal::nearest(power_of_two(-scale.accumulators.first().copied().unwrap_or_default())),
+        unit: Literal::nearest(
+            Scalar::F32,
+            power_of_two(-scale.accumulators.first().copied().unwrap_or_default()),
+        ),
         slope: match (activation, layer.activation) {
             (ActivationCode::LeakyRelu(_), Activation::LeakyRelu { slope }) => scales::slope_integer(slope) as i32,
             _ => 0,

@@ -8,9 +8,8 @@ pub mod network;
 pub mod simplify;
 
 pub use command::STATUS;
-use policy::rounding::{down_f32, nearest_f32, up_f32};
-use policy::{NumericFormat, Policy};
-use targets::{Fpu, TargetSpec};
+use policy::{NumericFormat, Policy, Scalar};
+use targets::TargetSpec;
 
 use crate::crc::crc32_words;
 use crate::program::{Coefficient, Literal, MappingCode, Program, Provenance, SignalPort};
@@ -32,6 +31,7 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
             target.rust_row_block
         }
     };
+    let scalar = policy.numeric_format.scalar();
     let (front, memory_words) = front::lower(policy);
     let loops = network::FloatLoops {
         row_block,
@@ -42,13 +42,13 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
     let duties: Vec<_> = policy
         .actions
         .iter()
-        .map(|action| Literal::nearest(action.duty))
+        .map(|action| Literal::nearest(scalar, action.duty))
         .collect();
     let mut program = Program {
         name: policy.name.clone(),
         sample_period: policy.sample_period,
         numeric_format: policy.numeric_format,
-        has_fpu: target.fpu != Fpu::None,
+        has_fpu: target.fpu.has(scalar == Scalar::F64),
         processor: target.rust.and_then(|rust| rust.processor()),
         provenance: Provenance {
             tool: TOOL.to_owned(),
@@ -58,7 +58,11 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
             c_flags: target.c_flags,
             rust_flags: target.rust_flags,
         },
-        signals: policy.signals.iter().map(signal_port).collect(),
+        signals: policy
+            .signals
+            .iter()
+            .map(|signal| signal_port(scalar, signal))
+            .collect(),
         features: policy
             .features
             .iter()
@@ -74,12 +78,12 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
         self_test: known_answers::lower(policy, &network),
         network,
         duties,
-        mapping: policy.mapping.as_ref().map(mapping),
+        mapping: policy.mapping.as_ref().map(|map| mapping(scalar, map)),
         decide: command::decide(policy),
         advance: command::advance(policy),
-        initial_duty: nearest_f32(policy.limits.initial_duty).into(),
-        soft_start_from: policy.limits.soft_start.map(|soft| Literal::nearest(soft.from)),
-        fallback_duty: nearest_f32(policy.fallback.duty).into(),
+        initial_duty: Literal::nearest(scalar, policy.limits.initial_duty),
+        soft_start_from: policy.limits.soft_start.map(|soft| Literal::nearest(scalar, soft.from)),
+        fallback_duty: Literal::nearest(scalar, policy.fallback.duty),
         hold: policy.fallback.hold,
         crc: 0,
     };
@@ -87,23 +91,18 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
     program
 }
 
-/// Interval rounded inwards.
-fn inward(interval: policy::Interval) -> (Literal, Literal) {
-    (up_f32(interval.low).into(), down_f32(interval.high).into())
-}
-
-fn signal_port(signal: &policy::Signal) -> SignalPort {
-    let range = inward(signal.range);
+fn signal_port(scalar: Scalar, signal: &policy::Signal) -> SignalPort {
+    let range = Literal::inward(scalar, signal.range);
     SignalPort {
         name: signal.name.clone(),
         unit: signal.unit.clone(),
         is_code: signal.adc.is_some(),
         range,
-        initial: 0.0_f32.max(range.0.value()).min(range.1.value()).into(),
+        initial: Literal::nearest(scalar, 0.0_f64.max(range.0.value()).min(range.1.value())),
     }
 }
 
-fn mapping(mapping: &policy::Mapping) -> MappingCode {
+fn mapping(scalar: Scalar, mapping: &policy::Mapping) -> MappingCode {
     let values = mapping.coefficients;
     let mut coefficients = vec![
         (Coefficient::A, values.a, mapping.adjust_a),
@@ -114,14 +113,14 @@ fn mapping(mapping: &policy::Mapping) -> MappingCode {
         coefficients.push((Coefficient::R, r, mapping.adjust_r));
     }
     let lowered = |(name, value, adjust): (Coefficient, f64, policy::Interval)| {
-        let (low, high) = inward(adjust);
-        (name, Literal::nearest(value), low, high)
+        let (low, high) = Literal::inward(scalar, adjust);
+        (name, Literal::nearest(scalar, value), low, high)
     };
     MappingCode {
         coefficients: coefficients.into_iter().map(lowered).collect(),
         valid_i_out: (
-            Literal::nearest(mapping.valid_i_out.low),
-            Literal::nearest(mapping.valid_i_out.high),
+            Literal::nearest(scalar, mapping.valid_i_out.low),
+            Literal::nearest(scalar, mapping.valid_i_out.high),
         ),
     }
 }

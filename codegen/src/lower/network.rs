@@ -1,6 +1,6 @@
 //! Contract section 6: layers with their tables in reading order.
 
-use policy::{Activation, Layer, NumericFormat, Policy};
+use policy::{Activation, Layer, NumericFormat, Policy, Scalar};
 use targets::{IntegerBlock, RowBlock};
 
 use super::integer;
@@ -8,7 +8,7 @@ use super::simplify::{self, Simplified};
 use crate::program::{ActivationCode, LayerCode, Literal, NetworkCode};
 
 /// Numerator of the tanh approximation, lowest power first (contract section 6).
-pub const TANH_NUMERATOR: [f32; 5] = [
+pub const TANH_NUMERATOR: [f64; 5] = [
     0.999_999_9,
     0.133_732_08,
     0.003_486_593_3,
@@ -16,9 +16,9 @@ pub const TANH_NUMERATOR: [f32; 5] = [
     1.318_444_4e-8,
 ];
 /// Denominator of the tanh approximation, lowest power first (contract section 6).
-pub const TANH_DENOMINATOR: [f32; 5] = [1.0, 0.467_065_04, 0.025_842_024, 0.000_327_140_35, 7.702_759e-7];
+pub const TANH_DENOMINATOR: [f64; 5] = [1.0, 0.467_065_04, 0.025_842_024, 0.000_327_140_35, 7.702_759e-7];
 /// Beyond this magnitude the approximation is evaluated at the end of its range.
-pub const TANH_RANGE: f32 = 9.0;
+pub const TANH_RANGE: f64 = 9.0;
 
 /// Loops of a network in floats that suit target and language.
 #[derive(Debug, Clone, Copy)]
@@ -37,6 +37,7 @@ pub fn lower(policy: &Policy, loops: FloatLoops, integer_block: IntegerBlock) ->
     match scales {
         Some(scales) => NetworkCode::Integer(integer::lower(&policy, &scales, integer_block)),
         None => NetworkCode::Real {
+            scalar: policy.numeric_format.scalar(),
             fused: policy.numeric_format == NumericFormat::F32Fma,
             layers: layers(&policy, loops),
         },
@@ -45,8 +46,9 @@ pub fn lower(policy: &Policy, loops: FloatLoops, integer_block: IntegerBlock) ->
 
 /// The last layer takes the outputs of the one before block by block where blocks are variables: half of the stack.
 fn layers(policy: &Policy, mut loops: FloatLoops) -> Vec<LayerCode> {
-    if let (RowBlock::Vectors(_), NumericFormat::F32Fma) = (loops.row_block, policy.numeric_format) {
-        // the fused operation is a function of scalars
+    let is_scalar = matches!(policy.numeric_format, NumericFormat::F32Fma | NumericFormat::F64);
+    if let (RowBlock::Vectors(_), true) = (loops.row_block, is_scalar) {
+        // the fused operation is a function of scalars, and weights of another width than the sums need a conversion
         loops.row_block = RowBlock::All;
     }
     let last = policy.layers.len().saturating_sub(1);
@@ -54,14 +56,15 @@ fn layers(policy: &Policy, mut loops: FloatLoops) -> Vec<LayerCode> {
         RowBlock::Rows(rows) if index == last && index > 0 => rows.clamp(1, layer.inputs),
         _ => layer.inputs,
     };
+    let scalar = policy.numeric_format.scalar();
     let layers = policy.layers.iter().enumerate();
     layers
-        .map(|(index, layer)| real(layer, loops, chunk(index, layer)))
+        .map(|(index, layer)| real(scalar, layer, loops, chunk(index, layer)))
         .collect()
 }
 
 /// Orders the weights in the blocks in which the generated code reads them.
-fn real(layer: &Layer, loops: FloatLoops, chunk: usize) -> LayerCode {
+fn real(scalar: Scalar, layer: &Layer, loops: FloatLoops, chunk: usize) -> LayerCode {
     let block_rows = match loops.row_block {
         RowBlock::All => layer.outputs,
         RowBlock::Rows(rows) | RowBlock::Vectors(rows) => rows.clamp(1, layer.outputs),
@@ -88,16 +91,16 @@ fn real(layer: &Layer, loops: FloatLoops, chunk: usize) -> LayerCode {
         has_assembly: loops.has_assembly,
         table,
         bias: layer.bias.clone(),
-        activation: activation(layer),
+        activation: activation(scalar, layer),
     }
 }
 
 /// Activation with its literals.
-pub fn activation(layer: &Layer) -> ActivationCode {
+pub fn activation(scalar: Scalar, layer: &Layer) -> ActivationCode {
     match layer.activation {
         Activation::Identity => ActivationCode::Identity,
         Activation::Relu => ActivationCode::Relu,
-        Activation::LeakyRelu { slope } => ActivationCode::LeakyRelu(Literal::nearest(slope)),
+        Activation::LeakyRelu { slope } => ActivationCode::LeakyRelu(Literal::nearest(scalar, slope)),
         Activation::Tanh => ActivationCode::Tanh,
     }
 }

@@ -1,8 +1,9 @@
 //! The network of a lowered controller, in its numeric format.
 
+use policy::Scalar;
 use targets::IntegerBlock;
 
-use super::Literal;
+use super::{Literal, words};
 
 /// Activation with its literals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,8 +72,10 @@ impl LayerCode {
 /// The network in the numeric format of the policy.
 #[derive(Debug, Clone, PartialEq)]
 pub enum NetworkCode {
-    /// In binary32.
+    /// In floats. The weights are binary32 in either format.
     Real {
+        /// Format of sums and values.
+        scalar: Scalar,
         /// Products are added with one rounding.
         fused: bool,
         /// First to last.
@@ -107,10 +110,12 @@ impl NetworkCode {
     /// Words of the tables in the order of the integrity check.
     pub(super) fn table_words(&self) -> Vec<u32> {
         match self {
-            NetworkCode::Real { layers, .. } => layers
-                .iter()
-                .flat_map(|layer| layer.table.iter().chain(&layer.bias).map(|w| w.to_bits()))
-                .collect(),
+            NetworkCode::Real { scalar, layers, .. } => {
+                let bias = |layer: &LayerCode| layer.bias.clone().into_iter().flat_map(|b| words(*scalar, b.into()));
+                let weights = |layer: &LayerCode| layer.table.clone().into_iter().map(f32::to_bits);
+                let layers = layers.iter();
+                layers.flat_map(|layer| weights(layer).chain(bias(layer))).collect()
+            }
             NetworkCode::Integer(network) => network
                 .layers
                 .iter()
@@ -128,7 +133,12 @@ impl NetworkCode {
 
     pub(super) fn table_bytes(&self) -> usize {
         match self {
-            NetworkCode::Real { layers, .. } => layers.iter().map(|l| 4 * (l.table.len() + l.bias.len())).sum(),
+            NetworkCode::Real { scalar, layers, .. } => {
+                let layers = layers.iter();
+                layers
+                    .map(|l| 4 * (l.table.len() + scalar.words() * l.bias.len()))
+                    .sum()
+            }
             NetworkCode::Integer(network) => {
                 let layers = network.layers.iter();
                 layers

@@ -227,7 +227,7 @@ pub fn close(bench: &Bench, policy: &Policy) -> Result<Figures, Error> {
         tail: 100,
     };
     let converter = HiddenConverter::new(bench);
-    let mut agent = Agent::new(policy)?;
+    let mut agent = Agent::<f32>::new(policy)?;
     let mut figures = Figures::default();
     for values in STEPS {
         let step = LoadStep {

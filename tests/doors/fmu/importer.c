@@ -221,7 +221,7 @@ static void variables(const api *f)
     check(not_refused(f, c) == 0, "what co-simulation does not have is refused");
     check(logged == before + REFUSED_AND_LOGGED, "every refused call has a message");
     check(set(f, c, ENABLE, 'b', 0.0) == OK && step(f, c, 2.0, PERIOD) == OK, "a disabled controller takes steps");
-    check(outputs(f, c).duty == (double)(float)FALLBACK, "a disabled controller gives the fallback duty");
+    check(outputs(f, c).duty == FALLBACK, "a disabled controller gives the fallback duty");
     FREE(c);
 }
 

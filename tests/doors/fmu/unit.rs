@@ -195,7 +195,7 @@ impl Unit {
             self.policy.sample_period,
             list(|range| range.low),
             list(|range| range.high),
-            self.policy.fallback.duty
+            self.policy.numeric_format.scalar().nearest(self.policy.fallback.duty)
         )
     }
 
@@ -288,6 +288,7 @@ impl Unit {
 fn value(sample: Sample) -> f64 {
     match sample {
         Sample::Physical(x) => f64::from(x),
+        Sample::Wide(x) => x,
         Sample::Code(code) => f64::from(code),
     }
 }

@@ -302,8 +302,8 @@ static void compare(instance *own, const double *inputs, int diagnostics)
     expect(same(own->s.output[1].signal[CANARY], (double)command.action_index), "action");
     expect(same(own->s.output[2].signal[CANARY], (double)command.status + refused), "status");
     if (diagnostics != 0) {
-        float observation[FEATURES];
-        float q[ACTIONS];
+        number observation[FEATURES];
+        number q[ACTIONS];
         int i;
         CONTROLLER_CALL(observe)(&own->core, &measured, observation);
         CONTROLLER_CALL(q_values)(observation, q);

@@ -2,10 +2,10 @@
 
 use std::fmt::Write;
 
-use policy::Policy;
+use policy::{Policy, Scalar};
 
 use super::{Form, mapping_terms};
-use crate::protocol::{MAGIC, kind, purity};
+use crate::protocol::{MAGIC, kind, purity, sample_words};
 
 /// Text of the driver for the generated `<name>.h`.
 pub fn text(policy: &Policy, form: Form) -> String {
@@ -86,22 +86,85 @@ static void flush(void)
 
 ";
 
+/// Numbers from and to words.
+pub(super) fn numbers(scalar: Scalar) -> &'static str {
+    match scalar {
+        Scalar::F32 => SINGLES,
+        Scalar::F64 => DOUBLES,
+    }
+}
+
+const SINGLES: &str = r"typedef float number;
+
+static number number_of(const uint32_t *words)
+{
+    number x;
+    memcpy(&x, words, 4u);
+    return x;
+}
+";
+
+const DOUBLES: &str = r"typedef double number;
+
+static number number_of(const uint32_t *words)
+{
+    const uint64_t bits = (uint64_t)words[0] | ((uint64_t)words[1] << 32);
+    number x;
+    memcpy(&x, &bits, 8u);
+    return x;
+}
+";
+
+/// The driver's answers: numbers as words.
+fn put_numbers(scalar: Scalar) -> &'static str {
+    match scalar {
+        Scalar::F32 => {
+            r"
+static void put_numbers(const number *x, size_t count)
+{
+    put(x, count);
+}
+"
+        }
+        Scalar::F64 => {
+            r"
+static void put_numbers(const number *x, size_t count)
+{
+    size_t i;
+    for (i = 0u; i < count; ++i) {
+        uint64_t bits;
+        uint32_t words[2];
+        memcpy(&bits, &x[i], 8u);
+        words[0] = (uint32_t)bits;
+        words[1] = (uint32_t)(bits >> 32);
+        put(words, 2u);
+    }
+}
+"
+        }
+    }
+}
+
 /// Memory, states, start.
 fn head(policy: &Policy) -> String {
+    let scalar = policy.numeric_format.scalar();
+    let (numbers, put_numbers, words) = (numbers(scalar), put_numbers(scalar), scalar.words());
     let name = &policy.name;
     let macro_name = name.to_uppercase();
     format!(
         r#"#include "{name}.h"
 
 #define STATE_WORDS (sizeof({name}_state) / 4u)
+#define NUMBER_WORDS {words}u
 
+{numbers}{put_numbers}
 static {name}_state state;       /* advanced by step */
 static {name}_state twin;        /* advanced by eval and commit */
 static {name}_state before;
 static {name}_measurement m;
 static {name}_command command;
-static float observation[{macro_name}_FEATURES];
-static float q[{macro_name}_ACTIONS];
+static number observation[{macro_name}_FEATURES];
+static number q[{macro_name}_ACTIONS];
 
 static void put_word(uint32_t word)
 {{
@@ -110,7 +173,9 @@ static void put_word(uint32_t word)
 
 static void put_state(void)
 {{
-    put(&state, STATE_WORDS);
+    put_numbers((const number *)(const void *)&state, (STATE_WORDS - 2u) / NUMBER_WORDS);
+    put(&state.bad_count, 1u);
+    put(&state.primed, 1u);
 }}
 
 static void start(void)
@@ -135,8 +200,8 @@ fn step(policy: &Policy, form: Form) -> String {
     format!(
         r#"static int read_measurement(void)
 {{
-    uint32_t words[{signals}];
-    if (!get(words, {signals}u)) {{
+    uint32_t words[{words}];
+    if (!get(words, {words}u)) {{
         return 0;
     }}
 {measurement}    return 1;
@@ -170,17 +235,17 @@ static void step(void)
         {name}_step(&state, &m, &command);
         memcpy(&twin, &state, sizeof twin);
     }}
-    put(observation, {macro_name}_FEATURES);
-    put(q, {macro_name}_ACTIONS);
-    put(&command.duty, 1u);
-    put(&command.duty_sim, 1u);
+    put_numbers(observation, {macro_name}_FEATURES);
+    put_numbers(q, {macro_name}_ACTIONS);
+    put_numbers(&command.duty, 1u);
+    put_numbers(&command.duty_sim, 1u);
     put_word(command.action_index);
     put_word(command.status);
     put_state();
     put_word(purity);
 }}
 "#,
-        signals = policy.signals.len(),
+        words = sample_words(policy),
     )
 }
 
@@ -191,6 +256,21 @@ fn main(policy: &Policy) -> String {
     let network = kind::NETWORK;
     format!(
         r#"
+static int network(void)
+{{
+    uint32_t words[NUMBER_WORDS * {macro_name}_FEATURES];
+    uint32_t i;
+    if (!get(words, NUMBER_WORDS * {macro_name}_FEATURES)) {{
+        return 0;
+    }}
+    for (i = 0u; i < {macro_name}_FEATURES; ++i) {{
+        observation[i] = number_of(&words[NUMBER_WORDS * i]);
+    }}
+    {name}_q_values(observation, q);
+    put_numbers(q, {macro_name}_ACTIONS);
+    return 1;
+}}
+
 int main(void)
 {{
     uint32_t kind;
@@ -227,11 +307,9 @@ int main(void)
             put_state();
             break;
         case {network}u:
-            if (!get(observation, {macro_name}_FEATURES)) {{
+            if (!network()) {{
                 return 2;
             }}
-            {name}_q_values(observation, q);
-            put(q, {macro_name}_ACTIONS);
             break;
         default:
             return 3;
@@ -247,9 +325,18 @@ int main(void)
 /// Copies `words` into the measurement `m`.
 pub(super) fn measurement(policy: &Policy) -> String {
     let mut text = String::new();
-    for (n, signal) in policy.signals.iter().enumerate() {
+    let scalar = policy.numeric_format.scalar();
+    let mut word = 0;
+    for signal in &policy.signals {
+        let name = &signal.name;
         // writing to a String cannot fail
-        let _ = writeln!(text, "    memcpy(&m.{}, &words[{n}], 4u);", signal.name);
+        if scalar == Scalar::F64 && signal.adc.is_none() {
+            let _ = writeln!(text, "    m.{name} = number_of(&words[{word}]);");
+            word += scalar.words();
+        } else {
+            let _ = writeln!(text, "    memcpy(&m.{name}, &words[{word}], 4u);");
+            word += 1;
+        }
     }
     text
 }
@@ -265,7 +352,8 @@ fn purity_tests(name: &str) -> String {
     let [observe, eval, repeat, step, commit] = purity_bits;
     let same = |a: &str, b: &str| {
         format!(
-            "memcmp(&{a}.duty, &{b}.duty, 4u) || memcmp(&{a}.duty_sim, &{b}.duty_sim, 4u)\n        \
+            "memcmp(&{a}.duty, &{b}.duty, sizeof(number))\n        \
+             || memcmp(&{a}.duty_sim, &{b}.duty_sim, sizeof(number))\n        \
              || {a}.action_index != {b}.action_index || {a}.status != {b}.status"
         )
     };
@@ -290,16 +378,22 @@ fn purity_tests(name: &str) -> String {
 fn set_mapping(policy: &Policy) -> String {
     let name = &policy.name;
     let arguments = match mapping_terms(policy) {
-        Some(4) => "k[0], k[1], k[2], k[3]",
-        Some(_) => "k[0], k[1], k[2]",
+        Some(4) => "k(0u), k(1u), k(2u), k(3u)",
+        Some(_) => "k(0u), k(1u), k(2u)",
         None => return "\nstatic int set_mapping(void)\n{\n    return 0;\n}\n".to_owned(),
     };
     format!(
         "
+static uint32_t coefficients[4u * NUMBER_WORDS];
+
+static number k(uint32_t index)
+{{
+    return number_of(&coefficients[NUMBER_WORDS * index]);
+}}
+
 static int set_mapping(void)
 {{
-    float k[4];
-    if (!get(k, 4u)) {{
+    if (!get(coefficients, 4u * NUMBER_WORDS)) {{
         return 0;
     }}
     (void){name}_set_mapping(&twin, {arguments});

@@ -2,30 +2,38 @@
 //!
 //! They read one word per signal and answer with the depth of the stack below the call, in bytes.
 
-use policy::Policy;
+use policy::{Policy, Scalar};
 
 use super::{c, rust};
+use crate::protocol::sample_words;
 
 /// In C.
 pub fn c(policy: &Policy) -> String {
     let name = &policy.name;
-    let signals = policy.signals.len();
+    let words = sample_words(policy);
     let measurement = c::measurement(policy);
+    let scalar = policy.numeric_format.scalar();
+    let numbers = if scalar == Scalar::F64 && policy.signals.iter().any(|signal| signal.adc.is_none()) {
+        c::numbers(scalar)
+    } else {
+        ""
+    };
     format!(
         r#"/* Driver of the measurement: samples in, depth of the stack out. */
 #include <stdint.h>
 #include <board.h>
 #include "{name}.h"
 
+{numbers}
 static {name}_state state;
 static {name}_measurement m;
 static {name}_command command;
 
 int main(void)
 {{
-    uint32_t words[{signals}];
+    uint32_t words[{words}];
     {name}_init(&state);
-    while (words_get(words, {signals}u)) {{
+    while (words_get(words, {words}u)) {{
         uint32_t depth;
 {measurement}        stack_paint();
         count_begin();
@@ -43,8 +51,9 @@ int main(void)
 /// In Rust, for the generated module in the file `path`.
 pub fn rust(policy: &Policy, path: &str) -> String {
     let name = &policy.name;
-    let signals = policy.signals.len();
+    let words = sample_words(policy);
     let fields = rust::measurement_fields(policy);
+    let number = rust::number(policy.numeric_format.scalar());
     format!(
         r#"// Driver of the measurement: samples in, depth of the stack out.
 #![no_std]
@@ -65,6 +74,7 @@ extern "C" {{
     fn board_exit(code: i32) -> !;
 }}
 
+{number}
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo) -> ! {{
     unsafe {{ board_exit(97) }}
@@ -79,8 +89,8 @@ fn measured(controller: &mut Controller, m: &Measurement) -> Command {{
 #[no_mangle]
 pub extern "C" fn main() -> i32 {{
     let mut controller = Controller::new();
-    let mut words = [0_u32; {signals}];
-    while unsafe {{ words_get(words.as_mut_ptr(), {signals}) }} != 0 {{
+    let mut words = [0_u32; {words}];
+    while unsafe {{ words_get(words.as_mut_ptr(), {words}) }} != 0 {{
         let m = Measurement {{
 {fields}        }};
         unsafe {{

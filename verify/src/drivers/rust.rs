@@ -2,10 +2,10 @@
 
 use std::fmt::Write;
 
-use policy::Policy;
+use policy::{Policy, Scalar};
 
 use super::{Form, mapping_terms};
-use crate::protocol::{MAGIC, kind, purity};
+use crate::protocol::{MAGIC, kind, purity, sample_words};
 
 /// Text of the driver for the generated module in the file `path`, relative to the driver.
 pub fn text(policy: &Policy, path: &str, form: Form) -> String {
@@ -24,13 +24,52 @@ pub fn text(policy: &Policy, path: &str, form: Form) -> String {
 mod {name};
 
 use {name}::{{Command, Controller, Measurement}};
-{words}{HELPERS}
+{words}{number}{HELPERS}
 {step}{set_mapping}{main}"#,
+        number = number(policy.numeric_format.scalar()),
         step = step(policy, form),
         set_mapping = set_mapping(policy),
         main = main(policy),
     );
     text
+}
+
+/// Numbers from and to words.
+pub(super) fn number(scalar: Scalar) -> &'static str {
+    match scalar {
+        Scalar::F32 => {
+            r"
+type Number = f32;
+const NUMBER_WORDS: usize = 1;
+
+#[allow(dead_code)]
+fn number(words: &[u32]) -> Number {
+    f32::from_bits(words[0])
+}
+
+#[allow(dead_code)]
+fn words_of(x: Number) -> [u32; NUMBER_WORDS] {
+    [x.to_bits()]
+}
+"
+        }
+        Scalar::F64 => {
+            r"
+type Number = f64;
+const NUMBER_WORDS: usize = 2;
+
+#[allow(dead_code)]
+fn number(words: &[u32]) -> Number {
+    f64::from_bits(words[0] as u64 | (words[1] as u64) << 32)
+}
+
+#[allow(dead_code)]
+fn words_of(x: Number) -> [u32; NUMBER_WORDS] {
+    [x.to_bits() as u32, (x.to_bits() >> 32) as u32]
+}
+"
+        }
+    }
 }
 
 /// Words through the standard library.
@@ -133,6 +172,12 @@ impl Driver {
         }
     }
 
+    fn put_numbers(&mut self, numbers: &[Number]) {
+        for number in numbers {
+            self.put(words_of(*number));
+        }
+    }
+
     fn put_state(&mut self) {
         let words = self.state.state_words();
         self.put(words);
@@ -148,18 +193,23 @@ impl Driver {
     }
 }
 
-fn bits(command: &Command) -> [u32; 4] {
-    [command.duty.to_bits(), command.duty_sim.to_bits(), command.action_index, command.status]
+fn bits(command: &Command) -> ([[u32; NUMBER_WORDS]; 2], [u32; 2]) {
+    ([words_of(command.duty), words_of(command.duty_sim)], [command.action_index, command.status])
 }
 "#;
 
 /// The fields of a measurement from `words`.
 pub(super) fn measurement_fields(policy: &Policy) -> String {
     let mut fields = String::new();
-    for (n, signal) in policy.signals.iter().enumerate() {
+    let mut word = 0;
+    for signal in &policy.signals {
         let value = match signal.adc {
-            Some(_) => format!("words[{n}] as i32"),
-            None => format!("f32::from_bits(words[{n}])"),
+            Some(_) => format!("words[{word}] as i32"),
+            None => format!("number(&words[{word}..])"),
+        };
+        word += match signal.adc {
+            Some(_) => 1,
+            None => policy.numeric_format.scalar().words(),
         };
         // writing to a String cannot fail
         let _ = writeln!(fields, "            {}: {value},", signal.name);
@@ -170,7 +220,7 @@ pub(super) fn measurement_fields(policy: &Policy) -> String {
 fn step(policy: &Policy, form: Form) -> String {
     let mask = form.purity_mask();
     let name = &policy.name;
-    let signals = policy.signals.len();
+    let words = sample_words(policy);
     let fields = measurement_fields(policy);
     let [observe, eval, repeat, step, commit] = [
         purity::OBSERVE_CHANGED_STATE,
@@ -200,7 +250,7 @@ impl Driver {{
         command
     }}
 
-    fn step(&mut self, words: [u32; {signals}]) {{
+    fn step(&mut self, words: [u32; {words}]) {{
         let m = Measurement {{
 {fields}        }};
         let observation = self.state.observe(&m);
@@ -214,10 +264,11 @@ impl Driver {{
             command
         }};
         self.steps = self.steps.wrapping_add(1);
-        let _: ([f32; {name}::FEATURES], [f32; {name}::ACTIONS]) = (observation, q);
-        self.put(observation.iter().map(|x| x.to_bits()));
-        self.put(q.iter().map(|x| x.to_bits()));
-        self.put(bits(&command));
+        let _: ([Number; {name}::FEATURES], [Number; {name}::ACTIONS]) = (observation, q);
+        self.put_numbers(&observation);
+        self.put_numbers(&q);
+        self.put_numbers(&[command.duty, command.duty_sim]);
+        self.put([command.action_index, command.status]);
         self.put_state();
         self.put([purity]);
     }}
@@ -230,14 +281,14 @@ fn set_mapping(policy: &Policy) -> String {
     let arguments = match mapping_terms(policy) {
         Some(4) => "a, b, c, r",
         Some(_) => "a, b, c",
-        None => return "\nimpl Driver {\n    fn set_mapping(&mut self, _: [u32; 4]) {\n        panic!(\"no mapping\");\n    }\n}\n".to_owned(),
+        None => return "\nimpl Driver {\n    fn set_mapping(&mut self, _: [u32; 4 * NUMBER_WORDS]) {\n        panic!(\"no mapping\");\n    }\n}\n".to_owned(),
     };
     let unused = if arguments.ends_with('r') { "r" } else { "_" };
     format!(
         r#"
 impl Driver {{
-    fn set_mapping(&mut self, words: [u32; 4]) {{
-        let [a, b, c, {unused}] = words.map(f32::from_bits);
+    fn set_mapping(&mut self, words: [u32; 4 * NUMBER_WORDS]) {{
+        let [a, b, c, {unused}] = [0, 1, 2, 3].map(|n| number(&words[n * NUMBER_WORDS..]));
         self.twin.set_mapping({arguments});
         let accepted: bool = self.state.set_mapping({arguments});
         self.put([accepted as u32]);
@@ -289,9 +340,13 @@ fn run() {{
                 driver.put_state();
             }}
             {network} => {{
-                let words: [u32; {name}::FEATURES] = driver.get().expect(truncated);
-                let q = Controller::q_values(&words.map(f32::from_bits));
-                driver.put(q.iter().map(|x| x.to_bits()));
+                let words: [u32; NUMBER_WORDS * {name}::FEATURES] = driver.get().expect(truncated);
+                let mut observation = [0.0; {name}::FEATURES];
+                for (x, words) in observation.iter_mut().zip(words.chunks(NUMBER_WORDS)) {{
+                    *x = number(words);
+                }}
+                let q = Controller::q_values(&observation);
+                driver.put_numbers(&q);
             }}
             _ => panic!("unknown event"),
         }}

@@ -1,10 +1,10 @@
 //! Values at which code goes wrong: ends of ranges, zeros, subnormals, NaN, infinities, extreme ADC codes.
 
 use interp::Sample;
-use policy::{Policy, Signal};
+use policy::{Policy, Scalar, Signal};
 
 use super::rng::Rng;
-use super::sample_of;
+use super::{physical, sample_of};
 
 /// The edge samples of one signal, split by the signal's plausible range.
 #[derive(Debug, Clone)]
@@ -24,31 +24,41 @@ const NANS: [u32; 7] = [
     0x7fc0_1234,
 ];
 
+/// The same of binary64.
+const WIDE_NANS: [u64; 7] = [
+    0x7ff8_0000_0000_0000,
+    0xfff8_0000_0000_0000,
+    0x7ff0_0000_0000_0001,
+    0xfff0_0000_0000_0001,
+    0x7fff_ffff_ffff_ffff,
+    0xffff_ffff_ffff_ffff,
+    0x7ff8_0000_1234_0000,
+];
+
 impl Edges {
     /// The edges of signal `index`: its own, and those of the mapping's validity if it is the load current.
     pub fn new(policy: &Policy, index: usize) -> Self {
         let mapping = policy.mapping.as_ref().filter(|mapping| mapping.load_current == index);
         let valid = mapping.map(|mapping| mapping.valid_i_out);
         let ends: Vec<f64> = valid.iter().flat_map(|valid| [valid.low, valid.high]).collect();
-        Self::of_signal(&policy.signals[index], &ends)
+        Self::of_signal(policy.numeric_format.scalar(), &policy.signals[index], &ends)
     }
 
-    fn of_signal(signal: &Signal, more_ends: &[f64]) -> Self {
+    fn of_signal(scalar: Scalar, signal: &Signal, more_ends: &[f64]) -> Self {
         let ends = [&[signal.range.low, signal.range.high], more_ends].concat();
         let all = if signal.adc.is_some() {
-            codes(signal, &ends)
+            codes(scalar, signal, &ends)
         } else {
-            floats(&ends)
+            floats(scalar, &ends)
         };
+        let within = |x: f64| x >= signal.range.low && x <= signal.range.high;
         let plausible = |sample: &Sample| match (*sample, signal.adc) {
-            (Sample::Physical(x), _) => {
-                let x = f64::from(x);
-                x >= signal.range.low && x <= signal.range.high
-            }
+            (Sample::Physical(x), _) => within(f64::from(x)),
+            (Sample::Wide(x), _) => within(x),
             (Sample::Code(n), Some(adc)) => {
                 // in the format of the contract
-                let x = f64::from(adc.gain as f32 * n as f32 + adc.offset as f32);
-                x >= signal.range.low && x <= signal.range.high
+                let [gain, n, offset] = [adc.gain, f64::from(n), adc.offset].map(|x| scalar.nearest(x));
+                within(scalar.nearest(scalar.nearest(gain * n) + offset))
             }
             (Sample::Code(_), None) => false,
         };
@@ -77,41 +87,51 @@ impl Edges {
     }
 }
 
-fn floats(ends: &[f64]) -> Vec<Sample> {
+fn floats(scalar: Scalar, ends: &[f64]) -> Vec<Sample> {
+    let (normal, nans) = match scalar {
+        Scalar::F32 => (
+            f64::from(f32::MIN_POSITIVE),
+            NANS.map(|bits| Sample::Physical(f32::from_bits(bits))),
+        ),
+        Scalar::F64 => (
+            f64::MIN_POSITIVE,
+            WIDE_NANS.map(|bits| Sample::Wide(f64::from_bits(bits))),
+        ),
+    };
+    let infinity = f64::INFINITY;
+    let (up, down) = (|x: f64| scalar.next_up(x), |x: f64| scalar.next_down(x));
     let mut values = vec![
         0.0,
         -0.0,
-        f32::from_bits(1),
-        -f32::from_bits(1),
-        f32::MIN_POSITIVE,
-        -f32::MIN_POSITIVE,
-        f32::MIN_POSITIVE.next_down(),
-        -f32::MIN_POSITIVE.next_down(),
+        up(0.0),
+        down(0.0),
+        normal,
+        -normal,
+        down(normal),
+        -down(normal),
         1.0,
         -1.0,
         1e30,
         -1e30,
-        f32::MAX,
-        f32::MIN,
-        f32::INFINITY,
-        f32::NEG_INFINITY,
+        down(infinity),
+        up(-infinity),
+        infinity,
+        -infinity,
     ];
-    for end in ends.iter().map(|end| *end as f32) {
-        let up = end.next_up();
-        let down = end.next_down();
-        values.extend([end, up, down, up.next_up(), down.next_down(), -end]);
+    for end in ends.iter().map(|end| scalar.nearest(*end)) {
+        values.extend([end, up(end), down(end), up(up(end)), down(down(end)), -end]);
     }
-    values.extend(NANS.map(f32::from_bits));
-    values.into_iter().map(Sample::Physical).collect()
+    let numbers = values.into_iter().map(|x| physical(scalar, x));
+    numbers.chain(nans).collect()
 }
 
-fn codes(signal: &Signal, ends: &[f64]) -> Vec<Sample> {
+fn codes(scalar: Scalar, signal: &Signal, ends: &[f64]) -> Vec<Sample> {
     let mut codes = vec![0, 1, -1, i32::MIN, i32::MIN + 1, i32::MAX, i32::MAX - 1];
     for n in [8, 10, 12, 14, 16, 24] {
         codes.extend([(1 << n) - 1, 1 << n, (1 << n) + 1, -(1 << n), -(1 << n) - 1]);
     }
     for &end in ends {
-        if let Sample::Code(code) = sample_of(signal, end) {
+        if let Sample::Code(code) = sample_of(scalar, signal, end) {
             codes.extend((-2..=2).map(|n| code.saturating_add(n)));
         }
     }
@@ -135,7 +155,7 @@ mod tests {
 
     #[test]
     fn edges_lie_on_both_sides_of_the_range() {
-        let edges = Edges::of_signal(&signal(None), &[]);
+        let edges = Edges::of_signal(Scalar::F32, &signal(None), &[]);
         // 0.1_f32 is above 0.1, 0.9_f32 below 0.9
         assert!(edges.inside.contains(&Sample::Physical(0.1)) && edges.inside.contains(&Sample::Physical(0.9)));
         assert!(edges.outside.contains(&Sample::Physical(0.1_f32.next_down())));
@@ -156,6 +176,7 @@ mod tests {
     #[test]
     fn codes_reach_the_ends_of_the_range_and_of_the_type() {
         let edges = Edges::of_signal(
+            Scalar::F32,
             &signal(Some(Adc {
                 gain: 1e-3,
                 offset: 0.0,

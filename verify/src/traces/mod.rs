@@ -12,8 +12,8 @@ mod rng;
 #[cfg(test)]
 mod tests;
 
-use interp::{Controller, Sample};
-use policy::{Interval, Policy};
+use interp::{Controller, Real, Sample};
+use policy::{Interval, Policy, Scalar};
 
 use edges::Edges;
 use plant::Plant;
@@ -25,23 +25,23 @@ pub use rng::Rng;
 pub enum Event {
     /// One control step with a sample per signal.
     Step(Vec<Sample>),
-    /// An attempt to replace the mapping coefficients; `r` in the four-term form only.
+    /// An attempt to replace the mapping coefficients, numbers of the format; `r` in the four-term form only.
     SetMapping {
         /// Gain on the duty.
-        a: f32,
+        a: f64,
         /// Per ampere.
-        b: f32,
+        b: f64,
         /// Constant.
-        c: f32,
+        c: f64,
         /// Product term per ampere.
-        r: Option<f32>,
+        r: Option<f64>,
     },
     /// `reset`: keeps the mapping coefficients.
     Reset,
     /// `init`: a new controller.
     Init,
     /// The network alone on an observation (known answers).
-    Network(Vec<f32>),
+    Network(Vec<f64>),
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,6 +82,7 @@ const FIRST_SEGMENT: usize = 200;
 #[derive(Debug, Clone)]
 pub struct Stream<'a> {
     policy: &'a Policy,
+    scalar: Scalar,
     rng: Rng,
     plant: Plant,
     edges: Vec<Edges>,
@@ -109,6 +110,7 @@ impl<'a> Stream<'a> {
         let mut rng = Rng::new(seed);
         Self {
             policy,
+            scalar: policy.numeric_format.scalar(),
             plant: Plant::new(policy, &mut rng),
             edges: (0..policy.signals.len())
                 .map(|index| Edges::new(policy, index))
@@ -126,7 +128,7 @@ impl<'a> Stream<'a> {
 
     /// The next event. `controller` is the interpreter in the state before it: the closed loop needs its duty, the
     /// clip segments its filter memories.
-    pub fn next_event(&mut self, controller: &Controller<f32>) -> Event {
+    pub fn next_event<T: Real>(&mut self, controller: &Controller<T>) -> Event {
         if let Some(event) = self.queued.pop() {
             return event;
         }
@@ -144,7 +146,7 @@ impl<'a> Stream<'a> {
         }
         self.left -= 1;
         Event::Step(match self.segment {
-            Segment::ClosedLoop => self.closed_loop(f64::from(controller.state().previous_command)),
+            Segment::ClosedLoop => self.closed_loop(controller.state().previous_command.to_f64()),
             Segment::Uniform => self.uniform(),
             Segment::Edges => self.with_edges(),
             Segment::Bursts => self.bursts(),
@@ -172,16 +174,16 @@ impl<'a> Stream<'a> {
             .signals
             .iter()
             .zip(values)
-            .map(|(signal, x)| sample_of(signal, x))
+            .map(|(signal, x)| sample_of(self.scalar, signal, x))
             .collect()
     }
 
     fn uniform(&mut self) -> Vec<Sample> {
-        let rng = &mut self.rng;
+        let (scalar, rng) = (self.scalar, &mut self.rng);
         self.policy
             .signals
             .iter()
-            .map(|signal| sample_of(signal, rng.uniform(signal.range.low, signal.range.high)))
+            .map(|signal| sample_of(scalar, signal, rng.uniform(signal.range.low, signal.range.high)))
             .collect()
     }
 
@@ -248,7 +250,8 @@ impl<'a> Stream<'a> {
     /// Moves one signal so that one observation comes to lie within a few units in the last place of a clip's end.
     ///
     /// Every filter is affine in its input for a given state, so two evaluations give the place.
-    fn at_a_clip(&mut self, controller: &Controller<f32>) -> Vec<Sample> {
+    fn at_a_clip<T: Real>(&mut self, controller: &Controller<T>) -> Vec<Sample> {
+        let scalar = self.scalar;
         let mut samples = self.uniform();
         let clipped: Vec<(usize, Interval)> = self
             .policy
@@ -266,11 +269,11 @@ impl<'a> Stream<'a> {
         };
         let (low, high) = (signal.range.low, signal.range.high);
         let mut unclipped_at = |x: f64| {
-            samples[index] = sample_of(signal, x);
+            samples[index] = sample_of(scalar, signal, x);
             controller
                 .eval(&samples)
                 .ok()
-                .map(|trace| f64::from(trace.features[feature].unclipped))
+                .map(|trace| trace.features[feature].unclipped.to_f64())
         };
         // stay off the ends, where rounding could leave the range
         let (x0, x1) = (low + 0.25 * (high - low), low + 0.75 * (high - low));
@@ -280,9 +283,9 @@ impl<'a> Stream<'a> {
         let end = if self.rng.one_in(2) { clip.low } else { clip.high };
         let x = x0 + (end - o0) / (o1 - o0) * (x1 - x0);
         samples[index] = if x >= low && x <= high {
-            nudged(sample_of(signal, x), self.rng.below(7) as i32 - 3)
+            nudged(sample_of(scalar, signal, x), self.rng.below(7) as i32 - 3)
         } else {
-            sample_of(signal, self.rng.uniform(low, high))
+            sample_of(scalar, signal, self.rng.uniform(low, high))
         };
         samples
     }
@@ -292,44 +295,45 @@ impl<'a> Stream<'a> {
         let Some(mapping) = &self.policy.mapping else {
             return Event::Reset;
         };
-        let rng = &mut self.rng;
+        let (scalar, rng) = (self.scalar, &mut self.rng);
         let own = mapping.coefficients;
-        let mut values = [own.a as f32, own.b as f32, own.c as f32, own.r.unwrap_or(0.0) as f32];
+        let mut values = [own.a, own.b, own.c, own.r.unwrap_or(0.0)].map(|value| scalar.nearest(value));
         let ranges = [mapping.adjust_a, mapping.adjust_b, mapping.adjust_c, mapping.adjust_r];
         let style = rng.below(5);
         if style != 0 {
             for (value, range) in values.iter_mut().zip(ranges) {
-                *value = rng.uniform(range.low, range.high) as f32;
+                *value = scalar.nearest(rng.uniform(range.low, range.high));
             }
         }
         let index = rng.below(if own.r.is_some() { 4 } else { 3 });
         if style == 2 || style == 3 {
-            let end = (if rng.one_in(2) {
+            let end = scalar.nearest(if rng.one_in(2) {
                 ranges[index].low
             } else {
                 ranges[index].high
-            }) as f32;
-            values[index] = rng.pick(&[end, end.next_up(), end.next_down()], end);
+            });
+            values[index] = rng.pick(&[end, scalar.next_up(end), scalar.next_down(end)], end);
         }
         if style == 3 && rng.one_in(2) {
+            let infinity = f64::INFINITY;
             let bad = [
-                f32::NAN,
-                -f32::NAN,
-                f32::INFINITY,
-                f32::NEG_INFINITY,
-                f32::MAX,
-                f32::MIN,
+                f64::NAN,
+                -f64::NAN,
+                infinity,
+                -infinity,
+                scalar.next_down(infinity),
+                -scalar.next_down(infinity),
                 0.0,
                 -0.0,
             ];
-            values[index] = rng.pick(&bad, f32::NAN);
+            values[index] = rng.pick(&bad, f64::NAN);
         }
         if style == 4 && own.r.is_some() {
             // a + r i close to 0 at one end of the current: where the mapping ceases to rise
             let valid = mapping.valid_i_out;
-            let i = (if rng.one_in(2) { valid.low } else { valid.high }) as f32;
-            let a = -(values[3] * i);
-            values[0] = rng.pick(&[a, a.next_up(), a.next_down()], a);
+            let i = scalar.nearest(if rng.one_in(2) { valid.low } else { valid.high });
+            let a = -scalar.nearest(values[3] * i);
+            values[0] = rng.pick(&[a, scalar.next_up(a), scalar.next_down(a)], a);
         }
         let [a, b, c, r] = values;
         Event::SetMapping {
@@ -341,24 +345,38 @@ impl<'a> Stream<'a> {
     }
 }
 
-/// `x` in the unit of the signal as the sample that arrives: rounded, or the nearest ADC code.
-pub fn sample_of(signal: &policy::Signal, x: f64) -> Sample {
+/// `x` in the unit of the signal as the sample that arrives in `scalar`: rounded, or the nearest ADC code.
+pub fn sample_of(scalar: Scalar, signal: &policy::Signal, x: f64) -> Sample {
     match signal.adc {
-        None => Sample::Physical(x as f32),
+        None => physical(scalar, x),
         // `as` saturates
         Some(adc) => Sample::Code(((x - adc.offset) / adc.gain).round() as i32),
     }
 }
 
+/// The number `x` as a sample in `scalar`.
+fn physical(scalar: Scalar, x: f64) -> Sample {
+    match scalar {
+        Scalar::F32 => Sample::Physical(x as f32),
+        Scalar::F64 => Sample::Wide(x),
+    }
+}
+
 /// The sample `ulps` units in the last place (or codes) further.
 fn nudged(sample: Sample, ulps: i32) -> Sample {
+    let moved = |scalar: Scalar, mut x: f64| {
+        for _ in 0..ulps.abs() {
+            x = if ulps > 0 {
+                scalar.next_up(x)
+            } else {
+                scalar.next_down(x)
+            };
+        }
+        physical(scalar, x)
+    };
     match sample {
         Sample::Code(code) => Sample::Code(code.saturating_add(ulps)),
-        Sample::Physical(mut x) => {
-            for _ in 0..ulps.abs() {
-                x = if ulps > 0 { x.next_up() } else { x.next_down() };
-            }
-            Sample::Physical(x)
-        }
+        Sample::Physical(x) => moved(Scalar::F32, x.into()),
+        Sample::Wide(x) => moved(Scalar::F64, x),
     }
 }

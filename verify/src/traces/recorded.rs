@@ -74,6 +74,7 @@ impl Recorded {
     /// ignored; lines that are empty or start with `#` are skipped. Values are in the unit of the signal, for ADC
     /// signals too, where the nearest code is taken. `nan` and `inf` are numbers here.
     pub fn from_csv(policy: &Policy, text: &str) -> Result<Self, RecordedError> {
+        let scalar = policy.numeric_format.scalar();
         let mut lines = text
             .trim_start_matches('\u{feff}')
             .lines()
@@ -113,7 +114,9 @@ impl Recorded {
                         signal: signal.name.clone(),
                         found: cell.to_owned(),
                     };
-                    cell.parse().map(|x: f64| sample_of(signal, x)).map_err(|_| bad())
+                    cell.parse()
+                        .map(|x: f64| sample_of(scalar, signal, x))
+                        .map_err(|_| bad())
                 };
                 policy.signals.iter().zip(&columns).map(sample).collect()
             })

@@ -12,8 +12,8 @@ fn example() -> Policy {
     policy::load(&path).unwrap_or_else(|faults| panic!("{faults:#?}"))
 }
 
-fn chunk(policy: &Policy, seed: u64, steps: u64, recorded: &[Recorded]) -> (Chunk, Oracle) {
-    let mut oracle = Oracle::new(policy);
+fn chunk(policy: &Policy, seed: u64, steps: u64, recorded: &[Recorded]) -> (Chunk, Oracle<f32>) {
+    let mut oracle = Oracle::<f32>::new(policy);
     let mut stream = Stream::new(policy, seed, recorded);
     let chunk = oracle.next_chunk(&mut stream, steps).unwrap();
     (chunk, oracle)
@@ -41,7 +41,7 @@ fn a_seed_gives_the_same_words_again_and_another_seed_others() {
 fn chunks_join_to_the_same_stream() {
     let policy = example();
     let (whole, one) = chunk(&policy, 5, 2000, &[]);
-    let mut two = Oracle::new(&policy);
+    let mut two = Oracle::<f32>::new(&policy);
     let mut stream = Stream::new(&policy, 5, &[]);
     let first = two.next_chunk(&mut stream, 700).unwrap();
     let second = two.next_chunk(&mut stream, 1300).unwrap();
@@ -76,7 +76,7 @@ fn every_kind_of_bad_sample_occurs() {
         .flatten()
         .filter_map(|sample| match sample {
             Sample::Physical(x) => Some(*x),
-            Sample::Code(_) => None,
+            Sample::Wide(_) | Sample::Code(_) => None,
         })
         .collect();
     type Kind = (&'static str, fn(&f32) -> bool);
@@ -102,7 +102,7 @@ fn bursts_end_around_the_hold_count() {
     let (chunk, _) = chunk(&policy, 1, 20_000, &[]);
     let inside = |(sample, signal): (&Sample, &policy::Signal)| match sample {
         Sample::Physical(x) => (signal.range.low..=signal.range.high).contains(&f64::from(*x)),
-        Sample::Code(_) => false,
+        Sample::Wide(_) | Sample::Code(_) => false,
     };
     let mut lengths = vec![0; 64];
     let mut run = 0;
@@ -123,7 +123,7 @@ fn bursts_end_around_the_hold_count() {
 #[test]
 fn observations_come_within_a_few_units_of_their_clips_on_both_sides() {
     let policy = example();
-    let mut oracle = Oracle::new(&policy);
+    let mut oracle = Oracle::<f32>::new(&policy);
     let mut stream = Stream::new(&policy, 1, &[]);
     let (mut just_inside, mut just_outside) = (0, 0);
     for _ in 0..20_000 {
@@ -193,6 +193,6 @@ fn an_adc_sample_is_the_nearest_code_and_saturates() {
         range: Interval { low: 0.0, high: 1.0 },
         adc,
     };
-    assert_eq!(sample_of(&signal, 1.1), Sample::Code(4));
-    assert_eq!(sample_of(&signal, -1e30), Sample::Code(i32::MAX));
+    assert_eq!(sample_of(policy::Scalar::F32, &signal, 1.1), Sample::Code(4));
+    assert_eq!(sample_of(policy::Scalar::F32, &signal, -1e30), Sample::Code(i32::MAX));
 }

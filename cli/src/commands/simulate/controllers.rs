@@ -1,6 +1,6 @@
 //! The policy in the loop: interpreted, or compiled and running as a program of its own.
 
-use closed_loop::{Agent, Answer, Call, Controller, External};
+use closed_loop::{Answer, Call, Controller, External, interpreter};
 use codegen::Language;
 use policy::Policy;
 use verify::Live;
@@ -20,7 +20,7 @@ pub fn start(policy: &Policy, kind: ControllerKind) -> Result<Named, Failure> {
         ControllerKind::Interpreter => {
             return Ok(Named {
                 name: "interpreter".to_owned(),
-                controller: Box::new(Agent::new(policy)?),
+                controller: interpreter(policy)?,
             });
         }
         ControllerKind::Rust => (Language::Rust, "generated Rust"),
@@ -32,7 +32,7 @@ pub fn start(policy: &Policy, kind: ControllerKind) -> Result<Named, Failure> {
         Call::Restart => live.restart().map(|()| None),
         Call::Step(samples) => live.step(samples).map(|command| {
             Some(Answer {
-                duty: f64::from(command.duty),
+                duty: command.duty,
                 action: Some(command.action_index),
                 status: command.status,
             })

@@ -62,7 +62,7 @@ pub fn view(prefix: &str, network: &IntegerNetwork, has_fpu: bool) -> IntegerVie
         input_length: padded,
         padding: (inputs..padded).map(|i| format!("input[{i}] = 0;")).collect(),
         output: output(network, "i"),
-        q_unit: float(network.q_unit.value()),
+        q_unit: float(network.q_unit.single()),
         q_field: network.q_field,
         has_fpu,
         special: special(network),
@@ -411,6 +411,6 @@ fn result(prefix: &str, layer: &IntegerLayer, index: usize) -> String {
         ActivationCode::Identity => cut,
         ActivationCode::Relu => format!("{prefix}_positive({cut})"),
         ActivationCode::LeakyRelu(_) => format!("{prefix}_leaky_integer({cut}, {})", layer.slope),
-        ActivationCode::Tanh => format!("{prefix}_tanh_integer(s{index}, {})", float(layer.unit.value())),
+        ActivationCode::Tanh => format!("{prefix}_tanh_integer(s{index}, {})", float(layer.unit.single())),
     }
 }

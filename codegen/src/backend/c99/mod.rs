@@ -1,6 +1,7 @@
 //! C99 that also compiles as C90 with `stdint.h` and as C++: one header, one source.
 
 mod integer;
+pub(super) mod number;
 mod real;
 pub(super) mod statements;
 pub(super) mod tables;
@@ -14,9 +15,10 @@ use templates::c::{Argmax, Common, Constant, Header, Helpers, Member, NetworkVie
 use crate::backend::assembly::RealKernel;
 use crate::backend::{Backend, banner};
 use crate::lower::STATUS;
-use crate::program::{ActivationCode, Coefficient, NetworkCode, Op, Program};
+use crate::program::{ActivationCode, Coefficient, Literal, NetworkCode, Op, Program};
 use crate::{CodegenError, GeneratedFiles};
-use statements::{Printer, float, unsigned};
+use number::number;
+use statements::{Printer, unsigned};
 
 /// The C99 backend.
 pub struct C99;
@@ -53,6 +55,7 @@ fn tidy(text: &str) -> String {
 }
 
 fn common(program: &Program) -> Common {
+    let number = number::kind(program.scalar());
     let parameters = program.mapping.iter().flat_map(|mapping| &mapping.coefficients);
     Common {
         name: program.name.clone(),
@@ -63,9 +66,10 @@ fn common(program: &Program) -> Common {
             program.provenance.c_flags,
         ),
         mapping_parameters: parameters
-            .map(|(name, ..)| format!("float {}", name.name()))
+            .map(|(name, ..)| format!("{} {}", number.name, name.name()))
             .collect::<Vec<_>>()
             .join(", "),
+        number,
     }
 }
 
@@ -98,22 +102,31 @@ fn header(program: &Program) -> Header {
             .iter()
             .map(|(name, bit)| constant(name, unsigned(1 << bit)))
             .collect(),
-        measurement: program.signals.iter().map(measurement_member).collect(),
+        measurement: program
+            .signals
+            .iter()
+            .map(|signal| measurement_member(program, signal))
+            .collect(),
         state: state_members(program),
         features: program.features.iter().map(|(_, formula)| formula.clone()).collect(),
     }
 }
 
-fn measurement_member(signal: &crate::program::SignalPort) -> Member {
+fn measurement_member(program: &Program, signal: &crate::program::SignalPort) -> Member {
+    let scalar = program.scalar();
     let (low, high) = signal.range;
-    let kind = if signal.is_code { "int32_t" } else { "float" };
+    let kind = if signal.is_code {
+        "int32_t"
+    } else {
+        number::kind(scalar).name
+    };
     let meaning = if signal.is_code { "ADC code, " } else { "" };
     Member {
         declaration: format!("{kind} {}", signal.name),
         comment: format!(
-            "{meaning}plausible {:?} to {:?} {}",
-            low.value(),
-            high.value(),
+            "{meaning}plausible {} to {} {}",
+            low.shortest(scalar),
+            high.shortest(scalar),
             signal.unit
         )
         .trim_end()
@@ -123,28 +136,32 @@ fn measurement_member(signal: &crate::program::SignalPort) -> Member {
 
 /// In the order of contract section 1.
 fn state_members(program: &Program) -> Vec<Member> {
+    let kind = number::kind(program.scalar()).name;
     let member = |declaration: String, comment: &str| Member {
         declaration,
         comment: comment.to_owned(),
     };
     let mut members = vec![member(
-        format!("float held[{}]", program.signals.len()),
+        format!("{kind} held[{}]", program.signals.len()),
         "last good samples",
     )];
     if program.memory_words > 0 {
         members.push(member(
-            format!("float memory[{}]", program.memory_words),
+            format!("{kind} memory[{}]", program.memory_words),
             "filters, in feature order, oldest first",
         ));
     }
-    members.push(member("float previous_duty".into(), "duty of the last chosen action"));
-    members.push(member("float previous_command".into(), "last command"));
+    members.push(member(
+        format!("{kind} previous_duty"),
+        "duty of the last chosen action",
+    ));
+    members.push(member(format!("{kind} previous_command"), "last command"));
     if program.soft_start_from.is_some() {
-        members.push(member("float soft_cap".into(), "rising upper limit"));
+        members.push(member(format!("{kind} soft_cap"), "rising upper limit"));
     }
     for (name, ..) in program.mapping.iter().flat_map(|mapping| &mapping.coefficients) {
         members.push(member(
-            format!("float mapping_{}", name.name()),
+            format!("{kind} mapping_{}", name.name()),
             "coefficient of the duty ratio mapping",
         ));
     }
@@ -179,7 +196,7 @@ fn source(program: &Program) -> Source {
         argmax: argmax(program),
         crc_kinds: tables::crc_kinds(program),
         helpers: helpers(program),
-        tanh: tables::tanh_steps(),
+        tanh: tables::tanh_steps(program.scalar()),
         front_members: front_members(program),
         sense: sense_lines,
         sense_results,
@@ -200,16 +217,23 @@ fn source(program: &Program) -> Source {
         mapping_conditions: mapping_conditions(program),
         mapping_assignments: mapping_assignments(program),
         hold: unsigned(program.hold),
-        fallback: float(program.fallback_duty.value()),
+        fallback: number(program.scalar(), program.fallback_duty),
         integrity: tables::integrity(program),
         crc: unsigned(program.crc),
-        self_test: tables::self_test(),
+        self_test: tables::self_test(program.scalar()),
     }
 }
 
 fn network(program: &Program) -> NetworkView {
     match &program.network {
-        NetworkCode::Real { fused, layers } => NetworkView::Real(real::view(&program.name, layers, *fused)),
+        NetworkCode::Real { scalar, fused, layers } => {
+            let arithmetic = real::Arithmetic {
+                name: &program.name,
+                scalar: *scalar,
+                fused: *fused,
+            };
+            NetworkView::Real(real::view(arithmetic, layers))
+        }
         NetworkCode::Integer(network) => NetworkView::Integer(integer::view(&program.name, network, program.has_fpu)),
     }
 }
@@ -222,14 +246,15 @@ fn senses_again(program: &Program) -> bool {
 fn argmax(program: &Program) -> Argmax {
     let n = &program.name;
     let again = senses_again(program);
+    let kind = number::kind(program.scalar()).name;
     match program.network {
         NetworkCode::Real { .. } => Argmax {
-            element: "float",
-            lowest: "-3.40282347e+38f",
+            element: kind,
+            lowest: number::lowest(program.scalar()),
             declarations: again
-                .then(|| format!("float observation[{}];", program.feature_count()))
+                .then(|| format!("{kind} observation[{}];", program.feature_count()))
                 .into_iter()
-                .chain([format!("float q[{}];", program.duties.len())])
+                .chain([format!("{kind} q[{}];", program.duties.len())])
                 .collect(),
             calls: again
                 .then(|| format!("{n}_observe(state, measured, observation);"))
@@ -263,18 +288,19 @@ fn argmax(program: &Program) -> Argmax {
 }
 
 fn front_members(program: &Program) -> Vec<Member> {
+    let kind = number::kind(program.scalar()).name;
     let member = |declaration: String, comment: &str| Member {
         declaration,
         comment: comment.to_owned(),
     };
-    let mut members = vec![member(format!("float signal[{}]", program.signals.len()), "sanitised")];
+    let mut members = vec![member(format!("{kind} signal[{}]", program.signals.len()), "sanitised")];
     members.push(member(
-        format!("float observation[{}]", program.feature_count()),
+        format!("{kind} observation[{}]", program.feature_count()),
         "network input",
     ));
     if !program.front.pushes.is_empty() {
         members.push(member(
-            format!("float push[{}]", program.front.pushes.len()),
+            format!("{kind} push[{}]", program.front.pushes.len()),
             "what the filters will remember",
         ));
     }
@@ -339,17 +365,18 @@ fn pushes(program: &Program) -> Vec<PushView> {
 }
 
 fn reset(program: &Program) -> Vec<String> {
+    let scalar = program.scalar();
     let signals = program.signals.iter().enumerate();
     let mut lines: Vec<String> = signals
-        .map(|(i, signal)| format!("state->held[{i}] = {};", float(signal.initial.value())))
+        .map(|(i, signal)| format!("state->held[{i}] = {};", number(scalar, signal.initial)))
         .collect();
-    let initial = float(program.initial_duty.value());
+    let initial = number(scalar, program.initial_duty);
     lines.push(format!("state->previous_duty = {initial};"));
     lines.push(format!("state->previous_command = {initial};"));
     lines.extend(
         program
             .soft_start_from
-            .map(|from| format!("state->soft_cap = {};", float(from.value()))),
+            .map(|from| format!("state->soft_cap = {};", number(scalar, from))),
     );
     lines.push("state->bad_count = 0u;".into());
     lines.push("state->primed = 0u;".into());
@@ -357,26 +384,29 @@ fn reset(program: &Program) -> Vec<String> {
 }
 
 fn init(program: &Program) -> Vec<String> {
+    let scalar = program.scalar();
     let coefficients = program.mapping.iter().flat_map(|mapping| &mapping.coefficients);
     coefficients
-        .map(|(name, value, ..)| format!("state->mapping_{} = {};", name.name(), float(value.value())))
+        .map(|(name, value, ..)| format!("state->mapping_{} = {};", name.name(), number(scalar, *value)))
         .collect()
 }
 
 fn mapping_conditions(program: &Program) -> Vec<String> {
+    let scalar = program.scalar();
     let Some(mapping) = &program.mapping else {
         return Vec::new();
     };
     let p = &program.name;
-    let within = |(name, _, low, high): &(Coefficient, _, crate::program::Literal, crate::program::Literal)| {
-        let (name, low, high) = (name.name(), float(low.value()), float(high.value()));
+    let within = |(name, _, low, high): &(Coefficient, _, Literal, Literal)| {
+        let (name, low, high) = (name.name(), number(scalar, *low), number(scalar, *high));
         format!("{p}_within({name}, {low}, {high})")
     };
     let mut conditions: Vec<String> = mapping.coefficients.iter().map(within).collect();
     if mapping.coefficients.iter().any(|(name, ..)| *name == Coefficient::R) {
         let (low, high) = mapping.valid_i_out;
         for end in [low, high] {
-            conditions.push(format!("{p}_flag((a + (r * {})) > 0.0f)", float(end.value())));
+            let zero = number(scalar, Literal::nearest(scalar, 0.0));
+            conditions.push(format!("{p}_flag((a + (r * {})) > {zero})", number(scalar, end)));
         }
     }
     conditions

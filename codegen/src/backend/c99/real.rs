@@ -2,12 +2,27 @@
 
 use templates::c::{BlockView, LayerView, RealRowView, RealView, VectorView};
 
-use super::statements::float;
+use policy::Scalar;
+
+use super::number;
 use crate::backend::assembly::RealKernel;
 use crate::program::{ActivationCode, LayerCode};
 
+/// How the sums of the layers are made.
+#[derive(Debug, Clone, Copy)]
+pub struct Arithmetic<'a> {
+    /// Prefix of all names.
+    pub name: &'a str,
+    /// Format of sums and values.
+    pub scalar: Scalar,
+    /// Products are added with one rounding.
+    pub fused: bool,
+}
+
 /// Functions of the layers and the calls of `q_values`.
-pub fn view(name: &str, layers: &[LayerCode], fused: bool) -> RealView {
+pub fn view(arithmetic: Arithmetic<'_>, layers: &[LayerCode]) -> RealView {
+    let name = arithmetic.name;
+    let kind = number::kind(arithmetic.scalar).name;
     let mut view = RealView {
         layers: Vec::new(),
         calls: Vec::new(),
@@ -18,9 +33,9 @@ pub fn view(name: &str, layers: &[LayerCode], fused: bool) -> RealView {
     };
     for (index, layer) in before.iter().enumerate() {
         if index + 1 < layers.len() {
-            view.calls.push(format!("float hidden{index}[{}];", layer.outputs));
+            view.calls.push(format!("{kind} hidden{index}[{}];", layer.outputs));
         }
-        view.layers.push(whole(name, index, layer, fused));
+        view.layers.push(whole(arithmetic, index, layer));
     }
     let source = |index: usize| match index {
         0 => "observation".to_owned(),
@@ -37,16 +52,15 @@ pub fn view(name: &str, layers: &[LayerCode], fused: bool) -> RealView {
     }
     if let Some((block, last)) = streamed {
         let pieces = Pieces {
-            name,
-            fused,
+            arithmetic,
             index: before.len(),
             block,
             last,
         };
         view.layers.extend(pieces.functions());
-        view.calls.push(format!("float part[{}];", last.chunk));
+        view.calls.push(format!("{kind} part[{}];", last.chunk));
         view.calls
-            .push(format!("const float *sums = {name}_bias{};", before.len() + 1));
+            .push(format!("const {kind} *sums = {name}_bias{};", before.len() + 1));
         if pieces.full() > 1 {
             view.calls.push("uint32_t block;".to_owned());
         }
@@ -58,8 +72,7 @@ pub fn view(name: &str, layers: &[LayerCode], fused: bool) -> RealView {
 
 /// The last two layers: a block of outputs of the one, then what it adds to the sums of the other.
 struct Pieces<'a> {
-    name: &'a str,
-    fused: bool,
+    arithmetic: Arithmetic<'a>,
     /// Number of the first of the two.
     index: usize,
     block: &'a LayerCode,
@@ -80,7 +93,6 @@ impl Pieces<'_> {
     }
 
     fn functions(&self) -> Vec<LayerView> {
-        let Self { name, fused, .. } = *self;
         let sizes = self.sizes().into_iter();
         let pairs = sizes.flat_map(|size| {
             let of_block = Function {
@@ -100,15 +112,16 @@ impl Pieces<'_> {
                 blocks: split(self.last),
             };
             [
-                of_block.view(name, self.block, fused),
-                of_last.view(name, self.last, fused),
+                of_block.view(self.arithmetic, self.block),
+                of_last.view(self.arithmetic, self.last),
             ]
         });
         pairs.collect()
     }
 
     fn calls(&self, source: &str) -> Vec<String> {
-        let Self { name, index, .. } = *self;
+        let Self { index, .. } = *self;
+        let name = self.arithmetic.name;
         let next = index + 1;
         let (rows, full) = (self.last.chunk, self.full());
         let (weights, out) = (rows * self.block.inputs, rows * self.last.outputs);
@@ -157,7 +170,7 @@ struct Function {
     blocks: Vec<(usize, usize)>,
 }
 
-fn whole(name: &str, index: usize, layer: &LayerCode, fused: bool) -> LayerView {
+fn whole(arithmetic: Arithmetic<'_>, index: usize, layer: &LayerCode) -> LayerView {
     let function = Function {
         index,
         suffix: String::new(),
@@ -166,11 +179,11 @@ fn whole(name: &str, index: usize, layer: &LayerCode, fused: bool) -> LayerView 
         outputs: layer.outputs,
         blocks: split(layer),
     };
-    function.view(name, layer, fused)
+    function.view(arithmetic, layer)
 }
 
 impl Function {
-    fn view(&self, name: &str, layer: &LayerCode, fused: bool) -> LayerView {
+    fn view(&self, arithmetic: Arithmetic<'_>, layer: &LayerCode) -> LayerView {
         let extent = if self.is_piece {
             format!(", {} -> {} of them", self.inputs, self.outputs)
         } else {
@@ -190,35 +203,52 @@ impl Function {
             blocks: self
                 .blocks
                 .iter()
-                .map(|(count, rows)| self.block(name, layer, fused, *count, *rows))
+                .map(|(count, rows)| self.block(arithmetic, layer, *count, *rows))
                 .collect(),
-            first: accumulated(name, fused, ["bias[o]", "w[o]", "x[0]"]),
-            next: accumulated(name, fused, ["out[o]", "w[o]", "input"]),
-            activation: activation(name, layer.activation, "y[o]"),
+            first: arithmetic.accumulated(["bias[o]", "w[o]", "x[0]"]),
+            next: arithmetic.accumulated(["out[o]", "w[o]", "input"]),
+            activation: arithmetic.activation(layer.activation, "y[o]"),
         }
     }
 
-    fn block(&self, name: &str, layer: &LayerCode, fused: bool, count: usize, rows: usize) -> BlockView {
+    fn block(&self, arithmetic: Arithmetic<'_>, layer: &LayerCode, count: usize, rows: usize) -> BlockView {
+        let name = arithmetic.name;
         BlockView {
             count,
             rows,
             assembly: RealKernel::of(layer, self.inputs, rows)
-                .map_or_else(Vec::new, |kernel| assembly(name, layer, &kernel)),
+                .map_or_else(Vec::new, |kernel| assembly(arithmetic, layer, &kernel)),
             vectors: if layer.has_vectors {
                 LANES.map(|lanes| vectors(name, lanes, rows)).to_vec()
             } else {
                 Vec::new()
             },
-            row_views: (0..rows).map(|index| row(name, layer, index, fused)).collect(),
+            row_views: (0..rows).map(|index| row(arithmetic, layer, index)).collect(),
         }
     }
 }
 
-fn accumulated(prefix: &str, fused: bool, [sum, weight, input]: [&str; 3]) -> String {
-    if fused {
-        format!("{prefix}_fma({weight}, {input}, {sum})")
-    } else {
-        format!("{sum} + ({weight} * {input})")
+impl Arithmetic<'_> {
+    fn accumulated(self, [sum, weight, input]: [&str; 3]) -> String {
+        match (self.scalar, self.fused) {
+            (Scalar::F32, true) => format!("{}_fma({weight}, {input}, {sum})", self.name),
+            (Scalar::F32, false) => format!("{sum} + ({weight} * {input})"),
+            // weights are binary32
+            (Scalar::F64, _) => format!("{sum} + ((double){weight} * {input})"),
+        }
+    }
+
+    /// Expression of the activation over `x`; empty for none.
+    fn activation(self, activation: ActivationCode, x: &str) -> String {
+        let name = self.name;
+        match activation {
+            ActivationCode::Identity => String::new(),
+            ActivationCode::Relu => format!("{name}_relu({x})"),
+            ActivationCode::LeakyRelu(slope) => {
+                format!("{name}_leaky_relu({x}, {})", number::number(self.scalar, slope))
+            }
+            ActivationCode::Tanh => format!("{name}_tanh({x})"),
+        }
     }
 }
 
@@ -265,8 +295,8 @@ fn vectors(name: &str, lanes: usize, rows: usize) -> VectorView {
 }
 
 /// One asm statement for a block, then what it leaves of the activation.
-fn assembly(name: &str, layer: &LayerCode, kernel: &RealKernel) -> Vec<String> {
-    let activated = |row: usize| activation(name, layer.activation, &format!("done[{row}]"));
+fn assembly(arithmetic: Arithmetic<'_>, layer: &LayerCode, kernel: &RealKernel) -> Vec<String> {
+    let activated = |row: usize| arithmetic.activation(layer.activation, &format!("done[{row}]"));
     let applied = !kernel.relu && !activated(0).is_empty();
     let mut lines = vec![
         "const float *input = x;".to_owned(),
@@ -300,22 +330,12 @@ fn assembly(name: &str, layer: &LayerCode, kernel: &RealKernel) -> Vec<String> {
         .collect()
 }
 
-fn row(name: &str, layer: &LayerCode, index: usize, fused: bool) -> RealRowView {
+fn row(arithmetic: Arithmetic<'_>, layer: &LayerCode, index: usize) -> RealRowView {
     let sum = format!("s{index}");
-    let activated = activation(name, layer.activation, &sum);
+    let activated = arithmetic.activation(layer.activation, &sum);
     RealRowView {
         index,
-        next: accumulated(name, fused, [sum.as_str(), &format!("w[{index}]"), "input"]),
+        next: arithmetic.accumulated([sum.as_str(), &format!("w[{index}]"), "input"]),
         result: if activated.is_empty() { sum } else { activated },
-    }
-}
-
-/// Expression of the activation over `x`; empty for none.
-fn activation(name: &str, activation: ActivationCode, x: &str) -> String {
-    match activation {
-        ActivationCode::Identity => String::new(),
-        ActivationCode::Relu => format!("{name}_relu({x})"),
-        ActivationCode::LeakyRelu(slope) => format!("{name}_leaky_relu({x}, {})", float(slope.value())),
-        ActivationCode::Tanh => format!("{name}_tanh({x})"),
     }
 }

@@ -1,5 +1,8 @@
 //! Straight-line blocks as C declarations.
 
+use policy::Scalar;
+
+use super::number;
 use crate::backend::literal::decimal;
 use crate::program::{Block, Op, Program, ValueId};
 
@@ -59,7 +62,7 @@ impl<'p> Printer<'p> {
         let (kind, letter) = if op.is_flag() {
             ("uint32_t", 'f')
         } else {
-            ("float", 'v')
+            (number::kind(self.program.scalar()).name, 'v')
         };
         let name = format!("{letter}{}", self.named);
         self.named += 1;
@@ -71,7 +74,11 @@ impl<'p> Printer<'p> {
     fn leaf(&self, op: &Op) -> Option<String> {
         Some(match op {
             Op::Measured(i) => format!("measured->{}", self.program.signals[*i].name),
-            Op::Code(i) => format!("(float)measured->{}", self.program.signals[*i].name),
+            Op::Code(i) => format!(
+                "({})measured->{}",
+                number::kind(self.program.scalar()).name,
+                self.program.signals[*i].name
+            ),
             Op::Held(i) => format!("state->held[{i}]"),
             Op::Sanitised(i) => format!("front->signal[{i}]"),
             Op::Memory(i) => format!("state->memory[{i}]"),
@@ -80,7 +87,7 @@ impl<'p> Printer<'p> {
             Op::SoftCap => "state->soft_cap".into(),
             Op::Coefficient(name) => format!("state->mapping_{}", name.name()),
             Op::ChosenDuty => "chosen".into(),
-            Op::Constant(literal) => float(literal.value()),
+            Op::Constant(literal) => number::number(self.program.scalar(), *literal),
             Op::Primed => "state->primed".into(),
             Op::Usable => "front->usable".into(),
             Op::Clipped => "front->clipped".into(),
@@ -116,7 +123,10 @@ impl<'p> Printer<'p> {
             }
             Op::Within { x, low, high } => format!("{p}_within({}, {}, {})", v(x), v(low), v(high)),
             Op::Outside { x, low, high } => format!("{p}_outside({}, {}, {})", v(x), v(low), v(high)),
-            Op::Difference(x, y) => format!("{p}_bits({}) ^ {p}_bits({})", v(x), v(y)),
+            Op::Difference(x, y) => match self.program.scalar() {
+                Scalar::F32 => format!("{p}_bits({}) ^ {p}_bits({})", v(x), v(y)),
+                Scalar::F64 => format!("{p}_differing({}, {})", v(x), v(y)),
+            },
             Op::NotZero(x) => format!("{p}_flag({} != 0u)", v(x)),
             Op::Above(x, limit) => format!("{p}_flag({} > {})", v(x), v(limit)),
             Op::And(x, y) => format!("{} & {}", v(x), v(y)),

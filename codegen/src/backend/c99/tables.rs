@@ -2,7 +2,10 @@
 
 use templates::c::{CrcItem, CrcKind, Member, SelfTestView, Table};
 
+use policy::Scalar;
+
 use super::integer;
+use super::number::{self, number};
 use super::statements::{float, unsigned};
 use crate::crc::nibble_table;
 use crate::lower::known_answers::{LCG, SEED, UNIT, VECTORS};
@@ -15,37 +18,46 @@ const LINE: usize = 108;
 /// All constant tables in the order of the file.
 pub fn tables(program: &Program) -> Vec<Table> {
     let mut all = match &program.network {
-        NetworkCode::Real { layers, .. } => real_tables(layers),
+        NetworkCode::Real { scalar, layers, .. } => real_tables(*scalar, layers),
         NetworkCode::Integer(network) => integer::tables(network),
     };
-    let duties: Vec<f32> = program.duties.iter().map(|duty| duty.value()).collect();
-    all.push(floats("duties".into(), &duties));
+    let scalar = program.scalar();
+    all.push(numbers("duties".into(), scalar, program.duties.iter().copied()));
     all.push(words("crc_steps", &nibble_table()));
     all.push(words("answers", &program.self_test.answers));
-    let column = |pick: fn(&(Literal, Literal)) -> Literal| -> Vec<f32> {
-        program
-            .self_test
-            .observation_box
-            .iter()
-            .map(|range| pick(range).value())
-            .collect()
-    };
-    all.push(floats("box_low".into(), &column(|range| range.0)));
-    all.push(floats("box_width".into(), &column(|range| range.1)));
+    let ranges = || program.self_test.observation_box.iter();
+    all.push(numbers("box_low".into(), scalar, ranges().map(|range| range.0)));
+    all.push(numbers("box_width".into(), scalar, ranges().map(|range| range.1)));
     all
 }
 
-fn real_tables(layers: &[LayerCode]) -> Vec<Table> {
+/// Weights stay binary32 in either format; sums start with a bias.
+fn real_tables(scalar: Scalar, layers: &[LayerCode]) -> Vec<Table> {
     let tables = layers.iter().enumerate().map(|(index, layer)| {
         [
             Table {
                 aligned: layer.alignment.is_some(),
                 ..floats(format!("weights{index}"), &layer.table)
             },
-            floats(format!("bias{index}"), &layer.bias),
+            numbers(
+                format!("bias{index}"),
+                scalar,
+                layer.bias.iter().map(|b| Literal::nearest(scalar, f64::from(*b))),
+            ),
         ]
     });
     tables.flatten().collect()
+}
+
+/// A table of numbers of the format.
+pub fn numbers(name: String, scalar: Scalar, values: impl ExactSizeIterator<Item = Literal>) -> Table {
+    Table {
+        element: number::kind(scalar).name,
+        name,
+        length: values.len(),
+        lines: wrap(values.map(|value| number(scalar, value))),
+        aligned: false,
+    }
 }
 
 /// A table of floats.
@@ -87,13 +99,14 @@ pub(super) fn wrap(literals: impl Iterator<Item = String>) -> Vec<String> {
 }
 
 /// Horner steps of numerator and denominator, each one rounding per operation.
-pub fn tanh_steps() -> Vec<Member> {
+pub fn tanh_steps(scalar: Scalar) -> Vec<Member> {
     let mut steps = Vec::new();
     for (letter, terms) in [('p', TANH_NUMERATOR), ('q', TANH_DENOMINATOR)] {
         for (power, term) in terms.iter().enumerate().rev() {
+            let term = number(scalar, Literal::nearest(scalar, *term));
             let value = match power {
-                4 => float(*term),
-                _ => format!("({letter}{} * z) + {}", power + 1, float(*term)),
+                4 => term,
+                _ => format!("({letter}{} * z) + {term}", power + 1),
             };
             steps.push(Member {
                 declaration: format!("{letter}{power}"),
@@ -107,6 +120,9 @@ pub fn tanh_steps() -> Vec<Member> {
 /// Tables that the CRC covers, in the order of [`Program::table_words`].
 pub fn integrity(program: &Program) -> Vec<CrcItem> {
     let (weights, bias) = match program.network {
+        NetworkCode::Real {
+            scalar: Scalar::F64, ..
+        } => ("crc_weights", "crc"),
         NetworkCode::Real { .. } => ("crc", "crc"),
         NetworkCode::Integer(_) => ("crc_weights", "crc_bias"),
     };
@@ -137,31 +153,46 @@ pub fn integrity(program: &Program) -> Vec<CrcItem> {
 
 /// CRC functions that [`integrity`] and the self test call.
 pub fn crc_kinds(program: &Program) -> Vec<CrcKind> {
+    let n = &program.name;
+    let kind = number::kind(program.scalar());
+    let word = format!("{n}_bits(words[i])");
     let mut kinds = vec![CrcKind {
         name: "crc",
-        element: "float",
-        word: format!("{}_bits(words[i])", program.name),
+        element: kind.name,
+        words: if kind.is_wide {
+            vec![format!("(uint32_t){word}"), format!("(uint32_t)({word} >> 32)")]
+        } else {
+            vec![word]
+        },
     }];
-    if let NetworkCode::Integer(network) = &program.network {
-        let word = "(uint32_t)(int32_t)words[i]";
-        for (name, element) in [("crc_weights", integer::element(network)), ("crc_bias", "int32_t")] {
-            kinds.push(CrcKind {
-                name,
-                element,
-                word: word.into(),
-            });
+    let of_type = |name: &'static str, element: &'static str, word: String| CrcKind {
+        name,
+        element,
+        words: vec![word],
+    };
+    match &program.network {
+        NetworkCode::Real {
+            scalar: Scalar::F64, ..
+        } => {
+            kinds.push(of_type("crc_weights", "float", format!("{n}_weight_bits(words[i])")));
+        }
+        NetworkCode::Real { .. } => {}
+        NetworkCode::Integer(network) => {
+            let word = || "(uint32_t)(int32_t)words[i]".to_owned();
+            kinds.push(of_type("crc_weights", integer::element(network), word()));
+            kinds.push(of_type("crc_bias", "int32_t", word()));
         }
     }
     kinds
 }
 
 /// Constants of the self test.
-pub fn self_test() -> SelfTestView {
+pub fn self_test(scalar: Scalar) -> SelfTestView {
     SelfTestView {
         vectors: VECTORS,
         seed: unsigned(SEED),
         multiplier: unsigned(LCG.0),
         increment: unsigned(LCG.1),
-        unit: float(UNIT),
+        unit: number(scalar, Literal::nearest(scalar, UNIT)),
     }
 }

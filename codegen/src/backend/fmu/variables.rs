@@ -1,17 +1,19 @@
 //! The variables of an FMU: the block's ports and parameters with types, units and start values.
 
+use policy::Scalar;
 use templates::block::BlockView;
 use templates::fmu::{Kind, UnitView, VariableView};
 
 use crate::Program;
-use crate::backend::literal::decimal;
+use crate::backend::literal::number;
 use crate::program::SignalPort;
 
 /// Inputs, `enable`, outputs, parameters; and a name for the time that none of them has.
 pub fn of(program: &Program, block: &BlockView) -> (Vec<VariableView>, String) {
+    let scalar = program.scalar();
     let inputs = program.signals.iter().zip(&block.inputs).enumerate();
     let mut all: Vec<VariableView> = inputs
-        .map(|(index, (signal, port))| input(index, signal, &port.meaning))
+        .map(|(index, (signal, port))| input(scalar, index, signal, &port.meaning))
         .collect();
     all.push(VariableView {
         name: "enable".to_owned(),
@@ -46,7 +48,7 @@ pub fn of(program: &Program, block: &BlockView) -> (Vec<VariableView>, String) {
     }
     let coefficients = program.mapping.iter().flat_map(|mapping| &mapping.coefficients);
     for (index, (name, value, low, high)) in coefficients.enumerate() {
-        let [value, low, high] = [value, low, high].map(|literal| decimal(literal.value()));
+        let [value, low, high] = [value, low, high].map(|literal| number(scalar, *literal));
         all.push(VariableView {
             name: name.name().to_owned(),
             initial: Some("exact"),
@@ -108,7 +110,7 @@ impl Meaning for VariableView {
     }
 }
 
-fn input(index: usize, signal: &SignalPort, meaning: &str) -> VariableView {
+fn input(scalar: Scalar, index: usize, signal: &SignalPort, meaning: &str) -> VariableView {
     let place = format!("inputs[{index}]");
     if signal.is_code {
         // a code has no unit, and which one stands for the initial value only the converter knows
@@ -120,7 +122,7 @@ fn input(index: usize, signal: &SignalPort, meaning: &str) -> VariableView {
             ..plain("input", "discrete", place).meaning(meaning)
         };
     }
-    let start = decimal(signal.initial.value());
+    let start = number(scalar, signal.initial);
     let unit = match signal.unit.as_str() {
         "" => String::new(),
         unit => format!(" unit=\"{}\"", xml(unit)),

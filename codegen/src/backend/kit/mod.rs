@@ -4,6 +4,7 @@
 //! everything the C backend can print), and the policy itself. Expected values come from outside as [`Material`].
 
 mod probes;
+mod texts;
 mod trace;
 
 use std::collections::BTreeMap;
@@ -11,12 +12,15 @@ use std::collections::BTreeMap;
 use templates::c::{Common, Table};
 use templates::kit::{Kit, Subject};
 
-use super::c99::statements::{float, unsigned};
-use super::c99::tables::{floats, words};
+use super::c99::number::{kind, number};
+use super::c99::statements::unsigned;
+use super::c99::tables::{numbers, words};
 use super::c99::{C99, render};
 use crate::backend::{Backend, banner};
+use crate::program::{Literal, words as number_words};
 use crate::{CodegenError, GeneratedFiles, Program};
 
+use texts::Texts;
 pub use trace::Trace;
 
 /// What the kit compares with; computed by the reference interpreter.
@@ -37,24 +41,33 @@ pub fn emit(program: &Program, material: &Material) -> Result<GeneratedFiles, Co
     let title = format!("Back-to-back kit of controller {}", program.name);
     let suite = material.suite.iter().map(|(program, _)| core(program));
     let suite = suite.collect::<Result<Vec<_>, _>>()?;
-    let controllers = material.suite.iter().map(|(program, trace)| subject(program, trace));
-    let probes = probes::probes();
-    let literals = probes::literals();
+    let controllers = material
+        .suite
+        .iter()
+        .map(|(program, trace)| subject(&name, program, trace));
+    let scalar = program.scalar();
+    let probes = probes::of(scalar);
+    let literals = probes::literals(scalar);
+    let literal_bits: Vec<u32> = literals
+        .iter()
+        .flat_map(|literal| number_words(scalar, literal.value()))
+        .collect();
     let view = Kit {
         common: Common {
             upper: name.to_uppercase(),
             banner: banner(program, &title, program.provenance.c_flags),
             mapping_parameters: String::new(),
+            number: kind(scalar),
             name: name.clone(),
         },
         controller: program.name.clone(),
-        probe_lines: probes.iter().map(probes::Probe::row).collect(),
+        probe_lines: probes.iter().map(|probe| probe.row(scalar)).collect(),
         probe_count: probes.len(),
-        third: float(1.0 / 3.0),
-        literals: floats("literals".into(), &literals),
-        literal_bits: words("literal_bits", &literals.map(f32::to_bits)),
+        third: number(scalar, Literal::nearest(scalar, 1.0 / 3.0)),
+        literals: numbers("literals".into(), scalar, literals.into_iter()),
+        literal_bits: words("literal_bits", &literal_bits),
         suite,
-        subjects: controllers.chain([subject(program, &material.policy)]).collect(),
+        subjects: controllers.chain([subject(&name, program, &material.policy)]).collect(),
     };
     Ok(GeneratedFiles {
         files: BTreeMap::from([(format!("{name}.c"), render(&view)?)]),
@@ -71,9 +84,11 @@ fn core(program: &Program) -> Result<String, CodegenError> {
     Ok(header.clone() + &source.replace(&format!("#include \"{}.h\"\n", program.name), ""))
 }
 
-fn subject(program: &Program, trace: &Trace) -> Subject {
+fn subject(kit: &str, program: &Program, trace: &Trace) -> Subject {
     let coefficients = program.mapping.iter().flat_map(|mapping| &mapping.coefficients);
     let coefficients: Vec<&str> = coefficients.map(|(name, ..)| name.name()).collect();
+    let texts = Texts { kit, program };
+    let (measurement, measurement_words) = texts.measurement();
     Subject {
         name: program.name.clone(),
         upper: program.name.to_uppercase(),
@@ -83,9 +98,13 @@ fn subject(program: &Program, trace: &Trace) -> Subject {
         },
         event_count: unsigned(trace.events()),
         steps: trace.steps(),
-        signals: program.signals.iter().map(|signal| signal.name.clone()).collect(),
-        coefficients: coefficients.len(),
-        coefficient_locals: coefficients.iter().map(|name| format!("const float {name}")).collect(),
+        measurement,
+        measurement_words,
+        answer: texts.answer(),
+        rest: texts.rest(),
+        state_crc: texts.state_crc("0xFFFFFFFFu", "state."),
+        coefficient_words: program.scalar().words() * coefficients.len(),
+        coefficient_locals: texts.coefficients(&coefficients),
         mapping_arguments: coefficients.join(", "),
     }
 }

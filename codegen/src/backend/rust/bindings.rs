@@ -1,9 +1,11 @@
 //! Rust declarations of the C core, with the controller type of the Rust backend in front of them.
 
+use policy::Scalar;
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use super::{DEFAULT_TYPE, constants, ident, types};
+use super::number;
+use super::{DEFAULT_TYPE, constants, ident, size, types};
 use crate::program::Program;
 
 /// `<name>_ffi.rs`: `Measurement`, `Command`, `status` and `Controller` as in the Rust backend's file, over the C core.
@@ -18,6 +20,13 @@ impl crate::Backend for Bindings {
 }
 
 fn items(program: &Program) -> TokenStream {
+    let number = number::kind(program.scalar());
+    let State {
+        fields,
+        zero,
+        words,
+        as_words,
+    } = state(program);
     let constants = constants(program);
     let types = types(program, &quote!(#[repr(C)]));
     let name = ident(DEFAULT_TYPE);
@@ -38,10 +47,10 @@ fn items(program: &Program) -> TokenStream {
     quote! {
         #constants
         #types
-        /// One controller: the C core's state, one 32-bit word per member. Several instances are independent.
+        #[doc = #words]
         #[derive(Clone)]
         #[repr(C)]
-        pub struct #name { words: [u32; STATE_WORDS] }
+        pub struct #name { #fields }
         mod c {
             use super::{Command, Measurement, #name};
             unsafe extern "C" {
@@ -56,9 +65,9 @@ fn items(program: &Program) -> TokenStream {
                 #[link_name = #step]
                 pub fn step(state: *mut #name, measured: *const Measurement, command: *mut Command);
                 #[link_name = #observe]
-                pub fn observe(state: *const #name, measured: *const Measurement, observation: *mut f32);
+                pub fn observe(state: *const #name, measured: *const Measurement, observation: *mut #number);
                 #[link_name = #q_values]
-                pub fn q_values(observation: *const f32, q: *mut f32);
+                pub fn q_values(observation: *const #number, q: *mut #number);
                 #declare_mapping
                 #[link_name = #self_test]
                 pub fn self_test() -> u32;
@@ -73,7 +82,7 @@ fn items(program: &Program) -> TokenStream {
             /// Start-up state.
             #[must_use]
             pub fn new() -> Self {
-                let mut new = Self { words: [0; STATE_WORDS] };
+                let mut new = Self { #zero };
                 unsafe { c::init(&mut new) };
                 new
             }
@@ -84,7 +93,7 @@ fn items(program: &Program) -> TokenStream {
             /// The state, word by word in the order of the numeric contract.
             #[must_use]
             pub fn state_words(&self) -> [u32; STATE_WORDS] {
-                self.words
+                #as_words
             }
             /// Command for this measurement; changes nothing.
             #[must_use]
@@ -105,14 +114,14 @@ fn items(program: &Program) -> TokenStream {
             }
             /// Observation for this measurement; changes nothing.
             #[must_use]
-            pub fn observe(&self, measured: &Measurement) -> [f32; FEATURES] {
+            pub fn observe(&self, measured: &Measurement) -> [#number; FEATURES] {
                 let mut observation = [0.0; FEATURES];
                 unsafe { c::observe(self, measured, observation.as_mut_ptr()) };
                 observation
             }
             /// Q values of an observation.
             #[must_use]
-            pub fn q_values(observation: &[f32; FEATURES]) -> [f32; ACTIONS] {
+            pub fn q_values(observation: &[#number; FEATURES]) -> [#number; ACTIONS] {
                 let mut q = [0.0; ACTIONS];
                 unsafe { c::q_values(observation.as_ptr(), q.as_mut_ptr()) };
                 q
@@ -139,6 +148,42 @@ fn items(program: &Program) -> TokenStream {
     }
 }
 
+/// The C core's state in Rust.
+struct State {
+    fields: TokenStream,
+    zero: TokenStream,
+    words: &'static str,
+    as_words: TokenStream,
+}
+
+/// Words, or numbers of two words and then the two counters: as C lays them out, without a gap.
+fn state(program: &Program) -> State {
+    let numbers = size((program.state_words() - 2) / 2);
+    match program.scalar() {
+        Scalar::F32 => State {
+            fields: quote!(words: [u32; STATE_WORDS]),
+            zero: quote!(words: [0; STATE_WORDS]),
+            words: " One controller: the C core's state, one 32-bit word per member. Several instances are independent.",
+            as_words: quote!(self.words),
+        },
+        Scalar::F64 => State {
+            fields: quote!(numbers: [f64; #numbers], counters: [u32; 2]),
+            zero: quote!(numbers: [0.0; #numbers], counters: [0; 2]),
+            words: " One controller: the C core's state, numbers and counters. Several instances are independent.",
+            as_words: {
+                let numbers = number::all_words(Scalar::F64, &quote!(self.numbers));
+                quote! {
+                    let mut words = [0; STATE_WORDS];
+                    for (word, value) in words.iter_mut().zip(#numbers.chain(self.counters)) {
+                        *word = value;
+                    }
+                    words
+                }
+            },
+        },
+    }
+}
+
 /// Declaration and method that set the mapping's coefficients; nothing if the policy has no mapping.
 fn mapping(program: &Program) -> (TokenStream, TokenStream) {
     let Some(mapping) = &program.mapping else {
@@ -146,6 +191,7 @@ fn mapping(program: &Program) -> (TokenStream, TokenStream) {
     };
     let symbol = format!("{}_set_mapping", program.name);
     let name = ident(DEFAULT_TYPE);
+    let number = number::kind(program.scalar());
     let names: Vec<_> = mapping
         .coefficients
         .iter()
@@ -153,13 +199,13 @@ fn mapping(program: &Program) -> (TokenStream, TokenStream) {
         .collect();
     let declaration = quote! {
         #[link_name = #symbol]
-        pub fn set_mapping(state: *mut #name, #(#names: f32),*) -> u32;
+        pub fn set_mapping(state: *mut #name, #(#names: #number),*) -> u32;
     };
     let method = quote! {
         /// Replaces the coefficients of the duty ratio mapping. False, changing nothing, if one is outside its
         /// interval or the mapping would not increase with the duty.
         #[must_use]
-        pub fn set_mapping(&mut self, #(#names: f32),*) -> bool {
+        pub fn set_mapping(&mut self, #(#names: #number),*) -> bool {
             unsafe { c::set_mapping(self, #(#names),*) == 1 }
         }
     };

@@ -1,19 +1,23 @@
 //! The controller type: state, step, checks.
 
+use policy::Scalar;
 use proc_macro2::{Ident, TokenStream};
 use quote::quote;
 
+use super::number::{self, number};
 use super::statements::{Printer, coefficient_field};
-use super::{float, ident, network, size, word};
+use super::{ident, network, size, word};
 use crate::lower::known_answers::{LCG, SEED, UNIT};
 use crate::program::{Coefficient, Literal, Program};
 
 /// Type and implementation.
 pub fn items(program: &Program, name: &Ident) -> TokenStream {
+    let scalar = program.scalar();
+    let kind = number::kind(scalar);
     let fields = fields(program);
     let (declared, initial): (Vec<_>, Vec<_>) = fields
         .iter()
-        .map(|field| (field.declaration(), field.initial()))
+        .map(|field| (field.declaration(scalar), field.initial(scalar)))
         .unzip();
     let front = front(program);
     let lifecycle = lifecycle(program, &fields);
@@ -52,12 +56,12 @@ pub fn items(program: &Program, name: &Ident) -> TokenStream {
             }
             /// Observation for this measurement; changes nothing.
             #[must_use]
-            pub fn observe(&self, measured: &Measurement) -> [f32; FEATURES] {
+            pub fn observe(&self, measured: &Measurement) -> [#kind; FEATURES] {
                 self.sense(measured).observation
             }
             /// Q values of an observation.
             #[must_use]
-            pub fn q_values(observation: &[f32; FEATURES]) -> [f32; ACTIONS] {
+            pub fn q_values(observation: &[#kind; FEATURES]) -> [#kind; ACTIONS] {
                 #q_values
             }
             #set_mapping
@@ -110,38 +114,39 @@ struct Field {
 }
 
 enum Kind {
-    Floats(Vec<f32>),
-    Float(f32),
-    Coefficient(f32),
+    Numbers(Vec<Literal>),
+    Number(Literal),
+    Coefficient(Literal),
     Word,
 }
 
 impl Field {
-    fn declaration(&self) -> TokenStream {
+    fn declaration(&self, scalar: Scalar) -> TokenStream {
+        let kind = number::kind(scalar);
         let name = &self.name;
         match &self.kind {
-            Kind::Floats(values) => {
+            Kind::Numbers(values) => {
                 let length = size(values.len());
-                quote!(#name: [f32; #length])
+                quote!(#name: [#kind; #length])
             }
-            Kind::Float(_) | Kind::Coefficient(_) => quote!(#name: f32),
+            Kind::Number(_) | Kind::Coefficient(_) => quote!(#name: #kind),
             Kind::Word => quote!(#name: u32),
         }
     }
 
-    fn initial(&self) -> TokenStream {
+    fn initial(&self, scalar: Scalar) -> TokenStream {
         let name = &self.name;
         match &self.kind {
-            Kind::Floats(values) if values.iter().all(|value| value.to_bits() == 0) => {
+            Kind::Numbers(values) if values.iter().all(|value| value.value().to_bits() == 0) => {
                 let length = size(values.len());
                 quote!(#name: [0.0; #length])
             }
-            Kind::Floats(values) => {
-                let values = values.iter().map(|value| float(*value));
+            Kind::Numbers(values) => {
+                let values = values.iter().map(|value| number(scalar, *value));
                 quote!(#name: [#(#values),*])
             }
-            Kind::Float(value) | Kind::Coefficient(value) => {
-                let value = float(*value);
+            Kind::Number(value) | Kind::Coefficient(value) => {
+                let value = number(scalar, *value);
                 quote!(#name: #value)
             }
             Kind::Word => quote!(#name: 0),
@@ -149,11 +154,18 @@ impl Field {
     }
 
     /// Expression that appends the field's words to the iterator `next`.
-    fn words(&self) -> TokenStream {
+    fn words(&self, scalar: Scalar) -> TokenStream {
         let name = &self.name;
+        let own = quote!(self.#name);
         match &self.kind {
-            Kind::Floats(_) => quote!(.chain(self.#name.iter().map(|value| value.to_bits()))),
-            Kind::Float(_) | Kind::Coefficient(_) => quote!(.chain(core::iter::once(self.#name.to_bits()))),
+            Kind::Numbers(_) => {
+                let words = number::all_words(scalar, &own);
+                quote!(.chain(#words))
+            }
+            Kind::Number(_) | Kind::Coefficient(_) => {
+                let words = number::words(scalar, &own);
+                quote!(.chain(#words))
+            }
             Kind::Word => quote!(.chain(core::iter::once(self.#name))),
         }
     }
@@ -164,23 +176,26 @@ fn fields(program: &Program) -> Vec<Field> {
         name: ident(name),
         kind,
     };
-    let held = program.signals.iter().map(|signal| signal.initial.value()).collect();
-    let initial = program.initial_duty.value();
-    let mut fields = vec![field("held", Kind::Floats(held))];
+    let held = program.signals.iter().map(|signal| signal.initial).collect();
+    let initial = program.initial_duty;
+    let mut fields = vec![field("held", Kind::Numbers(held))];
     if program.memory_words > 0 {
-        fields.push(field("memory", Kind::Floats(vec![0.0; program.memory_words])));
+        fields.push(field(
+            "memory",
+            Kind::Numbers(vec![Literal::nearest(program.scalar(), 0.0); program.memory_words]),
+        ));
     }
-    fields.push(field("previous_duty", Kind::Float(initial)));
-    fields.push(field("previous_command", Kind::Float(initial)));
+    fields.push(field("previous_duty", Kind::Number(initial)));
+    fields.push(field("previous_command", Kind::Number(initial)));
     fields.extend(
         program
             .soft_start_from
-            .map(|from| field("soft_cap", Kind::Float(from.value()))),
+            .map(|from| field("soft_cap", Kind::Number(from))),
     );
     for (name, value, ..) in program.mapping.iter().flat_map(|mapping| &mapping.coefficients) {
         fields.push(Field {
             name: coefficient_field(*name),
-            kind: Kind::Coefficient(value.value()),
+            kind: Kind::Coefficient(*value),
         });
     }
     fields.push(field("bad_count", Kind::Word));
@@ -203,7 +218,7 @@ fn lifecycle(program: &Program, fields: &[Field]) -> TokenStream {
     } else {
         quote!(Self { #(#kept,)* ..Self::new() })
     };
-    let words = fields.iter().map(Field::words);
+    let words = fields.iter().map(|field| field.words(program.scalar()));
     quote! {
         /// Start-up state, but coefficients set at run time stay.
         pub fn reset(&mut self) {
@@ -223,17 +238,18 @@ fn lifecycle(program: &Program, fields: &[Field]) -> TokenStream {
 }
 
 fn front(program: &Program) -> TokenStream {
+    let kind = number::kind(program.scalar());
     let pushes = program.front.pushes.len();
     let push = (pushes > 0).then(|| {
         let pushes = size(pushes);
-        quote!(push: [f32; #pushes],)
+        quote!(push: [#kind; #pushes],)
     });
     let clipped = program.front.clipped.map(|_| quote!(clipped: u32,));
     quote! {
         /// What a measurement means before the network sees it.
         struct Front {
-            signal: [f32; SIGNALS],
-            observation: [f32; FEATURES],
+            signal: [#kind; SIGNALS],
+            observation: [#kind; FEATURES],
             #push
             bad_count: u32,
             usable: u32,
@@ -296,7 +312,7 @@ fn decide(program: &Program) -> TokenStream {
         let (flag, bit) = (printer.operand(*flag), word(*bit));
         quote!((#flag << #bit))
     });
-    let fallback = float(program.fallback_duty.value());
+    let fallback = number(program.scalar(), program.fallback_duty);
     let (lowest, greater) = network::argmax(program);
     let apart = program.has_fpu.then(|| {
         quote! {
@@ -391,6 +407,8 @@ fn advance(program: &Program) -> TokenStream {
 
 fn set_mapping(program: &Program) -> Option<TokenStream> {
     let mapping = program.mapping.as_ref()?;
+    let scalar = program.scalar();
+    let kind = number::kind(scalar);
     let names: Vec<_> = mapping
         .coefficients
         .iter()
@@ -399,12 +417,12 @@ fn set_mapping(program: &Program) -> Option<TokenStream> {
     let fields = mapping.coefficients.iter().map(|(name, ..)| coefficient_field(*name));
     let mut conditions: Vec<TokenStream> = Vec::new();
     for (name, _, low, high) in &mapping.coefficients {
-        let (name, low, high) = (ident(name.name()), float(low.value()), float(high.value()));
+        let (name, low, high) = (ident(name.name()), number(scalar, *low), number(scalar, *high));
         conditions.push(quote!((#name >= #low) & (#name <= #high)));
     }
     if mapping.coefficients.iter().any(|(name, ..)| *name == Coefficient::R) {
         let (low, high): (Literal, Literal) = mapping.valid_i_out;
-        for end in [low, high].map(|end| float(end.value())) {
+        for end in [low, high].map(|end| number(scalar, end)) {
             conditions.push(quote!((a + r * #end > 0.0)));
         }
     }
@@ -412,7 +430,7 @@ fn set_mapping(program: &Program) -> Option<TokenStream> {
         /// Replaces the coefficients of the duty ratio mapping. False, changing nothing, if one is outside its
         /// interval or the mapping would not increase with the duty.
         #[must_use]
-        pub fn set_mapping(&mut self, #(#names: f32),*) -> bool {
+        pub fn set_mapping(&mut self, #(#names: #kind),*) -> bool {
             let accepted = #(#conditions)&*;
             if accepted {
                 #(self.#fields = #names;)*
@@ -424,15 +442,27 @@ fn set_mapping(program: &Program) -> Option<TokenStream> {
 
 fn checks(program: &Program) -> TokenStream {
     let test = &program.self_test;
+    let scalar = program.scalar();
+    let kind = number::kind(scalar);
+    let checksum = network::checksum(scalar);
     let column = |pick: fn(&(Literal, Literal)) -> Literal| {
-        let values = test.observation_box.iter().map(|range| float(pick(range).value()));
+        let values = test.observation_box.iter().map(|range| number(scalar, pick(range)));
         quote!([#(#values),*])
     };
     let low = column(|range| range.0);
     let width = column(|range| range.1);
     let answers = test.answers.iter().map(|answer| word(*answer));
     let vectors = size(test.answers.len());
-    let (seed, multiplier, increment, unit) = (word(SEED), word(LCG.0), word(LCG.1), float(UNIT));
+    let (seed, multiplier, increment, unit) = (
+        word(SEED),
+        word(LCG.0),
+        word(LCG.1),
+        number(scalar, Literal::nearest(scalar, UNIT)),
+    );
+    let zero = match scalar {
+        Scalar::F32 => quote!(0.0_f32),
+        Scalar::F64 => quote!(0.0_f64),
+    };
     let integrity = network::integrity(program);
     let crc = word(program.crc);
     quote! {
@@ -441,20 +471,20 @@ fn checks(program: &Program) -> TokenStream {
         /// # Errors
         /// The number (from 1) of the first failing vector.
         pub fn self_test() -> Result<(), u32> {
-            static BOX_LOW: [f32; FEATURES] = #low;
-            static BOX_WIDTH: [f32; FEATURES] = #width;
+            static BOX_LOW: [#kind; FEATURES] = #low;
+            static BOX_WIDTH: [#kind; FEATURES] = #width;
             static ANSWERS: [u32; #vectors] = [#(#answers),*];
             let mut random: u32 = #seed;
             let mut failed = 0_u32;
             let mut vector = 0_u32;
             for answer in &ANSWERS {
                 vector = vector.wrapping_add(1);
-                let mut observation = [0.0_f32; FEATURES];
+                let mut observation = [#zero; FEATURES];
                 for ((value, low), width) in observation.iter_mut().zip(&BOX_LOW).zip(&BOX_WIDTH) {
                     random = random.wrapping_mul(#multiplier).wrapping_add(#increment);
-                    *value = *low + *width * ((random >> 8) as f32 * #unit);
+                    *value = *low + *width * ((random >> 8) as #kind * #unit);
                 }
-                let crc = !crc_floats(u32::MAX, &Self::q_values(&observation));
+                let crc = !#checksum(u32::MAX, &Self::q_values(&observation));
                 if failed == 0 && crc != *answer {
                     failed = vector;
                 }

@@ -193,7 +193,7 @@ pub fn q_values(network: &IntegerNetwork, has_fpu: bool) -> TokenStream {
     if !has_fpu {
         return quote!(network(observation).map(q_value));
     }
-    let unit = float(network.q_unit.value());
+    let unit = float(network.q_unit.single());
     quote!(network(observation).map(|q| q as f32 * #unit))
 }
 
@@ -496,7 +496,7 @@ fn activated(layer: &IntegerLayer, is_last: bool) -> TokenStream {
             quote!(leaky_integer(#cut, #slope))
         }
         ActivationCode::Tanh => {
-            let unit = float(layer.unit.value());
+            let unit = float(layer.unit.single());
             quote!(((tanh(sum as f32 * #unit) * 16_384.0 + 32_768.5) as i32).wrapping_sub(32_768) as i16)
         }
     }

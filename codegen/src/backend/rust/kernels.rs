@@ -2,10 +2,11 @@
 
 use std::collections::BTreeSet;
 
+use policy::Scalar;
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
-use super::{ident, size};
+use super::{ident, number, size};
 use crate::backend::assembly::RealKernel;
 use crate::program::{ActivationCode, LayerCode, Program};
 
@@ -13,6 +14,7 @@ use crate::program::{ActivationCode, LayerCode, Program};
 ///
 /// `accumulate` is the statement that adds `weight * x` to `sum`.
 pub fn items(program: &Program, layers: &[LayerCode], accumulate: &TokenStream) -> TokenStream {
+    let kind = number::kind(program.scalar());
     let sizes = sizes(layers);
     let (portable, assembly) = if sizes.is_empty() {
         (TokenStream::new(), TokenStream::new())
@@ -27,17 +29,17 @@ pub fn items(program: &Program, layers: &[LayerCode], accumulate: &TokenStream) 
             quote!(#(#kernels)* #(#guard #items)*),
         )
     };
-    let forms = FORMS.map(Form::portable).into_iter();
-    let items = slots().into_iter().chain(forms);
+    let forms = FORMS.map(|form| form.portable(&kind)).into_iter();
+    let items = slots(&kind).into_iter().chain(forms);
     quote! {
         /// Sums of one block of outputs: from the bias, inputs in index order, every operation rounded.
         #[inline(always)]
         #[allow(dead_code)]
         fn block<const INPUTS: usize, const ROWS: usize>(
             weights: &[[f32; ROWS]; INPUTS],
-            bias: &[f32; ROWS],
-            x: &[f32; INPUTS],
-        ) -> [f32; ROWS] {
+            bias: &[#kind; ROWS],
+            x: &[#kind; INPUTS],
+        ) -> [#kind; ROWS] {
             let mut sums = *bias;
             for (column, x) in weights.iter().zip(x) {
                 for (sum, weight) in sums.iter_mut().zip(column) {
@@ -52,25 +54,25 @@ pub fn items(program: &Program, layers: &[LayerCode], accumulate: &TokenStream) 
 }
 
 /// What the activations of a layer are kept in.
-fn slots() -> [TokenStream; 4] {
+fn slots(kind: &TokenStream) -> [TokenStream; 4] {
     [
         quote!(
             /// What an activation is kept in.
-            type Slot = f32;
+            type Slot = #kind;
         ),
         quote!(
             const EMPTY: Slot = 0.0;
         ),
         quote! {
             #[inline(always)]
-            fn filled<const N: usize>(slots: &[Slot; N]) -> &[f32; N] {
+            fn filled<const N: usize>(slots: &[Slot; N]) -> &[#kind; N] {
                 slots
             }
         },
         quote! {
             #[inline(always)]
             #[allow(dead_code)]
-            fn activate<const N: usize>(slots: &mut [Slot; N], activation: impl Fn(f32) -> f32) {
+            fn activate<const N: usize>(slots: &mut [Slot; N], activation: impl Fn(#kind) -> #kind) {
                 *slots = slots.map(activation);
             }
         },
@@ -119,15 +121,15 @@ enum Form {
 const FORMS: [Form; 3] = [Form::Plain, Form::Rectified, Form::Added];
 
 impl Form {
-    fn function(self, body: &TokenStream) -> TokenStream {
-        let stored = quote!(bias: &[f32; ROWS], x: &[f32; INPUTS], out: &mut [Slot; ROWS]);
+    fn function(self, kind: &TokenStream, body: &TokenStream) -> TokenStream {
+        let stored = quote!(bias: &[#kind; ROWS], x: &[#kind; INPUTS], out: &mut [Slot; ROWS]);
         let (doc, name, parameters) = match self {
             Form::Plain => (" Sums of a block.", "plain", stored),
             Form::Rectified => (" Sums of a block behind a ReLU.", "rectified", stored),
             Form::Added => (
                 " Sums of a block that go on from `out`.",
                 "added",
-                quote!(x: &[f32; INPUTS], out: &mut [f32; ROWS]),
+                quote!(x: &[#kind; INPUTS], out: &mut [#kind; ROWS]),
             ),
         };
         let name = ident(name);
@@ -141,12 +143,13 @@ impl Form {
         }
     }
 
-    fn portable(self) -> TokenStream {
-        self.function(&match self {
+    fn portable(self, kind: &TokenStream) -> TokenStream {
+        let body = match self {
             Form::Plain => quote!(*out = block(weights, bias, x);),
             Form::Rectified => quote!(*out = block(weights, bias, x).map(relu);),
             Form::Added => quote!(*out = block(weights, out, x);),
-        })
+        };
+        self.function(kind, &body)
     }
 
     fn assembly(self, sizes: &BTreeSet<Size>) -> TokenStream {
@@ -169,12 +172,13 @@ impl Form {
                 }
             }
         });
-        self.function(&quote! {
+        let body = quote! {
             match (INPUTS, ROWS) {
                 #(#arms)*
                 _ => *out = #otherwise,
             }
-        })
+        };
+        self.function(&quote!(f32), &body)
     }
 }
 
@@ -243,12 +247,12 @@ pub fn processor(program: &Program) -> String {
 }
 
 /// Statement that puts the outputs of a block into `out`, an expression of a mutable reference to slots.
-pub fn store(activation: ActivationCode, arguments: &TokenStream, out: &TokenStream) -> TokenStream {
+pub fn store(scalar: Scalar, activation: ActivationCode, arguments: &TokenStream, out: &TokenStream) -> TokenStream {
     match activation {
         ActivationCode::Identity => quote!(plain(#arguments, #out);),
         ActivationCode::Relu => quote!(rectified(#arguments, #out);),
         _ => {
-            let activated = super::network::activation(activation);
+            let activated = super::network::activation(scalar, activation);
             quote! { plain(#arguments, #out); activate(#out, |sum| #activated); }
         }
     }

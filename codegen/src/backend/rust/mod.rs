@@ -6,6 +6,7 @@ mod controller;
 mod integer;
 mod kernels;
 mod network;
+mod number;
 mod statements;
 mod streamed;
 
@@ -125,12 +126,14 @@ fn status_meaning(bit: u32) -> &'static str {
 
 /// `layout` is an attribute for both types, or nothing.
 fn types(program: &Program, layout: &TokenStream) -> TokenStream {
+    let scalar = program.scalar();
+    let number = number::kind(scalar);
     let fields = program.signals.iter().map(|signal| {
         let name = ident(&signal.name);
-        let (low, high) = (signal.range.0.value(), signal.range.1.value());
-        let kind = if signal.is_code { quote!(i32) } else { quote!(f32) };
+        let (low, high) = (signal.range.0.shortest(scalar), signal.range.1.shortest(scalar));
+        let kind = if signal.is_code { quote!(i32) } else { number.clone() };
         let code = if signal.is_code { "ADC code; " } else { "" };
-        let doc = format!(" {code}plausible {low:?} to {high:?} {}", signal.unit);
+        let doc = format!(" {code}plausible {low} to {high} {}", signal.unit);
         let doc = doc.trim_end();
         quote! { #[doc = #doc] pub #name: #kind }
     });
@@ -144,9 +147,9 @@ fn types(program: &Program, layout: &TokenStream) -> TokenStream {
         #layout
         pub struct Command {
             /// Commanded duty, 0..1: mapped and limited.
-            pub duty: f32,
+            pub duty: #number,
             /// Duty of the chosen action, before the mapping.
-            pub duty_sim: f32,
+            pub duty_sim: #number,
             /// Greedy action.
             pub action_index: u32,
             /// Bits of [`status`].

@@ -1,25 +1,29 @@
 //! Tables, layers and `q_values`.
 
+use policy::Scalar;
 use proc_macro2::{Ident, TokenStream};
 use quote::quote;
 
+use super::number::{self, number};
 use super::{float, ident, integer, kernels, size, streamed};
 use crate::lower::network::{TANH_DENOMINATOR, TANH_NUMERATOR};
-use crate::program::{ActivationCode, LayerCode, NetworkCode, Program};
+use crate::program::{ActivationCode, LayerCode, Literal, NetworkCode, Program};
 
 /// Everything between observation and Q values.
 pub fn items(program: &Program) -> TokenStream {
-    let duties = program.duties.iter().map(|duty| float(duty.value()));
+    let scalar = program.scalar();
+    let kind = number::kind(scalar);
+    let duties = program.duties.iter().map(|duty| number(scalar, *duty));
     let tanh = program
         .network
         .activates(|activation| activation == ActivationCode::Tanh)
-        .then(tanh);
+        .then(|| tanh(scalar));
     let network = match &program.network {
-        NetworkCode::Real { fused, layers } => real(program, layers, *fused),
+        NetworkCode::Real { fused, layers, .. } => real(program, layers, *fused),
         NetworkCode::Integer(network) => integer::items(program, network),
     };
     quote! {
-        static DUTIES: [f32; ACTIONS] = [#(#duties),*];
+        static DUTIES: [#kind; ACTIONS] = [#(#duties),*];
         #tanh
         #network
     }
@@ -28,7 +32,10 @@ pub fn items(program: &Program) -> TokenStream {
 /// What argmax compares: type, value below all others, name of the selection.
 pub fn argmax(program: &Program) -> (TokenStream, TokenStream) {
     match program.network {
-        NetworkCode::Real { .. } => (quote!(f32::MIN), quote!(select)),
+        NetworkCode::Real { scalar, .. } => {
+            let kind = number::kind(scalar);
+            (quote!(#kind::MIN), quote!(select))
+        }
         NetworkCode::Integer(_) => (quote!(i32::MIN), quote!(select_integer)),
     }
 }
@@ -42,13 +49,16 @@ pub fn q_values(program: &Program) -> TokenStream {
 }
 
 fn real(program: &Program, layers: &[LayerCode], fused: bool) -> TokenStream {
-    let (items, body) = streamed::network(layers);
+    let scalar = program.scalar();
+    let (items, body) = streamed::network(scalar, layers);
+    let kind = number::kind(scalar);
     let aligned = layers.iter().find_map(|layer| layer.alignment).map(aligned);
     let fma = fused.then(fma);
-    let accumulate = if fused {
-        quote!(*sum = fma(*weight, *x, *sum);)
-    } else {
-        quote!(*sum += *weight * *x;)
+    let accumulate = match (scalar, fused) {
+        (Scalar::F32, true) => quote!(*sum = fma(*weight, *x, *sum);),
+        (Scalar::F32, false) => quote!(*sum += *weight * *x;),
+        // weights are binary32
+        (Scalar::F64, _) => quote!(*sum += *weight as f64 * *x;),
     };
     let blocks = kernels::items(program, layers, &accumulate);
     quote! {
@@ -56,7 +66,7 @@ fn real(program: &Program, layers: &[LayerCode], fused: bool) -> TokenStream {
         #aligned
         #blocks
         #items
-        fn network(observation: &[f32; FEATURES]) -> [f32; ACTIONS] {
+        fn network(observation: &[#kind; FEATURES]) -> [#kind; ACTIONS] {
             #body
         }
     }
@@ -104,7 +114,8 @@ fn fma() -> TokenStream {
 }
 
 /// Tables, and the function of the whole layer.
-pub(super) fn layer_items(index: usize, layer: &LayerCode) -> (TokenStream, TokenStream) {
+pub(super) fn layer_items(scalar: Scalar, index: usize, layer: &LayerCode) -> (TokenStream, TokenStream) {
+    let kind = number::kind(scalar);
     let name = ident(&format!("layer{index}"));
     let doc = format!(" {}: {} -> {}", layer.name, layer.inputs, layer.outputs);
     let (inputs, outputs) = (size(layer.inputs), size(layer.outputs));
@@ -114,24 +125,24 @@ pub(super) fn layer_items(index: usize, layer: &LayerCode) -> (TokenStream, Toke
     let blocks = layer.table[..split * layer.inputs]
         .chunks(rows * layer.inputs)
         .map(|block| columns(block, rows));
-    let biases = layer.bias[..split].chunks(rows).map(row);
+    let biases = layer.bias[..split].chunks(rows).map(|biases| sums(scalar, biases));
     let (rows_size, full_size) = (size(rows), size(full));
-    let stored = kernels::store(layer.activation, &quote!(weights, bias, x), &quote!(out));
-    let (tail_tables, tail_loop) = tail(index, layer);
-    let kind = quote!([[[f32; #rows_size]; #inputs]; #full_size]);
+    let stored = kernels::store(scalar, layer.activation, &quote!(weights, bias, x), &quote!(out));
+    let (tail_tables, tail_loop) = tail(scalar, index, layer);
+    let type_of_weights = quote!([[[f32; #rows_size]; #inputs]; #full_size]);
     let (held, table) = (
         held(layer, &weights),
-        table(layer, &weights, &kind, &quote!([#(#blocks),*])),
+        table(layer, &weights, &type_of_weights, &quote!([#(#blocks),*])),
     );
     let tables = quote! {
         #table
-        static #bias: [[f32; #rows_size]; #full_size] = [#(#biases),*];
+        static #bias: [[#kind; #rows_size]; #full_size] = [#(#biases),*];
         #tail_tables
     };
     let function = quote! {
         #[doc = #doc]
         #[inline(always)]
-        fn #name(x: &[f32; #inputs], y: &mut [Slot; #outputs]) {
+        fn #name(x: &[#kind; #inputs], y: &mut [Slot; #outputs]) {
             let mut rest: &mut [Slot] = y;
             for (weights, bias) in #held.iter().zip(&#bias) {
                 // no division and no slice index, so no way to a panic at any optimisation level
@@ -147,7 +158,8 @@ pub(super) fn layer_items(index: usize, layer: &LayerCode) -> (TokenStream, Toke
 }
 
 /// The shorter last block, if there is one.
-fn tail(index: usize, layer: &LayerCode) -> (TokenStream, TokenStream) {
+fn tail(scalar: Scalar, index: usize, layer: &LayerCode) -> (TokenStream, TokenStream) {
+    let kind = number::kind(scalar);
     let rows = layer.tail_rows();
     if rows == 0 {
         return (TokenStream::new(), TokenStream::new());
@@ -158,14 +170,14 @@ fn tail(index: usize, layer: &LayerCode) -> (TokenStream, TokenStream) {
         ident(&format!("TAIL_BIAS{index}")),
     );
     let values = columns(&layer.table[split * layer.inputs..], rows);
-    let biases = row(&layer.bias[split..]);
+    let biases = sums(scalar, &layer.bias[split..]);
     let (inputs, rows) = (size(layer.inputs), size(rows));
     let table = table(layer, &weights, &quote!([[f32; #rows]; #inputs]), &values);
     let held = held(layer, &weights);
-    let stored = kernels::store(layer.activation, &quote!(&#held, &#bias, x), &quote!(out));
+    let stored = kernels::store(scalar, layer.activation, &quote!(&#held, &#bias, x), &quote!(out));
     let tables = quote! {
         #table
-        static #bias: [f32; #rows] = #biases;
+        static #bias: [#kind; #rows] = #biases;
     };
     let code = quote! {
         if let Some((out, _)) = rest.split_first_chunk_mut::<#rows>() {
@@ -185,44 +197,57 @@ pub(super) fn row(values: &[f32]) -> TokenStream {
     quote!([#(#values),*])
 }
 
-pub(super) fn activation(activation: ActivationCode) -> TokenStream {
+/// Biases: sums start with them, so they have their type.
+pub(super) fn sums(scalar: Scalar, values: &[f32]) -> TokenStream {
+    let literal = |value: &f32| Literal::nearest(scalar, f64::from(*value));
+    let values = values.iter().map(|value| number(scalar, literal(value)));
+    quote!([#(#values),*])
+}
+
+pub(super) fn activation(scalar: Scalar, activation: ActivationCode) -> TokenStream {
     match activation {
         ActivationCode::Identity => quote!(sum),
         ActivationCode::Relu => quote!(relu(sum)),
         ActivationCode::LeakyRelu(slope) => {
-            let slope = float(slope.value());
+            let slope = number(scalar, slope);
             quote!(leaky_relu(sum, #slope))
         }
         ActivationCode::Tanh => quote!(tanh(sum)),
     }
 }
 
-fn tanh() -> TokenStream {
-    let steps = |letter: &str, terms: &[f32; 5]| {
+fn tanh(scalar: Scalar) -> TokenStream {
+    let kind = number::kind(scalar);
+    let (limit, nine, one) = number::limit(scalar);
+    let steps = |letter: &str, terms: &[f64; 5]| {
         let name = ident(letter);
-        let highest = float(terms[4]);
-        let lower = terms.iter().rev().skip(1).map(|term| float(*term));
-        quote! { let mut #name: f32 = #highest; #(#name = #name * z + #lower;)* }
+        let [lower @ .., highest] = terms.map(|term| number(scalar, Literal::nearest(scalar, term)));
+        let lower = lower.iter().rev();
+        quote! { let mut #name: #kind = #highest; #(#name = #name * z + #lower;)* }
     };
     let numerator = steps("p", &TANH_NUMERATOR);
     let denominator = steps("q", &TANH_DENOMINATOR);
     quote! {
         /// x limited to the magnitude with these bits, in integers so that loops over it can be vectorised
         #[inline(always)]
-        fn limit(x: f32, limit: u32) -> f32 {
-            let magnitude = x.to_bits() & 0x7FFF_FFFF;
-            let below = 0_u32.wrapping_sub(magnitude.wrapping_sub(limit) >> 31);
-            f32::from_bits((x.to_bits() & 0x8000_0000) | (magnitude & below) | (limit & !below))
-        }
+        #limit
         /// Rational approximation, |error| < 4e-7.
         #[inline(always)]
-        fn tanh(x: f32) -> f32 {
-            let t = limit(x, 0x4110_0000);
+        fn tanh(x: #kind) -> #kind {
+            let t = limit(x, #nine);
             let z = t * t;
             #numerator
             #denominator
-            limit((p * t) / q, 0x3F80_0000)
+            limit((p * t) / q, #one)
         }
+    }
+}
+
+/// Function of the checksum over numbers.
+pub fn checksum(scalar: Scalar) -> TokenStream {
+    match scalar {
+        Scalar::F32 => quote!(crc_floats),
+        Scalar::F64 => quote!(crc_numbers),
     }
 }
 
@@ -230,22 +255,24 @@ fn tanh() -> TokenStream {
 /// read, the compiler does not answer in its place.
 pub fn integrity(program: &Program) -> TokenStream {
     let network = match &program.network {
-        NetworkCode::Real { layers, .. } => {
+        NetworkCode::Real { scalar, layers, .. } => {
             let layers = layers
                 .iter()
                 .enumerate()
                 .map(|(index, layer)| match layer.is_streamed() {
-                    true => streamed::integrity(index, layer),
-                    false => layer_integrity(index, layer),
+                    true => streamed::integrity(*scalar, index, layer),
+                    false => layer_integrity(*scalar, index, layer),
                 });
             quote!(#(#layers)*)
         }
         NetworkCode::Integer(network) => integer::integrity(network),
     };
-    quote! { #network crc = crc_floats(crc, core::hint::black_box(&DUTIES)); }
+    let checksum = checksum(program.scalar());
+    quote! { #network crc = #checksum(crc, core::hint::black_box(&DUTIES)); }
 }
 
-fn layer_integrity(index: usize, layer: &LayerCode) -> TokenStream {
+fn layer_integrity(scalar: Scalar, index: usize, layer: &LayerCode) -> TokenStream {
+    let checksum = checksum(scalar);
     let (weights, bias) = (ident(&format!("WEIGHTS{index}")), ident(&format!("BIAS{index}")));
     let (tail_weights, tail_bias) = (
         ident(&format!("TAIL_WEIGHTS{index}")),
@@ -255,7 +282,7 @@ fn layer_integrity(index: usize, layer: &LayerCode) -> TokenStream {
     let full_weights = quote! {
         for column in core::hint::black_box(&#weights).iter().flatten() { crc = crc_floats(crc, column); }
     };
-    let full_bias = quote! { for row in core::hint::black_box(&#bias) { crc = crc_floats(crc, row); } };
+    let full_bias = quote! { for row in core::hint::black_box(&#bias) { crc = #checksum(crc, row); } };
     if layer.tail_rows() == 0 {
         return quote! { #full_weights #full_bias };
     }
@@ -263,6 +290,6 @@ fn layer_integrity(index: usize, layer: &LayerCode) -> TokenStream {
         #full_weights
         for column in core::hint::black_box(&#tail_weights) { crc = crc_floats(crc, column); }
         #full_bias
-        crc = crc_floats(crc, core::hint::black_box(&#tail_bias));
+        crc = #checksum(crc, core::hint::black_box(&#tail_bias));
     }
 }

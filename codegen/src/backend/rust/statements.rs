@@ -1,9 +1,11 @@
 //! Straight-line blocks as `let` statements, and the helpers they call.
 
+use policy::Scalar;
 use proc_macro2::{Ident, TokenStream};
 use quote::quote;
 
-use super::{float, ident, size};
+use super::number::{self, number};
+use super::{ident, size};
 use crate::program::{Block, Coefficient, Op, Program, ValueId};
 
 /// Field of the controller that holds a coefficient.
@@ -48,7 +50,7 @@ impl<'p> Printer<'p> {
         let (kind, letter) = if op.is_flag() {
             (quote!(u32), 'f')
         } else {
-            (quote!(f32), 'v')
+            (number::kind(self.program.scalar()), 'v')
         };
         let name = ident(&format!("{letter}{}", self.named));
         self.named += 1;
@@ -65,7 +67,8 @@ impl<'p> Printer<'p> {
             }
             Op::Code(i) => {
                 let name = ident(&self.program.signals[*i].name);
-                quote!((measured.#name as f32))
+                let kind = number::kind(self.program.scalar());
+                quote!((measured.#name as #kind))
             }
             Op::Held(i) => indexed(quote!(self.held), *i),
             Op::Sanitised(i) => indexed(quote!(front.signal), *i),
@@ -78,7 +81,7 @@ impl<'p> Printer<'p> {
                 quote!(self.#name)
             }
             Op::ChosenDuty => quote!(chosen),
-            Op::Constant(literal) => float(literal.value()),
+            Op::Constant(literal) => number(self.program.scalar(), *literal),
             Op::Primed => quote!(self.primed),
             Op::Usable => quote!(front.usable),
             Op::Clipped => quote!(front.clipped),
@@ -111,7 +114,13 @@ impl<'p> Printer<'p> {
             Op::Outside { x, low, high } => call("outside", &[v(x), v(low), v(high)]),
             Op::Difference(x, y) => {
                 let (x, y) = (v(x), v(y));
-                quote!(#x.to_bits() ^ #y.to_bits())
+                match self.program.scalar() {
+                    Scalar::F32 => quote!(#x.to_bits() ^ #y.to_bits()),
+                    // folded to a word
+                    Scalar::F64 => {
+                        quote!((#x.to_bits() ^ #y.to_bits()) as u32 | ((#x.to_bits() ^ #y.to_bits()) >> 32) as u32)
+                    }
+                }
             }
             Op::NotZero(x) => {
                 let x = v(x);
@@ -148,12 +157,21 @@ fn call(function: &str, arguments: &[&TokenStream]) -> TokenStream {
 
 /// Branch-free helpers; a policy need not use all of them.
 pub fn helpers(program: &Program) -> TokenStream {
+    let scalar = program.scalar();
+    let number = number::kind(scalar);
+    let number::Bits {
+        magnitude,
+        mask,
+        negative,
+        positive,
+    } = number::bits(scalar);
     let rectified = if program.has_fpu {
         // both operations are exact: no value comes near the end of the format
-        quote!((x + f32::from_bits(x.to_bits() & 0x7FFF_FFFF)) * 0.5)
+        quote!((x + #magnitude) * 0.5)
     } else {
-        quote!(f32::from_bits(x.to_bits() & (x.to_bits() >> 31).wrapping_sub(1)))
+        positive
     };
+    let checksums = checksums(scalar);
     quote! {
         /// A condition as 0 or 1. The optimiser must not know that: it would turn selections back into branches.
         #[inline(always)]
@@ -163,30 +181,30 @@ pub fn helpers(program: &Program) -> TokenStream {
         /// flag (0 or 1) ? then : otherwise, without a branch
         #[inline(always)]
         #[allow(dead_code)]
-        fn select(flag: u32, then: f32, otherwise: f32) -> f32 {
-            let mask = 0_u32.wrapping_sub(flag);
-            f32::from_bits((then.to_bits() & mask) | (otherwise.to_bits() & !mask))
+        fn select(flag: u32, then: #number, otherwise: #number) -> #number {
+            let mask = #mask;
+            #number::from_bits((then.to_bits() & mask) | (otherwise.to_bits() & !mask))
         }
         #[inline(always)]
         #[allow(dead_code)]
-        fn within(x: f32, low: f32, high: f32) -> u32 {
+        fn within(x: #number, low: #number, high: #number) -> u32 {
             flag(x >= low) & flag(x <= high)
         }
         #[inline(always)]
         #[allow(dead_code)]
-        fn outside(x: f32, low: f32, high: f32) -> u32 {
+        fn outside(x: #number, low: #number, high: #number) -> u32 {
             flag(x < low) | flag(x > high)
         }
         #[inline(always)]
         #[allow(dead_code)]
-        fn clamp(x: f32, low: f32, high: f32) -> f32 {
+        fn clamp(x: #number, low: #number, high: #number) -> #number {
             let raised = select(flag(x < low), low, x);
             select(flag(raised > high), high, raised)
         }
         /// Oldest first, newest last; a line that is not primed reads as newest throughout.
         #[inline(always)]
         #[allow(dead_code)]
-        fn line_sum<'a>(oldest: f32, rest: impl Iterator<Item = &'a f32>, newest: f32, primed: u32) -> f32 {
+        fn line_sum<'a>(oldest: #number, rest: impl Iterator<Item = &'a #number>, newest: #number, primed: u32) -> #number {
             let mut sum = select(primed, oldest, newest);
             for word in rest {
                 sum += select(primed, *word, newest);
@@ -196,13 +214,13 @@ pub fn helpers(program: &Program) -> TokenStream {
         /// x if x > 0 else +0, no branch in the binary
         #[inline(always)]
         #[allow(dead_code)]
-        fn relu(x: f32) -> f32 {
+        fn relu(x: #number) -> #number {
             #rectified
         }
         #[inline(always)]
         #[allow(dead_code)]
-        fn leaky_relu(x: f32, slope: f32) -> f32 {
-            select(x.to_bits() >> 31, slope * x, x)
+        fn leaky_relu(x: #number, slope: #number) -> #number {
+            select(#negative, slope * x, x)
         }
         /// CRC-32 (IEEE 802.3) of words taken little-endian, whatever the byte order of the machine.
         #[inline(always)]
@@ -214,9 +232,28 @@ pub fn helpers(program: &Program) -> TokenStream {
             }
             crc
         }
+        #checksums
+    }
+}
+
+/// CRC functions over numbers and, where those have another width, over weights.
+fn checksums(scalar: Scalar) -> TokenStream {
+    let floats = quote! {
         #[inline(never)]
         fn crc_floats(crc: u32, words: &[f32]) -> u32 {
             words.iter().fold(crc, |crc, word| crc_word(crc, word.to_bits()))
         }
+    };
+    match scalar {
+        Scalar::F32 => floats,
+        Scalar::F64 => quote! {
+            #floats
+            #[inline(never)]
+            fn crc_numbers(crc: u32, words: &[f64]) -> u32 {
+                words.iter().fold(crc, |crc, word| {
+                    crc_word(crc_word(crc, word.to_bits() as u32), (word.to_bits() >> 32) as u32)
+                })
+            }
+        },
     }
 }

@@ -1,14 +1,15 @@
 //! The layers one after the other; the last one takes the outputs of the one before block by block.
 
+use policy::Scalar;
 use proc_macro2::{Ident, TokenStream};
 use quote::quote;
 
-use super::network::{columns, held, layer_items, row, table};
-use super::{ident, kernels, size};
+use super::network::{checksum, columns, held, layer_items, sums, table};
+use super::{ident, kernels, number, size};
 use crate::program::LayerCode;
 
 /// Tables and functions of all layers, and the body of `network`.
-pub fn network(layers: &[LayerCode]) -> (TokenStream, TokenStream) {
+pub fn network(scalar: Scalar, layers: &[LayerCode]) -> (TokenStream, TokenStream) {
     let (before, streamed) = match layers {
         [before @ .., block, last] if last.is_streamed() => (before, Some((block, last))),
         _ => (layers, None),
@@ -18,7 +19,7 @@ pub fn network(layers: &[LayerCode]) -> (TokenStream, TokenStream) {
     let mut value = quote!(observation);
     let mut result = quote!(observation);
     for (index, layer) in before.iter().enumerate() {
-        let (tables, function) = layer_items(index, layer);
+        let (tables, function) = layer_items(scalar, index, layer);
         items.push(quote!(#tables #function));
         let (name, sink) = (ident(&format!("layer{index}")), ident(&format!("hidden{index}")));
         let outputs = size(layer.outputs);
@@ -33,8 +34,11 @@ pub fn network(layers: &[LayerCode]) -> (TokenStream, TokenStream) {
         return (quote!(#(#items)*), quote!(#(#calls)* #result));
     };
     let index = before.len();
-    let (tables, _) = layer_items(index, block);
-    let (last_items, chunks) = (last_layer(index + 1, last), chunks(index, block, last, &value));
+    let (tables, _) = layer_items(scalar, index, block);
+    let (last_items, chunks) = (
+        last_layer(scalar, index + 1, last),
+        chunks(scalar, index, block, last, &value),
+    );
     items.push(quote!(#tables #last_items));
     (quote!(#(#items)*), quote!(#(#calls)* #chunks))
 }
@@ -46,7 +50,8 @@ fn names(index: usize) -> [Ident; 4] {
 }
 
 /// Tables, and the function that adds a chunk of inputs to the sums.
-fn last_layer(index: usize, layer: &LayerCode) -> TokenStream {
+fn last_layer(scalar: Scalar, index: usize, layer: &LayerCode) -> TokenStream {
+    let number = number::kind(scalar);
     let [weights, tail_weights, last_weights, last_tail_weights] = names(index);
     let (rows, full, tail) = (layer.block_rows, layer.full_blocks(), layer.tail_rows());
     let (rest, count) = (layer.inputs % layer.chunk, layer.inputs / layer.chunk);
@@ -62,14 +67,14 @@ fn last_layer(index: usize, layer: &LayerCode) -> TokenStream {
         .map(|chunk| split(chunk, layer.chunk))
         .unzip();
     let bias = ident(&format!("BIAS{index}"));
-    let biases = row(&layer.bias);
+    let biases = sums(scalar, &layer.bias);
     let outputs = size(layer.outputs);
     let [rows, full, tail_rows, chunk, count, rest_size] = [rows, full, tail, layer.chunk, count, rest].map(size);
     let kind = quote!([[[[f32; #rows]; #chunk]; #full]; #count]);
     let of_blocks = table(layer, &weights, &kind, &quote!([#(#blocks),*]));
     let mut tables = vec![quote! {
         #of_blocks
-        static #bias: [f32; #outputs] = #biases;
+        static #bias: [#number; #outputs] = #biases;
     }];
     if tail > 0 {
         let kind = quote!([[[f32; #tail_rows]; #chunk]; #count]);
@@ -108,10 +113,10 @@ fn last_layer(index: usize, layer: &LayerCode) -> TokenStream {
         fn #name<const INPUTS: usize>(
             weights: &[[[f32; #rows]; INPUTS]; #full],
             #parameter
-            x: &[f32; INPUTS],
-            sums: &mut [f32; #outputs],
+            x: &[#number; INPUTS],
+            sums: &mut [#number; #outputs],
         ) {
-            let mut rest: &mut [f32] = sums;
+            let mut rest: &mut [#number] = sums;
             for weights in weights {
                 if let Some((out, after)) = core::mem::take(&mut rest).split_first_chunk_mut::<#rows>() {
                     added(weights, x, out);
@@ -124,7 +129,7 @@ fn last_layer(index: usize, layer: &LayerCode) -> TokenStream {
 }
 
 /// Body of `network` from the outputs `value` of the layers before.
-fn chunks(index: usize, layer: &LayerCode, last: &LayerCode, value: &TokenStream) -> TokenStream {
+fn chunks(scalar: Scalar, index: usize, layer: &LayerCode, last: &LayerCode, value: &TokenStream) -> TokenStream {
     let next = index + 1;
     let [weights, tail_weights, last_weights, last_tail_weights] = names(next).map(|name| held(last, &name));
     let (before, bias) = (ident(&format!("WEIGHTS{index}")), ident(&format!("BIAS{index}")));
@@ -135,7 +140,12 @@ fn chunks(index: usize, layer: &LayerCode, last: &LayerCode, value: &TokenStream
     let (name, sums) = (ident(&format!("layer{next}")), ident(&format!("BIAS{next}")));
     let [before, before_tail] = [before, before_tail].map(|name| held(layer, &name));
     let store = |weights: &TokenStream, bias: &TokenStream| {
-        kernels::store(layer.activation, &quote!(#weights, #bias, #value), &quote!(&mut part))
+        kernels::store(
+            scalar,
+            layer.activation,
+            &quote!(#weights, #bias, #value),
+            &quote!(&mut part),
+        )
     };
     let has_tail = last.tail_rows() > 0;
     let (iterator, pattern, argument, last_argument) = if has_tail {
@@ -177,7 +187,8 @@ fn chunks(index: usize, layer: &LayerCode, last: &LayerCode, value: &TokenStream
 }
 
 /// Statements of the integrity check, in the order of the table.
-pub fn integrity(index: usize, layer: &LayerCode) -> TokenStream {
+pub fn integrity(scalar: Scalar, index: usize, layer: &LayerCode) -> TokenStream {
+    let checksum = checksum(scalar);
     let [weights, tail_weights, last_weights, last_tail_weights] = names(index).map(|name| held(layer, &name));
     let bias = ident(&format!("BIAS{index}"));
     let has_tail = layer.tail_rows() > 0;
@@ -202,5 +213,5 @@ pub fn integrity(index: usize, layer: &LayerCode) -> TokenStream {
             #tail
         }
     });
-    quote! { #full #shorter crc = crc_floats(crc, core::hint::black_box(&#bias)); }
+    quote! { #full #shorter crc = #checksum(crc, core::hint::black_box(&#bias)); }
 }

@@ -1,0 +1,105 @@
+//! Statements of the kit that depend on the width of a number.
+
+use policy::Scalar;
+
+use crate::Program;
+
+/// Statements for one controller of a kit.
+pub struct Texts<'a> {
+    /// Prefix of the kit's functions.
+    pub kit: &'a str,
+    /// The controller.
+    pub program: &'a Program,
+}
+
+impl Texts<'_> {
+    fn is_wide(&self) -> bool {
+        self.program.scalar() == Scalar::F64
+    }
+
+    /// Assignments that fill the measurement from `word`, and how many words that takes.
+    pub fn measurement(&self) -> (Vec<String>, usize) {
+        let mut word = 0;
+        let mut lines = Vec::new();
+        for signal in &self.program.signals {
+            let name = &signal.name;
+            if self.is_wide() && !signal.is_code {
+                lines.push(format!("measured.{name} = {}_number(&word[{word}]);", self.kit));
+                word += 2;
+            } else {
+                lines.push(format!(
+                    "memcpy(&measured.{name}, &word[{word}], sizeof(measured.{name}));"
+                ));
+                word += 1;
+            }
+        }
+        (lines, word)
+    }
+
+    fn check_number(&self, what: &str, word: usize, number: &str) -> String {
+        let (k, s) = (self.kit, &self.program.name);
+        if self.is_wide() {
+            format!("{k}_check_bits(\"{s}\", \"{what}\", event, &word[{word}], {k}_bits({number}));")
+        } else {
+            format!("{k}_check(\"{s}\", \"{what}\", event, word[{word}], {k}_bits({number}));")
+        }
+    }
+
+    fn check(&self, what: &str, word: usize, found: &str) -> String {
+        let (k, s) = (self.kit, &self.program.name);
+        format!("{k}_check(\"{s}\", \"{what}\", event, word[{word}], {found});")
+    }
+
+    /// Comparisons of the command.
+    pub fn answer(&self) -> Vec<String> {
+        let number = self.program.scalar().words();
+        vec![
+            self.check_number("duty", 0, "command.duty"),
+            self.check_number("duty before the mapping", number, "command.duty_sim"),
+            self.check("action", 2 * number, "command.action_index"),
+            self.check("status", 2 * number + 1, "command.status"),
+            self.check_number("duty of eval", 0, "first.duty"),
+        ]
+    }
+
+    /// Checksum of the rest of the answer, its comparison, and the way to the next move.
+    pub fn rest(&self) -> Vec<String> {
+        let (k, u) = (self.kit, self.program.name.to_uppercase());
+        let crc = if self.is_wide() { "crc_numbers" } else { "crc" };
+        let last = 2 * self.program.scalar().words() + 2;
+        vec![
+            format!("crc = {k}_{crc}(0xFFFFFFFFu, observation, {u}_FEATURES);"),
+            format!("crc = {k}_{crc}(crc, q, {u}_ACTIONS);"),
+            format!("crc = {};", self.state_crc("crc", "state->")),
+            self.check("CRC of observation, Q values, state", last, "crc ^ 0xFFFFFFFFu"),
+            format!("return word + {};", last + 1),
+        ]
+    }
+
+    /// Checksum over the words of a state, from `start`; `member` is what stands before the name of a member.
+    pub fn state_crc(&self, start: &str, member: &str) -> String {
+        let (k, u) = (self.kit, self.program.name.to_uppercase());
+        let state = if member == "state." { "&state" } else { "state" };
+        if self.is_wide() {
+            let numbers = (self.program.state_words() - 2) / 2;
+            format!(
+                "{k}_crc({k}_crc({k}_crc_numbers({start}, {state}, {numbers}u), &{member}bad_count, 1u), &{member}primed, 1u)"
+            )
+        } else {
+            format!("{k}_crc({start}, {state}, {u}_STATE_WORDS)")
+        }
+    }
+
+    /// Declarations of the coefficients, read from `word`.
+    pub fn coefficients(&self, names: &[&str]) -> Vec<String> {
+        let k = self.kit;
+        let line = |(index, name): (usize, &&str)| {
+            if self.is_wide() {
+                format!("const double {name} = {k}_number(&word[{}]);", 2 * index)
+            } else {
+                format!("const float {name} = {k}_float(word[{index}]);")
+            }
+        };
+        names.iter().enumerate().map(line).collect()
+    }
+}

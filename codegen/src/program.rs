@@ -427,6 +427,12 @@ impl Program {
         self.network.table_bytes() + 4 * self.scalar().words() * self.duties.len()
     }
 
+    /// Numbers in the tables of the integrity check.
+    #[must_use]
+    pub fn table_numbers(&self) -> usize {
+        self.network.table_numbers() + self.duties.len()
+    }
+
     /// All table words in the order of the integrity check.
     pub fn table_words(&self) -> impl Iterator<Item = u32> + '_ {
         let network = self.network.table_words().into_iter();

@@ -131,6 +131,13 @@ impl NetworkCode {
         }
     }
 
+    pub(super) fn table_numbers(&self) -> usize {
+        match self {
+            NetworkCode::Real { layers, .. } => layers.iter().map(|l| l.table.len() + l.bias.len()).sum(),
+            NetworkCode::Integer(network) => network.layers.iter().map(|l| l.table.len() + l.bias.len()).sum(),
+        }
+    }
+
     pub(super) fn table_bytes(&self) -> usize {
         match self {
             NetworkCode::Real { scalar, layers, .. } => {

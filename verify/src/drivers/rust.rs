@@ -23,7 +23,7 @@ pub fn text(policy: &Policy, path: &str, form: Form) -> String {
 #[allow(dead_code)]
 mod {name};
 
-use {name}::{{Command, Controller, Measurement}};
+use {name}::{{Command, Controller, IntegrityCheck, Measurement}};
 {words}{number}{HELPERS}
 {step}{set_mapping}{main}"#,
         number = number(policy.numeric_format.scalar()),
@@ -313,7 +313,19 @@ fn run() {{
         steps: 0,
     }};
     let self_test: Result<(), u32> = Controller::self_test();
-    let integrity: bool = Controller::integrity();
+    let mut check = IntegrityCheck::new();
+    let mut integrity: bool = Controller::integrity();
+    // the whole check, then twice the one in slices: all must say the same
+    for _ in 0..2 {{
+        let mut calls = 1;
+        let found = loop {{
+            match check.slice(101) {{
+                Some(intact) => break intact,
+                None => calls += 1,
+            }}
+        }};
+        integrity &= found && calls == IntegrityCheck::LENGTH.div_ceil(101);
+    }}
     let state_words = driver.state.state_words().len() as u32;
     driver.put([{MAGIC}, self_test.err().unwrap_or(0), integrity as u32, {signals}]);
     driver.put([{name}::FEATURES as u32, {name}::ACTIONS as u32, state_words]);

@@ -96,6 +96,7 @@ fn header(program: &Program) -> Header {
             count("FEATURES", program.feature_count()),
             count("ACTIONS", program.duties.len()),
             count("STATE_WORDS", program.state_words()),
+            count("TABLE_NUMBERS", program.table_numbers()),
             constant("SAMPLE_PERIOD", period),
         ],
         status: STATUS

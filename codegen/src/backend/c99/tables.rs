@@ -139,6 +139,7 @@ pub fn integrity(program: &Program) -> Vec<CrcItem> {
             Some(CrcItem {
                 function,
                 table: table.name,
+                first: 0,
                 length: table.length,
             })
         })
@@ -146,8 +147,14 @@ pub fn integrity(program: &Program) -> Vec<CrcItem> {
     items.push(CrcItem {
         function: "crc",
         table: "duties".into(),
+        first: 0,
         length: program.duties.len(),
     });
+    let mut first = 0;
+    for item in &mut items {
+        item.first = first;
+        first += item.length;
+    }
     items
 }
 

@@ -4,8 +4,8 @@ use policy::Scalar;
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use super::number;
 use super::{DEFAULT_TYPE, constants, ident, size, types};
+use super::{integrity, number};
 use crate::program::Program;
 
 /// `<name>_ffi.rs`: `Measurement`, `Command`, `status` and `Controller` as in the Rust backend's file, over the C core.
@@ -31,7 +31,18 @@ fn items(program: &Program) -> TokenStream {
     let types = types(program, &quote!(#[repr(C)]));
     let name = ident(DEFAULT_TYPE);
     let symbol = |function: &str| format!("{}_{function}", program.name);
-    let [init, reset, eval, commit, step, observe, q_values, self_test, integrity] = [
+    let [
+        init,
+        reset,
+        eval,
+        commit,
+        step,
+        observe,
+        q_values,
+        self_test,
+        integrity,
+        integrity_slice,
+    ] = [
         "init",
         "reset",
         "eval",
@@ -41,9 +52,20 @@ fn items(program: &Program) -> TokenStream {
         "q_values",
         "self_test",
         "integrity",
+        "integrity_slice",
     ]
     .map(symbol);
     let (declare_mapping, set_mapping) = mapping(program);
+    let check = integrity::check(
+        program,
+        &quote!(#[repr(C)]),
+        &quote! {
+            match unsafe { c::integrity_slice(self, count) } {
+                0 => None,
+                state => Some(state == 1),
+            }
+        },
+    );
     quote! {
         #constants
         #types
@@ -52,7 +74,7 @@ fn items(program: &Program) -> TokenStream {
         #[repr(C)]
         pub struct #name { #fields }
         mod c {
-            use super::{Command, Measurement, #name};
+            use super::{Command, IntegrityCheck, Measurement, #name};
             unsafe extern "C" {
                 #[link_name = #init]
                 pub fn init(state: *mut #name);
@@ -73,8 +95,11 @@ fn items(program: &Program) -> TokenStream {
                 pub fn self_test() -> u32;
                 #[link_name = #integrity]
                 pub fn integrity() -> u32;
+                #[link_name = #integrity_slice]
+                pub fn integrity_slice(check: *mut IntegrityCheck, count: u32) -> u32;
             }
         }
+        #check
         // Every call hands over references or arrays of the lengths in the C header, which the C core reads and writes
         // within these lengths and does not keep.
         impl #name {

@@ -6,7 +6,7 @@ use quote::quote;
 
 use super::number::{self, number};
 use super::statements::{Printer, coefficient_field};
-use super::{ident, network, size, word};
+use super::{ident, integrity, network, size, word};
 use crate::lower::known_answers::{LCG, SEED, UNIT};
 use crate::program::{Coefficient, Literal, Program};
 
@@ -444,7 +444,7 @@ fn checks(program: &Program) -> TokenStream {
     let test = &program.self_test;
     let scalar = program.scalar();
     let kind = number::kind(scalar);
-    let checksum = network::checksum(scalar);
+    let checksum = integrity::checksum(scalar);
     let column = |pick: fn(&(Literal, Literal)) -> Literal| {
         let values = test.observation_box.iter().map(|range| number(scalar, pick(range)));
         quote!([#(#values),*])
@@ -463,8 +463,6 @@ fn checks(program: &Program) -> TokenStream {
         Scalar::F32 => quote!(0.0_f32),
         Scalar::F64 => quote!(0.0_f64),
     };
-    let integrity = network::integrity(program);
-    let crc = word(program.crc);
     quote! {
         /// Known answers: whether the arithmetic of this build is the policy's.
         ///
@@ -494,9 +492,7 @@ fn checks(program: &Program) -> TokenStream {
         /// CRC-32 over the tables: whether they are as generated.
         #[must_use]
         pub fn integrity() -> bool {
-            let mut crc = u32::MAX;
-            #integrity
-            !crc == #crc
+            IntegrityCheck::new().slice(IntegrityCheck::LENGTH) == Some(true)
         }
     }
 }

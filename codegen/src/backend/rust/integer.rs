@@ -4,6 +4,7 @@ use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use targets::IntegerLoop;
 
+use super::integrity::flat;
 use super::{float, ident, kernels, size, word};
 use crate::backend::assembly::Kernel;
 use crate::program::{ActivationCode, IntegerLayer, IntegerNetwork, Program};
@@ -200,26 +201,26 @@ pub fn q_values(network: &IntegerNetwork, has_fpu: bool) -> TokenStream {
 /// Statements of the integrity check.
 pub fn integrity(network: &IntegerNetwork) -> TokenStream {
     let layers = network.layers.iter().enumerate().map(|(index, layer)| {
-        if layer.is_streamed() {
-            return last_integrity(index, layer);
-        }
-        let names = blocks(index, layer);
-        let weights = names.iter().map(|(weights, ..)| {
-            quote! {
-                for weight in core::hint::black_box(&#weights.0).iter().flatten().flatten().flatten() {
-                    crc = crc_word(crc, i32::from(*weight) as u32);
-                }
-            }
-        });
-        let biases = names.iter().map(|(_, bias, ..)| {
-            quote! { for bias in core::hint::black_box(&#bias).iter().flatten() { crc = crc_word(crc, *bias as u32); } }
-        });
-        quote!(#(#weights)* #(#biases)*)
+        // biases of a streamed layer are one row, its weights have no blocks
+        let (names, biases, depth): (Vec<_>, Vec<_>, usize) = if layer.is_streamed() {
+            let names = chunks(index, layer).into_iter().map(|(weights, ..)| weights);
+            (names.collect(), vec![ident(&format!("BIAS{index}"))], 2)
+        } else {
+            let (names, biases) = blocks(index, layer)
+                .into_iter()
+                .map(|(weights, bias, ..)| (weights, bias))
+                .unzip();
+            (names, biases, 3)
+        };
+        let weights = names.iter().map(|weights| flat(&quote!(#weights.0), depth));
+        let biases = biases.iter().map(|bias| flat(&quote!(#bias), depth - 2));
+        quote!(#(span.weights(#weights);)* #(span.biases(#biases);)*)
     });
     quote!(#(#layers)*)
 }
 
-fn weight(network: &IntegerNetwork) -> TokenStream {
+/// Type of a weight.
+pub fn weight(network: &IntegerNetwork) -> TokenStream {
     if network.weight_bytes == 1 {
         quote!(i8)
     } else {
@@ -260,22 +261,6 @@ fn last_tables(network: &IntegerNetwork, index: usize, layer: &IntegerLayer) -> 
     let name = ident(&format!("BIAS{index}"));
     let bias = layer.bias.iter().map(|bias| signed(i64::from(*bias)));
     quote! { #(#tables)* static #name: [i32; #outputs] = [#(#bias),*]; }
-}
-
-/// Statements of the integrity check of a streamed layer.
-fn last_integrity(index: usize, layer: &IntegerLayer) -> TokenStream {
-    let weights = chunks(index, layer).into_iter().map(|(weights, ..)| {
-        quote! {
-            for weight in core::hint::black_box(&#weights.0).iter().flatten().flatten() {
-                crc = crc_word(crc, i32::from(*weight) as u32);
-            }
-        }
-    });
-    let bias = ident(&format!("BIAS{index}"));
-    quote! {
-        #(#weights)*
-        for bias in core::hint::black_box(&#bias) { crc = crc_word(crc, *bias as u32); }
-    }
 }
 
 /// The loop over blocks of `height` outputs that adds each to the sums of the streamed layer.

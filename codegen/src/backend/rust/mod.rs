@@ -4,6 +4,7 @@
 pub mod bindings;
 mod controller;
 mod integer;
+mod integrity;
 mod kernels;
 mod network;
 mod number;
@@ -51,6 +52,7 @@ pub fn items(program: &Program, type_name: &str) -> TokenStream {
     let types = types(program, &TokenStream::new());
     let helpers = statements::helpers(program);
     let network = network::items(program);
+    let integrity = integrity::items(program);
     let controller = controller::items(program, &ident(type_name));
     quote! {
         #constants
@@ -58,6 +60,7 @@ pub fn items(program: &Program, type_name: &str) -> TokenStream {
         #types
         #helpers
         #network
+        #integrity
         #controller
     }
 }

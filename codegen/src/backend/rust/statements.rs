@@ -171,7 +171,6 @@ pub fn helpers(program: &Program) -> TokenStream {
     } else {
         positive
     };
-    let checksums = checksums(scalar);
     quote! {
         /// A condition as 0 or 1. The optimiser must not know that: it would turn selections back into branches.
         #[inline(always)]
@@ -222,38 +221,5 @@ pub fn helpers(program: &Program) -> TokenStream {
         fn leaky_relu(x: #number, slope: #number) -> #number {
             select(#negative, slope * x, x)
         }
-        /// CRC-32 (IEEE 802.3) of words taken little-endian, whatever the byte order of the machine.
-        #[inline(always)]
-        #[allow(dead_code)]
-        fn crc_word(mut crc: u32, word: u32) -> u32 {
-            crc ^= word;
-            for _ in 0..8 {
-                crc = (crc >> 4) ^ CRC_STEPS[(crc & 15) as usize];
-            }
-            crc
-        }
-        #checksums
-    }
-}
-
-/// CRC functions over numbers and, where those have another width, over weights.
-fn checksums(scalar: Scalar) -> TokenStream {
-    let floats = quote! {
-        #[inline(never)]
-        fn crc_floats(crc: u32, words: &[f32]) -> u32 {
-            words.iter().fold(crc, |crc, word| crc_word(crc, word.to_bits()))
-        }
-    };
-    match scalar {
-        Scalar::F32 => floats,
-        Scalar::F64 => quote! {
-            #floats
-            #[inline(never)]
-            fn crc_numbers(crc: u32, words: &[f64]) -> u32 {
-                words.iter().fold(crc, |crc, word| {
-                    crc_word(crc_word(crc, word.to_bits() as u32), (word.to_bits() >> 32) as u32)
-                })
-            }
-        },
     }
 }

@@ -4,7 +4,8 @@ use policy::Scalar;
 use proc_macro2::{Ident, TokenStream};
 use quote::quote;
 
-use super::network::{checksum, columns, held, layer_items, sums, table};
+use super::integrity::{flat, numbers};
+use super::network::{columns, held, layer_items, sums, table};
 use super::{ident, kernels, number, size};
 use crate::program::LayerCode;
 
@@ -188,30 +189,25 @@ fn chunks(scalar: Scalar, index: usize, layer: &LayerCode, last: &LayerCode, val
 
 /// Statements of the integrity check, in the order of the table.
 pub fn integrity(scalar: Scalar, index: usize, layer: &LayerCode) -> TokenStream {
-    let checksum = checksum(scalar);
     let [weights, tail_weights, last_weights, last_tail_weights] = names(index).map(|name| held(layer, &name));
     let bias = ident(&format!("BIAS{index}"));
     let has_tail = layer.tail_rows() > 0;
     let full = if has_tail {
         quote! {
             for (blocks, tail) in core::hint::black_box(&#weights).iter().zip(core::hint::black_box(&#tail_weights)) {
-                for column in blocks.iter().flatten() { crc = crc_floats(crc, column); }
-                for column in tail { crc = crc_floats(crc, column); }
+                span.floats(blocks.as_flattened().as_flattened());
+                span.floats(tail.as_flattened());
             }
         }
     } else {
-        quote! {
-            for column in core::hint::black_box(&#weights).iter().flatten().flatten() { crc = crc_floats(crc, column); }
-        }
+        let weights = flat(&weights, 3);
+        quote!(span.floats(#weights);)
     };
     let shorter = (!layer.inputs.is_multiple_of(layer.chunk)).then(|| {
-        let tail = has_tail.then(|| {
-            quote! { for column in core::hint::black_box(&#last_tail_weights) { crc = crc_floats(crc, column); } }
-        });
-        quote! {
-            for column in core::hint::black_box(&#last_weights).iter().flatten() { crc = crc_floats(crc, column); }
-            #tail
-        }
+        let (weights, tail) = (flat(&last_weights, 2), flat(&last_tail_weights, 1));
+        let tail = has_tail.then(|| quote!(span.floats(#tail);));
+        quote!(span.floats(#weights); #tail)
     });
-    quote! { #full #shorter crc = #checksum(crc, core::hint::black_box(&#bias)); }
+    let (numbers, bias) = (numbers(scalar), flat(&quote!(#bias), 0));
+    quote! { #full #shorter span.#numbers(#bias); }
 }

@@ -100,8 +100,8 @@ fn planted_defects_in_binary64_are_caught() {
         ),
         ("front->observation[0] = ", "front->observation[0] = (double)(float)"),
         (
-            "buck12_duties[action], chosen",
-            "(double)(float)buck12_duties[action], chosen",
+            "chosen = buck12_duties[index]",
+            "chosen = (double)(float)buck12_duties[index]",
         ),
         (
             "state->previous_command = ",

@@ -153,7 +153,7 @@ fn greater_or_equal_in_argmax_is_caught_in_c() {
     let (_folder, policy) = ties();
     assert!(verify_files(&policy, &generated(&policy, Language::C), "gcc", &[]).passed());
     let files = edited(&policy, Language::C, &|text| {
-        text.replace("q[action] > best", "q[action] >= best")
+        text.replace("flag(output > best)", "flag(output >= best)")
     });
     assert_caught(&verify_files(&policy, &files, "gcc", &[]));
 }
@@ -170,7 +170,7 @@ fn a_limit_applied_before_the_mapping_is_caught() {
     let policy = example();
     let files = edited(&policy, Language::C, &|text| {
         text.replace(
-            "command->duty = buck12_select(usable, v8,",
+            "command->duty = buck12_select(usable, v7,",
             "command->duty = buck12_select(usable, v3,",
         )
     });
@@ -190,7 +190,7 @@ fn a_filter_that_forgets_is_caught() {
 fn an_eval_that_changes_the_state_is_caught() {
     let policy = example();
     let files = edited(&policy, Language::C, &|text| {
-        let place = "    buck12_sense(state, measured, &front);\n    buck12_decide(state, &front, command);\n}";
+        let place = "    buck12_sense(state, measured, &front);\n    buck12_decide(state, &front, index, command);\n}";
         text.replacen(
             place,
             &place.replace("\n}", "\n    ((buck12_state *)state)->bad_count += 1u;\n}"),

@@ -32,7 +32,7 @@ struct Peer {
     build: fn(&Site) -> Result<Vec<String>, Failure>,
 }
 
-const PEERS: [Peer; 3] = [
+const PEERS: [Peer; 4] = [
     Peer {
         name: "MicroFlow 0.1.3 int8",
         compiler: "rustc -O3, LTO",
@@ -48,11 +48,18 @@ const PEERS: [Peer; 3] = [
         build: emlearn,
     },
     Peer {
-        name: "burn-onnx 0.22.0 f32",
+        name: "burn-onnx 0.22.0 f32, ndarray",
         compiler: "rustc -O3, LTO",
         start: "void peer_start(void); peer_start();",
         limit: 1e-4,
-        build: burn_onnx,
+        build: |site| burn_onnx(site, "ndarray", BURN_NDARRAY),
+    },
+    Peer {
+        name: "burn-onnx 0.22.0 f32, flex",
+        compiler: "rustc -O3, LTO",
+        start: "void peer_start(void); peer_start();",
+        limit: 1e-4,
+        build: |site| burn_onnx(site, "flex", BURN_FLEX),
     },
 ];
 
@@ -132,23 +139,26 @@ impl<'a> Site<'a> {
         })
     }
 
-    /// Builds a package in a folder of its own with a library `peer`; returns the library.
-    fn package(&self, name: &str, files: &[(&str, String)]) -> Result<Vec<String>, Failure> {
+    /// Builds a package of this name in a folder of its own; returns the library.
+    fn package(&self, name: &str, dependencies: &str, files: &[(&str, String)]) -> Result<Vec<String>, Failure> {
         let package = self.folder.join(name);
         let failed = |error: std::io::Error| Failure(format!("{}: {error}", package.display()));
         std::fs::create_dir_all(package.join("src")).map_err(failed)?;
+        std::fs::write(package.join("Cargo.toml"), manifest(name, dependencies)).map_err(failed)?;
         for (file, text) in files {
             std::fs::write(package.join(file), text).map_err(failed)?;
         }
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-        let target = package.join("target");
+        let target = self.folder.join("target");
         run(Command::new(cargo)
             .current_dir(&package)
             .args(["build", "--release", "--target", self.rust.triple])
             .env("RUSTFLAGS", self.rust.machine_flags.join(" "))
             .env("CARGO_TARGET_DIR", &target)
             .stderr(Stdio::inherit()))?;
-        let library = target.join(self.rust.triple).join("release/libpeer.a");
+        let library = target
+            .join(self.rust.triple)
+            .join(format!("release/lib{}.a", name.replace('-', "_")));
         Ok(vec![library.display().to_string()])
     }
 
@@ -216,15 +226,19 @@ pub unsafe extern "C" fn peer_q_values({}) {{
     let dependencies = r#"microflow = "=0.1.3"
 nalgebra = { version = "=0.32.6", default-features = false, features = ["macros"] }
 "#;
-    site.package(
-        "microflow",
-        &[("Cargo.toml", package(dependencies)), ("src/lib.rs", code)],
-    )
+    site.package("microflow-peer", dependencies, &[("src/lib.rs", code)])
 }
 
+/// What burn computes with on a microcontroller: the backend that it recommends, and the one before, which needs a crate for
+/// atomics of 64 bits beside.
+const BURN_FLEX: &str =
+    r#"burn-flex = { version = "=0.22.1", default-features = false, features = ["critical-section"] }"#;
+const BURN_NDARRAY: &str = r#"burn-ndarray = { version = "=0.22.1", default-features = false }
+portable-atomic = { version = "=1.15.0", features = ["critical-section"] }"#;
+
 /// The model is made once, at the start; an inference has the floats of the observation and leaves those of the Q values.
-fn burn_onnx(site: &Site) -> Result<Vec<String>, Failure> {
-    eprintln!("note: burn-onnx takes many minutes to build the first time");
+fn burn_onnx(site: &Site, backend: &str, crates: &str) -> Result<Vec<String>, Failure> {
+    eprintln!("note: burn-onnx with {backend} takes many minutes to build the first time");
     let code = format!(
         r#"#![no_std]
 extern crate alloc;
@@ -276,20 +290,18 @@ pub unsafe extern "C" fn peer_q_values({}) {{
 "#,
         site.folder.join("network.onnx").display().to_string()
     );
-    let dependencies = r#"burn = { version = "=0.22.1", default-features = false, features = ["flex"] }
-burn-flex = { version = "=0.22.1", default-features = false, features = ["critical-section"] }
-burn-store = { version = "=0.22.1", default-features = false }
+    let dependencies = format!(
+        r#"burn = {{ version = "=0.22.1", default-features = false, features = ["{backend}"] }}
+burn-store = {{ version = "=0.22.1", default-features = false }}
 critical-section = "=1.2.0"
 embedded-alloc = "=0.7.0"
+{crates}
 [build-dependencies]
 burn-onnx = "=0.22.0"
-"#;
-    let files = [
-        ("Cargo.toml", package(dependencies)),
-        ("build.rs", script),
-        ("src/lib.rs", code),
-    ];
-    site.package("burn-onnx", &files)
+"#
+    );
+    let files = [("build.rs", script), ("src/lib.rs", code)];
+    site.package(&format!("burn-{backend}-peer"), &dependencies, &files)
 }
 
 /// For a library without `std`.
@@ -302,11 +314,11 @@ fn panic(_: &core::panic::PanicInfo) -> ! {
     loop {}
 }"#;
 
-/// A package with these dependencies, not a member of the workspace.
-fn package(dependencies: &str) -> String {
+/// Of a package that is not a member of the workspace.
+fn manifest(name: &str, dependencies: &str) -> String {
     format!(
         r#"[package]
-name = "peer"
+name = "{name}"
 version = "0.0.0"
 edition = "2021"
 [workspace]

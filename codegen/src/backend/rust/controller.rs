@@ -24,6 +24,7 @@ pub fn items(program: &Program, name: &Ident) -> TokenStream {
     let sense = sense(program);
     let decide = decide(program);
     let advance = advance(program);
+    let (eval, step) = bodies(program);
     let set_mapping = set_mapping(program);
     let checks = checks(program);
     let q_values = network::q_values(program);
@@ -42,7 +43,7 @@ pub fn items(program: &Program, name: &Ident) -> TokenStream {
             /// Command for this measurement; changes nothing.
             #[must_use]
             pub fn eval(&self, measured: &Measurement) -> Command {
-                self.decide(&self.sense(measured))
+                #eval
             }
             /// Advances the filters by one sample period, with the command that `eval` gave for this measurement.
             pub fn commit(&mut self, measured: &Measurement, command: &Command) {
@@ -51,10 +52,7 @@ pub fn items(program: &Program, name: &Ident) -> TokenStream {
             }
             /// `eval` and `commit`.
             pub fn step(&mut self, measured: &Measurement) -> Command {
-                let front = self.sense(measured);
-                let command = self.decide(&front);
-                self.advance(&front, &command);
-                command
+                #step
             }
             /// Observation for this measurement; changes nothing.
             #[must_use]
@@ -78,6 +76,35 @@ pub fn items(program: &Program, name: &Ident) -> TokenStream {
             }
         }
     }
+}
+
+/// Bodies of `eval` and `step`. To sense is a few per cent of the network where floats are hardware: there a measurement is
+/// sensed again after it instead of kept on the stack.
+fn bodies(program: &Program) -> (TokenStream, TokenStream) {
+    if program.has_fpu {
+        return (
+            quote! {
+                let chosen = self.choose_for(measured);
+                self.decide(&self.sense(measured), chosen)
+            },
+            quote! {
+                let chosen = self.choose_for(measured);
+                self.settle(measured, chosen)
+            },
+        );
+    }
+    (
+        quote! {
+            let front = self.sense(measured);
+            self.decide(&front, Self::choose(&front.observation))
+        },
+        quote! {
+            let front = self.sense(measured);
+            let command = self.decide(&front, Self::choose(&front.observation));
+            self.advance(&front, &command);
+            command
+        },
+    )
 }
 
 /// A state member in contract order.
@@ -287,16 +314,34 @@ fn decide(program: &Program) -> TokenStream {
     });
     let fallback = number(program.scalar(), program.fallback_duty);
     let (lowest, greater) = network::argmax(program);
+    let apart = program.has_fpu.then(|| {
+        quote! {
+            /// The greedy action for a measurement, with a stack of its own.
+            #[inline(never)]
+            fn choose_for(&self, measured: &Measurement) -> (u32, f32) {
+                Self::choose(&self.sense(measured).observation)
+            }
+            /// What a step does behind the network.
+            #[inline(never)]
+            fn settle(&mut self, measured: &Measurement, chosen: (u32, f32)) -> Command {
+                let front = self.sense(measured);
+                let command = self.decide(&front, chosen);
+                self.advance(&front, &command);
+                command
+            }
+        }
+    });
     quote! {
-        /// Network, argmax, mapping, limits, status.
+        #apart
+        /// Network and argmax: index and duty of the greedy action.
         #[inline(always)]
-        fn decide(&self, front: &Front) -> Command {
+        fn choose(observation: &[f32; FEATURES]) -> (u32, f32) {
             let mut best = #lowest;
             let mut chosen = DUTIES[0];
             let mut action_index = 0_u32;
             let mut action = 0_u32;
             // the lowest index wins among equals, a NaN never does
-            for (q, duty) in network(&front.observation).iter().zip(&DUTIES) {
+            for (q, duty) in network(observation).iter().zip(&DUTIES) {
                 let above = flag(*q > best);
                 let mask = 0_u32.wrapping_sub(above);
                 best = #greater(above, *q, best);
@@ -304,6 +349,11 @@ fn decide(program: &Program) -> TokenStream {
                 action_index = (action & mask) | (action_index & !mask);
                 action = action.wrapping_add(1);
             }
+            (action_index, chosen)
+        }
+        /// Mapping, limits, status.
+        #[inline(always)]
+        fn decide(&self, front: &Front, (action_index, chosen): (u32, f32)) -> Command {
             #(#statements)*
             let usable = front.usable;
             let status = #(#terms)|*;

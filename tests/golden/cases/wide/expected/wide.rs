@@ -717,7 +717,8 @@ impl Controller {
     /// Command for this measurement; changes nothing.
     #[must_use]
     pub fn eval(&self, measured: &Measurement) -> Command {
-        self.decide(&self.sense(measured))
+        let chosen = self.choose_for(measured);
+        self.decide(&self.sense(measured), chosen)
     }
     /// Advances the filters by one sample period, with the command that `eval` gave for this measurement.
     pub fn commit(&mut self, measured: &Measurement, command: &Command) {
@@ -726,10 +727,8 @@ impl Controller {
     }
     /// `eval` and `commit`.
     pub fn step(&mut self, measured: &Measurement) -> Command {
-        let front = self.sense(measured);
-        let command = self.decide(&front);
-        self.advance(&front, &command);
-        command
+        let chosen = self.choose_for(measured);
+        self.settle(measured, chosen)
     }
     /// Observation for this measurement; changes nothing.
     #[must_use]
@@ -862,14 +861,27 @@ impl Controller {
             clipped: f63,
         }
     }
-    /// Network, argmax, mapping, limits, status.
+    /// The greedy action for a measurement, with a stack of its own.
+    #[inline(never)]
+    fn choose_for(&self, measured: &Measurement) -> (u32, f32) {
+        Self::choose(&self.sense(measured).observation)
+    }
+    /// What a step does behind the network.
+    #[inline(never)]
+    fn settle(&mut self, measured: &Measurement, chosen: (u32, f32)) -> Command {
+        let front = self.sense(measured);
+        let command = self.decide(&front, chosen);
+        self.advance(&front, &command);
+        command
+    }
+    /// Network and argmax: index and duty of the greedy action.
     #[inline(always)]
-    fn decide(&self, front: &Front) -> Command {
+    fn choose(observation: &[f32; FEATURES]) -> (u32, f32) {
         let mut best = f64::MIN;
         let mut chosen = DUTIES[0];
         let mut action_index = 0_u32;
         let mut action = 0_u32;
-        for (q, duty) in network(&front.observation).iter().zip(&DUTIES) {
+        for (q, duty) in network(observation).iter().zip(&DUTIES) {
             let above = flag(*q > best);
             let mask = 0_u32.wrapping_sub(above);
             best = select(above, *q, best);
@@ -877,6 +889,11 @@ impl Controller {
             action_index = (action & mask) | (action_index & !mask);
             action = action.wrapping_add(1);
         }
+        (action_index, chosen)
+    }
+    /// Mapping, limits, status.
+    #[inline(always)]
+    fn decide(&self, front: &Front, (action_index, chosen): (u32, f32)) -> Command {
         let v0: f64 = self.mapping_a * chosen;
         let v1: f64 = self.mapping_b * front.signal[2];
         let v2: f64 = v0 + v1;

@@ -100,8 +100,8 @@ fn planted_defects_in_binary64_are_caught() {
         ),
         ("front->observation[0] = ", "front->observation[0] = (double)(float)"),
         (
-            "buck12_duties[action], chosen",
-            "(double)(float)buck12_duties[action], chosen",
+            "chosen = buck12_duties[index]",
+            "chosen = (double)(float)buck12_duties[index]",
         ),
         (
             "state->previous_command = ",
@@ -112,7 +112,7 @@ fn planted_defects_in_binary64_are_caught() {
         let mut files = clean.clone();
         let text = files.get_mut("buck12.c").unwrap();
         let edited = text.replacen(from, to, 1);
-        assert_ne!(*text, edited, "{from}: the edit has found its place");
+        assert!(*text != edited, "{from}: the edit has found its place");
         *text = edited;
         let options = Options {
             steps: 5000,

@@ -97,13 +97,10 @@ impl Bench {
                 rows.push(row);
             }
         }
-        // Rust has loops in assembly for integers only
-        if !assembly || policy::scales::is_integer(policy.numeric_format) {
-            self.rust_archive(target, assembly)?;
-            let mut row = self.counted(target, &["unit.a"], &[])?;
-            row.compiler = "rustc -O3".to_owned();
-            rows.push(row);
-        }
+        self.rust_archive(target, assembly)?;
+        let mut row = self.counted(target, &["unit.a"], &[])?;
+        row.compiler = "rustc -O3".to_owned();
+        rows.push(row);
         for row in &mut rows {
             row.policy = name.to_owned();
             row.variant = format_name(policy, assembly);

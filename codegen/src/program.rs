@@ -323,6 +323,8 @@ pub struct Program {
     pub numeric_format: NumericFormat,
     /// Whether the target has floats in hardware.
     pub has_fpu: bool,
+    /// The target's processor, as assemblers name it.
+    pub processor: Option<&'static str>,
     /// Origin.
     pub provenance: Provenance,
     /// Measurement fields.

@@ -48,11 +48,13 @@ const BASE: TargetSpec = TargetSpec {
     c_row_block: RowBlock::Rows(4),
     rust_row_block: RowBlock::Rows(4),
     weights_alignment: None,
+    has_float_assembly: false,
     integer_block: IntegerBlock {
         rows: 6,
         unrolled: 1,
         inner: IntegerLoop::Plain,
         streams: false,
+        rust_rows: (4, 4),
     },
     c_compilers: &[],
     c_flags: EXACT_C99,
@@ -75,6 +77,7 @@ pub const CORTEX_M0PLUS: TargetSpec = TargetSpec {
         unrolled: 1,
         inner: IntegerLoop::Halves,
         streams: false,
+        rust_rows: (8, 8),
     },
     c_compilers: &[
         gcc(&["-mthumb", "-mcpu=cortex-m0plus"]),
@@ -111,7 +114,7 @@ const FPU_BASE: TargetSpec = TargetSpec {
     // 32 single registers: 16 accumulators, one input, loads in flight
     c_row_block: RowBlock::Rows(16),
     rust_row_block: RowBlock::Rows(16),
-    weights_alignment: None,
+    has_float_assembly: true,
     integer_block: IntegerBlock::DUAL,
     ..BASE
 };

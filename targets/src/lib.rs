@@ -63,6 +63,9 @@ pub struct IntegerBlock {
     /// Whether the last layer takes the outputs of the one before block by block, so that those are never in memory: less
     /// stack and, where a block and its sums fit into registers, no more instructions.
     pub streams: bool,
+    /// In Rust instead of `rows`, with 16-bit and with 8-bit weights: LLVM unrolls the loops over a block and spills sooner or
+    /// later than C compilers do.
+    pub rust_rows: (usize, usize),
 }
 
 impl IntegerBlock {
@@ -72,6 +75,7 @@ impl IntegerBlock {
         unrolled: 4,
         inner: IntegerLoop::Dual,
         streams: true,
+        rust_rows: (4, 4),
     };
 }
 
@@ -161,6 +165,15 @@ pub struct RustTarget {
     pub machine_flags: &'static [&'static str],
 }
 
+impl RustTarget {
+    /// The processor, as its flag names it.
+    #[must_use]
+    pub fn processor(&self) -> Option<&'static str> {
+        let flags = self.machine_flags.iter();
+        flags.filter_map(|flag| flag.strip_prefix("-Ctarget-cpu=")).next()
+    }
+}
+
 /// Where a build of the target runs under `policyc verify`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -202,7 +215,9 @@ pub struct TargetSpec {
     pub rust_row_block: RowBlock,
     /// Bytes to a multiple of which the weights of a network in floats are aligned, where loads of whole vectors gain by it.
     pub weights_alignment: Option<u32>,
-    /// Blocks of the integer formats; Rust takes 4 rows at most.
+    /// Whether a network in binary32 has loops in assembly: ARM cores with binary32 in hardware.
+    pub has_float_assembly: bool,
+    /// Blocks of the integer formats.
     pub integer_block: IntegerBlock,
     /// C compilers in the order in which they are tried. The first also links what the others compile.
     pub c_compilers: &'static [CCompiler],

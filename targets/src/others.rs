@@ -26,6 +26,7 @@ pub const HOST: TargetSpec = TargetSpec {
     rust_row_block: RowBlock::Rows(32),
     // a line of the cache: no vector lies across two
     weights_alignment: Some(64),
+    has_float_assembly: false,
     integer_block: IntegerBlock::DUAL,
     c_compilers: &[
         CCompiler {
@@ -62,11 +63,13 @@ pub const DSPACE_DS1202: TargetSpec = TargetSpec {
     c_row_block: RowBlock::Rows(16),
     rust_row_block: RowBlock::Rows(16),
     weights_alignment: None,
+    has_float_assembly: false,
     integer_block: IntegerBlock {
         rows: 8,
         unrolled: 2,
         inner: IntegerLoop::Plain,
         streams: false,
+        rust_rows: (4, 4),
     },
     c_compilers: &[CCompiler {
         program: "powerpc-linux-gnu-gcc",
@@ -108,11 +111,13 @@ pub const C2000_C28X: TargetSpec = TargetSpec {
     c_row_block: RowBlock::Rows(4),
     rust_row_block: RowBlock::Rows(4),
     weights_alignment: None,
+    has_float_assembly: false,
     integer_block: IntegerBlock {
         rows: 4,
         unrolled: 2,
         inner: IntegerLoop::Plain,
         streams: false,
+        rust_rows: (4, 4),
     },
     c_compilers: &[CCompiler {
         program: "cl2000",

@@ -36,11 +36,13 @@ pub const RISCV32IMC: TargetSpec = TargetSpec {
     c_row_block: RowBlock::Rows(8),
     rust_row_block: RowBlock::Rows(8),
     weights_alignment: None,
+    has_float_assembly: false,
     integer_block: IntegerBlock {
         rows: 8,
         unrolled: 2,
         inner: IntegerLoop::Plain,
         streams: false,
+        rust_rows: (8, 4),
     },
     // clang puts float constants into the writable .sdata unless the limit is 0
     // the bare compiler has no C library, so <stdint.h> is there in freestanding mode only
@@ -71,7 +73,6 @@ pub const RISCV32IMFC: TargetSpec = TargetSpec {
     suitable_format: "f32",
     c_row_block: RowBlock::Rows(16),
     rust_row_block: RowBlock::Rows(16),
-    weights_alignment: None,
     c_compilers: &[
         gcc(&["-march=rv32imfc", "-mabi=ilp32f", "-ffreestanding"]),
         clang(&[

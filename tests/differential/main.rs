@@ -5,6 +5,7 @@ mod formats;
 mod macro_crate;
 mod mutations;
 mod simplified;
+mod warnings;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 

@@ -6,6 +6,7 @@
 mod costs;
 mod counter;
 mod fallback;
+mod formats;
 mod included;
 
 use std::collections::BTreeMap;

@@ -2,7 +2,7 @@
 
 use targets::IntegerLoop;
 
-use crate::program::{ActivationCode, IntegerLayer, IntegerNetwork};
+use crate::program::{ActivationCode, IntegerLayer, IntegerNetwork, LayerCode};
 
 /// What a kernel leaves of a sum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -292,7 +292,6 @@ impl Kernel {
 ///
 /// Operands: pointers `w`, `input`, `bias`, `out` and the counter `turns`, all advanced; `low` and `high` for the
 /// rectified outputs; registers s0 to s27 are overwritten.
-#[cfg(feature = "c")]
 pub struct RealKernel {
     /// Inputs.
     pub inputs: usize,
@@ -302,12 +301,26 @@ pub struct RealKernel {
     pub relu: bool,
 }
 
-#[cfg(feature = "c")]
 impl RealKernel {
     /// Most outputs whose sums fit beside the weights in flight.
-    pub const MAX_HEIGHT: usize = 16;
+    const MAX_HEIGHT: usize = 16;
     /// First register of the weights, number of weights in flight, first register of the inputs.
     const WEIGHTS: (usize, usize, usize) = (16, 8, 24);
+
+    /// The kernel of `height` outputs of a layer, from `inputs` inputs; `None` where the layer has none.
+    #[cfg(feature = "c")]
+    pub fn of(layer: &LayerCode, inputs: usize, height: usize) -> Option<Self> {
+        Self::is_for(layer).then_some(Self {
+            inputs,
+            height,
+            relu: layer.activation == ActivationCode::Relu,
+        })
+    }
+
+    /// Whether the blocks of a layer have kernels.
+    pub fn is_for(layer: &LayerCode) -> bool {
+        layer.has_assembly && !layer.in_memory && layer.block_rows <= Self::MAX_HEIGHT
+    }
 
     fn unrolled(&self) -> usize {
         (1..=4).rev().find(|n| self.inputs.is_multiple_of(*n)).unwrap_or(1)
@@ -319,6 +332,7 @@ impl RealKernel {
     }
 
     /// Registers that are overwritten.
+    #[cfg(feature = "c")]
     pub fn clobbered() -> Vec<String> {
         (0..28).map(|register| format!("s{register}")).collect()
     }

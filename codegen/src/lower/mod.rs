@@ -8,8 +8,8 @@ pub mod network;
 pub mod simplify;
 
 pub use command::STATUS;
-use policy::Policy;
 use policy::rounding::{down_f32, nearest_f32, up_f32};
+use policy::{NumericFormat, Policy};
 use targets::{Fpu, TargetSpec};
 
 use crate::crc::crc32_words;
@@ -23,13 +23,22 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
     let row_block = match language {
         Language::C => target.c_row_block,
         Language::Rust => {
-            // LLVM unrolls the loops over a block and runs out of registers with more
-            integer_block.rows = integer_block.rows.min(4);
+            let (of_16, of_8) = integer_block.rust_rows;
+            integer_block.rows = if policy.numeric_format == NumericFormat::I8 {
+                of_8
+            } else {
+                of_16
+            };
             target.rust_row_block
         }
     };
     let (front, memory_words) = front::lower(policy);
-    let network = network::lower(policy, row_block, target.weights_alignment, integer_block);
+    let loops = network::FloatLoops {
+        row_block,
+        alignment: target.weights_alignment,
+        has_assembly: target.has_float_assembly && policy.numeric_format == NumericFormat::F32,
+    };
+    let network = network::lower(policy, loops, integer_block);
     let duties: Vec<_> = policy
         .actions
         .iter()
@@ -40,6 +49,7 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
         sample_period: policy.sample_period,
         numeric_format: policy.numeric_format,
         has_fpu: target.fpu != Fpu::None,
+        processor: target.rust.and_then(|rust| rust.processor()),
         provenance: Provenance {
             tool: TOOL.to_owned(),
             digests: policy.digests.clone(),

@@ -20,39 +20,49 @@ pub const TANH_DENOMINATOR: [f32; 5] = [1.0, 0.467_065_04, 0.025_842_024, 0.000_
 /// Beyond this magnitude the approximation is evaluated at the end of its range.
 pub const TANH_RANGE: f32 = 9.0;
 
+/// Loops of a network in floats that suit target and language.
+#[derive(Debug, Clone, Copy)]
+pub struct FloatLoops {
+    /// Outputs side by side.
+    pub row_block: RowBlock,
+    /// Bytes to which weights are aligned, if to more than a float.
+    pub alignment: Option<u32>,
+    /// Whether there are loops in assembly.
+    pub has_assembly: bool,
+}
+
 /// The network in the policy's numeric format.
-pub fn lower(policy: &Policy, row_block: RowBlock, alignment: Option<u32>, integer_block: IntegerBlock) -> NetworkCode {
+pub fn lower(policy: &Policy, loops: FloatLoops, integer_block: IntegerBlock) -> NetworkCode {
     let Simplified { policy, scales } = simplify::simplified(policy);
     match scales {
         Some(scales) => NetworkCode::Integer(integer::lower(&policy, &scales, integer_block)),
         None => NetworkCode::Real {
             fused: policy.numeric_format == NumericFormat::F32Fma,
-            layers: layers(&policy, row_block, alignment),
+            layers: layers(&policy, loops),
         },
     }
 }
 
 /// The last layer takes the outputs of the one before block by block where blocks are variables: half of the stack.
-fn layers(policy: &Policy, row_block: RowBlock, alignment: Option<u32>) -> Vec<LayerCode> {
-    let row_block = match (row_block, policy.numeric_format) {
+fn layers(policy: &Policy, mut loops: FloatLoops) -> Vec<LayerCode> {
+    if let (RowBlock::Vectors(_), NumericFormat::F32Fma) = (loops.row_block, policy.numeric_format) {
         // the fused operation is a function of scalars
-        (RowBlock::Vectors(_), NumericFormat::F32Fma) => RowBlock::All,
-        _ => row_block,
-    };
+        loops.row_block = RowBlock::All;
+    }
     let last = policy.layers.len().saturating_sub(1);
-    let chunk = |index: usize, layer: &Layer| match row_block {
+    let chunk = |index: usize, layer: &Layer| match loops.row_block {
         RowBlock::Rows(rows) if index == last && index > 0 => rows.clamp(1, layer.inputs),
         _ => layer.inputs,
     };
     let layers = policy.layers.iter().enumerate();
     layers
-        .map(|(index, layer)| real(layer, row_block, chunk(index, layer), alignment))
+        .map(|(index, layer)| real(layer, loops, chunk(index, layer)))
         .collect()
 }
 
 /// Orders the weights in the blocks in which the generated code reads them.
-fn real(layer: &Layer, row_block: RowBlock, chunk: usize, alignment: Option<u32>) -> LayerCode {
-    let block_rows = match row_block {
+fn real(layer: &Layer, loops: FloatLoops, chunk: usize) -> LayerCode {
+    let block_rows = match loops.row_block {
         RowBlock::All => layer.outputs,
         RowBlock::Rows(rows) | RowBlock::Vectors(rows) => rows.clamp(1, layer.outputs),
     };
@@ -72,9 +82,10 @@ fn real(layer: &Layer, row_block: RowBlock, chunk: usize, alignment: Option<u32>
         outputs: layer.outputs,
         block_rows,
         chunk,
-        alignment,
-        in_memory: !matches!(row_block, RowBlock::Rows(_)),
-        has_vectors: matches!(row_block, RowBlock::Vectors(_)),
+        alignment: loops.alignment,
+        in_memory: !matches!(loops.row_block, RowBlock::Rows(_)),
+        has_vectors: matches!(loops.row_block, RowBlock::Vectors(_)),
+        has_assembly: loops.has_assembly,
         table,
         bias: layer.bias.clone(),
         activation: activation(layer),

@@ -32,6 +32,8 @@ pub struct LayerCode {
     pub in_memory: bool,
     /// Whether vectors of the compiler are taken where it has them; else what `in_memory` says.
     pub has_vectors: bool,
+    /// Whether the target has the sums of a block in assembly.
+    pub has_assembly: bool,
     /// Bytes to which the table of weights is aligned, if to more than its elements.
     pub alignment: Option<u32>,
     /// Inputs taken at a time: all, or the block of outputs that the layer before has just made. Then the sums stand in the

@@ -11,6 +11,7 @@ use targets::IntegerLoop;
 use templates::Template;
 use templates::c::{Argmax, Common, Constant, Header, Helpers, Member, NetworkView, PushView, Source, WideChar};
 
+use crate::backend::assembly::RealKernel;
 use crate::backend::{Backend, banner};
 use crate::lower::STATUS;
 use crate::program::{ActivationCode, Coefficient, NetworkCode, Op, Program};
@@ -406,7 +407,7 @@ fn helpers(program: &Program) -> Helpers {
         leaky_relu: real && network.activates(|activation| matches!(activation, ActivationCode::LeakyRelu(_))),
         tanh: network.activates(|activation| activation == ActivationCode::Tanh),
         assembly: match network {
-            NetworkCode::Real { fused, layers } => layers.iter().any(|layer| real::has_assembly(layer, *fused)),
+            NetworkCode::Real { layers, .. } => layers.iter().any(RealKernel::is_for),
             NetworkCode::Integer(network) => integer::is_in_assembly(network),
         },
         vectors: match network {

@@ -186,7 +186,7 @@ impl Function {
             in_memory: layer.in_memory,
             has_vectors: layer.has_vectors,
             has_loop: self.blocks.iter().any(|(count, _)| *count > 1),
-            has_assembly: has_assembly(layer, fused),
+            has_assembly: RealKernel::is_for(layer),
             blocks: self
                 .blocks
                 .iter()
@@ -202,11 +202,8 @@ impl Function {
         BlockView {
             count,
             rows,
-            assembly: if has_assembly(layer, fused) {
-                assembly(name, layer, self.inputs, rows)
-            } else {
-                Vec::new()
-            },
+            assembly: RealKernel::of(layer, self.inputs, rows)
+                .map_or_else(Vec::new, |kernel| assembly(name, layer, &kernel)),
             vectors: if layer.has_vectors {
                 LANES.map(|lanes| vectors(name, lanes, rows)).to_vec()
             } else {
@@ -267,18 +264,8 @@ fn vectors(name: &str, lanes: usize, rows: usize) -> VectorView {
     view
 }
 
-/// Whether the blocks of a layer have a form in assembly.
-pub fn has_assembly(layer: &LayerCode, fused: bool) -> bool {
-    !fused && !layer.in_memory && layer.block_rows <= RealKernel::MAX_HEIGHT
-}
-
 /// One asm statement for a block, then what it leaves of the activation.
-fn assembly(name: &str, layer: &LayerCode, inputs: usize, height: usize) -> Vec<String> {
-    let kernel = RealKernel {
-        inputs,
-        height,
-        relu: layer.activation == ActivationCode::Relu,
-    };
+fn assembly(name: &str, layer: &LayerCode, kernel: &RealKernel) -> Vec<String> {
     let activated = |row: usize| activation(name, layer.activation, &format!("done[{row}]"));
     let applied = !kernel.relu && !activated(0).is_empty();
     let mut lines = vec![
@@ -305,7 +292,7 @@ fn assembly(name: &str, layer: &LayerCode, inputs: usize, height: usize) -> Vec<
     let clobbered: Vec<String> = clobbered.collect();
     lines.push(format!("    : {}, \"cc\", \"memory\");", clobbered.join(", ")));
     if applied {
-        lines.extend((0..height).map(|row| format!("done[{row}] = {};", activated(row))));
+        lines.extend((0..kernel.height).map(|row| format!("done[{row}] = {};", activated(row))));
     }
     std::iter::once("{".to_owned())
         .chain(lines.into_iter().map(|line| format!("    {line}")))

@@ -4,22 +4,22 @@ use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 use targets::IntegerLoop;
 
-use super::{float, ident, size, word};
+use super::{float, ident, kernels, size, word};
 use crate::backend::assembly::Kernel;
-use crate::program::{ActivationCode, IntegerLayer, IntegerNetwork};
+use crate::program::{ActivationCode, IntegerLayer, IntegerNetwork, Program};
 
 /// Tables, layers and `network`.
-pub fn items(network: &IntegerNetwork, has_fpu: bool) -> TokenStream {
+pub fn items(program: &Program, network: &IntegerNetwork) -> TokenStream {
     let weight = weight(network);
     let lanes = size(network.lanes.len());
     let (before, streamed) = network.pieces();
     let whole = before.iter().enumerate();
     let mut layers: Vec<TokenStream> = whole
-        .map(|(index, layer)| layer_items(network, index, layer, None))
+        .map(|(index, layer)| layer_items(program, network, index, layer, None))
         .collect();
     if let Some((block, last)) = streamed {
         layers.push(last_tables(network, before.len() + 1, last));
-        layers.push(layer_items(network, before.len(), block, Some(last)));
+        layers.push(layer_items(program, network, before.len(), block, Some(last)));
     }
     let names: Vec<_> = (0..network.lanes.len()).map(|i| ident(&format!("x{i}"))).collect();
     let products = network.lanes.iter().enumerate().map(|(at, lane)| {
@@ -38,7 +38,7 @@ pub fn items(network: &IntegerNetwork, has_fpu: bool) -> TokenStream {
     });
     let (buffers, calls) = calls(network);
     let extremes = extremes(network);
-    let q_value = (!has_fpu).then(|| q_value(network));
+    let q_value = (!program.has_fpu).then(|| q_value(network));
     let padded = size(padded);
     let doc = format!(
         " Sums of one block of outputs, within +-{} for every input.",
@@ -318,6 +318,7 @@ fn blocks(index: usize, layer: &IntegerLayer) -> Vec<(proc_macro2::Ident, proc_m
 
 /// Tables and function of a layer; with `last` its blocks go into the sums of that streamed layer.
 fn layer_items(
+    program: &Program,
     network: &IntegerNetwork,
     index: usize,
     layer: &IntegerLayer,
@@ -372,7 +373,7 @@ fn layer_items(
             None => whole,
         });
         let blocks = ((last - first) / height, *height);
-        if let Some(kernel) = kernel(network, index, layer, blocks, streamed) {
+        if let Some(kernel) = kernel(program, network, index, layer, blocks, streamed) {
             let (name, first) = (
                 kernel_name(index, *height),
                 size(if next.is_some() { 0 } else { *first }),
@@ -427,6 +428,7 @@ fn kernel_name(index: usize, height: usize) -> proc_macro2::Ident {
 
 /// All blocks of a height in assembly, for ARM cores with `SMLAD` if the build asks for it.
 fn kernel(
+    program: &Program,
     network: &IntegerNetwork,
     index: usize,
     layer: &IntegerLayer,
@@ -440,13 +442,14 @@ fn kernel(
     let (sink, _) = sink(network, index, layer);
     let sink = if streamed.is_some() { quote!(i32) } else { sink };
     let next = streamed.map(|_| quote!(, next: *const #weight));
+    let processor = kernels::processor(program);
     Some(quote! {
         /// `--cfg policyc_assembly` takes the loops in assembly (Armv7E-M and Armv8-M with DSP); the bits are the same.
         #[cfg(all(target_arch = "arm", policyc_assembly))]
         #[allow(unexpected_cfgs)]
         #[unsafe(naked)]
         unsafe extern "C" fn #name(x: *const i16, y: *mut #sink, weights: *const #weight, bias: *const i32 #next) {
-            core::arch::naked_asm!(#(#text),*)
+            core::arch::naked_asm!(#processor, #(#text),*)
         }
     })
 }
@@ -477,7 +480,7 @@ fn cut(layer: &IntegerLayer) -> TokenStream {
     if layer.shift == 0 {
         quote!(sum)
     } else {
-        quote!((sum >> #shift))
+        quote!(sum >> #shift)
     }
 }
 
@@ -485,7 +488,8 @@ fn activated(layer: &IntegerLayer, is_last: bool) -> TokenStream {
     let cut = cut(layer);
     match layer.activation {
         ActivationCode::Identity if is_last => cut,
-        ActivationCode::Identity => quote!(#cut as i16),
+        ActivationCode::Identity if layer.shift == 0 => quote!(sum as i16),
+        ActivationCode::Identity => quote!((#cut) as i16),
         ActivationCode::Relu => quote!(positive(#cut)),
         ActivationCode::LeakyRelu(_) => {
             let slope = signed(i64::from(layer.slope));

@@ -4,6 +4,7 @@
 pub mod bindings;
 mod controller;
 mod integer;
+mod kernels;
 mod network;
 mod statements;
 mod streamed;

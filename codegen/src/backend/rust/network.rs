@@ -3,7 +3,7 @@
 use proc_macro2::{Ident, TokenStream};
 use quote::quote;
 
-use super::{float, ident, integer, size, streamed};
+use super::{float, ident, integer, kernels, size, streamed};
 use crate::lower::network::{TANH_DENOMINATOR, TANH_NUMERATOR};
 use crate::program::{ActivationCode, LayerCode, NetworkCode, Program};
 
@@ -15,8 +15,8 @@ pub fn items(program: &Program) -> TokenStream {
         .activates(|activation| activation == ActivationCode::Tanh)
         .then(tanh);
     let network = match &program.network {
-        NetworkCode::Real { fused, layers } => real(layers, *fused),
-        NetworkCode::Integer(network) => integer::items(network, program.has_fpu),
+        NetworkCode::Real { fused, layers } => real(program, layers, *fused),
+        NetworkCode::Integer(network) => integer::items(program, network),
     };
     quote! {
         static DUTIES: [f32; ACTIONS] = [#(#duties),*];
@@ -41,7 +41,7 @@ pub fn q_values(program: &Program) -> TokenStream {
     }
 }
 
-fn real(layers: &[LayerCode], fused: bool) -> TokenStream {
+fn real(program: &Program, layers: &[LayerCode], fused: bool) -> TokenStream {
     let (items, body) = streamed::network(layers);
     let aligned = layers.iter().find_map(|layer| layer.alignment).map(aligned);
     let fma = fused.then(fma);
@@ -50,24 +50,11 @@ fn real(layers: &[LayerCode], fused: bool) -> TokenStream {
     } else {
         quote!(*sum += *weight * *x;)
     };
+    let blocks = kernels::items(program, layers, &accumulate);
     quote! {
         #fma
         #aligned
-        /// Sums of one block of outputs: from the bias, inputs in index order, every operation rounded.
-        #[inline(always)]
-        fn block<const INPUTS: usize, const ROWS: usize>(
-            weights: &[[f32; ROWS]; INPUTS],
-            bias: &[f32; ROWS],
-            x: &[f32; INPUTS],
-        ) -> [f32; ROWS] {
-            let mut sums = *bias;
-            for (column, x) in weights.iter().zip(x) {
-                for (sum, weight) in sums.iter_mut().zip(column) {
-                    #accumulate
-                }
-            }
-            sums
-        }
+        #blocks
         #items
         fn network(observation: &[f32; FEATURES]) -> [f32; ACTIONS] {
             #body
@@ -129,7 +116,7 @@ pub(super) fn layer_items(index: usize, layer: &LayerCode) -> (TokenStream, Toke
         .map(|block| columns(block, rows));
     let biases = layer.bias[..split].chunks(rows).map(row);
     let (rows_size, full_size) = (size(rows), size(full));
-    let activated = activation(layer.activation);
+    let stored = kernels::store(layer.activation, &quote!(weights, bias, x), &quote!(out));
     let (tail_tables, tail_loop) = tail(index, layer);
     let kind = quote!([[[f32; #rows_size]; #inputs]; #full_size]);
     let (held, table) = (
@@ -144,20 +131,16 @@ pub(super) fn layer_items(index: usize, layer: &LayerCode) -> (TokenStream, Toke
     let function = quote! {
         #[doc = #doc]
         #[inline(always)]
-        fn #name(x: &[f32; #inputs]) -> [f32; #outputs] {
-            let mut y = [0.0; #outputs];
-            let mut rest: &mut [f32] = &mut y;
+        fn #name(x: &[f32; #inputs], y: &mut [Slot; #outputs]) {
+            let mut rest: &mut [Slot] = y;
             for (weights, bias) in #held.iter().zip(&#bias) {
                 // no division and no slice index, so no way to a panic at any optimisation level
                 if let Some((out, after)) = core::mem::take(&mut rest).split_first_chunk_mut::<#rows_size>() {
-                    for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-                        *y = #activated;
-                    }
+                    #stored
                     rest = after;
                 }
             }
             #tail_loop
-            y
         }
     };
     (tables, function)
@@ -177,16 +160,16 @@ fn tail(index: usize, layer: &LayerCode) -> (TokenStream, TokenStream) {
     let values = columns(&layer.table[split * layer.inputs..], rows);
     let biases = row(&layer.bias[split..]);
     let (inputs, rows) = (size(layer.inputs), size(rows));
-    let activated = activation(layer.activation);
     let table = table(layer, &weights, &quote!([[f32; #rows]; #inputs]), &values);
     let held = held(layer, &weights);
+    let stored = kernels::store(layer.activation, &quote!(&#held, &#bias, x), &quote!(out));
     let tables = quote! {
         #table
         static #bias: [f32; #rows] = #biases;
     };
     let code = quote! {
-        for (y, sum) in rest.iter_mut().zip(block(&#held, &#bias, x)) {
-            *y = #activated;
+        if let Some((out, _)) = rest.split_first_chunk_mut::<#rows>() {
+            #stored
         }
     };
     (tables, code)

@@ -3,8 +3,8 @@
 use proc_macro2::{Ident, TokenStream};
 use quote::quote;
 
-use super::network::{activation, columns, held, layer_items, row, table};
-use super::{ident, size};
+use super::network::{columns, held, layer_items, row, table};
+use super::{ident, kernels, size};
 use crate::program::LayerCode;
 
 /// Tables and functions of all layers, and the body of `network`.
@@ -21,9 +21,13 @@ pub fn network(layers: &[LayerCode]) -> (TokenStream, TokenStream) {
         let (tables, function) = layer_items(index, layer);
         items.push(quote!(#tables #function));
         let (name, sink) = (ident(&format!("layer{index}")), ident(&format!("hidden{index}")));
-        calls.push(quote! { let #sink = #name(#value); });
-        value = quote!(&#sink);
-        result = quote!(#sink);
+        let outputs = size(layer.outputs);
+        calls.push(quote! {
+            let mut #sink = [EMPTY; #outputs];
+            #name(#value, &mut #sink);
+        });
+        value = quote!(filled(&#sink));
+        result = quote!(*filled(&#sink));
     }
     let Some((block, last)) = streamed else {
         return (quote!(#(#items)*), quote!(#(#calls)* #result));
@@ -85,7 +89,7 @@ fn last_layer(index: usize, layer: &LayerCode) -> TokenStream {
             quote!(tail: &[[f32; #tail_rows]; INPUTS],),
             quote! {
                 if let Some((out, _)) = rest.split_first_chunk_mut::<#tail_rows>() {
-                    *out = block(tail, out, x);
+                    added(tail, x, out);
                 }
             },
         )
@@ -110,7 +114,7 @@ fn last_layer(index: usize, layer: &LayerCode) -> TokenStream {
             let mut rest: &mut [f32] = sums;
             for weights in weights {
                 if let Some((out, after)) = core::mem::take(&mut rest).split_first_chunk_mut::<#rows>() {
-                    *out = block(weights, out, x);
+                    added(weights, x, out);
                     rest = after;
                 }
             }
@@ -130,7 +134,9 @@ fn chunks(index: usize, layer: &LayerCode, last: &LayerCode, value: &TokenStream
     );
     let (name, sums) = (ident(&format!("layer{next}")), ident(&format!("BIAS{next}")));
     let [before, before_tail] = [before, before_tail].map(|name| held(layer, &name));
-    let activated = activation(layer.activation);
+    let store = |weights: &TokenStream, bias: &TokenStream| {
+        kernels::store(layer.activation, &quote!(#weights, #bias, #value), &quote!(&mut part))
+    };
     let has_tail = last.tail_rows() > 0;
     let (iterator, pattern, argument, last_argument) = if has_tail {
         (
@@ -148,16 +154,22 @@ fn chunks(index: usize, layer: &LayerCode, last: &LayerCode, value: &TokenStream
         )
     };
     let shorter = (!last.inputs.is_multiple_of(last.chunk)).then(|| {
+        let stored = store(&quote!(&#before_tail), &quote!(&#bias_tail));
+        let length = size(last.inputs % last.chunk);
         quote! {
-            let part = block(&#before_tail, &#bias_tail, #value).map(|sum| #activated);
-            #name(&#last_weights, #last_argument &part, &mut q);
+            let mut part = [EMPTY; #length];
+            #stored
+            #name(&#last_weights, #last_argument filled(&part), &mut q);
         }
     });
+    let stored = store(&quote!(weights), &quote!(bias));
+    let length = size(last.chunk);
     quote! {
         let mut q = #sums;
+        let mut part = [EMPTY; #length];
         for #pattern in #iterator {
-            let part = block(weights, bias, #value).map(|sum| #activated);
-            #name(next, #argument &part, &mut q);
+            #stored
+            #name(next, #argument filled(&part), &mut q);
         }
         #shorter
         q

@@ -157,6 +157,7 @@ fn tanh(x: f32) -> f32 {
 struct Aligned<T>(T);
 /// Sums of one block of outputs: from the bias, inputs in index order, every operation rounded.
 #[inline(always)]
+#[allow(dead_code)]
 fn block<const INPUTS: usize, const ROWS: usize>(
     weights: &[[f32; ROWS]; INPUTS],
     bias: &[f32; ROWS],
@@ -170,6 +171,50 @@ fn block<const INPUTS: usize, const ROWS: usize>(
     }
     sums
 }
+/// What an activation is kept in.
+type Slot = f32;
+const EMPTY: Slot = 0.0;
+#[inline(always)]
+fn filled<const N: usize>(slots: &[Slot; N]) -> &[f32; N] {
+    slots
+}
+#[inline(always)]
+#[allow(dead_code)]
+fn activate<const N: usize>(slots: &mut [Slot; N], activation: impl Fn(f32) -> f32) {
+    *slots = slots.map(activation);
+}
+/// Sums of a block.
+#[inline(always)]
+#[allow(dead_code)]
+fn plain<const INPUTS: usize, const ROWS: usize>(
+    weights: &[[f32; ROWS]; INPUTS],
+    bias: &[f32; ROWS],
+    x: &[f32; INPUTS],
+    out: &mut [Slot; ROWS],
+) {
+    *out = block(weights, bias, x);
+}
+/// Sums of a block behind a ReLU.
+#[inline(always)]
+#[allow(dead_code)]
+fn rectified<const INPUTS: usize, const ROWS: usize>(
+    weights: &[[f32; ROWS]; INPUTS],
+    bias: &[f32; ROWS],
+    x: &[f32; INPUTS],
+    out: &mut [Slot; ROWS],
+) {
+    *out = block(weights, bias, x).map(relu);
+}
+/// Sums of a block that go on from `out`.
+#[inline(always)]
+#[allow(dead_code)]
+fn added<const INPUTS: usize, const ROWS: usize>(
+    weights: &[[f32; ROWS]; INPUTS],
+    x: &[f32; INPUTS],
+    out: &mut [f32; ROWS],
+) {
+    *out = block(weights, out, x);
+}
 static WEIGHTS0: Aligned<[[[f32; 5]; 3]; 1]> = Aligned([
     [
         [-0.66952366, -0.7398165, -0.6319459, 0.67295265, -0.034356087],
@@ -182,20 +227,16 @@ static BIAS0: [[f32; 5]; 1] = [
 ];
 /// fc0: 3 -> 5
 #[inline(always)]
-fn layer0(x: &[f32; 3]) -> [f32; 5] {
-    let mut y = [0.0; 5];
-    let mut rest: &mut [f32] = &mut y;
+fn layer0(x: &[f32; 3], y: &mut [Slot; 5]) {
+    let mut rest: &mut [Slot] = y;
     for (weights, bias) in WEIGHTS0.0.iter().zip(&BIAS0) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<5>()
         {
-            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-                *y = relu(sum);
-            }
+            rectified(weights, bias, x, out);
             rest = after;
         }
     }
-    y
 }
 static WEIGHTS1: Aligned<[[[f32; 4]; 5]; 1]> = Aligned([
     [
@@ -209,20 +250,17 @@ static WEIGHTS1: Aligned<[[[f32; 4]; 5]; 1]> = Aligned([
 static BIAS1: [[f32; 4]; 1] = [[-0.45988896, 0.010735092, 0.2773859, 0.4780439]];
 /// fc1: 5 -> 4
 #[inline(always)]
-fn layer1(x: &[f32; 5]) -> [f32; 4] {
-    let mut y = [0.0; 4];
-    let mut rest: &mut [f32] = &mut y;
+fn layer1(x: &[f32; 5], y: &mut [Slot; 4]) {
+    let mut rest: &mut [Slot] = y;
     for (weights, bias) in WEIGHTS1.0.iter().zip(&BIAS1) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<4>()
         {
-            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-                *y = tanh(sum);
-            }
+            plain(weights, bias, x, out);
+            activate(out, |sum| tanh(sum));
             rest = after;
         }
     }
-    y
 }
 static WEIGHTS2: Aligned<[[[f32; 4]; 4]; 1]> = Aligned([
     [
@@ -235,20 +273,17 @@ static WEIGHTS2: Aligned<[[[f32; 4]; 4]; 1]> = Aligned([
 static BIAS2: [[f32; 4]; 1] = [[-0.23947059, -0.4564435, 0.574685, -0.12704511]];
 /// fc2: 4 -> 4
 #[inline(always)]
-fn layer2(x: &[f32; 4]) -> [f32; 4] {
-    let mut y = [0.0; 4];
-    let mut rest: &mut [f32] = &mut y;
+fn layer2(x: &[f32; 4], y: &mut [Slot; 4]) {
+    let mut rest: &mut [Slot] = y;
     for (weights, bias) in WEIGHTS2.0.iter().zip(&BIAS2) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<4>()
         {
-            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-                *y = leaky_relu(sum, 0.01);
-            }
+            plain(weights, bias, x, out);
+            activate(out, |sum| leaky_relu(sum, 0.01));
             rest = after;
         }
     }
-    y
 }
 static WEIGHTS3: Aligned<[[[f32; 6]; 4]; 1]> = Aligned([
     [
@@ -263,20 +298,16 @@ static BIAS3: [[f32; 6]; 1] = [
 ];
 /// fc3: 4 -> 6
 #[inline(always)]
-fn layer3(x: &[f32; 4]) -> [f32; 6] {
-    let mut y = [0.0; 6];
-    let mut rest: &mut [f32] = &mut y;
+fn layer3(x: &[f32; 4], y: &mut [Slot; 6]) {
+    let mut rest: &mut [Slot] = y;
     for (weights, bias) in WEIGHTS3.0.iter().zip(&BIAS3) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<6>()
         {
-            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-                *y = sum;
-            }
+            plain(weights, bias, x, out);
             rest = after;
         }
     }
-    y
 }
 static WEIGHTS4: Aligned<[[[f32; 3]; 6]; 1]> = Aligned([
     [
@@ -291,28 +322,29 @@ static WEIGHTS4: Aligned<[[[f32; 3]; 6]; 1]> = Aligned([
 static BIAS4: [[f32; 3]; 1] = [[0.20621607, -0.40930614, -0.15501034]];
 /// fc4: 6 -> 3
 #[inline(always)]
-fn layer4(x: &[f32; 6]) -> [f32; 3] {
-    let mut y = [0.0; 3];
-    let mut rest: &mut [f32] = &mut y;
+fn layer4(x: &[f32; 6], y: &mut [Slot; 3]) {
+    let mut rest: &mut [Slot] = y;
     for (weights, bias) in WEIGHTS4.0.iter().zip(&BIAS4) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<3>()
         {
-            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-                *y = sum;
-            }
+            plain(weights, bias, x, out);
             rest = after;
         }
     }
-    y
 }
 fn network(observation: &[f32; FEATURES]) -> [f32; ACTIONS] {
-    let hidden0 = layer0(observation);
-    let hidden1 = layer1(&hidden0);
-    let hidden2 = layer2(&hidden1);
-    let hidden3 = layer3(&hidden2);
-    let hidden4 = layer4(&hidden3);
-    hidden4
+    let mut hidden0 = [EMPTY; 5];
+    layer0(observation, &mut hidden0);
+    let mut hidden1 = [EMPTY; 4];
+    layer1(filled(&hidden0), &mut hidden1);
+    let mut hidden2 = [EMPTY; 4];
+    layer2(filled(&hidden1), &mut hidden2);
+    let mut hidden3 = [EMPTY; 6];
+    layer3(filled(&hidden2), &mut hidden3);
+    let mut hidden4 = [EMPTY; 3];
+    layer4(filled(&hidden3), &mut hidden4);
+    *filled(&hidden4)
 }
 /// One controller: a policy with the memory of its filters. Several instances are independent.
 #[derive(Clone)]

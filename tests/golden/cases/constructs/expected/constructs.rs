@@ -161,6 +161,7 @@ fn tanh(x: f32) -> f32 {
 struct Aligned<T>(T);
 /// Sums of one block of outputs: from the bias, inputs in index order, every operation rounded.
 #[inline(always)]
+#[allow(dead_code)]
 fn block<const INPUTS: usize, const ROWS: usize>(
     weights: &[[f32; ROWS]; INPUTS],
     bias: &[f32; ROWS],
@@ -173,6 +174,50 @@ fn block<const INPUTS: usize, const ROWS: usize>(
         }
     }
     sums
+}
+/// What an activation is kept in.
+type Slot = f32;
+const EMPTY: Slot = 0.0;
+#[inline(always)]
+fn filled<const N: usize>(slots: &[Slot; N]) -> &[f32; N] {
+    slots
+}
+#[inline(always)]
+#[allow(dead_code)]
+fn activate<const N: usize>(slots: &mut [Slot; N], activation: impl Fn(f32) -> f32) {
+    *slots = slots.map(activation);
+}
+/// Sums of a block.
+#[inline(always)]
+#[allow(dead_code)]
+fn plain<const INPUTS: usize, const ROWS: usize>(
+    weights: &[[f32; ROWS]; INPUTS],
+    bias: &[f32; ROWS],
+    x: &[f32; INPUTS],
+    out: &mut [Slot; ROWS],
+) {
+    *out = block(weights, bias, x);
+}
+/// Sums of a block behind a ReLU.
+#[inline(always)]
+#[allow(dead_code)]
+fn rectified<const INPUTS: usize, const ROWS: usize>(
+    weights: &[[f32; ROWS]; INPUTS],
+    bias: &[f32; ROWS],
+    x: &[f32; INPUTS],
+    out: &mut [Slot; ROWS],
+) {
+    *out = block(weights, bias, x).map(relu);
+}
+/// Sums of a block that go on from `out`.
+#[inline(always)]
+#[allow(dead_code)]
+fn added<const INPUTS: usize, const ROWS: usize>(
+    weights: &[[f32; ROWS]; INPUTS],
+    x: &[f32; INPUTS],
+    out: &mut [f32; ROWS],
+) {
+    *out = block(weights, out, x);
 }
 static WEIGHTS0: Aligned<[[[f32; 9]; 12]; 1]> = Aligned([
     [
@@ -325,20 +370,16 @@ static BIAS0: [[f32; 9]; 1] = [
 ];
 /// fc0: 12 -> 9
 #[inline(always)]
-fn layer0(x: &[f32; 12]) -> [f32; 9] {
-    let mut y = [0.0; 9];
-    let mut rest: &mut [f32] = &mut y;
+fn layer0(x: &[f32; 12], y: &mut [Slot; 9]) {
+    let mut rest: &mut [Slot] = y;
     for (weights, bias) in WEIGHTS0.0.iter().zip(&BIAS0) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<9>()
         {
-            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-                *y = relu(sum);
-            }
+            rectified(weights, bias, x, out);
             rest = after;
         }
     }
-    y
 }
 static WEIGHTS1: Aligned<[[[f32; 6]; 9]; 1]> = Aligned([
     [
@@ -365,20 +406,17 @@ static BIAS1: [[f32; 6]; 1] = [
 ];
 /// fc1: 9 -> 6
 #[inline(always)]
-fn layer1(x: &[f32; 9]) -> [f32; 6] {
-    let mut y = [0.0; 6];
-    let mut rest: &mut [f32] = &mut y;
+fn layer1(x: &[f32; 9], y: &mut [Slot; 6]) {
+    let mut rest: &mut [Slot] = y;
     for (weights, bias) in WEIGHTS1.0.iter().zip(&BIAS1) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<6>()
         {
-            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-                *y = tanh(sum);
-            }
+            plain(weights, bias, x, out);
+            activate(out, |sum| tanh(sum));
             rest = after;
         }
     }
-    y
 }
 static WEIGHTS2: Aligned<[[[f32; 8]; 6]; 1]> = Aligned([
     [
@@ -458,20 +496,17 @@ static BIAS2: [[f32; 8]; 1] = [
 ];
 /// fc2: 6 -> 8
 #[inline(always)]
-fn layer2(x: &[f32; 6]) -> [f32; 8] {
-    let mut y = [0.0; 8];
-    let mut rest: &mut [f32] = &mut y;
+fn layer2(x: &[f32; 6], y: &mut [Slot; 8]) {
+    let mut rest: &mut [Slot] = y;
     for (weights, bias) in WEIGHTS2.0.iter().zip(&BIAS2) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<8>()
         {
-            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-                *y = leaky_relu(sum, 0.01);
-            }
+            plain(weights, bias, x, out);
+            activate(out, |sum| leaky_relu(sum, 0.01));
             rest = after;
         }
     }
-    y
 }
 static WEIGHTS3: Aligned<[[[f32; 4]; 8]; 1]> = Aligned([
     [
@@ -488,20 +523,16 @@ static WEIGHTS3: Aligned<[[[f32; 4]; 8]; 1]> = Aligned([
 static BIAS3: [[f32; 4]; 1] = [[0.106001504, 0.002868658, 0.48848695, 0.21319786]];
 /// fc3: 8 -> 4
 #[inline(always)]
-fn layer3(x: &[f32; 8]) -> [f32; 4] {
-    let mut y = [0.0; 4];
-    let mut rest: &mut [f32] = &mut y;
+fn layer3(x: &[f32; 8], y: &mut [Slot; 4]) {
+    let mut rest: &mut [Slot] = y;
     for (weights, bias) in WEIGHTS3.0.iter().zip(&BIAS3) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<4>()
         {
-            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-                *y = sum;
-            }
+            plain(weights, bias, x, out);
             rest = after;
         }
     }
-    y
 }
 static WEIGHTS4: Aligned<[[[f32; 5]; 4]; 1]> = Aligned([
     [
@@ -516,28 +547,29 @@ static BIAS4: [[f32; 5]; 1] = [
 ];
 /// fc4: 4 -> 5
 #[inline(always)]
-fn layer4(x: &[f32; 4]) -> [f32; 5] {
-    let mut y = [0.0; 5];
-    let mut rest: &mut [f32] = &mut y;
+fn layer4(x: &[f32; 4], y: &mut [Slot; 5]) {
+    let mut rest: &mut [Slot] = y;
     for (weights, bias) in WEIGHTS4.0.iter().zip(&BIAS4) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<5>()
         {
-            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-                *y = sum;
-            }
+            plain(weights, bias, x, out);
             rest = after;
         }
     }
-    y
 }
 fn network(observation: &[f32; FEATURES]) -> [f32; ACTIONS] {
-    let hidden0 = layer0(observation);
-    let hidden1 = layer1(&hidden0);
-    let hidden2 = layer2(&hidden1);
-    let hidden3 = layer3(&hidden2);
-    let hidden4 = layer4(&hidden3);
-    hidden4
+    let mut hidden0 = [EMPTY; 9];
+    layer0(observation, &mut hidden0);
+    let mut hidden1 = [EMPTY; 6];
+    layer1(filled(&hidden0), &mut hidden1);
+    let mut hidden2 = [EMPTY; 8];
+    layer2(filled(&hidden1), &mut hidden2);
+    let mut hidden3 = [EMPTY; 4];
+    layer3(filled(&hidden2), &mut hidden3);
+    let mut hidden4 = [EMPTY; 5];
+    layer4(filled(&hidden3), &mut hidden4);
+    *filled(&hidden4)
 }
 /// One controller: a policy with the memory of its filters. Several instances are independent.
 #[derive(Clone)]

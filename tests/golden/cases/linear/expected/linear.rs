@@ -133,6 +133,7 @@ static DUTIES: [f32; ACTIONS] = [0.45, 0.48, 0.52, 0.55];
 struct Aligned<T>(T);
 /// Sums of one block of outputs: from the bias, inputs in index order, every operation rounded.
 #[inline(always)]
+#[allow(dead_code)]
 fn block<const INPUTS: usize, const ROWS: usize>(
     weights: &[[f32; ROWS]; INPUTS],
     bias: &[f32; ROWS],
@@ -146,6 +147,50 @@ fn block<const INPUTS: usize, const ROWS: usize>(
     }
     sums
 }
+/// What an activation is kept in.
+type Slot = f32;
+const EMPTY: Slot = 0.0;
+#[inline(always)]
+fn filled<const N: usize>(slots: &[Slot; N]) -> &[f32; N] {
+    slots
+}
+#[inline(always)]
+#[allow(dead_code)]
+fn activate<const N: usize>(slots: &mut [Slot; N], activation: impl Fn(f32) -> f32) {
+    *slots = slots.map(activation);
+}
+/// Sums of a block.
+#[inline(always)]
+#[allow(dead_code)]
+fn plain<const INPUTS: usize, const ROWS: usize>(
+    weights: &[[f32; ROWS]; INPUTS],
+    bias: &[f32; ROWS],
+    x: &[f32; INPUTS],
+    out: &mut [Slot; ROWS],
+) {
+    *out = block(weights, bias, x);
+}
+/// Sums of a block behind a ReLU.
+#[inline(always)]
+#[allow(dead_code)]
+fn rectified<const INPUTS: usize, const ROWS: usize>(
+    weights: &[[f32; ROWS]; INPUTS],
+    bias: &[f32; ROWS],
+    x: &[f32; INPUTS],
+    out: &mut [Slot; ROWS],
+) {
+    *out = block(weights, bias, x).map(relu);
+}
+/// Sums of a block that go on from `out`.
+#[inline(always)]
+#[allow(dead_code)]
+fn added<const INPUTS: usize, const ROWS: usize>(
+    weights: &[[f32; ROWS]; INPUTS],
+    x: &[f32; INPUTS],
+    out: &mut [f32; ROWS],
+) {
+    *out = block(weights, out, x);
+}
 static WEIGHTS0: Aligned<[[[f32; 4]; 2]; 1]> = Aligned([
     [
         [0.5087287, -0.9411388, 0.10764045, -0.6520509],
@@ -155,24 +200,21 @@ static WEIGHTS0: Aligned<[[[f32; 4]; 2]; 1]> = Aligned([
 static BIAS0: [[f32; 4]; 1] = [[-0.8106039, 0.867079, -0.79671407, -0.004069753]];
 /// fc0: 2 -> 4
 #[inline(always)]
-fn layer0(x: &[f32; 2]) -> [f32; 4] {
-    let mut y = [0.0; 4];
-    let mut rest: &mut [f32] = &mut y;
+fn layer0(x: &[f32; 2], y: &mut [Slot; 4]) {
+    let mut rest: &mut [Slot] = y;
     for (weights, bias) in WEIGHTS0.0.iter().zip(&BIAS0) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<4>()
         {
-            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-                *y = sum;
-            }
+            plain(weights, bias, x, out);
             rest = after;
         }
     }
-    y
 }
 fn network(observation: &[f32; FEATURES]) -> [f32; ACTIONS] {
-    let hidden0 = layer0(observation);
-    hidden0
+    let mut hidden0 = [EMPTY; 4];
+    layer0(observation, &mut hidden0);
+    *filled(&hidden0)
 }
 /// One controller: a policy with the memory of its filters. Several instances are independent.
 #[derive(Clone)]

@@ -135,6 +135,7 @@ static DUTIES: [f32; ACTIONS] = [0.45, 0.5, 0.55, 0.35, 0.45, 0.55, 0.525, 0.575
 struct Aligned<T>(T);
 /// Sums of one block of outputs: from the bias, inputs in index order, every operation rounded.
 #[inline(always)]
+#[allow(dead_code)]
 fn block<const INPUTS: usize, const ROWS: usize>(
     weights: &[[f32; ROWS]; INPUTS],
     bias: &[f32; ROWS],
@@ -147,6 +148,50 @@ fn block<const INPUTS: usize, const ROWS: usize>(
         }
     }
     sums
+}
+/// What an activation is kept in.
+type Slot = f32;
+const EMPTY: Slot = 0.0;
+#[inline(always)]
+fn filled<const N: usize>(slots: &[Slot; N]) -> &[f32; N] {
+    slots
+}
+#[inline(always)]
+#[allow(dead_code)]
+fn activate<const N: usize>(slots: &mut [Slot; N], activation: impl Fn(f32) -> f32) {
+    *slots = slots.map(activation);
+}
+/// Sums of a block.
+#[inline(always)]
+#[allow(dead_code)]
+fn plain<const INPUTS: usize, const ROWS: usize>(
+    weights: &[[f32; ROWS]; INPUTS],
+    bias: &[f32; ROWS],
+    x: &[f32; INPUTS],
+    out: &mut [Slot; ROWS],
+) {
+    *out = block(weights, bias, x);
+}
+/// Sums of a block behind a ReLU.
+#[inline(always)]
+#[allow(dead_code)]
+fn rectified<const INPUTS: usize, const ROWS: usize>(
+    weights: &[[f32; ROWS]; INPUTS],
+    bias: &[f32; ROWS],
+    x: &[f32; INPUTS],
+    out: &mut [Slot; ROWS],
+) {
+    *out = block(weights, bias, x).map(relu);
+}
+/// Sums of a block that go on from `out`.
+#[inline(always)]
+#[allow(dead_code)]
+fn added<const INPUTS: usize, const ROWS: usize>(
+    weights: &[[f32; ROWS]; INPUTS],
+    x: &[f32; INPUTS],
+    out: &mut [f32; ROWS],
+) {
+    *out = block(weights, out, x);
 }
 static WEIGHTS0: Aligned<[[[f32; 5]; 6]; 1]> = Aligned([
     [
@@ -163,20 +208,16 @@ static BIAS0: [[f32; 5]; 1] = [
 ];
 /// fc0: 6 -> 5
 #[inline(always)]
-fn layer0(x: &[f32; 6]) -> [f32; 5] {
-    let mut y = [0.0; 5];
-    let mut rest: &mut [f32] = &mut y;
+fn layer0(x: &[f32; 6], y: &mut [Slot; 5]) {
+    let mut rest: &mut [Slot] = y;
     for (weights, bias) in WEIGHTS0.0.iter().zip(&BIAS0) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<5>()
         {
-            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-                *y = relu(sum);
-            }
+            rectified(weights, bias, x, out);
             rest = after;
         }
     }
-    y
 }
 static WEIGHTS1: Aligned<[[[f32; 4]; 5]; 1]> = Aligned([
     [
@@ -190,20 +231,16 @@ static WEIGHTS1: Aligned<[[[f32; 4]; 5]; 1]> = Aligned([
 static BIAS1: [[f32; 4]; 1] = [[0.4645241, 0.5204928, 0.23977381, -0.4841729]];
 /// fc1: 5 -> 4
 #[inline(always)]
-fn layer1(x: &[f32; 5]) -> [f32; 4] {
-    let mut y = [0.0; 4];
-    let mut rest: &mut [f32] = &mut y;
+fn layer1(x: &[f32; 5], y: &mut [Slot; 4]) {
+    let mut rest: &mut [Slot] = y;
     for (weights, bias) in WEIGHTS1.0.iter().zip(&BIAS1) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<4>()
         {
-            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-                *y = relu(sum);
-            }
+            rectified(weights, bias, x, out);
             rest = after;
         }
     }
-    y
 }
 static WEIGHTS2: Aligned<[[[f32; 9]; 4]; 1]> = Aligned([
     [
@@ -268,26 +305,25 @@ static BIAS2: [[f32; 9]; 1] = [
 ];
 /// fc2: 4 -> 9
 #[inline(always)]
-fn layer2(x: &[f32; 4]) -> [f32; 9] {
-    let mut y = [0.0; 9];
-    let mut rest: &mut [f32] = &mut y;
+fn layer2(x: &[f32; 4], y: &mut [Slot; 9]) {
+    let mut rest: &mut [Slot] = y;
     for (weights, bias) in WEIGHTS2.0.iter().zip(&BIAS2) {
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<9>()
         {
-            for (y, sum) in out.iter_mut().zip(block(weights, bias, x)) {
-                *y = sum;
-            }
+            plain(weights, bias, x, out);
             rest = after;
         }
     }
-    y
 }
 fn network(observation: &[f32; FEATURES]) -> [f32; ACTIONS] {
-    let hidden0 = layer0(observation);
-    let hidden1 = layer1(&hidden0);
-    let hidden2 = layer2(&hidden1);
-    hidden2
+    let mut hidden0 = [EMPTY; 5];
+    layer0(observation, &mut hidden0);
+    let mut hidden1 = [EMPTY; 4];
+    layer1(filled(&hidden0), &mut hidden1);
+    let mut hidden2 = [EMPTY; 9];
+    layer2(filled(&hidden1), &mut hidden2);
+    *filled(&hidden2)
 }
 /// One controller: a policy with the memory of its filters. Several instances are independent.
 #[derive(Clone)]

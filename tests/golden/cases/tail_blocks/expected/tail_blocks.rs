@@ -156,6 +156,7 @@ static DUTIES: [f32; ACTIONS] = [
 struct Aligned<T>(T);
 /// Sums of one block of outputs: from the bias, inputs in index order, every operation rounded.
 #[inline(always)]
+#[allow(dead_code)]
 fn block<const INPUTS: usize, const ROWS: usize>(
     weights: &[[f32; ROWS]; INPUTS],
     bias: &[f32; ROWS],
@@ -168,6 +169,50 @@ fn block<const INPUTS: usize, const ROWS: usize>(
         }
     }
     sums
+}
+/// What an activation is kept in.
+type Slot = f32;
+const EMPTY: Slot = 0.0;
+#[inline(always)]
+fn filled<const N: usize>(slots: &[Slot; N]) -> &[f32; N] {
+    slots
+}
+#[inline(always)]
+#[allow(dead_code)]
+fn activate<const N: usize>(slots: &mut [Slot; N], activation: impl Fn(f32) -> f32) {
+    *slots = slots.map(activation);
+}
+/// Sums of a block.
+#[inline(always)]
+#[allow(dead_code)]
+fn plain<const INPUTS: usize, const ROWS: usize>(
+    weights: &[[f32; ROWS]; INPUTS],
+    bias: &[f32; ROWS],
+    x: &[f32; INPUTS],
+    out: &mut [Slot; ROWS],
+) {
+    *out = block(weights, bias, x);
+}
+/// Sums of a block behind a ReLU.
+#[inline(always)]
+#[allow(dead_code)]
+fn rectified<const INPUTS: usize, const ROWS: usize>(
+    weights: &[[f32; ROWS]; INPUTS],
+    bias: &[f32; ROWS],
+    x: &[f32; INPUTS],
+    out: &mut [Slot; ROWS],
+) {
+    *out = block(weights, bias, x).map(relu);
+}
+/// Sums of a block that go on from `out`.
+#[inline(always)]
+#[allow(dead_code)]
+fn added<const INPUTS: usize, const ROWS: usize>(
+    weights: &[[f32; ROWS]; INPUTS],
+    x: &[f32; INPUTS],
+    out: &mut [f32; ROWS],
+) {
+    *out = block(weights, out, x);
 }
 static WEIGHTS0: Aligned<[[[f32; 32]; 3]; 1]> = Aligned([
     [
@@ -1087,7 +1132,7 @@ fn layer1<const INPUTS: usize>(
         if let Some((out, after)) = core::mem::take(&mut rest)
             .split_first_chunk_mut::<20>()
         {
-            *out = block(weights, out, x);
+            added(weights, x, out);
             rest = after;
         }
     }
@@ -1095,12 +1140,14 @@ fn layer1<const INPUTS: usize>(
 }
 fn network(observation: &[f32; FEATURES]) -> [f32; ACTIONS] {
     let mut q = BIAS1;
+    let mut part = [EMPTY; 32];
     for ((weights, bias), next) in WEIGHTS0.0.iter().zip(&BIAS0).zip(&WEIGHTS1.0) {
-        let part = block(weights, bias, observation).map(|sum| relu(sum));
-        layer1(next, &part, &mut q);
+        rectified(weights, bias, observation, &mut part);
+        layer1(next, filled(&part), &mut q);
     }
-    let part = block(&TAIL_WEIGHTS0.0, &TAIL_BIAS0, observation).map(|sum| relu(sum));
-    layer1(&LAST_WEIGHTS1.0, &part, &mut q);
+    let mut part = [EMPTY; 1];
+    rectified(&TAIL_WEIGHTS0.0, &TAIL_BIAS0, observation, &mut part);
+    layer1(&LAST_WEIGHTS1.0, filled(&part), &mut q);
     q
 }
 /// One controller: a policy with the memory of its filters. Several instances are independent.

@@ -231,7 +231,7 @@ impl Bench {
     }
 
     /// What a linker keeps of the controller: for a firmware that asks for Q values alone, and for one that calls start-up,
-    /// step and integrity check, but neither self test nor setters.
+    /// step and the integrity check in slices, but neither self test nor setters.
     fn linked(
         &self,
         target: &TargetSpec,
@@ -256,7 +256,7 @@ impl Bench {
             size(target, &self.path("kept.o"))
         };
         row.network_flash = Some(kept(&["q_values"])?);
-        row.step_flash = Some(kept(&["init", "step", "integrity"])?);
+        row.step_flash = Some(kept(&["init", "step", "integrity_slice"])?);
         Ok(())
     }
 
@@ -321,10 +321,12 @@ impl Bench {
         // instructions, accesses to memory, jumps
         let instructions = |line: &str| line.split_whitespace().next()?.parse().ok();
         let counts: Vec<u64> = counts.lines().filter_map(instructions).collect();
-        let (q_values, step) = counts.split_at_checked(CALLS).unwrap_or_default();
+        let (q_values, rest) = counts.split_at_checked(CALLS).unwrap_or_default();
+        let (step, slice) = rest.split_at_checked(CALLS).unwrap_or_default();
         Ok(Row {
             q_values: extremes(q_values),
             step: extremes(step),
+            slice: extremes(slice),
             stack: Some(u64::from(*stack)),
             checksum: Some(format!("{checksum:08x}")),
             ..blank(target.name)
@@ -340,6 +342,7 @@ pub(crate) fn blank(core: &str) -> Row {
         variant: String::new(),
         q_values: None,
         step: None,
+        slice: None,
         flash: None,
         network_flash: None,
         step_flash: None,

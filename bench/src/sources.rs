@@ -1,11 +1,14 @@
-//! Programs around the code that is counted: 64 observations, then 64 steps, then a few words to the host.
+//! Programs around the code that is counted: 64 observations, then 64 steps, then 64 slices of the integrity check, then a few
+//! words to the host.
 
 use std::fmt::Write;
 
 use policy::{Policy, Scalar};
 
-/// Observations and steps per program.
+/// Observations, steps and slices of the integrity check per program.
 pub const CALLS: usize = 64;
+/// Numbers of a slice.
+const SLICE: u32 = 32;
 
 /// Program in C for a board.
 pub fn c(policy: &Policy) -> String {
@@ -26,6 +29,8 @@ static number o[{features}], q[{actions}];
 static {name}_state s;
 static {name}_measurement m;
 static {name}_command c;
+static {name}_check check;
+static volatile uint32_t slice;
 int main(void)
 {{
     uint32_t out[3], depth = 0u;
@@ -41,6 +46,9 @@ int main(void)
         stack_paint();
         count_begin(); {name}_step(&s, &m, &c); count_end();
         depth = stack_depth();
+    }}
+    for (k = 0; k < {CALLS}; ++k) {{
+        count_begin(); slice = {name}_integrity_slice(&check, {SLICE}u); count_end();
     }}
     out[0] = {name}_self_test(); out[1] = crc; out[2] = depth;
     words_put(out, 3u); words_flush();
@@ -209,7 +217,7 @@ pub fn rust(policy: &Policy) -> String {
 #[path = "{name}.rs"]
 #[allow(dead_code)]
 mod {name};
-use {name}::{{Controller, Measurement}};
+use {name}::{{Controller, IntegrityCheck, Measurement}};
 use core::hint::black_box;
 extern "C" {{
     fn count_begin();
@@ -257,6 +265,12 @@ pub extern "C" fn main() -> i32 {{
         unsafe {{ stack_paint(); count_begin() }};
         black_box(controller.step(black_box(&m)));
         unsafe {{ count_end(); depth = stack_depth() }};
+    }}
+    let mut check = IntegrityCheck::new();
+    for _ in 0..{CALLS} {{
+        unsafe {{ count_begin() }};
+        let _ = black_box(black_box(&mut check).slice({SLICE}));
+        unsafe {{ count_end() }};
     }}
     let out = [Controller::self_test().err().unwrap_or(0), crc, depth];
     unsafe {{ words_put(out.as_ptr(), 3); words_flush() }};

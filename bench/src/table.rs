@@ -25,13 +25,16 @@ pub struct Row {
     /// Fewest and most instructions of a whole step.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step: Option<(u64, u64)>,
+    /// Fewest and most instructions of a slice of 32 numbers of the integrity check.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub slice: Option<(u64, u64)>,
     /// Bytes of code and tables of the whole controller with all its functions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flash: Option<u64>,
     /// Of these what a linker keeps for a firmware that uses `q_values` alone: the network, as peers are counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub network_flash: Option<u64>,
-    /// What it keeps for a firmware that calls `init`, `step` and `integrity`.
+    /// What it keeps for a firmware that calls `init`, `step` and `integrity_slice`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step_flash: Option<u64>,
     /// Bytes of stack of a step.
@@ -92,21 +95,22 @@ pub fn text(rows: &[Row], json: bool) -> Result<String, Failure> {
         return Ok(text + "\n");
     }
     let mut text = String::from(
-        "| policy | core | compiler | variant | q_values | step | flash B | network linked B | step linked B | stack B | checksum | time / naive |\n\
-         |---|---|---|---|---|---|---|---|---|---|---|---|\n",
+        "| policy | core | compiler | variant | q_values | step | slice of 32 | flash B | network linked B | step linked B | stack B | checksum | time / naive |\n\
+         |---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for row in rows.iter().filter(|row| !row.variant.starts_with(PEER)) {
         let number = |value: Option<u64>| value.map(|value| value.to_string()).unwrap_or_default();
         // writing to a String cannot fail
         let _ = writeln!(
             text,
-            "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+            "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
             row.policy,
             row.core,
             row.compiler,
             row.variant,
             range(row.q_values),
             range(row.step),
+            range(row.slice),
             number(row.flash),
             number(row.network_flash),
             number(row.step_flash),
@@ -139,6 +143,7 @@ mod tests {
             variant: variant.into(),
             q_values: Some((7, 9)),
             step: Some((8, 8)),
+            slice: None,
             flash: None,
             network_flash: None,
             step_flash: None,

@@ -274,8 +274,6 @@ pub struct CrcItem {
     pub function: &'static str,
     /// Table, without the prefix.
     pub table: String,
-    /// Position of its first element among those of all tables.
-    pub first: usize,
     /// Elements.
     pub length: usize,
 }

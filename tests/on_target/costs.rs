@@ -58,7 +58,7 @@ fn check_core(target: &TargetSpec, costs: &Costs) {
 
 /// Target, compiler and largest spread where LLVM makes a number of a comparison by a jump over one instruction:
 /// docs/targets.md says so.
-const BRANCHES: [(&str, &str, u64); 1] = [("dspace-ds1202", "rustc", 16)];
+const BRANCHES: [(&str, &str, u64); 1] = [("dspace-ds1202", "rustc", 24)];
 
 #[test]
 fn the_instruction_count_does_not_depend_on_the_data_where_floats_are_hardware() {

@@ -139,7 +139,6 @@ pub fn integrity(program: &Program) -> Vec<CrcItem> {
             Some(CrcItem {
                 function,
                 table: table.name,
-                first: 0,
                 length: table.length,
             })
         })
@@ -147,14 +146,8 @@ pub fn integrity(program: &Program) -> Vec<CrcItem> {
     items.push(CrcItem {
         function: "crc",
         table: "duties".into(),
-        first: 0,
         length: program.duties.len(),
     });
-    let mut first = 0;
-    for item in &mut items {
-        item.first = first;
-        first += item.length;
-    }
     items
 }
 

@@ -29,7 +29,7 @@
  *   10 r (parameter): coefficient of the duty ratio mapping; set before a step, it counts from the one after it
  */
 #define ADC_MAPPING_FMU_VARIABLES 10u
-#define ADC_MAPPING_FMU_TOKEN "{547504b2-b136-79ad-cf2b-d059a3bd8081}"
+#define ADC_MAPPING_FMU_TOKEN "{3d24ef25-4943-ba7c-54ab-8684bae0bb96}"
 #define ADC_MAPPING_FMU_PERIOD 2e-5
 
 /* Types of variables. */

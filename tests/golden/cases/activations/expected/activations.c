@@ -772,31 +772,63 @@ ACTIVATIONS_COLD ACTIVATIONS_APART static uint32_t activations_crc_word(uint32_t
     return crc;
 }
 
-ACTIVATIONS_COLD ACTIVATIONS_APART static uint32_t activations_crc(uint32_t start, const volatile float *words, uint32_t length)
+/* Positions from to to among the numbers of all tables; the next table starts at first. */
+typedef struct {
+    uint32_t from;
+    uint32_t to;
+    uint32_t first;
+    uint32_t crc;
+} activations_span;
+
+/* Where a position lies in the next table; at its ends if outside. */
+ACTIVATIONS_COLD ACTIVATIONS_APART static uint32_t activations_place(const activations_span *span, uint32_t position, uint32_t length)
 {
-    uint32_t crc = start;
+    const uint32_t inside = (position > span->first) ? (position - span->first) : 0u;
+    return (inside < length) ? inside : length;
+}
+
+ACTIVATIONS_COLD ACTIVATIONS_APART static void activations_crc(activations_span *span, const volatile float *words, uint32_t length)
+{
+    const uint32_t to = activations_place(span, span->to, length);
     uint32_t i;
-    for (i = 0u; i < length; ++i) {
-        crc = activations_crc_word(crc, activations_bits(words[i]));
+    for (i = activations_place(span, span->from, length); i < to; ++i) {
+        span->crc = activations_crc_word(span->crc, activations_bits(words[i]));
     }
-    return crc;
+    span->first += length;
+}
+
+ACTIVATIONS_COLD uint32_t activations_integrity_slice(activations_check *check, uint32_t count)
+{
+    const uint32_t from = (check->position < ACTIVATIONS_TABLE_NUMBERS) ? check->position : 0u;
+    const uint32_t rest = ACTIVATIONS_TABLE_NUMBERS - from;
+    activations_span span;
+    span.from = from;
+    span.to = from + ((count < rest) ? count : rest);
+    span.first = 0u;
+    span.crc = (from == 0u) ? 0xFFFFFFFFu : check->crc;
+    activations_crc(&span, activations_weights0, 15u);
+    activations_crc(&span, activations_bias0, 5u);
+    activations_crc(&span, activations_weights1, 20u);
+    activations_crc(&span, activations_bias1, 4u);
+    activations_crc(&span, activations_weights2, 16u);
+    activations_crc(&span, activations_bias2, 4u);
+    activations_crc(&span, activations_weights3, 24u);
+    activations_crc(&span, activations_bias3, 6u);
+    activations_crc(&span, activations_weights4, 18u);
+    activations_crc(&span, activations_bias4, 3u);
+    activations_crc(&span, activations_duties, 3u);
+    check->position = span.to;
+    check->crc = span.crc;
+    if (span.to < ACTIVATIONS_TABLE_NUMBERS) {
+        return ACTIVATIONS_INTEGRITY_RUNNING;
+    }
+    return ((span.crc ^ 0xFFFFFFFFu) == 0x74B6B656u) ? ACTIVATIONS_INTEGRITY_INTACT : ACTIVATIONS_INTEGRITY_CHANGED;
 }
 
 ACTIVATIONS_COLD uint32_t activations_integrity(void)
 {
-    uint32_t crc = 0xFFFFFFFFu;
-    crc = activations_crc(crc, activations_weights0, 15u);
-    crc = activations_crc(crc, activations_bias0, 5u);
-    crc = activations_crc(crc, activations_weights1, 20u);
-    crc = activations_crc(crc, activations_bias1, 4u);
-    crc = activations_crc(crc, activations_weights2, 16u);
-    crc = activations_crc(crc, activations_bias2, 4u);
-    crc = activations_crc(crc, activations_weights3, 24u);
-    crc = activations_crc(crc, activations_bias3, 6u);
-    crc = activations_crc(crc, activations_weights4, 18u);
-    crc = activations_crc(crc, activations_bias4, 3u);
-    crc = activations_crc(crc, activations_duties, 3u);
-    return activations_flag((crc ^ 0xFFFFFFFFu) == 0x74B6B656u);
+    activations_check check = { 0u, 0u };
+    return activations_flag(activations_integrity_slice(&check, ACTIVATIONS_TABLE_NUMBERS) == ACTIVATIONS_INTEGRITY_INTACT);
 }
 
 ACTIVATIONS_COLD uint32_t activations_self_test(void)
@@ -807,13 +839,19 @@ ACTIVATIONS_COLD uint32_t activations_self_test(void)
     uint32_t failed = 0u;
     uint32_t vector;
     uint32_t i;
+    activations_span span;
+    span.from = 0u;
+    span.to = ACTIVATIONS_ACTIONS;
     for (vector = 0u; vector < 16u; ++vector) {
         for (i = 0u; i < ACTIVATIONS_FEATURES; ++i) {
             random = (random * 0x0019660Du) + 0x3C6EF35Fu;
             observation[i] = activations_box_low[i] + (activations_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
         }
+        span.first = 0u;
+        span.crc = 0xFFFFFFFFu;
         activations_q_values(observation, q);
-        if ((failed == 0u) && ((activations_crc(0xFFFFFFFFu, q, ACTIVATIONS_ACTIONS) ^ 0xFFFFFFFFu) != activations_answers[vector])) {
+        activations_crc(&span, q, ACTIVATIONS_ACTIONS);
+        if ((failed == 0u) && ((span.crc ^ 0xFFFFFFFFu) != activations_answers[vector])) {
             failed = vector + 1u;
         }
     }

@@ -21,6 +21,7 @@ extern "C" {
 #define ACTIVATIONS_FEATURES 3u
 #define ACTIVATIONS_ACTIONS 3u
 #define ACTIVATIONS_STATE_WORDS 5u
+#define ACTIVATIONS_TABLE_NUMBERS 118u
 #define ACTIVATIONS_SAMPLE_PERIOD 0.001
 
 /* Bits of the status word. */
@@ -90,6 +91,22 @@ uint32_t activations_self_test(void);
 
 /* CRC-32 over the tables: 1 if they are as generated, else 0. */
 uint32_t activations_integrity(void);
+
+/* The same check in slices, beside control: what it has done so far. All zero: nothing. */
+typedef struct {
+    uint32_t position;
+    uint32_t crc;
+} activations_check;
+
+#define ACTIVATIONS_INTEGRITY_RUNNING 0u
+#define ACTIVATIONS_INTEGRITY_INTACT 1u
+#define ACTIVATIONS_INTEGRITY_CHANGED 2u
+
+/*
+ * Checks the next count numbers of the tables and says how it stands; after the last of them the next call starts again. All
+ * ACTIVATIONS_TABLE_NUMBERS of them have been read after as many calls as count goes into them, rounded up.
+ */
+uint32_t activations_integrity_slice(activations_check *check, uint32_t count);
 
 #ifdef __cplusplus
 }

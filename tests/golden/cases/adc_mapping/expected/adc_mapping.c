@@ -685,27 +685,59 @@ ADC_MAPPING_COLD ADC_MAPPING_APART static uint32_t adc_mapping_crc_word(uint32_t
     return crc;
 }
 
-ADC_MAPPING_COLD ADC_MAPPING_APART static uint32_t adc_mapping_crc(uint32_t start, const volatile float *words, uint32_t length)
+/* Positions from to to among the numbers of all tables; the next table starts at first. */
+typedef struct {
+    uint32_t from;
+    uint32_t to;
+    uint32_t first;
+    uint32_t crc;
+} adc_mapping_span;
+
+/* Where a position lies in the next table; at its ends if outside. */
+ADC_MAPPING_COLD ADC_MAPPING_APART static uint32_t adc_mapping_place(const adc_mapping_span *span, uint32_t position, uint32_t length)
 {
-    uint32_t crc = start;
+    const uint32_t inside = (position > span->first) ? (position - span->first) : 0u;
+    return (inside < length) ? inside : length;
+}
+
+ADC_MAPPING_COLD ADC_MAPPING_APART static void adc_mapping_crc(adc_mapping_span *span, const volatile float *words, uint32_t length)
+{
+    const uint32_t to = adc_mapping_place(span, span->to, length);
     uint32_t i;
-    for (i = 0u; i < length; ++i) {
-        crc = adc_mapping_crc_word(crc, adc_mapping_bits(words[i]));
+    for (i = adc_mapping_place(span, span->from, length); i < to; ++i) {
+        span->crc = adc_mapping_crc_word(span->crc, adc_mapping_bits(words[i]));
     }
-    return crc;
+    span->first += length;
+}
+
+ADC_MAPPING_COLD uint32_t adc_mapping_integrity_slice(adc_mapping_check *check, uint32_t count)
+{
+    const uint32_t from = (check->position < ADC_MAPPING_TABLE_NUMBERS) ? check->position : 0u;
+    const uint32_t rest = ADC_MAPPING_TABLE_NUMBERS - from;
+    adc_mapping_span span;
+    span.from = from;
+    span.to = from + ((count < rest) ? count : rest);
+    span.first = 0u;
+    span.crc = (from == 0u) ? 0xFFFFFFFFu : check->crc;
+    adc_mapping_crc(&span, adc_mapping_weights0, 15u);
+    adc_mapping_crc(&span, adc_mapping_bias0, 5u);
+    adc_mapping_crc(&span, adc_mapping_weights1, 20u);
+    adc_mapping_crc(&span, adc_mapping_bias1, 4u);
+    adc_mapping_crc(&span, adc_mapping_weights2, 12u);
+    adc_mapping_crc(&span, adc_mapping_bias2, 3u);
+    adc_mapping_crc(&span, adc_mapping_duties, 3u);
+    check->position = span.to;
+    check->crc = span.crc;
+    if (span.to < ADC_MAPPING_TABLE_NUMBERS) {
+        return ADC_MAPPING_INTEGRITY_RUNNING;
+    }
+    return ((span.crc ^ 0xFFFFFFFFu) == 0x5F460CA8u) ? ADC_MAPPING_INTEGRITY_INTACT : ADC_MAPPING_INTEGRITY_CHANGED;
 }
 
 ADC_MAPPING_COLD uint32_t adc_mapping_integrity(void)
 {
-    uint32_t crc = 0xFFFFFFFFu;
-    crc = adc_mapping_crc(crc, adc_mapping_weights0, 15u);
-    crc = adc_mapping_crc(crc, adc_mapping_bias0, 5u);
-    crc = adc_mapping_crc(crc, adc_mapping_weights1, 20u);
-    crc = adc_mapping_crc(crc, adc_mapping_bias1, 4u);
-    crc = adc_mapping_crc(crc, adc_mapping_weights2, 12u);
-    crc = adc_mapping_crc(crc, adc_mapping_bias2, 3u);
-    crc = adc_mapping_crc(crc, adc_mapping_duties, 3u);
-    return adc_mapping_flag((crc ^ 0xFFFFFFFFu) == 0x5F460CA8u);
+    adc_mapping_check check = { 0u, 0u };
+    return adc_mapping_flag(adc_mapping_integrity_slice(&check, ADC_MAPPING_TABLE_NUMBERS) == ADC_MAPPING_INTEGRITY_INTACT);
 }
 
 ADC_MAPPING_COLD uint32_t adc_mapping_self_test(void)
@@ -716,13 +748,19 @@ ADC_MAPPING_COLD uint32_t adc_mapping_self_test(void)
     uint32_t failed = 0u;
     uint32_t vector;
     uint32_t i;
+    adc_mapping_span span;
+    span.from = 0u;
+    span.to = ADC_MAPPING_ACTIONS;
     for (vector = 0u; vector < 16u; ++vector) {
         for (i = 0u; i < ADC_MAPPING_FEATURES; ++i) {
             random = (random * 0x0019660Du) + 0x3C6EF35Fu;
             observation[i] = adc_mapping_box_low[i] + (adc_mapping_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
         }
+        span.first = 0u;
+        span.crc = 0xFFFFFFFFu;
         adc_mapping_q_values(observation, q);
-        if ((failed == 0u) && ((adc_mapping_crc(0xFFFFFFFFu, q, ADC_MAPPING_ACTIONS) ^ 0xFFFFFFFFu) != adc_mapping_answers[vector])) {
+        adc_mapping_crc(&span, q, ADC_MAPPING_ACTIONS);
+        if ((failed == 0u) && ((span.crc ^ 0xFFFFFFFFu) != adc_mapping_answers[vector])) {
             failed = vector + 1u;
         }
     }

@@ -21,6 +21,7 @@ extern "C" {
 #define ADC_MAPPING_FEATURES 3u
 #define ADC_MAPPING_ACTIONS 3u
 #define ADC_MAPPING_STATE_WORDS 11u
+#define ADC_MAPPING_TABLE_NUMBERS 62u
 #define ADC_MAPPING_SAMPLE_PERIOD 2e-5
 
 /* Bits of the status word. */
@@ -102,6 +103,22 @@ uint32_t adc_mapping_self_test(void);
 
 /* CRC-32 over the tables: 1 if they are as generated, else 0. */
 uint32_t adc_mapping_integrity(void);
+
+/* The same check in slices, beside control: what it has done so far. All zero: nothing. */
+typedef struct {
+    uint32_t position;
+    uint32_t crc;
+} adc_mapping_check;
+
+#define ADC_MAPPING_INTEGRITY_RUNNING 0u
+#define ADC_MAPPING_INTEGRITY_INTACT 1u
+#define ADC_MAPPING_INTEGRITY_CHANGED 2u
+
+/*
+ * Checks the next count numbers of the tables and says how it stands; after the last of them the next call starts again. All
+ * ADC_MAPPING_TABLE_NUMBERS of them have been read after as many calls as count goes into them, rounded up.
+ */
+uint32_t adc_mapping_integrity_slice(adc_mapping_check *check, uint32_t count);
 
 #ifdef __cplusplus
 }

@@ -974,31 +974,63 @@ CONSTRUCTS_COLD CONSTRUCTS_APART static uint32_t constructs_crc_word(uint32_t st
     return crc;
 }
 
-CONSTRUCTS_COLD CONSTRUCTS_APART static uint32_t constructs_crc(uint32_t start, const volatile float *words, uint32_t length)
+/* Positions from to to among the numbers of all tables; the next table starts at first. */
+typedef struct {
+    uint32_t from;
+    uint32_t to;
+    uint32_t first;
+    uint32_t crc;
+} constructs_span;
+
+/* Where a position lies in the next table; at its ends if outside. */
+CONSTRUCTS_COLD CONSTRUCTS_APART static uint32_t constructs_place(const constructs_span *span, uint32_t position, uint32_t length)
 {
-    uint32_t crc = start;
+    const uint32_t inside = (position > span->first) ? (position - span->first) : 0u;
+    return (inside < length) ? inside : length;
+}
+
+CONSTRUCTS_COLD CONSTRUCTS_APART static void constructs_crc(constructs_span *span, const volatile float *words, uint32_t length)
+{
+    const uint32_t to = constructs_place(span, span->to, length);
     uint32_t i;
-    for (i = 0u; i < length; ++i) {
-        crc = constructs_crc_word(crc, constructs_bits(words[i]));
+    for (i = constructs_place(span, span->from, length); i < to; ++i) {
+        span->crc = constructs_crc_word(span->crc, constructs_bits(words[i]));
     }
-    return crc;
+    span->first += length;
+}
+
+CONSTRUCTS_COLD uint32_t constructs_integrity_slice(constructs_check *check, uint32_t count)
+{
+    const uint32_t from = (check->position < CONSTRUCTS_TABLE_NUMBERS) ? check->position : 0u;
+    const uint32_t rest = CONSTRUCTS_TABLE_NUMBERS - from;
+    constructs_span span;
+    span.from = from;
+    span.to = from + ((count < rest) ? count : rest);
+    span.first = 0u;
+    span.crc = (from == 0u) ? 0xFFFFFFFFu : check->crc;
+    constructs_crc(&span, constructs_weights0, 108u);
+    constructs_crc(&span, constructs_bias0, 9u);
+    constructs_crc(&span, constructs_weights1, 54u);
+    constructs_crc(&span, constructs_bias1, 6u);
+    constructs_crc(&span, constructs_weights2, 48u);
+    constructs_crc(&span, constructs_bias2, 8u);
+    constructs_crc(&span, constructs_weights3, 32u);
+    constructs_crc(&span, constructs_bias3, 4u);
+    constructs_crc(&span, constructs_weights4, 20u);
+    constructs_crc(&span, constructs_bias4, 5u);
+    constructs_crc(&span, constructs_duties, 5u);
+    check->position = span.to;
+    check->crc = span.crc;
+    if (span.to < CONSTRUCTS_TABLE_NUMBERS) {
+        return CONSTRUCTS_INTEGRITY_RUNNING;
+    }
+    return ((span.crc ^ 0xFFFFFFFFu) == 0xDE8E81BEu) ? CONSTRUCTS_INTEGRITY_INTACT : CONSTRUCTS_INTEGRITY_CHANGED;
 }
 
 CONSTRUCTS_COLD uint32_t constructs_integrity(void)
 {
-    uint32_t crc = 0xFFFFFFFFu;
-    crc = constructs_crc(crc, constructs_weights0, 108u);
-    crc = constructs_crc(crc, constructs_bias0, 9u);
-    crc = constructs_crc(crc, constructs_weights1, 54u);
-    crc = constructs_crc(crc, constructs_bias1, 6u);
-    crc = constructs_crc(crc, constructs_weights2, 48u);
-    crc = constructs_crc(crc, constructs_bias2, 8u);
-    crc = constructs_crc(crc, constructs_weights3, 32u);
-    crc = constructs_crc(crc, constructs_bias3, 4u);
-    crc = constructs_crc(crc, constructs_weights4, 20u);
-    crc = constructs_crc(crc, constructs_bias4, 5u);
-    crc = constructs_crc(crc, constructs_duties, 5u);
-    return constructs_flag((crc ^ 0xFFFFFFFFu) == 0xDE8E81BEu);
+    constructs_check check = { 0u, 0u };
+    return constructs_flag(constructs_integrity_slice(&check, CONSTRUCTS_TABLE_NUMBERS) == CONSTRUCTS_INTEGRITY_INTACT);
 }
 
 CONSTRUCTS_COLD uint32_t constructs_self_test(void)
@@ -1009,13 +1041,19 @@ CONSTRUCTS_COLD uint32_t constructs_self_test(void)
     uint32_t failed = 0u;
     uint32_t vector;
     uint32_t i;
+    constructs_span span;
+    span.from = 0u;
+    span.to = CONSTRUCTS_ACTIONS;
     for (vector = 0u; vector < 16u; ++vector) {
         for (i = 0u; i < CONSTRUCTS_FEATURES; ++i) {
             random = (random * 0x0019660Du) + 0x3C6EF35Fu;
             observation[i] = constructs_box_low[i] + (constructs_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
         }
+        span.first = 0u;
+        span.crc = 0xFFFFFFFFu;
         constructs_q_values(observation, q);
-        if ((failed == 0u) && ((constructs_crc(0xFFFFFFFFu, q, CONSTRUCTS_ACTIONS) ^ 0xFFFFFFFFu) != constructs_answers[vector])) {
+        constructs_crc(&span, q, CONSTRUCTS_ACTIONS);
+        if ((failed == 0u) && ((span.crc ^ 0xFFFFFFFFu) != constructs_answers[vector])) {
             failed = vector + 1u;
         }
     }

@@ -21,6 +21,7 @@ extern "C" {
 #define CONSTRUCTS_FEATURES 12u
 #define CONSTRUCTS_ACTIONS 5u
 #define CONSTRUCTS_STATE_WORDS 27u
+#define CONSTRUCTS_TABLE_NUMBERS 299u
 #define CONSTRUCTS_SAMPLE_PERIOD 0.0001
 
 /* Bits of the status word. */
@@ -113,6 +114,22 @@ uint32_t constructs_self_test(void);
 
 /* CRC-32 over the tables: 1 if they are as generated, else 0. */
 uint32_t constructs_integrity(void);
+
+/* The same check in slices, beside control: what it has done so far. All zero: nothing. */
+typedef struct {
+    uint32_t position;
+    uint32_t crc;
+} constructs_check;
+
+#define CONSTRUCTS_INTEGRITY_RUNNING 0u
+#define CONSTRUCTS_INTEGRITY_INTACT 1u
+#define CONSTRUCTS_INTEGRITY_CHANGED 2u
+
+/*
+ * Checks the next count numbers of the tables and says how it stands; after the last of them the next call starts again. All
+ * CONSTRUCTS_TABLE_NUMBERS of them have been read after as many calls as count goes into them, rounded up.
+ */
+uint32_t constructs_integrity_slice(constructs_check *check, uint32_t count);
 
 #ifdef __cplusplus
 }

@@ -117,20 +117,6 @@ fn relu(x: f32) -> f32 {
 fn leaky_relu(x: f32, slope: f32) -> f32 {
     select(x.to_bits() >> 31, slope * x, x)
 }
-/// CRC-32 (IEEE 802.3) of words taken little-endian, whatever the byte order of the machine.
-#[inline(always)]
-#[allow(dead_code)]
-fn crc_word(mut crc: u32, word: u32) -> u32 {
-    crc ^= word;
-    for _ in 0..8 {
-        crc = (crc >> 4) ^ CRC_STEPS[(crc & 15) as usize];
-    }
-    crc
-}
-#[inline(never)]
-fn crc_floats(crc: u32, words: &[f32]) -> u32 {
-    words.iter().fold(crc, |crc, word| crc_word(crc, word.to_bits()))
-}
 static DUTIES: [f32; ACTIONS] = [0.275, 0.4, 0.525, 0.5, 0.7];
 /// x limited to the magnitude with these bits, in integers so that loops over it can be vectorised
 #[inline(always)]
@@ -571,6 +557,84 @@ fn network(observation: &[f32; FEATURES]) -> [f32; ACTIONS] {
     layer4(filled(&hidden3), &mut hidden4);
     *filled(&hidden4)
 }
+/// CRC-32 (IEEE 802.3) of words taken little-endian, whatever the byte order of the machine.
+#[inline(always)]
+fn crc_word(mut crc: u32, word: u32) -> u32 {
+    crc ^= word;
+    for _ in 0..8 {
+        crc = (crc >> 4) ^ CRC_STEPS[(crc & 15) as usize];
+    }
+    crc
+}
+#[inline(never)]
+fn crc_floats(crc: u32, numbers: &[f32]) -> u32 {
+    numbers.iter().fold(crc, |crc, x| crc_word(crc, x.to_bits()))
+}
+/// An integrity check in slices, beside control.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct IntegrityCheck {
+    position: u32,
+    crc: u32,
+}
+impl IntegrityCheck {
+    /// Numbers in all tables.
+    pub const LENGTH: u32 = 299;
+    /// Nothing checked so far.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { position: 0, crc: 0 }
+    }
+    /// Checks the next `count` numbers of the tables. Behind the last of them: whether all are as generated; then the
+    /// next call starts again.
+    #[must_use]
+    pub fn slice(&mut self, count: u32) -> Option<bool> {
+        let from = if self.position < Self::LENGTH { self.position } else { 0 };
+        let to = from.saturating_add(count).min(Self::LENGTH);
+        let mut span = Span {
+            from,
+            to,
+            first: 0,
+            crc: if from == 0 { u32::MAX } else { self.crc },
+        };
+        span.floats(core::hint::black_box(&WEIGHTS0.0).as_flattened().as_flattened());
+        span.floats(core::hint::black_box(&BIAS0).as_flattened());
+        span.floats(core::hint::black_box(&WEIGHTS1.0).as_flattened().as_flattened());
+        span.floats(core::hint::black_box(&BIAS1).as_flattened());
+        span.floats(core::hint::black_box(&WEIGHTS2.0).as_flattened().as_flattened());
+        span.floats(core::hint::black_box(&BIAS2).as_flattened());
+        span.floats(core::hint::black_box(&WEIGHTS3.0).as_flattened().as_flattened());
+        span.floats(core::hint::black_box(&BIAS3).as_flattened());
+        span.floats(core::hint::black_box(&WEIGHTS4.0).as_flattened().as_flattened());
+        span.floats(core::hint::black_box(&BIAS4).as_flattened());
+        span.floats(core::hint::black_box(&DUTIES));
+        self.position = to;
+        self.crc = span.crc;
+        if to < Self::LENGTH { None } else { Some(!span.crc == 3733881278) }
+    }
+}
+/// Positions `from` to `to` among all numbers; the next table starts at `first`.
+struct Span {
+    from: u32,
+    to: u32,
+    first: u32,
+    crc: u32,
+}
+impl Span {
+    /// What of the next table lies in the span.
+    fn part<'a, T>(&mut self, table: &'a [T]) -> &'a [T] {
+        let length = table.len() as u32;
+        let place = |position: u32| {
+            position.saturating_sub(self.first).min(length) as usize
+        };
+        let part = place(self.from)..place(self.to);
+        self.first = self.first.saturating_add(length);
+        table.get(part).unwrap_or_default()
+    }
+    fn floats(&mut self, table: &[f32]) {
+        let part = self.part(table);
+        self.crc = crc_floats(self.crc, part);
+    }
+}
 /// One controller: a policy with the memory of its filters. Several instances are independent.
 #[derive(Clone)]
 pub struct Controller {
@@ -951,39 +1015,7 @@ impl Controller {
     /// CRC-32 over the tables: whether they are as generated.
     #[must_use]
     pub fn integrity() -> bool {
-        let mut crc = u32::MAX;
-        for column in core::hint::black_box(&WEIGHTS0.0).iter().flatten() {
-            crc = crc_floats(crc, column);
-        }
-        for row in core::hint::black_box(&BIAS0) {
-            crc = crc_floats(crc, row);
-        }
-        for column in core::hint::black_box(&WEIGHTS1.0).iter().flatten() {
-            crc = crc_floats(crc, column);
-        }
-        for row in core::hint::black_box(&BIAS1) {
-            crc = crc_floats(crc, row);
-        }
-        for column in core::hint::black_box(&WEIGHTS2.0).iter().flatten() {
-            crc = crc_floats(crc, column);
-        }
-        for row in core::hint::black_box(&BIAS2) {
-            crc = crc_floats(crc, row);
-        }
-        for column in core::hint::black_box(&WEIGHTS3.0).iter().flatten() {
-            crc = crc_floats(crc, column);
-        }
-        for row in core::hint::black_box(&BIAS3) {
-            crc = crc_floats(crc, row);
-        }
-        for column in core::hint::black_box(&WEIGHTS4.0).iter().flatten() {
-            crc = crc_floats(crc, column);
-        }
-        for row in core::hint::black_box(&BIAS4) {
-            crc = crc_floats(crc, row);
-        }
-        crc = crc_floats(crc, core::hint::black_box(&DUTIES));
-        !crc == 3733881278
+        IntegrityCheck::new().slice(IntegrityCheck::LENGTH) == Some(true)
     }
 }
 impl Default for Controller {

@@ -700,27 +700,59 @@ FILTERS_COLD FILTERS_APART static uint32_t filters_crc_word(uint32_t start, uint
     return crc;
 }
 
-FILTERS_COLD FILTERS_APART static uint32_t filters_crc(uint32_t start, const volatile float *words, uint32_t length)
+/* Positions from to to among the numbers of all tables; the next table starts at first. */
+typedef struct {
+    uint32_t from;
+    uint32_t to;
+    uint32_t first;
+    uint32_t crc;
+} filters_span;
+
+/* Where a position lies in the next table; at its ends if outside. */
+FILTERS_COLD FILTERS_APART static uint32_t filters_place(const filters_span *span, uint32_t position, uint32_t length)
 {
-    uint32_t crc = start;
+    const uint32_t inside = (position > span->first) ? (position - span->first) : 0u;
+    return (inside < length) ? inside : length;
+}
+
+FILTERS_COLD FILTERS_APART static void filters_crc(filters_span *span, const volatile float *words, uint32_t length)
+{
+    const uint32_t to = filters_place(span, span->to, length);
     uint32_t i;
-    for (i = 0u; i < length; ++i) {
-        crc = filters_crc_word(crc, filters_bits(words[i]));
+    for (i = filters_place(span, span->from, length); i < to; ++i) {
+        span->crc = filters_crc_word(span->crc, filters_bits(words[i]));
     }
-    return crc;
+    span->first += length;
+}
+
+FILTERS_COLD uint32_t filters_integrity_slice(filters_check *check, uint32_t count)
+{
+    const uint32_t from = (check->position < FILTERS_TABLE_NUMBERS) ? check->position : 0u;
+    const uint32_t rest = FILTERS_TABLE_NUMBERS - from;
+    filters_span span;
+    span.from = from;
+    span.to = from + ((count < rest) ? count : rest);
+    span.first = 0u;
+    span.crc = (from == 0u) ? 0xFFFFFFFFu : check->crc;
+    filters_crc(&span, filters_weights0, 40u);
+    filters_crc(&span, filters_bias0, 5u);
+    filters_crc(&span, filters_weights1, 20u);
+    filters_crc(&span, filters_bias1, 4u);
+    filters_crc(&span, filters_weights2, 12u);
+    filters_crc(&span, filters_bias2, 3u);
+    filters_crc(&span, filters_duties, 3u);
+    check->position = span.to;
+    check->crc = span.crc;
+    if (span.to < FILTERS_TABLE_NUMBERS) {
+        return FILTERS_INTEGRITY_RUNNING;
+    }
+    return ((span.crc ^ 0xFFFFFFFFu) == 0x4ECCE7EDu) ? FILTERS_INTEGRITY_INTACT : FILTERS_INTEGRITY_CHANGED;
 }
 
 FILTERS_COLD uint32_t filters_integrity(void)
 {
-    uint32_t crc = 0xFFFFFFFFu;
-    crc = filters_crc(crc, filters_weights0, 40u);
-    crc = filters_crc(crc, filters_bias0, 5u);
-    crc = filters_crc(crc, filters_weights1, 20u);
-    crc = filters_crc(crc, filters_bias1, 4u);
-    crc = filters_crc(crc, filters_weights2, 12u);
-    crc = filters_crc(crc, filters_bias2, 3u);
-    crc = filters_crc(crc, filters_duties, 3u);
-    return filters_flag((crc ^ 0xFFFFFFFFu) == 0x4ECCE7EDu);
+    filters_check check = { 0u, 0u };
+    return filters_flag(filters_integrity_slice(&check, FILTERS_TABLE_NUMBERS) == FILTERS_INTEGRITY_INTACT);
 }
 
 FILTERS_COLD uint32_t filters_self_test(void)
@@ -731,13 +763,19 @@ FILTERS_COLD uint32_t filters_self_test(void)
     uint32_t failed = 0u;
     uint32_t vector;
     uint32_t i;
+    filters_span span;
+    span.from = 0u;
+    span.to = FILTERS_ACTIONS;
     for (vector = 0u; vector < 16u; ++vector) {
         for (i = 0u; i < FILTERS_FEATURES; ++i) {
             random = (random * 0x0019660Du) + 0x3C6EF35Fu;
             observation[i] = filters_box_low[i] + (filters_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
         }
+        span.first = 0u;
+        span.crc = 0xFFFFFFFFu;
         filters_q_values(observation, q);
-        if ((failed == 0u) && ((filters_crc(0xFFFFFFFFu, q, FILTERS_ACTIONS) ^ 0xFFFFFFFFu) != filters_answers[vector])) {
+        filters_crc(&span, q, FILTERS_ACTIONS);
+        if ((failed == 0u) && ((span.crc ^ 0xFFFFFFFFu) != filters_answers[vector])) {
             failed = vector + 1u;
         }
     }

@@ -21,6 +21,7 @@ extern "C" {
 #define FILTERS_FEATURES 8u
 #define FILTERS_ACTIONS 3u
 #define FILTERS_STATE_WORDS 75u
+#define FILTERS_TABLE_NUMBERS 87u
 #define FILTERS_SAMPLE_PERIOD 5e-5
 
 /* Bits of the status word. */
@@ -97,6 +98,22 @@ uint32_t filters_self_test(void);
 
 /* CRC-32 over the tables: 1 if they are as generated, else 0. */
 uint32_t filters_integrity(void);
+
+/* The same check in slices, beside control: what it has done so far. All zero: nothing. */
+typedef struct {
+    uint32_t position;
+    uint32_t crc;
+} filters_check;
+
+#define FILTERS_INTEGRITY_RUNNING 0u
+#define FILTERS_INTEGRITY_INTACT 1u
+#define FILTERS_INTEGRITY_CHANGED 2u
+
+/*
+ * Checks the next count numbers of the tables and says how it stands; after the last of them the next call starts again. All
+ * FILTERS_TABLE_NUMBERS of them have been read after as many calls as count goes into them, rounded up.
+ */
+uint32_t filters_integrity_slice(filters_check *check, uint32_t count);
 
 #ifdef __cplusplus
 }

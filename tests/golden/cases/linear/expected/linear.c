@@ -434,23 +434,55 @@ LINEAR_COLD LINEAR_APART static uint32_t linear_crc_word(uint32_t start, uint32_
     return crc;
 }
 
-LINEAR_COLD LINEAR_APART static uint32_t linear_crc(uint32_t start, const volatile float *words, uint32_t length)
+/* Positions from to to among the numbers of all tables; the next table starts at first. */
+typedef struct {
+    uint32_t from;
+    uint32_t to;
+    uint32_t first;
+    uint32_t crc;
+} linear_span;
+
+/* Where a position lies in the next table; at its ends if outside. */
+LINEAR_COLD LINEAR_APART static uint32_t linear_place(const linear_span *span, uint32_t position, uint32_t length)
 {
-    uint32_t crc = start;
+    const uint32_t inside = (position > span->first) ? (position - span->first) : 0u;
+    return (inside < length) ? inside : length;
+}
+
+LINEAR_COLD LINEAR_APART static void linear_crc(linear_span *span, const volatile float *words, uint32_t length)
+{
+    const uint32_t to = linear_place(span, span->to, length);
     uint32_t i;
-    for (i = 0u; i < length; ++i) {
-        crc = linear_crc_word(crc, linear_bits(words[i]));
+    for (i = linear_place(span, span->from, length); i < to; ++i) {
+        span->crc = linear_crc_word(span->crc, linear_bits(words[i]));
     }
-    return crc;
+    span->first += length;
+}
+
+LINEAR_COLD uint32_t linear_integrity_slice(linear_check *check, uint32_t count)
+{
+    const uint32_t from = (check->position < LINEAR_TABLE_NUMBERS) ? check->position : 0u;
+    const uint32_t rest = LINEAR_TABLE_NUMBERS - from;
+    linear_span span;
+    span.from = from;
+    span.to = from + ((count < rest) ? count : rest);
+    span.first = 0u;
+    span.crc = (from == 0u) ? 0xFFFFFFFFu : check->crc;
+    linear_crc(&span, linear_weights0, 8u);
+    linear_crc(&span, linear_bias0, 4u);
+    linear_crc(&span, linear_duties, 4u);
+    check->position = span.to;
+    check->crc = span.crc;
+    if (span.to < LINEAR_TABLE_NUMBERS) {
+        return LINEAR_INTEGRITY_RUNNING;
+    }
+    return ((span.crc ^ 0xFFFFFFFFu) == 0x4E6B233Cu) ? LINEAR_INTEGRITY_INTACT : LINEAR_INTEGRITY_CHANGED;
 }
 
 LINEAR_COLD uint32_t linear_integrity(void)
 {
-    uint32_t crc = 0xFFFFFFFFu;
-    crc = linear_crc(crc, linear_weights0, 8u);
-    crc = linear_crc(crc, linear_bias0, 4u);
-    crc = linear_crc(crc, linear_duties, 4u);
-    return linear_flag((crc ^ 0xFFFFFFFFu) == 0x4E6B233Cu);
+    linear_check check = { 0u, 0u };
+    return linear_flag(linear_integrity_slice(&check, LINEAR_TABLE_NUMBERS) == LINEAR_INTEGRITY_INTACT);
 }
 
 LINEAR_COLD uint32_t linear_self_test(void)
@@ -461,13 +493,19 @@ LINEAR_COLD uint32_t linear_self_test(void)
     uint32_t failed = 0u;
     uint32_t vector;
     uint32_t i;
+    linear_span span;
+    span.from = 0u;
+    span.to = LINEAR_ACTIONS;
     for (vector = 0u; vector < 16u; ++vector) {
         for (i = 0u; i < LINEAR_FEATURES; ++i) {
             random = (random * 0x0019660Du) + 0x3C6EF35Fu;
             observation[i] = linear_box_low[i] + (linear_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
         }
+        span.first = 0u;
+        span.crc = 0xFFFFFFFFu;
         linear_q_values(observation, q);
-        if ((failed == 0u) && ((linear_crc(0xFFFFFFFFu, q, LINEAR_ACTIONS) ^ 0xFFFFFFFFu) != linear_answers[vector])) {
+        linear_crc(&span, q, LINEAR_ACTIONS);
+        if ((failed == 0u) && ((span.crc ^ 0xFFFFFFFFu) != linear_answers[vector])) {
             failed = vector + 1u;
         }
     }

@@ -21,6 +21,7 @@ extern "C" {
 #define LINEAR_FEATURES 2u
 #define LINEAR_ACTIONS 4u
 #define LINEAR_STATE_WORDS 6u
+#define LINEAR_TABLE_NUMBERS 16u
 #define LINEAR_SAMPLE_PERIOD 0.0001
 
 /* Bits of the status word. */
@@ -90,6 +91,22 @@ uint32_t linear_self_test(void);
 
 /* CRC-32 over the tables: 1 if they are as generated, else 0. */
 uint32_t linear_integrity(void);
+
+/* The same check in slices, beside control: what it has done so far. All zero: nothing. */
+typedef struct {
+    uint32_t position;
+    uint32_t crc;
+} linear_check;
+
+#define LINEAR_INTEGRITY_RUNNING 0u
+#define LINEAR_INTEGRITY_INTACT 1u
+#define LINEAR_INTEGRITY_CHANGED 2u
+
+/*
+ * Checks the next count numbers of the tables and says how it stands; after the last of them the next call starts again. All
+ * LINEAR_TABLE_NUMBERS of them have been read after as many calls as count goes into them, rounded up.
+ */
+uint32_t linear_integrity_slice(linear_check *check, uint32_t count);
 
 #ifdef __cplusplus
 }

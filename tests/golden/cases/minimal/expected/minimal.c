@@ -514,25 +514,57 @@ MINIMAL_COLD MINIMAL_APART static uint32_t minimal_crc_word(uint32_t start, uint
     return crc;
 }
 
-MINIMAL_COLD MINIMAL_APART static uint32_t minimal_crc(uint32_t start, const volatile float *words, uint32_t length)
+/* Positions from to to among the numbers of all tables; the next table starts at first. */
+typedef struct {
+    uint32_t from;
+    uint32_t to;
+    uint32_t first;
+    uint32_t crc;
+} minimal_span;
+
+/* Where a position lies in the next table; at its ends if outside. */
+MINIMAL_COLD MINIMAL_APART static uint32_t minimal_place(const minimal_span *span, uint32_t position, uint32_t length)
 {
-    uint32_t crc = start;
+    const uint32_t inside = (position > span->first) ? (position - span->first) : 0u;
+    return (inside < length) ? inside : length;
+}
+
+MINIMAL_COLD MINIMAL_APART static void minimal_crc(minimal_span *span, const volatile float *words, uint32_t length)
+{
+    const uint32_t to = minimal_place(span, span->to, length);
     uint32_t i;
-    for (i = 0u; i < length; ++i) {
-        crc = minimal_crc_word(crc, minimal_bits(words[i]));
+    for (i = minimal_place(span, span->from, length); i < to; ++i) {
+        span->crc = minimal_crc_word(span->crc, minimal_bits(words[i]));
     }
-    return crc;
+    span->first += length;
+}
+
+MINIMAL_COLD uint32_t minimal_integrity_slice(minimal_check *check, uint32_t count)
+{
+    const uint32_t from = (check->position < MINIMAL_TABLE_NUMBERS) ? check->position : 0u;
+    const uint32_t rest = MINIMAL_TABLE_NUMBERS - from;
+    minimal_span span;
+    span.from = from;
+    span.to = from + ((count < rest) ? count : rest);
+    span.first = 0u;
+    span.crc = (from == 0u) ? 0xFFFFFFFFu : check->crc;
+    minimal_crc(&span, minimal_weights0, 8u);
+    minimal_crc(&span, minimal_bias0, 4u);
+    minimal_crc(&span, minimal_weights1, 12u);
+    minimal_crc(&span, minimal_bias1, 3u);
+    minimal_crc(&span, minimal_duties, 3u);
+    check->position = span.to;
+    check->crc = span.crc;
+    if (span.to < MINIMAL_TABLE_NUMBERS) {
+        return MINIMAL_INTEGRITY_RUNNING;
+    }
+    return ((span.crc ^ 0xFFFFFFFFu) == 0x49D4A3C9u) ? MINIMAL_INTEGRITY_INTACT : MINIMAL_INTEGRITY_CHANGED;
 }
 
 MINIMAL_COLD uint32_t minimal_integrity(void)
 {
-    uint32_t crc = 0xFFFFFFFFu;
-    crc = minimal_crc(crc, minimal_weights0, 8u);
-    crc = minimal_crc(crc, minimal_bias0, 4u);
-    crc = minimal_crc(crc, minimal_weights1, 12u);
-    crc = minimal_crc(crc, minimal_bias1, 3u);
-    crc = minimal_crc(crc, minimal_duties, 3u);
-    return minimal_flag((crc ^ 0xFFFFFFFFu) == 0x49D4A3C9u);
+    minimal_check check = { 0u, 0u };
+    return minimal_flag(minimal_integrity_slice(&check, MINIMAL_TABLE_NUMBERS) == MINIMAL_INTEGRITY_INTACT);
 }
 
 MINIMAL_COLD uint32_t minimal_self_test(void)
@@ -543,13 +575,19 @@ MINIMAL_COLD uint32_t minimal_self_test(void)
     uint32_t failed = 0u;
     uint32_t vector;
     uint32_t i;
+    minimal_span span;
+    span.from = 0u;
+    span.to = MINIMAL_ACTIONS;
     for (vector = 0u; vector < 16u; ++vector) {
         for (i = 0u; i < MINIMAL_FEATURES; ++i) {
             random = (random * 0x0019660Du) + 0x3C6EF35Fu;
             observation[i] = minimal_box_low[i] + (minimal_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
         }
+        span.first = 0u;
+        span.crc = 0xFFFFFFFFu;
         minimal_q_values(observation, q);
-        if ((failed == 0u) && ((minimal_crc(0xFFFFFFFFu, q, MINIMAL_ACTIONS) ^ 0xFFFFFFFFu) != minimal_answers[vector])) {
+        minimal_crc(&span, q, MINIMAL_ACTIONS);
+        if ((failed == 0u) && ((span.crc ^ 0xFFFFFFFFu) != minimal_answers[vector])) {
             failed = vector + 1u;
         }
     }

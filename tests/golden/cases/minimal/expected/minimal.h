@@ -21,6 +21,7 @@ extern "C" {
 #define MINIMAL_FEATURES 2u
 #define MINIMAL_ACTIONS 3u
 #define MINIMAL_STATE_WORDS 6u
+#define MINIMAL_TABLE_NUMBERS 30u
 #define MINIMAL_SAMPLE_PERIOD 0.0001
 
 /* Bits of the status word. */
@@ -90,6 +91,22 @@ uint32_t minimal_self_test(void);
 
 /* CRC-32 over the tables: 1 if they are as generated, else 0. */
 uint32_t minimal_integrity(void);
+
+/* The same check in slices, beside control: what it has done so far. All zero: nothing. */
+typedef struct {
+    uint32_t position;
+    uint32_t crc;
+} minimal_check;
+
+#define MINIMAL_INTEGRITY_RUNNING 0u
+#define MINIMAL_INTEGRITY_INTACT 1u
+#define MINIMAL_INTEGRITY_CHANGED 2u
+
+/*
+ * Checks the next count numbers of the tables and says how it stands; after the last of them the next call starts again. All
+ * MINIMAL_TABLE_NUMBERS of them have been read after as many calls as count goes into them, rounded up.
+ */
+uint32_t minimal_integrity_slice(minimal_check *check, uint32_t count);
 
 #ifdef __cplusplus
 }

@@ -682,27 +682,59 @@ PAPER_COLD PAPER_APART static uint32_t paper_crc_word(uint32_t start, uint32_t w
     return crc;
 }
 
-PAPER_COLD PAPER_APART static uint32_t paper_crc(uint32_t start, const volatile float *words, uint32_t length)
+/* Positions from to to among the numbers of all tables; the next table starts at first. */
+typedef struct {
+    uint32_t from;
+    uint32_t to;
+    uint32_t first;
+    uint32_t crc;
+} paper_span;
+
+/* Where a position lies in the next table; at its ends if outside. */
+PAPER_COLD PAPER_APART static uint32_t paper_place(const paper_span *span, uint32_t position, uint32_t length)
 {
-    uint32_t crc = start;
+    const uint32_t inside = (position > span->first) ? (position - span->first) : 0u;
+    return (inside < length) ? inside : length;
+}
+
+PAPER_COLD PAPER_APART static void paper_crc(paper_span *span, const volatile float *words, uint32_t length)
+{
+    const uint32_t to = paper_place(span, span->to, length);
     uint32_t i;
-    for (i = 0u; i < length; ++i) {
-        crc = paper_crc_word(crc, paper_bits(words[i]));
+    for (i = paper_place(span, span->from, length); i < to; ++i) {
+        span->crc = paper_crc_word(span->crc, paper_bits(words[i]));
     }
-    return crc;
+    span->first += length;
+}
+
+PAPER_COLD uint32_t paper_integrity_slice(paper_check *check, uint32_t count)
+{
+    const uint32_t from = (check->position < PAPER_TABLE_NUMBERS) ? check->position : 0u;
+    const uint32_t rest = PAPER_TABLE_NUMBERS - from;
+    paper_span span;
+    span.from = from;
+    span.to = from + ((count < rest) ? count : rest);
+    span.first = 0u;
+    span.crc = (from == 0u) ? 0xFFFFFFFFu : check->crc;
+    paper_crc(&span, paper_weights0, 30u);
+    paper_crc(&span, paper_bias0, 5u);
+    paper_crc(&span, paper_weights1, 20u);
+    paper_crc(&span, paper_bias1, 4u);
+    paper_crc(&span, paper_weights2, 36u);
+    paper_crc(&span, paper_bias2, 9u);
+    paper_crc(&span, paper_duties, 9u);
+    check->position = span.to;
+    check->crc = span.crc;
+    if (span.to < PAPER_TABLE_NUMBERS) {
+        return PAPER_INTEGRITY_RUNNING;
+    }
+    return ((span.crc ^ 0xFFFFFFFFu) == 0x49E6DD07u) ? PAPER_INTEGRITY_INTACT : PAPER_INTEGRITY_CHANGED;
 }
 
 PAPER_COLD uint32_t paper_integrity(void)
 {
-    uint32_t crc = 0xFFFFFFFFu;
-    crc = paper_crc(crc, paper_weights0, 30u);
-    crc = paper_crc(crc, paper_bias0, 5u);
-    crc = paper_crc(crc, paper_weights1, 20u);
-    crc = paper_crc(crc, paper_bias1, 4u);
-    crc = paper_crc(crc, paper_weights2, 36u);
-    crc = paper_crc(crc, paper_bias2, 9u);
-    crc = paper_crc(crc, paper_duties, 9u);
-    return paper_flag((crc ^ 0xFFFFFFFFu) == 0x49E6DD07u);
+    paper_check check = { 0u, 0u };
+    return paper_flag(paper_integrity_slice(&check, PAPER_TABLE_NUMBERS) == PAPER_INTEGRITY_INTACT);
 }
 
 PAPER_COLD uint32_t paper_self_test(void)
@@ -713,13 +745,19 @@ PAPER_COLD uint32_t paper_self_test(void)
     uint32_t failed = 0u;
     uint32_t vector;
     uint32_t i;
+    paper_span span;
+    span.from = 0u;
+    span.to = PAPER_ACTIONS;
     for (vector = 0u; vector < 16u; ++vector) {
         for (i = 0u; i < PAPER_FEATURES; ++i) {
             random = (random * 0x0019660Du) + 0x3C6EF35Fu;
             observation[i] = paper_box_low[i] + (paper_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
         }
+        span.first = 0u;
+        span.crc = 0xFFFFFFFFu;
         paper_q_values(observation, q);
-        if ((failed == 0u) && ((paper_crc(0xFFFFFFFFu, q, PAPER_ACTIONS) ^ 0xFFFFFFFFu) != paper_answers[vector])) {
+        paper_crc(&span, q, PAPER_ACTIONS);
+        if ((failed == 0u) && ((span.crc ^ 0xFFFFFFFFu) != paper_answers[vector])) {
             failed = vector + 1u;
         }
     }

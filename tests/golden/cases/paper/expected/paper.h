@@ -21,6 +21,7 @@ extern "C" {
 #define PAPER_FEATURES 6u
 #define PAPER_ACTIONS 9u
 #define PAPER_STATE_WORDS 13u
+#define PAPER_TABLE_NUMBERS 113u
 #define PAPER_SAMPLE_PERIOD 0.0001
 
 /* Bits of the status word. */
@@ -104,6 +105,22 @@ uint32_t paper_self_test(void);
 
 /* CRC-32 over the tables: 1 if they are as generated, else 0. */
 uint32_t paper_integrity(void);
+
+/* The same check in slices, beside control: what it has done so far. All zero: nothing. */
+typedef struct {
+    uint32_t position;
+    uint32_t crc;
+} paper_check;
+
+#define PAPER_INTEGRITY_RUNNING 0u
+#define PAPER_INTEGRITY_INTACT 1u
+#define PAPER_INTEGRITY_CHANGED 2u
+
+/*
+ * Checks the next count numbers of the tables and says how it stands; after the last of them the next call starts again. All
+ * PAPER_TABLE_NUMBERS of them have been read after as many calls as count goes into them, rounded up.
+ */
+uint32_t paper_integrity_slice(paper_check *check, uint32_t count);
 
 #ifdef __cplusplus
 }

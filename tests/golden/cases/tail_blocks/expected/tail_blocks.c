@@ -728,25 +728,57 @@ TAIL_BLOCKS_COLD TAIL_BLOCKS_APART static uint32_t tail_blocks_crc_word(uint32_t
     return crc;
 }
 
-TAIL_BLOCKS_COLD TAIL_BLOCKS_APART static uint32_t tail_blocks_crc(uint32_t start, const volatile float *words, uint32_t length)
+/* Positions from to to among the numbers of all tables; the next table starts at first. */
+typedef struct {
+    uint32_t from;
+    uint32_t to;
+    uint32_t first;
+    uint32_t crc;
+} tail_blocks_span;
+
+/* Where a position lies in the next table; at its ends if outside. */
+TAIL_BLOCKS_COLD TAIL_BLOCKS_APART static uint32_t tail_blocks_place(const tail_blocks_span *span, uint32_t position, uint32_t length)
 {
-    uint32_t crc = start;
+    const uint32_t inside = (position > span->first) ? (position - span->first) : 0u;
+    return (inside < length) ? inside : length;
+}
+
+TAIL_BLOCKS_COLD TAIL_BLOCKS_APART static void tail_blocks_crc(tail_blocks_span *span, const volatile float *words, uint32_t length)
+{
+    const uint32_t to = tail_blocks_place(span, span->to, length);
     uint32_t i;
-    for (i = 0u; i < length; ++i) {
-        crc = tail_blocks_crc_word(crc, tail_blocks_bits(words[i]));
+    for (i = tail_blocks_place(span, span->from, length); i < to; ++i) {
+        span->crc = tail_blocks_crc_word(span->crc, tail_blocks_bits(words[i]));
     }
-    return crc;
+    span->first += length;
+}
+
+TAIL_BLOCKS_COLD uint32_t tail_blocks_integrity_slice(tail_blocks_check *check, uint32_t count)
+{
+    const uint32_t from = (check->position < TAIL_BLOCKS_TABLE_NUMBERS) ? check->position : 0u;
+    const uint32_t rest = TAIL_BLOCKS_TABLE_NUMBERS - from;
+    tail_blocks_span span;
+    span.from = from;
+    span.to = from + ((count < rest) ? count : rest);
+    span.first = 0u;
+    span.crc = (from == 0u) ? 0xFFFFFFFFu : check->crc;
+    tail_blocks_crc(&span, tail_blocks_weights0, 99u);
+    tail_blocks_crc(&span, tail_blocks_bias0, 33u);
+    tail_blocks_crc(&span, tail_blocks_weights1, 660u);
+    tail_blocks_crc(&span, tail_blocks_bias1, 20u);
+    tail_blocks_crc(&span, tail_blocks_duties, 20u);
+    check->position = span.to;
+    check->crc = span.crc;
+    if (span.to < TAIL_BLOCKS_TABLE_NUMBERS) {
+        return TAIL_BLOCKS_INTEGRITY_RUNNING;
+    }
+    return ((span.crc ^ 0xFFFFFFFFu) == 0xC3C979FCu) ? TAIL_BLOCKS_INTEGRITY_INTACT : TAIL_BLOCKS_INTEGRITY_CHANGED;
 }
 
 TAIL_BLOCKS_COLD uint32_t tail_blocks_integrity(void)
 {
-    uint32_t crc = 0xFFFFFFFFu;
-    crc = tail_blocks_crc(crc, tail_blocks_weights0, 99u);
-    crc = tail_blocks_crc(crc, tail_blocks_bias0, 33u);
-    crc = tail_blocks_crc(crc, tail_blocks_weights1, 660u);
-    crc = tail_blocks_crc(crc, tail_blocks_bias1, 20u);
-    crc = tail_blocks_crc(crc, tail_blocks_duties, 20u);
-    return tail_blocks_flag((crc ^ 0xFFFFFFFFu) == 0xC3C979FCu);
+    tail_blocks_check check = { 0u, 0u };
+    return tail_blocks_flag(tail_blocks_integrity_slice(&check, TAIL_BLOCKS_TABLE_NUMBERS) == TAIL_BLOCKS_INTEGRITY_INTACT);
 }
 
 TAIL_BLOCKS_COLD uint32_t tail_blocks_self_test(void)
@@ -757,13 +789,19 @@ TAIL_BLOCKS_COLD uint32_t tail_blocks_self_test(void)
     uint32_t failed = 0u;
     uint32_t vector;
     uint32_t i;
+    tail_blocks_span span;
+    span.from = 0u;
+    span.to = TAIL_BLOCKS_ACTIONS;
     for (vector = 0u; vector < 16u; ++vector) {
         for (i = 0u; i < TAIL_BLOCKS_FEATURES; ++i) {
             random = (random * 0x0019660Du) + 0x3C6EF35Fu;
             observation[i] = tail_blocks_box_low[i] + (tail_blocks_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
         }
+        span.first = 0u;
+        span.crc = 0xFFFFFFFFu;
         tail_blocks_q_values(observation, q);
-        if ((failed == 0u) && ((tail_blocks_crc(0xFFFFFFFFu, q, TAIL_BLOCKS_ACTIONS) ^ 0xFFFFFFFFu) != tail_blocks_answers[vector])) {
+        tail_blocks_crc(&span, q, TAIL_BLOCKS_ACTIONS);
+        if ((failed == 0u) && ((span.crc ^ 0xFFFFFFFFu) != tail_blocks_answers[vector])) {
             failed = vector + 1u;
         }
     }

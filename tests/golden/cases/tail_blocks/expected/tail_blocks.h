@@ -21,6 +21,7 @@ extern "C" {
 #define TAIL_BLOCKS_FEATURES 3u
 #define TAIL_BLOCKS_ACTIONS 20u
 #define TAIL_BLOCKS_STATE_WORDS 9u
+#define TAIL_BLOCKS_TABLE_NUMBERS 832u
 #define TAIL_BLOCKS_SAMPLE_PERIOD 0.0001
 
 /* Bits of the status word. */
@@ -93,6 +94,22 @@ uint32_t tail_blocks_self_test(void);
 
 /* CRC-32 over the tables: 1 if they are as generated, else 0. */
 uint32_t tail_blocks_integrity(void);
+
+/* The same check in slices, beside control: what it has done so far. All zero: nothing. */
+typedef struct {
+    uint32_t position;
+    uint32_t crc;
+} tail_blocks_check;
+
+#define TAIL_BLOCKS_INTEGRITY_RUNNING 0u
+#define TAIL_BLOCKS_INTEGRITY_INTACT 1u
+#define TAIL_BLOCKS_INTEGRITY_CHANGED 2u
+
+/*
+ * Checks the next count numbers of the tables and says how it stands; after the last of them the next call starts again. All
+ * TAIL_BLOCKS_TABLE_NUMBERS of them have been read after as many calls as count goes into them, rounded up.
+ */
+uint32_t tail_blocks_integrity_slice(tail_blocks_check *check, uint32_t count);
 
 #ifdef __cplusplus
 }

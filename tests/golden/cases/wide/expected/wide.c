@@ -775,42 +775,74 @@ WIDE_COLD WIDE_APART static uint32_t wide_crc_word(uint32_t start, uint32_t word
     return crc;
 }
 
-WIDE_COLD WIDE_APART static uint32_t wide_crc(uint32_t start, const volatile double *words, uint32_t length)
+/* Positions from to to among the numbers of all tables; the next table starts at first. */
+typedef struct {
+    uint32_t from;
+    uint32_t to;
+    uint32_t first;
+    uint32_t crc;
+} wide_span;
+
+/* Where a position lies in the next table; at its ends if outside. */
+WIDE_COLD WIDE_APART static uint32_t wide_place(const wide_span *span, uint32_t position, uint32_t length)
 {
-    uint32_t crc = start;
-    uint32_t i;
-    for (i = 0u; i < length; ++i) {
-        crc = wide_crc_word(crc, (uint32_t)wide_bits(words[i]));
-        crc = wide_crc_word(crc, (uint32_t)(wide_bits(words[i]) >> 32));
-    }
-    return crc;
+    const uint32_t inside = (position > span->first) ? (position - span->first) : 0u;
+    return (inside < length) ? inside : length;
 }
 
-WIDE_COLD WIDE_APART static uint32_t wide_crc_weights(uint32_t start, const volatile float *words, uint32_t length)
+WIDE_COLD WIDE_APART static void wide_crc(wide_span *span, const volatile double *words, uint32_t length)
 {
-    uint32_t crc = start;
+    const uint32_t to = wide_place(span, span->to, length);
     uint32_t i;
-    for (i = 0u; i < length; ++i) {
-        crc = wide_crc_word(crc, wide_weight_bits(words[i]));
+    for (i = wide_place(span, span->from, length); i < to; ++i) {
+        span->crc = wide_crc_word(span->crc, (uint32_t)wide_bits(words[i]));
+        span->crc = wide_crc_word(span->crc, (uint32_t)(wide_bits(words[i]) >> 32));
     }
-    return crc;
+    span->first += length;
+}
+
+WIDE_COLD WIDE_APART static void wide_crc_weights(wide_span *span, const volatile float *words, uint32_t length)
+{
+    const uint32_t to = wide_place(span, span->to, length);
+    uint32_t i;
+    for (i = wide_place(span, span->from, length); i < to; ++i) {
+        span->crc = wide_crc_word(span->crc, wide_weight_bits(words[i]));
+    }
+    span->first += length;
+}
+
+WIDE_COLD uint32_t wide_integrity_slice(wide_check *check, uint32_t count)
+{
+    const uint32_t from = (check->position < WIDE_TABLE_NUMBERS) ? check->position : 0u;
+    const uint32_t rest = WIDE_TABLE_NUMBERS - from;
+    wide_span span;
+    span.from = from;
+    span.to = from + ((count < rest) ? count : rest);
+    span.first = 0u;
+    span.crc = (from == 0u) ? 0xFFFFFFFFu : check->crc;
+    wide_crc_weights(&span, wide_weights0, 108u);
+    wide_crc(&span, wide_bias0, 9u);
+    wide_crc_weights(&span, wide_weights1, 54u);
+    wide_crc(&span, wide_bias1, 6u);
+    wide_crc_weights(&span, wide_weights2, 48u);
+    wide_crc(&span, wide_bias2, 8u);
+    wide_crc_weights(&span, wide_weights3, 32u);
+    wide_crc(&span, wide_bias3, 4u);
+    wide_crc_weights(&span, wide_weights4, 20u);
+    wide_crc(&span, wide_bias4, 5u);
+    wide_crc(&span, wide_duties, 5u);
+    check->position = span.to;
+    check->crc = span.crc;
+    if (span.to < WIDE_TABLE_NUMBERS) {
+        return WIDE_INTEGRITY_RUNNING;
+    }
+    return ((span.crc ^ 0xFFFFFFFFu) == 0x94BC9EE0u) ? WIDE_INTEGRITY_INTACT : WIDE_INTEGRITY_CHANGED;
 }
 
 WIDE_COLD uint32_t wide_integrity(void)
 {
-    uint32_t crc = 0xFFFFFFFFu;
-    crc = wide_crc_weights(crc, wide_weights0, 108u);
-    crc = wide_crc(crc, wide_bias0, 9u);
-    crc = wide_crc_weights(crc, wide_weights1, 54u);
-    crc = wide_crc(crc, wide_bias1, 6u);
-    crc = wide_crc_weights(crc, wide_weights2, 48u);
-    crc = wide_crc(crc, wide_bias2, 8u);
-    crc = wide_crc_weights(crc, wide_weights3, 32u);
-    crc = wide_crc(crc, wide_bias3, 4u);
-    crc = wide_crc_weights(crc, wide_weights4, 20u);
-    crc = wide_crc(crc, wide_bias4, 5u);
-    crc = wide_crc(crc, wide_duties, 5u);
-    return wide_flag((crc ^ 0xFFFFFFFFu) == 0x94BC9EE0u);
+    wide_check check = { 0u, 0u };
+    return wide_flag(wide_integrity_slice(&check, WIDE_TABLE_NUMBERS) == WIDE_INTEGRITY_INTACT);
 }
 
 WIDE_COLD uint32_t wide_self_test(void)
@@ -821,13 +853,19 @@ WIDE_COLD uint32_t wide_self_test(void)
     uint32_t failed = 0u;
     uint32_t vector;
     uint32_t i;
+    wide_span span;
+    span.from = 0u;
+    span.to = WIDE_ACTIONS;
     for (vector = 0u; vector < 16u; ++vector) {
         for (i = 0u; i < WIDE_FEATURES; ++i) {
             random = (random * 0x0019660Du) + 0x3C6EF35Fu;
             observation[i] = wide_box_low[i] + (wide_box_width[i] * ((double)(random >> 8) * 5.960464477539063e-8));
         }
+        span.first = 0u;
+        span.crc = 0xFFFFFFFFu;
         wide_q_values(observation, q);
-        if ((failed == 0u) && ((wide_crc(0xFFFFFFFFu, q, WIDE_ACTIONS) ^ 0xFFFFFFFFu) != wide_answers[vector])) {
+        wide_crc(&span, q, WIDE_ACTIONS);
+        if ((failed == 0u) && ((span.crc ^ 0xFFFFFFFFu) != wide_answers[vector])) {
             failed = vector + 1u;
         }
     }

@@ -21,6 +21,7 @@ extern "C" {
 #define WIDE_FEATURES 12u
 #define WIDE_ACTIONS 5u
 #define WIDE_STATE_WORDS 52u
+#define WIDE_TABLE_NUMBERS 299u
 #define WIDE_SAMPLE_PERIOD 0.0001
 
 /* Bits of the status word. */
@@ -113,6 +114,22 @@ uint32_t wide_self_test(void);
 
 /* CRC-32 over the tables: 1 if they are as generated, else 0. */
 uint32_t wide_integrity(void);
+
+/* The same check in slices, beside control: what it has done so far. All zero: nothing. */
+typedef struct {
+    uint32_t position;
+    uint32_t crc;
+} wide_check;
+
+#define WIDE_INTEGRITY_RUNNING 0u
+#define WIDE_INTEGRITY_INTACT 1u
+#define WIDE_INTEGRITY_CHANGED 2u
+
+/*
+ * Checks the next count numbers of the tables and says how it stands; after the last of them the next call starts again. All
+ * WIDE_TABLE_NUMBERS of them have been read after as many calls as count goes into them, rounded up.
+ */
+uint32_t wide_integrity_slice(wide_check *check, uint32_t count);
 
 #ifdef __cplusplus
 }

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod formats;
+mod integrity;
 mod macro_crate;
 mod mutations;
 mod simplified;

@@ -73,7 +73,9 @@ fn slots(kind: &TokenStream) -> [TokenStream; 4] {
             #[inline(always)]
             #[allow(dead_code)]
             fn activate<const N: usize>(slots: &mut [Slot; N], activation: impl Fn(#kind) -> #kind) {
-                *slots = slots.map(activation);
+                for slot in slots {
+                    *slot = activation(*slot);
+                }
             }
         },
     ]
@@ -146,7 +148,11 @@ impl Form {
     fn portable(self, kind: &TokenStream) -> TokenStream {
         let body = match self {
             Form::Plain => quote!(*out = block(weights, bias, x);),
-            Form::Rectified => quote!(*out = block(weights, bias, x).map(relu);),
+            Form::Rectified => quote! {
+                for (out, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+                    *out = relu(sum);
+                }
+            },
             Form::Added => quote!(*out = block(weights, out, x);),
         };
         self.function(kind, &body)

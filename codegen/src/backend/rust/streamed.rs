@@ -177,8 +177,8 @@ fn chunks(scalar: Scalar, index: usize, layer: &LayerCode, last: &LayerCode, val
     let length = size(last.chunk);
     quote! {
         let mut q = #sums;
-        let mut part = [EMPTY; #length];
         for #pattern in #iterator {
+            let mut part = [EMPTY; #length];
             #stored
             #name(next, #argument filled(&part), &mut q);
         }

@@ -143,7 +143,9 @@ fn filled<const N: usize>(slots: &[Slot; N]) -> &[f32; N] {
 #[inline(always)]
 #[allow(dead_code)]
 fn activate<const N: usize>(slots: &mut [Slot; N], activation: impl Fn(f32) -> f32) {
-    *slots = slots.map(activation);
+    for slot in slots {
+        *slot = activation(*slot);
+    }
 }
 /// Sums of a block.
 #[inline(always)]
@@ -165,7 +167,9 @@ fn rectified<const INPUTS: usize, const ROWS: usize>(
     x: &[f32; INPUTS],
     out: &mut [Slot; ROWS],
 ) {
-    *out = block(weights, bias, x).map(relu);
+    for (out, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+        *out = relu(sum);
+    }
 }
 /// Sums of a block that go on from `out`.
 #[inline(always)]

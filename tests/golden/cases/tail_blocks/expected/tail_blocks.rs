@@ -166,7 +166,9 @@ fn filled<const N: usize>(slots: &[Slot; N]) -> &[f32; N] {
 #[inline(always)]
 #[allow(dead_code)]
 fn activate<const N: usize>(slots: &mut [Slot; N], activation: impl Fn(f32) -> f32) {
-    *slots = slots.map(activation);
+    for slot in slots {
+        *slot = activation(*slot);
+    }
 }
 /// Sums of a block.
 #[inline(always)]
@@ -188,7 +190,9 @@ fn rectified<const INPUTS: usize, const ROWS: usize>(
     x: &[f32; INPUTS],
     out: &mut [Slot; ROWS],
 ) {
-    *out = block(weights, bias, x).map(relu);
+    for (out, sum) in out.iter_mut().zip(block(weights, bias, x)) {
+        *out = relu(sum);
+    }
 }
 /// Sums of a block that go on from `out`.
 #[inline(always)]
@@ -1126,8 +1130,8 @@ fn layer1<const INPUTS: usize>(
 }
 fn network(observation: &[f32; FEATURES]) -> [f32; ACTIONS] {
     let mut q = BIAS1;
-    let mut part = [EMPTY; 32];
     for ((weights, bias), next) in WEIGHTS0.0.iter().zip(&BIAS0).zip(&WEIGHTS1.0) {
+        let mut part = [EMPTY; 32];
         rectified(weights, bias, observation, &mut part);
         layer1(next, filled(&part), &mut q);
     }

@@ -312,18 +312,19 @@ fn decide(program: &Program) -> TokenStream {
         let (flag, bit) = (printer.operand(*flag), word(*bit));
         quote!((#flag << #bit))
     });
+    let kind = number::kind(program.scalar());
     let fallback = number(program.scalar(), program.fallback_duty);
     let (lowest, greater) = network::argmax(program);
     let apart = program.has_fpu.then(|| {
         quote! {
             /// The greedy action for a measurement, with a stack of its own.
             #[inline(never)]
-            fn choose_for(&self, measured: &Measurement) -> (u32, f32) {
+            fn choose_for(&self, measured: &Measurement) -> (u32, #kind) {
                 Self::choose(&self.sense(measured).observation)
             }
             /// What a step does behind the network.
             #[inline(never)]
-            fn settle(&mut self, measured: &Measurement, chosen: (u32, f32)) -> Command {
+            fn settle(&mut self, measured: &Measurement, chosen: (u32, #kind)) -> Command {
                 let front = self.sense(measured);
                 let command = self.decide(&front, chosen);
                 self.advance(&front, &command);
@@ -335,7 +336,7 @@ fn decide(program: &Program) -> TokenStream {
         #apart
         /// Network and argmax: index and duty of the greedy action.
         #[inline(always)]
-        fn choose(observation: &[f32; FEATURES]) -> (u32, f32) {
+        fn choose(observation: &[#kind; FEATURES]) -> (u32, #kind) {
             let mut best = #lowest;
             let mut chosen = DUTIES[0];
             let mut action_index = 0_u32;
@@ -353,7 +354,7 @@ fn decide(program: &Program) -> TokenStream {
         }
         /// Mapping, limits, status.
         #[inline(always)]
-        fn decide(&self, front: &Front, (action_index, chosen): (u32, f32)) -> Command {
+        fn decide(&self, front: &Front, (action_index, chosen): (u32, #kind)) -> Command {
             #(#statements)*
             let usable = front.usable;
             let status = #(#terms)|*;

@@ -27,6 +27,8 @@ fn generated_rust_has_no_warnings() {
                         "--edition",
                         edition,
                         "--crate-type=lib",
+                        // as cargo does: a condition that it does not know is a warning
+                        "--check-cfg=cfg()",
                         "--emit=metadata",
                         "-Dwarnings",
                         "lib.rs",

@@ -388,22 +388,20 @@ fn layer_items(
     if kernels.is_empty() {
         return quote! { #(#tables)* #[doc = #doc] #[inline(always)] #head { #portable } };
     }
+    // all within the function, because on an item `allow` does not reach the item's own condition
     quote! {
         #(#tables)*
-        #(#kernels)*
         #[doc = #doc]
-        #[cfg(all(target_arch = "arm", policyc_assembly))]
-        #[allow(unexpected_cfgs)]
         #[inline(always)]
+        #[allow(unexpected_cfgs)]
         #head {
+            #(#kernels)*
             // SAFETY: reads all of `x` and of the tables, writes outputs of `y`; all are aligned to words
+            #[cfg(all(target_arch = "arm", policyc_assembly))]
             unsafe { #(#kernel_calls)* }
+            #[cfg(not(all(target_arch = "arm", policyc_assembly)))]
+            { #portable }
         }
-        #[doc = #doc]
-        #[cfg(not(all(target_arch = "arm", policyc_assembly)))]
-        #[allow(unexpected_cfgs)]
-        #[inline(always)]
-        #head { #portable }
     }
 }
 
@@ -431,7 +429,6 @@ fn kernel(
     Some(quote! {
         /// `--cfg policyc_assembly` takes the loops in assembly (Armv7E-M and Armv8-M with DSP); the bits are the same.
         #[cfg(all(target_arch = "arm", policyc_assembly))]
-        #[allow(unexpected_cfgs)]
         #[unsafe(naked)]
         unsafe extern "C" fn #name(x: *const i16, y: *mut #sink, weights: *const #weight, bias: *const i32 #next) {
             core::arch::naked_asm!(#processor, #(#text),*)

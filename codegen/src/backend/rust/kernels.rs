@@ -16,21 +16,30 @@ use crate::program::{ActivationCode, LayerCode, Program};
 pub fn items(program: &Program, layers: &[LayerCode], accumulate: &TokenStream) -> TokenStream {
     let kind = number::kind(program.scalar());
     let sizes = sizes(layers);
-    let (portable, assembly) = if sizes.is_empty() {
-        (TokenStream::new(), TokenStream::new())
-    } else {
-        let is_assembly = quote!(all(target_arch = "arm", target_abi = "eabihf", policyc_assembly));
-        let guard = quote!(#[cfg(#is_assembly)] #[allow(unexpected_cfgs)]);
-        let kernels = sizes.iter().map(|size| kernel(*size, &processor(program), &guard));
-        let forms = FORMS.map(|form| form.assembly(&sizes)).into_iter();
-        let items = slots_in_assembly().into_iter().chain(forms);
-        (
-            quote!(#[cfg(not(#is_assembly))] #[allow(unexpected_cfgs)]),
-            quote!(#(#kernels)* #(#guard #items)*),
-        )
+    let portable = |visible: &TokenStream| {
+        let forms = FORMS.map(|form| form.portable(&kind, visible)).into_iter();
+        slots(&kind, visible).into_iter().chain(forms)
     };
-    let forms = FORMS.map(|form| form.portable(&kind)).into_iter();
-    let items = slots(&kind).into_iter().chain(forms);
+    let items = if sizes.is_empty() {
+        portable(&TokenStream::new()).collect()
+    } else {
+        let visible = quote!(pub(super));
+        let is_assembly = quote!(all(target_arch = "arm", target_abi = "eabihf", policyc_assembly));
+        let kernels = sizes.iter().map(|size| kernel(*size, &processor(program)));
+        let forms = FORMS.map(|form| form.assembly(&sizes, &visible)).into_iter();
+        let assembly = kernels.chain(slots_in_assembly(&visible)).chain(forms);
+        let portable = portable(&visible);
+        // a module, because on an item `allow` does not reach the item's own condition
+        quote! {
+            #[allow(unexpected_cfgs)]
+            mod loops {
+                use super::*;
+                #(#[cfg(not(#is_assembly))] #portable)*
+                #(#[cfg(#is_assembly)] #assembly)*
+            }
+            use loops::*;
+        }
+    };
     quote! {
         /// Sums of one block of outputs: from the bias, inputs in index order, every operation rounded.
         #[inline(always)]
@@ -48,31 +57,30 @@ pub fn items(program: &Program, layers: &[LayerCode], accumulate: &TokenStream) 
             }
             sums
         }
-        #(#portable #items)*
-        #assembly
+        #items
     }
 }
 
 /// What the activations of a layer are kept in.
-fn slots(kind: &TokenStream) -> [TokenStream; 4] {
+fn slots(kind: &TokenStream, visible: &TokenStream) -> [TokenStream; 4] {
     [
         quote!(
             /// What an activation is kept in.
-            type Slot = #kind;
+            #visible type Slot = #kind;
         ),
         quote!(
-            const EMPTY: Slot = 0.0;
+            #visible const EMPTY: Slot = 0.0;
         ),
         quote! {
             #[inline(always)]
-            fn filled<const N: usize>(slots: &[Slot; N]) -> &[#kind; N] {
+            #visible fn filled<const N: usize>(slots: &[Slot; N]) -> &[#kind; N] {
                 slots
             }
         },
         quote! {
             #[inline(always)]
             #[allow(dead_code)]
-            fn activate<const N: usize>(slots: &mut [Slot; N], activation: impl Fn(#kind) -> #kind) {
+            #visible fn activate<const N: usize>(slots: &mut [Slot; N], activation: impl Fn(#kind) -> #kind) {
                 for slot in slots {
                     *slot = activation(*slot);
                 }
@@ -81,19 +89,19 @@ fn slots(kind: &TokenStream) -> [TokenStream; 4] {
     ]
 }
 
-fn slots_in_assembly() -> [TokenStream; 4] {
+fn slots_in_assembly(visible: &TokenStream) -> [TokenStream; 4] {
     [
         quote!(
             /// What an activation is kept in: loops in assembly fill what nobody has cleared.
-            type Slot = core::mem::MaybeUninit<f32>;
+            #visible type Slot = core::mem::MaybeUninit<f32>;
         ),
         quote!(
-            const EMPTY: Slot = core::mem::MaybeUninit::uninit();
+            #visible const EMPTY: Slot = core::mem::MaybeUninit::uninit();
         ),
         quote! {
             /// Slots that a layer has written, all of them.
             #[inline(always)]
-            fn filled<const N: usize>(slots: &[Slot; N]) -> &[f32; N] {
+            #visible fn filled<const N: usize>(slots: &[Slot; N]) -> &[f32; N] {
                 // SAFETY: the same layout; every layer writes all of its outputs
                 unsafe { &*slots.as_ptr().cast() }
             }
@@ -101,7 +109,7 @@ fn slots_in_assembly() -> [TokenStream; 4] {
         quote! {
             #[inline(always)]
             #[allow(dead_code)]
-            fn activate<const N: usize>(slots: &mut [Slot; N], activation: impl Fn(f32) -> f32) {
+            #visible fn activate<const N: usize>(slots: &mut [Slot; N], activation: impl Fn(f32) -> f32) {
                 let values = filled(slots).map(activation);
                 *slots = values.map(Slot::new);
             }
@@ -123,7 +131,7 @@ enum Form {
 const FORMS: [Form; 3] = [Form::Plain, Form::Rectified, Form::Added];
 
 impl Form {
-    fn function(self, kind: &TokenStream, body: &TokenStream) -> TokenStream {
+    fn function(self, kind: &TokenStream, visible: &TokenStream, body: &TokenStream) -> TokenStream {
         let stored = quote!(bias: &[#kind; ROWS], x: &[#kind; INPUTS], out: &mut [Slot; ROWS]);
         let (doc, name, parameters) = match self {
             Form::Plain => (" Sums of a block.", "plain", stored),
@@ -139,13 +147,13 @@ impl Form {
             #[doc = #doc]
             #[inline(always)]
             #[allow(dead_code)]
-            fn #name<const INPUTS: usize, const ROWS: usize>(weights: &[[f32; ROWS]; INPUTS], #parameters) {
+            #visible fn #name<const INPUTS: usize, const ROWS: usize>(weights: &[[f32; ROWS]; INPUTS], #parameters) {
                 #body
             }
         }
     }
 
-    fn portable(self, kind: &TokenStream) -> TokenStream {
+    fn portable(self, kind: &TokenStream, visible: &TokenStream) -> TokenStream {
         let body = match self {
             Form::Plain => quote!(*out = block(weights, bias, x);),
             Form::Rectified => quote! {
@@ -155,10 +163,10 @@ impl Form {
             },
             Form::Added => quote!(*out = block(weights, out, x);),
         };
-        self.function(kind, &body)
+        self.function(kind, visible, &body)
     }
 
-    fn assembly(self, sizes: &BTreeSet<Size>) -> TokenStream {
+    fn assembly(self, sizes: &BTreeSet<Size>, visible: &TokenStream) -> TokenStream {
         let (bias, otherwise) = match self {
             Form::Plain => (quote!(bias.as_ptr()), quote!(block(weights, bias, x).map(Slot::new))),
             Form::Rectified => (
@@ -184,7 +192,7 @@ impl Form {
                 _ => *out = #otherwise,
             }
         };
-        self.function(&quote!(f32), &body)
+        self.function(&quote!(f32), visible, &body)
     }
 }
 
@@ -218,7 +226,7 @@ impl Size {
 }
 
 /// A naked function `(weights, bias, x, out)`: no frame, and once in the binary however often a loop over blocks is unrolled.
-fn kernel(size: Size, processor: &str, guard: &TokenStream) -> TokenStream {
+fn kernel(size: Size, processor: &str) -> TokenStream {
     let Size { inputs, height, relu } = size;
     let kernel = RealKernel { inputs, height, relu };
     // the pointers to weights and biases are done with when the halves are needed
@@ -237,7 +245,6 @@ fn kernel(size: Size, processor: &str, guard: &TokenStream) -> TokenStream {
     let (name, turns) = (size.name(), format!("movw r12, #{}", kernel.turns()));
     quote! {
         /// `--cfg policyc_assembly` takes the sums in assembly: products and sums apart, the same bits.
-        #guard
         #[unsafe(naked)]
         unsafe extern "C" fn #name(weights: *const f32, bias: *const f32, x: *const f32, out: *mut f32) {
             core::arch::naked_asm!(#processor, "vpush {{s16-s27}}", #turns, #(#text,)* "vpop {{s16-s27}}", "bx lr")

@@ -29,7 +29,7 @@
  *   10 r (parameter): coefficient of the duty ratio mapping; set before a step, it counts from the one after it
  */
 #define ADC_MAPPING_FMU_VARIABLES 10u
-#define ADC_MAPPING_FMU_TOKEN "{3d24ef25-4943-ba7c-54ab-8684bae0bb96}"
+#define ADC_MAPPING_FMU_TOKEN "{a5cbfc8c-af2b-9a87-9fb3-af82a8a64973}"
 #define ADC_MAPPING_FMU_PERIOD 2e-5
 
 /* Types of variables. */

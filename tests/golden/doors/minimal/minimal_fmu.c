@@ -16,7 +16,7 @@
 
 #define INPUTS MINIMAL_BLOCK_INPUTS
 #define OUTPUTS 3u
-#define SIGNATURE 0x4cddb14cu
+#define SIGNATURE 0xec00ae8eu
 
 /* Type of each variable; references start at 1: inputs, outputs, parameters. */
 static const char types[MINIMAL_FMU_VARIABLES] = {

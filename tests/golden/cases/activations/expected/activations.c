@@ -182,8 +182,8 @@ static uint32_t activations_flag(int condition)
     return flag;
 }
 
-#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__)
-/* conditional moves: each is executed, or skipped, in the same time */
+#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__) && !defined(ACTIVATIONS_PORTABLE)
+/* conditional moves: each is executed, or skipped, in the same time; define ACTIVATIONS_PORTABLE to do without */
 #define ACTIVATIONS_MOVES 1
 #endif
 

@@ -161,8 +161,8 @@ static uint32_t adc_mapping_flag(int condition)
     return flag;
 }
 
-#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__)
-/* conditional moves: each is executed, or skipped, in the same time */
+#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__) && !defined(ADC_MAPPING_PORTABLE)
+/* conditional moves: each is executed, or skipped, in the same time; define ADC_MAPPING_PORTABLE to do without */
 #define ADC_MAPPING_MOVES 1
 #endif
 

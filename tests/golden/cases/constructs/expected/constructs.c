@@ -204,8 +204,8 @@ static uint32_t constructs_flag(int condition)
     return flag;
 }
 
-#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__)
-/* conditional moves: each is executed, or skipped, in the same time */
+#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__) && !defined(CONSTRUCTS_PORTABLE)
+/* conditional moves: each is executed, or skipped, in the same time; define CONSTRUCTS_PORTABLE to do without */
 #define CONSTRUCTS_MOVES 1
 #endif
 

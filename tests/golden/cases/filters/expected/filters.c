@@ -165,8 +165,8 @@ static uint32_t filters_flag(int condition)
     return flag;
 }
 
-#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__)
-/* conditional moves: each is executed, or skipped, in the same time */
+#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__) && !defined(FILTERS_PORTABLE)
+/* conditional moves: each is executed, or skipped, in the same time; define FILTERS_PORTABLE to do without */
 #define FILTERS_MOVES 1
 #endif
 

@@ -141,8 +141,8 @@ static uint32_t linear_flag(int condition)
     return flag;
 }
 
-#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__)
-/* conditional moves: each is executed, or skipped, in the same time */
+#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__) && !defined(LINEAR_PORTABLE)
+/* conditional moves: each is executed, or skipped, in the same time; define LINEAR_PORTABLE to do without */
 #define LINEAR_MOVES 1
 #endif
 

@@ -150,8 +150,8 @@ static uint32_t minimal_flag(int condition)
     return flag;
 }
 
-#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__)
-/* conditional moves: each is executed, or skipped, in the same time */
+#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__) && !defined(MINIMAL_PORTABLE)
+/* conditional moves: each is executed, or skipped, in the same time; define MINIMAL_PORTABLE to do without */
 #define MINIMAL_MOVES 1
 #endif
 

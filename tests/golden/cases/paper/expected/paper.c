@@ -167,8 +167,8 @@ static uint32_t paper_flag(int condition)
     return flag;
 }
 
-#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__)
-/* conditional moves: each is executed, or skipped, in the same time */
+#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__) && !defined(PAPER_PORTABLE)
+/* conditional moves: each is executed, or skipped, in the same time; define PAPER_PORTABLE to do without */
 #define PAPER_MOVES 1
 #endif
 

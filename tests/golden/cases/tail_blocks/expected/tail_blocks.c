@@ -256,8 +256,8 @@ static uint32_t tail_blocks_flag(int condition)
     return flag;
 }
 
-#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__)
-/* conditional moves: each is executed, or skipped, in the same time */
+#if defined(__GNUC__) && defined(__thumb2__) && defined(__ARM_FP) && !defined(__SOFTFP__) && !defined(TAIL_BLOCKS_PORTABLE)
+/* conditional moves: each is executed, or skipped, in the same time; define TAIL_BLOCKS_PORTABLE to do without */
 #define TAIL_BLOCKS_MOVES 1
 #endif
 

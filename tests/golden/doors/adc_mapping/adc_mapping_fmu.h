@@ -29,7 +29,7 @@
  *   10 r (parameter): coefficient of the duty ratio mapping; set before a step, it counts from the one after it
  */
 #define ADC_MAPPING_FMU_VARIABLES 10u
-#define ADC_MAPPING_FMU_TOKEN "{a5cbfc8c-af2b-9a87-9fb3-af82a8a64973}"
+#define ADC_MAPPING_FMU_TOKEN "{c37cc998-25c1-da0f-a5fa-215d671f721d}"
 #define ADC_MAPPING_FMU_PERIOD 2e-5
 
 /* Types of variables. */

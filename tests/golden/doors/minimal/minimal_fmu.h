@@ -25,7 +25,7 @@
  *   6 status (output): status bits; 65536 is added while the coefficients are refused
  */
 #define MINIMAL_FMU_VARIABLES 6u
-#define MINIMAL_FMU_TOKEN "{ec00ae8e-2d76-ccea-1399-d91f994ba09a}"
+#define MINIMAL_FMU_TOKEN "{c1fcb020-54cc-6886-d1be-f9ca52e0d56c}"
 #define MINIMAL_FMU_PERIOD 0.0001
 
 /* Types of variables. */

@@ -827,7 +827,10 @@ ACTIVATIONS_COLD uint32_t activations_integrity_slice(activations_check *check, 
 
 ACTIVATIONS_COLD uint32_t activations_integrity(void)
 {
-    activations_check check = { 0u, 0u };
+    activations_check check;
+    /* member by member: an initialiser may become a call of memset */
+    check.position = 0u;
+    check.crc = 0u;
     return activations_flag(activations_integrity_slice(&check, ACTIVATIONS_TABLE_NUMBERS) == ACTIVATIONS_INTEGRITY_INTACT);
 }
 

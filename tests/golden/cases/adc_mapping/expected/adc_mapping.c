@@ -736,7 +736,10 @@ ADC_MAPPING_COLD uint32_t adc_mapping_integrity_slice(adc_mapping_check *check, 
 
 ADC_MAPPING_COLD uint32_t adc_mapping_integrity(void)
 {
-    adc_mapping_check check = { 0u, 0u };
+    adc_mapping_check check;
+    /* member by member: an initialiser may become a call of memset */
+    check.position = 0u;
+    check.crc = 0u;
     return adc_mapping_flag(adc_mapping_integrity_slice(&check, ADC_MAPPING_TABLE_NUMBERS) == ADC_MAPPING_INTEGRITY_INTACT);
 }
 

@@ -1029,7 +1029,10 @@ CONSTRUCTS_COLD uint32_t constructs_integrity_slice(constructs_check *check, uin
 
 CONSTRUCTS_COLD uint32_t constructs_integrity(void)
 {
-    constructs_check check = { 0u, 0u };
+    constructs_check check;
+    /* member by member: an initialiser may become a call of memset */
+    check.position = 0u;
+    check.crc = 0u;
     return constructs_flag(constructs_integrity_slice(&check, CONSTRUCTS_TABLE_NUMBERS) == CONSTRUCTS_INTEGRITY_INTACT);
 }
 

@@ -751,7 +751,10 @@ FILTERS_COLD uint32_t filters_integrity_slice(filters_check *check, uint32_t cou
 
 FILTERS_COLD uint32_t filters_integrity(void)
 {
-    filters_check check = { 0u, 0u };
+    filters_check check;
+    /* member by member: an initialiser may become a call of memset */
+    check.position = 0u;
+    check.crc = 0u;
     return filters_flag(filters_integrity_slice(&check, FILTERS_TABLE_NUMBERS) == FILTERS_INTEGRITY_INTACT);
 }
 

@@ -481,7 +481,10 @@ LINEAR_COLD uint32_t linear_integrity_slice(linear_check *check, uint32_t count)
 
 LINEAR_COLD uint32_t linear_integrity(void)
 {
-    linear_check check = { 0u, 0u };
+    linear_check check;
+    /* member by member: an initialiser may become a call of memset */
+    check.position = 0u;
+    check.crc = 0u;
     return linear_flag(linear_integrity_slice(&check, LINEAR_TABLE_NUMBERS) == LINEAR_INTEGRITY_INTACT);
 }
 

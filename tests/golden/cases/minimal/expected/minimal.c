@@ -563,7 +563,10 @@ MINIMAL_COLD uint32_t minimal_integrity_slice(minimal_check *check, uint32_t cou
 
 MINIMAL_COLD uint32_t minimal_integrity(void)
 {
-    minimal_check check = { 0u, 0u };
+    minimal_check check;
+    /* member by member: an initialiser may become a call of memset */
+    check.position = 0u;
+    check.crc = 0u;
     return minimal_flag(minimal_integrity_slice(&check, MINIMAL_TABLE_NUMBERS) == MINIMAL_INTEGRITY_INTACT);
 }
 

@@ -733,7 +733,10 @@ PAPER_COLD uint32_t paper_integrity_slice(paper_check *check, uint32_t count)
 
 PAPER_COLD uint32_t paper_integrity(void)
 {
-    paper_check check = { 0u, 0u };
+    paper_check check;
+    /* member by member: an initialiser may become a call of memset */
+    check.position = 0u;
+    check.crc = 0u;
     return paper_flag(paper_integrity_slice(&check, PAPER_TABLE_NUMBERS) == PAPER_INTEGRITY_INTACT);
 }
 

@@ -777,7 +777,10 @@ TAIL_BLOCKS_COLD uint32_t tail_blocks_integrity_slice(tail_blocks_check *check, 
 
 TAIL_BLOCKS_COLD uint32_t tail_blocks_integrity(void)
 {
-    tail_blocks_check check = { 0u, 0u };
+    tail_blocks_check check;
+    /* member by member: an initialiser may become a call of memset */
+    check.position = 0u;
+    check.crc = 0u;
     return tail_blocks_flag(tail_blocks_integrity_slice(&check, TAIL_BLOCKS_TABLE_NUMBERS) == TAIL_BLOCKS_INTEGRITY_INTACT);
 }
 

@@ -841,7 +841,10 @@ WIDE_COLD uint32_t wide_integrity_slice(wide_check *check, uint32_t count)
 
 WIDE_COLD uint32_t wide_integrity(void)
 {
-    wide_check check = { 0u, 0u };
+    wide_check check;
+    /* member by member: an initialiser may become a call of memset */
+    check.position = 0u;
+    check.crc = 0u;
     return wide_flag(wide_integrity_slice(&check, WIDE_TABLE_NUMBERS) == WIDE_INTEGRITY_INTACT);
 }
 

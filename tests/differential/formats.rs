@@ -1,12 +1,10 @@
 //! The other numeric formats: generated code against the interpreter, bit by bit.
 
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use interp::Controller;
 use policy::{NumericFormat, Policy, scales};
 use verify::{Files, Options};
 
-use super::{COMPILERS, assert_equal, run};
+use super::{COMPILERS, assert_equal, assert_random_policies_are_equal, run};
 
 const OTHERS: [NumericFormat; 4] = [
     NumericFormat::F32Fma,
@@ -45,27 +43,9 @@ fn random_policies_are_equal_in_every_format() {
     }
 }
 
-/// Each with one compiler at all its levels, as `two_hundred_random_policies_are_equal` in binary32.
 #[test]
 fn sixty_random_policies_are_equal_in_binary64() {
-    let next = AtomicU64::new(400);
-    let work = || {
-        loop {
-            let seed = next.fetch_add(1, Ordering::Relaxed);
-            if seed >= 460 {
-                return;
-            }
-            let folder = tests::random::policy(seed).unwrap();
-            let policy = policy::load(&folder.path()).unwrap().with_format(NumericFormat::F64);
-            let report = run(&policy, 2000, seed, &[COMPILERS[seed as usize % 3]]);
-            assert_equal(&report, &folder.contract);
-        }
-    };
-    std::thread::scope(|scope| {
-        for _ in 0..2 {
-            scope.spawn(work);
-        }
-    });
+    assert_random_policies_are_equal(400..460, NumericFormat::F64, 2000);
 }
 
 /// Else a verification that took the wrong interpreter would not be seen.

@@ -8,9 +8,10 @@ mod mutations;
 mod simplified;
 mod warnings;
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use policy::Policy;
+use policy::{NumericFormat, Policy};
 use verify::traces::Recorded;
 use verify::{Options, Outcome, Report};
 
@@ -75,22 +76,22 @@ fn recorded_closed_loops_are_replayed() {
     assert_equal(&verify::run(&policy, options).unwrap(), "recorded");
 }
 
-/// 200 policies, each with one compiler at all its levels; `POLICYC_ALL_COMPILERS=1` takes all for each.
-#[test]
-fn two_hundred_random_policies_are_equal() {
-    let next = AtomicU64::new(0);
+/// Random policies of these seeds in a format, two at a time, each with one compiler at all its levels;
+/// `POLICYC_ALL_COMPILERS=1` takes all compilers for each.
+fn assert_random_policies_are_equal(seeds: Range<u64>, format: NumericFormat, steps: u64) {
+    let next = AtomicU64::new(seeds.start);
     let all = std::env::var_os("POLICYC_ALL_COMPILERS").is_some();
     let work = || {
         loop {
             let seed = next.fetch_add(1, Ordering::Relaxed);
-            if seed >= 200 {
+            if seed >= seeds.end {
                 return;
             }
             let folder = tests::random::policy(seed).unwrap();
             let policy = policy::load(&folder.path()).unwrap_or_else(|faults| panic!("{}\n{faults}", folder.contract));
             let turn = [COMPILERS[(seed % 3) as usize]];
             let compilers: &[&str] = if all { &[] } else { &turn };
-            let report = run(&policy, 3000, seed, compilers);
+            let report = run(&policy.with_format(format), steps, seed, compilers);
             assert_equal(&report, &folder.contract);
         }
     };
@@ -99,6 +100,11 @@ fn two_hundred_random_policies_are_equal() {
             scope.spawn(work);
         }
     });
+}
+
+#[test]
+fn two_hundred_random_policies_are_equal() {
+    assert_random_policies_are_equal(0..200, NumericFormat::F32, 3000);
 }
 
 #[test]

@@ -18,6 +18,7 @@ pub fn text(policy: &Policy, form: Form) -> String {
         &head(policy),
         &step(policy, form),
         &set_mapping(policy),
+        &integrity(policy),
         &main(policy),
     ]
     .concat()
@@ -249,6 +250,29 @@ static void step(void)
     )
 }
 
+/// The integrity check of the driver's start.
+fn integrity(policy: &Policy) -> String {
+    let name = &policy.name;
+    let macro_name = name.to_uppercase();
+    format!(
+        r#"
+/* The whole check, then twice the one in slices: all must say the same. */
+static uint32_t integrity(void)
+{{
+    {name}_check check = {{ 0u, 0u }};
+    uint32_t intact = {name}_integrity(), found = {macro_name}_INTEGRITY_RUNNING, calls = 0u, turn;
+    for (turn = 0u; turn < 2u; ++turn) {{
+        for (calls = 1u; (found = {name}_integrity_slice(&check, 101u)) == {macro_name}_INTEGRITY_RUNNING; ++calls) {{
+        }}
+        intact &= (uint32_t)(found == {macro_name}_INTEGRITY_INTACT);
+        intact &= (uint32_t)(calls == ({macro_name}_TABLE_NUMBERS + 100u) / 101u);
+    }}
+    return intact;
+}}
+"#
+    )
+}
+
 fn main(policy: &Policy) -> String {
     let name = &policy.name;
     let macro_name = name.to_uppercase();
@@ -269,20 +293,6 @@ static int network(void)
     {name}_q_values(observation, q);
     put_numbers(q, {macro_name}_ACTIONS);
     return 1;
-}}
-
-/* The whole check, then twice the one in slices: all must say the same. */
-static uint32_t integrity(void)
-{{
-    {name}_check check = {{ 0u, 0u }};
-    uint32_t intact = {name}_integrity(), found = {macro_name}_INTEGRITY_RUNNING, calls = 0u, turn;
-    for (turn = 0u; turn < 2u; ++turn) {{
-        for (calls = 1u; (found = {name}_integrity_slice(&check, 101u)) == {macro_name}_INTEGRITY_RUNNING; ++calls) {{
-        }}
-        intact &= (uint32_t)(found == {macro_name}_INTEGRITY_INTACT);
-        intact &= (uint32_t)(calls == ({macro_name}_TABLE_NUMBERS + 100u) / 101u);
-    }}
-    return intact;
 }}
 
 int main(void)

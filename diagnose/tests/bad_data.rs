@@ -5,9 +5,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use diagnose::columns::Columns;
-use diagnose::csv::Table;
 use diagnose::record::Record;
+use measured::{ColumnMap, Sheet};
 use plant::{Faults, Parameters};
 
 const HEADER: &str = "t,d,v_o,i_l,v_in,r_load";
@@ -30,8 +29,8 @@ fn text(lines: &[String]) -> String {
 }
 
 fn read(bytes: &[u8]) -> Result<Record, Faults> {
-    let table = Table::parse(Path::new("run.csv"), bytes)?;
-    Record::new(table, &Columns::default(), &Parameters::paper_table())
+    let sheet = Sheet::parse(Path::new("run.csv"), bytes.to_vec(), &Record::file_options())?;
+    Record::read(&sheet, &ColumnMap::default(), &Parameters::paper_table())
 }
 
 /// The good table with one line changed (0 is the header).
@@ -73,42 +72,47 @@ fn what_cannot_be_used_is_an_error_that_says_where_and_what_to_do() {
     unsorted.swap(10, 11);
     let cases: Vec<(&str, Vec<u8>, &str, Option<usize>)> = vec![
         ("empty", Vec::new(), "the table is empty", None),
-        ("header only", text(&rows[..1]).into_bytes(), "too few rows", None),
+        (
+            "header only",
+            text(&rows[..1]).into_bytes(),
+            "the table has no rows",
+            Some(1),
+        ),
         ("one row", text(&rows[..2]).into_bytes(), "too few rows", None),
         (
             "no header",
             text(&rows[1..]).into_bytes(),
             "the first line holds numbers",
-            None,
+            Some(1),
         ),
         (
             "a word",
             with(7, |l| l.replace("0.5", "half")).into_bytes(),
-            "`d` holds no number",
+            "`d` is not a number",
             Some(8),
         ),
         (
             "infinity",
             with(7, |l| l.replace("0.5", "inf")).into_bytes(),
-            "`d` holds no number",
+            "`d` is not a number",
             Some(8),
         ),
         (
             "short line",
             with(9, |l| l[..12].to_owned()).into_bytes(),
-            "another number of cells",
+            "cells are missing",
             Some(10),
         ),
         (
             "long line",
             with(9, |l| format!("{l},1")).into_bytes(),
-            "another number of cells",
+            "more cells than the header",
             Some(10),
         ),
         (
             "thousands",
             with(9, |l| l.replace(",20", ",1,000")).into_bytes(),
-            "another number of cells",
+            "more cells than the header",
             Some(10),
         ),
         ("unsorted", text(&unsorted).into_bytes(), "time goes backward", Some(12)),
@@ -172,10 +176,20 @@ fn what_cannot_be_used_is_an_error_that_says_where_and_what_to_do() {
             "twice",
             header("i_l", "v_o").into_bytes(),
             "two columns are called `v_o`",
-            None,
+            Some(1),
         ),
-        ("no duty", header(",d,", ",x,").into_bytes(), "no duty column", None),
-        ("no load", header("r_load", "r").into_bytes(), "what the load is", None),
+        (
+            "no duty",
+            header(",d,", ",x,").into_bytes(),
+            "no column `duty`",
+            Some(1),
+        ),
+        (
+            "no load",
+            header("r_load", "r").into_bytes(),
+            "what the load is",
+            Some(1),
+        ),
         (
             "negative load",
             column(5, times(-1.0)).into_bytes(),
@@ -186,7 +200,7 @@ fn what_cannot_be_used_is_an_error_that_says_where_and_what_to_do() {
             "nothing measured",
             header("v_o,i_l,v_in", "a,b,c").into_bytes(),
             "nothing is measured",
-            None,
+            Some(1),
         ),
         (
             "all stuck",
@@ -202,7 +216,26 @@ fn what_cannot_be_used_is_an_error_that_says_where_and_what_to_do() {
             "nothing is measured",
             None,
         ),
-        ("UTF-16", vec![0xff, 0xfe, b't', 0, b',', 0], "not UTF-8", None),
+        ("UTF-16 cut off", vec![0xff, 0xfe, b't', 0, b','], "UTF-16", None),
+        ("UTF-16 without mark", vec![b't', 0, b',', 0, b'd', 0], "UTF-16", None),
+        (
+            "unknown time",
+            header("t,", "sampling_time,").into_bytes(),
+            "`sampling_time` looks like time",
+            Some(1),
+        ),
+        (
+            "a clock without name",
+            header("t,", "x,").into_bytes(),
+            "`x` looks like time",
+            Some(1),
+        ),
+        (
+            "two duties",
+            header("i_l", "duty").into_bytes(),
+            "two columns are `duty`",
+            Some(1),
+        ),
         (
             "units of another kind",
             {
@@ -300,4 +333,55 @@ fn what_is_only_another_way_of_writing_it_changes_nothing() {
             record.repairs
         );
     }
+}
+
+/// A column called `timestamps` once made a record over time a table of settled points, with causes to match.
+#[test]
+fn other_names_of_the_columns_make_the_same_record() {
+    let plain = read(text(&good()).as_bytes()).unwrap();
+    for names in [
+        "timestamps,duty,v_out,i_l,v_in,r_load",
+        "time,d_real,v_out,i_l,v_in,r_load",
+        "Time [s],Duty,V_out,I_L,V_in,R_load",
+    ] {
+        let record = read(header(HEADER, names).as_bytes()).unwrap_or_else(|faults| panic!("{names}: {faults}"));
+        assert!(
+            !record.settled && record.repairs.is_empty(),
+            "{names}: {:?}",
+            record.repairs
+        );
+        assert_eq!((&record.duty, &record.time), (&plain.duty, &plain.time), "{names}");
+        assert_eq!(record.segments, plain.segments);
+    }
+}
+
+#[test]
+fn what_is_not_used_is_named_and_rows_are_settled_if_the_user_says_so() {
+    let more = header("i_l", "lamp");
+    assert_eq!(read(more.as_bytes()).unwrap().repairs, ["column not used: `lamp`"]);
+    let strange = header("t,", "Zeit,");
+    let with = |map: &str, settled: Option<bool>| {
+        let sheet = Sheet::parse(Path::new("run.csv"), strange.clone().into(), &Record::file_options())?;
+        let mut map = ColumnMap::parse(map)?;
+        map.settled = settled;
+        Record::read(&sheet, &map, &Parameters::paper_table())
+    };
+    assert!(!with("t=Zeit", None).unwrap().settled);
+    let said = with("", Some(true)).unwrap();
+    assert!(
+        said.settled && said.repairs == ["column not used: `Zeit`"],
+        "{:?}",
+        said.repairs
+    );
+    assert!(with("t=Zeit", Some(true)).unwrap().settled);
+    let faults = with("", Some(false)).unwrap_err().to_string();
+    assert!(
+        faults.contains("no column `t`") && faults.contains("settled = false"),
+        "{faults}"
+    );
+    let faults = with("", None).unwrap_err().to_string();
+    assert!(
+        faults.contains("--map t=Zeit") && faults.contains("--settled"),
+        "{faults}"
+    );
 }

@@ -6,14 +6,13 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use diagnose::columns::Columns;
-use diagnose::csv::Table;
 use diagnose::diagnosis::{Diagnosis, Verdict, diagnose};
 use diagnose::drive::Model;
 use diagnose::extend::extended_toml;
 use diagnose::fit::State;
 use diagnose::problem::Problem;
 use diagnose::record::Record;
+use measured::{ColumnMap, Sheet};
 use plant::{Load, Parameters, Plant};
 
 fn model() -> Parameters {
@@ -96,8 +95,8 @@ impl Bench {
             plant.step(d, &load(n));
         }
         let name = if stepped { "duty.csv" } else { "load.csv" };
-        let table = Table::parse(Path::new(name), text.as_bytes()).unwrap();
-        Record::new(table, &Columns::default(), &given).unwrap()
+        let sheet = Sheet::parse(Path::new(name), text.into(), &Record::file_options()).unwrap();
+        Record::read(&sheet, &ColumnMap::default(), &given).unwrap()
     }
 
     fn diagnosed(&self, hidden: &Parameters, seed: u64) -> Diagnosis {

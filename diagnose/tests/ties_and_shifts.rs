@@ -5,15 +5,14 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use diagnose::columns::Columns;
-use diagnose::csv::Table;
 use diagnose::diagnosis::{Diagnosis, Verdict, diagnose};
 use diagnose::record::Record;
+use measured::{ColumnMap, Sheet};
 use plant::{Load, Parameters, Plant};
 
 fn record(name: &str, text: &str, parameters: &Parameters) -> Record {
-    let table = Table::parse(Path::new(name), text.as_bytes()).unwrap();
-    Record::new(table, &Columns::default(), parameters).unwrap()
+    let sheet = Sheet::parse(Path::new(name), text.into(), &Record::file_options()).unwrap();
+    Record::read(&sheet, &ColumnMap::default(), parameters).unwrap()
 }
 
 /// Nine duties of a small converter at 10 ohm, from the loop equation with a winding of 0.35 ohm and a diode of 0.6 V.

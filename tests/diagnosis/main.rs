@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod records;
+
 use std::path::Path;
 use std::process::Command;
 use std::sync::OnceLock;

@@ -7,7 +7,6 @@ use drm::formula::Losses;
 use drm::{Conduction, DutyRatioMap, FitOptions, Table, TableOptions};
 use plant::{Load, Parameters, Signals};
 use policy::{Action, Interval, Policy};
-use toml_input::{FileName, Source};
 
 use crate::environment::{Environment, LoadPath, Start};
 use crate::faults::Error;
@@ -125,15 +124,12 @@ impl Refit<'_> {
     /// # Errors
     /// If the points do not determine a mapping.
     pub fn fit(&self, points: &str) -> Result<drm::Report, Error> {
-        let name = FileName::new(Path::new("points.csv"));
-        let source =
-            Source::new(name, points.as_bytes().to_vec()).map_err(|fault| Error::Mismatch(fault.to_string()))?;
         let options = TableOptions {
             simulation: Some(self.trained_on),
             skip_unsettled: true,
             ..TableOptions::default()
         };
-        let table = Table::parse(&source, &options)?;
+        let table = Table::parse(Path::new("points.csv"), points, &options)?;
         let options = FitOptions {
             conduction: Conduction::of(self.nominal),
             ..FitOptions::default()

@@ -9,7 +9,7 @@ use crate::problem::{Basis, Problem, dot};
 use crate::search::{Searcher, gained};
 
 /// Gain in chi-square that one parameter must bring. For 45 independent candidates and normal noise a false alarm in 0.3 %
-/// of records by the chi-square law; none in 12 blind cases without effect (docs/blind.md).
+/// of records by the chi-square law; none in 12 blind cases without effect (docs/results/blind-cases.md).
 pub const THRESHOLD: f64 = 16.0;
 /// For each further parameter.
 const PER_PARAMETER: f64 = 4.0;

@@ -1,8 +1,8 @@
 //! Drives the plant by a record: its duties, set loads and sampling instants.
 
+use measured::DutyIs;
 use plant::{Parameters, Plant, Signals};
 
-use crate::columns::DutyIs;
 use crate::record::{CHANNELS, Record, Segment};
 
 /// Duties before a segment that the plant is given: more than it can delay.

@@ -1,6 +1,7 @@
 //! What the extension is worth on records that no fit has seen.
 
-use crate::columns::DutyIs;
+use measured::DutyIs;
+
 use crate::drive::Model;
 use crate::fit::State;
 use crate::noise;

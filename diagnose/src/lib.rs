@@ -2,25 +2,24 @@
 //!
 //! ```no_run
 //! use std::path::Path;
-//! use diagnose::{columns::Columns, diagnosis::diagnose, extend::extended_toml, record::Record};
+//! use diagnose::{diagnosis::diagnose, extend::extended_toml, record::Record};
+//! use measured::ColumnMap;
 //!
 //! let model = plant::Parameters::from_file(Path::new("plant.toml"))?;
-//! let open = |file: &str| Record::open(Path::new(file), &Columns::default(), &model);
+//! let open = |file: &str| Record::open(Path::new(file), &ColumnMap::default(), &model);
 //! let found = diagnose(&model, vec![open("a.csv")?], &[open("b.csv")?], &|what| eprintln!("{what}"));
 //! println!("{}\n{}", found.findings.sentence, extended_toml(&found));
 //! # Ok::<(), plant::Faults>(())
 //! ```
 //!
-//! The way: [`record`] (from [`csv`] and [`columns`]) and [`drive`] make simulated rows of a model, [`problem`] a
+//! The way: [`record`] (from a table that `measured` read) and [`drive`] make simulated rows of a model, [`problem`] a
 //! least-squares problem with initial states as unknowns, [`fit`] moves the parameters of [`causes`], [`attribute`]
 //! chooses among them, [`profile`], [`shape`], [`gain`] and [`next`] say how sure that is, [`control`] what it is worth under control, [`diagnosis`] holds the
-//! answer and [`extend`] and [`page`] write it down. See docs/diagnose.md.
+//! answer and [`extend`] and [`page`] write it down. See docs/reference/diagnosis.md.
 
 pub mod attribute;
 pub mod causes;
-pub mod columns;
 pub mod control;
-pub mod csv;
 pub mod diagnosis;
 pub mod drive;
 mod duty_steps;

@@ -193,7 +193,7 @@ fn planned(problem: &Problem, plan: Plan) -> (String, Record) {
         lattice: [0.0; CHANNELS],
         resolution: [0.0; CHANNELS],
         v_in_ratio: plan.v_in_ratio,
-        duty_is: crate::columns::DutyIs::Commanded,
+        duty_is: measured::DutyIs::Commanded,
         is_true: [false; CHANNELS],
         settled: false,
         dense: true,

@@ -179,7 +179,8 @@ fn held_out(diagnosis: &Diagnosis) -> Result<Option<Section>, ReportError> {
         .bars_in(MODEL, "model", ratio(|held| held.rmse_before))
         .bars_in(EXTENDED, "extended", ratio(|held| held.rmse_after));
     let svg = BarChart::new("Held-out error", names).panel(panel).svg()?;
-    let mut section = Section::new("Gain on held-out records").chart(svg, "1 is the noise: no model gets below it.");
+    let mut section =
+        Section::new("Gain on held-out records").chart(svg, "1 is the noise as estimated: where a right model ends.");
     for shift in &diagnosis.findings.gain.shifts {
         section = section.text(crate::words::shifted(std::slice::from_ref(shift)).trim().to_owned());
     }

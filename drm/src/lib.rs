@@ -1,7 +1,7 @@
 //! Duty ratio mapping: acquire settled points of a real converter, fit the mapping, judge it.
 //!
 //! ```text
-//! Table::parse(csv) -> Table            settled points, strictly read
+//! Table::open(file) -> Table            settled points, strictly read
 //! fit(&table)       -> Report           coefficients, errors in volts, what the table cannot say
 //! DutyRatioMap::to_toml()               the drm.toml of a policy
 //! ```
@@ -24,4 +24,4 @@ pub use dcm::Conduction;
 pub use fit::*;
 pub use mapping::DutyRatioMap;
 pub use pictures::page;
-pub use table::{Columns, Point, Table, TableOptions};
+pub use table::{Point, Table, TableOptions};

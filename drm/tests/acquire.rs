@@ -48,7 +48,7 @@ fn simulated_table(plan: &Plan) -> Table {
         simulation: Some(Losses::none(200.0)),
         ..TableOptions::default()
     };
-    Table::parse(&common::source(&plan.to_csv().unwrap()), &options).unwrap()
+    Table::read(&common::sheet(&plan.to_csv().unwrap()), &options).unwrap()
 }
 
 fn currents(list: &[f64]) -> Vec<LoadSetting> {
@@ -198,14 +198,14 @@ fn a_plan_is_filled_in_and_resumed_point_by_point() {
     let plan = || Plan::new(200.0, &[0.45, 0.55], &loads, 60.0).unwrap();
     let empty = plan().to_csv().unwrap();
     assert!(empty.contains("cool down for 60 s") && empty.contains("closed loop at 90 V or current load 5.5556 A"));
-    assert_eq!(plan().resume(&common::source(&empty)), Ok(0));
+    assert_eq!(plan().resume(&common::sheet(&empty)), Ok(0));
 
     let row = "3,0.45,constant power 500 W,closed loop at 90 V or current load 5.5556 A,";
     let filled = empty.replace(&format!("{row},,,,,"), &format!("{row}0.4712,90.02,5.5543,199.8,,yes"));
     assert_ne!(filled, empty);
     // order of the rows does not matter, only what they say
     let mut resumed = plan();
-    assert_eq!(resumed.resume(&common::source(&filled)), Ok(1));
+    assert_eq!(resumed.resume(&common::sheet(&filled)), Ok(1));
     let expected = Measurement {
         d_real: 0.4712,
         v_out: 90.02,
@@ -218,15 +218,30 @@ fn a_plan_is_filled_in_and_resumed_point_by_point() {
     assert_eq!(resumed.points[2].1, Some(expected));
     assert_eq!(resumed.open(), 3);
     let mut again = plan();
-    assert_eq!(again.resume(&common::source(&resumed.to_csv().unwrap())), Ok(1));
+    assert_eq!(again.resume(&common::sheet(&resumed.to_csv().unwrap())), Ok(1));
     assert_eq!(again, resumed);
+    // a spreadsheet of a country with decimal commas saved it
+    let german: String = filled
+        .lines()
+        .map(|line| {
+            if line.starts_with('#') {
+                format!("{line}\n")
+            } else {
+                format!("{}\n", line.replace(',', ";").replace('.', ","))
+            }
+        })
+        .collect();
+    let german = german.replace("5,5556 A", "5.5556 A");
+    let mut from_german = plan();
+    assert_eq!(from_german.resume(&common::sheet(&german)), Ok(1));
+    assert_eq!(from_german, resumed);
     // another plan takes nothing over that it did not ask for
     let mut other = Plan::new(200.0, &[0.4, 0.55], &loads, 60.0).unwrap();
-    assert_eq!(other.resume(&common::source(&filled)), Ok(0));
+    assert_eq!(other.resume(&common::sheet(&filled)), Ok(0));
     let percent = filled.replace("0.4712,", "47.12,");
     assert!(
         plan()
-            .resume(&common::source(&percent))
+            .resume(&common::sheet(&percent))
             .unwrap_err()
             .to_string()
             .contains("percent")
@@ -307,7 +322,7 @@ fn losses_of_the_simulation_itself_are_not_mapped_twice() {
             simulation: Some(simulation),
             ..TableOptions::default()
         };
-        let table = Table::parse(&common::source(&csv), &options).unwrap();
+        let table = Table::read(&common::sheet(&csv), &options).unwrap();
         let map = drm::fit(&table, &FitOptions::default()).unwrap().fit.map;
         judge::against_plant(&map, &real, &nominal, 100.0, &[LoadSetting::Power(600.0)], None).unwrap()[0]
     };

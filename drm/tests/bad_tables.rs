@@ -3,8 +3,11 @@
 
 mod common;
 
-use common::source;
-use drm::{Columns, FitOptions, Table, TableOptions};
+use std::path::Path;
+
+use drm::{FitOptions, Table, TableOptions};
+use measured::ColumnMap;
+use plant::Faults;
 
 const GOOD: &str = "\
 d_real,v_out,i_out,v_in
@@ -15,12 +18,16 @@ d_real,v_out,i_out,v_in
 0.60,115.3,8.0,200
 ";
 
+fn parse(text: &str, options: &TableOptions) -> Result<Table, Faults> {
+    Table::parse(Path::new("table.csv"), text, options)
+}
+
 fn refused(text: &str, expected: &[&str]) {
     refused_with(text, &TableOptions::default(), expected);
 }
 
 fn refused_with(text: &str, options: &TableOptions, expected: &[&str]) {
-    let Err(faults) = Table::parse(&source(text), options) else {
+    let Err(faults) = parse(text, options) else {
         panic!("accepted:\n{text}")
     };
     let message = faults.to_string();
@@ -31,7 +38,7 @@ fn refused_with(text: &str, options: &TableOptions, expected: &[&str]) {
 
 fn mapped(map: &str) -> TableOptions {
     TableOptions {
-        columns: Columns::parse(map).unwrap(),
+        columns: ColumnMap::parse(map).unwrap(),
         ..TableOptions::default()
     }
 }
@@ -56,14 +63,17 @@ fn millivolts_in_both_columns_are_refused_unless_they_are_volts() {
         ],
     );
     let options = mapped("v_in=v_in*0.001,v_out=v_out*0.001");
-    let v_out = Table::parse(&source(both), &options).unwrap().points[0].v_out;
+    let v_out = parse(both, &options).unwrap().points[0].v_out;
     assert!((v_out - 78.1).abs() < 1e-12, "{v_out}");
 }
 
 #[test]
 fn a_missing_cell_is_refused() {
     let empty = GOOD.replace("78.1", "");
-    refused(&empty, &["a cell is empty", "table.csv:2:6", "measure the point again"]);
+    refused(
+        &empty,
+        &["a cell of `v_out` is empty", "table.csv:2:6", "measure the point again"],
+    );
     refused(
         &GOOD.replace(",2.0,200\n0.50", "\n0.50"),
         &["cells are missing", "table.csv:2", "found: 2 cells", "4 cells"],
@@ -94,13 +104,14 @@ fn percent_for_fractions_is_seen_and_can_be_mapped() {
             "`d_real` looks like percent",
             "found: 40 in lines 2, 3, 4, 5, 6",
             "--map d_real=d_real*0.01",
+            "`d_real (%)`",
         ],
     );
-    let table = Table::parse(&source(&percent), &mapped("d_real=d_real*0.01")).unwrap();
+    let table = parse(&percent, &mapped("d_real=d_real*0.01")).unwrap();
     assert!((table.points[0].d_real - 0.4).abs() < 1e-15);
     refused(
         &GOOD.replace("0.60,", "60 %,"),
-        &["not a number", "write 0.5 instead of 50 %"],
+        &["not a number", "found: 60 %", "write 0.5 instead of 50 %"],
     );
     refused(
         &GOOD.replace("0.60,", "1.6,"),
@@ -125,9 +136,9 @@ fn millivolts_and_milliamperes_are_seen() {
         &milliamperes,
         &["`i_out` looks like milliamperes", "--map i_out=i_out*0.001"],
     );
-    assert!(Table::parse(&source(&milliamperes), &mapped("i_out=i_out*0.001")).is_ok());
+    assert!(parse(&milliamperes, &mapped("i_out=i_out*0.001")).is_ok());
     assert!(
-        Table::parse(&source(&milliamperes), &mapped("i_out=i_out*1")).is_ok(),
+        parse(&milliamperes, &mapped("i_out=i_out*1")).is_ok(),
         "the user insists"
     );
     refused(
@@ -146,17 +157,21 @@ fn nan_and_infinity_are_no_numbers() {
 }
 
 #[test]
-fn decimal_commas_are_recognised() {
+fn decimal_commas_are_read_where_they_are_clear() {
     let german = GOOD.replace(',', ";").replace('.', ",");
-    refused(
-        &german,
-        &["not separated by commas", "found: semicolons", "sed 's/,/./g; s/;/,/g'"],
-    );
+    let plain = common::table(GOOD);
+    let read = common::table(&german);
+    assert_eq!(read.points, plain.points);
+    assert_eq!(read.notes, ["decimal commas read as points"]);
+    assert_eq!(common::table(&GOOD.replace(',', "\t")), plain);
     refused(
         &GOOD.replace('.', ","),
         &["more cells than the header", "write 0.5 instead of 0,5"],
     );
-    refused(&GOOD.replace(',', "\t"), &["found: tabs"]);
+    refused(
+        &german.replace("78,1", "78.1"),
+        &["decimal points and decimal commas", "table.csv:2:6", "found: 78.1"],
+    );
 }
 
 #[test]
@@ -202,7 +217,7 @@ d_real,v_out,i_out,v_in,v_std,settled
         skip_unsettled: true,
         ..TableOptions::default()
     };
-    let table = Table::parse(&source(text), &skip).unwrap();
+    let table = parse(text, &skip).unwrap();
     assert_eq!(table.points.len(), 2);
     assert!(table.notes[0].contains("lines 3, 4"), "{:?}", table.notes);
     refused_with(
@@ -214,7 +229,10 @@ d_real,v_out,i_out,v_in,v_std,settled
 
 #[test]
 fn columns_that_are_missing_or_double_are_named() {
-    refused(&GOOD.replace("v_in", "Vin"), &["no column `v_in`", "--map v_in=24"]);
+    refused(
+        &GOOD.replace("v_in", "Vin"),
+        &["no column `v_in`", "--map v_in=24", "found: d_real, v_out, i_out, Vin"],
+    );
     refused(
         &GOOD.replace("i_out", "v_out"),
         &["two columns are called `v_out`", "table.csv:1:14"],
@@ -226,7 +244,7 @@ fn columns_that_are_missing_or_double_are_named() {
 fn a_column_map_takes_names_factors_and_numbers() {
     let text = "duty %,U,I\n40,78.1,2000\n50,97.8,2000\n40,76,8000\n50,95.6,8000\n";
     let options = mapped("d_real = duty %*0.01, v_out=U, i_out=I*1e-3, v_in=200");
-    let table = Table::parse(&source(text), &options).unwrap();
+    let table = parse(text, &options).unwrap();
     let last = table.points[3];
     assert_eq!(
         (last.d_real, last.v_out, last.i_out, last.v_in),
@@ -238,9 +256,37 @@ fn a_column_map_takes_names_factors_and_numbers() {
         ("d_real=duty*x", "quantity=column*factor"),
         ("v_in=24,v_in=25", "mapped twice"),
     ] {
-        let message = Columns::parse(map).unwrap_err().to_string();
+        let message = ColumnMap::parse(map).unwrap_err().to_string();
         assert!(message.contains(expected), "{map}: {message}");
     }
+}
+
+#[test]
+fn short_forms_and_units_are_columns_and_what_is_left_over_is_named() {
+    let short = GOOD.replace("d_real,v_out,i_out,v_in", "d,v_o [mV],i_o,v_in");
+    let short = [
+        ("78.1", "78100"),
+        ("97.8", "97800"),
+        ("76.0", "76000"),
+        ("95.6", "95600"),
+        ("115.3", "115300"),
+    ]
+    .into_iter()
+    .fold(short, |text, (volts, millivolts)| text.replace(volts, millivolts));
+    let (read, plain) = (common::table(&short), common::table(GOOD));
+    for (read, plain) in read.points.iter().zip(&plain.points) {
+        assert!((read.v_out - plain.v_out).abs() < 1e-12 && read.d_real == plain.d_real);
+    }
+    let more = GOOD.replace('\n', ",7\n").replace("v_in,7", "v_in,lamp");
+    assert_eq!(common::table(&more).notes, ["column not used: `lamp`"]);
+    refused(
+        &more.replace("lamp", "duty").replace("d_real", "d"),
+        &[
+            "two columns are `duty`: `d` and `duty`",
+            "--map duty=d",
+            "table.csv:1:20",
+        ],
+    );
 }
 
 #[test]
@@ -251,7 +297,10 @@ fn rows_not_measured_yet_are_open_and_half_measured_ones_faults() {
         "d_real,v_out,i_out,v_in\n,,,\n,,,\n",
         &["no point is measured yet", "fill in"],
     );
-    refused(&format!("{GOOD}0.6,,,\n"), &["a cell is empty", "table.csv:7"]);
+    refused(
+        &format!("{GOOD}0.6,,,\n"),
+        &["a cell of `v_out` is empty", "table.csv:7", "may stay"],
+    );
 }
 
 #[test]

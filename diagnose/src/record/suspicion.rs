@@ -3,7 +3,7 @@
 use plant::Parameters;
 use toml_input::Message;
 
-use super::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS, Record};
+use super::{CHANNEL_UNITS, CHANNELS, Record};
 use crate::problem::median;
 
 /// A signal this many times larger or smaller than the model's is in another unit.
@@ -16,7 +16,7 @@ const NEAR: f64 = 1.3;
 const LEAST: f64 = 0.02;
 
 /// What is wrong with a record, as far as sizes tell.
-pub fn of(record: &Record, parameters: &Parameters) -> Vec<Message> {
+pub fn of(record: &Record, parameters: &Parameters, labels: &[String; CHANNELS]) -> Vec<Message> {
     let sizes = sizes(record, parameters);
     let known: Vec<(usize, f64, f64)> = (0..CHANNELS)
         .filter_map(|n| Some((n, sizes[n]?, typical(&record.measured[n])?)))
@@ -25,7 +25,7 @@ pub fn of(record: &Record, parameters: &Parameters) -> Vec<Message> {
         for (b, size_b, found_b) in &known[n + 1..] {
             let apart = ratio(*found_a, *size_a) > FAR && ratio(*found_b, *size_b) > FAR;
             if apart && ratio(*found_a, *size_b) < NEAR && ratio(*found_b, *size_a) < NEAR {
-                let (a, b) = (CHANNEL_NAMES[*a], CHANNEL_NAMES[*b]);
+                let (a, b) = (&labels[*a], &labels[*b]);
                 let message = Message::new(format!("the columns {a} and {b} look exchanged"));
                 let found = format!("{a} around {}, {b} around {}", shown(*found_a), shown(*found_b));
                 let expected = format!("about {} and {}", shown(*size_a), shown(*size_b));
@@ -33,7 +33,7 @@ pub fn of(record: &Record, parameters: &Parameters) -> Vec<Message> {
                     message
                         .found(found)
                         .expected(expected)
-                        .hint("name them the right way in a map file"),
+                        .hint("name them the right way in the header, or by a map: --map v_out=COLUMN,..."),
                 ];
             }
         }
@@ -42,7 +42,7 @@ pub fn of(record: &Record, parameters: &Parameters) -> Vec<Message> {
         .iter()
         .filter(|(_, size, found)| ratio(*found, *size) > OTHER_UNIT);
     let message = |(n, size, found): &(usize, f64, f64)| {
-        let (name, unit) = (CHANNEL_NAMES[*n], CHANNEL_UNITS[*n]);
+        let (name, unit) = (&labels[*n], CHANNEL_UNITS[*n]);
         Message::new(format!("{name} is not in {unit}, or not of this converter"))
             .found(format!("around {}", shown(*found)))
             .expected(format!("around {} {unit} by the model", shown(*size)))

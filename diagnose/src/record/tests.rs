@@ -3,11 +3,12 @@ use std::path::Path;
 
 use plant::Parameters;
 
+use super::digits::lattice;
 use super::*;
 
 fn read(text: &str) -> Result<Record, Faults> {
-    let table = Table::parse(Path::new("run.csv"), text.as_bytes())?;
-    Record::new(table, &Columns::default(), &Parameters::paper_table())
+    let sheet = Sheet::parse(Path::new("run.csv"), text.into(), &Record::file_options())?;
+    Record::read(&sheet, &ColumnMap::default(), &Parameters::paper_table())
 }
 
 /// 30 rows at the middle of the period; `edit` may change the line of a row.

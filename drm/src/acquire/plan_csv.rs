@@ -2,10 +2,14 @@
 
 use std::fmt::{self, Write};
 
-use toml_input::{Faults, Source};
+use measured::{Cell, Column, Sheet};
+use toml_input::Faults;
 
 use crate::acquire::{Hold, LoadSetting, Measurement, Plan, PlanPoint};
 use crate::table::{Point, Table, TableOptions};
+
+/// The columns of a plan that say what shall be measured.
+pub(crate) const PLAN_COLUMNS: [&str; 4] = ["point", "duty", "load", "hold"];
 
 const HEADER: &str = "point,duty,load,hold,d_real,v_out,i_out,v_in,v_std,settled";
 
@@ -62,43 +66,48 @@ impl Plan {
 
     /// Takes over the measured rows of an earlier table; they are found by `point`, `duty` and `load`.
     ///
+    /// The table may have gone through a spreadsheet: other separators and decimal commas are read like any table.
     /// Unsettled rows are measured again. Returns how many rows were taken over.
     ///
     /// # Errors
     /// All faults of the table, as for a fit.
-    pub fn resume(&mut self, text: &Source) -> Result<usize, Faults> {
+    pub fn resume(&mut self, sheet: &Sheet) -> Result<usize, Faults> {
         let options = TableOptions {
             skip_unsettled: true,
             partial: true,
             ..TableOptions::default()
         };
-        if !text.text.contains(HEADER) || rows(text).all(|(_, row)| row.ends_with(",,,,,")) {
-            // nothing is measured yet, or it is another table: say which columns are missing
-            return if text.text.contains(HEADER) {
-                Ok(0)
-            } else {
-                Table::parse(text, &options).map(|_| 0)
-            };
+        let wished = PLAN_COLUMNS.map(|name| sheet.column(name));
+        let measured = ["d_real", "v_out", "i_out", "v_in"].map(|name| sheet.column(name));
+        let is_open = |column: &Column| (0..sheet.rows()).all(|row| column.cell(row) == Cell::Empty);
+        if measured.iter().all(|column| column.is_some_and(is_open)) {
+            // nothing is measured yet
+            return Ok(0);
         }
-        let table = Table::parse(text, &options)?;
+        let table = Table::read(sheet, &options)?;
+        let [Some(point), Some(duty), Some(load), hold] = wished else {
+            // settled points of another origin: nobody knows which point is which
+            return Ok(0);
+        };
+        let v_std = sheet.column("v_std");
         let mut taken = 0;
-        for (line, row) in rows(text) {
-            let Some(measured) = table.points.iter().find(|point| point.line == line) else {
+        for row in 0..sheet.rows() {
+            let Some(measured) = table.points.iter().find(|point| point.line == sheet.line(row)) else {
                 continue;
             };
-            let cells: Vec<&str> = row.split(',').map(str::trim).collect();
-            let [number, duty, load, hold, ..] = cells[..] else {
+            let (Cell::Number(number), Cell::Number(duty), Cell::Word(load)) =
+                (point.cell(row), duty.cell(row), load.cell(row))
+            else {
                 continue;
             };
-            let entry = number
-                .parse::<usize>()
-                .ok()
-                .and_then(|number| self.points.get_mut(number.wrapping_sub(1)));
+            // `as` saturates: a number that is no index finds no point
+            let entry = self.points.get_mut((number as usize).wrapping_sub(1));
             if let Some((point, measurement)) = entry
-                && duty.parse() == Ok(point.duty)
+                && duty == point.duty
                 && load == point.load.to_string()
             {
-                let v_std = cells.get(8).and_then(|cell| cell.parse().ok()).unwrap_or(0.0);
+                let v_std = v_std.map_or(Cell::Empty, |column| column.cell(row));
+                let hold = hold.map_or(Cell::Empty, |column| column.cell(row));
                 *measurement = Some(taken_over(point, measured, hold, v_std));
                 taken += 1;
             }
@@ -107,25 +116,20 @@ impl Plan {
     }
 }
 
-/// Rows below the header with their lines.
-fn rows(text: &Source) -> impl Iterator<Item = (usize, &str)> {
-    let is_row = |(_, line): &(usize, &str)| line.starts_with(|c: char| c.is_ascii_digit());
-    text.text
-        .lines()
-        .enumerate()
-        .map(|(index, line)| (index + 1, line.trim()))
-        .filter(is_row)
-}
-
-fn taken_over(point: &PlanPoint, measured: &Point, hold: &str, v_std: f64) -> Measurement {
+fn taken_over(point: &PlanPoint, measured: &Point, hold: Cell<'_>, v_std: Cell<'_>) -> Measurement {
     Measurement {
         d_real: measured.d_real,
         v_out: measured.v_out,
         i_out: measured.i_out,
         v_in: measured.v_in,
-        v_std,
+        v_std: if let Cell::Number(v_std) = v_std { v_std } else { 0.0 },
         settled: measured.settled,
-        hold: held_as(hold).unwrap_or(point.hold),
+        hold: if let Cell::Word(hold) = hold {
+            held_as(hold)
+        } else {
+            None
+        }
+        .unwrap_or(point.hold),
     }
 }
 

@@ -1,19 +1,19 @@
-//! Tables of settled points: CSV with the columns `d_real`, `v_out`, `i_out`, `v_in`.
+//! Tables of settled points: files with the columns `duty` (or `d_real`), `v_out`, `i_out`, `v_in`.
 //!
-//! [`Table::parse`] reads strictly: all faults at once, each with file, line, what was found, what was expected and what
-//! to do. What is read is in SI units and within the range of a buck converter.
+//! [`Table::open`] reads strictly: all faults at once, each with file, line, what was found, what was expected and what
+//! to do. The crate `measured` finds the columns and turns them into SI units; here is what only a mapping asks for: each
+//! point whole, settled, and within the range of a buck converter.
 
-mod cells;
-mod columns;
+mod reading;
 mod suspicion;
 
+use std::path::Path;
+
+use measured::{ColumnMap, Options, Sheet};
 use serde::Serialize;
-use toml_input::{Fault, Faults, Message, Source as Text};
+use toml_input::Faults;
 
 use crate::formula::Losses;
-use cells::Sheet;
-pub use columns::Columns;
-use columns::{Located, Source};
 
 /// One settled point of a converter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -69,7 +69,7 @@ pub struct Table {
 #[derive(Debug, Clone, Default)]
 pub struct TableOptions {
     /// Where the quantities stand.
-    pub columns: Columns,
+    pub columns: ColumnMap,
     /// Unsettled points are left out instead of refused.
     pub skip_unsettled: bool,
     /// The simulation that the policy was trained on; without it a loss-free one at the input voltage of each point, as in
@@ -79,139 +79,41 @@ pub struct TableOptions {
     pub partial: bool,
 }
 
-/// More points than this are a record over time, not a table of settled points.
-const MOST_POINTS: usize = 2000;
-/// More faults than this are counted, not listed.
-const MOST_FAULTS: usize = 12;
-/// A standard deviation above this share of the voltage means that the point had not settled.
-const UNSETTLED: f64 = 0.005;
+/// Largest file of settled points, bytes: the points that a table may have take a twentieth of it.
+const MOST_BYTES: u64 = 4 << 20;
 
 impl Table {
-    /// Reads the text of a CSV file.
+    /// Reads a file.
     ///
-    /// Cells are separated by commas, numbers have a decimal point; empty lines and lines that start with `#` are
-    /// skipped, columns that nobody asked for are ignored.
+    /// # Errors
+    /// A file that cannot be read, and those of [`Table::read`].
+    pub fn open(file: &Path, options: &TableOptions) -> Result<Table, Faults> {
+        Self::read(&Sheet::open(file, &Self::file_options())?, options)
+    }
+
+    /// Reads the bytes of a file; `file` only names it in faults.
+    ///
+    /// # Errors
+    /// As [`Table::open`].
+    pub fn parse(file: &Path, bytes: impl Into<Vec<u8>>, options: &TableOptions) -> Result<Table, Faults> {
+        Self::read(&Sheet::parse(file, bytes.into(), &Self::file_options())?, options)
+    }
+
+    /// Reads the settled points of a sheet; columns that nobody asked for are named in the notes.
     ///
     /// # Errors
     /// All faults of the table; of very many the first.
-    pub fn parse(text: &Text, options: &TableOptions) -> Result<Table, Faults> {
-        read(text, options).map_err(|mut faults| {
-            let more = faults.len().saturating_sub(MOST_FAULTS);
-            faults.truncate(MOST_FAULTS);
-            if more > 0 {
-                faults.push(
-                    text.name
-                        .fault(Message::new(format!("{more} more faults of this kind"))),
-                );
-            }
-            Faults::unless_empty(faults).err().unwrap_or_else(|| {
-                // a reader that gives nothing has left a fault
-                text.name.fault(Message::new("the table cannot be read")).into()
-            })
-        })
+    pub fn read(sheet: &Sheet, options: &TableOptions) -> Result<Table, Faults> {
+        reading::read(sheet, options)
     }
-}
 
-fn read(text: &Text, options: &TableOptions) -> Result<Table, Vec<Fault>> {
-    let sheet = Sheet::parse(text)?;
-    let located = options.columns.locate(&sheet)?;
-    let mut faults = Vec::new();
-    let mut table = Table {
-        points: Vec::new(),
-        open: Vec::new(),
-        notes: Vec::new(),
-    };
-    for row in &sheet.rows {
-        match point(row, &located, options.simulation, &sheet, &mut faults) {
-            Some(Reading::Point(point)) => table.points.push(point),
-            Some(Reading::Open) => table.open.push(row.line),
-            None => {}
+    /// How files with settled points are read.
+    #[must_use]
+    pub fn file_options() -> Options {
+        Options {
+            most_bytes: MOST_BYTES,
+            leave_out_cut_line: false,
         }
-    }
-    if faults.is_empty() {
-        suspicion::check(&mut table, &located, &sheet, &mut faults);
-    }
-    if faults.is_empty() && !options.partial {
-        suspicion::variety(&table.points, &sheet, &mut faults);
-    }
-    if faults.is_empty() {
-        settled(&mut table, options, &sheet, &mut faults);
-    }
-    if table.points.len() > MOST_POINTS {
-        let message = Message::new("too many rows for a table of settled points")
-            .found(format!("{} rows", table.points.len()))
-            .expected(format!("at most {MOST_POINTS}, one for each settled point"));
-        let hint = "average a record over the time in which the converter had settled";
-        faults.push(sheet.fault(message.hint(hint)));
-    }
-    if faults.is_empty() { Ok(table) } else { Err(faults) }
-}
-
-enum Reading {
-    Point(Point),
-    Open,
-}
-
-/// One row; `None` if it has faults.
-fn point(
-    row: &cells::Row,
-    located: &Located,
-    simulation: Option<Losses>,
-    sheet: &Sheet<'_>,
-    faults: &mut Vec<Fault>,
-) -> Option<Reading> {
-    let measured = [&located.d_real, &located.v_out, &located.i_out, &located.v_in];
-    let in_table = |source: &&&Source| matches!(source, Source::Column { .. });
-    if measured
-        .iter()
-        .filter(in_table)
-        .all(|source| source.is_empty(row, sheet))
-    {
-        return Some(Reading::Open);
-    }
-    let before = faults.len();
-    let mut number = |source: &Source| source.number(row, sheet, faults);
-    let [d_real, v_out, i_out, v_in] = measured.map(&mut number);
-    let v_std = located.v_std.as_ref().filter(|source| !source.is_empty(row, sheet));
-    let v_std = v_std.and_then(&mut number);
-    let settled = located.settled.as_ref().filter(|source| !source.is_empty(row, sheet));
-    let settled = settled.and_then(|source| source.yes_or_no(row, sheet, faults));
-    if faults.len() > before {
-        return None;
-    }
-    let (v_out, v_in) = (v_out?, v_in?);
-    Some(Reading::Point(Point {
-        line: row.line,
-        d_real: d_real?,
-        v_out,
-        i_out: i_out?,
-        v_in,
-        simulation: simulation.unwrap_or(Losses::none(v_in)),
-        settled: settled.unwrap_or(true) && v_std.is_none_or(|v_std| v_std <= UNSETTLED * v_out.abs()),
-    }))
-}
-
-/// Unsettled points are refused, or left out if so wished.
-fn settled(table: &mut Table, options: &TableOptions, sheet: &Sheet<'_>, faults: &mut Vec<Fault>) {
-    let unsettled: Vec<usize> = table.points.iter().filter(|p| !p.settled).map(|p| p.line).collect();
-    if unsettled.is_empty() {
-        return;
-    }
-    if options.skip_unsettled {
-        table
-            .notes
-            .push(format!("left out as unsettled: {}", lines(&unsettled)));
-        table.points.retain(|point| point.settled);
-        return;
-    }
-    for line in unsettled {
-        let expected = format!(
-            "`settled` yes and `v_std` at most {} % of the voltage",
-            100.0 * UNSETTLED
-        );
-        let hint = "measure it again after a longer wait, or leave such points out with --skip-unsettled";
-        let message = Message::new("the point had not settled").expected(expected).hint(hint);
-        faults.push(sheet.line_fault(line, message));
     }
 }
 

@@ -6,17 +6,17 @@ use std::path::Path;
 
 use drm::acquire::Bench;
 use drm::{Table, TableOptions};
+use measured::Sheet;
 use plant::{Faults, Load, Parameters, Plant, Signals};
-use toml_input::{FileName, Source};
 
 /// A CSV text as a file called `table.csv`.
-pub fn source(text: &str) -> Source {
-    Source::new(FileName::new(Path::new("table.csv")), text.as_bytes().to_vec()).unwrap()
+pub fn sheet(text: &str) -> Sheet {
+    Sheet::parse(Path::new("table.csv"), text.into(), &Table::file_options()).unwrap()
 }
 
 /// A table that must be sound.
 pub fn table(text: &str) -> Table {
-    Table::parse(&source(text), &TableOptions::default()).unwrap_or_else(|faults| panic!("{faults}"))
+    Table::read(&sheet(text), &TableOptions::default()).unwrap_or_else(|faults| panic!("{faults}"))
 }
 
 /// A converter of the `plant` crate.

@@ -17,7 +17,7 @@ use policy::{Interval, Policy, Scalar};
 
 use edges::Edges;
 use plant::Plant;
-pub use recorded::{Recorded, RecordedError};
+pub use recorded::Recorded;
 pub use rng::Rng;
 
 /// What happens to a controller in one move.

@@ -1,9 +1,11 @@
-//! Recorded measurements as part of the stream: CSV with one column per signal, by name.
+//! Recorded measurements as part of the stream: a table with one column per signal, by name.
 
-use std::fmt;
+use std::path::Path;
 
 use interp::Sample;
+use measured::{Cell, ColumnMap, FaultList, Options, Quantity, Sheet, Signal};
 use policy::Policy;
+use toml_input::{Faults, Message};
 
 use super::sample_of;
 
@@ -11,117 +13,68 @@ use super::sample_of;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recorded {
     steps: Vec<Vec<Sample>>,
+    /// What a reader of the table should know: columns that were not used, decimal commas.
+    pub notes: Vec<String>,
 }
-
-/// What is wrong with a recording.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum RecordedError {
-    /// No column has the name of this signal.
-    MissingColumn {
-        /// Name of the signal.
-        signal: String,
-    },
-    /// Two columns have the same name.
-    DuplicateColumn {
-        /// Name of the column.
-        name: String,
-    },
-    /// A cell is missing or no number.
-    Cell {
-        /// Line in the file, the header is 1.
-        line: usize,
-        /// Name of the signal.
-        signal: String,
-        /// What was found.
-        found: String,
-    },
-    /// More cells than the header has: perhaps decimal commas.
-    TooManyCells {
-        /// Line in the file, the header is 1.
-        line: usize,
-        /// Number of cells.
-        found: usize,
-        /// Cells in the header.
-        expected: usize,
-    },
-}
-
-impl fmt::Display for RecordedError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::MissingColumn { signal } => {
-                write!(
-                    f,
-                    "no column for the signal `{signal}`; columns are separated by commas and named as the signals"
-                )
-            }
-            Self::DuplicateColumn { name } => write!(f, "two columns are called `{name}`"),
-            Self::Cell { line, signal, found } => {
-                write!(f, "line {line}, column `{signal}`: expected a number, found `{found}`")
-            }
-            Self::TooManyCells { line, found, expected } => write!(
-                f,
-                "line {line}: found {found} cells, expected {expected} as in the header (numbers take a decimal point)"
-            ),
-        }
-    }
-}
-
-impl std::error::Error for RecordedError {}
 
 impl Recorded {
-    /// Reads CSV text: commas, decimal points, a header line. Columns are found by the signals' names, others are
-    /// ignored; lines that are empty or start with `#` are skipped. Values are in the unit of the signal, for ADC
-    /// signals too, where the nearest code is taken. `nan` and `inf` are numbers here.
-    pub fn from_csv(policy: &Policy, text: &str) -> Result<Self, RecordedError> {
-        let scalar = policy.numeric_format.scalar();
-        let mut lines = text
-            .trim_start_matches('\u{feff}')
-            .lines()
-            .enumerate()
-            .filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
-        let header: Vec<&str> = lines.next().map(|(_, line)| cells(line)).unwrap_or_default();
-        let columns = policy
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// A file that cannot be read, and those of [`Recorded::read`].
+    pub fn open(policy: &Policy, file: &Path) -> Result<Self, Faults> {
+        Self::read(policy, &Sheet::open(file, &Options::default())?)
+    }
+
+    /// Reads a table. Columns are found by the signals' names, or by other names of the same quantity; a unit behind
+    /// the name is converted. Values are in the unit of the signal, for ADC signals too, where the nearest code is
+    /// taken. `nan` and `inf` are numbers here: what a controller does with them is part of the comparison.
+    ///
+    /// # Errors
+    /// A signal without column, two columns for one, cells that are no numbers.
+    pub fn read(policy: &Policy, sheet: &Sheet) -> Result<Self, Faults> {
+        let others: Vec<Vec<&str>> = policy
             .signals
             .iter()
-            .map(|signal| {
-                let mut found = header.iter().enumerate().filter(|(_, name)| **name == signal.name);
-                match (found.next(), found.next()) {
-                    (Some((column, _)), None) => Ok(column),
-                    (None, _) => Err(RecordedError::MissingColumn {
-                        signal: signal.name.clone(),
-                    }),
-                    (Some(_), Some(_)) => Err(RecordedError::DuplicateColumn {
-                        name: signal.name.clone(),
-                    }),
+            .map(|signal| other_names(policy, signal))
+            .collect();
+        let quantity = |(signal, aliases)| quantity(signal, aliases);
+        let wanted: Vec<Quantity<'_>> = policy.signals.iter().zip(&others).map(quantity).collect();
+        let located = sheet.locate(&wanted, &ColumnMap::default())?;
+        let mut faults = FaultList::default();
+        let mut columns = Vec::new();
+        for (signal, quantity) in policy.signals.iter().zip(&wanted) {
+            match located.signal(&signal.name) {
+                Some(found) => columns.push((signal, found)),
+                None => {
+                    let names: Vec<String> = quantity.names().map(|name| format!("`{name}`")).collect();
+                    let message = Message::new(format!("no column for the signal `{}`", signal.name))
+                        .found(sheet.listed())
+                        .expected(format!("a column {}", names.join(" or ")))
+                        .hint("columns are named as the signals of the policy");
+                    faults.push(sheet.header_fault(message));
                 }
-            })
-            .collect::<Result<Vec<_>, _>>()?;
-        let steps = lines
-            .map(|(line, text)| {
-                let cells = cells(text);
-                if cells.len() > header.len() {
-                    return Err(RecordedError::TooManyCells {
-                        line: line + 1,
-                        found: cells.len(),
-                        expected: header.len(),
-                    });
+            }
+        }
+        faults.done()?;
+        let scalar = policy.numeric_format.scalar();
+        let mut faults = FaultList::default();
+        let mut steps = Vec::with_capacity(sheet.rows());
+        for row in 0..sheet.rows() {
+            let mut sample = |(signal, found): &(&policy::Signal, &Signal)| {
+                let value = value(found, sheet, row);
+                if value.is_none() {
+                    faults.push(found.not_a_number(sheet, row));
                 }
-                let sample = |(signal, &column): (&policy::Signal, &usize)| {
-                    let cell = cells.get(column).copied().unwrap_or_default();
-                    let bad = || RecordedError::Cell {
-                        line: line + 1,
-                        signal: signal.name.clone(),
-                        found: cell.to_owned(),
-                    };
-                    cell.parse()
-                        .map(|x: f64| sample_of(scalar, signal, x))
-                        .map_err(|_| bad())
-                };
-                policy.signals.iter().zip(&columns).map(sample).collect()
-            })
-            .collect::<Result<_, _>>()?;
-        Ok(Self { steps })
+                sample_of(scalar, signal, value.unwrap_or(f64::NAN))
+            };
+            steps.push(columns.iter().map(&mut sample).collect());
+        }
+        faults.done()?;
+        Ok(Self {
+            steps,
+            notes: located.notes(sheet, &[]),
+        })
     }
 
     /// The steps, one sample per signal.
@@ -130,6 +83,31 @@ impl Recorded {
     }
 }
 
-fn cells(line: &str) -> Vec<&str> {
-    line.split(',').map(|cell| cell.trim().trim_matches('"')).collect()
+/// What else a table may call a signal that has the name of a quantity; never the name of another signal.
+fn other_names<'a>(policy: &Policy, signal: &policy::Signal) -> Vec<&'a str> {
+    let names = Quantity::find(&signal.name).into_iter().flat_map(Quantity::names);
+    let is_signal = |name: &&str| {
+        policy
+            .signals
+            .iter()
+            .any(|signal| signal.name.eq_ignore_ascii_case(name))
+    };
+    names.filter(|name| !is_signal(name)).collect()
+}
+
+fn quantity<'a>(signal: &'a policy::Signal, aliases: &'a Vec<&'a str>) -> Quantity<'a> {
+    Quantity {
+        name: &signal.name,
+        aliases,
+        unit: &signal.unit,
+    }
+}
+
+/// A number, which may be none that is finite.
+fn value(signal: &Signal, sheet: &Sheet, row: usize) -> Option<f64> {
+    match signal.cell(sheet, row) {
+        Cell::Number(value) => Some(value),
+        Cell::Word(word) => word.parse().ok().map(|value| signal.scaled(value)),
+        Cell::Empty => None,
+    }
 }

@@ -146,7 +146,8 @@ fn observations_come_within_a_few_units_of_their_clips_on_both_sides() {
 fn recordings_come_first_and_whole() {
     let policy = example();
     let text = "t, i_out, v_out, i_l\n# volts and amperes\n0, 1.5, 99, nan\n\n1e-4, 2.5, 98, 7\n";
-    let recorded = Recorded::from_csv(&policy, text).unwrap();
+    let recorded = recorded(&policy, text).unwrap();
+    assert_eq!(recorded.notes, ["column not used: `t`"]);
     let (chunk, _) = chunk(&policy, 1, 10, &[recorded]);
     assert_eq!(chunk.events[0], Event::Reset);
     let Event::Step(first) = &chunk.events[1] else {
@@ -163,22 +164,46 @@ fn recordings_come_first_and_whole() {
 #[test]
 fn a_faulty_recording_is_refused_with_its_place() {
     let policy = example();
-    let error = |text| Recorded::from_csv(&policy, text).unwrap_err();
-    assert_eq!(
-        error("v_out,i_l\n"),
-        RecordedError::MissingColumn { signal: "i_out".into() }
-    );
-    assert_eq!(
-        error("v_out,i_l,i_out,i_l\n"),
-        RecordedError::DuplicateColumn { name: "i_l".into() }
-    );
-    let cell = |line, found: &str| RecordedError::Cell {
-        line,
-        signal: "i_l".into(),
-        found: found.into(),
+    for (text, problem, place) in [
+        ("v_out,i_l\n1,2\n", "no column for the signal `i_out`", (1, 1)),
+        (
+            "v_out,i_l,i_out,i_l\n1,2,3,4\n",
+            "two columns are called `i_l`",
+            (1, 17),
+        ),
+        ("v_out,i_l,i_out,i_o\n1,2,3,4\n", "two columns are `i_out`", (1, 17)),
+        ("v_out,i_l,i_out\n1,2,3\n1,x,3\n", "`i_l` is not a number", (3, 3)),
+        ("v_out,i_out,i_l\n1,2\n", "cells are missing", (2, 1)),
+        ("v_out,i_out,i_l\n1,2,\n", "a cell of `i_l` is empty", (2, 5)),
+        ("v_out,i_l,i_out\n1,2,3,4\n", "more cells", (2, 1)),
+    ] {
+        let faults = recorded(&policy, text).unwrap_err();
+        let (fault, all) = (&faults.list[0], faults.to_string());
+        assert!(
+            fault.problem.contains(problem) && fault.line_column() == Some(place),
+            "{all}"
+        );
+    }
+}
+
+#[test]
+fn short_forms_units_and_decimal_commas_are_read_to_the_same_samples() {
+    let policy = example();
+    let plain = recorded(&policy, "v_out,i_l,i_out\n98.5,-0,2.5\n").unwrap();
+    let other = recorded(&policy, "i_l;v_o [mV];i_o\n-0;98500;2,5\n").unwrap();
+    assert_eq!(plain.steps(), other.steps());
+    let Sample::Physical(i_l) = plain.steps()[0][1] else {
+        panic!()
     };
-    assert_eq!(error("v_out,i_l,i_out\n1,2,3\n1,x,3\n"), cell(3, "x"));
-    assert_eq!(error("v_out,i_out,i_l\n1,2\n"), cell(2, ""));
+    assert_eq!(i_l.to_bits(), 1 << 31, "the sign of a zero is kept");
+}
+
+fn recorded(policy: &Policy, text: &str) -> Result<Recorded, toml_input::Faults> {
+    let options = measured::Options::default();
+    Recorded::read(
+        policy,
+        &measured::Sheet::parse(Path::new("trace.csv"), text.into(), &options)?,
+    )
 }
 
 #[test]

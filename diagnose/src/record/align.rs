@@ -1,0 +1,103 @@
+//! From the times of the rows to switching periods: which row stands for which period, and when in it was sampled.
+
+use toml_input::{Faults, Message};
+
+use super::raw::Raw;
+
+/// Most rows in a switching period, and most periods between rows.
+const MOST_PER_PERIOD: f64 = 500.0;
+const MOST_PERIODS: f64 = 100.0;
+
+impl Raw<'_> {
+    /// Rows for each control period in order (nothing in a gap), and the sampling phase.
+    pub fn align(&mut self, t_sw: f64, phase: Option<f64>) -> Result<(Vec<Option<usize>>, f64), Faults> {
+        let time = self.values("t").unwrap_or_default();
+        if let Some(row) = time.iter().position(|t| t.is_nan()) {
+            let hint = "leave the row out, or fill in its time";
+            return Err(self
+                .fault("t", row, Message::new("a row without time").hint(hint))
+                .into());
+        }
+        if let Some(row) = (1..time.len()).find(|n| time[*n] < time[*n - 1]) {
+            let message = Message::new("time goes backward").found(format!("{} after {}", time[row], time[row - 1]));
+            return Err(self
+                .fault("t", row, message.hint("cut the file into one record for each run"))
+                .into());
+        }
+        let twice = (1..time.len()).filter(|n| time[*n] == time[*n - 1]).count();
+        if twice > 0 {
+            let text = format!("{twice} rows repeat the time of the row before: the first of each is kept");
+            self.repairs.push(text);
+        }
+        let mut steps: Vec<f64> = time
+            .windows(2)
+            .map(|t| t[1] - t[0])
+            .filter(|step| *step > 0.0)
+            .collect();
+        steps.sort_by(f64::total_cmp);
+        let Some(step) = steps.get(steps.len() / 2).copied() else {
+            return Err(self
+                .sheet
+                .fault(Message::new("too few rows").expected("20 or more"))
+                .into());
+        };
+        let ratio = step / t_sw;
+        let (fast, slow) = ((1.0 / ratio).round(), ratio.round());
+        let fits = |a: f64, b: f64| (a / b - 1.0).abs() < 0.02;
+        let faster = (1.0..=MOST_PER_PERIOD).contains(&fast) && fits(1.0 / ratio, fast);
+        let slower = (1.0..=MOST_PERIODS).contains(&slow) && fits(ratio, slow);
+        if !(faster || slower) {
+            let message = Message::new("the sample rate does not fit the switching frequency")
+                .found(format!("a row every {step:e} s"))
+                .expected(format!(
+                    "the period, {t_sw:e} s, a whole multiple or a whole part of it"
+                ))
+                .hint("is the time in us or ms? name the column `t_us`; is `converter.f_sw` right?");
+            return Err(self.sheet.fault(message).into());
+        }
+        Ok(self.place(&time, t_sw, phase, step))
+    }
+
+    fn place(&mut self, time: &[f64], t_sw: f64, phase: Option<f64>, step: f64) -> (Vec<Option<usize>>, f64) {
+        let fraction = (time[0] / t_sw).rem_euclid(1.0);
+        let phase = phase.unwrap_or(if !(1e-3..=1.0 - 1e-3).contains(&fraction) {
+            0.0
+        } else {
+            fraction
+        });
+        let skip = match step < 0.75 * t_sw {
+            true => (phase - fraction).rem_euclid(1.0) * t_sw,
+            false => 0.0,
+        };
+        let first = time[0] + skip;
+        self.start = first;
+        let slot = |t: f64| ((t - first) / t_sw).round();
+        let count = time.last().map_or(0.0, |t| slot(*t)) as usize + 1;
+        let mut rows: Vec<Option<usize>> = vec![None; count.min(10_000_000)];
+        let (mut jitter, mut used) = (0.0f64, 0);
+        for (row, t) in time.iter().enumerate() {
+            let place = slot(*t);
+            let off = ((t - first) / t_sw - place).abs();
+            let fast = step < 0.75 * t_sw;
+            if place < 0.0 || place as usize >= rows.len() || (fast && off * t_sw > 0.51 * step) {
+                continue;
+            }
+            let entry = &mut rows[place as usize];
+            if entry.is_none() {
+                (*entry, used) = (Some(row), used + 1);
+                jitter = jitter.max(off);
+            }
+        }
+        while rows.last() == Some(&None) {
+            rows.pop();
+        }
+        if step < 0.75 * t_sw {
+            let text = format!("{used} of {} rows used: one each switching period", time.len());
+            self.repairs.push(text);
+        } else if jitter > 0.02 {
+            let text = format!("sampling instants jitter by up to {:.1} % of a period", 100.0 * jitter);
+            self.repairs.push(text);
+        }
+        (rows, phase)
+    }
+}

@@ -1,0 +1,220 @@
+//! A table with its signals found and turned into SI units: duty, load, channels, time.
+
+use measured::{ColumnMap, FaultList, Located, Quantity, Sheet};
+use plant::Load;
+use toml_input::{Fault, Faults, Message};
+
+use super::QUANTITIES;
+use super::digits::{last_digit, lattice};
+
+/// What a record may hold.
+const NAMES: [&str; 9] = [
+    "t", "duty", "v_out", "i_l", "i_out", "v_in", "r_load", "i_load", "p_load",
+];
+/// What may say the load: set, or else measured.
+const LOADS: [&str; 4] = ["r_load", "i_load", "p_load", "i_out"];
+
+/// A table with its signals found.
+pub(super) struct Raw<'a> {
+    pub sheet: &'a Sheet,
+    located: Located,
+    /// Each quantity in SI, NaN where nothing was measured; nothing if it is not there.
+    values: Vec<(&'static str, Vec<f64>)>,
+    pub repairs: Vec<String>,
+    /// Time of the first row that is used, s.
+    pub start: f64,
+}
+
+impl<'a> Raw<'a> {
+    pub fn new(sheet: &'a Sheet, map: &ColumnMap) -> Result<Self, Faults> {
+        let located = sheet.locate(&Quantity::all(&NAMES), map)?;
+        let has = |name: &str| located.signal(name).is_some();
+        let mut faults = FaultList::default();
+        if !has("duty") {
+            let hint = "; a map file can do so as well: --columns MAP.toml with [columns] duty = \"...\"";
+            let duty = Quantity::all(&["duty"]);
+            faults.extend(duty.iter().map(|duty| sheet.missing(duty, hint)));
+        }
+        if !LOADS.into_iter().any(has) {
+            let message = Message::new("nothing says what the load is").found(sheet.listed());
+            let hint = "give r_load, i_load or p_load as a column, or for the whole record: --map r_load=10, or under \
+                        [constants] in the map file";
+            faults.push(sheet.header_fault(message.expected("r_load, i_load, p_load or i_out").hint(hint)));
+        }
+        if !QUANTITIES.into_iter().any(has) {
+            let message = Message::new("nothing is measured in this record").found(sheet.listed());
+            faults.push(sheet.header_fault(message.expected("at least one of v_out, i_l, i_out, v_in")));
+        }
+        faults.done()?;
+        let mut faults = FaultList::default();
+        let mut values = Vec::new();
+        for name in NAMES {
+            if let Some(signal) = located.signal(name) {
+                values.push((name, signal.values(sheet, &mut faults)));
+            }
+        }
+        faults.done()?;
+        Ok(Raw {
+            repairs: located.notes(sheet, &[]),
+            sheet,
+            located,
+            values,
+            start: 0.0,
+        })
+    }
+
+    pub fn rows(&self) -> usize {
+        self.sheet.rows()
+    }
+
+    /// What the file calls a quantity.
+    pub fn label(&self, name: &str) -> String {
+        self.located
+            .signal(name)
+            .map_or(name, |signal| &signal.label)
+            .to_owned()
+    }
+
+    /// A fault of a quantity in a row.
+    pub fn fault(&self, name: &str, row: usize, message: Message) -> Fault {
+        match self.located.signal(name) {
+            Some(signal) => signal.fault(self.sheet, row, message),
+            None => self.sheet.row_fault(row, message),
+        }
+    }
+
+    /// A quantity in SI.
+    pub fn values(&self, name: &str) -> Option<Vec<f64>> {
+        let found = self.values.iter().find(|(known, _)| *known == name);
+        found.map(|(_, values)| values.clone())
+    }
+
+    /// A quantity in the rows that are used; a constant is a setting, no measurement.
+    pub fn pick(&self, name: &str, rows: &[Option<usize>]) -> Option<Vec<f64>> {
+        let is_column = self.located.signal(name)?.column().is_some();
+        let values = self.values(name).filter(|_| is_column || name == "duty")?;
+        Some(rows.iter().map(|row| row.map_or(f64::NAN, |row| values[row])).collect())
+    }
+
+    /// Whether rows are settled points: what the user says, or that nothing looks like time.
+    pub fn is_settled(&mut self, stated: Option<bool>) -> Result<bool, Faults> {
+        let time = self.located.signal("t");
+        match (stated, time) {
+            (Some(true), time) => {
+                let note = |time: &measured::Signal| {
+                    format!("`{}` is not used: rows are said to be settled points", time.label)
+                };
+                let note = time.filter(|time| time.column().is_some()).map(note);
+                self.repairs.extend(note);
+                return Ok(true);
+            }
+            (_, Some(_)) => return Ok(false),
+            (Some(false), None) => {
+                let time = Quantity::all(&["t"]);
+                let faults = time
+                    .iter()
+                    .map(|time| self.sheet.missing(time, ", since `settled = false`"));
+                Faults::unless_empty(faults.collect())?;
+            }
+            (None, None) => {}
+        }
+        let Some((column, why)) = self.located.time_like(self.sheet) else {
+            return Ok(true);
+        };
+        let name = &self.sheet.columns()[column].name;
+        let message = Message::new(format!("no time column, but `{name}` looks like time"))
+            .found(why)
+            .expected("a time `t`, `time` or `timestamps`, in s or with its unit: `t_us`")
+            .hint(format!(
+                "--map t={name} if it is the time; --settled if each row is a settled operating point"
+            ));
+        Err(self.sheet.name_fault(column, message).into())
+    }
+
+    pub fn check_duty(&self) -> Result<(), Faults> {
+        let duty = self.values("duty").unwrap_or_default();
+        let highest = duty.iter().copied().filter(|d| d.is_finite()).fold(0.0, f64::max);
+        let outside = duty.iter().position(|d| *d < -1e-9 || *d > 1.0 + 1e-9);
+        if let Some(row) = outside {
+            let label = self.label("duty");
+            let percent = highest > 1.5 && highest <= 100.0;
+            let hint = match percent {
+                true => format!("percent? call the column `{label} (%)`, or map it: --map duty=COLUMN*0.01"),
+                false => "a duty is a share of the period".to_owned(),
+            };
+            let message = Message::new("a duty outside 0 to 1").found(duty[row].to_string());
+            return Err(self.fault("duty", row, message.expected("0 to 1").hint(hint)).into());
+        }
+        Ok(())
+    }
+
+    /// A row without duty has that of the row before.
+    pub fn report_missing_duty(&mut self) {
+        let missing = self
+            .values("duty")
+            .unwrap_or_default()
+            .iter()
+            .filter(|d| d.is_nan())
+            .count();
+        if missing > 0 {
+            let text = format!("{missing} rows without duty: that of the row before is held");
+            self.repairs.push(text);
+        }
+    }
+
+    pub fn loads(&self) -> Result<Vec<Load>, Faults> {
+        let zero = vec![0.0; self.rows()];
+        let set = |name: &str| self.values(name);
+        let (resistance, current, power) = (set("r_load"), set("i_load"), set("p_load"));
+        if resistance.is_none() && current.is_none() && power.is_none() {
+            let drawn = self.values("i_out").unwrap_or(zero);
+            return Ok(drawn.into_iter().map(Load::current).collect());
+        }
+        let (r, i, p) = (
+            resistance.unwrap_or_else(|| zero.clone()),
+            current.unwrap_or_else(|| zero.clone()),
+            power.unwrap_or(zero),
+        );
+        let mut loads = Vec::with_capacity(r.len());
+        let mut last = Load::default();
+        for row in 0..r.len() {
+            let (r, i, p) = (r[row], i[row], p[row]);
+            if r < 0.0 || p < 0.0 {
+                let message = Message::new("a negative load").found(format!("{r} ohm, {p} W"));
+                return Err(self
+                    .fault(if r < 0.0 { "r_load" } else { "p_load" }, row, message)
+                    .into());
+            }
+            if !(r.is_nan() || i.is_nan() || p.is_nan()) {
+                last = Load {
+                    conductance: if r > 0.0 { 1.0 / r } else { 0.0 },
+                    current: i,
+                    power: p,
+                };
+            }
+            loads.push(last);
+        }
+        Ok(loads)
+    }
+
+    /// A step of the converter that measured a channel, 0 if none shows.
+    pub fn lattice(&self, name: &str) -> f64 {
+        self.of_column(name, lattice)
+    }
+
+    /// The last digit written of a channel.
+    pub fn resolution(&self, name: &str) -> f64 {
+        self.of_column(name, |_, decimals| last_digit(decimals))
+    }
+
+    /// A length that is read off the numbers as they are written, in SI.
+    fn of_column(&self, name: &str, length: impl Fn(&[f64], u32) -> f64) -> f64 {
+        let Some(signal) = self.located.signal(name) else {
+            return 0.0;
+        };
+        let column = signal.column().and_then(|index| self.sheet.columns().get(index));
+        column.map_or(0.0, |column| {
+            signal.scale().abs() * length(&column.values, column.decimals)
+        })
+    }
+}

@@ -1,0 +1,196 @@
+//! Where the quantities stand in a sheet, and which columns nobody asked for.
+
+use toml_input::{Fault, Faults, Message, nearest};
+
+use crate::map::{ColumnMap, Wish};
+use crate::quantity::{Quantity, split_unit};
+use crate::sheet::{Cell, Sheet};
+use crate::signal::{Signal, Source};
+use crate::time_like;
+
+/// Columns named in a note at most.
+const MOST_NAMED: usize = 8;
+
+/// The quantities of a sheet.
+#[derive(Debug, Clone)]
+pub struct Located {
+    /// Name and signal of every quantity that was found.
+    signals: Vec<(String, Signal)>,
+    /// Columns that no quantity was found in.
+    pub unused: Vec<usize>,
+    /// Quantities of the map that nobody asked for.
+    unasked: Vec<&'static str>,
+}
+
+impl Sheet {
+    /// Finds quantities: where the map says, or else by name.
+    ///
+    /// A quantity that is not there is no fault here: [`Sheet::missing`] makes one.
+    ///
+    /// # Errors
+    /// A column that the map names and the file has not; two columns for one quantity.
+    pub fn locate(&self, wanted: &[Quantity<'_>], map: &ColumnMap) -> Result<Located, Faults> {
+        let mut faults = Vec::new();
+        let mut signals = Vec::new();
+        for quantity in wanted {
+            match self.signal(quantity, map) {
+                Ok(Some(signal)) => signals.push((quantity.name.to_owned(), signal)),
+                Ok(None) => {}
+                Err(fault) => faults.push(*fault),
+            }
+        }
+        Faults::unless_empty(faults)?;
+        let used = |index: &usize| signals.iter().any(|(_, signal)| signal.column() == Some(*index));
+        let is_empty = |index: &usize| {
+            let column = &self.columns()[*index];
+            column.name.is_empty() && (0..self.rows()).all(|row| column.cell(row) == Cell::Empty)
+        };
+        let asked = |name: &&str| wanted.iter().any(|quantity| quantity.name == *name);
+        Ok(Located {
+            unused: (0..self.columns().len())
+                .filter(|index| !used(index) && !is_empty(index))
+                .collect(),
+            unasked: map.mapped().filter(|name| !asked(name)).collect(),
+            signals,
+        })
+    }
+
+    fn signal(&self, quantity: &Quantity<'_>, map: &ColumnMap) -> Result<Option<Signal>, Box<Fault>> {
+        let label = quantity.name.to_owned();
+        match map.wish(quantity.name) {
+            Some(Wish::Constant(value)) => Ok(Some(Signal {
+                label,
+                source: Source::Constant(*value),
+            })),
+            Some(Wish::Column { name, scale, offset }) => {
+                let index = self
+                    .named(name)
+                    .ok_or_else(|| Box::new(self.no_column(quantity.name, name)))?;
+                let header = &self.columns()[index].name;
+                let source = Source::Column {
+                    index,
+                    scale: scale.unwrap_or_else(|| quantity.scale_behind(header)),
+                    offset: *offset,
+                    stated: scale.is_some(),
+                };
+                let own = quantity.is_called(header);
+                Ok(Some(Signal {
+                    label: if own { header.clone() } else { label },
+                    source,
+                }))
+            }
+            None => self.by_name(quantity),
+        }
+    }
+
+    /// The column of this name, or of this name and a unit.
+    fn named(&self, name: &str) -> Option<usize> {
+        let exact = self.headers().position(|header| header == name);
+        exact.or_else(|| self.headers().position(|header| split_unit(header).0 == name))
+    }
+
+    fn by_name(&self, quantity: &Quantity<'_>) -> Result<Option<Signal>, Box<Fault>> {
+        let claims = self
+            .headers()
+            .enumerate()
+            .filter_map(|(index, header)| Some((index, quantity.scale_of(header)?)));
+        let mut claims: Vec<(usize, f64)> = claims.collect();
+        let name = |index: usize| self.columns()[index].name.as_str();
+        if claims.iter().any(|(index, _)| Quantity::is_measured_duty(name(*index))) {
+            claims.retain(|(index, _)| Quantity::is_measured_duty(name(*index)));
+        }
+        match claims[..] {
+            [] => Ok(None),
+            [(index, scale)] => Ok(Some(Signal {
+                label: quantity.called(name(index)).to_owned(),
+                source: Source::Column {
+                    index,
+                    scale,
+                    offset: 0.0,
+                    stated: false,
+                },
+            })),
+            [(first, _), (second, _), ..] => {
+                let (first, wanted) = (name(first), quantity.name);
+                let message = Message::new(format!("two columns are `{wanted}`: `{first}` and `{}`", name(second)));
+                let message = message.hint(format!("say which one: --map {wanted}={first}, or remove the other"));
+                Err(Box::new(self.name_fault(second, message)))
+            }
+        }
+    }
+
+    fn no_column(&self, quantity: &str, name: &str) -> Fault {
+        let near = nearest(name, self.headers()).map(|near| format!("did you mean `{near}`?"));
+        let message = Message::new(format!("no column `{name}` for `{quantity}`")).found(self.listed());
+        self.header_fault(message.maybe_hint(near))
+    }
+
+    /// The fault of a quantity that a reader needs and that is not there; `hint` follows the names it may have.
+    #[must_use]
+    pub fn missing(&self, quantity: &Quantity<'_>, hint: &str) -> Fault {
+        let name = quantity.name;
+        let near = quantity
+            .names()
+            .find_map(|name| nearest(name, self.headers()))
+            .unwrap_or("COLUMN");
+        let names: Vec<String> = quantity.names().map(|name| format!("`{name}`")).collect();
+        let message = Message::new(format!("no column `{name}`"))
+            .found(self.listed())
+            .expected(format!("a column {}", names.join(" or ")))
+            .hint(format!("say where it stands, --map {name}={near}{hint}"));
+        self.header_fault(message)
+    }
+
+    /// The columns of the file, for a fault.
+    #[must_use]
+    pub fn listed(&self) -> String {
+        let names: Vec<&str> = self.headers().collect();
+        names.join(", ")
+    }
+}
+
+impl Located {
+    /// The signal of a quantity.
+    #[must_use]
+    pub fn signal(&self, quantity: &str) -> Option<&Signal> {
+        let found = self.signals.iter().find(|(name, _)| name == quantity);
+        found.map(|(_, signal)| signal)
+    }
+
+    /// A column that nobody asked for and that looks like time, and why it does.
+    #[must_use]
+    pub fn time_like(&self, sheet: &Sheet) -> Option<(usize, String)> {
+        let used: Vec<usize> = self.signals.iter().filter_map(|(_, signal)| signal.column()).collect();
+        time_like::find(sheet, &self.unused, &used)
+    }
+
+    /// What a reader of the file should know: repairs, columns that were not used apart from `expected` ones, and
+    /// entries of the map that were of no use.
+    #[must_use]
+    pub fn notes(&self, sheet: &Sheet, expected: &[&str]) -> Vec<String> {
+        let mut notes = sheet.repairs.clone();
+        let names = self.unused.iter().map(|index| sheet.columns()[*index].name.as_str());
+        let mut names: Vec<String> = names
+            .filter(|name| !expected.contains(name))
+            .map(|name| format!("`{name}`"))
+            .collect();
+        let s = if names.len() == 1 { "" } else { "s" };
+        if !names.is_empty() {
+            let more = names.len().saturating_sub(MOST_NAMED);
+            names.truncate(MOST_NAMED);
+            let and = if more > 0 {
+                format!(" and {more} more")
+            } else {
+                String::new()
+            };
+            notes.push(format!("column{s} not used: {}{and}", names.join(", ")));
+        }
+        for name in &self.unasked {
+            notes.push(format!("`{name}` of the column map is not used here"));
+        }
+        notes
+    }
+}
+
+#[cfg(test)]
+mod tests;

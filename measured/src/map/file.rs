@@ -1,0 +1,90 @@
+//! Maps as files in TOML.
+
+use std::path::Path;
+
+use toml_input::{Document, Fault, Faults, Table, Value};
+
+use super::{ColumnMap, DutyIs, Wish, quantity};
+
+impl ColumnMap {
+    /// Reads a map file:
+    ///
+    /// ```toml
+    /// phase = 0.5                 # sampling instant in the PWM period; left out: from the time column
+    /// duty = "commanded"          # or "applied", "direct"
+    /// settled = true              # rows are settled points; left out: if there is no time column
+    /// [columns]
+    /// v_out = "CH1 [V]"
+    /// duty = { name = "D", scale = 0.01, offset = 0.0 }
+    /// [constants]
+    /// r_load = 10.0
+    /// ```
+    ///
+    /// # Errors
+    /// A file that cannot be read, unknown keys, wrong types, a quantity that is mapped twice.
+    pub fn open(path: &Path) -> Result<Self, Faults> {
+        Document::open(path)?.read(|root, faults| {
+            let mut map = ColumnMap::default();
+            if let Some(value) = root.optional("phase") {
+                map.phase = value.number_within(0.0..=0.999_999, faults);
+            }
+            if let Some(value) = root.optional("duty") {
+                let choices = [
+                    ("commanded", DutyIs::Commanded),
+                    ("applied", DutyIs::Applied),
+                    ("direct", DutyIs::Direct),
+                ];
+                map.duty = value.choice(&choices, faults).unwrap_or_default();
+            }
+            if let Some(value) = root.optional("settled") {
+                map.settled = value.boolean(faults);
+            }
+            map.read_table(root, "columns", faults, column);
+            map.read_table(root, "constants", faults, |value, faults| {
+                value.number(faults).map(Wish::Constant)
+            });
+            Some(map)
+        })
+    }
+
+    /// The entries of a table whose keys are quantities.
+    fn read_table(
+        &mut self,
+        root: &mut Table<'_>,
+        title: &'static str,
+        faults: &mut Vec<Fault>,
+        read: impl Fn(&Value<'_>, &mut Vec<Fault>) -> Option<Wish>,
+    ) {
+        let entries = root
+            .optional(title)
+            .and_then(|table| table.pairs(faults))
+            .unwrap_or_default();
+        for (key, value) in entries {
+            let Some(wish) = read(&value, faults) else { continue };
+            let added = quantity(&key.value).and_then(|name| self.add(name, wish));
+            faults.extend(added.err().map(|message| value.document().fault(&key.span, message)));
+        }
+    }
+}
+
+fn column(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Wish> {
+    if let Some(name) = value.as_text() {
+        return Some(Wish::Column {
+            name: name.to_owned(),
+            scale: None,
+            offset: 0.0,
+        });
+    }
+    value.read_table("a column", faults, |table, faults| {
+        let name = table
+            .required("name", "the column's header", faults)
+            .and_then(|v| v.text(faults));
+        let scale = table.with_default("scale", None, faults, |v, faults| v.number(faults).map(Some));
+        let offset = table.with_default("offset", 0.0, faults, |v, faults| v.number(faults));
+        Some(Wish::Column {
+            name: name?.to_owned(),
+            scale,
+            offset,
+        })
+    })
+}

@@ -1,0 +1,52 @@
+//! Maps on the command line: `duty=duty_percent*0.01,v_in=24`.
+
+use toml_input::{Faults, Message};
+
+use super::{ColumnMap, Wish, quantity};
+
+impl ColumnMap {
+    /// Reads `quantity=column`, `quantity=column*factor` or `quantity=number`, several separated by commas.
+    ///
+    /// # Errors
+    /// If an entry is none of these, or a quantity is mapped twice.
+    pub fn parse(text: &str) -> Result<Self, Faults> {
+        let mut map = ColumnMap::default();
+        let mut faults = Vec::new();
+        for text in text.split(',').map(str::trim).filter(|text| !text.is_empty()) {
+            if let Err(message) = entry(text).and_then(|(name, wish)| map.add(name, wish)) {
+                faults.push(message.found(text).into());
+            }
+        }
+        Faults::unless_empty(faults).map(|()| map)
+    }
+}
+
+fn entry(text: &str) -> Result<(&'static str, Wish), Message> {
+    let form = || {
+        Message::new("the column map cannot be read")
+            .expected("quantity=column, quantity=column*factor or quantity=number")
+            .hint("for example --map duty=duty_percent*0.01,v_in=24; a file can say more: --columns MAP.toml")
+    };
+    let (name, value) = text.split_once('=').ok_or_else(form)?;
+    let (name, value) = (quantity(name.trim())?, value.trim());
+    if let Some(number) = finite(value) {
+        return Ok((name, Wish::Constant(number)));
+    }
+    let (column, scale) = match value.rsplit_once('*') {
+        None => (value, None),
+        Some((column, factor)) => (column.trim(), Some(finite(factor.trim()).ok_or_else(form)?)),
+    };
+    if column.is_empty() {
+        return Err(form());
+    }
+    let wish = Wish::Column {
+        name: column.to_owned(),
+        scale,
+        offset: 0.0,
+    };
+    Ok((name, wish))
+}
+
+fn finite(text: &str) -> Option<f64> {
+    text.parse::<f64>().ok().filter(|number| number.is_finite())
+}

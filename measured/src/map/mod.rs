@@ -1,0 +1,109 @@
+//! Where the quantities stand in a table that names them otherwise: `--map` on the command line, or a file in TOML.
+
+mod file;
+mod line;
+
+use toml_input::{Fault, Faults, Message, nearest};
+
+use crate::quantity::{Quantity, VOCABULARY};
+
+/// What the duty of a record is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum DutyIs {
+    /// Commanded; or applied, if the record's sampling chain is another one and the data say so.
+    #[default]
+    Unknown,
+    /// What the controller asked for.
+    Commanded,
+    /// What the modulator did: delays and rounding of the duty lie before it.
+    Applied,
+    /// The same, and the sensors show at once what is true: another measuring chain, or a simulator's.
+    Direct,
+}
+
+/// Which column of a table holds which quantity, or what it was throughout; and how the table was recorded.
+///
+/// What is not mapped is found by its name ([`VOCABULARY`]).
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ColumnMap {
+    entries: Vec<(&'static str, Wish)>,
+    /// Sampling instant as a fraction of the PWM period; from the time column if not given.
+    pub phase: Option<f64>,
+    /// What the duty column holds.
+    pub duty: DutyIs,
+    /// Rows are settled operating points (true) or steps in time (false); from the columns if not given.
+    pub settled: Option<bool>,
+}
+
+/// Where a quantity shall be taken from.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Wish {
+    Column {
+        name: String,
+        /// SI value over value in the file, where the user says so.
+        scale: Option<f64>,
+        /// Added after scaling.
+        offset: f64,
+    },
+    Constant(f64),
+}
+
+impl ColumnMap {
+    /// What is wished for a quantity.
+    pub(crate) fn wish(&self, quantity: &str) -> Option<&Wish> {
+        let found = self.entries.iter().find(|(name, _)| *name == quantity);
+        found.map(|(_, wish)| wish)
+    }
+
+    /// The quantities that are mapped.
+    pub(crate) fn mapped(&self) -> impl Iterator<Item = &'static str> {
+        self.entries.iter().map(|(name, _)| *name)
+    }
+
+    /// The value of a quantity that holds for the whole table.
+    #[must_use]
+    pub fn constant(&self, quantity: &str) -> Option<f64> {
+        match self.wish(quantity)? {
+            Wish::Constant(value) => Some(*value),
+            Wish::Column { .. } => None,
+        }
+    }
+
+    /// Adds the entries of another map, such as those of the command line to those of a file.
+    ///
+    /// # Errors
+    /// If both name a quantity.
+    pub fn and(mut self, other: ColumnMap) -> Result<Self, Faults> {
+        for (name, wish) in other.entries {
+            self.add(name, wish).map_err(Fault::from)?;
+        }
+        self.phase = other.phase.or(self.phase);
+        self.settled = other.settled.or(self.settled);
+        if other.duty != DutyIs::Unknown {
+            self.duty = other.duty;
+        }
+        Ok(self)
+    }
+
+    fn add(&mut self, name: &'static str, wish: Wish) -> Result<(), Message> {
+        if self.wish(name).is_some() {
+            return Err(Message::new(format!("`{name}` is mapped twice")).hint("a quantity stands in one place"));
+        }
+        self.entries.push((name, wish));
+        Ok(())
+    }
+}
+
+/// The name of the quantity that a map calls `text`.
+fn quantity(text: &str) -> Result<&'static str, Message> {
+    let known = || VOCABULARY.iter().flat_map(Quantity::names);
+    Quantity::find(text).map(|quantity| quantity.name).ok_or_else(|| {
+        let hint = nearest(text, known()).map(|name| format!("did you mean `{name}`?"));
+        let names: Vec<&str> = VOCABULARY.iter().map(|quantity| quantity.name).collect();
+        let message = Message::new(format!("no quantity `{text}`")).maybe_hint(hint);
+        message.expected(format!("one of {}", names.join(", ")))
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -31,7 +31,7 @@ impl Default for Effort {
 /// Half widths of the boxes around golden observations, relative to the width of the features' bounds.
 const RADII: [f64; 3] = [1e-2, 1e-3, 1e-4];
 
-/// A policy's numeric format against real arithmetic. `docs/certificate.md` defines every entry.
+/// A policy's numeric format against real arithmetic. `docs/reference/certificate.md` defines every entry.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Certificate {
     /// Name of the policy.

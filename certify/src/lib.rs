@@ -3,7 +3,7 @@
 //!
 //! *Real* is the network of the policy file in exact arithmetic. The bounds are affine forms (zonotopes) with outward
 //! rounding, carried beside each other for the real values and for the error of the format: [`form`](self), `network`,
-//! `propagate` in the source. How to read the result: `docs/certificate.md`.
+//! `propagate` in the source. How to read the result: `docs/reference/certificate.md`.
 //!
 //! ```no_run
 //! # let policy: policy::Policy = std::process::exit(0);

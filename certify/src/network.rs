@@ -1,7 +1,7 @@
 //! A policy's network twice: in real arithmetic, and what its numeric format makes of it.
 
-use policy::scales::{self, SLOPE_BITS, TANH_EXPONENT, power_of_two, round_half_up};
-use policy::{Activation, NumericFormat, Policy};
+use policy::scales::{self, SIGMOID_EXPONENT, SLOPE_BITS, power_of_two, round_half_up};
+use policy::{Activation, NumericFormat, Policy, Shape};
 
 use crate::form::{Form, Matrix};
 
@@ -9,9 +9,7 @@ use crate::form::{Form, Matrix};
 const UNIT_32: f64 = 1.0 / 16_777_216.0;
 /// More than the rounding errors of a layer in the subnormal range of binary32.
 const TINY_32: f64 = 1e-40;
-/// Error of the contract's tanh in binary32 (contract section 6).
-pub(crate) const TANH_ERROR: f64 = 4e-7;
-/// An observation becomes an integer by rounding half up; `trunc(fl(x + 32768.5)) - 32768` behind a tanh is at most this
+/// An observation becomes an integer by rounding half up; `trunc(fl(x + 32768.5)) - 32768` behind a sigmoid is at most this
 /// far from x: one half, and half of the last bit below 2^16.
 const TO_INTEGER: f64 = 0.5 + 1.0 / 512.0;
 
@@ -145,20 +143,20 @@ impl Layer {
         // the rounded sums are larger than the exact ones by their own errors: second order
         let before = UNIT_32 * rounded * (1.0 + 4.0 * UNIT_32 * inputs.len() as f64) * (1.0 + 1e-9) + TINY_32;
         let relative = 2.01 * UNIT_32;
-        match self.activation {
-            Activation::LeakyRelu { .. } => Rounding {
+        match self.activation.shape() {
+            Shape::Hinge { .. } if self.is_exact() => Rounding {
+                before,
+                ..Rounding::default()
+            },
+            Shape::Hinge { .. } => Rounding {
                 before,
                 after: TINY_32,
                 after_relative: relative,
             },
-            Activation::Tanh => Rounding {
+            Shape::Sigmoid(sigmoid) => Rounding {
                 before,
-                after: TANH_ERROR,
+                after: sigmoid.error_32,
                 after_relative: 0.0,
-            },
-            Activation::Relu | Activation::Identity => Rounding {
-                before,
-                ..Rounding::default()
             },
         }
     }
@@ -166,25 +164,30 @@ impl Layer {
     fn integer_rounding(&self, accumulator: i32, shift: u32, magnitude: f64) -> Rounding {
         let unit = power_of_two(shift.cast_signed() - accumulator);
         let cut = if shift == 0 { 0.0 } else { 0.5 * unit };
-        match self.activation {
-            Activation::Relu | Activation::Identity => Rounding {
+        match self.activation.shape() {
+            Shape::Hinge { .. } if self.is_exact() => Rounding {
                 before: cut,
                 ..Rounding::default()
             },
-            Activation::LeakyRelu { slope } => {
-                let held = scales::slope_integer(slope) as f64 * power_of_two(-SLOPE_BITS.cast_signed());
+            Shape::Hinge { below } => {
+                let held = scales::slope_integer(below) as f64 * power_of_two(-SLOPE_BITS.cast_signed());
                 Rounding {
                     before: cut,
                     after: 0.5 * unit,
-                    after_relative: (held - slope).abs().next_up(),
+                    after_relative: (held - below).abs().next_up(),
                 }
             }
-            Activation::Tanh => Rounding {
+            Shape::Sigmoid(sigmoid) => Rounding {
                 before: 1.01 * UNIT_32 * magnitude + TINY_32,
-                after: TO_INTEGER * power_of_two(-TANH_EXPONENT) + TANH_ERROR,
+                after: TO_INTEGER * power_of_two(-SIGMOID_EXPONENT) + sigmoid.error_32,
                 after_relative: 0.0,
             },
         }
+    }
+
+    /// Whether the activation itself rounds nothing: it keeps a value or clears it.
+    fn is_exact(&self) -> bool {
+        self.activation.is_identity() || self.activation.is_rectifier()
     }
 
     /// Real sums.

@@ -1,6 +1,6 @@
 //! Neurons whose ReLU does nothing over the clamped box of observations.
 
-use policy::{Activation, Interval, Policy};
+use policy::{Interval, Policy};
 
 use crate::{Certifier, Domain, propagate};
 
@@ -28,7 +28,7 @@ impl Certifier {
         let mut found = Vec::with_capacity(sums.len());
         for (index, (layer, sums)) in policy.layers.iter().zip(&sums).enumerate() {
             let mut neurons = Neurons::default();
-            if layer.activation == Activation::Relu && index < last {
+            if layer.activation.is_rectifier() && index < last {
                 for (output, sum) in sums.iter().enumerate() {
                     let row = &layer.weights[output * layer.inputs..][..layer.inputs];
                     let mut weights = row.iter().enumerate();

@@ -4,10 +4,11 @@
 //! for some slope l of a between x and x + e (mean value): where both lie on one side of a ReLU, l is known; elsewhere
 //! it lies in `[l0, l1]`, and `l e` is within `(l1 - l0) / 2 * max |e|` of `(l0 + l1) / 2 * e`.
 
-use policy::{Activation, Interval, rational_tanh};
+use policy::activation::Sigmoid;
+use policy::{Activation, Interval, Shape};
 
 use crate::form::{Form, Replacement};
-use crate::network::{Layer, Network, TANH_ERROR};
+use crate::network::{Layer, Network};
 
 /// Real Q values over a set of observations, and what the format adds.
 #[derive(Debug, Clone, PartialEq)]
@@ -139,11 +140,10 @@ fn layer(layer: &Layer, input: &Enclosure) -> (Enclosure, Vec<Interval>) {
 
 /// Line and radius around an activation over an interval.
 fn relaxed(activation: Activation, x: Interval) -> Replacement {
-    match activation {
-        Activation::Identity => Replacement::IDENTITY,
-        Activation::Relu => convex(x, 0.0),
-        Activation::LeakyRelu { slope } => convex(x, slope),
-        Activation::Tanh => tanh(x),
+    match activation.shape() {
+        Shape::Hinge { .. } if activation.is_identity() => Replacement::IDENTITY,
+        Shape::Hinge { below } => convex(x, below),
+        Shape::Sigmoid(sigmoid) => flattening(sigmoid, x),
     }
 }
 
@@ -165,15 +165,15 @@ fn convex(x: Interval, slope: f64) -> Replacement {
     }
 }
 
-/// tanh less a line with its least slope over the interval does not fall: the ends enclose it.
-fn tanh(x: Interval) -> Replacement {
-    let (low, high) = (rational_tanh(x.low), rational_tanh(x.high));
-    let factor = tanh_slopes(x).0;
+/// A sigmoid less a line with its least slope over the interval does not fall: the ends enclose it.
+fn flattening(sigmoid: &Sigmoid, x: Interval) -> Replacement {
+    let (low, high) = ((sigmoid.value)(x.low), (sigmoid.value)(x.high));
+    let factor = sigmoid.slopes(x).0;
     let (start, end) = (low - factor * x.low, high - factor * x.high);
     Replacement {
         factor,
         shift: 0.5 * (start + end),
-        radius: 0.5 * (end - start).abs() + 2.0 * TANH_NEAR + 1e-12 * (x.low.abs() + x.high.abs()),
+        radius: 0.5 * (end - start).abs() + 2.0 * sigmoid.near + 1e-12 * (x.low.abs() + x.high.abs()),
     }
 }
 
@@ -192,36 +192,24 @@ fn slopes(activation: Activation, x: Interval, y: Interval) -> (f64, f64) {
             (below, 1.0)
         }
     };
-    match activation {
-        Activation::Identity => (1.0, 1.0),
-        Activation::Relu => sides(0.0),
-        Activation::LeakyRelu { slope } => sides(slope),
-        Activation::Tanh => tanh_slopes(hull),
+    match activation.shape() {
+        Shape::Hinge { below } => sides(below),
+        Shape::Sigmoid(sigmoid) => sigmoid.slopes(hull),
     }
-}
-
-/// Distance of [`rational_tanh`] from tanh.
-const TANH_NEAR: f64 = TANH_ERROR + 1e-7;
-
-/// tanh' = 1 - tanh^2 falls with the magnitude.
-fn tanh_slopes(x: Interval) -> (f64, f64) {
-    let far = x.low.abs().max(x.high.abs());
-    let near = if x.low <= 0.0 && x.high >= 0.0 {
-        0.0
-    } else {
-        x.low.abs().min(x.high.abs())
-    };
-    let slope = |x: f64| {
-        let y = rational_tanh(x);
-        1.0 - y * y
-    };
-    let slack = 2.5 * TANH_NEAR;
-    ((slope(far) - slack).max(0.0), (slope(near) + slack).min(1.0))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// In real arithmetic.
+    fn real(activation: Activation, x: f64) -> f64 {
+        match activation.shape() {
+            Shape::Hinge { .. } if x > 0.0 => x,
+            Shape::Hinge { below } => below * x,
+            Shape::Sigmoid(sigmoid) => (sigmoid.real)(x),
+        }
+    }
 
     fn encloses(step: Replacement, x: f64, y: f64) -> bool {
         (y - step.factor * x - step.shift).abs() <= step.radius + 1e-15
@@ -240,20 +228,10 @@ mod tests {
             let interval = Interval { low, high };
             for n in 0..=1000 {
                 let x = low + (high - low) * f64::from(n) / 1000.0;
-                assert!(
-                    encloses(relaxed(Activation::Relu, interval), x, x.max(0.0)),
-                    "{interval:?} {x}"
-                );
-                let leaky = if x > 0.0 { x } else { 0.3 * x };
-                assert!(encloses(
-                    relaxed(Activation::LeakyRelu { slope: 0.3 }, interval),
-                    x,
-                    leaky
-                ));
-                assert!(
-                    encloses(relaxed(Activation::Tanh, interval), x, x.tanh()),
-                    "{interval:?} {x}"
-                );
+                for each in Activation::EACH {
+                    let step = relaxed(*each, interval);
+                    assert!(encloses(step, x, real(*each, x)), "{each:?} {interval:?} {x}");
+                }
             }
         }
     }
@@ -261,14 +239,9 @@ mod tests {
     #[test]
     fn slopes_enclose_difference_quotients() {
         let (x, y) = (Interval { low: -1.0, high: 0.5 }, Interval { low: -1.2, high: 0.9 });
-        for activation in [Activation::Relu, Activation::LeakyRelu { slope: 0.2 }, Activation::Tanh] {
-            let (low, high) = slopes(activation, x, y);
-            let a = |x: f64| match activation {
-                Activation::Tanh => x.tanh(),
-                Activation::LeakyRelu { slope } if x < 0.0 => slope * x,
-                Activation::Relu => x.max(0.0),
-                _ => x,
-            };
+        for activation in Activation::EACH {
+            let (low, high) = slopes(*activation, x, y);
+            let a = |x: f64| real(*activation, x);
             for (p, q) in [(-1.0, -1.2), (-0.3, 0.9), (0.5, 0.6), (0.1, -1.1)] {
                 let slope = (a(q) - a(p)) / (q - p);
                 assert!(low <= slope + 1e-12 && slope <= high + 1e-12, "{activation:?} {slope}");

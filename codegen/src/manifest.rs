@@ -6,9 +6,10 @@ use policy::{Digests, Policy};
 use serde::Serialize;
 use targets::TargetSpec;
 
+use crate::backend::kit::Material;
 use crate::crc::crc32_bytes;
-use crate::program::NetworkCode;
-use crate::{GeneratedFiles, Language, TOOL};
+use crate::files::{GeneratedFiles, TOOL};
+use crate::output::{Language, Output, languages, with_cores};
 
 /// File name of the manifest in the output folder.
 pub const FILE: &str = "manifest.json";
@@ -20,9 +21,9 @@ const COSTS: &str = ",\n  \"costs\": ";
 ///
 /// # Errors
 /// If the costs cannot be written as JSON.
-pub fn with_costs(text: &str, costs: &impl Serialize) -> Result<String, crate::CodegenError> {
+pub fn with_costs(text: &str, costs: &impl Serialize) -> Result<String, crate::files::CodegenError> {
     let costs =
-        serde_json::to_string_pretty(costs).map_err(|error| crate::CodegenError::Manifest(error.to_string()))?;
+        serde_json::to_string_pretty(costs).map_err(|error| crate::files::CodegenError::Manifest(error.to_string()))?;
     let body = text.trim_end().strip_suffix("\n}").unwrap_or_default();
     Ok(format!("{body}{COSTS}{}\n}}\n", costs.replace('\n', "\n  ")))
 }
@@ -47,7 +48,7 @@ pub struct Manifest {
     pub target: String,
     /// Generated languages.
     pub languages: Vec<Language>,
-    /// Doors beside the core, by name.
+    /// Outputs beside the cores, by name. The key is older than the word *integration*; folders that users keep have it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub doors: Vec<&'static str>,
     /// Control steps in the back-to-back kit, if there is one.
@@ -121,19 +122,24 @@ pub fn sizes(policy: &Policy, target: &TargetSpec) -> Sizes {
         macs: program.macs(),
         table_bytes: program.table_bytes(),
         state_bytes: 4 * program.state_words(),
-        accumulator_bound: match &program.network {
-            NetworkCode::Integer(network) => Some(network.accumulator_bound),
-            NetworkCode::Real { .. } => None,
-        },
+        accumulator_bound: program.network.integer().map(|code| code.accumulator_bound),
         removed_neurons: removed,
         q_error_bound: policy::scales::is_integer(policy.numeric_format)
             .then(|| certify::Certifier::new(policy).box_bound().largest),
     }
 }
 
-/// The manifest of a set of generated files.
+/// The manifest of the generated files of these outputs; `expected` is what the kit among them compares with.
 #[must_use]
-pub fn manifest(policy: &Policy, target: &TargetSpec, languages: &[Language], files: &GeneratedFiles) -> Manifest {
+pub fn manifest(
+    policy: &Policy,
+    target: &TargetSpec,
+    outputs: &[Output],
+    expected: Option<&Material>,
+    files: &GeneratedFiles,
+) -> Manifest {
+    let outputs = with_cores(outputs);
+    let languages = languages(&outputs);
     let flags = |language: &Language| match language {
         Language::C => ("c", target.c_flags.to_vec()),
         Language::Rust => ("rust", target.rust_flags.to_vec()),
@@ -142,13 +148,19 @@ pub fn manifest(policy: &Policy, target: &TargetSpec, languages: &[Language], fi
         generator: TOOL.to_owned(),
         name: policy.name.clone(),
         target: target.name.to_owned(),
-        languages: languages.to_vec(),
-        doors: Vec::new(),
-        kit_steps: None,
+        doors: outputs
+            .iter()
+            .filter(|output| !output.is_core())
+            .map(|output| output.name())
+            .collect(),
+        kit_steps: expected
+            .filter(|_| outputs.contains(&Output::Kit))
+            .map(|expected| expected.policy.steps()),
         numeric_format: policy.numeric_format,
         sample_period: policy.sample_period,
         digests: policy.digests.clone(),
         flags: languages.iter().map(flags).collect(),
+        languages,
         sizes: sizes(policy, target),
         files: files
             .files

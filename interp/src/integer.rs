@@ -3,10 +3,10 @@
 //! Computed in 64 bits: a sum that left 32 bits would differ from the generated code and be found.
 
 use ndarray::{Array1, Array2, ArrayView1};
-use policy::Policy;
-use policy::scales::{LayerScale, SLOPE_BITS, Scales, TANH_EXPONENT, power_of_two};
+use policy::scales::{LayerScale, Scales, power_of_two};
+use policy::{Activation, Policy};
 
-use crate::network::tanh;
+use crate::activation::integer;
 use crate::real::Real;
 use crate::trace::LayerTrace;
 
@@ -34,14 +34,6 @@ struct Layer {
     accumulators: Vec<i32>,
     shift: u32,
     exponents: Vec<i32>,
-}
-
-#[derive(Debug, Clone, Copy)]
-enum Activation {
-    Identity,
-    Relu,
-    LeakyRelu { slope: i64 },
-    Tanh,
 }
 
 impl Network {
@@ -95,12 +87,12 @@ impl Input {
 }
 
 /// Round half up.
-fn rounded(x: f64) -> i64 {
+pub(crate) fn rounded(x: f64) -> i64 {
     (x + 0.5).floor() as i64
 }
 
 /// `floor(x / 2^bits + 1/2)`.
-fn shifted(x: i64, bits: u32) -> i64 {
+pub(crate) fn shifted(x: i64, bits: u32) -> i64 {
     if bits == 0 {
         x
     } else {
@@ -118,14 +110,7 @@ impl Layer {
         Self {
             weights: Array2::from_shape_fn((layer.inputs, layer.outputs), weight),
             bias: layer.bias.iter().zip(&scale.accumulators).map(bias).collect(),
-            activation: match layer.activation {
-                policy::Activation::Identity => Activation::Identity,
-                policy::Activation::Relu => Activation::Relu,
-                policy::Activation::LeakyRelu { slope } => Activation::LeakyRelu {
-                    slope: rounded(slope * power_of_two(SLOPE_BITS.cast_signed())).min(32_767),
-                },
-                policy::Activation::Tanh => Activation::Tanh,
-            },
+            activation: layer.activation,
             accumulators: scale.accumulators.clone(),
             shift: scale.shift,
             exponents: scale.outputs.clone(),
@@ -139,28 +124,12 @@ impl Layer {
         }
         let activated = sums.iter().zip(&self.accumulators);
         let y: Array1<i64> = activated
-            .map(|(sum, exponent)| self.activate(*sum, *exponent))
+            .map(|(sum, exponent)| integer(self.activation, *sum, *exponent, self.shift))
             .collect();
         let value = |(x, exponent): (&i64, &i32)| T::nearest(*x as f64 * power_of_two(-exponent));
         trace.pre_activation = sums.iter().zip(&self.accumulators).map(value).collect();
         trace.post_activation = y.iter().zip(&self.exponents).map(value).collect();
         y
-    }
-
-    fn activate(&self, sum: i64, accumulator: i32) -> i64 {
-        match self.activation {
-            Activation::Identity => shifted(sum, self.shift),
-            Activation::Relu => shifted(sum, self.shift).max(0),
-            Activation::LeakyRelu { slope } => {
-                let y = shifted(sum, self.shift);
-                if y > 0 { y } else { shifted(y * slope, SLOPE_BITS) }
-            }
-            Activation::Tanh => {
-                let x = sum as f32 * (power_of_two(-accumulator) as f32);
-                let y = tanh(x) * (power_of_two(TANH_EXPONENT) as f32);
-                (y + 32_768.5).trunc() as i64 - 32_768
-            }
-        }
     }
 }
 

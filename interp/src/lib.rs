@@ -1,4 +1,4 @@
-//! Reference interpreter of a policy, written from `docs/numeric-contract.md` alone.
+//! Reference interpreter of a policy, written from `docs/reference/numeric-contract.md` alone.
 //!
 //! It is the oracle against which generated code is compared bit by bit, so it shares nothing with the code generator:
 //! no lowering, no templates. The modules follow the sections of the contract page:
@@ -23,6 +23,7 @@
 //! # Ok(()) }
 //! ```
 
+mod activation;
 pub mod controller;
 mod feature;
 mod filter;
@@ -36,8 +37,9 @@ pub mod state;
 pub mod status;
 mod trace;
 
+pub use activation::activate;
 pub use controller::Controller;
-pub use network::{argmax, tanh};
+pub use network::argmax;
 pub use real::Real;
 pub use sanitise::{InputError, Sample};
 pub use state::{Coefficients, State};

@@ -1,8 +1,9 @@
-//! Dense layers, activations, argmax (contract sections 6 and 7).
+//! Dense layers and argmax (contract sections 6 and 7).
 
 use ndarray::{Array1, Array2, ArrayView1};
 
-use crate::real::{Range, Real};
+use crate::activation::activate;
+use crate::real::Real;
 use crate::trace::LayerTrace;
 
 /// A dense layer in the format.
@@ -11,35 +12,19 @@ pub(crate) struct Layer<T> {
     /// `[inputs][outputs]`: transposed against the policy, so that outputs advance side by side.
     weights: Array2<T>,
     bias: Array1<T>,
-    activation: Activation<T>,
+    activation: policy::Activation,
     /// Products are added with one rounding (`f32-fma`).
     fused: bool,
 }
 
-#[derive(Debug, Clone, Copy)]
-enum Activation<T> {
-    Identity,
-    Relu,
-    LeakyRelu { slope: T },
-    Tanh,
-}
-
 impl<T: Real> Layer<T> {
     pub fn new(layer: &policy::Layer, fused: bool) -> Self {
-        let activation = match layer.activation {
-            policy::Activation::Identity => Activation::Identity,
-            policy::Activation::Relu => Activation::Relu,
-            policy::Activation::LeakyRelu { slope } => Activation::LeakyRelu {
-                slope: T::nearest(slope),
-            },
-            policy::Activation::Tanh => Activation::Tanh,
-        };
         Self {
             weights: Array2::from_shape_fn((layer.inputs, layer.outputs), |(i, o)| {
                 T::widen(layer.weights[o * layer.inputs + i])
             }),
             bias: layer.bias.iter().map(|&b| T::widen(b)).collect(),
-            activation,
+            activation: layer.activation,
             fused,
         }
     }
@@ -54,46 +39,8 @@ impl<T: Real> Layer<T> {
         let accumulate = if self.fused { T::accumulate_fused } else { T::accumulate };
         accumulate(self.weights.view(), input, trace.pre_activation.view_mut());
         trace.post_activation.assign(&trace.pre_activation);
-        let post = &mut trace.post_activation;
-        match self.activation {
-            Activation::Identity => {}
-            Activation::Relu => post.mapv_inplace(relu),
-            Activation::LeakyRelu { slope } => post.mapv_inplace(|x| leaky_relu(slope, x)),
-            Activation::Tanh => post.mapv_inplace(tanh),
-        }
+        activate(self.activation, trace.post_activation.iter_mut());
     }
-}
-
-fn relu<T: Real>(x: T) -> T {
-    if x > T::ZERO { x } else { T::ZERO }
-}
-
-fn leaky_relu<T: Real>(slope: T, x: T) -> T {
-    if x > T::ZERO { x } else { slope * x }
-}
-
-/// Coefficients n0..n4 of the numerator.
-const NUMERATOR: [f64; 5] = [0.9999999, 0.13373208, 0.0034865933, 2.0472007e-5, 1.3184444e-8];
-/// Coefficients d0..d4 of the denominator.
-const DENOMINATOR: [f64; 5] = [1.0, 0.46706504, 0.025842024, 0.00032714035, 7.702759e-7];
-
-/// The contract's rational approximation of tanh (section 6): in binary32 less than 4e-7 off for every finite x.
-pub fn tanh<T: Real>(x: T) -> T {
-    let clamp = |limit: f64| Range {
-        lo: T::nearest(-limit),
-        hi: T::nearest(limit),
-    };
-    let t = clamp(9.0).clamp(x);
-    let z = t * t;
-    let p = horner(NUMERATOR, z) * t;
-    let q = horner(DENOMINATOR, z);
-    clamp(1.0).clamp(p / q)
-}
-
-fn horner<T: Real>([c0, c1, c2, c3, c4]: [f64; 5], z: T) -> T {
-    [c3, c2, c1, c0]
-        .into_iter()
-        .fold(T::nearest(c4), |sum, c| sum * z + T::nearest(c))
 }
 
 /// Greedy action (section 7): the lowest index among the largest values; a NaN never wins.
@@ -209,23 +156,6 @@ mod tests {
     }
 
     #[test]
-    fn relu_gives_plus_zero_for_everything_not_positive() {
-        for x in [-0.0_f32, 0.0, -1.0, -f32::MIN_POSITIVE, f32::NAN, f32::NEG_INFINITY] {
-            assert_eq!(relu(x).to_bits(), 0, "{x}");
-        }
-        assert_eq!(relu(f32::from_bits(1)).to_bits(), 1);
-    }
-
-    #[test]
-    fn leaky_relu_keeps_the_sign_of_zero_and_scales_the_negative_side() {
-        let slope = 0.01_f32;
-        assert_eq!(leaky_relu(slope, 0.0).to_bits(), 0);
-        assert_eq!(leaky_relu(slope, -0.0).to_bits(), 1 << 31);
-        assert_eq!(leaky_relu(slope, -3.0), 0.01_f32 * -3.0);
-        assert_eq!(leaky_relu(slope, 3.0), 3.0);
-    }
-
-    #[test]
     fn activation_acts_on_the_sums_and_leaves_them_in_the_trace() {
         let layer = layer(4, 9, 5, policy::Activation::LeakyRelu { slope: 0.25 });
         let trace = run(&layer, &[1.0_f32, -2.0, 0.5, 3.0]);
@@ -233,37 +163,6 @@ mod tests {
         for (&pre, &post) in trace.pre_activation.iter().zip(&trace.post_activation) {
             assert_eq!(post, if pre > 0.0 { pre } else { 0.25 * pre });
         }
-    }
-
-    #[test]
-    fn tanh_is_within_4e_7_over_a_dense_sweep_of_bit_patterns() {
-        let mut worst = (0.0_f64, 0.0_f32);
-        let mut check = |x: f32| {
-            let error = (f64::from(tanh(x)) - f64::from(x).tanh()).abs();
-            if error > worst.0 {
-                worst = (error, x);
-            }
-        };
-        // every 97th pattern of [0, 10], both signs: about 23 million values less the tail
-        for bits in (0..=10.0_f32.to_bits()).step_by(97) {
-            check(f32::from_bits(bits));
-            check(-f32::from_bits(bits));
-        }
-        for x in [1e3, 1e10, f32::MAX, -1e3, f32::MIN, 9.0, 9.0_f32.next_up(), 8.999_999] {
-            check(x);
-        }
-        assert!(worst.0 < 4e-7, "error {} at {}", worst.0, worst.1);
-        assert!(worst.0 > 1e-8, "a bound that is never approached: {}", worst.0);
-    }
-
-    #[test]
-    fn tanh_is_odd_bounded_and_keeps_the_sign_of_zero() {
-        for x in [1e-45_f32, 1e-3, 0.3, 1.0, 4.0, 8.9, 9.0, 100.0, f32::MAX] {
-            assert_eq!(tanh(-x).to_bits(), (-tanh(x)).to_bits(), "{x}");
-            assert!(tanh(x) <= 1.0);
-        }
-        assert_eq!(tanh(0.0_f32).to_bits(), 0);
-        assert_eq!(tanh(-0.0_f32).to_bits(), 1 << 31);
     }
 
     #[test]

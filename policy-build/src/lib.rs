@@ -21,8 +21,7 @@ mod error;
 
 use std::path::{Path, PathBuf};
 
-use codegen::backend::rust::bindings::Bindings;
-use codegen::{Backend, GeneratedFiles, Language};
+use codegen::{GeneratedFiles, Output};
 use policy::Policy;
 use targets::TargetSpec;
 
@@ -104,21 +103,24 @@ impl Build {
     }
 
     fn rust_in(&self, surroundings: &Surroundings) -> Result<(), Error> {
-        let (policy, target) = self.checked(surroundings)?;
-        write(&codegen::compile(&policy, target, Language::Rust)?, &surroundings.out)
+        self.write(surroundings, Output::Rust).map(drop)
     }
 
     fn c_files_in(&self, surroundings: &Surroundings) -> Result<CFiles, Error> {
-        let (policy, target) = self.checked(surroundings)?;
-        let program = codegen::lower(&policy, target, Language::C);
-        write(&codegen::backend_for(Language::C)?.emit(&program)?, &surroundings.out)?;
-        write(&Bindings.emit(&program)?, &surroundings.out)?;
+        let (policy, target) = self.write(surroundings, Output::RustOverC)?;
         Ok(CFiles {
             source: surroundings.out.join(format!("{}.c", policy.name)),
             include: surroundings.out.clone(),
-            flags: program.provenance.c_flags,
+            flags: target.c_flags,
             name: policy.name,
         })
+    }
+
+    /// Writes the sources of one output; a build script has no use for a manifest.
+    fn write(&self, surroundings: &Surroundings, output: Output) -> Result<(Policy, &'static TargetSpec), Error> {
+        let (policy, target) = self.checked(surroundings)?;
+        write(&codegen::sources(&policy, target, &[output], None)?, &surroundings.out)?;
+        Ok((policy, target))
     }
 
     /// Policy and target; cargo is told what to look at.

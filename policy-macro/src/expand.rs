@@ -19,12 +19,24 @@ struct Call {
     path: LitStr,
 }
 
+/// What the call takes, said wherever it does not begin like that.
+const PATH: &str = "expected the path of a policy in quotes, as seen from the folder of Cargo.toml: \
+                    include_policy!(\"policy/policy.toml\")";
+const EQUALS: &str = "expected `=` between the name of the controller's type and the path: \
+                      include_policy!(Regulator = \"policy/policy.toml\")";
+const END: &str = "expected one path in quotes and nothing after it: include_policy!(\"policy/policy.toml\")";
+
 impl Parse for Call {
     fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
         let visibility = input.parse()?;
         let type_name = if input.peek(syn::Ident) {
             let name: Ident = input.parse()?;
-            input.parse::<Token![=]>()?;
+            if input.peek(LitStr) {
+                return Err(input.error(EQUALS));
+            }
+            // a name that no `=` follows is the path itself, without quotes
+            let equals = input.parse::<Token![=]>();
+            equals.map_err(|_| syn::Error::new(name.span(), PATH))?;
             if let Some(objection) = objection(&name.to_string()) {
                 return Err(syn::Error::new(name.span(), objection));
             }
@@ -32,8 +44,11 @@ impl Parse for Call {
         } else {
             None
         };
-        let path = input.parse()?;
+        let path = input.parse().map_err(|error| syn::Error::new(error.span(), PATH))?;
         input.parse::<Option<Token![,]>>()?;
+        if !input.is_empty() {
+            return Err(input.error(END));
+        }
         Ok(Self {
             visibility,
             type_name,
@@ -163,9 +178,9 @@ const STAND_IN_LENGTH: usize = 1024;
 fn stand_in(type_name: &Ident, fields: &TokenStream) -> TokenStream {
     let length = STAND_IN_LENGTH;
     let counts = ["SIGNALS", "FEATURES", "ACTIONS", "STATE_WORDS"].map(|name| Ident::new(name, Span::call_site()));
-    let bits = STATUS.iter().map(|(name, bit)| {
-        let name = Ident::new(name, Span::call_site());
-        quote!(pub const #name: u32 = 1 << #bit;)
+    let bits = STATUS.iter().map(|bit| {
+        let (name, number) = (Ident::new(bit.name, Span::call_site()), bit.number);
+        quote!(pub const #name: u32 = 1 << #number;)
     });
     quote! {
         #(pub const #counts: usize = #length;)*

@@ -4,8 +4,9 @@
 //! image of a box under one rounded operation is therefore enclosed by the rounded operation at its corners: the
 //! ends are computed in binary32 itself and need no slack. Only filters with feedback need an argument of their own.
 
+use crate::activation::{Activation, Shape};
 use crate::limits::MAX_MAGNITUDE;
-use crate::model::{Action, Activation, Expr, Fallback, Filter, Input, Interval, Limits, Signal};
+use crate::model::{Action, Expr, Fallback, Filter, Input, Interval, Limits, Signal};
 use crate::rounding::{inward_f32, nearest_f32};
 
 /// Closed interval of binary32 values.
@@ -258,49 +259,22 @@ pub(crate) fn layer(
 }
 
 fn activated(x: Interval, activation: Activation) -> Interval {
-    match activation {
-        Activation::Identity => x,
-        Activation::Relu => Interval {
-            low: x.low.max(0.0),
-            high: x.high.max(0.0),
-        },
-        Activation::LeakyRelu { slope } => {
-            let one = |x: f64, sign: f64| {
-                let y = slope * x;
-                if x > 0.0 {
-                    x
-                } else {
-                    y + sign * (4.0 * UNIT * y.abs() + TINY)
-                }
-            };
-            Interval {
-                low: one(x.low, -1.0),
-                high: one(x.high, 1.0),
-            }
+    let below = match activation.shape() {
+        Shape::Hinge { below } => below,
+        Shape::Sigmoid(sigmoid) => return sigmoid.image(x),
+    };
+    let one = |x: f64, sign: f64| {
+        let y = below * x;
+        if x > 0.0 || activation.is_identity() {
+            x
+        } else if activation.is_rectifier() {
+            0.0
+        } else {
+            y + sign * (4.0 * UNIT * y.abs() + TINY)
         }
-        Activation::Tanh => {
-            let (low, high) = (rational_tanh(x.low) - 1e-6, rational_tanh(x.high) + 1e-6);
-            Interval {
-                low: low.max(-1.0),
-                high: high.min(1.0),
-            }
-        }
+    };
+    Interval {
+        low: one(x.low, -1.0),
+        high: one(x.high, 1.0),
     }
-}
-
-/// The contract's tanh in binary64: within 4e-7 of tanh and, unlike a libm's, the same on every machine.
-#[must_use]
-pub fn rational_tanh(x: f64) -> f64 {
-    const N: [f64; 5] = [
-        1.318_444_4e-8,
-        2.047_200_7e-5,
-        0.003_486_593_3,
-        0.133_732_08,
-        0.999_999_9,
-    ];
-    const D: [f64; 5] = [7.702_759e-7, 0.000_327_140_35, 0.025_842_024, 0.467_065_04, 1.0];
-    let t = x.clamp(-9.0, 9.0);
-    let z = t * t;
-    let horner = |c: [f64; 5]| c.iter().fold(0.0, |sum, c| sum * z + c);
-    (t * horner(N) / horner(D)).clamp(-1.0, 1.0)
 }

@@ -9,9 +9,9 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
+use crate::activation::Activation;
 use crate::model::{
-    Action, Activation, Digests, Expr, Fallback, Feature, Filter, Interval, Layer, Limits, Mapping, NumericFormat,
-    Policy, Signal,
+    Action, Digests, Expr, Fallback, Feature, Filter, Interval, Layer, Limits, Mapping, NumericFormat, Policy, Signal,
 };
 
 #[derive(Serialize)]

@@ -10,6 +10,7 @@
 
 use std::path::Path;
 
+pub mod activation;
 mod bounds;
 mod catalogue;
 mod check;
@@ -28,7 +29,7 @@ mod scaffold;
 pub mod scales;
 mod weights;
 
-pub use bounds::rational_tanh;
+pub use activation::{Activation, Shape};
 pub use check::check;
 pub use digests::sha256;
 pub use faults::Faults;

@@ -1,12 +1,14 @@
 //! The checked policy: what holds from here on needs no second check.
 //!
 //! A [`Policy`] comes from [`crate::check`] only. All numbers are binary64 as written in the contract; each stage
-//! that needs another format rounds once, as `docs/numeric-contract.md` says.
+//! that needs another format rounds once, as `docs/reference/numeric-contract.md` says.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use serde::Serialize;
+
+use crate::activation::Activation;
 
 /// Closed interval `[low, high]`, `low <= high`, both finite.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -17,7 +19,7 @@ pub struct Interval {
     pub high: f64,
 }
 
-/// Number format in which the whole controller computes (`docs/numeric-contract.md`).
+/// Number format in which the whole controller computes (`docs/reference/numeric-contract.md`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NumericFormat {
@@ -81,7 +83,7 @@ impl NumericFormat {
     }
 }
 
-/// Floating-point format of the numbers around the network (`docs/numeric-contract.md`); how it rounds is in
+/// Floating-point format of the numbers around the network (`docs/reference/numeric-contract.md`); how it rounds is in
 /// [`crate::rounding`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -274,23 +276,6 @@ pub struct Layer {
     pub activation: Activation,
     /// Sound bound of each output (after the activation) over the observation box, f32 rounding included.
     pub bounds: Vec<Interval>,
-}
-
-/// Activation behind a layer (contract section 6).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Activation {
-    /// None.
-    Identity,
-    /// max(x, 0).
-    Relu,
-    /// x or slope * x.
-    LeakyRelu {
-        /// Slope for x < 0, 0 < slope < 1.
-        slope: f64,
-    },
-    /// Rational approximation without libm, |error| < 4e-7.
-    Tanh,
 }
 
 /// One discrete action.

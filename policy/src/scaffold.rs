@@ -2,23 +2,26 @@
 //! weights do not say it and a guess would go unnoticed.
 
 use std::fmt::Write;
-use std::path::Path;
+use std::path::{Component, Path, PathBuf};
 
-use toml_input::{Fault, FileName};
+use toml_input::{Fault, FileName, Message};
 
+use crate::activation::Activation;
 use crate::faults::Faults;
 use crate::limits::MAX_WEIGHT_BYTES;
 use crate::raw::Binary;
 use crate::weights::{Outline, outline};
 
-/// Text of a commented `policy.toml` for the network in `weights`, to be written beside it.
+/// Text of a commented contract for the network in `weights`, to be written to `contract`, whose folder need not exist
+/// yet; nothing is written here.
 ///
 /// Numbers of features and duties follow from the network. Every value that the weights do not tell is the text
 /// `"TODO"`, which [`crate::check`] refuses by name.
 ///
 /// # Errors
-/// If the file is not a sound safetensors file or holds no single chain of dense layers.
-pub fn new_contract(weights: &Path) -> Result<String, Faults> {
+/// If the file is not a sound safetensors file or holds no single chain of dense layers, or a contract cannot hold its
+/// path.
+pub fn new_contract(weights: &Path, contract: &Path) -> Result<String, Faults> {
     let name = FileName::new(weights);
     let mut faults: Vec<Fault> = Vec::new();
     let outline = name
@@ -34,9 +37,10 @@ pub fn new_contract(weights: &Path) -> Result<String, Faults> {
                 &mut faults,
             )
         });
-    match outline {
-        Some(outline) => Ok(text(weights, &outline)),
-        None => Err(Faults {
+    let seen = seen_from(contract, weights).map_err(|message| faults.push(name.fault(message)));
+    match (outline, seen) {
+        (Some(outline), Ok(seen)) => Ok(text(&seen, &outline)),
+        _ => Err(Faults {
             list: faults,
             files: vec![name.path],
             name: None,
@@ -45,12 +49,56 @@ pub fn new_contract(weights: &Path) -> Result<String, Faults> {
     }
 }
 
-fn text(weights: &Path, outline: &Outline) -> String {
-    let file = weights
-        .file_name()
-        .map(|name| name.to_string_lossy().into_owned())
-        .unwrap_or_default();
-    let file = toml::Value::String(file).to_string();
+/// How a contract names a file: from the contract's folder, with `/` on every system; the whole path where there is no
+/// way from one to the other.
+fn seen_from(contract: &Path, file: &Path) -> Result<String, Message> {
+    // `.` also where the path is a name alone, whose parent is empty
+    let folder = |path: &Path| Path::new(".").join(path.parent().unwrap_or(Path::new("")));
+    // the file itself may be a link: its name counts, not what it leads to
+    let (to, from) = (resolved(&folder(file)), resolved(&folder(contract)));
+    let (Some(to), Some(from), Some(name)) = (to, from, file.file_name()) else {
+        return Err(Message::new("the way from the contract to this file cannot be told"));
+    };
+    let shared = to
+        .components()
+        .zip(from.components())
+        .take_while(|(a, b)| a == b)
+        .count();
+    let path: PathBuf = if shared == 0 {
+        to
+    } else {
+        let up = from.components().skip(shared).map(|_| Component::ParentDir);
+        up.chain(to.components().skip(shared)).collect()
+    };
+    let path = path.join(name);
+    let Some(text) = path.to_str() else {
+        return Err(Message::new("a contract cannot hold this path")
+            .found(path.to_string_lossy())
+            .expected("a path in UTF-8, as TOML is")
+            .hint("rename the file or its folders"));
+    };
+    Ok(text.replace(std::path::MAIN_SEPARATOR, "/"))
+}
+
+/// A folder without links and `..`, as far as it exists; the rest of the path, which is still to be made, by its text.
+fn resolved(folder: &Path) -> Option<PathBuf> {
+    let absolute = std::path::absolute(folder).ok()?;
+    let parts: Vec<Component<'_>> = absolute.components().collect();
+    let existing = |count: usize| parts[..count].iter().collect::<PathBuf>().canonicalize().ok();
+    let (count, real) = (1..=parts.len())
+        .rev()
+        .find_map(|count| Some((count, existing(count)?)))?;
+    Some(parts[count..].iter().fold(real, |mut path, part| {
+        match part {
+            Component::ParentDir => drop(path.pop()),
+            part => path.push(part),
+        }
+        path
+    }))
+}
+
+fn text(weights: &str, outline: &Outline) -> String {
+    let file = toml::Value::String(weights.to_owned()).to_string();
     let Outline {
         inputs,
         outputs,
@@ -77,7 +125,8 @@ fn text(weights: &Path, outline: &Outline) -> String {
         }
     }
     if outline.hidden {
-        text += "hidden_activation = \"TODO\"   # \"relu\", \"tanh\", \"identity\" or { leaky_relu = 0.01 }\n";
+        let written: Vec<String> = Activation::EACH.iter().map(|each| each.written()).collect();
+        let _ = writeln!(text, "hidden_activation = \"TODO\"   # {}", written.join(", "));
     }
     if !outline.bias {
         text += "bias = false                 # the file holds none\n";

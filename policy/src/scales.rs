@@ -7,10 +7,11 @@
 
 mod rows;
 
-use crate::model::{Activation, Layer, NumericFormat, Policy};
+use crate::activation::{Activation, Shape};
+use crate::model::{Layer, NumericFormat, Policy};
 
-/// Fractional bits of an activation behind a tanh: 1.0 is 2^14.
-pub const TANH_EXPONENT: i32 = 14;
+/// Fractional bits of what is within +-1 behind a sigmoid: 1.0 is 2^14.
+pub const SIGMOID_EXPONENT: i32 = 14;
 /// Fractional bits of the slope of a leaky ReLU.
 pub const SLOPE_BITS: u32 = 15;
 /// Largest magnitude of an activation.
@@ -38,7 +39,7 @@ pub struct LayerScale {
     pub inputs: Vec<i32>,
     /// Exponent of each accumulator: integer / 2^exponent is the sum.
     pub accumulators: Vec<i32>,
-    /// Bits that are rounded off the accumulators; not used behind a tanh.
+    /// Bits that are rounded off the accumulators; 0 in front of a sigmoid, which takes the whole sum.
     pub shift: u32,
     /// Exponent of each output: integer / 2^exponent is the activation. The same for all outputs of the last layer.
     pub outputs: Vec<i32>,
@@ -143,9 +144,9 @@ fn layer(
 ) -> LayerScale {
     let scale = |accumulator: i32, shift: u32, bound: (i64, i64), ranges: Vec<(i64, i64)>| {
         let accumulators: Vec<i32> = rows.iter().map(|row| accumulator + row).collect();
-        let output = |exponent: &i32| match layer.activation {
-            Activation::Tanh => TANH_EXPONENT,
-            _ => exponent - shift.cast_signed(),
+        let output = |exponent: &i32| match layer.activation.shape() {
+            Shape::Sigmoid(_) => SIGMOID_EXPONENT,
+            Shape::Hinge { .. } => exponent - shift.cast_signed(),
         };
         LayerScale {
             inputs: inputs.to_vec(),
@@ -230,13 +231,13 @@ pub fn half(shift: u32) -> i64 {
 }
 
 fn shift(sums: &[Sum], activation: Activation, limit: i64) -> u32 {
-    if activation == Activation::Tanh {
+    if activation.limit().is_some() {
         return 0;
     }
     let fits = |shift: &u32| {
         let rounded = |x: i64| (x + half(*shift)) >> shift;
         sums.iter().all(|sum| {
-            let low_fits = activation == Activation::Relu || rounded(sum.range.0) >= -limit;
+            let low_fits = activation.is_rectifier() || rounded(sum.range.0) >= -limit;
             low_fits && rounded(sum.range.1) <= limit
         })
     };
@@ -246,15 +247,15 @@ fn shift(sums: &[Sum], activation: Activation, limit: i64) -> u32 {
 fn activated(activation: Activation, sum: Sum, shift: u32) -> (i64, i64) {
     let rounded = |x: i64| (x + half(shift)) >> shift;
     let (low, high) = (rounded(sum.range.0), rounded(sum.range.1));
-    match activation {
-        Activation::Identity => (low, high),
-        Activation::Relu => (low.max(0), high.max(0)),
-        Activation::LeakyRelu { slope } => {
-            let slope = slope_integer(slope);
+    match activation.shape() {
+        Shape::Sigmoid(_) => (-(1 << SIGMOID_EXPONENT), 1 << SIGMOID_EXPONENT),
+        Shape::Hinge { .. } if activation.is_identity() => (low, high),
+        // 0 for a rectifier, whose slope is 0 as an integer, too
+        Shape::Hinge { below } => {
+            let slope = slope_integer(below);
             let one = |x: i64| if x > 0 { x } else { leaky(x, slope) };
             (one(low), one(high))
         }
-        Activation::Tanh => (-(1 << TANH_EXPONENT), 1 << TANH_EXPONENT),
     }
 }
 

@@ -181,7 +181,8 @@ fn activations_are_never_guessed() {
         "¦\"ReLU\"",
         &["hidden_activation", "did you mean \"relu\"?"],
     );
-    contract_fault("\"relu\"", "¦\"sigmoid\"", &["\"sigmoid\"", "relu, tanh, identity"]);
+    let words: Vec<&str> = policy::Activation::plain().map(policy::Activation::word).collect();
+    contract_fault("\"relu\"", "¦\"sigmoid\"", &["\"sigmoid\"", &words.join(", ")]);
     contract_fault("\"relu\"", "¦[\"relu\", \"relu\"]", &["2", "1, one per hidden layer"]);
     contract_fault("\"relu\"", "{ leaky_relu = ¦1.0 }", &["less than 1"]);
     contract_fault("\"relu\"", "¦\"leaky_relu\"", &["{ leaky_relu = 0.01 }"]);

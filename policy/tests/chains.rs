@@ -139,7 +139,7 @@ fn numbered_layers_come_before_the_head_where_shapes_allow_a_rotation() {
     let tensors = all(&[("fc1", 8, 4), ("fc2", 8, 8), ("out", 4, 8)]);
     let folder = Folder::new().tensors(&tensors);
     let weights = folder.path().join("weights.safetensors");
-    let text = policy::new_contract(&weights).unwrap();
+    let text = scaffold(&weights).unwrap();
     assert!(text.contains("first to last: fc1 > fc2 > out"), "{text}");
 }
 

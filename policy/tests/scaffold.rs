@@ -31,7 +31,7 @@ fn the_buck12_example_loads_without_complaint() {
 
 #[test]
 fn a_new_contract_has_the_right_counts_and_todo_for_the_rest() {
-    let text = policy::new_contract(&example().join("weights.safetensors")).unwrap_or_else(|faults| panic!("{faults}"));
+    let text = scaffold(&example().join("weights.safetensors")).unwrap_or_else(|faults| panic!("{faults}"));
     assert_eq!(text.matches("[[feature]]\nname").count(), 6, "{text}");
     assert_eq!(text.matches("# action ").count(), 12);
     assert!(text.contains("weights = \"weights.safetensors\""));
@@ -41,7 +41,7 @@ fn a_new_contract_has_the_right_counts_and_todo_for_the_rest() {
 #[test]
 fn every_placeholder_of_a_new_contract_is_a_fault_by_name() {
     let folder = Folder::new();
-    let text = policy::new_contract(&folder.path().join("weights.safetensors")).unwrap();
+    let text = scaffold(&folder.path().join("weights.safetensors")).unwrap();
     let faults = folder.contract(&text).faults();
     let todo = text
         .lines()
@@ -57,7 +57,7 @@ fn every_placeholder_of_a_new_contract_is_a_fault_by_name() {
 #[test]
 fn a_filled_in_contract_is_accepted() {
     let folder = Folder::new();
-    let text = policy::new_contract(&folder.path().join("weights.safetensors")).unwrap();
+    let text = scaffold(&folder.path().join("weights.safetensors")).unwrap();
     let filled = text
         .replacen("name = \"TODO\"", "name = \"buck\"", 1)
         .replacen("name = \"TODO\"", "name = \"v_out\"", 1)
@@ -83,22 +83,22 @@ fn a_new_contract_of_an_ambiguous_file_asks_for_the_prefix() {
     ]
     .concat();
     let folder = Folder::new().tensors(&tensors);
-    let text = policy::new_contract(&folder.path().join("weights.safetensors")).unwrap();
+    let text = scaffold(&folder.path().join("weights.safetensors")).unwrap();
     assert!(
         text.contains("#   a.0 > a.1\n#   b.0 > b.1\nprefix = \"TODO\"\n"),
         "{text}"
     );
     let folder = folder.tensors(&[dense("a.0", 4, 2), dense("b.0", 4, 3)].concat());
-    let faults = policy::new_contract(&folder.path().join("weights.safetensors")).unwrap_err();
+    let faults = scaffold(&folder.path().join("weights.safetensors")).unwrap_err();
     assert_says(&faults.list[0], &["more than one chain"]);
 }
 
 #[test]
 fn a_new_contract_needs_a_sound_file() {
     let folder = Folder::new();
-    let faults = policy::new_contract(&folder.path().join("none.safetensors")).unwrap_err();
+    let faults = scaffold(&folder.path().join("none.safetensors")).unwrap_err();
     assert_says(&faults.list[0], &["cannot find the file"]);
-    let text = policy::new_contract(&folder.path().join("policy.toml")).unwrap_err();
+    let text = scaffold(&folder.path().join("policy.toml")).unwrap_err();
     assert_says(&text.list[0], &["not a sound safetensors file"]);
 }
 

@@ -1,7 +1,7 @@
 //! What differs between deployment targets, as data.
 //!
 //! One entry of [`TARGETS`] per target; the compiler and the verifier read it, nothing else knows a target by name.
-//! How to add one: `docs/targets.md`.
+//! How to add one: `docs/reference/targets.md`.
 
 mod arm;
 pub mod boards;

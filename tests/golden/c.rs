@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 
-use codegen::Language;
+use codegen::Output;
 use targets::{RowBlock, TargetSpec};
 use tests::fixture::generate;
 use tests::tools::{run, run_silently};
@@ -138,7 +138,7 @@ fn the_block_form_of_a_layer_is_clean_and_computes_the_same_bits() {
         ..host().clone()
     };
     let case = cases().iter().find(|case| case.name == "tail_blocks").unwrap();
-    let files = generate(&case.policy, &block_form, &[Language::C]).unwrap();
+    let files = generate(&case.policy, &block_form, &[Output::C]).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let source = write(&files, folder.path());
     assert_ne!(files[&source], case.files[&source]);

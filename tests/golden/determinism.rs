@@ -15,7 +15,7 @@ const USER: &str = "wombat-4417";
 fn compile(policy: &Path, out: &Path, place: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut command = Command::new(policyc());
     command
-        .args(["compile", "--lang", "rust,c", "--out"])
+        .args(["compile", "--emit", "rust,c", "--out"])
         .arg(out)
         .arg(policy);
     command

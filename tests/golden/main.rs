@@ -11,8 +11,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use codegen::Language;
-use policy::Policy;
+use codegen::Output;
+use policy::{Activation, Policy};
 use targets::TargetSpec;
 use tests::fixture::{Recipe, generate};
 use tests::tools::{bless, listing};
@@ -41,7 +41,7 @@ fn case(folder: &Path) -> Case {
     Case {
         name: folder.file_name().unwrap().to_string_lossy().into_owned(),
         folder: folder.to_owned(),
-        files: generate(&policy, host(), &Language::ALL).unwrap(),
+        files: generate(&policy, host(), &Output::CORES).unwrap(),
         policy,
     }
 }
@@ -114,6 +114,45 @@ fn every_case_yields_its_golden_files() {
     assert!(differing.is_empty(), "{}\n{HINT}", differing.join("\n"));
 }
 
+/// `(name, meaning)` of each status bit of a C header.
+fn bits_of_header(header: &str) -> Vec<(String, String)> {
+    let defines = header.lines().filter_map(|line| line.strip_prefix("#define "));
+    let bits = defines.filter_map(|define| define.split_once("_STATUS_"));
+    bits.map(|(_, rest)| {
+        let (name, meaning) = (rest.split(' ').next().unwrap(), rest.split_once("/* "));
+        let meaning = meaning.map_or("", |(_, comment)| comment.trim_end_matches(" */"));
+        (name.to_owned(), meaning.to_owned())
+    })
+    .collect()
+}
+
+/// `(name, meaning)` of each status bit of a Rust file.
+fn bits_of_module(text: &str) -> Vec<(String, String)> {
+    let module = text
+        .split("pub mod status {")
+        .nth(1)
+        .unwrap()
+        .split('}')
+        .next()
+        .unwrap();
+    let lines: Vec<&str> = module.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
+    let bit = |pair: &[&str]| {
+        let name = pair[1].trim_start_matches("pub const ").split(':').next().unwrap();
+        (name.to_owned(), pair[0].trim_start_matches("/// ").to_owned())
+    };
+    lines.chunks(2).map(bit).collect()
+}
+
+#[test]
+fn every_status_bit_says_what_it_means_in_c_as_in_rust() {
+    for case in cases() {
+        let bits = bits_of_header(&case.files[&format!("{}.h", case.name)]);
+        assert_eq!(bits.len(), 8, "{}", case.name);
+        assert!(bits.iter().all(|(_, meaning)| meaning.ends_with('.')), "{bits:?}");
+        assert_eq!(bits, bits_of_module(&case.files[&format!("{}.rs", case.name)]));
+    }
+}
+
 /// The example's code is long: its golden file is the manifest, which holds length and checksum of each file.
 #[test]
 fn the_example_yields_its_golden_manifest() {
@@ -123,18 +162,16 @@ fn the_example_yields_its_golden_manifest() {
     assert!(differing.is_empty(), "{}\n{HINT}", differing.join("\n"));
 }
 
-/// Files of the doors for a case without mapping and one with ADC codes and the four-term mapping; of the kit, which is
+/// Files of the integrations for a case without mapping and one with ADC codes and the four-term mapping; of the kit, which is
 /// long, the entry in the manifest.
 #[test]
-fn the_doors_yield_their_golden_files() {
+fn the_integrations_yield_their_golden_files() {
     for name in ["minimal", "adc_mapping"] {
         let case = cases().iter().find(|case| case.name == name).unwrap();
-        let selection = verify::Selection {
-            doors: codegen::Door::ALL.to_vec(),
-            kit_steps: 20,
-            ..verify::Selection::core(&[Language::C])
-        };
-        let mut files = verify::doors::generate(&case.policy, host(), &selection).unwrap();
+        let integrations: Vec<Output> = Output::ALL.iter().copied().filter(|output| !output.is_core()).collect();
+        let expected = verify::kit::expected(&case.policy, host(), &integrations, 20).unwrap();
+        let generated = codegen::generate(&case.policy, host(), &integrations, expected.as_ref());
+        let mut files = generated.unwrap().files;
         files.retain(|file, _| !case.files.contains_key(file) || file == "manifest.json");
         files.remove(&format!("{name}_kit.c")).unwrap();
         if name == "minimal" {
@@ -143,7 +180,7 @@ fn the_doors_yield_their_golden_files() {
                 files.remove(&format!("{name}_{shell}")).unwrap();
             }
         }
-        let differing = differences(&tests::root().join("tests/golden/doors").join(name), &files);
+        let differing = differences(&tests::root().join("tests/golden/integrations").join(name), &files);
         assert!(differing.is_empty(), "{}\n{HINT}", differing.join("\n"));
     }
 }
@@ -169,10 +206,6 @@ fn together_the_cases_hold_every_part_of_a_contract() {
         "FilteredDerivative {",
         "MovingAverage {",
         "Integrator {",
-        "Relu",
-        "LeakyRelu {",
-        "Tanh",
-        "Identity",
         "pair: Some(",
         "adc: Some(",
         "adc: None",
@@ -191,6 +224,14 @@ fn together_the_cases_hold_every_part_of_a_contract() {
     ];
     let missing: Vec<_> = parts.iter().filter(|part| !shown.contains(**part)).collect();
     assert!(missing.is_empty(), "{missing:?}\n{shown}");
+    let has = |activation: &Activation| {
+        let layers = cases().iter().flat_map(|case| &case.policy.layers);
+        layers
+            .map(|layer| layer.activation.word())
+            .any(|word| word == activation.word())
+    };
+    let missing: Vec<_> = Activation::EACH.iter().filter(|each| !has(each)).collect();
+    assert!(missing.is_empty(), "no case has the activations {missing:?}");
     assert!(cases().iter().any(|case| case.policy.layers.len() == 1));
     let last = |case: &Case| case.policy.actions.len();
     assert!(cases().iter().any(|case| last(case) > 16 && last(case) % 16 != 0));

@@ -9,7 +9,7 @@
 //!
 //! Observations come from [`interp`] running the contract's own features; the network is the only thing of the
 //! controller that a training has for itself. Nothing here writes files (a contract is checked in a temporary folder).
-//! docs/train.md describes the training file.
+//! docs/reference/training-file.md describes the training file.
 
 mod checkpoint;
 pub mod contract;

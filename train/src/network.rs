@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use ndarray::linalg::general_mat_mul;
 use ndarray::{ArrayView2, ArrayViewMut2};
-use policy::Activation;
+use policy::{Activation, Shape};
 
 use crate::rng::Rng;
 
@@ -149,7 +149,7 @@ impl Network {
             let weights = view(&self.parameters[layer.weights.clone()], layer.inputs, layer.outputs);
             let mut sums = view_mut(output, rows, layer.outputs);
             general_mat_mul(1.0, &view(input, rows, layer.inputs), &weights, 1.0, &mut sums);
-            activate(layer.activation, output);
+            interp::activate(layer.activation, output.iter_mut());
         }
     }
 
@@ -225,7 +225,7 @@ impl Network {
         view_mut(&mut buffers.gradient[layer.weights.clone()], width, layer.outputs).assign(&turned.t());
     }
 
-    /// Q values of one observation in the order of `docs/numeric-contract.md`, section 6 (from the bias, inputs in
+    /// Q values of one observation in the order of `docs/reference/numeric-contract.md`, section 6 (from the bias, inputs in
     /// order, nothing contracted): the bits of the compiled policy. `scratch` grows once to the widest layer.
     pub fn q_values(&self, observation: &[f32], scratch: &mut [Vec<f32>; 2]) {
         let [x, y] = scratch;
@@ -240,7 +240,7 @@ impl Network {
                     *sum += w * x;
                 }
             }
-            activate(layer.activation, y);
+            interp::activate(layer.activation, y.iter_mut());
             std::mem::swap(x, y);
         }
     }
@@ -284,35 +284,16 @@ fn view_mut(values: &mut [f32], rows: usize, columns: usize) -> ArrayViewMut2<'_
     }
 }
 
-/// Contract section 6, in place.
-fn activate(activation: Activation, values: &mut [f32]) {
-    match activation {
-        Activation::Identity => {}
-        Activation::Relu => {
-            for x in values {
-                *x = if *x > 0.0 { *x } else { 0.0 };
-            }
-        }
-        Activation::LeakyRelu { slope } => {
-            for x in values {
-                *x = if *x > 0.0 { *x } else { slope as f32 * *x };
-            }
-        }
-        Activation::Tanh => {
-            for x in values {
-                *x = interp::tanh(*x);
-            }
-        }
-    }
-}
-
 /// Multiplies `delta` by the derivative of the activation, taken from its value.
 fn derive(activation: Activation, values: &[f32], delta: &mut [f32]) {
     let pairs = delta.iter_mut().zip(values);
-    match activation {
-        Activation::Identity => {}
-        Activation::Relu => pairs.for_each(|(d, &y)| *d = if y > 0.0 { *d } else { 0.0 }),
-        Activation::LeakyRelu { slope } => pairs.for_each(|(d, &y)| *d = if y > 0.0 { *d } else { slope as f32 * *d }),
-        Activation::Tanh => pairs.for_each(|(d, &y)| *d *= 1.0 - y * y),
+    match activation.shape() {
+        Shape::Hinge { .. } if activation.is_identity() => {}
+        // not a product with 0, which would leave zeros of both signs
+        Shape::Hinge { .. } if activation.is_rectifier() => {
+            pairs.for_each(|(d, &y)| *d = if y > 0.0 { *d } else { 0.0 })
+        }
+        Shape::Hinge { below } => pairs.for_each(|(d, &y)| *d = if y > 0.0 { *d } else { below as f32 * *d }),
+        Shape::Sigmoid(sigmoid) => pairs.for_each(|(d, &y)| *d *= (sigmoid.slope_32)(y)),
     }
 }

@@ -1,4 +1,4 @@
-//! The core behind ports of `double`: what the doors into block diagrams share.
+//! The core behind ports of `double`: what the integrations into block diagrams share.
 
 use policy::Scalar;
 use templates::block::{BlockHeader, BlockSource, BlockView, InputView, ParameterView};
@@ -7,8 +7,8 @@ use templates::c::Common;
 use super::c99::render;
 use crate::backend::banner;
 use crate::backend::literal::number;
-use crate::program::{Coefficient, Literal, SignalPort};
-use crate::{CodegenError, GeneratedFiles, Program};
+use crate::files::{CodegenError, GeneratedFiles};
+use crate::program::{Coefficient, Literal, Program, SignalPort};
 
 /// `<name>_block.h` and `<name>_block.c`.
 ///

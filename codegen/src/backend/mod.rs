@@ -1,6 +1,5 @@
-//! Backends: [`Program`] -> [`GeneratedFiles`], as data.
+//! Backends, a module an output: [`Program`] -> [`crate::GeneratedFiles`], as data.
 
-mod assembly;
 #[cfg(feature = "c")]
 mod block;
 #[cfg(feature = "c")]
@@ -15,17 +14,7 @@ pub mod rust;
 #[cfg(feature = "c")]
 pub mod sfunction;
 
-use crate::program::NetworkCode;
-use crate::{CodegenError, GeneratedFiles, Program};
-
-/// Prints a program in one language.
-pub trait Backend: Sync {
-    /// The files of the controller, without the manifest.
-    ///
-    /// # Errors
-    /// Only for a fault in the compiler itself.
-    fn emit(&self, program: &Program) -> Result<GeneratedFiles, CodegenError>;
-}
+use crate::program::{Arithmetic, Program};
 
 /// Lines of the banner at the head of every generated file: origin and the conditions under which the bits hold.
 /// No time, path or command line: equal policies give equal files.
@@ -35,7 +24,7 @@ pub fn banner(program: &Program, title: &str, flags: &[&str]) -> Vec<String> {
     let digests = &origin.digests;
     let mapping = digests.mapping.as_deref().unwrap_or("none");
     let shape: Vec<String> = std::iter::once(program.feature_count())
-        .chain(program.network.shape().iter().map(|(_, _, outputs)| *outputs))
+        .chain(program.network.layers.iter().map(|layer| layer.outputs))
         .map(|width| width.to_string())
         .collect();
     vec![
@@ -61,13 +50,13 @@ pub fn banner(program: &Program, title: &str, flags: &[&str]) -> Vec<String> {
 /// The numeric format with what it promises.
 fn format_text(program: &Program) -> String {
     let name = program.numeric_format.name();
-    match &program.network {
-        NetworkCode::Real { fused: false, .. } => format!("{name} (exact order, no contraction)"),
-        NetworkCode::Real { fused: true, .. } => format!("{name} (exact order, fused multiply-add in the network)"),
-        NetworkCode::Integer(network) => format!(
+    match &program.network.arithmetic {
+        Arithmetic::Real { fused: false, .. } => format!("{name} (exact order, no contraction)"),
+        Arithmetic::Real { fused: true, .. } => format!("{name} (exact order, fused multiply-add in the network)"),
+        Arithmetic::Integer(code) => format!(
             "{name} ({}-bit weights, 16-bit activations, sums within +-{} < 2^31)",
-            8 * network.weight_bytes,
-            network.accumulator_bound
+            8 * code.weight_bytes,
+            code.accumulator_bound
         ),
     }
 }

@@ -6,7 +6,8 @@ use templates::sfunction::{
 
 use super::block;
 use super::c99::render;
-use crate::{CodegenError, GeneratedFiles, Program};
+use crate::files::{CodegenError, GeneratedFiles};
+use crate::program::Program;
 
 /// The files around the core.
 ///

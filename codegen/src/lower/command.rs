@@ -4,23 +4,35 @@ use policy::{Mapping, Policy, Scalar};
 
 use crate::program::{Advance, Block, Coefficient, Decide, Literal, Op, ValueId};
 
-/// Bit numbers of the status word (contract section 9) with the names used in generated code.
-pub const STATUS: [(&str, u32); 8] = [
-    ("HELD", 0),
-    ("FALLBACK", 1),
-    ("PRIMED", 2),
-    ("CLIPPED", 3),
-    ("MAPPING_RANGE", 4),
-    ("SLEW_LIMITED", 5),
-    ("SOFT_START", 6),
-    ("LIMITED", 7),
+/// One bit of the status word.
+#[derive(Debug, Clone, Copy)]
+pub struct StatusBit {
+    /// Name in generated code.
+    pub name: &'static str,
+    /// Number of the bit.
+    pub number: u32,
+    /// What the user of generated code reads beside it; one sentence.
+    pub meaning: &'static str,
+}
+
+/// The status word (contract section 9).
+pub const STATUS: [StatusBit; 8] = [
+    status_bit("HELD", 0, "Held samples bridge an invalid measurement."),
+    status_bit("FALLBACK", 1, "No usable measurement: the fallback duty is commanded."),
+    status_bit("PRIMED", 2, "This step primed the filters."),
+    status_bit("CLIPPED", 3, "An observation was clipped."),
+    status_bit("MAPPING_RANGE", 4, "Outside the mapping's validity range."),
+    status_bit("SLEW_LIMITED", 5, "The slew limit was active."),
+    status_bit("SOFT_START", 6, "The soft start was active."),
+    status_bit("LIMITED", 7, "A duty limit was active."),
 ];
 
+const fn status_bit(name: &'static str, number: u32, meaning: &'static str) -> StatusBit {
+    StatusBit { name, number, meaning }
+}
+
 fn bit(name: &str) -> u32 {
-    STATUS
-        .iter()
-        .find(|(known, _)| *known == name)
-        .map_or(0, |(_, bit)| *bit)
+    STATUS.iter().find(|bit| bit.name == name).map_or(0, |bit| bit.number)
 }
 
 /// Lowers the way from the chosen duty to the command.

@@ -1,54 +1,58 @@
 //! Policy + target -> program. Each part of the contract has its file.
 
+pub mod activation;
 pub mod command;
 mod front;
 mod integer;
 pub mod known_answers;
-pub mod network;
+mod loops;
+mod network;
+mod real;
 pub mod simplify;
+mod state;
+mod tables;
 
 pub use command::STATUS;
-use policy::{NumericFormat, Policy, Scalar};
+use policy::{Policy, Scalar};
 use targets::TargetSpec;
 
-use crate::crc::crc32_words;
-use crate::program::{Coefficient, Literal, MappingCode, Program, Provenance, SignalPort};
-use crate::{Language, TOOL};
+use crate::crc::{crc32_words, nibble_table};
+use crate::files::TOOL;
+use crate::output::Language;
+use crate::program::{Coefficient, Element, Literal, MappingCode, Program, Provenance, SignalPort, Table};
 
-/// Lowers a policy for a target; the row block of the layers is the target's for that language.
+/// Lowers a policy for a target; the loops of its network are those that suit the language's compilers.
 #[must_use]
 pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Program {
-    let mut integer_block = target.integer_block;
-    let row_block = match language {
-        Language::C => target.c_row_block,
-        Language::Rust => {
-            let (of_16, of_8) = integer_block.rust_rows;
-            integer_block.rows = if policy.numeric_format == NumericFormat::I8 {
-                of_8
-            } else {
-                of_16
-            };
-            target.rust_row_block
-        }
-    };
     let scalar = policy.numeric_format.scalar();
     let (front, memory_words) = front::lower(policy);
-    let loops = network::FloatLoops {
-        row_block,
-        alignment: target.weights_alignment,
-        has_assembly: target.has_float_assembly && policy.numeric_format == NumericFormat::F32,
-    };
-    let network = network::lower(policy, loops, integer_block);
+    let (network, mut tables) = network::lower(policy, target, language);
     let duties: Vec<_> = policy
         .actions
         .iter()
         .map(|action| Literal::nearest(scalar, action.duty))
         .collect();
-    let mut program = Program {
+    let answers = known_answers::lower(policy, &network, &tables);
+    tables.push(Table {
+        is_checked: true,
+        ..Table::plain("duties", Element::Float(scalar), duties.iter().copied())
+    });
+    tables.push(Table::words("crc_steps", &nibble_table()));
+    tables.extend(answers);
+    let checked = tables.iter().filter(|table| table.is_checked);
+    let crc = crc32_words(checked.flat_map(Table::checked_words));
+    let has_fpu = target.fpu.has(scalar == Scalar::F64);
+    let signals: Vec<SignalPort> = (policy.signals.iter())
+        .map(|signal| signal_port(scalar, signal))
+        .collect();
+    let mapping = policy.mapping.as_ref().map(|map| mapping(scalar, map));
+    let state = state::members(policy, &signals, memory_words, mapping.as_ref());
+    Program {
         name: policy.name.clone(),
         sample_period: policy.sample_period,
         numeric_format: policy.numeric_format,
-        has_fpu: target.fpu.has(scalar == Scalar::F64),
+        has_fpu,
+        senses_again: has_fpu,
         processor: target.rust.and_then(|rust| rust.processor()),
         provenance: Provenance {
             tool: TOOL.to_owned(),
@@ -58,11 +62,7 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
             c_flags: target.c_flags,
             rust_flags: target.rust_flags,
         },
-        signals: policy
-            .signals
-            .iter()
-            .map(|signal| signal_port(scalar, signal))
-            .collect(),
+        signals,
         features: policy
             .features
             .iter()
@@ -75,20 +75,17 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
             .collect(),
         memory_words,
         front,
-        self_test: known_answers::lower(policy, &network),
         network,
         duties,
-        mapping: policy.mapping.as_ref().map(|map| mapping(scalar, map)),
+        mapping,
         decide: command::decide(policy),
         advance: command::advance(policy),
-        initial_duty: Literal::nearest(scalar, policy.limits.initial_duty),
-        soft_start_from: policy.limits.soft_start.map(|soft| Literal::nearest(scalar, soft.from)),
+        state,
         fallback_duty: Literal::nearest(scalar, policy.fallback.duty),
         hold: policy.fallback.hold,
-        crc: 0,
-    };
-    program.crc = crc32_words(program.table_words());
-    program
+        tables,
+        crc,
+    }
 }
 
 fn signal_port(scalar: Scalar, signal: &policy::Signal) -> SignalPort {

@@ -11,7 +11,7 @@ use std::borrow::Cow;
 
 use certify::{Certifier, Neurons};
 use policy::scales::{self, Scales};
-use policy::{Activation, Layer, NumericFormat, Policy};
+use policy::{Layer, NumericFormat, Policy};
 
 /// A policy whose layers lack neurons that do nothing, and the scales of the whole one in the same shape.
 pub struct Simplified<'a> {
@@ -47,7 +47,7 @@ pub fn removable(policy: &Policy) -> Vec<Vec<usize>> {
 
 /// Whether adding a zero from this input changes no sum of the layer that can be told apart.
 fn goes_unnoticed(format: NumericFormat, next: &Layer, input: usize) -> bool {
-    if scales::is_integer(format) || next.activation == Activation::Relu {
+    if scales::is_integer(format) || next.activation.is_rectifier() {
         return true;
     }
     let is_fused = format == NumericFormat::F32Fma;

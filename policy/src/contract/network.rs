@@ -2,13 +2,9 @@
 
 use toml_input::{At, Fault, Message, Table, Value};
 
+use crate::activation::Activation;
 use crate::catalogue;
 use crate::limits::MAX_LAYERS;
-use crate::model::Activation;
-
-const ACTIVATIONS: [&str; 3] = ["relu", "tanh", "identity"];
-const ACTIVATION_HINT: &str = "weights do not say it: hidden_activation = \"relu\", \"tanh\", \"identity\", \
-    { leaky_relu = 0.01 }, or an array with one per hidden layer";
 
 /// The activations behind the hidden layers, as given.
 pub(crate) enum Hidden<'a> {
@@ -82,7 +78,7 @@ impl Network<'_> {
             Hidden::Faulty => return None,
             Hidden::Missing if hidden == 0 => Vec::new(),
             Hidden::Missing => {
-                let message = catalogue::missing_key("hidden_activation", "[network]", ACTIVATION_HINT);
+                let message = catalogue::missing_key("hidden_activation", "[network]", &hint());
                 faults.push(self.section.fault(message));
                 return None;
             }
@@ -133,26 +129,31 @@ fn activation(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Activation> 
         return None;
     }
     let text = value.text(faults)?;
-    match text {
-        "relu" => Some(Activation::Relu),
-        "tanh" => Some(Activation::Tanh),
-        "identity" => Some(Activation::Identity),
-        "leaky_relu" => {
-            let message = catalogue::missing_key("slope", "leaky_relu", "write { leaky_relu = 0.01 }");
-            faults.push(value.fault(message));
-            None
-        }
-        _ => {
-            let lower = text.to_ascii_lowercase();
-            let shown = if ACTIVATIONS.contains(&lower.as_str()) {
-                &lower
-            } else {
-                text
-            };
-            faults.push(value.fault(catalogue::not_one_of("hidden_activation", shown, &ACTIVATIONS)));
-            None
-        }
+    if let Some(activation) = Activation::find(text) {
+        return Some(activation);
     }
+    let known: Vec<&str> = Activation::plain().map(Activation::word).collect();
+    let lower = text.to_ascii_lowercase();
+    let with_parameter = Activation::EACH.iter().find(|each| each.word() == text);
+    faults.push(
+        value.fault(match with_parameter.and_then(|each| Some((each, each.parameter()?))) {
+            Some((each, (parameter, _))) => {
+                catalogue::missing_key(parameter, text, &format!("write {}", each.written()))
+            }
+            None if known.contains(&lower.as_str()) => catalogue::not_one_of("hidden_activation", &lower, &known),
+            None => catalogue::not_one_of("hidden_activation", text, &known),
+        }),
+    );
+    None
+}
+
+/// What to write where nothing is written.
+fn hint() -> String {
+    let written: Vec<String> = Activation::EACH.iter().map(|each| each.written()).collect();
+    format!(
+        "weights do not say it: hidden_activation = {}, or an array with one per hidden layer",
+        written.join(", ")
+    )
 }
 
 fn owned(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<At<String>> {

@@ -6,7 +6,7 @@
 //! The choice balances the two, as in Nagel et al., "Data-Free Quantization Through Weight Equalization and Bias
 //! Correction" (2019), section 4.1, with 4-norms instead of ranges: one outlier does not decide alone.
 
-use crate::model::{Activation, Layer, Policy};
+use crate::model::{Layer, Policy};
 
 use super::power_of_two;
 
@@ -15,7 +15,7 @@ const SWEEPS: usize = 16;
 /// Largest distance of a row exponent from the layer's median.
 const LARGEST: i32 = 24;
 
-/// Row exponent of every output of every layer; 0 in the last layer and behind a tanh.
+/// Row exponent of every output of every layer; 0 in the last layer and before what is not homogeneous.
 pub(super) fn balanced(policy: &Policy, inputs: &[i32]) -> Vec<Vec<i32>> {
     let layers = &policy.layers;
     let ranges = ranges(policy);
@@ -24,7 +24,7 @@ pub(super) fn balanced(policy: &Policy, inputs: &[i32]) -> Vec<Vec<i32>> {
         let before = rows.clone();
         for (index, pair) in layers.windows(2).enumerate() {
             let [layer, next] = pair else { continue };
-            if layer.activation == Activation::Tanh {
+            if !layer.activation.is_homogeneous() {
                 continue;
             }
             let columns = match index.checked_sub(1) {
@@ -59,9 +59,9 @@ fn ranges(policy: &Policy) -> Vec<Vec<f64>> {
             let products = row.iter().zip(&inputs).map(|(w, x)| f64::from(*w).abs() * x);
             products.fold(f64::from(bias).abs(), |sum, product| sum + product)
         });
-        let outputs: Vec<f64> = match layer.activation {
-            Activation::Tanh => vec![1.0; layer.outputs],
-            _ => outputs.collect(),
+        let outputs: Vec<f64> = match layer.activation.limit() {
+            Some(limit) => vec![limit; layer.outputs],
+            None => outputs.collect(),
         };
         ranges.push(std::mem::replace(&mut inputs, outputs));
     }

@@ -10,9 +10,10 @@ pub(crate) mod tensors;
 
 use toml_input::{Fault, nearest};
 
+use crate::activation::Activation;
 use crate::contract::network::Network;
 use crate::limits::{MAX_LAYERS, MAX_WIDTH};
-use crate::model::{Activation, Layer};
+use crate::model::Layer;
 use crate::raw::Binary;
 use chain::{Chain, Ends};
 use explain::Scene;

@@ -311,3 +311,8 @@ impl Random {
         }
     }
 }
+
+/// The contract that `new` writes beside the weights.
+pub fn scaffold(weights: &std::path::Path) -> Result<String, policy::Faults> {
+    policy::new_contract(weights, &weights.with_file_name("policy.toml"))
+}

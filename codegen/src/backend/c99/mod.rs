@@ -5,31 +5,34 @@ pub(super) mod number;
 mod real;
 pub(super) mod statements;
 pub(super) mod tables;
+mod text;
 
 use std::collections::BTreeMap;
 
-use targets::IntegerLoop;
 use templates::Template;
-use templates::c::{Argmax, Common, Constant, Header, Helpers, Member, NetworkView, PushView, Source, WideChar};
+use templates::c::{
+    Common, Header, Helpers, IntegerView, Member, NetworkView, PushView, RealView, Source, StatusBit, WideChar,
+};
 
-use crate::backend::assembly::RealKernel;
-use crate::backend::{Backend, banner};
+use crate::backend::banner;
+use crate::files::{CodegenError, GeneratedFiles};
 use crate::lower::STATUS;
-use crate::program::{ActivationCode, Coefficient, Literal, NetworkCode, Op, Program};
-use crate::{CodegenError, GeneratedFiles};
+use crate::program::{
+    ActivationCode, Arithmetic, Buffer, Coefficient, Element, IntegerCode, Kept, Literal, Loop, Op, Program,
+    StateMember, StateValue,
+};
 use number::number;
-use statements::{Printer, unsigned};
+use statements::{Printer, float, unsigned};
 
-/// The C99 backend.
-pub struct C99;
-
-impl Backend for C99 {
-    fn emit(&self, program: &Program) -> Result<GeneratedFiles, CodegenError> {
-        let mut files = BTreeMap::new();
-        files.insert(format!("{}.h", program.name), render(&header(program))?);
-        files.insert(format!("{}.c", program.name), render(&source(program))?);
-        Ok(GeneratedFiles { files })
-    }
+/// Header and source of the controller.
+///
+/// # Errors
+/// Only for a fault in the compiler itself.
+pub fn emit(program: &Program) -> Result<GeneratedFiles, CodegenError> {
+    let mut files = BTreeMap::new();
+    files.insert(format!("{}.h", program.name), render(&header(program))?);
+    files.insert(format!("{}.c", program.name), render(&source(program))?);
+    Ok(GeneratedFiles { files })
 }
 
 /// The text of a template.
@@ -83,12 +86,7 @@ fn wide_char(program: &Program) -> Option<WideChar> {
 }
 
 fn header(program: &Program) -> Header {
-    let constant = |name: &str, value: String| Constant {
-        name: name.to_owned(),
-        value,
-    };
-    let count = |name: &str, value: usize| constant(name, format!("{value}u"));
-    let period = format!("{:?}", program.sample_period);
+    let count = |name: &'static str, value: usize| (name, format!("{value}u"));
     Header {
         common: common(program),
         constants: vec![
@@ -97,18 +95,22 @@ fn header(program: &Program) -> Header {
             count("ACTIONS", program.duties.len()),
             count("STATE_WORDS", program.state_words()),
             count("TABLE_NUMBERS", program.table_numbers()),
-            constant("SAMPLE_PERIOD", period),
+            ("SAMPLE_PERIOD", format!("{:?}", program.sample_period)),
         ],
         status: STATUS
             .iter()
-            .map(|(name, bit)| constant(name, unsigned(1 << bit)))
+            .map(|bit| StatusBit {
+                name: bit.name,
+                value: unsigned(1 << bit.number),
+                meaning: bit.meaning,
+            })
             .collect(),
         measurement: program
             .signals
             .iter()
             .map(|signal| measurement_member(program, signal))
             .collect(),
-        state: state_members(program),
+        state: state(program).0,
         features: program.features.iter().map(|(_, formula)| formula.clone()).collect(),
     }
 }
@@ -135,43 +137,42 @@ fn measurement_member(program: &Program, signal: &crate::program::SignalPort) ->
     }
 }
 
-/// In the order of contract section 1.
-fn state_members(program: &Program) -> Vec<Member> {
-    let kind = number::kind(program.scalar()).name;
-    let member = |declaration: String, comment: &str| Member {
-        declaration,
-        comment: comment.to_owned(),
-    };
-    let mut members = vec![member(
-        format!("{kind} held[{}]", program.signals.len()),
-        "last good samples",
-    )];
-    if program.memory_words > 0 {
-        members.push(member(
-            format!("{kind} memory[{}]", program.memory_words),
-            "filters, in feature order, oldest first",
-        ));
+/// Members of the state, statements that reset it, and those that set its coefficients.
+fn state(program: &Program) -> (Vec<Member>, Vec<String>, Vec<String>) {
+    let scalar = program.scalar();
+    let kind = number::kind(scalar).name;
+    let (mut members, mut reset, mut init) = (Vec::new(), Vec::new(), Vec::new());
+    for StateMember { name, meaning, value } in &program.state {
+        let set = |place: String, value: &Literal| format!("state->{place} = {};", number(scalar, *value));
+        let declaration = match value {
+            StateValue::Numbers(values) => {
+                let places = values
+                    .iter()
+                    .enumerate()
+                    .map(|(i, value)| set(format!("{name}[{i}]"), value));
+                // the memory is long: a loop clears it
+                reset.extend(places.filter(|_| name != "memory"));
+                format!("{kind} {name}[{}]", values.len())
+            }
+            StateValue::Number(value) => {
+                reset.push(set(name.clone(), value));
+                format!("{kind} {name}")
+            }
+            StateValue::Coefficient(value) => {
+                init.push(set(name.clone(), value));
+                format!("{kind} {name}")
+            }
+            StateValue::Word => {
+                reset.push(format!("state->{name} = 0u;"));
+                format!("uint32_t {name}")
+            }
+        };
+        members.push(Member {
+            declaration,
+            comment: (*meaning).to_owned(),
+        });
     }
-    members.push(member(
-        format!("{kind} previous_duty"),
-        "duty of the last chosen action",
-    ));
-    members.push(member(format!("{kind} previous_command"), "last command"));
-    if program.soft_start_from.is_some() {
-        members.push(member(format!("{kind} soft_cap"), "rising upper limit"));
-    }
-    for (name, ..) in program.mapping.iter().flat_map(|mapping| &mapping.coefficients) {
-        members.push(member(
-            format!("{kind} mapping_{}", name.name()),
-            "coefficient of the duty ratio mapping",
-        ));
-    }
-    members.push(member(
-        "uint32_t bad_count".into(),
-        "consecutive steps with an invalid sample",
-    ));
-    members.push(member("uint32_t primed".into(), "1 once the filters hold good samples"));
-    members
+    (members, reset, init)
 }
 
 fn source(program: &Program) -> Source {
@@ -181,42 +182,43 @@ fn source(program: &Program) -> Source {
     decide.block(&program.decide.block);
     let mut advance = Printer::new(&program.name, program);
     advance.block(&program.advance.block);
-    let status_terms = program
-        .decide
-        .status
-        .iter()
-        .map(|(bit, flag)| format!("({} << {bit})", decide.operand(*flag)))
-        .collect();
-    let (sense_lines, sense_results) = sense_statements(program, &sense);
+    let bits = program.decide.status.iter();
+    let (_, reset, init) = state(program);
+    let front = &program.front;
+    let operands = |ids: &[usize]| ids.iter().map(|id| sense.operand(*id)).collect();
+    let pushed: Vec<usize> = front.pushes.iter().map(|push| push.value).collect();
+    let coefficients = program.mapping.iter().flat_map(|mapping| &mapping.coefficients);
+    let soft_cap = program.advance.soft_cap.map(|value| advance.operand(value));
     Source {
         common: common(program),
         wide_char: wide_char(program),
-        tables: tables::tables(program),
+        tables: program.tables.iter().map(tables::view).collect(),
         network: network(program),
-        senses_again: senses_again(program),
-        argmax: argmax(program),
+        senses_again: program.senses_again,
         crc_kinds: tables::crc_kinds(program),
         helpers: helpers(program),
         tanh: tables::tanh_steps(program.scalar()),
-        front_members: front_members(program),
-        sense: sense_lines,
-        sense_results,
+        actions: program.duties.len(),
+        lowest: number::lowest(program.scalar()),
+        signals: operands(&front.signals),
+        observation: operands(&front.observation),
+        pushed: operands(&pushed),
+        valid: sense.operand(front.all_valid),
+        clipped: front.clipped.map(|flag| sense.operand(flag)),
         duty: decide.operand(program.decide.duty),
-        status_terms,
+        status_terms: bits
+            .map(|(bit, flag)| format!("({} << {bit})", decide.operand(*flag)))
+            .collect(),
+        sense: sense.lines,
         decide: decide.lines,
-        soft_cap: program
-            .advance
-            .soft_cap
-            .map(|value| advance.operand(value))
-            .unwrap_or_default(),
+        soft_cap: soft_cap.unwrap_or_default(),
         advance: advance.lines,
-        signal_count: program.signals.len(),
         pushes: pushes(program),
-        init: init(program),
-        reset: reset(program),
+        init,
+        reset,
         memory_words: program.memory_words,
         mapping_conditions: mapping_conditions(program),
-        mapping_assignments: mapping_assignments(program),
+        mapping_names: coefficients.map(|(name, ..)| name.name()).collect(),
         hold: unsigned(program.hold),
         fallback: number(program.scalar(), program.fallback_duty),
         integrity: tables::integrity(program),
@@ -226,134 +228,38 @@ fn source(program: &Program) -> Source {
 }
 
 fn network(program: &Program) -> NetworkView {
-    match &program.network {
-        NetworkCode::Real { scalar, fused, layers } => {
-            let arithmetic = real::Arithmetic {
-                name: &program.name,
-                scalar: *scalar,
-                fused: *fused,
-            };
-            NetworkView::Real(real::view(arithmetic, layers))
-        }
-        NetworkCode::Integer(network) => NetworkView::Integer(integer::view(&program.name, network, program.has_fpu)),
+    match &program.network.arithmetic {
+        Arithmetic::Real { .. } => NetworkView::Real(RealView {
+            functions: real::functions(program),
+            calls: real::calls(program),
+        }),
+        Arithmetic::Integer(code) => NetworkView::Integer(integer_view(program, code)),
     }
 }
 
-/// To sense is a few per cent of the network where floats are hardware, and a tenth of it where they are a library.
-fn senses_again(program: &Program) -> bool {
-    program.has_fpu
-}
-
-fn argmax(program: &Program) -> Argmax {
-    let n = &program.name;
-    let again = senses_again(program);
-    let kind = number::kind(program.scalar()).name;
-    match program.network {
-        NetworkCode::Real { .. } => Argmax {
-            element: kind,
-            lowest: number::lowest(program.scalar()),
-            declarations: again
-                .then(|| format!("{kind} observation[{}];", program.feature_count()))
-                .into_iter()
-                .chain([format!("{kind} q[{}];", program.duties.len())])
-                .collect(),
-            calls: again
-                .then(|| format!("{n}_observe(state, measured, observation);"))
-                .into_iter()
-                .chain([format!("{n}_q_values(observation, q);")])
-                .collect(),
-            output: "q[action]".to_owned(),
-            dual: false,
-            select: format!("{n}_select(above, output, best)"),
-        },
-        NetworkCode::Integer(ref network) => Argmax {
-            element: "int32_t",
-            lowest: "(-2147483647 - 1)",
-            declarations: vec![
-                format!("{n}_values values;"),
-                "const int32_t *const q = values.q;".to_owned(),
-            ],
-            calls: vec![
-                if again {
-                    format!("{n}_inputs(state, measured, values.input);")
-                } else {
-                    format!("{n}_quantise(observation, values.input);")
-                },
-                format!("{n}_network(&values);"),
-            ],
-            output: integer::output(network, "action"),
-            dual: network.block.inner == IntegerLoop::Dual,
-            select: format!("{n}_select_integer(above, output, best)"),
-        },
+fn integer_view(program: &Program, code: &IntegerCode) -> IntegerView {
+    let network = &program.network;
+    IntegerView {
+        bound: code.accumulator_bound,
+        weight: tables::element(Element::Integer {
+            bytes: code.weight_bytes,
+        }),
+        is_quad: network.lanes.len() == 4,
+        input_length: network.length(Buffer::Input),
+        padding: integer::padding(network, Buffer::Input),
+        shift: code.output_shift,
+        q_unit: float(code.q_unit.single()),
+        q_field: code.q_field,
+        has_fpu: program.has_fpu,
+        special: integer::special(code),
+        has_assembly: network.has_assembly,
+        shares: code.shares,
+        functions: integer::functions(program, code),
+        calls: integer::calls(program),
+        relu: network.activates(|activation| activation == ActivationCode::Relu),
+        leaky_relu: network.activates(|activation| matches!(activation, ActivationCode::LeakyRelu(_))),
+        tanh: network.activates(|activation| activation == ActivationCode::Tanh),
     }
-}
-
-fn front_members(program: &Program) -> Vec<Member> {
-    let kind = number::kind(program.scalar()).name;
-    let member = |declaration: String, comment: &str| Member {
-        declaration,
-        comment: comment.to_owned(),
-    };
-    let mut members = vec![member(format!("{kind} signal[{}]", program.signals.len()), "sanitised")];
-    members.push(member(
-        format!("{kind} observation[{}]", program.feature_count()),
-        "network input",
-    ));
-    if !program.front.pushes.is_empty() {
-        members.push(member(
-            format!("{kind} push[{}]", program.front.pushes.len()),
-            "what the filters will remember",
-        ));
-    }
-    members.push(member("uint32_t bad_count".into(), "including this step"));
-    members.push(member("uint32_t usable".into(), "1 if the network decides"));
-    members.push(member(
-        "uint32_t held".into(),
-        "1 if a held sample bridges an invalid one",
-    ));
-    members.push(member(
-        "uint32_t primed_now".into(),
-        "1 if this step primes the filters",
-    ));
-    if program.front.clipped.is_some() {
-        members.push(member("uint32_t clipped".into(), "1 if an observation was clipped"));
-    }
-    members
-}
-
-/// Declarations, then assignments, of `sense`.
-fn sense_statements(program: &Program, printer: &Printer<'_>) -> (Vec<String>, Vec<String>) {
-    let front = &program.front;
-    let valid = printer.operand(front.all_valid);
-    let (n, hold) = (&program.name, unsigned(program.hold));
-    let mut lines = printer.lines.clone();
-    lines.push(format!(
-        "const uint32_t counted = state->bad_count + {n}_flag(state->bad_count <= {hold});"
-    ));
-    lines.push(format!("const uint32_t bad_count = counted & ({valid} - (uint32_t)1);"));
-    lines.push(format!(
-        "const uint32_t bridged = state->primed & {n}_flag(bad_count <= {hold});"
-    ));
-    lines.push(format!("const uint32_t usable = {valid} | bridged;"));
-    let mut results = Vec::new();
-    let values = [("signal", &front.signals), ("observation", &front.observation)];
-    for (array, ids) in values {
-        results.extend(
-            ids.iter()
-                .enumerate()
-                .map(|(i, id)| format!("front->{array}[{i}] = {};", printer.operand(*id))),
-        );
-    }
-    let pushes = front.pushes.iter().enumerate();
-    results.extend(pushes.map(|(i, push)| format!("front->push[{i}] = {};", printer.operand(push.value))));
-    results.push("front->bad_count = bad_count;".into());
-    results.push("front->usable = usable;".into());
-    results.push(format!("front->held = usable & ({valid} ^ (uint32_t)1);"));
-    results.push("front->primed_now = usable & (state->primed ^ (uint32_t)1);".into());
-    if let Some(clipped) = front.clipped {
-        results.push(format!("front->clipped = {};", printer.operand(clipped)));
-    }
-    (lines, results)
 }
 
 fn pushes(program: &Program) -> Vec<PushView> {
@@ -363,33 +269,6 @@ fn pushes(program: &Program) -> Vec<PushView> {
         index,
     };
     program.front.pushes.iter().enumerate().map(view).collect()
-}
-
-fn reset(program: &Program) -> Vec<String> {
-    let scalar = program.scalar();
-    let signals = program.signals.iter().enumerate();
-    let mut lines: Vec<String> = signals
-        .map(|(i, signal)| format!("state->held[{i}] = {};", number(scalar, signal.initial)))
-        .collect();
-    let initial = number(scalar, program.initial_duty);
-    lines.push(format!("state->previous_duty = {initial};"));
-    lines.push(format!("state->previous_command = {initial};"));
-    lines.extend(
-        program
-            .soft_start_from
-            .map(|from| format!("state->soft_cap = {};", number(scalar, from))),
-    );
-    lines.push("state->bad_count = 0u;".into());
-    lines.push("state->primed = 0u;".into());
-    lines
-}
-
-fn init(program: &Program) -> Vec<String> {
-    let scalar = program.scalar();
-    let coefficients = program.mapping.iter().flat_map(|mapping| &mapping.coefficients);
-    coefficients
-        .map(|(name, value, ..)| format!("state->mapping_{} = {};", name.name(), number(scalar, *value)))
-        .collect()
 }
 
 fn mapping_conditions(program: &Program) -> Vec<String> {
@@ -413,20 +292,12 @@ fn mapping_conditions(program: &Program) -> Vec<String> {
     conditions
 }
 
-fn mapping_assignments(program: &Program) -> Vec<String> {
-    let coefficients = program.mapping.iter().flat_map(|mapping| &mapping.coefficients);
-    coefficients
-        .map(|(name, ..)| name.name())
-        .map(|name| format!("state->mapping_{name} = {name};"))
-        .collect()
-}
-
 fn helpers(program: &Program) -> Helpers {
     let ops = || {
         let blocks = [&program.front.block, &program.decide.block, &program.advance.block];
         blocks.into_iter().flat_map(|block| &block.ops)
     };
-    let real = matches!(program.network, NetworkCode::Real { .. });
+    let real = program.network.integer().is_none();
     let network = &program.network;
     Helpers {
         within: ops().any(|op| matches!(op, Op::Within { .. })),
@@ -437,19 +308,9 @@ fn helpers(program: &Program) -> Helpers {
         relu_by_sum: program.has_fpu,
         leaky_relu: real && network.activates(|activation| matches!(activation, ActivationCode::LeakyRelu(_))),
         tanh: network.activates(|activation| activation == ActivationCode::Tanh),
-        assembly: match network {
-            NetworkCode::Real { layers, .. } => layers.iter().any(RealKernel::is_for),
-            NetworkCode::Integer(network) => integer::is_in_assembly(network),
-        },
-        vectors: match network {
-            NetworkCode::Real { layers, .. } => layers.iter().any(|layer| layer.has_vectors),
-            NetworkCode::Integer(_) => false,
-        },
-        alignment: match network {
-            NetworkCode::Real { layers, .. } => layers.iter().find_map(|layer| layer.alignment),
-            // words, although the elements are smaller
-            NetworkCode::Integer(_) => Some(4),
-        },
-        fused: matches!(network, NetworkCode::Real { fused: true, .. }),
+        assembly: network.has_assembly,
+        vectors: (network.nodes().iter()).any(|node| matches!(node, Loop::Sums(sums) if sums.kept == Kept::Vectors)),
+        alignment: program.alignment(),
+        fused: matches!(network.arithmetic, Arithmetic::Real { fused: true, .. }),
     }
 }

@@ -1,253 +1,341 @@
-//! The network in floats: layers, blocks, rows.
-
-use templates::c::{BlockView, LayerView, RealRowView, RealView, VectorView};
+//! Loops over floats: functions of the layers, and the statements of `q_values`.
+//!
+//! ```text
+//!  for (block ...) {                       Repeat
+//!      s0 = bias[0]; s1 = bias[1]; ...     Sums: rows side by side, in variables; or in the output array, or in vectors
+//!      for (i ...) {
+//!          s0 = s0 + w[0] * x[i]; ...
+//!          w = &w[rows];
+//!      }
+//!      out[0] = activation(s0); ...        Store
+//!      bias, out move on
+//!  }
+//! ```
+//!
+//! In: `x`, and tables in reading order. Out: `y`. The one invariant: `w`, `bias` and `out` only ever move on by what was read or
+//! written, so the places in the tables are nowhere computed but where a piece of a layer begins.
 
 use policy::Scalar;
 
 use super::number;
-use crate::backend::assembly::RealKernel;
-use crate::program::{ActivationCode, LayerCode};
+use super::text::Text;
+use crate::assembly;
+use crate::assembly::real::RealKernel;
+use crate::program::{ActivationCode, Arithmetic, Buffer, Kept, Layer, Loop, Part, Program, Store, Sums};
 
-/// How the sums of the layers are made.
-#[derive(Debug, Clone, Copy)]
-pub struct Arithmetic<'a> {
-    /// Prefix of all names.
-    pub name: &'a str,
-    /// Format of sums and values.
-    pub scalar: Scalar,
-    /// Products are added with one rounding.
-    pub fused: bool,
+/// Functions of the layers.
+pub fn functions(program: &Program) -> Vec<String> {
+    let printer = Printer::new(program);
+    let mut text = Text::default();
+    for layer in program.network.pieces() {
+        printer.function(layer, &mut text);
+    }
+    text.lines
 }
 
-/// Functions of the layers and the calls of `q_values`.
-pub fn view(arithmetic: Arithmetic<'_>, layers: &[LayerCode]) -> RealView {
-    let name = arithmetic.name;
-    let kind = number::kind(arithmetic.scalar).name;
-    let mut view = RealView {
-        layers: Vec::new(),
-        calls: Vec::new(),
-    };
-    let (before, streamed) = match layers {
-        [before @ .., block, last] if last.is_streamed() => (before, Some((block, last))),
-        _ => (layers, None),
-    };
-    for (index, layer) in before.iter().enumerate() {
-        if index + 1 < layers.len() {
-            view.calls.push(format!("{kind} hidden{index}[{}];", layer.outputs));
-        }
-        view.layers.push(whole(arithmetic, index, layer));
-    }
-    let source = |index: usize| match index {
-        0 => "observation".to_owned(),
-        _ => format!("hidden{}", index - 1),
-    };
-    let mut calls = Vec::new();
-    for index in 0..before.len() {
-        let sink = if index + 1 == layers.len() {
-            "q".to_owned()
-        } else {
-            format!("hidden{index}")
-        };
-        calls.push(format!("{name}_layer{index}({}, {sink});", source(index)));
-    }
-    if let Some((block, last)) = streamed {
-        let pieces = Pieces {
-            arithmetic,
-            index: before.len(),
-            block,
-            last,
-        };
-        view.layers.extend(pieces.functions());
-        view.calls.push(format!("{kind} part[{}];", last.chunk));
-        view.calls
-            .push(format!("const {kind} *sums = {name}_bias{};", before.len() + 1));
-        if pieces.full() > 1 {
-            view.calls.push("uint32_t block;".to_owned());
-        }
-        calls.extend(pieces.calls(&source(before.len())));
-    }
-    view.calls.extend(calls);
-    view
-}
-
-/// The last two layers: a block of outputs of the one, then what it adds to the sums of the other.
-struct Pieces<'a> {
-    arithmetic: Arithmetic<'a>,
-    /// Number of the first of the two.
-    index: usize,
-    block: &'a LayerCode,
-    last: &'a LayerCode,
-}
-
-impl Pieces<'_> {
-    fn full(&self) -> usize {
-        self.last.inputs / self.last.chunk
-    }
-
-    /// Sizes of the blocks: the full one, and the shorter last one if there is one.
-    fn sizes(&self) -> Vec<usize> {
-        let tail = self.last.inputs % self.last.chunk;
-        std::iter::once(self.last.chunk)
-            .chain((tail > 0).then_some(tail))
-            .collect()
-    }
-
-    fn functions(&self) -> Vec<LayerView> {
-        let sizes = self.sizes().into_iter();
-        let pairs = sizes.flat_map(|size| {
-            let of_block = Function {
-                index: self.index,
-                suffix: format!("_{size}"),
-                is_piece: true,
-                inputs: self.block.inputs,
-                outputs: size,
-                blocks: vec![(1, size)],
-            };
-            let of_last = Function {
-                index: self.index + 1,
-                suffix: format!("_{size}"),
-                is_piece: true,
-                inputs: size,
-                outputs: self.last.outputs,
-                blocks: split(self.last),
-            };
-            [
-                of_block.view(self.arithmetic, self.block),
-                of_last.view(self.arithmetic, self.last),
-            ]
-        });
-        pairs.collect()
-    }
-
-    fn calls(&self, source: &str) -> Vec<String> {
-        let Self { index, .. } = *self;
-        let name = self.arithmetic.name;
-        let next = index + 1;
-        let (rows, full) = (self.last.chunk, self.full());
-        let (weights, out) = (rows * self.block.inputs, rows * self.last.outputs);
-        let call = |size: usize, block: &str| {
-            [
-                format!(
-                    "{name}_layer{index}_{size}({source}, part, &{name}_weights{index}[{block}{weights}u], \
-                     &{name}_bias{index}[{block}{rows}u]);"
-                ),
-                format!("{name}_layer{next}_{size}(part, q, &{name}_weights{next}[{block}{out}u], sums);"),
-            ]
-        };
-        let mut lines = Vec::new();
-        if full > 1 {
-            lines.push(format!("for (block = 0u; block < {full}u; ++block) {{"));
-            let inner = call(rows, "block * ").into_iter().chain(["sums = q;".to_owned()]);
-            lines.extend(inner.map(|line| format!("    {line}")));
-            lines.push("}".to_owned());
-        } else {
-            lines.extend(call(rows, "0u * "));
-            lines.push("sums = q;".to_owned());
-        }
-        if let [_, tail] = self.sizes()[..] {
-            lines.extend(call(tail, &format!("{full}u * ")));
-        }
-        lines
-    }
-}
-
-/// Count and rows of the blocks of a layer.
-fn split(layer: &LayerCode) -> Vec<(usize, usize)> {
-    let (full, tail) = (layer.full_blocks(), layer.tail_rows());
-    std::iter::once((full, layer.block_rows))
-        .chain((tail > 0).then_some((1, tail)))
-        .collect()
-}
-
-/// What a function computes of a layer.
-struct Function {
-    index: usize,
-    suffix: String,
-    is_piece: bool,
-    inputs: usize,
-    outputs: usize,
-    /// Count and rows.
-    blocks: Vec<(usize, usize)>,
-}
-
-fn whole(arithmetic: Arithmetic<'_>, index: usize, layer: &LayerCode) -> LayerView {
-    let function = Function {
-        index,
-        suffix: String::new(),
-        is_piece: false,
-        inputs: layer.inputs,
-        outputs: layer.outputs,
-        blocks: split(layer),
-    };
-    function.view(arithmetic, layer)
-}
-
-impl Function {
-    fn view(&self, arithmetic: Arithmetic<'_>, layer: &LayerCode) -> LayerView {
-        let extent = if self.is_piece {
-            format!(", {} -> {} of them", self.inputs, self.outputs)
-        } else {
-            String::new()
-        };
-        LayerView {
-            index: self.index,
-            function: format!("layer{}{}", self.index, self.suffix),
-            is_piece: self.is_piece,
-            comment: format!("{}: {} -> {}{extent}", layer.name, layer.inputs, layer.outputs),
-            inputs: self.inputs,
-            outputs: self.outputs,
-            in_memory: layer.in_memory,
-            has_vectors: layer.has_vectors,
-            has_loop: self.blocks.iter().any(|(count, _)| *count > 1),
-            has_assembly: RealKernel::is_for(layer),
-            blocks: self
-                .blocks
-                .iter()
-                .map(|(count, rows)| self.block(arithmetic, layer, *count, *rows))
-                .collect(),
-            first: arithmetic.accumulated(["bias[o]", "w[o]", "x[0]"]),
-            next: arithmetic.accumulated(["out[o]", "w[o]", "input"]),
-            activation: arithmetic.activation(layer.activation, "y[o]"),
+/// Declarations and statements of `q_values`.
+pub fn calls(program: &Program) -> Vec<String> {
+    let printer = Printer::new(program);
+    let mut text = Text::default();
+    for (buffer, length) in &program.network.buffers {
+        if matches!(buffer, Buffer::Hidden(_) | Buffer::Block) {
+            text.line(format!("{} {}[{length}];", printer.kind, place(*buffer)));
         }
     }
-
-    fn block(&self, arithmetic: Arithmetic<'_>, layer: &LayerCode, count: usize, rows: usize) -> BlockView {
-        let name = arithmetic.name;
-        BlockView {
-            count,
-            rows,
-            assembly: RealKernel::of(layer, self.inputs, rows)
-                .map_or_else(Vec::new, |kernel| assembly(arithmetic, layer, &kernel)),
-            vectors: if layer.has_vectors {
-                LANES.map(|lanes| vectors(name, lanes, rows)).to_vec()
-            } else {
-                Vec::new()
-            },
-            row_views: (0..rows).map(|index| row(arithmetic, layer, index)).collect(),
+    for node in &program.network.loops {
+        match node {
+            // the first block takes its sums from there, the others from where the one before left them: nothing is copied
+            Loop::Begin(last) => text.line(format!("const {} *sums = {}_bias{last};", printer.kind, program.name)),
+            Loop::Repeat { count, .. } if *count > 1 => text.line("uint32_t block;"),
+            _ => {}
         }
     }
-}
-
-impl Arithmetic<'_> {
-    fn accumulated(self, [sum, weight, input]: [&str; 3]) -> String {
-        match (self.scalar, self.fused) {
-            (Scalar::F32, true) => format!("{}_fma({weight}, {input}, {sum})", self.name),
-            (Scalar::F32, false) => format!("{sum} + ({weight} * {input})"),
-            // weights are binary32
-            (Scalar::F64, _) => format!("{sum} + ((double){weight} * {input})"),
-        }
-    }
-
-    /// Expression of the activation over `x`; empty for none.
-    fn activation(self, activation: ActivationCode, x: &str) -> String {
-        let name = self.name;
-        match activation {
-            ActivationCode::Identity => String::new(),
-            ActivationCode::Relu => format!("{name}_relu({x})"),
-            ActivationCode::LeakyRelu(slope) => {
-                format!("{name}_leaky_relu({x}, {})", number::number(self.scalar, slope))
+    let mut full = 0;
+    for node in &program.network.loops {
+        match node {
+            Loop::Layer(layer) => text.line(printer.call(layer)),
+            Loop::Repeat { blocks, count, body } => {
+                let index = match (blocks, count) {
+                    (Part::Rest, _) => format!("{full}u"),
+                    (Part::Full, 1) => "0u".to_owned(),
+                    (Part::Full, _) => "block".to_owned(),
+                };
+                full = *count;
+                let pieces = body.iter().filter_map(|node| printer.piece(node, &index));
+                let moved = (*blocks == Part::Full).then(|| "sums = q;".to_owned());
+                let lines: Vec<String> = pieces.chain(moved).collect();
+                if *count > 1 {
+                    text.count("block", 0, *count, |text| text.lines(lines));
+                } else {
+                    text.lines(lines);
+                }
             }
-            ActivationCode::Tanh => format!("{name}_tanh({x})"),
+            Loop::Begin(_) | Loop::Sums(_) | Loop::Store(_) | Loop::Add(_) | Loop::Pad { .. } => {}
+        }
+    }
+    text.lines
+}
+
+fn place(buffer: Buffer) -> String {
+    match buffer {
+        Buffer::Input => "observation".to_owned(),
+        Buffer::Hidden(index) => format!("hidden{index}"),
+        Buffer::Block => "part".to_owned(),
+        Buffer::Output => "q".to_owned(),
+    }
+}
+
+fn function(layer: &Layer) -> String {
+    match layer.piece {
+        None => format!("layer{}", layer.index),
+        Some(piece) => format!("layer{}_{}", layer.index, piece.rows),
+    }
+}
+
+struct Printer<'a> {
+    program: &'a Program,
+    /// Prefix of names, and of macros.
+    n: &'a str,
+    u: String,
+    /// Type of sums and values.
+    kind: &'static str,
+}
+
+impl<'a> Printer<'a> {
+    fn new(program: &'a Program) -> Self {
+        Self {
+            program,
+            n: &program.name,
+            u: program.name.to_uppercase(),
+            kind: number::kind(program.scalar()).name,
+        }
+    }
+
+    /// The call of a whole layer.
+    fn call(&self, layer: &Layer) -> String {
+        let (from, to) = (place(layer.from), place(layer.to));
+        format!("{}_{}({from}, {to});", self.n, function(layer))
+    }
+
+    /// The call of a piece of a layer, for the block of that index.
+    fn piece(&self, node: &Loop, block: &str) -> Option<String> {
+        let Loop::Layer(layer) = node else { return None };
+        let (n, index, piece) = (self.n, layer.index, layer.piece?);
+        let sums = match layer.from {
+            Buffer::Block => "sums".to_owned(),
+            _ => format!("&{n}_bias{index}[{block} * {}u]", piece.biases),
+        };
+        let (from, to, weights) = (place(layer.from), place(layer.to), piece.weights);
+        Some(format!(
+            "{n}_{}({from}, {to}, &{n}_weights{index}[{block} * {weights}u], {sums});",
+            function(layer)
+        ))
+    }
+
+    fn function(&self, layer: &Layer, text: &mut Text) {
+        let Self { n, u, kind, program } = self;
+        let shape = &program.network.layers[layer.index];
+        let extent = match layer.piece {
+            Some(_) => format!(", {} -> {} of them", layer.inputs, layer.outputs),
+            None => String::new(),
+        };
+        let parameters = match layer.piece {
+            Some(_) => format!("const {kind} *x, {kind} *y, const float *w, const {kind} *bias"),
+            None => format!("const {kind} *{u}_RESTRICT x, {kind} *{u}_RESTRICT y"),
+        };
+        text.line("");
+        text.line(format!(
+            "/* {}: {} -> {}{extent} */",
+            shape.name, shape.inputs, shape.outputs
+        ));
+        text.function(
+            &format!("{u}_CODE static void {n}_{}({parameters})", function(layer)),
+            |text| {
+                if layer.piece.is_none() {
+                    text.line(format!("const float *w = {n}_weights{};", layer.index));
+                    text.line(format!("const {kind} *bias = {n}_bias{};", layer.index));
+                }
+                text.line(format!("{kind} *out = y;"));
+                self.counters(layer, text);
+                for node in &layer.body {
+                    match node {
+                        Loop::Repeat { count, body, .. } => {
+                            text.repeat("block", *count, |text| self.block(layer, body, text))
+                        }
+                        Loop::Store(store) => self.in_place(store, text),
+                        _ => {}
+                    }
+                }
+            },
+        );
+    }
+
+    /// Declarations of the counters that some build of the layer needs.
+    fn counters(&self, layer: &Layer, text: &mut Text) {
+        let unless = |text: &mut Text, is_spare: bool, condition: &str, line: &str| {
+            if is_spare {
+                text.directive(format!("#if !defined({}_{condition})", self.u));
+                text.line(line);
+                text.directive("#endif");
+            } else {
+                text.line(line);
+            }
+        };
+        unless(text, layer.has_assembly, "ASSEMBLY", "uint32_t i;");
+        match kept(layer) {
+            Kept::Registers => {}
+            kept => {
+                let is_stored = layer.body.iter().any(|node| matches!(node, Loop::Store(_)));
+                unless(text, kept == Kept::Vectors && !is_stored, "LANES", "uint32_t o;");
+            }
+        }
+        if layer
+            .body
+            .iter()
+            .any(|node| matches!(node, Loop::Repeat { count, .. } if *count > 1))
+        {
+            text.line("uint32_t block;");
+        }
+    }
+
+    /// One block of outputs.
+    fn block(&self, layer: &Layer, body: &[Loop], text: &mut Text) {
+        let portable = |text: &mut Text| {
+            for node in body {
+                match node {
+                    Loop::Sums(sums) => self.sums(sums, text),
+                    Loop::Store(store) => self.store(store, text),
+                    _ => {}
+                }
+            }
+        };
+        let kernel = layer.has_assembly.then(|| RealKernel::of(body)).flatten();
+        let assembly = kernel.map(|kernel| {
+            move |text: &mut Text| {
+                let activated = |row: usize| match body.last() {
+                    Some(Loop::Store(store)) => self.activated(store, &format!("done[{row}]")),
+                    _ => String::new(),
+                };
+                let is_left = !kernel.relu && activated(0) != "done[0]";
+                let activated: Option<&dyn Fn(usize) -> String> = if is_left { Some(&activated) } else { None };
+                text.block("", |text| text.lines(assembly::c::real(&kernel, activated)));
+            }
+        });
+        text.either(&format!("defined({}_ASSEMBLY)", self.u), assembly, portable);
+    }
+
+    fn sums(&self, sums: &Sums, text: &mut Text) {
+        let Sums { rows, inputs, .. } = *sums;
+        if sums.kept != Kept::Registers {
+            self.sums_in_memory(sums, text);
+            text.lines([format!("bias = &bias[{rows}];"), format!("out = &out[{rows}];")]);
+            return;
+        }
+        text.lines((0..rows).map(|row| format!("{} s{row} = bias[{row}];", self.kind)));
+        text.count("i", 0, inputs, |text| {
+            text.line(format!("const {} input = x[i];", self.kind));
+            text.lines((0..rows).map(|row| {
+                let next = self.accumulated([&format!("s{row}"), &format!("w[{row}]"), "input"]);
+                format!("s{row} = {next};")
+            }));
+            text.line(format!("w = &w[{rows}];"));
+        });
+    }
+
+    /// The axpy form: the first input with the bias, so that no pass is spent on copying it.
+    fn sums_in_memory(&self, sums: &Sums, text: &mut Text) {
+        let Sums { rows, inputs, .. } = *sums;
+        let widths: &[usize] = if sums.kept == Kept::Vectors { &LANES } else { &[] };
+        for (at, lanes) in widths.iter().enumerate() {
+            let directive = if at == 0 { "if" } else { "elif" };
+            text.directive(format!(
+                "#{directive} defined({u}_LANES) && ({u}_LANES == {lanes})",
+                u = self.u
+            ));
+            self.sums_in_vectors(sums, *lanes, text);
+        }
+        if !widths.is_empty() {
+            text.directive("#else");
+        }
+        let all = |text: &mut Text, next: String| {
+            text.count("o", 0, rows, |text| text.line(format!("out[o] = {next};")));
+        };
+        all(text, self.accumulated(["bias[o]", "w[o]", "x[0]"]));
+        text.line(format!("w = &w[{rows}];"));
+        text.count("i", 1, inputs, |text| {
+            text.line(format!("const {} input = x[i];", self.kind));
+            all(text, self.accumulated(["out[o]", "w[o]", "input"]));
+            text.line(format!("w = &w[{rows}];"));
+        });
+        if !widths.is_empty() {
+            text.directive("#endif");
+        }
+    }
+
+    /// The sums of a block as vectors of `lanes`, then of four, then as scalars.
+    fn sums_in_vectors(&self, sums: &Sums, lanes: usize, text: &mut Text) {
+        let Sums { rows, inputs, .. } = *sums;
+        let (mut start, mut turn, mut end) = (Vec::new(), Vec::new(), Vec::new());
+        let mut first = 0;
+        while first < rows {
+            let widths = [lanes, 4, 1].into_iter();
+            let width = widths.clone().find(|width| first + width <= rows).unwrap_or(1);
+            let kind = match width {
+                1 => "float".to_owned(),
+                _ => format!("{}_lanes{width}", self.n),
+            };
+            let at = |array: &str, kind: &str| match width {
+                1 => format!("{array}[{first}]"),
+                _ => format!("*({kind} *)&{array}[{first}]"),
+            };
+            let constant = format!("const {kind}");
+            start.push(format!("{kind} s{first} = {};", at("bias", &constant)));
+            turn.push(format!("s{first} = s{first} + ({} * input);", at("w", &constant)));
+            end.push(format!("{} = s{first};", at("out", &kind)));
+            first += width;
+        }
+        text.lines(start);
+        text.count("i", 0, inputs, |text| {
+            text.line(format!("const {} input = x[i];", self.kind));
+            text.lines(turn);
+            text.line(format!("w = &w[{rows}];"));
+        });
+        text.lines(end);
+    }
+
+    fn store(&self, store: &Store, text: &mut Text) {
+        let rows = store.rows;
+        text.lines((0..rows).map(|row| format!("out[{row}] = {};", self.activated(store, &format!("s{row}")))));
+        text.lines([format!("bias = &bias[{rows}];"), format!("out = &out[{rows}];")]);
+    }
+
+    fn in_place(&self, store: &Store, text: &mut Text) {
+        let activated = self.activated(store, "y[o]");
+        text.count("o", 0, store.rows, |text| text.line(format!("y[o] = {activated};")));
+    }
+
+    fn accumulated(&self, [sum, weight, input]: [&str; 3]) -> String {
+        match self.program.network.arithmetic {
+            Arithmetic::Real { fused: true, .. } => format!("{}_fma({weight}, {input}, {sum})", self.n),
+            // weights are binary32
+            _ if self.program.scalar() == Scalar::F64 => format!("{sum} + ((double){weight} * {input})"),
+            _ => format!("{sum} + ({weight} * {input})"),
+        }
+    }
+
+    /// The output that a sum becomes.
+    fn activated(&self, store: &Store, sum: &str) -> String {
+        let n = self.n;
+        match store.activation {
+            ActivationCode::Identity => sum.to_owned(),
+            ActivationCode::Relu => format!("{n}_relu({sum})"),
+            ActivationCode::LeakyRelu(slope) => {
+                format!(
+                    "{n}_leaky_relu({sum}, {})",
+                    number::number(self.program.scalar(), slope)
+                )
+            }
+            ActivationCode::Tanh => format!("{n}_tanh({sum})"),
         }
     }
 }
@@ -255,87 +343,14 @@ impl Arithmetic<'_> {
 /// Floats in a vector: SSE2 and NEON, AVX, AVX-512.
 const LANES: [usize; 3] = [4, 8, 16];
 
-/// The sums of a block as vectors of `lanes`, then of four, then as scalars.
-fn vectors(name: &str, lanes: usize, rows: usize) -> VectorView {
-    let mut view = VectorView {
-        lanes,
-        start: Vec::new(),
-        turn: Vec::new(),
-        end: Vec::new(),
-    };
-    let mut first = 0;
-    while first < rows {
-        let width = [lanes, 4, 1]
-            .into_iter()
-            .find(|width| first + width <= rows)
-            .unwrap_or(1);
-        let kind = if width == 1 {
-            "float".to_owned()
-        } else {
-            format!("{name}_lanes{width}")
-        };
-        let at = |array: &str, kind: &str, first: usize| {
-            if width == 1 {
-                format!("{array}[{first}]")
-            } else {
-                format!("*({kind} *)&{array}[{first}]")
-            }
-        };
-        let constant = format!("const {kind}");
-        view.start
-            .push(format!("{kind} s{first} = {};", at("bias", &constant, first)));
-        view.turn.push(format!(
-            "s{first} = s{first} + ({} * input);",
-            at("w", &constant, first)
-        ));
-        view.end.push(format!("{} = s{first};", at("out", &kind, first)));
-        first += width;
-    }
-    view
-}
-
-/// One asm statement for a block, then what it leaves of the activation.
-fn assembly(arithmetic: Arithmetic<'_>, layer: &LayerCode, kernel: &RealKernel) -> Vec<String> {
-    let activated = |row: usize| arithmetic.activation(layer.activation, &format!("done[{row}]"));
-    let applied = !kernel.relu && !activated(0).is_empty();
-    let mut lines = vec![
-        "const float *input = x;".to_owned(),
-        format!("uint32_t turns = {}u;", kernel.turns()),
-    ];
-    if kernel.relu {
-        lines.push("uint32_t low, high;".to_owned());
-    }
-    if applied {
-        lines.push("float *const done = out;".to_owned());
-    }
-    lines.push("__asm__ volatile(".to_owned());
-    let text = kernel.text(&|operand| format!("%[{operand}]"), &|list| format!("{{{list}}}"));
-    lines.extend(text.iter().map(|line| format!("    \"{line}\\n\\t\"")));
-    let advanced = ["w", "input", "bias", "out", "turns"].map(|name| format!("[{name}] \"+r\"({name})"));
-    let mut outputs = advanced.to_vec();
-    if kernel.relu {
-        outputs.extend(["low", "high"].map(|name| format!("[{name}] \"=&r\"({name})")));
-    }
-    lines.push(format!("    : {}", outputs.join(", ")));
-    lines.push("    :".to_owned());
-    let clobbered = RealKernel::clobbered().into_iter().map(|name| format!("\"{name}\""));
-    let clobbered: Vec<String> = clobbered.collect();
-    lines.push(format!("    : {}, \"cc\", \"memory\");", clobbered.join(", ")));
-    if applied {
-        lines.extend((0..kernel.height).map(|row| format!("done[{row}] = {};", activated(row))));
-    }
-    std::iter::once("{".to_owned())
-        .chain(lines.into_iter().map(|line| format!("    {line}")))
-        .chain(["}".to_owned()])
-        .collect()
-}
-
-fn row(arithmetic: Arithmetic<'_>, layer: &LayerCode, index: usize) -> RealRowView {
-    let sum = format!("s{index}");
-    let activated = arithmetic.activation(layer.activation, &sum);
-    RealRowView {
-        index,
-        next: arithmetic.accumulated([sum.as_str(), &format!("w[{index}]"), "input"]),
-        result: if activated.is_empty() { sum } else { activated },
+/// Where the sums of a layer are kept.
+fn kept(layer: &Layer) -> Kept {
+    let first = layer.body.iter().find_map(|node| match node {
+        Loop::Repeat { body, .. } => body.first(),
+        _ => None,
+    });
+    match first {
+        Some(Loop::Sums(sums)) => sums.kept,
+        _ => Kept::Registers,
     }
 }

@@ -1,89 +1,45 @@
-//! Tables, layers and the data of the checks.
-
-use templates::c::{CrcItem, CrcKind, Member, SelfTestView, Table};
+//! Tables as arrays, and the data of the checks.
 
 use policy::Scalar;
+use templates::c::{CrcItem, CrcKind, Member, SelfTestView, Table as TableView};
 
-use super::integer;
 use super::number::{self, number};
-use super::statements::{float, unsigned};
-use crate::crc::nibble_table;
+use super::statements::unsigned;
+use crate::lower::activation::{TANH_DENOMINATOR, TANH_NUMERATOR};
 use crate::lower::known_answers::{LCG, SEED, UNIT, VECTORS};
-use crate::lower::network::{TANH_DENOMINATOR, TANH_NUMERATOR};
-use crate::program::{LayerCode, Literal, NetworkCode, Program};
+use crate::program::{Element, Literal, Program, Table};
 
 /// Columns up to which literals of a table are gathered in a line.
 const LINE: usize = 108;
 
-/// All constant tables in the order of the file.
-pub fn tables(program: &Program) -> Vec<Table> {
-    let mut all = match &program.network {
-        NetworkCode::Real { scalar, layers, .. } => real_tables(*scalar, layers),
-        NetworkCode::Integer(network) => integer::tables(network),
+/// A table as C has it: one array.
+pub fn view(table: &Table) -> TableView {
+    let literal = |value: &Literal| match table.element {
+        Element::Float(scalar) => number(scalar, *value),
+        Element::Integer { .. } => (value.value() as i64).to_string(),
+        Element::Word => format!("0x{:08X}u", value.value() as u32),
     };
-    let scalar = program.scalar();
-    all.push(numbers("duties".into(), scalar, program.duties.iter().copied()));
-    all.push(words("crc_steps", &nibble_table()));
-    all.push(words("answers", &program.self_test.answers));
-    let ranges = || program.self_test.observation_box.iter();
-    all.push(numbers("box_low".into(), scalar, ranges().map(|range| range.0)));
-    all.push(numbers("box_width".into(), scalar, ranges().map(|range| range.1)));
-    all
-}
-
-/// Weights stay binary32 in either format; sums start with a bias.
-fn real_tables(scalar: Scalar, layers: &[LayerCode]) -> Vec<Table> {
-    let tables = layers.iter().enumerate().map(|(index, layer)| {
-        [
-            Table {
-                aligned: layer.alignment.is_some(),
-                ..floats(format!("weights{index}"), &layer.table)
-            },
-            numbers(
-                format!("bias{index}"),
-                scalar,
-                layer.bias.iter().map(|b| Literal::nearest(scalar, f64::from(*b))),
-            ),
-        ]
-    });
-    tables.flatten().collect()
-}
-
-/// A table of numbers of the format.
-pub fn numbers(name: String, scalar: Scalar, values: impl ExactSizeIterator<Item = Literal>) -> Table {
-    Table {
-        element: number::kind(scalar).name,
-        name,
-        length: values.len(),
-        lines: wrap(values.map(|value| number(scalar, value))),
-        aligned: false,
+    TableView {
+        element: element(table.element),
+        name: table.name.clone(),
+        length: table.values.len(),
+        lines: wrap(table.values.iter().map(literal)),
+        aligned: table.alignment.is_some(),
     }
 }
 
-/// A table of floats.
-pub fn floats(name: String, values: &[f32]) -> Table {
-    Table {
-        element: "float",
-        name,
-        length: values.len(),
-        lines: wrap(values.iter().map(|value| float(*value))),
-        aligned: false,
+/// C type of a value.
+pub fn element(element: Element) -> &'static str {
+    match element {
+        Element::Float(scalar) => number::kind(scalar).name,
+        Element::Integer { bytes: 1 } => "int8_t",
+        Element::Integer { bytes: 2 } => "int16_t",
+        Element::Integer { .. } => "int32_t",
+        Element::Word => "uint32_t",
     }
 }
 
-/// A table of 32-bit words.
-pub fn words(name: &str, values: &[u32]) -> Table {
-    let literals = values.iter().map(|word| format!("0x{word:08X}u"));
-    Table {
-        element: "uint32_t",
-        name: name.to_owned(),
-        length: values.len(),
-        lines: wrap(literals),
-        aligned: false,
-    }
-}
-
-pub(super) fn wrap(literals: impl Iterator<Item = String>) -> Vec<String> {
+fn wrap(literals: impl Iterator<Item = String>) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for literal in literals {
         match lines.last_mut() {
@@ -117,73 +73,48 @@ pub fn tanh_steps(scalar: Scalar) -> Vec<Member> {
     steps
 }
 
-/// Tables that the CRC covers, in the order of [`Program::table_words`].
-pub fn integrity(program: &Program) -> Vec<CrcItem> {
-    let (weights, bias) = match program.network {
-        NetworkCode::Real {
-            scalar: Scalar::F64, ..
-        } => ("crc_weights", "crc"),
-        NetworkCode::Real { .. } => ("crc", "crc"),
-        NetworkCode::Integer(_) => ("crc_weights", "crc_bias"),
-    };
-    let mut items: Vec<CrcItem> = tables(program)
-        .into_iter()
-        .filter_map(|table| {
-            let function = if table.name.starts_with("weights") {
-                weights
-            } else if table.name.starts_with("bias") {
-                bias
-            } else {
-                return None;
-            };
-            Some(CrcItem {
-                function,
-                table: table.name,
-                length: table.length,
-            })
-        })
-        .collect();
-    items.push(CrcItem {
-        function: "crc",
-        table: "duties".into(),
-        length: program.duties.len(),
-    });
-    items
+/// CRC function of tables of this element, in a program of that format.
+fn crc(scalar: Scalar, element: Element) -> &'static str {
+    match element {
+        Element::Float(own) if own == scalar => "crc",
+        Element::Integer { bytes: 4 } => "crc_bias",
+        Element::Float(_) | Element::Integer { .. } | Element::Word => "crc_weights",
+    }
 }
 
-/// CRC functions that [`integrity`] and the self test call.
-pub fn crc_kinds(program: &Program) -> Vec<CrcKind> {
-    let n = &program.name;
-    let kind = number::kind(program.scalar());
-    let word = format!("{n}_bits(words[i])");
-    let mut kinds = vec![CrcKind {
-        name: "crc",
-        element: kind.name,
-        words: if kind.is_wide {
-            vec![format!("(uint32_t){word}"), format!("(uint32_t)({word} >> 32)")]
-        } else {
-            vec![word]
-        },
-    }];
-    let of_type = |name: &'static str, element: &'static str, word: String| CrcKind {
-        name,
-        element,
-        words: vec![word],
+/// Tables that the CRC covers, in order.
+pub fn integrity(program: &Program) -> Vec<CrcItem> {
+    let item = |table: &Table| CrcItem {
+        function: crc(program.scalar(), table.element),
+        table: table.name.clone(),
+        length: table.values.len(),
     };
-    match &program.network {
-        NetworkCode::Real {
-            scalar: Scalar::F64, ..
-        } => {
-            kinds.push(of_type("crc_weights", "float", format!("{n}_weight_bits(words[i])")));
-        }
-        NetworkCode::Real { .. } => {}
-        NetworkCode::Integer(network) => {
-            let word = || "(uint32_t)(int32_t)words[i]".to_owned();
-            kinds.push(of_type("crc_weights", integer::element(network), word()));
-            kinds.push(of_type("crc_bias", "int32_t", word()));
+    program.checked_tables().map(item).collect()
+}
+
+/// CRC functions that [`integrity`] and the self test call, that of numbers first.
+pub fn crc_kinds(program: &Program) -> Vec<CrcKind> {
+    let (n, scalar) = (&program.name, program.scalar());
+    let mut elements = vec![Element::Float(scalar)];
+    for table in program.checked_tables() {
+        if !elements.contains(&table.element) {
+            elements.push(table.element);
         }
     }
-    kinds
+    let kind = |of: Element| CrcKind {
+        name: crc(scalar, of),
+        element: element(of),
+        words: match of {
+            Element::Float(own) if own != scalar => vec![format!("{n}_weight_bits(words[i])")],
+            Element::Float(Scalar::F32) => vec![format!("{n}_bits(words[i])")],
+            Element::Float(Scalar::F64) => vec![
+                format!("(uint32_t){n}_bits(words[i])"),
+                format!("(uint32_t)({n}_bits(words[i]) >> 32)"),
+            ],
+            Element::Integer { .. } | Element::Word => vec!["(uint32_t)(int32_t)words[i]".to_owned()],
+        },
+    };
+    elements.into_iter().map(kind).collect()
 }
 
 /// Constants of the self test.

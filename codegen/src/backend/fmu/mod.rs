@@ -10,8 +10,9 @@ use templates::fmu::{
 };
 
 use super::block;
-use super::c99::{C99, render};
-use crate::{Backend, CodegenError, GeneratedFiles, Program, TOOL};
+use super::c99::{self, render};
+use crate::files::{CodegenError, GeneratedFiles, TOOL};
+use crate::program::Program;
 
 /// Version of the interface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -110,7 +111,7 @@ pub fn emit(program: &Program, fmi: Fmi) -> Result<GeneratedFiles, CodegenError>
 
 /// SHA-256 of core and block: another controller, another FMU.
 fn digest(program: &Program, block: &GeneratedFiles) -> Result<String, CodegenError> {
-    let core = C99.emit(program)?;
+    let core = c99::emit(program)?;
     let texts = core.files.iter().chain(&block.files);
     let all: String = texts.map(|(name, text)| format!("{name}\n{text}\n")).collect();
     Ok(sha256(all.as_bytes()))

@@ -4,9 +4,8 @@ use policy::Scalar;
 use templates::block::BlockView;
 use templates::fmu::{Kind, UnitView, VariableView};
 
-use crate::Program;
 use crate::backend::literal::number;
-use crate::program::SignalPort;
+use crate::program::{Program, SignalPort};
 
 /// Inputs, `enable`, outputs, parameters; and a name for the time that none of them has.
 pub fn of(program: &Program, block: &BlockView) -> (Vec<VariableView>, String) {

@@ -9,16 +9,16 @@ mod trace;
 
 use std::collections::BTreeMap;
 
-use templates::c::{Common, Table};
+use templates::c::Common;
 use templates::kit::{Kit, Subject};
 
 use super::c99::number::{kind, number};
 use super::c99::statements::unsigned;
-use super::c99::tables::{numbers, words};
-use super::c99::{C99, render};
-use crate::backend::{Backend, banner};
-use crate::program::{Literal, words as number_words};
-use crate::{CodegenError, GeneratedFiles, Program};
+use super::c99::tables::view as table;
+use super::c99::{self, render};
+use crate::backend::banner;
+use crate::files::{CodegenError, GeneratedFiles};
+use crate::program::{Element, Literal, Program, Table, words as number_words};
 
 use texts::Texts;
 pub use trace::Trace;
@@ -64,8 +64,8 @@ pub fn emit(program: &Program, material: &Material) -> Result<GeneratedFiles, Co
         probe_lines: probes.iter().map(|probe| probe.row(scalar)).collect(),
         probe_count: probes.len(),
         third: number(scalar, Literal::nearest(scalar, 1.0 / 3.0)),
-        literals: numbers("literals".into(), scalar, literals.into_iter()),
-        literal_bits: words("literal_bits", &literal_bits),
+        literals: table(&Table::plain("literals", Element::Float(scalar), literals)),
+        literal_bits: table(&Table::words("literal_bits", &literal_bits)),
         suite,
         subjects: controllers.chain([subject(&name, program, &material.policy)]).collect(),
     };
@@ -76,10 +76,10 @@ pub fn emit(program: &Program, material: &Material) -> Result<GeneratedFiles, Co
 
 /// Header and source of a controller of the suite as one text.
 fn core(program: &Program) -> Result<String, CodegenError> {
-    let files = C99.emit(program)?.files;
+    let files = c99::emit(program)?.files;
     let part = |extension: &str| files.get(&format!("{}.{extension}", program.name));
     let (Some(header), Some(source)) = (part("h"), part("c")) else {
-        return Err(CodegenError::Door("the C backend gave no header or no source"));
+        return Err(CodegenError::Output("the C backend gave no header or no source"));
     };
     Ok(header.clone() + &source.replace(&format!("#include \"{}.h\"\n", program.name), ""))
 }
@@ -92,10 +92,7 @@ fn subject(kit: &str, program: &Program, trace: &Trace) -> Subject {
     Subject {
         name: program.name.clone(),
         upper: program.name.to_uppercase(),
-        events: Table {
-            element: "uint32_t",
-            ..words("events", trace.words())
-        },
+        events: table(&Table::words("events", trace.words())),
         event_count: unsigned(trace.events()),
         steps: trace.steps(),
         measurement,

@@ -2,7 +2,7 @@
 
 use policy::Scalar;
 
-use crate::Program;
+use crate::program::Program;
 
 /// Statements for one controller of a kit.
 pub struct Texts<'a> {

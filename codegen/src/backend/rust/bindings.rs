@@ -4,19 +4,19 @@ use policy::Scalar;
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use super::{DEFAULT_TYPE, constants, ident, size, types};
+use super::tokens::{ident, size};
+use super::{DEFAULT_TYPE, constants, types};
 use super::{integrity, number};
 use crate::program::Program;
 
 /// `<name>_ffi.rs`: `Measurement`, `Command`, `status` and `Controller` as in the Rust backend's file, over the C core.
-pub struct Bindings;
-
-impl crate::Backend for Bindings {
-    fn emit(&self, program: &Program) -> Result<crate::GeneratedFiles, crate::CodegenError> {
-        let title = format!("Controller {} in C, from Rust", program.name);
-        let banner = crate::backend::banner(program, &title, program.provenance.c_flags);
-        super::file(format!("{}_ffi.rs", program.name), &banner, items(program))
-    }
+///
+/// # Errors
+/// Only for a fault in the compiler itself.
+pub fn emit(program: &Program) -> Result<crate::files::GeneratedFiles, crate::files::CodegenError> {
+    let title = format!("Controller {} in C, from Rust", program.name);
+    let banner = crate::backend::banner(program, &title, program.provenance.c_flags);
+    super::file(format!("{}_ffi.rs", program.name), &banner, items(program))
 }
 
 fn items(program: &Program) -> TokenStream {

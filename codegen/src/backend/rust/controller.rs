@@ -6,21 +6,19 @@ use quote::quote;
 
 use super::number::{self, number};
 use super::statements::{Printer, coefficient_field};
-use super::{ident, integrity, network, size, word};
-use crate::lower::known_answers::{LCG, SEED, UNIT};
-use crate::program::{Coefficient, Literal, Program};
+use super::tokens::{ident, size, word};
+use super::{integrity, network, tables};
+use crate::lower::known_answers::{LCG, SEED, UNIT, VECTORS};
+use crate::program::{Coefficient, Element, Literal, Program, StateMember, StateValue};
 
 /// Type and implementation.
 pub fn items(program: &Program, name: &Ident) -> TokenStream {
     let scalar = program.scalar();
     let kind = number::kind(scalar);
-    let fields = fields(program);
-    let (declared, initial): (Vec<_>, Vec<_>) = fields
-        .iter()
-        .map(|field| (field.declaration(scalar), field.initial(scalar)))
-        .unzip();
+    let members = program.state.iter().map(|member| self::member(scalar, member));
+    let (declared, initial): (Vec<_>, Vec<_>) = members.unzip();
     let front = front(program);
-    let lifecycle = lifecycle(program, &fields);
+    let lifecycle = lifecycle(program);
     let sense = sense(program);
     let decide = decide(program);
     let advance = advance(program);
@@ -78,10 +76,9 @@ pub fn items(program: &Program, name: &Ident) -> TokenStream {
     }
 }
 
-/// Bodies of `eval` and `step`. To sense is a few per cent of the network where floats are hardware: there a measurement is
-/// sensed again after it instead of kept on the stack.
+/// Bodies of `eval` and `step`.
 fn bodies(program: &Program) -> (TokenStream, TokenStream) {
-    if program.has_fpu {
+    if program.senses_again {
         return (
             quote! {
                 let chosen = self.choose_for(measured);
@@ -107,118 +104,45 @@ fn bodies(program: &Program) -> (TokenStream, TokenStream) {
     )
 }
 
-/// A state member in contract order.
-struct Field {
-    name: Ident,
-    kind: Kind,
-}
-
-enum Kind {
-    Numbers(Vec<Literal>),
-    Number(Literal),
-    Coefficient(Literal),
-    Word,
-}
-
-impl Field {
-    fn declaration(&self, scalar: Scalar) -> TokenStream {
-        let kind = number::kind(scalar);
-        let name = &self.name;
-        match &self.kind {
-            Kind::Numbers(values) => {
-                let length = size(values.len());
-                quote!(#name: [#kind; #length])
-            }
-            Kind::Number(_) | Kind::Coefficient(_) => quote!(#name: #kind),
-            Kind::Word => quote!(#name: u32),
-        }
-    }
-
-    fn initial(&self, scalar: Scalar) -> TokenStream {
-        let name = &self.name;
-        match &self.kind {
-            Kind::Numbers(values) if values.iter().all(|value| value.value().to_bits() == 0) => {
-                let length = size(values.len());
-                quote!(#name: [0.0; #length])
-            }
-            Kind::Numbers(values) => {
+/// A member of the state: its declaration and its value before the first step.
+fn member(scalar: Scalar, member: &StateMember) -> (TokenStream, TokenStream) {
+    let (kind, name) = (number::kind(scalar), ident(&member.name));
+    match &member.value {
+        StateValue::Numbers(values) => {
+            let length = size(values.len());
+            let initial = if values.iter().all(|value| value.value().to_bits() == 0) {
+                quote!([0.0; #length])
+            } else {
                 let values = values.iter().map(|value| number(scalar, *value));
-                quote!(#name: [#(#values),*])
-            }
-            Kind::Number(value) | Kind::Coefficient(value) => {
-                let value = number(scalar, *value);
-                quote!(#name: #value)
-            }
-            Kind::Word => quote!(#name: 0),
+                quote!([#(#values),*])
+            };
+            (quote!(#name: [#kind; #length]), quote!(#name: #initial))
         }
-    }
-
-    /// Expression that appends the field's words to the iterator `next`.
-    fn words(&self, scalar: Scalar) -> TokenStream {
-        let name = &self.name;
-        let own = quote!(self.#name);
-        match &self.kind {
-            Kind::Numbers(_) => {
-                let words = number::all_words(scalar, &own);
-                quote!(.chain(#words))
-            }
-            Kind::Number(_) | Kind::Coefficient(_) => {
-                let words = number::words(scalar, &own);
-                quote!(.chain(#words))
-            }
-            Kind::Word => quote!(.chain(core::iter::once(self.#name))),
+        StateValue::Number(value) | StateValue::Coefficient(value) => {
+            let value = number(scalar, *value);
+            (quote!(#name: #kind), quote!(#name: #value))
         }
+        StateValue::Word => (quote!(#name: u32), quote!(#name: 0)),
     }
 }
 
-fn fields(program: &Program) -> Vec<Field> {
-    let field = |name: &str, kind| Field {
-        name: ident(name),
-        kind,
-    };
-    let held = program.signals.iter().map(|signal| signal.initial).collect();
-    let initial = program.initial_duty;
-    let mut fields = vec![field("held", Kind::Numbers(held))];
-    if program.memory_words > 0 {
-        fields.push(field(
-            "memory",
-            Kind::Numbers(vec![Literal::nearest(program.scalar(), 0.0); program.memory_words]),
-        ));
-    }
-    fields.push(field("previous_duty", Kind::Number(initial)));
-    fields.push(field("previous_command", Kind::Number(initial)));
-    fields.extend(
-        program
-            .soft_start_from
-            .map(|from| field("soft_cap", Kind::Number(from))),
-    );
-    for (name, value, ..) in program.mapping.iter().flat_map(|mapping| &mapping.coefficients) {
-        fields.push(Field {
-            name: coefficient_field(*name),
-            kind: Kind::Coefficient(*value),
-        });
-    }
-    fields.push(field("bad_count", Kind::Word));
-    fields.push(field("primed", Kind::Word));
-    fields
-}
-
-fn lifecycle(program: &Program, fields: &[Field]) -> TokenStream {
-    let kept: Vec<_> = program
-        .mapping
-        .iter()
-        .flat_map(|mapping| &mapping.coefficients)
-        .map(|(name, ..)| {
-            let name = coefficient_field(*name);
-            quote!(#name: self.#name)
-        })
-        .collect();
+fn lifecycle(program: &Program) -> TokenStream {
+    let scalar = program.scalar();
+    let coefficients = (program.state.iter()).filter(|member| matches!(member.value, StateValue::Coefficient(_)));
+    let kept: Vec<Ident> = coefficients.map(|member| ident(&member.name)).collect();
     let fresh = if kept.is_empty() {
         quote!(Self::new())
     } else {
-        quote!(Self { #(#kept,)* ..Self::new() })
+        quote!(Self { #(#kept: self.#kept,)* ..Self::new() })
     };
-    let words = fields.iter().map(|field| field.words(program.scalar()));
+    let words = program.state.iter().map(|member| {
+        let name = ident(&member.name);
+        match &member.value {
+            StateValue::Numbers(_) => number::all_words(scalar, &quote!(self.#name)),
+            StateValue::Number(_) | StateValue::Coefficient(_) => number::words(scalar, &quote!(self.#name)),
+            StateValue::Word => quote!(core::iter::once(self.#name)),
+        }
+    });
     quote! {
         /// Start-up state, but coefficients set at run time stay.
         pub fn reset(&mut self) {
@@ -228,7 +152,7 @@ fn lifecycle(program: &Program, fields: &[Field]) -> TokenStream {
         #[must_use]
         pub fn state_words(&self) -> [u32; STATE_WORDS] {
             let mut words = [0; STATE_WORDS];
-            let state = core::iter::empty() #(#words)*;
+            let state = core::iter::empty() #(.chain(#words))*;
             for (word, value) in words.iter_mut().zip(state) {
                 *word = value;
             }
@@ -315,7 +239,7 @@ fn decide(program: &Program) -> TokenStream {
     let fallback = number(program.scalar(), program.fallback_duty);
     let kind = number::kind(program.scalar());
     let (lowest, greater) = network::argmax(program);
-    let apart = program.has_fpu.then(|| {
+    let apart = program.senses_again.then(|| {
         quote! {
             /// The greedy action for a measurement, with a stack of its own.
             #[inline(never)]
@@ -442,18 +366,11 @@ fn set_mapping(program: &Program) -> Option<TokenStream> {
 }
 
 fn checks(program: &Program) -> TokenStream {
-    let test = &program.self_test;
     let scalar = program.scalar();
     let kind = number::kind(scalar);
-    let checksum = integrity::checksum(scalar);
-    let column = |pick: fn(&(Literal, Literal)) -> Literal| {
-        let values = test.observation_box.iter().map(|range| number(scalar, pick(range)));
-        quote!([#(#values),*])
-    };
-    let low = column(|range| range.0);
-    let width = column(|range| range.1);
-    let answers = test.answers.iter().map(|answer| word(*answer));
-    let vectors = size(test.answers.len());
+    let checksum = integrity::checksum(Element::Float(scalar));
+    let [low, width, answers] = ["box_low", "box_width", "answers"].map(|name| tables::values(program, name));
+    let vectors = size(VECTORS);
     let (seed, multiplier, increment, unit) = (
         word(SEED),
         word(LCG.0),
@@ -472,7 +389,7 @@ fn checks(program: &Program) -> TokenStream {
         pub fn self_test() -> Result<(), u32> {
             static BOX_LOW: [#kind; FEATURES] = #low;
             static BOX_WIDTH: [#kind; FEATURES] = #width;
-            static ANSWERS: [u32; #vectors] = [#(#answers),*];
+            static ANSWERS: [u32; #vectors] = #answers;
             let mut random: u32 = #seed;
             let mut failed = 0_u32;
             let mut vector = 0_u32;

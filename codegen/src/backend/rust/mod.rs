@@ -4,51 +4,57 @@
 pub mod bindings;
 mod controller;
 mod integer;
+mod integer_loops;
 mod integrity;
-mod kernels;
+pub(crate) mod kernels;
+mod loops;
 mod network;
 mod number;
 mod statements;
-mod streamed;
+mod tables;
+pub(crate) mod tokens;
 
-use proc_macro2::{Ident, Literal, Span, TokenStream};
+use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
 use crate::lower::STATUS;
 use crate::program::Program;
+use tokens::{ident, size, word};
 
 /// Name of the controller type unless the user gives one.
 pub const DEFAULT_TYPE: &str = "Controller";
 
-/// The Rust backend as text, one file `<name>.rs` without inner attributes: usable as a module or by `include!`.
+/// The controller as text, one file `<name>.rs` without inner attributes: usable as a module or by `include!`.
+///
+/// # Errors
+/// Only for a fault in the compiler itself.
 #[cfg(feature = "rust-text")]
-pub struct RustText;
-
-#[cfg(feature = "rust-text")]
-impl crate::Backend for RustText {
-    fn emit(&self, program: &Program) -> Result<crate::GeneratedFiles, crate::CodegenError> {
-        let title = format!("Controller {}", program.name);
-        let banner = crate::backend::banner(program, &title, program.provenance.rust_flags);
-        file(format!("{}.rs", program.name), &banner, items(program, DEFAULT_TYPE))
-    }
+pub fn emit(program: &Program) -> Result<crate::files::GeneratedFiles, crate::files::CodegenError> {
+    let title = format!("Controller {}", program.name);
+    let banner = crate::backend::banner(program, &title, program.provenance.rust_flags);
+    file(format!("{}.rs", program.name), &banner, items(program, DEFAULT_TYPE))
 }
 
 /// One file: the banner, then the items.
 #[cfg(feature = "rust-text")]
-fn file(path: String, banner: &[String], items: TokenStream) -> Result<crate::GeneratedFiles, crate::CodegenError> {
-    let file = syn::parse2(items).map_err(|error| crate::CodegenError::Rust(error.to_string()))?;
+fn file(
+    path: String,
+    banner: &[String],
+    items: TokenStream,
+) -> Result<crate::files::GeneratedFiles, crate::files::CodegenError> {
+    let file = syn::parse2(items).map_err(|error| crate::files::CodegenError::Rust(error.to_string()))?;
     let mut text: String = banner.iter().map(|line| format!("// {line}\n")).collect();
     text.push('\n');
     text.push_str(&prettyplease::unparse(&file));
     let files = std::iter::once((path, text)).collect();
-    Ok(crate::GeneratedFiles { files })
+    Ok(crate::files::GeneratedFiles { files })
 }
 
 /// All items of a controller; `type_name` must be an identifier.
 #[must_use]
 pub fn items(program: &Program, type_name: &str) -> TokenStream {
     let constants = constants(program);
-    let crc_steps = crate::crc::nibble_table().map(word);
+    let crc_steps = tables::values(program, "crc_steps");
     let types = types(program, &TokenStream::new());
     let helpers = statements::helpers(program);
     let network = network::items(program);
@@ -56,7 +62,7 @@ pub fn items(program: &Program, type_name: &str) -> TokenStream {
     let controller = controller::items(program, &ident(type_name));
     quote! {
         #constants
-        static CRC_STEPS: [u32; 16] = [#(#crc_steps),*];
+        static CRC_STEPS: [u32; 16] = #crc_steps;
         #types
         #helpers
         #network
@@ -65,37 +71,15 @@ pub fn items(program: &Program, type_name: &str) -> TokenStream {
     }
 }
 
-fn ident(name: &str) -> Ident {
-    Ident::new(name, Span::call_site())
-}
-
-/// A float literal without suffix; the context gives the type.
-fn float(value: f32) -> TokenStream {
-    let magnitude = Literal::f32_unsuffixed(value.abs());
-    if value.is_sign_negative() {
-        quote!(-#magnitude)
-    } else {
-        quote!(#magnitude)
-    }
-}
-
-fn size(value: usize) -> Literal {
-    Literal::usize_unsuffixed(value)
-}
-
-fn word(value: u32) -> Literal {
-    Literal::u32_unsuffixed(value)
-}
-
 fn constants(program: &Program) -> TokenStream {
     let signals = size(program.signals.len());
     let features = size(program.feature_count());
     let actions = size(program.duties.len());
     let state_words = size(program.state_words());
     let period = Literal::f64_unsuffixed(program.sample_period);
-    let bits = STATUS.iter().map(|(name, bit)| {
-        let (name, value) = (ident(name), word(1 << bit));
-        let meaning = status_meaning(*bit);
+    let bits = STATUS.iter().map(|bit| {
+        let (name, value) = (ident(bit.name), word(1 << bit.number));
+        let meaning = format!(" {}", bit.meaning);
         quote! { #[doc = #meaning] pub const #name: u32 = #value; }
     });
     quote! {
@@ -111,19 +95,6 @@ fn constants(program: &Program) -> TokenStream {
         pub const SAMPLE_PERIOD: f64 = #period;
         /// Bits of [`Command::status`].
         pub mod status { #(#bits)* }
-    }
-}
-
-fn status_meaning(bit: u32) -> &'static str {
-    match bit {
-        0 => " Held samples bridge an invalid measurement.",
-        1 => " No usable measurement: the fallback duty is commanded.",
-        2 => " This step primed the filters.",
-        3 => " An observation was clipped.",
-        4 => " Outside the mapping's validity range.",
-        5 => " The slew limit was active.",
-        6 => " The soft start was active.",
-        _ => " A duty limit was active.",
     }
 }
 

@@ -1,29 +1,31 @@
 //! Tables, layers and `q_values`.
 
 use policy::Scalar;
-use proc_macro2::{Ident, TokenStream};
+use proc_macro2::TokenStream;
 use quote::quote;
 
 use super::number::{self, number};
-use super::{float, ident, integer, kernels, size, streamed};
-use crate::lower::network::{TANH_DENOMINATOR, TANH_NUMERATOR};
-use crate::program::{ActivationCode, LayerCode, Literal, NetworkCode, Program};
+use super::tokens::{ident, size};
+use super::{integer, kernels, loops, tables};
+use crate::assembly;
+use crate::lower::activation::{TANH_DENOMINATOR, TANH_NUMERATOR};
+use crate::program::{ActivationCode, Arithmetic, Literal, Program};
 
 /// Everything between observation and Q values.
 pub fn items(program: &Program) -> TokenStream {
     let scalar = program.scalar();
     let kind = number::kind(scalar);
-    let duties = program.duties.iter().map(|duty| number(scalar, *duty));
+    let duties = tables::values(program, "duties");
     let tanh = program
         .network
         .activates(|activation| activation == ActivationCode::Tanh)
         .then(|| tanh(scalar));
-    let network = match &program.network {
-        NetworkCode::Real { fused, layers, .. } => real(program, layers, *fused),
-        NetworkCode::Integer(network) => integer::items(program, network),
+    let network = match &program.network.arithmetic {
+        Arithmetic::Real { fused, .. } => real(program, *fused),
+        Arithmetic::Integer(code) => integer::items(program, code),
     };
     quote! {
-        static DUTIES: [#kind; ACTIONS] = [#(#duties),*];
+        static DUTIES: [#kind; ACTIONS] = #duties;
         #tanh
         #network
     }
@@ -31,28 +33,28 @@ pub fn items(program: &Program) -> TokenStream {
 
 /// What argmax compares: type, value below all others, name of the selection.
 pub fn argmax(program: &Program) -> (TokenStream, TokenStream) {
-    match program.network {
-        NetworkCode::Real { scalar, .. } => {
+    match program.network.arithmetic {
+        Arithmetic::Real { scalar, .. } => {
             let kind = number::kind(scalar);
             (quote!(#kind::MIN), quote!(select))
         }
-        NetworkCode::Integer(_) => (quote!(i32::MIN), quote!(select_integer)),
+        Arithmetic::Integer(_) => (quote!(i32::MIN), quote!(select_integer)),
     }
 }
 
 /// Body of `q_values`.
 pub fn q_values(program: &Program) -> TokenStream {
-    match &program.network {
-        NetworkCode::Real { .. } => quote!(network(observation)),
-        NetworkCode::Integer(network) => integer::q_values(network, program.has_fpu),
+    match &program.network.arithmetic {
+        Arithmetic::Real { .. } => quote!(network(observation)),
+        Arithmetic::Integer(code) => integer::q_values(code, program.has_fpu),
     }
 }
 
-fn real(program: &Program, layers: &[LayerCode], fused: bool) -> TokenStream {
+fn real(program: &Program, fused: bool) -> TokenStream {
     let scalar = program.scalar();
-    let (items, body) = streamed::network(scalar, layers);
     let kind = number::kind(scalar);
-    let aligned = layers.iter().find_map(|layer| layer.alignment).map(aligned);
+    let (items, body) = loops::network(program);
+    let aligned = program.alignment().map(aligned);
     let fma = fused.then(fma);
     let accumulate = match (scalar, fused) {
         (Scalar::F32, true) => quote!(*sum = fma(*weight, *x, *sum);),
@@ -60,11 +62,19 @@ fn real(program: &Program, layers: &[LayerCode], fused: bool) -> TokenStream {
         // weights are binary32
         (Scalar::F64, _) => quote!(*sum += *weight as f64 * *x;),
     };
-    let blocks = kernels::items(program, layers, &accumulate);
+    let block = kernels::block(&kind, &accumulate);
+    let kernels = assembly::real::kernels(&program.network);
+    let forms = if kernels.is_empty() {
+        let forms = kernels::portable(&kind, &TokenStream::new());
+        quote!(#(#forms)*)
+    } else {
+        assembly::rust::real(&kernels, program, &kernels::portable(&kind, &quote!(pub(super))))
+    };
     quote! {
         #fma
         #aligned
-        #blocks
+        #block
+        #forms
         #items
         fn network(observation: &[#kind; FEATURES]) -> [#kind; ACTIONS] {
             #body
@@ -81,22 +91,6 @@ fn aligned(bytes: u32) -> TokenStream {
     }
 }
 
-/// Table of weights of a layer.
-pub(super) fn table(layer: &LayerCode, name: &Ident, kind: &TokenStream, value: &TokenStream) -> TokenStream {
-    match layer.alignment {
-        Some(_) => quote! { static #name: Aligned<#kind> = Aligned(#value); },
-        None => quote! { static #name: #kind = #value; },
-    }
-}
-
-/// What [`table`] holds.
-pub(super) fn held(layer: &LayerCode, name: &Ident) -> TokenStream {
-    match layer.alignment {
-        Some(_) => quote!(#name.0),
-        None => quote!(#name),
-    }
-}
-
 fn fma() -> TokenStream {
     quote! {
         /// x * y + z, rounded once: `core` has no fused multiply-add, so through binary64 rounded to odd.
@@ -110,109 +104,6 @@ fn fma() -> TokenStream {
             let towards = 1_u64.wrapping_sub(((error.to_bits() ^ sum.to_bits()) >> 63) << 1);
             f64::from_bits(sum.to_bits().wrapping_add(odd.wrapping_mul(towards))) as f32
         }
-    }
-}
-
-/// Tables, and the function of the whole layer.
-pub(super) fn layer_items(scalar: Scalar, index: usize, layer: &LayerCode) -> (TokenStream, TokenStream) {
-    let kind = number::kind(scalar);
-    let name = ident(&format!("layer{index}"));
-    let doc = format!(" {}: {} -> {}", layer.name, layer.inputs, layer.outputs);
-    let (inputs, outputs) = (size(layer.inputs), size(layer.outputs));
-    let (rows, full) = (layer.block_rows, layer.full_blocks());
-    let split = full * rows;
-    let (weights, bias) = (ident(&format!("WEIGHTS{index}")), ident(&format!("BIAS{index}")));
-    let blocks = layer.table[..split * layer.inputs]
-        .chunks(rows * layer.inputs)
-        .map(|block| columns(block, rows));
-    let biases = layer.bias[..split].chunks(rows).map(|biases| sums(scalar, biases));
-    let (rows_size, full_size) = (size(rows), size(full));
-    let stored = kernels::store(scalar, layer.activation, &quote!(weights, bias, x), &quote!(out));
-    let (tail_tables, tail_loop) = tail(scalar, index, layer);
-    let type_of_weights = quote!([[[f32; #rows_size]; #inputs]; #full_size]);
-    let (held, table) = (
-        held(layer, &weights),
-        table(layer, &weights, &type_of_weights, &quote!([#(#blocks),*])),
-    );
-    let tables = quote! {
-        #table
-        static #bias: [[#kind; #rows_size]; #full_size] = [#(#biases),*];
-        #tail_tables
-    };
-    let function = quote! {
-        #[doc = #doc]
-        #[inline(always)]
-        fn #name(x: &[#kind; #inputs], y: &mut [Slot; #outputs]) {
-            let mut rest: &mut [Slot] = y;
-            for (weights, bias) in #held.iter().zip(&#bias) {
-                // no division and no slice index, so no way to a panic at any optimisation level
-                if let Some((out, after)) = core::mem::take(&mut rest).split_first_chunk_mut::<#rows_size>() {
-                    #stored
-                    rest = after;
-                }
-            }
-            #tail_loop
-        }
-    };
-    (tables, function)
-}
-
-/// The shorter last block, if there is one.
-fn tail(scalar: Scalar, index: usize, layer: &LayerCode) -> (TokenStream, TokenStream) {
-    let kind = number::kind(scalar);
-    let rows = layer.tail_rows();
-    if rows == 0 {
-        return (TokenStream::new(), TokenStream::new());
-    }
-    let split = layer.outputs - rows;
-    let (weights, bias) = (
-        ident(&format!("TAIL_WEIGHTS{index}")),
-        ident(&format!("TAIL_BIAS{index}")),
-    );
-    let values = columns(&layer.table[split * layer.inputs..], rows);
-    let biases = sums(scalar, &layer.bias[split..]);
-    let (inputs, rows) = (size(layer.inputs), size(rows));
-    let table = table(layer, &weights, &quote!([[f32; #rows]; #inputs]), &values);
-    let held = held(layer, &weights);
-    let stored = kernels::store(scalar, layer.activation, &quote!(&#held, &#bias, x), &quote!(out));
-    let tables = quote! {
-        #table
-        static #bias: [#kind; #rows] = #biases;
-    };
-    let code = quote! {
-        if let Some((out, _)) = rest.split_first_chunk_mut::<#rows>() {
-            #stored
-        }
-    };
-    (tables, code)
-}
-
-pub(super) fn columns(block: &[f32], rows: usize) -> TokenStream {
-    let columns = block.chunks(rows).map(row);
-    quote!([#(#columns),*])
-}
-
-pub(super) fn row(values: &[f32]) -> TokenStream {
-    let values = values.iter().map(|value| float(*value));
-    quote!([#(#values),*])
-}
-
-/// Biases: sums start with them, so they have their type.
-pub(super) fn sums(scalar: Scalar, values: &[f32]) -> TokenStream {
-    let literal = |value: &f32| Literal::nearest(scalar, f64::from(*value));
-    let values = values.iter().map(|value| number(scalar, literal(value)));
-    quote!([#(#values),*])
-}
-
-pub(super) fn activation(scalar: Scalar, activation: ActivationCode) -> TokenStream {
-    match activation {
-        ActivationCode::Identity => quote!(sum),
-        ActivationCode::Relu => quote!(relu(sum)),
-        ActivationCode::LeakyRelu(slope) => {
-            let slope = number(scalar, slope);
-            quote!(leaky_relu(sum, #slope))
-        }
-        ActivationCode::Tanh => quote!(tanh(sum)),
     }
 }
 

@@ -1,10 +1,10 @@
 //! The Rust type of the numbers, its literals and its bits.
 
 use policy::Scalar;
-use proc_macro2::{Literal as Token, TokenStream};
+use proc_macro2::TokenStream;
 use quote::quote;
 
-use super::float;
+use super::tokens::{double, float};
 use crate::program::Literal;
 
 /// The type that holds a number of the format.
@@ -17,15 +17,9 @@ pub fn kind(scalar: Scalar) -> TokenStream {
 
 /// A literal without suffix; the context gives the type.
 pub fn number(scalar: Scalar, literal: Literal) -> TokenStream {
-    if scalar == Scalar::F32 {
-        return float(literal.single());
-    }
-    let value = literal.value();
-    let magnitude = Token::f64_unsuffixed(value.abs());
-    if value.is_sign_negative() {
-        quote!(-#magnitude)
-    } else {
-        quote!(#magnitude)
+    match scalar {
+        Scalar::F32 => float(literal.single()),
+        Scalar::F64 => double(literal.value()),
     }
 }
 

@@ -5,7 +5,7 @@ use proc_macro2::{Ident, TokenStream};
 use quote::quote;
 
 use super::number::{self, number};
-use super::{ident, size};
+use super::tokens::{ident, size};
 use crate::program::{Block, Coefficient, Op, Program, ValueId};
 
 /// Field of the controller that holds a coefficient.

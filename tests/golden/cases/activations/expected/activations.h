@@ -25,14 +25,14 @@ extern "C" {
 #define ACTIVATIONS_SAMPLE_PERIOD 0.001
 
 /* Bits of the status word. */
-#define ACTIVATIONS_STATUS_HELD 1u
-#define ACTIVATIONS_STATUS_FALLBACK 2u
-#define ACTIVATIONS_STATUS_PRIMED 4u
-#define ACTIVATIONS_STATUS_CLIPPED 8u
-#define ACTIVATIONS_STATUS_MAPPING_RANGE 16u
-#define ACTIVATIONS_STATUS_SLEW_LIMITED 32u
-#define ACTIVATIONS_STATUS_SOFT_START 64u
-#define ACTIVATIONS_STATUS_LIMITED 128u
+#define ACTIVATIONS_STATUS_HELD            1u /* Held samples bridge an invalid measurement. */
+#define ACTIVATIONS_STATUS_FALLBACK        2u /* No usable measurement: the fallback duty is commanded. */
+#define ACTIVATIONS_STATUS_PRIMED          4u /* This step primed the filters. */
+#define ACTIVATIONS_STATUS_CLIPPED         8u /* An observation was clipped. */
+#define ACTIVATIONS_STATUS_MAPPING_RANGE  16u /* Outside the mapping's validity range. */
+#define ACTIVATIONS_STATUS_SLEW_LIMITED   32u /* The slew limit was active. */
+#define ACTIVATIONS_STATUS_SOFT_START     64u /* The soft start was active. */
+#define ACTIVATIONS_STATUS_LIMITED       128u /* A duty limit was active. */
 
 /* One sample of every signal. */
 typedef struct {

@@ -25,14 +25,14 @@ extern "C" {
 #define ADC_MAPPING_SAMPLE_PERIOD 2e-5
 
 /* Bits of the status word. */
-#define ADC_MAPPING_STATUS_HELD 1u
-#define ADC_MAPPING_STATUS_FALLBACK 2u
-#define ADC_MAPPING_STATUS_PRIMED 4u
-#define ADC_MAPPING_STATUS_CLIPPED 8u
-#define ADC_MAPPING_STATUS_MAPPING_RANGE 16u
-#define ADC_MAPPING_STATUS_SLEW_LIMITED 32u
-#define ADC_MAPPING_STATUS_SOFT_START 64u
-#define ADC_MAPPING_STATUS_LIMITED 128u
+#define ADC_MAPPING_STATUS_HELD            1u /* Held samples bridge an invalid measurement. */
+#define ADC_MAPPING_STATUS_FALLBACK        2u /* No usable measurement: the fallback duty is commanded. */
+#define ADC_MAPPING_STATUS_PRIMED          4u /* This step primed the filters. */
+#define ADC_MAPPING_STATUS_CLIPPED         8u /* An observation was clipped. */
+#define ADC_MAPPING_STATUS_MAPPING_RANGE  16u /* Outside the mapping's validity range. */
+#define ADC_MAPPING_STATUS_SLEW_LIMITED   32u /* The slew limit was active. */
+#define ADC_MAPPING_STATUS_SOFT_START     64u /* The soft start was active. */
+#define ADC_MAPPING_STATUS_LIMITED       128u /* A duty limit was active. */
 
 /* One sample of every signal. */
 typedef struct {

@@ -25,14 +25,14 @@ extern "C" {
 #define CONSTRUCTS_SAMPLE_PERIOD 0.0001
 
 /* Bits of the status word. */
-#define CONSTRUCTS_STATUS_HELD 1u
-#define CONSTRUCTS_STATUS_FALLBACK 2u
-#define CONSTRUCTS_STATUS_PRIMED 4u
-#define CONSTRUCTS_STATUS_CLIPPED 8u
-#define CONSTRUCTS_STATUS_MAPPING_RANGE 16u
-#define CONSTRUCTS_STATUS_SLEW_LIMITED 32u
-#define CONSTRUCTS_STATUS_SOFT_START 64u
-#define CONSTRUCTS_STATUS_LIMITED 128u
+#define CONSTRUCTS_STATUS_HELD            1u /* Held samples bridge an invalid measurement. */
+#define CONSTRUCTS_STATUS_FALLBACK        2u /* No usable measurement: the fallback duty is commanded. */
+#define CONSTRUCTS_STATUS_PRIMED          4u /* This step primed the filters. */
+#define CONSTRUCTS_STATUS_CLIPPED         8u /* An observation was clipped. */
+#define CONSTRUCTS_STATUS_MAPPING_RANGE  16u /* Outside the mapping's validity range. */
+#define CONSTRUCTS_STATUS_SLEW_LIMITED   32u /* The slew limit was active. */
+#define CONSTRUCTS_STATUS_SOFT_START     64u /* The soft start was active. */
+#define CONSTRUCTS_STATUS_LIMITED       128u /* A duty limit was active. */
 
 /* One sample of every signal. */
 typedef struct {

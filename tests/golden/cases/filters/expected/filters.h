@@ -25,14 +25,14 @@ extern "C" {
 #define FILTERS_SAMPLE_PERIOD 5e-5
 
 /* Bits of the status word. */
-#define FILTERS_STATUS_HELD 1u
-#define FILTERS_STATUS_FALLBACK 2u
-#define FILTERS_STATUS_PRIMED 4u
-#define FILTERS_STATUS_CLIPPED 8u
-#define FILTERS_STATUS_MAPPING_RANGE 16u
-#define FILTERS_STATUS_SLEW_LIMITED 32u
-#define FILTERS_STATUS_SOFT_START 64u
-#define FILTERS_STATUS_LIMITED 128u
+#define FILTERS_STATUS_HELD            1u /* Held samples bridge an invalid measurement. */
+#define FILTERS_STATUS_FALLBACK        2u /* No usable measurement: the fallback duty is commanded. */
+#define FILTERS_STATUS_PRIMED          4u /* This step primed the filters. */
+#define FILTERS_STATUS_CLIPPED         8u /* An observation was clipped. */
+#define FILTERS_STATUS_MAPPING_RANGE  16u /* Outside the mapping's validity range. */
+#define FILTERS_STATUS_SLEW_LIMITED   32u /* The slew limit was active. */
+#define FILTERS_STATUS_SOFT_START     64u /* The soft start was active. */
+#define FILTERS_STATUS_LIMITED       128u /* A duty limit was active. */
 
 /* One sample of every signal. */
 typedef struct {

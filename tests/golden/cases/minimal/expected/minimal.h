@@ -25,14 +25,14 @@ extern "C" {
 #define MINIMAL_SAMPLE_PERIOD 0.0001
 
 /* Bits of the status word. */
-#define MINIMAL_STATUS_HELD 1u
-#define MINIMAL_STATUS_FALLBACK 2u
-#define MINIMAL_STATUS_PRIMED 4u
-#define MINIMAL_STATUS_CLIPPED 8u
-#define MINIMAL_STATUS_MAPPING_RANGE 16u
-#define MINIMAL_STATUS_SLEW_LIMITED 32u
-#define MINIMAL_STATUS_SOFT_START 64u
-#define MINIMAL_STATUS_LIMITED 128u
+#define MINIMAL_STATUS_HELD            1u /* Held samples bridge an invalid measurement. */
+#define MINIMAL_STATUS_FALLBACK        2u /* No usable measurement: the fallback duty is commanded. */
+#define MINIMAL_STATUS_PRIMED          4u /* This step primed the filters. */
+#define MINIMAL_STATUS_CLIPPED         8u /* An observation was clipped. */
+#define MINIMAL_STATUS_MAPPING_RANGE  16u /* Outside the mapping's validity range. */
+#define MINIMAL_STATUS_SLEW_LIMITED   32u /* The slew limit was active. */
+#define MINIMAL_STATUS_SOFT_START     64u /* The soft start was active. */
+#define MINIMAL_STATUS_LIMITED       128u /* A duty limit was active. */
 
 /* One sample of every signal. */
 typedef struct {

@@ -25,14 +25,14 @@ extern "C" {
 #define PAPER_SAMPLE_PERIOD 0.0001
 
 /* Bits of the status word. */
-#define PAPER_STATUS_HELD 1u
-#define PAPER_STATUS_FALLBACK 2u
-#define PAPER_STATUS_PRIMED 4u
-#define PAPER_STATUS_CLIPPED 8u
-#define PAPER_STATUS_MAPPING_RANGE 16u
-#define PAPER_STATUS_SLEW_LIMITED 32u
-#define PAPER_STATUS_SOFT_START 64u
-#define PAPER_STATUS_LIMITED 128u
+#define PAPER_STATUS_HELD            1u /* Held samples bridge an invalid measurement. */
+#define PAPER_STATUS_FALLBACK        2u /* No usable measurement: the fallback duty is commanded. */
+#define PAPER_STATUS_PRIMED          4u /* This step primed the filters. */
+#define PAPER_STATUS_CLIPPED         8u /* An observation was clipped. */
+#define PAPER_STATUS_MAPPING_RANGE  16u /* Outside the mapping's validity range. */
+#define PAPER_STATUS_SLEW_LIMITED   32u /* The slew limit was active. */
+#define PAPER_STATUS_SOFT_START     64u /* The soft start was active. */
+#define PAPER_STATUS_LIMITED       128u /* A duty limit was active. */
 
 /* One sample of every signal. */
 typedef struct {

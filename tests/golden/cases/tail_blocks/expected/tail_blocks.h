@@ -25,14 +25,14 @@ extern "C" {
 #define TAIL_BLOCKS_SAMPLE_PERIOD 0.0001
 
 /* Bits of the status word. */
-#define TAIL_BLOCKS_STATUS_HELD 1u
-#define TAIL_BLOCKS_STATUS_FALLBACK 2u
-#define TAIL_BLOCKS_STATUS_PRIMED 4u
-#define TAIL_BLOCKS_STATUS_CLIPPED 8u
-#define TAIL_BLOCKS_STATUS_MAPPING_RANGE 16u
-#define TAIL_BLOCKS_STATUS_SLEW_LIMITED 32u
-#define TAIL_BLOCKS_STATUS_SOFT_START 64u
-#define TAIL_BLOCKS_STATUS_LIMITED 128u
+#define TAIL_BLOCKS_STATUS_HELD            1u /* Held samples bridge an invalid measurement. */
+#define TAIL_BLOCKS_STATUS_FALLBACK        2u /* No usable measurement: the fallback duty is commanded. */
+#define TAIL_BLOCKS_STATUS_PRIMED          4u /* This step primed the filters. */
+#define TAIL_BLOCKS_STATUS_CLIPPED         8u /* An observation was clipped. */
+#define TAIL_BLOCKS_STATUS_MAPPING_RANGE  16u /* Outside the mapping's validity range. */
+#define TAIL_BLOCKS_STATUS_SLEW_LIMITED   32u /* The slew limit was active. */
+#define TAIL_BLOCKS_STATUS_SOFT_START     64u /* The soft start was active. */
+#define TAIL_BLOCKS_STATUS_LIMITED       128u /* A duty limit was active. */
 
 /* One sample of every signal. */
 typedef struct {

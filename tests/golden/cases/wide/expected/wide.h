@@ -25,14 +25,14 @@ extern "C" {
 #define WIDE_SAMPLE_PERIOD 0.0001
 
 /* Bits of the status word. */
-#define WIDE_STATUS_HELD 1u
-#define WIDE_STATUS_FALLBACK 2u
-#define WIDE_STATUS_PRIMED 4u
-#define WIDE_STATUS_CLIPPED 8u
-#define WIDE_STATUS_MAPPING_RANGE 16u
-#define WIDE_STATUS_SLEW_LIMITED 32u
-#define WIDE_STATUS_SOFT_START 64u
-#define WIDE_STATUS_LIMITED 128u
+#define WIDE_STATUS_HELD            1u /* Held samples bridge an invalid measurement. */
+#define WIDE_STATUS_FALLBACK        2u /* No usable measurement: the fallback duty is commanded. */
+#define WIDE_STATUS_PRIMED          4u /* This step primed the filters. */
+#define WIDE_STATUS_CLIPPED         8u /* An observation was clipped. */
+#define WIDE_STATUS_MAPPING_RANGE  16u /* Outside the mapping's validity range. */
+#define WIDE_STATUS_SLEW_LIMITED   32u /* The slew limit was active. */
+#define WIDE_STATUS_SOFT_START     64u /* The soft start was active. */
+#define WIDE_STATUS_LIMITED       128u /* A duty limit was active. */
 
 /* One sample of every signal. */
 typedef struct {

@@ -1,0 +1,78 @@
+//! From a policy to files: one list of outputs, one program a language.
+
+use policy::{NumericFormat, Policy};
+use targets::TargetSpec;
+
+use crate::backend::fmu::Fmi;
+use crate::backend::kit::Material;
+use crate::files::{CodegenError, GeneratedFiles};
+use crate::output::Output;
+use crate::program::Program;
+use crate::{backend, lower, manifest, output};
+
+/// Everything that `policyc compile` writes for these outputs: their files, the cores that they call, and the manifest.
+/// `expected` is what [`Output::Kit`] compares with.
+///
+/// # Errors
+/// If the target has no type for the numeric format; else only for a fault in the compiler itself.
+pub fn generate(
+    policy: &Policy,
+    target: &TargetSpec,
+    outputs: &[Output],
+    expected: Option<&Material>,
+) -> Result<GeneratedFiles, CodegenError> {
+    let mut all = sources(policy, target, outputs, expected)?;
+    let manifest = manifest::manifest(policy, target, outputs, expected, &all);
+    let text = serde_json::to_string_pretty(&manifest).map_err(|error| CodegenError::Manifest(error.to_string()))?;
+    all.files.insert(manifest::FILE.to_owned(), text + "\n");
+    Ok(all)
+}
+
+/// [`generate`] without the manifest, for a caller who keeps the files to itself, such as a build script.
+///
+/// # Errors
+/// As [`generate`].
+pub fn sources(
+    policy: &Policy,
+    target: &TargetSpec,
+    outputs: &[Output],
+    expected: Option<&Material>,
+) -> Result<GeneratedFiles, CodegenError> {
+    check_types(policy, target)?;
+    let outputs = output::with_cores(outputs);
+    let mut all = GeneratedFiles::default();
+    for language in output::languages(&outputs) {
+        let program = lower(policy, target, language);
+        for output in outputs.iter().filter(|output| output.language() == language) {
+            all.files.extend(emit(*output, &program, expected)?.files);
+        }
+    }
+    Ok(all)
+}
+
+fn check_types(policy: &Policy, target: &TargetSpec) -> Result<(), CodegenError> {
+    let needs_bytes = matches!(policy.numeric_format, NumericFormat::I8 | NumericFormat::F64);
+    if needs_bytes && target.widths.char_bits > 8 {
+        return Err(CodegenError::NoType {
+            format: policy.numeric_format,
+            target: target.name,
+        });
+    }
+    Ok(())
+}
+
+/// The files of one output, from the program in its language.
+fn emit(output: Output, program: &Program, expected: Option<&Material>) -> Result<GeneratedFiles, CodegenError> {
+    match output {
+        Output::C => backend::c99::emit(program),
+        Output::Rust => backend::rust::emit(program),
+        Output::RustOverC => backend::rust::bindings::emit(program),
+        Output::Kit => match expected {
+            Some(expected) => backend::kit::emit(program, expected),
+            None => Err(CodegenError::Output("the kit has no expected values")),
+        },
+        Output::Sfunction => backend::sfunction::emit(program),
+        Output::Fmu2 => backend::fmu::emit(program, Fmi::Two),
+        Output::Fmu3 => backend::fmu::emit(program, Fmi::Three),
+    }
+}

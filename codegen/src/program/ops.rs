@@ -1,0 +1,282 @@
+//! The straight-line part of a step: operations, and the three blocks around the network.
+
+use super::literal::Literal;
+
+/// Index of a value within its block.
+pub type ValueId = usize;
+
+/// Run-time replaceable coefficient of the mapping.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Coefficient {
+    /// Gain on d_sim.
+    A,
+    /// Per ampere of load current.
+    B,
+    /// Constant.
+    C,
+    /// Product term.
+    R,
+}
+
+impl Coefficient {
+    /// Name of the parameter that sets it; the state member is `mapping_<name>`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Coefficient::A => "a",
+            Coefficient::B => "b",
+            Coefficient::C => "c",
+            Coefficient::R => "r",
+        }
+    }
+}
+
+/// One operation; its result is a number of the format or, where the name says so, a flag (0 or 1).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Op {
+    /// Measured physical sample of a signal.
+    Measured(usize),
+    /// ADC code of a signal, converted to the format.
+    Code(usize),
+    /// Last good sample of a signal.
+    Held(usize),
+    /// Sanitised sample of a signal, as `front` left it.
+    Sanitised(usize),
+    /// Word of the filter memory.
+    Memory(usize),
+    /// State: duty of the last chosen action.
+    PreviousDuty,
+    /// State: last command.
+    PreviousCommand,
+    /// State: rising upper limit.
+    SoftCap,
+    /// State: coefficient of the mapping.
+    Coefficient(Coefficient),
+    /// Duty of the action that argmax chose.
+    ChosenDuty,
+    /// Constant.
+    Constant(Literal),
+    /// Sign change, exact.
+    Neg(ValueId),
+    /// Sum, rounded once.
+    Add(ValueId, ValueId),
+    /// Difference, rounded once.
+    Sub(ValueId, ValueId),
+    /// Product, rounded once.
+    Mul(ValueId, ValueId),
+    /// `then` if `flag` else `otherwise`, without a branch.
+    Select {
+        /// Flag.
+        flag: ValueId,
+        /// Value if 1.
+        then: ValueId,
+        /// Value if 0.
+        otherwise: ValueId,
+    },
+    /// Contract section 4: `t = low if x < low else x; high if t > high else t`.
+    Clamp {
+        /// Value.
+        x: ValueId,
+        /// Lower end.
+        low: ValueId,
+        /// Upper end.
+        high: ValueId,
+    },
+    /// Sum over a line of memory, oldest first, then `newest`; every word reads as `newest` if not primed.
+    LineSum {
+        /// First word of the line.
+        word: usize,
+        /// Words in the line.
+        length: usize,
+        /// Value added last.
+        newest: ValueId,
+        /// Flag: state is primed.
+        primed: ValueId,
+    },
+    /// Flag of the state: filters are primed.
+    Primed,
+    /// Flag from `front`: this step's measurement can be used.
+    Usable,
+    /// Flag from `front`: an observation was clipped.
+    Clipped,
+    /// Flag from `front`: held samples bridge an invalid measurement.
+    HeldSample,
+    /// Flag from `front`: this step primes the filters.
+    PrimedNow,
+    /// Flag: `low <= x <= high`; 0 for NaN.
+    Within {
+        /// Value.
+        x: ValueId,
+        /// Lower end.
+        low: ValueId,
+        /// Upper end.
+        high: ValueId,
+    },
+    /// Flag: `x < low or x > high`.
+    Outside {
+        /// Value.
+        x: ValueId,
+        /// Lower end.
+        low: ValueId,
+        /// Upper end.
+        high: ValueId,
+    },
+    /// Word: the bits in which two numbers differ. Of a number and what a clamp has made of it: 0 if it was inside.
+    Difference(ValueId, ValueId),
+    /// Flag: a word is not 0.
+    NotZero(ValueId),
+    /// Flag: `x > limit`.
+    Above(ValueId, ValueId),
+    /// Flag: both.
+    And(ValueId, ValueId),
+    /// Flag: either. Of words, bit by bit.
+    Or(ValueId, ValueId),
+}
+
+impl Op {
+    /// Whether the result is a flag or a word.
+    #[must_use]
+    pub fn is_flag(&self) -> bool {
+        matches!(
+            self,
+            Op::Primed
+                | Op::Usable
+                | Op::Clipped
+                | Op::HeldSample
+                | Op::PrimedNow
+                | Op::Within { .. }
+                | Op::Outside { .. }
+                | Op::Difference(..)
+                | Op::NotZero(..)
+                | Op::Above(..)
+                | Op::And(..)
+                | Op::Or(..)
+        )
+    }
+}
+
+/// Straight-line code: value `i` is `ops[i]` and uses smaller indices only.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Block {
+    /// Operations in execution order.
+    pub ops: Vec<Op>,
+}
+
+impl Block {
+    /// Value of `op`, computed once however often it is asked for.
+    pub fn value(&mut self, op: Op) -> ValueId {
+        match self.ops.iter().position(|known| *known == op) {
+            Some(id) => id,
+            None => {
+                self.ops.push(op);
+                self.ops.len() - 1
+            }
+        }
+    }
+
+    /// A constant.
+    pub fn constant(&mut self, literal: Literal) -> ValueId {
+        self.value(Op::Constant(literal))
+    }
+}
+
+/// A measured signal as the generated code sees it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SignalPort {
+    /// Field name.
+    pub name: String,
+    /// Unit for the comment.
+    pub unit: String,
+    /// Whether the field is an integer ADC code.
+    pub is_code: bool,
+    /// Plausible range in the format, for the comment and the check.
+    pub range: (Literal, Literal),
+    /// `held` after init.
+    pub initial: Literal,
+}
+
+/// A member of the controller's state (contract section 1).
+#[derive(Debug, Clone, PartialEq)]
+pub struct StateMember {
+    /// Name.
+    pub name: String,
+    /// What it holds, for the comment.
+    pub meaning: &'static str,
+    /// Shape and value before the first step.
+    pub value: StateValue,
+}
+
+/// Shape of a member of the state, and its value before the first step.
+#[derive(Debug, Clone, PartialEq)]
+pub enum StateValue {
+    /// An array.
+    Numbers(Vec<Literal>),
+    /// A number.
+    Number(Literal),
+    /// A number that is set at run time and that a reset keeps.
+    Coefficient(Literal),
+    /// A word, 0 before the first step.
+    Word,
+}
+
+impl StateValue {
+    /// Words of 32 bits where a number has `number` of them.
+    #[must_use]
+    pub fn words(&self, number: usize) -> usize {
+        match self {
+            StateValue::Numbers(values) => number * values.len(),
+            StateValue::Number(_) | StateValue::Coefficient(_) => number,
+            StateValue::Word => 1,
+        }
+    }
+}
+
+/// What `commit` writes into one line of the filter memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Push {
+    /// First word.
+    pub word: usize,
+    /// Words in the line.
+    pub length: usize,
+    /// Value of `front` appended.
+    pub value: ValueId,
+}
+
+/// Measurement to observation.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Front {
+    /// Straight-line code.
+    pub block: Block,
+    /// Sanitised signals.
+    pub signals: Vec<ValueId>,
+    /// Flag: all signals valid.
+    pub all_valid: ValueId,
+    /// Flag: an observation was clipped; `None` if nothing can be.
+    pub clipped: Option<ValueId>,
+    /// Observation in network order.
+    pub observation: Vec<ValueId>,
+    /// Filter memory updates.
+    pub pushes: Vec<Push>,
+}
+
+/// Chosen duty to command.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Decide {
+    /// Straight-line code.
+    pub block: Block,
+    /// Commanded duty if usable.
+    pub duty: ValueId,
+    /// Duty before the mapping if usable.
+    pub duty_sim: ValueId,
+    /// Status bit number and its flag, for usable steps.
+    pub status: Vec<(u32, ValueId)>,
+}
+
+/// What `commit` remembers besides filters and duties.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Advance {
+    /// Straight-line code.
+    pub block: Block,
+    /// Next soft-start limit; `None` without a soft start.
+    pub soft_cap: Option<ValueId>,
+}

@@ -1,0 +1,197 @@
+//! Activations (contract sections 6 and 6b), from the contract's text alone.
+
+use policy::Activation;
+use policy::scales::{SIGMOID_EXPONENT, SLOPE_BITS, power_of_two};
+
+use crate::integer::{rounded, shifted};
+use crate::real::{Range, Real};
+
+/// Replaces sums of a layer by its outputs (section 6).
+pub fn activate<'a, T: Real>(activation: Activation, values: impl Iterator<Item = &'a mut T>) {
+    match activation {
+        Activation::Identity => {}
+        Activation::Relu => values.for_each(|x| *x = relu(*x)),
+        Activation::LeakyRelu { slope } => {
+            let slope = T::nearest(slope);
+            values.for_each(|x| *x = leaky_relu(slope, *x));
+        }
+        Activation::Tanh => values.for_each(|x| *x = tanh(*x)),
+    }
+}
+
+/// An output of a layer in integers from its sum, `sum / 2^accumulator` as a number (section 6b).
+pub(crate) fn integer(activation: Activation, sum: i64, accumulator: i32, shift: u32) -> i64 {
+    match activation {
+        Activation::Identity => shifted(sum, shift),
+        Activation::Relu => shifted(sum, shift).max(0),
+        Activation::LeakyRelu { slope } => {
+            let slope = rounded(slope * power_of_two(SLOPE_BITS.cast_signed())).min(32_767);
+            let y = shifted(sum, shift);
+            if y > 0 { y } else { shifted(y * slope, SLOPE_BITS) }
+        }
+        Activation::Tanh => through_binary32(tanh, sum, accumulator),
+    }
+}
+
+/// The sum as a binary32 number, the function of section 6, and back.
+fn through_binary32(function: fn(f32) -> f32, sum: i64, accumulator: i32) -> i64 {
+    let x = sum as f32 * (power_of_two(-accumulator) as f32);
+    let y = function(x) * (power_of_two(SIGMOID_EXPONENT) as f32);
+    (y + 32_768.5).trunc() as i64 - 32_768
+}
+
+fn relu<T: Real>(x: T) -> T {
+    if x > T::ZERO { x } else { T::ZERO }
+}
+
+fn leaky_relu<T: Real>(slope: T, x: T) -> T {
+    if x > T::ZERO { x } else { slope * x }
+}
+
+/// Coefficients n0..n4 of the numerator.
+const NUMERATOR: [f64; 5] = [0.9999999, 0.13373208, 0.0034865933, 2.0472007e-5, 1.3184444e-8];
+/// Coefficients d0..d4 of the denominator.
+const DENOMINATOR: [f64; 5] = [1.0, 0.46706504, 0.025842024, 0.00032714035, 7.702759e-7];
+
+/// The contract's rational approximation of tanh (section 6): in binary32 less than 4e-7 off for every finite x.
+pub fn tanh<T: Real>(x: T) -> T {
+    let clamp = |limit: f64| Range {
+        lo: T::nearest(-limit),
+        hi: T::nearest(limit),
+    };
+    let t = clamp(9.0).clamp(x);
+    let z = t * t;
+    let p = horner(NUMERATOR, z) * t;
+    let q = horner(DENOMINATOR, z);
+    clamp(1.0).clamp(p / q)
+}
+
+fn horner<T: Real>([c0, c1, c2, c3, c4]: [f64; 5], z: T) -> T {
+    [c3, c2, c1, c0]
+        .into_iter()
+        .fold(T::nearest(c4), |sum, c| sum * z + T::nearest(c))
+}
+
+#[cfg(test)]
+mod tests {
+    use policy::Shape;
+
+    use super::*;
+
+    fn one<T: Real>(activation: Activation, x: T) -> T {
+        let mut values = [x];
+        activate(activation, values.iter_mut());
+        values[0]
+    }
+
+    /// Every 1009th number of the format from 0 to its largest: 2 million, in order.
+    fn numbers() -> impl Iterator<Item = f32> {
+        (0..=f32::MAX.to_bits()).step_by(1009).map(f32::from_bits)
+    }
+
+    /// What bounds and certificates take for granted, against the arithmetic of the contract.
+    #[test]
+    fn the_facts_of_each_activation_hold_for_the_contracts_arithmetic() {
+        for each in Activation::EACH {
+            let word = each.word();
+            for x in numbers().chain([f32::MAX, 1.0, 9.0]) {
+                let (y, below) = (one(*each, x), one(*each, -x));
+                match each.shape() {
+                    Shape::Hinge { below: slope } => {
+                        assert!(y == x && below == slope as f32 * -x, "{word} {x}");
+                    }
+                    Shape::Sigmoid(sigmoid) => {
+                        let wide = f64::from(x);
+                        let apart = |value: f64| (f64::from(y) - value).abs();
+                        assert!(apart((sigmoid.real)(wide)) < sigmoid.error_32, "{word} {x}");
+                        assert!(apart((sigmoid.value)(wide)) < sigmoid.apart_32, "{word} {x}");
+                        assert!((one(*each, wide) - (sigmoid.value)(wide)).abs() < 1e-15, "{word} {x}");
+                        assert_eq!(below.to_bits(), (-y).to_bits(), "{word} {x}");
+                        assert!((0.0..=1.0).contains(&y), "{word} {x}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// A rectifier gives +0 for zeros of both signs: neurons are left out because of it.
+    #[test]
+    fn zeros_keep_their_sign_but_behind_a_rectifier() {
+        for each in Activation::EACH {
+            let signs = [0.0_f32, -0.0].map(|x| one(*each, x).to_bits() >> 31);
+            let expected = if each.is_rectifier() { [0, 0] } else { [0, 1] };
+            assert_eq!(signs, expected, "{}", each.word());
+            assert_eq!(one(*each, 0.0_f32), 0.0);
+        }
+    }
+
+    #[test]
+    fn integers_behind_a_sigmoid_are_the_nearest_to_its_value() {
+        for each in Activation::EACH {
+            let Shape::Sigmoid(sigmoid) = each.shape() else {
+                continue;
+            };
+            for sum in (-40_000_i64..=40_000)
+                .step_by(7)
+                .chain([i64::from(i32::MAX), i64::from(-i32::MAX)])
+            {
+                let y = integer(*each, sum, 13, 0) as f64;
+                let expected = 16_384.0 * (sigmoid.real)(sum as f64 / 8192.0);
+                // half a unit, and what the binary32 value is off
+                assert!(
+                    (y - expected).abs() < 0.502 + 16_384.0 * sigmoid.error_32,
+                    "{} {sum}",
+                    each.word()
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn relu_gives_plus_zero_for_everything_not_positive() {
+        for x in [-0.0_f32, 0.0, -1.0, -f32::MIN_POSITIVE, f32::NAN, f32::NEG_INFINITY] {
+            assert_eq!(relu(x).to_bits(), 0, "{x}");
+        }
+        assert_eq!(relu(f32::from_bits(1)).to_bits(), 1);
+    }
+
+    #[test]
+    fn leaky_relu_keeps_the_sign_of_zero_and_scales_the_negative_side() {
+        let slope = 0.01_f32;
+        assert_eq!(leaky_relu(slope, 0.0).to_bits(), 0);
+        assert_eq!(leaky_relu(slope, -0.0).to_bits(), 1 << 31);
+        assert_eq!(leaky_relu(slope, -3.0), 0.01_f32 * -3.0);
+        assert_eq!(leaky_relu(slope, 3.0), 3.0);
+    }
+
+    #[test]
+    fn tanh_is_within_4e_7_over_a_dense_sweep_of_bit_patterns() {
+        let mut worst = (0.0_f64, 0.0_f32);
+        let mut check = |x: f32| {
+            let error = (f64::from(tanh(x)) - f64::from(x).tanh()).abs();
+            if error > worst.0 {
+                worst = (error, x);
+            }
+        };
+        // every 97th pattern of [0, 10], both signs: about 23 million values less the tail
+        for bits in (0..=10.0_f32.to_bits()).step_by(97) {
+            check(f32::from_bits(bits));
+            check(-f32::from_bits(bits));
+        }
+        for x in [1e3, 1e10, f32::MAX, -1e3, f32::MIN, 9.0, 9.0_f32.next_up(), 8.999_999] {
+            check(x);
+        }
+        assert!(worst.0 < 4e-7, "error {} at {}", worst.0, worst.1);
+        assert!(worst.0 > 1e-8, "a bound that is never approached: {}", worst.0);
+    }
+
+    #[test]
+    fn tanh_is_odd_bounded_and_keeps_the_sign_of_zero() {
+        for x in [1e-45_f32, 1e-3, 0.3, 1.0, 4.0, 8.9, 9.0, 100.0, f32::MAX] {
+            assert_eq!(tanh(-x).to_bits(), (-tanh(x)).to_bits(), "{x}");
+            assert!(tanh(x) <= 1.0);
+        }
+        assert_eq!(tanh(0.0_f32).to_bits(), 0);
+        assert_eq!(tanh(-0.0_f32).to_bits(), 1 << 31);
+    }
+}

@@ -1,0 +1,311 @@
+//! Views of the C99 backend.
+
+use askama::Template;
+
+/// A declaration with a trailing comment.
+#[derive(Debug, Clone)]
+pub struct Member {
+    /// Declaration without the semicolon.
+    pub declaration: String,
+    /// Text of the comment.
+    pub comment: String,
+}
+
+/// A bit of the status word.
+#[derive(Debug, Clone)]
+pub struct StatusBit {
+    /// Name without the prefix.
+    pub name: &'static str,
+    /// Value as C text.
+    pub value: String,
+    /// One sentence for the reader of the header.
+    pub meaning: &'static str,
+}
+
+/// A constant table.
+#[derive(Debug, Clone)]
+pub struct Table {
+    /// C type of an element.
+    pub element: &'static str,
+    /// Name without the prefix.
+    pub name: String,
+    /// Number of elements.
+    pub length: usize,
+    /// Lines of comma-separated literals.
+    pub lines: Vec<String>,
+    /// Whether it is aligned to more than its elements are.
+    pub aligned: bool,
+}
+
+/// The network in floats.
+#[derive(Debug, Clone)]
+pub struct RealView {
+    /// Lines of the functions, in the order of the layers.
+    pub functions: Vec<String>,
+    /// Statements of `q_values`.
+    pub calls: Vec<String>,
+}
+
+/// The network in its numeric format.
+#[derive(Debug, Clone)]
+pub enum NetworkView {
+    /// Layers in binary32.
+    Real(RealView),
+    /// Layers in integers.
+    Integer(IntegerView),
+}
+
+/// A network in integers.
+#[derive(Debug, Clone)]
+pub struct IntegerView {
+    /// Largest magnitude of a sum.
+    pub bound: i64,
+    /// C type of a weight.
+    pub weight: &'static str,
+    /// Whether a group has four inputs.
+    pub is_quad: bool,
+    /// Integers in the input vector, padded to whole groups.
+    pub input_length: usize,
+    /// Whether the input has been read before the first output is written.
+    pub shares: bool,
+    /// Statements that fill the padding of the input vector.
+    pub padding: Vec<String>,
+    /// Bits that callers of the network cut off its outputs.
+    pub shift: u32,
+    /// What one integer of the output is worth.
+    pub q_unit: String,
+    /// Lines of the functions, in the order of the layers.
+    pub functions: Vec<String>,
+    /// Statements of `network`.
+    pub calls: Vec<String>,
+    /// Macro under which the special form is taken: `DSP`, `HALVES`, or none.
+    pub special: &'static str,
+    /// Whether there are functions in assembly.
+    pub has_assembly: bool,
+    /// Whether Q values are made of integers by floats in hardware.
+    pub has_fpu: bool,
+    /// Exponent field of an output with 25 significant bits as a Q value.
+    pub q_field: i32,
+    /// Which activations occur.
+    pub relu: bool,
+    /// A leaky ReLU occurs.
+    pub leaky_relu: bool,
+    /// A tanh occurs.
+    pub tanh: bool,
+}
+
+/// A CRC function over one type of table.
+#[derive(Debug, Clone)]
+pub struct CrcKind {
+    /// Name without the prefix.
+    pub name: &'static str,
+    /// C type of an element.
+    pub element: &'static str,
+    /// Element `i` as words, the low one first.
+    pub words: Vec<String>,
+}
+
+/// A table of the integrity check.
+#[derive(Debug, Clone)]
+pub struct CrcItem {
+    /// CRC function, without the prefix.
+    pub function: &'static str,
+    /// Table, without the prefix.
+    pub table: String,
+    /// Elements.
+    pub length: usize,
+}
+
+/// A line of filter memory that `commit` pushes into.
+#[derive(Debug, Clone)]
+pub struct PushView {
+    /// First word.
+    pub word: usize,
+    /// Last word.
+    pub last: usize,
+    /// Index into `front->push`.
+    pub index: usize,
+}
+
+/// The C type of the numbers and what goes with its width.
+#[derive(Debug, Clone, Copy)]
+pub struct NumberType {
+    /// `float` or `double`.
+    pub name: &'static str,
+    /// What IEEE 754 calls it.
+    pub format: &'static str,
+    /// Whether it has 64 bits.
+    pub is_wide: bool,
+    /// Of its literals and of the functions that take it.
+    pub suffix: &'static str,
+    /// Unsigned integer of its width.
+    pub word: &'static str,
+    /// All bits but the sign.
+    pub magnitude: &'static str,
+    /// The sign alone.
+    pub sign: &'static str,
+    /// Number of the sign bit.
+    pub top: u32,
+    /// Bits of 9.
+    pub nine: &'static str,
+    /// Bits of 1.
+    pub one: &'static str,
+}
+
+/// What both files need.
+#[derive(Debug, Clone)]
+pub struct Common {
+    /// Prefix of functions and types.
+    pub name: String,
+    /// Prefix of macros.
+    pub upper: String,
+    /// Lines of the banner.
+    pub banner: Vec<String>,
+    /// Parameters of `set_mapping` after the state; empty without a mapping.
+    pub mapping_parameters: String,
+    /// Type of the numbers.
+    pub number: NumberType,
+}
+
+/// Widths of a processor without 8-bit types, asserted when the core is compiled.
+#[derive(Debug, Clone, Copy)]
+pub struct WideChar {
+    /// Bits of `char`.
+    pub char_bits: u8,
+    /// Bits of `int`.
+    pub int_bits: u8,
+    /// `INT_MAX` of that width.
+    pub int_max: u64,
+}
+
+/// `<name>.h`
+#[derive(Debug, Template)]
+#[template(path = "c/header.h.jinja", escape = "none")]
+pub struct Header {
+    /// Names and banner.
+    pub common: Common,
+    /// Counts and limits: names without the prefix, and their values.
+    pub constants: Vec<(&'static str, String)>,
+    /// Status bits.
+    pub status: Vec<StatusBit>,
+    /// Members of the measurement.
+    pub measurement: Vec<Member>,
+    /// Members of the state, in contract order.
+    pub state: Vec<Member>,
+    /// One comment line per feature.
+    pub features: Vec<String>,
+}
+
+/// `<name>.c`
+#[derive(Debug, Template)]
+#[template(path = "c/source.c.jinja", escape = "none")]
+pub struct Source {
+    /// Names and banner.
+    pub common: Common,
+    /// Set where `char` has other than 8 bits.
+    pub wide_char: Option<WideChar>,
+    /// Weights, biases, duties, CRC steps, self-test data.
+    pub tables: Vec<Table>,
+    /// Layers in order.
+    pub network: NetworkView,
+    /// Whether a step senses its measurement again after the network instead of keeping it on the stack.
+    pub senses_again: bool,
+    /// CRC functions, the one for floats first.
+    pub crc_kinds: Vec<CrcKind>,
+    /// Which helper functions are used.
+    pub helpers: Helpers,
+    /// Numerator and denominator of tanh, highest power first.
+    pub tanh: Vec<Member>,
+    /// Number of actions.
+    pub actions: usize,
+    /// A number below every Q value.
+    pub lowest: &'static str,
+    /// Declarations of `sense`.
+    pub sense: Vec<String>,
+    /// Sanitised signals.
+    pub signals: Vec<String>,
+    /// Observation.
+    pub observation: Vec<String>,
+    /// What the filters will remember.
+    pub pushed: Vec<String>,
+    /// Flag that all signals are valid.
+    pub valid: String,
+    /// Flag that an observation was clipped, if one can be.
+    pub clipped: Option<String>,
+    /// Declarations of `decide`.
+    pub decide: Vec<String>,
+    /// Value of the duty in a usable step.
+    pub duty: String,
+    /// Terms of the status word.
+    pub status_terms: Vec<String>,
+    /// Declarations of `advance`.
+    pub advance: Vec<String>,
+    /// Next soft-start limit; empty without.
+    pub soft_cap: String,
+    /// Filter memory updates.
+    pub pushes: Vec<PushView>,
+    /// Statements of `init`.
+    pub init: Vec<String>,
+    /// Statements of `reset`.
+    pub reset: Vec<String>,
+    /// Words of filter memory.
+    pub memory_words: usize,
+    /// Conditions of `set_mapping`.
+    pub mapping_conditions: Vec<String>,
+    /// Coefficients that `set_mapping` sets.
+    pub mapping_names: Vec<&'static str>,
+    /// Hold count.
+    pub hold: String,
+    /// Fallback duty.
+    pub fallback: String,
+    /// Tables of the integrity check.
+    pub integrity: Vec<CrcItem>,
+    /// Expected CRC-32.
+    pub crc: String,
+    /// Self test: number of vectors, seed, multiplier, increment, unit.
+    pub self_test: SelfTestView,
+}
+
+/// Which helpers the source needs.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Helpers {
+    /// `within`
+    pub within: bool,
+    /// `outside`
+    pub outside: bool,
+    /// `clamp`
+    pub clamp: bool,
+    /// `line_sum`
+    pub line_sum: bool,
+    /// `relu`
+    pub relu: bool,
+    /// `relu` from a sum and a product, for processors that have them
+    pub relu_by_sum: bool,
+    /// `leaky_relu`
+    pub leaky_relu: bool,
+    /// `tanh`
+    pub tanh: bool,
+    /// `fma`
+    pub fused: bool,
+    /// Loops in assembly
+    pub assembly: bool,
+    /// Vectors of the compiler
+    pub vectors: bool,
+    /// Bytes to which tables are aligned that are so to more than their elements.
+    pub alignment: Option<u32>,
+}
+
+/// Numbers of the self test.
+#[derive(Debug, Clone)]
+pub struct SelfTestView {
+    /// Number of vectors.
+    pub vectors: usize,
+    /// Seed.
+    pub seed: String,
+    /// Multiplier.
+    pub multiplier: String,
+    /// Increment.
+    pub increment: String,
+    /// Scale to 0..1.
+    pub unit: String,
+}

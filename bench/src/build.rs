@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use codegen::Language;
+use codegen::Output;
 use policy::Policy;
 use targets::{Board, CCompiler, Endianness, Runner, TargetSpec};
 use tempfile::TempDir;
@@ -195,7 +195,8 @@ impl Bench {
     }
 
     fn write(&self, policy: &Policy, target: &TargetSpec) -> Result<(), Failure> {
-        let files = codegen::generate(policy, target, &Language::ALL).map_err(|error| Failure(error.to_string()))?;
+        let files =
+            codegen::sources(policy, target, &Output::CORES, None).map_err(|error| Failure(error.to_string()))?;
         files.files.iter().try_for_each(|(name, text)| self.put(name, text))
     }
 

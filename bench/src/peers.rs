@@ -18,16 +18,51 @@ pub const PEER: &str = "peer: ";
 /// What stands for a compiler in the row of a figure that was not measured here.
 pub const STATED: &str = "stated";
 
-/// Name with numeric format, instructions of an inference, flash in bytes: arm-none-eabi-gcc 12.2 or rustc, the same network and
-/// emulator, measured by others.
+/// How a peer computes: what of ours may stand beside it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Arithmetic {
+    /// Part of a peer's name that says so.
+    mark: &'static str,
+    words: &'static str,
+    /// Our format.
+    ours: &'static str,
+}
+
+/// The first that is marked counts. C in binary32 was stated as gcc builds it unless told otherwise, which is contracted; what is
+/// built here is not.
+const ARITHMETIC: [Arithmetic; 4] = [
+    Arithmetic {
+        mark: "s16",
+        words: "w8, a16",
+        ours: "i8",
+    },
+    Arithmetic {
+        mark: "int8",
+        words: "w8, a8",
+        ours: "i8",
+    },
+    Arithmetic {
+        mark: "contracted",
+        words: "binary32, contracted",
+        ours: "f32-fma",
+    },
+    Arithmetic {
+        mark: "f32",
+        words: "binary32",
+        ours: "f32",
+    },
+];
+
+/// Name with numeric format, instructions of an inference, flash in bytes: arm-none-eabi-gcc 12.2, the same network and emulator,
+/// measured by others, stated in November 2026.
 const OTHERS: [(&str, u64, u64); 8] = [
-    ("burn-onnx f32", 230_297, 1_245_880),
-    ("onnx2c f32", 26_670, 20_944),
-    ("emx-onnx-cgen f32", 27_569, 20_952),
-    ("TFLM f32", 29_439, 60_328),
-    ("CMSIS-NN f32", 28_265, 21_528),
-    ("RLtools f32 (other order of sums)", 14_442, 23_072),
-    ("CMSIS-NN int8", 16_480, 9_592),
+    ("onnx2c f32 contracted", 26_670, 20_952),
+    ("emx-onnx-cgen f32 contracted", 27_569, 20_952),
+    ("TFLM f32 contracted", 29_439, 60_328),
+    ("CMSIS-NN f32 contracted", 28_265, 21_528),
+    ("RLtools f32 contracted, other order of sums", 14_442, 23_072),
+    ("CMSIS-NN int8, floats in and out", 16_596, 9_936),
+    ("CMSIS-NN s16", 20_574, 7_656),
     ("TFLM int8 with CMSIS-NN", 18_062, 42_032),
 ];
 
@@ -59,9 +94,8 @@ fn row(name: &str, target: &TargetSpec) -> Row {
     }
 }
 
-/// Whether a row computes in integers.
-fn is_integer(row: &Row) -> bool {
-    row.variant.contains("int8") || row.variant.starts_with('i')
+fn arithmetic(peer: &Row) -> Option<&'static Arithmetic> {
+    ARITHMETIC.iter().find(|kind| peer.variant.contains(kind.mark))
 }
 
 /// Our rows on the core of the peers.
@@ -76,56 +110,57 @@ fn instructions(row: &Row) -> Option<u64> {
     row.q_values.map(|(_, most)| most)
 }
 
-/// Each peer beside our best row of the same kind (8-bit integers or binary32), as a Markdown table; empty without peers. Flash
-/// is that of the network alone, as linked.
+/// Each peer beside our builds of the same arithmetic, C and assembly apart, as a Markdown table; empty without peers. Flash is
+/// that of the network alone, as linked.
 pub fn table(rows: &[Row]) -> String {
     let peers: Vec<&Row> = rows.iter().filter(|row| row.variant.starts_with(PEER)).collect();
     if peers.is_empty() {
         return String::new();
     }
     let mut text = String::from(
-        "\n| peer | figures | instructions | flash B | ours | instructions | flash B | instructions / peer's | flash / peer's |\n\
-         |---|---|---|---|---|---|---|---|---|\n",
+        "\n| peer | figures | arithmetic | instructions | flash B | ours | in C | flash B | ratio | in assembly | flash B |\n\
+         |---|---|---|---|---|---|---|---|---|---|---|\n",
     );
+    let number = |value: Option<u64>| value.map(|value| value.to_string()).unwrap_or_default();
     for peer in peers {
-        let format = if is_integer(peer) { "i8" } else { "f32" };
-        let same: Vec<&Row> = ours(rows, &peer.core)
-            .filter(|row| row.variant.split(',').next() == Some(format) && row.network_flash.is_some())
-            .collect();
-        // of the fastest ones, less than 2 % apart, the smallest
-        let fewest = same
-            .iter()
-            .filter_map(|row| instructions(row))
-            .min()
-            .unwrap_or_default();
-        let fast = same
-            .iter()
-            .filter(|row| instructions(row).is_some_and(|count| count <= fewest + fewest / 50));
-        let Some(best) = fast.min_by_key(|row| row.network_flash) else {
-            continue;
-        };
-        let ratio = |ours: Option<u64>, theirs: Option<u64>| match (ours, theirs) {
-            (Some(ours), Some(theirs)) if ours > 0 => format!("1/{:.1}", theirs as f64 / ours as f64),
+        let Some(kind) = arithmetic(peer) else { continue };
+        let c = best(rows, &peer.core, kind.ours);
+        let assembly = best(rows, &peer.core, &format!("{}, assembly", kind.ours));
+        let count = |row: Option<&Row>| row.and_then(instructions);
+        let flash = |row: Option<&Row>| row.and_then(|row| row.network_flash);
+        let ratio = match (count(c), instructions(peer)) {
+            (Some(ours), Some(theirs)) if ours > 0 => format!("{:.1}", theirs as f64 / ours as f64),
             _ => String::new(),
         };
-        let number = |value: Option<u64>| value.map(|value| value.to_string()).unwrap_or_default();
         // writing to a String cannot fail
         let _ = writeln!(
             text,
-            "| {} | {} | {} | {} | {}, {} | {} | {} | {} | {} |",
+            "| {} | {} | {} | {} | {} | {} | {} | {} | {ratio} | {} | {} |",
             peer.variant.trim_start_matches(PEER),
-            if peer.compiler == STATED { "stated" } else { "measured" },
+            if peer.compiler == STATED { STATED } else { "measured" },
+            kind.words,
             number(instructions(peer)),
             number(peer.flash),
-            best.variant,
-            best.compiler,
-            number(instructions(best)),
-            number(best.network_flash),
-            ratio(instructions(best), instructions(peer)),
-            ratio(best.network_flash, peer.flash),
+            kind.ours,
+            number(count(c)),
+            number(flash(c)),
+            number(count(assembly)),
+            number(flash(assembly)),
         );
     }
     text
+}
+
+/// Our C build of a variant: of the fastest ones, less than 2 % apart, the smallest.
+fn best<'a>(rows: &'a [Row], core: &'a str, variant: &str) -> Option<&'a Row> {
+    let same: Vec<&Row> = ours(rows, core)
+        .filter(|row| row.variant == variant && row.network_flash.is_some())
+        .collect();
+    let fewest = same.iter().filter_map(|row| instructions(row)).min()?;
+    let fast = same
+        .into_iter()
+        .filter(|row| instructions(row).is_some_and(|count| count <= fewest + fewest / 50));
+    fast.min_by_key(|row| row.network_flash)
 }
 
 /// Instructions of an inference, ours and the peers', fewest first.
@@ -135,7 +170,15 @@ pub fn table(rows: &[Row]) -> String {
 pub fn picture(rows: &[Row]) -> Result<Svg, ReportError> {
     let core = "cortex-m4f";
     let mut bars: Vec<(String, u64, bool)> = Vec::new();
-    for format in ["f32", "f32, assembly", "i16", "i16, assembly", "i8", "i8, assembly"] {
+    for format in [
+        "f32",
+        "f32, assembly",
+        "f32-fma",
+        "i16",
+        "i16, assembly",
+        "i8",
+        "i8, assembly",
+    ] {
         let best = ours(rows, core)
             .filter(|row| row.variant == format)
             .filter_map(instructions)
@@ -146,7 +189,7 @@ pub fn picture(rows: &[Row]) -> Result<Svg, ReportError> {
         let mark = if row.compiler == STATED { ", stated" } else { "" };
         let name = match row.variant.strip_prefix(PEER) {
             Some(name) => format!("{name}{mark}"),
-            None if row.variant == "naive C" => "naive C f32".to_owned(),
+            None if row.variant.starts_with("naive C") => row.variant.replace("naive C", "naive C f32"),
             None => continue,
         };
         bars.extend(instructions(row).map(|count| (name, count, false)));
@@ -167,4 +210,44 @@ pub fn picture(rows: &[Row]) -> Result<Svg, ReportError> {
     )
     .dots()
     .svg()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn counted(variant: &str, compiler: &str, count: u64, flash: u64) -> Row {
+        let network_flash = (!variant.starts_with(PEER)).then_some(flash);
+        Row {
+            policy: "bench".into(),
+            variant: variant.into(),
+            compiler: compiler.into(),
+            q_values: Some((count, count)),
+            flash: Some(flash),
+            network_flash,
+            ..blank("m")
+        }
+    }
+
+    #[test]
+    fn like_stands_beside_like() {
+        let rows = [
+            counted("f32", "gcc -O2", 500, 90),
+            counted("f32", "gcc -O3", 495, 95),
+            counted("f32, assembly", "gcc -O2", 300, 91),
+            counted("f32-fma", "gcc -O2", 400, 92),
+            counted("i8", "gcc -O2", 200, 30),
+            counted(&format!("{PEER}exact f32"), "gcc -O2", 1000, 80),
+            counted(&format!("{PEER}fused f32 contracted"), STATED, 800, 81),
+            counted(&format!("{PEER}half s16"), STATED, 500, 25),
+        ];
+        let text = table(&rows);
+        for line in [
+            "| exact f32 | measured | binary32 | 1000 | 80 | f32 | 500 | 90 | 2.0 | 300 | 91 |",
+            "| fused f32 contracted | stated | binary32, contracted | 800 | 81 | f32-fma | 400 | 92 | 2.0 |  |  |",
+            "| half s16 | stated | w8, a16 | 500 | 25 | i8 | 200 | 30 | 2.5 |  |  |",
+        ] {
+            assert!(text.contains(line), "{text}");
+        }
+    }
 }

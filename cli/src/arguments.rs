@@ -2,8 +2,11 @@
 
 use std::path::PathBuf;
 
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use codegen::Output;
+use measured::ColumnMap;
+use toml_input::Faults;
 
 use crate::commands::budget::Clock;
 
@@ -26,7 +29,7 @@ pub enum Command {
     New(New),
     /// Show what a policy means: signals, features, network, actions, mapping, limits, sizes
     Inspect(Inspect),
-    /// Generate C or Rust and manifest.json
+    /// Generate C, Rust, blocks and units of simulation tools, and manifest.json
     Compile(Compile),
     /// Compile the generated code and compare it with the interpreter, bit by bit
     Verify(Verify),
@@ -51,7 +54,7 @@ pub enum Command {
 pub struct New {
     /// Network weights
     pub weights: PathBuf,
-    /// File to write; must not exist yet
+    /// File to write; must not exist yet. It names the weights as seen from its folder
     #[arg(long, value_name = "FILE", default_value = "policy.toml")]
     pub out: PathBuf,
 }
@@ -92,35 +95,20 @@ impl From<Format> for policy::NumericFormat {
     }
 }
 
-/// Language on the command line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Lang {
-    C,
-    Rust,
-}
-
-impl From<Lang> for codegen::Language {
-    fn from(lang: Lang) -> Self {
-        match lang {
-            Lang::C => codegen::Language::C,
-            Lang::Rust => codegen::Language::Rust,
-        }
-    }
-}
-
-/// Reads the name of a door.
-fn door() -> impl TypedValueParser<Value = codegen::Door> {
-    let names = codegen::Door::ALL.map(codegen::Door::name);
-    PossibleValuesParser::new(names).try_map(|name| codegen::Door::find(&name).ok_or("unknown door"))
+/// Reads the name of an output; the list of names, their meanings and near misses are clap's to print.
+fn output() -> impl TypedValueParser<Value = Output> {
+    let row = |output: &Output| PossibleValue::new(output.name()).help(output.meaning());
+    PossibleValuesParser::new(Output::ALL.iter().map(row)).try_map(|name| Output::find(&name).ok_or("unknown output"))
 }
 
 #[derive(Debug, Args)]
 pub struct Compile {
     /// policy.toml or the folder that holds it
     pub policy: PathBuf,
-    /// Language; several separated by commas
-    #[arg(long, value_enum, value_delimiter = ',', default_value = "c")]
-    pub lang: Vec<Lang>,
+    /// What to make, separated by commas or given several times. All but the two cores call one and bring it along
+    // `--lang` and `--door` are what this flag was before it was one
+    #[arg(long, aliases = ["lang", "door"], value_name = "OUTPUT", value_delimiter = ',', default_value = "c", value_parser = output())]
+    pub emit: Vec<Output>,
     /// Deployment target; `policyc targets` lists them
     #[arg(long, default_value = "host")]
     pub target: String,
@@ -131,11 +119,6 @@ pub struct Compile {
     /// and which numeric format would
     #[arg(long, value_name = "FREQUENCY", value_parser = Clock::parse, conflicts_with = "no_costs")]
     pub clock: Option<Clock>,
-    /// Also generate a way into a tool or onto a board, with the C core; may be repeated. kit: C test program with
-    /// expected bits for your compiler and board. sfunction: Simulink block, also for dSPACE RTI. fmu2, fmu3: unit for
-    /// co-simulation, FMI 2.0 or 3.0, sources and a binary for this machine
-    #[arg(long, value_name = "NAME", value_parser = door())]
-    pub door: Vec<codegen::Door>,
     /// Control steps in the kit
     #[arg(long, value_name = "N", default_value_t = verify::kit::DEFAULT_STEPS, value_parser = clap::value_parser!(u32).range(1..=200_000))]
     pub kit_steps: u32,
@@ -164,9 +147,13 @@ pub struct Verify {
     /// generated folder, else host
     #[arg(long)]
     pub target: Option<String>,
-    /// Verify the generated code in this folder, and that it is what the policy yields today
+    /// Verify the generated code in this folder, if it is what the policy yields today; files that differ are named, and
+    /// nothing is built
     #[arg(long, value_name = "DIR")]
     pub generated: Option<PathBuf>,
+    /// Only compare the files of --generated with what the policy yields today; needs no compiler
+    #[arg(long, requires = "generated", conflicts_with_all = ["steps", "seed", "trace"])]
+    pub drift_only: bool,
     /// Recorded measurements to replay first: CSV with one column per signal, in the signal's unit (ADC signals take
     /// the nearest code)
     #[arg(long, value_name = "CSV")]
@@ -262,21 +249,46 @@ pub struct Train {
     pub resume: bool,
 }
 
+/// Where the quantities of a table stand that names them otherwise.
+#[derive(Debug, Args)]
+pub struct Columns {
+    /// Where the quantities stand: quantity=column, quantity=column*factor or quantity=number, separated by commas;
+    /// quantities are t, duty, v_out, i_l, i_out, v_in, r_load, i_load, p_load, v_std, settled
+    #[arg(long, value_name = "MAP", default_value = "")]
+    pub map: String,
+    /// The same as a file: names, factors, offsets and constants
+    #[arg(long, value_name = "MAP.toml")]
+    pub columns: Option<PathBuf>,
+}
+
+impl Columns {
+    /// The file with what the command line adds.
+    pub fn read(&self) -> Result<ColumnMap, Faults> {
+        let file = self
+            .columns
+            .as_deref()
+            .map_or_else(|| Ok(ColumnMap::default()), ColumnMap::open)?;
+        file.and(ColumnMap::parse(&self.map)?)
+    }
+}
+
 #[derive(Debug, Args)]
 pub struct Diagnose {
     /// The model: plant.toml
     #[arg(long, value_name = "PLANT")]
     pub model: PathBuf,
-    /// Measured records to find causes in: CSV with the columns t,d,v_o,i_l,i_o,v_in,r_load,i_load,p_load, as far as
-    /// there are any; without t: settled points
+    /// Measured records to find causes in: CSV with the columns t,duty,v_out,i_l,i_out,v_in,r_load,i_load,p_load, as far
+    /// as there are any; without time: settled points
     #[arg(long, value_name = "CSV", num_args = 1.., required = true)]
     pub train: Vec<PathBuf>,
     /// Measured records that only judge the extended model
     #[arg(long, value_name = "CSV", num_args = 1..)]
     pub heldout: Vec<PathBuf>,
-    /// Names, units and constants of other tables
-    #[arg(long, value_name = "MAP")]
-    pub columns: Option<PathBuf>,
+    #[command(flatten)]
+    pub columns: Columns,
+    /// Each row is a settled operating point, whatever else the records hold
+    #[arg(long)]
+    pub settled: bool,
     /// policy.toml with a mapping, or the folder that holds it: its mapping is refitted from the extended model, and the
     /// loop closed on that model with both
     #[arg(long, value_name = "POLICY")]

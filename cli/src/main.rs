@@ -2,6 +2,7 @@
 
 mod arguments;
 mod commands;
+mod interruption;
 mod output;
 
 use std::process::ExitCode;
@@ -33,7 +34,22 @@ impl<E: std::error::Error> From<E> for Failure {
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    let result = match &arguments.command {
+    let result = run(&arguments.command);
+    interruption::go_no_further_if_ending();
+    match result {
+        Ok(outcome) => ExitCode::from(outcome as u8),
+        Err(Failure(message)) => {
+            let message = message.trim_end();
+            let label = if message.starts_with("error") { "" } else { "error: " };
+            eprintln!("{label}{message}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(command: &Command) -> Result<Outcome, Failure> {
+    let _scratch = interruption::watch()?;
+    match command {
         Command::New(options) => commands::new::run(options),
         Command::Inspect(options) => commands::inspect::run(options),
         Command::Compile(options) => commands::compile::run(options),
@@ -45,14 +61,5 @@ fn main() -> ExitCode {
         Command::Simulate(options) => commands::simulate::run(options),
         Command::Demo(options) => commands::demo::run(options),
         Command::Drm(command) => commands::drm::run(command),
-    };
-    match result {
-        Ok(outcome) => ExitCode::from(outcome as u8),
-        Err(Failure(message)) => {
-            let message = message.trim_end();
-            let label = if message.starts_with("error") { "" } else { "error: " };
-            eprintln!("{label}{message}");
-            ExitCode::from(2)
-        }
     }
 }

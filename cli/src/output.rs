@@ -5,7 +5,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crate::Failure;
+use crate::{Failure, interruption};
 
 /// Start of the names of temporary files; leftovers of an interrupted run are removed by the next.
 const TEMPORARY: &str = ".policyc-tmp-";
@@ -15,6 +15,7 @@ const TEMPORARY: &str = ".policyc-tmp-";
 /// # Errors
 /// If the folder cannot be made or written, or a destination is a folder or a symbolic link.
 pub fn write_all(folder: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<(), Failure> {
+    interruption::go_no_further_if_ending();
     let destinations: Vec<(PathBuf, &[u8])> = files
         .iter()
         .map(|(name, content)| (folder.join(name), content.as_slice()))
@@ -123,6 +124,7 @@ pub fn check_new_folder(folder: &Path) -> Result<(), Failure> {
 /// # Errors
 /// If the text cannot be written.
 pub fn say(text: &str) -> Result<(), Failure> {
+    interruption::go_no_further_if_ending();
     let mut out = io::stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),

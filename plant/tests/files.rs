@@ -94,13 +94,16 @@ fn not_a_number_is_refused() {
 
 #[test]
 fn every_key_is_documented() {
-    let page = include_str!("../../docs/plant.md");
+    let page = include_str!("../../docs/reference/plant-file.md");
     for parameter in plant::parameters() {
         let key = ["v_out", "i_l", "i_out", "v_in"]
             .iter()
             .fold(parameter.key.to_owned(), |key, channel| {
                 key.replace(&format!("sensors.{channel}."), "sensors.*.")
             });
-        assert!(page.contains(&format!("`{key}`")), "{key} is missing in docs/plant.md");
+        assert!(
+            page.contains(&format!("`{key}`")),
+            "{key} is missing in docs/reference/plant-file.md"
+        );
     }
 }

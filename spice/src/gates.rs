@@ -1,4 +1,4 @@
-//! From a duty to the edges of the gates, from the description of the modulator in docs/plant.md.
+//! From a duty to the edges of the gates, from the description of the modulator in docs/reference/plant-file.md.
 
 use plant::{Carrier, Parameters, Rectifier};
 

@@ -55,7 +55,7 @@ fn assert_agreement(name: &str, p: &Parameters) {
             a.v_min - b.v_min,
             a.v_max - b.v_max,
         ];
-        // the bounds of the plant's own comparison with ngspice, docs/plant.md
+        // the bounds of the plant's own comparison with ngspice, docs/results/plant.md
         let bounds = [1.5e-3, 1.5e-3, 1e-3, 2e-3, 2e-3];
         let within = off.iter().zip(bounds).all(|(x, bound)| x.abs() <= bound);
         assert!(within, "{name}, sample {n}: {off:?}\n{a:?}\n{b:?}");

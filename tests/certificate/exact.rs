@@ -1,7 +1,7 @@
 //! The real network in double-double arithmetic (Dekker): about 100 bits, so its own error is far below every bound here.
 //! Written from the formulas of a dense network alone.
 
-use policy::{Activation, Policy};
+use policy::{Policy, Shape};
 
 /// High and low part.
 #[derive(Clone, Copy)]
@@ -36,13 +36,11 @@ pub fn q_values(policy: &Policy, observation: &[f32]) -> Vec<f64> {
                 let products = row.iter().zip(&x).map(|(w, x)| x.times(f64::from(*w)));
                 products.fold(Double(f64::from(*bias), 0.0), Double::add)
             })
-            .map(|sum| match layer.activation {
-                Activation::Identity => sum,
-                Activation::Relu if sum.0 > 0.0 => sum,
-                Activation::Relu => Double(0.0, 0.0),
-                Activation::LeakyRelu { .. } if sum.0 > 0.0 => sum,
-                Activation::LeakyRelu { slope } => sum.times(slope),
-                Activation::Tanh => Double(sum.0.tanh(), 0.0),
+            .map(|sum| match layer.activation.shape() {
+                Shape::Hinge { .. } if sum.0 > 0.0 => sum,
+                Shape::Hinge { below } => sum.times(below),
+                // its own error is far below that of any format
+                Shape::Sigmoid(sigmoid) => Double((sigmoid.real)(sum.0), 0.0),
             })
             .collect();
     }

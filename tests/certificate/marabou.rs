@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, Stdio};
 
 use certify::Certifier;
-use policy::{Activation, Interval, NumericFormat, Policy};
+use policy::{Interval, NumericFormat, Policy};
 use serde_json::{Value, json};
 use verify::traces::Rng;
 
@@ -31,7 +31,7 @@ impl Marabou {
             .iter()
             .map(|layer| {
                 let rows: Vec<&[f32]> = layer.weights.chunks_exact(layer.inputs).collect();
-                json!({"weights": rows, "bias": layer.bias, "relu": layer.activation == Activation::Relu})
+                json!({"weights": rows, "bias": layer.bias, "relu": layer.activation.is_rectifier()})
             })
             .collect();
         let answers = BufReader::new(process.stdout.take().unwrap());
@@ -42,7 +42,7 @@ impl Marabou {
 
     fn say(&mut self, value: &Value) {
         writeln!(self.process.stdin.as_mut().unwrap(), "{value}")
-            .expect("Marabou listens (`cargo xtask install` installs it)");
+            .expect("Marabou listens (`cargo xtask setup` installs it)");
     }
 
     /// An input of the box with a sum of outputs of at least this, if there is one.
@@ -52,7 +52,7 @@ impl Marabou {
         let mut line = String::new();
         self.answers.read_line(&mut line).unwrap();
         let answer: Value = serde_json::from_str(&line)
-            .unwrap_or_else(|error| panic!("Marabou does not answer: {error} (`cargo xtask install` installs it)"));
+            .unwrap_or_else(|error| panic!("Marabou does not answer: {error} (`cargo xtask setup` installs it)"));
         assert!(answer.get("unknown").is_none(), "Marabou gives up: {line}");
         let found = answer["found"].as_array()?;
         Some(found.iter().map(|x| x.as_f64().unwrap()).collect())

@@ -46,6 +46,39 @@ fn a_target_without_a_model_says_so() {
     assert!(said.contains("cannot be said"), "{said}");
 }
 
+/// A kit has a `main` of its own, the others need headers of a tool: none of them is part of a step.
+#[test]
+fn what_is_generated_beside_the_controller_leaves_its_figures_as_they_are() {
+    let desk = Desk::new("minimal");
+    let costs = |outputs: &str, folder: &str| -> Value {
+        let said = desk.succeed(&format!(
+            "compile policy --target cortex-m4f --clock 168MHz{outputs} --out {folder}"
+        ));
+        assert!(said.contains("control period met"), "{outputs}\n{said}");
+        let manifest: Value = serde_json::from_str(&desk.read(&format!("{folder}/manifest.json"))).unwrap();
+        manifest["costs"].clone()
+    };
+    let alone = costs("", "alone");
+    assert_eq!(alone.as_array().unwrap().len(), 2, "-O2 and -O3");
+    for output in ["kit", "sfunction", "fmu2", "fmu3"] {
+        assert_eq!(alone, costs(&format!(" --emit {output}"), output), "{output}");
+    }
+    assert_eq!(alone, costs(" --emit c,kit", "both"));
+}
+
+#[test]
+fn a_missing_emulator_is_not_taken_for_a_missing_model() {
+    let desk = Desk::new("minimal");
+    let mut command = desk.command();
+    command.args("compile policy --target cortex-m4f --clock 168MHz --out out".split(' '));
+    let ran = tests::tools::run(command.env("PATH", ""));
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    for word in ["not measured", "qemu-system-arm", "cannot be said: no step ran"] {
+        assert!(ran.stdout.contains(word), "{word}\n{}", ran.stdout);
+    }
+    assert!(!ran.stdout.contains("no cycles are modelled"), "{}", ran.stdout);
+}
+
 #[test]
 fn a_clock_that_is_none_is_refused() {
     let desk = Desk::new("minimal");

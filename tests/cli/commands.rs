@@ -11,10 +11,29 @@ fn the_help_of_every_command_names_its_arguments() {
     for (command, arguments) in [
         ("new", &["<WEIGHTS>", "--out"][..]),
         ("inspect", &["<POLICY>", "--json"]),
-        ("compile", &["<POLICY>", "--lang", "c, rust", "--target", "--out"]),
+        (
+            "compile",
+            &[
+                "<POLICY>",
+                "--emit",
+                "- rust-over-c:",
+                "- fmu3:",
+                "[default: c]",
+                "--target",
+                "--out",
+            ],
+        ),
         (
             "verify",
-            &["<POLICY>", "--steps", "--seed", "--generated", "--trace", "--json"],
+            &[
+                "<POLICY>",
+                "--steps",
+                "--seed",
+                "--generated",
+                "--drift-only",
+                "--trace",
+                "--json",
+            ],
         ),
         ("certify", &["<POLICY>", "--format", "--axis", "--at", "--out"]),
         ("demo", &["--out", "--steps"]),
@@ -32,6 +51,17 @@ fn the_help_of_every_command_names_its_arguments() {
     assert!(desk.succeed("--version").starts_with("policyc "));
 }
 
+/// A name of `--emit` that no page of the integrations shows is one that nobody can use.
+#[test]
+fn every_output_is_in_the_documentation() {
+    let page = tests::root().join("docs/integrations/README.md");
+    let text = std::fs::read_to_string(page).unwrap();
+    for output in codegen::Output::ALL {
+        let row = format!("| `{}` |", output.name());
+        assert!(text.contains(&row), "docs/integrations/README.md has no row {row}");
+    }
+}
+
 #[test]
 fn a_command_line_that_cannot_be_read_ends_with_2() {
     let desk = Desk::new("minimal");
@@ -39,7 +69,7 @@ fn a_command_line_that_cannot_be_read_ends_with_2() {
         "compil policy",
         "compile policy",
         "compile --out out",
-        "compile policy --out out --lang cobol",
+        "compile policy --out out --emit cobol",
         "verify policy --steps many",
         "inspect policy --yaml",
     ] {
@@ -129,6 +159,76 @@ fn new_writes_a_skeleton_whose_gaps_inspect_names_one_by_one() {
         faults.matches("still says TODO").count() >= gaps,
         "{gaps} gaps\n{faults}"
     );
+}
+
+/// The contract names its weights from its own folder, wherever the command was typed.
+#[test]
+fn new_names_the_weights_as_the_contract_sees_them() {
+    let desk = Desk::new("linear");
+    std::fs::create_dir(desk.path("elsewhere")).unwrap();
+    let absolute = desk.path("policy/weights.safetensors").display().to_string();
+    for (weights, out, expected) in [
+        (
+            "policy/weights.safetensors",
+            "beside.toml",
+            "policy/weights.safetensors",
+        ),
+        (
+            "policy/weights.safetensors",
+            "elsewhere/policy.toml",
+            "../policy/weights.safetensors",
+        ),
+        (
+            "policy/weights.safetensors",
+            "not/yet/there/policy.toml",
+            "../../../policy/weights.safetensors",
+        ),
+        (
+            "policy/weights.safetensors",
+            "gone/../up.toml",
+            "policy/weights.safetensors",
+        ),
+        (
+            "./elsewhere/../policy/weights.safetensors",
+            "policy/near.toml",
+            "weights.safetensors",
+        ),
+        (&absolute, "elsewhere/absolute.toml", "../policy/weights.safetensors"),
+    ] {
+        desk.succeed(&format!("new {weights} --out {out}"));
+        let text = desk.read(out);
+        assert!(text.contains(&format!("\nweights = \"{expected}\"\n")), "{out}\n{text}");
+        // the network is read: what is left to say is the user's
+        let faults = desk.refuse(&format!("inspect {out}"), &["TODO"]);
+        assert!(!faults.contains("cannot find"), "{faults}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn new_climbs_out_of_the_folder_that_a_link_leads_to() {
+    let desk = Desk::new("linear");
+    std::fs::create_dir_all(desk.path("far/away")).unwrap();
+    std::os::unix::fs::symlink("far/away", desk.path("link")).unwrap();
+    desk.succeed("new policy/weights.safetensors --out link/policy.toml");
+    assert!(
+        desk.read("far/away/policy.toml")
+            .contains("\nweights = \"../../policy/weights.safetensors\"\n")
+    );
+    desk.refuse("inspect link/policy.toml", &["TODO"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn new_refuses_a_path_that_a_contract_cannot_hold() {
+    use std::os::unix::ffi::OsStrExt;
+    let desk = Desk::new("linear");
+    let folder = std::ffi::OsStr::from_bytes(b"caf\xe9");
+    std::fs::rename(desk.path("policy"), desk.folder.path().join(folder)).unwrap();
+    let weights = std::path::Path::new(folder).join("weights.safetensors");
+    let ran = desk.run([std::ffi::OsStr::new("new"), weights.as_os_str()]);
+    super::assert_refused(&ran, &["UTF-8", "weights.safetensors"]);
+    assert!(!desk.path("policy.toml").exists());
 }
 
 #[test]

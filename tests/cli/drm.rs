@@ -78,7 +78,7 @@ fn a_judgement_says_what_is_repaired_and_what_not() {
     assert!(said.contains("without a mapping"), "{said}");
 }
 
-/// ngspice shares no code with the plant; both measure the same steady state (docs/plant.md: samples agree within 1.5 mV).
+/// ngspice shares no code with the plant; both measure the same steady state (docs/results/plant.md: samples agree within 1.5 mV).
 #[test]
 fn ngspice_is_measured_as_the_plant_is() {
     let desk = desk();

@@ -8,14 +8,14 @@ use super::{Desk, assert_refused, contents};
 #[test]
 fn compile_writes_every_file_and_the_same_again() {
     let desk = Desk::new("paper");
-    let said = desk.succeed("compile policy --lang c,rust --out a/b");
+    let said = desk.succeed("compile policy --emit c,rust --out a/b");
     let first = contents(&desk.path("a/b"));
     let names = ["manifest.json", "paper.c", "paper.h", "paper.rs"];
     assert_eq!(first.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), names);
     for name in names {
         assert!(said.contains(name), "{name}\n{said}");
     }
-    desk.succeed("compile policy/policy.toml --lang rust,c,c --out a/b");
+    desk.succeed("compile policy/policy.toml --emit rust,c,c --out a/b");
     assert!(contents(&desk.path("a/b")) == first);
 }
 
@@ -30,6 +30,33 @@ fn the_manifest_names_the_files_that_were_written_and_their_lengths() {
         assert_eq!(entry["bytes"], desk.read(&format!("out/{name}")).len());
     }
     assert_eq!(manifest["languages"], serde_json::json!(["c"]));
+}
+
+/// All ways to name a choice are one choice: lists, repetition, any order, and the flags from before there was one.
+#[test]
+fn lists_repetition_and_the_older_flags_mean_the_same() {
+    let desk = Desk::new("linear");
+    let base = "compile policy --kit-steps 20 --out";
+    desk.succeed(&format!("{base} expected --emit rust,kit,sfunction"));
+    let expected = contents(&desk.path("expected"));
+    let names: Vec<&str> = expected.iter().map(|(name, _)| name.as_str()).collect();
+    assert!(
+        names.contains(&"linear.c") && names.contains(&"linear_kit.c"),
+        "{names:?}"
+    );
+    for choice in [
+        "--emit sfunction --emit kit,rust --emit c",
+        "--lang rust --door kit --door sfunction",
+        "--door kit,sfunction --emit rust",
+        "--lang rust,kit --emit sfunction",
+    ] {
+        desk.succeed(&format!("{base} out {choice}"));
+        assert!(contents(&desk.path("out")) == expected, "{choice}");
+        std::fs::remove_dir_all(desk.path("out")).unwrap();
+    }
+    // hidden, but there
+    let help = desk.succeed("compile --help");
+    assert!(!help.contains("--lang") && !help.contains("--door"), "{help}");
 }
 
 /// A second run leaves what is not its own alone.
@@ -47,7 +74,7 @@ fn strangers_in_the_output_folder_are_kept() {
 /// Whatever stands in the way, the run ends with 2 and every file and folder is as it was.
 fn nothing_written(desk: &Desk, out: &str, words: &[&str]) {
     let (names, before) = (desk.listing(), plain_files(desk));
-    desk.refuse(&format!("compile policy --lang c,rust --out {out}"), words);
+    desk.refuse(&format!("compile policy --emit c,rust --out {out}"), words);
     assert_eq!(desk.listing(), names);
     assert!(plain_files(desk) == before, "{out}");
 }
@@ -100,14 +127,14 @@ fn a_full_disk_leaves_the_old_files_and_no_fragments() {
     let desk = Desk::new("linear");
     for old_files in [false, true] {
         if old_files {
-            desk.succeed("compile policy --lang c,rust --out out");
+            desk.succeed("compile policy --emit c,rust --out out");
             desk.edit("policy/policy.toml", "duty = [0.4, 0.6]", "duty = [0.41, 0.59]");
         } else {
             std::fs::create_dir(desk.path("out")).unwrap();
         }
         let before = contents(&desk.path("out"));
         let script = format!(
-            "trap '' XFSZ; ulimit -f 8; exec '{}' compile policy --lang c,rust --out out",
+            "trap '' XFSZ; ulimit -f 8; exec '{}' compile policy --emit c,rust --out out",
             policyc().display()
         );
         let mut shell = std::process::Command::new("sh");

@@ -6,6 +6,8 @@ use std::time::{Duration, Instant};
 
 use ::verify::traces::Rng;
 use tests::tools::listing;
+#[cfg(unix)]
+use tests::tools::run;
 
 use super::{Desk, contents};
 
@@ -25,7 +27,7 @@ impl Pair {
         tests::tools::copy_folder(&desk.path("policy"), &desk.path("other"));
         desk.edit("other/policy.toml", "duty = [0.3, 0.7]", "duty = [0.35, 0.65]");
         let yields = POLICIES.map(|policy| {
-            desk.succeed(&format!("compile {policy} --lang c,rust --out expected-{policy}"));
+            desk.succeed(&format!("compile {policy} --emit c,rust --out expected-{policy}"));
             contents(&desk.path(&format!("expected-{policy}")))
         });
         assert!(yields[0].iter().zip(&yields[1]).all(|(a, b)| a.0 == b.0 && a.1 != b.1));
@@ -34,7 +36,7 @@ impl Pair {
 
     fn start(&self, policy: usize) -> Child {
         let mut command = self.desk.command();
-        command.args(["compile", POLICIES[policy], "--lang", "c,rust", "--out", "out"]);
+        command.args(["compile", POLICIES[policy], "--emit", "c,rust", "--out", "out"]);
         command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
     }
 
@@ -131,4 +133,49 @@ fn what_an_interrupted_run_left_behind_is_removed() {
     desk.write(&format!("out/{TEMPORARY}123-0"), "half a fi");
     desk.succeed("compile policy --out out");
     assert_eq!(listing(&desk.path("out")), ["linear.c", "linear.h", "manifest.json"]);
+}
+
+/// Everything below a folder.
+#[cfg(unix)]
+fn tree(folder: &std::path::Path) -> String {
+    run(std::process::Command::new("find").arg(folder).arg("-mindepth").arg("1")).stdout
+}
+
+/// Ctrl-C as soon as something below the temporary folder has `sign` in its path; what is there afterwards.
+#[cfg(unix)]
+fn interrupted(line: &str, sign: &str) {
+    let desk = Desk::new("linear");
+    let scratch = desk.path("scratch");
+    std::fs::create_dir(&scratch).unwrap();
+    let mut command = desk.command();
+    command.args(line.split(' ')).env("TMPDIR", &scratch);
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let started = Instant::now();
+    while !tree(&scratch).contains(sign) {
+        assert!(started.elapsed() < Duration::from_secs(300), "{line}: no {sign}");
+        assert_eq!(child.try_wait().unwrap(), None, "{line}: ended before {sign}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let ended = super::interrupt(child);
+    assert_eq!(ended.status.code(), Some(130), "{line} at {sign}");
+    assert_eq!(tree(&scratch), "", "{line} at {sign}");
+    // compilers that have outlived the run write nothing either
+    std::thread::sleep(Duration::from_secs(1));
+    assert_eq!(tree(&scratch), "", "{line} at {sign}, later");
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_verification_leaves_no_temporary_file() {
+    for sign in ["/", "policyc_driver.c", "driver.exe"] {
+        interrupted("verify policy --steps 4000000000", sign);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_compilation_or_demo_leaves_no_temporary_file() {
+    interrupted("compile policy --target cortex-m4f --emit c,rust --out out", "/");
+    interrupted("compile policy --emit fmu2 --out out", "/");
+    interrupted("demo --steps 4000000000", "driver.exe");
 }

@@ -8,6 +8,7 @@ mod drm;
 mod files;
 mod interruption;
 mod simulate;
+mod tables;
 mod traces;
 mod training;
 mod verify;

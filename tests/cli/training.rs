@@ -72,12 +72,12 @@ fn a_trained_policy_is_a_whole_folder_that_compiles() {
     assert_eq!(names[..5], expected);
     assert!(!desk.path("out/checkpoints").exists());
     // compile answers the golden vectors, which the trainer's own matrices made
-    desk.succeed("compile out --lang c,rust --out code");
+    desk.succeed("compile out --emit c,rust --out code");
     let weights = std::fs::read(desk.path("out/seeds/5/weights.safetensors")).unwrap();
     std::fs::write(desk.path("out/weights.safetensors"), weights).unwrap();
     let other = std::fs::read(desk.path("out/seeds/3/golden.safetensors")).unwrap();
     std::fs::write(desk.path("out/golden.safetensors"), other).unwrap();
-    desk.refuse("compile out --lang c --out code", &["golden"]);
+    desk.refuse("compile out --emit c --out code", &["golden"]);
 }
 
 #[test]

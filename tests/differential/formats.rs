@@ -68,7 +68,9 @@ fn binary64_gives_other_q_values_than_binary32() {
 fn planted_defects_in_binary64_are_caught() {
     let policy = example(NumericFormat::F64);
     let host = targets::find("host").unwrap();
-    let clean: Files = codegen::compile(&policy, host, codegen::Language::C).unwrap().files;
+    let clean: Files = codegen::sources(&policy, host, &[codegen::Output::C], None)
+        .unwrap()
+        .files;
     let edits = [
         (
             "select(f0, measured->v_out",
@@ -112,7 +114,9 @@ type Edit<'a> = &'a dyn Fn(&str) -> String;
 fn planted_defects_in_the_integer_network_are_caught() {
     let policy = example(NumericFormat::I16);
     let host = targets::find("host").unwrap();
-    let clean: Files = codegen::compile(&policy, host, codegen::Language::C).unwrap().files;
+    let clean: Files = codegen::sources(&policy, host, &[codegen::Output::C], None)
+        .unwrap()
+        .files;
     let shift = scales::of(&policy).unwrap().layers[1].shift;
     let edits: [(&str, Edit<'_>); 4] = [
         ("weight", &|text| flipped(text, "buck12_weights1[4096] = {")),

@@ -63,8 +63,7 @@ fn the_example_is_equal_in_every_build_and_gives_the_trainers_answers() {
 #[test]
 fn recorded_closed_loops_are_replayed() {
     let policy = policy::load(&tests::example()).unwrap();
-    let text = std::fs::read_to_string(tests::root().join("tests/fixtures/buck12_200_1000.csv")).unwrap();
-    let recorded = Recorded::from_csv(&policy, &text).unwrap();
+    let recorded = Recorded::open(&policy, &tests::root().join("tests/fixtures/buck12_200_1000.csv")).unwrap();
     let steps = recorded.steps().len() as u64;
     assert!(steps > 500);
     let options = Options {
@@ -121,10 +120,6 @@ fn random_policies_reach_every_status_bit_and_every_kind() {
         "moving_average",
         "integrator",
         "adc",
-        "tanh",
-        "leaky_relu",
-        "relu",
-        "identity",
         "pairs",
         "duties",
         "slew",
@@ -134,6 +129,9 @@ fn random_policies_reach_every_status_bit_and_every_kind() {
         "previous_command",
     ] {
         assert!(all.contains(word), "no random policy has {word}");
+    }
+    for each in policy::Activation::EACH {
+        assert!(all.contains(&each.written()), "no random policy has {}", each.word());
     }
     let layers: Vec<usize> = (0..60)
         .map(|seed| {

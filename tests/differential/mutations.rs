@@ -1,6 +1,6 @@
 //! What a hostile editor, or a careless build, would do to the generated code.
 
-use codegen::Language;
+use codegen::Output;
 use policy::Policy;
 use verify::{Files, Options, Outcome, Report};
 
@@ -8,8 +8,8 @@ fn example() -> Policy {
     policy::load(&tests::example()).unwrap()
 }
 
-fn generated(policy: &Policy, language: Language) -> Files {
-    codegen::compile(policy, targets::find("host").unwrap(), language)
+fn generated(policy: &Policy, core: Output) -> Files {
+    codegen::sources(policy, targets::find("host").unwrap(), &[core], None)
         .unwrap()
         .files
 }
@@ -26,9 +26,9 @@ fn verify_files(policy: &Policy, files: &Files, compiler: &str, extra: &[&str]) 
 }
 
 /// Replaces the first `from` in the source file; the edit must have happened.
-fn edited(policy: &Policy, language: Language, edit: &dyn Fn(&str) -> String) -> Files {
-    let mut files = generated(policy, language);
-    let extension = if language == Language::C { "c" } else { "rs" };
+fn edited(policy: &Policy, core: Output, edit: &dyn Fn(&str) -> String) -> Files {
+    let mut files = generated(policy, core);
+    let extension = if core == Output::C { "c" } else { "rs" };
     let text = files.get_mut(&format!("{}.{extension}", policy.name)).unwrap();
     let new = edit(text);
     assert_ne!(*text, new, "the edit has found its place");
@@ -85,14 +85,14 @@ fn caught(report: &Report) -> Vec<&str> {
 #[test]
 fn unedited_files_pass() {
     let policy = example();
-    assert!(verify_files(&policy, &generated(&policy, Language::C), "gcc", &[]).passed());
-    assert!(verify_files(&policy, &generated(&policy, Language::Rust), "rustc", &[]).passed());
+    assert!(verify_files(&policy, &generated(&policy, Output::C), "gcc", &[]).passed());
+    assert!(verify_files(&policy, &generated(&policy, Output::Rust), "rustc", &[]).passed());
 }
 
 #[test]
 fn two_swapped_weights_are_caught() {
     let policy = example();
-    let files = edited(&policy, Language::C, &|text| {
+    let files = edited(&policy, Output::C, &|text| {
         let literals = table_literals(text, "buck12_weights1[4096]");
         let ((a, b), (c, d)) = (literals[1000], literals[1001]);
         format!(
@@ -110,7 +110,7 @@ fn two_swapped_weights_are_caught() {
 #[test]
 fn one_flipped_bit_of_a_weight_is_caught() {
     let policy = example();
-    let files = edited(&policy, Language::C, &|text| {
+    let files = edited(&policy, Output::C, &|text| {
         let (a, b) = table_literals(text, "buck12_weights0[384]")[17];
         let value: f32 = text[a..b].trim_end_matches('f').parse().unwrap();
         format!("{}{:e}f{}", &text[..a], f32::from_bits(value.to_bits() ^ 1), &text[b..])
@@ -121,7 +121,7 @@ fn one_flipped_bit_of_a_weight_is_caught() {
 #[test]
 fn a_dropped_bias_is_caught() {
     let policy = example();
-    let files = edited(&policy, Language::C, &|text| {
+    let files = edited(&policy, Output::C, &|text| {
         let (a, b) = table_literals(text, "buck12_bias2[12]")[3];
         format!("{}0.0f{}", &text[..a], &text[b..])
     });
@@ -151,8 +151,8 @@ fn ties() -> (tempfile::TempDir, Policy) {
 #[test]
 fn greater_or_equal_in_argmax_is_caught_in_c() {
     let (_folder, policy) = ties();
-    assert!(verify_files(&policy, &generated(&policy, Language::C), "gcc", &[]).passed());
-    let files = edited(&policy, Language::C, &|text| {
+    assert!(verify_files(&policy, &generated(&policy, Output::C), "gcc", &[]).passed());
+    let files = edited(&policy, Output::C, &|text| {
         text.replace("flag(output > best)", "flag(output >= best)")
     });
     assert_caught(&verify_files(&policy, &files, "gcc", &[]));
@@ -161,14 +161,14 @@ fn greater_or_equal_in_argmax_is_caught_in_c() {
 #[test]
 fn greater_or_equal_in_argmax_is_caught_in_rust() {
     let (_folder, policy) = ties();
-    let files = edited(&policy, Language::Rust, &|text| text.replace("*q > best", "*q >= best"));
+    let files = edited(&policy, Output::Rust, &|text| text.replace("*q > best", "*q >= best"));
     assert_caught(&verify_files(&policy, &files, "rustc", &[]));
 }
 
 #[test]
 fn a_limit_applied_before_the_mapping_is_caught() {
     let policy = example();
-    let files = edited(&policy, Language::C, &|text| {
+    let files = edited(&policy, Output::C, &|text| {
         text.replace(
             "command->duty = buck12_select(usable, v7,",
             "command->duty = buck12_select(usable, v3,",
@@ -180,7 +180,7 @@ fn a_limit_applied_before_the_mapping_is_caught() {
 #[test]
 fn a_filter_that_forgets_is_caught() {
     let policy = example();
-    let files = edited(&policy, Language::C, &|text| {
+    let files = edited(&policy, Output::C, &|text| {
         text.replace("state->memory[0] = front->push[0];", "")
     });
     assert_caught(&verify_files(&policy, &files, "gcc", &[]));
@@ -189,7 +189,7 @@ fn a_filter_that_forgets_is_caught() {
 #[test]
 fn an_eval_that_changes_the_state_is_caught() {
     let policy = example();
-    let files = edited(&policy, Language::C, &|text| {
+    let files = edited(&policy, Output::C, &|text| {
         let place = "    buck12_sense(state, measured, &front);\n    buck12_decide(state, &front, index, command);\n}";
         text.replacen(
             place,
@@ -203,7 +203,7 @@ fn an_eval_that_changes_the_state_is_caught() {
 #[test]
 fn fast_math_is_refused_by_the_source() {
     let policy = example();
-    let files = generated(&policy, Language::C);
+    let files = generated(&policy, Output::C);
     for compiler in ["gcc", "clang"] {
         for flag in ["-ffast-math", "-Ofast"] {
             let report = verify_files(&policy, &files, compiler, &[flag]);
@@ -222,9 +222,9 @@ fn fast_math_is_refused_by_the_source() {
 #[test]
 fn contraction_on_fma_hardware_flags_does_not_reach_the_code_with_gcc() {
     let policy = example();
-    let files = generated(&policy, Language::C);
+    let files = generated(&policy, Output::C);
     assert!(verify_files(&policy, &files, "gcc", &FUSED).passed());
-    let files = edited(&policy, Language::C, &|text| text.replace("\"fp-contract=off\", ", ""));
+    let files = edited(&policy, Output::C, &|text| text.replace("\"fp-contract=off\", ", ""));
     assert_eq!(
         caught(&verify_files(&policy, &files, "gcc", &FUSED)),
         ["gcc -O2", "gcc -O3"],
@@ -237,7 +237,7 @@ fn contraction_on_fma_hardware_flags_does_not_reach_the_code_with_gcc() {
 #[test]
 fn contraction_on_fma_hardware_flags_is_caught_with_clang() {
     let policy = example();
-    let report = verify_files(&policy, &generated(&policy, Language::C), "clang", &FUSED);
+    let report = verify_files(&policy, &generated(&policy, Output::C), "clang", &FUSED);
     assert!(!report.passed());
     // sums are vectors, which clang fuses without optimisation, too
     assert_eq!(caught(&report), ["clang -O0", "clang -O2", "clang -O3"]);
@@ -248,7 +248,7 @@ fn unsafe_math_optimisations_are_refused_with_gcc() {
     let policy = example();
     let report = verify_files(
         &policy,
-        &generated(&policy, Language::C),
+        &generated(&policy, Output::C),
         "gcc",
         &["-funsafe-math-optimizations"],
     );

@@ -2,7 +2,7 @@
 
 use std::process::Command;
 
-use codegen::Language;
+use codegen::Output;
 use policy::NumericFormat;
 
 #[test]
@@ -13,7 +13,7 @@ fn generated_rust_has_no_warnings() {
         let policy = policy::load(&path).unwrap();
         for format in NumericFormat::ALL {
             let policy = policy.clone().with_format(format);
-            let files = codegen::generate(&policy, targets::host(), &[Language::Rust])
+            let files = codegen::generate(&policy, targets::host(), &[Output::Rust], None)
                 .unwrap()
                 .files;
             let crate_folder = tempfile::tempdir().unwrap();

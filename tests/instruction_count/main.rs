@@ -42,7 +42,7 @@ fn the_count_does_not_depend_on_the_input_rustc() {
 fn a_branch_on_the_data_is_seen() {
     let policy = policy::load(&tests::example()).unwrap();
     let folder = tempfile::tempdir().unwrap();
-    let text = generate(&policy, codegen::Language::C, folder.path());
+    let text = generate(&policy, codegen::Output::C, folder.path());
     let branchy = text.replace(
         "return (x + __builtin_fabsf(x)) * 0.5f;",
         "if (x < 0.0f) { return 0.0f; } __asm__ volatile(\"nop\\n nop\\n nop\\n nop\"); return x;",
@@ -81,7 +81,7 @@ fn counts(program: &Path, folder: &Path) -> BTreeSet<u64> {
         .arg(format!("--callgrind-out-file={}", folder.join("calls").display()))
         .arg(program)
         .output()
-        .expect("valgrind is installed by `cargo xtask install`");
+        .expect("valgrind is installed by `cargo xtask setup`");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let mut counts = Vec::new();
     for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
@@ -100,18 +100,18 @@ fn counts(program: &Path, folder: &Path) -> BTreeSet<u64> {
     counts.into_iter().collect()
 }
 
-fn generate(policy: &Policy, language: codegen::Language, folder: &Path) -> String {
+fn generate(policy: &Policy, core: codegen::Output, folder: &Path) -> String {
     let target = targets::find("host").unwrap();
-    let files = codegen::compile(policy, target, language).unwrap().files;
+    let files = codegen::sources(policy, target, &[core], None).unwrap().files;
     for (name, text) in &files {
         std::fs::write(folder.join(name), text).unwrap();
     }
-    let extension = if language == codegen::Language::C { "c" } else { "rs" };
+    let extension = if core == codegen::Output::C { "c" } else { "rs" };
     files[&format!("{}.{extension}", policy.name)].clone()
 }
 
 fn c_program(policy: &Policy, folder: &Path, compiler: &str, level: &str) -> PathBuf {
-    generate(policy, codegen::Language::C, folder);
+    generate(policy, codegen::Output::C, folder);
     link_c(policy, folder, compiler, level)
 }
 
@@ -161,7 +161,7 @@ fn link_c(policy: &Policy, folder: &Path, compiler: &str, level: &str) -> PathBu
 }
 
 fn rust_program(policy: &Policy, folder: &Path) -> PathBuf {
-    generate(policy, codegen::Language::Rust, folder);
+    generate(policy, codegen::Output::Rust, folder);
     let name = &policy.name;
     let mut rows = String::new();
     for row in samples(policy) {

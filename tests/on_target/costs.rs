@@ -1,6 +1,6 @@
 //! What a step costs: the count of executed instructions does not depend on the data, no library, little stack.
 
-use codegen::Language;
+use codegen::Output;
 use policy::{NumericFormat, Policy};
 use targets::{Fpu, Runner, TargetSpec};
 use verify::estimate::estimate;
@@ -19,7 +19,7 @@ fn emulated(has_fpu: bool) -> impl Iterator<Item = &'static TargetSpec> {
 
 /// Costs of every build of the target.
 fn costs(policy: &Policy, target: &'static TargetSpec) -> Vec<Costs> {
-    let files = codegen::generate(policy, target, &Language::ALL).unwrap().files;
+    let files = codegen::generate(policy, target, &Output::CORES, None).unwrap().files;
     let compilers: Vec<String> = super::compilers(target).into_iter().map(str::to_owned).collect();
     let builds = toolchain::builds(target, &compilers, &[]);
     let costs = builds.iter().map(|build| {
@@ -57,7 +57,7 @@ fn check_core(target: &TargetSpec, costs: &Costs) {
 }
 
 /// Target, compiler and largest spread where LLVM makes a number of a comparison by a jump over one instruction:
-/// docs/targets.md says so.
+/// docs/results/target-costs.md says so.
 const BRANCHES: [(&str, &str, u64); 1] = [("dspace-ds1202", "rustc", 24)];
 
 #[test]
@@ -82,7 +82,7 @@ fn nor_does_that_of_random_policies() {
     for (seed, target) in (9000..).zip(emulated(true)) {
         let folder = tests::random::policy(seed).unwrap();
         let policy = policy::load(&folder.path()).unwrap();
-        let files = codegen::generate(&policy, target, &Language::ALL).unwrap().files;
+        let files = codegen::generate(&policy, target, &Output::CORES, None).unwrap().files;
         let build = &toolchain::builds(target, &[], &[])[0];
         let costs = measure(&policy, target, &files, build).unwrap();
         assert_eq!(
@@ -107,7 +107,7 @@ fn nor_does_that_of_the_integer_formats() {
     for format in [NumericFormat::I16, NumericFormat::I8] {
         let policy = example().with_format(format);
         for (target, around) in emulated(true).map(|t| (t, 0)).chain(emulated(false).map(|t| (t, 320))) {
-            let files = codegen::generate(&policy, target, &Language::ALL).unwrap().files;
+            let files = codegen::generate(&policy, target, &Output::CORES, None).unwrap().files;
             let compilers: Vec<String> = super::compilers(target).into_iter().map(str::to_owned).collect();
             for build in toolchain::builds(target, &compilers, &["-O2".to_owned(), "-O".to_owned()]) {
                 let costs = measure(&policy, target, &files, &build).unwrap();
@@ -120,7 +120,7 @@ fn nor_does_that_of_the_integer_formats() {
     }
 }
 
-/// The float library's count does depend on the data; `docs/targets.md` states by how much.
+/// The float library's count does depend on the data; `docs/results/target-costs.md` states by how much.
 #[test]
 fn without_fpu_only_the_float_library_is_called_and_its_count_varies() {
     for target in emulated(false) {
@@ -143,7 +143,7 @@ fn without_fpu_only_the_float_library_is_called_and_its_count_varies() {
 fn the_estimated_stack_is_near_the_painted_one() {
     let policy = example();
     for target in emulated(true) {
-        let files = codegen::generate(&policy, target, &[Language::C]).unwrap().files;
+        let files = codegen::generate(&policy, target, &[Output::C], None).unwrap().files;
         let compiler = [target.c_compilers[0].program.to_owned()];
         for build in toolchain::builds(target, &compiler, &[]) {
             let painted = measure(&policy, target, &files, &build).unwrap().stack_bytes;
@@ -212,7 +212,7 @@ fn in_integers_the_example_takes_256_bytes_of_stack_on_a_cortex_m4f() {
 fn a_branch_a_static_variable_and_a_library_call_are_seen() {
     let policy = example();
     let target = targets::find("cortex-m4f").unwrap();
-    let mut files = codegen::generate(&policy, target, &[Language::C]).unwrap().files;
+    let mut files = codegen::generate(&policy, target, &[Output::C], None).unwrap().files;
     let text = files.get_mut("buck12.c").unwrap();
     let honest = "return (x + __builtin_fabsf(x)) * 0.5f;";
     assert!(text.contains(honest), "the place of the ReLU");

@@ -11,7 +11,7 @@ mod included;
 
 use std::collections::BTreeMap;
 
-use codegen::Language;
+use codegen::Output;
 use policy::{NumericFormat, Policy};
 use targets::{Fpu, TargetSpec};
 use verify::{Options, Outcome, Report};
@@ -170,7 +170,7 @@ fn a_flipped_weight_bit_is_found() {
     let policy = policy::load(&tests::example()).unwrap();
     for name in ["cortex-m4f", "dspace-ds1202"] {
         let target = target(name);
-        let files = codegen::generate(&policy, target, &[Language::C]).unwrap().files;
+        let files = codegen::generate(&policy, target, &[Output::C], None).unwrap().files;
         let spoilt = with_flipped_weight(&files, &policy.name);
         let report = verify::run(
             &policy,

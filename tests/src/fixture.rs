@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use codegen::{CodegenError, Language};
+use codegen::{CodegenError, Output};
 use policy::Policy;
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensorError};
@@ -72,16 +72,16 @@ pub fn first_byte(file: &[u8], tensor: &str) -> Option<usize> {
     Some(8 + length + offset)
 }
 
-/// Everything that `policyc compile` writes for these languages: file name to text.
+/// Everything that `policyc compile` writes for these outputs, apart from the kit: file name to text.
 ///
 /// # Errors
 /// Only for a fault in the compiler.
 pub fn generate(
     policy: &Policy,
     target: &TargetSpec,
-    languages: &[Language],
+    outputs: &[Output],
 ) -> Result<BTreeMap<String, String>, CodegenError> {
-    Ok(codegen::generate(policy, target, languages)?.files)
+    Ok(codegen::generate(policy, target, outputs, None)?.files)
 }
 
 #[cfg(test)]

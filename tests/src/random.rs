@@ -4,6 +4,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use policy::Activation;
 use safetensors::Dtype;
 use safetensors::tensor::TensorView;
 use verify::traces::Rng;
@@ -70,14 +71,8 @@ fn contract(rng: &mut Rng, seed: u64, features: usize, actions: usize, hidden: u
         feature(&mut text, rng, index, signals);
     }
     let _ = writeln!(text, "[network]\nweights = \"weights.safetensors\"");
-    let activations: Vec<&str> = (0..hidden)
-        .map(|_| {
-            rng.pick(
-                &["\"relu\"", "\"tanh\"", "{ leaky_relu = 0.01 }", "\"identity\""],
-                "\"relu\"",
-            )
-        })
-        .collect();
+    let kinds = Activation::EACH;
+    let activations: Vec<String> = (0..hidden).map(|_| kinds[rng.below(kinds.len())].written()).collect();
     let _ = writeln!(text, "hidden_activation = [{}]\n", activations.join(", "));
     action_table(&mut text, rng, actions);
     protection(&mut text, rng, signals);

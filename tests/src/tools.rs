@@ -33,7 +33,7 @@ pub fn run(command: &mut Command) -> Ran {
             stdout: String::from_utf8_lossy(&output.stdout).into_owned(),
             stderr: String::from_utf8_lossy(&output.stderr).into_owned(),
         },
-        Err(error) => panic!("cannot start {shown}: {error} (`cargo xtask install` installs the tools)"),
+        Err(error) => panic!("cannot start {shown}: {error} (`cargo xtask setup` installs the tools)"),
     }
 }
 
@@ -67,7 +67,7 @@ pub fn rustc() -> Command {
     Command::new(std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into()))
 }
 
-/// The Python of `cargo xtask install`, with the packages that tests need; `tmp` is `env!("CARGO_TARGET_TMPDIR")`.
+/// The Python of `cargo xtask setup`, with the packages that tests need; `tmp` is `env!("CARGO_TARGET_TMPDIR")`.
 #[must_use]
 pub fn python(tmp: &str) -> Command {
     let folder = Path::new(tmp).with_file_name("python").join("bin");

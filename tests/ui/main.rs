@@ -27,7 +27,7 @@ impl Fixture {
         copy_folder(&example, &fixture.path("../outside"));
         copy_folder(&linear, &fixture.path("linear"));
         let policy = policy::load(&linear.join("policy.toml")).unwrap();
-        let text = generate(&policy, targets::find("host").unwrap(), &[codegen::Language::Rust]).unwrap();
+        let text = generate(&policy, targets::find("host").unwrap(), &[codegen::Output::Rust]).unwrap();
         std::fs::create_dir(fixture.path("text")).unwrap();
         std::fs::write(fixture.path("text/linear.rs"), &text["linear.rs"]).unwrap();
         for directive in case.lines().filter_map(|line| line.strip_prefix("//@ ")) {

@@ -6,9 +6,7 @@ use std::path::Path;
 use codegen::manifest;
 use policy::Policy;
 use serde::Serialize;
-use targets::TargetSpec;
 
-use crate::doors::{Selection, generate};
 use crate::session::{Files, VerifyError};
 
 /// How a folder differs from what the policy yields; all lists empty if it does not.
@@ -42,14 +40,13 @@ pub struct Changed {
     pub found: Option<String>,
 }
 
-/// Compares `folder` with what the policy yields for `target`.
+/// Compares `folder` with the files that the policy yields.
 ///
 /// # Errors
-/// If code generation fails or a file is there but cannot be read. A missing folder lacks all files.
-pub fn drift(policy: &Policy, target: &TargetSpec, selection: &Selection, folder: &Path) -> Result<Drift, VerifyError> {
-    let expected = generate(policy, target, selection)?;
-    let found = read(&expected, &policy.name, folder)?;
-    Ok(compare(&expected, &found))
+/// If a file is there but cannot be read. A missing folder lacks all files.
+pub fn drift(policy: &Policy, expected: &Files, folder: &Path) -> Result<Drift, VerifyError> {
+    let found = read(expected, &policy.name, folder)?;
+    Ok(compare(expected, &found))
 }
 
 /// Compares two sets of files.

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use codegen::Door;
+use codegen::Output;
 use codegen::backend::fmu::{self, Fmi};
 use policy::Policy;
 use targets::{Runner, TargetSpec};
@@ -23,7 +23,7 @@ pub struct Archive {
     pub binary: Result<(&'static str, &'static str), String>,
 }
 
-/// The archives of those doors that are FMUs, of files that [`crate::doors::generate`] gave.
+/// The archives of those outputs that are FMUs, of files that [`codegen::generate`] gave.
 ///
 /// # Errors
 /// If a file is missing or there is no temporary folder. That no binary can be made is no error: an importer compiles the
@@ -31,11 +31,21 @@ pub struct Archive {
 pub fn archives(
     policy: &Policy,
     target: &TargetSpec,
-    doors: &[Door],
+    outputs: &[Output],
     files: &Files,
 ) -> Result<Vec<Archive>, VerifyError> {
-    let versions = doors.iter().filter_map(|door| door.fmi());
+    let versions = outputs.iter().filter_map(|output| version(*output));
     versions.map(|fmi| archive(policy, target, fmi, files)).collect()
+}
+
+/// The version of FMI, if this output is an FMU.
+#[must_use]
+pub fn version(output: Output) -> Option<Fmi> {
+    match output {
+        Output::Fmu2 => Some(Fmi::Two),
+        Output::Fmu3 => Some(Fmi::Three),
+        Output::C | Output::Rust | Output::RustOverC | Output::Kit | Output::Sfunction => None,
+    }
 }
 
 fn archive(policy: &Policy, target: &TargetSpec, fmi: Fmi, files: &Files) -> Result<Archive, VerifyError> {
@@ -63,7 +73,7 @@ fn archive(policy: &Policy, target: &TargetSpec, fmi: Fmi, files: &Files) -> Res
 }
 
 fn fault(text: &'static str) -> VerifyError {
-    VerifyError::Codegen(codegen::CodegenError::Door(text))
+    VerifyError::Codegen(codegen::CodegenError::Output(text))
 }
 
 /// Why there is no binary.
@@ -114,6 +124,7 @@ fn binary(name: &str, target: &TargetSpec, fmi: Fmi, files: &Files) -> Result<Bi
     }
     let mut command = Command::new(compiler);
     command.current_dir(temporary.path()).env("LC_ALL", "C");
+    command.env("TMPDIR", temporary.path());
     command.args(target.c_flags).args(FLAGS);
     command.arg(format!("-D{}_OVERRIDE_FUNCTION_PREFIX", fmi.name().to_uppercase()));
     command.arg(format!("-D{}_FMI_OWN_HEADER", name.to_uppercase()));

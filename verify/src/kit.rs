@@ -1,7 +1,7 @@
 //! What the back-to-back kit compares with: the interpreter's answers on the policy and on the construct suite.
 
-use codegen::Language;
 use codegen::backend::kit::{Material, Trace};
+use codegen::{Language, Output};
 use interp::Real;
 use policy::{NumericFormat, Policy, ReadOptions, Scalar};
 use targets::{RowBlock, TargetSpec};
@@ -35,6 +35,20 @@ const SUITE_STEPS: u32 = 300;
 const SEED: u64 = 2;
 /// The block form of a layer, with a shorter last block.
 const BLOCK: RowBlock = RowBlock::Rows(4);
+
+/// What the kit compares with, if it is among the outputs; for [`codegen::generate`].
+///
+/// # Errors
+/// Only for a fault in the compiler itself.
+pub fn expected(
+    policy: &Policy,
+    target: &TargetSpec,
+    outputs: &[Output],
+    steps: u32,
+) -> Result<Option<Material>, VerifyError> {
+    let needed = outputs.contains(&Output::Kit);
+    needed.then(|| material(policy, target, steps)).transpose()
+}
 
 /// Moves and expected answers for the kit of `policy`, `steps` of them control steps.
 ///
@@ -138,7 +152,7 @@ mod tests {
     use std::collections::BTreeSet;
     use std::mem::{Discriminant, discriminant};
 
-    use codegen::program::{ActivationCode, Literal, NetworkCode, Op};
+    use codegen::program::{ActivationCode, Literal, Loop, Op};
 
     use super::*;
 
@@ -223,24 +237,43 @@ mod tests {
     #[test]
     fn the_suite_uses_every_activation_and_every_form_of_a_layer() {
         let suite = suite();
-        let layers = || {
-            suite.iter().flat_map(|program| match &program.network {
-                NetworkCode::Real { layers, .. } => layers.as_slice(),
-                NetworkCode::Integer(_) => &[],
-            })
-        };
-        let kinds: BTreeSet<u8> = layers()
-            .map(|layer| match layer.activation {
-                ActivationCode::Identity => 0,
-                ActivationCode::Relu => 1,
-                ActivationCode::LeakyRelu(_) => 2,
-                ActivationCode::Tanh => 3,
+        let nodes = || suite.iter().flat_map(|program| program.network.nodes());
+        let kinds: BTreeSet<u8> = nodes()
+            .filter_map(|node| match node {
+                Loop::Store(store) => Some(match store.activation {
+                    ActivationCode::Identity => 0,
+                    ActivationCode::Relu => 1,
+                    ActivationCode::LeakyRelu(_) => 2,
+                    ActivationCode::Tanh => 3,
+                }),
+                _ => None,
             })
             .collect();
         assert_eq!(kinds.len(), 4);
-        assert!(layers().any(|layer| layer.full_blocks() == 1 && layer.tail_rows() == 0));
-        assert!(layers().any(|layer| layer.full_blocks() > 1 && layer.tail_rows() == 0));
-        assert!(layers().any(|layer| layer.full_blocks() > 1 && layer.tail_rows() > 0));
+        let blocks: Vec<Vec<usize>> = nodes()
+            .filter_map(|node| match node {
+                Loop::Layer(layer) => Some(&layer.body),
+                _ => None,
+            })
+            .map(|body| {
+                let counts = body.iter().filter_map(|node| match node {
+                    Loop::Repeat { count, .. } => Some(*count),
+                    _ => None,
+                });
+                counts.collect()
+            })
+            .collect();
+        assert!(blocks.iter().any(|blocks| matches!(blocks.as_slice(), [1])));
+        assert!(
+            blocks
+                .iter()
+                .any(|blocks| matches!(blocks.as_slice(), [full] if *full > 1))
+        );
+        assert!(
+            blocks
+                .iter()
+                .any(|blocks| matches!(blocks.as_slice(), [full, 1] if *full > 1))
+        );
     }
 
     /// A trace that never clips or falls back would check less than it says.

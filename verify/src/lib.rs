@@ -20,7 +20,6 @@
 //! | checked-in files against the policy | [`drift()`] |
 
 pub mod compare;
-pub mod doors;
 pub mod drift;
 pub mod drivers;
 pub mod elf;
@@ -40,7 +39,6 @@ pub mod toolchain;
 pub mod traces;
 mod zip;
 
-pub use doors::Selection;
 pub use drift::{drift, read_text};
 pub use live::{Live, LiveCommand};
 pub use report::{BuildReport, Difference, GoldenResult, Outcome, Report};

@@ -9,7 +9,7 @@ use policy::{Policy, Scalar};
 
 use crate::protocol::{self, Layout};
 use crate::runner::{ProcessRunner, Runner};
-use crate::session::{COMPILER_TIMEOUT, generate};
+use crate::session::COMPILER_TIMEOUT;
 use crate::toolchain::{self, Build, BuildError, Purpose, Sources};
 use crate::traces::Event;
 
@@ -50,13 +50,13 @@ impl Live {
     /// If there is no compiler, it refuses the code, or the program does not start as it should; text for a user.
     pub fn start(policy: &Policy, language: Language) -> Result<Self, String> {
         let target = targets::host();
-        let files = generate(policy, target, &[language]).map_err(|error| error.to_string())?;
+        let files = codegen::sources(policy, target, &[language.core()], None).map_err(|error| error.to_string())?;
         let build = build_for(language)?;
         let folder = tempfile::tempdir().map_err(|error| format!("cannot make a temporary folder: {error}"))?;
         let sources = Sources {
             purpose: Purpose::Compare,
             policy,
-            files: &files,
+            files: &files.files,
             target,
             extra_flags: &[],
             extra_rust_flags: &[],

@@ -167,6 +167,7 @@ fn plugin_arguments(folder: &Path, marks: &Elf, counts: &Path) -> Result<Vec<Str
     let plugin = folder.join("counter.so");
     let mut command = Command::new(PLUGIN_COMPILER);
     command.args(["-shared", "-fPIC", "-O2"]).arg(folder.join(counter.name));
+    command.env("TMPDIR", folder);
     let output = toolchain::run_for(command.arg("-o").arg(&plugin), COMPILER_TIMEOUT)?;
     if !output.status.success() {
         return Err(MeasureError::Run(String::from_utf8_lossy(&output.stderr).into_owned()));

@@ -9,7 +9,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 use std::time::Duration;
 
-use codegen::Language;
+use codegen::Output;
 use interp::{InputError, Real};
 use policy::{NumericFormat, Policy, Scalar};
 use targets::TargetSpec;
@@ -174,8 +174,8 @@ fn run_in<T: Real>(policy: &Policy, options: Options<'_>) -> Result<Report, Veri
     let files = match generated {
         Some(files) => files,
         None => {
-            fresh = generate(policy, target, &Language::ALL)?;
-            &fresh
+            fresh = codegen::generate(policy, target, &Output::CORES, None).map_err(VerifyError::Codegen)?;
+            &fresh.files
         }
     };
     let builds = toolchain::builds(target, &compilers, &levels);
@@ -336,12 +336,6 @@ fn known_answers<T: Real>(
     Ok((known, Some(judge(golden, &answers))))
 }
 
-/// The policy's files for `target` in each of `languages`.
-pub(crate) fn generate(policy: &Policy, target: &TargetSpec, languages: &[Language]) -> Result<Files, VerifyError> {
-    let generated = codegen::generate(policy, target, languages).map_err(VerifyError::Codegen)?;
-    Ok(generated.files)
-}
-
 /// Sends a chunk to every build that is still in the race.
 fn send(feeds: &mut [Option<SyncSender<Arc<Chunk>>>], chunk: &Arc<Chunk>) {
     for feed in feeds {
@@ -385,7 +379,7 @@ fn compile(build: &Build, sources: Sources<'_>, folder: &Path) -> Result<PathBuf
     let skipped = |reason: String, install: Option<Install>| Outcome::Skipped {
         missing: vec![Missing { reason, install }],
     };
-    let made = std::fs::create_dir_all(folder).map_err(BuildError::Io);
+    let made = std::fs::create_dir(folder).map_err(BuildError::Io);
     made.and_then(|()| toolchain::compile(build, sources, folder))
         .map_err(|error| match error {
             BuildError::NoFiles => skipped(format!("the files have no {} code", build.language().name()), None),

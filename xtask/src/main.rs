@@ -1,5 +1,7 @@
 //! One entry for desk and CI: `cargo xtask <command>`.
 
+mod book;
+mod markdown;
 mod process;
 mod rules;
 mod steps;
@@ -17,11 +19,13 @@ usage: cargo xtask <command>
   test [--quick] [--skip-install]   everything CI asks for; the last line counts the steps
          --quick          without the crates `tests` and `blind`, rustdoc, firmware and the demo
          --skip-install   look for the tools, install none
-  install                           only the tools: compilers, valgrind
+  setup                             only the tools: compilers, emulators, ngspice, mdBook (also called install)
   bless                             rewrite the golden files from what the code produces now
   layers                            only the layer rules
-  bench [--json|--peers|--host]     instruction counts and times of the generated network (docs/kernels.md)
-  blind --seed S --out DIR ...      blind cases for the diagnosis and their score (docs/blind.md; --help)
+  book                              only the book: links, contents, mdBook
+  words                             words of each page, and figures per hundred of them
+  bench [--json|--peers|--host]     instruction counts and times of the generated network (docs/results/kernels.md)
+  blind --seed S --out DIR ...      blind cases for the diagnosis and their score (docs/reference/blind-cases.md; --help)
 ";
 
 #[derive(Debug, PartialEq)]
@@ -30,6 +34,8 @@ enum Command {
     Install,
     Bless,
     Layers,
+    Book,
+    Words,
     Blind(Vec<String>),
     Bench(Vec<String>),
     Help,
@@ -62,9 +68,11 @@ fn parse(arguments: &[String]) -> Result<Command, String> {
         "test" => return parse_test(rest),
         "blind" => return Ok(Command::Blind(rest.to_vec())),
         "bench" => return Ok(Command::Bench(rest.to_vec())),
-        "install" => Command::Install,
+        "setup" | "install" => Command::Install,
         "bless" => Command::Bless,
         "layers" => Command::Layers,
+        "book" => Command::Book,
+        "words" => Command::Words,
         "help" | "--help" | "-h" => Command::Help,
         _ => return Err(format!("unknown command `{name}`")),
     };
@@ -94,13 +102,25 @@ fn run(command: Command) -> Result<bool, String> {
             Ok(true)
         }
         Command::Install => {
-            tools::provide(&Workspace::load()?.target_dir, &process::Output::Terminal)?;
+            let target_dir = Workspace::load()?.target_dir;
+            book::provide(&target_dir, &process::Output::Terminal);
+            tools::provide(&target_dir, &process::Output::Terminal)?;
             println!("all tools are there");
             Ok(true)
         }
-        Command::Test(options) => Ok(steps::run_all(&Workspace::load()?, options)),
+        Command::Test(options) => Ok(steps::run_all(&Workspace::load()?, steps::ALL, options)),
         Command::Bless => bless(&Workspace::load()?),
         Command::Layers => layers(&Workspace::load()?),
+        Command::Book => Ok(steps::run_all(
+            &Workspace::load()?,
+            steps::OF_THE_BOOK,
+            Options::default(),
+        )),
+        Command::Words => {
+            let lines = rules::words(&Workspace::load()?)?;
+            lines.iter().for_each(|line| println!("{line}"));
+            Ok(true)
+        }
         Command::Blind(arguments) => blind(&Workspace::load()?, &arguments),
         Command::Bench(arguments) => other_crate(&Workspace::load()?, "bench", &arguments),
     }

@@ -2,12 +2,16 @@
 
 mod layers;
 mod lengths;
+mod links;
 mod portable;
 mod source;
+mod words;
 mod writers;
 
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
+use crate::markdown::Page;
 use crate::workspace::Workspace;
 
 /// What a rule found, one line each.
@@ -53,6 +57,35 @@ pub fn portable(workspace: &Workspace) -> Result<Findings, String> {
     over_files(workspace, |path, bytes, findings| {
         findings.faults.extend(portable::check(path, bytes));
     })
+}
+
+/// Links between pages, the contents of the book, the length of the README.
+pub fn pages(workspace: &Workspace) -> Result<Findings, String> {
+    let mut faults = links::check(&read_pages(workspace)?, &workspace.files()?);
+    let readme = workspace.root.join("README.md");
+    let text = std::fs::read_to_string(&readme).map_err(|e| format!("cannot read {}: {e}", readme.display()))?;
+    faults.extend(words::check_readme(&text));
+    Ok(Findings {
+        faults,
+        warnings: Vec::new(),
+    })
+}
+
+/// Words and figures of each page, one line each.
+pub fn words(workspace: &Workspace) -> Result<Vec<String>, String> {
+    Ok(words::report(&read_pages(workspace)?))
+}
+
+fn read_pages(workspace: &Workspace) -> Result<BTreeMap<PathBuf, Page>, String> {
+    let files = workspace.files()?;
+    let markdown = files
+        .into_iter()
+        .filter(|file| file.extension().is_some_and(|e| e == "md"));
+    let read = |file: PathBuf| match std::fs::read_to_string(workspace.root.join(&file)) {
+        Ok(text) => Ok((file, Page::read(&text))),
+        Err(error) => Err(format!("cannot read {}: {error}", file.display())),
+    };
+    markdown.map(read).collect()
 }
 
 fn over_files(workspace: &Workspace, rule: impl Fn(&Path, &[u8], &mut Findings)) -> Result<Findings, String> {

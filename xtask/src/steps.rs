@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
+use crate::book;
 use crate::process::{self, Output};
 use crate::rules::{self, Findings};
 use crate::tools;
@@ -32,7 +33,8 @@ enum Done {
 
 type Outcome = Result<Done, String>;
 
-struct Step {
+/// One thing that is tested.
+pub struct Step {
     name: &'static str,
     in_quick: bool,
     run: fn(&Context) -> Outcome,
@@ -42,12 +44,21 @@ const fn step(name: &'static str, in_quick: bool, run: fn(&Context) -> Outcome) 
     Step { name, in_quick, run }
 }
 
-const STEPS: &[Step] = &[
+const PAGES: Step = step("pages", true, |c| judged(rules::pages(c.workspace)));
+const BOOK: Step = step("book", true, book);
+
+/// What an author of pages wants to know.
+pub const OF_THE_BOOK: &[Step] = &[PAGES, BOOK];
+
+/// What CI asks for.
+pub const ALL: &[Step] = &[
     step("tools", true, install),
     step("layers", true, |c| judged(rules::layers(c.workspace))),
     step("writers", true, |c| judged(rules::writers(c.workspace))),
     step("lengths", true, |c| judged(rules::lengths(c.workspace))),
     step("portable", true, |c| judged(rules::portable(c.workspace))),
+    PAGES,
+    BOOK,
     step("fmt", true, fmt),
     step("clippy", true, clippy),
     step("test", true, test),
@@ -79,8 +90,8 @@ impl Context<'_> {
 }
 
 /// Runs every step, also after a failing one; true when none failed.
-pub fn run_all(workspace: &Workspace, options: Options) -> bool {
-    let steps: Vec<&Step> = STEPS.iter().filter(|step| step.in_quick || !options.quick).collect();
+pub fn run_all(workspace: &Workspace, steps: &[Step], options: Options) -> bool {
+    let steps: Vec<&Step> = steps.iter().filter(|step| step.in_quick || !options.quick).collect();
     let mut passed = 0;
     let mut failures = Vec::new();
     let started = Instant::now();
@@ -182,9 +193,18 @@ fn install(context: &Context) -> Outcome {
     let notes = if context.options.skip_install {
         tools::require(target_dir)?
     } else {
-        tools::provide(target_dir, &Output::Log(context.log.clone()))?
+        let output = Output::Log(context.log.clone());
+        book::provide(target_dir, &output);
+        tools::provide(target_dir, &output)?
     };
     Ok(Done::Passed(notes))
+}
+
+fn book(context: &Context) -> Outcome {
+    match book::build(context.workspace, &context.log)? {
+        book::Built::Pages(folder) => Ok(Done::Passed(vec![folder.join("index.html").display().to_string()])),
+        book::Built::NoTool(what_to_type) => Ok(Done::Skipped(what_to_type)),
+    }
 }
 
 fn fmt(context: &Context) -> Outcome {

@@ -3,9 +3,10 @@
 use std::fmt;
 
 use ::targets::TargetSpec;
+use codegen::Output;
+use codegen::output::languages;
 use policy::{NumericFormat, Policy};
 use serde::Serialize;
-use verify::Selection;
 use verify::measure::Costs;
 
 use super::costs::Measured;
@@ -135,7 +136,7 @@ struct Proposal {
 pub fn lines(
     policy: &Policy,
     target: &'static TargetSpec,
-    selection: &Selection,
+    outputs: &[Output],
     measured: &Measured,
     clock: Clock,
 ) -> Result<Vec<String>, Failure> {
@@ -151,10 +152,13 @@ pub fn lines(
     let budgets: Vec<(&str, Budget)> = budgets.collect();
     lines.extend(budgets.iter().map(|(build, budget)| budget.text(build)));
     if budgets.is_empty() {
-        lines.push(format!(
-            "  cannot be said: no cycles are modelled for {} here; `policyc targets --json` names the targets with `cycles`",
-            target.name
-        ));
+        lines.push(match target.cycles {
+            None => format!(
+                "  cannot be said: no cycles are modelled for {}; `policyc targets --json` names the targets with `cycles`",
+                target.name
+            ),
+            Some(_) => "  cannot be said: no step ran under the target's emulator here".to_owned(),
+        });
         return Ok(lines);
     }
     if policy.numeric_format == NumericFormat::F32Fma {
@@ -163,7 +167,7 @@ pub fn lines(
     if budgets.iter().any(|(_, budget)| budget.fit == Fit::Met) {
         return Ok(lines);
     }
-    lines.push(match proposal(policy, target, selection, clock)? {
+    lines.push(match proposal(policy, target, outputs, clock)? {
         Some(Proposal { format, share }) => format!(
             "  = hint: --format {} takes {:.0} to {:.0} %{}",
             format.name(),
@@ -193,21 +197,18 @@ const EXACT_FIRST: [NumericFormat; 4] = [
 fn proposal(
     policy: &Policy,
     target: &'static TargetSpec,
-    selection: &Selection,
+    outputs: &[Output],
     clock: Clock,
 ) -> Result<Option<Proposal>, Failure> {
-    let core = Selection {
-        languages: selection.languages.clone(),
-        doors: Vec::new(),
-        kit_steps: selection.kit_steps,
-    };
+    let languages = languages(outputs);
+    let cores: Vec<Output> = languages.iter().map(|language| language.core()).collect();
     // binary64 from a library takes longer than anything else; whether it does, the target knows
     let natural = |format: &NumericFormat| *format != NumericFormat::F64 || target.fpu.has(true);
     let others = EXACT_FIRST.into_iter().filter(natural);
     for format in others.filter(|format| *format != policy.numeric_format) {
         let policy = policy.clone().with_format(format);
-        let files = verify::doors::generate(&policy, target, &core)?;
-        let measured = Measured::of(&policy, target, &core.languages, &files);
+        let files = codegen::sources(&policy, target, &cores, None)?.files;
+        let measured = Measured::of(&policy, target, &languages, &files);
         let budgets = measured
             .measured()
             .filter_map(|costs| Budget::of(costs, clock, policy.sample_period));

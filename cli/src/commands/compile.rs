@@ -1,13 +1,14 @@
 //! `policyc compile`
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use codegen::{Language, manifest};
+use codegen::output::{languages, with_cores};
+use codegen::{Output, manifest};
 use policy::Policy;
 use targets::TargetSpec;
+use verify::Files;
 use verify::fmu::Archive;
-use verify::{Files, Selection};
 
 use super::budget;
 use super::costs::Measured;
@@ -19,54 +20,54 @@ use crate::{Failure, Outcome, output};
 /// Generates, then writes everything at once.
 pub fn run(options: &Compile) -> Result<Outcome, Failure> {
     let target = super::target(&options.target)?;
-    let policy = super::load_as(&options.policy, options.format.map(Into::into))?;
-    if let Some(golden) = verify::golden_result(&policy)?.filter(|golden| !golden.passed()) {
-        return Err(Failure(format!(
-            "the network does not give the trainer's golden answers; nothing was written\n   = found: {}\n   \
-             = hint: look at hidden_activation, the order of layers and features, transpose; `policyc verify` compares them too",
-            golden_text(&golden)
-        )));
-    }
-    let mut languages: Vec<Language> = options.lang.iter().map(|lang| (*lang).into()).collect();
-    let mut doors = options.door.clone();
-    if !doors.is_empty() {
-        languages.push(Language::C);
-    }
-    languages.sort();
-    languages.dedup();
-    doors.sort();
-    doors.dedup();
-    let selection = Selection {
-        languages,
-        doors,
-        kit_steps: options.kit_steps,
-    };
-    let mut files = verify::doors::generate(&policy, target, &selection)?;
-    let measured = if options.no_costs {
-        Measured::default()
-    } else {
-        Measured::of(&policy, target, &selection.languages, &files)
-    };
-    if let (false, Some(manifest)) = (measured.costs.is_empty(), files.get_mut(manifest::FILE)) {
-        *manifest = manifest::with_costs(manifest, &measured.entries(&policy, options.clock))?;
-    }
-    let archives = verify::fmu::archives(&policy, target, &selection.doors, &files)?;
-    write(&policy, target, &options.out, &files, &archives)?;
+    let policy = load(options)?;
+    let outputs = with_cores(&options.emit);
+    let expected = verify::kit::expected(&policy, target, &outputs, options.kit_steps)?;
+    let mut files = codegen::generate(&policy, target, &outputs, expected.as_ref())?.files;
+    let measured = measure(options, &policy, target, &outputs, &mut files)?;
+    let archives = verify::fmu::archives(&policy, target, &outputs, &files)?;
+    let written = write(&options.out, &files, &archives)?;
+    say(&policy, target, &written, &archives)?;
     measured.say(&policy, target, options.clock)?;
     if let Some(clock) = options.clock {
-        output::say(&budget::lines(&policy, target, &selection, &measured, clock)?.join("\n"))?;
+        output::say(&budget::lines(&policy, target, &outputs, &measured, clock)?.join("\n"))?;
     }
     Ok(Outcome::Done)
 }
 
-/// Writes the files and says what they are.
-pub fn write(
+/// The policy in the format asked for; refused if its network does not give the trainer's answers.
+fn load(options: &Compile) -> Result<Policy, Failure> {
+    let policy = super::load_as(&options.policy, options.format.map(Into::into))?;
+    match verify::golden_result(&policy)?.filter(|golden| !golden.passed()) {
+        None => Ok(policy),
+        Some(golden) => Err(Failure(format!(
+            "the network does not give the trainer's golden answers; nothing was written\n   = found: {}\n   \
+             = hint: look at hidden_activation, the order of layers and features, transpose; `policyc verify` compares them too",
+            golden_text(&golden)
+        ))),
+    }
+}
+
+/// What a step costs under the target's emulator; it goes into the manifest, too.
+fn measure(
+    options: &Compile,
     policy: &Policy,
     target: &TargetSpec,
-    folder: &Path,
-    files: &Files,
-    archives: &[Archive],
-) -> Result<(), Failure> {
+    outputs: &[Output],
+    files: &mut Files,
+) -> Result<Measured, Failure> {
+    if options.no_costs {
+        return Ok(Measured::default());
+    }
+    let measured = Measured::of(policy, target, &languages(outputs), files);
+    if let (false, Some(manifest)) = (measured.costs.is_empty(), files.get_mut(manifest::FILE)) {
+        *manifest = manifest::with_costs(manifest, &measured.entries(policy, options.clock))?;
+    }
+    Ok(measured)
+}
+
+/// Writes files and archives, all or none; each with its length.
+pub fn write(folder: &Path, files: &Files, archives: &[Archive]) -> Result<Vec<(PathBuf, usize)>, Failure> {
     let texts = files.iter().map(|(name, text)| (name, text.as_bytes()));
     let packed = archives.iter().map(|archive| (&archive.file, archive.bytes.as_slice()));
     let all: BTreeMap<String, Vec<u8>> = texts
@@ -74,6 +75,17 @@ pub fn write(
         .map(|(name, bytes)| (name.clone(), bytes.to_vec()))
         .collect();
     output::write_all(folder, &all)?;
+    let length = |(name, content): (&String, &Vec<u8>)| (folder.join(name), content.len());
+    Ok(all.iter().map(length).collect())
+}
+
+/// Says what was made of the policy and what was written.
+pub fn say(
+    policy: &Policy,
+    target: &TargetSpec,
+    written: &[(PathBuf, usize)],
+    archives: &[Archive],
+) -> Result<(), Failure> {
     for note in &policy.notes {
         output::say(&format!("note: {note}"))?;
     }
@@ -109,8 +121,8 @@ pub fn write(
         "{}: {macs} MACs per step, {tables} of tables, {state} of state",
         policy.name
     ))?;
-    for (name, content) in &all {
-        output::say(&format!("  {} ({})", folder.join(name).display(), bytes(content.len())))?;
+    for (path, length) in written {
+        output::say(&format!("  {} ({})", path.display(), bytes(*length)))?;
     }
     for Archive { file, binary, .. } in archives {
         output::say(&match binary {

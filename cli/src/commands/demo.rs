@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use codegen::Language;
+use codegen::Output;
 
 use super::{compile, inspect, verify};
 use crate::arguments::{Demo, Inspect, Verify};
@@ -38,14 +38,16 @@ pub fn run(options: &Demo) -> Result<Outcome, Failure> {
 
     let generated = options.out.join("generated");
     let command = format!(
-        "policyc compile {} --lang c,rust --out {}",
+        "policyc compile {} --emit c,rust --out {}",
         policy_folder.display(),
         generated.display()
     );
     heading("The code", &command)?;
     let policy = super::load(&policy_folder)?;
-    let files = codegen::generate(&policy, super::target("host")?, &Language::ALL)?;
-    compile::write(&policy, super::target("host")?, &generated, &files.files, &[])?;
+    let target = ::targets::host();
+    let files = codegen::generate(&policy, target, &Output::CORES, None)?.files;
+    let written = compile::write(&generated, &files, &[])?;
+    compile::say(&policy, target, &written, &[])?;
 
     let (policy, generated) = (policy_folder.display(), generated.display());
     heading(
@@ -62,6 +64,7 @@ pub fn run(options: &Demo) -> Result<Outcome, Failure> {
         target: None,
         format: None,
         generated: Some(options.out.join("generated")),
+        drift_only: false,
         trace: Vec::new(),
         json: false,
     })?;

@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use ::diagnose::columns::Columns;
 use ::diagnose::control::Request;
 use ::diagnose::diagnosis::diagnose;
 use ::diagnose::extend::extended_toml;
@@ -12,6 +11,7 @@ use ::diagnose::page::page;
 use ::diagnose::record::Record;
 use closed_loop::Scenario;
 use closed_loop::scenario::Task;
+use measured::ColumnMap;
 use plant::{Fault, Faults, Parameters};
 
 use super::simulate;
@@ -21,10 +21,10 @@ use crate::{Failure, Outcome, output};
 /// Reads the records, diagnoses, writes the three files.
 pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
     let model = Parameters::from_file(&options.model)?;
-    let columns = options
-        .columns
-        .as_deref()
-        .map_or_else(|| Ok(Columns::default()), Columns::open)?;
+    let mut columns = options.columns.read()?;
+    if options.settled {
+        columns.settled = Some(true);
+    }
     let closed_loop = options
         .policy
         .as_deref()
@@ -102,7 +102,7 @@ fn short_task() -> Task {
 }
 
 /// All records, or all their faults.
-fn records(options: &Diagnose, columns: &Columns, model: &Parameters) -> Result<(Vec<Record>, Vec<Record>), Faults> {
+fn records(options: &Diagnose, columns: &ColumnMap, model: &Parameters) -> Result<(Vec<Record>, Vec<Record>), Faults> {
     let mut faults: Vec<Fault> = Vec::new();
     let mut read = |files: &[PathBuf]| {
         let one = |file: &PathBuf| match Record::open(Path::new(file), columns, model) {

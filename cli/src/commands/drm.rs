@@ -11,15 +11,12 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 use drm::acquire::LoadSetting;
 use drm::formula::Losses;
-use drm::{Columns, Table, TableOptions};
+use drm::{Table, TableOptions};
 use plant::Parameters;
 use policy::{Interval, Policy};
-use toml_input::{FileName, Source};
 
+use crate::arguments::Columns;
 use crate::{Failure, Outcome};
-
-/// Largest table that is read, bytes.
-const MOST_BYTES: u64 = 4 << 20;
 
 #[derive(Debug, Subcommand)]
 pub enum Drm {
@@ -46,10 +43,8 @@ pub fn run(command: &Drm) -> Result<Outcome, Failure> {
 /// How a table is read.
 #[derive(Debug, Args)]
 pub struct Reading {
-    /// Where the quantities stand: quantity=column, quantity=column*factor or quantity=number, separated by commas;
-    /// quantities are d_real, v_out, i_out, v_in, v_std, settled
-    #[arg(long, value_name = "MAP", default_value = "")]
-    map: String,
+    #[command(flatten)]
+    columns: Columns,
     /// Leave unsettled points out instead of refusing the table
     #[arg(long)]
     skip_unsettled: bool,
@@ -75,12 +70,12 @@ impl Reading {
             return Err(Failure(format!("--v-in-sim must be greater than 0 V\n   = found: {v}")));
         }
         let options = TableOptions {
-            columns: Columns::parse(&self.map)?,
+            columns: self.columns.read()?,
             skip_unsettled: self.skip_unsettled,
             simulation: self.simulation()?,
             partial: false,
         };
-        Ok(Table::parse(&source(path)?, &options)?)
+        Ok(Table::open(path, &options)?)
     }
 }
 
@@ -107,14 +102,6 @@ impl Loads {
             .chain(self.powers.iter().copied().map(LoadSetting::Power))
             .collect()
     }
-}
-
-fn source(path: &Path) -> Result<Source, Failure> {
-    let name = FileName::new(path);
-    let bytes = name
-        .read(MOST_BYTES)
-        .map_err(|message| Failure(name.fault(message).to_string()))?;
-    Source::new(name, bytes).map_err(|fault| Failure(fault.to_string()))
 }
 
 fn plant_parameters(path: &Path) -> Result<Parameters, Failure> {

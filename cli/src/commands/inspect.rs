@@ -190,12 +190,7 @@ fn network(out: &mut String, policy: &Policy) -> Result<(), Failure> {
         .max()
         .unwrap_or_default();
     for layer in &policy.layers {
-        let activation = match layer.activation {
-            Activation::Identity => "identity".to_owned(),
-            Activation::Relu => "relu".to_owned(),
-            Activation::LeakyRelu { slope } => format!("leaky relu, slope {slope}"),
-            Activation::Tanh => "tanh".to_owned(),
-        };
+        let activation = layer.activation.label();
         let (inputs, outputs, bound) = (layer.inputs, layer.outputs, range(hull(&layer.bounds)));
         writeln!(
             out,

@@ -8,7 +8,6 @@ pub mod demo;
 pub mod diagnose;
 pub mod drm;
 pub mod inspect;
-mod interruption;
 pub mod new;
 mod progress_line;
 pub mod simulate;

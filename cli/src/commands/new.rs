@@ -5,7 +5,7 @@ use crate::{Failure, Outcome, output};
 
 /// Writes a contract skeleton next to the weights' shapes.
 pub fn run(options: &New) -> Result<Outcome, Failure> {
-    let text = policy::new_contract(&options.weights)?;
+    let text = policy::new_contract(&options.weights, &options.out)?;
     output::write_new(&options.out, &text)?;
     let path = options.out.display();
     output::say(&format!(

@@ -2,13 +2,14 @@
 
 use std::path::Path;
 
-use codegen::{Door, Language, manifest};
+use codegen::{Output, manifest};
 use policy::{NumericFormat, Policy};
 use serde::{Deserialize, Serialize};
 use targets::TargetSpec;
+use toml_input::nearest;
 use verify::drift::Drift;
 use verify::traces::Recorded;
-use verify::{Files, Options, Progress, Report, Selection};
+use verify::{Files, Options, Progress, Report};
 
 use super::grouped;
 use super::progress_line::ProgressLine;
@@ -25,7 +26,9 @@ struct Answer {
     equal: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     drift: Option<Drift>,
-    report: Report,
+    /// Missing where nothing was built.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    report: Option<Report>,
 }
 
 /// Compares and reports.
@@ -39,14 +42,24 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
     let recorded = options
         .trace
         .iter()
-        .map(|path| recording(&policy, path))
+        .map(|path| Recorded::open(&policy, path))
         .collect::<Result<Vec<_>, _>>()?;
+    for (path, recording) in options.trace.iter().zip(&recorded) {
+        let note = |note: &String| eprintln!("note: {}: {note}", path.display());
+        recording.notes.iter().for_each(note);
+    }
     let on_disk = options
         .generated
         .as_deref()
         .map(|folder| checked_in(&policy, folder))
         .transpose()?;
     let target = target(options, on_disk.as_ref().map(|folder| folder.target))?;
+    if let Some(folder) = &on_disk
+        && (options.drift_only || !folder.drift.is_empty())
+    {
+        // a build of files that differ says the same once more, in every compiler's words
+        return files_alone(options, &policy.name, folder.drift.clone());
+    }
     let mut progress = ProgressLine::new();
     let mut tell = |news| {
         progress.show(|| match news {
@@ -73,9 +86,22 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
     let drift = on_disk.map(|folder| folder.drift);
     let equal = report.passed() && drift.as_ref().is_none_or(Drift::is_empty);
     if options.json {
+        let report = Some(report);
         output::say(&serde_json::to_string_pretty(&Answer { equal, drift, report })?)?;
     } else {
         output::say(show::report(&report, drift.as_ref(), equal)?.trim_end())?;
+    }
+    Ok(if equal { Outcome::Done } else { Outcome::Different })
+}
+
+/// The answer of a comparison that ends with the files.
+fn files_alone(options: &Verify, policy: &str, drift: Drift) -> Result<Outcome, Failure> {
+    let equal = drift.is_empty();
+    if options.json {
+        let (drift, report) = (Some(drift), None);
+        output::say(&serde_json::to_string_pretty(&Answer { equal, drift, report })?)?;
+    } else {
+        output::say(show::files_alone(policy, &drift)?.trim_end())?;
     }
     Ok(if equal { Outcome::Done } else { Outcome::Different })
 }
@@ -89,15 +115,6 @@ fn written_format(folder: &Path) -> Option<NumericFormat> {
     let text = verify::read_text(&folder.join(manifest::FILE)).ok()?;
     let written: Written = serde_json::from_str(&text).ok()?;
     NumericFormat::find(&written.numeric_format)
-}
-
-fn recording(policy: &Policy, path: &Path) -> Result<Recorded, Failure> {
-    let place = |error: &dyn std::fmt::Display| Failure(format!("{}: {error}", path.display()));
-    let text = verify::read_text(path).map_err(|error| place(&error))?;
-    if text.contains(char::REPLACEMENT_CHARACTER) {
-        return Err(place(&"is not UTF-8 text"));
-    }
-    Recorded::from_csv(policy, &text).map_err(|error| place(&error))
 }
 
 /// The target that was asked for; generated code is verified as what it was generated for.
@@ -151,37 +168,40 @@ fn checked_in(policy: &Policy, folder: &Path) -> Result<Folder, Failure> {
         ))
     })?;
     let target = super::target(&origin.target)?;
-    let languages: Vec<Language> = Language::ALL
-        .into_iter()
-        .filter(|language| origin.languages.iter().any(|name| name == language.name()))
-        .collect();
-    if languages.is_empty() || languages.len() != origin.languages.len() {
-        let known = Language::ALL.map(Language::name).join(", ");
-        return Err(Failure(format!(
-            "{shown}: unknown language\n   = found: {:?}\n   = expected: {known}",
-            origin.languages
-        )));
-    }
-    let doors: Option<Vec<Door>> = origin.doors.iter().map(|name| Door::find(name)).collect();
-    let Some(doors) = doors else {
-        let known = Door::ALL.map(Door::name).join(", ");
-        return Err(Failure(format!(
-            "{shown}: unknown door\n   = found: {:?}\n   = expected: {known}",
-            origin.doors
-        )));
-    };
-    let selection = Selection {
-        doors,
-        kit_steps: origin.kit_steps.unwrap_or(verify::kit::DEFAULT_STEPS),
-        ..Selection::core(&languages)
-    };
-    let drift = verify::drift(policy, target, &selection, folder)?;
+    let outputs = outputs(&origin).map_err(|error| Failure(format!("{shown}: {error}")))?;
+    let steps = origin.kit_steps.unwrap_or(verify::kit::DEFAULT_STEPS);
+    let expected = verify::kit::expected(policy, target, &outputs, steps)?;
+    let yielded = codegen::generate(policy, target, &outputs, expected.as_ref())?.files;
+    let drift = verify::drift(policy, &yielded, folder)?;
+    let cores: Vec<Output> = outputs.into_iter().filter(|output| output.is_core()).collect();
     let mut files = Files::new();
-    for name in codegen::generate(policy, target, &languages)?.files.into_keys() {
+    for name in codegen::sources(policy, target, &cores, None)?.files.into_keys() {
         // a missing file is already part of the drift
         if let Ok(text) = verify::read_text(&folder.join(&name)) {
             files.insert(name, text);
         }
     }
     Ok(Folder { files, drift, target })
+}
+
+/// What the folder was made of.
+fn outputs(origin: &Origin) -> Result<Vec<Output>, String> {
+    let names = origin.languages.iter().chain(&origin.doors);
+    let found = names.map(|name| Output::find(name).ok_or_else(|| unknown_output(name)));
+    let outputs = found.collect::<Result<Vec<_>, _>>()?;
+    if outputs.iter().any(|output| output.is_core()) {
+        Ok(outputs)
+    } else {
+        Err("no language\n   = expected: `languages` with c, rust or both".to_owned())
+    }
+}
+
+fn unknown_output(name: &str) -> String {
+    let known = || Output::ALL.iter().map(|output| output.name());
+    let hint = nearest(name, known()).map(|near| format!("\n   = hint: did you mean `{near}`?"));
+    format!(
+        "unknown output\n   = found: {name}\n   = expected: {}{}",
+        known().collect::<Vec<_>>().join(", "),
+        hint.unwrap_or_default()
+    )
 }

@@ -1,5 +1,5 @@
 //! Blind cases: data in which a simulator that shares no code with ours hides an effect, and the scoring of a diagnosis that
-//! has to find it. See docs/blind.md.
+//! has to find it. See docs/reference/blind-cases.md.
 
 pub mod bench;
 pub mod case;

@@ -12,7 +12,7 @@ use blind::plan::{Plan, plan, plan_of};
 use blind::score::{Closed, Diagnosis, closed_table, judge, table};
 use clap::Parser;
 
-/// Hides effects in data of an independent simulator. See docs/blind.md.
+/// Hides effects in data of an independent simulator. See docs/reference/blind-cases.md.
 #[derive(Debug, Parser)]
 #[command(name = "cargo xtask blind")]
 struct Arguments {

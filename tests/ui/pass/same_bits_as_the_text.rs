@@ -1,4 +1,4 @@
-// what the macro expands to and what `policyc compile --lang rust` writes are the same controller
+// what the macro expands to and what `policyc compile --emit rust` writes are the same controller
 policy_macro::include_policy!("linear/policy.toml");
 
 #[allow(dead_code)]

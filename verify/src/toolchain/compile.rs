@@ -69,7 +69,8 @@ impl From<std::io::Error> for BuildError {
 pub fn compile(build: &Build, sources: Sources<'_>, folder: &Path) -> Result<PathBuf, BuildError> {
     for (path, text) in sources.files {
         let path = folder.join(path);
-        if let Some(parent) = path.parent() {
+        // the folder itself, which an interruption may have removed, must not come back
+        if let Some(parent) = path.parent().filter(|parent| *parent != folder) {
             std::fs::create_dir_all(parent)?;
         }
         std::fs::write(path, text)?;
@@ -111,6 +112,14 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
+    /// Units in C. Integrations beside the controller bring a `main` or need headers of a tool: only the kit is compiled.
+    fn c_units(&self) -> impl Iterator<Item = &String> {
+        let Sources { purpose, policy, .. } = self.sources;
+        let is_controller = move |path: &&String| Path::new(path).file_stem().is_some_and(|stem| *stem == *policy.name);
+        self.of_kind("c")
+            .filter(move |path| purpose == Purpose::Kit || is_controller(path))
+    }
+
     fn of_kind(&self, extension: &'static str) -> impl Iterator<Item = &String> {
         self.sources
             .files
@@ -120,13 +129,22 @@ impl Job<'_> {
 
     fn command(&self, program: &str) -> Command {
         let mut command = Command::new(program);
-        command.current_dir(self.folder).env("LC_ALL", "C");
+        self.settle(&mut command);
         command
+    }
+
+    /// A compiler works in the folder of its build, also with its own temporary files, which it leaves behind if a signal
+    /// ends it.
+    fn settle(&self, command: &mut Command) {
+        command
+            .current_dir(self.folder)
+            .env("TMPDIR", self.folder)
+            .env("LC_ALL", "C");
     }
 
     /// The compiler with all flags, driver and units; the driver is written.
     fn c_command(&self, compiler: CCompiler, form: Form) -> Result<Command, BuildError> {
-        let mut units = self.of_kind("c").peekable();
+        let mut units = self.c_units().peekable();
         if units.peek().is_none() {
             return Err(BuildError::NoFiles);
         }
@@ -163,7 +181,7 @@ impl Job<'_> {
     fn c_objects(&self, compiler: CCompiler) -> Result<Vec<PathBuf>, BuildError> {
         let mut command = self.c_command(compiler, Form::Board)?;
         self.run(command.args(["-I", BOARD_FOLDER, "-c"]))?;
-        let units = self.of_kind("c").map(|unit| Path::new(unit).with_extension("o"));
+        let units = self.c_units().map(|unit| Path::new(unit).with_extension("o"));
         let names = units.filter_map(|unit| unit.file_name().map(PathBuf::from));
         Ok(std::iter::once(PathBuf::from("policyc_driver.o"))
             .chain(names)
@@ -180,7 +198,7 @@ impl Job<'_> {
             return Err(BuildError::NoFiles);
         };
         let mut command = toolchain.rustc().map_err(BuildError::Refused)?;
-        command.current_dir(self.folder).env("LC_ALL", "C");
+        self.settle(&mut command);
         command.args(self.sources.target.rust_flags).args(self.build.flags);
         if let Tool::Rust(spec) = self.build.tool {
             command.args(rust::flags(spec));
@@ -225,7 +243,7 @@ impl Job<'_> {
 
     fn write_board(&self, board: &Board) -> Result<(), BuildError> {
         let folder = self.folder.join(BOARD_FOLDER);
-        std::fs::create_dir_all(&folder)?;
+        std::fs::create_dir(&folder)?;
         for file in board.files {
             std::fs::write(folder.join(file.name), file.text)?;
         }

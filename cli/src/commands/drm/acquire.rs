@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use drm::Table;
 use drm::acquire::{Plan, Protocol, measure};
+use measured::Sheet;
 use plant::Parameters;
 
 use super::Loads;
@@ -76,7 +78,7 @@ pub fn run(options: &Acquire) -> Result<Outcome, Failure> {
     let v_in = options.v_in.or(nominal).unwrap_or_default();
     let mut plan = Plan::new(v_in, &options.duties.0, &options.loads.settings(), options.cool_down)?;
     let kept = match &options.resume {
-        Some(path) => plan.resume(&super::source(path)?)?,
+        Some(path) => plan.resume(&Sheet::open(path, &Table::file_options())?)?,
         None => 0,
     };
     let measured = match &parameters {

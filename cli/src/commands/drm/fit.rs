@@ -10,7 +10,7 @@ use crate::{Failure, Outcome, output};
 
 #[derive(Debug, Args)]
 pub struct Fit {
-    /// Settled points as CSV with the columns d_real, v_out, i_out, v_in
+    /// Settled points as CSV with the columns duty (or d_real), v_out, i_out, v_in
     pub table: PathBuf,
     /// Mapping to write; replaced if it exists
     #[arg(long, value_name = "FILE", default_value = "drm.toml")]

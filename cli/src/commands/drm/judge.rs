@@ -13,7 +13,7 @@ use crate::{Failure, Outcome, output};
 
 #[derive(Debug, Args)]
 pub struct Judge {
-    /// Settled points as CSV with the columns d_real, v_out, i_out, v_in
+    /// Settled points as CSV with the columns duty (or d_real), v_out, i_out, v_in
     #[arg(required_unless_present = "plant")]
     pub table: Option<PathBuf>,
     /// The mapping

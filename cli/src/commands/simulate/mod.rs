@@ -10,9 +10,8 @@ use closed_loop::{Converter, LoadStep, Scenario, Trajectory};
 use plant::Parameters;
 use policy::Policy;
 
-use super::interruption;
 use crate::arguments::Simulate;
-use crate::{Failure, Outcome, output};
+use crate::{Failure, Outcome, interruption, output};
 
 pub mod controllers;
 mod files;
@@ -72,7 +71,7 @@ struct Findings {
 pub fn run(options: &Simulate) -> Result<Outcome, Failure> {
     output::check_new_folder(&options.out)?;
     let setting = prepare(options)?;
-    let stop = interruption::stop_on_signal()?;
+    let stop = interruption::stop_on_signal();
     let found = runs::all(options, setting, &stop);
     if stop.load(Ordering::Relaxed) {
         // what failed, failed because of the signal

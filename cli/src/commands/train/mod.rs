@@ -9,9 +9,9 @@ use train::scenario_table as table;
 use train::seeds::best;
 use train::{Contract, Converter, Course, Ended, Outcome as Trained, SeedRun, Settings, train_all};
 
-use super::{grouped, interruption};
+use super::grouped;
 use crate::arguments::Train;
-use crate::{Failure, Outcome, output};
+use crate::{Failure, Outcome, interruption, output};
 
 mod progress;
 
@@ -36,7 +36,7 @@ pub fn run(options: &Train) -> Result<Outcome, Failure> {
         checkpoints: kept.prepare(&settings.seeds, options.resume)?,
         checkpoint_every: CHECKPOINT_EVERY,
     };
-    let stop = interruption::stop_on_signal()?;
+    let stop = interruption::stop_on_signal();
     let start = Instant::now();
     let watcher = Watcher::new(&settings, &kept, &stop);
     let result = train_all(&settings, &contract, &converter, &course, &stop, &watcher);

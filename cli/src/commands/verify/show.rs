@@ -56,6 +56,15 @@ pub fn report(report: &Report, drift: Option<&Drift>, equal: bool) -> Result<Str
     Ok(out)
 }
 
+/// What the files alone tell.
+pub fn files_alone(policy: &str, drift: &Drift) -> Result<String, Failure> {
+    let mut out = String::new();
+    write_drift(&mut out, drift)?;
+    let word = if drift.is_empty() { "equal" } else { "DIFFERENT" };
+    writeln!(out, "{word}: {policy}, by its files; no build was made")?;
+    Ok(out)
+}
+
 pub fn golden_text(golden: &GoldenResult) -> String {
     let mut parts = Vec::new();
     if golden.actions_compared > 0 {

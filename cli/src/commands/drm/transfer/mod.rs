@@ -18,8 +18,8 @@ use policy::Policy;
 
 use super::bench::Simulator;
 use crate::arguments::ControllerKind;
-use crate::commands::{interruption, simulate};
-use crate::{Failure, Outcome, output};
+use crate::commands::simulate;
+use crate::{Failure, Outcome, interruption, output};
 
 #[derive(Debug, Args)]
 pub struct Transfer {
@@ -101,7 +101,7 @@ struct Findings {
 pub fn run(options: &Transfer) -> Result<Outcome, Failure> {
     output::check_new_folder(&options.out)?;
     let setting = prepare(options)?;
-    let stop = interruption::stop_on_signal()?;
+    let stop = interruption::stop_on_signal();
     let found = runs::all(options, setting, &stop);
     if stop.load(Ordering::Relaxed) {
         output::say("Interrupted; nothing written")?;

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use std::process::Command;
 
 use closed_loop::{Answer, Call, External, interpreter};
-use codegen::Door;
+use codegen::Output;
 use interp::Sample;
 use policy::{NumericFormat, Policy};
 use tests::tools::{is_without, run, run_silently};
@@ -32,22 +32,22 @@ const FMPY_FROM_SOURCES: &[&str] = &["simulate.py", "--compile"];
 
 /// Every duty, action and status has the interpreter's bits.
 #[track_caller]
-fn agrees(policy: &Policy, periods: usize, doors: &[Door], script: &[&str]) {
+fn agrees(policy: &Policy, periods: usize, outputs: &[Output], script: &[&str]) {
     // both scripts read descriptions with it
     if is_without("FMPy") {
         return;
     }
     let trajectory = interpreted(policy, periods);
     let expected = lines(&trajectory);
-    for door in doors {
-        let unit = Unit::new(policy, *door);
+    for output in outputs {
+        let unit = Unit::new(policy, *output);
         let (ran, answers) = unit.simulate(&trajectory, script);
         let name = &policy.name;
-        assert_eq!(ran.code, Some(0), "{name} {door:?}\n{}{}", ran.stdout, ran.stderr);
-        assert!(!ran.stderr.contains("warning:"), "{name} {door:?}\n{}", ran.stderr);
+        assert_eq!(ran.code, Some(0), "{name} {output:?}\n{}{}", ran.stdout, ran.stderr);
+        assert!(!ran.stderr.contains("warning:"), "{name} {output:?}\n{}", ran.stderr);
         assert_eq!(answers.len(), periods);
         let different = answers.iter().zip(&expected).filter(|(a, b)| a != b).count();
-        assert_eq!(different, 0, "{name} {door:?}");
+        assert_eq!(different, 0, "{name} {output:?}");
     }
 }
 
@@ -74,8 +74,8 @@ fn libcosim_steps_half_a_second_of_closed_loop() {
     if is_without("libcosim") {
         return;
     }
-    agrees(&example(), PERIODS, &[Door::Fmu2], &["libcosim.py"]);
-    agrees(&golden_case("adc_mapping"), 500, &[Door::Fmu2], &["libcosim.py"]);
+    agrees(&example(), PERIODS, &[Output::Fmu2], &["libcosim.py"]);
+    agrees(&golden_case("adc_mapping"), 500, &[Output::Fmu2], &["libcosim.py"]);
 }
 
 /// The plant steps the FMU: what it answers to a sample is what the converter does until the next one.
@@ -94,8 +94,8 @@ fn the_plant_as_importing_program_sees_the_duties_of_the_interpreter() {
     let exact = [(example(), PERIODS), (golden_case("adc_mapping"), 1000)];
     for (policy, periods) in exact.into_iter().chain(others) {
         let expected = interpreted(&policy, periods);
-        for door in VERSIONS {
-            let unit = Unit::new(&policy, door);
+        for output in VERSIONS {
+            let unit = Unit::new(&policy, output);
             unit.build_importer();
             let mut running = unit.run();
             let ask = |call: Call<'_>| match call {
@@ -103,7 +103,7 @@ fn the_plant_as_importing_program_sees_the_duties_of_the_interpreter() {
                 Call::Step(samples) => running.step(samples).map(Some),
             };
             let found = closed_loop(&policy, &mut External::new(&policy, ask).unwrap(), periods);
-            assert_eq!(lines(&found), lines(&expected), "{} {door:?}", policy.name);
+            assert_eq!(lines(&found), lines(&expected), "{} {output:?}", policy.name);
         }
         // a loop that rests would say nothing
         let moved = lines(&expected).iter().collect::<BTreeSet<_>>().len();
@@ -122,11 +122,11 @@ fn instances_states_times_and_refusals_are_as_the_standard_says() {
         golden_case("wide"),
         golden_case("minimal"),
     ] {
-        for door in VERSIONS {
-            let unit = Unit::new(&policy, door);
+        for output in VERSIONS {
+            let unit = Unit::new(&policy, output);
             unit.build_importer();
             let ran = unit.check();
-            assert_eq!(ran.stdout, "PASS\n", "{} {door:?}\n{}", policy.name, ran.stderr);
+            assert_eq!(ran.stdout, "PASS\n", "{} {output:?}\n{}", policy.name, ran.stderr);
         }
     }
 }
@@ -167,7 +167,7 @@ fn several_fmus_link_into_one_program_with_the_standard_headers() {
     let sanitised = ["-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
     let mut units = Vec::new();
     for policy in [golden_case("constructs"), golden_case("minimal")] {
-        units.extend(VERSIONS.map(|door| Unit::new(&policy, door)));
+        units.extend(VERSIONS.map(|output| Unit::new(&policy, output)));
     }
     // core, block and unit are the same for both versions: each version is a program
     for version in 0..2 {
@@ -181,12 +181,12 @@ fn without_the_prefix_two_fmus_do_not_link() {
     if is_without("FMPy") {
         return;
     }
-    for door in VERSIONS {
-        let version = door.fmi().unwrap().name();
+    for output in VERSIONS {
+        let version = verify::fmu::version(output).unwrap().name();
         let define = format!("#define {}_FUNCTION_PREFIX", version.to_uppercase());
         let strip = |name: &str| {
             let policy = golden_case(name);
-            let unit = Unit::edited(&policy, door, &format!("_{version}.h"), &define, "#define NO_PREFIX");
+            let unit = Unit::edited(&policy, output, &format!("_{version}.h"), &define, "#define NO_PREFIX");
             // the importing program must find the plain names
             let config = std::fs::read_to_string(unit.path().join("config.h")).unwrap();
             let plain = config.replace(&format!("#define NAME {name}_"), "#define NAME");
@@ -204,12 +204,12 @@ fn the_binary_exports_the_functions_of_the_standard_and_no_others() {
     if is_without("FMPy") {
         return;
     }
-    for (door, count) in [(Door::Fmu2, 34), (Door::Fmu3, 75)] {
-        let unit = Unit::new(&golden_case("minimal"), door);
+    for (output, count) in [(Output::Fmu2, 34), (Output::Fmu3, 75)] {
+        let unit = Unit::new(&golden_case("minimal"), output);
         let version = unit.version();
         let header = std::fs::read_to_string(standard_headers().join(format!("{version}Functions.h"))).unwrap();
         // FMI 2 asks for the functions of model exchange only where it is offered
-        let skipped = |line: &str| line.contains("for Model Exchange") && door == Door::Fmu2;
+        let skipped = |line: &str| line.contains("for Model Exchange") && output == Output::Fmu2;
         let mut declared = BTreeSet::new();
         let mut skipping = false;
         let declarations = header.split("/* Inquire version numbers").last().unwrap();
@@ -240,9 +240,9 @@ fn the_sources_are_strict_c_with_and_without_the_standard_headers() {
     }
     let strict = "-pedantic -Wall -Wextra -Wconversion -Wshadow -Wstrict-prototypes -Wmissing-prototypes -Werror";
     let headers = format!("-isystem{}", standard_headers().display());
-    for (door, dialect) in [(Door::Fmu2, "-std=c90"), (Door::Fmu3, "-std=c99")] {
+    for (output, dialect) in [(Output::Fmu2, "-std=c90"), (Output::Fmu3, "-std=c99")] {
         for policy in ["constructs", "minimal"] {
-            let unit = Unit::new(&golden_case(policy), door);
+            let unit = Unit::new(&golden_case(policy), output);
             for compiler in ["gcc", "clang"] {
                 for more in ["-O2", &headers] {
                     let mut command = Command::new(compiler);
@@ -263,12 +263,12 @@ fn signals_may_have_the_names_of_outputs_parameters_and_time() {
     for taken in ["duty", "enable", "status", "time", "a"] {
         let mut policy = golden_case("adc_mapping");
         policy.signals[0].name = taken.to_owned();
-        for door in VERSIONS {
-            let text = descriptions.add(&policy, door, "", "");
+        for output in VERSIONS {
+            let text = descriptions.add(&policy, output, "", "");
             let quoted = |name: &str| format!(" name=\"{name}\"");
             assert_eq!(text.matches(&quoted(taken)).count(), 1, "{text}");
             // FMI 2 does without the time
-            if (taken, door) != ("time", Door::Fmu2) {
+            if (taken, output) != ("time", Output::Fmu2) {
                 assert!(text.contains(&quoted(&format!("{taken}_"))), "{text}");
             }
         }
@@ -286,8 +286,8 @@ fn units_are_escaped_and_defined_whatever_they_are() {
     for unit in ["V", "", "ohm", "A & \"B\" <°C>", "µWb·turn"] {
         let mut policy = golden_case("minimal");
         policy.signals[0].unit = unit.to_owned();
-        for door in VERSIONS {
-            descriptions.add(&policy, door, "", "");
+        for output in VERSIONS {
+            descriptions.add(&policy, output, "", "");
         }
     }
     assert_eq!(descriptions.problems(), [""; 10]);
@@ -298,11 +298,7 @@ fn units_are_escaped_and_defined_whatever_they_are() {
 fn an_fmu_for_another_target_has_sources_only_and_says_so() {
     let policy = golden_case("minimal");
     let target = targets::find("dspace-ds1202").unwrap();
-    let selection = verify::Selection {
-        doors: VERSIONS.to_vec(),
-        ..verify::Selection::core(&[codegen::Language::C])
-    };
-    let files = verify::doors::generate(&policy, target, &selection).unwrap();
+    let files = codegen::generate(&policy, target, &VERSIONS, None).unwrap().files;
     for archive in verify::fmu::archives(&policy, target, &VERSIONS, &files).unwrap() {
         let reason = archive.binary.unwrap_err();
         assert!(reason.contains("dspace-ds1202"), "{reason}");
@@ -319,19 +315,19 @@ fn an_fmu_for_another_target_has_sources_only_and_says_so() {
 /// Another controller is another FMU; the same one is the same, bytes and all, apart from what compilers add.
 #[test]
 fn the_token_follows_the_controller() {
-    let token = |policy: &Policy, door: Door| {
-        let all = files(policy, door, 1);
-        let text = &all[&format!("{}_{}.xml", policy.name, door.fmi().unwrap().name())];
+    let token = |policy: &Policy, output: Output| {
+        let all = files(policy, output, 1);
+        let text = &all[&format!("{}_{}.xml", policy.name, verify::fmu::version(output).unwrap().name())];
         let start = text.find('{').unwrap();
         text[start..start + 38].to_owned()
     };
     let policy = golden_case("minimal");
-    let own = token(&policy, Door::Fmu2);
-    assert_eq!(own, token(&policy, Door::Fmu2));
-    assert_eq!(own, token(&policy, Door::Fmu3));
+    let own = token(&policy, Output::Fmu2);
+    assert_eq!(own, token(&policy, Output::Fmu2));
+    assert_eq!(own, token(&policy, Output::Fmu3));
     let mut other = policy.clone();
     other.limits.duty.high -= 0.01;
-    assert_ne!(own, token(&other, Door::Fmu2));
+    assert_ne!(own, token(&other, Output::Fmu2));
 }
 
 #[test]
@@ -343,7 +339,7 @@ fn compile_writes_the_archives_and_verify_finds_the_files_as_generated() {
     command
         .arg("compile")
         .arg(&policy)
-        .args(["--no-costs", "--door", "fmu2", "--door", "fmu3", "--out"]);
+        .args(["--no-costs", "--emit", "fmu2", "--emit", "fmu3", "--out"]);
     let said = run_silently(command.arg(&out));
     for (file, platform) in [("minimal_fmi2.fmu", "linux64"), ("minimal_fmi3.fmu", "x86_64-linux")] {
         assert!(

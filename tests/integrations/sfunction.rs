@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use codegen::Door;
+use codegen::Output;
 use policy::{Interval, Policy, Scalar};
 use tests::tools::Ran;
 
@@ -127,8 +127,8 @@ struct Bench {
 impl Bench {
     fn new(policy: &Policy) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        write(&files(policy, Door::Sfunction, 1), folder.path());
-        tests::tools::copy_folder(&tests::root().join("tests/doors/simulink"), folder.path());
+        write(&files(policy, Output::Sfunction, 1), folder.path());
+        tests::tools::copy_folder(&tests::root().join("tests/integrations/simulink"), folder.path());
         std::fs::write(folder.path().join("config.h"), config(policy)).unwrap();
         Self {
             folder,
@@ -452,7 +452,7 @@ int main(void)
 #[test]
 fn the_tlc_file_is_balanced_and_calls_functions_of_the_block() {
     let policy = golden_case("constructs");
-    let files = files(&policy, Door::Sfunction, 1);
+    let files = files(&policy, Output::Sfunction, 1);
     let tlc = &files["sf_constructs.tlc"];
     let count = |word: &str| tlc.lines().filter(|line| line.trim_start().starts_with(word)).count();
     assert_eq!(count("%function"), count("%endfunction"));

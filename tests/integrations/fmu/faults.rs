@@ -4,7 +4,7 @@ use super::super::golden_case;
 use tests::tools::is_without;
 
 use super::unit::{Descriptions, Unit, VERSIONS};
-use codegen::Door;
+use codegen::Output;
 
 /// Ending of the file, text, its replacement, what is said of it: anything where nothing is given.
 type Fault = (&'static str, &'static str, &'static str, &'static str);
@@ -112,7 +112,7 @@ fn planted_faults_are_seen_by_the_importing_program() {
         return;
     }
     let policy = golden_case("constructs");
-    let good = VERSIONS.map(|door| Unit::new(&policy, door));
+    let good = VERSIONS.map(|output| Unit::new(&policy, output));
     good.iter().for_each(Unit::build_importer);
     for (index, (ending, from, to, complaint)) in FAULTS.iter().enumerate() {
         // the faults are in what both versions share
@@ -135,13 +135,13 @@ fn planted_faults_of_the_shells_are_seen() {
         return;
     }
     let policy = golden_case("minimal");
-    let faults: &[(Door, Fault)] = &[
+    let faults: &[(Output, Fault)] = &[
         (
-            Door::Fmu2,
+            Output::Fmu2,
             ("_fmi2.c", "release(&callbacks, c);", "", "all memory is given back"),
         ),
         (
-            Door::Fmu2,
+            Output::Fmu2,
             (
                 "_fmi2.c",
                 "own->fmu.state.next = start;",
@@ -150,7 +150,7 @@ fn planted_faults_of_the_shells_are_seen() {
             ),
         ),
         (
-            Door::Fmu3,
+            Output::Fmu3,
             (
                 "_fmi3.c",
                 "own->fmu.state.next = start;",
@@ -159,7 +159,7 @@ fn planted_faults_of_the_shells_are_seen() {
             ),
         ),
         (
-            Door::Fmu2,
+            Output::Fmu2,
             (
                 "_fmi2.c",
                 "if (callbacks->logger != NULL)",
@@ -168,7 +168,7 @@ fn planted_faults_of_the_shells_are_seen() {
             ),
         ),
         (
-            Door::Fmu3,
+            Output::Fmu3,
             (
                 "_fmi3.c",
                 "if (own->log != NULL)",
@@ -177,7 +177,7 @@ fn planted_faults_of_the_shells_are_seen() {
             ),
         ),
         (
-            Door::Fmu2,
+            Output::Fmu2,
             (
                 "_fmi2.c",
                 "type != fmi2CoSimulation",
@@ -186,11 +186,11 @@ fn planted_faults_of_the_shells_are_seen() {
             ),
         ),
         (
-            Door::Fmu3,
+            Output::Fmu3,
             ("_fmi3.c", "if (event_mode)", "if (0)", "other kinds of FMU are refused"),
         ),
         (
-            Door::Fmu3,
+            Output::Fmu3,
             (
                 "_fmi3.c",
                 "*last = own->fmu.state.next;",
@@ -199,11 +199,11 @@ fn planted_faults_of_the_shells_are_seen() {
             ),
         ),
     ];
-    let good = VERSIONS.map(|door| Unit::new(&policy, door));
+    let good = VERSIONS.map(|output| Unit::new(&policy, output));
     good.iter().for_each(Unit::build_importer);
-    for (door, (ending, from, to, complaint)) in faults {
-        let unit = Unit::edited(&policy, *door, ending, from, to);
-        unit.take_importer(&good[usize::from(*door == Door::Fmu3)]);
+    for (output, (ending, from, to, complaint)) in faults {
+        let unit = Unit::edited(&policy, *output, ending, from, to);
+        unit.take_importer(&good[usize::from(*output == Output::Fmu3)]);
         let ran = unit.check();
         assert_eq!(ran.code, Some(1), "not seen: {from} -> {to}");
         assert!(ran.stdout.contains(complaint), "{from} -> {to}\n{}", ran.stdout);
@@ -232,9 +232,9 @@ fn fmpy_sees_faults_of_the_description() {
         ("instantiationToken=", "guid="),
     ];
     let (mut descriptions, mut edits) = (Descriptions::default(), Vec::new());
-    for (door, own) in VERSIONS.into_iter().zip([two, three]) {
+    for (output, own) in VERSIONS.into_iter().zip([two, three]) {
         for (from, to) in common.into_iter().chain(own) {
-            descriptions.add(&policy, door, from, to);
+            descriptions.add(&policy, output, from, to);
             edits.push((from, to));
         }
     }

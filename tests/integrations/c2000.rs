@@ -3,11 +3,10 @@
 
 use std::collections::BTreeMap;
 
-use codegen::{Door, Language};
+use codegen::Output;
 use policy::Policy;
-use verify::Selection;
 
-use super::{build, golden_case, write};
+use super::{build, files, golden_case, write};
 
 const CASES: &[&str] = &[
     "constructs",
@@ -38,9 +37,7 @@ const FORBIDDEN: &[&str] = &[
 
 fn core(policy: &Policy) -> BTreeMap<String, String> {
     let target = targets::find("c2000-c28x").unwrap();
-    let mut files = verify::doors::generate(policy, target, &Selection::core(&[Language::C])).unwrap();
-    files.remove("manifest.json");
-    files
+    codegen::sources(policy, target, &[Output::C], None).unwrap().files
 }
 
 /// Words of C code outside of comments and strings that the profile forbids.
@@ -95,7 +92,10 @@ const COMPILER: &[&str] = &[
 fn bench(files: &BTreeMap<String, String>) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     write(files, folder.path());
-    tests::tools::copy_folder(&tests::root().join("tests/doors/c2000"), &folder.path().join("c2000"));
+    tests::tools::copy_folder(
+        &tests::root().join("tests/integrations/c2000"),
+        &folder.path().join("c2000"),
+    );
     folder
 }
 
@@ -160,7 +160,7 @@ fn the_core_asserts_widths_at_compile_time() {
             "{name}: {built:?}"
         );
     }
-    let host = verify::doors::generate(&policy, targets::host(), &Selection::core(&[Language::C])).unwrap();
+    let host = super::files(&policy, Output::C, 1);
     assert!(!host["minimal.c"].contains("limits.h"), "nothing of that elsewhere");
 }
 
@@ -168,12 +168,7 @@ fn the_core_asserts_widths_at_compile_time() {
 #[test]
 fn the_kit_asserts_widths_at_compile_time() {
     let policy = golden_case("minimal");
-    let selection = Selection {
-        doors: vec![Door::Kit],
-        kit_steps: 1,
-        ..Selection::core(&[Language::C])
-    };
-    let mut files = verify::doors::generate(&policy, targets::find("host").unwrap(), &selection).unwrap();
+    let mut files = files(&policy, Output::Kit, 1);
     let kit = files.get_mut("minimal_kit.c").unwrap();
     assert_eq!(kit.matches("* CHAR_BIT == 32u").count(), 2);
     // a machine whose bytes are wider than its header says

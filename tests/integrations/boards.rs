@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use codegen::Door;
+use codegen::Output;
 use policy::Policy;
 use targets::{Runner, TargetSpec};
 use verify::toolchain::{self, Build, BuildError, Purpose, Sources};
@@ -20,7 +20,7 @@ fn emulated() -> impl Iterator<Item = &'static TargetSpec> {
 
 /// The kit of a policy; a bare board has no `<string.h>`.
 fn kit(policy: &Policy) -> BTreeMap<String, String> {
-    let mut files = files(policy, Door::Kit, STEPS);
+    let mut files = files(policy, Output::Kit, STEPS);
     files.insert("string.h".to_owned(), "#include <board.h>\n".to_owned());
     files
 }

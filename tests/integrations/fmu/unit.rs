@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 
 use closed_loop::agent::Inputs;
 use closed_loop::{Answer, Controller, Converter, Environment, LoadPath, Start};
-use codegen::Door;
+use codegen::Output;
 use interp::Sample;
 use plant::{Load, Parameters};
 use policy::{Interval, Policy};
@@ -18,7 +18,7 @@ use verify::fmu::Archive;
 
 use crate::{build, files, write};
 
-pub const VERSIONS: [Door; 2] = [Door::Fmu2, Door::Fmu3];
+pub const VERSIONS: [Output; 2] = [Output::Fmu2, Output::Fmu3];
 
 /// Python with FMPy.
 pub fn python() -> Command {
@@ -60,8 +60,8 @@ fn copy_headers(from: &Path, to: &Path) {
 
 /// The files of an FMU with the first `from` of the file with that ending in the place of `to`.
 #[track_caller]
-fn edited(policy: &Policy, door: Door, ending: &str, from: &str, to: &str) -> BTreeMap<String, String> {
-    let mut files = files(policy, door, 1);
+fn edited(policy: &Policy, output: Output, ending: &str, from: &str, to: &str) -> BTreeMap<String, String> {
+    let mut files = files(policy, output, 1);
     if !from.is_empty() {
         let text = files.get_mut(&format!("{}{ending}", policy.name)).unwrap();
         assert!(text.contains(from), "{from}");
@@ -79,9 +79,9 @@ pub struct Descriptions {
 impl Descriptions {
     /// One more; returns its description.
     #[track_caller]
-    pub fn add(&mut self, policy: &Policy, door: Door, from: &str, to: &str) -> String {
-        let fmi = door.fmi().unwrap();
-        let files = edited(policy, door, &format!("_{}.xml", fmi.name()), from, to);
+    pub fn add(&mut self, policy: &Policy, output: Output, from: &str, to: &str) -> String {
+        let fmi = verify::fmu::version(output).unwrap();
+        let files = edited(policy, output, &format!("_{}.xml", fmi.name()), from, to);
         let folder = tempfile::tempdir().unwrap();
         let layout = codegen::backend::fmu::layout(&policy.name, fmi);
         let members = layout.iter().map(|(path, file)| (path.clone(), files[file].clone()));
@@ -108,34 +108,34 @@ impl Descriptions {
 pub struct Unit {
     folder: tempfile::TempDir,
     pub policy: Policy,
-    pub door: Door,
+    pub output: Output,
     pub archive: Archive,
     pub files: BTreeMap<String, String>,
 }
 
 impl Unit {
-    pub fn new(policy: &Policy, door: Door) -> Self {
-        Self::edited(policy, door, "", "", "")
+    pub fn new(policy: &Policy, output: Output) -> Self {
+        Self::edited(policy, output, "", "", "")
     }
 
     /// With the first `from` of the file with that ending in the place of `to`.
     #[track_caller]
-    pub fn edited(policy: &Policy, door: Door, ending: &str, from: &str, to: &str) -> Self {
-        let files = edited(policy, door, ending, from, to);
+    pub fn edited(policy: &Policy, output: Output, ending: &str, from: &str, to: &str) -> Self {
+        let files = edited(policy, output, ending, from, to);
         let target = targets::find("host").unwrap();
-        let archive = verify::fmu::archives(policy, target, &[door], &files)
+        let archive = verify::fmu::archives(policy, target, &[output], &files)
             .unwrap()
             .remove(0);
         let unit = Self {
             folder: tempfile::tempdir().unwrap(),
             policy: policy.clone(),
-            door,
+            output,
             archive,
             files,
         };
         write(&unit.files, unit.path());
         std::fs::write(unit.path().join(&unit.archive.file), &unit.archive.bytes).unwrap();
-        tests::tools::copy_folder(&tests::root().join("tests/doors/fmu"), unit.path());
+        tests::tools::copy_folder(&tests::root().join("tests/integrations/fmu"), unit.path());
         std::fs::write(unit.path().join("config.h"), unit.config()).unwrap();
         unit
     }
@@ -145,12 +145,12 @@ impl Unit {
     }
 
     pub fn version(&self) -> &'static str {
-        self.door.fmi().unwrap().name()
+        verify::fmu::version(self.output).unwrap().name()
     }
 
     /// C files of the FMU.
     pub fn sources(&self) -> Vec<String> {
-        codegen::backend::fmu::sources(&self.policy.name, self.door.fmi().unwrap())
+        codegen::backend::fmu::sources(&self.policy.name, verify::fmu::version(self.output).unwrap())
     }
 
     /// The binary, taken out of the archive by another reader of the format.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use codegen::Door;
+use codegen::Output;
 use policy::{NumericFormat, Policy};
 use tests::tools::Ran;
 
@@ -59,7 +59,7 @@ fn run_kit(policy: &Policy, files: &BTreeMap<String, String>, compiler: &Compile
 fn the_kit_of_the_example_passes_under_every_compiler_in_both_widths() {
     for format in [NumericFormat::F32, NumericFormat::F64] {
         let policy = example().with_format(format);
-        let files = files(&policy, Door::Kit, STEPS);
+        let files = files(&policy, Output::Kit, STEPS);
         for compiler in COMPILERS {
             let ran = run_kit(&policy, &files, compiler);
             let (command, line) = (compiler.command, &ran.stdout);
@@ -76,7 +76,7 @@ fn the_kit_of_the_example_passes_under_every_compiler_in_both_widths() {
 fn the_kit_passes_for_codes_filters_activations_and_policies_without_mapping() {
     for name in ["adc_mapping", "filters", "activations", "minimal", "linear", "wide"] {
         let policy = golden_case(name);
-        let ran = run_kit(&policy, &files(&policy, Door::Kit, STEPS), &COMPILERS[0]);
+        let ran = run_kit(&policy, &files(&policy, Output::Kit, STEPS), &COMPILERS[0]);
         assert_eq!(ran.code, Some(0), "{name}: {ran:?}");
     }
 }
@@ -84,7 +84,7 @@ fn the_kit_passes_for_codes_filters_activations_and_policies_without_mapping() {
 /// Runs the kit with an edited core.
 fn edited(policy: &Policy, edits: &[(&str, &str)]) -> Vec<Ran> {
     let folder = tempfile::tempdir().unwrap();
-    let files = files(policy, Door::Kit, STEPS);
+    let files = files(policy, Output::Kit, STEPS);
     write(&files, folder.path());
     let [core, kit] = sources(policy);
     let built = build(&["gcc", "-O1", "-c"], &[&kit], folder.path());
@@ -132,7 +132,7 @@ fn a_number_of_half_the_width_fails() {
 #[test]
 fn a_flipped_weight_bit_fails() {
     let policy = example();
-    let text = files(&policy, Door::Kit, STEPS)["buck12.c"].clone();
+    let text = files(&policy, Output::Kit, STEPS)["buck12.c"].clone();
     let literal = first_literal(&text, "buck12_weights0[");
     let ran = edited(&policy, &[(&literal, &flipped(&literal))]).remove(0);
     assert_eq!(ran.code, Some(1), "{ran:?}");
@@ -171,7 +171,7 @@ fn an_edited_constant_of_mapping_limits_or_status_fails() {
 fn fast_math_does_not_build() {
     let policy = golden_case("minimal");
     let folder = tempfile::tempdir().unwrap();
-    write(&files(&policy, Door::Kit, STEPS), folder.path());
+    write(&files(&policy, Output::Kit, STEPS), folder.path());
     let [core, kit] = sources(&policy);
     for source in [core, kit] {
         let built = build(&["gcc", "-O2", "-ffast-math", "-c"], &[&source], folder.path());
@@ -186,7 +186,7 @@ fn fast_math_does_not_build() {
 #[test]
 fn every_part_of_fast_math_fails_without_the_guards() {
     let policy = golden_case("minimal");
-    let mut files = files(&policy, Door::Kit, STEPS);
+    let mut files = files(&policy, Output::Kit, STEPS);
     for text in files.values_mut() {
         let guard = |line: &&str| !["#error", "#pragma"].iter().any(|word| line.starts_with(word));
         *text = text
@@ -225,7 +225,7 @@ fn every_part_of_fast_math_fails_without_the_guards() {
 fn the_kit_runs_without_main_and_standard_output() {
     let policy = golden_case("minimal");
     let folder = tempfile::tempdir().unwrap();
-    write(&files(&policy, Door::Kit, STEPS), folder.path());
+    write(&files(&policy, Output::Kit, STEPS), folder.path());
     let own = "#include <stdint.h>\nuint32_t minimal_kit_run(void);\nint main(void) { return minimal_kit_run() == 0u ? 17 : 1; }\n";
     std::fs::write(folder.path().join("own.c"), own).unwrap();
     let compiler = ["gcc", "-DMINIMAL_KIT_NO_MAIN", "-DMINIMAL_KIT_NO_STDIO", "-O2"];
@@ -237,8 +237,8 @@ fn the_kit_runs_without_main_and_standard_output() {
 fn the_kits_of_two_policies_link_into_one_program() {
     let (one, two) = (golden_case("minimal"), golden_case("linear"));
     let folder = tempfile::tempdir().unwrap();
-    write(&files(&one, Door::Kit, STEPS), folder.path());
-    write(&files(&two, Door::Kit, STEPS), folder.path());
+    write(&files(&one, Output::Kit, STEPS), folder.path());
+    write(&files(&two, Output::Kit, STEPS), folder.path());
     let compiler = ["gcc", "-DLINEAR_KIT_NO_MAIN", "-O2"];
     let sources = ["minimal.c", "minimal_kit.c", "linear.c", "linear_kit.c"];
     build_silently(&compiler, &sources, folder.path());

@@ -1,10 +1,9 @@
-//! The build script's door: the example crates, whose build scripts have generated a controller in Rust and one in C, answer
+//! The build script's way: the example crates, whose build scripts have generated a controller in Rust and one in C, answer
 //! as the interpreter does.
 
 use std::process::Command;
 
-use codegen::backend::rust::bindings::Bindings;
-use codegen::{Backend, Language};
+use codegen::Output;
 use interp::{Controller, Sample};
 use policy::{Policy, Scalar};
 use tests::tools::{copy_folder, run_silently, rustc};
@@ -17,12 +16,12 @@ const STEPS: u32 = 20_000;
 /// The first step at which the generated controller of a module and the interpreter differ in duty, status or state.
 macro_rules! first_difference {
     ($module:path, $policy:expr) => {{
-        use $module as door;
+        use $module as generated_code;
         let policy: &Policy = $policy;
         let mut stream = Stream::new(policy, 9, &[]);
         let mut expected = Controller::<f32>::new(policy);
-        let mut generated = door::Controller::new();
-        assert!(door::Controller::integrity() && door::Controller::self_test() == Ok(()));
+        let mut generated = generated_code::Controller::new();
+        assert!(generated_code::Controller::integrity() && generated_code::Controller::self_test() == Ok(()));
         let mut steps = 0;
         let mut different = None;
         while steps < STEPS && different.is_none() {
@@ -30,10 +29,10 @@ macro_rules! first_difference {
                 Event::Step(samples) => {
                     let answer = expected.step(&samples).unwrap();
                     let [v_out, i_l, i_out] = physical(&samples);
-                    let measured = door::Measurement { v_out, i_l, i_out };
+                    let measured = generated_code::Measurement { v_out, i_l, i_out };
                     let before = generated.eval(&measured);
                     let observation = generated.observe(&measured);
-                    let q = door::Controller::q_values(&observation);
+                    let q = generated_code::Controller::q_values(&observation);
                     let command = generated.step(&measured);
                     let bits = |q: &[f32]| q.iter().map(|q| q.to_bits()).collect::<Vec<_>>();
                     let equal = command.duty.to_bits() == answer.command.duty.to_bits()
@@ -54,7 +53,7 @@ macro_rules! first_difference {
                     expected.reset();
                 }
                 Event::Init => {
-                    generated = door::Controller::default();
+                    generated = generated_code::Controller::default();
                     expected = Controller::new(policy);
                 }
                 Event::Network(_) => {}
@@ -109,11 +108,9 @@ fn the_c_core_answers_through_its_declarations_as_rust_does_in_both_widths() {
     for name in ["constructs", "wide"] {
         let policy = golden_case(name);
         let folder = tempfile::tempdir().unwrap();
-        let mut all = codegen::generate(&policy, targets::host(), &Language::ALL)
-            .unwrap()
-            .files;
-        let program = codegen::lower(&policy, targets::host(), Language::C);
-        all.extend(Bindings.emit(&program).unwrap().files);
+        let outputs = [Output::Rust, Output::RustOverC];
+        let generated = codegen::sources(&policy, targets::host(), &outputs, None);
+        let mut all = generated.unwrap().files;
         let text = BOTH.replace("NAME", name).replace(
             "NUMBER",
             match policy.numeric_format.scalar() {

@@ -1,4 +1,4 @@
-//! The doors: what `compile --door` puts beside the core is built and run here, as far as that goes without the tools it is
+//! The integrations: what `compile --emit` puts beside the cores is built and run here, as far as that goes without the tools it is
 //! made for. Each check has a planted fault beside it.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -13,10 +13,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 
-use codegen::{Door, Language};
+use codegen::Output;
 use policy::Policy;
 use tests::tools::{Ran, run};
-use verify::Selection;
 
 fn golden_case(name: &str) -> Policy {
     let path = tests::root().join("tests/golden/cases").join(name).join("policy.toml");
@@ -27,14 +26,11 @@ fn example() -> Policy {
     policy::load(&tests::example()).unwrap_or_else(|faults| panic!("{faults}"))
 }
 
-/// The C core and the files of a door, as `policyc compile` writes them.
-fn files(policy: &Policy, door: Door, kit_steps: u32) -> BTreeMap<String, String> {
-    let selection = Selection {
-        doors: vec![door],
-        kit_steps,
-        ..Selection::core(&[Language::C])
-    };
-    verify::doors::generate(policy, targets::find("host").unwrap(), &selection).unwrap()
+/// The files of an output and its core, as `policyc compile` writes them.
+fn files(policy: &Policy, output: Output, kit_steps: u32) -> BTreeMap<String, String> {
+    let expected = verify::kit::expected(policy, targets::host(), &[output], kit_steps).unwrap();
+    let generated = codegen::generate(policy, targets::host(), &[output], expected.as_ref());
+    generated.unwrap().files
 }
 
 fn write(files: &BTreeMap<String, String>, folder: &Path) {

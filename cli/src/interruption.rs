@@ -1,0 +1,64 @@
+//! Ctrl-C: every command ends with 130, and no temporary file stays behind.
+//!
+//! All temporary folders of a run lie in one. A signal removes it while the rest of the program is still at work, compilers
+//! among it: from then on nothing may be said or written that comes of their failing.
+
+use std::io::Write;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
+
+use tempfile::TempDir;
+
+use crate::{Failure, Outcome};
+
+/// Set by the first signal for a command that ends by itself; see [`stop_on_signal`].
+static STOP: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+/// The program is being ended.
+static ENDING: AtomicBool = AtomicBool::new(false);
+
+/// Compilers and emulators end within this time, because their files and pipes are gone.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// Handles signals from now on and gives all temporary files of this run a folder, which goes when the result is dropped.
+///
+/// # Errors
+/// If signals cannot be handled.
+pub fn watch() -> Result<Option<TempDir>, Failure> {
+    // where there is no folder for temporary files, the command that needs one says so
+    let scratch = tempfile::Builder::new().prefix("policyc-").tempdir().ok();
+    let scratch = scratch.filter(|folder| tempfile::env::override_temp_dir(folder.path()).is_ok());
+    let folder = scratch.as_ref().map(|folder| folder.path().to_owned());
+    ctrlc::set_handler(move || match STOP.get() {
+        Some(stop) if !stop.swap(true, Ordering::Relaxed) => {}
+        _ => end(folder.as_deref()),
+    })?;
+    Ok(scratch)
+}
+
+/// For a command that keeps what it has done: the first signal sets this flag, only the second ends the program.
+pub fn stop_on_signal() -> Arc<AtomicBool> {
+    Arc::clone(STOP.get_or_init(Arc::default))
+}
+
+/// Does not return once the program is being ended: to be called before anything leaves it.
+pub fn go_no_further_if_ending() {
+    while ENDING.load(Ordering::SeqCst) {
+        std::thread::park();
+    }
+}
+
+fn end(scratch: Option<&Path>) -> ! {
+    ENDING.store(true, Ordering::SeqCst);
+    if let Some(folder) = scratch {
+        let begun = Instant::now();
+        // a compiler may put a file into it while it is being removed
+        while std::fs::remove_dir_all(folder).is_err() && folder.exists() && begun.elapsed() < PATIENCE {
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+    // nobody may be listening any more
+    let _ = writeln!(std::io::stderr(), "\ninterrupted");
+    std::process::exit(Outcome::Interrupted as i32)
+}

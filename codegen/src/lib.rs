@@ -1,4 +1,4 @@
-//! The compiler: `lower` turns a checked [`Policy`] into a [`Program`], a module of [`backend`] turns that into files;
+//! The compiler: `lower` turns a checked [`Policy`](policy::Policy) into a [`Program`], a module of [`backend`] turns that into files;
 //! [`generate`] does both for a list of [`Output`]s.
 //!
 //! Nothing here writes to disk; the order of operations is the one of `docs/reference/numeric-contract.md`.

@@ -25,8 +25,13 @@ const FIRST_SEED: u64 = 5000;
 const STEPS: u64 = 20_000;
 /// Steps of a build in every format.
 const CHECKSUM_STEPS: u64 = 500;
+/// Steps of the example where every float operation is a call of a library, which takes ten times as long to emulate;
+/// `POLICYC_FULL` makes them [`STEPS`].
+const STEPS_WITHOUT_FPU: u64 = 2_000;
+/// Steps of a random policy; `POLICYC_FULL` makes them [`STEPS`].
+const RANDOM_STEPS: u64 = 4_000;
 /// Steps of a random policy where every float operation is a call of a library.
-const RANDOM_STEPS_WITHOUT_FPU: u64 = 4_000;
+const RANDOM_STEPS_WITHOUT_FPU: u64 = 400;
 
 fn target(name: &str) -> &'static TargetSpec {
     targets::find(name).unwrap()
@@ -77,14 +82,15 @@ fn compilers(target: &TargetSpec) -> Vec<&'static str> {
 fn check(name: &str) {
     let target = target(name);
     let example = policy::load(&tests::example()).unwrap();
-    let report = run(&example, target, &compilers(target), &[], STEPS);
+    let (example_steps, random_steps) = match target.fpu {
+        _ if tests::full() => (STEPS, STEPS),
+        Fpu::None => (STEPS_WITHOUT_FPU, RANDOM_STEPS_WITHOUT_FPU),
+        _ => (STEPS, RANDOM_STEPS),
+    };
+    let report = run(&example, target, &compilers(target), &[], example_steps);
     assert_equal(&report, name);
     let builds = report.builds.iter().map(|build| build.build.rsplit_once(' ').unwrap());
     let (rust, c): (Vec<_>, Vec<_>) = builds.partition(|(compiler, _)| *compiler == verify::toolchain::RUSTC);
-    let random_steps = match target.fpu {
-        Fpu::None => RANDOM_STEPS_WITHOUT_FPU,
-        _ => STEPS,
-    };
     for (seed, (compiler, level)) in (FIRST_SEED..FIRST_SEED + RANDOM_POLICIES).zip(c.iter().cycle()) {
         let folder = tests::random::policy(seed).unwrap();
         let policy = policy::load(&folder.path()).unwrap_or_else(|faults| panic!("{}\n{faults}", folder.contract));

@@ -17,3 +17,10 @@ pub fn root() -> PathBuf {
 pub fn example() -> PathBuf {
     root().join("examples/buck12/policy.toml")
 }
+
+/// Tests that take hours in their long form, for a release, have a short one for every day: `cargo xtask test --full` asks for
+/// the long one.
+#[must_use]
+pub fn full() -> bool {
+    std::env::var_os("POLICYC_FULL").is_some()
+}

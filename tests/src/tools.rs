@@ -96,17 +96,18 @@ pub fn bless() -> bool {
     std::env::var_os("POLICYC_BLESS").is_some_and(|value| value == "1")
 }
 
-/// The program `policyc`, built once per test program.
+/// The program `policyc`, built once per test program; with the features of the whole workspace, since those of the package
+/// alone would build all it needs a second time.
 pub fn policyc() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-    PROGRAM.get_or_init(|| built(&["build", "-p", "cli", "--bin", "policyc"], "policyc", ""))
+    PROGRAM.get_or_init(|| built(&["build", "--workspace", "--bin", "policyc"], "policyc", ""))
 }
 
 /// The library of the crate `policy-macro` as rustc loads it, built once per test program.
 pub fn macro_library() -> &'static Path {
     static LIBRARY: OnceLock<PathBuf> = OnceLock::new();
     let extension = std::env::consts::DLL_SUFFIX;
-    LIBRARY.get_or_init(|| built(&["build", "-p", "policy-macro"], "policy_macro", extension))
+    LIBRARY.get_or_init(|| built(&["build", "--workspace", "--lib"], "policy_macro", extension))
 }
 
 fn built(arguments: &[&str], target: &str, ending: &str) -> PathBuf {

@@ -16,8 +16,9 @@ use workspace::Workspace;
 const USAGE: &str = "\
 usage: cargo xtask <command>
 
-  test [--quick] [--skip-install]   everything CI asks for; the last line counts the steps
+  test [--quick|--full] [--skip-install]   everything CI asks for; the last line counts the steps
          --quick          without the crates `tests` and `blind`, rustdoc, firmware and the demo
+         --full           what a release asks for: 20,000 steps on every emulated target, float libraries included
          --skip-install   look for the tools, install none
   setup                             only the tools: compilers, emulators, ngspice, mdBook (also called install)
   bless                             rewrite the golden files from what the code produces now
@@ -87,11 +88,15 @@ fn parse_test(flags: &[String]) -> Result<Command, String> {
     for flag in flags {
         match flag.as_str() {
             "--quick" => options.quick = true,
+            "--full" => options.full = true,
             "--skip-install" => options.skip_install = true,
             _ => return Err(format!("unknown option `{flag}` of `test`")),
         }
     }
-    Ok(Command::Test(options))
+    match options.quick && options.full {
+        true => Err("`--quick` and `--full` exclude each other".into()),
+        false => Ok(Command::Test(options)),
+    }
 }
 
 /// `Ok(false)`: the command ran and found faults, which it has printed.
@@ -175,8 +180,15 @@ mod tests {
         let options = Options {
             quick: true,
             skip_install: true,
+            full: false,
         };
         assert_eq!(parsed("test --skip-install --quick"), Ok(Command::Test(options)));
+        let options = Options {
+            full: true,
+            ..Options::default()
+        };
+        assert_eq!(parsed("test --full"), Ok(Command::Test(options)));
+        assert!(parsed("test --full --quick").unwrap_err().contains("exclude"));
     }
 
     #[test]

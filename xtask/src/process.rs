@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-const LIMIT: Duration = Duration::from_secs(35 * 60);
+/// Time that a command may take: CI as a whole has less than an hour.
+pub const LIMIT: Duration = Duration::from_secs(35 * 60);
 const POLL: Duration = Duration::from_millis(50);
 const TAIL_LINES: usize = 60;
 const TELLING_LINES: usize = 40;
@@ -18,17 +19,25 @@ pub enum Output {
     Log(PathBuf),
 }
 
-/// Runs a command to its end, at most 20 minutes.
+/// Runs a command to its end, no longer than [`LIMIT`].
 ///
 /// # Errors
 /// The command, how it ended and, with a log, the telling lines of it.
 pub fn run(command: &mut Command, output: &Output) -> Result<(), String> {
+    run_within(command, output, LIMIT)
+}
+
+/// [`run`] with another limit of time.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_within(command: &mut Command, output: &Output, limit: Duration) -> Result<(), String> {
     let shown = shown(command);
     let start = match output {
         Output::Terminal => 0,
         Output::Log(path) => redirect(command, path)?,
     };
-    match wait(command) {
+    match wait(command, limit) {
         Ok(status) if status.success() => Ok(()),
         Ok(status) => Err(failure(&format!("`{shown}`: {status}"), output, start)),
         Err(message) => Err(failure(&format!("`{shown}`: {message}"), output, start)),
@@ -73,7 +82,7 @@ fn redirect(command: &mut Command, log: &Path) -> Result<usize, String> {
     Ok(start)
 }
 
-fn wait(command: &mut Command) -> Result<ExitStatus, String> {
+fn wait(command: &mut Command, limit: Duration) -> Result<ExitStatus, String> {
     let mut child = command
         .stdin(Stdio::null())
         .spawn()
@@ -83,10 +92,10 @@ fn wait(command: &mut Command) -> Result<ExitStatus, String> {
         if let Some(status) = child.try_wait().map_err(|e| e.to_string())? {
             return Ok(status);
         }
-        if started.elapsed() > LIMIT {
+        if started.elapsed() > limit {
             child.kill().map_err(|e| e.to_string())?;
             child.wait().map_err(|e| e.to_string())?;
-            return Err(format!("stopped after {} minutes", LIMIT.as_secs() / 60));
+            return Err(format!("stopped after {} minutes", limit.as_secs() / 60));
         }
         std::thread::sleep(POLL);
     }

@@ -14,12 +14,22 @@ use crate::workspace::Workspace;
 /// Golden files are rewritten instead of compared when this is set.
 pub const BLESS: &str = "POLICYC_BLESS";
 
+/// Tests that have a short and a long form take the long one when this is set (`tests::full`).
+const FULL: &str = "POLICYC_FULL";
+
+/// The long forms take hours where floats are a library.
+const FULL_LIMIT: Duration = Duration::from_secs(6 * 3600);
+
+/// A test program that takes longer is worth a line.
+const LONG_SECONDS: f64 = 30.0;
+
 const HEARTBEAT: Duration = Duration::from_secs(60);
 
 /// Switches of `cargo xtask test`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Options {
     pub quick: bool,
+    pub full: bool,
     pub skip_install: bool,
 }
 
@@ -85,7 +95,8 @@ impl Context<'_> {
             .env_remove(BLESS)
             .env("CARGO_TERM_COLOR", "never");
         command.envs(environment.iter().copied());
-        process::run(&mut command, &Output::Log(self.log.clone()))
+        let limit = if self.options.full { FULL_LIMIT } else { process::LIMIT };
+        process::run_within(&mut command, &Output::Log(self.log.clone()), limit)
     }
 }
 
@@ -228,10 +239,33 @@ fn test(context: &Context) -> Outcome {
         arguments.extend(["--exclude", "tests", "--exclude", "blind"]);
     }
     let absent = tools::absent(&context.workspace.target_dir);
-    let absent = absent.each_ref().map(|(name, value)| (*name, value.as_str()));
-    context.cargo(&arguments, &absent)?;
+    let mut environment: Vec<_> = absent.iter().map(|(name, value)| (*name, value.as_str())).collect();
+    if context.options.full {
+        environment.push((FULL, "1"));
+    }
+    context.cargo(&arguments, &environment)?;
     let log = process::read_lossy(&context.log);
-    Ok(Done::Passed(vec![test_count(&log)]))
+    let mut notes = vec![test_count(&log)];
+    notes.extend(long_programs(&log));
+    Ok(Done::Passed(notes))
+}
+
+/// Where the time went: the test programs that took longer than [`LONG_SECONDS`].
+fn long_programs(log: &str) -> Vec<String> {
+    let mut program = "";
+    let mut long = Vec::new();
+    for line in log.lines() {
+        if let Some(rest) = line.trim_start().strip_prefix("Running ") {
+            program = rest.split(" (").next().unwrap_or(rest);
+        }
+        let seconds = line
+            .rsplit_once("finished in ")
+            .and_then(|(_, rest)| rest.trim_end_matches('s').parse().ok());
+        if let Some(seconds) = seconds.filter(|seconds: &f64| *seconds > LONG_SECONDS) {
+            long.push(format!("{seconds:6.0} s {program}"));
+        }
+    }
+    long
 }
 
 /// Sums the `test result:` lines of libtest.
@@ -312,6 +346,15 @@ test result: ok. 12 passed; 0 failed; 1 ignored; 0 measured; 0 filtered out; fin
 test result: FAILED. 3 passed; 2 failed; 0 ignored; 0 measured; 0 filtered out; finished in 0.1s
 ";
         assert_eq!(test_count(log), "15 tests passed, 1 ignored");
+    }
+
+    #[test]
+    fn long_test_programs_are_named_with_their_time() {
+        let log = "     Running cli/main.rs (target/debug/deps/cli-1)\n\
+test result: ok. 12 passed; 0 failed; finished in 61.20s\n\
+     Running ui/main.rs (target/debug/deps/ui-1)\n\
+test result: ok. 12 passed; 0 failed; finished in 1.20s\n";
+        assert_eq!(long_programs(log), ["    61 s cli/main.rs"]);
     }
 
     #[test]

@@ -63,6 +63,9 @@ pub struct New {
 pub struct Inspect {
     /// policy.toml or the folder that holds it
     pub policy: PathBuf,
+    /// Numeric format in the place of the contract's
+    #[arg(long, value_enum)]
+    pub format: Option<Format>,
     /// Machine-readable
     #[arg(long)]
     pub json: bool,
@@ -125,9 +128,21 @@ pub struct Compile {
     /// Numeric format in the place of the contract's
     #[arg(long, value_enum)]
     pub format: Option<Format>,
+    /// Share of the golden decisions that the numeric format may change, 0 to 1, in the place of the contract's
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    pub golden_decisions: Option<f64>,
     /// Folder for the generated files; made if missing
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+}
+
+/// A share, 0..1.
+fn share(text: &str) -> Result<f64, String> {
+    let number: f64 = text.parse().map_err(|_| "expected a number from 0 to 1".to_owned())?;
+    match (0.0..=1.0).contains(&number) {
+        true => Ok(number),
+        false => Err("expected a number from 0 to 1, such as 0.02 for 2 %".to_owned()),
+    }
 }
 
 #[derive(Debug, Args)]
@@ -151,6 +166,9 @@ pub struct Verify {
     /// nothing is built
     #[arg(long, value_name = "DIR")]
     pub generated: Option<PathBuf>,
+    /// Share of the golden decisions that the numeric format may change, 0 to 1, in the place of the contract's
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    pub golden_decisions: Option<f64>,
     /// Only compare the files of --generated with what the policy yields today; needs no compiler
     #[arg(long, requires = "generated", conflicts_with_all = ["steps", "seed", "trace"])]
     pub drift_only: bool,

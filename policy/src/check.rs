@@ -147,7 +147,7 @@ fn golden(
 ) -> Option<Option<Golden>> {
     let Some(file) = &raw.golden else { return Some(None) };
     let (count, actions) = sizes?;
-    weights::golden::read(file, count, features, actions, network?.tolerance, faults).map(Some)
+    weights::golden::read(file, count, features, actions, network?.golden, faults).map(Some)
 }
 
 fn bound_layers(raw: &RawPolicy, features: &[Feature], layers: &mut [Layer], faults: &mut Vec<Fault>) {

@@ -391,4 +391,9 @@ fn golden_vectors_that_cannot_be_are_refused() {
         "golden_tolerance = ¦0.0\nhidden_activation",
         &["golden_tolerance"],
     );
+    contract_fault(
+        "hidden_activation",
+        "golden_decisions = ¦1.5\nhidden_activation",
+        &["golden_decisions", "0 to 1"],
+    );
 }

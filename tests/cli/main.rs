@@ -4,6 +4,7 @@
 mod budget;
 mod certify;
 mod commands;
+mod decisions;
 mod drm;
 mod files;
 mod interruption;

@@ -14,6 +14,7 @@ use interp::{InputError, Real};
 use policy::{NumericFormat, Policy, Scalar};
 use targets::TargetSpec;
 
+use crate::decisions::decisions;
 use crate::golden;
 use crate::lane::Lane;
 use crate::oracle::{Chunk, Oracle};
@@ -44,6 +45,8 @@ pub struct Options<'a> {
     pub extra_flags: Vec<String>,
     /// More flags for rustc, after all others.
     pub extra_rust_flags: Vec<String>,
+    /// Share of golden decisions that the numeric format may change, 0..1; `None`: as the contract says.
+    pub golden_decisions: Option<f64>,
     /// Recordings to play before the random part.
     pub recorded: Vec<Recorded>,
     /// A build that sends nothing for so long has failed.
@@ -63,6 +66,7 @@ impl Default for Options<'_> {
             levels: Vec::new(),
             extra_flags: Vec::new(),
             extra_rust_flags: Vec::new(),
+            golden_decisions: None,
             recorded: Vec::new(),
             timeout: Duration::from_secs(60),
             progress: None,
@@ -160,6 +164,7 @@ fn run_in<T: Real>(policy: &Policy, options: Options<'_>) -> Result<Report, Veri
         levels,
         extra_flags,
         extra_rust_flags,
+        golden_decisions,
         recorded,
         timeout,
         mut progress,
@@ -215,6 +220,7 @@ fn run_in<T: Real>(policy: &Policy, options: Options<'_>) -> Result<Report, Veri
         checksum: format!("{:08x}", oracle.checksum()),
         coverage: oracle.coverage().clone(),
         golden,
+        decisions: decisions(policy, golden_decisions),
         builds,
     })
 }

@@ -12,7 +12,7 @@ use verify::fmu::Archive;
 
 use super::budget;
 use super::costs::Measured;
-use super::verify::golden_text;
+use super::verify::{MISREAD, UNPROVEN, decisions_lines, golden_text};
 use super::{bytes, grouped};
 use crate::arguments::Compile;
 use crate::{Failure, Outcome, output};
@@ -38,14 +38,27 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
 /// The policy in the format asked for; refused if its network does not give the trainer's answers.
 fn load(options: &Compile) -> Result<Policy, Failure> {
     let policy = super::load_as(&options.policy, options.format.map(Into::into))?;
-    match verify::golden_result(&policy)?.filter(|golden| !golden.passed()) {
-        None => Ok(policy),
-        Some(golden) => Err(Failure(format!(
+    if let Some(golden) = verify::golden_result(&policy)?.filter(|golden| !golden.passed()) {
+        return Err(Failure(format!(
             "the network does not give the trainer's golden answers; nothing was written\n   = found: {}\n   \
-             = hint: look at hidden_activation, the order of layers and features, transpose; `policyc verify` compares them too",
+             = hint: {MISREAD}",
             golden_text(&golden)
+        )));
+    }
+    match verify::decisions(&policy, options.golden_decisions).filter(|decisions| !decisions.kept()) {
+        None => Ok(policy),
+        Some(decisions) => Err(Failure(format!(
+            "the numeric format changes more of the trainer's decisions than allowed; nothing was written\n   = found: {}\n   \
+             = hint: see what they cost with `policyc certify` and `policyc simulate`; to accept them, --golden-decisions {}",
+            decisions_lines(&policy, &decisions).join("\n            "),
+            accepted(decisions.share())
         ))),
     }
+}
+
+/// The smallest number of two digits that accepts a share.
+fn accepted(share: f64) -> f64 {
+    (share * 100.0).ceil() / 100.0
 }
 
 /// What a step costs under the target's emulator; it goes into the manifest, too.
@@ -88,6 +101,9 @@ pub fn say(
 ) -> Result<(), Failure> {
     for note in &policy.notes {
         output::say(&format!("note: {note}"))?;
+    }
+    if policy.golden.is_none() {
+        output::say(&format!("note: {UNPROVEN}"))?;
     }
     let sizes = manifest::sizes(policy, target);
     if let Some(bound) = sizes.accumulator_bound {

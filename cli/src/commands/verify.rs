@@ -18,7 +18,7 @@ use crate::{Failure, Outcome, output};
 
 mod show;
 
-pub use show::{golden_text, missing_text};
+pub use show::{MISREAD, UNPROVEN, decisions_lines, golden_text, missing_text};
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -74,6 +74,7 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
             seed: options.seed,
             target,
             generated: on_disk.as_ref().map(|folder| &folder.files),
+            golden_decisions: options.golden_decisions,
             recorded,
             progress: Some(&mut tell),
             ..Options::default()
@@ -89,7 +90,7 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
         let report = Some(report);
         output::say(&serde_json::to_string_pretty(&Answer { equal, drift, report })?)?;
     } else {
-        output::say(show::report(&report, drift.as_ref(), equal)?.trim_end())?;
+        output::say(show::report(&policy, &report, drift.as_ref())?.trim_end())?;
     }
     Ok(if equal { Outcome::Done } else { Outcome::Different })
 }

@@ -5,6 +5,7 @@ use toml_input::{At, Fault, Message, Table, Value};
 use crate::activation::Activation;
 use crate::catalogue;
 use crate::limits::MAX_LAYERS;
+use crate::weights::golden::Limits;
 
 /// The activations behind the hidden layers, as given.
 pub(crate) enum Hidden<'a> {
@@ -26,7 +27,7 @@ pub(crate) struct Network<'a> {
     pub layers: Option<Vec<At<String>>>,
     pub transpose: Option<bool>,
     pub bias: bool,
-    pub tolerance: f64,
+    pub golden: Limits,
 }
 
 pub(crate) fn read<'a>(root: &mut Table<'a>, faults: &mut Vec<Fault>) -> Option<Network<'a>> {
@@ -53,6 +54,7 @@ pub(crate) fn read<'a>(root: &mut Table<'a>, faults: &mut Vec<Fault>) -> Option<
         .optional("golden_tolerance")
         .and_then(|v| tolerance(&v, faults))
         .unwrap_or(1e-5);
+    let decisions = section.optional("golden_decisions").and_then(|v| share(&v, faults));
     section.finish(faults);
     Some(Network {
         section: at,
@@ -61,7 +63,7 @@ pub(crate) fn read<'a>(root: &mut Table<'a>, faults: &mut Vec<Fault>) -> Option<
         layers,
         transpose,
         bias,
-        tolerance,
+        golden: Limits { tolerance, decisions },
     })
 }
 
@@ -170,6 +172,21 @@ fn layers(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<At<String>>>
         return None;
     }
     items.iter().map(|item| owned(item, faults)).collect()
+}
+
+/// A share of decisions, 0..1.
+fn share(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<f64> {
+    let number = value.number(faults)?;
+    if (0.0..=1.0).contains(&number) {
+        return Some(number);
+    }
+    let expected = "0 to 1: the share of golden actions that the numeric format may change";
+    faults.push(value.fault(catalogue::out_of_range(
+        "golden_decisions",
+        &number.to_string(),
+        expected,
+    )));
+    None
 }
 
 fn tolerance(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<f64> {

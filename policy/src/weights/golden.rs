@@ -8,13 +8,22 @@ use super::{catalogue, header, tensors};
 use crate::model::{Feature, Golden};
 use crate::raw::Binary;
 
+/// What the contract allows a network that answers them.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Limits {
+    /// |Q - golden| relative to the largest |Q| of a vector.
+    pub tolerance: f64,
+    /// Share of changed actions, 0..1.
+    pub decisions: Option<f64>,
+}
+
 /// Reads and checks the vectors; `bounds` are checked only if every feature is known.
 pub(crate) fn read(
     file: &Binary,
     features: usize,
     bounds: &[Feature],
     actions: usize,
-    tolerance: f64,
+    limits: Limits,
     faults: &mut Vec<Fault>,
 ) -> Option<Golden> {
     let opened = header::open(file, faults)?;
@@ -62,7 +71,8 @@ pub(crate) fn read(
         observations: obs?,
         q_values: q_values?,
         action_indices: action_indices?,
-        tolerance,
+        tolerance: limits.tolerance,
+        decisions: limits.decisions,
     };
     (faults.len() == before).then_some(golden)
 }

@@ -15,6 +15,7 @@ mod identity;
 mod leaky_relu;
 mod relu;
 mod sigmoid;
+mod softsign;
 mod tanh;
 
 use policy::{Activation, Scalar};
@@ -119,6 +120,7 @@ pub fn text_of(activation: Activation) -> Box<dyn Text> {
     match activation {
         Activation::Relu => Box::new(relu::Relu),
         Activation::Tanh => Box::new(sigmoid::Curve(tanh::Tanh)),
+        Activation::Softsign => Box::new(sigmoid::Curve(softsign::Softsign)),
         Activation::LeakyRelu { slope } => Box::new(leaky_relu::LeakyRelu { slope }),
         Activation::Identity => Box::new(identity::Identity),
     }

@@ -3,6 +3,7 @@
 //!
 //! Nothing here writes to disk; the order of operations is the one of `docs/reference/numeric-contract.md`.
 
+pub mod activation;
 mod assembly;
 pub mod backend;
 pub mod crc;

@@ -16,6 +16,7 @@ pub fn activate<'a, T: Real>(activation: Activation, values: impl Iterator<Item 
             values.for_each(|x| *x = leaky_relu(slope, *x));
         }
         Activation::Tanh => values.for_each(|x| *x = tanh(*x)),
+        Activation::Softsign => values.for_each(|x| *x = softsign(*x)),
     }
 }
 
@@ -30,6 +31,7 @@ pub(crate) fn integer(activation: Activation, sum: i64, accumulator: i32, shift:
             if y > 0 { y } else { shifted(y * slope, SLOPE_BITS) }
         }
         Activation::Tanh => through_binary32(tanh, sum, accumulator),
+        Activation::Softsign => through_binary32(softsign, sum, accumulator),
     }
 }
 
@@ -64,6 +66,12 @@ pub fn tanh<T: Real>(x: T) -> T {
     let p = horner(NUMERATOR, z) * t;
     let q = horner(DENOMINATOR, z);
     clamp(1.0).clamp(p / q)
+}
+
+/// Section 6: a sum and a quotient, each rounded once.
+fn softsign<T: Real>(x: T) -> T {
+    let magnitude = if x < T::ZERO { -x } else { x };
+    x / (T::nearest(1.0) + magnitude)
 }
 
 fn horner<T: Real>([c0, c1, c2, c3, c4]: [f64; 5], z: T) -> T {

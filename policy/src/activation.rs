@@ -86,6 +86,8 @@ activations! {
     Relu, "relu", Shape::Hinge { below: 0.0 };
     /// Rational approximation without libm.
     Tanh, "tanh", Shape::Sigmoid(&TANH);
+    /// x / (1 + |x|).
+    Softsign, "softsign", Shape::Sigmoid(&SOFTSIGN);
     /// x or slope * x.
     LeakyRelu { slope = 0.01, "Slope for x < 0, 0 < slope < 1." }, "leaky_relu", Shape::Hinge { below: slope };
     /// None.
@@ -102,6 +104,17 @@ static TANH: Sigmoid = Sigmoid {
     real: f64::tanh,
 };
 
+static SOFTSIGN: Sigmoid = Sigmoid {
+    value: softsign,
+    slope: |y| (1.0 - y.abs()) * (1.0 - y.abs()),
+    slope_32: |y| (1.0 - y.abs()) * (1.0 - y.abs()),
+    // two roundings of binary64, then of binary32, each of at most half a unit of a value up to 1
+    near: 3e-16,
+    error_32: 1.3e-7,
+    apart_32: 1.4e-7,
+    real: softsign,
+};
+
 /// Numerator of the contract's tanh, lowest power first.
 pub const TANH_NUMERATOR: [f64; 5] = [
     0.999_999_9,
@@ -114,6 +127,11 @@ pub const TANH_NUMERATOR: [f64; 5] = [
 pub const TANH_DENOMINATOR: [f64; 5] = [1.0, 0.467_065_04, 0.025_842_024, 0.000_327_140_35, 7.702_759e-7];
 /// Beyond this magnitude the contract's tanh is that of the end of its range.
 pub const TANH_RANGE: f64 = 9.0;
+
+/// Softsign in binary64.
+fn softsign(x: f64) -> f64 {
+    x / (1.0 + x.abs())
+}
 
 /// The contract's tanh in binary64.
 fn rational_tanh(x: f64) -> f64 {

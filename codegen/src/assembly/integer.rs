@@ -1,6 +1,6 @@
 //! Blocks of an integer layer with `SMLAD`.
 
-use crate::program::{ActivationCode, Loop, Network, Sink};
+use crate::program::{Loop, Network, Sink};
 
 /// What a kernel leaves of a sum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,10 +56,10 @@ impl Kernel {
         let [Loop::Sums(sums), Loop::Store(stored), added @ ..] = body else {
             return None;
         };
-        let store = match (stored.activation, stored.to) {
-            (ActivationCode::Relu, _) => Store::Rectified,
-            (_, Sink::Sums) => Store::Word,
-            _ => Store::Half,
+        let store = match (stored.activation.is_rectifier(), stored.to) {
+            (true, _) => Store::Rectified,
+            (false, Sink::Sums) => Store::Word,
+            (false, _) => Store::Half,
         };
         let next = added.first().and_then(|_| network.layers.last());
         Some(Self {

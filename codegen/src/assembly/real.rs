@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::program::{ActivationCode, Loop, Network};
+use crate::program::{Loop, Network};
 
 /// The kernels of all blocks of a network that have one.
 pub fn kernels(network: &Network) -> BTreeSet<RealKernel> {
@@ -43,7 +43,7 @@ impl RealKernel {
         Some(Self {
             inputs: sums.inputs,
             height: sums.rows,
-            relu: store.activation == ActivationCode::Relu,
+            relu: store.activation.is_rectifier(),
         })
     }
 

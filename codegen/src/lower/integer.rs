@@ -10,15 +10,14 @@
 //! order. The one invariant: a padded input is 0 or meets a weight that is 0, so padding changes no sum.
 
 use policy::scales::{self, LayerScale, Scales, power_of_two, round_half_up};
-use policy::{Activation, Layer, NumericFormat, Policy, Scalar};
+use policy::{Layer, NumericFormat, Policy, Scalar};
 use targets::{IntegerBlock, IntegerLoop, TargetSpec};
 
-use super::activation::activation;
 use super::loops::{self, Plan, Style};
 use super::tables;
 use crate::output::Language;
 use crate::program::{
-    ActivationCode, Arithmetic, Cut, Element, Inner, IntegerCode, IntegerInput, Kept, Literal, Network, Shape, Table,
+    Arithmetic, Cut, Element, Inner, IntegerCode, IntegerInput, Kept, Literal, Network, Shape, Table,
 };
 
 /// Two 16-bit weights of a word, in memory order.
@@ -137,7 +136,7 @@ fn input(input: &scales::InputScale) -> IntegerInput {
 /// Outputs side by side and inputs at a time of a layer. A last layer that is streamed takes blocks of the layer before.
 fn split(policy: &Policy, index: usize, lanes: usize, block: IntegerBlock) -> (usize, usize) {
     let layer = &policy.layers[index];
-    let is_plain_last = index + 1 == policy.layers.len() && layer.activation == Activation::Identity;
+    let is_plain_last = index + 1 == policy.layers.len() && layer.activation.is_identity();
     // a group of inputs must not lie in two blocks
     let streams = block.streams && is_plain_last && index > 0 && block.rows.is_multiple_of(lanes);
     if streams && block.rows < layer.inputs {
@@ -148,7 +147,7 @@ fn split(policy: &Policy, index: usize, lanes: usize, block: IntegerBlock) -> (u
 }
 
 fn plan(layer: &Layer, scale: &LayerScale, (rows, chunk): (usize, usize), block: IntegerBlock) -> Plan {
-    let activation = activation(Scalar::F32, layer);
+    let activation = layer.activation;
     let exponent = scale.accumulators.first().copied().unwrap_or_default();
     Plan {
         shape: Shape {
@@ -161,16 +160,11 @@ fn plan(layer: &Layer, scale: &LayerScale, (rows, chunk): (usize, usize), block:
         chunk,
         kept: Kept::Registers,
         // the kernels have `SMLAD`, and of the activations those that are a shift and a saturation
-        has_assembly: block.inner == IntegerLoop::Dual
-            && matches!(activation, ActivationCode::Identity | ActivationCode::Relu),
+        has_assembly: block.inner == IntegerLoop::Dual && (activation.is_identity() || activation.is_rectifier()),
         cut: Some(Cut {
             shift: scale.shift,
-            // of a layer with tanh and of the last: there all rows have one exponent
+            // of a layer behind which no scale passes and of the last: there all rows have one exponent
             unit: Literal::nearest(Scalar::F32, power_of_two(-exponent)),
-            slope: match layer.activation {
-                Activation::LeakyRelu { slope } => scales::slope_integer(slope) as i32,
-                _ => 0,
-            },
         }),
         activation,
     }

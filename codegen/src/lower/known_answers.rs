@@ -9,11 +9,10 @@ use std::ops::{Add, Div, Mul};
 use policy::scales::{power_of_two, round_half_up};
 use policy::{Policy, Scalar};
 
-use super::activation::{TANH_DENOMINATOR, TANH_NUMERATOR, TANH_RANGE};
+use crate::activation::{Text, text_of};
 use crate::crc::crc32_words;
 use crate::program::{
-    ActivationCode, Arithmetic, Buffer, Element, From, IntegerCode, Kept, Literal, Loop, Network, Sink, Store, Sums,
-    Table, words,
+    Arithmetic, Buffer, Element, From, IntegerCode, Kept, Literal, Loop, Network, Sink, Store, Sums, Table, words,
 };
 
 /// Number of vectors.
@@ -84,7 +83,7 @@ impl<T: Number> Machine<T> for Real {
     }
 
     fn stored(&self, store: &Store, sum: T) -> T {
-        activate(store.activation, sum)
+        sum.activated(&*text_of(store.activation))
     }
 }
 
@@ -102,14 +101,7 @@ impl Machine<i32> for Integers {
 
     fn stored(&self, store: &Store, sum: i32) -> i32 {
         let Some(cut) = store.cut else { return sum };
-        let shifted = sum >> cut.shift;
-        match store.activation {
-            ActivationCode::Identity => shifted,
-            ActivationCode::Relu => shifted.max(0),
-            ActivationCode::LeakyRelu(_) if shifted > 0 => shifted,
-            ActivationCode::LeakyRelu(_) => (shifted * cut.slope + (1 << 14)) >> 15,
-            ActivationCode::Tanh => (tanh(sum as f32 * cut.unit.single()) * 16_384.0 + 32_768.5) as i32 - 32_768,
-        }
+        text_of(store.activation).integer(sum, &cut)
     }
 }
 
@@ -250,11 +242,14 @@ impl<T: Copy + Default, M: Machine<T>> Run<'_, T, M> {
 }
 
 /// The format in which the answers are computed: `f32` or `f64`.
-trait Number: Copy + PartialOrd + Add<Output = Self> + Mul<Output = Self> + Div<Output = Self> {
+pub(crate) trait Number:
+    Copy + PartialOrd + Add<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
     const SCALAR: Scalar;
     fn nearest(value: f64) -> Self;
     fn fused(self, by: Self, plus: Self) -> Self;
     fn wide(self) -> f64;
+    fn activated(self, text: &dyn Text) -> Self;
 }
 
 impl Number for f32 {
@@ -268,6 +263,9 @@ impl Number for f32 {
     fn wide(self) -> f64 {
         self.into()
     }
+    fn activated(self, text: &dyn Text) -> Self {
+        text.single(self)
+    }
 }
 
 impl Number for f64 {
@@ -280,6 +278,9 @@ impl Number for f64 {
     }
     fn wide(self) -> f64 {
         self
+    }
+    fn activated(self, text: &dyn Text) -> Self {
+        text.double(self)
     }
 }
 
@@ -298,27 +299,4 @@ fn answers<T: Number>(observation_box: &[(Literal, Literal)], q_values: impl Fn(
         answers.push(crc32_words(q.flat_map(|q| words(T::SCALAR, q.wide()))));
     }
     answers
-}
-
-fn activate<T: Number>(activation: ActivationCode, x: T) -> T {
-    let zero = T::nearest(0.0);
-    match activation {
-        ActivationCode::Identity => x,
-        ActivationCode::Relu if x > zero => x,
-        ActivationCode::Relu => zero,
-        ActivationCode::LeakyRelu(_) if x > zero => x,
-        ActivationCode::LeakyRelu(slope) => T::nearest(slope.value()) * x,
-        ActivationCode::Tanh => tanh(x),
-    }
-}
-
-fn tanh<T: Number>(x: T) -> T {
-    let limited = |x: T, limit: f64| T::nearest(x.wide().clamp(-limit, limit));
-    let t = limited(x, TANH_RANGE);
-    let z = t * t;
-    let polynomial = |terms: &[f64; 5]| {
-        let [lower @ .., highest] = terms.map(T::nearest);
-        lower.into_iter().rev().fold(highest, |sum, term| sum * z + term)
-    };
-    limited(polynomial(&TANH_NUMERATOR) * t / polynomial(&TANH_DENOMINATOR), 1.0)
 }

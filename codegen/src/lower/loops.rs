@@ -1,8 +1,8 @@
 //! Builds the tree of loops of a network from what was decided about each layer.
 
-use crate::program::{
-    ActivationCode, Add, Buffer, Cut, From, Kept, Layer, Loop, Part, Piece, Shape, Sink, Store, Sums, Turns,
-};
+use policy::Activation;
+
+use crate::program::{Add, Buffer, Cut, From, Kept, Layer, Loop, Part, Piece, Shape, Sink, Store, Sums, Turns};
 
 /// What was decided about a layer.
 #[derive(Debug, Clone)]
@@ -18,7 +18,7 @@ pub struct Plan {
     /// Whether its blocks are there in assembly, too.
     pub has_assembly: bool,
     /// Behind the layer.
-    pub activation: ActivationCode,
+    pub activation: Activation,
     /// What is kept of its sums, in integers.
     pub cut: Option<Cut>,
 }
@@ -191,7 +191,7 @@ impl Builder<'_> {
                 Loop::Add(Add {
                     layer: index + 1,
                     inputs: rows,
-                    is_positive: block.activation == ActivationCode::Relu,
+                    is_positive: block.activation.is_rectifier(),
                     turns: turns(last.shape.outputs, (self.style.stretch)(last.shape.outputs)),
                 }),
             ],
@@ -227,7 +227,7 @@ impl Builder<'_> {
             });
         }
         // sums in memory are outputs already; a pass over all of them can be vectorised
-        if !is_kept && plan.activation != ActivationCode::Identity {
+        if !is_kept && !plan.activation.is_identity() {
             body.push(self.store(index, plan.shape.outputs, Sink::InPlace));
         }
         body

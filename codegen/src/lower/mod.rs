@@ -1,6 +1,5 @@
 //! Policy + target -> program. Each part of the contract has its file.
 
-pub mod activation;
 pub mod command;
 mod front;
 mod integer;

@@ -3,7 +3,6 @@
 use policy::{Layer, NumericFormat, Policy, Scalar};
 use targets::{RowBlock, TargetSpec};
 
-use super::activation::activation;
 use super::loops::{self, Plan, Style};
 use super::tables;
 use crate::output::Language;
@@ -88,7 +87,7 @@ fn plan(policy: &Policy, layer: &Layer, may_stream: bool, target: &TargetSpec, l
             && policy.numeric_format == NumericFormat::F32
             && matches!(blocks, RowBlock::Rows(_))
             && rows <= ASSEMBLY_ROWS,
-        activation: activation(policy.numeric_format.scalar(), layer),
+        activation: layer.activation,
         cut: None,
     }
 }

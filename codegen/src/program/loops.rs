@@ -17,22 +17,9 @@
 //!
 //! Lowering builds the tree (`lower::loops`), backends print its nodes, `lower::known_answers` computes on it.
 
-use policy::Scalar;
+use policy::{Activation, Scalar};
 
 use super::literal::Literal;
-
-/// Activation with its literals.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ActivationCode {
-    /// None.
-    Identity,
-    /// Clears negative values by their sign bit.
-    Relu,
-    /// Multiplies negative values.
-    LeakyRelu(Literal),
-    /// The contract's rational function.
-    Tanh,
-}
 
 /// A node.
 #[derive(Debug, Clone, PartialEq)]
@@ -170,12 +157,12 @@ pub enum Kept {
 }
 
 /// What becomes of sums.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Store {
     /// Outputs.
     pub rows: usize,
     /// Behind the sum.
-    pub activation: ActivationCode,
+    pub activation: Activation,
     /// What is kept of a sum of integers; `None` in floats.
     pub cut: Option<Cut>,
     /// Where the outputs go.
@@ -185,12 +172,10 @@ pub struct Store {
 /// What is kept of a sum of integers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cut {
-    /// Bits cut off the sum; 0 behind a tanh.
+    /// Bits cut off the sum; 0 where the activation takes it as a number.
     pub shift: u32,
-    /// Power of two that makes the sum a number, for a tanh.
+    /// Power of two that makes the sum a number, for an activation that takes one.
     pub unit: Literal,
-    /// Slope of a leaky ReLU in 2^-15.
-    pub slope: i32,
 }
 
 /// Where outputs go.
@@ -357,9 +342,9 @@ impl Network {
         })
     }
 
-    /// Whether a layer has this activation.
+    /// Whether a layer has an activation of this kind.
     #[must_use]
-    pub fn activates(&self, wanted: fn(ActivationCode) -> bool) -> bool {
+    pub fn activates(&self, wanted: impl Fn(Activation) -> bool) -> bool {
         let nodes = self.nodes();
         let mut stores = nodes.iter().filter_map(|node| match node {
             Loop::Store(store) => Some(store.activation),

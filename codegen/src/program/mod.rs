@@ -19,9 +19,7 @@ use targets::Widths;
 
 pub use literal::Literal;
 pub(crate) use literal::words;
-pub use loops::{
-    ActivationCode, Add, Arithmetic, Buffer, Cut, From, Inner, IntegerCode, IntegerInput, Kept, Layer, Loop,
-};
+pub use loops::{Add, Arithmetic, Buffer, Cut, From, Inner, IntegerCode, IntegerInput, Kept, Layer, Loop};
 pub use loops::{Network, Part, Piece, Shape, Sink, Store, Sums, Turns};
 pub use ops::{Advance, Block, Coefficient, Decide, Front, Op, Push, SignalPort, StateMember, StateValue, ValueId};
 pub use tables::{Element, Slice, Strip, Table};

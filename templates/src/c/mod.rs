@@ -86,12 +86,8 @@ pub struct IntegerView {
     pub has_fpu: bool,
     /// Exponent field of an output with 25 significant bits as a Q value.
     pub q_field: i32,
-    /// Which activations occur.
-    pub relu: bool,
-    /// A leaky ReLU occurs.
-    pub leaky_relu: bool,
-    /// A tanh occurs.
-    pub tanh: bool,
+    /// Functions of the activations that occur.
+    pub activations: Vec<String>,
 }
 
 /// A CRC function over one type of table.
@@ -146,10 +142,6 @@ pub struct NumberType {
     pub sign: &'static str,
     /// Number of the sign bit.
     pub top: u32,
-    /// Bits of 9.
-    pub nine: &'static str,
-    /// Bits of 1.
-    pub one: &'static str,
 }
 
 /// What both files need.
@@ -214,8 +206,8 @@ pub struct Source {
     pub crc_kinds: Vec<CrcKind>,
     /// Which helper functions are used.
     pub helpers: Helpers,
-    /// Numerator and denominator of tanh, highest power first.
-    pub tanh: Vec<Member>,
+    /// Functions for floats of the activations that occur.
+    pub activations: Vec<String>,
     /// Number of actions.
     pub actions: usize,
     /// A number below every Q value.
@@ -277,14 +269,6 @@ pub struct Helpers {
     pub clamp: bool,
     /// `line_sum`
     pub line_sum: bool,
-    /// `relu`
-    pub relu: bool,
-    /// `relu` from a sum and a product, for processors that have them
-    pub relu_by_sum: bool,
-    /// `leaky_relu`
-    pub leaky_relu: bool,
-    /// `tanh`
-    pub tanh: bool,
     /// `fma`
     pub fused: bool,
     /// Loops in assembly

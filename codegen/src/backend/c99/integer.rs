@@ -16,13 +16,14 @@
 //! In: `x`, whole groups of 16-bit integers. Out: `y`, 16 bits wide, or the sums of the last layer. The one invariant: every form of
 //! an inner loop leaves `in`, `w` and `next` behind what it has read, so the forms can be exchanged line by line.
 
-use super::statements::float;
+use super::number;
 use super::tables::element;
 use super::text::Text;
+use crate::activation::{C, text_of};
 use crate::assembly;
 use crate::assembly::integer::Kernel;
 use crate::program::{
-    ActivationCode, Add, Buffer, Element, Inner, IntegerCode, Layer, Loop, Network, Program, Sink, Store, Sums, Turns,
+    Add, Buffer, Element, Inner, IntegerCode, Layer, Loop, Network, Program, Sink, Store, Sums, Turns,
 };
 
 /// Functions of the layers.
@@ -30,6 +31,7 @@ pub fn functions(program: &Program, code: &IntegerCode) -> Vec<String> {
     let printer = Printer {
         n: &program.name,
         u: program.name.to_uppercase(),
+        names: number::names(program),
         network: &program.network,
         code,
         weight: element(Element::Integer {
@@ -100,17 +102,11 @@ fn place(buffer: Buffer) -> String {
     }
 }
 
-fn shifted(sum: &str, shift: u32) -> String {
-    match shift {
-        0 => sum.to_owned(),
-        _ => format!("{sum} >> {shift}"),
-    }
-}
-
 struct Printer<'a> {
     /// Prefix of names, and of macros.
     n: &'a str,
     u: String,
+    names: C<'a>,
     network: &'a Network,
     code: &'a IntegerCode,
     /// Type of a weight.
@@ -344,15 +340,9 @@ impl Printer<'_> {
 
     /// What is left of sum `row`, 32 bits wide; a hidden one fits 16.
     fn stored(&self, store: &Store, row: usize) -> String {
-        let (n, sum) = (self.n, format!("s{row}"));
-        let Some(kept) = store.cut else { return sum };
-        let cut = shifted(&sum, kept.shift);
-        match store.activation {
-            ActivationCode::Identity => cut,
-            ActivationCode::Relu => format!("{n}_positive({cut})"),
-            ActivationCode::LeakyRelu(_) => format!("{n}_leaky_integer({cut}, {})", kept.slope),
-            ActivationCode::Tanh => format!("{n}_tanh_integer({sum}, {})", float(kept.unit.single())),
-        }
+        let sum = format!("s{row}");
+        let Some(cut) = &store.cut else { return sum };
+        text_of(store.activation).c_integer(&self.names, &sum, cut)
     }
 
     /// What a block of outputs adds to all sums of the last layer.

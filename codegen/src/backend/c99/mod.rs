@@ -14,12 +14,12 @@ use templates::c::{
     Common, Header, Helpers, IntegerView, Member, NetworkView, PushView, RealView, Source, StatusBit, WideChar,
 };
 
+use crate::activation::{self, text_of};
 use crate::backend::banner;
 use crate::files::{CodegenError, GeneratedFiles};
 use crate::lower::STATUS;
 use crate::program::{
-    ActivationCode, Arithmetic, Buffer, Coefficient, Element, IntegerCode, Kept, Literal, Loop, Op, Program,
-    StateMember, StateValue,
+    Arithmetic, Buffer, Coefficient, Element, IntegerCode, Kept, Literal, Loop, Op, Program, StateMember, StateValue,
 };
 use number::number;
 use statements::{Printer, float, unsigned};
@@ -197,7 +197,7 @@ fn source(program: &Program) -> Source {
         senses_again: program.senses_again,
         crc_kinds: tables::crc_kinds(program),
         helpers: helpers(program),
-        tanh: tables::tanh_steps(program.scalar()),
+        activations: activations(program),
         actions: program.duties.len(),
         lowest: number::lowest(program.scalar()),
         signals: operands(&front.signals),
@@ -256,10 +256,19 @@ fn integer_view(program: &Program, code: &IntegerCode) -> IntegerView {
         shares: code.shares,
         functions: integer::functions(program, code),
         calls: integer::calls(program),
-        relu: network.activates(|activation| activation == ActivationCode::Relu),
-        leaky_relu: network.activates(|activation| matches!(activation, ActivationCode::LeakyRelu(_))),
-        tanh: network.activates(|activation| activation == ActivationCode::Tanh),
+        activations: activation::used(network)
+            .flat_map(|kind| text_of(kind).c_integer_helper(&number::names(program)))
+            .collect(),
     }
+}
+
+/// Functions of the activations in floats. A network of integers calls those alone that take its sums as numbers.
+fn activations(program: &Program) -> Vec<String> {
+    let is_integer = program.network.integer().is_some();
+    activation::used(&program.network)
+        .filter(|kind| !is_integer || kind.limit().is_some())
+        .flat_map(|kind| text_of(kind).c_helper(&number::names(program)))
+        .collect()
 }
 
 fn pushes(program: &Program) -> Vec<PushView> {
@@ -297,17 +306,12 @@ fn helpers(program: &Program) -> Helpers {
         let blocks = [&program.front.block, &program.decide.block, &program.advance.block];
         blocks.into_iter().flat_map(|block| &block.ops)
     };
-    let real = program.network.integer().is_none();
     let network = &program.network;
     Helpers {
         within: ops().any(|op| matches!(op, Op::Within { .. })),
         outside: ops().any(|op| matches!(op, Op::Outside { .. })),
         clamp: ops().any(|op| matches!(op, Op::Clamp { .. })),
         line_sum: ops().any(|op| matches!(op, Op::LineSum { .. })),
-        relu: real && network.activates(|activation| activation == ActivationCode::Relu),
-        relu_by_sum: program.has_fpu,
-        leaky_relu: real && network.activates(|activation| matches!(activation, ActivationCode::LeakyRelu(_))),
-        tanh: network.activates(|activation| activation == ActivationCode::Tanh),
         assembly: network.has_assembly,
         vectors: (network.nodes().iter()).any(|node| matches!(node, Loop::Sums(sums) if sums.kept == Kept::Vectors)),
         alignment: program.alignment(),

@@ -4,8 +4,9 @@ use policy::Scalar;
 use templates::c::NumberType;
 
 use super::statements::float;
+use crate::activation::C;
 use crate::backend::literal;
-use crate::program::Literal;
+use crate::program::{Literal, Program};
 
 /// The C type that holds a number of the format, and what goes with its width.
 pub fn kind(scalar: Scalar) -> NumberType {
@@ -19,8 +20,6 @@ pub fn kind(scalar: Scalar) -> NumberType {
             magnitude: "0x7FFFFFFFu",
             sign: "0x80000000u",
             top: 31,
-            nine: "0x41100000u",
-            one: "0x3F800000u",
         },
         // C90 has no literals of 64 bits
         Scalar::F64 => NumberType {
@@ -32,9 +31,26 @@ pub fn kind(scalar: Scalar) -> NumberType {
             magnitude: "(((uint64_t)1 << 63) - 1u)",
             sign: "((uint64_t)1 << 63)",
             top: 63,
-            nine: "(uint64_t)0x40220000u << 32",
-            one: "(uint64_t)0x3FF00000u << 32",
         },
+    }
+}
+
+/// What the text of an activation needs to know of the program.
+pub fn names(program: &Program) -> C<'_> {
+    let scalar = program.scalar();
+    let kind = kind(scalar);
+    C {
+        n: &program.name,
+        u: program.name.to_uppercase(),
+        scalar,
+        number: kind.name,
+        word: kind.word,
+        suffix: kind.suffix,
+        magnitude: kind.magnitude,
+        sign: kind.sign,
+        top: kind.top,
+        has_fpu: program.has_fpu,
+        literal: |scalar, value| number(scalar, Literal::nearest(scalar, value)),
     }
 }
 

@@ -19,9 +19,10 @@ use policy::Scalar;
 
 use super::number;
 use super::text::Text;
+use crate::activation::{C, text_of};
 use crate::assembly;
 use crate::assembly::real::RealKernel;
-use crate::program::{ActivationCode, Arithmetic, Buffer, Kept, Layer, Loop, Part, Program, Store, Sums};
+use crate::program::{Arithmetic, Buffer, Kept, Layer, Loop, Part, Program, Store, Sums};
 
 /// Functions of the layers.
 pub fn functions(program: &Program) -> Vec<String> {
@@ -97,6 +98,7 @@ struct Printer<'a> {
     /// Prefix of names, and of macros.
     n: &'a str,
     u: String,
+    names: C<'a>,
     /// Type of sums and values.
     kind: &'static str,
 }
@@ -107,6 +109,7 @@ impl<'a> Printer<'a> {
             program,
             n: &program.name,
             u: program.name.to_uppercase(),
+            names: number::names(program),
             kind: number::kind(program.scalar()).name,
         }
     }
@@ -133,7 +136,9 @@ impl<'a> Printer<'a> {
     }
 
     fn function(&self, layer: &Layer, text: &mut Text) {
-        let Self { n, u, kind, program } = self;
+        let Self {
+            n, u, kind, program, ..
+        } = self;
         let shape = &program.network.layers[layer.index];
         let extent = match layer.piece {
             Some(_) => format!(", {} -> {} of them", layer.inputs, layer.outputs),
@@ -325,18 +330,7 @@ impl<'a> Printer<'a> {
 
     /// The output that a sum becomes.
     fn activated(&self, store: &Store, sum: &str) -> String {
-        let n = self.n;
-        match store.activation {
-            ActivationCode::Identity => sum.to_owned(),
-            ActivationCode::Relu => format!("{n}_relu({sum})"),
-            ActivationCode::LeakyRelu(slope) => {
-                format!(
-                    "{n}_leaky_relu({sum}, {})",
-                    number::number(self.program.scalar(), slope)
-                )
-            }
-            ActivationCode::Tanh => format!("{n}_tanh({sum})"),
-        }
+        text_of(store.activation).c(&self.names, sum)
     }
 }
 

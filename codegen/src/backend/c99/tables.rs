@@ -1,11 +1,10 @@
 //! Tables as arrays, and the data of the checks.
 
 use policy::Scalar;
-use templates::c::{CrcItem, CrcKind, Member, SelfTestView, Table as TableView};
+use templates::c::{CrcItem, CrcKind, SelfTestView, Table as TableView};
 
 use super::number::{self, number};
 use super::statements::unsigned;
-use crate::lower::activation::{TANH_DENOMINATOR, TANH_NUMERATOR};
 use crate::lower::known_answers::{LCG, SEED, UNIT, VECTORS};
 use crate::program::{Element, Literal, Program, Table};
 
@@ -52,25 +51,6 @@ fn wrap(literals: impl Iterator<Item = String>) -> Vec<String> {
         }
     }
     lines
-}
-
-/// Horner steps of numerator and denominator, each one rounding per operation.
-pub fn tanh_steps(scalar: Scalar) -> Vec<Member> {
-    let mut steps = Vec::new();
-    for (letter, terms) in [('p', TANH_NUMERATOR), ('q', TANH_DENOMINATOR)] {
-        for (power, term) in terms.iter().enumerate().rev() {
-            let term = number(scalar, Literal::nearest(scalar, *term));
-            let value = match power {
-                4 => term,
-                _ => format!("({letter}{} * z) + {term}", power + 1),
-            };
-            steps.push(Member {
-                declaration: format!("{letter}{power}"),
-                comment: value,
-            });
-        }
-    }
-    steps
 }
 
 /// CRC function of tables of this element, in a program of that format.

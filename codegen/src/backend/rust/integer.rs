@@ -5,6 +5,7 @@ use quote::quote;
 
 use super::tokens::{float, ident, signed, size};
 use super::{integer_loops, tables};
+use crate::activation::rust_integer_lines;
 use crate::program::{Buffer, Element, Inner, IntegerCode, Program};
 
 /// Tables, layers and `network`.
@@ -30,6 +31,7 @@ pub fn items(program: &Program, code: &IntegerCode) -> TokenStream {
     });
     let (layers, body) = integer_loops::network(program, code, &weight);
     let extremes = extremes(code.inner);
+    let lines = rust_integer_lines();
     let q_value = (!program.has_fpu).then(|| q_value(code));
     let padded = size(padded);
     let doc = format!(
@@ -51,17 +53,7 @@ pub fn items(program: &Program, code: &IntegerCode) -> TokenStream {
             least(most(rounded, low), high) as i16
         }
         #q_value
-        #[inline(always)]
-        #[allow(dead_code)]
-        fn positive(x: i32) -> i16 {
-            (x & !(x >> 31)) as i16
-        }
-        #[inline(always)]
-        #[allow(dead_code)]
-        fn leaky_integer(x: i32, slope: i32) -> i16 {
-            let negative = x >> 31;
-            ((x & !negative) | ((x.wrapping_mul(slope).wrapping_add(16_384) >> 15) & negative)) as i16
-        }
+        #lines
         #[inline(always)]
         fn select_integer(flag: u32, then: i32, otherwise: i32) -> i32 {
             let mask = 0_u32.wrapping_sub(flag) as i32;

@@ -14,10 +14,11 @@ use proc_macro2::{Ident, TokenStream};
 use quote::quote;
 
 use super::tables;
-use super::tokens::{float, ident, signed, size, word};
+use super::tokens::{ident, size};
+use crate::activation::{rust_cut, text_of};
 use crate::assembly;
 use crate::assembly::integer::Kernel;
-use crate::program::{ActivationCode, Add, Buffer, IntegerCode, Layer, Loop, Part, Program, Sink, Store};
+use crate::program::{Add, Buffer, IntegerCode, Layer, Loop, Part, Program};
 
 /// Tables and functions of all layers, and the body of `network`.
 pub fn network(program: &Program, code: &IntegerCode, weight: &TokenStream) -> (TokenStream, TokenStream) {
@@ -32,7 +33,7 @@ pub fn network(program: &Program, code: &IntegerCode, weight: &TokenStream) -> (
         let (sink, value) = match layer.next {
             Some(last) => {
                 let biases = tables::biases(program, last, Part::Full);
-                let cut = cut(code.output_shift);
+                let cut = rust_cut(code.output_shift);
                 result = quote!(sums.0.map(|sum| #cut));
                 (ident("sums"), quote!(let mut sums = Words(#biases);))
             }
@@ -113,7 +114,8 @@ impl Printer<'_> {
         let [Loop::Sums(_), Loop::Store(store), added @ ..] = body else {
             return None;
         };
-        let (activated, rows) = (activated(store), size(store.rows));
+        let activated = text_of(store.activation).rust_integer(store, &store.cut?);
+        let rows = size(store.rows);
         if let [Loop::Add(add)] = added {
             let next = tables::weights(self.program, add.layer, part);
             let outputs: Vec<Ident> = (0..add.inputs).map(|i| ident(&format!("y{i}"))).collect();
@@ -185,30 +187,5 @@ fn buffer(buffer: Buffer) -> Ident {
     match buffer {
         Buffer::Hidden(index) => ident(&format!("hidden{index}")),
         Buffer::Input | Buffer::Block | Buffer::Output => ident("input"),
-    }
-}
-
-fn cut(shift: u32) -> TokenStream {
-    let bits = word(shift);
-    if shift == 0 { quote!(sum) } else { quote!(sum >> #bits) }
-}
-
-/// What is left of `sum`.
-fn activated(store: &Store) -> TokenStream {
-    let Some(kept) = store.cut else { return quote!(sum) };
-    let cut = cut(kept.shift);
-    match store.activation {
-        ActivationCode::Identity if store.to == Sink::Sums => cut,
-        ActivationCode::Identity if kept.shift == 0 => quote!(sum as i16),
-        ActivationCode::Identity => quote!((#cut) as i16),
-        ActivationCode::Relu => quote!(positive(#cut)),
-        ActivationCode::LeakyRelu(_) => {
-            let slope = signed(kept.slope);
-            quote!(leaky_integer(#cut, #slope))
-        }
-        ActivationCode::Tanh => {
-            let unit = float(kept.unit.single());
-            quote!(((tanh(sum as f32 * #unit) * 16_384.0 + 32_768.5) as i32).wrapping_sub(32_768) as i16)
-        }
     }
 }

@@ -1,12 +1,11 @@
 //! The sums of a block in floats.
 
-use policy::Scalar;
+use policy::{Activation, Scalar};
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use super::number::number;
 use super::tokens::ident;
-use crate::program::ActivationCode;
+use crate::activation::text_of;
 
 /// The sums of a block as a function; `accumulate` is the statement that adds `weight * x` to `sum`.
 pub fn block(kind: &TokenStream, accumulate: &TokenStream) -> TokenStream {
@@ -115,26 +114,13 @@ impl Form {
 }
 
 /// Statement that puts the outputs of a block into `out`, an expression of a mutable reference to slots.
-pub fn store(scalar: Scalar, activation: ActivationCode, arguments: &TokenStream, out: &TokenStream) -> TokenStream {
-    match activation {
-        ActivationCode::Identity => quote!(plain(#arguments, #out);),
-        ActivationCode::Relu => quote!(rectified(#arguments, #out);),
-        _ => {
-            let activated = activated(scalar, activation);
-            quote! { plain(#arguments, #out); activate(#out, |sum| #activated); }
-        }
+pub fn store(scalar: Scalar, activation: Activation, arguments: &TokenStream, out: &TokenStream) -> TokenStream {
+    if activation.is_identity() {
+        return quote!(plain(#arguments, #out););
     }
-}
-
-/// The activation of `sum`.
-fn activated(scalar: Scalar, activation: ActivationCode) -> TokenStream {
-    match activation {
-        ActivationCode::Identity => quote!(sum),
-        ActivationCode::Relu => quote!(relu(sum)),
-        ActivationCode::LeakyRelu(slope) => {
-            let slope = number(scalar, slope);
-            quote!(leaky_relu(sum, #slope))
-        }
-        ActivationCode::Tanh => quote!(tanh(sum)),
+    if activation.is_rectifier() {
+        return quote!(rectified(#arguments, #out););
     }
+    let activated = text_of(activation).rust(scalar);
+    quote! { plain(#arguments, #out); activate(#out, |sum| #activated); }
 }

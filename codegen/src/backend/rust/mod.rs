@@ -9,7 +9,7 @@ mod integrity;
 pub(crate) mod kernels;
 mod loops;
 mod network;
-mod number;
+pub(crate) mod number;
 mod statements;
 mod tables;
 pub(crate) mod tokens;

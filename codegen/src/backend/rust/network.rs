@@ -4,29 +4,26 @@ use policy::Scalar;
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use super::number::{self, number};
-use super::tokens::{ident, size};
+use super::number;
+use super::tokens::size;
 use super::{integer, kernels, loops, tables};
+use crate::activation::{Rust, rust_curves};
 use crate::assembly;
-use crate::lower::activation::{TANH_DENOMINATOR, TANH_NUMERATOR};
-use crate::program::{ActivationCode, Arithmetic, Literal, Program};
+use crate::program::{Arithmetic, Program};
 
 /// Everything between observation and Q values.
 pub fn items(program: &Program) -> TokenStream {
     let scalar = program.scalar();
     let kind = number::kind(scalar);
     let duties = tables::values(program, "duties");
-    let tanh = program
-        .network
-        .activates(|activation| activation == ActivationCode::Tanh)
-        .then(|| tanh(scalar));
+    let curves = rust_curves(&program.network, &Rust::of(program));
     let network = match &program.network.arithmetic {
         Arithmetic::Real { fused, .. } => real(program, *fused),
         Arithmetic::Integer(code) => integer::items(program, code),
     };
     quote! {
         static DUTIES: [#kind; ACTIONS] = #duties;
-        #tanh
+        #curves
         #network
     }
 }
@@ -103,33 +100,6 @@ fn fma() -> TokenStream {
             let odd = (u64::from(error < 0.0) | u64::from(error > 0.0)) & !sum.to_bits();
             let towards = 1_u64.wrapping_sub(((error.to_bits() ^ sum.to_bits()) >> 63) << 1);
             f64::from_bits(sum.to_bits().wrapping_add(odd.wrapping_mul(towards))) as f32
-        }
-    }
-}
-
-fn tanh(scalar: Scalar) -> TokenStream {
-    let kind = number::kind(scalar);
-    let (limit, nine, one) = number::limit(scalar);
-    let steps = |letter: &str, terms: &[f64; 5]| {
-        let name = ident(letter);
-        let [lower @ .., highest] = terms.map(|term| number(scalar, Literal::nearest(scalar, term)));
-        let lower = lower.iter().rev();
-        quote! { let mut #name: #kind = #highest; #(#name = #name * z + #lower;)* }
-    };
-    let numerator = steps("p", &TANH_NUMERATOR);
-    let denominator = steps("q", &TANH_DENOMINATOR);
-    quote! {
-        /// x limited to the magnitude with these bits, in integers so that loops over it can be vectorised
-        #[inline(always)]
-        #limit
-        /// Rational approximation, |error| < 4e-7.
-        #[inline(always)]
-        fn tanh(x: #kind) -> #kind {
-            let t = limit(x, #nine);
-            let z = t * t;
-            #numerator
-            #denominator
-            limit((p * t) / q, #one)
         }
     }
 }

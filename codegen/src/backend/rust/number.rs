@@ -53,34 +53,6 @@ pub fn bits(scalar: Scalar) -> Bits {
     }
 }
 
-/// `x` limited to the magnitude with the bits `limit`: the function, and the bits of 9 and of 1.
-pub fn limit(scalar: Scalar) -> (TokenStream, TokenStream, TokenStream) {
-    match scalar {
-        Scalar::F32 => (
-            quote! {
-                fn limit(x: f32, limit: u32) -> f32 {
-                    let magnitude = x.to_bits() & 0x7FFF_FFFF;
-                    let below = 0_u32.wrapping_sub(magnitude.wrapping_sub(limit) >> 31);
-                    f32::from_bits((x.to_bits() & 0x8000_0000) | (magnitude & below) | (limit & !below))
-                }
-            },
-            quote!(0x4110_0000),
-            quote!(0x3F80_0000),
-        ),
-        Scalar::F64 => (
-            quote! {
-                fn limit(x: f64, limit: u64) -> f64 {
-                    let magnitude = x.to_bits() & 0x7FFF_FFFF_FFFF_FFFF;
-                    let below = 0_u64.wrapping_sub(magnitude.wrapping_sub(limit) >> 63);
-                    f64::from_bits((x.to_bits() & 0x8000_0000_0000_0000) | (magnitude & below) | (limit & !below))
-                }
-            },
-            quote!(0x4022_0000_0000_0000),
-            quote!(0x3FF0_0000_0000_0000),
-        ),
-    }
-}
-
 /// The words of the number `value`, low one first, as an expression that can be chained.
 pub fn words(scalar: Scalar, value: &TokenStream) -> TokenStream {
     match scalar {

@@ -6,6 +6,7 @@ use quote::quote;
 
 use super::number::{self, number};
 use super::tokens::{ident, size};
+use crate::activation::{Rust, rust_lines};
 use crate::program::{Block, Coefficient, Op, Program, ValueId};
 
 /// Field of the controller that holds a coefficient.
@@ -159,18 +160,8 @@ fn call(function: &str, arguments: &[&TokenStream]) -> TokenStream {
 pub fn helpers(program: &Program) -> TokenStream {
     let scalar = program.scalar();
     let number = number::kind(scalar);
-    let number::Bits {
-        magnitude,
-        mask,
-        negative,
-        positive,
-    } = number::bits(scalar);
-    let rectified = if program.has_fpu {
-        // both operations are exact: no value comes near the end of the format
-        quote!((x + #magnitude) * 0.5)
-    } else {
-        positive
-    };
+    let mask = number::bits(scalar).mask;
+    let lines = rust_lines(&Rust::of(program));
     quote! {
         /// A condition as 0 or 1. The optimiser must not know that: it would turn selections back into branches.
         #[inline(always)]
@@ -210,16 +201,6 @@ pub fn helpers(program: &Program) -> TokenStream {
             }
             sum + newest
         }
-        /// x if x > 0 else +0, no branch in the binary
-        #[inline(always)]
-        #[allow(dead_code)]
-        fn relu(x: #number) -> #number {
-            #rectified
-        }
-        #[inline(always)]
-        #[allow(dead_code)]
-        fn leaky_relu(x: #number, slope: #number) -> #number {
-            select(#negative, slope * x, x)
-        }
+        #lines
     }
 }

@@ -7,7 +7,7 @@ use toml_input::{Document, Fault, Faults, Message, Table, Value};
 
 use crate::catalogue::{self, Field, Parameter};
 use crate::check;
-use crate::parameters::Parameters;
+use crate::effects::Parameters;
 
 impl Parameters {
     /// Reads the text of a `plant.toml`; `file` only names it in messages.

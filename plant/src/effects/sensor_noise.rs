@@ -3,49 +3,20 @@
 use random::{Random, Xoshiro};
 use serde::{Deserialize, Serialize};
 
-use crate::catalogue::{Effect, Field, Parameter, number};
+use crate::catalogue::{Effect, Field, Parameter, Way, of_each_sensor};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
     name: "sensor_noise",
     meaning: "noise of a sensor",
-    parameters: &[
-        number!(
-            sensors.v_out.noise,
-            "sensors.v_out.noise",
-            "V",
-            "standard deviation",
-            (0.0, 1e5),
-            (1e-3, 0.2),
-            0.0
-        ),
-        number!(
-            sensors.i_l.noise,
-            "sensors.i_l.noise",
-            "A",
-            "standard deviation",
-            (0.0, 1e5),
-            (1e-3, 0.2),
-            0.0
-        ),
-        number!(
-            sensors.i_out.noise,
-            "sensors.i_out.noise",
-            "A",
-            "standard deviation",
-            (0.0, 1e5),
-            (1e-3, 0.2),
-            0.0
-        ),
-        number!(
-            sensors.v_in.noise,
-            "sensors.v_in.noise",
-            "V",
-            "standard deviation",
-            (0.0, 1e5),
-            (1e-3, 0.2),
-            0.0
-        ),
+    needs: Way::Batch,
+    parameters: of_each_sensor!(
+        noise,
+        ("V", "A"),
+        "standard deviation",
+        (0.0, 1e5),
+        (1e-3, 0.2),
+        0.0,
         Parameter {
             key: "sensors.seed",
             unit: "1",
@@ -53,9 +24,10 @@ pub const EFFECT: Effect = Effect {
             allowed: (0.0, u64::MAX as f64),
             typical: (0.0, 1e6),
             neutral: 0.0,
+            switches_on: false,
             field: Field::Whole(|p| p.sensors.seed, |p, value| p.sensors.seed = value),
-        },
-    ],
+        }
+    ),
 };
 
 /// Where the noise of all sensors stands in its stream: the words of a [`Xoshiro`], as a checkpoint stores them.

@@ -111,6 +111,18 @@ impl Parameter {
         }
     }
 
+    /// Whether it is a ratio, without a unit.
+    #[must_use]
+    pub fn is_pure(&self) -> bool {
+        self.unit == "1"
+    }
+
+    /// Whether it takes whole numbers only.
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        matches!(self.field, Field::Whole(..))
+    }
+
     /// The words of a choice, in order; nothing for a number.
     #[must_use]
     pub fn choices(&self) -> &'static [&'static str] {

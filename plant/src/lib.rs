@@ -40,6 +40,7 @@ pub use effects::{
     ShortPulse, Source, Switch,
 };
 pub use plant::{Plant, PlantState};
+pub use reader::REQUIRED;
 pub use settle::{Regulator, Settled};
 pub use signals::{Load, Sample, Signals};
 pub use toml_input::{Fault, Faults, Place};

@@ -46,6 +46,14 @@ fn read(document: &Document) -> Result<Parameters, Faults> {
     document.conclude(Some(reader.parameters), reader.faults)
 }
 
+/// Numbers that a plant file must give.
+pub const REQUIRED: [&str; 4] = [
+    "converter.v_in",
+    "converter.inductance",
+    "converter.capacitance",
+    "converter.f_sw",
+];
+
 struct Reader<'a> {
     parameters: Parameters,
     /// The value of each key that was read.
@@ -98,13 +106,7 @@ impl<'a> Reader<'a> {
     }
 
     fn required(&mut self, document: &Document) {
-        let required = [
-            "converter.v_in",
-            "converter.inductance",
-            "converter.capacitance",
-            "converter.f_sw",
-        ];
-        let missing = required.iter().filter(|key| !self.values.contains_key(*key));
+        let missing = REQUIRED.iter().filter(|key| !self.values.contains_key(*key));
         let missing = missing.filter_map(|key| catalogue::parameter(key));
         let faults = missing.map(|Parameter { key, meaning, unit, .. }| {
             let message = Message::new(format!("`{key}` is missing"))

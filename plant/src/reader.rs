@@ -7,7 +7,7 @@ use toml_input::{Document, Fault, Faults, Message, Table, Value};
 
 use crate::catalogue::{self, Field, Parameter};
 use crate::check;
-use crate::parameters::Parameters;
+use crate::effects::Parameters;
 
 impl Parameters {
     /// Reads the text of a `plant.toml`; `file` only names it in messages.
@@ -45,6 +45,14 @@ fn read(document: &Document) -> Result<Parameters, Faults> {
     }
     document.conclude(Some(reader.parameters), reader.faults)
 }
+
+/// Numbers that a plant file must give.
+pub const REQUIRED: [&str; 4] = [
+    "converter.v_in",
+    "converter.inductance",
+    "converter.capacitance",
+    "converter.f_sw",
+];
 
 struct Reader<'a> {
     parameters: Parameters,
@@ -98,13 +106,7 @@ impl<'a> Reader<'a> {
     }
 
     fn required(&mut self, document: &Document) {
-        let required = [
-            "converter.v_in",
-            "converter.inductance",
-            "converter.capacitance",
-            "converter.f_sw",
-        ];
-        let missing = required.iter().filter(|key| !self.values.contains_key(*key));
+        let missing = REQUIRED.iter().filter(|key| !self.values.contains_key(*key));
         let missing = missing.filter_map(|key| catalogue::parameter(key));
         let faults = missing.map(|Parameter { key, meaning, unit, .. }| {
             let message = Message::new(format!("`{key}` is missing"))

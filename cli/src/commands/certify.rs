@@ -8,7 +8,7 @@ use ::certify::{Certificate, Certifier, Domain, Effort, Memory, Slice};
 use interp::Controller;
 use ndarray::aview1;
 use policy::{Interval, NumericFormat, Policy};
-use verify::traces::Rng;
+use random::{Random, SplitMix};
 
 use crate::arguments::Certify;
 use crate::{Failure, Outcome, output};
@@ -29,7 +29,7 @@ pub fn run(options: &Certify) -> Result<Outcome, Failure> {
         Ok(q_values) => q_values.iter().map(|q| f64::from(*q)).collect(),
         Err(_) => Vec::new(),
     };
-    let mut rng = Rng::new(options.seed);
+    let mut rng = SplitMix::new(options.seed);
     let effort = Effort {
         boxes: options.boxes as usize,
         samples: options.samples as usize,

@@ -5,6 +5,7 @@ mod budget;
 mod certify;
 mod commands;
 mod drm;
+mod faults;
 mod files;
 mod interruption;
 mod simulate;

@@ -7,6 +7,7 @@ use codegen::output::{languages, with_cores};
 use codegen::{Output, manifest};
 use policy::Policy;
 use targets::TargetSpec;
+use toml_input::Message;
 use verify::Files;
 use verify::fmu::Archive;
 
@@ -37,14 +38,18 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
 
 /// The policy in the format asked for; refused if its network does not give the trainer's answers.
 fn load(options: &Compile) -> Result<Policy, Failure> {
-    let policy = super::load_as(&options.policy, options.format.map(Into::into))?;
+    let policy = super::load_as(&options.policy, options.format)?;
     match verify::golden_result(&policy)?.filter(|golden| !golden.passed()) {
         None => Ok(policy),
-        Some(golden) => Err(Failure(format!(
-            "the network does not give the trainer's golden answers; nothing was written\n   = found: {}\n   \
-             = hint: look at hidden_activation, the order of layers and features, transpose; `policyc verify` compares them too",
-            golden_text(&golden)
-        ))),
+        Some(golden) => Err(Message::new(
+            "the network does not give the trainer's golden answers; nothing was written",
+        )
+        .found(golden_text(&golden))
+        .hint(
+            "look at hidden_activation, the order of layers and features, transpose; `policyc verify` compares \
+                     them too",
+        )
+        .into()),
     }
 }
 

@@ -68,7 +68,7 @@ fn an_extra_bias_is_refused() {
         .replace("hidden_activation", "bias = false\nhidden_activation")
         .faults();
     assert_tensor(
-        &fault.list[0],
+        &fault.faults.list[0],
         FILE,
         "net.0.bias",
         &["although the contract says `bias = false`"],

@@ -61,8 +61,8 @@ fn mutate(bytes: &[u8], random: &mut Draws) -> Vec<u8> {
 
 fn survives(folder: &Folder) {
     if let Err(faults) = folder.load() {
-        assert!(!faults.list.is_empty());
-        for fault in &faults {
+        assert!(!faults.faults.list.is_empty());
+        for fault in &faults.faults {
             let text = fault.to_string();
             assert!(text.starts_with("error: "));
             assert!(text.chars().all(|c| c == '\n' || !c.is_control()), "{text:?}");

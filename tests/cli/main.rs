@@ -6,6 +6,7 @@ mod certify;
 mod commands;
 mod decisions;
 mod drm;
+mod faults;
 mod files;
 mod interruption;
 mod simulate;

@@ -13,6 +13,7 @@ use codegen::Output;
 use interp::{InputError, Real};
 use policy::{NumericFormat, Policy, Scalar};
 use targets::TargetSpec;
+use toml_input::{Fault, Faults, Message, messages};
 
 use crate::decisions::decisions;
 use crate::golden;
@@ -122,7 +123,7 @@ impl fmt::Display for VerifyError {
                 expected,
             } => write!(
                 f,
-                "unknown compiler `{found}` for target {target}: expected one of {}",
+                "target {target} has no compiler `{found}`, but {}",
                 expected.join(", ")
             ),
             Self::Codegen(error) => write!(f, "{error}"),
@@ -134,6 +135,21 @@ impl fmt::Display for VerifyError {
 }
 
 impl std::error::Error for VerifyError {}
+
+impl From<VerifyError> for Faults {
+    fn from(error: VerifyError) -> Self {
+        match error {
+            VerifyError::UnknownCompiler {
+                found,
+                target,
+                expected,
+            } => messages::unknown(&format!("compiler of {target}"), &found, &expected).into(),
+            VerifyError::Codegen(error) => error.into(),
+            VerifyError::Interpreter(_) | VerifyError::Constructs(_) => Message::new(error.to_string()).into(),
+            VerifyError::Io(path, error) => Fault::in_file(&path, Message::new(error.to_string())).into(),
+        }
+    }
+}
 
 /// A compiler that takes longer has failed; the largest policies take seconds.
 pub(crate) const COMPILER_TIMEOUT: Duration = Duration::from_secs(600);

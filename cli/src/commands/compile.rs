@@ -7,6 +7,7 @@ use codegen::output::{languages, with_cores};
 use codegen::{Output, manifest};
 use policy::Policy;
 use targets::TargetSpec;
+use toml_input::Message;
 use verify::Files;
 use verify::fmu::Archive;
 
@@ -37,22 +38,23 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
 
 /// The policy in the format asked for; refused if its network does not give the trainer's answers.
 fn load(options: &Compile) -> Result<Policy, Failure> {
-    let policy = super::load_as(&options.policy, options.format.map(Into::into))?;
+    let policy = super::load_as(&options.policy, options.format)?;
     if let Some(golden) = verify::golden_result(&policy)?.filter(|golden| !golden.passed()) {
-        return Err(Failure(format!(
-            "the network does not give the trainer's golden answers; nothing was written\n   = found: {}\n   \
-             = hint: {MISREAD}",
-            golden_text(&golden)
-        )));
+        let message = Message::new("the network does not give the trainer's golden answers; nothing was written");
+        return Err(message.found(golden_text(&golden)).hint(MISREAD).into());
     }
     match verify::decisions(&policy, options.golden_decisions).filter(|decisions| !decisions.kept()) {
         None => Ok(policy),
-        Some(decisions) => Err(Failure(format!(
-            "the numeric format changes more of the trainer's decisions than allowed; nothing was written\n   = found: {}\n   \
-             = hint: see what they cost with `policyc certify` and `policyc simulate`; to accept them, --golden-decisions {}",
-            decisions_lines(&policy, &decisions).join("\n            "),
-            accepted(decisions.share())
-        ))),
+        Some(decisions) => {
+            let problem =
+                "the numeric format changes more of the trainer's decisions than allowed; nothing was written";
+            let hint = format!(
+                "see what they cost with `policyc certify` and `policyc simulate`; to accept them, --golden-decisions {}",
+                accepted(decisions.share())
+            );
+            let found = decisions_lines(&policy, &decisions).join("\n");
+            Err(Message::new(problem).found(found).hint(hint).into())
+        }
     }
 }
 

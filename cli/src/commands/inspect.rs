@@ -12,7 +12,7 @@ use crate::{Failure, Outcome, output};
 
 /// Prints the checked policy.
 pub fn run(options: &Inspect) -> Result<Outcome, Failure> {
-    let policy = super::load_as(&options.policy, options.format.map(Into::into))?;
+    let policy = super::load_as(&options.policy, options.format)?;
     if options.json {
         output::say(&serde_json::to_string_pretty(&view(&policy)?)?)?;
     } else {

@@ -2,7 +2,7 @@
 
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
-use toml_input::{Fault, Message};
+use toml_input::{Message, Sink};
 
 use super::{catalogue, header, tensors};
 use crate::model::{Feature, Golden};
@@ -24,16 +24,16 @@ pub(crate) fn read(
     bounds: &[Feature],
     actions: usize,
     limits: Limits,
-    faults: &mut Vec<Fault>,
+    faults: &mut Sink,
 ) -> Option<Golden> {
     let opened = header::open(file, faults)?;
-    let before = faults.len();
+    let before = faults.count();
     for (name, view) in opened.iter() {
         if let Err(message) = tensors::sound(name, view.shape()) {
             faults.push(file.name.tensor_fault(name, message));
         }
     }
-    if faults.len() > before {
+    if faults.count() > before {
         return None;
     }
     let view = |name: &str| opened.iter().find(|(found, _)| *found == name).map(|(_, view)| view);
@@ -74,7 +74,7 @@ pub(crate) fn read(
         tolerance: limits.tolerance,
         decisions: limits.decisions,
     };
-    (faults.len() == before).then_some(golden)
+    (faults.count() == before).then_some(golden)
 }
 
 fn names(tensors: &SafeTensors<'_>) -> String {
@@ -83,7 +83,7 @@ fn names(tensors: &SafeTensors<'_>) -> String {
     names.join(", ")
 }
 
-fn part<T>(file: &Binary, tensor: &str, faults: &mut Vec<Fault>, result: Result<T, Message>) -> Option<T> {
+fn part<T>(file: &Binary, tensor: &str, faults: &mut Sink, result: Result<T, Message>) -> Option<T> {
     result
         .map_err(|message| faults.push(file.name.tensor_fault(tensor, message)))
         .ok()

@@ -208,8 +208,8 @@ impl Folder {
     /// The one fault; more than one would be noise.
     pub fn fault(&self) -> Fault {
         let faults = self.faults();
-        assert_eq!(faults.list.len(), 1, "{faults}");
-        faults.list[0].clone()
+        assert_eq!(faults.faults.list.len(), 1, "{faults}");
+        faults.faults.list[0].clone()
     }
 }
 

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use policy::Policy;
+use toml_input::Message;
 use verify::drift::Drift;
 use verify::toolchain::{Install, Missing};
 use verify::{BuildReport, Decisions, Difference, GoldenResult, Outcome, Report};
@@ -186,28 +187,26 @@ pub fn missing_text(missing: &Missing) -> String {
 }
 
 /// Why no build was compared, and what to type.
-pub fn nothing_compared(report: &Report) -> Result<String, Failure> {
-    let mut out = format!("nothing could be compared for target {}\n", report.target);
-    for build in report.skipped() {
-        writeln!(out, "   = {}: {}", build.build, verdict(build).1)?;
-    }
-    let install = report.to_install();
-    let packages: Vec<&str> = install
-        .iter()
-        .filter_map(|install| match install {
-            Install::Package(package) => Some(package.as_str()),
-            Install::RustTarget(_) => None,
-        })
+pub fn nothing_compared(report: &Report) -> Message {
+    let builds: Vec<String> = report
+        .skipped()
+        .map(|build| format!("{}: {}", build.build, verdict(build).1))
         .collect();
-    if !packages.is_empty() {
-        writeln!(out, "   = hint: sudo apt-get install {}", packages.join(" "))?;
-    }
-    for install in install {
-        if let Install::RustTarget(triple) = install {
-            writeln!(out, "   = hint: rustup target add {triple}")?;
-        }
-    }
-    Ok(out)
+    let install = report.to_install();
+    let package = |install: &&Install| match install {
+        Install::Package(package) => Some(package.clone()),
+        Install::RustTarget(_) => None,
+    };
+    let triple = |install: &&Install| match install {
+        Install::Package(_) => None,
+        Install::RustTarget(triple) => Some(format!("rustup target add {triple}")),
+    };
+    let packages: Vec<String> = install.iter().filter_map(package).collect();
+    let apt = (!packages.is_empty()).then(|| format!("sudo apt-get install {}", packages.join(" ")));
+    let commands: Vec<String> = apt.into_iter().chain(install.iter().filter_map(triple)).collect();
+    Message::new(format!("nothing could be compared for target {}", report.target))
+        .found(builds.join("; "))
+        .maybe_hint((!commands.is_empty()).then(|| commands.join("; ")))
 }
 
 fn write_difference(out: &mut String, build: &str, difference: &Difference) -> Result<(), Failure> {

@@ -7,6 +7,7 @@ use drm::formula::Losses;
 use drm::{Conduction, DutyRatioMap, FitOptions, Table, TableOptions};
 use plant::{Load, Parameters, Signals};
 use policy::{Action, Interval, Policy};
+use toml_input::Message;
 
 use crate::environment::{Environment, LoadPath, Start};
 use crate::faults::Error;
@@ -40,7 +41,7 @@ impl<E: Environment> Bench for AtEnvironment<E> {
         let sample = self.0.step(duty, &LoadPath::constant(*load));
         match sample.v_out.is_finite() {
             true => Ok(sample.measured),
-            false => Err(Error::Mismatch("the simulation of the converter failed".to_owned())),
+            false => Err(Message::new("the simulation of the converter failed").into()),
         }
     }
 }

@@ -135,7 +135,7 @@ impl Refit<'_> {
             conduction: Conduction::of(self.nominal),
             ..FitOptions::default()
         };
-        Ok(drm::fit(&table, &options)?)
+        drm::fit(&table, &options)
     }
 
     /// The policy with another mapping, read from the text of a drm.toml as any other.

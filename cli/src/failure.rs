@@ -80,9 +80,7 @@ of_faults!(
     Faults,
     Message,
     policy::Faults,
-    closed_loop::Error,
     codegen::CodegenError,
-    train::Error,
     verify::VerifyError,
 );
 

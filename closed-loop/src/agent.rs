@@ -4,6 +4,7 @@
 use interp::{Command, Controller, Real, Sample, State, Trace};
 use plant::Signals;
 use policy::{Policy, Scalar};
+use toml_input::Message;
 
 use crate::faults::Error;
 
@@ -41,17 +42,17 @@ impl Inputs {
     /// # Errors
     /// If the contract measures something that the plant does not have.
     pub fn new(policy: &Policy) -> Result<Self, Error> {
-        let input = |signal: &policy::Signal| match SIGNALS.iter().position(|name| *name == signal.name) {
-            Some(index) => Ok(Input {
-                signal: index,
-                adc: signal.adc,
-            }),
-            None => {
-                let known = SIGNALS.join(", ");
-                let name = &signal.name;
-                Err(Error::Mismatch(format!(
-                    "the plant has no signal `{name}`\n  = expected: {known}"
-                )))
+        let input = |signal: &policy::Signal| -> Result<Input, Error> {
+            match SIGNALS.iter().position(|name| *name == signal.name) {
+                Some(index) => Ok(Input {
+                    signal: index,
+                    adc: signal.adc,
+                }),
+                None => {
+                    let message = Message::new(format!("the plant has no signal `{}`", signal.name));
+                    let message = message.expected(format!("one of {}", SIGNALS.join(", ")));
+                    Err(message.did_you_mean(&signal.name, SIGNALS).into())
+                }
             }
         };
         let inputs = policy.signals.iter().map(input).collect::<Result<Vec<_>, _>>()?;

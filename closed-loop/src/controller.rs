@@ -3,6 +3,7 @@
 use interp::{Real, Sample as Word};
 use plant::{Sample, Signals};
 use policy::{Policy, Scalar};
+use toml_input::Message;
 
 use crate::agent::{Agent, Inputs};
 use crate::baselines::Baseline;
@@ -111,8 +112,8 @@ pub struct External<F> {
     ask: F,
 }
 
-impl<F: FnMut(Call<'_>) -> Result<Option<Answer>, String>> External<F> {
-    /// `ask` passes on calls; it fails with a text for the user.
+impl<F: FnMut(Call<'_>) -> Result<Option<Answer>, Error>> External<F> {
+    /// `ask` passes on calls.
     ///
     /// # Errors
     /// If the contract measures something that the plant does not have.
@@ -124,15 +125,15 @@ impl<F: FnMut(Call<'_>) -> Result<Option<Answer>, String>> External<F> {
     }
 }
 
-impl<F: FnMut(Call<'_>) -> Result<Option<Answer>, String>> Controller for External<F> {
+impl<F: FnMut(Call<'_>) -> Result<Option<Answer>, Error>> Controller for External<F> {
     fn restart(&mut self) -> Result<(), Error> {
-        (self.ask)(Call::Restart).map(|_| ()).map_err(Error::Mismatch)
+        (self.ask)(Call::Restart).map(|_| ())
     }
 
     fn step(&mut self, measured: &Signals) -> Result<Answer, Error> {
         let samples = self.inputs.samples(measured);
-        let answer = (self.ask)(Call::Step(samples)).map_err(Error::Mismatch)?;
-        answer.ok_or_else(|| Error::Mismatch("a control step was not answered".to_owned()))
+        let answer = (self.ask)(Call::Step(samples))?;
+        answer.ok_or_else(|| Message::new("a control step was not answered").into())
     }
 }
 

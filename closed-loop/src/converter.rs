@@ -1,12 +1,12 @@
 //! The plant as an environment: parameters by key, load changes anywhere in a period.
 
-use std::path::Path;
-
 use plant::{Parameters, Plant, PlantState, Sample};
 use sha2::{Digest, Sha256};
+use toml_input::{FileName, Message};
 
 use crate::environment::{Environment, LoadPath, Start, varied};
 use crate::faults::Error;
+use crate::read::no_number;
 
 /// A load that changes at a sampling instant changes this much of a period before it, so that the sample shows it.
 const JUST_BEFORE: f64 = 1e-9;
@@ -34,10 +34,10 @@ impl Converter {
     ///
     /// # Errors
     /// If the file cannot be read, or is not a converter, or a key is not one of its numbers.
-    pub fn load(path: &Path, set: &[(String, f64)]) -> Result<Self, Error> {
-        let mut parameters = Parameters::from_file(path)?;
+    pub fn load(file: impl Into<FileName>, set: &[(String, f64)]) -> Result<Self, Error> {
+        let mut parameters = Parameters::from_file(file)?;
         for (key, value) in set {
-            let missing = || Error::Mismatch(format!("the plant has no number `{key}`"));
+            let missing = || no_number(key);
             let parameter = plant::parameter(key).ok_or_else(missing)?;
             parameter.set(&mut parameters, *value);
         }
@@ -83,12 +83,12 @@ impl Environment for Converter {
 
     fn save(&self) -> Result<Vec<u8>, Error> {
         let whole = (self.plant.parameters(), self.plant.state());
-        serde_json::to_vec(&whole).map_err(|error| Error::Saved(format!("cannot write the plant down: {error}")))
+        serde_json::to_vec(&whole).map_err(|error| Message::new(format!("cannot write the plant down: {error}")).into())
     }
 
     fn load(&mut self, bytes: &[u8]) -> Result<(), Error> {
         let (parameters, state): (Parameters, PlantState) = serde_json::from_slice(bytes)
-            .map_err(|error| Error::Saved(format!("the plant in it is of another version: {error}")))?;
+            .map_err(|error| Message::new("the plant in it is of another version").found(error.to_string()))?;
         self.plant = Plant::new(&parameters)?;
         self.plant.restore(&state);
         Ok(())

@@ -10,6 +10,7 @@
 
 use plant::{Load, Model, Parameters, Plant, Sample};
 use serde::Serialize;
+use toml_input::Message;
 
 use crate::faults::Error;
 use crate::load_step::LoadStep;
@@ -87,9 +88,9 @@ impl Question {
                 return Ok((plant, settled.duty));
             }
             let [low, high] = range;
-            Err(Error::Mismatch(format!(
-                "there is no limit for {step}: the plant does not rest at {v_ref} V with a duty within {low}..{high}"
-            )))
+            let message = Message::new(format!("there is no limit for {step}"));
+            let found = format!("the plant does not rest at {v_ref} V with a duty within {low}..{high}");
+            Err(message.found(found).into())
         };
         let (resting, duty) = rest(&from)?;
         let (after, _) = rest(&to)?;

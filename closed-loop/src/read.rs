@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use toml_input::{Message, Sink, Table, Value, messages, nearest};
+use toml_input::{Message, Sink, Table, Value, messages};
 
 use crate::scenario::Task;
 
@@ -52,11 +52,14 @@ pub fn plant_numbers(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<(String
 /// A fault at `value` if the plant has no number `key`.
 pub fn known_parameter(key: &str, value: &Value<'_>, faults: &mut Sink) {
     if plant::parameter(key).is_none() {
-        let message = Message::new(format!("the plant has no number `{}`", key.escape_debug()));
-        let hint = match nearest(key, plant::parameters().map(|parameter| parameter.key)) {
-            Some(near) => format!("did you mean `{near}`?"),
-            None => "write it as in the plant's file, `table.key`: \"switch.v_f\"".to_owned(),
-        };
-        faults.push(value.fault(message.hint(hint)));
+        faults.push(value.fault(no_number(key)));
     }
+}
+
+/// The plant has no number `key`.
+#[must_use]
+pub fn no_number(key: &str) -> Message {
+    Message::new(format!("the plant has no number `{}`", key.escape_debug()))
+        .hint("write it as in the plant's file, `table.key`: \"switch.v_f\"")
+        .did_you_mean(key, plant::parameters().map(|parameter| parameter.key))
 }

@@ -7,6 +7,7 @@ use drm::formula::Losses;
 use drm::{Conduction, DutyRatioMap, FitOptions, Table, TableOptions};
 use plant::{Load, Parameters, Signals};
 use policy::{Action, Interval, Policy};
+use toml_input::Message;
 
 use crate::environment::{Environment, LoadPath, Start};
 use crate::faults::Error;
@@ -40,7 +41,7 @@ impl<E: Environment> Bench for AtEnvironment<E> {
         let sample = self.0.step(duty, &LoadPath::constant(*load));
         match sample.v_out.is_finite() {
             true => Ok(sample.measured),
-            false => Err(Error::Mismatch("the simulation of the converter failed".to_owned())),
+            false => Err(Message::new("the simulation of the converter failed").into()),
         }
     }
 }
@@ -134,7 +135,7 @@ impl Refit<'_> {
             conduction: Conduction::of(self.nominal),
             ..FitOptions::default()
         };
-        Ok(drm::fit(&table, &options)?)
+        drm::fit(&table, &options)
     }
 
     /// The policy with another mapping, read from the text of a drm.toml as any other.

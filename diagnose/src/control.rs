@@ -11,6 +11,7 @@ use drm::formula::Losses;
 use plant::Parameters;
 use policy::{Coefficients, Policy};
 use serde::Serialize;
+use toml_input::Message;
 
 use crate::record::Record;
 
@@ -202,7 +203,7 @@ fn acquire(refit: &Refit<'_>, extended: &Parameters) -> Result<String, Error> {
         }
         refit.measure(&mut bench, entry)?;
     }
-    plan.to_csv().map_err(|error| Error::Mismatch(error.to_string()))
+    plan.to_csv().map_err(|error| Message::new(error.to_string()).into())
 }
 
 /// Largest difference of the duties of two mappings over the valid range of the second: at a corner, for both are linear

@@ -1,6 +1,7 @@
 //! Measurements in, sanitised signals out (contract section 2).
 
 use std::fmt;
+use toml_input::{Faults, Message};
 
 use crate::real::{Range, Real};
 
@@ -62,6 +63,12 @@ impl fmt::Display for InputError {
 }
 
 impl std::error::Error for InputError {}
+
+impl From<InputError> for Faults {
+    fn from(error: InputError) -> Self {
+        Message::new(error.to_string()).into()
+    }
+}
 
 /// A signal with its constants rounded to the format.
 #[derive(Debug, Clone)]

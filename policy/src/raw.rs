@@ -2,7 +2,7 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use toml_input::{Document, Fault, FileName, Message, Sink, Source, Value};
+use toml_input::{Document, Fault, FileName, Message, Origin, Sink, Source, Value};
 
 use crate::catalogue;
 use crate::faults::Faults;
@@ -137,7 +137,11 @@ fn locate(path: &Path, options: &ReadOptions) -> Result<FileName, Message> {
         return Ok(FileName::new(path));
     };
     let shown = path.strip_prefix(root).unwrap_or(path).display().to_string();
-    inside(root, &FileName::new(&root.join(path))).ok_or_else(|| catalogue::outside_root(&shown))
+    let name = FileName {
+        origin: Origin::Crate,
+        ..FileName::new(&root.join(path))
+    };
+    inside(root, &name).ok_or_else(|| catalogue::outside_root(&shown))
 }
 
 /// A file named in `owner`, relative to its folder.

@@ -48,7 +48,7 @@ fn every_placeholder_of_a_new_contract_is_a_fault_by_name() {
         .filter(|line| !line.starts_with('#'))
         .map(|line| line.matches("\"TODO\"").count());
     assert_eq!(faults.faults.list.len(), todo.sum::<usize>(), "{faults}");
-    for fault in &faults {
+    for fault in &faults.faults {
         assert_says(fault, &["still says TODO: fill in"]);
         assert!(fault.line_column().is_some());
     }
@@ -99,7 +99,7 @@ fn a_new_contract_needs_a_sound_file() {
     let faults = scaffold(&folder.path().join("none.safetensors")).unwrap_err();
     assert_says(&faults.faults.list[0], &["cannot find the file"]);
     let text = scaffold(&folder.path().join("policy.toml")).unwrap_err();
-    assert_says(&text.list[0], &["not a sound safetensors file"]);
+    assert_says(&text.faults.list[0], &["not a sound safetensors file"]);
 }
 
 #[test]

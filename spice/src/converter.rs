@@ -3,6 +3,7 @@
 use closed_loop::environment::{Environment, LoadPath, Start};
 use closed_loop::{Error, environment};
 use plant::{Load, Model, Parameters, Rectifier, Sample, Sensor, ShortPulse, Signals};
+use toml_input::Message;
 
 use crate::circuit::{Circuit, SOURCES, drawn, netlist};
 use crate::gates::{Modulator, pulse};
@@ -96,20 +97,17 @@ impl SpiceConverter {
     /// If an effect is on that the circuit for ngspice does not have, or the converter is an averaged one.
     pub fn new(parameters: &Parameters) -> Result<Self, Error> {
         if let Some(effect) = unknown(parameters).first() {
-            let text = format!(
-                "the circuit for ngspice has no `{effect}`; it has {}",
-                KNOWN[1..].join(", ")
-            );
-            return Err(Error::Mismatch(text));
+            let message = Message::new(format!("the circuit for ngspice has no `{effect}`"));
+            return Err(message.expected(format!("one of {}", KNOWN[1..].join(", "))).into());
         }
         if parameters.converter.model == Model::Averaged {
-            let text = "ngspice computes switching intervals: `converter.model` is \"averaged\"";
-            return Err(Error::Mismatch(text.to_owned()));
+            let message = Message::new("ngspice computes switching intervals");
+            return Err(message.found("`converter.model` is \"averaged\"").into());
         }
         let pwm = &parameters.pwm;
         if pwm.min_on_time > 0.0 && pwm.short_pulse == ShortPulse::Extend {
-            let text = "the modulator for ngspice drops short pulses: `pwm.short_pulse` is \"extend\"";
-            return Err(Error::Mismatch(text.to_owned()));
+            let message = Message::new("the modulator for ngspice drops short pulses");
+            return Err(message.found("`pwm.short_pulse` is \"extend\"").into());
         }
         Ok(Self {
             nominal: parameters.clone(),
@@ -165,7 +163,7 @@ impl SpiceConverter {
     /// The running host, after whatever a copy has to repeat.
     fn host(&mut self) -> Result<(&mut Host, Option<Row>), Error> {
         let Some(begin) = &self.start else {
-            return Err(Error::Mismatch("the converter has not been started".to_owned()));
+            return Err(Message::new("the converter has not been started").into());
         };
         let mut row = None;
         if self.host.is_none() {
@@ -178,13 +176,13 @@ impl SpiceConverter {
         }
         match &mut self.host {
             Some(host) => Ok((host, row)),
-            None => Err(Error::Mismatch("ngspice has not been started".to_owned())),
+            None => Err(Message::new("ngspice has not been started").into()),
         }
     }
 
     fn period(&mut self, duty: f64, load: &LoadPath) -> Result<Sample, Error> {
         let Some(begin) = &self.start else {
-            return Err(Error::Mismatch("the converter has not been started".to_owned()));
+            return Err(Message::new("the converter has not been started").into());
         };
         let p = &begin.parameters;
         let mut edges = std::mem::take(&mut self.leftover);
@@ -264,7 +262,7 @@ impl Environment for SpiceConverter {
         self.start = Some(self.begin(parameters, start));
         let (_, row) = self.host()?;
         row.map(|row| self.sample(&row))
-            .ok_or_else(|| Error::Mismatch("ngspice did not start".to_owned()))
+            .ok_or_else(|| Message::new("ngspice did not start").into())
     }
 
     /// Where ngspice fails the sample is not a number: a diverged run.
@@ -276,10 +274,10 @@ impl Environment for SpiceConverter {
     }
 
     fn save(&self) -> Result<Vec<u8>, Error> {
-        Err(Error::Saved("a run in ngspice cannot be saved".to_owned()))
+        Err(Message::new("a run in ngspice cannot be saved").into())
     }
 
     fn load(&mut self, _: &[u8]) -> Result<(), Error> {
-        Err(Error::Saved("a run in ngspice cannot be saved".to_owned()))
+        Err(Message::new("a run in ngspice cannot be saved").into())
     }
 }

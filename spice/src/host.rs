@@ -5,6 +5,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::OnceLock;
+use toml_input::Message;
 
 use closed_loop::Error;
 use tempfile::TempDir;
@@ -87,7 +88,7 @@ impl Host {
             .stderr(Stdio::inherit());
         let mut child = command.spawn().map_err(|error| failed("start ngspice", &error))?;
         let (Some(input), Some(output)) = (child.stdin.take(), child.stdout.take()) else {
-            return Err(Error::Mismatch("ngspice has no pipes".to_owned()));
+            return Err(Message::new("ngspice has no pipes").into());
         };
         let mut host = Self {
             child,
@@ -135,7 +136,7 @@ impl Host {
                 extremes: [a, b, c, d],
                 others: others.to_vec(),
             }),
-            _ => Err(Error::Mismatch("ngspice ended early; its words are above".to_owned())),
+            _ => Err(Message::new("ngspice ended early; its words are above").into()),
         }
     }
 }
@@ -149,32 +150,36 @@ impl Drop for Host {
 }
 
 fn failed(what: &str, error: &std::io::Error) -> Error {
-    Error::Mismatch(format!("cannot {what}: {error}"))
+    Message::new(format!("cannot {what}")).found(error.to_string()).into()
 }
 
 /// The built host program.
 fn program() -> Result<&'static Path, Error> {
-    static PROGRAM: OnceLock<Result<(TempDir, PathBuf), String>> = OnceLock::new();
+    static PROGRAM: OnceLock<Result<(TempDir, PathBuf), Error>> = OnceLock::new();
     match PROGRAM.get_or_init(build) {
         Ok((_, path)) => Ok(path),
-        Err(text) => Err(Error::Mismatch(text.clone())),
+        Err(error) => Err(error.clone()),
     }
 }
 
-fn build() -> Result<(TempDir, PathBuf), String> {
-    let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
+fn build() -> Result<(TempDir, PathBuf), Error> {
+    let folder = tempfile::tempdir().map_err(|error| failed("make a temporary folder", &error))?;
     let (source, program) = (folder.path().join("host.c"), folder.path().join("host"));
-    std::fs::write(&source, SOURCE).map_err(|error| error.to_string())?;
+    std::fs::write(&source, SOURCE).map_err(|error| failed("write the host program", &error))?;
     let mut command = Command::new("gcc");
     command
         .args(["-std=c99", "-O2", "-o"])
         .arg(&program)
         .arg(&source)
         .arg("-lngspice");
-    let output = command.output().map_err(|error| format!("gcc: {error}\n{INSTALL}"))?;
+    let missing = |found: String| {
+        Message::new("the host of ngspice cannot be built")
+            .found(found)
+            .hint(INSTALL)
+    };
+    let output = command.output().map_err(|error| missing(format!("gcc: {error}")))?;
     if !output.status.success() {
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        return Err(format!("{INSTALL}\n\n{said}"));
+        return Err(missing(String::from_utf8_lossy(&output.stderr).into_owned()).into());
     }
     Ok((folder, program))
 }

@@ -99,7 +99,8 @@ fn a_copy_goes_on_from_the_same_state() {
 
 #[test]
 fn what_ngspice_does_not_do_is_said() {
-    let refused: [(&str, fn(&mut Parameters)); 5] = [
+    type Change = fn(&mut Parameters);
+    let refused: [(&str, Change); 5] = [
         ("sensor_delay", |p| p.sensors.i_l.delay = 1e-6),
         ("sensor_low_pass", |p| p.sensors.v_out.low_pass = 1e-6),
         ("sensor_noise", |p| p.sensors.v_in.noise = 0.1),

@@ -100,7 +100,10 @@ fn the_plant_as_importing_program_sees_the_duties_of_the_interpreter() {
             let mut running = unit.run();
             let ask = |call: Call<'_>| match call {
                 Call::Restart => Ok(None),
-                Call::Step(samples) => running.step(samples).map(Some),
+                Call::Step(samples) => {
+                    let answer = running.step(samples).map(Some);
+                    answer.map_err(|text| toml_input::Message::new(text).into())
+                }
             };
             let found = closed_loop(&policy, &mut External::new(&policy, ask).unwrap(), periods);
             assert_eq!(lines(&found), lines(&expected), "{} {output:?}", policy.name);

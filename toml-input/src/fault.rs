@@ -212,8 +212,8 @@ pub(crate) fn in_file_order(faults: &mut Vec<Fault>) {
 
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "error: {}", printable(&self.problem))?;
-        let file = printable(&self.file.display().to_string());
+        writeln!(f, "error: {}", printable(&self.problem, "       "))?;
+        let file = printable(&self.file.display().to_string(), "");
         let mut margin = String::from("  ");
         match &self.place {
             Place::Nowhere => {}
@@ -240,7 +240,8 @@ impl fmt::Display for Fault {
             ("hint", &self.hint),
         ] {
             if let Some(text) = text {
-                writeln!(f, "{margin}= {label}: {}", printable(text))?;
+                let indent = " ".repeat(margin.len() + label.len() + 4);
+                writeln!(f, "{margin}= {label}: {}", printable(text.trim_end(), &indent))?;
             }
         }
         Ok(())
@@ -260,8 +261,13 @@ fn window(text: &str, column: usize) -> (String, usize) {
     (part.collect(), column - skip)
 }
 
-fn printable(text: &str) -> String {
-    text.chars()
-        .map(|c| if c.is_control() { '\u{fffd}' } else { c })
-        .collect()
+/// `text` without control characters; lines behind the first, such as a compiler's, begin with `indent`.
+fn printable(text: &str, indent: &str) -> String {
+    let visible = |line: &str| -> String {
+        line.chars()
+            .map(|c| if c.is_control() { '\u{fffd}' } else { c })
+            .collect()
+    };
+    let lines: Vec<String> = text.lines().map(visible).collect();
+    lines.join(&format!("\n{indent}"))
 }

@@ -12,8 +12,10 @@ pub type Span = Range<usize>;
 /// Who named a file: what its path is relative to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {
-    /// A person or a program: the working folder.
+    /// A person at the command line or a program: the working folder.
     Caller,
+    /// A macro or a build script: the folder of `Cargo.toml`.
+    Crate,
     /// Another file: that file's folder.
     File,
 }
@@ -21,7 +23,8 @@ pub enum Origin {
 impl Origin {
     pub(crate) fn relative_to(self) -> &'static str {
         match self {
-            Origin::Caller => "a path on the command line is relative to the working folder",
+            Origin::Caller => "the path is relative to the working folder",
+            Origin::Crate => "the path is relative to the folder of Cargo.toml",
             Origin::File => "paths are relative to the folder of the file that names them",
         }
     }

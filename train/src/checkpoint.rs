@@ -1,6 +1,7 @@
 //! The bytes of a checkpoint: a version, values in a fixed order, a SHA-256 over all of it.
 
 use sha2::{Digest, Sha256};
+use toml_input::Message;
 
 use crate::faults::Error;
 
@@ -61,11 +62,13 @@ pub(crate) struct Reader<'a> {
 impl<'a> Reader<'a> {
     pub fn new(bytes: &'a [u8]) -> Result<Self, Error> {
         let Some(rest) = bytes.strip_prefix(&MAGIC[..]) else {
-            let text = match bytes.starts_with(&MAGIC[..14]) {
-                true => "it is of another version\n  = expected: version 1\n  = hint: start the training anew",
-                false => "this is not a checkpoint of policyc",
-            };
-            return Err(Error::Checkpoint(text.to_owned()));
+            return Err(match bytes.starts_with(&MAGIC[..14]) {
+                true => Message::new("checkpoint: it is of another version")
+                    .expected("version 1")
+                    .hint("start the training anew"),
+                false => Message::new("checkpoint: this is not one of policyc"),
+            }
+            .into());
         };
         let Some(end) = rest.len().checked_sub(DIGEST) else {
             return Err(damaged());
@@ -124,14 +127,15 @@ impl<'a> Reader<'a> {
 }
 
 fn damaged() -> Error {
-    Error::Checkpoint("it is damaged: its digest does not fit its content".to_owned())
+    Message::new("checkpoint: it is damaged: its digest does not fit its content").into()
 }
 
 /// The checkpoint is sound but not of this training.
 pub(crate) fn other() -> Error {
-    let text = "it is of another training\n  = expected: one of this training file, contract and plant\n  \
-        = hint: files that were edited since need a new training";
-    Error::Checkpoint(text.to_owned())
+    Message::new("checkpoint: it is of another training")
+        .expected("one of this training file, contract and plant")
+        .hint("files that were edited since need a new training")
+        .into()
 }
 
 #[cfg(test)]

@@ -10,8 +10,9 @@ use safetensors::tensor::{TensorView, serialize};
 use sha2::{Digest, Sha256};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+use toml_input::Message;
 
-use crate::faults::Error;
+use crate::faults::{Error, of_file};
 use crate::network::Network;
 
 /// Files by name, as data; only the command line writes them.
@@ -58,12 +59,7 @@ impl Contract {
     /// # Errors
     /// If the file cannot be read or is not a sound contract.
     pub fn load(path: &Path, hidden: &[usize]) -> Result<Self, Error> {
-        let read = |path: &Path| {
-            std::fs::read(path).map_err(|error| Error::File {
-                path: path.to_owned(),
-                error,
-            })
-        };
+        let read = |path: &Path| std::fs::read(path).map_err(|error| of_file(path, &error));
         let text = String::from_utf8_lossy(&read(path)?).into_owned();
         let sketch = sketch(&text);
         let mut beside = Files::new();
@@ -149,8 +145,8 @@ fn plain(name: &str) -> Result<String, Error> {
     if Path::new(name).file_name().is_some_and(|file| file == name) {
         return Ok(name.to_owned());
     }
-    let text = format!("the contract names the file `{name}`\n  = expected: a file in the policy's own folder");
-    Err(Error::Mismatch(text))
+    let message = Message::new(format!("the contract names the file `{name}`"));
+    Err(message.expected("a file in the policy's own folder").into())
 }
 
 /// Faults of the contract are left to [`policy::load`]: what cannot be read here counts as absent.
@@ -267,8 +263,11 @@ fn bytes(values: &[f32]) -> Vec<u8> {
 }
 
 fn safetensors_file(tensors: &[(String, Vec<usize>, Dtype, Vec<u8>)]) -> Result<Vec<u8>, Error> {
-    let error =
-        |error: safetensors::SafeTensorError| Error::Mismatch(format!("cannot make a safetensors file: {error}"));
+    let error = |error: safetensors::SafeTensorError| -> Error {
+        Message::new("cannot make a safetensors file")
+            .found(error.to_string())
+            .into()
+    };
     let mut views = Vec::new();
     for (name, shape, dtype, data) in tensors {
         views.push((
@@ -283,7 +282,7 @@ fn safetensors_file(tensors: &[(String, Vec<usize>, Dtype, Vec<u8>)]) -> Result<
 fn check(files: &Files, path: &Path) -> Result<Policy, Error> {
     let fail = |path: &Path| {
         let path = path.to_owned();
-        move |error| Error::File { path, error }
+        move |error| of_file(&path, &error)
     };
     let folder = tempfile::tempdir().map_err(fail(&std::env::temp_dir()))?;
     for (name, bytes) in files {
@@ -300,7 +299,7 @@ fn check(files: &Files, path: &Path) -> Result<Policy, Error> {
         .map_err(|mut faults| {
             let rename = |fault: &mut Fault| fault.file = named(&fault.file);
             faults.faults.list.iter_mut().for_each(rename);
-            Error::Policy(faults)
+            faults.into()
         })
         .map(|mut policy| {
             policy.files = policy.files.iter().map(|file| named(file)).collect();

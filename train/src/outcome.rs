@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use plant::Sample;
+use toml_input::Message;
 
 use crate::contract::{Files, GoldenVectors};
 use crate::faults::Error;
@@ -48,8 +49,10 @@ impl<E: Environment> Trainer<E> {
     /// If there has been no look yet, the plant cannot be started or the policy does not pass its own check.
     pub fn finish(&self, ended: Ended) -> Result<Outcome, Error> {
         let Some(best) = self.best() else {
-            let text = "no policy has been judged yet\n  = hint: train at least `every` control periods of [selection]";
-            return Err(Error::Mismatch(text.to_owned()));
+            let message = Message::new("no policy has been judged yet");
+            return Err(message
+                .hint("train at least `every` control periods of [selection]")
+                .into());
         };
         let task = &self.settings.evaluation;
         let findings = self.survey(&best.network, task, &task.all_instants())?;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread;
+use toml_input::Message;
 
 use crate::checkpoint::other;
 use crate::contract::Contract;
@@ -95,7 +96,7 @@ pub fn train_all<E: Environment + Sync>(
             scope.spawn(work);
         }
     });
-    let missing = || Err(Error::Mismatch("a training thread ended without a result".to_owned()));
+    let missing = || Err(Message::new("a training thread ended without a result").into());
     let result = |slot: Mutex<Option<_>>| slot.into_inner().ok().flatten().unwrap_or_else(missing);
     results.into_iter().map(result).collect()
 }

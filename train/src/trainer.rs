@@ -5,6 +5,7 @@ use std::time::Instant as Clock;
 
 use plant::{Load, Sample};
 use random::{Random, Xoshiro};
+use toml_input::{Fault, Message};
 
 use crate::contract::Contract;
 use crate::faults::Error;
@@ -386,7 +387,7 @@ impl<E: Environment> Trainer<E> {
     pub fn survey(&self, network: &Network, task: &Task, instants: &[Instant]) -> Result<Vec<Finding>, Error> {
         let controller = controller(&self.contract, network)?;
         let v_ref = self.settings.reward.v_ref;
-        Ok(survey_all(&self.nominal, &controller, v_ref, task, instants)?)
+        survey_all(&self.nominal, &controller, v_ref, task, instants)
     }
 }
 
@@ -431,11 +432,10 @@ fn draw_load(loads: &Loads, rng: &mut Xoshiro) -> f64 {
 fn check_fit<E: Environment>(settings: &Settings, contract: &Contract, environment: &E) -> Result<(), Error> {
     let (policy, plant) = (contract.policy.sample_period, environment.t_sample());
     if (policy / plant - 1.0).abs() > 1e-9 {
-        let text = format!(
-            "contract and plant have different control periods\n  = found: sample_period = {policy} s in the contract, \
-             {plant} s at the plant\n  = hint: f_sw of the plant is 1 / sample_period"
-        );
-        return Err(Error::Mismatch(text));
+        let message = Message::new("contract and plant have different control periods").found(format!(
+            "sample_period = {policy} s in the contract, {plant} s at the plant"
+        ));
+        return Err(message.hint("f_sw of the plant is 1 / sample_period").into());
     }
     let unknown = settings
         .randomise
@@ -444,13 +444,13 @@ fn check_fit<E: Environment>(settings: &Settings, contract: &Contract, environme
     match unknown {
         None => Ok(()),
         Some(parameter) => {
-            let text = format!(
-                "{}: [[randomise]] names `{}`, which is not a number of the plant\n  = hint: write it as in the plant's \
-                 file, `table.key`: `switch.v_f`",
-                settings.file.display(),
-                parameter.key
-            );
-            Err(Error::Mismatch(text))
+            let name = &parameter.key;
+            let message = Message::new(format!(
+                "[[randomise]] names `{name}`, which is not a number of the plant"
+            ));
+            let hint = "write it as in the plant's file, `table.key`: `switch.v_f`";
+            let known = plant::parameters().map(|parameter| parameter.key);
+            Err(Fault::in_file(&settings.file, message.hint(hint).did_you_mean(name, known)).into())
         }
     }
 }

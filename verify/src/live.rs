@@ -6,6 +6,7 @@ use std::time::Duration;
 use codegen::Language;
 use interp::{Controller, Sample};
 use policy::{Policy, Scalar};
+use toml_input::{Faults, Message};
 
 use crate::protocol::{self, Layout};
 use crate::runner::{ProcessRunner, Runner};
@@ -47,12 +48,13 @@ impl Live {
     /// and starts it.
     ///
     /// # Errors
-    /// If there is no compiler, it refuses the code, or the program does not start as it should; text for a user.
-    pub fn start(policy: &Policy, language: Language) -> Result<Self, String> {
+    /// If there is no compiler, it refuses the code, or the program does not start as it should.
+    pub fn start(policy: &Policy, language: Language) -> Result<Self, Faults> {
         let target = targets::host();
-        let files = codegen::sources(policy, target, &[language.core()], None).map_err(|error| error.to_string())?;
+        let files = codegen::sources(policy, target, &[language.core()], None)?;
         let build = build_for(language)?;
-        let folder = tempfile::tempdir().map_err(|error| format!("cannot make a temporary folder: {error}"))?;
+        let folder =
+            tempfile::tempdir().map_err(|error| Message::new(format!("cannot make a temporary folder: {error}")))?;
         let sources = Sources {
             purpose: Purpose::Compare,
             policy,
@@ -71,17 +73,16 @@ impl Live {
         let mut runner = ProcessRunner::new(apart(Command::new(executable)), TIMEOUT, target.endianness);
         let hello = runner
             .start(layout.hello().len())
-            .map_err(|error| format!("{name}: {}", error.reason))?;
+            .map_err(|error| Message::new(format!("{name}: {}", error.reason)))?;
         if hello != layout.hello() {
-            return Err(format!(
-                "{name}: self-test, integrity or sizes of the generated code are wrong"
-            ));
+            let problem = format!("{name}: self-test, integrity or sizes of the generated code are wrong");
+            return Err(Message::new(problem).into());
         }
         let step = layout.answer(&Event::Step(Vec::new()));
         let place = |name: &str| step.iter().position(|word| word.name == name);
         let places = match ["duty", "action_index", "status", "purity of eval"].map(place) {
             [Some(a), Some(b), Some(c), Some(d)] => [a, b, c, d],
-            _ => return Err("internal fault: the answer to a step lacks a word".to_owned()),
+            _ => return Err(Message::new("internal fault: the answer to a step lacks a word").into()),
         };
         Ok(Self {
             name,
@@ -103,7 +104,7 @@ impl Live {
     ///
     /// # Errors
     /// If the program does not answer.
-    pub fn restart(&mut self) -> Result<(), String> {
+    pub fn restart(&mut self) -> Result<(), Faults> {
         self.ask(&Event::Init).map(|_| ())
     }
 
@@ -111,13 +112,13 @@ impl Live {
     ///
     /// # Errors
     /// If the program does not answer, or its `eval` and `commit` contradict its `step`.
-    pub fn step(&mut self, samples: &[Sample]) -> Result<LiveCommand, String> {
+    pub fn step(&mut self, samples: &[Sample]) -> Result<LiveCommand, Faults> {
         let answer = self.ask(&Event::Step(samples.to_vec()))?;
         let [duty, action, status, purity] = self.places;
         let number = protocol::numbers(self.layout.scalar(), &answer[duty..action]);
         let [action, status, purity] = [action, status, purity].map(|place| answer[place]);
         if purity != 0 {
-            return Err(format!("{}: eval and commit contradict step", self.name));
+            return Err(Message::new(format!("{}: eval and commit contradict step", self.name)).into());
         }
         Ok(LiveCommand {
             duty: number.first().copied().unwrap_or_default(),
@@ -126,12 +127,12 @@ impl Live {
         })
     }
 
-    fn ask(&mut self, event: &Event) -> Result<Vec<u32>, String> {
+    fn ask(&mut self, event: &Event) -> Result<Vec<u32>, Faults> {
         self.words.clear();
         protocol::encode(event, self.layout.scalar(), &mut self.words);
         let expected = self.layout.answer_len(event);
         let answer = self.runner.exchange(&self.words, expected);
-        answer.map_err(|error| format!("{}: {}", self.name, error.reason))
+        answer.map_err(|error| Message::new(format!("{}: {}", self.name, error.reason)).into())
     }
 }
 
@@ -142,24 +143,23 @@ fn apart(mut command: Command) -> Command {
     command
 }
 
-fn build_for(language: Language) -> Result<Build, String> {
+fn build_for(language: Language) -> Result<Build, Faults> {
     let builds = toolchain::builds(targets::host(), &[], &[]);
     let suits = |build: &&Build| build.language() == language && LEVELS.contains(&build.level);
     let found = builds.iter().filter(suits).find(|build| build.missing.is_empty());
     found.cloned().ok_or_else(|| {
         let names: Vec<&str> = builds.iter().filter(suits).map(|build| build.compiler).collect();
-        format!(
-            "no compiler for {} on PATH\n   = expected: {}",
-            language.name(),
-            names.join(" or ")
-        )
+        let message = Message::new(format!("no compiler for {} on PATH", language.name()));
+        message.expected(names.join(" or ")).into()
     })
 }
 
-fn refused(name: &str, error: BuildError) -> String {
+fn refused(name: &str, error: BuildError) -> Message {
     match error {
-        BuildError::NoFiles | BuildError::NoSanitiser => format!("{name}: nothing to build"),
-        BuildError::Io(error) => format!("{name}: could not compile: {error}"),
-        BuildError::Refused(text) | BuildError::TooLarge(text) => format!("{name} refused the generated code:\n{text}"),
+        BuildError::NoFiles | BuildError::NoSanitiser => Message::new(format!("{name}: nothing to build")),
+        BuildError::Io(error) => Message::new(format!("{name}: could not compile: {error}")),
+        BuildError::Refused(text) | BuildError::TooLarge(text) => {
+            Message::new(format!("{name} refused the generated code")).found(text)
+        }
     }
 }

@@ -9,7 +9,7 @@ use interp::Controller;
 use ndarray::aview1;
 use policy::{Interval, NumericFormat, Policy};
 use random::{Random, SplitMix};
-use toml_input::{Message, messages};
+use toml_input::Message;
 
 use crate::arguments::Certify;
 use crate::{Failure, Outcome, output};
@@ -69,7 +69,9 @@ fn slice(policy: &Policy, options: &Certify) -> Result<Option<Slice>, Failure> {
     let find = |name: &str| {
         coordinates.iter().position(|c| c.name == name).ok_or_else(|| {
             let names: Vec<&str> = coordinates.iter().map(|c| c.name.as_str()).collect();
-            Failure::from(messages::unknown("coordinate of the states", name, &names))
+            let message = Message::new("no such coordinate of the states").found(name);
+            let message = message.expected(format!("one of {}", names.join(", ")));
+            Failure::from(message.did_you_mean(name, names))
         })
     };
     let mut asked = Vec::new();

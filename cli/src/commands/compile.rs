@@ -45,15 +45,16 @@ fn load(options: &Compile) -> Result<Policy, Failure> {
     }
     match verify::decisions(&policy, options.golden_decisions).filter(|decisions| !decisions.kept()) {
         None => Ok(policy),
-        Some(decisions) => Err(Message::new(
-            "the numeric format changes more of the trainer's decisions than allowed; nothing was written",
-        )
-        .found(decisions_lines(&policy, &decisions).join("\n"))
-        .hint(format!(
-            "see what they cost with `policyc certify` and `policyc simulate`; to accept them, --golden-decisions {}",
-            accepted(decisions.share())
-        ))
-        .into()),
+        Some(decisions) => {
+            let problem =
+                "the numeric format changes more of the trainer's decisions than allowed; nothing was written";
+            let hint = format!(
+                "see what they cost with `policyc certify` and `policyc simulate`; to accept them, --golden-decisions {}",
+                accepted(decisions.share())
+            );
+            let found = decisions_lines(&policy, &decisions).join("\n");
+            Err(Message::new(problem).found(found).hint(hint).into())
+        }
     }
 }
 

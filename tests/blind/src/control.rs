@@ -8,6 +8,7 @@ use plant::{Sample, Signals};
 use policy::Policy;
 use serde::Serialize;
 use spice::host::{Edge, Host, Row, Source};
+use toml_input::Message;
 
 use crate::bench::{Bench, T_SW};
 use crate::experiment::Load;
@@ -88,7 +89,7 @@ impl HiddenConverter {
 
     fn period(&mut self, duty: f64, path: &LoadPath) -> Result<Sample, Error> {
         let Some(mut running) = self.running.take() else {
-            return Err(Error::Mismatch("the converter has not been started".to_owned()));
+            return Err(Message::new("the converter has not been started").into());
         };
         running.waiting.push(duty.clamp(0.0, 1.0));
         let duty = running.waiting.remove(0);
@@ -189,11 +190,11 @@ impl Environment for HiddenConverter {
     }
 
     fn save(&self) -> Result<Vec<u8>, Error> {
-        Err(Error::Saved("a run in ngspice cannot be saved".to_owned()))
+        Err(Message::new("a run in ngspice cannot be saved").into())
     }
 
     fn load(&mut self, _: &[u8]) -> Result<(), Error> {
-        Err(Error::Saved("a run in ngspice cannot be saved".to_owned()))
+        Err(Message::new("a run in ngspice cannot be saved").into())
     }
 }
 

@@ -214,7 +214,7 @@ impl Settings {
     /// # Errors
     /// If the file cannot be read, or all its faults with their places.
     pub fn load(path: &Path) -> Result<Self, Error> {
-        Ok(read::settings(&Document::open(path)?)?)
+        read::settings(&Document::open(path)?)
     }
 
     /// Checks the text of a training file; `path` names it in faults, and paths in it start from its folder.

@@ -59,7 +59,7 @@ impl Contract {
     /// # Errors
     /// If the file cannot be read or is not a sound contract.
     pub fn load(path: &Path, hidden: &[usize]) -> Result<Self, Error> {
-        let read = |path: &Path| std::fs::read(path).map_err(|error| of_file(path, &error));
+        let read = |path: &Path| std::fs::read(path).map_err(|error| Error::from(of_file(path, &error)));
         let text = String::from_utf8_lossy(&read(path)?).into_owned();
         let sketch = sketch(&text);
         let mut beside = Files::new();

@@ -39,7 +39,8 @@
 #define PAPER_RESTRICT
 #endif
 
-/* Where the linker shall put tables and code, for example __attribute__((section(".ccm"))). */
+/* Where the linker shall put tables and code, for example __attribute__((section(".ccm.rodata"))) and
+   __attribute__((section(".ccm.text"))): two sections, since one cannot hold both. */
 #ifndef PAPER_TABLE
 #define PAPER_TABLE
 #endif

@@ -42,7 +42,8 @@
 #define WIDE_RESTRICT
 #endif
 
-/* Where the linker shall put tables and code, for example __attribute__((section(".ccm"))). */
+/* Where the linker shall put tables and code, for example __attribute__((section(".ccm.rodata"))) and
+   __attribute__((section(".ccm.text"))): two sections, since one cannot hold both. */
 #ifndef WIDE_TABLE
 #define WIDE_TABLE
 #endif

@@ -322,7 +322,7 @@ impl<E: Environment> Trainer<E> {
             varied: &varied,
         })?;
         self.episode_step = 0;
-        Ok(self.agent.sense(&self.sample.measured)?)
+        self.agent.sense(&self.sample.measured)
     }
 
     /// Judges two candidates on the selection scenarios: the network that acts and, with a soft update, the target network,

@@ -8,6 +8,6 @@ use toml_input::{Fault, Message};
 pub type Error = toml_input::Faults;
 
 /// A file that could not be read or written.
-pub(crate) fn of_file(path: &Path, error: &std::io::Error) -> Fault {
-    Fault::in_file(path, Message::new(error.to_string()))
+pub(crate) fn of_file(path: &Path, error: &std::io::Error) -> Error {
+    Fault::in_file(path, Message::new(error.to_string())).into()
 }

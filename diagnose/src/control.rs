@@ -17,7 +17,7 @@ use crate::record::Record;
 
 /// Duties that differ by less are one: twice the accuracy of a model of ideal edges, and 0.2 V at 200 V.
 const SAME_DUTY: f64 = 1e-3;
-/// Share of the largest load from which load steps start where no scenario is given.
+/// Share of the largest load from which load steps start where no scenario is given: that of the paper, 200 W of 1 kW.
 const LIGHT: f64 = 0.2;
 
 /// The policy on one load step, each figure the worst of all instants.

@@ -7,9 +7,10 @@ use crate::record::{CHANNELS, Record, Segment};
 
 /// Duties before a segment that the plant is given: more than it can delay.
 const HISTORY: usize = 9;
-/// Time constant that stands for the mean over a settled point, periods.
+/// Time constant that stands for the mean over a settled point, periods: it lets through less than 0.2 % of a
+/// ripple at the switching frequency.
 const AVERAGED: f64 = 100.0;
-/// Two instants closer than this share of a period are one.
+/// Two instants closer than this share of a period are one: 0.1 ps at 10 kHz, far above the rounding of sums of periods.
 const SAME: f64 = 1e-9;
 
 /// Output voltage and inductor current at the first row of a segment.

@@ -7,14 +7,18 @@ use crate::parallel;
 use crate::problem::{Basis, Problem, dot};
 use crate::record::{CHANNELS, Record};
 
-/// Counts per period that are looked at, and how far apart: half a count of the duty moves by less than a tenth.
+/// Counts per period that are looked at, and how far apart: half a count of the duty moves by less than a tenth. Below 8 counts no
+/// controller regulates; half a step of 1000 is 5e-4, the accuracy of a model of ideal edges
+/// ([`crate::problem::DUTY_ACCURACY`]).
 const FEWEST: f64 = 8.0;
 const MOST: f64 = 1000.0;
 const APART: f64 = 0.1;
-/// The averaged circuit may be off in the size of the response by as much.
+/// The averaged circuit may be off in the size of the response by as much. It knows no discontinuous conduction and no losses that
+/// depend on the duty; tolerances of L and C add 20 %. A convention: it only orders what is then simulated.
 const LEAST_SHARE: f64 = 0.7;
 const MOST_SHARE: f64 = 1.3;
-/// Steps of the integration in a period.
+/// Steps of the integration in a period: 1/140 of the period of the paper's filter with 150 uF. The semi-implicit method of Euler
+/// neither damps nor drives the swing.
 const FINE: usize = 4;
 
 /// Counts per period (whole or not) whose rounding looks most like `residual`: ends and middles of the `count` best pieces.

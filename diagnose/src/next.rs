@@ -9,7 +9,7 @@ use crate::fit::State;
 use crate::problem::Problem;
 use crate::record::{CHANNELS, Record};
 
-/// Rows of a planned experiment.
+/// Rows of a planned experiment: 30 ms at 10 kHz, nine periods of the paper's filter, as long as the records of the blind cases.
 const ROWS: usize = 300;
 
 /// An experiment and what it would tell apart.

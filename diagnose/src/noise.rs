@@ -3,13 +3,16 @@
 use crate::problem::{Problem, dot, median};
 use crate::record::{CHANNELS, Record};
 
-/// An outlier differs from its neighbours by more than this many standard deviations.
+/// An outlier differs from its neighbours by more than this many standard deviations beyond their own spread. Normal noise does
+/// so in one row of 1e15, at half of it in one of 1e6; at double, a wrong bit of 16 steps of the noise would pass.
 const FAR: f64 = 8.0;
-/// A channel is stuck on one value if this share of neighbours are equal.
+/// A channel is stuck on one value if this share of neighbours are equal. Noise of half a step still changes the value between half
+/// of all rows. A convention between that and 1.
 const STUCK: f64 = 0.8;
-/// Rows averaged to look for slow structure.
+/// Rows averaged to look for slow structure: 1 ms of the paper's converter, a third of the period of its filter, and long enough
+/// that a mean scatters a third as much as a row.
 pub const BLOCK: usize = 10;
-/// Lags over which a residual's correlation is summed.
+/// Lags over which a residual's correlation is summed: two blocks. Slower noise looks like structure anyway.
 const LAGS: usize = 20;
 
 /// One channel of a residual: `residual[row]` for each row, 0 where nothing counts.
@@ -45,7 +48,7 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
         match (has, typical.is_finite()) {
             (false, _) => f64::INFINITY,
             (true, true) => (typical * problem.sigma[n]).max(least),
-            // too few points to tell noise from anything: a share of what is measured
+            // too few points to tell noise from anything: a share of what is measured, that of a good meter
             (true, false) => 2e-3 * scale,
         }
     })
@@ -144,12 +147,14 @@ pub fn inflation(problem: &Problem, residual: &[f64]) -> f64 {
     }
     let rho = if pairs > 0.0 { shared / pairs } else { 0.0 };
     let records = problem.records.len() as f64;
+    // three standard deviations of the correlation of 250 rows of white noise, and of 3600 (three channels of records)
     let same = if rho > 0.2 { 1.0 + rho * (records - 1.0) } else { 1.0 };
     let slow: f64 = lagged
         .iter()
         .map(|sum| sum / total.max(1e-300))
         .filter(|rho| *rho > 0.05)
         .sum();
+    // beyond 4 it is no noise but structure, and must not hide itself
     same * (1.0 + 2.0 * slow).clamp(1.0, 4.0)
 }
 

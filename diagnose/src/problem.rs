@@ -5,11 +5,13 @@ use crate::causes::{Bases, Knob};
 use crate::drive::{Model, Start, simulate};
 use crate::record::{CHANNELS, Record};
 
-/// Growth of a state over a segment of an unstable record, in time constants.
+/// Growth of a state over a segment of an unstable record, in time constants: an error of the initial state grows e^2, sevenfold,
+/// and the least-squares problem stays close to linear. At 4 it grows 55-fold. A convention.
 const MOST_GROWTH: f64 = 2.0;
-/// Shortest segment of an unstable record, rows.
+/// Shortest segment of an unstable record, rows: each costs two unknowns, of 30 rows of two signals.
 const SHORTEST: usize = 30;
-/// Change of the initial voltage (in units of the output voltage) and current (of the current) for a sensitivity.
+/// Change of the initial voltage (in units of the output voltage) and current (of the current) for a sensitivity: small against
+/// where the circuit bends, and far above rounding.
 const NUDGE: f64 = 1e-3;
 
 /// The problem.
@@ -31,10 +33,11 @@ pub struct Problem {
     pub trim_held: bool,
 }
 
-/// Standard deviation of what a model of ideal edges may be off in the duty, 1: rise and fall times of the gate. It is
-/// estimated beside every fit, so that nothing that small is called a cause.
+/// Standard deviation of what a model of ideal edges may be off in the duty, 1: rise and fall times of the gate, 50 ns at 10 kHz. It
+/// is estimated beside every fit, so that nothing that small is called a cause. The price: what loses less than four times
+/// as much duty (200 ns of dead time) gains less than 16 of chi-square over the trim, and goes unnamed.
 pub const DUTY_ACCURACY: f64 = 5e-4;
-/// Largest trim that is put into a model.
+/// Largest trim that is put into a model: three standard deviations. More stands for a cause on nobody's list.
 const MOST_TRIM: f64 = 3.0 * DUTY_ACCURACY;
 
 /// What is estimated beside every fit.

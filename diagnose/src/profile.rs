@@ -9,12 +9,15 @@ use crate::problem::Problem;
 const LEVEL: f64 = 3.841;
 /// The same in standard deviations.
 const TWO_SIDED: f64 = 1.96;
-/// How often the reach of a flat curve is doubled.
+/// How often the reach of a flat curve is doubled: to 16 standard deviations. Flatter still, the interval is said to reach the
+/// bound. A convention.
 const FURTHER: usize = 3;
-/// How far beside the best the counts of a duty counter are tried.
+/// How far beside the best the counts of a duty counter are tried: doubled from a shift so small that hardly a
+/// duty is rounded to another count. Conventions.
 const LEAST_COUNTS: f64 = 5e-3;
 const MOST_COUNTS: f64 = 10.0;
-/// Places of the profile, in standard deviations.
+/// Places of the profile, in standard deviations: the 95 % interval of a parabola ends at 1.96, so that the outer ones need hardly
+/// be extended, and the inner ones show whether it is one.
 const PLACES: [f64; 4] = [-2.0, -1.0, 1.0, 2.0];
 
 /// The profile of one parameter.

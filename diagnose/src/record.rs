@@ -24,9 +24,9 @@ const QUANTITIES: [&str; CHANNELS] = ["v_out", "i_l", "i_out", "v_in"];
 /// Their units.
 pub const CHANNEL_UNITS: [&str; CHANNELS] = ["V", "A", "A", "V"];
 
-/// Fewest rows of a record.
+/// Fewest rows of a record: two unknown initial states and a noise have to come out of it too.
 const FEWEST: usize = 20;
-/// Fewest settled points.
+/// Fewest settled points: two determine a line, so that the third is the first that could disagree.
 const FEWEST_SETTLED: usize = 3;
 
 /// Rows that are simulated in one go from an estimated state.

@@ -7,11 +7,14 @@ use crate::problem::Problem;
 use crate::record::CHANNEL_NAMES;
 use crate::spectrum::strongest_line;
 
-/// Structure is seen where block means scatter this much more than white noise of the same size would let them.
+/// Structure is seen where block means scatter this much more than white noise of the same size would let them: twice as much,
+/// however many blocks there are. Real noise is never quite white; a convention.
 const SLOW: f64 = 1.0;
-/// Standard deviations of that scatter which noise may reach.
+/// Standard deviations of that scatter which noise may reach. Sums of squares have long tails: a record of 25 blocks
+/// passes 5 once in 1e4, and some ten channels are looked at.
 const SIGMAS: f64 = 5.0;
-/// A line is named if it holds this share of a channel's residual power.
+/// A line is named if it holds this share of a channel's residual power. The strongest line in 250 rows of white noise holds
+/// about 4 %. It only words what is left.
 const LINE: f64 = 0.15;
 
 /// Structure left in one channel.
@@ -40,6 +43,7 @@ pub fn structures(problem: &Problem, null: &State, state: &State, inflation: f64
         for (n, name) in CHANNEL_NAMES.iter().enumerate() {
             let values = channel(problem, &state.residual, index, n);
             let left = noise::left(&values);
+            // fewer block means tell no scatter
             if left.blocks < 5 {
                 continue;
             }
@@ -49,6 +53,7 @@ pub fn structures(problem: &Problem, null: &State, state: &State, inflation: f64
             let coarse = step > 1.5 * problem.sigma[n] && left.square.sqrt() * problem.sigma[n] < step;
             let before = noise::left(&channel(problem, &null.residual, index, n));
             let slow = left.slow > 1.0 + SLOW.max(SIGMAS * scatter) + ACCURACY * ACCURACY * before.slow;
+            // fast structure: white, but 1.6 times as large as the noise that second differences showed
             let wild = left.square > 2.5 + ACCURACY * ACCURACY * before.square;
             if (slow || wild) && !coarse {
                 found.push(Structure {
@@ -84,6 +89,7 @@ fn shape(problem: &Problem, state: &State, index: usize, n: usize, values: &[f64
     let (at, step) = largest_step(values);
     let t = problem.records[index].time[at];
     let trend = correlation_with_time(values);
+    // the limits below choose words only
     if trend.abs() > 0.6 {
         return format!("a drift over the record (correlation with time {trend:.2})");
     }

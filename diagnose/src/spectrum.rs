@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 use crate::noise::channel;
 use crate::problem::Problem;
 
-/// Frequencies looked at, as shares of the sampling frequency.
+/// Frequencies looked at, as shares of the sampling frequency: 20 Hz, below which a record of 25 ms holds half a turn, to 2 kHz at
+/// 10 kHz, above which the filter lets nothing of the source through.
 const LOWEST: f64 = 2e-3;
 const HIGHEST: f64 = 0.2;
 

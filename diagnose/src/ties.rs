@@ -6,12 +6,16 @@ use crate::parallel;
 use crate::problem::Problem;
 use crate::search::gained;
 
-/// As for rivals of one cause: chi-square within this, times the scatter, or this share of what is explained.
+/// As for rivals of one cause: chi-square within three standard deviations of one parameter, times the scatter, or this share of
+/// what is explained. The share is fifty times that for rivals of one cause, since nothing of the leading pair is kept. A convention in
+/// its size.
 const TIE: f64 = 9.0;
 const TIE_SHARE: f64 = 0.005;
-/// A pair is fitted if at first order it explains this share of what the best pair explains.
+/// A pair is fitted if at first order it explains this share of what the best pair explains. A
+/// convention that trades time for ties that first order does not show.
 const LOOKS_AS_GOOD: f64 = 0.97;
-/// Pairs that are fitted at most, of settled points and of records.
+/// Pairs that are fitted at most, of settled points and of records. Settled points are quick to simulate, and ties are the rule among
+/// them. Conventions for time.
 const MOST_SETTLED: usize = 80;
 const MOST: usize = 8;
 

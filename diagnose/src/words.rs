@@ -4,7 +4,7 @@ use crate::diagnosis::{Named, Verdict};
 use crate::gain::Shift;
 use crate::shape::Structure;
 
-/// Rivals of a cause that the sentence names.
+/// Rivals of a cause that the sentence names; a reader remembers no more, and the rest stands in the list.
 const MOST_SAID: usize = 3;
 
 /// The verdict in a sentence.

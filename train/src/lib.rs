@@ -18,6 +18,7 @@ pub mod learner;
 pub mod network;
 pub mod optimiser;
 pub mod outcome;
+mod progress;
 pub mod replay;
 mod resume;
 pub mod score;

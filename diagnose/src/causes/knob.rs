@@ -40,7 +40,8 @@ pub(crate) enum Reach {
     Plain(f64, f64, f64),
 }
 
-/// Lags shorter than this share of a period are left out.
+/// Lags shorter than this share of a period are left out: between samples a period apart they leave no trace (e^-100), and the
+/// integrator would take 400 steps a period for them.
 const NO_LAG: f64 = 0.01;
 
 /// One parameter of a cause.

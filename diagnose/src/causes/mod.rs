@@ -130,4 +130,16 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn every_cause_is_documented() {
+        let page = include_str!("../../../docs/reference/diagnosis.md");
+        for cause in CAUSES {
+            assert!(
+                page.contains(&format!("`{}`", cause.id)),
+                "{} is missing in docs/reference/diagnosis.md",
+                cause.id
+            );
+        }
+    }
 }

@@ -6,13 +6,16 @@ use toml_input::Message;
 use super::{CHANNEL_UNITS, CHANNELS, Record};
 use crate::problem::median;
 
-/// A signal this many times larger or smaller than the model's is in another unit.
+/// A signal this many times larger or smaller than the model's is in another unit: units are a thousand apart, percent a hundred,
+/// and operating points of one converter less than ten. About the geometric mean of ten and a hundred.
 const OTHER_UNIT: f64 = 30.0;
-/// Two signals are exchanged if each is this far from its own size and ...
+/// Two signals are exchanged if each is this far from its own size and (conventions: no bench is 60 % off its model in two signals at
+/// once, and one that is 30 % off is no longer near) ...
 const FAR: f64 = 1.6;
 /// ... this near to the other's.
 const NEAR: f64 = 1.3;
-/// Duties and currents below this are too small to judge by.
+/// Duties and currents below this are too small to judge by: a ratio of two of them would be one of offsets. A
+/// convention.
 const LEAST: f64 = 0.02;
 
 /// What is wrong with a record, as far as sizes tell.

@@ -1,40 +1,43 @@
 //! The search for a set of causes: forward with several leaders, exchange, backward, and what would do as well.
 
+mod starts;
+
 use crate::attribute::{ACCURACY, threshold};
 use crate::causes::Search;
-use crate::duty_steps;
 use crate::fit::{FINE, Fit, Fitter, State, solve};
 use crate::noise;
 use crate::parallel;
 use crate::problem::dot;
 use crate::shape::structures;
-use crate::spectrum;
 
-/// An explanation within this of the best is as good, in chi-square ...
+/// An explanation within this of the best is as good, in chi-square: three standard deviations of one parameter ...
 const TIE: f64 = 9.0;
 /// ... or within this share of what the cause explains: twice the accuracy, squared.
 const TIE_SHARE: f64 = 4.0 * ACCURACY * ACCURACY;
-/// What is this many times as far off may come within it when its fit is brought to an end.
+/// What is this many times as far off may come within it when its fit is brought to an end. Rough fits stop at a gain of 0.5 a
+/// step; the factor trades time for a rival that a rough fit leaves far off. A convention.
 const NEAR: f64 = 5.0;
-/// A candidate is fitted if it explains this share of the most that one explains, and this much, both at first order.
+/// A candidate is fitted if it explains this share of the most that one explains, and this much, both at first order. Conventions
+/// that trade time for candidates that grow with nonlinearity: 6 is less than half of what a cause must gain in the end
+/// ([`crate::attribute::THRESHOLD`]).
 const FOLLOWED: f64 = 0.2;
 const LEAST_FOLLOWED: f64 = 6.0;
-/// A cause gives way to another that is better by this.
+/// A cause gives way to another that is better by this, in chi-square with the price of parameters. Above the 0.5 at which a rough
+/// fit stops, so that two fits of one optimum never change places for ever; below any tie. A convention.
 const SWAP: f64 = 2.0;
-/// Starts of one cause that are followed.
+/// Starts of one cause that are followed. What looks best at first order is not always where the fit ends best, and each more
+/// costs a fit. A convention.
 const BEGUN: usize = 2;
 /// A cause beside others that moves its parameters by less than this share of their steps (0.1 % of an inductance, 5e-4 of a
-/// gain) is left out.
+/// gain) is left out: of that size is what two simulators of one circuit differ by.
 const TINY: f64 = 0.05;
-/// Most causes named.
+/// Most causes named. Records of one converter hold 5 to 15 independent directions; blind cases hide at most two effects, and the
+/// third place is for one that a second imitates in part.
 const MOST: usize = 3;
-/// Candidates that are fitted after a linear look at all.
+/// Candidates that are fitted after a linear look at all. A convention: each costs a fit.
 const LOOKED_AT: usize = 5;
-/// Kinds of rounding that are simulated after a linear look at all.
-const COUNTS: usize = 8;
-/// First step of the refinement, counts.
-const COUNT_STEP: f64 = 0.2;
-/// Further sets that are tried as the start of a larger one, and candidates that are fitted beside each.
+/// Further sets that are tried as the start of a larger one, and candidates that are fitted beside each. Conventions: they bound
+/// the time of the search, six fits beside the leader's five.
 const LEADERS: usize = 2;
 const LOOKED_AT_BY_LEADERS: usize = 3;
 
@@ -137,75 +140,6 @@ impl Searcher<'_> {
         best.unwrap_or_else(|| self.fitter.unmoved(cause, 0.0))
     }
 
-    /// Starts of `cause`, and the chi-square that `set` with it would have from each at first order, best first.
-    fn begins(&self, set: &Set<'_>, cause: usize, from: &State) -> Vec<(f64, Vec<f64>)> {
-        if self.begins_at_own(cause) {
-            let mut columns = set.columns.to_vec();
-            columns.extend(self.fitter.sensitivity(cause, from));
-            let own = self.fitter.candidates[cause].own.clone();
-            return vec![(from.chi2 - gained(&columns, &from.residual), own)];
-        }
-        let looks = self.starts(cause, from).into_iter().map(|start| {
-            let state = self.fitter.state_at(&[cause], &start, from, 0).0;
-            // the initial states and the others may have to follow before it shows what it is worth
-            let mut left = state.residual.clone();
-            self.fitter.basis.project(&mut left);
-            let mut columns = set.columns.to_vec();
-            columns.extend(self.fitter.sensitivity(cause, &state));
-            (dot(&left, &left) - gained(&columns, &left), start)
-        });
-        let mut looks: Vec<_> = looks.collect();
-        looks.sort_by(|a, b| a.0.total_cmp(&b.0));
-        match (looks.first(), self.search(cause)) {
-            (Some((_, step)), Search::Counter) => vec![self.refined(set, cause, from, step[0].recip())],
-            _ => looks,
-        }
-    }
-
-    /// A duty counter near `counts` that fits better, and the chi-square expected with it.
-    fn refined(&self, set: &Set<'_>, cause: usize, from: &State, counts: f64) -> (f64, Vec<f64>) {
-        let look = |counts: f64| {
-            let mut left = self.fitter.state_at(&[cause], &[counts.recip()], from, 0).0.residual;
-            self.fitter.basis.project(&mut left);
-            dot(&left, &left) - gained(set.columns, &left)
-        };
-        let (mut best, mut at, mut step) = (look(counts), counts, COUNT_STEP);
-        while step > COUNT_STEP / 20.0 {
-            let next = [at - step, at + step].map(|counts| (look(counts), counts));
-            let next = if next[0].0 < next[1].0 { next[0] } else { next[1] };
-            match next.0 < best {
-                true => (best, at) = next,
-                false => step *= 0.5,
-            }
-        }
-        // counters have whole counts
-        let whole = libm::round(at);
-        let of_whole = look(whole);
-        if of_whole < best + TIE {
-            (best, at) = (of_whole, whole);
-        }
-        (best, vec![at.recip()])
-    }
-
-    /// Where the fit of a candidate may begin; what the residual itself tells is read off it.
-    fn starts(&self, cause: usize, from: &State) -> Vec<Vec<f64>> {
-        let (problem, residual) = (self.fitter.problem, &from.residual);
-        match self.search(cause) {
-            Search::Line => {
-                let line = spectrum::strongest_line(problem, residual, 3)
-                    .or_else(|| spectrum::strongest_line(problem, residual, 0));
-                vec![line.map_or(vec![0.0, 100.0, 0.0], |line| {
-                    vec![line.amplitude, line.frequency, line.phase]
-                })]
-            }
-            Search::Counter => {
-                let counts = duty_steps::likely(problem, self.fitter.basis, residual, COUNTS);
-                counts.into_iter().map(|counts| vec![counts.recip()]).collect()
-            }
-            _ => self.fitter.starts(cause),
-        }
-    }
-
     /// Forward: the cause that helps most, as long as one helps; where structure is left, from several leaders; backward:
     /// without each that no longer helps, and where structure is left with each replaced by a better one.
     pub fn grow(&self, singles: &[Fit], say: &(dyn Fn(&str) + Sync)) -> (Option<Fit>, Vec<f64>) {
@@ -256,37 +190,6 @@ impl Searcher<'_> {
         }
     }
 
-    /// The fit with the duty counter that is best beside the other causes.
-    fn counted(&self, fit: Fit, place: usize) -> Fit {
-        let counts = fit.values[place].recip();
-        let whole = libm::round(counts);
-        let tried = [
-            whole,
-            whole - 1.0,
-            whole + 1.0,
-            counts - COUNT_STEP,
-            counts + COUNT_STEP,
-        ];
-        let fits = parallel::map(&tried, |counts| {
-            let mut values = fit.values.clone();
-            values[place] = counts.recip();
-            self.fitter.from(&fit.causes, &values, &fit.state)
-        });
-        // counters have whole counts
-        let score = |fit: &Fit| {
-            fit.state.chi2
-                - if fit.values[place].recip().fract() < 1e-9 {
-                    TIE
-                } else {
-                    0.0
-                }
-        };
-        fits.into_iter().fold(
-            fit,
-            |best, other| if score(&other) < score(&best) { other } else { best },
-        )
-    }
-
     /// The first fit of each set of causes, whatever their forms.
     fn distinct<'f>(&self, fits: &'f [Fit]) -> Vec<&'f Fit> {
         let mut seen = Vec::new();
@@ -321,6 +224,7 @@ impl Searcher<'_> {
         let columns = self.sensitivities(&best.causes, &best.state);
         let set = Set::of(best, &columns);
         let looks = self.looks(&set, &self.others(&best.causes), &best.state);
+        // a nonlinear fit may gain three times what it promises at first order; less is not worth a fit
         let least = 0.3 * threshold(1, 1.0);
         let looks = looks.into_iter().filter(|(gain, _)| *gain > least).collect();
         parallel::map(&top(looks, count), |cause| self.added(&set, *cause, &best.state))

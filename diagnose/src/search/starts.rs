@@ -1,0 +1,117 @@
+//! Where the fit of a candidate begins: what the residual itself says of a line or a counter, or the starts of its entry.
+
+use super::{Searcher, Set, TIE, gained};
+use crate::causes::Search;
+use crate::duty_steps;
+use crate::fit::{Fit, State};
+use crate::parallel;
+use crate::problem::dot;
+use crate::spectrum;
+
+/// Kinds of rounding that are simulated after a linear look at all. The look knows the averaged circuit only; among eight the true
+/// one has to be. A convention that trades time.
+const COUNTS: usize = 8;
+/// First step of the refinement, counts: twice the distance of the numbers that are looked at, so that both neighbours are reached.
+const COUNT_STEP: f64 = 0.2;
+
+impl Searcher<'_> {
+    /// Starts of `cause`, and the chi-square that `set` with it would have from each at first order, best first.
+    pub(super) fn begins(&self, set: &Set<'_>, cause: usize, from: &State) -> Vec<(f64, Vec<f64>)> {
+        if self.begins_at_own(cause) {
+            let mut columns = set.columns.to_vec();
+            columns.extend(self.fitter.sensitivity(cause, from));
+            let own = self.fitter.candidates[cause].own.clone();
+            return vec![(from.chi2 - gained(&columns, &from.residual), own)];
+        }
+        let looks = self.starts(cause, from).into_iter().map(|start| {
+            let state = self.fitter.state_at(&[cause], &start, from, 0).0;
+            // the initial states and the others may have to follow before it shows what it is worth
+            let mut left = state.residual.clone();
+            self.fitter.basis.project(&mut left);
+            let mut columns = set.columns.to_vec();
+            columns.extend(self.fitter.sensitivity(cause, &state));
+            (dot(&left, &left) - gained(&columns, &left), start)
+        });
+        let mut looks: Vec<_> = looks.collect();
+        looks.sort_by(|a, b| a.0.total_cmp(&b.0));
+        match (looks.first(), self.search(cause)) {
+            (Some((_, step)), Search::Counter) => vec![self.refined(set, cause, from, step[0].recip())],
+            _ => looks,
+        }
+    }
+
+    /// A duty counter near `counts` that fits better, and the chi-square expected with it.
+    fn refined(&self, set: &Set<'_>, cause: usize, from: &State, counts: f64) -> (f64, Vec<f64>) {
+        let look = |counts: f64| {
+            let mut left = self.fitter.state_at(&[cause], &[counts.recip()], from, 0).0.residual;
+            self.fitter.basis.project(&mut left);
+            dot(&left, &left) - gained(set.columns, &left)
+        };
+        let (mut best, mut at, mut step) = (look(counts), counts, COUNT_STEP);
+        while step > COUNT_STEP / 20.0 {
+            let next = [at - step, at + step].map(|counts| (look(counts), counts));
+            let next = if next[0].0 < next[1].0 { next[0] } else { next[1] };
+            match next.0 < best {
+                true => (best, at) = next,
+                false => step *= 0.5,
+            }
+        }
+        // counters have whole counts
+        let whole = libm::round(at);
+        let of_whole = look(whole);
+        if of_whole < best + TIE {
+            (best, at) = (of_whole, whole);
+        }
+        (best, vec![at.recip()])
+    }
+
+    /// Where the fit of a candidate may begin; what the residual itself tells is read off it.
+    fn starts(&self, cause: usize, from: &State) -> Vec<Vec<f64>> {
+        let (problem, residual) = (self.fitter.problem, &from.residual);
+        match self.search(cause) {
+            Search::Line => {
+                let line = spectrum::strongest_line(problem, residual, 3)
+                    .or_else(|| spectrum::strongest_line(problem, residual, 0));
+                vec![line.map_or(vec![0.0, 100.0, 0.0], |line| {
+                    vec![line.amplitude, line.frequency, line.phase]
+                })]
+            }
+            Search::Counter => {
+                let counts = duty_steps::likely(problem, self.fitter.basis, residual, COUNTS);
+                counts.into_iter().map(|counts| vec![counts.recip()]).collect()
+            }
+            _ => self.fitter.starts(cause),
+        }
+    }
+
+    /// The fit with the duty counter that is best beside the other causes.
+    pub(super) fn counted(&self, fit: Fit, place: usize) -> Fit {
+        let counts = fit.values[place].recip();
+        let whole = libm::round(counts);
+        let tried = [
+            whole,
+            whole - 1.0,
+            whole + 1.0,
+            counts - COUNT_STEP,
+            counts + COUNT_STEP,
+        ];
+        let fits = parallel::map(&tried, |counts| {
+            let mut values = fit.values.clone();
+            values[place] = counts.recip();
+            self.fitter.from(&fit.causes, &values, &fit.state)
+        });
+        // counters have whole counts
+        let score = |fit: &Fit| {
+            fit.state.chi2
+                - if fit.values[place].recip().fract() < 1e-9 {
+                    TIE
+                } else {
+                    0.0
+                }
+        };
+        fits.into_iter().fold(
+            fit,
+            |best, other| if score(&other) < score(&best) { other } else { best },
+        )
+    }
+}

@@ -8,7 +8,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::effects::Parameters;
-use crate::effects::{derating, input_ripple, saturation};
+use crate::effects::{dcr, derating, input_ripple, saturation};
 use crate::plain::Track;
 use crate::signals::{Load, Signals};
 
@@ -85,7 +85,9 @@ impl Full {
         let p = &self.p;
         let l = p.converter.inductance * (1.0 - p.inductor.saturation);
         let c = p.converter.capacitance * (1.0 - p.capacitor.derating);
-        let r = p.inductor.dcr + p.switch.r_ds_on.max(p.switch.r_ds_on_low).max(p.switch.r_d) + p.source.resistance;
+        let r = dcr::in_series(&p.inductor)
+            + p.switch.r_ds_on.max(p.switch.r_ds_on_low).max(p.switch.r_d)
+            + p.source.resistance;
         let filter = 1.0 / (l * c).sqrt() / FILTER_STEP;
         let mut other = (r + p.capacitor.esr) / l;
         for tau in self.low_pass.into_iter().chain([p.load.cpl_time_constant]) {
@@ -259,7 +261,7 @@ impl Full {
         let l = p.converter.inductance * saturation::relative_inductance(&p.inductor, x[I_L]);
         let v_source = p.converter.v_in + input_ripple::voltage(&p.source, t);
         let (v_th, r_th) = self.thevenin(x, v_source);
-        let r = path.r + path.share * r_th + p.inductor.dcr;
+        let r = path.r + path.share * r_th + dcr::in_series(&p.inductor);
         let core = p.inductor.core_conductance;
         // v_l = (drive - v_out) / stretch, i_b = i_l + core v_l; nothing of it while no current flows
         let i_l = if path.open { 0.0 } else { x[I_L] };

@@ -1,7 +1,7 @@
 //! What the inductor is connected to in each state of the leg.
 
 use crate::effects::{Parameters, Rectifier};
-use crate::effects::{dead_time, switch_delay};
+use crate::effects::{dcr, dead_time, switch_delay};
 use crate::full::Path;
 use crate::gates::Gate;
 use crate::plain::Drive;
@@ -50,7 +50,7 @@ impl Legs {
             Path::closed(0.0, -s.v_f, s.r_d, 1.0),
             Path::closed(1.0, s.v_f, s.r_d, -1.0),
         ];
-        let (v_in, dcr) = (p.converter.v_in, p.inductor.dcr);
+        let (v_in, dcr) = (p.converter.v_in, dcr::in_series(&p.inductor));
         let drive = |path: &Path| as_drive(path, v_in, dcr);
         let (on, off) = switch_delay::edges(p);
         Legs {

@@ -7,7 +7,7 @@ use toml_input::Faults;
 use crate::catalogue::Way;
 use crate::check::check;
 use crate::effects::duty_delay::Queue;
-use crate::effects::{Parameters, duty_quantisation, load_setting, minimum_on_time};
+use crate::effects::{Parameters, dcr, duty_quantisation, load_setting, minimum_on_time};
 use crate::full::{Full, Path, States};
 use crate::gates::{GateTiming, Gates};
 use crate::legs::Legs;
@@ -53,7 +53,8 @@ impl Plant {
         let p = parameters;
         let (timing, sensing) = (GateTiming::new(p), Sensing::new(p));
         let switch = &p.switch;
-        let r = p.inductor.dcr + p.source.resistance + switch.r_ds_on.max(switch.r_d).max(switch.r_ds_on_low);
+        let r =
+            dcr::in_series(&p.inductor) + p.source.resistance + switch.r_ds_on.max(switch.r_d).max(switch.r_ds_on_low);
         let mut plant = Plant {
             t_sw: p.t_sw(),
             plain: Plain::new(&p.converter, r, p.load.v_fold),

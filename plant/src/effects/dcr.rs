@@ -4,6 +4,7 @@
 //! changes of `r_ds_on` and `r_d`.
 
 use crate::catalogue::{Effect, Way, number};
+use crate::effects::Inductor;
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
@@ -19,3 +20,9 @@ pub const EFFECT: Effect = Effect {
         0.0
     )],
 };
+
+/// What is in series with the inductance whatever the leg does, ohm; both circuits take it from here.
+#[inline]
+pub(crate) fn in_series(inductor: &Inductor) -> f64 {
+    inductor.dcr
+}

@@ -9,7 +9,7 @@ use crate::digests;
 use crate::faults::Faults;
 use crate::limits::MAX_FEATURES;
 use crate::model::{Action, Digests, Feature, Golden, Interval, Layer, Mapping, Policy, Signal};
-use crate::notes::{beyond_limits, unused};
+use crate::notes::{beyond_limits, beyond_mapping, unused};
 use crate::raw::RawPolicy;
 use crate::weights::{self, Weights};
 
@@ -82,6 +82,9 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
         &actions.list,
         mapping.as_ref().and_then(Option::as_ref),
     ));
+    if let Some(mapping) = mapping.as_ref().and_then(Option::as_ref) {
+        notes.extend(beyond_mapping(&limits, &actions.list, mapping));
+    }
     let mut policy = Policy {
         name: head.name?,
         sample_period: head.sample_period?,

@@ -84,6 +84,15 @@ pub(crate) fn objection(name: &str, kind: Kind) -> Option<String> {
     None
 }
 
+/// The name in letters that are allowed, as far as it has some.
+fn plain(name: &str) -> String {
+    let plain = |c: char| match c.to_ascii_lowercase() {
+        c if c.is_ascii_lowercase() || c.is_ascii_digit() => c,
+        _ => '_',
+    };
+    name.chars().map(plain).collect()
+}
+
 fn shape(name: &str) -> Option<String> {
     let allowed = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
     if name.is_empty() {
@@ -91,7 +100,7 @@ fn shape(name: &str) -> Option<String> {
     }
     if let Some(c) = name.chars().find(|&c| !allowed(c)) {
         return Some(match c {
-            _ if c.is_ascii_uppercase() => format!("write `{}`", name.to_ascii_lowercase().escape_debug()),
+            _ if c.is_ascii_uppercase() => format!("write `{}`", plain(name)),
             _ if !c.is_ascii() => format!(
                 "`{}` (U+{:04X}) is not ASCII, even if it looks like it",
                 c.escape_debug(),

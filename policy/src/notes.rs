@@ -46,6 +46,39 @@ fn reads(expr: &Expr, index: usize) -> bool {
     }
 }
 
+/// Actions outside the range of the mapping, and mapped duties that the limits cut off.
+///
+/// The mapping applies outside its range, too: the status bit says so. Both ends of the range of the load current are looked
+/// at, since a mapped duty is linear in it.
+pub(crate) fn beyond_mapping(limits: &Limits, actions: &[Action], mapping: &Mapping) -> Vec<String> {
+    let mut notes = Vec::new();
+    let range = mapping.valid_d_sim;
+    let outside = |action: &&Action| action.duty < range.low || action.duty > range.high;
+    let duties: Vec<String> = actions.iter().filter(outside).map(|a| a.duty.to_string()).collect();
+    if !duties.is_empty() {
+        notes.push(format!(
+            "duties outside the range of the mapping, d_sim {} to {}: {}",
+            range.low,
+            range.high,
+            duties.join(", ")
+        ));
+    }
+    let c = mapping.coefficients;
+    let mapped = |d: f64, i: f64| c.a * d + c.b * i + c.c + c.r.unwrap_or(0.0) * d * i;
+    let ends = [mapping.valid_i_out.low, mapping.valid_i_out.high];
+    let all = actions.iter().flat_map(|action| ends.map(|i| mapped(action.duty, i)));
+    let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), duty| {
+        (low.min(duty), high.max(duty))
+    });
+    if low < limits.duty.low || high > limits.duty.high {
+        notes.push(format!(
+            "mapped, the duties reach from {low:.3} to {high:.3} within the mapping's range of load; the limits {} to {} cut them off",
+            limits.duty.low, limits.duty.high
+        ));
+    }
+    notes
+}
+
 /// Actions that the duty limits cut off even without a mapping.
 pub(crate) fn beyond_limits(limits: &Limits, actions: &[Action], mapping: Option<&Mapping>) -> Option<String> {
     if mapping.is_some() {
@@ -58,4 +91,60 @@ pub(crate) fn beyond_limits(limits: &Limits, actions: &[Action], mapping: Option
         .map(|action| action.duty.to_string())
         .collect();
     (!duties.is_empty()).then(|| format!("duties outside the limits are cut off: {}", duties.join(", ")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Coefficients, Interval};
+
+    fn interval(low: f64, high: f64) -> Interval {
+        Interval { low, high }
+    }
+
+    fn mapping(valid_d_sim: Interval) -> Mapping {
+        let coefficients = Coefficients {
+            a: 1.0,
+            b: 0.01,
+            c: 0.0,
+            r: None,
+        };
+        Mapping {
+            coefficients,
+            load_current: 0,
+            valid_i_out: interval(0.0, 5.0),
+            valid_d_sim,
+            adjust_a: interval(0.5, 2.0),
+            adjust_b: interval(0.0, 0.02),
+            adjust_c: interval(-0.1, 0.1),
+            adjust_r: interval(0.0, 0.0),
+        }
+    }
+
+    fn notes(duties: &[f64], valid: Interval, limits: Interval) -> Vec<String> {
+        let action = |duty: &f64| Action {
+            duty: *duty,
+            pair: None,
+        };
+        let limits = Limits {
+            duty: limits,
+            slew: None,
+            soft_start: None,
+            initial_duty: 0.3,
+        };
+        beyond_mapping(&limits, &duties.iter().map(action).collect::<Vec<_>>(), &mapping(valid))
+    }
+
+    #[test]
+    fn a_mapping_that_covers_the_duties_has_no_note() {
+        assert!(notes(&[0.3, 0.5], interval(0.2, 0.6), interval(0.2, 0.6)).is_empty());
+    }
+
+    #[test]
+    fn duties_outside_the_mapping_and_mapped_duties_outside_the_limits_are_named() {
+        let said = notes(&[0.1, 0.58], interval(0.2, 0.6), interval(0.05, 0.6)).join("\n");
+        assert!(said.contains("d_sim 0.2 to 0.6: 0.1"), "{said}");
+        // 0.58 + 0.01 * 5 A
+        assert!(said.contains("from 0.100 to 0.630"), "{said}");
+    }
 }

@@ -52,6 +52,7 @@ fn reserved_identifiers_are_refused_and_their_lookalikes_are_not() {
 #[test]
 fn odd_characters_are_refused_by_name() {
     policy_name("Buck", &["write `buck`", "lower-case"]);
+    policy_name("Buck36-15", &["write `buck36_15`"]);
     policy_name("1buck", &["begin with a lower-case letter"]);
     policy_name("_buck", &["begin with a lower-case letter"]);
     policy_name("a-b", &["`-` is not allowed"]);

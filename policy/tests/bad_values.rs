@@ -179,7 +179,7 @@ fn activations_are_never_guessed() {
     contract_fault(
         "\"relu\"",
         "¦\"ReLU\"",
-        &["hidden_activation", "did you mean \"relu\"?"],
+        &["hidden_activation", "\"ReLU\"", "did you mean \"relu\"?"],
     );
     let words: Vec<&str> = policy::Activation::plain().map(policy::Activation::word).collect();
     contract_fault("\"relu\"", "¦\"sigmoid\"", &["\"sigmoid\"", &words.join(", ")]);

@@ -135,14 +135,12 @@ fn activation(value: &Value<'_>, faults: &mut Sink) -> Option<Activation> {
         return Some(activation);
     }
     let known: Vec<&str> = Activation::plain().map(Activation::word).collect();
-    let lower = text.to_ascii_lowercase();
     let with_parameter = Activation::EACH.iter().find(|each| each.word() == text);
     faults.push(
         value.fault(match with_parameter.and_then(|each| Some((each, each.parameter()?))) {
             Some((each, (parameter, _))) => {
                 catalogue::missing_key(parameter, text, &format!("write {}", each.written()))
             }
-            None if known.contains(&lower.as_str()) => catalogue::not_one_of("hidden_activation", &lower, &known),
             None => catalogue::not_one_of("hidden_activation", text, &known),
         }),
     );

@@ -16,7 +16,7 @@
 
 #define INPUTS MINIMAL_BLOCK_INPUTS
 #define OUTPUTS 3u
-#define SIGNATURE 0xa1ab405bu
+#define SIGNATURE 0x3a994a93u
 
 /* Type of each variable; references start at 1: inputs, outputs, parameters. */
 static const char types[MINIMAL_FMU_VARIABLES] = {

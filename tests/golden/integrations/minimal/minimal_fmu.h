@@ -25,7 +25,7 @@
  *   6 status (output): status bits; 65536 is added while the coefficients are refused
  */
 #define MINIMAL_FMU_VARIABLES 6u
-#define MINIMAL_FMU_TOKEN "{a1ab405b-cf55-ede0-96a1-425ef1b238ff}"
+#define MINIMAL_FMU_TOKEN "{3a994a93-9f2e-73c2-ce36-0a404746a7d7}"
 #define MINIMAL_FMU_PERIOD 0.0001
 
 /* Types of variables. */

@@ -2,13 +2,14 @@
 
 use std::path::PathBuf;
 
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use codegen::Output;
 use measured::ColumnMap;
+use policy::NumericFormat;
 use toml_input::Faults;
 
 use crate::commands::budget::Clock;
+use crate::one_of::OneOf;
 
 /// From a trained policy to verified controller code.
 ///
@@ -63,42 +64,31 @@ pub struct New {
 pub struct Inspect {
     /// policy.toml or the folder that holds it
     pub policy: PathBuf,
+    /// Numeric format in the place of the contract's
+    #[arg(long, value_parser = format())]
+    pub format: Option<NumericFormat>,
     /// Machine-readable
     #[arg(long)]
     pub json: bool,
 }
 
-/// Numeric format on the command line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Format {
-    /// binary32, exact order
-    F32,
-    /// binary32 with fused multiply-add in the network
-    F32Fma,
-    /// binary64, exact order
-    F64,
-    /// 16-bit integer network
-    I16,
-    /// 8-bit weights, 16-bit activations
-    I8,
+/// Reads the name of a numeric format.
+fn format() -> OneOf<NumericFormat> {
+    let meaning = |format| match format {
+        NumericFormat::F32 => "binary32, exact order",
+        NumericFormat::F32Fma => "binary32 with fused multiply-add in the network",
+        NumericFormat::F64 => "binary64, exact order",
+        NumericFormat::I16 => "16-bit integer network",
+        NumericFormat::I8 => "8-bit weights, 16-bit activations",
+    };
+    let row = |format: NumericFormat| (format.name(), meaning(format), format);
+    OneOf::new("numeric format", NumericFormat::ALL.map(row))
 }
 
-impl From<Format> for policy::NumericFormat {
-    fn from(format: Format) -> Self {
-        match format {
-            Format::F32 => policy::NumericFormat::F32,
-            Format::F32Fma => policy::NumericFormat::F32Fma,
-            Format::F64 => policy::NumericFormat::F64,
-            Format::I16 => policy::NumericFormat::I16,
-            Format::I8 => policy::NumericFormat::I8,
-        }
-    }
-}
-
-/// Reads the name of an output; the list of names, their meanings and near misses are clap's to print.
-fn output() -> impl TypedValueParser<Value = Output> {
-    let row = |output: &Output| PossibleValue::new(output.name()).help(output.meaning());
-    PossibleValuesParser::new(Output::ALL.iter().map(row)).try_map(|name| Output::find(&name).ok_or("unknown output"))
+/// Reads the name of an output.
+fn output() -> OneOf<Output> {
+    let row = |output: &Output| (output.name(), output.meaning(), *output);
+    OneOf::new("output", Output::ALL.iter().map(row))
 }
 
 #[derive(Debug, Args)]
@@ -123,11 +113,23 @@ pub struct Compile {
     #[arg(long, value_name = "N", default_value_t = verify::kit::DEFAULT_STEPS, value_parser = clap::value_parser!(u32).range(1..=200_000))]
     pub kit_steps: u32,
     /// Numeric format in the place of the contract's
-    #[arg(long, value_enum)]
-    pub format: Option<Format>,
+    #[arg(long, value_parser = format())]
+    pub format: Option<NumericFormat>,
+    /// Share of the golden decisions that the numeric format may change, 0 to 1, in the place of the contract's
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    pub golden_decisions: Option<f64>,
     /// Folder for the generated files; made if missing
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+}
+
+/// A share, 0..1.
+fn share(text: &str) -> Result<f64, String> {
+    let number: f64 = text.parse().map_err(|_| "expected a number from 0 to 1".to_owned())?;
+    match (0.0..=1.0).contains(&number) {
+        true => Ok(number),
+        false => Err("expected a number from 0 to 1, such as 0.02 for 2 %".to_owned()),
+    }
 }
 
 #[derive(Debug, Args)]
@@ -135,8 +137,8 @@ pub struct Verify {
     /// policy.toml or the folder that holds it
     pub policy: PathBuf,
     /// Numeric format in the place of the contract's; with --generated, of the code in that folder unless given
-    #[arg(long, value_enum)]
-    pub format: Option<Format>,
+    #[arg(long, value_parser = format())]
+    pub format: Option<NumericFormat>,
     /// Control steps to compare per build
     #[arg(long, default_value_t = 20_000, value_parser = clap::value_parser!(u64).range(1..))]
     pub steps: u64,
@@ -151,6 +153,9 @@ pub struct Verify {
     /// nothing is built
     #[arg(long, value_name = "DIR")]
     pub generated: Option<PathBuf>,
+    /// Share of the golden decisions that the numeric format may change, 0 to 1, in the place of the contract's
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    pub golden_decisions: Option<f64>,
     /// Only compare the files of --generated with what the policy yields today; needs no compiler
     #[arg(long, requires = "generated", conflicts_with_all = ["steps", "seed", "trace"])]
     pub drift_only: bool,
@@ -168,8 +173,8 @@ pub struct Certify {
     /// policy.toml or the folder that holds it
     pub policy: PathBuf,
     /// Numeric format in the place of the contract's
-    #[arg(long, value_enum)]
-    pub format: Option<Format>,
+    #[arg(long, value_parser = format())]
+    pub format: Option<NumericFormat>,
     /// Axis of the map, twice: a signal, or a feature with a memory of its own. Without a range: where the action
     /// changes. Without axes: the first two signals
     #[arg(long, value_name = "NAME[=LOW:HIGH]")]

@@ -2,7 +2,9 @@
 
 mod arguments;
 mod commands;
+mod failure;
 mod interruption;
+mod one_of;
 mod output;
 
 use std::process::ExitCode;
@@ -10,6 +12,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use arguments::{Arguments, Command};
+use failure::Failure;
 
 /// How a run ended; the number is the exit code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,26 +25,14 @@ enum Outcome {
     Interrupted = 130,
 }
 
-/// Why a run could not be done: bad input or an output that cannot be written. Exit code 2, nothing written.
-#[derive(Debug)]
-struct Failure(String);
-
-impl<E: std::error::Error> From<E> for Failure {
-    fn from(error: E) -> Self {
-        Failure(error.to_string())
-    }
-}
-
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let result = run(&arguments.command);
     interruption::go_no_further_if_ending();
     match result {
         Ok(outcome) => ExitCode::from(outcome as u8),
-        Err(Failure(message)) => {
-            let message = message.trim_end();
-            let label = if message.starts_with("error") { "" } else { "error: " };
-            eprintln!("{label}{message}");
+        Err(failure) => {
+            failure.print();
             ExitCode::from(2)
         }
     }

@@ -5,6 +5,8 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use toml_input::Message;
+
 use crate::{Failure, interruption};
 
 /// Start of the names of temporary files; leftovers of an interrupted run are removed by the next.
@@ -71,11 +73,8 @@ pub fn write_results(
 /// If it exists or cannot be written.
 pub fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
     if fs::symlink_metadata(path).is_ok() {
-        let hint = "move it away or choose another name with --out";
-        return Err(Failure(format!(
-            "{} exists already; nothing written\n   = hint: {hint}",
-            path.display()
-        )));
+        let message = Message::new(format!("{} exists already; nothing written", path.display()));
+        return Err(message.hint("move it away or choose another name with --out").into());
     }
     write_one(path, text)
 }
@@ -90,7 +89,7 @@ pub fn write_one(path: &Path, text: &str) -> Result<(), Failure> {
         .filter(|folder| !folder.as_os_str().is_empty())
         .unwrap_or(Path::new("."));
     let Some(name) = path.file_name().and_then(|name| name.to_str()) else {
-        return Err(Failure(format!("{} is not a file name", path.display())));
+        return Err(Message::new(format!("{} is not a file name", path.display())).into());
     };
     write_texts(folder, &BTreeMap::from([(name.to_owned(), text.to_owned())]))
 }
@@ -109,11 +108,9 @@ pub fn check_new_folder(folder: &Path) -> Result<(), Failure> {
         let name = entry.file_name();
         let name = name.to_string_lossy();
         if !name.starts_with(TEMPORARY) {
-            return Err(Failure(format!(
-                "{} is not empty; nothing written\n   = found: {}\n   = hint: choose another --out, or move it away",
-                folder.display(),
-                name.escape_debug()
-            )));
+            let message = Message::new(format!("{} is not empty; nothing written", folder.display()));
+            let message = message.found(name.escape_debug().to_string());
+            return Err(message.hint("choose another --out, or move it away").into());
         }
     }
     Ok(())
@@ -128,13 +125,13 @@ pub fn say(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     match writeln!(out, "{text}").and_then(|()| out.flush()) {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-        Err(error) => Err(Failure(format!("cannot write to standard output: {error}"))),
+        Err(error) => Err(Message::new(format!("cannot write to standard output: {error}")).into()),
         Ok(()) => Ok(()),
     }
 }
 
 fn cannot(what: &str, path: &Path, error: &io::Error) -> Failure {
-    Failure(format!("cannot {what} {}: {error}; nothing written", path.display()))
+    Message::new(format!("cannot {what} {}: {error}; nothing written", path.display())).into()
 }
 
 fn check_destination(path: &Path) -> Result<(), Failure> {
@@ -148,11 +145,10 @@ fn check_destination(path: &Path) -> Result<(), Failure> {
     } else {
         return Ok(());
     };
-    let hint = "policyc replaces plain files only; choose another --out";
-    Err(Failure(format!(
-        "{} is {kind}; nothing written\n   = hint: {hint}",
-        path.display()
-    )))
+    let message = Message::new(format!("{} is {kind}; nothing written", path.display()));
+    Err(message
+        .hint("policyc replaces plain files only; choose another --out")
+        .into())
 }
 
 /// Two runs into one folder take turns. Where folders cannot be locked, the renames alone keep each file whole.
@@ -285,10 +281,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("a"), "old").unwrap();
         fs::create_dir(folder.path().join("b")).unwrap();
-        let Err(Failure(message)) = write_all(folder.path(), &files(&["a", "b"])) else {
+        let Err(Failure(faults)) = write_all(folder.path(), &files(&["a", "b"])) else {
             panic!("must fail")
         };
-        assert!(message.contains("is a folder; nothing written"), "{message}");
+        assert!(faults.to_string().contains("is a folder; nothing written"), "{faults}");
         assert_eq!(fs::read_to_string(folder.path().join("a")).unwrap(), "old");
         assert_eq!(names(folder.path()), ["a", "b"]);
     }
@@ -299,10 +295,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("precious"), "old").unwrap();
         std::os::unix::fs::symlink("precious", folder.path().join("a")).unwrap();
-        let Err(Failure(message)) = write_all(folder.path(), &files(&["a"])) else {
+        let Err(Failure(faults)) = write_all(folder.path(), &files(&["a"])) else {
             panic!("must fail")
         };
-        assert!(message.contains("symbolic link"), "{message}");
+        assert!(faults.to_string().contains("symbolic link"), "{faults}");
         assert_eq!(fs::read_to_string(folder.path().join("precious")).unwrap(), "old");
     }
 

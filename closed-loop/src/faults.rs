@@ -2,12 +2,14 @@
 
 use std::fmt;
 
+use toml_input::{Faults, Message};
+
 /// Why a loop could not be closed or saved.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum Error {
     /// The plant.
-    Plant(plant::Faults),
+    Plant(Faults),
     /// A saved plant that is damaged or of another version.
     Saved(String),
     /// Controller and plant do not fit together.
@@ -25,9 +27,18 @@ impl fmt::Display for Error {
 
 impl std::error::Error for Error {}
 
-impl From<plant::Faults> for Error {
-    fn from(faults: plant::Faults) -> Self {
+impl From<Faults> for Error {
+    fn from(faults: Faults) -> Self {
         Self::Plant(faults)
+    }
+}
+
+impl From<Error> for Faults {
+    fn from(error: Error) -> Self {
+        match error {
+            Error::Plant(faults) => faults,
+            Error::Saved(text) | Error::Mismatch(text) => Message::new(text).into(),
+        }
     }
 }
 

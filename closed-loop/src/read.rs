@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use toml_input::{Fault, Message, Table, Value, messages, nearest};
+use toml_input::{Message, Sink, Table, Value, messages, nearest};
 
 use crate::scenario::Task;
 
@@ -10,9 +10,9 @@ use crate::scenario::Task;
 pub const POWER: RangeInclusive<f64> = 0.0..=1e7;
 
 /// The load steps and how they are run; what is left out is as in [`Task::default`].
-pub fn task(table: &mut Table<'_>, faults: &mut Vec<Fault>) -> Task {
+pub fn task(table: &mut Table<'_>, faults: &mut Sink) -> Task {
     let default = Task::default();
-    let count = |v: &Value<'_>, faults: &mut Vec<Fault>| v.integer(1..=1_000_000, faults);
+    let count = |v: &Value<'_>, faults: &mut Sink| v.integer(1..=1_000_000, faults);
     Task {
         load_steps: table.with_default("load_steps", default.load_steps, faults, |v, faults| {
             pairs(v, "powers in W: [[200, 500]]", POWER, faults)
@@ -26,18 +26,13 @@ pub fn task(table: &mut Table<'_>, faults: &mut Vec<Fault>) -> Task {
 }
 
 /// Pairs of numbers within `range`; `of` says of what.
-pub fn pairs(
-    value: &Value<'_>,
-    of: &str,
-    range: RangeInclusive<f64>,
-    faults: &mut Vec<Fault>,
-) -> Option<Vec<[f64; 2]>> {
-    let one = |item: &Value<'_>, faults: &mut Vec<Fault>| item.pair(range.clone(), faults);
+pub fn pairs(value: &Value<'_>, of: &str, range: RangeInclusive<f64>, faults: &mut Sink) -> Option<Vec<[f64; 2]>> {
+    let one = |item: &Value<'_>, faults: &mut Sink| item.pair(range.clone(), faults);
     value.each(&format!("pairs of {of}"), faults, one)
 }
 
 /// Numbers of a plant that take the place of its file's: `[set]`.
-pub fn plant_numbers(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<(String, f64)>> {
+pub fn plant_numbers(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<(String, f64)>> {
     let mut list = Vec::new();
     for (key, value) in value.pairs(faults)? {
         known_parameter(&key.value, &value, faults);
@@ -55,7 +50,7 @@ pub fn plant_numbers(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<(
 }
 
 /// A fault at `value` if the plant has no number `key`.
-pub fn known_parameter(key: &str, value: &Value<'_>, faults: &mut Vec<Fault>) {
+pub fn known_parameter(key: &str, value: &Value<'_>, faults: &mut Sink) {
     if plant::parameter(key).is_none() {
         let message = Message::new(format!("the plant has no number `{}`", key.escape_debug()));
         let hint = match nearest(key, plant::parameters().map(|parameter| parameter.key)) {

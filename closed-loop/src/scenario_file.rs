@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-use toml_input::{Document, Fault, Faults, Message, Table, Value};
+use toml_input::{Document, Faults, Message, Sink, Table, Value};
 
 use crate::baselines::Kind;
 use crate::load_step::{LoadKind, LoadStep};
@@ -58,7 +58,7 @@ impl Scenario {
     }
 }
 
-fn top(document: &Document, folder: &Path, root: &mut Table<'_>, faults: &mut Vec<Fault>) -> Option<Scenario> {
+fn top(document: &Document, folder: &Path, root: &mut Table<'_>, faults: &mut Sink) -> Option<Scenario> {
     let plant = root.optional("plant").and_then(|v| v.text(faults));
     let set = root.with_default("set", Vec::new(), faults, read::plant_numbers);
     let v_ref = root.optional("v_ref").and_then(|v| v.positive(faults));
@@ -71,7 +71,7 @@ fn top(document: &Document, folder: &Path, root: &mut Table<'_>, faults: &mut Ve
     } else {
         Vec::new()
     };
-    let read_steps = |value: Option<Value<'_>>, of, range, faults: &mut Vec<Fault>| {
+    let read_steps = |value: Option<Value<'_>>, of, range, faults: &mut Sink| {
         value
             .and_then(|v| read::pairs(&v, of, range, faults))
             .unwrap_or_default()
@@ -101,7 +101,7 @@ fn top(document: &Document, folder: &Path, root: &mut Table<'_>, faults: &mut Ve
     })
 }
 
-fn check(task: &Task, document: &Document, root: &Table<'_>, faults: &mut Vec<Fault>) {
+fn check(task: &Task, document: &Document, root: &Table<'_>, faults: &mut Sink) {
     // at the key that is there: the other one is the default
     let fault = |keys: [&str; 2], message: Message| {
         let value = keys.iter().find_map(|key| document.peek(&[key]));
@@ -130,7 +130,7 @@ fn check(task: &Task, document: &Document, root: &Table<'_>, faults: &mut Vec<Fa
     }
 }
 
-fn baselines(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<Kind>> {
+fn baselines(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<Kind>> {
     let choices = Kind::ALL.map(|kind| (kind.name(), kind));
     let mut kinds = value.each("names: [\"pid\", \"deadbeat\"]", faults, |item, faults| {
         item.choice(&choices, faults)
@@ -141,15 +141,15 @@ fn baselines(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<Kind>> {
 }
 
 /// `false`, the duties the limit may use, or several of them.
-fn limits(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<[f64; 2]>> {
+fn limits(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<[f64; 2]>> {
     let Some(items) = value.as_list() else {
-        let Some(wanted) = value.boolean(&mut Vec::new()) else {
+        let Some(wanted) = value.boolean(&mut Sink::new()) else {
             value.list("`false`, duties [low, high], or several of them", faults);
             return None;
         };
         return Some(if wanted { vec![[0.0, 1.0]] } else { Vec::new() });
     };
-    let one = |value: &Value<'_>, faults: &mut Vec<Fault>| value.interval_within(0.0..=1.0, faults);
+    let one = |value: &Value<'_>, faults: &mut Sink| value.interval_within(0.0..=1.0, faults);
     if items.iter().all(|item| item.as_list().is_some()) {
         value.each("pairs of duties: [[0.44, 0.55], [0, 1]]", faults, one)
     } else {

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use policy::NumericFormat;
+use toml_input::{Faults, Message};
 
 /// Version stamped into every generated file.
 pub const TOOL: &str = concat!("policyc ", env!("CARGO_PKG_VERSION"));
@@ -42,23 +43,30 @@ impl fmt::Display for CodegenError {
             CodegenError::Rust(message) => write!(f, "internal fault: generated Rust: {message}"),
             CodegenError::Manifest(message) => write!(f, "internal fault: manifest: {message}"),
             CodegenError::Output(message) => write!(f, "internal fault: output: {message}"),
-            CodegenError::NoType { format, target } => {
-                let (needed, expected) = match format {
-                    NumericFormat::F64 => (
-                        "whose numbers are a double of 64 bits, which there depends on the compiler's settings",
-                        "f32 or i16",
-                    ),
-                    _ => ("whose weights have 8 bits", "a format of 16 bits or more"),
-                };
-                write!(
-                    f,
-                    "the processor has no type for the numeric format\n  = found: {}, {needed}, for {target}\n  \
-                     = expected: {expected}\n  = hint: --format i16",
-                    format.name()
-                )
-            }
+            CodegenError::NoType { .. } => f.write_str("the processor has no type for the numeric format"),
         }
     }
 }
 
 impl std::error::Error for CodegenError {}
+
+impl From<CodegenError> for Faults {
+    fn from(error: CodegenError) -> Self {
+        let message = Message::new(error.to_string());
+        let CodegenError::NoType { format, target } = error else {
+            return message.into();
+        };
+        let (needed, expected) = match format {
+            NumericFormat::F64 => (
+                "whose numbers are a double of 64 bits, which there depends on the compiler's settings",
+                "f32 or i16",
+            ),
+            _ => ("whose weights have 8 bits", "a format of 16 bits or more"),
+        };
+        message
+            .found(format!("{}, {needed}, for {target}", format.name()))
+            .expected(expected)
+            .hint("--format i16")
+            .into()
+    }
+}

@@ -99,6 +99,12 @@ impl Attribution {
         self.best.as_ref().map_or(&self.null, |fit| &fit.state)
     }
 
+    /// Whether two candidates are forms of one cause.
+    #[must_use]
+    pub fn same(&self, one: usize, other: usize) -> bool {
+        self.candidates[one].number == self.candidates[other].number
+    }
+
     /// Id of a candidate.
     #[must_use]
     pub fn id(&self, cause: usize) -> &'static str {
@@ -119,7 +125,7 @@ impl Attribution {
         let sizes = parallel::map(&all, |cause| {
             let candidate = &self.candidates[*cause];
             let taken = self.best.as_ref().is_some_and(|fit| fit.causes.contains(cause));
-            if taken || candidate.cause.search != Search::Own {
+            if taken || candidate.form.search != Search::Own {
                 return None;
             }
             let column = fitter.sensitivity(*cause, state).into_iter().next()?;

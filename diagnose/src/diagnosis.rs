@@ -291,7 +291,7 @@ fn named(attribution: &Attribution, profiles: &[Profile]) -> Vec<Named> {
         });
         Named {
             id: candidate.cause.id,
-            words: candidate.cause.words,
+            words: candidate.form.words,
             parameters: parameters.collect(),
             evidence: Evidence {
                 delta_chi2: attribution.evidence[member] / attribution.inflation,
@@ -362,19 +362,8 @@ fn hidden(problem: &Problem, attribution: &Attribution) -> Vec<Hidden> {
     let mut list: Vec<Hidden> = Vec::new();
     for (cause, smallest) in sizes {
         let candidate = &attribution.candidates[cause];
-        let knob = &candidate.cause.knobs[0];
-        let typical = knob
-            .keys
-            .first()
-            .and_then(|key| plant::parameter(key))
-            .map(|p| p.typical);
-        let size = typical.map_or(f64::INFINITY, |(low, high)| match knob.unit() {
-            "1" => 0.5 * (high - low),
-            _ => high,
-        });
-        let own_scaled = matches!(candidate.cause.id, "l_wrong" | "c_wrong" | "v_in_wrong");
-        let size = if own_scaled { 0.3 * candidate.own[0] } else { size };
-        if smallest > size {
+        let knob = &candidate.form.knobs[0];
+        if smallest > candidate.large() {
             list.push(Hidden {
                 id: candidate.cause.id,
                 parameter: knob.name,

@@ -8,9 +8,6 @@ use plant::Parameters;
 use crate::diagnosis::Diagnosis;
 use crate::drive::Model;
 
-/// Numbers that are written without a point.
-const WHOLE: [&str; 2] = ["pwm.duty_delay", "sensors.seed"];
-
 /// The extended model as one plant: the sampling instant and the trim of the edges are among its parameters.
 #[must_use]
 pub fn as_plant(model: &Model, trim: f64) -> Parameters {
@@ -54,7 +51,7 @@ pub fn extended_toml(diagnosis: &Diagnosis) -> String {
         .flat_map(|fit| fit.causes.iter().enumerate());
     for (member, cause) in best {
         for (knob, profile) in diagnosis.attribution.candidates[*cause]
-            .cause
+            .form
             .knobs
             .iter()
             .zip(diagnosis.profiles.iter().filter(|p| p.member == member))
@@ -83,7 +80,7 @@ pub fn extended_toml(diagnosis: &Diagnosis) -> String {
     let mut tables: BTreeMap<&str, String> = BTreeMap::new();
     for parameter in plant::parameters() {
         let (was, is) = (parameter.get(before), parameter.get(&after));
-        let needed = parameter.key.starts_with("converter.") && parameter.choices().is_empty();
+        let needed = plant::REQUIRED.contains(&parameter.key);
         if is == parameter.neutral && !needed && was == is {
             continue;
         }
@@ -92,10 +89,10 @@ pub fn extended_toml(diagnosis: &Diagnosis) -> String {
         };
         let value = match parameter.choices().get(is as usize) {
             Some(word) => format!("\"{word}\""),
-            None if WHOLE.contains(&parameter.key) => format!("{}", is as u64),
+            None if parameter.is_whole() => format!("{}", is as u64),
             None => format!("{is:?}"),
         };
-        let unit = if parameter.unit == "1" {
+        let unit = if parameter.is_pure() {
             String::new()
         } else {
             format!("  # {}", parameter.unit)

@@ -130,20 +130,20 @@ impl Fitter<'_> {
     }
 
     fn set(&self, model: &mut Model, place: Place, value: f64) {
-        self.candidates[place.0].cause.knobs[place.1].set(model, value);
+        self.candidates[place.0].form.knobs[place.1].set(model, value);
     }
 
     /// Whether a parameter is varied continuously.
     #[must_use]
     pub fn is_smooth(&self, place: Place) -> bool {
-        !matches!(self.candidates[place.0].cause.search, Search::Scan(_)) || place.1 > 0
+        self.candidates[place.0].form.is_smooth() || place.1 > 0
     }
 
     /// Where the fit of a candidate may begin.
     #[must_use]
     pub fn starts(&self, cause: usize) -> Vec<Vec<f64>> {
         let candidate = &self.candidates[cause];
-        match candidate.cause.search {
+        match candidate.form.search {
             Search::Own => vec![candidate.own.clone()],
             Search::From(list) => list
                 .iter()
@@ -155,6 +155,8 @@ impl Fitter<'_> {
                         .collect()
                 })
                 .collect(),
+            // read off the residual by the search
+            Search::Line | Search::Counter => Vec::new(),
             Search::Scan(list) => list.iter().map(|n| vec![n * candidate.ranges[0][2]]).collect(),
         }
     }
@@ -241,7 +243,7 @@ impl Fitter<'_> {
         let mut jacobian = Jacobian::default();
         for n in smooth {
             let (candidate, knob) = places[*n];
-            let knob = &self.candidates[candidate].cause.knobs[knob];
+            let knob = &self.candidates[candidate].form.knobs[knob];
             let range = self.range(places[*n]);
             let (moved, step) = nudged(&state.model, knob, &range);
             let after = self.problem.residual(&moved, &state.starts);

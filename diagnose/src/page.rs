@@ -6,8 +6,9 @@ mod records;
 use report::{Axis, BarChart, BarPanel, Chart, Colour, Page, Panel, ReportError, Section, Series, Table, quantity};
 
 use crate::diagnosis::{Diagnosis, Named, Verdict};
+use crate::gain::Regime;
 use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS};
-use crate::words::si;
+use crate::words::{si, unit};
 
 /// Colours of the same things in all pictures.
 const MEASURED: Colour = Colour::GREY;
@@ -48,11 +49,6 @@ pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
     }
     page = page.section(ties(diagnosis));
     page.section(noise(diagnosis)).section(detectable(diagnosis)).html()
-}
-
-/// The unit of a number, nothing for a pure one.
-fn unit(text: &str) -> &str {
-    if text == "1" { "" } else { text }
 }
 
 fn causes(diagnosis: &Diagnosis) -> Section {
@@ -165,7 +161,7 @@ fn held_out(diagnosis: &Diagnosis) -> Result<Option<Section>, ReportError> {
         .gain
         .heldout
         .iter()
-        .filter(|held| held.regime == "all")
+        .filter(|held| held.regime == Regime::All)
         .collect();
     if whole.is_empty() {
         return Ok(None);
@@ -198,7 +194,7 @@ fn held_out(diagnosis: &Diagnosis) -> Result<Option<Section>, ReportError> {
         table = table.row([
             held.record.clone().into(),
             held.channel.into(),
-            held.regime.into(),
+            held.regime.word().into(),
             held.rmse_before.into(),
             held.rmse_after.into(),
             held.floor.into(),

@@ -1,6 +1,7 @@
 //! Profile likelihood: how well the data hold each parameter when all others may follow.
 
 use crate::attribute::{ACCURACY, Attribution};
+use crate::causes::Search;
 use crate::parallel;
 use crate::problem::Problem;
 
@@ -55,7 +56,7 @@ pub fn profiles(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
     parallel::map(&numbers, |number| {
         let place = places[*number];
         let candidate = &attribution.candidates[place.0];
-        let knob = &candidate.cause.knobs[place.1];
+        let knob = &candidate.form.knobs[place.1];
         let value = best.values[*number];
         let mut profile = Profile {
             member: best.causes.iter().position(|cause| *cause == place.0).unwrap_or(0),
@@ -74,7 +75,7 @@ pub fn profiles(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
             let fit = fitter.holding(&best.causes, &values, &best.state, Some(*number));
             ((fit.state.chi2 - best.state.chi2) / attribution.inflation).max(0.0)
         };
-        if knob.name == "duty_lsb" {
+        if candidate.form.search == Search::Counter {
             profile.interval = [-1.0, 1.0].map(|side| alike(value, side, &at_value));
         }
         if !fitter.is_smooth(place) || sigma.is_nan() || sigma <= 0.0 {

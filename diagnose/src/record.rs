@@ -10,7 +10,7 @@ use std::path::Path;
 
 use measured::{ColumnMap, DutyIs, Options, Sheet};
 use plant::{Load, Parameters};
-use toml_input::{Faults, Message};
+use toml_input::{Faults, Message, Sink};
 
 use raw::Raw;
 use rows::{held, held_loads, segments};
@@ -145,7 +145,8 @@ impl Record {
             return Err(sheet.fault(message).into());
         }
         let odd = suspicion::of(&record, parameters, &labels);
-        Faults::unless_empty(odd.into_iter().map(|message| sheet.fault(message)).collect())?;
+        let mut faults: Sink = odd.into_iter().map(|message| sheet.fault(message)).collect();
+        faults.propagate()?;
         Ok(record)
     }
 

@@ -72,8 +72,22 @@ impl Searcher<'_> {
         self.fitter.candidates[cause].cause.id
     }
 
-    fn is_smooth(&self, cause: usize) -> bool {
-        self.fitter.candidates[cause].cause.search == Search::Own
+    fn search(&self, cause: usize) -> Search {
+        self.fitter.candidates[cause].form.search
+    }
+
+    /// Whether the fit begins at the model's own value.
+    fn begins_at_own(&self, cause: usize) -> bool {
+        self.search(cause) == Search::Own
+    }
+
+    /// Whether two candidates are forms of one cause.
+    fn same(&self, one: usize, other: usize) -> bool {
+        self.number(one) == self.number(other)
+    }
+
+    fn number(&self, cause: usize) -> usize {
+        self.fitter.candidates[cause].number
     }
 
     fn names(&self, fit: &Fit) -> String {
@@ -91,7 +105,7 @@ impl Searcher<'_> {
         let most = first_order.iter().copied().fold(0.0, f64::max);
         parallel::map(&all, |cause| {
             let follow = first_order[*cause] > (FOLLOWED * most).max(LEAST_FOLLOWED);
-            if self.is_smooth(*cause) && !follow {
+            if self.begins_at_own(*cause) && !follow {
                 return self.fitter.unmoved(*cause, first_order[*cause]);
             }
             self.added(&Set::NONE, *cause, null)
@@ -125,7 +139,7 @@ impl Searcher<'_> {
 
     /// Starts of `cause`, and the chi-square that `set` with it would have from each at first order, best first.
     fn begins(&self, set: &Set<'_>, cause: usize, from: &State) -> Vec<(f64, Vec<f64>)> {
-        if self.is_smooth(cause) {
+        if self.begins_at_own(cause) {
             let mut columns = set.columns.to_vec();
             columns.extend(self.fitter.sensitivity(cause, from));
             let own = self.fitter.candidates[cause].own.clone();
@@ -142,8 +156,8 @@ impl Searcher<'_> {
         });
         let mut looks: Vec<_> = looks.collect();
         looks.sort_by(|a, b| a.0.total_cmp(&b.0));
-        match (looks.first(), self.id(cause)) {
-            (Some((_, step)), "duty_quantisation") => vec![self.refined(set, cause, from, step[0].recip())],
+        match (looks.first(), self.search(cause)) {
+            (Some((_, step)), Search::Counter) => vec![self.refined(set, cause, from, step[0].recip())],
             _ => looks,
         }
     }
@@ -176,15 +190,15 @@ impl Searcher<'_> {
     /// Where the fit of a candidate may begin; what the residual itself tells is read off it.
     fn starts(&self, cause: usize, from: &State) -> Vec<Vec<f64>> {
         let (problem, residual) = (self.fitter.problem, &from.residual);
-        match self.id(cause) {
-            "input_ripple" => {
+        match self.search(cause) {
+            Search::Line => {
                 let line = spectrum::strongest_line(problem, residual, 3)
                     .or_else(|| spectrum::strongest_line(problem, residual, 0));
                 vec![line.map_or(vec![0.0, 100.0, 0.0], |line| {
                     vec![line.amplitude, line.frequency, line.phase]
                 })]
             }
-            "duty_quantisation" => {
+            Search::Counter => {
                 let counts = duty_steps::likely(problem, self.fitter.basis, residual, COUNTS);
                 counts.into_iter().map(|counts| vec![counts.recip()]).collect()
             }
@@ -235,7 +249,7 @@ impl Searcher<'_> {
             ..self.fitter
         };
         let fine = fitter.from(&fit.causes, &fit.values, &fit.state);
-        let is_step = |place: &(usize, usize)| self.id(place.0) == "duty_quantisation";
+        let is_step = |place: &(usize, usize)| self.search(place.0) == Search::Counter;
         match fitter.places(&fit.causes).iter().position(is_step) {
             Some(place) => self.counted(fine, place),
             None => fine,
@@ -273,14 +287,14 @@ impl Searcher<'_> {
         )
     }
 
-    /// The first fit of each set of ids.
+    /// The first fit of each set of causes, whatever their forms.
     fn distinct<'f>(&self, fits: &'f [Fit]) -> Vec<&'f Fit> {
         let mut seen = Vec::new();
         let is_new = |fit: &&Fit| {
-            let mut ids: Vec<&str> = fit.causes.iter().map(|cause| self.id(*cause)).collect();
-            ids.sort_unstable();
-            let new = !seen.contains(&ids);
-            seen.push(ids);
+            let mut numbers: Vec<usize> = fit.causes.iter().map(|cause| self.number(*cause)).collect();
+            numbers.sort_unstable();
+            let new = !seen.contains(&numbers);
+            seen.push(numbers);
             new
         };
         fits.iter().filter(is_new).collect()
@@ -330,10 +344,10 @@ impl Searcher<'_> {
         })
     }
 
-    /// Candidates of other ids.
+    /// Candidates of other causes.
     fn others(&self, causes: &[usize]) -> Vec<usize> {
         let all = 0..self.fitter.candidates.len();
-        all.filter(|c| causes.iter().all(|known| self.id(*known) != self.id(*c)))
+        all.filter(|c| causes.iter().all(|known| !self.same(*known, *c)))
             .collect()
     }
 
@@ -402,7 +416,7 @@ impl Searcher<'_> {
         let candidate = &self.fitter.candidates[cause];
         let values = self.values_of(fit, &[cause]);
         let mut knobs = values.iter().zip(&candidate.own).zip(&candidate.ranges);
-        self.is_smooth(cause) && knobs.all(|((value, own), range)| (value - own).abs() < TINY * range[2])
+        self.begins_at_own(cause) && knobs.all(|((value, own), range)| (value - own).abs() < TINY * range[2])
     }
 
     /// For each cause of a set, what explains the data as well in its place.
@@ -416,7 +430,7 @@ impl Searcher<'_> {
                     _ => self.replacements(best, member, 8),
                 };
                 let is_rival = |fit: &Fit| {
-                    let other = fit.causes.last().is_some_and(|cause| self.id(*cause) != self.id(*own));
+                    let other = fit.causes.last().is_some_and(|cause| !self.same(*cause, *own));
                     other && fit.state.chi2 <= best.state.chi2 + tolerance
                 };
                 let near = |fit: &Fit| fit.state.chi2 <= best.state.chi2 + NEAR * tolerance;
@@ -427,9 +441,9 @@ impl Searcher<'_> {
                 list.sort_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
                 let mut seen = Vec::new();
                 list.retain(|fit| {
-                    let name = fit.causes.last().map(|cause| self.id(*cause));
-                    let new = !seen.contains(&name);
-                    seen.push(name);
+                    let number = fit.causes.last().map(|cause| self.number(*cause));
+                    let new = !seen.contains(&number);
+                    seen.push(number);
                     new
                 });
                 list

@@ -22,20 +22,20 @@ pub fn other_pairs(problem: &Problem, attribution: &Attribution) -> Vec<Fit> {
         return Vec::new();
     };
     let fitter = attribution.fitter(problem);
-    let own: Vec<&str> = best.causes.iter().map(|cause| attribution.id(*cause)).collect();
+    let is_own = |cause: usize| best.causes.iter().any(|own| attribution.same(*own, cause));
     let all: Vec<usize> = (0..attribution.candidates.len()).collect();
     let columns = parallel::map(&all, |cause| fitter.sensitivity(*cause, &attribution.null));
     let gain_of = |a: usize, b: usize| gained(&[&columns[a][..], &columns[b][..]].concat(), &attribution.null.residual);
     let reached = gain_of(best.causes[0], best.causes[1]);
     let others: Vec<usize> = all
         .into_iter()
-        .filter(|cause| !own.contains(&attribution.id(*cause)) && !columns[*cause].is_empty())
+        .filter(|cause| !is_own(*cause) && !columns[*cause].is_empty())
         .collect();
     let mut looks = Vec::new();
     for (n, a) in others.iter().enumerate() {
         for b in &others[n + 1..] {
             let gain = gain_of(*a, *b);
-            if attribution.id(*a) != attribution.id(*b) && gain >= LOOKS_AS_GOOD * reached {
+            if !attribution.same(*a, *b) && gain >= LOOKS_AS_GOOD * reached {
                 looks.push((gain, [*a, *b]));
             }
         }

@@ -12,7 +12,7 @@ pub fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure]) -> 
     let list = |causes: &[Named]| {
         let words = causes.iter().map(|cause| {
             let values = cause.parameters.iter().map(|(name, v)| {
-                let unit = if v.unit == "1" { "" } else { v.unit };
+                let unit = unit(v.unit);
                 let name = if *name == cause.id {
                     String::new()
                 } else {
@@ -91,6 +91,14 @@ pub fn shifted(shifts: &[Shift]) -> String {
         )
     };
     shifts.iter().map(one).collect()
+}
+
+/// The unit of a number, nothing for a pure one.
+pub fn unit(text: &'static str) -> &'static str {
+    match text {
+        "1" => "",
+        text => text,
+    }
 }
 
 /// A quantity with four digits.

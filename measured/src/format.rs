@@ -64,8 +64,8 @@ impl Sheet {
     ///
     /// # Errors
     /// A file that cannot be read or is too large, and those of [`Sheet::parse`].
-    pub fn open(file: &Path, options: &Options) -> Result<Self, Faults> {
-        let name = FileName::new(file);
+    pub fn open(file: impl Into<FileName>, options: &Options) -> Result<Self, Faults> {
+        let name: FileName = file.into();
         let bytes = name.read(options.most_bytes).map_err(|message| name.fault(message))?;
         Self::of_bytes(name, bytes, options)
     }

@@ -40,5 +40,5 @@ pub use format::Options;
 pub use locate::Located;
 pub use map::{ColumnMap, DutyIs};
 pub use quantity::{Quantity, VOCABULARY};
-pub use sheet::{Cell, Column, FaultList, Sheet};
+pub use sheet::{Cell, Column, Sheet, table_faults};
 pub use signal::Signal;

@@ -1,6 +1,6 @@
 //! Where the quantities stand in a sheet, and which columns nobody asked for.
 
-use toml_input::{Fault, Faults, Message, nearest};
+use toml_input::{Fault, Faults, Message, Sink, nearest};
 
 use crate::map::{ColumnMap, Wish};
 use crate::quantity::{Quantity, split_unit};
@@ -30,7 +30,7 @@ impl Sheet {
     /// # Errors
     /// A column that the map names and the file has not; two columns for one quantity.
     pub fn locate(&self, wanted: &[Quantity<'_>], map: &ColumnMap) -> Result<Located, Faults> {
-        let mut faults = Vec::new();
+        let mut faults = Sink::new();
         let mut signals = Vec::new();
         for quantity in wanted {
             match self.signal(quantity, map) {
@@ -39,7 +39,7 @@ impl Sheet {
                 Err(fault) => faults.push(*fault),
             }
         }
-        Faults::unless_empty(faults)?;
+        faults.propagate()?;
         let used = |index: &usize| signals.iter().any(|(_, signal)| signal.column() == Some(*index));
         let is_empty = |index: &usize| {
             let column = &self.columns()[*index];
@@ -120,9 +120,8 @@ impl Sheet {
     }
 
     fn no_column(&self, quantity: &str, name: &str) -> Fault {
-        let near = nearest(name, self.headers()).map(|near| format!("did you mean `{near}`?"));
         let message = Message::new(format!("no column `{name}` for `{quantity}`")).found(self.listed());
-        self.header_fault(message.maybe_hint(near))
+        self.header_fault(message.did_you_mean(name, self.headers()))
     }
 
     /// The fault of a quantity that a reader needs and that is not there; `hint` follows the names it may have.

@@ -2,12 +2,18 @@
 
 use std::path::Path;
 
-use toml_input::{Fault, Faults, FileName, Message, Place};
+use toml_input::{Fault, FileName, Message, Sink};
 
 use crate::csv::TextPlaces;
 
-/// More faults than this are counted, not listed.
+/// A screen of faults; a table in which every row is wrong has one reason, which the first ones show.
 const MOST_FAULTS: usize = 12;
+
+/// For the faults of a table: of very many the first are kept, the others counted.
+#[must_use]
+pub fn table_faults() -> Sink {
+    Sink::at_most(MOST_FAULTS)
+}
 
 /// A column of a file.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -201,57 +207,6 @@ impl Sheet {
     #[must_use]
     pub fn fault(&self, message: Message) -> Fault {
         self.name.fault(message)
-    }
-}
-
-/// Faults of a table: the first ones, and the number of all.
-#[derive(Debug, Clone, Default)]
-pub struct FaultList {
-    list: Vec<Fault>,
-    count: usize,
-}
-
-impl FaultList {
-    /// One more.
-    pub fn push(&mut self, fault: Fault) {
-        self.count += 1;
-        if self.list.len() < MOST_FAULTS {
-            self.list.push(fault);
-        }
-    }
-
-    /// How many there are.
-    #[must_use]
-    pub fn count(&self) -> usize {
-        self.count
-    }
-
-    /// Whether there is none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.count == 0
-    }
-
-    /// Nothing wrong if there is no fault.
-    ///
-    /// # Errors
-    /// The first faults; the others are counted.
-    pub fn done(self) -> Result<(), Faults> {
-        let more = self.count - self.list.len();
-        Faults::unless_empty(self.list).map_err(|mut faults| {
-            // behind the others: what has no line comes first in the order of a file
-            if let (true, Some(last)) = (more > 0, faults.list.last()) {
-                let message = Message::new(format!("{more} more faults of this kind"));
-                faults.list.push(Fault::new(&last.file, Place::File, message));
-            }
-            faults
-        })
-    }
-}
-
-impl Extend<Fault> for FaultList {
-    fn extend<T: IntoIterator<Item = Fault>>(&mut self, faults: T) {
-        faults.into_iter().for_each(|fault| self.push(fault));
     }
 }
 

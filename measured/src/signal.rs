@@ -1,8 +1,8 @@
 //! A quantity of a table: its column and the way from there to SI.
 
-use toml_input::{Fault, Message};
+use toml_input::{Fault, Message, Sink};
 
-use crate::sheet::{Cell, FaultList, Sheet};
+use crate::sheet::{Cell, Sheet};
 
 /// A quantity that was found: in a column, or as a constant of the map.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,7 +88,7 @@ impl Signal {
 
     /// All rows in the wanted unit; NaN where nothing was measured: an empty cell, or `nan`, `na`, `n/a`, `null`, `-`.
     /// Any other word is a fault.
-    pub fn values(&self, sheet: &Sheet, faults: &mut FaultList) -> Vec<f64> {
+    pub fn values(&self, sheet: &Sheet, faults: &mut Sink) -> Vec<f64> {
         let value = |row| match self.cell(sheet, row) {
             Cell::Number(value) => value,
             cell => {

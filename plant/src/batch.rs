@@ -4,8 +4,9 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 use toml_input::{Fault, Faults, Message};
 
+use crate::catalogue::Way;
+use crate::effects::{LoadBox, Parameters, Pwm};
 use crate::effects::{duty_quantisation, load_setting, minimum_on_time};
-use crate::parameters::{LoadBox, Parameters, Pwm};
 use crate::plain::{LARGEST_CHANGE, LONGEST_STEP, Number, ORDER, TERM_BEFORE, series, sum};
 use crate::plant::Plant;
 use crate::signals::Load;
@@ -31,7 +32,7 @@ impl Batch {
     pub fn new(parameters: &[Parameters]) -> Result<Self, Faults> {
         let plants = parameters.iter().map(Plant::new).collect::<Result<Vec<_>, _>>()?;
         for (index, plant) in plants.iter().enumerate() {
-            if !plant.is_fast || plant.parameters().pwm.duty_delay > 0 {
+            if plant.way > Way::Batch {
                 let message = Message::new(format!("converter {index} does not fit into a batch"))
                     .expected(
                         "resistances, diode voltage, load and duty quantisation only; trailing carrier, sampled at 0",

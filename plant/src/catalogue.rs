@@ -1,8 +1,7 @@
 //! The list of all parameters: key, unit, meaning, allowed and typical values, and how to read and set each by its key.
 //! The reader of `plant.toml`, the check, randomisation and diagnosis work from this list.
 
-use crate::effects::ALL;
-use crate::parameters::{Carrier, Model, Parameters, Rectifier, ShortPulse};
+use crate::effects::{ALL, Carrier, Model, Parameters, Rectifier, ShortPulse};
 
 /// A physical effect and its parameters.
 #[derive(Debug, Clone, Copy)]
@@ -11,8 +10,52 @@ pub struct Effect {
     pub name: &'static str,
     /// What it is, in one sentence.
     pub meaning: &'static str,
+    /// Which way of computing it asks for while it is on.
+    pub needs: Way,
     /// Its parameters.
     pub parameters: &'static [Parameter],
+}
+
+/// The ways in which a plant is computed, from the fastest to the one that can do everything; each can do what those before
+/// it can.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Way {
+    /// Many plants side by side ([`crate::Batch`]): two states, a pulse at the period's start, nothing that is remembered.
+    Batch,
+    /// The same of one plant, and what waits from period to period.
+    Step,
+    /// Two states between instants anywhere in the period: late gates, late sensors, a sampler off the period's start.
+    Walk,
+    /// All states of the circuit, or an inductance and a capacitance that change.
+    Full,
+}
+
+impl Way {
+    /// Its word in the documentation.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Way::Batch => "batch",
+            Way::Step => "step",
+            Way::Walk => "walk",
+            Way::Full => "full",
+        }
+    }
+
+    /// The way that a plant needs: the furthest of all effects that are on.
+    pub(crate) fn of(parameters: &Parameters) -> Self {
+        let on = effects().filter(|effect| effect.is_on(parameters));
+        on.map(|effect| effect.needs).max().unwrap_or(Way::Batch)
+    }
+}
+
+impl Effect {
+    /// Whether a plant has it: a number that brings it is off its neutral value.
+    #[must_use]
+    pub fn is_on(&self, parameters: &Parameters) -> bool {
+        let mut numbers = self.parameters.iter().filter(|parameter| parameter.switches_on);
+        numbers.any(|parameter| parameter.get(parameters) != parameter.neutral)
+    }
 }
 
 /// One parameter.
@@ -30,6 +73,8 @@ pub struct Parameter {
     pub typical: (f64, f64),
     /// The value of a converter without the effect; the default.
     pub neutral: f64,
+    /// Whether another value than the neutral one brings the effect; else it only shapes what another parameter brings.
+    pub switches_on: bool,
     /// How to get at it.
     pub(crate) field: Field,
 }
@@ -66,6 +111,18 @@ impl Parameter {
         }
     }
 
+    /// Whether it is a ratio, without a unit.
+    #[must_use]
+    pub fn is_pure(&self) -> bool {
+        self.unit == "1"
+    }
+
+    /// Whether it takes whole numbers only.
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        matches!(self.field, Field::Whole(..))
+    }
+
     /// The words of a choice, in order; nothing for a number.
     #[must_use]
     pub fn choices(&self) -> &'static [&'static str] {
@@ -92,36 +149,72 @@ pub fn parameter(key: &str) -> Option<&'static Parameter> {
     parameters().find(|p| p.key == key)
 }
 
-/// A number: `number!(capacitor.esr, "capacitor.esr", "ohm", "meaning", allowed, typical, neutral)`.
+/// A number that brings its effect: `number!(capacitor.esr, "ohm", "meaning", allowed, typical, neutral)`. Its key is the
+/// field's path.
 macro_rules! number {
-    ($($field:ident).+, $key:expr, $unit:expr, $meaning:expr, $allowed:expr, $typical:expr, $neutral:expr) => {
+    ($($path:tt).+, $($rest:expr),+ $(,)?) => {
+        $crate::catalogue::entry!(true, $($path).+, $($rest),+)
+    };
+}
+pub(crate) use number;
+
+/// A number that only shapes an effect, or without which there is no converter.
+macro_rules! detail {
+    ($($path:tt).+, $($rest:expr),+ $(,)?) => {
+        $crate::catalogue::entry!(false, $($path).+, $($rest),+)
+    };
+}
+pub(crate) use detail;
+
+macro_rules! entry {
+    ($switches_on:expr, $first:ident $(.$then:ident)+,
+     $unit:expr, $meaning:expr, $allowed:expr, $typical:expr, $neutral:expr) => {
         $crate::catalogue::Parameter {
-            key: $key,
+            key: concat!(stringify!($first) $(, ".", stringify!($then))+),
             unit: $unit,
             meaning: $meaning,
             allowed: $allowed,
             typical: $typical,
             neutral: $neutral,
-            field: $crate::catalogue::Field::Number(|p| p.$($field).+, |p, value| p.$($field).+ = value),
+            switches_on: $switches_on,
+            field: $crate::catalogue::Field::Number(|p| p.$first$(.$then)+, |p, value| p.$first$(.$then)+ = value),
         }
     };
 }
-pub(crate) use number;
+pub(crate) use entry;
 
-/// A choice among the variants of an enumeration, in the order of `$words`.
+/// The same number of each sensor, with the units of voltages and currents, and what else belongs to the effect:
+/// `of_each_sensor!(noise, ("V", "A"), "meaning", allowed, typical, neutral)`.
+macro_rules! of_each_sensor {
+    ($field:ident, ($volt:expr, $ampere:expr), $meaning:expr, $allowed:expr, $typical:expr, $neutral:expr
+     $(, $more:expr)* $(,)?) => {
+        &[
+            $crate::catalogue::number!(sensors.v_out.$field, $volt, $meaning, $allowed, $typical, $neutral),
+            $crate::catalogue::number!(sensors.i_l.$field, $ampere, $meaning, $allowed, $typical, $neutral),
+            $crate::catalogue::number!(sensors.i_out.$field, $ampere, $meaning, $allowed, $typical, $neutral),
+            $crate::catalogue::number!(sensors.v_in.$field, $volt, $meaning, $allowed, $typical, $neutral),
+            $($more),*
+        ]
+    };
+}
+pub(crate) use of_each_sensor;
+
+/// A choice among the variants of an enumeration, in the order of `$words`; the first is neutral.
 macro_rules! choice {
-    ($($field:ident).+, $key:expr, $meaning:expr, $kind:ident: $($variant:ident = $word:literal),+) => {
+    ($table:ident.$field:ident, switches_on = $switches_on:expr, $meaning:expr,
+     $kind:ident: $($variant:ident = $word:literal),+) => {
         $crate::catalogue::Parameter {
-            key: $key,
+            key: concat!(stringify!($table), ".", stringify!($field)),
             unit: "1",
             meaning: $meaning,
             allowed: (0.0, [$($word),+].len() as f64 - 1.0),
             typical: (0.0, [$($word),+].len() as f64 - 1.0),
             neutral: 0.0,
+            switches_on: $switches_on,
             field: $crate::catalogue::Field::Choice(
                 &[$($word),+],
-                |p| p.$($field).+ as usize,
-                |p, index| p.$($field).+ = *[$($kind::$variant),+].get(index).unwrap_or(&$kind::default()),
+                |p| p.$table.$field as usize,
+                |p, index| p.$table.$field = *[$($kind::$variant),+].get(index).unwrap_or(&$kind::default()),
             ),
         }
     };
@@ -131,59 +224,48 @@ macro_rules! choice {
 const CIRCUIT: Effect = Effect {
     name: "converter",
     meaning: "the loss-free buck converter, its modulator and its sampling instant",
+    needs: Way::Walk,
     parameters: &[
-        choice!(converter.model, "converter.model", "switching intervals, or mean values over the period",
+        choice!(converter.model, switches_on = true, "switching intervals, or mean values over the period",
             Model: Switched = "switched", Averaged = "averaged"),
-        choice!(converter.rectifier, "converter.rectifier", "what carries the current while the switch is off",
+        choice!(converter.rectifier, switches_on = false, "what carries the current while the switch is off",
             Rectifier: Diode = "diode", Synchronous = "synchronous"),
-        number!(
-            converter.v_in,
-            "converter.v_in",
-            "V",
-            "source voltage",
-            (1e-3, 1e6),
-            (12.0, 400.0),
-            200.0
-        ),
-        number!(
+        detail!(converter.v_in, "V", "source voltage", (1e-3, 1e6), (12.0, 400.0), 200.0),
+        detail!(
             converter.inductance,
-            "converter.inductance",
             "H",
             "inductance at no current",
             (1e-9, 10.0),
             (1e-6, 1e-2),
             2e-3
         ),
-        number!(
+        detail!(
             converter.capacitance,
-            "converter.capacitance",
             "F",
             "capacitance at no voltage",
             (1e-9, 10.0),
             (1e-6, 1e-2),
             1.5e-3
         ),
-        number!(
+        detail!(
             converter.f_sw,
-            "converter.f_sw",
             "Hz",
             "switching and control frequency",
             (1.0, 1e8),
             (1e4, 1e6),
             10e3
         ),
-        choice!(pwm.carrier, "pwm.carrier", "where in the period the on-interval lies: first, last, in the middle",
+        choice!(pwm.carrier, switches_on = true, "where in the period the on-interval lies: first, last, in the middle",
             Carrier: Trailing = "trailing", Leading = "leading", Centre = "centre"),
         number!(
             pwm.sampling_phase,
-            "pwm.sampling_phase",
             "1",
             "sampling instant as a fraction of the PWM period",
             (0.0, 1.0 - 1e-9),
             (0.0, 0.5),
             0.0
         ),
-        choice!(pwm.short_pulse, "pwm.short_pulse", "what becomes of a pulse shorter than pwm.min_on_time",
+        choice!(pwm.short_pulse, switches_on = false, "what becomes of a pulse shorter than pwm.min_on_time",
             ShortPulse: Drop = "drop", Extend = "extend"),
     ],
 };

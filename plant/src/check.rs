@@ -1,10 +1,10 @@
 //! Whether parameters describe a plant.
 
-use toml_input::{Fault, Faults, Message};
+use toml_input::{Fault, Faults, Message, Sink};
 
 use crate::catalogue;
+use crate::effects::Parameters;
 use crate::effects::duty_delay;
-use crate::parameters::Parameters;
 use crate::sensing;
 
 /// All faults of the parameters, if any.
@@ -12,7 +12,8 @@ use crate::sensing;
 /// # Errors
 /// Parameters outside their allowed range, and effects that lack a partner.
 pub fn check(p: &Parameters) -> Result<(), Faults> {
-    Faults::unless_empty(keyed(p).into_iter().map(|(_, message)| Fault::from(message)).collect())
+    let mut faults: Sink = keyed(p).into_iter().map(|(_, message)| Fault::from(message)).collect();
+    faults.propagate()
 }
 
 /// The faults, each with the key of the parameter it is about.

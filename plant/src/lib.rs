@@ -24,7 +24,6 @@ mod effects;
 mod full;
 mod gates;
 mod legs;
-mod parameters;
 mod plain;
 mod plant;
 mod reader;
@@ -34,10 +33,14 @@ mod signals;
 mod walk;
 
 pub use batch::Batch;
-pub use catalogue::{Effect, Parameter, effects, parameter, parameters};
+pub use catalogue::{Effect, Parameter, Way, effects, parameter, parameters};
 pub use check::check;
-pub use parameters::*;
+pub use effects::{
+    Cable, Capacitor, Carrier, Converter, Inductor, LoadBox, Model, Parameters, Pwm, Rectifier, Sensor, Sensors,
+    ShortPulse, Source, Switch,
+};
 pub use plant::{Plant, PlantState};
+pub use reader::REQUIRED;
 pub use settle::{Regulator, Settled};
 pub use signals::{Load, Sample, Signals};
 pub use toml_input::{Fault, Faults, Place};

@@ -4,13 +4,13 @@ use serde::{Deserialize, Serialize};
 
 use toml_input::Faults;
 
+use crate::catalogue::Way;
 use crate::check::check;
 use crate::effects::duty_delay::Queue;
-use crate::effects::{duty_quantisation, load_setting, minimum_on_time};
+use crate::effects::{Parameters, duty_quantisation, load_setting, minimum_on_time};
 use crate::full::{Full, Path, States};
 use crate::gates::{GateTiming, Gates};
 use crate::legs::Legs;
-use crate::parameters::{Carrier, Model, Parameters};
 use crate::plain::{Drive, Plain, Track};
 use crate::sensing::{Memory, Sensing, array};
 use crate::signals::{Load, Sample, Signals};
@@ -25,10 +25,8 @@ pub struct Plant {
     pub(crate) full: Full,
     pub(crate) timing: GateTiming,
     pub(crate) sensing: Sensing,
-    /// Two states and no effect beyond series resistances and voltages.
-    pub(crate) is_plain: bool,
-    /// Plain, on-interval first, sampled at the period's start, prompt gates and sensors.
-    pub(crate) is_fast: bool,
+    /// How it has to be computed.
+    pub(crate) way: Way,
     pub(crate) state: PlantState,
 }
 
@@ -54,8 +52,6 @@ impl Plant {
         check(parameters)?;
         let p = parameters;
         let (timing, sensing) = (GateTiming::new(p), Sensing::new(p));
-        let is_plain = is_plain(p) && !sensing.filters;
-        let prompt = timing.is_prompt() && p.pwm.carrier == Carrier::Trailing && p.pwm.sampling_phase == 0.0;
         let switch = &p.switch;
         let r = p.inductor.dcr + p.source.resistance + switch.r_ds_on.max(switch.r_d).max(switch.r_ds_on_low);
         let mut plant = Plant {
@@ -63,8 +59,7 @@ impl Plant {
             plain: Plain::new(&p.converter, r, p.load.v_fold),
             legs: Legs::new(p),
             full: Full::new(p),
-            is_plain,
-            is_fast: is_plain && prompt && !sensing.looks_back && p.converter.model == Model::Switched,
+            way: Way::of(p),
             timing,
             sensing,
             parameters: p.clone(),
@@ -173,7 +168,7 @@ impl Plant {
     #[inline]
     pub fn step(&mut self, duty: f64, load: &Load) -> Sample {
         let drawn = load_setting::drawn(&self.parameters.load, load);
-        if self.is_fast {
+        if self.way <= Way::Step {
             return self.step_fast(duty, &drawn);
         }
         self.walk(duty, &drawn, &drawn, 1.0)
@@ -265,17 +260,4 @@ impl Plant {
         };
         self.state.sample
     }
-}
-
-/// Nothing but series resistances and voltages in two states.
-fn is_plain(p: &Parameters) -> bool {
-    let (inductor, capacitor, source) = (&p.inductor, &p.capacitor, &p.source);
-    let linear = inductor.saturation == 0.0 && inductor.core_conductance == 0.0 && capacitor.derating == 0.0;
-    let two_states = p.cable.inductance == 0.0 && p.load.cpl_time_constant == 0.0 && source.c_in == 0.0;
-    linear
-        && two_states
-        && capacitor.esr == 0.0
-        && capacitor.esl == 0.0
-        && source.ripple == 0.0
-        && source.resistance == 0.0
 }

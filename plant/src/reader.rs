@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use toml_input::{Document, Fault, Faults, Message, Table, Value};
+use toml_input::{Document, Faults, FileName, Message, Sink, Table, Value};
 
 use crate::catalogue::{self, Field, Parameter};
 use crate::check;
-use crate::parameters::Parameters;
+use crate::effects::Parameters;
 
 impl Parameters {
     /// Reads the text of a `plant.toml`; `file` only names it in messages.
@@ -18,12 +18,12 @@ impl Parameters {
         read(&Document::from_text(file, text)?)
     }
 
-    /// Reads the `plant.toml` at `path`.
+    /// Reads a `plant.toml`.
     ///
     /// # Errors
     /// As [`Parameters::from_toml`], and a file that cannot be read.
-    pub fn from_file(path: &Path) -> Result<Self, Faults> {
-        read(&Document::open(path)?)
+    pub fn from_file(file: impl Into<FileName>) -> Result<Self, Faults> {
+        read(&Document::open(file)?)
     }
 }
 
@@ -31,7 +31,7 @@ fn read(document: &Document) -> Result<Parameters, Faults> {
     let mut reader = Reader {
         parameters: Parameters::default(),
         values: BTreeMap::new(),
-        faults: Vec::new(),
+        faults: Sink::new(),
     };
     reader.table(document.root(), "");
     reader.required(document);
@@ -46,11 +46,19 @@ fn read(document: &Document) -> Result<Parameters, Faults> {
     document.conclude(Some(reader.parameters), reader.faults)
 }
 
+/// Numbers that a plant file must give.
+pub const REQUIRED: [&str; 4] = [
+    "converter.v_in",
+    "converter.inductance",
+    "converter.capacitance",
+    "converter.f_sw",
+];
+
 struct Reader<'a> {
     parameters: Parameters,
     /// The value of each key that was read.
     values: BTreeMap<&'static str, Value<'a>>,
-    faults: Vec<Fault>,
+    faults: Sink,
 }
 
 impl<'a> Reader<'a> {
@@ -71,7 +79,7 @@ impl<'a> Reader<'a> {
 
     fn value(&mut self, parameter: &'static Parameter, value: Value<'a>) {
         let (plant, faults) = (&mut self.parameters, &mut self.faults);
-        let (before, mut hint) = (faults.len(), parameter.meaning.to_owned());
+        let (before, mut hint) = (faults.count(), parameter.meaning.to_owned());
         let read = match parameter.field {
             Field::Number(_, set) => {
                 if parameter.unit != "1" {
@@ -90,21 +98,13 @@ impl<'a> Reader<'a> {
             }
         };
         if read.is_none() {
-            for fault in &mut faults[before..] {
-                fault.hint.get_or_insert_with(|| hint.clone());
-            }
+            faults.hint_since(before, &hint);
         }
         self.values.insert(parameter.key, value);
     }
 
     fn required(&mut self, document: &Document) {
-        let required = [
-            "converter.v_in",
-            "converter.inductance",
-            "converter.capacitance",
-            "converter.f_sw",
-        ];
-        let missing = required.iter().filter(|key| !self.values.contains_key(*key));
+        let missing = REQUIRED.iter().filter(|key| !self.values.contains_key(*key));
         let missing = missing.filter_map(|key| catalogue::parameter(key));
         let faults = missing.map(|Parameter { key, meaning, unit, .. }| {
             let message = Message::new(format!("`{key}` is missing"))

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effects::sensor_noise::Noise;
 use crate::effects::sensor_quantisation;
-use crate::parameters::{Parameters, Sensor};
+use crate::effects::{Parameters, Sensor};
 use crate::signals::Signals;
 
 const CHANNELS: usize = 4;
@@ -19,8 +19,6 @@ pub(crate) struct Sensing {
     pub ideal: bool,
     /// Some sensor shows what was true earlier.
     pub looks_back: bool,
-    /// Some sensor has a low-pass, whose output is a state of the circuit.
-    pub filters: bool,
     /// When a delayed sensor looks, s from the step's start, and for how many steps it keeps the value.
     captures: [Option<(f64, usize)>; CHANNELS],
 }
@@ -58,10 +56,10 @@ impl Sensing {
                 ((t_sw - part).max(0.0), (whole as usize).min(LONGEST - 1))
             })
         });
+        let neutral = Sensor::default();
         Sensing {
-            ideal: sensors.iter().all(|sensor| *sensor == Sensor::default()),
+            ideal: sensors.iter().all(|sensor| *sensor == neutral),
             looks_back: sensors.iter().any(|s| s.delay > 0.0),
-            filters: sensors.iter().any(|s| s.low_pass > 0.0),
             sensors,
             captures,
         }

@@ -1,7 +1,8 @@
 //! A control period with anything in it: gate edges, the start of a PWM period, sensors that look earlier, a load step.
 
+use crate::catalogue::Way;
+use crate::effects::Model;
 use crate::full::Full;
-use crate::parameters::Model;
 use crate::plain::Track;
 use crate::plant::Plant;
 use crate::signals::{Load, Sample, Signals};
@@ -74,7 +75,7 @@ impl Plant {
                 Model::Switched => self.legs.path(gate, self.state.x[0]),
                 Model::Averaged => self.legs.averaged(self.state.applied),
             };
-            let used = if self.is_plain {
+            let used = if self.way < Way::Full {
                 let mut x = (self.state.x[0], self.state.x[1]);
                 let used = self.plain.advance(&mut x, &self.legs.drive(&path), load, rest, track);
                 (self.state.x[0], self.state.x[1]) = x;
@@ -92,7 +93,7 @@ impl Plant {
 
     /// What is true now, just before any edge that may come now.
     fn signals(&self, load: &Load) -> Signals {
-        if self.is_plain {
+        if self.way < Way::Full {
             let v_out = self.state.x[1];
             return Signals {
                 v_out,
@@ -115,7 +116,7 @@ impl Plant {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parameters::{Parameters, Rectifier};
+    use crate::effects::{Parameters, Rectifier};
 
     #[test]
     fn the_general_way_gives_the_bits_of_the_fast_one() {

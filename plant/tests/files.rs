@@ -92,18 +92,62 @@ fn not_a_number_is_refused() {
     assert!(message(&format!("{CIRCUIT}[capacitor]\nesr = inf\n")).contains("finite"));
 }
 
-#[test]
-fn every_key_is_documented() {
-    let page = include_str!("../../docs/reference/plant-file.md");
-    for parameter in plant::parameters() {
-        let key = ["v_out", "i_l", "i_out", "v_in"]
-            .iter()
-            .fold(parameter.key.to_owned(), |key, channel| {
-                key.replace(&format!("sensors.{channel}."), "sensors.*.")
-            });
-        assert!(
-            page.contains(&format!("`{key}`")),
-            "{key} is missing in docs/reference/plant-file.md"
-        );
+/// As the page writes a number: short, and powers of ten where digits would have to be counted.
+fn written(number: f64) -> String {
+    match number.abs() {
+        0.0 => "0".to_owned(),
+        size if (0.01..1e4).contains(&size) => format!("{number}"),
+        _ => format!("{number:e}"),
     }
+}
+
+fn range((low, high): (f64, f64)) -> String {
+    format!("{} .. {}", written(low), written(high))
+}
+
+/// The table of keys as the page has to show it; numbers that all sensors have stand once.
+fn table() -> Vec<String> {
+    let mut lines = Vec::new();
+    for effect in plant::effects() {
+        let (mut name, mut needs) = (effect.name, effect.needs.word());
+        for parameter in effect.parameters {
+            let parts: Vec<_> = parameter.key.split('.').collect();
+            let (key, unit) = match parts[..] {
+                ["sensors", "v_out", number] if parameter.unit == "V" => (format!("sensors.*.{number}"), "V, A"),
+                ["sensors", "v_out", number] => (format!("sensors.*.{number}"), parameter.unit),
+                ["sensors", _, _] => continue,
+                _ => (parameter.key.to_owned(), parameter.unit),
+            };
+            let (allowed, typical) = match parameter.choices() {
+                [] if parameter.key == "sensors.seed" => ("any".to_owned(), range(parameter.typical)),
+                [] => (range(parameter.allowed), range(parameter.typical)),
+                words => (words.join(", "), String::new()),
+            };
+            lines.push(format!(
+                "| {name} | {needs} | `{key}` | {unit} | {allowed} | {typical} | {} |",
+                parameter.meaning
+            ));
+            (name, needs) = ("", "");
+        }
+    }
+    lines
+}
+
+/// Compares, and with `POLICYC_BLESS=1` writes.
+#[test]
+fn the_pages_table_is_that_of_the_catalogue() {
+    const PAGE: &str = "../docs/reference/plant-file.md";
+    const HEAD: &str = "| effect | needs | key | unit | allowed | typical | meaning |\n|---|---|---|---|---|---|---|\n";
+    let page = std::fs::read_to_string(PAGE).unwrap();
+    let start = page.find(HEAD).expect("the table's head") + HEAD.len();
+    let end = start + page[start..].find("\n\n").unwrap();
+    let table = table().join("\n");
+    if std::env::var_os("POLICYC_BLESS").is_some() {
+        std::fs::write(PAGE, [&page[..start], &table, &page[end..]].concat()).unwrap();
+        return;
+    }
+    for (found, expected) in page[start..end].lines().zip(table.lines()) {
+        assert_eq!(found, expected);
+    }
+    assert_eq!(&page[start..end], table, "POLICYC_BLESS=1 writes the table");
 }

@@ -132,10 +132,10 @@ pub(crate) fn duplicate_name(kind: &str, name: &str, other: &str) -> Message {
         .expected("a name of its own")
 }
 
-pub(crate) fn unknown_name(kind: &str, name: &str, hint: Option<String>, expected: &str) -> Message {
+pub(crate) fn unknown_name(kind: &str, name: &str, known: &[&str]) -> Message {
     Message::new(format!("there is no {kind} `{}`", name.escape_debug()))
-        .expected(expected)
-        .maybe_hint(hint)
+        .expected(format!("one of {}", known.join(", ")))
+        .did_you_mean(name, known.iter().copied())
 }
 
 pub(crate) fn bad_unit(found: &str) -> Message {

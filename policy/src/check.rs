@@ -1,6 +1,6 @@
 //! From files to a policy that holds: section by section, then what must fit between them.
 
-use toml_input::{Fault, Table, in_file_order};
+use toml_input::{Sink, Table};
 
 use crate::bounds::{self, Inputs, Overflow};
 use crate::catalogue;
@@ -18,24 +18,16 @@ use crate::weights::{self, Weights};
 /// # Errors
 /// All faults of all files together: of form, of single values, and of parts that do not fit each other.
 pub fn check(raw: RawPolicy) -> Result<Policy, Faults> {
-    let mut faults = Vec::new();
+    let mut faults = Sink::new();
     let policy = whole(&raw, &mut faults);
-    faults.extend(raw.faults.iter().cloned());
-    match policy {
-        Some(policy) if faults.is_empty() => Ok(policy),
-        _ if faults.is_empty() => {
-            // every part that is missing has left a fault; if ever one did not, refuse all the same
-            let message = catalogue::incomplete();
-            Err(raw.faults(vec![raw.contract.source().name.fault(message)]))
-        }
-        _ => {
-            in_file_order(&mut faults);
-            Err(raw.faults(faults))
-        }
-    }
+    faults.append(raw.faults.clone());
+    let incomplete = || raw.contract.source().name.fault(catalogue::incomplete());
+    faults
+        .conclude(policy, incomplete)
+        .map_err(|faults| raw.rejected(faults))
 }
 
-fn whole(raw: &RawPolicy, faults: &mut Vec<Fault>) -> Option<Policy> {
+fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     let mut root = raw.contract.root();
     let mut taken = Vec::new();
     let head = head::read(&mut root, &mut taken, faults);
@@ -116,12 +108,7 @@ fn whole(raw: &RawPolicy, faults: &mut Vec<Fault>) -> Option<Policy> {
 }
 
 /// `None` if faulty, `Some(None)` without a mapping.
-fn mapped(
-    raw: &RawPolicy,
-    root: &mut Table<'_>,
-    signals: &[String],
-    faults: &mut Vec<Fault>,
-) -> Option<Option<Mapping>> {
+fn mapped(raw: &RawPolicy, root: &mut Table<'_>, signals: &[String], faults: &mut Sink) -> Option<Option<Mapping>> {
     let Some(value) = root.optional("mapping") else {
         return Some(None);
     };
@@ -143,14 +130,14 @@ fn golden(
     network: Option<&network::Network<'_>>,
     sizes: Option<(usize, usize)>,
     features: &[Feature],
-    faults: &mut Vec<Fault>,
+    faults: &mut Sink,
 ) -> Option<Option<Golden>> {
     let Some(file) = &raw.golden else { return Some(None) };
     let (count, actions) = sizes?;
-    weights::golden::read(file, count, features, actions, network?.tolerance, faults).map(Some)
+    weights::golden::read(file, count, features, actions, network?.golden, faults).map(Some)
 }
 
-fn bound_layers(raw: &RawPolicy, features: &[Feature], layers: &mut [Layer], faults: &mut Vec<Fault>) {
+fn bound_layers(raw: &RawPolicy, features: &[Feature], layers: &mut [Layer], faults: &mut Sink) {
     let mut inputs: Vec<Interval> = Vec::with_capacity(MAX_FEATURES);
     inputs.extend(features.iter().map(|feature| feature.bound));
     for layer in layers {
@@ -170,7 +157,7 @@ fn bound_layers(raw: &RawPolicy, features: &[Feature], layers: &mut [Layer], fau
     }
 }
 
-fn bound_mapping(raw: &RawPolicy, mapping: &Mapping, inputs: &Inputs, actions: &[Action], faults: &mut Vec<Fault>) {
+fn bound_mapping(raw: &RawPolicy, mapping: &Mapping, inputs: &Inputs, actions: &[Action], faults: &mut Sink) {
     let Some(current) = inputs.signal(mapping.load_current) else {
         return;
     };

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use toml_input::{Message, Span, nearest};
+use toml_input::{Message, Span};
 
 use crate::catalogue;
 use crate::limits;
@@ -316,15 +316,11 @@ impl Parser<'_> {
                 message.hint("delays, differences and averages go into `filters`"),
             ));
         }
-        let known = || {
-            let names = self.scope.signals.iter().chain(self.scope.parameters.keys());
-            names.map(String::as_str).chain(REMEMBERED)
-        };
-        let hint = nearest(name, known()).map(|name| format!("did you mean `{name}`?"));
-        let expected = format!("one of {}", known().collect::<Vec<_>>().join(", "));
+        let known = self.scope.signals.iter().chain(self.scope.parameters.keys());
+        let known: Vec<&str> = known.map(String::as_str).chain(REMEMBERED).collect();
         Err((
             span.clone(),
-            catalogue::unknown_name("signal or parameter", name, hint, &expected),
+            catalogue::unknown_name("signal or parameter", name, &known),
         ))
     }
 }

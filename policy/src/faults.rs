@@ -3,14 +3,12 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use toml_input::Fault;
-
-/// All faults found, in the order of the files; never empty.
+/// All faults found, and what a caller needs beside them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Faults {
-    /// The faults.
-    pub list: Vec<Fault>,
+    /// The faults, in the order of the files.
+    pub faults: toml_input::Faults,
     /// Every file that was opened or should have been, for rebuild tracking.
     pub files: Vec<PathBuf>,
     /// Name of the policy, if it could be read and is a fit name.
@@ -19,19 +17,10 @@ pub struct Faults {
     pub signals: Vec<(String, bool)>,
 }
 
-impl Faults {
-    /// The faults, in order.
-    pub fn iter(&self) -> std::slice::Iter<'_, Fault> {
-        self.list.iter()
-    }
-}
-
-impl<'a> IntoIterator for &'a Faults {
-    type Item = &'a Fault;
-    type IntoIter = std::slice::Iter<'a, Fault>;
-
-    fn into_iter(self) -> Self::IntoIter {
-        self.iter()
+/// The faults alone.
+impl From<Faults> for toml_input::Faults {
+    fn from(faults: Faults) -> Self {
+        faults.faults
     }
 }
 
@@ -39,6 +28,6 @@ impl std::error::Error for Faults {}
 
 impl fmt::Display for Faults {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        toml_input::write_list(&self.list, f)
+        self.faults.fmt(f)
     }
 }

@@ -65,7 +65,7 @@ pub fn read_mapping(file: &Path, text: &str) -> Result<Mapping, toml_input::Faul
 }
 
 fn mapping(document: &toml_input::Document) -> Result<Mapping, toml_input::Faults> {
-    let mut faults = Vec::new();
+    let mut faults = toml_input::Sink::new();
     let mapping = contract::mapping::read(document, 0, &mut faults);
     document.conclude(mapping, faults)
 }

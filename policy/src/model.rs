@@ -376,6 +376,24 @@ pub struct Golden {
     pub action_indices: Vec<u32>,
     /// Allowed |Q - golden| relative to the largest |Q| of the vector.
     pub tolerance: f64,
+    /// Share of the vectors, 0..1, whose action the numeric format may change; `None` if the contract does not say.
+    pub decisions: Option<f64>,
+}
+
+impl Golden {
+    /// Share of the vectors whose action the format may change: what the contract says; otherwise none for real formats,
+    /// which compute the trainer's network, and 2 % for integers, whose rounding is a choice to look at.
+    #[must_use]
+    pub fn allowed_changes(&self, format: NumericFormat) -> f64 {
+        /// What is left with scales from the operating range and 64-bit sums: the best that 16 bits were seen to do.
+        const INTEGER: f64 = 0.02;
+        let usual = if crate::scales::is_integer(format) {
+            INTEGER
+        } else {
+            0.0
+        };
+        self.decisions.unwrap_or(usual)
+    }
 }
 
 /// Lower-case hex SHA-256 digests of canonical content.

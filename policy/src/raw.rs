@@ -2,7 +2,7 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use toml_input::{Document, Fault, FileName, Message, Source, Value};
+use toml_input::{Document, Fault, FileName, Message, Sink, Source, Value};
 
 use crate::catalogue;
 use crate::faults::Faults;
@@ -60,7 +60,7 @@ pub struct RawPolicy {
     pub(crate) weights: Option<Binary>,
     pub(crate) golden: Option<Binary>,
     pub(crate) files: Vec<PathBuf>,
-    pub(crate) faults: Vec<Fault>,
+    pub(crate) faults: Sink,
 }
 
 impl RawPolicy {
@@ -70,15 +70,9 @@ impl RawPolicy {
         &self.files
     }
 
-    /// `list` with what a caller needs beside it.
-    pub(crate) fn faults(&self, list: Vec<Fault>) -> Faults {
-        let (name, signals) = skeleton(&self.contract);
-        Faults {
-            list,
-            files: self.files.clone(),
-            name,
-            signals,
-        }
+    /// `faults` with what a caller needs beside them.
+    pub(crate) fn rejected(&self, faults: toml_input::Faults) -> Faults {
+        rejected(&self.contract, self.files.clone(), faults)
     }
 }
 
@@ -88,11 +82,12 @@ impl RawPolicy {
 /// If the contract cannot be read, lies outside `options.root`, or is not valid TOML.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<RawPolicy, Faults> {
     let alone = |fault: Fault, files: Vec<PathBuf>| Faults {
-        list: vec![fault],
+        faults: fault.into(),
         files,
         name: None,
         signals: Vec::new(),
     };
+    let mut faults = Sink::new();
     let given = FileName::new(path);
     let name = locate(path, options).map_err(|message| alone(given.fault(message), Vec::new()))?;
     let mut files = vec![name.path.clone()];
@@ -100,17 +95,10 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<RawPolicy, Faults> {
         .content(&name, MAX_TOML_BYTES)
         .map_err(|message| alone(name.fault(message), files.clone()))?;
     let source = Source::new(name.clone(), bytes).map_err(|fault| alone(*fault, files.clone()))?;
-    let (contract, syntax) = Document::parse(source);
-    if !syntax.is_empty() {
-        let (name, signals) = skeleton(&contract);
-        return Err(Faults {
-            list: syntax,
-            files,
-            name,
-            signals,
-        });
-    }
-    let mut faults = Vec::new();
+    let contract = Document::parse(source, &mut faults);
+    faults
+        .propagate()
+        .map_err(|faults| rejected(&contract, files.clone(), faults))?;
     let mut companion = |keys: &[&str], limit: u64| -> Option<Binary> {
         let value = contract.peek(keys)?;
         let text = value.as_text()?;
@@ -134,14 +122,13 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<RawPolicy, Faults> {
     })
 }
 
-fn document(file: Binary, faults: &mut Vec<Fault>) -> Option<Document> {
+fn document(file: Binary, faults: &mut Sink) -> Option<Document> {
     let source = Source::new(file.name, file.bytes)
         .map_err(|fault| faults.push(*fault))
         .ok()?;
-    let (document, syntax) = Document::parse(source);
-    let sound = syntax.is_empty();
-    faults.extend(syntax);
-    sound.then_some(document)
+    let before = faults.count();
+    let document = Document::parse(source, faults);
+    (faults.count() == before).then_some(document)
 }
 
 /// The contract's path, checked against the root.
@@ -150,31 +137,31 @@ fn locate(path: &Path, options: &ReadOptions) -> Result<FileName, Message> {
         return Ok(FileName::new(path));
     };
     let shown = path.strip_prefix(root).unwrap_or(path).display().to_string();
-    inside(root, &root.join(path)).ok_or_else(|| catalogue::outside_root(&shown))
+    inside(root, &FileName::new(&root.join(path))).ok_or_else(|| catalogue::outside_root(&shown))
 }
 
 /// A file named in `owner`, relative to its folder.
 fn beside(owner: &FileName, text: &str, options: &ReadOptions) -> Result<FileName, Message> {
-    let join = |file: &Path| {
-        file.parent()
-            .map_or_else(|| PathBuf::from(text), |folder| folder.join(text))
-    };
-    let (path, shown) = (join(&owner.path), join(&owner.shown));
+    let name = owner.beside(text);
     match &options.root {
-        None => Ok(FileName { path, shown }),
-        Some(root) => inside(root, &path).ok_or_else(|| catalogue::outside_root(text)),
+        None => Ok(name),
+        Some(root) => inside(root, &name).ok_or_else(|| catalogue::outside_root(text)),
     }
 }
 
-/// `path` by its text alone, if it lies in `root`; shown relative to it.
-fn inside(root: &Path, path: &Path) -> Option<FileName> {
-    let (root, path) = (normalise(root)?, normalise(path)?);
+/// A file by the text of its path alone, if it lies in `root`; shown relative to it.
+fn inside(root: &Path, name: &FileName) -> Option<FileName> {
+    let (root, path) = (normalise(root)?, normalise(&name.path)?);
     let shown = path
         .strip_prefix(&root)
         .ok()
         .filter(|rest| !rest.as_os_str().is_empty())?
         .to_path_buf();
-    Some(FileName { path, shown })
+    Some(FileName {
+        path,
+        shown,
+        origin: name.origin,
+    })
 }
 
 /// `path` without `.` and `..`, by text alone; `None` if it climbs above its start.
@@ -191,6 +178,17 @@ fn normalise(path: &Path) -> Option<PathBuf> {
         }
     }
     Some(parts.iter().collect())
+}
+
+/// `faults` with what a caller needs beside them.
+fn rejected(contract: &Document, files: Vec<PathBuf>, faults: toml_input::Faults) -> Faults {
+    let (name, signals) = skeleton(contract);
+    Faults {
+        faults,
+        files,
+        name,
+        signals,
+    }
 }
 
 /// Name and signals of a contract as far as they can be told.

@@ -4,9 +4,10 @@
 use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
 
-use toml_input::{Fault, FileName, Message};
+use toml_input::{FileName, Message, Sink};
 
 use crate::activation::Activation;
+use crate::catalogue;
 use crate::faults::Faults;
 use crate::limits::MAX_WEIGHT_BYTES;
 use crate::raw::Binary;
@@ -23,30 +24,22 @@ use crate::weights::{Outline, outline};
 /// path.
 pub fn new_contract(weights: &Path, contract: &Path) -> Result<String, Faults> {
     let name = FileName::new(weights);
-    let mut faults: Vec<Fault> = Vec::new();
-    let outline = name
-        .read(MAX_WEIGHT_BYTES)
-        .map_err(|message| faults.push(name.fault(message)))
-        .ok()
-        .and_then(|bytes| {
-            outline(
-                &Binary {
-                    name: name.clone(),
-                    bytes,
-                },
-                &mut faults,
-            )
-        });
-    let seen = seen_from(contract, weights).map_err(|message| faults.push(name.fault(message)));
-    match (outline, seen) {
-        (Some(outline), Ok(seen)) => Ok(text(&seen, &outline)),
-        _ => Err(Faults {
-            list: faults,
-            files: vec![name.path],
+    let mut faults = Sink::new();
+    let bytes = faults.keep(name.read(MAX_WEIGHT_BYTES).map_err(|message| name.fault(message)));
+    let outline = bytes.and_then(|bytes| {
+        let name = name.clone();
+        outline(&Binary { name, bytes }, &mut faults)
+    });
+    let seen = faults.keep(seen_from(contract, weights).map_err(|message| name.fault(message)));
+    let text = outline.zip(seen).map(|(outline, seen)| text(&seen, &outline));
+    faults
+        .conclude(text, || name.fault(catalogue::incomplete()))
+        .map_err(|faults| Faults {
+            faults,
+            files: vec![name.path.clone()],
             name: None,
             signals: Vec::new(),
-        }),
-    }
+        })
 }
 
 /// How a contract names a file: from the contract's folder, with `/` on every system; the whole path where there is no

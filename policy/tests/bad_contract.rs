@@ -201,7 +201,7 @@ fn all_faults_of_all_files_come_together() {
     ] {
         assert!(text.contains(word), "{word}:\n{text}");
     }
-    assert_eq!(faults.list.len(), 8, "{text}");
+    assert_eq!(faults.faults.list.len(), 8, "{text}");
     assert_eq!(faults.name.as_deref(), Some("buck"));
     assert_eq!(
         faults.signals,
@@ -217,6 +217,7 @@ fn syntax_faults_are_collected_and_keep_name_and_signals() {
         .replace("hold = 3", "hold = [1");
     let faults = folder.faults();
     let lines: Vec<_> = faults
+        .faults
         .iter()
         .filter_map(|f| f.line_column())
         .map(|(line, _)| line)
@@ -286,9 +287,9 @@ fn a_contract_beyond_the_size_limit_is_refused() {
 fn a_missing_file_a_folder_and_a_missing_companion_are_told_apart() {
     let folder = Folder::new();
     let missing = policy::load(&folder.path().join("nothing.toml")).unwrap_err();
-    assert_whole_file(&missing.list[0], "nothing.toml", &["cannot find the file"]);
+    assert_whole_file(&missing.faults.list[0], "nothing.toml", &["cannot find the file"]);
     let is_folder = policy::load(&folder.path()).unwrap_err();
-    assert_says(&is_folder.list[0], &["is a folder"]);
+    assert_says(&is_folder.faults.list[0], &["is a folder"]);
     contract_fault(
         "\"weights.safetensors\"",
         "¦\"other.safetensors\"",
@@ -304,15 +305,18 @@ fn files_outside_the_root_are_refused() {
     let load = |path: &str| policy::read(std::path::Path::new(path), &options).and_then(policy::check);
     assert_eq!(load("policy.toml").unwrap().name, "buck");
     let outside = load("../policy.toml").unwrap_err();
-    assert_says(&outside.list[0], &["outside the crate"]);
+    assert_says(&outside.faults.list[0], &["outside the crate"]);
     let root = root.replace("\"weights.safetensors\"", "\"../weights.safetensors\"");
     let faults = load("policy.toml").unwrap_err();
     assert_eq!(
-        faults.list[0].file.to_str(),
+        faults.faults.list[0].file.to_str(),
         Some("policy.toml"),
         "shown relative to the root"
     );
-    assert_says(&faults.list[0], &["`../weights.safetensors` lies outside the crate"]);
-    assert_eq!(faults.list[0].line_column(), Some((30, 11)));
+    assert_says(
+        &faults.faults.list[0],
+        &["`../weights.safetensors` lies outside the crate"],
+    );
+    assert_eq!(faults.faults.list[0].line_column(), Some((30, 11)));
     drop(root);
 }

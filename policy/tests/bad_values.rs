@@ -16,10 +16,10 @@ fn an_unsupported_numeric_format_lists_what_is() {
 fn actions_are_two_to_256_duties_or_pairs() {
     contract_fault("[0.44, 0.50, 0.56]", "¦[]", &["too few actions", "0", "2 to 256"]);
     let faults = Folder::new().replace("[0.44, 0.50, 0.56]", "[0.5]").faults();
-    assert_says(&faults.list[0], &["too few actions", "1", "2 to 256"]);
+    assert_says(&faults.faults.list[0], &["too few actions", "1", "2 to 256"]);
     let many = format!("[{}]", vec!["0.5"; 257].join(", "));
     let faults = Folder::new().replace("[0.44, 0.50, 0.56]", &many).faults();
-    assert_says(&faults.list[0], &["too many actions", "257"]);
+    assert_says(&faults.faults.list[0], &["too many actions", "257"]);
     contract_fault(
         "[actions]\n",
         "¦[actions]\npairs = []\n",

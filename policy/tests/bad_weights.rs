@@ -68,7 +68,7 @@ fn an_extra_bias_is_refused() {
         .replace("hidden_activation", "bias = false\nhidden_activation")
         .faults();
     assert_tensor(
-        &fault.list[0],
+        &fault.faults.list[0],
         FILE,
         "net.0.bias",
         &["although the contract says `bias = false`"],
@@ -390,5 +390,10 @@ fn golden_vectors_that_cannot_be_are_refused() {
         "hidden_activation",
         "golden_tolerance = ¦0.0\nhidden_activation",
         &["golden_tolerance"],
+    );
+    contract_fault(
+        "hidden_activation",
+        "golden_decisions = ¦1.5\nhidden_activation",
+        &["golden_decisions", "0 to 1"],
     );
 }

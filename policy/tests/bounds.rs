@@ -126,7 +126,7 @@ fn assert_inside(value: f32, bound: Interval, what: &str) {
 
 /// Runs the front end on random signals, the network on random observations and on the corners of the box.
 fn exercise(policy: &Policy, seed: u64, steps: usize) {
-    let mut random = Random(seed);
+    let mut random = Draws::new(seed);
     let ranges: Vec<_> = policy
         .signals
         .iter()
@@ -260,7 +260,7 @@ fn remembered_duties_cover_actions_start_and_fallback() {
 
 #[test]
 fn random_networks_and_sources_stay_inside_their_bounds() {
-    let mut random = Random(7);
+    let mut random = Draws::new(7);
     let activations: Vec<String> = Activation::EACH.iter().map(|each| each.written()).collect();
     for round in 0..40u64 {
         let mut values = |count: usize| {
@@ -290,7 +290,7 @@ fn random_networks_and_sources_stay_inside_their_bounds() {
 #[test]
 fn rounding_inwards_brackets_and_nearest_is_between() {
     use policy::rounding::{down_f32, inward_f32, nearest_f32, up_f32};
-    let mut random = Random(3);
+    let mut random = Draws::new(3);
     for _ in 0..100_000 {
         let x = f64::from_bits(random.next());
         if !x.is_finite() || x.abs() > 3e38 {

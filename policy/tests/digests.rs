@@ -31,7 +31,10 @@ fn layout_comments_key_order_and_line_ends_do_not_matter() {
         CONTRACT
             .replace("\"v_ref - v_out\"", "\" v_ref  -  v_out \"")
             .replace("v_ref  -  v_out", "v_ref   - v_out"),
-        CONTRACT.replace("hidden_activation", "golden_tolerance = 1e-3\nhidden_activation"),
+        CONTRACT.replace(
+            "hidden_activation",
+            "golden_tolerance = 1e-3\ngolden_decisions = 0.5\nhidden_activation",
+        ),
     ];
     for text in same {
         assert_eq!(Folder::new().contract(&text).policy().digests, plain, "{text}");

@@ -31,7 +31,7 @@ const PIECES: [&[u8]; 24] = [
     b"\xef\xbb\xbf",
 ];
 
-fn mutate(bytes: &[u8], random: &mut Random) -> Vec<u8> {
+fn mutate(bytes: &[u8], random: &mut Draws) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     for _ in 0..=random.below(4) {
         let at = random.below(bytes.len().max(1));
@@ -61,8 +61,8 @@ fn mutate(bytes: &[u8], random: &mut Random) -> Vec<u8> {
 
 fn survives(folder: &Folder) {
     if let Err(faults) = folder.load() {
-        assert!(!faults.list.is_empty());
-        for fault in &faults {
+        assert!(!faults.faults.list.is_empty());
+        for fault in &faults.faults {
             let text = fault.to_string();
             assert!(text.starts_with("error: "));
             assert!(text.chars().all(|c| c == '\n' || !c.is_control()), "{text:?}");
@@ -71,7 +71,7 @@ fn survives(folder: &Folder) {
 }
 
 fn mutated(file: &str, seed: u64, rounds: usize) {
-    let mut random = Random(seed);
+    let mut random = Draws::new(seed);
     let mut folder = Folder::new();
     let golden = [
         f32_tensor("obs", &[1, 2], &[1.0, 5.0]),
@@ -107,7 +107,7 @@ fn mutated_golden_vectors_never_panic() {
 
 #[test]
 fn random_bytes_never_panic() {
-    let mut random = Random(5);
+    let mut random = Draws::new(5);
     let mut folder = Folder::new();
     for _ in 0..500 {
         let length = random.below(200);
@@ -125,7 +125,7 @@ fn random_bytes_never_panic() {
 
 #[test]
 fn random_expressions_never_panic() {
-    let mut random = Random(6);
+    let mut random = Draws::new(6);
     let pieces = [
         "v_out", "i_out", "v_ref", "(", ")", "+", "-", "*", "/", " ", "0", "1e", "2.5", "1e-300", ",", "é", "x", "\t",
     ];

@@ -47,7 +47,7 @@ fn every_placeholder_of_a_new_contract_is_a_fault_by_name() {
         .lines()
         .filter(|line| !line.starts_with('#'))
         .map(|line| line.matches("\"TODO\"").count());
-    assert_eq!(faults.list.len(), todo.sum::<usize>(), "{faults}");
+    assert_eq!(faults.faults.list.len(), todo.sum::<usize>(), "{faults}");
     for fault in &faults {
         assert_says(fault, &["still says TODO: fill in"]);
         assert!(fault.line_column().is_some());
@@ -90,14 +90,14 @@ fn a_new_contract_of_an_ambiguous_file_asks_for_the_prefix() {
     );
     let folder = folder.tensors(&[dense("a.0", 4, 2), dense("b.0", 4, 3)].concat());
     let faults = scaffold(&folder.path().join("weights.safetensors")).unwrap_err();
-    assert_says(&faults.list[0], &["more than one chain"]);
+    assert_says(&faults.faults.list[0], &["more than one chain"]);
 }
 
 #[test]
 fn a_new_contract_needs_a_sound_file() {
     let folder = Folder::new();
     let faults = scaffold(&folder.path().join("none.safetensors")).unwrap_err();
-    assert_says(&faults.list[0], &["cannot find the file"]);
+    assert_says(&faults.faults.list[0], &["cannot find the file"]);
     let text = scaffold(&folder.path().join("policy.toml")).unwrap_err();
     assert_says(&text.list[0], &["not a sound safetensors file"]);
 }

@@ -2,7 +2,7 @@
 
 use closed_loop::environment::{Environment, LoadPath, Start};
 use closed_loop::{Error, environment};
-use plant::{Load, Parameters, Rectifier, Sample, Sensor, Signals};
+use plant::{Load, Model, Parameters, Rectifier, Sample, Sensor, ShortPulse, Signals};
 
 use crate::circuit::{Circuit, SOURCES, drawn, netlist};
 use crate::gates::{Modulator, pulse};
@@ -14,6 +14,43 @@ const LOAD_RISE: f64 = 100e-9;
 const LONGEST_STEP: f64 = 0.005;
 /// Longest run, control periods.
 const LONGEST_RUN: f64 = 1e6;
+
+/// The plant's effects that the netlist and the modulator here reproduce. One that is new there is refused until somebody
+/// writes its netlist: ngspice would otherwise answer for another converter.
+const KNOWN: [&str; 24] = [
+    "converter",
+    "dcr",
+    "saturation",
+    "core_loss",
+    "esr",
+    "esl",
+    "derating",
+    "switch_resistance",
+    "diode",
+    "dead_time",
+    "switch_delay",
+    "source_impedance",
+    "input_ripple",
+    "bleed",
+    "cpl_bandwidth",
+    "cpl_fold",
+    "load_setting",
+    "cable",
+    "duty_delay",
+    "duty_quantisation",
+    "minimum_on_time",
+    "sensor_gain",
+    "sensor_offset",
+    "sensor_quantisation",
+];
+
+/// The effects of a converter that ngspice would leave out.
+fn unknown(parameters: &Parameters) -> Vec<&'static str> {
+    let on = plant::effects().filter(|effect| effect.is_on(parameters));
+    on.map(|effect| effect.name)
+        .filter(|name| !KNOWN.contains(name))
+        .collect()
+}
 
 /// A converter of the given parameters, simulated by ngspice.
 ///
@@ -56,14 +93,23 @@ impl SpiceConverter {
     /// A converter that has not been started.
     ///
     /// # Errors
-    /// If a sensor has a low-pass, a delay or noise, or the converter is an averaged one.
+    /// If an effect is on that the circuit for ngspice does not have, or the converter is an averaged one.
     pub fn new(parameters: &Parameters) -> Result<Self, Error> {
-        let sensors = &parameters.sensors;
-        for sensor in [&sensors.v_out, &sensors.i_l, &sensors.i_out, &sensors.v_in] {
-            if sensor.low_pass != 0.0 || sensor.delay != 0.0 || sensor.noise != 0.0 {
-                let text = "sensors at ngspice have gain, offset and lsb only";
-                return Err(Error::Mismatch(text.to_owned()));
-            }
+        if let Some(effect) = unknown(parameters).first() {
+            let text = format!(
+                "the circuit for ngspice has no `{effect}`; it has {}",
+                KNOWN[1..].join(", ")
+            );
+            return Err(Error::Mismatch(text));
+        }
+        if parameters.converter.model == Model::Averaged {
+            let text = "ngspice computes switching intervals: `converter.model` is \"averaged\"";
+            return Err(Error::Mismatch(text.to_owned()));
+        }
+        let pwm = &parameters.pwm;
+        if pwm.min_on_time > 0.0 && pwm.short_pulse == ShortPulse::Extend {
+            let text = "the modulator for ngspice drops short pulses: `pwm.short_pulse` is \"extend\"";
+            return Err(Error::Mismatch(text.to_owned()));
         }
         Ok(Self {
             nominal: parameters.clone(),

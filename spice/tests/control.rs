@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use closed_loop::{Converter, Environment, LoadPath, Start};
-use plant::{Carrier, Load, Parameters, Rectifier, Sample};
+use plant::{Carrier, Load, Model, Parameters, Rectifier, Sample, ShortPulse};
 use spice::SpiceConverter;
 
 fn lossy() -> Parameters {
@@ -99,8 +99,19 @@ fn a_copy_goes_on_from_the_same_state() {
 
 #[test]
 fn what_ngspice_does_not_do_is_said() {
-    let mut p = lossy();
-    p.sensors.i_l.delay = 1e-6;
-    let error = SpiceConverter::new(&p).unwrap_err().to_string();
-    assert!(error.contains("gain, offset and lsb only"), "{error}");
+    let refused: [(&str, fn(&mut Parameters)); 5] = [
+        ("sensor_delay", |p| p.sensors.i_l.delay = 1e-6),
+        ("sensor_low_pass", |p| p.sensors.v_out.low_pass = 1e-6),
+        ("sensor_noise", |p| p.sensors.v_in.noise = 0.1),
+        ("averaged", |p| p.converter.model = Model::Averaged),
+        ("extend", |p| {
+            (p.pwm.min_on_time, p.pwm.short_pulse) = (1e-6, ShortPulse::Extend)
+        }),
+    ];
+    for (said, change) in refused {
+        let mut p = lossy();
+        change(&mut p);
+        let error = SpiceConverter::new(&p).unwrap_err().to_string();
+        assert!(error.contains(said), "{error}");
+    }
 }

@@ -8,7 +8,7 @@ use certify::{Certifier, Domain, Memory};
 use interp::{Controller, Sample};
 use ndarray::aview1;
 use policy::{Interval, NumericFormat, Policy};
-use verify::traces::Rng;
+use random::{Random, SplitMix};
 
 fn example(format: NumericFormat) -> Policy {
     policy::load(&tests::example()).unwrap().with_format(format)
@@ -21,7 +21,7 @@ fn held(controller: &Controller<f32>, observation: &[f32]) -> Vec<f64> {
 }
 
 /// A box inside a domain, of a random size in each direction.
-fn cell(rng: &mut Rng, domain: &Domain) -> Vec<Interval> {
+fn cell(rng: &mut SplitMix, domain: &Domain) -> Vec<Interval> {
     let size = 10_f64.powf(rng.uniform(-5.0, 0.0));
     let one = |range: Interval| {
         let width = size * rng.uniform(0.0, 1.0) * (range.high - range.low);
@@ -35,7 +35,7 @@ fn cell(rng: &mut Rng, domain: &Domain) -> Vec<Interval> {
 }
 
 /// A point of a box: a corner as often as not.
-fn point(rng: &mut Rng, cell: &[Interval]) -> Vec<f64> {
+fn point(rng: &mut SplitMix, cell: &[Interval]) -> Vec<f64> {
     let is_corner = rng.one_in(2);
     let one = |range: &Interval| match (is_corner, rng.below(2)) {
         (true, 0) => range.low,
@@ -51,7 +51,7 @@ fn argmax(q_values: &[f64]) -> usize {
 }
 
 /// Boxes and points of a policy's observations: how near the bounds come, or what contradicts them.
-fn check(policy: &Policy, rng: &mut Rng, boxes: usize) -> (f64, usize) {
+fn check(policy: &Policy, rng: &mut SplitMix, boxes: usize) -> (f64, usize) {
     let certifier = Certifier::new(policy);
     let controller = Controller::<f32>::new(policy);
     let domain = certifier.observations().clone();
@@ -106,7 +106,7 @@ fn check(policy: &Policy, rng: &mut Rng, boxes: usize) -> (f64, usize) {
 fn the_examples_error_stays_within_its_bound() {
     for format in NumericFormat::ALL {
         let policy = example(format);
-        let (nearest, decided) = check(&policy, &mut Rng::new(1), 150);
+        let (nearest, decided) = check(&policy, &mut SplitMix::new(1), 150);
         println!("{format:?}: nearest {nearest:.3} of the bound, {decided} of 150 boxes decided");
         // roundings of single operations hardly ever add up as they could
         let is_integer = policy::scales::is_integer(format);
@@ -120,7 +120,7 @@ fn the_examples_error_stays_within_its_bound() {
 
 #[test]
 fn random_policies_stay_within_their_bounds() {
-    let mut rng = Rng::new(2);
+    let mut rng = SplitMix::new(2);
     for seed in 500..530 {
         let folder = tests::random::policy(seed).unwrap();
         let policy = policy::load(&folder.path()).unwrap();
@@ -158,7 +158,7 @@ fn the_examples_features_come_in_pairs_of_opposite_sign() {
 /// States are described by coordinates; the controller's own observation must be what they say.
 #[test]
 fn the_observation_of_a_controller_lies_where_its_coordinates_say() {
-    let mut rng = Rng::new(3);
+    let mut rng = SplitMix::new(3);
     for seed in 600..640 {
         let folder = tests::random::policy(seed).unwrap();
         let policy = policy::load(&folder.path()).unwrap();

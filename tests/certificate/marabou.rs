@@ -6,8 +6,8 @@ use std::process::{Child, Stdio};
 
 use certify::Certifier;
 use policy::{Interval, NumericFormat, Policy};
+use random::{Random, SplitMix};
 use serde_json::{Value, json};
-use verify::traces::Rng;
 
 const BOXES: usize = 200;
 
@@ -94,7 +94,7 @@ fn marabou_contradicts_no_bound_and_no_decision_on_200_boxes() {
 
 fn score(policy: &Policy, certifier: &Certifier, boxes: usize) -> Score {
     let mut marabou = Marabou::start(policy);
-    let mut rng = Rng::new(4);
+    let mut rng = SplitMix::new(4);
     let domain = certifier.observations().clone();
     let mut score = Score::default();
     for turn in 0..boxes {
@@ -133,7 +133,7 @@ fn score(policy: &Policy, certifier: &Certifier, boxes: usize) -> Score {
 }
 
 /// A box that Marabou decides in milliseconds.
-fn small_cell(rng: &mut Rng, whole: &[Interval]) -> Vec<Interval> {
+fn small_cell(rng: &mut SplitMix, whole: &[Interval]) -> Vec<Interval> {
     let size = 10_f64.powf(rng.uniform(-4.0, -1.3));
     let one = |range: &Interval| {
         let width = size * (range.high - range.low);

@@ -191,7 +191,7 @@ fn a_transfer_that_cannot_be_is_answered_before_it_runs() {
         &["fast.toml", "different control periods"],
     );
     desk.write("cases.toml", &CASES.replace("plant = ", "# "));
-    desk.refuse(&format!("{line} buck12"), &["cases.toml: no plant", "trained on"]);
+    desk.refuse(&format!("{line} buck12"), &["no plant", "--> cases.toml", "trained on"]);
     assert!(!desk.path("out").exists());
 }
 

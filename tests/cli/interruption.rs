@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
-use ::verify::traces::Rng;
+use random::{Random, SplitMix};
 use tests::tools::listing;
 #[cfg(unix)]
 use tests::tools::run;
@@ -96,7 +96,7 @@ fn a_killed_run_leaves_each_file_old_or_new_and_the_next_run_tidies_up() {
     let started = Instant::now();
     assert!(pair.start(0).wait().unwrap().success());
     let whole_run = started.elapsed();
-    let mut rng = Rng::new(1);
+    let mut rng = SplitMix::new(1);
     let (mut at_work, mut while_writing) = (0, 0);
     for round in 0..120 {
         let child = pair.start(round % 2);

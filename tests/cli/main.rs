@@ -4,7 +4,9 @@
 mod budget;
 mod certify;
 mod commands;
+mod decisions;
 mod drm;
+mod faults;
 mod files;
 mod interruption;
 mod simulate;

@@ -213,7 +213,7 @@ fn what_cannot_be_simulated_is_refused_and_nothing_is_written() {
         "simulate s.toml --policy policy --out out --plant nowhere.toml",
         &["nowhere.toml"],
     );
-    with("v_ref = 100.0\n", &["s.toml: no plant", "--plant"]);
+    with("v_ref = 100.0\n", &["--> s.toml", "no plant", "--plant"]);
     with("plant = \"plants/none.toml\"\n", &["plants/none.toml"]);
     with(
         &SCENARIO.replace("lead", "leap"),

@@ -205,7 +205,7 @@ fn an_unknown_output_is_refused_with_the_nearest_and_nothing_written() {
     for (flag, name) in [("--emit", "sfuncton"), ("--door", "sfuncton"), ("--lang", "c,sfuncton")] {
         let ran = desk.type_in(&format!("compile policy {flag} {name} --out out"));
         assert_eq!(ran.code, Some(2), "{}", ran.stderr);
-        for words in ["'sfuncton'", "a similar value exists: 'sfunction'", "rust-over-c"] {
+        for words in ["unknown output `sfuncton`", "did you mean `sfunction`?", "rust-over-c"] {
             assert!(ran.stderr.contains(words), "{words}\n{}", ran.stderr);
         }
     }

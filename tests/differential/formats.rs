@@ -2,6 +2,7 @@
 
 use interp::Controller;
 use policy::{NumericFormat, Policy, scales};
+use random::{Random, SplitMix};
 use verify::{Files, Options};
 
 use super::{COMPILERS, assert_equal, assert_random_policies_are_equal, run};
@@ -157,7 +158,7 @@ fn flipped(text: &str, table: &str) -> String {
 fn worst_error(policy: &Policy, format: NumericFormat) -> f64 {
     let real = Controller::<f64>::new(policy);
     let integer = Controller::<f32>::new(&policy.clone().with_format(format));
-    let mut rng = verify::traces::Rng::new(3);
+    let mut rng = SplitMix::new(3);
     let (mut worst, mut low, mut high) = (0.0_f64, f64::INFINITY, f64::NEG_INFINITY);
     for _ in 0..4000 {
         let o: Vec<f32> = policy
@@ -199,7 +200,7 @@ fn the_integer_networks_stay_near_the_real_one() {
 #[test]
 fn neurons_of_very_different_sizes_are_no_worse() {
     let example = policy::load(&tests::example()).unwrap();
-    let mut rng = verify::traces::Rng::new(11);
+    let mut rng = SplitMix::new(11);
     let mut policy = example.clone();
     for index in 0..policy.layers.len() - 1 {
         for neuron in 0..policy.layers[index].outputs {

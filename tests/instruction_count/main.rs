@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use policy::Policy;
-use verify::traces::Rng;
+use random::{Random, SplitMix};
 
 /// Calls counted per program.
 const CALLS: usize = 256;
@@ -117,7 +117,7 @@ fn c_program(policy: &Policy, folder: &Path, compiler: &str, level: &str) -> Pat
 
 /// Samples as bits per call and signal: inside the range, anywhere among the floats, not a number.
 fn samples(policy: &Policy) -> Vec<Vec<u32>> {
-    let mut rng = Rng::new(7);
+    let mut rng = SplitMix::new(7);
     let mut sample = |signal: &policy::Signal| match (rng.below(4), signal.adc) {
         (0, None) => rng.bits() as u32,
         (0, Some(_)) => rng.bits() as u32,

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use codegen::{CodegenError, Output};
 use policy::Policy;
+use random::{Random, SplitMix};
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensorError};
 use targets::TargetSpec;
-use verify::traces::Rng;
 
 /// How a network is drawn: `# network: seed 7, widths 3-33-20`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -38,7 +38,7 @@ impl Recipe {
     /// # Errors
     /// If the widths make no network.
     pub fn network(&self) -> Result<Vec<u8>, SafeTensorError> {
-        let mut rng = Rng::new(self.seed);
+        let mut rng = SplitMix::new(self.seed);
         let mut tensors = Vec::new();
         for (layer, pair) in self.widths.windows(2).enumerate() {
             let (inputs, outputs) = (pair[0], pair[1]);

@@ -5,9 +5,9 @@ use std::fmt::Write;
 use std::path::Path;
 
 use policy::Activation;
+use random::{Random, SplitMix};
 use safetensors::Dtype;
 use safetensors::tensor::TensorView;
-use verify::traces::Rng;
 
 /// A policy folder.
 pub struct Folder {
@@ -31,7 +31,7 @@ impl Folder {
 /// If the folder cannot be written.
 pub fn policy(seed: u64) -> std::io::Result<Folder> {
     let folder = tempfile::tempdir()?;
-    let mut rng = Rng::new(seed);
+    let mut rng = SplitMix::new(seed);
     let features = 1 + rng.below(9);
     let actions = 2 + rng.below(32);
     let hidden: Vec<usize> = (0..1 + rng.below(4)).map(|_| 1 + rng.below(40)).collect();
@@ -41,7 +41,7 @@ pub fn policy(seed: u64) -> std::io::Result<Folder> {
     Ok(Folder { folder, contract })
 }
 
-fn contract(rng: &mut Rng, seed: u64, features: usize, actions: usize, hidden: usize) -> String {
+fn contract(rng: &mut SplitMix, seed: u64, features: usize, actions: usize, hidden: usize) -> String {
     let mut text = format!(
         "name = \"random{seed}\"\nsample_period = {:?}\n\n",
         rng.uniform(1e-5, 1e-3)
@@ -79,8 +79,8 @@ fn contract(rng: &mut Rng, seed: u64, features: usize, actions: usize, hidden: u
     text
 }
 
-fn feature(text: &mut String, rng: &mut Rng, index: usize, signals: usize) {
-    let s = |rng: &mut Rng| format!("s{}", rng.below(signals));
+fn feature(text: &mut String, rng: &mut SplitMix, index: usize, signals: usize) {
+    let s = |rng: &mut SplitMix| format!("s{}", rng.below(signals));
     let source = match rng.below(7) {
         0 => s(rng),
         1 => format!("k1 - {}", s(rng)),
@@ -112,7 +112,7 @@ fn feature(text: &mut String, rng: &mut Rng, index: usize, signals: usize) {
     text.push('\n');
 }
 
-fn filter(rng: &mut Rng) -> String {
+fn filter(rng: &mut SplitMix) -> String {
     let tau = rng.uniform(1e-5, 1e-2);
     match rng.below(6) {
         0 => format!("{{ delay = {} }}", 1 + rng.below(4)),
@@ -124,7 +124,7 @@ fn filter(rng: &mut Rng) -> String {
     }
 }
 
-fn action_table(text: &mut String, rng: &mut Rng, actions: usize) {
+fn action_table(text: &mut String, rng: &mut SplitMix, actions: usize) {
     // pairs give three duties each; what is left over becomes a shorter list of factors
     if rng.one_in(2) {
         let duties: Vec<String> = (0..actions).map(|_| format!("{:?}", rng.uniform(0.0, 1.0))).collect();
@@ -145,7 +145,7 @@ fn action_table(text: &mut String, rng: &mut Rng, actions: usize) {
     let _ = writeln!(text, "[actions]\npairs = [{}]\n", pairs.join(", "));
 }
 
-fn protection(text: &mut String, rng: &mut Rng, signals: usize) {
+fn protection(text: &mut String, rng: &mut SplitMix, signals: usize) {
     if !rng.one_in(3) {
         let _ = writeln!(
             text,
@@ -178,7 +178,13 @@ fn protection(text: &mut String, rng: &mut Rng, signals: usize) {
 }
 
 /// Weights and, used or not, a mapping.
-fn weights(rng: &mut Rng, folder: &Path, features: usize, hidden: &[usize], actions: usize) -> std::io::Result<()> {
+fn weights(
+    rng: &mut SplitMix,
+    folder: &Path,
+    features: usize,
+    hidden: &[usize],
+    actions: usize,
+) -> std::io::Result<()> {
     let widths: Vec<usize> = std::iter::once(features)
         .chain(hidden.iter().copied())
         .chain([actions])
@@ -222,7 +228,7 @@ fn weights(rng: &mut Rng, folder: &Path, features: usize, hidden: &[usize], acti
     std::fs::write(folder.join("drm.toml"), text)
 }
 
-fn weight(rng: &mut Rng, spread: f64) -> f32 {
+fn weight(rng: &mut SplitMix, spread: f64) -> f32 {
     match rng.below(24) {
         0 => 0.0,
         1 => -0.0,

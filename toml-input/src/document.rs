@@ -6,6 +6,7 @@ use toml::de::{DeTable, DeValue};
 
 use crate::fault::{Fault, Faults, Message};
 use crate::messages;
+use crate::sink::Sink;
 use crate::source::{FileName, Source, Span};
 use crate::table::Table;
 use crate::value::Value;
@@ -47,12 +48,12 @@ pub struct Document {
 }
 
 impl Document {
-    /// Reads the file at `path`, at most [`MAX_TOML_BYTES`] long.
+    /// Reads a file, at most [`MAX_TOML_BYTES`] long.
     ///
     /// # Errors
     /// If it cannot be read, is no UTF-8 text or no valid TOML.
-    pub fn open(path: &Path) -> Result<Self, Faults> {
-        let name = FileName::new(path);
+    pub fn open(file: impl Into<FileName>) -> Result<Self, Faults> {
+        let name: FileName = file.into();
         let bytes = name.read(MAX_TOML_BYTES).map_err(|message| name.fault(message))?;
         Self::sound(Source::new(name, bytes).map_err(|fault| *fault)?)
     }
@@ -69,26 +70,26 @@ impl Document {
     }
 
     fn sound(source: Source) -> Result<Self, Faults> {
-        let (document, faults) = Self::parse(source);
-        Faults::unless_empty(faults).map(|()| document)
+        let mut faults = Sink::new();
+        let document = Self::parse(source, &mut faults);
+        faults.propagate().map(|()| document)
     }
 
     /// Parses `source`; with faults of syntax the document holds what could be recovered.
-    #[must_use]
-    pub fn parse(source: Source) -> (Self, Vec<Fault>) {
+    pub fn parse(source: Source, faults: &mut Sink) -> Self {
         let (tree, errors) = DeTable::parse_recoverable(&source.text);
-        let mut faults: Vec<Fault> = Vec::new();
+        let mut found: Vec<Fault> = Vec::new();
         for error in &errors {
             let span = error.span().unwrap_or(0..0);
             let fault = source.fault(&span, syntax(&source.text, &span, error.message()));
             let line = |f: &Fault| f.line_column().map(|(line, _)| line);
-            if faults.iter().all(|known| line(known) != line(&fault)) {
-                faults.push(fault);
+            if found.iter().all(|known| line(known) != line(&fault)) {
+                found.push(fault);
             }
         }
-        faults.truncate(MAX_SYNTAX_FAULTS);
+        faults.extend(found.into_iter().take(MAX_SYNTAX_FAULTS));
         let root = entries(tree.get_ref());
-        (Document { source, root }, faults)
+        Document { source, root }
     }
 
     /// The file by name and text.
@@ -107,8 +108,8 @@ impl Document {
     ///
     /// # Errors
     /// All faults, in the order of the file.
-    pub fn read<T>(&self, read: impl FnOnce(&mut Table<'_>, &mut Vec<Fault>) -> Option<T>) -> Result<T, Faults> {
-        let mut faults = Vec::new();
+    pub fn read<T>(&self, read: impl FnOnce(&mut Table<'_>, &mut Sink) -> Option<T>) -> Result<T, Faults> {
+        let mut faults = Sink::new();
         let mut root = self.root();
         let value = read(&mut root, &mut faults);
         root.finish(&mut faults);
@@ -119,10 +120,8 @@ impl Document {
     ///
     /// # Errors
     /// The faults in the order of the file; a fault as well if there is no value for no reason given.
-    pub fn conclude<T>(&self, value: Option<T>, faults: Vec<Fault>) -> Result<T, Faults> {
-        Faults::unless_empty(faults)?;
-        // a part that is missing has left a fault; if ever one did not, refuse all the same
-        value.ok_or_else(|| self.source.name.fault(messages::incomplete()).into())
+    pub fn conclude<T>(&self, value: Option<T>, faults: Sink) -> Result<T, Faults> {
+        faults.conclude(value, || self.source.name.fault(messages::incomplete()))
     }
 
     /// A fault at `span` of the text.

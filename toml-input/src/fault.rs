@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use crate::nearest::did_you_mean;
+
 /// Where a fault lies.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
@@ -64,6 +66,12 @@ impl Fault {
         }
     }
 
+    /// `message` about a file as a whole.
+    #[must_use]
+    pub fn in_file(file: &Path, message: Message) -> Self {
+        Fault::new(file, Place::File, message)
+    }
+
     /// Line and column, both from 1, if the fault lies in text.
     #[must_use]
     pub fn line_column(&self) -> Option<(usize, usize)> {
@@ -123,6 +131,12 @@ impl Message {
         self
     }
 
+    /// The nearest of `candidates` to `name` as the hint, if one is near.
+    #[must_use]
+    pub fn did_you_mean<'a>(self, name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Self {
+        self.maybe_hint(did_you_mean(name, candidates))
+    }
+
     /// What to do, if anything is known; an earlier hint stays otherwise.
     #[must_use]
     pub fn maybe_hint(mut self, text: Option<String>) -> Self {
@@ -140,18 +154,6 @@ pub struct Faults {
 }
 
 impl Faults {
-    /// Nothing wrong if `list` is empty.
-    ///
-    /// # Errors
-    /// The faults of `list` in the order of [`in_file_order`], if there are any.
-    pub fn unless_empty(mut list: Vec<Fault>) -> Result<(), Self> {
-        if list.is_empty() {
-            return Ok(());
-        }
-        in_file_order(&mut list);
-        Err(Faults { list })
-    }
-
     /// The faults, in order.
     pub fn iter(&self) -> std::slice::Iter<'_, Fault> {
         self.list.iter()
@@ -162,6 +164,13 @@ impl Faults {
 impl From<Fault> for Faults {
     fn from(fault: Fault) -> Self {
         Faults { list: vec![fault] }
+    }
+}
+
+/// A single fault that lies in no file.
+impl From<Message> for Faults {
+    fn from(message: Message) -> Self {
+        Fault::from(message).into()
     }
 }
 
@@ -178,12 +187,18 @@ impl std::error::Error for Faults {}
 
 impl fmt::Display for Faults {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write_list(&self.list, f)
+        for (index, fault) in self.list.iter().enumerate() {
+            if index > 0 {
+                writeln!(f)?;
+            }
+            write!(f, "{fault}")?;
+        }
+        Ok(())
     }
 }
 
 /// Sorts by file as first mentioned, then by line and column; each fault is kept once.
-pub fn in_file_order(faults: &mut Vec<Fault>) {
+pub(crate) fn in_file_order(faults: &mut Vec<Fault>) {
     let mut files = Vec::new();
     for fault in faults.iter() {
         if !files.contains(&fault.file) {
@@ -193,20 +208,6 @@ pub fn in_file_order(faults: &mut Vec<Fault>) {
     let order = |fault: &Fault| (files.iter().position(|file| *file == fault.file), fault.line_column());
     faults.sort_by_key(order);
     faults.dedup();
-}
-
-/// Writes faults one below the other, an empty line between them.
-///
-/// # Errors
-/// Those of `f`.
-pub fn write_list(faults: &[Fault], f: &mut fmt::Formatter<'_>) -> fmt::Result {
-    for (index, fault) in faults.iter().enumerate() {
-        if index > 0 {
-            writeln!(f)?;
-        }
-        write!(f, "{fault}")?;
-    }
-    Ok(())
 }
 
 impl fmt::Display for Fault {

@@ -1,11 +1,12 @@
 //! Input files: TOML in which every value knows its place, and faults that say where and what to do.
 //!
 //! A reader asks a [`Table`] for its keys and a [`Value`] for what it should be. What is wrong is collected, not
-//! first-come: a reader that returns nothing has left a [`Fault`]. Keys that nobody asked for are faults as well.
+//! first-come: a reader that returns nothing has left a [`Fault`] in the [`Sink`]. Keys that nobody asked for are faults as
+//! well.
 //!
 //! ```
 //! use std::path::Path;
-//! use toml_input::{Document, Fault, Faults, Table};
+//! use toml_input::{Document, Faults, Sink, Table};
 //!
 //! struct Step {
 //!     at: f64,
@@ -28,7 +29,7 @@
 //!     })
 //! }
 //!
-//! fn step(table: &mut Table<'_>, faults: &mut Vec<Fault>) -> Option<Step> {
+//! fn step(table: &mut Table<'_>, faults: &mut Sink) -> Option<Step> {
 //!     let at = table.required("at", "time of the step, s", faults).and_then(|v| v.positive(faults));
 //!     let load = table.required("load", "power, W", faults).and_then(|v| v.number_within(0.0..=1e4, faults));
 //!     Some(Step { at: at?, load: load? })
@@ -65,13 +66,15 @@ mod document;
 mod fault;
 pub mod messages;
 mod nearest;
+mod sink;
 mod source;
 mod table;
 mod value;
 
 pub use document::{At, Document, MAX_SYNTAX_FAULTS, MAX_TOML_BYTES};
-pub use fault::{Fault, Faults, Message, Place, in_file_order, write_list};
-pub use nearest::nearest;
-pub use source::{FileName, Source, Span};
+pub use fault::{Fault, Faults, Message, Place};
+pub use nearest::{did_you_mean, nearest};
+pub use sink::Sink;
+pub use source::{FileName, Origin, Source, Span};
 pub use table::Table;
 pub use value::Value;

@@ -4,16 +4,20 @@
 //! level of the file.
 
 use std::io;
+use std::path::Path;
 
 use crate::fault::Message;
 use crate::nearest::nearest;
+use crate::source::Origin;
 
 // --- files ---
 
-pub(crate) fn unreadable(file: &str, error: &io::Error) -> Message {
+pub(crate) fn unreadable(file: &str, origin: Origin, error: &io::Error) -> Message {
     match error.kind() {
-        io::ErrorKind::NotFound => Message::new(format!("cannot find the file `{file}`"))
-            .hint("paths are relative to the folder of the file that names them"),
+        io::ErrorKind::NotFound => {
+            let relative = Path::new(file).is_relative().then(|| origin.relative_to().to_owned());
+            Message::new(format!("cannot find the file `{file}`")).maybe_hint(relative)
+        }
         io::ErrorKind::PermissionDenied => Message::new(format!("may not read the file `{file}`")),
         _ => Message::new(format!("cannot read the file `{file}`")).found(error.to_string()),
     }
@@ -43,6 +47,16 @@ pub(crate) fn incomplete() -> Message {
     Message::new("the file is incomplete").hint("please report this: the missing part should have been named")
 }
 
+// --- names ---
+
+/// A name that is none of the `known` ones of its kind (`target`, `output`); the hint is the nearest of them.
+#[must_use]
+pub fn unknown(kind: &str, found: &str, known: &[&str]) -> Message {
+    Message::new(format!("unknown {kind} `{}`", found.escape_debug()))
+        .expected(format!("one of {}", known.join(", ")))
+        .did_you_mean(found, known.iter().copied())
+}
+
 // --- form ---
 
 pub(crate) fn syntax(message: &str, decimal_comma: bool) -> Message {
@@ -64,10 +78,9 @@ fn place(title: &str) -> String {
 /// A key that the table does not have; the hint is the nearest of `known`.
 #[must_use]
 pub fn unknown_key(key: &str, title: &str, known: &[&str]) -> Message {
-    let hint = nearest(key, known.iter().copied()).map(|name| format!("did you mean `{name}`?"));
     Message::new(format!("unknown key `{}` {}", key.escape_debug(), place(title)))
         .expected(format!("one of {}", known.join(", ")))
-        .maybe_hint(hint)
+        .did_you_mean(key, known.iter().copied())
 }
 
 /// A key that the table must have.

@@ -1,5 +1,10 @@
 //! Did you mean ...?
 
+/// The hint where `name` is none of the `candidates`, if one of them is near.
+pub fn did_you_mean<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
+    nearest(name, candidates).map(|near| format!("did you mean `{near}`?"))
+}
+
 /// The candidate that differs least from `name`, if the difference is small enough for a slip.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let limit = (name.chars().count() / 3).clamp(1, 3);
@@ -8,8 +13,15 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .filter(|candidate| candidate.len().abs_diff(name.len()) <= 8)
         .map(|candidate| (distance(name, candidate), candidate))
         .filter(|(distance, _)| *distance <= limit)
-        .min_by_key(|(distance, _)| *distance)
+        // of two at one distance the one of which `name` is a part: `cortexm4` is `cortex-m4f` cut short, not `cortex-m3`
+        .min_by_key(|(distance, candidate)| (*distance, !is_cut_from(name, candidate)))
         .map(|(_, candidate)| candidate)
+}
+
+/// Whether all characters of `name` stand in `whole` in this order.
+fn is_cut_from(name: &str, whole: &str) -> bool {
+    let mut rest = whole.chars();
+    name.chars().all(|c| rest.any(|other| other == c))
 }
 
 /// Levenshtein distance.

@@ -9,22 +9,57 @@ use crate::messages;
 /// Byte range in a text.
 pub type Span = Range<usize>;
 
+/// Who named a file: what its path is relative to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Origin {
+    /// A person or a program: the working folder.
+    Caller,
+    /// Another file: that file's folder.
+    File,
+}
+
+impl Origin {
+    pub(crate) fn relative_to(self) -> &'static str {
+        match self {
+            Origin::Caller => "a path on the command line is relative to the working folder",
+            Origin::File => "paths are relative to the folder of the file that names them",
+        }
+    }
+}
+
 /// A file by two names: where to open it, and how to show it.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileName {
     /// Path to open.
     pub path: PathBuf,
     /// Path as the user gave it, for messages.
     pub shown: PathBuf,
+    /// Who named it.
+    pub origin: Origin,
 }
 
 impl FileName {
-    /// A file that is shown by the path it is opened with.
+    /// A file that the caller named, shown by the path it is opened with.
     #[must_use]
     pub fn new(path: &Path) -> Self {
         FileName {
             path: path.to_path_buf(),
             shown: path.to_path_buf(),
+            origin: Origin::Caller,
+        }
+    }
+
+    /// The file that this one calls `text`: a path from its folder.
+    #[must_use]
+    pub fn beside(&self, text: &str) -> Self {
+        let join = |file: &Path| {
+            file.parent()
+                .map_or_else(|| PathBuf::from(text), |folder| folder.join(text))
+        };
+        FileName {
+            path: join(&self.path),
+            shown: join(&self.shown),
+            origin: Origin::File,
         }
     }
 
@@ -46,7 +81,7 @@ impl FileName {
     /// If it is no regular file, is larger than `limit` bytes, or cannot be read.
     pub fn read(&self, limit: u64) -> Result<Vec<u8>, Message> {
         let shown = self.shown.display().to_string();
-        let data = std::fs::metadata(&self.path).map_err(|e| messages::unreadable(&shown, &e))?;
+        let data = std::fs::metadata(&self.path).map_err(|e| messages::unreadable(&shown, self.origin, &e))?;
         if data.is_dir() {
             return Err(messages::is_folder(&shown));
         }
@@ -56,7 +91,13 @@ impl FileName {
         if data.len() > limit {
             return Err(messages::file_too_large(&shown, data.len(), limit));
         }
-        std::fs::read(&self.path).map_err(|e| messages::unreadable(&shown, &e))
+        std::fs::read(&self.path).map_err(|e| messages::unreadable(&shown, self.origin, &e))
+    }
+}
+
+impl<P: AsRef<Path> + ?Sized> From<&P> for FileName {
+    fn from(path: &P) -> Self {
+        FileName::new(path.as_ref())
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::document::{At, Document, Entries};
 use crate::fault::{Fault, Message};
 use crate::messages;
+use crate::sink::Sink;
 use crate::source::Span;
 use crate::value::Value;
 
@@ -43,7 +44,7 @@ impl<'a> Table<'a> {
     }
 
     /// The value of `key`; a fault with `hint` if it is missing.
-    pub fn required(&mut self, key: &'static str, hint: &str, faults: &mut Vec<Fault>) -> Option<Value<'a>> {
+    pub fn required(&mut self, key: &'static str, hint: &str, faults: &mut Sink) -> Option<Value<'a>> {
         let value = self.optional(key);
         if value.is_none() {
             faults.push(self.fault(messages::missing_key(key, &self.title, hint)));
@@ -56,8 +57,8 @@ impl<'a> Table<'a> {
         &mut self,
         key: &'static str,
         default: T,
-        faults: &mut Vec<Fault>,
-        read: impl FnOnce(&Value<'a>, &mut Vec<Fault>) -> Option<T>,
+        faults: &mut Sink,
+        read: impl FnOnce(&Value<'a>, &mut Sink) -> Option<T>,
     ) -> T {
         let value = self.optional(key);
         value.and_then(|value| read(&value, faults)).unwrap_or(default)
@@ -67,8 +68,8 @@ impl<'a> Table<'a> {
     pub fn section<T>(
         &mut self,
         key: &'static str,
-        faults: &mut Vec<Fault>,
-        read: impl FnOnce(&mut Table<'a>, &mut Vec<Fault>) -> Option<T>,
+        faults: &mut Sink,
+        read: impl FnOnce(&mut Table<'a>, &mut Sink) -> Option<T>,
     ) -> Option<T> {
         let title = format!("[{key}]");
         let mut table = match self.optional(key) {
@@ -84,8 +85,8 @@ impl<'a> Table<'a> {
     pub fn sections<T>(
         &mut self,
         key: &'static str,
-        faults: &mut Vec<Fault>,
-        read: impl Fn(&mut Table<'a>, &mut Vec<Fault>) -> Option<T>,
+        faults: &mut Sink,
+        read: impl Fn(&mut Table<'a>, &mut Sink) -> Option<T>,
     ) -> Vec<T> {
         let title = format!("[[{key}]]");
         let items = self
@@ -112,12 +113,12 @@ impl<'a> Table<'a> {
     }
 
     /// Reports keys nobody asked for.
-    pub fn finish(self, faults: &mut Vec<Fault>) {
+    pub fn finish(self, faults: &mut Sink) {
         self.finish_with(faults, |_| None);
     }
 
     /// Reports keys nobody asked for; `hint` may know better than the nearest key what is meant.
-    pub fn finish_with(self, faults: &mut Vec<Fault>, hint: impl Fn(&str) -> Option<String>) {
+    pub fn finish_with(self, faults: &mut Sink, hint: impl Fn(&str) -> Option<String>) {
         for (key, _) in self.entries {
             if !self.known.contains(&key.value.as_str()) {
                 let message = messages::unknown_key(&key.value, &self.title, &self.known);

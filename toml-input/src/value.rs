@@ -6,6 +6,7 @@ use std::ops::RangeInclusive;
 use crate::document::{At, Document, Node};
 use crate::fault::{Fault, Message};
 use crate::messages;
+use crate::sink::Sink;
 use crate::source::Span;
 use crate::table::Table;
 
@@ -112,7 +113,7 @@ impl<'a> Value<'a> {
         matches!(self.node.value, Node::Table(_))
     }
 
-    fn wrong(&self, expected: &str, faults: &mut Vec<Fault>) {
+    fn wrong(&self, expected: &str, faults: &mut Sink) {
         let message = match &self.node.value {
             Node::Text(text) if is_todo(text) => messages::still_todo(&self.label, expected),
             found => messages::wrong_type(&self.label, &describe(found), expected),
@@ -120,12 +121,12 @@ impl<'a> Value<'a> {
         faults.push(self.fault(message));
     }
 
-    fn out_of_range(&self, found: impl Display, expected: &str, faults: &mut Vec<Fault>) {
+    fn out_of_range(&self, found: impl Display, expected: &str, faults: &mut Sink) {
         faults.push(self.fault(messages::out_of_range(&self.label, &found.to_string(), expected)));
     }
 
     /// A finite number; integers are accepted.
-    pub fn number(&self, faults: &mut Vec<Fault>) -> Option<f64> {
+    pub fn number(&self, faults: &mut Sink) -> Option<f64> {
         match &self.node.value {
             Node::Float(value) if value.is_finite() => Some(*value),
             Node::Float(value) => {
@@ -141,7 +142,7 @@ impl<'a> Value<'a> {
     }
 
     /// A number within `range`; an end of `f64::MIN` or `f64::MAX` stands for none.
-    pub fn number_within(&self, range: RangeInclusive<f64>, faults: &mut Vec<Fault>) -> Option<f64> {
+    pub fn number_within(&self, range: RangeInclusive<f64>, faults: &mut Sink) -> Option<f64> {
         let number = self.number(faults)?;
         if range.contains(&number) {
             return Some(number);
@@ -157,7 +158,7 @@ impl<'a> Value<'a> {
     }
 
     /// A number above 0.
-    pub fn positive(&self, faults: &mut Vec<Fault>) -> Option<f64> {
+    pub fn positive(&self, faults: &mut Sink) -> Option<f64> {
         let number = self.number(faults)?;
         if number > 0.0 {
             return Some(number);
@@ -167,7 +168,7 @@ impl<'a> Value<'a> {
     }
 
     /// A whole number within `range`.
-    pub fn integer<T>(&self, range: RangeInclusive<T>, faults: &mut Vec<Fault>) -> Option<T>
+    pub fn integer<T>(&self, range: RangeInclusive<T>, faults: &mut Sink) -> Option<T>
     where
         T: TryFrom<i64> + PartialOrd + Display,
     {
@@ -184,7 +185,7 @@ impl<'a> Value<'a> {
     }
 
     /// A text that is not a placeholder (`"TODO"`).
-    pub fn text(&self, faults: &mut Vec<Fault>) -> Option<&'a str> {
+    pub fn text(&self, faults: &mut Sink) -> Option<&'a str> {
         let text = self.as_text().filter(|text| !is_todo(text));
         if text.is_none() {
             self.wrong("a text in quotes", faults);
@@ -193,7 +194,7 @@ impl<'a> Value<'a> {
     }
 
     /// A text that is one of `choices`, and what it stands for.
-    pub fn choice<T: Clone>(&self, choices: &[(&str, T)], faults: &mut Vec<Fault>) -> Option<T> {
+    pub fn choice<T: Clone>(&self, choices: &[(&str, T)], faults: &mut Sink) -> Option<T> {
         let text = self.text(faults)?;
         if let Some((_, meaning)) = choices.iter().find(|(word, _)| *word == text) {
             return Some(meaning.clone());
@@ -204,7 +205,7 @@ impl<'a> Value<'a> {
     }
 
     /// `true` or `false`.
-    pub fn boolean(&self, faults: &mut Vec<Fault>) -> Option<bool> {
+    pub fn boolean(&self, faults: &mut Sink) -> Option<bool> {
         if let Node::Boolean(value) = self.node.value {
             return Some(value);
         }
@@ -213,7 +214,7 @@ impl<'a> Value<'a> {
     }
 
     /// The elements of an array; `expected` says what an array is wanted.
-    pub fn list(&self, expected: &str, faults: &mut Vec<Fault>) -> Option<Vec<Value<'a>>> {
+    pub fn list(&self, expected: &str, faults: &mut Sink) -> Option<Vec<Value<'a>>> {
         let list = self.as_list();
         if list.is_none() {
             self.wrong(expected, faults);
@@ -225,8 +226,8 @@ impl<'a> Value<'a> {
     pub fn each<T>(
         &self,
         expected: &str,
-        faults: &mut Vec<Fault>,
-        read: impl Fn(&Value<'a>, &mut Vec<Fault>) -> Option<T>,
+        faults: &mut Sink,
+        read: impl Fn(&Value<'a>, &mut Sink) -> Option<T>,
     ) -> Option<Vec<T>> {
         let items = self.list(expected, faults)?;
         // all are read before one that is missing ends it, so that all faults are found
@@ -235,17 +236,17 @@ impl<'a> Value<'a> {
     }
 
     /// Two numbers within `range`.
-    pub fn pair(&self, range: RangeInclusive<f64>, faults: &mut Vec<Fault>) -> Option<[f64; 2]> {
+    pub fn pair(&self, range: RangeInclusive<f64>, faults: &mut Sink) -> Option<[f64; 2]> {
         self.two("two numbers", range, faults)
     }
 
     /// `[low, high]` with `low <= high`.
-    pub fn interval(&self, faults: &mut Vec<Fault>) -> Option<[f64; 2]> {
+    pub fn interval(&self, faults: &mut Sink) -> Option<[f64; 2]> {
         self.interval_within(f64::MIN..=f64::MAX, faults)
     }
 
     /// `[low, high]` with `low <= high`, both within `range`.
-    pub fn interval_within(&self, range: RangeInclusive<f64>, faults: &mut Vec<Fault>) -> Option<[f64; 2]> {
+    pub fn interval_within(&self, range: RangeInclusive<f64>, faults: &mut Sink) -> Option<[f64; 2]> {
         let [low, high] = self.two("two numbers: [low, high]", range, faults)?;
         if low <= high {
             return Some([low, high]);
@@ -254,7 +255,7 @@ impl<'a> Value<'a> {
         None
     }
 
-    fn two(&self, expected: &str, range: RangeInclusive<f64>, faults: &mut Vec<Fault>) -> Option<[f64; 2]> {
+    fn two(&self, expected: &str, range: RangeInclusive<f64>, faults: &mut Sink) -> Option<[f64; 2]> {
         let items = self.list(expected, faults)?;
         let numbers: Vec<_> = items
             .iter()
@@ -268,7 +269,7 @@ impl<'a> Value<'a> {
     }
 
     /// The table, to be finished by the caller; `title` as the user knows it, such as `[network]`.
-    pub fn table(&self, title: &str, faults: &mut Vec<Fault>) -> Option<Table<'a>> {
+    pub fn table(&self, title: &str, faults: &mut Sink) -> Option<Table<'a>> {
         let Node::Table(entries) = &self.node.value else {
             self.wrong("a table", faults);
             return None;
@@ -277,7 +278,7 @@ impl<'a> Value<'a> {
     }
 
     /// All keys and values of a table whose keys the user chooses.
-    pub fn pairs(&self, faults: &mut Vec<Fault>) -> Option<Vec<(&'a At<String>, Value<'a>)>> {
+    pub fn pairs(&self, faults: &mut Sink) -> Option<Vec<(&'a At<String>, Value<'a>)>> {
         let Node::Table(entries) = &self.node.value else {
             self.wrong("a table", faults);
             return None;
@@ -290,8 +291,8 @@ impl<'a> Value<'a> {
     pub fn read_table<T>(
         &self,
         title: &str,
-        faults: &mut Vec<Fault>,
-        read: impl FnOnce(&mut Table<'a>, &mut Vec<Fault>) -> Option<T>,
+        faults: &mut Sink,
+        read: impl FnOnce(&mut Table<'a>, &mut Sink) -> Option<T>,
     ) -> Option<T> {
         let mut table = self.table(title, faults)?;
         let result = read(&mut table, faults);

@@ -4,14 +4,16 @@
 
 use std::path::Path;
 
-use toml_input::{Document, Fault, Faults, MAX_TOML_BYTES, Message, Place, Table, Value, nearest};
+use toml_input::{
+    Document, Fault, Faults, FileName, MAX_TOML_BYTES, Message, Place, Sink, Table, Value, messages, nearest,
+};
 
-fn read<T>(text: &str, read: impl FnOnce(&mut Table<'_>, &mut Vec<Fault>) -> Option<T>) -> Result<T, Faults> {
+fn read<T>(text: &str, read: impl FnOnce(&mut Table<'_>, &mut Sink) -> Option<T>) -> Result<T, Faults> {
     Document::from_text(Path::new("in.toml"), text)?.read(read)
 }
 
 /// The faults of a file whose only key is `x`.
-fn faults<T>(text: &str, get: impl FnOnce(&Value<'_>, &mut Vec<Fault>) -> Option<T>) -> String {
+fn faults<T>(text: &str, get: impl FnOnce(&Value<'_>, &mut Sink) -> Option<T>) -> String {
     let read = read(text, |root, faults| {
         root.required("x", "give x", faults).and_then(|v| get(&v, faults))
     });
@@ -30,7 +32,7 @@ fn typed_values_are_read() {
         assert_eq!(root.optional("r")?.interval(faults), Some([1.0, 2.5]));
         let list = root.optional("l")?.each("numbers", faults, Value::positive);
         assert_eq!(list, Some(vec![1.0, 2.0]));
-        let a = |t: &mut Table<'_>, f: &mut Vec<Fault>| t.required("a", "", f)?.integer(0..=9_u32, f);
+        let a = |t: &mut Table<'_>, f: &mut Sink| t.required("a", "", f)?.integer(0..=9_u32, f);
         assert_eq!(root.section("t", faults, a), Some(1));
         Some(root.sections("s", faults, a))
     });
@@ -40,7 +42,7 @@ fn typed_values_are_read() {
 #[test]
 fn what_is_left_out_takes_its_default() {
     let values = read("", |root, faults| {
-        let inner = |t: &mut Table<'_>, f: &mut Vec<Fault>| Some(t.with_default("a", 5.0, f, Value::number));
+        let inner = |t: &mut Table<'_>, f: &mut Sink| Some(t.with_default("a", 5.0, f, Value::number));
         Some((root.section("t", faults, inner)?, root.sections("s", faults, inner)))
     });
     assert_eq!(values.unwrap(), (5.0, vec![]));
@@ -103,9 +105,10 @@ fn every_faulty_element_of_a_list_is_named() {
 #[test]
 fn unknown_keys_are_faults_and_a_reader_may_know_the_hint() {
     let document = Document::from_text(Path::new("in.toml"), "lenght = 1\nzzz = 2\n").unwrap();
-    let (mut root, mut faults) = (document.root(), Vec::new());
+    let (mut root, mut faults) = (document.root(), Sink::new());
     assert_eq!((root.optional("length").is_none(), root.count()), (true, 2));
     root.finish_with(&mut faults, |key| (key == "zzz").then(|| "try length".to_owned()));
+    let faults = faults.propagate().unwrap_err();
     let hints: Vec<_> = faults.iter().map(|fault| fault.hint.as_deref()).collect();
     assert_eq!(hints, [Some("did you mean `length`?"), Some("try length")]);
     assert_eq!(nearest("ab", ["zz", "xyz"]), None);
@@ -200,6 +203,32 @@ fn files_are_read_within_their_limits() {
     let said = |path: &Path| Document::open(path).unwrap_err().to_string();
     assert!(said(folder.path()).contains("is a folder"));
     assert!(said(&folder.path().join("none.toml")).contains("cannot find the file"));
+    assert!(
+        !said(&folder.path().join("none.toml")).contains("relative"),
+        "the path is absolute"
+    );
     #[cfg(unix)]
     assert!(said(Path::new("/dev/null")).contains("is not a regular file"));
+}
+
+#[test]
+fn what_a_missing_file_is_relative_to_follows_from_who_named_it() {
+    let said = |name: FileName| Document::open(name).unwrap_err().to_string();
+    let typed = FileName::new(Path::new("nope/in.toml"));
+    assert!(said(typed.clone()).contains("relative to the working folder"));
+    let named = typed.beside("other.toml");
+    assert_eq!(named.shown, Path::new("nope/other.toml"));
+    assert!(said(named).contains("relative to the folder of the file that names them"));
+}
+
+#[test]
+fn an_unknown_name_is_answered_with_all_and_the_nearest() {
+    let fault = Fault::from(messages::unknown(
+        "target",
+        "cortexm4",
+        &["host", "cortex-m3", "cortex-m4f"],
+    ));
+    assert_eq!(fault.problem, "unknown target `cortexm4`");
+    assert_eq!(fault.expected.as_deref(), Some("one of host, cortex-m3, cortex-m4f"));
+    assert_eq!(fault.hint.as_deref(), Some("did you mean `cortex-m4f`?"));
 }

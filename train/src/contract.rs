@@ -299,7 +299,7 @@ fn check(files: &Files, path: &Path) -> Result<Policy, Error> {
     policy::load(&folder.path().join("policy.toml"))
         .map_err(|mut faults| {
             let rename = |fault: &mut Fault| fault.file = named(&fault.file);
-            faults.list.iter_mut().for_each(rename);
+            faults.faults.list.iter_mut().for_each(rename);
             Error::Policy(faults)
         })
         .map(|mut policy| {

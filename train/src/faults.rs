@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use toml_input::Faults;
+use toml_input::{Faults, Message};
 
 /// Why a training could not start, go on or be saved.
 #[derive(Debug)]
@@ -46,6 +46,17 @@ impl std::error::Error for Error {}
 impl From<Faults> for Error {
     fn from(faults: Faults) -> Self {
         Self::Settings(faults)
+    }
+}
+
+impl From<Error> for Faults {
+    fn from(error: Error) -> Self {
+        match error {
+            Error::Settings(faults) => faults,
+            Error::Policy(faults) => faults.into(),
+            Error::Loop(error) => error.into(),
+            Error::Checkpoint(_) | Error::Mismatch(_) | Error::File { .. } => Message::new(error.to_string()).into(),
+        }
     }
 }
 

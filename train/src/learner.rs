@@ -1,9 +1,10 @@
 //! DQN (Mnih et al., 2015; van Hasselt et al., 2016): from a batch of transitions to better parameters.
 
+use random::Xoshiro;
+
 use crate::network::{Activations, Backward, Network};
 use crate::optimiser::{Adam, AdamSettings, clip};
 use crate::replay::{Batch, ReplayBuffer};
-use crate::rng::Rng;
 
 /// How the target network follows.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -94,7 +95,7 @@ impl Learner {
     }
 
     /// One update from transitions drawn from `replay`, which must not be empty. Returns the loss.
-    pub fn update(&mut self, replay: &ReplayBuffer, learning_rate: f64, rng: &mut Rng) -> f64 {
+    pub fn update(&mut self, replay: &ReplayBuffer, learning_rate: f64, rng: &mut Xoshiro) -> f64 {
         let mut batch = std::mem::take(&mut self.batch);
         replay.sample(self.settings.batch, rng, &mut batch);
         let loss = self.update_on(&batch, learning_rate);

@@ -20,7 +20,6 @@ pub mod optimiser;
 pub mod outcome;
 pub mod replay;
 mod resume;
-pub mod rng;
 pub mod score;
 pub mod seeds;
 pub mod settings;

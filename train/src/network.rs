@@ -8,8 +8,7 @@ use std::ops::Range;
 use ndarray::linalg::general_mat_mul;
 use ndarray::{ArrayView2, ArrayViewMut2};
 use policy::{Activation, Shape};
-
-use crate::rng::Rng;
+use random::{Random, Xoshiro};
 
 /// One layer and where its parameters lie.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,11 +81,11 @@ impl Network {
     }
 
     /// PyTorch's default for `nn.Linear`: weights and bias uniform over +-1/sqrt(inputs).
-    pub fn initialise(&mut self, rng: &mut Rng) {
+    pub fn initialise(&mut self, rng: &mut Xoshiro) {
         for layer in &self.layers {
             let bound = 1.0 / (layer.inputs as f64).sqrt();
             for parameter in &mut self.parameters[layer.weights.start..layer.bias.end] {
-                *parameter = rng.within(-bound, bound) as f32;
+                *parameter = rng.uniform(-bound, bound) as f32;
             }
         }
     }

@@ -1,6 +1,6 @@
 //! The replay buffer: a ring of transitions, allocated once.
 
-use crate::rng::Rng;
+use random::{Random, Xoshiro};
 
 /// Words of a transition beside its two observations: action, reward, terminated.
 const EXTRA: usize = 3;
@@ -91,11 +91,11 @@ impl ReplayBuffer {
     }
 
     /// Draws `size` transitions with replacement; the buffer must not be empty.
-    pub fn sample(&self, size: usize, rng: &mut Rng, batch: &mut Batch) {
+    pub fn sample(&self, size: usize, rng: &mut Xoshiro, batch: &mut Batch) {
         batch.clear();
         let (count, f, stride) = (self.len(), self.features, self.stride());
         for _ in 0..size {
-            let at = rng.index(count) * stride;
+            let at = rng.below(count) * stride;
             let row = &self.rows[at..at + stride];
             batch.observations.extend_from_slice(&row[..f]);
             batch.next_observations.extend_from_slice(&row[f..2 * f]);
@@ -145,7 +145,7 @@ mod tests {
     fn a_sampled_transition_is_one_that_was_stored() {
         let replay = filled(50, 80);
         let mut batch = Batch::default();
-        replay.sample(500, &mut Rng::new(3, 0), &mut batch);
+        replay.sample(500, &mut Xoshiro::stream(3, 0), &mut batch);
         let mut seen = std::collections::BTreeSet::new();
         for n in 0..500 {
             let x = batch.observations[2 * n];

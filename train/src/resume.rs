@@ -2,11 +2,11 @@
 
 use interp::{Coefficients, State};
 use plant::{Load, Sample, Signals};
+use random::Xoshiro;
 use sha2::{Digest, Sha256};
 
 use crate::checkpoint::{Reader, Writer, other};
 use crate::faults::Error;
-use crate::rng::Rng;
 use crate::score::Score;
 use crate::trainer::{Best, Look, Sums, Trainer};
 use closed_loop::environment::Environment;
@@ -76,7 +76,7 @@ impl<E: Environment> Trainer<E> {
         (self.seed, self.step, self.episode_step) = (from.u64()?, from.u64()?, from.u64()?);
         self.met = from.u64()? != 0;
         for rng in [&mut self.exploration, &mut self.sampling, &mut self.scenario] {
-            *rng = Rng::from_state([from.u64()?, from.u64()?, from.u64()?, from.u64()?]);
+            *rng = Xoshiro::from_state([from.u64()?, from.u64()?, from.u64()?, from.u64()?]);
         }
         from.floats_into(&mut self.learner.online.parameters)?;
         from.floats_into(&mut self.learner.target_network.parameters)?;

@@ -4,13 +4,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant as Clock;
 
 use plant::{Load, Sample};
+use random::{Random, Xoshiro};
 
 use crate::contract::Contract;
 use crate::faults::Error;
 use crate::learner::{Learner, TargetUpdate, greedy};
 use crate::network::Network;
 use crate::replay::ReplayBuffer;
-use crate::rng::Rng;
 use crate::score::{Score, Scoring};
 use crate::settings::{Draw, Loads, Settings};
 use closed_loop::Agent;
@@ -90,9 +90,9 @@ pub struct Trainer<E> {
     pub(crate) agent: Agent<f32>,
     pub(crate) learner: Learner,
     pub(crate) replay: ReplayBuffer,
-    pub(crate) exploration: Rng,
-    pub(crate) sampling: Rng,
-    pub(crate) scenario: Rng,
+    pub(crate) exploration: Xoshiro,
+    pub(crate) sampling: Xoshiro,
+    pub(crate) scenario: Xoshiro,
     pub(crate) step: u64,
     pub(crate) episode_step: u64,
     pub(crate) sample: Sample,
@@ -123,7 +123,7 @@ impl<E: Environment> Trainer<E> {
     pub fn new(settings: &Settings, contract: &Contract, environment: &E, seed: u64) -> Result<Self, Error> {
         check_fit(settings, contract, environment)?;
         let mut network = contract.network();
-        network.initialise(&mut Rng::new(seed, WEIGHTS));
+        network.initialise(&mut Xoshiro::stream(seed, WEIGHTS));
         let agent = Agent::<f32>::new(&contract.policy)?;
         let mut trainer = Self {
             replay: ReplayBuffer::new(network.inputs(), settings.learning.replay),
@@ -134,9 +134,9 @@ impl<E: Environment> Trainer<E> {
             nominal: environment.clone(),
             environment: environment.clone(),
             agent,
-            exploration: Rng::new(seed, EXPLORATION),
-            sampling: Rng::new(seed, REPLAY),
-            scenario: Rng::new(seed, SCENARIO),
+            exploration: Xoshiro::stream(seed, EXPLORATION),
+            sampling: Xoshiro::stream(seed, REPLAY),
+            scenario: Xoshiro::stream(seed, SCENARIO),
             step: 0,
             episode_step: 0,
             sample: Sample::default(),
@@ -230,7 +230,7 @@ impl<E: Environment> Trainer<E> {
         let learning = &self.settings.learning;
         let epsilon = learning.epsilon(self.step);
         let action = if self.exploration.unit() < epsilon {
-            self.exploration.index(self.learner.online.outputs())
+            self.exploration.below(self.learner.online.outputs())
         } else {
             self.learner
                 .online
@@ -299,15 +299,15 @@ impl<E: Environment> Trainer<E> {
         let rng = &mut self.scenario;
         let power = draw_load(loads, rng);
         let episode = &self.settings.episode;
-        let v_out = rng.within(episode.initial_voltage[0], episode.initial_voltage[1]);
-        let beside = rng.within(episode.initial_current[0], episode.initial_current[1]);
+        let v_out = rng.uniform(episode.initial_voltage[0], episode.initial_voltage[1]);
+        let beside = rng.uniform(episode.initial_current[0], episode.initial_current[1]);
         let seed = rng.bits();
         let mut varied = Vec::new();
         for parameter in &self.settings.randomise {
             let nominal = self.nominal.parameter(&parameter.key).unwrap_or_default();
             let drawn = match parameter.draw {
-                Draw::Value([low, high]) => rng.within(low, high),
-                Draw::Factor([low, high]) => nominal * rng.within(low, high),
+                Draw::Value([low, high]) => rng.uniform(low, high),
+                Draw::Factor([low, high]) => nominal * rng.uniform(low, high),
             };
             varied.push((parameter.key.as_str(), nominal + share * (drawn - nominal)));
         }
@@ -420,11 +420,11 @@ pub fn quick_controller(
     })
 }
 
-fn draw_load(loads: &Loads, rng: &mut Rng) -> f64 {
+fn draw_load(loads: &Loads, rng: &mut Xoshiro) -> f64 {
     if !loads.values.is_empty() && rng.unit() < loads.share {
-        loads.values[rng.index(loads.values.len())]
+        loads.values[rng.below(loads.values.len())]
     } else {
-        rng.within(loads.range[0], loads.range[1])
+        rng.uniform(loads.range[0], loads.range[1])
     }
 }
 

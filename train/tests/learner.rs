@@ -3,12 +3,12 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use policy::Activation;
+use random::{Random, Xoshiro};
 use serde::Deserialize;
 use train::learner::{Learner, LearnerSettings, Loss, TargetUpdate, greedy};
 use train::network::Network;
 use train::optimiser::AdamSettings;
 use train::replay::Batch;
-use train::rng::Rng;
 
 #[derive(Deserialize)]
 struct Fixture {
@@ -157,8 +157,8 @@ fn q_values(widths: &[usize], parameters: &[f64], activation: fn(f64) -> f64, ob
     x
 }
 
-fn random_batch(rows: usize, features: usize, actions: usize, rng: &mut Rng) -> Batch {
-    let mut values = |count: usize, size: f64| (0..count).map(|_| rng.within(-size, size) as f32).collect::<Vec<_>>();
+fn random_batch(rows: usize, features: usize, actions: usize, rng: &mut Xoshiro) -> Batch {
+    let mut values = |count: usize, size: f64| (0..count).map(|_| rng.uniform(-size, size) as f32).collect::<Vec<_>>();
     let (observations, next_observations, rewards) = (
         values(rows * features, 2.0),
         values(rows * features, 2.0),
@@ -168,7 +168,7 @@ fn random_batch(rows: usize, features: usize, actions: usize, rng: &mut Rng) -> 
         observations,
         next_observations,
         rewards,
-        actions: (0..rows).map(|_| rng.index(actions) as u32).collect(),
+        actions: (0..rows).map(|_| rng.below(actions) as u32).collect(),
         alive: (0..rows).map(|n| f32::from(u8::from(n % 4 != 0))).collect(),
     }
 }
@@ -186,7 +186,7 @@ fn gradient_is_the_slope_of_the_loss() {
     let (widths, rows) = ([4, 9, 6, 5], 24);
     for (activation, function) in kinds {
         for loss in [Loss::Huber, Loss::Squared] {
-            let mut rng = Rng::new(11, 0);
+            let mut rng = Xoshiro::stream(11, 0);
             let mut network = Network::zeros(&widths, &[activation, activation, Activation::Identity]);
             network.initialise(&mut rng);
             let batch = random_batch(rows, 4, 5, &mut rng);
@@ -282,11 +282,11 @@ fn nothing_is_expected_behind_a_terminated_episode() {
 
 #[test]
 fn one_observation_alone_and_in_a_batch_agree_but_for_the_order_of_summation() {
-    let mut rng = Rng::new(5, 0);
+    let mut rng = Xoshiro::stream(5, 0);
     let relu = Activation::Relu;
     let mut network = Network::zeros(&[6, 64, 64, 12], &[relu, relu, Activation::Identity]);
     network.initialise(&mut rng);
-    let rows: Vec<f32> = (0..6 * 32).map(|_| rng.within(-3.0, 3.0) as f32).collect();
+    let rows: Vec<f32> = (0..6 * 32).map(|_| rng.uniform(-3.0, 3.0) as f32).collect();
     let mut activations = network.activations(32);
     network.forward(&rows, &mut activations);
     let mut scratch = [Vec::new(), Vec::new()];

@@ -72,6 +72,7 @@ mod tests {
             q_values: vec![1.0, -4.0, 2.0, 3.0],
             action_indices: vec![0, 1],
             tolerance: 1e-5,
+            decisions: None,
         }
     }
 

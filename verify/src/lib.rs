@@ -17,9 +17,11 @@
 //! | what differs | [`compare`], [`report`] |
 //! | what a step costs | [`mod@measure`], [`elf`] |
 //! | archives of FMUs | [`fmu`] |
+//! | what the format does to decisions | [`mod@decisions`] |
 //! | checked-in files against the policy | [`drift()`] |
 
 pub mod compare;
+pub mod decisions;
 pub mod drift;
 pub mod drivers;
 pub mod elf;
@@ -39,6 +41,7 @@ pub mod toolchain;
 pub mod traces;
 mod zip;
 
+pub use decisions::{Decisions, decisions};
 pub use drift::{drift, read_text};
 pub use live::{Live, LiveCommand};
 pub use report::{BuildReport, Difference, GoldenResult, Outcome, Report};

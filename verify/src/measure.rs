@@ -11,6 +11,7 @@ use std::time::Duration;
 
 use interp::Sample;
 use policy::{Policy, Scalar};
+use random::{Random, SplitMix};
 use serde::Serialize;
 use targets::TargetSpec;
 
@@ -20,7 +21,7 @@ use crate::protocol::encode_sample;
 use crate::runner::{ProcessRunner, Runner as _};
 use crate::session::{COMPILER_TIMEOUT, Files};
 use crate::toolchain::{self, Build, BuildError, Install, Missing, Purpose, Sources};
-use crate::traces::{Rng, sample_of};
+use crate::traces::sample_of;
 
 /// Steps that are counted.
 pub const STEPS: usize = 256;
@@ -203,7 +204,7 @@ fn answers(policy: &Policy, target: &TargetSpec, command: Command) -> Result<Vec
 /// one that is not a number or at the end of the codes.
 fn samples(policy: &Policy) -> Vec<u32> {
     let scalar = policy.numeric_format.scalar();
-    let mut rng = Rng::new(7);
+    let mut rng = SplitMix::new(7);
     let mut words = Vec::new();
     for _ in 0..STEPS {
         let kind = rng.below(4);

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::decisions::Decisions;
 use crate::oracle::Coverage;
 use crate::toolchain::{Install, Missing};
 
@@ -22,19 +23,29 @@ pub struct Report {
     pub coverage: Coverage,
     /// Known answers against the interpreter; `None` if the policy has none.
     pub golden: Option<GoldenResult>,
+    /// What the numeric format does to the trainer's decisions; `None` if the policy has no known answers.
+    pub decisions: Option<Decisions>,
     /// One entry per build.
     pub builds: Vec<BuildReport>,
 }
 
 impl Report {
-    /// At least one build was compared, all compared builds are equal, all known answers hold.
+    /// The builds are equal, and the format keeps the decisions.
     pub fn passed(&self) -> bool {
+        self.equal() && self.decisions.as_ref().is_none_or(Decisions::kept)
+    }
+
+    /// At least one build was compared, all compared builds are equal, and the network gives the trainer's answers.
+    pub fn equal(&self) -> bool {
         let golden = |result: &Option<GoldenResult>| result.as_ref().is_none_or(GoldenResult::passed);
+        self.builds_equal() && golden(&self.golden) && self.builds.iter().all(|build| golden(&build.golden))
+    }
+
+    /// At least one build was compared, and all compared builds give the interpreter's bits, whatever these are worth.
+    pub fn builds_equal(&self) -> bool {
         let compared = self.builds.iter().any(|build| build.outcome == Outcome::Equal);
-        let sound = |build: &BuildReport| {
-            matches!(build.outcome, Outcome::Equal | Outcome::Skipped { .. }) && golden(&build.golden)
-        };
-        compared && golden(&self.golden) && self.builds.iter().all(sound)
+        let sound = |build: &BuildReport| matches!(build.outcome, Outcome::Equal | Outcome::Skipped { .. });
+        compared && self.builds.iter().all(sound)
     }
 
     /// Whether a build was started, whatever came of it.
@@ -171,10 +182,13 @@ pub struct GoldenResult {
 }
 
 impl GoldenResult {
-    /// All actions equal, all Q values within the tolerance; or rounded.
+    /// All Q values within the tolerance, or all actions equal where the trainer gave no Q values; or rounded. With Q values
+    /// the actions are [`Decisions`], which know ties.
     pub fn passed(&self) -> bool {
-        let equal = self.actions_equal == self.actions_compared
-            && self.worst_relative_error.is_none_or(|error| error <= self.tolerance);
-        self.rounded || equal
+        let actions = self.actions_equal == self.actions_compared;
+        let read = self
+            .worst_relative_error
+            .map_or(actions, |error| error <= self.tolerance);
+        self.rounded || read
     }
 }

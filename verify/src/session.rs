@@ -13,7 +13,9 @@ use codegen::Output;
 use interp::{InputError, Real};
 use policy::{NumericFormat, Policy, Scalar};
 use targets::TargetSpec;
+use toml_input::{Fault, Faults, Message, messages};
 
+use crate::decisions::decisions;
 use crate::golden;
 use crate::lane::Lane;
 use crate::oracle::{Chunk, Oracle};
@@ -44,6 +46,8 @@ pub struct Options<'a> {
     pub extra_flags: Vec<String>,
     /// More flags for rustc, after all others.
     pub extra_rust_flags: Vec<String>,
+    /// Share of golden decisions that the numeric format may change, 0..1; `None`: as the contract says.
+    pub golden_decisions: Option<f64>,
     /// Recordings to play before the random part.
     pub recorded: Vec<Recorded>,
     /// A build that sends nothing for so long has failed.
@@ -63,6 +67,7 @@ impl Default for Options<'_> {
             levels: Vec::new(),
             extra_flags: Vec::new(),
             extra_rust_flags: Vec::new(),
+            golden_decisions: None,
             recorded: Vec::new(),
             timeout: Duration::from_secs(60),
             progress: None,
@@ -118,7 +123,7 @@ impl fmt::Display for VerifyError {
                 expected,
             } => write!(
                 f,
-                "unknown compiler `{found}` for target {target}: expected one of {}",
+                "target {target} has no compiler `{found}`, but {}",
                 expected.join(", ")
             ),
             Self::Codegen(error) => write!(f, "{error}"),
@@ -130,6 +135,21 @@ impl fmt::Display for VerifyError {
 }
 
 impl std::error::Error for VerifyError {}
+
+impl From<VerifyError> for Faults {
+    fn from(error: VerifyError) -> Self {
+        match error {
+            VerifyError::UnknownCompiler {
+                found,
+                target,
+                expected,
+            } => messages::unknown(&format!("compiler of {target}"), &found, &expected).into(),
+            VerifyError::Codegen(error) => error.into(),
+            VerifyError::Interpreter(_) | VerifyError::Constructs(_) => Message::new(error.to_string()).into(),
+            VerifyError::Io(path, error) => Fault::in_file(&path, Message::new(error.to_string())).into(),
+        }
+    }
+}
 
 /// A compiler that takes longer has failed; the largest policies take seconds.
 pub(crate) const COMPILER_TIMEOUT: Duration = Duration::from_secs(600);
@@ -160,6 +180,7 @@ fn run_in<T: Real>(policy: &Policy, options: Options<'_>) -> Result<Report, Veri
         levels,
         extra_flags,
         extra_rust_flags,
+        golden_decisions,
         recorded,
         timeout,
         mut progress,
@@ -215,6 +236,7 @@ fn run_in<T: Real>(policy: &Policy, options: Options<'_>) -> Result<Report, Veri
         checksum: format!("{:08x}", oracle.checksum()),
         coverage: oracle.coverage().clone(),
         golden,
+        decisions: decisions(policy, golden_decisions),
         builds,
     })
 }

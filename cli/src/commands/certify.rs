@@ -8,20 +8,21 @@ use ::certify::{Certificate, Certifier, Domain, Effort, Memory, Slice};
 use interp::Controller;
 use ndarray::aview1;
 use policy::{Interval, NumericFormat, Policy};
-use verify::traces::Rng;
+use random::{Random, SplitMix};
+use toml_input::{Message, messages};
 
 use crate::arguments::Certify;
 use crate::{Failure, Outcome, output};
 
 /// Proves, measures, draws, writes.
 pub fn run(options: &Certify) -> Result<Outcome, Failure> {
-    let policy = super::load_as(&options.policy, options.format.map(Into::into))?;
+    let policy = super::load_as(&options.policy, options.format)?;
     if policy.numeric_format == NumericFormat::F64 {
-        return Err(Failure(
-            "the certificate is about binary32 and integers: its box holds the observations as binary32 rounds them\n   \
-             = found: f64\n   = expected: one of f32, f32-fma, i16, i8\n   = hint: --format f32"
-                .to_owned(),
-        ));
+        let message = Message::new(
+            "the certificate is about binary32 and integers: its box holds the observations as binary32 rounds them",
+        );
+        let message = message.found("f64").expected("one of f32, f32-fma, i16, i8");
+        return Err(message.hint("--format f32").into());
     }
     let slice = slice(&policy, options)?;
     let controller = Controller::<f32>::new(&policy);
@@ -29,7 +30,7 @@ pub fn run(options: &Certify) -> Result<Outcome, Failure> {
         Ok(q_values) => q_values.iter().map(|q| f64::from(*q)).collect(),
         Err(_) => Vec::new(),
     };
-    let mut rng = Rng::new(options.seed);
+    let mut rng = SplitMix::new(options.seed);
     let effort = Effort {
         boxes: options.boxes as usize,
         samples: options.samples as usize,
@@ -68,10 +69,7 @@ fn slice(policy: &Policy, options: &Certify) -> Result<Option<Slice>, Failure> {
     let find = |name: &str| {
         coordinates.iter().position(|c| c.name == name).ok_or_else(|| {
             let names: Vec<&str> = coordinates.iter().map(|c| c.name.as_str()).collect();
-            Failure(format!(
-                "no such coordinate of the states\n   = found: {name}\n   = expected: one of {}",
-                names.join(", ")
-            ))
+            Failure::from(messages::unknown("coordinate of the states", name, &names))
         })
     };
     let mut asked = Vec::new();
@@ -83,11 +81,13 @@ fn slice(policy: &Policy, options: &Certify) -> Result<Option<Slice>, Failure> {
         let whole = coordinates[index].range;
         asked.push((index, range.map(|range| within(range, name, whole)).transpose()?));
     }
-    let expected = "   = expected: two different axes, or none";
     let axes = match asked.as_slice() {
         [] => (first(policy, &domain, 0), first(policy, &domain, 1)),
         [x, y] if x.0 != y.0 => (Some(x.0), Some(y.0)),
-        _ => return Err(Failure(format!("--axis: {} axes found\n{expected}", asked.len()))),
+        _ => {
+            let message = Message::new(format!("--axis: {} axes found", asked.len()));
+            return Err(message.expected("two different axes, or none").into());
+        }
     };
     let (Some(x), Some(y)) = axes else {
         return Ok(None);
@@ -151,15 +151,15 @@ fn within(text: &str, name: &str, whole: Interval) -> Result<Interval, Failure> 
 fn number(text: &str, place: &str) -> Result<f64, Failure> {
     let number = text.trim().parse::<f64>().ok().filter(|number| number.is_finite());
     number.ok_or_else(|| {
-        Failure(format!(
-            "a number is missing\n   = found: {place}\n   = expected: NAME=LOW:HIGH for --axis, NAME=VALUE for --at"
-        ))
+        let message = Message::new("a number is missing").found(place);
+        Failure::from(message.expected("NAME=LOW:HIGH for --axis, NAME=VALUE for --at"))
     })
 }
 
 fn outside(place: &str, range: Interval) -> Failure {
-    Failure(format!(
-        "outside of the plausible range\n   = found: {place}\n   = expected: ascending, within {}:{}",
-        range.low, range.high
-    ))
+    let expected = format!("ascending, within {}:{}", range.low, range.high);
+    Message::new("outside of the plausible range")
+        .found(place)
+        .expected(expected)
+        .into()
 }

@@ -7,12 +7,13 @@ use codegen::output::{languages, with_cores};
 use codegen::{Output, manifest};
 use policy::Policy;
 use targets::TargetSpec;
+use toml_input::Message;
 use verify::Files;
 use verify::fmu::Archive;
 
 use super::budget;
 use super::costs::Measured;
-use super::verify::golden_text;
+use super::verify::{MISREAD, UNPROVEN, decisions_lines, golden_text};
 use super::{bytes, grouped};
 use crate::arguments::Compile;
 use crate::{Failure, Outcome, output};
@@ -37,15 +38,28 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
 
 /// The policy in the format asked for; refused if its network does not give the trainer's answers.
 fn load(options: &Compile) -> Result<Policy, Failure> {
-    let policy = super::load_as(&options.policy, options.format.map(Into::into))?;
-    match verify::golden_result(&policy)?.filter(|golden| !golden.passed()) {
-        None => Ok(policy),
-        Some(golden) => Err(Failure(format!(
-            "the network does not give the trainer's golden answers; nothing was written\n   = found: {}\n   \
-             = hint: look at hidden_activation, the order of layers and features, transpose; `policyc verify` compares them too",
-            golden_text(&golden)
-        ))),
+    let policy = super::load_as(&options.policy, options.format)?;
+    if let Some(golden) = verify::golden_result(&policy)?.filter(|golden| !golden.passed()) {
+        let message = Message::new("the network does not give the trainer's golden answers; nothing was written");
+        return Err(message.found(golden_text(&golden)).hint(MISREAD).into());
     }
+    match verify::decisions(&policy, options.golden_decisions).filter(|decisions| !decisions.kept()) {
+        None => Ok(policy),
+        Some(decisions) => Err(Message::new(
+            "the numeric format changes more of the trainer's decisions than allowed; nothing was written",
+        )
+        .found(decisions_lines(&policy, &decisions).join("\n"))
+        .hint(format!(
+            "see what they cost with `policyc certify` and `policyc simulate`; to accept them, --golden-decisions {}",
+            accepted(decisions.share())
+        ))
+        .into()),
+    }
+}
+
+/// The smallest number of two digits that accepts a share.
+fn accepted(share: f64) -> f64 {
+    (share * 100.0).ceil() / 100.0
 }
 
 /// What a step costs under the target's emulator; it goes into the manifest, too.
@@ -88,6 +102,9 @@ pub fn say(
 ) -> Result<(), Failure> {
     for note in &policy.notes {
         output::say(&format!("note: {note}"))?;
+    }
+    if policy.golden.is_none() {
+        output::say(&format!("note: {UNPROVEN}"))?;
     }
     let sizes = manifest::sizes(policy, target);
     if let Some(bound) = sizes.accumulator_bound {

@@ -33,6 +33,7 @@ pub fn run(options: &Demo) -> Result<Outcome, Failure> {
     heading("The policy", &format!("policyc inspect {}", policy_folder.display()))?;
     inspect::run(&Inspect {
         policy: policy_folder.clone(),
+        format: None,
         json: false,
     })?;
 
@@ -64,6 +65,7 @@ pub fn run(options: &Demo) -> Result<Outcome, Failure> {
         target: None,
         format: None,
         generated: Some(options.out.join("generated")),
+        golden_decisions: None,
         drift_only: false,
         trace: Vec::new(),
         json: false,

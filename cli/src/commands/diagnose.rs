@@ -12,7 +12,8 @@ use ::diagnose::record::Record;
 use closed_loop::Scenario;
 use closed_loop::scenario::Task;
 use measured::ColumnMap;
-use plant::{Fault, Faults, Parameters};
+use plant::{Faults, Parameters};
+use toml_input::Sink;
 
 use super::simulate;
 use crate::arguments::Diagnose;
@@ -72,13 +73,9 @@ fn request(options: &Diagnose, path: &Path, model: &Parameters) -> Result<Reques
     };
     let scenario = options.scenario.as_deref().map(Scenario::load).transpose()?;
     let given = scenario.as_ref().and_then(|scenario| scenario.v_ref);
-    let v_ref = simulate::v_ref(
-        given,
-        &policy,
-        &options.scenario.as_ref().unwrap_or(&options.model).display(),
-    )?;
+    let v_ref = simulate::v_ref(given, &policy, options.scenario.as_ref().unwrap_or(&options.model))?;
     for (converter, file) in [(&trained_on, file), (model, &options.model)] {
-        simulate::suits(&policy, converter, v_ref, &file.display())?;
+        simulate::suits(&policy, converter, v_ref, file)?;
     }
     Ok(Request {
         losses: super::drm::trained_on(&trained_on, file)?,
@@ -103,18 +100,12 @@ fn short_task() -> Task {
 
 /// All records, or all their faults.
 fn records(options: &Diagnose, columns: &ColumnMap, model: &Parameters) -> Result<(Vec<Record>, Vec<Record>), Faults> {
-    let mut faults: Vec<Fault> = Vec::new();
+    let mut faults = Sink::new();
     let mut read = |files: &[PathBuf]| {
-        let one = |file: &PathBuf| match Record::open(Path::new(file), columns, model) {
-            Ok(record) => Some(record),
-            Err(found) => {
-                faults.extend(found.list);
-                None
-            }
-        };
+        let one = |file: &PathBuf| faults.keep(Record::open(file, columns, model));
         files.iter().filter_map(one).collect::<Vec<_>>()
     };
     let (train, heldout) = (read(&options.train), read(&options.heldout));
-    Faults::unless_empty(faults)?;
+    faults.propagate()?;
     Ok((train, heldout))
 }

@@ -14,6 +14,7 @@ use drm::formula::Losses;
 use drm::{Table, TableOptions};
 use plant::Parameters;
 use policy::{Interval, Policy};
+use toml_input::{Fault, Message, messages};
 
 use crate::arguments::Columns;
 use crate::{Failure, Outcome};
@@ -67,7 +68,7 @@ impl Reading {
 
     fn table(&self, path: &Path) -> Result<Table, Failure> {
         if let Some(v) = self.v_in_sim.filter(|v| !(v.is_finite() && *v > 0.0)) {
-            return Err(Failure(format!("--v-in-sim must be greater than 0 V\n   = found: {v}")));
+            return Err(not_positive("--v-in-sim", v));
         }
         let options = TableOptions {
             columns: self.columns.read()?,
@@ -104,6 +105,11 @@ impl Loads {
     }
 }
 
+/// An option that must be a number above 0.
+fn not_positive(option: &str, found: f64) -> Failure {
+    messages::not_positive(option, found).into()
+}
+
 fn plant_parameters(path: &Path) -> Result<Parameters, Failure> {
     Ok(Parameters::from_file(path)?)
 }
@@ -112,9 +118,9 @@ fn plant_parameters(path: &Path) -> Result<Parameters, Failure> {
 pub fn needs_mapping(policy: &Policy) -> Result<(), Failure> {
     if policy.mapping.is_none() {
         let hint = "add [mapping] with file = \"drm.toml\" and load_current, and an identity a = 1, b = 0, c = 0";
-        return Err(Failure(format!(
-            "the policy has no mapping to transfer with\n   = hint: {hint}"
-        )));
+        return Err(Message::new("the policy has no mapping to transfer with")
+            .hint(hint)
+            .into());
     }
     Ok(())
 }
@@ -122,11 +128,9 @@ pub fn needs_mapping(policy: &Policy) -> Result<(), Failure> {
 /// The losses of the converter that a policy was trained on.
 pub fn trained_on(nominal: &Parameters, path: &Path) -> Result<Losses, Failure> {
     Losses::of(nominal).ok_or_else(|| {
-        Failure(format!(
-            "{}: a synchronous leg has no formula of its steady state\n   = hint: give --v-in-sim instead, its input \
-             voltage, and count its losses to the mapping",
-            path.display()
-        ))
+        let hint = "give --v-in-sim instead, its input voltage, and count its losses to the mapping";
+        let message = Message::new("a synchronous leg has no formula of its steady state");
+        Fault::in_file(path, message.hint(hint)).into()
     })
 }
 

@@ -12,13 +12,20 @@ use crate::{Failure, Outcome, output};
 
 /// Prints the checked policy.
 pub fn run(options: &Inspect) -> Result<Outcome, Failure> {
-    let policy = super::load(&options.policy)?;
+    let policy = super::load_as(&options.policy, options.format)?;
     if options.json {
         output::say(&serde_json::to_string_pretty(&view(&policy)?)?)?;
     } else {
         output::say(text(&policy)?.trim_end())?;
     }
-    Ok(Outcome::Done)
+    match verify::golden_result(&policy)?.is_some_and(|golden| !golden.passed()) {
+        false => Ok(Outcome::Done),
+        true => {
+            eprintln!("\nDIFFERENT: the network does not give the trainer's golden answers");
+            eprintln!("  = hint: {}", super::verify::MISREAD);
+            Ok(Outcome::Different)
+        }
+    }
 }
 
 /// What `--json` prints.
@@ -35,6 +42,7 @@ struct View<'p> {
     limits: policy::Limits,
     fallback: policy::Fallback,
     golden_vectors: usize,
+    decisions: Option<verify::Decisions>,
     digests: &'p policy::Digests,
     sizes: manifest::Sizes,
     notes: &'p [String],
@@ -73,6 +81,7 @@ fn view(policy: &Policy) -> Result<View<'_>, Failure> {
         limits: policy.limits,
         fallback: policy.fallback,
         golden_vectors: policy.golden.as_ref().map_or(0, |golden| golden.count),
+        decisions: verify::decisions(policy, None),
         digests: &policy.digests,
         sizes: manifest::sizes(policy, super::target("host")?),
         notes: &policy.notes,
@@ -96,10 +105,11 @@ fn text(policy: &Policy) -> Result<String, Failure> {
     let sizes = manifest::sizes(policy, super::target("host")?);
     writeln!(
         out,
-        "{}   one step every {} us ({:.6} kHz), f32",
+        "{}   one step every {} us ({:.6} kHz), {}",
         policy.name,
         period * 1e6,
-        1e-3 / period
+        1e-3 / period,
+        policy.numeric_format.name()
     )?;
     signals(&mut out, policy)?;
     features(&mut out, policy)?;
@@ -202,11 +212,13 @@ fn network(out: &mut String, policy: &Policy) -> Result<(), Failure> {
         Some(golden) => {
             let text = super::verify::golden_text(&golden);
             writeln!(out, "  {} golden vectors from the trainer: {text}", golden.vectors)?;
+            if let Some(decisions) = verify::decisions(policy, None) {
+                for line in super::verify::decisions_lines(policy, &decisions) {
+                    writeln!(out, "  {line}")?;
+                }
+            }
         }
-        None => writeln!(
-            out,
-            "  no golden vectors: nothing shows that the weights were read as the trainer meant"
-        )?,
+        None => writeln!(out, "  {}", super::verify::UNPROVEN)?,
     }
     Ok(())
 }

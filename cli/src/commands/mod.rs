@@ -19,6 +19,7 @@ use std::path::{Path, PathBuf};
 
 use ::targets::TargetSpec;
 use policy::{NumericFormat, Policy};
+use toml_input::messages;
 
 use crate::Failure;
 
@@ -32,15 +33,7 @@ fn contract_path(path: &Path) -> PathBuf {
 }
 
 fn load(path: &Path) -> Result<Policy, Failure> {
-    policy::load(&contract_path(path)).map_err(|faults| {
-        let count = faults.iter().count();
-        let total = if count > 1 {
-            format!("\n{count} faults; nothing was written")
-        } else {
-            String::new()
-        };
-        Failure(format!("{}\n{total}", faults.to_string().trim_end()))
-    })
+    Ok(policy::load(&contract_path(path))?)
 }
 
 /// [`load`], in another numeric format if one is asked for.
@@ -53,12 +46,7 @@ fn load_as(path: &Path, format: Option<NumericFormat>) -> Result<Policy, Failure
 }
 
 fn target(name: &str) -> Result<&'static TargetSpec, Failure> {
-    ::targets::find(name).ok_or_else(|| {
-        let known = ::targets::names().join(", ");
-        Failure(format!(
-            "unknown target\n   = found: {name}\n   = expected: one of {known}"
-        ))
-    })
+    ::targets::find(name).ok_or_else(|| messages::unknown("target", name, &::targets::names()).into())
 }
 
 /// Bytes as people read them.

@@ -6,7 +6,7 @@ use codegen::{Output, manifest};
 use policy::{NumericFormat, Policy};
 use serde::{Deserialize, Serialize};
 use targets::TargetSpec;
-use toml_input::nearest;
+use toml_input::{Fault, Message, messages};
 use verify::drift::Drift;
 use verify::traces::Recorded;
 use verify::{Files, Options, Progress, Report};
@@ -18,7 +18,7 @@ use crate::{Failure, Outcome, output};
 
 mod show;
 
-pub use show::{golden_text, missing_text};
+pub use show::{MISREAD, UNPROVEN, decisions_lines, golden_text, missing_text};
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -34,7 +34,7 @@ struct Answer {
 /// Compares and reports.
 pub fn run(options: &Verify) -> Result<Outcome, Failure> {
     let written = match (options.format, &options.generated) {
-        (Some(format), _) => Some(format.into()),
+        (Some(format), _) => Some(format),
         (None, Some(folder)) => written_format(folder),
         (None, None) => None,
     };
@@ -74,6 +74,7 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
             seed: options.seed,
             target,
             generated: on_disk.as_ref().map(|folder| &folder.files),
+            golden_decisions: options.golden_decisions,
             recorded,
             progress: Some(&mut tell),
             ..Options::default()
@@ -81,7 +82,7 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
     )?;
     progress.clear();
     if !report.compared() {
-        return Err(Failure(show::nothing_compared(&report)?));
+        return Err(show::nothing_compared(&report).into());
     }
     let drift = on_disk.map(|folder| folder.drift);
     let equal = report.passed() && drift.as_ref().is_none_or(Drift::is_empty);
@@ -89,7 +90,7 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
         let report = Some(report);
         output::say(&serde_json::to_string_pretty(&Answer { equal, drift, report })?)?;
     } else {
-        output::say(show::report(&report, drift.as_ref(), equal)?.trim_end())?;
+        output::say(show::report(&policy, &report, drift.as_ref())?.trim_end())?;
     }
     Ok(if equal { Outcome::Done } else { Outcome::Different })
 }
@@ -121,11 +122,11 @@ fn written_format(folder: &Path) -> Option<NumericFormat> {
 fn target(options: &Verify, generated_for: Option<&'static TargetSpec>) -> Result<&'static TargetSpec, Failure> {
     let asked = options.target.as_deref().map(super::target).transpose()?;
     match (asked, generated_for) {
-        (Some(asked), Some(found)) if asked != found => Err(Failure(format!(
-            "the generated folder is for another target\n   = found: {}\n   = expected: {}\n   \
-             = hint: leave --target out, or compile again for {}",
-            found.name, asked.name, asked.name
-        ))),
+        (Some(asked), Some(found)) if asked != found => {
+            let message = Message::new("the generated folder is for another target");
+            let hint = format!("leave --target out, or compile again for {}", asked.name);
+            Err(message.found(found.name).expected(asked.name).hint(hint).into())
+        }
         (Some(target), _) | (None, Some(target)) => Ok(target),
         (None, None) => Ok(::targets::host()),
     }
@@ -152,23 +153,19 @@ struct Folder {
 
 fn checked_in(policy: &Policy, folder: &Path) -> Result<Folder, Failure> {
     let path = folder.join(manifest::FILE);
-    let shown = path.display();
     let hint = format!(
         "make the folder with `policyc compile POLICY --out {}`",
         folder.display()
     );
+    let fault = |message: Message| Fault::in_file(&path, message);
     let text = verify::read_text(&path).map_err(|error| {
-        Failure(format!(
-            "{shown}: {error}\n   = expected: the manifest that compile wrote\n   = hint: {hint}"
-        ))
+        let message = Message::new(error.to_string()).expected("the manifest that compile wrote");
+        fault(message.hint(&hint))
     })?;
-    let origin: Origin = serde_json::from_str(&text).map_err(|error| {
-        Failure(format!(
-            "{shown}: not a manifest of policyc: {error}\n   = hint: {hint}"
-        ))
-    })?;
+    let origin: Origin = serde_json::from_str(&text)
+        .map_err(|error| fault(Message::new(format!("not a manifest of policyc: {error}")).hint(&hint)))?;
     let target = super::target(&origin.target)?;
-    let outputs = outputs(&origin).map_err(|error| Failure(format!("{shown}: {error}")))?;
+    let outputs = outputs(&origin).map_err(fault)?;
     let steps = origin.kit_steps.unwrap_or(verify::kit::DEFAULT_STEPS);
     let expected = verify::kit::expected(policy, target, &outputs, steps)?;
     let yielded = codegen::generate(policy, target, &outputs, expected.as_ref())?.files;
@@ -185,23 +182,14 @@ fn checked_in(policy: &Policy, folder: &Path) -> Result<Folder, Failure> {
 }
 
 /// What the folder was made of.
-fn outputs(origin: &Origin) -> Result<Vec<Output>, String> {
+fn outputs(origin: &Origin) -> Result<Vec<Output>, Message> {
+    let known: Vec<&str> = Output::ALL.iter().map(|output| output.name()).collect();
     let names = origin.languages.iter().chain(&origin.doors);
-    let found = names.map(|name| Output::find(name).ok_or_else(|| unknown_output(name)));
+    let found = names.map(|name| Output::find(name).ok_or_else(|| messages::unknown("output", name, &known)));
     let outputs = found.collect::<Result<Vec<_>, _>>()?;
     if outputs.iter().any(|output| output.is_core()) {
         Ok(outputs)
     } else {
-        Err("no language\n   = expected: `languages` with c, rust or both".to_owned())
+        Err(Message::new("no language").expected("`languages` with c, rust or both"))
     }
-}
-
-fn unknown_output(name: &str) -> String {
-    let known = || Output::ALL.iter().map(|output| output.name());
-    let hint = nearest(name, known()).map(|near| format!("\n   = hint: did you mean `{near}`?"));
-    format!(
-        "unknown output\n   = found: {name}\n   = expected: {}{}",
-        known().collect::<Vec<_>>().join(", "),
-        hint.unwrap_or_default()
-    )
 }

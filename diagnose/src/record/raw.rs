@@ -1,8 +1,8 @@
 //! A table with its signals found and turned into SI units: duty, load, channels, time.
 
-use measured::{ColumnMap, FaultList, Located, Quantity, Sheet};
+use measured::{ColumnMap, Located, Quantity, Sheet, table_faults};
 use plant::Load;
-use toml_input::{Fault, Faults, Message};
+use toml_input::{Fault, Faults, Message, Sink};
 
 use super::QUANTITIES;
 use super::digits::{last_digit, lattice};
@@ -29,7 +29,7 @@ impl<'a> Raw<'a> {
     pub fn new(sheet: &'a Sheet, map: &ColumnMap) -> Result<Self, Faults> {
         let located = sheet.locate(&Quantity::all(&NAMES), map)?;
         let has = |name: &str| located.signal(name).is_some();
-        let mut faults = FaultList::default();
+        let mut faults = table_faults();
         if !has("duty") {
             let hint = "; a map file can do so as well: --columns MAP.toml with [columns] duty = \"...\"";
             let duty = Quantity::all(&["duty"]);
@@ -45,15 +45,15 @@ impl<'a> Raw<'a> {
             let message = Message::new("nothing is measured in this record").found(sheet.listed());
             faults.push(sheet.header_fault(message.expected("at least one of v_out, i_l, i_out, v_in")));
         }
-        faults.done()?;
-        let mut faults = FaultList::default();
+        faults.propagate()?;
+        let mut faults = table_faults();
         let mut values = Vec::new();
         for name in NAMES {
             if let Some(signal) = located.signal(name) {
                 values.push((name, signal.values(sheet, &mut faults)));
             }
         }
-        faults.done()?;
+        faults.propagate()?;
         Ok(Raw {
             repairs: located.notes(sheet, &[]),
             sheet,
@@ -111,10 +111,8 @@ impl<'a> Raw<'a> {
             (_, Some(_)) => return Ok(false),
             (Some(false), None) => {
                 let time = Quantity::all(&["t"]);
-                let faults = time
-                    .iter()
-                    .map(|time| self.sheet.missing(time, ", since `settled = false`"));
-                Faults::unless_empty(faults.collect())?;
+                let missing = |time| self.sheet.missing(time, ", since `settled = false`");
+                time.iter().map(missing).collect::<Sink>().propagate()?;
             }
             (None, None) => {}
         }

@@ -8,7 +8,7 @@ mod protocol;
 use std::fmt;
 
 use plant::Load;
-use toml_input::{Fault, Faults, Message};
+use toml_input::{Faults, Message, Sink};
 
 pub use bench::Bench;
 pub use protocol::{Protocol, measure};
@@ -124,11 +124,11 @@ impl Plan {
     /// # Errors
     /// If there is no duty or load, or one makes no sense.
     pub fn new(v_in: f64, duties: &[f64], loads: &[LoadSetting], cool_down: f64) -> Result<Self, Faults> {
-        let mut faults: Vec<Fault> = Vec::new();
+        let mut faults = Sink::new();
         let mut require = |holds: bool, what: &str, found: f64, expected: &str| {
             if !holds {
                 let message = Message::new(format!("{what} out of range")).found(found.to_string());
-                faults.push(message.expected(expected).into());
+                faults.push(message.expected(expected));
             }
         };
         require(
@@ -157,14 +157,10 @@ impl Plan {
         }
         for (list, what) in [(duties.len(), "duties"), (loads.len(), "loads")] {
             if list == 0 {
-                faults.push(
-                    Message::new(format!("the plan has no {what}"))
-                        .expected("at least two")
-                        .into(),
-                );
+                faults.push(Message::new(format!("the plan has no {what}")).expected("at least two"));
             }
         }
-        Faults::unless_empty(faults)?;
+        faults.propagate()?;
         let point = |load: LoadSetting, duty: f64| PlanPoint {
             duty,
             load,

@@ -1,7 +1,7 @@
 //! From the rows of a sheet to settled points.
 
-use measured::{Cell, FaultList, Located, Quantity, Sheet, Signal};
-use toml_input::{Fault, Faults, Message};
+use measured::{Cell, Located, Quantity, Sheet, Signal, table_faults};
+use toml_input::{Fault, Faults, Message, Sink};
 
 use super::{Point, Table, TableOptions, lines, suspicion};
 use crate::acquire::PLAN_COLUMNS;
@@ -40,7 +40,7 @@ pub(super) fn read(sheet: &Sheet, options: &TableOptions) -> Result<Table, Fault
         open: Vec::new(),
         notes: located.notes(sheet, &PLAN_COLUMNS),
     };
-    let mut faults = FaultList::default();
+    let mut faults = table_faults();
     for row in 0..sheet.rows() {
         if reading.is_open(row) {
             table.open.push(sheet.line(row));
@@ -49,7 +49,7 @@ pub(super) fn read(sheet: &Sheet, options: &TableOptions) -> Result<Table, Fault
             reading.rows.push(row);
         }
     }
-    faults.done()?;
+    faults.propagate()?;
     suspicion::check(&mut table, &reading)?;
     if !options.partial {
         suspicion::variety(&table.points, &reading)?;
@@ -77,11 +77,9 @@ impl<'a> Reading<'a> {
                 };
                 sheet.missing(quantity, hint)
             };
-            let faults = Quantity::all(&NEEDED).iter().filter(absent).map(missing).collect();
-            return Err(Faults::unless_empty(faults).err().unwrap_or_else(|| {
-                // one of the four is missing
-                sheet.header_fault(Message::new("the table cannot be read")).into()
-            }));
+            let faults: Sink = Quantity::all(&NEEDED).iter().filter(absent).map(missing).collect();
+            // one of the four is missing
+            return faults.conclude(None, || sheet.header_fault(Message::new("the table cannot be read")));
         };
         Ok(Reading {
             sheet,
@@ -111,7 +109,7 @@ impl<'a> Reading<'a> {
     }
 
     /// One row; nothing if it has faults.
-    fn point(&self, row: usize, simulation: Option<Losses>, faults: &mut FaultList) -> Option<Point> {
+    fn point(&self, row: usize, simulation: Option<Losses>, faults: &mut Sink) -> Option<Point> {
         let before = faults.count();
         let mut number = |signal: &Signal| {
             let number = signal.number(self.sheet, row);
@@ -148,7 +146,7 @@ impl<'a> Reading<'a> {
         })
     }
 
-    fn yes_or_no(&self, signal: &Signal, row: usize, faults: &mut FaultList) -> Option<bool> {
+    fn yes_or_no(&self, signal: &Signal, row: usize, faults: &mut Sink) -> Option<bool> {
         match signal.cell(self.sheet, row) {
             Cell::Number(1.0) => return Some(true),
             Cell::Number(0.0) => return Some(false),
@@ -170,7 +168,7 @@ impl<'a> Reading<'a> {
             table.points.retain(|point| point.settled);
             return Ok(());
         }
-        let mut faults = FaultList::default();
+        let mut faults = table_faults();
         for point in unsettled {
             let most = 100.0 * UNSETTLED;
             let message = Message::new("the point had not settled")
@@ -178,6 +176,6 @@ impl<'a> Reading<'a> {
                 .hint("measure it again after a longer wait, or leave such points out with --skip-unsettled");
             faults.push(self.fault(point, message));
         }
-        faults.done()
+        faults.propagate()
     }
 }

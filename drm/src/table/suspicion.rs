@@ -1,6 +1,6 @@
 //! Values that no buck converter has, and those that look like another unit.
 
-use measured::{FaultList, Signal};
+use measured::{Signal, table_faults};
 use toml_input::{Fault, Faults, Message};
 
 use super::reading::Reading;
@@ -24,14 +24,14 @@ pub(super) fn check(table: &mut Table, reading: &Reading<'_>) -> Result<(), Faul
         let message = Message::new("no point is measured yet").expected("numbers in duty, v_out, i_out and v_in");
         return Err(reading.sheet.fault(message.hint("fill in the rows of the plan")).into());
     }
-    let mut faults = FaultList::default();
+    let mut faults = table_faults();
     faults.extend((0..points.len()).filter_map(|n| not_positive("v_in", points[n].v_in, n, reading)));
     faults.extend(duties(points, reading));
-    faults.done()?;
-    let mut faults = FaultList::default();
+    faults.propagate()?;
+    let mut faults = table_faults();
     faults.extend(voltages(points, reading));
     faults.extend(both_in_millivolts(points, reading));
-    faults.done()?;
+    faults.propagate()?;
     let most = points.iter().map(|p| p.i_out.abs()).fold(0.0, f64::max);
     let power = points.iter().map(|p| (p.i_out * p.v_out).abs()).fold(0.0, f64::max);
     if (most > CURRENT || power > POWER) && !reading.i_out.is_stated() {

@@ -13,11 +13,11 @@ mod text;
 
 use std::iter::Peekable;
 
-use toml_input::{Fault, Faults, FileName, Message, Source, Span};
+use toml_input::{Fault, Faults, FileName, Message, Sink, Source, Span};
 
 use crate::format::Options;
 use crate::quantity::split_unit;
-use crate::sheet::{Column, FaultList, Sheet};
+use crate::sheet::{Column, Sheet, table_faults};
 use number::Mark;
 pub(crate) use places::TextPlaces;
 use places::TextRow;
@@ -68,7 +68,7 @@ pub(crate) fn read(name: FileName, bytes: Vec<u8>, options: &Options) -> Result<
         source: &source,
         header: &names,
         rows: Vec::new(),
-        faults: FaultList::default(),
+        faults: table_faults(),
         marks: [None, None],
     };
     let (columns, rows) = table.read(&body, options, &mut repairs)?;
@@ -148,7 +148,8 @@ fn header_faults(source: &Source, line: &Line, names: &[Span]) -> Result<(), Fau
         let message = Message::new(format!("two columns are called `{}`", text(&names[index])));
         source.fault(&names[index], message.hint("remove or rename one"))
     };
-    Faults::unless_empty((0..names.len()).filter(twin).map(fault).collect())
+    let mut faults: Sink = (0..names.len()).filter(twin).map(fault).collect();
+    faults.propagate()
 }
 
 /// Whether a line holds words throughout that are not missing numbers: units, as oscilloscopes write them below the names.
@@ -192,7 +193,7 @@ struct Reader<'a> {
     header: &'a [Span],
     columns: Vec<Column>,
     rows: Vec<TextRow>,
-    faults: FaultList,
+    faults: Sink,
     /// The first number with a decimal point and the first with a decimal comma.
     marks: [Option<Span>; 2],
 }
@@ -220,7 +221,7 @@ impl Reader<'_> {
         } else if self.marks[Mark::Comma as usize].is_some() {
             repairs.push("decimal commas read as points".to_owned());
         }
-        self.faults.done()?;
+        self.faults.propagate()?;
         Ok((self.columns, self.rows))
     }
 

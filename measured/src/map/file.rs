@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use toml_input::{Document, Fault, Faults, Table, Value};
+use toml_input::{Document, Faults, Sink, Table, Value};
 
 use super::{ColumnMap, DutyIs, Wish, quantity};
 
@@ -52,8 +52,8 @@ impl ColumnMap {
         &mut self,
         root: &mut Table<'_>,
         title: &'static str,
-        faults: &mut Vec<Fault>,
-        read: impl Fn(&Value<'_>, &mut Vec<Fault>) -> Option<Wish>,
+        faults: &mut Sink,
+        read: impl Fn(&Value<'_>, &mut Sink) -> Option<Wish>,
     ) {
         let entries = root
             .optional(title)
@@ -67,7 +67,7 @@ impl ColumnMap {
     }
 }
 
-fn column(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Wish> {
+fn column(value: &Value<'_>, faults: &mut Sink) -> Option<Wish> {
     if let Some(name) = value.as_text() {
         return Some(Wish::Column {
             name: name.to_owned(),

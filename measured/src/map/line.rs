@@ -1,6 +1,6 @@
 //! Maps on the command line: `duty=duty_percent*0.01,v_in=24`.
 
-use toml_input::{Faults, Message};
+use toml_input::{Faults, Message, Sink};
 
 use super::{ColumnMap, Wish, quantity};
 
@@ -11,13 +11,13 @@ impl ColumnMap {
     /// If an entry is none of these, or a quantity is mapped twice.
     pub fn parse(text: &str) -> Result<Self, Faults> {
         let mut map = ColumnMap::default();
-        let mut faults = Vec::new();
+        let mut faults = Sink::new();
         for text in text.split(',').map(str::trim).filter(|text| !text.is_empty()) {
             if let Err(message) = entry(text).and_then(|(name, wish)| map.add(name, wish)) {
-                faults.push(message.found(text).into());
+                faults.push(message.found(text));
             }
         }
-        Faults::unless_empty(faults).map(|()| map)
+        faults.propagate().map(|()| map)
     }
 }
 

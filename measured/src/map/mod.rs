@@ -3,7 +3,7 @@
 mod file;
 mod line;
 
-use toml_input::{Fault, Faults, Message, nearest};
+use toml_input::{Faults, Message};
 
 use crate::quantity::{Quantity, VOCABULARY};
 
@@ -75,7 +75,7 @@ impl ColumnMap {
     /// If both name a quantity.
     pub fn and(mut self, other: ColumnMap) -> Result<Self, Faults> {
         for (name, wish) in other.entries {
-            self.add(name, wish).map_err(Fault::from)?;
+            self.add(name, wish)?;
         }
         self.phase = other.phase.or(self.phase);
         self.settled = other.settled.or(self.settled);
@@ -96,12 +96,11 @@ impl ColumnMap {
 
 /// The name of the quantity that a map calls `text`.
 fn quantity(text: &str) -> Result<&'static str, Message> {
-    let known = || VOCABULARY.iter().flat_map(Quantity::names);
     Quantity::find(text).map(|quantity| quantity.name).ok_or_else(|| {
-        let hint = nearest(text, known()).map(|name| format!("did you mean `{name}`?"));
         let names: Vec<&str> = VOCABULARY.iter().map(|quantity| quantity.name).collect();
-        let message = Message::new(format!("no quantity `{text}`")).maybe_hint(hint);
-        message.expected(format!("one of {}", names.join(", ")))
+        Message::new(format!("no quantity `{text}`"))
+            .expected(format!("one of {}", names.join(", ")))
+            .did_you_mean(text, VOCABULARY.iter().flat_map(Quantity::names))
     })
 }
 

@@ -1,18 +1,11 @@
 //! A conductance that is always across the output, beside the set load; part of `i_out`.
 
-use crate::catalogue::{Effect, number};
+use crate::catalogue::{Effect, Way, number};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
     name: "bleed",
     meaning: "conductance that is always across the output",
-    parameters: &[number!(
-        load.bleed,
-        "load.bleed",
-        "S",
-        "conductance",
-        (0.0, 1e3),
-        (0.0, 1e-3),
-        0.0
-    )],
+    needs: Way::Batch,
+    parameters: &[number!(load.bleed, "S", "conductance", (0.0, 1e3), (0.0, 1e-3), 0.0)],
 };

@@ -3,16 +3,16 @@
 //!
 //! A resonance of `1 / (2 pi sqrt(L C))`, and `resistance i` between converter and load.
 
-use crate::catalogue::{Effect, number};
+use crate::catalogue::{Effect, Way, number};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
     name: "cable",
     meaning: "wires to the load and the capacitor at their end",
+    needs: Way::Full,
     parameters: &[
         number!(
             cable.inductance,
-            "cable.inductance",
             "H",
             "inductance of both wires; needs capacitance",
             (0.0, 1e-2),
@@ -21,7 +21,6 @@ pub const EFFECT: Effect = Effect {
         ),
         number!(
             cable.resistance,
-            "cable.resistance",
             "ohm",
             "resistance of both wires; needs inductance",
             (0.0, 100.0),
@@ -30,7 +29,6 @@ pub const EFFECT: Effect = Effect {
         ),
         number!(
             cable.capacitance,
-            "cable.capacitance",
             "F",
             "capacitor at the load's terminals; needs inductance",
             (0.0, 1.0),

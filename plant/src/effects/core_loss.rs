@@ -3,15 +3,15 @@
 //! A current step of `g v_in` at every edge, and slightly more damping. When the winding current ends (DCM), what the
 //! inductance still holds (`g v_out`, milliamperes) is lost in the core at once.
 
-use crate::catalogue::{Effect, number};
+use crate::catalogue::{Effect, Way, number};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
     name: "core_loss",
     meaning: "loss in the inductor's core",
+    needs: Way::Full,
     parameters: &[number!(
         inductor.core_conductance,
-        "inductor.core_conductance",
         "S",
         "conductance across the inductance",
         (0.0, 0.1),

@@ -2,15 +2,15 @@
 //!
 //! 0 is the ideal, immediate load. A slow one behaves as a current sink in the first moments of a step.
 
-use crate::catalogue::{Effect, number};
+use crate::catalogue::{Effect, Way, number};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
     name: "cpl_bandwidth",
     meaning: "lag of the constant-power regulation",
+    needs: Way::Full,
     parameters: &[number!(
         load.cpl_time_constant,
-        "load.cpl_time_constant",
         "s",
         "time constant of the regulation",
         (0.0, 10.0),

@@ -1,14 +1,14 @@
 //! Below `v_fold` a constant-power load is the resistor `v_fold^2 / P`: no real load draws unlimited current.
 
-use crate::catalogue::{Effect, number};
+use crate::catalogue::{Effect, Way, detail};
 
 /// Catalogue entry. Not an effect that can be absent: every plant has it.
 pub const EFFECT: Effect = Effect {
     name: "cpl_fold",
     meaning: "voltage below which constant power becomes a resistor",
-    parameters: &[number!(
+    needs: Way::Batch,
+    parameters: &[detail!(
         load.v_fold,
-        "load.v_fold",
         "V",
         "voltage of the fold",
         (1e-3, 1e5),

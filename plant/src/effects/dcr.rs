@@ -3,15 +3,15 @@
 //! Lowers the output by `dcr i` (CCM) and damps the LC resonance. In steady state it cannot be told from equal
 //! changes of `r_ds_on` and `r_d`.
 
-use crate::catalogue::{Effect, number};
+use crate::catalogue::{Effect, Way, number};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
     name: "dcr",
     meaning: "resistance of the inductor's winding",
+    needs: Way::Batch,
     parameters: &[number!(
         inductor.dcr,
-        "inductor.dcr",
         "ohm",
         "winding resistance",
         (0.0, 100.0),

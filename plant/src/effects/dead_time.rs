@@ -3,16 +3,16 @@
 //! A diode leg loses `dead_time / t_sw` of duty. In a synchronous leg the body diodes carry the current meanwhile: the
 //! duty is lost while the current is positive and kept while it is negative.
 
-use crate::catalogue::{Effect, number};
-use crate::parameters::Parameters;
+use crate::catalogue::{Effect, Way, number};
+use crate::effects::Parameters;
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
     name: "dead_time",
     meaning: "time during which neither switch is told to conduct",
+    needs: Way::Walk,
     parameters: &[number!(
         switch.dead_time,
-        "switch.dead_time",
         "s",
         "how much later a switch is told to turn on",
         (0.0, 1e-3),

@@ -3,26 +3,25 @@
 //! Differential capacitance, i = C(v) dv/dt, as ceramics of class II have it. More ripple and a deeper dip at higher
 //! voltage; nothing in the mean. At one voltage it cannot be told from a smaller C.
 
-use crate::catalogue::{Effect, number};
-use crate::parameters::Capacitor;
+use crate::catalogue::{Effect, Way, detail, number};
+use crate::effects::Capacitor;
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
     name: "derating",
     meaning: "capacitance that falls with voltage",
+    needs: Way::Full,
     parameters: &[
         number!(
             capacitor.derating,
-            "capacitor.derating",
             "1",
             "share of the capacitance that is lost far above v_half",
             (0.0, 0.95),
             (0.1, 0.8),
             0.0
         ),
-        number!(
+        detail!(
             capacitor.v_half,
-            "capacitor.v_half",
             "V",
             "voltage at which half of that share is lost",
             (1e-3, 1e6),

@@ -2,25 +2,17 @@
 //!
 //! Lowers the output by `(1 - d) (v_f + r_d i)` (CCM) and ends the conduction earlier (DCM).
 
-use crate::catalogue::{Effect, number};
+use crate::catalogue::{Effect, Way, number};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
     name: "diode",
     meaning: "forward voltage and resistance of the diode",
+    needs: Way::Batch,
     parameters: &[
-        number!(
-            switch.v_f,
-            "switch.v_f",
-            "V",
-            "forward voltage",
-            (0.0, 100.0),
-            (0.3, 2.0),
-            0.0
-        ),
+        number!(switch.v_f, "V", "forward voltage", (0.0, 100.0), (0.3, 2.0), 0.0),
         number!(
             switch.r_d,
-            "switch.r_d",
             "ohm",
             "differential resistance",
             (0.0, 100.0),

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::catalogue::{Effect, Field, Parameter};
+use crate::catalogue::{Effect, Field, Parameter, Way};
 
 /// Longest delay, periods.
 pub const LONGEST: usize = 8;
@@ -11,6 +11,7 @@ pub const LONGEST: usize = 8;
 pub const EFFECT: Effect = Effect {
     name: "duty_delay",
     meaning: "whole periods a commanded duty waits",
+    needs: Way::Step,
     parameters: &[Parameter {
         key: "pwm.duty_delay",
         unit: "1",
@@ -18,6 +19,7 @@ pub const EFFECT: Effect = Effect {
         allowed: (0.0, LONGEST as f64),
         typical: (0.0, 2.0),
         neutral: 0.0,
+        switches_on: true,
         field: Field::Whole(
             |p| u64::from(p.pwm.duty_delay),
             |p, value| p.pwm.duty_delay = u32::try_from(value).unwrap_or(u32::MAX),

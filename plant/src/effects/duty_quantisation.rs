@@ -1,14 +1,14 @@
 //! The modulator counts: the duty is rounded to the nearest multiple of `duty_lsb`, half up.
 
-use crate::catalogue::{Effect, number};
+use crate::catalogue::{Effect, Way, number};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
     name: "duty_quantisation",
     meaning: "step of the duty",
+    needs: Way::Batch,
     parameters: &[number!(
         pwm.duty_lsb,
-        "pwm.duty_lsb",
         "1",
         "step of the duty",
         (0.0, 0.5),

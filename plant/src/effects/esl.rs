@@ -3,15 +3,15 @@
 //! With the inductor it divides the step of the switch node: v_out jumps by `v_in esl / (L + esl)` at every edge. The
 //! derivative of the load current without cable is left out: it decays within `esl G`, nanoseconds.
 
-use crate::catalogue::{Effect, number};
+use crate::catalogue::{Effect, Way, number};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
     name: "esl",
     meaning: "series inductance of the output capacitor",
+    needs: Way::Full,
     parameters: &[number!(
         capacitor.esl,
-        "capacitor.esl",
         "H",
         "series inductance",
         (0.0, 1e-5),

@@ -3,15 +3,15 @@
 //! Ripple in phase with the current, a step of `esr di` at a load step, a zero at `1/(esr C)`; damps a constant-power
 //! load only when in series with it. No trace in the mean.
 
-use crate::catalogue::{Effect, number};
+use crate::catalogue::{Effect, Way, number};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
     name: "esr",
     meaning: "series resistance of the output capacitor",
+    needs: Way::Full,
     parameters: &[number!(
         capacitor.esr,
-        "capacitor.esr",
         "ohm",
         "series resistance",
         (0.0, 10.0),

@@ -2,35 +2,33 @@
 //!
 //! The sine is a polynomial of our own: the same bits on every machine.
 
-use crate::catalogue::{Effect, number};
-use crate::parameters::Source;
+use crate::catalogue::{Effect, Way, detail, number};
+use crate::effects::Source;
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
     name: "input_ripple",
     meaning: "line harmonic on the source voltage",
+    needs: Way::Full,
     parameters: &[
         number!(
             source.ripple,
-            "source.ripple",
             "V",
             "amplitude of the line harmonic",
             (0.0, 1e5),
             (0.5, 10.0),
             0.0
         ),
-        number!(
+        detail!(
             source.ripple_frequency,
-            "source.ripple_frequency",
             "Hz",
             "frequency of the line harmonic",
             (0.0, 1e6),
             (100.0, 360.0),
             100.0
         ),
-        number!(
+        detail!(
             source.ripple_phase,
-            "source.ripple_phase",
             "1",
             "phase at time 0, turns",
             (-1.0, 1.0),

@@ -1,17 +1,17 @@
 //! The electronic load draws another current or power than it was set to; a resistor has another value than printed.
 
-use crate::catalogue::{Effect, number};
-use crate::parameters::LoadBox;
+use crate::catalogue::{Effect, Way, number};
+use crate::effects::LoadBox;
 use crate::signals::Load;
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
     name: "load_setting",
     meaning: "gain between the set and the drawn load",
+    needs: Way::Batch,
     parameters: &[
         number!(
             load.setting_gain,
-            "load.setting_gain",
             "1",
             "drawn over set current or power",
             (0.0, 10.0),
@@ -20,7 +20,6 @@ pub const EFFECT: Effect = Effect {
         ),
         number!(
             load.resistor_gain,
-            "load.resistor_gain",
             "1",
             "real over set conductance",
             (0.0, 10.0),

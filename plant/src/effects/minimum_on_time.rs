@@ -1,15 +1,15 @@
 //! Pulses shorter than the minimum on-time are left out, or lengthened to it.
 
-use crate::catalogue::{Effect, number};
-use crate::parameters::{Pwm, ShortPulse};
+use crate::catalogue::{Effect, Way, number};
+use crate::effects::{Pwm, ShortPulse};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
     name: "minimum_on_time",
     meaning: "shortest pulse of the switch",
+    needs: Way::Batch,
     parameters: &[number!(
         pwm.min_on_time,
-        "pwm.min_on_time",
         "s",
         "shortest pulse of the switch",
         (0.0, 1.0),

@@ -3,26 +3,25 @@
 //! Differential inductance, v = L(i) di/dt. Half of the share k is lost at `i_sat`; k = 0 is the linear inductor.
 //! More ripple at high current, a faster response there; nothing in steady state in CCM.
 
-use crate::catalogue::{Effect, number};
-use crate::parameters::Inductor;
+use crate::catalogue::{Effect, Way, detail, number};
+use crate::effects::Inductor;
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
     name: "saturation",
     meaning: "inductance that falls with current",
+    needs: Way::Full,
     parameters: &[
         number!(
             inductor.saturation,
-            "inductor.saturation",
             "1",
             "share of the inductance that is lost far above i_sat",
             (0.0, 0.95),
             (0.1, 0.7),
             0.0
         ),
-        number!(
+        detail!(
             inductor.i_sat,
-            "inductor.i_sat",
             "A",
             "current at which half of that share is lost",
             (1e-3, 1e6),

@@ -1,49 +1,13 @@
 //! The analog-digital converter: rounded to the nearest multiple of `lsb`, half up.
 
-use crate::catalogue::{Effect, number};
+use crate::catalogue::{Effect, Way, of_each_sensor};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
     name: "sensor_quantisation",
     meaning: "step of the analog-digital converter",
-    parameters: &[
-        number!(
-            sensors.v_out.lsb,
-            "sensors.v_out.lsb",
-            "V",
-            "step of the converter",
-            (0.0, 1e4),
-            (1e-3, 0.1),
-            0.0
-        ),
-        number!(
-            sensors.i_l.lsb,
-            "sensors.i_l.lsb",
-            "A",
-            "step of the converter",
-            (0.0, 1e4),
-            (1e-3, 0.1),
-            0.0
-        ),
-        number!(
-            sensors.i_out.lsb,
-            "sensors.i_out.lsb",
-            "A",
-            "step of the converter",
-            (0.0, 1e4),
-            (1e-3, 0.1),
-            0.0
-        ),
-        number!(
-            sensors.v_in.lsb,
-            "sensors.v_in.lsb",
-            "V",
-            "step of the converter",
-            (0.0, 1e4),
-            (1e-3, 0.1),
-            0.0
-        ),
-    ],
+    needs: Way::Batch,
+    parameters: of_each_sensor!(lsb, ("V", "A"), "step of the converter", (0.0, 1e4), (1e-3, 0.1), 0.0),
 };
 
 /// The code of `value`, in the sensor's unit.

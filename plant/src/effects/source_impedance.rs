@@ -4,16 +4,16 @@
 //! Lowers the output like a resistance of `resistance d^2` (with capacitor) and shows in `v_in`. The `v_in` reported
 //! at an edge is that just before it.
 
-use crate::catalogue::{Effect, number};
+use crate::catalogue::{Effect, Way, number};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
     name: "source_impedance",
     meaning: "impedance of the source and input capacitor",
+    needs: Way::Full,
     parameters: &[
         number!(
             source.resistance,
-            "source.resistance",
             "ohm",
             "series resistance",
             (0.0, 1e3),
@@ -22,25 +22,15 @@ pub const EFFECT: Effect = Effect {
         ),
         number!(
             source.inductance,
-            "source.inductance",
             "H",
             "series inductance; needs c_in",
             (0.0, 1.0),
             (1e-7, 1e-4),
             0.0
         ),
-        number!(
-            source.c_in,
-            "source.c_in",
-            "F",
-            "input capacitor",
-            (0.0, 10.0),
-            (1e-5, 1e-2),
-            0.0
-        ),
+        number!(source.c_in, "F", "input capacitor", (0.0, 10.0), (1e-5, 1e-2), 0.0),
         number!(
             source.esr_in,
-            "source.esr_in",
             "ohm",
             "series resistance of the input capacitor; needs c_in",
             (0.0, 10.0),

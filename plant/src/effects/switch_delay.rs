@@ -2,17 +2,17 @@
 //!
 //! `turn_on_delay - turn_off_delay` over the period is lost duty; slow turn-off gains duty.
 
-use crate::catalogue::{Effect, number};
-use crate::parameters::Parameters;
+use crate::catalogue::{Effect, Way, number};
+use crate::effects::Parameters;
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
     name: "switch_delay",
     meaning: "delay between the command and the switch",
+    needs: Way::Walk,
     parameters: &[
         number!(
             switch.turn_on_delay,
-            "switch.turn_on_delay",
             "s",
             "from the command to the current when turning on",
             (0.0, 1e-3),
@@ -21,7 +21,6 @@ pub const EFFECT: Effect = Effect {
         ),
         number!(
             switch.turn_off_delay,
-            "switch.turn_off_delay",
             "s",
             "from the command to no current when turning off",
             (0.0, 1e-3),

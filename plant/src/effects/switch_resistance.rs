@@ -3,16 +3,16 @@
 //!
 //! Lowers the output by `d r_ds_on i` (CCM).
 
-use crate::catalogue::{Effect, number};
+use crate::catalogue::{Effect, Way, number};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
     name: "switch_resistance",
     meaning: "on-resistance of the switches",
+    needs: Way::Batch,
     parameters: &[
         number!(
             switch.r_ds_on,
-            "switch.r_ds_on",
             "ohm",
             "on-resistance of the switch",
             (0.0, 100.0),
@@ -21,7 +21,6 @@ pub const EFFECT: Effect = Effect {
         ),
         number!(
             switch.r_ds_on_low,
-            "switch.r_ds_on_low",
             "ohm",
             "on-resistance of the second switch of a synchronous leg",
             (0.0, 100.0),

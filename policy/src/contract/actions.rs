@@ -1,6 +1,6 @@
 //! `[actions]`: the duty of each network output.
 
-use toml_input::{Fault, Table, Value};
+use toml_input::{Sink, Table, Value};
 
 use super::duty;
 use crate::catalogue;
@@ -14,7 +14,7 @@ pub(crate) struct Actions {
     pub count: usize,
 }
 
-pub(crate) fn read(root: &mut Table<'_>, faults: &mut Vec<Fault>) -> Actions {
+pub(crate) fn read(root: &mut Table<'_>, faults: &mut Sink) -> Actions {
     let hint = "give [actions] with `duties = [...]` or `pairs = [...]`, one per network output";
     let Some(mut section) = root
         .required("actions", hint, faults)
@@ -44,7 +44,7 @@ pub(crate) fn read(root: &mut Table<'_>, faults: &mut Vec<Fault>) -> Actions {
     actions
 }
 
-fn from_duties(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Actions> {
+fn from_duties(value: &Value<'_>, faults: &mut Sink) -> Option<Actions> {
     let items = value.list("an array of duty ratios", faults)?;
     let duties = items.iter().filter_map(|item| duty(item, faults));
     let list: Vec<_> = duties.map(|duty| Action { duty, pair: None }).collect();
@@ -54,7 +54,7 @@ fn from_duties(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Actions> {
     })
 }
 
-fn from_pairs(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Actions> {
+fn from_pairs(value: &Value<'_>, faults: &mut Sink) -> Option<Actions> {
     let items = value.list("an array of pairs: [{ xi = 0.5, phi = 0.05 }]", faults)?;
     let mut actions = Actions::default();
     let mut known = true;
@@ -72,7 +72,7 @@ fn from_pairs(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Actions> {
     known.then_some(actions)
 }
 
-fn pair(item: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<Pair>> {
+fn pair(item: &Value<'_>, faults: &mut Sink) -> Option<Vec<Pair>> {
     let mut section = item.table("pairs", faults)?;
     let hint = "a pair means duty = xi + c phi: { xi = 0.5, phi = 0.05, c = [-1, 0, 1] }";
     let xi = section.required("xi", hint, faults).and_then(|v| duty(&v, faults));
@@ -85,7 +85,7 @@ fn pair(item: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<Pair>> {
     Some(factors?.into_iter().map(|c| Pair { xi, phi, c }).collect())
 }
 
-fn factors(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<i8>> {
+fn factors(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<i8>> {
     let items = value.list("an array of -1, 0, 1", faults)?;
     let mut list = Vec::new();
     for item in &items {
@@ -107,7 +107,7 @@ fn factors(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<i8>> {
     Some(list)
 }
 
-fn action(item: &Value<'_>, pair: Pair, faults: &mut Vec<Fault>) -> Option<Action> {
+fn action(item: &Value<'_>, pair: Pair, faults: &mut Sink) -> Option<Action> {
     let duty = pair.xi + f64::from(pair.c) * pair.phi;
     if (0.0..=1.0).contains(&duty) {
         return Some(Action { duty, pair: Some(pair) });

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use toml_input::{Fault, Table, Value};
+use toml_input::{Sink, Table, Value};
 
 use super::{Taken, filters, name, number_f32, range_f32};
 use crate::bounds::{self, Box32, Inputs, Overflow};
@@ -31,7 +31,7 @@ pub(crate) struct Surroundings<'a> {
     pub period: Option<f64>,
 }
 
-pub(crate) fn read<'a>(root: &mut Table<'a>, around: &Surroundings<'_>, faults: &mut Vec<Fault>) -> Features<'a> {
+pub(crate) fn read<'a>(root: &mut Table<'a>, around: &Surroundings<'_>, faults: &mut Sink) -> Features<'a> {
     let mut features = Features {
         list: Vec::new(),
         count: 0,
@@ -57,7 +57,7 @@ pub(crate) fn read<'a>(root: &mut Table<'a>, around: &Surroundings<'_>, faults: 
     features
 }
 
-fn one(item: &Value<'_>, around: &Surroundings<'_>, taken: &mut Taken, faults: &mut Vec<Fault>) -> Option<Feature> {
+fn one(item: &Value<'_>, around: &Surroundings<'_>, taken: &mut Taken, faults: &mut Sink) -> Option<Feature> {
     let mut section = item.table("[[feature]]", faults)?;
     let hint = "a feature needs a name: `name = \"e\"`";
     let name = section
@@ -95,7 +95,7 @@ fn one(item: &Value<'_>, around: &Surroundings<'_>, taken: &mut Taken, faults: &
     })
 }
 
-fn source(value: &Value<'_>, around: &Surroundings<'_>, faults: &mut Vec<Fault>) -> Option<(Expr, String)> {
+fn source(value: &Value<'_>, around: &Surroundings<'_>, faults: &mut Sink) -> Option<(Expr, String)> {
     let text = value.text(faults)?;
     let scope = Scope {
         signals: around.signals,
@@ -112,7 +112,7 @@ fn source(value: &Value<'_>, around: &Surroundings<'_>, faults: &mut Vec<Fault>)
 }
 
 /// Features with their bounds; a fault for each that could leave the format.
-pub(crate) fn bounded(list: Vec<Unbounded<'_>>, inputs: &Inputs, period: f64, faults: &mut Vec<Fault>) -> Vec<Feature> {
+pub(crate) fn bounded(list: Vec<Unbounded<'_>>, inputs: &Inputs, period: f64, faults: &mut Sink) -> Vec<Feature> {
     let mut features = Vec::with_capacity(list.len());
     for Unbounded { at, mut feature } in list {
         match bound(&feature, inputs, period) {

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use toml_input::{Fault, Value};
+use toml_input::{Sink, Value};
 
 use super::number_f32;
 use crate::catalogue;
@@ -21,7 +21,7 @@ const KINDS: [&str; 6] = [
 ];
 
 /// The chain, first to last; `period` is `None` if the contract's is faulty.
-pub(crate) fn read(value: &Value<'_>, period: Option<f64>, faults: &mut Vec<Fault>) -> Option<Vec<Filter>> {
+pub(crate) fn read(value: &Value<'_>, period: Option<f64>, faults: &mut Sink) -> Option<Vec<Filter>> {
     let items = value.list("an array of filters: [{ delay = 1 }]", faults)?;
     if items.len() > MAX_FILTERS {
         faults.push(value.fault(catalogue::count("filters", items.len(), 0, MAX_FILTERS)));
@@ -31,7 +31,7 @@ pub(crate) fn read(value: &Value<'_>, period: Option<f64>, faults: &mut Vec<Faul
     filters.into_iter().collect()
 }
 
-fn one(value: &Value<'_>, period: Option<f64>, faults: &mut Vec<Fault>) -> Option<Filter> {
+fn one(value: &Value<'_>, period: Option<f64>, faults: &mut Sink) -> Option<Filter> {
     if let Some(text) = value.as_text() {
         return named(value, text, faults);
     }
@@ -41,12 +41,12 @@ fn one(value: &Value<'_>, period: Option<f64>, faults: &mut Vec<Fault>) -> Optio
         .filter_map(|kind| section.optional(kind).map(|value| (*kind, value)))
         .collect();
     let number = section.count();
-    let before = faults.len();
+    let before = faults.count();
     if number == 1 || found.is_empty() {
         section.finish(faults);
     }
     let (Some((kind, inner)), 1) = (found.pop(), number) else {
-        if faults.len() == before {
+        if faults.count() == before {
             faults.push(value.fault(catalogue::exactly_one_of("a filter", &KINDS.join(", "), number)));
         }
         return None;
@@ -73,7 +73,7 @@ fn one(value: &Value<'_>, period: Option<f64>, faults: &mut Vec<Fault>) -> Optio
     }
 }
 
-fn named(value: &Value<'_>, text: &str, faults: &mut Vec<Fault>) -> Option<Filter> {
+fn named(value: &Value<'_>, text: &str, faults: &mut Sink) -> Option<Filter> {
     if text == "backward_difference" {
         return Some(Filter::BackwardDifference);
     }
@@ -86,7 +86,7 @@ fn named(value: &Value<'_>, text: &str, faults: &mut Vec<Fault>) -> Option<Filte
 }
 
 /// tau from `{ time_constant = s }` or `{ cutoff = Hz }`: tau = 1/(2 pi f).
-fn time_constant(value: &Value<'_>, period: Option<f64>, faults: &mut Vec<Fault>) -> Option<f64> {
+fn time_constant(value: &Value<'_>, period: Option<f64>, faults: &mut Sink) -> Option<f64> {
     let mut section = value.table(value.label(), faults)?;
     let tau = section.optional("time_constant");
     let cutoff = section.optional("cutoff");
@@ -116,7 +116,7 @@ fn time_constant(value: &Value<'_>, period: Option<f64>, faults: &mut Vec<Fault>
     Some(seconds)
 }
 
-fn integrator(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Filter> {
+fn integrator(value: &Value<'_>, faults: &mut Sink) -> Option<Filter> {
     let mut section = value.table("integrator", faults)?;
     let hint = "an integrator needs both clamps: { min = -1.0, max = 1.0 }";
     let min = section

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use toml_input::{Fault, Table, Value};
+use toml_input::{Sink, Table, Value};
 
 use super::{Taken, name, taken_once};
 use crate::catalogue;
@@ -18,7 +18,7 @@ pub(crate) struct Head {
     pub parameters: BTreeMap<String, f64>,
 }
 
-pub(crate) fn read(root: &mut Table<'_>, taken: &mut Taken, faults: &mut Vec<Fault>) -> Head {
+pub(crate) fn read(root: &mut Table<'_>, taken: &mut Taken, faults: &mut Sink) -> Head {
     let hint = "name the controller: `name = \"buck\"`; files and symbols begin with it";
     let name = root
         .required("name", hint, faults)
@@ -43,7 +43,7 @@ pub(crate) fn read(root: &mut Table<'_>, taken: &mut Taken, faults: &mut Vec<Fau
     }
 }
 
-fn period(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<f64> {
+fn period(value: &Value<'_>, faults: &mut Sink) -> Option<f64> {
     let period = value.number(faults)?;
     if (limits::MIN_SAMPLE_PERIOD..=limits::MAX_SAMPLE_PERIOD).contains(&period) {
         return Some(period);
@@ -56,7 +56,7 @@ fn period(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<f64> {
     None
 }
 
-fn format(value: &Value<'_>, faults: &mut Vec<Fault>) -> NumericFormat {
+fn format(value: &Value<'_>, faults: &mut Sink) -> NumericFormat {
     let Some(text) = value.text(faults) else {
         return NumericFormat::F32;
     };
@@ -67,7 +67,7 @@ fn format(value: &Value<'_>, faults: &mut Vec<Fault>) -> NumericFormat {
     })
 }
 
-fn parameters(value: &Value<'_>, taken: &mut Taken, faults: &mut Vec<Fault>) -> BTreeMap<String, f64> {
+fn parameters(value: &Value<'_>, taken: &mut Taken, faults: &mut Sink) -> BTreeMap<String, f64> {
     let mut parameters = BTreeMap::new();
     for (key, value) in value.pairs(faults).unwrap_or_default() {
         let kind = Kind::Parameter;

@@ -1,6 +1,6 @@
 //! `[mapping]` of `policy.toml` and the file it names (`drm.toml`).
 
-use toml_input::{Document, Fault, Table, nearest};
+use toml_input::{Document, Sink, Table};
 
 use super::{duty_interval, interval_f32, number_f32};
 use crate::bounds::Box32;
@@ -9,23 +9,25 @@ use crate::model::{Coefficients, Interval, Mapping};
 use crate::rounding::{inward_f32, nearest_f32};
 
 /// The section in `policy.toml`: the index of the load current; the coefficients stand in `drm.toml`.
-pub(crate) fn load_current(section: &mut Table<'_>, signals: &[String], faults: &mut Vec<Fault>) -> Option<usize> {
+pub(crate) fn load_current(section: &mut Table<'_>, signals: &[String], faults: &mut Sink) -> Option<usize> {
     let hint = "name the signal that is i_out in the mapping: `load_current = \"i_out\"`";
     let value = section.required("load_current", hint, faults)?;
     let text = value.text(faults)?;
     let index = signals.iter().position(|name| name == text);
     if index.is_none() {
-        let names = signals.iter().map(String::as_str).filter(|name| !name.is_empty());
-        let hint = nearest(text, names.clone()).map(|name| format!("did you mean `{name}`?"));
-        let expected = format!("one of {}", names.collect::<Vec<_>>().join(", "));
-        faults.push(value.fault(catalogue::unknown_name("signal", text, hint, &expected)));
+        let names: Vec<&str> = signals
+            .iter()
+            .map(String::as_str)
+            .filter(|name| !name.is_empty())
+            .collect();
+        faults.push(value.fault(catalogue::unknown_name("signal", text, &names)));
     }
     index
 }
 
 /// Reads `drm.toml`; `load_current` is entered as given.
-pub(crate) fn read(document: &Document, load_current: usize, faults: &mut Vec<Fault>) -> Option<Mapping> {
-    let before = faults.len();
+pub(crate) fn read(document: &Document, load_current: usize, faults: &mut Sink) -> Option<Mapping> {
+    let before = faults.count();
     let mut root = document.root();
     let hint = "a mapping is d_real = a d_sim + b i_out + c (+ r i_out d_sim)";
     let places = ["a", "b", "c"].map(|key| root.required(key, hint, faults));
@@ -87,10 +89,10 @@ pub(crate) fn read(document: &Document, load_current: usize, faults: &mut Vec<Fa
         adjust_c: adjust_c?,
         adjust_r: adjust_r?,
     };
-    if faults.len() == before {
+    if faults.count() == before {
         rising(&mapping, product.as_ref().or(places[0].as_ref()), faults);
     }
-    (faults.len() == before).then_some(mapping)
+    (faults.count() == before).then_some(mapping)
 }
 
 /// `[adjust] key`, or the default; the coefficient must lie inside, as it stands and in binary32, and `a` stay above 0.
@@ -99,7 +101,7 @@ fn adjustable(
     key: &'static str,
     coefficient: Option<f64>,
     default: Option<Interval>,
-    faults: &mut Vec<Fault>,
+    faults: &mut Sink,
 ) -> Option<Interval> {
     let Some(value) = adjust.as_mut().and_then(|section| section.optional(key)) else {
         return default;
@@ -121,7 +123,7 @@ fn adjustable(
 }
 
 /// `adjust r` has no meaning in the three-term form.
-fn without_r(adjust: &mut Option<Table<'_>>, faults: &mut Vec<Fault>) -> bool {
+fn without_r(adjust: &mut Option<Table<'_>>, faults: &mut Sink) -> bool {
     match adjust.as_mut().and_then(|section| section.optional("r")) {
         None => true,
         Some(value) => {
@@ -132,7 +134,7 @@ fn without_r(adjust: &mut Option<Table<'_>>, faults: &mut Vec<Fault>) -> bool {
 }
 
 /// The mapping must rise with d_sim at both ends of i_out, computed as the controller computes it.
-fn rising(mapping: &Mapping, at: Option<&toml_input::Value<'_>>, faults: &mut Vec<Fault>) {
+fn rising(mapping: &Mapping, at: Option<&toml_input::Value<'_>>, faults: &mut Sink) {
     let Some(r) = mapping.coefficients.r else { return };
     for i_out in [mapping.valid_i_out.low, mapping.valid_i_out.high].map(nearest_f32) {
         let slope = nearest_f32(mapping.coefficients.a) + nearest_f32(r) * i_out;

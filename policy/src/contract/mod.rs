@@ -9,7 +9,7 @@ pub(crate) mod network;
 pub(crate) mod protection;
 pub(crate) mod signals;
 
-use toml_input::{Fault, Value};
+use toml_input::{Sink, Value};
 
 use crate::catalogue;
 use crate::limits::MAX_MAGNITUDE;
@@ -21,7 +21,7 @@ use crate::rounding::inward_f32;
 pub(crate) type Taken = Vec<(String, Kind)>;
 
 /// A name that is fit for `kind` and not used by anything it could be confused with.
-pub(crate) fn name(value: &Value<'_>, kind: Kind, taken: &mut Taken, faults: &mut Vec<Fault>) -> Option<String> {
+pub(crate) fn name(value: &Value<'_>, kind: Kind, taken: &mut Taken, faults: &mut Sink) -> Option<String> {
     let text = value.text(faults)?;
     if let Some(hint) = names::objection(text, kind) {
         faults.push(value.fault(catalogue::bad_name(kind.word(), text, &hint)));
@@ -43,7 +43,7 @@ pub(crate) fn taken_once(name: &str, kind: Kind, taken: &mut Taken) -> Result<St
 }
 
 /// A number that is 0 or keeps its sign and size in binary32.
-pub(crate) fn number_f32(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<f64> {
+pub(crate) fn number_f32(value: &Value<'_>, faults: &mut Sink) -> Option<f64> {
     let number = value.number(faults)?;
     if fits_f32(number) {
         return Some(number);
@@ -57,7 +57,7 @@ pub(crate) fn fits_f32(number: f64) -> bool {
 }
 
 /// An interval whose ends fit binary32 and that still holds a binary32 number after rounding inwards.
-pub(crate) fn interval_f32(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Interval> {
+pub(crate) fn interval_f32(value: &Value<'_>, faults: &mut Sink) -> Option<Interval> {
     let [low, high] = value.interval(faults)?;
     let interval = Interval { low, high };
     let widest = interval.low.abs().max(interval.high.abs());
@@ -77,7 +77,7 @@ pub(crate) fn interval_f32(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option
 }
 
 /// An interval with `low < high`.
-pub(crate) fn range_f32(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Interval> {
+pub(crate) fn range_f32(value: &Value<'_>, faults: &mut Sink) -> Option<Interval> {
     let interval = interval_f32(value, faults)?;
     if interval.low < interval.high {
         return Some(interval);
@@ -87,7 +87,7 @@ pub(crate) fn range_f32(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<In
 }
 
 /// A duty ratio within 0..1.
-pub(crate) fn duty(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<f64> {
+pub(crate) fn duty(value: &Value<'_>, faults: &mut Sink) -> Option<f64> {
     let number = value.number(faults)?;
     if (0.0..=1.0).contains(&number) {
         return Some(number);
@@ -97,7 +97,7 @@ pub(crate) fn duty(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<f64> {
 }
 
 /// An interval of duty ratios within 0..1.
-pub(crate) fn duty_interval(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Interval> {
+pub(crate) fn duty_interval(value: &Value<'_>, faults: &mut Sink) -> Option<Interval> {
     let interval = interval_f32(value, faults)?;
     match [interval.low, interval.high]
         .iter()

@@ -1,10 +1,11 @@
 //! `[network]`: which tensors, which activations.
 
-use toml_input::{At, Fault, Message, Table, Value};
+use toml_input::{At, Fault, Message, Sink, Table, Value};
 
 use crate::activation::Activation;
 use crate::catalogue;
 use crate::limits::MAX_LAYERS;
+use crate::weights::golden::Limits;
 
 /// The activations behind the hidden layers, as given.
 pub(crate) enum Hidden<'a> {
@@ -26,10 +27,10 @@ pub(crate) struct Network<'a> {
     pub layers: Option<Vec<At<String>>>,
     pub transpose: Option<bool>,
     pub bias: bool,
-    pub tolerance: f64,
+    pub golden: Limits,
 }
 
-pub(crate) fn read<'a>(root: &mut Table<'a>, faults: &mut Vec<Fault>) -> Option<Network<'a>> {
+pub(crate) fn read<'a>(root: &mut Table<'a>, faults: &mut Sink) -> Option<Network<'a>> {
     let hint = "give [network] with `weights` and `hidden_activation`";
     let at = root.required("network", hint, faults)?;
     let mut section = at.table("[network]", faults)?;
@@ -53,6 +54,7 @@ pub(crate) fn read<'a>(root: &mut Table<'a>, faults: &mut Vec<Fault>) -> Option<
         .optional("golden_tolerance")
         .and_then(|v| tolerance(&v, faults))
         .unwrap_or(1e-5);
+    let decisions = section.optional("golden_decisions").and_then(|v| share(&v, faults));
     section.finish(faults);
     Some(Network {
         section: at,
@@ -61,7 +63,7 @@ pub(crate) fn read<'a>(root: &mut Table<'a>, faults: &mut Vec<Fault>) -> Option<
         layers,
         transpose,
         bias,
-        tolerance,
+        golden: Limits { tolerance, decisions },
     })
 }
 
@@ -72,7 +74,7 @@ impl Network<'_> {
     }
 
     /// One activation per layer; the last is the identity.
-    pub fn activations(&self, layers: usize, faults: &mut Vec<Fault>) -> Option<Vec<Activation>> {
+    pub fn activations(&self, layers: usize, faults: &mut Sink) -> Option<Vec<Activation>> {
         let hidden = layers.saturating_sub(1);
         let mut list = match &self.hidden {
             Hidden::Faulty => return None,
@@ -95,7 +97,7 @@ impl Network<'_> {
     }
 }
 
-fn hidden<'a>(value: &Value<'a>, faults: &mut Vec<Fault>) -> Hidden<'a> {
+fn hidden<'a>(value: &Value<'a>, faults: &mut Sink) -> Hidden<'a> {
     let Some(items) = value.as_list() else {
         return activation(value, faults).map_or(Hidden::Faulty, Hidden::Same);
     };
@@ -106,7 +108,7 @@ fn hidden<'a>(value: &Value<'a>, faults: &mut Vec<Fault>) -> Hidden<'a> {
     }
 }
 
-fn activation(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Activation> {
+fn activation(value: &Value<'_>, faults: &mut Sink) -> Option<Activation> {
     if value.is_table() {
         let mut section = value.table("hidden_activation", faults)?;
         let slope = section.required(
@@ -156,14 +158,14 @@ fn hint() -> String {
     )
 }
 
-fn owned(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<At<String>> {
+fn owned(value: &Value<'_>, faults: &mut Sink) -> Option<At<String>> {
     value.text(faults).map(|text| At {
         value: text.to_owned(),
         span: value.span().clone(),
     })
 }
 
-fn layers(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<At<String>>> {
+fn layers(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<At<String>>> {
     let items = value.list("an array of layer names: [\"fc1\", \"fc2\", \"out\"]", faults)?;
     if !(1..=MAX_LAYERS).contains(&items.len()) {
         faults.push(value.fault(catalogue::count("layers", items.len(), 1, MAX_LAYERS)));
@@ -172,7 +174,22 @@ fn layers(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<Vec<At<String>>>
     items.iter().map(|item| owned(item, faults)).collect()
 }
 
-fn tolerance(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<f64> {
+/// A share of decisions, 0..1.
+fn share(value: &Value<'_>, faults: &mut Sink) -> Option<f64> {
+    let number = value.number(faults)?;
+    if (0.0..=1.0).contains(&number) {
+        return Some(number);
+    }
+    let expected = "0 to 1: the share of golden actions that the numeric format may change";
+    faults.push(value.fault(catalogue::out_of_range(
+        "golden_decisions",
+        &number.to_string(),
+        expected,
+    )));
+    None
+}
+
+fn tolerance(value: &Value<'_>, faults: &mut Sink) -> Option<f64> {
     let number = value.number(faults)?;
     if number > 0.0 && number < 1.0 {
         return Some(number);

@@ -1,13 +1,13 @@
 //! `[limits]` and `[fallback]`.
 
-use toml_input::{Fault, Table, Value};
+use toml_input::{Sink, Table, Value};
 
 use super::{duty, duty_interval};
 use crate::catalogue;
 use crate::limits::{MAX_HOLD, MAX_SOFT_START_STEPS, MIN_SOFT_START_INCREMENT};
 use crate::model::{Fallback, Interval, Limits, SoftStart};
 
-pub(crate) fn fallback(root: &mut Table<'_>, faults: &mut Vec<Fault>) -> Option<Fallback> {
+pub(crate) fn fallback(root: &mut Table<'_>, faults: &mut Sink) -> Option<Fallback> {
     let hint = "say what happens without a usable measurement: [fallback] with `duty` and `hold`";
     let mut section = root.required("fallback", hint, faults)?.table("[fallback]", faults)?;
     let hint = "the duty commanded when no measurement is usable: `duty = 0.0`";
@@ -24,7 +24,7 @@ pub(crate) fn fallback(root: &mut Table<'_>, faults: &mut Vec<Fault>) -> Option<
 }
 
 /// The limits; `initial_duty` is the fallback duty where the contract does not give it.
-pub(crate) fn limits(root: &mut Table<'_>, fallback: Option<Fallback>, faults: &mut Vec<Fault>) -> Option<Limits> {
+pub(crate) fn limits(root: &mut Table<'_>, fallback: Option<Fallback>, faults: &mut Sink) -> Option<Limits> {
     let hint = "give [limits] with `duty = [low, high]`";
     let mut section = root.required("limits", hint, faults)?.table("[limits]", faults)?;
     let hint = "the smallest and largest duty the hardware may see: `duty = [0.05, 0.95]`";
@@ -50,7 +50,7 @@ pub(crate) fn limits(root: &mut Table<'_>, fallback: Option<Fallback>, faults: &
     })
 }
 
-fn slew(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<f64> {
+fn slew(value: &Value<'_>, faults: &mut Sink) -> Option<f64> {
     let number = value.number(faults)?;
     if (MIN_SOFT_START_INCREMENT..=1.0).contains(&number) {
         return Some(number);
@@ -60,7 +60,7 @@ fn slew(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<f64> {
     None
 }
 
-fn soft_start(value: &Value<'_>, range: Option<Interval>, faults: &mut Vec<Fault>) -> Option<SoftStart> {
+fn soft_start(value: &Value<'_>, range: Option<Interval>, faults: &mut Sink) -> Option<SoftStart> {
     let mut section = value.table("soft_start", faults)?;
     let hint = "a soft start is `{ from = 0.1, steps = 1000 }`";
     let start = section.required("from", hint, faults);

@@ -1,6 +1,6 @@
 //! `[[signal]]`: what is measured.
 
-use toml_input::{Fault, Table, Value};
+use toml_input::{Sink, Table, Value};
 
 use super::{Taken, name, number_f32, range_f32};
 use crate::catalogue;
@@ -16,7 +16,7 @@ pub(crate) struct Signals {
     pub adc: Vec<bool>,
 }
 
-pub(crate) fn read(root: &mut Table<'_>, taken: &mut Taken, faults: &mut Vec<Fault>) -> Signals {
+pub(crate) fn read(root: &mut Table<'_>, taken: &mut Taken, faults: &mut Sink) -> Signals {
     let mut signals = Signals {
         names: Vec::new(),
         list: Vec::new(),
@@ -65,7 +65,7 @@ pub(crate) fn read(root: &mut Table<'_>, taken: &mut Taken, faults: &mut Vec<Fau
 }
 
 /// A unit as it may stand in a comment.
-fn unit(value: &Value<'_>, faults: &mut Vec<Fault>) -> Option<String> {
+fn unit(value: &Value<'_>, faults: &mut Sink) -> Option<String> {
     let text = value.text(faults)?;
     let printable = |c: char| !c.is_control() && !matches!(c, '"' | '\'' | '\\' | '`') && is_visible(c);
     let fit = text.chars().count() <= MAX_UNIT_CHARS && text.chars().all(printable);
@@ -85,7 +85,7 @@ fn is_visible(c: char) -> bool {
     !matches!(c, '\u{2028}' | '\u{2029}' | '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
 }
 
-fn adc(value: &Value<'_>, range: Option<Interval>, name: &str, faults: &mut Vec<Fault>) -> Option<Adc> {
+fn adc(value: &Value<'_>, range: Option<Interval>, name: &str, faults: &mut Sink) -> Option<Adc> {
     let mut section = value.table("adc", faults)?;
     let gain = section.required(
         "gain",

@@ -94,11 +94,10 @@ pub(crate) fn extra_bias(name: &str) -> Message {
         .hint("remove `bias = false` from [network]")
 }
 
-pub(crate) fn unknown_layer(name: &str, hint: Option<String>, all: &str) -> Message {
+pub(crate) fn unknown_layer(name: &str, all: &str) -> Message {
     Message::new(format!("there is no layer `{}` in the weights", name.escape_debug()))
         .found(format!("layers: {all}"))
         .expected("a tensor name without `.weight`")
-        .maybe_hint(hint)
 }
 
 pub(crate) fn unknown_prefix(prefix: &str, all: &str) -> Message {

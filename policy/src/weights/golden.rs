@@ -2,11 +2,20 @@
 
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
-use toml_input::{Fault, Message};
+use toml_input::{Message, Sink};
 
 use super::{catalogue, header, tensors};
 use crate::model::{Feature, Golden};
 use crate::raw::Binary;
+
+/// What the contract allows a network that answers them.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Limits {
+    /// |Q - golden| relative to the largest |Q| of a vector.
+    pub tolerance: f64,
+    /// Share of changed actions, 0..1.
+    pub decisions: Option<f64>,
+}
 
 /// Reads and checks the vectors; `bounds` are checked only if every feature is known.
 pub(crate) fn read(
@@ -14,17 +23,17 @@ pub(crate) fn read(
     features: usize,
     bounds: &[Feature],
     actions: usize,
-    tolerance: f64,
-    faults: &mut Vec<Fault>,
+    limits: Limits,
+    faults: &mut Sink,
 ) -> Option<Golden> {
     let opened = header::open(file, faults)?;
-    let before = faults.len();
+    let before = faults.count();
     for (name, view) in opened.iter() {
         if let Err(message) = tensors::sound(name, view.shape()) {
             faults.push(file.name.tensor_fault(name, message));
         }
     }
-    if faults.len() > before {
+    if faults.count() > before {
         return None;
     }
     let view = |name: &str| opened.iter().find(|(found, _)| *found == name).map(|(_, view)| view);
@@ -62,9 +71,10 @@ pub(crate) fn read(
         observations: obs?,
         q_values: q_values?,
         action_indices: action_indices?,
-        tolerance,
+        tolerance: limits.tolerance,
+        decisions: limits.decisions,
     };
-    (faults.len() == before).then_some(golden)
+    (faults.count() == before).then_some(golden)
 }
 
 fn names(tensors: &SafeTensors<'_>) -> String {
@@ -73,7 +83,7 @@ fn names(tensors: &SafeTensors<'_>) -> String {
     names.join(", ")
 }
 
-fn part<T>(file: &Binary, tensor: &str, faults: &mut Vec<Fault>, result: Result<T, Message>) -> Option<T> {
+fn part<T>(file: &Binary, tensor: &str, faults: &mut Sink, result: Result<T, Message>) -> Option<T> {
     result
         .map_err(|message| faults.push(file.name.tensor_fault(tensor, message)))
         .ok()

@@ -5,7 +5,7 @@ use std::fmt;
 
 use safetensors::SafeTensors;
 use serde::de::{Deserialize, DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
-use toml_input::Fault;
+use toml_input::Sink;
 
 use super::catalogue;
 use crate::limits::{MAX_HEADER_BYTES, MAX_TENSORS};
@@ -15,7 +15,7 @@ const EXPORT: &str = "export in Python: from safetensors.torch import save_file;
     save_file(model.q_net.state_dict(), \"weights.safetensors\")";
 
 /// Opens `file`; the crate checks offsets, this checks what the crate lets pass.
-pub(crate) fn open<'a>(file: &'a Binary, faults: &mut Vec<Fault>) -> Option<SafeTensors<'a>> {
+pub(crate) fn open<'a>(file: &'a Binary, faults: &mut Sink) -> Option<SafeTensors<'a>> {
     let header = match header_text(&file.bytes) {
         Ok(header) => header,
         Err(message) => {

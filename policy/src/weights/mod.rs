@@ -8,7 +8,7 @@ pub(crate) mod header;
 pub(crate) mod layers;
 pub(crate) mod tensors;
 
-use toml_input::{Fault, nearest};
+use toml_input::{Fault, Sink};
 
 use crate::activation::Activation;
 use crate::contract::network::Network;
@@ -31,7 +31,7 @@ pub(crate) fn read(
     file: &Binary,
     network: &Network<'_>,
     sizes: Option<(usize, usize)>,
-    faults: &mut Vec<Fault>,
+    faults: &mut Sink,
 ) -> Option<Weights> {
     let opened = header::open(file, faults)?;
     let tensors = tensors::convert(file, &opened, faults)?;
@@ -85,7 +85,7 @@ pub(crate) struct Outline {
 }
 
 /// The network in `file`, if all chains that could be meant have the same ends.
-pub(crate) fn outline(file: &Binary, faults: &mut Vec<Fault>) -> Option<Outline> {
+pub(crate) fn outline(file: &Binary, faults: &mut Sink) -> Option<Outline> {
     let opened = header::open(file, faults)?;
     let tensors = tensors::convert(file, &opened, faults)?;
     let grouped = layers::group(&tensors.list, None);
@@ -138,10 +138,10 @@ fn chain_names(layers: &[Dense], chain: &[usize]) -> String {
 }
 
 /// The chain the contract lists by name.
-fn listed(scene: &Scene<'_>, network: &Network<'_>, faults: &mut Vec<Fault>) -> Option<Chain> {
+fn listed(scene: &Scene<'_>, network: &Network<'_>, faults: &mut Sink) -> Option<Chain> {
     let stems = || scene.layers.dense.iter().map(|layer| layer.stem.as_str());
     let mut chain = Chain::new();
-    let before = faults.len();
+    let before = faults.count();
     for name in network.layers.iter().flatten() {
         match stems().position(|stem| stem == name.value) {
             Some(index) if chain.contains(&index) => {
@@ -149,13 +149,15 @@ fn listed(scene: &Scene<'_>, network: &Network<'_>, faults: &mut Vec<Fault>) -> 
             }
             Some(index) => chain.push(index),
             None => {
-                let hint = nearest(&name.value, stems()).map(|stem| format!("did you mean `{stem}`?"));
                 let all = stems().collect::<Vec<_>>().join(", ");
-                faults.push(network.fault(name, catalogue::unknown_layer(&name.value, hint, &all)));
+                faults.push(network.fault(
+                    name,
+                    catalogue::unknown_layer(&name.value, &all).did_you_mean(&name.value, stems()),
+                ));
             }
         }
     }
-    if faults.len() > before {
+    if faults.count() > before {
         return None;
     }
     match scene.mismatch(&chain) {
@@ -168,7 +170,7 @@ fn listed(scene: &Scene<'_>, network: &Network<'_>, faults: &mut Vec<Fault>) -> 
 }
 
 /// The only chain that fits, and the target networks passed over.
-fn inferred(scene: &Scene<'_>, network: &Network<'_>, faults: &mut Vec<Fault>) -> Option<(Chain, Vec<usize>)> {
+fn inferred(scene: &Scene<'_>, network: &Network<'_>, faults: &mut Sink) -> Option<(Chain, Vec<usize>)> {
     let dense = &scene.layers.dense;
     let prefix = network.prefix.as_ref();
     let under = |index: &usize| prefix.is_none_or(|prefix| layers::is_under(&dense[*index].stem, &prefix.value));
@@ -206,9 +208,9 @@ fn inferred(scene: &Scene<'_>, network: &Network<'_>, faults: &mut Vec<Fault>) -
     }
 }
 
-fn layer(file: &Binary, tensors: &Tensors, dense: &Dense, bias: bool, faults: &mut Vec<Fault>) -> Option<Layer> {
+fn layer(file: &Binary, tensors: &Tensors, dense: &Dense, bias: bool, faults: &mut Sink) -> Option<Layer> {
     let weight = &tensors.list[dense.weight];
-    let before = faults.len();
+    let before = faults.count();
     if dense.outputs > MAX_WIDTH {
         faults.push(file.name.tensor_fault(&weight.name, catalogue::too_wide(dense.outputs)));
     }
@@ -233,7 +235,7 @@ fn layer(file: &Binary, tensors: &Tensors, dense: &Dense, bias: bool, faults: &m
         }
         _ => {}
     }
-    (faults.len() == before).then(|| Layer {
+    (faults.count() == before).then(|| Layer {
         name: dense.stem.clone(),
         inputs: dense.inputs,
         outputs: dense.outputs,

@@ -1,7 +1,7 @@
 //! Tensors as finite binary32 numbers.
 
 use safetensors::{Dtype, SafeTensors};
-use toml_input::{Fault, Message};
+use toml_input::{Message, Sink};
 
 use super::catalogue;
 use crate::limits::MAX_TENSOR_NAME_CHARS;
@@ -25,8 +25,8 @@ pub(crate) struct Tensors {
 }
 
 /// Converts every tensor; `None` if any is unfit.
-pub(crate) fn convert(file: &Binary, tensors: &SafeTensors<'_>, faults: &mut Vec<Fault>) -> Option<Tensors> {
-    let before = faults.len();
+pub(crate) fn convert(file: &Binary, tensors: &SafeTensors<'_>, faults: &mut Sink) -> Option<Tensors> {
+    let before = faults.count();
     let mut result = Tensors::default();
     let mut views = tensors.tensors();
     views.sort_by(|(a, _), (b, _)| a.cmp(b));
@@ -70,7 +70,7 @@ pub(crate) fn convert(file: &Binary, tensors: &SafeTensors<'_>, faults: &mut Vec
             widened.join(", ")
         ));
     }
-    (faults.len() == before).then_some(result)
+    (faults.count() == before).then_some(result)
 }
 
 /// Whether a tensor's name can be printed and its shape holds anything.

@@ -5,6 +5,7 @@
 use std::path::PathBuf;
 
 use policy::{Fault, Faults, Place, Policy};
+use random::{Random, SplitMix};
 use safetensors::Dtype;
 use safetensors::tensor::{TensorView, serialize};
 
@@ -207,8 +208,8 @@ impl Folder {
     /// The one fault; more than one would be noise.
     pub fn fault(&self) -> Fault {
         let faults = self.faults();
-        assert_eq!(faults.list.len(), 1, "{faults}");
-        faults.list[0].clone()
+        assert_eq!(faults.faults.list.len(), 1, "{faults}");
+        faults.faults.list[0].clone()
     }
 }
 
@@ -286,16 +287,16 @@ pub fn mapping_fault(from: &str, to: &str, expected: &[&str]) -> Fault {
     fault
 }
 
-/// A small deterministic generator (splitmix64).
-pub struct Random(pub u64);
+/// Draws that suit contracts.
+pub struct Draws(pub SplitMix);
 
-impl Random {
+impl Draws {
+    pub fn new(seed: u64) -> Self {
+        Self(SplitMix::new(seed))
+    }
+
     pub fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        self.0.bits()
     }
 
     pub fn below(&mut self, n: usize) -> usize {

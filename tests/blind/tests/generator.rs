@@ -110,7 +110,7 @@ fn nominal_records_are_those_of_the_nominal_plant() {
 /// The nominal plant without noise.
 fn quiet() -> Parameters {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/blind/plant.toml");
-    let mut parameters = Parameters::from_file(file.as_ref()).unwrap();
+    let mut parameters = Parameters::from_file(file).unwrap();
     let s = &mut parameters.sensors;
     for sensor in [&mut s.v_out, &mut s.i_l, &mut s.i_out, &mut s.v_in] {
         sensor.noise = 0.0;

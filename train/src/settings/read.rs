@@ -4,14 +4,12 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 
 use sha2::{Digest, Sha256};
-use toml_input::{Document, Fault, Faults, Message, Table, Value, messages};
+use toml_input::{Document, Faults, Message, Sink, Table, Value, messages};
 
 use super::{Draw, Episode, Instants, Learning, Loads, Randomised, Requirement, Reward, Selection, Settings, Stage};
 use crate::learner::{LearnerSettings, Loss, TargetUpdate};
 use crate::optimiser::AdamSettings;
 use closed_loop::read;
-
-type FaultList = Vec<Fault>;
 
 const ANY: RangeInclusive<f64> = f64::MIN..=f64::MAX;
 
@@ -19,10 +17,10 @@ pub(super) fn settings(document: &Document) -> Result<Settings, Faults> {
     document.read(|root, faults| top(document, root, faults))
 }
 
-fn top(document: &Document, root: &mut Table<'_>, faults: &mut FaultList) -> Option<Settings> {
+fn top(document: &Document, root: &mut Table<'_>, faults: &mut Sink) -> Option<Settings> {
     let path = &document.source().name.path;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let mut file = |key, hint, faults: &mut FaultList| {
+    let mut file = |key, hint, faults: &mut Sink| {
         let value = root.required(key, hint, faults)?;
         value.text(faults).map(|text| folder.join(text))
     };
@@ -71,20 +69,20 @@ fn top(document: &Document, root: &mut Table<'_>, faults: &mut FaultList) -> Opt
 }
 
 /// A number of control periods.
-fn periods(value: &Value<'_>, faults: &mut FaultList) -> Option<u64> {
+fn periods(value: &Value<'_>, faults: &mut Sink) -> Option<u64> {
     value.integer(1..=1_000_000_000, faults)
 }
 
-fn share(value: &Value<'_>, faults: &mut FaultList) -> Option<f64> {
+fn share(value: &Value<'_>, faults: &mut Sink) -> Option<f64> {
     value.number_within(0.0..=1.0, faults)
 }
 
 /// A factor that makes a sum over the past converge.
-fn below_one(value: &Value<'_>, faults: &mut FaultList) -> Option<f64> {
+fn below_one(value: &Value<'_>, faults: &mut Sink) -> Option<f64> {
     value.number_within(0.0..=0.999_999, faults)
 }
 
-fn seeds(value: &Value<'_>, faults: &mut FaultList) -> Option<Vec<u64>> {
+fn seeds(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<u64>> {
     let seeds = value.each("whole numbers: [0, 1, 2]", faults, |item, faults| {
         item.integer(0..=i64::MAX as u64, faults)
     })?;
@@ -94,7 +92,7 @@ fn seeds(value: &Value<'_>, faults: &mut FaultList) -> Option<Vec<u64>> {
     Some(seeds)
 }
 
-fn widths(value: &Value<'_>, faults: &mut FaultList) -> Option<Vec<usize>> {
+fn widths(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<usize>> {
     let widths = value.each("widths of the hidden layers: [64, 64]", faults, |item, faults| {
         item.integer(1..=1024, faults)
     })?;
@@ -104,7 +102,7 @@ fn widths(value: &Value<'_>, faults: &mut FaultList) -> Option<Vec<usize>> {
     Some(widths)
 }
 
-fn learning(table: &mut Table<'_>, steps: u64, faults: &mut FaultList) -> Learning {
+fn learning(table: &mut Table<'_>, steps: u64, faults: &mut Sink) -> Learning {
     let double = table.with_default("algorithm", false, faults, |v, faults| {
         v.choice(&[("dqn", false), ("double-dqn", true)], faults)
     });
@@ -150,7 +148,7 @@ fn learning(table: &mut Table<'_>, steps: u64, faults: &mut FaultList) -> Learni
     }
 }
 
-fn target_update(value: &Value<'_>, faults: &mut FaultList) -> Option<TargetUpdate> {
+fn target_update(value: &Value<'_>, faults: &mut Sink) -> Option<TargetUpdate> {
     value.read_table("target_update", faults, |table, faults| {
         match (table.optional("soft"), table.optional("hard")) {
             (Some(soft), None) => {
@@ -172,7 +170,7 @@ fn target_update(value: &Value<'_>, faults: &mut FaultList) -> Option<TargetUpda
     })
 }
 
-fn adam(value: &Value<'_>, faults: &mut FaultList) -> Option<AdamSettings> {
+fn adam(value: &Value<'_>, faults: &mut Sink) -> Option<AdamSettings> {
     let default = AdamSettings::default();
     value.read_table("adam", faults, |table, faults| {
         Some(AdamSettings {
@@ -184,14 +182,14 @@ fn adam(value: &Value<'_>, faults: &mut FaultList) -> Option<AdamSettings> {
 }
 
 /// Start, end and control periods between.
-fn epsilon(table: &mut Table<'_>, default: (f64, f64, u64), faults: &mut FaultList) -> (f64, f64, u64) {
+fn epsilon(table: &mut Table<'_>, default: (f64, f64, u64), faults: &mut Sink) -> (f64, f64, u64) {
     let start = table.with_default("start", default.0, faults, share);
     let end = table.with_default("end", default.1, faults, share);
     (start, end, table.with_default("steps", default.2, faults, periods))
 }
 
-fn reward(table: &mut Table<'_>, faults: &mut FaultList) -> Option<Reward> {
-    let weight = |v: &Value<'_>, faults: &mut FaultList| v.number_within(0.0..=f64::MAX, faults);
+fn reward(table: &mut Table<'_>, faults: &mut Sink) -> Option<Reward> {
+    let weight = |v: &Value<'_>, faults: &mut Sink| v.number_within(0.0..=f64::MAX, faults);
     Some(Reward {
         v_ref: table.with_default("v_ref", 100.0, faults, Value::positive),
         bands: table.with_default("bands", vec![(0.1, 10.0), (1.0, 1.0)], faults, bands),
@@ -200,7 +198,7 @@ fn reward(table: &mut Table<'_>, faults: &mut FaultList) -> Option<Reward> {
     })
 }
 
-fn bands(value: &Value<'_>, faults: &mut FaultList) -> Option<Vec<(f64, f64)>> {
+fn bands(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<(f64, f64)>> {
     let items = value.list("pairs: [[0.1, 10.0], [1.0, 1.0]]", faults)?;
     let mut list: Vec<(f64, f64)> = Vec::new();
     for item in &items {
@@ -217,7 +215,7 @@ fn bands(value: &Value<'_>, faults: &mut FaultList) -> Option<Vec<(f64, f64)>> {
     Some(list)
 }
 
-fn loads(value: &Value<'_>, faults: &mut FaultList) -> Option<Loads> {
+fn loads(value: &Value<'_>, faults: &mut Sink) -> Option<Loads> {
     value.read_table("loads", faults, |table, faults| {
         let values = table.optional("values").map_or(Some(Vec::new()), |v| {
             v.each("powers in W: [200, 500]", faults, |item, faults| {
@@ -243,14 +241,14 @@ fn loads(value: &Value<'_>, faults: &mut FaultList) -> Option<Loads> {
     })
 }
 
-fn episode(table: &mut Table<'_>, faults: &mut FaultList) -> Option<Episode> {
+fn episode(table: &mut Table<'_>, faults: &mut Sink) -> Option<Episode> {
     let default = Loads {
         values: vec![200.0, 500.0, 800.0, 1000.0],
         range: [150.0, 1050.0],
         share: 0.5,
     };
-    let voltage = |v: &Value<'_>, faults: &mut FaultList| v.interval_within(0.0..=1e5, faults);
-    let current = |v: &Value<'_>, faults: &mut FaultList| v.interval_within(-1e4..=1e4, faults);
+    let voltage = |v: &Value<'_>, faults: &mut Sink| v.interval_within(0.0..=1e5, faults);
+    let current = |v: &Value<'_>, faults: &mut Sink| v.interval_within(-1e4..=1e4, faults);
     Some(Episode {
         steps: table.with_default("steps", 400, faults, periods),
         load_every: table.with_default("load_every", 100, faults, periods),
@@ -262,7 +260,7 @@ fn episode(table: &mut Table<'_>, faults: &mut FaultList) -> Option<Episode> {
     })
 }
 
-fn stage(table: &mut Table<'_>, faults: &mut FaultList) -> Option<Stage> {
+fn stage(table: &mut Table<'_>, faults: &mut Sink) -> Option<Stage> {
     let hint = "first control period behind the stage: `until = 4000`";
     let until = table.required("until", hint, faults).and_then(|v| periods(&v, faults));
     let loads = table.optional("loads").and_then(|v| loads(&v, faults));
@@ -274,7 +272,7 @@ fn stage(table: &mut Table<'_>, faults: &mut FaultList) -> Option<Stage> {
     })
 }
 
-fn randomised(table: &mut Table<'_>, faults: &mut FaultList) -> Option<Randomised> {
+fn randomised(table: &mut Table<'_>, faults: &mut Sink) -> Option<Randomised> {
     let hint = "a number of the plant's file: `key = \"switch.v_f\"`";
     let key = table.required("key", hint, faults).and_then(|v| {
         let key = v.text(faults)?;
@@ -297,14 +295,14 @@ fn randomised(table: &mut Table<'_>, faults: &mut FaultList) -> Option<Randomise
     })
 }
 
-fn selection(table: &mut Table<'_>, faults: &mut FaultList) -> Option<Selection> {
+fn selection(table: &mut Table<'_>, faults: &mut Sink) -> Option<Selection> {
     let every = table.with_default("every", 500, faults, periods);
     let margin = table.with_default("margin", 1.0, faults, Value::positive);
     let task = read::task(table, faults);
     Some(Selection { every, margin, task })
 }
 
-fn requirement(table: &mut Table<'_>, faults: &mut FaultList) -> Option<Requirement> {
+fn requirement(table: &mut Table<'_>, faults: &mut Sink) -> Option<Requirement> {
     let load_step = table.optional("load_step").and_then(|v| v.pair(read::POWER, faults));
     let instants = table.with_default("instants", Instants::Worst, faults, |v, faults| {
         v.choice(&[("worst", Instants::Worst), ("sample", Instants::Sample)], faults)

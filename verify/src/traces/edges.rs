@@ -2,8 +2,8 @@
 
 use interp::Sample;
 use policy::{Policy, Scalar, Signal};
+use random::{Random, SplitMix};
 
-use super::rng::Rng;
 use super::{physical, sample_of};
 
 /// The edge samples of one signal, split by the signal's plausible range.
@@ -67,16 +67,16 @@ impl Edges {
     }
 
     /// An edge within the plausible range; `default` if there is none.
-    pub fn inside(&self, rng: &mut Rng, default: Sample) -> Sample {
+    pub fn inside(&self, rng: &mut SplitMix, default: Sample) -> Sample {
         rng.pick(&self.inside, default)
     }
 
     /// An edge outside the plausible range; `default` if the ADC cannot leave it.
-    pub fn outside(&self, rng: &mut Rng, default: Sample) -> Sample {
+    pub fn outside(&self, rng: &mut SplitMix, default: Sample) -> Sample {
         rng.pick(&self.outside, default)
     }
 
-    pub fn any(&self, rng: &mut Rng, default: Sample) -> Sample {
+    pub fn any(&self, rng: &mut SplitMix, default: Sample) -> Sample {
         let n = rng.below(self.inside.len() + self.outside.len());
         self.inside
             .iter()

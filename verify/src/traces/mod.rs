@@ -8,17 +8,16 @@
 mod edges;
 mod plant;
 mod recorded;
-mod rng;
 #[cfg(test)]
 mod tests;
 
 use interp::{Controller, Real, Sample};
 use policy::{Interval, Policy, Scalar};
+use random::{Random, SplitMix};
 
 use edges::Edges;
 use plant::Plant;
 pub use recorded::Recorded;
-pub use rng::Rng;
 
 /// What happens to a controller in one move.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,7 +82,7 @@ const FIRST_SEGMENT: usize = 200;
 pub struct Stream<'a> {
     policy: &'a Policy,
     scalar: Scalar,
-    rng: Rng,
+    rng: SplitMix,
     plant: Plant,
     edges: Vec<Edges>,
     segment: Segment,
@@ -107,7 +106,7 @@ impl<'a> Stream<'a> {
             queued.extend(recording.steps().iter().cloned().map(Event::Step));
         }
         queued.reverse();
-        let mut rng = Rng::new(seed);
+        let mut rng = SplitMix::new(seed);
         Self {
             policy,
             scalar: policy.numeric_format.scalar(),

@@ -3,8 +3,7 @@
 //! It need not be the plant of the policy: it has to move every signal through its plausible range as a converter does.
 
 use policy::{Interval, Policy};
-
-use super::rng::Rng;
+use random::{Random, SplitMix};
 
 #[derive(Debug, Clone)]
 pub(super) struct Plant {
@@ -45,7 +44,7 @@ const SUBSTEPS: usize = 8;
 const NOISE: f64 = 5e-4;
 
 impl Plant {
-    pub fn new(policy: &Policy, rng: &mut Rng) -> Self {
+    pub fn new(policy: &Policy, rng: &mut SplitMix) -> Self {
         let responses = policy
             .signals
             .iter()
@@ -63,7 +62,7 @@ impl Plant {
     }
 
     /// One sample period under `duty`; the values at its end with noise, one per signal.
-    pub fn advance(&mut self, duty: f64, rng: &mut Rng) -> Vec<f64> {
+    pub fn advance(&mut self, duty: f64, rng: &mut SplitMix) -> Vec<f64> {
         let mut values: Vec<f64> = self
             .responses
             .iter_mut()
@@ -82,7 +81,7 @@ impl Plant {
             values[buck.i_out] = i_out;
         }
         for (value, response) in values.iter_mut().zip(&self.responses) {
-            *value += NOISE * (response.range.high - response.range.low) * rng.normal();
+            *value += NOISE * (response.range.high - response.range.low) * rng.sum_of_twelve();
         }
         values
     }
@@ -90,7 +89,7 @@ impl Plant {
 
 impl Buck {
     /// `None` unless the signals have the names of a buck converter.
-    fn new(policy: &Policy, rng: &mut Rng) -> Option<Self> {
+    fn new(policy: &Policy, rng: &mut SplitMix) -> Option<Self> {
         let find = |name: &str| policy.signals.iter().position(|signal| signal.name == name);
         let (v_out, i_l, i_out) = (find("v_out")?, find("i_l")?, find("i_out")?);
         let period = policy.sample_period;
@@ -124,7 +123,7 @@ impl Buck {
     }
 
     /// One period; the load current at its end.
-    fn advance(&mut self, duty: f64, rng: &mut Rng) -> f64 {
+    fn advance(&mut self, duty: f64, rng: &mut SplitMix) -> f64 {
         if rng.one_in(120) {
             self.power = self.max_power * rng.uniform(0.05, 0.7);
         }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use interp::Sample;
-use measured::{Cell, ColumnMap, FaultList, Options, Quantity, Sheet, Signal};
+use measured::{Cell, ColumnMap, Options, Quantity, Sheet, Signal, table_faults};
 use policy::Policy;
 use toml_input::{Faults, Message};
 
@@ -41,7 +41,7 @@ impl Recorded {
         let quantity = |(signal, aliases)| quantity(signal, aliases);
         let wanted: Vec<Quantity<'_>> = policy.signals.iter().zip(&others).map(quantity).collect();
         let located = sheet.locate(&wanted, &ColumnMap::default())?;
-        let mut faults = FaultList::default();
+        let mut faults = table_faults();
         let mut columns = Vec::new();
         for (signal, quantity) in policy.signals.iter().zip(&wanted) {
             match located.signal(&signal.name) {
@@ -56,9 +56,9 @@ impl Recorded {
                 }
             }
         }
-        faults.done()?;
+        faults.propagate()?;
         let scalar = policy.numeric_format.scalar();
-        let mut faults = FaultList::default();
+        let mut faults = table_faults();
         let mut steps = Vec::with_capacity(sheet.rows());
         for row in 0..sheet.rows() {
             let mut sample = |(signal, found): &(&policy::Signal, &Signal)| {
@@ -70,7 +70,7 @@ impl Recorded {
             };
             steps.push(columns.iter().map(&mut sample).collect());
         }
-        faults.done()?;
+        faults.propagate()?;
         Ok(Self {
             steps,
             notes: located.notes(sheet, &[]),

@@ -14,20 +14,31 @@ pub fn check_readme(text: &str) -> Option<String> {
     (words > README_WORDS).then(|| format!("README.md: {words} words, more than {README_WORDS}"))
 }
 
-/// One line a page: words of prose and figures per hundred of them; results pages hold figures by nature.
+/// One line a page: words of prose and figures per hundred of them; then all pages but the results, which hold figures by
+/// nature.
 pub fn report(pages: &BTreeMap<PathBuf, Page>) -> Vec<String> {
     let shown = pages
         .iter()
         .filter(|(path, page)| page.words > 0 && is_read_by_strangers(path));
-    let line = |(path, page): (&PathBuf, &Page)| {
-        let share = 100.0 * page.figures as f64 / page.words as f64;
-        format!(
-            "{:6} words {share:5.1} figures per 100   {}",
-            page.words,
-            path.display()
-        )
-    };
-    shown.map(line).collect()
+    let mut lines = Vec::new();
+    let mut outside_results = (0, 0);
+    for (path, page) in shown {
+        lines.push(line(page.words, page.figures, &path.display().to_string()));
+        if !path.starts_with("docs/results") {
+            outside_results.0 += page.words;
+            outside_results.1 += page.figures;
+        }
+    }
+    let (words, figures) = outside_results;
+    if words > 0 {
+        lines.push(line(words, figures, "all of them but the results"));
+    }
+    lines
+}
+
+fn line(words: usize, figures: usize, what: &str) -> String {
+    let share = 100.0 * figures as f64 / words as f64;
+    format!("{words:6} words {share:5.1} figures per 100   {what}")
 }
 
 fn is_read_by_strangers(path: &Path) -> bool {
@@ -47,7 +58,16 @@ mod tests {
     #[test]
     fn figures_are_counted_per_hundred_words_of_prose() {
         let text = format!("{} 7.\n", "word ".repeat(99));
-        let pages = BTreeMap::from([(PathBuf::from("docs/a.md"), Page::read(&text))]);
-        assert_eq!(report(&pages), ["   100 words   1.0 figures per 100   docs/a.md"]);
+        let results = PathBuf::from("docs/results/b.md");
+        let pages = BTreeMap::from([
+            (PathBuf::from("docs/a.md"), Page::read(&text)),
+            (results, Page::read("one 1 2 3\n")),
+        ]);
+        let lines = report(&pages);
+        assert_eq!(lines[0], "   100 words   1.0 figures per 100   docs/a.md");
+        assert_eq!(
+            lines[2],
+            "   100 words   1.0 figures per 100   all of them but the results"
+        );
     }
 }

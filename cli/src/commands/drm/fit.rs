@@ -102,7 +102,7 @@ fn fit_options(options: &Fit) -> Result<FitOptions, Failure> {
     ];
     for (name, value) in numbers {
         if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
-            return Err(Failure(format!("{name} must be greater than 0\n   = found: {value}")));
+            return Err(super::not_positive(name, value));
         }
     }
     let plant = options.plant.as_deref().map(super::plant_parameters).transpose()?;

@@ -7,6 +7,7 @@ use drm::DutyRatioMap;
 use drm::judge::{Judgement, Steady};
 use policy::Interval;
 use serde::Serialize;
+use toml_input::Message;
 
 use super::{Loads, Reading};
 use crate::{Failure, Outcome, output};
@@ -88,16 +89,13 @@ fn steady(options: &Judge, map: &DutyRatioMap) -> Result<Option<Vec<Steady>>, Fa
     };
     let (real, nominal) = (super::plant_parameters(real)?, super::plant_parameters(nominal)?);
     if !(v_ref > 0.0 && v_ref < real.converter.v_in.min(nominal.converter.v_in)) {
-        let expected = "above 0 and below the input voltages";
-        return Err(Failure(format!(
-            "--v-ref is out of reach\n   = found: {v_ref} V\n   = expected: {expected}"
-        )));
+        let message = Message::new("--v-ref is out of reach").found(format!("{v_ref} V"));
+        return Err(message.expected("above 0 and below the input voltages").into());
     }
     let loads = options.loads.settings();
     if loads.is_empty() {
-        return Err(Failure(
-            "no load\n   = hint: give --powers, --currents or --resistors".to_owned(),
-        ));
+        let message = Message::new("no load");
+        return Err(message.hint("give --powers, --currents or --resistors").into());
     }
     let limits = options.duty_limits;
     Ok(Some(drm::judge::against_plant(

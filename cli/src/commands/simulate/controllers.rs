@@ -3,6 +3,7 @@
 use closed_loop::{Answer, Call, Controller, External, interpreter};
 use codegen::Language;
 use policy::Policy;
+use toml_input::Message;
 use verify::Live;
 
 use crate::Failure;
@@ -26,7 +27,7 @@ pub fn start(policy: &Policy, kind: ControllerKind) -> Result<Named, Failure> {
         ControllerKind::Rust => (Language::Rust, "generated Rust"),
         ControllerKind::C => (Language::C, "generated C"),
     };
-    let mut live = Live::start(policy, language).map_err(Failure)?;
+    let mut live = Live::start(policy, language).map_err(Message::new)?;
     let name = format!("{name} ({})", live.name());
     let ask = move |call: Call<'_>| match call {
         Call::Restart => live.restart().map(|()| None),

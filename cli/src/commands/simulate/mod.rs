@@ -1,7 +1,6 @@
 //! `policyc simulate`
 
-use std::fmt::Display;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use closed_loop::limit::{Limit, left_out};
@@ -9,6 +8,7 @@ use closed_loop::scenario::Finding;
 use closed_loop::{Converter, LoadStep, Scenario, Trajectory};
 use plant::Parameters;
 use policy::Policy;
+use toml_input::{Fault, Message};
 
 use crate::arguments::Simulate;
 use crate::{Failure, Outcome, interruption, output};
@@ -88,7 +88,7 @@ pub fn run(options: &Simulate) -> Result<Outcome, Failure> {
 /// An error where the user has had enough.
 pub fn go_on(stop: &AtomicBool) -> Result<(), Failure> {
     if stop.load(Ordering::Relaxed) {
-        return Err(Failure("interrupted".to_owned()));
+        return Err(Message::new("interrupted").into());
     }
     Ok(())
 }
@@ -96,15 +96,14 @@ pub fn go_on(stop: &AtomicBool) -> Result<(), Failure> {
 fn prepare(options: &Simulate) -> Result<Setting, Failure> {
     let scenario = Scenario::load(&options.scenario)?;
     let policy = super::load(&options.policy)?;
-    let file = options.scenario.display();
+    let file = &options.scenario;
     let Some(plant) = options.plant.clone().or(scenario.plant.clone()) else {
-        return Err(Failure(format!(
-            "{file}: no plant\n   = hint: plant = \"../plants/paper-model.toml\", or --plant PLANT"
-        )));
+        let message = Message::new("no plant").hint("plant = \"../plants/paper-model.toml\", or --plant PLANT");
+        return Err(Fault::in_file(file, message).into());
     };
     let converter = Converter::load(&plant, &scenario.set)?;
-    let v_ref = v_ref(scenario.v_ref, &policy, &file)?;
-    suits(&policy, converter.parameters(), v_ref, &file)?;
+    let v_ref = v_ref(scenario.v_ref, &policy, file)?;
+    suits(&policy, converter.parameters(), v_ref, file)?;
     let mut notes = Vec::new();
     if let Some(theirs) = held_by(&policy).filter(|theirs| *theirs != v_ref) {
         notes.push(format!(
@@ -137,11 +136,11 @@ fn held_by(policy: &Policy) -> Option<f64> {
 ///
 /// # Errors
 /// If neither scenario nor policy names one.
-pub fn v_ref(given: Option<f64>, policy: &Policy, file: &dyn Display) -> Result<f64, Failure> {
+pub fn v_ref(given: Option<f64>, policy: &Policy, file: &Path) -> Result<f64, Failure> {
     given.or(held_by(policy)).ok_or_else(|| {
-        Failure(format!(
-            "{file}: no voltage to hold\n   = hint: v_ref = 100.0, as the policy has no parameter `v_ref`"
-        ))
+        let message = Message::new("no voltage to hold");
+        let message = message.hint("v_ref = 100.0, as the policy has no parameter `v_ref`");
+        Fault::in_file(file, message).into()
     })
 }
 
@@ -149,19 +148,21 @@ pub fn v_ref(given: Option<f64>, policy: &Policy, file: &dyn Display) -> Result<
 ///
 /// # Errors
 /// If the voltage is out of reach or the control periods differ.
-pub fn suits(policy: &Policy, converter: &Parameters, v_ref: f64, file: &dyn Display) -> Result<(), Failure> {
+pub fn suits(policy: &Policy, converter: &Parameters, v_ref: f64, file: &Path) -> Result<(), Failure> {
     let v_in = converter.converter.v_in;
     if v_ref >= v_in {
-        return Err(Failure(format!(
-            "{file}: a buck converter cannot hold this voltage\n   = found: v_ref = {v_ref} V, v_in = {v_in} V at the plant"
-        )));
+        let message = Message::new("a buck converter cannot hold this voltage")
+            .found(format!("v_ref = {v_ref} V, v_in = {v_in} V at the plant"));
+        return Err(Fault::in_file(file, message).into());
     }
     let (ours, theirs) = (policy.sample_period, converter.t_sw());
     if (ours - theirs).abs() > 1e-9 * theirs {
-        return Err(Failure(format!(
-            "{file}: policy and plant have different control periods\n   = found: sample_period = {ours} s in the policy, \
-             {theirs} s at the plant\n   = hint: f_sw of the plant is 1 / sample_period"
-        )));
+        let message = Message::new("policy and plant have different control periods")
+            .found(format!(
+                "sample_period = {ours} s in the policy, {theirs} s at the plant"
+            ))
+            .hint("f_sw of the plant is 1 / sample_period");
+        return Err(Fault::in_file(file, message).into());
     }
     Ok(())
 }

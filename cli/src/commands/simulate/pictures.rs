@@ -3,6 +3,7 @@
 use closed_loop::baselines::Kind;
 use closed_loop::scenario::SETTLED;
 use report::{Axis, Chart, Colour, Panel, Series, Svg};
+use toml_input::Message;
 
 use super::{Course, POLICY, Setting, Step};
 use crate::Failure;
@@ -17,7 +18,7 @@ const AFTER: f64 = 40.0;
 pub fn picture(setting: &Setting, step: &Step) -> Result<Svg, Failure> {
     let mut title = format!("{}: {}", setting.policy.name, step.step);
     let Some(policy) = step.courses.first() else {
-        return Err(Failure("internal fault: a picture of no controller".to_owned()));
+        return Err(Message::new("internal fault: a picture of no controller").into());
     };
     let most = DRAWN * policy.shown.metrics.deviation.max(1.0);
     let (drawn, left_out): (Vec<&Course>, Vec<&Course>) = step

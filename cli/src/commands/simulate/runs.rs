@@ -6,6 +6,7 @@ use closed_loop::baselines::Baseline;
 use closed_loop::limit::{Limit, Question};
 use closed_loop::scenario::{Finding, Instant};
 use closed_loop::{Classical, Controller, LoadStep, Trajectory, follow};
+use toml_input::Message;
 
 use super::controllers::{self, Named};
 use super::{Check, Course, Findings, POLICY, Setting, Step, go_on};
@@ -123,7 +124,7 @@ fn course(
         shown.get_or_insert(trajectory);
     }
     let name = name.to_owned();
-    let shown = shown.ok_or_else(|| Failure("internal fault: a load step at no instant".to_owned()))?;
+    let shown = shown.ok_or_else(|| Message::new("internal fault: a load step at no instant"))?;
     Ok(Course { name, finding, shown })
 }
 
@@ -137,7 +138,7 @@ fn policy_course(
 ) -> Result<Course, Failure> {
     let (first, others) = named
         .split_first_mut()
-        .ok_or_else(|| Failure("internal fault: no controller".to_owned()))?;
+        .ok_or_else(|| Message::new("internal fault: no controller"))?;
     let mut different = vec![false; others.len()];
     course(setting, POLICY, step, progress, |instant, progress| {
         progress.next(step, &first.name)?;

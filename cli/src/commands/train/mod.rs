@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::Instant;
 
+use toml_input::Message;
 use train::scenario_table as table;
 use train::seeds::best;
 use train::{Contract, Converter, Course, Ended, Outcome as Trained, SeedRun, Settings, train_all};
@@ -46,7 +47,7 @@ pub fn run(options: &Train) -> Result<Outcome, Failure> {
         return interrupted(options, &settings, &kept, &runs);
     }
     let Some(best) = best(&runs) else {
-        return Err(Failure("no seed was trained".to_owned()));
+        return Err(Message::new("no seed was trained").into());
     };
     write(&options.out, &settings, &runs, best)?;
     kept.remove();
@@ -146,9 +147,10 @@ fn distinct(seeds: &[u64]) -> Result<Vec<u64>, Failure> {
     let mut seen = BTreeSet::new();
     match seeds.iter().find(|seed| !seen.insert(**seed)) {
         None => Ok(seeds.to_vec()),
-        Some(seed) => Err(Failure(format!(
-            "--seeds names a seed twice\n   = found: {seed}\n   = expected: different numbers"
-        ))),
+        Some(seed) => {
+            let message = Message::new("--seeds names a seed twice").found(seed.to_string());
+            Err(message.expected("different numbers").into())
+        }
     }
 }
 
@@ -174,32 +176,31 @@ impl Kept {
 
     /// The checkpoints to go on from. Hours of work are not overwritten by a command that was typed once too often.
     fn prepare(&self, seeds: &[u64], resume: bool) -> Result<BTreeMap<u64, Vec<u8>>, Failure> {
-        let out = self.out.display();
+        let (out, kept) = (self.out.display(), self.folder.display());
         if self.out.join("policy.toml").exists() {
-            return Err(Failure(format!(
-                "{out} holds a policy already; nothing written\n   = hint: choose another --out, or move it away"
-            )));
+            let message = Message::new(format!("{out} holds a policy already; nothing written"));
+            return Err(message.hint("choose another --out, or move it away").into());
         }
         let found: Vec<u64> = seeds.iter().copied().filter(|seed| self.path(*seed).exists()).collect();
         match (resume, found.is_empty()) {
             (false, true) => Ok(BTreeMap::new()),
-            (false, false) => Err(Failure(format!(
-                "{out} holds an interrupted training; nothing written\n   = hint: --resume goes on with it; to begin \
-                 anew, remove {} or choose another --out",
-                self.folder.display()
-            ))),
-            (true, true) => Err(Failure(format!(
-                "nothing to resume\n   = found: no checkpoint of these seeds in {}\n   = hint: without --resume the \
-                 training begins",
-                self.folder.display()
-            ))),
+            (false, false) => {
+                let message = Message::new(format!("{out} holds an interrupted training; nothing written"));
+                let hint = format!("--resume goes on with it; to begin anew, remove {kept} or choose another --out");
+                Err(message.hint(hint).into())
+            }
+            (true, true) => {
+                let message = Message::new("nothing to resume");
+                let message = message.found(format!("no checkpoint of these seeds in {kept}"));
+                Err(message.hint("without --resume the training begins").into())
+            }
             (true, false) => found.into_iter().map(|seed| Ok((seed, self.read(seed)?))).collect(),
         }
     }
 
     fn read(&self, seed: u64) -> Result<Vec<u8>, Failure> {
         let path = self.path(seed);
-        std::fs::read(&path).map_err(|error| Failure(format!("cannot read {}: {error}", path.display())))
+        std::fs::read(&path).map_err(|error| Message::new(format!("cannot read {}: {error}", path.display())).into())
     }
 
     fn write(&self, seed: u64, bytes: &[u8]) -> Result<(), Failure> {

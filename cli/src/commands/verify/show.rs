@@ -2,21 +2,35 @@
 
 use std::fmt::Write;
 
+use policy::Policy;
+use toml_input::Message;
 use verify::drift::Drift;
 use verify::toolchain::{Install, Missing};
-use verify::{BuildReport, Difference, GoldenResult, Outcome, Report};
+use verify::{BuildReport, Decisions, Difference, GoldenResult, Outcome, Report};
 
 use crate::Failure;
 use crate::commands::grouped;
 
+/// What to look at when the network does not give the trainer's answers.
+pub const MISREAD: &str =
+    "look at hidden_activation, the order of layers, transpose: the contract says something else than the trainer did";
+
+/// What is open without golden vectors.
+pub const UNPROVEN: &str = "no golden vectors: nothing shows that the weights were read as the trainer meant";
+
 /// The whole report.
-pub fn report(report: &Report, drift: Option<&Drift>, equal: bool) -> Result<String, Failure> {
+pub fn report(policy: &Policy, report: &Report, drift: Option<&Drift>) -> Result<String, Failure> {
     let mut out = String::new();
     if let Some(drift) = drift {
         write_drift(&mut out, drift)?;
     }
     if let Some(golden) = &report.golden {
         writeln!(out, "golden vectors   {}", golden_text(golden))?;
+    }
+    if let Some(decisions) = &report.decisions {
+        for line in decisions_lines(policy, decisions) {
+            writeln!(out, "{line}")?;
+        }
     }
     let width = report
         .builds
@@ -51,9 +65,73 @@ pub fn report(report: &Report, drift: Option<&Drift>, equal: bool) -> Result<Str
         "\nseed {}, checksum of all compared words {}",
         report.seed, report.checksum
     )?;
-    let word = if equal { "equal" } else { "DIFFERENT" };
+    let builds_equal = report.builds_equal() && drift.is_none_or(Drift::is_empty);
+    let word = if builds_equal { "equal" } else { "DIFFERENT" };
     writeln!(out, "{word}: {} against the interpreter", report.policy)?;
+    if report.golden.as_ref().is_some_and(|golden| !golden.passed()) {
+        writeln!(
+            out,
+            "DIFFERENT: {} does not give the trainer's golden answers",
+            report.policy
+        )?;
+        writeln!(out, "  = hint: {}", MISREAD)?;
+    } else if report.golden.is_none() {
+        writeln!(out, "note: {UNPROVEN}")?;
+    }
+    let read = report.golden.as_ref().is_none_or(GoldenResult::passed);
+    // the decisions of a network that was read wrongly say nothing about its format
+    if let Some(decisions) = report.decisions.as_ref().filter(|decisions| read && !decisions.kept()) {
+        writeln!(
+            out,
+            "DIFFERENT: {} in {} decides otherwise than its trainer's network more often than allowed",
+            report.policy, decisions.numeric_format
+        )?;
+    }
     Ok(out)
+}
+
+/// What the numeric format does to the trainer's decisions, and at which observation it does most.
+pub fn decisions_lines(policy: &Policy, decisions: &Decisions) -> Vec<String> {
+    let Decisions {
+        numeric_format,
+        observations,
+        changed,
+        ties,
+        allowed,
+        operating_range,
+        largest_loss,
+        mean_loss,
+        worst,
+    } = decisions;
+    let ties = match ties {
+        0 => String::new(),
+        1 => ", 1 tie apart".to_owned(),
+        ties => format!(", {ties} ties apart"),
+    };
+    let word = if decisions.kept() { "" } else { "DIFFERENT: " };
+    let mut lines = vec![format!(
+        "decisions in {numeric_format}: {word}{changed} of {observations} changed ({:.1} %, allowed {} %){ties}",
+        100.0 * decisions.share(),
+        report::quantity(100.0 * allowed, "", 3),
+    )];
+    let Some(change) = worst.first() else { return lines };
+    lines.push(format!(
+        "  they give up at most {largest_loss:.2} and on average {mean_loss:.4} of the operating range of Q, which is {}",
+        report::quantity(*operating_range, "", 3)
+    ));
+    let values = policy.features.iter().zip(&change.observation);
+    let place: Vec<String> = values
+        .map(|(feature, value)| format!("{} = {value}", feature.name))
+        .collect();
+    let duty = |action: usize| policy.actions.get(action).map_or(f64::NAN, |action| action.duty);
+    lines.push(format!(
+        "  most at golden vector {}: duty {} becomes {}, at {}",
+        change.row,
+        duty(change.expected),
+        duty(change.found),
+        place.join(", ")
+    ));
+    lines
 }
 
 /// What the files alone tell.
@@ -86,10 +164,8 @@ pub fn golden_text(golden: &GoldenResult) -> String {
 fn verdict(build: &BuildReport) -> (&'static str, String) {
     let steps = grouped(build.steps_compared);
     match &build.outcome {
-        Outcome::Equal => match build.golden.as_ref().filter(|golden| !golden.passed()) {
-            Some(golden) => ("DIFFERENT", golden_text(golden)),
-            None => ("equal", format!("{steps} steps   {}", build.compiler)),
-        },
+        // whether the network gives the trainer's answers is said once, above: a build with equal bits gives the same
+        Outcome::Equal => ("equal", format!("{steps} steps   {}", build.compiler)),
         Outcome::Different { .. } => ("DIFFERENT", format!("after {steps} equal steps")),
         Outcome::Failed { .. } => ("FAILED", format!("after {steps} equal steps")),
         Outcome::CompileError { .. } => ("REFUSED", "by the compiler".to_owned()),
@@ -111,28 +187,26 @@ pub fn missing_text(missing: &Missing) -> String {
 }
 
 /// Why no build was compared, and what to type.
-pub fn nothing_compared(report: &Report) -> Result<String, Failure> {
-    let mut out = format!("nothing could be compared for target {}\n", report.target);
-    for build in report.skipped() {
-        writeln!(out, "   = {}: {}", build.build, verdict(build).1)?;
-    }
-    let install = report.to_install();
-    let packages: Vec<&str> = install
-        .iter()
-        .filter_map(|install| match install {
-            Install::Package(package) => Some(package.as_str()),
-            Install::RustTarget(_) => None,
-        })
+pub fn nothing_compared(report: &Report) -> Message {
+    let builds: Vec<String> = report
+        .skipped()
+        .map(|build| format!("{}: {}", build.build, verdict(build).1))
         .collect();
-    if !packages.is_empty() {
-        writeln!(out, "   = hint: sudo apt-get install {}", packages.join(" "))?;
-    }
-    for install in install {
-        if let Install::RustTarget(triple) = install {
-            writeln!(out, "   = hint: rustup target add {triple}")?;
-        }
-    }
-    Ok(out)
+    let install = report.to_install();
+    let package = |install: &&Install| match install {
+        Install::Package(package) => Some(package.clone()),
+        Install::RustTarget(_) => None,
+    };
+    let triple = |install: &&Install| match install {
+        Install::Package(_) => None,
+        Install::RustTarget(triple) => Some(format!("rustup target add {triple}")),
+    };
+    let packages: Vec<String> = install.iter().filter_map(package).collect();
+    let apt = (!packages.is_empty()).then(|| format!("sudo apt-get install {}", packages.join(" ")));
+    let commands: Vec<String> = apt.into_iter().chain(install.iter().filter_map(triple)).collect();
+    Message::new(format!("nothing could be compared for target {}", report.target))
+        .found(builds.join("; "))
+        .maybe_hint((!commands.is_empty()).then(|| commands.join("; ")))
 }
 
 fn write_difference(out: &mut String, build: &str, difference: &Difference) -> Result<(), Failure> {

@@ -15,6 +15,7 @@ use closed_loop::{LoadStep, Scenario, Trajectory};
 use drm::formula::Losses;
 use plant::Parameters;
 use policy::Policy;
+use toml_input::{Fault, Message};
 
 use super::bench::Simulator;
 use crate::arguments::ControllerKind;
@@ -116,13 +117,12 @@ pub fn run(options: &Transfer) -> Result<Outcome, Failure> {
 fn prepare(options: &Transfer) -> Result<Setting, Failure> {
     let scenario = Scenario::load(&options.scenario)?;
     let policy = crate::commands::load(&options.policy)?;
-    let file = options.scenario.display();
+    let file = &options.scenario;
     super::needs_mapping(&policy)?;
     let Some(trained_on) = &scenario.plant else {
-        return Err(Failure(format!(
-            "{file}: no plant\n   = expected: the converter that the policy was trained on\n   = hint: plant = \
-             \"../plants/paper-model.toml\""
-        )));
+        let message = Message::new("no plant").expected("the converter that the policy was trained on");
+        let message = message.hint("plant = \"../plants/paper-model.toml\"");
+        return Err(Fault::in_file(file, message).into());
     };
     let mut nominal = super::plant_parameters(trained_on)?;
     for (key, value) in &scenario.set {
@@ -130,8 +130,8 @@ fn prepare(options: &Transfer) -> Result<Setting, Failure> {
             parameter.set(&mut nominal, *value);
         }
     }
-    let v_ref = simulate::v_ref(scenario.v_ref, &policy, &file)?;
-    simulate::suits(&policy, &nominal, v_ref, &trained_on.display())?;
+    let v_ref = simulate::v_ref(scenario.v_ref, &policy, file)?;
+    simulate::suits(&policy, &nominal, v_ref, trained_on)?;
     Ok(Setting {
         trained_on: super::trained_on(&nominal, trained_on)?,
         scenario,

@@ -8,6 +8,7 @@ use closed_loop::{Controller, Converter, Environment, LoadStep, follow};
 use drm::formula::Losses;
 use plant::Parameters;
 use spice::SpiceConverter;
+use toml_input::Message;
 
 use super::ideal::Ideal;
 use super::{Course, Findings, Real, Run, Setting, Transfer};
@@ -43,7 +44,7 @@ pub fn all(options: &Transfer, setting: Setting, stop: &AtomicBool) -> Result<Fi
     let mut benches = Vec::new();
     for path in &options.real {
         let parameters = super::super::plant_parameters(path)?;
-        simulate::suits(&setting.policy, &parameters, setting.v_ref, &path.display())?;
+        simulate::suits(&setting.policy, &parameters, setting.v_ref, path)?;
         benches.push((path, parameters));
     }
     let mut progress = Progress {
@@ -162,7 +163,7 @@ fn courses<E: Environment>(
             finding.add(instant, trajectory.metrics);
             shown.get_or_insert(trajectory);
         }
-        let shown = shown.ok_or_else(|| Failure("internal fault: a load step at no instant".to_owned()))?;
+        let shown = shown.ok_or_else(|| Message::new("internal fault: a load step at no instant"))?;
         Ok(Course {
             step: *step,
             finding,

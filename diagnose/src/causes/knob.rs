@@ -1,0 +1,111 @@
+//! The parameters that causes move, and how far they may go in a converter of any size.
+
+use crate::drive::Model;
+
+/// Typical magnitudes of a converter, which make bounds and steps of parameters of any size.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bases {
+    /// Output voltage, V.
+    pub v: f64,
+    /// Current, A.
+    pub i: f64,
+    /// Source voltage, V.
+    pub v_in: f64,
+    /// Switching period, s.
+    pub t_sw: f64,
+}
+
+/// How a parameter may move: lowest, highest, and the step that counts as one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Reach {
+    /// In shares of the model's own value.
+    Own(f64, f64, f64),
+    /// In units of v / i: highest and step.
+    Resistance(f64, f64),
+    /// In units of v / i: lowest, highest and step.
+    ResistanceFrom(f64, f64, f64),
+    /// In units of t_sw i / v.
+    Capacitance(f64, f64, f64),
+    /// In units of i / v.
+    Conductance(f64, f64),
+    /// In units of v_in.
+    Source(f64, f64, f64),
+    /// In units of v.
+    Voltage(f64, f64, f64),
+    /// In units of i.
+    Current(f64, f64, f64),
+    /// In switching periods.
+    Time(f64, f64, f64),
+    /// As it is.
+    Plain(f64, f64, f64),
+}
+
+/// Lags shorter than this share of a period are left out.
+const NO_LAG: f64 = 0.01;
+
+/// One parameter of a cause.
+#[derive(Debug, Clone, Copy)]
+pub struct Knob {
+    /// Name in the results.
+    pub name: &'static str,
+    /// Keys of the plant that take its value; none for the sampling instant.
+    pub keys: &'static [&'static str],
+    pub(super) reach: Reach,
+    /// A time constant, of which one far shorter than a period is none.
+    pub(super) is_lag: bool,
+}
+
+impl Knob {
+    /// SI unit.
+    #[must_use]
+    pub fn unit(&self) -> &'static str {
+        match self.keys.first().and_then(|key| plant::parameter(key)) {
+            Some(parameter) => parameter.unit,
+            None => "s",
+        }
+    }
+
+    /// Value in a model.
+    #[must_use]
+    pub fn get(&self, model: &Model) -> f64 {
+        match self.keys.first().and_then(|key| plant::parameter(key)) {
+            Some(parameter) => parameter.get(&model.plant),
+            None => model.late,
+        }
+    }
+
+    /// Gives a model the value.
+    pub fn set(&self, model: &mut Model, value: f64) {
+        let value = self.snapped(model, value);
+        if self.keys.is_empty() {
+            model.late = value;
+        }
+        for parameter in self.keys.iter().filter_map(|key| plant::parameter(key)) {
+            parameter.set(&mut model.plant, value);
+        }
+    }
+
+    /// A lag far shorter than a period is none: it would only cost steps of the integrator.
+    fn snapped(&self, model: &Model, value: f64) -> f64 {
+        let shortest = NO_LAG * model.plant.t_sw();
+        if self.is_lag && value < shortest { 0.0 } else { value }
+    }
+
+    /// Lowest value, highest value, and step, for a converter of these magnitudes around `own`.
+    #[must_use]
+    pub fn range(&self, own: f64, bases: &Bases) -> [f64; 3] {
+        let by = |unit: f64, low: f64, high: f64, step: f64| [low * unit, high * unit, step * unit];
+        match self.reach {
+            Reach::Own(low, high, step) => by(own, low, high, step),
+            Reach::Resistance(high, step) => by(bases.v / bases.i, 0.0, high, step),
+            Reach::ResistanceFrom(low, high, step) => by(bases.v / bases.i, low, high, step),
+            Reach::Capacitance(low, high, step) => by(bases.t_sw * bases.i / bases.v, low, high, step),
+            Reach::Conductance(high, step) => by(bases.i / bases.v, 0.0, high, step),
+            Reach::Source(low, high, step) => by(bases.v_in, low, high, step),
+            Reach::Voltage(low, high, step) => by(bases.v, low, high, step),
+            Reach::Current(low, high, step) => by(bases.i, low, high, step),
+            Reach::Time(low, high, step) => by(bases.t_sw, low, high, step),
+            Reach::Plain(low, high, step) => [low, high, step],
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! The candidate causes: which parameters of the plant each moves, and how far.
+//!
+//! A cause has one or more forms, such as the gain of one current sensor or of both; a form is what is fitted. What the search
+//! has to know of a cause stands in its entry: nothing asks for a name.
+
+mod knob;
+mod list;
+
+use plant::Parameters;
+
+use crate::drive::Model;
+use knob::Reach;
+pub use knob::{Bases, Knob};
+pub use list::CAUSES;
+
+/// A change of this share of a number that every converter has is a large one: tolerances of inductors, capacitors and
+/// supplies are 5 to 20 %.
+const LARGE_SHARE: f64 = 0.3;
+
+/// How a form is fitted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Search {
+    /// From the model's own value.
+    Own,
+    /// From each of these starts, in steps of the parameters' own steps above the model's value.
+    From(&'static [&'static [f64]]),
+    /// Its first parameter takes each of these values (times its step), and is not smooth in between.
+    Scan(&'static [f64]),
+    /// Amplitude, frequency and phase of a line, from the strongest that stands in the residual.
+    Line,
+    /// The step of a counter, from the counts that the residual suggests; whole counts are likely, and it is not smooth.
+    Counter,
+}
+
+/// A cause.
+#[derive(Debug)]
+pub struct Cause {
+    /// Its name in results.
+    pub id: &'static str,
+    /// What is fitted, each by itself.
+    pub forms: &'static [Form],
+}
+
+/// One way in which a cause may act.
+#[derive(Debug)]
+pub struct Form {
+    /// What it is, for a reader.
+    pub words: &'static str,
+    /// Its parameters.
+    pub knobs: &'static [Knob],
+    /// How to fit it.
+    pub search: Search,
+}
+
+impl Form {
+    /// Whether its first parameter is varied continuously.
+    #[must_use]
+    pub fn is_smooth(&self) -> bool {
+        !matches!(self.search, Search::Scan(_) | Search::Counter)
+    }
+}
+
+/// A form of a cause with the numbers it has for one converter.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// Which cause, as a place in [`CAUSES`]: candidates with the same are forms of one cause.
+    pub number: usize,
+    /// The cause.
+    pub cause: &'static Cause,
+    /// Which of its forms.
+    pub form: &'static Form,
+    /// The model's own values.
+    pub own: Vec<f64>,
+    /// Lowest and highest value and step of each.
+    pub ranges: Vec<[f64; 3]>,
+}
+
+impl Candidate {
+    /// A change of the first parameter that nobody would call small: of a number that every converter has a share, else what
+    /// converters typically have.
+    #[must_use]
+    pub fn large(&self) -> f64 {
+        let knob = &self.form.knobs[0];
+        let typical = knob.keys.first().and_then(|key| plant::parameter(key));
+        match (knob.reach, typical) {
+            (Reach::Own(..), _) => LARGE_SHARE * self.own[0],
+            (_, Some(parameter)) if parameter.is_pure() => 0.5 * (parameter.typical.1 - parameter.typical.0),
+            (_, Some(parameter)) => parameter.typical.1,
+            (_, None) => f64::INFINITY,
+        }
+    }
+}
+
+/// The candidates for a converter.
+#[must_use]
+pub fn candidates(parameters: &Parameters, bases: &Bases) -> Vec<Candidate> {
+    let model = Model::new(parameters);
+    let candidate = |number: usize, cause: &'static Cause, form: &'static Form| {
+        let own: Vec<f64> = form.knobs.iter().map(|knob| knob.get(&model)).collect();
+        let ranges = form.knobs.iter().zip(&own);
+        let ranges = ranges.map(|(knob, own)| knob.range(*own, bases)).collect();
+        Candidate {
+            number,
+            cause,
+            form,
+            own,
+            ranges,
+        }
+    };
+    let causes = CAUSES.iter().enumerate();
+    causes
+        .flat_map(|(number, cause)| cause.forms.iter().map(move |form| (number, cause, form)))
+        .map(|(number, cause, form)| candidate(number, cause, form))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_cause_stands_once_and_moves_numbers_that_the_plant_has() {
+        for (n, cause) in CAUSES.iter().enumerate() {
+            assert!(CAUSES[n + 1..].iter().all(|other| other.id != cause.id), "{}", cause.id);
+            assert!(!cause.forms.is_empty(), "{}", cause.id);
+            for knob in cause.forms.iter().flat_map(|form| form.knobs) {
+                for key in knob.keys {
+                    assert!(plant::parameter(key).is_some(), "{}: {key}", cause.id);
+                }
+            }
+        }
+    }
+}

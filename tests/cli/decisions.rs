@@ -1,0 +1,105 @@
+//! A numeric format is judged by the decisions that it changes, wherever it is named.
+
+use serde_json::Value;
+
+use super::{Desk, assert_refused};
+
+/// The example, with its 515 golden vectors, in `policy/`.
+fn example() -> Desk {
+    let desk = Desk::new("linear");
+    std::fs::remove_dir_all(desk.path("policy")).unwrap();
+    tests::tools::copy_folder(&tests::example().with_file_name(""), &desk.path("policy"));
+    desk
+}
+
+/// Changed decisions and ties as `inspect --json` counts them.
+fn counted(desk: &Desk, format: &str) -> (u64, u64) {
+    let text = desk.succeed(&format!("inspect policy --format {format} --json"));
+    let json: Value = serde_json::from_str(&text).unwrap();
+    let number = |key: &str| json["decisions"][key].as_u64().unwrap();
+    assert_eq!(number("observations"), 515);
+    (number("changed"), number("ties"))
+}
+
+/// The expected numbers were counted with the compiled C and a program of its own, before this existed.
+#[test]
+fn integers_change_as_many_decisions_as_their_compiled_code_does() {
+    let desk = example();
+    for (format, expected) in [("f32", 0), ("f64", 0), ("i16", 194), ("i8", 364)] {
+        let (changed, ties) = counted(&desk, format);
+        assert_eq!(changed + ties, expected, "{format}: {changed} and {ties} ties");
+    }
+}
+
+#[test]
+fn verify_of_a_format_that_changes_decisions_ends_with_1_though_all_builds_are_equal() {
+    let desk = example();
+    let ran = desk.type_in("verify policy --format i8 --steps 200");
+    assert_eq!(ran.code, Some(1), "{}{}", ran.stdout, ran.stderr);
+    for words in [
+        "decisions in i8: DIFFERENT",
+        "of 515 changed",
+        "operating range",
+        "equal: buck12 against the interpreter",
+    ] {
+        assert!(ran.stdout.contains(words), "{words}\n{}", ran.stdout);
+    }
+    let text = desk.succeed("verify policy --format f32 --steps 200");
+    assert!(text.contains("decisions in f32: 0 of 515 changed"), "{text}");
+    desk.succeed("verify policy --format i8 --golden-decisions 0.8 --steps 200");
+}
+
+#[test]
+fn compile_refuses_a_format_that_changes_decisions_unless_their_share_is_accepted() {
+    let desk = example();
+    let before = desk.listing();
+    let ran = desk.type_in("compile policy --format i16 --no-costs --out out");
+    assert_refused(
+        &ran,
+        &["of 515 changed", "most at golden vector", "--golden-decisions 0.37"],
+    );
+    assert_eq!(desk.listing(), before, "nothing is written");
+    desk.succeed("compile policy --format i16 --golden-decisions 0.37 --no-costs --out out");
+    let ran = desk.type_in("compile policy --golden-decisions 37 --no-costs --out out");
+    assert_refused(&ran, &["--golden-decisions", "0.02 for 2 %"]);
+}
+
+#[test]
+fn the_contract_may_accept_a_share() {
+    let desk = example();
+    desk.edit("policy/policy.toml", "[network]", "[network]\ngolden_decisions = 0.4");
+    desk.succeed("compile policy --format i16 --no-costs --out out");
+    desk.succeed("verify policy --format i16 --steps 200");
+}
+
+/// A wrong activation is no matter of decisions or builds: it is said once, with what to look at.
+#[test]
+fn a_network_that_was_read_wrongly_is_told_apart_from_builds_that_differ() {
+    let desk = example();
+    desk.edit("policy/policy.toml", "\"relu\"", "\"tanh\"");
+    let ran = desk.type_in("verify policy --steps 200");
+    assert_eq!(ran.code, Some(1));
+    for words in [
+        "equal: buck12 against the interpreter",
+        "does not give the trainer's golden answers",
+        "hint: look at hidden_activation",
+    ] {
+        assert!(ran.stdout.contains(words), "{words}\n{}", ran.stdout);
+    }
+    assert!(!ran.stdout.contains("decides otherwise"), "{}", ran.stdout);
+    let ran = desk.type_in("inspect policy");
+    assert_eq!(ran.code, Some(1), "{}", ran.stderr);
+    assert!(ran.stderr.contains("hint: look at hidden_activation"), "{}", ran.stderr);
+}
+
+#[test]
+fn code_without_golden_vectors_is_said_to_be_unproven() {
+    let desk = Desk::new("linear");
+    for line in ["compile policy --no-costs --out out", "verify policy --steps 50"] {
+        let text = desk.succeed(line);
+        assert!(
+            text.contains("nothing shows that the weights were read"),
+            "{line}\n{text}"
+        );
+    }
+}

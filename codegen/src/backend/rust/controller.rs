@@ -46,8 +46,8 @@ pub fn items(program: &Program, name: &Ident) -> TokenStream {
             }
             /// Advances the filters by one sample period, with the command that `eval` gave for this measurement.
             pub fn commit(&mut self, measured: &Measurement, command: &Command) {
-                let front = self.guarded(measured);
-                self.advance(&front, command);
+                let (front, sound) = self.guarded(measured);
+                self.advance(&front, sound, command);
             }
             /// `eval` and `commit`.
             pub fn step(&mut self, measured: &Measurement) -> Command {
@@ -68,11 +68,11 @@ pub fn items(program: &Program, name: &Ident) -> TokenStream {
             #sound
             /// [`Self::sense`], and what a damaged state forbids.
             #[inline(always)]
-            fn guarded(&self, measured: &Measurement) -> Front {
+            fn guarded(&self, measured: &Measurement) -> (Front, u32) {
                 let mut front = self.sense(measured);
-                front.sound = self.sound();
-                front.usable &= front.sound;
-                front
+                let sound = self.sound();
+                front.usable &= sound;
+                (front, sound)
             }
             #decide
             #advance
@@ -92,7 +92,8 @@ fn bodies(program: &Program) -> (TokenStream, TokenStream) {
         return (
             quote! {
                 let chosen = self.choose_for(measured);
-                self.decide(&self.guarded(measured), chosen)
+                let (front, sound) = self.guarded(measured);
+                self.decide(&front, sound, chosen)
             },
             quote! {
                 let chosen = self.choose_for(measured);
@@ -102,13 +103,13 @@ fn bodies(program: &Program) -> (TokenStream, TokenStream) {
     }
     (
         quote! {
-            let front = self.guarded(measured);
-            self.decide(&front, Self::choose(&front.observation))
+            let (front, sound) = self.guarded(measured);
+            self.decide(&front, sound, Self::choose(&front.observation))
         },
         quote! {
-            let front = self.guarded(measured);
-            let command = self.decide(&front, Self::choose(&front.observation));
-            self.advance(&front, &command);
+            let (front, sound) = self.guarded(measured);
+            let command = self.decide(&front, sound, Self::choose(&front.observation));
+            self.advance(&front, sound, &command);
             command
         },
     )
@@ -186,7 +187,6 @@ fn front(program: &Program) -> TokenStream {
             observation: [#kind; FEATURES],
             #push
             bad_count: u32,
-            sound: u32,
             usable: u32,
             held: u32,
             primed_now: u32,
@@ -229,7 +229,6 @@ fn sense(program: &Program) -> TokenStream {
                 observation: #observation,
                 #push
                 bad_count,
-                sound: 1,
                 usable,
                 held: usable & (#valid ^ 1),
                 primed_now: usable & (self.primed ^ 1),
@@ -266,9 +265,9 @@ fn decide(program: &Program) -> TokenStream {
             /// What a step does behind the network.
             #[inline(never)]
             fn settle(&mut self, measured: &Measurement, chosen: (u32, #kind)) -> Command {
-                let front = self.guarded(measured);
-                let command = self.decide(&front, chosen);
-                self.advance(&front, &command);
+                let (front, sound) = self.guarded(measured);
+                let command = self.decide(&front, sound, chosen);
+                self.advance(&front, sound, &command);
                 command
             }
         }
@@ -295,10 +294,10 @@ fn decide(program: &Program) -> TokenStream {
         }
         /// Mapping, limits, status.
         #[inline(always)]
-        fn decide(&self, front: &Front, (action_index, chosen): (u32, #kind)) -> Command {
+        fn decide(&self, front: &Front, sound: u32, (action_index, chosen): (u32, #kind)) -> Command {
             #(#statements)*
             let stray = #stray;
-            let trusted = front.sound & (!stray >> #top) #narrowed;
+            let trusted = sound & !((stray >> #top) #narrowed);
             let usable = front.usable & trusted;
             let status = #(#terms)|*;
             Command {
@@ -324,13 +323,13 @@ fn advance(program: &Program) -> TokenStream {
         let (first, last, length) = (size(push.word), size(push.word + push.length - 1), size(push.length));
         let index = size(index);
         if push.length == 1 {
-            return quote! { self.memory[#last] = select(front.sound, front.push[#index], 0.0); };
+            return quote! { self.memory[#last] = select(sound, front.push[#index], 0.0); };
         }
         quote! {
-            let pushed = select(front.sound, front.push[#index], 0.0);
+            let pushed = select(sound, front.push[#index], 0.0);
             let mut moved = pushed;
             for word in self.memory.iter_mut().skip(#first).take(#length).rev() {
-                let before = select(self.primed & front.sound, *word, pushed);
+                let before = select(self.primed & sound, *word, pushed);
                 *word = moved;
                 moved = before;
             }
@@ -339,15 +338,15 @@ fn advance(program: &Program) -> TokenStream {
     quote! {
         /// Filters, held samples and counters move on by one sample period.
         #[inline(always)]
-        fn advance(&mut self, front: &Front, command: &Command) {
+        fn advance(&mut self, front: &Front, sound: u32, command: &Command) {
             #(#statements)*
             #(#pushes)*
             #soft_cap
             self.held = front.signal;
             self.previous_duty = command.duty_sim;
             self.previous_command = command.duty;
-            self.bad_count = front.bad_count & 0_u32.wrapping_sub(front.sound);
-            self.primed = front.usable | ((front.sound ^ 1) << 1);
+            self.bad_count = front.bad_count & 0_u32.wrapping_sub(sound);
+            self.primed = front.usable.wrapping_add(2).wrapping_sub(sound << 1);
         }
     }
 }

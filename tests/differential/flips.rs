@@ -14,7 +14,7 @@ use codegen::program::StateValue;
 use codegen::{Language, Output};
 use interp::{Controller, Sample, State, status};
 use policy::{NumericFormat, Policy};
-use verify::traces::Rng;
+use random::{Random, SplitMix};
 
 /// Steps behind a flip.
 const STEPS: usize = 6;
@@ -69,7 +69,7 @@ fn state_of(shape: &State<f32>, words: &[u32]) -> State<f32> {
 }
 
 /// A measurement within the ranges, or one that is not, as often as `bad` says.
-fn sample(policy: &Policy, rng: &mut Rng, bad: f64) -> Vec<Sample> {
+fn sample(policy: &Policy, rng: &mut SplitMix, bad: f64) -> Vec<Sample> {
     let one = |signal: &policy::Signal| {
         let is_bad = rng.uniform(0.0, 1.0) < bad;
         match (signal.adc, is_bad) {
@@ -87,7 +87,7 @@ fn sample(policy: &Policy, rng: &mut Rng, bad: f64) -> Vec<Sample> {
 
 /// Every bit of every word of the state, from each base.
 fn flips(policy: &Policy) -> Vec<Flip> {
-    let mut rng = Rng::new(17);
+    let mut rng = SplitMix::new(17);
     let mut controller = Controller::<f32>::new(policy);
     let mut flips = Vec::new();
     for step in 0..=BASES[BASES.len() - 1] {
@@ -225,7 +225,7 @@ fn no_flipped_bit_of_the_state_makes_a_duty_that_is_no_number_or_outside() {
 fn a_damaged_state_is_left_by_init_and_by_reset_unless_the_mapping_is_damaged() {
     let policy = example();
     let coefficients = coefficients(&policy);
-    let good = sample(&policy, &mut Rng::new(3), 0.0);
+    let good = sample(&policy, &mut SplitMix::new(3), 0.0);
     for flip in flips(&policy).iter().step_by(7) {
         let mut controller = Controller::<f32>::new(&policy);
         controller.restore(&state_of(controller.state(), &flip.state));

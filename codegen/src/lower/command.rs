@@ -89,7 +89,10 @@ pub fn decide(policy: &Policy) -> Decide {
     Decide {
         block,
         duty,
-        within: Within::of(scalar, (Literal::exact(f64::NEG_INFINITY), Literal::exact(f64::INFINITY))),
+        within: Within::of(
+            scalar,
+            (Literal::exact(f64::NEG_INFINITY), Literal::exact(f64::INFINITY)),
+        ),
         duty_sim,
         status,
     }

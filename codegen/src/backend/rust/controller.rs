@@ -69,8 +69,9 @@ pub fn items(program: &Program, name: &Ident) -> TokenStream {
             /// [`Self::sense`], and what a damaged state forbids.
             #[inline(always)]
             fn guarded(&self, measured: &Measurement) -> (Front, u32) {
-                let mut front = self.sense(measured);
+                // first, so that no number of the measurement waits for it on the stack
                 let sound = self.sound();
+                let mut front = self.sense(measured);
                 front.usable &= sound;
                 (front, sound)
             }

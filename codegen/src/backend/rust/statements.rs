@@ -179,12 +179,12 @@ pub fn helpers(program: &Program) -> TokenStream {
         #[inline(always)]
         #[allow(dead_code)]
         fn within(x: #number, low: #number, high: #number) -> u32 {
-            flag(x >= low) & flag(x <= high)
+            flag((x >= low) & (x <= high))
         }
         #[inline(always)]
         #[allow(dead_code)]
         fn outside(x: #number, low: #number, high: #number) -> u32 {
-            flag(x < low) | flag(x > high)
+            flag((x < low) | (x > high))
         }
         #[inline(always)]
         #[allow(dead_code)]

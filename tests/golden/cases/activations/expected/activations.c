@@ -39,7 +39,8 @@
 #define ACTIVATIONS_RESTRICT
 #endif
 
-/* Where the linker shall put tables and code, for example __attribute__((section(".ccm"))). */
+/* Where the linker shall put tables and code, for example __attribute__((section(".ccm.rodata"))) and
+   __attribute__((section(".ccm.text"))): two sections, since one cannot hold both. */
 #ifndef ACTIVATIONS_TABLE
 #define ACTIVATIONS_TABLE
 #endif
@@ -48,15 +49,17 @@
 #endif
 
 /*
- * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
- * fast; helpers that this build may not need.
+ * Functions that are there once and share no stack frame with their caller; functions that are part of it; functions off
+ * the control path: small before fast; helpers that this build may not need.
  */
 #if defined(__GNUC__)
 #define ACTIVATIONS_APART __attribute__((noinline))
+#define ACTIVATIONS_TOGETHER __inline__ __attribute__((always_inline))
 #define ACTIVATIONS_COLD __attribute__((cold))
 #define ACTIVATIONS_SPARE __attribute__((unused))
 #else
 #define ACTIVATIONS_APART
+#define ACTIVATIONS_TOGETHER
 #define ACTIVATIONS_COLD
 #define ACTIVATIONS_SPARE
 #endif
@@ -327,14 +330,13 @@ ACTIVATIONS_CODE ACTIVATIONS_APART static void activations_sense(const activatio
     front->observation[1] = state->previous_duty;
     front->observation[2] = v5;
     front->bad_count = bad_count;
-    front->sound = 1u;
     front->usable = usable;
     front->held = usable & (f0 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
 }
 
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
-ACTIVATIONS_CODE static void activations_guard(const activations_state *state, activations_front *front)
+ACTIVATIONS_CODE ACTIVATIONS_TOGETHER static void activations_guard(const activations_state *state, activations_front *front)
 {
     const uint32_t stray = activations_aside(state->held[0], 0x41C00000u, 0x41C00000u)
                          | activations_aside(state->previous_duty, 0x3F19999Au, 0x3F19999Au)
@@ -707,14 +709,14 @@ ACTIVATIONS_CODE ACTIVATIONS_APART static uint32_t activations_choose(const acti
 }
 
 /* Mapping, limits, status. */
-ACTIVATIONS_CODE static void activations_decide(const activations_state *state, const activations_front *front, uint32_t index, activations_command *command)
+ACTIVATIONS_CODE ACTIVATIONS_TOGETHER static void activations_decide(const activations_state *state, const activations_front *front, uint32_t index, activations_command *command)
 {
     const float chosen = activations_duties[index];
     const float v0 = activations_clamp(chosen, 0.0f, 1.0f);
     const uint32_t f1 = activations_bits(chosen) ^ activations_bits(v0);
     const uint32_t f2 = activations_flag(f1 != 0u);
-    const uint32_t stray = activations_aside(v0, 0x3F800000u, 0x3F800000u);
-    const uint32_t trusted = front->sound & (uint32_t)(~stray >> 31);
+    const uint32_t stray = activations_far(v0, 0x7F800000u);
+    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
     const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
@@ -729,7 +731,7 @@ ACTIVATIONS_CODE static void activations_decide(const activations_state *state, 
 }
 
 /* Filters, held samples and counters move on by one sample period. */
-ACTIVATIONS_CODE ACTIVATIONS_NO_LIBC static void activations_advance(activations_state *state, const activations_front *front, const activations_command *command)
+ACTIVATIONS_CODE ACTIVATIONS_TOGETHER ACTIVATIONS_NO_LIBC static void activations_advance(activations_state *state, const activations_front *front, const activations_command *command)
 {
     uint32_t i;
     for (i = 0u; i < ACTIVATIONS_SIGNALS; ++i) {
@@ -738,7 +740,7 @@ ACTIVATIONS_CODE ACTIVATIONS_NO_LIBC static void activations_advance(activations
     state->previous_duty = command->duty_sim;
     state->previous_command = command->duty;
     state->bad_count = front->bad_count & ((uint32_t)0 - front->sound);
-    state->primed = front->usable | ((front->sound ^ (uint32_t)1) << 1);
+    state->primed = (front->usable + (uint32_t)2) - (front->sound << 1);
 }
 
 /*

@@ -39,7 +39,8 @@
 #define ADC_MAPPING_RESTRICT
 #endif
 
-/* Where the linker shall put tables and code, for example __attribute__((section(".ccm"))). */
+/* Where the linker shall put tables and code, for example __attribute__((section(".ccm.rodata"))) and
+   __attribute__((section(".ccm.text"))): two sections, since one cannot hold both. */
 #ifndef ADC_MAPPING_TABLE
 #define ADC_MAPPING_TABLE
 #endif
@@ -48,15 +49,17 @@
 #endif
 
 /*
- * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
- * fast; helpers that this build may not need.
+ * Functions that are there once and share no stack frame with their caller; functions that are part of it; functions off
+ * the control path: small before fast; helpers that this build may not need.
  */
 #if defined(__GNUC__)
 #define ADC_MAPPING_APART __attribute__((noinline))
+#define ADC_MAPPING_TOGETHER __inline__ __attribute__((always_inline))
 #define ADC_MAPPING_COLD __attribute__((cold))
 #define ADC_MAPPING_SPARE __attribute__((unused))
 #else
 #define ADC_MAPPING_APART
+#define ADC_MAPPING_TOGETHER
 #define ADC_MAPPING_COLD
 #define ADC_MAPPING_SPARE
 #endif
@@ -319,7 +322,6 @@ ADC_MAPPING_CODE ADC_MAPPING_APART static void adc_mapping_sense(const adc_mappi
     front->observation[1] = v18;
     front->observation[2] = v19;
     front->bad_count = bad_count;
-    front->sound = 1u;
     front->usable = usable;
     front->held = usable & (f8 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
@@ -327,7 +329,7 @@ ADC_MAPPING_CODE ADC_MAPPING_APART static void adc_mapping_sense(const adc_mappi
 }
 
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
-ADC_MAPPING_CODE static void adc_mapping_guard(const adc_mapping_state *state, adc_mapping_front *front)
+ADC_MAPPING_CODE ADC_MAPPING_TOGETHER static void adc_mapping_guard(const adc_mapping_state *state, adc_mapping_front *front)
 {
     const uint32_t stray = adc_mapping_aside(state->held[0], 0x41A00000u, 0x41A00000u)
                          | adc_mapping_aside(state->held[1], 0x01000000u, 0x41800000u)
@@ -578,7 +580,7 @@ ADC_MAPPING_CODE ADC_MAPPING_APART static uint32_t adc_mapping_choose(const adc_
 }
 
 /* Mapping, limits, status. */
-ADC_MAPPING_CODE static void adc_mapping_decide(const adc_mapping_state *state, const adc_mapping_front *front, uint32_t index, adc_mapping_command *command)
+ADC_MAPPING_CODE ADC_MAPPING_TOGETHER static void adc_mapping_decide(const adc_mapping_state *state, const adc_mapping_front *front, uint32_t index, adc_mapping_command *command)
 {
     const float chosen = adc_mapping_duties[index];
     const float v0 = state->mapping_a * chosen;
@@ -601,8 +603,8 @@ ADC_MAPPING_CODE static void adc_mapping_decide(const adc_mapping_state *state, 
     const float v17 = adc_mapping_clamp(v16, 0.05f, 0.9f);
     const uint32_t f18 = adc_mapping_bits(v16) ^ adc_mapping_bits(v17);
     const uint32_t f19 = adc_mapping_flag(f18 != 0u);
-    const uint32_t stray = adc_mapping_beyond(v17, 0x3D4CCCCDu, 0x02199999u);
-    const uint32_t trusted = front->sound & (uint32_t)(~stray >> 31);
+    const uint32_t stray = adc_mapping_far(v17, 0x7F800000u);
+    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
     const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
@@ -620,7 +622,7 @@ ADC_MAPPING_CODE static void adc_mapping_decide(const adc_mapping_state *state, 
 }
 
 /* Filters, held samples and counters move on by one sample period. */
-ADC_MAPPING_CODE ADC_MAPPING_NO_LIBC static void adc_mapping_advance(adc_mapping_state *state, const adc_mapping_front *front, const adc_mapping_command *command)
+ADC_MAPPING_CODE ADC_MAPPING_TOGETHER ADC_MAPPING_NO_LIBC static void adc_mapping_advance(adc_mapping_state *state, const adc_mapping_front *front, const adc_mapping_command *command)
 {
     const float v0 = state->soft_cap + 0.0016f;
     const uint32_t f1 = adc_mapping_flag(v0 > 0.9f);
@@ -634,7 +636,7 @@ ADC_MAPPING_CODE ADC_MAPPING_NO_LIBC static void adc_mapping_advance(adc_mapping
     state->previous_command = command->duty;
     state->soft_cap = v3;
     state->bad_count = front->bad_count & ((uint32_t)0 - front->sound);
-    state->primed = front->usable | ((front->sound ^ (uint32_t)1) << 1);
+    state->primed = (front->usable + (uint32_t)2) - (front->sound << 1);
 }
 
 /*

@@ -39,7 +39,8 @@
 #define CONSTRUCTS_RESTRICT
 #endif
 
-/* Where the linker shall put tables and code, for example __attribute__((section(".ccm"))). */
+/* Where the linker shall put tables and code, for example __attribute__((section(".ccm.rodata"))) and
+   __attribute__((section(".ccm.text"))): two sections, since one cannot hold both. */
 #ifndef CONSTRUCTS_TABLE
 #define CONSTRUCTS_TABLE
 #endif
@@ -48,15 +49,17 @@
 #endif
 
 /*
- * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
- * fast; helpers that this build may not need.
+ * Functions that are there once and share no stack frame with their caller; functions that are part of it; functions off
+ * the control path: small before fast; helpers that this build may not need.
  */
 #if defined(__GNUC__)
 #define CONSTRUCTS_APART __attribute__((noinline))
+#define CONSTRUCTS_TOGETHER __inline__ __attribute__((always_inline))
 #define CONSTRUCTS_COLD __attribute__((cold))
 #define CONSTRUCTS_SPARE __attribute__((unused))
 #else
 #define CONSTRUCTS_APART
+#define CONSTRUCTS_TOGETHER
 #define CONSTRUCTS_COLD
 #define CONSTRUCTS_SPARE
 #endif
@@ -459,7 +462,6 @@ CONSTRUCTS_CODE CONSTRUCTS_APART static void constructs_sense(const constructs_s
     front->push[8] = v46;
     front->push[9] = v48;
     front->bad_count = bad_count;
-    front->sound = 1u;
     front->usable = usable;
     front->held = usable & (f9 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
@@ -467,7 +469,7 @@ CONSTRUCTS_CODE CONSTRUCTS_APART static void constructs_sense(const constructs_s
 }
 
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
-CONSTRUCTS_CODE static void constructs_guard(const constructs_state *state, constructs_front *front)
+CONSTRUCTS_CODE CONSTRUCTS_TOGETHER static void constructs_guard(const constructs_state *state, constructs_front *front)
 {
     const uint32_t stray = constructs_aside(state->held[0], 0x42A00000u, 0x42A00000u)
                          | constructs_far(state->held[1], 0x41A00000u)
@@ -862,7 +864,7 @@ CONSTRUCTS_CODE CONSTRUCTS_APART static uint32_t constructs_choose(const constru
 }
 
 /* Mapping, limits, status. */
-CONSTRUCTS_CODE static void constructs_decide(const constructs_state *state, const constructs_front *front, uint32_t index, constructs_command *command)
+CONSTRUCTS_CODE CONSTRUCTS_TOGETHER static void constructs_decide(const constructs_state *state, const constructs_front *front, uint32_t index, constructs_command *command)
 {
     const float chosen = constructs_duties[index];
     const float v0 = state->mapping_a * chosen;
@@ -885,8 +887,8 @@ CONSTRUCTS_CODE static void constructs_decide(const constructs_state *state, con
     const float v17 = constructs_clamp(v16, 0.3f, 0.67999995f);
     const uint32_t f18 = constructs_bits(v16) ^ constructs_bits(v17);
     const uint32_t f19 = constructs_flag(f18 != 0u);
-    const uint32_t stray = constructs_beyond(v17, 0x3E99999Au, 0x00947AE0u);
-    const uint32_t trusted = front->sound & (uint32_t)(~stray >> 31);
+    const uint32_t stray = constructs_far(v17, 0x7F800000u);
+    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
     const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
@@ -904,7 +906,7 @@ CONSTRUCTS_CODE static void constructs_decide(const constructs_state *state, con
 }
 
 /* Filters, held samples and counters move on by one sample period. */
-CONSTRUCTS_CODE CONSTRUCTS_NO_LIBC static void constructs_advance(constructs_state *state, const constructs_front *front, const constructs_command *command)
+CONSTRUCTS_CODE CONSTRUCTS_TOGETHER CONSTRUCTS_NO_LIBC static void constructs_advance(constructs_state *state, const constructs_front *front, const constructs_command *command)
 {
     const float v0 = state->soft_cap + 0.0165f;
     const uint32_t f1 = constructs_flag(v0 > 0.67999995f);
@@ -949,7 +951,7 @@ CONSTRUCTS_CODE CONSTRUCTS_NO_LIBC static void constructs_advance(constructs_sta
     state->previous_command = command->duty;
     state->soft_cap = v3;
     state->bad_count = front->bad_count & ((uint32_t)0 - front->sound);
-    state->primed = front->usable | ((front->sound ^ (uint32_t)1) << 1);
+    state->primed = (front->usable + (uint32_t)2) - (front->sound << 1);
 }
 
 /*

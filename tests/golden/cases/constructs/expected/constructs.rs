@@ -80,12 +80,12 @@ fn select(flag: u32, then: f32, otherwise: f32) -> f32 {
 #[inline(always)]
 #[allow(dead_code)]
 fn within(x: f32, low: f32, high: f32) -> u32 {
-    flag(x >= low) & flag(x <= high)
+    flag((x >= low) & (x <= high))
 }
 #[inline(always)]
 #[allow(dead_code)]
 fn outside(x: f32, low: f32, high: f32) -> u32 {
-    flag(x < low) | flag(x > high)
+    flag((x < low) | (x > high))
 }
 #[inline(always)]
 #[allow(dead_code)]
@@ -688,7 +688,6 @@ struct Front {
     observation: [f32; FEATURES],
     push: [f32; 10],
     bad_count: u32,
-    sound: u32,
     usable: u32,
     held: u32,
     primed_now: u32,
@@ -747,12 +746,13 @@ impl Controller {
     #[must_use]
     pub fn eval(&self, measured: &Measurement) -> Command {
         let chosen = self.choose_for(measured);
-        self.decide(&self.guarded(measured), chosen)
+        let (front, sound) = self.guarded(measured);
+        self.decide(&front, sound, chosen)
     }
     /// Advances the filters by one sample period, with the command that `eval` gave for this measurement.
     pub fn commit(&mut self, measured: &Measurement, command: &Command) {
-        let front = self.guarded(measured);
-        self.advance(&front, command);
+        let (front, sound) = self.guarded(measured);
+        self.advance(&front, sound, command);
     }
     /// `eval` and `commit`.
     pub fn step(&mut self, measured: &Measurement) -> Command {
@@ -882,7 +882,6 @@ impl Controller {
             ],
             push: [v14, v1, v27, v30, v36, v1, v44, v7, v46, v48],
             bad_count,
-            sound: 1,
             usable,
             held: usable & (f9 ^ 1),
             primed_now: usable & (self.primed ^ 1),
@@ -930,11 +929,11 @@ impl Controller {
     }
     /// [`Self::sense`], and what a damaged state forbids.
     #[inline(always)]
-    fn guarded(&self, measured: &Measurement) -> Front {
+    fn guarded(&self, measured: &Measurement) -> (Front, u32) {
+        let sound = self.sound();
         let mut front = self.sense(measured);
-        front.sound = self.sound();
-        front.usable &= front.sound;
-        front
+        front.usable &= sound;
+        (front, sound)
     }
     /// The greedy action for a measurement, with a stack of its own.
     #[inline(never)]
@@ -944,9 +943,9 @@ impl Controller {
     /// What a step does behind the network.
     #[inline(never)]
     fn settle(&mut self, measured: &Measurement, chosen: (u32, f32)) -> Command {
-        let front = self.guarded(measured);
-        let command = self.decide(&front, chosen);
-        self.advance(&front, &command);
+        let (front, sound) = self.guarded(measured);
+        let command = self.decide(&front, sound, chosen);
+        self.advance(&front, sound, &command);
         command
     }
     /// Network and argmax: index and duty of the greedy action.
@@ -968,7 +967,12 @@ impl Controller {
     }
     /// Mapping, limits, status.
     #[inline(always)]
-    fn decide(&self, front: &Front, (action_index, chosen): (u32, f32)) -> Command {
+    fn decide(
+        &self,
+        front: &Front,
+        sound: u32,
+        (action_index, chosen): (u32, f32),
+    ) -> Command {
         let v0: f32 = self.mapping_a * chosen;
         let v1: f32 = self.mapping_b * front.signal[2];
         let v2: f32 = v0 + v1;
@@ -989,8 +993,8 @@ impl Controller {
         let v17: f32 = clamp(v16, 0.3, 0.67999995);
         let f18: u32 = v16.to_bits() ^ v17.to_bits();
         let f19: u32 = flag(f18 != 0);
-        let stray = beyond(v17, 1050253722, 9730784);
-        let trusted = front.sound & (!stray >> 31);
+        let stray = far(v17, 2139095040);
+        let trusted = sound & !((stray >> 31));
         let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
             | (f9 << 4) | (f14 << 5) | (f15 << 6) | (f19 << 7);
@@ -1005,39 +1009,39 @@ impl Controller {
     }
     /// Filters, held samples and counters move on by one sample period.
     #[inline(always)]
-    fn advance(&mut self, front: &Front, command: &Command) {
+    fn advance(&mut self, front: &Front, sound: u32, command: &Command) {
         let v0: f32 = self.soft_cap + 0.0165;
         let f1: u32 = flag(v0 > 0.67999995);
         let v2: f32 = select(f1, 0.67999995, v0);
         let v3: f32 = select(front.usable, v2, 0.35);
-        let pushed = select(front.sound, front.push[0], 0.0);
+        let pushed = select(sound, front.push[0], 0.0);
         let mut moved = pushed;
         for word in self.memory.iter_mut().skip(0).take(3).rev() {
-            let before = select(self.primed & front.sound, *word, pushed);
+            let before = select(self.primed & sound, *word, pushed);
             *word = moved;
             moved = before;
         }
-        self.memory[3] = select(front.sound, front.push[1], 0.0);
-        self.memory[4] = select(front.sound, front.push[2], 0.0);
-        self.memory[5] = select(front.sound, front.push[3], 0.0);
-        self.memory[6] = select(front.sound, front.push[4], 0.0);
-        let pushed = select(front.sound, front.push[5], 0.0);
+        self.memory[3] = select(sound, front.push[1], 0.0);
+        self.memory[4] = select(sound, front.push[2], 0.0);
+        self.memory[5] = select(sound, front.push[3], 0.0);
+        self.memory[6] = select(sound, front.push[4], 0.0);
+        let pushed = select(sound, front.push[5], 0.0);
         let mut moved = pushed;
         for word in self.memory.iter_mut().skip(7).take(4).rev() {
-            let before = select(self.primed & front.sound, *word, pushed);
+            let before = select(self.primed & sound, *word, pushed);
             *word = moved;
             moved = before;
         }
-        self.memory[11] = select(front.sound, front.push[6], 0.0);
-        self.memory[12] = select(front.sound, front.push[7], 0.0);
-        self.memory[13] = select(front.sound, front.push[8], 0.0);
-        self.memory[14] = select(front.sound, front.push[9], 0.0);
+        self.memory[11] = select(sound, front.push[6], 0.0);
+        self.memory[12] = select(sound, front.push[7], 0.0);
+        self.memory[13] = select(sound, front.push[8], 0.0);
+        self.memory[14] = select(sound, front.push[9], 0.0);
         self.soft_cap = v3;
         self.held = front.signal;
         self.previous_duty = command.duty_sim;
         self.previous_command = command.duty;
-        self.bad_count = front.bad_count & 0_u32.wrapping_sub(front.sound);
-        self.primed = front.usable | ((front.sound ^ 1) << 1);
+        self.bad_count = front.bad_count & 0_u32.wrapping_sub(sound);
+        self.primed = front.usable.wrapping_add(2).wrapping_sub(sound << 1);
     }
     /// Known answers: whether the arithmetic of this build is the policy's.
     ///

@@ -39,7 +39,8 @@
 #define FILTERS_RESTRICT
 #endif
 
-/* Where the linker shall put tables and code, for example __attribute__((section(".ccm"))). */
+/* Where the linker shall put tables and code, for example __attribute__((section(".ccm.rodata"))) and
+   __attribute__((section(".ccm.text"))): two sections, since one cannot hold both. */
 #ifndef FILTERS_TABLE
 #define FILTERS_TABLE
 #endif
@@ -48,15 +49,17 @@
 #endif
 
 /*
- * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
- * fast; helpers that this build may not need.
+ * Functions that are there once and share no stack frame with their caller; functions that are part of it; functions off
+ * the control path: small before fast; helpers that this build may not need.
  */
 #if defined(__GNUC__)
 #define FILTERS_APART __attribute__((noinline))
+#define FILTERS_TOGETHER __inline__ __attribute__((always_inline))
 #define FILTERS_COLD __attribute__((cold))
 #define FILTERS_SPARE __attribute__((unused))
 #else
 #define FILTERS_APART
+#define FILTERS_TOGETHER
 #define FILTERS_COLD
 #define FILTERS_SPARE
 #endif
@@ -357,7 +360,6 @@ FILTERS_CODE FILTERS_APART static void filters_sense(const filters_state *state,
     front->push[10] = v41;
     front->push[11] = v48;
     front->bad_count = bad_count;
-    front->sound = 1u;
     front->usable = usable;
     front->held = usable & (f4 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
@@ -365,7 +367,7 @@ FILTERS_CODE FILTERS_APART static void filters_sense(const filters_state *state,
 }
 
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
-FILTERS_CODE static void filters_guard(const filters_state *state, filters_front *front)
+FILTERS_CODE FILTERS_TOGETHER static void filters_guard(const filters_state *state, filters_front *front)
 {
     const uint32_t stray = filters_aside(state->held[0], 0x42A00000u, 0x42A00000u)
                          | filters_aside(state->held[1], 0x01D00000u, 0x41F00000u)
@@ -618,14 +620,14 @@ FILTERS_CODE FILTERS_APART static uint32_t filters_choose(const filters_state *s
 }
 
 /* Mapping, limits, status. */
-FILTERS_CODE static void filters_decide(const filters_state *state, const filters_front *front, uint32_t index, filters_command *command)
+FILTERS_CODE FILTERS_TOGETHER static void filters_decide(const filters_state *state, const filters_front *front, uint32_t index, filters_command *command)
 {
     const float chosen = filters_duties[index];
     const float v0 = filters_clamp(chosen, 0.05f, 0.95f);
     const uint32_t f1 = filters_bits(chosen) ^ filters_bits(v0);
     const uint32_t f2 = filters_flag(f1 != 0u);
-    const uint32_t stray = filters_beyond(v0, 0x3D4CCCCDu, 0x02266666u);
-    const uint32_t trusted = front->sound & (uint32_t)(~stray >> 31);
+    const uint32_t stray = filters_far(v0, 0x7F800000u);
+    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
     const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
@@ -641,7 +643,7 @@ FILTERS_CODE static void filters_decide(const filters_state *state, const filter
 }
 
 /* Filters, held samples and counters move on by one sample period. */
-FILTERS_CODE FILTERS_NO_LIBC static void filters_advance(filters_state *state, const filters_front *front, const filters_command *command)
+FILTERS_CODE FILTERS_TOGETHER FILTERS_NO_LIBC static void filters_advance(filters_state *state, const filters_front *front, const filters_command *command)
 {
     const uint32_t kept = (uint32_t)0 - front->sound;
     const uint32_t primed = state->primed & front->sound;
@@ -685,7 +687,7 @@ FILTERS_CODE FILTERS_NO_LIBC static void filters_advance(filters_state *state, c
     state->previous_duty = command->duty_sim;
     state->previous_command = command->duty;
     state->bad_count = front->bad_count & ((uint32_t)0 - front->sound);
-    state->primed = front->usable | ((front->sound ^ (uint32_t)1) << 1);
+    state->primed = (front->usable + (uint32_t)2) - (front->sound << 1);
 }
 
 /*

@@ -78,12 +78,12 @@ fn select(flag: u32, then: f32, otherwise: f32) -> f32 {
 #[inline(always)]
 #[allow(dead_code)]
 fn within(x: f32, low: f32, high: f32) -> u32 {
-    flag(x >= low) & flag(x <= high)
+    flag((x >= low) & (x <= high))
 }
 #[inline(always)]
 #[allow(dead_code)]
 fn outside(x: f32, low: f32, high: f32) -> u32 {
-    flag(x < low) | flag(x > high)
+    flag((x < low) | (x > high))
 }
 #[inline(always)]
 #[allow(dead_code)]
@@ -377,7 +377,6 @@ struct Front {
     observation: [f32; FEATURES],
     push: [f32; 12],
     bad_count: u32,
-    sound: u32,
     usable: u32,
     held: u32,
     primed_now: u32,
@@ -420,12 +419,13 @@ impl Controller {
     #[must_use]
     pub fn eval(&self, measured: &Measurement) -> Command {
         let chosen = self.choose_for(measured);
-        self.decide(&self.guarded(measured), chosen)
+        let (front, sound) = self.guarded(measured);
+        self.decide(&front, sound, chosen)
     }
     /// Advances the filters by one sample period, with the command that `eval` gave for this measurement.
     pub fn commit(&mut self, measured: &Measurement, command: &Command) {
-        let front = self.guarded(measured);
-        self.advance(&front, command);
+        let (front, sound) = self.guarded(measured);
+        self.advance(&front, sound, command);
     }
     /// `eval` and `commit`.
     pub fn step(&mut self, measured: &Measurement) -> Command {
@@ -517,7 +517,6 @@ impl Controller {
             observation: [v8, v13, v19, v24, v31, v34, v38, v50],
             push: [v5, v1, v17, v23, v1, v30, v1, v38, v3, v39, v41, v48],
             bad_count,
-            sound: 1,
             usable,
             held: usable & (f4 ^ 1),
             primed_now: usable & (self.primed ^ 1),
@@ -563,11 +562,11 @@ impl Controller {
     }
     /// [`Self::sense`], and what a damaged state forbids.
     #[inline(always)]
-    fn guarded(&self, measured: &Measurement) -> Front {
+    fn guarded(&self, measured: &Measurement) -> (Front, u32) {
+        let sound = self.sound();
         let mut front = self.sense(measured);
-        front.sound = self.sound();
-        front.usable &= front.sound;
-        front
+        front.usable &= sound;
+        (front, sound)
     }
     /// The greedy action for a measurement, with a stack of its own.
     #[inline(never)]
@@ -577,9 +576,9 @@ impl Controller {
     /// What a step does behind the network.
     #[inline(never)]
     fn settle(&mut self, measured: &Measurement, chosen: (u32, f32)) -> Command {
-        let front = self.guarded(measured);
-        let command = self.decide(&front, chosen);
-        self.advance(&front, &command);
+        let (front, sound) = self.guarded(measured);
+        let command = self.decide(&front, sound, chosen);
+        self.advance(&front, sound, &command);
         command
     }
     /// Network and argmax: index and duty of the greedy action.
@@ -601,12 +600,17 @@ impl Controller {
     }
     /// Mapping, limits, status.
     #[inline(always)]
-    fn decide(&self, front: &Front, (action_index, chosen): (u32, f32)) -> Command {
+    fn decide(
+        &self,
+        front: &Front,
+        sound: u32,
+        (action_index, chosen): (u32, f32),
+    ) -> Command {
         let v0: f32 = clamp(chosen, 0.05, 0.95);
         let f1: u32 = chosen.to_bits() ^ v0.to_bits();
         let f2: u32 = flag(f1 != 0);
-        let stray = beyond(v0, 1028443341, 36071014);
-        let trusted = front.sound & (!stray >> 31);
+        let stray = far(v0, 2139095040);
+        let trusted = sound & !((stray >> 31));
         let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
             | (f2 << 7);
@@ -621,36 +625,36 @@ impl Controller {
     }
     /// Filters, held samples and counters move on by one sample period.
     #[inline(always)]
-    fn advance(&mut self, front: &Front, command: &Command) {
-        let pushed = select(front.sound, front.push[0], 0.0);
+    fn advance(&mut self, front: &Front, sound: u32, command: &Command) {
+        let pushed = select(sound, front.push[0], 0.0);
         let mut moved = pushed;
         for word in self.memory.iter_mut().skip(0).take(20).rev() {
-            let before = select(self.primed & front.sound, *word, pushed);
+            let before = select(self.primed & sound, *word, pushed);
             *word = moved;
             moved = before;
         }
-        self.memory[20] = select(front.sound, front.push[1], 0.0);
-        self.memory[21] = select(front.sound, front.push[2], 0.0);
-        self.memory[22] = select(front.sound, front.push[3], 0.0);
-        self.memory[23] = select(front.sound, front.push[4], 0.0);
-        self.memory[24] = select(front.sound, front.push[5], 0.0);
-        let pushed = select(front.sound, front.push[6], 0.0);
+        self.memory[20] = select(sound, front.push[1], 0.0);
+        self.memory[21] = select(sound, front.push[2], 0.0);
+        self.memory[22] = select(sound, front.push[3], 0.0);
+        self.memory[23] = select(sound, front.push[4], 0.0);
+        self.memory[24] = select(sound, front.push[5], 0.0);
+        let pushed = select(sound, front.push[6], 0.0);
         let mut moved = pushed;
         for word in self.memory.iter_mut().skip(25).take(39).rev() {
-            let before = select(self.primed & front.sound, *word, pushed);
+            let before = select(self.primed & sound, *word, pushed);
             *word = moved;
             moved = before;
         }
-        self.memory[64] = select(front.sound, front.push[7], 0.0);
-        self.memory[65] = select(front.sound, front.push[8], 0.0);
-        self.memory[66] = select(front.sound, front.push[9], 0.0);
-        self.memory[67] = select(front.sound, front.push[10], 0.0);
-        self.memory[68] = select(front.sound, front.push[11], 0.0);
+        self.memory[64] = select(sound, front.push[7], 0.0);
+        self.memory[65] = select(sound, front.push[8], 0.0);
+        self.memory[66] = select(sound, front.push[9], 0.0);
+        self.memory[67] = select(sound, front.push[10], 0.0);
+        self.memory[68] = select(sound, front.push[11], 0.0);
         self.held = front.signal;
         self.previous_duty = command.duty_sim;
         self.previous_command = command.duty;
-        self.bad_count = front.bad_count & 0_u32.wrapping_sub(front.sound);
-        self.primed = front.usable | ((front.sound ^ 1) << 1);
+        self.bad_count = front.bad_count & 0_u32.wrapping_sub(sound);
+        self.primed = front.usable.wrapping_add(2).wrapping_sub(sound << 1);
     }
     /// Known answers: whether the arithmetic of this build is the policy's.
     ///

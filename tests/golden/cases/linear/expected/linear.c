@@ -39,7 +39,8 @@
 #define LINEAR_RESTRICT
 #endif
 
-/* Where the linker shall put tables and code, for example __attribute__((section(".ccm"))). */
+/* Where the linker shall put tables and code, for example __attribute__((section(".ccm.rodata"))) and
+   __attribute__((section(".ccm.text"))): two sections, since one cannot hold both. */
 #ifndef LINEAR_TABLE
 #define LINEAR_TABLE
 #endif
@@ -48,15 +49,17 @@
 #endif
 
 /*
- * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
- * fast; helpers that this build may not need.
+ * Functions that are there once and share no stack frame with their caller; functions that are part of it; functions off
+ * the control path: small before fast; helpers that this build may not need.
  */
 #if defined(__GNUC__)
 #define LINEAR_APART __attribute__((noinline))
+#define LINEAR_TOGETHER __inline__ __attribute__((always_inline))
 #define LINEAR_COLD __attribute__((cold))
 #define LINEAR_SPARE __attribute__((unused))
 #else
 #define LINEAR_APART
+#define LINEAR_TOGETHER
 #define LINEAR_COLD
 #define LINEAR_SPARE
 #endif
@@ -247,14 +250,13 @@ LINEAR_CODE LINEAR_APART static void linear_sense(const linear_state *state, con
     front->observation[1] = v7;
     front->push[0] = v7;
     front->bad_count = bad_count;
-    front->sound = 1u;
     front->usable = usable;
     front->held = usable & (f0 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
 }
 
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
-LINEAR_CODE static void linear_guard(const linear_state *state, linear_front *front)
+LINEAR_CODE LINEAR_TOGETHER static void linear_guard(const linear_state *state, linear_front *front)
 {
     const uint32_t stray = linear_aside(state->held[0], 0x437A0000u, 0x437A0000u)
                          | linear_far(state->memory[0], 0x3F800008u)
@@ -359,7 +361,7 @@ LINEAR_CODE LINEAR_APART static uint32_t linear_choose(const linear_state *state
 }
 
 /* Mapping, limits, status. */
-LINEAR_CODE static void linear_decide(const linear_state *state, const linear_front *front, uint32_t index, linear_command *command)
+LINEAR_CODE LINEAR_TOGETHER static void linear_decide(const linear_state *state, const linear_front *front, uint32_t index, linear_command *command)
 {
     const float chosen = linear_duties[index];
     const float v0 = state->previous_command - 0.049999997f;
@@ -370,8 +372,8 @@ LINEAR_CODE static void linear_decide(const linear_state *state, const linear_fr
     const float v5 = linear_clamp(v2, 0.4f, 0.59999996f);
     const uint32_t f6 = linear_bits(v2) ^ linear_bits(v5);
     const uint32_t f7 = linear_flag(f6 != 0u);
-    const uint32_t stray = linear_beyond(v5, 0x3ECCCCCDu, 0x004CCCCCu);
-    const uint32_t trusted = front->sound & (uint32_t)(~stray >> 31);
+    const uint32_t stray = linear_far(v5, 0x7F800000u);
+    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
     const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
@@ -387,7 +389,7 @@ LINEAR_CODE static void linear_decide(const linear_state *state, const linear_fr
 }
 
 /* Filters, held samples and counters move on by one sample period. */
-LINEAR_CODE LINEAR_NO_LIBC static void linear_advance(linear_state *state, const linear_front *front, const linear_command *command)
+LINEAR_CODE LINEAR_TOGETHER LINEAR_NO_LIBC static void linear_advance(linear_state *state, const linear_front *front, const linear_command *command)
 {
     const uint32_t kept = (uint32_t)0 - front->sound;
     const uint32_t primed = state->primed & front->sound;
@@ -401,7 +403,7 @@ LINEAR_CODE LINEAR_NO_LIBC static void linear_advance(linear_state *state, const
     state->previous_duty = command->duty_sim;
     state->previous_command = command->duty;
     state->bad_count = front->bad_count & ((uint32_t)0 - front->sound);
-    state->primed = front->usable | ((front->sound ^ (uint32_t)1) << 1);
+    state->primed = (front->usable + (uint32_t)2) - (front->sound << 1);
 }
 
 /*

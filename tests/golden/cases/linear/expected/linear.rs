@@ -76,12 +76,12 @@ fn select(flag: u32, then: f32, otherwise: f32) -> f32 {
 #[inline(always)]
 #[allow(dead_code)]
 fn within(x: f32, low: f32, high: f32) -> u32 {
-    flag(x >= low) & flag(x <= high)
+    flag((x >= low) & (x <= high))
 }
 #[inline(always)]
 #[allow(dead_code)]
 fn outside(x: f32, low: f32, high: f32) -> u32 {
-    flag(x < low) | flag(x > high)
+    flag((x < low) | (x > high))
 }
 #[inline(always)]
 #[allow(dead_code)]
@@ -314,7 +314,6 @@ struct Front {
     observation: [f32; FEATURES],
     push: [f32; 1],
     bad_count: u32,
-    sound: u32,
     usable: u32,
     held: u32,
     primed_now: u32,
@@ -356,12 +355,13 @@ impl Controller {
     #[must_use]
     pub fn eval(&self, measured: &Measurement) -> Command {
         let chosen = self.choose_for(measured);
-        self.decide(&self.guarded(measured), chosen)
+        let (front, sound) = self.guarded(measured);
+        self.decide(&front, sound, chosen)
     }
     /// Advances the filters by one sample period, with the command that `eval` gave for this measurement.
     pub fn commit(&mut self, measured: &Measurement, command: &Command) {
-        let front = self.guarded(measured);
-        self.advance(&front, command);
+        let (front, sound) = self.guarded(measured);
+        self.advance(&front, sound, command);
     }
     /// `eval` and `commit`.
     pub fn step(&mut self, measured: &Measurement) -> Command {
@@ -397,7 +397,6 @@ impl Controller {
             observation: [v3, v7],
             push: [v7],
             bad_count,
-            sound: 1,
             usable,
             held: usable & (f0 ^ 1),
             primed_now: usable & (self.primed ^ 1),
@@ -415,11 +414,11 @@ impl Controller {
     }
     /// [`Self::sense`], and what a damaged state forbids.
     #[inline(always)]
-    fn guarded(&self, measured: &Measurement) -> Front {
+    fn guarded(&self, measured: &Measurement) -> (Front, u32) {
+        let sound = self.sound();
         let mut front = self.sense(measured);
-        front.sound = self.sound();
-        front.usable &= front.sound;
-        front
+        front.usable &= sound;
+        (front, sound)
     }
     /// The greedy action for a measurement, with a stack of its own.
     #[inline(never)]
@@ -429,9 +428,9 @@ impl Controller {
     /// What a step does behind the network.
     #[inline(never)]
     fn settle(&mut self, measured: &Measurement, chosen: (u32, f32)) -> Command {
-        let front = self.guarded(measured);
-        let command = self.decide(&front, chosen);
-        self.advance(&front, &command);
+        let (front, sound) = self.guarded(measured);
+        let command = self.decide(&front, sound, chosen);
+        self.advance(&front, sound, &command);
         command
     }
     /// Network and argmax: index and duty of the greedy action.
@@ -453,7 +452,12 @@ impl Controller {
     }
     /// Mapping, limits, status.
     #[inline(always)]
-    fn decide(&self, front: &Front, (action_index, chosen): (u32, f32)) -> Command {
+    fn decide(
+        &self,
+        front: &Front,
+        sound: u32,
+        (action_index, chosen): (u32, f32),
+    ) -> Command {
         let v0: f32 = self.previous_command - 0.049999997;
         let v1: f32 = self.previous_command + 0.049999997;
         let v2: f32 = clamp(chosen, v0, v1);
@@ -462,8 +466,8 @@ impl Controller {
         let v5: f32 = clamp(v2, 0.4, 0.59999996);
         let f6: u32 = v2.to_bits() ^ v5.to_bits();
         let f7: u32 = flag(f6 != 0);
-        let stray = beyond(v5, 1053609165, 5033164);
-        let trusted = front.sound & (!stray >> 31);
+        let stray = far(v5, 2139095040);
+        let trusted = sound & !((stray >> 31));
         let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (f4 << 5) | (f7 << 7);
         Command {
@@ -477,13 +481,13 @@ impl Controller {
     }
     /// Filters, held samples and counters move on by one sample period.
     #[inline(always)]
-    fn advance(&mut self, front: &Front, command: &Command) {
-        self.memory[0] = select(front.sound, front.push[0], 0.0);
+    fn advance(&mut self, front: &Front, sound: u32, command: &Command) {
+        self.memory[0] = select(sound, front.push[0], 0.0);
         self.held = front.signal;
         self.previous_duty = command.duty_sim;
         self.previous_command = command.duty;
-        self.bad_count = front.bad_count & 0_u32.wrapping_sub(front.sound);
-        self.primed = front.usable | ((front.sound ^ 1) << 1);
+        self.bad_count = front.bad_count & 0_u32.wrapping_sub(sound);
+        self.primed = front.usable.wrapping_add(2).wrapping_sub(sound << 1);
     }
     /// Known answers: whether the arithmetic of this build is the policy's.
     ///

@@ -39,7 +39,8 @@
 #define MINIMAL_RESTRICT
 #endif
 
-/* Where the linker shall put tables and code, for example __attribute__((section(".ccm"))). */
+/* Where the linker shall put tables and code, for example __attribute__((section(".ccm.rodata"))) and
+   __attribute__((section(".ccm.text"))): two sections, since one cannot hold both. */
 #ifndef MINIMAL_TABLE
 #define MINIMAL_TABLE
 #endif
@@ -48,15 +49,17 @@
 #endif
 
 /*
- * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
- * fast; helpers that this build may not need.
+ * Functions that are there once and share no stack frame with their caller; functions that are part of it; functions off
+ * the control path: small before fast; helpers that this build may not need.
  */
 #if defined(__GNUC__)
 #define MINIMAL_APART __attribute__((noinline))
+#define MINIMAL_TOGETHER __inline__ __attribute__((always_inline))
 #define MINIMAL_COLD __attribute__((cold))
 #define MINIMAL_SPARE __attribute__((unused))
 #else
 #define MINIMAL_APART
+#define MINIMAL_TOGETHER
 #define MINIMAL_COLD
 #define MINIMAL_SPARE
 #endif
@@ -262,14 +265,13 @@ MINIMAL_CODE MINIMAL_APART static void minimal_sense(const minimal_state *state,
     front->observation[0] = v1;
     front->observation[1] = v3;
     front->bad_count = bad_count;
-    front->sound = 1u;
     front->usable = usable;
     front->held = usable & (f4 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
 }
 
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
-MINIMAL_CODE static void minimal_guard(const minimal_state *state, minimal_front *front)
+MINIMAL_CODE MINIMAL_TOGETHER static void minimal_guard(const minimal_state *state, minimal_front *front)
 {
     const uint32_t stray = minimal_aside(state->held[0], 0x437A0000u, 0x437A0000u)
                          | minimal_aside(state->held[1], 0x02D00000u, 0x42700000u);
@@ -447,14 +449,14 @@ MINIMAL_CODE MINIMAL_APART static uint32_t minimal_choose(const minimal_state *s
 }
 
 /* Mapping, limits, status. */
-MINIMAL_CODE static void minimal_decide(const minimal_state *state, const minimal_front *front, uint32_t index, minimal_command *command)
+MINIMAL_CODE MINIMAL_TOGETHER static void minimal_decide(const minimal_state *state, const minimal_front *front, uint32_t index, minimal_command *command)
 {
     const float chosen = minimal_duties[index];
     const float v0 = minimal_clamp(chosen, 0.1f, 0.9f);
     const uint32_t f1 = minimal_bits(chosen) ^ minimal_bits(v0);
     const uint32_t f2 = minimal_flag(f1 != 0u);
-    const uint32_t stray = minimal_beyond(v0, 0x3DCCCCCDu, 0x01999999u);
-    const uint32_t trusted = front->sound & (uint32_t)(~stray >> 31);
+    const uint32_t stray = minimal_far(v0, 0x7F800000u);
+    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
     const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
@@ -469,7 +471,7 @@ MINIMAL_CODE static void minimal_decide(const minimal_state *state, const minima
 }
 
 /* Filters, held samples and counters move on by one sample period. */
-MINIMAL_CODE MINIMAL_NO_LIBC static void minimal_advance(minimal_state *state, const minimal_front *front, const minimal_command *command)
+MINIMAL_CODE MINIMAL_TOGETHER MINIMAL_NO_LIBC static void minimal_advance(minimal_state *state, const minimal_front *front, const minimal_command *command)
 {
     uint32_t i;
     for (i = 0u; i < MINIMAL_SIGNALS; ++i) {
@@ -478,7 +480,7 @@ MINIMAL_CODE MINIMAL_NO_LIBC static void minimal_advance(minimal_state *state, c
     state->previous_duty = command->duty_sim;
     state->previous_command = command->duty;
     state->bad_count = front->bad_count & ((uint32_t)0 - front->sound);
-    state->primed = front->usable | ((front->sound ^ (uint32_t)1) << 1);
+    state->primed = (front->usable + (uint32_t)2) - (front->sound << 1);
 }
 
 /*

@@ -78,12 +78,12 @@ fn select(flag: u32, then: f32, otherwise: f32) -> f32 {
 #[inline(always)]
 #[allow(dead_code)]
 fn within(x: f32, low: f32, high: f32) -> u32 {
-    flag(x >= low) & flag(x <= high)
+    flag((x >= low) & (x <= high))
 }
 #[inline(always)]
 #[allow(dead_code)]
 fn outside(x: f32, low: f32, high: f32) -> u32 {
-    flag(x < low) | flag(x > high)
+    flag((x < low) | (x > high))
 }
 #[inline(always)]
 #[allow(dead_code)]
@@ -340,7 +340,6 @@ struct Front {
     signal: [f32; SIGNALS],
     observation: [f32; FEATURES],
     bad_count: u32,
-    sound: u32,
     usable: u32,
     held: u32,
     primed_now: u32,
@@ -380,12 +379,13 @@ impl Controller {
     #[must_use]
     pub fn eval(&self, measured: &Measurement) -> Command {
         let chosen = self.choose_for(measured);
-        self.decide(&self.guarded(measured), chosen)
+        let (front, sound) = self.guarded(measured);
+        self.decide(&front, sound, chosen)
     }
     /// Advances the filters by one sample period, with the command that `eval` gave for this measurement.
     pub fn commit(&mut self, measured: &Measurement, command: &Command) {
-        let front = self.guarded(measured);
-        self.advance(&front, command);
+        let (front, sound) = self.guarded(measured);
+        self.advance(&front, sound, command);
     }
     /// `eval` and `commit`.
     pub fn step(&mut self, measured: &Measurement) -> Command {
@@ -417,7 +417,6 @@ impl Controller {
             signal: [v1, v3],
             observation: [v1, v3],
             bad_count,
-            sound: 1,
             usable,
             held: usable & (f4 ^ 1),
             primed_now: usable & (self.primed ^ 1),
@@ -434,11 +433,11 @@ impl Controller {
     }
     /// [`Self::sense`], and what a damaged state forbids.
     #[inline(always)]
-    fn guarded(&self, measured: &Measurement) -> Front {
+    fn guarded(&self, measured: &Measurement) -> (Front, u32) {
+        let sound = self.sound();
         let mut front = self.sense(measured);
-        front.sound = self.sound();
-        front.usable &= front.sound;
-        front
+        front.usable &= sound;
+        (front, sound)
     }
     /// The greedy action for a measurement, with a stack of its own.
     #[inline(never)]
@@ -448,9 +447,9 @@ impl Controller {
     /// What a step does behind the network.
     #[inline(never)]
     fn settle(&mut self, measured: &Measurement, chosen: (u32, f32)) -> Command {
-        let front = self.guarded(measured);
-        let command = self.decide(&front, chosen);
-        self.advance(&front, &command);
+        let (front, sound) = self.guarded(measured);
+        let command = self.decide(&front, sound, chosen);
+        self.advance(&front, sound, &command);
         command
     }
     /// Network and argmax: index and duty of the greedy action.
@@ -472,12 +471,17 @@ impl Controller {
     }
     /// Mapping, limits, status.
     #[inline(always)]
-    fn decide(&self, front: &Front, (action_index, chosen): (u32, f32)) -> Command {
+    fn decide(
+        &self,
+        front: &Front,
+        sound: u32,
+        (action_index, chosen): (u32, f32),
+    ) -> Command {
         let v0: f32 = clamp(chosen, 0.1, 0.9);
         let f1: u32 = chosen.to_bits() ^ v0.to_bits();
         let f2: u32 = flag(f1 != 0);
-        let stray = beyond(v0, 1036831949, 26843545);
-        let trusted = front.sound & (!stray >> 31);
+        let stray = far(v0, 2139095040);
+        let trusted = sound & !((stray >> 31));
         let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (f2 << 7);
         Command {
@@ -491,12 +495,12 @@ impl Controller {
     }
     /// Filters, held samples and counters move on by one sample period.
     #[inline(always)]
-    fn advance(&mut self, front: &Front, command: &Command) {
+    fn advance(&mut self, front: &Front, sound: u32, command: &Command) {
         self.held = front.signal;
         self.previous_duty = command.duty_sim;
         self.previous_command = command.duty;
-        self.bad_count = front.bad_count & 0_u32.wrapping_sub(front.sound);
-        self.primed = front.usable | ((front.sound ^ 1) << 1);
+        self.bad_count = front.bad_count & 0_u32.wrapping_sub(sound);
+        self.primed = front.usable.wrapping_add(2).wrapping_sub(sound << 1);
     }
     /// Known answers: whether the arithmetic of this build is the policy's.
     ///

@@ -39,7 +39,8 @@
 #define PAPER_RESTRICT
 #endif
 
-/* Where the linker shall put tables and code, for example __attribute__((section(".ccm"))). */
+/* Where the linker shall put tables and code, for example __attribute__((section(".ccm.rodata"))) and
+   __attribute__((section(".ccm.text"))): two sections, since one cannot hold both. */
 #ifndef PAPER_TABLE
 #define PAPER_TABLE
 #endif
@@ -48,15 +49,17 @@
 #endif
 
 /*
- * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
- * fast; helpers that this build may not need.
+ * Functions that are there once and share no stack frame with their caller; functions that are part of it; functions off
+ * the control path: small before fast; helpers that this build may not need.
  */
 #if defined(__GNUC__)
 #define PAPER_APART __attribute__((noinline))
+#define PAPER_TOGETHER __inline__ __attribute__((always_inline))
 #define PAPER_COLD __attribute__((cold))
 #define PAPER_SPARE __attribute__((unused))
 #else
 #define PAPER_APART
+#define PAPER_TOGETHER
 #define PAPER_COLD
 #define PAPER_SPARE
 #endif
@@ -334,7 +337,6 @@ PAPER_CODE PAPER_APART static void paper_sense(const paper_state *state, const p
     front->push[2] = v1;
     front->push[3] = v1;
     front->bad_count = bad_count;
-    front->sound = 1u;
     front->usable = usable;
     front->held = usable & (f4 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
@@ -342,7 +344,7 @@ PAPER_CODE PAPER_APART static void paper_sense(const paper_state *state, const p
 }
 
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
-PAPER_CODE static void paper_guard(const paper_state *state, paper_front *front)
+PAPER_CODE PAPER_TOGETHER static void paper_guard(const paper_state *state, paper_front *front)
 {
     const uint32_t stray = paper_aside(state->held[0], 0x437A0000u, 0x437A0000u)
                          | paper_aside(state->held[1], 0x7DA00000u, 0x42200000u)
@@ -587,7 +589,7 @@ PAPER_CODE PAPER_APART static uint32_t paper_choose(const paper_state *state, co
 }
 
 /* Mapping, limits, status. */
-PAPER_CODE static void paper_decide(const paper_state *state, const paper_front *front, uint32_t index, paper_command *command)
+PAPER_CODE PAPER_TOGETHER static void paper_decide(const paper_state *state, const paper_front *front, uint32_t index, paper_command *command)
 {
     const float chosen = paper_duties[index];
     const float v0 = state->mapping_a * chosen;
@@ -600,8 +602,8 @@ PAPER_CODE static void paper_decide(const paper_state *state, const paper_front 
     const float v7 = paper_clamp(v3, 0.3f, 0.7f);
     const uint32_t f8 = paper_bits(v3) ^ paper_bits(v7);
     const uint32_t f9 = paper_flag(f8 != 0u);
-    const uint32_t stray = paper_beyond(v7, 0x3E99999Au, 0x00999999u);
-    const uint32_t trusted = front->sound & (uint32_t)(~stray >> 31);
+    const uint32_t stray = paper_far(v7, 0x7F800000u);
+    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
     const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
@@ -617,7 +619,7 @@ PAPER_CODE static void paper_decide(const paper_state *state, const paper_front 
 }
 
 /* Filters, held samples and counters move on by one sample period. */
-PAPER_CODE PAPER_NO_LIBC static void paper_advance(paper_state *state, const paper_front *front, const paper_command *command)
+PAPER_CODE PAPER_TOGETHER PAPER_NO_LIBC static void paper_advance(paper_state *state, const paper_front *front, const paper_command *command)
 {
     const uint32_t kept = (uint32_t)0 - front->sound;
     const uint32_t primed = state->primed & front->sound;
@@ -637,7 +639,7 @@ PAPER_CODE PAPER_NO_LIBC static void paper_advance(paper_state *state, const pap
     state->previous_duty = command->duty_sim;
     state->previous_command = command->duty;
     state->bad_count = front->bad_count & ((uint32_t)0 - front->sound);
-    state->primed = front->usable | ((front->sound ^ (uint32_t)1) << 1);
+    state->primed = (front->usable + (uint32_t)2) - (front->sound << 1);
 }
 
 /*

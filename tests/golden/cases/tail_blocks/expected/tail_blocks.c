@@ -39,7 +39,8 @@
 #define TAIL_BLOCKS_RESTRICT
 #endif
 
-/* Where the linker shall put tables and code, for example __attribute__((section(".ccm"))). */
+/* Where the linker shall put tables and code, for example __attribute__((section(".ccm.rodata"))) and
+   __attribute__((section(".ccm.text"))): two sections, since one cannot hold both. */
 #ifndef TAIL_BLOCKS_TABLE
 #define TAIL_BLOCKS_TABLE
 #endif
@@ -48,15 +49,17 @@
 #endif
 
 /*
- * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
- * fast; helpers that this build may not need.
+ * Functions that are there once and share no stack frame with their caller; functions that are part of it; functions off
+ * the control path: small before fast; helpers that this build may not need.
  */
 #if defined(__GNUC__)
 #define TAIL_BLOCKS_APART __attribute__((noinline))
+#define TAIL_BLOCKS_TOGETHER __inline__ __attribute__((always_inline))
 #define TAIL_BLOCKS_COLD __attribute__((cold))
 #define TAIL_BLOCKS_SPARE __attribute__((unused))
 #else
 #define TAIL_BLOCKS_APART
+#define TAIL_BLOCKS_TOGETHER
 #define TAIL_BLOCKS_COLD
 #define TAIL_BLOCKS_SPARE
 #endif
@@ -380,7 +383,6 @@ TAIL_BLOCKS_CODE TAIL_BLOCKS_APART static void tail_blocks_sense(const tail_bloc
     front->observation[2] = v11;
     front->push[0] = v1;
     front->bad_count = bad_count;
-    front->sound = 1u;
     front->usable = usable;
     front->held = usable & (f4 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
@@ -388,7 +390,7 @@ TAIL_BLOCKS_CODE TAIL_BLOCKS_APART static void tail_blocks_sense(const tail_bloc
 }
 
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
-TAIL_BLOCKS_CODE static void tail_blocks_guard(const tail_blocks_state *state, tail_blocks_front *front)
+TAIL_BLOCKS_CODE TAIL_BLOCKS_TOGETHER static void tail_blocks_guard(const tail_blocks_state *state, tail_blocks_front *front)
 {
     const uint32_t stray = tail_blocks_aside(state->held[0], 0x437A0000u, 0x437A0000u)
                          | tail_blocks_aside(state->held[1], 0x02D00000u, 0x42700000u)
@@ -645,7 +647,7 @@ TAIL_BLOCKS_CODE TAIL_BLOCKS_APART static uint32_t tail_blocks_choose(const tail
 }
 
 /* Mapping, limits, status. */
-TAIL_BLOCKS_CODE static void tail_blocks_decide(const tail_blocks_state *state, const tail_blocks_front *front, uint32_t index, tail_blocks_command *command)
+TAIL_BLOCKS_CODE TAIL_BLOCKS_TOGETHER static void tail_blocks_decide(const tail_blocks_state *state, const tail_blocks_front *front, uint32_t index, tail_blocks_command *command)
 {
     const float chosen = tail_blocks_duties[index];
     const uint32_t f0 = tail_blocks_flag(chosen > state->soft_cap);
@@ -653,8 +655,8 @@ TAIL_BLOCKS_CODE static void tail_blocks_decide(const tail_blocks_state *state, 
     const float v2 = tail_blocks_clamp(v1, 0.3f, 0.7f);
     const uint32_t f3 = tail_blocks_bits(v1) ^ tail_blocks_bits(v2);
     const uint32_t f4 = tail_blocks_flag(f3 != 0u);
-    const uint32_t stray = tail_blocks_beyond(v2, 0x3E99999Au, 0x00999999u);
-    const uint32_t trusted = front->sound & (uint32_t)(~stray >> 31);
+    const uint32_t stray = tail_blocks_far(v2, 0x7F800000u);
+    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
     const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
@@ -670,7 +672,7 @@ TAIL_BLOCKS_CODE static void tail_blocks_decide(const tail_blocks_state *state, 
 }
 
 /* Filters, held samples and counters move on by one sample period. */
-TAIL_BLOCKS_CODE TAIL_BLOCKS_NO_LIBC static void tail_blocks_advance(tail_blocks_state *state, const tail_blocks_front *front, const tail_blocks_command *command)
+TAIL_BLOCKS_CODE TAIL_BLOCKS_TOGETHER TAIL_BLOCKS_NO_LIBC static void tail_blocks_advance(tail_blocks_state *state, const tail_blocks_front *front, const tail_blocks_command *command)
 {
     const float v0 = state->soft_cap + 0.004f;
     const uint32_t f1 = tail_blocks_flag(v0 > 0.7f);
@@ -693,7 +695,7 @@ TAIL_BLOCKS_CODE TAIL_BLOCKS_NO_LIBC static void tail_blocks_advance(tail_blocks
     state->previous_command = command->duty;
     state->soft_cap = v3;
     state->bad_count = front->bad_count & ((uint32_t)0 - front->sound);
-    state->primed = front->usable | ((front->sound ^ (uint32_t)1) << 1);
+    state->primed = (front->usable + (uint32_t)2) - (front->sound << 1);
 }
 
 /*

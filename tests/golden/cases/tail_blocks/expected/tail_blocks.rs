@@ -78,12 +78,12 @@ fn select(flag: u32, then: f32, otherwise: f32) -> f32 {
 #[inline(always)]
 #[allow(dead_code)]
 fn within(x: f32, low: f32, high: f32) -> u32 {
-    flag(x >= low) & flag(x <= high)
+    flag((x >= low) & (x <= high))
 }
 #[inline(always)]
 #[allow(dead_code)]
 fn outside(x: f32, low: f32, high: f32) -> u32 {
-    flag(x < low) | flag(x > high)
+    flag((x < low) | (x > high))
 }
 #[inline(always)]
 #[allow(dead_code)]
@@ -1261,7 +1261,6 @@ struct Front {
     observation: [f32; FEATURES],
     push: [f32; 1],
     bad_count: u32,
-    sound: u32,
     usable: u32,
     held: u32,
     primed_now: u32,
@@ -1306,12 +1305,13 @@ impl Controller {
     #[must_use]
     pub fn eval(&self, measured: &Measurement) -> Command {
         let chosen = self.choose_for(measured);
-        self.decide(&self.guarded(measured), chosen)
+        let (front, sound) = self.guarded(measured);
+        self.decide(&front, sound, chosen)
     }
     /// Advances the filters by one sample period, with the command that `eval` gave for this measurement.
     pub fn commit(&mut self, measured: &Measurement, command: &Command) {
-        let front = self.guarded(measured);
-        self.advance(&front, command);
+        let (front, sound) = self.guarded(measured);
+        self.advance(&front, sound, command);
     }
     /// `eval` and `commit`.
     pub fn step(&mut self, measured: &Measurement) -> Command {
@@ -1352,7 +1352,6 @@ impl Controller {
             observation: [v7, v10, v11],
             push: [v1],
             bad_count,
-            sound: 1,
             usable,
             held: usable & (f4 ^ 1),
             primed_now: usable & (self.primed ^ 1),
@@ -1377,11 +1376,11 @@ impl Controller {
     }
     /// [`Self::sense`], and what a damaged state forbids.
     #[inline(always)]
-    fn guarded(&self, measured: &Measurement) -> Front {
+    fn guarded(&self, measured: &Measurement) -> (Front, u32) {
+        let sound = self.sound();
         let mut front = self.sense(measured);
-        front.sound = self.sound();
-        front.usable &= front.sound;
-        front
+        front.usable &= sound;
+        (front, sound)
     }
     /// The greedy action for a measurement, with a stack of its own.
     #[inline(never)]
@@ -1391,9 +1390,9 @@ impl Controller {
     /// What a step does behind the network.
     #[inline(never)]
     fn settle(&mut self, measured: &Measurement, chosen: (u32, f32)) -> Command {
-        let front = self.guarded(measured);
-        let command = self.decide(&front, chosen);
-        self.advance(&front, &command);
+        let (front, sound) = self.guarded(measured);
+        let command = self.decide(&front, sound, chosen);
+        self.advance(&front, sound, &command);
         command
     }
     /// Network and argmax: index and duty of the greedy action.
@@ -1415,14 +1414,19 @@ impl Controller {
     }
     /// Mapping, limits, status.
     #[inline(always)]
-    fn decide(&self, front: &Front, (action_index, chosen): (u32, f32)) -> Command {
+    fn decide(
+        &self,
+        front: &Front,
+        sound: u32,
+        (action_index, chosen): (u32, f32),
+    ) -> Command {
         let f0: u32 = flag(chosen > self.soft_cap);
         let v1: f32 = select(f0, self.soft_cap, chosen);
         let v2: f32 = clamp(v1, 0.3, 0.7);
         let f3: u32 = v1.to_bits() ^ v2.to_bits();
         let f4: u32 = flag(f3 != 0);
-        let stray = beyond(v2, 1050253722, 10066329);
-        let trusted = front.sound & (!stray >> 31);
+        let stray = far(v2, 2139095040);
+        let trusted = sound & !((stray >> 31));
         let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
             | (f0 << 6) | (f4 << 7);
@@ -1437,15 +1441,15 @@ impl Controller {
     }
     /// Filters, held samples and counters move on by one sample period.
     #[inline(always)]
-    fn advance(&mut self, front: &Front, command: &Command) {
+    fn advance(&mut self, front: &Front, sound: u32, command: &Command) {
         let v0: f32 = self.soft_cap + 0.004;
         let f1: u32 = flag(v0 > 0.7);
         let v2: f32 = select(f1, 0.7, v0);
         let v3: f32 = select(front.usable, v2, 0.3);
-        let pushed = select(front.sound, front.push[0], 0.0);
+        let pushed = select(sound, front.push[0], 0.0);
         let mut moved = pushed;
         for word in self.memory.iter_mut().skip(0).take(2).rev() {
-            let before = select(self.primed & front.sound, *word, pushed);
+            let before = select(self.primed & sound, *word, pushed);
             *word = moved;
             moved = before;
         }
@@ -1453,8 +1457,8 @@ impl Controller {
         self.held = front.signal;
         self.previous_duty = command.duty_sim;
         self.previous_command = command.duty;
-        self.bad_count = front.bad_count & 0_u32.wrapping_sub(front.sound);
-        self.primed = front.usable | ((front.sound ^ 1) << 1);
+        self.bad_count = front.bad_count & 0_u32.wrapping_sub(sound);
+        self.primed = front.usable.wrapping_add(2).wrapping_sub(sound << 1);
     }
     /// Known answers: whether the arithmetic of this build is the policy's.
     ///

@@ -42,7 +42,8 @@
 #define WIDE_RESTRICT
 #endif
 
-/* Where the linker shall put tables and code, for example __attribute__((section(".ccm"))). */
+/* Where the linker shall put tables and code, for example __attribute__((section(".ccm.rodata"))) and
+   __attribute__((section(".ccm.text"))): two sections, since one cannot hold both. */
 #ifndef WIDE_TABLE
 #define WIDE_TABLE
 #endif
@@ -51,15 +52,17 @@
 #endif
 
 /*
- * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
- * fast; helpers that this build may not need.
+ * Functions that are there once and share no stack frame with their caller; functions that are part of it; functions off
+ * the control path: small before fast; helpers that this build may not need.
  */
 #if defined(__GNUC__)
 #define WIDE_APART __attribute__((noinline))
+#define WIDE_TOGETHER __inline__ __attribute__((always_inline))
 #define WIDE_COLD __attribute__((cold))
 #define WIDE_SPARE __attribute__((unused))
 #else
 #define WIDE_APART
+#define WIDE_TOGETHER
 #define WIDE_COLD
 #define WIDE_SPARE
 #endif
@@ -450,7 +453,6 @@ WIDE_CODE WIDE_APART static void wide_sense(const wide_state *state, const wide_
     front->push[8] = v46;
     front->push[9] = v48;
     front->bad_count = bad_count;
-    front->sound = 1u;
     front->usable = usable;
     front->held = usable & (f9 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
@@ -458,7 +460,7 @@ WIDE_CODE WIDE_APART static void wide_sense(const wide_state *state, const wide_
 }
 
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
-WIDE_CODE static void wide_guard(const wide_state *state, wide_front *front)
+WIDE_CODE WIDE_TOGETHER static void wide_guard(const wide_state *state, wide_front *front)
 {
     const uint64_t stray = wide_aside(state->held[0], (((uint64_t)0x40540000u << 32) | 0x00000000u), (((uint64_t)0x40540000u << 32) | 0x00000000u))
                          | wide_far(state->held[1], (((uint64_t)0x40340000u << 32) | 0x00000000u))
@@ -656,7 +658,7 @@ WIDE_CODE WIDE_APART static uint32_t wide_choose(const wide_state *state, const 
 }
 
 /* Mapping, limits, status. */
-WIDE_CODE static void wide_decide(const wide_state *state, const wide_front *front, uint32_t index, wide_command *command)
+WIDE_CODE WIDE_TOGETHER static void wide_decide(const wide_state *state, const wide_front *front, uint32_t index, wide_command *command)
 {
     const double chosen = wide_duties[index];
     const double v0 = state->mapping_a * chosen;
@@ -679,8 +681,8 @@ WIDE_CODE static void wide_decide(const wide_state *state, const wide_front *fro
     const double v17 = wide_clamp(v16, 0.3, 0.68);
     const uint32_t f18 = wide_differing(v16, v17);
     const uint32_t f19 = wide_flag(f18 != 0u);
-    const uint64_t stray = wide_beyond(v17, (((uint64_t)0x3FD33333u << 32) | 0x33333333u), (((uint64_t)0x00128F5Cu << 32) | 0x28F5C290u));
-    const uint32_t trusted = front->sound & (uint32_t)(~stray >> 63);
+    const uint64_t stray = wide_far(v17, (((uint64_t)0x7FF00000u << 32) | 0x00000000u));
+    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 63);
     const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
@@ -698,7 +700,7 @@ WIDE_CODE static void wide_decide(const wide_state *state, const wide_front *fro
 }
 
 /* Filters, held samples and counters move on by one sample period. */
-WIDE_CODE WIDE_NO_LIBC static void wide_advance(wide_state *state, const wide_front *front, const wide_command *command)
+WIDE_CODE WIDE_TOGETHER WIDE_NO_LIBC static void wide_advance(wide_state *state, const wide_front *front, const wide_command *command)
 {
     const double v0 = state->soft_cap + 0.016500000000000004;
     const uint32_t f1 = wide_flag(v0 > 0.68);
@@ -743,7 +745,7 @@ WIDE_CODE WIDE_NO_LIBC static void wide_advance(wide_state *state, const wide_fr
     state->previous_command = command->duty;
     state->soft_cap = v3;
     state->bad_count = front->bad_count & ((uint32_t)0 - front->sound);
-    state->primed = front->usable | ((front->sound ^ (uint32_t)1) << 1);
+    state->primed = (front->usable + (uint32_t)2) - (front->sound << 1);
 }
 
 /*

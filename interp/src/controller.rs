@@ -10,6 +10,7 @@ use crate::mapping::Mapping;
 use crate::network::{Layer, argmax};
 use crate::real::Real;
 use crate::sanitise::{InputError, Sample, Signal};
+use crate::sound::Sound;
 use crate::state::{Coefficients, State};
 use crate::status;
 use crate::trace::{Command, FeatureTrace, LayerTrace, Trace};
@@ -28,6 +29,7 @@ pub struct Controller<T> {
     fallback: T,
     /// K: bad steps bridged.
     hold: u32,
+    sound: Sound<T>,
     state_names: Vec<String>,
     state: State<T>,
 }
@@ -57,7 +59,7 @@ impl<T: Real> Controller<T> {
             soft_cap: limits.soft_start.map(|soft| soft.from),
             mapping: mapping.as_ref().map(|mapping| mapping.initial),
             bad_count: 0,
-            primed: false,
+            primed: 0,
         };
         Self {
             state_names: state_names(policy, &features, &state),
@@ -70,6 +72,7 @@ impl<T: Real> Controller<T> {
             initial_duty,
             fallback: T::nearest(policy.fallback.duty),
             hold: policy.fallback.hold,
+            sound: Sound::new(policy),
             state,
         }
     }
@@ -84,7 +87,7 @@ impl<T: Real> Controller<T> {
             soft_cap: self.limits.soft_start.map(|soft| soft.from),
             mapping: self.state.mapping,
             bad_count: 0,
-            primed: false,
+            primed: 0,
         };
     }
 
@@ -227,6 +230,7 @@ impl<T: Real> Controller<T> {
             bad_count: 0,
             expired: false,
             usable: false,
+            sound: false,
             primed: false,
             features: self
                 .features
@@ -271,12 +275,15 @@ impl<T: Real> Controller<T> {
         }
         trace.bad_count = if trace.all_valid {
             0
+        } else if state.bad_count <= self.hold {
+            state.bad_count + 1
         } else {
-            state.bad_count.saturating_add(1).min(self.hold.saturating_add(1))
+            state.bad_count
         };
         trace.expired = trace.bad_count > self.hold;
-        trace.primed = state.primed;
-        trace.usable = trace.all_valid || (state.primed && !trace.expired);
+        trace.primed = state.primed & 1 == 1;
+        trace.sound = self.sound.holds(state, self.mapping.as_ref());
+        trace.usable = trace.sound && (trace.all_valid || (trace.primed && !trace.expired));
 
         let inputs = Inputs {
             signals: &trace.signals,
@@ -284,7 +291,7 @@ impl<T: Real> Controller<T> {
             previous_command: state.previous_command,
         };
         for (feature, feature_trace) in self.features.iter().zip(&mut trace.features) {
-            feature.filter(inputs, &state.memory, state.primed, feature_trace);
+            feature.filter(inputs, &state.memory, trace.primed, feature_trace);
         }
         Ok(())
     }
@@ -331,7 +338,9 @@ impl<T: Real> Controller<T> {
         trace.limited = limited.limited;
         trace.computed_status = bits;
         let action_index = trace.action_index;
-        trace.command = if trace.usable {
+        // what cannot come out of a sound state is no reason to command it
+        let is_number = self.limits.contains(limited.limited);
+        trace.command = if trace.usable && is_number {
             let held = if trace.all_valid { 0 } else { status::HELD };
             let primes = if trace.primed { 0 } else { status::PRIMED };
             Command {
@@ -344,8 +353,8 @@ impl<T: Real> Controller<T> {
             Command {
                 duty: self.fallback,
                 duty_sim: self.fallback,
-                action_index,
-                status: status::FALLBACK,
+                action_index: if trace.sound && is_number { action_index } else { 0 },
+                status: status::FALLBACK | if trace.sound && is_number { 0 } else { status::STATE },
             }
         };
     }
@@ -357,13 +366,16 @@ impl<T: Real> Controller<T> {
         for (feature, feature_trace) in self.features.iter().zip(&trace.features) {
             feature.push(&mut state.memory, trace.primed, feature_trace);
         }
+        if !trace.sound {
+            state.memory.fill(T::ZERO);
+        }
         state.previous_duty = command.duty_sim;
         state.previous_command = command.duty;
         if let (Some(soft), Some(cap)) = (self.limits.soft_start, state.soft_cap) {
             state.soft_cap = Some(self.limits.next_cap(soft, cap, trace.usable));
         }
-        state.bad_count = trace.bad_count;
-        state.primed = trace.usable;
+        state.bad_count = if trace.sound { trace.bad_count } else { 0 };
+        state.primed = if trace.sound { u32::from(trace.usable) } else { 2 };
     }
 }
 

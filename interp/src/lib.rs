@@ -5,7 +5,7 @@
 //!
 //! | section | module |
 //! |---|---|
-//! | 1 state | [`state`] |
+//! | 1 state | [`state`], `sound` |
 //! | 2 sanitise | `sanitise` |
 //! | 3, 4, 5 source, filters, observation | `feature`, `filter` |
 //! | 6, 7 network, argmax | `network`; in integers `integer` |
@@ -33,6 +33,7 @@ mod mapping;
 mod network;
 mod real;
 mod sanitise;
+mod sound;
 pub mod state;
 pub mod status;
 mod trace;

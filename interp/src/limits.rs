@@ -70,6 +70,11 @@ impl<T: Real> Limits<T> {
         }
     }
 
+    /// Whether a duty may leave the controller; false for NaN.
+    pub fn contains(&self, duty: T) -> bool {
+        self.duty.contains(duty)
+    }
+
     /// The cap for the next step (section 10).
     pub fn next_cap(&self, soft: SoftStart<T>, cap: T, usable: bool) -> T {
         let risen = cap + soft.increment;

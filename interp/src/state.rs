@@ -32,8 +32,8 @@ pub struct State<T> {
     pub mapping: Option<Coefficients<T>>,
     /// Consecutive bad steps, saturating at K + 1.
     pub bad_count: u32,
-    /// The filter memories hold samples.
-    pub primed: bool,
+    /// 1 if the filter memories hold samples, else 0; 2 after a state that was not sound.
+    pub primed: u32,
 }
 
 impl<T: Real> State<T> {
@@ -55,6 +55,6 @@ impl<T: Real> State<T> {
         for number in numbers.chain(self.soft_cap).chain(mapping.flatten()) {
             number.append_words(words);
         }
-        words.extend([self.bad_count, u32::from(self.primed)]);
+        words.extend([self.bad_count, self.primed]);
     }
 }

@@ -2,7 +2,7 @@
 
 /// A measurement was invalid and has been bridged with held samples.
 pub const HELD: u32 = 1 << 0;
-/// No usable measurement: the fallback duty is commanded; stands alone.
+/// The fallback duty is commanded: no usable measurement, or, with [`STATE`], no sound state. No other bit stands beside it.
 pub const FALLBACK: u32 = 1 << 1;
 /// This step primed the filters.
 pub const PRIMED: u32 = 1 << 2;
@@ -16,9 +16,11 @@ pub const SLEW_LIMITED: u32 = 1 << 5;
 pub const SOFT_START: u32 = 1 << 6;
 /// The duty limits were active.
 pub const LIMITED: u32 = 1 << 7;
+/// The state was not one that the controller can have written, or the duty was no number: fallback until a reset.
+pub const STATE: u32 = 1 << 8;
 
 /// Name of every bit, bit 0 first.
-pub const NAMES: [&str; 8] = [
+pub const NAMES: [&str; 9] = [
     "HELD",
     "FALLBACK",
     "PRIMED",
@@ -27,6 +29,7 @@ pub const NAMES: [&str; 8] = [
     "SLEW_LIMITED",
     "SOFT_START",
     "LIMITED",
+    "STATE",
 ];
 
 /// The bits of `status` as `A | B`, or `-` if none is set. Bits without a name appear as a hexadecimal number.
@@ -56,6 +59,6 @@ mod tests {
     fn names_list_the_bits_that_are_set() {
         assert_eq!(names(0), "-");
         assert_eq!(names(HELD | LIMITED), "HELD | LIMITED");
-        assert_eq!(names(PRIMED | 0x100), "PRIMED | 0x100");
+        assert_eq!(names(PRIMED | 0x200), "PRIMED | 0x200");
     }
 }

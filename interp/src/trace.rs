@@ -67,6 +67,8 @@ pub struct Trace<T> {
     pub expired: bool,
     /// The action of this step is applied; otherwise the fallback (2.5).
     pub usable: bool,
+    /// The state was one that the controller can have written (1).
+    pub sound: bool,
     /// The state was primed on entry.
     pub primed: bool,
     /// Per feature (3 to 5).

@@ -128,3 +128,28 @@ fn state_words_have_the_order_of_the_contract() {
     assert_eq!(words[..6], [3.0, 1.0, 3.0, 1.0, 0.0, 1.0].map(f32::to_bits));
     assert_eq!(words[12..], [0, 1]);
 }
+
+#[test]
+fn a_coefficient_that_has_become_no_number_is_answered_with_the_fallback_until_init() {
+    let fallback = |c: &mut Controller<f32>| {
+        let command = c.step(&[Physical(9.0), Physical(2.0)]).unwrap().command;
+        (command.duty, command.duty_sim, command.action_index, command.status)
+    };
+    let damaged = (0.0625, 0.0625, 0, status::FALLBACK | status::STATE);
+    for a in [f32::NAN, f32::INFINITY, 0.25_f32.next_down(), 2.0_f32.next_up(), -0.5] {
+        let mut c = mapped(THREE_TERMS);
+        c.step(&[Physical(9.0), Physical(2.0)]).unwrap();
+        let mut state = c.state().clone();
+        if let Some(mapping) = &mut state.mapping {
+            mapping.a = a;
+        }
+        assert!(c.restore(&state));
+        assert_eq!(fallback(&mut c), damaged, "{a}");
+        assert_eq!(c.state().primed, 2);
+        // the state is sound again but for the mark
+        assert!(c.set_mapping(0.5, 0.0625, 0.125, None));
+        assert_eq!(fallback(&mut c), damaged, "{a}: it stays visible");
+        c.reset();
+        assert_eq!(fallback(&mut c).3, status::PRIMED, "{a}");
+    }
+}

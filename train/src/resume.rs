@@ -186,6 +186,6 @@ fn read_state(from: &mut Reader<'_>) -> Result<State<f32>, Error> {
         soft_cap,
         mapping,
         bad_count: u32::try_from(from.u64()?).map_err(|_| other())?,
-        primed: from.u64()? != 0,
+        primed: u32::try_from(from.u64()?).map_err(|_| other())?,
     })
 }

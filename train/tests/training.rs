@@ -166,7 +166,7 @@ fn a_checkpoint_of_another_training_is_refused() {
             .resume(&bytes[1..])
             .unwrap_err()
             .to_string()
-            .contains("not a checkpoint")
+            .contains("this is not one of policyc")
     );
 }
 

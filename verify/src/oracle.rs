@@ -25,7 +25,7 @@ pub struct Chunk {
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Coverage {
     /// Steps with each status bit, bit 0 first (see [`interp::status::NAMES`]).
-    pub status_bits: [u64; 8],
+    pub status_bits: [u64; 9],
     /// Steps in which each action was chosen.
     pub actions: Vec<u64>,
     /// Attempts to replace the mapping coefficients that were accepted.

@@ -2,7 +2,7 @@
 
 use policy::{Mapping, Policy, Scalar};
 
-use crate::program::{Advance, Block, Coefficient, Decide, Literal, Op, ValueId};
+use crate::program::{Advance, Block, Coefficient, Decide, Literal, Op, ValueId, Within};
 
 /// One bit of the status word.
 #[derive(Debug, Clone, Copy)]
@@ -16,15 +16,24 @@ pub struct StatusBit {
 }
 
 /// The status word (contract section 9).
-pub const STATUS: [StatusBit; 8] = [
+pub const STATUS: [StatusBit; 9] = [
     status_bit("HELD", 0, "Held samples bridge an invalid measurement."),
-    status_bit("FALLBACK", 1, "No usable measurement: the fallback duty is commanded."),
+    status_bit(
+        "FALLBACK",
+        1,
+        "The fallback duty is commanded: no usable measurement, or no sound state.",
+    ),
     status_bit("PRIMED", 2, "This step primed the filters."),
     status_bit("CLIPPED", 3, "An observation was clipped."),
     status_bit("MAPPING_RANGE", 4, "Outside the mapping's validity range."),
     status_bit("SLEW_LIMITED", 5, "The slew limit was active."),
     status_bit("SOFT_START", 6, "The soft start was active."),
     status_bit("LIMITED", 7, "A duty limit was active."),
+    status_bit(
+        "STATE",
+        8,
+        "The state was damaged: the fallback duty is commanded until init or reset.",
+    ),
 ];
 
 const fn status_bit(name: &'static str, number: u32, meaning: &'static str) -> StatusBit {
@@ -72,14 +81,18 @@ pub fn decide(policy: &Policy) -> Decide {
             otherwise: duty,
         });
     }
-    let (low, high) = Literal::inward(scalar, policy.limits.duty);
-    let (low, high) = (block.constant(low), block.constant(high));
+    let range = Literal::inward(scalar, policy.limits.duty);
+    let (low, high) = (block.constant(range.0), block.constant(range.1));
     let limited = block.value(Op::Clamp { x: duty, low, high });
     status.push((bit("LIMITED"), changed(&mut block, duty, limited)));
     duty = limited;
     Decide {
         block,
         duty,
+        within: Within::of(
+            scalar,
+            (Literal::exact(f64::NEG_INFINITY), Literal::exact(f64::INFINITY)),
+        ),
         duty_sim,
         status,
     }

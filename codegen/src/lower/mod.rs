@@ -2,6 +2,7 @@
 
 pub mod command;
 mod front;
+mod guard;
 mod integer;
 pub mod known_answers;
 mod loops;
@@ -45,6 +46,7 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
         .map(|signal| signal_port(scalar, signal))
         .collect();
     let mapping = policy.mapping.as_ref().map(|map| mapping(scalar, map));
+    let guard = guard::lower(policy, &signals, mapping.as_ref());
     let state = state::members(policy, &signals, memory_words, mapping.as_ref());
     Program {
         name: policy.name.clone(),
@@ -78,6 +80,7 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
         duties,
         mapping,
         decide: command::decide(policy),
+        guard,
         advance: command::advance(policy),
         state,
         fallback_duty: Literal::nearest(scalar, policy.fallback.duty),

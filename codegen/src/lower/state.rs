@@ -44,7 +44,7 @@ pub fn members(
     members.push(member("bad_count", meaning, StateValue::Word));
     members.push(member(
         "primed",
-        "1 once the filters hold good samples",
+        "1 once the filters hold good samples, 2 after a damaged state",
         StateValue::Word,
     ));
     members

@@ -9,6 +9,7 @@
 //! A block is straight-line code: a backend prints its values one after the other. The network is a tree of a few kinds of
 //! loops which walk the tables from end to end; a backend prints the nodes, and the known answers are computed on them.
 
+mod guard;
 mod literal;
 mod loops;
 mod ops;
@@ -17,6 +18,7 @@ mod tables;
 use policy::{Digests, NumericFormat, Scalar};
 use targets::Widths;
 
+pub use guard::{Guard, Guarded, Place, Within};
 pub use literal::Literal;
 pub(crate) use literal::words;
 pub use loops::{Add, Arithmetic, Buffer, Cut, From, Inner, IntegerCode, IntegerInput, Kept, Layer, Loop};
@@ -84,6 +86,8 @@ pub struct Program {
     pub mapping: Option<MappingCode>,
     /// Chosen duty to command.
     pub decide: Decide,
+    /// What a sound state lies within.
+    pub guard: Guard,
     /// Memory of the command path.
     pub advance: Advance,
     /// State, in contract order.

@@ -1,5 +1,6 @@
 //! The straight-line part of a step: operations, and the three blocks around the network.
 
+use super::guard::Within;
 use super::literal::Literal;
 
 /// Index of a value within its block.
@@ -260,12 +261,14 @@ pub struct Front {
 }
 
 /// Chosen duty to command.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Decide {
     /// Straight-line code.
     pub block: Block,
     /// Commanded duty if usable.
     pub duty: ValueId,
+    /// What the commanded duty lies within, if it is a number.
+    pub within: Within,
     /// Duty before the mapping if usable.
     pub duty_sim: ValueId,
     /// Status bit number and its flag, for usable steps.

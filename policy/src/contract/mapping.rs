@@ -95,7 +95,7 @@ pub(crate) fn read(document: &Document, load_current: usize, faults: &mut Sink) 
     (faults.count() == before).then_some(mapping)
 }
 
-/// `[adjust] key`, or the default; the coefficient must lie inside, in binary32 as well, and `a` stay above 0.
+/// `[adjust] key`, or the default; the coefficient must lie inside, as it stands and in binary32, and `a` stay above 0.
 fn adjustable(
     adjust: &mut Option<Table<'_>>,
     key: &'static str,
@@ -113,7 +113,7 @@ fn adjustable(
         return None;
     }
     if let Some(x) = coefficient
-        && !(low..=high).contains(&nearest_f32(x))
+        && !((low..=high).contains(&nearest_f32(x)) && (interval.low..=interval.high).contains(&x))
     {
         let name = "its [adjust] interval";
         faults.push(value.fault(catalogue::outside(key, x, name, interval.low, interval.high)));
@@ -135,10 +135,8 @@ fn without_r(adjust: &mut Option<Table<'_>>, faults: &mut Sink) -> bool {
 
 /// The mapping must rise with d_sim at both ends of i_out, computed as the controller computes it.
 fn rising(mapping: &Mapping, at: Option<&toml_input::Value<'_>>, faults: &mut Sink) {
-    let (Some(r), Some((low, high))) = (mapping.coefficients.r, inward_f32(mapping.valid_i_out)) else {
-        return;
-    };
-    for i_out in [low, high] {
+    let Some(r) = mapping.coefficients.r else { return };
+    for i_out in [mapping.valid_i_out.low, mapping.valid_i_out.high].map(nearest_f32) {
         let slope = nearest_f32(mapping.coefficients.a) + nearest_f32(r) * i_out;
         if slope.is_nan() || slope <= 0.0 {
             let message = catalogue::not_increasing(f64::from(i_out), f64::from(slope));

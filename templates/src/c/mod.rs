@@ -228,6 +228,14 @@ pub struct Source {
     pub decide: Vec<String>,
     /// Value of the duty in a usable step.
     pub duty: String,
+    /// Word whose sign bit is set if that is not within the limits.
+    pub duty_stray: String,
+    /// Terms of a word whose sign bit is set if the state is not sound.
+    pub guard: Vec<String>,
+    /// Conditions that are 1 if it is.
+    pub guard_conditions: Vec<String>,
+    /// Largest count of bad steps.
+    pub most_bad: String,
     /// Terms of the status word.
     pub status_terms: Vec<String>,
     /// Declarations of `advance`.

@@ -1,5 +1,6 @@
 //! C99 that also compiles as C90 with `stdint.h` and as C++: one header, one source.
 
+mod guard;
 mod integer;
 pub(super) mod number;
 mod real;
@@ -206,6 +207,10 @@ fn source(program: &Program) -> Source {
         valid: sense.operand(front.all_valid),
         clipped: front.clipped.map(|flag| sense.operand(flag)),
         duty: decide.operand(program.decide.duty),
+        duty_stray: guard::stray(program, &decide.operand(program.decide.duty), program.decide.within),
+        guard: guard::terms(program),
+        guard_conditions: guard::conditions(program),
+        most_bad: unsigned(program.guard.bad_count),
         status_terms: bits
             .map(|(bit, flag)| format!("({} << {bit})", decide.operand(*flag)))
             .collect(),

@@ -88,7 +88,7 @@ impl<'p> Printer<'p> {
             Op::Coefficient(name) => format!("state->mapping_{}", name.name()),
             Op::ChosenDuty => "chosen".into(),
             Op::Constant(literal) => number::number(self.program.scalar(), *literal),
-            Op::Primed => "state->primed".into(),
+            Op::Primed => "state->primed & 1u".into(),
             Op::Usable => "front->usable".into(),
             Op::Clipped => "front->clipped".into(),
             Op::HeldSample => "front->held".into(),

@@ -7,7 +7,7 @@ use quote::quote;
 use super::number::{self, number};
 use super::statements::{Printer, coefficient_field};
 use super::tokens::{ident, size, word};
-use super::{integrity, network, tables};
+use super::{guard, integrity, network, tables};
 use crate::lower::known_answers::{LCG, SEED, UNIT, VECTORS};
 use crate::program::{Coefficient, Element, Literal, Program, StateMember, StateValue};
 
@@ -20,6 +20,7 @@ pub fn items(program: &Program, name: &Ident) -> TokenStream {
     let front = front(program);
     let lifecycle = lifecycle(program);
     let sense = sense(program);
+    let sound = guard::method(program);
     let decide = decide(program);
     let advance = advance(program);
     let (eval, step) = bodies(program);
@@ -45,8 +46,8 @@ pub fn items(program: &Program, name: &Ident) -> TokenStream {
             }
             /// Advances the filters by one sample period, with the command that `eval` gave for this measurement.
             pub fn commit(&mut self, measured: &Measurement, command: &Command) {
-                let front = self.sense(measured);
-                self.advance(&front, command);
+                let (front, sound) = self.guarded(measured);
+                self.advance(&front, sound, command);
             }
             /// `eval` and `commit`.
             pub fn step(&mut self, measured: &Measurement) -> Command {
@@ -64,6 +65,16 @@ pub fn items(program: &Program, name: &Ident) -> TokenStream {
             }
             #set_mapping
             #sense
+            #sound
+            /// [`Self::sense`], and what a damaged state forbids.
+            #[inline(always)]
+            fn guarded(&self, measured: &Measurement) -> (Front, u32) {
+                // first, so that no number of the measurement waits for it on the stack
+                let sound = self.sound();
+                let mut front = self.sense(measured);
+                front.usable &= sound;
+                (front, sound)
+            }
             #decide
             #advance
             #checks
@@ -82,7 +93,8 @@ fn bodies(program: &Program) -> (TokenStream, TokenStream) {
         return (
             quote! {
                 let chosen = self.choose_for(measured);
-                self.decide(&self.sense(measured), chosen)
+                let (front, sound) = self.guarded(measured);
+                self.decide(&front, sound, chosen)
             },
             quote! {
                 let chosen = self.choose_for(measured);
@@ -92,13 +104,13 @@ fn bodies(program: &Program) -> (TokenStream, TokenStream) {
     }
     (
         quote! {
-            let front = self.sense(measured);
-            self.decide(&front, Self::choose(&front.observation))
+            let (front, sound) = self.guarded(measured);
+            self.decide(&front, sound, Self::choose(&front.observation))
         },
         quote! {
-            let front = self.sense(measured);
-            let command = self.decide(&front, Self::choose(&front.observation));
-            self.advance(&front, &command);
+            let (front, sound) = self.guarded(measured);
+            let command = self.decide(&front, sound, Self::choose(&front.observation));
+            self.advance(&front, sound, &command);
             command
         },
     )
@@ -237,6 +249,11 @@ fn decide(program: &Program) -> TokenStream {
         quote!((#flag << #bit))
     });
     let fallback = number(program.scalar(), program.fallback_duty);
+    let stray = guard::stray(program.scalar(), &duty, decide.within);
+    let (top, narrowed) = match program.scalar() {
+        Scalar::F32 => (quote!(31), TokenStream::new()),
+        Scalar::F64 => (quote!(63), quote!(as u32)),
+    };
     let kind = number::kind(program.scalar());
     let (lowest, greater) = network::argmax(program);
     let apart = program.senses_again.then(|| {
@@ -249,9 +266,9 @@ fn decide(program: &Program) -> TokenStream {
             /// What a step does behind the network.
             #[inline(never)]
             fn settle(&mut self, measured: &Measurement, chosen: (u32, #kind)) -> Command {
-                let front = self.sense(measured);
-                let command = self.decide(&front, chosen);
-                self.advance(&front, &command);
+                let (front, sound) = self.guarded(measured);
+                let command = self.decide(&front, sound, chosen);
+                self.advance(&front, sound, &command);
                 command
             }
         }
@@ -278,15 +295,19 @@ fn decide(program: &Program) -> TokenStream {
         }
         /// Mapping, limits, status.
         #[inline(always)]
-        fn decide(&self, front: &Front, (action_index, chosen): (u32, #kind)) -> Command {
+        fn decide(&self, front: &Front, sound: u32, (action_index, chosen): (u32, #kind)) -> Command {
             #(#statements)*
-            let usable = front.usable;
+            let stray = #stray;
+            let trusted = sound & !((stray >> #top) #narrowed);
+            let usable = front.usable & trusted;
             let status = #(#terms)|*;
             Command {
                 duty: select(usable, #duty, #fallback),
                 duty_sim: select(usable, chosen, #fallback),
-                action_index,
-                status: (status & 0_u32.wrapping_sub(usable)) | (status::FALLBACK & usable.wrapping_sub(1)),
+                action_index: action_index & 0_u32.wrapping_sub(trusted),
+                status: (status & 0_u32.wrapping_sub(usable))
+                    | (status::FALLBACK & usable.wrapping_sub(1))
+                    | (status::STATE & trusted.wrapping_sub(1)),
             }
         }
     }
@@ -303,12 +324,13 @@ fn advance(program: &Program) -> TokenStream {
         let (first, last, length) = (size(push.word), size(push.word + push.length - 1), size(push.length));
         let index = size(index);
         if push.length == 1 {
-            return quote! { self.memory[#last] = front.push[#index]; };
+            return quote! { self.memory[#last] = select(sound, front.push[#index], 0.0); };
         }
         quote! {
-            let mut moved = front.push[#index];
+            let pushed = select(sound, front.push[#index], 0.0);
+            let mut moved = pushed;
             for word in self.memory.iter_mut().skip(#first).take(#length).rev() {
-                let before = select(self.primed, *word, front.push[#index]);
+                let before = select(self.primed & sound, *word, pushed);
                 *word = moved;
                 moved = before;
             }
@@ -317,15 +339,15 @@ fn advance(program: &Program) -> TokenStream {
     quote! {
         /// Filters, held samples and counters move on by one sample period.
         #[inline(always)]
-        fn advance(&mut self, front: &Front, command: &Command) {
+        fn advance(&mut self, front: &Front, sound: u32, command: &Command) {
             #(#statements)*
             #(#pushes)*
             #soft_cap
             self.held = front.signal;
             self.previous_duty = command.duty_sim;
             self.previous_command = command.duty;
-            self.bad_count = front.bad_count;
-            self.primed = front.usable;
+            self.bad_count = front.bad_count & 0_u32.wrapping_sub(sound);
+            self.primed = front.usable.wrapping_add(2).wrapping_sub(sound << 1);
         }
     }
 }

@@ -3,6 +3,7 @@
 #[cfg(all(feature = "c", feature = "rust-text"))]
 pub mod bindings;
 mod controller;
+mod guard;
 mod integer;
 mod integer_loops;
 mod integrity;

@@ -83,7 +83,7 @@ impl<'p> Printer<'p> {
             }
             Op::ChosenDuty => quote!(chosen),
             Op::Constant(literal) => number(self.program.scalar(), *literal),
-            Op::Primed => quote!(self.primed),
+            Op::Primed => quote!(self.primed & 1),
             Op::Usable => quote!(front.usable),
             Op::Clipped => quote!(front.clipped),
             Op::HeldSample => quote!(front.held),
@@ -161,6 +161,7 @@ pub fn helpers(program: &Program) -> TokenStream {
     let scalar = program.scalar();
     let number = number::kind(scalar);
     let mask = number::bits(scalar).mask;
+    let comparisons = super::guard::helpers(scalar);
     let lines = rust_lines(&Rust::of(program));
     quote! {
         /// A condition as 0 or 1. The optimiser must not know that: it would turn selections back into branches.
@@ -178,12 +179,12 @@ pub fn helpers(program: &Program) -> TokenStream {
         #[inline(always)]
         #[allow(dead_code)]
         fn within(x: #number, low: #number, high: #number) -> u32 {
-            flag(x >= low) & flag(x <= high)
+            flag((x >= low) & (x <= high))
         }
         #[inline(always)]
         #[allow(dead_code)]
         fn outside(x: #number, low: #number, high: #number) -> u32 {
-            flag(x < low) | flag(x > high)
+            flag((x < low) | (x > high))
         }
         #[inline(always)]
         #[allow(dead_code)]
@@ -202,5 +203,6 @@ pub fn helpers(program: &Program) -> TokenStream {
             sum + newest
         }
         #lines
+        #comparisons
     }
 }

@@ -21,7 +21,7 @@ pub const SAMPLE_PERIOD: f64 = 0.0001;
 pub mod status {
     /// Held samples bridge an invalid measurement.
     pub const HELD: u32 = 1;
-    /// No usable measurement: the fallback duty is commanded.
+    /// The fallback duty is commanded: no usable measurement, or no sound state.
     pub const FALLBACK: u32 = 2;
     /// This step primed the filters.
     pub const PRIMED: u32 = 4;
@@ -35,6 +35,8 @@ pub mod status {
     pub const SOFT_START: u32 = 64;
     /// A duty limit was active.
     pub const LIMITED: u32 = 128;
+    /// The state was damaged: the fallback duty is commanded until init or reset.
+    pub const STATE: u32 = 256;
 }
 /// One sample of every signal.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -49,15 +49,17 @@
 #endif
 
 /*
- * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
- * fast; helpers that this build may not need.
+ * Functions that are there once and share no stack frame with their caller; functions that are part of it; functions off
+ * the control path: small before fast; helpers that this build may not need.
  */
 #if defined(__GNUC__)
 #define ACTIVATIONS_APART __attribute__((noinline))
+#define ACTIVATIONS_TOGETHER __inline__ __attribute__((always_inline))
 #define ACTIVATIONS_COLD __attribute__((cold))
 #define ACTIVATIONS_SPARE __attribute__((unused))
 #else
 #define ACTIVATIONS_APART
+#define ACTIVATIONS_TOGETHER
 #define ACTIVATIONS_COLD
 #define ACTIVATIONS_SPARE
 #endif
@@ -227,6 +229,34 @@ ACTIVATIONS_CODE ACTIVATIONS_APART static float activations_clamp(float x, float
 #endif
 }
 
+/* The sign bit is set if |x| is above the number with these bits. Integers: a comparison of floats costs more, and a NaN is above. */
+ACTIVATIONS_SPARE static uint32_t activations_far(float x, uint32_t bound)
+{
+    return bound - (activations_bits(x) & 0x7FFFFFFFu);
+}
+
+/* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
+ACTIVATIONS_SPARE static uint32_t activations_aside(float x, uint32_t difference, uint32_t high)
+{
+    return activations_far(x, high ^ (difference & ((uint32_t)0 - (activations_bits(x) >> 31))));
+}
+
+/* The sign bit is set if x is not among the numbers from the one with the bits low on. */
+ACTIVATIONS_SPARE static uint32_t activations_beyond(float x, uint32_t low, uint32_t width)
+{
+    const uint32_t above = activations_bits(x) - low;
+    return above | (width - above);
+}
+
+ACTIVATIONS_SPARE static uint32_t activations_line_far(const float *line, uint32_t length, uint32_t bound)
+{
+    uint32_t i;
+    uint32_t stray = 0u;
+    for (i = 0u; i < length; ++i) {
+        stray |= activations_far(line[i], bound);
+    }
+    return stray;
+}
 /* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
 static float activations_relu(float x)
 {
@@ -275,6 +305,7 @@ typedef struct {
     float signal[1]; /* sanitised */
     float observation[3]; /* network input */
     uint32_t bad_count; /* including this step */
+    uint32_t sound; /* 1 if the state is one that the controller can have written */
     uint32_t usable; /* 1 if the network decides */
     uint32_t held; /* 1 if a held sample bridges an invalid one */
     uint32_t primed_now; /* 1 if this step primes the filters */
@@ -302,6 +333,18 @@ ACTIVATIONS_CODE ACTIVATIONS_APART static void activations_sense(const activatio
     front->usable = usable;
     front->held = usable & (f0 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
+}
+
+/* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
+ACTIVATIONS_CODE ACTIVATIONS_TOGETHER static void activations_guard(const activations_state *state, activations_front *front)
+{
+    const uint32_t stray = activations_aside(state->held[0], 0x41C00000u, 0x41C00000u)
+                         | activations_aside(state->previous_duty, 0x3F19999Au, 0x3F19999Au)
+                         | activations_aside(state->previous_command, 0x3F800000u, 0x3F800000u);
+    const uint32_t counters = (6u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
+    const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1);
+    front->sound = sound;
+    front->usable &= sound;
 }
 
 /* Sums side by side in vectors, each one in the order written; the width is that of the machine the compiler is told of. */
@@ -666,26 +709,29 @@ ACTIVATIONS_CODE ACTIVATIONS_APART static uint32_t activations_choose(const acti
 }
 
 /* Mapping, limits, status. */
-ACTIVATIONS_CODE static void activations_decide(const activations_state *state, const activations_front *front, uint32_t index, activations_command *command)
+ACTIVATIONS_CODE ACTIVATIONS_TOGETHER static void activations_decide(const activations_state *state, const activations_front *front, uint32_t index, activations_command *command)
 {
     const float chosen = activations_duties[index];
     const float v0 = activations_clamp(chosen, 0.0f, 1.0f);
     const uint32_t f1 = activations_bits(chosen) ^ activations_bits(v0);
     const uint32_t f2 = activations_flag(f1 != 0u);
-    const uint32_t usable = front->usable;
+    const uint32_t stray = activations_far(v0, 0x7F800000u);
+    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
+    const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
                           | (f2 << 7);
 
     command->duty = activations_select(usable, v0, 0.0f);
     command->duty_sim = activations_select(usable, chosen, 0.0f);
-    command->action_index = index;
-    command->status = (status & ((uint32_t)0 - usable)) | (ACTIVATIONS_STATUS_FALLBACK & (usable - (uint32_t)1));
+    command->action_index = index & ((uint32_t)0 - trusted);
+    command->status = (status & ((uint32_t)0 - usable)) | (ACTIVATIONS_STATUS_FALLBACK & (usable - (uint32_t)1))
+                    | (ACTIVATIONS_STATUS_STATE & (trusted - (uint32_t)1));
     (void)state;
 }
 
 /* Filters, held samples and counters move on by one sample period. */
-ACTIVATIONS_CODE ACTIVATIONS_NO_LIBC static void activations_advance(activations_state *state, const activations_front *front, const activations_command *command)
+ACTIVATIONS_CODE ACTIVATIONS_TOGETHER ACTIVATIONS_NO_LIBC static void activations_advance(activations_state *state, const activations_front *front, const activations_command *command)
 {
     uint32_t i;
     for (i = 0u; i < ACTIVATIONS_SIGNALS; ++i) {
@@ -693,8 +739,8 @@ ACTIVATIONS_CODE ACTIVATIONS_NO_LIBC static void activations_advance(activations
     }
     state->previous_duty = command->duty_sim;
     state->previous_command = command->duty;
-    state->bad_count = front->bad_count;
-    state->primed = front->usable;
+    state->bad_count = front->bad_count & ((uint32_t)0 - front->sound);
+    state->primed = (front->usable + (uint32_t)2) - (front->sound << 1);
 }
 
 /*
@@ -705,6 +751,7 @@ ACTIVATIONS_CODE ACTIVATIONS_APART static void activations_answer(const activati
 {
     activations_front front;
     activations_sense(state, measured, &front);
+    activations_guard(state, &front);
     activations_decide(state, &front, index, command);
 }
 
@@ -712,6 +759,7 @@ ACTIVATIONS_CODE ACTIVATIONS_APART static void activations_settle(activations_st
 {
     activations_front front;
     activations_sense(state, measured, &front);
+    activations_guard(state, &front);
     activations_decide(state, &front, index, command);
     activations_advance(state, &front, command);
 }
@@ -726,6 +774,7 @@ ACTIVATIONS_CODE void activations_commit(activations_state *state, const activat
 {
     activations_front front;
     activations_sense(state, measured, &front);
+    activations_guard(state, &front);
     activations_advance(state, &front, command);
 }
 

@@ -49,15 +49,17 @@
 #endif
 
 /*
- * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
- * fast; helpers that this build may not need.
+ * Functions that are there once and share no stack frame with their caller; functions that are part of it; functions off
+ * the control path: small before fast; helpers that this build may not need.
  */
 #if defined(__GNUC__)
 #define ADC_MAPPING_APART __attribute__((noinline))
+#define ADC_MAPPING_TOGETHER __inline__ __attribute__((always_inline))
 #define ADC_MAPPING_COLD __attribute__((cold))
 #define ADC_MAPPING_SPARE __attribute__((unused))
 #else
 #define ADC_MAPPING_APART
+#define ADC_MAPPING_TOGETHER
 #define ADC_MAPPING_COLD
 #define ADC_MAPPING_SPARE
 #endif
@@ -218,6 +220,34 @@ ADC_MAPPING_CODE ADC_MAPPING_APART static float adc_mapping_clamp(float x, float
 #endif
 }
 
+/* The sign bit is set if |x| is above the number with these bits. Integers: a comparison of floats costs more, and a NaN is above. */
+ADC_MAPPING_SPARE static uint32_t adc_mapping_far(float x, uint32_t bound)
+{
+    return bound - (adc_mapping_bits(x) & 0x7FFFFFFFu);
+}
+
+/* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
+ADC_MAPPING_SPARE static uint32_t adc_mapping_aside(float x, uint32_t difference, uint32_t high)
+{
+    return adc_mapping_far(x, high ^ (difference & ((uint32_t)0 - (adc_mapping_bits(x) >> 31))));
+}
+
+/* The sign bit is set if x is not among the numbers from the one with the bits low on. */
+ADC_MAPPING_SPARE static uint32_t adc_mapping_beyond(float x, uint32_t low, uint32_t width)
+{
+    const uint32_t above = adc_mapping_bits(x) - low;
+    return above | (width - above);
+}
+
+ADC_MAPPING_SPARE static uint32_t adc_mapping_line_far(const float *line, uint32_t length, uint32_t bound)
+{
+    uint32_t i;
+    uint32_t stray = 0u;
+    for (i = 0u; i < length; ++i) {
+        stray |= adc_mapping_far(line[i], bound);
+    }
+    return stray;
+}
 /* x limited to the magnitude with these bits, in integers so that loops over it can be vectorised */
 static float adc_mapping_limit(float x, uint32_t limit)
 {
@@ -250,6 +280,7 @@ typedef struct {
     float signal[2]; /* sanitised */
     float observation[3]; /* network input */
     uint32_t bad_count; /* including this step */
+    uint32_t sound; /* 1 if the state is one that the controller can have written */
     uint32_t usable; /* 1 if the network decides */
     uint32_t held; /* 1 if a held sample bridges an invalid one */
     uint32_t primed_now; /* 1 if this step primes the filters */
@@ -295,6 +326,25 @@ ADC_MAPPING_CODE ADC_MAPPING_APART static void adc_mapping_sense(const adc_mappi
     front->held = usable & (f8 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
     front->clipped = f20;
+}
+
+/* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
+ADC_MAPPING_CODE ADC_MAPPING_TOGETHER static void adc_mapping_guard(const adc_mapping_state *state, adc_mapping_front *front)
+{
+    const uint32_t stray = adc_mapping_aside(state->held[0], 0x41A00000u, 0x41A00000u)
+                         | adc_mapping_aside(state->held[1], 0x01000000u, 0x41800000u)
+                         | adc_mapping_aside(state->previous_command, 0x3F666666u, 0x3F666666u)
+                         | adc_mapping_beyond(state->soft_cap, 0x3DCCCCCDu, 0x01999999u)
+                         | adc_mapping_beyond(state->mapping_a, 0x3F4CCCCDu, 0x00533333u)
+                         | adc_mapping_far(state->mapping_b, 0x3CA3D70Au)
+                         | adc_mapping_far(state->mapping_c, 0x3DCCCCCCu)
+                         | adc_mapping_far(state->mapping_r, 0x3C23D70Au);
+    const uint32_t counters = (5u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
+    const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1)
+                         & adc_mapping_flag((state->mapping_a + (state->mapping_r * -1.0f)) > 0.0f)
+                         & adc_mapping_flag((state->mapping_a + (state->mapping_r * 14.0f)) > 0.0f);
+    front->sound = sound;
+    front->usable &= sound;
 }
 
 /* Sums side by side in vectors, each one in the order written; the width is that of the machine the compiler is told of. */
@@ -530,7 +580,7 @@ ADC_MAPPING_CODE ADC_MAPPING_APART static uint32_t adc_mapping_choose(const adc_
 }
 
 /* Mapping, limits, status. */
-ADC_MAPPING_CODE static void adc_mapping_decide(const adc_mapping_state *state, const adc_mapping_front *front, uint32_t index, adc_mapping_command *command)
+ADC_MAPPING_CODE ADC_MAPPING_TOGETHER static void adc_mapping_decide(const adc_mapping_state *state, const adc_mapping_front *front, uint32_t index, adc_mapping_command *command)
 {
     const float chosen = adc_mapping_duties[index];
     const float v0 = state->mapping_a * chosen;
@@ -553,7 +603,9 @@ ADC_MAPPING_CODE static void adc_mapping_decide(const adc_mapping_state *state, 
     const float v17 = adc_mapping_clamp(v16, 0.05f, 0.9f);
     const uint32_t f18 = adc_mapping_bits(v16) ^ adc_mapping_bits(v17);
     const uint32_t f19 = adc_mapping_flag(f18 != 0u);
-    const uint32_t usable = front->usable;
+    const uint32_t stray = adc_mapping_far(v17, 0x7F800000u);
+    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
+    const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
                           | (front->clipped << 3)
@@ -564,12 +616,13 @@ ADC_MAPPING_CODE static void adc_mapping_decide(const adc_mapping_state *state, 
 
     command->duty = adc_mapping_select(usable, v17, 0.0f);
     command->duty_sim = adc_mapping_select(usable, chosen, 0.0f);
-    command->action_index = index;
-    command->status = (status & ((uint32_t)0 - usable)) | (ADC_MAPPING_STATUS_FALLBACK & (usable - (uint32_t)1));
+    command->action_index = index & ((uint32_t)0 - trusted);
+    command->status = (status & ((uint32_t)0 - usable)) | (ADC_MAPPING_STATUS_FALLBACK & (usable - (uint32_t)1))
+                    | (ADC_MAPPING_STATUS_STATE & (trusted - (uint32_t)1));
 }
 
 /* Filters, held samples and counters move on by one sample period. */
-ADC_MAPPING_CODE ADC_MAPPING_NO_LIBC static void adc_mapping_advance(adc_mapping_state *state, const adc_mapping_front *front, const adc_mapping_command *command)
+ADC_MAPPING_CODE ADC_MAPPING_TOGETHER ADC_MAPPING_NO_LIBC static void adc_mapping_advance(adc_mapping_state *state, const adc_mapping_front *front, const adc_mapping_command *command)
 {
     const float v0 = state->soft_cap + 0.0016f;
     const uint32_t f1 = adc_mapping_flag(v0 > 0.9f);
@@ -582,8 +635,8 @@ ADC_MAPPING_CODE ADC_MAPPING_NO_LIBC static void adc_mapping_advance(adc_mapping
     state->previous_duty = command->duty_sim;
     state->previous_command = command->duty;
     state->soft_cap = v3;
-    state->bad_count = front->bad_count;
-    state->primed = front->usable;
+    state->bad_count = front->bad_count & ((uint32_t)0 - front->sound);
+    state->primed = (front->usable + (uint32_t)2) - (front->sound << 1);
 }
 
 /*
@@ -594,6 +647,7 @@ ADC_MAPPING_CODE ADC_MAPPING_APART static void adc_mapping_answer(const adc_mapp
 {
     adc_mapping_front front;
     adc_mapping_sense(state, measured, &front);
+    adc_mapping_guard(state, &front);
     adc_mapping_decide(state, &front, index, command);
 }
 
@@ -601,6 +655,7 @@ ADC_MAPPING_CODE ADC_MAPPING_APART static void adc_mapping_settle(adc_mapping_st
 {
     adc_mapping_front front;
     adc_mapping_sense(state, measured, &front);
+    adc_mapping_guard(state, &front);
     adc_mapping_decide(state, &front, index, command);
     adc_mapping_advance(state, &front, command);
 }
@@ -615,6 +670,7 @@ ADC_MAPPING_CODE void adc_mapping_commit(adc_mapping_state *state, const adc_map
 {
     adc_mapping_front front;
     adc_mapping_sense(state, measured, &front);
+    adc_mapping_guard(state, &front);
     adc_mapping_advance(state, &front, command);
 }
 

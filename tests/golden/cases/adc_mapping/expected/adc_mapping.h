@@ -26,13 +26,14 @@ extern "C" {
 
 /* Bits of the status word. */
 #define ADC_MAPPING_STATUS_HELD            1u /* Held samples bridge an invalid measurement. */
-#define ADC_MAPPING_STATUS_FALLBACK        2u /* No usable measurement: the fallback duty is commanded. */
+#define ADC_MAPPING_STATUS_FALLBACK        2u /* The fallback duty is commanded: no usable measurement, or no sound state. */
 #define ADC_MAPPING_STATUS_PRIMED          4u /* This step primed the filters. */
 #define ADC_MAPPING_STATUS_CLIPPED         8u /* An observation was clipped. */
 #define ADC_MAPPING_STATUS_MAPPING_RANGE  16u /* Outside the mapping's validity range. */
 #define ADC_MAPPING_STATUS_SLEW_LIMITED   32u /* The slew limit was active. */
 #define ADC_MAPPING_STATUS_SOFT_START     64u /* The soft start was active. */
 #define ADC_MAPPING_STATUS_LIMITED       128u /* A duty limit was active. */
+#define ADC_MAPPING_STATUS_STATE         256u /* The state was damaged: the fallback duty is commanded until init or reset. */
 
 /* One sample of every signal. */
 typedef struct {
@@ -65,7 +66,7 @@ typedef struct {
     float mapping_c; /* coefficient of the duty ratio mapping */
     float mapping_r; /* coefficient of the duty ratio mapping */
     uint32_t bad_count; /* consecutive steps with an invalid sample */
-    uint32_t primed; /* 1 once the filters hold good samples */
+    uint32_t primed; /* 1 once the filters hold good samples, 2 after a damaged state */
 } adc_mapping_state;
 
 /* Start-up state. */

@@ -49,15 +49,17 @@
 #endif
 
 /*
- * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
- * fast; helpers that this build may not need.
+ * Functions that are there once and share no stack frame with their caller; functions that are part of it; functions off
+ * the control path: small before fast; helpers that this build may not need.
  */
 #if defined(__GNUC__)
 #define CONSTRUCTS_APART __attribute__((noinline))
+#define CONSTRUCTS_TOGETHER __inline__ __attribute__((always_inline))
 #define CONSTRUCTS_COLD __attribute__((cold))
 #define CONSTRUCTS_SPARE __attribute__((unused))
 #else
 #define CONSTRUCTS_APART
+#define CONSTRUCTS_TOGETHER
 #define CONSTRUCTS_COLD
 #define CONSTRUCTS_SPARE
 #endif
@@ -272,6 +274,34 @@ static float constructs_line_sum(const float *line, uint32_t length, float newes
     return sum + newest;
 }
 
+/* The sign bit is set if |x| is above the number with these bits. Integers: a comparison of floats costs more, and a NaN is above. */
+CONSTRUCTS_SPARE static uint32_t constructs_far(float x, uint32_t bound)
+{
+    return bound - (constructs_bits(x) & 0x7FFFFFFFu);
+}
+
+/* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
+CONSTRUCTS_SPARE static uint32_t constructs_aside(float x, uint32_t difference, uint32_t high)
+{
+    return constructs_far(x, high ^ (difference & ((uint32_t)0 - (constructs_bits(x) >> 31))));
+}
+
+/* The sign bit is set if x is not among the numbers from the one with the bits low on. */
+CONSTRUCTS_SPARE static uint32_t constructs_beyond(float x, uint32_t low, uint32_t width)
+{
+    const uint32_t above = constructs_bits(x) - low;
+    return above | (width - above);
+}
+
+CONSTRUCTS_SPARE static uint32_t constructs_line_far(const float *line, uint32_t length, uint32_t bound)
+{
+    uint32_t i;
+    uint32_t stray = 0u;
+    for (i = 0u; i < length; ++i) {
+        stray |= constructs_far(line[i], bound);
+    }
+    return stray;
+}
 /* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
 static float constructs_relu(float x)
 {
@@ -327,6 +357,7 @@ typedef struct {
     float observation[12]; /* network input */
     float push[10]; /* what the filters will remember */
     uint32_t bad_count; /* including this step */
+    uint32_t sound; /* 1 if the state is one that the controller can have written */
     uint32_t usable; /* 1 if the network decides */
     uint32_t held; /* 1 if a held sample bridges an invalid one */
     uint32_t primed_now; /* 1 if this step primes the filters */
@@ -351,41 +382,41 @@ CONSTRUCTS_CODE CONSTRUCTS_APART static void constructs_sense(const constructs_s
     const float v12 = constructs_clamp(v11, -2.0f, 2.0f);
     const uint32_t f13 = constructs_bits(v11) ^ constructs_bits(v12);
     const float v14 = v1 - 48.0f;
-    const float v15 = constructs_select(state->primed, state->memory[0], v14);
+    const float v15 = constructs_select(state->primed & 1u, state->memory[0], v14);
     const float v16 = v15 * 0.05f;
     const float v17 = v16 + 0.25f;
-    const float v18 = constructs_select(state->primed, state->memory[3], v1);
+    const float v18 = constructs_select(state->primed & 1u, state->memory[3], v1);
     const float v19 = v1 - v18;
     const float v20 = v19 * 10000.0f;
     const float v21 = v20 * 1e-5f;
     const float v22 = constructs_clamp(v21, -1.0f, 1.0f);
     const uint32_t f23 = constructs_bits(v21) ^ constructs_bits(v22);
-    const float v24 = constructs_select(state->primed, state->memory[4], v5);
+    const float v24 = constructs_select(state->primed & 1u, state->memory[4], v5);
     const float v25 = v5 - v24;
     const float v26 = v25 * 0.09090909f;
     const float v27 = v24 + v26;
     const float v28 = v27 * 0.05f;
     const float v29 = v28 + -0.125f;
     const float v30 = v5 - v7;
-    const float v31 = constructs_select(state->primed, state->memory[5], v30);
-    const float v32 = constructs_select(state->primed, state->memory[6], 0.0f);
+    const float v31 = constructs_select(state->primed & 1u, state->memory[5], v30);
+    const float v32 = constructs_select(state->primed & 1u, state->memory[6], 0.0f);
     const float v33 = v32 * 0.95238096f;
     const float v34 = v30 - v31;
     const float v35 = v34 * 476.1905f;
     const float v36 = v33 + v35;
     const float v37 = v36 * 0.0001f;
-    const float v38 = constructs_line_sum(&state->memory[7], 4u, v1, state->primed);
+    const float v38 = constructs_line_sum(&state->memory[7], 4u, v1, state->primed & 1u);
     const float v39 = v38 * 0.2f;
     const float v40 = v39 * 0.02f;
-    const float v41 = constructs_select(state->primed, state->memory[11], 0.01f);
+    const float v41 = constructs_select(state->primed & 1u, state->memory[11], 0.01f);
     const float v42 = v10 * 0.0001f;
     const float v43 = v41 + v42;
     const float v44 = constructs_clamp(v43, -0.02f, 0.03f);
     const float v45 = v44 * 30.0f;
-    const float v46 = constructs_select(state->primed, state->memory[12], v7);
-    const float v47 = constructs_line_sum(&state->memory[13], 1u, v46, state->primed);
+    const float v46 = constructs_select(state->primed & 1u, state->memory[12], v7);
+    const float v47 = constructs_line_sum(&state->memory[13], 1u, v46, state->primed & 1u);
     const float v48 = v47 * 0.5f;
-    const float v49 = constructs_select(state->primed, state->memory[14], v48);
+    const float v49 = constructs_select(state->primed & 1u, state->memory[14], v48);
     const float v50 = v48 - v49;
     const float v51 = v50 * 10000.0f;
     const float v52 = v51 * 1e-5f;
@@ -435,6 +466,36 @@ CONSTRUCTS_CODE CONSTRUCTS_APART static void constructs_sense(const constructs_s
     front->held = usable & (f9 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
     front->clipped = f63;
+}
+
+/* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
+CONSTRUCTS_CODE CONSTRUCTS_TOGETHER static void constructs_guard(const constructs_state *state, constructs_front *front)
+{
+    const uint32_t stray = constructs_aside(state->held[0], 0x42A00000u, 0x42A00000u)
+                         | constructs_far(state->held[1], 0x41A00000u)
+                         | constructs_aside(state->held[2], 0x7E000000u, 0x41800000u)
+                         | constructs_line_far(&state->memory[0], 3u, 0x4300000Bu)
+                         | constructs_far(state->memory[3], 0x42A00000u)
+                         | constructs_far(state->memory[4], 0x41A00014u)
+                         | constructs_far(state->memory[5], 0x42100009u)
+                         | constructs_far(state->memory[6], 0x4705EDFFu)
+                         | constructs_line_far(&state->memory[7], 4u, 0x42A00000u)
+                         | constructs_far(state->memory[11], 0x3CF5C29Fu)
+                         | constructs_line_far(&state->memory[12], 2u, 0x41800000u)
+                         | constructs_far(state->memory[14], 0x4180000Au)
+                         | constructs_beyond(state->previous_duty, 0x3CA3D70Au, 0x028F5C29u)
+                         | constructs_beyond(state->previous_command, 0x3CA3D70Au, 0x028A3D70u)
+                         | constructs_beyond(state->soft_cap, 0x3EB33333u, 0x007AE147u)
+                         | constructs_beyond(state->mapping_a, 0x3F4CCCCDu, 0x00533333u)
+                         | constructs_far(state->mapping_b, 0x3CA3D70Au)
+                         | constructs_far(state->mapping_c, 0x3DCCCCCCu)
+                         | constructs_far(state->mapping_r, 0x3C23D70Au);
+    const uint32_t counters = (4u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
+    const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1)
+                         & constructs_flag((state->mapping_a + (state->mapping_r * -0.5f)) > 0.0f)
+                         & constructs_flag((state->mapping_a + (state->mapping_r * 12.0f)) > 0.0f);
+    front->sound = sound;
+    front->usable &= sound;
 }
 
 /* Sums side by side in vectors, each one in the order written; the width is that of the machine the compiler is told of. */
@@ -803,7 +864,7 @@ CONSTRUCTS_CODE CONSTRUCTS_APART static uint32_t constructs_choose(const constru
 }
 
 /* Mapping, limits, status. */
-CONSTRUCTS_CODE static void constructs_decide(const constructs_state *state, const constructs_front *front, uint32_t index, constructs_command *command)
+CONSTRUCTS_CODE CONSTRUCTS_TOGETHER static void constructs_decide(const constructs_state *state, const constructs_front *front, uint32_t index, constructs_command *command)
 {
     const float chosen = constructs_duties[index];
     const float v0 = state->mapping_a * chosen;
@@ -826,7 +887,9 @@ CONSTRUCTS_CODE static void constructs_decide(const constructs_state *state, con
     const float v17 = constructs_clamp(v16, 0.3f, 0.67999995f);
     const uint32_t f18 = constructs_bits(v16) ^ constructs_bits(v17);
     const uint32_t f19 = constructs_flag(f18 != 0u);
-    const uint32_t usable = front->usable;
+    const uint32_t stray = constructs_far(v17, 0x7F800000u);
+    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
+    const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
                           | (front->clipped << 3)
@@ -837,44 +900,58 @@ CONSTRUCTS_CODE static void constructs_decide(const constructs_state *state, con
 
     command->duty = constructs_select(usable, v17, 0.02f);
     command->duty_sim = constructs_select(usable, chosen, 0.02f);
-    command->action_index = index;
-    command->status = (status & ((uint32_t)0 - usable)) | (CONSTRUCTS_STATUS_FALLBACK & (usable - (uint32_t)1));
+    command->action_index = index & ((uint32_t)0 - trusted);
+    command->status = (status & ((uint32_t)0 - usable)) | (CONSTRUCTS_STATUS_FALLBACK & (usable - (uint32_t)1))
+                    | (CONSTRUCTS_STATUS_STATE & (trusted - (uint32_t)1));
 }
 
 /* Filters, held samples and counters move on by one sample period. */
-CONSTRUCTS_CODE CONSTRUCTS_NO_LIBC static void constructs_advance(constructs_state *state, const constructs_front *front, const constructs_command *command)
+CONSTRUCTS_CODE CONSTRUCTS_TOGETHER CONSTRUCTS_NO_LIBC static void constructs_advance(constructs_state *state, const constructs_front *front, const constructs_command *command)
 {
     const float v0 = state->soft_cap + 0.0165f;
     const uint32_t f1 = constructs_flag(v0 > 0.67999995f);
     const float v2 = constructs_select(f1, 0.67999995f, v0);
     const float v3 = constructs_select(front->usable, v2, 0.35f);
+    const uint32_t kept = (uint32_t)0 - front->sound;
+    const uint32_t primed = state->primed & front->sound;
+    const float push0 = constructs_from_bits(constructs_bits(front->push[0]) & kept);
+    const float push1 = constructs_from_bits(constructs_bits(front->push[1]) & kept);
+    const float push2 = constructs_from_bits(constructs_bits(front->push[2]) & kept);
+    const float push3 = constructs_from_bits(constructs_bits(front->push[3]) & kept);
+    const float push4 = constructs_from_bits(constructs_bits(front->push[4]) & kept);
+    const float push5 = constructs_from_bits(constructs_bits(front->push[5]) & kept);
+    const float push6 = constructs_from_bits(constructs_bits(front->push[6]) & kept);
+    const float push7 = constructs_from_bits(constructs_bits(front->push[7]) & kept);
+    const float push8 = constructs_from_bits(constructs_bits(front->push[8]) & kept);
+    const float push9 = constructs_from_bits(constructs_bits(front->push[9]) & kept);
     uint32_t i;
+    (void)primed;
 
     for (i = 0u; i < 2u; ++i) {
-        state->memory[i] = constructs_select(state->primed, state->memory[i + 1u], front->push[0]);
+        state->memory[i] = constructs_select(primed, state->memory[i + 1u], push0);
     }
-    state->memory[2] = front->push[0];
-    state->memory[3] = front->push[1];
-    state->memory[4] = front->push[2];
-    state->memory[5] = front->push[3];
-    state->memory[6] = front->push[4];
+    state->memory[2] = push0;
+    state->memory[3] = push1;
+    state->memory[4] = push2;
+    state->memory[5] = push3;
+    state->memory[6] = push4;
 
     for (i = 7u; i < 10u; ++i) {
-        state->memory[i] = constructs_select(state->primed, state->memory[i + 1u], front->push[5]);
+        state->memory[i] = constructs_select(primed, state->memory[i + 1u], push5);
     }
-    state->memory[10] = front->push[5];
-    state->memory[11] = front->push[6];
-    state->memory[12] = front->push[7];
-    state->memory[13] = front->push[8];
-    state->memory[14] = front->push[9];
+    state->memory[10] = push5;
+    state->memory[11] = push6;
+    state->memory[12] = push7;
+    state->memory[13] = push8;
+    state->memory[14] = push9;
     for (i = 0u; i < CONSTRUCTS_SIGNALS; ++i) {
         state->held[i] = front->signal[i];
     }
     state->previous_duty = command->duty_sim;
     state->previous_command = command->duty;
     state->soft_cap = v3;
-    state->bad_count = front->bad_count;
-    state->primed = front->usable;
+    state->bad_count = front->bad_count & ((uint32_t)0 - front->sound);
+    state->primed = (front->usable + (uint32_t)2) - (front->sound << 1);
 }
 
 /*
@@ -885,6 +962,7 @@ CONSTRUCTS_CODE CONSTRUCTS_APART static void constructs_answer(const constructs_
 {
     constructs_front front;
     constructs_sense(state, measured, &front);
+    constructs_guard(state, &front);
     constructs_decide(state, &front, index, command);
 }
 
@@ -892,6 +970,7 @@ CONSTRUCTS_CODE CONSTRUCTS_APART static void constructs_settle(constructs_state 
 {
     constructs_front front;
     constructs_sense(state, measured, &front);
+    constructs_guard(state, &front);
     constructs_decide(state, &front, index, command);
     constructs_advance(state, &front, command);
 }
@@ -906,6 +985,7 @@ CONSTRUCTS_CODE void constructs_commit(constructs_state *state, const constructs
 {
     constructs_front front;
     constructs_sense(state, measured, &front);
+    constructs_guard(state, &front);
     constructs_advance(state, &front, command);
 }
 

@@ -21,7 +21,7 @@ pub const SAMPLE_PERIOD: f64 = 0.0001;
 pub mod status {
     /// Held samples bridge an invalid measurement.
     pub const HELD: u32 = 1;
-    /// No usable measurement: the fallback duty is commanded.
+    /// The fallback duty is commanded: no usable measurement, or no sound state.
     pub const FALLBACK: u32 = 2;
     /// This step primed the filters.
     pub const PRIMED: u32 = 4;
@@ -35,6 +35,8 @@ pub mod status {
     pub const SOFT_START: u32 = 64;
     /// A duty limit was active.
     pub const LIMITED: u32 = 128;
+    /// The state was damaged: the fallback duty is commanded until init or reset.
+    pub const STATE: u32 = 256;
 }
 static CRC_STEPS: [u32; 16] = [
     0, 498536548, 997073096, 651767980, 1994146192, 1802195444, 1303535960, 1342533948,
@@ -78,12 +80,12 @@ fn select(flag: u32, then: f32, otherwise: f32) -> f32 {
 #[inline(always)]
 #[allow(dead_code)]
 fn within(x: f32, low: f32, high: f32) -> u32 {
-    flag(x >= low) & flag(x <= high)
+    flag((x >= low) & (x <= high))
 }
 #[inline(always)]
 #[allow(dead_code)]
 fn outside(x: f32, low: f32, high: f32) -> u32 {
-    flag(x < low) | flag(x > high)
+    flag((x < low) | (x > high))
 }
 #[inline(always)]
 #[allow(dead_code)]
@@ -116,6 +118,26 @@ fn relu(x: f32) -> f32 {
 #[allow(dead_code)]
 fn leaky_relu(x: f32, slope: f32) -> f32 {
     select(x.to_bits() >> 31, slope * x, x)
+}
+/// The sign bit is set if |x| is above the number with the bits `bound`.
+#[inline(always)]
+#[allow(dead_code)]
+fn far(x: f32, bound: u32) -> u32 {
+    bound.wrapping_sub(x.to_bits() & 0x7FFF_FFFF)
+}
+/// The sign bit is set if |x| is above the bound of its sign: `high`, or below 0 what `difference` makes of it.
+#[inline(always)]
+#[allow(dead_code)]
+fn aside(x: f32, difference: u32, high: u32) -> u32 {
+    let below = (0 as u32).wrapping_sub(x.to_bits() >> 31);
+    far(x, high ^ (difference & below))
+}
+/// The sign bit is set if x is not among the `width` numbers from that with the bits `low` on.
+#[inline(always)]
+#[allow(dead_code)]
+fn beyond(x: f32, low: u32, width: u32) -> u32 {
+    let above = x.to_bits().wrapping_sub(low);
+    above | width.wrapping_sub(above)
 }
 static DUTIES: [f32; ACTIONS] = [0.275, 0.4, 0.525, 0.5, 0.7];
 /// x limited to the magnitude with these bits, in integers so that loops over it can be vectorised
@@ -724,12 +746,13 @@ impl Controller {
     #[must_use]
     pub fn eval(&self, measured: &Measurement) -> Command {
         let chosen = self.choose_for(measured);
-        self.decide(&self.sense(measured), chosen)
+        let (front, sound) = self.guarded(measured);
+        self.decide(&front, sound, chosen)
     }
     /// Advances the filters by one sample period, with the command that `eval` gave for this measurement.
     pub fn commit(&mut self, measured: &Measurement, command: &Command) {
-        let front = self.sense(measured);
-        self.advance(&front, command);
+        let (front, sound) = self.guarded(measured);
+        self.advance(&front, sound, command);
     }
     /// `eval` and `commit`.
     pub fn step(&mut self, measured: &Measurement) -> Command {
@@ -779,24 +802,24 @@ impl Controller {
         let v12: f32 = clamp(v11, -2.0, 2.0);
         let f13: u32 = v11.to_bits() ^ v12.to_bits();
         let v14: f32 = v1 - 48.0;
-        let v15: f32 = select(self.primed, self.memory[0], v14);
+        let v15: f32 = select(self.primed & 1, self.memory[0], v14);
         let v16: f32 = v15 * 0.05;
         let v17: f32 = v16 + 0.25;
-        let v18: f32 = select(self.primed, self.memory[3], v1);
+        let v18: f32 = select(self.primed & 1, self.memory[3], v1);
         let v19: f32 = v1 - v18;
         let v20: f32 = v19 * 10000.0;
         let v21: f32 = v20 * 0.00001;
         let v22: f32 = clamp(v21, -1.0, 1.0);
         let f23: u32 = v21.to_bits() ^ v22.to_bits();
-        let v24: f32 = select(self.primed, self.memory[4], v5);
+        let v24: f32 = select(self.primed & 1, self.memory[4], v5);
         let v25: f32 = v5 - v24;
         let v26: f32 = v25 * 0.09090909;
         let v27: f32 = v24 + v26;
         let v28: f32 = v27 * 0.05;
         let v29: f32 = v28 + -0.125;
         let v30: f32 = v5 - v7;
-        let v31: f32 = select(self.primed, self.memory[5], v30);
-        let v32: f32 = select(self.primed, self.memory[6], 0.0);
+        let v31: f32 = select(self.primed & 1, self.memory[5], v30);
+        let v32: f32 = select(self.primed & 1, self.memory[6], 0.0);
         let v33: f32 = v32 * 0.95238096;
         let v34: f32 = v30 - v31;
         let v35: f32 = v34 * 476.1905;
@@ -806,24 +829,24 @@ impl Controller {
             self.memory[7],
             self.memory.iter().skip(8).take(3),
             v1,
-            self.primed,
+            self.primed & 1,
         );
         let v39: f32 = v38 * 0.2;
         let v40: f32 = v39 * 0.02;
-        let v41: f32 = select(self.primed, self.memory[11], 0.01);
+        let v41: f32 = select(self.primed & 1, self.memory[11], 0.01);
         let v42: f32 = v10 * 0.0001;
         let v43: f32 = v41 + v42;
         let v44: f32 = clamp(v43, -0.02, 0.03);
         let v45: f32 = v44 * 30.0;
-        let v46: f32 = select(self.primed, self.memory[12], v7);
+        let v46: f32 = select(self.primed & 1, self.memory[12], v7);
         let v47: f32 = line_sum(
             self.memory[13],
             self.memory.iter().skip(14).take(0),
             v46,
-            self.primed,
+            self.primed & 1,
         );
         let v48: f32 = v47 * 0.5;
-        let v49: f32 = select(self.primed, self.memory[14], v48);
+        let v49: f32 = select(self.primed & 1, self.memory[14], v48);
         let v50: f32 = v48 - v49;
         let v51: f32 = v50 * 10000.0;
         let v52: f32 = v51 * 0.00001;
@@ -865,6 +888,53 @@ impl Controller {
             clipped: f63,
         }
     }
+    /// 1 if the state is one that the controller can have written: a flipped bit that would decide the duty gives 0.
+    #[inline(always)]
+    fn sound(&self) -> u32 {
+        let stray = aside(self.held[0], 1117782016, 1117782016)
+            | far(self.held[1], 1101004800) | aside(self.held[2], 2113929216, 1098907648)
+            | self
+                .memory
+                .iter()
+                .skip(0)
+                .take(3)
+                .fold(0, |stray, word| stray | far(*word, 1124073483))
+            | far(self.memory[3], 1117782016) | far(self.memory[4], 1101004820)
+            | far(self.memory[5], 1108344841) | far(self.memory[6], 1191570943)
+            | self
+                .memory
+                .iter()
+                .skip(7)
+                .take(4)
+                .fold(0, |stray, word| stray | far(*word, 1117782016))
+            | far(self.memory[11], 1022739103)
+            | self
+                .memory
+                .iter()
+                .skip(12)
+                .take(2)
+                .fold(0, |stray, word| stray | far(*word, 1098907648))
+            | far(self.memory[14], 1098907658)
+            | beyond(self.previous_duty, 1017370378, 42949673)
+            | beyond(self.previous_command, 1017370378, 42614128)
+            | beyond(self.soft_cap, 1051931443, 8053063)
+            | beyond(self.mapping_a, 1061997773, 5452595)
+            | far(self.mapping_b, 1017370378) | far(self.mapping_c, 1036831948)
+            | far(self.mapping_r, 1008981770);
+        let counters = 4u32.wrapping_sub(self.bad_count) | self.bad_count
+            | 1_u32.wrapping_sub(self.primed) | self.primed;
+        ((((stray | counters) >> 31) ^ 1)
+            & flag(self.mapping_a + self.mapping_r * -0.5 > 0.0))
+            & flag(self.mapping_a + self.mapping_r * 12.0 > 0.0)
+    }
+    /// [`Self::sense`], and what a damaged state forbids.
+    #[inline(always)]
+    fn guarded(&self, measured: &Measurement) -> (Front, u32) {
+        let sound = self.sound();
+        let mut front = self.sense(measured);
+        front.usable &= sound;
+        (front, sound)
+    }
     /// The greedy action for a measurement, with a stack of its own.
     #[inline(never)]
     fn choose_for(&self, measured: &Measurement) -> (u32, f32) {
@@ -873,9 +943,9 @@ impl Controller {
     /// What a step does behind the network.
     #[inline(never)]
     fn settle(&mut self, measured: &Measurement, chosen: (u32, f32)) -> Command {
-        let front = self.sense(measured);
-        let command = self.decide(&front, chosen);
-        self.advance(&front, &command);
+        let (front, sound) = self.guarded(measured);
+        let command = self.decide(&front, sound, chosen);
+        self.advance(&front, sound, &command);
         command
     }
     /// Network and argmax: index and duty of the greedy action.
@@ -897,7 +967,12 @@ impl Controller {
     }
     /// Mapping, limits, status.
     #[inline(always)]
-    fn decide(&self, front: &Front, (action_index, chosen): (u32, f32)) -> Command {
+    fn decide(
+        &self,
+        front: &Front,
+        sound: u32,
+        (action_index, chosen): (u32, f32),
+    ) -> Command {
         let v0: f32 = self.mapping_a * chosen;
         let v1: f32 = self.mapping_b * front.signal[2];
         let v2: f32 = v0 + v1;
@@ -918,50 +993,55 @@ impl Controller {
         let v17: f32 = clamp(v16, 0.3, 0.67999995);
         let f18: u32 = v16.to_bits() ^ v17.to_bits();
         let f19: u32 = flag(f18 != 0);
-        let usable = front.usable;
+        let stray = far(v17, 2139095040);
+        let trusted = sound & !((stray >> 31));
+        let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
             | (f9 << 4) | (f14 << 5) | (f15 << 6) | (f19 << 7);
         Command {
             duty: select(usable, v17, 0.02),
             duty_sim: select(usable, chosen, 0.02),
-            action_index,
+            action_index: action_index & 0_u32.wrapping_sub(trusted),
             status: (status & 0_u32.wrapping_sub(usable))
-                | (status::FALLBACK & usable.wrapping_sub(1)),
+                | (status::FALLBACK & usable.wrapping_sub(1))
+                | (status::STATE & trusted.wrapping_sub(1)),
         }
     }
     /// Filters, held samples and counters move on by one sample period.
     #[inline(always)]
-    fn advance(&mut self, front: &Front, command: &Command) {
+    fn advance(&mut self, front: &Front, sound: u32, command: &Command) {
         let v0: f32 = self.soft_cap + 0.0165;
         let f1: u32 = flag(v0 > 0.67999995);
         let v2: f32 = select(f1, 0.67999995, v0);
         let v3: f32 = select(front.usable, v2, 0.35);
-        let mut moved = front.push[0];
+        let pushed = select(sound, front.push[0], 0.0);
+        let mut moved = pushed;
         for word in self.memory.iter_mut().skip(0).take(3).rev() {
-            let before = select(self.primed, *word, front.push[0]);
+            let before = select(self.primed & sound, *word, pushed);
             *word = moved;
             moved = before;
         }
-        self.memory[3] = front.push[1];
-        self.memory[4] = front.push[2];
-        self.memory[5] = front.push[3];
-        self.memory[6] = front.push[4];
-        let mut moved = front.push[5];
+        self.memory[3] = select(sound, front.push[1], 0.0);
+        self.memory[4] = select(sound, front.push[2], 0.0);
+        self.memory[5] = select(sound, front.push[3], 0.0);
+        self.memory[6] = select(sound, front.push[4], 0.0);
+        let pushed = select(sound, front.push[5], 0.0);
+        let mut moved = pushed;
         for word in self.memory.iter_mut().skip(7).take(4).rev() {
-            let before = select(self.primed, *word, front.push[5]);
+            let before = select(self.primed & sound, *word, pushed);
             *word = moved;
             moved = before;
         }
-        self.memory[11] = front.push[6];
-        self.memory[12] = front.push[7];
-        self.memory[13] = front.push[8];
-        self.memory[14] = front.push[9];
+        self.memory[11] = select(sound, front.push[6], 0.0);
+        self.memory[12] = select(sound, front.push[7], 0.0);
+        self.memory[13] = select(sound, front.push[8], 0.0);
+        self.memory[14] = select(sound, front.push[9], 0.0);
         self.soft_cap = v3;
         self.held = front.signal;
         self.previous_duty = command.duty_sim;
         self.previous_command = command.duty;
-        self.bad_count = front.bad_count;
-        self.primed = front.usable;
+        self.bad_count = front.bad_count & 0_u32.wrapping_sub(sound);
+        self.primed = front.usable.wrapping_add(2).wrapping_sub(sound << 1);
     }
     /// Known answers: whether the arithmetic of this build is the policy's.
     ///

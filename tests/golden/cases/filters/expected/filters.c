@@ -49,15 +49,17 @@
 #endif
 
 /*
- * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
- * fast; helpers that this build may not need.
+ * Functions that are there once and share no stack frame with their caller; functions that are part of it; functions off
+ * the control path: small before fast; helpers that this build may not need.
  */
 #if defined(__GNUC__)
 #define FILTERS_APART __attribute__((noinline))
+#define FILTERS_TOGETHER __inline__ __attribute__((always_inline))
 #define FILTERS_COLD __attribute__((cold))
 #define FILTERS_SPARE __attribute__((unused))
 #else
 #define FILTERS_APART
+#define FILTERS_TOGETHER
 #define FILTERS_COLD
 #define FILTERS_SPARE
 #endif
@@ -221,6 +223,34 @@ static float filters_line_sum(const float *line, uint32_t length, float newest, 
     return sum + newest;
 }
 
+/* The sign bit is set if |x| is above the number with these bits. Integers: a comparison of floats costs more, and a NaN is above. */
+FILTERS_SPARE static uint32_t filters_far(float x, uint32_t bound)
+{
+    return bound - (filters_bits(x) & 0x7FFFFFFFu);
+}
+
+/* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
+FILTERS_SPARE static uint32_t filters_aside(float x, uint32_t difference, uint32_t high)
+{
+    return filters_far(x, high ^ (difference & ((uint32_t)0 - (filters_bits(x) >> 31))));
+}
+
+/* The sign bit is set if x is not among the numbers from the one with the bits low on. */
+FILTERS_SPARE static uint32_t filters_beyond(float x, uint32_t low, uint32_t width)
+{
+    const uint32_t above = filters_bits(x) - low;
+    return above | (width - above);
+}
+
+FILTERS_SPARE static uint32_t filters_line_far(const float *line, uint32_t length, uint32_t bound)
+{
+    uint32_t i;
+    uint32_t stray = 0u;
+    for (i = 0u; i < length; ++i) {
+        stray |= filters_far(line[i], bound);
+    }
+    return stray;
+}
 /* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
 static float filters_relu(float x)
 {
@@ -238,6 +268,7 @@ typedef struct {
     float observation[8]; /* network input */
     float push[12]; /* what the filters will remember */
     uint32_t bad_count; /* including this step */
+    uint32_t sound; /* 1 if the state is one that the controller can have written */
     uint32_t usable; /* 1 if the network decides */
     uint32_t held; /* 1 if a held sample bridges an invalid one */
     uint32_t primed_now; /* 1 if this step primes the filters */
@@ -253,46 +284,46 @@ FILTERS_CODE FILTERS_APART static void filters_sense(const filters_state *state,
     const float v3 = filters_select(f2, measured->i_l, state->held[1]);
     const uint32_t f4 = f0 & f2;
     const float v5 = 48.0f - v1;
-    const float v6 = filters_select(state->primed, state->memory[0], v5);
+    const float v6 = filters_select(state->primed & 1u, state->memory[0], v5);
     const float v7 = v6 * 0.1f;
     const float v8 = filters_clamp(v7, -5.0f, 5.0f);
     const uint32_t f9 = filters_bits(v7) ^ filters_bits(v8);
-    const float v10 = filters_select(state->primed, state->memory[20], v1);
+    const float v10 = filters_select(state->primed & 1u, state->memory[20], v1);
     const float v11 = v1 - v10;
     const float v12 = v11 * 20000.0f;
     const float v13 = v12 * 1e-6f;
-    const float v14 = filters_select(state->primed, state->memory[21], v3);
+    const float v14 = filters_select(state->primed & 1u, state->memory[21], v3);
     const float v15 = v3 - v14;
     const float v16 = v15 * 0.04761905f;
     const float v17 = v14 + v16;
     const float v18 = v17 * 0.05f;
     const float v19 = v18 + -0.25f;
-    const float v20 = filters_select(state->primed, state->memory[22], v3);
+    const float v20 = filters_select(state->primed & 1u, state->memory[22], v3);
     const float v21 = v3 - v20;
     const float v22 = v21 * 0.13575524f;
     const float v23 = v20 + v22;
     const float v24 = v23 * 0.05f;
-    const float v25 = filters_select(state->primed, state->memory[23], v1);
-    const float v26 = filters_select(state->primed, state->memory[24], 0.0f);
+    const float v25 = filters_select(state->primed & 1u, state->memory[23], v1);
+    const float v26 = filters_select(state->primed & 1u, state->memory[24], 0.0f);
     const float v27 = v26 * 0.9756098f;
     const float v28 = v1 - v25;
     const float v29 = v28 * 487.80487f;
     const float v30 = v27 + v29;
     const float v31 = v30 * 0.001f;
-    const float v32 = filters_line_sum(&state->memory[25], 39u, v1, state->primed);
+    const float v32 = filters_line_sum(&state->memory[25], 39u, v1, state->primed & 1u);
     const float v33 = v32 * 0.025f;
     const float v34 = v33 * 0.02f;
-    const float v35 = filters_select(state->primed, state->memory[64], 0.1f);
+    const float v35 = filters_select(state->primed & 1u, state->memory[64], 0.1f);
     const float v36 = v5 * 5e-5f;
     const float v37 = v35 + v36;
     const float v38 = filters_clamp(v37, -0.5f, 0.75f);
-    const float v39 = filters_select(state->primed, state->memory[65], v3);
-    const float v40 = filters_line_sum(&state->memory[66], 1u, v39, state->primed);
+    const float v39 = filters_select(state->primed & 1u, state->memory[65], v3);
+    const float v40 = filters_line_sum(&state->memory[66], 1u, v39, state->primed & 1u);
     const float v41 = v40 * 0.5f;
-    const float v42 = filters_select(state->primed, state->memory[67], v41);
+    const float v42 = filters_select(state->primed & 1u, state->memory[67], v41);
     const float v43 = v41 - v42;
     const float v44 = v43 * 20000.0f;
-    const float v45 = filters_select(state->primed, state->memory[68], v44);
+    const float v45 = filters_select(state->primed & 1u, state->memory[68], v44);
     const float v46 = v44 - v45;
     const float v47 = v46 * 0.33333334f;
     const float v48 = v45 + v47;
@@ -333,6 +364,27 @@ FILTERS_CODE FILTERS_APART static void filters_sense(const filters_state *state,
     front->held = usable & (f4 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
     front->clipped = f53;
+}
+
+/* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
+FILTERS_CODE FILTERS_TOGETHER static void filters_guard(const filters_state *state, filters_front *front)
+{
+    const uint32_t stray = filters_aside(state->held[0], 0x42A00000u, 0x42A00000u)
+                         | filters_aside(state->held[1], 0x01D00000u, 0x41F00000u)
+                         | filters_line_far(&state->memory[0], 20u, 0x4300000Bu)
+                         | filters_far(state->memory[20], 0x42A00000u)
+                         | filters_line_far(&state->memory[21], 2u, 0x41F0001Eu)
+                         | filters_far(state->memory[23], 0x42A00000u)
+                         | filters_far(state->memory[24], 0x479870E8u)
+                         | filters_line_far(&state->memory[25], 39u, 0x42A00000u)
+                         | filters_far(state->memory[64], 0x3F40000Cu)
+                         | filters_line_far(&state->memory[65], 2u, 0x41F00000u)
+                         | filters_far(state->memory[67], 0x41F00013u)
+                         | filters_far(state->memory[68], 0x49927C39u);
+    const uint32_t counters = (3u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
+    const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1);
+    front->sound = sound;
+    front->usable &= sound;
 }
 
 /* Sums side by side in vectors, each one in the order written; the width is that of the machine the compiler is told of. */
@@ -568,13 +620,15 @@ FILTERS_CODE FILTERS_APART static uint32_t filters_choose(const filters_state *s
 }
 
 /* Mapping, limits, status. */
-FILTERS_CODE static void filters_decide(const filters_state *state, const filters_front *front, uint32_t index, filters_command *command)
+FILTERS_CODE FILTERS_TOGETHER static void filters_decide(const filters_state *state, const filters_front *front, uint32_t index, filters_command *command)
 {
     const float chosen = filters_duties[index];
     const float v0 = filters_clamp(chosen, 0.05f, 0.95f);
     const uint32_t f1 = filters_bits(chosen) ^ filters_bits(v0);
     const uint32_t f2 = filters_flag(f1 != 0u);
-    const uint32_t usable = front->usable;
+    const uint32_t stray = filters_far(v0, 0x7F800000u);
+    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
+    const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
                           | (front->clipped << 3)
@@ -582,42 +636,58 @@ FILTERS_CODE static void filters_decide(const filters_state *state, const filter
 
     command->duty = filters_select(usable, v0, 0.05f);
     command->duty_sim = filters_select(usable, chosen, 0.05f);
-    command->action_index = index;
-    command->status = (status & ((uint32_t)0 - usable)) | (FILTERS_STATUS_FALLBACK & (usable - (uint32_t)1));
+    command->action_index = index & ((uint32_t)0 - trusted);
+    command->status = (status & ((uint32_t)0 - usable)) | (FILTERS_STATUS_FALLBACK & (usable - (uint32_t)1))
+                    | (FILTERS_STATUS_STATE & (trusted - (uint32_t)1));
     (void)state;
 }
 
 /* Filters, held samples and counters move on by one sample period. */
-FILTERS_CODE FILTERS_NO_LIBC static void filters_advance(filters_state *state, const filters_front *front, const filters_command *command)
+FILTERS_CODE FILTERS_TOGETHER FILTERS_NO_LIBC static void filters_advance(filters_state *state, const filters_front *front, const filters_command *command)
 {
+    const uint32_t kept = (uint32_t)0 - front->sound;
+    const uint32_t primed = state->primed & front->sound;
+    const float push0 = filters_from_bits(filters_bits(front->push[0]) & kept);
+    const float push1 = filters_from_bits(filters_bits(front->push[1]) & kept);
+    const float push2 = filters_from_bits(filters_bits(front->push[2]) & kept);
+    const float push3 = filters_from_bits(filters_bits(front->push[3]) & kept);
+    const float push4 = filters_from_bits(filters_bits(front->push[4]) & kept);
+    const float push5 = filters_from_bits(filters_bits(front->push[5]) & kept);
+    const float push6 = filters_from_bits(filters_bits(front->push[6]) & kept);
+    const float push7 = filters_from_bits(filters_bits(front->push[7]) & kept);
+    const float push8 = filters_from_bits(filters_bits(front->push[8]) & kept);
+    const float push9 = filters_from_bits(filters_bits(front->push[9]) & kept);
+    const float push10 = filters_from_bits(filters_bits(front->push[10]) & kept);
+    const float push11 = filters_from_bits(filters_bits(front->push[11]) & kept);
     uint32_t i;
+    (void)primed;
 
     for (i = 0u; i < 19u; ++i) {
-        state->memory[i] = filters_select(state->primed, state->memory[i + 1u], front->push[0]);
+        state->memory[i] = filters_select(primed, state->memory[i + 1u], push0);
     }
-    state->memory[19] = front->push[0];
-    state->memory[20] = front->push[1];
-    state->memory[21] = front->push[2];
-    state->memory[22] = front->push[3];
-    state->memory[23] = front->push[4];
-    state->memory[24] = front->push[5];
+    state->memory[19] = push0;
+    state->memory[20] = push1;
+    state->memory[21] = push2;
+    state->memory[22] = push3;
+    state->memory[23] = push4;
+    state->memory[24] = push5;
 
     for (i = 25u; i < 63u; ++i) {
-        state->memory[i] = filters_select(state->primed, state->memory[i + 1u], front->push[6]);
+        state->memory[i] = filters_select(primed, state->memory[i + 1u], push6);
     }
-    state->memory[63] = front->push[6];
-    state->memory[64] = front->push[7];
-    state->memory[65] = front->push[8];
-    state->memory[66] = front->push[9];
-    state->memory[67] = front->push[10];
-    state->memory[68] = front->push[11];
+    state->memory[63] = push6;
+    state->memory[64] = push7;
+    state->memory[65] = push8;
+    state->memory[66] = push9;
+    state->memory[67] = push10;
+    state->memory[68] = push11;
     for (i = 0u; i < FILTERS_SIGNALS; ++i) {
         state->held[i] = front->signal[i];
     }
     state->previous_duty = command->duty_sim;
     state->previous_command = command->duty;
-    state->bad_count = front->bad_count;
-    state->primed = front->usable;
+    state->bad_count = front->bad_count & ((uint32_t)0 - front->sound);
+    state->primed = (front->usable + (uint32_t)2) - (front->sound << 1);
 }
 
 /*
@@ -628,6 +698,7 @@ FILTERS_CODE FILTERS_APART static void filters_answer(const filters_state *state
 {
     filters_front front;
     filters_sense(state, measured, &front);
+    filters_guard(state, &front);
     filters_decide(state, &front, index, command);
 }
 
@@ -635,6 +706,7 @@ FILTERS_CODE FILTERS_APART static void filters_settle(filters_state *state, cons
 {
     filters_front front;
     filters_sense(state, measured, &front);
+    filters_guard(state, &front);
     filters_decide(state, &front, index, command);
     filters_advance(state, &front, command);
 }
@@ -649,6 +721,7 @@ FILTERS_CODE void filters_commit(filters_state *state, const filters_measurement
 {
     filters_front front;
     filters_sense(state, measured, &front);
+    filters_guard(state, &front);
     filters_advance(state, &front, command);
 }
 

@@ -26,13 +26,14 @@ extern "C" {
 
 /* Bits of the status word. */
 #define FILTERS_STATUS_HELD            1u /* Held samples bridge an invalid measurement. */
-#define FILTERS_STATUS_FALLBACK        2u /* No usable measurement: the fallback duty is commanded. */
+#define FILTERS_STATUS_FALLBACK        2u /* The fallback duty is commanded: no usable measurement, or no sound state. */
 #define FILTERS_STATUS_PRIMED          4u /* This step primed the filters. */
 #define FILTERS_STATUS_CLIPPED         8u /* An observation was clipped. */
 #define FILTERS_STATUS_MAPPING_RANGE  16u /* Outside the mapping's validity range. */
 #define FILTERS_STATUS_SLEW_LIMITED   32u /* The slew limit was active. */
 #define FILTERS_STATUS_SOFT_START     64u /* The soft start was active. */
 #define FILTERS_STATUS_LIMITED       128u /* A duty limit was active. */
+#define FILTERS_STATUS_STATE         256u /* The state was damaged: the fallback duty is commanded until init or reset. */
 
 /* One sample of every signal. */
 typedef struct {
@@ -66,7 +67,7 @@ typedef struct {
     float previous_duty; /* duty of the last chosen action */
     float previous_command; /* last command */
     uint32_t bad_count; /* consecutive steps with an invalid sample */
-    uint32_t primed; /* 1 once the filters hold good samples */
+    uint32_t primed; /* 1 once the filters hold good samples, 2 after a damaged state */
 } filters_state;
 
 /* Start-up state. */

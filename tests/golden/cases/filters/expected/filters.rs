@@ -21,7 +21,7 @@ pub const SAMPLE_PERIOD: f64 = 0.00005;
 pub mod status {
     /// Held samples bridge an invalid measurement.
     pub const HELD: u32 = 1;
-    /// No usable measurement: the fallback duty is commanded.
+    /// The fallback duty is commanded: no usable measurement, or no sound state.
     pub const FALLBACK: u32 = 2;
     /// This step primed the filters.
     pub const PRIMED: u32 = 4;
@@ -35,6 +35,8 @@ pub mod status {
     pub const SOFT_START: u32 = 64;
     /// A duty limit was active.
     pub const LIMITED: u32 = 128;
+    /// The state was damaged: the fallback duty is commanded until init or reset.
+    pub const STATE: u32 = 256;
 }
 static CRC_STEPS: [u32; 16] = [
     0, 498536548, 997073096, 651767980, 1994146192, 1802195444, 1303535960, 1342533948,
@@ -76,12 +78,12 @@ fn select(flag: u32, then: f32, otherwise: f32) -> f32 {
 #[inline(always)]
 #[allow(dead_code)]
 fn within(x: f32, low: f32, high: f32) -> u32 {
-    flag(x >= low) & flag(x <= high)
+    flag((x >= low) & (x <= high))
 }
 #[inline(always)]
 #[allow(dead_code)]
 fn outside(x: f32, low: f32, high: f32) -> u32 {
-    flag(x < low) | flag(x > high)
+    flag((x < low) | (x > high))
 }
 #[inline(always)]
 #[allow(dead_code)]
@@ -114,6 +116,26 @@ fn relu(x: f32) -> f32 {
 #[allow(dead_code)]
 fn leaky_relu(x: f32, slope: f32) -> f32 {
     select(x.to_bits() >> 31, slope * x, x)
+}
+/// The sign bit is set if |x| is above the number with the bits `bound`.
+#[inline(always)]
+#[allow(dead_code)]
+fn far(x: f32, bound: u32) -> u32 {
+    bound.wrapping_sub(x.to_bits() & 0x7FFF_FFFF)
+}
+/// The sign bit is set if |x| is above the bound of its sign: `high`, or below 0 what `difference` makes of it.
+#[inline(always)]
+#[allow(dead_code)]
+fn aside(x: f32, difference: u32, high: u32) -> u32 {
+    let below = (0 as u32).wrapping_sub(x.to_bits() >> 31);
+    far(x, high ^ (difference & below))
+}
+/// The sign bit is set if x is not among the `width` numbers from that with the bits `low` on.
+#[inline(always)]
+#[allow(dead_code)]
+fn beyond(x: f32, low: u32, width: u32) -> u32 {
+    let above = x.to_bits().wrapping_sub(low);
+    above | width.wrapping_sub(above)
 }
 static DUTIES: [f32; ACTIONS] = [0.25, 0.5, 0.75];
 /// So that no vector of weights lies across two lines of the cache.
@@ -397,12 +419,13 @@ impl Controller {
     #[must_use]
     pub fn eval(&self, measured: &Measurement) -> Command {
         let chosen = self.choose_for(measured);
-        self.decide(&self.sense(measured), chosen)
+        let (front, sound) = self.guarded(measured);
+        self.decide(&front, sound, chosen)
     }
     /// Advances the filters by one sample period, with the command that `eval` gave for this measurement.
     pub fn commit(&mut self, measured: &Measurement, command: &Command) {
-        let front = self.sense(measured);
-        self.advance(&front, command);
+        let (front, sound) = self.guarded(measured);
+        self.advance(&front, sound, command);
     }
     /// `eval` and `commit`.
     pub fn step(&mut self, measured: &Measurement) -> Command {
@@ -428,27 +451,27 @@ impl Controller {
         let v3: f32 = select(f2, measured.i_l, self.held[1]);
         let f4: u32 = f0 & f2;
         let v5: f32 = 48.0 - v1;
-        let v6: f32 = select(self.primed, self.memory[0], v5);
+        let v6: f32 = select(self.primed & 1, self.memory[0], v5);
         let v7: f32 = v6 * 0.1;
         let v8: f32 = clamp(v7, -5.0, 5.0);
         let f9: u32 = v7.to_bits() ^ v8.to_bits();
-        let v10: f32 = select(self.primed, self.memory[20], v1);
+        let v10: f32 = select(self.primed & 1, self.memory[20], v1);
         let v11: f32 = v1 - v10;
         let v12: f32 = v11 * 20000.0;
         let v13: f32 = v12 * 0.000001;
-        let v14: f32 = select(self.primed, self.memory[21], v3);
+        let v14: f32 = select(self.primed & 1, self.memory[21], v3);
         let v15: f32 = v3 - v14;
         let v16: f32 = v15 * 0.04761905;
         let v17: f32 = v14 + v16;
         let v18: f32 = v17 * 0.05;
         let v19: f32 = v18 + -0.25;
-        let v20: f32 = select(self.primed, self.memory[22], v3);
+        let v20: f32 = select(self.primed & 1, self.memory[22], v3);
         let v21: f32 = v3 - v20;
         let v22: f32 = v21 * 0.13575524;
         let v23: f32 = v20 + v22;
         let v24: f32 = v23 * 0.05;
-        let v25: f32 = select(self.primed, self.memory[23], v1);
-        let v26: f32 = select(self.primed, self.memory[24], 0.0);
+        let v25: f32 = select(self.primed & 1, self.memory[23], v1);
+        let v26: f32 = select(self.primed & 1, self.memory[24], 0.0);
         let v27: f32 = v26 * 0.9756098;
         let v28: f32 = v1 - v25;
         let v29: f32 = v28 * 487.80487;
@@ -458,26 +481,26 @@ impl Controller {
             self.memory[25],
             self.memory.iter().skip(26).take(38),
             v1,
-            self.primed,
+            self.primed & 1,
         );
         let v33: f32 = v32 * 0.025;
         let v34: f32 = v33 * 0.02;
-        let v35: f32 = select(self.primed, self.memory[64], 0.1);
+        let v35: f32 = select(self.primed & 1, self.memory[64], 0.1);
         let v36: f32 = v5 * 0.00005;
         let v37: f32 = v35 + v36;
         let v38: f32 = clamp(v37, -0.5, 0.75);
-        let v39: f32 = select(self.primed, self.memory[65], v3);
+        let v39: f32 = select(self.primed & 1, self.memory[65], v3);
         let v40: f32 = line_sum(
             self.memory[66],
             self.memory.iter().skip(67).take(0),
             v39,
-            self.primed,
+            self.primed & 1,
         );
         let v41: f32 = v40 * 0.5;
-        let v42: f32 = select(self.primed, self.memory[67], v41);
+        let v42: f32 = select(self.primed & 1, self.memory[67], v41);
         let v43: f32 = v41 - v42;
         let v44: f32 = v43 * 20000.0;
-        let v45: f32 = select(self.primed, self.memory[68], v44);
+        let v45: f32 = select(self.primed & 1, self.memory[68], v44);
         let v46: f32 = v44 - v45;
         let v47: f32 = v46 * 0.33333334;
         let v48: f32 = v45 + v47;
@@ -500,6 +523,51 @@ impl Controller {
             clipped: f53,
         }
     }
+    /// 1 if the state is one that the controller can have written: a flipped bit that would decide the duty gives 0.
+    #[inline(always)]
+    fn sound(&self) -> u32 {
+        let stray = aside(self.held[0], 1117782016, 1117782016)
+            | aside(self.held[1], 30408704, 1106247680)
+            | self
+                .memory
+                .iter()
+                .skip(0)
+                .take(20)
+                .fold(0, |stray, word| stray | far(*word, 1124073483))
+            | far(self.memory[20], 1117782016)
+            | self
+                .memory
+                .iter()
+                .skip(21)
+                .take(2)
+                .fold(0, |stray, word| stray | far(*word, 1106247710))
+            | far(self.memory[23], 1117782016) | far(self.memory[24], 1201172712)
+            | self
+                .memory
+                .iter()
+                .skip(25)
+                .take(39)
+                .fold(0, |stray, word| stray | far(*word, 1117782016))
+            | far(self.memory[64], 1061158924)
+            | self
+                .memory
+                .iter()
+                .skip(65)
+                .take(2)
+                .fold(0, |stray, word| stray | far(*word, 1106247680))
+            | far(self.memory[67], 1106247699) | far(self.memory[68], 1234336825);
+        let counters = 3u32.wrapping_sub(self.bad_count) | self.bad_count
+            | 1_u32.wrapping_sub(self.primed) | self.primed;
+        ((stray | counters) >> 31) ^ 1
+    }
+    /// [`Self::sense`], and what a damaged state forbids.
+    #[inline(always)]
+    fn guarded(&self, measured: &Measurement) -> (Front, u32) {
+        let sound = self.sound();
+        let mut front = self.sense(measured);
+        front.usable &= sound;
+        (front, sound)
+    }
     /// The greedy action for a measurement, with a stack of its own.
     #[inline(never)]
     fn choose_for(&self, measured: &Measurement) -> (u32, f32) {
@@ -508,9 +576,9 @@ impl Controller {
     /// What a step does behind the network.
     #[inline(never)]
     fn settle(&mut self, measured: &Measurement, chosen: (u32, f32)) -> Command {
-        let front = self.sense(measured);
-        let command = self.decide(&front, chosen);
-        self.advance(&front, &command);
+        let (front, sound) = self.guarded(measured);
+        let command = self.decide(&front, sound, chosen);
+        self.advance(&front, sound, &command);
         command
     }
     /// Network and argmax: index and duty of the greedy action.
@@ -532,51 +600,61 @@ impl Controller {
     }
     /// Mapping, limits, status.
     #[inline(always)]
-    fn decide(&self, front: &Front, (action_index, chosen): (u32, f32)) -> Command {
+    fn decide(
+        &self,
+        front: &Front,
+        sound: u32,
+        (action_index, chosen): (u32, f32),
+    ) -> Command {
         let v0: f32 = clamp(chosen, 0.05, 0.95);
         let f1: u32 = chosen.to_bits() ^ v0.to_bits();
         let f2: u32 = flag(f1 != 0);
-        let usable = front.usable;
+        let stray = far(v0, 2139095040);
+        let trusted = sound & !((stray >> 31));
+        let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
             | (f2 << 7);
         Command {
             duty: select(usable, v0, 0.05),
             duty_sim: select(usable, chosen, 0.05),
-            action_index,
+            action_index: action_index & 0_u32.wrapping_sub(trusted),
             status: (status & 0_u32.wrapping_sub(usable))
-                | (status::FALLBACK & usable.wrapping_sub(1)),
+                | (status::FALLBACK & usable.wrapping_sub(1))
+                | (status::STATE & trusted.wrapping_sub(1)),
         }
     }
     /// Filters, held samples and counters move on by one sample period.
     #[inline(always)]
-    fn advance(&mut self, front: &Front, command: &Command) {
-        let mut moved = front.push[0];
+    fn advance(&mut self, front: &Front, sound: u32, command: &Command) {
+        let pushed = select(sound, front.push[0], 0.0);
+        let mut moved = pushed;
         for word in self.memory.iter_mut().skip(0).take(20).rev() {
-            let before = select(self.primed, *word, front.push[0]);
+            let before = select(self.primed & sound, *word, pushed);
             *word = moved;
             moved = before;
         }
-        self.memory[20] = front.push[1];
-        self.memory[21] = front.push[2];
-        self.memory[22] = front.push[3];
-        self.memory[23] = front.push[4];
-        self.memory[24] = front.push[5];
-        let mut moved = front.push[6];
+        self.memory[20] = select(sound, front.push[1], 0.0);
+        self.memory[21] = select(sound, front.push[2], 0.0);
+        self.memory[22] = select(sound, front.push[3], 0.0);
+        self.memory[23] = select(sound, front.push[4], 0.0);
+        self.memory[24] = select(sound, front.push[5], 0.0);
+        let pushed = select(sound, front.push[6], 0.0);
+        let mut moved = pushed;
         for word in self.memory.iter_mut().skip(25).take(39).rev() {
-            let before = select(self.primed, *word, front.push[6]);
+            let before = select(self.primed & sound, *word, pushed);
             *word = moved;
             moved = before;
         }
-        self.memory[64] = front.push[7];
-        self.memory[65] = front.push[8];
-        self.memory[66] = front.push[9];
-        self.memory[67] = front.push[10];
-        self.memory[68] = front.push[11];
+        self.memory[64] = select(sound, front.push[7], 0.0);
+        self.memory[65] = select(sound, front.push[8], 0.0);
+        self.memory[66] = select(sound, front.push[9], 0.0);
+        self.memory[67] = select(sound, front.push[10], 0.0);
+        self.memory[68] = select(sound, front.push[11], 0.0);
         self.held = front.signal;
         self.previous_duty = command.duty_sim;
         self.previous_command = command.duty;
-        self.bad_count = front.bad_count;
-        self.primed = front.usable;
+        self.bad_count = front.bad_count & 0_u32.wrapping_sub(sound);
+        self.primed = front.usable.wrapping_add(2).wrapping_sub(sound << 1);
     }
     /// Known answers: whether the arithmetic of this build is the policy's.
     ///

@@ -49,15 +49,17 @@
 #endif
 
 /*
- * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
- * fast; helpers that this build may not need.
+ * Functions that are there once and share no stack frame with their caller; functions that are part of it; functions off
+ * the control path: small before fast; helpers that this build may not need.
  */
 #if defined(__GNUC__)
 #define LINEAR_APART __attribute__((noinline))
+#define LINEAR_TOGETHER __inline__ __attribute__((always_inline))
 #define LINEAR_COLD __attribute__((cold))
 #define LINEAR_SPARE __attribute__((unused))
 #else
 #define LINEAR_APART
+#define LINEAR_TOGETHER
 #define LINEAR_COLD
 #define LINEAR_SPARE
 #endif
@@ -186,12 +188,42 @@ LINEAR_CODE LINEAR_APART static float linear_clamp(float x, float low, float hig
 #endif
 }
 
+/* The sign bit is set if |x| is above the number with these bits. Integers: a comparison of floats costs more, and a NaN is above. */
+LINEAR_SPARE static uint32_t linear_far(float x, uint32_t bound)
+{
+    return bound - (linear_bits(x) & 0x7FFFFFFFu);
+}
+
+/* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
+LINEAR_SPARE static uint32_t linear_aside(float x, uint32_t difference, uint32_t high)
+{
+    return linear_far(x, high ^ (difference & ((uint32_t)0 - (linear_bits(x) >> 31))));
+}
+
+/* The sign bit is set if x is not among the numbers from the one with the bits low on. */
+LINEAR_SPARE static uint32_t linear_beyond(float x, uint32_t low, uint32_t width)
+{
+    const uint32_t above = linear_bits(x) - low;
+    return above | (width - above);
+}
+
+LINEAR_SPARE static uint32_t linear_line_far(const float *line, uint32_t length, uint32_t bound)
+{
+    uint32_t i;
+    uint32_t stray = 0u;
+    for (i = 0u; i < length; ++i) {
+        stray |= linear_far(line[i], bound);
+    }
+    return stray;
+}
+
 /* What a measurement means before the network sees it. */
 typedef struct {
     float signal[1]; /* sanitised */
     float observation[2]; /* network input */
     float push[1]; /* what the filters will remember */
     uint32_t bad_count; /* including this step */
+    uint32_t sound; /* 1 if the state is one that the controller can have written */
     uint32_t usable; /* 1 if the network decides */
     uint32_t held; /* 1 if a held sample bridges an invalid one */
     uint32_t primed_now; /* 1 if this step primes the filters */
@@ -204,7 +236,7 @@ LINEAR_CODE LINEAR_APART static void linear_sense(const linear_state *state, con
     const float v1 = linear_select(f0, measured->v_out, state->held[0]);
     const float v2 = 100.0f - v1;
     const float v3 = v2 * 0.05f;
-    const float v4 = linear_select(state->primed, state->memory[0], 0.0f);
+    const float v4 = linear_select(state->primed & 1u, state->memory[0], 0.0f);
     const float v5 = v2 * 0.0001f;
     const float v6 = v4 + v5;
     const float v7 = linear_clamp(v6, -1.0f, 1.0f);
@@ -221,6 +253,18 @@ LINEAR_CODE LINEAR_APART static void linear_sense(const linear_state *state, con
     front->usable = usable;
     front->held = usable & (f0 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
+}
+
+/* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
+LINEAR_CODE LINEAR_TOGETHER static void linear_guard(const linear_state *state, linear_front *front)
+{
+    const uint32_t stray = linear_aside(state->held[0], 0x437A0000u, 0x437A0000u)
+                         | linear_far(state->memory[0], 0x3F800008u)
+                         | linear_beyond(state->previous_command, 0x3ECCCCCDu, 0x004CCCCCu);
+    const uint32_t counters = (2u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
+    const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1);
+    front->sound = sound;
+    front->usable &= sound;
 }
 
 /* Sums side by side in vectors, each one in the order written; the width is that of the machine the compiler is told of. */
@@ -317,7 +361,7 @@ LINEAR_CODE LINEAR_APART static uint32_t linear_choose(const linear_state *state
 }
 
 /* Mapping, limits, status. */
-LINEAR_CODE static void linear_decide(const linear_state *state, const linear_front *front, uint32_t index, linear_command *command)
+LINEAR_CODE LINEAR_TOGETHER static void linear_decide(const linear_state *state, const linear_front *front, uint32_t index, linear_command *command)
 {
     const float chosen = linear_duties[index];
     const float v0 = state->previous_command - 0.049999997f;
@@ -328,7 +372,9 @@ LINEAR_CODE static void linear_decide(const linear_state *state, const linear_fr
     const float v5 = linear_clamp(v2, 0.4f, 0.59999996f);
     const uint32_t f6 = linear_bits(v2) ^ linear_bits(v5);
     const uint32_t f7 = linear_flag(f6 != 0u);
-    const uint32_t usable = front->usable;
+    const uint32_t stray = linear_far(v5, 0x7F800000u);
+    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
+    const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
                           | (f4 << 5)
@@ -336,23 +382,28 @@ LINEAR_CODE static void linear_decide(const linear_state *state, const linear_fr
 
     command->duty = linear_select(usable, v5, 0.4f);
     command->duty_sim = linear_select(usable, chosen, 0.4f);
-    command->action_index = index;
-    command->status = (status & ((uint32_t)0 - usable)) | (LINEAR_STATUS_FALLBACK & (usable - (uint32_t)1));
+    command->action_index = index & ((uint32_t)0 - trusted);
+    command->status = (status & ((uint32_t)0 - usable)) | (LINEAR_STATUS_FALLBACK & (usable - (uint32_t)1))
+                    | (LINEAR_STATUS_STATE & (trusted - (uint32_t)1));
     (void)state;
 }
 
 /* Filters, held samples and counters move on by one sample period. */
-LINEAR_CODE LINEAR_NO_LIBC static void linear_advance(linear_state *state, const linear_front *front, const linear_command *command)
+LINEAR_CODE LINEAR_TOGETHER LINEAR_NO_LIBC static void linear_advance(linear_state *state, const linear_front *front, const linear_command *command)
 {
+    const uint32_t kept = (uint32_t)0 - front->sound;
+    const uint32_t primed = state->primed & front->sound;
+    const float push0 = linear_from_bits(linear_bits(front->push[0]) & kept);
     uint32_t i;
-    state->memory[0] = front->push[0];
+    (void)primed;
+    state->memory[0] = push0;
     for (i = 0u; i < LINEAR_SIGNALS; ++i) {
         state->held[i] = front->signal[i];
     }
     state->previous_duty = command->duty_sim;
     state->previous_command = command->duty;
-    state->bad_count = front->bad_count;
-    state->primed = front->usable;
+    state->bad_count = front->bad_count & ((uint32_t)0 - front->sound);
+    state->primed = (front->usable + (uint32_t)2) - (front->sound << 1);
 }
 
 /*
@@ -363,6 +414,7 @@ LINEAR_CODE LINEAR_APART static void linear_answer(const linear_state *state, co
 {
     linear_front front;
     linear_sense(state, measured, &front);
+    linear_guard(state, &front);
     linear_decide(state, &front, index, command);
 }
 
@@ -370,6 +422,7 @@ LINEAR_CODE LINEAR_APART static void linear_settle(linear_state *state, const li
 {
     linear_front front;
     linear_sense(state, measured, &front);
+    linear_guard(state, &front);
     linear_decide(state, &front, index, command);
     linear_advance(state, &front, command);
 }
@@ -384,6 +437,7 @@ LINEAR_CODE void linear_commit(linear_state *state, const linear_measurement *me
 {
     linear_front front;
     linear_sense(state, measured, &front);
+    linear_guard(state, &front);
     linear_advance(state, &front, command);
 }
 

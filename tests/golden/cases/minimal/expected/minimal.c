@@ -49,15 +49,17 @@
 #endif
 
 /*
- * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
- * fast; helpers that this build may not need.
+ * Functions that are there once and share no stack frame with their caller; functions that are part of it; functions off
+ * the control path: small before fast; helpers that this build may not need.
  */
 #if defined(__GNUC__)
 #define MINIMAL_APART __attribute__((noinline))
+#define MINIMAL_TOGETHER __inline__ __attribute__((always_inline))
 #define MINIMAL_COLD __attribute__((cold))
 #define MINIMAL_SPARE __attribute__((unused))
 #else
 #define MINIMAL_APART
+#define MINIMAL_TOGETHER
 #define MINIMAL_COLD
 #define MINIMAL_SPARE
 #endif
@@ -195,6 +197,34 @@ MINIMAL_CODE MINIMAL_APART static float minimal_clamp(float x, float low, float 
 #endif
 }
 
+/* The sign bit is set if |x| is above the number with these bits. Integers: a comparison of floats costs more, and a NaN is above. */
+MINIMAL_SPARE static uint32_t minimal_far(float x, uint32_t bound)
+{
+    return bound - (minimal_bits(x) & 0x7FFFFFFFu);
+}
+
+/* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
+MINIMAL_SPARE static uint32_t minimal_aside(float x, uint32_t difference, uint32_t high)
+{
+    return minimal_far(x, high ^ (difference & ((uint32_t)0 - (minimal_bits(x) >> 31))));
+}
+
+/* The sign bit is set if x is not among the numbers from the one with the bits low on. */
+MINIMAL_SPARE static uint32_t minimal_beyond(float x, uint32_t low, uint32_t width)
+{
+    const uint32_t above = minimal_bits(x) - low;
+    return above | (width - above);
+}
+
+MINIMAL_SPARE static uint32_t minimal_line_far(const float *line, uint32_t length, uint32_t bound)
+{
+    uint32_t i;
+    uint32_t stray = 0u;
+    for (i = 0u; i < length; ++i) {
+        stray |= minimal_far(line[i], bound);
+    }
+    return stray;
+}
 /* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
 static float minimal_relu(float x)
 {
@@ -211,6 +241,7 @@ typedef struct {
     float signal[2]; /* sanitised */
     float observation[2]; /* network input */
     uint32_t bad_count; /* including this step */
+    uint32_t sound; /* 1 if the state is one that the controller can have written */
     uint32_t usable; /* 1 if the network decides */
     uint32_t held; /* 1 if a held sample bridges an invalid one */
     uint32_t primed_now; /* 1 if this step primes the filters */
@@ -237,6 +268,17 @@ MINIMAL_CODE MINIMAL_APART static void minimal_sense(const minimal_state *state,
     front->usable = usable;
     front->held = usable & (f4 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
+}
+
+/* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
+MINIMAL_CODE MINIMAL_TOGETHER static void minimal_guard(const minimal_state *state, minimal_front *front)
+{
+    const uint32_t stray = minimal_aside(state->held[0], 0x437A0000u, 0x437A0000u)
+                         | minimal_aside(state->held[1], 0x02D00000u, 0x42700000u);
+    const uint32_t counters = (1u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
+    const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1);
+    front->sound = sound;
+    front->usable &= sound;
 }
 
 /* Sums side by side in vectors, each one in the order written; the width is that of the machine the compiler is told of. */
@@ -407,26 +449,29 @@ MINIMAL_CODE MINIMAL_APART static uint32_t minimal_choose(const minimal_state *s
 }
 
 /* Mapping, limits, status. */
-MINIMAL_CODE static void minimal_decide(const minimal_state *state, const minimal_front *front, uint32_t index, minimal_command *command)
+MINIMAL_CODE MINIMAL_TOGETHER static void minimal_decide(const minimal_state *state, const minimal_front *front, uint32_t index, minimal_command *command)
 {
     const float chosen = minimal_duties[index];
     const float v0 = minimal_clamp(chosen, 0.1f, 0.9f);
     const uint32_t f1 = minimal_bits(chosen) ^ minimal_bits(v0);
     const uint32_t f2 = minimal_flag(f1 != 0u);
-    const uint32_t usable = front->usable;
+    const uint32_t stray = minimal_far(v0, 0x7F800000u);
+    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
+    const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
                           | (f2 << 7);
 
     command->duty = minimal_select(usable, v0, 0.0f);
     command->duty_sim = minimal_select(usable, chosen, 0.0f);
-    command->action_index = index;
-    command->status = (status & ((uint32_t)0 - usable)) | (MINIMAL_STATUS_FALLBACK & (usable - (uint32_t)1));
+    command->action_index = index & ((uint32_t)0 - trusted);
+    command->status = (status & ((uint32_t)0 - usable)) | (MINIMAL_STATUS_FALLBACK & (usable - (uint32_t)1))
+                    | (MINIMAL_STATUS_STATE & (trusted - (uint32_t)1));
     (void)state;
 }
 
 /* Filters, held samples and counters move on by one sample period. */
-MINIMAL_CODE MINIMAL_NO_LIBC static void minimal_advance(minimal_state *state, const minimal_front *front, const minimal_command *command)
+MINIMAL_CODE MINIMAL_TOGETHER MINIMAL_NO_LIBC static void minimal_advance(minimal_state *state, const minimal_front *front, const minimal_command *command)
 {
     uint32_t i;
     for (i = 0u; i < MINIMAL_SIGNALS; ++i) {
@@ -434,8 +479,8 @@ MINIMAL_CODE MINIMAL_NO_LIBC static void minimal_advance(minimal_state *state, c
     }
     state->previous_duty = command->duty_sim;
     state->previous_command = command->duty;
-    state->bad_count = front->bad_count;
-    state->primed = front->usable;
+    state->bad_count = front->bad_count & ((uint32_t)0 - front->sound);
+    state->primed = (front->usable + (uint32_t)2) - (front->sound << 1);
 }
 
 /*
@@ -446,6 +491,7 @@ MINIMAL_CODE MINIMAL_APART static void minimal_answer(const minimal_state *state
 {
     minimal_front front;
     minimal_sense(state, measured, &front);
+    minimal_guard(state, &front);
     minimal_decide(state, &front, index, command);
 }
 
@@ -453,6 +499,7 @@ MINIMAL_CODE MINIMAL_APART static void minimal_settle(minimal_state *state, cons
 {
     minimal_front front;
     minimal_sense(state, measured, &front);
+    minimal_guard(state, &front);
     minimal_decide(state, &front, index, command);
     minimal_advance(state, &front, command);
 }
@@ -467,6 +514,7 @@ MINIMAL_CODE void minimal_commit(minimal_state *state, const minimal_measurement
 {
     minimal_front front;
     minimal_sense(state, measured, &front);
+    minimal_guard(state, &front);
     minimal_advance(state, &front, command);
 }
 

@@ -21,7 +21,7 @@ pub const SAMPLE_PERIOD: f64 = 0.0001;
 pub mod status {
     /// Held samples bridge an invalid measurement.
     pub const HELD: u32 = 1;
-    /// No usable measurement: the fallback duty is commanded.
+    /// The fallback duty is commanded: no usable measurement, or no sound state.
     pub const FALLBACK: u32 = 2;
     /// This step primed the filters.
     pub const PRIMED: u32 = 4;
@@ -35,6 +35,8 @@ pub mod status {
     pub const SOFT_START: u32 = 64;
     /// A duty limit was active.
     pub const LIMITED: u32 = 128;
+    /// The state was damaged: the fallback duty is commanded until init or reset.
+    pub const STATE: u32 = 256;
 }
 static CRC_STEPS: [u32; 16] = [
     0, 498536548, 997073096, 651767980, 1994146192, 1802195444, 1303535960, 1342533948,
@@ -76,12 +78,12 @@ fn select(flag: u32, then: f32, otherwise: f32) -> f32 {
 #[inline(always)]
 #[allow(dead_code)]
 fn within(x: f32, low: f32, high: f32) -> u32 {
-    flag(x >= low) & flag(x <= high)
+    flag((x >= low) & (x <= high))
 }
 #[inline(always)]
 #[allow(dead_code)]
 fn outside(x: f32, low: f32, high: f32) -> u32 {
-    flag(x < low) | flag(x > high)
+    flag((x < low) | (x > high))
 }
 #[inline(always)]
 #[allow(dead_code)]
@@ -114,6 +116,26 @@ fn relu(x: f32) -> f32 {
 #[allow(dead_code)]
 fn leaky_relu(x: f32, slope: f32) -> f32 {
     select(x.to_bits() >> 31, slope * x, x)
+}
+/// The sign bit is set if |x| is above the number with the bits `bound`.
+#[inline(always)]
+#[allow(dead_code)]
+fn far(x: f32, bound: u32) -> u32 {
+    bound.wrapping_sub(x.to_bits() & 0x7FFF_FFFF)
+}
+/// The sign bit is set if |x| is above the bound of its sign: `high`, or below 0 what `difference` makes of it.
+#[inline(always)]
+#[allow(dead_code)]
+fn aside(x: f32, difference: u32, high: u32) -> u32 {
+    let below = (0 as u32).wrapping_sub(x.to_bits() >> 31);
+    far(x, high ^ (difference & below))
+}
+/// The sign bit is set if x is not among the `width` numbers from that with the bits `low` on.
+#[inline(always)]
+#[allow(dead_code)]
+fn beyond(x: f32, low: u32, width: u32) -> u32 {
+    let above = x.to_bits().wrapping_sub(low);
+    above | width.wrapping_sub(above)
 }
 static DUTIES: [f32; ACTIONS] = [0.4, 0.5, 0.6];
 /// So that no vector of weights lies across two lines of the cache.
@@ -357,12 +379,13 @@ impl Controller {
     #[must_use]
     pub fn eval(&self, measured: &Measurement) -> Command {
         let chosen = self.choose_for(measured);
-        self.decide(&self.sense(measured), chosen)
+        let (front, sound) = self.guarded(measured);
+        self.decide(&front, sound, chosen)
     }
     /// Advances the filters by one sample period, with the command that `eval` gave for this measurement.
     pub fn commit(&mut self, measured: &Measurement, command: &Command) {
-        let front = self.sense(measured);
-        self.advance(&front, command);
+        let (front, sound) = self.guarded(measured);
+        self.advance(&front, sound, command);
     }
     /// `eval` and `commit`.
     pub fn step(&mut self, measured: &Measurement) -> Command {
@@ -399,6 +422,23 @@ impl Controller {
             primed_now: usable & (self.primed ^ 1),
         }
     }
+    /// 1 if the state is one that the controller can have written: a flipped bit that would decide the duty gives 0.
+    #[inline(always)]
+    fn sound(&self) -> u32 {
+        let stray = aside(self.held[0], 1132068864, 1132068864)
+            | aside(self.held[1], 47185920, 1114636288);
+        let counters = 1u32.wrapping_sub(self.bad_count) | self.bad_count
+            | 1_u32.wrapping_sub(self.primed) | self.primed;
+        ((stray | counters) >> 31) ^ 1
+    }
+    /// [`Self::sense`], and what a damaged state forbids.
+    #[inline(always)]
+    fn guarded(&self, measured: &Measurement) -> (Front, u32) {
+        let sound = self.sound();
+        let mut front = self.sense(measured);
+        front.usable &= sound;
+        (front, sound)
+    }
     /// The greedy action for a measurement, with a stack of its own.
     #[inline(never)]
     fn choose_for(&self, measured: &Measurement) -> (u32, f32) {
@@ -407,9 +447,9 @@ impl Controller {
     /// What a step does behind the network.
     #[inline(never)]
     fn settle(&mut self, measured: &Measurement, chosen: (u32, f32)) -> Command {
-        let front = self.sense(measured);
-        let command = self.decide(&front, chosen);
-        self.advance(&front, &command);
+        let (front, sound) = self.guarded(measured);
+        let command = self.decide(&front, sound, chosen);
+        self.advance(&front, sound, &command);
         command
     }
     /// Network and argmax: index and duty of the greedy action.
@@ -431,28 +471,36 @@ impl Controller {
     }
     /// Mapping, limits, status.
     #[inline(always)]
-    fn decide(&self, front: &Front, (action_index, chosen): (u32, f32)) -> Command {
+    fn decide(
+        &self,
+        front: &Front,
+        sound: u32,
+        (action_index, chosen): (u32, f32),
+    ) -> Command {
         let v0: f32 = clamp(chosen, 0.1, 0.9);
         let f1: u32 = chosen.to_bits() ^ v0.to_bits();
         let f2: u32 = flag(f1 != 0);
-        let usable = front.usable;
+        let stray = far(v0, 2139095040);
+        let trusted = sound & !((stray >> 31));
+        let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (f2 << 7);
         Command {
             duty: select(usable, v0, 0.0),
             duty_sim: select(usable, chosen, 0.0),
-            action_index,
+            action_index: action_index & 0_u32.wrapping_sub(trusted),
             status: (status & 0_u32.wrapping_sub(usable))
-                | (status::FALLBACK & usable.wrapping_sub(1)),
+                | (status::FALLBACK & usable.wrapping_sub(1))
+                | (status::STATE & trusted.wrapping_sub(1)),
         }
     }
     /// Filters, held samples and counters move on by one sample period.
     #[inline(always)]
-    fn advance(&mut self, front: &Front, command: &Command) {
+    fn advance(&mut self, front: &Front, sound: u32, command: &Command) {
         self.held = front.signal;
         self.previous_duty = command.duty_sim;
         self.previous_command = command.duty;
-        self.bad_count = front.bad_count;
-        self.primed = front.usable;
+        self.bad_count = front.bad_count & 0_u32.wrapping_sub(sound);
+        self.primed = front.usable.wrapping_add(2).wrapping_sub(sound << 1);
     }
     /// Known answers: whether the arithmetic of this build is the policy's.
     ///

@@ -49,15 +49,17 @@
 #endif
 
 /*
- * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
- * fast; helpers that this build may not need.
+ * Functions that are there once and share no stack frame with their caller; functions that are part of it; functions off
+ * the control path: small before fast; helpers that this build may not need.
  */
 #if defined(__GNUC__)
 #define PAPER_APART __attribute__((noinline))
+#define PAPER_TOGETHER __inline__ __attribute__((always_inline))
 #define PAPER_COLD __attribute__((cold))
 #define PAPER_SPARE __attribute__((unused))
 #else
 #define PAPER_APART
+#define PAPER_TOGETHER
 #define PAPER_COLD
 #define PAPER_SPARE
 #endif
@@ -224,6 +226,34 @@ PAPER_CODE PAPER_APART static float paper_clamp(float x, float low, float high)
 #endif
 }
 
+/* The sign bit is set if |x| is above the number with these bits. Integers: a comparison of floats costs more, and a NaN is above. */
+PAPER_SPARE static uint32_t paper_far(float x, uint32_t bound)
+{
+    return bound - (paper_bits(x) & 0x7FFFFFFFu);
+}
+
+/* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
+PAPER_SPARE static uint32_t paper_aside(float x, uint32_t difference, uint32_t high)
+{
+    return paper_far(x, high ^ (difference & ((uint32_t)0 - (paper_bits(x) >> 31))));
+}
+
+/* The sign bit is set if x is not among the numbers from the one with the bits low on. */
+PAPER_SPARE static uint32_t paper_beyond(float x, uint32_t low, uint32_t width)
+{
+    const uint32_t above = paper_bits(x) - low;
+    return above | (width - above);
+}
+
+PAPER_SPARE static uint32_t paper_line_far(const float *line, uint32_t length, uint32_t bound)
+{
+    uint32_t i;
+    uint32_t stray = 0u;
+    for (i = 0u; i < length; ++i) {
+        stray |= paper_far(line[i], bound);
+    }
+    return stray;
+}
 /* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
 static float paper_relu(float x)
 {
@@ -241,6 +271,7 @@ typedef struct {
     float observation[6]; /* network input */
     float push[4]; /* what the filters will remember */
     uint32_t bad_count; /* including this step */
+    uint32_t sound; /* 1 if the state is one that the controller can have written */
     uint32_t usable; /* 1 if the network decides */
     uint32_t held; /* 1 if a held sample bridges an invalid one */
     uint32_t primed_now; /* 1 if this step primes the filters */
@@ -259,11 +290,11 @@ PAPER_CODE PAPER_APART static void paper_sense(const paper_state *state, const p
     const float v6 = v5 * 0.01f;
     const float v7 = paper_clamp(v6, -2.0f, 2.0f);
     const uint32_t f8 = paper_bits(v6) ^ paper_bits(v7);
-    const float v9 = paper_select(state->primed, state->memory[0], v5);
+    const float v9 = paper_select(state->primed & 1u, state->memory[0], v5);
     const float v10 = v9 * 0.01f;
     const float v11 = paper_clamp(v10, -2.0f, 2.0f);
     const uint32_t f12 = paper_bits(v10) ^ paper_bits(v11);
-    const float v13 = paper_select(state->primed, state->memory[1], v5);
+    const float v13 = paper_select(state->primed & 1u, state->memory[1], v5);
     const float v14 = v5 - v13;
     const float v15 = v14 * 10000.0f;
     const float v16 = v15 * 1e-5f;
@@ -272,11 +303,11 @@ PAPER_CODE PAPER_APART static void paper_sense(const paper_state *state, const p
     const float v19 = v1 * 0.01f;
     const float v20 = paper_clamp(v19, 0.0f, 2.5f);
     const uint32_t f21 = paper_bits(v19) ^ paper_bits(v20);
-    const float v22 = paper_select(state->primed, state->memory[2], v1);
+    const float v22 = paper_select(state->primed & 1u, state->memory[2], v1);
     const float v23 = v22 * 0.01f;
     const float v24 = paper_clamp(v23, 0.0f, 2.5f);
     const uint32_t f25 = paper_bits(v23) ^ paper_bits(v24);
-    const float v26 = paper_select(state->primed, state->memory[3], v1);
+    const float v26 = paper_select(state->primed & 1u, state->memory[3], v1);
     const float v27 = v1 - v26;
     const float v28 = v27 * 10000.0f;
     const float v29 = v28 * 1e-5f;
@@ -310,6 +341,22 @@ PAPER_CODE PAPER_APART static void paper_sense(const paper_state *state, const p
     front->held = usable & (f4 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
     front->clipped = f37;
+}
+
+/* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
+PAPER_CODE PAPER_TOGETHER static void paper_guard(const paper_state *state, paper_front *front)
+{
+    const uint32_t stray = paper_aside(state->held[0], 0x437A0000u, 0x437A0000u)
+                         | paper_aside(state->held[1], 0x7DA00000u, 0x42200000u)
+                         | paper_line_far(&state->memory[0], 2u, 0x43AF000Eu)
+                         | paper_line_far(&state->memory[2], 2u, 0x437A0000u)
+                         | paper_beyond(state->mapping_a, 0x3EF851ECu, 0x00FFFFFFu)
+                         | paper_aside(state->mapping_b, 0x00115405u, 0x3D5566CFu)
+                         | paper_aside(state->mapping_c, 0x00656041u, 0x3E5A1CACu);
+    const uint32_t counters = (4u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
+    const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1);
+    front->sound = sound;
+    front->usable &= sound;
 }
 
 /* Sums side by side in vectors, each one in the order written; the width is that of the machine the compiler is told of. */
@@ -542,7 +589,7 @@ PAPER_CODE PAPER_APART static uint32_t paper_choose(const paper_state *state, co
 }
 
 /* Mapping, limits, status. */
-PAPER_CODE static void paper_decide(const paper_state *state, const paper_front *front, uint32_t index, paper_command *command)
+PAPER_CODE PAPER_TOGETHER static void paper_decide(const paper_state *state, const paper_front *front, uint32_t index, paper_command *command)
 {
     const float chosen = paper_duties[index];
     const float v0 = state->mapping_a * chosen;
@@ -555,7 +602,9 @@ PAPER_CODE static void paper_decide(const paper_state *state, const paper_front 
     const float v7 = paper_clamp(v3, 0.3f, 0.7f);
     const uint32_t f8 = paper_bits(v3) ^ paper_bits(v7);
     const uint32_t f9 = paper_flag(f8 != 0u);
-    const uint32_t usable = front->usable;
+    const uint32_t stray = paper_far(v7, 0x7F800000u);
+    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
+    const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
                           | (front->clipped << 3)
@@ -564,25 +613,33 @@ PAPER_CODE static void paper_decide(const paper_state *state, const paper_front 
 
     command->duty = paper_select(usable, v7, 0.0f);
     command->duty_sim = paper_select(usable, chosen, 0.0f);
-    command->action_index = index;
-    command->status = (status & ((uint32_t)0 - usable)) | (PAPER_STATUS_FALLBACK & (usable - (uint32_t)1));
+    command->action_index = index & ((uint32_t)0 - trusted);
+    command->status = (status & ((uint32_t)0 - usable)) | (PAPER_STATUS_FALLBACK & (usable - (uint32_t)1))
+                    | (PAPER_STATUS_STATE & (trusted - (uint32_t)1));
 }
 
 /* Filters, held samples and counters move on by one sample period. */
-PAPER_CODE PAPER_NO_LIBC static void paper_advance(paper_state *state, const paper_front *front, const paper_command *command)
+PAPER_CODE PAPER_TOGETHER PAPER_NO_LIBC static void paper_advance(paper_state *state, const paper_front *front, const paper_command *command)
 {
+    const uint32_t kept = (uint32_t)0 - front->sound;
+    const uint32_t primed = state->primed & front->sound;
+    const float push0 = paper_from_bits(paper_bits(front->push[0]) & kept);
+    const float push1 = paper_from_bits(paper_bits(front->push[1]) & kept);
+    const float push2 = paper_from_bits(paper_bits(front->push[2]) & kept);
+    const float push3 = paper_from_bits(paper_bits(front->push[3]) & kept);
     uint32_t i;
-    state->memory[0] = front->push[0];
-    state->memory[1] = front->push[1];
-    state->memory[2] = front->push[2];
-    state->memory[3] = front->push[3];
+    (void)primed;
+    state->memory[0] = push0;
+    state->memory[1] = push1;
+    state->memory[2] = push2;
+    state->memory[3] = push3;
     for (i = 0u; i < PAPER_SIGNALS; ++i) {
         state->held[i] = front->signal[i];
     }
     state->previous_duty = command->duty_sim;
     state->previous_command = command->duty;
-    state->bad_count = front->bad_count;
-    state->primed = front->usable;
+    state->bad_count = front->bad_count & ((uint32_t)0 - front->sound);
+    state->primed = (front->usable + (uint32_t)2) - (front->sound << 1);
 }
 
 /*
@@ -593,6 +650,7 @@ PAPER_CODE PAPER_APART static void paper_answer(const paper_state *state, const 
 {
     paper_front front;
     paper_sense(state, measured, &front);
+    paper_guard(state, &front);
     paper_decide(state, &front, index, command);
 }
 
@@ -600,6 +658,7 @@ PAPER_CODE PAPER_APART static void paper_settle(paper_state *state, const paper_
 {
     paper_front front;
     paper_sense(state, measured, &front);
+    paper_guard(state, &front);
     paper_decide(state, &front, index, command);
     paper_advance(state, &front, command);
 }
@@ -614,6 +673,7 @@ PAPER_CODE void paper_commit(paper_state *state, const paper_measurement *measur
 {
     paper_front front;
     paper_sense(state, measured, &front);
+    paper_guard(state, &front);
     paper_advance(state, &front, command);
 }
 

@@ -49,15 +49,17 @@
 #endif
 
 /*
- * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
- * fast; helpers that this build may not need.
+ * Functions that are there once and share no stack frame with their caller; functions that are part of it; functions off
+ * the control path: small before fast; helpers that this build may not need.
  */
 #if defined(__GNUC__)
 #define TAIL_BLOCKS_APART __attribute__((noinline))
+#define TAIL_BLOCKS_TOGETHER __inline__ __attribute__((always_inline))
 #define TAIL_BLOCKS_COLD __attribute__((cold))
 #define TAIL_BLOCKS_SPARE __attribute__((unused))
 #else
 #define TAIL_BLOCKS_APART
+#define TAIL_BLOCKS_TOGETHER
 #define TAIL_BLOCKS_COLD
 #define TAIL_BLOCKS_SPARE
 #endif
@@ -301,6 +303,34 @@ TAIL_BLOCKS_CODE TAIL_BLOCKS_APART static float tail_blocks_clamp(float x, float
 #endif
 }
 
+/* The sign bit is set if |x| is above the number with these bits. Integers: a comparison of floats costs more, and a NaN is above. */
+TAIL_BLOCKS_SPARE static uint32_t tail_blocks_far(float x, uint32_t bound)
+{
+    return bound - (tail_blocks_bits(x) & 0x7FFFFFFFu);
+}
+
+/* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
+TAIL_BLOCKS_SPARE static uint32_t tail_blocks_aside(float x, uint32_t difference, uint32_t high)
+{
+    return tail_blocks_far(x, high ^ (difference & ((uint32_t)0 - (tail_blocks_bits(x) >> 31))));
+}
+
+/* The sign bit is set if x is not among the numbers from the one with the bits low on. */
+TAIL_BLOCKS_SPARE static uint32_t tail_blocks_beyond(float x, uint32_t low, uint32_t width)
+{
+    const uint32_t above = tail_blocks_bits(x) - low;
+    return above | (width - above);
+}
+
+TAIL_BLOCKS_SPARE static uint32_t tail_blocks_line_far(const float *line, uint32_t length, uint32_t bound)
+{
+    uint32_t i;
+    uint32_t stray = 0u;
+    for (i = 0u; i < length; ++i) {
+        stray |= tail_blocks_far(line[i], bound);
+    }
+    return stray;
+}
 /* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
 static float tail_blocks_relu(float x)
 {
@@ -318,6 +348,7 @@ typedef struct {
     float observation[3]; /* network input */
     float push[1]; /* what the filters will remember */
     uint32_t bad_count; /* including this step */
+    uint32_t sound; /* 1 if the state is one that the controller can have written */
     uint32_t usable; /* 1 if the network decides */
     uint32_t held; /* 1 if a held sample bridges an invalid one */
     uint32_t primed_now; /* 1 if this step primes the filters */
@@ -336,7 +367,7 @@ TAIL_BLOCKS_CODE TAIL_BLOCKS_APART static void tail_blocks_sense(const tail_bloc
     const float v6 = v5 * 0.05f;
     const float v7 = tail_blocks_clamp(v6, -5.0f, 5.0f);
     const uint32_t f8 = tail_blocks_bits(v6) ^ tail_blocks_bits(v7);
-    const float v9 = tail_blocks_select(state->primed, state->memory[0], v1);
+    const float v9 = tail_blocks_select(state->primed & 1u, state->memory[0], v1);
     const float v10 = v9 * 0.01f;
     const float v11 = v3 * 0.02f;
     const uint32_t f12 = tail_blocks_flag(f8 != 0u);
@@ -356,6 +387,19 @@ TAIL_BLOCKS_CODE TAIL_BLOCKS_APART static void tail_blocks_sense(const tail_bloc
     front->held = usable & (f4 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
     front->clipped = f12;
+}
+
+/* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
+TAIL_BLOCKS_CODE TAIL_BLOCKS_TOGETHER static void tail_blocks_guard(const tail_blocks_state *state, tail_blocks_front *front)
+{
+    const uint32_t stray = tail_blocks_aside(state->held[0], 0x437A0000u, 0x437A0000u)
+                         | tail_blocks_aside(state->held[1], 0x02D00000u, 0x42700000u)
+                         | tail_blocks_line_far(&state->memory[0], 2u, 0x437A0000u)
+                         | tail_blocks_beyond(state->soft_cap, 0x3E99999Au, 0x00999999u);
+    const uint32_t counters = (4u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
+    const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1);
+    front->sound = sound;
+    front->usable &= sound;
 }
 
 /* Sums side by side in vectors, each one in the order written; the width is that of the machine the compiler is told of. */
@@ -603,7 +647,7 @@ TAIL_BLOCKS_CODE TAIL_BLOCKS_APART static uint32_t tail_blocks_choose(const tail
 }
 
 /* Mapping, limits, status. */
-TAIL_BLOCKS_CODE static void tail_blocks_decide(const tail_blocks_state *state, const tail_blocks_front *front, uint32_t index, tail_blocks_command *command)
+TAIL_BLOCKS_CODE TAIL_BLOCKS_TOGETHER static void tail_blocks_decide(const tail_blocks_state *state, const tail_blocks_front *front, uint32_t index, tail_blocks_command *command)
 {
     const float chosen = tail_blocks_duties[index];
     const uint32_t f0 = tail_blocks_flag(chosen > state->soft_cap);
@@ -611,7 +655,9 @@ TAIL_BLOCKS_CODE static void tail_blocks_decide(const tail_blocks_state *state, 
     const float v2 = tail_blocks_clamp(v1, 0.3f, 0.7f);
     const uint32_t f3 = tail_blocks_bits(v1) ^ tail_blocks_bits(v2);
     const uint32_t f4 = tail_blocks_flag(f3 != 0u);
-    const uint32_t usable = front->usable;
+    const uint32_t stray = tail_blocks_far(v2, 0x7F800000u);
+    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
+    const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
                           | (front->clipped << 3)
@@ -620,31 +666,36 @@ TAIL_BLOCKS_CODE static void tail_blocks_decide(const tail_blocks_state *state, 
 
     command->duty = tail_blocks_select(usable, v2, 0.0f);
     command->duty_sim = tail_blocks_select(usable, chosen, 0.0f);
-    command->action_index = index;
-    command->status = (status & ((uint32_t)0 - usable)) | (TAIL_BLOCKS_STATUS_FALLBACK & (usable - (uint32_t)1));
+    command->action_index = index & ((uint32_t)0 - trusted);
+    command->status = (status & ((uint32_t)0 - usable)) | (TAIL_BLOCKS_STATUS_FALLBACK & (usable - (uint32_t)1))
+                    | (TAIL_BLOCKS_STATUS_STATE & (trusted - (uint32_t)1));
 }
 
 /* Filters, held samples and counters move on by one sample period. */
-TAIL_BLOCKS_CODE TAIL_BLOCKS_NO_LIBC static void tail_blocks_advance(tail_blocks_state *state, const tail_blocks_front *front, const tail_blocks_command *command)
+TAIL_BLOCKS_CODE TAIL_BLOCKS_TOGETHER TAIL_BLOCKS_NO_LIBC static void tail_blocks_advance(tail_blocks_state *state, const tail_blocks_front *front, const tail_blocks_command *command)
 {
     const float v0 = state->soft_cap + 0.004f;
     const uint32_t f1 = tail_blocks_flag(v0 > 0.7f);
     const float v2 = tail_blocks_select(f1, 0.7f, v0);
     const float v3 = tail_blocks_select(front->usable, v2, 0.3f);
+    const uint32_t kept = (uint32_t)0 - front->sound;
+    const uint32_t primed = state->primed & front->sound;
+    const float push0 = tail_blocks_from_bits(tail_blocks_bits(front->push[0]) & kept);
     uint32_t i;
+    (void)primed;
 
     for (i = 0u; i < 1u; ++i) {
-        state->memory[i] = tail_blocks_select(state->primed, state->memory[i + 1u], front->push[0]);
+        state->memory[i] = tail_blocks_select(primed, state->memory[i + 1u], push0);
     }
-    state->memory[1] = front->push[0];
+    state->memory[1] = push0;
     for (i = 0u; i < TAIL_BLOCKS_SIGNALS; ++i) {
         state->held[i] = front->signal[i];
     }
     state->previous_duty = command->duty_sim;
     state->previous_command = command->duty;
     state->soft_cap = v3;
-    state->bad_count = front->bad_count;
-    state->primed = front->usable;
+    state->bad_count = front->bad_count & ((uint32_t)0 - front->sound);
+    state->primed = (front->usable + (uint32_t)2) - (front->sound << 1);
 }
 
 /*
@@ -655,6 +706,7 @@ TAIL_BLOCKS_CODE TAIL_BLOCKS_APART static void tail_blocks_answer(const tail_blo
 {
     tail_blocks_front front;
     tail_blocks_sense(state, measured, &front);
+    tail_blocks_guard(state, &front);
     tail_blocks_decide(state, &front, index, command);
 }
 
@@ -662,6 +714,7 @@ TAIL_BLOCKS_CODE TAIL_BLOCKS_APART static void tail_blocks_settle(tail_blocks_st
 {
     tail_blocks_front front;
     tail_blocks_sense(state, measured, &front);
+    tail_blocks_guard(state, &front);
     tail_blocks_decide(state, &front, index, command);
     tail_blocks_advance(state, &front, command);
 }
@@ -676,6 +729,7 @@ TAIL_BLOCKS_CODE void tail_blocks_commit(tail_blocks_state *state, const tail_bl
 {
     tail_blocks_front front;
     tail_blocks_sense(state, measured, &front);
+    tail_blocks_guard(state, &front);
     tail_blocks_advance(state, &front, command);
 }
 

@@ -21,7 +21,7 @@ pub const SAMPLE_PERIOD: f64 = 0.0001;
 pub mod status {
     /// Held samples bridge an invalid measurement.
     pub const HELD: u32 = 1;
-    /// No usable measurement: the fallback duty is commanded.
+    /// The fallback duty is commanded: no usable measurement, or no sound state.
     pub const FALLBACK: u32 = 2;
     /// This step primed the filters.
     pub const PRIMED: u32 = 4;
@@ -35,6 +35,8 @@ pub mod status {
     pub const SOFT_START: u32 = 64;
     /// A duty limit was active.
     pub const LIMITED: u32 = 128;
+    /// The state was damaged: the fallback duty is commanded until init or reset.
+    pub const STATE: u32 = 256;
 }
 static CRC_STEPS: [u32; 16] = [
     0, 498536548, 997073096, 651767980, 1994146192, 1802195444, 1303535960, 1342533948,
@@ -76,12 +78,12 @@ fn select(flag: u32, then: f32, otherwise: f32) -> f32 {
 #[inline(always)]
 #[allow(dead_code)]
 fn within(x: f32, low: f32, high: f32) -> u32 {
-    flag(x >= low) & flag(x <= high)
+    flag((x >= low) & (x <= high))
 }
 #[inline(always)]
 #[allow(dead_code)]
 fn outside(x: f32, low: f32, high: f32) -> u32 {
-    flag(x < low) | flag(x > high)
+    flag((x < low) | (x > high))
 }
 #[inline(always)]
 #[allow(dead_code)]
@@ -114,6 +116,26 @@ fn relu(x: f32) -> f32 {
 #[allow(dead_code)]
 fn leaky_relu(x: f32, slope: f32) -> f32 {
     select(x.to_bits() >> 31, slope * x, x)
+}
+/// The sign bit is set if |x| is above the number with the bits `bound`.
+#[inline(always)]
+#[allow(dead_code)]
+fn far(x: f32, bound: u32) -> u32 {
+    bound.wrapping_sub(x.to_bits() & 0x7FFF_FFFF)
+}
+/// The sign bit is set if |x| is above the bound of its sign: `high`, or below 0 what `difference` makes of it.
+#[inline(always)]
+#[allow(dead_code)]
+fn aside(x: f32, difference: u32, high: u32) -> u32 {
+    let below = (0 as u32).wrapping_sub(x.to_bits() >> 31);
+    far(x, high ^ (difference & below))
+}
+/// The sign bit is set if x is not among the `width` numbers from that with the bits `low` on.
+#[inline(always)]
+#[allow(dead_code)]
+fn beyond(x: f32, low: u32, width: u32) -> u32 {
+    let above = x.to_bits().wrapping_sub(low);
+    above | width.wrapping_sub(above)
 }
 static DUTIES: [f32; ACTIONS] = [
     0.31,
@@ -1283,12 +1305,13 @@ impl Controller {
     #[must_use]
     pub fn eval(&self, measured: &Measurement) -> Command {
         let chosen = self.choose_for(measured);
-        self.decide(&self.sense(measured), chosen)
+        let (front, sound) = self.guarded(measured);
+        self.decide(&front, sound, chosen)
     }
     /// Advances the filters by one sample period, with the command that `eval` gave for this measurement.
     pub fn commit(&mut self, measured: &Measurement, command: &Command) {
-        let front = self.sense(measured);
-        self.advance(&front, command);
+        let (front, sound) = self.guarded(measured);
+        self.advance(&front, sound, command);
     }
     /// `eval` and `commit`.
     pub fn step(&mut self, measured: &Measurement) -> Command {
@@ -1317,7 +1340,7 @@ impl Controller {
         let v6: f32 = v5 * 0.05;
         let v7: f32 = clamp(v6, -5.0, 5.0);
         let f8: u32 = v6.to_bits() ^ v7.to_bits();
-        let v9: f32 = select(self.primed, self.memory[0], v1);
+        let v9: f32 = select(self.primed & 1, self.memory[0], v1);
         let v10: f32 = v9 * 0.01;
         let v11: f32 = v3 * 0.02;
         let f12: u32 = flag(f8 != 0);
@@ -1335,6 +1358,30 @@ impl Controller {
             clipped: f12,
         }
     }
+    /// 1 if the state is one that the controller can have written: a flipped bit that would decide the duty gives 0.
+    #[inline(always)]
+    fn sound(&self) -> u32 {
+        let stray = aside(self.held[0], 1132068864, 1132068864)
+            | aside(self.held[1], 47185920, 1114636288)
+            | self
+                .memory
+                .iter()
+                .skip(0)
+                .take(2)
+                .fold(0, |stray, word| stray | far(*word, 1132068864))
+            | beyond(self.soft_cap, 1050253722, 10066329);
+        let counters = 4u32.wrapping_sub(self.bad_count) | self.bad_count
+            | 1_u32.wrapping_sub(self.primed) | self.primed;
+        ((stray | counters) >> 31) ^ 1
+    }
+    /// [`Self::sense`], and what a damaged state forbids.
+    #[inline(always)]
+    fn guarded(&self, measured: &Measurement) -> (Front, u32) {
+        let sound = self.sound();
+        let mut front = self.sense(measured);
+        front.usable &= sound;
+        (front, sound)
+    }
     /// The greedy action for a measurement, with a stack of its own.
     #[inline(never)]
     fn choose_for(&self, measured: &Measurement) -> (u32, f32) {
@@ -1343,9 +1390,9 @@ impl Controller {
     /// What a step does behind the network.
     #[inline(never)]
     fn settle(&mut self, measured: &Measurement, chosen: (u32, f32)) -> Command {
-        let front = self.sense(measured);
-        let command = self.decide(&front, chosen);
-        self.advance(&front, &command);
+        let (front, sound) = self.guarded(measured);
+        let command = self.decide(&front, sound, chosen);
+        self.advance(&front, sound, &command);
         command
     }
     /// Network and argmax: index and duty of the greedy action.
@@ -1367,33 +1414,42 @@ impl Controller {
     }
     /// Mapping, limits, status.
     #[inline(always)]
-    fn decide(&self, front: &Front, (action_index, chosen): (u32, f32)) -> Command {
+    fn decide(
+        &self,
+        front: &Front,
+        sound: u32,
+        (action_index, chosen): (u32, f32),
+    ) -> Command {
         let f0: u32 = flag(chosen > self.soft_cap);
         let v1: f32 = select(f0, self.soft_cap, chosen);
         let v2: f32 = clamp(v1, 0.3, 0.7);
         let f3: u32 = v1.to_bits() ^ v2.to_bits();
         let f4: u32 = flag(f3 != 0);
-        let usable = front.usable;
+        let stray = far(v2, 2139095040);
+        let trusted = sound & !((stray >> 31));
+        let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
             | (f0 << 6) | (f4 << 7);
         Command {
             duty: select(usable, v2, 0.0),
             duty_sim: select(usable, chosen, 0.0),
-            action_index,
+            action_index: action_index & 0_u32.wrapping_sub(trusted),
             status: (status & 0_u32.wrapping_sub(usable))
-                | (status::FALLBACK & usable.wrapping_sub(1)),
+                | (status::FALLBACK & usable.wrapping_sub(1))
+                | (status::STATE & trusted.wrapping_sub(1)),
         }
     }
     /// Filters, held samples and counters move on by one sample period.
     #[inline(always)]
-    fn advance(&mut self, front: &Front, command: &Command) {
+    fn advance(&mut self, front: &Front, sound: u32, command: &Command) {
         let v0: f32 = self.soft_cap + 0.004;
         let f1: u32 = flag(v0 > 0.7);
         let v2: f32 = select(f1, 0.7, v0);
         let v3: f32 = select(front.usable, v2, 0.3);
-        let mut moved = front.push[0];
+        let pushed = select(sound, front.push[0], 0.0);
+        let mut moved = pushed;
         for word in self.memory.iter_mut().skip(0).take(2).rev() {
-            let before = select(self.primed, *word, front.push[0]);
+            let before = select(self.primed & sound, *word, pushed);
             *word = moved;
             moved = before;
         }
@@ -1401,8 +1457,8 @@ impl Controller {
         self.held = front.signal;
         self.previous_duty = command.duty_sim;
         self.previous_command = command.duty;
-        self.bad_count = front.bad_count;
-        self.primed = front.usable;
+        self.bad_count = front.bad_count & 0_u32.wrapping_sub(sound);
+        self.primed = front.usable.wrapping_add(2).wrapping_sub(sound << 1);
     }
     /// Known answers: whether the arithmetic of this build is the policy's.
     ///

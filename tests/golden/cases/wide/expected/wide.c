@@ -52,15 +52,17 @@
 #endif
 
 /*
- * Functions that are there once and share no stack frame with their caller; functions off the control path: small before
- * fast; helpers that this build may not need.
+ * Functions that are there once and share no stack frame with their caller; functions that are part of it; functions off
+ * the control path: small before fast; helpers that this build may not need.
  */
 #if defined(__GNUC__)
 #define WIDE_APART __attribute__((noinline))
+#define WIDE_TOGETHER __inline__ __attribute__((always_inline))
 #define WIDE_COLD __attribute__((cold))
 #define WIDE_SPARE __attribute__((unused))
 #else
 #define WIDE_APART
+#define WIDE_TOGETHER
 #define WIDE_COLD
 #define WIDE_SPARE
 #endif
@@ -269,6 +271,34 @@ static double wide_line_sum(const double *line, uint32_t length, double newest, 
     return sum + newest;
 }
 
+/* The sign bit is set if |x| is above the number with these bits. Integers: a comparison of floats costs more, and a NaN is above. */
+WIDE_SPARE static uint64_t wide_far(double x, uint64_t bound)
+{
+    return bound - (wide_bits(x) & (((uint64_t)1 << 63) - 1u));
+}
+
+/* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
+WIDE_SPARE static uint64_t wide_aside(double x, uint64_t difference, uint64_t high)
+{
+    return wide_far(x, high ^ (difference & ((uint64_t)0 - (wide_bits(x) >> 63))));
+}
+
+/* The sign bit is set if x is not among the numbers from the one with the bits low on. */
+WIDE_SPARE static uint64_t wide_beyond(double x, uint64_t low, uint64_t width)
+{
+    const uint64_t above = wide_bits(x) - low;
+    return above | (width - above);
+}
+
+WIDE_SPARE static uint64_t wide_line_far(const double *line, uint32_t length, uint64_t bound)
+{
+    uint32_t i;
+    uint64_t stray = 0u;
+    for (i = 0u; i < length; ++i) {
+        stray |= wide_far(line[i], bound);
+    }
+    return stray;
+}
 /* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
 static double wide_relu(double x)
 {
@@ -318,6 +348,7 @@ typedef struct {
     double observation[12]; /* network input */
     double push[10]; /* what the filters will remember */
     uint32_t bad_count; /* including this step */
+    uint32_t sound; /* 1 if the state is one that the controller can have written */
     uint32_t usable; /* 1 if the network decides */
     uint32_t held; /* 1 if a held sample bridges an invalid one */
     uint32_t primed_now; /* 1 if this step primes the filters */
@@ -342,41 +373,41 @@ WIDE_CODE WIDE_APART static void wide_sense(const wide_state *state, const wide_
     const double v12 = wide_clamp(v11, -2.0, 2.0);
     const uint32_t f13 = wide_differing(v11, v12);
     const double v14 = v1 - 48.0;
-    const double v15 = wide_select(state->primed, state->memory[0], v14);
+    const double v15 = wide_select(state->primed & 1u, state->memory[0], v14);
     const double v16 = v15 * 0.05;
     const double v17 = v16 + 0.25;
-    const double v18 = wide_select(state->primed, state->memory[3], v1);
+    const double v18 = wide_select(state->primed & 1u, state->memory[3], v1);
     const double v19 = v1 - v18;
     const double v20 = v19 * 10000.0;
     const double v21 = v20 * 1e-5;
     const double v22 = wide_clamp(v21, -1.0, 1.0);
     const uint32_t f23 = wide_differing(v21, v22);
-    const double v24 = wide_select(state->primed, state->memory[4], v5);
+    const double v24 = wide_select(state->primed & 1u, state->memory[4], v5);
     const double v25 = v5 - v24;
     const double v26 = v25 * 0.09090909090909091;
     const double v27 = v24 + v26;
     const double v28 = v27 * 0.05;
     const double v29 = v28 + -0.125;
     const double v30 = v5 - v7;
-    const double v31 = wide_select(state->primed, state->memory[5], v30);
-    const double v32 = wide_select(state->primed, state->memory[6], 0.0);
+    const double v31 = wide_select(state->primed & 1u, state->memory[5], v30);
+    const double v32 = wide_select(state->primed & 1u, state->memory[6], 0.0);
     const double v33 = v32 * 0.9523809523809524;
     const double v34 = v30 - v31;
     const double v35 = v34 * 476.1904761904762;
     const double v36 = v33 + v35;
     const double v37 = v36 * 0.0001;
-    const double v38 = wide_line_sum(&state->memory[7], 4u, v1, state->primed);
+    const double v38 = wide_line_sum(&state->memory[7], 4u, v1, state->primed & 1u);
     const double v39 = v38 * 0.2;
     const double v40 = v39 * 0.02;
-    const double v41 = wide_select(state->primed, state->memory[11], 0.01);
+    const double v41 = wide_select(state->primed & 1u, state->memory[11], 0.01);
     const double v42 = v10 * 0.0001;
     const double v43 = v41 + v42;
     const double v44 = wide_clamp(v43, -0.02, 0.03);
     const double v45 = v44 * 30.0;
-    const double v46 = wide_select(state->primed, state->memory[12], v7);
-    const double v47 = wide_line_sum(&state->memory[13], 1u, v46, state->primed);
+    const double v46 = wide_select(state->primed & 1u, state->memory[12], v7);
+    const double v47 = wide_line_sum(&state->memory[13], 1u, v46, state->primed & 1u);
     const double v48 = v47 * 0.5;
-    const double v49 = wide_select(state->primed, state->memory[14], v48);
+    const double v49 = wide_select(state->primed & 1u, state->memory[14], v48);
     const double v50 = v48 - v49;
     const double v51 = v50 * 10000.0;
     const double v52 = v51 * 1e-5;
@@ -426,6 +457,36 @@ WIDE_CODE WIDE_APART static void wide_sense(const wide_state *state, const wide_
     front->held = usable & (f9 ^ (uint32_t)1);
     front->primed_now = usable & (state->primed ^ (uint32_t)1);
     front->clipped = f63;
+}
+
+/* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
+WIDE_CODE WIDE_TOGETHER static void wide_guard(const wide_state *state, wide_front *front)
+{
+    const uint64_t stray = wide_aside(state->held[0], (((uint64_t)0x40540000u << 32) | 0x00000000u), (((uint64_t)0x40540000u << 32) | 0x00000000u))
+                         | wide_far(state->held[1], (((uint64_t)0x40340000u << 32) | 0x00000000u))
+                         | wide_aside(state->held[2], (((uint64_t)0x7FC00000u << 32) | 0x00000000u), (((uint64_t)0x40300000u << 32) | 0x00000000u))
+                         | wide_line_far(&state->memory[0], 3u, (((uint64_t)0x40600001u << 32) | 0x60000600u))
+                         | wide_far(state->memory[3], (((uint64_t)0x40540000u << 32) | 0x00000000u))
+                         | wide_far(state->memory[4], (((uint64_t)0x40340002u << 32) | 0x80001400u))
+                         | wide_far(state->memory[5], (((uint64_t)0x40420001u << 32) | 0x20000000u))
+                         | wide_far(state->memory[6], (((uint64_t)0x40E0BDBFu << 32) | 0xD0F72F59u))
+                         | wide_line_far(&state->memory[7], 4u, (((uint64_t)0x40540000u << 32) | 0x00000000u))
+                         | wide_far(state->memory[11], (((uint64_t)0x3F9EB853u << 32) | 0xD70A3D70u))
+                         | wide_line_far(&state->memory[12], 2u, (((uint64_t)0x40300000u << 32) | 0x00000000u))
+                         | wide_far(state->memory[14], (((uint64_t)0x40300001u << 32) | 0x40000400u))
+                         | wide_beyond(state->previous_duty, (((uint64_t)0x3F947AE1u << 32) | 0x47AE147Bu), (((uint64_t)0x0051EB85u << 32) | 0x1EB851EBu))
+                         | wide_beyond(state->previous_command, (((uint64_t)0x3F947AE1u << 32) | 0x47AE147Bu), (((uint64_t)0x005147AEu << 32) | 0x147AE148u))
+                         | wide_beyond(state->soft_cap, (((uint64_t)0x3FD66666u << 32) | 0x66666666u), (((uint64_t)0x000F5C28u << 32) | 0xF5C28F5Du))
+                         | wide_beyond(state->mapping_a, (((uint64_t)0x3FE99999u << 32) | 0x9999999Au), (((uint64_t)0x000A6666u << 32) | 0x66666666u))
+                         | wide_far(state->mapping_b, (((uint64_t)0x3F947AE1u << 32) | 0x47AE147Bu))
+                         | wide_far(state->mapping_c, (((uint64_t)0x3FB99999u << 32) | 0x9999999Au))
+                         | wide_far(state->mapping_r, (((uint64_t)0x3F847AE1u << 32) | 0x47AE147Bu));
+    const uint32_t counters = (4u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
+    const uint32_t sound = ((((uint32_t)(stray >> 32) | counters) >> 31) ^ (uint32_t)1)
+                         & wide_flag((state->mapping_a + (state->mapping_r * -0.5)) > 0.0)
+                         & wide_flag((state->mapping_a + (state->mapping_r * 12.0)) > 0.0);
+    front->sound = sound;
+    front->usable &= sound;
 }
 
 /* fc0: 12 -> 9 */
@@ -597,7 +658,7 @@ WIDE_CODE WIDE_APART static uint32_t wide_choose(const wide_state *state, const 
 }
 
 /* Mapping, limits, status. */
-WIDE_CODE static void wide_decide(const wide_state *state, const wide_front *front, uint32_t index, wide_command *command)
+WIDE_CODE WIDE_TOGETHER static void wide_decide(const wide_state *state, const wide_front *front, uint32_t index, wide_command *command)
 {
     const double chosen = wide_duties[index];
     const double v0 = state->mapping_a * chosen;
@@ -620,7 +681,9 @@ WIDE_CODE static void wide_decide(const wide_state *state, const wide_front *fro
     const double v17 = wide_clamp(v16, 0.3, 0.68);
     const uint32_t f18 = wide_differing(v16, v17);
     const uint32_t f19 = wide_flag(f18 != 0u);
-    const uint32_t usable = front->usable;
+    const uint64_t stray = wide_far(v17, (((uint64_t)0x7FF00000u << 32) | 0x00000000u));
+    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 63);
+    const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
                           | (front->clipped << 3)
@@ -631,44 +694,58 @@ WIDE_CODE static void wide_decide(const wide_state *state, const wide_front *fro
 
     command->duty = wide_select(usable, v17, 0.02);
     command->duty_sim = wide_select(usable, chosen, 0.02);
-    command->action_index = index;
-    command->status = (status & ((uint32_t)0 - usable)) | (WIDE_STATUS_FALLBACK & (usable - (uint32_t)1));
+    command->action_index = index & ((uint32_t)0 - trusted);
+    command->status = (status & ((uint32_t)0 - usable)) | (WIDE_STATUS_FALLBACK & (usable - (uint32_t)1))
+                    | (WIDE_STATUS_STATE & (trusted - (uint32_t)1));
 }
 
 /* Filters, held samples and counters move on by one sample period. */
-WIDE_CODE WIDE_NO_LIBC static void wide_advance(wide_state *state, const wide_front *front, const wide_command *command)
+WIDE_CODE WIDE_TOGETHER WIDE_NO_LIBC static void wide_advance(wide_state *state, const wide_front *front, const wide_command *command)
 {
     const double v0 = state->soft_cap + 0.016500000000000004;
     const uint32_t f1 = wide_flag(v0 > 0.68);
     const double v2 = wide_select(f1, 0.68, v0);
     const double v3 = wide_select(front->usable, v2, 0.35);
+    const uint64_t kept = (uint64_t)0 - front->sound;
+    const uint32_t primed = state->primed & front->sound;
+    const double push0 = wide_from_bits(wide_bits(front->push[0]) & kept);
+    const double push1 = wide_from_bits(wide_bits(front->push[1]) & kept);
+    const double push2 = wide_from_bits(wide_bits(front->push[2]) & kept);
+    const double push3 = wide_from_bits(wide_bits(front->push[3]) & kept);
+    const double push4 = wide_from_bits(wide_bits(front->push[4]) & kept);
+    const double push5 = wide_from_bits(wide_bits(front->push[5]) & kept);
+    const double push6 = wide_from_bits(wide_bits(front->push[6]) & kept);
+    const double push7 = wide_from_bits(wide_bits(front->push[7]) & kept);
+    const double push8 = wide_from_bits(wide_bits(front->push[8]) & kept);
+    const double push9 = wide_from_bits(wide_bits(front->push[9]) & kept);
     uint32_t i;
+    (void)primed;
 
     for (i = 0u; i < 2u; ++i) {
-        state->memory[i] = wide_select(state->primed, state->memory[i + 1u], front->push[0]);
+        state->memory[i] = wide_select(primed, state->memory[i + 1u], push0);
     }
-    state->memory[2] = front->push[0];
-    state->memory[3] = front->push[1];
-    state->memory[4] = front->push[2];
-    state->memory[5] = front->push[3];
-    state->memory[6] = front->push[4];
+    state->memory[2] = push0;
+    state->memory[3] = push1;
+    state->memory[4] = push2;
+    state->memory[5] = push3;
+    state->memory[6] = push4;
 
     for (i = 7u; i < 10u; ++i) {
-        state->memory[i] = wide_select(state->primed, state->memory[i + 1u], front->push[5]);
+        state->memory[i] = wide_select(primed, state->memory[i + 1u], push5);
     }
-    state->memory[10] = front->push[5];
-    state->memory[11] = front->push[6];
-    state->memory[12] = front->push[7];
-    state->memory[13] = front->push[8];
-    state->memory[14] = front->push[9];
+    state->memory[10] = push5;
+    state->memory[11] = push6;
+    state->memory[12] = push7;
+    state->memory[13] = push8;
+    state->memory[14] = push9;
     for (i = 0u; i < WIDE_SIGNALS; ++i) {
         state->held[i] = front->signal[i];
     }
     state->previous_duty = command->duty_sim;
     state->previous_command = command->duty;
     state->soft_cap = v3;
-    state->bad_count = front->bad_count;
-    state->primed = front->usable;
+    state->bad_count = front->bad_count & ((uint32_t)0 - front->sound);
+    state->primed = (front->usable + (uint32_t)2) - (front->sound << 1);
 }
 
 /*
@@ -679,6 +756,7 @@ WIDE_CODE WIDE_APART static void wide_answer(const wide_state *state, const wide
 {
     wide_front front;
     wide_sense(state, measured, &front);
+    wide_guard(state, &front);
     wide_decide(state, &front, index, command);
 }
 
@@ -686,6 +764,7 @@ WIDE_CODE WIDE_APART static void wide_settle(wide_state *state, const wide_measu
 {
     wide_front front;
     wide_sense(state, measured, &front);
+    wide_guard(state, &front);
     wide_decide(state, &front, index, command);
     wide_advance(state, &front, command);
 }
@@ -700,6 +779,7 @@ WIDE_CODE void wide_commit(wide_state *state, const wide_measurement *measured, 
 {
     wide_front front;
     wide_sense(state, measured, &front);
+    wide_guard(state, &front);
     wide_advance(state, &front, command);
 }
 

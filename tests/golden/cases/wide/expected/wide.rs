@@ -21,7 +21,7 @@ pub const SAMPLE_PERIOD: f64 = 0.0001;
 pub mod status {
     /// Held samples bridge an invalid measurement.
     pub const HELD: u32 = 1;
-    /// No usable measurement: the fallback duty is commanded.
+    /// The fallback duty is commanded: no usable measurement, or no sound state.
     pub const FALLBACK: u32 = 2;
     /// This step primed the filters.
     pub const PRIMED: u32 = 4;
@@ -35,6 +35,8 @@ pub mod status {
     pub const SOFT_START: u32 = 64;
     /// A duty limit was active.
     pub const LIMITED: u32 = 128;
+    /// The state was damaged: the fallback duty is commanded until init or reset.
+    pub const STATE: u32 = 256;
 }
 static CRC_STEPS: [u32; 16] = [
     0, 498536548, 997073096, 651767980, 1994146192, 1802195444, 1303535960, 1342533948,
@@ -78,12 +80,12 @@ fn select(flag: u32, then: f64, otherwise: f64) -> f64 {
 #[inline(always)]
 #[allow(dead_code)]
 fn within(x: f64, low: f64, high: f64) -> u32 {
-    flag(x >= low) & flag(x <= high)
+    flag((x >= low) & (x <= high))
 }
 #[inline(always)]
 #[allow(dead_code)]
 fn outside(x: f64, low: f64, high: f64) -> u32 {
-    flag(x < low) | flag(x > high)
+    flag((x < low) | (x > high))
 }
 #[inline(always)]
 #[allow(dead_code)]
@@ -116,6 +118,26 @@ fn relu(x: f64) -> f64 {
 #[allow(dead_code)]
 fn leaky_relu(x: f64, slope: f64) -> f64 {
     select((x.to_bits() >> 63) as u32, slope * x, x)
+}
+/// The sign bit is set if |x| is above the number with the bits `bound`.
+#[inline(always)]
+#[allow(dead_code)]
+fn far(x: f64, bound: u64) -> u64 {
+    bound.wrapping_sub(x.to_bits() & 0x7FFF_FFFF_FFFF_FFFF)
+}
+/// The sign bit is set if |x| is above the bound of its sign: `high`, or below 0 what `difference` makes of it.
+#[inline(always)]
+#[allow(dead_code)]
+fn aside(x: f64, difference: u64, high: u64) -> u64 {
+    let below = (0 as u64).wrapping_sub(x.to_bits() >> 63);
+    far(x, high ^ (difference & below))
+}
+/// The sign bit is set if x is not among the `width` numbers from that with the bits `low` on.
+#[inline(always)]
+#[allow(dead_code)]
+fn beyond(x: f64, low: u64, width: u64) -> u64 {
+    let above = x.to_bits().wrapping_sub(low);
+    above | width.wrapping_sub(above)
 }
 static DUTIES: [f64; ACTIONS] = [0.275, 0.4, 0.525, 0.5, 0.7];
 /// x limited to the magnitude with these bits, in integers so that loops over it can be vectorised
@@ -788,12 +810,13 @@ impl Controller {
     #[must_use]
     pub fn eval(&self, measured: &Measurement) -> Command {
         let chosen = self.choose_for(measured);
-        self.decide(&self.sense(measured), chosen)
+        let (front, sound) = self.guarded(measured);
+        self.decide(&front, sound, chosen)
     }
     /// Advances the filters by one sample period, with the command that `eval` gave for this measurement.
     pub fn commit(&mut self, measured: &Measurement, command: &Command) {
-        let front = self.sense(measured);
-        self.advance(&front, command);
+        let (front, sound) = self.guarded(measured);
+        self.advance(&front, sound, command);
     }
     /// `eval` and `commit`.
     pub fn step(&mut self, measured: &Measurement) -> Command {
@@ -844,25 +867,25 @@ impl Controller {
         let f13: u32 = (v11.to_bits() ^ v12.to_bits()) as u32
             | ((v11.to_bits() ^ v12.to_bits()) >> 32) as u32;
         let v14: f64 = v1 - 48.0;
-        let v15: f64 = select(self.primed, self.memory[0], v14);
+        let v15: f64 = select(self.primed & 1, self.memory[0], v14);
         let v16: f64 = v15 * 0.05;
         let v17: f64 = v16 + 0.25;
-        let v18: f64 = select(self.primed, self.memory[3], v1);
+        let v18: f64 = select(self.primed & 1, self.memory[3], v1);
         let v19: f64 = v1 - v18;
         let v20: f64 = v19 * 10000.0;
         let v21: f64 = v20 * 0.00001;
         let v22: f64 = clamp(v21, -1.0, 1.0);
         let f23: u32 = (v21.to_bits() ^ v22.to_bits()) as u32
             | ((v21.to_bits() ^ v22.to_bits()) >> 32) as u32;
-        let v24: f64 = select(self.primed, self.memory[4], v5);
+        let v24: f64 = select(self.primed & 1, self.memory[4], v5);
         let v25: f64 = v5 - v24;
         let v26: f64 = v25 * 0.09090909090909091;
         let v27: f64 = v24 + v26;
         let v28: f64 = v27 * 0.05;
         let v29: f64 = v28 + -0.125;
         let v30: f64 = v5 - v7;
-        let v31: f64 = select(self.primed, self.memory[5], v30);
-        let v32: f64 = select(self.primed, self.memory[6], 0.0);
+        let v31: f64 = select(self.primed & 1, self.memory[5], v30);
+        let v32: f64 = select(self.primed & 1, self.memory[6], 0.0);
         let v33: f64 = v32 * 0.9523809523809524;
         let v34: f64 = v30 - v31;
         let v35: f64 = v34 * 476.1904761904762;
@@ -872,24 +895,24 @@ impl Controller {
             self.memory[7],
             self.memory.iter().skip(8).take(3),
             v1,
-            self.primed,
+            self.primed & 1,
         );
         let v39: f64 = v38 * 0.2;
         let v40: f64 = v39 * 0.02;
-        let v41: f64 = select(self.primed, self.memory[11], 0.01);
+        let v41: f64 = select(self.primed & 1, self.memory[11], 0.01);
         let v42: f64 = v10 * 0.0001;
         let v43: f64 = v41 + v42;
         let v44: f64 = clamp(v43, -0.02, 0.03);
         let v45: f64 = v44 * 30.0;
-        let v46: f64 = select(self.primed, self.memory[12], v7);
+        let v46: f64 = select(self.primed & 1, self.memory[12], v7);
         let v47: f64 = line_sum(
             self.memory[13],
             self.memory.iter().skip(14).take(0),
             v46,
-            self.primed,
+            self.primed & 1,
         );
         let v48: f64 = v47 * 0.5;
-        let v49: f64 = select(self.primed, self.memory[14], v48);
+        let v49: f64 = select(self.primed & 1, self.memory[14], v48);
         let v50: f64 = v48 - v49;
         let v51: f64 = v50 * 10000.0;
         let v52: f64 = v51 * 0.00001;
@@ -931,6 +954,57 @@ impl Controller {
             clipped: f63,
         }
     }
+    /// 1 if the state is one that the controller can have written: a flipped bit that would decide the duty gives 0.
+    #[inline(always)]
+    fn sound(&self) -> u32 {
+        let stray = aside(self.held[0], 4635329916471083008, 4635329916471083008)
+            | far(self.held[1], 4626322717216342016)
+            | aside(self.held[2], 9205357638345293824, 4625196817309499392)
+            | self
+                .memory
+                .iter()
+                .skip(0)
+                .take(3)
+                .fold(0, |stray, word| stray | far(*word, 4638707622097192448))
+            | far(self.memory[3], 4635329916471083008)
+            | far(self.memory[4], 4626322727953765376)
+            | far(self.memory[5], 4630263371722129408)
+            | far(self.memory[6], 4674945044752838489)
+            | self
+                .memory
+                .iter()
+                .skip(7)
+                .take(4)
+                .fold(0, |stray, word| stray | far(*word, 4635329916471083008))
+            | far(self.memory[11], 4584304140939312496)
+            | self
+                .memory
+                .iter()
+                .skip(12)
+                .take(2)
+                .fold(0, |stray, word| stray | far(*word, 4625196817309499392))
+            | far(self.memory[14], 4625196822678209536)
+            | beyond(self.previous_duty, 4581421828931458171, 23058430092136939)
+            | beyond(self.previous_command, 4581421828931458171, 22878286107042120)
+            | beyond(self.soft_cap, 4599976659396224614, 4323455642275677)
+            | beyond(self.mapping_a, 4605380978949069210, 2927339757790822)
+            | far(self.mapping_b, 4581421828931458171)
+            | far(self.mapping_c, 4591870180066957722)
+            | far(self.mapping_r, 4576918229304087675);
+        let counters = 4u32.wrapping_sub(self.bad_count) | self.bad_count
+            | 1_u32.wrapping_sub(self.primed) | self.primed;
+        (((((stray >> 32) as u32 | counters) >> 31) ^ 1)
+            & flag(self.mapping_a + self.mapping_r * -0.5 > 0.0))
+            & flag(self.mapping_a + self.mapping_r * 12.0 > 0.0)
+    }
+    /// [`Self::sense`], and what a damaged state forbids.
+    #[inline(always)]
+    fn guarded(&self, measured: &Measurement) -> (Front, u32) {
+        let sound = self.sound();
+        let mut front = self.sense(measured);
+        front.usable &= sound;
+        (front, sound)
+    }
     /// The greedy action for a measurement, with a stack of its own.
     #[inline(never)]
     fn choose_for(&self, measured: &Measurement) -> (u32, f64) {
@@ -939,9 +1013,9 @@ impl Controller {
     /// What a step does behind the network.
     #[inline(never)]
     fn settle(&mut self, measured: &Measurement, chosen: (u32, f64)) -> Command {
-        let front = self.sense(measured);
-        let command = self.decide(&front, chosen);
-        self.advance(&front, &command);
+        let (front, sound) = self.guarded(measured);
+        let command = self.decide(&front, sound, chosen);
+        self.advance(&front, sound, &command);
         command
     }
     /// Network and argmax: index and duty of the greedy action.
@@ -963,7 +1037,12 @@ impl Controller {
     }
     /// Mapping, limits, status.
     #[inline(always)]
-    fn decide(&self, front: &Front, (action_index, chosen): (u32, f64)) -> Command {
+    fn decide(
+        &self,
+        front: &Front,
+        sound: u32,
+        (action_index, chosen): (u32, f64),
+    ) -> Command {
         let v0: f64 = self.mapping_a * chosen;
         let v1: f64 = self.mapping_b * front.signal[2];
         let v2: f64 = v0 + v1;
@@ -986,50 +1065,55 @@ impl Controller {
         let f18: u32 = (v16.to_bits() ^ v17.to_bits()) as u32
             | ((v16.to_bits() ^ v17.to_bits()) >> 32) as u32;
         let f19: u32 = flag(f18 != 0);
-        let usable = front.usable;
+        let stray = far(v17, 9218868437227405312);
+        let trusted = sound & !((stray >> 63) as u32);
+        let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
             | (f9 << 4) | (f14 << 5) | (f15 << 6) | (f19 << 7);
         Command {
             duty: select(usable, v17, 0.02),
             duty_sim: select(usable, chosen, 0.02),
-            action_index,
+            action_index: action_index & 0_u32.wrapping_sub(trusted),
             status: (status & 0_u32.wrapping_sub(usable))
-                | (status::FALLBACK & usable.wrapping_sub(1)),
+                | (status::FALLBACK & usable.wrapping_sub(1))
+                | (status::STATE & trusted.wrapping_sub(1)),
         }
     }
     /// Filters, held samples and counters move on by one sample period.
     #[inline(always)]
-    fn advance(&mut self, front: &Front, command: &Command) {
+    fn advance(&mut self, front: &Front, sound: u32, command: &Command) {
         let v0: f64 = self.soft_cap + 0.016500000000000004;
         let f1: u32 = flag(v0 > 0.68);
         let v2: f64 = select(f1, 0.68, v0);
         let v3: f64 = select(front.usable, v2, 0.35);
-        let mut moved = front.push[0];
+        let pushed = select(sound, front.push[0], 0.0);
+        let mut moved = pushed;
         for word in self.memory.iter_mut().skip(0).take(3).rev() {
-            let before = select(self.primed, *word, front.push[0]);
+            let before = select(self.primed & sound, *word, pushed);
             *word = moved;
             moved = before;
         }
-        self.memory[3] = front.push[1];
-        self.memory[4] = front.push[2];
-        self.memory[5] = front.push[3];
-        self.memory[6] = front.push[4];
-        let mut moved = front.push[5];
+        self.memory[3] = select(sound, front.push[1], 0.0);
+        self.memory[4] = select(sound, front.push[2], 0.0);
+        self.memory[5] = select(sound, front.push[3], 0.0);
+        self.memory[6] = select(sound, front.push[4], 0.0);
+        let pushed = select(sound, front.push[5], 0.0);
+        let mut moved = pushed;
         for word in self.memory.iter_mut().skip(7).take(4).rev() {
-            let before = select(self.primed, *word, front.push[5]);
+            let before = select(self.primed & sound, *word, pushed);
             *word = moved;
             moved = before;
         }
-        self.memory[11] = front.push[6];
-        self.memory[12] = front.push[7];
-        self.memory[13] = front.push[8];
-        self.memory[14] = front.push[9];
+        self.memory[11] = select(sound, front.push[6], 0.0);
+        self.memory[12] = select(sound, front.push[7], 0.0);
+        self.memory[13] = select(sound, front.push[8], 0.0);
+        self.memory[14] = select(sound, front.push[9], 0.0);
         self.soft_cap = v3;
         self.held = front.signal;
         self.previous_duty = command.duty_sim;
         self.previous_command = command.duty;
-        self.bad_count = front.bad_count;
-        self.primed = front.usable;
+        self.bad_count = front.bad_count & 0_u32.wrapping_sub(sound);
+        self.primed = front.usable.wrapping_add(2).wrapping_sub(sound << 1);
     }
     /// Known answers: whether the arithmetic of this build is the policy's.
     ///

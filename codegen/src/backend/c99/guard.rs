@@ -1,0 +1,70 @@
+//! Comparisons of the state with its ranges, by bits.
+
+use policy::Scalar;
+
+use super::number::{self, number};
+use super::statements::unsigned;
+use crate::program::{Guarded, Literal, Place, Program, Within};
+
+/// Terms of a word whose sign bit is set if a number of the state is outside.
+pub fn terms(program: &Program) -> Vec<String> {
+    let terms = program.guard.numbers.iter().map(|guarded| term(program, guarded));
+    terms.collect()
+}
+
+/// The same of one number.
+pub fn stray(program: &Program, x: &str, within: Within) -> String {
+    let n = &program.name;
+    let word = |bits| word(program.scalar(), bits);
+    match within {
+        Within::Magnitude { bound } => format!("{n}_far({x}, {})", word(bound)),
+        Within::Around { difference, high } => format!("{n}_aside({x}, {}, {})", word(difference), word(high)),
+        Within::Beyond { low, width, negated } => {
+            let x = if negated { format!("-({x})") } else { x.to_owned() };
+            format!("{n}_beyond({x}, {}, {})", word(low), word(width))
+        }
+    }
+}
+
+/// The counters in the same way, and conditions that are 1 in a sound state.
+pub fn conditions(program: &Program) -> Vec<String> {
+    let n = &program.name;
+    let zero = number(program.scalar(), Literal::exact(0.0));
+    let rising = program.guard.rising.iter().map(|current| {
+        let current = number(program.scalar(), *current);
+        format!("{n}_flag((state->mapping_a + (state->mapping_r * {current})) > {zero})")
+    });
+    rising.collect()
+}
+
+fn term(program: &Program, guarded: &Guarded) -> String {
+    let n = &program.name;
+    let place = match guarded.place {
+        Place::Held(index) => format!("state->held[{index}]"),
+        Place::Memory { first, count: 1 } => format!("state->memory[{first}]"),
+        Place::Memory { first, count } => {
+            let Within::Magnitude { bound } = guarded.within else {
+                return String::new();
+            };
+            let bound = word(program.scalar(), bound);
+            return format!("{n}_line_far(&state->memory[{first}], {count}u, {bound})");
+        }
+        Place::PreviousDuty => "state->previous_duty".to_owned(),
+        Place::PreviousCommand => "state->previous_command".to_owned(),
+        Place::SoftCap => "state->soft_cap".to_owned(),
+        Place::Coefficient(name) => format!("state->mapping_{}", name.name()),
+    };
+    stray(program, &place, guarded.within)
+}
+
+/// Bits as an unsigned literal; C90 has none of 64 bits.
+fn word(scalar: Scalar, bits: u64) -> String {
+    match scalar {
+        Scalar::F32 => unsigned(bits as u32),
+        Scalar::F64 => {
+            let kind = number::kind(scalar).word;
+            let [high, low] = [(bits >> 32) as u32, bits as u32].map(|half| format!("0x{half:08X}u"));
+            format!("((({kind}){high} << 32) | {low})")
+        }
+    }
+}

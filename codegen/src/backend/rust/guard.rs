@@ -1,0 +1,118 @@
+//! Comparisons of the state with its ranges, by bits.
+
+use policy::Scalar;
+use proc_macro2::{Literal as Token, TokenStream};
+use quote::quote;
+
+use super::number::{self, number};
+use super::statements::coefficient_field;
+use super::tokens::size;
+use crate::program::{Guarded, Place, Program, Within};
+
+/// The functions that compare, and the method that says whether the state is sound.
+pub fn method(program: &Program) -> TokenStream {
+    let terms = program
+        .guard
+        .numbers
+        .iter()
+        .map(|guarded| term(program.scalar(), guarded));
+    let most = Token::u32_suffixed(program.guard.bad_count);
+    let top = match program.scalar() {
+        Scalar::F32 => quote!(stray),
+        Scalar::F64 => quote!((stray >> 32) as u32),
+    };
+    let mut sound = quote!(((#top | counters) >> 31) ^ 1);
+    for current in &program.guard.rising {
+        let current = number(program.scalar(), *current);
+        sound = quote!((#sound) & flag(self.mapping_a + self.mapping_r * #current > 0.0));
+    }
+    quote! {
+        /// 1 if the state is one that the controller can have written: a flipped bit that would decide the duty gives 0.
+        #[inline(always)]
+        fn sound(&self) -> u32 {
+            let stray = #(#terms)|*;
+            let counters = #most.wrapping_sub(self.bad_count) | self.bad_count | 1_u32.wrapping_sub(self.primed) | self.primed;
+            #sound
+        }
+    }
+}
+
+/// A word whose sign bit is set if `x` is outside.
+pub fn stray(scalar: Scalar, x: &TokenStream, within: Within) -> TokenStream {
+    let bits = |bits: u64| match scalar {
+        Scalar::F32 => Token::u32_unsuffixed(bits as u32),
+        Scalar::F64 => Token::u64_unsuffixed(bits),
+    };
+    match within {
+        Within::Magnitude { bound } => {
+            let bound = bits(bound);
+            quote!(far(#x, #bound))
+        }
+        Within::Around { difference, high } => {
+            let (difference, high) = (bits(difference), bits(high));
+            quote!(aside(#x, #difference, #high))
+        }
+        Within::Beyond { low, width, negated } => {
+            let (low, width) = (bits(low), bits(width));
+            let sign = negated.then(|| quote!(-));
+            quote!(beyond(#sign #x, #low, #width))
+        }
+    }
+}
+
+fn term(scalar: Scalar, guarded: &Guarded) -> TokenStream {
+    let place = match guarded.place {
+        Place::Held(index) => {
+            let index = size(index);
+            quote!(self.held[#index])
+        }
+        Place::Memory { first, count: 1 } => {
+            let first = size(first);
+            quote!(self.memory[#first])
+        }
+        Place::Memory { first, count } => {
+            let (first, count) = (size(first), size(count));
+            let one = stray(scalar, &quote!(*word), guarded.within);
+            return quote!(self.memory.iter().skip(#first).take(#count).fold(0, |stray, word| stray | #one));
+        }
+        Place::PreviousDuty => quote!(self.previous_duty),
+        Place::PreviousCommand => quote!(self.previous_command),
+        Place::SoftCap => quote!(self.soft_cap),
+        Place::Coefficient(name) => {
+            let name = coefficient_field(name);
+            quote!(self.#name)
+        }
+    };
+    stray(scalar, &place, guarded.within)
+}
+
+/// The comparisons: integers, because a comparison of floats costs more and a NaN must be outside.
+pub fn helpers(scalar: Scalar) -> TokenStream {
+    let kind = number::kind(scalar);
+    let (bits, magnitude, top) = match scalar {
+        Scalar::F32 => (quote!(u32), quote!(0x7FFF_FFFF), quote!(31)),
+        Scalar::F64 => (quote!(u64), quote!(0x7FFF_FFFF_FFFF_FFFF), quote!(63)),
+    };
+    quote! {
+        /// The sign bit is set if |x| is above the number with the bits `bound`.
+        #[inline(always)]
+        #[allow(dead_code)]
+        fn far(x: #kind, bound: #bits) -> #bits {
+            bound.wrapping_sub(x.to_bits() & #magnitude)
+        }
+        /// The sign bit is set if |x| is above the bound of its sign: `high`, or below 0 what `difference` makes of it.
+        #[inline(always)]
+        #[allow(dead_code)]
+        fn aside(x: #kind, difference: #bits, high: #bits) -> #bits {
+            let below = (0 as #bits).wrapping_sub(x.to_bits() >> #top);
+            far(x, high ^ (difference & below))
+        }
+        /// The sign bit is set if x is not among the `width` numbers from that with the bits `low` on.
+        #[inline(always)]
+        #[allow(dead_code)]
+        fn beyond(x: #kind, low: #bits, width: #bits) -> #bits {
+            let above = x.to_bits().wrapping_sub(low);
+            above | width.wrapping_sub(above)
+        }
+    }
+}

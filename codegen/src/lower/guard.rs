@@ -1,0 +1,83 @@
+//! Contract section 1: what a sound state lies within.
+
+use policy::{Expr, Input, Policy, Scalar};
+
+use crate::program::{Coefficient, Guard, Guarded, Literal, MappingCode, Place, SignalPort, Within};
+
+/// Ranges of all parts of the state that a source, a filter or a limiter reads.
+pub fn lower(policy: &Policy, signals: &[SignalPort], mapping: Option<&MappingCode>) -> Guard {
+    let scalar = policy.numeric_format.scalar();
+    let within = |place: Place, range: (Literal, Literal)| Guarded {
+        place,
+        within: Within::of(scalar, range),
+    };
+    let held = signals.iter().enumerate();
+    let mut numbers: Vec<Guarded> = held
+        .map(|(index, signal)| within(Place::Held(index), signal.range))
+        .collect();
+    numbers.extend(memories(policy, scalar));
+    let read = |input: Input| policy.features.iter().any(|feature| reads(&feature.source, input));
+    let start = [policy.limits.initial_duty, policy.fallback.duty].map(|duty| Literal::nearest(scalar, duty));
+    let (min, max) = Literal::inward(scalar, policy.limits.duty);
+    if read(Input::PreviousDuty) {
+        let duties = policy
+            .actions
+            .iter()
+            .map(|action| Literal::nearest(scalar, action.duty));
+        numbers.push(within(Place::PreviousDuty, hull(start.into_iter().chain(duties))));
+    }
+    if read(Input::PreviousCommand) || policy.limits.slew.is_some() {
+        let range = hull(start.into_iter().chain([min, max]));
+        numbers.push(within(Place::PreviousCommand, range));
+    }
+    if let Some(soft) = policy.limits.soft_start {
+        let range = hull([Literal::nearest(scalar, soft.from), max].into_iter());
+        numbers.push(within(Place::SoftCap, range));
+    }
+    let coefficients = mapping.iter().flat_map(|mapping| &mapping.coefficients);
+    numbers.extend(coefficients.map(|(name, _, low, high)| within(Place::Coefficient(*name), (*low, *high))));
+    let rising = mapping.filter(|mapping| mapping.coefficients.iter().any(|(name, ..)| *name == Coefficient::R));
+    let rising = rising.map_or_else(Vec::new, |mapping| vec![mapping.valid_i_out.0, mapping.valid_i_out.1]);
+    Guard {
+        numbers,
+        bad_count: policy.fallback.hold.saturating_add(1),
+        rising,
+    }
+}
+
+/// The words of the filter memories; neighbours of one bound together, so that a long line is one loop.
+fn memories(policy: &Policy, scalar: Scalar) -> Vec<Guarded> {
+    let mut runs: Vec<(Literal, usize, usize)> = Vec::new();
+    for (word, bound) in policy::memory_bounds(policy).into_iter().enumerate() {
+        let bound = Literal::nearest(scalar, bound);
+        match runs.last_mut() {
+            Some((last, _, count)) if *last == bound => *count += 1,
+            _ => runs.push((bound, word, 1)),
+        }
+    }
+    let guarded = |(bound, first, count): (Literal, usize, usize)| Guarded {
+        place: Place::Memory { first, count },
+        within: Within::of(scalar, (Literal::nearest(scalar, -bound.value()), bound)),
+    };
+    runs.into_iter().map(guarded).collect()
+}
+
+fn reads(expr: &Expr, input: Input) -> bool {
+    match expr {
+        Expr::Input(own) => *own == input,
+        Expr::Constant(_) => false,
+        Expr::Neg(x) | Expr::Scale(_, x) => reads(x, input),
+        Expr::Add(x, y) | Expr::Sub(x, y) => reads(x, input) || reads(y, input),
+    }
+}
+
+/// From the smallest to the largest of some numbers.
+fn hull(numbers: impl Iterator<Item = Literal>) -> (Literal, Literal) {
+    let none = (Literal::exact(f64::INFINITY), Literal::exact(f64::NEG_INFINITY));
+    numbers.fold(none, |(low, high), x| {
+        (
+            if x.value() < low.value() { x } else { low },
+            if x.value() > high.value() { x } else { high },
+        )
+    })
+}

@@ -1,0 +1,114 @@
+//! What the state is compared with before a step answers.
+//!
+//! ```text
+//!  state ─► Guarded ... ─► sign bit set if outside ─┐
+//!                                                   ├─ or ─► sound: 1, or 0 and the step answers with the fallback
+//!  bad_count, primed ─────────────────────────────--┘
+//! ```
+//!
+//! Numbers are compared by their bits as integers: that is a subtraction where a comparison of floats with its move of flags
+//! takes four instructions, and a NaN, whose magnitude is above that of every number, is outside of everything.
+
+use policy::Scalar;
+
+use super::literal::Literal;
+use super::ops::Coefficient;
+
+/// What a sound state lies within (contract section 1).
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Guard {
+    /// Numbers.
+    pub numbers: Vec<Guarded>,
+    /// Largest `bad_count`.
+    pub bad_count: u32,
+    /// Load currents at which the four-term form must rise with the duty.
+    pub rising: Vec<Literal>,
+}
+
+/// A number of the state, or several of one bound, and what it lies within.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Guarded {
+    /// Where it stands.
+    pub place: Place,
+    /// Its range.
+    pub within: Within,
+}
+
+/// A place in the state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// Last good sample of a signal.
+    Held(usize),
+    /// Words of the filter memory.
+    Memory {
+        /// First word.
+        first: usize,
+        /// Words.
+        count: usize,
+    },
+    /// Duty of the last chosen action.
+    PreviousDuty,
+    /// Last command.
+    PreviousCommand,
+    /// Rising upper limit.
+    SoftCap,
+    /// Coefficient of the mapping.
+    Coefficient(Coefficient),
+}
+
+/// A range by the bits of its ends; the fewer instructions the more is known of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Within {
+    /// `|x| <= bound`
+    Magnitude {
+        /// Bits of the bound.
+        bound: u64,
+    },
+    /// `-low <= x <= high`, both not negative; zeros of both signs are inside.
+    Around {
+        /// Bits in which the two bounds differ.
+        difference: u64,
+        /// Bits of the upper end.
+        high: u64,
+    },
+    /// `low <= x <= low + width`, counted in bits, of a positive number.
+    Beyond {
+        /// Bits of the lower end.
+        low: u64,
+        /// Numbers of the format above it that are inside.
+        width: u64,
+        /// Whether `-x` is meant.
+        negated: bool,
+    },
+}
+
+impl Within {
+    /// The range from `low` to `high`.
+    #[must_use]
+    pub fn of(scalar: Scalar, (low, high): (Literal, Literal)) -> Self {
+        let bits = |value: f64| match scalar {
+            Scalar::F32 => u64::from((value as f32).to_bits()),
+            Scalar::F64 => value.to_bits(),
+        };
+        let (low, high) = (low.value(), high.value());
+        if low == -high {
+            return Self::Magnitude {
+                bound: bits(high.abs()),
+            };
+        }
+        if low > 0.0 || high < 0.0 {
+            let negated = high < 0.0;
+            let near = bits(low.abs().min(high.abs()));
+            let far = bits(low.abs().max(high.abs()));
+            let width = far - near;
+            return Self::Beyond {
+                low: near,
+                width,
+                negated,
+            };
+        }
+        let high = bits(high.abs());
+        let difference = high ^ bits(low.abs());
+        Self::Around { difference, high }
+    }
+}

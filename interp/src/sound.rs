@@ -1,0 +1,84 @@
+//! Whether a state is one that the controller can have written (contract section 1).
+
+use policy::{Expr, Input, Policy};
+
+use crate::mapping::Mapping;
+use crate::real::{Range, Real};
+use crate::state::State;
+
+/// What the parts of a sound state lie within, in the format.
+#[derive(Debug, Clone)]
+pub(crate) struct Sound<T> {
+    held: Vec<Range<T>>,
+    /// Largest magnitude of each word of the filter memories.
+    memory: Vec<T>,
+    /// `None` where no source reads it.
+    previous_duty: Option<Range<T>>,
+    /// `None` where neither a source nor a limiter reads it.
+    previous_command: Option<Range<T>>,
+    soft_cap: Option<Range<T>>,
+    /// K: bad steps bridged.
+    hold: u32,
+}
+
+impl<T: Real> Sound<T> {
+    pub fn new(policy: &Policy) -> Self {
+        let read = |input: Input| policy.features.iter().any(|feature| reads(&feature.source, input));
+        let start = [policy.limits.initial_duty, policy.fallback.duty].map(T::nearest);
+        let limits = Range::inwards(policy.limits.duty);
+        let duties = policy.actions.iter().map(|action| T::nearest(action.duty));
+        let slewed = policy.limits.slew.is_some();
+        Self {
+            held: policy
+                .signals
+                .iter()
+                .map(|signal| Range::inwards(signal.range))
+                .collect(),
+            memory: policy::memory_bounds(policy).into_iter().map(T::nearest).collect(),
+            previous_duty: read(Input::PreviousDuty).then(|| hull(start.into_iter().chain(duties))),
+            previous_command: (read(Input::PreviousCommand) || slewed)
+                .then(|| hull(start.into_iter().chain([limits.lo, limits.hi]))),
+            soft_cap: (policy.limits.soft_start).map(|soft| hull([T::nearest(soft.from), limits.hi].into_iter())),
+            hold: policy.fallback.hold,
+        }
+    }
+
+    /// Whether all parts of the state lie within; a NaN lies nowhere.
+    pub fn holds(&self, state: &State<T>, mapping: Option<&Mapping<T>>) -> bool {
+        let within = |range: Option<Range<T>>, x: T| range.is_none_or(|range| range.contains(x));
+        let bounded = |(&x, &bound): (&T, &T)| Range { lo: -bound, hi: bound }.contains(x);
+        let coefficients = match (mapping, state.mapping) {
+            (Some(mapping), Some(coefficients)) => mapping.accepts(coefficients),
+            _ => true,
+        };
+        self.held.iter().zip(&state.held).all(|(range, &x)| range.contains(x))
+            && state.memory.iter().zip(&self.memory).all(bounded)
+            && within(self.previous_duty, state.previous_duty)
+            && within(self.previous_command, state.previous_command)
+            && state.soft_cap.is_none_or(|cap| within(self.soft_cap, cap))
+            && coefficients
+            && state.bad_count <= self.hold.saturating_add(1)
+            && state.primed <= 1
+    }
+}
+
+fn reads(expr: &Expr, input: Input) -> bool {
+    match expr {
+        Expr::Input(own) => *own == input,
+        Expr::Constant(_) => false,
+        Expr::Neg(x) | Expr::Scale(_, x) => reads(x, input),
+        Expr::Add(x, y) | Expr::Sub(x, y) => reads(x, input) || reads(y, input),
+    }
+}
+
+/// From the smallest to the largest of some numbers.
+fn hull<T: Real>(numbers: impl Iterator<Item = T>) -> Range<T> {
+    let none = Range {
+        lo: T::MAX,
+        hi: -T::MAX,
+    };
+    numbers.fold(none, |range, x| Range {
+        lo: if x < range.lo { x } else { range.lo },
+        hi: if x > range.hi { x } else { range.hi },
+    })
+}

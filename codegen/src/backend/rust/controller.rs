@@ -250,9 +250,9 @@ fn decide(program: &Program) -> TokenStream {
     });
     let fallback = number(program.scalar(), program.fallback_duty);
     let stray = guard::stray(program.scalar(), &duty, decide.within);
-    let (top, narrowed) = match program.scalar() {
-        Scalar::F32 => (quote!(31), TokenStream::new()),
-        Scalar::F64 => (quote!(63), quote!(as u32)),
+    let is_stray = match program.scalar() {
+        Scalar::F32 => quote!((stray >> 31)),
+        Scalar::F64 => quote!(((stray >> 63) as u32)),
     };
     let kind = number::kind(program.scalar());
     let (lowest, greater) = network::argmax(program);
@@ -298,7 +298,7 @@ fn decide(program: &Program) -> TokenStream {
         fn decide(&self, front: &Front, sound: u32, (action_index, chosen): (u32, #kind)) -> Command {
             #(#statements)*
             let stray = #stray;
-            let trusted = sound & !((stray >> #top) #narrowed);
+            let trusted = sound & !#is_stray;
             let usable = front.usable & trusted;
             let status = #(#terms)|*;
             Command {

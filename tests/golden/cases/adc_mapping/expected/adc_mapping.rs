@@ -615,7 +615,7 @@ impl Controller {
         let f18: u32 = v16.to_bits() ^ v17.to_bits();
         let f19: u32 = flag(f18 != 0);
         let stray = far(v17, 2139095040);
-        let trusted = sound & !((stray >> 31));
+        let trusted = sound & !(stray >> 31);
         let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
             | (f9 << 4) | (f14 << 5) | (f15 << 6) | (f19 << 7);

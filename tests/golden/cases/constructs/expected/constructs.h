@@ -4,7 +4,7 @@
  * Network 12-9-6-8-4-5, 262 MACs, numeric format f32 (exact order, no contraction).
  * Sample period 0.0001 s.
  * Weights  sha256 397733e9d2c9e01f6e449903d527e62ae398f2f41615b00bceab66d2fe1b9d8f
- * Contract sha256 f094fd50558c30cd5e942e6c301939f39b7d70bafefad6527684eca0d5d27f25
+ * Contract sha256 377a14f39c36433ff8808e10a7a370da63b0140474793e15b9186a9e269028cb
  * Mapping  sha256 cced4b690cbf07dd008aaaf3758b1bda86ce53a0a5209aec7de712d05f0214fe
  * Bits hold with: -std=c99 -ffp-contract=off
  */

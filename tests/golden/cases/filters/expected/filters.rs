@@ -610,7 +610,7 @@ impl Controller {
         let f1: u32 = chosen.to_bits() ^ v0.to_bits();
         let f2: u32 = flag(f1 != 0);
         let stray = far(v0, 2139095040);
-        let trusted = sound & !((stray >> 31));
+        let trusted = sound & !(stray >> 31);
         let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
             | (f2 << 7);

@@ -467,7 +467,7 @@ impl Controller {
         let f6: u32 = v2.to_bits() ^ v5.to_bits();
         let f7: u32 = flag(f6 != 0);
         let stray = far(v5, 2139095040);
-        let trusted = sound & !((stray >> 31));
+        let trusted = sound & !(stray >> 31);
         let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (f4 << 5) | (f7 << 7);
         Command {

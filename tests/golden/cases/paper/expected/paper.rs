@@ -655,7 +655,7 @@ impl Controller {
         let f8: u32 = v3.to_bits() ^ v7.to_bits();
         let f9: u32 = flag(f8 != 0);
         let stray = far(v7, 2139095040);
-        let trusted = sound & !((stray >> 31));
+        let trusted = sound & !(stray >> 31);
         let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
             | (f6 << 4) | (f9 << 7);

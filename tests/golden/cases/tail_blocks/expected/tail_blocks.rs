@@ -1426,7 +1426,7 @@ impl Controller {
         let f3: u32 = v1.to_bits() ^ v2.to_bits();
         let f4: u32 = flag(f3 != 0);
         let stray = far(v2, 2139095040);
-        let trusted = sound & !((stray >> 31));
+        let trusted = sound & !(stray >> 31);
         let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
             | (f0 << 6) | (f4 << 7);

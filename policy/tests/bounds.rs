@@ -106,8 +106,8 @@ fn activate(x: f32, activation: Activation, is_above: bool) -> f32 {
         Shape::Hinge { .. } if activation.is_rectifier() => 0.0,
         Shape::Hinge { below } => f(below) * x,
         Shape::Sigmoid(sigmoid) => {
-            // the rest is for the rounding to binary32
-            let apart = 0.9 * sigmoid.apart_32;
+            // the rounding to binary32 below moves a value up to 1 by at most 2^-25
+            let apart = sigmoid.apart_32 - 0.25 * f64::from(f32::EPSILON);
             let value = (sigmoid.value)(x.into()) + if is_above { apart } else { -apart };
             f(value.clamp(-1.0, 1.0))
         }

@@ -181,7 +181,7 @@ fn a_limit_applied_before_the_mapping_is_caught() {
 fn a_filter_that_forgets_is_caught() {
     let policy = example();
     let files = edited(&policy, Output::C, &|text| {
-        text.replace("state->memory[0] = front->push[0];", "")
+        text.replace("state->memory[0] = push0;", "")
     });
     assert_caught(&verify_files(&policy, &files, "gcc", &[]));
 }
@@ -190,7 +190,7 @@ fn a_filter_that_forgets_is_caught() {
 fn an_eval_that_changes_the_state_is_caught() {
     let policy = example();
     let files = edited(&policy, Output::C, &|text| {
-        let place = "    buck12_sense(state, measured, &front);\n    buck12_decide(state, &front, index, command);\n}";
+        let place = "    buck12_answer(state, measured, index, command);\n}";
         text.replacen(
             place,
             &place.replace("\n}", "\n    ((buck12_state *)state)->bad_count += 1u;\n}"),

@@ -53,7 +53,7 @@ const FAULTS: &[Fault] = &[
         "_fmu.c",
         "constructs_block_step(fmu->state.work, fmu->state.inputs, fmu->state.coefficients, fmu->state.outputs);",
         "constructs_block_update(fmu->state.work, fmu->state.inputs, fmu->state.coefficients);",
-        "inputs during initialisation leave",
+        "outputs follow the inputs",
     ),
     (
         "_fmu.c",

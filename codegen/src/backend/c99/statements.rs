@@ -88,7 +88,8 @@ impl<'p> Printer<'p> {
             Op::Coefficient(name) => format!("state->mapping_{}", name.name()),
             Op::ChosenDuty => "chosen".into(),
             Op::Constant(literal) => number::number(self.program.scalar(), *literal),
-            Op::Primed => "state->primed & 1u".into(),
+            // a flag behind its barrier: of what is known to be 0 or 1 clang makes a branch on RISC-V
+            Op::Primed => format!("{}_flag((int)(state->primed & 1u))", self.program.name),
             Op::Usable => "front->usable".into(),
             Op::Clipped => "front->clipped".into(),
             Op::HeldSample => "front->held".into(),

@@ -83,7 +83,8 @@ impl<'p> Printer<'p> {
             }
             Op::ChosenDuty => quote!(chosen),
             Op::Constant(literal) => number(self.program.scalar(), *literal),
-            Op::Primed => quote!(self.primed & 1),
+            // behind a barrier: of what is known to be 0 or 1 the optimiser makes a branch
+            Op::Primed => quote!(core::hint::black_box(self.primed & 1)),
             Op::Usable => quote!(front.usable),
             Op::Clipped => quote!(front.clipped),
             Op::HeldSample => quote!(front.held),
@@ -179,12 +180,12 @@ pub fn helpers(program: &Program) -> TokenStream {
         #[inline(always)]
         #[allow(dead_code)]
         fn within(x: #number, low: #number, high: #number) -> u32 {
-            flag((x >= low) & (x <= high))
+            flag(x >= low) & flag(x <= high)
         }
         #[inline(always)]
         #[allow(dead_code)]
         fn outside(x: #number, low: #number, high: #number) -> u32 {
-            flag((x < low) | (x > high))
+            flag(x < low) | flag(x > high)
         }
         #[inline(always)]
         #[allow(dead_code)]

@@ -78,12 +78,12 @@ fn select(flag: u32, then: f32, otherwise: f32) -> f32 {
 #[inline(always)]
 #[allow(dead_code)]
 fn within(x: f32, low: f32, high: f32) -> u32 {
-    flag((x >= low) & (x <= high))
+    flag(x >= low) & flag(x <= high)
 }
 #[inline(always)]
 #[allow(dead_code)]
 fn outside(x: f32, low: f32, high: f32) -> u32 {
-    flag((x < low) | (x > high))
+    flag(x < low) | flag(x > high)
 }
 #[inline(always)]
 #[allow(dead_code)]

@@ -80,12 +80,12 @@ fn select(flag: u32, then: f64, otherwise: f64) -> f64 {
 #[inline(always)]
 #[allow(dead_code)]
 fn within(x: f64, low: f64, high: f64) -> u32 {
-    flag((x >= low) & (x <= high))
+    flag(x >= low) & flag(x <= high)
 }
 #[inline(always)]
 #[allow(dead_code)]
 fn outside(x: f64, low: f64, high: f64) -> u32 {
-    flag((x < low) | (x > high))
+    flag(x < low) | flag(x > high)
 }
 #[inline(always)]
 #[allow(dead_code)]

@@ -16,7 +16,7 @@
 
 #define INPUTS ADC_MAPPING_BLOCK_INPUTS
 #define OUTPUTS 3u
-#define SIGNATURE 0x212087c6u
+#define SIGNATURE 0x61959b17u
 
 /* Type of each variable; references start at 1: inputs, outputs, parameters. */
 static const char types[ADC_MAPPING_FMU_VARIABLES] = {

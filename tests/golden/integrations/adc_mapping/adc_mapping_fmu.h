@@ -29,7 +29,7 @@
  *   10 r (parameter): coefficient of the duty ratio mapping; set before a step, it counts from the one after it
  */
 #define ADC_MAPPING_FMU_VARIABLES 10u
-#define ADC_MAPPING_FMU_TOKEN "{212087c6-dfb4-2870-8b7e-60c0927973cd}"
+#define ADC_MAPPING_FMU_TOKEN "{61959b17-dc07-ba6c-4aac-d9a194481ad2}"
 #define ADC_MAPPING_FMU_PERIOD 2e-5
 
 /* Types of variables. */

@@ -16,7 +16,7 @@
 
 #define INPUTS MINIMAL_BLOCK_INPUTS
 #define OUTPUTS 3u
-#define SIGNATURE 0x80d0220du
+#define SIGNATURE 0xdb6d4189u
 
 /* Type of each variable; references start at 1: inputs, outputs, parameters. */
 static const char types[MINIMAL_FMU_VARIABLES] = {

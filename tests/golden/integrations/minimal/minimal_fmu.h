@@ -25,7 +25,7 @@
  *   6 status (output): status bits; 65536 is added while the coefficients are refused
  */
 #define MINIMAL_FMU_VARIABLES 6u
-#define MINIMAL_FMU_TOKEN "{80d0220d-b610-aa55-ece9-a9874e9cc9e4}"
+#define MINIMAL_FMU_TOKEN "{db6d4189-fd86-5fdb-7305-d55e4af62f02}"
 #define MINIMAL_FMU_PERIOD 0.0001
 
 /* Types of variables. */

@@ -238,7 +238,9 @@ ACTIVATIONS_SPARE static uint32_t activations_far(float x, uint32_t bound)
 /* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
 ACTIVATIONS_SPARE static uint32_t activations_aside(float x, uint32_t difference, uint32_t high)
 {
-    return activations_far(x, high ^ (difference & ((uint32_t)0 - (activations_bits(x) >> 31))));
+    /* a flag behind its barrier: of a mask made of a sign clang makes a branch on RISC-V */
+    const uint32_t below = activations_flag((int)(activations_bits(x) >> 31));
+    return activations_far(x, high ^ (difference & ((uint32_t)0 - below)));
 }
 
 /* The sign bit is set if x is not among the numbers from the one with the bits low on. */
@@ -343,7 +345,7 @@ ACTIVATIONS_CODE ACTIVATIONS_TOGETHER static void activations_guard(const activa
                          | activations_aside(state->previous_command, 0x3F800000u, 0x3F800000u);
     const uint32_t counters = (6u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
     const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1);
-    front->sound = sound;
+    front->sound = activations_flag((int)sound);
     front->usable &= sound;
 }
 
@@ -716,7 +718,7 @@ ACTIVATIONS_CODE ACTIVATIONS_TOGETHER static void activations_decide(const activ
     const uint32_t f1 = activations_bits(chosen) ^ activations_bits(v0);
     const uint32_t f2 = activations_flag(f1 != 0u);
     const uint32_t stray = activations_far(v0, 0x7F800000u);
-    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
+    const uint32_t trusted = activations_flag((int)(front->sound & ~(uint32_t)(stray >> 31)));
     const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)

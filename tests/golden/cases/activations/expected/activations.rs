@@ -125,7 +125,7 @@ fn far(x: f32, bound: u32) -> u32 {
 #[inline(always)]
 #[allow(dead_code)]
 fn aside(x: f32, difference: u32, high: u32) -> u32 {
-    let below = (0 as u32).wrapping_sub(x.to_bits() >> 31);
+    let below = (0 as u32).wrapping_sub(core::hint::black_box(x.to_bits() >> 31));
     far(x, high ^ (difference & below))
 }
 /// The sign bit is set if x is not among the `width` numbers from that with the bits `low` on.
@@ -541,7 +541,7 @@ impl Controller {
             | aside(self.previous_command, 1065353216, 1065353216);
         let counters = 6u32.wrapping_sub(self.bad_count) | self.bad_count
             | 1_u32.wrapping_sub(self.primed) | self.primed;
-        ((stray | counters) >> 31) ^ 1
+        core::hint::black_box(((stray | counters) >> 31) ^ 1)
     }
     /// [`Self::sense`], and what a damaged state forbids.
     #[inline(always)]
@@ -593,7 +593,7 @@ impl Controller {
         let f1: u32 = chosen.to_bits() ^ v0.to_bits();
         let f2: u32 = flag(f1 != 0);
         let stray = far(v0, 2139095040);
-        let trusted = sound & !(stray >> 31);
+        let trusted = core::hint::black_box(sound & !(stray >> 31));
         let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (f2 << 7);
         Command {

@@ -229,7 +229,9 @@ ADC_MAPPING_SPARE static uint32_t adc_mapping_far(float x, uint32_t bound)
 /* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
 ADC_MAPPING_SPARE static uint32_t adc_mapping_aside(float x, uint32_t difference, uint32_t high)
 {
-    return adc_mapping_far(x, high ^ (difference & ((uint32_t)0 - (adc_mapping_bits(x) >> 31))));
+    /* a flag behind its barrier: of a mask made of a sign clang makes a branch on RISC-V */
+    const uint32_t below = adc_mapping_flag((int)(adc_mapping_bits(x) >> 31));
+    return adc_mapping_far(x, high ^ (difference & ((uint32_t)0 - below)));
 }
 
 /* The sign bit is set if x is not among the numbers from the one with the bits low on. */
@@ -343,7 +345,7 @@ ADC_MAPPING_CODE ADC_MAPPING_TOGETHER static void adc_mapping_guard(const adc_ma
     const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1)
                          & adc_mapping_flag((state->mapping_a + (state->mapping_r * -1.0f)) > 0.0f)
                          & adc_mapping_flag((state->mapping_a + (state->mapping_r * 14.0f)) > 0.0f);
-    front->sound = sound;
+    front->sound = adc_mapping_flag((int)sound);
     front->usable &= sound;
 }
 
@@ -604,7 +606,7 @@ ADC_MAPPING_CODE ADC_MAPPING_TOGETHER static void adc_mapping_decide(const adc_m
     const uint32_t f18 = adc_mapping_bits(v16) ^ adc_mapping_bits(v17);
     const uint32_t f19 = adc_mapping_flag(f18 != 0u);
     const uint32_t stray = adc_mapping_far(v17, 0x7F800000u);
-    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
+    const uint32_t trusted = adc_mapping_flag((int)(front->sound & ~(uint32_t)(stray >> 31)));
     const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)

@@ -127,7 +127,7 @@ fn far(x: f32, bound: u32) -> u32 {
 #[inline(always)]
 #[allow(dead_code)]
 fn aside(x: f32, difference: u32, high: u32) -> u32 {
-    let below = (0 as u32).wrapping_sub(x.to_bits() >> 31);
+    let below = (0 as u32).wrapping_sub(core::hint::black_box(x.to_bits() >> 31));
     far(x, high ^ (difference & below))
 }
 /// The sign bit is set if x is not among the `width` numbers from that with the bits `low` on.
@@ -544,9 +544,11 @@ impl Controller {
             | far(self.mapping_r, 1008981770);
         let counters = 5u32.wrapping_sub(self.bad_count) | self.bad_count
             | 1_u32.wrapping_sub(self.primed) | self.primed;
-        ((((stray | counters) >> 31) ^ 1)
-            & flag(self.mapping_a + self.mapping_r * -1.0 > 0.0))
-            & flag(self.mapping_a + self.mapping_r * 14.0 > 0.0)
+        core::hint::black_box(
+            ((((stray | counters) >> 31) ^ 1)
+                & flag(self.mapping_a + self.mapping_r * -1.0 > 0.0))
+                & flag(self.mapping_a + self.mapping_r * 14.0 > 0.0),
+        )
     }
     /// [`Self::sense`], and what a damaged state forbids.
     #[inline(always)]
@@ -615,7 +617,7 @@ impl Controller {
         let f18: u32 = v16.to_bits() ^ v17.to_bits();
         let f19: u32 = flag(f18 != 0);
         let stray = far(v17, 2139095040);
-        let trusted = sound & !(stray >> 31);
+        let trusted = core::hint::black_box(sound & !(stray >> 31));
         let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
             | (f9 << 4) | (f14 << 5) | (f15 << 6) | (f19 << 7);

@@ -283,7 +283,9 @@ CONSTRUCTS_SPARE static uint32_t constructs_far(float x, uint32_t bound)
 /* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
 CONSTRUCTS_SPARE static uint32_t constructs_aside(float x, uint32_t difference, uint32_t high)
 {
-    return constructs_far(x, high ^ (difference & ((uint32_t)0 - (constructs_bits(x) >> 31))));
+    /* a flag behind its barrier: of a mask made of a sign clang makes a branch on RISC-V */
+    const uint32_t below = constructs_flag((int)(constructs_bits(x) >> 31));
+    return constructs_far(x, high ^ (difference & ((uint32_t)0 - below)));
 }
 
 /* The sign bit is set if x is not among the numbers from the one with the bits low on. */
@@ -382,41 +384,41 @@ CONSTRUCTS_CODE CONSTRUCTS_APART static void constructs_sense(const constructs_s
     const float v12 = constructs_clamp(v11, -2.0f, 2.0f);
     const uint32_t f13 = constructs_bits(v11) ^ constructs_bits(v12);
     const float v14 = v1 - 48.0f;
-    const float v15 = constructs_select(state->primed & 1u, state->memory[0], v14);
+    const float v15 = constructs_select(constructs_flag((int)(state->primed & 1u)), state->memory[0], v14);
     const float v16 = v15 * 0.05f;
     const float v17 = v16 + 0.25f;
-    const float v18 = constructs_select(state->primed & 1u, state->memory[3], v1);
+    const float v18 = constructs_select(constructs_flag((int)(state->primed & 1u)), state->memory[3], v1);
     const float v19 = v1 - v18;
     const float v20 = v19 * 10000.0f;
     const float v21 = v20 * 1e-5f;
     const float v22 = constructs_clamp(v21, -1.0f, 1.0f);
     const uint32_t f23 = constructs_bits(v21) ^ constructs_bits(v22);
-    const float v24 = constructs_select(state->primed & 1u, state->memory[4], v5);
+    const float v24 = constructs_select(constructs_flag((int)(state->primed & 1u)), state->memory[4], v5);
     const float v25 = v5 - v24;
     const float v26 = v25 * 0.09090909f;
     const float v27 = v24 + v26;
     const float v28 = v27 * 0.05f;
     const float v29 = v28 + -0.125f;
     const float v30 = v5 - v7;
-    const float v31 = constructs_select(state->primed & 1u, state->memory[5], v30);
-    const float v32 = constructs_select(state->primed & 1u, state->memory[6], 0.0f);
+    const float v31 = constructs_select(constructs_flag((int)(state->primed & 1u)), state->memory[5], v30);
+    const float v32 = constructs_select(constructs_flag((int)(state->primed & 1u)), state->memory[6], 0.0f);
     const float v33 = v32 * 0.95238096f;
     const float v34 = v30 - v31;
     const float v35 = v34 * 476.1905f;
     const float v36 = v33 + v35;
     const float v37 = v36 * 0.0001f;
-    const float v38 = constructs_line_sum(&state->memory[7], 4u, v1, state->primed & 1u);
+    const float v38 = constructs_line_sum(&state->memory[7], 4u, v1, constructs_flag((int)(state->primed & 1u)));
     const float v39 = v38 * 0.2f;
     const float v40 = v39 * 0.02f;
-    const float v41 = constructs_select(state->primed & 1u, state->memory[11], 0.01f);
+    const float v41 = constructs_select(constructs_flag((int)(state->primed & 1u)), state->memory[11], 0.01f);
     const float v42 = v10 * 0.0001f;
     const float v43 = v41 + v42;
     const float v44 = constructs_clamp(v43, -0.02f, 0.03f);
     const float v45 = v44 * 30.0f;
-    const float v46 = constructs_select(state->primed & 1u, state->memory[12], v7);
-    const float v47 = constructs_line_sum(&state->memory[13], 1u, v46, state->primed & 1u);
+    const float v46 = constructs_select(constructs_flag((int)(state->primed & 1u)), state->memory[12], v7);
+    const float v47 = constructs_line_sum(&state->memory[13], 1u, v46, constructs_flag((int)(state->primed & 1u)));
     const float v48 = v47 * 0.5f;
-    const float v49 = constructs_select(state->primed & 1u, state->memory[14], v48);
+    const float v49 = constructs_select(constructs_flag((int)(state->primed & 1u)), state->memory[14], v48);
     const float v50 = v48 - v49;
     const float v51 = v50 * 10000.0f;
     const float v52 = v51 * 1e-5f;
@@ -494,7 +496,7 @@ CONSTRUCTS_CODE CONSTRUCTS_TOGETHER static void constructs_guard(const construct
     const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1)
                          & constructs_flag((state->mapping_a + (state->mapping_r * -0.5f)) > 0.0f)
                          & constructs_flag((state->mapping_a + (state->mapping_r * 12.0f)) > 0.0f);
-    front->sound = sound;
+    front->sound = constructs_flag((int)sound);
     front->usable &= sound;
 }
 
@@ -888,7 +890,7 @@ CONSTRUCTS_CODE CONSTRUCTS_TOGETHER static void constructs_decide(const construc
     const uint32_t f18 = constructs_bits(v16) ^ constructs_bits(v17);
     const uint32_t f19 = constructs_flag(f18 != 0u);
     const uint32_t stray = constructs_far(v17, 0x7F800000u);
-    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
+    const uint32_t trusted = constructs_flag((int)(front->sound & ~(uint32_t)(stray >> 31)));
     const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)

@@ -129,7 +129,7 @@ fn far(x: f32, bound: u32) -> u32 {
 #[inline(always)]
 #[allow(dead_code)]
 fn aside(x: f32, difference: u32, high: u32) -> u32 {
-    let below = (0 as u32).wrapping_sub(x.to_bits() >> 31);
+    let below = (0 as u32).wrapping_sub(core::hint::black_box(x.to_bits() >> 31));
     far(x, high ^ (difference & below))
 }
 /// The sign bit is set if x is not among the `width` numbers from that with the bits `low` on.
@@ -802,24 +802,44 @@ impl Controller {
         let v12: f32 = clamp(v11, -2.0, 2.0);
         let f13: u32 = v11.to_bits() ^ v12.to_bits();
         let v14: f32 = v1 - 48.0;
-        let v15: f32 = select(self.primed & 1, self.memory[0], v14);
+        let v15: f32 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[0],
+            v14,
+        );
         let v16: f32 = v15 * 0.05;
         let v17: f32 = v16 + 0.25;
-        let v18: f32 = select(self.primed & 1, self.memory[3], v1);
+        let v18: f32 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[3],
+            v1,
+        );
         let v19: f32 = v1 - v18;
         let v20: f32 = v19 * 10000.0;
         let v21: f32 = v20 * 0.00001;
         let v22: f32 = clamp(v21, -1.0, 1.0);
         let f23: u32 = v21.to_bits() ^ v22.to_bits();
-        let v24: f32 = select(self.primed & 1, self.memory[4], v5);
+        let v24: f32 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[4],
+            v5,
+        );
         let v25: f32 = v5 - v24;
         let v26: f32 = v25 * 0.09090909;
         let v27: f32 = v24 + v26;
         let v28: f32 = v27 * 0.05;
         let v29: f32 = v28 + -0.125;
         let v30: f32 = v5 - v7;
-        let v31: f32 = select(self.primed & 1, self.memory[5], v30);
-        let v32: f32 = select(self.primed & 1, self.memory[6], 0.0);
+        let v31: f32 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[5],
+            v30,
+        );
+        let v32: f32 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[6],
+            0.0,
+        );
         let v33: f32 = v32 * 0.95238096;
         let v34: f32 = v30 - v31;
         let v35: f32 = v34 * 476.1905;
@@ -829,24 +849,36 @@ impl Controller {
             self.memory[7],
             self.memory.iter().skip(8).take(3),
             v1,
-            self.primed & 1,
+            core::hint::black_box(self.primed & 1),
         );
         let v39: f32 = v38 * 0.2;
         let v40: f32 = v39 * 0.02;
-        let v41: f32 = select(self.primed & 1, self.memory[11], 0.01);
+        let v41: f32 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[11],
+            0.01,
+        );
         let v42: f32 = v10 * 0.0001;
         let v43: f32 = v41 + v42;
         let v44: f32 = clamp(v43, -0.02, 0.03);
         let v45: f32 = v44 * 30.0;
-        let v46: f32 = select(self.primed & 1, self.memory[12], v7);
+        let v46: f32 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[12],
+            v7,
+        );
         let v47: f32 = line_sum(
             self.memory[13],
             self.memory.iter().skip(14).take(0),
             v46,
-            self.primed & 1,
+            core::hint::black_box(self.primed & 1),
         );
         let v48: f32 = v47 * 0.5;
-        let v49: f32 = select(self.primed & 1, self.memory[14], v48);
+        let v49: f32 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[14],
+            v48,
+        );
         let v50: f32 = v48 - v49;
         let v51: f32 = v50 * 10000.0;
         let v52: f32 = v51 * 0.00001;
@@ -923,9 +955,11 @@ impl Controller {
             | far(self.mapping_r, 1008981770);
         let counters = 4u32.wrapping_sub(self.bad_count) | self.bad_count
             | 1_u32.wrapping_sub(self.primed) | self.primed;
-        ((((stray | counters) >> 31) ^ 1)
-            & flag(self.mapping_a + self.mapping_r * -0.5 > 0.0))
-            & flag(self.mapping_a + self.mapping_r * 12.0 > 0.0)
+        core::hint::black_box(
+            ((((stray | counters) >> 31) ^ 1)
+                & flag(self.mapping_a + self.mapping_r * -0.5 > 0.0))
+                & flag(self.mapping_a + self.mapping_r * 12.0 > 0.0),
+        )
     }
     /// [`Self::sense`], and what a damaged state forbids.
     #[inline(always)]
@@ -994,7 +1028,7 @@ impl Controller {
         let f18: u32 = v16.to_bits() ^ v17.to_bits();
         let f19: u32 = flag(f18 != 0);
         let stray = far(v17, 2139095040);
-        let trusted = sound & !(stray >> 31);
+        let trusted = core::hint::black_box(sound & !(stray >> 31));
         let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
             | (f9 << 4) | (f14 << 5) | (f15 << 6) | (f19 << 7);

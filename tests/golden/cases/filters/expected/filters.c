@@ -232,7 +232,9 @@ FILTERS_SPARE static uint32_t filters_far(float x, uint32_t bound)
 /* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
 FILTERS_SPARE static uint32_t filters_aside(float x, uint32_t difference, uint32_t high)
 {
-    return filters_far(x, high ^ (difference & ((uint32_t)0 - (filters_bits(x) >> 31))));
+    /* a flag behind its barrier: of a mask made of a sign clang makes a branch on RISC-V */
+    const uint32_t below = filters_flag((int)(filters_bits(x) >> 31));
+    return filters_far(x, high ^ (difference & ((uint32_t)0 - below)));
 }
 
 /* The sign bit is set if x is not among the numbers from the one with the bits low on. */
@@ -284,46 +286,46 @@ FILTERS_CODE FILTERS_APART static void filters_sense(const filters_state *state,
     const float v3 = filters_select(f2, measured->i_l, state->held[1]);
     const uint32_t f4 = f0 & f2;
     const float v5 = 48.0f - v1;
-    const float v6 = filters_select(state->primed & 1u, state->memory[0], v5);
+    const float v6 = filters_select(filters_flag((int)(state->primed & 1u)), state->memory[0], v5);
     const float v7 = v6 * 0.1f;
     const float v8 = filters_clamp(v7, -5.0f, 5.0f);
     const uint32_t f9 = filters_bits(v7) ^ filters_bits(v8);
-    const float v10 = filters_select(state->primed & 1u, state->memory[20], v1);
+    const float v10 = filters_select(filters_flag((int)(state->primed & 1u)), state->memory[20], v1);
     const float v11 = v1 - v10;
     const float v12 = v11 * 20000.0f;
     const float v13 = v12 * 1e-6f;
-    const float v14 = filters_select(state->primed & 1u, state->memory[21], v3);
+    const float v14 = filters_select(filters_flag((int)(state->primed & 1u)), state->memory[21], v3);
     const float v15 = v3 - v14;
     const float v16 = v15 * 0.04761905f;
     const float v17 = v14 + v16;
     const float v18 = v17 * 0.05f;
     const float v19 = v18 + -0.25f;
-    const float v20 = filters_select(state->primed & 1u, state->memory[22], v3);
+    const float v20 = filters_select(filters_flag((int)(state->primed & 1u)), state->memory[22], v3);
     const float v21 = v3 - v20;
     const float v22 = v21 * 0.13575524f;
     const float v23 = v20 + v22;
     const float v24 = v23 * 0.05f;
-    const float v25 = filters_select(state->primed & 1u, state->memory[23], v1);
-    const float v26 = filters_select(state->primed & 1u, state->memory[24], 0.0f);
+    const float v25 = filters_select(filters_flag((int)(state->primed & 1u)), state->memory[23], v1);
+    const float v26 = filters_select(filters_flag((int)(state->primed & 1u)), state->memory[24], 0.0f);
     const float v27 = v26 * 0.9756098f;
     const float v28 = v1 - v25;
     const float v29 = v28 * 487.80487f;
     const float v30 = v27 + v29;
     const float v31 = v30 * 0.001f;
-    const float v32 = filters_line_sum(&state->memory[25], 39u, v1, state->primed & 1u);
+    const float v32 = filters_line_sum(&state->memory[25], 39u, v1, filters_flag((int)(state->primed & 1u)));
     const float v33 = v32 * 0.025f;
     const float v34 = v33 * 0.02f;
-    const float v35 = filters_select(state->primed & 1u, state->memory[64], 0.1f);
+    const float v35 = filters_select(filters_flag((int)(state->primed & 1u)), state->memory[64], 0.1f);
     const float v36 = v5 * 5e-5f;
     const float v37 = v35 + v36;
     const float v38 = filters_clamp(v37, -0.5f, 0.75f);
-    const float v39 = filters_select(state->primed & 1u, state->memory[65], v3);
-    const float v40 = filters_line_sum(&state->memory[66], 1u, v39, state->primed & 1u);
+    const float v39 = filters_select(filters_flag((int)(state->primed & 1u)), state->memory[65], v3);
+    const float v40 = filters_line_sum(&state->memory[66], 1u, v39, filters_flag((int)(state->primed & 1u)));
     const float v41 = v40 * 0.5f;
-    const float v42 = filters_select(state->primed & 1u, state->memory[67], v41);
+    const float v42 = filters_select(filters_flag((int)(state->primed & 1u)), state->memory[67], v41);
     const float v43 = v41 - v42;
     const float v44 = v43 * 20000.0f;
-    const float v45 = filters_select(state->primed & 1u, state->memory[68], v44);
+    const float v45 = filters_select(filters_flag((int)(state->primed & 1u)), state->memory[68], v44);
     const float v46 = v44 - v45;
     const float v47 = v46 * 0.33333334f;
     const float v48 = v45 + v47;
@@ -383,7 +385,7 @@ FILTERS_CODE FILTERS_TOGETHER static void filters_guard(const filters_state *sta
                          | filters_far(state->memory[68], 0x49927C39u);
     const uint32_t counters = (3u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
     const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1);
-    front->sound = sound;
+    front->sound = filters_flag((int)sound);
     front->usable &= sound;
 }
 
@@ -627,7 +629,7 @@ FILTERS_CODE FILTERS_TOGETHER static void filters_decide(const filters_state *st
     const uint32_t f1 = filters_bits(chosen) ^ filters_bits(v0);
     const uint32_t f2 = filters_flag(f1 != 0u);
     const uint32_t stray = filters_far(v0, 0x7F800000u);
-    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
+    const uint32_t trusted = filters_flag((int)(front->sound & ~(uint32_t)(stray >> 31)));
     const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)

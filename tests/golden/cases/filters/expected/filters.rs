@@ -127,7 +127,7 @@ fn far(x: f32, bound: u32) -> u32 {
 #[inline(always)]
 #[allow(dead_code)]
 fn aside(x: f32, difference: u32, high: u32) -> u32 {
-    let below = (0 as u32).wrapping_sub(x.to_bits() >> 31);
+    let below = (0 as u32).wrapping_sub(core::hint::black_box(x.to_bits() >> 31));
     far(x, high ^ (difference & below))
 }
 /// The sign bit is set if x is not among the `width` numbers from that with the bits `low` on.
@@ -451,27 +451,47 @@ impl Controller {
         let v3: f32 = select(f2, measured.i_l, self.held[1]);
         let f4: u32 = f0 & f2;
         let v5: f32 = 48.0 - v1;
-        let v6: f32 = select(self.primed & 1, self.memory[0], v5);
+        let v6: f32 = select(core::hint::black_box(self.primed & 1), self.memory[0], v5);
         let v7: f32 = v6 * 0.1;
         let v8: f32 = clamp(v7, -5.0, 5.0);
         let f9: u32 = v7.to_bits() ^ v8.to_bits();
-        let v10: f32 = select(self.primed & 1, self.memory[20], v1);
+        let v10: f32 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[20],
+            v1,
+        );
         let v11: f32 = v1 - v10;
         let v12: f32 = v11 * 20000.0;
         let v13: f32 = v12 * 0.000001;
-        let v14: f32 = select(self.primed & 1, self.memory[21], v3);
+        let v14: f32 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[21],
+            v3,
+        );
         let v15: f32 = v3 - v14;
         let v16: f32 = v15 * 0.04761905;
         let v17: f32 = v14 + v16;
         let v18: f32 = v17 * 0.05;
         let v19: f32 = v18 + -0.25;
-        let v20: f32 = select(self.primed & 1, self.memory[22], v3);
+        let v20: f32 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[22],
+            v3,
+        );
         let v21: f32 = v3 - v20;
         let v22: f32 = v21 * 0.13575524;
         let v23: f32 = v20 + v22;
         let v24: f32 = v23 * 0.05;
-        let v25: f32 = select(self.primed & 1, self.memory[23], v1);
-        let v26: f32 = select(self.primed & 1, self.memory[24], 0.0);
+        let v25: f32 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[23],
+            v1,
+        );
+        let v26: f32 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[24],
+            0.0,
+        );
         let v27: f32 = v26 * 0.9756098;
         let v28: f32 = v1 - v25;
         let v29: f32 = v28 * 487.80487;
@@ -481,26 +501,42 @@ impl Controller {
             self.memory[25],
             self.memory.iter().skip(26).take(38),
             v1,
-            self.primed & 1,
+            core::hint::black_box(self.primed & 1),
         );
         let v33: f32 = v32 * 0.025;
         let v34: f32 = v33 * 0.02;
-        let v35: f32 = select(self.primed & 1, self.memory[64], 0.1);
+        let v35: f32 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[64],
+            0.1,
+        );
         let v36: f32 = v5 * 0.00005;
         let v37: f32 = v35 + v36;
         let v38: f32 = clamp(v37, -0.5, 0.75);
-        let v39: f32 = select(self.primed & 1, self.memory[65], v3);
+        let v39: f32 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[65],
+            v3,
+        );
         let v40: f32 = line_sum(
             self.memory[66],
             self.memory.iter().skip(67).take(0),
             v39,
-            self.primed & 1,
+            core::hint::black_box(self.primed & 1),
         );
         let v41: f32 = v40 * 0.5;
-        let v42: f32 = select(self.primed & 1, self.memory[67], v41);
+        let v42: f32 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[67],
+            v41,
+        );
         let v43: f32 = v41 - v42;
         let v44: f32 = v43 * 20000.0;
-        let v45: f32 = select(self.primed & 1, self.memory[68], v44);
+        let v45: f32 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[68],
+            v44,
+        );
         let v46: f32 = v44 - v45;
         let v47: f32 = v46 * 0.33333334;
         let v48: f32 = v45 + v47;
@@ -558,7 +594,7 @@ impl Controller {
             | far(self.memory[67], 1106247699) | far(self.memory[68], 1234336825);
         let counters = 3u32.wrapping_sub(self.bad_count) | self.bad_count
             | 1_u32.wrapping_sub(self.primed) | self.primed;
-        ((stray | counters) >> 31) ^ 1
+        core::hint::black_box(((stray | counters) >> 31) ^ 1)
     }
     /// [`Self::sense`], and what a damaged state forbids.
     #[inline(always)]
@@ -610,7 +646,7 @@ impl Controller {
         let f1: u32 = chosen.to_bits() ^ v0.to_bits();
         let f2: u32 = flag(f1 != 0);
         let stray = far(v0, 2139095040);
-        let trusted = sound & !(stray >> 31);
+        let trusted = core::hint::black_box(sound & !(stray >> 31));
         let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
             | (f2 << 7);

@@ -197,7 +197,9 @@ LINEAR_SPARE static uint32_t linear_far(float x, uint32_t bound)
 /* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
 LINEAR_SPARE static uint32_t linear_aside(float x, uint32_t difference, uint32_t high)
 {
-    return linear_far(x, high ^ (difference & ((uint32_t)0 - (linear_bits(x) >> 31))));
+    /* a flag behind its barrier: of a mask made of a sign clang makes a branch on RISC-V */
+    const uint32_t below = linear_flag((int)(linear_bits(x) >> 31));
+    return linear_far(x, high ^ (difference & ((uint32_t)0 - below)));
 }
 
 /* The sign bit is set if x is not among the numbers from the one with the bits low on. */
@@ -236,7 +238,7 @@ LINEAR_CODE LINEAR_APART static void linear_sense(const linear_state *state, con
     const float v1 = linear_select(f0, measured->v_out, state->held[0]);
     const float v2 = 100.0f - v1;
     const float v3 = v2 * 0.05f;
-    const float v4 = linear_select(state->primed & 1u, state->memory[0], 0.0f);
+    const float v4 = linear_select(linear_flag((int)(state->primed & 1u)), state->memory[0], 0.0f);
     const float v5 = v2 * 0.0001f;
     const float v6 = v4 + v5;
     const float v7 = linear_clamp(v6, -1.0f, 1.0f);
@@ -263,7 +265,7 @@ LINEAR_CODE LINEAR_TOGETHER static void linear_guard(const linear_state *state, 
                          | linear_beyond(state->previous_command, 0x3ECCCCCDu, 0x004CCCCCu);
     const uint32_t counters = (2u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
     const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1);
-    front->sound = sound;
+    front->sound = linear_flag((int)sound);
     front->usable &= sound;
 }
 
@@ -373,7 +375,7 @@ LINEAR_CODE LINEAR_TOGETHER static void linear_decide(const linear_state *state,
     const uint32_t f6 = linear_bits(v2) ^ linear_bits(v5);
     const uint32_t f7 = linear_flag(f6 != 0u);
     const uint32_t stray = linear_far(v5, 0x7F800000u);
-    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
+    const uint32_t trusted = linear_flag((int)(front->sound & ~(uint32_t)(stray >> 31)));
     const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)

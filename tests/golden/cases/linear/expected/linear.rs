@@ -125,7 +125,7 @@ fn far(x: f32, bound: u32) -> u32 {
 #[inline(always)]
 #[allow(dead_code)]
 fn aside(x: f32, difference: u32, high: u32) -> u32 {
-    let below = (0 as u32).wrapping_sub(x.to_bits() >> 31);
+    let below = (0 as u32).wrapping_sub(core::hint::black_box(x.to_bits() >> 31));
     far(x, high ^ (difference & below))
 }
 /// The sign bit is set if x is not among the `width` numbers from that with the bits `low` on.
@@ -385,7 +385,11 @@ impl Controller {
         let v1: f32 = select(f0, measured.v_out, self.held[0]);
         let v2: f32 = 100.0 - v1;
         let v3: f32 = v2 * 0.05;
-        let v4: f32 = select(self.primed & 1, self.memory[0], 0.0);
+        let v4: f32 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[0],
+            0.0,
+        );
         let v5: f32 = v2 * 0.0001;
         let v6: f32 = v4 + v5;
         let v7: f32 = clamp(v6, -1.0, 1.0);
@@ -410,7 +414,7 @@ impl Controller {
             | beyond(self.previous_command, 1053609165, 5033164);
         let counters = 2u32.wrapping_sub(self.bad_count) | self.bad_count
             | 1_u32.wrapping_sub(self.primed) | self.primed;
-        ((stray | counters) >> 31) ^ 1
+        core::hint::black_box(((stray | counters) >> 31) ^ 1)
     }
     /// [`Self::sense`], and what a damaged state forbids.
     #[inline(always)]
@@ -467,7 +471,7 @@ impl Controller {
         let f6: u32 = v2.to_bits() ^ v5.to_bits();
         let f7: u32 = flag(f6 != 0);
         let stray = far(v5, 2139095040);
-        let trusted = sound & !(stray >> 31);
+        let trusted = core::hint::black_box(sound & !(stray >> 31));
         let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (f4 << 5) | (f7 << 7);
         Command {

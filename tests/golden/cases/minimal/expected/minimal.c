@@ -206,7 +206,9 @@ MINIMAL_SPARE static uint32_t minimal_far(float x, uint32_t bound)
 /* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
 MINIMAL_SPARE static uint32_t minimal_aside(float x, uint32_t difference, uint32_t high)
 {
-    return minimal_far(x, high ^ (difference & ((uint32_t)0 - (minimal_bits(x) >> 31))));
+    /* a flag behind its barrier: of a mask made of a sign clang makes a branch on RISC-V */
+    const uint32_t below = minimal_flag((int)(minimal_bits(x) >> 31));
+    return minimal_far(x, high ^ (difference & ((uint32_t)0 - below)));
 }
 
 /* The sign bit is set if x is not among the numbers from the one with the bits low on. */
@@ -277,7 +279,7 @@ MINIMAL_CODE MINIMAL_TOGETHER static void minimal_guard(const minimal_state *sta
                          | minimal_aside(state->held[1], 0x02D00000u, 0x42700000u);
     const uint32_t counters = (1u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
     const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1);
-    front->sound = sound;
+    front->sound = minimal_flag((int)sound);
     front->usable &= sound;
 }
 
@@ -456,7 +458,7 @@ MINIMAL_CODE MINIMAL_TOGETHER static void minimal_decide(const minimal_state *st
     const uint32_t f1 = minimal_bits(chosen) ^ minimal_bits(v0);
     const uint32_t f2 = minimal_flag(f1 != 0u);
     const uint32_t stray = minimal_far(v0, 0x7F800000u);
-    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
+    const uint32_t trusted = minimal_flag((int)(front->sound & ~(uint32_t)(stray >> 31)));
     const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)

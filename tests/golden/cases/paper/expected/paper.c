@@ -235,7 +235,9 @@ PAPER_SPARE static uint32_t paper_far(float x, uint32_t bound)
 /* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
 PAPER_SPARE static uint32_t paper_aside(float x, uint32_t difference, uint32_t high)
 {
-    return paper_far(x, high ^ (difference & ((uint32_t)0 - (paper_bits(x) >> 31))));
+    /* a flag behind its barrier: of a mask made of a sign clang makes a branch on RISC-V */
+    const uint32_t below = paper_flag((int)(paper_bits(x) >> 31));
+    return paper_far(x, high ^ (difference & ((uint32_t)0 - below)));
 }
 
 /* The sign bit is set if x is not among the numbers from the one with the bits low on. */
@@ -290,11 +292,11 @@ PAPER_CODE PAPER_APART static void paper_sense(const paper_state *state, const p
     const float v6 = v5 * 0.01f;
     const float v7 = paper_clamp(v6, -2.0f, 2.0f);
     const uint32_t f8 = paper_bits(v6) ^ paper_bits(v7);
-    const float v9 = paper_select(state->primed & 1u, state->memory[0], v5);
+    const float v9 = paper_select(paper_flag((int)(state->primed & 1u)), state->memory[0], v5);
     const float v10 = v9 * 0.01f;
     const float v11 = paper_clamp(v10, -2.0f, 2.0f);
     const uint32_t f12 = paper_bits(v10) ^ paper_bits(v11);
-    const float v13 = paper_select(state->primed & 1u, state->memory[1], v5);
+    const float v13 = paper_select(paper_flag((int)(state->primed & 1u)), state->memory[1], v5);
     const float v14 = v5 - v13;
     const float v15 = v14 * 10000.0f;
     const float v16 = v15 * 1e-5f;
@@ -303,11 +305,11 @@ PAPER_CODE PAPER_APART static void paper_sense(const paper_state *state, const p
     const float v19 = v1 * 0.01f;
     const float v20 = paper_clamp(v19, 0.0f, 2.5f);
     const uint32_t f21 = paper_bits(v19) ^ paper_bits(v20);
-    const float v22 = paper_select(state->primed & 1u, state->memory[2], v1);
+    const float v22 = paper_select(paper_flag((int)(state->primed & 1u)), state->memory[2], v1);
     const float v23 = v22 * 0.01f;
     const float v24 = paper_clamp(v23, 0.0f, 2.5f);
     const uint32_t f25 = paper_bits(v23) ^ paper_bits(v24);
-    const float v26 = paper_select(state->primed & 1u, state->memory[3], v1);
+    const float v26 = paper_select(paper_flag((int)(state->primed & 1u)), state->memory[3], v1);
     const float v27 = v1 - v26;
     const float v28 = v27 * 10000.0f;
     const float v29 = v28 * 1e-5f;
@@ -355,7 +357,7 @@ PAPER_CODE PAPER_TOGETHER static void paper_guard(const paper_state *state, pape
                          | paper_aside(state->mapping_c, 0x00656041u, 0x3E5A1CACu);
     const uint32_t counters = (4u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
     const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1);
-    front->sound = sound;
+    front->sound = paper_flag((int)sound);
     front->usable &= sound;
 }
 
@@ -603,7 +605,7 @@ PAPER_CODE PAPER_TOGETHER static void paper_decide(const paper_state *state, con
     const uint32_t f8 = paper_bits(v3) ^ paper_bits(v7);
     const uint32_t f9 = paper_flag(f8 != 0u);
     const uint32_t stray = paper_far(v7, 0x7F800000u);
-    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
+    const uint32_t trusted = paper_flag((int)(front->sound & ~(uint32_t)(stray >> 31)));
     const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)

@@ -127,7 +127,7 @@ fn far(x: f32, bound: u32) -> u32 {
 #[inline(always)]
 #[allow(dead_code)]
 fn aside(x: f32, difference: u32, high: u32) -> u32 {
-    let below = (0 as u32).wrapping_sub(x.to_bits() >> 31);
+    let below = (0 as u32).wrapping_sub(core::hint::black_box(x.to_bits() >> 31));
     far(x, high ^ (difference & below))
 }
 /// The sign bit is set if x is not among the `width` numbers from that with the bits `low` on.
@@ -531,11 +531,15 @@ impl Controller {
         let v6: f32 = v5 * 0.01;
         let v7: f32 = clamp(v6, -2.0, 2.0);
         let f8: u32 = v6.to_bits() ^ v7.to_bits();
-        let v9: f32 = select(self.primed & 1, self.memory[0], v5);
+        let v9: f32 = select(core::hint::black_box(self.primed & 1), self.memory[0], v5);
         let v10: f32 = v9 * 0.01;
         let v11: f32 = clamp(v10, -2.0, 2.0);
         let f12: u32 = v10.to_bits() ^ v11.to_bits();
-        let v13: f32 = select(self.primed & 1, self.memory[1], v5);
+        let v13: f32 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[1],
+            v5,
+        );
         let v14: f32 = v5 - v13;
         let v15: f32 = v14 * 10000.0;
         let v16: f32 = v15 * 0.00001;
@@ -544,11 +548,19 @@ impl Controller {
         let v19: f32 = v1 * 0.01;
         let v20: f32 = clamp(v19, 0.0, 2.5);
         let f21: u32 = v19.to_bits() ^ v20.to_bits();
-        let v22: f32 = select(self.primed & 1, self.memory[2], v1);
+        let v22: f32 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[2],
+            v1,
+        );
         let v23: f32 = v22 * 0.01;
         let v24: f32 = clamp(v23, 0.0, 2.5);
         let f25: u32 = v23.to_bits() ^ v24.to_bits();
-        let v26: f32 = select(self.primed & 1, self.memory[3], v1);
+        let v26: f32 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[3],
+            v1,
+        );
         let v27: f32 = v1 - v26;
         let v28: f32 = v27 * 10000.0;
         let v29: f32 = v28 * 0.00001;
@@ -596,7 +608,7 @@ impl Controller {
             | aside(self.mapping_c, 6643777, 1046092972);
         let counters = 4u32.wrapping_sub(self.bad_count) | self.bad_count
             | 1_u32.wrapping_sub(self.primed) | self.primed;
-        ((stray | counters) >> 31) ^ 1
+        core::hint::black_box(((stray | counters) >> 31) ^ 1)
     }
     /// [`Self::sense`], and what a damaged state forbids.
     #[inline(always)]
@@ -655,7 +667,7 @@ impl Controller {
         let f8: u32 = v3.to_bits() ^ v7.to_bits();
         let f9: u32 = flag(f8 != 0);
         let stray = far(v7, 2139095040);
-        let trusted = sound & !(stray >> 31);
+        let trusted = core::hint::black_box(sound & !(stray >> 31));
         let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
             | (f6 << 4) | (f9 << 7);

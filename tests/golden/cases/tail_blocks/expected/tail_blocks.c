@@ -312,7 +312,9 @@ TAIL_BLOCKS_SPARE static uint32_t tail_blocks_far(float x, uint32_t bound)
 /* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
 TAIL_BLOCKS_SPARE static uint32_t tail_blocks_aside(float x, uint32_t difference, uint32_t high)
 {
-    return tail_blocks_far(x, high ^ (difference & ((uint32_t)0 - (tail_blocks_bits(x) >> 31))));
+    /* a flag behind its barrier: of a mask made of a sign clang makes a branch on RISC-V */
+    const uint32_t below = tail_blocks_flag((int)(tail_blocks_bits(x) >> 31));
+    return tail_blocks_far(x, high ^ (difference & ((uint32_t)0 - below)));
 }
 
 /* The sign bit is set if x is not among the numbers from the one with the bits low on. */
@@ -367,7 +369,7 @@ TAIL_BLOCKS_CODE TAIL_BLOCKS_APART static void tail_blocks_sense(const tail_bloc
     const float v6 = v5 * 0.05f;
     const float v7 = tail_blocks_clamp(v6, -5.0f, 5.0f);
     const uint32_t f8 = tail_blocks_bits(v6) ^ tail_blocks_bits(v7);
-    const float v9 = tail_blocks_select(state->primed & 1u, state->memory[0], v1);
+    const float v9 = tail_blocks_select(tail_blocks_flag((int)(state->primed & 1u)), state->memory[0], v1);
     const float v10 = v9 * 0.01f;
     const float v11 = v3 * 0.02f;
     const uint32_t f12 = tail_blocks_flag(f8 != 0u);
@@ -398,7 +400,7 @@ TAIL_BLOCKS_CODE TAIL_BLOCKS_TOGETHER static void tail_blocks_guard(const tail_b
                          | tail_blocks_beyond(state->soft_cap, 0x3E99999Au, 0x00999999u);
     const uint32_t counters = (4u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
     const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1);
-    front->sound = sound;
+    front->sound = tail_blocks_flag((int)sound);
     front->usable &= sound;
 }
 
@@ -656,7 +658,7 @@ TAIL_BLOCKS_CODE TAIL_BLOCKS_TOGETHER static void tail_blocks_decide(const tail_
     const uint32_t f3 = tail_blocks_bits(v1) ^ tail_blocks_bits(v2);
     const uint32_t f4 = tail_blocks_flag(f3 != 0u);
     const uint32_t stray = tail_blocks_far(v2, 0x7F800000u);
-    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 31);
+    const uint32_t trusted = tail_blocks_flag((int)(front->sound & ~(uint32_t)(stray >> 31)));
     const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)

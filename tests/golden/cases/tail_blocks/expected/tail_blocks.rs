@@ -127,7 +127,7 @@ fn far(x: f32, bound: u32) -> u32 {
 #[inline(always)]
 #[allow(dead_code)]
 fn aside(x: f32, difference: u32, high: u32) -> u32 {
-    let below = (0 as u32).wrapping_sub(x.to_bits() >> 31);
+    let below = (0 as u32).wrapping_sub(core::hint::black_box(x.to_bits() >> 31));
     far(x, high ^ (difference & below))
 }
 /// The sign bit is set if x is not among the `width` numbers from that with the bits `low` on.
@@ -1340,7 +1340,7 @@ impl Controller {
         let v6: f32 = v5 * 0.05;
         let v7: f32 = clamp(v6, -5.0, 5.0);
         let f8: u32 = v6.to_bits() ^ v7.to_bits();
-        let v9: f32 = select(self.primed & 1, self.memory[0], v1);
+        let v9: f32 = select(core::hint::black_box(self.primed & 1), self.memory[0], v1);
         let v10: f32 = v9 * 0.01;
         let v11: f32 = v3 * 0.02;
         let f12: u32 = flag(f8 != 0);
@@ -1372,7 +1372,7 @@ impl Controller {
             | beyond(self.soft_cap, 1050253722, 10066329);
         let counters = 4u32.wrapping_sub(self.bad_count) | self.bad_count
             | 1_u32.wrapping_sub(self.primed) | self.primed;
-        ((stray | counters) >> 31) ^ 1
+        core::hint::black_box(((stray | counters) >> 31) ^ 1)
     }
     /// [`Self::sense`], and what a damaged state forbids.
     #[inline(always)]
@@ -1426,7 +1426,7 @@ impl Controller {
         let f3: u32 = v1.to_bits() ^ v2.to_bits();
         let f4: u32 = flag(f3 != 0);
         let stray = far(v2, 2139095040);
-        let trusted = sound & !(stray >> 31);
+        let trusted = core::hint::black_box(sound & !(stray >> 31));
         let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
             | (f0 << 6) | (f4 << 7);

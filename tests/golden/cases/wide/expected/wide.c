@@ -280,7 +280,9 @@ WIDE_SPARE static uint64_t wide_far(double x, uint64_t bound)
 /* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
 WIDE_SPARE static uint64_t wide_aside(double x, uint64_t difference, uint64_t high)
 {
-    return wide_far(x, high ^ (difference & ((uint64_t)0 - (wide_bits(x) >> 63))));
+    /* a flag behind its barrier: of a mask made of a sign clang makes a branch on RISC-V */
+    const uint32_t below = wide_flag((int)(wide_bits(x) >> 63));
+    return wide_far(x, high ^ (difference & ((uint64_t)0 - below)));
 }
 
 /* The sign bit is set if x is not among the numbers from the one with the bits low on. */
@@ -373,41 +375,41 @@ WIDE_CODE WIDE_APART static void wide_sense(const wide_state *state, const wide_
     const double v12 = wide_clamp(v11, -2.0, 2.0);
     const uint32_t f13 = wide_differing(v11, v12);
     const double v14 = v1 - 48.0;
-    const double v15 = wide_select(state->primed & 1u, state->memory[0], v14);
+    const double v15 = wide_select(wide_flag((int)(state->primed & 1u)), state->memory[0], v14);
     const double v16 = v15 * 0.05;
     const double v17 = v16 + 0.25;
-    const double v18 = wide_select(state->primed & 1u, state->memory[3], v1);
+    const double v18 = wide_select(wide_flag((int)(state->primed & 1u)), state->memory[3], v1);
     const double v19 = v1 - v18;
     const double v20 = v19 * 10000.0;
     const double v21 = v20 * 1e-5;
     const double v22 = wide_clamp(v21, -1.0, 1.0);
     const uint32_t f23 = wide_differing(v21, v22);
-    const double v24 = wide_select(state->primed & 1u, state->memory[4], v5);
+    const double v24 = wide_select(wide_flag((int)(state->primed & 1u)), state->memory[4], v5);
     const double v25 = v5 - v24;
     const double v26 = v25 * 0.09090909090909091;
     const double v27 = v24 + v26;
     const double v28 = v27 * 0.05;
     const double v29 = v28 + -0.125;
     const double v30 = v5 - v7;
-    const double v31 = wide_select(state->primed & 1u, state->memory[5], v30);
-    const double v32 = wide_select(state->primed & 1u, state->memory[6], 0.0);
+    const double v31 = wide_select(wide_flag((int)(state->primed & 1u)), state->memory[5], v30);
+    const double v32 = wide_select(wide_flag((int)(state->primed & 1u)), state->memory[6], 0.0);
     const double v33 = v32 * 0.9523809523809524;
     const double v34 = v30 - v31;
     const double v35 = v34 * 476.1904761904762;
     const double v36 = v33 + v35;
     const double v37 = v36 * 0.0001;
-    const double v38 = wide_line_sum(&state->memory[7], 4u, v1, state->primed & 1u);
+    const double v38 = wide_line_sum(&state->memory[7], 4u, v1, wide_flag((int)(state->primed & 1u)));
     const double v39 = v38 * 0.2;
     const double v40 = v39 * 0.02;
-    const double v41 = wide_select(state->primed & 1u, state->memory[11], 0.01);
+    const double v41 = wide_select(wide_flag((int)(state->primed & 1u)), state->memory[11], 0.01);
     const double v42 = v10 * 0.0001;
     const double v43 = v41 + v42;
     const double v44 = wide_clamp(v43, -0.02, 0.03);
     const double v45 = v44 * 30.0;
-    const double v46 = wide_select(state->primed & 1u, state->memory[12], v7);
-    const double v47 = wide_line_sum(&state->memory[13], 1u, v46, state->primed & 1u);
+    const double v46 = wide_select(wide_flag((int)(state->primed & 1u)), state->memory[12], v7);
+    const double v47 = wide_line_sum(&state->memory[13], 1u, v46, wide_flag((int)(state->primed & 1u)));
     const double v48 = v47 * 0.5;
-    const double v49 = wide_select(state->primed & 1u, state->memory[14], v48);
+    const double v49 = wide_select(wide_flag((int)(state->primed & 1u)), state->memory[14], v48);
     const double v50 = v48 - v49;
     const double v51 = v50 * 10000.0;
     const double v52 = v51 * 1e-5;
@@ -485,7 +487,7 @@ WIDE_CODE WIDE_TOGETHER static void wide_guard(const wide_state *state, wide_fro
     const uint32_t sound = ((((uint32_t)(stray >> 32) | counters) >> 31) ^ (uint32_t)1)
                          & wide_flag((state->mapping_a + (state->mapping_r * -0.5)) > 0.0)
                          & wide_flag((state->mapping_a + (state->mapping_r * 12.0)) > 0.0);
-    front->sound = sound;
+    front->sound = wide_flag((int)sound);
     front->usable &= sound;
 }
 
@@ -682,7 +684,7 @@ WIDE_CODE WIDE_TOGETHER static void wide_decide(const wide_state *state, const w
     const uint32_t f18 = wide_differing(v16, v17);
     const uint32_t f19 = wide_flag(f18 != 0u);
     const uint64_t stray = wide_far(v17, (((uint64_t)0x7FF00000u << 32) | 0x00000000u));
-    const uint32_t trusted = front->sound & ~(uint32_t)(stray >> 63);
+    const uint32_t trusted = wide_flag((int)(front->sound & ~(uint32_t)(stray >> 63)));
     const uint32_t usable = front->usable & trusted;
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)

@@ -129,7 +129,7 @@ fn far(x: f64, bound: u64) -> u64 {
 #[inline(always)]
 #[allow(dead_code)]
 fn aside(x: f64, difference: u64, high: u64) -> u64 {
-    let below = (0 as u64).wrapping_sub(x.to_bits() >> 63);
+    let below = (0 as u64).wrapping_sub(core::hint::black_box(x.to_bits() >> 63));
     far(x, high ^ (difference & below))
 }
 /// The sign bit is set if x is not among the `width` numbers from that with the bits `low` on.
@@ -867,25 +867,45 @@ impl Controller {
         let f13: u32 = (v11.to_bits() ^ v12.to_bits()) as u32
             | ((v11.to_bits() ^ v12.to_bits()) >> 32) as u32;
         let v14: f64 = v1 - 48.0;
-        let v15: f64 = select(self.primed & 1, self.memory[0], v14);
+        let v15: f64 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[0],
+            v14,
+        );
         let v16: f64 = v15 * 0.05;
         let v17: f64 = v16 + 0.25;
-        let v18: f64 = select(self.primed & 1, self.memory[3], v1);
+        let v18: f64 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[3],
+            v1,
+        );
         let v19: f64 = v1 - v18;
         let v20: f64 = v19 * 10000.0;
         let v21: f64 = v20 * 0.00001;
         let v22: f64 = clamp(v21, -1.0, 1.0);
         let f23: u32 = (v21.to_bits() ^ v22.to_bits()) as u32
             | ((v21.to_bits() ^ v22.to_bits()) >> 32) as u32;
-        let v24: f64 = select(self.primed & 1, self.memory[4], v5);
+        let v24: f64 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[4],
+            v5,
+        );
         let v25: f64 = v5 - v24;
         let v26: f64 = v25 * 0.09090909090909091;
         let v27: f64 = v24 + v26;
         let v28: f64 = v27 * 0.05;
         let v29: f64 = v28 + -0.125;
         let v30: f64 = v5 - v7;
-        let v31: f64 = select(self.primed & 1, self.memory[5], v30);
-        let v32: f64 = select(self.primed & 1, self.memory[6], 0.0);
+        let v31: f64 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[5],
+            v30,
+        );
+        let v32: f64 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[6],
+            0.0,
+        );
         let v33: f64 = v32 * 0.9523809523809524;
         let v34: f64 = v30 - v31;
         let v35: f64 = v34 * 476.1904761904762;
@@ -895,24 +915,36 @@ impl Controller {
             self.memory[7],
             self.memory.iter().skip(8).take(3),
             v1,
-            self.primed & 1,
+            core::hint::black_box(self.primed & 1),
         );
         let v39: f64 = v38 * 0.2;
         let v40: f64 = v39 * 0.02;
-        let v41: f64 = select(self.primed & 1, self.memory[11], 0.01);
+        let v41: f64 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[11],
+            0.01,
+        );
         let v42: f64 = v10 * 0.0001;
         let v43: f64 = v41 + v42;
         let v44: f64 = clamp(v43, -0.02, 0.03);
         let v45: f64 = v44 * 30.0;
-        let v46: f64 = select(self.primed & 1, self.memory[12], v7);
+        let v46: f64 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[12],
+            v7,
+        );
         let v47: f64 = line_sum(
             self.memory[13],
             self.memory.iter().skip(14).take(0),
             v46,
-            self.primed & 1,
+            core::hint::black_box(self.primed & 1),
         );
         let v48: f64 = v47 * 0.5;
-        let v49: f64 = select(self.primed & 1, self.memory[14], v48);
+        let v49: f64 = select(
+            core::hint::black_box(self.primed & 1),
+            self.memory[14],
+            v48,
+        );
         let v50: f64 = v48 - v49;
         let v51: f64 = v50 * 10000.0;
         let v52: f64 = v51 * 0.00001;
@@ -993,9 +1025,11 @@ impl Controller {
             | far(self.mapping_r, 4576918229304087675);
         let counters = 4u32.wrapping_sub(self.bad_count) | self.bad_count
             | 1_u32.wrapping_sub(self.primed) | self.primed;
-        (((((stray >> 32) as u32 | counters) >> 31) ^ 1)
-            & flag(self.mapping_a + self.mapping_r * -0.5 > 0.0))
-            & flag(self.mapping_a + self.mapping_r * 12.0 > 0.0)
+        core::hint::black_box(
+            (((((stray >> 32) as u32 | counters) >> 31) ^ 1)
+                & flag(self.mapping_a + self.mapping_r * -0.5 > 0.0))
+                & flag(self.mapping_a + self.mapping_r * 12.0 > 0.0),
+        )
     }
     /// [`Self::sense`], and what a damaged state forbids.
     #[inline(always)]
@@ -1066,7 +1100,7 @@ impl Controller {
             | ((v16.to_bits() ^ v17.to_bits()) >> 32) as u32;
         let f19: u32 = flag(f18 != 0);
         let stray = far(v17, 9218868437227405312);
-        let trusted = sound & !((stray >> 63) as u32);
+        let trusted = core::hint::black_box(sound & !((stray >> 63) as u32));
         let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
             | (f9 << 4) | (f14 << 5) | (f15 << 6) | (f19 << 7);

@@ -3,6 +3,7 @@
 mod book;
 mod markdown;
 mod process;
+mod programs;
 mod rules;
 mod steps;
 mod tools;

@@ -2,11 +2,13 @@
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
 use crate::book;
 use crate::process::{self, Output};
+use crate::programs;
 use crate::rules::{self, Findings};
 use crate::tools;
 use crate::workspace::Workspace;
@@ -19,9 +21,6 @@ const FULL: &str = "POLICYC_FULL";
 
 /// The long forms take hours where floats are a library.
 const FULL_LIMIT: Duration = Duration::from_secs(6 * 3600);
-
-/// A test program that takes longer is worth a line.
-const LONG_SECONDS: f64 = 30.0;
 
 const HEARTBEAT: Duration = Duration::from_secs(60);
 
@@ -89,14 +88,20 @@ impl Context<'_> {
     }
 
     fn cargo_in(&self, folder: &Path, arguments: &[&str], environment: &[(&str, &str)]) -> Result<(), String> {
+        let mut command = self.command(arguments, environment);
+        command.current_dir(folder);
+        process::run_within(&mut command, &Output::Log(self.log.clone()), self.limit())
+    }
+
+    fn command(&self, arguments: &[&str], environment: &[(&str, &str)]) -> Command {
         let mut command = self.workspace.cargo(arguments);
-        command
-            .current_dir(folder)
-            .env_remove(BLESS)
-            .env("CARGO_TERM_COLOR", "never");
+        command.env_remove(BLESS).env("CARGO_TERM_COLOR", "never");
         command.envs(environment.iter().copied());
-        let limit = if self.options.full { FULL_LIMIT } else { process::LIMIT };
-        process::run_within(&mut command, &Output::Log(self.log.clone()), limit)
+        command
+    }
+
+    fn limit(&self) -> Duration {
+        if self.options.full { FULL_LIMIT } else { process::LIMIT }
     }
 }
 
@@ -233,56 +238,28 @@ fn clippy(context: &Context) -> Outcome {
 }
 
 fn test(context: &Context) -> Outcome {
-    // the dev profile (opt-level 1) keeps overflow checks, which the integer formats are to pass
-    let mut arguments = vec!["test", "--workspace", "--no-fail-fast"];
-    if context.options.quick {
-        arguments.extend(["--exclude", "tests", "--exclude", "blind"]);
-    }
     let absent = tools::absent(&context.workspace.target_dir);
     let mut environment: Vec<_> = absent.iter().map(|(name, value)| (*name, value.as_str())).collect();
     if context.options.full {
         environment.push((FULL, "1"));
     }
-    context.cargo(&arguments, &environment)?;
-    let log = process::read_lossy(&context.log);
-    let mut notes = vec![test_count(&log)];
-    notes.extend(long_programs(&log));
-    Ok(Done::Passed(notes))
-}
-
-/// Where the time went: the test programs that took longer than [`LONG_SECONDS`].
-fn long_programs(log: &str) -> Vec<String> {
-    let mut program = "";
-    let mut long = Vec::new();
-    for line in log.lines() {
-        if let Some(rest) = line.trim_start().strip_prefix("Running ") {
-            program = rest.split(" (").next().unwrap_or(rest);
-        }
-        let seconds = line
-            .rsplit_once("finished in ")
-            .and_then(|(_, rest)| rest.trim_end_matches('s').parse().ok());
-        if let Some(seconds) = seconds.filter(|seconds: &f64| *seconds > LONG_SECONDS) {
-            long.push(format!("{seconds:6.0} s {program}"));
-        }
+    // the dev profile (opt-level 1) keeps overflow checks, which the integer formats are to pass
+    let arguments = ["test", "--workspace"];
+    if context.options.quick {
+        let without = ["--no-fail-fast", "--exclude", "tests", "--exclude", "blind"];
+        context.cargo(&[&arguments[..], &without].concat(), &environment)?;
+        let log = process::read_lossy(&context.log);
+        return Ok(Done::Passed(vec![programs::test_count(std::iter::once(log.as_str()))]));
     }
-    long
-}
-
-/// Sums the `test result:` lines of libtest.
-fn test_count(log: &str) -> String {
-    let (mut passed, mut ignored) = (0, 0);
-    for line in log.lines().filter(|l| l.starts_with("test result:")) {
-        for part in line.split(['.', ';']) {
-            let mut words = part.split_whitespace();
-            let count = words.next().and_then(|word| word.parse::<usize>().ok());
-            match (count, words.next()) {
-                (Some(count), Some("passed")) => passed += count,
-                (Some(count), Some("ignored")) => ignored += count,
-                _ => {}
-            }
-        }
-    }
-    format!("{passed} tests passed, {ignored} ignored")
+    context.cargo(&[&arguments[..], &["--no-run"]].concat(), &environment)?;
+    let tests = context.workspace.crates.iter().flat_map(|one| &one.tests);
+    let command = |selection: &[String]| {
+        let mut command = context.command(&arguments, &environment);
+        command.arg("--no-fail-fast").args(selection);
+        command
+    };
+    let programs = programs::all(tests.map(String::as_str));
+    programs::run(programs, command, &context.log, context.limit()).map(Done::Passed)
 }
 
 fn rustdoc(context: &Context) -> Outcome {
@@ -317,20 +294,12 @@ fn firmware(context: &Context) -> Outcome {
     }
 }
 
-/// The README's first command, with its files below the target folder.
+/// What the README begins with, its files below the target folder. The program is that of the tests: a build for
+/// release takes minutes on two cores and finds nothing that they do not.
 fn demo(context: &Context) -> Outcome {
     let out = context.workspace.target_dir.join("xtask/demo");
     let out = out.to_string_lossy();
-    let command = [
-        "run",
-        "--release",
-        "--bin",
-        "policyc",
-        "--",
-        "demo",
-        "--out",
-        out.as_ref(),
-    ];
+    let command = ["run", "--bin", "policyc", "--", "demo", "--out", out.as_ref()];
     context.cargo(&command, &[])?;
     passed()
 }
@@ -338,24 +307,6 @@ fn demo(context: &Context) -> Outcome {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn libtest_results_are_summed() {
-        let log = "\
-test result: ok. 12 passed; 0 failed; 1 ignored; 0 measured; 0 filtered out; finished in 0.00s
-test result: FAILED. 3 passed; 2 failed; 0 ignored; 0 measured; 0 filtered out; finished in 0.1s
-";
-        assert_eq!(test_count(log), "15 tests passed, 1 ignored");
-    }
-
-    #[test]
-    fn long_test_programs_are_named_with_their_time() {
-        let log = "     Running cli/main.rs (target/debug/deps/cli-1)\n\
-test result: ok. 12 passed; 0 failed; finished in 61.20s\n\
-     Running ui/main.rs (target/debug/deps/ui-1)\n\
-test result: ok. 12 passed; 0 failed; finished in 1.20s\n";
-        assert_eq!(long_programs(log), ["    61 s cli/main.rs"]);
-    }
 
     #[test]
     fn a_fault_fails_a_step_and_a_warning_does_not() {

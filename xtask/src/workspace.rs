@@ -24,6 +24,8 @@ pub struct Dependency {
 #[derive(Clone, Debug)]
 pub struct Crate {
     pub name: String,
+    /// Names of its integration tests.
+    pub tests: Vec<String>,
     pub dependencies: Vec<Dependency>,
 }
 
@@ -125,8 +127,18 @@ fn package(package: &Value) -> Result<Crate, String> {
             },
         })
     };
+    let is_test = |target: &&Value| {
+        target["kind"]
+            .as_array()
+            .is_some_and(|kinds| kinds.iter().any(|k| k == "test"))
+    };
+    let targets = package["targets"].as_array().into_iter().flatten();
     Ok(Crate {
         name: text(package, "name")?.into(),
+        tests: targets
+            .filter(is_test)
+            .map(|target| Ok(text(target, "name")?.into()))
+            .collect::<Result<_, String>>()?,
         dependencies: own.map(dependency).collect::<Result<_, String>>()?,
     })
 }

@@ -145,6 +145,7 @@ mod tests {
             kind: *kind,
         });
         Crate {
+            tests: Vec::new(),
             name: name.into(),
             dependencies: dependencies.collect(),
         }

@@ -70,10 +70,12 @@ pub fn run(
     let started = Instant::now();
     let waiting = Mutex::new(VecDeque::from(programs));
     let ended = Mutex::new(Vec::new());
+    // a call of its own: in the head of the loop the guard would live as long as the turn
+    let next = || locked(&waiting).pop_front();
     std::thread::scope(|scope| {
         for _ in 0..LANES {
             scope.spawn(|| {
-                while let Some(program) = locked(&waiting).pop_front() {
+                while let Some(program) = next() {
                     let left = limit.saturating_sub(started.elapsed());
                     let result = run_one(&program, &command, log, left);
                     append(log, &result);
@@ -170,22 +172,37 @@ test result: FAILED. 3 passed; 2 failed; 0 ignored; 0 measured; 0 filtered out; 
         assert_eq!(programs[4].selection, ["--test", "ui"]);
     }
 
-    #[test]
-    fn every_program_runs_and_what_failed_is_told() {
-        let folder = std::env::temp_dir().join(format!("xtask-programs-{}", std::process::id()));
+    fn run_in_shell(script: &str, names: [&str; 3]) -> (Result<Vec<String>, String>, String) {
+        let folder = std::env::temp_dir().join(format!("xtask-programs-{}-{}", std::process::id(), names[0]));
         std::fs::create_dir_all(&folder).unwrap();
         let log = folder.join("test.log");
         std::fs::write(&log, "").unwrap();
-        let programs = ["a", "b", "c"].map(|name| Program::new(name, &[name])).to_vec();
+        let programs = names.map(|name| Program::new(name, &[name])).to_vec();
         let shell = |arguments: &[String]| {
             let mut command = Command::new("sh");
-            command.args(["-c", "echo $0 speaks; test $0 != b", &arguments[0]]);
+            command.args(["-c", script, &arguments[0]]).current_dir(&folder);
             command
         };
-        let fault = run(programs, shell, &log, Duration::from_secs(60)).unwrap_err();
+        let result = run(programs, shell, &log, Duration::from_secs(60));
         let text = process::read_lossy(&log);
         std::fs::remove_dir_all(&folder).unwrap();
+        (result, text)
+    }
+
+    #[test]
+    fn every_program_runs_and_what_failed_is_told() {
+        let (result, text) = run_in_shell("echo $0 speaks; test $0 != b", ["a", "b", "c"]);
+        let fault = result.unwrap_err();
         assert!(fault.contains("b speaks") && !fault.contains("a speaks"), "{fault}");
         assert!(text.contains("c speaks") && text.contains("b: FAILED"), "{text}");
+    }
+
+    #[test]
+    fn two_programs_run_at_the_same_time() {
+        // the first ends when the second has begun
+        let wait =
+            "touch $0.here; test $0 != first || timeout 20 sh -c 'until [ -e second.here ]; do sleep 0.05; done'";
+        let (result, _) = run_in_shell(wait, ["first", "second", "third"]);
+        assert_eq!(result.unwrap(), ["0 tests passed, 0 ignored"]);
     }
 }

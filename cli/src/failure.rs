@@ -17,12 +17,38 @@ impl Failure {
 
     /// The faults with their lines of source, coloured.
     fn rendered(&self) -> String {
-        let mut texts: Vec<String> = self.0.iter().map(rendered).collect();
+        let (gaps, faults): (Vec<&Fault>, Vec<&Fault>) = self.0.iter().partition(|fault| fault.is_gap);
+        let mut texts: Vec<String> = match gaps.as_slice() {
+            [] => Vec::new(),
+            [only] => vec![rendered(only)],
+            [first, ..] => vec![gaps_rendered(first, &gaps)],
+        };
+        texts.extend(faults.into_iter().map(rendered));
         if texts.len() > 1 {
-            texts.push(format!("{} faults; nothing was written", texts.len()));
+            texts.push(format!("{} faults; nothing was written", self.0.list.len()));
         }
         texts.join("\n\n")
     }
+}
+
+/// What is still to be filled in, a line each: a new contract has dozens.
+fn gaps_rendered(first: &Fault, gaps: &[&Fault]) -> String {
+    let title = format!("{} values are still to be filled in", gaps.len());
+    let file = normalize_untrusted_str(&first.file.display().to_string());
+    let lines: Vec<(String, String)> = gaps
+        .iter()
+        .map(|gap| {
+            let line = gap
+                .line_column()
+                .map_or_else(String::new, |(line, _)| format!("line {line}"));
+            (line, normalize_untrusted_str(&gap.problem))
+        })
+        .collect();
+    let notes = lines
+        .iter()
+        .map(|(line, problem)| Level::NOTE.with_name(line.as_str()).message(problem.as_str()));
+    let group = Level::ERROR.primary_title(title.as_str()).element(Origin::path(file));
+    Renderer::styled().render(&[group.elements(notes)])
 }
 
 /// One fault, coloured.

@@ -22,6 +22,6 @@ mod table;
 
 pub use dcm::Conduction;
 pub use fit::*;
-pub use mapping::DutyRatioMap;
+pub use mapping::{DutyRatioMap, simulation_toml};
 pub use pictures::page;
 pub use table::{Point, Table, TableOptions};

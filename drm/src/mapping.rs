@@ -5,6 +5,8 @@ use std::fmt::Write;
 use policy::{Coefficients, Interval};
 use serde::Serialize;
 
+use crate::formula::Losses;
+
 /// Duty ratio mapping `d_real = a d_sim + b i_out + c (+ r i_out d_sim)` with the box of `i_out` and `d_sim` in which it
 /// was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -146,6 +148,52 @@ impl DutyRatioMap {
     }
 }
 
+/// `[simulation]` of a `drm.toml`: the converter that `d_sim` is a duty of. Losses of 0 are left out.
+#[must_use]
+pub fn simulation_toml(simulation: &Losses) -> String {
+    let Losses {
+        v_in,
+        v_f,
+        r_d,
+        r_on,
+        dcr,
+        lost_duty,
+    } = *simulation;
+    let losses = [
+        ("v_f", v_f),
+        ("r_d", r_d),
+        ("r_on", r_on),
+        ("dcr", dcr),
+        ("lost_duty", lost_duty),
+    ];
+    let mut text = format!("\n[simulation]\nv_in = {v_in:?}\n");
+    for (key, value) in losses.iter().filter(|(_, value)| *value != 0.0) {
+        text += &format!("{key} = {value:?}\n");
+    }
+    text
+}
+
+impl From<&policy::Simulation> for Losses {
+    fn from(simulation: &policy::Simulation) -> Self {
+        let policy::Simulation {
+            v_in,
+            v_f,
+            r_d,
+            r_on,
+            dcr,
+            lost_duty,
+        } = *simulation;
+        Losses {
+            v_in,
+            v_f,
+            r_d,
+            r_on,
+            dcr,
+            lost_duty,
+        }
+    }
+}
+
 fn nine_digits(x: f64) -> f64 {
     let mut text = String::new();
     match write!(text, "{x:.8e}") {
@@ -193,6 +241,18 @@ mod tests {
         let range = map(None).duty_range();
         assert!((range.low - (0.285 + 0.004 + 0.03)).abs() < 1e-15, "{range:?}");
         assert!((range.high - (0.665 + 0.02 + 0.03)).abs() < 1e-15, "{range:?}");
+    }
+
+    #[test]
+    fn the_simulation_survives_the_file() {
+        let losses = Losses {
+            v_f: 0.7,
+            dcr: 0.1 + 0.2,
+            ..Losses::none(100.0)
+        };
+        let text = map(None).to_toml("") + &simulation_toml(&losses);
+        let mapping = policy::read_mapping(std::path::Path::new("drm.toml"), &text).unwrap();
+        assert_eq!(mapping.simulation.as_ref().map(Losses::from), Some(losses));
     }
 
     #[test]

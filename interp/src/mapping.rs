@@ -84,6 +84,7 @@ mod tests {
             adjust_b: interval(-0.1, 0.1),
             adjust_c: interval(-0.05, 0.05),
             adjust_r: interval(-0.3, 0.3),
+            simulation: None,
         })
     }
 

@@ -11,12 +11,15 @@ use syn::{LitStr, Token, Visibility};
 use codegen::Language;
 use codegen::backend::rust::{DEFAULT_TYPE, items};
 use codegen::lower::STATUS;
+use targets::TargetSpec;
 
-/// `[visibility] [Type =] "path"`
+/// `[visibility] [Type =] "path" [, target = "name"]`
 struct Call {
     visibility: Visibility,
     type_name: Option<Ident>,
     path: LitStr,
+    /// Whose processor the loops are cut for; the bits are the same for all.
+    target: &'static TargetSpec,
 }
 
 /// What the call takes, said wherever it does not begin like that.
@@ -24,7 +27,8 @@ const PATH: &str = "expected the path of a policy in quotes, as seen from the fo
                     include_policy!(\"policy/policy.toml\")";
 const EQUALS: &str = "expected `=` between the name of the controller's type and the path: \
                       include_policy!(Regulator = \"policy/policy.toml\")";
-const END: &str = "expected one path in quotes and nothing after it: include_policy!(\"policy/policy.toml\")";
+const END: &str = "expected nothing more after the path in quotes than a target: \
+                   include_policy!(\"policy/policy.toml\", target = \"cortex-m4f\")";
 
 impl Parse for Call {
     fn parse(input: ParseStream<'_>) -> syn::Result<Self> {
@@ -45,7 +49,11 @@ impl Parse for Call {
             None
         };
         let path = input.parse().map_err(|error| syn::Error::new(error.span(), PATH))?;
-        input.parse::<Option<Token![,]>>()?;
+        let comma = input.parse::<Option<Token![,]>>()?;
+        let target = match comma.is_some() && input.peek(syn::Ident) {
+            true => target(input)?,
+            false => targets::host(),
+        };
         if !input.is_empty() {
             return Err(input.error(END));
         }
@@ -53,8 +61,27 @@ impl Parse for Call {
             visibility,
             type_name,
             path,
+            target,
         })
     }
+}
+
+/// `target = "name" [,]`
+fn target(input: ParseStream<'_>) -> syn::Result<&'static TargetSpec> {
+    let key: Ident = input.parse()?;
+    if key != "target" {
+        return Err(syn::Error::new(key.span(), END));
+    }
+    input
+        .parse::<Token![=]>()
+        .map_err(|error| syn::Error::new(error.span(), END))?;
+    let name: LitStr = input.parse().map_err(|error| syn::Error::new(error.span(), END))?;
+    input.parse::<Option<Token![,]>>()?;
+    targets::find(&name.value()).ok_or_else(|| {
+        let hint = targets::of_part(&name.value()).map_or_else(String::new, |core| format!("; did you mean `{core}`?"));
+        let names = targets::names().join(", ");
+        syn::Error::new(name.span(), format!("no such target: expected one of {names}{hint}"))
+    })
 }
 
 /// Why a name cannot be that of the controller's type; `None` if it can. The module holds other types and uses others.
@@ -106,10 +133,7 @@ fn load(root: &Path, path: &str) -> Result<Policy, Faults> {
 }
 
 fn controller(call: &Call, root: &Path, policy: &Policy) -> TokenStream {
-    let Some(target) = targets::find("host") else {
-        return error_at(call, "internal fault: no host target");
-    };
-    let program = codegen::lower(policy, target, Language::Rust);
+    let program = codegen::lower(policy, call.target, Language::Rust);
     let type_name = call
         .type_name
         .as_ref()
@@ -140,7 +164,7 @@ fn rejected(call: &Call, root: &Path, faults: &Faults) -> TokenStream {
             .type_name
             .clone()
             .unwrap_or_else(|| Ident::new(DEFAULT_TYPE, Span::call_site()));
-        module(call, name, &stand_in(&type_name, &quote!(#(#fields),*)))
+        module(call, name, &stand_in(&type_name, faults, &quote!(#(#fields),*)))
     });
     quote! { #error #stand_in }
 }
@@ -171,19 +195,27 @@ fn error_at(call: &Call, message: &str) -> TokenStream {
     syn::Error::new(call.path.span(), message).to_compile_error()
 }
 
-/// Length of every array of the stand-in: no index that firmware writes lies beyond it.
+/// Length of those arrays of the stand-in that the faulty contract does not tell: no index that firmware writes lies
+/// beyond it.
 const STAND_IN_LENGTH: usize = 1024;
 
 /// The interface of a controller without behaviour.
-fn stand_in(type_name: &Ident, fields: &TokenStream) -> TokenStream {
-    let length = STAND_IN_LENGTH;
-    let counts = ["SIGNALS", "FEATURES", "ACTIONS", "STATE_WORDS"].map(|name| Ident::new(name, Span::call_site()));
+fn stand_in(type_name: &Ident, faults: &Faults, fields: &TokenStream) -> TokenStream {
+    // firmware asserts these: a second error would look for the fault where it is not
+    let counts = [
+        ("SIGNALS", Some(faults.signals.len())),
+        ("FEATURES", faults.features),
+        ("ACTIONS", faults.actions),
+        ("STATE_WORDS", None),
+    ];
+    let lengths = counts.map(|(_, length)| length.map_or(STAND_IN_LENGTH, |n| n.clamp(1, STAND_IN_LENGTH)));
+    let counts = counts.map(|(name, _)| Ident::new(name, Span::call_site()));
     let bits = STATUS.iter().map(|bit| {
         let (name, number) = (Ident::new(bit.name, Span::call_site()), bit.number);
         quote!(pub const #name: u32 = 1 << #number;)
     });
     quote! {
-        #(pub const #counts: usize = #length;)*
+        #(pub const #counts: usize = #lengths;)*
         pub const SAMPLE_PERIOD: f64 = 1.0;
         pub mod status { #(#bits)* }
         #[derive(Debug, Clone, Copy, PartialEq)]

@@ -68,8 +68,9 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     if let (Some(Some(mapping)), Some(inputs)) = (&mapping, &inputs) {
         bound_mapping(raw, mapping, inputs, &actions.list, faults);
     }
-    let golden = golden(raw, network.as_ref(), sizes, known, faults);
+    // with sizes that the network does not have, every vector would be a fault of its own
     let Weights { layers, mut notes } = weights?;
+    let golden = golden(raw, network.as_ref(), sizes, known, faults);
     notes.extend(unused(
         &head.parameters,
         signals.as_deref().unwrap_or_default(),

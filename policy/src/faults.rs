@@ -15,6 +15,10 @@ pub struct Faults {
     pub name: Option<String>,
     /// Signals with fit names, as far as they could be read, and whether each arrives as an ADC code.
     pub signals: Vec<(String, bool)>,
+    /// How many features the contract lists, faulty ones included, if that can be told.
+    pub features: Option<usize>,
+    /// How many actions it lists.
+    pub actions: Option<usize>,
 }
 
 /// The faults alone.

@@ -317,6 +317,26 @@ pub struct Mapping {
     pub adjust_c: Interval,
     /// Run-time adjustment allowed for `r`, 1/A; used in the four-term form only.
     pub adjust_r: Interval,
+    /// The converter that `d_sim` is a duty of, where the file names one; the controller does not use it.
+    #[serde(skip)]
+    pub simulation: Option<Simulation>,
+}
+
+/// The simulated converter of a mapping: at `d_sim` it has the voltage that is wanted of the real one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Simulation {
+    /// Input voltage, V.
+    pub v_in: f64,
+    /// Forward voltage of the diode, V.
+    pub v_f: f64,
+    /// Differential resistance of the diode, ohm.
+    pub r_d: f64,
+    /// On-resistance of the switch, ohm.
+    pub r_on: f64,
+    /// Resistance of the inductor, ohm.
+    pub dcr: f64,
+    /// Share of the period that the switch is on for less than commanded.
+    pub lost_duty: f64,
 }
 
 /// Coefficients of a mapping.

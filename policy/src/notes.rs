@@ -118,6 +118,7 @@ mod tests {
             adjust_b: interval(0.0, 0.02),
             adjust_c: interval(-0.1, 0.1),
             adjust_r: interval(0.0, 0.0),
+            simulation: None,
         }
     }
 

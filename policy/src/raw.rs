@@ -8,6 +8,7 @@ use crate::catalogue;
 use crate::faults::Faults;
 use crate::limits::{MAX_TOML_BYTES, MAX_WEIGHT_BYTES};
 use crate::names::{self, Kind};
+use crate::weights::header::not_a_contract;
 
 /// How files are found.
 #[derive(Debug, Clone, Default)]
@@ -86,6 +87,8 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<RawPolicy, Faults> {
         files,
         name: None,
         signals: Vec::new(),
+        features: None,
+        actions: None,
     };
     let mut faults = Sink::new();
     let given = FileName::new(path);
@@ -94,6 +97,9 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<RawPolicy, Faults> {
     let bytes = options
         .content(&name, MAX_TOML_BYTES)
         .map_err(|message| alone(name.fault(message), files.clone()))?;
+    if let Some(message) = not_a_contract(&bytes) {
+        return Err(alone(name.fault(message), files));
+    }
     let source = Source::new(name.clone(), bytes).map_err(|fault| alone(*fault, files.clone()))?;
     let contract = Document::parse(source, &mut faults);
     faults
@@ -187,11 +193,14 @@ fn normalise(path: &Path) -> Option<PathBuf> {
 /// `faults` with what a caller needs beside them.
 fn rejected(contract: &Document, files: Vec<PathBuf>, faults: toml_input::Faults) -> Faults {
     let (name, signals) = skeleton(contract);
+    let count = |keys: &[&str]| Some(contract.peek(keys)?.as_list()?.len());
     Faults {
         faults,
         files,
         name,
         signals,
+        features: count(&["feature"]),
+        actions: count(&["actions", "duties"]),
     }
 }
 

@@ -31,7 +31,8 @@ pub fn new_contract(weights: &Path, contract: &Path) -> Result<String, Faults> {
         outline(&Binary { name, bytes }, &mut faults)
     });
     let seen = faults.keep(seen_from(contract, weights).map_err(|message| name.fault(message)));
-    let text = outline.zip(seen).map(|(outline, seen)| text(&seen, &outline));
+    let golden = weights.with_file_name("golden.safetensors").is_file();
+    let text = outline.zip(seen).map(|(outline, seen)| text(&seen, golden, &outline));
     faults
         .conclude(text, || name.fault(catalogue::incomplete()))
         .map_err(|faults| Faults {
@@ -39,6 +40,8 @@ pub fn new_contract(weights: &Path, contract: &Path) -> Result<String, Faults> {
             files: vec![name.path.clone()],
             name: None,
             signals: Vec::new(),
+            features: None,
+            actions: None,
         })
 }
 
@@ -90,7 +93,9 @@ fn resolved(folder: &Path) -> Option<PathBuf> {
     }))
 }
 
-fn text(weights: &str, outline: &Outline) -> String {
+/// `golden`: whether `golden.safetensors` lies beside the weights.
+fn text(weights: &str, golden: bool, outline: &Outline) -> String {
+    let folder = &weights[..weights.rfind('/').map_or(0, |slash| slash + 1)];
     let file = toml::Value::String(weights.to_owned()).to_string();
     let Outline {
         inputs,
@@ -124,7 +129,12 @@ fn text(weights: &str, outline: &Outline) -> String {
     if !outline.bias {
         text += "bias = false                 # the file holds none\n";
     }
-    text += "# golden = \"golden.safetensors\"   # obs [n, inputs], q [n, actions], action [n] from the trainer\n";
+    let beside = if golden { "" } else { "# " };
+    let golden = toml::Value::String(format!("{folder}golden.safetensors"));
+    let _ = writeln!(
+        text,
+        "{beside}golden = {golden}   # obs [n, inputs], q [n, actions], action [n] from the trainer"
+    );
     text += "\n[actions]                    # duty ratio of each network output, 0 to 1\nduties = [\n";
     for output in 0..*outputs {
         let _ = writeln!(text, "    \"TODO\",   # action {output}");

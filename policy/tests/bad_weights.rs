@@ -345,6 +345,44 @@ fn golden_vectors_are_read() {
 }
 
 #[test]
+fn golden_vectors_are_no_second_fault_where_the_network_does_not_fit() {
+    let obs = tensor("obs", &[2, 2]);
+    let folder = Folder::new().tensors(&replaced(tensor("net.2.weight", &[5, 4])));
+    let list = folder.golden(&[obs, tensor("q", &[2, 5])]).faults().faults.list;
+    assert!(
+        !list.is_empty() && list.iter().all(|fault| fault.file.ends_with(FILE)),
+        "{list:?}"
+    );
+}
+
+#[test]
+fn a_file_that_ends_early_says_by_how_much() {
+    let folder = Folder::new();
+    let whole = std::fs::read(folder.path().join(FILE)).unwrap();
+    let short = &whole[..whole.len() - 10];
+    let fault = folder.file(FILE, short).fault();
+    assert_whole_file(
+        &fault,
+        FILE,
+        &["cut off", "bytes of data, as the header says", "copy or download"],
+    );
+}
+
+#[test]
+fn weights_in_the_place_of_the_contract_are_told_apart() {
+    let folder = Folder::new();
+    let faults = policy::load(&folder.path().join(FILE)).unwrap_err();
+    assert_whole_file(
+        &faults.faults.list[0],
+        FILE,
+        &["a file of weights, not a contract", "policyc new"],
+    );
+    std::fs::write(folder.path().join("model.zip"), b"PK\x03\x04....").unwrap();
+    let faults = policy::load(&folder.path().join("model.zip")).unwrap_err();
+    assert_whole_file(&faults.faults.list[0], "model.zip", &["zip archive"]);
+}
+
+#[test]
 fn golden_vectors_that_cannot_be_are_refused() {
     const GOLDEN: &str = "golden.safetensors";
     let obs = f32_tensor("obs", &[2, 2], &[1.0, 5.0, -2.0, -10.0]);
@@ -363,7 +401,13 @@ fn golden_vectors_that_cannot_be_are_refused() {
         &fault(&[tensor("obs", &[2, 3]), q.clone()]),
         GOLDEN,
         "obs",
-        &["shape [2, 3]", "shape [2, 2]"],
+        &["shape [2, 3]", "shape [rows, 2]"],
+    );
+    assert_tensor(
+        &fault(&[tensor("obs", &[2, 5]), tensor("q", &[5, 3])]),
+        GOLDEN,
+        "obs",
+        &["shape [2, 5]", "shape [rows, 2]", "transposed"],
     );
     assert_tensor(
         &fault(&[obs.clone(), u8s(&[0, 3])]),

@@ -39,6 +39,15 @@ fn a_new_contract_has_the_right_counts_and_todo_for_the_rest() {
 }
 
 #[test]
+fn golden_vectors_beside_the_weights_are_named() {
+    let text = scaffold(&example().join("weights.safetensors")).unwrap_or_else(|faults| panic!("{faults}"));
+    assert!(text.contains("\ngolden = \"golden.safetensors\""), "{text}");
+    let folder = Folder::new();
+    let text = scaffold(&folder.path().join("weights.safetensors")).unwrap();
+    assert!(text.contains("\n# golden = \"golden.safetensors\""), "{text}");
+}
+
+#[test]
 fn every_placeholder_of_a_new_contract_is_a_fault_by_name() {
     let folder = Folder::new();
     let text = scaffold(&folder.path().join("weights.safetensors")).unwrap();

@@ -5,12 +5,14 @@
 
 mod arm;
 pub mod boards;
+mod families;
 mod others;
 mod riscv;
 
 use serde::Serialize;
 
 pub use boards::{Board, BoardFile};
+pub use families::of_part;
 
 /// Byte order of a target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

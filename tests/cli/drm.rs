@@ -74,8 +74,12 @@ fn a_judgement_says_what_is_repaired_and_what_not() {
         assert!(steady["without_v"].as_f64().unwrap() < -9.0, "{said}");
         assert!(steady["with_v"].as_f64().unwrap().abs() < 0.05, "{said}");
     }
-    let said = desk.succeed("drm judge points.csv --v-in-sim 200");
+    // the mapping's file says which simulation its duties are of
+    assert!(desk.read("drm.toml").contains("[simulation]\nv_in = 200.0\n"));
+    let said = desk.succeed("drm judge points.csv");
     assert!(said.contains("without a mapping"), "{said}");
+    assert_eq!(said, desk.succeed("drm judge points.csv --v-in-sim 200"));
+    assert_ne!(said, desk.succeed("drm judge points.csv --v-in-sim 190"));
 }
 
 /// ngspice shares no code with the plant; both measure the same steady state (docs/results/plant.md: samples agree within 1.5 mV).

@@ -22,6 +22,19 @@ fn a_missing_path_of_the_command_line_is_not_explained_by_a_file() {
 }
 
 #[test]
+fn a_plant_that_a_scenario_names_is_sought_from_its_folder() {
+    let desk = Desk::new("minimal");
+    let examples = tests::root().join("examples");
+    tests::tools::copy_folder(&examples.join("simulate"), &desk.path("simulate"));
+    tests::tools::copy_folder(&examples.join("buck12"), &desk.path("buck12"));
+    let line = "simulate simulate/sb3-buck12.toml --policy buck12 --out loop";
+    let named = desk.refuse(line, &["cannot find the file", "folder of the file that names them"]);
+    assert!(!named.contains("working folder"), "{named}");
+    let typed = desk.refuse(&format!("{line} --plant nope.toml"), &["nope.toml", "working folder"]);
+    assert!(!typed.contains("folder of the file that names them"), "{typed}");
+}
+
+#[test]
 fn a_name_that_is_nearly_one_is_answered_with_it() {
     let desk = Desk::new("minimal");
     for (line, near) in [
@@ -36,6 +49,10 @@ fn a_name_that_is_nearly_one_is_answered_with_it() {
         ("compile policy --out out --format f32fma", "did you mean `f32-fma`?"),
         ("verify policy --format I16", "did you mean `i16`?"),
         ("certify policy --out out --axis v_ou", "did you mean `v_out`?"),
+        (
+            "compile policy --out out --target STM32G474RE",
+            "its core is that of `cortex-m4f`",
+        ),
     ] {
         desk.refuse(line, &[near, "= expected: one of "]);
     }

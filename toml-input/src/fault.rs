@@ -44,6 +44,8 @@ pub struct Fault {
     pub expected: Option<String>,
     /// What to do.
     pub hint: Option<String>,
+    /// Whether it is only something that is still to be filled in.
+    pub is_gap: bool,
 }
 
 impl Fault {
@@ -55,6 +57,7 @@ impl Fault {
             found,
             expected,
             hint,
+            is_gap,
         } = message;
         Fault {
             file: file.to_path_buf(),
@@ -63,6 +66,7 @@ impl Fault {
             found,
             expected,
             hint,
+            is_gap,
         }
     }
 
@@ -96,6 +100,7 @@ pub struct Message {
     found: Option<String>,
     expected: Option<String>,
     hint: Option<String>,
+    is_gap: bool,
 }
 
 impl Message {
@@ -107,7 +112,15 @@ impl Message {
             found: None,
             expected: None,
             hint: None,
+            is_gap: false,
         }
+    }
+
+    /// Nothing is wrong, but something is still to be filled in.
+    #[must_use]
+    pub(crate) fn gap(mut self) -> Self {
+        self.is_gap = true;
+        self
     }
 
     /// What stands there.

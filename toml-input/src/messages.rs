@@ -37,6 +37,12 @@ pub(crate) fn file_too_large(file: &str, found: u64, limit: u64) -> Message {
         .expected(format!("at most {limit} bytes"))
 }
 
+pub(crate) fn not_text() -> Message {
+    Message::new("the file is not text")
+        .found("zero bytes, as programs, pictures and UTF-16 have them")
+        .expected("text in UTF-8")
+}
+
 pub(crate) fn not_utf8(byte: u8) -> Message {
     Message::new("the file is not UTF-8 text")
         .found(format!("byte 0x{byte:02x}"))
@@ -90,9 +96,7 @@ pub fn missing_key(key: &str, title: &str, hint: &str) -> Message {
 }
 
 pub(crate) fn still_todo(label: &str, expected: &str) -> Message {
-    Message::new(format!("`{label}` still says TODO: fill in {expected}"))
-        .found("TODO")
-        .expected(expected)
+    Message::new(format!("`{label}` still says TODO: fill in {expected}")).gap()
 }
 
 pub(crate) fn wrong_type(label: &str, found: &str, expected: &str) -> Message {

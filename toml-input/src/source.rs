@@ -52,6 +52,15 @@ impl FileName {
         }
     }
 
+    /// A file that another file named; `path` leads there from the working folder.
+    #[must_use]
+    pub fn named_by_a_file(path: &Path) -> Self {
+        FileName {
+            origin: Origin::File,
+            ..FileName::new(path)
+        }
+    }
+
     /// The file that this one calls `text`: a path from its folder.
     #[must_use]
     pub fn beside(&self, text: &str) -> Self {
@@ -117,8 +126,12 @@ impl Source {
     /// The text in `bytes`.
     ///
     /// # Errors
-    /// If it is not UTF-8; the fault shows the first byte that is not.
+    /// If it is no text, or not UTF-8; the fault of a text shows the first byte that is not.
     pub fn new(name: FileName, bytes: Vec<u8>) -> Result<Self, Box<Fault>> {
+        // no line of a program or a picture is worth showing
+        if bytes.contains(&0) {
+            return Err(Box::new(name.fault(messages::not_text())));
+        }
         match String::from_utf8(bytes) {
             Ok(text) => {
                 let text = text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text);

@@ -129,6 +129,7 @@ impl Budget {
 /// A format that fits where the policy's own does not.
 struct Proposal {
     format: NumericFormat,
+    build: String,
     share: (f64, f64),
 }
 
@@ -154,7 +155,7 @@ pub fn lines(
     if budgets.is_empty() {
         lines.push(match target.cycles {
             None => format!(
-                "  cannot be said: no cycles are modelled for {}; `policyc targets --json` names the targets with `cycles`",
+                "  cannot be said: no cycles are modelled for {}; `policyc targets` says for which they are",
                 target.name
             ),
             Some(_) => "  cannot be said: no step ran under the target's emulator here".to_owned(),
@@ -168,8 +169,8 @@ pub fn lines(
         return Ok(lines);
     }
     lines.push(match proposal(policy, target, outputs, clock)? {
-        Some(Proposal { format, share }) => format!(
-            "  = hint: --format {} takes {:.0} to {:.0} %{}",
+        Some(Proposal { format, build, share }) => format!(
+            "  = hint: --format {} takes {:.0} to {:.0} % with {build}{}",
             format.name(),
             100.0 * share.0,
             100.0 * share.1,
@@ -211,12 +212,13 @@ fn proposal(
         let measured = Measured::of(&policy, target, &languages, &files);
         let budgets = measured
             .measured()
-            .filter_map(|costs| Budget::of(costs, clock, policy.sample_period));
+            .filter_map(|costs| Some((costs, Budget::of(costs, clock, policy.sample_period)?)));
         let best = budgets
-            .filter(|budget| budget.fit == Fit::Met)
-            .min_by(|a, b| a.share.1.total_cmp(&b.share.1));
-        if let Some(Budget { share, .. }) = best {
-            return Ok(Some(Proposal { format, share }));
+            .filter(|(_, budget)| budget.fit == Fit::Met)
+            .min_by(|(_, a), (_, b)| a.share.1.total_cmp(&b.share.1));
+        if let Some((Costs { build, .. }, Budget { share, .. })) = best {
+            let build = build.clone();
+            return Ok(Some(Proposal { format, build, share }));
         }
     }
     Ok(None)

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use codegen::output::{languages, with_cores};
 use codegen::{Output, manifest};
-use policy::Policy;
-use targets::TargetSpec;
+use policy::{NumericFormat, Policy};
+use targets::{Fma, TargetSpec};
 use toml_input::Message;
 use verify::Files;
 use verify::fmu::Archive;
@@ -94,6 +94,24 @@ pub fn write(folder: &Path, files: &Files, archives: &[Archive]) -> Result<Vec<(
     Ok(all.iter().map(length).collect())
 }
 
+/// Why fused operations are no gain on a processor, where they are none.
+fn fused(policy: &Policy, target: &TargetSpec) -> Option<String> {
+    if policy.numeric_format != NumericFormat::F32Fma {
+        return None;
+    }
+    match target.fma {
+        Fma::Absent => Some(format!(
+            "{} has no fused multiply-add; a library computes it, many times slower than f32",
+            target.name
+        )),
+        Fma::Cycles { fused, apart } if fused >= apart => Some(format!(
+            "on {} a fused multiply-add takes {fused} cycles, a product and a sum {apart}: f32 is faster",
+            target.name
+        )),
+        _ => None,
+    }
+}
+
 /// Says what was made of the policy and what was written.
 pub fn say(
     policy: &Policy,
@@ -106,6 +124,9 @@ pub fn say(
     }
     if policy.golden.is_none() {
         output::say(&format!("note: {UNPROVEN}"))?;
+    }
+    if let Some(note) = fused(policy, target) {
+        output::say(&format!("note: {note}"))?;
     }
     let sizes = manifest::sizes(policy, target);
     if let Some(bound) = sizes.accumulator_bound {

@@ -66,14 +66,15 @@ impl Reading {
         }
     }
 
-    fn table(&self, path: &Path) -> Result<Table, Failure> {
+    /// The table; without a simulation on the command line `known` is that of the points.
+    fn table(&self, path: &Path, known: Option<Losses>) -> Result<Table, Failure> {
         if let Some(v) = self.v_in_sim.filter(|v| !(v.is_finite() && *v > 0.0)) {
             return Err(not_positive("--v-in-sim", v));
         }
         let options = TableOptions {
             columns: self.columns.read()?,
             skip_unsettled: self.skip_unsettled,
-            simulation: self.simulation()?,
+            simulation: self.simulation()?.or(known),
             partial: false,
         };
         Ok(Table::open(path, &options)?)

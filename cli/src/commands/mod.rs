@@ -46,7 +46,12 @@ fn load_as(path: &Path, format: Option<NumericFormat>) -> Result<Policy, Failure
 }
 
 fn target(name: &str) -> Result<&'static TargetSpec, Failure> {
-    ::targets::find(name).ok_or_else(|| messages::unknown("target", name, &::targets::names()).into())
+    ::targets::find(name).ok_or_else(|| {
+        let core = ::targets::of_part(name).map(|core| format!("its core is that of `{core}`"));
+        messages::unknown("target", name, &::targets::names())
+            .maybe_hint(core)
+            .into()
+    })
 }
 
 /// Bytes as people read them.

@@ -11,10 +11,10 @@ pub fn run(options: &Targets) -> Result<Outcome, Failure> {
         output::say(&serde_json::to_string_pretty(TARGETS)?)?;
         return Ok(Outcome::Done);
     }
-    let rows: Vec<[String; 6]> = std::iter::once(HEAD.map(str::to_owned))
+    let rows: Vec<[String; COLUMNS]> = std::iter::once(HEAD.map(str::to_owned))
         .chain(TARGETS.iter().map(row))
         .collect();
-    let widths: [usize; 6] =
+    let widths: [usize; COLUMNS] =
         std::array::from_fn(|column| rows.iter().map(|row| row[column].len()).max().unwrap_or_default());
     for row in &rows {
         let cells: Vec<String> = row
@@ -27,9 +27,19 @@ pub fn run(options: &Targets) -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
-const HEAD: [&str; 6] = ["target", "order", "floats", "suits", "verify runs it", "description"];
+const COLUMNS: usize = 7;
 
-fn row(target: &TargetSpec) -> [String; 6] {
+const HEAD: [&str; COLUMNS] = [
+    "target",
+    "order",
+    "floats",
+    "suits",
+    "cycles",
+    "verify runs it",
+    "description",
+];
+
+fn row(target: &TargetSpec) -> [String; COLUMNS] {
     let order = match target.endianness {
         Endianness::Little => "little",
         Endianness::Big => "big",
@@ -46,11 +56,14 @@ fn row(target: &TargetSpec) -> [String; 6] {
         Runner::Emulated(board) => format!("{} {}", board.emulator, board.name),
         Runner::None(_) => "nowhere".to_owned(),
     };
+    // what `compile --clock` can say
+    let cycles = if target.cycles.is_some() { "modelled" } else { "-" };
     [
         target.name,
         order,
         floats,
         target.suitable_format,
+        cycles,
         &runner,
         target.description,
     ]

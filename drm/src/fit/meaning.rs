@@ -31,7 +31,7 @@ pub(crate) fn of(fit: &Fit, points: &[Point], explanations: &[Explanation], impo
     gained(fit, &mut meaning);
     let ties = causes::ties(explanations);
     if ties.len() > 1 {
-        meaning.push("a tie: each of these explains the table as well, and it cannot say which is true:".to_owned());
+        meaning.push(tie(&ties, fit));
         meaning.extend(ties.iter().map(|tie| format!("  {}", describe(tie))));
         let beside = causes::as_good(impossible, &ties);
         if !beside.is_empty() {
@@ -40,6 +40,23 @@ pub(crate) fn of(fit: &Fit, points: &[Point], explanations: &[Explanation], impo
         }
     }
     meaning
+}
+
+/// A pair of causes that leaves this many times what the fit leaves does not explain the table.
+/// Between pairs a fifth is the limit ([`causes::ties`]); what two causes of the first order leave out may double it.
+const LEAVES_MORE: f64 = 2.0;
+
+/// The line above the explanations that the table cannot tell apart.
+fn tie(ties: &[&Explanation], fit: &Fit) -> String {
+    let best = ties.iter().map(|tie| tie.rms_v).fold(f64::INFINITY, f64::min);
+    let left = fit.with.rms_v;
+    match best > LEAVES_MORE * left {
+        false => "a tie: each of these explains the table as well, and it cannot say which is true:".to_owned(),
+        true => format!(
+            "no cause of the list, nor two together, leaves as little as the fit ({left:.4} V rms); these come nearest, and the \
+             table cannot tell them apart:"
+        ),
+    }
 }
 
 fn describe(explanation: &Explanation) -> String {

@@ -19,7 +19,7 @@ use cortex_m_semihosting::{debug, hprintln};
 
 use run::{Outcome, Run, PERIODS};
 
-policy_macro::include_policy!("policy/policy.toml");
+policy_macro::include_policy!("policy/policy.toml", target = "cortex-m4f");
 use buck12::{Controller, Measurement};
 
 /// Ticks of the processor's clock between two control interrupts: 100 us at the 25 MHz of the board.

@@ -5,7 +5,7 @@ use toml_input::{Document, Sink, Table};
 use super::{duty_interval, interval_f32, number_f32};
 use crate::bounds::Box32;
 use crate::catalogue;
-use crate::model::{Coefficients, Interval, Mapping};
+use crate::model::{Coefficients, Interval, Mapping, Simulation};
 use crate::rounding::{inward_f32, nearest_f32};
 
 /// The section in `policy.toml`: the index of the load current; the coefficients stand in `drm.toml`.
@@ -73,6 +73,7 @@ pub(crate) fn read(document: &Document, load_current: usize, faults: &mut Sink) 
     if let Some(section) = adjust {
         section.finish(faults);
     }
+    let simulation = simulation(&mut root, faults);
     root.finish(faults);
     let mapping = Mapping {
         coefficients: Coefficients {
@@ -88,11 +89,33 @@ pub(crate) fn read(document: &Document, load_current: usize, faults: &mut Sink) 
         adjust_b: adjust_b?,
         adjust_c: adjust_c?,
         adjust_r: adjust_r?,
+        simulation,
     };
     if faults.count() == before {
         rising(&mapping, product.as_ref().or(places[0].as_ref()), faults);
     }
     (faults.count() == before).then_some(mapping)
+}
+
+/// `[simulation]`: the converter that `d_sim` is a duty of. A loss that is not named is 0.
+fn simulation(root: &mut Table<'_>, faults: &mut Sink) -> Option<Simulation> {
+    let mut section = root.optional("simulation")?.table("[simulation]", faults)?;
+    let hint = "the input voltage of the simulation that the policy was trained on: `v_in = 200.0`";
+    let v_in = section
+        .required("v_in", hint, faults)
+        .and_then(|value| value.positive(faults));
+    let keys = ["v_f", "r_d", "r_on", "dcr", "lost_duty"];
+    let [v_f, r_d, r_on, dcr, lost_duty] =
+        keys.map(|key| section.optional(key).map_or(Some(0.0), |value| value.number(faults)));
+    section.finish(faults);
+    Some(Simulation {
+        v_in: v_in?,
+        v_f: v_f?,
+        r_d: r_d?,
+        r_on: r_on?,
+        dcr: dcr?,
+        lost_duty: lost_duty?,
+    })
 }
 
 /// `[adjust] key`, or the default; the coefficient must lie inside, as it stands and in binary32, and `a` stay above 0.

@@ -11,6 +11,19 @@ pub(crate) fn malformed(found: &str, hint: Option<&str>) -> Message {
         .maybe_hint(hint.map(str::to_owned))
 }
 
+pub(crate) fn cut_off(found: usize, described: u64) -> Message {
+    Message::new("the file is cut off")
+        .found(format!("{found} bytes of data"))
+        .expected(format!("{described} bytes of data, as the header says"))
+        .hint("copy or download the file again")
+}
+
+pub(crate) fn weights_as_contract() -> Message {
+    Message::new("this is a file of weights, not a contract")
+        .expected("a policy.toml, or the folder that holds it")
+        .hint("`policyc new <this file> --out policy.toml` writes a contract to fill in")
+}
+
 pub(crate) fn other_format(found: &str, hint: &str) -> Message {
     Message::new("this is not a safetensors file")
         .found(found)
@@ -151,6 +164,20 @@ pub(crate) fn no_order(layers: &str) -> Message {
 
 pub(crate) fn golden_missing(name: &str, expected: &str) -> Message {
     Message::new(format!("golden vectors need the tensor `{name}`")).expected(expected)
+}
+
+pub(crate) fn golden_shape(found: &[usize], features: usize) -> Message {
+    let hint = match found {
+        [first, _] if *first == features => "the vectors stand in columns: save the transposed array, `obs.T.copy()`",
+        [_] => "one vector is still a table of one row: `obs[None, :]`",
+        _ => "one row for each vector, one column for each [[feature]], in their order",
+    };
+    Message::new("the observations do not fit the contract")
+        .found(format!("shape {found:?}"))
+        .expected(format!(
+            "shape [rows, {features}]: the contract has {features} features"
+        ))
+        .hint(hint)
 }
 
 pub(crate) fn golden_outside(row: usize, feature: &str, value: f64, low: f64, high: f64) -> Message {

@@ -43,7 +43,12 @@ pub(crate) fn read(
         faults.push(file.name.fault(message));
         return None;
     };
-    let rows = observations.shape()[0];
+    let Some(rows) = rows(&observations, features) else {
+        // how many rows there are is not known: what follows would be echoes
+        let message = catalogue::golden_shape(observations.shape(), features);
+        faults.push(file.name.tensor_fault("obs", message));
+        return None;
+    };
     let (q, action) = (view("q"), view("action"));
     if q.is_none() && action.is_none() {
         let expected = format!("`q` f32 [{rows}, {actions}] or `action` i32 [{rows}], or both");
@@ -75,6 +80,14 @@ pub(crate) fn read(
         decisions: limits.decisions,
     };
     (faults.count() == before).then_some(golden)
+}
+
+/// The number of vectors, if the shape is `[rows, features]`.
+fn rows(observations: &TensorView<'_>, features: usize) -> Option<usize> {
+    match observations.shape() {
+        [rows, columns] if *columns == features => Some(*rows),
+        _ => None,
+    }
 }
 
 fn names(tensors: &SafeTensors<'_>) -> String {

@@ -54,10 +54,33 @@ pub(crate) fn open<'a>(file: &'a Binary, faults: &mut Sink) -> Option<SafeTensor
         }
         Ok(tensors) => Some(tensors),
         Err(error) => {
-            faults.push(file.name.fault(catalogue::malformed(&error.to_string(), None)));
+            let length = file.bytes.len().saturating_sub(8 + header.len());
+            let message = match described(header) {
+                Some(described) if described > length as u64 => catalogue::cut_off(length, described),
+                _ => catalogue::malformed(&error.to_string(), None),
+            };
+            faults.push(file.name.fault(message));
             None
         }
     }
+}
+
+/// Bytes of data that the header promises.
+fn described(header: &str) -> Option<u64> {
+    let header: serde_json::Value = serde_json::from_str(header).ok()?;
+    let ends = header
+        .as_object()?
+        .values()
+        .filter_map(|tensor| tensor["data_offsets"][1].as_u64());
+    ends.max()
+}
+
+/// Why `bytes` are no contract although somebody named them as one; `None` if they may be text.
+pub(crate) fn not_a_contract(bytes: &[u8]) -> Option<toml_input::Message> {
+    if plausible_length(bytes) && bytes.get(8) == Some(&b'{') {
+        return Some(catalogue::weights_as_contract());
+    }
+    foreign(bytes)
 }
 
 fn header_text(bytes: &[u8]) -> Result<&str, toml_input::Message> {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use drm::{Conduction, FitOptions, Form, Report};
+use drm::{Conduction, FitOptions, Form, Report, simulation_toml};
 
 use super::Reading;
 use crate::{Failure, Outcome, output};
@@ -64,7 +64,7 @@ pub enum Terms {
 
 /// Fits, writes, reports.
 pub fn run(options: &Fit) -> Result<Outcome, Failure> {
-    let table = options.reading.table(&options.table)?;
+    let table = options.reading.table(&options.table, None)?;
     let report = drm::fit(&table, &fit_options(options)?)?;
     let text = drm::text(&report)?;
     let title = format!("Duty ratio mapping of {}", options.table.display());
@@ -73,7 +73,10 @@ pub fn run(options: &Fit) -> Result<Outcome, Failure> {
         .as_ref()
         .map(|path| Ok::<_, Failure>((path, drm::page(&report, &title, &text)?)));
     let page = page.transpose()?;
-    output::write_one(&options.out, &report.fit.map.to_toml(&comment(&report)))?;
+    let simulation = options.reading.simulation()?;
+    let mapping =
+        report.fit.map.to_toml(&comment(&report)) + &simulation.as_ref().map_or_else(String::new, simulation_toml);
+    output::write_one(&options.out, &mapping)?;
     if let Some((path, page)) = &page {
         output::write_one(path, page)?;
     }

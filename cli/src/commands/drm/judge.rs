@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use drm::DutyRatioMap;
+use drm::formula::Losses;
 use drm::judge::{Judgement, Steady};
 use policy::Interval;
 use serde::Serialize;
@@ -53,11 +54,13 @@ struct Answer {
 
 /// Judges and reports.
 pub fn run(options: &Judge) -> Result<Outcome, Failure> {
-    let map = DutyRatioMap::from(&policy::load_mapping(&options.mapping)?);
+    let mapping = policy::load_mapping(&options.mapping)?;
+    let map = DutyRatioMap::from(&mapping);
+    let simulation = mapping.simulation.as_ref().map(Losses::from);
     let table = options
         .table
         .as_ref()
-        .map(|path| options.reading.table(path))
+        .map(|path| options.reading.table(path, simulation))
         .transpose()?;
     let judgement = table.map(|table| drm::judge::judge(&table, &map, options.duty_limits));
     let steady = steady(options, &map)?;

@@ -8,7 +8,7 @@ use closed_loop::scenario::Finding;
 use closed_loop::{Converter, LoadStep, Scenario, Trajectory};
 use plant::Parameters;
 use policy::Policy;
-use toml_input::{Fault, Message};
+use toml_input::{Fault, FileName, Message};
 
 use crate::arguments::Simulate;
 use crate::{Failure, Outcome, interruption, output};
@@ -101,7 +101,11 @@ fn prepare(options: &Simulate) -> Result<Setting, Failure> {
         let message = Message::new("no plant").hint("plant = \"../plants/paper-model.toml\", or --plant PLANT");
         return Err(Fault::in_file(file, message).into());
     };
-    let converter = Converter::load(&plant, &scenario.set)?;
+    let name = match &options.plant {
+        Some(path) => FileName::new(path),
+        None => FileName::named_by_a_file(&plant),
+    };
+    let converter = Converter::load(name, &scenario.set)?;
     let v_ref = v_ref(scenario.v_ref, &policy, file)?;
     suits(&policy, converter.parameters(), v_ref, file)?;
     let mut notes = Vec::new();

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::Instant;
 
-use toml_input::Message;
+use toml_input::{FileName, Message};
 use train::scenario_table as table;
 use train::seeds::best;
 use train::{Contract, Converter, Course, Ended, Outcome as Trained, SeedRun, Settings, train_all};
@@ -30,7 +30,7 @@ pub fn run(options: &Train) -> Result<Outcome, Failure> {
         settings.seeds = distinct(&options.seeds)?;
     }
     let contract = Contract::load(&settings.contract, &settings.hidden)?;
-    let converter = Converter::load(&settings.plant, &settings.set)?;
+    let converter = Converter::load(FileName::named_by_a_file(&settings.plant), &settings.set)?;
     let kept = Kept::new(&options.out);
     let course = Course {
         threads: options.threads,

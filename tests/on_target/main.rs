@@ -18,6 +18,9 @@ use verify::{Options, Outcome, Report};
 
 /// Policies drawn at random beside the example.
 const RANDOM_POLICIES: u64 = 20;
+/// Those of them that a target has every day: each target others, so that all targets together have all of them.
+/// `POLICYC_FULL` gives every target all of them.
+const RANDOM_POLICIES_A_DAY: u64 = 6;
 /// Seed of the first.
 const FIRST_SEED: u64 = 5000;
 
@@ -91,7 +94,7 @@ fn check(name: &str) {
     assert_equal(&report, name);
     let builds = report.builds.iter().map(|build| build.build.rsplit_once(' ').unwrap());
     let (rust, c): (Vec<_>, Vec<_>) = builds.partition(|(compiler, _)| *compiler == verify::toolchain::RUSTC);
-    for (seed, (compiler, level)) in (FIRST_SEED..FIRST_SEED + RANDOM_POLICIES).zip(c.iter().cycle()) {
+    for (seed, (compiler, level)) in seeds(target).zip(c.iter().cycle()) {
         let folder = tests::random::policy(seed).unwrap();
         let policy = policy::load(&folder.path()).unwrap_or_else(|faults| panic!("{}\n{faults}", folder.contract));
         let mut builds: Vec<_> = rust.iter().copied().chain([(*compiler, *level)]).collect();
@@ -103,6 +106,27 @@ fn check(name: &str) {
         assert_eq!(report.builds.len(), compilers.len(), "{report:?}");
         assert_equal(&report, &format!("{name}, {compiler} {level}\n{}", folder.contract));
     }
+}
+
+/// The random policies of a target.
+fn seeds(target: &TargetSpec) -> impl Iterator<Item = u64> {
+    let place = targets::TARGETS.iter().position(|other| other.name == target.name);
+    let first = place.unwrap_or(0) as u64 * RANDOM_POLICIES_A_DAY;
+    let count = if tests::full() {
+        RANDOM_POLICIES
+    } else {
+        RANDOM_POLICIES_A_DAY
+    };
+    (first..first + count).map(|number| FIRST_SEED + number % RANDOM_POLICIES)
+}
+
+#[test]
+fn all_targets_together_have_all_random_policies() {
+    let emulated = targets::TARGETS
+        .iter()
+        .filter(|t| matches!(t.runner, targets::Runner::Emulated(_)));
+    let seeds: std::collections::BTreeSet<u64> = emulated.flat_map(seeds).collect();
+    assert!(seeds.into_iter().eq(FIRST_SEED..FIRST_SEED + RANDOM_POLICIES));
 }
 
 macro_rules! equal_on {
@@ -162,7 +186,7 @@ fn a_format_has_one_checksum_on_every_target_and_in_every_language() {
 #[test]
 fn random_policies_are_equal_in_binary64_on_powerpc() {
     let target = target("dspace-ds1202");
-    for seed in FIRST_SEED..FIRST_SEED + RANDOM_POLICIES {
+    for seed in seeds(target) {
         let folder = tests::random::policy(seed).unwrap();
         let policy = policy::load(&folder.path()).unwrap().with_format(NumericFormat::F64);
         let report = run(&policy, target, &compilers(target), &["-O2", "-O"], 2_000);

@@ -59,7 +59,20 @@ fn what_is_generated_beside_the_controller_leaves_its_figures_as_they_are() {
         manifest["costs"].clone()
     };
     let alone = costs("", "alone");
-    assert_eq!(alone.as_array().unwrap().len(), 2, "-O2 and -O3");
+    let builds: Vec<&str> = alone
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|cost| cost["build"].as_str().unwrap())
+        .collect();
+    let plain = ["arm-none-eabi-gcc -O2", "arm-none-eabi-gcc -O3"];
+    let each = plain.map(|build| [build.to_owned(), format!("{build} -DMINIMAL_ASSEMBLY (assembly)")]);
+    assert_eq!(builds, each.concat());
+    let instructions = |index: usize| alone[index]["instructions_max"].as_u64().unwrap();
+    assert!(
+        instructions(1) < instructions(0),
+        "the loops of the assembly are shorter: {alone}"
+    );
     for output in ["kit", "sfunction", "fmu2", "fmu3"] {
         assert_eq!(alone, costs(&format!(" --emit {output}"), output), "{output}");
     }

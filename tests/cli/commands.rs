@@ -149,7 +149,7 @@ fn new_writes_a_skeleton_whose_gaps_inspect_names_one_by_one() {
             "`hidden_activation`",
             "`hold`",
             "--> policy/fresh.toml",
-            "line 4: `name`",
+            "line 3: `name`",
         ],
     );
     let gaps = skeleton

@@ -1,7 +1,7 @@
 #![deny(warnings)]
 
 mod own {
-    policy_macro::include_policy!("policy/policy.toml");
+    policy_macro::include_policy!(pub "policy/policy.toml");
 }
 mod of_another_core {
     policy_macro::include_policy!(pub Regulator = "policy/policy.toml", target = "cortex-m4f",);

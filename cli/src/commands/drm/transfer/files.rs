@@ -22,10 +22,14 @@ pub fn all(found: &Findings) -> Result<BTreeMap<String, String>, Failure> {
     let mut page = Page::new(format!("Transfer of {}", found.setting.policy.name))
         .verdict(Verdict::Note, sentence)
         .section(Section::new("").text(explanation(found)).table(overview(found)));
+    let simulation = drm::simulation_toml(&found.setting.trained_on);
     for real in &found.real {
         let name = &real.name;
         files.insert(format!("{name}-points.csv"), real.points.clone());
-        files.insert(format!("{name}-drm.toml"), real.report.fit.map.to_toml(""));
+        files.insert(
+            format!("{name}-drm.toml"),
+            real.report.fit.map.to_toml("") + &simulation,
+        );
         let text = drm::text(&real.report)?;
         let mut section = Section::new(name.as_str());
         for run in &real.runs {

@@ -151,8 +151,8 @@ fn rejected(call: &Call, root: &Path, faults: &Faults) -> TokenStream {
     // rustc puts its own `error: ` before the first; a rejected policy is expanded anew in every build, so none of
     // its files, which may be missing or huge, needs to be tracked
     let error = error_at(call, text.strip_prefix("error: ").unwrap_or(&text).trim_end());
-    let stand_in = faults.name.as_ref().map(|name| {
-        let fields = faults.signals.iter().map(|(name, adc)| {
+    let stand_in = faults.skeleton.name.as_ref().map(|name| {
+        let fields = faults.skeleton.signals.iter().map(|(name, adc)| {
             let name = Ident::new(name, Span::call_site());
             if *adc {
                 quote!(pub #name: i32)
@@ -203,9 +203,9 @@ const STAND_IN_LENGTH: usize = 1024;
 fn stand_in(type_name: &Ident, faults: &Faults, fields: &TokenStream) -> TokenStream {
     // firmware asserts these: a second error would look for the fault where it is not
     let counts = [
-        ("SIGNALS", Some(faults.signals.len())),
-        ("FEATURES", faults.features),
-        ("ACTIONS", faults.actions),
+        ("SIGNALS", Some(faults.skeleton.signals.len())),
+        ("FEATURES", faults.skeleton.features),
+        ("ACTIONS", faults.skeleton.actions),
         ("STATE_WORDS", None),
     ];
     let lengths = counts.map(|(_, length)| length.map_or(STAND_IN_LENGTH, |n| n.clamp(1, STAND_IN_LENGTH)));

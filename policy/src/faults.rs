@@ -11,6 +11,14 @@ pub struct Faults {
     pub faults: toml_input::Faults,
     /// Every file that was opened or should have been, for rebuild tracking.
     pub files: Vec<PathBuf>,
+    /// What the contract says all the same.
+    pub skeleton: Box<Skeleton>,
+}
+
+/// What could be read of a contract with faults: enough for a stand-in of the controller.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Skeleton {
     /// Name of the policy, if it could be read and is a fit name.
     pub name: Option<String>,
     /// Signals with fit names, as far as they could be read, and whether each arrives as an ADC code.

@@ -33,7 +33,7 @@ mod weights;
 pub use activation::{Activation, Shape};
 pub use check::check;
 pub use digests::sha256;
-pub use faults::Faults;
+pub use faults::{Faults, Skeleton};
 pub use memory::memory_bounds;
 pub use model::*;
 pub use raw::{RawPolicy, ReadOptions, read};

@@ -5,7 +5,7 @@ use std::path::{Component, Path, PathBuf};
 use toml_input::{Document, Fault, FileName, Message, Origin, Sink, Source, Value};
 
 use crate::catalogue;
-use crate::faults::Faults;
+use crate::faults::{Faults, Skeleton};
 use crate::limits::{MAX_TOML_BYTES, MAX_WEIGHT_BYTES};
 use crate::names::{self, Kind};
 use crate::weights::header::not_a_contract;
@@ -85,10 +85,7 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<RawPolicy, Faults> {
     let alone = |fault: Fault, files: Vec<PathBuf>| Faults {
         faults: fault.into(),
         files,
-        name: None,
-        signals: Vec::new(),
-        features: None,
-        actions: None,
+        skeleton: Box::default(),
     };
     let mut faults = Sink::new();
     let given = FileName::new(path);
@@ -192,20 +189,14 @@ fn normalise(path: &Path) -> Option<PathBuf> {
 
 /// `faults` with what a caller needs beside them.
 fn rejected(contract: &Document, files: Vec<PathBuf>, faults: toml_input::Faults) -> Faults {
-    let (name, signals) = skeleton(contract);
-    let count = |keys: &[&str]| Some(contract.peek(keys)?.as_list()?.len());
     Faults {
         faults,
         files,
-        name,
-        signals,
-        features: count(&["feature"]),
-        actions: count(&["actions", "duties"]),
+        skeleton: Box::new(skeleton(contract)),
     }
 }
 
-/// Name and signals of a contract as far as they can be told.
-fn skeleton(contract: &Document) -> (Option<String>, Vec<(String, bool)>) {
+fn skeleton(contract: &Document) -> Skeleton {
     let fit = |value: Option<Value<'_>>, kind| {
         let text = value?.as_text()?;
         names::objection(text, kind).is_none().then(|| text.to_owned())
@@ -220,5 +211,11 @@ fn skeleton(contract: &Document) -> (Option<String>, Vec<(String, bool)>) {
             signals.push((name, item.peek("adc").is_some()));
         }
     }
-    (name, signals)
+    let count = |keys: &[&str]| Some(contract.peek(keys)?.as_list()?.len());
+    Skeleton {
+        name,
+        signals,
+        features: count(&["feature"]),
+        actions: count(&["actions", "duties"]),
+    }
 }

@@ -38,10 +38,7 @@ pub fn new_contract(weights: &Path, contract: &Path) -> Result<String, Faults> {
         .map_err(|faults| Faults {
             faults,
             files: vec![name.path.clone()],
-            name: None,
-            signals: Vec::new(),
-            features: None,
-            actions: None,
+            skeleton: Box::default(),
         })
 }
 

@@ -202,9 +202,9 @@ fn all_faults_of_all_files_come_together() {
         assert!(text.contains(word), "{word}:\n{text}");
     }
     assert_eq!(faults.faults.list.len(), 8, "{text}");
-    assert_eq!(faults.name.as_deref(), Some("buck"));
+    assert_eq!(faults.skeleton.name.as_deref(), Some("buck"));
     assert_eq!(
-        faults.signals,
+        faults.skeleton.signals,
         [("v_out".to_owned(), false), ("i_out".to_owned(), false)]
     );
     assert_eq!(faults.files.len(), 3);
@@ -224,8 +224,8 @@ fn syntax_faults_are_collected_and_keep_name_and_signals() {
         .collect();
     assert!(lines.contains(&21), "{faults}");
     assert!(lines.len() >= 2, "{faults}");
-    assert_eq!(faults.name.as_deref(), Some("buck"));
-    assert_eq!(faults.signals.len(), 2);
+    assert_eq!(faults.skeleton.name.as_deref(), Some("buck"));
+    assert_eq!(faults.skeleton.signals.len(), 2);
 }
 
 #[test]

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread;
+use std::time::{Duration, Instant};
+
 use toml_input::Message;
 
 use crate::checkpoint::other;
@@ -27,6 +29,9 @@ pub struct SeedRun {
     pub checkpoint: Vec<u8>,
 }
 
+/// Control periods between two looks at the clock: with the paper's network some 50 ms.
+const BETWEEN_CLOCKS: u64 = 256;
+
 /// How several seeds are trained.
 #[derive(Debug, Clone, Default)]
 pub struct Course {
@@ -34,8 +39,9 @@ pub struct Course {
     pub threads: usize,
     /// Seeds that go on from a checkpoint.
     pub checkpoints: BTreeMap<u64, Vec<u8>>,
-    /// Control periods between two checkpoints on the way; 0: none.
-    pub checkpoint_every: u64,
+    /// Time between two checkpoints on the way; without it there are none. A look at the selection scenarios is not
+    /// interrupted: one that takes longer puts the checkpoint off.
+    pub checkpoint_every: Option<Duration>,
 }
 
 /// Who follows a training; called from its threads.
@@ -114,16 +120,21 @@ fn one<E: Environment>(
             return Err(other());
         }
     }
+    // the first comes at once: what has begun can be resumed
+    let mut last: Option<Instant> = None;
     let ended = loop {
-        let next = match course.checkpoint_every {
-            0 => u64::MAX,
-            every => (trainer.step_count() / every + 1) * every,
-        };
+        let next = course
+            .checkpoint_every
+            .map_or(u64::MAX, |_| trainer.step_count() + BETWEEN_CLOCKS);
         let ended = trainer.run_until(next, stop, |progress| watch.look(progress))?;
         if ended != Ended::Interrupted || stop.load(Ordering::Relaxed) {
             break ended;
         }
-        watch.checkpoint(seed, &trainer.checkpoint()?);
+        let is_due = |every| last.is_none_or(|last| last.elapsed() >= every);
+        if course.checkpoint_every.is_some_and(is_due) {
+            watch.checkpoint(seed, &trainer.checkpoint()?);
+            last = Some(Instant::now());
+        }
     };
     let run = SeedRun {
         outcome: trainer.best().is_some().then(|| trainer.finish(ended)).transpose()?,

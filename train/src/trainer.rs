@@ -50,6 +50,8 @@ pub struct Trainer<E> {
     pub(crate) met: bool,
     before: Vec<f32>,
     scratch: [Vec<f32>; 2],
+    /// When and at which control period this program began with it; not part of a checkpoint.
+    started: Option<(Clock, u64)>,
 }
 
 impl<E: Environment> Trainer<E> {
@@ -84,6 +86,7 @@ impl<E: Environment> Trainer<E> {
             met: false,
             before: Vec::new(),
             scratch: [Vec::new(), Vec::new()],
+            started: None,
         };
         trainer.begin_episode()?;
         Ok(trainer)
@@ -138,7 +141,7 @@ impl<E: Environment> Trainer<E> {
         stop: &AtomicBool,
         mut progress: impl FnMut(&Progress),
     ) -> Result<Ended, Error> {
-        let (started, first) = (Clock::now(), self.step);
+        let (started, first) = *self.started.get_or_insert_with(|| (Clock::now(), self.step));
         while self.step < self.settings.steps && !self.met {
             if stop.load(Ordering::Relaxed) || self.step >= last {
                 return Ok(Ended::Interrupted);

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use toml_input::{FileName, Message};
 use train::scenario_table as table;
@@ -18,8 +18,9 @@ mod progress;
 
 use progress::Watcher;
 
-/// Control periods between two checkpoints on the way: some seconds.
-const CHECKPOINT_EVERY: u64 = 20_000;
+/// Time between two checkpoints on the way. A kill or a power cut may cost five seconds of work; the rest is for a look at
+/// the selection scenarios and for writing.
+const CHECKPOINT_EVERY: Duration = Duration::from_secs(3);
 const CHECKPOINTS: &str = "checkpoints";
 const SEEDS: &str = "seeds";
 
@@ -35,7 +36,7 @@ pub fn run(options: &Train) -> Result<Outcome, Failure> {
     let course = Course {
         threads: options.threads,
         checkpoints: kept.prepare(&settings.seeds, options.resume)?,
-        checkpoint_every: CHECKPOINT_EVERY,
+        checkpoint_every: Some(CHECKPOINT_EVERY),
     };
     let stop = interruption::stop_on_signal();
     let start = Instant::now();

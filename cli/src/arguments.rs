@@ -10,6 +10,7 @@ use toml_input::Faults;
 
 use crate::commands::budget::Clock;
 use crate::one_of::OneOf;
+use crate::ownership::Replacing;
 
 /// From a trained policy to verified controller code.
 ///
@@ -93,6 +94,8 @@ fn output() -> OneOf<Output> {
 
 #[derive(Debug, Args)]
 pub struct Compile {
+    #[command(flatten)]
+    pub replacing: Replacing,
     /// policy.toml or the folder that holds it
     pub policy: PathBuf,
     /// What to make, separated by commas or given several times. All but the two cores call one and bring it along
@@ -170,6 +173,8 @@ pub struct Verify {
 
 #[derive(Debug, Args)]
 pub struct Certify {
+    #[command(flatten)]
+    pub replacing: Replacing,
     /// policy.toml or the folder that holds it
     pub policy: PathBuf,
     /// Numeric format in the place of the contract's
@@ -279,6 +284,8 @@ impl Columns {
 
 #[derive(Debug, Args)]
 pub struct Diagnose {
+    #[command(flatten)]
+    pub replacing: Replacing,
     /// The model: plant.toml
     #[arg(long, value_name = "PLANT")]
     pub model: PathBuf,
@@ -311,6 +318,8 @@ pub struct Diagnose {
 
 #[derive(Debug, Args)]
 pub struct Demo {
+    #[command(flatten)]
+    pub replacing: Replacing,
     /// Folder for the example and the generated files
     #[arg(long, value_name = "DIR", default_value = "policyc-demo")]
     pub out: PathBuf,

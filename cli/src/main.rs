@@ -6,6 +6,7 @@ mod failure;
 mod interruption;
 mod one_of;
 mod output;
+mod ownership;
 
 use std::process::ExitCode;
 

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use toml_input::Message;
 
+use crate::ownership::{self, Replacing};
 use crate::{Failure, interruption};
 
 /// Start of the names of temporary files; leftovers of an interrupted run are removed by the next.
@@ -37,18 +38,27 @@ pub fn write_all(folder: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<(),
     staged.publish()
 }
 
-/// [`write_all`] for text.
+/// [`write_all`] where files of others may stand: they are kept. What does not bear policyc's name goes on record.
 ///
 /// # Errors
-/// As [`write_all`].
-pub fn write_texts(folder: &Path, files: &BTreeMap<String, String>) -> Result<(), Failure> {
-    write_all(
-        folder,
-        &files
-            .iter()
-            .map(|(name, text)| (name.clone(), text.clone().into_bytes()))
-            .collect(),
-    )
+/// If a file of others is in the way ([`ownership::check`]); else as [`write_all`].
+pub fn replace_own(folder: &Path, files: BTreeMap<String, Vec<u8>>, replacing: Replacing) -> Result<(), Failure> {
+    let files = ownership::recorded(files)?;
+    ownership::check(folder, &files, replacing)?;
+    write_all(folder, &files)
+}
+
+/// [`replace_own`] for text.
+///
+/// # Errors
+/// As [`replace_own`].
+pub fn replace_own_texts(folder: &Path, files: &BTreeMap<String, String>, replacing: Replacing) -> Result<(), Failure> {
+    replace_own(folder, bytes_of(files), replacing)
+}
+
+fn bytes_of(files: &BTreeMap<String, String>) -> BTreeMap<String, Vec<u8>> {
+    let bytes = |(name, text): (&String, &String)| (name.clone(), text.clone().into_bytes());
+    files.iter().map(bytes).collect()
 }
 
 /// Writes the results of a run to a folder that holds nothing yet, then says `summary` and what to look at.
@@ -62,7 +72,7 @@ pub fn write_results(
     page: &str,
 ) -> Result<(), Failure> {
     check_new_folder(folder)?;
-    write_texts(folder, files)?;
+    write_all(folder, &bytes_of(files))?;
     let (count, out) = (files.len(), folder.display());
     say(&format!("{summary}\n{count} files in {out}; to look at: {out}/{page}"))
 }
@@ -79,11 +89,28 @@ pub fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
     write_one(path, text)
 }
 
-/// Writes one file; an older one is replaced.
+/// Writes one file that bears policyc's name; an older one of its own is replaced.
+///
+/// # Errors
+/// If a file of others is in the way, or it cannot be written.
+pub fn replace_own_one(path: &Path, text: &str, replacing: Replacing) -> Result<(), Failure> {
+    let (folder, name) = split(path)?;
+    let file = BTreeMap::from([(name, text.as_bytes().to_vec())]);
+    ownership::check(folder, &file, replacing)?;
+    write_all(folder, &file)
+}
+
+/// Writes one file; an older one is replaced, so the caller has looked at it.
 ///
 /// # Errors
 /// If it cannot be written.
 pub fn write_one(path: &Path, text: &str) -> Result<(), Failure> {
+    let (folder, name) = split(path)?;
+    write_all(folder, &BTreeMap::from([(name, text.as_bytes().to_vec())]))
+}
+
+/// Folder and name of a file.
+fn split(path: &Path) -> Result<(&Path, String), Failure> {
     let folder = path
         .parent()
         .filter(|folder| !folder.as_os_str().is_empty())
@@ -91,7 +118,7 @@ pub fn write_one(path: &Path, text: &str) -> Result<(), Failure> {
     let Some(name) = path.file_name().and_then(|name| name.to_str()) else {
         return Err(Message::new(format!("{} is not a file name", path.display())).into());
     };
-    write_texts(folder, &BTreeMap::from([(name.to_owned(), text.to_owned())]))
+    Ok((folder, name.to_owned()))
 }
 
 /// Refuses a folder that holds something: results of two runs are not mixed, and none are lost.

@@ -8,6 +8,7 @@ use crate::backend::kit::Material;
 use crate::files::{CodegenError, GeneratedFiles};
 use crate::output::Output;
 use crate::program::Program;
+use crate::stamp::stamp;
 use crate::{backend, lower, manifest, output};
 
 /// Everything that `policyc compile` writes for these outputs: their files, the cores that they call, and the manifest.
@@ -47,6 +48,7 @@ pub fn sources(
             all.files.extend(emit(*output, &program, expected)?.files);
         }
     }
+    stamp(&mut all, policy, target);
     Ok(all)
 }
 

@@ -15,6 +15,8 @@ pub mod lower;
 pub mod manifest;
 pub mod output;
 pub mod program;
+#[cfg(feature = "c")]
+mod stamp;
 
 pub use files::{CodegenError, GeneratedFiles, TOOL};
 #[cfg(feature = "c")]

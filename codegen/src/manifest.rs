@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use policy::{Digests, Policy};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use targets::TargetSpec;
 
 use crate::backend::kit::Material;
@@ -98,7 +98,7 @@ pub struct Sizes {
 }
 
 /// One generated file.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FileEntry {
     /// Length in bytes.
     pub bytes: usize,
@@ -165,15 +165,19 @@ pub fn manifest(
         files: files
             .files
             .iter()
-            .map(|(name, text)| (name.clone(), entry(text)))
+            .map(|(name, text)| (name.clone(), FileEntry::of(text.as_bytes())))
             .collect(),
     }
 }
 
-fn entry(text: &str) -> FileEntry {
-    FileEntry {
-        bytes: text.len(),
-        crc32: format!("{:08x}", crc32_bytes(text.bytes())),
+impl FileEntry {
+    /// That of a file with this content.
+    #[must_use]
+    pub fn of(content: &[u8]) -> Self {
+        FileEntry {
+            bytes: content.len(),
+            crc32: format!("{:08x}", crc32_bytes(content.iter().copied())),
+        }
     }
 }
 

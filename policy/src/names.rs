@@ -31,6 +31,24 @@ const POLICY_CLASHES: &str = "core std alloc test proc_macro self_test init rese
     stdint stdio stdlib stdnoreturn string tgmath threads time uchar wchar wctype simstruc con prn aux nul com1 com2 \
     com3 com4 lpt1 lpt2 lpt3 lpt4";
 
+/// What outputs put behind a policy's name: `buck` with an S-function and a policy `buck_block` would share a file and its
+/// symbols.
+const OUTPUT_ENDINGS: [&str; 10] = [
+    "_block",
+    "_caller",
+    "_ffi",
+    "_fmi2",
+    "_fmi3",
+    "_fmu",
+    "_kit",
+    "_kit_blocks",
+    "_kit_suite",
+    "_usr",
+];
+
+/// What they put before it.
+const OUTPUT_BEGINNINGS: [&str; 3] = ["legacy_", "make_", "sf_"];
+
 /// Names of an expression that are not free.
 pub(crate) const REMEMBERED: [&str; 2] = ["previous_duty", "previous_command"];
 
@@ -75,6 +93,15 @@ pub(crate) fn objection(name: &str, kind: Kind) -> Option<String> {
         return Some(format!(
             "`{name}` stands for the controller's own memory in expressions"
         ));
+    }
+    if kind == Kind::Policy {
+        let ending = OUTPUT_ENDINGS.into_iter().find(|end| name.ends_with(end));
+        let beginning = OUTPUT_BEGINNINGS.into_iter().find(|begin| name.starts_with(begin));
+        if let Some(taken) = ending.or(beginning) {
+            return Some(format!(
+                "`{taken}` is what files beside another policy's controller are called: try `{name}_policy`"
+            ));
+        }
     }
     if kind == Kind::Policy && is(POLICY_CLASHES) {
         return Some(format!(

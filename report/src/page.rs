@@ -104,6 +104,8 @@ impl Page {
                 ("content", &"width=device-width, initial-scale=1"),
             ],
         );
+        // whose page it is: policyc replaces its own pages, and no others
+        out.leaf("meta", &[("name", &"generator"), ("content", &"policyc")]);
         out.text("title", &[], &self.title);
         out.open("style", &[]);
         out.raw(include_str!("page.css"));

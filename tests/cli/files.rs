@@ -152,3 +152,138 @@ fn a_format_without_a_type_on_the_target_is_refused() {
     assert!(!desk.path("out").exists());
     desk.succeed("compile policy --target c2000-c28x --format i16 --no-costs --out out");
 }
+
+/// What a user has written, or changed since, is not lost by typing a command once more.
+#[test]
+fn files_of_others_are_kept_unless_they_are_given_up() {
+    let desk = Desk::new("linear");
+    desk.write("out/linear.h", "/* mine */\n");
+    let before = contents(&desk.path("out"));
+    desk.refuse(
+        "compile policy --out out",
+        &["out/linear.h was not written by policyc", "--force"],
+    );
+    assert!(contents(&desk.path("out")) == before, "nothing has changed");
+    desk.succeed("compile policy --out out --force");
+    desk.succeed("compile policy --out out --emit c,fmu3");
+    desk.succeed("compile policy --out out --emit c,fmu3");
+    // an archive cannot say whose it is
+    desk.write("out/linear_fmi3.fmu", "mine");
+    desk.refuse(
+        "compile policy --out out --emit fmu3",
+        &["linear_fmi3.fmu was edited since"],
+    );
+
+    desk.write("drm.toml", "a = 1.0\n");
+    desk.write("points.csv", &points());
+    desk.refuse("drm fit points.csv", &["drm.toml was not written by policyc"]);
+    desk.succeed("drm fit points.csv --out own.toml --report own.html");
+    desk.succeed("drm fit points.csv --out own.toml --report own.html");
+    desk.write("own.html", "<p>mine</p>");
+    desk.refuse(
+        "drm fit points.csv --out own.toml --report own.html",
+        &["own.html was not written"],
+    );
+
+    desk.succeed("certify policy --out certificate --boxes 10 --samples 10");
+    desk.succeed("certify policy --out certificate --boxes 10 --samples 20");
+    desk.write("certificate/certificate.json", "{}");
+    desk.refuse(
+        "certify policy --out certificate",
+        &["certificate.json was edited since policyc wrote it"],
+    );
+
+    desk.succeed("demo --out demo --steps 10");
+    desk.succeed("demo --out demo --steps 10");
+    desk.edit("demo/policy/policy.toml", "duty = [0.40, 0.60]", "duty = [0.45, 0.55]");
+    desk.refuse(
+        "demo --out demo --steps 10",
+        &["policy.toml was edited since policyc wrote it"],
+    );
+}
+
+/// Settled points of a converter with losses.
+fn points() -> String {
+    let mut text = String::from("duty,v_out,i_out,v_in\n");
+    for duty in [0.45, 0.5, 0.55, 0.6] {
+        for i_out in [2.0, 5.0, 8.0] {
+            let v_out = 200.0 * duty - 0.8 * (1.0 - duty) - 0.2 * i_out;
+            text += &format!("{duty},{v_out:.4},{i_out},200.0\n");
+        }
+    }
+    text
+}
+
+#[test]
+fn a_folder_holds_the_code_of_one_policy() {
+    let desk = Desk::new("linear");
+    desk.succeed("compile policy --out out");
+    desk.edit("policy/policy.toml", "name = \"linear\"", "name = \"other\"");
+    desk.refuse(
+        "compile policy --out out",
+        &["the code of another policy", "= found: linear"],
+    );
+    desk.succeed("verify policy --steps 10");
+    desk.succeed("compile policy --out apart");
+}
+
+/// A source beside the header of another run is a controller that no policy has.
+#[test]
+fn a_source_refuses_the_header_of_another_run() {
+    let desk = Desk::new("linear");
+    desk.succeed("compile policy --out first --emit c,sfunction,fmu2,kit --kit-steps 5");
+    desk.edit("policy/policy.toml", "hold = ", "hold = 1");
+    desk.succeed("compile policy --out second --emit c,sfunction,fmu2,kit --kit-steps 5");
+    let compile = |source: &str, header: &str| {
+        let mut gcc = std::process::Command::new("gcc");
+        gcc.args(["-std=c99", "-fsyntax-only", "-iquote"])
+            .arg(desk.path(header));
+        // a header beside the source would come first
+        let apart = desk.path("apart.c");
+        std::fs::copy(desk.path(source), &apart).unwrap();
+        run(gcc.arg(apart))
+    };
+    for file in [
+        "linear.c",
+        "linear_kit.c",
+        "linear_block.c",
+        "linear_caller.c",
+        "linear_fmu.c",
+        "linear_fmi2.c",
+    ] {
+        let ran = compile(&format!("first/{file}"), "first");
+        assert_eq!(ran.code, Some(0), "{file}\n{}", ran.stderr);
+        let ran = compile(&format!("first/{file}"), "second");
+        assert!(
+            ran.code == Some(1) && ran.stderr.contains("two runs of policyc"),
+            "{file}\n{}",
+            ran.stderr
+        );
+    }
+}
+
+/// `buck` with an S-function has a `buck_block.c`; so has a policy of that name.
+#[test]
+fn no_policy_is_called_like_a_file_beside_another() {
+    let desk = Desk::new("linear");
+    let all = codegen::Output::ALL.map(|output| output.name()).join(",");
+    desk.succeed(&format!("compile policy --out out --kit-steps 5 --emit {all}"));
+    let contract = desk.read("policy/policy.toml");
+    let mut tried = 0;
+    for (file, _) in contents(&desk.path("out")) {
+        let (stem, ending) = file.split_once('.').unwrap();
+        if stem == "linear" || !stem.contains("linear") || !["c", "h", "rs"].contains(&ending) {
+            continue;
+        }
+        desk.write(
+            "policy/policy.toml",
+            &contract.replace("name = \"linear\"", &format!("name = \"{stem}\"")),
+        );
+        desk.refuse(
+            "inspect policy",
+            &["is what files beside another policy's controller are called"],
+        );
+        tried += 1;
+    }
+    assert!(tried >= 8, "{tried}");
+}

@@ -50,7 +50,7 @@ pub fn run(options: &Certify) -> Result<Outcome, Failure> {
     if let Some(map) = map {
         files.insert("map.svg".to_owned(), map.to_string());
     }
-    output::write_texts(&options.out, &files)?;
+    output::replace_own_texts(&options.out, &files, options.replacing)?;
     output::say(&page::summary(&certificate))?;
     output::say(&format!(
         "to look at: {}",

@@ -16,6 +16,7 @@ use super::costs::Measured;
 use super::verify::{MISREAD, UNPROVEN, decisions_lines, golden_text};
 use super::{bytes, grouped};
 use crate::arguments::Compile;
+use crate::ownership::{self, Replacing};
 use crate::{Failure, Outcome, output};
 
 /// Generates, then writes everything at once.
@@ -27,7 +28,8 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
     let mut files = codegen::generate(&policy, target, &outputs, expected.as_ref())?.files;
     let measured = measure(options, &policy, target, &outputs, &mut files)?;
     let archives = verify::fmu::archives(&policy, target, &outputs, &files)?;
-    let written = write(&options.out, &files, &archives)?;
+    ownership::check_policy(&options.out, &policy.name, options.replacing)?;
+    let written = write(&options.out, &files, &archives, options.replacing)?;
     say(&policy, target, &written, &archives)?;
     measured.say(&policy, target, options.clock)?;
     if let Some(clock) = options.clock {
@@ -82,16 +84,22 @@ fn measure(
 }
 
 /// Writes files and archives, all or none; each with its length.
-pub fn write(folder: &Path, files: &Files, archives: &[Archive]) -> Result<Vec<(PathBuf, usize)>, Failure> {
+pub fn write(
+    folder: &Path,
+    files: &Files,
+    archives: &[Archive],
+    replacing: Replacing,
+) -> Result<Vec<(PathBuf, usize)>, Failure> {
     let texts = files.iter().map(|(name, text)| (name, text.as_bytes()));
     let packed = archives.iter().map(|archive| (&archive.file, archive.bytes.as_slice()));
     let all: BTreeMap<String, Vec<u8>> = texts
         .chain(packed)
         .map(|(name, bytes)| (name.clone(), bytes.to_vec()))
         .collect();
-    output::write_all(folder, &all)?;
     let length = |(name, content): (&String, &Vec<u8>)| (folder.join(name), content.len());
-    Ok(all.iter().map(length).collect())
+    let written = all.iter().map(length).collect();
+    output::replace_own(folder, all, replacing)?;
+    Ok(written)
 }
 
 /// Why fused operations are no gain on a processor, where they are none.

@@ -29,7 +29,7 @@ pub fn run(options: &Demo) -> Result<Outcome, Failure> {
         .iter()
         .map(|(name, content)| ((*name).to_owned(), content.to_vec()))
         .collect();
-    output::write_all(&policy_folder, &files)?;
+    output::replace_own(&policy_folder, files, options.replacing)?;
     heading("The policy", &format!("policyc inspect {}", policy_folder.display()))?;
     inspect::run(&Inspect {
         policy: policy_folder.clone(),
@@ -47,7 +47,7 @@ pub fn run(options: &Demo) -> Result<Outcome, Failure> {
     let policy = super::load(&policy_folder)?;
     let target = ::targets::host();
     let files = codegen::generate(&policy, target, &Output::CORES, None)?.files;
-    let written = compile::write(&generated, &files, &[])?;
+    let written = compile::write(&generated, &files, &[], options.replacing)?;
     compile::say(&policy, target, &written, &[])?;
 
     let (policy, generated) = (policy_folder.display(), generated.display());

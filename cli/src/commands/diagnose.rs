@@ -49,7 +49,7 @@ pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
     if let Some(control) = &diagnosis.control {
         files.insert("drm.toml".to_owned(), control.mapping.clone());
     }
-    output::write_texts(&options.out, &files)?;
+    output::replace_own_texts(&options.out, &files, options.replacing)?;
     let out = options.out.display();
     for repair in &diagnosis.findings.noise.repairs {
         output::say(&format!("note: {repair}"))?;

@@ -6,13 +6,14 @@ use clap::{Args, ValueEnum};
 use drm::{Conduction, FitOptions, Form, Report, simulation_toml};
 
 use super::Reading;
+use crate::ownership::Replacing;
 use crate::{Failure, Outcome, output};
 
 #[derive(Debug, Args)]
 pub struct Fit {
     /// Settled points as CSV with the columns duty (or d_real), v_out, i_out, v_in
     pub table: PathBuf,
-    /// Mapping to write; replaced if it exists
+    /// Mapping to write; an older one of policyc is replaced
     #[arg(long, value_name = "FILE", default_value = "drm.toml")]
     pub out: PathBuf,
     #[command(flatten)]
@@ -44,6 +45,8 @@ pub struct Fit {
     /// Write a page with pictures as well: errors, surface, leave-one-out
     #[arg(long, value_name = "FILE.html")]
     pub report: Option<PathBuf>,
+    #[command(flatten)]
+    pub replacing: Replacing,
     /// Machine-readable
     #[arg(long)]
     pub json: bool,
@@ -76,9 +79,9 @@ pub fn run(options: &Fit) -> Result<Outcome, Failure> {
     let simulation = options.reading.simulation()?;
     let mapping =
         report.fit.map.to_toml(&comment(&report)) + &simulation.as_ref().map_or_else(String::new, simulation_toml);
-    output::write_one(&options.out, &mapping)?;
+    output::replace_own_one(&options.out, &mapping, options.replacing)?;
     if let Some((path, page)) = &page {
-        output::write_one(path, page)?;
+        output::replace_own_one(path, page, options.replacing)?;
     }
     if options.json {
         output::say(&serde_json::to_string_pretty(&report)?)?;

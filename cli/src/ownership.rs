@@ -1,0 +1,181 @@
+//! Whose a file is: `policyc` replaces what it wrote, and nothing else unless it is told to.
+//!
+//! What it wrote bears its name near the beginning, or stands in the folder's record with its length and CRC-32. The record
+//! is `manifest.json` of generated code, and [`RECORD`] for files that cannot bear a name: tables, pictures, archives, and
+//! files that a user is meant to edit.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use clap::Args;
+use codegen::manifest::{self, FileEntry};
+use serde::{Deserialize, Serialize};
+use toml_input::Message;
+
+use crate::Failure;
+
+/// The record of what was written to a folder and does not say so itself.
+pub const RECORD: &str = "policyc-files.json";
+
+/// The mark, in whatever kind of comment.
+const MARK: &[u8] = b"policyc";
+
+/// Where the mark stands in what `policyc` writes: the head of a page has its style before it.
+const HEAD_BYTES: usize = 4096;
+
+/// Whether files of others may be replaced.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub struct Replacing {
+    /// Replace files, too, that policyc did not write or that were edited since
+    #[arg(long, display_order = 900)]
+    pub force: bool,
+}
+
+#[derive(Serialize, Deserialize, Default)]
+struct Record {
+    /// The policy, in the manifest of generated code.
+    #[serde(default, skip_serializing)]
+    name: Option<String>,
+    files: BTreeMap<String, FileEntry>,
+}
+
+impl Record {
+    /// That of a folder, from all files that hold one; what cannot be read vouches for nothing.
+    fn of(folder: &Path) -> Self {
+        let read = |name: &str| -> Option<Record> { serde_json::from_slice(&fs::read(folder.join(name)).ok()?).ok() };
+        let mut all = Record::default();
+        for record in [manifest::FILE, RECORD].into_iter().filter_map(read) {
+            all.name = all.name.or(record.name);
+            all.files.extend(record.files);
+        }
+        all
+    }
+}
+
+fn bears_mark(content: &[u8]) -> bool {
+    let head = &content[..content.len().min(HEAD_BYTES)];
+    head.windows(MARK.len()).any(|window| window == MARK)
+}
+
+/// Refuses to replace a file that is neither the same, nor written here, nor given up by `--force`.
+///
+/// # Errors
+/// The first such file.
+pub fn check(folder: &Path, files: &BTreeMap<String, Vec<u8>>, replacing: Replacing) -> Result<(), Failure> {
+    if replacing.force {
+        return Ok(());
+    }
+    let record = Record::of(folder);
+    for (name, content) in files {
+        let path = folder.join(name);
+        let Ok(existing) = fs::read(&path) else { continue };
+        let is_recorded = record.files.get(name) == Some(&FileEntry::of(&existing));
+        if existing == *content || is_recorded || bears_mark(&existing) {
+            continue;
+        }
+        let what = if record.files.contains_key(name) {
+            "was edited since policyc wrote it"
+        } else {
+            "was not written by policyc"
+        };
+        let message = Message::new(format!("{} {what}; nothing written", path.display()));
+        return Err(message
+            .hint("move it away, choose another --out, or give it up with --force")
+            .into());
+    }
+    Ok(())
+}
+
+/// Refuses the folder of another policy's code, whose manifest would be lost: `verify` could not judge that code any more.
+///
+/// # Errors
+/// If the manifest there names another policy, unless `--force` gives it up.
+pub fn check_policy(folder: &Path, policy: &str, replacing: Replacing) -> Result<(), Failure> {
+    match Record::of(folder).name {
+        Some(other) if other != policy && !replacing.force => {
+            let message = format!("{} holds the code of another policy; nothing written", folder.display());
+            let hint = "give each policy a folder of its own, or give the other up with --force";
+            Err(Message::new(message).found(other).expected(policy).hint(hint).into())
+        }
+        _ => Ok(()),
+    }
+}
+
+/// `files` with the record of those that do not bear the mark, if there are any.
+///
+/// # Errors
+/// If the record cannot be written as JSON.
+pub fn recorded(mut files: BTreeMap<String, Vec<u8>>) -> Result<BTreeMap<String, Vec<u8>>, Failure> {
+    let unmarked = files.iter().filter(|(_, content)| !bears_mark(content));
+    let record = Record {
+        name: None,
+        files: unmarked
+            .map(|(name, content)| (name.clone(), FileEntry::of(content)))
+            .collect(),
+    };
+    if !record.files.is_empty() {
+        let text = serde_json::to_string_pretty(&record)? + "\n";
+        files.insert(RECORD.to_owned(), text.into_bytes());
+    }
+    Ok(files)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const KEEP: Replacing = Replacing { force: false };
+
+    fn files(list: &[(&str, &str)]) -> BTreeMap<String, Vec<u8>> {
+        let own = |(name, text): &(&str, &str)| ((*name).to_owned(), text.as_bytes().to_vec());
+        list.iter().map(own).collect()
+    }
+
+    fn put(folder: &Path, files: &BTreeMap<String, Vec<u8>>) {
+        for (name, content) in files {
+            fs::write(folder.join(name), content).unwrap();
+        }
+    }
+
+    #[test]
+    fn what_others_wrote_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        put(folder.path(), &files(&[("a.c", "int main(void);")]));
+        let new = files(&[("a.c", "/* Generated by policyc */")]);
+        let Err(Failure(faults)) = check(folder.path(), &new, KEEP) else {
+            panic!("must fail")
+        };
+        assert!(faults.to_string().contains("not written by policyc"), "{faults}");
+        assert!(check(folder.path(), &new, Replacing { force: true }).is_ok());
+        assert!(
+            check(folder.path(), &files(&[("a.c", "int main(void);")]), KEEP).is_ok(),
+            "the same"
+        );
+        assert!(check(folder.path(), &files(&[("b.c", "")]), KEEP).is_ok(), "another");
+    }
+
+    #[test]
+    fn what_bears_the_mark_or_stands_in_the_record_is_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let old = recorded(files(&[("a.c", "/* by policyc */ 1"), ("t.csv", "1,2")])).unwrap();
+        assert!(
+            !String::from_utf8_lossy(&old[RECORD]).contains("a.c"),
+            "it says so itself"
+        );
+        put(folder.path(), &old);
+        let new = files(&[("a.c", "/* by policyc */ 2"), ("t.csv", "3,4")]);
+        assert!(check(folder.path(), &new, KEEP).is_ok());
+        put(folder.path(), &files(&[("t.csv", "1,2 # mine")]));
+        let Err(Failure(faults)) = check(folder.path(), &new, KEEP) else {
+            panic!("must fail")
+        };
+        assert!(faults.to_string().contains("edited since"), "{faults}");
+    }
+
+    #[test]
+    fn where_every_file_bears_the_mark_there_is_no_record() {
+        let own = files(&[("a.c", "/* by policyc */")]);
+        assert_eq!(recorded(own.clone()).unwrap(), own);
+    }
+}

@@ -20,6 +20,7 @@ pub mod scenario;
 mod scenario_file;
 mod tables;
 pub mod time_optimal;
+mod unusable;
 
 pub use agent::Agent;
 pub use controller::{Answer, Call, Classical, Controller, External, Period, Trajectory, follow, interpreter};
@@ -29,3 +30,4 @@ pub use faults::Error;
 pub use load_step::{LoadKind, LoadStep};
 pub use scenario_file::Scenario;
 pub use tables::{COLUMNS, MetricsCsv, cells, comparison, evaluation_csv, limit_cells, table, trajectory_csv};
+pub use unusable::unusable;

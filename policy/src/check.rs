@@ -9,7 +9,7 @@ use crate::digests;
 use crate::faults::Faults;
 use crate::limits::MAX_FEATURES;
 use crate::model::{Action, Digests, Feature, Golden, Interval, Layer, Mapping, Policy, Signal};
-use crate::notes::{beyond_limits, beyond_mapping, unused};
+use crate::notes::{beyond_limits, beyond_mapping, only_duty, outside_at_first, unused};
 use crate::raw::RawPolicy;
 use crate::weights::{self, Weights};
 
@@ -78,6 +78,11 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
         mapping.as_ref().and_then(Option::as_ref),
     ));
     let limits = limits?;
+    if let Some(duty) = only_duty(&limits, &actions.list, mapping.as_ref().and_then(Option::as_ref)) {
+        let at = raw.contract.peek(&["limits", "duty"]);
+        faults.extend(at.map(|value| value.fault(catalogue::one_duty_for_all(duty))));
+    }
+    notes.extend(outside_at_first(&limits));
     notes.extend(beyond_limits(
         &limits,
         &actions.list,

@@ -79,6 +79,13 @@ pub(crate) fn beyond_mapping(limits: &Limits, actions: &[Action], mapping: &Mapp
     notes
 }
 
+/// The duty that the limits make of all actions, if they leave no other; a mapping moves duties, so with one nothing is said.
+pub(crate) fn only_duty(limits: &Limits, actions: &[Action], mapping: Option<&Mapping>) -> Option<f64> {
+    let limited = |action: &Action| action.duty.clamp(limits.duty.low, limits.duty.high);
+    let first = limited(actions.first()?);
+    (mapping.is_none() && actions.iter().all(|action| limited(action) == first)).then_some(first)
+}
+
 /// Actions that the duty limits cut off even without a mapping.
 pub(crate) fn beyond_limits(limits: &Limits, actions: &[Action], mapping: Option<&Mapping>) -> Option<String> {
     if mapping.is_some() {
@@ -91,6 +98,18 @@ pub(crate) fn beyond_limits(limits: &Limits, actions: &[Action], mapping: Option
         .map(|action| action.duty.to_string())
         .collect();
     (!duties.is_empty()).then(|| format!("duties outside the limits are cut off: {}", duties.join(", ")))
+}
+
+/// A duty before the first step that the limits do not hold.
+pub(crate) fn outside_at_first(limits: &Limits) -> Option<String> {
+    let (duty, range) = (limits.initial_duty, limits.duty);
+    let is_outside = duty != 0.0 && !(range.low..=range.high).contains(&duty);
+    is_outside.then(|| {
+        format!(
+            "initial_duty {duty} lies outside of the limits {} to {}: no step ever commands it",
+            range.low, range.high
+        )
+    })
 }
 
 #[cfg(test)]

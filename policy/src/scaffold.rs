@@ -162,7 +162,9 @@ const FEATURE: &str = "
 [[feature]]
 name = \"TODO\"
 source = \"TODO\"              # affine in signals and parameters, such as v_ref - v_out
-# filters = [{ delay = 1 }]  # first to last
+# filters = [{ delay = 1 }]  # first to last; also { integrator = { min = -1.0, max = 1.0 } }, { backward_difference = true },
+#                            # { low_pass = { time_constant = 1e-3 } }, { filtered_derivative = { cutoff = 500.0 } },
+#                            # { moving_average = 4 }
 # scale = 1.0                # normalisation of the training: scale * x + offset, then clip
 # offset = 0.0
 # clip = [-1.0, 1.0]
@@ -181,6 +183,6 @@ duty = [\"TODO\", \"TODO\"]      # smallest and largest duty the hardware may se
 # initial_duty = 0.5         # otherwise the fallback duty
 
 [fallback]
-duty = \"TODO\"                # commanded without a usable measurement
+duty = \"TODO\"                # commanded without a usable measurement; in a synchronous leg 0 keeps the lower switch on
 hold = \"TODO\"                # bad samples bridged with the last good one
 ";

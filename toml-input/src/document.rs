@@ -169,6 +169,11 @@ fn syntax(text: &str, span: &Span, message: &str) -> Message {
     let bytes = text.as_bytes();
     let digit = |index: Option<usize>| index.and_then(|i| bytes.get(i)).is_some_and(u8::is_ascii_digit);
     let comma = (span.start..=span.end).find(|&i| bytes.get(i) == Some(&b','));
-    let decimal = comma.is_some_and(|i| digit(i.checked_sub(1)) && digit(Some(i + 1)));
-    messages::syntax(message, decimal)
+    let between_digits = |i: usize| digit(i.checked_sub(1)) && digit(Some(i + 1));
+    // the zero of 0,05 stands behind the comma
+    let leading_zero = bytes.get(span.start) == Some(&b'0') && span.start > 0 && between_digits(span.start - 1);
+    messages::syntax(
+        message,
+        comma.is_some_and(between_digits) || (leading_zero && bytes[span.start - 1] == b','),
+    )
 }

@@ -18,11 +18,17 @@ pub fn run(options: &Inspect) -> Result<Outcome, Failure> {
     } else {
         output::say(text(&policy)?.trim_end())?;
     }
-    match verify::golden_result(&policy)?.is_some_and(|golden| !golden.passed()) {
+    if verify::golden_result(&policy)?.is_some_and(|golden| !golden.passed()) {
+        eprintln!("\nDIFFERENT: the network does not give the trainer's golden answers");
+        eprintln!("  = hint: {}", super::verify::MISREAD);
+        return Ok(Outcome::Different);
+    }
+    match verify::decisions(&policy, None).is_some_and(|decisions| !decisions.kept()) {
         false => Ok(Outcome::Done),
         true => {
-            eprintln!("\nDIFFERENT: the network does not give the trainer's golden answers");
-            eprintln!("  = hint: {}", super::verify::MISREAD);
+            eprintln!(
+                "\nDIFFERENT: the numeric format changes more of the trainer's decisions than the contract allows"
+            );
             Ok(Outcome::Different)
         }
     }
@@ -124,7 +130,10 @@ fn text(policy: &Policy) -> Result<String, Failure> {
         bytes(sizes.table_bytes),
         bytes(sizes.state_bytes)
     )?;
-    writeln!(out, "\ndigests (sha256)")?;
+    writeln!(
+        out,
+        "\ndigests (sha256 of what decides the controller, not of the files)"
+    )?;
     writeln!(
         out,
         "  weights  {}\n  contract {}",
@@ -186,9 +195,30 @@ fn features(out: &mut String, policy: &Policy) -> Result<(), Failure> {
     )?;
     for (index, feature) in policy.features.iter().enumerate() {
         let formula = policy::describe::formula(feature, &policy.signals);
-        writeln!(out, "  {index:2}  {formula}   in {}", range(feature.bound))?;
+        let bound = range(feature.bound);
+        match golden_range(policy, index) {
+            None => writeln!(out, "  {index:2}  {formula}   in {bound}")?,
+            Some(seen) => writeln!(out, "  {index:2}  {formula}   in {bound}, golden in {}", range(seen))?,
+        }
+    }
+    if policy.golden.is_some() {
+        writeln!(
+            out,
+            "  golden vectors begin at the observation: they do not show that these formulas are those of the training"
+        )?;
     }
     Ok(())
+}
+
+/// Smallest and largest value of a feature in the golden vectors: far from its bound, scale or unit may be wrong.
+fn golden_range(policy: &Policy, feature: usize) -> Option<Interval> {
+    let golden = policy.golden.as_ref()?;
+    let column = golden.observations.iter().skip(feature).step_by(policy.features.len());
+    let values = column.map(|x| Interval {
+        low: f64::from(*x),
+        high: f64::from(*x),
+    });
+    (golden.count > 0).then(|| hull(&values.collect::<Vec<_>>()))
 }
 
 fn network(out: &mut String, policy: &Policy) -> Result<(), Failure> {

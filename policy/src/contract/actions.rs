@@ -46,12 +46,30 @@ pub(crate) fn read(root: &mut Table<'_>, faults: &mut Sink) -> Actions {
 
 fn from_duties(value: &Value<'_>, faults: &mut Sink) -> Option<Actions> {
     let items = value.list("an array of duty ratios", faults)?;
+    if has_decimal_commas(&items) {
+        faults.push(value.fault(catalogue::decimal_commas("duties", items.len())));
+        return None;
+    }
     let duties = items.iter().filter_map(|item| duty(item, faults));
     let list: Vec<_> = duties.map(|duty| Action { duty, pair: None }).collect();
     Some(Actions {
         list,
         count: items.len(),
     })
+}
+
+/// `[0,10, 0,15]`: zeros and whole numbers above 1 in turn.
+fn has_decimal_commas(items: &[Value<'_>]) -> bool {
+    let whole = |item: &Value<'_>| item.number(&mut Sink::new()).filter(|x| x.fract() == 0.0);
+    let pairs = items.chunks_exact(2);
+    items.len() >= 4
+        && pairs.remainder().is_empty()
+        && items
+            .chunks_exact(2)
+            .all(|pair| whole(&pair[0]) == Some(0.0) && whole(&pair[1]).is_some())
+        && items
+            .chunks_exact(2)
+            .any(|pair| whole(&pair[1]).is_some_and(|x| x > 1.0))
 }
 
 fn from_pairs(value: &Value<'_>, faults: &mut Sink) -> Option<Actions> {

@@ -20,6 +20,27 @@ const KINDS: [&str; 6] = [
     "integrator",
 ];
 
+/// Each kind as it is written, for hints.
+const WRITTEN: [&str; 6] = [
+    "{ delay = 1 }",
+    "{ backward_difference = true }",
+    "{ low_pass = { time_constant = 1e-3 } }",
+    "{ filtered_derivative = { time_constant = 1e-3 } }",
+    "{ moving_average = 4 }",
+    "{ integrator = { min = -1.0, max = 1.0 } }",
+];
+
+/// Other words for a kind.
+const SYNONYMS: [(&str, &str); 7] = [
+    ("integral", "integrator"),
+    ("sum", "integrator"),
+    ("difference", "backward_difference"),
+    ("derivative", "backward_difference"),
+    ("lowpass", "low_pass"),
+    ("mean", "moving_average"),
+    ("average", "moving_average"),
+];
+
 /// The chain, first to last; `period` is `None` if the contract's is faulty.
 pub(crate) fn read(value: &Value<'_>, period: Option<f64>, faults: &mut Sink) -> Option<Vec<Filter>> {
     let items = value.list("an array of filters: [{ delay = 1 }]", faults)?;
@@ -78,9 +99,22 @@ fn named(value: &Value<'_>, text: &str, faults: &mut Sink) -> Option<Filter> {
         return Some(Filter::BackwardDifference);
     }
     value.text(faults)?;
-    faults.push(value.fault(match KINDS.contains(&text) {
-        true => catalogue::missing_key("value", &format!("the filter `{text}`"), "write it as { delay = 1 }"),
-        false => catalogue::not_one_of("filters", text, &KINDS),
+    let meant = SYNONYMS.iter().find(|(word, _)| *word == text);
+    let kind = meant.map_or(text, |(_, kind)| *kind);
+    let written = KINDS
+        .iter()
+        .position(|known| *known == kind)
+        .map(|index| WRITTEN[index]);
+    faults.push(value.fault(match (written, meant) {
+        (Some(written), None) => catalogue::missing_key(
+            "value",
+            &format!("the filter `{text}`"),
+            &format!("write it as {written}"),
+        ),
+        (Some(written), Some(_)) => {
+            catalogue::not_one_of("filters", text, &KINDS).hint(format!("write it as {written}"))
+        }
+        (None, _) => catalogue::not_one_of("filters", text, &KINDS),
     }));
     None
 }

@@ -141,18 +141,45 @@ fn activation(value: &Value<'_>, faults: &mut Sink) -> Option<Activation> {
             Some((each, (parameter, _))) => {
                 catalogue::missing_key(parameter, text, &format!("write {}", each.written()))
             }
+            // a word for another function is no slip of the pen
+            None if FOREIGN.contains(&text.to_ascii_lowercase().as_str()) => {
+                catalogue::foreign_activation(text, &written())
+            }
             None => catalogue::not_one_of("hidden_activation", text, &known),
         }),
     );
     None
 }
 
+/// Activations of other frameworks that no output computes.
+const FOREIGN: [&str; 14] = [
+    "celu",
+    "elu",
+    "exponential",
+    "gelu",
+    "hard_sigmoid",
+    "hardswish",
+    "log_sigmoid",
+    "mish",
+    "selu",
+    "sigmoid",
+    "silu",
+    "softmax",
+    "softplus",
+    "swish",
+];
+
+/// All activations as they are written.
+fn written() -> String {
+    let written: Vec<String> = Activation::EACH.iter().map(|each| each.written()).collect();
+    written.join(", ")
+}
+
 /// What to write where nothing is written.
 fn hint() -> String {
-    let written: Vec<String> = Activation::EACH.iter().map(|each| each.written()).collect();
     format!(
         "weights do not say it: hidden_activation = {}, or an array with one per hidden layer",
-        written.join(", ")
+        written()
     )
 }
 

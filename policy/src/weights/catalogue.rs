@@ -135,10 +135,11 @@ pub(crate) fn no_dense_layer(shape: &[usize]) -> Message {
         .hint("fold it into the layers before exporting; if it is not part of the network, name the layers: layers = [...]")
 }
 
-pub(crate) fn no_layers() -> Message {
+pub(crate) fn no_layers(names: &str) -> Message {
     Message::new("the file holds no dense layer")
+        .found(format!("tensors {names}"))
         .expected("tensors named <layer>.weight [out, in] and <layer>.bias [out] (or kernel [in, out])")
-        .hint("name them in this way when exporting: `save_file(model.state_dict(), \"weights.safetensors\")`")
+        .hint("rename them when exporting, as `l1.weight` for `l1.w`; a PyTorch module's state_dict() has such names")
 }
 
 pub(crate) fn too_deep(found: usize) -> Message {

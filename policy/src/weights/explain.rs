@@ -36,7 +36,8 @@ impl Scene<'_> {
             return odd;
         }
         if members.is_empty() {
-            return vec![self.file.fault(catalogue::no_layers())];
+            let names: Vec<String> = self.tensors.iter().map(|tensor| format!("`{}`", tensor.name)).collect();
+            return vec![self.file.fault(catalogue::no_layers(&names.join(", ")))];
         }
         let closest = self.closest(members);
         match self.mismatch(&closest) {

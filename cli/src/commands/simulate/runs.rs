@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use closed_loop::baselines::Baseline;
 use closed_loop::limit::{Limit, Question};
 use closed_loop::scenario::{Finding, Instant};
-use closed_loop::{Classical, Controller, LoadStep, Trajectory, follow};
+use closed_loop::{Classical, Controller, LoadStep, Trajectory, follow, unusable};
 use toml_input::Message;
 
 use super::controllers::{self, Named};
@@ -71,6 +71,10 @@ pub fn all(options: &Simulate, mut setting: Setting, stop: &AtomicBool) -> Resul
             };
             courses.push(course(&setting, name, step, &mut progress, one)?);
         }
+        let said = courses
+            .first()
+            .and_then(|policy| unusable(&policy.shown, &setting.policy));
+        setting.notes.extend(said.map(|said| format!("{step}: {said}")));
         progress.next(step, "limit")?;
         let limits = limits(&mut setting, step);
         steps.push(Step { step, courses, limits });

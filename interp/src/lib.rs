@@ -13,6 +13,8 @@
 //! | 9 limits and status | `limits`, [`status`] |
 //! | 10 commit | [`controller`] |
 //!
+//! [`golden`] and [`decisions`] hold its answers against the trainer's.
+//!
 //! ```no_run
 //! use interp::{Controller, Sample};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -25,8 +27,10 @@
 
 mod activation;
 pub mod controller;
+pub mod decisions;
 mod feature;
 mod filter;
+pub mod golden;
 mod integer;
 mod limits;
 mod mapping;

@@ -128,6 +128,9 @@ impl Build {
         let target = self.find_target(&surroundings.triple)?;
         // cargo runs a script that failed again, so that the files of a policy with faults need no line
         let policy = policy::load(&self.contract)?;
+        if let Some(message) = interp::golden::refusal(&policy) {
+            return Err(policy::Faults::refusing(&policy, message).into());
+        }
         for line in reruns(&policy) {
             println!("{line}");
         }

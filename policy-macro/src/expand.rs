@@ -129,7 +129,11 @@ pub fn expand(input: TokenStream) -> TokenStream {
 
 fn load(root: &Path, path: &str) -> Result<Policy, Faults> {
     let options = ReadOptions::within(root);
-    policy::check(policy::read(&root.join(path), &options)?)
+    let policy = policy::check(policy::read(&root.join(path), &options)?)?;
+    match interp::golden::refusal(&policy) {
+        None => Ok(policy),
+        Some(message) => Err(Faults::refusing(&policy, message)),
+    }
 }
 
 fn controller(call: &Call, root: &Path, policy: &Policy) -> TokenStream {

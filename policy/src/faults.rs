@@ -3,6 +3,10 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use toml_input::{Fault, Message};
+
+use crate::model::{Policy, Signal};
+
 /// All faults found, and what a caller needs beside them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
@@ -27,6 +31,28 @@ pub struct Skeleton {
     pub features: Option<usize>,
     /// How many actions it lists.
     pub actions: Option<usize>,
+}
+
+impl Faults {
+    /// A checked policy that is refused all the same.
+    #[must_use]
+    pub fn refusing(policy: &Policy, message: Message) -> Self {
+        let contract = policy.files.first().map(PathBuf::as_path);
+        let signal = |signal: &Signal| (signal.name.clone(), signal.adc.is_some());
+        Faults {
+            faults: contract.map_or_else(
+                || message.clone().into(),
+                |file| Fault::in_file(file, message.clone()).into(),
+            ),
+            files: policy.files.clone(),
+            skeleton: Box::new(Skeleton {
+                name: Some(policy.name.clone()),
+                signals: policy.signals.iter().map(signal).collect(),
+                features: Some(policy.features.len()),
+                actions: Some(policy.actions.len()),
+            }),
+        }
+    }
 }
 
 /// The faults alone.

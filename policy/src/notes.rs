@@ -63,10 +63,10 @@ pub(crate) fn beyond_mapping(limits: &Limits, actions: &[Action], mapping: &Mapp
             duties.join(", ")
         ));
     }
-    let c = mapping.coefficients;
-    let mapped = |d: f64, i: f64| c.a * d + c.b * i + c.c + c.r.unwrap_or(0.0) * d * i;
     let ends = [mapping.valid_i_out.low, mapping.valid_i_out.high];
-    let all = actions.iter().flat_map(|action| ends.map(|i| mapped(action.duty, i)));
+    let all = actions
+        .iter()
+        .flat_map(|action| ends.map(|i| mapped(mapping, action.duty, i)));
     let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), duty| {
         (low.min(duty), high.max(duty))
     });
@@ -79,11 +79,22 @@ pub(crate) fn beyond_mapping(limits: &Limits, actions: &[Action], mapping: &Mapp
     notes
 }
 
-/// The duty that the limits make of all actions, if they leave no other; a mapping moves duties, so with one nothing is said.
+/// The duty that the limits make of all actions, if they leave no other. A mapped duty is linear in the load current: if both
+/// ends of its range leave the same one, so does everything between.
 pub(crate) fn only_duty(limits: &Limits, actions: &[Action], mapping: Option<&Mapping>) -> Option<f64> {
-    let limited = |action: &Action| action.duty.clamp(limits.duty.low, limits.duty.high);
-    let first = limited(actions.first()?);
-    (mapping.is_none() && actions.iter().all(|action| limited(action) == first)).then_some(first)
+    let ends = mapping.map_or([0.0; 2], |m| [m.valid_i_out.low, m.valid_i_out.high]);
+    let limited = |action: &Action, i: f64| {
+        let duty = mapping.map_or(action.duty, |mapping| mapped(mapping, action.duty, i));
+        duty.clamp(limits.duty.low, limits.duty.high)
+    };
+    let first = limited(actions.first()?, ends[0]);
+    let all = actions.iter().flat_map(|action| ends.map(|i| limited(action, i)));
+    all.into_iter().all(|duty| duty == first).then_some(first)
+}
+
+fn mapped(mapping: &Mapping, d: f64, i: f64) -> f64 {
+    let c = mapping.coefficients;
+    c.a * d + c.b * i + c.c + c.r.unwrap_or(0.0) * d * i
 }
 
 /// Actions that the duty limits cut off even without a mapping.

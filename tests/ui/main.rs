@@ -53,7 +53,11 @@ impl Fixture {
                 let (old, new) = rest.split_once(" => ").unwrap();
                 let text = std::fs::read_to_string(self.path("policy/policy.toml")).unwrap();
                 assert!(text.contains(old), "{old}");
-                std::fs::write(self.path("policy/policy.toml"), text.replace(old, new)).unwrap();
+                std::fs::write(
+                    self.path("policy/policy.toml"),
+                    text.replace(old, &new.replace("\\n", "\n")),
+                )
+                .unwrap();
             }
             "write" => std::fs::write(file(rest), last(rest)).unwrap(),
             "grow" => {

@@ -21,7 +21,6 @@
 //! | checked-in files against the policy | [`drift()`] |
 
 pub mod compare;
-pub mod decisions;
 pub mod drift;
 pub mod drivers;
 pub mod elf;
@@ -41,8 +40,9 @@ pub mod toolchain;
 pub mod traces;
 mod zip;
 
-pub use decisions::{Decisions, decisions};
 pub use drift::{drift, read_text};
+pub use interp::decisions::{Decisions, decisions};
+pub use interp::golden::golden_result;
 pub use live::{Live, LiveCommand};
 pub use report::{BuildReport, Difference, GoldenResult, Outcome, Report};
-pub use session::{Files, Options, Progress, VerifyError, golden_result, run};
+pub use session::{Files, Options, Progress, VerifyError, run};

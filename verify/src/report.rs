@@ -2,9 +2,10 @@
 
 use serde::Serialize;
 
-use crate::decisions::Decisions;
 use crate::oracle::Coverage;
 use crate::toolchain::{Install, Missing};
+use interp::decisions::Decisions;
+pub use interp::golden::GoldenResult;
 
 /// Result of a verification.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -160,35 +161,4 @@ pub struct Measured {
     pub signal: String,
     /// Value or ADC code.
     pub sample: Value,
-}
-
-/// Known answers of the trainer against the interpreter or a build.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct GoldenResult {
-    /// Number of vectors.
-    pub vectors: usize,
-    /// Vectors with an action to compare; 0 if the trainer gave Q values only.
-    pub actions_compared: usize,
-    /// Vectors with the trainer's action.
-    pub actions_equal: usize,
-    /// Largest |Q - golden| relative to the largest |Q| of its vector; `None` if the trainer gave actions only.
-    pub worst_relative_error: Option<f64>,
-    /// Allowed error.
-    pub tolerance: f64,
-    /// The answers are those of a network that was rounded to integers: told, not judged. The trainer's network is judged
-    /// in binary32 then.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub rounded: bool,
-}
-
-impl GoldenResult {
-    /// All Q values within the tolerance, or all actions equal where the trainer gave no Q values; or rounded. With Q values
-    /// the actions are [`Decisions`], which know ties.
-    pub fn passed(&self) -> bool {
-        let actions = self.actions_equal == self.actions_compared;
-        let read = self
-            .worst_relative_error
-            .map_or(actions, |error| error <= self.tolerance);
-        self.rounded || read
-    }
 }

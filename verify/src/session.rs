@@ -10,17 +10,18 @@ use std::thread;
 use std::time::Duration;
 
 use codegen::Output;
+use interp::decisions::decisions;
+use interp::golden::golden_result;
 use interp::{InputError, Real};
 use policy::{NumericFormat, Policy, Scalar};
 use targets::TargetSpec;
 use toml_input::{Fault, Faults, Message, messages};
 
-use crate::decisions::decisions;
 use crate::golden;
 use crate::lane::Lane;
 use crate::oracle::{Chunk, Oracle};
 use crate::protocol::Layout;
-use crate::report::{BuildReport, GoldenResult, Outcome, Report};
+use crate::report::{BuildReport, Outcome, Report};
 use crate::runner::ProcessRunner;
 use crate::toolchain::{self, Build, BuildError, Install, Missing, Purpose, Sources};
 use crate::traces::{Recorded, Stream};
@@ -216,7 +217,10 @@ fn run_in<T: Real>(policy: &Policy, options: Options<'_>) -> Result<Report, Veri
 
     let mut oracle = Oracle::<T>::new(policy);
     let layout = oracle.layout().clone();
-    let (known, golden) = known_answers(policy, &mut oracle)?;
+    let known = oracle
+        .chunk_of(golden::events(policy))
+        .map_err(VerifyError::Interpreter)?;
+    let golden = golden_result(policy);
     let mut stream = Stream::new(policy, seed, &recorded);
     let lanes = Lanes {
         policy,
@@ -320,42 +324,6 @@ impl Lanes<'_> {
             ..entry(build, lane.steps_compared(), outcome)
         }
     }
-}
-
-/// The trainer's known answers against the interpreter alone; `None` if the policy has none.
-///
-/// # Errors
-/// If the interpreter refuses an observation, which the check of a policy rules out.
-pub fn golden_result(policy: &Policy) -> Result<Option<GoldenResult>, VerifyError> {
-    let answers = match policy.numeric_format.scalar() {
-        Scalar::F32 => known_answers(policy, &mut Oracle::<f32>::new(policy)),
-        Scalar::F64 => known_answers(policy, &mut Oracle::<f64>::new(policy)),
-    };
-    answers.map(|(_, result)| result)
-}
-
-fn known_answers<T: Real>(
-    policy: &Policy,
-    oracle: &mut Oracle<T>,
-) -> Result<(Chunk, Option<GoldenResult>), VerifyError> {
-    let known = oracle
-        .chunk_of(golden::events(policy))
-        .map_err(VerifyError::Interpreter)?;
-    let scalar = policy.numeric_format.scalar();
-    let judge = |golden, chunk: &Chunk| golden::judge(golden, scalar, policy.actions.len(), &chunk.expected);
-    let Some(golden) = policy.golden.as_ref() else {
-        return Ok((known, None));
-    };
-    if !policy::scales::is_integer(policy.numeric_format) {
-        let result = judge(golden, &known);
-        return Ok((known, Some(result)));
-    }
-    // the trainer's answers judge how the network was read; what rounding it costs is another question
-    let exact = policy.clone().with_format(NumericFormat::F32);
-    let answers = Oracle::<f32>::new(&exact)
-        .chunk_of(golden::events(&exact))
-        .map_err(VerifyError::Interpreter)?;
-    Ok((known, Some(judge(golden, &answers))))
 }
 
 /// Sends a chunk to every build that is still in the race.

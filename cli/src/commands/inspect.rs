@@ -18,7 +18,7 @@ pub fn run(options: &Inspect) -> Result<Outcome, Failure> {
     } else {
         output::say(text(&policy)?.trim_end())?;
     }
-    if verify::golden_result(&policy)?.is_some_and(|golden| !golden.passed()) {
+    if verify::golden_result(&policy).is_some_and(|golden| !golden.passed()) {
         eprintln!("\nDIFFERENT: the network does not give the trainer's golden answers");
         eprintln!("  = hint: {}", super::verify::MISREAD);
         return Ok(Outcome::Different);
@@ -238,7 +238,7 @@ fn network(out: &mut String, policy: &Policy) -> Result<(), Failure> {
             layer.name
         )?;
     }
-    match verify::golden_result(policy)? {
+    match verify::golden_result(policy) {
         Some(golden) => {
             let text = super::verify::golden_text(&golden);
             writeln!(out, "  {} golden vectors from the trainer: {text}", golden.vectors)?;

@@ -11,9 +11,7 @@ use verify::{BuildReport, Decisions, Difference, GoldenResult, Outcome, Report};
 use crate::Failure;
 use crate::commands::grouped;
 
-/// What to look at when the network does not give the trainer's answers.
-pub const MISREAD: &str = "look at hidden_activation, the order of layers, transpose, and in the golden file at the order of obs's columns and at the \
-     first action, which is 0: the contract says something else than the trainer did";
+pub use interp::golden::MISREAD;
 
 /// What is open without golden vectors.
 pub const UNPROVEN: &str = "no golden vectors: nothing shows that the weights were read as the trainer meant";

@@ -4,10 +4,11 @@
 //! actions are compared with those of the rounded network, and each change is weighed by what it gives up of the trainer's
 //! own Q values.
 
-use interp::{Controller, Real, argmax};
 use ndarray::{Array1, aview1};
 use policy::{Golden, NumericFormat, Policy, Scalar};
 use serde::Serialize;
+
+use crate::{Controller, Real, argmax};
 
 /// Changes that are told one by one: the worst of them; a user looks at one or two.
 const TOLD: usize = 3;
@@ -87,7 +88,7 @@ fn actions<T: Real>(policy: &Policy, golden: &Golden) -> Vec<usize> {
 }
 
 /// Q values of each golden observation; a controller that refuses an observation, which the check rules out, chooses 0.
-fn answers<T: Real>(policy: &Policy, golden: &Golden) -> Vec<Array1<T>> {
+pub(crate) fn answers<T: Real>(policy: &Policy, golden: &Golden) -> Vec<Array1<T>> {
     let controller = Controller::<T>::new(policy);
     let rows = golden.observations.chunks_exact(policy.features.len().max(1));
     rows.map(|row| {

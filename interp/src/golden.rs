@@ -1,0 +1,192 @@
+//! Known answers of the trainer: was the network read as he meant, and does the numeric format keep his decisions?
+
+use ndarray::aview1;
+use policy::{Golden, NumericFormat, Policy, Scalar};
+use serde::Serialize;
+use toml_input::Message;
+
+use crate::decisions::{Decisions, answers, decisions};
+use crate::{Real, argmax};
+
+/// Known answers of the trainer against the interpreter or a build.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GoldenResult {
+    /// Number of vectors.
+    pub vectors: usize,
+    /// Vectors with an action to compare; 0 if the trainer gave Q values only.
+    pub actions_compared: usize,
+    /// Vectors with the trainer's action.
+    pub actions_equal: usize,
+    /// Largest |Q - golden| relative to the largest |Q| of its vector; `None` if the trainer gave actions only.
+    pub worst_relative_error: Option<f64>,
+    /// Allowed error.
+    pub tolerance: f64,
+    /// The answers are those of a network that was rounded to integers: told, not judged. The trainer's network is judged
+    /// in binary32 then.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub rounded: bool,
+}
+
+impl GoldenResult {
+    /// All Q values within the tolerance, or all actions equal where the trainer gave no Q values; or rounded. With Q values
+    /// the actions are [`Decisions`](crate::decisions::Decisions), which know ties.
+    #[must_use]
+    pub fn passed(&self) -> bool {
+        let actions = self.actions_equal == self.actions_compared;
+        let read = self
+            .worst_relative_error
+            .map_or(actions, |error| error <= self.tolerance);
+        self.rounded || read
+    }
+}
+
+/// Compares Q values, a row for each golden vector, with the trainer's; rows that are missing count as wrong.
+#[must_use]
+pub fn judge(golden: &Golden, answers: &[&[f64]]) -> GoldenResult {
+    let actions_equal = golden
+        .action_indices
+        .iter()
+        .zip(answers)
+        .filter(|(expected, q)| argmax(aview1(q)) == **expected as usize)
+        .count();
+    let missing = answers.len() < golden.count;
+    let actions = golden.q_values.len() / golden.count.max(1);
+    let worst = golden
+        .q_values
+        .chunks_exact(actions.max(1))
+        .zip(answers)
+        .map(|(expected, q)| relative_error(expected, q))
+        .fold(if missing { f64::INFINITY } else { 0.0 }, f64::max);
+    GoldenResult {
+        vectors: golden.count,
+        actions_compared: golden.action_indices.len(),
+        actions_equal,
+        worst_relative_error: (!golden.q_values.is_empty()).then_some(worst),
+        tolerance: golden.tolerance,
+        rounded: false,
+    }
+}
+
+/// Largest difference relative to the largest expected |Q|; infinite if a value is no number.
+fn relative_error(expected: &[f32], got: &[f64]) -> f64 {
+    let largest = expected
+        .iter()
+        .map(|q| f64::from(q.abs()))
+        .fold(f64::MIN_POSITIVE, f64::max);
+    expected
+        .iter()
+        .zip(got)
+        .map(|(e, g)| (f64::from(*e) - g).abs() / largest)
+        .map(|error| if error.is_nan() { f64::INFINITY } else { error })
+        .fold(0.0, f64::max)
+}
+
+/// The interpreter's answers against the trainer's; `None` without golden vectors.
+///
+/// A network in integers is judged in binary32: how it was read is the question here, what rounding costs that of
+/// [`decisions`].
+#[must_use]
+pub fn golden_result(policy: &Policy) -> Option<GoldenResult> {
+    let golden = policy.golden.as_ref()?;
+    let format = match policy::scales::is_integer(policy.numeric_format) {
+        true => NumericFormat::F32,
+        false => policy.numeric_format,
+    };
+    let policy = policy.clone().with_format(format);
+    let rows = match format.scalar() {
+        Scalar::F32 => wide::<f32>(&policy, golden),
+        Scalar::F64 => wide::<f64>(&policy, golden),
+    };
+    let rows: Vec<&[f64]> = rows.iter().map(Vec::as_slice).collect();
+    Some(judge(golden, &rows))
+}
+
+fn wide<T: Real + Into<f64>>(policy: &Policy, golden: &Golden) -> Vec<Vec<f64>> {
+    let rows = answers::<T>(policy, golden);
+    rows.into_iter()
+        .map(|q| q.into_iter().map(Into::into).collect())
+        .collect()
+}
+
+/// Why no code should be made of a policy: it was not read as the trainer meant, or its format changes more of his decisions
+/// than the contract allows. `None` if neither, or without golden vectors.
+#[must_use]
+pub fn refusal(policy: &Policy) -> Option<Message> {
+    let result = golden_result(policy)?;
+    if !result.passed() {
+        let found = match result.worst_relative_error {
+            Some(error) => format!("a relative error of Q of {error:.1e}, allowed {:.0e}", result.tolerance),
+            None => format!("{} of {} actions equal", result.actions_equal, result.actions_compared),
+        };
+        return Some(
+            Message::new("the network does not give the trainer's golden answers")
+                .found(found)
+                .hint(MISREAD),
+        );
+    }
+    let changed = decisions(policy, None).filter(|decisions| !decisions.kept())?;
+    let Decisions {
+        numeric_format,
+        observations,
+        changed,
+        allowed,
+        ..
+    } = changed;
+    Some(
+        Message::new("the numeric format changes more of the trainer's decisions than allowed")
+            .found(format!(
+                "{changed} of {observations} changed in {numeric_format}, allowed {} %",
+                (1e4 * allowed).round() / 100.0
+            ))
+            .hint("`policyc inspect` tells what they cost; to accept them: golden_decisions in [network], a share from 0 to 1"),
+    )
+}
+
+/// What to look at when the network does not give the trainer's answers.
+pub const MISREAD: &str = "look at hidden_activation, the order of layers, transpose, and in the golden file at the order of obs's \
+                           columns and at the first action, which is 0: the contract says something else than the trainer did";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn golden() -> Golden {
+        Golden {
+            count: 2,
+            observations: vec![0.0, 1.0],
+            q_values: vec![1.0, -4.0, 2.0, 3.0],
+            action_indices: vec![0, 1],
+            tolerance: 1e-5,
+            decisions: None,
+        }
+    }
+
+    fn judged(q: [f64; 4]) -> GoldenResult {
+        judge(&golden(), &[&q[..2], &q[2..]])
+    }
+
+    #[test]
+    fn equal_answers_pass() {
+        let result = judged([1.0, -4.0, 2.0, 3.0]);
+        assert!(result.passed());
+        assert_eq!((result.actions_equal, result.worst_relative_error), (2, Some(0.0)));
+    }
+
+    #[test]
+    fn error_is_relative_to_the_largest_q_of_its_vector() {
+        assert_eq!(judged([1.5, -4.0, 2.0, 3.0]).worst_relative_error, Some(0.125));
+    }
+
+    #[test]
+    fn nan_and_missing_answers_do_not_pass() {
+        assert!(!judged([f64::NAN, -4.0, 2.0, 3.0]).passed());
+        assert!(!judge(&golden(), &[&[1.0, -4.0]]).passed());
+    }
+
+    #[test]
+    fn another_action_does_not_pass() {
+        let result = judged([1.0, -4.0, 3.0, 2.999_999_9]);
+        assert_eq!(result.actions_equal, 1);
+        assert!(!result.passed());
+    }
+}

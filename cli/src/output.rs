@@ -44,6 +44,9 @@ pub fn write_all(folder: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<(),
 /// If a file of others is in the way ([`ownership::check`]); else as [`write_all`].
 pub fn replace_own(folder: &Path, files: BTreeMap<String, Vec<u8>>, replacing: Replacing) -> Result<(), Failure> {
     let files = ownership::recorded(files)?;
+    for name in files.keys() {
+        check_destination(&folder.join(name))?;
+    }
     ownership::check(folder, &files, replacing)?;
     write_all(folder, &files)
 }
@@ -95,6 +98,7 @@ pub fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
 /// If a file of others is in the way, or it cannot be written.
 pub fn replace_own_one(path: &Path, text: &str, replacing: Replacing) -> Result<(), Failure> {
     let (folder, name) = split(path)?;
+    check_destination(path)?;
     let file = BTreeMap::from([(name, text.as_bytes().to_vec())]);
     ownership::check(folder, &file, replacing)?;
     write_all(folder, &file)

@@ -31,8 +31,9 @@ pub(crate) fn incomplete() -> Message {
 // --- values ---
 
 pub(crate) fn foreign_activation(found: &str, known: &str) -> Message {
-    Message::new(format!("policyc has no activation `{}`", found.escape_debug()))
-        .expected(format!("one of {known}"))
+    Message::new("`hidden_activation` names a function that policyc does not have")
+        .found(format!("\"{}\"", found.escape_debug()))
+        .expected(format!("one of {known}, leaky_relu with its slope"))
         .hint("train with one of these; another function in its place would be another policy")
 }
 

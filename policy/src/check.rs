@@ -78,7 +78,9 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
         mapping.as_ref().and_then(Option::as_ref),
     ));
     let limits = limits?;
-    if let Some(duty) = only_duty(&limits, &actions.list, mapping.as_ref().and_then(Option::as_ref)) {
+    let complete = actions.list.len() == action_count;
+    let only = only_duty(&limits, &actions.list, mapping.as_ref().and_then(Option::as_ref));
+    if let Some(duty) = only.filter(|_| complete) {
         let at = raw.contract.peek(&["limits", "duty"]);
         faults.extend(at.map(|value| value.fault(catalogue::one_duty_for_all(duty))));
     }

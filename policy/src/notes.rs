@@ -79,9 +79,13 @@ pub(crate) fn beyond_mapping(limits: &Limits, actions: &[Action], mapping: &Mapp
     notes
 }
 
-/// The duty that the limits make of all actions, if they leave no other. A mapped duty is linear in the load current: if both
+/// The duty that the limits make of all actions, if these differ and nobody asked for a fixed duty by equal limits. A mapped duty is linear in the load current: if both
 /// ends of its range leave the same one, so does everything between.
 pub(crate) fn only_duty(limits: &Limits, actions: &[Action], mapping: Option<&Mapping>) -> Option<f64> {
+    let own = actions.first()?.duty;
+    if limits.duty.low == limits.duty.high || actions.iter().all(|action| action.duty == own) {
+        return None;
+    }
     let ends = mapping.map_or([0.0; 2], |m| [m.valid_i_out.low, m.valid_i_out.high]);
     let limited = |action: &Action, i: f64| {
         let duty = mapping.map_or(action.duty, |mapping| mapped(mapping, action.duty, i));
@@ -150,6 +154,33 @@ mod tests {
             adjust_r: interval(0.0, 0.0),
             simulation: None,
         }
+    }
+
+    #[test]
+    fn limits_that_leave_one_duty_are_found_with_and_without_mapping() {
+        let limits = |low, high| Limits {
+            duty: interval(low, high),
+            slew: None,
+            soft_start: None,
+            initial_duty: 0.3,
+        };
+        let actions = [0.4, 0.5].map(|duty| Action { duty, pair: None });
+        assert_eq!(only_duty(&limits(0.6, 0.9), &actions, None), Some(0.6));
+        assert_eq!(only_duty(&limits(0.3, 0.45), &actions, None), None, "0.4 and 0.45");
+        assert_eq!(
+            only_duty(&limits(0.6, 0.6), &actions, None),
+            None,
+            "a fixed duty is asked for"
+        );
+        assert_eq!(
+            only_duty(&limits(0.6, 0.9), &[actions[0]; 2], None),
+            None,
+            "by the actions alone"
+        );
+        // 0.01 i at up to 5 A lifts 0.5 to 0.55
+        let mapping = mapping(interval(0.0, 1.0));
+        assert_eq!(only_duty(&limits(0.56, 0.9), &actions, Some(&mapping)), Some(0.56));
+        assert_eq!(only_duty(&limits(0.54, 0.9), &actions, Some(&mapping)), None);
     }
 
     fn notes(duties: &[f64], valid: Interval, limits: Interval) -> Vec<String> {

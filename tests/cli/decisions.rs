@@ -14,8 +14,11 @@ fn example() -> Desk {
 
 /// Changed decisions and ties as `inspect --json` counts them.
 fn counted(desk: &Desk, format: &str) -> (u64, u64) {
-    let text = desk.succeed(&format!("inspect policy --format {format} --json"));
-    let json: Value = serde_json::from_str(&text).unwrap();
+    let ran = desk.type_in(&format!("inspect policy --format {format} --json"));
+    let json: Value = serde_json::from_str(&ran.stdout).unwrap();
+    let allowed = json["decisions"]["allowed"].as_f64().unwrap();
+    let is_kept = json["decisions"]["changed"].as_f64().unwrap() <= 515.0 * allowed;
+    assert_eq!(ran.code, Some(i32::from(!is_kept)), "{}", ran.stderr);
     let number = |key: &str| json["decisions"][key].as_u64().unwrap();
     assert_eq!(number("observations"), 515);
     (number("changed"), number("ties"))

@@ -41,7 +41,7 @@ fn a_measured_mapping_reaches_the_generated_code() {
     let said = desk.succeed(&format!("drm acquire --plant real.toml {DUTIES} --out points.csv"));
     assert!(said.contains("15 points, 0 taken over, 15 measured"), "{said}");
     let said = desk.succeed(
-        "drm fit points.csv --plant real.toml --v-in-sim 200 --terms 4 --out buck12/drm.toml --report fit.html",
+        "drm fit points.csv --plant real.toml --v-in-sim 200 --terms 4 --out buck12/drm.toml --report fit.html --force",
     );
     assert!(
         said.contains("V_f = 1.5") && said.contains("lost duty = 0.039"),

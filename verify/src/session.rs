@@ -13,7 +13,7 @@ use codegen::Output;
 use interp::decisions::decisions;
 use interp::golden::golden_result;
 use interp::{InputError, Real};
-use policy::{NumericFormat, Policy, Scalar};
+use policy::{Policy, Scalar};
 use targets::TargetSpec;
 use toml_input::{Fault, Faults, Message, messages};
 

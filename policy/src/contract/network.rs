@@ -143,7 +143,7 @@ fn activation(value: &Value<'_>, faults: &mut Sink) -> Option<Activation> {
             }
             // a word for another function is no slip of the pen
             None if FOREIGN.contains(&text.to_ascii_lowercase().as_str()) => {
-                catalogue::foreign_activation(text, &written())
+                catalogue::foreign_activation(text, &known.join(", "))
             }
             None => catalogue::not_one_of("hidden_activation", text, &known),
         }),

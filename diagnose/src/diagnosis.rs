@@ -14,6 +14,7 @@ use crate::noise::{self, Outlier};
 use crate::problem::Problem;
 use crate::profile::{Profile, profiles};
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
+use crate::sampling;
 use crate::shape::{Structure, structures};
 use crate::words::{sentence, shifted};
 
@@ -256,6 +257,7 @@ fn prepared(train: Vec<Record>, base: &Model) -> (Problem, State, Vec<Outlier>) 
     let mut problem = Problem::new(train, base.clone());
     let mut null = State::settle(&problem, base, &problem.first_starts(), None);
     problem.sigma = noise::sigma(&problem, &null.residual);
+    sampling::decide(&mut problem, base);
     null = State::settle(&problem, base, &null.starts, None);
     let outliers = noise::outliers(&problem, &null.residual);
     for one in &outliers {

@@ -33,6 +33,7 @@ mod parallel;
 pub mod problem;
 pub mod profile;
 pub mod record;
+mod sampling;
 mod search;
 pub mod shape;
 mod spectrum;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use toml_input::{Document, Faults, Sink, Table, Value};
 
-use super::{ColumnMap, DutyIs, Wish, quantity};
+use super::{ColumnMap, DutyIs, Sampled, Wish, quantity};
 
 impl ColumnMap {
     /// Reads a map file:
@@ -13,6 +13,7 @@ impl ColumnMap {
     /// phase = 0.5                 # sampling instant in the PWM period; left out: from the time column
     /// duty = "commanded"          # or "applied", "direct"
     /// settled = true              # rows are settled points; left out: if there is no time column
+    /// sampled = "mean"            # or "instant": rows many periods apart; left out: what fits better
     /// [columns]
     /// v_out = "CH1 [V]"
     /// duty = { name = "D", scale = 0.01, offset = 0.0 }
@@ -38,6 +39,9 @@ impl ColumnMap {
             }
             if let Some(value) = root.optional("settled") {
                 map.settled = value.boolean(faults);
+            }
+            if let Some(value) = root.optional("sampled") {
+                map.sampled = value.choice(&[("mean", Sampled::Mean), ("instant", Sampled::Instant)], faults);
             }
             map.read_table(root, "columns", faults, column);
             map.read_table(root, "constants", faults, |value, faults| {

@@ -21,6 +21,15 @@ pub enum DutyIs {
     Direct,
 }
 
+/// What a number of a slow record holds: rows many switching periods apart, or settled points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sampled {
+    /// The mean since the row before, or over a settled point.
+    Mean,
+    /// What was there at one instant of a switching period.
+    Instant,
+}
+
 /// Which column of a table holds which quantity, or what it was throughout; and how the table was recorded.
 ///
 /// What is not mapped is found by its name ([`VOCABULARY`]).
@@ -31,6 +40,8 @@ pub struct ColumnMap {
     pub phase: Option<f64>,
     /// What the duty column holds.
     pub duty: DutyIs,
+    /// What the rows of a slow record hold; what fits better, if not given.
+    pub sampled: Option<Sampled>,
     /// Rows are settled operating points (true) or steps in time (false); from the columns if not given.
     pub settled: Option<bool>,
 }
@@ -79,6 +90,7 @@ impl ColumnMap {
         }
         self.phase = other.phase.or(self.phase);
         self.settled = other.settled.or(self.settled);
+        self.sampled = other.sampled.or(self.sampled);
         if other.duty != DutyIs::Unknown {
             self.duty = other.duty;
         }

@@ -13,6 +13,7 @@ use crate::gain::{self, Held, Pair, Shift};
 use crate::noise::{self, Outlier};
 use crate::problem::Problem;
 use crate::profile::{Profile, profiles};
+use crate::quantised;
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
 use crate::sampling;
 use crate::shape::{Structure, structures};
@@ -176,7 +177,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     let profiles = profiles(&problem, &attribution);
     let structure = structures(&problem, &attribution.null, attribution.state(), attribution.inflation);
     let named = named(&attribution, &profiles);
-    let lattice = quantised(&problem);
+    let lattice = quantised::cause(&problem);
     let verdict = verdict(&named, &lattice, &structure);
     let explained = verdict != Verdict::Unexplained;
     say("held-out records");
@@ -206,7 +207,10 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         structure,
         not_detectable: hidden(&problem, &attribution),
         next_experiments,
-        noise: noise_of(&problem, &attribution, &outliers, pair.as_ref(), trim),
+        noise: Noise {
+            repairs: notes(&problem, pair.as_ref()),
+            ..noise_of(&problem, &attribution, &outliers, trim)
+        },
         gain: Gain {
             heldout: pair.as_ref().map_or_else(Vec::new, Pair::errors),
             mean_square: pair.as_ref().map_or([f64::NAN; 2], |pair| pair.total().into()),
@@ -315,37 +319,6 @@ fn each_once(sets: impl Iterator<Item = Vec<&'static str>>) -> Vec<Vec<&'static 
     })
 }
 
-/// Channels whose values lie on the steps of a converter that the model does not have.
-fn quantised(problem: &Problem) -> Option<Named> {
-    let sensors = &problem.base.plant.sensors;
-    let known = [sensors.v_out.lsb, sensors.i_l.lsb, sensors.i_out.lsb, sensors.v_in.lsb];
-    let names = ["v_lsb", "i_lsb", "i_o_lsb", "v_in_lsb"];
-    let mut parameters = BTreeMap::new();
-    for n in 0..CHANNELS {
-        let step = problem.records.iter().map(|r| r.lattice[n]).fold(0.0, f64::max);
-        if step > 0.0 && (known[n] - step).abs() > 0.02 * step {
-            let value = Value {
-                value: step,
-                low: 0.999 * step,
-                high: 1.001 * step,
-                unit: crate::record::CHANNEL_UNITS[n],
-                model: known[n],
-            };
-            parameters.insert(names[n], value);
-        }
-    }
-    (!parameters.is_empty()).then(|| Named {
-        id: "adc_quantisation",
-        words: "step of the converter",
-        parameters,
-        evidence: Evidence {
-            delta_chi2: f64::MAX,
-            threshold: 0.0,
-        },
-        rivals: Vec::new(),
-    })
-}
-
 fn verdict(named: &[Named], lattice: &Option<Named>, structure: &[Structure]) -> Verdict {
     if !structure.is_empty() {
         return Verdict::Unexplained;
@@ -377,31 +350,29 @@ fn hidden(problem: &Problem, attribution: &Attribution) -> Vec<Hidden> {
     list
 }
 
-fn noise_of(
-    problem: &Problem,
-    attribution: &Attribution,
-    outliers: &[Outlier],
-    pair: Option<&Pair>,
-    trim: f64,
-) -> Noise {
+fn noise_of(problem: &Problem, attribution: &Attribution, outliers: &[Outlier], trim: f64) -> Noise {
     let measured = (0..CHANNELS).filter(|n| problem.sigma[*n].is_finite());
     let outlier = |one: &Outlier| {
         let record = &problem.records[one.record].name;
         format!("{record}:{}:{}", one.row, CHANNEL_NAMES[one.channel])
     };
-    let held = pair.map_or(&[][..], |pair| &pair.problem.records);
-    let repairs = problem
-        .records
-        .iter()
-        .chain(held)
-        .flat_map(|r| r.repairs.iter().map(|text| format!("{}: {text}", r.name)));
     Noise {
         sigma: measured.map(|n| (CHANNEL_NAMES[n], problem.sigma[n])).collect(),
         inflation: attribution.inflation,
         outliers: outliers.iter().map(outlier).collect(),
-        repairs: repairs
-            .chain(pair.into_iter().flat_map(|pair| pair.remarks.clone()))
-            .collect(),
+        repairs: Vec::new(),
         trim,
     }
+}
+
+/// What was repaired, assumed or noticed.
+fn notes(problem: &Problem, pair: Option<&Pair>) -> Vec<String> {
+    let held = pair.map_or(&[][..], |pair| &pair.problem.records);
+    let records = problem.records.iter().chain(held);
+    let mut notes: Vec<String> = records
+        .flat_map(|r| r.repairs.iter().map(|text| format!("{}: {text}", r.name)))
+        .collect();
+    notes.extend(quantised::notes(problem));
+    notes.extend(pair.into_iter().flat_map(|pair| pair.remarks.clone()));
+    notes
 }

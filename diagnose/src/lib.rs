@@ -32,6 +32,7 @@ pub mod page;
 mod parallel;
 pub mod problem;
 pub mod profile;
+mod quantised;
 pub mod record;
 mod sampling;
 mod search;

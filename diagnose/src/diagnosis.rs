@@ -174,8 +174,10 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         rivals.extend(others.iter().cloned());
     }
     say("intervals");
-    let profiles = profiles(&problem, &attribution);
+    let mut profiles = profiles(&problem, &attribution);
+    // what is too small for a cause still leaves no structure
     let structure = structures(&problem, &attribution.null, attribution.state(), attribution.inflation);
+    let nothing = attribution.leave_out_nothing(&problem, &mut profiles);
     let named = named(&attribution, &profiles);
     let lattice = quantised::cause(&problem);
     let verdict = verdict(&named, &lattice, &structure);
@@ -208,7 +210,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         not_detectable: hidden(&problem, &attribution),
         next_experiments,
         noise: Noise {
-            repairs: notes(&problem, pair.as_ref()),
+            repairs: notes(&problem, pair.as_ref(), &nothing),
             ..noise_of(&problem, &attribution, &outliers, trim)
         },
         gain: Gain {
@@ -366,13 +368,16 @@ fn noise_of(problem: &Problem, attribution: &Attribution, outliers: &[Outlier], 
 }
 
 /// What was repaired, assumed or noticed.
-fn notes(problem: &Problem, pair: Option<&Pair>) -> Vec<String> {
+fn notes(problem: &Problem, pair: Option<&Pair>, nothing: &[&str]) -> Vec<String> {
     let held = pair.map_or(&[][..], |pair| &pair.problem.records);
     let records = problem.records.iter().chain(held);
     let mut notes: Vec<String> = records
         .flat_map(|r| r.repairs.iter().map(|text| format!("{}: {text}", r.name)))
         .collect();
     notes.extend(quantised::notes(problem));
+    notes.extend(nothing.iter().map(|id| {
+        format!("{id} would fit a little better, by less than two simulators of one circuit differ: not named")
+    }));
     notes.extend(pair.into_iter().flat_map(|pair| pair.remarks.clone()));
     notes
 }

@@ -44,6 +44,27 @@ fn said(found: &Diagnosis) -> String {
 }
 
 #[test]
+fn a_cause_whose_size_is_nothing_is_not_named() {
+    let mut hidden = model();
+    // a tenth of what two simulators differ by, in a record with next to no noise
+    hidden.converter.capacitance *= 1.0001;
+    hidden.capacitor.derating = 1e-4;
+    hidden.capacitor.v_half = 50.0;
+    let found = diagnosed(&hidden, 2e-4, 6);
+    for cause in &found.findings.causes {
+        let moved = cause.parameters.values().any(|v| v.model < v.low || v.high < v.model);
+        assert!(moved, "{}", found.findings.sentence);
+    }
+    assert_eq!(
+        found.findings.verdict,
+        Verdict::Consistent,
+        "{}",
+        found.findings.sentence
+    );
+    assert!(said(&found).contains("not named"), "{}", said(&found));
+}
+
+#[test]
 fn a_step_of_a_converter_that_is_lost_in_the_noise_is_a_note() {
     let mut hidden = model();
     hidden.sensors.v_out.lsb = 0.05;

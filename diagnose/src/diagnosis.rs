@@ -33,6 +33,19 @@ pub enum Verdict {
     Unexplained,
 }
 
+impl Verdict {
+    /// As in `diagnosis.json`.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Verdict::Consistent => "consistent",
+            Verdict::Explained => "explained",
+            Verdict::Ambiguous => "ambiguous",
+            Verdict::Unexplained => "unexplained",
+        }
+    }
+}
+
 /// A value with its 95 % interval.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Value {

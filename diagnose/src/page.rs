@@ -26,12 +26,7 @@ pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
         Verdict::Ambiguous => report::Verdict::Warn,
         Verdict::Unexplained => report::Verdict::Fail,
     };
-    let word = match findings.verdict {
-        Verdict::Consistent => "consistent",
-        Verdict::Explained => "explained",
-        Verdict::Ambiguous => "ambiguous",
-        Verdict::Unexplained => "unexplained",
-    };
+    let word = findings.verdict.word();
     let mut page = Page::new(format!("Diagnosis: {word}")).verdict(mark, findings.sentence.clone());
     page = page.section(causes(diagnosis));
     if let Some(section) = held_out(diagnosis)? {

@@ -59,7 +59,9 @@ pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
             "note: no mapping and no closed loop on the extended model: {reason}"
         ))?;
     }
-    output::say(&format!("{}\n\nreport: {out}/report.html", diagnosis.findings.sentence))?;
+    let findings = &diagnosis.findings;
+    let (word, sentence) = (findings.verdict.word(), &findings.sentence);
+    output::say(&format!("verdict: {word}\n{sentence}\n\nreport: {out}/report.html"))?;
     Ok(Outcome::Done)
 }
 

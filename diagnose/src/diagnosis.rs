@@ -92,8 +92,10 @@ pub struct Hidden {
     pub id: &'static str,
     /// Parameter.
     pub parameter: &'static str,
-    /// Smallest change that would be seen.
-    pub smallest: f64,
+    /// Smallest change that would be seen; nothing if none within the reach would.
+    pub smallest: Option<f64>,
+    /// Largest change that is tried: a cause beyond it is another converter.
+    pub reach: f64,
     /// SI unit.
     pub unit: &'static str,
 }
@@ -353,11 +355,13 @@ fn hidden(problem: &Problem, attribution: &Attribution) -> Vec<Hidden> {
     for (cause, smallest) in sizes {
         let candidate = &attribution.candidates[cause];
         let knob = &candidate.form.knobs[0];
-        if smallest > candidate.large() {
+        let reach = candidate.reach();
+        if smallest > candidate.large().min(reach) {
             list.push(Hidden {
                 id: candidate.cause.id,
                 parameter: knob.name,
-                smallest,
+                smallest: (smallest <= reach).then_some(smallest),
+                reach,
                 unit: knob.unit(),
             });
         }

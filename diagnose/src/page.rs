@@ -247,7 +247,14 @@ fn detectable(diagnosis: &Diagnosis) -> Section {
         table = table.row([
             one.id.into(),
             one.parameter.into(),
-            quantity(one.smallest, unit(one.unit), 3).into(),
+            match one.smallest {
+                Some(smallest) => quantity(smallest, unit(one.unit), 3),
+                None => format!(
+                    "not at any size within its reach, {}",
+                    quantity(one.reach, unit(one.unit), 3)
+                ),
+            }
+            .into(),
         ]);
     }
     Section::new("").details(Section::new("Not detectable").table(table))

@@ -98,3 +98,13 @@ fn a_coarse_step_is_named_and_stands_in_the_extended_model() {
     let extended = Parameters::from_toml(Path::new("plant.extended.toml"), &text).unwrap();
     assert!((extended.sensors.v_out.lsb / 0.5 - 1.0).abs() < 1e-3, "{text}");
 }
+
+#[test]
+fn nothing_is_called_visible_beyond_its_reach() {
+    let found = diagnosed(&model(), 0.1, 3);
+    let list = &found.findings.not_detectable;
+    assert!(list.iter().any(|hidden| hidden.smallest.is_none()), "{list:?}");
+    for hidden in list {
+        assert!(hidden.smallest.is_none_or(|size| size <= hidden.reach), "{hidden:?}");
+    }
+}

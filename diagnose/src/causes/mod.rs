@@ -80,6 +80,13 @@ pub struct Candidate {
 }
 
 impl Candidate {
+    /// The largest change of the first parameter that is tried.
+    #[must_use]
+    pub fn reach(&self) -> f64 {
+        let (own, [low, high, _]) = (self.own[0], self.ranges[0]);
+        (high - own).max(own - low)
+    }
+
     /// Whether the cause at `values` is no effect, whatever it gains.
     #[must_use]
     pub fn is_nothing(&self, values: &[f64]) -> bool {

@@ -99,6 +99,7 @@ impl Record {
     /// The faults of the table, missing or unusable columns, time that goes backward, another sample rate, a column
     /// that looks like time and is not known as such.
     pub fn read(sheet: &Sheet, map: &ColumnMap, parameters: &Parameters) -> Result<Self, Faults> {
+        let map = &*map.of(sheet.file());
         let mut raw = Raw::new(sheet, map)?;
         raw.check_duty()?;
         raw.report_missing_duty();

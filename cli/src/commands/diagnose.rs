@@ -23,6 +23,8 @@ use crate::{Failure, Outcome, output};
 pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
     let model = Parameters::from_file(&options.model)?;
     let mut columns = options.columns.read()?;
+    let files = || options.train.iter().chain(&options.heldout).map(PathBuf::as_path);
+    columns.check_records(files())?;
     if options.settled {
         columns.settled = Some(true);
     }

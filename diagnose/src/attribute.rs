@@ -6,6 +6,7 @@ use crate::fit::{FINE, Fit, Fitter, ROUGH, State};
 use crate::noise;
 use crate::parallel;
 use crate::problem::{Basis, Problem, dot};
+use crate::profile::Profile;
 use crate::search::{Searcher, gained};
 
 /// Gain in chi-square that one parameter must bring. Chi-square of one degree of freedom exceeds 16 with probability 6.3e-5:
@@ -99,6 +100,36 @@ impl Attribution {
     #[must_use]
     pub fn state(&self) -> &State {
         self.best.as_ref().map_or(&self.null, |fit| &fit.state)
+    }
+
+    /// Takes out causes that are no effect: by their size, or because the interval of each parameter that makes it holds
+    /// the model's own value. Their ids.
+    pub fn leave_out_nothing(&mut self, problem: &Problem, profiles: &mut Vec<Profile>) -> Vec<&'static str> {
+        let Some(best) = self.best.clone() else {
+            return Vec::new();
+        };
+        let own = |member: usize| profiles.iter().filter(move |profile| profile.member == member);
+        let is_nothing = |member: &usize| {
+            let candidate = &self.candidates[best.causes[*member]];
+            let values: Vec<f64> = own(*member).map(|profile| profile.value).collect();
+            let sizes = candidate.sizes();
+            candidate.is_nothing(&values) || sizes > 0 && own(*member).take(sizes).all(Profile::holds_own)
+        };
+        let (out, kept): (Vec<usize>, Vec<usize>) = (0..best.causes.len()).partition(is_nothing);
+        if out.is_empty() {
+            return Vec::new();
+        }
+        let causes: Vec<usize> = kept.iter().map(|member| best.causes[*member]).collect();
+        let values: Vec<f64> = kept.iter().flat_map(|m| own(*m).map(|profile| profile.value)).collect();
+        let fit = (!causes.is_empty()).then(|| self.fitter(problem).from(&causes, &values, &self.null));
+        self.evidence = kept.iter().map(|member| self.evidence[*member]).collect();
+        self.rivals = kept.iter().map(|member| self.rivals[*member].clone()).collect();
+        profiles.retain(|profile| kept.contains(&profile.member));
+        for profile in profiles {
+            profile.member = kept.iter().position(|m| *m == profile.member).unwrap_or(0);
+        }
+        self.best = fit;
+        out.iter().map(|member| self.id(best.causes[*member])).collect()
     }
 
     /// Whether two candidates are forms of one cause.

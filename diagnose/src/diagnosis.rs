@@ -13,7 +13,9 @@ use crate::gain::{self, Held, Pair, Shift};
 use crate::noise::{self, Outlier};
 use crate::problem::Problem;
 use crate::profile::{Profile, profiles};
+use crate::quantised;
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
+use crate::sampling;
 use crate::shape::{Structure, structures};
 use crate::words::{sentence, shifted};
 
@@ -29,6 +31,19 @@ pub enum Verdict {
     Ambiguous,
     /// None of the known causes does.
     Unexplained,
+}
+
+impl Verdict {
+    /// As in `diagnosis.json`.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Verdict::Consistent => "consistent",
+            Verdict::Explained => "explained",
+            Verdict::Ambiguous => "ambiguous",
+            Verdict::Unexplained => "unexplained",
+        }
+    }
 }
 
 /// A value with its 95 % interval.
@@ -77,8 +92,10 @@ pub struct Hidden {
     pub id: &'static str,
     /// Parameter.
     pub parameter: &'static str,
-    /// Smallest change that would be seen.
-    pub smallest: f64,
+    /// Smallest change that would be seen; nothing if none within the reach would.
+    pub smallest: Option<f64>,
+    /// Largest change that is tried: a cause beyond it is another converter.
+    pub reach: f64,
     /// SI unit.
     pub unit: &'static str,
 }
@@ -172,10 +189,12 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         rivals.extend(others.iter().cloned());
     }
     say("intervals");
-    let profiles = profiles(&problem, &attribution);
+    let mut profiles = profiles(&problem, &attribution);
+    // what is too small for a cause still leaves no structure
     let structure = structures(&problem, &attribution.null, attribution.state(), attribution.inflation);
+    let nothing = attribution.leave_out_nothing(&problem, &mut profiles);
     let named = named(&attribution, &profiles);
-    let lattice = quantised(&problem);
+    let lattice = quantised::cause(&problem);
     let verdict = verdict(&named, &lattice, &structure);
     let explained = verdict != Verdict::Unexplained;
     say("held-out records");
@@ -205,7 +224,10 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         structure,
         not_detectable: hidden(&problem, &attribution),
         next_experiments,
-        noise: noise_of(&problem, &attribution, &outliers, pair.as_ref(), trim),
+        noise: Noise {
+            repairs: notes(&problem, pair.as_ref(), &nothing),
+            ..noise_of(&problem, &attribution, &outliers, trim)
+        },
         gain: Gain {
             heldout: pair.as_ref().map_or_else(Vec::new, Pair::errors),
             mean_square: pair.as_ref().map_or([f64::NAN; 2], |pair| pair.total().into()),
@@ -256,6 +278,7 @@ fn prepared(train: Vec<Record>, base: &Model) -> (Problem, State, Vec<Outlier>) 
     let mut problem = Problem::new(train, base.clone());
     let mut null = State::settle(&problem, base, &problem.first_starts(), None);
     problem.sigma = noise::sigma(&problem, &null.residual);
+    sampling::decide(&mut problem, base);
     null = State::settle(&problem, base, &null.starts, None);
     let outliers = noise::outliers(&problem, &null.residual);
     for one in &outliers {
@@ -313,37 +336,6 @@ fn each_once(sets: impl Iterator<Item = Vec<&'static str>>) -> Vec<Vec<&'static 
     })
 }
 
-/// Channels whose values lie on the steps of a converter that the model does not have.
-fn quantised(problem: &Problem) -> Option<Named> {
-    let sensors = &problem.base.plant.sensors;
-    let known = [sensors.v_out.lsb, sensors.i_l.lsb, sensors.i_out.lsb, sensors.v_in.lsb];
-    let names = ["v_lsb", "i_lsb", "i_o_lsb", "v_in_lsb"];
-    let mut parameters = BTreeMap::new();
-    for n in 0..CHANNELS {
-        let step = problem.records.iter().map(|r| r.lattice[n]).fold(0.0, f64::max);
-        if step > 0.0 && (known[n] - step).abs() > 0.02 * step {
-            let value = Value {
-                value: step,
-                low: 0.999 * step,
-                high: 1.001 * step,
-                unit: crate::record::CHANNEL_UNITS[n],
-                model: known[n],
-            };
-            parameters.insert(names[n], value);
-        }
-    }
-    (!parameters.is_empty()).then(|| Named {
-        id: "adc_quantisation",
-        words: "step of the converter",
-        parameters,
-        evidence: Evidence {
-            delta_chi2: f64::MAX,
-            threshold: 0.0,
-        },
-        rivals: Vec::new(),
-    })
-}
-
 fn verdict(named: &[Named], lattice: &Option<Named>, structure: &[Structure]) -> Verdict {
     if !structure.is_empty() {
         return Verdict::Unexplained;
@@ -363,11 +355,13 @@ fn hidden(problem: &Problem, attribution: &Attribution) -> Vec<Hidden> {
     for (cause, smallest) in sizes {
         let candidate = &attribution.candidates[cause];
         let knob = &candidate.form.knobs[0];
-        if smallest > candidate.large() {
+        let reach = candidate.reach();
+        if smallest > candidate.large().min(reach) {
             list.push(Hidden {
                 id: candidate.cause.id,
                 parameter: knob.name,
-                smallest,
+                smallest: (smallest <= reach).then_some(smallest),
+                reach,
                 unit: knob.unit(),
             });
         }
@@ -375,31 +369,32 @@ fn hidden(problem: &Problem, attribution: &Attribution) -> Vec<Hidden> {
     list
 }
 
-fn noise_of(
-    problem: &Problem,
-    attribution: &Attribution,
-    outliers: &[Outlier],
-    pair: Option<&Pair>,
-    trim: f64,
-) -> Noise {
+fn noise_of(problem: &Problem, attribution: &Attribution, outliers: &[Outlier], trim: f64) -> Noise {
     let measured = (0..CHANNELS).filter(|n| problem.sigma[*n].is_finite());
     let outlier = |one: &Outlier| {
         let record = &problem.records[one.record].name;
         format!("{record}:{}:{}", one.row, CHANNEL_NAMES[one.channel])
     };
-    let held = pair.map_or(&[][..], |pair| &pair.problem.records);
-    let repairs = problem
-        .records
-        .iter()
-        .chain(held)
-        .flat_map(|r| r.repairs.iter().map(|text| format!("{}: {text}", r.name)));
     Noise {
         sigma: measured.map(|n| (CHANNEL_NAMES[n], problem.sigma[n])).collect(),
         inflation: attribution.inflation,
         outliers: outliers.iter().map(outlier).collect(),
-        repairs: repairs
-            .chain(pair.into_iter().flat_map(|pair| pair.remarks.clone()))
-            .collect(),
+        repairs: Vec::new(),
         trim,
     }
+}
+
+/// What was repaired, assumed or noticed.
+fn notes(problem: &Problem, pair: Option<&Pair>, nothing: &[&str]) -> Vec<String> {
+    let held = pair.map_or(&[][..], |pair| &pair.problem.records);
+    let records = problem.records.iter().chain(held);
+    let mut notes: Vec<String> = records
+        .flat_map(|r| r.repairs.iter().map(|text| format!("{}: {text}", r.name)))
+        .collect();
+    notes.extend(quantised::notes(problem));
+    notes.extend(nothing.iter().map(|id| {
+        format!("{id} would fit a little better, by less than two simulators of one circuit differ: not named")
+    }));
+    notes.extend(pair.into_iter().flat_map(|pair| pair.remarks.clone()));
+    notes
 }

@@ -1,6 +1,6 @@
 //! Drives the plant by a record: its duties, set loads and sampling instants.
 
-use measured::DutyIs;
+use measured::{DutyIs, Sampled};
 use plant::{Parameters, Plant, Signals};
 
 use crate::record::{CHANNELS, Record, Segment};
@@ -80,7 +80,9 @@ pub fn simulate(model: &Model, record: &Record, starts: &[Start], trim: f64) -> 
     if phase.abs() < SAME {
         phase = 0.0;
     }
-    if record.settled {
+    if record.settled && record.sampled == Some(Sampled::Instant) {
+        (p.source.ripple, whole) = (0.0, 0.0);
+    } else if record.settled {
         // what is noted of a settled point is a mean over many periods
         for sensor in sensors(&mut p) {
             (sensor.low_pass, sensor.delay) = (AVERAGED * model.plant.t_sw(), 0.0);
@@ -101,6 +103,7 @@ pub fn simulate(model: &Model, record: &Record, starts: &[Start], trim: f64) -> 
         }
         let Ok(mut plant) = Plant::new(&p) else { return shown };
         match record.settled {
+            true if driver.repeats(segment.start) => shown[segment.start] = shown[segment.start - 1],
             true => driver.settle(&mut plant, segment.start, start, &mut shown),
             false => driver.run(&mut plant, segment, start, &mut shown),
         }
@@ -144,6 +147,12 @@ impl Driver<'_> {
             };
             *place = array(&sample.measured);
         }
+    }
+
+    /// Whether a row is the settled point of the row before again, which need not be sought twice.
+    fn repeats(&self, row: usize) -> bool {
+        let record = self.record;
+        record.repeated && row > 0 && record.is_same_point(row - 1, row)
     }
 
     fn settle(&self, plant: &mut Plant, row: usize, start: &Start, shown: &mut [[f64; CHANNELS]]) {

@@ -33,7 +33,9 @@ pub fn as_plant(model: &Model, trim: f64) -> Parameters {
 /// The model with what was found, or as it is, with the trim of the edges.
 #[must_use]
 pub fn extended_plant(diagnosis: &Diagnosis) -> Parameters {
-    as_plant(&diagnosis.extended, diagnosis.trim)
+    let mut plant = as_plant(&diagnosis.extended, diagnosis.trim);
+    crate::quantised::extend(&mut plant, &diagnosis.findings.causes);
+    plant
 }
 
 /// Text of `plant.extended.toml`; changed numbers carry what they were and their 95 % interval.

@@ -7,6 +7,7 @@ use crate::fit::State;
 use crate::noise;
 use crate::problem::{Problem, dot};
 use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS, Record};
+use crate::sampling;
 
 /// Which rows of a record are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -117,6 +118,7 @@ pub fn hold(records: &[Record], base: &Model, extended: &Model, sigma: [f64; CHA
     let mut problem = Problem::new(records.to_vec(), base.clone());
     problem.sigma = sigma.map(|s| if s.is_finite() { s } else { f64::INFINITY });
     problem.trim_held = true;
+    sampling::decide(&mut problem, extended);
     let remarks = other_chains(&mut problem, base, extended, trim);
     let before = State::settle(&problem, base, &problem.first_starts(), None);
     let mut starts = before.starts.clone();

@@ -29,14 +29,21 @@ pub fn channel(problem: &Problem, residual: &[f64], record: usize, channel: usiz
 #[must_use]
 pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
     std::array::from_fn(|n| {
-        let of = |record: usize| -> Vec<f64> {
+        let of = |record: usize| -> f64 {
+            let one = &problem.records[record];
+            if one.repeated {
+                return one.scatter[n] / problem.sigma[n];
+            }
             let values = channel(problem, residual, record, n);
-            let triples = values.windows(3).filter(|w| w.iter().all(|v| *v != 0.0));
-            triples.map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect()
+            let mut rows: Vec<usize> = (0..values.len()).collect();
+            if !one.dense {
+                // rows of a slower rate have nothing between them
+                rows.retain(|row| values[*row] != 0.0);
+            }
+            let shown: Vec<f64> = rows.iter().map(|row| values[*row]).collect();
+            scatter(&shown, |triple| triple.iter().all(|v| *v != 0.0))
         };
-        let estimates = (0..problem.records.len()).map(of).filter(|list| list.len() >= 5);
-        // median of |x| over sigma, and three independent terms with weights 1, -2, 1
-        let typical = median(estimates.map(|list| median(list) / 0.674_49 / 6f64.sqrt()));
+        let typical = median((0..problem.records.len()).map(of));
         let steps = problem.records.iter().map(|r| r.lattice[n].max(r.resolution[n]));
         let lattice = steps.fold(0.0, f64::max);
         let scale = [problem.bases.v, problem.bases.i, problem.bases.i, problem.bases.v_in][n];
@@ -52,6 +59,17 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
             (true, false) => 2e-3 * scale,
         }
     })
+}
+
+/// Standard deviation of noise by second differences of the triples that count; NaN where there are too few.
+pub(crate) fn scatter(values: &[f64], counts: impl Fn(&[f64]) -> bool) -> f64 {
+    let triples = values.windows(3).filter(|triple| counts(triple));
+    let second: Vec<f64> = triples.map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
+    match second.len() {
+        0..5 => f64::NAN,
+        // median of |x| over sigma, and three independent terms with weights 1, -2, 1
+        _ => median(second) / 0.674_49 / 6f64.sqrt(),
+    }
 }
 
 /// A converter coarser than the noise shows one value nearly always: its rounding error is then the same in all rows, which

@@ -26,12 +26,7 @@ pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
         Verdict::Ambiguous => report::Verdict::Warn,
         Verdict::Unexplained => report::Verdict::Fail,
     };
-    let word = match findings.verdict {
-        Verdict::Consistent => "consistent",
-        Verdict::Explained => "explained",
-        Verdict::Ambiguous => "ambiguous",
-        Verdict::Unexplained => "unexplained",
-    };
+    let word = findings.verdict.word();
     let mut page = Page::new(format!("Diagnosis: {word}")).verdict(mark, findings.sentence.clone());
     page = page.section(causes(diagnosis));
     if let Some(section) = held_out(diagnosis)? {
@@ -252,7 +247,14 @@ fn detectable(diagnosis: &Diagnosis) -> Section {
         table = table.row([
             one.id.into(),
             one.parameter.into(),
-            quantity(one.smallest, unit(one.unit), 3).into(),
+            match one.smallest {
+                Some(smallest) => quantity(smallest, unit(one.unit), 3),
+                None => format!(
+                    "not at any size within its reach, {}",
+                    quantity(one.reach, unit(one.unit), 3)
+                ),
+            }
+            .into(),
         ]);
     }
     Section::new("").details(Section::new("Not detectable").table(table))

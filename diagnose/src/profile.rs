@@ -40,6 +40,12 @@ pub struct Profile {
 }
 
 impl Profile {
+    /// Whether the model's own value lies in the interval.
+    #[must_use]
+    pub fn holds_own(&self) -> bool {
+        self.interval[0] <= self.own && self.own <= self.interval[1]
+    }
+
     /// Cost of a value that was tried.
     fn cost(&self, value: f64) -> f64 {
         let tried = self.curve.iter().find(|(x, _)| *x == value);
@@ -105,6 +111,16 @@ pub fn profiles(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
                 false => at.signum() * (high - low),
             };
             let systematic = TWO_SIDED * ACCURACY * (value - profile.own);
+            // without the cause, chi-square is what its evidence says: the interval ends before that
+            let none = profile.own - value;
+            let size = place.1 < candidate.sizes() && candidate.sizes() == 1 && none.signum() == at.signum();
+            let statistical = match attribution.evidence.get(profile.member) {
+                Some(lost) if size && lost / attribution.inflation > LEVEL => {
+                    let before = none.abs() * (LEVEL * attribution.inflation / lost).sqrt();
+                    at.signum() * statistical.abs().min(before)
+                }
+                _ => statistical,
+            };
             let reach = at.signum() * statistical.hypot(systematic);
             profile.interval[side] = (value + reach).clamp(low, high);
         }

@@ -2,18 +2,18 @@
 
 mod align;
 mod digits;
+mod logged;
 mod raw;
 mod rows;
 mod suspicion;
 
 use std::path::Path;
 
-use measured::{ColumnMap, DutyIs, Options, Sheet};
+use measured::{ColumnMap, DutyIs, Options, Sampled, Sheet};
 use plant::{Load, Parameters};
 use toml_input::{Faults, Message, Sink};
 
 use raw::Raw;
-use rows::{held, held_loads, segments};
 
 /// Channels: `v_o`, `i_l`, `i_o`, `v_in`.
 pub const CHANNELS: usize = 4;
@@ -59,6 +59,13 @@ pub struct Record {
     pub is_true: [bool; CHANNELS],
     /// Rows are settled operating points.
     pub settled: bool,
+    /// Neighbouring settled points repeat each other: they are means of rows of one stretch.
+    pub repeated: bool,
+    /// Standard deviation of the noise of such rows, by channel. A mean of many is not taken for better than one: what an
+    /// instrument gets wrong does not average out.
+    pub scatter: [f64; CHANNELS],
+    /// What a settled point holds; nothing if the data have to say it.
+    pub sampled: Option<Sampled>,
     /// There is a row in each period, gaps apart.
     pub dense: bool,
     /// Stretches to simulate.
@@ -92,38 +99,19 @@ impl Record {
     /// The faults of the table, missing or unusable columns, time that goes backward, another sample rate, a column
     /// that looks like time and is not known as such.
     pub fn read(sheet: &Sheet, map: &ColumnMap, parameters: &Parameters) -> Result<Self, Faults> {
+        let map = &*map.of(sheet.file());
         let mut raw = Raw::new(sheet, map)?;
         raw.check_duty()?;
         raw.report_missing_duty();
-        let settled = raw.is_settled(map.settled)?;
-        let t_sw = parameters.t_sw();
-        let (rows, phase) = if settled {
-            ((0..raw.rows()).map(Some).collect(), 0.5)
-        } else {
-            raw.align(t_sw, map.phase)?
-        };
-        let fewest = if settled { FEWEST_SETTLED } else { FEWEST };
-        if rows.iter().flatten().count() < fewest {
-            let used = rows.iter().flatten().count();
-            let message = Message::new("too few rows").found(match raw.rows() > used {
-                true => format!("{used} switching periods in {} rows", raw.rows()),
-                false => used.to_string(),
-            });
-            let message = message.expected(format!("{fewest} or more"));
-            let hint = "a capture of a settled point is one row of a table without `t`: note its means there";
-            return Err(sheet.fault(if settled { message } else { message.hint(hint) }).into());
-        }
-        let loads = raw.loads()?;
+        let lines = raw.lines(map, parameters)?;
         let name = sheet.file().file_stem().map(|name| name.to_string_lossy().into_owned());
         let mut record = Record {
             name: name.unwrap_or_else(|| "record".to_owned()),
-            time: (0..rows.len())
-                .map(|n| raw.start + n as f64 * if settled { 1.0 } else { t_sw })
-                .collect(),
-            phase,
-            duty: held(raw.pick("duty", &rows).unwrap_or_default()),
-            load: held_loads(&rows, &loads),
-            measured: QUANTITIES.map(|name| raw.pick(name, &rows).unwrap_or_default()),
+            time: lines.time,
+            phase: lines.phase,
+            duty: lines.duty,
+            load: lines.load,
+            measured: lines.measured,
             lattice: QUANTITIES.map(|name| raw.lattice(name)),
             resolution: QUANTITIES.map(|name| raw.resolution(name)),
             v_in_ratio: map
@@ -131,9 +119,12 @@ impl Record {
                 .map_or(1.0, |v_in| v_in / parameters.converter.v_in),
             duty_is: map.duty,
             is_true: [false; CHANNELS],
-            settled,
-            dense: settled || 2 * rows.iter().flatten().count() > rows.len(),
-            segments: segments(&rows, settled),
+            settled: lines.settled,
+            repeated: lines.repeated,
+            scatter: lines.scatter,
+            sampled: lines.sampled,
+            dense: lines.dense,
+            segments: lines.segments,
             repairs: raw.repairs.clone(),
         };
         let labels = QUANTITIES.map(|name| raw.label(name));
@@ -156,13 +147,20 @@ impl Record {
         self.duty.len()
     }
 
+    /// Whether two rows have one duty and one load.
+    #[must_use]
+    pub fn is_same_point(&self, one: usize, other: usize) -> bool {
+        self.duty[one] == self.duty[other] && self.load[one] == self.load[other]
+    }
+
     /// Gaps and empty cells are filled or left out, but said.
     fn report_holes(&mut self, labels: &[String; CHANNELS]) {
         if !self.settled && self.segments.len() > 1 {
             let at = |segment: &Segment| format!("{:.6} s", self.time[segment.start]);
             let list: Vec<String> = self.segments.iter().skip(1).take(5).map(at).collect();
+            let what = if self.dense { "gaps" } else { "steps and gaps" };
             self.repairs.push(format!(
-                "{} gaps: simulated anew behind each, from {}",
+                "{} {what}: simulated anew behind each, from {}",
                 self.segments.len() - 1,
                 list.join(", ")
             ));

@@ -240,10 +240,10 @@ fn what_cannot_be_used_is_an_error_that_says_where_and_what_to_do() {
             "units of another kind",
             {
                 let mut lines = rows.clone();
-                lines.insert(1, "ms,,mV,A,V,ohm".to_owned());
+                lines.insert(1, "ms,,mA,A,V,ohm".to_owned());
                 text(&lines).into_bytes()
             },
-            "units that are not SI",
+            "no unit of `v_out`",
             Some(2),
         ),
     ];

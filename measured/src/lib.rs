@@ -10,7 +10,7 @@
 //! they stand in a table that names them otherwise, and [`Sheet::locate`] finds them, with the unit behind the name
 //! (`v_out [mV]`, `t_us`) turned into SI. What is wrong is a [`Fault`](toml_input::Fault) with file, line and column.
 //! What only one reader of measurements can suspect, such as a voltage that a buck converter does not have, is no
-//! business of this crate. The format for users: docs/measured.md.
+//! business of this crate. The format for users: docs/reference/measurements.md.
 //!
 //! ```
 //! use std::path::Path;
@@ -38,7 +38,7 @@ mod time_like;
 
 pub use format::Options;
 pub use locate::Located;
-pub use map::{ColumnMap, DutyIs};
+pub use map::{ColumnMap, DutyIs, Sampled};
 pub use quantity::{Quantity, VOCABULARY};
 pub use sheet::{Cell, Column, Sheet, table_faults};
 pub use signal::Signal;

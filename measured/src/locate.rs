@@ -30,6 +30,7 @@ impl Sheet {
     /// # Errors
     /// A column that the map names and the file has not; two columns for one quantity.
     pub fn locate(&self, wanted: &[Quantity<'_>], map: &ColumnMap) -> Result<Located, Faults> {
+        let map = &*map.of(self.file());
         let mut faults = Sink::new();
         let mut signals = Vec::new();
         for quantity in wanted {

@@ -39,47 +39,70 @@ const fn quantity(name: &'static str, aliases: &'static [&'static str], unit: &'
     Quantity { name, aliases, unit }
 }
 
-/// Units by what they measure, and how many SI units they are.
-///
-/// A prefix counts in the case that it has in SI: `mV` is known, `MV` is not, since nobody can tell which was meant.
-const UNITS: &[(&str, &str, f64)] = &[
-    ("s", "s", 1.0),
-    ("ms", "s", 1e-3),
-    ("us", "s", 1e-6),
-    ("\u{b5}s", "s", 1e-6),
-    ("\u{3bc}s", "s", 1e-6),
-    ("ns", "s", 1e-9),
-    ("v", "V", 1.0),
-    ("mv", "V", 1e-3),
-    ("kv", "V", 1e3),
-    ("a", "A", 1.0),
-    ("ma", "A", 1e-3),
-    ("w", "W", 1.0),
-    ("mw", "W", 1e-3),
-    ("kw", "W", 1e3),
-    ("ohm", "ohm", 1.0),
-    ("\u{3a9}", "ohm", 1.0),
-    ("\u{2126}", "ohm", 1.0),
-    ("1", "1", 1.0),
-    ("-", "1", 1.0),
-    ("%", "1", 0.01),
-    ("percent", "1", 0.01),
-    ("pct", "1", 0.01),
+/// Units without a prefix, and what they measure; the first of a kind is its SI unit.
+const UNITS: &[(&str, &str)] = &[
+    ("s", "s"),
+    ("sec", "s"),
+    ("second", "s"),
+    ("seconds", "s"),
+    ("V", "V"),
+    ("volt", "V"),
+    ("volts", "V"),
+    ("A", "A"),
+    ("amp", "A"),
+    ("amps", "A"),
+    ("ampere", "A"),
+    ("amperes", "A"),
+    ("W", "W"),
+    ("watt", "W"),
+    ("watts", "W"),
+    ("ohm", "ohm"),
+    ("ohms", "ohm"),
+    ("\u{3a9}", "ohm"),
+    ("\u{2126}", "ohm"),
+    ("1", "1"),
+    ("-", "1"),
 ];
+
+/// Prefixes and their factors. There is none for millions: `MV` may be meant as millivolts, and nobody can tell.
+const PREFIXES: &[(char, f64)] = &[
+    ('n', 1e-9),
+    ('u', 1e-6),
+    ('\u{b5}', 1e-6),
+    ('\u{3bc}', 1e-6),
+    ('m', 1e-3),
+    ('k', 1e3),
+];
+
+/// Shares of one.
+const SHARES: [&str; 3] = ["%", "percent", "pct"];
+
+/// What a unit measures, and how many SI units it is. The case of letters does not matter, but for a capital M.
+fn unit(text: &str) -> Option<(&'static str, f64)> {
+    let plain = |text: &str| {
+        UNITS
+            .iter()
+            .find(|(name, _)| name.to_lowercase() == text.to_lowercase())
+    };
+    if SHARES.iter().any(|share| share.eq_ignore_ascii_case(text)) {
+        return Some(("1", 0.01));
+    }
+    if let Some((_, of)) = plain(text) {
+        return Some((of, 1.0));
+    }
+    let first = text.chars().next().filter(|first| *first != 'M')?;
+    let known = |(prefix, _): &&(char, f64)| first.to_lowercase().eq([*prefix]);
+    let (_, factor) = PREFIXES.iter().find(known)?;
+    let (_, of) = plain(&text[first.len_utf8()..]).filter(|(_, of)| *of != "1")?;
+    Some((of, *factor))
+}
 
 /// How many of `to` one of `from` is; nothing if they do not measure the same.
 fn scale(from: &str, to: &str) -> Option<f64> {
     if from.eq_ignore_ascii_case(to) {
         return Some(1.0);
     }
-    let find = |unit: &str| {
-        let mega = unit.starts_with('M') && unit.chars().count() > 1;
-        let lower = unit.to_ascii_lowercase();
-        UNITS
-            .iter()
-            .find(|(name, ..)| !mega && (*name == lower || *name == unit))
-    };
-    let ((_, of, from), (_, wanted, to)) = (find(from)?, find(to)?);
+    let ((of, from), (wanted, to)) = (unit(from)?, unit(to)?);
     (of == wanted).then(|| from / to)
 }
 
@@ -120,12 +143,36 @@ impl Quantity<'_> {
     pub(crate) fn scale_of(&self, header: &str) -> Option<f64> {
         let (base, unit) = split_unit(header);
         if self.is_called(base) {
-            return unit.map_or(Some(1.0), |unit| scale(unit, self.unit));
+            return unit.map_or(Some(1.0), |unit| self.scale_from(unit));
         }
         // `v_out_mV`, `t us`: only a known unit is one, for `v_out_old` is another column
         let (base, unit) = header.trim().rsplit_once(['_', ' '])?;
         let scale = scale(unit, self.unit).filter(|_| !self.unit.is_empty())?;
         self.is_called(base.trim_end()).then_some(scale)
+    }
+
+    /// How many of its own unit one of another is; a quantity without a known unit takes any.
+    pub(crate) fn scale_from(&self, unit: &str) -> Option<f64> {
+        match self.unit {
+            "" => Some(1.0),
+            own => scale(unit, own),
+        }
+    }
+
+    /// Its unit with the prefixes that are read, for a fault.
+    pub(crate) fn units(&self) -> String {
+        match self.unit {
+            "1" => "1 or %".to_owned(),
+            unit => format!("{unit}, with a prefix n, u, m or k"),
+        }
+    }
+
+    /// The quantity of the vocabulary that a header names, and the scale of the unit behind the name, if there is one.
+    pub(crate) fn of_header(header: &str) -> Option<(&'static Quantity<'static>, Option<f64>)> {
+        VOCABULARY.iter().find_map(|quantity| {
+            let scale = quantity.scale_of(header)?;
+            Some((quantity, (!quantity.is_called(header.trim())).then_some(scale)))
+        })
     }
 
     /// The unit behind a name that a map gives: of the quantity's kind, or it is part of the name.
@@ -180,6 +227,14 @@ mod tests {
             ("duty%", Some(("duty", 0.01))),
             ("d_percent", Some(("duty", 0.01))),
             ("d_real", Some(("duty", 1.0))),
+            ("i_out [uA]", Some(("i_out", 1e-6))),
+            ("v_in/kV", Some(("v_in", 1e3))),
+            ("V_IN [KV]", Some(("v_in", 1e3))),
+            ("v_out [Volt]", Some(("v_out", 1.0))),
+            ("r_load [k\u{3a9}]", Some(("r_load", 1e3))),
+            ("p_load_kW", Some(("p_load", 1e3))),
+            ("time (sec)", Some(("t", 1.0))),
+            ("duty [m%]", None),
             ("i_out [MA]", None),
             ("v_out [us]", None),
             ("v_out [dBV]", None),

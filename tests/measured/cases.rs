@@ -150,6 +150,14 @@ fn named_otherwise() -> Vec<Case> {
             times(&HEADER.replace("i_l,i_out", "i_l [mA],i_out_mA"), &[3, 4], 1e3),
         ),
         same("millivolts", times(&HEADER.replace("v_out", "v_out/mV"), &[2], 1e3)),
+        same(
+            "milliseconds, millivolts and milliamperes below the names",
+            times(&format!("{HEADER}\nms,-,mV,mA,[mA],V,ohm"), &[0, 2, 3, 4], 1e3),
+        ),
+        same(
+            "percent below the name",
+            times(&format!("{HEADER}\n,%,,,,,"), &[1], 100.0),
+        ),
         same("microseconds", times(&HEADER.replacen("t,", "t_us,", 1), &[0], 1e6)),
         same(
             "a column of words",
@@ -259,9 +267,9 @@ fn broken() -> Vec<Case> {
             Some(9),
         ),
         refused(
-            "units that are not SI",
-            line(1, |l| format!("{l}\nms,-,mV,A,A,V,ohm")),
-            &["units that are not SI", "v_out [mV]"],
+            "a unit of another kind below a name",
+            line(1, |l| format!("{l}\nms,-,mA,A,A,V,ohm")),
+            &["no unit of `v_out`", "V, with a prefix"],
             Some(2),
         ),
         each(

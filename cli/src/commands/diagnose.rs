@@ -23,6 +23,8 @@ use crate::{Failure, Outcome, output};
 pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
     let model = Parameters::from_file(&options.model)?;
     let mut columns = options.columns.read()?;
+    let files = || options.train.iter().chain(&options.heldout).map(PathBuf::as_path);
+    columns.check_records(files())?;
     if options.settled {
         columns.settled = Some(true);
     }
@@ -59,7 +61,9 @@ pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
             "note: no mapping and no closed loop on the extended model: {reason}"
         ))?;
     }
-    output::say(&format!("{}\n\nreport: {out}/report.html", diagnosis.findings.sentence))?;
+    let findings = &diagnosis.findings;
+    let (word, sentence) = (findings.verdict.word(), &findings.sentence);
+    output::say(&format!("verdict: {word}\n{sentence}\n\nreport: {out}/report.html"))?;
     Ok(Outcome::Done)
 }
 

@@ -17,6 +17,10 @@ pub use list::CAUSES;
 /// supplies are 5 to 20 %.
 const LARGE_SHARE: f64 = 0.3;
 
+/// Parameters that move by less than this share of their steps (0.1 % of an inductance, 5e-4 of a gain) are no effect: of that
+/// size is what two simulators of one circuit differ by.
+const TINY: f64 = 0.05;
+
 /// How a form is fitted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Search {
@@ -76,6 +80,34 @@ pub struct Candidate {
 }
 
 impl Candidate {
+    /// The largest change of the first parameter that is tried.
+    #[must_use]
+    pub fn reach(&self) -> f64 {
+        let (own, [low, high, _]) = (self.own[0], self.ranges[0]);
+        (high - own).max(own - low)
+    }
+
+    /// Whether the cause at `values` is no effect, whatever it gains.
+    #[must_use]
+    pub fn is_nothing(&self, values: &[f64]) -> bool {
+        let sizes = values.iter().zip(&self.own).zip(&self.ranges).take(self.sizes());
+        self.sizes() > 0
+            && sizes
+                .into_iter()
+                .all(|((value, own), range)| (value - own).abs() < TINY * range[2])
+    }
+
+    /// How many of its parameters make its size: all, or the first alone where the others only shape it.
+    #[must_use]
+    pub fn sizes(&self) -> usize {
+        match self.form.search {
+            Search::Own => self.own.len(),
+            Search::From(_) | Search::Scan(_) | Search::Line => 1,
+            // its step is one of counts
+            Search::Counter => 0,
+        }
+    }
+
     /// A change of the first parameter that nobody would call small: of a number that every converter has a share, else what
     /// converters typically have.
     #[must_use]

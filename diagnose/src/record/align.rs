@@ -10,8 +10,8 @@ const MOST_PER_PERIOD: f64 = 500.0;
 const MOST_PERIODS: f64 = 100.0;
 
 impl Raw<'_> {
-    /// Rows for each control period in order (nothing in a gap), and the sampling phase.
-    pub fn align(&mut self, t_sw: f64, phase: Option<f64>) -> Result<(Vec<Option<usize>>, f64), Faults> {
+    /// The usual time between rows, s; faults of the time column are found here.
+    pub fn row_step(&mut self) -> Result<f64, Faults> {
         let time = self.values("t").unwrap_or_default();
         if let Some(row) = time.iter().position(|t| t.is_nan()) {
             let hint = "leave the row out, or fill in its time";
@@ -42,6 +42,12 @@ impl Raw<'_> {
                 .fault(Message::new("too few rows").expected("20 or more"))
                 .into());
         };
+        Ok(step)
+    }
+
+    /// Rows for each control period in order (nothing in a gap), and the sampling phase; rows are `step` apart.
+    pub fn align(&mut self, step: f64, t_sw: f64, phase: Option<f64>) -> Result<(Vec<Option<usize>>, f64), Faults> {
+        let time = self.values("t").unwrap_or_default();
         let ratio = step / t_sw;
         let (fast, slow) = ((1.0 / ratio).round(), ratio.round());
         let fits = |a: f64, b: f64| (a / b - 1.0).abs() < 0.02;
@@ -53,19 +59,29 @@ impl Raw<'_> {
                 .expected(format!(
                     "the period, {t_sw:e} s, a whole multiple or a whole part of it"
                 ))
-                .hint("is the time in us or ms? name the column `t_us`; is `converter.f_sw` right?");
+                .hint(
+                    "is the time in us or ms? name the column `t_us`; is `converter.f_sw` right? If each row is a settled \
+                     point: --settled",
+                );
             return Err(self.sheet.fault(message).into());
         }
         Ok(self.place(&time, t_sw, phase, step))
     }
 
+    /// The sampling instant in the period by the first time.
+    pub fn stamped(&self, t_sw: f64) -> f64 {
+        let first = self.values("t").and_then(|time| time.first().copied()).unwrap_or(0.0);
+        let fraction = (first / t_sw).rem_euclid(1.0);
+        if (1e-3..=1.0 - 1e-3).contains(&fraction) {
+            fraction
+        } else {
+            0.0
+        }
+    }
+
     fn place(&mut self, time: &[f64], t_sw: f64, phase: Option<f64>, step: f64) -> (Vec<Option<usize>>, f64) {
         let fraction = (time[0] / t_sw).rem_euclid(1.0);
-        let phase = phase.unwrap_or(if !(1e-3..=1.0 - 1e-3).contains(&fraction) {
-            0.0
-        } else {
-            fraction
-        });
+        let phase = phase.unwrap_or_else(|| self.stamped(t_sw));
         let skip = match step < 0.75 * t_sw {
             true => (phase - fraction).rem_euclid(1.0) * t_sw,
             false => 0.0,

@@ -89,10 +89,18 @@ impl<'a> Raw<'a> {
         found.map(|(_, values)| values.clone())
     }
 
-    /// A quantity in the rows that are used; a constant is a setting, no measurement.
-    pub fn pick(&self, name: &str, rows: &[Option<usize>]) -> Option<Vec<f64>> {
+    /// A quantity that stands in a column; a constant is a setting, no measurement.
+    pub fn measured(&self, name: &str) -> Option<Vec<f64>> {
         let is_column = self.located.signal(name)?.column().is_some();
-        let values = self.values(name).filter(|_| is_column || name == "duty")?;
+        self.values(name).filter(|_| is_column)
+    }
+
+    /// A quantity in the rows that are used.
+    pub fn pick(&self, name: &str, rows: &[Option<usize>]) -> Option<Vec<f64>> {
+        let values = match name {
+            "duty" => self.values(name),
+            name => self.measured(name),
+        }?;
         Some(rows.iter().map(|row| row.map_or(f64::NAN, |row| values[row])).collect())
     }
 

@@ -1,8 +1,122 @@
-//! Rows that are missing: what is held over them, and where a new stretch begins.
+//! From a table to the rows that are simulated; what is held over rows that are missing, and where a new stretch begins.
 
-use plant::Load;
+use measured::{ColumnMap, Sampled};
+use plant::{Load, Parameters};
+use toml_input::{Faults, Message};
 
-use super::Segment;
+use super::raw::Raw;
+use super::{CHANNELS, FEWEST, FEWEST_SETTLED, QUANTITIES, Segment, logged};
+
+/// Rows as the plant can be driven by them.
+pub struct Lines {
+    pub time: Vec<f64>,
+    pub phase: f64,
+    pub duty: Vec<f64>,
+    pub load: Vec<Load>,
+    pub measured: [Vec<f64>; CHANNELS],
+    pub settled: bool,
+    pub repeated: bool,
+    pub scatter: [f64; CHANNELS],
+    pub sampled: Option<Sampled>,
+    pub dense: bool,
+    pub segments: Vec<Segment>,
+}
+
+impl Lines {
+    /// Nothing yet, of settled points.
+    pub fn empty(phase: f64) -> Self {
+        Lines {
+            time: Vec::new(),
+            phase,
+            duty: Vec::new(),
+            load: Vec::new(),
+            measured: Default::default(),
+            settled: true,
+            repeated: false,
+            scatter: [f64::NAN; CHANNELS],
+            sampled: None,
+            dense: true,
+            segments: Vec::new(),
+        }
+    }
+
+    /// Each row is simulated by itself.
+    pub fn of_points(mut self) -> Self {
+        self.segments = (0..self.duty.len()).map(|n| n..n + 1).collect();
+        self
+    }
+}
+
+impl Raw<'_> {
+    /// The rows to simulate: settled points, a row each period, or what a logger's rows allow.
+    pub fn lines(&mut self, map: &ColumnMap, parameters: &Parameters) -> Result<Lines, Faults> {
+        if self.is_settled(map.settled)? {
+            return self.points(map);
+        }
+        let (step, t_sw) = (self.row_step()?, parameters.t_sw());
+        // who says `settled = false` wants the rows simulated as they are
+        if map.settled != Some(false) && logged::is_logged(step / t_sw, parameters) {
+            let stamped = self.stamped(t_sw);
+            let sampled = map.sampled.or(map.phase.map(|_| Sampled::Instant));
+            let lines = self.logged(parameters, step, map.phase.unwrap_or(stamped))?;
+            return Ok(Lines { sampled, ..lines });
+        }
+        if map.sampled.is_some() {
+            let note = "`sampled` of the column map is not used: rows are simulated at their instants";
+            self.repairs.push(note.to_owned());
+        }
+        let (rows, phase) = self.align(step, t_sw, map.phase)?;
+        self.enough(&rows, FEWEST)?;
+        let lines = self.picked(&rows, phase)?;
+        Ok(Lines {
+            time: (0..rows.len()).map(|n| self.start + n as f64 * t_sw).collect(),
+            segments: segments(&rows, &lines.duty, &lines.load),
+            dense: step < 1.5 * t_sw,
+            settled: false,
+            ..lines
+        })
+    }
+
+    /// Each row of the table as a settled point.
+    fn points(&mut self, map: &ColumnMap) -> Result<Lines, Faults> {
+        let rows: Vec<Option<usize>> = (0..self.rows()).map(Some).collect();
+        self.enough(&rows, FEWEST_SETTLED)?;
+        let lines = Lines {
+            time: (0..rows.len()).map(|n| n as f64).collect(),
+            sampled: map.sampled.or(Some(Sampled::Mean)),
+            ..self.picked(&rows, map.phase.unwrap_or(0.5))?
+        };
+        Ok(lines.of_points())
+    }
+
+    /// The quantities of the rows that are used.
+    fn picked(&self, rows: &[Option<usize>], phase: f64) -> Result<Lines, Faults> {
+        Ok(Lines {
+            duty: held(self.pick("duty", rows).unwrap_or_default()),
+            load: held_loads(rows, &self.loads()?),
+            measured: QUANTITIES.map(|name| self.pick(name, rows).unwrap_or_default()),
+            ..Lines::empty(phase)
+        })
+    }
+
+    fn enough(&self, rows: &[Option<usize>], fewest: usize) -> Result<(), Faults> {
+        let used = rows.iter().flatten().count();
+        if used >= fewest {
+            return Ok(());
+        }
+        let message = Message::new("too few rows").found(match self.rows() > used {
+            true => format!("{used} switching periods in {} rows", self.rows()),
+            false => used.to_string(),
+        });
+        let message = message.expected(format!("{fewest} or more"));
+        let hint = "a capture of a settled point is one row of a table without `t`: note its means there";
+        let of_points = fewest == FEWEST_SETTLED;
+        Err(self
+            .sheet
+            .fault(if of_points { message } else { message.hint(hint) })
+            .into())
+    }
+}
 
 /// Gaps are filled with the value before.
 pub fn held(values: Vec<f64>) -> Vec<f64> {
@@ -27,19 +141,26 @@ pub fn held_loads(rows: &[Option<usize>], loads: &[Load]) -> Vec<Load> {
     rows.iter().map(hold).collect()
 }
 
+/// Rows of a slower rate change their duty or load in at most this share of them, if somebody stepped it by hand or by
+/// a plan; a controller changes it in nearly all. A convention.
+const RARE: f64 = 0.2;
+
 /// Stretches without a long gap; a short one is bridged with the duty held (as in a record of a slower rate).
-pub fn segments(rows: &[Option<usize>], settled: bool) -> Vec<Segment> {
-    if settled {
-        return (0..rows.len()).map(|n| n..n + 1).collect();
-    }
+///
+/// Where rows are further apart than a period, nobody knows when between two of them a step was: behind a step of
+/// duty or load a new stretch begins, whose initial state is estimated.
+pub fn segments(rows: &[Option<usize>], duty: &[f64], load: &[Load]) -> Vec<Segment> {
     let used: Vec<usize> = (0..rows.len()).filter(|n| rows[*n].is_some()).collect();
     let mut steps: Vec<usize> = used.windows(2).map(|n| n[1] - n[0]).collect();
     steps.sort_unstable();
     let usual = steps.get(steps.len() / 2).copied().unwrap_or(1);
+    let steps = |pair: &[usize]| duty[pair[0]] != duty[pair[1]] || load[pair[0]] != load[pair[1]];
+    let stepped = used.windows(2).filter(|pair| steps(pair)).count();
+    let cut = usual > 1 && (stepped as f64) < RARE * used.len() as f64;
     let mut segments = Vec::new();
     let mut start = used.first().copied().unwrap_or(0);
     for pair in used.windows(2) {
-        if pair[1] - pair[0] > usual {
+        if pair[1] - pair[0] > usual || cut && steps(pair) {
             segments.push(start..pair[0] + 1);
             start = pair[1];
         }

@@ -73,7 +73,7 @@ fn sizes(record: &Record, parameters: &Parameters) -> [Option<f64>; CHANNELS] {
 }
 
 /// The middle size of a signal; nothing if it is empty or 0.
-fn typical(values: &[f64]) -> Option<f64> {
+pub fn typical(values: &[f64]) -> Option<f64> {
     let sizes: Vec<f64> = values.iter().filter(|v| v.is_finite()).map(|v| v.abs()).collect();
     let middle = if sizes.is_empty() { 0.0 } else { median(sizes) };
     (middle > 0.0).then_some(middle)

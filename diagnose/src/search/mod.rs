@@ -28,9 +28,6 @@ const SWAP: f64 = 2.0;
 /// Starts of one cause that are followed. What looks best at first order is not always where the fit ends best, and each more
 /// costs a fit. A convention.
 const BEGUN: usize = 2;
-/// A cause beside others that moves its parameters by less than this share of their steps (0.1 % of an inductance, 5e-4 of a
-/// gain) is left out: of that size is what two simulators of one circuit differ by.
-const TINY: f64 = 0.05;
 /// Most causes named. Records of one converter hold 5 to 15 independent directions; blind cases hide at most two effects, and the
 /// third place is for one that a second imitates in part.
 const MOST: usize = 3;
@@ -317,10 +314,7 @@ impl Searcher<'_> {
     /// Whether a cause beside others is so small that the difference of two simulators may look like it.
     fn is_tiny(&self, fit: &Fit, member: usize) -> bool {
         let cause = fit.causes[member];
-        let candidate = &self.fitter.candidates[cause];
-        let values = self.values_of(fit, &[cause]);
-        let mut knobs = values.iter().zip(&candidate.own).zip(&candidate.ranges);
-        self.begins_at_own(cause) && knobs.all(|((value, own), range)| (value - own).abs() < TINY * range[2])
+        self.fitter.candidates[cause].is_nothing(&self.values_of(fit, &[cause]))
     }
 
     /// For each cause of a set, what explains the data as well in its place.

@@ -10,6 +10,7 @@ mod number;
 mod places;
 mod split;
 mod text;
+mod units;
 
 use std::iter::Peekable;
 
@@ -52,19 +53,17 @@ pub(crate) fn read(name: FileName, bytes: Vec<u8>, options: &Options) -> Result<
     let mut body: Vec<Line> = lines.collect();
     let is_units = |line: &&Line| {
         let text = &source.text[line.span.clone()];
-        text != head && names_units(text, separator)
+        text != head && units::are_units(text, separator)
     };
-    if let Some(units) = body.first().filter(is_units) {
-        check_units(&source, units, separator)?;
-        repairs.push(format!("line {} holds units: left out", units.number));
+    let mut titles: Vec<String> = names.iter().map(|name| source.text[name.clone()].to_owned()).collect();
+    if let Some(line) = body.first().filter(is_units) {
+        titles = units::named_with_units(&source, &names, &line.span, separator)?;
+        repairs.push(format!("line {} holds units: they are heeded", line.number));
         body.remove(0);
     }
     let table = Reader {
         separator,
-        columns: names
-            .iter()
-            .map(|name| Column::new(&source.text[name.clone()], Vec::new()))
-            .collect(),
+        columns: titles.iter().map(|title| Column::new(title, Vec::new())).collect(),
         source: &source,
         header: &names,
         rows: Vec::new(),
@@ -150,40 +149,6 @@ fn header_faults(source: &Source, line: &Line, names: &[Span]) -> Result<(), Fau
     };
     let mut faults: Sink = (0..names.len()).filter(twin).map(fault).collect();
     faults.propagate()
-}
-
-/// Whether a line holds words throughout that are not missing numbers: units, as oscilloscopes write them below the names.
-fn names_units(line: &str, separator: Separator) -> bool {
-    let Ok(words) = cells(line, 0, separator) else {
-        return false;
-    };
-    let unit = |cell: &str| {
-        cell.chars().all(|c| c.is_alphabetic() || "%/[]()-1".contains(c)) && !cell.eq_ignore_ascii_case("nan")
-    };
-    let letters = |cell: &str| cell.contains(|c: char| c.is_alphabetic() || c == '%');
-    words.iter().all(|cell| unit(&line[cell.clone()])) && words.iter().any(|cell| letters(&line[cell.clone()]))
-}
-
-/// Units below the names are SI; others belong to the names, where they are heeded.
-fn check_units(source: &Source, line: &Line, separator: Separator) -> Result<(), Faults> {
-    const SI: [&str; 18] = [
-        "", "s", "second", "seconds", "v", "volt", "volts", "a", "ampere", "amperes", "ohm", "ohms", "\u{3c9}", "w",
-        "watt", "watts", "1", "-",
-    ];
-    let units = cells(&source.text[line.span.clone()], line.span.start, separator).unwrap_or_default();
-    let bare = |cell: &Span| {
-        source.text[cell.clone()]
-            .trim_matches(|c| "[]()".contains(c))
-            .to_lowercase()
-    };
-    let Some(other) = units.iter().find(|cell| !SI.contains(&bare(cell).as_str())) else {
-        return Ok(());
-    };
-    let message = Message::new("a line of units that are not SI")
-        .found(&source.text[other.clone()])
-        .expected("s, V, A, ohm, W")
-        .hint("put the unit behind the name, `v_out [mV]`, and remove this line");
-    Err(source.fault(other, message).into())
 }
 
 /// What has been read of the rows.

@@ -54,7 +54,6 @@ fn other_ways_of_writing_it_change_nothing() {
             "comments and empty lines",
             format!("# a\n\n{plain}\n  # b\n").into_bytes(),
         ),
-        ("units", plain.replace("out\n", "out\n[s],V\n").into_bytes()),
         ("no last line end", plain.trim_end().as_bytes().to_vec()),
         ("UTF-16, low byte first", wide(plain, u16::to_le_bytes)),
         ("UTF-16, high byte first", wide(plain, u16::to_be_bytes)),
@@ -70,9 +69,37 @@ fn other_ways_of_writing_it_change_nothing() {
 fn what_was_repaired_is_said() {
     let repairs = |text: &str| read(text).unwrap().repairs;
     assert_eq!(repairs("t;v\n0,1;1,5\n"), ["decimal commas read as points"]);
-    assert_eq!(repairs("t,v\ns,V\n0,1\n"), ["line 2 holds units: left out"]);
+    assert_eq!(repairs("t,v\ns,V\n0,1\n"), ["line 2 holds units: they are heeded"]);
     assert_eq!(repairs("t,v\n0,1\n1,2\n2"), ["line 4 is cut off: left out"]);
     assert_eq!(repairs("t,v\n0,1\n"), [""; 0]);
+}
+
+#[test]
+fn units_below_the_names_scale_as_those_behind_them() {
+    for (text, expected) in [
+        ("t,duty,v_out,i_l\nms,%,mV,mA\n1,50,1500,20\n", [1e-3, 0.5, 1.5, 0.02]),
+        (
+            "t,duty,v_out,i_l\n[\u{b5}s],[%],[kV],[uA]\n1,50,1500,20\n",
+            [1e-6, 0.5, 1.5e6, 2e-5],
+        ),
+        ("t;duty;v_out;i_l\nsec;-;Volt;A\n0,5;0,5;1,5;2\n", [0.5, 0.5, 1.5, 2.0]),
+        ("t [ms],duty,v_out,i_l\nms,%,V,\n1,50,1,2\n", [1e-3, 0.5, 1.0, 2.0]),
+        ("t_us,d%,v_out/mV,i_l (mA)\n1,50,1500,20\n", [1e-6, 0.5, 1.5, 0.02]),
+    ] {
+        let sheet = read(text).unwrap();
+        let located = sheet.locate(&crate::VOCABULARY, &crate::ColumnMap::default()).unwrap();
+        let number = |name: &str| located.signal(name).unwrap().number(&sheet, 0).unwrap();
+        let found = ["t", "duty", "v_out", "i_l"].map(number);
+        let close = found
+            .iter()
+            .zip(&expected)
+            .all(|(a, b)| (a - b).abs() <= 1e-12 * b.abs());
+        assert!(close, "{text}: {found:?}");
+    }
+    let sheet = read("t,CH1,lamp\ns,mV,deg C\n1,1500,20\n").unwrap();
+    let map = crate::ColumnMap::parse("v_out=CH1").unwrap();
+    let located = sheet.locate(&crate::VOCABULARY, &map).unwrap();
+    assert_eq!(located.signal("v_out").unwrap().number(&sheet, 0), Some(1.5));
 }
 
 #[test]
@@ -119,7 +146,13 @@ fn what_is_no_table_is_refused_with_its_place() {
         ("t,v\nt,v\n1,2\n", "the header stands a second time", Some((2, 1))),
         ("t;v\n0,5;1\n1;1.5\n", "decimal points and decimal commas", Some((3, 3))),
         ("t;v\n0.5;1\n1;1,5\n", "decimal points and decimal commas", Some((3, 3))),
-        ("t,v\ns,mV\n1,2\n", "a line of units that are not SI", Some((2, 3))),
+        ("t,v_out\ns,mA\n1,2\n", "no unit of `v_out`", Some((2, 3))),
+        ("t,v_out\nms,MV\n1,2\n", "no unit of `v_out`", Some((2, 4))),
+        (
+            "t [ms],v_out [mV]\nms,V\n1,2\n",
+            "another unit behind its name",
+            Some((2, 4)),
+        ),
     ] {
         let (found, at) = fault(text);
         assert!(found.contains(problem) && at == place, "{text:?}: {found} {at:?}");

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use toml_input::{Document, Faults, Sink, Table, Value};
+use toml_input::{Document, Faults, Message, Sink, Table, Value};
 
-use super::{ColumnMap, DutyIs, Wish, quantity};
+use super::{ColumnMap, DutyIs, OfRecord, Sampled, Wish, quantity};
 
 impl ColumnMap {
     /// Reads a map file:
@@ -13,11 +13,14 @@ impl ColumnMap {
     /// phase = 0.5                 # sampling instant in the PWM period; left out: from the time column
     /// duty = "commanded"          # or "applied", "direct"
     /// settled = true              # rows are settled points; left out: if there is no time column
+    /// sampled = "mean"            # or "instant": rows many periods apart; left out: what fits better
     /// [columns]
     /// v_out = "CH1 [V]"
     /// duty = { name = "D", scale = 0.01, offset = 0.0 }
     /// [constants]
     /// r_load = 10.0
+    /// [records.run2]              # what is different in run2.csv: the same keys and tables
+    /// columns = { v_out = "CH3 [V]" }
     /// ```
     ///
     /// # Errors
@@ -25,26 +28,53 @@ impl ColumnMap {
     pub fn open(path: &Path) -> Result<Self, Faults> {
         Document::open(path)?.read(|root, faults| {
             let mut map = ColumnMap::default();
-            if let Some(value) = root.optional("phase") {
-                map.phase = value.number_within(0.0..=0.999_999, faults);
-            }
-            if let Some(value) = root.optional("duty") {
-                let choices = [
-                    ("commanded", DutyIs::Commanded),
-                    ("applied", DutyIs::Applied),
-                    ("direct", DutyIs::Direct),
-                ];
-                map.duty = value.choice(&choices, faults).unwrap_or_default();
-            }
-            if let Some(value) = root.optional("settled") {
-                map.settled = value.boolean(faults);
-            }
-            map.read_table(root, "columns", faults, column);
-            map.read_table(root, "constants", faults, |value, faults| {
-                value.number(faults).map(Wish::Constant)
-            });
+            map.read_keys(root, faults);
+            map.read_records(root, faults);
             Some(map)
         })
+    }
+
+    /// What a map says of all records, or of one.
+    fn read_keys(&mut self, root: &mut Table<'_>, faults: &mut Sink) {
+        if let Some(value) = root.optional("phase") {
+            self.phase = value.number_within(0.0..=0.999_999, faults);
+        }
+        if let Some(value) = root.optional("duty") {
+            let choices = [
+                ("commanded", DutyIs::Commanded),
+                ("applied", DutyIs::Applied),
+                ("direct", DutyIs::Direct),
+            ];
+            self.duty = value.choice(&choices, faults).unwrap_or_default();
+        }
+        if let Some(value) = root.optional("settled") {
+            self.settled = value.boolean(faults);
+        }
+        if let Some(value) = root.optional("sampled") {
+            self.sampled = value.choice(&[("mean", Sampled::Mean), ("instant", Sampled::Instant)], faults);
+        }
+        self.read_table(root, "columns", faults, column);
+        self.read_table(root, "constants", faults, |value, faults| {
+            value.number(faults).map(Wish::Constant)
+        });
+    }
+
+    /// What is different in single records, by the names of their files.
+    fn read_records(&mut self, root: &mut Table<'_>, faults: &mut Sink) {
+        let sections = root.optional("records").and_then(|table| table.pairs(faults));
+        for (key, value) in sections.unwrap_or_default() {
+            let mut map = ColumnMap::default();
+            value.read_table("a record", faults, |table, faults| {
+                map.read_keys(table, faults);
+                Some(())
+            });
+            let message = Message::new(format!("no record is called `{}`", key.value));
+            self.records.push(OfRecord {
+                name: key.value.clone(),
+                map,
+                missing: value.document().fault(&key.span, message),
+            });
+        }
     }
 
     /// The entries of a table whose keys are quantities.

@@ -3,7 +3,10 @@
 mod file;
 mod line;
 
-use toml_input::{Faults, Message};
+use std::borrow::Cow;
+use std::path::Path;
+
+use toml_input::{Fault, Faults, Message, Sink};
 
 use crate::quantity::{Quantity, VOCABULARY};
 
@@ -21,6 +24,15 @@ pub enum DutyIs {
     Direct,
 }
 
+/// What a number of a slow record holds: rows many switching periods apart, or settled points.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sampled {
+    /// The mean since the row before, or over a settled point.
+    Mean,
+    /// What was there at one instant of a switching period.
+    Instant,
+}
+
 /// Which column of a table holds which quantity, or what it was throughout; and how the table was recorded.
 ///
 /// What is not mapped is found by its name ([`VOCABULARY`]).
@@ -31,8 +43,22 @@ pub struct ColumnMap {
     pub phase: Option<f64>,
     /// What the duty column holds.
     pub duty: DutyIs,
+    /// What the rows of a slow record hold; what fits better, if not given.
+    pub sampled: Option<Sampled>,
     /// Rows are settled operating points (true) or steps in time (false); from the columns if not given.
     pub settled: Option<bool>,
+    /// What is different in single records.
+    records: Vec<OfRecord>,
+}
+
+/// What a map says of one record only.
+#[derive(Debug, Clone, PartialEq)]
+struct OfRecord {
+    /// Its file without folder and extension.
+    name: String,
+    map: ColumnMap,
+    /// The fault if there is no such record.
+    missing: Fault,
 }
 
 /// Where a quantity shall be taken from.
@@ -75,23 +101,79 @@ impl ColumnMap {
     /// If both name a quantity.
     pub fn and(mut self, other: ColumnMap) -> Result<Self, Faults> {
         for (name, wish) in other.entries {
+            if self.records.iter().any(|record| record.map.wish(name).is_some()) {
+                return Err(mapped_twice(name).into());
+            }
             self.add(name, wish)?;
         }
         self.phase = other.phase.or(self.phase);
         self.settled = other.settled.or(self.settled);
+        self.sampled = other.sampled.or(self.sampled);
         if other.duty != DutyIs::Unknown {
             self.duty = other.duty;
         }
         Ok(self)
     }
 
+    /// The map of the record in `file`: what is said of it alone counts before what is said of all.
+    #[must_use]
+    pub fn of(&self, file: &Path) -> Cow<'_, ColumnMap> {
+        let Some(own) = self.records.iter().find(|record| is_called(file, &record.name)) else {
+            return Cow::Borrowed(self);
+        };
+        let own = &own.map;
+        let others = self.entries.iter().filter(|(name, _)| own.wish(name).is_none());
+        Cow::Owned(ColumnMap {
+            entries: others.chain(&own.entries).cloned().collect(),
+            phase: own.phase.or(self.phase),
+            duty: if own.duty == DutyIs::Unknown {
+                self.duty
+            } else {
+                own.duty
+            },
+            sampled: own.sampled.or(self.sampled),
+            settled: own.settled.or(self.settled),
+            records: Vec::new(),
+        })
+    }
+
+    /// # Errors
+    /// If the map speaks of a record that is none of `files`.
+    pub fn check_records<'f>(&self, files: impl Iterator<Item = &'f Path> + Clone) -> Result<(), Faults> {
+        let missing = |record: &&OfRecord| !files.clone().any(|file| is_called(file, &record.name));
+        let names: Vec<String> = files.clone().filter_map(stem).collect();
+        let mut faults: Sink = self
+            .records
+            .iter()
+            .filter(missing)
+            .map(|record| {
+                let mut fault = record.missing.clone();
+                fault.expected = Some(format!("a file without folder and extension: {}", names.join(", ")));
+                fault
+            })
+            .collect();
+        faults.propagate()
+    }
+
     fn add(&mut self, name: &'static str, wish: Wish) -> Result<(), Message> {
         if self.wish(name).is_some() {
-            return Err(Message::new(format!("`{name}` is mapped twice")).hint("a quantity stands in one place"));
+            return Err(mapped_twice(name));
         }
         self.entries.push((name, wish));
         Ok(())
     }
+}
+
+fn stem(file: &Path) -> Option<String> {
+    file.file_stem().map(|stem| stem.to_string_lossy().into_owned())
+}
+
+fn is_called(file: &Path, name: &str) -> bool {
+    stem(file).is_some_and(|stem| stem == name)
+}
+
+fn mapped_twice(name: &str) -> Message {
+    Message::new(format!("`{name}` is mapped twice")).hint("a quantity stands in one place")
 }
 
 /// The name of the quantity that a map calls `text`.

@@ -27,6 +27,27 @@ fn a_file_says_how_the_table_was_recorded() {
 }
 
 #[test]
+fn a_section_says_what_is_different_in_one_record() {
+    let text = "phase = 0.5\n[columns]\nv_out = \"CH1\"\n[constants]\nr_load = 10\n\
+                [records.second]\nsampled = \"mean\"\ncolumns = { v_out = \"U\", duty = \"D\" }\n";
+    let map = file(text).unwrap();
+    let first = map.of(Path::new("a/first.csv"));
+    assert_eq!(first.mapped().collect::<Vec<_>>(), ["v_out", "r_load"]);
+    let second = map.of(Path::new("a/second.csv"));
+    let own = ColumnMap::parse("r_load=10,v_out=U,duty=D").unwrap();
+    assert_eq!(second.entries, own.entries);
+    assert_eq!((second.phase, second.sampled), (Some(0.5), Some(Sampled::Mean)));
+    assert_eq!((first.phase, first.sampled), (Some(0.5), None));
+    let files = ["a/first.csv", "a/second.csv"].map(Path::new);
+    assert!(map.check_records(files.into_iter()).is_ok());
+    let faults = map.check_records(files.into_iter().take(1)).unwrap_err();
+    assert_eq!(faults.list[0].line_column(), Some((6, 10)));
+    assert!(faults.to_string().contains("no record is called `second`"), "{faults}");
+    let twice = map.and(ColumnMap::parse("duty=E").unwrap()).unwrap_err();
+    assert!(twice.to_string().contains("`duty` is mapped twice"), "{twice}");
+}
+
+#[test]
 fn what_cannot_be_read_is_named() {
     for (map, expected) in [
         ("d_rael=duty", "did you mean `d_real`?"),

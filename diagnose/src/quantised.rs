@@ -1,0 +1,100 @@
+//! Analogue-to-digital converters whose steps show in a record and stand not in the model.
+//!
+//! A step is no discrepancy: rounding counts as noise, and a model that rounds predicts nothing better. A step that makes much
+//! of the noise is a property of the bench that the model lacks, and is named; a finer one is noted.
+
+use std::collections::BTreeMap;
+
+use plant::Parameters;
+
+use crate::diagnosis::{Evidence, Named, Value};
+use crate::drive::sensors;
+use crate::problem::Problem;
+use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS};
+use crate::words::si;
+
+/// The name of the cause.
+pub const ID: &str = "adc_quantisation";
+/// Its parameters, by channel, and where the plant has them.
+const PARAMETERS: [(&str, &str); CHANNELS] = [
+    ("v_lsb", "sensors.v_out.lsb"),
+    ("i_lsb", "sensors.i_l.lsb"),
+    ("i_o_lsb", "sensors.i_out.lsb"),
+    ("v_in_lsb", "sensors.v_in.lsb"),
+];
+/// A step of 2.2 times the noise makes two fifths of it in squares, step^2 / 12: below that, other noise hides it. A
+/// convention.
+const COARSE: f64 = 2.2;
+
+/// The steps that the model does not have: channel, step, the model's own.
+fn steps(problem: &Problem) -> Vec<(usize, f64, f64)> {
+    let mut plant = problem.base.plant.clone();
+    let known = sensors(&mut plant).map(|sensor| sensor.lsb);
+    let steps = known.into_iter().enumerate().map(|(n, known)| {
+        let step = problem.records.iter().map(|r| r.lattice[n]).fold(0.0, f64::max);
+        (n, step, known)
+    });
+    steps
+        .filter(|(_, step, known)| *step > 0.0 && (known - step).abs() > 0.02 * step)
+        .collect()
+}
+
+fn is_coarse(problem: &Problem, n: usize, step: f64) -> bool {
+    step >= COARSE * problem.sigma[n]
+}
+
+/// The steps that make much of the noise, as a cause.
+pub fn cause(problem: &Problem) -> Option<Named> {
+    let coarse = steps(problem)
+        .into_iter()
+        .filter(|(n, step, _)| is_coarse(problem, *n, *step));
+    let parameters: BTreeMap<&'static str, Value> = coarse
+        .map(|(n, step, known)| {
+            let value = Value {
+                value: step,
+                low: 0.999 * step,
+                high: 1.001 * step,
+                unit: CHANNEL_UNITS[n],
+                model: known,
+            };
+            (PARAMETERS[n].0, value)
+        })
+        .collect();
+    (!parameters.is_empty()).then(|| Named {
+        id: ID,
+        words: "step of the analogue-to-digital converter",
+        parameters,
+        evidence: Evidence {
+            delta_chi2: f64::MAX,
+            threshold: 0.0,
+        },
+        rivals: Vec::new(),
+    })
+}
+
+/// What is said of the others.
+pub fn notes(problem: &Problem) -> Vec<String> {
+    let fine = steps(problem)
+        .into_iter()
+        .filter(|(n, step, _)| !is_coarse(problem, *n, *step));
+    fine.map(|(n, step, known)| {
+        let (name, key) = (CHANNEL_NAMES[n], PARAMETERS[n].1);
+        let (shown, known) = (si(step, CHANNEL_UNITS[n]), si(known, CHANNEL_UNITS[n]));
+        format!(
+            "values of {name} lie on steps of {shown}, as of an analogue-to-digital converter; lost in the noise and no cause \
+             ({key} of the model: {known})"
+        )
+    })
+    .collect()
+}
+
+/// Puts the steps of a cause into a plant.
+pub fn extend(plant: &mut Parameters, causes: &[Named]) {
+    for cause in causes.iter().filter(|cause| cause.id == ID) {
+        for (sensor, (name, _)) in sensors(plant).into_iter().zip(PARAMETERS) {
+            if let Some(step) = cause.parameters.get(name) {
+                sensor.lsb = step.value;
+            }
+        }
+    }
+}

@@ -89,7 +89,9 @@ impl Question {
             }
             let [low, high] = range;
             let message = Message::new(format!("there is no limit for {step}"));
-            let found = format!("the plant does not rest at {v_ref} V with a duty within {low}..{high}");
+            let found = format!(
+                "the plant does not rest at {v_ref} V with a duty within {low}..{high}; a load of constant power may not let it"
+            );
             Err(message.found(found).into())
         };
         let (resting, duty) = rest(&from)?;

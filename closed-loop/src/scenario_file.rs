@@ -21,6 +21,8 @@ pub struct Scenario {
     pub v_ref: Option<f64>,
     /// Load steps in the order of the file: powers, currents, resistances.
     pub load_steps: Vec<LoadStep>,
+    /// Whether the load steps are those of the paper's converter, because the file names none.
+    pub default_steps: bool,
     /// Instants and periods; its own load steps are not used.
     pub task: Task,
     /// Classical controllers that run beside the policy.
@@ -65,6 +67,7 @@ fn top(document: &Document, folder: &Path, root: &mut Table<'_>, faults: &mut Si
     let (currents, resistances) = (root.optional("current_steps"), root.optional("resistance_steps"));
     let task = read::task(root, faults);
     check(&task, document, root, faults);
+    let default_steps = document.peek(&["load_steps"]).is_none() && currents.is_none() && resistances.is_none();
     let powers_meant = document.peek(&["load_steps"]).is_some() || (currents.is_none() && resistances.is_none());
     let powers = if powers_meant {
         task.load_steps.clone()
@@ -95,6 +98,7 @@ fn top(document: &Document, folder: &Path, root: &mut Table<'_>, faults: &mut Si
         set,
         v_ref,
         load_steps,
+        default_steps,
         task,
         baselines: root.with_default("baselines", Kind::ALL.to_vec(), faults, baselines),
         limits: root.with_default("limit", vec![[0.0, 1.0]], faults, limits),

@@ -60,7 +60,7 @@ pub(crate) fn duty_range(label: &str, found: f64) -> Message {
 }
 
 /// A quotient by 100 without the binary noise (0.44 rather than 0.44000000000000006).
-fn tidy(x: f64) -> f64 {
+pub(crate) fn tidy(x: f64) -> f64 {
     (x * 1e12).round() / 1e12
 }
 

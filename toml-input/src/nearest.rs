@@ -17,8 +17,19 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .map(|candidate| (distance(&asked, &candidate.to_ascii_lowercase()), candidate))
         .filter(|(distance, candidate)| *distance <= limit || is_part(candidate))
         // of two at one distance the one of which `name` is a part: `cortexm4` is `cortex-m4f` cut short, not `cortex-m3`
-        .min_by_key(|(distance, candidate)| (*distance, !is_cut_from(&asked, candidate)))
+        .min_by_key(|(distance, candidate)| {
+            (
+                digits(&asked) != digits(candidate),
+                *distance,
+                !is_cut_from(&asked, candidate),
+            )
+        })
         .map(|(_, candidate)| candidate)
+}
+
+/// The digits of a name: `cortex-m7f` is nearer to `cortex-m7` than to `cortex-m4f`.
+fn digits(name: &str) -> String {
+    name.chars().filter(char::is_ascii_digit).collect()
 }
 
 /// Whether all characters of `name` stand in `whole` in this order.
@@ -61,6 +72,7 @@ mod tests {
             ("cortexm7", Some("cortex-m7")),
             ("ds1202", Some("dspace-ds1202")),
             ("hsot", Some("host")),
+            ("cortex-m7f", Some("cortex-m7")),
             ("z80", None),
         ] {
             assert_eq!(nearest(typed, targets), meant, "{typed}");

@@ -101,62 +101,6 @@ impl From<std::io::Error> for MeasureError {
 /// # Errors
 /// If tools are missing or the program does not run; see [`MeasureError`].
 pub fn measure(policy: &Policy, target: &TargetSpec, files: &Files, build: &Build) -> Result<Costs, MeasureError> {
-    measure_with(policy, target, files, build, Loops::Portable)
-}
-
-/// How the loops of the network are compiled.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Loops {
-    /// By the compiler, from C or Rust.
-    Portable,
-    /// From the assembly in the generated files.
-    Assembly,
-}
-
-/// What turns the assembly on in a language.
-struct Switch {
-    /// In the generated files of a target that has assembly, and nowhere else.
-    word: String,
-    flags: Vec<String>,
-}
-
-impl Switch {
-    fn of(policy: &Policy, language: codegen::Language) -> Self {
-        match language {
-            codegen::Language::C => {
-                let name = format!("{}_ASSEMBLY", policy.name.to_uppercase());
-                Switch {
-                    flags: vec![format!("-D{name}")],
-                    word: format!("defined({name})"),
-                }
-            }
-            codegen::Language::Rust => Switch {
-                flags: ["--cfg", "policyc_assembly"].map(str::to_owned).to_vec(),
-                word: "policyc_assembly".to_owned(),
-            },
-        }
-    }
-
-    fn has_effect(&self, files: &Files) -> bool {
-        files.values().any(|text| text.contains(&self.word))
-    }
-}
-
-fn measure_with(
-    policy: &Policy,
-    target: &TargetSpec,
-    files: &Files,
-    build: &Build,
-    loops: Loops,
-) -> Result<Costs, MeasureError> {
-    let flags = match loops {
-        Loops::Portable => Vec::new(),
-        Loops::Assembly => Switch::of(policy, build.language()).flags,
-    };
-    let (c_flags, rust_flags) = match build.language() {
-        codegen::Language::C => (flags, Vec::new()),
-        codegen::Language::Rust => (Vec::new(), flags),
-    };
     let mut missing = build.missing.clone();
     if toolchain::find(PLUGIN_COMPILER).is_none() {
         missing.push(Missing {
@@ -174,8 +118,8 @@ fn measure_with(
         policy,
         files,
         target,
-        extra_flags: &c_flags,
-        extra_rust_flags: &rust_flags,
+        extra_flags: &[],
+        extra_rust_flags: &[],
         timeout: COMPILER_TIMEOUT,
     };
     let image = toolchain::compile(build, sources, folder).map_err(MeasureError::Build)?;
@@ -190,13 +134,7 @@ fn measure_with(
     let depths = answers(policy, target, command)?;
     let counts = read_counts(&counts)?;
     Ok(Costs {
-        build: match loops {
-            Loops::Portable => build.name(),
-            Loops::Assembly => {
-                let Switch { flags, .. } = Switch::of(policy, build.language());
-                format!("{} {} (assembly)", build.name(), flags.join(" "))
-            }
-        },
+        build: build.name(),
         flash_bytes: object.flash_bytes(),
         static_ram_bytes: object.ram_bytes(),
         stack_bytes: depths.iter().copied().max().unwrap_or_default(),
@@ -361,9 +299,8 @@ pub fn usual_builds(
         match measure(policy, target, files, &build) {
             Ok(costs) => {
                 usual_builds.measured.push(costs);
-                if Switch::of(policy, build.language()).has_effect(files) {
-                    let costs = measure_with(policy, target, files, &build, Loops::Assembly)?;
-                    usual_builds.measured.push(costs);
+                if let Some(build) = build.with_assembly(policy, target, files) {
+                    usual_builds.measured.push(measure(policy, target, files, &build)?);
                 }
             }
             Err(MeasureError::Missing(what)) => {

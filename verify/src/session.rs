@@ -47,6 +47,8 @@ pub struct Options<'a> {
     pub extra_flags: Vec<String>,
     /// More flags for rustc, after all others.
     pub extra_rust_flags: Vec<String>,
+    /// Whether each build is made once more with the loops in assembly, where the generated files have some.
+    pub assembly: bool,
     /// Share of golden decisions that the numeric format may change, 0..1; `None`: as the contract says.
     pub golden_decisions: Option<f64>,
     /// Recordings to play before the random part.
@@ -68,6 +70,7 @@ impl Default for Options<'_> {
             levels: Vec::new(),
             extra_flags: Vec::new(),
             extra_rust_flags: Vec::new(),
+            assembly: false,
             golden_decisions: None,
             recorded: Vec::new(),
             timeout: Duration::from_secs(60),
@@ -181,6 +184,7 @@ fn run_in<T: Real>(policy: &Policy, options: Options<'_>) -> Result<Report, Veri
         levels,
         extra_flags,
         extra_rust_flags,
+        assembly,
         golden_decisions,
         recorded,
         timeout,
@@ -200,7 +204,12 @@ fn run_in<T: Real>(policy: &Policy, options: Options<'_>) -> Result<Report, Veri
             &fresh.files
         }
     };
-    let builds = toolchain::builds(target, &compilers, &levels);
+    let plain = toolchain::builds(target, &compilers, &levels);
+    let both = plain.into_iter().flat_map(|build| {
+        let assembly = build.with_assembly(policy, target, files).filter(|_| assembly);
+        [Some(build), assembly]
+    });
+    let builds: Vec<Build> = both.flatten().collect();
     let temp = std::env::temp_dir();
     let folder = tempfile::tempdir().map_err(|error| VerifyError::Io(temp, error))?;
     tell(Progress::Compiling { builds: builds.len() });

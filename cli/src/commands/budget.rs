@@ -126,6 +126,27 @@ impl Budget {
     }
 }
 
+/// What can be said without a model: how many cycles there are, and how many instructions.
+fn unmodelled(target: &TargetSpec, measured: &Measured, clock: Clock, period: f64) -> String {
+    let cycles = clock.hz * period;
+    let mut text = format!(
+        "  cannot be said: no cycles are modelled for {} (`policyc targets` says for which they are); a control period is {} cycles at {clock}",
+        target.name,
+        grouped(cycles as u64)
+    );
+    let least = measured.measured().min_by_key(|costs| costs.instructions_max);
+    if let Some(costs) = least {
+        let instructions = costs.instructions_max;
+        text += &format!(
+            ", and {} instructions in the shortest build, {}: it fits if the processor does {:.2} a cycle or more, with its wait states",
+            grouped(instructions),
+            costs.build,
+            instructions as f64 / cycles
+        );
+    }
+    text
+}
+
 /// A format that fits where the policy's own does not.
 struct Proposal {
     format: NumericFormat,
@@ -154,10 +175,7 @@ pub fn lines(
     lines.extend(budgets.iter().map(|(build, budget)| budget.text(build)));
     if budgets.is_empty() {
         lines.push(match target.cycles {
-            None => format!(
-                "  cannot be said: no cycles are modelled for {}; `policyc targets` says for which they are",
-                target.name
-            ),
+            None => unmodelled(target, measured, clock, period),
             Some(_) => "  cannot be said: no step ran under the target's emulator here".to_owned(),
         });
         return Ok(lines);

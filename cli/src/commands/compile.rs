@@ -103,11 +103,15 @@ pub fn write(
 }
 
 /// Why fused operations are no gain on a processor, where they are none.
-fn fused(policy: &Policy, target: &TargetSpec) -> Option<String> {
+fn fused(policy: &Policy, target: &TargetSpec, written: &[(PathBuf, usize)]) -> Vec<String> {
     if policy.numeric_format != NumericFormat::F32Fma {
-        return None;
+        return Vec::new();
     }
-    match target.fma {
+    let is_rust = |(path, _): &(PathBuf, usize)| path.extension().is_some_and(|end| end == "rs");
+    let in_rust = written.iter().any(is_rust).then(|| {
+        "Rust has no fused multiply-add in `core`: the module computes it in software, many times slower than f32; take C".to_owned()
+    });
+    let on_target = match target.fma {
         Fma::Absent => Some(format!(
             "{} has no fused multiply-add; a library computes it, many times slower than f32",
             target.name
@@ -117,7 +121,8 @@ fn fused(policy: &Policy, target: &TargetSpec) -> Option<String> {
             target.name
         )),
         _ => None,
-    }
+    };
+    [on_target, in_rust].into_iter().flatten().collect()
 }
 
 /// Says what was made of the policy and what was written.
@@ -133,7 +138,7 @@ pub fn say(
     if policy.golden.is_none() {
         output::say(&format!("note: {UNPROVEN}"))?;
     }
-    if let Some(note) = fused(policy, target) {
+    for note in fused(policy, target, written) {
         output::say(&format!("note: {note}"))?;
     }
     let sizes = manifest::sizes(policy, target);

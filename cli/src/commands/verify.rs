@@ -74,6 +74,7 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
             seed: options.seed,
             target,
             generated: on_disk.as_ref().map(|folder| &folder.files),
+            assembly: true,
             golden_decisions: options.golden_decisions,
             recorded,
             progress: Some(&mut tell),

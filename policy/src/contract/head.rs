@@ -50,7 +50,11 @@ fn period(value: &Value<'_>, faults: &mut Sink) -> Option<f64> {
     }
     let mut message = catalogue::out_of_range("sample_period", &format!("{period} s"), "1e-9 s to 10 s");
     if period > limits::MAX_SAMPLE_PERIOD {
-        message = message.hint("a frequency in Hz? write the period in seconds: 1e-4 for 10 kHz");
+        message = message.hint(format!(
+            "write the period in seconds: {} for {period} us, {} for {period} Hz",
+            catalogue::tidy(period * 1e-6),
+            catalogue::tidy(1.0 / period)
+        ));
     }
     faults.push(value.fault(message));
     None

@@ -161,6 +161,7 @@ impl Job<'_> {
             .args(compiler.machine_flags)
             .args(self.sources.target.c_flags)
             .args(self.build.flags)
+            .args(&self.build.extra)
             .args(self.sources.extra_flags);
         let parents = self.of_kind("h").filter_map(|path| Path::new(path).parent());
         for parent in parents.collect::<std::collections::BTreeSet<_>>() {
@@ -203,7 +204,7 @@ impl Job<'_> {
         if let Tool::Rust(spec) = self.build.tool {
             command.args(rust::flags(spec));
         }
-        command.args(self.sources.extra_rust_flags);
+        command.args(&self.build.extra).args(self.sources.extra_rust_flags);
         Ok((unit, command))
     }
 

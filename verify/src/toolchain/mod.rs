@@ -1,5 +1,6 @@
 //! Compilers of this machine and what is built with them for a target.
 
+mod assembly;
 mod compile;
 pub mod debian;
 mod rust;
@@ -86,6 +87,8 @@ pub struct Build {
     pub missing: Vec<Missing>,
     tool: Tool,
     flags: &'static [&'static str],
+    /// Further flags, which name the build.
+    extra: Vec<String>,
     /// Which `rustc`; of a build in Rust whose compiler is there.
     rust: Option<Toolchain>,
 }
@@ -93,7 +96,11 @@ pub struct Build {
 impl Build {
     /// Such as `gcc -O2`.
     pub fn name(&self) -> String {
-        format!("{} {}", self.compiler, self.level)
+        let plain = format!("{} {}", self.compiler, self.level);
+        match self.extra.is_empty() {
+            true => plain,
+            false => format!("{plain} {} (assembly)", self.extra.join(" ")),
+        }
     }
 
     /// What it compiles.
@@ -174,6 +181,7 @@ fn of_tool(target: &TargetSpec, tool: Tool) -> Vec<Build> {
             missing: missing.clone(),
             tool,
             flags,
+            extra: Vec::new(),
             rust,
         })
         .collect()

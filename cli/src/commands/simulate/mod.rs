@@ -109,6 +109,13 @@ fn prepare(options: &Simulate) -> Result<Setting, Failure> {
     let v_ref = v_ref(scenario.v_ref, &policy, file)?;
     suits(&policy, converter.parameters(), v_ref, file)?;
     let mut notes = Vec::new();
+    if scenario.default_steps {
+        notes.push(
+            "the scenario names no load step: those of the paper's 100 V converter are taken; give load_steps (W), current_steps (A) \
+             or resistance_steps (ohm) for yours"
+                .to_owned(),
+        );
+    }
     if let Some(theirs) = held_by(&policy).filter(|theirs| *theirs != v_ref) {
         notes.push(format!(
             "the policy holds {theirs} V, but errors are counted from {v_ref} V"

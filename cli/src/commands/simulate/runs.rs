@@ -6,7 +6,7 @@ use closed_loop::baselines::Baseline;
 use closed_loop::limit::{Limit, Question};
 use closed_loop::scenario::{Finding, Instant};
 use closed_loop::{Classical, Controller, LoadStep, Trajectory, follow, unusable};
-use toml_input::Message;
+use toml_input::{Fault, Message};
 
 use super::controllers::{self, Named};
 use super::{Check, Course, Findings, POLICY, Setting, Step, go_on};
@@ -183,7 +183,13 @@ fn limits(setting: &mut Setting, step: LoadStep) -> Vec<(String, Limit)> {
         let [low, high] = range;
         match Question::new(setting.converter.parameters(), setting.v_ref, step, range) {
             Ok(question) => limits.push((format!("limit {low}..{high}"), question.answer(&phases))),
-            Err(error) => setting.notes.push(error.to_string()),
+            Err(error) => {
+                let reason = |fault: &Fault| match &fault.found {
+                    Some(found) => format!("{}: {found}", fault.problem),
+                    None => fault.problem.clone(),
+                };
+                setting.notes.extend(error.iter().map(reason));
+            }
         }
     }
     limits

@@ -151,11 +151,12 @@ impl Quantity<'_> {
         self.is_called(base.trim_end()).then_some(scale)
     }
 
-    /// How many of its own unit one of another is; a quantity without a known unit takes any.
-    pub(crate) fn scale_from(&self, unit: &str) -> Option<f64> {
+    /// How many of its own unit one of another is. A quantity without a unit takes any that has no prefix: what millivolts
+    /// would have to be converted to, nobody has said.
+    pub(crate) fn scale_from(&self, text: &str) -> Option<f64> {
         match self.unit {
-            "" => Some(1.0),
-            own => scale(unit, own),
+            "" => unit(text).is_none_or(|(_, factor)| factor == 1.0).then_some(1.0),
+            own => scale(text, own),
         }
     }
 

@@ -157,6 +157,7 @@ fn a_format_without_a_type_on_the_target_is_refused() {
 #[test]
 fn files_of_others_are_kept_unless_they_are_given_up() {
     let desk = Desk::new("linear");
+    std::fs::create_dir(desk.path("out")).unwrap();
     desk.write("out/linear.h", "/* mine */\n");
     let before = contents(&desk.path("out"));
     desk.refuse(

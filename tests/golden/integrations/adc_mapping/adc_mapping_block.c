@@ -12,6 +12,10 @@
 #include <string.h>
 #include "adc_mapping_block.h"
 
+#ifndef ADC_MAPPING_RUN_be8c7b7d
+#error "adc_mapping.h and this file are of two runs of policyc: take both from one"
+#endif
+
 /* The nearest float; what no float can hold becomes the largest, which no plausible range contains. NaN stays. */
 static float adc_mapping_block_float(double x)
 {

@@ -11,6 +11,10 @@
 #include "adc_mapping_caller.h"
 #include "adc_mapping_block.h"
 
+#ifndef ADC_MAPPING_RUN_be8c7b7d
+#error "adc_mapping.h and this file are of two runs of policyc: take both from one"
+#endif
+
 static double adc_mapping_caller_work[ADC_MAPPING_BLOCK_WORK];
 static int adc_mapping_caller_ready;
 static const double adc_mapping_caller_coefficients[ADC_MAPPING_BLOCK_PARAMETERS] = { 1.02, -0.0015, 0.004, 0.0007 };

@@ -13,6 +13,10 @@
 #include "adc_mapping_fmi3.h"
 #include "adc_mapping_fmu.h"
 
+#ifndef ADC_MAPPING_RUN_be8c7b7d
+#error "adc_mapping.h and this file are of two runs of policyc: take both from one"
+#endif
+
 /* What fmi3Instance points to. */
 typedef struct {
     adc_mapping_fmu fmu;

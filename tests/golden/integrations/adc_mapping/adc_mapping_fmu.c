@@ -14,6 +14,10 @@
 #include <string.h>
 #include "adc_mapping_fmu.h"
 
+#ifndef ADC_MAPPING_RUN_be8c7b7d
+#error "adc_mapping.h and this file are of two runs of policyc: take both from one"
+#endif
+
 #define INPUTS ADC_MAPPING_BLOCK_INPUTS
 #define OUTPUTS 3u
 #define SIGNATURE 0x61959b17u

@@ -18,6 +18,10 @@
 #include "simstruc.h"
 #include "adc_mapping_block.h"
 
+#ifndef ADC_MAPPING_RUN_be8c7b7d
+#error "adc_mapping.h and this file are of two runs of policyc: take both from one"
+#endif
+
 #define DIAGNOSTICS ADC_MAPPING_BLOCK_PARAMETERS
 #define PARAMETERS (ADC_MAPPING_BLOCK_PARAMETERS + 1)
 

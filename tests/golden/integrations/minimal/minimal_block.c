@@ -12,6 +12,10 @@
 #include <string.h>
 #include "minimal_block.h"
 
+#ifndef MINIMAL_RUN_f28cb5c4
+#error "minimal.h and this file are of two runs of policyc: take both from one"
+#endif
+
 /* The nearest float; what no float can hold becomes the largest, which no plausible range contains. NaN stays. */
 static float minimal_block_float(double x)
 {

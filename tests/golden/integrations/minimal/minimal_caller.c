@@ -11,6 +11,10 @@
 #include "minimal_caller.h"
 #include "minimal_block.h"
 
+#ifndef MINIMAL_RUN_f28cb5c4
+#error "minimal.h and this file are of two runs of policyc: take both from one"
+#endif
+
 static double minimal_caller_work[MINIMAL_BLOCK_WORK];
 static int minimal_caller_ready;
 

@@ -14,6 +14,10 @@
 #include <string.h>
 #include "minimal_fmu.h"
 
+#ifndef MINIMAL_RUN_f28cb5c4
+#error "minimal.h and this file are of two runs of policyc: take both from one"
+#endif
+
 #define INPUTS MINIMAL_BLOCK_INPUTS
 #define OUTPUTS 3u
 #define SIGNATURE 0xdb6d4189u

@@ -18,6 +18,10 @@
 #include "simstruc.h"
 #include "minimal_block.h"
 
+#ifndef MINIMAL_RUN_f28cb5c4
+#error "minimal.h and this file are of two runs of policyc: take both from one"
+#endif
+
 #define DIAGNOSTICS MINIMAL_BLOCK_PARAMETERS
 #define PARAMETERS (MINIMAL_BLOCK_PARAMETERS + 1)
 

@@ -11,6 +11,9 @@
 #ifndef ACTIVATIONS_H
 #define ACTIVATIONS_H
 
+/* The run of policyc that wrote this file; the sources ask for it. */
+#define ACTIVATIONS_RUN_d89ffee7 1
+
 #include <stdint.h>
 
 #ifdef __cplusplus

@@ -10,6 +10,10 @@
  */
 #include "adc_mapping.h"
 
+#ifndef ADC_MAPPING_RUN_be8c7b7d
+#error "adc_mapping.h and this file are of two runs of policyc: take both from one"
+#endif
+
 /* The bits of the policy hold only if every operation is rounded to binary32, in the order written. */
 #if defined(__FAST_MATH__) || defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__) || defined(__NO_SIGNED_ZEROS__)
 #error "adc_mapping: -ffast-math and its parts change the controller; build without them"

@@ -11,6 +11,9 @@
 #ifndef ADC_MAPPING_H
 #define ADC_MAPPING_H
 
+/* The run of policyc that wrote this file; the sources ask for it. */
+#define ADC_MAPPING_RUN_be8c7b7d 1
+
 #include <stdint.h>
 
 #ifdef __cplusplus

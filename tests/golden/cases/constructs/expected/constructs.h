@@ -11,6 +11,9 @@
 #ifndef CONSTRUCTS_H
 #define CONSTRUCTS_H
 
+/* The run of policyc that wrote this file; the sources ask for it. */
+#define CONSTRUCTS_RUN_31b819b4 1
+
 #include <stdint.h>
 
 #ifdef __cplusplus

@@ -11,6 +11,9 @@
 #ifndef FILTERS_H
 #define FILTERS_H
 
+/* The run of policyc that wrote this file; the sources ask for it. */
+#define FILTERS_RUN_d0d75be9 1
+
 #include <stdint.h>
 
 #ifdef __cplusplus

@@ -11,6 +11,9 @@
 #ifndef LINEAR_H
 #define LINEAR_H
 
+/* The run of policyc that wrote this file; the sources ask for it. */
+#define LINEAR_RUN_aed563a3 1
+
 #include <stdint.h>
 
 #ifdef __cplusplus

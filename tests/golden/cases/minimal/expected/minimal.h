@@ -11,6 +11,9 @@
 #ifndef MINIMAL_H
 #define MINIMAL_H
 
+/* The run of policyc that wrote this file; the sources ask for it. */
+#define MINIMAL_RUN_f28cb5c4 1
+
 #include <stdint.h>
 
 #ifdef __cplusplus

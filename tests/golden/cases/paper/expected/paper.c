@@ -10,6 +10,10 @@
  */
 #include "paper.h"
 
+#ifndef PAPER_RUN_509a1eae
+#error "paper.h and this file are of two runs of policyc: take both from one"
+#endif
+
 /* The bits of the policy hold only if every operation is rounded to binary32, in the order written. */
 #if defined(__FAST_MATH__) || defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__) || defined(__NO_SIGNED_ZEROS__)
 #error "paper: -ffast-math and its parts change the controller; build without them"

@@ -11,6 +11,9 @@
 #ifndef PAPER_H
 #define PAPER_H
 
+/* The run of policyc that wrote this file; the sources ask for it. */
+#define PAPER_RUN_509a1eae 1
+
 #include <stdint.h>
 
 #ifdef __cplusplus

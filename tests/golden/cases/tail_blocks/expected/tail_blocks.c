@@ -10,6 +10,10 @@
  */
 #include "tail_blocks.h"
 
+#ifndef TAIL_BLOCKS_RUN_e20b5b31
+#error "tail_blocks.h and this file are of two runs of policyc: take both from one"
+#endif
+
 /* The bits of the policy hold only if every operation is rounded to binary32, in the order written. */
 #if defined(__FAST_MATH__) || defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__) || defined(__NO_SIGNED_ZEROS__)
 #error "tail_blocks: -ffast-math and its parts change the controller; build without them"

@@ -11,6 +11,9 @@
 #ifndef TAIL_BLOCKS_H
 #define TAIL_BLOCKS_H
 
+/* The run of policyc that wrote this file; the sources ask for it. */
+#define TAIL_BLOCKS_RUN_e20b5b31 1
+
 #include <stdint.h>
 
 #ifdef __cplusplus

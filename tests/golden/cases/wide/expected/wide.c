@@ -10,6 +10,10 @@
  */
 #include "wide.h"
 
+#ifndef WIDE_RUN_9eaf6bdc
+#error "wide.h and this file are of two runs of policyc: take both from one"
+#endif
+
 /* The bits of the policy hold only if every operation is rounded to binary64, in the order written. */
 #if defined(__FAST_MATH__) || defined(__ASSOCIATIVE_MATH__) || defined(__RECIPROCAL_MATH__) || defined(__NO_SIGNED_ZEROS__)
 #error "wide: -ffast-math and its parts change the controller; build without them"

@@ -11,6 +11,9 @@
 #ifndef WIDE_H
 #define WIDE_H
 
+/* The run of policyc that wrote this file; the sources ask for it. */
+#define WIDE_RUN_9eaf6bdc 1
+
 #include <stdint.h>
 
 #ifdef __cplusplus

@@ -391,7 +391,7 @@ fn notes(problem: &Problem, pair: Option<&Pair>, nothing: &[&str]) -> Vec<String
     let mut notes: Vec<String> = records
         .flat_map(|r| r.repairs.iter().map(|text| format!("{}: {text}", r.name)))
         .collect();
-    notes.extend(quantised::notes(problem));
+    notes.extend(quantised::note(problem));
     notes.extend(nothing.iter().map(|id| {
         format!("{id} would fit a little better, by less than two simulators of one circuit differ: not named")
     }));

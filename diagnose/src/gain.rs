@@ -313,6 +313,6 @@ fn is_in(regime: Regime, problem: &Problem, record: &Record, row: usize) -> bool
         Regime::All => true,
         Regime::Continuous => !noise::is_discontinuous(record, row, ripple),
         Regime::Discontinuous => noise::is_discontinuous(record, row, ripple),
-        Regime::Transient => (row.saturating_sub(TRANSIENT).max(1)..=row).any(moved),
+        Regime::Transient => !record.settled && (row.saturating_sub(TRANSIENT).max(1)..=row).any(moved),
     }
 }

@@ -25,6 +25,8 @@ const PARAMETERS: [(&str, &str); CHANNELS] = [
 /// A step of 2.2 times the noise makes two fifths of it in squares, step^2 / 12: below that, other noise hides it. A
 /// convention.
 const COARSE: f64 = 2.2;
+/// A step below a fifth of the noise adds less than 0.2 % to it, and is not worth a word.
+const WORTH_A_NOTE: f64 = 0.2;
 
 /// The steps that the model does not have: channel, step, the model's own.
 fn steps(problem: &Problem) -> Vec<(usize, f64, f64)> {
@@ -72,20 +74,24 @@ pub fn cause(problem: &Problem) -> Option<Named> {
     })
 }
 
-/// What is said of the others.
-pub fn notes(problem: &Problem) -> Vec<String> {
+/// What is said of finer ones.
+pub fn note(problem: &Problem) -> Option<String> {
     let fine = steps(problem)
         .into_iter()
-        .filter(|(n, step, _)| !is_coarse(problem, *n, *step));
-    fine.map(|(n, step, known)| {
-        let (name, key) = (CHANNEL_NAMES[n], PARAMETERS[n].1);
-        let (shown, known) = (si(step, CHANNEL_UNITS[n]), si(known, CHANNEL_UNITS[n]));
+        .filter(|(n, step, _)| !is_coarse(problem, *n, *step) && *step >= WORTH_A_NOTE * problem.sigma[*n]);
+    let each: Vec<String> = fine
+        .map(|(n, step, known)| {
+            let [step, known] = [step, known].map(|value| si(value, CHANNEL_UNITS[n]));
+            let key = PARAMETERS[n].1;
+            format!("{} on steps of {step} ({key} of the model: {known})", CHANNEL_NAMES[n])
+        })
+        .collect();
+    (!each.is_empty()).then(|| {
         format!(
-            "values of {name} lie on steps of {shown}, as of an analogue-to-digital converter; lost in the noise and no cause \
-             ({key} of the model: {known})"
+            "values lie on the steps of an analogue-to-digital converter, which are lost in the noise and no cause: {}",
+            each.join(", ")
         )
     })
-    .collect()
 }
 
 /// Puts the steps of a cause into a plant.

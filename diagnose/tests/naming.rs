@@ -77,7 +77,7 @@ fn a_step_of_a_converter_that_is_lost_in_the_noise_is_a_note() {
     );
     let said = said(&found);
     assert!(
-        said.contains("v_o lie on steps of 50.00 mV") && said.contains("analogue-to-digital converter"),
+        said.contains("v_o on steps of 50.00 mV") && said.contains("analogue-to-digital converter"),
         "{said}"
     );
 }

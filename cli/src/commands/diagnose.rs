@@ -23,8 +23,6 @@ use crate::{Failure, Outcome, output};
 pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
     let model = Parameters::from_file(&options.model)?;
     let mut columns = options.columns.read()?;
-    let files = || options.train.iter().chain(&options.heldout).map(PathBuf::as_path);
-    columns.check_records(files())?;
     if options.settled {
         columns.settled = Some(true);
     }
@@ -53,6 +51,12 @@ pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
     }
     output::replace_own_texts(&options.out, &files, options.replacing)?;
     let out = options.out.display();
+    let files = options.train.iter().chain(&options.heldout);
+    for name in columns.sections_without(&files.map(PathBuf::as_path).collect::<Vec<_>>()) {
+        output::say(&format!(
+            "note: no record is called `{name}`: its section of the column map is not used"
+        ))?;
+    }
     for repair in &diagnosis.findings.noise.repairs {
         output::say(&format!("note: {repair}"))?;
     }

@@ -90,11 +90,8 @@ impl Candidate {
     /// Whether the cause at `values` is no effect, whatever it gains.
     #[must_use]
     pub fn is_nothing(&self, values: &[f64]) -> bool {
-        let sizes = values.iter().zip(&self.own).zip(&self.ranges).take(self.sizes());
-        self.sizes() > 0
-            && sizes
-                .into_iter()
-                .all(|((value, own), range)| (value - own).abs() < TINY * range[2])
+        let mut sizes = values.iter().zip(&self.own).zip(&self.ranges).take(self.sizes());
+        self.sizes() > 0 && sizes.all(|((value, own), range)| (value - own).abs() < TINY * range[2])
     }
 
     /// How many of its parameters make its size: all, or the first alone where the others only shape it.

@@ -29,7 +29,7 @@ pub(super) fn panels(
     second: Option<&str>,
 ) -> Result<Svg, ReportError> {
     let one = &problem.records[record];
-    let axis = if one.settled {
+    let axis = if one.settled && !one.repeated {
         Axis::new("point")
     } else {
         Axis::new("time").unit("s")

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use toml_input::{Document, Faults, Message, Sink, Table, Value};
+use toml_input::{Document, Faults, Sink, Table, Value};
 
 use super::{ColumnMap, DutyIs, OfRecord, Sampled, Wish, quantity};
 
@@ -68,11 +68,9 @@ impl ColumnMap {
                 map.read_keys(table, faults);
                 Some(())
             });
-            let message = Message::new(format!("no record is called `{}`", key.value));
             self.records.push(OfRecord {
                 name: key.value.clone(),
                 map,
-                missing: value.document().fault(&key.span, message),
             });
         }
     }

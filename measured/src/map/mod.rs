@@ -6,7 +6,7 @@ mod line;
 use std::borrow::Cow;
 use std::path::Path;
 
-use toml_input::{Fault, Faults, Message, Sink};
+use toml_input::{Faults, Message};
 
 use crate::quantity::{Quantity, VOCABULARY};
 
@@ -57,8 +57,6 @@ struct OfRecord {
     /// Its file without folder and extension.
     name: String,
     map: ColumnMap,
-    /// The fault if there is no such record.
-    missing: Fault,
 }
 
 /// Where a quantity shall be taken from.
@@ -137,22 +135,12 @@ impl ColumnMap {
         })
     }
 
-    /// # Errors
-    /// If the map speaks of a record that is none of `files`.
-    pub fn check_records<'f>(&self, files: impl Iterator<Item = &'f Path> + Clone) -> Result<(), Faults> {
-        let missing = |record: &&OfRecord| !files.clone().any(|file| is_called(file, &record.name));
-        let names: Vec<String> = files.clone().filter_map(stem).collect();
-        let mut faults: Sink = self
-            .records
-            .iter()
-            .filter(missing)
-            .map(|record| {
-                let mut fault = record.missing.clone();
-                fault.expected = Some(format!("a file without folder and extension: {}", names.join(", ")));
-                fault
-            })
-            .collect();
-        faults.propagate()
+    /// Sections of records that are none of `files`: a map may describe more records than a command reads.
+    #[must_use]
+    pub fn sections_without(&self, files: &[&Path]) -> Vec<&str> {
+        let missing = |record: &&OfRecord| !files.iter().any(|file| is_called(file, &record.name));
+        let sections = self.records.iter().filter(missing);
+        sections.map(|record| record.name.as_str()).collect()
     }
 
     fn add(&mut self, name: &'static str, wish: Wish) -> Result<(), Message> {
@@ -164,12 +152,8 @@ impl ColumnMap {
     }
 }
 
-fn stem(file: &Path) -> Option<String> {
-    file.file_stem().map(|stem| stem.to_string_lossy().into_owned())
-}
-
 fn is_called(file: &Path, name: &str) -> bool {
-    stem(file).is_some_and(|stem| stem == name)
+    file.file_stem().is_some_and(|stem| stem.to_string_lossy() == name)
 }
 
 fn mapped_twice(name: &str) -> Message {

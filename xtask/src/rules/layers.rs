@@ -52,7 +52,9 @@ pub const MACRO_TREE: [&str; 11] = [
     "tree", "-p", MACRO, "-e", "no-dev", "--target", "all", "--prefix", "none", "--format", "{p}",
 ];
 
-const NOT_IN_MACRO: &[&str] = &["askama", "clap", "ndarray"];
+// `ndarray` comes with the interpreter, which holds the trainer's golden answers against the network: a controller that
+// was misread is worse than the seconds that a first build takes
+const NOT_IN_MACRO: &[&str] = &["askama", "clap"];
 
 /// One line per violation.
 pub fn check(crates: &[Crate]) -> Vec<String> {

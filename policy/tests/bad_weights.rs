@@ -410,6 +410,22 @@ fn golden_vectors_that_cannot_be_are_refused() {
         &["shape [2, 5]", "shape [rows, 2]", "transposed"],
     );
     assert_tensor(
+        &fault(&[obs.clone(), tensor("q", &[3, 2])]),
+        GOLDEN,
+        "q",
+        &["shape [3, 2]", ".T.copy()"],
+    );
+    let column = raw_tensor("action", Dtype::U8, &[2, 1], vec![0, 1]);
+    assert_tensor(
+        &fault(&[obs.clone(), column]),
+        GOLDEN,
+        "action",
+        &["shape [2, 1]", "squeeze"],
+    );
+    let real = f32_tensor("action", &[2], &[0.0, 1.0]);
+    assert_tensor(&fault(&[obs.clone(), real]), GOLDEN, "action", &["F32", "astype"]);
+    assert_whole_file(&fault(&[tensor("states", &[2, 2])]), GOLDEN, &["`states`", "rename"]);
+    assert_tensor(
         &fault(&[obs.clone(), u8s(&[0, 3])]),
         GOLDEN,
         "action",

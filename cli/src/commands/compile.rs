@@ -160,7 +160,8 @@ pub fn say(
     }
     if let Some(bound) = sizes.q_error_bound {
         output::say(&format!(
-            "note: no Q value is further than {} from real arithmetic, for every observation; `policyc certify` says more",
+            "note: no Q value is further than {} from real arithmetic, for every observation the clips let through, however rare; \
+             what the trainer's own observations lose stands below `decisions` in `policyc inspect`, and `policyc certify` says more",
             report::quantity(bound, "", 3)
         ))?;
     }

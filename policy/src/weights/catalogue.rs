@@ -164,7 +164,9 @@ pub(crate) fn no_order(layers: &str) -> Message {
 // --- golden vectors ---
 
 pub(crate) fn golden_missing(name: &str, expected: &str) -> Message {
-    Message::new(format!("golden vectors need the tensor `{name}`")).expected(expected)
+    Message::new(format!("golden vectors need the tensor `{name}`"))
+        .expected(expected)
+        .hint("the tensors are called obs, q and action: rename those that are there")
 }
 
 pub(crate) fn golden_shape(found: &[usize], features: usize) -> Message {

@@ -102,9 +102,11 @@ fn part<T>(file: &Binary, tensor: &str, faults: &mut Sink, result: Result<T, Mes
         .ok()
 }
 
-fn floats(view: &TensorView<'_>, shape: &[usize]) -> Result<Vec<f32>, Message> {
+fn floats(view: &TensorView<'_>, shape: &[usize; 2]) -> Result<Vec<f32>, Message> {
     if view.shape() != shape {
-        return Err(catalogue::wrong_shape("this tensor", view.shape(), shape, None));
+        let is_transposed = view.shape() == [shape[1], shape[0]];
+        let hint = is_transposed.then(|| "save the transposed array: `.T.copy()`".to_owned());
+        return Err(catalogue::wrong_shape("this tensor", view.shape(), shape, hint));
     }
     match view.dtype() {
         dtype @ (Dtype::F32 | Dtype::F64) => tensors::values(dtype, view.data()),
@@ -114,7 +116,8 @@ fn floats(view: &TensorView<'_>, shape: &[usize]) -> Result<Vec<f32>, Message> {
 
 fn integers(view: &TensorView<'_>, rows: usize, actions: usize) -> Result<Vec<u32>, Message> {
     if view.shape() != [rows] {
-        return Err(catalogue::wrong_shape("this tensor", view.shape(), &[rows], None));
+        let hint = (view.shape() == [rows, 1]).then(|| "save it flat: `.squeeze(1)`".to_owned());
+        return Err(catalogue::wrong_shape("this tensor", view.shape(), &[rows], hint));
     }
     let data = view.data();
     let numbers: Vec<i64> = match view.dtype() {
@@ -126,7 +129,10 @@ fn integers(view: &TensorView<'_>, rows: usize, actions: usize) -> Result<Vec<u3
             .collect(),
         Dtype::I64 => tensors::chunks(data).map(i64::from_le_bytes).collect(),
         Dtype::U8 => data.iter().map(|&b| i64::from(b)).collect(),
-        other => return Err(catalogue::wrong_dtype(&other.to_string(), "I32, I64, U8 or U32")),
+        other => {
+            return Err(catalogue::wrong_dtype(&other.to_string(), "I32, I64, U8 or U32")
+                .hint("save whole numbers: `.int()`, or `.astype(np.int32)`"));
+        }
     };
     let index = |(row, number): (usize, i64)| match u32::try_from(number) {
         Ok(index) if (index as usize) < actions => Ok(index),

@@ -27,6 +27,15 @@ pub enum CodegenError {
     Manifest(String),
     /// An output lacks what it needs.
     Output(&'static str),
+    /// The processor would take a constant for zero.
+    Flushed {
+        /// Where it stands.
+        place: String,
+        /// The constant.
+        value: f64,
+        /// Name of the target.
+        target: &'static str,
+    },
     /// The processor lacks a type that the numeric format stores.
     NoType {
         /// The format.
@@ -43,6 +52,7 @@ impl fmt::Display for CodegenError {
             CodegenError::Rust(message) => write!(f, "internal fault: generated Rust: {message}"),
             CodegenError::Manifest(message) => write!(f, "internal fault: manifest: {message}"),
             CodegenError::Output(message) => write!(f, "internal fault: output: {message}"),
+            CodegenError::Flushed { .. } => f.write_str("the processor would take a constant of the policy for zero"),
             CodegenError::NoType { .. } => f.write_str("the processor has no type for the numeric format"),
         }
     }
@@ -53,8 +63,18 @@ impl std::error::Error for CodegenError {}
 impl From<CodegenError> for Faults {
     fn from(error: CodegenError) -> Self {
         let message = Message::new(error.to_string());
-        let CodegenError::NoType { format, target } = error else {
-            return message.into();
+        let (format, target) = match error {
+            CodegenError::NoType { format, target } => (format, target),
+            CodegenError::Flushed { place, value, target } => {
+                return message
+                    .found(format!(
+                        "{value:e} in {place}; the FPU of {target} has no subnormal numbers"
+                    ))
+                    .expected(format!("0, or a magnitude of at least {:e}", f32::MIN_POSITIVE))
+                    .hint("round it to 0 where the policy is exported, or take --format i16")
+                    .into();
+            }
+            _ => return message.into(),
         };
         let (needed, expected) = match format {
             NumericFormat::F64 => (

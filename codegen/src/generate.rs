@@ -7,7 +7,7 @@ use crate::backend::fmu::Fmi;
 use crate::backend::kit::Material;
 use crate::files::{CodegenError, GeneratedFiles};
 use crate::output::Output;
-use crate::program::Program;
+use crate::program::{Element, Literal, Op, Program};
 use crate::stamp::stamp;
 use crate::{backend, lower, manifest, output};
 
@@ -44,12 +44,46 @@ pub fn sources(
     let mut all = GeneratedFiles::default();
     for language in output::languages(&outputs) {
         let program = lower(policy, target, language);
+        check_subnormals(&program, target)?;
         for output in outputs.iter().filter(|output| output.language() == language) {
             all.files.extend(emit(*output, &program, expected)?.files);
         }
     }
     stamp(&mut all, policy, target);
     Ok(all)
+}
+
+/// No constant of the program is one that the processor takes for zero: the code would compute another policy.
+fn check_subnormals(program: &Program, target: &TargetSpec) -> Result<(), CodegenError> {
+    if !target.flushes_subnormals {
+        return Ok(());
+    }
+    let is_flushed = |value: &Literal| (value.value() as f32).is_subnormal();
+    let floats = program
+        .checked_tables()
+        .filter(|table| matches!(table.element, Element::Float(_)));
+    let in_tables = floats.flat_map(|table| {
+        let found = table.values.iter().filter(|value| is_flushed(value));
+        found.map(|value| (format!("the table `{}`", table.name), value.value()))
+    });
+    let constants = program.front.block.ops.iter().filter_map(|op| match op {
+        Op::Constant(value) => Some(*value),
+        _ => None,
+    });
+    let in_features = constants.map(|value| ("the features".to_owned(), value));
+    let in_duties = program.duties.iter().map(|value| ("the duties".to_owned(), *value));
+    let elsewhere = in_features
+        .chain(in_duties)
+        .filter(|(_, value)| is_flushed(value))
+        .map(|(place, value)| (place, value.value()));
+    match in_tables.chain(elsewhere).next() {
+        None => Ok(()),
+        Some((place, value)) => Err(CodegenError::Flushed {
+            place,
+            value,
+            target: target.name,
+        }),
+    }
 }
 
 fn check_types(policy: &Policy, target: &TargetSpec) -> Result<(), CodegenError> {

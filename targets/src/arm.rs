@@ -41,6 +41,7 @@ const BASE: TargetSpec = TargetSpec {
     widths: ILP32,
     fpu: Fpu::None,
     fma: Fma::Absent,
+    flushes_subnormals: false,
     suitable_format: "i16",
     cycles: None,
     sections: SECTIONS,
@@ -124,6 +125,7 @@ pub const CORTEX_M4F: TargetSpec = TargetSpec {
     description: "Arm Cortex-M4 with FPU (Armv7E-M, FPv4-SP)",
     // Arm's timing table: VFMA 3 cycles, VMUL and VADD 1 each
     fma: Fma::Cycles { fused: 3, apart: 2 },
+    flushes_subnormals: false,
     cycles: Some(M3_M4_CYCLES),
     clock_hz: Some(168_000_000),
     c_compilers: &[
@@ -148,6 +150,7 @@ pub const CORTEX_M7: TargetSpec = TargetSpec {
     name: "cortex-m7",
     description: "Arm Cortex-M7 with FPU (Armv7E-M, FPv5-SP)",
     fma: Fma::Cycles { fused: 1, apart: 2 },
+    flushes_subnormals: false,
     clock_hz: Some(400_000_000),
     c_compilers: &[
         gcc(&["-mthumb", "-mcpu=cortex-m7", "-mfpu=fpv5-sp-d16", "-mfloat-abi=hard"]),
@@ -170,6 +173,7 @@ pub const CORTEX_M33: TargetSpec = TargetSpec {
     name: "cortex-m33",
     description: "Arm Cortex-M33 with FPU (Armv8-M Mainline, FPv5-SP)",
     fma: Fma::Unrated,
+    flushes_subnormals: false,
     clock_hz: Some(160_000_000),
     c_compilers: &[
         gcc(&["-mthumb", "-mcpu=cortex-m33", "-mfpu=fpv5-sp-d16", "-mfloat-abi=hard"]),

@@ -215,6 +215,8 @@ pub struct TargetSpec {
     pub fpu: Fpu,
     /// Fused multiply-add.
     pub fma: Fma,
+    /// Whether the FPU takes subnormal numbers for zero, operands and results.
+    pub flushes_subnormals: bool,
     /// Numeric format that suits the processor, as `policy.toml` names it; the policy decides, not the target.
     pub suitable_format: &'static str,
     /// Cycles of an instruction mix, where the processor's table is simple enough to say so.

@@ -7,6 +7,7 @@ mod integrity;
 mod macro_crate;
 mod mutations;
 mod simplified;
+mod subnormal;
 mod warnings;
 
 use std::ops::Range;

@@ -44,12 +44,6 @@ pub(crate) fn decimal_commas(label: &str, found: usize) -> Message {
         .hint("write 0.10, 0.15 instead of 0,10, 0,15")
 }
 
-pub(crate) fn one_duty_for_all(duty: f64) -> Message {
-    Message::new("the limits leave one duty to all actions: nothing is left to control with")
-        .found(format!("every action commands {duty}"))
-        .expected("limits that hold at least two of the duties in [actions]")
-}
-
 pub(crate) fn duty_range(label: &str, found: f64) -> Message {
     let percent = found > 1.0 && found <= 100.0;
     let hint = percent.then(|| format!("looks like a percentage: write {}", tidy(found / 100.0)));

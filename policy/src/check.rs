@@ -78,19 +78,15 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
         mapping.as_ref().and_then(Option::as_ref),
     ));
     let limits = limits?;
-    let complete = actions.list.len() == action_count;
-    let only = only_duty(&limits, &actions.list, mapping.as_ref().and_then(Option::as_ref));
-    if let Some(duty) = only.filter(|_| complete) {
-        let at = raw.contract.peek(&["limits", "duty"]);
-        faults.extend(at.map(|value| value.fault(catalogue::one_duty_for_all(duty))));
-    }
     notes.extend(outside_at_first(&limits));
-    notes.extend(beyond_limits(
-        &limits,
-        &actions.list,
-        mapping.as_ref().and_then(Option::as_ref),
-    ));
-    if let Some(mapping) = mapping.as_ref().and_then(Option::as_ref) {
+    let mapping_read = mapping.as_ref().and_then(Option::as_ref);
+    match only_duty(&limits, &actions.list, mapping_read) {
+        Some(duty) => notes.push(format!(
+            "every action commands the duty {duty}: the limits leave no other, and nothing is left to control with"
+        )),
+        None => notes.extend(beyond_limits(&limits, &actions.list, mapping_read)),
+    }
+    if let Some(mapping) = mapping_read {
         notes.extend(beyond_mapping(&limits, &actions.list, mapping));
     }
     let mut policy = Policy {

@@ -20,7 +20,7 @@ use verify::{Options, Outcome, Report};
 const RANDOM_POLICIES: u64 = 20;
 /// Those of them that a target has every day: each target others, so that all targets together have all of them.
 /// `POLICYC_FULL` gives every target all of them.
-const RANDOM_POLICIES_A_DAY: u64 = 6;
+const RANDOM_POLICIES_A_DAY: u64 = 3;
 /// Seed of the first.
 const FIRST_SEED: u64 = 5000;
 

@@ -24,14 +24,15 @@ const RANDOM_POLICIES_A_DAY: u64 = 3;
 /// Seed of the first.
 const FIRST_SEED: u64 = 5000;
 
-/// Steps of a build.
+/// Steps of a build with `POLICYC_FULL`.
 const STEPS: u64 = 20_000;
+/// Steps of the example where floats are hardware.
+const EXAMPLE_STEPS: u64 = 5_000;
 /// Steps of a build in every format.
 const CHECKSUM_STEPS: u64 = 500;
-/// Steps of the example where every float operation is a call of a library, which takes ten times as long to emulate;
-/// `POLICYC_FULL` makes them [`STEPS`].
+/// Steps of the example where every float operation is a call of a library, which takes ten times as long to emulate.
 const STEPS_WITHOUT_FPU: u64 = 2_000;
-/// Steps of a random policy; `POLICYC_FULL` makes them [`STEPS`].
+/// Steps of a random policy.
 const RANDOM_STEPS: u64 = 4_000;
 /// Steps of a random policy where every float operation is a call of a library.
 const RANDOM_STEPS_WITHOUT_FPU: u64 = 400;
@@ -88,7 +89,7 @@ fn check(name: &str) {
     let (example_steps, random_steps) = match target.fpu {
         _ if tests::full() => (STEPS, STEPS),
         Fpu::None => (STEPS_WITHOUT_FPU, RANDOM_STEPS_WITHOUT_FPU),
-        _ => (STEPS, RANDOM_STEPS),
+        _ => (EXAMPLE_STEPS, RANDOM_STEPS),
     };
     let report = run(&example, target, &compilers(target), &[], example_steps);
     assert_equal(&report, name);

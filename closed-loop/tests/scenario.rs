@@ -48,8 +48,11 @@ fn every_example_is_a_scenario_and_the_commented_one_says_the_defaults() {
     let bare = Scenario {
         plant: commented.plant.clone(),
         v_ref: commented.v_ref,
+        // it says them; a file that does not is told so
+        default_steps: false,
         ..read("")
     };
+    assert!(read("").default_steps);
     assert_eq!(commented, bare);
 }
 

@@ -34,6 +34,9 @@ pub struct Replacing {
 
 #[derive(Serialize, Deserialize, Default)]
 struct Record {
+    /// Says whose the record itself is.
+    #[serde(default)]
+    generator: String,
     /// The policy, in the manifest of generated code.
     #[serde(default, skip_serializing)]
     name: Option<String>,
@@ -109,6 +112,7 @@ pub fn check_policy(folder: &Path, policy: &str, replacing: Replacing) -> Result
 pub fn recorded(mut files: BTreeMap<String, Vec<u8>>) -> Result<BTreeMap<String, Vec<u8>>, Failure> {
     let unmarked = files.iter().filter(|(_, content)| !bears_mark(content));
     let record = Record {
+        generator: codegen::TOOL.to_owned(),
         name: None,
         files: unmarked
             .map(|(name, content)| (name.clone(), FileEntry::of(content)))
@@ -165,7 +169,8 @@ mod tests {
         );
         put(folder.path(), &old);
         let new = files(&[("a.c", "/* by policyc */ 2"), ("t.csv", "3,4")]);
-        assert!(check(folder.path(), &new, KEEP).is_ok());
+        let new = recorded(new).unwrap();
+        assert!(check(folder.path(), &new, KEEP).is_ok(), "the record, too");
         put(folder.path(), &files(&[("t.csv", "1,2 # mine")]));
         let Err(Failure(faults)) = check(folder.path(), &new, KEEP) else {
             panic!("must fail")

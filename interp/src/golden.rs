@@ -29,7 +29,7 @@ pub struct GoldenResult {
 
 impl GoldenResult {
     /// All Q values within the tolerance, or all actions equal where the trainer gave no Q values; or rounded. With Q values
-    /// the actions are [`Decisions`](crate::decisions::Decisions), which know ties.
+    /// the actions are [`Decisions`], which know ties.
     #[must_use]
     pub fn passed(&self) -> bool {
         let actions = self.actions_equal == self.actions_compared;

@@ -17,7 +17,7 @@
 //! | what differs | [`compare`], [`report`] |
 //! | what a step costs | [`mod@measure`], [`elf`] |
 //! | archives of FMUs | [`fmu`] |
-//! | what the format does to decisions | [`mod@decisions`] |
+//! | what the format does to decisions | [`decisions`] |
 //! | checked-in files against the policy | [`drift()`] |
 
 pub mod compare;

@@ -52,6 +52,17 @@ pub enum Command {
     Drm(crate::commands::drm::Drm),
 }
 
+impl Command {
+    /// Whether it keeps or tells what it has done so far when a signal comes.
+    pub fn ends_by_itself(&self) -> bool {
+        use crate::commands::drm::Drm;
+        matches!(
+            self,
+            Command::Simulate(_) | Command::Train(_) | Command::Drm(Drm::Transfer(_))
+        )
+    }
+}
+
 #[derive(Debug, Args)]
 pub struct New {
     /// Network weights

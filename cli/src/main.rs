@@ -40,6 +40,10 @@ fn main() -> ExitCode {
 }
 
 fn run(command: &Command) -> Result<Outcome, Failure> {
+    if command.ends_by_itself() {
+        // before the first signal is heeded: one in between would end the program without a word
+        interruption::stop_on_signal();
+    }
     let _scratch = interruption::watch()?;
     match command {
         Command::New(options) => commands::new::run(options),

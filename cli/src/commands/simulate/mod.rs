@@ -69,7 +69,6 @@ struct Findings {
 
 /// Simulates, writes, reports.
 pub fn run(options: &Simulate) -> Result<Outcome, Failure> {
-    // before anything else: a signal in between would end the program without a word
     let stop = interruption::stop_on_signal();
     output::check_new_folder(&options.out)?;
     let setting = prepare(options)?;

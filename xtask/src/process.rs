@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-/// Time that a command may take. All tests together take half an hour on two cores; what takes this long hangs.
+/// Time that a command may take. All tests together take some forty minutes on two busy cores; what takes this long hangs.
 pub const LIMIT: Duration = Duration::from_secs(50 * 60);
 const POLL: Duration = Duration::from_millis(50);
 const TAIL_LINES: usize = 60;

@@ -1,5 +1,5 @@
-//! The test programs of the workspace, two at a time: many of them wait most of their time for one compiler or one
-//! emulator, and a program alone leaves the other core idle.
+//! The test programs of the workspace, two at a time: several end with one long test, and a program alone leaves the other
+//! core idle then. Most of the time goes to compilers and emulators, so two lanes are quicker by that alone.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};

@@ -1,31 +1,39 @@
-//! Where the inductor current rests at zero: settled points there do not follow the mapping.
+//! Where the inductor current rests at zero, or turns round in a synchronous leg with dead time: settled points there do
+//! not follow the mapping.
 
 use plant::{Parameters, Rectifier};
 
-/// What decides between continuous and discontinuous conduction.
+/// What decides whether the current stays positive throughout the period.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Conduction {
     /// H.
     pub inductance: f64,
     /// Hz.
     pub f_sw: f64,
-    /// Forward voltage of the diode, V.
+    /// Forward voltage of the diode, 0 for a second switch, V.
     pub v_f: f64,
 }
 
 impl Conduction {
-    /// Of a plant; `None` if its current cannot rest, because its leg is synchronous or its model averaged.
+    /// Of a plant; `None` if the sign of its current decides nothing: in an averaged model, and in a synchronous leg that
+    /// loses no duty to dead time.
     #[must_use]
     pub fn of(plant: &Parameters) -> Option<Self> {
-        let diode = plant.converter.rectifier == Rectifier::Diode && plant.converter.model == plant::Model::Switched;
-        diode.then_some(Conduction {
-            inductance: plant.converter.inductance,
-            f_sw: plant.converter.f_sw,
-            v_f: plant.switch.v_f,
+        let (converter, switch) = (&plant.converter, &plant.switch);
+        let v_f = match converter.rectifier {
+            Rectifier::Diode => switch.v_f,
+            Rectifier::Synchronous => 0.0,
+        };
+        let edges = [switch.dead_time, switch.turn_on_delay, switch.turn_off_delay];
+        let depends = converter.rectifier == Rectifier::Diode || edges != [0.0; 3];
+        (depends && converter.model == plant::Model::Switched).then_some(Conduction {
+            inductance: converter.inductance,
+            f_sw: converter.f_sw,
+            v_f,
         })
     }
 
-    /// Load current below which a buck converter with a diode runs discontinuously: half the ripple, A.
+    /// Load current below which the current of a buck converter rests or turns round: half the ripple, A.
     ///
     /// While the diode carries the current it falls by `(v_out + v_f) (1 - d) / (L f_sw)`, with
     /// `1 - d = (v_in - v_out) / (v_in + v_f)`.
@@ -54,9 +62,11 @@ mod tests {
     }
 
     #[test]
-    fn a_synchronous_leg_has_no_boundary() {
+    fn a_synchronous_leg_has_a_boundary_where_dead_time_makes_one() {
         let mut parameters = Parameters::paper_model();
         parameters.converter.rectifier = Rectifier::Synchronous;
         assert_eq!(Conduction::of(&parameters), None);
+        parameters.switch.dead_time = 1e-6;
+        assert_eq!(Conduction::of(&parameters).map(|conduction| conduction.v_f), Some(0.0));
     }
 }

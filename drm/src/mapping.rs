@@ -158,6 +158,7 @@ pub fn simulation_toml(simulation: &Losses) -> String {
         r_on,
         dcr,
         lost_duty,
+        v_dead,
     } = *simulation;
     let losses = [
         ("v_f", v_f),
@@ -165,6 +166,7 @@ pub fn simulation_toml(simulation: &Losses) -> String {
         ("r_on", r_on),
         ("dcr", dcr),
         ("lost_duty", lost_duty),
+        ("v_dead", v_dead),
     ];
     let mut text = format!("\n[simulation]\nv_in = {v_in:?}\n");
     for (key, value) in losses.iter().filter(|(_, value)| *value != 0.0) {
@@ -182,6 +184,7 @@ impl From<&policy::Simulation> for Losses {
             r_on,
             dcr,
             lost_duty,
+            v_dead,
         } = *simulation;
         Losses {
             v_in,
@@ -190,6 +193,7 @@ impl From<&policy::Simulation> for Losses {
             r_on,
             dcr,
             lost_duty,
+            v_dead,
         }
     }
 }
@@ -248,6 +252,7 @@ mod tests {
         let losses = Losses {
             v_f: 0.7,
             dcr: 0.1 + 0.2,
+            v_dead: 0.016,
             ..Losses::none(100.0)
         };
         let text = map(None).to_toml("") + &simulation_toml(&losses);

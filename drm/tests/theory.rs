@@ -13,6 +13,7 @@ const LOSSY: Losses = Losses {
     r_on: 0.5,
     dcr: 0.1,
     lost_duty: 0.04,
+    v_dead: 0.0,
 };
 
 const D_SIM: [f64; 5] = [0.3, 0.4, 0.5, 0.6, 0.7];

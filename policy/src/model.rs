@@ -337,6 +337,8 @@ pub struct Simulation {
     pub dcr: f64,
     /// Share of the period that the switch is on for less than commanded.
     pub lost_duty: f64,
+    /// What the body diodes of a synchronous leg take in the dead times, as a mean over the period, V.
+    pub v_dead: f64,
 }
 
 /// Coefficients of a mapping.

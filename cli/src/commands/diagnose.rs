@@ -11,6 +11,7 @@ use ::diagnose::page::page;
 use ::diagnose::record::Record;
 use closed_loop::Scenario;
 use closed_loop::scenario::Task;
+use drm::formula::Losses;
 use measured::ColumnMap;
 use plant::{Faults, Parameters};
 use toml_input::Sink;
@@ -86,7 +87,7 @@ fn request(options: &Diagnose, path: &Path, model: &Parameters) -> Result<Reques
         simulate::suits(&policy, converter, v_ref, file)?;
     }
     Ok(Request {
-        losses: super::drm::trained_on(&trained_on, file)?,
+        losses: Losses::of(&trained_on),
         policy,
         trained_on,
         v_ref,

@@ -14,7 +14,7 @@ use drm::formula::Losses;
 use drm::{Table, TableOptions};
 use plant::Parameters;
 use policy::{Interval, Policy};
-use toml_input::{Fault, Message, messages};
+use toml_input::{Message, messages};
 
 use crate::arguments::Columns;
 use crate::{Failure, Outcome};
@@ -62,7 +62,7 @@ impl Reading {
     fn simulation(&self) -> Result<Option<Losses>, Failure> {
         match &self.trained_on {
             None => Ok(self.v_in_sim.map(Losses::none)),
-            Some(path) => trained_on(&plant_parameters(path)?, path).map(Some),
+            Some(path) => Ok(Some(Losses::of(&plant_parameters(path)?))),
         }
     }
 
@@ -124,15 +124,6 @@ pub fn needs_mapping(policy: &Policy) -> Result<(), Failure> {
             .into());
     }
     Ok(())
-}
-
-/// The losses of the converter that a policy was trained on.
-pub fn trained_on(nominal: &Parameters, path: &Path) -> Result<Losses, Failure> {
-    Losses::of(nominal).ok_or_else(|| {
-        let hint = "give --v-in-sim instead, its input voltage, and count its losses to the mapping";
-        let message = Message::new("a synchronous leg has no formula of its steady state");
-        Fault::in_file(path, message.hint(hint)).into()
-    })
 }
 
 /// `low,high` of duty ratios.

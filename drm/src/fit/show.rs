@@ -57,7 +57,10 @@ pub fn text(report: &Report) -> Result<String, fmt::Error> {
     )?;
     if !report.discontinuous.is_empty() {
         let lines = crate::table::lines(&report.discontinuous);
-        writeln!(out, "left out as discontinuous conduction: {lines}")?;
+        writeln!(
+            out,
+            "left out, for the current rests or turns round in each period: {lines}"
+        )?;
     }
     for outlier in &report.outliers {
         let sigmas = if outlier.sigmas < 1e4 {

@@ -104,8 +104,8 @@ fn simulation(root: &mut Table<'_>, faults: &mut Sink) -> Option<Simulation> {
     let v_in = section
         .required("v_in", hint, faults)
         .and_then(|value| value.positive(faults));
-    let keys = ["v_f", "r_d", "r_on", "dcr", "lost_duty"];
-    let [v_f, r_d, r_on, dcr, lost_duty] =
+    let keys = ["v_f", "r_d", "r_on", "dcr", "lost_duty", "v_dead"];
+    let [v_f, r_d, r_on, dcr, lost_duty, v_dead] =
         keys.map(|key| section.optional(key).map_or(Some(0.0), |value| value.number(faults)));
     section.finish(faults);
     Some(Simulation {
@@ -115,6 +115,7 @@ fn simulation(root: &mut Table<'_>, faults: &mut Sink) -> Option<Simulation> {
         r_on: r_on?,
         dcr: dcr?,
         lost_duty: lost_duty?,
+        v_dead: v_dead?,
     })
 }
 

@@ -38,7 +38,7 @@ pub struct Transfer {
     /// What controls them
     #[arg(long, value_enum, default_value_t = ControllerKind::C)]
     pub controller: ControllerKind,
-    /// Beside the fitted mapping, run the exact one: the formula of the real converter's losses (diode rectifier)
+    /// Beside the fitted mapping, run the exact one: the formula of the real converter's losses
     #[arg(long)]
     pub ideal: bool,
     /// Folder to write; must be empty or not exist yet
@@ -133,7 +133,7 @@ fn prepare(options: &Transfer) -> Result<Setting, Failure> {
     let v_ref = simulate::v_ref(scenario.v_ref, &policy, file)?;
     simulate::suits(&policy, &nominal, v_ref, trained_on)?;
     Ok(Setting {
-        trained_on: super::trained_on(&nominal, trained_on)?,
+        trained_on: Losses::of(&nominal),
         scenario,
         policy,
         nominal,

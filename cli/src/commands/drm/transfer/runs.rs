@@ -88,18 +88,14 @@ fn one(
     let mut mapped = controllers::start(&setting.refit().with(&report.fit.map)?, setting.controller)?;
     runs.push(at(setting, MAPPED, real, mapped.controller.as_mut(), progress)?);
     let mut notes = report.notes.clone();
-    match Losses::of(real).filter(|_| setting.ideal) {
-        Some(losses) => {
-            let mut ideal = Ideal {
-                inner: unmapped,
-                trained_on: setting.trained_on,
-                real: losses,
-                limits: setting.policy.limits.duty,
-            };
-            runs.push(at(setting, EXACT, real, &mut ideal, progress)?);
-        }
-        None if setting.ideal => notes.push("a synchronous leg has no exact mapping to compare with".to_owned()),
-        None => {}
+    if setting.ideal {
+        let mut ideal = Ideal {
+            inner: unmapped,
+            trained_on: setting.trained_on,
+            real: Losses::of(real),
+            limits: setting.policy.limits.duty,
+        };
+        runs.push(at(setting, EXACT, real, &mut ideal, progress)?);
     }
     notes.extend(runs.iter().flat_map(ended_early));
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());

@@ -65,12 +65,15 @@ fn the_good_table_is_good() {
     assert_eq!((record.rows(), record.repairs.len()), (40, 0), "{:?}", record.repairs);
 }
 
-#[test]
-fn what_cannot_be_used_is_an_error_that_says_where_and_what_to_do() {
+/// What is wrong, the file, what the fault says, and the line that it names.
+type Case = (&'static str, Vec<u8>, &'static str, Option<usize>);
+
+/// Lines and cells that cannot be read.
+fn broken() -> Vec<Case> {
     let rows = good();
     let mut unsorted = rows.clone();
     unsorted.swap(10, 11);
-    let cases: Vec<(&str, Vec<u8>, &str, Option<usize>)> = vec![
+    vec![
         ("empty", Vec::new(), "the table is empty", None),
         (
             "header only",
@@ -122,6 +125,12 @@ fn what_cannot_be_used_is_an_error_that_says_where_and_what_to_do() {
             "without time",
             Some(5),
         ),
+    ]
+}
+
+/// Numbers that this quantity of this converter cannot have.
+fn impossible() -> Vec<Case> {
+    vec![
         ("time in us", column(0, times(1e6)).into_bytes(), "sample rate", None),
         ("time in ms", column(0, times(1e3)).into_bytes(), "sample rate", None),
         (
@@ -172,6 +181,13 @@ fn what_cannot_be_used_is_an_error_that_says_where_and_what_to_do() {
             "v_o and v_in look exchanged",
             None,
         ),
+    ]
+}
+
+/// Columns that are not there, or twice.
+fn misnamed() -> Vec<Case> {
+    let rows = good();
+    vec![
         (
             "twice",
             header("i_l", "v_o").into_bytes(),
@@ -246,8 +262,12 @@ fn what_cannot_be_used_is_an_error_that_says_where_and_what_to_do() {
             "no unit of `v_out`",
             Some(2),
         ),
-    ];
-    for (name, bytes, problem, line) in cases {
+    ]
+}
+
+#[test]
+fn what_cannot_be_used_is_an_error_that_says_where_and_what_to_do() {
+    for (name, bytes, problem, line) in [broken(), impossible(), misnamed()].concat() {
         let faults = read(&bytes).expect_err(name);
         let fault = &faults.list[0];
         assert!(fault.problem.contains(problem), "{name}: {}", fault.problem);

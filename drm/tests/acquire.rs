@@ -1,5 +1,5 @@
 //! Algorithm 1 against our own plant, and plans for a bench.
-#![allow(clippy::unwrap_used, clippy::panic)]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::disallowed_methods)]
 
 mod common;
 

@@ -1,6 +1,6 @@
 //! `plant.toml`: the presets read as documented, and every fault is named with its place.
 
-#![allow(clippy::unwrap_used)] // helpers of tests stand outside of #[test] functions
+#![allow(clippy::unwrap_used, clippy::disallowed_methods)] // helpers of tests stand outside of #[test] functions
 
 use std::path::Path;
 

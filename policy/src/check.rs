@@ -9,7 +9,7 @@ use crate::digests;
 use crate::faults::Faults;
 use crate::limits::MAX_FEATURES;
 use crate::model::{Action, Digests, Feature, Golden, Interval, Layer, Mapping, Policy, Signal};
-use crate::notes::{beyond_limits, beyond_mapping, only_duty, outside_at_first, unused};
+use crate::notes::{on_duties, unused};
 use crate::raw::RawPolicy;
 use crate::weights::{self, Weights};
 
@@ -78,17 +78,11 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
         mapping.as_ref().and_then(Option::as_ref),
     ));
     let limits = limits?;
-    notes.extend(outside_at_first(&limits));
-    let mapping_read = mapping.as_ref().and_then(Option::as_ref);
-    match only_duty(&limits, &actions.list, mapping_read) {
-        Some(duty) => notes.push(format!(
-            "every action commands the duty {duty}: the limits leave no other, and nothing is left to control with"
-        )),
-        None => notes.extend(beyond_limits(&limits, &actions.list, mapping_read)),
-    }
-    if let Some(mapping) = mapping_read {
-        notes.extend(beyond_mapping(&limits, &actions.list, mapping));
-    }
+    notes.extend(on_duties(
+        &limits,
+        &actions.list,
+        mapping.as_ref().and_then(Option::as_ref),
+    ));
     let mut policy = Policy {
         name: head.name?,
         sample_period: head.sample_period?,

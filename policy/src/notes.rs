@@ -4,6 +4,21 @@ use std::collections::BTreeMap;
 
 use crate::model::{Action, Expr, Feature, Input, Limits, Mapping, Signal};
 
+/// What the limits and the mapping make of the duties, where a reader may not expect it.
+pub fn on_duties(limits: &Limits, actions: &[Action], mapping: Option<&Mapping>) -> Vec<String> {
+    let mut notes: Vec<String> = outside_at_first(limits).into_iter().collect();
+    match only_duty(limits, actions, mapping) {
+        Some(duty) => notes.push(format!(
+            "every action commands the duty {duty}: the limits leave no other, and nothing is left to control with"
+        )),
+        None => notes.extend(beyond_limits(limits, actions, mapping)),
+    }
+    if let Some(mapping) = mapping {
+        notes.extend(beyond_mapping(limits, actions, mapping));
+    }
+    notes
+}
+
 /// Signals and parameters that nothing refers to.
 pub(crate) fn unused(
     parameters: &BTreeMap<String, f64>,
@@ -50,7 +65,7 @@ fn reads(expr: &Expr, index: usize) -> bool {
 ///
 /// The mapping applies outside its range, too: the status bit says so. Both ends of the range of the load current are looked
 /// at, since a mapped duty is linear in it.
-pub(crate) fn beyond_mapping(limits: &Limits, actions: &[Action], mapping: &Mapping) -> Vec<String> {
+fn beyond_mapping(limits: &Limits, actions: &[Action], mapping: &Mapping) -> Vec<String> {
     let mut notes = Vec::new();
     let range = mapping.valid_d_sim;
     let outside = |action: &&Action| action.duty < range.low || action.duty > range.high;
@@ -81,7 +96,7 @@ pub(crate) fn beyond_mapping(limits: &Limits, actions: &[Action], mapping: &Mapp
 
 /// The duty that the limits make of all actions, if these differ and nobody asked for a fixed duty by equal limits. A mapped duty is linear in the load current: if both
 /// ends of its range leave the same one, so does everything between.
-pub(crate) fn only_duty(limits: &Limits, actions: &[Action], mapping: Option<&Mapping>) -> Option<f64> {
+fn only_duty(limits: &Limits, actions: &[Action], mapping: Option<&Mapping>) -> Option<f64> {
     let own = actions.first()?.duty;
     if limits.duty.low == limits.duty.high || actions.iter().all(|action| action.duty == own) {
         return None;
@@ -102,7 +117,7 @@ fn mapped(mapping: &Mapping, d: f64, i: f64) -> f64 {
 }
 
 /// Actions that the duty limits cut off even without a mapping.
-pub(crate) fn beyond_limits(limits: &Limits, actions: &[Action], mapping: Option<&Mapping>) -> Option<String> {
+fn beyond_limits(limits: &Limits, actions: &[Action], mapping: Option<&Mapping>) -> Option<String> {
     if mapping.is_some() {
         return None;
     }
@@ -116,7 +131,7 @@ pub(crate) fn beyond_limits(limits: &Limits, actions: &[Action], mapping: Option
 }
 
 /// A duty before the first step that the limits do not hold.
-pub(crate) fn outside_at_first(limits: &Limits) -> Option<String> {
+fn outside_at_first(limits: &Limits) -> Option<String> {
     let (duty, range) = (limits.initial_duty, limits.duty);
     let is_outside = duty != 0.0 && !(range.low..=range.high).contains(&duty);
     is_outside.then(|| {

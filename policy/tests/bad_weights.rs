@@ -1,5 +1,7 @@
 //! Faults of safetensors files, each with its tensor.
 
+#![allow(clippy::disallowed_methods)]
+
 mod common;
 use common::*;
 use safetensors::Dtype;

@@ -24,27 +24,7 @@ const REAL_TIME: &str = "-DRT";
 /// What the harness must know of a policy, as C.
 fn config(policy: &Policy) -> String {
     let n = &policy.name;
-    let coefficients = policy.mapping.as_ref().map_or(Vec::new(), |mapping| {
-        let own = mapping.coefficients;
-        let mut all = vec![
-            (own.a, mapping.adjust_a),
-            (own.b, mapping.adjust_b),
-            (own.c, mapping.adjust_c),
-        ];
-        all.extend(own.r.map(|r| (r, mapping.adjust_r)));
-        all
-    });
-    let list = |values: Vec<f64>| {
-        let texts: Vec<String> = values.iter().map(|value| format!("{value:?}")).collect();
-        format!(
-            "{{ {} }}",
-            if texts.is_empty() {
-                "0.0".to_owned()
-            } else {
-                texts.join(", ")
-            }
-        )
-    };
+    let coefficients = coefficients(policy);
     // the range as it arrives: an ADC port takes codes
     let arrives = |pick: fn(Interval) -> f64| {
         let value = |signal: &policy::Signal| match signal.adc {
@@ -117,6 +97,30 @@ static uint32_t set_mapping({n}_state *state, const double *values)
         coefficient_lows = list(coefficients.iter().map(|(_, range)| range.low).collect()),
         coefficient_highs = list(coefficients.iter().map(|(_, range)| range.high).collect()),
     )
+}
+
+/// What can be set at run time: value and range of each coefficient of the mapping.
+fn coefficients(policy: &Policy) -> Vec<(f64, Interval)> {
+    let Some(mapping) = &policy.mapping else {
+        return Vec::new();
+    };
+    let own = mapping.coefficients;
+    let mut all = vec![
+        (own.a, mapping.adjust_a),
+        (own.b, mapping.adjust_b),
+        (own.c, mapping.adjust_c),
+    ];
+    all.extend(own.r.map(|r| (r, mapping.adjust_r)));
+    all
+}
+
+/// Numbers as an initialiser in C, which is never empty.
+fn list(values: Vec<f64>) -> String {
+    let texts: Vec<String> = values.iter().map(|value| format!("{value:?}")).collect();
+    match texts.as_slice() {
+        [] => "{ 0.0 }".to_owned(),
+        texts => format!("{{ {} }}", texts.join(", ")),
+    }
 }
 
 struct Bench {

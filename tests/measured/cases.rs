@@ -88,6 +88,7 @@ pub fn cases() -> Vec<Case> {
         written_otherwise(),
         named_otherwise(),
         broken(),
+        broken_lines(),
         other_files(),
         odd_cells(),
         in_other_units(),
@@ -236,6 +237,15 @@ fn broken() -> Vec<Case> {
             &["the header stands a second time", "cut the file"],
             Some(42),
         ),
+    ]
+}
+
+/// Tables with a line that is none.
+fn broken_lines() -> Vec<Case> {
+    let refused = |name, text: String, words: &'static [&'static str], line| {
+        each(name, text, [(); 3].map(|()| Refused(words, line)))
+    };
+    vec![
         refused(
             "a short line",
             line(9, |l| l[..20].to_owned()),

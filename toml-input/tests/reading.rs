@@ -1,6 +1,6 @@
 //! Places, limits and typed values: what is read, and what is said where.
 
-#![allow(clippy::unwrap_used, clippy::panic)]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::disallowed_methods)]
 
 use std::path::Path;
 

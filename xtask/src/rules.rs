@@ -4,9 +4,7 @@ mod layers;
 mod lengths;
 mod links;
 mod portable;
-mod source;
 mod words;
-mod writers;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -34,16 +32,7 @@ pub fn layers(workspace: &Workspace) -> Result<Findings, String> {
     })
 }
 
-/// Only `cli` and the test side write files.
-pub fn writers(workspace: &Workspace) -> Result<Findings, String> {
-    over_files(workspace, |path, bytes, findings| {
-        if let (true, Ok(text)) = (writers::applies(path), std::str::from_utf8(bytes)) {
-            findings.faults.extend(writers::check(path, text));
-        }
-    })
-}
-
-/// Lengths of files and functions.
+/// Lengths of files and templates.
 pub fn lengths(workspace: &Workspace) -> Result<Findings, String> {
     over_files(workspace, |path, bytes, findings| {
         if let Ok(text) = std::str::from_utf8(bytes) {

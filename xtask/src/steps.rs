@@ -63,7 +63,6 @@ pub const OF_THE_BOOK: &[Step] = &[PAGES, BOOK];
 pub const ALL: &[Step] = &[
     step("tools", true, install),
     step("layers", true, |c| judged(rules::layers(c.workspace))),
-    step("writers", true, |c| judged(rules::writers(c.workspace))),
     step("lengths", true, |c| judged(rules::lengths(c.workspace))),
     step("portable", true, |c| judged(rules::portable(c.workspace))),
     PAGES,

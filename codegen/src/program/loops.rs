@@ -291,6 +291,22 @@ pub struct IntegerInput {
     pub high: i32,
 }
 
+impl Layer {
+    /// The blocks of its outputs: which, how many, and what is done for each.
+    pub fn blocks(&self) -> impl Iterator<Item = (Part, usize, &[Loop])> {
+        self.body.iter().filter_map(|node| match node {
+            Loop::Repeat { blocks, count, body } => Some((*blocks, *count, body.as_slice())),
+            _ => None,
+        })
+    }
+
+    /// Whether some blocks take a loop.
+    #[must_use]
+    pub fn loops_over_blocks(&self) -> bool {
+        self.blocks().any(|(_, count, _)| count > 1)
+    }
+}
+
 impl Network {
     /// Format of sums, or of what integers stand for.
     #[must_use]

@@ -24,7 +24,7 @@ pub fn text(report: &Report) -> Result<String, fmt::Error> {
         entries.push(("r", r, se, " 1/A"));
     }
     for (name, value, error, unit) in entries {
-        writeln!(out, "  {name} = {value:>12.6e} +- {error:.1e}{unit}")?;
+        writeln!(out, "  {name} = {value:>11.8} +- {error:.1e}{unit}")?;
     }
     let (i, d) = (fit.map.valid_i_out, fit.map.valid_d_sim);
     writeln!(

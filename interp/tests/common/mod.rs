@@ -1,6 +1,6 @@
 //! Policies for tests: written to a temporary folder and loaded like a user's.
 
-#![allow(clippy::unwrap_used, clippy::panic)]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::disallowed_methods)]
 
 use std::fs;
 use std::path::Path;

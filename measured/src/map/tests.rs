@@ -1,3 +1,5 @@
+#![allow(clippy::disallowed_methods)]
+
 use super::*;
 
 fn file(text: &str) -> Result<ColumnMap, Faults> {

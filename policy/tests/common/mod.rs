@@ -1,6 +1,6 @@
 //! A small valid policy in a temporary folder, and ways to spoil it.
 #![allow(dead_code)] // each test file uses its part
-#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // helpers of tests fail as tests do
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::disallowed_methods)] // helpers of tests fail as tests do
 
 use std::path::PathBuf;
 

@@ -1,12 +1,11 @@
-//! Files of up to about 500 lines, functions of up to about 80, templates of up to 150.
+//! Files of up to about 500 lines, templates of up to 150; clippy counts those of functions.
 
 use std::path::Path;
 
-use super::{Findings, source};
+use super::Findings;
 
 const FILE_WARN: usize = 500;
 const FILE_FAIL: usize = 600;
-const FUNCTION_WARN: usize = 80;
 /// A template is fixed text and layout: a longer one holds more than one idea.
 const TEMPLATE_LINES: usize = 150;
 
@@ -36,14 +35,6 @@ pub fn check(path: &Path, text: &str, findings: &mut Findings) {
             .warnings
             .push(format!("{shown}: {lines} lines, more than {FILE_WARN}"));
     }
-    for function in source::functions(&source::mask(text)) {
-        if function.lines > FUNCTION_WARN {
-            findings.warnings.push(format!(
-                "{shown}:{}: fn {} has {} lines, more than {FUNCTION_WARN}",
-                function.line, function.name, function.lines
-            ));
-        }
-    }
 }
 
 #[cfg(test)]
@@ -72,16 +63,6 @@ mod tests {
             let judged = judge(path, &"\n".repeat(1000));
             assert_eq!((judged.faults.len(), judged.warnings.len()), (0, 0));
         }
-    }
-
-    #[test]
-    fn a_function_over_80_lines_warns_with_its_place() {
-        let text = format!("\nfn long() {{{}}}\n", "\n".repeat(80));
-        let judged = judge("policy/src/a.rs", &text);
-        assert_eq!(
-            judged.warnings,
-            ["policy/src/a.rs:2: fn long has 81 lines, more than 80"]
-        );
     }
 
     #[test]

@@ -147,11 +147,8 @@ impl Printer<'_> {
         let (n, u, weight, index) = (self.n, &self.u, self.weight, layer.index);
         let mut calls = Vec::new();
         let mut first = 0;
-        for node in &layer.body {
-            let Loop::Repeat { count, body, .. } = node else {
-                continue;
-            };
-            let Some(kernel) = Kernel::of(self.network, *count, body) else {
+        for (_, count, body) in layer.blocks() {
+            let Some(kernel) = Kernel::of(self.network, count, body) else {
                 continue;
             };
             let name = format!("{n}_kernel{index}_{}", kernel.height);
@@ -198,18 +195,12 @@ impl Printer<'_> {
             if layer.next.is_some() || has_turns(layer) {
                 text.line("uint32_t i;");
             }
-            if layer
-                .body
-                .iter()
-                .any(|node| matches!(node, Loop::Repeat { count, .. } if *count > 1))
-            {
+            if layer.loops_over_blocks() {
                 text.line("uint32_t block;");
             }
             self.begin(layer, text);
-            for node in &layer.body {
-                if let Loop::Repeat { count, body, .. } = node {
-                    text.repeat("block", *count, |text| self.block(body, text));
-                }
+            for (_, count, body) in layer.blocks() {
+                text.repeat("block", count, |text| self.block(body, text));
             }
         });
     }
@@ -442,8 +433,5 @@ fn sink(layer: &Layer) -> &'static str {
 /// Whether the loops over groups of inputs are loops.
 fn has_turns(layer: &Layer) -> bool {
     let turns = |node: &Loop| matches!(node, Loop::Sums(sums) if sums.turns.iter().any(|turns| turns.count > 1));
-    layer
-        .body
-        .iter()
-        .any(|node| matches!(node, Loop::Repeat { body, .. } if body.iter().any(turns)))
+    layer.blocks().any(|(_, _, body)| body.iter().any(turns))
 }

@@ -194,11 +194,7 @@ impl<'a> Printer<'a> {
                 unless(text, kept == Kept::Vectors && !is_stored, "LANES", "uint32_t o;");
             }
         }
-        if layer
-            .body
-            .iter()
-            .any(|node| matches!(node, Loop::Repeat { count, .. } if *count > 1))
-        {
+        if layer.loops_over_blocks() {
             text.line("uint32_t block;");
         }
     }
@@ -339,11 +335,7 @@ const LANES: [usize; 3] = [4, 8, 16];
 
 /// Where the sums of a layer are kept.
 fn kept(layer: &Layer) -> Kept {
-    let first = layer.body.iter().find_map(|node| match node {
-        Loop::Repeat { body, .. } => body.first(),
-        _ => None,
-    });
-    match first {
+    match layer.blocks().find_map(|(_, _, body)| body.first()) {
         Some(Loop::Sums(sums)) => sums.kept,
         _ => Kept::Registers,
     }

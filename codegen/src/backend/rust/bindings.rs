@@ -20,42 +20,17 @@ pub fn emit(program: &Program) -> Result<crate::files::GeneratedFiles, crate::fi
 }
 
 fn items(program: &Program) -> TokenStream {
-    let number = number::kind(program.scalar());
+    let constants = constants(program);
+    let types = types(program, &quote!(#[repr(C)]));
+    let name = ident(DEFAULT_TYPE);
     let State {
         fields,
         zero,
         words,
         as_words,
     } = state(program);
-    let constants = constants(program);
-    let types = types(program, &quote!(#[repr(C)]));
-    let name = ident(DEFAULT_TYPE);
-    let symbol = |function: &str| format!("{}_{function}", program.name);
-    let [
-        init,
-        reset,
-        eval,
-        commit,
-        step,
-        observe,
-        q_values,
-        self_test,
-        integrity,
-        integrity_slice,
-    ] = [
-        "init",
-        "reset",
-        "eval",
-        "commit",
-        "step",
-        "observe",
-        "q_values",
-        "self_test",
-        "integrity",
-        "integrity_slice",
-    ]
-    .map(symbol);
-    let (declare_mapping, set_mapping) = mapping(program);
+    let (declared_mapping, set_mapping) = mapping(program);
+    let core = core(program, &declared_mapping);
     let check = integrity::check(
         program,
         &quote!(#[repr(C)]),
@@ -66,6 +41,7 @@ fn items(program: &Program) -> TokenStream {
             }
         },
     );
+    let methods = methods(program, &set_mapping);
     quote! {
         #constants
         #types
@@ -73,32 +49,7 @@ fn items(program: &Program) -> TokenStream {
         #[derive(Clone)]
         #[repr(C)]
         pub struct #name { #fields }
-        mod c {
-            use super::{Command, IntegrityCheck, Measurement, #name};
-            unsafe extern "C" {
-                #[link_name = #init]
-                pub fn init(state: *mut #name);
-                #[link_name = #reset]
-                pub fn reset(state: *mut #name);
-                #[link_name = #eval]
-                pub fn eval(state: *const #name, measured: *const Measurement, command: *mut Command);
-                #[link_name = #commit]
-                pub fn commit(state: *mut #name, measured: *const Measurement, command: *const Command);
-                #[link_name = #step]
-                pub fn step(state: *mut #name, measured: *const Measurement, command: *mut Command);
-                #[link_name = #observe]
-                pub fn observe(state: *const #name, measured: *const Measurement, observation: *mut #number);
-                #[link_name = #q_values]
-                pub fn q_values(observation: *const #number, q: *mut #number);
-                #declare_mapping
-                #[link_name = #self_test]
-                pub fn self_test() -> u32;
-                #[link_name = #integrity]
-                pub fn integrity() -> u32;
-                #[link_name = #integrity_slice]
-                pub fn integrity_slice(check: *mut IntegrityCheck, count: u32) -> u32;
-            }
-        }
+        #core
         #check
         // Every call hands over references or arrays of the lengths in the C header, which the C core reads and writes
         // within these lengths and does not keep.
@@ -120,55 +71,114 @@ fn items(program: &Program) -> TokenStream {
             pub fn state_words(&self) -> [u32; STATE_WORDS] {
                 #as_words
             }
-            /// Command for this measurement; changes nothing.
-            #[must_use]
-            pub fn eval(&self, measured: &Measurement) -> Command {
-                let mut command = Self::NOTHING;
-                unsafe { c::eval(self, measured, &mut command) };
-                command
-            }
-            /// Advances the filters by one sample period, with the command that `eval` gave for this measurement.
-            pub fn commit(&mut self, measured: &Measurement, command: &Command) {
-                unsafe { c::commit(self, measured, command) }
-            }
-            /// `eval` and `commit`.
-            pub fn step(&mut self, measured: &Measurement) -> Command {
-                let mut command = Self::NOTHING;
-                unsafe { c::step(self, measured, &mut command) };
-                command
-            }
-            /// Observation for this measurement; changes nothing.
-            #[must_use]
-            pub fn observe(&self, measured: &Measurement) -> [#number; FEATURES] {
-                let mut observation = [0.0; FEATURES];
-                unsafe { c::observe(self, measured, observation.as_mut_ptr()) };
-                observation
-            }
-            /// Q values of an observation.
-            #[must_use]
-            pub fn q_values(observation: &[#number; FEATURES]) -> [#number; ACTIONS] {
-                let mut q = [0.0; ACTIONS];
-                unsafe { c::q_values(observation.as_ptr(), q.as_mut_ptr()) };
-                q
-            }
-            #set_mapping
-            /// Known answers: the number of the first failing vector if the arithmetic of this build is not the policy's.
-            pub fn self_test() -> Result<(), u32> {
-                match unsafe { c::self_test() } {
-                    0 => Ok(()),
-                    vector => Err(vector),
-                }
-            }
-            /// CRC-32 over the tables: whether they are as generated.
-            #[must_use]
-            pub fn integrity() -> bool {
-                unsafe { c::integrity() == 1 }
-            }
+            #methods
         }
         impl Default for #name {
             fn default() -> Self {
                 Self::new()
             }
+        }
+    }
+}
+
+/// The declarations of the C core; each is called as in its header, less the name of the policy.
+fn core(program: &Program, set_mapping: &TokenStream) -> TokenStream {
+    let (name, number) = (ident(DEFAULT_TYPE), number::kind(program.scalar()));
+    let function = |name: &str, signature: TokenStream| {
+        let (symbol, name) = (format!("{}_{name}", program.name), ident(name));
+        quote! {
+            #[link_name = #symbol]
+            pub fn #name #signature;
+        }
+    };
+    let control = [
+        function("init", quote!((state: *mut #name))),
+        function("reset", quote!((state: *mut #name))),
+        function(
+            "eval",
+            quote!((state: *const #name, measured: *const Measurement, command: *mut Command)),
+        ),
+        function(
+            "commit",
+            quote!((state: *mut #name, measured: *const Measurement, command: *const Command)),
+        ),
+        function(
+            "step",
+            quote!((state: *mut #name, measured: *const Measurement, command: *mut Command)),
+        ),
+        function(
+            "observe",
+            quote!((state: *const #name, measured: *const Measurement, observation: *mut #number)),
+        ),
+        function("q_values", quote!((observation: *const #number, q: *mut #number))),
+    ];
+    let checks = [
+        function("self_test", quote!(() -> u32)),
+        function("integrity", quote!(() -> u32)),
+        function(
+            "integrity_slice",
+            quote!((check: *mut IntegrityCheck, count: u32) -> u32),
+        ),
+    ];
+    quote! {
+        mod c {
+            use super::{Command, IntegrityCheck, Measurement, #name};
+            unsafe extern "C" {
+                #(#control)*
+                #set_mapping
+                #(#checks)*
+            }
+        }
+    }
+}
+
+/// What a controller does, each by one call of the C core.
+fn methods(program: &Program, set_mapping: &TokenStream) -> TokenStream {
+    let number = number::kind(program.scalar());
+    quote! {
+        /// Command for this measurement; changes nothing.
+        #[must_use]
+        pub fn eval(&self, measured: &Measurement) -> Command {
+            let mut command = Self::NOTHING;
+            unsafe { c::eval(self, measured, &mut command) };
+            command
+        }
+        /// Advances the filters by one sample period, with the command that `eval` gave for this measurement.
+        pub fn commit(&mut self, measured: &Measurement, command: &Command) {
+            unsafe { c::commit(self, measured, command) }
+        }
+        /// `eval` and `commit`.
+        pub fn step(&mut self, measured: &Measurement) -> Command {
+            let mut command = Self::NOTHING;
+            unsafe { c::step(self, measured, &mut command) };
+            command
+        }
+        /// Observation for this measurement; changes nothing.
+        #[must_use]
+        pub fn observe(&self, measured: &Measurement) -> [#number; FEATURES] {
+            let mut observation = [0.0; FEATURES];
+            unsafe { c::observe(self, measured, observation.as_mut_ptr()) };
+            observation
+        }
+        /// Q values of an observation.
+        #[must_use]
+        pub fn q_values(observation: &[#number; FEATURES]) -> [#number; ACTIONS] {
+            let mut q = [0.0; ACTIONS];
+            unsafe { c::q_values(observation.as_ptr(), q.as_mut_ptr()) };
+            q
+        }
+        #set_mapping
+        /// Known answers: the number of the first failing vector if the arithmetic of this build is not the policy's.
+        pub fn self_test() -> Result<(), u32> {
+            match unsafe { c::self_test() } {
+                0 => Ok(()),
+                vector => Err(vector),
+            }
+        }
+        /// CRC-32 over the tables: whether they are as generated.
+        #[must_use]
+        pub fn integrity() -> bool {
+            unsafe { c::integrity() == 1 }
         }
     }
 }

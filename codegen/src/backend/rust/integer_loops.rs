@@ -14,7 +14,7 @@ use proc_macro2::{Ident, TokenStream};
 use quote::quote;
 
 use super::tables;
-use super::tokens::{ident, size};
+use super::tokens::{self, hidden, ident, size};
 use crate::activation::{rust_cut, text_of};
 use crate::assembly;
 use crate::assembly::integer::Kernel;
@@ -29,7 +29,7 @@ pub fn network(program: &Program, code: &IntegerCode, weight: &TokenStream) -> (
         items.extend(layer.next.map(|last| tables::layer(program, last, true)));
         items.push(tables::layer(program, layer.index, false));
         items.push(printer.function(layer));
-        let (name, source) = (function(layer), buffer(layer.from));
+        let (name, source) = (tokens::layer(layer.index), buffer(layer.from));
         let (sink, value) = match layer.next {
             Some(last) => {
                 let biases = tables::biases(program, last, Part::Full);
@@ -38,7 +38,7 @@ pub fn network(program: &Program, code: &IntegerCode, weight: &TokenStream) -> (
                 (ident("sums"), quote!(let mut sums = Words(#biases);))
             }
             None => {
-                let sink = ident(&format!("hidden{}", layer.index));
+                let sink = hidden(layer.index);
                 let (kind, length) = printer.sink(layer);
                 result = quote!(#sink.0);
                 (
@@ -75,17 +75,19 @@ impl Printer<'_> {
             " {}: {} -> {}, cut by {} bits",
             shape.name, shape.inputs, shape.outputs, shape.shift
         );
-        let (name, inputs) = (function(layer), size(self.program.network.padded(layer.inputs)));
+        let (name, inputs) = (
+            tokens::layer(layer.index),
+            size(self.program.network.padded(layer.inputs)),
+        );
         let (kind, length) = self.sink(layer);
         let head = quote!(fn #name(x: &Words<[i16; #inputs]>, y: &mut Words<[#kind; #length]>));
         let rest = layer
             .next
             .is_none()
             .then(|| quote! { let mut rest: &mut [#kind] = &mut y.0; });
-        let loops = layer.body.iter().filter_map(|node| match node {
-            Loop::Repeat { blocks, body, .. } => self.repeat(layer, *blocks, body),
-            _ => None,
-        });
+        let loops = layer
+            .blocks()
+            .filter_map(|(part, _, body)| self.repeat(layer, part, body));
         let portable = quote! { #rest #(#loops)* };
         if !layer.has_assembly {
             return quote! { #[doc = #doc] #[inline(always)] #head { #portable } };
@@ -156,17 +158,14 @@ impl Printer<'_> {
     /// The kernels of a layer, one a height of blocks, and their calls.
     fn kernels(&self, layer: &Layer) -> (Vec<TokenStream>, Vec<TokenStream>) {
         let (mut kernels, mut calls, mut first) = (Vec::new(), Vec::new(), 0);
-        for node in &layer.body {
-            let Loop::Repeat { blocks, count, body } = node else {
-                continue;
-            };
-            let Some(kernel) = Kernel::of(&self.program.network, *count, body) else {
+        for (part, count, body) in layer.blocks() {
+            let Some(kernel) = Kernel::of(&self.program.network, count, body) else {
                 continue;
             };
             let name = ident(&format!("kernel{}_{}", layer.index, kernel.height));
-            let weights = tables::weights(self.program, layer.index, *blocks);
-            let biases = tables::biases(self.program, layer.index, *blocks);
-            let next = layer.next.map(|last| tables::weights(self.program, last, *blocks));
+            let weights = tables::weights(self.program, layer.index, part);
+            let biases = tables::biases(self.program, layer.index, part);
+            let next = layer.next.map(|last| tables::weights(self.program, last, part));
             let next = next.into_iter().flatten().map(|next| quote!(, #next.as_ptr().cast()));
             let at = size(if layer.next.is_some() { 0 } else { first });
             kernels.push(assembly::rust::integer(&kernel, &name, self.program, self.weight));
@@ -179,13 +178,9 @@ impl Printer<'_> {
     }
 }
 
-fn function(layer: &Layer) -> Ident {
-    ident(&format!("layer{}", layer.index))
-}
-
 fn buffer(buffer: Buffer) -> Ident {
     match buffer {
-        Buffer::Hidden(index) => ident(&format!("hidden{index}")),
+        Buffer::Hidden(index) => hidden(index),
         Buffer::Input | Buffer::Block | Buffer::Output => ident("input"),
     }
 }

@@ -4,11 +4,11 @@
 //! `network` with the block of the one written out and one function, generic over the length of a block, of the other.
 
 use policy::Scalar;
-use proc_macro2::{Ident, TokenStream};
+use proc_macro2::TokenStream;
 use quote::quote;
 
 use super::kernels::store;
-use super::tokens::{ident, size};
+use super::tokens::{self, hidden, size};
 use super::{number, tables};
 use crate::program::{Buffer, Layer, Loop, Part, Program, Shape, Store};
 
@@ -64,7 +64,7 @@ impl Printer<'_> {
 
     /// The function of a layer.
     fn whole(&self, layer: &Layer) -> TokenStream {
-        let (kind, name) = (number::kind(self.scalar), function(layer));
+        let (kind, name) = (number::kind(self.scalar), tokens::layer(layer.index));
         let doc = format!(" {}: {} -> {}", self.shape(layer).name, layer.inputs, layer.outputs);
         let (inputs, outputs) = (size(layer.inputs), size(layer.outputs));
         let loops = blocks(layer).map(|(part, node)| {
@@ -102,7 +102,7 @@ impl Printer<'_> {
     }
 
     fn call(&self, layer: &Layer) -> TokenStream {
-        let (name, sink, outputs) = (function(layer), hidden(layer.index), size(layer.outputs));
+        let (name, sink, outputs) = (tokens::layer(layer.index), hidden(layer.index), size(layer.outputs));
         let value = value(layer.from);
         quote! {
             let mut #sink = [EMPTY; #outputs];
@@ -112,20 +112,17 @@ impl Printer<'_> {
 
     /// The function that adds a block of inputs to the sums of the last layer.
     fn added(&self, last: &Layer) -> TokenStream {
-        let (kind, name, shape) = (number::kind(self.scalar), function(last), self.shape(last));
+        let (kind, name, shape) = (number::kind(self.scalar), tokens::layer(last.index), self.shape(last));
         let doc = format!(
             " {}: {} -> {}, what a chunk of its inputs adds",
             shape.name, shape.inputs, shape.outputs
         );
         let outputs = size(last.outputs);
         let (mut parameters, mut loops) = (Vec::new(), Vec::new());
-        for node in &last.body {
-            let Loop::Repeat { blocks, count, body } = node else {
-                continue;
-            };
+        for (part, count, body) in last.blocks() {
             let rows = size(stored(body).map_or(0, |node| node.rows));
-            if *blocks == Part::Full {
-                let count = size(*count);
+            if part == Part::Full {
+                let count = size(count);
                 parameters.push(quote!(weights: &[[[f32; #rows]; INPUTS]; #count],));
                 loops.push(quote! {
                     for weights in weights {
@@ -166,7 +163,7 @@ impl Printer<'_> {
         let weights = tables::weights(self.program, block.index, part);
         let biases = tables::biases(self.program, block.index, part);
         let next = tables::weights(self.program, last.index, part);
-        let (function, length, x) = (function(last), size(block.outputs), value(block.from));
+        let (function, length, x) = (tokens::layer(last.index), size(block.outputs), value(block.from));
         let activation = blocks(block).next().map(|(_, node)| node.activation);
         let stored = |tables: TokenStream| {
             activation.map(|activation| store(self.scalar, activation, &quote!(#tables, #x), &quote!(&mut part)))
@@ -200,10 +197,7 @@ impl Printer<'_> {
 
 /// The blocks of outputs of a layer, and what becomes of their sums.
 fn blocks(layer: &Layer) -> impl Iterator<Item = (Part, &Store)> {
-    layer.body.iter().filter_map(|node| match node {
-        Loop::Repeat { blocks, body, .. } => Some((*blocks, stored(body)?)),
-        _ => None,
-    })
+    layer.blocks().filter_map(|(part, _, body)| Some((part, stored(body)?)))
 }
 
 fn stored(body: &[Loop]) -> Option<&Store> {
@@ -211,14 +205,6 @@ fn stored(body: &[Loop]) -> Option<&Store> {
         Loop::Store(store) => Some(store),
         _ => None,
     })
-}
-
-fn function(layer: &Layer) -> Ident {
-    ident(&format!("layer{}", layer.index))
-}
-
-fn hidden(index: usize) -> Ident {
-    ident(&format!("hidden{index}"))
 }
 
 /// A buffer as the input of a layer.

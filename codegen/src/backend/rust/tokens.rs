@@ -23,6 +23,16 @@ pub fn signed(value: impl Into<i64>) -> TokenStream {
     negated(value < 0, Literal::u64_unsuffixed(value.unsigned_abs()))
 }
 
+/// The function of a layer.
+pub fn layer(index: usize) -> Ident {
+    ident(&format!("layer{index}"))
+}
+
+/// The outputs of a hidden layer.
+pub fn hidden(index: usize) -> Ident {
+    ident(&format!("hidden{index}"))
+}
+
 pub fn size(value: usize) -> Literal {
     Literal::usize_unsuffixed(value)
 }

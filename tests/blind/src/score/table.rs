@@ -98,20 +98,7 @@ fn lines(all: &[&Judgement]) -> Vec<Line> {
             .fold((0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
         Line { what, hits, of, asked }
     };
-    let errors: Vec<_> = all.iter().flat_map(|j| &j.parameters).collect();
-    let bounded: Vec<f64> = errors.iter().filter_map(|error| error.of_bound).collect();
-    let parameters = Line {
-        what: "parameters of separable causes within their bounds",
-        hits: bounded.iter().filter(|&&error| error <= 1.0).count(),
-        of: bounded.len(),
-        asked: Asked::AtLeast(1.0),
-    };
-    let coverage = Line {
-        what: "95 % intervals that hold the hidden value",
-        hits: errors.iter().filter(|error| error.covered).count(),
-        of: errors.len(),
-        asked: Asked::Between(0.85, 1.0),
-    };
+    let [parameters, coverage] = sizes(all);
     vec![
         line("no effect: false alarms", &none, &|j| j.false_alarm, Asked::AtMost(0)),
         line(
@@ -163,6 +150,25 @@ fn lines(all: &[&Judgement]) -> Vec<Line> {
             Asked::AtMost(listed.len() / 24 + usize::from(listed.len() < 24)),
         ),
     ]
+}
+
+/// How well the sizes of effects are told.
+fn sizes(all: &[&Judgement]) -> [Line; 2] {
+    let errors: Vec<_> = all.iter().flat_map(|j| &j.parameters).collect();
+    let bounded: Vec<f64> = errors.iter().filter_map(|error| error.of_bound).collect();
+    let parameters = Line {
+        what: "parameters of separable causes within their bounds",
+        hits: bounded.iter().filter(|&&error| error <= 1.0).count(),
+        of: bounded.len(),
+        asked: Asked::AtLeast(1.0),
+    };
+    let coverage = Line {
+        what: "95 % intervals that hold the hidden value",
+        hits: errors.iter().filter(|error| error.covered).count(),
+        of: errors.len(),
+        asked: Asked::Between(0.85, 1.0),
+    };
+    [parameters, coverage]
 }
 
 fn gains(all: &[&Judgement], text: &mut String) {

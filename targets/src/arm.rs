@@ -1,7 +1,7 @@
 //! Arm Cortex-M.
 
 use crate::boards::{MICROBIT, MPS2_AN385_BOARD, MPS2_AN386_BOARD, MPS2_AN500_BOARD, MPS2_AN505_BOARD};
-use crate::{
+use crate::spec::{
     CCompiler, CycleModel, EXACT_C99, EXACT_RUST, Endianness, Fma, Fpu, GNU_SECTIONS, ILP32, IntegerBlock, IntegerLoop,
     RowBlock, Runner, RustTarget, Sections, TargetSpec,
 };

@@ -1,7 +1,7 @@
 //! This machine, the laboratory box, the DSP, and whatever has a C99 compiler.
 
 use crate::boards::LINUX_PPC;
-use crate::{
+use crate::spec::{
     CCompiler, EXACT_C99, EXACT_RUST, Endianness, Fma, Fpu, GNU_SECTIONS, ILP32, IntegerBlock, IntegerLoop, RowBlock,
     Runner, RustTarget, Sections, TargetSpec, Widths,
 };

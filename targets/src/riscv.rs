@@ -1,7 +1,7 @@
 //! RISC-V with 32 bits.
 
 use crate::boards::{VIRT_RV32IMC, VIRT_RV32IMFC};
-use crate::{
+use crate::spec::{
     CCompiler, EXACT_C99, EXACT_RUST, Endianness, Fma, Fpu, GNU_SECTIONS, ILP32, IntegerBlock, IntegerLoop, RowBlock,
     Runner, RustTarget, TargetSpec,
 };

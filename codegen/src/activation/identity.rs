@@ -4,7 +4,7 @@ use policy::Scalar;
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use super::{C, Text, c_shifted, rust_shifted};
+use super::text::{C, Text, c_shifted, rust_shifted};
 use crate::program::{Cut, Sink, Store};
 
 pub(super) struct Identity;

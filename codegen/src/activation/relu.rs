@@ -4,7 +4,7 @@ use policy::Scalar;
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use super::{C, Rust, Text, c_shifted, rust_shifted};
+use super::text::{C, Rust, Text, c_shifted, rust_shifted};
 use crate::backend::rust::number;
 use crate::program::{Cut, Store};
 

@@ -4,9 +4,9 @@ use policy::Scalar;
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use super::{C, Rust, Text};
+use super::number::Number;
+use super::text::{C, Rust, Text};
 use crate::backend::rust::tokens::{float, ident};
-use crate::lower::known_answers::Number;
 use crate::program::{Cut, Literal, Store};
 
 /// A function of one number, by its name in generated code.

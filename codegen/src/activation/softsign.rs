@@ -3,10 +3,10 @@
 use proc_macro2::TokenStream;
 use quote::quote;
 
+use super::number::Number;
 use super::sigmoid::Function;
-use super::{C, Rust};
+use super::text::{C, Rust};
 use crate::backend::rust::number;
-use crate::lower::known_answers::Number;
 
 pub(super) struct Softsign;
 

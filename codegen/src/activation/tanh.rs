@@ -5,11 +5,11 @@ use policy::activation::{TANH_DENOMINATOR, TANH_NUMERATOR, TANH_RANGE};
 use proc_macro2::TokenStream;
 use quote::quote;
 
+use super::number::Number;
 use super::sigmoid::{Function, nearest};
-use super::{C, Rust};
+use super::text::{C, Rust};
 use crate::backend::rust::number::{self, number};
 use crate::backend::rust::tokens::ident;
-use crate::lower::known_answers::Number;
 
 pub(super) struct Tanh;
 

@@ -4,12 +4,11 @@
 //! changes the arithmetic on the target; that the lowering itself is right is shown elsewhere, against the interpreter.
 
 use std::collections::BTreeMap;
-use std::ops::{Add, Div, Mul};
 
 use policy::scales::{power_of_two, round_half_up};
 use policy::{Policy, Scalar};
 
-use crate::activation::{Text, text_of};
+use crate::activation::{Number, text_of};
 use crate::crc::crc32_words;
 use crate::program::{
     Arithmetic, Buffer, Element, From, IntegerCode, Kept, Literal, Loop, Network, Sink, Store, Sums, Table, words,
@@ -238,49 +237,6 @@ impl<T: Copy + Default, M: Machine<T>> Run<'_, T, M> {
         buffer.resize(buffer.len().max(end), T::default());
         buffer[self.at..end].copy_from_slice(&self.sums);
         self.at = end;
-    }
-}
-
-/// The format in which the answers are computed: `f32` or `f64`.
-pub(crate) trait Number:
-    Copy + PartialOrd + Add<Output = Self> + Mul<Output = Self> + Div<Output = Self>
-{
-    const SCALAR: Scalar;
-    fn nearest(value: f64) -> Self;
-    fn fused(self, by: Self, plus: Self) -> Self;
-    fn wide(self) -> f64;
-    fn activated(self, text: &dyn Text) -> Self;
-}
-
-impl Number for f32 {
-    const SCALAR: Scalar = Scalar::F32;
-    fn nearest(value: f64) -> Self {
-        value as f32
-    }
-    fn fused(self, by: Self, plus: Self) -> Self {
-        self.mul_add(by, plus)
-    }
-    fn wide(self) -> f64 {
-        self.into()
-    }
-    fn activated(self, text: &dyn Text) -> Self {
-        text.single(self)
-    }
-}
-
-impl Number for f64 {
-    const SCALAR: Scalar = Scalar::F64;
-    fn nearest(value: f64) -> Self {
-        value
-    }
-    fn fused(self, by: Self, plus: Self) -> Self {
-        self.mul_add(by, plus)
-    }
-    fn wide(self) -> f64 {
-        self
-    }
-    fn activated(self, text: &dyn Text) -> Self {
-        text.double(self)
     }
 }
 

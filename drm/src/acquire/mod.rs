@@ -2,7 +2,6 @@
 
 mod bench;
 mod plan_csv;
-pub(crate) use plan_csv::PLAN_COLUMNS;
 mod protocol;
 
 use std::fmt;

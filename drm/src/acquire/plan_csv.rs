@@ -6,10 +6,7 @@ use measured::{Cell, Column, Sheet};
 use toml_input::Faults;
 
 use crate::acquire::{Hold, LoadSetting, Measurement, Plan, PlanPoint};
-use crate::table::{Point, Table, TableOptions};
-
-/// The columns of a plan that say what shall be measured.
-pub(crate) const PLAN_COLUMNS: [&str; 4] = ["point", "duty", "load", "hold"];
+use crate::table::{PLAN_COLUMNS, Point, Table, TableOptions};
 
 const HEADER: &str = "point,duty,load,hold,d_real,v_out,i_out,v_in,v_std,settled";
 

@@ -3,8 +3,8 @@
 use measured::{Cell, Located, Quantity, Sheet, Signal, table_faults};
 use toml_input::{Fault, Faults, Message, Sink};
 
-use super::{Point, Table, TableOptions, lines, suspicion};
-use crate::acquire::PLAN_COLUMNS;
+use super::point::{PLAN_COLUMNS, Point, Table, TableOptions, lines};
+use super::suspicion;
 use crate::formula::Losses;
 
 /// More points than this are a record over time, not a table of settled points.

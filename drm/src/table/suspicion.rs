@@ -3,8 +3,8 @@
 use measured::{Signal, table_faults};
 use toml_input::{Fault, Faults, Message};
 
+use super::point::{Point, Table};
 use super::reading::Reading;
-use super::{Point, Table};
 
 /// Measured voltage over `d v_in` beyond which the units differ.
 const OTHER_UNIT: f64 = 20.0;
@@ -47,7 +47,7 @@ pub(super) fn check(table: &mut Table, reading: &Reading<'_>) -> Result<(), Faul
     }
     let negative: Vec<usize> = points.iter().filter(|p| p.i_out < 0.0).map(|p| p.line).collect();
     if !negative.is_empty() {
-        let lines = super::lines(&negative);
+        let lines = super::point::lines(&negative);
         table.notes.push(format!("the load delivers current in {lines}"));
     }
     Ok(())
@@ -93,7 +93,7 @@ fn duties(points: &[Point], reading: &Reading<'_>) -> Vec<Fault> {
     if percent {
         let lines: Vec<usize> = above.iter().map(|n| points[*n].line).collect();
         let message = Message::new(format!("`{label}` looks like percent"))
-            .found(format!("{} in {}", points[*first].d_real, super::lines(&lines)))
+            .found(format!("{} in {}", points[*first].d_real, super::point::lines(&lines)))
             .expected("a fraction of 1")
             .hint(format!(
                 "--map {} converts; or call the column `{label} (%)`",

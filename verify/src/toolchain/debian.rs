@@ -6,7 +6,7 @@ use std::process::Command;
 use std::sync::Mutex;
 use std::time::Duration;
 
-use super::run_for;
+use super::run::run_for;
 
 /// Where Debian puts the compiler.
 pub(super) const RUSTC: &str = "/usr/bin/rustc";

@@ -3,6 +3,7 @@
 mod assembly;
 mod compile;
 pub mod debian;
+mod run;
 mod rust;
 
 use std::path::PathBuf;
@@ -13,7 +14,8 @@ use codegen::Language;
 use serde::Serialize;
 use targets::{Board, CCompiler, Runner, RustTarget, TargetSpec};
 
-pub use compile::{BuildError, Purpose, Sources, compile, controller_object, run_for};
+pub use compile::{BuildError, Purpose, Sources, compile, controller_object};
+pub use run::run_for;
 pub use rust::{Toolchain, toolchain};
 
 /// Optimisation levels that are built: name, flags.

@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use targets::RustTarget;
 
-use super::{Install, Missing, RUSTC, debian, find, run_for};
+use super::run::run_for;
+use super::{Install, Missing, RUSTC, debian, find};
 
 /// A `rustc` for a target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

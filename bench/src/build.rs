@@ -1,6 +1,5 @@
 //! Builds the programs and runs them.
 
-use std::fmt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -9,19 +8,8 @@ use policy::Policy;
 use targets::{Board, CCompiler, Endianness, Runner, TargetSpec};
 use tempfile::TempDir;
 
-use crate::format_name;
+use crate::row::{Failure, Row, variant};
 use crate::sources::{self, CALLS};
-use crate::table::Row;
-
-/// Why there is no table.
-#[derive(Debug)]
-pub struct Failure(pub String);
-
-impl fmt::Display for Failure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
 
 /// Compilers and emulators with a folder to work in.
 pub struct Bench {
@@ -103,7 +91,7 @@ impl Bench {
         rows.push(row);
         for row in &mut rows {
             row.policy = name.to_owned();
-            row.variant = format_name(policy, assembly);
+            row.variant = variant(policy, assembly);
         }
         Ok(rows)
     }

@@ -6,17 +6,18 @@
 
 mod build;
 mod peers;
+mod row;
 mod sources;
 mod table;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use policy::{NumericFormat, Policy};
+use policy::NumericFormat;
 use targets::{Fma, Fpu, IntegerLoop, Runner, TargetSpec};
 
-use build::{Bench, Failure};
-use table::Row;
+use build::Bench;
+use row::{Failure, Row};
 
 /// What is measured.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -175,14 +176,4 @@ fn has_avx2() -> bool {
 #[cfg(not(target_arch = "x86_64"))]
 fn has_avx2() -> bool {
     false
-}
-
-/// Name of a policy's format as the table shows it.
-fn format_name(policy: &Policy, assembly: bool) -> String {
-    let name = policy.numeric_format.name();
-    if assembly {
-        format!("{name}, assembly")
-    } else {
-        name.to_owned()
-    }
 }

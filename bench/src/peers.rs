@@ -11,7 +11,7 @@ use report::{Axis, BarChart, BarPanel, ReportError, Svg};
 use targets::TargetSpec;
 
 use crate::build::{Bench, blank};
-use crate::table::Row;
+use crate::row::Row;
 
 /// Start of the variant of a peer's row.
 pub const PEER: &str = "peer: ";

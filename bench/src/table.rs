@@ -3,50 +3,8 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use serde::Serialize;
-
-use crate::build::Failure;
 use crate::peers::{self, PEER};
-
-/// One measured line.
-#[derive(Debug, Clone, Serialize)]
-pub struct Row {
-    /// Policy.
-    pub policy: String,
-    /// Processor.
-    pub core: String,
-    /// Compiler with its level.
-    pub compiler: String,
-    /// Numeric format or what the code is.
-    pub variant: String,
-    /// Fewest and most instructions of `q_values` over 64 observations.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub q_values: Option<(u64, u64)>,
-    /// Fewest and most instructions of a whole step.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub step: Option<(u64, u64)>,
-    /// Fewest and most instructions of a slice of 32 numbers of the integrity check.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub slice: Option<(u64, u64)>,
-    /// Bytes of code and tables of the whole controller with all its functions.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub flash: Option<u64>,
-    /// Of these what a linker keeps for a firmware that uses `q_values` alone: the network, as peers are counted.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub network_flash: Option<u64>,
-    /// What it keeps for a firmware that calls `init`, `step` and `integrity_slice`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub step_flash: Option<u64>,
-    /// Bytes of stack of a step.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub stack: Option<u64>,
-    /// CRC-32 over the Q values' bits: one per policy and format.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub checksum: Option<String>,
-    /// Time as a ratio to the naive loop in the same run.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub time_ratio: Option<f64>,
-}
+use crate::row::{Failure, Row};
 
 /// Equal policies in equal formats have given equal bits, on every core, in every language, portable or not.
 ///

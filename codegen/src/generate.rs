@@ -100,7 +100,7 @@ fn check_types(policy: &Policy, target: &TargetSpec) -> Result<(), CodegenError>
 /// The files of one output, from the program in its language.
 fn emit(output: Output, program: &Program, expected: Option<&Material>) -> Result<GeneratedFiles, CodegenError> {
     match output {
-        Output::C => backend::c99::emit(program),
+        Output::C => backend::c::emit(program),
         Output::Rust => backend::rust::emit(program),
         Output::RustOverC => backend::rust::bindings::emit(program),
         Output::Kit => match expected {

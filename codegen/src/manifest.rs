@@ -124,7 +124,9 @@ pub fn sizes(policy: &Policy, target: &TargetSpec) -> Sizes {
         state_bytes: 4 * program.state_words(),
         accumulator_bound: program.network.integer().map(|code| code.accumulator_bound),
         removed_neurons: removed,
-        q_error_bound: policy::scales::is_integer(policy.numeric_format)
+        q_error_bound: policy
+            .numeric_format
+            .is_integer()
             .then(|| certify::Certifier::new(policy).box_bound().largest),
     }
 }

@@ -88,7 +88,7 @@ fn relative_error(expected: &[f32], got: &[f64]) -> f64 {
 #[must_use]
 pub fn golden_result(policy: &Policy) -> Option<GoldenResult> {
     let golden = policy.golden.as_ref()?;
-    let format = match policy::scales::is_integer(policy.numeric_format) {
+    let format = match policy.numeric_format.is_integer() {
         true => NumericFormat::F32,
         false => policy.numeric_format,
     };

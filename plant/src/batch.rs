@@ -4,9 +4,9 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 use toml_input::{Fault, Faults, Message};
 
-use crate::catalogue::Way;
-use crate::effects::{LoadBox, Parameters, Pwm};
 use crate::effects::{duty_quantisation, load_setting, minimum_on_time};
+use crate::entry::Way;
+use crate::parameters::{LoadBox, Parameters, Pwm};
 use crate::plain::{LARGEST_CHANGE, LONGEST_STEP, Number, ORDER, TERM_BEFORE, series, sum};
 use crate::plant::Plant;
 use crate::signals::Load;

@@ -3,8 +3,8 @@
 use toml_input::{Fault, Faults, Message, Sink};
 
 use crate::catalogue;
-use crate::effects::Parameters;
 use crate::effects::duty_delay;
+use crate::parameters::Parameters;
 use crate::sensing;
 
 /// All faults of the parameters, if any.

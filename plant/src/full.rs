@@ -7,8 +7,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::effects::Parameters;
 use crate::effects::{dcr, derating, input_ripple, saturation};
+use crate::parameters::Parameters;
 use crate::plain::Track;
 use crate::signals::{Load, Signals};
 

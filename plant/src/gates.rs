@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::effects::{Carrier, Parameters, Rectifier};
 use crate::effects::{dead_time, switch_delay};
+use crate::parameters::{Carrier, Parameters, Rectifier};
 
 /// Start and end in seconds from the period's start; empty when the end is not after the start.
 type Span = (f64, f64);

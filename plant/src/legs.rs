@@ -1,9 +1,9 @@
 //! What the inductor is connected to in each state of the leg.
 
-use crate::effects::{Parameters, Rectifier};
 use crate::effects::{dcr, dead_time, switch_delay};
 use crate::full::Path;
 use crate::gates::Gate;
+use crate::parameters::{Parameters, Rectifier};
 use crate::plain::Drive;
 
 /// The paths of the inductor current, for both integrators.

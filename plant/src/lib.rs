@@ -21,9 +21,11 @@ mod batch;
 mod catalogue;
 mod check;
 mod effects;
+mod entry;
 mod full;
 mod gates;
 mod legs;
+mod parameters;
 mod plain;
 mod plant;
 mod reader;
@@ -33,9 +35,10 @@ mod signals;
 mod walk;
 
 pub use batch::Batch;
-pub use catalogue::{Effect, Parameter, Way, effects, parameter, parameters};
+pub use catalogue::{effects, parameter, parameters};
 pub use check::check;
-pub use effects::{
+pub use entry::{Effect, Parameter, Way};
+pub use parameters::{
     Cable, Capacitor, Carrier, Converter, Inductor, LoadBox, Model, Parameters, Pwm, Rectifier, Sensor, Sensors,
     ShortPulse, Source, Switch,
 };

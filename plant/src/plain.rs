@@ -9,7 +9,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 use serde::{Deserialize, Serialize};
 
-use crate::effects::Converter;
+use crate::parameters::Converter;
 use crate::signals::Load;
 
 pub(crate) const ORDER: usize = 6;

@@ -4,13 +4,15 @@ use serde::{Deserialize, Serialize};
 
 use toml_input::Faults;
 
-use crate::catalogue::Way;
+use crate::catalogue;
 use crate::check::check;
 use crate::effects::duty_delay::Queue;
-use crate::effects::{Parameters, dcr, duty_quantisation, load_setting, minimum_on_time};
+use crate::effects::{dcr, duty_quantisation, load_setting, minimum_on_time};
+use crate::entry::Way;
 use crate::full::{Full, Path, States};
 use crate::gates::{GateTiming, Gates};
 use crate::legs::Legs;
+use crate::parameters::Parameters;
 use crate::plain::{Drive, Plain, Track};
 use crate::sensing::{Memory, Sensing, array};
 use crate::signals::{Load, Sample, Signals};
@@ -60,7 +62,7 @@ impl Plant {
             plain: Plain::new(&p.converter, r, p.load.v_fold),
             legs: Legs::new(p),
             full: Full::new(p),
-            way: Way::of(p),
+            way: catalogue::way(p),
             timing,
             sensing,
             parameters: p.clone(),

@@ -5,9 +5,10 @@ use std::path::Path;
 
 use toml_input::{Document, Faults, FileName, Message, Sink, Table, Value};
 
-use crate::catalogue::{self, Field, Parameter};
+use crate::catalogue;
 use crate::check;
-use crate::effects::Parameters;
+use crate::entry::{Field, Parameter};
+use crate::parameters::Parameters;
 
 impl Parameters {
     /// Reads the text of a `plant.toml`; `file` only names it in messages.

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effects::sensor_noise::Noise;
 use crate::effects::sensor_quantisation;
-use crate::effects::{Parameters, Sensor};
+use crate::parameters::{Parameters, Sensor};
 use crate::signals::Signals;
 
 const CHANNELS: usize = 4;

@@ -1,7 +1,7 @@
 //! The steady state in which the plant runs at a given sampled voltage.
 
-use crate::effects::Parameters;
 use crate::full::{STATES, States};
+use crate::parameters::Parameters;
 use crate::plant::{Plant, PlantState};
 use crate::signals::{Load, Sample, Signals};
 

@@ -1,8 +1,8 @@
 //! A control period with anything in it: gate edges, the start of a PWM period, sensors that look earlier, a load step.
 
-use crate::catalogue::Way;
-use crate::effects::Model;
+use crate::entry::Way;
 use crate::full::Full;
+use crate::parameters::Model;
 use crate::plain::Track;
 use crate::plant::Plant;
 use crate::signals::{Load, Sample, Signals};
@@ -116,7 +116,7 @@ impl Plant {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::{Parameters, Rectifier};
+    use crate::parameters::{Parameters, Rectifier};
 
     #[test]
     fn the_general_way_gives_the_bits_of_the_fast_one() {

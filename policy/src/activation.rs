@@ -6,7 +6,7 @@
 
 use serde::Serialize;
 
-use crate::model::Interval;
+use crate::interval::Interval;
 
 /// The graph of an activation.
 #[derive(Debug, Clone, Copy)]

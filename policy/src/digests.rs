@@ -29,6 +29,16 @@ struct Contract<'a> {
     fallback: &'a Fallback,
 }
 
+impl Policy {
+    /// The same policy in another numeric format; its contract's digest changes with it.
+    #[must_use]
+    pub fn with_format(mut self, format: NumericFormat) -> Self {
+        self.numeric_format = format;
+        self.digests = of(&self);
+        self
+    }
+}
+
 /// A feature without its bound, which follows from the rest.
 #[derive(Serialize)]
 struct Observed<'a> {

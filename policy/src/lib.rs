@@ -19,6 +19,7 @@ pub mod describe;
 mod digests;
 mod expression;
 mod faults;
+mod interval;
 pub mod limits;
 mod memory;
 pub mod model;

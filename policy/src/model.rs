@@ -9,15 +9,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use crate::activation::Activation;
-
-/// Closed interval `[low, high]`, `low <= high`, both finite.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Interval {
-    /// Lower end.
-    pub low: f64,
-    /// Upper end.
-    pub high: f64,
-}
+pub use crate::interval::Interval;
 
 /// Number format in which the whole controller computes (`docs/reference/numeric-contract.md`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -44,6 +36,12 @@ impl NumericFormat {
         NumericFormat::I16,
         NumericFormat::I8,
     ];
+
+    /// Whether the network runs in integers.
+    #[must_use]
+    pub fn is_integer(self) -> bool {
+        self.weight_limit().is_some()
+    }
 
     /// Name in `policy.toml` and on the command line.
     #[must_use]
@@ -139,16 +137,6 @@ pub struct Policy {
     pub notes: Vec<String>,
     /// Every file that was read, the contract first; for rebuild tracking.
     pub files: Vec<PathBuf>,
-}
-
-impl Policy {
-    /// The same policy in another numeric format; its contract's digest changes with it.
-    #[must_use]
-    pub fn with_format(mut self, format: NumericFormat) -> Self {
-        self.numeric_format = format;
-        self.digests = crate::digests::of(&self);
-        self
-    }
 }
 
 /// A measured quantity.
@@ -409,11 +397,7 @@ impl Golden {
     pub fn allowed_changes(&self, format: NumericFormat) -> f64 {
         /// What is left with scales from the operating range and 64-bit sums: the best that 16 bits were seen to do.
         const INTEGER: f64 = 0.02;
-        let usual = if crate::scales::is_integer(format) {
-            INTEGER
-        } else {
-            0.0
-        };
+        let usual = if format.is_integer() { INTEGER } else { 0.0 };
         self.decisions.unwrap_or(usual)
     }
 }

@@ -8,7 +8,7 @@
 mod rows;
 
 use crate::activation::{Activation, Shape};
-use crate::model::{Layer, NumericFormat, Policy};
+use crate::model::{Layer, Policy};
 
 /// Fractional bits of what is within +-1 behind a sigmoid: 1.0 is 2^14.
 pub const SIGMOID_EXPONENT: i32 = 14;
@@ -267,10 +267,4 @@ pub fn slope_integer(slope: f64) -> i64 {
 
 fn leaky(x: i64, slope: i64) -> i64 {
     (x * slope + half(SLOPE_BITS)) >> SLOPE_BITS
-}
-
-/// Whether the format has an integer network.
-#[must_use]
-pub fn is_integer(format: NumericFormat) -> bool {
-    format.weight_limit().is_some()
 }

@@ -109,7 +109,7 @@ fn the_examples_error_stays_within_its_bound() {
         let (nearest, decided) = check(&policy, &mut SplitMix::new(1), 150);
         println!("{format:?}: nearest {nearest:.3} of the bound, {decided} of 150 boxes decided");
         // roundings of single operations hardly ever add up as they could
-        let is_integer = policy::scales::is_integer(format);
+        let is_integer = format.is_integer();
         assert!(
             nearest > if is_integer { 0.2 } else { 0.02 },
             "{format:?}: a bound that is never approached: {nearest}"

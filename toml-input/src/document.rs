@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use toml::de::{DeTable, DeValue};
+use toml::de::DeTable;
 
 use crate::fault::{Fault, Faults, Message};
 use crate::messages;
+use crate::node::{Entries, entries};
 use crate::sink::Sink;
 use crate::source::{FileName, Source, Span};
 use crate::table::Table;
@@ -15,30 +16,6 @@ use crate::value::Value;
 pub const MAX_TOML_BYTES: u64 = 1 << 20;
 /// Faults shown at most for one file's syntax; what follows is mostly an echo.
 pub const MAX_SYNTAX_FAULTS: usize = 8;
-
-/// Something and where it stands.
-#[derive(Debug, Clone)]
-pub struct At<T> {
-    /// The thing.
-    pub value: T,
-    /// Its bytes in the text of the document.
-    pub span: Span,
-}
-
-/// Keys and values in the order of the file.
-pub(crate) type Entries = Vec<(At<String>, At<Node>)>;
-
-/// A TOML value; numbers are kept as far as they can be represented.
-#[derive(Debug, Clone)]
-pub(crate) enum Node {
-    Text(String),
-    Integer(Option<i64>),
-    Float(f64),
-    Boolean(bool),
-    Date,
-    List(Vec<At<Node>>),
-    Table(Entries),
-}
 
 /// A parsed TOML file.
 #[derive(Debug, Clone)]
@@ -101,7 +78,7 @@ impl Document {
     /// The top level of the file.
     #[must_use]
     pub fn root(&self) -> Table<'_> {
-        Table::root(self, &self.root)
+        Table::root(&self.source, &self.root)
     }
 
     /// What `read` makes of the top level; keys it did not ask for are faults.
@@ -134,35 +111,9 @@ impl Document {
     #[must_use]
     pub fn peek(&self, path: &[&str]) -> Option<Value<'_>> {
         let (first, rest) = path.split_first()?;
-        let value = Value::find(self, &self.root, first)?;
+        let value = Value::find(&self.source, &self.root, first)?;
         rest.iter().try_fold(value, |value, key| value.peek(key))
     }
-}
-
-fn entries(table: &DeTable<'_>) -> Entries {
-    let mut list: Entries = table
-        .iter()
-        .map(|(key, value)| (at(key.get_ref().to_string(), key.span()), node(value)))
-        .collect();
-    list.sort_by_key(|(key, _)| key.span.start);
-    list
-}
-
-fn at<T>(value: T, span: Span) -> At<T> {
-    At { value, span }
-}
-
-fn node(value: &toml::Spanned<DeValue<'_>>) -> At<Node> {
-    let node = match value.get_ref() {
-        DeValue::String(text) => Node::Text(text.to_string()),
-        DeValue::Integer(number) => Node::Integer(i64::from_str_radix(number.as_str(), number.radix()).ok()),
-        DeValue::Float(number) => Node::Float(number.as_str().parse().unwrap_or(f64::NAN)),
-        DeValue::Boolean(value) => Node::Boolean(*value),
-        DeValue::Datetime(_) => Node::Date,
-        DeValue::Array(list) => Node::List(list.iter().map(node).collect()),
-        DeValue::Table(table) => Node::Table(entries(table)),
-    };
-    at(node, value.span())
 }
 
 fn syntax(text: &str, span: &Span, message: &str) -> Message {

@@ -66,14 +66,16 @@ mod document;
 mod fault;
 pub mod messages;
 mod nearest;
+mod node;
 mod sink;
 mod source;
 mod table;
 mod value;
 
-pub use document::{At, Document, MAX_SYNTAX_FAULTS, MAX_TOML_BYTES};
+pub use document::{Document, MAX_SYNTAX_FAULTS, MAX_TOML_BYTES};
 pub use fault::{Fault, Faults, Message, Place};
 pub use nearest::{did_you_mean, nearest};
+pub use node::At;
 pub use sink::Sink;
 pub use source::{FileName, Origin, Source, Span};
 pub use table::Table;

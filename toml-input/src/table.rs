@@ -1,16 +1,16 @@
 //! A table that remembers which keys were asked for.
 
-use crate::document::{At, Document, Entries};
 use crate::fault::{Fault, Message};
 use crate::messages;
+use crate::node::{At, Entries, Node};
 use crate::sink::Sink;
-use crate::source::Span;
+use crate::source::{Source, Span};
 use crate::value::Value;
 
 /// A table being read: every key asked for is known, what is left over at the end is a fault.
 pub struct Table<'a> {
-    document: &'a Document,
-    entries: &'a [(At<String>, At<crate::document::Node>)],
+    source: &'a Source,
+    entries: &'a [(At<String>, At<Node>)],
     /// Nothing for the top level and for a table that the file leaves out.
     span: Option<Span>,
     title: String,
@@ -18,18 +18,18 @@ pub struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
-    pub(crate) fn root(document: &'a Document, entries: &'a Entries) -> Self {
-        Self::new(document, entries, None, "")
+    pub(crate) fn root(source: &'a Source, entries: &'a Entries) -> Self {
+        Self::new(source, entries, None, "")
     }
 
     pub(crate) fn new(
-        document: &'a Document,
-        entries: &'a [(At<String>, At<crate::document::Node>)],
+        source: &'a Source,
+        entries: &'a [(At<String>, At<Node>)],
         span: Option<Span>,
         title: &str,
     ) -> Self {
         Table {
-            document,
+            source,
             entries,
             span,
             title: title.to_owned(),
@@ -40,7 +40,7 @@ impl<'a> Table<'a> {
     /// The value of `key`, if present.
     pub fn optional(&mut self, key: &'static str) -> Option<Value<'a>> {
         self.known.push(key);
-        Value::find(self.document, self.entries, key)
+        Value::find(self.source, self.entries, key)
     }
 
     /// The value of `key`; a fault with `hint` if it is missing.
@@ -74,7 +74,7 @@ impl<'a> Table<'a> {
         let title = format!("[{key}]");
         let mut table = match self.optional(key) {
             Some(value) => value.table(&title, faults)?,
-            None => Table::new(self.document, &[], None, &title),
+            None => Table::new(self.source, &[], None, &title),
         };
         let result = read(&mut table, faults);
         table.finish(faults);
@@ -101,8 +101,8 @@ impl<'a> Table<'a> {
     #[must_use]
     pub fn fault(&self, message: Message) -> Fault {
         match &self.span {
-            Some(span) => self.document.fault(span, message),
-            None => self.document.source().name.fault(message),
+            Some(span) => self.source.fault(span, message),
+            None => self.source.name.fault(message),
         }
     }
 
@@ -122,7 +122,7 @@ impl<'a> Table<'a> {
         for (key, _) in self.entries {
             if !self.known.contains(&key.value.as_str()) {
                 let message = messages::unknown_key(&key.value, &self.title, &self.known);
-                faults.push(self.document.fault(&key.span, message.maybe_hint(hint(&key.value))));
+                faults.push(self.source.fault(&key.span, message.maybe_hint(hint(&key.value))));
             }
         }
     }

@@ -3,40 +3,40 @@
 use std::fmt::Display;
 use std::ops::RangeInclusive;
 
-use crate::document::{At, Document, Node};
 use crate::fault::{Fault, Message};
 use crate::messages;
+use crate::node::{At, Node};
 use crate::sink::Sink;
-use crate::source::Span;
+use crate::source::{Source, Span};
 use crate::table::Table;
 
 /// A value being read. The readers (`number`, `text`, ...) return nothing where they leave a fault; `peek`, `as_text`
 /// and `is_...` look without one.
 #[derive(Clone)]
 pub struct Value<'a> {
-    document: &'a Document,
+    source: &'a Source,
     label: String,
     node: &'a At<Node>,
 }
 
 impl<'a> Value<'a> {
-    pub(crate) fn new(document: &'a Document, label: &str, node: &'a At<Node>) -> Self {
+    pub(crate) fn new(source: &'a Source, label: &str, node: &'a At<Node>) -> Self {
         Value {
-            document,
+            source,
             label: label.to_owned(),
             node,
         }
     }
 
-    pub(crate) fn find(document: &'a Document, entries: &'a [(At<String>, At<Node>)], key: &str) -> Option<Self> {
+    pub(crate) fn find(source: &'a Source, entries: &'a [(At<String>, At<Node>)], key: &str) -> Option<Self> {
         let (name, node) = entries.iter().find(|(name, _)| name.value == key)?;
-        Some(Value::new(document, &name.value, node))
+        Some(Value::new(source, &name.value, node))
     }
 
     /// The same value, called `label` in faults.
     #[must_use]
     pub fn labelled(self, label: &str) -> Self {
-        Value::new(self.document, label, self.node)
+        Value::new(self.source, label, self.node)
     }
 
     /// The key the value belongs to, as faults call it.
@@ -45,10 +45,10 @@ impl<'a> Value<'a> {
         &self.label
     }
 
-    /// The document the value stands in.
+    /// The file the value stands in.
     #[must_use]
-    pub fn document(&self) -> &'a Document {
-        self.document
+    pub fn source(&self) -> &'a Source {
+        self.source
     }
 
     /// The value's bytes in the text of the document.
@@ -60,18 +60,18 @@ impl<'a> Value<'a> {
     /// A fault of this value.
     #[must_use]
     pub fn fault(&self, message: Message) -> Fault {
-        self.document.fault(&self.node.span, message)
+        self.source.fault(&self.node.span, message)
     }
 
     /// A fault of the bytes `range` of a text; of the whole value if the text is written with escapes.
     #[must_use]
     pub fn fault_within(&self, range: &Span, message: Message) -> Fault {
         let span = &self.node.span;
-        let raw = self.document.source().text.get(span.clone()).unwrap_or_default();
+        let raw = self.source.text.get(span.clone()).unwrap_or_default();
         match raw.get(1..raw.len().saturating_sub(1)) {
             Some(inner) if Some(inner) == self.as_text() => {
                 let first = span.start + 1;
-                self.document.fault(&(first + range.start..first + range.end), message)
+                self.source.fault(&(first + range.start..first + range.end), message)
             }
             _ => self.fault(message),
         }
@@ -81,7 +81,7 @@ impl<'a> Value<'a> {
     #[must_use]
     pub fn peek(&self, key: &str) -> Option<Value<'a>> {
         match &self.node.value {
-            Node::Table(entries) => Value::find(self.document, entries, key),
+            Node::Table(entries) => Value::find(self.source, entries, key),
             _ => None,
         }
     }
@@ -100,7 +100,7 @@ impl<'a> Value<'a> {
     pub fn as_list(&self) -> Option<Vec<Value<'a>>> {
         match &self.node.value {
             Node::List(items) => {
-                let item = |node| Value::new(self.document, &self.label, node);
+                let item = |node| Value::new(self.source, &self.label, node);
                 Some(items.iter().map(item).collect())
             }
             _ => None,
@@ -274,7 +274,7 @@ impl<'a> Value<'a> {
             self.wrong("a table", faults);
             return None;
         };
-        Some(Table::new(self.document, entries, Some(self.node.span.clone()), title))
+        Some(Table::new(self.source, entries, Some(self.node.span.clone()), title))
     }
 
     /// All keys and values of a table whose keys the user chooses.
@@ -283,7 +283,7 @@ impl<'a> Value<'a> {
             self.wrong("a table", faults);
             return None;
         };
-        let pair = |(key, node): &'a (At<String>, _)| (key, Value::new(self.document, &key.value, node));
+        let pair = |(key, node): &'a (At<String>, _)| (key, Value::new(self.source, &key.value, node));
         Some(entries.iter().map(pair).collect())
     }
 

@@ -71,7 +71,7 @@ impl<'a> Lane<'a> {
         };
         if let Some(known) = &self.policy.golden {
             self.golden = Some(GoldenResult {
-                rounded: policy::scales::is_integer(self.policy.numeric_format),
+                rounded: self.policy.numeric_format.is_integer(),
                 ..golden::judge(known, self.layout.scalar(), self.policy.actions.len(), words)
             });
         }

@@ -6,9 +6,9 @@ use std::process::{Command, Stdio};
 use policy::Policy;
 use targets::{CCompiler, RustTarget, TargetSpec};
 
-use crate::build::{Bench, Failure, run};
+use crate::build::{Bench, run};
+use crate::row::{Failure, Row};
 use crate::sources;
-use crate::table::Row;
 
 /// Python packages that write the network for the peers.
 const PACKAGES: [&str; 5] = [

@@ -192,7 +192,7 @@ pub fn lines(
             format.name(),
             100.0 * share.0,
             100.0 * share.1,
-            if policy::scales::is_integer(format) {
+            if format.is_integer() {
                 "; `policyc certify` says what it does to the decision"
             } else {
                 ""

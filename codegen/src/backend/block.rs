@@ -4,7 +4,7 @@ use policy::Scalar;
 use templates::block::{BlockHeader, BlockSource, BlockView, InputView, ParameterView};
 use templates::c::Common;
 
-use super::c99::render;
+use super::c::render;
 use crate::backend::banner;
 use crate::backend::literal::number;
 use crate::files::{CodegenError, GeneratedFiles};
@@ -48,7 +48,7 @@ pub fn view(program: &Program, title: &str) -> BlockView {
             upper: program.name.to_uppercase(),
             banner: banner(program, title, program.provenance.c_flags),
             mapping_parameters: String::new(),
-            number: super::c99::number::kind(scalar),
+            number: super::c::number::kind(scalar),
         },
         inputs: program.signals.iter().map(|signal| input(scalar, signal)).collect(),
         has_codes: program.signals.iter().any(|signal| signal.is_code),

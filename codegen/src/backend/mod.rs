@@ -3,7 +3,7 @@
 #[cfg(feature = "c")]
 mod block;
 #[cfg(feature = "c")]
-pub mod c99;
+pub mod c;
 #[cfg(feature = "c")]
 pub mod fmu;
 #[cfg(feature = "c")]

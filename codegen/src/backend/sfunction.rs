@@ -5,7 +5,7 @@ use templates::sfunction::{
 };
 
 use super::block;
-use super::c99::render;
+use super::c::render;
 use crate::files::{CodegenError, GeneratedFiles};
 use crate::program::Program;
 

@@ -47,7 +47,7 @@ pub fn removable(policy: &Policy) -> Vec<Vec<usize>> {
 
 /// Whether adding a zero from this input changes no sum of the layer that can be told apart.
 fn goes_unnoticed(format: NumericFormat, next: &Layer, input: usize) -> bool {
-    if scales::is_integer(format) || next.activation.is_rectifier() {
+    if format.is_integer() || next.activation.is_rectifier() {
         return true;
     }
     let is_fused = format == NumericFormat::F32Fma;

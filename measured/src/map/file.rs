@@ -90,7 +90,7 @@ impl ColumnMap {
         for (key, value) in entries {
             let Some(wish) = read(&value, faults) else { continue };
             let added = quantity(&key.value).and_then(|name| self.add(name, wish));
-            faults.extend(added.err().map(|message| value.document().fault(&key.span, message)));
+            faults.extend(added.err().map(|message| value.source().fault(&key.span, message)));
         }
     }
 }

@@ -1,6 +1,6 @@
 //! A conductance that is always across the output, beside the set load; part of `i_out`.
 
-use crate::catalogue::{Effect, Way, number};
+use crate::entry::{Effect, Way, number};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {

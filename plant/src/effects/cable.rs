@@ -3,7 +3,7 @@
 //!
 //! A resonance of `1 / (2 pi sqrt(L C))`, and `resistance i` between converter and load.
 
-use crate::catalogue::{Effect, Way, number};
+use crate::entry::{Effect, Way, number};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {

@@ -3,7 +3,7 @@
 //! A current step of `g v_in` at every edge, and slightly more damping. When the winding current ends (DCM), what the
 //! inductance still holds (`g v_out`, milliamperes) is lost in the core at once.
 
-use crate::catalogue::{Effect, Way, number};
+use crate::entry::{Effect, Way, number};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {

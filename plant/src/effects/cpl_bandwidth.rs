@@ -2,7 +2,7 @@
 //!
 //! 0 is the ideal, immediate load. A slow one behaves as a current sink in the first moments of a step.
 
-use crate::catalogue::{Effect, Way, number};
+use crate::entry::{Effect, Way, number};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {

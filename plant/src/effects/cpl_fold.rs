@@ -1,6 +1,6 @@
 //! Below `v_fold` a constant-power load is the resistor `v_fold^2 / P`: no real load draws unlimited current.
 
-use crate::catalogue::{Effect, Way, detail};
+use crate::entry::{Effect, Way, detail};
 
 /// Catalogue entry. Not an effect that can be absent: every plant has it.
 pub const EFFECT: Effect = Effect {

@@ -3,8 +3,8 @@
 //! Lowers the output by `dcr i` (CCM) and damps the LC resonance. In steady state it cannot be told from equal
 //! changes of `r_ds_on` and `r_d`.
 
-use crate::catalogue::{Effect, Way, number};
-use crate::effects::Inductor;
+use crate::entry::{Effect, Way, number};
+use crate::parameters::Inductor;
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {

@@ -3,8 +3,8 @@
 //! A diode leg loses `dead_time / t_sw` of duty. In a synchronous leg the body diodes carry the current meanwhile: the
 //! duty is lost while the current is positive and kept while it is negative.
 
-use crate::catalogue::{Effect, Way, number};
-use crate::effects::Parameters;
+use crate::entry::{Effect, Way, number};
+use crate::parameters::Parameters;
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {

@@ -3,8 +3,8 @@
 //! Differential capacitance, i = C(v) dv/dt, as ceramics of class II have it. More ripple and a deeper dip at higher
 //! voltage; nothing in the mean. At one voltage it cannot be told from a smaller C.
 
-use crate::catalogue::{Effect, Way, detail, number};
-use crate::effects::Capacitor;
+use crate::entry::{Effect, Way, detail, number};
+use crate::parameters::Capacitor;
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {

@@ -2,7 +2,7 @@
 //!
 //! Lowers the output by `(1 - d) (v_f + r_d i)` (CCM) and ends the conduction earlier (DCM).
 
-use crate::catalogue::{Effect, Way, number};
+use crate::entry::{Effect, Way, number};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {

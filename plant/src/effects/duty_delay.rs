@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::catalogue::{Effect, Field, Parameter, Way};
+use crate::entry::{Effect, Field, Parameter, Way};
 
 /// Longest delay, periods.
 pub const LONGEST: usize = 8;

@@ -1,6 +1,6 @@
 //! The modulator counts: the duty is rounded to the nearest multiple of `duty_lsb`, half up.
 
-use crate::catalogue::{Effect, Way, number};
+use crate::entry::{Effect, Way, number};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {

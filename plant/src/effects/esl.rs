@@ -3,7 +3,7 @@
 //! With the inductor it divides the step of the switch node: v_out jumps by `v_in esl / (L + esl)` at every edge. The
 //! derivative of the load current without cable is left out: it decays within `esl G`, nanoseconds.
 
-use crate::catalogue::{Effect, Way, number};
+use crate::entry::{Effect, Way, number};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {

@@ -3,7 +3,7 @@
 //! Ripple in phase with the current, a step of `esr di` at a load step, a zero at `1/(esr C)`; damps a constant-power
 //! load only when in series with it. No trace in the mean.
 
-use crate::catalogue::{Effect, Way, number};
+use crate::entry::{Effect, Way, number};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {

@@ -2,8 +2,8 @@
 //!
 //! The sine is a polynomial of our own: the same bits on every machine.
 
-use crate::catalogue::{Effect, Way, detail, number};
-use crate::effects::Source;
+use crate::entry::{Effect, Way, detail, number};
+use crate::parameters::Source;
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {

@@ -1,7 +1,7 @@
 //! The electronic load draws another current or power than it was set to; a resistor has another value than printed.
 
-use crate::catalogue::{Effect, Way, number};
-use crate::effects::LoadBox;
+use crate::entry::{Effect, Way, number};
+use crate::parameters::LoadBox;
 use crate::signals::Load;
 
 /// Catalogue entry.

@@ -1,7 +1,7 @@
 //! Pulses shorter than the minimum on-time are left out, or lengthened to it.
 
-use crate::catalogue::{Effect, Way, number};
-use crate::effects::{Pwm, ShortPulse};
+use crate::entry::{Effect, Way, number};
+use crate::parameters::{Pwm, ShortPulse};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {

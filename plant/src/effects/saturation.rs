@@ -3,8 +3,8 @@
 //! Differential inductance, v = L(i) di/dt. Half of the share k is lost at `i_sat`; k = 0 is the linear inductor.
 //! More ripple at high current, a faster response there; nothing in steady state in CCM.
 
-use crate::catalogue::{Effect, Way, detail, number};
-use crate::effects::Inductor;
+use crate::entry::{Effect, Way, detail, number};
+use crate::parameters::Inductor;
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {

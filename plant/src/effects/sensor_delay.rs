@@ -2,7 +2,7 @@
 //!
 //! For a sampler that comes late use `pwm.sampling_phase`.
 
-use crate::catalogue::{Effect, Way, of_each_sensor};
+use crate::entry::{Effect, Way, of_each_sensor};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {

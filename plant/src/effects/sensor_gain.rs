@@ -2,7 +2,7 @@
 //!
 //! A gain of v_out scales the mapping's coefficient a, one of i_out scales b.
 
-use crate::catalogue::{Effect, Way, of_each_sensor};
+use crate::entry::{Effect, Way, of_each_sensor};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {

@@ -2,7 +2,7 @@
 //!
 //! With ripple it also turns into a bias: the filtered ripple at the sampling instant is not its mean.
 
-use crate::catalogue::{Effect, Way, of_each_sensor};
+use crate::entry::{Effect, Way, of_each_sensor};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {

@@ -3,7 +3,7 @@
 use random::{Random, Xoshiro};
 use serde::{Deserialize, Serialize};
 
-use crate::catalogue::{Effect, Field, Parameter, Way, of_each_sensor};
+use crate::entry::{Effect, Field, Parameter, Way, of_each_sensor};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {

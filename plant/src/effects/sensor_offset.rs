@@ -1,6 +1,6 @@
 //! Offset of a sensor: shown = (gain * true) + offset.
 
-use crate::catalogue::{Effect, Way, of_each_sensor};
+use crate::entry::{Effect, Way, of_each_sensor};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {

@@ -1,6 +1,6 @@
 //! The analog-digital converter: rounded to the nearest multiple of `lsb`, half up.
 
-use crate::catalogue::{Effect, Way, of_each_sensor};
+use crate::entry::{Effect, Way, of_each_sensor};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {

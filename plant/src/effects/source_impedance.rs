@@ -4,7 +4,7 @@
 //! Lowers the output like a resistance of `resistance d^2` (with capacitor) and shows in `v_in`. The `v_in` reported
 //! at an edge is that just before it.
 
-use crate::catalogue::{Effect, Way, number};
+use crate::entry::{Effect, Way, number};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {

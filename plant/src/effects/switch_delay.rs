@@ -2,8 +2,8 @@
 //!
 //! `turn_on_delay - turn_off_delay` over the period is lost duty; slow turn-off gains duty.
 
-use crate::catalogue::{Effect, Way, number};
-use crate::effects::Parameters;
+use crate::entry::{Effect, Way, number};
+use crate::parameters::Parameters;
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {

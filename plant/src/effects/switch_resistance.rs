@@ -3,7 +3,7 @@
 //!
 //! Lowers the output by `d r_ds_on i` (CCM).
 
-use crate::catalogue::{Effect, Way, number};
+use crate::entry::{Effect, Way, number};
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {

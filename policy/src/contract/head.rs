@@ -81,7 +81,7 @@ fn parameters(value: &Value<'_>, taken: &mut Taken, faults: &mut Sink) -> BTreeM
             Some(message) => Err(message),
             None => taken_once(&key.value, kind, taken),
         };
-        faults.extend(named.err().map(|message| value.document().fault(&key.span, message)));
+        faults.extend(named.err().map(|message| value.source().fault(&key.span, message)));
         // a faulty parameter keeps its name, lest every expression that uses it be reported too
         let number = value.number(faults).unwrap_or(1.0);
         parameters.insert(key.value.clone(), number);

@@ -70,7 +70,7 @@ pub(crate) fn read<'a>(root: &mut Table<'a>, faults: &mut Sink) -> Option<Networ
 impl Network<'_> {
     /// A fault at a place in the contract.
     pub fn fault<T>(&self, at: &At<T>, message: Message) -> Fault {
-        self.section.document().fault(&at.span, message)
+        self.section.source().fault(&at.span, message)
     }
 
     /// One activation per layer; the last is the identity.

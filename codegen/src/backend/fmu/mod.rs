@@ -10,7 +10,7 @@ use templates::fmu::{
 };
 
 use super::block;
-use super::c99::{self, render};
+use super::c::{self, render};
 use crate::files::{CodegenError, GeneratedFiles, TOOL};
 use crate::program::Program;
 
@@ -111,7 +111,7 @@ pub fn emit(program: &Program, fmi: Fmi) -> Result<GeneratedFiles, CodegenError>
 
 /// SHA-256 of core and block: another controller, another FMU.
 fn digest(program: &Program, block: &GeneratedFiles) -> Result<String, CodegenError> {
-    let core = c99::emit(program)?;
+    let core = c::emit(program)?;
     let texts = core.files.iter().chain(&block.files);
     let all: String = texts.map(|(name, text)| format!("{name}\n{text}\n")).collect();
     Ok(sha256(all.as_bytes()))

@@ -12,10 +12,10 @@ use std::collections::BTreeMap;
 use templates::c::Common;
 use templates::kit::{Kit, Subject};
 
-use super::c99::number::{kind, number};
-use super::c99::statements::unsigned;
-use super::c99::tables::view as table;
-use super::c99::{self, render};
+use super::c::number::{kind, number};
+use super::c::statements::unsigned;
+use super::c::tables::view as table;
+use super::c::{self, render};
 use crate::backend::banner;
 use crate::files::{CodegenError, GeneratedFiles};
 use crate::program::{Element, Literal, Program, Table, words as number_words};
@@ -76,7 +76,7 @@ pub fn emit(program: &Program, material: &Material) -> Result<GeneratedFiles, Co
 
 /// Header and source of a controller of the suite as one text.
 fn core(program: &Program) -> Result<String, CodegenError> {
-    let files = c99::emit(program)?.files;
+    let files = c::emit(program)?.files;
     let part = |extension: &str| files.get(&format!("{}.{extension}", program.name));
     let (Some(header), Some(source)) = (part("h"), part("c")) else {
         return Err(CodegenError::Output("the C backend gave no header or no source"));

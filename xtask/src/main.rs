@@ -26,6 +26,7 @@ usage: cargo xtask <command>
   layers                            only the layer rules
   book                              only the book: links, contents, mdBook
   words                             words of each page, and figures per hundred of them
+  comments                          share of the lines of each crate that say why
   bench [--json|--peers|--host]     instruction counts and times of the generated network (docs/results/kernels.md)
   blind --seed S --out DIR ...      blind cases for the diagnosis and their score (docs/reference/blind-cases.md; --help)
 ";
@@ -38,6 +39,7 @@ enum Command {
     Layers,
     Book,
     Words,
+    Comments,
     Blind(Vec<String>),
     Bench(Vec<String>),
     Help,
@@ -75,6 +77,7 @@ fn parse(arguments: &[String]) -> Result<Command, String> {
         "layers" => Command::Layers,
         "book" => Command::Book,
         "words" => Command::Words,
+        "comments" => Command::Comments,
         "help" | "--help" | "-h" => Command::Help,
         _ => return Err(format!("unknown command `{name}`")),
     };
@@ -122,14 +125,16 @@ fn run(command: Command) -> Result<bool, String> {
             steps::OF_THE_BOOK,
             Options::default(),
         )),
-        Command::Words => {
-            let lines = rules::words(&Workspace::load()?)?;
-            lines.iter().for_each(|line| println!("{line}"));
-            Ok(true)
-        }
+        Command::Words => listed(&rules::words(&Workspace::load()?)?),
+        Command::Comments => listed(&rules::comments(&Workspace::load()?)?),
         Command::Blind(arguments) => blind(&Workspace::load()?, &arguments),
         Command::Bench(arguments) => other_crate(&Workspace::load()?, "bench", &arguments),
     }
+}
+
+fn listed(lines: &[String]) -> Result<bool, String> {
+    lines.iter().for_each(|line| println!("{line}"));
+    Ok(true)
 }
 
 fn bless(workspace: &Workspace) -> Result<bool, String> {

@@ -1,5 +1,6 @@
 //! House rules that no compiler checks. One file per rule.
 
+mod comments;
 mod layers;
 mod lengths;
 mod links;
@@ -65,6 +66,20 @@ pub fn words(workspace: &Workspace) -> Result<Vec<String>, String> {
     Ok(words::report(&read_pages(workspace)?))
 }
 
+/// How much of each crate says why, one line each.
+pub fn comments(workspace: &Workspace) -> Result<Vec<String>, String> {
+    let mut counts: BTreeMap<String, comments::Count> = BTreeMap::new();
+    over_files(workspace, |path, bytes, _| {
+        if let (Some(name), Ok(text)) = (comments::crate_of(path), std::str::from_utf8(bytes)) {
+            let found = comments::count(text);
+            let count = counts.entry(name.to_owned()).or_default();
+            count.lines += found.lines;
+            count.comments += found.comments;
+        }
+    })?;
+    Ok(comments::report(&counts))
+}
+
 fn read_pages(workspace: &Workspace) -> Result<BTreeMap<PathBuf, Page>, String> {
     let files = workspace.files()?;
     let markdown = files
@@ -77,7 +92,7 @@ fn read_pages(workspace: &Workspace) -> Result<BTreeMap<PathBuf, Page>, String> 
     markdown.map(read).collect()
 }
 
-fn over_files(workspace: &Workspace, rule: impl Fn(&Path, &[u8], &mut Findings)) -> Result<Findings, String> {
+fn over_files(workspace: &Workspace, mut rule: impl FnMut(&Path, &[u8], &mut Findings)) -> Result<Findings, String> {
     let mut findings = Findings::default();
     for path in workspace.files()? {
         let bytes =

@@ -23,13 +23,13 @@ pub struct Controller<T> {
     network: Network<T>,
     /// Duty per action.
     table: Vec<T>,
-    mapping: Option<Mapping<T>>,
+    pub(crate) mapping: Option<Mapping<T>>,
     limits: Limits<T>,
     initial_duty: T,
     fallback: T,
     /// K: bad steps bridged.
     hold: u32,
-    sound: Sound<T>,
+    pub(crate) sound: Sound<T>,
     state_names: Vec<String>,
     state: State<T>,
 }

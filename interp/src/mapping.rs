@@ -30,6 +30,12 @@ impl<T: Real> Mapping<T> {
         }
     }
 
+    /// What each coefficient may be set to, in the order of the state.
+    pub fn adjustable(&self) -> impl Iterator<Item = Range<T>> {
+        let count = if self.initial.r.is_some() { 4 } else { 3 };
+        self.adjust.into_iter().take(count)
+    }
+
     /// The duty for the plant from the duty `d` for the simulation at load current `i`.
     pub fn apply(coefficients: Coefficients<T>, d: T, i: T) -> T {
         let Coefficients { a, b, c, r } = coefficients;

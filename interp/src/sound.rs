@@ -2,6 +2,7 @@
 
 use policy::{Expr, Input, Policy};
 
+use crate::controller::Controller;
 use crate::mapping::Mapping;
 use crate::real::{Range, Real};
 use crate::state::State;
@@ -43,6 +44,16 @@ impl<T: Real> Sound<T> {
         }
     }
 
+    /// What each number of `state` lies within, in the order of its words; nothing for one that no step reads.
+    pub fn ends(&self, state: &State<T>, mapping: Option<&Mapping<T>>) -> Vec<Option<Range<T>>> {
+        let mut ends: Vec<Option<Range<T>>> = self.held.iter().copied().map(Some).collect();
+        ends.extend(self.memory.iter().map(|&bound| Some(Range { lo: -bound, hi: bound })));
+        ends.extend([self.previous_duty, self.previous_command]);
+        ends.extend(state.soft_cap.map(|_| self.soft_cap));
+        ends.extend(mapping.into_iter().flat_map(Mapping::adjustable).map(Some));
+        ends
+    }
+
     /// Whether all parts of the state lie within; a NaN lies nowhere.
     pub fn holds(&self, state: &State<T>, mapping: Option<&Mapping<T>>) -> bool {
         let within = |range: Option<Range<T>>, x: T| range.is_none_or(|range| range.contains(x));
@@ -59,6 +70,16 @@ impl<T: Real> Sound<T> {
             && coefficients
             && state.bad_count <= self.hold.saturating_add(1)
             && state.primed <= 1
+    }
+}
+
+impl<T: Real> Controller<T> {
+    /// Lower and upper end of each number of a sound state (section 1), in the order of the words; nothing for a number
+    /// that no step reads.
+    #[must_use]
+    pub fn sound_ends(&self) -> Vec<Option<(T, T)>> {
+        let ends = self.sound.ends(self.state(), self.mapping.as_ref()).into_iter();
+        ends.map(|range| range.map(|range| (range.lo, range.hi))).collect()
     }
 }
 

@@ -44,6 +44,17 @@ impl<T: Real> State<T> {
         words
     }
 
+    /// The numbers among the words, in their order; the two counters stand behind them.
+    pub fn numbers_mut(&mut self) -> impl Iterator<Item = &mut T> {
+        let mapping = self
+            .mapping
+            .iter_mut()
+            .flat_map(|own| [Some(&mut own.a), Some(&mut own.b), Some(&mut own.c), own.r.as_mut()]);
+        let duties = [&mut self.previous_duty, &mut self.previous_command];
+        let numbers = self.held.iter_mut().chain(&mut self.memory).chain(duties);
+        numbers.chain(&mut self.soft_cap).chain(mapping.flatten())
+    }
+
     /// Appends [`State::words`] to a buffer.
     pub fn append_words(&self, words: &mut Vec<u32>) {
         let duties = [self.previous_duty, self.previous_command];

@@ -45,7 +45,8 @@ pub(crate) fn decimal_commas(label: &str, found: usize) -> Message {
 }
 
 pub(crate) fn duty_range(label: &str, found: f64) -> Message {
-    let percent = found > 1.0 && found <= 100.0;
+    // a little above 1 is a duty ratio that is too large, not one of a few percent
+    let percent = (2.0..=100.0).contains(&found);
     let hint = percent.then(|| format!("looks like a percentage: write {}", tidy(found / 100.0)));
     Message::new(format!("`{label}` is not a duty ratio"))
         .found(found.to_string())

@@ -162,7 +162,7 @@ const FEATURE: &str = "
 [[feature]]
 name = \"TODO\"
 source = \"TODO\"              # affine in signals and parameters, such as v_ref - v_out
-# filters = [{ delay = 1 }]  # first to last; also { integrator = { min = -1.0, max = 1.0 } }, { backward_difference = true },
+# filters = [{ delay = 1 }]  # first to last; also { integrator = { min = -1.0, max = 1.0 } }, \"backward_difference\",
 #                            # { low_pass = { time_constant = 1e-3 } }, { filtered_derivative = { cutoff = 500.0 } },
 #                            # { moving_average = 4 }
 # scale = 1.0                # normalisation of the training: scale * x + offset, then clip

@@ -14,6 +14,8 @@ const FAMILIES: &[(&str, &str)] = &[
     ("stm32f4", "cortex-m4f"),
     ("stm32g4", "cortex-m4f"),
     ("stm32l4", "cortex-m4f"),
+    ("stm32wba", "cortex-m33"),
+    ("stm32wb0", "cortex-m0plus"),
     ("stm32wb", "cortex-m4f"),
     ("stm32f7", "cortex-m7"),
     ("stm32h7", "cortex-m7"),

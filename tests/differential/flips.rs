@@ -41,27 +41,8 @@ struct Flip {
 fn state_of(shape: &State<f32>, words: &[u32]) -> State<f32> {
     let mut state = shape.clone();
     let mut words = words.iter().copied();
-    {
-        let State {
-            held,
-            memory,
-            previous_duty,
-            previous_command,
-            soft_cap,
-            mapping,
-            ..
-        } = &mut state;
-        let coefficients = mapping
-            .iter_mut()
-            .flat_map(|own| [Some(&mut own.a), Some(&mut own.b), Some(&mut own.c), own.r.as_mut()]);
-        let numbers = held
-            .iter_mut()
-            .chain(memory)
-            .chain([previous_duty, previous_command])
-            .chain(soft_cap);
-        for (number, word) in numbers.chain(coefficients.flatten()).zip(words.by_ref()) {
-            *number = f32::from_bits(word);
-        }
+    for (number, word) in state.numbers_mut().zip(words.by_ref()) {
+        *number = f32::from_bits(word);
     }
     state.bad_count = words.next().unwrap();
     state.primed = words.next().unwrap();

@@ -1,6 +1,6 @@
 //! What the interpreter answers, chunk by chunk, in the words of the protocol.
 
-use interp::{Controller, InputError, Real, Trace};
+use interp::{Controller, InputError, Real, State, Trace};
 use ndarray::Array1;
 use policy::Policy;
 use serde::Serialize;
@@ -91,6 +91,12 @@ impl<T: Real> Oracle<T> {
     /// The interpreter in its present state.
     pub fn controller(&self) -> &Controller<T> {
         &self.controller
+    }
+
+    /// Puts the interpreter into another state of the same shape.
+    pub fn restore(&mut self, state: &State<T>) {
+        // a state that `controller` gave, with other numbers, always fits
+        self.controller.restore(state);
     }
 
     /// The next chunk of `steps` control steps.

@@ -27,6 +27,8 @@ pub struct Subject {
     pub rest: Vec<String>,
     /// Checksum over the state.
     pub state_crc: String,
+    /// Numbers in the state, before its two counters, as a literal.
+    pub state_numbers: String,
     /// Words of the mapping's coefficients; 0 without.
     pub coefficient_words: usize,
     /// Declarations of locals that hold them.

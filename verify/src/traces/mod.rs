@@ -5,6 +5,7 @@
 //! long enough for integrators to reach their clamps. Attempts to replace the mapping
 //! coefficients, resets and fresh starts are strewn in.
 
+pub mod directed;
 mod edges;
 mod plant;
 mod recorded;

@@ -100,6 +100,7 @@ fn subject(kit: &str, program: &Program, trace: &Trace) -> Subject {
         answer: texts.answer(),
         rest: texts.rest(),
         state_crc: texts.state_crc("0xFFFFFFFFu", "state."),
+        state_numbers: unsigned(((program.state_words() - 2) / program.scalar().words()) as u32),
         coefficient_words: program.scalar().words() * coefficients.len(),
         coefficient_locals: texts.coefficients(&coefficients),
         mapping_arguments: coefficients.join(", "),

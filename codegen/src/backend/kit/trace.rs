@@ -8,6 +8,7 @@ mod kind {
     pub const SET_MAPPING: u32 = 1;
     pub const RESET: u32 = 2;
     pub const INIT: u32 = 3;
+    pub const DAMAGE: u32 = 4;
 }
 
 /// Moves and answers, one after the other.
@@ -64,6 +65,12 @@ impl Trace {
     pub fn init(&mut self, state: impl IntoIterator<Item = u32>) {
         self.open(kind::INIT);
         self.words.push(crc32_words(state));
+    }
+
+    /// One word of the state gets other bits.
+    pub fn damage(&mut self, word: u32, bits: u32, state: impl IntoIterator<Item = u32>) {
+        self.open(kind::DAMAGE);
+        self.words.extend([word, bits, crc32_words(state)]);
     }
 
     fn open(&mut self, kind: u32) {

@@ -21,6 +21,7 @@ pub struct Effort {
 impl Default for Effort {
     fn default() -> Self {
         Self {
+            // conventions; 1000 samples leave the share an interval of about 6 points at most
             boxes: 2000,
             samples: 1000,
             depth: 48,
@@ -29,6 +30,7 @@ impl Default for Effort {
 }
 
 /// Half widths of the boxes around golden observations, relative to the width of the features' bounds.
+// conventions, a decade apart
 const RADII: [f64; 3] = [1e-2, 1e-3, 1e-4];
 
 /// A policy's numeric format against real arithmetic. `docs/reference/certificate.md` defines every entry.
@@ -88,6 +90,7 @@ impl Certificate {
     ) -> Self {
         let certifier = Certifier::new(policy);
         let domain = Domain::of(policy, Memory::Free);
+        // the same states for the share and for what is seen, so that the two can be held against each other
         let points: Vec<Vec<f64>> = (0..effort.samples).map(|_| domain.draw(uniform)).collect();
         let observations: Vec<Vec<f32>> = points.iter().map(|point| domain.observation(point)).collect();
         Self {
@@ -137,8 +140,10 @@ impl Certifier {
     }
 
     fn changing(&self, domain: &Domain, slice: &Slice) -> Option<(Interval, Interval)> {
+        // a convention, as is the tenth of margin below: fine enough to see a region, quick enough to ask three times
         const GRID: usize = 96;
         let at = |range: Interval, n: usize| range.low + (range.high - range.low) * (n as f64 / (GRID - 1) as f64);
+        // the real network alone: no format may decide which region is looked at
         let action = |column: usize, row: usize| {
             let mut point = slice.at.clone();
             point[slice.x.0] = at(slice.x.1, column);
@@ -149,6 +154,7 @@ impl Certifier {
         let mut ends: Option<[usize; 4]> = None;
         for n in 0..GRID * GRID {
             let (column, row) = (n % GRID, n / GRID);
+            // two neighbours of each point are enough: the other two have asked already
             let right = column + 1 < GRID && grid[n] != grid[n + 1];
             let up = row + 1 < GRID && grid[n] != grid[n + GRID];
             if right || up {

@@ -1,4 +1,13 @@
 //! Sets of states by splitting boxes: the bound over all states, the share that is decided, the map of a slice.
+//!
+//! ```text
+//!  state_bound  split the worst box again and again       every state lies in a leaf: the largest bound holds
+//!  share        a random point walks down the halves      is it in a box with one proven action?
+//!  map          cells of a plane, split while undecided   paint what is proven, look at a point of the rest
+//! ```
+//!
+//! In: a certifier, a domain. Out: bounds and shares. The one invariant: where a box is cut depends on the box alone, never
+//! on the point that asks, so all points walk down one tree, and proven boxes are a set whose volume can be estimated.
 
 use std::collections::BinaryHeap;
 
@@ -79,6 +88,7 @@ struct Waiting {
 
 impl Ord for Waiting {
     fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        // a heap needs an order of all numbers, and `partial_cmp` has none for one that is no number
         self.bound.largest.total_cmp(&other.bound.largest)
     }
 }
@@ -107,6 +117,7 @@ impl Certifier {
         };
         let mut waiting = BinaryHeap::from([wait(domain.whole())]);
         let mut count = 1;
+        // the worst first: the bound of the whole is the largest of the leaves, so no other split can lower it
         while count + 2 <= boxes {
             let Some(worst) = waiting.pop() else { break };
             let (lower, upper, _) = domain.halves(&worst.cell);
@@ -115,6 +126,7 @@ impl Certifier {
             count += 2;
         }
         let mut per_action: Vec<f64> = Vec::new();
+        // the leaves cover the domain, so the largest of their bounds holds everywhere
         for leaf in &waiting {
             per_action.resize(leaf.bound.per_action.len(), 0.0);
             for (largest, bound) in per_action.iter_mut().zip(&leaf.bound.per_action) {
@@ -166,6 +178,7 @@ impl Certifier {
                 .zip(&whole)
                 .map(|(o, bound)| {
                     let half = radius * (bound.high - bound.low);
+                    // a trainer may have drawn it elsewhere; an integer network clamps it in the same way
                     let o = f64::from(*o).clamp(bound.low, bound.high);
                     Interval {
                         low: (o - half).max(bound.low),
@@ -236,6 +249,7 @@ impl Painter<'_> {
         cell[slice.y.0] = y;
         self.map.boxes += 1;
         let action = self.certifier.decided(self.domain, &cell);
+        // a proven square is not split: what holds for the whole holds for its parts
         if action.is_none() && size > 1 {
             let half = size / 2;
             for (right, up) in [(0, 0), (half, 0), (0, half), (half, half)] {
@@ -259,6 +273,7 @@ fn part(range: Interval, index: usize, size: usize, count: usize) -> Interval {
     let at = |index: usize| range.low + (range.high - range.low) * (index as f64 / count as f64);
     Interval {
         low: at(index),
+        // a product of a fraction may be rounded below the end, which belongs to the last cell
         high: if index + size == count {
             range.high
         } else {
@@ -270,6 +285,8 @@ fn part(range: Interval, index: usize, size: usize, count: usize) -> Interval {
 impl Share {
     /// Wilson's interval at 95 %.
     fn of(proven: usize, samples: usize) -> Self {
+        // the normal distribution has 2.5 % beyond it on each side; Wilson's, because the usual interval has no width
+        // where all samples are proven, or none
         const Z: f64 = 1.959_964;
         let n = samples.max(1) as f64;
         let share = proven as f64 / n;

@@ -156,6 +156,7 @@ impl Domain {
             .iter()
             .enumerate()
             .map(|(index, range)| self.influence(index) * (range.high - range.low));
+        // the first among equals, so that equal cells are always cut alike
         let (widest, _) = effects
             .enumerate()
             .fold((0, f64::NEG_INFINITY), |best, (index, effect)| {
@@ -256,6 +257,7 @@ impl Domain {
         };
         // a filter's memory settles up to its own rounding
         y.error += past.filters as f64 * 64.0 * UNIT_32 * y.magnitude;
+        // the contract's order: scale, offset, clip
         y = y.scaled(feature.scale).plus(&Affine::constant(feature.offset));
         y.clip = feature.clip.map(|clip| Interval {
             low: f64::from(clip.low as f32),
@@ -329,6 +331,7 @@ impl Affine {
         self.constant += other.constant;
         self.magnitude += other.magnitude;
         // the sum is rounded once in binary32, its factors in binary64 here
+        // a rounded sum is larger than the exact one by its own error: 1.001 covers that second order
         self.error = (self.error + other.error + UNIT_32 * self.magnitude) * 1.001 + TINY_32;
         self
     }
@@ -354,6 +357,7 @@ impl Affine {
             |function: &Self, index: usize| function.factors.iter().find(|(found, _)| *found == index).map(|f| f.1);
         let factor = slope / at(other, *first)?;
         let is_copy = self.factors.iter().all(|(index, slope)| {
+            // thousands of roundings of binary64: two formulas of the same slopes differ by a few
             at(other, *index).is_some_and(|theirs| (slope - factor * theirs).abs() <= 1e-12 * slope.abs())
         });
         (is_copy && self.factors.len() == other.factors.len() && factor.is_finite() && factor != 0.0).then_some(factor)
@@ -367,6 +371,7 @@ impl Affine {
         if x.low >= clip.low && x.high <= clip.high {
             return Replacement::IDENTITY;
         }
+        // a range and no line: it forgets the samples it came from, but holds on both sides of the clip
         let inside = |x: f64| x.max(clip.low).min(clip.high);
         let (low, high) = (inside(x.low), inside(x.high));
         let shift = 0.5 * (low + high);
@@ -393,6 +398,7 @@ fn delay(feature: &Feature, memory: Memory) -> Option<Past> {
     for filter in &feature.filters {
         match (filter, memory) {
             (Filter::Delay { samples }, Memory::Free) => past.delay += samples,
+            // settled: all samples are equal, so a delay changes nothing and a difference is 0
             (Filter::Delay { .. }, Memory::Settled) => {}
             (Filter::BackwardDifference | Filter::FilteredDerivative { .. }, Memory::Settled) => {
                 past.is_difference = true;
@@ -415,6 +421,7 @@ fn described(policy: &Policy, input: Input) -> (String, String, Interval) {
                 (low.min(x), high.max(x))
             });
         Interval {
+            // the state holds the duty rounded to the format, which may be to either side
             low: f64::from(low as f32).min(low),
             high: f64::from(high as f32).max(high),
         }

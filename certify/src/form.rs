@@ -19,6 +19,7 @@ const TINY: f64 = 1e-300;
 pub(crate) fn outward(low: f64, high: f64, magnitude: f64, operations: usize) -> Interval {
     let slack = rounding(magnitude, operations);
     Interval {
+        // the difference is rounded once more: one number further out
         low: (low - slack).next_down(),
         high: (high + slack).next_up(),
     }
@@ -26,6 +27,7 @@ pub(crate) fn outward(low: f64, high: f64, magnitude: f64, operations: usize) ->
 
 /// More than the error of `operations` roundings on values whose magnitudes sum up to `magnitude`.
 pub(crate) fn rounding(magnitude: f64, operations: usize) -> f64 {
+    // twice and four more: gamma(n) is a little more than n u, and this product is rounded itself
     2.0 * UNIT * (operations + 4) as f64 * magnitude + TINY
 }
 
@@ -149,6 +151,7 @@ impl Form {
                     y.centre[output] += w * x.centre[i];
                     add(y.shared.row_mut(output), w, x.shared.row(i));
                     add(y.own.row_mut(output), w, x.own.row(i));
+                    // a slack has no symbol and cannot cancel: magnitudes add up
                     y.slack[output] += w.abs() * x.slack[i];
                     *total += w.abs() * sizes[i];
                 }
@@ -172,6 +175,7 @@ impl Form {
             own: self.own.widened(self.own.columns + if is_shared { 0 } else { fresh }),
             slack: vec![0.0; self.len()],
         };
+        // new symbols stand behind those that are there: columns of both forms keep their meaning
         let mut column = if is_shared {
             self.shared.columns
         } else {
@@ -186,6 +190,7 @@ impl Form {
                 }
             }
             y.slack[index] = factor.abs() * self.slack[index];
+            // a factor of 0 or 1 without a shift rounds nothing
             if factor != 0.0 && factor != 1.0 || step.shift != 0.0 {
                 let magnitude = factor.abs() * self.magnitude(index) + step.shift.abs();
                 y.slack[index] += 2.0 * rounding(magnitude, 4);
@@ -214,12 +219,14 @@ impl Form {
             slack += form.slack[plus] + form.slack[minus];
             magnitude += form.magnitude(plus) + form.magnitude(minus);
             operations += 2 + form.symbols();
+            // shared symbols mean the same in both forms, so what cancels cancels before the magnitude is taken
             for (sum, (a, b)) in shared
                 .iter_mut()
                 .zip(form.shared.row(plus).iter().zip(form.shared.row(minus)))
             {
                 *sum += a - b;
             }
+            // symbols of its own a form shares with no other
             let own = form.own.row(plus).iter().zip(form.own.row(minus));
             radius += own.map(|(a, b)| (a - b).abs()).sum::<f64>();
         }

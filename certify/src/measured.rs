@@ -40,6 +40,7 @@ impl Certifier {
 
     fn real(&self, observation: &[f32]) -> Form {
         let mut x = Form::zeros(observation.len(), 0);
+        // no symbols: one point, of which the form keeps the rounding of binary64 alone
         x.centre = observation.iter().map(|o| f64::from(*o)).collect();
         Network::real(&self.network, x)
     }
@@ -69,6 +70,7 @@ impl Certifier {
         let before = measured.observations as f64;
         measured.mean_spread = (measured.mean_spread * before + (high - low)) / (before + 1.0);
         measured.observations += 1;
+        // what was given up is counted in real Q: the format's own values would flatter it
         let chosen = argmax(&held);
         measured.largest_loss = measured
             .largest_loss

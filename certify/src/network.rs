@@ -68,6 +68,7 @@ impl Network {
                 .iter()
                 .map(|input| TO_INTEGER * power_of_two(-input.exponent) + TINY_32)
                 .collect(),
+            // floats take the observation as it is
             None => vec![0.0; policy.features.len()],
         };
         let layer = |(index, layer): (usize, &policy::Layer)| {
@@ -138,10 +139,12 @@ impl Layer {
         for (w, x) in self.held.row(output).iter().zip(inputs) {
             let product = w.abs() * x;
             partial += product;
+            // a product counts twice: it is rounded, and part of the sum that is; fused, it is not rounded by itself
             rounded += partial + if is_fused { 0.0 } else { product };
         }
         // the rounded sums are larger than the exact ones by their own errors: second order
         let before = UNIT_32 * rounded * (1.0 + 4.0 * UNIT_32 * inputs.len() as f64) * (1.0 + 1e-9) + TINY_32;
+        // slope and product are rounded: two units, and a hundredth for the second order
         let relative = 2.01 * UNIT_32;
         match self.activation.shape() {
             Shape::Hinge { .. } if self.is_exact() => Rounding {
@@ -163,6 +166,7 @@ impl Layer {
 
     fn integer_rounding(&self, accumulator: i32, shift: u32, magnitude: f64) -> Rounding {
         let unit = power_of_two(shift.cast_signed() - accumulator);
+        // the bias holds half of the last bit kept, so the shift rounds to nearest
         let cut = if shift == 0 { 0.0 } else { 0.5 * unit };
         match self.activation.shape() {
             Shape::Hinge { .. } if self.is_exact() => Rounding {
@@ -170,6 +174,7 @@ impl Layer {
                 ..Rounding::default()
             },
             Shape::Hinge { below } => {
+                // the slope as the format holds it; its product is rounded to the nearest integer
                 let held = scales::slope_integer(below) as f64 * power_of_two(-SLOPE_BITS.cast_signed());
                 Rounding {
                     before: cut,
@@ -178,6 +183,7 @@ impl Layer {
                 }
             }
             Shape::Sigmoid(sigmoid) => Rounding {
+                // the sum becomes a binary32 number; the power of two behind it rounds nothing
                 before: 1.01 * UNIT_32 * magnitude + TINY_32,
                 after: TO_INTEGER * power_of_two(-SIGMOID_EXPONENT) + sigmoid.error_32,
                 after_relative: 0.0,

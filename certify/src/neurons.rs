@@ -34,6 +34,7 @@ impl Certifier {
                     let mut weights = row.iter().enumerate();
                     // adding products that are 0 leaves the bias as it is
                     let is_silent = weights.all(|(input, w)| *w == 0.0 || dead_inputs.contains(&input));
+                    // 0 itself is dead, too: behind the activation it is the same +0
                     if sum.high <= 0.0 || is_silent && layer.bias[output] <= 0.0 {
                         neurons.dead.push(output);
                     } else if sum.low >= 0.0 {
@@ -41,6 +42,7 @@ impl Certifier {
                     }
                 }
             }
+            // layer by layer: what is dead here is a zero input of the next
             dead_inputs.clone_from(&neurons.dead);
             found.push(neurons);
         }

@@ -3,6 +3,17 @@
 //! With a(x) the activation, x the real sum and e the error before it, the error behind is `a(x + e) - a(x) = l e`
 //! for some slope l of a between x and x + e (mean value): where both lie on one side of a ReLU, l is known; elsewhere
 //! it lies in `[l0, l1]`, and `l e` is within `(l1 - l0) / 2 * max |e|` of `(l0 + l1) / 2 * e`.
+//!
+//! ```text
+//!  real   x ──W x + b──► sums ──line, radius──► x' ─► Q
+//!         │               │
+//!         │ same symbols  │ which side of the bend
+//!         │               ▼
+//!  error  e ──W' e + (W' - W) x + b' - b──► e before ──slope, spread, rounding──► e'
+//! ```
+//!
+//! In: the observations of a cell. Out: a form of the real Q values and one of the error. The one invariant: both have the same
+//! shared symbols, so a Q value of the format is their sum, and what moves together cancels in a difference.
 
 use policy::activation::Sigmoid;
 use policy::{Activation, Interval, Shape};
@@ -33,6 +44,7 @@ impl Enclosure {
 
     /// The action with the largest centre.
     pub fn candidate(&self) -> usize {
+        // no other can be proven: a difference that is positive over the cell is so at its centre
         let centres = self.real.centre.iter().enumerate();
         centres
             .fold(
@@ -80,6 +92,7 @@ fn start(network: &Network, observation: Form) -> Enclosure {
         .iter()
         .map(|radius| Replacement::scaled(0.0, *radius))
         .collect();
+    // symbols of its own: how an observation is rounded has nothing to do with where in the cell it lies
     let error = Form::zeros(observation.len(), shared).replaced(&steps, false, shared);
     Enclosure {
         real: observation,
@@ -100,6 +113,7 @@ pub(crate) fn sums(network: &Network, observation: Form) -> Vec<Vec<Interval>> {
 
 /// Behind a layer, and the format's sums before its activation.
 fn layer(layer: &Layer, input: &Enclosure) -> (Enclosure, Vec<Interval>) {
+    // what the format multiplies is the real input and its error together
     let magnitudes: Vec<f64> = (0..input.real.len())
         .map(|i| input.real.magnitude(i) + input.error.magnitude(i))
         .collect();
@@ -127,9 +141,11 @@ fn layer(layer: &Layer, input: &Enclosure) -> (Enclosure, Vec<Interval>) {
         let (low, high) = slopes(layer.activation, x, y);
         let spread = 0.5 * (high - low) * e.low.abs().max(e.high.abs());
         let factor = 0.5 * (low + high);
+        // the activation of the format is off by more, the larger its argument, whose own rounding counts as well
         let after = rounding.after + rounding.after_relative * (magnitude + before);
         error_steps.push(Replacement::scaled(
             factor,
+            // 1e-12: more than this line rounds
             (factor * before + spread + after) * (1.0 + 1e-12),
         ));
     }
@@ -149,6 +165,7 @@ fn relaxed(activation: Activation, x: Interval) -> Replacement {
 
 /// `x` above 0, `slope * x` below: never below the line through 0 of the chord's slope, and never above the chord.
 fn convex(x: Interval, slope: f64) -> Replacement {
+    // on one side of the bend the function is a line: nothing is lost, no symbol is added
     if x.low >= 0.0 {
         return Replacement::IDENTITY;
     }
@@ -179,6 +196,7 @@ fn flattening(sigmoid: &Sigmoid, x: Interval) -> Replacement {
 
 /// Least and largest slope between a point of `x` and one of `y`.
 fn slopes(activation: Activation, x: Interval, y: Interval) -> (f64, f64) {
+    // the mean value lies between a point of x and one of y, wherever they are
     let hull = Interval {
         low: x.low.min(y.low),
         high: x.high.max(y.high),

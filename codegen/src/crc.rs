@@ -3,6 +3,7 @@
 /// The sixteen steps of the polynomial for one nibble; the generated code carries the same table.
 #[must_use]
 pub const fn nibble_table() -> [u32; 16] {
+    // a nibble at a time: 64 bytes of flash where a table for bytes takes 1024, and it runs beside control
     let mut table = [0_u32; 16];
     let mut index = 0;
     while index < 16 {
@@ -32,6 +33,7 @@ pub fn crc32_words(words: impl IntoIterator<Item = u32>) -> u32 {
 #[must_use]
 pub fn crc32_bytes(bytes: impl IntoIterator<Item = u8>) -> u32 {
     let table = nibble_table();
+    // ones before and their complement behind, as in IEEE 802.3: leading zeros count
     let mut crc = u32::MAX;
     for byte in bytes {
         crc ^= u32::from(byte);

@@ -70,6 +70,7 @@ impl From<CodegenError> for Faults {
                     .found(format!(
                         "{value:e} in {place}; the FPU of {target} has no subnormal numbers"
                     ))
+                    // the smallest normal number: below it the FPU sees zero
                     .expected(format!("0, or a magnitude of at least {:e}", f32::MIN_POSITIVE))
                     .hint("round it to 0 where the policy is exported, or take --format i16")
                     .into();

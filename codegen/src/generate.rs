@@ -43,12 +43,14 @@ pub fn sources(
     let outputs = output::with_cores(outputs);
     let mut all = GeneratedFiles::default();
     for language in output::languages(&outputs) {
+        // one program a language, whatever calls it: all outputs share the core
         let program = lower(policy, target, language);
         check_subnormals(&program, target)?;
         for output in outputs.iter().filter(|output| output.language() == language) {
             all.files.extend(emit(*output, &program, expected)?.files);
         }
     }
+    // last, and before the manifest: its checksums are those of the files as they are written
     stamp(&mut all, policy, target);
     Ok(all)
 }
@@ -58,6 +60,7 @@ fn check_subnormals(program: &Program, target: &TargetSpec) -> Result<(), Codege
     if !target.flushes_subnormals {
         return Ok(());
     }
+    // refused and not rounded to 0 here: that would be another policy than the one the trainer exported
     let is_flushed = |value: &Literal| (value.value() as f32).is_subnormal();
     let floats = program
         .checked_tables()
@@ -87,6 +90,7 @@ fn check_subnormals(program: &Program, target: &TargetSpec) -> Result<(), Codege
 }
 
 fn check_types(policy: &Policy, target: &TargetSpec) -> Result<(), CodegenError> {
+    // binary64 because the width of `double` is a setting of those compilers
     let needs_bytes = matches!(policy.numeric_format, NumericFormat::I8 | NumericFormat::F64);
     if needs_bytes && target.widths.char_bits > 8 {
         return Err(CodegenError::NoType {

@@ -15,6 +15,7 @@ use crate::output::{Language, Output, languages, with_cores};
 pub const FILE: &str = "manifest.json";
 
 /// Start of the entry that [`with_costs`] adds.
+// as `serde_json` lays it out, so that a manifest with costs is printed like any other
 const COSTS: &str = ",\n  \"costs\": ";
 
 /// A manifest with the costs of builds as its last entry. They come from the compilers of a machine, all else does not.
@@ -24,6 +25,7 @@ const COSTS: &str = ",\n  \"costs\": ";
 pub fn with_costs(text: &str, costs: &impl Serialize) -> Result<String, crate::files::CodegenError> {
     let costs =
         serde_json::to_string_pretty(costs).map_err(|error| crate::files::CodegenError::Manifest(error.to_string()))?;
+    // as text: read and written anew, the other entries might not keep their bytes, which `verify` compares
     let body = text.trim_end().strip_suffix("\n}").unwrap_or_default();
     Ok(format!("{body}{COSTS}{}\n}}\n", costs.replace('\n', "\n  ")))
 }
@@ -109,8 +111,10 @@ pub struct FileEntry {
 /// Sizes of a policy's controller, the same in every language.
 #[must_use]
 pub fn sizes(policy: &Policy, target: &TargetSpec) -> Sizes {
+    // any language would do: loops differ, checked tables and state do not
     let program = crate::lower(policy, target, Language::C);
     let mut removed: Vec<usize> = crate::lower::simplify::removable(policy).iter().map(Vec::len).collect();
+    // an empty list is not written at all
     if removed.iter().all(|count| *count == 0) {
         removed.clear();
     }

@@ -98,6 +98,7 @@ pub fn with_cores(chosen: &[Output]) -> Vec<Output> {
         .iter()
         .flat_map(|output| [*output, output.language().core()])
         .collect();
+    // derived, so in the order of the rows: that of the help text and of the manifest
     all.sort();
     all.dedup();
     all

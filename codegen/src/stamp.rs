@@ -16,6 +16,7 @@ pub(crate) fn stamp(files: &mut GeneratedFiles, policy: &Policy, target: &Target
     for (file, text) in &mut files.files {
         if *file == format!("{name}.h") {
             let guard = format!("#define {upper}_H\n");
+            // behind the guard, so that a header which is included twice defines it once
             let line = format!(
                 "{guard}\n/* The run of policyc that wrote this file; the sources ask for it. */\n#define {macro_name} 1\n"
             );
@@ -24,7 +25,7 @@ pub(crate) fn stamp(files: &mut GeneratedFiles, policy: &Policy, target: &Target
             // a header of the controller includes the core's, and no other header does
             let include = format!("#include \"{name}");
             let Some(end) = text
-                .rfind(&include)
+                .rfind(&include) // the last of them: the question stands behind all headers
                 .and_then(|at| Some(at + text[at..].find('\n')? + 1))
             else {
                 continue;
@@ -48,5 +49,6 @@ fn digest(policy: &Policy, target: &TargetSpec) -> u32 {
         &digests.contract,
         digests.mapping.as_deref().unwrap_or_default(),
     ];
+    // 32 bits are enough against files that were mixed by accident
     crc32_bytes(parts.join("\n").bytes())
 }

@@ -38,11 +38,15 @@ pub(crate) fn integer(activation: Activation, sum: i64, accumulator: i32, shift:
 /// The sum as a binary32 number, the function of section 6, and back.
 fn through_binary32(function: fn(f32) -> f32, sum: i64, accumulator: i32) -> i64 {
     let x = sum as f32 * (power_of_two(-accumulator) as f32);
+    // the sum is rounded to binary32 once; the power of two changes its exponent alone
     let y = function(x) * (power_of_two(SIGMOID_EXPONENT) as f32);
+    // the sum is positive, so that cutting it off rounds half up; it is made in binary32, as in the contract:
+    // in binary64 a value just below a half would not be rounded up to it first
     (y + 32_768.5).trunc() as i64 - 32_768
 }
 
 fn relu<T: Real>(x: T) -> T {
+    // not `max`, which leaves open which of two zeros it gives: of -0 the contract makes +0
     if x > T::ZERO { x } else { T::ZERO }
 }
 
@@ -50,6 +54,7 @@ fn leaky_relu<T: Real>(slope: T, x: T) -> T {
     if x > T::ZERO { x } else { slope * x }
 }
 
+// typed from the contract and not taken from `policy`, as the compiler's are: a wrong digit in one of them shows
 /// Coefficients n0..n4 of the numerator.
 const NUMERATOR: [f64; 5] = [0.9999999, 0.13373208, 0.0034865933, 2.0472007e-5, 1.3184444e-8];
 /// Coefficients d0..d4 of the denominator.
@@ -61,10 +66,12 @@ pub fn tanh<T: Real>(x: T) -> T {
         lo: T::nearest(-limit),
         hi: T::nearest(limit),
     };
+    // from 9 on tanh is less than 4e-8 below 1, a tenth of the approximation's error
     let t = clamp(9.0).clamp(x);
     let z = t * t;
     let p = horner(NUMERATOR, z) * t;
     let q = horner(DENOMINATOR, z);
+    // the quotient of two rounded sums may pass 1; the scales of section 6b rest on it not doing so
     clamp(1.0).clamp(p / q)
 }
 

@@ -281,7 +281,7 @@ impl<T: Real> Controller<T> {
             state.bad_count
         };
         trace.expired = trace.bad_count > self.hold;
-        trace.primed = state.primed & 1 == 1;
+        trace.primed = state.primed & 1 == 1; // 2 is the mark of a damaged state
         trace.sound = self.sound.holds(state, self.mapping.as_ref());
         trace.usable = trace.sound && (trace.all_valid || (trace.primed && !trace.expired));
 
@@ -374,8 +374,8 @@ impl<T: Real> Controller<T> {
         if let (Some(soft), Some(cap)) = (self.limits.soft_start, state.soft_cap) {
             state.soft_cap = Some(self.limits.next_cap(soft, cap, trace.usable));
         }
-        state.bad_count = if trace.sound { trace.bad_count } else { 0 };
-        state.primed = if trace.sound { u32::from(trace.usable) } else { 2 };
+        state.bad_count = if trace.sound { trace.bad_count } else { 0 }; // it may be the damaged word
+        state.primed = if trace.sound { u32::from(trace.usable) } else { 2 }; // 2: seen until init or reset
     }
 }
 

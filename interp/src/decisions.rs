@@ -105,12 +105,15 @@ fn reference(policy: &Policy, golden: &Golden) -> Vec<Vec<f64>> {
         let rows = golden.q_values.chunks_exact(policy.actions.len().max(1));
         return rows.map(|row| row.iter().copied().map(f64::from).collect()).collect();
     }
+    // binary64 stands for exact arithmetic: the format at hand must not be its own judge
     let exact = policy.clone().with_format(NumericFormat::F64);
     let answers = answers::<f64>(&exact, golden);
     answers.into_iter().map(|q| q.to_vec()).collect()
 }
 
 fn weigh(policy: &Policy, golden: &Golden, reference: &[Vec<f64>], found: &[usize], allowed: f64) -> Decisions {
+    // losses are shares of what the trainer tells apart, not of the whole box of observations: Q spans far more
+    // there than where a converter works, so that every loss would look small
     let spans = reference.iter().map(|q| {
         let highest = q.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         highest - q.iter().copied().fold(f64::INFINITY, f64::min)
@@ -132,6 +135,7 @@ fn weigh(policy: &Policy, golden: &Golden, reference: &[Vec<f64>], found: &[usiz
         let value = |action: usize| q.get(action).copied().unwrap_or(f64::NAN);
         // the trainer's action may be one of two that are equal in its own arithmetic: then nothing is given up
         let lost = (value(expected) - value(*found)).max(0.0);
+        // the same measure as in `golden`: a tie is what the trainer's own rounding could have turned
         let largest = q.iter().fold(f64::MIN_POSITIVE, |largest, q| largest.max(q.abs()));
         if lost <= golden.tolerance * largest {
             ties += 1;

@@ -67,6 +67,7 @@ pub(crate) struct Feature<T> {
 impl<T: Real> Feature<T> {
     /// `period` in seconds; `start` is the first free word of the filter memory.
     pub fn new(feature: &policy::Feature, period: f64, start: usize) -> Self {
+        // words are given out in the order of section 1: by feature, then by filter
         let mut next = start;
         let filters = feature
             .filters
@@ -80,6 +81,7 @@ impl<T: Real> Feature<T> {
         Self {
             source: Source::new(&feature.source),
             filters,
+            // an offset of 0 is left out and not added: it would make +0 of -0, which the generated code keeps
             scale: (feature.scale != 1.0).then(|| T::nearest(feature.scale)),
             offset: (feature.offset != 0.0).then(|| T::nearest(feature.offset)),
             clip: feature.clip.map(Range::nearest),

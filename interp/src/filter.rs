@@ -25,6 +25,8 @@ enum Kind<T> {
 impl<T: Real> Filter<T> {
     /// `period` in seconds; `start` is the first free word of the memory.
     pub fn new(spec: Spec, period: f64, start: usize) -> Self {
+        // coefficients are rational in time constant and period: an exponential would be that of a libm,
+        // another one on another machine; each is computed in binary64 and rounded once
         let kind = match spec {
             Spec::Delay { samples } => Kind::Delay { samples },
             Spec::BackwardDifference => Kind::BackwardDifference {
@@ -57,6 +59,7 @@ impl<T: Real> Filter<T> {
     pub fn words(&self) -> usize {
         match self.kind {
             Kind::Delay { samples } => samples,
+            // the newest sample is the input itself; the check demands two at least
             Kind::MovingAverage { samples, .. } => samples - 1,
             Kind::BackwardDifference { .. } | Kind::LowPass { .. } | Kind::Integrator { .. } => 1,
             Kind::FilteredDerivative { .. } => 2,
@@ -87,8 +90,10 @@ impl<T: Real> Filter<T> {
                 let y1 = read(0, x);
                 y1 + k * (x - y1)
             }
+            // unprimed the difference is 0 and so is the slope before: no pulse at the start
             Kind::FilteredDerivative { p, k } => p * read(1, T::ZERO) + k * (x - read(0, x)),
             Kind::MovingAverage { samples, k } => {
+                // oldest first: the order of a sum of floats is part of its bits
                 let mut sum = read(0, x);
                 for word in 1..samples - 1 {
                     sum = sum + read(word, x);
@@ -105,6 +110,7 @@ impl<T: Real> Filter<T> {
         match self.kind {
             Kind::Delay { .. } | Kind::BackwardDifference { .. } | Kind::MovingAverage { .. } => shift(line, primed, x),
             Kind::LowPass { .. } | Kind::Integrator { .. } => shift(line, primed, y),
+            // two lines of one word: a push sets them, primed or not
             Kind::FilteredDerivative { .. } => line.copy_from_slice(&[x, y]),
         }
     }
@@ -118,6 +124,7 @@ fn shift<T: Real>(line: &mut [T], primed: bool, newest: T) {
             *last = newest;
         }
     } else {
+        // the first good sample stands for a past that nobody has measured: zeros would be a step from 0
         line.fill(newest);
     }
 }

@@ -49,6 +49,7 @@ pub fn judge(golden: &Golden, answers: &[&[f64]]) -> GoldenResult {
         .zip(answers)
         .filter(|(expected, q)| argmax(aview1(q)) == **expected as usize)
         .count();
+    // `zip` below leaves out what is missing, and must not pass it
     let missing = answers.len() < golden.count;
     let actions = golden.q_values.len() / golden.count.max(1);
     let worst = golden
@@ -69,9 +70,11 @@ pub fn judge(golden: &Golden, answers: &[&[f64]]) -> GoldenResult {
 
 /// Largest difference relative to the largest expected |Q|; infinite if a value is no number.
 fn relative_error(expected: &[f32], got: &[f64]) -> f64 {
+    // relative to the largest of the row: near 0 a Q value has lost its digits to the sums that it is made of
     let largest = expected
         .iter()
         .map(|q| f64::from(q.abs()))
+        // a row of zeros has no largest: the division stays one by a number
         .fold(f64::MIN_POSITIVE, f64::max);
     expected
         .iter()
@@ -112,6 +115,7 @@ fn wide<T: Real + Into<f64>>(policy: &Policy, golden: &Golden) -> Vec<Vec<f64>> 
 /// than the contract allows. `None` if neither, or without golden vectors.
 #[must_use]
 pub fn refusal(policy: &Policy) -> Option<Message> {
+    // reading comes first: of a network that was read wrongly the decisions say nothing about the format
     let result = golden_result(policy)?;
     if !result.passed() {
         let found = match result.worst_relative_error {
@@ -136,6 +140,7 @@ pub fn refusal(policy: &Policy) -> Option<Message> {
         Message::new("the numeric format changes more of the trainer's decisions than allowed")
             .found(format!(
                 "{changed} of {observations} changed in {numeric_format}, allowed {} %",
+                // to hundredths of a percent: 100 * 0.07 is 7.000000000000001
                 (1e4 * allowed).round() / 100.0
             ))
             .hint("`policyc inspect` tells what they cost; to accept them: golden_decisions in [network], a share from 0 to 1"),

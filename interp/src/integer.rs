@@ -63,6 +63,7 @@ impl Network {
 
     /// Runs all layers; the traces hold the integers' values.
     pub fn run<T: Real>(&self, observation: ArrayView1<'_, T>, traces: &mut [LayerTrace<T>]) {
+        // measurements of the integer formats are binary32: the way through binary64 is exact
         let inputs = self.inputs.iter().zip(observation);
         let mut x: Array1<i64> = inputs.map(|(input, o)| input.integer(o.to_f64() as f32)).collect();
         for (layer, trace) in self.layers.iter().zip(traces) {
@@ -88,6 +89,7 @@ impl Input {
 
 /// Round half up.
 pub(crate) fn rounded(x: f64) -> i64 {
+    // not `round`, which sends -0.5 to -1: the contract rounds halves up on both sides of 0
     (x + 0.5).floor() as i64
 }
 
@@ -96,6 +98,7 @@ pub(crate) fn shifted(x: i64, bits: u32) -> i64 {
     if bits == 0 {
         x
     } else {
+        // `/` would round towards 0; with a positive divisor Euclid's quotient is the floor
         (x + (1 << (bits - 1))).div_euclid(1 << bits)
     }
 }
@@ -118,6 +121,7 @@ impl Layer {
     }
 
     fn run<T: Real>(&self, x: &Array1<i64>, trace: &mut LayerTrace<T>) -> Array1<i64> {
+        // sums of integers are exact: here the order of the inputs is free
         let mut sums = self.bias.clone();
         for (row, &x) in self.weights.rows().into_iter().zip(x) {
             sums.zip_mut_with(&row, |sum, &w| *sum += w * x);
@@ -126,6 +130,7 @@ impl Layer {
         let y: Array1<i64> = activated
             .map(|(sum, exponent)| integer(self.activation, *sum, *exponent, self.shift))
             .collect();
+        // a sum of 31 bits may be rounded here, in the trace alone; outputs are within 2^24, so each is exact
         let value = |(x, exponent): (&i64, &i32)| T::nearest(*x as f64 * power_of_two(-exponent));
         trace.pre_activation = sums.iter().zip(&self.accumulators).map(value).collect();
         trace.post_activation = y.iter().zip(&self.exponents).map(value).collect();

@@ -33,6 +33,7 @@ impl<T: Real> Limits<T> {
     pub fn new(limits: &policy::Limits) -> Self {
         Self {
             duty: Range::inwards(limits.duty),
+            // down, so that rounding never lets the duty move farther than the contract says
             slew: limits.slew.map(T::down),
             soft_start: limits.soft_start.map(|soft| SoftStart {
                 from: T::nearest(soft.from),
@@ -43,6 +44,7 @@ impl<T: Real> Limits<T> {
 
     /// `soft_cap` is `None` without a soft start.
     pub fn apply(&self, mapped: T, previous_command: T, soft_cap: Option<T>) -> Limited<T> {
+        // in this order, so that the duty limits have the last word: what slew and soft start leave is still clamped
         let mut bits = 0;
         let mut t = mapped;
         if let Some(slew) = self.slew {
@@ -55,6 +57,7 @@ impl<T: Real> Limits<T> {
         }
         let slewed = t;
         if let Some(cap) = soft_cap
+            // from above alone: a soft start holds a duty down and never raises one
             && t > cap
         {
             bits |= status::SOFT_START;
@@ -77,6 +80,7 @@ impl<T: Real> Limits<T> {
 
     /// The cap for the next step (section 10).
     pub fn next_cap(&self, soft: SoftStart<T>, cap: T, usable: bool) -> T {
+        // so many rounded increments need not end at the limit, so the rise is cut off there
         let risen = cap + soft.increment;
         if !usable {
             soft.from

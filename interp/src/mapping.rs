@@ -24,6 +24,8 @@ impl<T: Real> Mapping<T> {
                 r: r.map(T::nearest),
             },
             load_current: mapping.load_current,
+            // to nearest, as the actions are: one at the end of the range is inside; what is accepted at run time is
+            // rounded inwards, so that it lies in the interval as written
             valid_i_out: Range::nearest(mapping.valid_i_out),
             valid_d_sim: Range::nearest(mapping.valid_d_sim),
             adjust: [mapping.adjust_a, mapping.adjust_b, mapping.adjust_c, mapping.adjust_r].map(Range::inwards),
@@ -39,6 +41,7 @@ impl<T: Real> Mapping<T> {
     /// The duty for the plant from the duty `d` for the simulation at load current `i`.
     pub fn apply(coefficients: Coefficients<T>, d: T, i: T) -> T {
         let Coefficients { a, b, c, r } = coefficients;
+        // every product and every sum is rounded by itself; Rust never makes one fused operation of them
         let mut t = a * d;
         t = t + b * i;
         t = t + c;
@@ -50,6 +53,7 @@ impl<T: Real> Mapping<T> {
 
     /// Whether `d` or `i` lies outside the validity range.
     pub fn outside(&self, d: T, i: T) -> bool {
+        // not the negation of `contains`: a NaN is no extrapolation, its bit is STATE
         self.valid_d_sim.clamps(d) || self.valid_i_out.clamps(i)
     }
 
@@ -59,6 +63,7 @@ impl<T: Real> Mapping<T> {
         let form_and_r = match (self.initial.r, new.r) {
             (None, None) => true,
             (Some(_), Some(r)) => {
+                // the slope a + r i is a line in i: above 0 at both ends, it is above 0 between them
                 let rises = |i: T| new.a + r * i > T::ZERO;
                 adjust_r.contains(r) && rises(self.valid_i_out.lo) && rises(self.valid_i_out.hi)
             }

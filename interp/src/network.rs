@@ -35,6 +35,7 @@ impl<T: Real> Layer<T> {
 
     /// Runs the layer; the result is `trace.post_activation`.
     pub fn run(&self, input: ArrayView1<'_, T>, trace: &mut LayerTrace<T>) {
+        // sums start from the bias, not with it at the end: in floats these are different bits
         trace.pre_activation.assign(&self.bias);
         let accumulate = if self.fused { T::accumulate_fused } else { T::accumulate };
         accumulate(self.weights.view(), input, trace.pre_activation.view_mut());
@@ -45,6 +46,7 @@ impl<T: Real> Layer<T> {
 
 /// Greedy action (section 7): the lowest index among the largest values; a NaN never wins.
 pub fn argmax<T: Real>(q_values: ArrayView1<'_, T>) -> usize {
+    // compared one by one with `>`, not with `max_by`: equal values keep the lower index, and a NaN never wins
     let mut best = -T::MAX;
     let mut index = 0;
     for (n, &q) in q_values.iter().enumerate() {

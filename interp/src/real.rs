@@ -5,6 +5,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use ndarray::{ArrayView1, ArrayView2, ArrayViewMut1};
 
+// a third format would be a section of the contract first: nobody outside can add one
 mod sealed {
     pub trait Sealed {}
     impl Sealed for f32 {}
@@ -66,6 +67,8 @@ pub trait Real:
     fn accumulate_fused(weights: ArrayView2<'_, Self>, input: ArrayView1<'_, Self>, acc: ArrayViewMut1<'_, Self>);
 }
 
+// written out for each type: a default method would be compiled in the crate that calls it, which tests build with
+// less optimisation than this one
 macro_rules! accumulate {
     () => {
         fn accumulate(weights: ArrayView2<'_, Self>, input: ArrayView1<'_, Self>, mut acc: ArrayViewMut1<'_, Self>) {
@@ -80,6 +83,7 @@ macro_rules! accumulate {
             mut acc: ArrayViewMut1<'_, Self>,
         ) {
             for (row, &x) in weights.rows().into_iter().zip(input.iter()) {
+                // one rounding on every machine; without the instruction it is a slower function of equal bits
                 acc.zip_mut_with(&row, |acc, &w| *acc = w.mul_add(x, *acc));
             }
         }
@@ -203,6 +207,7 @@ impl<T: Real> Range<T> {
 
     /// `clamp` of contract section 4.
     pub fn clamp(self, x: T) -> T {
+        // not `max` and `min`: these drop a NaN, which has to come through, so that section 9 can answer with STATE
         let t = if x < self.lo { self.lo } else { x };
         if t > self.hi { self.hi } else { t }
     }

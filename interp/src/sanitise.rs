@@ -81,6 +81,7 @@ impl<T: Real> Signal<T> {
     pub fn new(signal: &policy::Signal) -> Self {
         Self {
             adc: signal.adc.map(|adc| (T::nearest(adc.gain), T::nearest(adc.offset))),
+            // inwards: no sample beyond the contract's range passes because an end was rounded outwards
             range: Range::inwards(signal.range),
         }
     }
@@ -101,6 +102,7 @@ impl<T: Real> Signal<T> {
         match (self.adc, sample) {
             (None, Sample::Physical(x)) => Ok(T::widen(x)),
             (None, Sample::Wide(x)) => Ok(T::nearest(x)),
+            // added even if it is 0, as in the contract: that makes +0 of -0, and left out it would be another bit
             (Some((gain, offset)), Sample::Code(n)) => Ok(gain * T::from_code(n) + offset),
             (None, Sample::Code(_)) => Err(InputError::PhysicalExpected { signal: index }),
             (Some(_), Sample::Physical(_) | Sample::Wide(_)) => Err(InputError::CodeExpected { signal: index }),

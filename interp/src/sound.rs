@@ -25,6 +25,7 @@ pub(crate) struct Sound<T> {
 impl<T: Real> Sound<T> {
     pub fn new(policy: &Policy) -> Self {
         let read = |input: Input| policy.features.iter().any(|feature| reads(&feature.source, input));
+        // reset and fallback write these two without a limiter, and a contract may put them outside of the limits
         let start = [policy.limits.initial_duty, policy.fallback.duty].map(T::nearest);
         let limits = Range::inwards(policy.limits.duty);
         let duties = policy.actions.iter().map(|action| T::nearest(action.duty));
@@ -36,6 +37,7 @@ impl<T: Real> Sound<T> {
                 .map(|signal| Range::inwards(signal.range))
                 .collect(),
             memory: policy::memory_bounds(policy).into_iter().map(T::nearest).collect(),
+            // a flip in what nothing reads decides no duty: asked, it would only stop a controller that works
             previous_duty: read(Input::PreviousDuty).then(|| hull(start.into_iter().chain(duties))),
             previous_command: (read(Input::PreviousCommand) || slewed)
                 .then(|| hull(start.into_iter().chain([limits.lo, limits.hi]))),
@@ -60,6 +62,7 @@ impl<T: Real> Sound<T> {
         let bounded = |(&x, &bound): (&T, &T)| Range { lo: -bound, hi: bound }.contains(x);
         let coefficients = match (mapping, state.mapping) {
             (Some(mapping), Some(coefficients)) => mapping.accepts(coefficients),
+            // without a mapping there is nothing to be wrong
             _ => true,
         };
         self.held.iter().zip(&state.held).all(|(range, &x)| range.contains(x))
@@ -68,6 +71,7 @@ impl<T: Real> Sound<T> {
             && within(self.previous_command, state.previous_command)
             && state.soft_cap.is_none_or(|cap| within(self.soft_cap, cap))
             && coefficients
+            // the counter stops one above K, so it never wraps, and a larger one was not counted
             && state.bad_count <= self.hold.saturating_add(1)
             && state.primed <= 1
     }
@@ -94,6 +98,7 @@ fn reads(expr: &Expr, input: Input) -> bool {
 
 /// From the smallest to the largest of some numbers.
 fn hull<T: Real>(numbers: impl Iterator<Item = T>) -> Range<T> {
+    // nothing lies within: the first number sets both ends
     let none = Range {
         lo: T::MAX,
         hi: -T::MAX,

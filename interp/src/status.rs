@@ -40,6 +40,7 @@ pub fn names(status: u32) -> String {
         .filter(|(bit, _)| status >> bit & 1 == 1)
         .map(|(_, name)| (*name).to_owned())
         .collect();
+    // S-function and FMU add 65536 to the word while they ignore coefficients; it must not vanish from a log
     let unknown = status >> NAMES.len() << NAMES.len();
     if unknown != 0 {
         parts.push(format!("{unknown:#x}"));

@@ -95,6 +95,7 @@ impl Build {
             .include(&files.include)
             .opt_level(2)
             .warnings(false);
+        // without them a compiler may contract products and sums, and the bits are others
         for flag in files.flags {
             compiler.flag(flag);
         }
@@ -128,6 +129,7 @@ impl Build {
         let target = self.find_target(&surroundings.triple)?;
         // cargo runs a script that failed again, so that the files of a policy with faults need no line
         let policy = policy::load(&self.contract)?;
+        // as `policyc compile` does: who never types `policyc` must not get the controller of a misread network
         if let Some(message) = interp::golden::refusal(&policy) {
             return Err(policy::Faults::refusing(&policy, message).into());
         }
@@ -138,6 +140,7 @@ impl Build {
     }
 
     fn find_target(&self, triple: &str) -> Result<&'static TargetSpec, Error> {
+        // the targets of this machine have an empty triple, which an empty TARGET must not find
         let fitting = |target: &&TargetSpec| {
             target
                 .rust
@@ -145,6 +148,7 @@ impl Build {
         };
         match &self.target {
             Some(name) => targets::find(name).ok_or_else(|| Error::Target(name.clone())),
+            // an unknown processor gets the code of the host: its bits are the same, its loops may be slower
             None => Ok(targets::TARGETS.iter().find(fitting).unwrap_or(targets::host())),
         }
     }
@@ -174,11 +178,13 @@ fn reruns(policy: &Policy) -> impl Iterator<Item = String> {
     policy
         .files
         .iter()
+        // as soon as a script prints one such line, cargo looks at no other file: all of them have to be named
         .map(|file| format!("cargo::rerun-if-changed={}", file.display()))
 }
 
 fn write(generated: &GeneratedFiles, folder: &Path) -> Result<(), Error> {
     for (name, text) in &generated.files {
+        // written in place, without a temporary file: the folder is cargo's, and a script that failed is run again
         let path = folder.join(name);
         std::fs::write(&path, text).map_err(|error| Error::Write(path, error.to_string()))?;
     }

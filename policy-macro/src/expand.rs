@@ -86,6 +86,7 @@ fn target(input: ParseStream<'_>) -> syn::Result<&'static TargetSpec> {
 
 /// Why a name cannot be that of the controller's type; `None` if it can. The module holds other types and uses others.
 fn objection(name: &str) -> Option<&'static str> {
+    // types of the module, and those of the prelude that its code names: one of ours in their place would not build
     const TAKEN: [&str; 12] = [
         "Measurement",
         "Command",
@@ -137,6 +138,7 @@ fn load(root: &Path, path: &str) -> Result<Policy, Faults> {
 }
 
 fn controller(call: &Call, root: &Path, policy: &Policy) -> TokenStream {
+    // no files, no manifest: the macro is built without templates, and rustc takes tokens
     let program = codegen::lower(policy, call.target, Language::Rust);
     let type_name = call
         .type_name
@@ -190,6 +192,7 @@ fn module(call: &Call, name: &str, items: &TokenStream) -> TokenStream {
 fn track(root: &Path, files: &[PathBuf]) -> TokenStream {
     let paths = files
         .iter()
+        // reading refuses files outside of the crate, so each has a path from its root
         .filter_map(|file| file.strip_prefix(root).ok()?.to_str())
         .map(|path| format!("/{path}"));
     quote! { #(const _: &[u8] = include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), #paths));)* }

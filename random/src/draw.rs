@@ -8,6 +8,7 @@ pub trait Random {
     /// Uniform over `[0, 1)`, a multiple of 2^-53.
     #[inline]
     fn unit(&mut self) -> f64 {
+        // 53 bits are what a binary64 holds: conversion and product are exact, so every machine draws the same number
         (self.bits() >> 11) as f64 * (1.0 / (1_u64 << 53) as f64)
     }
 
@@ -20,6 +21,7 @@ pub trait Random {
     /// Uniform over `0..count` by Lemire's multiplication; 0 if `count` is 0. The bias is below count / 2^64.
     #[inline]
     fn below(&mut self, count: usize) -> usize {
+        // not `%`, whose bias is as small but which divides; u128 holds every product
         ((u128::from(self.bits()) * count as u128) >> 64) as usize
     }
 
@@ -40,8 +42,10 @@ pub trait Random {
     #[inline]
     fn normal(&mut self) -> f64 {
         const PER_SIGMA: f64 = 0.176_318_129_815_27; // 1 / sqrt(128 / 4 + 1 / 6)
+        // 128 coins have the variance 128 / 4, and the triangle between the whole numbers adds 1 / 6
         let ones = self.bits().count_ones() + self.bits().count_ones();
         let fraction = self.bits();
+        // both callers leave 32 bits: the conversion cannot fail
         let half = |bits: u64| f64::from(u32::try_from(bits).unwrap_or(0)) * (1.0 / 4_294_967_296.0);
         let triangle = half(fraction >> 32) + half(fraction & 0xffff_ffff) - 1.0;
         (f64::from(ones) - 64.0 + triangle) * PER_SIGMA
@@ -52,6 +56,7 @@ pub trait Random {
     /// Its tails are thinner than those of [`Random::normal`] (excess kurtosis -0.1) and it costs twelve draws. Traces of a
     /// verification take it, whose streams stay as they are.
     fn sum_of_twelve(&mut self) -> f64 {
+        // twelve, because one has the variance 1 / 12; their mean is 6
         (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
     }
 }

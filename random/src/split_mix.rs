@@ -17,8 +17,11 @@ impl SplitMix {
 impl Random for SplitMix {
     #[inline]
     fn bits(&mut self) -> u64 {
+        // 2^64 over the golden ratio; it is odd, so the state goes through all 2^64 words before one comes again
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
+        // shifts and factors of the published generator, known answers of which are in the tests; another choice is
+        // another stream
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         z ^ (z >> 31)

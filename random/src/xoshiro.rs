@@ -21,6 +21,7 @@ impl Xoshiro {
         // 2^64 over the root of x^4 = x + 1, made odd: the seeds of neighbouring streams lie far apart
         let mut seeds = SplitMix::new(seed ^ stream.wrapping_mul(0xD1B5_4A32_D192_ED03));
         Self {
+            // never four zeros, at which the generator would stay: SplitMix gives each word once in 2^64
             state: std::array::from_fn(|_| seeds.bits()),
         }
     }
@@ -42,6 +43,7 @@ impl Random for Xoshiro {
     #[inline]
     fn bits(&mut self) -> u64 {
         let s = &mut self.state;
+        // 23, 17 and 45 belong to the published generator
         let result = s[0].wrapping_add(s[3]).rotate_left(23).wrapping_add(s[0]);
         let t = s[1] << 17;
         s[2] ^= s[0];

@@ -42,15 +42,18 @@ const BASE: TargetSpec = TargetSpec {
     fpu: Fpu::None,
     fma: Fma::Absent,
     flushes_subnormals: false,
+    // without FPU a step in floats takes 20 to 45 times as many instructions, and their number depends on the data
     suitable_format: "i16",
     cycles: None,
     sections: SECTIONS,
     clock_hz: None,
+    // four until instructions have been counted with other shapes; where a library computes floats they matter little
     c_row_block: RowBlock::Rows(4),
     rust_row_block: RowBlock::Rows(4),
     weights_alignment: None,
     has_float_assembly: false,
     integer_block: IntegerBlock {
+        // heights of blocks are measured, not derived: gcc and LLVM spill at different ones (decision 3)
         rows: 6,
         unrolled: 1,
         inner: IntegerLoop::Plain,
@@ -72,6 +75,7 @@ pub const CORTEX_M0PLUS: TargetSpec = TargetSpec {
         access: (1, 1),
         jump: (1, 2),
     }),
+    // of a usual device, as with all targets: a convention, from which `--clock` departs
     clock_hz: Some(48_000_000),
     integer_block: IntegerBlock {
         rows: 6,
@@ -151,6 +155,7 @@ pub const CORTEX_M7: TargetSpec = TargetSpec {
     description: "Arm Cortex-M7 with FPU (Armv7E-M, FPv5-SP)",
     fma: Fma::Cycles { fused: 1, apart: 2 },
     flushes_subnormals: false,
+    // no cycle model: it issues two instructions at a time, of which a count says nothing
     clock_hz: Some(400_000_000),
     c_compilers: &[
         gcc(&["-mthumb", "-mcpu=cortex-m7", "-mfpu=fpv5-sp-d16", "-mfloat-abi=hard"]),
@@ -163,6 +168,7 @@ pub const CORTEX_M7: TargetSpec = TargetSpec {
     ],
     rust: Some(RustTarget {
         triple: "thumbv7em-none-eabihf",
+        // rustc's cortex-m7 has binary64 in hardware, parts with FPv5-SP do not
         machine_flags: &["-Ctarget-cpu=cortex-m7", "-Ctarget-feature=-fp64"],
     }),
     runner: Runner::Emulated(MPS2_AN500_BOARD),
@@ -174,6 +180,7 @@ pub const CORTEX_M33: TargetSpec = TargetSpec {
     description: "Arm Cortex-M33 with FPU (Armv8-M Mainline, FPv5-SP)",
     fma: Fma::Unrated,
     flushes_subnormals: false,
+    // no cycle model either: the tables differ from core to core
     clock_hz: Some(160_000_000),
     c_compilers: &[
         gcc(&["-mthumb", "-mcpu=cortex-m33", "-mfpu=fpv5-sp-d16", "-mfloat-abi=hard"]),

@@ -76,6 +76,7 @@ macro_rules! arm_board {
                 $machine,
                 "-display",
                 "none",
+                // semihosting has the standard streams to itself: a serial line or monitor would write among the words
                 "-serial",
                 "none",
                 "-monitor",
@@ -113,6 +114,7 @@ macro_rules! riscv_board {
                 "virt",
                 "-cpu",
                 $cpu,
+                // none: QEMU would put firmware of its own where the image begins
                 "-bios",
                 "none",
                 "-display",
@@ -142,8 +144,10 @@ pub const LINUX_PPC: Board = Board {
     name: "linux",
     emulator: "qemu-ppc",
     package: "qemu-user",
+    // QEMU has no e5500; this one has the instructions of it that 32-bit code uses
     arguments: &["-cpu", "e500mc"],
     files: &[HEADER, WORDS, LINUX],
     linker_script: None,
+    // static: the emulator then needs no libraries of the target
     link_flags: &["-std=gnu99", "-O2", "-static", "-no-pie"],
 };

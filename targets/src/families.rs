@@ -56,6 +56,7 @@ const FAMILIES: &[(&str, &str)] = &[
 /// The target of a part or a compiler's triple, if `name` begins as one that is known.
 #[must_use]
 pub fn of_part(name: &str) -> Option<&'static str> {
+    // by its beginning: what follows in a part number is package, memory and temperature, not the core
     let name = name.to_ascii_lowercase();
     let part = FAMILIES.iter().find(|(part, _)| name.starts_with(part));
     part.map(|(_, target)| *target)

@@ -21,6 +21,7 @@ pub const HOST: TargetSpec = TargetSpec {
     suitable_format: "f32",
     cycles: None,
     sections: GNU_SECTIONS,
+    // one that only the user knows
     clock_hz: None,
     // eight vectors of four lanes; gcc spills them as scalars
     c_row_block: RowBlock::Vectors(32),
@@ -59,9 +60,11 @@ pub const DSPACE_DS1202: TargetSpec = TargetSpec {
     fma: Fma::Cycles { fused: 1, apart: 2 },
     flushes_subnormals: false,
     suitable_format: "f32",
+    // it issues two instructions at a time, of which a count says nothing
     cycles: None,
     sections: GNU_SECTIONS,
     clock_hz: Some(2_000_000_000),
+    // half of the 32 float registers for sums, as on Arm
     c_row_block: RowBlock::Rows(16),
     rust_row_block: RowBlock::Rows(16),
     weights_alignment: None,
@@ -99,6 +102,7 @@ pub const C2000_C28X: TargetSpec = TargetSpec {
         int_bits: 16,
         pointer_bits: 32,
     },
+    // of binary64 nothing is promised: how wide `double` is depends on the compiler's settings
     fpu: Fpu::Single,
     fma: Fma::Absent,
     flushes_subnormals: true,
@@ -111,6 +115,7 @@ pub const C2000_C28X: TargetSpec = TargetSpec {
         fast_code: Some(".TI.ramfunc"),
     },
     clock_hz: Some(200_000_000),
+    // never counted: there is neither a compiler nor an emulator to count with, so small blocks
     c_row_block: RowBlock::Rows(4),
     rust_row_block: RowBlock::Rows(4),
     weights_alignment: None,
@@ -138,7 +143,9 @@ pub const GENERIC_C99: TargetSpec = TargetSpec {
     description: "any C99 compiler with IEEE 754 binary32; verified on this machine",
     fma: Fma::Unrated,
     flushes_subnormals: false,
+    // no processor is known, so no number of registers
     rust_row_block: RowBlock::All,
+    // nor a line of the cache
     weights_alignment: None,
     integer_block: IntegerBlock::DUAL,
     ..HOST

@@ -30,7 +30,9 @@ pub const RISCV32IMC: TargetSpec = TargetSpec {
     fpu: Fpu::None,
     fma: Fma::Absent,
     flushes_subnormals: false,
+    // floats are a library's, as on Arm without FPU
     suitable_format: "i16",
+    // the tables differ from core to core
     cycles: None,
     sections: GNU_SECTIONS,
     clock_hz: Some(160_000_000),
@@ -70,9 +72,11 @@ pub const RISCV32IMFC: TargetSpec = TargetSpec {
     name: "riscv32imfc",
     description: "RISC-V RV32IMFC: FPU for binary32",
     fpu: Fpu::Single,
+    // an instruction set and not a processor: no manual says
     fma: Fma::Unrated,
     flushes_subnormals: false,
     suitable_format: "f32",
+    // half of the 32 float registers for sums, as on Arm
     c_row_block: RowBlock::Rows(16),
     rust_row_block: RowBlock::Rows(16),
     c_compilers: &[

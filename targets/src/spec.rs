@@ -238,6 +238,7 @@ pub struct TargetSpec {
 }
 
 /// C flags under which the bits hold with every compiler that knows them.
+// gcc fuses products and sums wherever the processor can, unless told otherwise (decision 1)
 pub(crate) const EXACT_C99: &[&str] = &["-std=c99", "-ffp-contract=off"];
 
 /// rustc never contracts and has no fast-math switch.

@@ -25,6 +25,7 @@ impl Text for Identity {
     fn rust_integer(&self, store: &Store, cut: &Cut) -> TokenStream {
         let shifted = rust_shifted(cut);
         match (store.to, cut.shift) {
+            // Q values are 32 bits wide, as their sums
             (Sink::Sums, _) => shifted,
             (_, 0) => quote!(sum as i16),
             _ => quote!((#shifted) as i16),

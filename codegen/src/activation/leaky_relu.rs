@@ -23,6 +23,7 @@ impl LeakyRelu {
 impl Text for LeakyRelu {
     fn c_helper(&self, c: &C<'_>) -> Vec<String> {
         let C { n, number, .. } = c;
+        // the sign bit is the flag already; zeros of both signs come out as by a comparison with 0
         let negative = match c.scalar {
             Scalar::F32 => format!("{n}_bits(x) >> 31"),
             Scalar::F64 => format!("(uint32_t)({n}_bits(x) >> 63)"),
@@ -40,6 +41,7 @@ static {number} {n}_leaky_relu({number} x, {number} slope)
         format!("{}_leaky_relu({sum}, {})", c.n, (c.literal)(c.scalar, self.slope))
     }
 
+    // 16384 is half of 2^15, so that the shift rounds half up; 16 bits times 15 bits leave room for it in 32
     fn c_integer_helper(&self, c: &C<'_>) -> Vec<String> {
         vec![format!(
             "
@@ -106,6 +108,7 @@ static int32_t {n}_leaky_integer(int32_t x, int32_t slope)
         let shifted = sum >> cut.shift;
         match shifted > 0 {
             true => shifted,
+            // rounded for itself: what the cut has rounded is an activation already (section 6b)
             false => (shifted * self.integer_slope() + (1 << 14)) >> 15,
         }
     }

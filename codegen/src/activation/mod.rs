@@ -53,6 +53,7 @@ fn kinds() -> impl Iterator<Item = Activation> {
 
 /// The kinds of a network, in that order.
 pub(crate) fn used(network: &Network) -> impl Iterator<Item = Activation> {
+    // by its word: two slopes of a leaky ReLU share one function
     kinds().filter(|kind| network.activates(|activation| activation.word() == kind.word()))
 }
 

@@ -53,6 +53,7 @@ static {number} {n}_relu({number} x)
     }
 
     fn c_integer_helper(&self, c: &C<'_>) -> Vec<String> {
+        // `__usat` clears what is below 0; above 32767 it has nothing to cut, as the scales prove
         let C { n, u, .. } = c;
         vec![format!(
             "

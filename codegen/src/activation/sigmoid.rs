@@ -36,6 +36,7 @@ impl<F: Function> Text for Curve<F> {
     }
 
     fn c_integer_helper(&self, c: &C<'_>) -> Vec<String> {
+        // as in `integer` below: a positive number is cut off, for a cast of a negative one would round towards 0
         let (n, name) = (c.n, F::NAME);
         vec![format!(
             "

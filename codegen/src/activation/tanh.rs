@@ -31,6 +31,7 @@ impl Function for Tanh {
             Scalar::F32 => ["0x41100000u", "0x3F800000u"],
             Scalar::F64 => ["(uint64_t)0x40220000u << 32", "(uint64_t)0x3FF00000u << 32"],
         };
+        // by bits: positive floats have the order of their bits, and a selection by comparison would be a branch
         let limit = format!(
             "
 /* x limited to the magnitude with these bits, in integers so that loops over it can be vectorised */
@@ -119,6 +120,7 @@ fn limit(scalar: Scalar) -> (TokenStream, TokenStream, TokenStream) {
                     f32::from_bits((x.to_bits() & 0x8000_0000) | (magnitude & below) | (limit & !below))
                 }
             },
+            // 9 and 1
             quote!(0x4110_0000),
             quote!(0x3F80_0000),
         ),
@@ -130,6 +132,7 @@ fn limit(scalar: Scalar) -> (TokenStream, TokenStream, TokenStream) {
                     f64::from_bits((x.to_bits() & 0x8000_0000_0000_0000) | (magnitude & below) | (limit & !below))
                 }
             },
+            // 9 and 1
             quote!(0x4022_0000_0000_0000),
             quote!(0x3FF0_0000_0000_0000),
         ),

@@ -12,9 +12,11 @@ pub fn real(kernel: &RealKernel, activated: Option<&dyn Fn(usize) -> String>) ->
     if kernel.relu {
         lines.push("uint32_t low, high;".to_owned());
     }
+    // the text moves `out` on, but an activation comes behind it
     if activated.is_some() {
         lines.push("float *const done = out;".to_owned());
     }
+    // volatile: nobody reads its operands behind it, so without that a compiler may leave it out
     lines.push("__asm__ volatile(".to_owned());
     let text = kernel.text(&|operand| format!("%[{operand}]"), &|list| format!("{{{list}}}"));
     lines.extend(text.iter().map(|line| format!("    \"{line}\\n\\t\"")));
@@ -40,6 +42,7 @@ pub fn integer(kernel: &Kernel) -> Vec<String> {
     let lines = text.iter().map(|line| format!("    \"{line}\\n\\t\""));
     std::iter::once("__asm__ volatile(".to_owned())
         .chain(lines)
+        // r4 to r11 are saved by the text itself
         .chain(["    : : : \"r0\", \"r1\", \"r2\", \"r3\", \"r12\", \"lr\", \"cc\", \"memory\");".to_owned()])
         .collect()
 }

@@ -1,4 +1,15 @@
 //! Blocks of an integer layer with `SMLAD`.
+//!
+//! ```text
+//!  r0 input   r1 output   r2 weights   r3 bias   lr turns     four sums, four loaded words, r12 for the input
+//!
+//!  3: sums = biases               every block
+//!  2:   word of inputs, word of weights a sum, SMLAD ...      every turn, groups written out
+//!     cut, activation ─► y        or, streamed: pairs ─► SMLAD into every sum of the last layer (4:)
+//!     input back to its start
+//! ```
+//!
+//! The one invariant: weights and biases only ever move on, through all blocks; the input goes back behind each.
 
 use crate::program::{Loop, Network, Sink};
 
@@ -47,6 +58,7 @@ const BIAS: &str = "r3";
 const COUNTER: &str = "lr";
 /// A block's outputs as pairs, the weights of the sums that they go into, and two such sums.
 const PAIRS: [&str; 2] = ["r4", "r6"];
+// the pairs leave two of the four sums' registers free: for these
 const NEXT: &str = "r5";
 const TAKEN: [&str; 2] = ["r7", "r12"];
 
@@ -85,6 +97,7 @@ impl Kernel {
     /// Lines, with `list` giving the text of a register list. On the stack: the end of the outputs or the number of blocks to
     /// come, then, where bytes are widened in the registers of their pointers, outputs and biases.
     pub fn text(&self, list: &dyn Fn(&str) -> String) -> Vec<String> {
+        // no register is free for a frame, and nothing is called: the stack need not be aligned to 8 bytes
         let mut lines = vec![format!("push {}", list("r4-r11, lr"))];
         let is_repeated = self.count > 1;
         if self.is_quad {
@@ -94,6 +107,7 @@ impl Kernel {
             lines.push(format!("movw {COUNTER}, #{}", self.count));
         } else {
             let bytes = if self.store == Store::Word { 4 } else { 2 };
+            // at most 1024 outputs: the number fits 16 bits
             lines.push(format!("movw {COUNTER}, #{}", bytes * self.count * self.height));
             lines.push(format!("add {COUNTER}, {COUNTER}, {OUTPUT}"));
         }
@@ -122,6 +136,7 @@ impl Kernel {
             None => self.stored(&mut lines, list),
         }
         if is_repeated {
+            // at most 1024 inputs, which are 2048 bytes: within the 12 bits of `subw`
             let bytes = self.groups * if self.is_quad { 8 } else { 4 };
             lines.push(format!("subw {INPUT}, {INPUT}, #{bytes}"));
             lines.push(format!("ldr {COUNTER}, [sp]"));
@@ -135,6 +150,7 @@ impl Kernel {
             lines.push("bne 3b".to_owned());
         }
         lines.push(format!("add sp, sp, #{}", self.kept_bytes()));
+        // the return address goes where `lr` was saved: no jump of its own
         lines.push(format!("pop {}", list("r4-r11, pc")));
         lines
     }
@@ -169,6 +185,7 @@ impl Kernel {
         }
         lines.extend([format!("ldrd {OUTPUT}, r12, [{INPUT}], #8"), load]);
         for (sum, weight) in rows() {
+            // even bytes, then odd ones: tables of bytes have that order (`QUAD`)
             lines.push(format!("sxtb16 {BIAS}, {weight}"));
             lines.push(format!("sxtb16 {weight}, {weight}, ror #8"));
             lines.push(format!("smlad {sum}, {BIAS}, {OUTPUT}, {sum}"));
@@ -180,6 +197,7 @@ impl Kernel {
     fn cut(&self, lines: &mut Vec<String>) {
         for sum in &SUMS[..self.height] {
             match (self.store, self.shift) {
+                // half of the last bit kept is in the biases: a plain shift rounds half up
                 (Store::Rectified, 0) => lines.push(format!("usat {sum}, #15, {sum}")),
                 (Store::Rectified, shift) => lines.push(format!("usat {sum}, #15, {sum}, asr #{shift}")),
                 (_, 0) => {}
@@ -196,6 +214,7 @@ impl Kernel {
         }
         for pair in sums.chunks(2) {
             match pair {
+                // two outputs with one store; the buffer is aligned to words
                 [low, high] => {
                     lines.push(format!("pkhbt {low}, {low}, {high}, lsl #16"));
                     lines.push(format!("str {low}, [{OUTPUT}], #4"));

@@ -1,4 +1,13 @@
 //! Blocks of a layer in binary32.
+//!
+//! ```text
+//!  s0..s15 biases                            VLDM, once a block
+//!  s24..s27 inputs                           every turn: up to four inputs written out
+//!    s16..s23 weights ─► VMUL ─► VADD s0..   eight at a time, all outputs of the block
+//!  outputs                                   VSTM, or through two integer registers, where the sign clears them (ReLU)
+//! ```
+//!
+//! The one invariant: a sum takes its inputs in index order, product and sum rounded apart, so the bits are those of the loops.
 
 use std::collections::BTreeSet;
 
@@ -33,6 +42,7 @@ pub struct RealKernel {
 
 impl RealKernel {
     /// First register of the weights, number of weights in flight, first register of the inputs.
+    // s0 to s15 are the sums; s28 to s31 are left to the compiler
     const WEIGHTS: (usize, usize, usize) = (16, 8, 24);
 
     /// The kernel of a repeated `body`, which makes sums and stores them.
@@ -48,6 +58,7 @@ impl RealKernel {
     }
 
     fn unrolled(&self) -> usize {
+        // four registers hold inputs; a divisor, so that no turn is left over
         (1..=4).rev().find(|n| self.inputs.is_multiple_of(*n)).unwrap_or(1)
     }
 
@@ -72,6 +83,7 @@ impl RealKernel {
         };
         let mut lines = vec![
             format!("vldmia {}!, {}", operand("bias"), registers(0, self.height)),
+            // a number, because the same text may stand in a file several times
             "2:".to_owned(),
             format!("vldmia {input}!, {}", registers(inputs, self.unrolled())),
         ];
@@ -93,6 +105,7 @@ impl RealKernel {
             return lines;
         }
         let (low, high) = (operand("low"), operand("high"));
+        // in integer registers, by the sign: a comparison of floats would have to bring its flags over first
         for row in (0..self.height).step_by(2) {
             let clear = |register: &str| format!("bic {register}, {register}, {register}, asr #31");
             if row + 1 < self.height {

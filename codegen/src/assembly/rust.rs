@@ -14,6 +14,7 @@ use crate::program::Program;
 /// The forms of a block in assembly or, in other builds, `portable` ones.
 pub fn real(kernels: &BTreeSet<RealKernel>, program: &Program, portable: &[TokenStream]) -> TokenStream {
     let visible = quote!(pub(super));
+    // eabihf says that the FPU is there; `arm` alone does not
     let is_assembly = quote!(all(target_arch = "arm", target_abi = "eabihf", policyc_assembly));
     let processor = processor(program);
     let functions = kernels.iter().map(|kernel| function(*kernel, &processor));
@@ -76,6 +77,7 @@ fn assembled(form: Form, kernels: &BTreeSet<RealKernel>, visible: &TokenStream) 
         ),
         Form::Added => (quote!(out.cast_const()), quote!(block(weights, out, x))),
     };
+    // a kernel with the ReLU in it serves no other form
     let is_of_form = |kernel: &&RealKernel| kernel.relu == (form == Form::Rectified);
     let arms = kernels.iter().filter(is_of_form).map(|kernel| {
         let (name, inputs, height) = (name(*kernel), size(kernel.inputs), size(kernel.height));
@@ -121,6 +123,7 @@ fn function(kernel: RealKernel, processor: &str) -> TokenStream {
         /// `--cfg policyc_assembly` takes the sums in assembly: products and sums apart, the same bits.
         #[unsafe(naked)]
         unsafe extern "C" fn #name(weights: *const f32, bias: *const f32, x: *const f32, out: *mut f32) {
+            // the callee saves s16 to s31 (AAPCS with VFP registers)
             core::arch::naked_asm!(#processor, "vpush {{s16-s27}}", #turns, #(#text,)* "vpop {{s16-s27}}", "bx lr")
         }
     }

@@ -52,6 +52,7 @@ pub fn view(program: &Program, title: &str) -> BlockView {
         },
         inputs: program.signals.iter().map(|signal| input(scalar, signal)).collect(),
         has_codes: program.signals.iter().any(|signal| signal.is_code),
+        // and `enable`
         input_count: program.signals.len() + 1,
         parameters: coefficients().map(parameter).collect(),
         mapping_arguments: coefficients()
@@ -61,6 +62,7 @@ pub fn view(program: &Program, title: &str) -> BlockView {
         fallback: number(scalar, program.fallback_duty),
         sample_period: format!("{:?}", program.sample_period),
         // the state and one word
+        // in doubles, which hold two words each
         work: (program.state_words() + 1).div_ceil(2),
         features: program.feature_count(),
         actions: program.duties.len(),

@@ -24,6 +24,7 @@ pub fn emit(program: &Program) -> Result<GeneratedFiles, CodegenError> {
         (format!("sf_{n}.c"), render(&Source { b })?),
         (format!("sf_{n}.tlc"), render(&Tlc { b })?),
         (format!("make_{n}.m"), render(&Make { b })?),
+        // the name that Simulink Coder looks for
         ("rtwmakecfg.m".to_owned(), render(&Rtwmakecfg { b })?),
         (format!("{n}_usr.mk"), render(&UserMakefile { b })?),
         (format!("legacy_{n}.m"), render(&LegacyCode { b })?),

@@ -1,4 +1,13 @@
 //! Contract sections 8 to 10: mapping, limits, status, and what the command path remembers.
+//!
+//! ```text
+//!  chosen duty ─► mapping ─► slew ─► soft start ─► limits ─► is it a number? ─► command
+//!                    │        │         │            │
+//!                    └────────┴─────────┴────────────┴─► status bits
+//! ```
+//!
+//! In: the contract's mapping and limits. Out: a block for the command, one for what is remembered. The one invariant: everything
+//! is computed in every step, and the backend selects the fallback where the step is not usable.
 
 use policy::{Mapping, Policy, Scalar};
 
@@ -41,6 +50,7 @@ const fn status_bit(name: &'static str, number: u32, meaning: &'static str) -> S
 }
 
 fn bit(name: &str) -> u32 {
+    // names below are those of the table above, so that 0 is never taken for one that is missing
     STATUS.iter().find(|bit| bit.name == name).map_or(0, |bit| bit.number)
 }
 
@@ -55,6 +65,7 @@ pub fn decide(policy: &Policy) -> Decide {
     if policy.features.iter().any(|feature| feature.clip.is_some()) {
         status.push((bit("CLIPPED"), block.value(Op::Clipped)));
     }
+    // each limiter takes what the one before left, in the order of section 9: the duty limits have the last word
     let duty_sim = block.value(Op::ChosenDuty);
     let mut duty = duty_sim;
     if let Some(map) = &policy.mapping {
@@ -64,6 +75,7 @@ pub fn decide(policy: &Policy) -> Decide {
     }
     if let Some(slew) = policy.limits.slew {
         let step = block.constant(Literal::down(scalar, slew));
+        // around what left the controller, not around the chosen duty: the hardware moves from the former
         let before = block.value(Op::PreviousCommand);
         let low = block.value(Op::Sub(before, step));
         let high = block.value(Op::Add(before, step));
@@ -73,6 +85,7 @@ pub fn decide(policy: &Policy) -> Decide {
     }
     if policy.limits.soft_start.is_some() {
         let cap = block.value(Op::SoftCap);
+        // from above alone: a soft start never raises a duty
         let above = block.value(Op::Above(duty, cap));
         status.push((bit("SOFT_START"), above));
         duty = block.value(Op::Select {
@@ -89,6 +102,7 @@ pub fn decide(policy: &Policy) -> Decide {
     Decide {
         block,
         duty,
+        // behind the last clamp a duty is outside only if it is no number: to ask that alone costs one comparison less
         within: Within::of(
             scalar,
             (Literal::exact(f64::NEG_INFINITY), Literal::exact(f64::INFINITY)),
@@ -100,6 +114,7 @@ pub fn decide(policy: &Policy) -> Decide {
 
 /// The flag that a clamp has changed a value.
 fn changed(block: &mut Block, value: ValueId, clamped: ValueId) -> ValueId {
+    // a clamp hands its value on unless it is active: different bits say so without two more comparisons of floats
     let difference = block.value(Op::Difference(value, clamped));
     block.value(Op::NotZero(difference))
 }
@@ -121,6 +136,7 @@ fn mapping(scalar: Scalar, block: &mut Block, map: &Mapping, duty: ValueId) -> (
         mapped = block.value(Op::Add(mapped, product));
     }
     let mut outside = |x: ValueId, range: policy::Interval| {
+        // to nearest, as the actions are: one at the end of the range is inside
         let low = block.constant(Literal::nearest(scalar, range.low));
         let high = block.constant(Literal::nearest(scalar, range.high));
         block.value(Op::Outside { x, low, high })
@@ -147,6 +163,7 @@ pub fn advance(policy: &Policy) -> Advance {
             then: max,
             otherwise: risen,
         });
+        // a soft start begins again behind a fallback
         let usable = block.value(Op::Usable);
         let from = block.constant(Literal::nearest(scalar, soft.from));
         block.value(Op::Select {

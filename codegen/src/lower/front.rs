@@ -1,4 +1,14 @@
 //! Contract sections 2 to 5: sanitise, sources, filters, observation.
+//!
+//! ```text
+//!  sample ─► within its range? ─► Select: sample or held ─► source ─► filters ─► scale, offset, clip ─► observation
+//!                │                                             │                        │
+//!                └─ And ─► all valid                           └─► pushes of `commit`   └─ Or ─► clipped
+//! ```
+//!
+//! In: the features of a policy. Out: one straight-line block, its signals, observation and flags, and what `commit` pushes.
+//! The one invariant: every operation is one rounding of the contract, in its order, and none of them depends on a flag, so
+//! the number of executed instructions does not depend on the measurement.
 
 use policy::{Expr, Feature, Filter, Input, Policy, Scalar};
 
@@ -22,6 +32,7 @@ pub fn lower(policy: &Policy) -> (Front, usize) {
         clipped.extend(outside);
     }
     let block = &mut builder.block;
+    // differences of bits are gathered as words: one flag for all features, not one each
     let clipped = clipped.into_iter().reduce(|all, one| block.value(Op::Or(all, one)));
     let clipped = clipped.map(|differences| block.value(Op::NotZero(differences)));
     let front = Front {
@@ -63,6 +74,7 @@ impl Builder {
             let (low, high) = (block.constant(low), block.constant(high));
             let valid = block.value(Op::Within { x, low, high });
             let held = block.value(Op::Held(index));
+            // the step goes on with the held sample, usable or not: the same instructions for every measurement
             self.signals.push(block.value(Op::Select {
                 flag: valid,
                 then: x,
@@ -86,6 +98,7 @@ impl Builder {
             let scale = block.constant(Literal::nearest(scalar, feature.scale));
             value = block.value(Op::Mul(value, scale));
         }
+        // not added if it is 0: that would make +0 of -0
         if feature.offset != 0.0 {
             let offset = block.constant(Literal::nearest(scalar, feature.offset));
             value = block.value(Op::Add(value, offset));
@@ -147,6 +160,7 @@ impl Builder {
             Filter::MovingAverage { samples } => {
                 let word = self.line(samples - 1, x);
                 let primed = self.block.value(Op::Primed);
+                // one operation, so that a line of 256 samples is a loop and not as many statements
                 let sum = self.block.value(Op::LineSum {
                     word,
                     length: samples - 1,
@@ -197,6 +211,7 @@ impl Builder {
     }
 
     fn scaled(&mut self, x: ValueId, by: f64) -> ValueId {
+        // quotients of constants are made here, in binary64: a division would be another rounding, and slow
         let by = self.constant(by);
         self.block.value(Op::Mul(x, by))
     }
@@ -216,6 +231,7 @@ impl Builder {
 
     /// Oldest word of a line, or `unprimed` before the first good measurement.
     fn recall(&mut self, word: usize, unprimed: ValueId) -> ValueId {
+        // selected at each read, not filled in before the first step: `eval` changes nothing
         let primed = self.block.value(Op::Primed);
         let memory = self.block.value(Op::Memory(word));
         self.block.value(Op::Select {

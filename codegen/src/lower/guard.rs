@@ -16,7 +16,9 @@ pub fn lower(policy: &Policy, signals: &[SignalPort], mapping: Option<&MappingCo
         .map(|(index, signal)| within(Place::Held(index), signal.range))
         .collect();
     numbers.extend(memories(policy, scalar));
+    // what nothing reads decides no duty, and each comparison is paid in every step
     let read = |input: Input| policy.features.iter().any(|feature| reads(&feature.source, input));
+    // reset and fallback write these two without a limiter, and they may lie outside of the duty limits
     let start = [policy.limits.initial_duty, policy.fallback.duty].map(|duty| Literal::nearest(scalar, duty));
     let (min, max) = Literal::inward(scalar, policy.limits.duty);
     if read(Input::PreviousDuty) {
@@ -37,9 +39,11 @@ pub fn lower(policy: &Policy, signals: &[SignalPort], mapping: Option<&MappingCo
     let coefficients = mapping.iter().flat_map(|mapping| &mapping.coefficients);
     numbers.extend(coefficients.map(|(name, _, low, high)| within(Place::Coefficient(*name), (*low, *high))));
     let rising = mapping.filter(|mapping| mapping.coefficients.iter().any(|(name, ..)| *name == Coefficient::R));
+    // the slope a + r i is a line in i: positive at both ends, it is positive between them
     let rising = rising.map_or_else(Vec::new, |mapping| vec![mapping.valid_i_out.0, mapping.valid_i_out.1]);
     Guard {
         numbers,
+        // the counter stops one above K
         bad_count: policy.fallback.hold.saturating_add(1),
         rising,
     }
@@ -51,6 +55,7 @@ fn memories(policy: &Policy, scalar: Scalar) -> Vec<Guarded> {
     for (word, bound) in policy::memory_bounds(policy).into_iter().enumerate() {
         let bound = Literal::nearest(scalar, bound);
         match runs.last_mut() {
+            // all words of a delay have one bound, and so have features that read one signal
             Some((last, _, count)) if *last == bound => *count += 1,
             _ => runs.push((bound, word, 1)),
         }

@@ -26,6 +26,7 @@ const PAIR: [usize; 2] = [0, 1];
 const QUAD: [usize; 4] = [0, 2, 1, 3];
 
 /// Exponent field of binary32 of a number whose mantissa of 24 bits is an integer.
+// 127 is the bias of the exponent, 23 the bits behind the point
 const MANTISSA_FIELD: i32 = 150;
 
 /// Sums of a streamed layer that C takes at a time, where that leaves none over; else the last number of these.
@@ -58,6 +59,7 @@ pub fn lower(policy: &Policy, scales: &Scales, target: &TargetSpec, language: La
     let inputs: Vec<IntegerInput> = scales.inputs.iter().map(input).collect();
     if language == Language::C {
         // Rust has them in its code
+        // one loop over a table takes less flash than a call written out for each input
         let ranges = inputs.iter().flat_map(|input| [input.unshifted, input.low, input.high]);
         tables.push(Table::plain(
             "ranges",
@@ -74,9 +76,11 @@ pub fn lower(policy: &Policy, scales: &Scales, target: &TargetSpec, language: La
             weight_bytes,
             inner: inner(block, weight_bytes),
             inputs,
+            // a layer before the last two has used the observation up when these write the first sum
             shares: plans.len() > 2,
             output_shift: streamed.map_or(0, |last| last.shape.shift),
             q_unit: Literal::nearest(Scalar::F32, power_of_two(-q_exponent)),
+            // one more than for 24 bits: an output may be 2^24 itself
             q_field: MANTISSA_FIELD + 1 - q_exponent,
             accumulator_bound: scales.accumulator_bound(),
         }),
@@ -139,6 +143,7 @@ fn split(policy: &Policy, index: usize, lanes: usize, block: IntegerBlock) -> (u
     let is_plain_last = index + 1 == policy.layers.len() && layer.activation.is_identity();
     // a group of inputs must not lie in two blocks
     let streams = block.streams && is_plain_last && index > 0 && block.rows.is_multiple_of(lanes);
+    // one block alone would be no stream, only a sum in memory instead of registers
     if streams && block.rows < layer.inputs {
         (1, block.rows)
     } else {
@@ -173,6 +178,7 @@ fn plan(layer: &Layer, scale: &LayerScale, (rows, chunk): (usize, usize), block:
 /// A weight as integer; the scales were chosen so that every one fits.
 fn weight(layer: &Layer, scale: &LayerScale, output: usize, input: usize) -> i16 {
     let weight = f64::from(layer.weights[output * layer.inputs + input]);
+    // a power of two changes the exponent alone: this rounding is the only one
     round_half_up(weight * power_of_two(scale.accumulators[output] - scale.inputs[input])) as i16
 }
 

@@ -2,6 +2,12 @@
 //!
 //! They are computed on the program's own loops and tables, node by node. So they catch a compiler, flag or byte order that
 //! changes the arithmetic on the target; that the lowering itself is right is shown elsewhere, against the interpreter.
+//!
+//! ```text
+//!  seed ─► observation in the box ─► loops over tables ─► Q values ─► CRC of their bits     16 times, here and in `self_test`
+//! ```
+//!
+//! The one invariant: draw and arithmetic are those of the generated code, operation by operation, in the format of the policy.
 
 use std::collections::BTreeMap;
 
@@ -15,12 +21,15 @@ use crate::program::{
 };
 
 /// Number of vectors.
+// a convention: they are for compiler, flags and byte order, which show at once; flipped tables are for the CRC
 pub const VECTORS: usize = 16;
 /// Seed of the generator in `self_test`.
+// a convention: the upper half of a published multiplier
 pub const SEED: u32 = 0x2545_F491;
 /// Multiplier and increment of the generator (Numerical Recipes' LCG).
 pub const LCG: (u32, u32) = (1_664_525, 1_013_904_223);
 /// Scale from the generator's upper 24 bits to 0..1, exact.
+// 24 bits, because a binary32 number holds no more of them
 pub const UNIT: f64 = 1.0 / 16_777_216.0;
 
 /// Draws the observations as `self_test` will and computes the answers: the tables of answers, lower ends and widths of the
@@ -46,6 +55,7 @@ pub fn lower(policy: &Policy, network: &Network, tables: &[Table]) -> [Table; 3]
         }),
         Arithmetic::Integer(code) => answers(&observation_box, |x: &[f32]| {
             let outputs = evaluate(network, tables, &Integers, quantised(code, x));
+            // a streamed last layer leaves its sums: they are cut here, not where they are stored
             let q = |output: &i32| (output >> code.output_shift) as f32 * code.q_unit.single();
             outputs.iter().map(q).collect()
         }),
@@ -107,6 +117,7 @@ impl Machine<i32> for Integers {
 fn quantised(code: &IntegerCode, observation: &[f32]) -> Vec<i32> {
     let inputs = code.inputs.iter().zip(observation);
     let integer = inputs.map(|(input, o)| {
+        // 150: the exponent field of a number whose mantissa is an integer
         let integer = round_half_up(f64::from(*o) * power_of_two(150 - input.unshifted)) as i32;
         integer.clamp(input.low, input.high)
     });
@@ -211,6 +222,7 @@ impl<T: Copy + Default, M: Machine<T>> Run<'_, T, M> {
             for sum in sums.iter_mut() {
                 for lane in lanes {
                     let weight = self.weights[layer].next().map(|weight| self.machine.constant(*weight));
+                    // the last group may lack inputs: these are the zeros of `Pad`
                     let x = group.get(*lane).copied().unwrap_or_default();
                     *sum = self.machine.accumulated(*sum, weight.unwrap_or_default(), x);
                 }
@@ -252,6 +264,7 @@ fn answers<T: Number>(observation_box: &[(Literal, Literal)], q_values: impl Fn(
             values.push(T::nearest(low.value()) + T::nearest(width.value()) * share);
         }
         let q = q_values(&values).into_iter();
+        // a word for a whole row: of the bits and not of the action, which stays the same through most faults
         answers.push(crc32_words(q.flat_map(|q| words(T::SCALAR, q.wide()))));
     }
     answers

@@ -1,4 +1,13 @@
 //! Builds the tree of loops of a network from what was decided about each layer.
+//!
+//! ```text
+//!  plan ─► whole           Layer { Repeat full { Sums, Store }, Repeat rest { Sums, Store } }
+//!          in_pieces       Begin, Repeat { Layer block, Layer what it adds }     floats, last layer streamed
+//!          added_at_once   Layer { Begin, Repeat { Sums, Store, Add } }          integers, last layer streamed
+//! ```
+//!
+//! In: a plan for each layer (`lower::real`, `lower::integer`) and how a language writes loops. Out: the tree and the length
+//! of each buffer. The one invariant: the nodes read every table of `lower::tables` once, in its order.
 
 use policy::Activation;
 
@@ -65,6 +74,7 @@ pub struct Style {
 pub fn build(plans: &[Plan], style: &Style) -> (Vec<Loop>, Vec<(Buffer, usize)>) {
     let builder = Builder { plans, style };
     let (before, streamed) = match plans {
+        // streamed or not, the last two belong together: the one makes blocks, the other takes them
         [before @ .., _, last] if last.is_streamed() => (before.len(), true),
         _ => (plans.len(), false),
     };
@@ -84,6 +94,8 @@ pub fn build(plans: &[Plan], style: &Style) -> (Vec<Loop>, Vec<(Buffer, usize)>)
         if style.is_integer {
             loops.push(builder.added_at_once(before));
         } else {
+            // the sums of a block of floats fill the registers, so it goes through a buffer of its own; the few sums
+            // of a block of integers stay where they are
             buffers.push((Buffer::Block, last.chunk));
             loops.extend(builder.in_pieces(before));
         }
@@ -159,6 +171,7 @@ impl Builder<'_> {
                 index,
                 piece: Some(Piece {
                     rows: size,
+                    // of a full block, for the shorter last one, too: its tables begin behind whole blocks
                     weights: last.chunk * if is_last { outputs } else { inputs },
                     biases: if is_last { 0 } else { last.chunk },
                 }),
@@ -191,6 +204,7 @@ impl Builder<'_> {
                 Loop::Add(Add {
                     layer: index + 1,
                     inputs: rows,
+                    // two outputs without a sign go into a word with a shift and an or
                     is_positive: block.activation.is_rectifier(),
                     turns: turns(last.shape.outputs, (self.style.stretch)(last.shape.outputs)),
                 }),
@@ -213,6 +227,7 @@ impl Builder<'_> {
         let plan = &self.plans[index];
         let is_kept = plan.kept == Kept::Registers;
         let sink = match self.to(index) {
+            // what goes on to a layer fits 16 bits, as the scales prove; Q values need all of theirs
             Buffer::Hidden(_) if self.style.is_integer => Sink::Halves,
             _ => Sink::Sums,
         };
@@ -257,6 +272,7 @@ impl Builder<'_> {
 
 /// Turns of `width` that make up `total`, then a shorter one.
 fn turns(total: usize, width: usize) -> Vec<Turns> {
+    // a width is 1 or more, as heights and stretches are: no division by zero
     let turns = [(total / width, width), (1, total % width)];
     let some = turns.into_iter().filter(|(count, width)| count * width > 0);
     some.map(|(count, width)| Turns { count, width }).collect()

@@ -32,11 +32,14 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
         .iter()
         .map(|action| Literal::nearest(scalar, action.duty))
         .collect();
+    // on the finished tables: the answers are those of what is printed, not of the policy a second time
     let answers = known_answers::lower(policy, &network, &tables);
     tables.push(Table {
+        // a flipped duty would be commanded as it is
         is_checked: true,
         ..Table::plain("duties", Element::Float(scalar), duties.iter().copied())
     });
+    // what follows needs no check: a wrong step gives another checksum, a wrong answer fails the self test
     tables.push(Table::words("crc_steps", &nibble_table()));
     tables.extend(answers);
     let checked = tables.iter().filter(|table| table.is_checked);
@@ -97,6 +100,7 @@ fn signal_port(scalar: Scalar, signal: &policy::Signal) -> SignalPort {
         unit: signal.unit.clone(),
         is_code: signal.adc.is_some(),
         range,
+        // held before the first good sample: a plausible one, so that the state is sound from the start
         initial: Literal::nearest(scalar, 0.0_f64.max(range.0.value()).min(range.1.value())),
     }
 }
@@ -118,6 +122,7 @@ fn mapping(scalar: Scalar, mapping: &policy::Mapping) -> MappingCode {
     MappingCode {
         coefficients: coefficients.into_iter().map(lowered).collect(),
         valid_i_out: (
+            // to nearest and not inwards, as section 8 has it: the end of the range is inside
             Literal::nearest(scalar, mapping.valid_i_out.low),
             Literal::nearest(scalar, mapping.valid_i_out.high),
         ),

@@ -24,6 +24,7 @@ const STYLE: Style = Style {
 pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> (Network, Vec<Table>) {
     let scalar = policy.numeric_format.scalar();
     let last = policy.layers.len().saturating_sub(1);
+    // a first layer is never streamed: it reads the observation, which is there all at once
     let plan = |(index, layer)| plan(policy, layer, index == last && index > 0, target, language);
     let plans: Vec<Plan> = policy.layers.iter().enumerate().map(plan).collect();
     let mut tables = Vec::new();
@@ -60,6 +61,7 @@ fn plan(policy: &Policy, layer: &Layer, may_stream: bool, target: &TargetSpec, l
     let blocks = row_block(policy.numeric_format, target, language);
     let rows = match blocks {
         RowBlock::All => layer.outputs,
+        // a layer has outputs, or the check refuses it: the ends of the clamp are in order
         RowBlock::Rows(rows) | RowBlock::Vectors(rows) => rows.clamp(1, layer.outputs),
     };
     let chunk = match blocks {
@@ -83,6 +85,7 @@ fn plan(policy: &Policy, layer: &Layer, may_stream: bool, target: &TargetSpec, l
         rows,
         chunk,
         kept,
+        // the kernels round product and sum apart, in binary32, and keep the sums of a block in registers
         has_assembly: target.has_float_assembly
             && policy.numeric_format == NumericFormat::F32
             && matches!(blocks, RowBlock::Rows(_))

@@ -38,6 +38,7 @@ pub fn removable(policy: &Policy) -> Vec<Vec<usize>> {
                 return Vec::new();
             };
             dead.retain(|neuron| goes_unnoticed(policy.numeric_format, next, *neuron));
+            // one stays where all are dead, for a layer needs an output; which of them go makes no difference to a bit
             let kept = (layer.outputs - dead.len()).max(1).next_multiple_of(GROUP);
             dead.truncate(layer.outputs.saturating_sub(kept));
             dead
@@ -60,6 +61,7 @@ fn goes_unnoticed(format: NumericFormat, next: &Layer, input: usize) -> bool {
 
 /// The network to lower.
 pub fn simplified(policy: &Policy) -> Simplified<'_> {
+    // of the whole network, because the interpreter leaves nothing out: scales of the rest could be finer
     let mut scales = scales::of(policy);
     let removable = removable(policy);
     if removable.iter().all(Vec::is_empty) {

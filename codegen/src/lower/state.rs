@@ -20,6 +20,7 @@ pub fn members(
     let number = |value| StateValue::Number(Literal::nearest(scalar, value));
     let held = signals.iter().map(|signal| signal.initial).collect();
     let mut members = vec![member("held", "last good samples", StateValue::Numbers(held))];
+    // C has no array of length 0
     if memory_words > 0 {
         let zeros = vec![Literal::nearest(scalar, 0.0); memory_words];
         let meaning = "filters, in feature order, oldest first";

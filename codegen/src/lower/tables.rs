@@ -18,6 +18,7 @@ pub fn weights(
         for first in (0..outputs).step_by(plan.rows) {
             for group in (first_input..end).step_by(lanes.len()) {
                 for output in first..(first + plan.rows).min(outputs) {
+                    // in the order in which a word is taken apart: with bytes in it that is not the order of the inputs
                     let lane = |lane: &usize| match group + lane {
                         input if input < inputs => weight(output, input),
                         _ => Literal::exact(0),
@@ -42,6 +43,7 @@ pub fn weights(
 
 /// The biases of a layer, in order.
 pub fn bias((index, plan): (usize, &Plan), element: Element, values: Vec<Literal>) -> Table {
+    // the sums of a streamed layer start from all biases at once: one array, no blocks
     let strips = if plan.is_streamed() {
         vec![Strip::of("", plan.shape.outputs, Vec::new())]
     } else {

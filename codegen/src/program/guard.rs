@@ -91,11 +91,13 @@ impl Within {
             Scalar::F64 => value.to_bits(),
         };
         let (low, high) = (low.value(), high.value());
+        // the cheapest form first: clear the sign, subtract
         if low == -high {
             return Self::Magnitude {
                 bound: bits(high.abs()),
             };
         }
+        // on one side of 0 the bits count numbers in their order, so that one unsigned range is enough
         if low > 0.0 || high < 0.0 {
             let negated = high < 0.0;
             let near = bits(low.abs().min(high.abs()));
@@ -107,6 +109,7 @@ impl Within {
                 negated,
             };
         }
+        // 0 lies inside or is an end: each sign has its bound, and zeros of both signs are within it
         let high = bits(high.abs());
         let difference = high ^ bits(low.abs());
         Self::Around { difference, high }

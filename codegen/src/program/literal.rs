@@ -45,6 +45,7 @@ impl Literal {
     #[must_use]
     pub fn shortest(self, scalar: Scalar) -> String {
         match scalar {
+            // `{:?}` and not `{}`: it keeps a point or an exponent, without which C and Rust read an integer
             Scalar::F32 => format!("{:?}", self.single()),
             Scalar::F64 => format!("{:?}", self.value()),
         }

@@ -340,6 +340,7 @@ impl Network {
     #[must_use]
     pub fn nodes(&self) -> Vec<&Loop> {
         let mut nodes = Vec::new();
+        // a stack gives back the last first, so nodes go in the wrong way round
         let mut open: Vec<&Loop> = self.loops.iter().rev().collect();
         while let Some(node) = open.pop() {
             nodes.push(node);

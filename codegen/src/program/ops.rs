@@ -166,6 +166,7 @@ pub struct Block {
 impl Block {
     /// Value of `op`, computed once however often it is asked for.
     pub fn value(&mut self, op: Op) -> ValueId {
+        // sound, because no operation has an effect: in straight-line code a value stays what it was
         match self.ops.iter().position(|known| *known == op) {
             Some(id) => id,
             None => {

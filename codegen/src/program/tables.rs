@@ -136,6 +136,7 @@ impl Table {
         for strip in &self.strips {
             let (part, after) = rest.split_at(strip.len().min(rest.len()));
             rest = after;
+            // two slices of a strip alternate: each takes its part of every period
             let period = strip.len() / strip.times.max(1);
             let mut first = 0;
             for slice in &strip.slices {

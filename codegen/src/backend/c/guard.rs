@@ -43,6 +43,7 @@ fn term(program: &Program, guarded: &Guarded) -> String {
         Place::Held(index) => format!("state->held[{index}]"),
         Place::Memory { first, count: 1 } => format!("state->memory[{first}]"),
         Place::Memory { first, count } => {
+            // memories are bounded by a magnitude and nothing else (contract section 1)
             let Within::Magnitude { bound } = guarded.within else {
                 return String::new();
             };

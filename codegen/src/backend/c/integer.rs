@@ -184,6 +184,7 @@ impl Printer<'_> {
     fn portable(&self, layer: &Layer, text: &mut Text) {
         let (n, index) = (self.n, layer.index);
         let restrict = format!("{}_RESTRICT ", self.u);
+        // sound, because the word type may alias the elements and tables are aligned to words
         let weights = |index: usize| format!("(const {n}_weight *)(const void *){n}_weights{index};");
         text.function(&self.head(layer, &restrict), |text| {
             text.line(format!("const {n}_weight *w = {}", weights(index)));
@@ -413,6 +414,7 @@ impl Printer<'_> {
 }
 
 /// Where a statement for [`Printer::by_twos`] has its word.
+// a character that C has not
 const WORD: &str = "@";
 
 /// Statements in a block of their own.

@@ -79,6 +79,7 @@ fn common(program: &Program) -> Common {
 
 fn wide_char(program: &Program) -> Option<WideChar> {
     let widths = program.provenance.widths;
+    // a compiler with other widths than these has to stop, not to compute something else
     (widths.char_bits != 8).then_some(WideChar {
         char_bits: widths.char_bits,
         int_bits: widths.int_bits,
@@ -159,6 +160,7 @@ fn state(program: &Program) -> (Vec<Member>, Vec<String>, Vec<String>) {
                 reset.push(set(name.clone(), value));
                 format!("{kind} {name}")
             }
+            // not reset: `init` alone sets what the user may have replaced
             StateValue::Coefficient(value) => {
                 init.push(set(name.clone(), value));
                 format!("{kind} {name}")
@@ -313,6 +315,7 @@ fn helpers(program: &Program) -> Helpers {
     };
     let network = &program.network;
     Helpers {
+        // what is not called is not printed: unused functions are warnings, and the code builds with -Werror
         within: ops().any(|op| matches!(op, Op::Within { .. })),
         outside: ops().any(|op| matches!(op, Op::Outside { .. })),
         clamp: ops().any(|op| matches!(op, Op::Clamp { .. })),

@@ -65,6 +65,7 @@ pub fn number(scalar: Scalar, literal: Literal) -> String {
 /// Below every number that is one.
 pub fn lowest(scalar: Scalar) -> &'static str {
     match scalar {
+        // as digits: `FLT_MAX` would need <float.h>, and the core includes <stdint.h> alone
         Scalar::F32 => "-3.40282347e+38f",
         Scalar::F64 => "-1.7976931348623157e+308",
     }

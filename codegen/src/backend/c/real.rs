@@ -57,6 +57,7 @@ pub fn calls(program: &Program) -> Vec<String> {
             Loop::Layer(layer) => text.line(printer.call(layer)),
             Loop::Repeat { blocks, count, body } => {
                 let index = match (blocks, count) {
+                    // the shorter block stands behind the full ones
                     (Part::Rest, _) => format!("{full}u"),
                     (Part::Full, 1) => "0u".to_owned(),
                     (Part::Full, _) => "block".to_owned(),
@@ -145,6 +146,7 @@ impl<'a> Printer<'a> {
             None => String::new(),
         };
         let parameters = match layer.piece {
+            // no `restrict`: from the second block on biases and outputs are the same sums
             Some(_) => format!("const {kind} *x, {kind} *y, const float *w, const {kind} *bias"),
             None => format!("const {kind} *{u}_RESTRICT x, {kind} *{u}_RESTRICT y"),
         };
@@ -178,6 +180,7 @@ impl<'a> Printer<'a> {
     /// Declarations of the counters that some build of the layer needs.
     fn counters(&self, layer: &Layer, text: &mut Text) {
         let unless = |text: &mut Text, is_spare: bool, condition: &str, line: &str| {
+            // declared only in builds that use it: the code has to pass -Wall -Wextra -Werror
             if is_spare {
                 text.directive(format!("#if !defined({}_{condition})", self.u));
                 text.line(line);
@@ -217,6 +220,7 @@ impl<'a> Printer<'a> {
                     Some(Loop::Store(store)) => self.activated(store, &format!("done[{row}]")),
                     _ => String::new(),
                 };
+                // the kernel has the ReLU in it; other activations come behind
                 let is_left = !kernel.relu && activated(0) != "done[0]";
                 let activated: Option<&dyn Fn(usize) -> String> = if is_left { Some(&activated) } else { None };
                 text.block("", |text| text.lines(assembly::c::real(&kernel, activated)));
@@ -279,6 +283,7 @@ impl<'a> Printer<'a> {
         let (mut start, mut turn, mut end) = (Vec::new(), Vec::new(), Vec::new());
         let mut first = 0;
         while first < rows {
+            // down to four and then to one: a block need not be whole vectors
             let widths = [lanes, 4, 1].into_iter();
             let width = widths.clone().find(|width| first + width <= rows).unwrap_or(1);
             let kind = match width {

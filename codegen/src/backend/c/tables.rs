@@ -9,6 +9,7 @@ use crate::lower::known_answers::{LCG, SEED, UNIT, VECTORS};
 use crate::program::{Element, Literal, Program, Table};
 
 /// Columns up to which literals of a table are gathered in a line.
+// a convention: with the indentation within 120
 const LINE: usize = 108;
 
 /// A table as C has it: one array.
@@ -58,6 +59,7 @@ fn crc(scalar: Scalar, element: Element) -> &'static str {
     match element {
         Element::Float(own) if own == scalar => "crc",
         Element::Integer { bytes: 4 } => "crc_bias",
+        // a program has weights of one kind, so the name is taken once
         Element::Float(_) | Element::Integer { .. } | Element::Word => "crc_weights",
     }
 }

@@ -192,6 +192,7 @@ fn view(fmi: Fmi, (name, parameters, reason): Absent) -> AbsentView {
         Some(rest) => format!("{REFERENCES}{rest}"),
         None => parameters.to_owned(),
     };
+    // parameters are written once and taken apart: a stub names each, to say that it is not used
     let list: Vec<&str> = parameters.split(", ").filter(|part| !part.is_empty()).collect();
     let name_of = |parameter: &str| {
         let word = parameter.rsplit([' ', '*']).next().unwrap_or_default();

@@ -112,6 +112,7 @@ pub fn emit(program: &Program, fmi: Fmi) -> Result<GeneratedFiles, CodegenError>
 /// SHA-256 of core and block: another controller, another FMU.
 fn digest(program: &Program, block: &GeneratedFiles) -> Result<String, CodegenError> {
     let core = c::emit(program)?;
+    // without the shell, whose text contains the digest
     let texts = core.files.iter().chain(&block.files);
     let all: String = texts.map(|(name, text)| format!("{name}\n{text}\n")).collect();
     Ok(sha256(all.as_bytes()))
@@ -121,11 +122,13 @@ fn view(program: &Program, fmi: Fmi, hash: &str) -> FmuView {
     let n = &program.name;
     let b = block::view(program, &format!("Co-simulation unit of controller {n}"));
     let part = |from: usize, to: usize| hash.get(from..to).unwrap_or_default();
+    // in the form of a GUID, but not drawn: equal policies give equal files
     let groups = [part(0, 8), part(8, 12), part(12, 16), part(16, 20), part(20, 32)];
     let (variables, time) = variables::of(program, &b);
     FmuView {
         api: fmi.api(),
         token: format!("{{{}}}", groups.join("-")),
+        // what a stored state is asked for, so that another controller's is refused
         signature: format!("0x{}", part(0, 8)),
         description: format!(
             "Controller {n}, control period {} s: policy and duty ratio mapping, bit for bit as in C",

@@ -63,6 +63,7 @@ pub fn of(program: &Program, block: &BlockView) -> (Vec<VariableView>, String) {
 
 /// Signals keep their names; our own names give way with underscores.
 fn name_all(all: &mut [VariableView], program: &Program) -> String {
+    // a signal's name is the user's, who connects it by that name
     let mut taken: Vec<String> = program.signals.iter().map(|signal| signal.name.clone()).collect();
     let mut free = |name: &str| {
         let mut name = name.to_owned();
@@ -73,6 +74,7 @@ fn name_all(all: &mut [VariableView], program: &Program) -> String {
         name
     };
     for (index, variable) in all.iter_mut().enumerate() {
+        // 0 is the time in FMI 3
         variable.reference = index + 1;
         if index >= program.signals.len() {
             variable.name = free(&variable.name);
@@ -167,6 +169,7 @@ fn base(unit: &str) -> Option<&'static str> {
         "Hz" => "s=\"-1\"",
         "K" => "K=\"1\"",
         "degC" | "°C" => "K=\"1\" offset=\"273.15\"",
+        // a unit without base units is allowed; guessed ones would be converted
         _ => return None,
     })
 }
@@ -180,6 +183,7 @@ pub fn xml(text: &str) -> String {
             '<' => escaped.push_str("&lt;"),
             '>' => escaped.push_str("&gt;"),
             '"' => escaped.push_str("&quot;"),
+            // XML 1.0 cannot say most of them, not even as a reference
             c if c.is_control() => escaped.push(' '),
             c => escaped.push(c),
         }

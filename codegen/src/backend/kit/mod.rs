@@ -67,6 +67,7 @@ pub fn emit(program: &Program, material: &Material) -> Result<GeneratedFiles, Co
         literals: table(&Table::plain("literals", Element::Float(scalar), literals)),
         literal_bits: table(&Table::words("literal_bits", &literal_bits)),
         suite,
+        // the policy last: a difference in what it is made of is told first
         subjects: controllers.chain([subject(&name, program, &material.policy)]).collect(),
     };
     Ok(GeneratedFiles {
@@ -81,6 +82,7 @@ fn core(program: &Program) -> Result<String, CodegenError> {
     let (Some(header), Some(source)) = (part("h"), part("c")) else {
         return Err(CodegenError::Output("the C backend gave no header or no source"));
     };
+    // one file for the user's build: the header stands in front of the source, not beside it
     Ok(header.clone() + &source.replace(&format!("#include \"{}.h\"\n", program.name), ""))
 }
 

@@ -62,6 +62,7 @@ impl Number for f32 {
         -3.0,
         0.1,
         -7.000_001,
+        // 2^24 - 1: a sum with it has bits to lose
         16_777_215.0,
         1.0e-40,
         -1.175_494_4e-38,
@@ -91,11 +92,13 @@ impl Number for f64 {
         -3.0,
         0.1,
         -7.000_000_000_000_001,
+        // 2^53 - 1: a sum with it has bits to lose
         9_007_199_254_740_991.0,
         1.0e-310,
         -f64::MIN_POSITIVE,
         2.5e150,
     ];
+    // not 3: drawn numbers have 24 bits, with 3 as a factor 26, and the product of two such is exact in binary64
     const SPREAD: Self = 3.1;
     const SMALL: [Self; 3] = [1.0e-200, 1.0e-110, 1.0e-310];
 
@@ -142,6 +145,7 @@ fn comparisons<T: Number>() -> [fn(T, T) -> bool; 5] {
         |x, y| x.partial_cmp(&y).is_some(),
     ]
 }
+// the C program has the same numbers in its `switch`; gaps leave room for operations of a kind
 const FIRST_COMPARISON: u32 = 16;
 const FROM_I32: u32 = 24;
 const FROM_U32: u32 = 25;
@@ -177,6 +181,7 @@ fn probes<T: Number>() -> Vec<Probe> {
 }
 
 fn push<T: Number>(all: &mut Vec<Probe>, operation: u32, operands: [T; 3], result: T) {
+    // the bits of a NaN differ from machine to machine
     if result.is_number() {
         all.push(Probe {
             operation,
@@ -188,6 +193,7 @@ fn push<T: Number>(all: &mut Vec<Probe>, operation: u32, operands: [T; 3], resul
 
 /// Numbers whose products and sums have digits to lose.
 fn triples<T: Number>() -> Vec<[T; 3]> {
+    // a convention; drawn, because round numbers have exact products and sums
     let mut bits: u32 = 0x1234_5678;
     let mut draw = || {
         bits = bits.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -195,6 +201,7 @@ fn triples<T: Number>() -> Vec<[T; 3]> {
         (share - T::nearest(0.5)) * T::SPREAD
     };
     let mut triples: Vec<[T; 3]> = (0..12).map(|_| [draw(), draw(), draw()]).collect();
+    // signs of zero, and a sum that is 0 or 1 in binary32 by its order
     let more = [[-0.0, 0.0, -0.0], [1.0e8, 1.0, -1.0e8]].map(|triple| triple.map(T::nearest));
     triples.extend(more);
     triples.push(T::SMALL);
@@ -202,6 +209,7 @@ fn triples<T: Number>() -> Vec<[T; 3]> {
 }
 
 fn compared<T: Number>(all: &mut Vec<Probe>) {
+    // here with NaN and infinities: the sanitiser compares with them, and `-ffinite-math-only` leaves that out
     let mut special = [0.0, -0.0, 1.0, -1.0e-40, f64::NAN, f64::INFINITY, f64::NEG_INFINITY].map(T::nearest);
     special[3] = -T::SMALL[2];
     for x in special {
@@ -254,7 +262,9 @@ pub fn literals(scalar: Scalar) -> [Literal; 12] {
             3.402_823_5e38,
             0.1,
             -0.3,
+            // 2^24 + 1: halfway between two numbers
             16_777_217.0,
+            // its shortest digits, read through binary64, give the neighbour
             f64::from(f32::from_bits(0x15AE_43FD)),
             8.589_973e9,
             0.0,
@@ -268,6 +278,7 @@ pub fn literals(scalar: Scalar) -> [Literal; 12] {
             f64::MAX,
             0.1,
             -0.3,
+            // 2^53 + 1: halfway between two numbers
             9_007_199_254_740_993.0,
             6.631_236_846_766e-316,
             1.797_693_134_862_315_5e308,

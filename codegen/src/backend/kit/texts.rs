@@ -24,6 +24,7 @@ impl Texts<'_> {
         for signal in &self.program.signals {
             let name = &signal.name;
             if self.is_wide() && !signal.is_code {
+                // put together from two words: the table has the low one first on every processor
                 lines.push(format!("measured.{name} = {}_number(&word[{word}]);", self.kit));
                 word += 2;
             } else {
@@ -81,6 +82,7 @@ impl Texts<'_> {
         let (k, u) = (self.kit, self.program.name.to_uppercase());
         let state = if member == "state." { "&state" } else { "state" };
         if self.is_wide() {
+            // the two counters stand behind the numbers
             let numbers = (self.program.state_words() - 2) / 2;
             format!(
                 "{k}_crc({k}_crc({k}_crc_numbers({start}, {state}, {numbers}u), &{member}bad_count, 1u), &{member}primed, 1u)"

@@ -44,6 +44,7 @@ impl Trace {
         self.open(kind::STEP);
         self.words.extend_from_slice(measurement);
         self.words.extend_from_slice(command);
+        // a checksum for the rest: the kit lies in the flash of a board, where each word counts
         self.words.push(crc32_words(rest));
         self.steps += 1;
     }

@@ -193,6 +193,7 @@ struct State {
 
 /// Words, or numbers of two words and then the two counters: as C lays them out, without a gap.
 fn state(program: &Program) -> State {
+    // the two counters come last
     let numbers = size((program.state_words() - 2) / 2);
     match program.scalar() {
         Scalar::F32 => State {

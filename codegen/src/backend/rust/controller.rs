@@ -122,6 +122,7 @@ fn member(scalar: Scalar, member: &StateMember) -> (TokenStream, TokenStream) {
     match &member.value {
         StateValue::Numbers(values) => {
             let length = size(values.len());
+            // by bits: -0 is no [0.0; N]
             let initial = if values.iter().all(|value| value.value().to_bits() == 0) {
                 quote!([0.0; #length])
             } else {
@@ -222,8 +223,10 @@ fn sense(program: &Program) -> TokenStream {
         #[inline(always)]
         fn sense(&self, measured: &Measurement) -> Front {
             #(#statements)*
+            // wrapping, like all sums here: checked ones would be ways to a panic in debug builds
             let counted = self.bad_count.wrapping_add(flag(self.bad_count <= #hold));
             let bad_count = counted & #valid.wrapping_sub(1);
+            // a flag is 0 or 1: of `primed` the lowest bit counts, as in section 2
             let usable = #valid | (self.primed & flag(bad_count <= #hold));
             Front {
                 signal: #signal,
@@ -259,6 +262,7 @@ fn decide(program: &Program) -> TokenStream {
     let apart = program.senses_again.then(|| {
         quote! {
             /// The greedy action for a measurement, with a stack of its own.
+            // apart, so that its numbers are off the stack while the network runs
             #[inline(never)]
             fn choose_for(&self, measured: &Measurement) -> (u32, #kind) {
                 Self::choose(&self.sense(measured).observation)
@@ -347,6 +351,7 @@ fn advance(program: &Program) -> TokenStream {
             self.previous_duty = command.duty_sim;
             self.previous_command = command.duty;
             self.bad_count = front.bad_count & 0_u32.wrapping_sub(sound);
+            // 0 or 1; of a damaged state, which is never usable, 2
             self.primed = front.usable.wrapping_add(2).wrapping_sub(sound << 1);
         }
     }

@@ -31,6 +31,7 @@ pub fn method(program: &Program) -> TokenStream {
         #[inline(always)]
         fn sound(&self) -> u32 {
             let stray = #(#terms)|*;
+            // each counter beside its difference: from 2^31 on the difference alone would look small again
             let counters = #most.wrapping_sub(self.bad_count) | self.bad_count | 1_u32.wrapping_sub(self.primed) | self.primed;
             // behind a barrier: of what is known to be 0 or 1 the optimiser makes a branch
             core::hint::black_box(#sound)
@@ -67,6 +68,7 @@ fn term(scalar: Scalar, guarded: &Guarded) -> TokenStream {
             let index = size(index);
             quote!(self.held[#index])
         }
+        // one word needs no loop
         Place::Memory { first, count: 1 } => {
             let first = size(first);
             quote!(self.memory[#first])

@@ -32,6 +32,7 @@ pub fn network(program: &Program, code: &IntegerCode, weight: &TokenStream) -> (
         let (name, source) = (tokens::layer(layer.index), buffer(layer.from));
         let (sink, value) = match layer.next {
             Some(last) => {
+                // sums of a streamed layer start from its biases; they are cut at the end, when all blocks are in
                 let biases = tables::biases(program, last, Part::Full);
                 let cut = rust_cut(code.output_shift);
                 result = quote!(sums.0.map(|sum| #cut));
@@ -120,6 +121,7 @@ impl Printer<'_> {
         let rows = size(store.rows);
         if let [Loop::Add(add)] = added {
             let next = tables::weights(self.program, add.layer, part);
+            // names and no array: outputs stay in registers, and no index could be wrong
             let outputs: Vec<Ident> = (0..add.inputs).map(|i| ident(&format!("y{i}"))).collect();
             let products = self.products(add, &outputs);
             return Some(quote! {
@@ -167,6 +169,7 @@ impl Printer<'_> {
             let biases = tables::biases(self.program, layer.index, part);
             let next = layer.next.map(|last| tables::weights(self.program, last, part));
             let next = next.into_iter().flatten().map(|next| quote!(, #next.as_ptr().cast()));
+            // every block of a streamed layer adds to all sums, from the first
             let at = size(if layer.next.is_some() { 0 } else { first });
             kernels.push(assembly::rust::integer(&kernel, &name, self.program, self.weight));
             calls.push(quote! {

@@ -1,4 +1,12 @@
 //! The integrity check: CRC-32 over all tables, whole or in slices beside control.
+//!
+//! ```text
+//!  numbers of all tables, one after the other     |weights0 ....|bias0 .|weights1 ......|bias1 .|duties|
+//!  a span                                                 from ┴───────────────┴ to
+//! ```
+//!
+//! Each table is asked what of it lies in the span. The one invariant: the checksum goes on from slice to slice, so many small
+//! slices give what one large one gives.
 
 use policy::Scalar;
 use proc_macro2::{Ident, TokenStream};
@@ -48,6 +56,7 @@ pub fn items(program: &Program) -> TokenStream {
                 let place = |position: u32| position.saturating_sub(self.first).min(length) as usize;
                 let part = place(self.from)..place(self.to);
                 self.first = self.first.saturating_add(length);
+                // not by index, which would be a way to a panic; the ends are in order, so nothing is ever left out
                 table.get(part).unwrap_or_default()
             }
             #methods
@@ -103,6 +112,7 @@ fn checksums(program: &Program) -> (TokenStream, TokenStream) {
             Element::Integer { .. } => quote!(crc_word(crc, i32::from(*x) as u32)),
         };
         let function = quote! {
+            // off the control path: once in flash, whatever it costs in time
             #[inline(never)]
             fn #checksum(crc: u32, numbers: &[#kind]) -> u32 {
                 numbers.iter().fold(crc, |crc, x| #words)

@@ -122,5 +122,6 @@ pub fn store(scalar: Scalar, activation: Activation, arguments: &TokenStream, ou
         return quote!(rectified(#arguments, #out););
     }
     let activated = text_of(activation).rust(scalar);
+    // a pass of its own over the block, because assembly ends with the sums
     quote! { plain(#arguments, #out); activate(#out, |sum| #activated); }
 }

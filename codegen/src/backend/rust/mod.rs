@@ -44,6 +44,7 @@ fn file(
     items: TokenStream,
 ) -> Result<crate::files::GeneratedFiles, crate::files::CodegenError> {
     let file = syn::parse2(items).map_err(|error| crate::files::CodegenError::Rust(error.to_string()))?;
+    // in front of the text: a comment is no token
     let mut text: String = banner.iter().map(|line| format!("// {line}\n")).collect();
     text.push('\n');
     text.push_str(&prettyplease::unparse(&file));

@@ -42,6 +42,7 @@ pub fn bits(scalar: Scalar) -> Bits {
             magnitude: quote!(f32::from_bits(x.to_bits() & 0x7FFF_FFFF)),
             mask: quote!(0_u32.wrapping_sub(flag)),
             negative: quote!(x.to_bits() >> 31),
+            // where floats are a library: a comparison would be a call of it
             positive: quote!(f32::from_bits(x.to_bits() & (x.to_bits() >> 31).wrapping_sub(1))),
         },
         Scalar::F64 => Bits {

@@ -97,6 +97,7 @@ impl<'p> Printer<'p> {
         let v = |id: &ValueId| &self.operands[*id];
         match op {
             Op::Neg(x) => unary(quote!(-), v(x)),
+            // no parentheses: operands are names or leaves, everything computed has a name
             Op::Add(x, y) => binary(v(x), quote!(+), v(y)),
             Op::Sub(x, y) => binary(v(x), quote!(-), v(y)),
             Op::Mul(x, y) => binary(v(x), quote!(*), v(y)),
@@ -190,6 +191,7 @@ pub fn helpers(program: &Program) -> TokenStream {
         #[inline(always)]
         #[allow(dead_code)]
         fn clamp(x: #number, low: #number, high: #number) -> #number {
+            // not `clamp` of core, which can panic; flags behind their barrier keep the selection free of branches
             let raised = select(flag(x < low), low, x);
             select(flag(raised > high), high, raised)
         }
@@ -198,6 +200,7 @@ pub fn helpers(program: &Program) -> TokenStream {
         #[allow(dead_code)]
         fn line_sum<'a>(oldest: #number, rest: impl Iterator<Item = &'a #number>, newest: #number, primed: u32) -> #number {
             let mut sum = select(primed, oldest, newest);
+            // an iterator and no slice: a range that could be wrong is a way to a panic
             for word in rest {
                 sum += select(primed, *word, newest);
             }

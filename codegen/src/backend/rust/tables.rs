@@ -61,6 +61,7 @@ pub fn biases(program: &Program, index: usize, part: Part) -> Option<TokenStream
 
 fn held(table: &Table, part: Part) -> Vec<TokenStream> {
     let strips = match part {
+        // every table has a strip, and the shorter blocks stand in those behind it
         Part::Full => &table.strips[..1],
         Part::Rest => &table.strips[1..],
     };

@@ -42,6 +42,8 @@ pub fn word(value: u32) -> Literal {
 }
 
 fn negated(is_negative: bool, magnitude: Literal) -> TokenStream {
+    // a minus of its own: a negative literal may not survive the way through a token stream; by the sign, so that -0
+    // keeps it
     if is_negative {
         quote!(-#magnitude)
     } else {

@@ -45,6 +45,7 @@ pub(crate) fn decimal_commas(label: &str, found: usize) -> Message {
 }
 
 pub(crate) fn duty_range(label: &str, found: f64) -> Message {
+    // above 100 it is no percentage either, and a wrong hint is worse than none
     let percent = found > 1.0 && found <= 100.0;
     let hint = percent.then(|| format!("looks like a percentage: write {}", tidy(found / 100.0)));
     Message::new(format!("`{label}` is not a duty ratio"))
@@ -55,6 +56,7 @@ pub(crate) fn duty_range(label: &str, found: f64) -> Message {
 
 /// A quotient by 100 without the binary noise (0.44 rather than 0.44000000000000006).
 pub(crate) fn tidy(x: f64) -> f64 {
+    // nobody types a duty or a period with more decimals; the binary noise lies behind the sixteenth digit
     (x * 1e12).round() / 1e12
 }
 

@@ -35,6 +35,7 @@ const FOREIGN: &[(&[u8], &str, &str)] = &[
         "in MATLAB: writetable(T, \"run.csv\")",
     ),
     (
+        // by first bytes and not by the extension: files are renamed, and a MAT-file of version 7.3 is HDF5
         b"\x89HDF",
         "an HDF5 file (a MAT-file of version 7.3 is one)",
         "export the channels as CSV",
@@ -79,6 +80,7 @@ impl Sheet {
     }
 
     fn of_bytes(name: FileName, bytes: Vec<u8>, options: &Options) -> Result<Self, Faults> {
+        // before anything is decoded: "not UTF-8" would be the lesser hint
         if let Some((_, what, hint)) = FOREIGN.iter().find(|(start, ..)| bytes.starts_with(start)) {
             let message = Message::new(format!("the file is {what}, which is not read yet"));
             return Err(name.fault(message.expected("a table as text (CSV)").hint(*hint)).into());

@@ -1,4 +1,12 @@
 //! Where the quantities stand in a sheet, and which columns nobody asked for.
+//!
+//! ```text
+//! quantity ─► in the map? ─ yes ─► the column that it names, or its constant
+//!                         └ no ──► the columns whose header is one of its names, with a unit or without
+//!                                    none: missing, if a reader needs it    one: found    two: a fault
+//! ```
+//!
+//! A guess is never made between two columns: what is fitted to the wrong one looks plausible.
 
 use toml_input::{Fault, Faults, Message, Sink, nearest};
 
@@ -9,6 +17,7 @@ use crate::signal::{Signal, Source};
 use crate::time_like;
 
 /// Columns named in a note at most.
+// a convention: a logger may record hundreds of channels
 const MOST_NAMED: usize = 8;
 
 /// The quantities of a sheet.
@@ -40,10 +49,12 @@ impl Sheet {
                 Err(fault) => faults.push(*fault),
             }
         }
+        // a quantity that is missing by a fault would be called unused or missing again
         faults.propagate()?;
         let used = |index: &usize| signals.iter().any(|(_, signal)| signal.column() == Some(*index));
         let is_empty = |index: &usize| {
             let column = &self.columns()[*index];
+            // a separator at the end of each line makes such a column, and nobody has forgotten it
             column.name.is_empty() && (0..self.rows()).all(|row| column.cell(row) == Cell::Empty)
         };
         let asked = |name: &&str| wanted.iter().any(|quantity| quantity.name == *name);
@@ -70,6 +81,7 @@ impl Sheet {
                 let header = &self.columns()[index].name;
                 let source = Source::Column {
                     index,
+                    // a factor of the map is the user's word: the unit behind the name then does not count
                     scale: scale.unwrap_or_else(|| quantity.scale_behind(header)),
                     offset: *offset,
                     stated: scale.is_some(),
@@ -86,6 +98,7 @@ impl Sheet {
 
     /// The column of this name, or of this name and a unit.
     fn named(&self, name: &str) -> Option<usize> {
+        // exactly first: of `U` and `U [V]` the map can name either
         let exact = self.headers().position(|header| header == name);
         exact.or_else(|| self.headers().position(|header| split_unit(header).0 == name))
     }
@@ -97,6 +110,7 @@ impl Sheet {
             .filter_map(|(index, header)| Some((index, quantity.scale_of(header)?)));
         let mut claims: Vec<(usize, f64)> = claims.collect();
         let name = |index: usize| self.columns()[index].name.as_str();
+        // a plan of `drm acquire` that was filled in has both duties, and what was measured is what happened
         if claims.iter().any(|(index, _)| Quantity::is_measured_duty(name(*index))) {
             claims.retain(|(index, _)| Quantity::is_measured_duty(name(*index)));
         }

@@ -58,6 +58,7 @@ const UNITS: &[(&str, &str)] = &[
     ("watts", "W"),
     ("ohm", "ohm"),
     ("ohms", "ohm"),
+    // the Greek letter and the sign of the unit look alike; so do the two signs for micro below
     ("\u{3a9}", "ohm"),
     ("\u{2126}", "ohm"),
     ("1", "1"),
@@ -90,9 +91,11 @@ fn unit(text: &str) -> Option<(&'static str, f64)> {
     if let Some((_, of)) = plain(text) {
         return Some((of, 1.0));
     }
+    // K, N and U can only be meant as the small letters; M may be milli or mega
     let first = text.chars().next().filter(|first| *first != 'M')?;
     let known = |(prefix, _): &&(char, f64)| first.to_lowercase().eq([*prefix]);
     let (_, factor) = PREFIXES.iter().find(known)?;
+    // a share has no prefix: nobody can tell what `m%` means
     let (_, of) = plain(&text[first.len_utf8()..]).filter(|(_, of)| *of != "1")?;
     Some((of, *factor))
 }
@@ -134,6 +137,7 @@ impl Quantity<'_> {
     /// What a header calls this quantity.
     pub(crate) fn called<'h>(&'h self, header: &'h str) -> &'h str {
         let (base, _) = split_unit(header);
+        // `v_out_mV` is called `v_out` where a fault names it
         let shorter = base.rsplit_once(['_', ' ']).map(|(shorter, _)| shorter.trim_end());
         let known = [Some(base), shorter].into_iter().flatten();
         known.into_iter().find(|text| self.is_called(text)).unwrap_or(self.name)
@@ -188,6 +192,7 @@ impl Quantity<'_> {
         let lower = header.trim().to_ascii_lowercase();
         lower
             .strip_prefix(MEASURED_DUTY)
+            // `d_real [%]` and `d_real_pct` are meant, `d_really` is another column
             .is_some_and(|rest| !rest.starts_with(char::is_alphanumeric))
     }
 }
@@ -196,6 +201,7 @@ impl Quantity<'_> {
 pub(crate) fn split_unit(header: &str) -> (&str, Option<&str>) {
     let header = header.trim();
     match header.find(['[', '(', '/', '%']) {
+        // a sign at the start is all of the name: `%` alone measures nothing
         Some(start) if start > 0 => {
             let unit = header[start..].trim_matches(|c: char| c == ' ' || "[]()/".contains(c));
             (header[..start].trim_end_matches([' ', '_']), Some(unit))

@@ -76,6 +76,7 @@ impl Column {
     pub fn cell(&self, row: usize) -> Cell<'_> {
         match self.values.get(row) {
             Some(value) if value.is_finite() => Cell::Number(*value),
+            // rows are read in order, so the words are sorted by theirs
             _ => match self.words.binary_search_by_key(&row, |(row, _)| *row) {
                 Ok(index) => Cell::Word(&self.words[index].1),
                 Err(_) => Cell::Empty,

@@ -3,6 +3,15 @@
 //! Rounding to nearest is monotone, and so are sums, differences and products with a constant in each argument. The
 //! image of a box under one rounded operation is therefore enclosed by the rounded operation at its corners: the
 //! ends are computed in binary32 itself and need no slack. Only filters with feedback need an argument of their own.
+//!
+//! ```text
+//! ranges of signals ─► expression ─► filter ... filter ─► observation ─► layer ─► ... ─► layer
+//! (inwards, as the     (section 3)   (section 4)          (section 5)    (section 6, in binary64 with slack)
+//!  sanitiser rounds)
+//! ```
+//!
+//! In: a checked policy, part by part. Out: a [`Box32`] or the magnitude that is too large. The invariant: every box
+//! has finite ends of at most [`MAX_MAGNITUDE`]; what the controller computes from any history of samples lies within.
 
 use crate::activation::{Activation, Shape};
 use crate::limits::MAX_MAGNITUDE;
@@ -25,6 +34,7 @@ type Bounded = Result<Box32, Overflow>;
 /// Unit roundoff of binary32.
 const UNIT: f64 = 1.0 / 16_777_216.0;
 /// More than the rounding errors of a few operations in the subnormal range.
+// 71 steps of 2^-149; one operation there errs by at most half a step
 const TINY: f64 = 1e-43;
 
 impl Box32 {
@@ -79,6 +89,7 @@ impl Box32 {
     }
 
     pub fn times(self, other: Box32) -> Bounded {
+        // both boxes are finite, so a corner may be infinite but is never a NaN, which `min` and `max` would pass over
         let corners = [
             self.low * other.low,
             self.low * other.high,
@@ -113,6 +124,7 @@ impl Box32 {
 
     /// Widened by `by` on both sides, outwards to the next binary32.
     fn widened(self, by: f64) -> Bounded {
+        // the conversion may round inwards by half a unit: a whole one makes up for it
         let low = nearest_f32(f64::from(self.low) - by).next_down();
         Box32::checked(low, nearest_f32(f64::from(self.high) + by).next_up())
     }
@@ -129,9 +141,11 @@ impl Inputs {
     /// Ranges after the sanitiser: signals inwards-rounded, remembered duties the hull of all they can be.
     pub fn new(signals: &[Signal], actions: &[Action], limits: &Limits, fallback: &Fallback) -> Self {
         let inward = |interval| {
+            // never 0: `interval_f32` has refused what holds no binary32 number
             let (low, high) = inward_f32(interval).unwrap_or((0.0, 0.0));
             Box32 { low, high }
         };
+        // `init` writes the initial duty; the fallback may lie outside of the limits
         let start = Box32::point(nearest_f32(limits.initial_duty)).hull(nearest_f32(fallback.duty));
         let limit = inward(limits.duty);
         Inputs {
@@ -151,6 +165,7 @@ impl Inputs {
 /// Bound of a source expression (contract section 3).
 pub(crate) fn expression(expr: &Expr, inputs: &Inputs) -> Bounded {
     match expr {
+        // an index without a signal would be a fault of the parser: refused rather than taken as 0
         Expr::Input(Input::Signal(index)) => inputs.signal(*index).ok_or(Overflow(f64::INFINITY)),
         Expr::Input(Input::PreviousDuty) => Ok(inputs.previous_duty),
         Expr::Input(Input::PreviousCommand) => Ok(inputs.previous_command),
@@ -169,10 +184,12 @@ pub(crate) fn expression(expr: &Expr, inputs: &Inputs) -> Bounded {
 pub(crate) fn filter(filter: &Filter, x: Box32, period: f64) -> Bounded {
     match *filter {
         Filter::Delay { .. } => Ok(x),
+        // the two samples differ: the whole width, not 0
         Filter::BackwardDifference => x.sub(x)?.scale(1.0 / period),
         Filter::LowPass { .. } => low_pass(x),
         Filter::FilteredDerivative { time_constant } => filtered_derivative(x, time_constant, period),
         Filter::MovingAverage { samples } => {
+            // one by one, as the contract adds: each partial sum is rounded, and none may leave the format
             let mut sum = x;
             for _ in 1..samples {
                 sum = sum.add(x)?;
@@ -180,6 +197,7 @@ pub(crate) fn filter(filter: &Filter, x: Box32, period: f64) -> Bounded {
             sum.scale(1.0 / samples as f64)
         }
         Filter::Integrator { min, max, .. } => {
+            // the memory lies within the clamps after every step, so no history is needed
             let clamp = Box32::nearest(Interval { low: min, high: max });
             Ok(clamp.add(x.scale(period)?)?.clamp(clamp.low, clamp.high))
         }
@@ -190,6 +208,7 @@ pub(crate) fn filter(filter: &Filter, x: Box32, period: f64) -> Bounded {
 /// at most 3 units of the width plus one of the result, covered by 16 units of the largest magnitude.
 fn low_pass(x: Box32) -> Bounded {
     let y = x.widened(16.0 * UNIT * x.magnitude() + TINY)?;
+    // the difference is an operation of its own and has to stay in the format as well
     x.sub(y)?;
     Ok(y)
 }
@@ -202,10 +221,13 @@ fn filtered_derivative(x: Box32, time_constant: f64, period: f64) -> Bounded {
     let k = f64::from(nearest_f32(1.0 / sum));
     let width = f64::from(x.high) - f64::from(x.low);
     x.sub(x)?.scale(1.0 / sum)?;
+    // two roundings act on the memory, those of p y1 and of the sum; the .1 is more than their product
     let decay = 1.0 - p - 2.1 * UNIT;
     if decay <= 0.0 {
+        // a time constant of at most 1e6 periods leaves 16 units or more; where errors need not decay there is no bound
         return Err(Overflow(f64::INFINITY));
     }
+    // the difference, its product with k and the sum: three roundings, and 4.1 units are more
     let error = (4.1 * UNIT * k * width + 4.0 * TINY * (1.0 + k)) / decay;
     Box32::point(0.0).widened(k * width + error)
 }
@@ -213,6 +235,7 @@ fn filtered_derivative(x: Box32, time_constant: f64, period: f64) -> Bounded {
 /// Bound of an observation from the bound behind the filters (contract section 5).
 pub(crate) fn observation(y: Box32, scale: f64, offset: f64, clip: Option<Interval>) -> Bounded {
     let mut o = y;
+    // left out where the contract leaves the operation out, or the bound would be that of another computation
     if scale != 1.0 {
         o = o.scale(scale)?;
     }
@@ -243,7 +266,9 @@ pub(crate) fn layer(
             high += a.max(b);
             magnitude += a.abs().max(b.abs());
         }
+        // the loop above adds in binary64: its own errors of 2^-53 drown in the slack
         let slack = 2.0 * UNIT * (inputs.len() + 2) as f64 * magnitude + TINY * inputs.len() as f64;
+        // magnitudes and not the sum: no partial sum may overflow, in whatever order
         if magnitude + slack > MAX_MAGNITUDE {
             return Err((output, Overflow(magnitude + slack)));
         }
@@ -270,6 +295,7 @@ fn activated(x: Interval, activation: Activation) -> Interval {
         } else if activation.is_rectifier() {
             0.0
         } else {
+            // the slope is rounded and so is the product; 4 units are more than both
             y + sign * (4.0 * UNIT * y.abs() + TINY)
         }
     };

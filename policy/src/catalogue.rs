@@ -45,7 +45,7 @@ pub(crate) fn decimal_commas(label: &str, found: usize) -> Message {
 }
 
 pub(crate) fn duty_range(label: &str, found: f64) -> Message {
-    // a little above 1 is a duty ratio that is too large, not one of a few percent
+    // a little above 1 is a duty ratio that is too large; above 100 it is no percentage, and a wrong hint is worse than none
     let percent = (2.0..=100.0).contains(&found);
     let hint = percent.then(|| format!("looks like a percentage: write {}", tidy(found / 100.0)));
     Message::new(format!("`{label}` is not a duty ratio"))
@@ -56,6 +56,7 @@ pub(crate) fn duty_range(label: &str, found: f64) -> Message {
 
 /// A quotient by 100 without the binary noise (0.44 rather than 0.44000000000000006).
 pub(crate) fn tidy(x: f64) -> f64 {
+    // nobody types a duty or a period with more decimals; the binary noise lies behind the sixteenth digit
     (x * 1e12).round() / 1e12
 }
 

@@ -1,4 +1,14 @@
 //! From files to a policy that holds: section by section, then what must fit between them.
+//!
+//! ```text
+//! head  signals  features  network  actions  mapping  fallback  limits     sections: each reads all of its keys
+//!         │         │         └─ weights ◄─ sizes of features and actions
+//!         └─ Inputs ┴─► bounded features ─► bounded layers, golden vectors  what must fit between them
+//!                 └───► bounded mapping
+//! ```
+//!
+//! A section that is faulty gives `None` or less, and leaves a fault; what needs it is then left out instead of being
+//! reported as well. So nothing ends early, and a user sees every fault that stands on its own.
 
 use toml_input::{Sink, Table};
 
@@ -21,6 +31,7 @@ pub fn check(raw: RawPolicy) -> Result<Policy, Faults> {
     let mut faults = Sink::new();
     let policy = whole(&raw, &mut faults);
     faults.append(raw.faults.clone());
+    // only if a part is missing that left no fault, which would be a mistake of ours
     let incomplete = || raw.contract.source().name.fault(catalogue::incomplete());
     faults
         .conclude(policy, incomplete)
@@ -43,9 +54,11 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     let mapping = mapped(raw, &mut root, &signals.names, faults);
     let fallback = protection::fallback(&mut root, faults);
     let limits = protection::limits(&mut root, fallback, faults);
+    // all sections have been asked for by now: a key that is left is one that nobody knows
     root.finish(faults);
 
     let (feature_count, action_count) = (features.count, actions.count);
+    // a count of 0 is a faulty list: the widths of the weights cannot be judged by it
     let sizes = (feature_count > 0 && action_count > 0).then_some((feature_count, action_count));
     let mut weights = network
         .as_ref()
@@ -60,6 +73,7 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
         (Some(inputs), Some(period)) => features::bounded(features.list, inputs, period, faults),
         _ => Vec::new(),
     };
+    // a layer has to know every input: bounds of the others would be another network's
     let complete = feature_count > 0 && bounded.len() == feature_count;
     let known: &[Feature] = if complete { &bounded } else { &[] };
     if let (true, Some(weights)) = (complete, weights.as_mut()) {
@@ -77,6 +91,7 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
         known,
         mapping.as_ref().and_then(Option::as_ref),
     ));
+    // from here on whatever is missing has left its fault
     let limits = limits?;
     notes.extend(on_duties(
         &limits,
@@ -104,6 +119,7 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
         notes,
         files: raw.files.clone(),
     };
+    // last, because they are taken of all the rest
     policy.digests = digests::of(&policy);
     Some(policy)
 }
@@ -121,6 +137,7 @@ fn mapped(raw: &RawPolicy, root: &mut Table<'_>, signals: &[String], faults: &mu
     let load_current = mapping::load_current(&mut section, signals, faults);
     section.finish(faults);
     let document = raw.mapping.as_ref()?;
+    // read without a load current too, so that the faults of drm.toml come in the same run
     let mapping = mapping::read(document, load_current.unwrap_or_default(), faults)?;
     load_current.map(|_| Some(mapping))
 }
@@ -151,6 +168,7 @@ fn bound_layers(raw: &RawPolicy, features: &[Feature], layers: &mut [Layer], fau
                     .as_ref()
                     .map_or(&raw.contract.source().name, |file| &file.name);
                 faults.push(file.tensor_fault(&layer.name, catalogue::may_overflow(&what, magnitude)));
+                // the layers behind would be bounded from numbers that do not hold
                 return;
             }
         }
@@ -163,6 +181,7 @@ fn bound_mapping(raw: &RawPolicy, mapping: &Mapping, inputs: &Inputs, actions: &
         return;
     };
     let duties = Interval {
+        // no duty is negative: a box from 0 holds them all
         low: 0.0,
         high: actions.iter().fold(0.0, |high, action| action.duty.max(high)),
     };

@@ -15,6 +15,7 @@ pub fn formula(feature: &Feature, signals: &[Signal]) -> String {
     for filter in &feature.filters {
         text = format!("{}({text})", filter_name(filter));
     }
+    // a scale before a sum needs parentheses; behind a name or a filter they stand already
     let closed = atom || !feature.filters.is_empty();
     if feature.scale != 1.0 {
         text = if closed {

@@ -20,6 +20,7 @@ struct Contract<'a> {
     name: &'a str,
     sample_period: f64,
     numeric_format: NumericFormat,
+    // ordered by name: the order of the keys in the file does not count
     parameters: &'a BTreeMap<String, f64>,
     signals: &'a [Signal],
     features: Vec<Observed<'a>>,
@@ -53,6 +54,7 @@ struct Observed<'a> {
 
 impl<'a> Observed<'a> {
     fn of(feature: &'a Feature) -> Self {
+        // taken apart by name: a field that is added does not compile until somebody decides whether it counts
         let Feature {
             name,
             source,
@@ -100,9 +102,11 @@ pub(crate) fn of(policy: &Policy) -> Digests {
 fn weights(layers: &[Layer]) -> String {
     let mut hash = Sha256::new();
     for layer in layers {
+        // sizes first: the same numbers in layers of another shape are another network
         hash.update((layer.outputs as u64).to_le_bytes());
         hash.update((layer.inputs as u64).to_le_bytes());
         for value in layer.weights.iter().chain(&layer.bias) {
+            // the bits, little-endian: no form of text between, and the same digest on every machine
             hash.update(value.to_bits().to_le_bytes());
         }
     }

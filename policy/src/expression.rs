@@ -1,4 +1,14 @@
 //! Source expressions: text to an affine tree with constants folded (contract section 3).
+//!
+//! ```text
+//! sum     = product { ("+" | "-") product }
+//! product = signed { ("*" | "/") signed }          one side of "*" is known, the right side of "/" always
+//! signed  = ("+" | "-") signed | primary
+//! primary = number | name | "(" sum ")"
+//! ```
+//!
+//! Each rule gives a [`Value`]: known in binary64, or an [`Expr`] over inputs. Two known ones fold at once, so that a
+//! constant is rounded to the format once. Nothing is reordered: the tree is what the controller computes.
 
 use std::collections::BTreeMap;
 
@@ -20,6 +30,7 @@ pub(crate) type Wrong = (Span, Message);
 
 /// Parses and folds `text`.
 pub(crate) fn parse(text: &str, scope: &Scope<'_>) -> Result<Expr, Wrong> {
+    // before anything is parsed: the size of the text bounds the tree
     if text.chars().count() > limits::MAX_SOURCE_CHARS {
         let found = format!("{} characters", text.chars().count());
         let message = catalogue::expression("the expression is too long").found(found);
@@ -53,6 +64,7 @@ fn tokens(text: &str) -> Result<Vec<(Token, Span)>, Wrong> {
     let bytes = text.as_bytes();
     let mut list = Vec::new();
     let mut at = 0;
+    // whatever is taken below is ASCII, so `at` always stands between two characters
     while let Some(c) = text[at..].chars().next() {
         let start = at;
         let token = match c {
@@ -90,6 +102,7 @@ fn number_end(bytes: &[u8], start: usize) -> usize {
     if matches!(bytes.get(at), Some(b'e' | b'E')) {
         let sign = usize::from(matches!(bytes.get(at + 1), Some(b'+' | b'-')));
         let end = digits(at + 1 + sign);
+        // without digits it is no exponent: `2e` is 2 before a name, and the fault says that an operator is missing
         if end > at + 1 + sign {
             at = end;
         }
@@ -103,6 +116,7 @@ fn number(text: &str, span: &Span) -> Result<f64, Message> {
         .parse()
         .map_err(|_| catalogue::expression("this is not a number").found(format!("`{written}`")))?;
     let follower = text[span.end..].chars().next();
+    // `2v` is refused rather than read as a product: it may be a slip in a name
     if follower.is_some_and(|c| c.is_ascii_alphabetic() || c == '_') {
         let message = catalogue::expression("an operator is missing after this number");
         return Err(message
@@ -148,6 +162,7 @@ impl Value {
 /// A constant that stays itself in binary32: finite, and zero only if it is zero.
 fn constant(value: f64, span: Span) -> Result<f64, Wrong> {
     let rounded = value as f32;
+    // a constant that rounds to 0 would take its term away without a word
     if f64::from(rounded.abs()) > limits::MAX_MAGNITUDE || (rounded == 0.0 && value != 0.0) || value.is_nan() {
         return Err((span, catalogue::not_in_f32("constant", value)));
     }
@@ -200,6 +215,7 @@ impl Parser<'_> {
         let mut left = self.product()?;
         while let Some((sign, _)) = self.take_symbol(&['+', '-']) {
             let second = self.next;
+            // the sign was a token, so one stands before `second`
             let left_span = self.tokens[first].1.start..self.tokens[second.saturating_sub(1)].1.start;
             let right = self.product()?;
             left = match (left, right) {
@@ -224,6 +240,7 @@ impl Parser<'_> {
             let right = self.signed()?;
             let span = self.span_from(first);
             left = match (left, sign == '/', right) {
+                // before the arms that fold: "not finite" would say less than a division by zero
                 (_, true, Value::Known(0.0)) => {
                     return Err((self.span_from(second), catalogue::expression("division by zero")));
                 }
@@ -232,6 +249,7 @@ impl Parser<'_> {
                 (Value::Known(k), false, Value::Open(e)) | (Value::Open(e), false, Value::Known(k)) => {
                     scale(k, e, span)?
                 }
+                // section 3 says so: the reciprocal in binary64, then one rounded product
                 (Value::Open(e), _, Value::Known(k)) => scale(k.recip(), e, span)?,
                 (_, true, Value::Open(_)) => {
                     let message = catalogue::expression("division by a signal is not affine");
@@ -264,6 +282,7 @@ impl Parser<'_> {
             Some(_) => self.signed()?,
             None => self.primary()?,
         };
+        // an error ends the whole parse, so the depth need not be put back there
         self.depth -= 1;
         Ok(value)
     }
@@ -303,12 +322,14 @@ impl Parser<'_> {
             "previous_command" => return input(Input::PreviousCommand),
             _ => {}
         }
+        // signals and parameters share one space of names: the order of these two looks does not matter
         if let Some(index) = self.scope.signals.iter().position(|signal| signal == name) {
             return input(Input::Signal(index));
         }
         if let Some(value) = self.scope.parameters.get(name) {
             return Ok(Value::Known(*value));
         }
+        // only behind the known names: a signal may be called as a function is
         if matches!(self.tokens.get(self.next + 1), Some((Token::Symbol('('), _))) {
             let message = catalogue::expression("functions are not affine").found(format!("`{name}(...)`"));
             return Err((

@@ -6,8 +6,10 @@
 use crate::model::{Expr, Filter, Input, Policy};
 
 /// More than what one operation can round up by, in either format.
+// 16 unit roundoffs of binary32
 const GROWTH: f64 = 1.0 + 1.0 / 1_048_576.0;
 /// More than a few roundings of subnormal numbers.
+// 1e-40 is 70,000 steps of 2^-149
 const TINY: f64 = 1e-40;
 /// Unit roundoff of binary32.
 const UNIT: f64 = 1.0 / 16_777_216.0;
@@ -29,6 +31,7 @@ fn source(expr: &Expr, policy: &Policy) -> f64 {
     match expr {
         Expr::Input(Input::Signal(index)) => {
             let signal = policy.signals.get(*index);
+            // the parser made the index from a signal that is there
             signal.map_or(0.0, |signal| signal.range.low.abs().max(signal.range.high.abs()))
         }
         // duties are within 0..1
@@ -59,10 +62,12 @@ fn through(filter: &Filter, x: f64, period: f64, words: &mut Vec<f64>) -> f64 {
         }
         Filter::FilteredDerivative { time_constant } => {
             let (sum, width) = (time_constant + period, 2.0 * x);
+            // section 1: e = 10 u X/s + ..., with a width of 2X
             let error = 5.0 * UNIT * width / sum + TINY * (1.0 + 1.0 / sum);
             // what one step rounds off adds up over all steps that p keeps
             let decay = 1.0 - time_constant / sum - 3.0 * UNIT;
             let y = match decay > 0.0 {
+                // `bounds` has shown that the value stays within binary32, in every format
                 true => ((width / sum + error / decay) * GROWTH).min(f64::from(f32::MAX)),
                 false => f64::from(f32::MAX),
             };
@@ -71,6 +76,7 @@ fn through(filter: &Filter, x: f64, period: f64, words: &mut Vec<f64>) -> f64 {
         }
         Filter::MovingAverage { samples } => {
             words.extend(std::iter::repeat_n(x, samples.saturating_sub(1)));
+            // n - 1 sums, k and the product with it round n + 1 times: less than 2 n units and the growth
             x * (1.0 + 2.0 * UNIT * samples as f64) * GROWTH
         }
         Filter::Integrator { min, max, .. } => {

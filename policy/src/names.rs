@@ -3,6 +3,8 @@
 use crate::limits::MAX_NAME_CHARS;
 
 /// Keywords and predefined words of C11, C++20 and the compilers of common controllers.
+// `far`, `near`, `interrupt`, `cregister`, `ioport` are words of TI's and other compilers of controllers, `vector` and
+// `pixel` of AltiVec; `linux`, `unix`, `i386` are macros that gcc defines in its GNU modes
 const C_WORDS: &str = "alignas alignof and and_eq asm auto bitand bitor bool break case catch char char8_t char16_t \
     char32_t class co_await co_return co_yield compl complex concept const const_cast consteval constexpr constinit \
     continue cregister decltype default delete do double dynamic_cast else entry enum explicit export extern false far \
@@ -13,6 +15,7 @@ const C_WORDS: &str = "alignas alignof and and_eq asm auto bitand bitor bool bre
     vector virtual void volatile wchar_t while xor xor_eq";
 
 /// Names that macros or types of the C library take.
+// `real_t`, `int_t`, `boolean_t` and their like are types that Simulink's headers define
 const C_LIBRARY: &str = "assert errno fpclassify int8_t int16_t int32_t int64_t int_fast8_t int_fast16_t \
     int_fast32_t int_fast64_t int_least8_t int_least16_t int_least32_t int_least64_t intmax_t intptr_t isfinite isinf \
     isnan isnormal main max_align_t nan inf null offsetof ptrdiff_t setjmp signbit size_t ssize_t stderr stdin stdout \
@@ -26,6 +29,8 @@ const RUST_WORDS: &str = "abstract as async await become box break const continu
     i128 isize u8 u16 u32 u64 u128 usize";
 
 /// Names a policy cannot have: modules, files and headers that would be hidden.
+// `math.h` of a policy `math` would be included for the system's; `con`, `nul`, `lpt1` are devices of Windows, with any
+// extension; `simstruc` is the header of S-functions
 const POLICY_CLASHES: &str = "core std alloc test proc_macro self_test init reset step eval commit integrity policy \
     complex ctype fenv float inttypes iso646 limits locale math setjmp signal stdalign stdarg stdatomic stdbool stddef \
     stdint stdio stdlib stdnoreturn string tgmath threads time uchar wchar wctype simstruc con prn aux nul com1 com2 \
@@ -89,6 +94,7 @@ pub(crate) fn objection(name: &str, kind: Kind) -> Option<String> {
     if is(C_LIBRARY) {
         return Some(format!("`{name}` is reserved by the C library: try `{name}_value`"));
     }
+    // no expression names a feature, so one may be called `previous_duty`
     if kind != Kind::Feature && REMEMBERED.contains(&name) {
         return Some(format!(
             "`{name}` stands for the controller's own memory in expressions"
@@ -121,6 +127,7 @@ fn plain(name: &str) -> String {
 }
 
 fn shape(name: &str) -> Option<String> {
+    // no capitals: macros are the name in capitals, so `buck` and `Buck` would share theirs
     let allowed = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
     if name.is_empty() {
         return Some("the name is empty".to_owned());

@@ -27,6 +27,7 @@ pub(crate) fn unused(
     mapping: Option<&Mapping>,
 ) -> Vec<String> {
     let mut notes = Vec::new();
+    // the features are faulty: what nobody reads cannot be told
     if features.is_empty() {
         return notes;
     }
@@ -41,6 +42,7 @@ pub(crate) fn unused(
             signal.name
         )
     }));
+    // parameters are folded into the tree: the text alone still names them
     let word = |text: &str, name: &str| {
         text.split(|c: char| !c.is_ascii_alphanumeric() && c != '_')
             .any(|w| w == name)
@@ -101,6 +103,7 @@ fn only_duty(limits: &Limits, actions: &[Action], mapping: Option<&Mapping>) -> 
     if limits.duty.low == limits.duty.high || actions.iter().all(|action| action.duty == own) {
         return None;
     }
+    // without a mapping the current has no effect, and any two values do
     let ends = mapping.map_or([0.0; 2], |m| [m.valid_i_out.low, m.valid_i_out.high]);
     let limited = |action: &Action, i: f64| {
         let duty = mapping.map_or(action.duty, |mapping| mapped(mapping, action.duty, i));
@@ -113,6 +116,7 @@ fn only_duty(limits: &Limits, actions: &[Action], mapping: Option<&Mapping>) -> 
 
 fn mapped(mapping: &Mapping, d: f64, i: f64) -> f64 {
     let c = mapping.coefficients;
+    // binary64 is near enough for a note: the controller rounds each step
     c.a * d + c.b * i + c.c + c.r.unwrap_or(0.0) * d * i
 }
 
@@ -133,6 +137,7 @@ fn beyond_limits(limits: &Limits, actions: &[Action], mapping: Option<&Mapping>)
 /// A duty before the first step that the limits do not hold.
 fn outside_at_first(limits: &Limits) -> Option<String> {
     let (duty, range) = (limits.initial_duty, limits.duty);
+    // 0 is what a fallback of 0 leaves here, and a fallback may lie outside of the limits
     let is_outside = duty != 0.0 && !(range.low..=range.high).contains(&duty);
     is_outside.then(|| {
         format!(

@@ -94,18 +94,21 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<RawPolicy, Faults> {
     let bytes = options
         .content(&name, MAX_TOML_BYTES)
         .map_err(|message| alone(name.fault(message), files.clone()))?;
+    // before the bytes become text: "not UTF-8" would be the lesser hint for a file of weights
     if let Some(message) = not_a_contract(&bytes) {
         return Err(alone(name.fault(message), files));
     }
     let source = Source::new(name.clone(), bytes).map_err(|fault| alone(*fault, files.clone()))?;
     let contract = Document::parse(source, &mut faults);
     faults
+        // in a text with faults of syntax the names of the other files may be what is broken
         .propagate()
         .map_err(|faults| rejected(&contract, files.clone(), faults))?;
     let mut companion = |keys: &[&str], limit: u64| -> Option<Binary> {
         let value = contract.peek(keys)?;
         let text = value.as_text()?;
         let read = beside(&name, text, options).and_then(|name| {
+            // before it is read: a file that is missing has to cause a rebuild when it comes
             files.push(name.path.clone());
             options.content(&name, limit).map(|bytes| Binary { name, bytes })
         });
@@ -131,6 +134,7 @@ fn document(file: Binary, faults: &mut Sink) -> Option<Document> {
         .ok()?;
     let before = faults.count();
     let document = Document::parse(source, faults);
+    // what was recovered may lack keys, and each would be reported as missing
     (faults.count() == before).then_some(document)
 }
 
@@ -173,6 +177,7 @@ fn inside(root: &Path, name: &FileName) -> Option<FileName> {
 
 /// `path` without `.` and `..`, by text alone; `None` if it climbs above its start.
 fn normalise(path: &Path) -> Option<PathBuf> {
+    // not `canonicalize`, which needs a file that exists: a missing one is to be called missing, not outside
     let mut parts: Vec<Component<'_>> = Vec::new();
     for part in path.components() {
         match part {
@@ -205,6 +210,7 @@ fn skeleton(contract: &Document) -> Skeleton {
     let mut signals: Vec<(String, bool)> = Vec::new();
     let items = contract.peek(&["signal"]).and_then(|value| value.as_list());
     for item in items.unwrap_or_default() {
+        // a name that is given twice is left out: the stand-in has a field for each
         if let Some(name) = fit(item.peek("name"), Kind::Signal)
             && signals.iter().all(|(known, _)| *known != name)
         {

@@ -9,6 +9,7 @@ impl Scalar {
     pub fn nearest(self, x: f64) -> f64 {
         match self {
             Scalar::F32 => f64::from(nearest_f32(x)),
+            // section 11: the constants of a contract are binary64 already
             Scalar::F64 => x,
         }
     }
@@ -43,6 +44,7 @@ impl Scalar {
     /// The number of the format before `x`, which is one.
     #[must_use]
     pub fn next_down(self, x: f64) -> f64 {
+        // the format is symmetric, so one direction suffices
         -self.next_up(-x)
     }
 }
@@ -56,6 +58,7 @@ pub fn nearest_f32(x: f64) -> f32 {
 /// Smallest binary32 that is not below `x`: rounds a lower limit inwards.
 #[must_use]
 pub fn up_f32(x: f64) -> f32 {
+    // `as` rounds to nearest, ties to even: at most one step is to be corrected
     let nearest = x as f32;
     if f64::from(nearest) < x {
         nearest.next_up()

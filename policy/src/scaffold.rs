@@ -93,6 +93,7 @@ fn resolved(folder: &Path) -> Option<PathBuf> {
 /// `golden`: whether `golden.safetensors` lies beside the weights.
 fn text(weights: &str, golden: bool, outline: &Outline) -> String {
     let folder = &weights[..weights.rfind('/').map_or(0, |slash| slash + 1)];
+    // TOML's own quotes and escapes: a path may hold both
     let file = toml::Value::String(weights.to_owned()).to_string();
     let Outline {
         inputs,
@@ -111,6 +112,7 @@ fn text(weights: &str, golden: bool, outline: &Outline) -> String {
     let _ = write!(text, "\n[network]\nweights = {file}\n");
     match chains.as_slice() {
         [only] => drop(writeln!(text, "# layers found, first to last: {only}")),
+        // no choice is made here: a chain that was not meant would give a controller all the same
         several => {
             text += "# more than one chain of layers fits; name the prefix of one, or list its layers:\n";
             for chain in several {

@@ -4,6 +4,12 @@
 //!
 //! The proof is exact: integer intervals of every activation, from the clamped inputs on, and for every output the sum
 //! of all positive and of all negative terms. Whatever the order of the additions, every partial sum lies between.
+//!
+//! ```text
+//! inputs(policy) ─► exponents, ranges of integers ─► layer ─► ... ─► layer        one pass, front to back
+//! rows::balanced ─► r_o for every output ────────────┘
+//! layer: finest accumulator whose sums fit in 32 bits, then the smallest shift whose outputs fit in 16 (last: 25) bits
+//! ```
 
 mod rows;
 
@@ -11,14 +17,17 @@ use crate::activation::{Activation, Shape};
 use crate::model::{Layer, Policy};
 
 /// Fractional bits of what is within +-1 behind a sigmoid: 1.0 is 2^14.
+// the finest exponent at which 1.0 is within 32,767
 pub const SIGMOID_EXPONENT: i32 = 14;
 /// Fractional bits of the slope of a leaky ReLU.
+// the finest exponent at which a slope below 1 is within 32,767
 pub const SLOPE_BITS: u32 = 15;
 /// Largest magnitude of an activation.
 pub const ACTIVATION_LIMIT: i64 = 32_767;
 /// Largest magnitude of an output of the network: up to here an integer is a binary32 number.
 pub const OUTPUT_LIMIT: i64 = 1 << 24;
 /// Largest magnitude of an exponent: 2^e and its reciprocal are normal binary32 numbers.
+// 126 is the last exponent of which that is true; 100 is a convention
 const MAX_EXPONENT: i32 = 100;
 
 /// How an observation becomes an integer.
@@ -102,6 +111,7 @@ pub fn power_of_two(exponent: i32) -> f64 {
 /// `floor(x + 1/2)`: round half up, for magnitudes below 2^51.
 #[must_use]
 pub fn round_half_up(x: f64) -> i64 {
+    // `f64::round` would round halves away from 0; the contract's `hu` rounds them up, as a shift of integers does
     (x + 0.5).floor() as i64
 }
 
@@ -117,11 +127,13 @@ fn inputs(policy: &Policy) -> Vec<InputScale> {
     let finest = |bound: crate::model::Interval| {
         let magnitude = bound.low.abs().max(bound.high.abs());
         let fits = |exponent: &i32| magnitude * power_of_two(*exponent) <= ACTIVATION_LIMIT as f64;
+        // finest first, so that the first that fits is the answer
         (-MAX_EXPONENT..=24).rev().find(fits).unwrap_or(-MAX_EXPONENT)
     };
     let finest: Vec<i32> = policy.features.iter().map(|feature| finest(feature.bound)).collect();
     let coarsest = finest.iter().copied().min().unwrap_or_default();
     let scale = |(feature, finest): (&crate::model::Feature, &i32)| {
+        // never negative, so `/` rounds down as section 6b wants it
         let exponent = coarsest + (finest - coarsest) / 2;
         InputScale {
             exponent,
@@ -162,6 +174,7 @@ fn layer(
         let sums = sums(layer, rows, inputs, ranges, accumulator, weight_limit)?;
         let shift = shift(&sums, layer.activation, output_limit);
         let low = sums.iter().map(|sum| sum.lowest).min().unwrap_or_default();
+        // the half that rounds the cut is added in the same 32 bits
         let high = sums.iter().map(|sum| sum.highest).max().unwrap_or_default() + half(shift);
         let limit = i64::from(i32::MAX);
         let outputs = sums.iter().map(|sum| activated(layer.activation, *sum, shift));
@@ -196,17 +209,20 @@ fn sums(
     let sum = |((weights, bias), row): ((&[f32], &f32), &i32)| {
         let scaled = power_of_two(*row);
         let bias = f64::from(*bias) * power_of_two(accumulator + row);
+        // before it becomes an integer: the conversion would saturate and look as if it fitted
         if bias.abs() >= f64::from(i32::MAX) {
             return None;
         }
         let bias = round_half_up(bias);
         let mut sum = Sum {
             range: (bias, bias),
+            // "in any order" includes sums that have not met the bias yet, and those begin at 0
             lowest: bias.min(0),
             highest: bias.max(0),
         };
         for ((weight, factor), (low, high)) in weights.iter().zip(&factors).zip(ranges) {
             let weight = f64::from(*weight) * factor * scaled;
+            // before the rounding, whose integer would saturate; behind it 32767.4 has become one that fits
             if weight.abs() > (weight_limit + 1) as f64 {
                 return None;
             }
@@ -231,16 +247,19 @@ pub fn half(shift: u32) -> i64 {
 }
 
 fn shift(sums: &[Sum], activation: Activation, limit: i64) -> u32 {
+    // a curve takes the whole sum as a binary32 number
     if activation.limit().is_some() {
         return 0;
     }
     let fits = |shift: &u32| {
         let rounded = |x: i64| (x + half(*shift)) >> shift;
         sums.iter().all(|sum| {
+            // what is below 0 becomes 0 and needs no bits
             let low_fits = activation.is_rectifier() || rounded(sum.range.0) >= -limit;
             low_fits && rounded(sum.range.1) <= limit
         })
     };
+    // 1024 products of 15 and 15 bits have 40: no sum of a network within its limits needs more
     (0..40).find(fits).unwrap_or(40)
 }
 
@@ -262,6 +281,7 @@ fn activated(activation: Activation, sum: Sum, shift: u32) -> (i64, i64) {
 /// Slope of a leaky ReLU as integer: round half up of slope * 2^15, below 2^15.
 #[must_use]
 pub fn slope_integer(slope: f64) -> i64 {
+    // a slope just below 1 would round to 2^15, which 16 bits do not hold
     round_half_up(slope * power_of_two(SLOPE_BITS.cast_signed())).min(ACTIVATION_LIMIT)
 }
 

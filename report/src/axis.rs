@@ -1,4 +1,13 @@
 //! Axes: what they show, their range, their ticks.
+//!
+//! ```text
+//! value ──place──► place (itself, or its decade) ──part──► 0..1 ──onto──► pixel
+//!   None: NaN, infinite, beyond 1e150, <= 0 on a logarithmic axis: a gap, never a wrong point
+//!
+//! Axis (what is asked) ──settle, with the data──► Settled (range, ticks, title) ──onto──► Scale (on pixels)
+//! ```
+//!
+//! Ticks are places computed from whole numbers, so that labels are exact and equal on every machine.
 
 use crate::error::ReportError;
 use crate::number::{
@@ -55,6 +64,7 @@ impl Axis {
     pub(crate) fn place(&self, value: f64) -> Option<f64> {
         match (drawable(value), self.log) {
             (true, false) => Some(value),
+            // as far below 1 as the largest value that is drawn lies above
             (true, true) if value >= 1e-150 => Some(libm::log10(value)),
             _ => None,
         }
@@ -70,6 +80,7 @@ impl Axis {
     ) -> Result<Settled, ReportError> {
         let (low, high) = match self.range {
             Some((low, high)) => match (self.place(low), self.place(high)) {
+                // an empty range would divide by 0 in `part`
                 (Some(a), Some(b)) if a < b => (a, b),
                 _ => {
                     let axis = self.label.clone();
@@ -109,6 +120,7 @@ impl Axis {
         let size = low.abs().max(high.abs());
         // a constant has no span of its own, and the last bits of a double are no signal
         if high - low <= size * 1e-9 || high == low {
+            // half a decade or 5 %: conventions, so that the line lies in the middle of an axis with ticks
             let half = if self.log || size < 1e-150 { 0.5 } else { size * 0.05 };
             return Ok((low - half, high + half));
         }
@@ -137,6 +149,7 @@ impl Axis {
         if takes_prefix(&self.unit) {
             (exponent, format!("{}{}", prefix(exponent), self.unit))
         } else if (-3..=3).contains(&exponent) {
+            // from 0.001 to 999,999 as plain numbers, beyond with a power of ten: a convention
             (0, self.unit.clone())
         } else {
             (exponent, format!("{} {}", raised_power(exponent), self.unit))
@@ -150,6 +163,7 @@ impl Axis {
             values.last().copied().unwrap_or(0.0),
         );
         let (exponent, _) = self.scaled_unit(ends.0, ends.1);
+        // a relative 1e-6 is far below a pixel, and lets 0.1 + 0.2 be 0.3
         let close = |value: f64, decimals: usize| {
             let read = format!("{value:.decimals$}").parse::<f64>().unwrap_or(value);
             (read - value).abs() <= value.abs() * 1e-6
@@ -171,10 +185,12 @@ impl Axis {
     /// `low` and `high` are decades here.
     fn log_ticks(&self, low: f64, high: f64, count: usize) -> (String, Vec<Tick>) {
         let (first, last) = (libm::floor(low) as i32, libm::ceil(high) as i32);
+        // labels at every n-th decade: hundreds of decades would write over each other
         let every = usize::try_from(last - first).unwrap_or(1).div_ceil(count.max(3)).max(1);
         // fewer than two decades would leave an axis with one labelled tick
         let labelled: &[u32] = if high - low < 1.5 { &[1, 2, 5] } else { &[1] };
         // one way of writing along an axis
+        // from 0.001 to 10,000 as numbers, beyond as powers of ten: a convention
         let plain = low >= -3.0 && high <= 4.0;
         let mut ticks = Vec::new();
         for exponent in first..=last {
@@ -182,6 +198,7 @@ impl Axis {
             for digit in 1..=9_u32 {
                 let place = f64::from(exponent) + libm::log10(f64::from(digit));
                 let inside = (low - 1e-9..=high + 1e-9).contains(&place);
+                // beyond five decades the lines between would be a grey surface
                 if !inside || digit > 1 && high - low > 5.0 {
                     continue;
                 }
@@ -197,6 +214,7 @@ impl Axis {
     }
 
     fn log_label(&self, exponent: i32, digit: u32, plain: bool) -> String {
+        // towards minus infinity: 10^-4 is 100 u, not 0.1 m
         let three = exponent.div_euclid(3) * 3;
         if takes_prefix(&self.unit) && (-15..=12).contains(&three) {
             let number = f64::from(digit) * power_of_ten(exponent - three);
@@ -225,6 +243,7 @@ fn titled(label: &str, unit: &str) -> String {
 /// Multiples of 1, 2 or 5 times a power of ten between `low` and `high`, about `count` of them but at least three, with
 /// their labels.
 fn nice(low: f64, high: f64, count: usize) -> Vec<(f64, String)> {
+    // an axis with fewer than three ticks cannot be read; ten tries end it for ranges of a few last places
     let mut denser = (count..count + 10).map(|count| spaced(low, high, count));
     denser
         .find(|ticks| ticks.len() > 2)
@@ -235,6 +254,7 @@ fn spaced(low: f64, high: f64, count: usize) -> Vec<(f64, String)> {
     let rough = (high - low) / count.max(2) as f64;
     let exponent = decade(rough);
     let digit = match rough / power_of_ten(exponent) {
+        // the quotient may miss a whole digit by its last bits, and would take the next larger step
         d if d <= 1.0 + 1e-9 => 1.0,
         d if d <= 2.0 + 1e-9 => 2.0,
         d if d <= 5.0 + 1e-9 => 5.0,
@@ -244,9 +264,12 @@ fn spaced(low: f64, high: f64, count: usize) -> Vec<(f64, String)> {
     let digit = if digit == 10.0 { 1.0 } else { digit };
     let step = shifted(digit, exponent);
     let decimals = usize::try_from(-exponent).unwrap_or(0);
+    // a tick at the very end of the range counts in spite of rounding
     let (first, last) = (libm::ceil(low / step - 1e-9), libm::floor(high / step + 1e-9));
+    // hostile ranges, such as 1 to 1 + 2^-52, must neither hang nor fill the memory
     let number = (last - first).clamp(0.0, 50.0) as usize;
     let tick = |n: usize| {
+        // a whole number, shifted with one rounding: adding up steps of 0.1 would give 0.30000000000000004
         let value = shifted((first + n as f64) * digit, exponent);
         (value, fixed(value, decimals))
     };

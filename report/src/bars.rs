@@ -67,6 +67,7 @@ impl BarPanel {
         let data = || self.series.iter().flat_map(|(_, values, _)| values.iter().copied());
         // the length of a bar is its value only if it starts at zero
         let zero = (!self.axis.is_log()).then_some(0.0);
+        // no free part below zero where no bar goes there: the foot of the bars is the edge of the panel
         let foot = if zero.is_some() && !data().any(|value| value < 0.0) {
             0.0
         } else {
@@ -77,6 +78,7 @@ impl BarPanel {
 }
 
 /// Height of a row with one bar, pixels.
+// pixels here and below are laid out by eye
 const ROW: f64 = 18.0;
 const ROW_OF_GROUP: f64 = 10.0;
 const GAP: f64 = 28.0;
@@ -166,8 +168,10 @@ impl BarChart {
             .iter()
             .map(|name| width(name, SMALL))
             .fold(0.0, f64::max);
+        // long names take at most this much; the bars are what the chart is for
         let left = EDGE + names.min(WIDTH * 0.45) + 8.0;
         let wide = ((WIDTH - left - EDGE - 12.0 - (number - 1.0) * GAP) / number).max(40.0);
+        // a tick for every 75 pixels: the widest usual label has room
         let axes = self.panels.iter().map(|panel| panel.settle((wide / 75.0) as usize));
         let axes = axes.collect::<Result<Vec<_>, _>>()?;
         let entries = self.entries();
@@ -265,6 +269,7 @@ impl BarChart {
             (area.width, area.height)
         };
         let slot = across / self.categories.len() as f64;
+        // a logarithmic axis has no zero to start from
         let start = if panel.axis.is_log() {
             0.0
         } else {
@@ -280,9 +285,11 @@ impl BarChart {
                 let middle = slot * (n as f64 + 0.5);
                 let known = || ends.iter().flatten().copied();
                 let (low, high) = (known().fold(f64::INFINITY, f64::min), known().fold(0.0, f64::max));
+                // no line for a single dot, and none for no dot, where `low` is infinite
                 if high > low {
                     self.bar(out, area, (low, high), (middle - 0.75, 1.5), Colour::GRID);
                 }
+                // backwards, so that the first series lies on top where dots meet
                 for (end, colour) in ends.iter().zip(&colours).rev() {
                     let Some(end) = end else { continue };
                     let (x, y) = if self.vertical {
@@ -294,6 +301,7 @@ impl BarChart {
                 }
                 continue;
             }
+            // a fifth of the slot stays free between groups; 40 pixels are enough, few categories would make blocks
             let thick = (slot * 0.8 / self.lanes() as f64).min(40.0);
             let first = slot * (n as f64 + 0.5) - thick * self.lanes() as f64 / 2.0;
             for (lane, (end, colour)) in ends.iter().zip(&colours).enumerate() {

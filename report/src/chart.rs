@@ -153,6 +153,7 @@ impl Chart {
             .rev()
             .find_map(|tick| tick.label.as_deref())
             .unwrap_or("");
+        // half of the last label stands beyond the end of the axis
         let right = EDGE + (width(last_label, SMALL) / 2.0).max(4.0);
         let mut areas = Vec::new();
         let mut top = head.height();
@@ -191,6 +192,7 @@ fn y_axis(panel: &Panel) -> Result<Settled, ReportError> {
         .series
         .iter()
         .flat_map(|series| series.y.iter().chain(&series.high).copied());
+    // a tick for every 42 pixels, two to eight: a convention
     let ticks = (panel.height / 42.0).clamp(2.0, 8.0) as usize;
     panel.y.settle(data.chain(panel.ends(false)), [0.06; 2], ticks)
 }
@@ -209,6 +211,7 @@ impl Colours {
                 continue;
             }
             let (next, worn) = Colour::series(taken);
+            // a colour of its own does not use up one of the palette
             taken += usize::from(series.colour.is_none());
             entries.push(Entry {
                 name: series.name.clone(),
@@ -249,12 +252,14 @@ fn draw(
     for mark in &panel.marks {
         zone(out, mark, xs, ys);
     }
+    // bands first: what lies on top of a line would hide it
     let bands = panel.series.iter().filter(|series| series.kind == Kind::Band);
     let others = panel.series.iter().filter(|series| series.kind != Kind::Band);
     for series in bands.chain(others) {
         let (colour, dashed) = colours.of(series);
         trace(out, series, xs, ys, colour, dashed)?;
     }
+    // labels last, over the data, and none over another
     let mut taken: Vec<Area> = Vec::new();
     for mark in &panel.marks {
         label(out, mark, xs, ys, &mut taken);
@@ -277,6 +282,7 @@ fn trace(
     };
     let low = points(&series.y);
     let data = match series.kind {
+        // thinned in pixels, not in samples: so the extremes of each column of pixels stay
         Kind::Line => path::line(&path::thin(&low)),
         Kind::Step => path::line(&path::thin(&path::stairs(&low))),
         Kind::Band => path::area(&low, &points(&series.high)),
@@ -292,6 +298,7 @@ fn trace(
             "path",
             &[("d", &data), ("fill", &colour), ("fill-opacity", &BAND_OPACITY)],
         ),
+        // a line of no length with round ends is a dot: one path for all, where circles would be an element each
         Kind::Points => out.leaf(
             "path",
             &[
@@ -311,6 +318,7 @@ fn trace(
                     ("stroke", &colour),
                     ("stroke-width", &1.6),
                     ("stroke-linejoin", &"round"),
+                    // round ends would close part of the gaps between dashes
                     ("stroke-linecap", &if dashed { "butt" } else { "round" }),
                     ("stroke-dasharray", &dash),
                     ("fill", &"none"),
@@ -376,6 +384,8 @@ fn label(out: &mut Markup, mark: &Mark, xs: Scale, ys: Scale, taken: &mut Vec<Ar
     };
     let (near, far) = (a.min(b), a.max(b));
     let places: Vec<Area> = if mark.on_x {
+        // six rows and three columns of places: a convention; with all taken the first is used, since a label is never
+        // dropped
         let rows = (0..6).map(|row| f64::from(row) * LINE + 2.0);
         rows.flat_map(|y| [box_at(near + 5.0, y), box_at(far - size.0 - 5.0, y)])
             .collect()
@@ -401,6 +411,7 @@ fn label(out: &mut Markup, mark: &Mark, xs: Scale, ys: Scale, taken: &mut Vec<Ar
             ("x", &Px(place.x)),
             ("y", &Px(place.y + 12.0)),
             ("fill", &Colour::DIM),
+            // a seam of paper round the letters keeps them readable on lines and bands
             ("stroke", &Colour::PAPER),
             ("stroke-width", &3),
             ("paint-order", &"stroke"),

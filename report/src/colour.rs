@@ -51,6 +51,7 @@ impl Colour {
     /// Colour of the `index`-th series, and whether the palette has been used up, so that a dash must tell two apart.
     pub(crate) fn series(index: usize) -> (Self, bool) {
         let round = index / Self::SERIES.len();
+        // the third round is plain again: more than twelve series are not told apart
         (Self::SERIES[index % Self::SERIES.len()], round % 2 == 1)
     }
 }
@@ -95,6 +96,7 @@ impl Ramp {
             Self::Diverging => &RED_BLUE,
         };
         let place = part.clamp(0.0, 1.0) * (stops.len() - 1) as f64;
+        // at 1 the last pair is taken, not one beyond it
         let below = (place as usize).min(stops.len() - 2);
         let (a, b, t) = (stops[below], stops[below + 1], place - below as f64);
         let mix = |a: u8, b: u8| (f64::from(a) + (f64::from(b) - f64::from(a)) * t).round() as u8;

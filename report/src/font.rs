@@ -21,6 +21,7 @@ fn advance(c: char) -> f64 {
         'A'..='Z' => 0.72,
         '⁰'..='⁹' | '⁻' | '¹' | '²' | '³' => 0.42,
         c if c.is_ascii() => 0.63,
+        // from here on the scripts of East Asia, which are as wide as high
         c if u32::from(c) < 0x2e80 => 0.7,
         _ => 1.0,
     }
@@ -31,6 +32,7 @@ pub fn wrap(text: &str, size: f64, room: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
         match lines.last_mut() {
+            // .38 is the width of a blank
             Some(line) if width(line, size) + width(word, size) + size * 0.38 <= room => {
                 line.push(' ');
                 line.push_str(word);

@@ -24,6 +24,7 @@ impl std::fmt::Display for Svg {
 }
 
 /// Width of a chart unless told otherwise, pixels.
+// this and the pixels below are laid out by eye: conventions
 pub const WIDTH: f64 = 900.0;
 /// Free edge of the sheet.
 pub const EDGE: f64 = 12.0;
@@ -78,6 +79,7 @@ impl Head {
         let mut x = EDGE;
         for entry in entries {
             let wide = SWATCH + width(&entry.name, SMALL) + 16.0;
+            // an entry that is wider than the sheet has a row of its own; text is never cut
             if rows.is_empty() || x + wide > EDGE + room {
                 rows.push(Vec::new());
                 x = EDGE;
@@ -136,6 +138,7 @@ fn swatch(out: &mut Markup, x: f64, y: f64, entry: &Entry) {
         }
         Kind::Points => dot(out, x + 9.0, y, 4.0, colour),
         Kind::Band => {
+            // dashes mean nothing for a surface: here they say that its colour is full
             let opacity = if entry.dashed { 1.0 } else { BAND_OPACITY };
             rectangle(
                 out,
@@ -188,6 +191,7 @@ pub fn sheet(title: &str, wide: f64, high: f64) -> Markup {
             ("height", &Px(high)),
             ("role", &"img"),
             ("aria-label", &title),
+            // names only: no font is embedded or loaded
             ("font-family", &"system-ui, 'Segoe UI', Helvetica, Arial, sans-serif"),
             ("font-size", &SMALL),
             ("fill", &Colour::INK),
@@ -257,6 +261,7 @@ fn roomy<'a>(scale: Scale<'a>) -> Vec<(&'a Tick, &'a String)> {
         let Some(label) = &tick.label else { continue };
         let half = width(label, SMALL) / 2.0;
         let at = scale.tick(tick);
+        // from the left, so that the first label always stands
         if at - half > end + 4.0 {
             end = at + half;
             kept.push((tick, label));

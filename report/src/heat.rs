@@ -49,7 +49,9 @@ enum Colours {
 /// Colour of a cell without value.
 const MISSING: Colour = Colour(0xd0, 0xd3, 0xd8);
 /// Steps of a smooth ramp; more cannot be told apart.
+// fewer colours also make fewer paths, each of a whole map
 const STEPS: f64 = 64.0;
+// pixels from here on, laid out by eye
 const HEIGHT: f64 = 380.0;
 const BAR: f64 = 16.0;
 /// Room between map and colour bar.
@@ -144,6 +146,7 @@ impl HeatMap {
         let categories = matches!(self.colours, Colours::Categories(_));
         let bar = (BAR + 6.0 + widest(&value)).max(width(&value.label, SMALL));
         let right = EDGE + if categories { 8.0 } else { BESIDE + bar };
+        // whole pixels, so that cells, frame and grid meet without half-covered edges
         let area = Area {
             x: left.round(),
             y: top.round(),
@@ -154,6 +157,7 @@ impl HeatMap {
         head.draw(&mut out);
         out.text("text", &[("x", &Px(EDGE)), ("y", &Px(area.y - 11.0))], &y.label);
         let (xs, ys) = (x.onto(area.x, area.right()), y.onto(area.bottom(), area.y));
+        // before the cells, which cover its lines: its labels are what is wanted
         grid(&mut out, area, Some((xs, true)), Some(ys));
         self.cells(&mut out, &value, area, &x_edges, &y_edges);
         for (_, x, y) in &self.dots {
@@ -162,6 +166,7 @@ impl HeatMap {
                 (inside(xs.settled.part(*x)?) && inside(ys.settled.part(*y)?)).then_some((xs.at(*x)?, ys.at(*y)?))
             });
             let data = path::dots(&points.collect::<Vec<_>>());
+            // dark on a light rim is seen on every colour of the map
             for (colour, size) in [(Colour::PAPER, 7.0), (Colour::INK, 4.0)] {
                 out.leaf(
                     "path",
@@ -187,6 +192,7 @@ impl HeatMap {
         let cells = || self.cells.iter().copied();
         match &self.colours {
             Colours::Smooth(Ramp::Sequential) | Colours::Categories(_) => self.value.settle(cells(), [0.0; 2], 7),
+            // with all values mirrored the range is symmetric, and white is zero
             Colours::Smooth(Ramp::Diverging) => self.value.settle(cells().chain(cells().map(|v| -v)), [0.0; 2], 7),
             Colours::Levels(_, levels) => {
                 let ascending = levels.windows(2).all(|pair| pair[0] < pair[1]);
@@ -232,6 +238,7 @@ impl HeatMap {
                 interval(*ramp, below.saturating_sub(1).min(levels.len() - 2), levels.len() - 1)
             }
             Colours::Categories(names) => {
+                // equal, not near: 1.5 is no category
                 let known = (0..names.len()).find(|n| *n as f64 == value);
                 known.map_or(MISSING, |n| category(n, names.len()))
             }
@@ -240,6 +247,7 @@ impl HeatMap {
 
     /// One path for each colour; equal neighbours of a row are one rectangle.
     fn cells(&self, out: &mut Markup, value: &Settled, area: Area, x: &[f64], y: &[f64]) {
+        // ordered, so that equal maps have equal bytes
         let mut paths: BTreeMap<Colour, String> = BTreeMap::new();
         // whole pixels: short, and neighbours meet without a seam
         let across = |part: f64| Px((area.x + part * area.width).round());
@@ -347,6 +355,7 @@ fn edges(axis: &Axis, centres: &[f64], ticks: usize) -> Result<(Settled, Vec<f64
             axis: axis.label.clone(),
         });
     }
+    // the outer cells are as wide as the way to their neighbour says
     let mut edges = vec![first - (second - first) / 2.0];
     edges.extend(places.windows(2).map(|pair| (pair[0] + pair[1]) / 2.0));
     if let [.., before, last] = places[..] {

@@ -81,8 +81,10 @@ fn escape(out: &mut String, text: &str) {
             '<' => out.push_str("&lt;"),
             '>' => out.push_str("&gt;"),
             '"' => out.push_str("&quot;"),
+            // `&apos;` is XML, but HTML 4 does not know it
             '\'' => out.push_str("&#39;"),
             '\n' | '\t' => out.push(c),
+            // no characters of XML 1.0 either
             '\u{fffe}' | '\u{ffff}' => out.push('\u{fffd}'),
             c if c.is_control() => out.push('\u{fffd}'),
             c => out.push(c),

@@ -1,6 +1,7 @@
 //! Numbers as text, by fixed rules.
 
 /// Values beyond cannot be placed on an axis next to others; they leave a gap as NaN does.
+// about the root of the largest binary64: products of two such values stay finite
 const HUGE: f64 = 1e150;
 
 /// Whether a value has a place on an axis.
@@ -55,6 +56,7 @@ pub fn takes_prefix(unit: &str) -> bool {
 pub fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     match text.strip_prefix('-') {
+        // a minus before zeros would say something that the digits do not
         Some(rest) if rest.bytes().all(|b| b == b'0' || b == b'.') => rest.to_owned(),
         Some(rest) => format!("−{rest}"),
         None => text,
@@ -95,12 +97,14 @@ pub fn quantity(value: f64, unit: &str, digits: usize) -> String {
     // rounded first: 999.96 to three digits is 1.00 k
     let value: f64 = format!("{value:.*e}", digits - 1).parse().unwrap_or(value);
     // from the value itself: scaling rounds, and could fall below a power of ten
+    // the logarithm of 0 is no power of ten
     let leading = if value == 0.0 { 0 } else { decade(value.abs()) };
     let places = |exponent: i32| usize::try_from(digits as i32 - 1 - (leading - exponent)).unwrap_or(0);
     let (text, prefix) = if takes_prefix(unit) {
         let exponent = engineering_exponent(value);
         (fixed(shifted(value, -exponent), places(exponent)), prefix(exponent))
     } else if !(-4..6).contains(&leading) {
+        // as `%g` of C has it: plain from 0.0001 on, below a million
         (
             format!(
                 "{}·{}",
@@ -122,6 +126,7 @@ pub fn quantity(value: f64, unit: &str, digits: usize) -> String {
 /// `value * 10^exponent` with one rounding for a positive and for a negative exponent.
 pub fn shifted(value: f64, exponent: i32) -> f64 {
     if exponent < 0 {
+        // 10^-3 is no binary number and would be a second rounding; 10^3 is exact, as all up to 10^22
         value / power_of_ten(-exponent)
     } else {
         value * power_of_ten(exponent)

@@ -108,6 +108,7 @@ impl Page {
         out.leaf("meta", &[("name", &"generator"), ("content", &"policyc")]);
         out.text("title", &[], &self.title);
         out.open("style", &[]);
+        // inside the page, which loads nothing
         out.raw(include_str!("page.css"));
         out.close("style");
         out.close("head");
@@ -117,6 +118,7 @@ impl Page {
         if let Some((verdict, sentence)) = &self.verdict {
             let class = verdict.class();
             out.open("p", &[("class", &format_args!("verdict {class}"))]);
+            // a note judges nothing: its sentence stands alone
             if *verdict != Verdict::Note {
                 out.text("strong", &[], class);
             }

@@ -12,11 +12,13 @@ pub type Point = Option<(f64, f64)>;
 pub fn thin(points: &[Point]) -> Vec<Point> {
     let column = |point: &Point| point.map(|(x, _)| x.floor() as i64);
     let mut kept = Vec::new();
+    // runs and not columns: a line that comes back to a column later is drawn again
     for run in points.chunk_by(|a, b| a.is_some() == b.is_some() && column(a) == column(b)) {
         let height = |n: &usize| run[*n].map_or(0.0, |(_, y)| y);
         let lowest = (0..run.len()).min_by(|a, b| height(a).total_cmp(&height(b)));
         let highest = (0..run.len()).max_by(|a, b| height(a).total_cmp(&height(b)));
         let mut keep = [Some(0), lowest, highest, run.len().checked_sub(1)];
+        // in the order of the data: the line enters and leaves the column where it did
         keep.sort_unstable();
         let mut last = None;
         for n in keep.into_iter().flatten() {
@@ -34,6 +36,7 @@ pub fn stairs(points: &[Point]) -> Vec<Point> {
     let mut corners = Vec::with_capacity(points.len() * 2);
     for (n, point) in points.iter().enumerate() {
         if let (Some((x, _)), Some(Some((_, before)))) = (point, n.checked_sub(1).map(|m| points[m])) {
+            // the value before holds up to here; behind a gap there is none to hold
             corners.push(Some((*x, before)));
         }
         corners.push(*point);
@@ -58,6 +61,7 @@ pub fn area(low: &[Point], high: &[Point]) -> String {
     for piece in whole.chunk_by(|a, b| a == b) {
         let to = from + piece.len();
         if piece.first() == Some(&true) {
+            // each edge is thinned by itself: they share no extremes
             let (there, back) = (thin(&high[from..to]), thin(&low[from..to]));
             draw(
                 &mut path,
@@ -77,6 +81,7 @@ fn draw(path: &mut String, points: impl Iterator<Item = (f64, f64)>, close: bool
         let here = (Px(x).tenths(), Px(y).tenths());
         // writing to a `String` cannot fail
         let _ = match last {
+            // compared as they are written, in tenths of a pixel
             Some(last) if last == here => Ok(()),
             Some(last) if last.1 == here.1 => write!(path, "H{}", Px(x)),
             Some(last) if last.0 == here.0 => write!(path, "V{}", Px(y)),
@@ -88,6 +93,7 @@ fn draw(path: &mut String, points: impl Iterator<Item = (f64, f64)>, close: bool
     }
     match last {
         Some(_) if close => path.push('Z'),
+        // without a line round ends have nothing to stand at, and the dot would be missing
         Some(_) if !moved => path.push_str("h0"),
         _ => {}
     }
@@ -98,6 +104,7 @@ pub fn dots(points: &[Point]) -> String {
     let mut path = String::new();
     let mut seen = std::collections::BTreeSet::new();
     for (x, y) in points.iter().flatten() {
+        // thousands of points on one place would be thousands of equal dots
         let half = |v: f64| (v * 2.0).round() as i64;
         if seen.insert((half(*x), half(*y))) {
             // writing to a `String` cannot fail

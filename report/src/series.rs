@@ -86,6 +86,7 @@ impl Series {
     pub(crate) fn check(&self) -> Result<(), ReportError> {
         let expected = self.x.len();
         let found = match self.kind {
+            // the lower edge is looked at first, so that the number in the fault is that of the wrong list
             Kind::Band if self.y.len() == expected => self.high.len(),
             _ => self.y.len(),
         };

@@ -59,6 +59,7 @@ impl Table {
     /// Adds a number column; the heading names the unit.
     #[must_use]
     pub fn number(mut self, heading: impl Into<String>, decimals: usize) -> Self {
+        // a binary64 has no more digits
         self.columns.push((heading.into(), Some(decimals.min(17))));
         self
     }
@@ -95,6 +96,7 @@ impl Table {
                 let text = match content {
                     Cell::Text(text) => text.clone(),
                     Cell::Number(value) if value.is_nan() => "–".to_owned(),
+                    // `fixed` for its true minus sign
                     Cell::Number(value) if value.is_infinite() => fixed(*value, 0).replace("inf", "∞"),
                     Cell::Number(value) => fixed(*value, decimals.unwrap_or(6)),
                 };

@@ -1,4 +1,9 @@
 //! A TOML file as a tree in which every key and value knows its place.
+//!
+//! ```text
+//! FileName ─► Source ─► Document ─► Table ─► Value ─► f64, &str, ...      each step knows the place in the text
+//!   path       text      tree        keys      kind                       what is wrong goes into a Sink
+//! ```
 
 use std::path::Path;
 
@@ -54,12 +59,14 @@ impl Document {
 
     /// Parses `source`; with faults of syntax the document holds what could be recovered.
     pub fn parse(source: Source, faults: &mut Sink) -> Self {
+        // recoverable, so that a reader can still tell name and signals of a contract with faults of syntax
         let (tree, errors) = DeTable::parse_recoverable(&source.text);
         let mut found: Vec<Fault> = Vec::new();
         for error in &errors {
             let span = error.span().unwrap_or(0..0);
             let fault = source.fault(&span, syntax(&source.text, &span, error.message()));
             let line = |f: &Fault| f.line_column().map(|(line, _)| line);
+            // the parser goes on in the middle of the line and stumbles again over the same slip
             if found.iter().all(|known| line(known) != line(&fault)) {
                 found.push(fault);
             }
@@ -119,6 +126,7 @@ impl Document {
 fn syntax(text: &str, span: &Span, message: &str) -> Message {
     let bytes = text.as_bytes();
     let digit = |index: Option<usize>| index.and_then(|i| bytes.get(i)).is_some_and(u8::is_ascii_digit);
+    // to the parser `1,5` is a 1 with something behind it: the comma lies in the span of its complaint, or at its end
     let comma = (span.start..=span.end).find(|&i| bytes.get(i) == Some(&b','));
     let between_digits = |i: usize| digit(i.checked_sub(1)) && digit(Some(i + 1));
     // the zero of 0,05 stands behind the comma

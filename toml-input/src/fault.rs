@@ -212,6 +212,7 @@ impl fmt::Display for Faults {
 
 /// Sorts by file as first mentioned, then by line and column; each fault is kept once.
 pub(crate) fn in_file_order(faults: &mut Vec<Fault>) {
+    // by first mention and not by name: the contract comes before the files that it names
     let mut files = Vec::new();
     for fault in faults.iter() {
         if !files.contains(&fault.file) {
@@ -240,6 +241,7 @@ impl fmt::Display for Fault {
             } => {
                 margin = " ".repeat(line.to_string().len() + 1);
                 let (text, start) = window(text, *column);
+                // a span may reach beyond the part of the line that is shown
                 let carets = "^".repeat((*length).clamp(1, text.chars().count().saturating_sub(start - 1).max(1)));
                 writeln!(f, "{}--> {file}:{line}:{column}", &margin[1..])?;
                 writeln!(f, "{margin}|")?;
@@ -263,6 +265,7 @@ impl fmt::Display for Fault {
 
 /// The part of a long line around `column`, and the column inside it; control characters become blanks.
 fn window(text: &str, column: usize) -> (String, usize) {
+    // a convention; a line may be as long as the file, which is up to 1 MiB
     const WIDTH: usize = 120;
     let column = column.max(1);
     let skip = if column > WIDTH { column - WIDTH / 2 } else { 0 };
@@ -278,6 +281,7 @@ fn window(text: &str, column: usize) -> (String, usize) {
 fn printable(text: &str, indent: &str) -> String {
     let visible = |line: &str| -> String {
         line.chars()
+            // a file may hold escape sequences, which would move the cursor or colour the terminal
             .map(|c| if c.is_control() { '\u{fffd}' } else { c })
             .collect()
     };

@@ -15,6 +15,7 @@ use crate::source::Origin;
 pub(crate) fn unreadable(file: &str, origin: Origin, error: &io::Error) -> Message {
     match error.kind() {
         io::ErrorKind::NotFound => {
+            // an absolute path is not relative to anything
             let relative = Path::new(file).is_relative().then(|| origin.relative_to().to_owned());
             Message::new(format!("cannot find the file `{file}`")).maybe_hint(relative)
         }
@@ -116,6 +117,7 @@ fn decimal_comma_in_text(found: &str) -> bool {
 /// An array of `found` values where another number of them is needed.
 #[must_use]
 pub fn wrong_length(label: &str, found: usize, expected: &str) -> Message {
+    // [0,4, 0,6] in place of two numbers is four whole ones
     let hint = (found == 4).then(|| "a decimal comma? write 0.4 instead of 0,4".to_owned());
     Message::new(format!("`{label}` has the wrong number of values"))
         .found(found.to_string())

@@ -8,11 +8,13 @@ pub fn did_you_mean<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str
 /// The candidate that differs least from `name`, if the difference is small enough for a slip; case does not matter.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let asked = name.to_ascii_lowercase();
+    // a convention: one slip in three letters, and never more than three
     let limit = (asked.chars().count() / 3).clamp(1, 3);
     // a part of four letters is meant, `ds1202` of `dspace-ds1202`; a shorter one stands in many names
     let is_part = |candidate: &str| asked.len() >= 4 && candidate.contains(&asked);
     candidates
         .into_iter()
+        // `ds1202` is 7 letters shorter than `dspace-ds1202`
         .filter(|candidate| candidate.len().abs_diff(name.len()) <= 8)
         .map(|candidate| (distance(&asked, &candidate.to_ascii_lowercase()), candidate))
         .filter(|(distance, candidate)| *distance <= limit || is_part(candidate))
@@ -21,6 +23,7 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
             (
                 digits(&asked) != digits(candidate),
                 *distance,
+                // false sorts before true
                 !is_cut_from(&asked, candidate),
             )
         })

@@ -33,6 +33,7 @@ pub(crate) fn entries(table: &DeTable<'_>) -> Entries {
         .iter()
         .map(|(key, value)| (at(key.get_ref().to_string(), key.span()), node(value)))
         .collect();
+    // the parser's map does not keep the order of the file, in which faults have to come
     list.sort_by_key(|(key, _)| key.span.start);
     list
 }
@@ -44,6 +45,7 @@ fn at<T>(value: T, span: Span) -> At<T> {
 fn node(value: &toml::Spanned<DeValue<'_>>) -> At<Node> {
     let node = match value.get_ref() {
         DeValue::String(text) => Node::Text(text.to_string()),
+        // beyond 64 bits it is nothing here; who reads it says so at its place
         DeValue::Integer(number) => Node::Integer(i64::from_str_radix(number.as_str(), number.radix()).ok()),
         DeValue::Float(number) => Node::Float(number.as_str().parse().unwrap_or(f64::NAN)),
         DeValue::Boolean(value) => Node::Boolean(*value),

@@ -73,6 +73,7 @@ impl Sink {
 
     /// The faults of another sink behind those of this one.
     pub fn append(&mut self, other: Sink) {
+        // what the other sink has only counted is still a fault
         let beyond = other.count - other.list.len();
         self.extend(other.list);
         self.count += beyond;

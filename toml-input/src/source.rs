@@ -97,9 +97,11 @@ impl FileName {
         if data.is_dir() {
             return Err(messages::is_folder(&shown));
         }
+        // a pipe would wait for its writer, and /dev/zero would never end
         if !data.is_file() {
             return Err(messages::not_regular(&shown));
         }
+        // before it is read: a sparse file of 2 GB would fill the memory
         if data.len() > limit {
             return Err(messages::file_too_large(&shown, data.len(), limit));
         }
@@ -134,12 +136,14 @@ impl Source {
         }
         match String::from_utf8(bytes) {
             Ok(text) => {
+                // a byte order mark would shift every column of the first line by one
                 let text = text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text);
                 Ok(Source { name, text })
             }
             Err(error) => {
                 let at = error.utf8_error().valid_up_to();
                 let byte = error.as_bytes().get(at).copied().unwrap_or_default();
+                // nothing before `at` is replaced, so the place of the fault is right
                 let text = String::from_utf8_lossy(error.as_bytes()).into_owned();
                 let source = Source { name, text };
                 Err(Box::new(source.fault(&(at..at + 1), messages::not_utf8(byte))))
@@ -155,6 +159,7 @@ impl Source {
 
     fn place(&self, span: &Span) -> Place {
         let bytes = self.text.as_bytes();
+        // the end of a span may lie within a replacement character, which has three bytes
         let start = floor_boundary(&self.text, span.start);
         let end = floor_boundary(&self.text, span.end.max(start));
         let line_start = bytes[..start].iter().rposition(|&b| b == b'\n').map_or(0, |p| p + 1);

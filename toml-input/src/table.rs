@@ -39,6 +39,7 @@ impl<'a> Table<'a> {
 
     /// The value of `key`, if present.
     pub fn optional(&mut self, key: &'static str) -> Option<Value<'a>> {
+        // also where the key is missing: the list of known keys is what an unknown one is compared with
         self.known.push(key);
         Value::find(self.source, self.entries, key)
     }
@@ -74,6 +75,7 @@ impl<'a> Table<'a> {
         let title = format!("[{key}]");
         let mut table = match self.optional(key) {
             Some(value) => value.table(&title, faults)?,
+            // so its required keys are missing with their own hints, instead of one fault for the section
             None => Table::new(self.source, &[], None, &title),
         };
         let result = read(&mut table, faults);

@@ -69,6 +69,7 @@ impl<'a> Value<'a> {
         let span = &self.node.span;
         let raw = self.source.text.get(span.clone()).unwrap_or_default();
         match raw.get(1..raw.len().saturating_sub(1)) {
+            // an escape is longer in the file than in the text, and every place behind it would be wrong
             Some(inner) if Some(inner) == self.as_text() => {
                 let first = span.start + 1;
                 self.source.fault(&(first + range.start..first + range.end), message)
@@ -115,6 +116,7 @@ impl<'a> Value<'a> {
 
     fn wrong(&self, expected: &str, faults: &mut Sink) {
         let message = match &self.node.value {
+            // not wrong, only not filled in yet: a new contract has many of them
             Node::Text(text) if is_todo(text) => messages::still_todo(&self.label, expected),
             found => messages::wrong_type(&self.label, &describe(found), expected),
         };
@@ -256,6 +258,7 @@ impl<'a> Value<'a> {
     }
 
     fn two(&self, expected: &str, range: RangeInclusive<f64>, faults: &mut Sink) -> Option<[f64; 2]> {
+        // all numbers before their count: of two slips in one array both are said
         let items = self.list(expected, faults)?;
         let numbers: Vec<_> = items
             .iter()

@@ -91,6 +91,7 @@ pub fn measurement(policy: &Policy, event: &Event) -> Vec<Measured> {
             .zip(values)
             .map(|(name, x)| Measured {
                 signal: name.to_owned(),
+                // as the controller gets it: rounded to its format
                 sample: match scalar {
                     Scalar::F32 => value(WordKind::Float, (*x as f32).to_bits()),
                     Scalar::F64 => wide(*x),
@@ -134,6 +135,7 @@ fn sample_value(sample: Sample, scalar: Scalar) -> Value {
 fn value_at(kind: WordKind, words: &[u32], index: usize) -> Value {
     let first = match kind {
         WordKind::Low => index,
+        // the low word comes first, so the high one is never at 0
         WordKind::High => index.saturating_sub(1),
         WordKind::Float | WordKind::Integer | WordKind::Status => return value(kind, words[index]),
     };

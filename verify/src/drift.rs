@@ -59,6 +59,7 @@ pub fn compare(expected: &Files, found: &Files) -> Drift {
             Some(_) => {}
         }
     }
+    // only files of our name and kind were read, so what is not expected was once generated
     drift.extra = found
         .keys()
         .filter(|path| !expected.contains_key(*path))
@@ -104,9 +105,11 @@ pub fn read_text(path: &Path) -> std::io::Result<String> {
 
 /// The expected files that exist, and files beside them that look generated for a policy of this name.
 fn read(expected: &Files, name: &str, folder: &Path) -> Result<Files, VerifyError> {
+    // expected files by their paths, which may lead into folders; strangers beside them in the folder itself
     let mut paths: BTreeSet<String> = expected.keys().cloned().collect();
     let extensions: BTreeSet<_> = expected.keys().filter_map(|path| Path::new(path).extension()).collect();
     let mine = |file: &str| {
+        // `-` begins neither an extension nor an ending: the file is somebody else's
         let rest = file.strip_prefix(name).unwrap_or("-");
         rest.starts_with(['.', '_']) && Path::new(file).extension().is_some_and(|e| extensions.contains(e))
     };
@@ -129,6 +132,7 @@ fn read(expected: &Files, name: &str, folder: &Path) -> Result<Files, VerifyErro
             // what a step costs depends on the compilers of a machine
             Ok(text) if path == manifest::FILE => drop(files.insert(path, manifest::without_costs(&text))),
             Ok(text) => drop(files.insert(path, text)),
+            // what is not there is found missing by the comparison
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
             Err(error) => return Err(VerifyError::Io(place, error)),
         }

@@ -46,6 +46,7 @@ impl Elf {
         let mut sections = Vec::new();
         for section in table
             .iter()
+            // debug information and relocations stay in the file
             .filter(|section| section.sh_flags(endian).contains(elf::SHF_ALLOC))
         {
             let name = table.section_name(endian, section).ok()?;
@@ -56,6 +57,7 @@ impl Elf {
                 has_content: section.sh_type(endian) != elf::SHT_NOBITS,
             });
         }
+        // on Arm alone the lowest bit of an address is a mark
         let is_arm = header.e_machine(endian) == elf::EM_ARM;
         let table = table.symbols(endian, bytes, elf::SHT_SYMTAB).ok()?;
         let mut symbols = Vec::new();
@@ -100,6 +102,7 @@ impl Elf {
     /// Bytes that can be written at run time.
     #[must_use]
     pub fn ram_bytes(&self) -> u32 {
+        // `.data` counts here and in flash: its first values are copied at the start
         let sections = self.kept().filter(|section| section.is_writable);
         sections.map(|section| section.size).sum()
     }

@@ -15,6 +15,7 @@ use crate::traces::{Event, Stream, directed};
 const CONSTRUCTS: &[(&str, &[u8])] = &[
     (
         "policy.toml",
+        // inside the program: a user of the tool has no checkout to read them from
         include_bytes!("../../tests/golden/cases/constructs/policy.toml"),
     ),
     (
@@ -28,12 +29,14 @@ const CONSTRUCTS: &[(&str, &[u8])] = &[
 ];
 
 /// Control steps of the policy in a kit unless the user asks for another number.
+// a step takes 4 (6 + signals) bytes of constant memory (docs/integrations/kit.md): 18 kB with three signals
 pub const DEFAULT_STEPS: u32 = 500;
 /// Control steps of each controller of the construct suite.
 const SUITE_STEPS: u32 = 300;
 /// Seed of the moves: one whose 300 steps on the suite reach all that a test below asks for.
 const SEED: u64 = 28;
 /// The block form of a layer, with a shorter last block.
+// whatever the target's own shape is, so that the blocks are printed and tried on every board
 const BLOCK: RowBlock = RowBlock::Rows(4);
 
 /// What the kit compares with, if it is among the outputs; for [`codegen::generate`].
@@ -214,6 +217,7 @@ fn append(policy: &Policy, layout: &Layout, chunk: &Chunk, trace: &mut Trace) {
             }
             Event::SetMapping { r, .. } => {
                 let coefficients = take(&mut input, 4 * number);
+                // four numbers travel in any case; the kit calls a function of three
                 let given = if r.is_some() {
                     coefficients
                 } else {
@@ -223,6 +227,7 @@ fn append(policy: &Policy, layout: &Layout, chunk: &Chunk, trace: &mut Trace) {
             }
             Event::Reset => trace.reset(answer.iter().copied()),
             Event::Init => trace.init(answer.iter().copied()),
+            // the stream has none of these; the generated code has its own known answers
             Event::Network(observation) => {
                 take(&mut input, number * observation.len());
             }

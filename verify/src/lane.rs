@@ -67,6 +67,7 @@ impl<'a> Lane<'a> {
         let answer = self.runner.exchange(&chunk.input, chunk.expected.len());
         let words = match &answer {
             Ok(words) => words,
+            // answers that came before a crash are judged; those that are missing count as wrong
             Err(error) => &error.received,
         };
         if let Some(known) = &self.policy.golden {
@@ -89,9 +90,11 @@ impl<'a> Lane<'a> {
             Ok(words) => (words, None),
             Err(error) => (error.received, Some(error.reason)),
         };
+        // before the failure: a difference in what came before a crash is nearer to the cause
         if let Some(index) = compare::first_difference(&chunk.expected, &words)
             && let Some(difference) = compare::describe(self.policy, chunk, self.layout, index, &words)
         {
+            // the steps before it were equal
             self.steps_compared = difference.step;
             return Err(Outcome::Different {
                 difference: Box::new(difference),
@@ -112,6 +115,7 @@ impl<'a> Lane<'a> {
     }
 
     fn failed(&mut self, chunk: &Chunk, received: usize, reason: &RunFailure) -> Outcome {
+        // the first word that did not come belongs to the event that did not end
         let place = compare::place(chunk, self.layout, received);
         let step = place.map_or(chunk.first_step, |place| place.step);
         self.steps_compared = step;

@@ -41,6 +41,7 @@ pub struct Live {
 /// A build that is silent for so long has failed.
 const TIMEOUT: Duration = Duration::from_secs(20);
 /// The level that is built of each compiler.
+// of C and of Rust: a level of each that firmware is built with
 const LEVELS: [&str; 2] = ["-O2", "-O"];
 
 impl Live {
@@ -74,10 +75,12 @@ impl Live {
         let hello = runner
             .start(layout.hello().len())
             .map_err(|error| Message::new(format!("{name}: {}", error.reason)))?;
+        // a program whose tables or arithmetic are wrong must not close a loop
         if hello != layout.hello() {
             let problem = format!("{name}: self-test, integrity or sizes of the generated code are wrong");
             return Err(Message::new(problem).into());
         }
+        // the layout depends on the kind of the event alone
         let step = layout.answer(&Event::Step(Vec::new()));
         let place = |name: &str| step.iter().position(|word| word.name == name);
         let places = match ["duty", "action_index", "status", "purity of eval"].map(place) {
@@ -115,6 +118,7 @@ impl Live {
     pub fn step(&mut self, samples: &[Sample]) -> Result<LiveCommand, Faults> {
         let answer = self.ask(&Event::Step(samples.to_vec()))?;
         let [duty, action, status, purity] = self.places;
+        // duty and duty_sim stand before the action; the first of them is the command
         let number = protocol::numbers(self.layout.scalar(), &answer[duty..action]);
         let [action, status, purity] = [action, status, purity].map(|place| answer[place]);
         if purity != 0 {

@@ -3,6 +3,12 @@
 //! Instructions are those the emulator executes from the call of `step` to its return, both included; the plugin that
 //! counts them is `targets/boards/counter`. The stack is painted before each step and looked at afterwards. Neither is
 //! time: QEMU knows no cycles.
+//!
+//! ```text
+//! controller.o ─────────────────────────► sizes, library calls
+//! controller.o + driver + board ─► image ─► QEMU with the plugin ─► pipe: depth of the stack, a word a step
+//!                                     └ addresses of count_begin, count_end     └► file: instructions, a line a step
+//! ```
 
 use std::fmt;
 use std::path::Path;
@@ -140,6 +146,7 @@ pub fn measure(policy: &Policy, target: &TargetSpec, files: &Files, build: &Buil
         stack_bytes: depths.iter().copied().max().unwrap_or_default(),
         instructions_min: counts.iter().map(|count| count.instructions).min().unwrap_or_default(),
         instructions_max: counts.iter().map(|count| count.instructions).max().unwrap_or_default(),
+        // least with the cheapest accesses and jumps, most with the dearest: what the processor does lies between
         model_cycles: target.cycles.map(|model| {
             let least = counts.iter().map(|count| count.cycles(model.access.0, model.jump.0));
             let most = counts.iter().map(|count| count.cycles(model.access.1, model.jump.1));
@@ -168,6 +175,7 @@ fn plugin_arguments(folder: &Path, marks: &Elf, counts: &Path) -> Result<Vec<Str
     let plugin = folder.join("counter.so");
     let mut command = Command::new(PLUGIN_COMPILER);
     command.args(["-shared", "-fPIC", "-O2"]).arg(folder.join(counter.name));
+    // what the compiler leaves behind when it is ended goes with the folder
     command.env("TMPDIR", folder);
     let output = toolchain::run_for(command.arg("-o").arg(&plugin), COMPILER_TIMEOUT)?;
     if !output.status.success() {
@@ -204,6 +212,7 @@ fn answers(policy: &Policy, target: &TargetSpec, command: Command) -> Result<Vec
 /// one that is not a number or at the end of the codes.
 fn samples(policy: &Policy) -> Vec<u32> {
     let scalar = policy.numeric_format.scalar();
+    // always the same samples: costs of two builds are compared with each other
     let mut rng = SplitMix::new(7);
     let mut words = Vec::new();
     for _ in 0..STEPS {
@@ -253,6 +262,7 @@ impl Count {
 fn read_counts(path: &Path) -> Result<Vec<Count>, MeasureError> {
     let text = std::fs::read_to_string(path)?;
     let counts: Vec<Count> = text.lines().filter_map(Count::read).collect();
+    // fewer would be a fault of the marks, and a minimum over the rest would look right
     if counts.len() == STEPS {
         Ok(counts)
     } else {
@@ -305,6 +315,7 @@ pub fn usual_builds(
             }
             Err(MeasureError::Missing(what)) => {
                 let compiles = toolchain::find(build.compiler).is_some() && build.language() == codegen::Language::C;
+                // only where nothing can run: a stack that is summed must not stand in for one that is measured
                 if compiles && toolchain::find(board.emulator).is_none() {
                     usual_builds.estimated.push(estimate(policy, target, files, &build)?);
                 }

@@ -144,11 +144,13 @@ impl<T: Real> Oracle<T> {
                 }
                 words.extend([command.action_index, command.status]);
                 self.controller.state().append_words(words);
+                // purity: the interpreter has one state and cannot contradict itself
                 words.push(0);
                 self.steps += 1;
                 for (bit, count) in self.coverage.status_bits.iter_mut().enumerate() {
                     *count += u64::from(command.status >> bit & 1);
                 }
+                // section 9: the index is below N, after a fallback too
                 self.coverage.actions[command.action_index as usize] += 1;
             }
             Event::SetMapping { a, b, c, r } => {

@@ -32,6 +32,7 @@ pub mod kind {
 }
 
 /// First word of a driver's prologue.
+// `pcv1` in ASCII; in the wrong byte order it reads 0x31766370
 pub const MAGIC: u32 = 0x7063_7631;
 
 /// Words of the prologue: magic, self-test, integrity, then the numbers of signals, features, actions, state words.
@@ -110,6 +111,7 @@ impl Layout {
         let state: Vec<Word> = state_names
             .iter()
             .flat_map(|name| match name.as_str() {
+                // the two counters of the state are u32 in every format (section 1)
                 "bad_count" | "primed" => vec![word(format!("state {name}"), WordKind::Integer)],
                 _ => number(format!("state {name}")),
             })
@@ -202,6 +204,7 @@ pub fn encode(event: &Event, scalar: Scalar, words: &mut Vec<u32>) {
         }
         Event::SetMapping { a, b, c, r } => {
             words.push(kind::SET_MAPPING);
+            // always four: so the length of an event follows from its kind alone
             for number in [*a, *b, *c, r.unwrap_or(0.0)] {
                 encode_number(number, scalar, words);
             }
@@ -244,6 +247,7 @@ pub fn sample_words(policy: &Policy) -> usize {
 
 /// The numbers that words stand for; half a number at the end is left out.
 pub fn numbers(scalar: Scalar, words: &[u32]) -> Vec<f64> {
+    // the slices have one or two words, by the format
     let number = |words: &[u32]| match *words {
         [low, high] => f64::from_bits(u64::from(low) | u64::from(high) << 32),
         [bits] => f64::from(f32::from_bits(bits)),

@@ -44,6 +44,7 @@ impl Report {
 
     /// At least one build was compared, and all compared builds give the interpreter's bits, whatever these are worth.
     pub fn builds_equal(&self) -> bool {
+        // with every build skipped nothing was shown
         let compared = self.builds.iter().any(|build| build.outcome == Outcome::Equal);
         let sound = |build: &BuildReport| matches!(build.outcome, Outcome::Equal | Outcome::Skipped { .. });
         compared && self.builds.iter().all(sound)

@@ -1,4 +1,13 @@
 //! Ways of running a build: here a program on this machine, elsewhere an emulator or a board.
+//!
+//! ```text
+//! exchange ──channel──► writer thread ──stdin──►  driver
+//! receive  ◄─channel─── reader thread ◄─stdout──  (this machine, or QEMU with semihosting on the same streams)
+//! ended    ◄───join──── error thread  ◄─stderr──
+//! ```
+//!
+//! A thread a pipe, because a pipe holds 64 kB: a driver that waits until somebody reads its answers would not read its
+//! events, and a writer who waits for that would not read its answers.
 
 use std::fmt;
 use std::io::{Read, Write};
@@ -101,9 +110,11 @@ impl ProcessRunner {
         let Some(mut process) = self.process.take() else {
             return Ok(());
         };
+        // the end of the stream: the writer thread ends, and the driver reads an end of file
         process.to_child = None;
         match process.from_child.recv_timeout(self.timeout) {
             Err(RecvTimeoutError::Disconnected) => {}
+            // answers to no question are a fault of the driver as well
             Ok(_) | Err(RecvTimeoutError::Timeout) => return Err(error(RunFailure::Silent(self.timeout))),
         }
         match process.child.wait() {
@@ -159,6 +170,7 @@ impl Process {
         }
         if let Some(mut stdout) = child.stdout.take() {
             std::thread::spawn(move || {
+                // what a pipe of Linux holds
                 let mut buffer = vec![0; 1 << 16];
                 while let Ok(n @ 1..) = stdout.read(&mut buffer) {
                     if output.send(buffer[..n].to_vec()).is_err() {
@@ -171,6 +183,7 @@ impl Process {
             std::thread::spawn(move || {
                 let mut kept = Vec::new();
                 let _ = stderr.by_ref().take(STDERR_KEPT).read_to_end(&mut kept);
+                // the rest is read and thrown away, or the driver would block on a full pipe
                 let _ = std::io::copy(&mut stderr, &mut std::io::sink());
                 String::from_utf8_lossy(&kept).trim().to_owned()
             })
@@ -192,6 +205,7 @@ impl Process {
             let reason = match self.from_child.recv_timeout(wait) {
                 Ok(more) => {
                     self.pending.extend(more);
+                    // an emulator that answers slowly is not silent: each piece starts the time anew
                     deadline = Instant::now() + timeout;
                     continue;
                 }
@@ -206,6 +220,7 @@ impl Process {
                 reason,
             });
         }
+        // what came beyond belongs to the next answer
         let rest = self.pending.split_off(bytes);
         Ok(words(&std::mem::replace(&mut self.pending, rest), order))
     }
@@ -228,11 +243,13 @@ impl Process {
         self.to_child = None;
         // it may have ended by itself in the meantime
         let _ = self.child.kill();
+        // without it a dead child stays in the table of processes
         let _ = self.child.wait();
     }
 }
 
 impl Drop for Process {
+    // a lane that ends at a difference leaves a driver that would run on
     fn drop(&mut self) {
         self.kill();
     }

@@ -1,4 +1,12 @@
 //! A whole verification: compile, feed, compare.
+//!
+//! ```text
+//! Stream ─► Oracle ─► Chunk (4096 steps: events and expected words) ─┬─► lane ─► driver of build 1
+//!                                                                    ├─► lane ─► driver of build 2
+//!                                                                    └─► ...      a thread each, LAG chunks behind
+//! ```
+//!
+//! The interpreter runs once, whatever the number of builds. A lane ends at its first difference; the others go on.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -158,8 +166,10 @@ impl From<VerifyError> for Faults {
 /// A compiler that takes longer has failed; the largest policies take seconds.
 pub(crate) const COMPILER_TIMEOUT: Duration = Duration::from_secs(600);
 /// Steps per chunk.
+// for buck12 0.6 MB of expected words, 35 a step; the figure itself is a convention
 const CHUNK: u64 = 4096;
 /// Chunks a slow build may lag behind.
+// bounded, or a fast interpreter would fill the memory with chunks for a slow emulator
 const LAG: usize = 2;
 
 /// Compiles the policy's code with every compiler at hand and compares it with the interpreter.
@@ -195,6 +205,7 @@ fn run_in<T: Real>(policy: &Policy, options: Options<'_>) -> Result<Report, Veri
             progress(news);
         }
     };
+    // before anything is built: a mistyped name would leave no build and look like missing tools
     check_names(target, &compilers)?;
     let fresh;
     let files = match generated {
@@ -205,6 +216,7 @@ fn run_in<T: Real>(policy: &Policy, options: Options<'_>) -> Result<Report, Veri
         }
     };
     let plain = toolchain::builds(target, &compilers, &levels);
+    // the build with assembly stands behind the one without, so that a report shows them together
     let both = plain.into_iter().flat_map(|build| {
         let assembly = build.with_assembly(policy, target, files).filter(|_| assembly);
         [Some(build), assembly]
@@ -227,6 +239,7 @@ fn run_in<T: Real>(policy: &Policy, options: Options<'_>) -> Result<Report, Veri
     let mut oracle = Oracle::<T>::new(policy);
     let layout = oracle.layout().clone();
     let known = oracle
+        // the network alone answers these: the state stays as the stream wants to find it
         .chunk_of(golden::events(policy))
         .map_err(VerifyError::Interpreter)?;
     let golden = golden_result(policy);
@@ -294,6 +307,7 @@ impl Lanes<'_> {
                 feeds.push(Some(feed));
                 lanes.push(scope.spawn(move || self.lane(build, compiled, &chunks)));
             }
+            // with every lane ended nobody would look at the rest of the stream
             while oracle.steps() < steps && feeds.iter().any(Option::is_some) {
                 let chunk = oracle.next_chunk(stream, CHUNK.min(steps - oracle.steps()))?;
                 send(&mut feeds, &Arc::new(chunk));
@@ -302,6 +316,7 @@ impl Lanes<'_> {
                     of: steps,
                 });
             }
+            // the lanes wait for chunks until their channels close
             drop(feeds);
             // a lane does not panic; if one does, that is a fault of ours and must not pass as equal
             let reports = lanes.into_iter().zip(builds).map(|(lane, build)| {
@@ -347,6 +362,7 @@ fn send(feeds: &mut [Option<SyncSender<Arc<Chunk>>>], chunk: &Arc<Chunk>) {
 
 /// Compiles all builds, as many at a time as the machine has processors.
 fn compile_all(builds: &[Build], sources: Sources<'_>, folder: &Path) -> Vec<Result<PathBuf, Outcome>> {
+    // a counter and not shares: builds take times of very different length
     let next = AtomicUsize::new(0);
     let workers = thread::available_parallelism().map_or(1, usize::from).min(builds.len());
     let work = || {
@@ -359,6 +375,7 @@ fn compile_all(builds: &[Build], sources: Sources<'_>, folder: &Path) -> Vec<Res
     };
     let mut results: Vec<Result<PathBuf, Outcome>> = builds
         .iter()
+        // stands until a worker has put its result there
         .map(|_| Err(failed("the compilation itself panicked")))
         .collect();
     thread::scope(|scope| {
@@ -378,12 +395,14 @@ fn compile(build: &Build, sources: Sources<'_>, folder: &Path) -> Result<PathBuf
     let skipped = |reason: String, install: Option<Install>| Outcome::Skipped {
         missing: vec![Missing { reason, install }],
     };
+    // a folder each: two compilers write objects of the same names
     let made = std::fs::create_dir(folder).map_err(BuildError::Io);
     made.and_then(|()| toolchain::compile(build, sources, folder))
         .map_err(|error| match error {
             BuildError::NoFiles => skipped(format!("the files have no {} code", build.language().name()), None),
             BuildError::NoSanitiser => skipped(
                 format!("{} has no sanitiser libraries", build.compiler),
+                // of Debian 12, whose gcc it belongs to
                 Some(Install::Package("libgcc-12-dev".to_owned())),
             ),
             BuildError::Io(error) => failed(&format!("could not compile: {error}")),

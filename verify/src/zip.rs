@@ -54,6 +54,7 @@ const VERSION: u16 = 20;
 fn header(name: &str, content: &[u8]) -> Option<Vec<u8>> {
     let words = [VERSION, UTF8, DEFLATE, 0, DATE];
     let mut header: Vec<u8> = words.into_iter().flat_map(u16::to_le_bytes).collect();
+    // an empty member is one empty block; each has five bytes before its content
     let blocks = content.len().div_ceil(BLOCK).max(1);
     header.extend(crc32_bytes(content.iter().copied()).to_le_bytes());
     header.extend(u32::try_from(content.len() + 5 * blocks).ok()?.to_le_bytes());
@@ -74,6 +75,7 @@ fn stored(content: &[u8]) -> Vec<u8> {
         let length = block.len() as u16;
         out.push(u8::from(behind.is_empty()));
         out.extend(length.to_le_bytes());
+        // RFC 1951, 3.2.4: the length and its complement
         out.extend((!length).to_le_bytes());
         out.extend(block);
         rest = behind;

@@ -48,11 +48,13 @@ pub(crate) fn read(name: FileName, bytes: Vec<u8>, options: &Options) -> Result<
     let head = &source.text[header.span.clone()];
     let separator = stated.unwrap_or_else(|| Separator::of_header(head));
     let mut names = cells(head, header.span.start, separator).map_err(|cell| open_quote(&source, &cell))?;
+    // one stays: a line of separators alone is a header without names
     drop_empty_end(&mut names, 1);
     header_faults(&source, &header, &names)?;
     let mut body: Vec<Line> = lines.collect();
     let is_units = |line: &&Line| {
         let text = &source.text[line.span.clone()];
+        // a header that stands twice holds words alone and would pass for units
         text != head && units::are_units(text, separator)
     };
     let mut titles: Vec<String> = names.iter().map(|name| source.text[name.clone()].to_owned()).collect();
@@ -125,6 +127,7 @@ fn open_quote(source: &Source, cell: &Span) -> Fault {
 /// A table without a header, and names that stand in it twice.
 fn header_faults(source: &Source, line: &Line, names: &[Span]) -> Result<(), Faults> {
     let text = |name: &Span| &source.text[name.clone()];
+    // numbers as names: the first measurement would be lost, and every column unknown
     if names
         .iter()
         .all(|name| number::read(text(name)).is_some_and(|n| n.value.is_finite()))
@@ -172,12 +175,15 @@ impl Reader<'_> {
     ) -> Result<(Vec<Column>, Vec<TextRow>), Faults> {
         let whole = self.source.text.ends_with('\n');
         for (index, line) in lines.iter().enumerate() {
+            // a logger that was switched off while it wrote leaves a last line without its end
             let cut = index + 1 == lines.len() && !whole && options.leave_out_cut_line;
             if !self.row(line, cut) {
                 repairs.push(format!("line {} is cut off: left out", line.number));
             }
         }
+        // 1.500 may then be 1500 or 1.5: the table has to be clear about it
         if let [Some(point), Some(comma)] = &self.marks {
+            // the first of them set the rule that this one breaks
             let second = if point.start > comma.start { point } else { comma };
             let message = Message::new("decimal points and decimal commas in one table")
                 .found(&self.source.text[second.clone()])
@@ -200,6 +206,7 @@ impl Reader<'_> {
                 return true;
             }
         };
+        // some programs end each row with a separator, but not the header
         drop_empty_end(&mut cells, self.columns.len());
         if cells.len() < self.columns.len() && may_be_cut {
             return false;
@@ -209,6 +216,7 @@ impl Reader<'_> {
             self.faults.push(self.source.fault(&line.span, message));
             return true;
         }
+        // behind the count of cells, so that it compares name by name
         if self.is_header(&cells) {
             let message = Message::new("the header stands a second time")
                 .expected("one header and rows of numbers")
@@ -240,6 +248,7 @@ impl Reader<'_> {
         let text = |cell: &Span| &self.source.text[cell.clone()];
         let pairs = || cells.iter().zip(self.header);
         pairs().all(|(cell, name)| text(cell) == text(name))
+            // nameless columns would "repeat their header" in every row of empty cells
             && pairs().any(|(_, name)| !split_unit(text(name)).0.is_empty())
     }
 }

@@ -17,11 +17,13 @@ pub(crate) enum Mark {
 }
 
 /// Most digits after the point that are told apart.
+// decimals tell on what step a column was written; a number such as 1e-300 would have hundreds of them
 const MOST_DECIMALS: i64 = 12;
 
 /// Reads a finite number with a decimal point or a decimal comma.
 pub(crate) fn read(cell: &str) -> Option<Number> {
     let mark = match (cell.contains('.'), cell.contains(',')) {
+        // 1,000.5 may be a thousand or one: a mark between thousands cannot be told from a decimal one
         (true, true) => return None,
         (true, false) => Some(Mark::Point),
         (false, true) => Some(Mark::Comma),
@@ -34,6 +36,7 @@ pub(crate) fn read(cell: &str) -> Option<Number> {
     } else {
         cell
     };
+    // `inf`, `nan` and 1e999 are words of their cells: readers differ in what these mean to them
     let value = text.parse::<f64>().ok().filter(|value| value.is_finite())?;
     let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
     let digits = mantissa

@@ -42,6 +42,7 @@ impl TextPlaces {
 
     pub fn cell(&self, row: usize, column: usize, message: Message) -> Fault {
         let line = self.span(row);
+        // cut again for a fault only: spans of all cells would take more memory than the numbers
         let cells = cells(&self.source.text[line.clone()], line.start, self.separator).unwrap_or_default();
         self.source.fault(cells.get(column).unwrap_or(&line), message)
     }

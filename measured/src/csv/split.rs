@@ -22,6 +22,7 @@ impl Separator {
         let outside: String = header
             .chars()
             .filter(|c| {
+                // a name in quotes may hold any separator: "i_l, filtered"
                 quoted ^= *c == '"';
                 !quoted
             })
@@ -39,6 +40,7 @@ impl Separator {
         let mut marks = mark.chars();
         match (marks.next(), marks.next()) {
             (Some(mark @ (',' | ';' | '\t' | '|')), None) => Some(Separator::Mark(mark)),
+            // `sep=` and a tab, which was trimmed off with the blanks
             (None, _) => Some(Separator::Mark('\t')),
             _ => None,
         }
@@ -81,6 +83,7 @@ fn closing_quote(text: &str) -> Option<usize> {
     let mut from = 0;
     loop {
         let at = from + text[from..].find('"')?;
+        // a doubled quote stands for one within the cell
         if !text[at + 1..].starts_with('"') {
             return Some(at);
         }
@@ -90,6 +93,7 @@ fn closing_quote(text: &str) -> Option<usize> {
 
 fn parted_by_blanks(line: &str, start: usize) -> Vec<Span> {
     let cell = |word: &str| {
+        // a word is a part of its line: the distance of the pointers is its place
         let at = word.as_ptr() as usize - line.as_ptr() as usize;
         trimmed(line, at..at + word.len(), start)
     };

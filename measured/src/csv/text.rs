@@ -19,6 +19,7 @@ pub(crate) fn decode(name: FileName, bytes: Vec<u8>) -> Result<(Source, Vec<Stri
         }
     };
     let mut source = Source::new(name, bytes).map_err(|fault| *fault)?;
+    // only where there is no other line end: a CR before an LF is taken off with its line
     if !source.text.contains('\n') && source.text.contains('\r') {
         // line ends of old systems
         source.text = source.text.replace('\r', "\n");
@@ -43,6 +44,7 @@ fn wide(bytes: &[u8]) -> Option<Wide> {
     match bytes {
         [0xff, 0xfe, ..] => Some(Wide::Marked(Order::Little)),
         [0xfe, 0xff, ..] => Some(Wide::Marked(Order::Big)),
+        // two characters in a row: a text in UTF-8 holds no zero byte at all
         [0, 1..=255, 0, 1..=255, ..] | [1..=255, 0, 1..=255, 0, ..] => Some(Wide::Unmarked),
         _ => None,
     }
@@ -53,6 +55,7 @@ fn decode_wide(name: &FileName, bytes: &[u8], order: Order) -> Result<Vec<u8>, F
         Order::Little => u16::from_le_bytes([pair[0], pair[1]]),
         Order::Big => u16::from_be_bytes([pair[0], pair[1]]),
     });
+    // `chunks_exact` would drop half a character without a word
     let whole = bytes.len().is_multiple_of(2);
     let text: Result<String, _> = char::decode_utf16(pairs).collect();
     match text {

@@ -14,6 +14,7 @@ pub(super) fn are_units(line: &str, separator: Separator) -> bool {
         return false;
     };
     let unit =
+        // `nan` is letters alone, but a line of it is a row in which nothing was measured
         |cell: &str| cell.chars().all(|c| c.is_alphabetic() || SIGNS.contains(c)) && !cell.eq_ignore_ascii_case("nan");
     let letters = |cell: &str| cell.contains(|c: char| c.is_alphabetic() || c == '%');
     words.iter().all(|cell| unit(&line[cell.clone()])) && words.iter().any(|cell| letters(&line[cell.clone()]))
@@ -72,6 +73,7 @@ fn checked(name: &str, unit: &str) -> Result<String, Message> {
     };
     match behind {
         None => Ok(with),
+        // both are products of powers of ten, equal but for their last bits
         Some(own) if (own / scale - 1.0).abs() < 1e-9 => Ok(name.to_owned()),
         Some(_) => {
             let message = Message::new(format!("`{name}` has another unit behind its name than below it"));

@@ -37,6 +37,7 @@ impl ColumnMap {
     /// What a map says of all records, or of one.
     fn read_keys(&mut self, root: &mut Table<'_>, faults: &mut Sink) {
         if let Some(value) = root.optional("phase") {
+            // a fraction below 1: the whole period is the start of the next one
             self.phase = value.number_within(0.0..=0.999_999, faults);
         }
         if let Some(value) = root.optional("duty") {
@@ -88,6 +89,7 @@ impl ColumnMap {
             .and_then(|table| table.pairs(faults))
             .unwrap_or_default();
         for (key, value) in entries {
+            // the fault is left; the other entries are read all the same
             let Some(wish) = read(&value, faults) else { continue };
             let added = quantity(&key.value).and_then(|name| self.add(name, wish));
             faults.extend(added.err().map(|message| value.source().fault(&key.span, message)));

@@ -12,6 +12,7 @@ impl ColumnMap {
     pub fn parse(text: &str) -> Result<Self, Faults> {
         let mut map = ColumnMap::default();
         let mut faults = Sink::new();
+        // so a header with a comma has to be mapped in a file
         for text in text.split(',').map(str::trim).filter(|text| !text.is_empty()) {
             if let Err(message) = entry(text).and_then(|(name, wish)| map.add(name, wish)) {
                 faults.push(message.found(text));
@@ -29,9 +30,11 @@ fn entry(text: &str) -> Result<(&'static str, Wish), Message> {
     };
     let (name, value) = text.split_once('=').ok_or_else(form)?;
     let (name, value) = (quantity(name.trim())?, value.trim());
+    // a number before a name: a column that is called `10` has to be mapped in a file
     if let Some(number) = finite(value) {
         return Ok((name, Wish::Constant(number)));
     }
+    // from the right: a header may hold a `*` of its own
     let (column, scale) = match value.rsplit_once('*') {
         None => (value, None),
         Some((column, factor)) => (column.trim(), Some(finite(factor.trim()).ok_or_else(form)?)),

@@ -99,6 +99,8 @@ impl ColumnMap {
     /// If both name a quantity.
     pub fn and(mut self, other: ColumnMap) -> Result<Self, Faults> {
         for (name, wish) in other.entries {
+            // the section of a record counts before the others: an entry of the command line would silently not hold
+            // for it
             if self.records.iter().any(|record| record.map.wish(name).is_some()) {
                 return Err(mapped_twice(name).into());
             }
@@ -107,6 +109,7 @@ impl ColumnMap {
         self.phase = other.phase.or(self.phase);
         self.settled = other.settled.or(self.settled);
         self.sampled = other.sampled.or(self.sampled);
+        // the command line cannot say `unknown`: it is what was left out
         if other.duty != DutyIs::Unknown {
             self.duty = other.duty;
         }
@@ -131,6 +134,7 @@ impl ColumnMap {
             },
             sampled: own.sampled.or(self.sampled),
             settled: own.settled.or(self.settled),
+            // a section holds for one record and has none of its own
             records: Vec::new(),
         })
     }

@@ -27,6 +27,7 @@ pub(crate) fn read(root: &mut Table<'_>, faults: &mut Sink) -> Actions {
         (Some(value), None) => (value.clone(), from_duties(&value, faults)),
         (None, Some(value)) => (value.clone(), from_pairs(&value, faults)),
         (both, _) => {
+            // the arms above took exactly one: it is both or none
             let count = if both.is_some() { 2 } else { 0 };
             faults.push(section.fault(catalogue::exactly_one_of("[actions]", "`duties`, `pairs`", count)));
             section.finish(faults);
@@ -46,6 +47,7 @@ pub(crate) fn read(root: &mut Table<'_>, faults: &mut Sink) -> Actions {
 
 fn from_duties(value: &Value<'_>, faults: &mut Sink) -> Option<Actions> {
     let items = value.list("an array of duty ratios", faults)?;
+    // one fault for the whole list, instead of one for every whole number in it
     if has_decimal_commas(&items) {
         faults.push(value.fault(catalogue::decimal_commas("duties", items.len())));
         return None;
@@ -62,6 +64,7 @@ fn from_duties(value: &Value<'_>, faults: &mut Sink) -> Option<Actions> {
 fn has_decimal_commas(items: &[Value<'_>]) -> bool {
     let whole = |item: &Value<'_>| item.number(&mut Sink::new()).filter(|x| x.fract() == 0.0);
     let pairs = items.chunks_exact(2);
+    // two numbers may be meant as they stand: [0, 1]
     items.len() >= 4
         && pairs.remainder().is_empty()
         && items
@@ -69,6 +72,7 @@ fn has_decimal_commas(items: &[Value<'_>]) -> bool {
             .all(|pair| whole(&pair[0]) == Some(0.0) && whole(&pair[1]).is_some())
         && items
             .chunks_exact(2)
+            // [0, 1, 0, 1] may be meant, too; a duty above 1 is not
             .any(|pair| whole(&pair[1]).is_some_and(|x| x > 1.0))
 }
 
@@ -87,6 +91,7 @@ fn from_pairs(value: &Value<'_>, faults: &mut Sink) -> Option<Actions> {
             None => known = false,
         }
     }
+    // a count that leaves out a faulty pair would be a second fault, of the network's outputs
     known.then_some(actions)
 }
 

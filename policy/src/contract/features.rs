@@ -45,6 +45,7 @@ pub(crate) fn read<'a>(root: &mut Table<'a>, around: &Surroundings<'_>, faults: 
     };
     if !(1..=MAX_FEATURES).contains(&items.len()) {
         faults.push(value.fault(catalogue::count("features", items.len(), 1, MAX_FEATURES)));
+        // not read one by one: hundreds of entries could be hundreds of faults
         return features;
     }
     features.count = items.len();
@@ -82,6 +83,7 @@ fn one(item: &Value<'_>, around: &Surroundings<'_>, taken: &mut Taken, faults: &
         .map_or(Some(None), |v| range_f32(&v, faults).map(Some));
     section.finish(faults);
     let (source, source_text) = source?;
+    // filled in by `bounded`, when all signals are known
     let bound = Interval { low: 0.0, high: 0.0 };
     Some(Feature {
         name: name?,

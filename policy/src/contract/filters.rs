@@ -61,8 +61,10 @@ fn one(value: &Value<'_>, period: Option<f64>, faults: &mut Sink) -> Option<Filt
         .iter()
         .filter_map(|kind| section.optional(kind).map(|value| (*kind, value)))
         .collect();
+    // unknown keys count: `{ delay = 1, dely = 2 }` names two filters
     let number = section.count();
     let before = faults.count();
+    // beside two kinds the fault of the unknown key would only be an echo
     if number == 1 || found.is_empty() {
         section.finish(faults);
     }
@@ -141,6 +143,7 @@ fn time_constant(value: &Value<'_>, period: Option<f64>, faults: &mut Sink) -> O
             return None;
         }
     };
+    // behind the keys, so that their faults are not lost with the period's
     let period = period?;
     let longest = period * MAX_TIME_CONSTANT_PERIODS;
     if seconds <= 0.0 || seconds > longest {
@@ -163,6 +166,7 @@ fn integrator(value: &Value<'_>, faults: &mut Sink) -> Option<Filter> {
     let initial = start.as_ref().map_or(Some(0.0), |v| number_f32(v, faults));
     section.finish(faults);
     let (min, max, initial) = (min?, max?, initial?);
+    // the clamp needs a number of the format between its ends
     if min > max || inward_f32(Interval { low: min, high: max }).is_none() {
         faults.push(value.fault(catalogue::crossed("integrator", min, max).hint("min must lie below max")));
         return None;

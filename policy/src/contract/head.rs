@@ -22,6 +22,7 @@ pub(crate) fn read(root: &mut Table<'_>, taken: &mut Taken, faults: &mut Sink) -
     let hint = "name the controller: `name = \"buck\"`; files and symbols begin with it";
     let name = root
         .required("name", hint, faults)
+        // a space of its own: nothing in an expression is called by the policy's name
         .and_then(|v| name(&v, Kind::Policy, &mut Vec::new(), faults));
     let hint = "give the control period in seconds: `sample_period = 1e-4`";
     let sample_period = root
@@ -62,6 +63,7 @@ fn period(value: &Value<'_>, faults: &mut Sink) -> Option<f64> {
 
 fn format(value: &Value<'_>, faults: &mut Sink) -> NumericFormat {
     let Some(text) = value.text(faults) else {
+        // any format will do: the fault refuses the policy, and the rest is to be read all the same
         return NumericFormat::F32;
     };
     NumericFormat::find(text).unwrap_or_else(|| {

@@ -34,6 +34,7 @@ pub(crate) fn read(document: &Document, load_current: usize, faults: &mut Sink) 
     let [a, b, c] = places.clone().map(|value| value.and_then(|v| number_f32(&v, faults)));
     let product = root.optional("r");
     let r = product.as_ref().map(|v| number_f32(v, faults));
+    // a <= 0 would turn the sign of the loop, or take the policy out of it
     let a = a.filter(|a| *a > 0.0).or_else(|| {
         let value = places[0].as_ref().zip(a);
         faults.extend(value.map(|(value, a)| value.fault(catalogue::not_positive("a", a))));
@@ -68,6 +69,7 @@ pub(crate) fn read(document: &Document, load_current: usize, faults: &mut Sink) 
     let adjust_c = adjustable(&mut adjust, "c", c, c.map(|c| near(c, 0.2)), faults);
     let adjust_r = match r {
         Some(r) => adjustable(&mut adjust, "r", r, r.map(|r| near(r, 0.05)), faults),
+        // three terms: the interval is never looked at, but the field wants one
         None => without_r(&mut adjust, faults).then_some(near(0.0, 0.05)),
     };
     if let Some(section) = adjust {
@@ -80,6 +82,7 @@ pub(crate) fn read(document: &Document, load_current: usize, faults: &mut Sink) 
             a: a?,
             b: b?,
             c: c?,
+            // a faulty `r` looks like none here, but its fault refuses the mapping below
             r: r.flatten(),
         },
         load_current,
@@ -91,6 +94,7 @@ pub(crate) fn read(document: &Document, load_current: usize, faults: &mut Sink) 
         adjust_r: adjust_r?,
         simulation,
     };
+    // with a faulty coefficient the slope would be a second fault of one cause
     if faults.count() == before {
         rising(&mapping, product.as_ref().or(places[0].as_ref()), faults);
     }
@@ -160,6 +164,7 @@ fn without_r(adjust: &mut Option<Table<'_>>, faults: &mut Sink) -> bool {
 /// The mapping must rise with d_sim at both ends of i_out, computed as the controller computes it.
 fn rising(mapping: &Mapping, at: Option<&toml_input::Value<'_>>, faults: &mut Sink) {
     let Some(r) = mapping.coefficients.r else { return };
+    // linear in the current: both ends speak for all between
     for i_out in [mapping.valid_i_out.low, mapping.valid_i_out.high].map(nearest_f32) {
         let slope = nearest_f32(mapping.coefficients.a) + nearest_f32(r) * i_out;
         if slope.is_nan() || slope <= 0.0 {
@@ -174,6 +179,7 @@ fn rising(mapping: &Mapping, at: Option<&toml_input::Value<'_>>, faults: &mut Si
 pub(crate) fn magnitude_fits(mapping: &Mapping, current: Box32, duties: Interval) -> Result<(), f64> {
     let d = Box32::nearest(duties);
     let all = || {
+        // in the order of section 8, and with what the lab may set, not with the coefficients as they are
         let mut t = Box32::nearest(mapping.adjust_a).times(d)?;
         t = t.add(Box32::nearest(mapping.adjust_b).times(current)?)?;
         t = t.add(Box32::nearest(mapping.adjust_c))?;

@@ -34,6 +34,7 @@ pub(crate) fn name(value: &Value<'_>, kind: Kind, taken: &mut Taken, faults: &mu
 
 /// Enters `name`; a fault if it is taken. Signals and parameters share one space, features have their own.
 pub(crate) fn taken_once(name: &str, kind: Kind, taken: &mut Taken) -> Result<String, toml_input::Message> {
+    // no expression names a feature: it may be called as the signal that it passes on
     let clash = |other: Kind| (kind == Kind::Feature) == (other == Kind::Feature);
     if let Some((_, other)) = taken.iter().find(|(used, other)| used == name && clash(*other)) {
         return Err(catalogue::duplicate_name(kind.word(), name, other.word()));
@@ -53,6 +54,7 @@ pub(crate) fn number_f32(value: &Value<'_>, faults: &mut Sink) -> Option<f64> {
 }
 
 pub(crate) fn fits_f32(number: f64) -> bool {
+    // a number that rounds to 0 would silently be another one
     number.abs() <= MAX_MAGNITUDE && (number == 0.0 || number as f32 != 0.0)
 }
 

@@ -53,6 +53,7 @@ pub(crate) fn read<'a>(root: &mut Table<'a>, faults: &mut Sink) -> Option<Networ
     let tolerance = section
         .optional("golden_tolerance")
         .and_then(|v| tolerance(&v, faults))
+        // a tolerance and not bits, because trainers add in an order of their own
         .unwrap_or(1e-5);
     let decisions = section.optional("golden_decisions").and_then(|v| share(&v, faults));
     section.finish(faults);
@@ -78,6 +79,8 @@ impl Network<'_> {
         let hidden = layers.saturating_sub(1);
         let mut list = match &self.hidden {
             Hidden::Faulty => return None,
+            // a single layer has nothing to choose; otherwise nothing is assumed, since a wrong curve gives plausible
+            // numbers
             Hidden::Missing if hidden == 0 => Vec::new(),
             Hidden::Missing => {
                 let message = catalogue::missing_key("hidden_activation", "[network]", &hint());
@@ -92,6 +95,7 @@ impl Network<'_> {
             }
             Hidden::Each(list, _) => list.clone(),
         };
+        // section 6: the last layer gives its Q values as they are
         list.push(Activation::Identity);
         Some(list)
     }

@@ -11,6 +11,7 @@ pub(crate) fn fallback(root: &mut Table<'_>, faults: &mut Sink) -> Option<Fallba
     let hint = "say what happens without a usable measurement: [fallback] with `duty` and `hold`";
     let mut section = root.required("fallback", hint, faults)?.table("[fallback]", faults)?;
     let hint = "the duty commanded when no measurement is usable: `duty = 0.0`";
+    // any duty: 0 has to be possible where the limits begin at 0.05
     let duty = section.required("duty", hint, faults).and_then(|v| duty(&v, faults));
     let hint = "how many bad samples are bridged with the last good one: `hold = 3`";
     let hold = section
@@ -52,6 +53,7 @@ pub(crate) fn limits(root: &mut Table<'_>, fallback: Option<Fallback>, faults: &
 
 fn slew(value: &Value<'_>, faults: &mut Sink) -> Option<f64> {
     let number = value.number(faults)?;
+    // the same bound as for the soft start: a much smaller step is lost in the rounding of a duty near 1
     if (MIN_SOFT_START_INCREMENT..=1.0).contains(&number) {
         return Some(number);
     }
@@ -79,6 +81,7 @@ fn soft_start(value: &Value<'_>, range: Option<Interval>, faults: &mut Sink) -> 
         )));
         return None;
     }
+    // in binary64, as section 10 combines it before the one rounding
     let increment = (range.high - from) / f64::from(steps);
     if increment < MIN_SOFT_START_INCREMENT {
         faults.push(value.fault(catalogue::soft_start_too_slow(increment)));

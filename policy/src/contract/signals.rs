@@ -35,6 +35,7 @@ pub(crate) fn read(root: &mut Table<'_>, taken: &mut Taken, faults: &mut Sink) -
     }
     for item in items {
         let Some(mut section) = item.table("[[signal]]", faults) else {
+            // without a table there is no name to keep
             continue;
         };
         let hint = "a signal needs a name: `name = \"v_out\"`";
@@ -70,6 +71,7 @@ fn unit(value: &Value<'_>, faults: &mut Sink) -> Option<String> {
     let printable = |c: char| !c.is_control() && !matches!(c, '"' | '\'' | '\\' | '`') && is_visible(c);
     let fit = text.chars().count() <= MAX_UNIT_CHARS && text.chars().all(printable);
     if fit
+        // ends and beginnings of comments in C and XML, the end of CDATA, and trigraphs, which C90 still reads
         && !["*/", "/*", "//", "]]>", "--", "??"]
             .iter()
             .any(|mark| text.contains(mark))
@@ -82,6 +84,7 @@ fn unit(value: &Value<'_>, faults: &mut Sink) -> Option<String> {
 
 /// Not a line separator, a direction mark or another invisible character.
 fn is_visible(c: char) -> bool {
+    // such a character can make a comment show another text than the compiler reads
     !matches!(c, '\u{2028}' | '\u{2029}' | '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
 }
 
@@ -103,6 +106,7 @@ fn adc(value: &Value<'_>, range: Option<Interval>, name: &str, faults: &mut Sink
         return None;
     }
     let range = range?;
+    // a negative gain turns the ends round, so that neither is the larger
     let (a, b) = ((range.low - offset) / factor, (range.high - offset) / factor);
     if a.abs().max(b.abs()) > MAX_ADC_CODE {
         faults.push(value.fault(catalogue::adc_codes(name, a.min(b), a.max(b))));

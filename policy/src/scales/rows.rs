@@ -24,9 +24,11 @@ pub(super) fn balanced(policy: &Policy, inputs: &[i32]) -> Vec<Vec<i32>> {
         let before = rows.clone();
         for (index, pair) in layers.windows(2).enumerate() {
             let [layer, next] = pair else { continue };
+            // a factor in front of a curve is another curve: its rows stay
             if !layer.activation.is_homogeneous() {
                 continue;
             }
+            // the exponents of this very sweep: a change runs on to the layers behind at once
             let columns = match index.checked_sub(1) {
                 Some(previous) => &rows[previous],
                 None => inputs,
@@ -60,6 +62,7 @@ fn ranges(policy: &Policy) -> Vec<Vec<f64>> {
             products.fold(f64::from(bias).abs(), |sum, product| sum + product)
         });
         let outputs: Vec<f64> = match layer.activation.limit() {
+            // behind a curve its bound counts, however large the sum
             Some(limit) => vec![limit; layer.outputs],
             None => outputs.collect(),
         };
@@ -77,6 +80,7 @@ fn incoming(layer: &Layer, columns: &[i32], ranges: &[f64]) -> Vec<f64> {
     let fourth = |(row, bias): (&[f32], f32)| {
         let weights = row.iter().zip(columns);
         let weights = weights.map(|(w, column)| fourth_power(f64::from(*w) * power_of_two(-column)));
+        // without an input that moves there is nothing to measure the bias by
         let bias = if largest > 0.0 { f64::from(bias) / largest } else { 0.0 };
         weights.fold(fourth_power(bias), |sum, weight| sum + weight) / layer.inputs as f64
     };
@@ -109,6 +113,7 @@ fn balance(row: f64, column: f64) -> i32 {
     let quotient = column / row;
     if quotient.is_normal() {
         // a neuron that nothing enters or leaves has a quotient of 0, infinity or NaN
+        // adding 4 rounds to nearest, halves upwards; `/` would round negative ones towards 0
         (exponent(quotient) + 4).div_euclid(8)
     } else {
         0
@@ -117,6 +122,7 @@ fn balance(row: f64, column: f64) -> i32 {
 
 /// `floor(log2(x))` of a normal number above 0.
 fn exponent(x: f64) -> i32 {
+    // exact, from the bits: a computed log2 could round across a power of two
     (x.to_bits() >> 52) as i32 - 1023
 }
 

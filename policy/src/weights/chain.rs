@@ -1,4 +1,13 @@
 //! Which layers in which order form the network: the chain of dense layers from features to actions.
+//!
+//! ```text
+//!   q_net.0 (6 -> 64)   q_net.2 (64 -> 64)   q_net.4 (64 -> 12)      candidates: groups by name, then orders by width
+//!   target.0  ...                                                     target networks only if nothing else fits
+//!
+//!   features = 6 ─► 0 ─► 64 ─► 2 ─► 64 ─► 4 ─► 12 = actions           a path that uses every layer of its group once
+//! ```
+//!
+//! One chain is the answer. None and several are faults: a chain that fits by accident would compute something else.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,6 +22,7 @@ pub(crate) struct Ends {
 }
 
 /// Orders looked at before a group counts as undecided.
+// more than the two that show a doubt: one of them may be the order in which numbers come first
 const MOST_ORDERS: usize = 16;
 
 /// Indices of layers, first to last.
@@ -21,6 +31,7 @@ pub(crate) type Chain = Vec<usize>;
 /// All chains that use every layer of some natural group: numbered siblings, a folder, or the whole file. Target
 /// networks count only if nothing else fits; the second value lists those passed over.
 pub(crate) fn candidates(layers: &[Dense], ends: Ends) -> (Vec<Chain>, Vec<usize>) {
+    // training keeps a target network of the same shape beside each: with both, every file would be ambiguous
     let (targets, own): (Vec<usize>, Vec<usize>) = (0..layers.len()).partition(|&i| is_target(&layers[i].stem));
     let chains = chains_of(layers, &own, ends);
     if !chains.is_empty() || targets.is_empty() {
@@ -61,6 +72,7 @@ fn groups(layers: &[Dense], members: &[usize]) -> Vec<Vec<usize>> {
             .collect());
     }
     let folders: BTreeSet<_> = members.iter().flat_map(|&i| ancestors(&layers[i].stem)).collect();
+    // a folder sorts before what lies in it: backwards the inner ones come first
     for folder in folders.into_iter().rev() {
         add(members
             .iter()
@@ -86,6 +98,7 @@ pub(crate) fn orders(layers: &[Dense], group: &[usize], ends: Ends) -> Vec<Chain
     search.extend(ends.inputs);
     let natural = |chain: &&Chain| numbered_first(layers, chain);
     match search.found.iter().filter(natural).collect::<Vec<_>>().as_slice() {
+        // exactly one order is the natural one: `fc1`, `fc2`, `out`, and not `out` in the middle
         [only] => vec![(*only).clone()],
         _ => search.found,
     }
@@ -113,6 +126,7 @@ fn balanced(layers: &[Dense], group: &[usize], ends: Ends) -> bool {
     ends.outputs
         .into_iter()
         .for_each(|n| *balance.entry(n).or_default() -= 1);
+    // with an unknown end a width may be left over on either side
     open || balance.values().all(|&n| n == 0)
 }
 
@@ -135,6 +149,7 @@ impl Search<'_> {
             let layer = &self.layers[next];
             let joins = inputs.is_none_or(|n| n == layer.inputs);
             let ends = !last || self.ends.outputs.is_none_or(|n| n == layer.outputs);
+            // nine equal layers have 362,880 orders
             if self.found.len() < MOST_ORDERS
                 && joins
                 && ends

@@ -27,6 +27,7 @@ impl Scene<'_> {
 
     /// Faults of a file in which no chain fits; `members` are the layers that were tried.
     pub fn explain(&self, members: &[usize]) -> Vec<Fault> {
+        // first what explains the rest: without its weight a layer is missing, and widths cannot join
         let orphans: Vec<_> = self.layers.orphans.iter().map(|&bias| self.orphan(bias)).collect();
         if !orphans.is_empty() {
             return orphans;
@@ -83,6 +84,7 @@ impl Scene<'_> {
             .copied()
             .filter(|&i| !is_target(&self.dense(i).stem))
             .collect();
+        // training keeps target networks beside the one in use, and that one is to be explained
         let members = if own.is_empty() { members } else { &own };
         let family = |i: usize| Place::of(&self.dense(i).stem).family;
         let row = |i: usize| {
@@ -147,10 +149,12 @@ impl Scene<'_> {
             }
             inputs = Some(layer.inputs);
         }
+        // an unknown end fits whatever comes
         inputs == self.ends.outputs.or(inputs)
     }
 
     fn hint(&self, chain: &[usize], position: usize, flipped: bool) -> Option<String> {
+        // before the single tensor: if the whole chain fits flipped, one setting mends it
         if self.all_flipped(chain) {
             let setting = !self.dense(chain[position]).transposed;
             return Some(format!(

@@ -33,6 +33,7 @@ pub(crate) fn read(
             faults.push(file.name.tensor_fault(name, message));
         }
     }
+    // messages below list the names of all tensors: they have to be fit for printing
     if faults.count() > before {
         return None;
     }
@@ -149,6 +150,7 @@ fn inside(observations: &[f32], features: &[Feature]) -> Result<(), Message> {
     for (row, values) in observations.chunks_exact(features.len()).enumerate() {
         for (&value, feature) in values.iter().zip(features) {
             let (low, high, value) = (feature.bound.low, feature.bound.high, f64::from(value));
+            // 17 units of binary32: the trainer scales and clips in an order of its own
             let slack = 1e-6 * low.abs().max(high.abs());
             if value < low - slack || value > high + slack {
                 return Err(catalogue::golden_outside(row, &feature.name, value, low, high));
@@ -168,6 +170,7 @@ fn greedy(q_values: &[f32], chosen: &[u32], actions: usize) -> Result<(), Messag
             .iter()
             .enumerate()
             .fold(0, |best, (i, q)| if *q > values[best] { i } else { best });
+        // an equal value passes: a trainer may break ties otherwise than section 7
         if values.get(action as usize).is_none_or(|q| *q < values[best]) {
             return Err(catalogue::golden_not_greedy(row, action, best));
         }

@@ -1,4 +1,13 @@
 //! The outside of a safetensors file: is it one, and is its header unambiguous?
+//!
+//! ```text
+//! bytes 0..8      length n of the header, little-endian
+//!       8..8+n    JSON: {"__metadata__": {...}, "fc1.weight": {"dtype", "shape", "data_offsets": [from, to]}, ...}
+//!       8+n..     data, which the offsets cover without gaps
+//! ```
+//!
+//! The crate `safetensors` refuses wrong offsets, overlaps and holes. It lets keys pass that stand twice (the last one
+//! wins), and any number of tensors; so the header is walked here once more, before the crate sees it.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -40,6 +49,7 @@ pub(crate) fn open<'a>(file: &'a Binary, faults: &mut Sink) -> Option<SafeTensor
             None => file.name.tensor_fault(key, message),
         });
     }
+    // before the crate builds its table of them
     if complete && keys.tensors > MAX_TENSORS {
         faults.push(file.name.fault(catalogue::too_many_tensors(keys.tensors)));
         return None;
@@ -48,6 +58,7 @@ pub(crate) fn open<'a>(file: &'a Binary, faults: &mut Sink) -> Option<SafeTensor
         return None;
     }
     match SafeTensors::deserialize(&file.bytes) {
+        // a sound file to the crate
         Ok(tensors) if tensors.is_empty() => {
             faults.push(file.name.fault(catalogue::no_tensors()));
             None
@@ -55,6 +66,7 @@ pub(crate) fn open<'a>(file: &'a Binary, faults: &mut Sink) -> Option<SafeTensor
         Ok(tensors) => Some(tensors),
         Err(error) => {
             let length = file.bytes.len().saturating_sub(8 + header.len());
+            // more data promised than there is: that the end is missing says more than a wrong offset
             let message = match described(header) {
                 Some(described) if described > length as u64 => catalogue::cut_off(length, described),
                 _ => catalogue::malformed(&error.to_string(), None),
@@ -77,6 +89,7 @@ fn described(header: &str) -> Option<u64> {
 
 /// Why `bytes` are no contract although somebody named them as one; `None` if they may be text.
 pub(crate) fn not_a_contract(bytes: &[u8]) -> Option<toml_input::Message> {
+    // a JSON object behind a length that fits: no TOML begins so
     if plausible_length(bytes) && bytes.get(8) == Some(&b'{') {
         return Some(catalogue::weights_as_contract());
     }
@@ -94,6 +107,7 @@ fn header_text(bytes: &[u8]) -> Result<&str, toml_input::Message> {
         ));
     };
     let length = u64::from_le_bytes(*length);
+    // before anything is sliced or allocated by a number of the file
     if length > MAX_HEADER_BYTES {
         let found = format!("a header of {length} bytes, more than {MAX_HEADER_BYTES}");
         return Err(catalogue::malformed(&found, Some(EXPORT)));
@@ -115,6 +129,7 @@ fn foreign(bytes: &[u8]) -> Option<toml_input::Message> {
             EXPORT,
         ));
     }
+    // the opcode PROTO and its version; pickles of protocols 0 and 1 have no such mark
     if bytes.len() > 2 && bytes[0] == 0x80 && (2..=5).contains(&bytes[1]) {
         return Some(catalogue::other_format(
             "a python pickle (never opened here: it can run code)",
@@ -130,6 +145,7 @@ fn foreign(bytes: &[u8]) -> Option<toml_input::Message> {
             "fetch the content: git lfs pull",
         ));
     }
+    // a protobuf whose field 1 is a number (ir_version), and soon field 2, a text (0x12)
     if begins(b"\x08") && bytes.iter().take(64).any(|&b| b == b':' || b == 0x12) && !plausible_length(bytes) {
         let hint = "convert an ONNX model's initialisers to safetensors: numpy_helper.to_array, then save_file";
         return Some(catalogue::other_format("what looks like an ONNX model", hint));
@@ -167,6 +183,7 @@ impl<'de> DeserializeSeed<'de> for Node<'_> {
 }
 
 /// A key, taken as text.
+// owned and not borrowed: a key with escapes cannot be, and `\u0061` is the same key as `a`
 struct Key(String);
 
 impl<'de> Deserialize<'de> for Key {
@@ -193,9 +210,11 @@ impl<'de> Visitor<'de> for Node<'_> {
             } else {
                 self.tensor.clone()
             };
+            // bounded, for a hostile header may repeat a key a hundred thousand times
             if !seen.insert(key.clone()) && self.keys.repeated.len() < MAX_TENSORS {
                 self.keys.repeated.push((self.tensor.clone(), key));
             }
+            // serde_json refuses 128 levels, which bounds this recursion
             map.next_value_seed(Node {
                 keys: &mut *self.keys,
                 depth: self.depth + 1,

@@ -46,6 +46,7 @@ pub(crate) struct Layers {
 
 /// Stem and role of a tensor by its name.
 pub(crate) fn role(name: &str) -> Option<(&str, Role)> {
+    // TensorFlow puts the number of an operation's output behind a name
     let name = name.strip_suffix(":0").unwrap_or(name);
     let (stem, leaf) = name.rsplit_once(['.', '/'])?;
     let role = match leaf {
@@ -64,7 +65,9 @@ pub(crate) fn group(tensors: &[Tensor], transpose: Option<bool>) -> Layers {
         let Some((stem, role @ (Role::Weight | Role::Kernel))) = role(&tensor.name) else {
             continue;
         };
+        // other shapes are named where they matter: as strangers, or if no chain fits
         let [rows, columns] = tensor.shape[..] else { continue };
+        // PyTorch stores [out, in] as `weight`, Keras and Flax [in, out] as `kernel`
         let transposed = transpose.unwrap_or(role == Role::Kernel);
         let (outputs, inputs) = if transposed { (columns, rows) } else { (rows, columns) };
         let stem = stem.to_owned();
@@ -109,9 +112,11 @@ impl<'a> Place<'a> {
         let start = stem[..end]
             .rfind(|c: char| !c.is_ascii_digit())
             .map_or(0, |before| before + 1);
+        // so that Keras' `dense` and `dense_1` are of one family
         let family = stem[..start].trim_end_matches(['.', '/', '_', '-']);
         Place {
             family: (family, &stem[end..]),
+            // more digits than 64 bits hold: it stands last, whatever it says
             number: Some(stem[start..end].parse().unwrap_or(u64::MAX)),
         }
     }

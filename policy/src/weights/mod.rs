@@ -51,6 +51,7 @@ pub(crate) fn read(
         Some(_) => (listed(&scene, network, faults)?, Vec::new()),
         None => inferred(&scene, network, faults)?,
     };
+    // listed layers have not passed the limit of a group
     if chain.len() > MAX_LAYERS {
         faults.push(file.name.fault(catalogue::too_deep(chain.len())));
         return None;
@@ -60,6 +61,7 @@ pub(crate) fn read(
         .iter()
         .map(|&index| layer(file, &tensors, &grouped.dense[index], network.bias, faults))
         .collect();
+    // who lists the layers has said what belongs to the network
     if network.layers.is_none() {
         faults.extend(strangers(file, &tensors, &grouped, network));
     }
@@ -94,6 +96,7 @@ pub(crate) fn outline(file: &Binary, faults: &mut Sink) -> Option<Outline> {
         outputs: None,
     };
     let (found, _) = chain::candidates(&grouped.dense, ends);
+    // with open ends a part of a chain fits as well as the whole
     let part_of = |a: &Chain, b: &Chain| a.len() < b.len() && a.iter().all(|layer| b.contains(layer));
     let chains: Vec<&Chain> = found
         .iter()
@@ -184,10 +187,12 @@ fn inferred(scene: &Scene<'_>, network: &Network<'_>, faults: &mut Sink) -> Opti
         faults.push(network.fault(prefix, catalogue::unknown_prefix(&prefix.value, &all)));
         return None;
     }
+    // the search counts within the subset; `back` leads to the file's numbers again
     let subset: Vec<Dense> = members.iter().map(|&index| dense[index].clone()).collect();
     let (chains, passed) = chain::candidates(&subset, scene.ends);
     match chains.as_slice() {
         [only] => {
+            // a prefix is a choice: what it passes over was not passed over by us
             let passed = if prefix.is_some() { Vec::new() } else { passed };
             let back = |list: &[usize]| list.iter().map(|&i| members[i]).collect();
             Some((back(only), back(&passed)))
@@ -244,6 +249,7 @@ fn layer(file: &Binary, tensors: &Tensors, dense: &Dense, bias: bool, faults: &m
         } else {
             weight.values.clone()
         },
+        // +0: the contract starts such a sum from it
         bias: stored.map_or_else(|| vec![0.0; dense.outputs], |tensor| tensor.values.clone()),
         activation: Activation::Identity,
         bounds: Vec::new(),

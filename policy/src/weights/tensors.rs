@@ -29,6 +29,7 @@ pub(crate) fn convert(file: &Binary, tensors: &SafeTensors<'_>, faults: &mut Sin
     let before = faults.count();
     let mut result = Tensors::default();
     let mut views = tensors.tensors();
+    // the crate hands them out in the order of a hash map: faults and notes must not depend on it
     views.sort_by(|(a, _), (b, _)| a.cmp(b));
     let (mut rounded, mut widened) = (Vec::new(), Vec::new());
     for (name, view) in &views {
@@ -40,6 +41,7 @@ pub(crate) fn convert(file: &Binary, tensors: &SafeTensors<'_>, faults: &mut Sin
             Dtype::F32 => {}
             Dtype::F64 => rounded.push(name.as_str()),
             Dtype::F16 | Dtype::BF16 => widened.push(name.as_str()),
+            // integers that are no weights, such as counters of a norm layer, do not disturb
             _ if super::layers::role(name).is_none() => {
                 result.set_aside.push(name.clone());
                 continue;
@@ -95,6 +97,7 @@ pub(crate) fn values(dtype: Dtype, data: &[u8]) -> Result<Vec<f32>, Message> {
         if !value.is_finite() {
             return Err(catalogue::not_finite(index, value));
         }
+        // a finite binary64 may still become infinite here
         let rounded = value as f32;
         if rounded.is_finite() {
             Ok(rounded)

@@ -140,6 +140,7 @@ impl Job<'_> {
         command
             .current_dir(self.folder)
             .env("TMPDIR", self.folder)
+            // messages are searched for English words below
             .env("LC_ALL", "C");
     }
 
@@ -163,6 +164,7 @@ impl Job<'_> {
             .args(self.sources.target.c_flags)
             .args(self.build.flags)
             .args(&self.build.extra)
+            // last, so that a user's flag wins over ours
             .args(self.sources.extra_flags);
         let parents = self.of_kind("h").filter_map(|path| Path::new(path).parent());
         for parent in parents.collect::<std::collections::BTreeSet<_>>() {
@@ -183,6 +185,7 @@ impl Job<'_> {
     fn c_objects(&self, compiler: CCompiler) -> Result<Vec<PathBuf>, BuildError> {
         let mut command = self.c_command(compiler, Form::Board)?;
         self.run(command.args(["-I", BOARD_FOLDER, "-c"]))?;
+        // with -c gcc writes the objects into the working folder, without the folders of their sources
         let units = self.c_units().map(|unit| Path::new(unit).with_extension("o"));
         let names = units.filter_map(|unit| unit.file_name().map(PathBuf::from));
         Ok(std::iter::once(PathBuf::from("policyc_driver.o"))
@@ -214,9 +217,11 @@ impl Job<'_> {
         let (unit, mut command) = self.rust_command()?;
         std::fs::write(
             self.folder.join("policyc_core.rs"),
+            // alone and not with the driver, whose code would be measured as well
             format!("#![no_std]\n#[path = \"{unit}\"]\npub mod controller;\n"),
         )?;
         let object = self.folder.join("policyc_core.o");
+        // one codegen unit, since `-o` names one object file
         command.args(["--crate-type=lib", "--emit=obj", "-Cpanic=abort", "-Ccodegen-units=1"]);
         self.run(command.arg("policyc_core.rs").arg("-o").arg(&object))?;
         Ok(object)
@@ -255,6 +260,7 @@ impl Job<'_> {
     /// Compiles the board's own files and links all.
     fn link(&self, board: &Board, objects: &[PathBuf]) -> Result<PathBuf, BuildError> {
         let executable = self.folder.join("driver.elf");
+        // the same linker for Rust: start-up and linker script are those of C
         let Some(linker) = self.sources.target.c_compilers.first() else {
             return Err(BuildError::NoFiles);
         };
@@ -284,10 +290,12 @@ impl Job<'_> {
         }
         // the folder is a random name: without it the same fault gives the same text
         let text = String::from_utf8_lossy(&output.stderr).replace(&self.folder.display().to_string(), ".");
+        // a linker that misses libasan is a missing package, not a fault of the code
         let sanitised = self.build.flags.iter().any(|flag| flag.starts_with("-fsanitize"));
         if text.contains("cannot find") && text.contains("san") && sanitised {
             return Err(BuildError::NoSanitiser);
         }
+        // a screen; what follows the first error is mostly its echo
         let first_lines: Vec<&str> = text.lines().take(40).collect();
         let text = first_lines.join("\n");
         Err(

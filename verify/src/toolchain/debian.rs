@@ -36,6 +36,7 @@ pub fn cargo() -> Option<Command> {
             cargo.env_remove(name);
         }
     }
+    // -Zbuild-std is unstable: a stable compiler takes it only so
     cargo.env("RUSTC", RUSTC).env("RUSTC_BOOTSTRAP", "1");
     Some(cargo)
 }
@@ -46,7 +47,9 @@ pub fn cargo() -> Option<Command> {
 /// Cargo's text, or the system's.
 pub(super) fn sysroot(triple: &str) -> Result<PathBuf, String> {
     static TURN: Mutex<()> = Mutex::new(());
+    // one at a time: builds are compiled side by side, and two would make the same library
     let _turn = TURN.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    // kept across runs: building takes half a minute, and asks crates.io for what `core` depends on
     let folder = cache()?.join(version()?).join(triple);
     let library = PathBuf::from("lib/rustlib").join(triple).join("lib");
     if folder.join(&library).is_dir() {

@@ -30,6 +30,7 @@ const GCC_LEVELS: Levels = &[
     ("-O3", &["-O3"]),
     (
         "sanitised",
+        // no recovery: a driver that went on after a fault would answer, and count as equal
         &["-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"],
     ),
 ];
@@ -146,6 +147,7 @@ fn of_tool(target: &TargetSpec, tool: Tool) -> Vec<Build> {
     let mut rust = None;
     match tool {
         Tool::C(compiler) => missing.extend(absent(compiler.program, compiler.package)),
+        // the compiler alone is not enough: it needs `core` for the target
         Tool::Rust(spec) => match toolchain(spec) {
             Ok(found) => rust = Some(found),
             Err(what) => missing.push(what),
@@ -153,6 +155,7 @@ fn of_tool(target: &TargetSpec, tool: Tool) -> Vec<Build> {
     }
     if let Runner::Emulated(board) = &target.runner {
         missing.extend(absent_of_board(target, board));
+        // the first C compiler also links, and would be named twice
         missing.dedup();
     }
     if let Runner::None(why) = target.runner {
@@ -213,6 +216,7 @@ pub fn find(name: &str) -> Option<PathBuf> {
     let path = std::env::var_os("PATH")?;
     std::env::split_paths(&path)
         .map(|folder| folder.join(name))
+        // a folder of the name does not run
         .find(|program| program.is_file())
 }
 

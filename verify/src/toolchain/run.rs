@@ -9,12 +9,14 @@ use std::time::{Duration, Instant};
 /// If it cannot be started or does not end in time.
 pub fn run_for(command: &mut Command, timeout: Duration) -> std::io::Result<Output> {
     let mut child = command
+        // a compiler that asks something gets an end of file instead of our terminal
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()?;
     let (stdout, stderr) = (child.stdout.take(), child.stderr.take());
     std::thread::scope(|scope| {
+        // both at once: a program that fills one pipe while the other is read would never end
         let out = scope.spawn(|| drain(stdout));
         let err = scope.spawn(|| drain(stderr));
         let deadline = Instant::now() + timeout;
@@ -24,12 +26,14 @@ pub fn run_for(command: &mut Command, timeout: Duration) -> std::io::Result<Outp
                 break status;
             }
             if Instant::now() > deadline {
+                // its pipes close with it, so the threads that drain them end
                 child.kill()?;
                 child.wait()?;
                 let text = format!("no end after {} s", timeout.as_secs());
                 return Err(std::io::Error::new(std::io::ErrorKind::TimedOut, text));
             }
             std::thread::sleep(pause);
+            // short at first, for programs that take milliseconds; then rare, for those that take minutes
             pause = (pause * 2).min(Duration::from_millis(20));
         };
         let text = |thread: std::thread::ScopedJoinHandle<'_, Vec<u8>>| thread.join().unwrap_or_default();

@@ -58,6 +58,7 @@ pub fn toolchain(spec: RustTarget) -> Result<Toolchain, Missing> {
             install: Some(Install::Package("rustc".to_owned())),
         });
     }
+    // no triple is this machine, whose library is always there
     if spec.triple.is_empty() || has_core(RUSTC, spec.triple) {
         return Ok(Toolchain::OnPath);
     }
@@ -73,6 +74,7 @@ pub fn toolchain(spec: RustTarget) -> Result<Toolchain, Missing> {
 /// Whether the library `core` of that target lies beside the compiler.
 fn has_core(rustc: &str, triple: &str) -> bool {
     let mut command = Command::new(rustc);
+    // rustc prints this folder for every target that it knows, installed or not: so look into it
     command.args(["--target", triple, "--print", "target-libdir"]);
     let Ok(output) = run_for(&mut command, Duration::from_secs(20)) else {
         return false;

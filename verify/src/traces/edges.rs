@@ -45,6 +45,7 @@ impl Edges {
     }
 
     fn of_signal(scalar: Scalar, signal: &Signal, more_ends: &[f64]) -> Self {
+        // where the mapping's range ends a status bit changes, too
         let ends = [&[signal.range.low, signal.range.high], more_ends].concat();
         let all = if signal.adc.is_some() {
             codes(scalar, signal, &ends)
@@ -118,6 +119,7 @@ fn floats(scalar: Scalar, ends: &[f64]) -> Vec<Sample> {
         infinity,
         -infinity,
     ];
+    // one and two units on either side: the range is rounded inwards, and the contract compares with >= and <=
     for end in ends.iter().map(|end| scalar.nearest(*end)) {
         values.extend([end, up(end), down(end), up(up(end)), down(down(end)), -end]);
     }
@@ -127,6 +129,7 @@ fn floats(scalar: Scalar, ends: &[f64]) -> Vec<Sample> {
 
 fn codes(scalar: Scalar, signal: &Signal, ends: &[f64]) -> Vec<Sample> {
     let mut codes = vec![0, 1, -1, i32::MIN, i32::MIN + 1, i32::MAX, i32::MAX - 1];
+    // widths of converters, and 24 bits up to which an integer is a binary32 number
     for n in [8, 10, 12, 14, 16, 24] {
         codes.extend([(1 << n) - 1, 1 << n, (1 << n) + 1, -(1 << n), -(1 << n) - 1]);
     }

@@ -64,6 +64,7 @@ const SEGMENTS: [Segment; 7] = [
     Segment::Plateaus,
 ];
 
+// conventions; tests.rs counts what a stream of 20,000 steps reaches with them
 /// Steps between two attempts to replace the mapping coefficients, on average.
 const STEPS_PER_SET_MAPPING: usize = 50;
 /// Steps between two resets, on average.
@@ -73,6 +74,7 @@ const STEPS_PER_INIT: usize = 1500;
 /// Steps of a plateau, on average.
 const STEPS_PER_PLATEAU: usize = 60;
 /// Longest part of a segment given to one burst cycle.
+// a contract may hold for a million steps, and other segments have to come
 const MAX_SEGMENT: usize = 20_000;
 
 /// Longest first segment.
@@ -106,6 +108,7 @@ impl<'a> Stream<'a> {
             queued.push(Event::Reset);
             queued.extend(recording.steps().iter().cloned().map(Event::Step));
         }
+        // taken from the end, which is quick in a vector
         queued.reverse();
         let mut rng = SplitMix::new(seed);
         Self {
@@ -118,6 +121,7 @@ impl<'a> Stream<'a> {
             rng,
             // hold and fallback first, so that short runs see them too
             segment: Segment::Bursts,
+            // room for a few bursts of about K steps, but a short one where a contract holds for long
             left: (4 * (policy.fallback.hold as usize).saturating_add(4)).min(FIRST_SEGMENT),
             bad_left: 0,
             good_left: 0,
@@ -129,6 +133,7 @@ impl<'a> Stream<'a> {
     /// The next event. `controller` is the interpreter in the state before it: the closed loop needs its duty, the
     /// clip segments its filter memories.
     pub fn next_event<T: Real>(&mut self, controller: &Controller<T>) -> Event {
+        // nothing random in between: a recording is played whole
         if let Some(event) = self.queued.pop() {
             return event;
         }
@@ -213,6 +218,7 @@ impl<'a> Stream<'a> {
         let hold = self.policy.fallback.hold as usize;
         let mut samples = self.uniform();
         if self.bad_left == 0 && self.good_left == 0 {
+            // K bad steps are bridged and K + 1 are not; the last entry lies anywhere up to 2K + 3
             let around = [
                 1,
                 hold.max(1),
@@ -281,6 +287,7 @@ impl<'a> Stream<'a> {
             return samples;
         };
         let end = if self.rng.one_in(2) { clip.low } else { clip.high };
+        // a feature that does not read the signal gives o1 = o0 and an x that is not in the range: a uniform value then
         let x = x0 + (end - o0) / (o1 - o0) * (x1 - x0);
         samples[index] = if x >= low && x <= high {
             nudged(sample_of(scalar, signal, x), self.rng.below(7) as i32 - 3)
@@ -299,6 +306,7 @@ impl<'a> Stream<'a> {
         let own = mapping.coefficients;
         let mut values = [own.a, own.b, own.c, own.r.unwrap_or(0.0)].map(|value| scalar.nearest(value));
         let ranges = [mapping.adjust_a, mapping.adjust_b, mapping.adjust_c, mapping.adjust_r];
+        // 0: the policy's own, 1: inside, 2: at an end, 3: at an end or no number, 4: where the mapping ceases to rise
         let style = rng.below(5);
         if style != 0 {
             for (value, range) in values.iter_mut().zip(ranges) {
@@ -375,6 +383,7 @@ fn nudged(sample: Sample, ulps: i32) -> Sample {
         physical(scalar, x)
     };
     match sample {
+        // a code moves by whole steps of the converter
         Sample::Code(code) => Sample::Code(code.saturating_add(ulps)),
         Sample::Physical(x) => moved(Scalar::F32, x.into()),
         Sample::Wide(x) => moved(Scalar::F64, x),

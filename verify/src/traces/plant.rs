@@ -39,6 +39,7 @@ struct Buck {
 }
 
 /// Euler steps per sample period.
+// this and all figures below are conventions: they have to move signals, not to be those of a converter
 const SUBSTEPS: usize = 8;
 /// Measurement noise relative to the range.
 const NOISE: f64 = 5e-4;
@@ -67,6 +68,7 @@ impl Plant {
             .responses
             .iter_mut()
             .map(|response| {
+                // a load or source that changes now and then, so that the signal does not settle for good
                 if rng.one_in(100) {
                     response.bias = rng.uniform(0.1, 0.9);
                 }
@@ -91,6 +93,7 @@ impl Buck {
     /// `None` unless the signals have the names of a buck converter.
     fn new(policy: &Policy, rng: &mut SplitMix) -> Option<Self> {
         let find = |name: &str| policy.signals.iter().position(|signal| signal.name == name);
+        // by their names alone: nothing else in a contract says what a signal is
         let (v_out, i_l, i_out) = (find("v_out")?, find("i_l")?, find("i_out")?);
         let period = policy.sample_period;
         let v_max = policy.signals[v_out].range.high;

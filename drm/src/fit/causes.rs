@@ -136,8 +136,8 @@ fn solve(set: &[Cause], points: &[Point]) -> Option<Vec<f64>> {
             let b = sum(&|p| one.takes(p) * two.takes(p));
             let (x, y) = (sum(&|p| one.takes(p) * gap(p)), sum(&|p| two.takes(p) * gap(p)));
             let determinant = a * c - b * b;
-            // over a c this is the squared sine between the columns: below an angle of 1e-3 they are one. The bound also
-            // limits what the normal equations lose, to six of sixteen digits
+            // over a c this is the squared sine between the columns: below an angle of 1e-3 they are one. The bound
+            // also limits what the normal equations lose, to six of sixteen digits
             (determinant > 1e-6 * a * c).then(|| vec![(c * x - b * y) / determinant, (a * y - b * x) / determinant])
         }
         _ => None,

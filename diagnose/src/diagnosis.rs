@@ -185,6 +185,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     let (problem, null, outliers) = prepared(train, &base);
     let mut attribution = attribute(&problem, null, say);
     let others = crate::ties::other_pairs(&problem, &attribution);
+    // they stand in the place of all causes together: said once, at the first
     for rivals in attribution.rivals.iter_mut().take(1) {
         rivals.extend(others.iter().cloned());
     }
@@ -277,6 +278,8 @@ fn as_given(problem: &Problem, base: &Model) -> State {
 fn prepared(train: Vec<Record>, base: &Model) -> (Problem, State, Vec<Outlier>) {
     let mut problem = Problem::new(train, base.clone());
     let mut null = State::settle(&problem, base, &problem.first_starts(), None);
+    // noise before the instants of loggers and before outliers, which are judged in its units; and again without the
+    // outliers
     problem.sigma = noise::sigma(&problem, &null.residual);
     sampling::decide(&mut problem, base);
     null = State::settle(&problem, base, &null.starts, None);
@@ -309,6 +312,7 @@ fn named(attribution: &Attribution, profiles: &[Profile]) -> Vec<Named> {
         });
         let rivals = attribution.rivals[member].iter().map(|fit| {
             let mut ids: Vec<&str> = fit.causes.iter().map(|cause| attribution.id(*cause)).collect();
+            // two forms of one cause are one cause to a reader
             ids.dedup();
             ids
         });
@@ -318,6 +322,7 @@ fn named(attribution: &Attribution, profiles: &[Profile]) -> Vec<Named> {
             parameters: parameters.collect(),
             evidence: Evidence {
                 delta_chi2: attribution.evidence[member] / attribution.inflation,
+                // without the inflation: the evidence is over it already
                 threshold: crate::attribute::threshold(candidate.own.len(), 1.0),
             },
             rivals: each_once(rivals),
@@ -337,6 +342,7 @@ fn each_once(sets: impl Iterator<Item = Vec<&'static str>>) -> Vec<Vec<&'static 
 }
 
 fn verdict(named: &[Named], lattice: &Option<Named>, structure: &[Structure]) -> Verdict {
+    // before anything else: where the truth is not on the list, its best cause imitates it with a wrong value
     if !structure.is_empty() {
         return Verdict::Unexplained;
     }

@@ -19,6 +19,7 @@ pub fn as_plant(model: &Model, trim: f64) -> Parameters {
     if (0.0..1.0).contains(&phase) {
         p.pwm.sampling_phase = phase;
     } else if model.late < 0.0 {
+        // earlier than its PWM period: what is shown is then that much older
         for sensor in crate::drive::sensors(&mut p) {
             sensor.delay -= model.late;
         }
@@ -83,6 +84,7 @@ pub fn extended_toml(diagnosis: &Diagnosis) -> String {
     for parameter in plant::parameters() {
         let (was, is) = (parameter.get(before), parameter.get(&after));
         let needed = plant::REQUIRED.contains(&parameter.key);
+        // a number that came back to neutral is written all the same: a reader looks for what has changed
         if is == parameter.neutral && !needed && was == is {
             continue;
         }
@@ -92,6 +94,7 @@ pub fn extended_toml(diagnosis: &Diagnosis) -> String {
         let value = match parameter.choices().get(is as usize) {
             Some(word) => format!("\"{word}\""),
             None if parameter.is_whole() => format!("{}", is as u64),
+            // `{:?}`, because `{}` writes 1 for 1.0, which is an integer in TOML
             None => format!("{is:?}"),
         };
         let unit = if parameter.is_pure() {

@@ -116,7 +116,9 @@ pub struct Pair {
 #[must_use]
 pub fn hold(records: &[Record], base: &Model, extended: &Model, sigma: [f64; CHANNELS], trim: f64) -> Pair {
     let mut problem = Problem::new(records.to_vec(), base.clone());
+    // a channel that no training record has gets no weight
     problem.sigma = sigma.map(|s| if s.is_finite() { s } else { f64::INFINITY });
+    // a trim that is fitted to a record that judges would flatter the model
     problem.trim_held = true;
     sampling::decide(&mut problem, extended);
     let remarks = other_chains(&mut problem, base, extended, trim);
@@ -234,6 +236,7 @@ impl Pair {
             rmse_before: sigma * a.sqrt(),
             rmse_after: sigma * b.sqrt(),
             floor: sigma,
+            // errors without their noise, which adds in squares and which no model removes
             removed: (a > 1.0 + above).then(|| 1.0 - (b - 1.0).max(0.0).sqrt() / (a - 1.0).sqrt()),
             unit: CHANNEL_UNITS[n],
             rows: rows.len(),

@@ -17,6 +17,7 @@ pub fn map<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<
                     let index = next.fetch_add(1, Ordering::Relaxed);
                     let Some(item) = items.get(index) else { break };
                     let result = work(item);
+                    // poisoned only by a panic, which `scope` passes on
                     if let Ok(mut done) = done.lock() {
                         done.push((index, result));
                     }
@@ -25,6 +26,7 @@ pub fn map<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<
         }
     });
     let mut done = done.into_inner().unwrap_or_default();
+    // threads end in any order, and no result may depend on it
     done.sort_by_key(|(index, _)| *index);
     done.into_iter().map(|(_, result)| result).collect()
 }

@@ -107,6 +107,7 @@ pub fn profiles(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
                 profile.curve.push((far, cost));
             }
             let statistical = match cost > 0.3 {
+                // the parabola through the best value and this one, carried to the level
                 true => (far - value) * (LEVEL / cost).sqrt(),
                 false => at.signum() * (high - low),
             };
@@ -121,6 +122,7 @@ pub fn profiles(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
                 }
                 _ => statistical,
             };
+            // noise and the simulator's error have nothing to do with each other: they add in squares
             let reach = at.signum() * statistical.hypot(systematic);
             profile.interval[side] = (value + reach).clamp(low, high);
         }

@@ -29,6 +29,7 @@ pub fn other_pairs(problem: &Problem, attribution: &Attribution) -> Vec<Fit> {
     let is_own = |cause: usize| best.causes.iter().any(|own| attribution.same(*own, cause));
     let all: Vec<usize> = (0..attribution.candidates.len()).collect();
     let columns = parallel::map(&all, |cause| fitter.sensitivity(*cause, &attribution.null));
+    // at first order, because some 800 pairs cannot all be fitted
     let gain_of = |a: usize, b: usize| gained(&[&columns[a][..], &columns[b][..]].concat(), &attribution.null.residual);
     let reached = gain_of(best.causes[0], best.causes[1]);
     let others: Vec<usize> = all
@@ -44,6 +45,7 @@ pub fn other_pairs(problem: &Problem, attribution: &Attribution) -> Vec<Fit> {
             }
         }
     }
+    // equal gains in the order of the list, so that the same records give the same ties
     looks.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     let settled = problem.records.iter().all(|record| record.settled);
     looks.truncate(if settled { MOST_SETTLED } else { MOST });

@@ -77,6 +77,7 @@ pub(super) fn second(diagnosis: &Diagnosis) -> Option<&'static str> {
 pub(super) fn training(diagnosis: &Diagnosis) -> Result<Section, ReportError> {
     let (problem, before, after) = (&diagnosis.problem, &diagnosis.given, diagnosis.attribution.state());
     let second = second(diagnosis);
+    // in units of the noise, so that volts and amperes count alike
     let square = |record: usize| {
         let own = (0..crate::record::CHANNELS).flat_map(|n| channel(problem, &before.residual, record, n));
         own.map(|v| v * v).sum::<f64>() / problem.records[record].rows().max(1) as f64

@@ -1,4 +1,8 @@
-//! The steady state in which the plant runs at a given sampled voltage.
+//! The steady state in which the plant runs, from its voltage or from its duty.
+//!
+//! - `settle` finds the duty of a voltage: a regulator is run until nothing moves any more.
+//! - `rest` finds the state of a duty: Newton's method on the map `f` of one period, `(f' - 1) step = x - f(x)`. The
+//!   slopes `f'` are differences of runs from nudged states.
 
 use crate::full::{STATES, States};
 use crate::parameters::Parameters;

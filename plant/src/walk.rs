@@ -1,4 +1,12 @@
 //! A control period with anything in it: gate edges, the start of a PWM period, sensors that look earlier, a load step.
+//!
+//! ```text
+//! s = 0                                                                          s = t_sw
+//! sample ──── gate edge ──── start of PWM ──── load step ──── sensor looks ──── next sample
+//!        duty in force       the new duty
+//! ```
+//!
+//! Invariant: between two instants gates and load stand still. The path changes only where a diode ends the current.
 
 use crate::entry::Way;
 use crate::full::Full;

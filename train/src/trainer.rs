@@ -1,4 +1,12 @@
 //! One training: the loop, what it says on its way, how it is judged.
+//!
+//! ```text
+//! begin_episode ─► sense ─► act ─► plant ─► sense ─► replay ─► learn ─┬─► look, every so often ─► best, met
+//!       ▲                    ▲                                        │
+//!       └── episode over ────┴── next control period ─────────────────┘
+//! ```
+//!
+//! Invariant: what decides how it goes on is in the trainer and its checkpoint. The clock is asked for `Progress` only.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant as Clock;

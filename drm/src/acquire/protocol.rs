@@ -1,4 +1,11 @@
 //! Settle, detect the steady state, measure.
+//!
+//! ```text
+//! periods  |<-- window -->|<-- window -->|<-- window -->|
+//! means         before          last           this        equal, nothing to come, no ringing: settled
+//! ```
+//!
+//! The last window is the measurement. A point that never rests is measured all the same, and says so.
 
 use plant::{Load, Parameters, Regulator, Signals};
 

@@ -1,4 +1,9 @@
 //! From a table of settled points to a mapping, and how far it can be trusted.
+//!
+//! ```text
+//! table ─► points in continuous conduction ─► what they tell apart ─► outliers, by the richer form
+//!       ─► both forms: components, coefficients, leave-one-out ─► choice ─► meaning, remarks ─► Report
+//! ```
 
 mod causes;
 mod meaning;

@@ -193,6 +193,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     let mut profiles = profiles(&problem, &attribution);
     // what is too small for a cause still leaves no structure
     let structure = structures(&problem, &attribution.null, attribution.state(), attribution.inflation);
+    // behind the profiles: whether a cause is nothing is read off its intervals
     let nothing = attribution.leave_out_nothing(&problem, &mut profiles);
     let named = named(&attribution, &profiles);
     let lattice = quantised::cause(&problem);
@@ -214,6 +215,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     };
     let mut causes = if explained { named.clone() } else { Vec::new() };
     if explained {
+        // a step of a converter is named beside other causes; where structure is left nothing is named, not even this
         causes.extend(lattice);
     }
     let shifts = pair.as_ref().map_or_else(Vec::new, |pair| pair.shifts(&problem, state));
@@ -362,6 +364,7 @@ fn hidden(problem: &Problem, attribution: &Attribution) -> Vec<Hidden> {
         let candidate = &attribution.candidates[cause];
         let knob = &candidate.form.knobs[0];
         let reach = candidate.reach();
+        // what would be seen at a usual size is not worth a line
         if smallest > candidate.large().min(reach) {
             list.push(Hidden {
                 id: candidate.cause.id,

@@ -50,6 +50,7 @@ impl Model {
             (sensor.low_pass, sensor.delay) = (0.0, 0.0);
         }
         let p = &mut model.plant;
+        // what stands between command and switch is in the column already
         (p.pwm.duty_delay, p.pwm.duty_lsb, p.pwm.min_on_time) = (0, 0.0, 0.0);
         (p.switch.dead_time, p.switch.turn_on_delay, p.switch.turn_off_delay) = (0.0, 0.0, 0.0);
         model.late = 0.0;
@@ -112,6 +113,7 @@ pub fn simulate(model: &Model, record: &Record, starts: &[Start], trim: f64) -> 
             let turns = model.plant.source.ripple_phase + p.source.ripple_frequency * record.time[segment.start];
             p.source.ripple_phase = turns - turns.floor();
         }
+        // a fit may try numbers that are no converter: NaN costs it that step, and not the diagnosis
         let Ok(mut plant) = Plant::new(&p) else { return shown };
         match record.settled {
             true if driver.repeats(segment.start) => shown[segment.start] = shown[segment.start - 1],
@@ -132,6 +134,7 @@ struct Driver<'a> {
 impl Driver<'_> {
     /// Row of the PWM period in which row `n` is sampled.
     fn period(&self, n: usize) -> usize {
+        // a record has no duties beyond its ends: the first and the last go on
         n.saturating_add_signed(self.whole).min(self.record.rows() - 1)
     }
 

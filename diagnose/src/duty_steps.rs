@@ -36,6 +36,7 @@ pub(crate) fn likely(problem: &Problem, basis: &Basis, residual: &[f64], count: 
         }
         basis.project(&mut column);
         let (along, length) = (dot(&column, residual), dot(&column, &column));
+        // a count that rounds no duty has no response at all
         let share = (along / length.max(1e-300)).clamp(LEAST_SHARE, MOST_SHARE);
         // by how much chi-square falls if that share of the response is taken away
         2.0 * share * along - share * share * length
@@ -90,6 +91,7 @@ fn response(problem: &Problem, counts: f64) -> Vec<f64> {
                 out[offset + row * CHANNELS] = v / problem.sigma[0];
                 out[offset + row * CHANNELS + 1] = i / problem.sigma[1];
                 let next = (row + 1).min(record.rows() - 1);
+                // sampled inside a PWM period, the way to the next sample belongs to two of them
                 for (row, share) in [(row, 1.0 - record.phase), (next, record.phase)] {
                     (v, i) = advanced(problem, record, row, counts, share, (v, i));
                 }

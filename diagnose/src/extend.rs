@@ -13,6 +13,7 @@ use crate::drive::Model;
 pub fn as_plant(model: &Model, trim: f64) -> Parameters {
     let mut p = model.plant.clone();
     let t_sw = p.t_sw();
+    // the same edges as in `drive::simulate`, so that the file shows what was fitted
     p.switch.turn_off_delay += trim.max(0.0) * t_sw;
     p.switch.turn_on_delay += (-trim).max(0.0) * t_sw;
     let phase = p.pwm.sampling_phase + model.late / t_sw;

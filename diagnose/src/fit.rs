@@ -177,6 +177,7 @@ impl Fitter<'_> {
     pub fn unmoved(&self, cause: usize, first_order: f64) -> Fit {
         let values = self.candidates[cause].own.clone();
         let mut state = self.null.clone();
+        // not simulated: only to be ranked among those that were fitted
         state.chi2 -= first_order.max(0.0);
         Fit {
             causes: vec![cause],
@@ -302,6 +303,7 @@ impl Fitter<'_> {
             self.basis.absorb(&left, &mut starts);
             let next = State::at(self.problem, &model, starts);
             if next.chi2 < state.chi2 {
+                // below that a step is Gauss and Newton's anyway, and damping would only take longer to come back
                 *damping = (*damping * 0.1).max(1e-9);
                 return Some((next, moved));
             }

@@ -160,6 +160,7 @@ fn other_chains(problem: &mut Problem, base: &Model, extended: &Model, trim: f64
             starts.trim = trim;
             State::settle(&alone, extended, &starts, None).chi2
         };
+        // `min_by` takes the first of equals: commanded, as without a choice
         let kinds = [DutyIs::Commanded, DutyIs::Applied, DutyIs::Direct];
         let fits = kinds.map(|kind| (chi2(kind, record.is_true), kind));
         let (mut least, best) = fits
@@ -271,6 +272,7 @@ impl Pair {
                 let all = (0..training.records.len()).flat_map(|r| used(noise::channel(training, &at.residual, r, n)));
                 let all: Vec<f64> = all.collect();
                 let own = mean(&all);
+                // training records that lie below their own noise by chance must not make others look worse
                 let usual = (dot(&all, &all) / all.len().max(1) as f64).max(1.0);
                 let apart = (whole - own).abs() > SHIFT_ERRORS * error && whole.abs() > 3.0 * own.abs();
                 // below the noise a shift is no matter

@@ -32,6 +32,7 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
         let of = |record: usize| -> f64 {
             let one = &problem.records[record];
             if one.repeated {
+                // points of a logger have no neighbours in time: their scatter was taken from the rows of each
                 return one.scatter[n] / problem.sigma[n];
             }
             let values = channel(problem, residual, record, n);

@@ -22,6 +22,7 @@ const MOST: usize = 8;
 /// Pairs of causes beside a leading pair with which they have nothing in common; the best first.
 #[must_use]
 pub fn other_pairs(problem: &Problem, attribution: &Attribution) -> Vec<Fit> {
+    // rivals of each cause by itself are found in the search; pairs that share nothing with the leader are not
     let Some(best) = attribution.best.as_ref().filter(|best| best.causes.len() == 2) else {
         return Vec::new();
     };
@@ -50,6 +51,7 @@ pub fn other_pairs(problem: &Problem, attribution: &Attribution) -> Vec<Fit> {
     let settled = problem.records.iter().all(|record| record.settled);
     looks.truncate(if settled { MOST_SETTLED } else { MOST });
     let explained = attribution.null.chi2 - best.state.chi2;
+    // the share is of what is explained: what two simulators differ by grows with the effect
     let worst = best.state.chi2 + (TIE * attribution.inflation).max(TIE_SHARE * explained);
     let mut fits = parallel::map(&looks, |(_, pair)| {
         let values: Vec<f64> = pair

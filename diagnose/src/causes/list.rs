@@ -308,6 +308,7 @@ pub static CAUSES: &[Cause] = &[
         forms: &[searched(
             "voltage below which constant power becomes a resistor",
             &[knob("v_fold", &["load.v_fold"], Reach::Voltage(0.01, 1.5, 0.01))],
+            // denser towards the held voltage: a fold below all voltages of a record does nothing and has no slope
             Search::From(&[&[55.0], &[70.0], &[80.0], &[86.0], &[91.0], &[96.0], &[101.0]]),
         )],
     },

@@ -118,6 +118,7 @@ fn by_operating_point(diagnosis: &Diagnosis) -> Result<Svg, ReportError> {
         for (index, record) in problem.records.iter().enumerate() {
             let errors = errors(problem, state, index, 0);
             let drawn = record.measured[0].iter().zip(&record.load);
+            // a voltage of 0 would send the point beyond any picture
             let drawn = drawn.map(|(v, load)| load.current + load.conductance * v + load.power / v.max(1e-3));
             points.extend(drawn.zip(errors).filter(|(i, e)| i.is_finite() && e.is_finite()));
         }

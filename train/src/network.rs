@@ -236,8 +236,8 @@ impl Network {
             y.clear();
             y.extend_from_slice(&self.parameters[layer.bias.clone()]);
             let rows = self.parameters[layer.weights.clone()].chunks_exact(layer.outputs);
-            // inputs outside, outputs inside: each sum keeps the contract's order, and the compiler may take several at once.
-            // Rust never contracts the product and the sum to a fused operation
+            // inputs outside, outputs inside: each sum keeps the contract's order, and the compiler may take several at
+            // once. Rust never contracts the product and the sum to a fused operation
             for (row, &x) in rows.zip(x.iter()) {
                 for (sum, &w) in y.iter_mut().zip(row) {
                     *sum += w * x;

@@ -71,6 +71,7 @@ impl Inputs {
             *sample = match (input.adc, self.scalar) {
                 (None, Scalar::F32) => Sample::Physical(x as f32),
                 (None, Scalar::F64) => Sample::Wide(x),
+                // `as` saturates; a code out of range is the controller's to judge
                 (Some(adc), _) => Sample::Code(((x - adc.offset) / adc.gain).round() as i32),
             };
         }
@@ -109,6 +110,7 @@ impl<T: Real> Agent<T> {
     /// The observation of the last [`Agent::sense`].
     #[must_use]
     pub fn observation(&self) -> &[T] {
+        // one dimension, owned: always a slice
         self.trace.observation.as_slice().unwrap_or_default()
     }
 

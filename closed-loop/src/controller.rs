@@ -183,6 +183,7 @@ impl Trajectory {
                 load.current,
                 load.conductance,
             ];
+            // as bits: two NaN are equal here, and zeros of both signs are not
             (numbers.map(f64::to_bits), period.answer.action, period.answer.status)
         };
         let (a, b) = (&self.periods, &other.periods);

@@ -61,11 +61,13 @@ impl Environment for Converter {
     }
 
     fn identity(&self) -> Vec<u8> {
+        // `{:?}` writes every number so that it survives the round trip: different plants give different texts
         Sha256::digest(format!("{:?}", self.nominal)).to_vec()
     }
 
     fn restart(&mut self, start: &Start<'_>) -> Result<Sample, Error> {
         let mut parameters = varied(&self.nominal, start.varied);
+        // a seed of 0, as scenarios have it, leaves the noise of the plant's file
         parameters.sensors.seed ^= start.seed;
         self.plant = Plant::new(&parameters)?;
         Ok(self.plant.reset_at(start.v_out, start.i_l, &start.load))
@@ -82,6 +84,7 @@ impl Environment for Converter {
     }
 
     fn save(&self) -> Result<Vec<u8>, Error> {
+        // the parameters too: an episode may have varied them
         let whole = (self.plant.parameters(), self.plant.state());
         serde_json::to_vec(&whole).map_err(|error| Message::new(format!("cannot write the plant down: {error}")).into())
     }

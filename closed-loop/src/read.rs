@@ -38,6 +38,7 @@ pub fn plant_numbers(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<(String
         known_parameter(&key.value, &value, faults);
         let Some(number) = value.number(faults) else { continue };
         let allowed = plant::parameter(&key.value).map(|parameter| parameter.allowed);
+        // the plant checks it again; only here the line is known
         if let Some((low, high)) = allowed
             && !(low..=high).contains(&number)
         {

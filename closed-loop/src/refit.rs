@@ -39,6 +39,7 @@ impl<E: Environment> Bench for AtEnvironment<E> {
 
     fn step(&mut self, duty: f64, load: &Load) -> Result<Signals, Error> {
         let sample = self.0.step(duty, &LoadPath::constant(*load));
+        // a simulator that has failed has no other way to say so
         match sample.v_out.is_finite() {
             true => Ok(sample.measured),
             false => Err(Message::new("the simulation of the converter failed").into()),
@@ -91,6 +92,7 @@ impl Refit<'_> {
         let (low, high) = duties(&self.policy.actions);
         let low = (low * own).max((1.0 - BESIDE) * self.v_ref);
         let high = (high * own).min((1.0 + BESIDE) * self.v_ref).min(0.97 * v_in.min(own));
+        // for its head only: the points below are voltages to be held, not duties
         let mut plan = Plan::new(own, &[0.5], &[LoadSetting::Current(1.0)], 0.0)?;
         plan.points.clear();
         for load in self.loads() {
@@ -99,6 +101,7 @@ impl Refit<'_> {
                 let point = PlanPoint {
                     duty: v_out / own,
                     load,
+                    // loads of constant power have no stable open loop
                     hold: Hold::ClosedLoop(v_out),
                 };
                 plan.points.push((point, None));
@@ -143,6 +146,7 @@ impl Refit<'_> {
     /// # Errors
     /// If the contract does not allow such a mapping.
     pub fn with(&self, map: &DutyRatioMap) -> Result<Policy, Error> {
+        // through its text, so that digits and checks are those of a file
         let mut mapping = policy::read_mapping(Path::new("drm.toml"), &map.to_toml(""))?;
         let mut policy = self.policy.clone();
         mapping.load_current = policy.mapping.map_or(0, |mapping| mapping.load_current);

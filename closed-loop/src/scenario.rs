@@ -231,6 +231,7 @@ impl<E: Environment, C: FnMut(&Sample) -> f64> Loop<E, C> {
                 duty,
                 load,
             });
+            // `f64::max` ignores a NaN, so a run that diverged would look good
             let size = if error.is_finite() { error.abs() } else { f64::INFINITY };
             metrics.deviation = metrics.deviation.max(size);
             if size > SETTLED {
@@ -244,6 +245,7 @@ impl<E: Environment, C: FnMut(&Sample) -> f64> Loop<E, C> {
         }
         metrics.tail_mean = (sum / tail as f64).abs();
         metrics.ripple = ripple / tail as f64;
+        // a mean that is NaN would vanish in `Metrics::worst`
         if metrics.deviation.is_infinite() {
             metrics.tail_mean = f64::INFINITY;
         }
@@ -271,6 +273,7 @@ impl Task {
     #[must_use]
     pub fn all_instants(&self) -> Vec<Instant> {
         let sampling = (0..self.sampling_instants.max(1)).map(|periods| Instant { periods, phase: 0.0 });
+        // from 1: the first is a sampling instant and stands above
         let others = (1..self.instants).map(|k| Instant {
             periods: k,
             phase: k as f64 / self.instants as f64,
@@ -300,6 +303,7 @@ where
     let mut run = Loop::start(environment, controller, v_ref, from)?;
     let mut records = Vec::new();
     let lead = task.lead + instant.periods;
+    // the last period of the lead is `last_before`, in which a step at a sampling instant takes place
     run.lead(lead - 1, task.tail, |record| records.push(record));
     run.last_before(to, instant.phase, task.tail, |record| records.push(record));
     let metrics = run.measure(to, instant.phase, task.after, task.tail, |record| records.push(record));
@@ -335,6 +339,7 @@ where
     let last = instants.iter().map(|instant| instant.periods).max().unwrap_or(0);
     for period in 0..=last {
         for instant in instants.iter().filter(|instant| instant.periods == period) {
+            // from here on every instant has a run of its own; the lead is common to all
             let mut run = run.clone();
             run.last_before(to, instant.phase, task.tail, quiet);
             let metrics = run.measure(to, instant.phase, task.after, task.tail, quiet);

@@ -120,6 +120,7 @@ fn check(task: &Task, document: &Document, root: &Table<'_>, faults: &mut Sink) 
             .expected("the tail is the last part of the periods after the step");
         faults.push(fault(["tail", "after"], message));
     }
+    // instants come one period after the other, so the last of them makes the lead that much longer
     let longest = task.lead + task.after + task.instants.max(task.sampling_instants);
     if longest > LONGEST_RUN {
         let message = Message::new("a run is too long")
@@ -139,6 +140,7 @@ fn baselines(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<Kind>> {
     let mut kinds = value.each("names: [\"pid\", \"deadbeat\"]", faults, |item, faults| {
         item.choice(&choices, faults)
     })?;
+    // in the order of the page, whatever that of the file
     kinds.sort();
     kinds.dedup();
     Some(kinds)
@@ -147,6 +149,7 @@ fn baselines(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<Kind>> {
 /// `false`, the duties the limit may use, or several of them.
 fn limits(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<[f64; 2]>> {
     let Some(items) = value.as_list() else {
+        // its fault is thrown away: that of `list` names all forms there are
         let Some(wanted) = value.boolean(&mut Sink::new()) else {
             value.list("`false`, duties [low, high], or several of them", faults);
             return None;

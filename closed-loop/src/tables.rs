@@ -182,6 +182,7 @@ pub fn trajectory_csv(trajectory: &Trajectory, kind: LoadKind) -> String {
             .unwrap_or_default();
         let _ = writeln!(
             out,
+            // time to a nanosecond: as a product it would otherwise show the last bits of its factors
             "{:.9},{},{},{},{},{},{},{},{},{action},{}",
             record.time,
             kind.value(&record.load),

@@ -31,6 +31,7 @@ pub struct Target {
 
 /// Periods after which an effort counts as in vain.
 const LONGEST: usize = 400;
+// down to 1e-12 of the range
 const BISECTIONS: usize = 40;
 const NEWTON_STEPS: usize = 12;
 
@@ -69,6 +70,7 @@ impl TimeOptimal {
         if let Some(duty) = self.deadbeat(v_out, i_l, load, target) {
             return duty;
         }
+        // the arrival rises with the duty, so the ends decide first whether there is anything to bisect
         let [mut low, mut high] = self.range;
         if self.arrival(v_out, i_l, high, load, target) <= target.v_out {
             return high;
@@ -92,6 +94,7 @@ impl TimeOptimal {
         let allowed = |duty: f64| (self.range[0]..=self.range[1]).contains(&duty);
         let (a, b) = (self.current_gain, self.voltage_gain);
         let later = 1.0 - self.rest;
+        // Newton from the duty at rest with the gains of the linear circuit; only DCM and load bend it
         let mut duties = [self.rest; 2];
         for _ in 0..NEWTON_STEPS {
             self.model.reset_at(v_out, i_l, load);
@@ -127,6 +130,7 @@ impl TimeOptimal {
             }
             sample = next;
         }
+        // the effort cannot turn the current: whatever is wanted, this duty goes too far
         if braking { f64::INFINITY } else { f64::NEG_INFINITY }
     }
 }

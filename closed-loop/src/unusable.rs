@@ -47,6 +47,7 @@ fn outside(period: &Period, policy: &Policy) -> Option<String> {
     };
     policy.signals.iter().find_map(|signal| {
         let (x, range) = (value(&signal.name)?, signal.range);
+        // in this form NaN is outside as well
         (!(range.low..=range.high).contains(&x)).then(|| {
             format!(
                 "`{}` is {x:.2} {unit}, outside of its range {} to {} {unit}",

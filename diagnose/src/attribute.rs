@@ -126,6 +126,7 @@ impl Attribution {
         self.rivals = kept.iter().map(|member| self.rivals[*member].clone()).collect();
         profiles.retain(|profile| kept.contains(&profile.member));
         for profile in profiles {
+            // always found: `retain` has left only members that are kept
             profile.member = kept.iter().position(|m| *m == profile.member).unwrap_or(0);
         }
         self.best = fit;
@@ -158,12 +159,15 @@ impl Attribution {
         let sizes = parallel::map(&all, |cause| {
             let candidate = &self.candidates[*cause];
             let taken = self.best.as_ref().is_some_and(|fit| fit.causes.contains(cause));
+            // first order says something near the model's own value only
             if taken || candidate.form.search != Search::Own {
                 return None;
             }
             let column = fitter.sensitivity(*cause, state).into_iter().next()?;
+            // what the causes found can imitate would not be seen
             let seen = dot(&column, &column) - if own.is_empty() { 0.0 } else { gained(&own, &column) };
             let needed = threshold(1, self.inflation);
+            // chi-square grows with the square of the size
             Some((*cause, candidate.ranges[0][2] * (needed / seen.max(1e-12)).sqrt()))
         });
         sizes.into_iter().flatten().collect()

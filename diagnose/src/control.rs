@@ -115,6 +115,7 @@ pub fn load_steps<'a>(records: impl Iterator<Item = &'a Record>, v_ref: f64) -> 
 /// # Errors
 /// If the policy does not fit the converter, or the settled points determine no mapping.
 pub fn control(request: &Request, extended: &Parameters) -> Result<Control, Error> {
+    // only to fit: the runs below have ripple and noise
     let (nominal, real) = (quiet(&request.trained_on), quiet(extended));
     let refit = Refit {
         policy: &request.policy,
@@ -135,6 +136,7 @@ pub fn control(request: &Request, extended: &Parameters) -> Result<Control, Erro
     let map = if refitted { fitted } else { own };
     let (unmapped, after) = (refit.with(&DutyRatioMap::IDENTITY)?, refit.with(&map)?);
     let runs = [
+        // in the simulation of its training a policy needs no mapping
         run(request, &unmapped, &request.trained_on)?,
         run(request, &request.policy, extended)?,
         run(request, &after, extended)?,
@@ -218,6 +220,7 @@ fn furthest(own: &DutyRatioMap, fitted: &DutyRatioMap) -> f64 {
 /// The policy over all load steps at a converter: figures, and the periods of each step's first instant.
 fn run(request: &Request, policy: &Policy, converter: &Parameters) -> Result<Vec<(Metrics, Vec<Period>)>, Error> {
     let environment = Converter::new(converter)?;
+    // figures, not bits: binary32 will do for every format
     let mut agent = Agent::<f32>::new(policy)?;
     let mut one = |step: &LoadStep| {
         let mut finding = Finding::new(*step);

@@ -185,6 +185,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     let (problem, null, outliers) = prepared(train, &base);
     let mut attribution = attribute(&problem, null, say);
     let others = crate::ties::other_pairs(&problem, &attribution);
+    // they stand in the place of all causes together: said once, at the first
     for rivals in attribution.rivals.iter_mut().take(1) {
         rivals.extend(others.iter().cloned());
     }
@@ -192,6 +193,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     let mut profiles = profiles(&problem, &attribution);
     // what is too small for a cause still leaves no structure
     let structure = structures(&problem, &attribution.null, attribution.state(), attribution.inflation);
+    // behind the profiles: whether a cause is nothing is read off its intervals
     let nothing = attribution.leave_out_nothing(&problem, &mut profiles);
     let named = named(&attribution, &profiles);
     let lattice = quantised::cause(&problem);
@@ -213,6 +215,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     };
     let mut causes = if explained { named.clone() } else { Vec::new() };
     if explained {
+        // a step of a converter is named beside other causes; where structure is left nothing is named, not even this
         causes.extend(lattice);
     }
     let shifts = pair.as_ref().map_or_else(Vec::new, |pair| pair.shifts(&problem, state));
@@ -277,6 +280,8 @@ fn as_given(problem: &Problem, base: &Model) -> State {
 fn prepared(train: Vec<Record>, base: &Model) -> (Problem, State, Vec<Outlier>) {
     let mut problem = Problem::new(train, base.clone());
     let mut null = State::settle(&problem, base, &problem.first_starts(), None);
+    // noise before the instants of loggers and before outliers, which are judged in its units; and again without the
+    // outliers
     problem.sigma = noise::sigma(&problem, &null.residual);
     sampling::decide(&mut problem, base);
     null = State::settle(&problem, base, &null.starts, None);
@@ -309,6 +314,7 @@ fn named(attribution: &Attribution, profiles: &[Profile]) -> Vec<Named> {
         });
         let rivals = attribution.rivals[member].iter().map(|fit| {
             let mut ids: Vec<&str> = fit.causes.iter().map(|cause| attribution.id(*cause)).collect();
+            // two forms of one cause are one cause to a reader
             ids.dedup();
             ids
         });
@@ -318,6 +324,7 @@ fn named(attribution: &Attribution, profiles: &[Profile]) -> Vec<Named> {
             parameters: parameters.collect(),
             evidence: Evidence {
                 delta_chi2: attribution.evidence[member] / attribution.inflation,
+                // without the inflation: the evidence is over it already
                 threshold: crate::attribute::threshold(candidate.own.len(), 1.0),
             },
             rivals: each_once(rivals),
@@ -337,6 +344,7 @@ fn each_once(sets: impl Iterator<Item = Vec<&'static str>>) -> Vec<Vec<&'static 
 }
 
 fn verdict(named: &[Named], lattice: &Option<Named>, structure: &[Structure]) -> Verdict {
+    // before anything else: where the truth is not on the list, its best cause imitates it with a wrong value
     if !structure.is_empty() {
         return Verdict::Unexplained;
     }
@@ -356,6 +364,7 @@ fn hidden(problem: &Problem, attribution: &Attribution) -> Vec<Hidden> {
         let candidate = &attribution.candidates[cause];
         let knob = &candidate.form.knobs[0];
         let reach = candidate.reach();
+        // what would be seen at a usual size is not worth a line
         if smallest > candidate.large().min(reach) {
             list.push(Hidden {
                 id: candidate.cause.id,

@@ -1,4 +1,11 @@
 //! Drives the plant by a record: its duties, set loads and sampling instants.
+//!
+//! ```text
+//! PWM periods       | duty[n], load[n]          | duty[n+1], load[n+1]      |
+//! sampling instants |       ^ row n             |       ^ row n+1           |    phase + late / t_sw
+//! ```
+//!
+//! A row is a PWM period. Samples that come whole periods later are moved by rows; the rest is the plant's phase.
 
 use measured::{DutyIs, Sampled};
 use plant::{Parameters, Plant, Signals};
@@ -6,6 +13,7 @@ use plant::{Parameters, Plant, Signals};
 use crate::record::{CHANNELS, Record, Segment};
 
 /// Duties before a segment that the plant is given: more than it can delay.
+// eight that wait and the one in force
 const HISTORY: usize = 9;
 /// Time constant that stands for the mean over a settled point, periods: it lets through less than 0.2 % of a
 /// ripple at the switching frequency.
@@ -42,6 +50,7 @@ impl Model {
             (sensor.low_pass, sensor.delay) = (0.0, 0.0);
         }
         let p = &mut model.plant;
+        // what stands between command and switch is in the column already
         (p.pwm.duty_delay, p.pwm.duty_lsb, p.pwm.min_on_time) = (0, 0.0, 0.0);
         (p.switch.dead_time, p.switch.turn_on_delay, p.switch.turn_off_delay) = (0.0, 0.0, 0.0);
         model.late = 0.0;
@@ -67,11 +76,13 @@ pub fn simulate(model: &Model, record: &Record, starts: &[Start], trim: f64) -> 
     let mut p = model.plant.clone();
     p.converter.v_in *= record.v_in_ratio;
     for (sensor, is_true) in sensors(&mut p).into_iter().zip(record.is_true) {
+        // the record has its own; a model that rounds or scatters predicts nothing better
         (sensor.noise, sensor.lsb) = (0.0, 0.0);
         if is_true {
             *sensor = plant::Sensor::default();
         }
     }
+    // as late edges, which add or take duty whatever the commanded one is; a delay cannot be negative, hence two
     p.switch.turn_off_delay += trim.max(0.0) * p.t_sw();
     p.switch.turn_on_delay += (-trim).max(0.0) * p.t_sw();
     let instant = record.phase + model.late / p.t_sw();
@@ -98,9 +109,11 @@ pub fn simulate(model: &Model, record: &Record, starts: &[Start], trim: f64) -> 
     };
     for (segment, start) in record.segments.iter().zip(starts) {
         if p.source.ripple > 0.0 {
+            // the plant's time starts at 0 with each segment, the line's phase does not
             let turns = model.plant.source.ripple_phase + p.source.ripple_frequency * record.time[segment.start];
             p.source.ripple_phase = turns - turns.floor();
         }
+        // a fit may try numbers that are no converter: NaN costs it that step, and not the diagnosis
         let Ok(mut plant) = Plant::new(&p) else { return shown };
         match record.settled {
             true if driver.repeats(segment.start) => shown[segment.start] = shown[segment.start - 1],
@@ -121,6 +134,7 @@ struct Driver<'a> {
 impl Driver<'_> {
     /// Row of the PWM period in which row `n` is sampled.
     fn period(&self, n: usize) -> usize {
+        // a record has no duties beyond its ends: the first and the last go on
         n.saturating_add_signed(self.whole).min(self.record.rows() - 1)
     }
 
@@ -141,6 +155,7 @@ impl Driver<'_> {
             let now = self.period(n);
             let before = self.period(n - 1);
             let sample = if self.phase > 0.0 {
+                // rows are PWM periods, and between two samples inside of them the next period starts at 1 - phase
                 plant.step_with_change(duty[now], &load[before], &load[now], 1.0 - self.phase)
             } else {
                 plant.step(duty[before], &load[before])

@@ -36,13 +36,16 @@ pub(crate) fn likely(problem: &Problem, basis: &Basis, residual: &[f64], count: 
         }
         basis.project(&mut column);
         let (along, length) = (dot(&column, residual), dot(&column, &column));
+        // a count that rounds no duty has no response at all
         let share = (along / length.max(1e-300)).clamp(LEAST_SHARE, MOST_SHARE);
+        // by how much chi-square falls if that share of the response is taken away
         2.0 * share * along - share * share * length
     });
     let mut pieces: Vec<(f64, Range<usize>)> = pieces(problem, &numbers)
         .into_iter()
         .map(|piece| (gains[piece.clone()].iter().copied().fold(0.0, f64::max), piece))
         .collect();
+    // equal gains in the order of the counts, so that the same records give the same starts
     pieces.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.start.cmp(&b.1.start)));
     let mut found: Vec<f64> = Vec::new();
     for (_, piece) in pieces.into_iter().take(count) {
@@ -61,6 +64,7 @@ fn pieces(problem: &Problem, numbers: &[f64]) -> Vec<Range<usize>> {
     let mut duties: Vec<f64> = problem.records.iter().flat_map(|r| r.duty.iter().copied()).collect();
     duties.sort_by(f64::total_cmp);
     duties.dedup();
+    // as the plant rounds: half up
     let count = |duty: f64, counts: f64| libm::floor(duty * counts + 0.5);
     let mut list = Vec::new();
     let mut start = 0;
@@ -87,6 +91,7 @@ fn response(problem: &Problem, counts: f64) -> Vec<f64> {
                 out[offset + row * CHANNELS] = v / problem.sigma[0];
                 out[offset + row * CHANNELS + 1] = i / problem.sigma[1];
                 let next = (row + 1).min(record.rows() - 1);
+                // sampled inside a PWM period, the way to the next sample belongs to two of them
                 for (row, share) in [(row, 1.0 - record.phase), (next, record.phase)] {
                     (v, i) = advanced(problem, record, row, counts, share, (v, i));
                 }
@@ -111,6 +116,7 @@ fn advanced(
     let pushed = p.converter.v_in * record.v_in_ratio * (rounded - duty);
     let r = p.inductor.dcr + 0.5 * (p.switch.r_ds_on + p.switch.r_d);
     let load = &record.load[row];
+    // to small changes a constant power is a negative conductance
     let g = load.conductance - load.power / (problem.bases.v * problem.bases.v);
     let h = share * problem.bases.t_sw / FINE as f64;
     for _ in 0..FINE {

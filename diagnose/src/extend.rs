@@ -13,12 +13,14 @@ use crate::drive::Model;
 pub fn as_plant(model: &Model, trim: f64) -> Parameters {
     let mut p = model.plant.clone();
     let t_sw = p.t_sw();
+    // the same edges as in `drive::simulate`, so that the file shows what was fitted
     p.switch.turn_off_delay += trim.max(0.0) * t_sw;
     p.switch.turn_on_delay += (-trim).max(0.0) * t_sw;
     let phase = p.pwm.sampling_phase + model.late / t_sw;
     if (0.0..1.0).contains(&phase) {
         p.pwm.sampling_phase = phase;
     } else if model.late < 0.0 {
+        // earlier than its PWM period: what is shown is then that much older
         for sensor in crate::drive::sensors(&mut p) {
             sensor.delay -= model.late;
         }
@@ -83,6 +85,7 @@ pub fn extended_toml(diagnosis: &Diagnosis) -> String {
     for parameter in plant::parameters() {
         let (was, is) = (parameter.get(before), parameter.get(&after));
         let needed = plant::REQUIRED.contains(&parameter.key);
+        // a number that came back to neutral is written all the same: a reader looks for what has changed
         if is == parameter.neutral && !needed && was == is {
             continue;
         }
@@ -92,6 +95,7 @@ pub fn extended_toml(diagnosis: &Diagnosis) -> String {
         let value = match parameter.choices().get(is as usize) {
             Some(word) => format!("\"{word}\""),
             None if parameter.is_whole() => format!("{}", is as u64),
+            // `{:?}`, because `{}` writes 1 for 1.0, which is an integer in TOML
             None => format!("{is:?}"),
         };
         let unit = if parameter.is_pure() {

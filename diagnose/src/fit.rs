@@ -1,4 +1,13 @@
 //! Damped least squares (Levenberg-Marquardt) of a few parameters on the switched model, initial states beside them.
+//!
+//! ```text
+//! in    causes, first values, a state: model, initial states, residual over noise
+//! step  J: change of the signals for a step of each parameter, less what initial states explain
+//!       (J'J + damping) step = J' residual, then the initial states take up the rest
+//! out   values, state, covariance
+//! ```
+//!
+//! Invariant: values stay within their ranges, and chi-square only falls.
 
 use crate::causes::{Candidate, Search};
 use crate::drive::Model;
@@ -77,6 +86,7 @@ impl State {
             basis.absorb(&state.residual, &mut starts);
             let next = Self::at(problem, model, starts);
             let gain = state.chi2 - next.chi2;
+            // linear in the initial states only near them: a step that costs is not taken
             if gain > 0.0 {
                 state = next;
             }
@@ -167,6 +177,7 @@ impl Fitter<'_> {
     pub fn unmoved(&self, cause: usize, first_order: f64) -> Fit {
         let values = self.candidates[cause].own.clone();
         let mut state = self.null.clone();
+        // not simulated: only to be ranked among those that were fitted
         state.chi2 -= first_order.max(0.0);
         Fit {
             causes: vec![cause],
@@ -204,18 +215,21 @@ impl Fitter<'_> {
             .filter(|n| held != Some(*n) && self.is_smooth(places[*n]))
             .collect();
         let mut covariance = vec![vec![0.0; places.len()]; places.len()];
+        // a convention, as Marquardt's factor of ten in `improve`
         let mut damping = 1e-3;
         for _ in 0..self.effort.steps {
             if smooth.is_empty() {
                 break;
             }
             let round = self.round(&places, &smooth, &state);
+            // before the step: a fit that cannot improve has a covariance all the same
             round.normal.covariance(&smooth, &round.jacobian.scale, &mut covariance);
             let Some((next, moved)) = self.improve(&round, &values, &state, &mut damping) else {
                 break;
             };
             let gain = state.chi2 - next.chi2;
             (state, values) = (next, moved);
+            // relative as well: of a chi-square in the millions a gain of 1 decides nothing
             if gain < self.effort.small_gain.max(1e-6 * state.chi2) {
                 break;
             }
@@ -257,6 +271,7 @@ impl Fitter<'_> {
                 .collect();
             let mut projected = raw.clone();
             self.basis.project(&mut projected);
+            // both: the step is found without what initial states explain, and they then take up the whole change
             jacobian.raw.push(raw);
             jacobian.projected.push(projected);
             jacobian.scale.push(range[2]);
@@ -288,6 +303,7 @@ impl Fitter<'_> {
             self.basis.absorb(&left, &mut starts);
             let next = State::at(self.problem, &model, starts);
             if next.chi2 < state.chi2 {
+                // below that a step is Gauss and Newton's anyway, and damping would only take longer to come back
                 *damping = (*damping * 0.1).max(1e-9);
                 return Some((next, moved));
             }
@@ -344,6 +360,7 @@ impl Normal {
     fn step(&self, damping: f64) -> Vec<f64> {
         let mut matrix = self.matrix.clone();
         for (n, row) in matrix.iter_mut().enumerate() {
+            // a parameter without any effect has an equation of zeros
             row[n] = row[n] * (1.0 + damping) + 1e-12;
         }
         solve(&matrix, &self.right)
@@ -353,6 +370,7 @@ impl Normal {
         let n = self.right.len();
         let mut matrix = self.matrix.clone();
         for (k, row) in matrix.iter_mut().enumerate() {
+            // two parameters with one effect would make the matrix singular; this bounds their variance instead
             row[k] = row[k] * (1.0 + 1e-9) + 1e-12;
         }
         for column in 0..n {
@@ -380,6 +398,7 @@ pub fn solve(matrix: &[Vec<f64>], right: &[f64]) -> Vec<f64> {
                 false => 0.0,
             };
         }
+        // rounding of the sums: such a direction would get a step of any size
         if l[row][row] * l[row][row] < 1e-13 * matrix[row][row] {
             l[row][row] = 0.0;
         }

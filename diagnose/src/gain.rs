@@ -116,7 +116,9 @@ pub struct Pair {
 #[must_use]
 pub fn hold(records: &[Record], base: &Model, extended: &Model, sigma: [f64; CHANNELS], trim: f64) -> Pair {
     let mut problem = Problem::new(records.to_vec(), base.clone());
+    // a channel that no training record has gets no weight
     problem.sigma = sigma.map(|s| if s.is_finite() { s } else { f64::INFINITY });
+    // a trim that is fitted to a record that judges would flatter the model
     problem.trim_held = true;
     sampling::decide(&mut problem, extended);
     let remarks = other_chains(&mut problem, base, extended, trim);
@@ -158,6 +160,7 @@ fn other_chains(problem: &mut Problem, base: &Model, extended: &Model, trim: f64
             starts.trim = trim;
             State::settle(&alone, extended, &starts, None).chi2
         };
+        // `min_by` takes the first of equals: commanded, as without a choice
         let kinds = [DutyIs::Commanded, DutyIs::Applied, DutyIs::Direct];
         let fits = kinds.map(|kind| (chi2(kind, record.is_true), kind));
         let (mut least, best) = fits
@@ -234,6 +237,7 @@ impl Pair {
             rmse_before: sigma * a.sqrt(),
             rmse_after: sigma * b.sqrt(),
             floor: sigma,
+            // errors without their noise, which adds in squares and which no model removes
             removed: (a > 1.0 + above).then(|| 1.0 - (b - 1.0).max(0.0).sqrt() / (a - 1.0).sqrt()),
             unit: CHANNEL_UNITS[n],
             rows: rows.len(),
@@ -268,6 +272,7 @@ impl Pair {
                 let all = (0..training.records.len()).flat_map(|r| used(noise::channel(training, &at.residual, r, n)));
                 let all: Vec<f64> = all.collect();
                 let own = mean(&all);
+                // training records that lie below their own noise by chance must not make others look worse
                 let usual = (dot(&all, &all) / all.len().max(1) as f64).max(1.0);
                 let apart = (whole - own).abs() > SHIFT_ERRORS * error && whole.abs() > 3.0 * own.abs();
                 // below the noise a shift is no matter

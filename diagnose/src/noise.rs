@@ -32,6 +32,7 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
         let of = |record: usize| -> f64 {
             let one = &problem.records[record];
             if one.repeated {
+                // points of a logger have no neighbours in time: their scatter was taken from the rows of each
                 return one.scatter[n] / problem.sigma[n];
             }
             let values = channel(problem, residual, record, n);
@@ -43,10 +44,12 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
             let shown: Vec<f64> = rows.iter().map(|row| values[*row]).collect();
             scatter(&shown, |triple| triple.iter().all(|v| *v != 0.0))
         };
+        // the median: one noisy record must not hide what the others show
         let typical = median((0..problem.records.len()).map(of));
         let steps = problem.records.iter().map(|r| r.lattice[n].max(r.resolution[n]));
         let lattice = steps.fold(0.0, f64::max);
         let scale = [problem.bases.v, problem.bases.i, problem.bases.i, problem.bases.v_in][n];
+        // step / sqrt 12: the standard deviation of rounding
         let least = (lattice / 12f64.sqrt()).max(1e-5 * scale).max(stuck(problem, n));
         let has = problem
             .records
@@ -116,6 +119,7 @@ pub fn outliers(problem: &Problem, residual: &[f64]) -> Vec<Outlier> {
             let left = channel(problem, residual, index, n);
             let raw: Vec<f64> = record.measured[n].iter().map(|v| v / problem.sigma[n]).collect();
             for row in 2..record.rows().saturating_sub(2) {
+                // both: what leaps in the signal alone the model explains, what leaps in the residual alone it brings
                 if leaps(&left, row) && leaps(&raw, row) {
                     found.push(Outlier {
                         record: index,
@@ -154,6 +158,7 @@ pub fn inflation(problem: &Problem, residual: &[f64]) -> f64 {
                 *sum += a.iter().zip(a.iter().skip(lag + 1)).map(|(x, y)| x * y).sum::<f64>();
             }
             for b in &all[..k] {
+                // of differences: a slow error of the model is alike in all records and no noise
                 let (da, db) = (differences(a), differences(b));
                 let scale = (dot(&da, &da) * dot(&db, &db)).sqrt();
                 if scale > 0.0 {

@@ -60,6 +60,7 @@ fn causes(diagnosis: &Diagnosis) -> Section {
             let rivals: Vec<String> = cause.rivals.iter().map(|ids| ids.join(" + ")).collect();
             for (name, v) in &cause.parameters {
                 let evidence = cause.evidence.delta_chi2;
+                // the step of a converter is read off, not fitted: `quantised` writes f64::MAX
                 let evidence = if evidence < 1e300 {
                     evidence.into()
                 } else {
@@ -118,6 +119,7 @@ fn profiles(diagnosis: &Diagnosis) -> Result<Section, ReportError> {
             format!("{id}: {}", profile.name),
             Axis::new(profile.name).unit(unit(profile.unit)),
         );
+        // the level at which `profile` ends its intervals
         let svg = chart.panel(panel.y_line(3.84, "95 %")).svg()?;
         section = section.chart(svg, "");
     }
@@ -136,6 +138,7 @@ fn ties(diagnosis: &Diagnosis) -> Section {
     table = table.text("to separate").text("do").number("separation", 1);
     let mut shown = Vec::new();
     for next in &findings.next_experiments {
+        // the best experiment of a tie comes first
         if shown.contains(&&next.separates) {
             continue;
         }

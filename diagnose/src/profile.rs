@@ -48,6 +48,7 @@ impl Profile {
 
     /// Cost of a value that was tried.
     fn cost(&self, value: f64) -> f64 {
+        // exact: the ends of the curve come from the same expression
         let tried = self.curve.iter().find(|(x, _)| *x == value);
         tried.map_or(0.0, |(_, cost)| *cost)
     }
@@ -87,6 +88,7 @@ pub fn profiles(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
         if candidate.form.search == Search::Counter {
             profile.interval = [-1.0, 1.0].map(|side| alike(value, side, &at_value));
         }
+        // without a slope there is no scale at which to try other values
         if !fitter.is_smooth(place) || sigma.is_nan() || sigma <= 0.0 {
             return profile;
         }
@@ -107,9 +109,11 @@ pub fn profiles(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
                 profile.curve.push((far, cost));
             }
             let statistical = match cost > 0.3 {
+                // the parabola through the best value and this one, carried to the level
                 true => (far - value) * (LEVEL / cost).sqrt(),
                 false => at.signum() * (high - low),
             };
+            // a simulator that is off by a share of a response puts the parameter off by that share of its change
             let systematic = TWO_SIDED * ACCURACY * (value - profile.own);
             // without the cause, chi-square is what its evidence says: the interval ends before that
             let none = profile.own - value;
@@ -121,6 +125,7 @@ pub fn profiles(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
                 }
                 _ => statistical,
             };
+            // noise and the simulator's error have nothing to do with each other: they add in squares
             let reach = at.signum() * statistical.hypot(systematic);
             profile.interval[side] = (value + reach).clamp(low, high);
         }
@@ -138,6 +143,7 @@ fn alike(step: f64, side: f64, cost: &dyn Fn(f64) -> f64) -> f64 {
         let cost = cost(moved(counts));
         if cost > LEVEL {
             let within = counts * (LEVEL / cost).sqrt();
+            // not short of a shift that was tried and allowed
             return moved(within.max(reached));
         }
         reached = counts;

@@ -67,6 +67,7 @@ pub fn cause(problem: &Problem) -> Option<Named> {
         words: "step of the analogue-to-digital converter",
         parameters,
         evidence: Evidence {
+            // read off the values, not fitted
             delta_chi2: f64::MAX,
             threshold: 0.0,
         },

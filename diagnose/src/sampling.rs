@@ -42,6 +42,7 @@ pub fn decide(problem: &mut Problem, model: &Model) {
         let record = &mut problem.records[index];
         if least >= mean - CLEARLY {
             record.sampled = Some(Sampled::Mean);
+            // said only where the data decided; where both fit alike a mean is what anybody would assume
             if least > mean + CLEARLY {
                 record.repairs.push(said("means", "mean"));
             }

@@ -52,6 +52,7 @@ pub fn structures(problem: &Problem, null: &State, state: &State, inflation: f64
             let step = record.lattice[n];
             let coarse = step > 1.5 * problem.sigma[n] && left.square.sqrt() * problem.sigma[n] < step;
             let before = noise::left(&channel(problem, &null.residual, index, n));
+            // a simulator that is off by ACCURACY leaves that share of what was there, in squares
             let slow = left.slow > 1.0 + SLOW.max(SIGMAS * scatter) + ACCURACY * ACCURACY * before.slow;
             // fast structure: white, but 1.6 times as large as the noise that second differences showed
             let wild = left.square > 2.5 + ACCURACY * ACCURACY * before.square;

@@ -22,6 +22,7 @@ const MOST: usize = 8;
 /// Pairs of causes beside a leading pair with which they have nothing in common; the best first.
 #[must_use]
 pub fn other_pairs(problem: &Problem, attribution: &Attribution) -> Vec<Fit> {
+    // rivals of each cause by itself are found in the search; pairs that share nothing with the leader are not
     let Some(best) = attribution.best.as_ref().filter(|best| best.causes.len() == 2) else {
         return Vec::new();
     };
@@ -29,6 +30,7 @@ pub fn other_pairs(problem: &Problem, attribution: &Attribution) -> Vec<Fit> {
     let is_own = |cause: usize| best.causes.iter().any(|own| attribution.same(*own, cause));
     let all: Vec<usize> = (0..attribution.candidates.len()).collect();
     let columns = parallel::map(&all, |cause| fitter.sensitivity(*cause, &attribution.null));
+    // at first order, because some 800 pairs cannot all be fitted
     let gain_of = |a: usize, b: usize| gained(&[&columns[a][..], &columns[b][..]].concat(), &attribution.null.residual);
     let reached = gain_of(best.causes[0], best.causes[1]);
     let others: Vec<usize> = all
@@ -44,10 +46,12 @@ pub fn other_pairs(problem: &Problem, attribution: &Attribution) -> Vec<Fit> {
             }
         }
     }
+    // equal gains in the order of the list, so that the same records give the same ties
     looks.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     let settled = problem.records.iter().all(|record| record.settled);
     looks.truncate(if settled { MOST_SETTLED } else { MOST });
     let explained = attribution.null.chi2 - best.state.chi2;
+    // the share is of what is explained: what two simulators differ by grows with the effect
     let worst = best.state.chi2 + (TIE * attribution.inflation).max(TIE_SHARE * explained);
     let mut fits = parallel::map(&looks, |(_, pair)| {
         let values: Vec<f64> = pair

@@ -149,6 +149,7 @@ pub fn against_plant(
         let (seen, wanted) = (bench.sample(), simulation.sample());
         let mapped = map.apply(d_sim, seen.measured.i_out);
         let limited = limits.map_or(mapped, |limits| mapped.clamp(limits.low, limits.high));
+        // to first order, by the mapping's own slope: no run at the wrong duty, which may have no steady state
         let volts = |duty: f64| (duty - d_needed) / map.slope(seen.i_out) * nominal.converter.v_in;
         Steady {
             v_ref,
@@ -163,6 +164,7 @@ pub fn against_plant(
                 i_out: seen.measured.i_out - seen.i_out,
                 v_in: seen.measured.v_in - seen.v_in,
             },
+            // both as shown: a sensor that the simulation has too is no shift
             i_l_shift: seen.measured.i_l - wanted.measured.i_l,
         }
     });

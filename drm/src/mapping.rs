@@ -70,6 +70,7 @@ impl DutyRatioMap {
     /// Whether the mapped duty rises with d_sim all over the valid load current.
     #[must_use]
     pub fn rises(&self) -> bool {
+        // the slope is a line in i_out, so its ends decide
         self.slope(self.valid_i_out.low) > 0.0 && self.slope(self.valid_i_out.high) > 0.0
     }
 
@@ -134,6 +135,7 @@ impl DutyRatioMap {
         let mut entry = |line: String| text.push_str(&(line + "\n"));
         let product = if r.is_some() { " + r i_out d_sim" } else { "" };
         entry(format!("# d_real = a d_sim + b i_out + c{product}"));
+        // `{:?}`, because `{}` writes 1 for 1.0, which is an integer in TOML
         entry(format!("a = {a:?}"));
         entry(format!("b = {b:?}"));
         entry(format!("c = {c:?}"));

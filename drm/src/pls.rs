@@ -48,6 +48,7 @@ impl Pls {
         for _ in 0..components.min(x.len()) {
             let mut weights: Vec<f64> = residual.iter().map(|column| dot(column, &y_residual)).collect();
             let norm = dot(&weights, &weights).sqrt();
+            // an exact table on a balanced grid needs fewer components than asked for: no error, as in scikit-learn
             if norm <= NOTHING_LEFT * size {
                 break;
             }
@@ -113,6 +114,7 @@ pub(crate) fn centre_and_scale(column: &[f64]) -> (f64, f64) {
     let n = column.len() as f64;
     let mean = column.iter().sum::<f64>() / n;
     let squares: f64 = column.iter().map(|v| (v - mean) * (v - mean)).sum();
+    // over n - 1 as in scikit-learn: another divisor would move the coefficients of fewer components
     let scale = (squares / (n - 1.0).max(1.0)).sqrt();
     let largest = column.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
     (mean, if scale <= CONSTANT * largest { 0.0 } else { scale })

@@ -42,6 +42,7 @@ impl Batch {
             }
         }
         let count = plants.len();
+        // what does not fill a group is stepped one by one, so the constants of a partial group are never needed
         let groups = plants.chunks_exact(LANES).map(Group::new).collect();
         Ok(Batch {
             plants,
@@ -105,9 +106,11 @@ impl Batch {
         lanes.i.0.copy_from_slice(&self.i_l[first..first + LANES]);
         lanes.v.0.copy_from_slice(&self.v_out[first..first + LANES]);
         let off = group.t_sw - lanes.on;
+        // no branch for duties of 0 and 1: an interval of length 0 leaves current and voltage as they are, to the bit
         lanes.segment(group, lanes.on, [group.emf_on, group.r_on], Lane([0.0; LANES]));
         lanes.segment(group, off, [group.emf_off, group.r_off], group.diode);
         for n in 0..LANES {
+            // a lane that is not regular may hold nonsense; `i_l` and `v_out` still have the start of the period
             if lanes.regular[n] {
                 (self.i_l[first + n], self.v_out[first + n]) = (lanes.i.0[n], lanes.v.0[n]);
             } else {
@@ -175,6 +178,7 @@ struct Group {
 impl Group {
     fn new(plants: &[Plant]) -> Self {
         let lane = |of: &dyn Fn(&Plant) -> f64| Lane(std::array::from_fn(|n| of(&plants[n])));
+        // the upper diode has no lane: a current that is not positive makes its lane irregular (`flows` below)
         let off = |p: &Plant| {
             if p.legs.synchronous {
                 p.legs.lower
@@ -241,6 +245,7 @@ impl Lanes {
         let (i0, v0, power) = (self.i, self.v, self.power);
         let mut w0 = Lane([0.0; LANES]);
         for n in 0..LANES {
+            // 1 / v0 at a voltage of 0 would bring 0 * inf, a NaN, into a lane without constant power
             w0.0[n] = if v0.0[n] < group.v_fold.0[n] {
                 0.0
             } else {
@@ -254,6 +259,7 @@ impl Lanes {
         let rate = b * self.conductance;
         for n in 0..LANES {
             let fold = group.v_fold.0[n];
+            // the conditions of `Plain::leaf`, so that a lane that passes has the bits of a plant alone
             let steady = v[1].0[n].abs() <= LARGEST_CHANGE * v0.0[n] && v0.0[n] >= fold && self.v.0[n] >= fold;
             let smooth = (power.0[n] == 0.0) | steady;
             let short = (h.0[n] <= group.longest.0[n]) & (rate.0[n] <= LONGEST_STEP);

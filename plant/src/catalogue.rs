@@ -24,6 +24,7 @@ pub fn parameter(key: &str) -> Option<&'static Parameter> {
 /// The way that a plant needs: the furthest of all effects that are on.
 pub(crate) fn way(parameters: &Parameters) -> Way {
     let on = effects().filter(|effect| effect.is_on(parameters));
+    // nothing is on: the loss-free converter
     on.map(|effect| effect.needs).max().unwrap_or(Way::Batch)
 }
 
@@ -42,12 +43,15 @@ impl Default for Parameters {
 const CIRCUIT: Effect = Effect {
     name: "converter",
     meaning: "the loss-free buck converter, its modulator and its sampling instant",
+    // another carrier or sampling instant moves the edges in the step; the averaged model has no edges at all
     needs: Way::Walk,
     parameters: &[
         choice!(converter.model, switches_on = true, "switching intervals, or mean values over the period",
             Model: Switched = "switched", Averaged = "averaged"),
+        // both rectifiers are known to every way, so neither asks for a slower one
         choice!(converter.rectifier, switches_on = false, "what carries the current while the switch is off",
             Rectifier: Diode = "diode", Synchronous = "synchronous"),
+        // the four neutral numbers are the paper's; a file cannot lean on them (`reader::REQUIRED`)
         detail!(converter.v_in, "V", "source voltage", (1e-3, 1e6), (12.0, 400.0), 200.0),
         detail!(
             converter.inductance,
@@ -79,6 +83,7 @@ const CIRCUIT: Effect = Effect {
             pwm.sampling_phase,
             "1",
             "sampling instant as a fraction of the PWM period",
+            // ranges are closed, and this one must end below 1: a whole period later is phase 0 of the next one
             (0.0, 1.0 - 1e-9),
             (0.0, 0.5),
             0.0

@@ -22,6 +22,7 @@ pub(crate) fn keyed(p: &Parameters) -> Vec<(&'static str, Message)> {
     for parameter in catalogue::parameters() {
         let value = parameter.get(p);
         let (low, high) = parameter.allowed;
+        // in this form NaN is out of range as well
         if !(low <= value && value <= high) {
             let unit = if parameter.unit == "1" { "" } else { parameter.unit };
             let message = Message::new(format!("`{}` is out of range", parameter.key))
@@ -31,6 +32,7 @@ pub(crate) fn keyed(p: &Parameters) -> Vec<(&'static str, Message)> {
             faults.push((parameter.key, message));
         }
     }
+    // partners are asked only of numbers in range: a wrong unit would otherwise be answered twice
     if faults.is_empty() {
         partners(p, &mut faults);
     }
@@ -77,6 +79,7 @@ fn partners(p: &Parameters, faults: &mut Vec<(&'static str, Message)>) {
     let t_sw = p.t_sw();
     let s = &p.switch;
     require(
+        // `gates::Train` remembers one pulse for the next period only
         s.dead_time + s.turn_on_delay < t_sw && s.turn_off_delay < t_sw,
         if s.turn_off_delay < t_sw {
             "switch.dead_time"

@@ -47,6 +47,7 @@ impl Effect {
     #[must_use]
     pub fn is_on(&self, parameters: &Parameters) -> bool {
         let mut numbers = self.parameters.iter().filter(|parameter| parameter.switches_on);
+        // without tolerance: an effect below a bound would be dropped (docs/decisions/0004-ways-of-computing.md)
         numbers.any(|parameter| parameter.get(parameters) != parameter.neutral)
     }
 }

@@ -4,6 +4,16 @@
 //! Two voltages are algebraic. At the output `v_out = v_c + esr (i_b - i_out) + esl d(i_b - i_out)/dt`, at the input the
 //! source as seen from the switch, `v_th - r_th i`. `i_b` is the winding current, `i_l` that of the inductance itself;
 //! the core conductance carries the difference.
+//!
+//! ```text
+//!                      v_in          v_sw                       v_out
+//!  v + ripple ── R, L ──┬── switch ──┬── dcr ──[ L || core ]──┬── cable R, L ──┬── load: G, J,
+//!                    esr_in        diode or    i_b         esr, esl   i_out    C of    P / v with
+//!                     c_in        2nd switch                  C               cable    a lag
+//!                       │            │                        │                │       │
+//! ```
+//!
+//! A part of this picture that a converter does not have keeps its state where it was, with slope 0.
 
 use serde::{Deserialize, Serialize};
 
@@ -24,6 +34,8 @@ const I_SOURCE: usize = 6;
 const SHOWN: usize = 7;
 
 /// Steps per time constant: of the LC filter, and of everything else.
+// a step leaves about (h / tau)^5 / 120: 3e-9 of the filter's swing, 8e-6 of a fast transient. With these the
+// bounds against ngspice hold (docs/results/plant.md)
 const FILTER_STEP: f64 = 0.05;
 const OTHER_STEP: f64 = 0.25;
 
@@ -68,6 +80,7 @@ impl Full {
     pub fn new(p: &Parameters) -> Self {
         let sensors = &p.sensors;
         let low_pass = [&sensors.v_out, &sensors.i_l, &sensors.i_out, &sensors.v_in].map(|s| s.low_pass);
+        // a capacitor at an ideal source changes nothing, and its current would be 0 / 0
         let has_c_in = p.source.c_in > 0.0 && (p.source.resistance > 0.0 || p.source.inductance > 0.0);
         let mut full = Full {
             p: p.clone(),
@@ -83,6 +96,7 @@ impl Full {
 
     fn fastest_rate(&self) -> f64 {
         let p = &self.p;
+        // the least that saturation and derating can leave, so that the step need not follow current and voltage
         let l = p.converter.inductance * (1.0 - p.inductor.saturation);
         let c = p.converter.capacitance * (1.0 - p.capacitor.derating);
         let r = dcr::in_series(&p.inductor)
@@ -121,6 +135,7 @@ impl Full {
         let cpl = self.constant_power(load, v_out);
         let i_out = load.conductance * v_out + load.current + cpl;
         let v_in = self.p.converter.v_in;
+        // power balance of a converter without losses
         let i_in = i_l * v_out / v_in;
         let v_c = v_out - self.p.capacitor.esr * (i_l - i_out);
         (x[I_L], x[V_C], x[V_LOAD], x[I_CPL]) = (i_l, v_c, v_out, cpl);
@@ -155,10 +170,12 @@ impl Full {
     /// used.
     pub fn advance(&self, x: &mut States, path: &Path, load: &Load, span: (f64, f64), track: &mut Track) -> f64 {
         let (t, h) = span;
+        // a load step changes this rate, so it is not part of `rate`
         let far = match self.has_cable {
             true => load.conductance / self.p.cable.capacitance,
             false => load.conductance / self.p.converter.capacitance,
         };
+        // at least one step: an interval of length 0 would be 0 / 0
         let count = (h * self.rate.max(far / OTHER_STEP)).ceil().max(1.0);
         let step = h / count;
         let mut before = self.algebra(x, path, load, t);
@@ -170,6 +187,7 @@ impl Full {
             let mut after = self.algebra(x, path, load, t + used + step);
             let mut length = step;
             let crossed = path.only != 0.0 && after.signals.i_l * path.only <= 0.0;
+            // the diode has no current to begin with: no time is used, and the caller goes on with an open leg
             if crossed && before.signals.i_l * path.only <= 0.0 {
                 length = 0.0;
                 *x = start;
@@ -186,6 +204,7 @@ impl Full {
             }
             used += length;
             if crossed {
+                // exactly 0, because the next path is chosen by the sign of the current
                 after.signals.i_l = 0.0;
                 x[I_L] = 0.0;
             }
@@ -213,6 +232,7 @@ impl Full {
             if i * high.1 < 0.0 {
                 low = high;
             } else {
+                // the Illinois rule: plain regula falsi would keep this end for ever on a curve that bends one way
                 low.1 *= 0.5;
             }
             high = (guess, i);
@@ -224,6 +244,7 @@ impl Full {
     }
 
     fn step(&self, x: &States, first: &Algebra, path: &Path, load: &Load, t: f64, h: f64) -> States {
+        // the slopes at the start are known from the step before: three evaluations instead of four
         let k1 = &first.slopes;
         let k2 = self.algebra(&moved(x, k1, 0.5 * h), path, load, t + 0.5 * h).slopes;
         let k3 = self.algebra(&moved(x, &k2, 0.5 * h), path, load, t + 0.5 * h).slopes;
@@ -232,6 +253,7 @@ impl Full {
     }
 
     fn constant_power(&self, load: &Load, v: f64) -> f64 {
+        // continuous at the fold: P / v_fold on both sides
         let fold = self.p.load.v_fold;
         if v >= fold {
             load.power / v
@@ -244,6 +266,7 @@ impl Full {
     fn thevenin(&self, x: &States, v_source: f64) -> (f64, f64) {
         let s = &self.p.source;
         if !self.has_c_in {
+            // without capacitor the source's resistance is in series with the switch, while that conducts
             return (v_source, s.resistance);
         }
         if s.inductance > 0.0 {
@@ -302,6 +325,7 @@ impl Full {
             let divided = c.esl / cable.inductance;
             slope += divided;
             right += divided * (x[V_LOAD] + cable.resistance * x[I_CABLE]) - c.esr * x[I_CABLE];
+            // the cable's current is a state: constant power acts behind it and needs no equation here
             return (right / slope, x[I_CABLE]);
         }
         let fixed = load.current + if self.has_lag { x[I_CPL] } else { 0.0 };
@@ -311,14 +335,17 @@ impl Full {
         if self.has_lag || load.power == 0.0 {
             return (v, load.conductance * v + fixed);
         }
+        // without ESR the voltage is that of the capacitor, whatever the load draws
         if c.esr > 0.0 {
             for _ in 0..4 {
                 let cpl = self.constant_power(load, v);
                 let turn = if v >= self.p.load.v_fold {
                     -cpl / v
                 } else {
+                    // P / v_fold^2, and not 0 / 0 at a voltage of 0
                     cpl / v.max(1e-300)
                 };
+                // constant power is a negative resistance: near the fold it may turn Newton's step round
                 v -= (slope * v + c.esr * cpl - right) / (slope + c.esr * turn).max(0.1 * slope);
             }
         }
@@ -383,5 +410,6 @@ fn extend(track: &mut Track, signals: &Signals, path: &Path) {
 fn vertex(first: f64, middle: f64, last: f64) -> Option<f64> {
     let (slope, bend) = (0.5 * (last - first), first - 2.0 * middle + last);
     let at = -slope / bend;
+    // without bend the quotient is infinite or NaN, and the comparison refuses both
     (at.abs() < 1.0).then_some(middle + 0.5 * slope * at)
 }

@@ -1,4 +1,15 @@
 //! When the switches conduct: from a duty to intervals within the PWM period, with delays that reach into the next one.
+//!
+//! ```text
+//!                    command falls     command rises
+//! command  ‾‾‾‾‾‾‾‾‾‾‾‾|_________________|‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾
+//! upper    ‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾|_____________________|‾‾‾‾‾‾‾‾‾‾‾‾‾‾   down off later, up dead + on later
+//! lower    ___________________|‾‾‾‾‾‾‾‾‾‾‾‾‾|__________________   up dead + on later, down off later
+//! ```
+//!
+//! A `Train` delays one gate. Of the lower gate it holds the times at which that gate is *off*, so that both gates
+//! follow the same pulse. Invariant: no delay reaches a whole period (`check`), so a train owes the next period one
+//! pulse at most.
 
 use serde::{Deserialize, Serialize};
 
@@ -69,6 +80,7 @@ impl Train {
         let (start, end) = pulse;
         let (mut old, mut new) = (self.owed, EMPTY);
         if end > start {
+            // a command that stays high over the period's end has no edge there: its rising delay must not begin anew
             let goes_on = self.high_at_end && start <= 0.0;
             new = (
                 if goes_on { self.owed.0.max(0.0) } else { start + delay.0 },
@@ -79,11 +91,13 @@ impl Train {
             }
         }
         self.high_at_end = end > start && end >= t_sw;
+        // a late falling edge that meets the next pulse is no edge at the gate
         let overlap = old.1 > old.0 && new.1 > new.0 && new.0 <= old.1;
         if overlap {
             new = (new.0.min(old.0), new.1.max(old.1));
             old = EMPTY;
         }
+        // a pulse shorter than its rising delay ends before it starts: it is lost and owes nothing
         self.owed = match new.1 > t_sw && new.1 > new.0 {
             true => ((new.0 - t_sw).max(0.0), new.1 - t_sw),
             false => EMPTY,
@@ -145,6 +159,7 @@ impl Gates {
 
     /// What conducts at `t`.
     pub fn at(&self, timing: &GateTiming, t: f64) -> Gate {
+        // where delays let both gates be high the upper one counts: this circuit has no shoot-through
         if self.upper.is_high(t) {
             return Gate::Upper;
         }

@@ -48,6 +48,7 @@ impl Legs {
             Path::closed(1.0, 0.0, s.r_ds_on, 0.0),
             Path::closed(0.0, 0.0, s.r_ds_on_low, 0.0),
             Path::closed(0.0, -s.v_f, s.r_d, 1.0),
+            // a negative current flows back into the source, through the upper body diode
             Path::closed(1.0, s.v_f, s.r_d, -1.0),
         ];
         let (v_in, dcr) = (p.converter.v_in, dcr::in_series(&p.inductor));
@@ -79,6 +80,7 @@ impl Legs {
 
     /// The mean of the paths over a period (equation 2 of the paper, with losses; CCM).
     pub fn averaged(&self, duty: f64) -> Path {
+        // a switch that stays off or on has no edges, and so loses no duty
         let on = if duty <= 0.0 || duty >= 1.0 {
             duty
         } else {

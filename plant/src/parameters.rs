@@ -28,6 +28,7 @@ pub struct Parameters {
 
 impl Parameters {
     /// Zeros and first words, before the catalogue sets the neutral values.
+    // not `Default`: that of a table asks for `Parameters::default()`, which would ask the tables again, for ever
     pub(crate) fn blank() -> Self {
         Parameters {
             converter: Blank::blank(),
@@ -57,6 +58,7 @@ impl Parameters {
     /// The paper's converter with the 150 uF of its Table I.
     #[must_use]
     pub fn paper_table() -> Self {
+        // no controller reaches the paper's curves with it (docs/results/training.md), hence the second preset
         Self::ideal(200.0, 2e-3, 150e-6, 10e3)
     }
 

@@ -128,6 +128,7 @@ impl Plant {
         state.queue = Queue::filled(duty);
         state.applied = duty;
         state.gates = Gates::default();
+        // sampled inside a PWM period, what is left of that period belongs to the duty in force
         if self.parameters.pwm.sampling_phase > 0.0 {
             state.gates.plan(&self.timing, duty);
         }
@@ -160,6 +161,7 @@ impl Plant {
     pub fn shows(&mut self, measured: [f64; 4]) {
         let all = &self.parameters.sensors;
         let sensors = [&all.v_out, &all.i_l, &all.i_out, &all.v_in];
+        // a gain of 0 gives no number, which leaves the low-pass as it is
         let before = |n: usize| (measured[n] - sensors[n].offset) / sensors[n].gain;
         Full::hold_filtered(&mut self.state.x, std::array::from_fn(before));
     }
@@ -171,6 +173,7 @@ impl Plant {
     #[inline]
     pub fn step(&mut self, duty: f64, load: &Load) -> Sample {
         let drawn = load_setting::drawn(&self.parameters.load, load);
+        // `walk` gives the same bits and takes longer
         if self.way <= Way::Step {
             return self.step_fast(duty, &drawn);
         }
@@ -179,6 +182,7 @@ impl Plant {
 
     /// A control period in which the load changes from `before` to `after` at the fraction `at` of the period.
     pub fn step_with_change(&mut self, duty: f64, before: &Load, after: &Load, at: f64) -> Sample {
+        // a change at either end splits nothing, and `walk` would be the slower way to the same bits
         if at <= 0.0 {
             return self.step(duty, after);
         }
@@ -194,6 +198,7 @@ impl Plant {
     #[inline(always)]
     pub(crate) fn modulate(&mut self, duty: f64) -> f64 {
         let pwm = &self.parameters.pwm;
+        // not `clamp`: a duty that is NaN must not get into the state, which would never recover
         let clamped = if duty > 0.0 { duty.min(1.0) } else { 0.0 };
         let queued = self.state.queue.pass(clamped, pwm.duty_delay);
         minimum_on_time::limit(duty_quantisation::round(queued, pwm.duty_lsb), pwm, self.t_sw)
@@ -214,6 +219,7 @@ impl Plant {
                 self.plain.advance(&mut x, &self.legs.lower, load, rest, &mut track);
             }
         } else {
+            // exactly 0 where a diode has ended the current (`Plain::leaf`), so no tolerance is needed
             if x.0 != 0.0 && rest > 0.0 {
                 let drive: &Drive = if x.0 > 0.0 {
                     &self.legs.lower_diode

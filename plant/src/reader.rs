@@ -36,6 +36,7 @@ fn read(document: &Document) -> Result<Parameters, Faults> {
     };
     reader.table(document.root(), "");
     reader.required(document);
+    // a number that could not be read is still neutral here: its range and partners would be those of another plant
     if reader.faults.is_empty() {
         for (key, message) in check::keyed(&reader.parameters) {
             reader.faults.push(match reader.values.get(key) {
@@ -49,6 +50,7 @@ fn read(document: &Document) -> Result<Parameters, Faults> {
 
 /// Numbers that a plant file must give.
 pub const REQUIRED: [&str; 4] = [
+    // neutral is the paper's converter: a forgotten line would silently be one of its numbers
     "converter.v_in",
     "converter.inductance",
     "converter.capacitance",
@@ -90,6 +92,7 @@ impl<'a> Reader<'a> {
                 value.number(faults).map(|number| set(plant, number))
             }
             Field::Whole(_, set) => {
+                // TOML knows no larger integers
                 let range = 0..=parameter.allowed.1.min(i64::MAX as f64) as u64;
                 value.integer(range, faults).map(|number| set(plant, number))
             }

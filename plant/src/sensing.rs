@@ -53,6 +53,7 @@ impl Sensing {
             (sensor.delay > 0.0).then(|| {
                 let whole = (sensor.delay / t_sw).floor();
                 let part = sensor.delay - whole * t_sw;
+                // `check` keeps the delay below `LONGEST` periods; the bounds only take away rounding
                 ((t_sw - part).max(0.0), (whole as usize).min(LONGEST - 1))
             })
         });
@@ -106,6 +107,7 @@ impl Sensing {
                 now[n] = memory.history[n][kept];
             }
             let mut value = sensor.gain * now[n] + sensor.offset;
+            // a sensor without noise draws nothing, so that it does not move the noise of the others
             if sensor.noise > 0.0 {
                 value += sensor.noise * memory.noise.normal();
             }

@@ -1,4 +1,8 @@
-//! The steady state in which the plant runs at a given sampled voltage.
+//! The steady state in which the plant runs, from its voltage or from its duty.
+//!
+//! - `settle` finds the duty of a voltage: a regulator is run until nothing moves any more.
+//! - `rest` finds the state of a duty: Newton's method on the map `f` of one period, `(f' - 1) step = x - f(x)`. The
+//!   slopes `f'` are differences of runs from nudged states.
 
 use crate::full::{STATES, States};
 use crate::parameters::Parameters;
@@ -45,6 +49,7 @@ impl Regulator {
             slowness,
             g,
             k,
+            // without a voltage error the first duty is then v_out / v_in
             integral: v_out - k * (now.i_out - now.i_l),
         }
     }
@@ -53,6 +58,8 @@ impl Regulator {
     pub fn duty(&mut self, now: &Signals) -> f64 {
         let (g, k) = (self.g, self.k);
         let error = self.v_out - now.v_out;
+        // an integral time of ten periods, as the voltage loop. Against wind-up it stays near what the leg can give;
+        // wider than 0..v_in, since the proportional part is added to it
         self.integral = (self.integral + 0.1 * k * g * error / self.slowness).clamp(-self.v_in, 2.0 * self.v_in);
         let wanted = self.integral + k * (g * error + now.i_out - now.i_l);
         (wanted / self.v_in).clamp(0.0, 1.0)
@@ -62,12 +69,14 @@ impl Regulator {
 const MOST_PERIODS: u32 = 20_000;
 const AT_REST: u32 = 20;
 /// Periods in which delays forget what was before.
+// two more than the longest delay of a duty or a sensor
 const WARM_UP: u32 = 10;
 /// Periods between two attempts that did not get nearer.
 const BETWEEN: u32 = 40;
 const MOST_NEWTON: usize = 40;
 /// At rest a period moves no state by this share.
 const AT_REST_1: f64 = 1e-9;
+// rounding of 1e-16 then costs the derivative 1e-10 of its value
 const NUDGE: f64 = 1e-6;
 
 impl Plant {
@@ -79,6 +88,7 @@ impl Plant {
         let (v_in, l) = (p.converter.v_in, p.converter.inductance);
         let t = self.t_sample();
         let i_out = self.reset_at(v_out, 0.0, load).i_out;
+        // sampled at the start of the on-interval the current is at its valley: half the ripple below the load's
         let ripple = v_out * (1.0 - v_out / v_in) * t / l;
         let mut sample = self.reset_at(v_out, (i_out - 0.5 * ripple).max(0.0), load);
         let mut regulator = Regulator::new(self.parameters(), v_out, &sample.signals());
@@ -88,6 +98,7 @@ impl Plant {
             let error = v_out - sample.v_out;
             duty = regulator.duty(&sample.signals());
             sample = self.step(duty, load);
+            // k turns the current into volts
             let moved = (sample.v_out - last.v_out).abs() + (sample.i_l - last.i_l).abs() * regulator.k;
             let small = 1e-9 * v_out.abs().max(1.0);
             rests = if error.abs() + moved < small { rests + 1 } else { 0 };
@@ -119,6 +130,7 @@ impl Plant {
             let before = *self.state();
             let (after, distance) = self.moved(duty, load);
             if distance < AT_REST_1 {
+                // Newton moves states only; queues and delayed sensors follow by running
                 return (self.run(WARM_UP, duty, load), true);
             }
             let mut jacobian = [[0.0; STATES]; STATES];
@@ -189,6 +201,7 @@ fn eliminate(matrix: &mut [States; STATES], right: &mut States) {
     let mut row_of = [None; STATES];
     let mut free = [true; STATES];
     for column in 0..STATES {
+        // a state that the circuit does not use has an empty row and column: no pivot, and it keeps its value
         let rows = (0..STATES).filter(|row| free[*row]);
         let pivot = rows.max_by(|a, b| matrix[*a][column].abs().total_cmp(&matrix[*b][column].abs()));
         let Some(pivot) = pivot.filter(|row| matrix[*row][column].abs() > 1e-12) else {

@@ -1,4 +1,12 @@
 //! A control period with anything in it: gate edges, the start of a PWM period, sensors that look earlier, a load step.
+//!
+//! ```text
+//! s = 0                                                                          s = t_sw
+//! sample ──── gate edge ──── start of PWM ──── load step ──── sensor looks ──── next sample
+//!        duty in force       the new duty
+//! ```
+//!
+//! Invariant: between two instants gates and load stand still. The path changes only where a diode ends the current.
 
 use crate::entry::Way;
 use crate::full::Full;
@@ -8,6 +16,7 @@ use crate::plant::Plant;
 use crate::signals::{Load, Sample, Signals};
 
 /// Two instants closer than this fraction of a period are one.
+// far above the rounding of a sum of instants, 1e-16, and far below any edge: 1e-16 s at 10 kHz
 const SAME: f64 = 1e-12;
 
 impl Plant {
@@ -34,6 +43,7 @@ impl Plant {
             if s + same < change && change < next {
                 next = change;
             }
+            // the next instant is the nearest of all kinds; nothing changes in between
             next = self.sensing.next_capture(s + same, next);
             next = origin + self.timing_edge(s + same - origin, next - origin);
             if next > end - same {
@@ -68,6 +78,7 @@ impl Plant {
 
     /// Advances by `h` from `t` in the PWM period; the gates do not change meanwhile.
     fn conduct(&mut self, t: f64, h: f64, load: &Load, track: &mut Track) {
+        // asked in the middle: at an end of the interval rounding would decide on which side of an edge it lies
         let gate = self.state.gates.at(&self.timing, t + 0.5 * h);
         let mut rest = h;
         while rest > 0.0 {
@@ -87,6 +98,7 @@ impl Plant {
             };
             self.state.path = path;
             self.state.time += used;
+            // only a diode ends its interval early; what is left then runs with an open leg
             rest = if path.only != 0.0 { rest - used } else { 0.0 };
         }
     }

@@ -83,6 +83,7 @@ impl Clone for SpiceConverter {
             nominal: self.nominal.clone(),
             start: self.start.clone(),
             history: self.history.clone(),
+            // a process cannot be copied: the copy repeats the history
             host: None,
             modulator: self.modulator.clone(),
             leftover: self.leftover.clone(),
@@ -105,6 +106,7 @@ impl SpiceConverter {
             return Err(message.found("`converter.model` is \"averaged\"").into());
         }
         let pwm = &parameters.pwm;
+        // refused, not ignored: ngspice would answer for another converter
         if pwm.min_on_time > 0.0 && pwm.short_pulse == ShortPulse::Extend {
             let message = Message::new("the modulator for ngspice drops short pulses");
             return Err(message.found("`pwm.short_pulse` is \"extend\"").into());
@@ -141,9 +143,11 @@ impl SpiceConverter {
         text.push_str(&format!(
             ".save v(out) i(vil) i(vout) v(nin)\n.tran {:e} {:e} 0 {:e} uic\n.end\n",
             1e-3 * t,
+            // `.tran` wants an end; the run ends sooner, with its input
             LONGEST_RUN * t,
             LONGEST_STEP * t
         ));
+        // in force before time 0, so that the transient starts under its load
         let mut before = load_edges(&parameters, &start.load, -1e-6);
         if parameters.converter.rectifier == Rectifier::Synchronous {
             before.push(Edge {
@@ -188,6 +192,7 @@ impl SpiceConverter {
         let mut edges = std::mem::take(&mut self.leftover);
         edges.extend(self.modulator.edges(p, duty));
         if let Some((at, after)) = &load.change {
+            // done by its instant: a sample taken there shows the load behind it, as the plant's does
             edges.extend(load_edges(p, after, at * p.t_sw() - LOAD_RISE));
         }
         let (host, _) = self.host()?;

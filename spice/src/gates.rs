@@ -35,6 +35,7 @@ impl Modulator {
 
 /// What the modulator makes of a duty.
 fn real(p: &Parameters, duty: f64) -> f64 {
+    // written anew, not taken from the plant: a shared line could be wrong in both and the comparison would not see it
     let duty = if duty.is_nan() { 0.0 } else { duty.clamp(0.0, 1.0) };
     let lsb = p.pwm.duty_lsb;
     let duty = if lsb > 0.0 { (duty / lsb).round() * lsb } else { duty };

@@ -110,6 +110,7 @@ impl Host {
             // writing to a String cannot fail
             let _ = write!(
                 line,
+                // `{:e}` has as many digits as the round trip needs: the edges are where they were computed
                 " {} {:e} {:e} {:e}",
                 edge.source as u8, edge.time, edge.rise, edge.level
             );
@@ -126,6 +127,7 @@ impl Host {
         let mut line = String::new();
         let read = self.output.read_line(&mut line);
         read.map_err(|error| failed("hear ngspice", &error))?;
+        // where ngspice has ended the line is empty, and has too few numbers
         let numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
         match &numbers[..] {
             &[_, v_out, i_l, i_out, v_in, a, b, c, d, ref others @ ..] => Ok(Row {

@@ -29,6 +29,7 @@ impl Writer {
     }
 
     pub fn f64(&mut self, value: f64) {
+        // as bits: a checkpoint must go on to the same bytes, so the sign of a zero counts
         self.u64(value.to_bits());
     }
 
@@ -74,6 +75,7 @@ impl<'a> Reader<'a> {
             return Err(damaged());
         };
         let (values, digest) = rest.split_at(end);
+        // before any value is read: from here on a value that does not fit means another training, not a damaged file
         if Sha256::digest(&bytes[..bytes.len() - DIGEST]).as_slice() != digest {
             return Err(damaged());
         }

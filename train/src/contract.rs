@@ -76,9 +76,11 @@ impl Contract {
             (None, Some((_, span))) => ("golden.safetensors".to_owned(), name_golden(&text, span, sketch.inline)),
             (None, None) => ("golden.safetensors".to_owned(), text),
         };
+        // a contract without features or actions is refused by `policy::load`, which needs a network to get that far
         let mut widths = vec![sketch.features.max(1)];
         widths.extend_from_slice(hidden);
         widths.push(sketch.actions.max(1));
+        // stands in for the trained one: a fault of the contract is said before a training, not after it
         let network = Network::zeros(&widths, &vec![policy::Activation::Identity; widths.len() - 1]);
         let empty = GoldenVectors {
             observations: vec![0.0; network.inputs()],
@@ -169,6 +171,7 @@ fn sketch(text: &str) -> Sketch {
         Some(DeValue::Array(items)) => items
             .iter()
             .map(|item| match item.get_ref() {
+                // three factors unless given: the paper's -1, 0 and 1
                 DeValue::Table(pair) => pair.get("c").map_or(3, |c| list(Some(c))),
                 _ => 0,
             })
@@ -190,6 +193,7 @@ fn sketch(text: &str) -> Sketch {
 
 /// The contract with its golden vectors named beside the weights.
 fn name_golden(text: &str, weights: &Range<usize>, inline: bool) -> String {
+    // an inline table may not be broken into lines
     let (at, golden) = if inline {
         (weights.end, ", golden = \"golden.safetensors\"")
     } else {
@@ -217,6 +221,7 @@ fn files(
 fn weights_file(network: &Network) -> Result<Vec<u8>, Error> {
     let mut tensors = Vec::new();
     for (index, layer) in network.layers().iter().enumerate() {
+        // the numbers of torch's `nn.Sequential`, where an activation between two layers counts as well
         let name = format!("q_net.{}", 2 * index);
         let (outputs, inputs) = (layer.outputs, layer.inputs);
         let bias = &network.parameters[layer.bias.clone()];
@@ -284,6 +289,7 @@ fn check(files: &Files, path: &Path) -> Result<Policy, Error> {
         let path = path.to_owned();
         move |error| of_file(&path, &error)
     };
+    // through files, because this is the way that a user's policy takes
     let folder = tempfile::tempdir().map_err(fail(&std::env::temp_dir()))?;
     for (name, bytes) in files {
         let path = folder.path().join(name);

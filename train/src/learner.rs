@@ -136,6 +136,7 @@ impl Learner {
         let values = next.outputs().chunks_exact(outputs);
         let choosing = choice.as_ref().unwrap_or(next).outputs().chunks_exact(outputs);
         let predicted = now.outputs().chunks_exact(outputs);
+        // the mean, not the sum: learning rate and clipping then mean the same for every size of batch
         let scale = 1.0 / batch.actions.len().max(1) as f32;
         let discount = self.settings.discount as f32;
         let mut loss = 0.0_f64;
@@ -167,6 +168,7 @@ impl Learner {
                 let rate = rate as f32;
                 pairs.for_each(|(target, &online)| *target += rate * (online - *target));
             }
+            // the optimiser's count is part of a checkpoint, so a resumed training copies at the same updates
             TargetUpdate::Hard { every } if self.adam.steps.is_multiple_of(every.max(1)) => {
                 pairs.for_each(|(target, &online)| *target = online);
             }
@@ -178,6 +180,7 @@ impl Learner {
 /// Index of the largest value, the lowest among equals (contract section 7).
 #[must_use]
 pub fn greedy(values: &[f32]) -> usize {
+    // so that a NaN never wins, not even as the first
     let (mut best, mut index) = (-f32::MAX, 0);
     for (n, &value) in values.iter().enumerate() {
         if value > best {

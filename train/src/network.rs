@@ -147,6 +147,7 @@ impl Network {
             }
             let weights = view(&self.parameters[layer.weights.clone()], layer.inputs, layer.outputs);
             let mut sums = view_mut(output, rows, layer.outputs);
+            // sums in whatever order is fast: this is for learning; what acts is `q_values`
             general_mat_mul(1.0, &view(input, rows, layer.inputs), &weights, 1.0, &mut sums);
             interp::activate(layer.activation, output.iter_mut());
         }
@@ -192,6 +193,7 @@ impl Network {
             let delta = view(delta, rows, layer.outputs);
             let mut weights = view_mut(weights, layer.inputs, layer.outputs);
             general_mat_mul(1.0, &view(input, rows, layer.inputs).t(), &delta, 0.0, &mut weights);
+            // nothing lies before the first layer
             if index > 0 {
                 let weights = view(&self.parameters[layer.weights.clone()], layer.inputs, layer.outputs);
                 let mut next = view_mut(&mut next[..rows * layer.inputs], rows, layer.inputs);
@@ -234,6 +236,8 @@ impl Network {
             y.clear();
             y.extend_from_slice(&self.parameters[layer.bias.clone()]);
             let rows = self.parameters[layer.weights.clone()].chunks_exact(layer.outputs);
+            // inputs outside, outputs inside: each sum keeps the contract's order, and the compiler may take several at
+            // once. Rust never contracts the product and the sum to a fused operation
             for (row, &x) in rows.zip(x.iter()) {
                 for (sum, &w) in y.iter_mut().zip(row) {
                     *sum += w * x;

@@ -14,6 +14,7 @@ pub struct AdamSettings {
 impl Default for AdamSettings {
     fn default() -> Self {
         Self {
+            // those of Kingma and Ba, and PyTorch's
             beta1: 0.9,
             beta2: 0.999,
             epsilon: 1e-8,
@@ -50,6 +51,7 @@ impl Adam {
         self.steps += 1;
         let AdamSettings { beta1, beta2, epsilon } = self.settings;
         // powers by repeated squaring: the same on every machine, unlike powf
+        // at `i32::MAX` updates both powers are 0 for every beta that is allowed
         let steps = i32::try_from(self.steps).unwrap_or(i32::MAX);
         let rate = (learning_rate / (1.0 - power(beta1, steps))) as f32;
         let root = (1.0 / (1.0 - power(beta2, steps)).sqrt()) as f32;
@@ -87,6 +89,7 @@ pub fn clip(gradient: &mut [f32], limit: f64) -> f64 {
         }
     }
     let norm = f64::from(sums.iter().sum::<f32>() + rest).sqrt();
+    // 1e-6 is PyTorch's, whose updates the tests compare with
     let factor = limit / (norm + 1e-6);
     if factor < 1.0 {
         for g in gradient {

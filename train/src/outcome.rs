@@ -56,6 +56,7 @@ impl<E: Environment> Trainer<E> {
         };
         let task = &self.settings.evaluation;
         let findings = self.survey(&best.network, task, &task.all_instants())?;
+        // the limits as they are: `margin` only makes the choice stricter than the verdict
         let evaluated = Scoring::new(&task.load_steps, &self.settings.specification, 1.0).score(&findings);
         let golden = self.golden(&best.network)?;
         let (_, mut files) = self.contract.folder(&best.network, &golden)?;
@@ -94,6 +95,7 @@ impl<E: Environment> Trainer<E> {
                 v_ref,
                 task,
                 step,
+                // another instant for each load step, for observations that differ
                 instants[n % instants.len()],
             )?;
             agent.reset();
@@ -169,6 +171,7 @@ fn network_shape(network: &Network) -> String {
 
 /// Every n-th observation, without doubles and near ties, and what the network says to it.
 fn golden_vectors(network: &Network, observations: &[Vec<f32>]) -> GoldenVectors {
+    // at rest a loop sees the same again and again; ordered by bits, so that equal trainings give equal files
     let mut distinct = BTreeMap::new();
     for observation in observations {
         let key: Vec<u32> = observation.iter().map(|x| x.to_bits()).collect();

@@ -75,6 +75,7 @@ impl ReplayBuffer {
 
     /// Stores a transition, in the place of the oldest if the ring is full.
     pub fn push(&mut self, observation: &[f32], action: u32, reward: f32, next_observation: &[f32], terminated: bool) {
+        // an index is exact in binary32 up to 2^24, far beyond any number of actions
         let tail = [action as f32, reward, if terminated { 0.0 } else { 1.0 }];
         if self.len() < self.capacity {
             self.rows.extend_from_slice(observation);

@@ -96,6 +96,7 @@ impl<E: Environment> Trainer<E> {
                 i_out: from.f64()?,
                 v_in: from.f64()?,
             },
+            // the rest of a sample is not read before the next one comes
             ..Sample::default()
         };
         self.load = Load {
@@ -137,6 +138,7 @@ impl<E: Environment> Trainer<E> {
             let step = from.u64()?;
             let met = from.u64()? != 0;
             let score = Score { met, cost: from.f64()? };
+            // for its shape; the parameters follow
             let mut network = self.learner.online.clone();
             from.floats_into(&mut network.parameters)?;
             self.best = Some(Best { step, score, network });
@@ -147,6 +149,7 @@ impl<E: Environment> Trainer<E> {
     /// Digest of training file, contract and plant.
     fn identity(&self) -> [u8; 32] {
         let mut digest = Sha256::new();
+        // not the seed: a checkpoint says which it is of
         digest.update(self.settings.digest.as_bytes());
         digest.update(self.contract.digest());
         digest.update(self.nominal.identity());

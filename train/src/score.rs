@@ -42,6 +42,7 @@ impl<'a> Scoring<'a> {
             count: 0.0,
         };
         let figures = |index| scoring.limited(index, &Metrics::default(), &Metrics::default()).len();
+        // of all load steps: over those seen so far the mean of the first few would be no lower bound
         scoring.count = (0..load_steps.len()).map(figures).sum::<usize>().max(1) as f64;
         scoring
     }
@@ -53,6 +54,7 @@ impl<'a> Scoring<'a> {
         for (index, finding) in findings.iter().enumerate() {
             for (value, limit) in self.limited(index, &finding.at_sample, &finding.worst) {
                 let ratio = value / (limit * self.margin);
+                // in this form a NaN counts as worst
                 let ratio = if ratio < WORST_RATIO { ratio } else { WORST_RATIO };
                 ratios += ratio;
                 excess += f64::max(ratio - 1.0, 0.0);
@@ -60,6 +62,7 @@ impl<'a> Scoring<'a> {
         }
         let complete = findings.len() == self.load_steps.len();
         Score {
+            // some of the load steps cannot show that every limit holds
             met: complete && excess == 0.0 && !self.specification.is_empty(),
             cost: (ratios + EXCESS * excess) / self.count,
         }
@@ -90,6 +93,7 @@ impl<'a> Scoring<'a> {
         };
         let distance = |step: &[f64; 2]| (step[0] - from).abs() + (step[1] - to).abs();
         let nearest = self.load_steps.iter().map(distance).fold(f64::INFINITY, f64::min);
+        // the nearest counts however far it is: selection and evaluation may have other load steps than the [[spec]]
         let near = nearest.max(NEIGHBOURS * (from - to).abs());
         self.load_steps.get(index).is_some_and(|step| distance(step) <= near)
     }

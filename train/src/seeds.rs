@@ -83,6 +83,7 @@ pub fn train_all<E: Environment + Sync>(
     let cores = thread::available_parallelism().map_or(1, usize::from);
     let threads = if course.threads == 0 { cores } else { course.threads }.min(seeds.len());
     let results: Vec<Mutex<Option<Result<SeedRun, Error>>>> = seeds.iter().map(|_| Mutex::new(None)).collect();
+    // one after the other from a common list: seeds take very different times, because each may stop early
     let next = AtomicUsize::new(0);
     let work = || {
         loop {
@@ -116,6 +117,7 @@ fn one<E: Environment>(
     let seed = trainer.seed();
     if let Some(bytes) = course.checkpoints.get(&seed) {
         trainer.resume(bytes)?;
+        // `resume` takes the checkpoint's seed over, so a file under the wrong name would train one seed twice
         if trainer.seed() != seed {
             return Err(other());
         }
@@ -127,6 +129,7 @@ fn one<E: Environment>(
             .checkpoint_every
             .map_or(u64::MAX, |_| trainer.step_count() + BETWEEN_CLOCKS);
         let ended = trainer.run_until(next, stop, |progress| watch.look(progress))?;
+        // also called interrupted where only a look at the clock was due
         if ended != Ended::Interrupted || stop.load(Ordering::Relaxed) {
             break ended;
         }
@@ -151,6 +154,7 @@ fn one<E: Environment>(
 pub fn best(runs: &[SeedRun]) -> Option<&Outcome> {
     let outcomes = runs.iter().filter_map(|run| run.outcome.as_ref());
     outcomes.min_by(|a, b| {
+        // by the selection: chosen by the evaluation, the evaluation would no longer be independent
         let order = |outcome: &Outcome| (!outcome.selected.met, outcome.selected.cost);
         let ((a_open, a_cost), (b_open, b_cost)) = (order(a), order(b));
         a_open.cmp(&b_open).then(a_cost.total_cmp(&b_cost))

@@ -1,4 +1,12 @@
 //! One training: the loop, what it says on its way, how it is judged.
+//!
+//! ```text
+//! begin_episode ─► sense ─► act ─► plant ─► sense ─► replay ─► learn ─┬─► look, every so often ─► best, met
+//!       ▲                    ▲                                        │
+//!       └── episode over ────┴── next control period ─────────────────┘
+//! ```
+//!
+//! Invariant: what decides how it goes on is in the trainer and its checkpoint. The clock is asked for `Progress` only.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant as Clock;
@@ -21,6 +29,7 @@ use closed_loop::environment::{Environment, LoadPath, Start};
 use closed_loop::scenario::{Finding, Instant, Task, survey, survey_all};
 
 /// Streams of a seed.
+// a stream each: what one of them draws must not move the others
 const WEIGHTS: u64 = 0;
 const EXPLORATION: u64 = 1;
 const REPLAY: u64 = 2;
@@ -147,6 +156,7 @@ impl<E: Environment> Trainer<E> {
                 return Ok(Ended::Interrupted);
             }
             self.control_period()?;
+            // the end counts as well: a budget need not be a multiple, and a policy never judged cannot be kept
             if self.step.is_multiple_of(self.settings.selection.every) || self.step == self.settings.steps {
                 self.look()?;
                 let elapsed = started.elapsed().as_secs_f64();
@@ -189,6 +199,7 @@ impl<E: Environment> Trainer<E> {
 
         let reward = self.settings.reward.of(self.sample.v_out, duty - before);
         self.replay
+            // never terminated: control has no end, an episode is only cut short, and what lies behind it has a value
             .push(&self.before, action, reward as f32, self.agent.observation(), false);
         self.step += 1;
         self.episode_step += 1;
@@ -224,6 +235,7 @@ impl<E: Environment> Trainer<E> {
             let (loads, _) = self.settings.stage(self.step);
             let power = draw_load(loads, &mut self.scenario);
             let at = if episode.any_phase {
+                // above 0: at 0 the load would change at a sample that has been taken
                 1.0 - self.scenario.unit()
             } else {
                 1.0
@@ -244,17 +256,20 @@ impl<E: Environment> Trainer<E> {
         let seed = rng.bits();
         let mut varied = Vec::new();
         for parameter in &self.settings.randomise {
+            // `check_fit` has refused unknown keys
             let nominal = self.nominal.parameter(&parameter.key).unwrap_or_default();
             let drawn = match parameter.draw {
                 Draw::Value([low, high]) => rng.uniform(low, high),
                 Draw::Factor([low, high]) => nominal * rng.uniform(low, high),
             };
+            // drawn whatever the share is: a stage of the curriculum does not shift what is drawn behind it
             varied.push((parameter.key.as_str(), nominal + share * (drawn - nominal)));
         }
         self.load = Load::power(power);
         self.agent.reset();
         self.sample = self.environment.restart(&Start {
             v_out,
+            // a training may start at 0 V
             i_l: (power / v_out.max(1.0) + beside).max(0.0),
             load: self.load,
             seed,
@@ -305,6 +320,7 @@ impl<E: Environment> Trainer<E> {
         let best = self.best.as_ref().map_or(f64::INFINITY, |best| best.score.cost);
         let instants = task.all_instants();
         let mut score = scoring.score(&[]);
+        // one instant of each load step first: what fails there needs none of the others
         for instants in [&instants[..1], &instants] {
             let mut findings = Vec::new();
             for &load_step in &task.load_steps {
@@ -312,6 +328,7 @@ impl<E: Environment> Trainer<E> {
                 findings.push(survey(&self.nominal, &controller, v_ref, task, load_step, instants)?);
                 score = scoring.score(&findings);
                 if score.cost >= best {
+                    // cut short, so nothing can be said of the rest
                     return Ok(Score { met: false, ..score });
                 }
             }
@@ -370,6 +387,7 @@ fn draw_load(loads: &Loads, rng: &mut Xoshiro) -> f64 {
 
 fn check_fit<E: Environment>(settings: &Settings, contract: &Contract, environment: &E) -> Result<(), Error> {
     let (policy, plant) = (contract.policy.sample_period, environment.t_sample());
+    // a decimal period and 1 / f_sw may differ by rounding
     if (policy / plant - 1.0).abs() > 1e-9 {
         let message = Message::new("contract and plant have different control periods").found(format!(
             "sample_period = {policy} s in the contract, {plant} s at the plant"

@@ -59,6 +59,7 @@ impl Cascade {
                 gain: voltage * design.c / design.t / n,
                 share: voltage_share / n,
                 sum: None,
+                // no limit of current is known of a plant
                 range: [f64::NEG_INFINITY, f64::INFINITY],
             },
             current: Pi {
@@ -72,8 +73,10 @@ impl Cascade {
 
     /// The duty for a measurement.
     pub fn step(&mut self, measured: &Signals) -> f64 {
+        // the sample is taken at the valley, and what the load needs is the mean
         let i_l = measured.i_l + self.half_ripple;
         let i_ref = self.voltage.step(self.v_ref - measured.v_out, i_l);
+        // its sum begins at the duty at rest, so this start is never taken
         self.current.step(i_ref - i_l, 0.0)
     }
 }

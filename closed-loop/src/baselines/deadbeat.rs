@@ -35,6 +35,7 @@ impl Deadbeat {
         let mut model = Parameters::ideal(design.v_in, design.l, design.c, 1.0 / design.t);
         model.converter.rectifier = parameters.converter.rectifier;
         model.converter.model = parameters.converter.model;
+        // as given, because 1 / t may round: model and plant must have the same period to the bit
         model.converter.f_sw = parameters.converter.f_sw;
         model.pwm.carrier = parameters.pwm.carrier;
         model.pwm.sampling_phase = parameters.pwm.sampling_phase;
@@ -52,6 +53,7 @@ impl Deadbeat {
         let (mut v, mut i) = (measured.v_out, measured.i_l);
         let load = Load::power(v * measured.i_out);
         let gain = self.design.v_in * self.design.t / self.design.l;
+        // a current that rests at 0 A does so at many duties, and says nothing of losses
         if let Some(expected) = self.expected
             && i > 0.0
         {
@@ -60,6 +62,7 @@ impl Deadbeat {
         let mut expected = None;
         for n in 0..self.pending.len() {
             (v, i) = self.planner.predict(v, i, self.pending[n], &load);
+            // with a delay the next sample is decided by the oldest duty under way
             expected = expected.or(Some(i));
         }
         let target = Target {

@@ -44,6 +44,7 @@ impl FeedForward {
         let Design { l, c, t, v_ref, .. } = self.design;
         let half_ripple = self.design.half_ripple();
         let (mut v, mut i) = (measured.v_out, measured.i_l);
+        // what is commanded now acts behind these: control the state in which it will be met
         for duty in &self.pending {
             let next = i + t / l * (duty * measured.v_in - v);
             v += t / c * (0.5 * (i + next) + half_ripple - measured.i_out);
@@ -52,6 +53,7 @@ impl FeedForward {
         let i_ref = measured.i_out - half_ripple + self.gain * (v_ref - v) + self.sum;
         let wanted = (v + l / t * (i_ref - i)) / measured.v_in;
         let duty = wanted.clamp(0.0, 1.0);
+        // only at rest: in a transient the sum would grow by an error that is not due to losses
         if duty == wanted && (self.gain * (v_ref - v)).abs() < half_ripple {
             self.sum += self.integral * (v_ref - v);
         }

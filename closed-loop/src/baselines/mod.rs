@@ -90,6 +90,7 @@ impl Design {
 
     /// How far the current at the valley lies below its mean over the period, A.
     fn half_ripple(&self) -> f64 {
+        // half of (v_in - v_ref) d t / l with d = v_ref / v_in
         0.5 * self.v_ref * (1.0 - self.v_ref / self.v_in) * self.t / self.l
     }
 

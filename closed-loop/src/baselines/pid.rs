@@ -44,10 +44,12 @@ impl Pid {
     /// The duty for a measurement.
     pub fn step(&mut self, measured: &Signals) -> f64 {
         let error = self.v_ref - measured.v_out;
+        // no kick at the first sample
         let change = error - self.last.unwrap_or(error);
         self.last = Some(error);
         let wanted = self.sum + self.proportional * error + self.derivative * change;
         let duty = wanted.clamp(0.0, 1.0);
+        // at a limit the sum stands still, else it winds up
         if duty == wanted {
             self.sum += self.integral * error;
         }

@@ -97,6 +97,7 @@ impl Knob {
     pub fn range(&self, own: f64, bases: &Bases) -> [f64; 3] {
         let by = |unit: f64, low: f64, high: f64, step: f64| [low * unit, high * unit, step * unit];
         match self.reach {
+            // for numbers that every converter has: shares of a 0 would leave no room
             Reach::Own(low, high, step) => by(own, low, high, step),
             Reach::Resistance(high, step) => by(bases.v / bases.i, 0.0, high, step),
             Reach::ResistanceFrom(low, high, step) => by(bases.v / bases.i, low, high, step),

@@ -30,6 +30,7 @@ const fn searched(words: &'static str, knobs: &'static [Knob], search: Search) -
     Form { words, knobs, search }
 }
 
+// in units of the converter's own size: absolute bounds would suit one converter only (docs/recipes/cause.md)
 const OHMS: Reach = Reach::Resistance(0.5, 0.005);
 const EDGE: Reach = Reach::Time(0.0, 0.2, 0.002);
 const GAIN: Reach = Reach::Plain(0.5, 1.5, 0.01);
@@ -206,6 +207,7 @@ pub static CAUSES: &[Cause] = &[
         forms: &[searched(
             "sampling instant",
             &[knob("delay", &[], Reach::Time(-1.9, 1.9, 0.02))],
+            // a quarter of a period to either side, and 0.7 later: the response bends where the instant passes an edge
             Search::From(&[&[0.0], &[-12.0], &[12.0], &[35.0]]),
         )],
     },
@@ -278,6 +280,7 @@ pub static CAUSES: &[Cause] = &[
         forms: &[searched(
             "whole periods the duty waits",
             &[knob("periods", &["pwm.duty_delay"], Reach::Plain(0.0, 8.0, 1.0))],
+            // whole periods: in between nothing changes smoothly
             Search::Scan(&[0.0, 1.0, 2.0, 3.0, 4.0]),
         )],
     },
@@ -305,6 +308,7 @@ pub static CAUSES: &[Cause] = &[
         forms: &[searched(
             "voltage below which constant power becomes a resistor",
             &[knob("v_fold", &["load.v_fold"], Reach::Voltage(0.01, 1.5, 0.01))],
+            // denser towards the held voltage: a fold below all voltages of a record does nothing and has no slope
             Search::From(&[&[55.0], &[70.0], &[80.0], &[86.0], &[91.0], &[96.0], &[101.0]]),
         )],
     },

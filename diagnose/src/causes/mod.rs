@@ -115,6 +115,7 @@ impl Candidate {
             (Reach::Own(..), _) => LARGE_SHARE * self.own[0],
             (_, Some(parameter)) if parameter.is_pure() => 0.5 * (parameter.typical.1 - parameter.typical.0),
             (_, Some(parameter)) => parameter.typical.1,
+            // the sampling instant is no number of the plant and has no usual size: its reach alone decides
             (_, None) => f64::INFINITY,
         }
     }

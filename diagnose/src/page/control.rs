@@ -56,6 +56,7 @@ fn picture(control: &Control) -> Result<Svg, ReportError> {
     let mut voltage = Panel::new(Axis::new("output voltage").unit("V")).height(220.0);
     let mut duty = Panel::new(Axis::new("duty")).height(110.0);
     for ((name, run), colour) in RUNS.into_iter().zip(&control.shown).zip([MEASURED, MODEL, EXTENDED]) {
+        // without a refit the third run is the second again
         if !control.findings.refitted && name == RUNS[2] {
             continue;
         }

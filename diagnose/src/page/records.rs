@@ -77,6 +77,7 @@ pub(super) fn second(diagnosis: &Diagnosis) -> Option<&'static str> {
 pub(super) fn training(diagnosis: &Diagnosis) -> Result<Section, ReportError> {
     let (problem, before, after) = (&diagnosis.problem, &diagnosis.given, diagnosis.attribution.state());
     let second = second(diagnosis);
+    // in units of the noise, so that volts and amperes count alike
     let square = |record: usize| {
         let own = (0..crate::record::CHANNELS).flat_map(|n| channel(problem, &before.residual, record, n));
         own.map(|v| v * v).sum::<f64>() / problem.records[record].rows().max(1) as f64
@@ -117,6 +118,7 @@ fn by_operating_point(diagnosis: &Diagnosis) -> Result<Svg, ReportError> {
         for (index, record) in problem.records.iter().enumerate() {
             let errors = errors(problem, state, index, 0);
             let drawn = record.measured[0].iter().zip(&record.load);
+            // a voltage of 0 would send the point beyond any picture
             let drawn = drawn.map(|(v, load)| load.current + load.conductance * v + load.power / v.max(1e-3));
             points.extend(drawn.zip(errors).filter(|(i, e)| i.is_finite() && e.is_finite()));
         }

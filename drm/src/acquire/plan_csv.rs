@@ -77,6 +77,7 @@ impl Plan {
         let wished = PLAN_COLUMNS.map(|name| sheet.column(name));
         let measured = ["d_real", "v_out", "i_out", "v_in"].map(|name| sheet.column(name));
         let is_open = |column: &Column| (0..sheet.rows()).all(|row| column.cell(row) == Cell::Empty);
+        // `Table::read` refuses a table without any point; for a plan that is no fault
         if measured.iter().all(|column| column.is_some_and(is_open)) {
             // nothing is measured yet
             return Ok(0);
@@ -99,8 +100,10 @@ impl Plan {
             };
             // `as` saturates: a number that is no index finds no point
             let entry = self.points.get_mut((number as usize).wrapping_sub(1));
+            // the plan may be another than that of the table: a number alone would take over a point nobody asked for
             if let Some((point, measurement)) = entry
                 && duty == point.duty
+                // compared as text: with its unit the cell is a word, which a spreadsheet leaves as it was written
                 && load == point.load.to_string()
             {
                 let v_std = v_std.map_or(Cell::Empty, |column| column.cell(row));

@@ -91,6 +91,7 @@ pub(crate) fn explain(points: &[Point]) -> (Vec<Explanation>, Vec<Explanation>) 
 }
 
 fn explanation(set: &[Cause], points: &[Point]) -> Option<Explanation> {
+    // without one point there must still be one more than unknowns, else leave-one-out leaves nothing
     if points.len() < set.len() + 2 {
         return None;
     }
@@ -123,6 +124,7 @@ fn solve(set: &[Cause], points: &[Point]) -> Option<Vec<f64>> {
     let gap = |p: &Point| p.d_real * p.v_in - p.v_out;
     match set {
         [one] => {
+            // a cause that acts at no point, such as a diode at full duty, has no value
             let square = sum(&|p| one.takes(p) * one.takes(p));
             (square > 0.0).then(|| vec![sum(&|p| one.takes(p) * gap(p)) / square])
         }
@@ -134,6 +136,8 @@ fn solve(set: &[Cause], points: &[Point]) -> Option<Vec<f64>> {
             let b = sum(&|p| one.takes(p) * two.takes(p));
             let (x, y) = (sum(&|p| one.takes(p) * gap(p)), sum(&|p| two.takes(p) * gap(p)));
             let determinant = a * c - b * b;
+            // over a c this is the squared sine between the columns: below an angle of 1e-3 they are one. The bound
+            // also limits what the normal equations lose, to six of sixteen digits
             (determinant > 1e-6 * a * c).then(|| vec![(c * x - b * y) / determinant, (a * y - b * x) / determinant])
         }
         _ => None,
@@ -147,6 +151,7 @@ const AS_WELL: f64 = 1.2;
 pub(crate) fn as_good<'a>(list: &'a [Explanation], ties: &[&Explanation]) -> Vec<&'a Explanation> {
     let best = ties.iter().map(|e| e.rms_v).fold(f64::INFINITY, f64::min);
     let size = ties.first().map_or(0, |e| e.causes.len());
+    // a table without noise leaves rounding, of which no factor is meaningful
     let fits = |e: &&Explanation| e.causes.len() == size && e.rms_v <= AS_WELL * best + 1e-9;
     list.iter().filter(fits).collect()
 }

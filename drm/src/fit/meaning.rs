@@ -6,13 +6,16 @@ use crate::fit::{Fit, Row};
 use crate::table::Point;
 
 /// A coefficient counts as known if it is this many standard errors away from no effect.
+// a convention: about 95 %
 const KNOWN: f64 = 2.0;
 
 pub(crate) fn of(fit: &Fit, points: &[Point], explanations: &[Explanation], impossible: &[Explanation]) -> Vec<String> {
     let mut meaning = Vec::new();
+    // the bound of `separation::WEAK`: beyond it a coefficient alone means nothing
     let apart = fit.separation.directions == fit.separation.predictors && fit.separation.condition <= 30.0;
     let mean = |of: &dyn Fn(&Point) -> f64| points.iter().map(of).sum::<f64>() / points.len().max(1) as f64;
     let (v_in, v_sim) = (mean(&|p| p.v_in), mean(&|p| p.simulation.v_in));
+    // the formulas below start from v = d_sim v_in, which a simulation with losses does not have
     if points.iter().any(|p| !p.simulation.is_none()) {
         meaning.push("a, b and c are what the converter differs by from the nominal one, not its own parts".to_owned());
     } else if apart {
@@ -110,6 +113,7 @@ fn four(fit: &Fit, v_in: f64, v_sim: f64, meaning: &mut Vec<String>) {
         }
     };
     meaning.push(claim("V_f", v_f, se_v, " V"));
+    // V_f is in c as well, so its uncertainty counts again
     let se_lost = (se.c * se.c + se_v * se_v / (v * v)).sqrt();
     meaning.push(claim("lost duty", k.c - v_f / v, se_lost, ""));
     let apart = r * v * v / v_sim;

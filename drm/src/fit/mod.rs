@@ -1,4 +1,9 @@
 //! From a table of settled points to a mapping, and how far it can be trusted.
+//!
+//! ```text
+//! table ─► points in continuous conduction ─► what they tell apart ─► outliers, by the richer form
+//!       ─► both forms: components, coefficients, leave-one-out ─► choice ─► meaning, remarks ─► Report
+//! ```
 
 mod causes;
 mod meaning;
@@ -126,6 +131,7 @@ pub fn fit(table: &Table, options: &FitOptions) -> Result<Report, Faults> {
     if !table.open.is_empty() {
         notes.push(format!("not measured yet: {}", crate::table::lines(&table.open)));
     }
+    // first of all: points in discontinuous conduction follow another law and would be outliers of both forms
     let (mut points, discontinuous) = continuous(table, options, &mut notes);
     let constant_load = separation::is_constant_load(&points);
     let load_line = separation::load_line(&points);
@@ -133,6 +139,7 @@ pub fn fit(table: &Table, options: &FitOptions) -> Result<Report, Faults> {
         form,
         constant_load,
         assumed_a: options.assumed_a,
+        // with a given, b is known by itself, and an error is stated at constant current
         load_line: if options.assumed_a.is_some() { 0.0 } else { load_line },
     };
     let forms = forms(&points, constant_load, options).map_err(|message| Faults::from(Fault::from(message)))?;
@@ -228,6 +235,7 @@ fn choose(fits: &[Fit]) -> usize {
     const CLEARLY: f64 = 0.8;
     match fits {
         [three, four] => {
+            // a product that the table cannot tell from its factors holds on the measured points only
             let told_apart = four.separation.directions == four.separation.predictors;
             let better = four.left_out.rms_v < CLEARLY * three.left_out.rms_v;
             usize::from(told_apart && better && four.map.rises())
@@ -240,9 +248,12 @@ fn one(model: &Model, points: &[Point], options: &FitOptions) -> Result<Fit, Fau
     let separation = separation::examine(model, points);
     let cap = separation.directions;
     let (best, components_v) = validation::choose_components(model, points, cap);
+    // further components would fit directions that are rounding or noise
     let components = options.components.unwrap_or(best).min(cap);
     let pls = model.fit(points, components);
+    // rounded before it is judged: the errors are those of the mapping that a policy reads
     let map = model.map(points, &pls).rounded();
+    // refused, not noted: with a mapping that falls the control loop has the wrong sign
     if !map.rises() {
         let slope = map.slope(map.valid_i_out.low).min(map.slope(map.valid_i_out.high));
         let message = Message::new(format!("the {} mapping does not rise with d_sim", model.form.name()))

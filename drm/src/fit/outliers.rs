@@ -23,6 +23,7 @@ const CRITICAL: [f64; 30] = [
     4.9, 4.84, 4.78, 4.74, 4.69, 4.65, 4.62, 4.59, 4.56, 4.53, 4.51, 4.48,
 ];
 /// The same for more.
+// that of 30 degrees; the normal distribution has 3.89. In doubt a point stays
 const CRITICAL_MANY: f64 = 4.48;
 /// No smaller deviation makes an outlier, as a share of v_in: the forms themselves are not better.
 const FLOOR: f64 = 1e-4;
@@ -37,6 +38,7 @@ pub(crate) fn remove(model: &Model, points: &mut Vec<Point>, components: usize) 
         let Some((index, outlier)) = worst(model, points, components) else {
             break;
         };
+        // the others are judged anew: a bad point has moved the fits that judged them
         outliers.push(outlier);
         *points = without(points, index);
     }
@@ -48,6 +50,7 @@ fn worst(model: &Model, points: &[Point], components: usize) -> Option<(usize, O
     let mut worst: Option<(usize, Outlier)> = None;
     for (index, point) in points.iter().enumerate() {
         let (deleted, degrees) = deleted(model, points, index, components)?;
+        // `deleted` gives two degrees or more
         let critical = CRITICAL.get(degrees - 1).copied().unwrap_or(CRITICAL_MANY);
         let beyond = deleted.studentised > critical && deleted.error_v.abs() > FLOOR * point.v_in;
         if beyond

@@ -63,6 +63,7 @@ impl Model {
     }
 
     pub fn row(&self, point: &Point) -> Vec<f64> {
+        // a column of zeros has no spread and gets the coefficient 0, so that the others keep their places
         let d_sim = if self.assumed_a.is_some() { 0.0 } else { point.d_sim() };
         let i_out = if self.constant_load { 0.0 } else { point.i_out };
         let product = if self.constant_load {
@@ -94,6 +95,7 @@ impl Model {
     pub fn map(&self, points: &[Point], pls: &Pls) -> DutyRatioMap {
         DutyRatioMap {
             coefficients: self.coefficients(pls),
+            // no bound at 0: a load may deliver current, and the table then says so
             valid_i_out: widened(hull(points.iter().map(|p| p.i_out)), f64::NEG_INFINITY, f64::INFINITY),
             valid_d_sim: widened(hull(points.iter().map(Point::d_sim)), 0.0, 1.0),
         }

@@ -58,6 +58,7 @@ pub(crate) fn examine(model: &Model, points: &[Point]) -> Separation {
     }
     Separation {
         condition,
+        // a fit has one component at least; without a direction that one finds nothing to explain
         directions: directions.max(1),
         predictors,
         findings,
@@ -69,11 +70,13 @@ fn condition(model: &Model, points: &[Point]) -> (f64, usize) {
     let columns: Vec<Vec<f64>> = model
         .columns(points)
         .iter()
+        // a column that is constant by intent (no load current, a given) would make every condition infinite
         .filter_map(|column| standardised(column))
         .collect();
     let values = eigenvalues(&correlation(&columns));
     let largest = values.first().copied().unwrap_or(0.0);
     let smallest = values.last().copied().unwrap_or(0.0).max(0.0);
+    // eigenvalues of the correlation are squares of the singular values
     let directions = values.iter().filter(|value| **value * LOST * LOST > largest).count();
     let condition = if smallest > 0.0 {
         (largest / smallest).sqrt()
@@ -95,6 +98,7 @@ impl LoadLine {
         let i: Vec<f64> = points.iter().map(|p| p.i_out).collect();
         let ((d_mean, d_scale), (i_mean, i_scale)) = (centre_and_scale(&d), centre_and_scale(&i));
         let together = dot(&d, &i) - d_mean * i_mean * d.len() as f64;
+        // the ratio of the spreads: a regression would depend on which of the two is taken for the cause
         let slope = together.signum() * i_scale / d_scale;
         LoadLine {
             slope,
@@ -111,6 +115,7 @@ pub(crate) fn load_line(points: &[Point]) -> f64 {
         assumed_a: None,
         load_line: 0.0,
     };
+    // two points always lie on a line
     let apart = model.constant_load || points.len() < 3 || condition(&model, points).0 <= LOST;
     if apart { 0.0 } else { LoadLine::of(points).slope }
 }
@@ -170,9 +175,11 @@ fn correlation(columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
 fn eigenvalues(matrix: &[Vec<f64>]) -> Vec<f64> {
     let n = matrix.len();
     let mut a = matrix.to_vec();
+    // Jacobi converges quadratically, so three columns need far fewer turns; a fixed number needs no bound to stop at
     for _ in 0..30 {
         for p in 0..n {
             for q in p + 1..n {
+                // the angle is a quotient over this element
                 if a[p][q] != 0.0 {
                     rotate(&mut a, p, q);
                 }

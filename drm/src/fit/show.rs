@@ -63,6 +63,7 @@ pub fn text(report: &Report) -> Result<String, fmt::Error> {
         )?;
     }
     for outlier in &report.outliers {
+        // a table without noise makes any deviation as many as one likes
         let sigmas = if outlier.sigmas < 1e4 {
             format!("{:.0}", outlier.sigmas)
         } else {

@@ -68,6 +68,7 @@ pub(crate) fn standard_errors(left_out: &LeftOut) -> Coefficients {
             .iter()
             .map(|k| (of(k) - mean) * (of(k) - mean))
             .sum();
+        // not over n - 1: fits that share all points but one hardly differ, and the factor makes up for that
         ((n - 1.0) / n * squares).sqrt()
     };
     let product = left_out.coefficients.iter().any(|k| k.r.is_some());
@@ -94,11 +95,13 @@ pub(crate) fn deleted(model: &Model, points: &[Point], index: usize, components:
     let degrees = rest
         .len()
         .checked_sub(pls.components + 1)
+        // with one degree of freedom t would have to exceed 6366
         .filter(|degrees| *degrees >= 2)?;
     let deviation = |point: &Point| model.response(point) - pls.predict(&model.row(point));
     let squares: f64 = rest.iter().map(|point| deviation(point) * deviation(point)).sum();
     let noise = (squares / degrees as f64).sqrt();
     let point = &points[index];
+    // a point that took no part scatters by its own noise and by that of the fit
     let expected = noise * (1.0 + pls.leverage(&model.row(point))).sqrt();
     let deleted = Deleted {
         studentised: deviation(point).abs() / expected.max(f64::MIN_POSITIVE),

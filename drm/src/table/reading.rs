@@ -49,6 +49,7 @@ pub(super) fn read(sheet: &Sheet, options: &TableOptions) -> Result<Table, Fault
             reading.rows.push(row);
         }
     }
+    // ranges and units are judged on whole points only
     faults.propagate()?;
     suspicion::check(&mut table, &reading)?;
     if !options.partial {
@@ -141,6 +142,7 @@ impl<'a> Reading<'a> {
             v_out,
             i_out: i_out?,
             v_in,
+            // the paper's d_sim = v_out / v_in, with the input voltage of each point
             simulation: simulation.unwrap_or(Losses::none(v_in)),
             settled: settled.unwrap_or(true) && v_std.is_none_or(|v_std| v_std <= UNSETTLED * v_out.abs()),
         })

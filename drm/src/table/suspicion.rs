@@ -7,6 +7,7 @@ use super::point::{Point, Table};
 use super::reading::Reading;
 
 /// Measured voltage over `d v_in` beyond which the units differ.
+// a slip of a prefix is a factor of 1000; at light load v_out may be several times d v_in
 const OTHER_UNIT: f64 = 20.0;
 /// A buck converter cannot lift the voltage; this much is left to sensors.
 const SENSOR: f64 = 1.05;
@@ -27,6 +28,7 @@ pub(super) fn check(table: &mut Table, reading: &Reading<'_>) -> Result<(), Faul
     let mut faults = table_faults();
     faults.extend((0..points.len()).filter_map(|n| not_positive("v_in", points[n].v_in, n, reading)));
     faults.extend(duties(points, reading));
+    // what follows divides by duty and input voltage
     faults.propagate()?;
     let mut faults = table_faults();
     faults.extend(voltages(points, reading));
@@ -89,6 +91,7 @@ fn duties(points: &[Point], reading: &Reading<'_>) -> Vec<Fault> {
     let above: Vec<usize> = (0..points.len()).filter(outside).collect();
     let Some(first) = above.first() else { return Vec::new() };
     let label = &reading.duty.label;
+    // a few duties above 1 are slips; a column in percent has them in most rows
     let percent = most <= 100.0 && points.iter().all(|p| p.d_real >= 0.0) && above.len() * 2 > points.len();
     if percent {
         let lines: Vec<usize> = above.iter().map(|n| points[*n].line).collect();
@@ -115,6 +118,7 @@ fn voltages(points: &[Point], reading: &Reading<'_>) -> Vec<Fault> {
         .map(|p| (p.v_out / (p.d_real * p.v_in)).abs())
         .collect();
     ratios.sort_by(f64::total_cmp);
+    // the median: one bad row must not make the whole column look like another unit
     let Some(middle) = ratios.get(ratios.len() / 2).copied() else {
         let message = Message::new("every duty ratio is 0").expected("points at different duty ratios");
         return vec![reading.sheet.fault(message)];

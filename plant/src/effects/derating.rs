@@ -16,6 +16,7 @@ pub const EFFECT: Effect = Effect {
             capacitor.derating,
             "1",
             "share of the capacitance that is lost far above v_half",
+            // something must be left: the steps of the full circuit are as short as the least capacitance asks for
             (0.0, 0.95),
             (0.1, 0.8),
             0.0
@@ -34,6 +35,7 @@ pub const EFFECT: Effect = Effect {
 /// C(v) over C0.
 #[inline]
 pub(crate) fn relative_capacitance(capacitor: &Capacitor, v: f64) -> f64 {
+    // a rational law, as of the inductance: no libm
     let x = v / capacitor.v_half;
     let square = x * x;
     1.0 - capacitor.derating * square / (1.0 + square)

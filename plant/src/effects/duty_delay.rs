@@ -22,6 +22,7 @@ pub const EFFECT: Effect = Effect {
         switches_on: true,
         field: Field::Whole(
             |p| u64::from(p.pwm.duty_delay),
+            // what does not fit is out of range, too, and `check` refuses it
             |p, value| p.pwm.duty_delay = u32::try_from(value).unwrap_or(u32::MAX),
         ),
     }],

@@ -23,5 +23,6 @@ pub(crate) fn round(duty: f64, lsb: f64) -> f64 {
     if lsb == 0.0 {
         return duty;
     }
+    // a step that does not divide 1 can round a duty of 1 above it: 0.4 gives 1.2
     ((duty / lsb + 0.5).floor() * lsb).min(1.0)
 }

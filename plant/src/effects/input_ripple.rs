@@ -49,6 +49,7 @@ pub(crate) fn voltage(source: &Source, t: f64) -> f64 {
 
 /// sin(2 pi turns) to 1e-11, from the Taylor series on a quarter turn.
 fn sine(turns: f64) -> f64 {
+    // folded to a quarter turn first: there eight terms leave (pi/2)^19 / 19! = 4e-14
     let whole = turns - turns.floor();
     let folded = match whole {
         x if x < 0.25 => x,

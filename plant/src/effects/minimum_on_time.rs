@@ -21,11 +21,13 @@ pub const EFFECT: Effect = Effect {
 /// The duty that is left of `duty`.
 #[inline(always)]
 pub(crate) fn limit(duty: f64, pwm: &Pwm, t_sw: f64) -> f64 {
+    // a duty of 0 asks for no pulse, so there is none to lengthen
     if pwm.min_on_time == 0.0 || duty * t_sw >= pwm.min_on_time || duty == 0.0 {
         return duty;
     }
     match pwm.short_pulse {
         ShortPulse::Drop => 0.0,
+        // the minimum may be longer than the period: its range is in seconds and knows no frequency
         ShortPulse::Extend => (pwm.min_on_time / t_sw).min(1.0),
     }
 }

@@ -16,6 +16,7 @@ pub const EFFECT: Effect = Effect {
             inductor.saturation,
             "1",
             "share of the inductance that is lost far above i_sat",
+            // something must be left: the steps of the full circuit are as short as the least inductance asks for
             (0.0, 0.95),
             (0.1, 0.7),
             0.0
@@ -34,6 +35,7 @@ pub const EFFECT: Effect = Effect {
 /// L(i) over L0.
 #[inline]
 pub(crate) fn relative_inductance(inductor: &Inductor, i: f64) -> f64 {
+    // a rational law: one with an exponential would need libm, whose bits differ between machines
     let x = i / inductor.i_sat;
     let square = x * x;
     1.0 - inductor.saturation * square / (1.0 + square)

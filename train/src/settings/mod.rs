@@ -104,6 +104,7 @@ impl Reward {
     /// Reward of a control period that ended with the output at `v_out` and changed the duty by `duty_change`.
     #[must_use]
     pub fn of(&self, v_out: f64, duty_change: f64) -> f64 {
+        // the paper prints a signed error with a weight of -10, which would reward an error
         let error = (v_out - self.v_ref).abs();
         let band = self
             .bands

@@ -11,6 +11,7 @@ use crate::learner::{LearnerSettings, Loss, TargetUpdate};
 use crate::optimiser::AdamSettings;
 use closed_loop::read;
 
+// any finite number
 const ANY: RangeInclusive<f64> = f64::MIN..=f64::MAX;
 
 pub(super) fn settings(document: &Document) -> Result<Settings, Faults> {
@@ -37,6 +38,7 @@ fn top(document: &Document, root: &mut Table<'_>, faults: &mut Sink) -> Option<S
         Some(table.with_default("hidden", vec![64, 64], faults, widths))
     });
     let learning = root.section("learning", faults, |table, faults| {
+        // missing steps have a fault of their own; the default of epsilon only needs some number
         Some(learning(table, steps.unwrap_or(1), faults))
     });
     let reward = root.section("reward", faults, reward);
@@ -79,11 +81,13 @@ fn share(value: &Value<'_>, faults: &mut Sink) -> Option<f64> {
 
 /// A factor that makes a sum over the past converge.
 fn below_one(value: &Value<'_>, faults: &mut Sink) -> Option<f64> {
+    // ranges are closed: this stands for below 1
     value.number_within(0.0..=0.999_999, faults)
 }
 
 fn seeds(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<u64>> {
     let seeds = value.each("whole numbers: [0, 1, 2]", faults, |item, faults| {
+        // TOML knows no larger integers
         item.integer(0..=i64::MAX as u64, faults)
     })?;
     if seeds.is_empty() {
@@ -109,6 +113,8 @@ fn learning(table: &mut Table<'_>, steps: u64, faults: &mut Sink) -> Learning {
     let loss = table.with_default("loss", Loss::Huber, faults, |v, faults| {
         v.choice(&[("huber", Loss::Huber), ("squared", Loss::Squared)], faults)
     });
+    // rate, discount and batch are the paper's; clipping, soft update and replay are from its authors' code. The
+    // replay buffer of 1e-6 that the paper prints is a misprint
     let learning_rate = table.with_default("learning_rate", 1e-3, faults, Value::positive);
     let final_learning_rate = table.with_default("final_learning_rate", learning_rate, faults, Value::positive);
     let discount = table.with_default("discount", 0.9, faults, below_one);
@@ -205,6 +211,7 @@ fn bands(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<(f64, f64)>> {
         let Some([within, reward]) = item.pair(ANY, faults) else {
             continue;
         };
+        // the first band that holds |e| counts: a narrow one behind a wide one never would
         if within <= list.last().map_or(0.0, |(before, _)| *before) {
             let expected = "bands from the narrowest to the widest";
             let message = messages::out_of_range(item.label(), &format!("{within} V"), expected);
@@ -230,6 +237,7 @@ fn loads(value: &Value<'_>, faults: &mut Sink) -> Option<Loads> {
         let (range, share) = match (values.first(), range) {
             (None, Some(range)) => (range, 0.0),
             (Some(_), Some(range)) => (range, share),
+            // with a share of 1 nothing is ever drawn from the range
             (Some(first), None) => ([*first; 2], 1.0),
             (None, None) => {
                 let message = Message::new("`loads` is empty").expected("`values`, `range` or both, in W");

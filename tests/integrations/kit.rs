@@ -166,6 +166,32 @@ fn an_edited_constant_of_mapping_limits_or_status_fails() {
     }
 }
 
+/// What a random run of some hundred steps meets seldom or never: limits far from the actions, the last bridged sample, the
+/// end of a range, equal values of two actions, a state that is not sound, the position of a sliced check.
+#[test]
+fn an_edit_where_random_moves_seldom_come_fails() {
+    let policy = example();
+    let edits = [
+        ("(v3, 0.4f, 0.59999996f)", "(v3, 0.38f, 0.59999996f)"),
+        ("(v3, 0.4f, 0.59999996f)", "(v3, 0.4f, 0.62f)"),
+        (
+            "state->primed & buck12_flag(bad_count <= 3u)",
+            "state->primed & buck12_flag(bad_count <= 4u)",
+        ),
+        ("measured->i_out, -1.0f, 40.0f", "measured->i_out, -1.0f, 40.04f"),
+        ("buck12_flag(output > best)", "buck12_flag(output >= best)"),
+        ("(4u - state->bad_count)", "(5u - state->bad_count)"),
+        ("check->position = span.to;", ""),
+        ("? check->position : 0u;", "? check->position : 1u;"),
+    ];
+    for (ran, (from, to)) in edited(&policy, &edits).into_iter().zip(edits) {
+        assert!(
+            ran.code == Some(1) && ran.stdout.contains("FAIL"),
+            "{from} => {to}: {ran:?}"
+        );
+    }
+}
+
 /// The guards stop a compiler that says in its macros what it was asked for.
 #[test]
 fn fast_math_does_not_build() {

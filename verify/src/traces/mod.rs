@@ -5,7 +5,6 @@
 //! long enough for integrators to reach their clamps. Attempts to replace the mapping
 //! coefficients, resets and fresh starts are strewn in.
 
-pub mod directed;
 mod edges;
 mod plant;
 mod recorded;
@@ -371,7 +370,7 @@ fn physical(scalar: Scalar, x: f64) -> Sample {
 }
 
 /// The sample `ulps` units in the last place (or codes) further.
-fn nudged(sample: Sample, ulps: i32) -> Sample {
+pub fn nudged(sample: Sample, ulps: i32) -> Sample {
     let moved = |scalar: Scalar, mut x: f64| {
         for _ in 0..ulps.abs() {
             x = if ulps > 0 {

@@ -6,17 +6,23 @@
 use interp::Sample;
 use policy::{Interval, Policy, Scalar, Signal};
 
-use super::{Event, nudged, sample_of};
+use crate::traces::{Event, nudged, sample_of};
 
 /// More bad samples in a row than this are not worth a kit's memory: what is bridged longer is left to `policyc verify`.
 const LONGEST_RUN: u32 = 40;
 
-/// Steps with a mapping that asks for more than the limits allow: enough for the duty to arrive there in most policies.
-const STEPS_TO_A_LIMIT: usize = 8;
+/// A move, or a jump to where slew limit and soft start end for the usual samples.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Move {
+    /// As in a run.
+    Do(Event),
+    /// No run has it.
+    Settle,
+}
 
 /// The moves, from a fresh controller on.
 #[must_use]
-pub fn moves(policy: &Policy) -> Vec<Event> {
+pub fn moves(policy: &Policy) -> Vec<Move> {
     let good = usual(policy);
     let mut moves = vec![Event::Step(good.clone()), Event::Step(good.clone())];
     runs(policy, &good, &mut moves);
@@ -33,8 +39,8 @@ pub fn moves(policy: &Policy) -> Vec<Event> {
         }
         moves.push(Event::Step(good.clone()));
     }
-    coefficients(policy, &good, &mut moves);
-    moves
+    let settled = std::iter::once(Move::Settle).chain(moves.into_iter().map(Move::Do));
+    settled.chain(coefficients(policy, &good)).collect()
 }
 
 /// A sample in the middle of each range.
@@ -80,22 +86,23 @@ fn runs(policy: &Policy, good: &[Sample], moves: &mut Vec<Event>) {
     }
 }
 
-/// Each coefficient of the mapping at the ends of what it may be set to, and next to them; the policy's own at last.
-fn coefficients(policy: &Policy, good: &[Sample], moves: &mut Vec<Event>) {
+/// Each coefficient of the mapping at the ends of what it may be set to, and next to them, then all at one end, where the
+/// duty leaves its limits; the policy's own at last.
+fn coefficients(policy: &Policy, good: &[Sample]) -> Vec<Move> {
     let Some(mapping) = &policy.mapping else {
-        return;
+        return Vec::new();
     };
     let scalar = policy.numeric_format.scalar();
     let own = mapping.coefficients;
-    let set = |[a, b, c, r]: [f64; 4]| Event::SetMapping {
-        a,
-        b,
-        c,
-        r: own.r.map(|_| r),
+    let set = |[a, b, c, r]: [f64; 4]| {
+        let r = own.r.map(|_| r);
+        Move::Do(Event::SetMapping { a, b, c, r })
     };
     let own_values = [own.a, own.b, own.c, own.r.unwrap_or(0.0)].map(|value| scalar.nearest(value));
     let ranges = [mapping.adjust_a, mapping.adjust_b, mapping.adjust_c, mapping.adjust_r];
     let count = if own.r.is_some() { 4 } else { 3 };
+    let step = || [Move::Settle, Move::Do(Event::Step(good.to_vec()))];
+    let mut moves = Vec::new();
     for (index, range) in ranges.into_iter().enumerate().take(count) {
         for end in [range.low, range.high].map(|end| scalar.nearest(end)) {
             for value in [end, scalar.next_up(end), scalar.next_down(end)] {
@@ -103,13 +110,14 @@ fn coefficients(policy: &Policy, good: &[Sample], moves: &mut Vec<Event>) {
                 values[index] = value;
                 moves.push(set(values));
             }
+            moves.extend(step());
         }
-        moves.push(Event::Step(good.to_vec()));
     }
-    // all at one end: the duty leaves its limits, on the way through a slew limit if there is one
     for end in [|range: Interval| range.low, |range: Interval| range.high] {
         moves.push(set(ranges.map(|range| scalar.nearest(end(range)))));
-        moves.extend((0..STEPS_TO_A_LIMIT).map(|_| Event::Step(good.to_vec())));
+        moves.extend(step());
     }
     moves.push(set(own_values));
+    moves.extend(step());
+    moves
 }

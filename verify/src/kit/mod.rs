@@ -1,30 +1,31 @@
 //! What the back-to-back kit compares with: the interpreter's answers on the policy and on the construct suite.
 
+mod course;
+mod directed;
+
 use codegen::backend::kit::{Material, Trace};
 use codegen::{Language, Output};
-use interp::{Controller, Real};
+use interp::Real;
 use policy::{NumericFormat, Policy, ReadOptions, Scalar};
 use targets::{RowBlock, TargetSpec};
 
-use crate::oracle::{Chunk, Oracle};
-use crate::protocol::{Layout, sample_words};
+use self::course::Course;
 use crate::session::VerifyError;
-use crate::traces::{Event, Stream, directed};
 
 /// A small policy that uses every construct of the generated code.
 const CONSTRUCTS: &[(&str, &[u8])] = &[
     (
         "policy.toml",
         // inside the program: a user of the tool has no checkout to read them from
-        include_bytes!("../../tests/golden/cases/constructs/policy.toml"),
+        include_bytes!("../../../tests/golden/cases/constructs/policy.toml"),
     ),
     (
         "drm.toml",
-        include_bytes!("../../tests/golden/cases/constructs/drm.toml"),
+        include_bytes!("../../../tests/golden/cases/constructs/drm.toml"),
     ),
     (
         "weights.safetensors",
-        include_bytes!("../../tests/golden/cases/constructs/weights.safetensors"),
+        include_bytes!("../../../tests/golden/cases/constructs/weights.safetensors"),
     ),
 ];
 
@@ -97,148 +98,15 @@ fn trace(policy: &Policy, steps: u32) -> Result<Trace, VerifyError> {
     }
 }
 
-/// Moves to the places where edits hide, damages of the state, then random moves: `steps` control steps together, or as
-/// many as the first two parts take.
+/// Moves to the places where edits hide, states that are not sound, equal Q values, then random moves: `steps` control steps
+/// together, or as many as the first parts take.
 fn trace_in<T: Real>(policy: &Policy, steps: u32) -> Result<Trace, VerifyError> {
-    let mut oracle = Oracle::<T>::new(policy);
-    let layout = oracle.layout().clone();
-    let mut trace = Trace::default();
-    let directed = oracle
-        .chunk_of(directed::moves(policy))
-        .map_err(VerifyError::Interpreter)?;
-    append(policy, &layout, &directed, &mut trace);
-    let damages = damages(policy, &Controller::<T>::new(policy));
-    for damage in damages {
-        let events = vec![Event::Init];
-        append(
-            policy,
-            &layout,
-            &oracle.chunk_of(events).map_err(VerifyError::Interpreter)?,
-            &mut trace,
-        );
-        damage_state(&damage, &mut oracle, &mut trace);
-        let events = vec![Event::Step(directed::usual(policy))];
-        append(
-            policy,
-            &layout,
-            &oracle.chunk_of(events).map_err(VerifyError::Interpreter)?,
-            &mut trace,
-        );
-    }
-    let left = u64::from(steps).saturating_sub(u64::from(trace.steps()));
-    let mut stream = Stream::new(policy, SEED, &[]);
-    let chunk = oracle.next_chunk(&mut stream, left).map_err(VerifyError::Interpreter)?;
-    append(policy, &layout, &chunk, &mut trace);
-    Ok(trace)
-}
-
-/// Words of the state that get other values, by their place among the numbers; the counters stand behind these.
-#[derive(Debug, Clone, PartialEq)]
-struct Damage<T> {
-    numbers: Vec<(usize, T)>,
-    counters: Option<(u32, u32)>,
-}
-
-/// Each number of the state just outside of what a sound state holds; all of them at either end; the counters at their ends
-/// and beyond.
-fn damages<T: Real>(policy: &Policy, fresh: &Controller<T>) -> Vec<Damage<T>> {
-    let (scalar, hold) = (policy.numeric_format.scalar(), policy.fallback.hold);
-    let ends: Vec<(usize, (T, T))> = fresh
-        .sound_ends()
-        .into_iter()
-        .enumerate()
-        .filter_map(|(at, ends)| Some((at, ends?)))
-        .collect();
-    let of_numbers = |numbers: Vec<(usize, T)>| Damage {
-        numbers,
-        counters: None,
-    };
-    let all = |pick: fn((T, T)) -> T| of_numbers(ends.iter().map(|(at, ends)| (*at, pick(*ends))).collect());
-    let mut damages = vec![all(|ends| ends.0), all(|ends| ends.1)];
-    for &(at, (low, high)) in &ends {
-        let (below, above) = (scalar.next_down(low.to_f64()), scalar.next_up(high.to_f64()));
-        // what is no number gives one of many in the observation, and the contract does not say which
-        let finite = [below, above].into_iter().filter(|end| end.is_finite());
-        damages.extend(finite.map(|end| of_numbers(vec![(at, T::nearest(end))])));
-    }
-    let counters = [
-        (hold.saturating_add(1), 1),
-        (hold.saturating_add(2), 1),
-        (u32::MAX, 1),
-        (0, 2),
-        (0, u32::MAX),
-    ];
-    damages.extend(counters.map(|counters| Damage {
-        numbers: Vec::new(),
-        counters: Some(counters),
-    }));
-    damages
-}
-
-/// Puts the damage into the interpreter's state and into the trace, word by word.
-fn damage_state<T: Real>(damage: &Damage<T>, oracle: &mut Oracle<T>, trace: &mut Trace) {
-    let mut state = oracle.controller().state().clone();
-    let before = state.words();
-    for (at, value) in &damage.numbers {
-        if let Some(number) = state.numbers_mut().nth(*at) {
-            *number = *value;
-        }
-    }
-    if let Some((bad_count, primed)) = damage.counters {
-        (state.bad_count, state.primed) = (bad_count, primed);
-    }
-    let mut words = before;
-    for (at, word) in state.words().into_iter().enumerate() {
-        if words[at] != word {
-            words[at] = word;
-            trace.damage(at as u32, word, words.iter().copied());
-        }
-    }
-    oracle.restore(&state);
-}
-
-/// Appends the words of a chunk in the form of the kit: its layout is that of [`crate::protocol`].
-fn append(policy: &Policy, layout: &Layout, chunk: &Chunk, trace: &mut Trace) {
-    let number = layout.scalar().words();
-    let values = number * (policy.features.len() + policy.actions.len());
-    let (mut input, mut expected) = (chunk.input.as_slice(), chunk.expected.as_slice());
-    for event in &chunk.events {
-        let answer = take(&mut expected, layout.answer(event).len());
-        // the kind comes first
-        take(&mut input, 1);
-        match event {
-            Event::Step(_) => {
-                let (before, rest) = answer.split_at(values);
-                let (command, state) = rest.split_at(2 * number + 2);
-                // the last word is the driver's verdict on purity
-                let state = &state[..state.len() - 1];
-                let rest = before.iter().chain(state).copied();
-                trace.step(take(&mut input, sample_words(policy)), command, rest);
-            }
-            Event::SetMapping { r, .. } => {
-                let coefficients = take(&mut input, 4 * number);
-                // four numbers travel in any case; the kit calls a function of three
-                let given = if r.is_some() {
-                    coefficients
-                } else {
-                    &coefficients[..3 * number]
-                };
-                trace.set_mapping(given, answer[0], answer[1..].iter().copied());
-            }
-            Event::Reset => trace.reset(answer.iter().copied()),
-            Event::Init => trace.init(answer.iter().copied()),
-            // the stream has none of these; the generated code has its own known answers
-            Event::Network(observation) => {
-                take(&mut input, number * observation.len());
-            }
-        }
-    }
-}
-
-fn take<'a>(words: &mut &'a [u32], count: usize) -> &'a [u32] {
-    let (first, rest) = words.split_at(count.min(words.len()));
-    *words = rest;
-    first
+    let mut course = Course::<T>::new(policy);
+    course.directed().map_err(VerifyError::Interpreter)?;
+    course.damaged().map_err(VerifyError::Interpreter)?;
+    course.tied().map_err(VerifyError::Interpreter)?;
+    course.random(steps, SEED).map_err(VerifyError::Interpreter)?;
+    Ok(course.trace)
 }
 
 #[cfg(test)]
@@ -249,6 +117,8 @@ mod tests {
     use codegen::program::{Literal, Loop, Op};
 
     use super::*;
+    use crate::oracle::Oracle;
+    use crate::traces::Stream;
 
     /// Every operation of the program; the match makes the compiler ask for new ones.
     fn all_operations() -> Vec<Op> {

@@ -1,0 +1,317 @@
+//! The moves of a kit, played on the interpreter and written down with its answers.
+//!
+//! ```text
+//!  directed   ends of ranges, bridged samples, coefficients at their ends   what a random run meets now and then
+//!  damaged    each number just outside of what a sound state holds          what no run meets
+//!  tied       two actions of exactly equal value                            what a run meets once in millions of steps
+//!  random     the stream of `policyc verify`
+//! ```
+
+use codegen::backend::kit::Trace;
+use interp::{Controller, InputError, Real, Sample, State};
+use policy::{Policy, Scalar};
+
+use super::directed::{self, Move};
+use crate::oracle::{Chunk, Oracle};
+use crate::protocol::{Layout, sample_words};
+use crate::traces::{Event, Stream, nudged, sample_of};
+
+/// Steps after which a duty that still moves is left where it is: the longest soft start that a kit waits for.
+const MOST_TO_REST: usize = 4000;
+/// Places in a signal's range between which another action is looked for.
+const PLACES: usize = 33;
+/// Halvings that bring two numbers of either format next to each other.
+const HALVINGS: usize = 64;
+/// Numbers to either side of a change of action that are looked at for a tie.
+const BESIDE: i32 = 100;
+/// Ties that are worth their steps.
+const TIES: usize = 4;
+
+/// The interpreter on its way, and what is written down.
+pub struct Course<'a, T> {
+    policy: &'a Policy,
+    oracle: Oracle<T>,
+    layout: Layout,
+    /// All moves so far.
+    pub trace: Trace,
+}
+
+impl<'a, T: Real> Course<'a, T> {
+    /// At a fresh controller.
+    pub fn new(policy: &'a Policy) -> Self {
+        let oracle = Oracle::<T>::new(policy);
+        Self {
+            policy,
+            layout: oracle.layout().clone(),
+            oracle,
+            trace: Trace::default(),
+        }
+    }
+
+    fn play(&mut self, event: Event) -> Result<(), InputError> {
+        let chunk = self.oracle.chunk_of(vec![event])?;
+        append(self.policy, &self.layout, &chunk, &mut self.trace);
+        Ok(())
+    }
+
+    /// Another state, word by word.
+    fn put(&mut self, change: impl FnOnce(&mut State<T>)) {
+        let mut state = self.oracle.controller().state().clone();
+        let mut words = state.words();
+        change(&mut state);
+        for (at, word) in state.words().into_iter().enumerate() {
+            if words[at] != word {
+                words[at] = word;
+                self.trace.damage(at as u32, word, words.iter().copied());
+            }
+        }
+        self.oracle.restore(&state);
+    }
+
+    /// Goes at once where slew limit and soft start would let the duty be in the end: behind them nothing else shows.
+    fn settle(&mut self, samples: &[Sample]) -> Result<(), InputError> {
+        let mut ahead = self.oracle.controller().clone();
+        let ends = |state: &State<T>| (state.previous_command, state.soft_cap);
+        for _ in 0..MOST_TO_REST {
+            let before = ends(ahead.state());
+            ahead.step(samples)?;
+            if ends(ahead.state()) == before {
+                break;
+            }
+        }
+        let (previous_command, soft_cap) = ends(ahead.state());
+        self.put(|state| (state.previous_command, state.soft_cap) = (previous_command, soft_cap));
+        Ok(())
+    }
+
+    /// The moves of [`directed`].
+    pub fn directed(&mut self) -> Result<(), InputError> {
+        let usual = directed::usual(self.policy);
+        for next in directed::moves(self.policy) {
+            match next {
+                Move::Do(event) => self.play(event)?,
+                Move::Settle => self.settle(&usual)?,
+            }
+        }
+        Ok(())
+    }
+
+    /// A step from each state that is not sound by one number or counter, and from those that are just sound.
+    pub fn damaged(&mut self) -> Result<(), InputError> {
+        let usual = directed::usual(self.policy);
+        for damage in damages(self.policy, &Controller::<T>::new(self.policy)) {
+            self.play(Event::Init)?;
+            self.put(|state| damage.apply(state));
+            self.play(Event::Step(usual.clone()))?;
+        }
+        Ok(())
+    }
+
+    /// Measurements at which two actions have exactly the same, highest value: the lower index is to win.
+    ///
+    /// Between two measurements with different actions the two values meet. Next to that place the difference goes in steps
+    /// of the last digit, so that some measurement near it often makes them equal.
+    pub fn tied(&mut self) -> Result<(), InputError> {
+        self.play(Event::Init)?;
+        let usual = directed::usual(self.policy);
+        self.play(Event::Step(usual.clone()))?;
+        let mut found = 0;
+        for index in 0..self.policy.signals.len() {
+            let places: Vec<Vec<Sample>> = (0..PLACES).map(|place| self.at(&usual, index, place)).collect();
+            for pair in places.windows(2) {
+                if found == TIES {
+                    return Ok(());
+                }
+                if let Some(samples) = self.tie_between(&pair[0], &pair[1], index) {
+                    self.play(Event::Step(samples))?;
+                    found += 1;
+                    self.play(Event::Init)?;
+                    self.play(Event::Step(usual.clone()))?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The usual samples with one signal at a place of its range.
+    fn at(&self, usual: &[Sample], index: usize, place: usize) -> Vec<Sample> {
+        let signal = &self.policy.signals[index];
+        let share = place as f64 / (PLACES - 1) as f64;
+        let x = signal.range.low + share * (signal.range.high - signal.range.low);
+        let mut samples = usual.to_vec();
+        samples[index] = sample_of(self.policy.numeric_format.scalar(), signal, x);
+        samples
+    }
+
+    fn tie_between(&self, from: &[Sample], to: &[Sample], index: usize) -> Option<Vec<Sample>> {
+        let controller = self.oracle.controller();
+        let action = |samples: &[Sample]| Some(controller.eval(samples).ok()?.command.action_index);
+        let with = |sample: Sample| {
+            let mut samples = from.to_vec();
+            samples[index] = sample;
+            samples
+        };
+        let (mut low, mut high) = (from[index], to[index]);
+        let first = action(from)?;
+        if action(to)? == first {
+            return None;
+        }
+        for _ in 0..HALVINGS {
+            let middle = between(low, high)?;
+            match action(&with(middle))? == first {
+                true => low = middle,
+                false => high = middle,
+            }
+        }
+        let near = (-BESIDE..=BESIDE).map(|ulps| with(nudged(low, ulps)));
+        let is_tied = |samples: &Vec<Sample>| {
+            controller.eval(samples).is_ok_and(|trace| {
+                let highest = trace
+                    .q_values
+                    .iter()
+                    .fold(-T::MAX, |highest, &q| if q > highest { q } else { highest });
+                trace.usable && trace.q_values.iter().filter(|q| **q == highest).count() > 1
+            })
+        };
+        near.into_iter().find(is_tied)
+    }
+
+    /// Random moves up to so many control steps in all.
+    pub fn random(&mut self, steps: u32, seed: u64) -> Result<(), InputError> {
+        let left = u64::from(steps).saturating_sub(u64::from(self.trace.steps()));
+        self.play(Event::Init)?;
+        let mut stream = Stream::new(self.policy, seed, &[]);
+        let chunk = self.oracle.next_chunk(&mut stream, left)?;
+        append(self.policy, &self.layout, &chunk, &mut self.trace);
+        Ok(())
+    }
+}
+
+/// The sample half way; `None` for two kinds of samples.
+fn between(low: Sample, high: Sample) -> Option<Sample> {
+    Some(match (low, high) {
+        (Sample::Physical(low), Sample::Physical(high)) => Sample::Physical(low + 0.5 * (high - low)),
+        (Sample::Wide(low), Sample::Wide(high)) => Sample::Wide(low + 0.5 * (high - low)),
+        (Sample::Code(low), Sample::Code(high)) => Sample::Code(low.midpoint(high)),
+        _ => return None,
+    })
+}
+
+/// Parts of the state that get other values.
+#[derive(Debug, Clone, PartialEq)]
+struct Damage<T> {
+    /// Place among the numbers, and the value.
+    numbers: Vec<(usize, T)>,
+    /// `bad_count` and `primed`.
+    counters: Option<(u32, u32)>,
+}
+
+impl<T: Real> Damage<T> {
+    fn of_numbers(numbers: Vec<(usize, T)>) -> Self {
+        Damage {
+            numbers,
+            counters: None,
+        }
+    }
+
+    fn apply(&self, state: &mut State<T>) {
+        for (at, value) in &self.numbers {
+            if let Some(number) = state.numbers_mut().nth(*at) {
+                *number = *value;
+            }
+        }
+        if let Some((bad_count, primed)) = self.counters {
+            (state.bad_count, state.primed) = (bad_count, primed);
+        }
+    }
+}
+
+/// Each number of the state just outside of what a sound state holds; all of them at either end; the counters at their ends
+/// and beyond; a soft start one step before its end.
+fn damages<T: Real>(policy: &Policy, fresh: &Controller<T>) -> Vec<Damage<T>> {
+    let (scalar, hold) = (policy.numeric_format.scalar(), policy.fallback.hold);
+    let ends = fresh.sound_ends().into_iter().enumerate();
+    let ends: Vec<(usize, (T, T))> = ends.filter_map(|(at, ends)| Some((at, ends?))).collect();
+    let all = |pick: fn((T, T)) -> T| Damage::of_numbers(ends.iter().map(|(at, ends)| (*at, pick(*ends))).collect());
+    let mut damages = vec![all(|ends| ends.0), all(|ends| ends.1)];
+    for &(at, (low, high)) in &ends {
+        let (below, above) = (scalar.next_down(low.to_f64()), scalar.next_up(high.to_f64()));
+        // what is no number gives one of many in the observation, and the contract does not say which
+        let finite = [below, above].into_iter().filter(|end| end.is_finite());
+        damages.extend(finite.map(|end| Damage::of_numbers(vec![(at, T::nearest(end))])));
+    }
+    let counters = [
+        (hold.saturating_add(1), 1),
+        (hold.saturating_add(2), 1),
+        (u32::MAX, 1),
+        (0, 2),
+        (0, u32::MAX),
+    ];
+    damages.extend(counters.map(|counters| Damage {
+        numbers: Vec::new(),
+        counters: Some(counters),
+    }));
+    damages.extend(end_of_soft_start(policy, scalar, fresh.state()));
+    damages
+}
+
+/// The cap that one more step brings to the upper limit, and its neighbours.
+fn end_of_soft_start<T: Real>(policy: &Policy, scalar: Scalar, state: &State<T>) -> Vec<Damage<T>> {
+    let Some(soft) = policy.limits.soft_start.filter(|_| state.soft_cap.is_some()) else {
+        return Vec::new();
+    };
+    let high = policy.limits.duty.high;
+    let before = scalar.nearest(high - (high - soft.from) / f64::from(soft.steps));
+    let mapping = state
+        .mapping
+        .map_or(0, |mapping| if mapping.r.is_some() { 4 } else { 3 });
+    // the cap stands before the coefficients, and the two counters are no numbers
+    let numbers = state.clone().numbers_mut().count();
+    let at = numbers - mapping - 1;
+    let caps = [scalar.next_down(before), before, scalar.next_up(before)];
+    caps.map(|cap| Damage::of_numbers(vec![(at, T::nearest(cap))])).to_vec()
+}
+
+/// Appends the words of a chunk in the form of the kit: its layout is that of [`crate::protocol`].
+fn append(policy: &Policy, layout: &Layout, chunk: &Chunk, trace: &mut Trace) {
+    let number = layout.scalar().words();
+    let values = number * (policy.features.len() + policy.actions.len());
+    let (mut input, mut expected) = (chunk.input.as_slice(), chunk.expected.as_slice());
+    for event in &chunk.events {
+        let answer = take(&mut expected, layout.answer(event).len());
+        // the kind comes first
+        take(&mut input, 1);
+        match event {
+            Event::Step(_) => {
+                let (before, rest) = answer.split_at(values);
+                let (command, state) = rest.split_at(2 * number + 2);
+                // the last word is the driver's verdict on purity
+                let state = &state[..state.len() - 1];
+                let rest = before.iter().chain(state).copied();
+                trace.step(take(&mut input, sample_words(policy)), command, rest);
+            }
+            Event::SetMapping { r, .. } => {
+                let coefficients = take(&mut input, 4 * number);
+                // four numbers travel in any case; the kit calls a function of three
+                let given = if r.is_some() {
+                    coefficients
+                } else {
+                    &coefficients[..3 * number]
+                };
+                trace.set_mapping(given, answer[0], answer[1..].iter().copied());
+            }
+            Event::Reset => trace.reset(answer.iter().copied()),
+            Event::Init => trace.init(answer.iter().copied()),
+            // the stream has none of these; the generated code has its own known answers
+            Event::Network(observation) => {
+                take(&mut input, number * observation.len());
+            }
+        }
+    }
+}
+
+fn take<'a>(words: &mut &'a [u32], count: usize) -> &'a [u32] {
+    let (first, rest) = words.split_at(count.min(words.len()));
+    *words = rest;
+    first
+}

@@ -10,6 +10,7 @@ use crate::control::Request;
 use crate::drive::Model;
 use crate::fit::State;
 use crate::gain::{self, Held, Pair, Shift};
+use crate::instants;
 use crate::noise::{self, Outlier};
 use crate::problem::Problem;
 use crate::profile::{Profile, profiles};
@@ -183,7 +184,8 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     let base = Model::new(model);
     say("noise and initial states");
     let (problem, null, outliers) = prepared(train, &base);
-    let mut attribution = attribute(&problem, null, say);
+    let (mut problem, mut attribution) = attribute(problem, null, say);
+    instants::note(&mut problem, &attribution.state().starts);
     let others = crate::ties::other_pairs(&problem, &attribution);
     for rivals in attribution.rivals.iter_mut().take(1) {
         rivals.extend(others.iter().cloned());
@@ -270,7 +272,7 @@ impl Diagnosis {
 fn as_given(problem: &Problem, base: &Model) -> State {
     let mut held = problem.clone();
     held.trim_held = true;
-    State::settle(&held, base, &held.first_starts(), None)
+    instants::scanned(&held, base, &held.first_starts())
 }
 
 /// Noise estimated, outliers masked, initial states fitted.

@@ -1,8 +1,9 @@
 //! Damped least squares (Levenberg-Marquardt) of a few parameters on the switched model, initial states beside them.
 
+use crate::basis::Basis;
 use crate::causes::{Candidate, Search};
 use crate::drive::Model;
-use crate::problem::{Basis, Problem, Starts, axpy, dot, nudged};
+use crate::problem::{Problem, Starts, axpy, dot, nudged};
 
 /// A step that gains less than this ends the settling of initial states: a five-hundredth of what
 /// decides a tie (9).

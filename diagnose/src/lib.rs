@@ -18,6 +18,7 @@
 //! answer and [`extend`] and [`page`] write it down. See docs/reference/diagnosis.md.
 
 pub mod attribute;
+pub mod basis;
 pub mod causes;
 pub mod control;
 pub mod diagnosis;
@@ -26,6 +27,7 @@ mod duty_steps;
 pub mod extend;
 pub mod fit;
 pub mod gain;
+pub mod instants;
 pub mod next;
 pub mod noise;
 pub mod page;

@@ -60,7 +60,7 @@ fn separation(problem: &Problem, record: &Record, one: &Model, other: &Model) ->
     let mut made = Problem::new(vec![record.clone()], one.clone());
     made.sigma = problem.sigma.map(|s| if s.is_finite() { s } else { f64::INFINITY });
     let starts = made.first_starts();
-    let shown = crate::drive::simulate(one, &made.records[0], &starts.states[0], 0.0);
+    let shown = crate::drive::simulate(one, &made.records[0], &starts.of(0));
     for n in 0..CHANNELS {
         if problem.sigma[n].is_finite() {
             made.records[0].measured[n] = shown.iter().map(|row| row[n]).collect();
@@ -201,6 +201,7 @@ fn planned(problem: &Problem, plan: Plan) -> (String, Record) {
         sampled: None,
         dense: true,
         segments: std::iter::once(0..ROWS).collect(),
+        free_steps: Vec::new(),
         repairs: Vec::new(),
     };
     (plan.words, record)

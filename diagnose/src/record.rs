@@ -70,6 +70,8 @@ pub struct Record {
     pub dense: bool,
     /// Stretches to simulate.
     pub segments: Vec<Segment>,
+    /// Rows of load steps whose instant in the period is estimated beside every fit ([`crate::instants`]).
+    pub free_steps: Vec<usize>,
     /// What was repaired or left out, in plain words.
     pub repairs: Vec<String>,
 }
@@ -125,6 +127,7 @@ impl Record {
             sampled: lines.sampled,
             dense: lines.dense,
             segments: lines.segments,
+            free_steps: Vec::new(),
             repairs: raw.repairs.clone(),
         };
         let labels = QUANTITIES.map(|name| raw.label(name));

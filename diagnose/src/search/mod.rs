@@ -11,7 +11,7 @@ use crate::problem::dot;
 use crate::shape::structures;
 
 /// An explanation within this of the best is as good, in chi-square: three standard deviations of one parameter ...
-const TIE: f64 = 9.0;
+pub(crate) const TIE: f64 = 9.0;
 /// ... or within this share of what the cause explains: twice the accuracy, squared.
 const TIE_SHARE: f64 = 4.0 * ACCURACY * ACCURACY;
 /// What is this many times as far off may come within it when its fit is brought to an end. Rough fits stop at a gain of 0.5 a
@@ -113,7 +113,7 @@ impl Searcher<'_> {
     }
 
     /// Chi-square with a price for each parameter.
-    fn score(&self, fit: &Fit) -> f64 {
+    pub fn score(&self, fit: &Fit) -> f64 {
         let price = libm::log(self.fitter.problem.count() as f64);
         fit.state.chi2 + price * fit.values.len() as f64
     }
@@ -171,6 +171,26 @@ impl Searcher<'_> {
             leaders = larger;
         }
         self.backward(best)
+    }
+
+    /// The single cause that explains most for its parameters, brought to its end; nothing if none is worth it.
+    pub fn leading(&self, singles: &[Fit]) -> Option<Fit> {
+        let first = singles.iter().min_by(|a, b| self.score(a).total_cmp(&self.score(b)))?;
+        let gain = self.fitter.null.chi2 - first.state.chi2;
+        (gain >= threshold(first.values.len(), self.inflation(first))).then(|| self.polished(first))
+    }
+
+    /// Places of the `count` single causes that explain most for their parameters.
+    pub fn leaders(&self, singles: &[Fit], count: usize) -> Vec<usize> {
+        let mut places: Vec<usize> = (0..singles.len()).collect();
+        places.sort_by(|a, b| self.score(&singles[*a]).total_cmp(&self.score(&singles[*b])));
+        places.truncate(count);
+        places
+    }
+
+    /// A set that was found in another problem of the same records, fitted in this.
+    pub fn refitted(&self, fit: &Fit) -> Fit {
+        self.polished(&self.fitter.from(&fit.causes, &fit.values, self.fitter.null))
     }
 
     /// The fit brought to its end.
@@ -286,7 +306,7 @@ impl Searcher<'_> {
     }
 
     /// Drops what is not needed; the evidence of what is.
-    fn backward(&self, fit: Fit) -> (Option<Fit>, Vec<f64>) {
+    pub fn backward(&self, fit: Fit) -> (Option<Fit>, Vec<f64>) {
         let mut best = fit;
         loop {
             let members: Vec<usize> = (0..best.causes.len()).collect();

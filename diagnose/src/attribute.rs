@@ -9,6 +9,7 @@ use crate::noise;
 use crate::parallel;
 use crate::problem::{Problem, dot};
 use crate::profile::Profile;
+use crate::progress::{Listener, Progress};
 use crate::search::{Searcher, TIE, gained};
 
 /// Gain in chi-square that one parameter must bring. Chi-square of one degree of freedom exceeds 16 with probability 6.3e-5:
@@ -56,22 +57,21 @@ pub fn threshold(parameters: usize, inflation: f64) -> f64 {
 /// Finds the causes. `say` hears how far it is. Where load steps turn out to be inside a period, the problem that comes back has
 /// their instants free.
 #[must_use]
-pub fn attribute(problem: Problem, null: State, say: &(dyn Fn(&str) + Sync)) -> (Problem, Attribution) {
+pub fn attribute(problem: Problem, null: State, say: Listener<'_>) -> (Problem, Attribution) {
     let candidates = candidates(&problem.base.plant, &problem.bases);
     let basis = problem.basis(&null.model, &null.starts, &null.residual);
-    let search = searcher(&problem, &candidates, &basis, &null);
-    say("each cause alone");
-    let singles = search.singles();
+    let search = searcher(&problem, &candidates, &basis, &null, say);
+    let singles = search.singles("each cause alone");
     let Some((freed, near)) = needs_instants(&search, &singles) else {
-        let attribution = grown(&search, singles, None, say);
+        let attribution = grown(&search, singles, None);
         return (problem, attribution);
     };
-    say("load steps inside a period: each cause alone");
+    say(Progress::Stage("load steps inside a period"));
     let inside = instants::scanned(&freed, &null.model, &null.starts);
     // the model as given may be so far off that its instants run away: sensitivities are those of where the instants fit
     let free_basis = freed.basis(&near.model, &near.starts, &near.residual);
-    let free = searcher(&freed, &candidates, &free_basis, &inside);
-    let mut free_singles = free.singles();
+    let free = searcher(&freed, &candidates, &free_basis, &inside, say);
+    let mut free_singles = free.singles("load steps inside a period: each cause alone");
     for (place, fit) in search
         .leaders(&singles, LEADERS)
         .into_iter()
@@ -83,7 +83,7 @@ pub fn attribute(problem: Problem, null: State, say: &(dyn Fn(&str) + Sync)) -> 
             free_singles[place] = fit;
         }
     }
-    let found = grown(&free, free_singles, None, say);
+    let found = grown(&free, free_singles, None);
     // two causes together may have looked like instants, as long as one of them was missing
     let as_listed = found.best.as_ref().map(|best| search.refitted(best));
     match (as_listed, &found.best) {
@@ -91,15 +91,22 @@ pub fn attribute(problem: Problem, null: State, say: &(dyn Fn(&str) + Sync)) -> 
             if instants::chi2(&freed, &listed.state.residual)
                 < best.state.chi2 + threshold(instants::count(&freed), found.inflation) =>
         {
-            let attribution = grown(&search, singles, Some(listed), say);
+            let attribution = grown(&search, singles, Some(listed));
             (problem, attribution)
         }
         _ => (freed, found),
     }
 }
 
-fn searcher<'a>(problem: &'a Problem, candidates: &'a [Candidate], basis: &'a Basis, null: &'a State) -> Searcher<'a> {
+fn searcher<'a>(
+    problem: &'a Problem,
+    candidates: &'a [Candidate],
+    basis: &'a Basis,
+    null: &'a State,
+    say: Listener<'a>,
+) -> Searcher<'a> {
     Searcher {
+        say,
         fitter: Fitter {
             problem,
             candidates,
@@ -128,17 +135,16 @@ fn needs_instants(search: &Searcher<'_>, singles: &[Fit]) -> Option<(Problem, St
 }
 
 /// The causes that `search` finds, or what is left of those that are `known`, with all that goes with them.
-fn grown(search: &Searcher<'_>, singles: Vec<Fit>, known: Option<Fit>, say: &(dyn Fn(&str) + Sync)) -> Attribution {
+fn grown(search: &Searcher<'_>, singles: Vec<Fit>, known: Option<Fit>) -> Attribution {
     let (problem, null) = (search.fitter.problem, search.fitter.null);
     let (best, evidence) = match known {
         Some(fit) => search.backward(fit),
-        None => search.grow(&singles, say),
+        None => search.grow(&singles),
     };
     let inflation = match &best {
         Some(fit) => search.inflation(fit),
         None => noise::inflation(problem, &null.residual),
     };
-    say("rivals");
     let rivals = best
         .as_ref()
         .map_or_else(Vec::new, |fit| search.rivals(fit, &evidence, &singles));
@@ -171,6 +177,19 @@ impl Attribution {
     #[must_use]
     pub fn state(&self) -> &State {
         self.best.as_ref().map_or(&self.null, |fit| &fit.state)
+    }
+
+    /// Share of the error above the noise that the best explanation takes away, 1.
+    #[must_use]
+    pub fn removed(&self, problem: &Problem) -> f64 {
+        let count = problem.count().max(1) as f64;
+        let above = |state: &State| (state.chi2 / count - 1.0).max(0.0);
+        let before = above(&self.null);
+        if before > 0.0 {
+            1.0 - (above(self.state()) / before).sqrt()
+        } else {
+            0.0
+        }
     }
 
     /// Takes out causes that are no effect: by their size, or because the interval of each parameter that makes it holds

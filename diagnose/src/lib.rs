@@ -7,7 +7,7 @@
 //!
 //! let model = plant::Parameters::from_file(Path::new("plant.toml"))?;
 //! let open = |file: &str| Record::open(Path::new(file), &ColumnMap::default(), &model);
-//! let found = diagnose(&model, vec![open("a.csv")?], &[open("b.csv")?], &|what| eprintln!("{what}"));
+//! let found = diagnose(&model, vec![open("a.csv")?], &[open("b.csv")?], &|what| eprintln!("{what:?}"));
 //! println!("{}\n{}", found.findings.sentence, extended_toml(&found));
 //! # Ok::<(), plant::Faults>(())
 //! ```
@@ -34,6 +34,7 @@ pub mod page;
 mod parallel;
 pub mod problem;
 pub mod profile;
+pub mod progress;
 mod quantised;
 pub mod record;
 mod sampling;

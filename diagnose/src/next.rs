@@ -7,6 +7,7 @@ use crate::attribute::Attribution;
 use crate::drive::Model;
 use crate::fit::State;
 use crate::problem::Problem;
+use crate::progress::{Listener, Progress};
 use crate::record::{CHANNELS, Record};
 
 /// Rows of a planned experiment: 30 ms at 10 kHz, nine periods of the paper's filter, as long as the records of the blind cases.
@@ -25,7 +26,7 @@ pub struct Experiment {
 
 /// For every tie the experiments by predicted separation, best first.
 #[must_use]
-pub fn experiments(problem: &Problem, attribution: &Attribution, say: &(dyn Fn(&str) + Sync)) -> Vec<Experiment> {
+pub fn experiments(problem: &Problem, attribution: &Attribution, say: Listener<'_>) -> Vec<Experiment> {
     let Some(best) = &attribution.best else {
         return Vec::new();
     };
@@ -33,7 +34,7 @@ pub fn experiments(problem: &Problem, attribution: &Attribution, say: &(dyn Fn(&
     if ties.is_empty() {
         return Vec::new();
     }
-    say("next experiment");
+    say(Progress::Stage("next experiment"));
     let plans = plans(problem);
     let name = |causes: &[usize]| {
         causes

@@ -405,3 +405,30 @@ fn what_is_not_used_is_named_and_rows_are_settled_if_the_user_says_so() {
         "{faults}"
     );
 }
+
+#[test]
+fn a_set_load_current_is_said_to_be_set_unless_the_load_current_was_measured() {
+    let note = "i_load is read as the load that was set; a measured load current is i_out";
+    let said = |table: String| read(table.as_bytes()).unwrap().repairs.iter().any(|text| text == note);
+    assert!(!said(text(&good())));
+    assert!(said(header("r_load", "i_load")));
+    assert!(!said(header("i_l,v_in,r_load", "i_out,v_in,i_load")));
+}
+
+#[test]
+fn columns_with_names_of_their_own_get_a_whole_map_proposed_and_never_applied() {
+    let other = header(HEADER, "time_s,D,Vout,IL,Spannung,Iout");
+    let faults = read(other.as_bytes()).unwrap_err().to_string();
+    assert!(faults.contains("--map v_out=Vout,i_l=IL,i_out=Iout"), "{faults}");
+    let none = header(HEADER, "Zeit,Tastgrad,Vout [V],IL,Vin,r_load");
+    let faults = read(none.as_bytes()).unwrap_err().to_string();
+    assert!(
+        faults.contains("--map 't=Zeit,duty=Tastgrad,v_out=Vout [V],i_l=IL,v_in=Vin'"),
+        "{faults}"
+    );
+    // what the record can do without is read only if the map says so
+    let some = header("i_l", "IL");
+    let repairs = read(some.as_bytes()).unwrap().repairs;
+    let note = "`IL` looks like i_l and is not read as such: --map i_l=IL";
+    assert!(repairs.iter().any(|text| text == note), "{repairs:?}");
+}

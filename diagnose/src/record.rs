@@ -138,7 +138,8 @@ impl Record {
                 .expected("a column v_out, i_l, i_out or v_in that is not constant");
             return Err(sheet.fault(message).into());
         }
-        let odd = suspicion::of(&record, parameters, &labels);
+        let sources = QUANTITIES.map(|name| raw.source(name));
+        let odd = suspicion::of(&record, parameters, &sources, &raw.source("duty"));
         let mut faults: Sink = odd.into_iter().map(|message| sheet.fault(message)).collect();
         faults.propagate()?;
         Ok(record)

@@ -1,11 +1,12 @@
 //! A table with its signals found and turned into SI units: duty, load, channels, time.
 
-use measured::{ColumnMap, Located, Quantity, Sheet, proposal, table_faults};
+use measured::{ColumnMap, Located, Quantity, Sheet, Signal, proposal, table_faults};
 use plant::Load;
 use toml_input::{Fault, Faults, Message, Sink};
 
 use super::QUANTITIES;
 use super::digits::{last_digit, lattice};
+use super::suspicion::Source;
 
 /// What a record may hold.
 const NAMES: [&str; 9] = [
@@ -69,6 +70,20 @@ impl<'a> Raw<'a> {
             .signal(name)
             .map_or(name, |signal| &signal.label)
             .to_owned()
+    }
+
+    /// Where a channel comes from, to say how its map would have to be.
+    pub fn source(&self, name: &str) -> Source {
+        let signal = self.located.signal(name);
+        let column = signal
+            .and_then(Signal::column)
+            .and_then(|n| self.sheet.columns().get(n));
+        Source {
+            label: self.label(name),
+            header: column.map_or(name, |column| &column.name).to_owned(),
+            scale: signal.map_or(1.0, Signal::scale),
+            stated: signal.is_some_and(Signal::is_stated),
+        }
     }
 
     /// A fault of a quantity in a row.

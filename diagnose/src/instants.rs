@@ -173,10 +173,40 @@ pub(crate) fn note(problem: &mut Problem, starts: &Starts) {
             });
         if !late.is_empty() {
             record.repairs.push(format!(
-                "{} load steps were inside a switching period: their instants are estimated, {low:+.2} to {high:+.2} periods \
-                 from where the table has them",
+                "{} load steps are taken to lie inside a switching period, {low:+.2} to {high:+.2} periods from where the table has \
+                 them",
                 late.len()
             ));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write as _;
+    use std::path::Path;
+
+    use measured::{ColumnMap, Sheet};
+    use plant::Parameters;
+
+    use super::steps;
+    use crate::record::Record;
+
+    #[test]
+    fn steps_close_to_each_other_or_to_an_end_stay_where_the_table_has_them() {
+        let changes = [3, 12, 22, 24, 34, 57];
+        let mut text = "t,d,v_o,i_load\n".to_owned();
+        for n in 0..60 {
+            let current = 5 + changes.iter().filter(|row| **row <= n).count();
+            let _ = writeln!(
+                text,
+                "{:.5},0.5,{:.2},{current}",
+                f64::from(n) * 1e-4,
+                100.0 + 0.1 * f64::from(n % 3)
+            );
+        }
+        let sheet = Sheet::parse(Path::new("run.csv"), text.into(), &Record::file_options()).unwrap();
+        let record = Record::read(&sheet, &ColumnMap::default(), &Parameters::paper_table()).unwrap();
+        assert_eq!(steps(&record), [12, 34]);
     }
 }

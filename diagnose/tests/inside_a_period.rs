@@ -148,7 +148,10 @@ fn a_healthy_bench_whose_load_steps_inside_a_period_is_consistent() {
     let found = HEALTHY.diagnosed();
     assert_eq!(found.findings.verdict, Verdict::Consistent);
     let notes = found.findings.noise.repairs.join("\n");
-    assert!(notes.contains("4 load steps were inside a switching period"), "{notes}");
+    assert!(
+        notes.contains("4 load steps are taken to lie inside a switching period"),
+        "{notes}"
+    );
     let [before, after] = found.findings.gain.mean_square;
     assert!(before < 1.3 && after < 1.3, "held out: {before}, {after}");
 }

@@ -154,6 +154,14 @@ impl Sheet {
     }
 }
 
+impl Sheet {
+    /// A column that is called like a quantity.
+    pub(crate) fn resembling(&self, quantity: &str) -> Option<&str> {
+        let (_, synonyms) = SYNONYMS.iter().find(|(name, _)| *name == quantity)?;
+        self.headers().find(|header| synonyms.contains(&plain(header).as_str()))
+    }
+}
+
 /// Guesses as a map: an argument of `--map`, or a line of a map file where a name could not stand there. Nothing without a guess.
 #[must_use]
 pub fn proposal(guesses: &[(&str, &str)]) -> Option<String> {

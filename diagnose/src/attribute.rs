@@ -1,13 +1,16 @@
 //! Which causes explain the discrepancy: one, then more by forward and backward steps, with everything that explains it
 //! as well beside them.
 
+use crate::basis::Basis;
 use crate::causes::{Candidate, Search, candidates};
 use crate::fit::{FINE, Fit, Fitter, ROUGH, State};
+use crate::instants;
 use crate::noise;
 use crate::parallel;
-use crate::problem::{Basis, Problem, dot};
+use crate::problem::{Problem, dot};
 use crate::profile::Profile;
-use crate::search::{Searcher, gained};
+use crate::progress::{Listener, Progress};
+use crate::search::{Searcher, TIE, gained};
 
 /// Gain in chi-square that one parameter must bring. Chi-square of one degree of freedom exceeds 16 with probability 6.3e-5:
 /// for 40 independent forms and normal noise a false alarm in 0.25 % of diagnoses. At 8 it would be one in six, at 32 an effect
@@ -19,6 +22,10 @@ const PER_PARAMETER: f64 = 4.0;
 /// Two simulators of one circuit differ by about this share of the response to a cause: the plant against ngspice (0.4 % of
 /// a change of capacitance, less than that elsewhere).
 pub const ACCURACY: f64 = 0.005;
+
+/// Causes that are fitted with free instants from where they fit without. As many as are fitted after a linear look in the search: a
+/// convention.
+const LEADERS: usize = 5;
 
 /// What was found.
 #[derive(Debug, Clone)]
@@ -47,27 +54,97 @@ pub fn threshold(parameters: usize, inflation: f64) -> f64 {
     (THRESHOLD + PER_PARAMETER * (parameters.max(1) - 1) as f64) * inflation
 }
 
-/// Finds the causes. `say` hears how far it is.
+/// Finds the causes. `say` hears how far it is. Where load steps turn out to be inside a period, the problem that comes back has
+/// their instants free.
 #[must_use]
-pub fn attribute(problem: &Problem, null: State, say: &(dyn Fn(&str) + Sync)) -> Attribution {
+pub fn attribute(problem: Problem, null: State, say: Listener<'_>) -> (Problem, Attribution) {
     let candidates = candidates(&problem.base.plant, &problem.bases);
     let basis = problem.basis(&null.model, &null.starts, &null.residual);
-    let fitter = Fitter {
-        problem,
-        candidates: &candidates,
-        basis: &basis,
-        null: &null,
-        effort: ROUGH,
+    let search = searcher(&problem, &candidates, &basis, &null, say);
+    let singles = search.singles("each cause alone");
+    let Some((freed, near)) = needs_instants(&search, &singles) else {
+        let attribution = grown(&search, singles, None);
+        return (problem, attribution);
     };
-    let search = Searcher { fitter };
-    say("each cause alone");
-    let singles = search.singles();
-    let (best, evidence) = search.grow(&singles, say);
+    say(Progress::Stage("load steps inside a period"));
+    let inside = instants::scanned(&freed, &null.model, &null.starts);
+    // the model as given may be so far off that its instants run away: sensitivities are those of where the instants fit
+    let free_basis = freed.basis(&near.model, &near.starts, &near.residual);
+    let free = searcher(&freed, &candidates, &free_basis, &inside, say);
+    let mut free_singles = free.singles("load steps inside a period: each cause alone");
+    for (place, fit) in search
+        .leaders(&singles, LEADERS)
+        .into_iter()
+        .map(|place| (place, &singles[place]))
+    {
+        let at = instants::scanned(&freed, &fit.state.model, &fit.state.starts);
+        let fit = free.fitter.from(&fit.causes, &fit.values, &at);
+        if fit.state.chi2 < free_singles[place].state.chi2 {
+            free_singles[place] = fit;
+        }
+    }
+    let found = grown(&free, free_singles, None);
+    // two causes together may have looked like instants, as long as one of them was missing
+    let as_listed = found.best.as_ref().map(|best| search.refitted(best));
+    match (as_listed, &found.best) {
+        (Some(listed), Some(best))
+            if instants::chi2(&freed, &listed.state.residual)
+                < best.state.chi2 + threshold(instants::count(&freed), found.inflation) =>
+        {
+            let attribution = grown(&search, singles, Some(listed));
+            (problem, attribution)
+        }
+        _ => (freed, found),
+    }
+}
+
+fn searcher<'a>(
+    problem: &'a Problem,
+    candidates: &'a [Candidate],
+    basis: &'a Basis,
+    null: &'a State,
+    say: Listener<'a>,
+) -> Searcher<'a> {
+    Searcher {
+        say,
+        fitter: Fitter {
+            problem,
+            candidates,
+            basis,
+            null,
+            effort: ROUGH,
+        },
+    }
+}
+
+/// The problem with free instants of load steps, if no single cause does what they do, and where they fit best so far.
+fn needs_instants(search: &Searcher<'_>, singles: &[Fit]) -> Option<(Problem, State)> {
+    let (problem, null) = (search.fitter.problem, search.fitter.null);
+    let single = search.leading(singles);
+    let at = single.as_ref().map_or(null, |fit| &fit.state);
+    let inflation = noise::inflation(problem, &at.residual);
+    if let Some(needed) = instants::freed(problem, at, inflation) {
+        return Some(needed);
+    }
+    let (freed, inside) = instants::freed(problem, null, inflation)?;
+    // as good as the cause: then no cause is named
+    let price = instants::PRICE * instants::count(&freed) as f64;
+    let listed = |fit: &Fit| search.score(fit) - fit.state.chi2 + instants::chi2(&freed, &fit.state.residual);
+    let is_as_good = single.is_none_or(|fit| inside.chi2 + price < listed(&fit) + TIE);
+    is_as_good.then_some((freed, inside))
+}
+
+/// The causes that `search` finds, or what is left of those that are `known`, with all that goes with them.
+fn grown(search: &Searcher<'_>, singles: Vec<Fit>, known: Option<Fit>) -> Attribution {
+    let (problem, null) = (search.fitter.problem, search.fitter.null);
+    let (best, evidence) = match known {
+        Some(fit) => search.backward(fit),
+        None => search.grow(&singles),
+    };
     let inflation = match &best {
         Some(fit) => search.inflation(fit),
         None => noise::inflation(problem, &null.residual),
     };
-    say("rivals");
     let rivals = best
         .as_ref()
         .map_or_else(Vec::new, |fit| search.rivals(fit, &evidence, &singles));
@@ -78,8 +155,8 @@ pub fn attribute(problem: &Problem, null: State, say: &(dyn Fn(&str) + Sync)) ->
         rivals,
         evidence,
         inflation,
-        basis: basis.clone(),
-        candidates: candidates.clone(),
+        basis: search.fitter.basis.clone(),
+        candidates: search.fitter.candidates.to_vec(),
     }
 }
 
@@ -100,6 +177,19 @@ impl Attribution {
     #[must_use]
     pub fn state(&self) -> &State {
         self.best.as_ref().map_or(&self.null, |fit| &fit.state)
+    }
+
+    /// Share of the error above the noise that the best explanation takes away, 1.
+    #[must_use]
+    pub fn removed(&self, problem: &Problem) -> f64 {
+        let count = problem.count().max(1) as f64;
+        let above = |state: &State| (state.chi2 / count - 1.0).max(0.0);
+        let before = above(&self.null);
+        if before > 0.0 {
+            1.0 - (above(self.state()) / before).sqrt()
+        } else {
+            0.0
+        }
     }
 
     /// Takes out causes that are no effect: by their size, or because the interval of each parameter that makes it holds

@@ -10,14 +10,16 @@ use crate::control::Request;
 use crate::drive::Model;
 use crate::fit::State;
 use crate::gain::{self, Held, Pair, Shift};
+use crate::instants;
 use crate::noise::{self, Outlier};
 use crate::problem::Problem;
 use crate::profile::{Profile, profiles};
+use crate::progress::{Listener, Progress};
 use crate::quantised;
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
 use crate::sampling;
 use crate::shape::{Structure, structures};
-use crate::words::{sentence, shifted};
+use crate::words::{nearest, sentence, shifted};
 
 /// The answer in a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -179,18 +181,18 @@ pub struct Diagnosis {
 
 /// Diagnoses `model` by the records `train`; `heldout` only judges. `say` hears how far it is.
 #[must_use]
-pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say: &(dyn Fn(&str) + Sync)) -> Diagnosis {
+pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say: Listener<'_>) -> Diagnosis {
     let base = Model::new(model);
-    say("noise and initial states");
+    say(Progress::Stage("noise and initial states"));
     let (problem, null, outliers) = prepared(train, &base);
-    let mut attribution = attribute(&problem, null, say);
-    let others = crate::ties::other_pairs(&problem, &attribution);
+    let (mut problem, mut attribution) = attribute(problem, null, say);
+    instants::note(&mut problem, &attribution.state().starts);
+    let others = crate::ties::other_pairs(&problem, &attribution, say);
     // they stand in the place of all causes together: said once, at the first
     for rivals in attribution.rivals.iter_mut().take(1) {
         rivals.extend(others.iter().cloned());
     }
-    say("intervals");
-    let mut profiles = profiles(&problem, &attribution);
+    let mut profiles = profiles(&problem, &attribution, say);
     // what is too small for a cause still leaves no structure
     let structure = structures(&problem, &attribution.null, attribution.state(), attribution.inflation);
     // behind the profiles: whether a cause is nothing is read off its intervals
@@ -199,7 +201,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     let lattice = quantised::cause(&problem);
     let verdict = verdict(&named, &lattice, &structure);
     let explained = verdict != Verdict::Unexplained;
-    say("held-out records");
+    say(Progress::Stage("held-out records"));
     // what does not explain the records is no better model
     let state = if explained {
         attribution.state()
@@ -219,8 +221,12 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         causes.extend(lattice);
     }
     let shifts = pair.as_ref().map_or_else(Vec::new, |pair| pair.shifts(&problem, state));
+    let near = match explained {
+        true => String::new(),
+        false => nearest(&named, attribution.removed(&problem)),
+    };
     let findings = Findings {
-        sentence: sentence(verdict, &causes, &structure) + &shifted(&shifts),
+        sentence: sentence(verdict, &causes, &structure) + &near + &shifted(&shifts),
         verdict,
         partial: if explained { Vec::new() } else { named },
         causes,
@@ -273,7 +279,7 @@ impl Diagnosis {
 fn as_given(problem: &Problem, base: &Model) -> State {
     let mut held = problem.clone();
     held.trim_held = true;
-    State::settle(&held, base, &held.first_starts(), None)
+    instants::scanned(&held, base, &held.first_starts())
 }
 
 /// Noise estimated, outliers masked, initial states fitted.
@@ -393,13 +399,25 @@ fn noise_of(problem: &Problem, attribution: &Attribution, outliers: &[Outlier], 
     }
 }
 
+/// What was repaired in each record; what is the same in several is said once.
+fn by_text<'a>(records: impl Iterator<Item = &'a Record>) -> Vec<String> {
+    let mut list: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (record, text) in records.flat_map(|r| r.repairs.iter().map(move |text| (r, text))) {
+        match list.iter_mut().find(|(known, _)| known == text) {
+            Some((_, names)) if names.contains(&record.name.as_str()) => {}
+            Some((_, names)) => names.push(&record.name),
+            None => list.push((text, vec![&record.name])),
+        }
+    }
+    let said = |(text, names): (&str, Vec<&str>)| format!("{}: {text}", names.join(", "));
+    list.into_iter().map(said).collect()
+}
+
 /// What was repaired, assumed or noticed.
 fn notes(problem: &Problem, pair: Option<&Pair>, nothing: &[&str]) -> Vec<String> {
     let held = pair.map_or(&[][..], |pair| &pair.problem.records);
     let records = problem.records.iter().chain(held);
-    let mut notes: Vec<String> = records
-        .flat_map(|r| r.repairs.iter().map(|text| format!("{}: {text}", r.name)))
-        .collect();
+    let mut notes = by_text(records);
     notes.extend(quantised::note(problem));
     notes.extend(nothing.iter().map(|id| {
         format!("{id} would fit a little better, by less than two simulators of one circuit differ: not named")

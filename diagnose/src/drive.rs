@@ -8,7 +8,7 @@
 //! A row is a PWM period. Samples that come whole periods later are moved by rows; the rest is the plant's phase.
 
 use measured::{DutyIs, Sampled};
-use plant::{Parameters, Plant, Signals};
+use plant::{Load, Parameters, Plant, Signals};
 
 use crate::record::{CHANNELS, Record, Segment};
 
@@ -23,6 +23,17 @@ const SAME: f64 = 1e-9;
 
 /// Output voltage and inductor current at the first row of a segment.
 pub type Start = [f64; 2];
+
+/// What is estimated of one record beside every fit.
+#[derive(Debug, Clone, Copy)]
+pub struct Begin<'a> {
+    /// The state at the start of each segment.
+    pub states: &'a [Start],
+    /// How much later than the record says each of its free load steps was, periods.
+    pub late: &'a [f64],
+    /// Duty that the gate's edges add.
+    pub trim: f64,
+}
 
 /// What is simulated.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,10 +71,8 @@ impl Model {
 
 /// What the sensors show at each row, from the given states at the start of each segment; NaN outside of segments and
 /// where the model is no plant.
-///
-/// `starts` has an element for each segment; `trim` is duty that the gate's edges add.
 #[must_use]
-pub fn simulate(model: &Model, record: &Record, starts: &[Start], trim: f64) -> Vec<[f64; CHANNELS]> {
+pub fn simulate(model: &Model, record: &Record, begin: &Begin<'_>) -> Vec<[f64; CHANNELS]> {
     let mut shown = vec![[f64::NAN; CHANNELS]; record.rows()];
     let stripped;
     let model = match record.duty_is {
@@ -83,6 +92,7 @@ pub fn simulate(model: &Model, record: &Record, starts: &[Start], trim: f64) -> 
         }
     }
     // as late edges, which add or take duty whatever the commanded one is; a delay cannot be negative, hence two
+    let trim = begin.trim;
     p.switch.turn_off_delay += trim.max(0.0) * p.t_sw();
     p.switch.turn_on_delay += (-trim).max(0.0) * p.t_sw();
     let instant = record.phase + model.late / p.t_sw();
@@ -106,8 +116,14 @@ pub fn simulate(model: &Model, record: &Record, starts: &[Start], trim: f64) -> 
         record,
         whole: whole as isize,
         phase,
+        steps: record
+            .free_steps
+            .iter()
+            .copied()
+            .zip(begin.late.iter().copied())
+            .collect(),
     };
-    for (segment, start) in record.segments.iter().zip(starts) {
+    for (segment, start) in record.segments.iter().zip(begin.states) {
         if p.source.ripple > 0.0 {
             // the plant's time starts at 0 with each segment, the line's phase does not
             let turns = model.plant.source.ripple_phase + p.source.ripple_frequency * record.time[segment.start];
@@ -129,7 +145,16 @@ struct Driver<'a> {
     /// Periods by which the sampling instants lie later than the rows say.
     whole: isize,
     phase: f64,
+    /// Row from which a free load step acts in the record, and how much later it was, periods.
+    steps: Vec<(usize, f64)>,
 }
+
+/// The load between two samples: what is drawn first, what then, and the share of the time at which it changes.
+struct Drawn<'a>(&'a Load, &'a Load, f64);
+
+/// Rows by which a free load step is apart from any other change of the load and from the ends of its segment: it may
+/// lie a period to either side, and the samples by another one.
+pub(crate) const FREE_APART: usize = 4;
 
 impl Driver<'_> {
     /// Row of the PWM period in which row `n` is sampled.
@@ -154,14 +179,30 @@ impl Driver<'_> {
         for (n, place) in (segment.start + 1..).zip(&mut shown[segment.start + 1..segment.end]) {
             let now = self.period(n);
             let before = self.period(n - 1);
-            let sample = if self.phase > 0.0 {
-                // rows are PWM periods, and between two samples inside of them the next period starts at 1 - phase
-                plant.step_with_change(duty[now], &load[before], &load[now], 1.0 - self.phase)
-            } else {
-                plant.step(duty[before], &load[before])
+            // rows are PWM periods, and between two samples inside of them the next period starts at 1 - phase
+            let given = if self.phase > 0.0 { duty[now] } else { duty[before] };
+            let sample = match self.moved(n) {
+                Some(Drawn(first, then, at)) => plant.step_with_change(given, first, then, at),
+                None if self.phase > 0.0 => plant.step_with_change(given, &load[before], &load[now], 1.0 - self.phase),
+                None => plant.step(given, &load[before]),
             };
             *place = array(&sample.measured);
         }
+    }
+
+    /// The load before the sample of row `n`, where a free step is near.
+    fn moved(&self, n: usize) -> Option<Drawn<'_>> {
+        let near = |step: &&(usize, f64)| self.period(n).abs_diff(step.0) < FREE_APART;
+        let (row, late) = *self.steps.iter().find(near)?;
+        let load = &self.record.load;
+        let (old, new) = (load.get(row.checked_sub(1)?)?, load.get(row)?);
+        // the sample of row n is taken at n + whole + phase, in periods of the record
+        let since = row as f64 + late - (self.whole as f64 + self.phase) - (n as f64 - 1.0);
+        Some(if since <= 0.0 {
+            Drawn(new, new, 1.0)
+        } else {
+            Drawn(old, new, since)
+        })
     }
 
     /// Whether a row is the settled point of the row before again, which need not be sought twice.

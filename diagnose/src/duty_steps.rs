@@ -3,8 +3,9 @@
 
 use std::ops::Range;
 
+use crate::basis::Basis;
 use crate::parallel;
-use crate::problem::{Basis, Problem, dot};
+use crate::problem::{Problem, dot};
 use crate::record::{CHANNELS, Record};
 
 /// Counts per period that are looked at, and how far apart: half a count of the duty moves by less than a tenth. Below 8 counts no

@@ -9,9 +9,10 @@
 //!
 //! Invariant: values stay within their ranges, and chi-square only falls.
 
+use crate::basis::Basis;
 use crate::causes::{Candidate, Search};
 use crate::drive::Model;
-use crate::problem::{Basis, Problem, Starts, axpy, dot, nudged};
+use crate::problem::{Problem, Starts, axpy, dot, nudged};
 
 /// A step that gains less than this ends the settling of initial states: a five-hundredth of what
 /// decides a tie (9).

@@ -4,6 +4,7 @@ use measured::DutyIs;
 
 use crate::drive::Model;
 use crate::fit::State;
+use crate::instants;
 use crate::noise;
 use crate::problem::{Problem, dot};
 use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS, Record};
@@ -126,6 +127,16 @@ pub fn hold(records: &[Record], base: &Model, extended: &Model, sigma: [f64; CHA
     let mut starts = before.starts.clone();
     starts.trim = trim;
     let after = State::settle(&problem, extended, &starts, None);
+    let inflation = noise::inflation(&problem, &after.residual);
+    if let Some((mut problem, after)) = instants::freed(&problem, &after, inflation) {
+        instants::note(&mut problem, &after.starts);
+        return Pair {
+            before: instants::scanned(&problem, base, &before.starts),
+            after,
+            problem,
+            remarks,
+        };
+    }
     Pair {
         problem,
         before,

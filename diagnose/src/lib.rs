@@ -7,7 +7,7 @@
 //!
 //! let model = plant::Parameters::from_file(Path::new("plant.toml"))?;
 //! let open = |file: &str| Record::open(Path::new(file), &ColumnMap::default(), &model);
-//! let found = diagnose(&model, vec![open("a.csv")?], &[open("b.csv")?], &|what| eprintln!("{what}"));
+//! let found = diagnose(&model, vec![open("a.csv")?], &[open("b.csv")?], &|what| eprintln!("{what:?}"));
 //! println!("{}\n{}", found.findings.sentence, extended_toml(&found));
 //! # Ok::<(), plant::Faults>(())
 //! ```
@@ -18,6 +18,7 @@
 //! answer and [`extend`] and [`page`] write it down. See docs/reference/diagnosis.md.
 
 pub mod attribute;
+pub mod basis;
 pub mod causes;
 pub mod control;
 pub mod diagnosis;
@@ -26,12 +27,14 @@ mod duty_steps;
 pub mod extend;
 pub mod fit;
 pub mod gain;
+pub mod instants;
 pub mod next;
 pub mod noise;
 pub mod page;
 mod parallel;
 pub mod problem;
 pub mod profile;
+pub mod progress;
 mod quantised;
 pub mod record;
 mod sampling;

@@ -7,6 +7,7 @@ use crate::attribute::Attribution;
 use crate::drive::Model;
 use crate::fit::State;
 use crate::problem::Problem;
+use crate::progress::{Listener, Progress};
 use crate::record::{CHANNELS, Record};
 
 /// Rows of a planned experiment: 30 ms at 10 kHz, nine periods of the paper's filter, as long as the records of the blind cases.
@@ -25,7 +26,7 @@ pub struct Experiment {
 
 /// For every tie the experiments by predicted separation, best first.
 #[must_use]
-pub fn experiments(problem: &Problem, attribution: &Attribution, say: &(dyn Fn(&str) + Sync)) -> Vec<Experiment> {
+pub fn experiments(problem: &Problem, attribution: &Attribution, say: Listener<'_>) -> Vec<Experiment> {
     let Some(best) = &attribution.best else {
         return Vec::new();
     };
@@ -33,7 +34,7 @@ pub fn experiments(problem: &Problem, attribution: &Attribution, say: &(dyn Fn(&
     if ties.is_empty() {
         return Vec::new();
     }
-    say("next experiment");
+    say(Progress::Stage("next experiment"));
     let plans = plans(problem);
     let name = |causes: &[usize]| {
         causes
@@ -60,7 +61,7 @@ fn separation(problem: &Problem, record: &Record, one: &Model, other: &Model) ->
     let mut made = Problem::new(vec![record.clone()], one.clone());
     made.sigma = problem.sigma.map(|s| if s.is_finite() { s } else { f64::INFINITY });
     let starts = made.first_starts();
-    let shown = crate::drive::simulate(one, &made.records[0], &starts.states[0], 0.0);
+    let shown = crate::drive::simulate(one, &made.records[0], &starts.of(0));
     for n in 0..CHANNELS {
         if problem.sigma[n].is_finite() {
             made.records[0].measured[n] = shown.iter().map(|row| row[n]).collect();
@@ -201,6 +202,7 @@ fn planned(problem: &Problem, plan: Plan) -> (String, Record) {
         sampled: None,
         dense: true,
         segments: std::iter::once(0..ROWS).collect(),
+        free_steps: Vec::new(),
         repairs: Vec::new(),
     };
     (plan.words, record)

@@ -2,7 +2,7 @@
 //! estimated beside every fit, and the part of a signal that they can explain is projected out.
 
 use crate::causes::{Bases, Knob};
-use crate::drive::{Model, Start, simulate};
+use crate::drive::{Begin, Model, Start, simulate};
 use crate::record::{CHANNELS, Record};
 
 /// Growth of a state over a segment of an unstable record, in time constants: an error of the initial state grows e^2, sevenfold,
@@ -10,9 +10,6 @@ use crate::record::{CHANNELS, Record};
 const MOST_GROWTH: f64 = 2.0;
 /// Shortest segment of an unstable record, rows: each costs two unknowns, of 30 rows of two signals.
 const SHORTEST: usize = 30;
-/// Change of the initial voltage (in units of the output voltage) and current (of the current) for a sensitivity: small against
-/// where the circuit bends, and far above rounding.
-const NUDGE: f64 = 1e-3;
 
 /// The problem.
 #[derive(Debug, Clone)]
@@ -45,36 +42,28 @@ const MOST_TRIM: f64 = 3.0 * DUTY_ACCURACY;
 pub struct Starts {
     /// Initial states of all segments of all records.
     pub states: Vec<Vec<Start>>,
+    /// How much later than the table says each free load step of each record was, periods.
+    pub late: Vec<Vec<f64>>,
     /// Duty added by the edges of the gate, 1.
     pub trim: f64,
 }
 
 impl Starts {
+    /// Where the simulation of a record begins.
+    #[must_use]
+    pub fn of(&self, record: usize) -> Begin<'_> {
+        Begin {
+            states: &self.states[record],
+            late: &self.late[record],
+            trim: self.trim,
+        }
+    }
+
     /// The trim; 0 where it is so large that it must stand for something else.
     #[must_use]
     pub fn trim_or_none(&self) -> f64 {
         if self.trim.abs() <= MOST_TRIM { self.trim } else { 0.0 }
     }
-}
-
-/// An orthonormal basis of what initial states can explain, for each segment: two vectors and the triangle that leads
-/// from them back to states.
-#[derive(Debug, Clone)]
-pub struct Basis {
-    q: [Vec<f64>; 2],
-    spans: Vec<Span>,
-    /// Sensitivity to the trim, as it is and without what initial states explain; empty if the trim is held.
-    trim: [Vec<f64>; 2],
-}
-
-#[derive(Debug, Clone)]
-struct Span {
-    record: usize,
-    segment: usize,
-    from: usize,
-    to: usize,
-    /// r11, r12, r22; 0 where a direction is not seen.
-    r: [f64; 3],
 }
 
 impl Problem {
@@ -134,6 +123,11 @@ impl Problem {
         };
         Starts {
             states: self.records.iter().map(of).collect(),
+            late: self
+                .records
+                .iter()
+                .map(|record| vec![0.0; record.free_steps.len()])
+                .collect(),
             trim: 0.0,
         }
     }
@@ -162,7 +156,7 @@ impl Problem {
     pub fn residual(&self, model: &Model, starts: &Starts) -> Vec<f64> {
         let mut out = vec![0.0; self.len()];
         for (index, record) in self.records.iter().enumerate() {
-            let shown = simulate(model, record, &starts.states[index], starts.trim);
+            let shown = simulate(model, record, &starts.of(index));
             for segment in &record.segments {
                 let first = if record.settled {
                     segment.start
@@ -207,121 +201,6 @@ impl Problem {
         };
         (0..self.records.len()).map(of).sum()
     }
-
-    /// What initial states can explain, around `starts`; `residual` is that of the model there.
-    #[must_use]
-    pub fn basis(&self, model: &Model, starts: &Starts, residual: &[f64]) -> Basis {
-        let mut q: [Vec<f64>; 2] = std::array::from_fn(|state| {
-            let step = NUDGE * [self.bases.v, self.bases.i][state];
-            let mut moved = starts.clone();
-            for start in moved.states.iter_mut().flatten() {
-                start[state] += step;
-            }
-            let after = self.residual(model, &moved);
-            residual
-                .iter()
-                .zip(&after)
-                .map(|(before, after)| (before - after) / step)
-                .collect()
-        });
-        let mut spans = Vec::new();
-        for (record, one) in self.records.iter().enumerate() {
-            if one.settled {
-                continue;
-            }
-            for (segment, rows) in one.segments.iter().enumerate() {
-                let from = self.offsets[record] + rows.start * CHANNELS;
-                let to = self.offsets[record] + rows.end * CHANNELS;
-                let [first, second] = &mut q;
-                let (first, second) = (&mut first[from..to], &mut second[from..to]);
-                let r11 = normalise(first, 1e-6);
-                let r12 = dot(first, second);
-                axpy(second, -r12, first);
-                let r22 = normalise(second, 1e-6);
-                spans.push(Span {
-                    record,
-                    segment,
-                    from,
-                    to,
-                    r: [r11, r12, r22],
-                });
-            }
-        }
-        if self.records.iter().any(|record| record.settled) {
-            for (record, one) in self.records.iter().enumerate().filter(|(_, one)| one.settled) {
-                let from = self.offsets[record];
-                let to = from + one.rows() * CHANNELS;
-                for q in &mut q {
-                    q[from..to].fill(0.0);
-                }
-            }
-        }
-        let mut basis = Basis {
-            q,
-            spans,
-            trim: [Vec::new(), Vec::new()],
-        };
-        if !self.trim_held {
-            let mut moved = starts.clone();
-            moved.trim += DUTY_ACCURACY;
-            let after = self.residual(model, &moved);
-            let raw: Vec<f64> = residual
-                .iter()
-                .zip(&after)
-                .map(|(a, b)| (a - b) / DUTY_ACCURACY)
-                .collect();
-            let mut own = raw.clone();
-            basis.project(&mut own);
-            basis.trim = [raw, own];
-        }
-        basis
-    }
-}
-
-impl Basis {
-    /// Takes out of `u` what initial states explain.
-    pub fn project(&self, u: &mut [f64]) {
-        for span in &self.spans {
-            let part = &mut u[span.from..span.to];
-            for q in &self.q {
-                let q = &q[span.from..span.to];
-                let share = dot(q, part);
-                axpy(part, -share, q);
-            }
-        }
-        let own = &self.trim[1];
-        if !own.is_empty() {
-            axpy(u, -dot(own, u) / dot(own, own), own);
-        }
-    }
-
-    /// Moves `starts` to where they explain most of `u`, a residual.
-    pub fn absorb(&self, u: &[f64], starts: &mut Starts) {
-        let [raw, own] = &self.trim;
-        let trimmed;
-        let mut u = u;
-        if !own.is_empty() {
-            let step = dot(own, u) / dot(own, own);
-            starts.trim += step;
-            let mut rest = u.to_vec();
-            axpy(&mut rest, -step, raw);
-            trimmed = rest;
-            u = &trimmed;
-        }
-        for span in &self.spans {
-            let [r11, r12, r22] = span.r;
-            let part = &u[span.from..span.to];
-            let (a, b) = (
-                dot(&self.q[0][span.from..span.to], part),
-                dot(&self.q[1][span.from..span.to], part),
-            );
-            let i = if r22 > 0.0 { b / r22 } else { 0.0 };
-            let v = if r11 > 0.0 { (a - r12 * i) / r11 } else { 0.0 };
-            let start = &mut starts.states[span.record][span.segment];
-            start[0] = (start[0] + v).max(0.0);
-            start[1] += i;
-        }
-    }
 }
 
 /// Scalar product.
@@ -335,16 +214,6 @@ pub fn axpy(a: &mut [f64], k: f64, b: &[f64]) {
     for (a, b) in a.iter_mut().zip(b) {
         *a += k * b;
     }
-}
-
-/// Scales to length 1 and returns the length; a vector shorter than `least` becomes 0.
-fn normalise(a: &mut [f64], least: f64) -> f64 {
-    let length = dot(a, a).sqrt();
-    let scale = if length > least { 1.0 / length } else { 0.0 };
-    for value in a.iter_mut() {
-        *value *= scale;
-    }
-    if length > least { length } else { 0.0 }
 }
 
 /// Change of the residual for a step of a knob.

@@ -2,8 +2,8 @@
 
 use crate::attribute::{ACCURACY, Attribution};
 use crate::causes::Search;
-use crate::parallel;
 use crate::problem::Problem;
+use crate::progress::{self, Listener};
 
 /// 95 % of a chi-square of one degree of freedom.
 const LEVEL: f64 = 3.841;
@@ -56,14 +56,14 @@ impl Profile {
 
 /// Profiles of all parameters of the best explanation. The intervals allow for the accuracy of the plant too.
 #[must_use]
-pub fn profiles(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
+pub fn profiles(problem: &Problem, attribution: &Attribution, say: Listener<'_>) -> Vec<Profile> {
     let Some(best) = &attribution.best else {
         return Vec::new();
     };
     let fitter = attribution.fitter(problem);
     let places = fitter.places(&best.causes);
     let numbers: Vec<usize> = (0..places.len()).collect();
-    parallel::map(&numbers, |number| {
+    progress::map(say, "intervals", &numbers, |number| {
         let place = places[*number];
         let candidate = &attribution.candidates[place.0];
         let knob = &candidate.form.knobs[place.1];

@@ -70,6 +70,8 @@ pub struct Record {
     pub dense: bool,
     /// Stretches to simulate.
     pub segments: Vec<Segment>,
+    /// Rows of load steps whose instant in the period is estimated beside every fit ([`crate::instants`]).
+    pub free_steps: Vec<usize>,
     /// What was repaired or left out, in plain words.
     pub repairs: Vec<String>,
 }
@@ -125,6 +127,7 @@ impl Record {
             sampled: lines.sampled,
             dense: lines.dense,
             segments: lines.segments,
+            free_steps: Vec::new(),
             repairs: raw.repairs.clone(),
         };
         let labels = QUANTITIES.map(|name| raw.label(name));
@@ -135,7 +138,8 @@ impl Record {
                 .expected("a column v_out, i_l, i_out or v_in that is not constant");
             return Err(sheet.fault(message).into());
         }
-        let odd = suspicion::of(&record, parameters, &labels);
+        let sources = QUANTITIES.map(|name| raw.source(name));
+        let odd = suspicion::of(&record, parameters, &sources, &raw.source("duty"));
         let mut faults: Sink = odd.into_iter().map(|message| sheet.fault(message)).collect();
         faults.propagate()?;
         Ok(record)

@@ -4,6 +4,7 @@ use crate::attribute::Attribution;
 use crate::fit::Fit;
 use crate::parallel;
 use crate::problem::Problem;
+use crate::progress::{self, Listener};
 use crate::search::gained;
 
 /// As for rivals of one cause: chi-square within three standard deviations of one parameter, times the scatter, or this share of
@@ -21,7 +22,7 @@ const MOST: usize = 8;
 
 /// Pairs of causes beside a leading pair with which they have nothing in common; the best first.
 #[must_use]
-pub fn other_pairs(problem: &Problem, attribution: &Attribution) -> Vec<Fit> {
+pub fn other_pairs(problem: &Problem, attribution: &Attribution, say: Listener<'_>) -> Vec<Fit> {
     // rivals of each cause by itself are found in the search; pairs that share nothing with the leader are not
     let Some(best) = attribution.best.as_ref().filter(|best| best.causes.len() == 2) else {
         return Vec::new();
@@ -53,7 +54,7 @@ pub fn other_pairs(problem: &Problem, attribution: &Attribution) -> Vec<Fit> {
     let explained = attribution.null.chi2 - best.state.chi2;
     // the share is of what is explained: what two simulators differ by grows with the effect
     let worst = best.state.chi2 + (TIE * attribution.inflation).max(TIE_SHARE * explained);
-    let mut fits = parallel::map(&looks, |(_, pair)| {
+    let mut fits = progress::map(say, "other pairs of causes", &looks, |(_, pair)| {
         let values: Vec<f64> = pair
             .iter()
             .flat_map(|cause| attribution.candidates[*cause].own.clone())

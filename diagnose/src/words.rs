@@ -67,6 +67,31 @@ pub fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure]) -> 
     }
 }
 
+/// Said where nothing explains the records: which causes come nearest, and the share of the error above the noise that they take away.
+/// Intervals would claim more than is known.
+pub fn nearest(partial: &[Named], removed: f64) -> String {
+    let one = |cause: &Named| {
+        let values = cause.parameters.iter().map(|(name, v)| {
+            let unit = unit(v.unit);
+            let name = if *name == cause.id { "" } else { name };
+            format!("{name} {} (model {})", si(v.value, unit), si(v.model, unit))
+                .trim_start()
+                .to_owned()
+        });
+        let values: Vec<String> = values.collect();
+        format!("{} [{}]: {}", cause.words, cause.id, values.join(", "))
+    };
+    let list: Vec<String> = partial.iter().map(one).collect();
+    match list.is_empty() {
+        true => " No cause takes away a part of it that is more than noise.".to_owned(),
+        false => format!(
+            " Nearest comes {}. That takes away {:.0} % of the error above the noise, and is no explanation.",
+            list.join("; with "),
+            100.0 * removed
+        ),
+    }
+}
+
 /// Said behind the verdict: what no fit to the training records can know.
 pub fn shifted(shifts: &[Shift]) -> String {
     let one = |shift: &Shift| {

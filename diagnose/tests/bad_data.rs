@@ -405,3 +405,111 @@ fn what_is_not_used_is_named_and_rows_are_settled_if_the_user_says_so() {
         "{faults}"
     );
 }
+
+#[test]
+fn a_set_load_current_is_said_to_be_set_unless_the_load_current_was_measured() {
+    let note = "i_load is read as the load that was set; a measured load current is i_out";
+    let said = |table: String| read(table.as_bytes()).unwrap().repairs.iter().any(|text| text == note);
+    assert!(!said(text(&good())));
+    assert!(said(header("r_load", "i_load")));
+    assert!(!said(header("i_l,v_in,r_load", "i_out,v_in,i_load")));
+}
+
+#[test]
+fn columns_with_names_of_their_own_get_a_whole_map_proposed_and_never_applied() {
+    let other = header(HEADER, "time_s,D,Vout,IL,Spannung,Iout");
+    let faults = read(other.as_bytes()).unwrap_err().to_string();
+    assert!(faults.contains("--map v_out=Vout,i_l=IL,i_out=Iout"), "{faults}");
+    let none = header(HEADER, "Zeit,Tastgrad,Vout [V],IL,Vin,r_load");
+    let faults = read(none.as_bytes()).unwrap_err().to_string();
+    assert!(
+        faults.contains("--map 't=Zeit,duty=Tastgrad,v_out=Vout [V],i_l=IL,v_in=Vin'"),
+        "{faults}"
+    );
+    // what the record can do without is read only if the map says so
+    let some = header("i_l", "IL");
+    let repairs = read(some.as_bytes()).unwrap().repairs;
+    let note = "`IL` looks like i_l and is not read as such: --map i_l=IL";
+    assert!(repairs.iter().any(|text| text == note), "{repairs:?}");
+}
+
+fn mapped(table: &str, map: &str) -> Result<Record, Faults> {
+    let sheet = Sheet::parse(Path::new("run.csv"), table.into(), &Record::file_options())?;
+    Record::read(&sheet, &ColumnMap::parse(map)?, &Parameters::paper_table())
+}
+
+#[test]
+fn a_sensor_the_other_way_round_is_said_with_the_map_that_turns_it() {
+    for (table, message, map) in [
+        (column(3, times(-1.0)), "i_l has the turned sign", "i_l=i_l*-1"),
+        (column(2, times(-1.0)), "v_o has the turned sign", "v_out=v_o*-1"),
+        (column(4, times(-1.0)), "v_in has the turned sign", "v_in=v_in*-1"),
+    ] {
+        let faults = read(table.as_bytes()).unwrap_err().to_string();
+        assert!(
+            faults.contains(message) && faults.contains(&format!("--map {map}\n")),
+            "{faults}"
+        );
+        assert!(mapped(&table, map).is_ok());
+    }
+    // a unit of its own stays in the factor
+    let milliamperes = column(3, times(-1000.0)).replace("i_l", "i_l [mA]");
+    let faults = read(milliamperes.as_bytes()).unwrap_err().to_string();
+    assert!(faults.contains("--map 'i_l=i_l [mA]*-0.001'"), "{faults}");
+    assert!(mapped(&milliamperes, "i_l=i_l [mA]*-0.001").is_ok());
+    assert!(
+        mapped(&column(3, times(-1.0)), "i_l=i_l*1").is_ok(),
+        "who gives a factor knows"
+    );
+}
+
+#[test]
+fn one_probe_of_another_ratio_is_said_where_the_other_signals_agree() {
+    let tenfold = column(2, times(10.0));
+    let faults = read(tenfold.as_bytes()).unwrap_err().to_string();
+    assert!(faults.contains("v_o is 10 times what the model has"), "{faults}");
+    assert!(
+        faults.contains("--map v_out=v_o*0.1;") && mapped(&tenfold, "v_out=v_o*0.1").is_ok(),
+        "{faults}"
+    );
+    // a current alone may be twice as large because the load is another
+    let doubled = column(3, times(2.0));
+    assert!(read(doubled.as_bytes()).is_ok());
+    let beside_i_out = |table: &str| {
+        let with_i_out = table.replace("v_in", "i_out");
+        let lines = with_i_out.lines().enumerate().map(|(n, line)| {
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            if n > 0 {
+                cells[4] = format!("{:.3}", cells[4].parse::<f64>().unwrap() / 40.0);
+            }
+            cells.join(",")
+        });
+        lines.collect::<Vec<_>>().join("\n")
+    };
+    assert!(read(beside_i_out(&text(&good())).as_bytes()).is_ok());
+    let faults = read(beside_i_out(&doubled).as_bytes()).unwrap_err().to_string();
+    assert!(faults.contains("i_l is 2 times what the model has"), "{faults}");
+}
+
+#[test]
+fn a_duty_of_the_lower_switch_is_said() {
+    let of = |duty: f64| {
+        let lines = good().into_iter().enumerate().map(|(n, line)| {
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            if n > 0 {
+                cells[1] = duty.to_string();
+                cells[2] = format!("{:.3}", 1.6 * cells[2].parse::<f64>().unwrap());
+                cells[3] = format!("{:.3}", 1.6 * cells[3].parse::<f64>().unwrap());
+            }
+            cells.join(",")
+        });
+        lines.collect::<Vec<_>>().join("\n")
+    };
+    assert!(read(of(0.8).as_bytes()).is_ok());
+    let faults = read(of(0.2).as_bytes()).unwrap_err().to_string();
+    assert!(
+        faults.contains("1 - d") && faults.contains("{ name = \"d\", scale = -1.0, offset = 1.0 }"),
+        "{faults}"
+    );
+    assert!(mapped(&of(0.2), "duty=d*1").is_ok(), "who gives a factor knows");
+}

@@ -29,6 +29,7 @@
 
 mod csv;
 mod format;
+mod guess;
 mod locate;
 mod map;
 mod quantity;
@@ -37,6 +38,7 @@ mod signal;
 mod time_like;
 
 pub use format::Options;
+pub use guess::proposal;
 pub use locate::Located;
 pub use map::{ColumnMap, DutyIs, Sampled};
 pub use quantity::{Quantity, VOCABULARY};

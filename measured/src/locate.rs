@@ -143,10 +143,8 @@ impl Sheet {
     #[must_use]
     pub fn missing(&self, quantity: &Quantity<'_>, hint: &str) -> Fault {
         let name = quantity.name;
-        let near = quantity
-            .names()
-            .find_map(|name| nearest(name, self.headers()))
-            .unwrap_or("COLUMN");
+        let slip = || quantity.names().find_map(|name| nearest(name, self.headers()));
+        let near = self.resembling(name).or_else(slip).unwrap_or("COLUMN");
         let names: Vec<String> = quantity.names().map(|name| format!("`{name}`")).collect();
         let message = Message::new(format!("no column `{name}`"))
             .found(self.listed())

@@ -100,6 +100,11 @@ fn unit(text: &str) -> Option<(&'static str, f64)> {
     Some((of, *factor))
 }
 
+/// Whether a text is a unit.
+pub(crate) fn is_unit(text: &str) -> bool {
+    unit(text).is_some()
+}
+
 /// How many of `to` one of `from` is; nothing if they do not measure the same.
 fn scale(from: &str, to: &str) -> Option<f64> {
     if from.eq_ignore_ascii_case(to) {

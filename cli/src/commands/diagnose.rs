@@ -2,12 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 use std::time::Instant;
 
 use ::diagnose::control::Request;
-use ::diagnose::diagnosis::diagnose;
+use ::diagnose::diagnosis::{Findings, diagnose};
 use ::diagnose::extend::extended_toml;
 use ::diagnose::page::page;
+use ::diagnose::progress::Progress;
 use ::diagnose::record::Record;
 use closed_loop::Scenario;
 use closed_loop::scenario::Task;
@@ -16,6 +18,7 @@ use measured::ColumnMap;
 use plant::{Faults, Parameters};
 use toml_input::Sink;
 
+use super::progress_line::ProgressLine;
 use super::simulate;
 use crate::arguments::Diagnose;
 use crate::{Failure, Outcome, output};
@@ -34,11 +37,19 @@ pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
         .transpose()?;
     let (train, heldout) = records(options, &columns, &model)?;
     let start = Instant::now();
-    let say = |what: &str| eprintln!("{:6.1} s  {what}", start.elapsed().as_secs_f64());
+    let shown = Mutex::new(Shown::new(start));
+    let say = |what: Progress<'_>| {
+        if let Ok(mut shown) = shown.lock() {
+            shown.hear(what);
+        }
+    };
     let mut diagnosis = diagnose(&model, train, &heldout, &say);
     if let Some(request) = closed_loop {
-        say("closed loop");
+        say(Progress::Stage("closed loop"));
         diagnosis.close_the_loop(request);
+    }
+    if let Ok(mut shown) = shown.lock() {
+        shown.line.clear();
     }
     let mut json = serde_json::to_string_pretty(&diagnosis.findings)?;
     json.push('\n');
@@ -51,25 +62,68 @@ pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
         files.insert("drm.toml".to_owned(), control.mapping.clone());
     }
     output::replace_own_texts(&options.out, &files, options.replacing)?;
-    let out = options.out.display();
+    answer(options, &columns, &diagnosis.findings)?;
+    Ok(Outcome::Done)
+}
+
+/// The verdict, then what was noticed, then where the rest stands.
+fn answer(options: &Diagnose, columns: &ColumnMap, findings: &Findings) -> Result<(), Failure> {
+    let (word, sentence) = (findings.verdict.word(), &findings.sentence);
+    let mut lines = vec![format!("verdict: {word}\n{sentence}\n")];
     let files = options.train.iter().chain(&options.heldout);
     for name in columns.sections_without(&files.map(PathBuf::as_path).collect::<Vec<_>>()) {
-        output::say(&format!(
+        lines.push(format!(
             "note: no record is called `{name}`: its section of the column map is not used"
-        ))?;
+        ));
     }
-    for repair in &diagnosis.findings.noise.repairs {
-        output::say(&format!("note: {repair}"))?;
-    }
-    if let Some(reason) = &diagnosis.findings.gain.closed_loop_missing {
-        output::say(&format!(
+    lines.extend(findings.noise.repairs.iter().map(|repair| format!("note: {repair}")));
+    if let Some(reason) = &findings.gain.closed_loop_missing {
+        lines.push(format!(
             "note: no mapping and no closed loop on the extended model: {reason}"
-        ))?;
+        ));
     }
-    let findings = &diagnosis.findings;
-    let (word, sentence) = (findings.verdict.word(), &findings.sentence);
-    output::say(&format!("verdict: {word}\n{sentence}\n\nreport: {out}/report.html"))?;
-    Ok(Outcome::Done)
+    if lines.len() > 1 {
+        lines.push(String::new());
+    }
+    lines.push(format!("report: {}/report.html", options.out.display()));
+    output::say(&lines.join("\n"))?;
+    Ok(())
+}
+
+/// Progress on standard error: a line for each stage, and how much of it is done.
+struct Shown {
+    begun: Instant,
+    stage: String,
+    stage_begun: Instant,
+    line: ProgressLine,
+}
+
+impl Shown {
+    fn new(begun: Instant) -> Self {
+        Shown {
+            begun,
+            stage: String::new(),
+            stage_begun: begun,
+            line: ProgressLine::new(),
+        }
+    }
+
+    fn hear(&mut self, what: Progress<'_>) {
+        match what {
+            Progress::Stage(stage) => {
+                self.line.clear();
+                eprintln!("{:6.1} s  {stage}", self.begun.elapsed().as_secs_f64());
+                (self.stage, self.stage_begun) = (stage.to_owned(), Instant::now());
+            }
+            Progress::Done { done, total } => {
+                let spent = self.stage_begun.elapsed().as_secs_f64();
+                let left = spent / done.max(1) as f64 * total.saturating_sub(done) as f64;
+                let (now, stage) = (self.begun.elapsed().as_secs_f64(), &self.stage);
+                self.line
+                    .show(|| format!("{now:6.1} s  {stage}: {done} of {total}, about {left:.0} s left"));
+            }
+        }
+    }
 }
 
 /// The policy and what is asked of it.

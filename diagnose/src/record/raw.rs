@@ -1,11 +1,12 @@
 //! A table with its signals found and turned into SI units: duty, load, channels, time.
 
-use measured::{ColumnMap, Located, Quantity, Sheet, table_faults};
+use measured::{ColumnMap, Located, Quantity, Sheet, Signal, proposal, table_faults};
 use plant::Load;
 use toml_input::{Fault, Faults, Message, Sink};
 
 use super::QUANTITIES;
 use super::digits::{last_digit, lattice};
+use super::suspicion::Source;
 
 /// What a record may hold.
 const NAMES: [&str; 9] = [
@@ -28,24 +29,7 @@ pub(super) struct Raw<'a> {
 impl<'a> Raw<'a> {
     pub fn new(sheet: &'a Sheet, map: &ColumnMap) -> Result<Self, Faults> {
         let located = sheet.locate(&Quantity::all(&NAMES), map)?;
-        let has = |name: &str| located.signal(name).is_some();
-        let mut faults = table_faults();
-        if !has("duty") {
-            let hint = "; a map file can do so as well: --columns MAP.toml with [columns] duty = \"...\"";
-            let duty = Quantity::all(&["duty"]);
-            faults.extend(duty.iter().map(|duty| sheet.missing(duty, hint)));
-        }
-        if !LOADS.into_iter().any(has) {
-            let message = Message::new("nothing says what the load is").found(sheet.listed());
-            let hint = "give r_load, i_load or p_load as a column, or for the whole record: --map r_load=10, or under \
-                        [constants] in the map file";
-            faults.push(sheet.header_fault(message.expected("r_load, i_load, p_load or i_out").hint(hint)));
-        }
-        if !QUANTITIES.into_iter().any(has) {
-            let message = Message::new("nothing is measured in this record").found(sheet.listed());
-            faults.push(sheet.header_fault(message.expected("at least one of v_out, i_l, i_out, v_in")));
-        }
-        faults.propagate()?;
+        incomplete(sheet, &located).propagate()?;
         let mut faults = table_faults();
         let mut values = Vec::new();
         for name in NAMES {
@@ -54,8 +38,21 @@ impl<'a> Raw<'a> {
             }
         }
         faults.propagate()?;
+        let mut repairs = located.notes(sheet, &[]);
+        let is_column = |name: &str| located.signal(name).is_some_and(|signal| signal.column().is_some());
+        // beside a measured load current nobody takes one for the other
+        if is_column("i_load") && !is_column("i_out") {
+            repairs.push("i_load is read as the load that was set; a measured load current is i_out".to_owned());
+        }
+        let guesses = sheet.guesses(&located, &Quantity::all(&NAMES));
+        // an unknown time is a question of its own
+        for (name, column) in guesses.iter().filter(|(name, _)| *name != "t") {
+            repairs.push(format!(
+                "`{column}` looks like {name} and is not read as such: --map {name}={column}"
+            ));
+        }
         Ok(Raw {
-            repairs: located.notes(sheet, &[]),
+            repairs,
             sheet,
             located,
             values,
@@ -73,6 +70,20 @@ impl<'a> Raw<'a> {
             .signal(name)
             .map_or(name, |signal| &signal.label)
             .to_owned()
+    }
+
+    /// Where a channel comes from, to say how its map would have to be.
+    pub fn source(&self, name: &str) -> Source {
+        let signal = self.located.signal(name);
+        let column = signal
+            .and_then(Signal::column)
+            .and_then(|n| self.sheet.columns().get(n));
+        Source {
+            label: self.label(name),
+            header: column.map_or(name, |column| &column.name).to_owned(),
+            scale: signal.map_or(1.0, Signal::scale),
+            stated: signal.is_some_and(Signal::is_stated),
+        }
     }
 
     /// A fault of a quantity in a row.
@@ -223,4 +234,36 @@ impl<'a> Raw<'a> {
             signal.scale().abs() * length(&column.values, column.decimals)
         })
     }
+}
+
+/// What no record can do without; the first fault proposes a map of the columns that look like it.
+fn incomplete(sheet: &Sheet, located: &Located) -> Sink {
+    let has = |name: &str| located.signal(name).is_some();
+    let mut list = Vec::new();
+    if !has("duty") {
+        let hint = "; a map file can do so as well: --columns MAP.toml with [columns] duty = \"...\"";
+        let duty = Quantity::all(&["duty"]);
+        list.extend(duty.iter().map(|duty| sheet.missing(duty, hint)));
+    }
+    if !QUANTITIES.into_iter().any(has) {
+        let message = Message::new("nothing is measured in this record").found(sheet.listed());
+        list.push(sheet.header_fault(message.expected("at least one of v_out, i_l, i_out, v_in")));
+    }
+    if !LOADS.into_iter().any(has) {
+        let message = Message::new("nothing says what the load is").found(sheet.listed());
+        let hint = "give r_load, i_load or p_load as a column, or for the whole record: --map r_load=10, or under \
+                    [constants] in the map file";
+        list.push(sheet.header_fault(message.expected("r_load, i_load, p_load or i_out").hint(hint)));
+    }
+    let map = proposal(&sheet.guesses(located, &Quantity::all(&NAMES)));
+    if let (Some(first), Some(map)) = (list.first_mut(), map) {
+        let proposed = format!("these columns look like it, check each: {map}");
+        first.hint = Some(match first.hint.take() {
+            Some(hint) if has("duty") => format!("{hint}; {proposed}"),
+            _ => proposed,
+        });
+    }
+    let mut faults = table_faults();
+    faults.extend(list);
+    faults
 }

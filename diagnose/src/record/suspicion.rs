@@ -1,9 +1,9 @@
-//! Signals whose size says that they are not what their column is called, or not in its unit.
+//! Signals whose size or sign says that they are not what their column is called, or not in its unit.
 
 use plant::Parameters;
 use toml_input::Message;
 
-use super::{CHANNEL_UNITS, CHANNELS, Record};
+use super::{CHANNEL_UNITS, CHANNELS, QUANTITIES, Record};
 use crate::problem::median;
 
 /// A signal this many times larger or smaller than the model's is in another unit: units are a thousand apart, percent a hundred,
@@ -18,8 +18,158 @@ const NEAR: f64 = 1.3;
 /// convention.
 const LEAST: f64 = 0.02;
 
-/// What is wrong with a record, as far as sizes tell.
-pub fn of(record: &Record, parameters: &Parameters, labels: &[String; CHANNELS]) -> Vec<Message> {
+/// A signal has the turned sign if it lies on the other side of 0 by this share of its size. A convention: offsets of sensors are
+/// smaller, and a negative mean current needs a load that feeds back.
+const TURNED: f64 = 0.5;
+/// Ratios of probes and shunts that are set wrong, and how near to one a signal has to be: 0.3 diode drops at 12 V make 8 %, and
+/// no cause of the list makes a signal 1.8 times as large.
+const PROBES: [f64; 4] = [2.0, 10.0, 0.5, 0.1];
+const AS_PROBE: f64 = 1.1;
+/// The duty is taken for that of the other switch if the voltage is this near to what 1 - d makes, in units of the source, ...
+const AS_OTHER: f64 = 0.05;
+/// ... and this far from what d makes. Losses, a tenth of the source at most, lie between.
+const NOT_AS_OWN: f64 = 0.2;
+/// Drawn current over half the ripple from which on a current surely never rests: at rest the voltage is above d v_in, at any factor.
+const CONTINUOUS: f64 = 1.2;
+
+/// A channel's column.
+pub struct Source {
+    /// What to call it.
+    pub label: String,
+    /// Its header in the file.
+    pub header: String,
+    /// SI units over units of the file.
+    pub scale: f64,
+    /// The map has a factor for it: the user knows.
+    pub stated: bool,
+}
+
+/// What is wrong with a record, as far as signs and sizes tell; signs first, since a turned signal has no size to speak of.
+pub fn of(record: &Record, parameters: &Parameters, sources: &[Source; CHANNELS], duty: &Source) -> Vec<Message> {
+    let turned = turned(record, parameters, sources);
+    if !turned.is_empty() {
+        return turned;
+    }
+    let labels: [&str; CHANNELS] = std::array::from_fn(|n| sources[n].label.as_str());
+    let mut odd = sized(record, parameters, &labels);
+    if odd.is_empty() && !duty.stated {
+        odd = other_duty(record, parameters, &duty.header);
+    }
+    if odd.is_empty() {
+        odd = probes(record, parameters, sources);
+    }
+    odd
+}
+
+/// Signals on the wrong side of 0.
+fn turned(record: &Record, parameters: &Parameters, sources: &[Source; CHANNELS]) -> Vec<Message> {
+    let sizes = sizes(record, parameters);
+    let is_drawn = drawn(record, parameters).is_some_and(|drawn| drawn > 0.0);
+    let message = |n: usize| {
+        let (size, found, source) = (sizes[n]?, median(record.measured[n].iter().copied()), &sources[n]);
+        let is_current = n == 1 || n == 2;
+        let is_turned = found < -TURNED * size && !source.stated && (is_drawn || !is_current);
+        let unit = CHANNEL_UNITS[n];
+        is_turned.then(|| {
+            Message::new(format!("{} has the turned sign", source.label))
+                .found(format!("around {} {unit}", shown(found)))
+                .expected(format!("about {} {unit} by the model", shown(size)))
+                .hint(format!(
+                    "was the sensor or the probe put in the other way round? turn it by a map: {}",
+                    mapped(n, source, -1.0)
+                ))
+        })
+    };
+    (0..CHANNELS).filter_map(message).collect()
+}
+
+/// The argument that multiplies a channel by `factor`.
+fn mapped(n: usize, source: &Source, factor: f64) -> String {
+    let text = format!("{}={}*{}", QUANTITIES[n], source.header, factor * source.scale);
+    match text.contains(|c: char| !(c.is_ascii_alphanumeric() || "_.=*-".contains(c))) {
+        true => format!("--map '{text}'"),
+        false => format!("--map {text}"),
+    }
+}
+
+/// The median of the drawn current, with its sign, at the voltage that the duty makes.
+fn drawn(record: &Record, parameters: &Parameters) -> Option<f64> {
+    let v_in = parameters.converter.v_in * record.v_in_ratio;
+    let each = record.load.iter().zip(&record.duty).map(|(load, duty)| {
+        let v = duty * v_in;
+        load.conductance * v + load.current + if v > 0.0 { load.power / v } else { 0.0 }
+    });
+    Some(median(each)).filter(|drawn| drawn.is_finite())
+}
+
+/// Whether the inductor current surely never rests: a voltage then follows from the duty alone.
+fn is_continuous(record: &Record, parameters: &Parameters) -> bool {
+    let p = &parameters.converter;
+    let d = median(record.duty.iter().copied());
+    let half = 0.5 * p.v_in * record.v_in_ratio * d * (1.0 - d) / (p.inductance * p.f_sw);
+    drawn(record, parameters).is_some_and(|drawn| drawn > CONTINUOUS * half)
+}
+
+/// A duty that is that of the lower switch.
+fn other_duty(record: &Record, parameters: &Parameters, header: &str) -> Vec<Message> {
+    let v_in = parameters.converter.v_in * record.v_in_ratio;
+    let off = |duty: &dyn Fn(f64) -> f64| {
+        let each = record.measured[0].iter().zip(&record.duty);
+        median(each.map(|(v, d)| (v / v_in - duty(*d)).abs()))
+    };
+    let (own, other) = (off(&|d| d), off(&|d| 1.0 - d));
+    // the ripple is that of both
+    if !(own > NOT_AS_OWN && other < AS_OTHER && is_continuous(record, parameters)) {
+        return Vec::new();
+    }
+    let d = median(record.duty.iter().copied());
+    let message = Message::new("the duty looks like that of the lower switch, 1 - d")
+        .found(format!(
+            "duties around {}, and voltages as with {}",
+            shown(d),
+            shown(1.0 - d)
+        ))
+        .hint(format!(
+            "turn it by a map file: duty = {{ name = {header:?}, scale = -1.0, offset = 1.0 }} under [columns]; if it is right: \
+             --map duty={header}*1"
+        ));
+    vec![message]
+}
+
+/// One signal that is twice or ten times what it should be, while no other is.
+fn probes(record: &Record, parameters: &Parameters, sources: &[Source; CHANNELS]) -> Vec<Message> {
+    let sizes = sizes(record, parameters);
+    let over = |n: usize| Some(typical(&record.measured[n])? / sizes[n]?);
+    let known: Vec<(usize, f64)> = (0..CHANNELS).filter_map(|n| Some((n, over(n)?))).collect();
+    let off: Vec<(usize, f64)> = known
+        .iter()
+        .copied()
+        .filter(|(_, over)| ratio(*over, 1.0) > FAR)
+        .collect();
+    let [(n, over)] = off[..] else { return Vec::new() };
+    let probe = PROBES.into_iter().find(|probe| ratio(over, *probe) < AS_PROBE);
+    // a current alone may be off because the load is
+    let confirmed = n == 3 || is_continuous(record, parameters) && known.len() > 1;
+    let is_current = n == 1 || n == 2;
+    let sure = confirmed && (!is_current || known.iter().any(|(other, _)| other + n == 3));
+    let (Some(probe), true, false) = (probe, sure, sources[n].stated) else {
+        return Vec::new();
+    };
+    let (source, unit) = (&sources[n], CHANNEL_UNITS[n]);
+    let (found, size) = (over * sizes[n].unwrap_or(f64::NAN), sizes[n].unwrap_or(f64::NAN));
+    let message = Message::new(format!("{} is {probe} times what the model has", source.label))
+        .found(format!("around {} {unit}", shown(found)))
+        .expected(format!("about {} {unit}, as the other signals have it", shown(size)))
+        .hint(format!(
+            "a probe or shunt of another ratio? {}; if it is right as it is: {}",
+            mapped(n, source, 1.0 / probe),
+            mapped(n, source, 1.0)
+        ));
+    vec![message]
+}
+
+/// Signals in another unit, and two that are exchanged.
+fn sized(record: &Record, parameters: &Parameters, labels: &[&str; CHANNELS]) -> Vec<Message> {
     let sizes = sizes(record, parameters);
     let known: Vec<(usize, f64, f64)> = (0..CHANNELS)
         .filter_map(|n| Some((n, sizes[n]?, typical(&record.measured[n])?)))
@@ -28,7 +178,7 @@ pub fn of(record: &Record, parameters: &Parameters, labels: &[String; CHANNELS])
         for (b, size_b, found_b) in &known[n + 1..] {
             let apart = ratio(*found_a, *size_a) > FAR && ratio(*found_b, *size_b) > FAR;
             if apart && ratio(*found_a, *size_b) < NEAR && ratio(*found_b, *size_a) < NEAR {
-                let (a, b) = (&labels[*a], &labels[*b]);
+                let (a, b) = (labels[*a], labels[*b]);
                 let message = Message::new(format!("the columns {a} and {b} look exchanged"));
                 let found = format!("{a} around {}, {b} around {}", shown(*found_a), shown(*found_b));
                 let expected = format!("about {} and {}", shown(*size_a), shown(*size_b));
@@ -45,7 +195,7 @@ pub fn of(record: &Record, parameters: &Parameters, labels: &[String; CHANNELS])
         .iter()
         .filter(|(_, size, found)| ratio(*found, *size) > OTHER_UNIT);
     let message = |(n, size, found): &(usize, f64, f64)| {
-        let (name, unit) = (&labels[*n], CHANNEL_UNITS[*n]);
+        let (name, unit) = (labels[*n], CHANNEL_UNITS[*n]);
         Message::new(format!("{name} is not in {unit}, or not of this converter"))
             .found(format!("around {}", shown(*found)))
             .expected(format!("around {} {unit} by the model", shown(*size)))

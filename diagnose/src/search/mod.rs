@@ -8,10 +8,11 @@ use crate::fit::{FINE, Fit, Fitter, State, solve};
 use crate::noise;
 use crate::parallel;
 use crate::problem::dot;
+use crate::progress::{self, Listener};
 use crate::shape::structures;
 
 /// An explanation within this of the best is as good, in chi-square: three standard deviations of one parameter ...
-const TIE: f64 = 9.0;
+pub(crate) const TIE: f64 = 9.0;
 /// ... or within this share of what the cause explains: twice the accuracy, squared.
 const TIE_SHARE: f64 = 4.0 * ACCURACY * ACCURACY;
 /// What is this many times as far off may come within it when its fit is brought to an end. Rough fits stop at a gain of 0.5 a
@@ -42,6 +43,8 @@ const LOOKED_AT_BY_LEADERS: usize = 3;
 pub(crate) struct Searcher<'a> {
     /// Fits one set.
     pub fitter: Fitter<'a>,
+    /// Hears how far it is.
+    pub say: Listener<'a>,
 }
 
 /// A fitted set, and the sensitivities of its parameters where it ends.
@@ -96,14 +99,14 @@ impl Searcher<'_> {
     }
 
     /// Every candidate alone. Those that explain next to nothing at first order are not followed further.
-    pub fn singles(&self) -> Vec<Fit> {
+    pub fn singles(&self, stage: &str) -> Vec<Fit> {
         let null = self.fitter.null;
         let all: Vec<usize> = (0..self.fitter.candidates.len()).collect();
         let first_order = parallel::map(&all, |cause| {
             gained(&self.fitter.sensitivity(*cause, null), &null.residual)
         });
         let most = first_order.iter().copied().fold(0.0, f64::max);
-        parallel::map(&all, |cause| {
+        progress::map(self.say, stage, &all, |cause| {
             let follow = first_order[*cause] > (FOLLOWED * most).max(LEAST_FOLLOWED);
             if self.begins_at_own(*cause) && !follow {
                 return self.fitter.unmoved(*cause, first_order[*cause]);
@@ -113,7 +116,7 @@ impl Searcher<'_> {
     }
 
     /// Chi-square with a price for each parameter.
-    fn score(&self, fit: &Fit) -> f64 {
+    pub fn score(&self, fit: &Fit) -> f64 {
         let price = libm::log(self.fitter.problem.count() as f64);
         fit.state.chi2 + price * fit.values.len() as f64
     }
@@ -139,7 +142,7 @@ impl Searcher<'_> {
 
     /// Forward: the cause that helps most, as long as one helps; where structure is left, from several leaders; backward:
     /// without each that no longer helps, and where structure is left with each replaced by a better one.
-    pub fn grow(&self, singles: &[Fit], say: &(dyn Fn(&str) + Sync)) -> (Option<Fit>, Vec<f64>) {
+    pub fn grow(&self, singles: &[Fit]) -> (Option<Fit>, Vec<f64>) {
         let null = self.fitter.null;
         let mut leaders = singles.to_vec();
         self.sort(&mut leaders);
@@ -151,12 +154,13 @@ impl Searcher<'_> {
         }
         let mut best = self.polished(first);
         while best.causes.len() < MOST {
-            say(&format!("more than {}", self.names(&best)));
-            let mut larger = self.forward(&best, LOOKED_AT);
+            let stage = format!("more than {}", self.names(&best));
+            let mut larger = self.forward(&best, LOOKED_AT, &stage);
             // two causes that resemble each other are best found from the one that explains less alone
             if self.structure(&best) > 0.0 || larger.iter().any(|fit| self.is_worth(&best, fit)) {
                 for leader in self.distinct(&leaders).into_iter().skip(1).take(LEADERS) {
-                    larger.extend(self.forward(leader, LOOKED_AT_BY_LEADERS));
+                    let stage = format!("{} and another", self.names(leader));
+                    larger.extend(self.forward(leader, LOOKED_AT_BY_LEADERS, &stage));
                 }
             }
             self.sort(&mut larger);
@@ -171,6 +175,26 @@ impl Searcher<'_> {
             leaders = larger;
         }
         self.backward(best)
+    }
+
+    /// The single cause that explains most for its parameters, brought to its end; nothing if none is worth it.
+    pub fn leading(&self, singles: &[Fit]) -> Option<Fit> {
+        let first = singles.iter().min_by(|a, b| self.score(a).total_cmp(&self.score(b)))?;
+        let gain = self.fitter.null.chi2 - first.state.chi2;
+        (gain >= threshold(first.values.len(), self.inflation(first))).then(|| self.polished(first))
+    }
+
+    /// Places of the `count` single causes that explain most for their parameters.
+    pub fn leaders(&self, singles: &[Fit], count: usize) -> Vec<usize> {
+        let mut places: Vec<usize> = (0..singles.len()).collect();
+        places.sort_by(|a, b| self.score(&singles[*a]).total_cmp(&self.score(&singles[*b])));
+        places.truncate(count);
+        places
+    }
+
+    /// A set that was found in another problem of the same records, fitted in this.
+    pub fn refitted(&self, fit: &Fit) -> Fit {
+        self.polished(&self.fitter.from(&fit.causes, &fit.values, self.fitter.null))
     }
 
     /// The fit brought to its end.
@@ -217,14 +241,16 @@ impl Searcher<'_> {
     }
 
     /// Sets that are one cause larger: those of the candidates that look best at first order.
-    fn forward(&self, best: &Fit, count: usize) -> Vec<Fit> {
+    fn forward(&self, best: &Fit, count: usize, stage: &str) -> Vec<Fit> {
         let columns = self.sensitivities(&best.causes, &best.state);
         let set = Set::of(best, &columns);
         let looks = self.looks(&set, &self.others(&best.causes), &best.state);
         // a nonlinear fit may gain three times what it promises at first order; less is not worth a fit
         let least = 0.3 * threshold(1, 1.0);
         let looks = looks.into_iter().filter(|(gain, _)| *gain > least).collect();
-        parallel::map(&top(looks, count), |cause| self.added(&set, *cause, &best.state))
+        progress::map(self.say, stage, &top(looks, count), |cause| {
+            self.added(&set, *cause, &best.state)
+        })
     }
 
     fn sensitivities(&self, causes: &[usize], state: &State) -> Vec<Vec<f64>> {
@@ -256,7 +282,8 @@ impl Searcher<'_> {
     fn swapped(&self, fit: Fit) -> Fit {
         let mut best = fit;
         for member in 0..best.causes.len() {
-            for other in self.replacements(&best, member, 3) {
+            let stage = format!("another cause for {}", self.id(best.causes[member]));
+            for other in self.replacements(&best, member, 3, &stage) {
                 if self.score(&other) < self.score(&best) - SWAP {
                     best = self.polished(&other);
                     break;
@@ -268,7 +295,7 @@ impl Searcher<'_> {
 
     /// Fits of the set with other causes in the place of one: those that look best at first order where the kept ones alone
     /// end.
-    fn replacements(&self, fit: &Fit, member: usize, count: usize) -> Vec<Fit> {
+    fn replacements(&self, fit: &Fit, member: usize, count: usize, stage: &str) -> Vec<Fit> {
         let kept = without(&fit.causes, member);
         let kept = self.fitter.from(&kept, &self.values_of(fit, &kept), self.fitter.null);
         let columns = self.sensitivities(&kept.causes, &kept.state);
@@ -276,7 +303,9 @@ impl Searcher<'_> {
         let looks = self.looks(&set, &self.others(&fit.causes), &kept.state);
         let most = looks.iter().map(|look| look.0).fold(0.0, f64::max);
         let looks = looks.into_iter().filter(|look| look.0 > FOLLOWED * most).collect();
-        parallel::map(&top(looks, count), |cause| self.added(&set, *cause, &kept.state))
+        progress::map(self.say, stage, &top(looks, count), |cause| {
+            self.added(&set, *cause, &kept.state)
+        })
     }
 
     fn values_of(&self, fit: &Fit, kept: &[usize]) -> Vec<f64> {
@@ -286,7 +315,7 @@ impl Searcher<'_> {
     }
 
     /// Drops what is not needed; the evidence of what is.
-    fn backward(&self, fit: Fit) -> (Option<Fit>, Vec<f64>) {
+    pub fn backward(&self, fit: Fit) -> (Option<Fit>, Vec<f64>) {
         let mut best = fit;
         loop {
             let members: Vec<usize> = (0..best.causes.len()).collect();
@@ -325,17 +354,17 @@ impl Searcher<'_> {
                 let tolerance = (TIE * self.inflation(best)).max(TIE_SHARE * evidence[member]);
                 let all: Vec<Fit> = match best.causes.len() {
                     1 => singles.to_vec(),
-                    _ => self.replacements(best, member, 8),
+                    _ => self.replacements(best, member, 8, &format!("rivals of {}", self.id(*own))),
                 };
                 let is_rival = |fit: &Fit| {
                     let other = fit.causes.last().is_some_and(|cause| !self.same(*cause, *own));
                     other && fit.state.chi2 <= best.state.chi2 + tolerance
                 };
                 let near = |fit: &Fit| fit.state.chi2 <= best.state.chi2 + NEAR * tolerance;
-                let all = all
-                    .iter()
-                    .map(|fit| if near(fit) { self.polished(fit) } else { fit.clone() });
-                let mut list: Vec<Fit> = all.filter(is_rival).collect();
+                let all: Vec<Fit> = all.into_iter().filter(near).collect();
+                let stage = format!("rivals of {}, those that come near", self.id(*own));
+                let all = progress::map(self.say, &stage, &all, |fit| self.polished(fit));
+                let mut list: Vec<Fit> = all.into_iter().filter(is_rival).collect();
                 list.sort_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
                 let mut seen = Vec::new();
                 list.retain(|fit| {

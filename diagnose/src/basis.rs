@@ -1,0 +1,219 @@
+//! What initial states, instants of load steps and the edges of the gate can explain of a signal: an orthonormal basis, to project
+//! it out and to move the estimates.
+
+use crate::drive::{FREE_APART, Model};
+use crate::parallel;
+use crate::problem::{DUTY_ACCURACY, Problem, Starts, axpy, dot};
+use crate::record::{CHANNELS, Record, Segment};
+
+/// Change of the initial voltage (in units of the output voltage) and current (of the current) for a sensitivity: small against
+/// where the circuit bends, and far above rounding.
+const NUDGE: f64 = 1e-3;
+/// Change of the instant of a load step for a sensitivity, periods: a fifth of the paper's sensor filter, whose output bends there.
+const NUDGE_STEP: f64 = 0.02;
+/// Farthest from where the record has it that a load step is looked for, periods: a column of the load may hold that of the
+/// period's start, of its end, or of the row.
+pub const FARTHEST: f64 = 1.0;
+/// A direction shorter than this is not seen.
+const UNSEEN: f64 = 1e-6;
+
+/// An orthonormal basis of what initial states and free load steps can explain, for each segment.
+#[derive(Debug, Clone)]
+pub struct Basis {
+    spans: Vec<Span>,
+    /// Sensitivity to the trim, as it is and without what the others explain; empty if the trim is held.
+    trim: [Vec<f64>; 2],
+}
+
+/// One segment: columns over `from..to`, and the triangle that leads from them back to the estimates.
+#[derive(Debug, Clone)]
+struct Span {
+    record: usize,
+    segment: usize,
+    from: usize,
+    to: usize,
+    /// Voltage, current, then the instants of the free steps `steps`.
+    q: Vec<Vec<f64>>,
+    /// `r[column][row]` up to the diagonal; 0 where a direction is not seen.
+    r: Vec<Vec<f64>>,
+    /// Places of the free steps among those of the record.
+    steps: Vec<usize>,
+}
+
+/// Free steps of a segment, as places among those of the record.
+fn steps_in(record: &Record, segment: &Segment) -> Vec<usize> {
+    let steps = record.free_steps.iter().enumerate();
+    let inside = steps.filter(|(_, row)| segment.start + FREE_APART <= **row && **row < segment.end);
+    inside.map(|(place, _)| place).collect()
+}
+
+impl Problem {
+    /// What initial states can explain, around `starts`; `residual` is that of the model there.
+    #[must_use]
+    pub fn basis(&self, model: &Model, starts: &Starts, residual: &[f64]) -> Basis {
+        let states: [Vec<f64>; 2] = std::array::from_fn(|state| {
+            let step = NUDGE * [self.bases.v, self.bases.i][state];
+            let mut moved = starts.clone();
+            for start in moved.states.iter_mut().flatten() {
+                start[state] += step;
+            }
+            let after = self.residual(model, &moved);
+            residual
+                .iter()
+                .zip(&after)
+                .map(|(before, after)| (before - after) / step)
+                .collect()
+        });
+        let mut spans = self.spans();
+        let most = spans.iter().map(|span| span.steps.len()).max().unwrap_or(0);
+        // the first step of all segments is moved at once, then the second: nothing leads from one segment to the next
+        let numbers: Vec<usize> = (0..most).collect();
+        let instants = parallel::map(&numbers, |n| self.moved_steps(model, starts, residual, &spans, *n));
+        for span in &mut spans {
+            let of_steps = instants.iter().take(span.steps.len());
+            for column in states.iter().chain(of_steps) {
+                span.add(column[span.from..span.to].to_vec());
+            }
+        }
+        let mut basis = Basis {
+            spans,
+            trim: [Vec::new(), Vec::new()],
+        };
+        if !self.trim_held {
+            let mut moved = starts.clone();
+            moved.trim += DUTY_ACCURACY;
+            let after = self.residual(model, &moved);
+            let raw: Vec<f64> = residual
+                .iter()
+                .zip(&after)
+                .map(|(a, b)| (a - b) / DUTY_ACCURACY)
+                .collect();
+            let mut own = raw.clone();
+            basis.project(&mut own);
+            basis.trim = [raw, own];
+        }
+        basis
+    }
+
+    /// All segments, without columns as yet. Settled points have no initial state.
+    fn spans(&self) -> Vec<Span> {
+        let mut spans = Vec::new();
+        for (record, one) in self.records.iter().enumerate().filter(|(_, one)| !one.settled) {
+            for (segment, rows) in one.segments.iter().enumerate() {
+                spans.push(Span {
+                    record,
+                    segment,
+                    from: self.offsets[record] + rows.start * CHANNELS,
+                    to: self.offsets[record] + rows.end * CHANNELS,
+                    q: Vec::new(),
+                    r: Vec::new(),
+                    steps: steps_in(one, rows),
+                });
+            }
+        }
+        spans
+    }
+
+    /// Sensitivity to the instant of the `n`th free step of each segment, a period.
+    fn moved_steps(&self, model: &Model, starts: &Starts, residual: &[f64], spans: &[Span], n: usize) -> Vec<f64> {
+        let mut moved = starts.clone();
+        let mut signs = vec![0.0; residual.len()];
+        for span in spans {
+            let Some(place) = span.steps.get(n) else { continue };
+            let late = &mut moved.late[span.record][*place];
+            // what a load sensor shows leaps where the step passes a sample: the step is moved within its side
+            let instant = self.records[span.record].phase + model.late / self.bases.t_sw;
+            let side = if (*late - instant).rem_euclid(1.0) > 0.5 {
+                -1.0
+            } else {
+                1.0
+            };
+            *late += side * NUDGE_STEP;
+            signs[span.from..span.to].fill(side / NUDGE_STEP);
+        }
+        let after = self.residual(model, &moved);
+        let both = residual.iter().zip(&after).zip(&signs);
+        both.map(|((before, after), sign)| (before - after) * sign).collect()
+    }
+}
+
+impl Span {
+    /// Takes a column in: what the others before it do not hold, at length 1.
+    fn add(&mut self, mut column: Vec<f64>) {
+        let mut r = Vec::with_capacity(self.q.len() + 1);
+        for q in &self.q {
+            let share = dot(q, &column);
+            axpy(&mut column, -share, q);
+            r.push(share);
+        }
+        r.push(normalise(&mut column, UNSEEN));
+        self.q.push(column);
+        self.r.push(r);
+    }
+
+    /// The estimates' moves that explain most of `part`.
+    fn moves(&self, part: &[f64]) -> Vec<f64> {
+        let mut left: Vec<f64> = self.q.iter().map(|q| dot(q, part)).collect();
+        for column in (0..left.len()).rev() {
+            let r = &self.r[column];
+            left[column] = if r[column] > 0.0 { left[column] / r[column] } else { 0.0 };
+            let by = left[column];
+            for row in 0..column {
+                left[row] -= r[row] * by;
+            }
+        }
+        left
+    }
+}
+
+impl Basis {
+    /// Takes out of `u` what initial states explain.
+    pub fn project(&self, u: &mut [f64]) {
+        for span in &self.spans {
+            let part = &mut u[span.from..span.to];
+            for q in &span.q {
+                let share = dot(q, part);
+                axpy(part, -share, q);
+            }
+        }
+        let own = &self.trim[1];
+        if !own.is_empty() {
+            axpy(u, -dot(own, u) / dot(own, own), own);
+        }
+    }
+
+    /// Moves `starts` to where they explain most of `u`, a residual.
+    pub fn absorb(&self, u: &[f64], starts: &mut Starts) {
+        let [raw, own] = &self.trim;
+        let trimmed;
+        let mut u = u;
+        if !own.is_empty() {
+            let step = dot(own, u) / dot(own, own);
+            starts.trim += step;
+            let mut rest = u.to_vec();
+            axpy(&mut rest, -step, raw);
+            trimmed = rest;
+            u = &trimmed;
+        }
+        for span in &self.spans {
+            let moves = span.moves(&u[span.from..span.to]);
+            let start = &mut starts.states[span.record][span.segment];
+            start[0] = (start[0] + moves[0]).max(0.0);
+            start[1] += moves[1];
+            for (place, by) in span.steps.iter().zip(&moves[2..]) {
+                let late = &mut starts.late[span.record][*place];
+                *late = (*late + by).clamp(-FARTHEST, FARTHEST);
+            }
+        }
+    }
+}
+
+/// Scales to length 1 and returns the length; a vector shorter than `least` becomes 0.
+fn normalise(a: &mut [f64], least: f64) -> f64 {
+    let length = dot(a, a).sqrt();
+    let scale = if length > least { 1.0 / length } else { 0.0 };
+    for value in a.iter_mut() {
+        *value *= scale;
+    }
+    if length > least { length } else { 0.0 }
+}

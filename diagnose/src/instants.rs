@@ -1,0 +1,212 @@
+//! Load steps inside a switching period.
+//!
+//! ```text
+//! sample      ○         ○         ○         ○       a row each period
+//! load   ─────────────────┐
+//!                         └───────────────────      stepped here, on the bench
+//! column ─────────────────────────┐
+//!                                 └───────────      says so from this row on
+//! ```
+//! A bench steps its load when it likes, and a table shows only between which rows. Where the model steps it a part of a period too
+//! late or too early, the output capacitor is off by the charge of that time, and rings. So the instant of a step may be an
+//! unknown of no interest, as initial states are: it is estimated beside every fit, and what it explains is projected out. A delay
+//! of all steps by the same time could also be a cause, so instants are free only in records that need it.
+
+use crate::attribute::threshold;
+use crate::basis::FARTHEST;
+use crate::drive::{FREE_APART, Model};
+use crate::fit::State;
+use crate::parallel;
+use crate::problem::{Problem, Starts, dot};
+use crate::record::{CHANNELS, Record};
+
+/// Steps closer to where the record has them are where the record has them: of about that size (5 us at 10 kHz, .1 V at 150 uF)
+/// is what two simulators of one load step differ by.
+const NEGLIGIBLE: f64 = 0.05;
+/// Chi-square that a free instant must be worth beside a cause: twice the logarithm of how many instants two periods hold that a
+/// record tells apart (some 60, each three hundredths of a period wide).
+pub(crate) const PRICE: f64 = 8.0;
+/// Most free steps of a record: each is one more simulation in a round of sensitivities. A convention for time.
+const MOST: usize = 64;
+/// Instants that are looked at first, to either side: the fit then finds its way within an eighth of a period.
+const LOOKS: i32 = 8;
+
+/// The channel that shows the load itself, and the rows around a free step in which it may leap.
+const LOAD_SENSOR: usize = 2;
+const LEAPS_BEFORE: usize = 2;
+const LEAPS_BEHIND: usize = 2;
+
+/// Rows of load steps whose instant could be estimated: with nothing else of the load near, inside a stretch.
+fn steps(record: &Record) -> Vec<usize> {
+    if record.settled || !record.dense {
+        return Vec::new();
+    }
+    let load = &record.load;
+    let changes: Vec<usize> = (1..load.len()).filter(|n| load[*n] != load[*n - 1]).collect();
+    let alone = |row: usize| changes.iter().all(|n| *n == row || n.abs_diff(row) >= 2 * FREE_APART);
+    let inside = |row: usize| {
+        let mut segments = record.segments.iter();
+        segments.any(|s| s.start + FREE_APART <= row && row + FREE_APART <= s.end)
+    };
+    let mut rows: Vec<usize> = changes.iter().copied().filter(|n| alone(*n) && inside(*n)).collect();
+    rows.truncate(MOST);
+    rows
+}
+
+/// The problem with free instants in the records that are much better with them, and where the model of `at` then stands; nothing
+/// where none is.
+pub(crate) fn freed(problem: &Problem, at: &State, inflation: f64) -> Option<(Problem, State)> {
+    let all: Vec<Vec<usize>> = problem.records.iter().map(steps).collect();
+    let tried = free(problem, &all)?;
+    let state = scanned(&tried, &at.model, &at.starts);
+    let needs = |index: usize| {
+        let gain = chi2_of(&tried, &at.residual, index) - chi2_of(&tried, &state.residual, index);
+        let moved = state.starts.late[index].iter().any(|late| late.abs() > NEGLIGIBLE);
+        moved && gain >= threshold(all[index].len(), inflation)
+    };
+    let kept = all.iter().enumerate();
+    let kept: Vec<Vec<usize>> = kept
+        .map(|(index, rows)| if needs(index) { rows.clone() } else { Vec::new() })
+        .collect();
+    if kept == all {
+        return Some((tried, state));
+    }
+    let freed = free(problem, &kept)?;
+    let state = scanned(&freed, &at.model, &at.starts);
+    Some((freed, state))
+}
+
+/// The problem with these steps free; nothing if there are none. The load sensor is not compared around them: what it shows leaps with
+/// the load, so that a fit would be caught at the instants of its samples.
+fn free(problem: &Problem, steps: &[Vec<usize>]) -> Option<Problem> {
+    let mut freed = problem.clone();
+    for ((record, masked), rows) in freed.records.iter_mut().zip(&mut freed.masked).zip(steps) {
+        for row in rows {
+            let near = row.saturating_sub(LEAPS_BEFORE)..row + LEAPS_BEHIND;
+            masked[LOAD_SENSOR]
+                .get_mut(near)
+                .into_iter()
+                .for_each(|part| part.fill(true));
+        }
+        record.free_steps.clone_from(rows);
+    }
+    (count(&freed) > 0).then_some(freed)
+}
+
+/// Number of free instants.
+pub(crate) fn count(problem: &Problem) -> usize {
+    problem.records.iter().map(|record| record.free_steps.len()).sum()
+}
+
+/// Chi-square of a residual over what counts in `problem`.
+pub(crate) fn chi2(problem: &Problem, residual: &[f64]) -> f64 {
+    (0..problem.records.len())
+        .map(|index| chi2_of(problem, residual, index))
+        .sum()
+}
+
+fn chi2_of(problem: &Problem, residual: &[f64], index: usize) -> f64 {
+    let (offset, masked) = (problem.offsets[index], &problem.masked[index]);
+    let rows = residual[offset..]
+        .chunks_exact(CHANNELS)
+        .take(problem.records[index].rows());
+    let squares = rows.enumerate().flat_map(|(row, values)| {
+        let counts = move |(n, value): (usize, &f64)| if masked[n][row] { 0.0 } else { value * value };
+        values.iter().enumerate().map(counts)
+    });
+    squares.sum()
+}
+
+/// The model with initial states and free instants fitted, instants sought over all that is possible.
+pub(crate) fn scanned(problem: &Problem, model: &Model, from: &Starts) -> State {
+    let mut starts = from.clone();
+    starts.late = problem.first_starts().late;
+    let steps: Vec<(usize, usize, usize, usize)> = windows(problem);
+    let most = steps.iter().map(|step| step.1 + 1).max().unwrap_or(0);
+    for nth in 0..most {
+        let looks: Vec<f64> = (-LOOKS..=LOOKS)
+            .map(|n| FARTHEST * f64::from(n) / f64::from(LOOKS))
+            .collect();
+        let tried = parallel::map(&looks, |late| {
+            let mut tried = starts.clone();
+            for (record, place, ..) in steps.iter().filter(|step| step.1 == nth) {
+                tried.late[*record][*place] = *late;
+            }
+            problem.residual(model, &tried)
+        });
+        for (record, place, from, to) in steps.iter().filter(|step| step.1 == nth) {
+            let chi2 = |residual: &Vec<f64>| dot(&residual[*from..*to], &residual[*from..*to]);
+            let all = looks.iter().zip(tried.iter().map(chi2));
+            if let Some((late, _)) = all.min_by(|a, b| a.1.total_cmp(&b.1)) {
+                starts.late[*record][*place] = *late;
+            }
+        }
+    }
+    State::settle(problem, model, &starts, None)
+}
+
+/// Each free step: its record, its place there, and the part of the vectors that it alone shapes, up to the next step.
+fn windows(problem: &Problem) -> Vec<(usize, usize, usize, usize)> {
+    let mut list = Vec::new();
+    for (index, record) in problem.records.iter().enumerate() {
+        for (place, row) in record.free_steps.iter().enumerate() {
+            let segment = record.segments.iter().find(|segment| segment.contains(row));
+            let end = segment.map_or(record.rows(), |segment| segment.end);
+            let next = record
+                .free_steps
+                .get(place + 1)
+                .map_or(end, |next| end.min(next - FREE_APART));
+            let of = |row: usize| problem.offsets[index] + row * CHANNELS;
+            list.push((index, place, of(row - FREE_APART), of(next)));
+        }
+    }
+    list
+}
+
+/// What is said of the records whose instants were estimated.
+pub(crate) fn note(problem: &mut Problem, starts: &Starts) {
+    for (record, late) in problem.records.iter_mut().zip(&starts.late) {
+        let (low, high) = late
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), late| {
+                (low.min(*late), high.max(*late))
+            });
+        if !late.is_empty() {
+            record.repairs.push(format!(
+                "{} load steps are taken to lie inside a switching period, {low:+.2} to {high:+.2} periods from where the table has \
+                 them",
+                late.len()
+            ));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write as _;
+    use std::path::Path;
+
+    use measured::{ColumnMap, Sheet};
+    use plant::Parameters;
+
+    use super::steps;
+    use crate::record::Record;
+
+    #[test]
+    fn steps_close_to_each_other_or_to_an_end_stay_where_the_table_has_them() {
+        let changes = [3, 12, 22, 24, 34, 57];
+        let mut text = "t,d,v_o,i_load\n".to_owned();
+        for n in 0..60 {
+            let current = 5 + changes.iter().filter(|row| **row <= n).count();
+            let _ = writeln!(
+                text,
+                "{:.5},0.5,{:.2},{current}",
+                f64::from(n) * 1e-4,
+                100.0 + 0.1 * f64::from(n % 3)
+            );
+        }
+        let sheet = Sheet::parse(Path::new("run.csv"), text.into(), &Record::file_options()).unwrap();
+        let record = Record::read(&sheet, &ColumnMap::default(), &Parameters::paper_table()).unwrap();
+        assert_eq!(steps(&record), [12, 34]);
+    }
+}

@@ -1,0 +1,272 @@
+//! What unknown columns may be, by names that people give: a proposal for a map, never applied.
+
+use crate::locate::Located;
+use crate::quantity::{Quantity, is_unit, split_unit};
+use crate::sheet::Sheet;
+
+/// Names that are met in files, without case, umlauts and punctuation. One that could be two quantities (`current`, `voltage` beside
+/// another) stands where it is most often right: the user decides.
+const SYNONYMS: [(&str, &[&str]); 9] = [
+    (
+        "t",
+        &[
+            "t",
+            "time",
+            "times",
+            "timestamp",
+            "timestamps",
+            "elapsed",
+            "elapsedtime",
+            "seconds",
+            "secs",
+            "zeit",
+            "zeitstempel",
+        ],
+    ),
+    (
+        "duty",
+        &[
+            "d",
+            "duty",
+            "dutycycle",
+            "dutyratio",
+            "dutycmd",
+            "dcmd",
+            "dreal",
+            "pwm",
+            "pwmduty",
+            "tastgrad",
+            "tastverhaeltnis",
+            "aussteuergrad",
+        ],
+    ),
+    (
+        "v_out",
+        &[
+            "vout",
+            "vo",
+            "uout",
+            "uo",
+            "ua",
+            "uaus",
+            "vaus",
+            "voutput",
+            "outv",
+            "outputvoltage",
+            "voltageout",
+            "voltage",
+            "vload",
+            "loadvoltage",
+            "vc",
+            "ausgangsspannung",
+            "spannung",
+            "lastspannung",
+        ],
+    ),
+    (
+        "i_l",
+        &[
+            "il",
+            "iind",
+            "icoil",
+            "iinductor",
+            "inductorcurrent",
+            "coilcurrent",
+            "ilind",
+            "ispule",
+            "idrossel",
+            "spulenstrom",
+            "drosselstrom",
+        ],
+    ),
+    (
+        "i_out",
+        &[
+            "iout",
+            "io",
+            "ia",
+            "iaus",
+            "ioutput",
+            "outi",
+            "outputcurrent",
+            "currentout",
+            "loadcurrent",
+            "current",
+            "ausgangsstrom",
+            "laststrom",
+            "strom",
+        ],
+    ),
+    (
+        "v_in",
+        &[
+            "vin",
+            "vi",
+            "uin",
+            "ue",
+            "uein",
+            "vein",
+            "vinput",
+            "inputvoltage",
+            "voltagein",
+            "vsupply",
+            "supplyvoltage",
+            "vbus",
+            "vdc",
+            "busvoltage",
+            "eingangsspannung",
+            "zwischenkreisspannung",
+        ],
+    ),
+    (
+        "r_load",
+        &[
+            "rload",
+            "rl",
+            "rlast",
+            "loadresistance",
+            "loadresistor",
+            "lastwiderstand",
+        ],
+    ),
+    ("i_load", &["iload", "iset", "loadset", "setcurrent", "sollstrom"]),
+    ("p_load", &["pload", "plast", "pset", "loadpower", "lastleistung"]),
+];
+
+/// Words that say how something was measured, not what.
+const MANNERS: [&str; 12] = [
+    "meas", "measured", "mess", "ist", "actual", "act", "avg", "mean", "raw", "adc", "sense", "sensor",
+];
+
+impl Sheet {
+    /// Columns that nobody asked for and that are called like a quantity which was not found: its name and the column's.
+    #[must_use]
+    pub fn guesses(&self, located: &Located, wanted: &[Quantity<'_>]) -> Vec<(&'static str, &str)> {
+        let missing = SYNONYMS
+            .iter()
+            .filter(|(name, _)| located.signal(name).is_none() && wanted.iter().any(|quantity| quantity.name == *name));
+        let column = |(name, synonyms): &(&'static str, &[&str])| {
+            let mut unused = located.unused.iter().filter_map(|index| self.columns().get(*index));
+            let found = unused.find(|column| synonyms.contains(&plain(&column.name).as_str()))?;
+            Some((*name, found.name.as_str()))
+        };
+        missing.filter_map(column).collect()
+    }
+}
+
+impl Sheet {
+    /// A column that is called like a quantity.
+    pub(crate) fn resembling(&self, quantity: &str) -> Option<&str> {
+        let (_, synonyms) = SYNONYMS.iter().find(|(name, _)| *name == quantity)?;
+        self.headers().find(|header| synonyms.contains(&plain(header).as_str()))
+    }
+}
+
+/// Guesses as a map: an argument of `--map`, or a line of a map file where a name could not stand there. Nothing without a guess.
+#[must_use]
+pub fn proposal(guesses: &[(&str, &str)]) -> Option<String> {
+    if guesses.is_empty() {
+        return None;
+    }
+    let is_plain = |name: &str| !name.contains([',', '*', '=', '\'']) && name.parse::<f64>().is_err();
+    if guesses.iter().any(|(_, column)| !is_plain(column)) {
+        let entries: Vec<String> = guesses
+            .iter()
+            .map(|(name, column)| format!("{name} = {column:?}"))
+            .collect();
+        return Some(format!(
+            "--columns MAP.toml with the line: columns = {{ {} }}",
+            entries.join(", ")
+        ));
+    }
+    let entries: Vec<String> = guesses
+        .iter()
+        .map(|(name, column)| format!("{name}={column}"))
+        .collect();
+    let list = entries.join(",");
+    let is_word = |c: char| c.is_ascii_alphanumeric() || "_.=,-".contains(c);
+    Some(match list.chars().all(is_word) {
+        true => format!("--map {list}"),
+        false => format!("--map '{list}'"),
+    })
+}
+
+/// A header without unit, case, umlauts, punctuation and manner of measuring.
+fn plain(header: &str) -> String {
+    let (base, _) = split_unit(header);
+    let base = match base.rsplit_once(['_', ' ', '.', '-']) {
+        Some((shorter, unit)) if is_unit(unit) => shorter,
+        _ => base,
+    };
+    let lower = base.to_lowercase();
+    let words = lower.split(|c: char| !c.is_alphanumeric());
+    let words: String = words.filter(|word| !MANNERS.contains(word)).collect();
+    let spelled = |c: char| match c {
+        'ä' => "ae".to_owned(),
+        'ö' => "oe".to_owned(),
+        'ü' => "ue".to_owned(),
+        'ß' => "ss".to_owned(),
+        other => other.to_string(),
+    };
+    words.chars().map(spelled).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::{plain, proposal};
+    use crate::{ColumnMap, Options, Sheet, VOCABULARY};
+
+    fn proposed(header: &str) -> Option<String> {
+        let text = format!("{header}\n{}\n", vec!["1"; header.split(';').count()].join(";"));
+        let sheet = Sheet::parse(Path::new("a.csv"), text.into_bytes(), &Options::default()).unwrap();
+        let located = sheet.locate(&VOCABULARY, &ColumnMap::default()).unwrap();
+        proposal(&sheet.guesses(&located, &VOCABULARY))
+    }
+
+    #[test]
+    fn case_punctuation_units_and_manner_do_not_matter() {
+        for (header, expected) in [
+            ("V-Out", "vout"),
+            ("V.out [mV]", "vout"),
+            ("vout_V", "vout"),
+            ("Vout (meas)", "vout"),
+            ("I_L_avg", "il"),
+            ("Tastverhältnis", "tastverhaeltnis"),
+        ] {
+            assert_eq!(plain(header), expected, "{header}");
+        }
+    }
+
+    #[test]
+    fn a_bench_with_names_of_its_own_gets_a_whole_map() {
+        assert_eq!(
+            proposed("Vout;Iout;IL;Vin;D;time_s").as_deref(),
+            Some("--map v_out=Vout,i_l=IL,i_out=Iout,v_in=Vin")
+        );
+        assert_eq!(
+            proposed("Zeit;Tastgrad;Spannung [mV];Spulenstrom").as_deref(),
+            Some("--map 't=Zeit,duty=Tastgrad,v_out=Spannung [mV],i_l=Spulenstrom'")
+        );
+    }
+
+    #[test]
+    fn names_that_the_command_line_cannot_hold_go_into_a_file() {
+        assert_eq!(
+            proposed("Vout*2;d").as_deref(),
+            None,
+            "a name with a factor in it is not the quantity"
+        );
+        assert_eq!(
+            proposal(&[("v_out", "Vout, V")]).as_deref(),
+            Some("--columns MAP.toml with the line: columns = { v_out = \"Vout, V\" }")
+        );
+    }
+
+    #[test]
+    fn nothing_is_proposed_for_what_is_known_or_strange() {
+        assert_eq!(proposed("t;d;v_o;i_l;lamp;temperature;v_offset;Vout_old"), None);
+        assert_eq!(proposed("v_out;Vout"), None, "v_out is there");
+    }
+}

@@ -10,8 +10,8 @@ use serde::Serialize;
 use verify::measure::Costs;
 
 use super::costs::Measured;
-use super::grouped;
 use crate::Failure;
+use report::grouped;
 
 /// A clock from the command line.
 #[derive(Debug, Clone, Copy, PartialEq)]

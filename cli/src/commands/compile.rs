@@ -14,10 +14,10 @@ use verify::fmu::Archive;
 use super::budget;
 use super::costs::Measured;
 use super::verify::{MISREAD, UNPROVEN, decisions_lines, golden_text};
-use super::{bytes, grouped};
 use crate::arguments::Compile;
 use crate::ownership::{self, Replacing};
 use crate::{Failure, Outcome, output};
+use report::{bytes, grouped};
 
 /// Generates, then writes everything at once.
 pub fn run(options: &Compile) -> Result<Outcome, Failure> {

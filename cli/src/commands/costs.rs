@@ -10,8 +10,8 @@ use verify::measure::{Costs, usual_builds};
 
 use super::budget::{Budget, Clock};
 use super::verify::missing_text;
-use super::{bytes, grouped};
 use crate::{Failure, output};
+use report::{bytes, grouped};
 
 /// Costs of one build.
 #[derive(Serialize)]

@@ -6,9 +6,9 @@ use codegen::manifest;
 use policy::{Activation, Fallback, Interval, Policy};
 use serde::Serialize;
 
-use super::{bytes, grouped};
 use crate::arguments::Inspect;
 use crate::{Failure, Outcome, output};
+use report::{bytes, grouped};
 
 /// Prints the checked policy.
 pub fn run(options: &Inspect) -> Result<Outcome, Failure> {

@@ -53,25 +53,3 @@ fn target(name: &str) -> Result<&'static TargetSpec, Failure> {
             .into()
     })
 }
-
-/// Bytes as people read them.
-fn bytes(count: usize) -> String {
-    if count < 10_000 {
-        format!("{count} B")
-    } else {
-        format!("{:.1} kB", count as f64 / 1000.0)
-    }
-}
-
-/// Digits in groups of three.
-fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let mut text = String::new();
-    for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}

@@ -11,10 +11,10 @@ use verify::drift::Drift;
 use verify::traces::Recorded;
 use verify::{Files, Options, Progress, Report};
 
-use super::grouped;
 use super::progress_line::ProgressLine;
 use crate::arguments::Verify;
 use crate::{Failure, Outcome, output};
+use report::grouped;
 
 mod show;
 

@@ -6,7 +6,7 @@ use ::certify::{Certificate, Coordinate, Domain, Map, Measured, Memory, Share};
 use policy::Policy;
 use report::{Axis, Cell, HeatMap, Page, Ramp, ReportError, Section, Svg, Table, Verdict, quantity};
 
-use crate::commands::grouped;
+use report::grouped;
 
 /// The answer in a few lines.
 pub fn summary(certificate: &Certificate) -> String {

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::{Check, Findings, Setting, Step, page, pictures};
 use crate::Failure;
-use crate::commands::grouped;
+use report::grouped;
 
 /// The page with everything on it.
 pub const PAGE: &str = "report.html";

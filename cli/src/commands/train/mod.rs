@@ -10,9 +10,9 @@ use train::scenario_table as table;
 use train::seeds::best;
 use train::{Contract, Converter, Course, Ended, Outcome as Trained, SeedRun, Settings, train_all};
 
-use super::grouped;
 use crate::arguments::Train;
 use crate::{Failure, Outcome, interruption, output};
+use report::grouped;
 
 mod progress;
 

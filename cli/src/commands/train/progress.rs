@@ -9,9 +9,9 @@ use std::time::{Duration, Instant};
 use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressStyle};
 use train::{Ended, Progress, SeedRun, Settings, Watch};
 
-use super::super::grouped;
 use super::Kept;
 use crate::Failure;
+use report::grouped;
 
 const LOG_EVERY: Duration = Duration::from_secs(5);
 

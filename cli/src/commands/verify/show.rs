@@ -9,7 +9,7 @@ use verify::toolchain::{Install, Missing};
 use verify::{BuildReport, Decisions, Difference, GoldenResult, Outcome, Report};
 
 use crate::Failure;
-use crate::commands::grouped;
+use report::grouped;
 
 pub use interp::golden::MISREAD;
 

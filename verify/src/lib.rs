@@ -14,7 +14,7 @@
 //! | what is expected | [`oracle`] |
 //! | who answers | [`runner`]: [`runner::Runner`] has one implementation per way of running a build |
 //! | a loop closed around a build | [`live`] |
-//! | what differs | [`compare`], [`report`] |
+//! | what differs | [`compare`], [`report`]; in words: [`text`] |
 //! | what a step costs | [`mod@measure`], [`elf`] |
 //! | archives of FMUs | [`fmu`] |
 //! | what the format does to decisions | [`decisions`] |
@@ -36,13 +36,14 @@ pub mod protocol;
 pub mod report;
 pub mod runner;
 mod session;
+pub mod text;
 pub mod toolchain;
 pub mod traces;
 mod zip;
 
 pub use drift::{drift, read_text};
 pub use interp::decisions::{Decisions, decisions};
-pub use interp::golden::golden_result;
+pub use interp::golden::{MISREAD, UNPROVEN, golden_result};
 pub use live::{Live, LiveCommand};
 pub use report::{BuildReport, Difference, GoldenResult, Outcome, Report};
 pub use session::{Files, Options, Progress, VerifyError, run};

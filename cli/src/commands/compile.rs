@@ -8,12 +8,11 @@ use codegen::{Output, manifest};
 use policy::{NumericFormat, Policy};
 use targets::{Fma, TargetSpec};
 use toml_input::Message;
-use verify::Files;
 use verify::fmu::Archive;
+use verify::{Files, MISREAD, UNPROVEN, text};
 
 use super::budget;
 use super::costs::Measured;
-use super::verify::{MISREAD, UNPROVEN, decisions_lines, golden_text};
 use crate::arguments::Compile;
 use crate::ownership::{self, Replacing};
 use crate::{Failure, Outcome, output};
@@ -43,7 +42,7 @@ fn load(options: &Compile) -> Result<Policy, Failure> {
     let policy = super::load_as(&options.policy, options.format)?;
     if let Some(golden) = verify::golden_result(&policy).filter(|golden| !golden.passed()) {
         let message = Message::new("the network does not give the trainer's golden answers; nothing was written");
-        return Err(message.found(golden_text(&golden)).hint(MISREAD).into());
+        return Err(message.found(golden.to_string()).hint(MISREAD).into());
     }
     match verify::decisions(&policy, options.golden_decisions).filter(|decisions| !decisions.kept()) {
         None => Ok(policy),
@@ -54,7 +53,7 @@ fn load(options: &Compile) -> Result<Policy, Failure> {
                 "see what they cost with `policyc certify` and `policyc simulate`; to accept them, --golden-decisions {}",
                 accepted(decisions.share())
             );
-            let found = decisions_lines(&policy, &decisions).join("\n");
+            let found = text::decisions(&policy, &decisions).join("\n");
             Err(Message::new(problem).found(found).hint(hint).into())
         }
     }

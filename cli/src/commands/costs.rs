@@ -9,7 +9,6 @@ use verify::estimate::Estimate;
 use verify::measure::{Costs, usual_builds};
 
 use super::budget::{Budget, Clock};
-use super::verify::missing_text;
 use crate::{Failure, output};
 use report::{bytes, grouped};
 
@@ -60,7 +59,7 @@ impl Measured {
                 notes: usual
                     .missing
                     .iter()
-                    .map(|missing| format!("costs on {} not measured: {}", target.name, missing_text(missing)))
+                    .map(|missing| format!("costs on {} not measured: {missing}", target.name))
                     .collect(),
             },
             Err(error) => Self {

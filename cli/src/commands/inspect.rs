@@ -20,7 +20,7 @@ pub fn run(options: &Inspect) -> Result<Outcome, Failure> {
     }
     if verify::golden_result(&policy).is_some_and(|golden| !golden.passed()) {
         eprintln!("\nDIFFERENT: the network does not give the trainer's golden answers");
-        eprintln!("  = hint: {}", super::verify::MISREAD);
+        eprintln!("  = hint: {}", verify::MISREAD);
         return Ok(Outcome::Different);
     }
     match verify::decisions(&policy, None).is_some_and(|decisions| !decisions.kept()) {
@@ -240,15 +240,14 @@ fn network(out: &mut String, policy: &Policy) -> Result<(), Failure> {
     }
     match verify::golden_result(policy) {
         Some(golden) => {
-            let text = super::verify::golden_text(&golden);
-            writeln!(out, "  {} golden vectors from the trainer: {text}", golden.vectors)?;
+            writeln!(out, "  {} golden vectors from the trainer: {golden}", golden.vectors)?;
             if let Some(decisions) = verify::decisions(policy, None) {
-                for line in super::verify::decisions_lines(policy, &decisions) {
+                for line in verify::text::decisions(policy, &decisions) {
                     writeln!(out, "  {line}")?;
                 }
             }
         }
-        None => writeln!(out, "  {}", super::verify::UNPROVEN)?,
+        None => writeln!(out, "  {}", verify::UNPROVEN)?,
     }
     Ok(())
 }

@@ -9,16 +9,12 @@ use targets::TargetSpec;
 use toml_input::{Fault, Message, messages};
 use verify::drift::Drift;
 use verify::traces::Recorded;
-use verify::{Files, Options, Progress, Report};
+use verify::{Files, Options, Progress, Report, text};
 
 use super::progress_line::ProgressLine;
 use crate::arguments::Verify;
 use crate::{Failure, Outcome, output};
 use report::grouped;
-
-mod show;
-
-pub use show::{MISREAD, UNPROVEN, decisions_lines, golden_text, missing_text};
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -83,7 +79,7 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
     )?;
     progress.clear();
     if !report.compared() {
-        return Err(show::nothing_compared(&report).into());
+        return Err(text::nothing_compared(&report).into());
     }
     let drift = on_disk.map(|folder| folder.drift);
     let equal = report.passed() && drift.as_ref().is_none_or(Drift::is_empty);
@@ -91,7 +87,7 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
         let report = Some(report);
         output::say(&serde_json::to_string_pretty(&Answer { equal, drift, report })?)?;
     } else {
-        output::say(show::report(&policy, &report, drift.as_ref())?.trim_end())?;
+        output::say(text::report(&policy, &report, drift.as_ref())?.trim_end())?;
     }
     Ok(if equal { Outcome::Done } else { Outcome::Different })
 }
@@ -103,7 +99,7 @@ fn files_alone(options: &Verify, policy: &str, drift: Drift) -> Result<Outcome, 
         let (drift, report) = (Some(drift), None);
         output::say(&serde_json::to_string_pretty(&Answer { equal, drift, report })?)?;
     } else {
-        output::say(show::files_alone(policy, &drift)?.trim_end())?;
+        output::say(text::files_alone(policy, &drift)?.trim_end())?;
     }
     Ok(if equal { Outcome::Done } else { Outcome::Different })
 }

@@ -24,3 +24,17 @@ pub use generate::{generate, sources};
 pub use lower::lower;
 pub use output::{Language, Output};
 pub use program::Program;
+
+use targets::TargetSpec;
+use toml_input::{Message, messages};
+
+/// The deployment target of that name.
+///
+/// # Errors
+/// If there is none: the names that there are, and the core of a part whose name it is.
+pub fn target(name: &str) -> Result<&'static TargetSpec, Message> {
+    targets::find(name).ok_or_else(|| {
+        let core = targets::of_part(name).map(|core| format!("its core is that of `{core}`"));
+        messages::unknown("target", name, &targets::names()).maybe_hint(core)
+    })
+}

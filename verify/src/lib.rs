@@ -18,7 +18,7 @@
 //! | what a step costs | [`mod@measure`], [`elf`] |
 //! | archives of FMUs | [`fmu`] |
 //! | what the format does to decisions | [`decisions`] |
-//! | checked-in files against the policy | [`drift()`] |
+//! | checked-in files against the policy | [`drift()`], [`folder`] |
 
 pub mod compare;
 pub mod drift;
@@ -26,6 +26,7 @@ pub mod drivers;
 pub mod elf;
 pub mod estimate;
 pub mod fmu;
+pub mod folder;
 mod golden;
 pub mod kit;
 pub mod lane;
@@ -42,6 +43,7 @@ pub mod traces;
 mod zip;
 
 pub use drift::{drift, read_text};
+pub use folder::Folder;
 pub use interp::decisions::{Decisions, decisions};
 pub use interp::golden::{MISREAD, UNPROVEN, golden_result};
 pub use live::{Live, LiveCommand};

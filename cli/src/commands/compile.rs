@@ -20,7 +20,7 @@ use report::{bytes, grouped};
 
 /// Generates, then writes everything at once.
 pub fn run(options: &Compile) -> Result<Outcome, Failure> {
-    let target = super::target(&options.target)?;
+    let target = codegen::target(&options.target)?;
     let policy = load(options)?;
     let outputs = with_cores(&options.emit);
     let expected = verify::kit::expected(&policy, target, &outputs, options.kit_steps)?;

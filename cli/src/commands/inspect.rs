@@ -89,7 +89,7 @@ fn view(policy: &Policy) -> Result<View<'_>, Failure> {
         golden_vectors: policy.golden.as_ref().map_or(0, |golden| golden.count),
         decisions: verify::decisions(policy, None),
         digests: &policy.digests,
-        sizes: manifest::sizes(policy, super::target("host")?),
+        sizes: manifest::sizes(policy, ::targets::host()),
         notes: &policy.notes,
     })
 }
@@ -108,7 +108,7 @@ fn hull(bounds: &[Interval]) -> Interval {
 fn text(policy: &Policy) -> Result<String, Failure> {
     let mut out = String::new();
     let period = policy.sample_period;
-    let sizes = manifest::sizes(policy, super::target("host")?);
+    let sizes = manifest::sizes(policy, ::targets::host());
     writeln!(
         out,
         "{}   one step every {} us ({:.6} kHz), {}",

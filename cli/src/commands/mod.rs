@@ -17,9 +17,7 @@ pub mod verify;
 
 use std::path::{Path, PathBuf};
 
-use ::targets::TargetSpec;
 use policy::{NumericFormat, Policy};
-use toml_input::messages;
 
 use crate::Failure;
 
@@ -42,14 +40,5 @@ fn load_as(path: &Path, format: Option<NumericFormat>) -> Result<Policy, Failure
     Ok(match format {
         Some(format) => policy.with_format(format),
         None => policy,
-    })
-}
-
-fn target(name: &str) -> Result<&'static TargetSpec, Failure> {
-    ::targets::find(name).ok_or_else(|| {
-        let core = ::targets::of_part(name).map(|core| format!("its core is that of `{core}`"));
-        messages::unknown("target", name, &::targets::names())
-            .maybe_hint(core)
-            .into()
     })
 }

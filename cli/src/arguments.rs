@@ -7,8 +7,8 @@ use codegen::Output;
 use measured::ColumnMap;
 use policy::NumericFormat;
 use toml_input::Faults;
+use verify::budget::Clock;
 
-use crate::commands::budget::Clock;
 use crate::one_of::OneOf;
 use crate::ownership::Replacing;
 

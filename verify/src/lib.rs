@@ -15,12 +15,15 @@
 //! | who answers | [`runner`]: [`runner::Runner`] has one implementation per way of running a build |
 //! | a loop closed around a build | [`live`] |
 //! | what differs | [`compare`], [`report`]; in words: [`text`] |
-//! | what a step costs | [`mod@measure`], [`elf`] |
+//! | what a step costs | [`mod@measure`], [`elf`]; of all builds: [`costs`]; whether it fits into its period: [`budget`], [`advice`] |
 //! | archives of FMUs | [`fmu`] |
 //! | what the format does to decisions | [`decisions`] |
 //! | checked-in files against the policy | [`drift()`], [`folder`] |
 
+pub mod advice;
+pub mod budget;
 pub mod compare;
+pub mod costs;
 pub mod drift;
 pub mod drivers;
 pub mod elf;

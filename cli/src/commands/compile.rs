@@ -8,11 +8,10 @@ use codegen::{Output, manifest};
 use policy::{NumericFormat, Policy};
 use targets::{Fma, TargetSpec};
 use toml_input::Message;
+use verify::costs::StepCosts;
 use verify::fmu::Archive;
-use verify::{Files, MISREAD, UNPROVEN, text};
+use verify::{Files, MISREAD, UNPROVEN, advice, text};
 
-use super::budget;
-use super::costs::Measured;
 use crate::arguments::Compile;
 use crate::ownership::{self, Replacing};
 use crate::{Failure, Outcome, output};
@@ -25,14 +24,16 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
     let outputs = with_cores(&options.emit);
     let expected = verify::kit::expected(&policy, target, &outputs, options.kit_steps)?;
     let mut files = codegen::generate(&policy, target, &outputs, expected.as_ref())?.files;
-    let measured = measure(options, &policy, target, &outputs, &mut files)?;
+    let costs = measure(options, &policy, target, &outputs, &mut files)?;
     let archives = verify::fmu::archives(&policy, target, &outputs, &files)?;
     ownership::check_policy(&options.out, &policy.name, options.replacing)?;
     let written = write(&options.out, &files, &archives, options.replacing)?;
     say(&policy, target, &written, &archives)?;
-    measured.say(&policy, target, options.clock)?;
+    for text in costs.texts(&policy, target, options.clock) {
+        output::say(&text)?;
+    }
     if let Some(clock) = options.clock {
-        output::say(&budget::lines(&policy, target, &outputs, &measured, clock)?.join("\n"))?;
+        output::say(&advice::lines(&policy, target, &outputs, &costs, clock)?.join("\n"))?;
     }
     Ok(Outcome::Done)
 }
@@ -71,15 +72,15 @@ fn measure(
     target: &TargetSpec,
     outputs: &[Output],
     files: &mut Files,
-) -> Result<Measured, Failure> {
+) -> Result<StepCosts, Failure> {
     if options.no_costs {
-        return Ok(Measured::default());
+        return Ok(StepCosts::default());
     }
-    let measured = Measured::of(policy, target, &languages(outputs), files);
-    if let (false, Some(manifest)) = (measured.costs.is_empty(), files.get_mut(manifest::FILE)) {
-        *manifest = manifest::with_costs(manifest, &measured.entries(policy, options.clock))?;
+    let costs = StepCosts::of(policy, target, &languages(outputs), files);
+    if let (false, Some(manifest)) = (costs.builds.is_empty(), files.get_mut(manifest::FILE)) {
+        *manifest = manifest::with_costs(manifest, &costs.entries(policy, options.clock))?;
     }
-    Ok(measured)
+    Ok(costs)
 }
 
 /// Writes files and archives, all or none; each with its length.

@@ -1,9 +1,7 @@
 //! One file per command.
 
-pub mod budget;
 pub mod certify;
 pub mod compile;
-mod costs;
 pub mod demo;
 pub mod diagnose;
 pub mod drm;

@@ -18,6 +18,8 @@ mod form;
 mod measured;
 mod network;
 mod neurons;
+#[cfg(feature = "page")]
+pub mod page;
 mod propagate;
 
 use policy::{Interval, Policy};

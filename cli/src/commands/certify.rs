@@ -1,10 +1,8 @@
 //! `policyc certify`
 
-mod page;
-
 use std::collections::BTreeMap;
 
-use ::certify::{Certificate, Certifier, Domain, Effort, Memory, Slice};
+use ::certify::{Certificate, Certifier, Domain, Effort, Memory, Slice, page};
 use interp::Controller;
 use ndarray::aview1;
 use policy::{Interval, NumericFormat, Policy};

@@ -15,7 +15,7 @@ use super::{Course, Findings, Real, Run, Setting, Transfer};
 use crate::Failure;
 use crate::commands::drm::bench::Simulator;
 use crate::commands::progress_line::ProgressLine;
-use crate::commands::simulate::{self, controllers, go_on};
+use crate::commands::simulate::{self, controllers};
 
 /// Names of the runs.
 const SIMULATION: &str = "simulation";
@@ -32,7 +32,7 @@ struct Progress<'a> {
 
 impl Progress<'_> {
     fn next(&mut self, what: impl std::fmt::Display) -> Result<(), Failure> {
-        go_on(self.stop)?;
+        crate::interruption::go_on()?;
         let at = &self.at;
         self.line.show(|| format!("{at}: {what}"));
         Ok(())

@@ -2,16 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use closed_loop::limit::Bound;
-use closed_loop::scenario::{Metrics, SETTLED};
-use closed_loop::{LoadStep, MetricsCsv, comparison, trajectory_csv};
+use report::grouped;
 use serde::Serialize;
 
 use super::{Check, Findings, Setting, Step, page, pictures};
-use crate::Failure;
-use report::grouped;
+use crate::faults::{Error, told};
+use crate::limit::Bound;
+use crate::scenario::{Metrics, SETTLED};
+use crate::tables::{MetricsCsv, comparison, trajectory_csv};
 
-/// The page with everything on it.
+/// Name of the page with everything on it, among the files.
 pub const PAGE: &str = "report.html";
 
 /// `metrics.json`. Figures that are not finite are null.
@@ -50,39 +50,65 @@ struct JsonCheck<'a> {
     differences: &'a [String],
 }
 
-/// Name and text of every file.
-pub fn all(found: &Findings) -> Result<BTreeMap<String, String>, Failure> {
-    let mut files = BTreeMap::new();
-    let mut metrics = MetricsCsv::default();
-    let mut drawn = Vec::new();
-    for step in &found.steps {
-        let stem = stem(step.step);
-        for course in &step.courses {
-            metrics.controller(&course.name, &course.finding);
-            let name = format!("{stem}-{}.csv", course.name);
-            files.insert(name, trajectory_csv(&course.shown, step.step.kind));
+impl Findings {
+    /// Name and text of every file: metrics, trajectories, a picture for each load step, the summary, and the [`PAGE`].
+    ///
+    /// # Errors
+    /// If a picture cannot be drawn.
+    pub fn files(&self) -> Result<BTreeMap<String, String>, Error> {
+        let mut files = BTreeMap::new();
+        let mut metrics = MetricsCsv::default();
+        let mut drawn = Vec::new();
+        for step in &self.steps {
+            let stem = step.step.stem();
+            for (name, course) in &step.courses {
+                metrics.controller(name, &course.finding);
+                let file = format!("{stem}-{name}.csv");
+                files.insert(file, trajectory_csv(&course.shown, step.step.kind));
+            }
+            for (name, limit) in &step.limits {
+                metrics.limit(name, step.step, limit);
+            }
+            let picture = pictures::picture(&self.setting, step)?;
+            files.insert(format!("{stem}.svg"), picture.as_str().to_owned());
+            drawn.push(picture);
         }
-        for (name, limit) in &step.limits {
-            metrics.limit(name, step.step, limit);
-        }
-        let picture = pictures::picture(&found.setting, step)?;
-        files.insert(format!("{stem}.svg"), picture.as_str().to_owned());
-        drawn.push(picture);
+        files.insert("metrics.csv".to_owned(), metrics.finish());
+        files.insert("metrics.json".to_owned(), json(self)?);
+        files.insert("summary.txt".to_owned(), self.summary());
+        files.insert(PAGE.to_owned(), page::page(self, drawn)?);
+        Ok(files)
     }
-    files.insert("metrics.csv".to_owned(), metrics.finish());
-    files.insert("metrics.json".to_owned(), json(found)?);
-    files.insert("summary.txt".to_owned(), summary(found));
-    files.insert(PAGE.to_owned(), page::page(found, drawn)?);
-    Ok(files)
+
+    /// What was simulated and a table of each load step, for people: voltages in V, times in ms.
+    #[must_use]
+    pub fn summary(&self) -> String {
+        let setting = &self.setting;
+        let mut out = format!(
+            "policy  {} ({})\nplant   {}\n\n{}\n",
+            setting.policy.name,
+            self.controller,
+            plant_text(setting),
+            explanation(setting).replace(". ", ".\n")
+        );
+        for step in &self.steps {
+            let courses = step.courses.iter();
+            let controllers = courses.map(|(name, course)| (name.as_str(), &course.finding));
+            let limits = step.limits.iter().map(|(name, limit)| (name.as_str(), limit));
+            out.push('\n');
+            out.push_str(&comparison(step.step, controllers, limits));
+        }
+        if let Some(check) = &self.check {
+            out.push_str(&format!("\n{}\n", check_text(check)));
+        }
+        for note in unsettled(self).iter().chain(&setting.notes) {
+            out.push_str(&format!("\nnote: {note}\n"));
+        }
+        out
+    }
 }
 
-/// Start of the names of a load step's files: `200-500W`.
-fn stem(step: LoadStep) -> String {
-    let [from, to] = step.values;
-    format!("{from}-{to}{}", step.kind.unit())
-}
-
-fn json(found: &Findings) -> Result<String, Failure> {
+fn json(found: &Findings) -> Result<String, Error> {
     let Findings {
         setting,
         controller,
@@ -103,15 +129,15 @@ fn json(found: &Findings) -> Result<String, Failure> {
         }),
         notes: &setting.notes,
     };
-    let text = serde_json::to_string_pretty(&json)?;
+    let text = serde_json::to_string_pretty(&json).map_err(told)?;
     Ok(format!("{text}\n"))
 }
 
 fn json_step(step: &Step) -> JsonStep<'_> {
     let [from, to] = step.step.values;
-    let controllers = step.courses.iter().map(|course| {
+    let controllers = step.courses.iter().map(|(name, course)| {
         let (sample, worst) = (&course.finding.at_sample, &course.finding.worst);
-        (course.name.as_str(), JsonPair { sample, worst })
+        (name.as_str(), JsonPair { sample, worst })
     });
     let limits = step.limits.iter().map(|(name, limit)| {
         let (sample, worst) = (&limit.at_sample, &limit.worst);
@@ -127,7 +153,7 @@ fn json_step(step: &Step) -> JsonStep<'_> {
 }
 
 /// The plant's file and the numbers that were replaced.
-pub fn plant_text(setting: &Setting) -> String {
+pub(super) fn plant_text(setting: &Setting) -> String {
     let set = setting.scenario.set.iter();
     set.fold(setting.plant.display().to_string(), |text, (key, value)| {
         format!("{text}, {key} = {value}")
@@ -135,7 +161,7 @@ pub fn plant_text(setting: &Setting) -> String {
 }
 
 /// What the figures are of.
-pub fn explanation(setting: &Setting) -> String {
+pub(super) fn explanation(setting: &Setting) -> String {
     let task = &setting.scenario.task;
     format!(
         "True voltages at the sampling instants, errors from {} V, settled within {SETTLED} V. Each pair: worst of {} \
@@ -147,10 +173,10 @@ pub fn explanation(setting: &Setting) -> String {
 }
 
 /// The load steps before or after which the policy does not stay within the settling band, in words.
-pub fn unsettled(found: &Findings) -> Option<String> {
+pub(super) fn unsettled(found: &Findings) -> Option<String> {
     let lost = |step: &&Step| {
         let policy = step.courses.first();
-        policy.is_some_and(|policy| policy.finding.worst.tail_max.max(policy.finding.worst.pre_error) > SETTLED)
+        policy.is_some_and(|(_, policy)| policy.finding.worst.tail_max.max(policy.finding.worst.pre_error) > SETTLED)
     };
     let steps: Vec<String> = found
         .steps
@@ -167,36 +193,8 @@ pub fn unsettled(found: &Findings) -> Option<String> {
     })
 }
 
-/// The summary, also printed.
-pub fn summary(found: &Findings) -> String {
-    let setting = &found.setting;
-    let mut out = format!(
-        "policy  {} ({})\nplant   {}\n\n{}\n",
-        setting.policy.name,
-        found.controller,
-        plant_text(setting),
-        explanation(setting).replace(". ", ".\n")
-    );
-    for step in &found.steps {
-        let controllers = step
-            .courses
-            .iter()
-            .map(|course| (course.name.as_str(), &course.finding));
-        let limits = step.limits.iter().map(|(name, limit)| (name.as_str(), limit));
-        out.push('\n');
-        out.push_str(&comparison(step.step, controllers, limits));
-    }
-    if let Some(check) = &found.check {
-        out.push_str(&format!("\n{}\n", check_text(check)));
-    }
-    for note in unsettled(found).iter().chain(&setting.notes) {
-        out.push_str(&format!("\nnote: {note}\n"));
-    }
-    out
-}
-
 /// How the comparison of the controllers came out.
-pub fn check_text(check: &Check) -> String {
+pub(super) fn check_text(check: &Check) -> String {
     let names = check.names.join(", ");
     let periods = grouped(check.periods as u64);
     if check.differences.is_empty() {

@@ -1,13 +1,14 @@
 //! The page with all tables and pictures.
 
-use closed_loop::scenario::Metrics;
 use report::{Cell, Page, Section, Svg, Table, Verdict};
 
 use super::{Findings, Step, files};
-use crate::Failure;
+use crate::faults::{Error, told};
+use crate::scenario::Metrics;
+use crate::tables::{COLUMNS, cells, limit_cells};
 
 /// One HTML file; `drawn` are the pictures of the load steps in their order.
-pub fn page(found: &Findings, drawn: Vec<Svg>) -> Result<String, Failure> {
+pub(super) fn page(found: &Findings, drawn: Vec<Svg>) -> Result<String, Error> {
     let setting = &found.setting;
     let (verdict, sentence) = verdict(found);
     let setup = [
@@ -26,7 +27,7 @@ pub fn page(found: &Findings, drawn: Vec<Svg>) -> Result<String, Failure> {
         let section = Section::new(step.step.to_string()).chart(picture, CAPTION);
         page = page.section(section.table(table(step)));
     }
-    Ok(page.html()?)
+    page.html().map_err(told)
 }
 
 const CAPTION: &str = "The first sampling instant. Voltages and currents are samples, one per control period. The dashed lines \
@@ -57,7 +58,7 @@ fn worst(found: &Findings) -> String {
     let of_policy = found
         .steps
         .iter()
-        .filter_map(|step| Some((step, step.courses.first()?)));
+        .filter_map(|step| Some((step, &step.courses.first()?.1)));
     let largest = of_policy.max_by(|(_, a), (_, b)| {
         let [a, b] = [a, b].map(|course| course.finding.worst.deviation);
         a.total_cmp(&b)
@@ -76,16 +77,16 @@ fn worst(found: &Findings) -> String {
 
 fn table(step: &Step) -> Table {
     let mut table = Table::new("").text("");
-    for heading in closed_loop::COLUMNS {
+    for heading in COLUMNS {
         table = table.text(heading);
     }
-    for course in &step.courses {
-        let cells = closed_loop::cells(&course.finding).into_iter().map(Cell::from);
-        table = table.row([Cell::from(course.name.as_str())].into_iter().chain(cells));
+    for (name, course) in &step.courses {
+        let cells = cells(&course.finding).into_iter().map(Cell::from);
+        table = table.row([Cell::from(name.as_str())].into_iter().chain(cells));
     }
     for (name, limit) in &step.limits {
-        let [deviation, settling] = closed_loop::limit_cells(limit).map(Cell::from);
-        let blank = std::iter::repeat_n(Cell::from("-"), closed_loop::COLUMNS.len() - 2);
+        let [deviation, settling] = limit_cells(limit).map(Cell::from);
+        let blank = std::iter::repeat_n(Cell::from("-"), COLUMNS.len() - 2);
         let cells = [Cell::from(name.as_str()), deviation, settling];
         table = table.row(cells.into_iter().chain(blank));
     }

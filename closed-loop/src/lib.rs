@@ -23,6 +23,7 @@ pub mod simulation;
 mod suits;
 mod tables;
 pub mod time_optimal;
+pub mod transfer;
 mod unusable;
 
 pub use agent::Agent;

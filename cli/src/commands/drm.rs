@@ -13,8 +13,8 @@ use drm::acquire::LoadSetting;
 use drm::formula::Losses;
 use drm::{Table, TableOptions};
 use plant::Parameters;
-use policy::{Interval, Policy};
-use toml_input::{Message, messages};
+use policy::Interval;
+use toml_input::messages;
 
 use crate::arguments::Columns;
 use crate::{Failure, Outcome};
@@ -115,16 +115,8 @@ fn plant_parameters(path: &Path) -> Result<Parameters, Failure> {
     Ok(Parameters::from_file(path)?)
 }
 
-/// Refuses a policy whose duties no mapping can follow.
-pub fn needs_mapping(policy: &Policy) -> Result<(), Failure> {
-    if policy.mapping.is_none() {
-        let hint = "add [mapping] with file = \"drm.toml\" and load_current, and an identity a = 1, b = 0, c = 0";
-        return Err(Message::new("the policy has no mapping to transfer with")
-            .hint(hint)
-            .into());
-    }
-    Ok(())
-}
+// `diagnose` asks the same of a policy
+pub use closed_loop::refit::needs_mapping;
 
 /// `low,high` of duty ratios.
 fn duty_limits(text: &str) -> Result<Interval, String> {

@@ -2,6 +2,7 @@
 
 pub mod certify;
 pub mod compile;
+mod controllers;
 pub mod demo;
 pub mod diagnose;
 pub mod drm;

@@ -1,43 +1,16 @@
 //! `policyc drm transfer`: the paper's procedure, from the simulation to converters that are not the simulated one
 
-use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
-use clap::Args;
 use closed_loop::transfer::{Findings, Means, PAGE, Setting, transfer};
 use closed_loop::{Converter, Environment, Error, Scenario};
 use plant::Parameters;
 use spice::SpiceConverter;
 
-use super::bench::Simulator;
-use crate::arguments::ControllerKind;
+use crate::arguments::drm::{Simulator, Transfer};
+use crate::commands::controllers;
 use crate::commands::progress_line::ProgressLine;
-use crate::commands::simulate::controllers;
 use crate::{Failure, Outcome, interruption, output};
-
-#[derive(Debug, Args)]
-pub struct Transfer {
-    /// Scenario file, as for `simulate`: load steps, instants; its plant is the converter that the policy was trained on
-    pub scenario: PathBuf,
-    /// policy.toml with a mapping, or the folder that holds it
-    #[arg(long, value_name = "POLICY")]
-    pub policy: PathBuf,
-    /// "Real" converters; several separated by commas
-    #[arg(long, value_name = "FILE", required = true, value_delimiter = ',')]
-    pub real: Vec<PathBuf>,
-    /// What simulates the real converters
-    #[arg(long, value_enum, default_value_t = Simulator::Plant)]
-    pub simulator: Simulator,
-    /// What controls them
-    #[arg(long, value_enum, default_value_t = ControllerKind::C)]
-    pub controller: ControllerKind,
-    /// Beside the fitted mapping, run the exact one: the formula of the real converter's losses
-    #[arg(long)]
-    pub ideal: bool,
-    /// Folder to write; must be empty or not exist yet
-    #[arg(long, value_name = "DIR")]
-    pub out: PathBuf,
-}
 
 /// Transfers, writes, reports.
 pub fn run(options: &Transfer) -> Result<Outcome, Failure> {

@@ -1,8 +1,7 @@
 //! `policyc train`
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::collections::BTreeSet;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use toml_input::{FileName, Message};
@@ -14,14 +13,15 @@ use crate::arguments::Train;
 use crate::{Failure, Outcome, interruption, output};
 use report::grouped;
 
+mod kept;
 mod progress;
 
+use kept::Kept;
 use progress::Watcher;
 
 /// Time between two checkpoints on the way. A kill or a power cut may cost five seconds of work; the rest is for a look at
 /// the selection scenarios and for writing.
 const CHECKPOINT_EVERY: Duration = Duration::from_secs(3);
-const CHECKPOINTS: &str = "checkpoints";
 const SEEDS: &str = "seeds";
 
 /// Trains all seeds and writes the folders.
@@ -152,70 +152,5 @@ fn distinct(seeds: &[u64]) -> Result<Vec<u64>, Failure> {
             let message = Message::new("--seeds names a seed twice").found(seed.to_string());
             Err(message.expected("different numbers").into())
         }
-    }
-}
-
-/// Checkpoints of a training, one file per seed.
-pub struct Kept {
-    out: PathBuf,
-    folder: PathBuf,
-    failure: Mutex<Option<Failure>>,
-}
-
-impl Kept {
-    fn new(out: &Path) -> Self {
-        Self {
-            out: out.to_owned(),
-            folder: out.join(CHECKPOINTS),
-            failure: Mutex::new(None),
-        }
-    }
-
-    fn path(&self, seed: u64) -> PathBuf {
-        self.folder.join(format!("seed-{seed}.bin"))
-    }
-
-    /// The checkpoints to go on from. Hours of work are not overwritten by a command that was typed once too often.
-    fn prepare(&self, seeds: &[u64], resume: bool) -> Result<BTreeMap<u64, Vec<u8>>, Failure> {
-        let (out, kept) = (self.out.display(), self.folder.display());
-        if self.out.join("policy.toml").exists() {
-            let message = Message::new(format!("{out} holds a policy already; nothing written"));
-            return Err(message.hint("choose another --out, or move it away").into());
-        }
-        let found: Vec<u64> = seeds.iter().copied().filter(|seed| self.path(*seed).exists()).collect();
-        match (resume, found.is_empty()) {
-            (false, true) => Ok(BTreeMap::new()),
-            (false, false) => {
-                let message = Message::new(format!("{out} holds an interrupted training; nothing written"));
-                let hint = format!("--resume goes on with it; to begin anew, remove {kept} or choose another --out");
-                Err(message.hint(hint).into())
-            }
-            (true, true) => {
-                let message = Message::new("nothing to resume");
-                let message = message.found(format!("no checkpoint of these seeds in {kept}"));
-                Err(message.hint("without --resume the training begins").into())
-            }
-            (true, false) => found.into_iter().map(|seed| Ok((seed, self.read(seed)?))).collect(),
-        }
-    }
-
-    fn read(&self, seed: u64) -> Result<Vec<u8>, Failure> {
-        let path = self.path(seed);
-        std::fs::read(&path).map_err(|error| Message::new(format!("cannot read {}: {error}", path.display())).into())
-    }
-
-    fn write(&self, seed: u64, bytes: &[u8]) -> Result<(), Failure> {
-        let name = self
-            .path(seed)
-            .file_name()
-            .map(|name| name.to_string_lossy().into_owned());
-        let files = BTreeMap::from([(name.unwrap_or_default(), bytes.to_vec())]);
-        output::write_all(&self.folder, &files)
-    }
-
-    /// They belong to a training that is whole now.
-    fn remove(&self) {
-        // what cannot be removed only takes room
-        let _ = std::fs::remove_dir_all(&self.folder);
     }
 }

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressStyle};
 use train::{Ended, Progress, SeedRun, Settings, Watch};
 
-use super::Kept;
+use super::kept::Kept;
 use crate::Failure;
 use report::grouped;
 
@@ -54,8 +54,7 @@ impl<'a> Watcher<'a> {
             // progress that cannot be shown is no reason to stop
             let _ = all.clear();
         }
-        let failure = self.kept.failure.lock().ok().and_then(|mut failure| failure.take());
-        failure.map_or(Ok(()), Err)
+        self.kept.failure()
     }
 }
 
@@ -97,12 +96,9 @@ impl Watch for Watcher<'_> {
     }
 
     fn checkpoint(&self, seed: u64, bytes: &[u8]) {
-        if let Err(failure) = self.kept.write(seed, bytes) {
+        if !self.kept.try_write(seed, bytes) {
             // a training that cannot be kept is stopped while it can be told
             self.stop.store(true, Ordering::Relaxed);
-            if let Ok(mut first) = self.kept.failure.lock() {
-                first.get_or_insert(failure);
-            }
         }
     }
 

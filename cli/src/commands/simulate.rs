@@ -1,12 +1,11 @@
 //! `policyc simulate`
 
-pub mod controllers;
-
 use std::sync::atomic::Ordering;
 
 use closed_loop::Scenario;
 use closed_loop::simulation::{Findings, PAGE, Setting, simulate};
 
+use super::controllers;
 use super::progress_line::ProgressLine;
 use crate::arguments::Simulate;
 use crate::{Failure, Outcome, interruption, output};

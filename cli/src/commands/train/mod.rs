@@ -5,9 +5,9 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use toml_input::{FileName, Message};
-use train::scenario_table as table;
-use train::seeds::best;
-use train::{Contract, Converter, Course, Ended, Outcome as Trained, SeedRun, Settings, train_all};
+use train::{
+    Contract, Converter, Course, Ended, Outcome as Trained, SeedRun, Settings, scenario_table, seeds, train_all,
+};
 
 use crate::arguments::Train;
 use crate::{Failure, Outcome, interruption, output};
@@ -47,7 +47,7 @@ pub fn run(options: &Train) -> Result<Outcome, Failure> {
     if runs.iter().any(|run| run.ended == Ended::Interrupted) {
         return interrupted(options, &settings, &kept, &runs);
     }
-    let Some(best) = best(&runs) else {
+    let Some(best) = seeds::best(&runs) else {
         return Err(Message::new("no seed was trained").into());
     };
     write(&options.out, &settings, &runs, best)?;
@@ -61,7 +61,7 @@ fn write(out: &Path, settings: &Settings, runs: &[SeedRun], best: &Trained) -> R
         output::write_all(&out.join(SEEDS).join(outcome.seed.to_string()), &outcome.files)?;
     }
     let mut files = best.files.clone();
-    files.insert("seeds.txt".to_owned(), seeds_table(settings, runs).into_bytes());
+    files.insert("seeds.txt".to_owned(), seeds::table(settings, runs).into_bytes());
     output::write_all(out, &files)
 }
 
@@ -75,11 +75,11 @@ fn report(
     let steps: u64 = runs.iter().map(|run| run.steps).sum();
     let seconds = start.elapsed().as_secs_f64();
     let out = options.out.display();
-    let mut text = seeds_table(settings, runs);
+    let mut text = seeds::table(settings, runs);
     text.push_str(&format!(
         "\nSeed {}, best on the selection scenarios, in its evaluation (at sampling instants / worst of all instants):\n\n{}",
         best.seed,
-        table(&best.findings)
+        scenario_table(&best.findings)
     ));
     text.push_str(&format!(
         "\n{} control periods in {seconds:.1} s; policy in {out}, all seeds in {out}/{SEEDS}\n\
@@ -89,38 +89,6 @@ fn report(
     output::say(&text)?;
     let missed = !settings.specification.is_empty() && !best.evaluated.met;
     Ok(if missed { Outcome::Different } else { Outcome::Done })
-}
-
-/// One line per seed.
-fn seeds_table(settings: &Settings, runs: &[SeedRun]) -> String {
-    let verdict = |met: bool| match (settings.specification.is_empty(), met) {
-        (true, _) => "-",
-        (false, true) => "met",
-        (false, false) => "missed",
-    };
-    let mut text =
-        "seed  control periods  kept after  selection  evaluation  deviation V  settling ms  tail V   cost\n"
-            .to_owned();
-    for run in runs {
-        let Some(outcome) = &run.outcome else { continue };
-        let largest = |figure: fn(&train::Metrics) -> f64| {
-            let figures = outcome.findings.iter().map(|finding| figure(&finding.worst));
-            figures.fold(0.0, f64::max)
-        };
-        text.push_str(&format!(
-            "{:4}  {:>15}  {:>10}  {:<9}  {:<10}  {:>11.2}  {:>11.2}  {:>6.3}  {:>6.3}\n",
-            outcome.seed,
-            grouped(run.steps),
-            grouped(outcome.best_step),
-            verdict(outcome.selected.met),
-            verdict(outcome.evaluated.met),
-            largest(|metrics| metrics.deviation),
-            1e3 * largest(|metrics| metrics.settling),
-            largest(|metrics| metrics.tail_max),
-            outcome.selected.cost,
-        ));
-    }
-    text
 }
 
 fn interrupted(options: &Train, settings: &Settings, kept: &Kept, runs: &[SeedRun]) -> Result<Outcome, Failure> {
@@ -138,7 +106,7 @@ fn interrupted(options: &Train, settings: &Settings, kept: &Kept, runs: &[SeedRu
     }
     output::say(&format!(
         "{}\nInterrupted; checkpoints in {}. To go on: {resume} --resume",
-        seeds_table(settings, runs),
+        seeds::table(settings, runs),
         kept.folder.display()
     ))?;
     Ok(Outcome::Interrupted)

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressStyle};
-use train::{Ended, Progress, SeedRun, Settings, Watch};
+use train::{Progress, SeedRun, Settings, Watch};
 
 use super::kept::Kept;
 use crate::Failure;
@@ -58,17 +58,6 @@ impl<'a> Watcher<'a> {
     }
 }
 
-/// Reward, error and how far the best policy is from the specification.
-fn text(progress: &Progress) -> String {
-    let look = &progress.look;
-    let best = if progress.best.is_finite() {
-        format!("{:.3}", progress.best)
-    } else {
-        "-".to_owned()
-    };
-    format!("reward {:7.2}  |e| {:6.3} V  best cost {best}", look.reward, look.error)
-}
-
 impl Watch for Watcher<'_> {
     fn look(&self, progress: &Progress) {
         let Ok(mut view) = self.view.lock() else { return };
@@ -77,7 +66,7 @@ impl Watch for Watcher<'_> {
             View::Bars(all, bars) => {
                 let bar = bars.entry(seed).or_insert_with(|| all.add(new_bar(seed, self.steps)));
                 bar.set_position(look.step);
-                bar.set_message(text(progress));
+                bar.set_message(progress.to_string());
             }
             View::Log(shown) => {
                 let last = shown.entry(seed).or_insert_with(Instant::now);
@@ -87,7 +76,7 @@ impl Watch for Watcher<'_> {
                         "seed {seed}: {} of {}, {}, {} left at most",
                         grouped(look.step),
                         grouped(self.steps),
-                        text(progress),
+                        progress,
                         HumanDuration(Duration::from_secs_f64(progress.remaining.clamp(0.0, 1e9)))
                     );
                 }
@@ -104,12 +93,7 @@ impl Watch for Watcher<'_> {
 
     fn ended(&self, seed: u64, run: &SeedRun) {
         let Ok(mut view) = self.view.lock() else { return };
-        let how = match run.ended {
-            Ended::Met => "meets the specification",
-            Ended::Budget => "has used its budget",
-            Ended::Interrupted => "is interrupted",
-        };
-        let line = format!("seed {seed} {how} after {} control periods", grouped(run.steps));
+        let line = format!("seed {seed} {} after {} control periods", run.ended, grouped(run.steps));
         match &mut *view {
             View::Bars(all, bars) => {
                 if let Some(bar) = bars.remove(&seed) {

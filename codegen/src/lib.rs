@@ -13,6 +13,8 @@ mod generate;
 pub mod lower;
 #[cfg(feature = "c")]
 pub mod manifest;
+#[cfg(feature = "c")]
+mod notes;
 pub mod output;
 pub mod program;
 #[cfg(feature = "c")]
@@ -22,6 +24,8 @@ pub use files::{CodegenError, GeneratedFiles, TOOL};
 #[cfg(feature = "c")]
 pub use generate::{generate, sources};
 pub use lower::lower;
+#[cfg(feature = "c")]
+pub use notes::notes;
 pub use output::{Language, Output};
 pub use program::Program;
 

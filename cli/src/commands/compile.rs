@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use codegen::output::{languages, with_cores};
-use codegen::{Output, manifest};
-use policy::{NumericFormat, Policy};
-use targets::{Fma, TargetSpec};
+use codegen::{Output, manifest, notes};
+use policy::Policy;
+use targets::TargetSpec;
 use toml_input::Message;
 use verify::costs::StepCosts;
 use verify::fmu::Archive;
@@ -15,7 +15,7 @@ use verify::{Files, MISREAD, UNPROVEN, advice, text};
 use crate::arguments::Compile;
 use crate::ownership::{self, Replacing};
 use crate::{Failure, Outcome, output};
-use report::{bytes, grouped};
+use report::bytes;
 
 /// Generates, then writes everything at once.
 pub fn run(options: &Compile) -> Result<Outcome, Failure> {
@@ -102,29 +102,6 @@ pub fn write(
     Ok(written)
 }
 
-/// Why fused operations are no gain on a processor, where they are none.
-fn fused(policy: &Policy, target: &TargetSpec, written: &[(PathBuf, usize)]) -> Vec<String> {
-    if policy.numeric_format != NumericFormat::F32Fma {
-        return Vec::new();
-    }
-    let is_rust = |(path, _): &(PathBuf, usize)| path.extension().is_some_and(|end| end == "rs");
-    let in_rust = written.iter().any(is_rust).then(|| {
-        "Rust has no fused multiply-add in `core`: the module computes it in software, many times slower than f32; take C".to_owned()
-    });
-    let on_target = match target.fma {
-        Fma::Absent => Some(format!(
-            "{} has no fused multiply-add; a library computes it, many times slower than f32",
-            target.name
-        )),
-        Fma::Cycles { fused, apart } if fused >= apart => Some(format!(
-            "on {} a fused multiply-add takes {fused} cycles, a product and a sum {apart}: f32 is faster",
-            target.name
-        )),
-        _ => None,
-    };
-    [on_target, in_rust].into_iter().flatten().collect()
-}
-
 /// Says what was made of the policy and what was written.
 pub fn say(
     policy: &Policy,
@@ -138,42 +115,11 @@ pub fn say(
     if policy.golden.is_none() {
         output::say(&format!("note: {UNPROVEN}"))?;
     }
-    for note in fused(policy, target, written) {
+    let sizes = manifest::sizes(policy, target);
+    for note in notes(policy, target, &sizes, written.iter().map(|(path, _)| path.as_path())) {
         output::say(&format!("note: {note}"))?;
     }
-    let sizes = manifest::sizes(policy, target);
-    if let Some(bound) = sizes.accumulator_bound {
-        output::say(&format!(
-            "note: integer network: no 32-bit sum can overflow, the largest is {} of {} over the whole box of observations",
-            grouped(bound.unsigned_abs()),
-            grouped(u64::from(i32::MAX.unsigned_abs()))
-        ))?;
-    }
-    let removed: usize = sizes.removed_neurons.iter().sum();
-    if removed > 0 {
-        let whole: usize = policy.layers.iter().map(|layer| layer.inputs * layer.outputs).sum();
-        output::say(&format!(
-            "note: {removed} neurons are 0 for every observation and left out: {} of {} MACs, the same bits",
-            grouped(sizes.macs as u64),
-            grouped(whole as u64)
-        ))?;
-    }
-    if let Some(bound) = sizes.q_error_bound {
-        output::say(&format!(
-            "note: no Q value is further than {} from real arithmetic, for every observation the clips let through, however rare; \
-             what the trainer's own observations lose stands below `decisions` in `policyc inspect`, and `policyc certify` says more",
-            report::quantity(bound, "", 3)
-        ))?;
-    }
-    let (macs, tables, state) = (
-        grouped(sizes.macs as u64),
-        bytes(sizes.table_bytes),
-        bytes(sizes.state_bytes),
-    );
-    output::say(&format!(
-        "{}: {macs} MACs per step, {tables} of tables, {state} of state",
-        policy.name
-    ))?;
+    output::say(&format!("{}: {sizes}", policy.name))?;
     for (path, length) in written {
         output::say(&format!("  {} ({})", path.display(), bytes(*length)))?;
     }

@@ -6,7 +6,6 @@ use serde::Serialize;
 
 use crate::arguments::Inspect;
 use crate::{Failure, Outcome, output};
-use report::{bytes, grouped};
 
 /// Prints the checked policy.
 pub fn run(options: &Inspect) -> Result<Outcome, Failure> {
@@ -93,19 +92,13 @@ fn view(policy: &Policy) -> View<'_> {
 }
 
 fn text(policy: &Policy) -> String {
-    let sizes = manifest::sizes(policy, ::targets::host());
     let mut out = describe::head(policy) + &describe::signals(policy) + &describe::observation(policy);
     out += &describe::network(policy);
     for line in golden(policy) {
         out += &format!("  {line}\n");
     }
     out += &(describe::actions(policy) + &describe::mapping(policy) + &describe::limits(policy));
-    out += &format!(
-        "\nsize\n  {} MACs per step, {} of tables, {} of state\n",
-        grouped(sizes.macs as u64),
-        bytes(sizes.table_bytes),
-        bytes(sizes.state_bytes)
-    );
+    out += &format!("\nsize\n  {}\n", manifest::sizes(policy, ::targets::host()));
     out += &describe::digests(policy);
     for note in &policy.notes {
         out += &format!("\nnote: {note}\n");

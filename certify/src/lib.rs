@@ -21,6 +21,7 @@ mod neurons;
 #[cfg(feature = "page")]
 pub mod page;
 mod propagate;
+mod slice;
 
 use policy::{Interval, Policy};
 use serde::Serialize;

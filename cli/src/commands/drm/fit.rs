@@ -1,6 +1,6 @@
 //! `policyc drm fit`
 
-use drm::{Conduction, FitOptions, Form, Report, simulation_toml};
+use drm::{Conduction, FitOptions, Form, simulation_toml};
 use plant::Parameters;
 use toml_input::messages;
 
@@ -20,7 +20,7 @@ pub fn run(options: &Fit) -> Result<Outcome, Failure> {
     let page = page.transpose()?;
     let simulation = options.reading.simulation()?;
     let mapping =
-        report.fit.map.to_toml(&comment(&report)) + &simulation.as_ref().map_or_else(String::new, simulation_toml);
+        report.fit.map.to_toml(&drm::comment(&report)) + &simulation.as_ref().map_or_else(String::new, simulation_toml);
     output::replace_own_one(&options.out, &mapping, options.replacing)?;
     if let Some((path, page)) = &page {
         output::replace_own_one(path, page, options.replacing)?;
@@ -67,24 +67,4 @@ fn fit_options(options: &Fit) -> Result<FitOptions, Failure> {
         keep_outliers: options.keep_outliers,
         assumed_a: options.assume_a,
     })
-}
-
-/// What stands above the mapping in its file.
-fn comment(report: &Report) -> String {
-    let fit = &report.fit;
-    let mut text = format!(
-        "Duty ratio mapping, fitted by policyc {} to {} settled points ({} components).\n\
-         Voltage error rms {:.4} V, leave-one-out {:.4} V rms, {:.4} V at most; without a mapping {:.4} V rms.",
-        env!("CARGO_PKG_VERSION"),
-        fit.rows.len(),
-        fit.components,
-        fit.with.rms_v,
-        fit.left_out.rms_v,
-        fit.left_out.max_v,
-        fit.without.rms_v
-    );
-    for finding in &fit.separation.findings {
-        text += &format!("\nNote: {finding}.");
-    }
-    text
 }

@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use report::grouped;
 use serde::Serialize;
 
-use super::{Check, Findings, Setting, Step, page, pictures};
+use super::findings::{Findings, Step};
+use super::{page, pictures, words};
 use crate::faults::{Error, told};
 use crate::limit::Bound;
-use crate::scenario::{Metrics, SETTLED};
+use crate::scenario::Metrics;
 use crate::tables::{MetricsCsv, comparison, trajectory_csv};
 
 /// Name of the page with everything on it, among the files.
@@ -88,8 +88,8 @@ impl Findings {
             "policy  {} ({})\nplant   {}\n\n{}\n",
             setting.policy.name,
             self.controller,
-            plant_text(setting),
-            explanation(setting).replace(". ", ".\n")
+            words::plant_text(setting),
+            words::explanation(setting).replace(". ", ".\n")
         );
         for step in &self.steps {
             let courses = step.courses.iter();
@@ -99,9 +99,9 @@ impl Findings {
             out.push_str(&comparison(step.step, controllers, limits));
         }
         if let Some(check) = &self.check {
-            out.push_str(&format!("\n{}\n", check_text(check)));
+            out.push_str(&format!("\n{}\n", words::check_text(check)));
         }
-        for note in unsettled(self).iter().chain(&setting.notes) {
+        for note in words::unsettled(self).iter().chain(&setting.notes) {
             out.push_str(&format!("\nnote: {note}\n"));
         }
         out
@@ -150,59 +150,4 @@ fn json_step(step: &Step) -> JsonStep<'_> {
         controllers: controllers.collect(),
         limits: limits.collect(),
     }
-}
-
-/// The plant's file and the numbers that were replaced.
-pub(super) fn plant_text(setting: &Setting) -> String {
-    let set = setting.scenario.set.iter();
-    set.fold(setting.plant.display().to_string(), |text, (key, value)| {
-        format!("{text}, {key} = {value}")
-    })
-}
-
-/// What the figures are of.
-pub(super) fn explanation(setting: &Setting) -> String {
-    let task = &setting.scenario.task;
-    format!(
-        "True voltages at the sampling instants, errors from {} V, settled within {SETTLED} V. Each pair: worst of {} \
-         sampling instants / worst of {} instants and phases.",
-        setting.v_ref,
-        task.sampling_instants,
-        task.all_instants().len(),
-    )
-}
-
-/// The load steps before or after which the policy does not stay within the settling band, in words.
-pub(super) fn unsettled(found: &Findings) -> Option<String> {
-    let lost = |step: &&Step| {
-        let policy = step.courses.first();
-        policy.is_some_and(|(_, policy)| policy.finding.worst.tail_max.max(policy.finding.worst.pre_error) > SETTLED)
-    };
-    let steps: Vec<String> = found
-        .steps
-        .iter()
-        .filter(lost)
-        .map(|step| step.step.to_string())
-        .collect();
-    (!steps.is_empty()).then(|| {
-        format!(
-            "the policy does not settle within {SETTLED} V of {} V before or after {}",
-            found.setting.v_ref,
-            steps.join(", ")
-        )
-    })
-}
-
-/// How the comparison of the controllers came out.
-pub(super) fn check_text(check: &Check) -> String {
-    let names = check.names.join(", ");
-    let periods = grouped(check.periods as u64);
-    if check.differences.is_empty() {
-        return format!("equal to the bit over {periods} control periods: {names}");
-    }
-    let first = check.names.first().map(String::as_str).unwrap_or_default();
-    format!(
-        "DIFFERENT from {first} within {periods} control periods:\n  {}",
-        check.differences.join("\n  ")
-    )
 }

@@ -2,7 +2,8 @@
 
 use report::{Cell, Page, Section, Svg, Table, Verdict};
 
-use super::{Findings, Step, files};
+use super::findings::{Findings, Step};
+use super::words;
 use crate::faults::{Error, told};
 use crate::scenario::Metrics;
 use crate::tables::{COLUMNS, cells, limit_cells};
@@ -14,9 +15,9 @@ pub(super) fn page(found: &Findings, drawn: Vec<Svg>) -> Result<String, Error> {
     let setup = [
         ("policy", setting.policy.name.clone()),
         ("run by", found.controller.clone()),
-        ("plant", files::plant_text(setting)),
+        ("plant", words::plant_text(setting)),
     ];
-    let mut about = Section::new("").pairs(setup).text(files::explanation(setting));
+    let mut about = Section::new("").pairs(setup).text(words::explanation(setting));
     for note in &setting.notes {
         about = about.text(format!("Note: {note}."));
     }
@@ -35,7 +36,7 @@ const CAPTION: &str = "The first sampling instant. Voltages and currents are sam
     with another current and can stay within it at one instant. The table is of all instants.";
 
 fn verdict(found: &Findings) -> (Verdict, String) {
-    let compared = found.check.as_ref().map(files::check_text);
+    let compared = found.check.as_ref().map(words::check_text);
     let different = found.check.as_ref().is_some_and(|check| !check.differences.is_empty());
     let sentences = |first: String| {
         [Some(first), compared]
@@ -44,7 +45,7 @@ fn verdict(found: &Findings) -> (Verdict, String) {
             .collect::<Vec<_>>()
             .join("; ")
     };
-    match files::unsettled(found) {
+    match words::unsettled(found) {
         Some(text) if different => (Verdict::Fail, sentences(text)),
         Some(text) => (Verdict::Warn, sentences(text)),
         None if different => (Verdict::Fail, sentences(worst(found))),

@@ -3,7 +3,7 @@
 use report::{Axis, Chart, Colour, Panel, Series, Svg};
 use toml_input::Message;
 
-use super::{POLICY, Setting, Step};
+use super::findings::{POLICY, Setting, Step};
 use crate::baselines::Kind;
 use crate::course::Course;
 use crate::faults::{Error, told};

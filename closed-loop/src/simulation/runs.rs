@@ -2,7 +2,7 @@
 
 use toml_input::{Fault, Message};
 
-use super::{Check, Findings, POLICY, Setting, Step};
+use super::findings::{Check, Findings, POLICY, Setting, Step};
 use crate::baselines::Baseline;
 use crate::controller::{Classical, Controller, Trajectory, follow};
 use crate::course::{Course, Named, Tell};

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use report::{Cell, Page, Section, Table, Verdict};
 
-use super::{Findings, Real, Run, pictures, runs};
+use super::findings::{Findings, MAPPED, Real, Run};
+use super::pictures;
 use crate::faults::{Error, told};
 use crate::scenario::{Metrics, SETTLED};
 use crate::tables::{COLUMNS, MetricsCsv, cells, comparison};
@@ -202,7 +203,7 @@ fn overview_text(found: &Findings) -> String {
 fn sentence(found: &Findings) -> String {
     let gained = |real: &&Real| {
         let before = real.runs.first().map(largest)?;
-        let after = real.runs.iter().find(|run| run.name == runs::MAPPED).map(largest)?;
+        let after = real.runs.iter().find(|run| run.name == MAPPED).map(largest)?;
         Some((real.name.clone(), before.tail_mean, after.tail_mean))
     };
     let all = found.real.iter().filter_map(|real| gained(&real));

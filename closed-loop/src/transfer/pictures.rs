@@ -2,7 +2,7 @@
 
 use report::{Axis, Chart, Colour, Panel, Series, Svg};
 
-use super::{Findings, Real, runs};
+use super::findings::{EXACT, Findings, Real};
 use crate::faults::{Error, told};
 use crate::scenario::{Record, SETTLED};
 
@@ -32,8 +32,8 @@ pub(super) fn picture(found: &Findings, real: &Real, index: usize) -> Result<Svg
         let of = |figure: fn(&Record) -> f64| -> Vec<f64> { inside.iter().map(|record| figure(record)).collect() };
         let time = of(|record| record.time);
         let line = Series::line(run.name, time.clone(), of(|record| record.sample.v_out)).colour(colour);
-        voltage = voltage.series(if run.name == runs::EXACT { line.dashed() } else { line });
-        if run.name != runs::EXACT {
+        voltage = voltage.series(if run.name == EXACT { line.dashed() } else { line });
+        if run.name != EXACT {
             duty = duty.series(Series::step(run.name, time, of(|record| record.duty)).colour(colour));
         }
     }

@@ -6,8 +6,8 @@ use drm::DutyRatioMap;
 use drm::formula::Losses;
 use plant::Parameters;
 
+use super::findings::{EXACT, Findings, MAPPED, Means, Real, Run, SIMULATION, Setting, UNMAPPED};
 use super::ideal::Ideal;
-use super::{Findings, Means, Real, Run, Setting};
 use crate::controller::{Controller, follow};
 use crate::converter::Converter;
 use crate::course::Course;
@@ -16,12 +16,6 @@ use crate::faults::{Error, told};
 use crate::load_step::LoadStep;
 use crate::refit::AtEnvironment;
 use crate::suits::suits;
-
-/// Names of the runs.
-const SIMULATION: &str = "simulation";
-const UNMAPPED: &str = "no mapping";
-pub(super) const MAPPED: &str = "mapped";
-pub(super) const EXACT: &str = "exact mapping";
 
 /// Where a transfer stands.
 struct Progress<'a, 'b, E> {

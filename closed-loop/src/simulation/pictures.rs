@@ -5,7 +5,6 @@ use toml_input::Message;
 
 use super::findings::{POLICY, Setting, Step};
 use crate::baselines::Kind;
-use crate::course::Course;
 use crate::faults::{Error, told};
 use crate::scenario::{Record, SETTLED};
 
@@ -22,7 +21,7 @@ pub(super) fn picture(setting: &Setting, step: &Step) -> Result<Svg, Error> {
         return Err(Message::new("internal fault: a picture of no controller").into());
     };
     let most = DRAWN * policy.shown.metrics.deviation.max(1.0);
-    let (drawn, left_out): (Vec<&(String, Course)>, Vec<&(String, Course)>) = step
+    let (drawn, left_out): (Vec<_>, Vec<_>) = step
         .courses
         .iter()
         .partition(|(name, course)| course.shown.metrics.deviation <= most || name == POLICY);

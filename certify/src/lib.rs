@@ -18,7 +18,10 @@ mod form;
 mod measured;
 mod network;
 mod neurons;
+#[cfg(feature = "page")]
+pub mod page;
 mod propagate;
+mod slice;
 
 use policy::{Interval, Policy};
 use serde::Serialize;

@@ -10,6 +10,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
+use toml_input::{Faults, Message};
 
 use crate::{Failure, Outcome};
 
@@ -40,6 +41,17 @@ pub fn watch() -> Result<Option<TempDir>, Failure> {
 /// For a command that keeps what it has done: the first signal sets this flag, only the second ends the program.
 pub fn stop_on_signal() -> Arc<AtomicBool> {
     Arc::clone(STOP.get_or_init(Arc::default))
+}
+
+/// An error where the user has had enough.
+///
+/// # Errors
+/// After a signal that [`stop_on_signal`] heeds.
+pub fn go_on() -> Result<(), Faults> {
+    match STOP.get() {
+        Some(stop) if stop.load(Ordering::Relaxed) => Err(Message::new("interrupted").into()),
+        _ => Ok(()),
+    }
 }
 
 /// Does not return once the program is being ended: to be called before anything leaves it.

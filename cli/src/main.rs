@@ -5,6 +5,7 @@ mod commands;
 mod failure;
 mod interruption;
 mod one_of;
+mod outcome;
 mod output;
 mod ownership;
 
@@ -14,17 +15,7 @@ use clap::Parser;
 
 use arguments::{Arguments, Command};
 use failure::Failure;
-
-/// How a run ended; the number is the exit code.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Outcome {
-    /// Done; for `verify`: everything equal.
-    Done = 0,
-    /// `verify`: something differs; `train`: the specification is missed.
-    Different = 1,
-    /// Ended by a signal; what was done so far is kept.
-    Interrupted = 130,
-}
+use outcome::Outcome;
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();

@@ -63,6 +63,13 @@ impl LoadStep {
     pub fn loads(&self) -> [Load; 2] {
         self.values.map(|value| self.kind.load(value))
     }
+
+    /// Start of the names of its files: `200-500W`.
+    #[must_use]
+    pub fn stem(&self) -> String {
+        let [from, to] = self.values;
+        format!("{from}-{to}{}", self.kind.unit())
+    }
 }
 
 impl From<[f64; 2]> for LoadStep {

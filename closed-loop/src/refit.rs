@@ -190,6 +190,20 @@ impl Refit<'_> {
     }
 }
 
+/// Refuses a policy whose duties no mapping can follow.
+///
+/// # Errors
+/// If its contract has no mapping.
+pub fn needs_mapping(policy: &Policy) -> Result<(), Error> {
+    if policy.mapping.is_none() {
+        let hint = "add [mapping] with file = \"drm.toml\" and load_current, and an identity a = 1, b = 0, c = 0";
+        return Err(Message::new("the policy has no mapping to transfer with")
+            .hint(hint)
+            .into());
+    }
+    Ok(())
+}
+
 /// Smallest and largest duty of the actions.
 fn duties(actions: &[Action]) -> (f64, f64) {
     let all = actions.iter().map(|action| action.duty);

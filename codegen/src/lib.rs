@@ -13,6 +13,8 @@ mod generate;
 pub mod lower;
 #[cfg(feature = "c")]
 pub mod manifest;
+#[cfg(feature = "c")]
+mod notes;
 pub mod output;
 pub mod program;
 #[cfg(feature = "c")]
@@ -22,5 +24,21 @@ pub use files::{CodegenError, GeneratedFiles, TOOL};
 #[cfg(feature = "c")]
 pub use generate::{generate, sources};
 pub use lower::lower;
+#[cfg(feature = "c")]
+pub use notes::notes;
 pub use output::{Language, Output};
 pub use program::Program;
+
+use targets::TargetSpec;
+use toml_input::{Message, messages};
+
+/// The deployment target of that name.
+///
+/// # Errors
+/// If there is none: the names that there are, and the core of a part whose name it is.
+pub fn target(name: &str) -> Result<&'static TargetSpec, Message> {
+    targets::find(name).ok_or_else(|| {
+        let core = targets::of_part(name).map(|core| format!("its core is that of `{core}`"));
+        messages::unknown("target", name, &targets::names()).maybe_hint(core)
+    })
+}

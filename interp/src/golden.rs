@@ -1,5 +1,7 @@
 //! Known answers of the trainer: was the network read as he meant, and does the numeric format keep his decisions?
 
+use std::fmt;
+
 use ndarray::aview1;
 use policy::{Golden, NumericFormat, Policy, Scalar};
 use serde::Serialize;
@@ -37,6 +39,27 @@ impl GoldenResult {
             .worst_relative_error
             .map_or(actions, |error| error <= self.tolerance);
         self.rounded || read
+    }
+}
+
+impl fmt::Display for GoldenResult {
+    /// In one line: equal actions, the largest error of Q beside the allowed one, and whether that is too much.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut parts = Vec::new();
+        if self.actions_compared > 0 {
+            parts.push(format!(
+                "action equal in {} of {}",
+                self.actions_equal, self.actions_compared
+            ));
+        }
+        if let Some(error) = self.worst_relative_error {
+            parts.push(format!(
+                "largest relative error of Q {error:.1e} (allowed {:.0e})",
+                self.tolerance
+            ));
+        }
+        let word = if self.passed() { "" } else { "DIFFERENT: " };
+        write!(f, "{word}{}", parts.join(", "))
     }
 }
 
@@ -150,6 +173,9 @@ pub fn refusal(policy: &Policy) -> Option<Message> {
 /// What to look at when the network does not give the trainer's answers.
 pub const MISREAD: &str = "look at hidden_activation, the order of layers, transpose, and in the golden file at the order of obs's \
                            columns and at the first action, which is 0: the contract says something else than the trainer did";
+
+/// What is open without golden vectors.
+pub const UNPROVEN: &str = "no golden vectors: nothing shows that the weights were read as the trainer meant";
 
 #[cfg(test)]
 mod tests {

@@ -32,7 +32,7 @@ pub use colour::{Colour, Ramp};
 pub use error::ReportError;
 pub use frame::Svg;
 pub use heat::HeatMap;
-pub use number::quantity;
+pub use number::{bytes, grouped, quantity};
 pub use page::{Page, Section, Verdict};
 pub use series::Series;
 pub use table::{Cell, Table};

@@ -123,6 +123,39 @@ pub fn quantity(value: f64, unit: &str, digits: usize) -> String {
     }
 }
 
+/// Digits in groups of three.
+///
+/// ```
+/// assert_eq!(report::grouped(20_000), "20,000");
+/// ```
+#[must_use]
+pub fn grouped(number: u64) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (index, digit) in digits.chars().enumerate() {
+        if index > 0 && (digits.len() - index).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// A number of bytes as people read it: exact below 10,000, else in kB of 1,000 bytes.
+///
+/// ```
+/// assert_eq!(report::bytes(9_999), "9999 B");
+/// assert_eq!(report::bytes(31_456), "31.5 kB");
+/// ```
+#[must_use]
+pub fn bytes(count: usize) -> String {
+    if count < 10_000 {
+        format!("{count} B")
+    } else {
+        format!("{:.1} kB", count as f64 / 1000.0)
+    }
+}
+
 /// `value * 10^exponent` with one rounding for a positive and for a negative exponent.
 pub fn shifted(value: f64, exponent: i32) -> f64 {
     if exponent < 0 {

@@ -7,11 +7,13 @@ mod arm;
 pub mod boards;
 mod families;
 mod others;
+mod overview;
 mod riscv;
 mod spec;
 
 pub use boards::{Board, BoardFile};
 pub use families::of_part;
+pub use overview::overview;
 pub use spec::{
     CCompiler, CycleModel, Endianness, Fma, Fpu, IntegerBlock, IntegerLoop, RowBlock, Runner, RustTarget, Sections,
     TargetSpec, Widths,

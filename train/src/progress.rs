@@ -1,5 +1,7 @@
 //! What a training says of itself: its looks, its best policy, how it ended.
 
+use std::fmt;
+
 use crate::network::Network;
 use crate::score::Score;
 
@@ -12,6 +14,17 @@ pub enum Ended {
     Budget,
     /// The flag was raised; the training can go on from its checkpoint.
     Interrupted,
+}
+
+impl fmt::Display for Ended {
+    /// What a seed does: `has used its budget`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Ended::Met => "meets the specification",
+            Ended::Budget => "has used its budget",
+            Ended::Interrupted => "is interrupted",
+        })
+    }
 }
 
 /// What a training says at every look.
@@ -29,6 +42,18 @@ pub struct Progress {
     pub elapsed: f64,
     /// Until the budget is used, s.
     pub remaining: f64,
+}
+
+impl fmt::Display for Progress {
+    /// Reward, error and how far the best policy is from the specification.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Look { reward, error, .. } = self.look;
+        write!(f, "reward {reward:7.2}  |e| {error:6.3} V  best cost ")?;
+        match self.best.is_finite() {
+            true => write!(f, "{:.3}", self.best),
+            false => f.write_str("-"),
+        }
+    }
 }
 
 /// A row of the learning curve: what happened since the row before.

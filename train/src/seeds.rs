@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use report::grouped;
 use toml_input::Message;
 
 use crate::checkpoint::other;
@@ -15,6 +16,7 @@ use crate::outcome::Outcome;
 use crate::settings::Settings;
 use crate::trainer::{Ended, Progress, Trainer};
 use closed_loop::environment::Environment;
+use closed_loop::scenario::Metrics;
 
 /// One seed's training after a run.
 #[derive(Debug)]
@@ -159,4 +161,38 @@ pub fn best(runs: &[SeedRun]) -> Option<&Outcome> {
         let ((a_open, a_cost), (b_open, b_cost)) = (order(a), order(b));
         a_open.cmp(&b_open).then(a_cost.total_cmp(&b_cost))
     })
+}
+
+/// A line for each seed that has an outcome, for people: whether it meets the specification, and the largest figures of its
+/// evaluation, V and ms.
+#[must_use]
+pub fn table(settings: &Settings, runs: &[SeedRun]) -> String {
+    let verdict = |met: bool| match (settings.specification.is_empty(), met) {
+        (true, _) => "-",
+        (false, true) => "met",
+        (false, false) => "missed",
+    };
+    let mut text =
+        "seed  control periods  kept after  selection  evaluation  deviation V  settling ms  tail V   cost\n"
+            .to_owned();
+    for run in runs {
+        let Some(outcome) = &run.outcome else { continue };
+        let largest = |figure: fn(&Metrics) -> f64| {
+            let figures = outcome.findings.iter().map(|finding| figure(&finding.worst));
+            figures.fold(0.0, f64::max)
+        };
+        text.push_str(&format!(
+            "{:4}  {:>15}  {:>10}  {:<9}  {:<10}  {:>11.2}  {:>11.2}  {:>6.3}  {:>6.3}\n",
+            outcome.seed,
+            grouped(run.steps),
+            grouped(outcome.best_step),
+            verdict(outcome.selected.met),
+            verdict(outcome.evaluated.met),
+            largest(|metrics| metrics.deviation),
+            1e3 * largest(|metrics| metrics.settling),
+            largest(|metrics| metrics.tail_max),
+            outcome.selected.cost,
+        ));
+    }
+    text
 }

@@ -14,18 +14,22 @@
 //! | what is expected | [`oracle`] |
 //! | who answers | [`runner`]: [`runner::Runner`] has one implementation per way of running a build |
 //! | a loop closed around a build | [`live`] |
-//! | what differs | [`compare`], [`report`] |
-//! | what a step costs | [`mod@measure`], [`elf`] |
+//! | what differs | [`compare`], [`report`]; in words: [`text`] |
+//! | what a step costs | [`mod@measure`], [`elf`]; of all builds: [`costs`]; whether it fits into its period: [`budget`], [`advice`] |
 //! | archives of FMUs | [`fmu`] |
 //! | what the format does to decisions | [`decisions`] |
-//! | checked-in files against the policy | [`drift()`] |
+//! | checked-in files against the policy | [`drift()`], [`folder`] |
 
+pub mod advice;
+pub mod budget;
 pub mod compare;
+pub mod costs;
 pub mod drift;
 pub mod drivers;
 pub mod elf;
 pub mod estimate;
 pub mod fmu;
+pub mod folder;
 mod golden;
 pub mod kit;
 pub mod lane;
@@ -36,13 +40,15 @@ pub mod protocol;
 pub mod report;
 pub mod runner;
 mod session;
+pub mod text;
 pub mod toolchain;
 pub mod traces;
 mod zip;
 
 pub use drift::{drift, read_text};
+pub use folder::Folder;
 pub use interp::decisions::{Decisions, decisions};
-pub use interp::golden::golden_result;
+pub use interp::golden::{MISREAD, UNPROVEN, golden_result};
 pub use live::{Live, LiveCommand};
 pub use report::{BuildReport, Difference, GoldenResult, Outcome, Report};
 pub use session::{Files, Options, Progress, VerifyError, run};

@@ -1,10 +1,8 @@
 //! `policyc certify`
 
-mod page;
-
 use std::collections::BTreeMap;
 
-use ::certify::{Certificate, Certifier, Domain, Effort, Memory, Slice};
+use ::certify::{Certificate, Domain, Effort, Slice, page};
 use interp::Controller;
 use ndarray::aview1;
 use policy::{Interval, NumericFormat, Policy};
@@ -61,10 +59,7 @@ pub fn run(options: &Certify) -> Result<Outcome, Failure> {
 
 /// The slice that is asked for, of settled states unless those have fewer than two coordinates; `None` if all have.
 fn slice(policy: &Policy, options: &Certify) -> Result<Option<Slice>, Failure> {
-    let memories = [Memory::Settled, Memory::Free].into_iter();
-    let mut domains = memories.map(|memory| (memory, Domain::of(policy, memory)));
-    let found = domains.find(|(_, domain)| domain.coordinates().len() > 1);
-    let (memory, domain) = found.unwrap_or_else(|| (Memory::Free, Domain::of(policy, Memory::Free)));
+    let (memory, domain) = Domain::mapped(policy);
     let coordinates = domain.coordinates();
     let find = |name: &str| {
         coordinates.iter().position(|c| c.name == name).ok_or_else(|| {
@@ -83,18 +78,17 @@ fn slice(policy: &Policy, options: &Certify) -> Result<Option<Slice>, Failure> {
         let whole = coordinates[index].range;
         asked.push((index, range.map(|range| within(range, name, whole)).transpose()?));
     }
-    let axes = match asked.as_slice() {
-        [] => (first(policy, &domain, 0), first(policy, &domain, 1)),
-        [x, y] if x.0 != y.0 => (Some(x.0), Some(y.0)),
+    let order = domain.signals_first(policy);
+    let axes = match (asked.as_slice(), order.as_slice()) {
+        ([], [x, y, ..]) => [(*x, None), (*y, None)],
+        ([], _) => return Ok(None),
+        ([x, y], _) if x.0 != y.0 => [*x, *y],
         _ => {
             let message = Message::new(format!("--axis: {} axes found", asked.len()));
             return Err(message.expected("two different axes, or none").into());
         }
     };
-    let (Some(x), Some(y)) = axes else {
-        return Ok(None);
-    };
-    let mut at: Vec<f64> = coordinates.iter().map(|c| 0.5 * (c.range.low + c.range.high)).collect();
+    let mut at = domain.middle();
     for text in &options.at {
         let (name, value) = text.split_once('=').unwrap_or((text, ""));
         let index = find(name)?;
@@ -104,35 +98,8 @@ fn slice(policy: &Policy, options: &Certify) -> Result<Option<Slice>, Failure> {
             return Err(outside(text, range));
         }
     }
-    let ranges: Vec<Option<Interval>> = asked.iter().map(|(_, range)| *range).collect();
-    let given = |n: usize| ranges.get(n).copied().flatten();
-    let whole = Slice {
-        memory,
-        x: (x, given(0).unwrap_or(coordinates[x].range)),
-        y: (y, given(1).unwrap_or(coordinates[y].range)),
-        at,
-    };
-    let zoomed = Certifier::new(policy).zoomed(&domain, &whole);
-    Ok(Some(Slice {
-        memory,
-        x: (x, given(0).unwrap_or(zoomed.x.1)),
-        y: (y, given(1).unwrap_or(zoomed.y.1)),
-        at: whole.at,
-    }))
-}
-
-/// The `n`-th coordinate in the order of the policy's signals, then the others.
-fn first(policy: &Policy, domain: &Domain, n: usize) -> Option<usize> {
-    let position = |name: &str| domain.coordinates().iter().position(|c| c.name == name);
-    let mut order: Vec<usize> = policy
-        .signals
-        .iter()
-        .filter_map(|signal| position(&signal.name))
-        .collect();
-    let others = (0..domain.coordinates().len()).filter(|index| !order.contains(index));
-    let others: Vec<usize> = others.collect();
-    order.extend(others);
-    order.get(n).copied()
+    let [x, y] = axes;
+    Ok(Slice::through(policy, memory, x, y, at))
 }
 
 /// `LOW:HIGH` inside of a range.

@@ -4,36 +4,36 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use codegen::output::{languages, with_cores};
-use codegen::{Output, manifest};
-use policy::{NumericFormat, Policy};
-use targets::{Fma, TargetSpec};
+use codegen::{Output, manifest, notes};
+use policy::Policy;
+use targets::TargetSpec;
 use toml_input::Message;
-use verify::Files;
+use verify::costs::StepCosts;
 use verify::fmu::Archive;
+use verify::{Files, MISREAD, UNPROVEN, advice, text};
 
-use super::budget;
-use super::costs::Measured;
-use super::verify::{MISREAD, UNPROVEN, decisions_lines, golden_text};
-use super::{bytes, grouped};
 use crate::arguments::Compile;
 use crate::ownership::{self, Replacing};
 use crate::{Failure, Outcome, output};
+use report::bytes;
 
 /// Generates, then writes everything at once.
 pub fn run(options: &Compile) -> Result<Outcome, Failure> {
-    let target = super::target(&options.target)?;
+    let target = codegen::target(&options.target)?;
     let policy = load(options)?;
     let outputs = with_cores(&options.emit);
     let expected = verify::kit::expected(&policy, target, &outputs, options.kit_steps)?;
     let mut files = codegen::generate(&policy, target, &outputs, expected.as_ref())?.files;
-    let measured = measure(options, &policy, target, &outputs, &mut files)?;
+    let costs = measure(options, &policy, target, &outputs, &mut files)?;
     let archives = verify::fmu::archives(&policy, target, &outputs, &files)?;
     ownership::check_policy(&options.out, &policy.name, options.replacing)?;
     let written = write(&options.out, &files, &archives, options.replacing)?;
     say(&policy, target, &written, &archives)?;
-    measured.say(&policy, target, options.clock)?;
+    for text in costs.texts(&policy, target, options.clock) {
+        output::say(&text)?;
+    }
     if let Some(clock) = options.clock {
-        output::say(&budget::lines(&policy, target, &outputs, &measured, clock)?.join("\n"))?;
+        output::say(&advice::lines(&policy, target, &outputs, &costs, clock)?.join("\n"))?;
     }
     Ok(Outcome::Done)
 }
@@ -43,7 +43,7 @@ fn load(options: &Compile) -> Result<Policy, Failure> {
     let policy = super::load_as(&options.policy, options.format)?;
     if let Some(golden) = verify::golden_result(&policy).filter(|golden| !golden.passed()) {
         let message = Message::new("the network does not give the trainer's golden answers; nothing was written");
-        return Err(message.found(golden_text(&golden)).hint(MISREAD).into());
+        return Err(message.found(golden.to_string()).hint(MISREAD).into());
     }
     match verify::decisions(&policy, options.golden_decisions).filter(|decisions| !decisions.kept()) {
         None => Ok(policy),
@@ -54,7 +54,7 @@ fn load(options: &Compile) -> Result<Policy, Failure> {
                 "see what they cost with `policyc certify` and `policyc simulate`; to accept them, --golden-decisions {}",
                 accepted(decisions.share())
             );
-            let found = decisions_lines(&policy, &decisions).join("\n");
+            let found = text::decisions(&policy, &decisions).join("\n");
             Err(Message::new(problem).found(found).hint(hint).into())
         }
     }
@@ -72,15 +72,15 @@ fn measure(
     target: &TargetSpec,
     outputs: &[Output],
     files: &mut Files,
-) -> Result<Measured, Failure> {
+) -> Result<StepCosts, Failure> {
     if options.no_costs {
-        return Ok(Measured::default());
+        return Ok(StepCosts::default());
     }
-    let measured = Measured::of(policy, target, &languages(outputs), files);
-    if let (false, Some(manifest)) = (measured.costs.is_empty(), files.get_mut(manifest::FILE)) {
-        *manifest = manifest::with_costs(manifest, &measured.entries(policy, options.clock))?;
+    let costs = StepCosts::of(policy, target, &languages(outputs), files);
+    if let (false, Some(manifest)) = (costs.builds.is_empty(), files.get_mut(manifest::FILE)) {
+        *manifest = manifest::with_costs(manifest, &costs.entries(policy, options.clock))?;
     }
-    Ok(measured)
+    Ok(costs)
 }
 
 /// Writes files and archives, all or none; each with its length.
@@ -102,29 +102,6 @@ pub fn write(
     Ok(written)
 }
 
-/// Why fused operations are no gain on a processor, where they are none.
-fn fused(policy: &Policy, target: &TargetSpec, written: &[(PathBuf, usize)]) -> Vec<String> {
-    if policy.numeric_format != NumericFormat::F32Fma {
-        return Vec::new();
-    }
-    let is_rust = |(path, _): &(PathBuf, usize)| path.extension().is_some_and(|end| end == "rs");
-    let in_rust = written.iter().any(is_rust).then(|| {
-        "Rust has no fused multiply-add in `core`: the module computes it in software, many times slower than f32; take C".to_owned()
-    });
-    let on_target = match target.fma {
-        Fma::Absent => Some(format!(
-            "{} has no fused multiply-add; a library computes it, many times slower than f32",
-            target.name
-        )),
-        Fma::Cycles { fused, apart } if fused >= apart => Some(format!(
-            "on {} a fused multiply-add takes {fused} cycles, a product and a sum {apart}: f32 is faster",
-            target.name
-        )),
-        _ => None,
-    };
-    [on_target, in_rust].into_iter().flatten().collect()
-}
-
 /// Says what was made of the policy and what was written.
 pub fn say(
     policy: &Policy,
@@ -138,42 +115,11 @@ pub fn say(
     if policy.golden.is_none() {
         output::say(&format!("note: {UNPROVEN}"))?;
     }
-    for note in fused(policy, target, written) {
+    let sizes = manifest::sizes(policy, target);
+    for note in notes(policy, target, &sizes, written.iter().map(|(path, _)| path.as_path())) {
         output::say(&format!("note: {note}"))?;
     }
-    let sizes = manifest::sizes(policy, target);
-    if let Some(bound) = sizes.accumulator_bound {
-        output::say(&format!(
-            "note: integer network: no 32-bit sum can overflow, the largest is {} of {} over the whole box of observations",
-            grouped(bound.unsigned_abs()),
-            grouped(u64::from(i32::MAX.unsigned_abs()))
-        ))?;
-    }
-    let removed: usize = sizes.removed_neurons.iter().sum();
-    if removed > 0 {
-        let whole: usize = policy.layers.iter().map(|layer| layer.inputs * layer.outputs).sum();
-        output::say(&format!(
-            "note: {removed} neurons are 0 for every observation and left out: {} of {} MACs, the same bits",
-            grouped(sizes.macs as u64),
-            grouped(whole as u64)
-        ))?;
-    }
-    if let Some(bound) = sizes.q_error_bound {
-        output::say(&format!(
-            "note: no Q value is further than {} from real arithmetic, for every observation the clips let through, however rare; \
-             what the trainer's own observations lose stands below `decisions` in `policyc inspect`, and `policyc certify` says more",
-            report::quantity(bound, "", 3)
-        ))?;
-    }
-    let (macs, tables, state) = (
-        grouped(sizes.macs as u64),
-        bytes(sizes.table_bytes),
-        bytes(sizes.state_bytes),
-    );
-    output::say(&format!(
-        "{}: {macs} MACs per step, {tables} of tables, {state} of state",
-        policy.name
-    ))?;
+    output::say(&format!("{}: {sizes}", policy.name))?;
     for (path, length) in written {
         output::say(&format!("  {} ({})", path.display(), bytes(*length)))?;
     }

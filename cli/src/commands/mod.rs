@@ -1,9 +1,8 @@
 //! One file per command.
 
-pub mod budget;
 pub mod certify;
 pub mod compile;
-mod costs;
+mod controllers;
 pub mod demo;
 pub mod diagnose;
 pub mod drm;
@@ -17,9 +16,7 @@ pub mod verify;
 
 use std::path::{Path, PathBuf};
 
-use ::targets::TargetSpec;
 use policy::{NumericFormat, Policy};
-use toml_input::messages;
 
 use crate::Failure;
 
@@ -43,35 +40,4 @@ fn load_as(path: &Path, format: Option<NumericFormat>) -> Result<Policy, Failure
         Some(format) => policy.with_format(format),
         None => policy,
     })
-}
-
-fn target(name: &str) -> Result<&'static TargetSpec, Failure> {
-    ::targets::find(name).ok_or_else(|| {
-        let core = ::targets::of_part(name).map(|core| format!("its core is that of `{core}`"));
-        messages::unknown("target", name, &::targets::names())
-            .maybe_hint(core)
-            .into()
-    })
-}
-
-/// Bytes as people read them.
-fn bytes(count: usize) -> String {
-    if count < 10_000 {
-        format!("{count} B")
-    } else {
-        format!("{:.1} kB", count as f64 / 1000.0)
-    }
-}
-
-/// Digits in groups of three.
-fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let mut text = String::new();
-    for (index, digit) in digits.chars().enumerate() {
-        if index > 0 && (digits.len() - index).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
 }

@@ -1,7 +1,12 @@
 //! Progress as one line.
 
+use std::fmt::Display;
 use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
+
+use toml_input::Faults;
+
+use crate::interruption;
 
 /// One line on the terminal; lines at intervals where the output is a log.
 pub struct ProgressLine {
@@ -40,6 +45,16 @@ impl ProgressLine {
         };
         let _ = out.flush();
         self.shown = self.terminal;
+    }
+
+    /// Shows what comes next, for a library that tells it.
+    ///
+    /// # Errors
+    /// If there is to be no next: the user has had enough.
+    pub fn next(&mut self, what: &dyn Display) -> Result<(), Faults> {
+        interruption::go_on()?;
+        self.show(|| what.to_string());
+        Ok(())
     }
 
     /// Clears the line.

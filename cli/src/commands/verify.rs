@@ -1,24 +1,16 @@
 //! `policyc verify`
 
-use std::path::Path;
-
-use codegen::{Output, manifest};
-use policy::{NumericFormat, Policy};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use targets::TargetSpec;
-use toml_input::{Fault, Message, messages};
+use toml_input::Message;
 use verify::drift::Drift;
 use verify::traces::Recorded;
-use verify::{Files, Options, Progress, Report};
+use verify::{Folder, Options, Progress, Report, folder, text};
 
-use super::grouped;
 use super::progress_line::ProgressLine;
 use crate::arguments::Verify;
 use crate::{Failure, Outcome, output};
-
-mod show;
-
-pub use show::{MISREAD, UNPROVEN, decisions_lines, golden_text, missing_text};
+use report::grouped;
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -35,7 +27,7 @@ struct Answer {
 pub fn run(options: &Verify) -> Result<Outcome, Failure> {
     let written = match (options.format, &options.generated) {
         (Some(format), _) => Some(format),
-        (None, Some(folder)) => written_format(folder),
+        (None, Some(folder)) => folder::numeric_format(folder),
         (None, None) => None,
     };
     let policy = super::load_as(&options.policy, written)?;
@@ -51,7 +43,7 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
     let on_disk = options
         .generated
         .as_deref()
-        .map(|folder| checked_in(&policy, folder))
+        .map(|folder| Folder::open(&policy, folder))
         .transpose()?;
     let target = target(options, on_disk.as_ref().map(|folder| folder.target))?;
     if let Some(folder) = &on_disk
@@ -83,7 +75,7 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
     )?;
     progress.clear();
     if !report.compared() {
-        return Err(show::nothing_compared(&report).into());
+        return Err(text::nothing_compared(&report).into());
     }
     let drift = on_disk.map(|folder| folder.drift);
     let equal = report.passed() && drift.as_ref().is_none_or(Drift::is_empty);
@@ -91,7 +83,7 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
         let report = Some(report);
         output::say(&serde_json::to_string_pretty(&Answer { equal, drift, report })?)?;
     } else {
-        output::say(show::report(&policy, &report, drift.as_ref())?.trim_end())?;
+        output::say(text::report(&policy, &report, drift.as_ref())?.trim_end())?;
     }
     Ok(if equal { Outcome::Done } else { Outcome::Different })
 }
@@ -103,25 +95,14 @@ fn files_alone(options: &Verify, policy: &str, drift: Drift) -> Result<Outcome, 
         let (drift, report) = (Some(drift), None);
         output::say(&serde_json::to_string_pretty(&Answer { equal, drift, report })?)?;
     } else {
-        output::say(show::files_alone(policy, &drift)?.trim_end())?;
+        output::say(text::files_alone(policy, &drift)?.trim_end())?;
     }
     Ok(if equal { Outcome::Done } else { Outcome::Different })
 }
 
-/// The numeric format that the folder's manifest names; a manifest that cannot be read is reported later.
-fn written_format(folder: &Path) -> Option<NumericFormat> {
-    #[derive(Deserialize)]
-    struct Written {
-        numeric_format: String,
-    }
-    let text = verify::read_text(&folder.join(manifest::FILE)).ok()?;
-    let written: Written = serde_json::from_str(&text).ok()?;
-    NumericFormat::find(&written.numeric_format)
-}
-
 /// The target that was asked for; generated code is verified as what it was generated for.
 fn target(options: &Verify, generated_for: Option<&'static TargetSpec>) -> Result<&'static TargetSpec, Failure> {
-    let asked = options.target.as_deref().map(super::target).transpose()?;
+    let asked = options.target.as_deref().map(codegen::target).transpose()?;
     match (asked, generated_for) {
         (Some(asked), Some(found)) if asked != found => {
             let message = Message::new("the generated folder is for another target");
@@ -130,67 +111,5 @@ fn target(options: &Verify, generated_for: Option<&'static TargetSpec>) -> Resul
         }
         (Some(target), _) | (None, Some(target)) => Ok(target),
         (None, None) => Ok(::targets::host()),
-    }
-}
-
-/// The parts of a manifest that say how the folder was generated.
-#[derive(Deserialize)]
-struct Origin {
-    target: String,
-    languages: Vec<String>,
-    #[serde(default)]
-    doors: Vec<String>,
-    #[serde(default)]
-    kit_steps: Option<u32>,
-}
-
-/// A folder that compile wrote.
-struct Folder {
-    files: Files,
-    /// How they differ from what the policy yields today.
-    drift: Drift,
-    target: &'static TargetSpec,
-}
-
-fn checked_in(policy: &Policy, folder: &Path) -> Result<Folder, Failure> {
-    let path = folder.join(manifest::FILE);
-    let hint = format!(
-        "make the folder with `policyc compile POLICY --out {}`",
-        folder.display()
-    );
-    let fault = |message: Message| Fault::in_file(&path, message);
-    let text = verify::read_text(&path).map_err(|error| {
-        let message = Message::new(error.to_string()).expected("the manifest that compile wrote");
-        fault(message.hint(&hint))
-    })?;
-    let origin: Origin = serde_json::from_str(&text)
-        .map_err(|error| fault(Message::new(format!("not a manifest of policyc: {error}")).hint(&hint)))?;
-    let target = super::target(&origin.target)?;
-    let outputs = outputs(&origin).map_err(fault)?;
-    let steps = origin.kit_steps.unwrap_or(verify::kit::DEFAULT_STEPS);
-    let expected = verify::kit::expected(policy, target, &outputs, steps)?;
-    let yielded = codegen::generate(policy, target, &outputs, expected.as_ref())?.files;
-    let drift = verify::drift(policy, &yielded, folder)?;
-    let cores: Vec<Output> = outputs.into_iter().filter(|output| output.is_core()).collect();
-    let mut files = Files::new();
-    for name in codegen::sources(policy, target, &cores, None)?.files.into_keys() {
-        // a missing file is already part of the drift
-        if let Ok(text) = verify::read_text(&folder.join(&name)) {
-            files.insert(name, text);
-        }
-    }
-    Ok(Folder { files, drift, target })
-}
-
-/// What the folder was made of.
-fn outputs(origin: &Origin) -> Result<Vec<Output>, Message> {
-    let known: Vec<&str> = Output::ALL.iter().map(|output| output.name()).collect();
-    let names = origin.languages.iter().chain(&origin.doors);
-    let found = names.map(|name| Output::find(name).ok_or_else(|| messages::unknown("output", name, &known)));
-    let outputs = found.collect::<Result<Vec<_>, _>>()?;
-    if outputs.iter().any(|output| output.is_core()) {
-        Ok(outputs)
-    } else {
-        Err(Message::new("no language").expected("`languages` with c, rust or both"))
     }
 }

@@ -27,7 +27,7 @@ pub(crate) use regression::error_v;
 use regression::{Model, hull};
 pub use separation::Separation;
 pub(crate) use separation::load_line;
-pub use show::text;
+pub use show::{comment, text};
 pub(crate) use show::{error_head, error_line, wrapped};
 pub(crate) use validation::rms;
 

@@ -138,3 +138,24 @@ fn components(fit: &Fit) -> String {
         list.join(", ")
     )
 }
+
+/// What stands above the mapping in its file: which program fitted it to what, and how large the errors are, V.
+#[must_use]
+pub fn comment(report: &Report) -> String {
+    let fit = &report.fit;
+    let mut text = format!(
+        "Duty ratio mapping, fitted by policyc {} to {} settled points ({} components).\n\
+         Voltage error rms {:.4} V, leave-one-out {:.4} V rms, {:.4} V at most; without a mapping {:.4} V rms.",
+        env!("CARGO_PKG_VERSION"),
+        fit.rows.len(),
+        fit.components,
+        fit.with.rms_v,
+        fit.left_out.rms_v,
+        fit.left_out.max_v,
+        fit.without.rms_v
+    );
+    for finding in &fit.separation.findings {
+        text += &format!("\nNote: {finding}.");
+    }
+    text
+}

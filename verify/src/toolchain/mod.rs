@@ -6,6 +6,7 @@ pub mod debian;
 mod run;
 mod rust;
 
+use std::fmt;
 use std::path::PathBuf;
 use std::process::Command;
 use std::time::Duration;
@@ -58,6 +59,18 @@ pub struct Missing {
     pub reason: String,
     /// What to type to get it, if that is known.
     pub install: Option<Install>,
+}
+
+impl fmt::Display for Missing {
+    /// What is missing, and how to get it if that is known.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.reason)?;
+        match &self.install {
+            Some(Install::Package(package)) => write!(f, " (Debian package {package})"),
+            Some(Install::RustTarget(triple)) => write!(f, " (rustup target add {triple})"),
+            None => Ok(()),
+        }
+    }
 }
 
 /// How to get a tool.

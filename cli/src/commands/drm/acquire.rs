@@ -1,79 +1,20 @@
 //! `policyc drm acquire`
 
-use std::path::PathBuf;
-
-use clap::Args;
+use closed_loop::refit::AtEnvironment;
+use closed_loop::{Converter, Error};
 use drm::Table;
-use drm::acquire::{Plan, Protocol, measure};
+use drm::acquire::{Bench, Plan, Protocol, measure};
 use measured::Sheet;
 use plant::Parameters;
+use spice::SpiceConverter;
 
-use super::Loads;
-use super::bench::Simulator;
+use crate::arguments::drm::{Acquire, Simulator};
 use crate::commands::progress_line::ProgressLine;
 use crate::{Failure, Outcome, output};
 
-#[derive(Debug, Args)]
-pub struct Acquire {
-    /// The converter to measure, simulated; without it a plan for the bench is written
-    #[arg(long, value_name = "FILE")]
-    pub plant: Option<PathBuf>,
-    /// What simulates it
-    #[arg(long, value_enum, default_value_t = Simulator::Plant, requires = "plant")]
-    pub simulator: Simulator,
-    /// Nominal input voltage in V; with --plant the plant's unless given
-    #[arg(long, value_name = "V", required_unless_present = "plant")]
-    pub v_in: Option<f64>,
-    /// Duty ratios: a list 0.4,0.5,0.6 or FROM:STEP:TO
-    #[arg(long, value_name = "LIST", value_parser = duties)]
-    pub duties: Duties,
-    #[command(flatten)]
-    pub loads: Loads,
-    /// Table to write
-    #[arg(long, value_name = "FILE")]
-    pub out: PathBuf,
-    /// Take measured points over from this table and go on with the others
-    #[arg(long, value_name = "TABLE")]
-    pub resume: Option<PathBuf>,
-    /// Pause after each point at the bench, in s; a simulated converter has no temperature and is not waited for
-    #[arg(long, value_name = "S", default_value_t = 0.0)]
-    pub cool_down: f64,
-    /// Periods whose mean is one figure
-    #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
-    pub window: u32,
-    /// After so many windows a point counts as unsettled
-    #[arg(long, value_name = "N", default_value_t = 40, value_parser = clap::value_parser!(u32).range(3..=100_000))]
-    pub most_windows: u32,
-}
-
-/// Duty ratios on the command line.
-#[derive(Debug, Clone)]
-pub struct Duties(Vec<f64>);
-
-fn duties(text: &str) -> Result<Duties, String> {
-    let number = |text: &str| {
-        let number = text.trim().parse::<f64>().ok().filter(|number| number.is_finite());
-        number.ok_or_else(|| format!("`{text}` is not a number"))
-    };
-    let parts: Vec<&str> = text.split(':').collect();
-    let [from, step, to] = parts[..] else {
-        return Ok(Duties(text.split(',').map(number).collect::<Result<_, _>>()?));
-    };
-    let (from, step, to) = (number(from)?, number(step)?, number(to)?);
-    let count = ((to - from) / step + 1e-9).floor();
-    if !(step > 0.0 && (0.0..1000.0).contains(&count)) {
-        return Err("expected FROM:STEP:TO with STEP > 0, FROM below TO and at most 1000 duties".to_owned());
-    }
-    // in steps of 1e-9, so that 0.1 + 0.2 is written 0.3
-    let tidy = |duty: f64| (duty * 1e9).round() / 1e9;
-    Ok(Duties(
-        (0..=count as u32).map(|k| tidy(from + f64::from(k) * step)).collect(),
-    ))
-}
-
 /// Measures or plans.
 pub fn run(options: &Acquire) -> Result<Outcome, Failure> {
-    let parameters = options.plant.as_deref().map(super::plant_parameters).transpose()?;
+    let parameters = options.plant.as_deref().map(Parameters::from_file).transpose()?;
     let nominal = parameters.as_ref().map(|parameters| parameters.converter.v_in);
     let v_in = options.v_in.or(nominal).unwrap_or_default();
     let mut plan = Plan::new(v_in, &options.duties.0, &options.loads.settings(), options.cool_down)?;
@@ -93,7 +34,7 @@ pub fn run(options: &Acquire) -> Result<Outcome, Failure> {
 /// Measures what is open; in ngspice, where it takes long, the table is written after each point, so that an
 /// interrupted run can be resumed.
 fn measure_open(options: &Acquire, parameters: &Parameters, plan: &mut Plan) -> Result<usize, Failure> {
-    let mut bench = options.simulator.bench(parameters)?;
+    let mut bench = bench(options.simulator, parameters)?;
     let protocol = Protocol {
         window: options.window as usize,
         most_windows: options.most_windows as usize,
@@ -111,6 +52,14 @@ fn measure_open(options: &Acquire, parameters: &Parameters, plan: &mut Plan) -> 
     }
     progress.clear();
     Ok(measured)
+}
+
+/// A simulated converter as one that settled points are measured at.
+fn bench(simulator: Simulator, parameters: &Parameters) -> Result<Box<dyn Bench<Error = Error>>, Error> {
+    Ok(match simulator {
+        Simulator::Plant => Box::new(AtEnvironment(Converter::new(parameters)?)),
+        Simulator::Ngspice => Box::new(AtEnvironment(SpiceConverter::new(parameters)?)),
+    })
 }
 
 fn summary(options: &Acquire, plan: &Plan, kept: usize, measured: usize) -> String {

@@ -1,69 +1,11 @@
 //! `policyc drm fit`
 
-use std::path::PathBuf;
+use drm::{Conduction, FitOptions, Form, simulation_toml};
+use plant::Parameters;
+use toml_input::messages;
 
-use clap::{Args, ValueEnum};
-use drm::{Conduction, FitOptions, Form, Report, simulation_toml};
-
-use super::Reading;
-use crate::ownership::Replacing;
+use crate::arguments::drm::{Fit, Terms};
 use crate::{Failure, Outcome, output};
-
-#[derive(Debug, Args)]
-pub struct Fit {
-    /// Settled points as CSV with the columns duty (or d_real), v_out, i_out, v_in
-    pub table: PathBuf,
-    /// Mapping to write; an older one of policyc is replaced
-    #[arg(long, value_name = "FILE", default_value = "drm.toml")]
-    pub out: PathBuf,
-    #[command(flatten)]
-    pub reading: Reading,
-    /// Form of the mapping
-    #[arg(long, value_enum, default_value_t = Terms::Auto)]
-    pub terms: Terms,
-    /// Components of the partial least squares, instead of cross-validation
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=3))]
-    pub components: Option<u8>,
-    /// The converter, for its boundary of discontinuous conduction
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["inductance", "f_sw", "v_f"])]
-    pub plant: Option<PathBuf>,
-    /// Inductance in H, for the boundary of discontinuous conduction (diode rectifier)
-    #[arg(long, value_name = "H", requires = "f_sw")]
-    pub inductance: Option<f64>,
-    /// Switching frequency in Hz
-    #[arg(long, value_name = "HZ", requires = "inductance")]
-    pub f_sw: Option<f64>,
-    /// Forward voltage of the diode in V
-    #[arg(long, value_name = "V", default_value_t = 0.0)]
-    pub v_f: f64,
-    /// Name outliers, but leave them in the fit
-    #[arg(long)]
-    pub keep_outliers: bool,
-    /// Take a as given, for a table whose voltage does not vary
-    #[arg(long, value_name = "A")]
-    pub assume_a: Option<f64>,
-    /// Write a page with pictures as well: errors, surface, leave-one-out
-    #[arg(long, value_name = "FILE.html")]
-    pub report: Option<PathBuf>,
-    #[command(flatten)]
-    pub replacing: Replacing,
-    /// Machine-readable
-    #[arg(long)]
-    pub json: bool,
-}
-
-/// Form on the command line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Terms {
-    /// The four-term form where it foretells clearly better
-    Auto,
-    /// a d_sim + b i_out + c
-    #[value(name = "3")]
-    Three,
-    /// With the product r i_out d_sim
-    #[value(name = "4")]
-    Four,
-}
 
 /// Fits, writes, reports.
 pub fn run(options: &Fit) -> Result<Outcome, Failure> {
@@ -78,7 +20,7 @@ pub fn run(options: &Fit) -> Result<Outcome, Failure> {
     let page = page.transpose()?;
     let simulation = options.reading.simulation()?;
     let mapping =
-        report.fit.map.to_toml(&comment(&report)) + &simulation.as_ref().map_or_else(String::new, simulation_toml);
+        report.fit.map.to_toml(&drm::comment(&report)) + &simulation.as_ref().map_or_else(String::new, simulation_toml);
     output::replace_own_one(&options.out, &mapping, options.replacing)?;
     if let Some((path, page)) = &page {
         output::replace_own_one(path, page, options.replacing)?;
@@ -108,10 +50,10 @@ fn fit_options(options: &Fit) -> Result<FitOptions, Failure> {
     ];
     for (name, value) in numbers {
         if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
-            return Err(super::not_positive(name, value));
+            return Err(messages::not_positive(name, value).into());
         }
     }
-    let plant = options.plant.as_deref().map(super::plant_parameters).transpose()?;
+    let plant = options.plant.as_deref().map(Parameters::from_file).transpose()?;
     let continuous = plant.as_ref().is_some_and(|plant| Conduction::of(plant).is_none());
     Ok(FitOptions {
         form: match options.terms {
@@ -125,24 +67,4 @@ fn fit_options(options: &Fit) -> Result<FitOptions, Failure> {
         keep_outliers: options.keep_outliers,
         assumed_a: options.assume_a,
     })
-}
-
-/// What stands above the mapping in its file.
-fn comment(report: &Report) -> String {
-    let fit = &report.fit;
-    let mut text = format!(
-        "Duty ratio mapping, fitted by policyc {} to {} settled points ({} components).\n\
-         Voltage error rms {:.4} V, leave-one-out {:.4} V rms, {:.4} V at most; without a mapping {:.4} V rms.",
-        env!("CARGO_PKG_VERSION"),
-        fit.rows.len(),
-        fit.components,
-        fit.with.rms_v,
-        fit.left_out.rms_v,
-        fit.left_out.max_v,
-        fit.without.rms_v
-    );
-    for finding in &fit.separation.findings {
-        text += &format!("\nNote: {finding}.");
-    }
-    text
 }

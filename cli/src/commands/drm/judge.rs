@@ -1,46 +1,14 @@
 //! `policyc drm judge`
 
-use std::path::PathBuf;
-
-use clap::Args;
 use drm::DutyRatioMap;
 use drm::formula::Losses;
 use drm::judge::{Judgement, Steady};
-use policy::Interval;
+use plant::Parameters;
 use serde::Serialize;
 use toml_input::Message;
 
-use super::{Loads, Reading};
+use crate::arguments::drm::Judge;
 use crate::{Failure, Outcome, output};
-
-#[derive(Debug, Args)]
-pub struct Judge {
-    /// Settled points as CSV with the columns duty (or d_real), v_out, i_out, v_in
-    #[arg(required_unless_present = "plant")]
-    pub table: Option<PathBuf>,
-    /// The mapping
-    #[arg(long, value_name = "FILE", default_value = "drm.toml")]
-    pub mapping: PathBuf,
-    #[command(flatten)]
-    pub reading: Reading,
-    /// Duty limits of the controller
-    #[arg(long, value_name = "LOW,HIGH", value_parser = super::duty_limits)]
-    pub duty_limits: Option<Interval>,
-    /// The real converter, simulated
-    #[arg(long, value_name = "FILE", requires_all = ["nominal", "v_ref"])]
-    pub plant: Option<PathBuf>,
-    /// The converter that the policy was trained on
-    #[arg(long, value_name = "FILE", requires = "plant")]
-    pub nominal: Option<PathBuf>,
-    /// Wanted voltage in V
-    #[arg(long, value_name = "V", requires = "plant")]
-    pub v_ref: Option<f64>,
-    #[command(flatten)]
-    pub loads: Loads,
-    /// Machine-readable
-    #[arg(long)]
-    pub json: bool,
-}
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -90,7 +58,7 @@ fn steady(options: &Judge, map: &DutyRatioMap) -> Result<Option<Vec<Steady>>, Fa
     let (Some(real), Some(nominal), Some(v_ref)) = (&options.plant, &options.nominal, options.v_ref) else {
         return Ok(None);
     };
-    let (real, nominal) = (super::plant_parameters(real)?, super::plant_parameters(nominal)?);
+    let (real, nominal) = (Parameters::from_file(real)?, Parameters::from_file(nominal)?);
     if !(v_ref > 0.0 && v_ref < real.converter.v_in.min(nominal.converter.v_in)) {
         let message = Message::new("--v-ref is out of reach").found(format!("{v_ref} V"));
         return Err(message.expected("above 0 and below the input voltages").into());

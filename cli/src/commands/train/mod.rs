@@ -1,27 +1,27 @@
 //! `policyc train`
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::collections::BTreeSet;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use toml_input::{FileName, Message};
-use train::scenario_table as table;
-use train::seeds::best;
-use train::{Contract, Converter, Course, Ended, Outcome as Trained, SeedRun, Settings, train_all};
+use train::{
+    Contract, Converter, Course, Ended, Outcome as Trained, SeedRun, Settings, scenario_table, seeds, train_all,
+};
 
-use super::grouped;
 use crate::arguments::Train;
 use crate::{Failure, Outcome, interruption, output};
+use report::grouped;
 
+mod kept;
 mod progress;
 
+use kept::Kept;
 use progress::Watcher;
 
 /// Time between two checkpoints on the way. A kill or a power cut may cost five seconds of work; the rest is for a look at
 /// the selection scenarios and for writing.
 const CHECKPOINT_EVERY: Duration = Duration::from_secs(3);
-const CHECKPOINTS: &str = "checkpoints";
 const SEEDS: &str = "seeds";
 
 /// Trains all seeds and writes the folders.
@@ -47,7 +47,7 @@ pub fn run(options: &Train) -> Result<Outcome, Failure> {
     if runs.iter().any(|run| run.ended == Ended::Interrupted) {
         return interrupted(options, &settings, &kept, &runs);
     }
-    let Some(best) = best(&runs) else {
+    let Some(best) = seeds::best(&runs) else {
         return Err(Message::new("no seed was trained").into());
     };
     write(&options.out, &settings, &runs, best)?;
@@ -61,7 +61,7 @@ fn write(out: &Path, settings: &Settings, runs: &[SeedRun], best: &Trained) -> R
         output::write_all(&out.join(SEEDS).join(outcome.seed.to_string()), &outcome.files)?;
     }
     let mut files = best.files.clone();
-    files.insert("seeds.txt".to_owned(), seeds_table(settings, runs).into_bytes());
+    files.insert("seeds.txt".to_owned(), seeds::table(settings, runs).into_bytes());
     output::write_all(out, &files)
 }
 
@@ -75,11 +75,11 @@ fn report(
     let steps: u64 = runs.iter().map(|run| run.steps).sum();
     let seconds = start.elapsed().as_secs_f64();
     let out = options.out.display();
-    let mut text = seeds_table(settings, runs);
+    let mut text = seeds::table(settings, runs);
     text.push_str(&format!(
         "\nSeed {}, best on the selection scenarios, in its evaluation (at sampling instants / worst of all instants):\n\n{}",
         best.seed,
-        table(&best.findings)
+        scenario_table(&best.findings)
     ));
     text.push_str(&format!(
         "\n{} control periods in {seconds:.1} s; policy in {out}, all seeds in {out}/{SEEDS}\n\
@@ -89,38 +89,6 @@ fn report(
     output::say(&text)?;
     let missed = !settings.specification.is_empty() && !best.evaluated.met;
     Ok(if missed { Outcome::Different } else { Outcome::Done })
-}
-
-/// One line per seed.
-fn seeds_table(settings: &Settings, runs: &[SeedRun]) -> String {
-    let verdict = |met: bool| match (settings.specification.is_empty(), met) {
-        (true, _) => "-",
-        (false, true) => "met",
-        (false, false) => "missed",
-    };
-    let mut text =
-        "seed  control periods  kept after  selection  evaluation  deviation V  settling ms  tail V   cost\n"
-            .to_owned();
-    for run in runs {
-        let Some(outcome) = &run.outcome else { continue };
-        let largest = |figure: fn(&train::Metrics) -> f64| {
-            let figures = outcome.findings.iter().map(|finding| figure(&finding.worst));
-            figures.fold(0.0, f64::max)
-        };
-        text.push_str(&format!(
-            "{:4}  {:>15}  {:>10}  {:<9}  {:<10}  {:>11.2}  {:>11.2}  {:>6.3}  {:>6.3}\n",
-            outcome.seed,
-            grouped(run.steps),
-            grouped(outcome.best_step),
-            verdict(outcome.selected.met),
-            verdict(outcome.evaluated.met),
-            largest(|metrics| metrics.deviation),
-            1e3 * largest(|metrics| metrics.settling),
-            largest(|metrics| metrics.tail_max),
-            outcome.selected.cost,
-        ));
-    }
-    text
 }
 
 fn interrupted(options: &Train, settings: &Settings, kept: &Kept, runs: &[SeedRun]) -> Result<Outcome, Failure> {
@@ -138,7 +106,7 @@ fn interrupted(options: &Train, settings: &Settings, kept: &Kept, runs: &[SeedRu
     }
     output::say(&format!(
         "{}\nInterrupted; checkpoints in {}. To go on: {resume} --resume",
-        seeds_table(settings, runs),
+        seeds::table(settings, runs),
         kept.folder.display()
     ))?;
     Ok(Outcome::Interrupted)
@@ -152,70 +120,5 @@ fn distinct(seeds: &[u64]) -> Result<Vec<u64>, Failure> {
             let message = Message::new("--seeds names a seed twice").found(seed.to_string());
             Err(message.expected("different numbers").into())
         }
-    }
-}
-
-/// Checkpoints of a training, one file per seed.
-pub struct Kept {
-    out: PathBuf,
-    folder: PathBuf,
-    failure: Mutex<Option<Failure>>,
-}
-
-impl Kept {
-    fn new(out: &Path) -> Self {
-        Self {
-            out: out.to_owned(),
-            folder: out.join(CHECKPOINTS),
-            failure: Mutex::new(None),
-        }
-    }
-
-    fn path(&self, seed: u64) -> PathBuf {
-        self.folder.join(format!("seed-{seed}.bin"))
-    }
-
-    /// The checkpoints to go on from. Hours of work are not overwritten by a command that was typed once too often.
-    fn prepare(&self, seeds: &[u64], resume: bool) -> Result<BTreeMap<u64, Vec<u8>>, Failure> {
-        let (out, kept) = (self.out.display(), self.folder.display());
-        if self.out.join("policy.toml").exists() {
-            let message = Message::new(format!("{out} holds a policy already; nothing written"));
-            return Err(message.hint("choose another --out, or move it away").into());
-        }
-        let found: Vec<u64> = seeds.iter().copied().filter(|seed| self.path(*seed).exists()).collect();
-        match (resume, found.is_empty()) {
-            (false, true) => Ok(BTreeMap::new()),
-            (false, false) => {
-                let message = Message::new(format!("{out} holds an interrupted training; nothing written"));
-                let hint = format!("--resume goes on with it; to begin anew, remove {kept} or choose another --out");
-                Err(message.hint(hint).into())
-            }
-            (true, true) => {
-                let message = Message::new("nothing to resume");
-                let message = message.found(format!("no checkpoint of these seeds in {kept}"));
-                Err(message.hint("without --resume the training begins").into())
-            }
-            (true, false) => found.into_iter().map(|seed| Ok((seed, self.read(seed)?))).collect(),
-        }
-    }
-
-    fn read(&self, seed: u64) -> Result<Vec<u8>, Failure> {
-        let path = self.path(seed);
-        std::fs::read(&path).map_err(|error| Message::new(format!("cannot read {}: {error}", path.display())).into())
-    }
-
-    fn write(&self, seed: u64, bytes: &[u8]) -> Result<(), Failure> {
-        let name = self
-            .path(seed)
-            .file_name()
-            .map(|name| name.to_string_lossy().into_owned());
-        let files = BTreeMap::from([(name.unwrap_or_default(), bytes.to_vec())]);
-        output::write_all(&self.folder, &files)
-    }
-
-    /// They belong to a training that is whole now.
-    fn remove(&self) {
-        // what cannot be removed only takes room
-        let _ = std::fs::remove_dir_all(&self.folder);
     }
 }

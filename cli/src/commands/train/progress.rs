@@ -7,11 +7,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressStyle};
-use train::{Ended, Progress, SeedRun, Settings, Watch};
+use train::{Progress, SeedRun, Settings, Watch};
 
-use super::super::grouped;
-use super::Kept;
+use super::kept::Kept;
 use crate::Failure;
+use report::grouped;
 
 const LOG_EVERY: Duration = Duration::from_secs(5);
 
@@ -54,20 +54,8 @@ impl<'a> Watcher<'a> {
             // progress that cannot be shown is no reason to stop
             let _ = all.clear();
         }
-        let failure = self.kept.failure.lock().ok().and_then(|mut failure| failure.take());
-        failure.map_or(Ok(()), Err)
+        self.kept.failure()
     }
-}
-
-/// Reward, error and how far the best policy is from the specification.
-fn text(progress: &Progress) -> String {
-    let look = &progress.look;
-    let best = if progress.best.is_finite() {
-        format!("{:.3}", progress.best)
-    } else {
-        "-".to_owned()
-    };
-    format!("reward {:7.2}  |e| {:6.3} V  best cost {best}", look.reward, look.error)
 }
 
 impl Watch for Watcher<'_> {
@@ -78,7 +66,7 @@ impl Watch for Watcher<'_> {
             View::Bars(all, bars) => {
                 let bar = bars.entry(seed).or_insert_with(|| all.add(new_bar(seed, self.steps)));
                 bar.set_position(look.step);
-                bar.set_message(text(progress));
+                bar.set_message(progress.to_string());
             }
             View::Log(shown) => {
                 let last = shown.entry(seed).or_insert_with(Instant::now);
@@ -88,7 +76,7 @@ impl Watch for Watcher<'_> {
                         "seed {seed}: {} of {}, {}, {} left at most",
                         grouped(look.step),
                         grouped(self.steps),
-                        text(progress),
+                        progress,
                         HumanDuration(Duration::from_secs_f64(progress.remaining.clamp(0.0, 1e9)))
                     );
                 }
@@ -97,23 +85,15 @@ impl Watch for Watcher<'_> {
     }
 
     fn checkpoint(&self, seed: u64, bytes: &[u8]) {
-        if let Err(failure) = self.kept.write(seed, bytes) {
+        if !self.kept.try_write(seed, bytes) {
             // a training that cannot be kept is stopped while it can be told
             self.stop.store(true, Ordering::Relaxed);
-            if let Ok(mut first) = self.kept.failure.lock() {
-                first.get_or_insert(failure);
-            }
         }
     }
 
     fn ended(&self, seed: u64, run: &SeedRun) {
         let Ok(mut view) = self.view.lock() else { return };
-        let how = match run.ended {
-            Ended::Met => "meets the specification",
-            Ended::Budget => "has used its budget",
-            Ended::Interrupted => "is interrupted",
-        };
-        let line = format!("seed {seed} {how} after {} control periods", grouped(run.steps));
+        let line = format!("seed {seed} {} after {} control periods", run.ended, grouped(run.steps));
         match &mut *view {
             View::Bars(all, bars) => {
                 if let Some(bar) = bars.remove(&seed) {

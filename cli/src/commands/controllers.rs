@@ -1,21 +1,28 @@
 //! The policy in the loop: interpreted, or compiled and running as a program of its own.
 
-use closed_loop::{Answer, Call, Controller, External, interpreter};
+use closed_loop::{Answer, Call, Error, External, Named, interpreter};
 use codegen::Language;
 use policy::Policy;
 use verify::Live;
 
-use crate::Failure;
 use crate::arguments::ControllerKind;
+use crate::interruption;
 
-/// A controller and what it is called.
-pub struct Named {
-    pub name: String,
-    pub controller: Box<dyn Controller>,
+/// The policy's controller of this kind; the others behind it where they are to be compared with it.
+pub fn start_all(policy: &Policy, kind: ControllerKind, check: bool) -> Result<Vec<Named>, Error> {
+    use ControllerKind::{C, Interpreter, Rust};
+    let others = [Interpreter, Rust, C].into_iter();
+    let others = others.filter(|other| check && *other != kind);
+    let mut named = Vec::new();
+    for kind in [kind].into_iter().chain(others) {
+        interruption::go_on()?;
+        named.push(start(policy, kind)?);
+    }
+    Ok(named)
 }
 
 /// The policy's controller, started.
-pub fn start(policy: &Policy, kind: ControllerKind) -> Result<Named, Failure> {
+pub fn start(policy: &Policy, kind: ControllerKind) -> Result<Named, Error> {
     let (language, name) = match kind {
         ControllerKind::Interpreter => {
             return Ok(Named {

@@ -2,20 +2,15 @@
 
 use std::fmt;
 
-use ::targets::TargetSpec;
-use codegen::Output;
-use codegen::output::languages;
-use policy::{NumericFormat, Policy};
+use report::grouped;
 use serde::Serialize;
-use verify::measure::Costs;
 
-use super::costs::Measured;
-use super::grouped;
-use crate::Failure;
+use crate::measure::Costs;
 
-/// A clock from the command line.
+/// Clock of a processor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clock {
+    /// Frequency, Hz.
     pub hz: f64,
 }
 
@@ -24,6 +19,9 @@ const PLAUSIBLE: (f64, f64) = (1e3, 1e11);
 
 impl Clock {
     /// `168MHz`, `48 MHz`, `1.2GHz`, `32768Hz`.
+    ///
+    /// # Errors
+    /// If number or unit is missing, or no processor has such a clock.
     pub fn parse(text: &str) -> Result<Self, String> {
         let text = text.trim();
         let unit = text.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.');
@@ -90,7 +88,8 @@ pub struct Budget {
 }
 
 impl Budget {
-    /// `None` where the target has no cycle model.
+    /// That of a control period of `period` s; `None` where the target has no cycle model.
+    #[must_use]
     pub fn of(costs: &Costs, clock: Clock, period: f64) -> Option<Self> {
         let (least, most) = costs.model_cycles?;
         let period_cycles = clock.hz * period;
@@ -107,7 +106,8 @@ impl Budget {
         })
     }
 
-    /// One line for a build.
+    /// One line for the build of this name.
+    #[must_use]
     pub fn text(&self, build: &str) -> String {
         let (least, most) = (100.0 * self.share.0, 100.0 * self.share.1);
         let period = grouped(self.period_cycles as u64);
@@ -124,122 +124,6 @@ impl Budget {
             "  {build}: control period {verdict}; {least:.0} to {most:.0} % of {period} cycles at {clock} (model, never measured)"
         )
     }
-}
-
-/// What can be said without a model: how many cycles there are, and how many instructions.
-fn unmodelled(target: &TargetSpec, measured: &Measured, clock: Clock, period: f64) -> String {
-    let cycles = clock.hz * period;
-    let mut text = format!(
-        "  cannot be said: no cycles are modelled for {} (`policyc targets` says for which they are); a control period is {} cycles at {clock}",
-        target.name,
-        grouped(cycles as u64)
-    );
-    let least = measured.measured().min_by_key(|costs| costs.instructions_max);
-    if let Some(costs) = least {
-        let instructions = costs.instructions_max;
-        text += &format!(
-            ", and {} instructions in the shortest build, {}: it fits if the processor does {:.2} a cycle or more, with its wait states",
-            grouped(instructions),
-            costs.build,
-            instructions as f64 / cycles
-        );
-    }
-    text
-}
-
-/// A format that fits where the policy's own does not.
-struct Proposal {
-    format: NumericFormat,
-    build: String,
-    share: (f64, f64),
-}
-
-/// What is said about the budget, one line each.
-pub fn lines(
-    policy: &Policy,
-    target: &'static TargetSpec,
-    outputs: &[Output],
-    measured: &Measured,
-    clock: Clock,
-) -> Result<Vec<String>, Failure> {
-    let period = policy.sample_period;
-    let mut lines = vec![format!(
-        "budget of {} in {}:",
-        policy.name,
-        policy.numeric_format.name()
-    )];
-    let budgets = measured
-        .measured()
-        .filter_map(|costs| Some((costs.build.as_str(), Budget::of(costs, clock, period)?)));
-    let budgets: Vec<(&str, Budget)> = budgets.collect();
-    lines.extend(budgets.iter().map(|(build, budget)| budget.text(build)));
-    if budgets.is_empty() {
-        lines.push(match target.cycles {
-            None => unmodelled(target, measured, clock, period),
-            Some(_) => "  cannot be said: no step ran under the target's emulator here".to_owned(),
-        });
-        return Ok(lines);
-    }
-    if policy.numeric_format == NumericFormat::F32Fma {
-        lines.push("  note: the model does not know fused operations; it says too little".to_owned());
-    }
-    if budgets.iter().any(|(_, budget)| budget.fit == Fit::Met) {
-        return Ok(lines);
-    }
-    lines.push(match proposal(policy, target, outputs, clock)? {
-        Some(Proposal { format, build, share }) => format!(
-            "  = hint: --format {} takes {:.0} to {:.0} % with {build}{}",
-            format.name(),
-            100.0 * share.0,
-            100.0 * share.1,
-            if format.is_integer() {
-                "; `policyc certify` says what it does to the decision"
-            } else {
-                ""
-            }
-        ),
-        None => "  = hint: no numeric format fits: a faster clock, a longer period or a smaller network is needed"
-            .to_owned(),
-    });
-    Ok(lines)
-}
-
-/// What may be proposed, the most exact first; the cycle models do not know fused operations.
-const EXACT_FIRST: [NumericFormat; 4] = [
-    NumericFormat::F64,
-    NumericFormat::F32,
-    NumericFormat::I16,
-    NumericFormat::I8,
-];
-
-/// The most exact of the other formats that fits in every build that can be made here.
-fn proposal(
-    policy: &Policy,
-    target: &'static TargetSpec,
-    outputs: &[Output],
-    clock: Clock,
-) -> Result<Option<Proposal>, Failure> {
-    let languages = languages(outputs);
-    let cores: Vec<Output> = languages.iter().map(|language| language.core()).collect();
-    // binary64 from a library takes longer than anything else; whether it does, the target knows
-    let natural = |format: &NumericFormat| *format != NumericFormat::F64 || target.fpu.has(true);
-    let others = EXACT_FIRST.into_iter().filter(natural);
-    for format in others.filter(|format| *format != policy.numeric_format) {
-        let policy = policy.clone().with_format(format);
-        let files = codegen::sources(&policy, target, &cores, None)?.files;
-        let measured = Measured::of(&policy, target, &languages, &files);
-        let budgets = measured
-            .measured()
-            .filter_map(|costs| Some((costs, Budget::of(costs, clock, policy.sample_period)?)));
-        let best = budgets
-            .filter(|(_, budget)| budget.fit == Fit::Met)
-            .min_by(|(_, a), (_, b)| a.share.1.total_cmp(&b.share.1));
-        if let Some((Costs { build, .. }, Budget { share, .. })) = best {
-            let build = build.clone();
-            return Ok(Some(Proposal { format, build, share }));
-        }
-    }
-    Ok(None)
 }
 
 #[cfg(test)]

@@ -1,32 +1,32 @@
-//! A verification as text.
+//! A verification in words, for people.
 
-use std::fmt::Write;
+use std::fmt::{self, Write};
 
+use interp::decisions::Decisions;
+use interp::golden::{GoldenResult, MISREAD, UNPROVEN};
 use policy::Policy;
+use report::{grouped, quantity};
 use toml_input::Message;
-use verify::drift::Drift;
-use verify::toolchain::{Install, Missing};
-use verify::{BuildReport, Decisions, Difference, GoldenResult, Outcome, Report};
 
-use crate::Failure;
-use crate::commands::grouped;
+use crate::drift::Drift;
+use crate::report::{BuildReport, Difference, Outcome, Report};
+use crate::toolchain::Install;
 
-pub use interp::golden::MISREAD;
-
-/// What is open without golden vectors.
-pub const UNPROVEN: &str = "no golden vectors: nothing shows that the weights were read as the trainer meant";
-
-/// The whole report.
-pub fn report(policy: &Policy, report: &Report, drift: Option<&Drift>) -> Result<String, Failure> {
+/// The whole report: golden vectors, decisions, a line per build, what differs, the verdict last. `drift` is that of the
+/// folder that was verified, if it was one.
+///
+/// # Errors
+/// Never, in fact: writing to a text does not fail.
+pub fn report(policy: &Policy, report: &Report, drift: Option<&Drift>) -> Result<String, fmt::Error> {
     let mut out = String::new();
     if let Some(drift) = drift {
         write_drift(&mut out, drift)?;
     }
     if let Some(golden) = &report.golden {
-        writeln!(out, "golden vectors   {}", golden_text(golden))?;
+        writeln!(out, "golden vectors   {golden}")?;
     }
     if let Some(decisions) = &report.decisions {
-        for line in decisions_lines(policy, decisions) {
+        for line in self::decisions(policy, decisions) {
             writeln!(out, "{line}")?;
         }
     }
@@ -72,7 +72,7 @@ pub fn report(policy: &Policy, report: &Report, drift: Option<&Drift>) -> Result
             "DIFFERENT: {} does not give the trainer's golden answers",
             report.policy
         )?;
-        writeln!(out, "  = hint: {}", MISREAD)?;
+        writeln!(out, "  = hint: {MISREAD}")?;
     } else if report.golden.is_none() {
         writeln!(out, "note: {UNPROVEN}")?;
     }
@@ -88,8 +88,10 @@ pub fn report(policy: &Policy, report: &Report, drift: Option<&Drift>) -> Result
     Ok(out)
 }
 
-/// What the numeric format does to the trainer's decisions, and at which observation it does most.
-pub fn decisions_lines(policy: &Policy, decisions: &Decisions) -> Vec<String> {
+/// What the numeric format does to the trainer's decisions, and at which observation it does most: one line each. Losses are
+/// shares of the operating range of Q, duties 0..1.
+#[must_use]
+pub fn decisions(policy: &Policy, decisions: &Decisions) -> Vec<String> {
     let Decisions {
         numeric_format,
         observations,
@@ -110,12 +112,12 @@ pub fn decisions_lines(policy: &Policy, decisions: &Decisions) -> Vec<String> {
     let mut lines = vec![format!(
         "decisions in {numeric_format}: {word}{changed} of {observations} changed ({:.1} %, allowed {} %){ties}",
         100.0 * decisions.share(),
-        report::quantity(100.0 * allowed, "", 3),
+        quantity(100.0 * allowed, "", 3),
     )];
     let Some(change) = worst.first() else { return lines };
     lines.push(format!(
         "  they give up at most {largest_loss:.2} and on average {mean_loss:.4} of the operating range of Q, which is {}",
-        report::quantity(*operating_range, "", 3)
+        quantity(*operating_range, "", 3)
     ));
     let values = policy.features.iter().zip(&change.observation);
     let place: Vec<String> = values
@@ -132,31 +134,16 @@ pub fn decisions_lines(policy: &Policy, decisions: &Decisions) -> Vec<String> {
     lines
 }
 
-/// What the files alone tell.
-pub fn files_alone(policy: &str, drift: &Drift) -> Result<String, Failure> {
+/// What the files of a folder alone tell, where nothing was built.
+///
+/// # Errors
+/// Never, in fact: writing to a text does not fail.
+pub fn files_alone(policy: &str, drift: &Drift) -> Result<String, fmt::Error> {
     let mut out = String::new();
     write_drift(&mut out, drift)?;
     let word = if drift.is_empty() { "equal" } else { "DIFFERENT" };
     writeln!(out, "{word}: {policy}, by its files; no build was made")?;
     Ok(out)
-}
-
-pub fn golden_text(golden: &GoldenResult) -> String {
-    let mut parts = Vec::new();
-    if golden.actions_compared > 0 {
-        parts.push(format!(
-            "action equal in {} of {}",
-            golden.actions_equal, golden.actions_compared
-        ));
-    }
-    if let Some(error) = golden.worst_relative_error {
-        parts.push(format!(
-            "largest relative error of Q {error:.1e} (allowed {:.0e})",
-            golden.tolerance
-        ));
-    }
-    let word = if golden.passed() { "" } else { "DIFFERENT: " };
-    format!("{word}{}", parts.join(", "))
 }
 
 fn verdict(build: &BuildReport) -> (&'static str, String) {
@@ -169,22 +156,13 @@ fn verdict(build: &BuildReport) -> (&'static str, String) {
         Outcome::CompileError { .. } => ("REFUSED", "by the compiler".to_owned()),
         Outcome::Skipped { missing } => (
             "skipped",
-            missing.iter().map(missing_text).collect::<Vec<_>>().join(", "),
+            missing.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "),
         ),
     }
 }
 
-/// What is missing and how to get it.
-pub fn missing_text(missing: &Missing) -> String {
-    let install = match &missing.install {
-        Some(Install::Package(package)) => format!(" (Debian package {package})"),
-        Some(Install::RustTarget(triple)) => format!(" (rustup target add {triple})"),
-        None => String::new(),
-    };
-    format!("{}{install}", missing.reason)
-}
-
 /// Why no build was compared, and what to type.
+#[must_use]
 pub fn nothing_compared(report: &Report) -> Message {
     let builds: Vec<String> = report
         .skipped()
@@ -207,7 +185,7 @@ pub fn nothing_compared(report: &Report) -> Message {
         .maybe_hint((!commands.is_empty()).then(|| commands.join("; ")))
 }
 
-fn write_difference(out: &mut String, build: &str, difference: &Difference) -> Result<(), Failure> {
+fn write_difference(out: &mut String, build: &str, difference: &Difference) -> fmt::Result {
     let Difference {
         step,
         event,
@@ -229,7 +207,7 @@ fn write_difference(out: &mut String, build: &str, difference: &Difference) -> R
     Ok(())
 }
 
-fn write_drift(out: &mut String, drift: &Drift) -> Result<(), Failure> {
+fn write_drift(out: &mut String, drift: &Drift) -> fmt::Result {
     if drift.is_empty() {
         writeln!(out, "files            as the policy yields them today")?;
         return Ok(());

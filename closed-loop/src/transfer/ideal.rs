@@ -1,12 +1,14 @@
 //! The exact mapping of a converter, as far as a formula goes: what a fitted one can be compared with.
 
-use closed_loop::{Answer, Controller, Error};
 use drm::formula::Losses;
 use plant::Signals;
 use policy::Interval;
 
+use crate::controller::{Answer, Controller};
+use crate::faults::Error;
+
 /// A controller without a mapping whose duty is turned into that with which `real` has the voltage of `trained_on`.
-pub struct Ideal<'a> {
+pub(super) struct Ideal<'a> {
     pub inner: &'a mut dyn Controller,
     pub trained_on: Losses,
     pub real: Losses,

@@ -2,56 +2,89 @@
 
 use std::collections::BTreeMap;
 
-use closed_loop::scenario::{Metrics, SETTLED};
-use closed_loop::{LoadStep, MetricsCsv, comparison};
 use report::{Cell, Page, Section, Table, Verdict};
 
-use super::{Findings, Real, Run, pictures, runs};
-use crate::Failure;
-use crate::commands::drm::bench::Simulator;
+use super::findings::{Findings, MAPPED, Real, Run};
+use super::pictures;
+use crate::faults::{Error, told};
+use crate::scenario::{Metrics, SETTLED};
+use crate::tables::{COLUMNS, MetricsCsv, cells, comparison};
 
-/// The page with everything on it.
+/// Name of the page with everything on it, among the files.
 pub const PAGE: &str = "report.html";
 
-/// Name and text of every file.
-pub fn all(found: &Findings) -> Result<BTreeMap<String, String>, Failure> {
-    let mut files = BTreeMap::new();
-    let mut metrics = MetricsCsv::default();
-    add(&mut metrics, found.simulation.name, &found.simulation);
-    let sentence = sentence(found);
-    let mut page = Page::new(format!("Transfer of {}", found.setting.policy.name))
-        .verdict(Verdict::Note, sentence)
-        .section(Section::new("").text(explanation(found)).table(overview(found)));
-    let simulation = drm::simulation_toml(&found.setting.trained_on);
-    for real in &found.real {
-        let name = &real.name;
-        files.insert(format!("{name}-points.csv"), real.points.clone());
-        files.insert(
-            format!("{name}-drm.toml"),
-            real.report.fit.map.to_toml("") + &simulation,
-        );
-        let text = drm::text(&real.report)?;
-        let mut section = Section::new(name.as_str());
-        for run in &real.runs {
-            add(&mut metrics, &format!("{name}: {}", run.name), run);
+impl Findings {
+    /// Name and text of every file: points, mapping and pictures of each real converter, metrics, the summary with the figures
+    /// of every load step, and the [`PAGE`].
+    ///
+    /// # Errors
+    /// If a picture cannot be drawn.
+    pub fn files(&self) -> Result<BTreeMap<String, String>, Error> {
+        let mut files = BTreeMap::new();
+        let mut metrics = MetricsCsv::default();
+        add(&mut metrics, self.simulation.name, &self.simulation);
+        let mut page = Page::new(format!("Transfer of {}", self.setting.policy.name))
+            .verdict(Verdict::Note, sentence(self))
+            .section(Section::new("").text(explanation(self)).table(overview(self)));
+        let simulation = drm::simulation_toml(&self.setting.trained_on);
+        for real in &self.real {
+            let name = &real.name;
+            files.insert(format!("{name}-points.csv"), real.points.clone());
+            let mapping = real.report.fit.map.to_toml("") + &simulation;
+            files.insert(format!("{name}-drm.toml"), mapping);
+            for run in &real.runs {
+                add(&mut metrics, &format!("{name}: {}", run.name), run);
+            }
+            page = page.section(section(self, real, &mut files)?);
         }
-        for note in &real.notes {
-            section = section.text(format!("Note: {note}."));
-        }
-        for remark in &real.remarks {
-            section = section.text(format!("No mapping repairs: {remark}."));
-        }
-        for (index, course) in found.simulation.courses.iter().enumerate() {
-            let picture = pictures::picture(found, real, index)?;
-            files.insert(format!("{name}-{}.svg", stem(course.step)), picture.as_str().to_owned());
-            section = section.chart(picture, CAPTION).table(table(found, real, index));
-        }
-        page = page.section(section.details(Section::new("Fit").code(text)));
+        files.insert("metrics.csv".to_owned(), metrics.finish());
+        files.insert("summary.txt".to_owned(), whole_summary(self));
+        files.insert(PAGE.to_owned(), page.html().map_err(told)?);
+        Ok(files)
     }
-    files.insert("metrics.csv".to_owned(), metrics.finish());
-    files.insert("summary.txt".to_owned(), summary(found));
-    files.insert(PAGE.to_owned(), page.html()?);
-    Ok(files)
+
+    /// The largest figures, the mappings and what none repairs, for people: voltages in V, times in ms.
+    #[must_use]
+    pub fn summary(&self) -> String {
+        let mut out = format!("{}\n\n{}", explanation(self), overview_text(self));
+        for real in &self.real {
+            let fit = &real.report.fit;
+            out.push_str(&format!(
+                "\n{}: {} points, leave-one-out {:.4} V rms, {:.4} V at most; {}\n",
+                real.name,
+                fit.rows.len(),
+                fit.left_out.rms_v,
+                fit.left_out.max_v,
+                formula(real)
+            ));
+            for note in &real.notes {
+                out.push_str(&format!("  note: {note}\n"));
+            }
+            for remark in &real.remarks {
+                out.push_str(&format!("  no mapping repairs: {remark}\n"));
+            }
+        }
+        out
+    }
+}
+
+/// A real converter on the page; its pictures are files as well.
+fn section(found: &Findings, real: &Real, files: &mut BTreeMap<String, String>) -> Result<Section, Error> {
+    let mut section = Section::new(real.name.as_str());
+    for note in &real.notes {
+        section = section.text(format!("Note: {note}."));
+    }
+    for remark in &real.remarks {
+        section = section.text(format!("No mapping repairs: {remark}."));
+    }
+    for (index, course) in found.simulation.courses.iter().enumerate() {
+        let picture = pictures::picture(found, real, index)?;
+        let stem = course.finding.step().stem();
+        files.insert(format!("{}-{stem}.svg", real.name), picture.as_str().to_owned());
+        section = section.chart(picture, CAPTION).table(table(found, real, index));
+    }
+    let text = drm::text(&real.report).map_err(told)?;
+    Ok(section.details(Section::new("Fit").code(text)))
 }
 
 const CAPTION: &str =
@@ -63,48 +96,19 @@ fn add(metrics: &mut MetricsCsv, name: &str, run: &Run) {
     }
 }
 
-/// Start of the names of a load step's files: `200-500W`.
-fn stem(step: LoadStep) -> String {
-    let [from, to] = step.values;
-    format!("{from}-{to}{}", step.kind.unit())
-}
-
 /// The runs at a converter, that in simulation first.
 fn rows<'a>(found: &'a Findings, real: &'a Real) -> impl Iterator<Item = &'a Run> {
     std::iter::once(&found.simulation).chain(&real.runs)
 }
 
 /// The summary with the figures of every load step.
-fn summary(found: &Findings) -> String {
-    let mut out = said(found);
+fn whole_summary(found: &Findings) -> String {
+    let mut out = found.summary();
     for real in &found.real {
         out.push_str(&format!("\n{}\n", real.name));
         for (index, course) in found.simulation.courses.iter().enumerate() {
             let findings = rows(found, real).filter_map(|run| Some((run.name, &run.courses.get(index)?.finding)));
-            out.push_str(&format!("\n{}", comparison(course.step, findings, [])));
-        }
-    }
-    out
-}
-
-/// What is printed: the largest figures, the mappings and what none repairs.
-pub fn said(found: &Findings) -> String {
-    let mut out = format!("{}\n\n{}", explanation(found), overview_text(found));
-    for real in &found.real {
-        let fit = &real.report.fit;
-        out.push_str(&format!(
-            "\n{}: {} points, leave-one-out {:.4} V rms, {:.4} V at most; {}\n",
-            real.name,
-            fit.rows.len(),
-            fit.left_out.rms_v,
-            fit.left_out.max_v,
-            formula(real)
-        ));
-        for note in &real.notes {
-            out.push_str(&format!("  note: {note}\n"));
-        }
-        for remark in &real.remarks {
-            out.push_str(&format!("  no mapping repairs: {remark}\n"));
+            out.push_str(&format!("\n{}", comparison(course.finding.step(), findings, [])));
         }
     }
     out
@@ -118,17 +122,14 @@ fn formula(real: &Real) -> String {
 
 fn explanation(found: &Findings) -> String {
     let setting = &found.setting;
-    let by = match setting.simulator {
-        Simulator::Plant => "the plant of this program",
-        Simulator::Ngspice => "ngspice",
-    };
     let task = &setting.scenario.task;
     format!(
-        "Policy {} ({}) at real converters simulated by {by}. True voltages at the sampling instants, errors from {} V, \
+        "Policy {} ({}) at real converters simulated by {}. True voltages at the sampling instants, errors from {} V, \
          settled within {SETTLED} V; worst of {} sampling instants / of {} instants and phases. Steady state: the last {} \
          of {} control periods after the step.",
         setting.policy.name,
         found.controller,
+        found.simulator,
         setting.v_ref,
         task.sampling_instants,
         task.all_instants().len(),
@@ -202,7 +203,7 @@ fn overview_text(found: &Findings) -> String {
 fn sentence(found: &Findings) -> String {
     let gained = |real: &&Real| {
         let before = real.runs.first().map(largest)?;
-        let after = real.runs.iter().find(|run| run.name == runs::MAPPED).map(largest)?;
+        let after = real.runs.iter().find(|run| run.name == MAPPED).map(largest)?;
         Some((real.name.clone(), before.tail_mean, after.tail_mean))
     };
     let all = found.real.iter().filter_map(|real| gained(&real));
@@ -218,12 +219,12 @@ fn sentence(found: &Findings) -> String {
 
 fn table(found: &Findings, real: &Real, index: usize) -> Table {
     let mut table = Table::new("").text("");
-    for heading in closed_loop::COLUMNS {
+    for heading in COLUMNS {
         table = table.text(heading);
     }
     for run in rows(found, real) {
         let Some(course) = run.courses.get(index) else { continue };
-        let cells = closed_loop::cells(&course.finding).into_iter().map(Cell::from);
+        let cells = cells(&course.finding).into_iter().map(Cell::from);
         table = table.row([Cell::from(run.name)].into_iter().chain(cells));
     }
     table

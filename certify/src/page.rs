@@ -1,14 +1,14 @@
-//! The page of a certificate.
+//! A certificate for people: a few lines, a map, a page.
 
 use std::collections::BTreeSet;
 
-use ::certify::{Certificate, Coordinate, Domain, Map, Measured, Memory, Share};
-use policy::Policy;
-use report::{Axis, Cell, HeatMap, Page, Ramp, ReportError, Section, Svg, Table, Verdict, quantity};
+use policy::{Interval, Policy};
+use report::{Axis, Cell, HeatMap, Page, Ramp, ReportError, Section, Svg, Table, Verdict, grouped, quantity};
 
-use crate::commands::grouped;
+use crate::{Certificate, Coordinate, Domain, Map, Measured, Memory, Share};
 
-/// The answer in a few lines.
+/// The answer in a few lines; errors have the unit of Q.
+#[must_use]
 pub fn summary(certificate: &Certificate) -> String {
     let bound = certificate.state_bound.bound.largest;
     let measured = &certificate.measured;
@@ -70,22 +70,25 @@ fn changed_text(measured: &Measured) -> String {
     format!("{} of {}", grouped(changed), grouped(all))
 }
 
-/// The slice as a picture.
+/// The slice of a certificate of `policy` as a picture, if it has one and a cell of it is proven.
+///
+/// # Errors
+/// If its axes have no extent.
 pub fn map(policy: &Policy, certificate: &Certificate) -> Result<Option<Svg>, ReportError> {
     let Some(map) = &certificate.map else { return Ok(None) };
     let domain = Domain::of(policy, map.slice.memory);
     let axis = |index: usize| {
-        let coordinate = &domain.coordinates()[index];
-        Axis::new(coordinate.name.as_str()).unit(&coordinate.unit)
+        let axis = |coordinate: &Coordinate| Axis::new(coordinate.name.as_str()).unit(&coordinate.unit);
+        domain.coordinates().get(index).map_or_else(|| Axis::new(""), axis)
     };
-    let centres = |range: policy::Interval, count: usize| -> Vec<f64> {
+    let centres = |range: Interval, count: usize| -> Vec<f64> {
         (0..count)
             .map(|n| range.low + (range.high - range.low) * (n as f64 + 0.5) / count as f64)
             .collect()
     };
-    let duty = |action: &Option<usize>| match action {
-        Some(action) => policy.actions[*action].duty,
-        None => f64::NAN,
+    let duty = |action: &Option<usize>| {
+        let action = action.and_then(|action| policy.actions.get(action));
+        action.map_or(f64::NAN, |action| action.duty)
     };
     let cells: Vec<f64> = map.actions.iter().map(duty).collect();
     let title = format!(
@@ -116,13 +119,16 @@ pub fn map(policy: &Policy, certificate: &Certificate) -> Result<Option<Svg>, Re
 /// One point for each square of finest cells, so that dots stay dots.
 fn thinned(map: &Map) -> Vec<(f64, f64)> {
     const SQUARES: f64 = 72.0;
-    let square = |x: f64, range: policy::Interval| (SQUARES * (x - range.low) / (range.high - range.low)) as i64;
+    let square = |x: f64, range: Interval| (SQUARES * (x - range.low) / (range.high - range.low)) as i64;
     let mut seen = BTreeSet::new();
     let is_first = |&(x, y): &(f64, f64)| seen.insert((square(x, map.slice.x.1), square(y, map.slice.y.1)));
     map.changes.iter().copied().filter(is_first).collect()
 }
 
-/// The whole page.
+/// The whole page as HTML; `picture` is that of [`map`].
+///
+/// # Errors
+/// Never, in fact: its tables have the columns that they say.
 pub fn page(policy: &Policy, certificate: &Certificate, picture: Option<Svg>) -> Result<String, ReportError> {
     let format = certificate.numeric_format.name();
     let sentence = format!(
@@ -284,7 +290,7 @@ fn meaning(policy: &Policy, certificate: &Certificate) -> Section {
         )
         .table(table)
         .pairs(certificate.copies.iter().map(|copy| {
-            let name = |index: usize| policy.features[index].name.as_str();
+            let name = |index: usize| policy.features.get(index).map_or("?", |feature| &feature.name);
             let offset = match copy.offset {
                 0.0 => String::new(),
                 offset => format!(" + ({})", digits(offset)),

@@ -1,21 +1,23 @@
 //! The page with all tables and pictures.
 
-use closed_loop::scenario::Metrics;
 use report::{Cell, Page, Section, Svg, Table, Verdict};
 
-use super::{Findings, Step, files};
-use crate::Failure;
+use super::findings::{Findings, Step};
+use super::words;
+use crate::faults::{Error, told};
+use crate::scenario::Metrics;
+use crate::tables::{COLUMNS, cells, limit_cells};
 
 /// One HTML file; `drawn` are the pictures of the load steps in their order.
-pub fn page(found: &Findings, drawn: Vec<Svg>) -> Result<String, Failure> {
+pub(super) fn page(found: &Findings, drawn: Vec<Svg>) -> Result<String, Error> {
     let setting = &found.setting;
     let (verdict, sentence) = verdict(found);
     let setup = [
         ("policy", setting.policy.name.clone()),
         ("run by", found.controller.clone()),
-        ("plant", files::plant_text(setting)),
+        ("plant", words::plant_text(setting)),
     ];
-    let mut about = Section::new("").pairs(setup).text(files::explanation(setting));
+    let mut about = Section::new("").pairs(setup).text(words::explanation(setting));
     for note in &setting.notes {
         about = about.text(format!("Note: {note}."));
     }
@@ -26,7 +28,7 @@ pub fn page(found: &Findings, drawn: Vec<Svg>) -> Result<String, Failure> {
         let section = Section::new(step.step.to_string()).chart(picture, CAPTION);
         page = page.section(section.table(table(step)));
     }
-    Ok(page.html()?)
+    page.html().map_err(told)
 }
 
 const CAPTION: &str = "The first sampling instant. Voltages and currents are samples, one per control period. The dashed lines \
@@ -34,7 +36,7 @@ const CAPTION: &str = "The first sampling instant. Voltages and currents are sam
     with another current and can stay within it at one instant. The table is of all instants.";
 
 fn verdict(found: &Findings) -> (Verdict, String) {
-    let compared = found.check.as_ref().map(files::check_text);
+    let compared = found.check.as_ref().map(words::check_text);
     let different = found.check.as_ref().is_some_and(|check| !check.differences.is_empty());
     let sentences = |first: String| {
         [Some(first), compared]
@@ -43,7 +45,7 @@ fn verdict(found: &Findings) -> (Verdict, String) {
             .collect::<Vec<_>>()
             .join("; ")
     };
-    match files::unsettled(found) {
+    match words::unsettled(found) {
         Some(text) if different => (Verdict::Fail, sentences(text)),
         Some(text) => (Verdict::Warn, sentences(text)),
         None if different => (Verdict::Fail, sentences(worst(found))),
@@ -57,7 +59,7 @@ fn worst(found: &Findings) -> String {
     let of_policy = found
         .steps
         .iter()
-        .filter_map(|step| Some((step, step.courses.first()?)));
+        .filter_map(|step| Some((step, &step.courses.first()?.1)));
     let largest = of_policy.max_by(|(_, a), (_, b)| {
         let [a, b] = [a, b].map(|course| course.finding.worst.deviation);
         a.total_cmp(&b)
@@ -76,16 +78,16 @@ fn worst(found: &Findings) -> String {
 
 fn table(step: &Step) -> Table {
     let mut table = Table::new("").text("");
-    for heading in closed_loop::COLUMNS {
+    for heading in COLUMNS {
         table = table.text(heading);
     }
-    for course in &step.courses {
-        let cells = closed_loop::cells(&course.finding).into_iter().map(Cell::from);
-        table = table.row([Cell::from(course.name.as_str())].into_iter().chain(cells));
+    for (name, course) in &step.courses {
+        let cells = cells(&course.finding).into_iter().map(Cell::from);
+        table = table.row([Cell::from(name.as_str())].into_iter().chain(cells));
     }
     for (name, limit) in &step.limits {
-        let [deviation, settling] = closed_loop::limit_cells(limit).map(Cell::from);
-        let blank = std::iter::repeat_n(Cell::from("-"), closed_loop::COLUMNS.len() - 2);
+        let [deviation, settling] = limit_cells(limit).map(Cell::from);
+        let blank = std::iter::repeat_n(Cell::from("-"), COLUMNS.len() - 2);
         let cells = [Cell::from(name.as_str()), deviation, settling];
         table = table.row(cells.into_iter().chain(blank));
     }

@@ -1,44 +1,42 @@
 //! All controllers over all load steps.
 
-use std::sync::atomic::AtomicBool;
-
-use closed_loop::baselines::Baseline;
-use closed_loop::limit::{Limit, Question};
-use closed_loop::scenario::{Finding, Instant};
-use closed_loop::{Classical, Controller, LoadStep, Trajectory, follow, unusable};
 use toml_input::{Fault, Message};
 
-use super::controllers::{self, Named};
-use super::{Check, Course, Findings, POLICY, Setting, Step, go_on};
-use crate::Failure;
-use crate::arguments::{ControllerKind, Simulate};
-use crate::commands::progress_line::ProgressLine;
+use super::findings::{Check, Findings, POLICY, Setting, Step};
+use crate::baselines::Baseline;
+use crate::controller::{Classical, Controller, Trajectory, follow};
+use crate::course::{Course, Named, Tell};
+use crate::faults::Error;
+use crate::limit::{Limit, Question};
+use crate::load_step::LoadStep;
+use crate::scenario::Instant;
+use crate::unusable::unusable;
 
 /// Where a simulation stands.
-struct Progress<'a> {
-    line: ProgressLine,
-    stop: &'a AtomicBool,
+struct Progress<'a, 'b> {
+    tell: &'a mut Tell<'b>,
     of: usize,
     done: usize,
 }
 
-impl Progress<'_> {
+impl Progress<'_, '_> {
     /// Tells what comes next.
     ///
     /// # Errors
     /// If there is to be no next.
-    fn next(&mut self, step: LoadStep, what: &str) -> Result<(), Failure> {
-        go_on(self.stop)?;
+    fn next(&mut self, step: LoadStep, what: &str) -> Result<(), Error> {
         let (number, of) = (self.done + 1, self.of);
-        self.line.show(|| format!("{step} ({number} of {of}): {what}"));
-        Ok(())
+        (self.tell)(&format_args!("{step} ({number} of {of}): {what}"))
     }
 }
 
-/// Runs everything the scenario asks for.
-pub fn all(options: &Simulate, mut setting: Setting, stop: &AtomicBool) -> Result<Findings, Failure> {
-    let mut named = start(options, &setting, stop)?;
-    let mut check = options.check.then(|| Check {
+/// Runs everything the scenario asks for. `named` are controllers of the policy: the first counts, the others are compared
+/// with it to the bit. `tell` is called before each run.
+///
+/// # Errors
+/// If there is no controller or one fails, a classical controller has no design for the converter, or `tell` ends it.
+pub fn simulate(mut setting: Setting, mut named: Vec<Named>, tell: &mut Tell<'_>) -> Result<Findings, Error> {
+    let mut check = (named.len() > 1).then(|| Check {
         names: named.iter().map(|named| named.name.clone()).collect(),
         periods: 0,
         differences: Vec::new(),
@@ -50,37 +48,28 @@ pub fn all(options: &Simulate, mut setting: Setting, stop: &AtomicBool) -> Resul
     }
     let load_steps = setting.scenario.load_steps.clone();
     let mut progress = Progress {
-        line: ProgressLine::new(),
-        stop,
+        tell,
         of: load_steps.len(),
         done: 0,
     };
     let mut steps = Vec::new();
     for step in load_steps {
-        let mut courses = vec![policy_course(
-            &setting,
-            &mut named,
-            step,
-            check.as_mut(),
-            &mut progress,
-        )?];
+        let course = policy_course(&setting, &mut named, step, check.as_mut(), &mut progress)?;
+        let said = unusable(&course.shown, &setting.policy);
+        let mut courses = vec![(POLICY.to_owned(), course)];
         for (name, baseline) in &mut baselines {
-            let one = |instant, progress: &mut Progress<'_>| {
+            let course = Course::new(step, &setting.scenario.task, |instant| {
                 progress.next(step, name)?;
                 run(&setting, baseline, step, instant)
-            };
-            courses.push(course(&setting, name, step, &mut progress, one)?);
+            });
+            courses.push(((*name).to_owned(), course?));
         }
-        let said = courses
-            .first()
-            .and_then(|policy| unusable(&policy.shown, &setting.policy));
         setting.notes.extend(said.map(|said| format!("{step}: {said}")));
         progress.next(step, "limit")?;
         let limits = limits(&mut setting, step);
         steps.push(Step { step, courses, limits });
         progress.done += 1;
     }
-    progress.line.clear();
     Ok(Findings {
         controller: named.first().map(|named| named.name.clone()).unwrap_or_default(),
         setting,
@@ -89,47 +78,14 @@ pub fn all(options: &Simulate, mut setting: Setting, stop: &AtomicBool) -> Resul
     })
 }
 
-/// The policy's controller; with `--check` the others behind it.
-fn start(options: &Simulate, setting: &Setting, stop: &AtomicBool) -> Result<Vec<Named>, Failure> {
-    use ControllerKind::{C, Interpreter, Rust};
-    let others = [Interpreter, Rust, C].into_iter();
-    let others = others.filter(|kind| options.check && *kind != options.controller);
-    let mut named = Vec::new();
-    for kind in [options.controller].into_iter().chain(others) {
-        go_on(stop)?;
-        named.push(controllers::start(&setting.policy, kind)?);
-    }
-    Ok(named)
-}
-
 fn run(
     setting: &Setting,
     controller: &mut dyn Controller,
     step: LoadStep,
     instant: Instant,
-) -> Result<Trajectory, Failure> {
+) -> Result<Trajectory, Error> {
     let (environment, task) = (&setting.converter, &setting.scenario.task);
-    Ok(follow(environment, controller, setting.v_ref, task, step, instant)?)
-}
-
-/// A controller at all instants; `one` runs one of them.
-fn course(
-    setting: &Setting,
-    name: &str,
-    step: LoadStep,
-    progress: &mut Progress<'_>,
-    mut one: impl FnMut(Instant, &mut Progress<'_>) -> Result<Trajectory, Failure>,
-) -> Result<Course, Failure> {
-    let mut finding = Finding::new(step);
-    let mut shown = None;
-    for instant in setting.scenario.task.all_instants() {
-        let trajectory = one(instant, progress)?;
-        finding.add(instant, trajectory.metrics);
-        shown.get_or_insert(trajectory);
-    }
-    let name = name.to_owned();
-    let shown = shown.ok_or_else(|| Message::new("internal fault: a load step at no instant"))?;
-    Ok(Course { name, finding, shown })
+    follow(environment, controller, setting.v_ref, task, step, instant)
 }
 
 /// The policy, by its first controller; the others are compared with it.
@@ -138,13 +94,13 @@ fn policy_course(
     named: &mut [Named],
     step: LoadStep,
     mut check: Option<&mut Check>,
-    progress: &mut Progress<'_>,
-) -> Result<Course, Failure> {
+    progress: &mut Progress<'_, '_>,
+) -> Result<Course, Error> {
     let (first, others) = named
         .split_first_mut()
         .ok_or_else(|| Message::new("internal fault: no controller"))?;
     let mut different = vec![false; others.len()];
-    course(setting, POLICY, step, progress, |instant, progress| {
+    Course::new(step, &setting.scenario.task, |instant| {
         progress.next(step, &first.name)?;
         let reference = run(setting, first.controller.as_mut(), step, instant)?;
         let Some(check) = &mut check else {

@@ -1,70 +1,73 @@
-//! What a control step costs on the target, measured under its emulator after `compile`.
+//! What a control step costs in the builds that firmware takes, for people and for the manifest.
 
-use ::targets::TargetSpec;
 use codegen::Language;
 use policy::Policy;
+use report::{bytes, grouped};
 use serde::Serialize;
-use verify::Files;
-use verify::estimate::Estimate;
-use verify::measure::{Costs, usual_builds};
+use targets::TargetSpec;
 
-use super::budget::{Budget, Clock};
-use super::verify::missing_text;
-use super::{bytes, grouped};
-use crate::{Failure, output};
+use crate::budget::{Budget, Clock};
+use crate::estimate::Estimate;
+use crate::measure::{Costs, usual_builds};
+use crate::session::Files;
 
 /// Costs of one build.
-#[derive(Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(untagged)]
-pub enum Report {
+pub enum BuildCosts {
+    /// It ran under the target's emulator.
     Measured(Costs),
+    /// It was compiled and did not run.
     Estimated(Estimate),
 }
 
-impl Report {
+impl BuildCosts {
     fn measured(&self) -> Option<&Costs> {
         match self {
-            Report::Measured(costs) => Some(costs),
-            Report::Estimated(_) => None,
+            BuildCosts::Measured(costs) => Some(costs),
+            BuildCosts::Estimated(_) => None,
         }
     }
 }
 
 /// Costs of the builds that could be made here, and what was not possible.
-#[derive(Default)]
-pub struct Measured {
-    pub costs: Vec<Report>,
-    notes: Vec<String>,
+#[derive(Debug, Clone, Default)]
+pub struct StepCosts {
+    /// The builds, those that ran first.
+    pub builds: Vec<BuildCosts>,
+    /// Why others were not measured, one sentence each.
+    pub notes: Vec<String>,
 }
 
-/// Costs of a build in the manifest.
-#[derive(Serialize)]
+/// Costs of a build as an entry of the manifest ([`codegen::manifest::with_costs`]).
+#[derive(Debug, Serialize)]
 pub struct Entry<'a> {
     #[serde(flatten)]
-    costs: &'a Report,
+    costs: &'a BuildCosts,
     #[serde(skip_serializing_if = "Option::is_none")]
     budget: Option<Budget>,
 }
 
-impl Measured {
-    /// Builds and runs the files. The report is an extra: that it cannot be made is a note, not a failure.
+impl StepCosts {
+    /// Builds and runs the files in each of the languages. Costs are an extra: that there are none is a note, not an error.
+    #[must_use]
     pub fn of(policy: &Policy, target: &TargetSpec, languages: &[Language], files: &Files) -> Self {
         match usual_builds(policy, target, files, languages) {
             Ok(usual) => Self {
-                costs: usual
+                builds: usual
                     .measured
                     .into_iter()
-                    .map(Report::Measured)
-                    .chain(usual.estimated.into_iter().map(Report::Estimated))
+                    .map(BuildCosts::Measured)
+                    .chain(usual.estimated.into_iter().map(BuildCosts::Estimated))
                     .collect(),
                 notes: usual
                     .missing
                     .iter()
-                    .map(|missing| format!("costs on {} not measured: {}", target.name, missing_text(missing)))
+                    .map(|missing| format!("costs on {} not measured: {missing}", target.name))
                     .collect(),
             },
             Err(error) => Self {
-                costs: Vec::new(),
+                builds: Vec::new(),
                 notes: vec![format!("costs on {} not measured: {error}", target.name)],
             },
         }
@@ -72,32 +75,31 @@ impl Measured {
 
     /// Costs of the builds that ran.
     pub fn measured(&self) -> impl Iterator<Item = &Costs> {
-        self.costs.iter().filter_map(Report::measured)
+        self.builds.iter().filter_map(BuildCosts::measured)
     }
 
     /// As the manifest has them, with the budget at a clock.
+    #[must_use]
     pub fn entries(&self, policy: &Policy, clock: Option<Clock>) -> Vec<Entry<'_>> {
-        let budget = |report: &Report| Budget::of(report.measured()?, clock?, policy.sample_period);
+        let budget = |build: &BuildCosts| Budget::of(build.measured()?, clock?, policy.sample_period);
         let entry = |costs| Entry {
             costs,
             budget: budget(costs),
         };
-        self.costs.iter().map(entry).collect()
+        self.builds.iter().map(entry).collect()
     }
 
-    /// Prints a block per build.
-    pub fn say(&self, policy: &Policy, target: &TargetSpec, clock: Option<Clock>) -> Result<(), Failure> {
+    /// A block of lines for each build, then a line for each note. Cycles become shares of the control period at `clock`, or
+    /// at the clock that the target is known by.
+    #[must_use]
+    pub fn texts(&self, policy: &Policy, target: &TargetSpec, clock: Option<Clock>) -> Vec<String> {
         let clock = clock.map(|clock| clock.hz).or(target.clock_hz.map(f64::from));
-        for report in &self.costs {
-            output::say(&match report {
-                Report::Measured(costs) => text(costs, policy, target, clock),
-                Report::Estimated(estimate) => estimated(estimate, target),
-            })?;
-        }
-        for note in &self.notes {
-            output::say(&format!("note: {note}"))?;
-        }
-        Ok(())
+        let text = |build: &BuildCosts| match build {
+            BuildCosts::Measured(costs) => measured(costs, policy, target, clock),
+            BuildCosts::Estimated(estimate) => estimated(estimate, target),
+        };
+        let notes = self.notes.iter().map(|note| format!("note: {note}"));
+        self.builds.iter().map(text).chain(notes).collect()
     }
 }
 
@@ -112,7 +114,7 @@ fn estimated(estimate: &Estimate, target: &TargetSpec) -> String {
     )
 }
 
-fn text(costs: &Costs, policy: &Policy, target: &TargetSpec, clock: Option<f64>) -> String {
+fn measured(costs: &Costs, policy: &Policy, target: &TargetSpec, clock: Option<f64>) -> String {
     let (fewest, most) = (costs.instructions_min, costs.instructions_max);
     let instructions = if fewest == most {
         format!("{} for every input", grouped(most))

@@ -1,16 +1,20 @@
 //! The command line.
 
+pub mod drm;
+mod shared;
+
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
 use codegen::Output;
-use measured::ColumnMap;
 use policy::NumericFormat;
-use toml_input::Faults;
+use verify::budget::Clock;
 
-use crate::commands::budget::Clock;
 use crate::one_of::OneOf;
 use crate::ownership::Replacing;
+
+use drm::Drm;
+pub use shared::{Columns, ControllerKind};
 
 /// From a trained policy to verified controller code.
 ///
@@ -49,13 +53,12 @@ pub enum Command {
     Demo(Demo),
     /// Duty ratio mapping: acquire settled points, fit drm.toml, judge it
     #[command(subcommand)]
-    Drm(crate::commands::drm::Drm),
+    Drm(Drm),
 }
 
 impl Command {
     /// Whether it keeps or tells what it has done so far when a signal comes.
     pub fn ends_by_itself(&self) -> bool {
-        use crate::commands::drm::Drm;
         matches!(
             self,
             Command::Simulate(_) | Command::Train(_) | Command::Drm(Drm::Transfer(_))
@@ -212,17 +215,6 @@ pub struct Certify {
     pub out: PathBuf,
 }
 
-/// What runs the policy in a closed loop.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ControllerKind {
-    /// The reference interpreter
-    Interpreter,
-    /// The generated Rust, built with rustc
-    Rust,
-    /// The generated C, built with gcc or clang
-    C,
-}
-
 #[derive(Debug, Args)]
 pub struct Simulate {
     /// Scenario file: plant, load steps, instants, classical controllers
@@ -268,29 +260,6 @@ pub struct Train {
     /// Go on from the checkpoints that an interrupted training left in DIR, bit for bit
     #[arg(long)]
     pub resume: bool,
-}
-
-/// Where the quantities of a table stand that names them otherwise.
-#[derive(Debug, Args)]
-pub struct Columns {
-    /// Where the quantities stand: quantity=column, quantity=column*factor or quantity=number, separated by commas;
-    /// quantities are t, duty, v_out, i_l, i_out, v_in, r_load, i_load, p_load, v_std, settled
-    #[arg(long, value_name = "MAP", default_value = "")]
-    pub map: String,
-    /// The same as a file: names, factors, offsets and constants
-    #[arg(long, value_name = "MAP.toml")]
-    pub columns: Option<PathBuf>,
-}
-
-impl Columns {
-    /// The file with what the command line adds.
-    pub fn read(&self) -> Result<ColumnMap, Faults> {
-        let file = self
-            .columns
-            .as_deref()
-            .map_or_else(|| Ok(ColumnMap::default()), ColumnMap::open)?;
-        file.and(ColumnMap::parse(&self.map)?)
-    }
 }
 
 #[derive(Debug, Args)]

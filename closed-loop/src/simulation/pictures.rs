@@ -1,12 +1,12 @@
 //! Voltage, current and duty of a load step, controllers laid over each other.
 
-use closed_loop::baselines::Kind;
-use closed_loop::scenario::SETTLED;
 use report::{Axis, Chart, Colour, Panel, Series, Svg};
 use toml_input::Message;
 
-use super::{Course, POLICY, Setting, Step};
-use crate::Failure;
+use super::findings::{POLICY, Setting, Step};
+use crate::baselines::Kind;
+use crate::faults::{Error, told};
+use crate::scenario::{Record, SETTLED};
 
 /// A classical controller that deviates more than so many times the policy would only flatten the picture.
 const DRAWN: f64 = 5.0;
@@ -15,24 +15,24 @@ const BEFORE: f64 = 10.0;
 const AFTER: f64 = 40.0;
 
 /// The load step at its first sampling instant as SVG; a voltage between the samples is not drawn.
-pub fn picture(setting: &Setting, step: &Step) -> Result<Svg, Failure> {
+pub(super) fn picture(setting: &Setting, step: &Step) -> Result<Svg, Error> {
     let mut title = format!("{}: {}", setting.policy.name, step.step);
-    let Some(policy) = step.courses.first() else {
+    let Some((_, policy)) = step.courses.first() else {
         return Err(Message::new("internal fault: a picture of no controller").into());
     };
     let most = DRAWN * policy.shown.metrics.deviation.max(1.0);
-    let (drawn, left_out): (Vec<&Course>, Vec<&Course>) = step
+    let (drawn, left_out): (Vec<_>, Vec<_>) = step
         .courses
         .iter()
-        .partition(|course| course.shown.metrics.deviation <= most || course.name == POLICY);
+        .partition(|(name, course)| course.shown.metrics.deviation <= most || name == POLICY);
     if !left_out.is_empty() {
-        let names: Vec<&str> = left_out.iter().map(|course| course.name.as_str()).collect();
+        let names: Vec<&str> = left_out.iter().map(|(name, _)| name.as_str()).collect();
         title.push_str(&format!(" (far off and not drawn: {})", names.join(", ")));
     }
     let t = setting.policy.sample_period;
     let longest = drawn
         .iter()
-        .map(|course| course.shown.metrics.settling)
+        .map(|(_, course)| course.shown.metrics.settling)
         .fold(0.0, f64::max);
     let recorded = setting.scenario.task.after as f64 * t;
     let window = [-BEFORE * t, (1.5 * longest).max(AFTER * t).min(recorded)];
@@ -40,19 +40,16 @@ pub fn picture(setting: &Setting, step: &Step) -> Result<Svg, Failure> {
     let mut current = Panel::new(Axis::new("inductor current").unit("A"));
     let mut duty = Panel::new(Axis::new("duty"));
     // the policy last: on top of the others
-    for course in drawn.iter().rev() {
+    for (name, course) in drawn.iter().rev() {
         let periods = course.shown.periods.iter().map(|period| &period.record);
         let inside: Vec<_> = periods.filter(|r| r.time >= window[0] && r.time <= window[1]).collect();
-        let of = |figure: fn(&closed_loop::scenario::Record) -> f64| -> Vec<f64> {
-            inside.iter().map(|record| figure(record)).collect()
-        };
+        let of = |figure: fn(&Record) -> f64| -> Vec<f64> { inside.iter().map(|record| figure(record)).collect() };
         let time = of(|record| record.time);
-        let name = course.name.as_str();
         let colour = colour(name);
-        let line = |y| Series::line(name, time.clone(), y).colour(colour);
+        let line = |y| Series::line(name.as_str(), time.clone(), y).colour(colour);
         voltage = voltage.series(line(of(|record| record.sample.v_out)));
         current = current.series(line(of(|record| record.sample.i_l)));
-        duty = duty.series(Series::step(name, time.clone(), of(|record| record.duty)).colour(colour));
+        duty = duty.series(Series::step(name.as_str(), time.clone(), of(|record| record.duty)).colour(colour));
     }
     voltage = voltage.y_zone(setting.v_ref - SETTLED, setting.v_ref + SETTLED, "settled");
     let [from, to] = step
@@ -67,7 +64,7 @@ pub fn picture(setting: &Setting, step: &Step) -> Result<Svg, Failure> {
         .unit("s")
         .range(window[0], window[1]);
     let chart = Chart::new(title, x).panel(voltage).panel(current).panel(duty);
-    Ok(chart.svg()?)
+    chart.svg().map_err(told)
 }
 
 /// The same controller in the same colour in every picture, whichever are left out.

@@ -1,0 +1,41 @@
+//! Options that commands share.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use measured::ColumnMap;
+use toml_input::Faults;
+
+/// What runs the policy in a closed loop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ControllerKind {
+    /// The reference interpreter
+    Interpreter,
+    /// The generated Rust, built with rustc
+    Rust,
+    /// The generated C, built with gcc or clang
+    C,
+}
+
+/// Where the quantities of a table stand that names them otherwise.
+#[derive(Debug, Args)]
+pub struct Columns {
+    /// Where the quantities stand: quantity=column, quantity=column*factor or quantity=number, separated by commas;
+    /// quantities are t, duty, v_out, i_l, i_out, v_in, r_load, i_load, p_load, v_std, settled
+    #[arg(long, value_name = "MAP", default_value = "")]
+    pub map: String,
+    /// The same as a file: names, factors, offsets and constants
+    #[arg(long, value_name = "MAP.toml")]
+    pub columns: Option<PathBuf>,
+}
+
+impl Columns {
+    /// The file with what the command line adds.
+    pub fn read(&self) -> Result<ColumnMap, Faults> {
+        let file = self
+            .columns
+            .as_deref()
+            .map_or_else(|| Ok(ColumnMap::default()), ColumnMap::open)?;
+        file.and(ColumnMap::parse(&self.map)?)
+    }
+}

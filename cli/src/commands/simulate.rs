@@ -1,0 +1,42 @@
+//! `policyc simulate`
+
+use std::sync::atomic::Ordering;
+
+use closed_loop::Scenario;
+use closed_loop::simulation::{Findings, PAGE, Setting, simulate};
+
+use super::controllers;
+use super::progress_line::ProgressLine;
+use crate::arguments::Simulate;
+use crate::{Failure, Outcome, interruption, output};
+
+// `diagnose` asks the same of a policy
+pub use closed_loop::{suits, v_ref};
+
+/// Simulates, writes, reports.
+pub fn run(options: &Simulate) -> Result<Outcome, Failure> {
+    let stop = interruption::stop_on_signal();
+    output::check_new_folder(&options.out)?;
+    let scenario = Scenario::load(&options.scenario)?;
+    let policy = super::load(&options.policy)?;
+    let setting = Setting::new(&options.scenario, scenario, policy, options.plant.as_deref())?;
+    let found = all(options, setting);
+    if stop.load(Ordering::Relaxed) {
+        // what failed, failed because of the signal
+        output::say("Interrupted; nothing written")?;
+        return Ok(Outcome::Interrupted);
+    }
+    let found = found?;
+    output::write_results(&options.out, &found.files()?, &found.summary(), PAGE)?;
+    let equal = found.check.is_none_or(|check| check.differences.is_empty());
+    Ok(if equal { Outcome::Done } else { Outcome::Different })
+}
+
+/// Starts the controllers and simulates.
+fn all(options: &Simulate, setting: Setting) -> Result<Findings, Failure> {
+    let named = controllers::start_all(&setting.policy, options.controller, options.check)?;
+    let mut line = ProgressLine::new();
+    let found = simulate(setting, named, &mut |what| line.next(what))?;
+    line.clear();
+    Ok(found)
+}

@@ -1,0 +1,153 @@
+//! What a simulation leaves behind, as text.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::findings::{Findings, Step};
+use super::{page, pictures, words};
+use crate::faults::{Error, told};
+use crate::limit::Bound;
+use crate::scenario::Metrics;
+use crate::tables::{MetricsCsv, comparison, trajectory_csv};
+
+/// Name of the page with everything on it, among the files.
+pub const PAGE: &str = "report.html";
+
+/// `metrics.json`. Figures that are not finite are null.
+#[derive(Serialize)]
+struct Json<'a> {
+    policy: &'a str,
+    controller: &'a str,
+    v_ref: f64,
+    sample_period: f64,
+    load_steps: Vec<JsonStep<'a>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    check: Option<JsonCheck<'a>>,
+    notes: &'a [String],
+}
+
+#[derive(Serialize)]
+struct JsonStep<'a> {
+    from: f64,
+    to: f64,
+    unit: &'a str,
+    controllers: BTreeMap<&'a str, JsonPair<&'a Metrics>>,
+    limits: BTreeMap<&'a str, JsonPair<&'a Bound>>,
+}
+
+#[derive(Serialize)]
+struct JsonPair<T> {
+    sample: T,
+    worst: T,
+}
+
+#[derive(Serialize)]
+struct JsonCheck<'a> {
+    equal: bool,
+    controllers: &'a [String],
+    periods: usize,
+    differences: &'a [String],
+}
+
+impl Findings {
+    /// Name and text of every file: metrics, trajectories, a picture for each load step, the summary, and the [`PAGE`].
+    ///
+    /// # Errors
+    /// If a picture cannot be drawn.
+    pub fn files(&self) -> Result<BTreeMap<String, String>, Error> {
+        let mut files = BTreeMap::new();
+        let mut metrics = MetricsCsv::default();
+        let mut drawn = Vec::new();
+        for step in &self.steps {
+            let stem = step.step.stem();
+            for (name, course) in &step.courses {
+                metrics.controller(name, &course.finding);
+                let file = format!("{stem}-{name}.csv");
+                files.insert(file, trajectory_csv(&course.shown, step.step.kind));
+            }
+            for (name, limit) in &step.limits {
+                metrics.limit(name, step.step, limit);
+            }
+            let picture = pictures::picture(&self.setting, step)?;
+            files.insert(format!("{stem}.svg"), picture.as_str().to_owned());
+            drawn.push(picture);
+        }
+        files.insert("metrics.csv".to_owned(), metrics.finish());
+        files.insert("metrics.json".to_owned(), json(self)?);
+        files.insert("summary.txt".to_owned(), self.summary());
+        files.insert(PAGE.to_owned(), page::page(self, drawn)?);
+        Ok(files)
+    }
+
+    /// What was simulated and a table of each load step, for people: voltages in V, times in ms.
+    #[must_use]
+    pub fn summary(&self) -> String {
+        let setting = &self.setting;
+        let mut out = format!(
+            "policy  {} ({})\nplant   {}\n\n{}\n",
+            setting.policy.name,
+            self.controller,
+            words::plant_text(setting),
+            words::explanation(setting).replace(". ", ".\n")
+        );
+        for step in &self.steps {
+            let courses = step.courses.iter();
+            let controllers = courses.map(|(name, course)| (name.as_str(), &course.finding));
+            let limits = step.limits.iter().map(|(name, limit)| (name.as_str(), limit));
+            out.push('\n');
+            out.push_str(&comparison(step.step, controllers, limits));
+        }
+        if let Some(check) = &self.check {
+            out.push_str(&format!("\n{}\n", words::check_text(check)));
+        }
+        for note in words::unsettled(self).iter().chain(&setting.notes) {
+            out.push_str(&format!("\nnote: {note}\n"));
+        }
+        out
+    }
+}
+
+fn json(found: &Findings) -> Result<String, Error> {
+    let Findings {
+        setting,
+        controller,
+        steps,
+        check,
+    } = found;
+    let json = Json {
+        policy: &setting.policy.name,
+        controller,
+        v_ref: setting.v_ref,
+        sample_period: setting.policy.sample_period,
+        load_steps: steps.iter().map(json_step).collect(),
+        check: check.as_ref().map(|check| JsonCheck {
+            equal: check.differences.is_empty(),
+            controllers: &check.names,
+            periods: check.periods,
+            differences: &check.differences,
+        }),
+        notes: &setting.notes,
+    };
+    let text = serde_json::to_string_pretty(&json).map_err(told)?;
+    Ok(format!("{text}\n"))
+}
+
+fn json_step(step: &Step) -> JsonStep<'_> {
+    let [from, to] = step.step.values;
+    let controllers = step.courses.iter().map(|(name, course)| {
+        let (sample, worst) = (&course.finding.at_sample, &course.finding.worst);
+        (name.as_str(), JsonPair { sample, worst })
+    });
+    let limits = step.limits.iter().map(|(name, limit)| {
+        let (sample, worst) = (&limit.at_sample, &limit.worst);
+        (name.as_str(), JsonPair { sample, worst })
+    });
+    JsonStep {
+        from,
+        to,
+        unit: step.step.kind.unit(),
+        controllers: controllers.collect(),
+        limits: limits.collect(),
+    }
+}

@@ -1,0 +1,61 @@
+//! Sentences that the summary and the page share.
+
+use report::grouped;
+
+use super::findings::{Check, Findings, Setting, Step};
+use crate::scenario::SETTLED;
+
+/// The plant's file and the numbers that were replaced.
+pub(super) fn plant_text(setting: &Setting) -> String {
+    let set = setting.scenario.set.iter();
+    set.fold(setting.plant.display().to_string(), |text, (key, value)| {
+        format!("{text}, {key} = {value}")
+    })
+}
+
+/// What the figures are of.
+pub(super) fn explanation(setting: &Setting) -> String {
+    let task = &setting.scenario.task;
+    format!(
+        "True voltages at the sampling instants, errors from {} V, settled within {SETTLED} V. Each pair: worst of {} \
+         sampling instants / worst of {} instants and phases.",
+        setting.v_ref,
+        task.sampling_instants,
+        task.all_instants().len(),
+    )
+}
+
+/// The load steps before or after which the policy does not stay within the settling band, in words.
+pub(super) fn unsettled(found: &Findings) -> Option<String> {
+    let lost = |step: &&Step| {
+        let policy = step.courses.first();
+        policy.is_some_and(|(_, policy)| policy.finding.worst.tail_max.max(policy.finding.worst.pre_error) > SETTLED)
+    };
+    let steps: Vec<String> = found
+        .steps
+        .iter()
+        .filter(lost)
+        .map(|step| step.step.to_string())
+        .collect();
+    (!steps.is_empty()).then(|| {
+        format!(
+            "the policy does not settle within {SETTLED} V of {} V before or after {}",
+            found.setting.v_ref,
+            steps.join(", ")
+        )
+    })
+}
+
+/// How the comparison of the controllers came out.
+pub(super) fn check_text(check: &Check) -> String {
+    let names = check.names.join(", ");
+    let periods = grouped(check.periods as u64);
+    if check.differences.is_empty() {
+        return format!("equal to the bit over {periods} control periods: {names}");
+    }
+    let first = check.names.first().map(String::as_str).unwrap_or_default();
+    format!(
+        "DIFFERENT from {first} within {periods} control periods:\n  {}",
+        check.differences.join("\n  ")
+    )
+}

@@ -1,0 +1,174 @@
+//! A simulation and a transfer by the library alone, as the command line does them.
+
+#![allow(clippy::unwrap_used)] // helpers of tests stand outside of #[test] functions
+
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+
+use closed_loop::simulation::{PAGE, Setting, simulate};
+use closed_loop::transfer::{self, Means};
+use closed_loop::{Answer, Controller, Converter, Error, Named, Scenario, interpreter};
+use plant::Signals;
+use policy::Policy;
+use toml_input::Message;
+
+const SCENARIO: &str = "plant = \"plants/sb3-buck12.toml\"
+load_steps = [[200, 500]]
+instants = 2
+sampling_instants = 1
+lead = 20
+after = 60
+tail = 20
+baselines = [\"pid\"]
+";
+
+fn examples() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples")
+}
+
+fn policy() -> Policy {
+    policy::load(&examples().join("buck12/policy.toml")).unwrap()
+}
+
+/// The scenario stands beside the examples, so that its plant is found.
+fn scenario() -> (PathBuf, Scenario) {
+    let file = examples().join("s.toml");
+    let scenario = Scenario::from_toml(&file, SCENARIO).unwrap();
+    (file, scenario)
+}
+
+fn setting() -> Setting {
+    let (file, scenario) = scenario();
+    Setting::new(&file, scenario, policy(), None).unwrap()
+}
+
+fn named(name: &str, controller: Box<dyn Controller>) -> Named {
+    Named {
+        name: name.to_owned(),
+        controller,
+    }
+}
+
+/// Answers as another does, but for one bit of one duty.
+struct OneBitOff {
+    inner: Box<dyn Controller>,
+    period: usize,
+}
+
+impl Controller for OneBitOff {
+    fn restart(&mut self) -> Result<(), Error> {
+        self.period = 0;
+        self.inner.restart()
+    }
+
+    fn step(&mut self, measured: &Signals) -> Result<Answer, Error> {
+        let mut answer = self.inner.step(measured)?;
+        if self.period == 7 {
+            answer.duty = f64::from_bits(answer.duty.to_bits() + 1);
+        }
+        self.period += 1;
+        Ok(answer)
+    }
+}
+
+fn go_on(_: &dyn Display) -> Result<(), Error> {
+    Ok(())
+}
+
+#[test]
+fn a_controller_that_differs_in_one_bit_is_named_with_its_period() {
+    let both = vec![
+        named("interpreter", interpreter(&policy()).unwrap()),
+        named(
+            "other",
+            Box::new(OneBitOff {
+                inner: interpreter(&policy()).unwrap(),
+                period: 0,
+            }),
+        ),
+    ];
+    let found = simulate(setting(), both, &mut go_on).unwrap();
+    let check = found.check.as_ref().unwrap();
+    assert_eq!(check.names, ["interpreter", "other"]);
+    // two instants of lead, a period more at the second, and 60 periods after the step
+    assert_eq!(check.periods, 80 + 81);
+    let [difference] = check.differences.as_slice() else {
+        panic!("{:?}", check.differences)
+    };
+    assert!(
+        difference.starts_with("other: 200 -> 500 W differs from period 7 on"),
+        "{difference}"
+    );
+    assert!(found.summary().contains("DIFFERENT from interpreter"));
+}
+
+#[test]
+fn one_controller_is_compared_with_none_and_leaves_all_files() {
+    let one = vec![named("interpreter", interpreter(&policy()).unwrap())];
+    let found = simulate(setting(), one, &mut go_on).unwrap();
+    assert!(found.check.is_none());
+    let files = found.files().unwrap();
+    let names: Vec<&str> = files.keys().map(String::as_str).collect();
+    assert_eq!(
+        names,
+        [
+            "200-500W-pid.csv",
+            "200-500W-policy.csv",
+            "200-500W.svg",
+            "metrics.csv",
+            "metrics.json",
+            PAGE,
+            "summary.txt"
+        ]
+    );
+}
+
+#[test]
+fn who_is_told_what_comes_next_can_end_it() {
+    let mut told = Vec::new();
+    let mut tell = |what: &dyn Display| {
+        told.push(what.to_string());
+        match told.len() {
+            3 => Err(Message::new("enough").into()),
+            _ => Ok(()),
+        }
+    };
+    let one = vec![named("interpreter", interpreter(&policy()).unwrap())];
+    let error = simulate(setting(), one, &mut tell).unwrap_err();
+    assert!(error.to_string().contains("enough"), "{error}");
+    assert_eq!(
+        told,
+        [
+            "200 -> 500 W (1 of 1): interpreter",
+            "200 -> 500 W (1 of 1): interpreter",
+            "200 -> 500 W (1 of 1): pid"
+        ]
+    );
+}
+
+#[test]
+fn a_transfer_that_is_ended_ran_nothing_more() {
+    let (file, scenario) = scenario();
+    let setting = transfer::Setting::new(&file, scenario, policy()).unwrap();
+    let real = [examples().join("drm/plants/lossy.toml")];
+    let start = |policy: &Policy| Ok(named("interpreter", interpreter(policy)?));
+    let mut told = 0;
+    let mut tell = |what: &dyn Display| {
+        told += 1;
+        match what.to_string().ends_with("point 2 of 10") {
+            true => Err(Message::new("enough").into()),
+            false => Ok(()),
+        }
+    };
+    let means = Means {
+        simulator: "the plant",
+        simulate: Converter::new,
+        start: &start,
+        ideal: false,
+        tell: &mut tell,
+    };
+    let error = transfer::transfer(setting, &real, means).unwrap_err();
+    assert!(error.to_string().contains("enough"), "{error}");
+    // two instants in simulation, two at the real converter, and two points of two loads at five voltages
+    assert_eq!(told, 6);
+}

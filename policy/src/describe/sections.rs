@@ -1,0 +1,224 @@
+//! The parts of a policy, a text each: a heading behind an empty line, then a line for each thing that there is.
+
+use crate::describe::formula::formula;
+use crate::model::{Fallback, Interval, Mapping, Policy};
+
+/// Characters of a line of actions, with which it still fits into a terminal beside its indentation.
+const LINE: usize = 96;
+
+/// Name, period and numeric format: the first line.
+#[must_use]
+pub fn head(policy: &Policy) -> String {
+    let period = policy.sample_period;
+    format!(
+        "{}   one step every {} us ({:.6} kHz), {}\n",
+        policy.name,
+        period * 1e6,
+        1e-3 / period,
+        policy.numeric_format.name()
+    )
+}
+
+/// Signals with ranges and units, and parameters.
+#[must_use]
+pub fn signals(policy: &Policy) -> String {
+    let mut out = "\nsignals (plausible range; a sample outside is held)\n".to_owned();
+    let width = widest(policy.signals.iter().map(|signal| signal.name.as_str()));
+    for signal in &policy.signals {
+        let adc = signal
+            .adc
+            .map(|adc| format!("   = {} * code + {}", adc.gain, adc.offset))
+            .unwrap_or_default();
+        let (name, range, unit) = (&signal.name, range(signal.range), &signal.unit);
+        out += &format!("  {name:width$}  {range} {unit}{adc}\n");
+    }
+    for (name, value) in &policy.parameters {
+        out += &format!("  {name:width$}  {value} (parameter)\n");
+    }
+    out
+}
+
+/// Features as formulas with their bounds, and the ranges that the golden vectors have of them.
+#[must_use]
+pub fn observation(policy: &Policy) -> String {
+    let mut out = "\nobservation (network input order; bound over all plausible measurements)\n".to_owned();
+    for (index, feature) in policy.features.iter().enumerate() {
+        let (formula, bound) = (formula(feature, &policy.signals), range(feature.bound));
+        let golden =
+            golden_range(policy, index).map_or_else(String::new, |seen| format!(", golden in {}", range(seen)));
+        out += &format!("  {index:2}  {formula}   in {bound}{golden}\n");
+    }
+    if policy.golden.is_some() {
+        out += "  golden vectors begin at the observation: they do not show that these formulas are those of the training\n";
+    }
+    out
+}
+
+/// Smallest and largest value of a feature in the golden vectors: far from its bound, scale or unit may be wrong.
+fn golden_range(policy: &Policy, feature: usize) -> Option<Interval> {
+    let golden = policy.golden.as_ref()?;
+    let column = golden.observations.iter().skip(feature).step_by(policy.features.len());
+    let values = column.map(|x| Interval {
+        low: f64::from(*x),
+        high: f64::from(*x),
+    });
+    (golden.count > 0).then(|| hull(values))
+}
+
+/// Layers with their sizes, activations and bounds over the box of observations.
+#[must_use]
+pub fn network(policy: &Policy) -> String {
+    let mut out = "\nnetwork\n".to_owned();
+    let width = widest(policy.layers.iter().map(|layer| layer.name.as_str()));
+    for layer in &policy.layers {
+        let (name, activation) = (&layer.name, layer.activation.label());
+        let (inputs, outputs) = (layer.inputs, layer.outputs);
+        let bound = range(hull(layer.bounds.iter().copied()));
+        out += &format!("  {name:width$}  {inputs:4} -> {outputs:<4} {activation}, outputs in {bound}\n");
+    }
+    out
+}
+
+/// Duties of the actions, several a line.
+#[must_use]
+pub fn actions(policy: &Policy) -> String {
+    let mut out = "\nactions (argmax of Q, lowest index wins)\n".to_owned();
+    let texts = policy
+        .actions
+        .iter()
+        .enumerate()
+        .map(|(index, action)| match action.pair {
+            None => format!("{index}: {}", action.duty),
+            Some(pair) => format!("{index}: {} {:+} * {} = {:.6}", pair.xi, pair.c, pair.phi, action.duty),
+        });
+    let mut line = String::new();
+    for text in texts {
+        if line.len() + text.len() > LINE {
+            out += &format!("  {line}\n");
+            line.clear();
+        }
+        if !line.is_empty() {
+            line.push_str("   ");
+        }
+        line.push_str(&text);
+    }
+    out + &format!("  {line}\n")
+}
+
+/// The mapping as a formula, with its valid range and what may be adjusted at run time.
+#[must_use]
+pub fn mapping(policy: &Policy) -> String {
+    let of = |mapping: &Mapping| mapped(mapping, policy);
+    let none = || "  none: duty = duty of the action\n".to_owned();
+    format!("\nmapping\n{}", policy.mapping.as_ref().map_or_else(none, of))
+}
+
+fn mapped(mapping: &Mapping, policy: &Policy) -> String {
+    let c = mapping.coefficients;
+    let signal = policy.signals.get(mapping.load_current);
+    let current = signal.map_or("?", |signal| &signal.name);
+    let product = c.r.map(|r| format!(" {r:+} {current} d_sim")).unwrap_or_default();
+    let adjust = [
+        ("a", mapping.adjust_a),
+        ("b", mapping.adjust_b),
+        ("c", mapping.adjust_c),
+        ("r", mapping.adjust_r),
+    ];
+    let shown = adjust.iter().filter(|(name, _)| *name != "r" || c.r.is_some());
+    let adjust: Vec<String> = shown
+        .map(|(name, interval)| format!("{name} in {}", range(*interval)))
+        .collect();
+    format!(
+        "  duty = {} d_sim {:+} {current} {:+}{product}\n  valid for {current} in {}, d_sim in {}\n  at run time {}\n",
+        c.a,
+        c.b,
+        c.c,
+        range(mapping.valid_i_out),
+        range(mapping.valid_d_sim),
+        adjust.join(", ")
+    )
+}
+
+/// Limits of the duty, and what is commanded without a measurement.
+#[must_use]
+pub fn limits(policy: &Policy) -> String {
+    let limits = &policy.limits;
+    let mut out = format!(
+        "\nlimits\n  duty in {}, {} before the first step\n",
+        range(limits.duty),
+        limits.initial_duty
+    );
+    if let Some(slew) = limits.slew {
+        out += &format!("  at most {slew} per step\n");
+    }
+    if let Some(soft) = limits.soft_start {
+        out += &format!("  soft start: upper limit from {} in {} steps\n", soft.from, soft.steps);
+    }
+    let Fallback { duty, hold } = policy.fallback;
+    out + &format!("  invalid measurement: hold {hold} steps, then duty {duty}\n")
+}
+
+/// Digests of what decides the controller.
+#[must_use]
+pub fn digests(policy: &Policy) -> String {
+    let digests = &policy.digests;
+    let mut out = format!(
+        "\ndigests (sha256 of what decides the controller, not of the files)\n  weights  {}\n  contract {}\n",
+        digests.weights, digests.contract
+    );
+    if let Some(mapping) = &digests.mapping {
+        out += &format!("  mapping  {mapping}\n");
+    }
+    out
+}
+
+/// The smallest interval that holds all of them; upside down if there are none.
+#[must_use]
+pub fn hull(intervals: impl IntoIterator<Item = Interval>) -> Interval {
+    let empty = Interval {
+        low: f64::INFINITY,
+        high: f64::NEG_INFINITY,
+    };
+    intervals.into_iter().fold(empty, |all, one| Interval {
+        low: all.low.min(one.low),
+        high: all.high.max(one.high),
+    })
+}
+
+/// An interval to five digits behind the point, `[0.05, 0.95]`; very small and very large ends with an exponent.
+#[must_use]
+pub fn range(interval: Interval) -> String {
+    let number = |x: f64| {
+        let text = format!("{x:.5}");
+        let text = text.trim_end_matches('0').trim_end_matches('.');
+        if x != 0.0 && (x.abs() < 1e-3 || x.abs() >= 1e7) {
+            format!("{x:.4e}")
+        } else {
+            text.to_owned()
+        }
+    };
+    format!("[{}, {}]", number(interval.low), number(interval.high))
+}
+
+fn widest<'a>(names: impl Iterator<Item = &'a str>) -> usize {
+    names.map(str::len).max().unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_range_is_short_where_it_can_be() {
+        let of = |low, high| range(Interval { low, high });
+        assert_eq!(of(0.0, 250.0), "[0, 250]");
+        assert_eq!(of(-0.05, 0.123_456_7), "[-0.05, 0.12346]");
+        assert_eq!(of(1e-4, 2.5e7), "[1.0000e-4, 2.5000e7]");
+    }
+
+    #[test]
+    fn the_hull_holds_all() {
+        let list = [(0.0, 1.0), (-2.0, -1.0)].map(|(low, high)| Interval { low, high });
+        assert_eq!(hull(list), Interval { low: -2.0, high: 1.0 });
+    }
+}

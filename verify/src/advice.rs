@@ -1,0 +1,131 @@
+//! What is said about the budget of a control step, and what to do where it is not met.
+
+use codegen::output::languages;
+use codegen::{CodegenError, Output};
+use policy::{NumericFormat, Policy};
+use report::grouped;
+use targets::TargetSpec;
+
+use crate::budget::{Budget, Clock, Fit};
+use crate::costs::StepCosts;
+use crate::measure::Costs;
+
+/// Whether a step of `outputs`' cores fits into its period at a clock, and which numeric format would if it does not: one
+/// line each. `costs` are those of the policy's own format; those of the others are found out here, build by build.
+///
+/// # Errors
+/// If code in another format cannot be generated.
+pub fn lines(
+    policy: &Policy,
+    target: &'static TargetSpec,
+    outputs: &[Output],
+    costs: &StepCosts,
+    clock: Clock,
+) -> Result<Vec<String>, CodegenError> {
+    let period = policy.sample_period;
+    let mut lines = vec![format!(
+        "budget of {} in {}:",
+        policy.name,
+        policy.numeric_format.name()
+    )];
+    let budgets = costs
+        .measured()
+        .filter_map(|costs| Some((costs.build.as_str(), Budget::of(costs, clock, period)?)));
+    let budgets: Vec<(&str, Budget)> = budgets.collect();
+    lines.extend(budgets.iter().map(|(build, budget)| budget.text(build)));
+    if budgets.is_empty() {
+        lines.push(match target.cycles {
+            None => unmodelled(target, costs, clock, period),
+            Some(_) => "  cannot be said: no step ran under the target's emulator here".to_owned(),
+        });
+        return Ok(lines);
+    }
+    if policy.numeric_format == NumericFormat::F32Fma {
+        lines.push("  note: the model does not know fused operations; it says too little".to_owned());
+    }
+    if budgets.iter().any(|(_, budget)| budget.fit == Fit::Met) {
+        return Ok(lines);
+    }
+    lines.push(match proposal(policy, target, outputs, clock)? {
+        Some(Proposal { format, build, share }) => format!(
+            "  = hint: --format {} takes {:.0} to {:.0} % with {build}{}",
+            format.name(),
+            100.0 * share.0,
+            100.0 * share.1,
+            if format.is_integer() {
+                "; `policyc certify` says what it does to the decision"
+            } else {
+                ""
+            }
+        ),
+        None => "  = hint: no numeric format fits: a faster clock, a longer period or a smaller network is needed"
+            .to_owned(),
+    });
+    Ok(lines)
+}
+
+/// What can be said without a model: how many cycles there are, and how many instructions.
+fn unmodelled(target: &TargetSpec, costs: &StepCosts, clock: Clock, period: f64) -> String {
+    let cycles = clock.hz * period;
+    let mut text = format!(
+        "  cannot be said: no cycles are modelled for {} (`policyc targets` says for which they are); a control period is {} cycles at {clock}",
+        target.name,
+        grouped(cycles as u64)
+    );
+    let least = costs.measured().min_by_key(|costs| costs.instructions_max);
+    if let Some(costs) = least {
+        let instructions = costs.instructions_max;
+        text += &format!(
+            ", and {} instructions in the shortest build, {}: it fits if the processor does {:.2} a cycle or more, with its wait states",
+            grouped(instructions),
+            costs.build,
+            instructions as f64 / cycles
+        );
+    }
+    text
+}
+
+/// A format that fits where the policy's own does not.
+struct Proposal {
+    format: NumericFormat,
+    build: String,
+    share: (f64, f64),
+}
+
+/// What may be proposed, the most exact first; the cycle models do not know fused operations.
+const EXACT_FIRST: [NumericFormat; 4] = [
+    NumericFormat::F64,
+    NumericFormat::F32,
+    NumericFormat::I16,
+    NumericFormat::I8,
+];
+
+/// The most exact of the other formats that fits in every build that can be made here.
+fn proposal(
+    policy: &Policy,
+    target: &'static TargetSpec,
+    outputs: &[Output],
+    clock: Clock,
+) -> Result<Option<Proposal>, CodegenError> {
+    let languages = languages(outputs);
+    let cores: Vec<Output> = languages.iter().map(|language| language.core()).collect();
+    // binary64 from a library takes longer than anything else; whether it does, the target knows
+    let natural = |format: &NumericFormat| *format != NumericFormat::F64 || target.fpu.has(true);
+    let others = EXACT_FIRST.into_iter().filter(natural);
+    for format in others.filter(|format| *format != policy.numeric_format) {
+        let policy = policy.clone().with_format(format);
+        let files = codegen::sources(&policy, target, &cores, None)?.files;
+        let measured = StepCosts::of(&policy, target, &languages, &files);
+        let budgets = measured
+            .measured()
+            .filter_map(|costs| Some((costs, Budget::of(costs, clock, policy.sample_period)?)));
+        let best = budgets
+            .filter(|(_, budget)| budget.fit == Fit::Met)
+            .min_by(|(_, a), (_, b)| a.share.1.total_cmp(&b.share.1));
+        if let Some((Costs { build, .. }, Budget { share, .. })) = best {
+            let build = build.clone();
+            return Ok(Some(Proposal { format, build, share }));
+        }
+    }
+    Ok(None)
+}

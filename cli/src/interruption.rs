@@ -12,7 +12,8 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use toml_input::{Faults, Message};
 
-use crate::{Failure, Outcome};
+use crate::failure::Failure;
+use crate::outcome::Outcome;
 
 /// Set by the first signal for a command that ends by itself; see [`stop_on_signal`].
 static STOP: OnceLock<Arc<AtomicBool>> = OnceLock::new();

@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 
 use toml_input::Message;
 
+use crate::failure::Failure;
+use crate::interruption;
 use crate::ownership::{self, Replacing};
-use crate::{Failure, interruption};
 
 /// Start of the names of temporary files; leftovers of an interrupted run are removed by the next.
 const TEMPORARY: &str = ".policyc-tmp-";

@@ -13,7 +13,7 @@ use codegen::manifest::{self, FileEntry};
 use serde::{Deserialize, Serialize};
 use toml_input::Message;
 
-use crate::Failure;
+use crate::failure::Failure;
 
 /// The record of what was written to a folder and does not say so itself.
 pub const RECORD: &str = "policyc-files.json";

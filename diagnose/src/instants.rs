@@ -12,10 +12,10 @@
 //! unknown of no interest, as initial states are: it is estimated beside every fit, and what it explains is projected out. A delay
 //! of all steps by the same time could also be a cause, so instants are free only in records that need it.
 
-use crate::attribute::threshold;
 use crate::basis::FARTHEST;
 use crate::drive::{FREE_APART, Model};
 use crate::fit::State;
+use crate::level::threshold;
 use crate::parallel;
 use crate::problem::{Problem, Starts, dot};
 use crate::record::{CHANNELS, Record};

@@ -1,6 +1,7 @@
 //! Noise of each channel, outliers, and what is left in a residual that noise would not leave.
 
-use crate::problem::{Problem, dot, median};
+use crate::median::median;
+use crate::problem::{Problem, dot};
 use crate::record::{CHANNELS, Record};
 
 /// An outlier differs from its neighbours by more than this many standard deviations beyond their own spread. Normal noise does

@@ -1,19 +1,17 @@
 //! The report: one page.
 
+mod colours;
 mod control;
 mod records;
 
-use report::{Axis, BarChart, BarPanel, Chart, Colour, Page, Panel, ReportError, Section, Series, Table, quantity};
+use report::{Axis, BarChart, BarPanel, Chart, Page, Panel, ReportError, Section, Series, Table, quantity};
 
-use crate::diagnosis::{Diagnosis, Named, Verdict};
+use self::colours::{EXTENDED, MODEL};
+use crate::diagnosis::Diagnosis;
+use crate::findings::{Named, Verdict};
 use crate::gain::Regime;
 use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS};
 use crate::words::{si, unit};
-
-/// Colours of the same things in all pictures.
-const MEASURED: Colour = Colour::GREY;
-const MODEL: Colour = Colour::VERMILION;
-const EXTENDED: Colour = Colour::BLUE;
 
 /// The page as HTML.
 ///

@@ -3,6 +3,7 @@
 
 use crate::causes::{Bases, Knob};
 use crate::drive::{Begin, Model, Start, simulate};
+use crate::median::median;
 use crate::record::{CHANNELS, Record};
 
 /// Growth of a state over a segment of an unstable record, in time constants: an error of the initial state grows e^2, sevenfold,
@@ -226,14 +227,6 @@ pub fn nudged(model: &Model, knob: &Knob, range: &[f64; 3]) -> (Model, f64) {
     let mut moved = model.clone();
     knob.set(&mut moved, value + step);
     (moved, step)
-}
-
-/// The median of what is finite; NaN if nothing is.
-#[must_use]
-pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
-    let mut sorted: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 /// Records at clearly different source voltages were set so; a common deviation is the model's.

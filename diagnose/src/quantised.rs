@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 
 use plant::Parameters;
 
-use crate::diagnosis::{Evidence, Named, Value};
 use crate::drive::sensors;
+use crate::findings::{Evidence, Named, Value};
 use crate::problem::Problem;
 use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS};
 use crate::words::si;

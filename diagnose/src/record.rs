@@ -1,10 +1,12 @@
 //! A measured record as the plant can be driven by it: one row a control period, or settled points.
 
 mod align;
+mod channels;
 mod digits;
 mod logged;
 mod raw;
 mod rows;
+mod source;
 mod suspicion;
 
 use std::path::Path;
@@ -13,24 +15,9 @@ use measured::{ColumnMap, DutyIs, Options, Sampled, Sheet};
 use plant::{Load, Parameters};
 use toml_input::{Faults, Message, Sink};
 
+pub use channels::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS, Segment};
+use channels::{FEWEST, QUANTITIES};
 use raw::Raw;
-
-/// Channels: `v_o`, `i_l`, `i_o`, `v_in`.
-pub const CHANNELS: usize = 4;
-/// Their names.
-pub const CHANNEL_NAMES: [&str; CHANNELS] = ["v_o", "i_l", "i_o", "v_in"];
-/// What the columns of a table call them.
-const QUANTITIES: [&str; CHANNELS] = ["v_out", "i_l", "i_out", "v_in"];
-/// Their units.
-pub const CHANNEL_UNITS: [&str; CHANNELS] = ["V", "A", "A", "V"];
-
-/// Fewest rows of a record: two unknown initial states and a noise have to come out of it too.
-const FEWEST: usize = 20;
-/// Fewest settled points: two determine a line, so that the third is the first that could disagree.
-const FEWEST_SETTLED: usize = 3;
-
-/// Rows that are simulated in one go from an estimated state.
-pub type Segment = std::ops::Range<usize>;
 
 /// A record.
 #[derive(Debug, Clone)]

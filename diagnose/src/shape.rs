@@ -1,7 +1,7 @@
 //! What a residual looks like that no cause explains.
 
-use crate::attribute::ACCURACY;
 use crate::fit::State;
+use crate::level::ACCURACY;
 use crate::noise::{self, BLOCK, channel};
 use crate::problem::Problem;
 use crate::record::CHANNEL_NAMES;

@@ -1,6 +1,6 @@
 //! The verdict for a reader.
 
-use crate::diagnosis::{Named, Verdict};
+use crate::findings::{Named, Verdict};
 use crate::gain::Shift;
 use crate::shape::Structure;
 

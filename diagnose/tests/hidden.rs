@@ -6,9 +6,10 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use diagnose::diagnosis::{Diagnosis, Verdict, diagnose};
+use diagnose::diagnosis::{Diagnosis, diagnose};
 use diagnose::drive::Model;
 use diagnose::extend::extended_toml;
+use diagnose::findings::Verdict;
 use diagnose::fit::State;
 use diagnose::problem::Problem;
 use diagnose::record::Record;

@@ -6,7 +6,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use diagnose::diagnosis::{Diagnosis, Verdict, diagnose};
+use diagnose::diagnosis::{Diagnosis, diagnose};
+use diagnose::findings::Verdict;
 use diagnose::record::Record;
 use measured::{ColumnMap, Sheet};
 use plant::{Faults, Load, Parameters, Plant};

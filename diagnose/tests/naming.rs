@@ -5,8 +5,9 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use diagnose::diagnosis::{Diagnosis, Verdict, diagnose};
+use diagnose::diagnosis::{Diagnosis, diagnose};
 use diagnose::extend::extended_toml;
+use diagnose::findings::Verdict;
 use diagnose::record::Record;
 use measured::{ColumnMap, Sheet};
 use plant::{Load, Parameters, Plant};

@@ -10,7 +10,9 @@ use random::{Random, SplitMix};
 use toml_input::Message;
 
 use crate::arguments::Certify;
-use crate::{Failure, Outcome, output};
+use crate::failure::Failure;
+use crate::outcome::Outcome;
+use crate::output;
 
 /// Proves, measures, draws, writes.
 pub fn run(options: &Certify) -> Result<Outcome, Failure> {

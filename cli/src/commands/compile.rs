@@ -13,8 +13,10 @@ use verify::fmu::Archive;
 use verify::{Files, MISREAD, UNPROVEN, advice, text};
 
 use crate::arguments::Compile;
+use crate::failure::Failure;
+use crate::outcome::Outcome;
+use crate::output;
 use crate::ownership::{self, Replacing};
-use crate::{Failure, Outcome, output};
 use report::bytes;
 
 /// Generates, then writes everything at once.

@@ -6,7 +6,9 @@ use codegen::Output;
 
 use super::{compile, inspect, verify};
 use crate::arguments::{Demo, Inspect, Verify};
-use crate::{Failure, Outcome, output};
+use crate::failure::Failure;
+use crate::outcome::Outcome;
+use crate::output;
 
 /// The example as shipped, so that the demo runs anywhere.
 const EXAMPLE: [(&str, &[u8]); 4] = [

@@ -6,8 +6,9 @@ use std::sync::Mutex;
 use std::time::Instant;
 
 use ::diagnose::control::Request;
-use ::diagnose::diagnosis::{Findings, diagnose};
+use ::diagnose::diagnosis::diagnose;
 use ::diagnose::extend::extended_toml;
+use ::diagnose::findings::Findings;
 use ::diagnose::page::page;
 use ::diagnose::progress::Progress;
 use ::diagnose::record::Record;
@@ -21,7 +22,9 @@ use toml_input::Sink;
 use super::progress_line::ProgressLine;
 use super::simulate;
 use crate::arguments::Diagnose;
-use crate::{Failure, Outcome, output};
+use crate::failure::Failure;
+use crate::outcome::Outcome;
+use crate::output;
 
 /// Reads the records, diagnoses, writes the three files.
 pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {

@@ -5,7 +5,9 @@ use policy::{Activation, Interval, Policy, describe};
 use serde::Serialize;
 
 use crate::arguments::Inspect;
-use crate::{Failure, Outcome, output};
+use crate::failure::Failure;
+use crate::outcome::Outcome;
+use crate::output;
 
 /// Prints the checked policy.
 pub fn run(options: &Inspect) -> Result<Outcome, Failure> {

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 
 use policy::{NumericFormat, Policy};
 
-use crate::Failure;
+use crate::failure::Failure;
 
 /// `policy.toml` itself, also if the folder that holds it was named.
 fn contract_path(path: &Path) -> PathBuf {

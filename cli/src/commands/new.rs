@@ -1,7 +1,9 @@
 //! `policyc new`
 
 use crate::arguments::New;
-use crate::{Failure, Outcome, output};
+use crate::failure::Failure;
+use crate::outcome::Outcome;
+use crate::output;
 
 /// Writes a contract skeleton next to the weights' shapes.
 pub fn run(options: &New) -> Result<Outcome, Failure> {

@@ -8,7 +8,10 @@ use closed_loop::simulation::{Findings, PAGE, Setting, simulate};
 use super::controllers;
 use super::progress_line::ProgressLine;
 use crate::arguments::Simulate;
-use crate::{Failure, Outcome, interruption, output};
+use crate::failure::Failure;
+use crate::interruption;
+use crate::outcome::Outcome;
+use crate::output;
 
 // `diagnose` asks the same of a policy
 pub use closed_loop::{suits, v_ref};

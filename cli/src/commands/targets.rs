@@ -3,7 +3,9 @@
 use ::targets::{TARGETS, overview};
 
 use crate::arguments::Targets;
-use crate::{Failure, Outcome, output};
+use crate::failure::Failure;
+use crate::outcome::Outcome;
+use crate::output;
 
 /// Lists the table.
 pub fn run(options: &Targets) -> Result<Outcome, Failure> {

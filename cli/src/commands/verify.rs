@@ -9,7 +9,9 @@ use verify::{Folder, Options, Progress, Report, folder, text};
 
 use super::progress_line::ProgressLine;
 use crate::arguments::Verify;
-use crate::{Failure, Outcome, output};
+use crate::failure::Failure;
+use crate::outcome::Outcome;
+use crate::output;
 use report::grouped;
 
 /// What `--json` prints.

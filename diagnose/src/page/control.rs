@@ -4,7 +4,7 @@ use closed_loop::controller::Period;
 use closed_loop::scenario::{Metrics, SETTLED};
 use report::{Axis, Chart, Panel, ReportError, Section, Series, Svg, Table};
 
-use super::{EXTENDED, MEASURED, MODEL};
+use super::colours::{EXTENDED, MEASURED, MODEL};
 use crate::control::{ClosedLoop, Control, Course};
 
 /// Shown before and after the step, in control periods.

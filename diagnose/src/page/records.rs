@@ -2,8 +2,9 @@
 
 use report::{Axis, Chart, Panel, ReportError, Section, Series, Svg};
 
-use super::{EXTENDED, MEASURED, MODEL};
-use crate::diagnosis::{Diagnosis, Verdict};
+use super::colours::{EXTENDED, MEASURED, MODEL};
+use crate::diagnosis::Diagnosis;
+use crate::findings::Verdict;
 use crate::fit::State;
 use crate::noise::channel;
 use crate::problem::Problem;

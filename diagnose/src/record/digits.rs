@@ -1,6 +1,6 @@
 //! The steps of a converter, from the digits of its values.
 
-use super::FEWEST;
+use super::channels::FEWEST;
 
 /// The last digit written.
 pub fn last_digit(decimals: u32) -> f64 {

@@ -13,9 +13,9 @@
 use plant::{Load, Parameters};
 use toml_input::{Faults, Message};
 
+use super::channels::{CHANNELS, FEWEST_SETTLED, QUANTITIES};
 use super::raw::Raw;
 use super::rows::Lines;
-use super::{CHANNELS, FEWEST_SETTLED, QUANTITIES};
 use crate::noise;
 
 /// Rows further apart than this share of the filter's period do not show how it swings. A controller that holds its duty
@@ -216,7 +216,7 @@ struct Input {
 impl Input {
     fn new(values: Vec<f64>, least: f64) -> Self {
         let changes = values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-        let usual = crate::problem::median(changes);
+        let usual = crate::median::median(changes);
         let noise = if usual.is_finite() { STEP * usual } else { 0.0 };
         Input {
             values,

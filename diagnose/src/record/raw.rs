@@ -4,9 +4,9 @@ use measured::{ColumnMap, Located, Quantity, Sheet, Signal, proposal, table_faul
 use plant::Load;
 use toml_input::{Fault, Faults, Message, Sink};
 
-use super::QUANTITIES;
+use super::channels::QUANTITIES;
 use super::digits::{last_digit, lattice};
-use super::suspicion::Source;
+use super::source::Source;
 
 /// What a record may hold.
 const NAMES: [&str; 9] = [

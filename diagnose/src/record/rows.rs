@@ -4,8 +4,9 @@ use measured::{ColumnMap, Sampled};
 use plant::{Load, Parameters};
 use toml_input::{Faults, Message};
 
+use super::channels::{CHANNELS, FEWEST, FEWEST_SETTLED, QUANTITIES, Segment};
+use super::logged;
 use super::raw::Raw;
-use super::{CHANNELS, FEWEST, FEWEST_SETTLED, QUANTITIES, Segment, logged};
 
 /// Rows as the plant can be driven by them.
 pub struct Lines {

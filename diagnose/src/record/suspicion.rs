@@ -3,8 +3,10 @@
 use plant::Parameters;
 use toml_input::Message;
 
-use super::{CHANNEL_UNITS, CHANNELS, QUANTITIES, Record};
-use crate::problem::median;
+use super::Record;
+use super::channels::{CHANNEL_UNITS, CHANNELS, QUANTITIES};
+use super::source::Source;
+use crate::median::median;
 
 /// A signal this many times larger or smaller than the model's is in another unit: units are a thousand apart, percent a hundred,
 /// and operating points of one converter less than ten. About the geometric mean of ten and a hundred.
@@ -31,18 +33,6 @@ const AS_OTHER: f64 = 0.05;
 const NOT_AS_OWN: f64 = 0.2;
 /// Drawn current over half the ripple from which on a current surely never rests: at rest the voltage is above d v_in, at any factor.
 const CONTINUOUS: f64 = 1.2;
-
-/// A channel's column.
-pub struct Source {
-    /// What to call it.
-    pub label: String,
-    /// Its header in the file.
-    pub header: String,
-    /// SI units over units of the file.
-    pub scale: f64,
-    /// The map has a factor for it: the user knows.
-    pub stated: bool,
-}
 
 /// What is wrong with a record, as far as signs and sizes tell; signs first, since a turned signal has no size to speak of.
 pub fn of(record: &Record, parameters: &Parameters, sources: &[Source; CHANNELS], duty: &Source) -> Vec<Message> {

@@ -2,9 +2,9 @@
 
 mod starts;
 
-use crate::attribute::{ACCURACY, threshold};
 use crate::causes::Search;
 use crate::fit::{FINE, Fit, Fitter, State, solve};
+use crate::level::{ACCURACY, threshold};
 use crate::noise;
 use crate::parallel;
 use crate::problem::dot;
@@ -20,7 +20,7 @@ const TIE_SHARE: f64 = 4.0 * ACCURACY * ACCURACY;
 const NEAR: f64 = 5.0;
 /// A candidate is fitted if it explains this share of the most that one explains, and this much, both at first order. Conventions
 /// that trade time for candidates that grow with nonlinearity: 6 is less than half of what a cause must gain in the end
-/// ([`crate::attribute::THRESHOLD`]).
+/// ([`crate::level::THRESHOLD`]).
 const FOLLOWED: f64 = 0.2;
 const LEAST_FOLLOWED: f64 = 6.0;
 /// A cause gives way to another that is better by this, in chi-square with the price of parameters. Above the 0.5 at which a rough

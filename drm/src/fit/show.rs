@@ -24,7 +24,8 @@ pub fn text(report: &Report) -> Result<String, fmt::Error> {
         entries.push(("r", r, se, " 1/A"));
     }
     for (name, value, error, unit) in entries {
-        writeln!(out, "  {name} = {value:>11.8} +- {error:.1e}{unit}")?;
+        let places = places(value);
+        writeln!(out, "  {name} = {value:>12.places$} +- {error:.1e}{unit}")?;
     }
     let (i, d) = (fit.map.valid_i_out, fit.map.valid_d_sim);
     writeln!(
@@ -158,4 +159,12 @@ pub fn comment(report: &Report) -> String {
         text += &format!("\nNote: {finding}.");
     }
     text
+}
+
+/// Decimal places that show seven digits of a coefficient.
+fn places(value: f64) -> usize {
+    match value.abs().log10().floor() {
+        order if order.is_finite() => (6.0 - order).clamp(0.0, 15.0) as usize,
+        _ => 6,
+    }
 }

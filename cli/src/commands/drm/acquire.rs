@@ -10,7 +10,9 @@ use spice::SpiceConverter;
 
 use crate::arguments::drm::{Acquire, Simulator};
 use crate::commands::progress_line::ProgressLine;
-use crate::{Failure, Outcome, output};
+use crate::failure::Failure;
+use crate::outcome::Outcome;
+use crate::output;
 
 /// Measures or plans.
 pub fn run(options: &Acquire) -> Result<Outcome, Failure> {

@@ -5,7 +5,9 @@ use plant::Parameters;
 use toml_input::messages;
 
 use crate::arguments::drm::{Fit, Terms};
-use crate::{Failure, Outcome, output};
+use crate::failure::Failure;
+use crate::outcome::Outcome;
+use crate::output;
 
 /// Fits, writes, reports.
 pub fn run(options: &Fit) -> Result<Outcome, Failure> {

@@ -8,7 +8,9 @@ use serde::Serialize;
 use toml_input::Message;
 
 use crate::arguments::drm::Judge;
-use crate::{Failure, Outcome, output};
+use crate::failure::Failure;
+use crate::outcome::Outcome;
+use crate::output;
 
 /// What `--json` prints.
 #[derive(Serialize)]

@@ -6,7 +6,8 @@ mod judge;
 mod transfer;
 
 use crate::arguments::drm::Drm;
-use crate::{Failure, Outcome};
+use crate::failure::Failure;
+use crate::outcome::Outcome;
 
 // `diagnose` asks the same of a policy
 pub use closed_loop::refit::needs_mapping;

@@ -10,7 +10,10 @@ use spice::SpiceConverter;
 use crate::arguments::drm::{Simulator, Transfer};
 use crate::commands::controllers;
 use crate::commands::progress_line::ProgressLine;
-use crate::{Failure, Outcome, interruption, output};
+use crate::failure::Failure;
+use crate::interruption;
+use crate::outcome::Outcome;
+use crate::output;
 
 /// Transfers, writes, reports.
 pub fn run(options: &Transfer) -> Result<Outcome, Failure> {

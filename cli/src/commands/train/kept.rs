@@ -6,7 +6,8 @@ use std::sync::Mutex;
 
 use toml_input::Message;
 
-use crate::{Failure, output};
+use crate::failure::Failure;
+use crate::output;
 
 const CHECKPOINTS: &str = "checkpoints";
 

@@ -10,7 +10,10 @@ use train::{
 };
 
 use crate::arguments::Train;
-use crate::{Failure, Outcome, interruption, output};
+use crate::failure::Failure;
+use crate::interruption;
+use crate::outcome::Outcome;
+use crate::output;
 use report::grouped;
 
 mod kept;

@@ -10,7 +10,7 @@ use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressStyle};
 use train::{Progress, SeedRun, Settings, Watch};
 
 use super::kept::Kept;
-use crate::Failure;
+use crate::failure::Failure;
 use report::grouped;
 
 const LOG_EVERY: Duration = Duration::from_secs(5);

@@ -1,0 +1,143 @@
+//! What a diagnosis finds, as it is written to `diagnosis.json`.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::gain::{Held, Shift};
+use crate::shape::Structure;
+
+/// The answer in a word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// The model explains the data.
+    Consistent,
+    /// Named causes explain the rest, and nothing else does.
+    Explained,
+    /// Causes explain the rest, and others would as well.
+    Ambiguous,
+    /// None of the known causes does.
+    Unexplained,
+}
+
+impl Verdict {
+    /// As in `diagnosis.json`.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Verdict::Consistent => "consistent",
+            Verdict::Explained => "explained",
+            Verdict::Ambiguous => "ambiguous",
+            Verdict::Unexplained => "unexplained",
+        }
+    }
+}
+
+/// A value with its 95 % interval.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Value {
+    /// Best value.
+    pub value: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// SI unit.
+    pub unit: &'static str,
+    /// The model's own value.
+    pub model: f64,
+}
+
+/// How sure a cause is.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Evidence {
+    /// Chi-square lost without it, over the scatter of the noise.
+    pub delta_chi2: f64,
+    /// What one cause must reach.
+    pub threshold: f64,
+}
+
+/// A named cause.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Named {
+    /// Which.
+    pub id: &'static str,
+    /// In words.
+    pub words: &'static str,
+    /// Its parameters.
+    pub parameters: BTreeMap<&'static str, Value>,
+    /// How sure.
+    pub evidence: Evidence,
+    /// What would explain the data as well in its place; each a set of ids.
+    pub rivals: Vec<Vec<&'static str>>,
+}
+
+/// A cause that the records cannot show unless it is large.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Hidden {
+    /// Which.
+    pub id: &'static str,
+    /// Parameter.
+    pub parameter: &'static str,
+    /// Smallest change that would be seen; nothing if none within the reach would.
+    pub smallest: Option<f64>,
+    /// Largest change that is tried: a cause beyond it is another converter.
+    pub reach: f64,
+    /// SI unit.
+    pub unit: &'static str,
+}
+
+/// Noise and what was left out.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Noise {
+    /// Standard deviation of each measured channel.
+    pub sigma: BTreeMap<&'static str, f64>,
+    /// Scatter of sums over that of independent noise: noise shared among records or correlated in time.
+    pub inflation: f64,
+    /// Rows left out, as `record:row:channel`.
+    pub outliers: Vec<String>,
+    /// What was repaired or assumed in each record.
+    pub repairs: Vec<String>,
+    /// Duty that the gate's edges seem to add, 1: within the accuracy of a model of ideal edges, no cause.
+    pub trim: f64,
+}
+
+/// What the extension is worth.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Gain {
+    /// Held-out errors.
+    pub heldout: Vec<Held>,
+    /// Mean square over that of the noise, all held-out records: before and after.
+    pub mean_square: [f64; 2],
+    /// Held-out records that the extended model fits much worse than the training records.
+    pub shifts: Vec<Shift>,
+    /// Closed loop with a policy, if one was given.
+    pub closed_loop: Option<crate::control::ClosedLoop>,
+    /// Why it is missing although one was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub closed_loop_missing: Option<String>,
+}
+
+/// What is written to `diagnosis.json`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Findings {
+    /// The answer.
+    pub verdict: Verdict,
+    /// The same in a sentence.
+    pub sentence: String,
+    /// Named causes; empty if none is needed or none explains the data.
+    pub causes: Vec<Named>,
+    /// What explains part of it where the verdict is `unexplained`.
+    pub partial: Vec<Named>,
+    /// Structure that is left.
+    pub structure: Vec<Structure>,
+    /// Causes that would have to be large to be seen.
+    pub not_detectable: Vec<Hidden>,
+    /// Experiments that would separate what is tied.
+    pub next_experiments: Vec<crate::next::Experiment>,
+    /// Noise.
+    pub noise: Noise,
+    /// Held-out gain.
+    pub gain: Gain,
+}

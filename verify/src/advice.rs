@@ -46,8 +46,19 @@ pub fn lines(
     if budgets.iter().any(|(_, budget)| budget.fit == Fit::Met) {
         return Ok(lines);
     }
-    lines.push(match proposal(policy, target, outputs, clock)? {
-        Some(Proposal { format, build, share }) => format!(
+    let own = budgets.iter().map(|(build, budget)| Proposal {
+        format: policy.numeric_format,
+        build: (*build).to_owned(),
+        share: budget.share,
+    });
+    let others = proposals(policy, target, outputs, clock)?;
+    let fits = others.iter().find(|proposal| proposal.share.1 <= 1.0);
+    let nearest = || {
+        own.chain(others.iter().cloned())
+            .min_by(|a, b| a.share.1.total_cmp(&b.share.1))
+    };
+    lines.push(match fits.cloned().or_else(nearest) {
+        Some(Proposal { format, build, share }) if share.1 <= 1.0 => format!(
             "  = hint: --format {} takes {:.0} to {:.0} % with {build}{}",
             format.name(),
             100.0 * share.0,
@@ -57,6 +68,15 @@ pub fn lines(
             } else {
                 ""
             }
+        ),
+        Some(Proposal { format, build, share }) => format!(
+            "  = hint: no numeric format fits; next to it comes {} with {build}, {:.0} to {:.0} %: that fits with a period of \
+             {:.0} us or a clock of {:.0} MHz. A smaller network would do, too",
+            format.name(),
+            100.0 * share.0,
+            100.0 * share.1,
+            (1e6 * period * share.1).ceil(),
+            (1e-6 * clock.hz * share.1).ceil()
         ),
         None => "  = hint: no numeric format fits: a faster clock, a longer period or a smaller network is needed"
             .to_owned(),
@@ -85,7 +105,8 @@ fn unmodelled(target: &TargetSpec, costs: &StepCosts, clock: Clock, period: f64)
     text
 }
 
-/// A format that fits where the policy's own does not.
+/// What a format takes in its fastest build.
+#[derive(Debug, Clone)]
 struct Proposal {
     format: NumericFormat,
     build: String,
@@ -100,13 +121,15 @@ const EXACT_FIRST: [NumericFormat; 4] = [
     NumericFormat::I8,
 ];
 
-/// The most exact of the other formats that fits in every build that can be made here.
-fn proposal(
+/// The other formats, each with the build of the least cycles among those that can be made here: the most exact first, and
+/// none behind one that fits.
+fn proposals(
     policy: &Policy,
     target: &'static TargetSpec,
     outputs: &[Output],
     clock: Clock,
-) -> Result<Option<Proposal>, CodegenError> {
+) -> Result<Vec<Proposal>, CodegenError> {
+    let mut found = Vec::new();
     let languages = languages(outputs);
     let cores: Vec<Output> = languages.iter().map(|language| language.core()).collect();
     // binary64 from a library takes longer than anything else; whether it does, the target knows
@@ -119,13 +142,14 @@ fn proposal(
         let budgets = measured
             .measured()
             .filter_map(|costs| Some((costs, Budget::of(costs, clock, policy.sample_period)?)));
-        let best = budgets
-            .filter(|(_, budget)| budget.fit == Fit::Met)
-            .min_by(|(_, a), (_, b)| a.share.1.total_cmp(&b.share.1));
-        if let Some((Costs { build, .. }, Budget { share, .. })) = best {
+        let best = budgets.min_by(|(_, a), (_, b)| a.share.1.total_cmp(&b.share.1));
+        if let Some((Costs { build, .. }, Budget { share, fit, .. })) = best {
             let build = build.clone();
-            return Ok(Some(Proposal { format, build, share }));
+            found.push(Proposal { format, build, share });
+            if fit == Fit::Met {
+                break;
+            }
         }
     }
-    Ok(None)
+    Ok(found)
 }

@@ -3,7 +3,7 @@
 use std::fmt::{self, Write};
 
 use interp::decisions::Decisions;
-use interp::golden::{GoldenResult, MISREAD, UNPROVEN};
+use interp::golden::{GoldenResult, UNPROVEN};
 use policy::Policy;
 use report::{grouped, quantity};
 use toml_input::Message;
@@ -66,13 +66,13 @@ pub fn report(policy: &Policy, report: &Report, drift: Option<&Drift>) -> Result
     let builds_equal = report.builds_equal() && drift.is_none_or(Drift::is_empty);
     let word = if builds_equal { "equal" } else { "DIFFERENT" };
     writeln!(out, "{word}: {} against the interpreter", report.policy)?;
-    if report.golden.as_ref().is_some_and(|golden| !golden.passed()) {
+    if let Some(golden) = report.golden.as_ref().filter(|golden| !golden.passed()) {
         writeln!(
             out,
             "DIFFERENT: {} does not give the trainer's golden answers",
             report.policy
         )?;
-        writeln!(out, "  = hint: {MISREAD}")?;
+        writeln!(out, "  = hint: {}", golden.hint())?;
     } else if report.golden.is_none() {
         writeln!(out, "note: {UNPROVEN}")?;
     }

@@ -10,7 +10,7 @@ use targets::TargetSpec;
 use toml_input::Message;
 use verify::costs::StepCosts;
 use verify::fmu::Archive;
-use verify::{Files, MISREAD, UNPROVEN, advice, text};
+use verify::{Files, UNPROVEN, advice, text};
 
 use crate::arguments::Compile;
 use crate::failure::Failure;
@@ -45,7 +45,7 @@ fn load(options: &Compile) -> Result<Policy, Failure> {
     let policy = super::load_as(&options.policy, options.format)?;
     if let Some(golden) = verify::golden_result(&policy).filter(|golden| !golden.passed()) {
         let message = Message::new("the network does not give the trainer's golden answers; nothing was written");
-        return Err(message.found(golden.to_string()).hint(MISREAD).into());
+        return Err(message.found(golden.to_string()).hint(golden.hint()).into());
     }
     match verify::decisions(&policy, options.golden_decisions).filter(|decisions| !decisions.kept()) {
         None => Ok(policy),

@@ -17,9 +17,9 @@ pub fn run(options: &Inspect) -> Result<Outcome, Failure> {
     } else {
         output::say(text(&policy).trim_end())?;
     }
-    if verify::golden_result(&policy).is_some_and(|golden| !golden.passed()) {
+    if let Some(golden) = verify::golden_result(&policy).filter(|golden| !golden.passed()) {
         eprintln!("\nDIFFERENT: the network does not give the trainer's golden answers");
-        eprintln!("  = hint: {}", verify::MISREAD);
+        eprintln!("  = hint: {}", golden.hint());
         return Ok(Outcome::Different);
     }
     match verify::decisions(&policy, None).is_some_and(|decisions| !decisions.kept()) {

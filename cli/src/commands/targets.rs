@@ -1,6 +1,6 @@
 //! `policyc targets`
 
-use ::targets::{TARGETS, overview};
+use ::targets::{TARGETS, overview, parts};
 
 use crate::arguments::Targets;
 use crate::failure::Failure;
@@ -11,7 +11,11 @@ use crate::output;
 pub fn run(options: &Targets) -> Result<Outcome, Failure> {
     let text = match options.json {
         true => serde_json::to_string_pretty(TARGETS)?,
-        false => overview(TARGETS),
+        false => format!(
+            "{}\n\nparts by their target; the maker's data sheet names the core\n{}",
+            overview(TARGETS),
+            parts()
+        ),
     };
     output::say(&text)?;
     Ok(Outcome::Done)

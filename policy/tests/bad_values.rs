@@ -115,6 +115,11 @@ fn filters_are_checked_one_by_one() {
         &with("{ ¦dely = 1 }"),
         &["unknown key `dely`", "did you mean `delay`?"],
     );
+    contract_fault(
+        one,
+        &with("{ ¦cutoff = 500.0 }"),
+        &["unknown key `cutoff`", "{ low_pass = { cutoff = ... } }"],
+    );
     contract_fault(one, &with("¦{ delay = 1, moving_average = 2 }"), &["exactly one", "2"]);
     contract_fault(
         one,

@@ -11,24 +11,65 @@ use crate::model::Filter;
 use crate::model::Interval;
 use crate::rounding::inward_f32;
 
-const KINDS: [&str; 6] = [
-    "delay",
-    "backward_difference",
-    "low_pass",
-    "filtered_derivative",
-    "moving_average",
-    "integrator",
+/// What is read behind the word of a kind; the sample period is `None` if the contract's is faulty.
+type Reader = fn(&Value<'_>, Option<f64>, &mut Sink) -> Option<Filter>;
+
+/// A kind of filter: its word, how it is written, for hints, and what reads it.
+struct Kind {
+    word: &'static str,
+    written: &'static str,
+    read: Reader,
+}
+
+/// The only list of kinds: what stands here can be written, is proposed and is read.
+const KINDS: [Kind; 6] = [
+    Kind {
+        word: "delay",
+        written: "{ delay = 1 }",
+        read: |value, _, faults| {
+            let samples = value.integer(1..=MAX_LINE, faults)?;
+            Some(Filter::Delay { samples })
+        },
+    },
+    Kind {
+        word: "backward_difference",
+        written: "\"backward_difference\"",
+        read: |value, _, faults| backward_difference(value, faults),
+    },
+    Kind {
+        word: "low_pass",
+        written: "{ low_pass = { time_constant = 1e-3 } }",
+        read: |value, period, faults| {
+            let time_constant = time_constant(value, period, faults)?;
+            Some(Filter::LowPass { time_constant })
+        },
+    },
+    Kind {
+        word: "filtered_derivative",
+        written: "{ filtered_derivative = { time_constant = 1e-3 } }",
+        read: |value, period, faults| {
+            let time_constant = time_constant(value, period, faults)?;
+            Some(Filter::FilteredDerivative { time_constant })
+        },
+    },
+    Kind {
+        word: "moving_average",
+        written: "{ moving_average = 4 }",
+        read: |value, _, faults| {
+            let samples = value.integer(2..=MAX_LINE, faults)?;
+            Some(Filter::MovingAverage { samples })
+        },
+    },
+    Kind {
+        word: "integrator",
+        written: "{ integrator = { min = -1.0, max = 1.0 } }",
+        read: |value, _, faults| integrator(value, faults),
+    },
 ];
 
-/// Each kind as it is written, for hints.
-const WRITTEN: [&str; 6] = [
-    "{ delay = 1 }",
-    "{ backward_difference = true }",
-    "{ low_pass = { time_constant = 1e-3 } }",
-    "{ filtered_derivative = { time_constant = 1e-3 } }",
-    "{ moving_average = 4 }",
-    "{ integrator = { min = -1.0, max = 1.0 } }",
-];
+fn words() -> [&'static str; KINDS.len()] {
+    KINDS.map(|kind| kind.word)
+}
 
 /// Other words for a kind.
 const SYNONYMS: [(&str, &str); 7] = [
@@ -58,42 +99,35 @@ fn one(value: &Value<'_>, period: Option<f64>, faults: &mut Sink) -> Option<Filt
     }
     let mut section = value.table("filter", faults)?;
     let mut found: Vec<_> = KINDS
-        .iter()
-        .filter_map(|kind| section.optional(kind).map(|value| (*kind, value)))
+        .into_iter()
+        .filter_map(|kind| section.optional(kind.word).map(|value| (kind, value)))
         .collect();
     // unknown keys count: `{ delay = 1, dely = 2 }` names two filters
     let number = section.count();
     let before = faults.count();
     // beside two kinds the fault of the unknown key would only be an echo
     if number == 1 || found.is_empty() {
-        section.finish(faults);
+        let inner = |key: &str| matches!(key, "cutoff" | "time_constant");
+        section.finish_with(faults, |key| {
+            inner(key).then(|| format!("as in {{ low_pass = {{ {key} = ... }} }}"))
+        });
     }
     let (Some((kind, inner)), 1) = (found.pop(), number) else {
         if faults.count() == before {
-            faults.push(value.fault(catalogue::exactly_one_of("a filter", &KINDS.join(", "), number)));
+            faults.push(value.fault(catalogue::exactly_one_of("a filter", &words().join(", "), number)));
         }
         return None;
     };
-    match kind {
-        "delay" => inner
-            .integer(1..=MAX_LINE, faults)
-            .map(|samples| Filter::Delay { samples }),
-        "moving_average" => inner
-            .integer(2..=MAX_LINE, faults)
-            .map(|samples| Filter::MovingAverage { samples }),
-        "backward_difference" => match inner.boolean(faults)? {
-            true => Some(Filter::BackwardDifference),
-            false => {
-                faults.push(inner.fault(catalogue::out_of_range(kind, "false", "true").hint("leave the filter out")));
-                None
-            }
-        },
-        "low_pass" => time_constant(&inner, period, faults).map(|time_constant| Filter::LowPass { time_constant }),
-        "filtered_derivative" => {
-            time_constant(&inner, period, faults).map(|time_constant| Filter::FilteredDerivative { time_constant })
-        }
-        _ => integrator(&inner, faults),
+    (kind.read)(&inner, period, faults)
+}
+
+fn backward_difference(value: &Value<'_>, faults: &mut Sink) -> Option<Filter> {
+    if value.boolean(faults)? {
+        return Some(Filter::BackwardDifference);
     }
+    let message = catalogue::out_of_range(value.label(), "false", "true");
+    faults.push(value.fault(message.hint("leave the filter out")));
+    None
 }
 
 fn named(value: &Value<'_>, text: &str, faults: &mut Sink) -> Option<Filter> {
@@ -102,11 +136,8 @@ fn named(value: &Value<'_>, text: &str, faults: &mut Sink) -> Option<Filter> {
     }
     value.text(faults)?;
     let meant = SYNONYMS.iter().find(|(word, _)| *word == text);
-    let kind = meant.map_or(text, |(_, kind)| *kind);
-    let written = KINDS
-        .iter()
-        .position(|known| *known == kind)
-        .map(|index| WRITTEN[index]);
+    let word = meant.map_or(text, |(_, word)| *word);
+    let written = KINDS.iter().find(|kind| kind.word == word).map(|kind| kind.written);
     faults.push(value.fault(match (written, meant) {
         (Some(written), None) => catalogue::missing_key(
             "value",
@@ -114,9 +145,9 @@ fn named(value: &Value<'_>, text: &str, faults: &mut Sink) -> Option<Filter> {
             &format!("write it as {written}"),
         ),
         (Some(written), Some(_)) => {
-            catalogue::not_one_of("filters", text, &KINDS).hint(format!("write it as {written}"))
+            catalogue::not_one_of("filters", text, &words()).hint(format!("write it as {written}"))
         }
-        (None, _) => catalogue::not_one_of("filters", text, &KINDS),
+        (None, _) => catalogue::not_one_of("filters", text, &words()),
     }));
     None
 }

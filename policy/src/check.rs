@@ -97,6 +97,7 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
         &limits,
         &actions.list,
         mapping.as_ref().and_then(Option::as_ref),
+        known,
     ));
     let mut policy = Policy {
         name: head.name?,

@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use crate::model::{Action, Expr, Feature, Input, Limits, Mapping, Signal};
 
 /// What the limits and the mapping make of the duties, where a reader may not expect it.
-pub fn on_duties(limits: &Limits, actions: &[Action], mapping: Option<&Mapping>) -> Vec<String> {
+pub fn on_duties(limits: &Limits, actions: &[Action], mapping: Option<&Mapping>, features: &[Feature]) -> Vec<String> {
     let mut notes: Vec<String> = outside_at_first(limits).into_iter().collect();
+    notes.extend(unlike_any_action(limits, actions, features));
     match only_duty(limits, actions, mapping) {
         Some(duty) => notes.push(format!(
             "every action commands the duty {duty}: the limits leave no other, and nothing is left to control with"
@@ -17,6 +18,30 @@ pub fn on_duties(limits: &Limits, actions: &[Action], mapping: Option<&Mapping>)
         notes.extend(beyond_mapping(limits, actions, mapping));
     }
     notes
+}
+
+/// A first observation with a duty that the training hardly had.
+fn unlike_any_action(limits: &Limits, actions: &[Action], features: &[Feature]) -> Option<String> {
+    let first = limits.initial_duty;
+    let (low, high) = actions.iter().fold((1.0_f64, 0.0_f64), |(low, high), action| {
+        (low.min(action.duty), high.max(action.duty))
+    });
+    let is_read = features.iter().any(|feature| reads_duty(&feature.source));
+    (is_read && !(low..=high).contains(&first)).then(|| {
+        format!(
+            "the first observation has the duty {first}, which lies outside of all actions, {low} to {high}: the duty before the \
+             first step of the training is initial_duty in [limits]"
+        )
+    })
+}
+
+fn reads_duty(expr: &Expr) -> bool {
+    match expr {
+        Expr::Input(input) => matches!(input, Input::PreviousDuty | Input::PreviousCommand),
+        Expr::Constant(_) => false,
+        Expr::Neg(e) | Expr::Scale(_, e) => reads_duty(e),
+        Expr::Add(a, b) | Expr::Sub(a, b) => reads_duty(a) || reads_duty(b),
+    }
 }
 
 /// Signals and parameters that nothing refers to.

@@ -163,7 +163,7 @@ range = [\"TODO\", \"TODO\"]     # plausible; a sample outside is held
 const FEATURE: &str = "
 [[feature]]
 name = \"TODO\"
-source = \"TODO\"              # affine in signals and parameters, such as v_ref - v_out
+source = \"TODO\"              # affine in signals, parameters, previous_duty, previous_command: v_ref - v_out
 # filters = [{ delay = 1 }]  # first to last; also { integrator = { min = -1.0, max = 1.0 } }, \"backward_difference\",
 #                            # { low_pass = { time_constant = 1e-3 } }, { filtered_derivative = { cutoff = 500.0 } },
 #                            # { moving_average = 4 }
@@ -182,7 +182,7 @@ const TAIL: &str = "
 duty = [\"TODO\", \"TODO\"]      # smallest and largest duty the hardware may see
 # slew = 0.01                # largest change per sample period
 # soft_start = { from = 0.1, steps = 1000 }
-# initial_duty = 0.5         # otherwise the fallback duty
+# initial_duty = 0.5         # duty before the first step, for previous_duty and slew; otherwise the fallback duty
 
 [fallback]
 duty = \"TODO\"                # commanded without a usable measurement; in a synchronous leg 0 keeps the lower switch on

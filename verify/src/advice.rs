@@ -35,7 +35,7 @@ pub fn lines(
     lines.extend(budgets.iter().map(|(build, budget)| budget.text(build)));
     if budgets.is_empty() {
         lines.push(match target.cycles {
-            None => unmodelled(target, costs, clock, period),
+            None => unmodelled(policy, target, outputs, costs, clock)?,
             Some(_) => "  cannot be said: no step ran under the target's emulator here".to_owned(),
         });
         return Ok(lines);
@@ -84,25 +84,38 @@ pub fn lines(
     Ok(lines)
 }
 
-/// What can be said without a model: how many cycles there are, and how many instructions.
-fn unmodelled(target: &TargetSpec, costs: &StepCosts, clock: Clock, period: f64) -> String {
-    let cycles = clock.hz * period;
+/// What can be said without a model: how many cycles there are, and how many instructions, in the other formats as well.
+fn unmodelled(
+    policy: &Policy,
+    target: &'static TargetSpec,
+    outputs: &[Output],
+    costs: &StepCosts,
+    clock: Clock,
+) -> Result<String, CodegenError> {
+    let cycles = clock.hz * policy.sample_period;
     let mut text = format!(
         "  cannot be said: no cycles are modelled for {} (`policyc targets` says for which they are); a control period is {} cycles at {clock}",
         target.name,
         grouped(cycles as u64)
     );
     let least = costs.measured().min_by_key(|costs| costs.instructions_max);
-    if let Some(costs) = least {
-        let instructions = costs.instructions_max;
-        text += &format!(
-            ", and {} instructions in the shortest build, {}: it fits if the processor does {:.2} a cycle or more, with its wait states",
-            grouped(instructions),
-            costs.build,
-            instructions as f64 / cycles
-        );
+    let Some(costs) = least else { return Ok(text) };
+    let instructions = costs.instructions_max;
+    text += &format!(
+        ", and {} instructions in the shortest build, {}: it fits if the processor does {:.2} a cycle or more, with its wait states",
+        grouped(instructions),
+        costs.build,
+        instructions as f64 / cycles
+    );
+    for format in others(policy, target) {
+        let policy = policy.clone().with_format(format);
+        let least = in_format(&policy, target, outputs)?;
+        let least = least.measured().map(|costs| costs.instructions_max).min();
+        if let Some(instructions) = least {
+            text += &format!("; {:.2} in {}", instructions as f64 / cycles, format.name());
+        }
     }
-    text
+    Ok(text + ". A cycle counter on the board says the rest")
 }
 
 /// What a format takes in its fastest build.
@@ -130,15 +143,9 @@ fn proposals(
     clock: Clock,
 ) -> Result<Vec<Proposal>, CodegenError> {
     let mut found = Vec::new();
-    let languages = languages(outputs);
-    let cores: Vec<Output> = languages.iter().map(|language| language.core()).collect();
-    // binary64 from a library takes longer than anything else; whether it does, the target knows
-    let natural = |format: &NumericFormat| *format != NumericFormat::F64 || target.fpu.has(true);
-    let others = EXACT_FIRST.into_iter().filter(natural);
-    for format in others.filter(|format| *format != policy.numeric_format) {
+    for format in others(policy, target) {
         let policy = policy.clone().with_format(format);
-        let files = codegen::sources(&policy, target, &cores, None)?.files;
-        let measured = StepCosts::of(&policy, target, &languages, &files);
+        let measured = in_format(&policy, target, outputs)?;
         let budgets = measured
             .measured()
             .filter_map(|costs| Some((costs, Budget::of(costs, clock, policy.sample_period)?)));
@@ -152,4 +159,23 @@ fn proposals(
         }
     }
     Ok(found)
+}
+
+/// The formats beside the policy's own that suit a target.
+fn others(policy: &Policy, target: &'static TargetSpec) -> impl Iterator<Item = NumericFormat> {
+    let own = policy.numeric_format;
+    // binary64 from a library takes longer than anything else; whether it does, the target knows
+    let natural = |format: &NumericFormat| *format != NumericFormat::F64 || target.fpu.has(true);
+    EXACT_FIRST
+        .into_iter()
+        .filter(natural)
+        .filter(move |format| *format != own)
+}
+
+/// Costs of a step of the cores of `outputs`, in every build that can be made here.
+fn in_format(policy: &Policy, target: &'static TargetSpec, outputs: &[Output]) -> Result<StepCosts, CodegenError> {
+    let languages = languages(outputs);
+    let cores: Vec<Output> = languages.iter().map(|language| language.core()).collect();
+    let files = codegen::sources(policy, target, &cores, None)?.files;
+    Ok(StepCosts::of(policy, target, &languages, &files))
 }

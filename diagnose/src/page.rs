@@ -99,7 +99,7 @@ fn causes(diagnosis: &Diagnosis) -> Section {
 fn profiles(diagnosis: &Diagnosis) -> Result<Section, ReportError> {
     let mut section = Section::new("How well the data hold the parameters").text(
         "Cost of holding a parameter at a value while all others and the initial states follow; below the line are the values \
-         that the data allow at 95 %.",
+         that the data allow at 95 %. The interval in the table is wider: it adds what two simulators of one circuit differ by.",
     );
     for profile in diagnosis.profiles.iter().filter(|profile| profile.curve.len() > 1) {
         let (x, y): (Vec<f64>, Vec<f64>) = profile.curve.iter().copied().unzip();

@@ -183,12 +183,17 @@ pub fn proposal(guesses: &[(&str, &str)]) -> Option<String> {
         .iter()
         .map(|(name, column)| format!("{name}={column}"))
         .collect();
-    let list = entries.join(",");
-    let is_word = |c: char| c.is_ascii_alphanumeric() || "_.=,-".contains(c);
-    Some(match list.chars().all(is_word) {
-        true => format!("--map {list}"),
-        false => format!("--map '{list}'"),
-    })
+    Some(argument(&entries.join(",")))
+}
+
+/// `--map` with what stands behind it, as a shell takes it.
+#[must_use]
+pub fn argument(map: &str) -> String {
+    let is_word = |c: char| c.is_ascii_alphanumeric() || "_.=,-*".contains(c);
+    match map.chars().all(is_word) {
+        true => format!("--map {map}"),
+        false => format!("--map '{map}'"),
+    }
 }
 
 /// A header without unit, case, umlauts, punctuation and manner of measuring.

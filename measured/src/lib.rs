@@ -38,7 +38,7 @@ mod signal;
 mod time_like;
 
 pub use format::Options;
-pub use guess::proposal;
+pub use guess::{argument, proposal};
 pub use locate::Located;
 pub use map::{ColumnMap, DutyIs, Sampled};
 pub use quantity::{Quantity, VOCABULARY};

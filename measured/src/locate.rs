@@ -10,6 +10,7 @@
 
 use toml_input::{Fault, Faults, Message, Sink, nearest};
 
+use crate::guess::argument;
 use crate::map::{ColumnMap, Wish};
 use crate::quantity::{Quantity, split_unit};
 use crate::sheet::{Cell, Sheet};
@@ -128,7 +129,8 @@ impl Sheet {
             [(first, _), (second, _), ..] => {
                 let (first, wanted) = (name(first), quantity.name);
                 let message = Message::new(format!("two columns are `{wanted}`: `{first}` and `{}`", name(second)));
-                let message = message.hint(format!("say which one: --map {wanted}={first}, or remove the other"));
+                let map = argument(&format!("{wanted}={first}"));
+                let message = message.hint(format!("say which one: {map}, or remove the other"));
                 Err(Box::new(self.name_fault(second, message)))
             }
         }
@@ -149,7 +151,10 @@ impl Sheet {
         let message = Message::new(format!("no column `{name}`"))
             .found(self.listed())
             .expected(format!("a column {}", names.join(" or ")))
-            .hint(format!("say where it stands, --map {name}={near}{hint}"));
+            .hint(format!(
+                "say where it stands, {}{hint}",
+                argument(&format!("{name}={near}"))
+            ));
         self.header_fault(message)
     }
 

@@ -1,6 +1,6 @@
 //! A table with its signals found and turned into SI units: duty, load, channels, time.
 
-use measured::{ColumnMap, Located, Quantity, Sheet, Signal, proposal, table_faults};
+use measured::{ColumnMap, Located, Quantity, Sheet, Signal, argument, proposal, table_faults};
 use plant::Load;
 use toml_input::{Fault, Faults, Message, Sink};
 
@@ -47,9 +47,8 @@ impl<'a> Raw<'a> {
         let guesses = sheet.guesses(&located, &Quantity::all(&NAMES));
         // an unknown time is a question of its own
         for (name, column) in guesses.iter().filter(|(name, _)| *name != "t") {
-            repairs.push(format!(
-                "`{column}` looks like {name} and is not read as such: --map {name}={column}"
-            ));
+            let map = argument(&format!("{name}={column}"));
+            repairs.push(format!("`{column}` looks like {name} and is not read as such: {map}"));
         }
         Ok(Raw {
             repairs,

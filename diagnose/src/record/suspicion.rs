@@ -75,11 +75,12 @@ fn turned(record: &Record, parameters: &Parameters, sources: &[Source; CHANNELS]
 
 /// The argument that multiplies a channel by `factor`.
 fn mapped(n: usize, source: &Source, factor: f64) -> String {
-    let text = format!("{}={}*{}", QUANTITIES[n], source.header, factor * source.scale);
-    match text.contains(|c: char| !(c.is_ascii_alphanumeric() || "_.=*-".contains(c))) {
-        true => format!("--map '{text}'"),
-        false => format!("--map {text}"),
-    }
+    measured::argument(&format!(
+        "{}={}*{}",
+        QUANTITIES[n],
+        source.header,
+        factor * source.scale
+    ))
 }
 
 /// The median of the drawn current, with its sign, at the voltage that the duty makes.

@@ -138,6 +138,10 @@ fn a_missing_column_is_sought_among_the_names_that_people_give() {
     let sheet = sheet("Tastgrad,Spannung [V],lamp\n0.5,12,1\n");
     let hint = |name: &str| sheet.missing(&Quantity::all(&[name])[0], "").hint.unwrap();
     assert!(hint("duty").contains("--map duty=Tastgrad"), "{}", hint("duty"));
-    assert!(hint("v_out").contains("--map v_out=Spannung [V]"), "{}", hint("v_out"));
+    assert!(
+        hint("v_out").contains("--map 'v_out=Spannung [V]'"),
+        "{}",
+        hint("v_out")
+    );
     assert!(hint("i_l").contains("--map i_l=COLUMN"), "{}", hint("i_l"));
 }

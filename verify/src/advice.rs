@@ -70,8 +70,8 @@ pub fn lines(
             }
         ),
         Some(Proposal { format, build, share }) => format!(
-            "  = hint: no numeric format fits; next to it comes {} with {build}, {:.0} to {:.0} %: that fits with a period of \
-             {:.0} us or a clock of {:.0} MHz. A smaller network would do, too",
+            "  = hint: no numeric format fits; next to it comes {} with {build}, {:.0} to {:.0} %: it fills a period of \
+             {:.0} us, or the present one at {:.0} MHz. A smaller network would do, or another period; train again for either",
             format.name(),
             100.0 * share.0,
             100.0 * share.1,

@@ -7,6 +7,7 @@ use crate::feature::{Feature, Inputs};
 use crate::integer;
 use crate::limits::Limits;
 use crate::mapping::Mapping;
+use crate::names::state_names;
 use crate::network::{Layer, argmax};
 use crate::real::Real;
 use crate::sanitise::{InputError, Sample, Signal};
@@ -423,30 +424,4 @@ impl<T: Real> Network<T> {
             input = trace.post_activation.view();
         }
     }
-}
-
-fn state_names<T: Real>(policy: &Policy, features: &[Feature<T>], state: &State<T>) -> Vec<String> {
-    let mut names: Vec<String> = policy
-        .signals
-        .iter()
-        .map(|signal| format!("held.{}", signal.name))
-        .collect();
-    for (feature, spec) in features.iter().zip(&policy.features) {
-        for (n, filter) in feature.filters.iter().enumerate() {
-            names.extend(
-                filter
-                    .word_names()
-                    .iter()
-                    .map(|word| format!("{}.{n}.{word}", spec.name)),
-            );
-        }
-    }
-    names.extend(["previous_duty", "previous_command"].map(str::to_owned));
-    names.extend(state.soft_cap.map(|_| "soft_cap".to_owned()));
-    if let Some(coefficients) = &state.mapping {
-        names.extend(["mapping.a", "mapping.b", "mapping.c"].map(str::to_owned));
-        names.extend(coefficients.r.map(|_| "mapping.r".to_owned()));
-    }
-    names.extend(["bad_count", "primed"].map(str::to_owned));
-    names
 }

@@ -34,6 +34,7 @@ pub mod golden;
 mod integer;
 mod limits;
 mod mapping;
+mod names;
 mod network;
 mod real;
 mod sanitise;

@@ -321,43 +321,6 @@ fn malformed_files_say_what_is_wrong() {
 }
 
 #[test]
-fn golden_vectors_are_read() {
-    let obs = f32_tensor("obs", &[2, 2], &[1.0, 5.0, -2.0, -10.0]);
-    let q = f32_tensor("q", &[2, 3], &[0.0, 1.0, 0.5, 3.0, 1.0, 2.0]);
-    let action = raw_tensor(
-        "action",
-        Dtype::I64,
-        &[2],
-        [1i64, 0].iter().flat_map(|v| v.to_le_bytes()).collect(),
-    );
-    let golden = Folder::new()
-        .golden(&[obs.clone(), q.clone(), action.clone()])
-        .policy()
-        .golden
-        .unwrap();
-    assert_eq!(
-        (golden.count, golden.observations[3], golden.q_values[5]),
-        (2, -10.0, 2.0)
-    );
-    assert_eq!((golden.action_indices, golden.tolerance), (vec![1, 0], 1e-5));
-    let q_only = Folder::new().golden(&[obs.clone(), q]).policy().golden.unwrap();
-    assert!(q_only.action_indices.is_empty());
-    let action_only = Folder::new().golden(&[obs, action]).policy().golden.unwrap();
-    assert!(action_only.q_values.is_empty());
-}
-
-#[test]
-fn golden_vectors_are_no_second_fault_where_the_network_does_not_fit() {
-    let obs = tensor("obs", &[2, 2]);
-    let folder = Folder::new().tensors(&replaced(tensor("net.2.weight", &[5, 4])));
-    let list = folder.golden(&[obs, tensor("q", &[2, 5])]).faults().faults.list;
-    assert!(
-        !list.is_empty() && list.iter().all(|fault| fault.file.ends_with(FILE)),
-        "{list:?}"
-    );
-}
-
-#[test]
 fn a_file_that_ends_early_says_by_how_much() {
     let folder = Folder::new();
     let whole = std::fs::read(folder.path().join(FILE)).unwrap();
@@ -385,77 +348,12 @@ fn weights_in_the_place_of_the_contract_are_told_apart() {
 }
 
 #[test]
-fn golden_vectors_that_cannot_be_are_refused() {
-    const GOLDEN: &str = "golden.safetensors";
-    let obs = f32_tensor("obs", &[2, 2], &[1.0, 5.0, -2.0, -10.0]);
-    let q = f32_tensor("q", &[2, 3], &[0.0, 1.0, 0.5, 3.0, 1.0, 2.0]);
-    let u8s = |values: &[u8]| raw_tensor("action", Dtype::U8, &[values.len()], values.to_vec());
-    let fault = |tensors: &[Tensor]| Folder::new().golden(tensors).fault();
-    assert_whole_file(&fault(std::slice::from_ref(&q)), GOLDEN, &["need the tensor `obs`"]);
-    assert_whole_file(&fault(std::slice::from_ref(&obs)), GOLDEN, &["`q`", "`action`"]);
-    assert_tensor(
-        &fault(&[obs.clone(), tensor("q", &[2, 4])]),
-        GOLDEN,
-        "q",
-        &["shape [2, 4]", "shape [2, 3]"],
-    );
-    assert_tensor(
-        &fault(&[tensor("obs", &[2, 3]), q.clone()]),
-        GOLDEN,
-        "obs",
-        &["shape [2, 3]", "shape [rows, 2]"],
-    );
-    assert_tensor(
-        &fault(&[tensor("obs", &[2, 5]), tensor("q", &[5, 3])]),
-        GOLDEN,
-        "obs",
-        &["shape [2, 5]", "shape [rows, 2]", "transposed"],
-    );
-    assert_tensor(
-        &fault(&[obs.clone(), tensor("q", &[3, 2])]),
-        GOLDEN,
-        "q",
-        &["shape [3, 2]", ".T.copy()"],
-    );
-    let column = raw_tensor("action", Dtype::U8, &[2, 1], vec![0, 1]);
-    assert_tensor(
-        &fault(&[obs.clone(), column]),
-        GOLDEN,
-        "action",
-        &["shape [2, 1]", "squeeze"],
-    );
-    let real = f32_tensor("action", &[2], &[0.0, 1.0]);
-    assert_tensor(&fault(&[obs.clone(), real]), GOLDEN, "action", &["F32", "astype"]);
-    assert_whole_file(&fault(&[tensor("states", &[2, 2])]), GOLDEN, &["`states`", "rename"]);
-    assert_tensor(
-        &fault(&[obs.clone(), u8s(&[0, 3])]),
-        GOLDEN,
-        "action",
-        &["row 1", "3", "0 to 2"],
-    );
-    assert_tensor(
-        &fault(&[obs.clone(), q.clone(), u8s(&[1, 2])]),
-        GOLDEN,
-        "action",
-        &["row 1", "action 2", "action 0"],
-    );
-    let outside = f32_tensor("obs", &[2, 2], &[1.0, 5.0, 21.0, 0.0]);
-    assert_tensor(
-        &fault(&[outside, q.clone()]),
-        GOLDEN,
-        "obs",
-        &["row 1", "`e` = 21", "-20 to 20", "order, scale or clip"],
-    );
-    let nan = f32_tensor("obs", &[2, 2], &[1.0, 5.0, f32::NAN, 0.0]);
-    assert_tensor(&fault(&[nan, q]), GOLDEN, "obs", &["nan at index 2"]);
-    contract_fault(
-        "hidden_activation",
-        "golden_tolerance = ¦0.0\nhidden_activation",
-        &["golden_tolerance"],
-    );
-    contract_fault(
-        "hidden_activation",
-        "golden_decisions = ¦1.5\nhidden_activation",
-        &["golden_decisions", "0 to 1"],
+fn golden_vectors_are_no_second_fault_where_the_network_does_not_fit() {
+    let obs = tensor("obs", &[2, 2]);
+    let folder = Folder::new().tensors(&replaced(tensor("net.2.weight", &[5, 4])));
+    let list = folder.golden(&[obs, tensor("q", &[2, 5])]).faults().faults.list;
+    assert!(
+        !list.is_empty() && list.iter().all(|fault| fault.file.ends_with(FILE)),
+        "{list:?}"
     );
 }

@@ -40,6 +40,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::New(options) => commands::new::run(options),
         Command::Inspect(options) => commands::inspect::run(options),
         Command::Compile(options) => commands::compile::run(options),
+        Command::Replay(options) => commands::replay::run(options),
         Command::Verify(options) => commands::verify::run(options),
         Command::Certify(options) => commands::certify::run(options),
         Command::Targets(options) => commands::targets::run(options),

@@ -11,6 +11,7 @@ fn the_help_of_every_command_names_its_arguments() {
     for (command, arguments) in [
         ("new", &["<WEIGHTS>", "--out"][..]),
         ("inspect", &["<POLICY>", "--json"]),
+        ("replay", &["<POLICY>", "<LOG>", "--exploring", "--tolerance", "--json"]),
         (
             "compile",
             &[

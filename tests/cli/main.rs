@@ -9,6 +9,7 @@ mod drm;
 mod faults;
 mod files;
 mod interruption;
+mod replay;
 mod simulate;
 mod tables;
 mod traces;

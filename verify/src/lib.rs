@@ -18,6 +18,7 @@
 //! | what a step costs | [`mod@measure`], [`elf`]; of all builds: [`costs`]; whether it fits into its period: [`budget`], [`advice`] |
 //! | archives of FMUs | [`fmu`] |
 //! | what the format does to decisions | [`decisions`] |
+//! | a log of the trainer against the contract | [`replay`] |
 //! | checked-in files against the policy | [`drift()`], [`folder`] |
 
 pub mod advice;
@@ -37,6 +38,7 @@ pub mod live;
 pub mod measure;
 pub mod oracle;
 pub mod protocol;
+pub mod replay;
 pub mod report;
 pub mod runner;
 mod session;

@@ -37,6 +37,8 @@ pub enum Command {
     Inspect(Inspect),
     /// Generate C, Rust, blocks and units of simulation tools, and manifest.json
     Compile(Compile),
+    /// Put a log of the trainer's environment through the contract: are the features what the network was trained on?
+    Replay(Replay),
     /// Compile the generated code and compare it with the interpreter, bit by bit
     Verify(Verify),
     /// Bound what the numeric format does to the Q values, and map where it can change an action
@@ -104,6 +106,24 @@ fn format() -> OneOf<NumericFormat> {
 fn output() -> OneOf<Output> {
     let row = |output: &Output| (output.name(), output.meaning(), *output);
     OneOf::new("output", Output::ALL.iter().map(row))
+}
+
+#[derive(Debug, Args)]
+pub struct Replay {
+    /// policy.toml or the folder that holds it
+    pub policy: PathBuf,
+    /// Table with a row for each control period. A column for each signal; to compare: `obs_0`, `obs_1`, ... (or `obs_NAME`) and
+    /// `action`. Also read: `duty` or `previous_duty`, `episode`, `t`
+    pub log: PathBuf,
+    /// Logged actions are of a trainer who explores: they are applied, and not compared
+    #[arg(long)]
+    pub exploring: bool,
+    /// Largest difference that is equal, as a share of the largest logged magnitude of the feature
+    #[arg(long, value_name = "SHARE", default_value_t = verify::replay::TOLERANCE, value_parser = share)]
+    pub tolerance: f64,
+    /// Machine-readable
+    #[arg(long)]
+    pub json: bool,
 }
 
 #[derive(Debug, Args)]

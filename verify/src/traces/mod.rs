@@ -18,6 +18,7 @@ use random::{Random, SplitMix};
 use edges::Edges;
 use plant::Plant;
 pub use recorded::Recorded;
+pub(crate) use recorded::SignalColumns;
 
 /// What happens to a controller in one move.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use interp::Sample;
-use measured::{Cell, ColumnMap, Options, Quantity, Sheet, Signal, table_faults};
+use measured::{Cell, ColumnMap, Located, Options, Quantity, Sheet, Signal, table_faults};
 use policy::Policy;
 use toml_input::{Faults, Message};
 
@@ -33,17 +33,50 @@ impl Recorded {
     /// # Errors
     /// A signal without column, two columns for one, cells that are no numbers.
     pub fn read(policy: &Policy, sheet: &Sheet) -> Result<Self, Faults> {
-        let others: Vec<Vec<&str>> = policy
-            .signals
-            .iter()
-            .map(|signal| other_names(policy, signal))
-            .collect();
+        let signals = SignalColumns::new(policy);
+        let located = sheet.locate(&signals.quantities(), &ColumnMap::default())?;
+        let steps = signals.samples(sheet, &located)?;
+        Ok(Self {
+            steps,
+            notes: located.notes(sheet, &[]),
+        })
+    }
+
+    /// The steps, one sample per signal.
+    pub fn steps(&self) -> &[Vec<Sample>] {
+        &self.steps
+    }
+}
+
+/// The columns of a policy's signals in a table.
+#[derive(Debug, Clone)]
+pub(crate) struct SignalColumns<'a> {
+    policy: &'a Policy,
+    /// Per signal, what else a table may call it.
+    others: Vec<Vec<&'a str>>,
+}
+
+impl<'a> SignalColumns<'a> {
+    pub fn new(policy: &'a Policy) -> Self {
+        let others = policy.signals.iter().map(|signal| other_names(policy, signal));
+        let others = others.collect();
+        Self { policy, others }
+    }
+
+    /// What is looked for, a quantity per signal.
+    pub fn quantities(&'a self) -> Vec<Quantity<'a>> {
         let quantity = |(signal, aliases)| quantity(signal, aliases);
-        let wanted: Vec<Quantity<'_>> = policy.signals.iter().zip(&others).map(quantity).collect();
-        let located = sheet.locate(&wanted, &ColumnMap::default())?;
+        self.policy.signals.iter().zip(&self.others).map(quantity).collect()
+    }
+
+    /// One sample per signal for each row of a sheet in which [`SignalColumns::quantities`] were located.
+    ///
+    /// # Errors
+    /// A signal without column, cells that are no numbers.
+    pub fn samples(&self, sheet: &Sheet, located: &Located) -> Result<Vec<Vec<Sample>>, Faults> {
         let mut faults = table_faults();
         let mut columns = Vec::new();
-        for (signal, quantity) in policy.signals.iter().zip(&wanted) {
+        for (signal, quantity) in self.policy.signals.iter().zip(&self.quantities()) {
             match located.signal(&signal.name) {
                 Some(found) => columns.push((signal, found)),
                 None => {
@@ -57,7 +90,7 @@ impl Recorded {
             }
         }
         faults.propagate()?;
-        let scalar = policy.numeric_format.scalar();
+        let scalar = self.policy.numeric_format.scalar();
         let mut faults = table_faults();
         let mut steps = Vec::with_capacity(sheet.rows());
         for row in 0..sheet.rows() {
@@ -71,15 +104,7 @@ impl Recorded {
             steps.push(columns.iter().map(&mut sample).collect());
         }
         faults.propagate()?;
-        Ok(Self {
-            steps,
-            notes: located.notes(sheet, &[]),
-        })
-    }
-
-    /// The steps, one sample per signal.
-    pub fn steps(&self) -> &[Vec<Sample>] {
-        &self.steps
+        Ok(steps)
     }
 }
 

@@ -1,0 +1,41 @@
+//! `policyc replay`
+
+use serde::Serialize;
+use toml_input::Message;
+use verify::replay::{self, Log};
+
+use crate::arguments::Replay;
+use crate::failure::Failure;
+use crate::outcome::Outcome;
+use crate::output;
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Answer {
+    equal: bool,
+    #[serde(flatten)]
+    replay: replay::Replay,
+}
+
+/// Compares and reports.
+pub fn run(options: &Replay) -> Result<Outcome, Failure> {
+    let policy = super::load(&options.policy)?;
+    let log = Log::open(&policy, &options.log)?;
+    if !log.compares() {
+        let message = Message::new("the log has nothing to compare with").found(log.columns());
+        return Err(message
+            .expected("columns `obs_0`, `obs_1`, ... in the network's order, or `action`, beside the signals")
+            .into());
+    }
+    let replay = replay::replay(&policy, &log, options.tolerance, options.exploring)?;
+    for note in &replay.notes {
+        eprintln!("note: {}: {note}", options.log.display());
+    }
+    let equal = replay.equal();
+    if options.json {
+        output::say(&serde_json::to_string_pretty(&Answer { equal, replay })?)?;
+    } else {
+        output::say(replay::text(&policy, &replay).trim_end())?;
+    }
+    Ok(if equal { Outcome::Done } else { Outcome::Different })
+}

@@ -1,0 +1,215 @@
+//! `policyc replay`: logs of environments, right ones and ones that made other features than the contract says.
+//!
+//! The environment here is written from the formulas of the contract, in binary64 and without the interpreter.
+
+use super::Desk;
+use tests::tools::copy_folder;
+
+/// One control period of the log: samples, and what the environment observed.
+#[derive(Clone)]
+struct Row {
+    episode: usize,
+    samples: [f64; 3],
+    observation: [f64; 6],
+}
+
+/// Two episodes with transients, without noise: v_out, i_l and i_out in V and A.
+fn environment() -> Vec<Row> {
+    let mut rows = Vec::new();
+    for episode in 0..2 {
+        let mut last: Option<f64> = None;
+        for k in 0..60 {
+            let t = k as f64;
+            let sign = if episode == 0 { 1.0 } else { -1.0 };
+            let v_out = 100.0 + sign * 3.0 * (0.21 * t).sin() * (-0.03 * t).exp();
+            let i_out = if k < 20 { 2.0 } else { 7.5 };
+            let i_l = i_out + 1.5 * (0.21 * t + 0.4).cos();
+            let (e, before) = (100.0 - v_out, 100.0 - last.unwrap_or(v_out));
+            let slope = (i_out - i_l) / 1.5e-3;
+            last = Some(v_out);
+            rows.push(Row {
+                episode,
+                samples: [v_out, i_l, i_out],
+                observation: [
+                    0.2 * e,
+                    0.2 * before,
+                    3e-4 * slope,
+                    -0.2 * e,
+                    -0.2 * before,
+                    -3e-4 * slope,
+                ],
+            });
+        }
+    }
+    rows
+}
+
+fn table(rows: &[Row]) -> String {
+    let mut text = "episode,v_out,i_l,i_out,obs_0,obs_1,obs_2,obs_3,obs_4,obs_5\n".to_owned();
+    for row in rows {
+        let cells = row.samples.iter().chain(&row.observation);
+        let cells: Vec<String> = cells.map(|cell| format!("{cell:.7}")).collect();
+        text += &format!("{},{}\n", row.episode, cells.join(","));
+    }
+    text
+}
+
+/// The example's contract, and a log.
+fn desk(rows: &[Row]) -> Desk {
+    let desk = Desk::new("minimal");
+    copy_folder(&tests::root().join("examples/buck12"), &desk.path("buck12"));
+    desk.write("log.csv", &table(rows));
+    desk
+}
+
+/// What is said of a log of which one feature is spoiled: exit code 1, and the line of that feature.
+#[track_caller]
+fn said_of(feature: usize, name: &str, spoil: impl Fn(&[Row], usize) -> f64) -> String {
+    let rows = environment();
+    let mut spoiled = rows.clone();
+    for (k, row) in spoiled.iter_mut().enumerate() {
+        row.observation[feature] = spoil(&rows, k);
+    }
+    let ran = desk(&spoiled).type_in("replay buck12 log.csv");
+    assert_eq!(ran.code, Some(1), "{}{}", ran.stdout, ran.stderr);
+    assert!(
+        ran.stdout.contains("DIFFERENT: 1 of 6 logged features"),
+        "{}",
+        ran.stdout
+    );
+    let line = ran
+        .stdout
+        .lines()
+        .find(|line| line.trim_start().starts_with(&format!("{name}: ")));
+    line.unwrap_or_else(|| panic!("{}", ran.stdout)).to_owned()
+}
+
+#[test]
+fn replay_of_a_log_that_the_contract_explains_is_equal_to_the_last_feature() {
+    let said = desk(&environment()).succeed("replay buck12 log.csv");
+    assert!(said.contains("120 samples") && said.contains("2 episodes"), "{said}");
+    assert!(said.contains("equal: all 6 features"), "{said}");
+}
+
+#[test]
+fn replay_names_sign_scale_offset_and_clip() {
+    let line = said_of(0, "e", |rows, k| -rows[k].observation[0]);
+    assert!(line.contains("other sign") && line.contains("scale = -0.2"), "{line}");
+    let line = said_of(2, "de_dt", |rows, k| 5.0 * rows[k].observation[2]);
+    assert!(line.contains("5 times") && line.contains("scale = 0.0015"), "{line}");
+    let line = said_of(3, "v", |rows, k| rows[k].observation[3] + 0.25);
+    assert!(line.contains("plus 0.25") && line.contains("offset = 0.25"), "{line}");
+    let line = said_of(0, "e", |rows, k| rows[k].observation[0].clamp(-0.2, 0.2));
+    assert!(line.contains("clip = [-0.2, 0.2]"), "{line}");
+}
+
+#[test]
+fn replay_names_a_delay_another_order_and_another_source() {
+    let line = said_of(0, "e", |rows, k| rows[k].observation[1]);
+    assert!(line.contains("what the contract calls `e_del`"), "{line}");
+    // two rows before, within the episode
+    let line = said_of(1, "e_del", |rows, k| {
+        rows[if k % 60 < 2 { k - k % 60 } else { k - 2 }].observation[0]
+    });
+    assert!(line.contains("1 row earlier") && line.contains("delay = 1"), "{line}");
+    let line = said_of(2, "de_dt", |rows, k| 0.1 * rows[k].samples[1] - 1.0);
+    assert!(line.contains("0.1 * (i_l) - 1"), "{line}");
+    let line = said_of(5, "dv_dt", |rows, k| {
+        let before = if k % 60 == 0 { k } else { k - 1 };
+        rows[k].samples[0] - rows[before].samples[0]
+    });
+    assert!(line.contains("the change of v_out from row to row"), "{line}");
+}
+
+#[test]
+fn replay_says_that_only_the_starts_of_episodes_differ() {
+    let line = said_of(
+        1,
+        "e_del",
+        |rows, k| if k % 60 == 0 { 0.7 } else { rows[k].observation[1] },
+    );
+    assert!(line.contains("only in the first row of an episode"), "{line}");
+}
+
+#[test]
+fn replay_does_not_invent_a_reason() {
+    let noise = |k: usize| ((k * 7919 + 13) % 101) as f64 / 101.0;
+    let line = said_of(2, "de_dt", |_, k| noise(k));
+    assert!(line.contains("no simple relation"), "{line}");
+}
+
+#[test]
+fn replay_compares_actions_unless_the_trainer_explored() {
+    let desk = desk(&environment());
+    let with = |actions: &dyn Fn(usize) -> usize| {
+        let table = table(&environment());
+        let lines = table.lines().enumerate().map(|(line, text)| match line {
+            0 => format!("{text},action\n"),
+            line => format!("{text},{}\n", actions(line)),
+        });
+        lines.collect::<String>()
+    };
+    desk.write("log.csv", &with(&|line| line % 12));
+    let ran = desk.type_in("replay buck12 log.csv");
+    assert_eq!(ran.code, Some(1), "{}", ran.stdout);
+    assert!(ran.stdout.contains("--exploring"), "{}", ran.stdout);
+    let said = desk.succeed("replay buck12 log.csv --exploring");
+    assert!(said.contains("explored"), "{said}");
+    desk.write("log.csv", &with(&|_| 12));
+    desk.refuse(
+        "replay buck12 log.csv",
+        &["an action that the contract does not have", "log.csv:2", "from 0 to 11"],
+    );
+}
+
+/// What the controller remembers of its own duty is the trainer's duty.
+#[test]
+fn replay_takes_previous_duty_from_the_log() {
+    let desk = desk(&environment());
+    desk.edit(
+        "buck12/policy.toml",
+        "source = \"(i_l - i_out) / c_out\"\nscale = 3e-4",
+        "source = \"previous_duty - 0.5\"\nscale = 10",
+    );
+    // the trainer's observations were made with another feature
+    desk.edit("buck12/policy.toml", "golden = \"golden.safetensors\"", "");
+    let log = |column: &str, values: &dyn Fn(usize) -> f64, observed: &dyn Fn(usize) -> f64| {
+        let mut text = format!("v_out,i_l,i_out,obs_dv_dt,{column}\n");
+        for k in 0..12 {
+            text += &format!("100,2,2,{:.5},{}\n", observed(k), values(k));
+        }
+        text
+    };
+    let duties = |k: usize| 0.44 + 0.01 * ((5 * k) % 12) as f64;
+    let before = |k: usize| if k == 0 { 0.5 } else { duties(k - 1) };
+    desk.write(
+        "log.csv",
+        &log("action", &|k| ((5 * k) % 12) as f64, &|k| 10.0 * (before(k) - 0.5)),
+    );
+    desk.succeed("replay buck12 log.csv --exploring");
+    desk.write("log.csv", &log("duty", &duties, &|k| 10.0 * (before(k) - 0.5)));
+    desk.succeed("replay buck12 log.csv");
+    desk.write("log.csv", &log("previous_duty", &duties, &|k| 10.0 * (duties(k) - 0.5)));
+    desk.succeed("replay buck12 log.csv");
+    desk.write("log.csv", &log("previous_duty", &|_| 0.9, &|_| 4.0));
+    desk.refuse(
+        "replay buck12 log.csv",
+        &["none that the contract's actions command", "0.9"],
+    );
+}
+
+#[test]
+fn replay_refuses_a_log_that_it_cannot_compare() {
+    let desk = desk(&environment());
+    desk.write("log.csv", "v_out,i_l,i_out\n100,2,2\n");
+    desk.refuse(
+        "replay buck12 log.csv",
+        &["nothing to compare with", "v_out, i_l, i_out", "obs_0"],
+    );
+    desk.write("log.csv", "v_out,i_l,obs_0\n100,2,0\n");
+    desk.refuse("replay buck12 log.csv", &["no column for the signal `i_out`"]);
+    desk.write("log.csv", "t,v_out,i_l,i_out,obs_0\n0,100,2,2,0\n2e-4,100,2,2,0\n");
+    desk.refuse("replay buck12 log.csv", &["not a control period apart", "1e-4 s"]);
+    desk.write("log.csv", "v_out,i_l,i_out,obs_0\n100,2,2,zero\n");
+    desk.refuse("replay buck12 log.csv", &["zero"]);
+}

@@ -1,0 +1,333 @@
+//! What logged values of a feature are instead: the simplest of a few relations that holds in nearly every row.
+//!
+//! | tried, in this order | what it says |
+//! |---|---|
+//! | other only in the first rows of episodes | what the filters start with |
+//! | `y = s x + o` of the feature itself | sign, scale, offset, clip |
+//! | another feature | order of the network's inputs |
+//! | `s x + o` of the feature some rows earlier or later | a delay |
+//! | `s x + o` of a signal or of another feature's source | another source |
+//! | `s x + o` of the change of one of these from row to row | a difference that is missing |
+
+use interp::{Real, Trace};
+use policy::{Feature, Policy};
+
+use super::{allowed, ends};
+
+/// Rows in which a relation has to hold, as a share.
+// some rows of a log are odd: a clip that only the log has, the first rows of an episode
+const NEARLY_ALL: f64 = 0.97;
+/// Fewest rows that show a relation.
+// a line goes through any two; a third may lie on it by the few digits of a log
+const FEWEST_ROWS: usize = 4;
+/// Longest delay that is looked for, rows.
+const LONGEST_SHIFT: isize = 4;
+/// Rows at the start of an episode that a filter may still remember.
+const START: usize = 8;
+
+/// What the interpreter made of the log.
+#[derive(Debug, Clone)]
+pub(super) struct Course {
+    begins: Vec<bool>,
+    features: Vec<FeatureCourse>,
+    signals: Vec<Vec<f64>>,
+    pub actions: Vec<u32>,
+    /// Rows in which a sample was held or the fallback came.
+    pub held_rows: usize,
+}
+
+#[derive(Debug, Clone, Default)]
+struct FeatureCourse {
+    source: Vec<f64>,
+    unclipped: Vec<f64>,
+    observation: Vec<f64>,
+}
+
+impl Course {
+    pub fn new(policy: &Policy, begins: &[bool]) -> Self {
+        Self {
+            begins: begins.to_vec(),
+            features: vec![FeatureCourse::default(); policy.features.len()],
+            signals: vec![Vec::new(); policy.signals.len()],
+            actions: Vec::new(),
+            held_rows: 0,
+        }
+    }
+
+    pub fn push<T: Real>(&mut self, trace: &Trace<T>) {
+        for (course, feature) in self.features.iter_mut().zip(&trace.features) {
+            course.source.push(feature.source.to_f64());
+            course.unclipped.push(feature.unclipped.to_f64());
+            course.observation.push(feature.observation.to_f64());
+        }
+        for (course, signal) in self.signals.iter_mut().zip(&trace.signals) {
+            course.push(signal.to_f64());
+        }
+        self.actions.push(trace.action_index);
+        self.held_rows += usize::from(!trace.all_valid);
+    }
+
+    /// What the network sees of a feature.
+    pub fn observation(&self, feature: usize) -> &[f64] {
+        self.features.get(feature).map_or(&[], |course| &course.observation)
+    }
+
+    /// Rows since the start of the episode.
+    fn ages(&self) -> Vec<usize> {
+        let mut age = 0;
+        let next = |begins: &bool| {
+            age = if *begins { 0 } else { age + 1 };
+            age
+        };
+        self.begins.iter().map(next).collect()
+    }
+}
+
+/// A relation `s x + o`.
+#[derive(Debug, Clone, Copy)]
+struct Line {
+    s: f64,
+    o: f64,
+}
+
+/// Logged values, and how near is equal.
+struct Logged<'a> {
+    values: &'a [f64],
+    allowed: f64,
+    /// Rows that lie between the ends, or all where no end comes back: at a clip a relation ends.
+    inner: Vec<usize>,
+    /// The ends, where several rows lie at one: a clip.
+    clip: Option<[f64; 2]>,
+}
+
+impl<'a> Logged<'a> {
+    fn new(values: &'a [f64], tolerance: f64) -> Self {
+        let allowed = allowed(values, tolerance);
+        let [low, high] = ends(values);
+        let at = |end: f64| values.iter().filter(|value| (*value - end).abs() <= allowed).count();
+        // one row has to be the highest; several of exactly one value are held there, unless all are
+        let is_clip = |end: f64| at(end) >= FEWEST_ROWS.min(values.len().div_ceil(2));
+        let clipped = high - low > allowed && (is_clip(low) || is_clip(high));
+        let is_inner = |value: f64| {
+            !(clipped && ((is_clip(low) && value <= low + allowed) || (is_clip(high) && value >= high - allowed)))
+        };
+        let rows = values.iter().enumerate();
+        Self {
+            allowed,
+            inner: rows
+                .filter(|(_, value)| is_inner(**value))
+                .map(|(row, _)| row)
+                .collect(),
+            clip: clipped.then_some([low, high]),
+            values,
+        }
+    }
+
+    /// The line through `x` that nearly all inner rows lie on; `x` is `None` where a row has no such value.
+    fn line(&self, x: &[Option<f64>]) -> Option<Line> {
+        let pair = |row: &usize| Some(((*x.get(*row)?)?, *self.values.get(*row)?));
+        let pairs: Vec<(f64, f64)> = self.inner.iter().filter_map(pair).collect();
+        let lowest = pairs.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let highest = pairs.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let is_line = |line: Line| {
+            let on = |(x, y): &&(f64, f64)| (line.s * x + line.o - y).abs() <= 2.0 * self.allowed;
+            pairs.len() >= FEWEST_ROWS && pairs.iter().filter(on).count() as f64 >= NEARLY_ALL * pairs.len() as f64
+        };
+        // a value that hardly moves lies on every line
+        let height = (highest.1 - lowest.1).abs();
+        if highest.0 - lowest.0 <= f64::EPSILON * highest.0.abs().max(lowest.0.abs()) || height <= 20.0 * self.allowed {
+            return None;
+        }
+        let s = (highest.1 - lowest.1) / (highest.0 - lowest.0);
+        let through = Line {
+            s,
+            o: lowest.1 - s * lowest.0,
+        };
+        // the plain ones first: what a log's last digit adds is no offset
+        let plain = [1.0, -1.0, s].map(|s| Line { s, o: 0.0 });
+        let tilted = [1.0, -1.0, s].map(|s| Line {
+            s,
+            o: lowest.1 - s * lowest.0,
+        });
+        plain
+            .into_iter()
+            .chain(tilted)
+            .chain([through])
+            .find(|line| is_line(*line))
+    }
+}
+
+/// What the logged values are instead; `None` if it is nothing simple.
+pub(super) fn explain(
+    policy: &Policy,
+    course: &Course,
+    index: usize,
+    values: &[f64],
+    tolerance: f64,
+) -> Option<String> {
+    let logged = Logged::new(values, tolerance);
+    let feature = policy.features.get(index)?;
+    let own = course.features.get(index)?;
+    if let Some(text) = starts(course, own, &logged) {
+        return Some(text);
+    }
+    if let Some(line) = logged.line(&all(&own.unclipped)) {
+        return Some(of_itself(feature, line, &logged));
+    }
+    let same = |other: &FeatureCourse| {
+        let line = logged.line(&all(&other.observation));
+        line.is_some_and(|line| line.s == 1.0 && line.o == 0.0)
+    };
+    if let Some(other) = course.features.iter().position(same) {
+        let name = &policy.features.get(other)?.name;
+        return Some(format!(
+            "the log has here what the contract calls `{name}`: another order of the features"
+        ));
+    }
+    let shifts = (1..=LONGEST_SHIFT).flat_map(|shift| [shift, -shift]);
+    for shift in shifts {
+        if let Some(line) = logged.line(&shifted(&own.unclipped, course, shift)) {
+            let rows = shift.abs();
+            let s = if rows == 1 { "" } else { "s" };
+            let (word, hint) = match shift > 0 {
+                true => ("earlier", format!("filters = [{{ delay = {rows} }}] more")),
+                false => ("later", "a delay less".to_owned()),
+            };
+            return Some(format!(
+                "it is the contract's{} {rows} row{s} {word}: {hint}",
+                times(line)
+            ));
+        }
+    }
+    of_another_source(policy, course, &logged)
+}
+
+fn starts(course: &Course, own: &FeatureCourse, logged: &Logged<'_>) -> Option<String> {
+    let ages = course.ages();
+    let other = own.observation.iter().zip(logged.values).enumerate();
+    let is_other = |(_, (own, logged_value)): &(usize, (&f64, &f64))| (**own - **logged_value).abs() > logged.allowed;
+    let last = other
+        .filter(is_other)
+        .map(|(row, _)| ages.get(row).copied().unwrap_or(0))
+        .max()?;
+    let longest = ages.iter().copied().max()?;
+    (last < START && longest > 2 * last + 2).then(|| {
+        let rows = if last == 0 { "row".to_owned() } else { format!("{} rows", last + 1) };
+        format!("it differs only in the first {rows} of an episode: the contract's filters start as if the first sample had always been there")
+    })
+}
+
+fn of_itself(feature: &Feature, line: Line, logged: &Logged<'_>) -> String {
+    let clip = logged
+        .clip
+        .map(|[low, high]| format!("clip = [{}, {}]", number(low), number(high)));
+    let (scale, offset) = (line.s * feature.scale, line.s * feature.offset + line.o);
+    let mut keys = Vec::new();
+    let head = if line.s == 1.0 && line.o == 0.0 {
+        match &clip {
+            Some(_) => "it ends elsewhere".to_owned(),
+            None => "it is not clipped".to_owned(),
+        }
+    } else {
+        if line.s != 1.0 {
+            keys.push(format!("scale = {}", number(scale)));
+        }
+        if offset != feature.offset {
+            keys.push(format!("offset = {}", number(offset)));
+        }
+        match (line.s, line.o) {
+            (-1.0, 0.0) => "it has the other sign".to_owned(),
+            (s, 0.0) => format!("it is {} times the contract's", number(s)),
+            (1.0, o) => format!("it is the contract's plus {}", number(o)),
+            (s, o) => format!("it is {} times the contract's plus {}", number(s), number(o)),
+        }
+    };
+    keys.extend(clip);
+    match keys.is_empty() {
+        true => head,
+        false => format!("{head}: {} fits the log", keys.join(", ")),
+    }
+}
+
+fn of_another_source(policy: &Policy, course: &Course, logged: &Logged<'_>) -> Option<String> {
+    let signals = policy
+        .signals
+        .iter()
+        .map(|signal| signal.name.clone())
+        .zip(&course.signals);
+    let sources = policy.features.iter().map(|feature| feature.source_text.clone());
+    let sources = sources.zip(course.features.iter().map(|course| &course.source));
+    let candidates: Vec<(String, &Vec<f64>)> = signals.chain(sources).collect();
+    for shift in 0..=LONGEST_SHIFT {
+        for (name, values) in &candidates {
+            if let Some(line) = logged.line(&shifted(values, course, shift)) {
+                let rows = match shift {
+                    0 => String::new(),
+                    1 => ", one row earlier".to_owned(),
+                    rows => format!(", {rows} rows earlier"),
+                };
+                return Some(format!("it is {}{rows}", affine(line, name)));
+            }
+        }
+    }
+    candidates.iter().find_map(|(name, values)| {
+        let before = shifted(values, course, 1);
+        let change: Vec<Option<f64>> = values
+            .iter()
+            .zip(&before)
+            .map(|(now, before)| Some(now - (*before)?))
+            .collect();
+        let line = logged.line(&change)?;
+        Some(format!("it is the change of {name} from row to row{}", times(line)))
+    })
+}
+
+fn all(values: &[f64]) -> Vec<Option<f64>> {
+    values.iter().copied().map(Some).collect()
+}
+
+/// The values `shift` rows earlier, within the episode.
+fn shifted(values: &[f64], course: &Course, shift: isize) -> Vec<Option<f64>> {
+    let ages = course.ages();
+    let at = |row: usize| {
+        let from = row.checked_add_signed(-shift)?;
+        let (age, age_from) = (*ages.get(row)?, *ages.get(from)?);
+        // rows of one episode: as far apart in age as in the log
+        (age.checked_add_signed(-shift)? == age_from)
+            .then(|| values.get(from).copied())
+            .flatten()
+    };
+    (0..values.len()).map(at).collect()
+}
+
+/// ` times 2 plus 3`, or nothing for the line through itself.
+fn times(line: Line) -> String {
+    let mut text = String::new();
+    if line.s != 1.0 {
+        text += &format!(" times {}", number(line.s));
+    }
+    if line.o != 0.0 {
+        text += &format!(" plus {}", number(line.o));
+    }
+    text
+}
+
+fn affine(line: Line, name: &str) -> String {
+    let mut text = match line.s {
+        1.0 => name.to_owned(),
+        s => format!("{} * ({name})", number(s)),
+    };
+    if line.o != 0.0 {
+        text += &format!(" {} {}", if line.o < 0.0 { '-' } else { '+' }, number(line.o.abs()));
+    }
+    text
+}
+
+/// With the digits that a log carries.
+pub(super) fn number(value: f64) -> String {
+    let rounded: f64 = format!("{value:.3e}").parse().unwrap_or(value);
+    match rounded.abs() {
+        size if size != 0.0 && !(1e-4..1e7).contains(&size) => format!("{rounded:e}"),
+        _ => rounded.to_string(),
+    }
+}

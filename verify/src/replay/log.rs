@@ -1,0 +1,226 @@
+//! The log of a trainer's environment: a table with a row for each control period.
+
+use std::path::Path;
+
+use interp::Sample;
+use measured::{ColumnMap, Located, Options, Quantity, Sheet, table_faults};
+use policy::Policy;
+use toml_input::{Fault, Faults, Message};
+
+use crate::traces::SignalColumns;
+
+/// Rows may be apart by this much more or less than the sample period.
+// a logger's clock and a time with four digits stay within; half or twice a period does not
+const PERIOD_TOLERANCE: f64 = 0.01;
+
+/// Samples of an environment, in a row, and what the trainer made of them.
+#[derive(Debug, Clone)]
+pub struct Log {
+    sheet: Sheet,
+    /// One sample per signal and row.
+    pub(super) samples: Vec<Vec<Sample>>,
+    /// Whether an episode begins in the row.
+    pub(super) begins: Vec<bool>,
+    /// Per feature what the trainer's network saw, if the log has it.
+    pub(super) observed: Vec<Option<Vec<f64>>>,
+    /// The trainer's choice in each row.
+    pub(super) actions: Option<Vec<u32>>,
+    /// The duty before each row.
+    pub(super) previous_duty: Option<Vec<f64>>,
+    /// What stands behind each row.
+    pub(super) applied: Applied,
+    pub(super) notes: Vec<String>,
+}
+
+/// The duty that follows a row, before a mapping.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Applied {
+    /// The policy's own: the log says nothing.
+    Own,
+    /// That of an action.
+    Actions(Vec<u32>),
+    /// A logged one.
+    Duties(Vec<f64>),
+}
+
+/// Columns that say what the trainer did, beside samples and observations.
+const DONE: [Quantity<'static>; 5] = [
+    other("t", &["time"], "s"),
+    other("episode", &["episodes"], ""),
+    other("action", &["actions", "action_index"], ""),
+    other("duty", &[], "1"),
+    other("previous_duty", &[], "1"),
+];
+
+const fn other(name: &'static str, aliases: &'static [&'static str], unit: &'static str) -> Quantity<'static> {
+    Quantity { name, aliases, unit }
+}
+
+impl Log {
+    /// Reads a log of `policy`.
+    ///
+    /// Columns: every signal by its name, in its unit (as for [`Recorded`](crate::traces::Recorded)). If there: observations as
+    /// `obs_0`, `obs_1`, ... in the network's order, or `obs_NAME`, or the feature's name; `action`, from 0; `duty`, what the
+    /// action commanded; `previous_duty`, where the environment has its own; `episode`, which begins anew where it changes; `t` in
+    /// seconds.
+    ///
+    /// # Errors
+    /// A file that cannot be read, a signal without column, cells that are no numbers, rows that are not a control period apart.
+    pub fn open(policy: &Policy, file: &Path) -> Result<Self, Faults> {
+        Self::read(policy, Sheet::open(file, &Options::default())?)
+    }
+
+    /// [`Log::open`] of a table.
+    ///
+    /// # Errors
+    /// As [`Log::open`].
+    pub fn read(policy: &Policy, sheet: Sheet) -> Result<Self, Faults> {
+        let signals = SignalColumns::new(policy);
+        let observations = observation_names(policy);
+        let mut wanted = signals.quantities();
+        wanted.extend(
+            DONE.iter()
+                .filter(|done| policy.signals.iter().all(|signal| signal.name != done.name)),
+        );
+        wanted.extend(observations.iter().map(|names| Quantity {
+            name: names.first().map_or("", String::as_str),
+            aliases: &[],
+            unit: "",
+        }));
+        let aliases: Vec<Vec<&str>> = observations
+            .iter()
+            .map(|names| names.iter().skip(1).map(String::as_str).collect())
+            .collect();
+        let first = wanted.len() - observations.len();
+        for (quantity, aliases) in wanted.iter_mut().skip(first).zip(&aliases) {
+            quantity.aliases = aliases;
+        }
+        let located = sheet.locate(&wanted, &ColumnMap::default())?;
+        let samples = signals.samples(&sheet, &located)?;
+        let mut faults = table_faults();
+        let mut numbers = |name: &str| located.signal(name).map(|column| column.values(&sheet, &mut faults));
+        let episode = numbers("episode");
+        let (time, action) = (numbers("t"), numbers("action"));
+        let (duty, previous_duty) = (numbers("duty"), numbers("previous_duty"));
+        let observed = observations.iter().map(|names| numbers(names.first()?)).collect();
+        faults.propagate()?;
+        let begins = begins(sheet.rows(), episode.as_deref());
+        if let Some(time) = time {
+            check_period(policy, &sheet, &time, &begins)?;
+        }
+        let actions = action
+            .map(|action| indices(policy, &sheet, &located, &action))
+            .transpose()?;
+        let applied = match (&actions, duty) {
+            (Some(actions), _) => Applied::Actions(actions.clone()),
+            (None, Some(duties)) => Applied::Duties(duties),
+            (None, None) => Applied::Own,
+        };
+        let notes = located.notes(&sheet, &[]);
+        Ok(Self {
+            samples,
+            begins,
+            observed,
+            actions,
+            previous_duty,
+            applied,
+            notes,
+            sheet,
+        })
+    }
+
+    /// Control periods in the log.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.samples.len()
+    }
+
+    /// Whether it holds an observation or an action to compare with.
+    #[must_use]
+    pub fn compares(&self) -> bool {
+        self.actions.is_some() || self.observed.iter().any(Option::is_some)
+    }
+
+    /// Its columns, for a fault.
+    #[must_use]
+    pub fn columns(&self) -> String {
+        self.sheet.listed()
+    }
+
+    pub(super) fn line(&self, row: usize) -> usize {
+        self.sheet.line(row)
+    }
+
+    pub(super) fn fault(&self, row: usize, message: Message) -> Fault {
+        self.sheet.row_fault(row, message)
+    }
+}
+
+/// What a table may call each feature: `obs_e`, `obs_0`, ..., and `e` where that is no other column's name.
+fn observation_names(policy: &Policy) -> Vec<Vec<String>> {
+    let taken = |name: &str| {
+        let signals = policy.signals.iter().map(|signal| signal.name.as_str());
+        let known = Quantity::find(name).is_some() || DONE.iter().any(|done| done.name == name);
+        known || signals.into_iter().any(|signal| signal == name)
+    };
+    let names = |(index, feature): (usize, &policy::Feature)| {
+        let name = &feature.name;
+        let mut names = vec![format!("obs_{name}"), format!("obs_{index}"), format!("obs{index}")];
+        names.extend([format!("obs[{index}]"), format!("observation_{index}")]);
+        if !taken(name) {
+            names.push(name.clone());
+        }
+        names
+    };
+    policy.features.iter().enumerate().map(names).collect()
+}
+
+/// Where episodes begin: in the first row, and wherever the number of the episode is another.
+fn begins(rows: usize, episode: Option<&[f64]>) -> Vec<bool> {
+    let mut begins = vec![false; rows];
+    if let Some(first) = begins.first_mut() {
+        *first = true;
+    }
+    if let Some(episode) = episode {
+        for (begins, pair) in begins.iter_mut().skip(1).zip(episode.windows(2)) {
+            *begins = pair.first() != pair.last();
+        }
+    }
+    begins
+}
+
+/// A delay of a sample is a period only if the rows are.
+fn check_period(policy: &Policy, sheet: &Sheet, time: &[f64], begins: &[bool]) -> Result<(), Faults> {
+    let period = policy.sample_period;
+    for (row, pair) in time.windows(2).enumerate() {
+        let step = pair.last().unwrap_or(&0.0) - pair.first().unwrap_or(&0.0);
+        let begins_next = begins.get(row + 1).copied().unwrap_or(false);
+        if !begins_next && (step / period - 1.0).abs() > PERIOD_TOLERANCE {
+            let message = Message::new("rows that are not a control period apart")
+                .found(format!("{step:.6e} s"))
+                .expected(format!("{period:e} s, sample_period of the contract"))
+                .hint("a row for each control period; a column `episode` says where another episode begins");
+            return Err(sheet.row_fault(row + 1, message).into());
+        }
+    }
+    Ok(())
+}
+
+fn indices(policy: &Policy, sheet: &Sheet, located: &Located, values: &[f64]) -> Result<Vec<u32>, Faults> {
+    let mut faults = table_faults();
+    let most = policy.actions.len();
+    let index = |(row, value): (usize, &f64)| {
+        if value.fract() == 0.0 && *value >= 0.0 && *value < most as f64 {
+            return *value as u32;
+        }
+        if let Some(column) = located.signal("action") {
+            let message = Message::new("an action that the contract does not have").found(value.to_string());
+            let last = most.saturating_sub(1);
+            faults.push(column.fault(sheet, row, message.expected(format!("an index from 0 to {last}"))));
+        }
+        0
+    };
+    let indices = values.iter().enumerate().map(index).collect();
+    faults.propagate()?;
+    Ok(indices)
+}

@@ -1,0 +1,242 @@
+//! A log of the trainer's environment against the contract: are the features what the network was trained on?
+//!
+//! Golden vectors check the network, and nothing that stands before it. A log has the samples too: the interpreter makes its own
+//! observation of them, and what differs is searched for a simple reason.
+//!
+//! ```text
+//! log ─► samples ──────────► sense ─► own observation ─► network ─► own action
+//!     ├► what was applied ──► commit: `previous_duty`, as the trainer had it
+//!     └► his observation, his action ─► compare ─► explain
+//! ```
+
+mod explain;
+mod log;
+mod text;
+
+use interp::{Controller, Real, Trace};
+use policy::{Policy, Scalar};
+use serde::Serialize;
+use toml_input::{Faults, Message};
+
+pub use log::Log;
+pub use text::text;
+
+use explain::Course;
+use log::Applied;
+
+/// What differs less than this share of the largest logged magnitude is equal.
+// a log has five digits at least, and an environment in binary32 adds in another order than the contract
+pub const TOLERANCE: f64 = 1e-4;
+
+/// The contract against a log.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Replay {
+    /// Control periods in the log.
+    pub rows: usize,
+    /// Fresh starts in it, the first included.
+    pub episodes: usize,
+    /// One entry per feature, in the order of the network's inputs.
+    pub features: Vec<FeatureResult>,
+    /// The network's choice beside the logged one; `None` if the log has no actions.
+    pub actions: Option<ActionResult>,
+    /// Rows in which a sample outside its plausible range was held, or the fallback came.
+    pub held_rows: usize,
+    /// Share of the largest logged magnitude of a feature that is still equal.
+    pub tolerance: f64,
+    /// What a reader of the log should know.
+    pub notes: Vec<String>,
+}
+
+/// A feature of the contract beside the log's.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FeatureResult {
+    /// Its name in the contract.
+    pub name: String,
+    /// Smallest and largest value that the contract makes of the log's samples.
+    pub own: [f64; 2],
+    /// The comparison; `None` if the log does not have this feature.
+    pub logged: Option<Compared>,
+}
+
+/// A feature's values against logged ones.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Compared {
+    /// Smallest and largest logged value.
+    pub range: [f64; 2],
+    /// Rows that are equal within the tolerance.
+    pub equal: usize,
+    /// Largest difference.
+    pub worst: f64,
+    /// Line of the log in which it is.
+    pub worst_line: usize,
+    /// Line of the first difference beyond the tolerance.
+    pub first_line: Option<usize>,
+    /// What the logged values are instead, if that is simple.
+    pub explanation: Option<String>,
+}
+
+/// Greedy actions against logged ones.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ActionResult {
+    /// Rows with the logged action.
+    pub equal: usize,
+    /// Line of the first other one.
+    pub first_line: Option<usize>,
+    /// The log's actions are a trainer's who explores: told, not judged.
+    pub exploring: bool,
+}
+
+impl Replay {
+    /// Nothing that the log has is other than the contract says.
+    #[must_use]
+    pub fn equal(&self) -> bool {
+        let actions = (self.actions.as_ref()).is_none_or(|actions| actions.exploring || actions.first_line.is_none());
+        actions && self.compared().all(|(_, compared)| compared.first_line.is_none())
+    }
+
+    /// The features that the log has.
+    pub fn compared(&self) -> impl Iterator<Item = (&FeatureResult, &Compared)> {
+        self.features
+            .iter()
+            .filter_map(|feature| Some((feature, feature.logged.as_ref()?)))
+    }
+}
+
+/// Puts a log through the contract.
+///
+/// `tolerance` is a share of the largest logged magnitude of a feature ([`TOLERANCE`]); with `exploring` the logged actions are
+/// those that were applied, and need not be the network's.
+///
+/// # Errors
+/// A duty in the log that no action of the contract commands.
+pub fn replay(policy: &Policy, log: &Log, tolerance: f64, exploring: bool) -> Result<Replay, Faults> {
+    let course = match policy.numeric_format.scalar() {
+        Scalar::F32 => course::<f32>(policy, log)?,
+        Scalar::F64 => course::<f64>(policy, log)?,
+    };
+    let features = policy.features.iter().enumerate().map(|(index, feature)| {
+        let own = course.observation(index);
+        let logged = log.observed.get(index).and_then(Option::as_ref);
+        FeatureResult {
+            name: feature.name.clone(),
+            own: ends(own),
+            logged: logged.map(|logged| {
+                let mut compared = compare(own, logged, log, tolerance);
+                if compared.first_line.is_some() {
+                    compared.explanation = explain::explain(policy, &course, index, logged, tolerance);
+                }
+                compared
+            }),
+        }
+    });
+    Ok(Replay {
+        rows: log.rows(),
+        episodes: log.begins.iter().filter(|begins| **begins).count(),
+        features: features.collect(),
+        actions: log.actions.as_ref().map(|logged| {
+            let other = |row: &usize| logged.get(*row) != course.actions.get(*row);
+            let others: Vec<usize> = (0..log.rows()).filter(other).collect();
+            ActionResult {
+                equal: log.rows() - others.len(),
+                first_line: others.first().map(|row| log.line(*row)),
+                exploring,
+            }
+        }),
+        held_rows: course.held_rows,
+        tolerance,
+        notes: log.notes.clone(),
+    })
+}
+
+/// Smallest and largest.
+fn ends(values: &[f64]) -> [f64; 2] {
+    let lowest = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let highest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    [lowest, highest]
+}
+
+/// How far apart two values of a feature may be.
+fn allowed(logged: &[f64], tolerance: f64) -> f64 {
+    tolerance * logged.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()))
+}
+
+fn compare(own: &[f64], logged: &[f64], log: &Log, tolerance: f64) -> Compared {
+    let allowed = allowed(logged, tolerance);
+    let differences: Vec<f64> = own
+        .iter()
+        .zip(logged)
+        .map(|(own, logged)| (own - logged).abs())
+        .collect();
+    // what is no number is not within anything
+    let is_equal = |difference: &f64| *difference <= allowed;
+    let (row, worst) = differences
+        .iter()
+        .enumerate()
+        .fold((0, 0.0), |worst, (row, difference)| {
+            if *difference > worst.1 {
+                (row, *difference)
+            } else {
+                worst
+            }
+        });
+    Compared {
+        range: ends(logged),
+        equal: differences.iter().filter(|difference| is_equal(difference)).count(),
+        worst,
+        worst_line: log.line(row),
+        first_line: differences
+            .iter()
+            .position(|difference| !is_equal(difference))
+            .map(|row| log.line(row)),
+        explanation: None,
+    }
+}
+
+/// The interpreter over all rows, with the trainer's duties behind each.
+fn course<T: Real>(policy: &Policy, log: &Log) -> Result<Course, Faults> {
+    let mut controller = Controller::<T>::new(policy);
+    let mut trace = controller.blank_trace();
+    let mut course = Course::new(policy, &log.begins);
+    for (row, samples) in log.samples.iter().enumerate() {
+        if log.begins.get(row).copied().unwrap_or(row == 0) {
+            controller.reset();
+        }
+        if let Some(duty) = log.previous_duty.as_ref().and_then(|duties| duties.get(row)) {
+            let mut state = controller.state().clone();
+            state.previous_duty = T::nearest(*duty);
+            controller.restore(&state);
+        }
+        controller.eval_into(samples, &mut trace)?;
+        if !trace.sound {
+            let message = Message::new("the duty before this row is none that the contract's actions command");
+            let message = message
+                .found(controller.state().previous_duty.to_f64().to_string())
+                .expected(
+                    "one between the smallest and the largest of [actions] duties, initial_duty and the fallback's",
+                );
+            return Err(log.fault(row, message).into());
+        }
+        course.push(&trace);
+        apply(&controller, &mut trace, &log.applied, row);
+        controller.commit_trace(&trace);
+    }
+    Ok(course)
+}
+
+/// Puts what the trainer applied in the place of the controller's own command.
+fn apply<T: Real>(controller: &Controller<T>, trace: &mut Trace<T>, applied: &Applied, row: usize) {
+    match applied {
+        Applied::Own => {}
+        Applied::Actions(actions) => {
+            if let Some(action) = actions.get(row) {
+                controller.choose(trace, *action);
+            }
+        }
+        Applied::Duties(duties) => {
+            if let Some(duty) = duties.get(row) {
+                trace.command.duty_sim = T::nearest(*duty);
+                trace.command.duty = trace.command.duty_sim;
+            }
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! A replay in words.
+
+use policy::Policy;
+use report::grouped;
+
+use super::explain::number;
+use super::{Compared, FeatureResult, Replay};
+
+/// The table of features, what differs, and the verdict.
+#[must_use]
+pub fn text(policy: &Policy, replay: &Replay) -> String {
+    let rows = replay.rows;
+    let mut out = format!(
+        "{}: {} of the log through the contract\n\n",
+        policy.name,
+        counted(rows, "sample")
+    );
+    if replay.episodes > 1 {
+        out = format!(
+            "{}: {} of the log through the contract, {}\n\n",
+            policy.name,
+            counted(rows, "sample"),
+            counted(replay.episodes, "episode")
+        );
+    }
+    let width = replay.features.iter().map(|feature| feature.name.chars().count());
+    let width = width.max().unwrap_or(0).max("feature".len());
+    out += &format!(
+        "  {:width$}  {:>23}  {:>23}  equal\n",
+        "feature", "contract makes", "log has"
+    );
+    for feature in &replay.features {
+        out += &row(feature, rows, width);
+    }
+    let words = words(replay);
+    if !words.is_empty() {
+        out.push('\n');
+    }
+    for line in words {
+        out += &format!("  {line}\n");
+    }
+    out.push('\n');
+    out += &verdict(replay);
+    out.push('\n');
+    out
+}
+
+fn row(feature: &FeatureResult, rows: usize, width: usize) -> String {
+    let (log, equal) = match &feature.logged {
+        None => ("-".to_owned(), "not in the log".to_owned()),
+        Some(compared) => (
+            range(compared.range),
+            format!("{} of {}", grouped(compared.equal as u64), grouped(rows as u64)),
+        ),
+    };
+    let own = range(feature.own);
+    format!("  {:width$}  {own:>23}  {log:>23}  {equal}\n", feature.name)
+}
+
+fn range([low, high]: [f64; 2]) -> String {
+    format!("{} .. {}", number(low), number(high))
+}
+
+/// What is to be said below the table.
+fn words(replay: &Replay) -> Vec<String> {
+    let mut words = Vec::new();
+    for (feature, compared) in replay.compared() {
+        let name = &feature.name;
+        if let Some(first) = compared.first_line {
+            let reason = compared.explanation.as_deref();
+            let reason = reason.unwrap_or("no simple relation to the samples was found");
+            words.push(format!(
+                "{name}: first other in line {first}, by up to {} in line {}; {reason}",
+                number(compared.worst),
+                compared.worst_line
+            ));
+        } else if is_still(compared) && replay.rows > 1 {
+            words.push(format!("{name} does not move in this log, which shows little of it"));
+        }
+    }
+    if let Some(actions) = &replay.actions {
+        let (equal, rows) = (grouped(actions.equal as u64), grouped(replay.rows as u64));
+        let told = match (actions.first_line, actions.exploring) {
+            (None, _) => String::new(),
+            (Some(line), true) => format!(", first other in line {line}: explored"),
+            (Some(line), false) => format!(", first other in line {line}"),
+        };
+        words.push(format!("action equal in {equal} of {rows}{told}"));
+    }
+    if replay.held_rows > 0 {
+        words.push(format!(
+            "in {} a sample lies outside the range of its signal: the controller held the last one",
+            counted(replay.held_rows, "row")
+        ));
+    }
+    words
+}
+
+fn is_still(compared: &Compared) -> bool {
+    let [low, high] = compared.range;
+    low == high
+}
+
+fn verdict(replay: &Replay) -> String {
+    let compared = replay.compared().count();
+    let of = replay.features.len();
+    if !replay.equal() {
+        let others = replay
+            .compared()
+            .filter(|(_, compared)| compared.first_line.is_some())
+            .count();
+        return match others {
+            0 => "DIFFERENT: the observations are equal, the actions are not. A trainer who explores: --exploring. Otherwise look at \
+                  the order of [actions], and at the golden vectors"
+                .to_owned(),
+            1 => format!("DIFFERENT: 1 of {compared} logged features"),
+            others => format!("DIFFERENT: {others} of {compared} logged features"),
+        };
+    }
+    match (compared, &replay.actions) {
+        (0, None) => "NOTHING COMPARED: the log has no observations and no actions".to_owned(),
+        (0, Some(_)) => "equal: the actions (the log has no observations)".to_owned(),
+        (compared, _) if compared < of => format!("equal: the {compared} of {of} features that the log has"),
+        _ => format!(
+            "equal: all {} within {} of their largest value",
+            counted(of, "feature"),
+            number(replay.tolerance)
+        ),
+    }
+}
+
+fn counted(count: usize, noun: &str) -> String {
+    let s = if count == 1 { "" } else { "s" };
+    format!("{} {noun}{s}", grouped(count as u64))
+}

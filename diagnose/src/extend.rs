@@ -8,11 +8,20 @@ use plant::Parameters;
 use crate::diagnosis::Diagnosis;
 use crate::drive::Model;
 
+/// A trim of the edges that moves the duty by less than this share of a period is none.
+// a microvolt in a volt of the source: no sensor shows it, and the fit leaves such remains. In the file it would read as a finding
+const NO_TRIM: f64 = 1e-6;
+
+fn told(trim: f64) -> f64 {
+    if trim.abs() < NO_TRIM { 0.0 } else { trim }
+}
+
 /// The extended model as one plant: the sampling instant and the trim of the edges are among its parameters.
 #[must_use]
 pub fn as_plant(model: &Model, trim: f64) -> Parameters {
     let mut p = model.plant.clone();
     let t_sw = p.t_sw();
+    let trim = told(trim);
     // the same edges as in `drive::simulate`, so that the file shows what was fitted
     p.switch.turn_off_delay += trim.max(0.0) * t_sw;
     p.switch.turn_on_delay += (-trim).max(0.0) * t_sw;
@@ -44,7 +53,7 @@ pub fn extended_plant(diagnosis: &Diagnosis) -> Parameters {
 #[must_use]
 pub fn extended_toml(diagnosis: &Diagnosis) -> String {
     let findings = &diagnosis.findings;
-    let trim = diagnosis.trim;
+    let trim = told(diagnosis.trim);
     let after = extended_plant(diagnosis);
     let before = &diagnosis.problem.base.plant;
     let mut notes: BTreeMap<&str, String> = BTreeMap::new();

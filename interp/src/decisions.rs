@@ -64,6 +64,12 @@ impl Decisions {
     pub fn share(&self) -> f64 {
         self.changed as f64 / self.observations.max(1) as f64
     }
+
+    /// The smallest number of two digits that accepts [`Decisions::share`].
+    #[must_use]
+    pub fn accepting_share(&self) -> f64 {
+        (self.share() * 100.0).ceil() / 100.0
+    }
 }
 
 /// Answers the golden observations in the policy's format; `None` if the policy has none.

@@ -203,6 +203,7 @@ mod tests {
     fn golden() -> Golden {
         Golden {
             count: 2,
+            outside: 0,
             observations: vec![0.0, 1.0],
             q_values: vec![1.0, -4.0, 2.0, 3.0],
             action_indices: vec![0, 1],

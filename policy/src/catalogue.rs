@@ -16,6 +16,12 @@ pub(crate) fn outside_root(file: &str) -> Message {
         .hint("copy the file into the crate, so that a build elsewhere finds the same one")
 }
 
+pub(crate) fn outside_folder(file: &str) -> Message {
+    Message::new(format!("`{file}` lies outside the contract's folder"))
+        .expected("a path inside the folder of the contract")
+        .hint("copy the file there, or say --allow-outside if you know where the contract comes from")
+}
+
 // --- form ---
 
 pub(crate) fn not_supported_yet(label: &str, found: &str, supported: &[&str]) -> Message {

@@ -19,7 +19,7 @@ use crate::digests;
 use crate::faults::Faults;
 use crate::limits::MAX_FEATURES;
 use crate::model::{Action, Digests, Feature, Golden, Interval, Layer, Mapping, Policy, Signal};
-use crate::notes::{on_duties, unused};
+use crate::notes::{left_out, on_duties, unused};
 use crate::raw::RawPolicy;
 use crate::weights::{self, Weights};
 
@@ -85,6 +85,7 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     // with sizes that the network does not have, every vector would be a fault of its own
     let Weights { layers, mut notes } = weights?;
     let golden = golden(raw, network.as_ref(), sizes, known, faults);
+    notes.extend(golden.as_ref().and_then(Option::as_ref).and_then(left_out));
     notes.extend(unused(
         &head.parameters,
         signals.as_deref().unwrap_or_default(),

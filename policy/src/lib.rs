@@ -46,7 +46,15 @@ pub use toml_input::{Fault, Place};
 /// # Errors
 /// All faults of the files; see [`read`] and [`check`].
 pub fn load(path: &Path) -> Result<Policy, Faults> {
-    check(read(path, &ReadOptions::default())?)
+    load_with(path, &ReadOptions::default())
+}
+
+/// [`load`] with options.
+///
+/// # Errors
+/// As [`load`], and for files that the options refuse.
+pub fn load_with(path: &Path, options: &ReadOptions) -> Result<Policy, Faults> {
+    check(read(path, options)?)
 }
 
 /// Reads a `drm.toml` alone; [`Mapping::load_current`] is 0, for no signals are known.

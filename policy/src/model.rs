@@ -378,6 +378,8 @@ pub struct Fallback {
 pub struct Golden {
     /// Number of vectors.
     pub count: usize,
+    /// Vectors of the file that are left out, because the controller can never see their observation.
+    pub outside: usize,
     /// Row-major `[count][features]`.
     pub observations: Vec<f32>,
     /// Row-major `[count][actions]`; may be empty if the trainer gave actions only.

@@ -2,7 +2,18 @@
 
 use std::collections::BTreeMap;
 
-use crate::model::{Action, Expr, Feature, Input, Limits, Mapping, Signal};
+use crate::model::{Action, Expr, Feature, Golden, Input, Limits, Mapping, Signal};
+
+/// Golden observations that the controller never sees, because the training left the range of a signal.
+pub fn left_out(golden: &Golden) -> Option<String> {
+    let (outside, all) = (golden.outside, golden.count + golden.outside);
+    (outside > 0).then(|| {
+        format!(
+            "{outside} of {all} golden observations are left out, as golden_outside allows: where the training made them, this controller \
+             holds the last sample and then commands the fallback"
+        )
+    })
+}
 
 /// What the limits and the mapping make of the duties, where a reader may not expect it.
 pub fn on_duties(limits: &Limits, actions: &[Action], mapping: Option<&Mapping>, features: &[Feature]) -> Vec<String> {

@@ -18,6 +18,11 @@ pub struct ReadOptions {
     pub root: Option<PathBuf>,
     /// Files that a program carries inside: name and content. A file named here is not looked for on disk.
     pub embedded: &'static [(&'static str, &'static [u8])],
+    /// Files that the contract names must lie in its own folder, by the path alone. A contract from elsewhere could name any
+    /// file of this machine, and a message about it would show a line of it.
+    pub own_folder: bool,
+    /// Do not read the golden vectors: whoever looks for what is wrong with the features must get past them.
+    pub without_golden: bool,
 }
 
 impl ReadOptions {
@@ -115,7 +120,10 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<RawPolicy, Faults> {
         read.map_err(|message| faults.push(value.fault(message))).ok()
     };
     let weights = companion(&["network", "weights"], MAX_WEIGHT_BYTES);
-    let golden = companion(&["network", "golden"], MAX_WEIGHT_BYTES);
+    let golden = match options.without_golden {
+        true => None,
+        false => companion(&["network", "golden"], MAX_WEIGHT_BYTES),
+    };
     let mapping = companion(&["mapping", "file"], MAX_TOML_BYTES);
     let mapping = mapping.and_then(|file| document(file, &mut faults));
     Ok(RawPolicy {
@@ -154,10 +162,22 @@ fn locate(path: &Path, options: &ReadOptions) -> Result<FileName, Message> {
 /// A file named in `owner`, relative to its folder.
 fn beside(owner: &FileName, text: &str, options: &ReadOptions) -> Result<FileName, Message> {
     let name = owner.beside(text);
+    if options.own_folder && !is_in_folder_of(owner, &name) {
+        return Err(catalogue::outside_folder(text));
+    }
     match &options.root {
         None => Ok(name),
         Some(root) => inside(root, &name).ok_or_else(|| catalogue::outside_root(text)),
     }
+}
+
+fn is_in_folder_of(owner: &FileName, name: &FileName) -> bool {
+    // from the root of the file system: one of the two paths may be relative and the other not
+    let whole = |path: &Path| normalise(&std::path::absolute(path).ok()?);
+    let folder = whole(&owner.path).and_then(|path| path.parent().map(Path::to_owned));
+    folder
+        .zip(whole(&name.path))
+        .is_some_and(|(folder, path)| path.starts_with(folder))
 }
 
 /// A file by the text of its path alone, if it lies in `root`; shown relative to it.

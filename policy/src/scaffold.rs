@@ -110,6 +110,9 @@ fn text(weights: &str, golden: bool, outline: &Outline) -> String {
         let _ = write!(text, "\n# network input {input}{FEATURE}");
     }
     let _ = write!(text, "\n[network]\nweights = {file}\n");
+    if weights.starts_with("..") || Path::new(weights).is_absolute() {
+        text += "# outside this folder: copy it here, or say --allow-outside to every command\n";
+    }
     match chains.as_slice() {
         [only] => drop(writeln!(text, "# layers found, first to last: {only}")),
         // no choice is made here: a chain that was not meant would give a controller all the same

@@ -320,3 +320,43 @@ fn files_outside_the_root_are_refused() {
     assert_eq!(faults.faults.list[0].line_column(), Some((30, 11)));
     drop(root);
 }
+
+/// Nothing of the file is read: a message about it would show a line of it.
+#[test]
+fn files_outside_the_contracts_folder_are_refused_unread() {
+    let folder = Folder::new();
+    let options = policy::ReadOptions {
+        own_folder: true,
+        ..policy::ReadOptions::default()
+    };
+    assert!(policy::load_with(&folder.path().join("policy.toml"), &options).is_ok());
+    let secret = folder.path().join("secret");
+    std::fs::write(&secret, "password = hunter2\n").unwrap();
+    for name in [
+        "../secret".to_owned(),
+        "a/../../secret".to_owned(),
+        "/etc/hostname".to_owned(),
+    ] {
+        let inner = folder.path().join("inner");
+        std::fs::create_dir_all(&inner).unwrap();
+        for file in ["policy.toml", "weights.safetensors", "drm.toml"] {
+            std::fs::copy(folder.path().join(file), inner.join(file)).unwrap();
+        }
+        let contract = std::fs::read_to_string(inner.join("policy.toml")).unwrap();
+        std::fs::write(
+            inner.join("policy.toml"),
+            contract.replace("\"drm.toml\"", &format!("{name:?}")),
+        )
+        .unwrap();
+        let faults = policy::load_with(&inner.join("policy.toml"), &options).unwrap_err();
+        assert_says(
+            &faults.faults.list[0],
+            &["lies outside the contract's folder", "--allow-outside"],
+        );
+        assert!(!faults.to_string().contains("hunter2"), "{faults}");
+        assert!(
+            policy::load(&inner.join("policy.toml")).is_err(),
+            "the mapping is none, wherever it lies"
+        );
+    }
+}

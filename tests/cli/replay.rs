@@ -213,3 +213,90 @@ fn replay_refuses_a_log_that_it_cannot_compare() {
     desk.write("log.csv", "v_out,i_l,i_out,obs_0\n100,2,2,zero\n");
     desk.refuse("replay buck12 log.csv", &["zero"]);
 }
+
+/// A sensor that ends below what the training reached is no feature that is wrong, and the golden vectors do not stand in the way.
+#[test]
+fn replay_tells_a_signal_that_leaves_its_range_from_a_wrong_feature() {
+    let desk = desk(&environment());
+    desk.edit("buck12/policy.toml", "range = [0.0, 250.0]", "range = [0.0, 101.0]");
+    let stderr = desk.refuse(
+        "inspect buck12",
+        &[
+            "can never see",
+            "golden_outside",
+            "policyc replay",
+            "the `range` of a signal",
+        ],
+    );
+    let said = desk.succeed("replay buck12 log.csv");
+    assert!(
+        said.contains("v_out: ") && said.contains("outside its range in"),
+        "{said}"
+    );
+    let share = stderr
+        .split("golden_outside = ")
+        .nth(1)
+        .unwrap()
+        .split(' ')
+        .next()
+        .unwrap();
+    desk.edit(
+        "buck12/policy.toml",
+        "[network]",
+        &format!("[network]\ngolden_outside = {share}"),
+    );
+    let said = desk.succeed("inspect buck12");
+    assert!(said.contains("golden observations are left out"), "{said}");
+    desk.edit(
+        "buck12/policy.toml",
+        &format!("golden_outside = {share}"),
+        "golden_outside = 0.01",
+    );
+    desk.refuse("inspect buck12", &["can never see"]);
+}
+
+#[test]
+fn replay_names_initial_duty_time_constant_and_a_shift_of_the_duties() {
+    let rows = environment();
+    let low_pass = |k: usize| {
+        let start = k - k % 60;
+        (start + 1..=k).fold(rows[start].observation[0], |y, row| {
+            y + 0.25 * (rows[row].observation[0] - y)
+        })
+    };
+    let line = said_of(0, "e", |_, k| low_pass(k));
+    // 0.25 = T / (tau + T) at T = 0.1 ms
+    assert!(
+        line.contains("time_constant = 3e-4") || line.contains("time_constant = 0.0003"),
+        "{line}"
+    );
+    let desk = desk(&rows);
+    desk.edit("buck12/policy.toml", "golden = \"golden.safetensors\"", "");
+    desk.edit(
+        "buck12/policy.toml",
+        "source = \"(i_l - i_out) / c_out\"\nscale = 3e-4",
+        "source = \"previous_duty\"\nscale = 2",
+    );
+    let log = |first: f64, shift: f64| {
+        let mut text = "episode,v_out,i_l,i_out,obs_dv_dt,action\n".to_owned();
+        for k in 0..100 {
+            let before = if k % 50 == 0 {
+                first
+            } else {
+                0.44 + 0.01 * ((5 * (k - 1)) % 12) as f64 + shift
+            };
+            text += &format!("{},100,2,2,{:.5},{}\n", k / 50, 2.0 * before, (5 * k) % 12);
+        }
+        text
+    };
+    let said = |text: &str| {
+        desk.write("log.csv", text);
+        let ran = desk.type_in("replay buck12 log.csv --exploring");
+        assert_eq!(ran.code, Some(1), "{}{}", ran.stdout, ran.stderr);
+        ran.stdout
+    };
+    let stdout = said(&log(0.46, 0.0));
+    assert!(stdout.contains("initial_duty"), "{stdout}");
+    let stdout = said(&log(0.5, 0.04));
+    assert!(stdout.contains("plus 0.08"), "{stdout}");
+}

@@ -121,7 +121,7 @@ impl Budget {
             Fit::Missed => "NOT met".to_owned(),
         };
         format!(
-            "  {build}: control period {verdict}; {least:.0} to {most:.0} % of {period} cycles at {clock} (model, never measured)"
+            "  {build}: control period {verdict}; {least:.0} to {most:.0} % of {period} cycles at {clock} (model at 0 wait states, never measured)"
         )
     }
 }

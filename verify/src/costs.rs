@@ -93,13 +93,27 @@ impl StepCosts {
     /// at the clock that the target is known by.
     #[must_use]
     pub fn texts(&self, policy: &Policy, target: &TargetSpec, clock: Option<Clock>) -> Vec<String> {
-        let clock = clock.map(|clock| clock.hz).or(target.clock_hz.map(f64::from));
+        let usual = target.clock_hz.map(f64::from);
+        let is_asked = clock.is_some();
+        let clock = clock.map(|clock| clock.hz).or(usual);
         let text = |build: &BuildCosts| match build {
             BuildCosts::Measured(costs) => measured(costs, policy, target, clock),
             BuildCosts::Estimated(estimate) => estimated(estimate, target),
         };
         let notes = self.notes.iter().map(|note| format!("note: {note}"));
-        self.builds.iter().map(text).chain(notes).collect()
+        let period = clock.map_or(f64::INFINITY, |hz| hz * policy.sample_period);
+        let may_miss = |build: &BuildCosts| match build {
+            BuildCosts::Measured(costs) => costs.model_cycles.is_some_and(|(_, most)| most as f64 > period),
+            BuildCosts::Estimated(_) => false,
+        };
+        // whoever gave the clock reads the verdict of the budget
+        let is_late = !is_asked && self.builds.iter().any(may_miss);
+        let late = is_late.then(|| {
+            "note: a step may take longer than its control period; `--clock FREQUENCY` says whether it does at your processor's, and what would \
+             fit"
+            .to_owned()
+        });
+        self.builds.iter().map(text).chain(notes).chain(late).collect()
     }
 }
 

@@ -84,6 +84,11 @@ pub fn report(policy: &Policy, report: &Report, drift: Option<&Drift>) -> Result
             "DIFFERENT: {} in {} decides otherwise than its trainer's network more often than allowed",
             report.policy, decisions.numeric_format
         )?;
+        let share = decisions.accepting_share();
+        writeln!(
+            out,
+            "  = hint: to accept them for good: golden_decisions = {share} in [network] of the contract"
+        )?;
     }
     Ok(out)
 }

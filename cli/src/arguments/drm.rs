@@ -10,7 +10,7 @@ use plant::Parameters;
 use policy::Interval;
 use toml_input::{Faults, messages};
 
-use super::shared::{Columns, ControllerKind};
+use super::shared::{Columns, ControllerKind, Outside};
 use crate::ownership::Replacing;
 
 #[derive(Debug, Subcommand)]
@@ -170,6 +170,8 @@ pub struct Judge {
 
 #[derive(Debug, Args)]
 pub struct Transfer {
+    #[command(flatten)]
+    pub outside: Outside,
     /// Scenario file, as for `simulate`: load steps, instants; its plant is the converter that the policy was trained on
     pub scenario: PathBuf,
     /// policy.toml with a mapping, or the folder that holds it

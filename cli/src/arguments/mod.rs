@@ -14,7 +14,7 @@ use crate::one_of::OneOf;
 use crate::ownership::Replacing;
 
 use drm::Drm;
-pub use shared::{Columns, ControllerKind};
+pub use shared::{Columns, ControllerKind, Outside};
 
 /// From a trained policy to verified controller code.
 ///
@@ -79,6 +79,8 @@ pub struct New {
 
 #[derive(Debug, Args)]
 pub struct Inspect {
+    #[command(flatten)]
+    pub outside: Outside,
     /// policy.toml or the folder that holds it
     pub policy: PathBuf,
     /// Numeric format in the place of the contract's
@@ -110,6 +112,8 @@ fn output() -> OneOf<Output> {
 
 #[derive(Debug, Args)]
 pub struct Replay {
+    #[command(flatten)]
+    pub outside: Outside,
     /// policy.toml or the folder that holds it
     pub policy: PathBuf,
     /// Table with a row for each control period. A column for each signal; to compare: `obs_0`, `obs_1`, ... (or `obs_NAME`) and
@@ -128,6 +132,8 @@ pub struct Replay {
 
 #[derive(Debug, Args)]
 pub struct Compile {
+    #[command(flatten)]
+    pub outside: Outside,
     #[command(flatten)]
     pub replacing: Replacing,
     /// policy.toml or the folder that holds it
@@ -171,6 +177,8 @@ fn share(text: &str) -> Result<f64, String> {
 
 #[derive(Debug, Args)]
 pub struct Verify {
+    #[command(flatten)]
+    pub outside: Outside,
     /// policy.toml or the folder that holds it
     pub policy: PathBuf,
     /// Numeric format in the place of the contract's; with --generated, of the code in that folder unless given
@@ -208,6 +216,8 @@ pub struct Verify {
 #[derive(Debug, Args)]
 pub struct Certify {
     #[command(flatten)]
+    pub outside: Outside,
+    #[command(flatten)]
     pub replacing: Replacing,
     /// policy.toml or the folder that holds it
     pub policy: PathBuf,
@@ -237,6 +247,8 @@ pub struct Certify {
 
 #[derive(Debug, Args)]
 pub struct Simulate {
+    #[command(flatten)]
+    pub outside: Outside,
     /// Scenario file: plant, load steps, instants, classical controllers
     pub scenario: PathBuf,
     /// policy.toml or the folder that holds it
@@ -284,6 +296,8 @@ pub struct Train {
 
 #[derive(Debug, Args)]
 pub struct Diagnose {
+    #[command(flatten)]
+    pub outside: Outside,
     #[command(flatten)]
     pub replacing: Replacing,
     /// The model: plant.toml

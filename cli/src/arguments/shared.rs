@@ -6,6 +6,14 @@ use clap::{Args, ValueEnum};
 use measured::ColumnMap;
 use toml_input::Faults;
 
+/// Which files a contract may name.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub struct Outside {
+    /// Read files, too, that the contract names outside its own folder
+    #[arg(long, display_order = 901)]
+    pub allow_outside: bool,
+}
+
 /// What runs the policy in a closed loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum ControllerKind {

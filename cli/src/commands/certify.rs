@@ -16,7 +16,7 @@ use crate::output;
 
 /// Proves, measures, draws, writes.
 pub fn run(options: &Certify) -> Result<Outcome, Failure> {
-    let policy = super::load_as(&options.policy, options.format)?;
+    let policy = super::load_as(&options.policy, options.outside, options.format)?;
     if policy.numeric_format == NumericFormat::F64 {
         let message = Message::new(
             "the certificate is about binary32 and integers: its box holds the observations as binary32 rounds them",

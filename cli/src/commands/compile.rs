@@ -42,7 +42,7 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
 
 /// The policy in the format asked for; refused if its network does not give the trainer's answers.
 fn load(options: &Compile) -> Result<Policy, Failure> {
-    let policy = super::load_as(&options.policy, options.format)?;
+    let policy = super::load_as(&options.policy, options.outside, options.format)?;
     if let Some(golden) = verify::golden_result(&policy).filter(|golden| !golden.passed()) {
         let message = Message::new("the network does not give the trainer's golden answers; nothing was written");
         return Err(message.found(golden.to_string()).hint(golden.hint()).into());
@@ -52,19 +52,15 @@ fn load(options: &Compile) -> Result<Policy, Failure> {
         Some(decisions) => {
             let problem =
                 "the numeric format changes more of the trainer's decisions than allowed; nothing was written";
+            let share = decisions.accepting_share();
             let hint = format!(
-                "see what they cost with `policyc certify` and `policyc simulate`; to accept them, --golden-decisions {}",
-                accepted(decisions.share())
+                "see what they cost with `policyc certify` and `policyc simulate`; to accept them, golden_decisions = {share} in \
+                 [network] of the contract, which `verify` reads too, or --golden-decisions {share} for this run"
             );
             let found = text::decisions(&policy, &decisions).join("\n");
             Err(Message::new(problem).found(found).hint(hint).into())
         }
     }
-}
-
-/// The smallest number of two digits that accepts a share.
-fn accepted(share: f64) -> f64 {
-    (share * 100.0).ceil() / 100.0
 }
 
 /// What a step costs under the target's emulator; it goes into the manifest, too.

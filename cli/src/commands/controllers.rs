@@ -26,7 +26,8 @@ pub fn start(policy: &Policy, kind: ControllerKind) -> Result<Named, Error> {
     let (language, name) = match kind {
         ControllerKind::Interpreter => {
             return Ok(Named {
-                name: "interpreter".to_owned(),
+                // beside a run in another format nobody could tell which is which
+                name: format!("interpreter, {}", policy.numeric_format.name()),
                 controller: interpreter(policy)?,
             });
         }

@@ -5,7 +5,7 @@ use std::path::Path;
 use codegen::Output;
 
 use super::{compile, inspect, verify};
-use crate::arguments::{Demo, Inspect, Verify};
+use crate::arguments::{Demo, Inspect, Outside, Verify};
 use crate::failure::Failure;
 use crate::outcome::Outcome;
 use crate::output;
@@ -34,6 +34,7 @@ pub fn run(options: &Demo) -> Result<Outcome, Failure> {
     output::replace_own(&policy_folder, files, options.replacing)?;
     heading("The policy", &format!("policyc inspect {}", policy_folder.display()))?;
     inspect::run(&Inspect {
+        outside: Outside::default(),
         policy: policy_folder.clone(),
         format: None,
         json: false,
@@ -46,7 +47,7 @@ pub fn run(options: &Demo) -> Result<Outcome, Failure> {
         generated.display()
     );
     heading("The code", &command)?;
-    let policy = super::load(&policy_folder)?;
+    let policy = super::load(&policy_folder, Outside::default())?;
     let target = ::targets::host();
     let files = codegen::generate(&policy, target, &Output::CORES, None)?.files;
     let written = compile::write(&generated, &files, &[], options.replacing)?;
@@ -61,6 +62,7 @@ pub fn run(options: &Demo) -> Result<Outcome, Failure> {
         ),
     )?;
     let outcome = verify::run(&Verify {
+        outside: Outside::default(),
         policy: policy_folder.clone(),
         steps: options.steps,
         seed: 1,

@@ -131,7 +131,7 @@ impl Shown {
 
 /// The policy and what is asked of it.
 fn request(options: &Diagnose, path: &Path, model: &Parameters) -> Result<Request, Failure> {
-    let policy = super::load(path)?;
+    let policy = super::load(path, options.outside)?;
     super::drm::needs_mapping(&policy)?;
     let (trained_on, file) = match &options.trained_on {
         Some(path) => (Parameters::from_file(path)?, path),

@@ -11,7 +11,7 @@ use crate::output;
 
 /// Prints the checked policy.
 pub fn run(options: &Inspect) -> Result<Outcome, Failure> {
-    let policy = super::load_as(&options.policy, options.format)?;
+    let policy = super::load_as(&options.policy, options.outside, options.format)?;
     if options.json {
         output::say(&serde_json::to_string_pretty(&view(&policy))?)?;
     } else {

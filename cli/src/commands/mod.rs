@@ -17,8 +17,9 @@ pub mod verify;
 
 use std::path::{Path, PathBuf};
 
-use policy::{NumericFormat, Policy};
+use policy::{NumericFormat, Policy, ReadOptions};
 
+use crate::arguments::Outside;
 use crate::failure::Failure;
 
 /// `policy.toml` itself, also if the folder that holds it was named.
@@ -30,13 +31,29 @@ fn contract_path(path: &Path) -> PathBuf {
     }
 }
 
-fn load(path: &Path) -> Result<Policy, Failure> {
-    Ok(policy::load(&contract_path(path))?)
+fn load(path: &Path, outside: Outside) -> Result<Policy, Failure> {
+    Ok(policy::load_with(&contract_path(path), &options(outside))?)
+}
+
+/// [`load`] without the golden vectors.
+fn load_without_golden(path: &Path, outside: Outside) -> Result<Policy, Failure> {
+    let options = ReadOptions {
+        without_golden: true,
+        ..options(outside)
+    };
+    Ok(policy::load_with(&contract_path(path), &options)?)
+}
+
+fn options(outside: Outside) -> ReadOptions {
+    ReadOptions {
+        own_folder: !outside.allow_outside,
+        ..ReadOptions::default()
+    }
 }
 
 /// [`load`], in another numeric format if one is asked for.
-fn load_as(path: &Path, format: Option<NumericFormat>) -> Result<Policy, Failure> {
-    let policy = load(path)?;
+fn load_as(path: &Path, outside: Outside, format: Option<NumericFormat>) -> Result<Policy, Failure> {
+    let policy = load(path, outside)?;
     Ok(match format {
         Some(format) => policy.with_format(format),
         None => policy,

@@ -21,7 +21,7 @@ pub fn run(options: &Simulate) -> Result<Outcome, Failure> {
     let stop = interruption::stop_on_signal();
     output::check_new_folder(&options.out)?;
     let scenario = Scenario::load(&options.scenario)?;
-    let policy = super::load(&options.policy)?;
+    let policy = super::load(&options.policy, options.outside)?;
     let setting = Setting::new(&options.scenario, scenario, policy, options.plant.as_deref())?;
     let found = all(options, setting);
     if stop.load(Ordering::Relaxed) {

@@ -32,7 +32,7 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
         (None, Some(folder)) => folder::numeric_format(folder),
         (None, None) => None,
     };
-    let policy = super::load_as(&options.policy, written)?;
+    let policy = super::load_as(&options.policy, options.outside, written)?;
     let recorded = options
         .trace
         .iter()

@@ -55,7 +55,17 @@ pub(crate) fn read<'a>(root: &mut Table<'a>, faults: &mut Sink) -> Option<Networ
         .and_then(|v| tolerance(&v, faults))
         // a tolerance and not bits, because trainers add in an order of their own
         .unwrap_or(1e-5);
-    let decisions = section.optional("golden_decisions").and_then(|v| share(&v, faults));
+    let decisions = section.optional("golden_decisions").and_then(|v| {
+        share(
+            &v,
+            "golden_decisions",
+            "golden actions that the numeric format may change",
+            faults,
+        )
+    });
+    let outside = section
+        .optional("golden_outside")
+        .and_then(|v| share(&v, "golden_outside", "golden observations that may be left out", faults));
     section.finish(faults);
     Some(Network {
         section: at,
@@ -64,7 +74,11 @@ pub(crate) fn read<'a>(root: &mut Table<'a>, faults: &mut Sink) -> Option<Networ
         layers,
         transpose,
         bias,
-        golden: Limits { tolerance, decisions },
+        golden: Limits {
+            tolerance,
+            decisions,
+            outside: outside.unwrap_or(0.0),
+        },
     })
 }
 
@@ -203,18 +217,14 @@ fn layers(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<At<String>>> {
     items.iter().map(|item| owned(item, faults)).collect()
 }
 
-/// A share of decisions, 0..1.
-fn share(value: &Value<'_>, faults: &mut Sink) -> Option<f64> {
+/// A share of the golden vectors, 0..1.
+fn share(value: &Value<'_>, key: &str, of: &str, faults: &mut Sink) -> Option<f64> {
     let number = value.number(faults)?;
     if (0.0..=1.0).contains(&number) {
         return Some(number);
     }
-    let expected = "0 to 1: the share of golden actions that the numeric format may change";
-    faults.push(value.fault(catalogue::out_of_range(
-        "golden_decisions",
-        &number.to_string(),
-        expected,
-    )));
+    let expected = format!("0 to 1: the share of {of}");
+    faults.push(value.fault(catalogue::out_of_range(key, &number.to_string(), &expected)));
     None
 }
 

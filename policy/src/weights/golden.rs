@@ -15,6 +15,8 @@ pub(crate) struct Limits {
     pub tolerance: f64,
     /// Share of changed actions, 0..1.
     pub decisions: Option<f64>,
+    /// Share of observations, 0..1, that may lie outside of what the controller can see, and are left out.
+    pub outside: f64,
 }
 
 /// Reads and checks the vectors; `bounds` are checked only if every feature is known.
@@ -62,8 +64,9 @@ pub(crate) fn read(
     let obs = part(file, "obs", faults, floats(&observations, &[rows, features]));
     let q_values = q.map(|view| part(file, "q", faults, floats(&view, &[rows, actions])));
     let indices = action.map(|view| part(file, "action", faults, integers(&view, rows, actions)));
-    if let Some(obs) = &obs {
-        part(file, "obs", faults, inside(obs, bounds));
+    let seen = obs.as_deref().map(|obs| seen(obs, rows, bounds));
+    if let Some(seen) = &seen {
+        part(file, "obs", faults, seen.enough(rows, limits.outside));
     }
     let (q_values, action_indices) = (
         q_values.unwrap_or(Some(Vec::new())),
@@ -72,11 +75,14 @@ pub(crate) fn read(
     if let (Some(q), Some(chosen)) = (&q_values, &action_indices) {
         part(file, "action", faults, greedy(q, chosen, actions));
     }
+    let (observations, seen) = (obs?, seen?);
+    let (q_values, action_indices) = (q_values?, action_indices?);
     let golden = Golden {
-        count: rows,
-        observations: obs?,
-        q_values: q_values?,
-        action_indices: action_indices?,
+        count: seen.rows.len(),
+        outside: rows - seen.rows.len(),
+        observations: seen.keep(&observations, features),
+        q_values: seen.keep(&q_values, actions),
+        action_indices: seen.keep(&action_indices, 1),
         tolerance: limits.tolerance,
         decisions: limits.decisions,
     };
@@ -142,22 +148,65 @@ fn integers(view: &TensorView<'_>, rows: usize, actions: usize) -> Result<Vec<u3
     numbers.into_iter().enumerate().map(index).collect()
 }
 
-/// Every observation lies within the bounds, give or take a few roundings of the trainer's own arithmetic.
-fn inside(observations: &[f32], features: &[Feature]) -> Result<(), Message> {
-    if features.is_empty() {
-        return Ok(());
-    }
-    for (row, values) in observations.chunks_exact(features.len()).enumerate() {
-        for (&value, feature) in values.iter().zip(features) {
-            let (low, high, value) = (feature.bound.low, feature.bound.high, f64::from(value));
-            // 17 units of binary32: the trainer scales and clips in an order of its own
-            let slack = 1e-6 * low.abs().max(high.abs());
-            if value < low - slack || value > high + slack {
-                return Err(catalogue::golden_outside(row, &feature.name, value, low, high));
+/// Which observations the controller can make.
+struct Seen {
+    rows: Vec<usize>,
+    /// Message about the first row that is none of them.
+    first_outside: Option<Message>,
+}
+
+impl Seen {
+    /// No more rows lie outside than the contract says, and one is left.
+    fn enough(&self, rows: usize, share: f64) -> Result<(), Message> {
+        let outside = rows - self.rows.len();
+        match &self.first_outside {
+            Some(message) if self.rows.is_empty() || outside as f64 > share * rows as f64 => {
+                Err(catalogue::golden_outside_rows(message.clone(), outside, rows))
             }
+            _ => Ok(()),
         }
     }
-    Ok(())
+
+    /// The values of these rows, `width` in each; nothing of nothing.
+    fn keep<T: Copy>(&self, values: &[T], width: usize) -> Vec<T> {
+        let row = |row: &usize| values.get(row * width..(row + 1) * width).unwrap_or_default();
+        self.rows.iter().flat_map(row).copied().collect()
+    }
+}
+
+/// The rows that lie within the bounds, give or take a few roundings of the trainer's own arithmetic.
+fn seen(observations: &[f32], rows: usize, features: &[Feature]) -> Seen {
+    let mut seen = Seen {
+        rows: Vec::with_capacity(rows),
+        first_outside: None,
+    };
+    if features.is_empty() {
+        seen.rows = (0..rows).collect();
+        return seen;
+    }
+    for (row, values) in observations.chunks_exact(features.len()).enumerate() {
+        let outside = values.iter().zip(features).find(|(value, feature)| {
+            let (low, high, value) = (feature.bound.low, feature.bound.high, f64::from(**value));
+            // 17 units of binary32: the trainer scales and clips in an order of its own
+            let slack = 1e-6 * low.abs().max(high.abs());
+            value < low - slack || value > high + slack
+        });
+        match outside {
+            None => seen.rows.push(row),
+            Some((value, feature)) if seen.first_outside.is_none() => {
+                let (low, high) = (feature.bound.low, feature.bound.high);
+                seen.first_outside = Some(catalogue::golden_outside(
+                    row,
+                    &feature.name,
+                    (*value).into(),
+                    low,
+                    high,
+                ));
+            }
+            Some(_) => {}
+        }
+    }
+    seen
 }
 
 /// Where both are given, the action has the largest Q value of its row.

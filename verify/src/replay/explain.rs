@@ -4,13 +4,14 @@
 //! |---|---|
 //! | other only in the first rows of episodes | what the filters start with |
 //! | `y = s x + o` of the feature itself | sign, scale, offset, clip |
+//! | a low-pass of the feature's source | a filter, or its time constant |
 //! | another feature | order of the network's inputs |
 //! | `s x + o` of the feature some rows earlier or later | a delay |
 //! | `s x + o` of a signal or of another feature's source | another source |
 //! | `s x + o` of the change of one of these from row to row | a difference that is missing |
 
 use interp::{Real, Trace};
-use policy::{Feature, Policy};
+use policy::{Feature, Filter, Policy};
 
 use super::{allowed, ends};
 
@@ -22,6 +23,8 @@ const NEARLY_ALL: f64 = 0.97;
 const FEWEST_ROWS: usize = 4;
 /// Longest delay that is looked for, rows.
 const LONGEST_SHIFT: isize = 4;
+/// A factor of a low-pass this near to 1 is none: the samples themselves.
+const NEARLY_ONE: f64 = 1e-3;
 /// Rows at the start of an episode that a filter may still remember.
 const START: usize = 8;
 
@@ -32,8 +35,6 @@ pub(super) struct Course {
     features: Vec<FeatureCourse>,
     signals: Vec<Vec<f64>>,
     pub actions: Vec<u32>,
-    /// Rows in which a sample was held or the fallback came.
-    pub held_rows: usize,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -50,7 +51,6 @@ impl Course {
             features: vec![FeatureCourse::default(); policy.features.len()],
             signals: vec![Vec::new(); policy.signals.len()],
             actions: Vec::new(),
-            held_rows: 0,
         }
     }
 
@@ -64,7 +64,6 @@ impl Course {
             course.push(signal.to_f64());
         }
         self.actions.push(trace.action_index);
-        self.held_rows += usize::from(!trace.all_valid);
     }
 
     /// What the network sees of a feature.
@@ -96,8 +95,8 @@ struct Logged<'a> {
     allowed: f64,
     /// Rows that lie between the ends, or all where no end comes back: at a clip a relation ends.
     inner: Vec<usize>,
-    /// The ends, where several rows lie at one: a clip.
-    clip: Option<[f64; 2]>,
+    /// The ends at which several rows lie: a clip. `None` of one that the log does not reach.
+    clip: Option<[Option<f64>; 2]>,
 }
 
 impl<'a> Logged<'a> {
@@ -118,7 +117,7 @@ impl<'a> Logged<'a> {
                 .filter(|(_, value)| is_inner(**value))
                 .map(|(row, _)| row)
                 .collect(),
-            clip: clipped.then_some([low, high]),
+            clip: clipped.then(|| [low, high].map(|end| is_clip(end).then_some(end))),
             values,
         }
     }
@@ -127,33 +126,31 @@ impl<'a> Logged<'a> {
     fn line(&self, x: &[Option<f64>]) -> Option<Line> {
         let pair = |row: &usize| Some(((*x.get(*row)?)?, *self.values.get(*row)?));
         let pairs: Vec<(f64, f64)> = self.inner.iter().filter_map(pair).collect();
-        let lowest = pairs.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let highest = pairs.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let is_line = |line: Line| {
-            let on = |(x, y): &&(f64, f64)| (line.s * x + line.o - y).abs() <= 2.0 * self.allowed;
-            pairs.len() >= FEWEST_ROWS && pairs.iter().filter(on).count() as f64 >= NEARLY_ALL * pairs.len() as f64
-        };
+        let mut ordered = pairs.clone();
+        ordered.sort_by(|a, b| a.0.total_cmp(&b.0));
         // a value that hardly moves lies on every line
-        let height = (highest.1 - lowest.1).abs();
-        if highest.0 - lowest.0 <= f64::EPSILON * highest.0.abs().max(lowest.0.abs()) || height <= 20.0 * self.allowed {
+        let heights = pairs.iter().map(|(_, y)| *y).collect::<Vec<_>>();
+        let [low, high] = ends(&heights);
+        if pairs.len() < FEWEST_ROWS || high - low <= 20.0 * self.allowed {
             return None;
         }
-        let s = (highest.1 - lowest.1) / (highest.0 - lowest.0);
-        let through = Line {
-            s,
-            o: lowest.1 - s * lowest.0,
+        let is_line = |line: &Line| {
+            let on = |(x, y): &&(f64, f64)| (line.s * x + line.o - y).abs() <= 2.0 * self.allowed;
+            pairs.iter().filter(on).count() as f64 >= NEARLY_ALL * pairs.len() as f64
         };
-        // the plain ones first: what a log's last digit adds is no offset
-        let plain = [1.0, -1.0, s].map(|s| Line { s, o: 0.0 });
-        let tilted = [1.0, -1.0, s].map(|s| Line {
-            s,
-            o: lowest.1 - s * lowest.0,
+        // through the ends, and through rows further in: the row at an end may be the odd one
+        let last = ordered.len() - 1;
+        let chords = [0, last / 10, last / 4].into_iter().filter_map(|inset| {
+            let ((x1, y1), (x2, y2)) = (*ordered.get(inset)?, *ordered.get(last - inset)?);
+            (x2 - x1 > f64::EPSILON * x1.abs().max(x2.abs())).then(|| ((x1, y1), (y2 - y1) / (x2 - x1)))
         });
-        plain
-            .into_iter()
-            .chain(tilted)
-            .chain([through])
-            .find(|line| is_line(*line))
+        // the plain ones first: what a log's last digit adds is no offset
+        let lines = chords.flat_map(|((x, y), s)| {
+            let plain = [1.0, -1.0, s].map(|s| Line { s, o: 0.0 });
+            let tilted = [1.0, -1.0, s].map(|s| Line { s, o: y - s * x });
+            plain.into_iter().chain(tilted)
+        });
+        lines.into_iter().find(is_line)
     }
 }
 
@@ -168,11 +165,14 @@ pub(super) fn explain(
     let logged = Logged::new(values, tolerance);
     let feature = policy.features.get(index)?;
     let own = course.features.get(index)?;
-    if let Some(text) = starts(course, own, &logged) {
+    if let Some(text) = starts(feature, course, own, &logged) {
         return Some(text);
     }
     if let Some(line) = logged.line(&all(&own.unclipped)) {
         return Some(of_itself(feature, line, &logged));
+    }
+    if let Some(text) = of_another_filter(policy, feature, own, course, &logged) {
+        return Some(text);
     }
     let same = |other: &FeatureCourse| {
         let line = logged.line(&all(&other.observation));
@@ -202,7 +202,7 @@ pub(super) fn explain(
     of_another_source(policy, course, &logged)
 }
 
-fn starts(course: &Course, own: &FeatureCourse, logged: &Logged<'_>) -> Option<String> {
+fn starts(feature: &Feature, course: &Course, own: &FeatureCourse, logged: &Logged<'_>) -> Option<String> {
     let ages = course.ages();
     let other = own.observation.iter().zip(logged.values).enumerate();
     let is_other = |(_, (own, logged_value)): &(usize, (&f64, &f64))| (**own - **logged_value).abs() > logged.allowed;
@@ -212,6 +212,9 @@ fn starts(course: &Course, own: &FeatureCourse, logged: &Logged<'_>) -> Option<S
         .max()?;
     let longest = ages.iter().copied().max()?;
     (last < START && longest > 2 * last + 2).then(|| {
+        if last == 0 && feature.filters.is_empty() {
+            return "it differs only in the first row of an episode: the training has another duty before it; look at initial_duty".to_owned();
+        }
         let rows = if last == 0 { "row".to_owned() } else { format!("{} rows", last + 1) };
         format!("it differs only in the first {rows} of an episode: the contract's filters start as if the first sample had always been there")
     })
@@ -220,7 +223,8 @@ fn starts(course: &Course, own: &FeatureCourse, logged: &Logged<'_>) -> Option<S
 fn of_itself(feature: &Feature, line: Line, logged: &Logged<'_>) -> String {
     let clip = logged
         .clip
-        .map(|[low, high]| format!("clip = [{}, {}]", number(low), number(high)));
+        .map(|ends| ends.map(|end| end.map_or_else(|| "...".to_owned(), number)))
+        .map(|[low, high]| format!("clip = [{low}, {high}]"));
     let (scale, offset) = (line.s * feature.scale, line.s * feature.offset + line.o);
     let mut keys = Vec::new();
     let head = if line.s == 1.0 && line.o == 0.0 {
@@ -247,6 +251,50 @@ fn of_itself(feature: &Feature, line: Line, logged: &Logged<'_>) -> String {
         true => head,
         false => format!("{head}: {} fits the log", keys.join(", ")),
     }
+}
+
+/// A low-pass that the contract does not have, or has with another time constant.
+fn of_another_filter(
+    policy: &Policy,
+    feature: &Feature,
+    own: &FeatureCourse,
+    course: &Course,
+    logged: &Logged<'_>,
+) -> Option<String> {
+    let head = match feature.filters.as_slice() {
+        [] => "it is low-pass filtered",
+        [Filter::LowPass { .. }] => "its low-pass has another time constant",
+        _ => return None,
+    };
+    let scaled = |x: &f64| feature.scale * x + feature.offset;
+    let ages = course.ages();
+    // y - y1 = k (x - y1) between two rows of an episode that no clip holds
+    let step = |row: usize| {
+        let before = row.checked_sub(1)?;
+        let inner = |row: &usize| logged.inner.binary_search(row).is_ok();
+        (*ages.get(row)? > 0 && inner(&row) && inner(&before)).then_some(())?;
+        let (y, y1) = (*logged.values.get(row)?, *logged.values.get(before)?);
+        Some((own.source.get(row).map(scaled)? - y1, y - y1))
+    };
+    let steps: Vec<(f64, f64)> = (0..logged.values.len()).filter_map(step).collect();
+    let large = |(drive, _): &&(f64, f64)| drive.abs() > 20.0 * logged.allowed;
+    let mut ratios: Vec<f64> = steps
+        .iter()
+        .filter(large)
+        .map(|(drive, change)| change / drive)
+        .collect();
+    ratios.sort_by(f64::total_cmp);
+    let k = *ratios.get(ratios.len() / 2)?;
+    let fits = |(drive, change): &&(f64, f64)| (change - k * drive).abs() <= 3.0 * logged.allowed;
+    let most = NEARLY_ALL * steps.len() as f64;
+    let is_low_pass = ratios.len() >= FEWEST_ROWS && 0.0 < k && k < 1.0 - NEARLY_ONE;
+    (is_low_pass && steps.iter().filter(fits).count() as f64 >= most).then(|| {
+        let time_constant = number(policy.sample_period * (1.0 - k) / k);
+        format!(
+            "{head}: {{ low_pass = {{ time_constant = {time_constant} }} }} fits the log, y = y + {} (x - y)",
+            number(k)
+        )
+    })
 }
 
 fn of_another_source(policy: &Policy, course: &Course, logged: &Logged<'_>) -> Option<String> {

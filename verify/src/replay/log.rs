@@ -147,6 +147,45 @@ impl Log {
         self.sheet.listed()
     }
 
+    /// The policy with signals whose ranges hold every logged sample.
+    pub(super) fn widened(&self, policy: &Policy) -> Policy {
+        let mut wide = policy.clone();
+        for (index, signal) in wide.signals.iter_mut().enumerate() {
+            for value in self.physical(policy, index).filter(|value| value.is_finite()) {
+                signal.range.low = signal.range.low.min(value);
+                signal.range.high = signal.range.high.max(value);
+            }
+        }
+        wide
+    }
+
+    /// Signals that leave their range: name, in how many rows, and between which values the log lies.
+    pub(super) fn outside(&self, policy: &Policy) -> Vec<(String, usize, [f64; 2])> {
+        let signals = policy.signals.iter().enumerate();
+        let left = signals.map(|(index, signal)| {
+            let values: Vec<f64> = self.physical(policy, index).collect();
+            let is_outside = |value: &&f64| !(signal.range.low..=signal.range.high).contains(*value);
+            (
+                signal.name.clone(),
+                values.iter().filter(is_outside).count(),
+                super::ends(&values),
+            )
+        });
+        left.filter(|(_, rows, _)| *rows > 0).collect()
+    }
+
+    /// The logged values of a signal, in its unit.
+    fn physical(&self, policy: &Policy, index: usize) -> impl Iterator<Item = f64> {
+        let adc = policy.signals.get(index).and_then(|signal| signal.adc);
+        let value = move |samples: &Vec<Sample>| match (samples.get(index), adc) {
+            (Some(Sample::Physical(value)), _) => f64::from(*value),
+            (Some(Sample::Wide(value)), _) => *value,
+            (Some(Sample::Code(code)), Some(adc)) => adc.gain * f64::from(*code) + adc.offset,
+            _ => f64::NAN,
+        };
+        self.samples.iter().map(value)
+    }
+
     pub(super) fn line(&self, row: usize) -> usize {
         self.sheet.line(row)
     }

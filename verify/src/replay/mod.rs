@@ -39,8 +39,9 @@ pub struct Replay {
     pub features: Vec<FeatureResult>,
     /// The network's choice beside the logged one; `None` if the log has no actions.
     pub actions: Option<ActionResult>,
-    /// Rows in which a sample outside its plausible range was held, or the fallback came.
-    pub held_rows: usize,
+    /// Signals with samples outside their plausible range: name, rows, smallest and largest logged value. They were taken as they
+    /// are; the controller will hold the last good sample.
+    pub outside: Vec<(String, usize, [f64; 2])>,
     /// Share of the largest logged magnitude of a feature that is still equal.
     pub tolerance: f64,
     /// What a reader of the log should know.
@@ -110,9 +111,11 @@ impl Replay {
 /// # Errors
 /// A duty in the log that no action of the contract commands.
 pub fn replay(policy: &Policy, log: &Log, tolerance: f64, exploring: bool) -> Result<Replay, Faults> {
+    // the environment held no sample: what the features are does not depend on what a sensor can show
+    let wide = &log.widened(policy);
     let course = match policy.numeric_format.scalar() {
-        Scalar::F32 => course::<f32>(policy, log)?,
-        Scalar::F64 => course::<f64>(policy, log)?,
+        Scalar::F32 => course::<f32>(wide, log)?,
+        Scalar::F64 => course::<f64>(wide, log)?,
     };
     let features = policy.features.iter().enumerate().map(|(index, feature)| {
         let own = course.observation(index);
@@ -142,7 +145,7 @@ pub fn replay(policy: &Policy, log: &Log, tolerance: f64, exploring: bool) -> Re
                 exploring,
             }
         }),
-        held_rows: course.held_rows,
+        outside: log.outside(policy),
         tolerance,
         notes: log.notes.clone(),
     })

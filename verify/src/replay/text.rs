@@ -87,10 +87,13 @@ fn words(replay: &Replay) -> Vec<String> {
         };
         words.push(format!("action equal in {equal} of {rows}{told}"));
     }
-    if replay.held_rows > 0 {
+    for (signal, rows, [low, high]) in &replay.outside {
         words.push(format!(
-            "in {} a sample lies outside the range of its signal: the controller held the last one",
-            counted(replay.held_rows, "row")
+            "{signal}: {} to {} in the log, outside its range in {}: there the controller will hold the last good sample, and then \
+             command the fallback",
+            number(*low),
+            number(*high),
+            counted(*rows, "row")
         ));
     }
     words

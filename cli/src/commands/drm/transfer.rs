@@ -19,7 +19,7 @@ use crate::output;
 pub fn run(options: &Transfer) -> Result<Outcome, Failure> {
     output::check_new_folder(&options.out)?;
     let scenario = Scenario::load(&options.scenario)?;
-    let policy = crate::commands::load(&options.policy)?;
+    let policy = crate::commands::load(&options.policy, options.outside)?;
     let setting = Setting::new(&options.scenario, scenario, policy)?;
     let stop = interruption::stop_on_signal();
     let found = match options.simulator {

@@ -190,7 +190,7 @@ pub fn beyond_repair(steady: &[Steady], v_ref: f64) -> Vec<String> {
     }
     let shift = most(&|s| s.i_l_shift);
     let current = most(&|s| s.i_out);
-    // current sensors are no better; a late sample shifts 1.7 A. With 0.2 % a repaired bench is blamed, with 20 % none is
+    // current sensors are no better; a late sample shifts 1.7 A. 0.2 % blames a repaired bench, 20 % none at all
     if shift.abs() > 0.02 * current {
         remarks.push(format!(
             "the sampled inductor current is off by up to {shift:+.3} A from the simulation's at the same point (sampling \

@@ -22,7 +22,7 @@ pub struct Pls {
     scores: Vec<(Vec<f64>, f64)>,
 }
 
-// the mean of thousands of rows loses 1e-16 each; with 0 a constant column takes part, and scikit-learn's answers are missed
+// thousands of rows lose 1e-16 each; with 0 a constant column takes part, and scikit-learn's answers are missed
 /// A spread below this share of a column's largest value is rounding.
 const CONSTANT: f64 = 1e-12;
 // the tests hold up to 1e-10; at 1e-6 the last component of scikit-learn's tables goes missing

@@ -61,7 +61,7 @@ pub struct Parameter {
     pub unit: &'static str,
     /// What it is.
     pub meaning: &'static str,
-    // decades beyond any part: a slip of unit or sign is refused, and a fit has room. Another reason stands at the number
+    // decades beyond any part: a slip of unit or sign is refused, a fit has room. Other reasons stand at the number
     /// Smallest and largest value a plant takes.
     pub allowed: (f64, f64),
     // classes of data sheets, rounded to 1, 2, 5: conventions that reach from the smallest part to the largest

@@ -6,6 +6,7 @@ use toml_input::{Message, Sink, Table, Value, messages};
 
 use crate::scenario::Task;
 
+// a decade beyond the largest current times voltage of a bench: a slip of unit or sign is refused
 /// Powers a load step may have, W.
 pub const POWER: RangeInclusive<f64> = 0.0..=1e7;
 

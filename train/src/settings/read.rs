@@ -262,8 +262,8 @@ fn episode(table: &mut Table<'_>, faults: &mut Sink) -> Option<Episode> {
     let voltage = |v: &Value<'_>, faults: &mut Sink| v.interval_within(0.0..=1e5, faults);
     let current = |v: &Value<'_>, faults: &mut Sink| v.interval_within(-1e4..=1e4, faults);
     Some(Episode {
-        // conventions: a new load after twice the 50 periods in which the paper settles, four loads an episode; a start beside
-        // rest; 40 V is far beyond all that a controller meets, and nothing is learnt there
+        // conventions: a new load after twice the 50 periods in which the paper settles, four loads an episode; a start
+        // beside rest; 40 V is far beyond all that a controller meets, and nothing is learnt there
         steps: table.with_default("steps", 400, faults, periods),
         load_every: table.with_default("load_every", 100, faults, periods),
         loads: table.with_default("loads", default, faults, loads),

@@ -38,8 +38,8 @@ pub fn netlist(circuit: &Circuit<'_>) -> String {
     inductor(&mut n, p, circuit.i_l);
     capacitor(&mut n, circuit);
     load(&mut n, circuit);
-    // tighter than ngspice's own (1e-3, 1e-14): with those, and with a tenth of these, mean and ripple of a buck move by
-    // less than 1e-6 V. Without a low-pass 1 ps, far below any step
+    // tighter than ngspice's own (1e-3, 1e-14): with those, and with a tenth of these, mean and ripple of a buck move
+    // by less than 1e-6 V. Without a low-pass 1 ps, far below any step
     let tau = p.sensors.v_out.low_pass.max(1e-12);
     let _ = writeln!(
         n,
@@ -135,9 +135,9 @@ fn capacitor(n: &mut String, circuit: &Circuit<'_>) {
     let v_c = v_out - k.esr * i_c;
     let _ = writeln!(n, "Rc out c1 {:e}", k.esr.max(1e-6));
     match k.esl > 0.0 {
-        // of two parts of no converter, both for the solver. Constant power behind an inductance ends with "timestep too
-        // small" unless 5 ohm, below its v^2 / P (10 ohm at 1 kW, 100 V), carry the difference: 0.5 does as well, 50 does
-        // not. 100 pF, and 10 pF as 10 nF, change mean and ripple by 1e-5 V at most
+        // parts of no converter, both for the solver. Constant power behind an inductance ends with "timestep too
+        // small" unless 5 ohm, below its v^2 / P (10 ohm at 1 kW, 100 V), carry the difference: 0.5 does as well,
+        // 50 does not. 100 pF, and 10 pF as 10 nF, change mean and ripple by 1e-5 V at most
         true => writeln!(
             n,
             "Lc c1 c2 {:e} ic={i_c}\nRlc c1 c2 5\nCsn out 0 100p ic={v_out}",

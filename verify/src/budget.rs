@@ -14,6 +14,7 @@ pub struct Clock {
     pub hz: f64,
 }
 
+// from watch crystals, with a factor of 30 below, to a factor of ten above any: a slip of a prefix lies beyond
 /// Frequencies that a processor could have, in Hz.
 const PLAUSIBLE: (f64, f64) = (1e3, 1e11);
 

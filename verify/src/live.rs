@@ -38,6 +38,7 @@ pub struct Live {
     _folder: tempfile::TempDir,
 }
 
+// a step of a native build takes microseconds; seconds are a machine under load
 /// A build that is silent for so long has failed.
 const TIMEOUT: Duration = Duration::from_secs(20);
 /// The level that is built of each compiler.

@@ -29,6 +29,7 @@ use crate::session::{COMPILER_TIMEOUT, Files};
 use crate::toolchain::{self, Build, BuildError, Install, Missing, Purpose, Sources};
 use crate::traces::sample_of;
 
+// a convention: about 64 of each of the four kinds of samples below
 /// Steps that are counted.
 pub const STEPS: usize = 256;
 
@@ -160,6 +161,7 @@ pub fn measure(policy: &Policy, target: &TargetSpec, files: &Files, build: &Buil
 /// Builds the plugin for the emulator of this machine.
 const PLUGIN_COMPILER: &str = "gcc";
 
+// the limit is a hundred times what all of them take, for machines under load
 /// A step under the emulator takes milliseconds.
 const RUN_TIMEOUT: Duration = Duration::from_secs(120);
 

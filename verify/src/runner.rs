@@ -82,6 +82,7 @@ struct Process {
     pending: Vec<u8>,
 }
 
+// a screen: a sanitiser's first report
 /// Bytes of error output kept.
 const STDERR_KEPT: u64 = 4096;
 

@@ -222,7 +222,7 @@ impl Full {
     fn crossing(&self, x: &States, a: &Algebra, path: &Path, load: &Load, span: (f64, f64), i_end: f64) -> f64 {
         let (t, h) = span;
         let (mut low, mut high) = ((0.0, a.signals.i_l), (h, i_end));
-        // a bound alone: the tests take 6 turns at most, and as many halvings end at 1e-12 of the step
+        // a bound alone: the tests take 8 turns at most, and as many halvings end at 1e-12 of the step
         for _ in 0..40 {
             let guess = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
             let inside = guess > low.0.min(high.0) && guess < low.0.max(high.0);

@@ -31,7 +31,7 @@ const fn searched(words: &'static str, knobs: &'static [Knob], search: Search) -
 }
 
 // in units of the converter's own size: absolute bounds would suit one converter only (docs/recipes/cause.md)
-// bounds hold what the blind cases hide (tests/blind/src/effects.rs, at 100 V and 5 A), mostly several times: a value at
+// bounds hold what blind cases hide (tests/blind/src/effects.rs, at 100 V and 5 A), mostly several times: a value at
 // its bound then says that the cause is another. A step is twenty times what two simulators of one circuit differ by
 // (`super::TINY`); half of all steps finds the same in the tests of naming, ties and loggers
 //
@@ -142,7 +142,7 @@ pub static CAUSES: &[Cause] = &[
         forms: &[searched(
             "inductance that falls with current",
             &[
-                // the plant's bound; it bends from below the usual current to far above, where it is a smaller inductance
+                // the bound is the plant's; it bends from below the usual current to far above, where it is a smaller L
                 knob("saturation", &["inductor.saturation"], Reach::Plain(0.0, 0.95, 0.1)),
                 knob("i_sat", &["inductor.i_sat"], Reach::Current(0.5, 5.0, 0.1)),
             ],

@@ -33,8 +33,8 @@ const fn searched(words: &'static str, knobs: &'static [Knob], search: Search) -
 // in units of the converter's own size: absolute bounds would suit one converter only (docs/recipes/cause.md)
 // bounds hold what blind cases hide (tests/blind/src/effects.rs, at 100 V and 5 A), mostly several times: a value at
 // its bound then says that the cause is another. A step is twenty times what two simulators of one circuit differ by
-// (`super::TINY`); half or twice all steps, and 0.7 or twice all bounds, find the
-// same in the tests of naming, ties and loggers
+// (`super::TINY`); half or twice all steps, and 0.7 or twice all bounds, find the same in the tests of naming, ties and
+// loggers
 //
 // half of the load's resistance would take a third of the voltage; the step is 0.1 ohm of 20, the least that is hidden
 const OHMS: Reach = Reach::Resistance(0.5, 0.005);

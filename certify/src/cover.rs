@@ -75,6 +75,7 @@ pub struct Map {
     pub boxes: usize,
 }
 
+// conventions: with the halvings 384 by 256 finest cells, each some two pixels of the picture
 /// Largest number of cells of a map along an axis before splitting.
 const COARSE: (usize, usize) = (48, 32);
 /// Halvings of a map's cell along each axis.

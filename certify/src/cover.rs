@@ -75,8 +75,8 @@ pub struct Map {
     pub boxes: usize,
 }
 
-// conventions: with the halvings 384 by 256 finest cells, each some two pixels of the picture
 /// Largest number of cells of a map along an axis before splitting.
+// conventions: with the halvings 384 by 256 finest cells, each some two pixels of the picture
 const COARSE: (usize, usize) = (48, 32);
 /// Halvings of a map's cell along each axis.
 const SPLITS: usize = 3;

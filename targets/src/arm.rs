@@ -77,6 +77,8 @@ pub const CORTEX_M0PLUS: TargetSpec = TargetSpec {
     }),
     // of a usual device, as with all targets: a convention, from which `--clock` departs
     clock_hz: Some(48_000_000),
+    // bench network in 16 bits, rows of 4, 6, 8: gcc 44398, 26016, 44133 instructions; clang 29866, 28501, 27558; rustc
+    // 34291, 33979, 31201 (its `rust_rows`)
     integer_block: IntegerBlock {
         rows: 6,
         unrolled: 1,

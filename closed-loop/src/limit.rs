@@ -62,8 +62,8 @@ struct Strategy {
     beyond: f64,
 }
 
-// 0.1 ns at 10 kHz: as good as at the instant for the plant, and behind it for the controller
 /// Just behind a sampling instant, in periods.
+// 0.1 ns at 10 kHz: as good as at the instant for the plant, and behind it for the controller
 const BEHIND: f64 = 1e-6;
 /// Broken periods of full effort.
 const PARTS: usize = 16;

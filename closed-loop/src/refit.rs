@@ -13,12 +13,12 @@ use crate::environment::{Environment, LoadPath, Start};
 use crate::faults::Error;
 use crate::load_step::{LoadKind, LoadStep};
 
-// three would fit a plane; two more show whether it bends (`drm fit` leaves each out once)
 /// Voltages that settled points are measured at, over the range of the policy's duties.
+// three would fit a plane; two more show whether it bends (`drm fit` leaves each out once)
 const VOLTAGES: usize = 5;
 
-// a little wider than the paper's duties, 0.44 to 0.55 of 200 V for 100 V
 /// Share of the held voltage within which points are measured: a policy may have all duties, but stays near it.
+// a little wider than the paper's duties, 0.44 to 0.55 of 200 V for 100 V
 const BESIDE: f64 = 0.15;
 
 /// An environment as a bench that settled points are measured at.

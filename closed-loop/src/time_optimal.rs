@@ -29,8 +29,8 @@ pub struct Target {
     pub i_l: f64,
 }
 
-// more than any scenario looks at by default (300): what turns the current later never came to rest in time
 /// Periods after which an effort counts as in vain.
+// more than any scenario looks at by default (300): what turns the current later never came to rest in time
 const LONGEST: usize = 400;
 // down to 1e-12 of the range
 const BISECTIONS: usize = 40;

@@ -14,8 +14,8 @@ const NUDGE_STEP: f64 = 0.02;
 /// Farthest from where the record has it that a load step is looked for, periods: a column of the load may hold that of the
 /// period's start, of its end, or of the row.
 pub const FARTHEST: f64 = 1.0;
-// in standard deviations, of which a nudge makes one and more: what is left this short is rounding
 /// A direction shorter than this is not seen.
+// in standard deviations, of which a nudge makes one and more: what is left this short is rounding
 const UNSEEN: f64 = 1e-6;
 
 /// An orthonormal basis of what initial states and free load steps can explain, for each segment.

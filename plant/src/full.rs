@@ -22,8 +22,8 @@ use crate::parameters::Parameters;
 use crate::plain::Track;
 use crate::signals::{Load, Signals};
 
-// those of the drawing above, and a low-pass for each of four sensors
 /// Number of states.
+// those of the drawing above, and a low-pass for each of four sensors
 pub(crate) const STATES: usize = 11;
 const I_L: usize = 0;
 const V_C: usize = 1;

@@ -74,13 +74,13 @@ const AT_REST: u32 = 20;
 /// Periods in which delays forget what was before.
 // two more than the longest delay of a duty or a sensor
 const WARM_UP: u32 = 10;
-// four integral times of the regulator. A convention: in the tests only points of the diagnosis need it at all
 /// Periods between two attempts that did not get nearer.
+// four integral times of the regulator. A convention: in the tests only points of the diagnosis need it at all
 const BETWEEN: u32 = 40;
 // four times the 9 steps that the slowest point of the tests takes; 5 are too few for discontinuous conduction
 const MOST_NEWTON: usize = 40;
-// 0.1 uV at 100 V, a thousandth of what the two integrators differ by (1e-4 V); the tests hold from 1e-13 to 1e-6
 /// At rest a period moves no state by this share.
+// 0.1 uV at 100 V, a thousandth of what the two integrators differ by (1e-4 V); the tests hold from 1e-13 to 1e-6
 const AT_REST_1: f64 = 1e-9;
 // the tests hold from 1e-10 to 1e-3: Newton corrects a coarse slope in the next step
 // rounding of 1e-16 then costs the derivative 1e-10 of its value

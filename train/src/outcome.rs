@@ -17,12 +17,12 @@ use closed_loop::environment::Environment;
 use closed_loop::scenario::{Finding, load_step};
 use closed_loop::{evaluation_csv, table};
 
-// a convention: `compile` and `verify` compute each of them once, and the paper's network fits them into 40 kB
 /// Observations among the golden vectors at most.
+// a convention: `compile` and `verify` compute each of them once, and the paper's network fits them into 40 kB
 const GOLDEN: usize = 512;
-// a hundred times what another order of 64 sums was seen to do (8.5e-6, interp's golden check)
 /// Rows whose two best Q values are closer than this share of the largest are left out: another order of summation may
 /// turn them round.
+// a hundred times what another order of 64 sums was seen to do (8.5e-6, interp's golden check)
 const GAP: f32 = 1e-3;
 
 /// A finished training.

@@ -29,8 +29,8 @@ use crate::session::{COMPILER_TIMEOUT, Files};
 use crate::toolchain::{self, Build, BuildError, Install, Missing, Purpose, Sources};
 use crate::traces::sample_of;
 
-// a convention: about 64 of each of the four kinds of samples below
 /// Steps that are counted.
+// a convention: about 64 of each of the four kinds of samples below
 pub const STEPS: usize = 256;
 
 /// What one control step costs in one build.
@@ -161,8 +161,8 @@ pub fn measure(policy: &Policy, target: &TargetSpec, files: &Files, build: &Buil
 /// Builds the plugin for the emulator of this machine.
 const PLUGIN_COMPILER: &str = "gcc";
 
-// the limit is a hundred times what all of them take, for machines under load
 /// A step under the emulator takes milliseconds.
+// the limit is a hundred times what all of them take, for machines under load
 const RUN_TIMEOUT: Duration = Duration::from_secs(120);
 
 pub(crate) fn read_elf(path: &Path) -> Result<Elf, MeasureError> {

@@ -82,8 +82,8 @@ struct Process {
     pending: Vec<u8>,
 }
 
-// a screen: a sanitiser's first report
 /// Bytes of error output kept.
+// a screen: a sanitiser's first report
 const STDERR_KEPT: u64 = 4096;
 
 impl ProcessRunner {

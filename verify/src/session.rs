@@ -165,8 +165,8 @@ impl From<VerifyError> for Faults {
     }
 }
 
-// a hundred times that, for machines under load
 /// A compiler that takes longer has failed; the largest policies take seconds.
+// a hundred times that, for machines under load
 pub(crate) const COMPILER_TIMEOUT: Duration = Duration::from_secs(600);
 /// Steps per chunk.
 // for buck12 0.6 MB of expected words, 35 a step; the figure itself is a convention

@@ -22,8 +22,8 @@ pub struct Deadbeat {
     expected: Option<f64>,
 }
 
-// twenty periods to learn: slower than a load step is answered, faster than losses drift. A convention
 /// Share of the error of the predicted current that is learnt each period.
+// twenty periods to learn: slower than a load step is answered, faster than losses drift. A convention
 const LEARNING: f64 = 0.05;
 
 impl Deadbeat {

@@ -13,8 +13,8 @@ pub(super) const RUSTC: &str = "/usr/bin/rustc";
 const CARGO: &str = "/usr/bin/cargo";
 /// The switch that lets cargo build `core`, unstable in upstream's eyes.
 pub const BUILD_CORE: &str = "-Zbuild-std=core";
-// twenty times that, for machines under load
 /// Building `core` takes half a minute.
+// twenty times that, for machines under load
 const TIMEOUT: Duration = Duration::from_secs(600);
 
 /// Debian's cargo, set up for [`BUILD_CORE`]; `None` if it, the compiler or the sources of `core` are not installed

@@ -161,7 +161,7 @@ impl Question {
             let effort = part as f64 / PARTS as f64;
             let tried = attempt(Strategy { effort, beyond: 0.0 });
             least = least.min(tried.deviation);
-            // clearly past the least, in share and in volts; a convention, the tests hold with any margin
+            // clearly past the least, in share and in volts; a convention, the tests hold with a share of 1.0 as well
             if tried.deviation > 1.2 * least + 0.1 {
                 break;
             }

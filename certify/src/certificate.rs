@@ -22,8 +22,12 @@ impl Default for Effort {
     fn default() -> Self {
         Self {
             // conventions; 1000 samples leave the share an interval of about 6 points at most
+            // the bound of examples/buck12 in binary32: 0.69 whole, 0.159 with 200 boxes, 0.119 with 1000, 0.1145 with
+            // 2000, 0.1130 with 4000
             boxes: 2000,
             samples: 1000,
+            // of its four coordinates: of 300 states 148 are proven by 16 halvings, 255 by 24, 290 by 32, 296 by 48,
+            // 299 by 56 and no more by 96
             depth: 48,
         }
     }

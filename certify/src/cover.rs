@@ -76,6 +76,7 @@ pub struct Map {
 }
 
 /// Largest number of cells of a map along an axis before splitting.
+// conventions: with the halvings 384 by 256 finest cells, each some two pixels of the picture
 const COARSE: (usize, usize) = (48, 32);
 /// Halvings of a map's cell along each axis.
 const SPLITS: usize = 3;

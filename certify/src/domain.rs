@@ -215,6 +215,8 @@ impl Domain {
                 magnitude += factor.abs() * low.abs().max(high.abs());
             }
             form.centre[row] = centre;
+            // centre and coefficients each round the sum of two ends, a product, and n sums: below 4 + n. Twice for the
+            // two of them, and twice more since the magnitude is a rounded sum itself
             form.slack[row] = feature.error + 4.0 * rounding(magnitude, 4 + feature.factors.len());
             steps.push(feature.clipped(form.bounds(row)));
         }

@@ -193,6 +193,8 @@ impl Form {
             // a factor of 0 or 1 without a shift rounds nothing
             if factor != 0.0 && factor != 1.0 || step.shift != 0.0 {
                 let magnitude = factor.abs() * self.magnitude(index) + step.shift.abs();
+                // two roundings in the centre, one in each coefficient and in the slack, whose magnitudes add up to
+                // this one: 4. Twice, since the magnitude is rounded itself
                 y.slack[index] += 2.0 * rounding(magnitude, 4);
             }
             if step.radius > 0.0 {

@@ -118,6 +118,7 @@ pub fn map(policy: &Policy, certificate: &Certificate) -> Result<Option<Svg>, Re
 
 /// One point for each square of finest cells, so that dots stay dots.
 fn thinned(map: &Map) -> Vec<(f64, f64)> {
+    // a convention: some ten pixels of the picture
     const SQUARES: f64 = 72.0;
     let square = |x: f64, range: Interval| (SQUARES * (x - range.low) / (range.high - range.low)) as i64;
     let mut seen = BTreeSet::new();

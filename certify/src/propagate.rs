@@ -174,6 +174,7 @@ fn convex(x: Interval, slope: f64) -> Replacement {
     }
     // any slope between is sound with the gap of both ends
     let factor = ((x.high - slope * x.low) / (x.high - x.low)).clamp(slope, 1.0);
+    // 1e-12, here and below: thousands of roundings, where a handful is made
     let gap = ((factor - slope) * -x.low).max((1.0 - factor) * x.high) * (1.0 + 1e-12);
     Replacement {
         factor,

@@ -7,6 +7,7 @@ use toml_input::{Message, Sink, Table, Value, messages};
 use crate::scenario::Task;
 
 /// Powers a load step may have, W.
+// a decade beyond the largest current times voltage of a bench: a slip of unit or sign is refused
 pub const POWER: RangeInclusive<f64> = 0.0..=1e7;
 
 /// The load steps and how they are run; what is left out is as in [`Task::default`].

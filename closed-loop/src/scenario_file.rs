@@ -31,6 +31,7 @@ pub struct Scenario {
     pub limits: Vec<[f64; 2]>,
 }
 
+// decades beyond any bench: a slip of unit or sign is refused
 const CURRENT: RangeInclusive<f64> = 0.0..=1e6;
 const RESISTANCE: RangeInclusive<f64> = 1e-6..=1e12;
 /// Control periods of one run at most, so that a slip of the pen does not run for hours.

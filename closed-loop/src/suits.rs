@@ -38,6 +38,7 @@ pub fn suits(policy: &Policy, converter: &Parameters, v_ref: f64, file: &Path) -
         return Err(Fault::in_file(file, message).into());
     }
     let (ours, theirs) = (policy.sample_period, converter.t_sw());
+    // a decimal period and 1 / f_sw may differ by rounding
     if (ours - theirs).abs() > 1e-9 * theirs {
         let message = Message::new("policy and plant have different control periods")
             .found(format!(

@@ -15,6 +15,7 @@ const NUDGE_STEP: f64 = 0.02;
 /// period's start, of its end, or of the row.
 pub const FARTHEST: f64 = 1.0;
 /// A direction shorter than this is not seen.
+// in standard deviations, of which a nudge makes one and more: what is left this short is rounding
 const UNSEEN: f64 = 1e-6;
 
 /// An orthonormal basis of what initial states and free load steps can explain, for each segment.

@@ -156,6 +156,7 @@ fn other_chains(problem: &mut Problem, base: &Model, extended: &Model, trim: f64
     let own = base.plant.pwm.sampling_phase;
     for index in 0..problem.records.len() {
         let record = &problem.records[index];
+        // as near as the instants of one sampler lie: from there on their jitter is told
         if record.duty_is != DutyIs::Unknown || record.settled || (record.phase - own).abs() < 0.02 {
             continue;
         }

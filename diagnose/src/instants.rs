@@ -32,6 +32,7 @@ const MOST: usize = 64;
 const LOOKS: i32 = 8;
 
 /// The channel that shows the load itself, and the rows around a free step in which it may leap.
+// two rows: a free step lies up to a period (`FARTHEST`) to either side, and the samples another
 const LOAD_SENSOR: usize = 2;
 const LEAPS_BEFORE: usize = 2;
 const LEAPS_BEHIND: usize = 2;

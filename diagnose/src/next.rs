@@ -115,6 +115,8 @@ struct Plan {
 fn plans(problem: &Problem) -> Vec<(String, Record)> {
     use Course::{Halves, Stair, Still, Trembling};
     let (v, i, v_in) = (problem.bases.v, problem.bases.i, problem.bases.v_in);
+    // sizes of the plans are conventions: steps as large as a bench takes without leaving continuous conduction (but
+    // for the light load), and a PRBS small enough that the response stays linear
     let d = (v / v_in).clamp(0.1, 0.9);
     let (low, high, ohms) = (0.6 * d, 1.4 * d, v / i);
     let (few, many) = (0.3 * v * i, 1.2 * v * i);

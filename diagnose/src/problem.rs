@@ -172,6 +172,7 @@ impl Problem {
                             let error = if error.is_finite() {
                                 error
                             } else {
+                                // far beyond any real error, and its square still a number
                                 1e6 * self.sigma[channel]
                             };
                             out[self.offsets[index] + row * CHANNELS + channel] = error / self.sigma[channel];
@@ -221,6 +222,7 @@ pub fn axpy(a: &mut [f64], k: f64, b: &[f64]) {
 #[must_use]
 pub fn nudged(model: &Model, knob: &Knob, range: &[f64; 3]) -> (Model, f64) {
     let value = knob.get(model);
+    // small against where the response bends, and four times what is no effect at all (`causes`' TINY)
     let step = 0.2 * range[2];
     // inwards at the upper bound
     let step = if value + step > range[1] { -step } else { step };
@@ -237,6 +239,7 @@ fn share_source_voltage(records: &mut [Record], v_in: f64) {
         .collect();
     let finite = || medians.iter().copied().filter(|m| m.is_finite());
     let (low, high) = (finite().fold(f64::INFINITY, f64::min), finite().fold(0.0, f64::max));
+    // 3 %, here and below: gains of two sensors differ by as much (`typical` of the plant)
     let apart = high > 1.03 * low;
     for (record, ratio) in records.iter_mut().zip(&medians) {
         if apart && ratio.is_finite() && record.v_in_ratio == 1.0 && !(0.97..1.03).contains(ratio) {
@@ -260,6 +263,7 @@ fn bases(records: &[Record], base: &Model) -> Bases {
             })
             .collect::<Vec<_>>()
     };
+    // a base of 0 would make every bound in volts 0
     let v = median(records.iter().flat_map(voltage)).max(0.01 * v_in);
     let current = |r: &Record| {
         let drawn = |n: usize| r.load[n].conductance * v + r.load[n].current + r.load[n].power / v;

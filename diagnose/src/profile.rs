@@ -109,6 +109,7 @@ pub fn profiles(problem: &Problem, attribution: &Attribution, say: Listener<'_>)
                 cost = at_value(far);
                 profile.curve.push((far, cost));
             }
+            // below a third of what one standard deviation costs, after three doublings: no data on this side
             let statistical = match cost > 0.3 {
                 // the parabola through the best value and this one, carried to the level
                 true => (far - value) * (LEVEL / cost).sqrt(),

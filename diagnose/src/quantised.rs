@@ -37,6 +37,7 @@ fn steps(problem: &Problem) -> Vec<(usize, f64, f64)> {
         (n, step, known)
     });
     steps
+        // a plant's file says 0.1 V where the record has 0.0977; a bit more or less is a factor of two
         .filter(|(_, step, known)| *step > 0.0 && (known - step).abs() > 0.02 * step)
         .collect()
 }
@@ -54,6 +55,7 @@ pub fn cause(problem: &Problem) -> Option<Named> {
         .map(|(n, step, known)| {
             let value = Value {
                 value: step,
+                // a convention: the step is read off the numbers, not fitted, and shows as exact
                 low: 0.999 * step,
                 high: 1.001 * step,
                 unit: CHANNEL_UNITS[n],

@@ -47,6 +47,7 @@ pub fn structures(problem: &Problem, null: &State, state: &State, inflation: f64
             if left.blocks < 5 {
                 continue;
             }
+            // chi-square of n blocks has the variance 2 n; the bound, so that correlated noise hides no structure
             let scatter = (2.0 / left.blocks as f64).sqrt() * inflation.sqrt().min(1.5);
             // a coarse converter leaves patterns that are none of the plant's
             let step = record.lattice[n];
@@ -109,6 +110,7 @@ fn burst(values: &[f64], total: f64) -> Option<(usize, f64)> {
     }
     let sums = values.windows(window).map(|w| w.iter().map(|v| v * v).sum::<f64>());
     let (row, most) = sums.enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    // "most of the power", as the words above say
     (most > 0.5 * total).then_some((row + BLOCK, most / total))
 }
 

@@ -39,6 +39,7 @@ pub fn strongest_line(problem: &Problem, residual: &[f64], n: usize) -> Option<L
         );
         longest = longest.max(record.rows() as f64 * t_sw);
     }
+    // the strongest line of white noise holds 2 ln(n / 2) / n of its power: 13 % here, and `shape::LINE` is 15 %
     if samples.len() < 50 {
         return None;
     }

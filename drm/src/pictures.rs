@@ -5,6 +5,7 @@ use report::{Axis, Chart, Colour, HeatMap, Page, Panel, Ramp, ReportError, Secti
 use crate::fit::{Fit, Report, Row};
 
 /// Cells of the surface along each side.
+// a convention: smooth to the eye
 const CELLS: usize = 60;
 /// How far the surface is drawn beyond the valid range, so that dots at its edge are whole.
 const MARGIN: f64 = 0.04;

@@ -12,6 +12,8 @@ use crate::plant::Plant;
 use crate::signals::Load;
 
 /// Converters computed together in the lanes of the vector unit.
+// a convention from before it was measured: on x86-64 with SSE2, 1024 converters make 17.9 M periods a second with 2
+// lanes, 22.2 with 4, 16.6 with 8, 15.3 with 16, and 7.7 one by one
 const LANES: usize = 8;
 
 /// Converters without any effect that needs more than two states: what [`Plant::step`] computes, to the bit, without

@@ -62,8 +62,10 @@ pub struct Parameter {
     /// What it is.
     pub meaning: &'static str,
     /// Smallest and largest value a plant takes.
+    // decades beyond any part: a slip of unit or sign is refused, a fit has room. Other reasons stand at the number
     pub allowed: (f64, f64),
     /// What converters of 10 W to 10 kW usually have.
+    // classes of data sheets, rounded to 1, 2, 5: conventions that reach from the smallest part to the largest
     pub typical: (f64, f64),
     /// The value of a converter without the effect; the default.
     pub neutral: f64,

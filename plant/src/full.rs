@@ -23,6 +23,7 @@ use crate::plain::Track;
 use crate::signals::{Load, Signals};
 
 /// Number of states.
+// those of the drawing above, and a low-pass for each of four sensors
 pub(crate) const STATES: usize = 11;
 const I_L: usize = 0;
 const V_C: usize = 1;
@@ -221,6 +222,7 @@ impl Full {
     fn crossing(&self, x: &States, a: &Algebra, path: &Path, load: &Load, span: (f64, f64), i_end: f64) -> f64 {
         let (t, h) = span;
         let (mut low, mut high) = ((0.0, a.signals.i_l), (h, i_end));
+        // a bound alone: the tests take 8 turns at most, and as many halvings end at 1e-12 of the step
         for _ in 0..40 {
             let guess = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
             let inside = guess > low.0.min(high.0) && guess < low.0.max(high.0);
@@ -236,6 +238,7 @@ impl Full {
                 low.1 *= 0.5;
             }
             high = (guess, i);
+            // rounding of a current of amperes, 1e-16 of it, a thousand times
             if i.abs() < 1e-13 {
                 break;
             }
@@ -337,6 +340,7 @@ impl Full {
         }
         // without ESR the voltage is that of the capacitor, whatever the load draws
         if c.esr > 0.0 {
+            // Newton's error squares: behind the fourth turn less than 2e-16 of v is left in the tests
             for _ in 0..4 {
                 let cpl = self.constant_power(load, v);
                 let turn = if v >= self.p.load.v_fold {

@@ -272,6 +272,7 @@ fn slope(c: &Series, x: f64) -> f64 {
 /// Newton's iteration from a chord; the current is close to a straight line here.
 fn zero(c: &Series, guess: f64) -> f64 {
     let mut x = if guess.is_finite() { guess } else { 0.0 };
+    // twice the turns that the tests take at most
     for _ in 0..6 {
         let step = value(c, x) / slope(c, x);
         if !step.is_finite() {

@@ -12,8 +12,10 @@ use crate::host::{Edge, Host, Row, Source};
 /// Duration of a load step, before its instant, s; faster ones ngspice does not follow into an inductance.
 const LOAD_RISE: f64 = 100e-9;
 /// Longest step of the transient, as a share of the control period.
+// ripple moves by 1e-7 V from half of it to twice, by 5e-5 V at twenty times
 const LONGEST_STEP: f64 = 0.005;
 /// Longest run, control periods.
+// 100 s at 10 kHz, ten times the longest of a scenario file
 const LONGEST_RUN: f64 = 1e6;
 
 /// The plant's effects that the netlist and the modulator here reproduce. One that is new there is refused until somebody
@@ -148,6 +150,7 @@ impl SpiceConverter {
             LONGEST_STEP * t
         ));
         // in force before time 0, so that the transient starts under its load
+        // before the start, however short: a microsecond behind which all rises are over
         let mut before = load_edges(&parameters, &start.load, -1e-6);
         if parameters.converter.rectifier == Rectifier::Synchronous {
             before.push(Edge {

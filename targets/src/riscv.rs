@@ -40,6 +40,8 @@ pub const RISCV32IMC: TargetSpec = TargetSpec {
     rust_row_block: RowBlock::Rows(8),
     weights_alignment: None,
     has_float_assembly: false,
+    // bench network in 16 bits, rows of 4, 6, 8: gcc 19230, 19373, 18124 instructions; clang 19310, 18506, 18067; rustc
+    // 20509, 19702, 19668
     integer_block: IntegerBlock {
         rows: 8,
         unrolled: 2,

@@ -15,6 +15,7 @@ pub struct Clock {
 }
 
 /// Frequencies that a processor could have, in Hz.
+// from watch crystals, with a factor of 30 below, to a factor of ten above any: a slip of a prefix lies beyond
 const PLAUSIBLE: (f64, f64) = (1e3, 1e11);
 
 impl Clock {

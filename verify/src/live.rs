@@ -39,6 +39,7 @@ pub struct Live {
 }
 
 /// A build that is silent for so long has failed.
+// a step of a native build takes microseconds; seconds are a machine under load
 const TIMEOUT: Duration = Duration::from_secs(20);
 /// The level that is built of each compiler.
 // of C and of Rust: a level of each that firmware is built with

@@ -30,6 +30,7 @@ use crate::toolchain::{self, Build, BuildError, Install, Missing, Purpose, Sourc
 use crate::traces::sample_of;
 
 /// Steps that are counted.
+// a convention: about 64 of each of the four kinds of samples below
 pub const STEPS: usize = 256;
 
 /// What one control step costs in one build.
@@ -161,6 +162,7 @@ pub fn measure(policy: &Policy, target: &TargetSpec, files: &Files, build: &Buil
 const PLUGIN_COMPILER: &str = "gcc";
 
 /// A step under the emulator takes milliseconds.
+// the limit is a hundred times what all of them take, for machines under load
 const RUN_TIMEOUT: Duration = Duration::from_secs(120);
 
 pub(crate) fn read_elf(path: &Path) -> Result<Elf, MeasureError> {

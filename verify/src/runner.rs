@@ -83,6 +83,7 @@ struct Process {
 }
 
 /// Bytes of error output kept.
+// a screen: a sanitiser's first report
 const STDERR_KEPT: u64 = 4096;
 
 impl ProcessRunner {

@@ -81,6 +81,8 @@ impl Default for Options<'_> {
             assembly: false,
             golden_decisions: None,
             recorded: Vec::new(),
+            // a driver's buffer of 64 kB holds some 470 steps, of 0.9 M instructions at most (floats by library on a
+            // Cortex-M0+): a second or two of an emulator, and the rest is for machines under load
             timeout: Duration::from_secs(60),
             progress: None,
         }
@@ -164,6 +166,7 @@ impl From<VerifyError> for Faults {
 }
 
 /// A compiler that takes longer has failed; the largest policies take seconds.
+// a hundred times that, for machines under load
 pub(crate) const COMPILER_TIMEOUT: Duration = Duration::from_secs(600);
 /// Steps per chunk.
 // for buck12 0.6 MB of expected words, 35 a step; the figure itself is a convention

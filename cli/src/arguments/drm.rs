@@ -72,6 +72,7 @@ fn duties(text: &str) -> Result<Duties, String> {
         return Ok(Duties(text.split(',').map(number).collect::<Result<_, _>>()?));
     };
     let (from, step, to) = (number(from)?, number(step)?, number(to)?);
+    // the end belongs to it although 0.1 does not divide 0.3; at two loads a thousand are all that a table may have
     let count = ((to - from) / step + 1e-9).floor();
     if !(step > 0.0 && (0.0..1000.0).contains(&count)) {
         return Err("expected FROM:STEP:TO with STEP > 0, FROM below TO and at most 1000 duties".to_owned());

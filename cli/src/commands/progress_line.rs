@@ -26,6 +26,7 @@ impl ProgressLine {
 
     /// Shows what `text` says, if it is time for it.
     pub fn show(&mut self, text: impl FnOnce() -> String) {
+        // an eye sees no more; a log of a job in CI shows that it lives
         let interval = if self.terminal {
             Duration::from_millis(100)
         } else {

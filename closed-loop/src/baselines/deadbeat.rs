@@ -23,6 +23,7 @@ pub struct Deadbeat {
 }
 
 /// Share of the error of the predicted current that is learnt each period.
+// twenty periods to learn: slower than a load step is answered, faster than losses drift. A convention
 const LEARNING: f64 = 0.05;
 
 impl Deadbeat {

@@ -22,6 +22,7 @@ pub struct FeedForward {
 }
 
 /// Integral time in control periods, for each period that a duty takes.
+// slow against the one or two periods of the current loop, within the 5 ms that the paper takes to settle
 const INTEGRAL_PERIODS: f64 = 50.0;
 
 impl FeedForward {

@@ -48,6 +48,7 @@ pub struct Kernel {
 }
 
 /// Groups per turn of the loop at most.
+// against code size: with 4 the bench network in 16 bits takes 4949 instructions on Cortex-M4F, with 8 it takes 4821
 const UNROLL: usize = 8;
 const SUMS: [&str; 4] = ["r4", "r5", "r6", "r7"];
 const LOADED: [&str; 4] = ["r8", "r9", "r10", "r11"];

@@ -22,6 +22,7 @@ pub struct Simplified<'a> {
 }
 
 /// Loops take outputs and inputs in groups; a group that is not full costs more than what it lacks.
+// four is the most that a loop takes at once: lanes of 8-bit weights in a word, rows of the smallest blocks
 const GROUP: usize = 4;
 
 /// Neurons that [`simplified`] leaves out, per layer. None in `f64`: the box in which a neuron is proven dead is that of the

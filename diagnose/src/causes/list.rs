@@ -31,9 +31,18 @@ const fn searched(words: &'static str, knobs: &'static [Knob], search: Search) -
 }
 
 // in units of the converter's own size: absolute bounds would suit one converter only (docs/recipes/cause.md)
+// bounds hold what blind cases hide (tests/blind/src/effects.rs, at 100 V and 5 A), mostly several times: a value at
+// its bound then says that the cause is another. A step is twenty times what two simulators of one circuit differ by
+// (`super::TINY`); half or twice all steps, and 0.7 or twice all bounds, find the same in the tests of naming, ties and
+// loggers
+//
+// half of the load's resistance would take a third of the voltage; the step is 0.1 ohm of 20, the least that is hidden
 const OHMS: Reach = Reach::Resistance(0.5, 0.005);
+// 20 us at 10 kHz, seven times the longest dead time hidden; the step is four times `problem::DUTY_ACCURACY`
 const EDGE: Reach = Reach::Time(0.0, 0.2, 0.002);
+// from a factor of two on a probe is set wrong, which the reader names (`record::suspicion`)
 const GAIN: Reach = Reach::Plain(0.5, 1.5, 0.01);
+// 0.5 ms at 10 kHz, 2.5 times the slowest hidden
 const FILTER: Reach = Reach::Time(0.0, 5.0, 0.1);
 
 /// All causes, each with its forms.
@@ -57,6 +66,7 @@ pub static CAUSES: &[Cause] = &[
         forms: &[
             form(
                 "forward voltage of the diode",
+                // 20 V at 200 V: no diode drops a tenth of the source
                 &[knob("v_f", &["switch.v_f"], Reach::Source(0.0, 0.1, 0.002))],
             ),
             form(
@@ -101,6 +111,7 @@ pub static CAUSES: &[Cause] = &[
         id: "esl",
         forms: &[form(
             "series inductance of the output capacitor",
+            // the plant's bound, and the upper end of its typical range: no share of the converter's size
             &[knob("esl", &["capacitor.esl"], Reach::Plain(0.0, 1e-5, 2e-7))],
         )],
     },
@@ -111,6 +122,7 @@ pub static CAUSES: &[Cause] = &[
             &[knob(
                 "inductance",
                 &["converter.inductance"],
+                // beyond a third or three times it is another part; the step is a fifth of a usual tolerance (10 %)
                 Reach::Own(0.3, 3.0, 0.02),
             )],
         )],
@@ -131,6 +143,7 @@ pub static CAUSES: &[Cause] = &[
         forms: &[searched(
             "inductance that falls with current",
             &[
+                // the bound is the plant's; it bends from below the usual current to far above, where it is a smaller L
                 knob("saturation", &["inductor.saturation"], Reach::Plain(0.0, 0.95, 0.1)),
                 knob("i_sat", &["inductor.i_sat"], Reach::Current(0.5, 5.0, 0.1)),
             ],
@@ -142,6 +155,7 @@ pub static CAUSES: &[Cause] = &[
         forms: &[searched(
             "capacitance that falls with voltage",
             &[
+                // as of the inductance
                 knob("derating", &["capacitor.derating"], Reach::Plain(0.0, 0.95, 0.1)),
                 knob("v_half", &["capacitor.v_half"], Reach::Voltage(0.5, 5.0, 0.1)),
             ],
@@ -174,6 +188,7 @@ pub static CAUSES: &[Cause] = &[
         id: "v_in_wrong",
         forms: &[form(
             "source voltage",
+            // beyond 30 % a supply is set to another value on purpose; what is hidden ends at 4 %
             &[knob("v_in", &["converter.v_in"], Reach::Own(0.7, 1.3, 0.005))],
         )],
     },
@@ -206,6 +221,7 @@ pub static CAUSES: &[Cause] = &[
         id: "sampling_delay",
         forms: &[searched(
             "sampling instant",
+            // below two periods: from there on it is rows that are shifted
             &[knob("delay", &[], Reach::Time(-1.9, 1.9, 0.02))],
             // a quarter of a period to either side, and 0.7 later: the response bends where the instant passes an edge
             Search::From(&[&[0.0], &[-12.0], &[12.0], &[35.0]]),
@@ -225,6 +241,7 @@ pub static CAUSES: &[Cause] = &[
             &[knob(
                 "offset",
                 &["sensors.v_out.offset"],
+                // 30 V of 100, twenty times what is hidden: a reference or a range that is wrong altogether
                 Reach::Voltage(-0.3, 0.3, 0.002),
             )],
         )],
@@ -254,6 +271,7 @@ pub static CAUSES: &[Cause] = &[
                 &[knob(
                     "offset",
                     &["sensors.i_l.offset"],
+                    // the usual current itself, more than ten times what is hidden; as of the other two forms
                     Reach::Current(-1.0, 1.0, 0.005),
                 )],
             ),
@@ -279,6 +297,7 @@ pub static CAUSES: &[Cause] = &[
         id: "duty_delay",
         forms: &[searched(
             "whole periods the duty waits",
+            // the plant's bound; the scan ends at four, twice the most that is hidden and usual
             &[knob("periods", &["pwm.duty_delay"], Reach::Plain(0.0, 8.0, 1.0))],
             // whole periods: in between nothing changes smoothly
             Search::Scan(&[0.0, 1.0, 2.0, 3.0, 4.0]),
@@ -299,6 +318,7 @@ pub static CAUSES: &[Cause] = &[
             &[lag(
                 "time_constant",
                 &["load.cpl_time_constant"],
+                // 5 ms at 10 kHz, three times the slowest hidden; slower, constant power is a constant current
                 Reach::Time(0.0, 50.0, 0.5),
             )],
         )],
@@ -307,6 +327,7 @@ pub static CAUSES: &[Cause] = &[
         id: "cpl_fold",
         forms: &[searched(
             "voltage below which constant power becomes a resistor",
+            // a fold above the held voltage turns constant power into a resistor for good: half as much again is enough
             &[knob("v_fold", &["load.v_fold"], Reach::Voltage(0.01, 1.5, 0.01))],
             // denser towards the held voltage: a fold below all voltages of a record does nothing and has no slope
             Search::From(&[&[55.0], &[70.0], &[80.0], &[86.0], &[91.0], &[96.0], &[101.0]]),
@@ -333,6 +354,7 @@ pub static CAUSES: &[Cause] = &[
         id: "bleed",
         forms: &[form(
             "conductance that is always there",
+            // nearly a third of the load: what draws more is a second load
             &[knob("bleed", &["load.bleed"], Reach::Conductance(0.3, 0.003))],
         )],
     },
@@ -343,6 +365,7 @@ pub static CAUSES: &[Cause] = &[
             &[knob(
                 "core_conductance",
                 &["inductor.core_conductance"],
+                // a loss of a tenth of the load's power; no core is that bad
                 Reach::Conductance(0.1, 0.001),
             )],
         )],
@@ -352,6 +375,7 @@ pub static CAUSES: &[Cause] = &[
         forms: &[searched(
             "line harmonic on the source",
             &[
+                // 40 V at 200 V, seven times what is hidden; the frequencies are those of mains, whatever the converter
                 knob("ripple", &["source.ripple"], Reach::Source(0.0, 0.2, 0.002)),
                 knob(
                     "frequency",

@@ -50,6 +50,7 @@ impl Raw<'_> {
         let time = self.values("t").unwrap_or_default();
         let ratio = step / t_sw;
         let (fast, slow) = ((1.0 / ratio).round(), ratio.round());
+        // a convention: clocks are far better, but times are written with few digits, and f_sw is a rounded number
         let fits = |a: f64, b: f64| (a / b - 1.0).abs() < 0.02;
         let faster = (1.0..=MOST_PER_PERIOD).contains(&fast) && fits(1.0 / ratio, fast);
         let slower = (1.0..=MOST_PERIODS).contains(&slow) && fits(ratio, slow);
@@ -72,6 +73,7 @@ impl Raw<'_> {
     pub fn stamped(&self, t_sw: f64) -> f64 {
         let first = self.values("t").and_then(|time| time.first().copied()).unwrap_or(0.0);
         let fraction = (first / t_sw).rem_euclid(1.0);
+        // what a time of few digits leaves of a whole period
         if (1e-3..=1.0 - 1e-3).contains(&fraction) {
             fraction
         } else {
@@ -82,6 +84,7 @@ impl Raw<'_> {
     fn place(&mut self, time: &[f64], t_sw: f64, phase: Option<f64>, step: f64) -> (Vec<Option<usize>>, f64) {
         let fraction = (time[0] / t_sw).rem_euclid(1.0);
         let phase = phase.unwrap_or_else(|| self.stamped(t_sw));
+        // here and below: between one row a period and two
         let skip = match step < 0.75 * t_sw {
             true => (phase - fraction).rem_euclid(1.0) * t_sw,
             false => 0.0,
@@ -90,12 +93,14 @@ impl Raw<'_> {
         self.start = first;
         let slot = |t: f64| ((t - first) / t_sw).round();
         let count = time.last().map_or(0.0, |t| slot(*t)) as usize + 1;
+        // 1000 s at 10 kHz, 160 MB: one wrong time must not ask for more
         let mut rows: Vec<Option<usize>> = vec![None; count.min(10_000_000)];
         let (mut jitter, mut used) = (0.0f64, 0);
         for (row, t) in time.iter().enumerate() {
             let place = slot(*t);
             let off = ((t - first) / t_sw - place).abs();
             let fast = step < 0.75 * t_sw;
+            // the row nearest to the instant is half a step off at most; the hundredth is for rounding
             if place < 0.0 || place as usize >= rows.len() || (fast && off * t_sw > 0.51 * step) {
                 continue;
             }

@@ -39,9 +39,11 @@ pub fn lattice(values: &[f64], decimals: u32) -> f64 {
     let gaps: Vec<f64> = sorted
         .windows(2)
         .map(|v| v[1] - v[0])
+        // between one digit and two: the same value, written twice
         .filter(|gap| *gap > 1.5 * digit)
         .collect();
     let smallest = gaps.iter().copied().fold(f64::INFINITY, f64::min);
+    // five digits, of which rounding may take half a one
     if sorted.len() < FEWEST || gaps.len() < 5 || smallest < 4.5 * digit {
         return 0.0;
     }
@@ -50,12 +52,14 @@ pub fn lattice(values: &[f64], decimals: u32) -> f64 {
     let mut step = smallest;
     for gap in &sorted {
         let count = ((gap - low) / step).round();
+        // two values, each off by half a digit, and as much again for the step so far
         if count >= 1.0 && (gap - low - count * step).abs() <= 1.01 * digit * 2.0 {
             step = (gap - low) / count;
         }
     }
     let near = |value: &f64| {
         let count = ((value - low) / step).round();
+        // two values, each off by half a digit, and a fifth for the step
         (value - low - count * step).abs() <= 1.2 * digit
     };
     if sorted.iter().all(near) && high > low {

@@ -150,6 +150,7 @@ impl<'a> Raw<'a> {
     pub fn check_duty(&self) -> Result<(), Faults> {
         let duty = self.values("duty").unwrap_or_default();
         let highest = duty.iter().copied().filter(|d| d.is_finite()).fold(0.0, f64::max);
+        // rounding of a duty that somebody computed
         let outside = duty.iter().position(|d| *d < -1e-9 || *d > 1.0 + 1e-9);
         if let Some(row) = outside {
             let label = self.label("duty");

@@ -72,6 +72,7 @@ impl Raw<'_> {
         Ok(Lines {
             time: (0..rows.len()).map(|n| self.start + n as f64 * t_sw).collect(),
             segments: segments(&rows, &lines.duty, &lines.load),
+            // between rows of each period and of every second one
             dense: step < 1.5 * t_sw,
             settled: false,
             ..lines
@@ -167,6 +168,7 @@ pub fn segments(rows: &[Option<usize>], duty: &[f64], load: &[Load]) -> Vec<Segm
         }
     }
     segments.push(start..used.last().map_or(0, |n| n + 1));
+    // four rows say little more than the initial states that they cost
     segments.retain(|segment| segment.len() > 4);
     segments
 }

@@ -25,18 +25,20 @@ impl Default for Protocol {
         Protocol {
             // 50 ms at 10 kHz: more than four periods of 2 mH with 1.5 mF, which resonate at 92 Hz
             window: 500,
+            // two seconds at 10 kHz: beyond the slowest source or load that is still called settled. A convention
             most_windows: 40,
         }
     }
 }
 
 /// Means of two windows that differ by less than this share of the input voltage are equal.
-// 1 mV at 200 V
+// 1 mV at 200 V. With twenty times as much a filter that rings for ever counts as settled
 const AT_REST: f64 = 5e-6;
 /// Standard errors of a mean that noise may move it by.
-// a convention: noise alone exceeds it once in 370 comparisons
+// a convention: noise alone exceeds it once in 370 comparisons; at 10 a filter that rings for ever counts as settled
 const NOISE: f64 = 3.0;
 /// An oscillation that keeps this share of its size from window to window is there to stay.
+// what keeps 95 % from window to window outlives half of the windows allowed. A convention: 0.8 to 1 pass the tests
 const STANDING: f64 = 0.95;
 
 /// Measures one point of a plan.
@@ -193,8 +195,10 @@ fn rests(before: &Window, last: &Window, this: &Window, at_rest: f64) -> bool {
     // the sum of a geometric series; steps that do not shrink are noise here and have none. A slow bench moves little
     // from window to window and is still far from its end
     let shrinks = if earlier > later { later / earlier } else { 0.0 };
+    // a shrinking that slow is noise of two equal steps: the bound keeps the quotient finite
     let to_come = later * shrinks / (1.0 - shrinks).max(1e-3);
     // quantisation and the ripple of an input harmonic stay for ever; ringing that dies out would still move the mean
+    // white noise has 1, a slow swing far more; 1 to 3 pass the tests
     let oscillation = this.v_std > (1.5 * this.v_noise).max(at_rest);
     let dies_out = this.v_std < STANDING * last.v_std;
     to_come <= enough && !(oscillation && dies_out)

@@ -123,6 +123,7 @@ fn four(fit: &Fit, v_in: f64, v_sim: f64, meaning: &mut Vec<String>) {
 
 /// Losses take voltage away: where there is more than `d v_in`, something else is at work.
 fn gained(fit: &Fit, meaning: &mut Vec<String>) {
+    // 0.2 V at 200 V, as much as good meters may be off together. A convention
     let above = |row: &&Row| row.point.v_out > (row.point.d_real + 1e-3) * row.point.v_in;
     let lines: Vec<usize> = fit.rows.iter().filter(above).map(|row| row.point.line).collect();
     if lines.is_empty() {

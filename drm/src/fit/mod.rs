@@ -188,6 +188,7 @@ fn continuous(table: &Table, options: &FitOptions, notes: &mut Vec<String>) -> (
     };
     let share = |p: &Point| p.i_out / conduction.boundary(p.v_out, p.v_in);
     let (kept, rest): (Vec<Point>, Vec<Point>) = table.points.iter().partition(|p| share(p) >= 1.0);
+    // 10 % is a common tolerance of an inductance, by which the boundary moves; a note alone
     let near: Vec<usize> = kept.iter().filter(|p| share(p) < 1.1).map(|p| p.line).collect();
     if !near.is_empty() {
         let lines = crate::table::lines(&near);
@@ -232,6 +233,8 @@ fn has_product(points: &[Point], constant_load: bool, options: &FitOptions) -> b
 
 /// The four-term form if it foretells clearly better and the table tells its terms apart.
 fn choose(fits: &[Fit]) -> usize {
+    // the ratio of two rms errors of a dozen points scatters by a fifth (1 / root of 2 n). With 1 the term is taken
+    // where there is none; 0.2 finds the real ones of the tests as well
     const CLEARLY: f64 = 0.8;
     match fits {
         [three, four] => {
@@ -342,6 +345,7 @@ fn simulated_by(points: &[Point]) -> String {
     if v_sim.low == v_sim.high && v_sim.low != v_in.low {
         return format!("d_sim = v_out / {} V, the input voltage of the simulation", v_sim.low);
     }
+    // a controller that does not divide misses by 0.2 V at 100 V, less than the 0.3 V that the paper's policy may leave
     if v_in.high - v_in.low > 2e-3 * v_in.high {
         return format!(
             "v_in goes from {:.2} to {:.2} V and is divided out (d_sim = v_out / v_in): a controller does not do so; with \

@@ -125,6 +125,7 @@ pub(crate) fn hull(values: impl Iterator<Item = f64>) -> Interval {
 /// A range of next to no width would call every sample invalid: it gets 1 % of its middle to either side.
 fn widened(range: Interval, low: f64, high: f64) -> Interval {
     let middle = 0.5 * (range.low + range.high);
+    // the noise of a held current or voltage stays within; a convention
     let least = 0.01 * middle.abs();
     if range.high - range.low >= least {
         return Interval {

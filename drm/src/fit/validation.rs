@@ -42,6 +42,7 @@ pub(crate) fn rms(values: &[f64]) -> f64 {
 }
 
 /// A smaller error counts only if it is smaller by more than this share: equal errors mean fewer components.
+// between the rounding of the errors (1e-10 of them) and any that matters: the tests hold from 0 to a tenth
 const CLEARLY: f64 = 1e-6;
 
 /// The number of components with the least leave-one-out error, and that error in V for one, two, ... components.

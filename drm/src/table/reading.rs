@@ -8,8 +8,10 @@ use super::suspicion;
 use crate::formula::Losses;
 
 /// More points than this are a record over time, not a table of settled points.
+// a convention: at two seconds a point, the longest that `acquire` waits at 10 kHz, more than an hour on a bench
 const MOST_POINTS: usize = 2000;
 /// A standard deviation above this share of the voltage means that the point had not settled.
+// 0.5 V at 100 V: the band within which the paper's voltage counts as settled
 const UNSETTLED: f64 = 0.005;
 
 /// The quantities of every point.

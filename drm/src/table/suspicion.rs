@@ -10,12 +10,16 @@ use super::reading::Reading;
 // a slip of a prefix is a factor of 1000; at light load v_out may be several times d v_in
 const OTHER_UNIT: f64 = 20.0;
 /// A buck converter cannot lift the voltage; this much is left to sensors.
+// two sensors, 2.5 % each
 const SENSOR: f64 = 1.05;
 /// A load current beyond this is more likely in milliamperes, A.
+// one ampere in milliamperes; few benches have a thousand, and those say the unit
 const CURRENT: f64 = 1000.0;
 /// An input voltage beyond this is more likely in millivolts, V.
+// three volts in millivolts, the least that converters are fed with
 const VOLTAGE: f64 = 3000.0;
 /// A power beyond this is more likely one of milliamperes, W.
+// 20 W with the current in milliamperes; the parts that the plant knows end at 10 kW
 const POWER: f64 = 20e3;
 
 /// Faults of range and unit, and notes on what only looks odd.

@@ -7,5 +7,6 @@ pub const EFFECT: Effect = Effect {
     name: "bleed",
     meaning: "conductance that is always across the output",
     needs: Way::Batch,
+    // a bleeder of 1 kohm and more
     parameters: &[number!(load.bleed, "S", "conductance", (0.0, 1e3), (0.0, 1e-3), 0.0)],
 };

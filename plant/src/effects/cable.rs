@@ -14,6 +14,7 @@ pub const EFFECT: Effect = Effect {
         number!(
             cable.inductance,
             "H",
+            // 1 uH a metre of two wires side by side: 0.2 to 5 m
             "inductance of both wires; needs capacitance",
             (0.0, 1e-2),
             (2e-7, 5e-6),
@@ -22,6 +23,7 @@ pub const EFFECT: Effect = Effect {
         number!(
             cable.resistance,
             "ohm",
+            // of those metres, in copper of 10 to 1.5 mm2
             "resistance of both wires; needs inductance",
             (0.0, 100.0),
             (0.002, 0.1),
@@ -30,6 +32,7 @@ pub const EFFECT: Effect = Effect {
         number!(
             cable.capacitance,
             "F",
+            // from ceramics to the electrolytic capacitor of an electronic load's input
             "capacitor at the load's terminals; needs inductance",
             (0.0, 1.0),
             (1e-6, 1e-3),

@@ -13,6 +13,7 @@ pub const EFFECT: Effect = Effect {
     parameters: &[number!(
         inductor.core_conductance,
         "S",
+        // 0.1 to 5 W at 100 V across the inductance
         "conductance across the inductance",
         (0.0, 0.1),
         (1e-5, 5e-4),

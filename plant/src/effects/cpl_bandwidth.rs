@@ -12,6 +12,7 @@ pub const EFFECT: Effect = Effect {
     parameters: &[number!(
         load.cpl_time_constant,
         "s",
+        // bandwidths of electronic loads, 16 kHz to 160 Hz
         "time constant of the regulation",
         (0.0, 10.0),
         (1e-5, 1e-3),

@@ -10,6 +10,7 @@ pub const EFFECT: Effect = Effect {
     parameters: &[detail!(
         load.v_fold,
         "V",
+        // a share of the output, from which a load gives up its regulation
         "voltage of the fold",
         (1e-3, 1e5),
         (1.0, 50.0),

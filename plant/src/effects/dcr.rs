@@ -14,6 +14,7 @@ pub const EFFECT: Effect = Effect {
     parameters: &[number!(
         inductor.dcr,
         "ohm",
+        // power inductors, from tens of microhenries to ten millihenries
         "winding resistance",
         (0.0, 100.0),
         (0.005, 0.5),

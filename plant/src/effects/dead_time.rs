@@ -14,6 +14,7 @@ pub const EFFECT: Effect = Effect {
     parameters: &[number!(
         switch.dead_time,
         "s",
+        // from drivers of small MOSFETs to those of IGBT modules
         "how much later a switch is told to turn on",
         (0.0, 1e-3),
         (5e-8, 4e-6),

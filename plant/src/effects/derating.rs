@@ -18,6 +18,7 @@ pub const EFFECT: Effect = Effect {
             "share of the capacitance that is lost far above v_half",
             // something must be left: the steps of the full circuit are as short as the least capacitance asks for
             (0.0, 0.95),
+            // ceramics of class II at their rated voltage
             (0.1, 0.8),
             0.0
         ),

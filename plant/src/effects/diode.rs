@@ -10,6 +10,7 @@ pub const EFFECT: Effect = Effect {
     meaning: "forward voltage and resistance of the diode",
     needs: Way::Batch,
     parameters: &[
+        // from Schottky to silicon carbide and fast silicon; a slope of those, and of body diodes
         number!(switch.v_f, "V", "forward voltage", (0.0, 100.0), (0.3, 2.0), 0.0),
         number!(
             switch.r_d,

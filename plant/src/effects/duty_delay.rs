@@ -17,6 +17,7 @@ pub const EFFECT: Effect = Effect {
         unit: "1",
         meaning: "whole periods a commanded duty waits beyond the next start of a PWM period",
         allowed: (0.0, LONGEST as f64),
+        // sampled, computed and updated within a period, or a period for each of the last two
         typical: (0.0, 2.0),
         neutral: 0.0,
         switches_on: true,

@@ -10,6 +10,7 @@ pub const EFFECT: Effect = Effect {
     parameters: &[number!(
         pwm.duty_lsb,
         "1",
+        // counters of 10,000 down to 200 counts a period
         "step of the duty",
         (0.0, 0.5),
         (1e-4, 5e-3),

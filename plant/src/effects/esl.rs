@@ -13,6 +13,7 @@ pub const EFFECT: Effect = Effect {
     parameters: &[number!(
         capacitor.esl,
         "H",
+        // from a chip on its pads to a can with leads and wires of its own
         "series inductance",
         (0.0, 1e-5),
         (5e-9, 2e-7),

@@ -13,6 +13,7 @@ pub const EFFECT: Effect = Effect {
     parameters: &[number!(
         capacitor.esr,
         "ohm",
+        // from film and polymer to aluminium electrolytic capacitors
         "series resistance",
         (0.0, 10.0),
         (0.002, 0.3),

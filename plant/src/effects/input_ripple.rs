@@ -14,6 +14,7 @@ pub const EFFECT: Effect = Effect {
         number!(
             source.ripple,
             "V",
+            // a few percent of the source
             "amplitude of the line harmonic",
             (0.0, 1e5),
             (0.5, 10.0),
@@ -22,6 +23,7 @@ pub const EFFECT: Effect = Effect {
         detail!(
             source.ripple_frequency,
             "Hz",
+            // rectified mains: 2 x 50 Hz of one phase to 6 x 60 Hz of three
             "frequency of the line harmonic",
             (0.0, 1e6),
             (100.0, 360.0),

@@ -13,6 +13,7 @@ pub const EFFECT: Effect = Effect {
         number!(
             load.setting_gain,
             "1",
+            // resistors of 5 or 10 %; electronic loads are better
             "drawn over set current or power",
             (0.0, 10.0),
             (0.9, 1.1),

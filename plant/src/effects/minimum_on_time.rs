@@ -11,6 +11,7 @@ pub const EFFECT: Effect = Effect {
     parameters: &[number!(
         pwm.min_on_time,
         "s",
+        // from controllers of small MOSFETs to drivers of IGBT modules
         "shortest pulse of the switch",
         (0.0, 1.0),
         (1e-7, 3e-6),

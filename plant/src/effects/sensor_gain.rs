@@ -9,5 +9,6 @@ pub const EFFECT: Effect = Effect {
     name: "sensor_gain",
     meaning: "gain of a sensor",
     needs: Way::Batch,
+    // two resistors of 1 % each, and a reference of as much
     parameters: of_each_sensor!(gain, ("1", "1"), "shown over true", (0.0, 10.0), (0.97, 1.03), 1.0),
 };

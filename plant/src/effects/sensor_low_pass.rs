@@ -12,6 +12,7 @@ pub const EFFECT: Effect = Effect {
     parameters: of_each_sensor!(
         low_pass,
         ("s", "s"),
+        // corners of 160 kHz to 1.6 kHz
         "time constant of the low-pass",
         (0.0, 10.0),
         (1e-6, 1e-4),

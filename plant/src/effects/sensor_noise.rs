@@ -13,6 +13,7 @@ pub const EFFECT: Effect = Effect {
     parameters: of_each_sensor!(
         noise,
         ("V", "A"),
+        // a step of the quantisation below, up to two
         "standard deviation",
         (0.0, 1e5),
         (1e-3, 0.2),

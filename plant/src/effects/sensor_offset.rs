@@ -10,6 +10,7 @@ pub const EFFECT: Effect = Effect {
     parameters: of_each_sensor!(
         offset,
         ("V", "A"),
+        // some steps of the quantisation
         "shown when the true value is 0",
         (-1e5, 1e5),
         (-0.5, 0.5),

@@ -7,6 +7,7 @@ pub const EFFECT: Effect = Effect {
     name: "sensor_quantisation",
     meaning: "step of the analog-digital converter",
     needs: Way::Batch,
+    // 12 bits over 4 to 400 V or A
     parameters: of_each_sensor!(lsb, ("V", "A"), "step of the converter", (0.0, 1e4), (1e-3, 0.1), 0.0),
 };
 

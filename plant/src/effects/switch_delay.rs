@@ -14,6 +14,7 @@ pub const EFFECT: Effect = Effect {
         number!(
             switch.turn_on_delay,
             "s",
+            // from MOSFETs at 10 ohm of gate resistance to IGBT modules; those turn off with a tail
             "from the command to the current when turning on",
             (0.0, 1e-3),
             (2e-8, 1e-6),

@@ -14,6 +14,7 @@ pub const EFFECT: Effect = Effect {
         number!(
             switch.r_ds_on,
             "ohm",
+            // MOSFETs from 30 V to 650 V
             "on-resistance of the switch",
             (0.0, 100.0),
             (0.005, 0.5),

@@ -60,6 +60,8 @@ pub(crate) fn read(document: &Document, load_current: usize, faults: &mut Sink) 
         low: value - by,
         high: value + by,
     };
+    // conventions: a converter whose gain is off by two, whose b by half of the duty at 10 A, or whose c by a fifth of
+    // the duty (as `drm fit` has it) has a fault that no adjustment is for
     let a_default = a.map(|a| Interval {
         low: 0.5 * a,
         high: 2.0 * a,

@@ -72,6 +72,7 @@ fn top(document: &Document, root: &mut Table<'_>, faults: &mut Sink) -> Option<S
 
 /// A number of control periods.
 fn periods(value: &Value<'_>, faults: &mut Sink) -> Option<u64> {
+    // two days of a training that does 5,000 a second: more is a slip of the pen
     value.integer(1..=1_000_000_000, faults)
 }
 
@@ -98,6 +99,7 @@ fn seeds(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<u64>> {
 
 fn widths(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<usize>> {
     let widths = value.each("widths of the hidden layers: [64, 64]", faults, |item, faults| {
+        // width and depth that a policy may have (`policy::limits`), of whose nine layers the last is no hidden one
         item.integer(1..=1024, faults)
     })?;
     if !(1..=8).contains(&widths.len()) {
@@ -118,6 +120,7 @@ fn learning(table: &mut Table<'_>, steps: u64, faults: &mut Sink) -> Learning {
     let learning_rate = table.with_default("learning_rate", 1e-3, faults, Value::positive);
     let final_learning_rate = table.with_default("final_learning_rate", learning_rate, faults, Value::positive);
     let discount = table.with_default("discount", 0.9, faults, below_one);
+    // upper ends are conventions: ten million transitions of six features take 600 MB, more is a slip of the pen
     let batch = table.with_default("batch", 256, faults, |v, faults| v.integer(1..=65_536, faults));
     let replay = table.with_default("replay", 200_000, faults, |v, faults| v.integer(1..=10_000_000, faults));
     let warm_up = table.with_default("warm_up", batch as u64, faults, periods);
@@ -128,6 +131,7 @@ fn learning(table: &mut Table<'_>, steps: u64, faults: &mut Sink) -> Learning {
     let soft = TargetUpdate::Soft { rate: 1e-3 };
     let target_update = table.with_default("target_update", soft, faults, target_update);
     let adam = table.with_default("adam", AdamSettings::default(), faults, adam);
+    // the paper's 0.1; start and a third of the steps are conventions
     let default = (1.0, 0.1, steps.div_ceil(3));
     let (epsilon_start, epsilon_end, epsilon_steps) = table.with_default("epsilon", default, faults, |v, faults| {
         v.read_table("epsilon", faults, |table, faults| Some(epsilon(table, default, faults)))
@@ -258,6 +262,8 @@ fn episode(table: &mut Table<'_>, faults: &mut Sink) -> Option<Episode> {
     let voltage = |v: &Value<'_>, faults: &mut Sink| v.interval_within(0.0..=1e5, faults);
     let current = |v: &Value<'_>, faults: &mut Sink| v.interval_within(-1e4..=1e4, faults);
     Some(Episode {
+        // conventions: a new load after twice the 50 periods in which the paper settles, four loads an episode; a start
+        // beside rest; 40 V is far beyond all that a controller meets, and nothing is learnt there
         steps: table.with_default("steps", 400, faults, periods),
         load_every: table.with_default("load_every", 100, faults, periods),
         loads: table.with_default("loads", default, faults, loads),

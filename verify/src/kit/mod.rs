@@ -33,6 +33,7 @@ const CONSTRUCTS: &[(&str, &[u8])] = &[
 // a step takes 4 (6 + signals) bytes of constant memory (docs/integrations/kit.md): 18 kB with three signals
 pub const DEFAULT_STEPS: u32 = 500;
 /// Control steps of each controller of the construct suite.
+// a convention, as the seed: with it the moves reach all that a test below asks for
 const SUITE_STEPS: u32 = 300;
 /// Seed of the moves: one whose 300 steps on the suite reach all that a test below asks for.
 const SEED: u64 = 28;

@@ -14,6 +14,7 @@ const CARGO: &str = "/usr/bin/cargo";
 /// The switch that lets cargo build `core`, unstable in upstream's eyes.
 pub const BUILD_CORE: &str = "-Zbuild-std=core";
 /// Building `core` takes half a minute.
+// twenty times that, for machines under load
 const TIMEOUT: Duration = Duration::from_secs(600);
 
 /// Debian's cargo, set up for [`BUILD_CORE`]; `None` if it, the compiler or the sources of `core` are not installed
@@ -22,6 +23,7 @@ const TIMEOUT: Duration = Duration::from_secs(600);
 pub fn cargo() -> Option<Command> {
     let mut sysroot = Command::new(RUSTC);
     sysroot.args(["--print", "sysroot"]);
+    // here, and wherever a program only says what it is: a fraction of a second, and 20 s for machines under load
     let output = run_for(&mut sysroot, Duration::from_secs(20)).ok()?;
     let sysroot = PathBuf::from(String::from_utf8_lossy(&output.stdout).trim());
     let core = sysroot.join("lib/rustlib/src/rust/library/core");

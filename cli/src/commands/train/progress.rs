@@ -13,6 +13,7 @@ use super::kept::Kept;
 use crate::failure::Failure;
 use report::grouped;
 
+// a convention: a training of minutes gives a log of some ten lines
 const LOG_EVERY: Duration = Duration::from_secs(5);
 
 /// Shows progress and keeps checkpoints.

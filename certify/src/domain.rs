@@ -9,6 +9,7 @@ use policy::{Expr, Feature, Filter, Input, Interval, Policy};
 use serde::Serialize;
 
 use crate::form::{Form, Replacement, rounding};
+use crate::past::Past;
 
 /// Unit roundoff of binary32.
 const UNIT_32: f64 = 1.0 / 16_777_216.0;
@@ -90,7 +91,7 @@ impl Domain {
             features: Vec::new(),
         };
         for (index, feature) in policy.features.iter().enumerate() {
-            let affine = match delay(feature, memory) {
+            let affine = match Past::of(feature, policy.sample_period, memory) {
                 Some(past) => domain.affine(policy, feature, past),
                 None => domain.own(index, feature),
             };
@@ -258,7 +259,7 @@ impl Domain {
             self.expression(policy, &feature.source, past.delay)
         };
         // a filter's memory settles up to its own rounding
-        y.error += past.filters as f64 * 64.0 * UNIT_32 * y.magnitude;
+        y.error += past.roundings * UNIT_32 * y.magnitude + past.remains;
         // the contract's order: scale, offset, clip
         y = y.scaled(feature.scale).plus(&Affine::constant(feature.offset));
         y.clip = feature.clip.map(|clip| Interval {
@@ -383,33 +384,6 @@ impl Affine {
             radius: 0.5 * (high - low) * (1.0 + 1e-12) + if high > low { rounding(shift.abs(), 2) } else { 0.0 },
         }
     }
-}
-
-/// What a feature looks at.
-#[derive(Debug, Clone, Copy, Default)]
-struct Past {
-    delay: usize,
-    is_difference: bool,
-    /// Filters with arithmetic of their own.
-    filters: usize,
-}
-
-/// `None` if the feature depends on a history.
-fn delay(feature: &Feature, memory: Memory) -> Option<Past> {
-    let mut past = Past::default();
-    for filter in &feature.filters {
-        match (filter, memory) {
-            (Filter::Delay { samples }, Memory::Free) => past.delay += samples,
-            // settled: all samples are equal, so a delay changes nothing and a difference is 0
-            (Filter::Delay { .. }, Memory::Settled) => {}
-            (Filter::BackwardDifference | Filter::FilteredDerivative { .. }, Memory::Settled) => {
-                past.is_difference = true;
-            }
-            (Filter::LowPass { .. } | Filter::MovingAverage { .. }, Memory::Settled) => past.filters += 1,
-            _ => return None,
-        }
-    }
-    Some(past)
 }
 
 /// Name, unit and plausible range of what a source reads.

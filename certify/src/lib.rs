@@ -20,6 +20,7 @@ mod network;
 mod neurons;
 #[cfg(feature = "page")]
 pub mod page;
+mod past;
 mod propagate;
 mod slice;
 

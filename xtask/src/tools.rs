@@ -81,6 +81,7 @@ const NGSPICE_HEADER: &[&str] = &[
 
 const VENV: &[&str] = &["python3", "-c", "import venv, ensurepip"];
 const MARABOU: &[&str] = &["python3", "-c", "from maraboupy import MarabouCore"];
+const BITWUZLA: &[&str] = &["python3", "-c", "import bitwuzla; bitwuzla.Parser"];
 const FMPY: &[&str] = &["python3", "-c", "import fmpy; assert fmpy.__version__ == '0.3.32'"];
 
 /// One row a tool. A Python package is probed by `["python3", "-c", "import it"]` in the environment of [`python`].
@@ -140,6 +141,7 @@ const TOOLS: &[Tool] = &[
         Python("libcosimpy==0.0.6"),
     ),
     tool("Marabou", MARABOU, Python("maraboupy==2.0.0")),
+    tool("Bitwuzla", BITWUZLA, Python("bitwuzla==0.9.1")),
 ];
 
 /// Debian's Rust with the sources of `core`, which stands in where rustup has no target.

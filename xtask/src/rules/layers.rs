@@ -11,7 +11,15 @@ const LAYERS: &[&[&str]] = &[
     &["certify"],
     &["interp", "codegen", "drm"],
     &["closed-loop"],
-    &["policy-macro", "policy-build", "train", "spice", "diagnose", "verify"],
+    &[
+        "policy-macro",
+        "policy-build",
+        "train",
+        "spice",
+        "diagnose",
+        "verify",
+        "equivalence",
+    ],
     &["cli", "example-build-rust", "example-build-c", "example-embedded-hal"],
     &["tests", "blind", "bench", "xtask", "firmware"],
 ];
@@ -30,6 +38,11 @@ const FORBIDDEN: &[Forbidden] = &[
         why: "an oracle that shares the lowering proves nothing",
     },
     Forbidden {
+        from: &["equivalence"],
+        to: &["codegen", "templates", "interp"],
+        why: "a specification that shares the lowering proves nothing, and one that shares the oracle shows no more than it does",
+    },
+    Forbidden {
         from: &[
             "policy",
             "certify",
@@ -39,6 +52,7 @@ const FORBIDDEN: &[Forbidden] = &[
             "templates",
             "policy-macro",
             "verify",
+            "equivalence",
         ],
         to: &["plant", "drm", "closed-loop", "train", "diagnose"],
         why: "the compile side does not know the model side",

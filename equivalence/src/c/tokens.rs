@@ -1,0 +1,222 @@
+//! C text to tokens: comments dropped, conditions and object-like macros of the preprocessor applied.
+
+use std::collections::BTreeMap;
+
+use crate::machine::Wrong;
+use crate::refusal::Refusal;
+
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Name(String),
+    /// Digits as written, with their suffix.
+    Number(String),
+    /// What stands between the quotes.
+    Text(String),
+    Symbol(&'static str),
+}
+
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Token {
+    pub kind: Kind,
+    /// From 1.
+    pub line: usize,
+}
+
+/// Longest first.
+const SYMBOLS: [&str; 38] = [
+    "<<=", ">>=", "...", "->", "++", "--", "<<", ">>", "<=", ">=", "==", "!=", "&&", "||", "+=", "-=", "*=", "&=",
+    "|=", "^=", "/=", "(", ")", "[", "]", "{", "}", ";", ",", "=", "+", "-", "*", "/", "&", "|", "^", "~",
+];
+const MORE: [&str; 9] = ["<", ">", "!", "?", ":", ".", "%", "#", "\\"];
+
+/// Object-like macros: name to what stands for it.
+pub(crate) type Macros = BTreeMap<String, Vec<Token>>;
+
+/// Tokens of a file in which `macros` are defined; definitions of the file are added to them.
+pub(crate) fn tokens(file: &str, text: &str, macros: &mut Macros) -> Result<Vec<Token>, Refusal> {
+    let text = without_comments(text);
+    let mut out = Vec::new();
+    // per open condition: whether its lines count, and whether one of its branches has been taken
+    let mut open: Vec<(bool, bool)> = Vec::new();
+    let mut lines = text.lines().enumerate();
+    while let Some((index, first)) = lines.next() {
+        let (line, mut whole) = (index + 1, first.to_owned());
+        while whole.ends_with('\\') {
+            whole.pop();
+            whole.push_str(lines.next().map_or("", |(_, next)| next));
+        }
+        let refused = |message: Wrong| Refusal::at(file, line, message);
+        let active = open.iter().all(|(counts, _)| *counts);
+        match whole.trim_start().strip_prefix('#') {
+            Some(directive) => apply(directive.trim_start(), line, active, &mut open, macros).map_err(refused)?,
+            None if active => {
+                let mut found = split(&whole, line).map_err(refused)?;
+                expand(&mut found, macros, 0);
+                out.append(&mut found);
+            }
+            None => {}
+        }
+    }
+    match open.is_empty() {
+        true => Ok(out),
+        false => Err(Refusal::at(
+            file,
+            text.lines().count(),
+            "a condition that does not end".into(),
+        )),
+    }
+}
+
+fn apply(
+    directive: &str,
+    line: usize,
+    active: bool,
+    open: &mut Vec<(bool, bool)>,
+    macros: &mut Macros,
+) -> Result<(), Wrong> {
+    let end = directive
+        .find(|c: char| !c.is_ascii_alphanumeric())
+        .unwrap_or(directive.len());
+    let (name, rest) = directive.split_at(end);
+    let holds = |text: &str, macros: &Macros| -> Result<bool, Wrong> {
+        let mut found = split(text, line)?;
+        super::condition::holds(&mut found, macros)
+    };
+    let lone = |text: &str| text.trim().to_owned();
+    match name {
+        "if" | "ifdef" | "ifndef" => {
+            let taken = active
+                && match name {
+                    "ifdef" => macros.contains_key(&lone(rest)),
+                    "ifndef" => !macros.contains_key(&lone(rest)),
+                    _ => holds(rest, macros)?,
+                };
+            // inside of what does not count no branch is ever taken
+            open.push((taken, taken || !active));
+        }
+        "elif" => {
+            let (_, taken) = open.pop().ok_or("an #elif without its #if")?;
+            let now = !taken && holds(rest, macros)?;
+            open.push((now, taken || now));
+        }
+        "else" => {
+            let (_, taken) = open.pop().ok_or("an #else without its #if")?;
+            open.push((!taken, true));
+        }
+        "endif" => {
+            open.pop().ok_or("an #endif without its #if")?;
+        }
+        _ if !active => {}
+        "define" => {
+            let rest = rest.trim_start();
+            let end = rest
+                .find(|c: char| !c.is_ascii_alphanumeric() && c != '_')
+                .unwrap_or(rest.len());
+            let (name, body) = rest.split_at(end);
+            if body.starts_with('(') {
+                return Err(format!("the macro `{name}` with arguments"));
+            }
+            macros.insert(name.to_owned(), split(body, line)?);
+        }
+        "undef" => {
+            macros.remove(&lone(rest));
+        }
+        // the header is read before the source, and types of fixed width are known
+        "include" | "pragma" => {}
+        "error" => return Err(format!("#error{rest}")),
+        other => return Err(format!("the directive #{other}")),
+    }
+    Ok(())
+}
+
+/// Puts the bodies of macros in the place of their names.
+pub(crate) fn expand(tokens: &mut Vec<Token>, macros: &Macros, depth: usize) {
+    // a macro that names itself stays as it is at the latest here
+    if depth > 8 {
+        return;
+    }
+    let mut out = Vec::with_capacity(tokens.len());
+    for token in tokens.drain(..) {
+        match &token.kind {
+            Kind::Name(name) if macros.contains_key(name) => {
+                let mut body = macros[name].clone();
+                body.iter_mut().for_each(|t| t.line = token.line);
+                expand(&mut body, macros, depth + 1);
+                out.append(&mut body);
+            }
+            _ => out.push(token),
+        }
+    }
+    *tokens = out;
+}
+
+/// Comments become a space; line ends stay, so that lines keep their numbers.
+fn without_comments(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(start) = rest.find("/*") {
+        let (before, comment) = rest.split_at(start);
+        out.push_str(before);
+        let end = comment.find("*/").map_or(comment.len(), |end| end + 2);
+        let (comment, after) = comment.split_at(end);
+        out.push(' ');
+        out.extend(comment.chars().filter(|c| *c == '\n'));
+        rest = after;
+    }
+    out.push_str(rest);
+    out
+}
+
+/// Tokens of a line.
+pub(crate) fn split(text: &str, line: usize) -> Result<Vec<Token>, Wrong> {
+    let mut out = Vec::new();
+    let mut rest = text.trim_start();
+    while let Some(first) = rest.chars().next() {
+        let (kind, after) = if first.is_ascii_alphabetic() || first == '_' {
+            let (name, after) = take(rest, |c, _| c.is_ascii_alphanumeric() || c == '_');
+            (Kind::Name(name.to_owned()), after)
+        } else if first.is_ascii_digit() {
+            // the sign of an exponent belongs to the number, but not in hexadecimal
+            let is_hex = rest.starts_with("0x") || rest.starts_with("0X");
+            let signed = |c: char, before: char| !is_hex && matches!(c, '+' | '-') && matches!(before, 'e' | 'E');
+            let (digits, after) = take(rest, |c, before| {
+                c.is_ascii_alphanumeric() || c == '.' || signed(c, before)
+            });
+            (Kind::Number(digits.to_owned()), after)
+        } else if first == '"' {
+            let inner = &rest[1..];
+            let end = closing(inner).ok_or("a text without its end")?;
+            (Kind::Text(inner[..end].to_owned()), &inner[end + 1..])
+        } else {
+            let mut symbols = SYMBOLS.iter().chain(&MORE);
+            let symbol = symbols.find(|symbol| rest.starts_with(**symbol));
+            let symbol = symbol.ok_or_else(|| format!("the character `{first}`"))?;
+            (Kind::Symbol(symbol), &rest[symbol.len()..])
+        };
+        out.push(Token { kind, line });
+        rest = after.trim_start();
+    }
+    Ok(out)
+}
+
+/// Where the text ends; a quote behind a backslash does not end it.
+fn closing(inner: &str) -> Option<usize> {
+    let mut escaped = false;
+    for (index, c) in inner.char_indices() {
+        match c {
+            '"' if !escaped => return Some(index),
+            _ => escaped = c == '\\' && !escaped,
+        }
+    }
+    None
+}
+
+fn take(text: &str, mut belongs: impl FnMut(char, char) -> bool) -> (&str, &str) {
+    let mut before = ' ';
+    let end = text.find(|c| {
+        let goes_on = belongs(c, before);
+        before = c;
+        !goes_on
+    });
+    text.split_at(end.unwrap_or(text.len()))
+}

@@ -1,0 +1,300 @@
+//! The goals of a policy: every function of the controller against the specification.
+
+use crate::emitted::{Called, Emitted};
+use crate::facts;
+use crate::goal::{Assumption, Goal, Pair, equal};
+use crate::machine::{Kind, U32};
+use crate::refusal::Refusal;
+use crate::spec::{self, Command, Sensed, Spec, State};
+use crate::term::Term;
+
+/// What a step is about: any state, any measurement, any command for `commit`.
+struct Given {
+    state: State,
+    measurement: Vec<Term>,
+    sensed: Sensed,
+    /// Holds for every arithmetic that rounds; each has a goal of its own.
+    assumptions: Vec<Assumption>,
+}
+
+impl Given {
+    fn new(spec: Spec<'_>) -> Self {
+        let state = State::any(spec);
+        let measurement = spec::measurement(spec);
+        let sensed = spec::sense(spec, &state, &measurement);
+        let assumptions = facts::assumptions(spec, &state);
+        Given {
+            state,
+            measurement,
+            sensed,
+            assumptions,
+        }
+    }
+}
+
+/// All goals about one language's controller.
+pub(crate) fn of(spec: Spec<'_>, emitted: &dyn Emitted) -> Result<Vec<Goal>, Refusal> {
+    let given = Given::new(spec);
+    let mut goals = Vec::new();
+    let evaluated = emitted.eval(&given.state, &given.measurement)?;
+    let index = spec::best(spec, emitted.to_cut()?, &evaluated.outputs);
+    let command = spec::decide(spec, &given.state, &given.sensed, index);
+    eval(spec, emitted, &given, &evaluated, &command, &mut goals);
+    let any = Command {
+        duty: spec.terms.input("command_duty", spec.float.width()),
+        duty_sim: spec.terms.input("command_duty_sim", spec.float.width()),
+        action_index: spec.terms.input("index", 32),
+        status: spec.terms.input("word_status", 32),
+    };
+    let committed = emitted.commit(&given.state, &given.measurement, &any)?;
+    commit(spec, emitted, &given, &committed, &any, &mut goals);
+    let stepped = emitted.step(&given.state, &given.measurement)?;
+    step(spec, emitted, &given, &evaluated, &stepped, &mut goals)?;
+    around(spec, emitted, &given, &evaluated, &mut goals)?;
+    let asked = [evaluated.obligations, committed.obligations, stepped.obligations].concat();
+    let language = emitted.language();
+    let pair = Pair {
+        label: "defined".into(),
+        emitted: spec.terms.all(asked),
+        specified: spec.terms.truth(true),
+        kind: Kind::Truth,
+    };
+    goals.push(equal(
+        spec.float,
+        name(language, "defined"),
+        format!("{language}: no step reads beyond a table, and no sum of signed integers overflows"),
+        &[pair],
+        &given.assumptions,
+    ));
+    Ok(goals)
+}
+
+fn name(language: &str, part: &str) -> String {
+    format!("{}.{part}", language.to_lowercase())
+}
+
+fn pair(label: impl Into<String>, emitted: Term, specified: Term, kind: Kind) -> Pair {
+    Pair {
+        label: label.into(),
+        emitted,
+        specified,
+        kind,
+    }
+}
+
+fn list(label: &str, emitted: &[Term], specified: &[Term], kind: Kind) -> Vec<Pair> {
+    let both = emitted.iter().zip(specified).enumerate();
+    both.map(|(n, (x, y))| pair(format!("{label} {n}"), *x, *y, kind))
+        .collect()
+}
+
+/// That as many observations as the specification has went into as many runs of the network: a refusal would hide a defect.
+fn observations(spec: Spec<'_>, called: &Called, specified: &[Term]) -> Vec<Pair> {
+    let float = Kind::Float(spec.float.format);
+    match called.observations.as_slice() {
+        [once] if once.len() == specified.len() => list("observation", once, specified, float),
+        other => {
+            let count = |n: usize| spec.terms.bits(n as u64, 32);
+            vec![pair("runs of the network", count(other.len()), count(1), U32)]
+        }
+    }
+}
+
+fn eval(
+    spec: Spec<'_>,
+    emitted: &dyn Emitted,
+    given: &Given,
+    called: &Called,
+    command: &Command,
+    goals: &mut Vec<Goal>,
+) {
+    let language = emitted.language();
+    let float = Kind::Float(spec.float.format);
+    let mut add = |part: &str, claim: &str, pairs: &[Pair]| {
+        let claim = format!("{language}: {claim}");
+        goals.push(equal(
+            spec.float,
+            name(language, part),
+            claim,
+            pairs,
+            &given.assumptions,
+        ));
+    };
+    let observed = observations(spec, called, &given.sensed.observation);
+    let text = "the network gets the observation of sections 2 to 5: held samples, filters, scales and clips";
+    add("observation", text, &observed);
+    if let Some(found) = &called.command {
+        let text =
+            "`eval` commands the duty of sections 7 to 9: argmax, mapping, slew limit, soft start, limits, fallback";
+        add("duty", text, &[pair("duty", found.duty, command.duty, float)]);
+        let text = "`eval` says the duty of the chosen action, or the fallback";
+        add(
+            "duty_sim",
+            text,
+            &[pair("duty_sim", found.duty_sim, command.duty_sim, float)],
+        );
+        let text = "`eval` says the lowest index of the largest Q value, and 0 with STATE";
+        add(
+            "action_index",
+            text,
+            &[pair("action_index", found.action_index, command.action_index, U32)],
+        );
+        let text = "`eval` sets exactly the status bits of section 9";
+        add("status", text, &[pair("status", found.status, command.status, U32)]);
+    }
+    add(
+        "pure",
+        "`eval` changes nothing",
+        &state_pairs(spec, &called.state, &given.state),
+    );
+}
+
+/// The parts of two states.
+fn state_pairs(spec: Spec<'_>, emitted: &State, specified: &State) -> Vec<Pair> {
+    let groups = state_groups(spec, emitted, specified);
+    groups.into_iter().flat_map(|(_, _, pairs)| pairs).collect()
+}
+
+type Group = (&'static str, &'static str, Vec<Pair>);
+
+fn state_groups(spec: Spec<'_>, emitted: &State, specified: &State) -> Vec<Group> {
+    let float = Kind::Float(spec.float.format);
+    let memories = |state: &State| -> Vec<Term> { state.memories.iter().flatten().flatten().copied().collect() };
+    let caps = emitted.soft_cap.zip(specified.soft_cap);
+    let all = [
+        (
+            "held",
+            "the signals of this step",
+            list("held", &emitted.held, &specified.held, float),
+        ),
+        (
+            "memory",
+            "the pushed words of every filter, or +0",
+            list("memory", &memories(emitted), &memories(specified), float),
+        ),
+        (
+            "remembered",
+            "the duties of the command",
+            vec![
+                pair("previous_duty", emitted.previous_duty, specified.previous_duty, float),
+                pair(
+                    "previous_command",
+                    emitted.previous_command,
+                    specified.previous_command,
+                    float,
+                ),
+            ],
+        ),
+        (
+            "soft_cap",
+            "the raised cap, or its start",
+            caps.map(|(x, y)| pair("soft_cap", x, y, float)).into_iter().collect(),
+        ),
+        (
+            "coefficients",
+            "the coefficients as they are",
+            list("coefficient", &emitted.coefficients, &specified.coefficients, float),
+        ),
+        (
+            "counters",
+            "the count of bad steps and `primed`",
+            vec![
+                pair("bad_count", emitted.bad_count, specified.bad_count, U32),
+                pair("primed", emitted.primed, specified.primed, U32),
+            ],
+        ),
+    ];
+    all.into_iter().filter(|(_, _, pairs)| !pairs.is_empty()).collect()
+}
+
+fn commit(
+    spec: Spec<'_>,
+    emitted: &dyn Emitted,
+    given: &Given,
+    called: &Called,
+    command: &Command,
+    goals: &mut Vec<Goal>,
+) {
+    let language = emitted.language();
+    let after = spec::commit(spec, &given.state, &given.sensed, command.duty, command.duty_sim);
+    for (part, text, pairs) in state_groups(spec, &called.state, &after) {
+        let claim = format!("{language}: `commit` leaves what section 10 says: {text}");
+        let name = name(language, &format!("commit.{part}"));
+        goals.push(equal(spec.float, name, claim, &pairs, &given.assumptions));
+    }
+}
+
+/// Both sides are emitted code: with the goals of `eval` and `commit`, which are for any command, this is the whole step.
+fn step(
+    spec: Spec<'_>,
+    emitted: &dyn Emitted,
+    given: &Given,
+    evaluated: &Called,
+    called: &Called,
+    goals: &mut Vec<Goal>,
+) -> Result<(), Refusal> {
+    let language = emitted.language();
+    let float = Kind::Float(spec.float.format);
+    let mut pairs = match evaluated.observations.first() {
+        Some(observation) => observations(spec, called, observation),
+        None => Vec::new(),
+    };
+    if let (Some(found), Some(command)) = (&called.command, &evaluated.command) {
+        pairs.push(pair("duty", found.duty, command.duty, float));
+        pairs.push(pair("duty_sim", found.duty_sim, command.duty_sim, float));
+        pairs.push(pair("action_index", found.action_index, command.action_index, U32));
+        pairs.push(pair("status", found.status, command.status, U32));
+        let after = emitted.commit(&given.state, &given.measurement, command)?;
+        pairs.extend(state_pairs(spec, &called.state, &after.state));
+    }
+    let claim = format!("{language}: `step` is `eval`, then `commit` with its command");
+    goals.push(equal(spec.float, name(language, "step"), claim, &pairs, &[]));
+    Ok(())
+}
+
+/// What is called beside the control path.
+fn around(
+    spec: Spec<'_>,
+    emitted: &dyn Emitted,
+    given: &Given,
+    evaluated: &Called,
+    goals: &mut Vec<Goal>,
+) -> Result<(), Refusal> {
+    let language = emitted.language();
+    let float = Kind::Float(spec.float.format);
+    let state = &given.state;
+    let mut add = |part: &str, claim: &str, pairs: &[Pair]| {
+        let claim = format!("{language}: {claim}");
+        goals.push(equal(spec.float, name(language, part), claim, pairs, &[]));
+    };
+    let observed = emitted.observe(state, &given.measurement)?;
+    let observation = evaluated.observations.first().map_or(&[][..], Vec::as_slice);
+    let pairs = list("observation", &observed, observation, float);
+    add(
+        "observe",
+        "`observe` gives the observation that `eval` gives to the network",
+        &pairs,
+    );
+    let pairs = state_pairs(spec, &emitted.init(state)?, &spec::initial(spec, state));
+    add("init", "`init` leaves the state of section 1", &pairs);
+    let pairs = state_pairs(spec, &emitted.reset(state)?, &spec::reset(spec, state));
+    add("reset", "`reset` leaves the same, but keeps the coefficients", &pairs);
+    if state.coefficients.is_empty() {
+        return Ok(());
+    }
+    let new = ["new_a", "new_b", "new_c", "new_r"].iter().zip(&state.coefficients);
+    let new: Vec<Term> = new
+        .map(|(name, _)| spec.terms.input(name, spec.float.width()))
+        .collect();
+    let (after, said) = emitted.set_mapping(state, &new)?;
+    let accepted = spec::accepted(spec, &new);
+    let mut specified = state.clone();
+    for (old, new) in specified.coefficients.iter_mut().zip(&new) {
+        *old = spec.terms.choose(accepted, *new, *old);
+    }
+    let mut pairs = state_pairs(spec, &after, &specified);
+    pairs.push(pair("accepted", said, spec.terms.number(accepted, 32), U32));
+    let text = "`set_mapping` takes exactly the coefficients that section 8 accepts, and changes nothing else";
+    add("set_mapping", text, &pairs);
+    Ok(())
+}

@@ -1,0 +1,71 @@
+//! Shows by SMT that the emitted C and Rust do what the contract says.
+
+mod c;
+mod emitted;
+mod facts;
+mod float;
+mod goal;
+mod goals;
+mod helpers;
+mod machine;
+mod refusal;
+mod run;
+mod rust;
+mod smt;
+mod solver;
+mod spec;
+mod term;
+
+use policy::Policy;
+
+pub use goal::Goal;
+pub use refusal::Refusal;
+pub use run::{Claim, Options, Verdict, run};
+pub use solver::Solver;
+
+use emitted::Emitted;
+use spec::Spec;
+use term::Terms;
+
+/// A file of the emitted code.
+#[derive(Debug, Clone, Copy)]
+pub struct Source<'a> {
+    /// Name, for messages.
+    pub name: &'a str,
+    /// Its text.
+    pub text: &'a str,
+}
+
+/// The emitted code that is judged; what is `None` has no goals.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Sources<'a> {
+    /// Header and source of the C core.
+    pub c: Option<(Source<'a>, Source<'a>)>,
+    /// The Rust core.
+    pub rust: Option<Source<'a>>,
+}
+
+/// All goals of a policy and its emitted code.
+///
+/// # Errors
+/// Code that is outside of the subset that is read: nothing is claimed then.
+pub fn goals(policy: &Policy, sources: &Sources<'_>) -> Result<Vec<Goal>, Refusal> {
+    let terms = Terms::default();
+    let spec = Spec::new(policy, &terms);
+    let mut all = facts::goals(spec);
+    if let Some((header, source)) = sources.c {
+        let unit = c::Unit::read((header.name, header.text), (source.name, source.text), None)?;
+        all.extend(of(spec, &c::C { spec, unit })?);
+    }
+    if let Some(source) = sources.rust {
+        let unit = rust::Unit::read(source.name, source.text)?;
+        all.extend(of(spec, &rust::Rust { spec, unit })?);
+    }
+    Ok(all)
+}
+
+fn of(spec: Spec<'_>, emitted: &dyn Emitted) -> Result<Vec<Goal>, Refusal> {
+    let mut all = helpers::goals(spec, emitted)?;
+    all.extend(goals::of(spec, emitted)?);
+    Ok(all)
+}

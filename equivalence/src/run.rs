@@ -1,0 +1,169 @@
+//! Goals to a solver, several at a time, and what it answers in words.
+
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use policy::Scalar;
+
+use crate::goal::{Goal, Shown};
+use crate::machine::Kind;
+use crate::solver::{Silence, Solver};
+
+/// What became of a goal.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Verdict {
+    /// No state and no measurement contradicts the claim.
+    Proved,
+    /// A state and a measurement that contradict it, one value a line. Rounded operations are chosen by the solver: where the numbers
+    /// of the model are not those of IEEE 754, the claim hangs on a property of rounding that was not assumed.
+    Refuted(Vec<String>),
+    /// No answer, and why.
+    Unknown(String),
+    /// The solver was not asked, and why.
+    NotRun(String),
+}
+
+/// A goal with its verdict.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Claim {
+    /// [`Goal::name`]
+    pub name: String,
+    /// [`Goal::claim`]
+    pub claim: String,
+    /// What became of it.
+    pub verdict: Verdict,
+    /// Wall time of the solver, s.
+    pub seconds: f64,
+    /// Name and version of the solver.
+    pub solver: String,
+}
+
+/// How goals are run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Options {
+    /// Time for one goal.
+    pub limit: Duration,
+    /// Solvers at a time.
+    pub parallel: usize,
+}
+
+impl Default for Options {
+    /// A minute a goal, two at a time.
+    fn default() -> Self {
+        Options {
+            // the slowest goal of the examples takes a fiftieth of it
+            limit: Duration::from_secs(60),
+            parallel: 2,
+        }
+    }
+}
+
+/// Asks the solver about every goal. `done` hears of each as it is decided, in any order; the answer is in the order of the goals.
+/// When `interrupt` becomes true the running solvers are ended, and what is left is [`Verdict::NotRun`].
+pub fn run(
+    goals: &[Goal],
+    solver: &Solver,
+    options: Options,
+    interrupt: &AtomicBool,
+    mut done: impl FnMut(&Claim),
+) -> Vec<Claim> {
+    let next = AtomicUsize::new(0);
+    let mut claims: Vec<Option<Claim>> = vec![None; goals.len()];
+    thread::scope(|scope| {
+        let (answers, heard) = mpsc::channel();
+        for _ in 0..options.parallel.max(1) {
+            let (answers, next) = (answers.clone(), &next);
+            scope.spawn(move || {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(goal) = goals.get(index) else { return };
+                    if answers
+                        .send((index, decide(goal, solver, options.limit, interrupt)))
+                        .is_err()
+                    {
+                        return;
+                    }
+                }
+            });
+        }
+        drop(answers);
+        for (index, claim) in heard {
+            done(&claim);
+            claims[index] = Some(claim);
+        }
+    });
+    claims.into_iter().flatten().collect()
+}
+
+fn decide(goal: &Goal, solver: &Solver, limit: Duration, interrupt: &AtomicBool) -> Claim {
+    let start = Instant::now();
+    let verdict = match interrupt.load(Ordering::Relaxed) {
+        true => Verdict::NotRun("interrupted".into()),
+        false => verdict(goal, solver, limit, interrupt),
+    };
+    Claim {
+        name: goal.name.clone(),
+        claim: goal.claim.clone(),
+        verdict,
+        seconds: start.elapsed().as_secs_f64(),
+        solver: solver.title(),
+    }
+}
+
+fn verdict(goal: &Goal, solver: &Solver, limit: Duration, interrupt: &AtomicBool) -> Verdict {
+    let answer = match solver.ask(&goal.text, limit, interrupt) {
+        Ok(answer) => answer,
+        Err(Silence::TimeOut) => return Verdict::Unknown(format!("no answer within {} s", limit.as_secs_f64())),
+        Err(Silence::Interrupted) => return Verdict::NotRun("interrupted".into()),
+        Err(Silence::Failed(why)) => return Verdict::Unknown(format!("the solver failed: {why}")),
+    };
+    match answer.split_whitespace().next() {
+        Some("unsat") => Verdict::Proved,
+        Some("sat") => Verdict::Refuted(model(goal, solver, limit, interrupt)),
+        _ => Verdict::Unknown(format!("the solver says: {}", answer.trim())),
+    }
+}
+
+/// A second run with a question behind it: a pipe that is not answered line by line suits every solver.
+fn model(goal: &Goal, solver: &Solver, limit: Duration, interrupt: &AtomicBool) -> Vec<String> {
+    let mut text = goal.text.clone();
+    for shown in &goal.shown {
+        text.push_str(&format!("(get-value ({}))\n", shown.term));
+    }
+    let Ok(answer) = solver.ask(&text, limit, interrupt) else {
+        return vec!["the solver gave no model".into()];
+    };
+    let values = answer.lines().skip(1).filter_map(value);
+    goal.shown
+        .iter()
+        .zip(values)
+        .map(|(shown, bits)| in_words(shown, bits))
+        .collect()
+}
+
+/// The value in `((name #x3f800000))`.
+fn value(line: &str) -> Option<u64> {
+    let text = line.trim().trim_end_matches(')');
+    let text = text.rsplit([' ', '(']).next()?;
+    match text {
+        "true" => Some(1),
+        "false" => Some(0),
+        _ => match text.split_at_checked(2)? {
+            ("#x", digits) => u64::from_str_radix(digits, 16).ok(),
+            ("#b", digits) => u64::from_str_radix(digits, 2).ok(),
+            _ => None,
+        },
+    }
+}
+
+fn in_words(shown: &Shown, bits: u64) -> String {
+    let label = &shown.label;
+    match shown.kind {
+        Kind::Float(Scalar::F32) => format!("{label} = {:?} (0x{bits:08X})", f32::from_bits(bits as u32)),
+        Kind::Float(Scalar::F64) => format!("{label} = {:?} (0x{bits:016X})", f64::from_bits(bits)),
+        Kind::Integer { bits: 32, signed: true } => format!("{label} = {}", bits as u32 as i32),
+        _ => format!("{label} = {bits}"),
+    }
+}

@@ -1,0 +1,151 @@
+//! The items of the emitted Rust by their names.
+
+use std::collections::BTreeMap;
+
+use syn::spanned::Spanned;
+use syn::{Expr, Fields, FnArg, ImplItem, Item, ItemStruct, Pat, ReturnType, Signature, Type};
+
+use crate::machine::{I32, Kind, U32, U64, Wrong};
+use crate::refusal::Refusal;
+
+/// A function or method: parameters without the receiver, and its block.
+#[derive(Clone)]
+pub(crate) struct Function {
+    pub has_self: bool,
+    pub parameters: Vec<(Pat, Type)>,
+    pub result: Option<Type>,
+    pub body: syn::Block,
+}
+
+pub(crate) struct Unit {
+    pub file: String,
+    pub functions: BTreeMap<String, Function>,
+    /// Constants and statics: type and value.
+    pub constants: BTreeMap<String, (Type, Expr)>,
+    /// Members of each record, with their types.
+    pub records: BTreeMap<String, BTreeMap<String, Type>>,
+}
+
+impl Unit {
+    pub(crate) fn read(file: &str, text: &str) -> Result<Self, Refusal> {
+        let parsed = syn::parse_file(text)
+            .map_err(|error| Refusal::at(file, error.span().start().line, format!("no Rust: {error}")))?;
+        let mut unit = Unit {
+            file: file.to_owned(),
+            functions: BTreeMap::new(),
+            constants: BTreeMap::new(),
+            records: BTreeMap::new(),
+        };
+        for item in &parsed.items {
+            unit.item("", item);
+        }
+        Ok(unit)
+    }
+
+    /// Names inside of a module or of `Controller` are written as they are called: `status::HELD`, `Self::new`.
+    fn item(&mut self, prefix: &str, item: &Item) {
+        let named = |ident: &syn::Ident| format!("{prefix}{ident}");
+        match item {
+            Item::Fn(function) => {
+                let read = function_of(&function.sig, &function.block);
+                self.functions.insert(named(&function.sig.ident), read);
+            }
+            Item::Const(item) => {
+                self.constants
+                    .insert(named(&item.ident), ((*item.ty).clone(), (*item.expr).clone()));
+            }
+            Item::Static(item) => {
+                self.constants
+                    .insert(named(&item.ident), ((*item.ty).clone(), (*item.expr).clone()));
+            }
+            Item::Struct(item) => self.record(item),
+            Item::Mod(module) => {
+                let inner = format!("{}::", named(&module.ident));
+                for item in module.content.iter().flat_map(|(_, items)| items) {
+                    self.item(&inner, item);
+                }
+            }
+            // what implements a trait is called under the trait's name, which no step does
+            Item::Impl(item) if is_controller(&item.self_ty) && item.trait_.is_none() => {
+                for item in &item.items {
+                    if let ImplItem::Fn(function) = item {
+                        let read = function_of(&function.sig, &function.block);
+                        self.functions.insert(format!("Self::{}", function.sig.ident), read);
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn record(&mut self, item: &ItemStruct) {
+        let Fields::Named(fields) = &item.fields else { return };
+        let named = fields
+            .named
+            .iter()
+            .filter_map(|field| Some((field.ident.as_ref()?.to_string(), field.ty.clone())));
+        self.records.insert(item.ident.to_string(), named.collect());
+    }
+}
+
+fn is_controller(of: &Type) -> bool {
+    matches!(of, Type::Path(path) if path.path.is_ident("Controller"))
+}
+
+fn function_of(signature: &Signature, body: &syn::Block) -> Function {
+    let typed = signature.inputs.iter().filter_map(|input| match input {
+        FnArg::Typed(typed) => Some(((*typed.pat).clone(), (*typed.ty).clone())),
+        FnArg::Receiver(_) => None,
+    });
+    Function {
+        has_self: signature.receiver().is_some(),
+        parameters: typed.collect(),
+        result: match &signature.output {
+            ReturnType::Type(_, of) => Some((**of).clone()),
+            ReturnType::Default => None,
+        },
+        body: body.clone(),
+    }
+}
+
+/// The scalar of a type, or of what it holds: an array and a reference give a literal inside of them its type.
+pub(crate) fn kind_of(of: &Type) -> Option<Kind> {
+    match of {
+        Type::Array(array) => kind_of(&array.elem),
+        Type::Reference(reference) => kind_of(&reference.elem),
+        Type::Slice(slice) => kind_of(&slice.elem),
+        Type::Paren(inner) => kind_of(&inner.elem),
+        Type::Path(path) => scalar(&path.path.get_ident()?.to_string()),
+        _ => None,
+    }
+}
+
+/// The scalar of that name. An index is a number of 64 bits here: no step computes with one.
+pub(crate) fn scalar(name: &str) -> Option<Kind> {
+    Some(match name {
+        "f32" => Kind::Float(policy::Scalar::F32),
+        "f64" => Kind::Float(policy::Scalar::F64),
+        "u32" => U32,
+        "i32" => I32,
+        "u64" | "usize" => U64,
+        "i64" => Kind::Integer { bits: 64, signed: true },
+        "i16" => Kind::Integer { bits: 16, signed: true },
+        "u16" => Kind::Integer {
+            bits: 16,
+            signed: false,
+        },
+        "bool" => Kind::Truth,
+        _ => return None,
+    })
+}
+
+/// Segments of a path, joined.
+pub(crate) fn joined(path: &syn::Path) -> String {
+    let segments = path.segments.iter().map(|segment| segment.ident.to_string());
+    segments.collect::<Vec<_>>().join("::")
+}
+
+/// `what` with its line.
+pub(crate) fn at(node: &impl Spanned, what: impl Into<Wrong>) -> (usize, Wrong) {
+    (node.span().start().line, what.into())
+}

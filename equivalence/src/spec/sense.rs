@@ -1,0 +1,115 @@
+//! Sections 2 to 5: from a measurement to the observation.
+
+use policy::{Expr, Input};
+
+use super::filter::filter;
+use super::{Spec, State};
+use crate::term::Term;
+
+/// What a step knows before the network runs.
+pub(crate) struct Sensed {
+    pub sound: Term,
+    pub all_valid: Term,
+    pub signals: Vec<Term>,
+    pub bad: Term,
+    pub usable: Term,
+    pub primed: Term,
+    pub observation: Vec<Term>,
+    pub clipped: Term,
+    /// The filters' lines as `commit` leaves them in a sound state.
+    pub pushed: Vec<Vec<Vec<Term>>>,
+}
+
+/// Any measurement: a number of the format per physical signal, a code of 32 bits per ADC signal.
+pub(crate) fn measurement(spec: Spec<'_>) -> Vec<Term> {
+    let width = |adc: bool| if adc { 32 } else { spec.float.width() };
+    let word = |signal: &policy::Signal| {
+        let start = if signal.adc.is_some() { "code" } else { "measurement" };
+        spec.terms
+            .input(&format!("{start}_{}", signal.name), width(signal.adc.is_some()))
+    };
+    spec.policy.signals.iter().map(word).collect()
+}
+
+pub(crate) fn sense(spec: Spec<'_>, state: &State, measurement: &[Term]) -> Sensed {
+    let (terms, float) = (spec.terms, spec.float);
+    let (mut valid, mut signals) = (Vec::new(), Vec::new());
+    for ((signal, word), held) in spec.policy.signals.iter().zip(measurement).zip(&state.held) {
+        let x = match signal.adc {
+            Some(adc) => {
+                let scaled = float.mul(spec.nearest(adc.gain), float.of_i32(*word));
+                float.add(scaled, spec.nearest(adc.offset))
+            }
+            None => *word,
+        };
+        let (low, high) = spec.inwards(signal.range);
+        let inside = float.within(x, low, high);
+        valid.push(inside);
+        signals.push(terms.choose(inside, x, *held));
+    }
+    let all_valid = terms.all(valid.iter().copied());
+    let count = state.bad_count;
+    let counts = terms.order("bvule", count, spec.counter(spec.hold()));
+    let raised = terms.choose(counts, terms.binary("bvadd", count, spec.counter(1)), count);
+    let bad = terms.choose(all_valid, spec.counter(0), raised);
+    let expired = terms.order("bvult", spec.counter(spec.hold()), bad);
+    let primed = state.is_primed(spec);
+    let bridged = terms.and(primed, terms.not(expired));
+    let sound = state.sound(spec);
+    let usable = terms.and(sound, terms.or(all_valid, bridged));
+    let mut sensed = Sensed {
+        sound,
+        all_valid,
+        signals,
+        bad,
+        usable,
+        primed,
+        observation: Vec::new(),
+        clipped: terms.truth(false),
+        pushed: Vec::new(),
+    };
+    observe(spec, state, &mut sensed);
+    sensed
+}
+
+fn observe(spec: Spec<'_>, state: &State, sensed: &mut Sensed) {
+    let (terms, float) = (spec.terms, spec.float);
+    for (feature, lines) in spec.policy.features.iter().zip(&state.memories) {
+        let mut y = source(spec, &feature.source, state, &sensed.signals);
+        let mut pushed = Vec::new();
+        for (each, line) in feature.filters.iter().zip(lines) {
+            let filtered = filter(spec, each, line, sensed.primed, y);
+            y = filtered.y;
+            pushed.push(filtered.words);
+        }
+        sensed.pushed.push(pushed);
+        if feature.scale != 1.0 {
+            y = float.mul(y, spec.nearest(feature.scale));
+        }
+        if feature.offset != 0.0 {
+            y = float.add(y, spec.nearest(feature.offset));
+        }
+        if let Some(clip) = feature.clip {
+            let (low, high) = spec.ends(clip);
+            sensed.clipped = terms.or(sensed.clipped, float.outside(y, low, high));
+            y = float.clamp(y, low, high);
+        }
+        sensed.observation.push(y);
+    }
+}
+
+/// Section 3: every `+`, `-` and product with a constant is one rounding, as the tree stands.
+fn source(spec: Spec<'_>, expr: &Expr, state: &State, signals: &[Term]) -> Term {
+    let float = spec.float;
+    let of = |x: &Expr| source(spec, x, state, signals);
+    match expr {
+        Expr::Input(Input::Signal(index)) => signals[*index],
+        Expr::Input(Input::PreviousDuty) => state.previous_duty,
+        Expr::Input(Input::PreviousCommand) => state.previous_command,
+        Expr::Constant(value) => spec.nearest(*value),
+        Expr::Neg(x) => float.neg(of(x)),
+        Expr::Add(x, y) => float.add(of(x), of(y)),
+        Expr::Sub(x, y) => float.sub(of(x), of(y)),
+        Expr::Scale(by, x) => float.mul(of(x), spec.nearest(*by)),
+    }
+}

@@ -1,0 +1,197 @@
+//! Section 1: the state, which states are sound, and what `init` and `reset` leave. Section 8: coefficients set at run time.
+
+use policy::{Expr, Feature, Filter, Input, Mapping, memory_bounds};
+
+use super::Spec;
+use crate::term::Term;
+
+/// The state in the order of section 1.
+#[derive(Clone)]
+pub(crate) struct State {
+    pub held: Vec<Term>,
+    /// By feature, then filter, then word: oldest first.
+    pub memories: Vec<Vec<Vec<Term>>>,
+    pub previous_duty: Term,
+    pub previous_command: Term,
+    pub soft_cap: Option<Term>,
+    /// a, b, c and in the four-term form r; none without a mapping.
+    pub coefficients: Vec<Term>,
+    pub bad_count: Term,
+    pub primed: Term,
+}
+
+impl State {
+    /// Any state of the policy, inside the invariant or not: an input for every word.
+    pub(crate) fn any(spec: Spec<'_>) -> Self {
+        let number = |name: &str| spec.terms.input(name, spec.float.width());
+        let memories = spec.policy.features.iter().enumerate().map(|(f, feature)| {
+            let filters = feature.filters.iter().enumerate().map(|(g, filter)| {
+                let words = (0..words(filter)).map(|w| number(&format!("memory_{f}_{g}_{w}")));
+                words.collect()
+            });
+            filters.collect()
+        });
+        State {
+            held: (0..spec.policy.signals.len())
+                .map(|s| number(&format!("held_{s}")))
+                .collect(),
+            memories: memories.collect(),
+            previous_duty: number("previous_duty"),
+            previous_command: number("previous_command"),
+            soft_cap: spec.policy.limits.soft_start.map(|_| number("soft_cap")),
+            coefficients: coefficients(spec)
+                .iter()
+                .map(|(name, _, _)| number(&format!("mapping_{name}")))
+                .collect(),
+            bad_count: spec.terms.input("bad_count", 32),
+            primed: spec.terms.input("primed", 32),
+        }
+    }
+
+    /// The lowest bit of the word (section 2).
+    pub(crate) fn is_primed(&self, spec: Spec<'_>) -> Term {
+        let one = spec.counter(1);
+        spec.terms.equal(spec.terms.binary("bvand", self.primed, one), one)
+    }
+
+    /// Whether the state is one that the controller writes.
+    pub(crate) fn sound(&self, spec: Spec<'_>) -> Term {
+        let (terms, float) = (spec.terms, spec.float);
+        let mut all = Vec::new();
+        for (held, signal) in self.held.iter().zip(&spec.policy.signals) {
+            let (low, high) = spec.inwards(signal.range);
+            all.push(float.within(*held, low, high));
+        }
+        let memories = self.memories.iter().flatten().flatten();
+        for (word, bound) in memories.zip(memory_bounds(spec.policy)) {
+            all.push(float.within(*word, spec.nearest(-bound), spec.nearest(bound)));
+        }
+        let limits = &spec.policy.limits;
+        let start = [limits.initial_duty, spec.policy.fallback.duty].map(|duty| spec.format().nearest(duty));
+        if reads(spec, Input::PreviousDuty) {
+            let actions = spec
+                .policy
+                .actions
+                .iter()
+                .map(|action| spec.format().nearest(action.duty));
+            all.push(between(spec, self.previous_duty, actions.chain(start)));
+        }
+        let range = [spec.format().up(limits.duty.low), spec.format().down(limits.duty.high)];
+        if reads(spec, Input::PreviousCommand) || limits.slew.is_some() {
+            all.push(between(spec, self.previous_command, range.into_iter().chain(start)));
+        }
+        if let Some((cap, (low, high))) = self.soft_cap.zip(spec.soft_range()) {
+            all.push(float.within(cap, low, high));
+        }
+        all.push(accepted(spec, &self.coefficients));
+        all.push(terms.order("bvule", self.bad_count, spec.counter(spec.hold() + 1)));
+        all.push(terms.order("bvule", self.primed, spec.counter(1)));
+        terms.all(all)
+    }
+}
+
+/// Words of a filter's memory (section 4).
+fn words(filter: &Filter) -> usize {
+    match *filter {
+        Filter::Delay { samples } => samples,
+        Filter::MovingAverage { samples } => samples - 1,
+        Filter::FilteredDerivative { .. } => 2,
+        Filter::BackwardDifference | Filter::LowPass { .. } | Filter::Integrator { .. } => 1,
+    }
+}
+
+fn between(spec: Spec<'_>, x: Term, values: impl Iterator<Item = f64>) -> Term {
+    let ends = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+        (low.min(v), high.max(v))
+    });
+    spec.float
+        .within(x, spec.float.constant(ends.0), spec.float.constant(ends.1))
+}
+
+/// Whether any source reads `input`.
+fn reads(spec: Spec<'_>, input: Input) -> bool {
+    fn in_tree(expr: &Expr, input: Input) -> bool {
+        match expr {
+            Expr::Input(found) => *found == input,
+            Expr::Constant(_) => false,
+            Expr::Neg(x) | Expr::Scale(_, x) => in_tree(x, input),
+            Expr::Add(x, y) | Expr::Sub(x, y) => in_tree(x, input) || in_tree(y, input),
+        }
+    }
+    let features: &[Feature] = &spec.policy.features;
+    features.iter().any(|feature| in_tree(&feature.source, input))
+}
+
+/// Name, value and allowed interval of every coefficient of the mapping; nothing without one.
+fn coefficients(spec: Spec<'_>) -> Vec<(&'static str, f64, policy::Interval)> {
+    let Some(mapping) = &spec.policy.mapping else {
+        return Vec::new();
+    };
+    let Mapping { coefficients: k, .. } = mapping;
+    let mut all = vec![
+        ("a", k.a, mapping.adjust_a),
+        ("b", k.b, mapping.adjust_b),
+        ("c", k.c, mapping.adjust_c),
+    ];
+    all.extend(k.r.map(|r| ("r", r, mapping.adjust_r)));
+    all
+}
+
+/// Section 8: whether coefficients are accepted at run time. True without a mapping.
+pub(crate) fn accepted(spec: Spec<'_>, values: &[Term]) -> Term {
+    let float = spec.float;
+    let mut all = Vec::new();
+    for (value, (_, _, range)) in values.iter().zip(coefficients(spec)) {
+        let (low, high) = spec.inwards(range);
+        all.push(float.within(*value, low, high));
+    }
+    if let (Some(mapping), [a, _, _, r]) = (&spec.policy.mapping, values) {
+        for end in [mapping.valid_i_out.low, mapping.valid_i_out.high] {
+            let gain = float.add(*a, float.mul(*r, spec.nearest(end)));
+            all.push(float.gt(gain, spec.zero()));
+        }
+    }
+    spec.terms.all(all)
+}
+
+/// The state after `reset`, which keeps the coefficients of the state before.
+pub(crate) fn reset(spec: Spec<'_>, before: &State) -> State {
+    let limits = &spec.policy.limits;
+    let held = spec.policy.signals.iter().map(|signal| {
+        let (low, high) = (
+            spec.format().up(signal.range.low),
+            spec.format().down(signal.range.high),
+        );
+        // the value of the range nearest to 0; a +0 where the range has it inside
+        let nearest = if low > 0.0 {
+            low
+        } else if high < 0.0 {
+            high
+        } else {
+            0.0
+        };
+        spec.float.constant(nearest)
+    });
+    let zeros = |filters: &Vec<Vec<Term>>| filters.iter().map(|words| vec![spec.zero(); words.len()]).collect();
+    State {
+        held: held.collect(),
+        memories: before.memories.iter().map(zeros).collect(),
+        previous_duty: spec.nearest(limits.initial_duty),
+        previous_command: spec.nearest(limits.initial_duty),
+        soft_cap: limits.soft_start.map(|start| spec.nearest(start.from)),
+        coefficients: before.coefficients.clone(),
+        bad_count: spec.counter(0),
+        primed: spec.counter(0),
+    }
+}
+
+/// The state after `init`: the coefficients are those of the file.
+pub(crate) fn initial(spec: Spec<'_>, before: &State) -> State {
+    State {
+        coefficients: coefficients(spec)
+            .iter()
+            .map(|(_, value, _)| spec.nearest(*value))
+            .collect(),
+        ..reset(spec, before)
+    }
+}

@@ -1,0 +1,128 @@
+//! Defects planted in emitted code: each is refuted by the goal that is about it.
+
+use equivalence::Verdict;
+
+use super::{Code, load, run, solver};
+
+/// Where a defect is planted.
+#[derive(Clone, Copy)]
+enum In {
+    C,
+    Rust,
+}
+
+struct Defect {
+    policy: &'static str,
+    language: In,
+    what: &'static str,
+    /// The text, once in the file, and what it becomes.
+    edit: (&'static str, &'static str),
+    /// The goal that has to be refuted.
+    goal: &'static str,
+}
+
+const ADC: &str = "tests/golden/cases/adc_mapping";
+const FILTERS: &str = "tests/golden/cases/filters";
+
+const fn c(policy: &'static str, what: &'static str, edit: (&'static str, &'static str), goal: &'static str) -> Defect {
+    Defect {
+        policy,
+        language: In::C,
+        what,
+        edit,
+        goal,
+    }
+}
+
+const fn rust(
+    policy: &'static str,
+    what: &'static str,
+    edit: (&'static str, &'static str),
+    goal: &'static str,
+) -> Defect {
+    Defect {
+        policy,
+        language: In::Rust,
+        what,
+        edit,
+        goal,
+    }
+}
+
+/// One a language and kind first: a plain run takes the first of them.
+#[rustfmt::skip]
+const DEFECTS: [Defect; 37] = [
+    c(ADC, "argmax inverted", ("output > best", "output < best"), "c.action_index"),
+    rust(ADC, "tie to the highest index", ("*q > best", "*q >= best"), "rust.action_index"),
+    c(ADC, "off by one in the bad count", ("state->bad_count <= 4u", "state->bad_count <= 5u"), "c.commit.counters"),
+    rust(ADC, "stale held samples", ("self.held = front.signal;", ""), "rust.commit.held"),
+    c(FILTERS, "filter coefficient", ("v15 * 0.04761905f", "v15 * 0.0476191f"), "c.observation"),
+    rust(FILTERS, "line one word too short", (".take(20).rev()", ".take(19).rev()"), "rust.commit.memory"),
+    c(ADC, "missing clip", ("adc_mapping_clamp(v10, -4.0f, 4.0f)", "v10"), "c.observation"),
+    c(ADC, "tie to the highest index", ("output > best", "output >= best"), "c.action_index"),
+    c(ADC, "wrong status bit", ("front->clipped << 3", "front->clipped << 4"), "c.status"),
+    c(ADC, "limits swapped", ("adc_mapping_clamp(v16, 0.05f, 0.9f)", "adc_mapping_clamp(v16, 0.9f, 0.05f)"), "c.duty"),
+    c(ADC, "sign of the slew limit", ("state->previous_command - 0.02f", "state->previous_command + 0.02f"), "c.duty"),
+    c(ADC, "mapping coefficients exchanged", ("state->mapping_b * front", "state->mapping_r * front"), "c.duty"),
+    c(ADC, "stale previous duty", ("state->previous_duty = command->duty_sim", "state->previous_duty = state->previous_duty"), "c.commit.remembered"),
+    c(ADC, "fallback missing", ("adc_mapping_select(usable, v17, 0.0f)", "v17"), "c.duty"),
+    c(ADC, "soft start goes on after a fallback", ("adc_mapping_select(front->usable, v2, 0.1f)", "v2"), "c.commit.soft_cap"),
+    c(ADC, "damaged state not marked", ("(front->usable + (uint32_t)2) - (front->sound << 1)", "front->usable"), "c.commit.counters"),
+    c(ADC, "a coefficient not guarded", ("| adc_mapping_far(state->mapping_r, 0x3C23D70Au)", ""), "c.status"),
+    c(ADC, "coefficient accepted too far", ("adc_mapping_within(a, 0.8f, 1.25f)", "adc_mapping_within(a, 0.8f, 1.5f)"), "c.set_mapping"),
+    c(ADC, "sign of a coefficient at the start", ("state->mapping_b = -0.0015f", "state->mapping_b = 0.0015f"), "c.init"),
+    c(FILTERS, "wrong feature order", ("front->observation[0] = v8;", "front->observation[0] = v13;"), "c.observation"),
+    c(FILTERS, "delay one period too short", ("state->memory[0], v5)", "state->memory[1], v5)"), "c.observation"),
+    c(FILTERS, "line not moved", ("state->memory[i] = filters_select(primed, state->memory[i + 1u], push0)", "state->memory[i] = filters_select(primed, state->memory[i], push0)"), "c.commit.memory"),
+    rust(ADC, "missing clip", ("clamp(v10, -4.0, 4.0)", "v10"), "rust.observation"),
+    rust(ADC, "argmax inverted", ("*q > best", "*q < best"), "rust.action_index"),
+    rust(ADC, "wrong status bit", ("(front.held << 0)", "(front.held << 1)"), "rust.status"),
+    rust(ADC, "off by one in the bad count", ("flag(self.bad_count <= 4)", "flag(self.bad_count < 4)"), "rust.commit.counters"),
+    rust(ADC, "limits swapped", ("clamp(v16, 0.05, 0.9)", "clamp(v16, 0.9, 0.05)"), "rust.duty"),
+    rust(ADC, "sign of the slew limit", ("self.previous_command - 0.02", "self.previous_command + 0.02"), "rust.duty"),
+    rust(ADC, "mapping coefficients exchanged", ("self.mapping_a * chosen", "self.mapping_c * chosen"), "rust.duty"),
+    rust(ADC, "duty before the mapping remembered as the command", ("self.previous_command = command.duty;", "self.previous_command = command.duty_sim;"), "rust.commit.remembered"),
+    rust(ADC, "fallback missing", ("select(usable, chosen, 0.0)", "chosen"), "rust.duty_sim"),
+    rust(ADC, "index of a damaged state", ("action_index & 0_u32.wrapping_sub(trusted)", "action_index"), "rust.action_index"),
+    rust(ADC, "held one period too short", ("flag(bad_count <= 4)", "flag(bad_count <= 3)"), "rust.status"),
+    rust(ADC, "counters not guarded", ("((stray | counters) >> 31)", "(stray >> 31)"), "rust.status"),
+    rust(ADC, "reset forgets a coefficient", ("mapping_a: self.mapping_a,", ""), "rust.reset"),
+    rust(FILTERS, "limit of an integrator", ("clamp(v37, -0.5, 0.75)", "clamp(v37, -0.75, 0.75)"), "rust.observation"),
+    rust(FILTERS, "the newest sample left out of a mean", ("sum + newest", "sum"), "rust.observation"),
+];
+
+impl Defect {
+    fn is_refuted(&self) -> Verdict {
+        let Some(solver) = solver() else {
+            return Verdict::NotRun("no solver".into());
+        };
+        let policy = load(self.policy);
+        let mut code = Code::of(&policy);
+        let text = match self.language {
+            In::C => &mut code.c,
+            In::Rust => &mut code.rust,
+        };
+        let (from, to) = self.edit;
+        assert_eq!(text.matches(from).count(), 1, "{}: `{from}` is there once", self.what);
+        *text = text.replace(from, to);
+        let goals: Vec<_> = code
+            .goals(&policy)
+            .into_iter()
+            .filter(|goal| goal.name == self.goal)
+            .collect();
+        assert_eq!(goals.len(), 1, "{}: the goal {}", self.what, self.goal);
+        run(&goals, &solver).remove(0).verdict
+    }
+}
+
+#[test]
+fn every_planted_defect_is_refuted() {
+    let count = if tests::full() { DEFECTS.len() } else { 6 };
+    for defect in &DEFECTS[..count] {
+        match defect.is_refuted() {
+            Verdict::Refuted(model) => assert!(model.len() > 1, "{}: a counterexample in words", defect.what),
+            Verdict::NotRun(_) => return,
+            other => panic!("{} in {}: {other:?}", defect.what, defect.goal),
+        }
+    }
+}

@@ -43,17 +43,26 @@ const OTHER_STEP: f64 = 0.25;
 /// The states: inductance current, capacitor voltage, cable, load, source, four low-passes.
 pub(crate) type States = [f64; STATES];
 
-/// What the inductor is connected to: `v_sw = share v_in + emf - r i`.
+/// What the inductor is connected to: `v_l = share v_in + emf - r i - give v_out`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Path {
     /// How much of the inductor current the source delivers: 1, 0, or the duty of the averaged model.
     pub share: f64,
+    /// How much of the inductor current the output receives: 1, 0, or its mean. The output's voltage stands against the
+    /// inductor in the same share, since what the inductor loses the output gains.
+    #[serde(default = "all")]
+    pub give: f64,
     pub emf: f64,
     pub r: f64,
     /// The sign of current a diode lets through: 1 or -1; 0 for both.
     pub only: f64,
     /// No current.
     pub open: bool,
+}
+
+/// A state stored before there was a share: the output received all of the current.
+fn all() -> f64 {
+    1.0
 }
 
 /// The circuit's constants.
@@ -287,18 +296,22 @@ impl Full {
         let l = p.converter.inductance * saturation::relative_inductance(&p.inductor, x[I_L]);
         let v_source = p.converter.v_in + input_ripple::voltage(&p.source, t);
         let (v_th, r_th) = self.thevenin(x, v_source);
-        let r = path.r + path.share * r_th + dcr::in_series(&p.inductor);
+        let r = path.r + path.share * r_th + dcr::in_series(&p.inductor) + self.apart(path, load);
         let core = p.inductor.core_conductance;
-        // v_l = (drive - v_out) / stretch, i_b = i_l + core v_l; nothing of it while no current flows
+        // v_l = (drive - give v_out) / stretch, i_b = i_l + core v_l; nothing of it while no current flows
         let i_l = if path.open { 0.0 } else { x[I_L] };
         let drive = path.share * v_th + path.emf - r * i_l;
         let stretch = 1.0 + r * core;
         let reflected = match path.open {
             true => 0.0,
-            false => (p.capacitor.esr * core + p.capacitor.esl / l) / stretch,
+            false => path.give * (p.capacitor.esr * core + p.capacitor.esl / l) / stretch,
         };
-        let (v_out, i_out) = self.output(x, load, i_l, reflected, drive);
-        let v_l = if path.open { 0.0 } else { (drive - v_out) / stretch };
+        let (v_out, i_out) = self.output(x, load, path.give, i_l, (reflected, drive));
+        let v_l = if path.open {
+            0.0
+        } else {
+            (drive - path.give * v_out) / stretch
+        };
         let i_b = i_l + core * v_l;
         let v_in = v_th - path.share * r_th * i_b;
         let signals = Signals {
@@ -317,12 +330,25 @@ impl Full {
         algebra
     }
 
+    /// What the averaged model adds to the resistance: the output stands against the inductor while it receives the
+    /// current, and then lies above its mean by the ESR's share of that current.
+    fn apart(&self, path: &Path, load: &Load) -> f64 {
+        let esr = self.p.capacitor.esr;
+        // a load at the terminals takes its part of the jump; a cable's current does not jump
+        let seen = match self.has_cable {
+            true => esr,
+            false => esr / (1.0 + esr * load.conductance),
+        };
+        // 0 in every state of the leg, where `give` is 0 or 1
+        path.give * (1.0 - path.give) * seen
+    }
+
     /// Output voltage and current from
-    /// `v (1 + reflected) + esr i_out(v) = v_c + esr i_l + reflected drive - esl di_out/dt`.
-    fn output(&self, x: &States, load: &Load, i_l: f64, reflected: f64, drive: f64) -> (f64, f64) {
+    /// `v (1 + give reflected) + esr i_out(v) = v_c + esr give i_l + reflected drive - esl di_out/dt`.
+    fn output(&self, x: &States, load: &Load, give: f64, i_l: f64, (reflected, drive): (f64, f64)) -> (f64, f64) {
         let c = &self.p.capacitor;
-        let mut slope = 1.0 + reflected;
-        let mut right = x[V_C] + c.esr * i_l + reflected * drive;
+        let mut slope = 1.0 + give * reflected;
+        let mut right = x[V_C] + c.esr * (give * i_l) + reflected * drive;
         if self.has_cable {
             let cable = &self.p.cable;
             let divided = c.esl / cable.inductance;
@@ -360,7 +386,7 @@ impl Full {
         let (p, s) = (&self.p, a.signals);
         let c = p.converter.capacitance * derating::relative_capacitance(&p.capacitor, x[V_C]);
         a.slopes[I_L] = a.v_l / l;
-        a.slopes[V_C] = (s.i_l - s.i_out) / c;
+        a.slopes[V_C] = (path.give * s.i_l - s.i_out) / c;
         let mut v_load = s.v_out;
         if self.has_cable {
             v_load = x[V_LOAD];

@@ -6,6 +6,10 @@ use crate::gates::Gate;
 use crate::parameters::{Parameters, Rectifier};
 use crate::plain::Drive;
 
+/// Shares of the inductor current that the source delivers and the output receives, with the switch on and off.
+const ON: (f64, f64) = (1.0, 1.0);
+const OFF: (f64, f64) = (0.0, 1.0);
+
 /// The paths of the inductor current, for both integrators.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Legs {
@@ -24,15 +28,17 @@ pub(crate) struct Legs {
 impl Path {
     pub const OPEN: Path = Path {
         share: 0.0,
+        give: 1.0,
         emf: 0.0,
         r: 0.0,
         only: 0.0,
         open: true,
     };
 
-    fn closed(share: f64, emf: f64, r: f64, only: f64) -> Self {
+    fn closed((share, give): (f64, f64), emf: f64, r: f64, only: f64) -> Self {
         Path {
             share,
+            give,
             emf,
             r,
             only,
@@ -45,11 +51,11 @@ impl Legs {
     pub fn new(p: &Parameters) -> Self {
         let s = &p.switch;
         let paths = [
-            Path::closed(1.0, 0.0, s.r_ds_on, 0.0),
-            Path::closed(0.0, 0.0, s.r_ds_on_low, 0.0),
-            Path::closed(0.0, -s.v_f, s.r_d, 1.0),
+            Path::closed(ON, 0.0, s.r_ds_on, 0.0),
+            Path::closed(OFF, 0.0, s.r_ds_on_low, 0.0),
+            Path::closed(OFF, -s.v_f, s.r_d, 1.0),
             // a negative current flows back into the source, through the upper body diode
-            Path::closed(1.0, s.v_f, s.r_d, -1.0),
+            Path::closed(ON, s.v_f, s.r_d, -1.0),
         ];
         let (v_in, dcr) = (p.converter.v_in, dcr::in_series(&p.inductor));
         let drive = |path: &Path| as_drive(path, v_in, dcr);
@@ -92,7 +98,9 @@ impl Legs {
             &self.paths[2]
         };
         let upper = &self.paths[0];
-        Path::closed(on, (1.0 - on) * other.emf, on * upper.r + (1.0 - on) * other.r, 0.0)
+        let mean = |of: fn(&Path) -> f64| on * of(upper) + (1.0 - on) * of(other);
+        let (share, give) = (mean(|path| path.share), mean(|path| path.give));
+        Path::closed((share, give), (1.0 - on) * other.emf, mean(|path| path.r), 0.0)
     }
 
     /// The same path for the circuit of two states.
@@ -108,6 +116,7 @@ fn as_drive(path: &Path, v_in: f64, dcr: f64) -> Drive {
     Drive {
         emf: path.share * v_in + path.emf,
         r: path.r + dcr,
+        give: path.give,
         stops_at_zero: path.only != 0.0,
         open: false,
     }

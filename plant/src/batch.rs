@@ -205,12 +205,12 @@ impl Group {
         // the upper diode has no lane: a current that is not positive makes its lane irregular (`flows` below)
         let off = |p: &Plant| {
             if p.legs.synchronous {
-                p.legs.lower
+                p.legs.second
             } else {
-                p.legs.lower_diode
+                p.legs.diode
             }
         };
-        let (give_on, give_off) = (lane(&|p| p.legs.upper.give), lane(&|p| off(p).give));
+        let (give_on, give_off) = (lane(&|p| p.legs.main.give), lane(&|p| off(p).give));
         Group {
             all: give_on.0.iter().chain(&give_off.0).all(|give| *give == 1.0),
             give_on,
@@ -221,8 +221,8 @@ impl Group {
             longest: lane(&|p| p.plain.longest),
             last_term: lane(&|p| p.plain.last_term),
             v_fold: lane(&|p| p.plain.v_fold),
-            emf_on: lane(&|p| p.legs.upper.emf),
-            r_on: lane(&|p| p.legs.upper.r),
+            emf_on: lane(&|p| p.legs.main.emf),
+            r_on: lane(&|p| p.legs.main.r),
             emf_off: lane(&|p| off(p).emf),
             r_off: lane(&|p| off(p).r),
             diode: lane(&|p| if p.legs.synchronous { 0.0 } else { 1.0 }),

@@ -54,7 +54,8 @@ pub(crate) struct Path {
     pub give: f64,
     pub emf: f64,
     pub r: f64,
-    /// The sign of current a diode lets through: 1 or -1; 0 for both.
+    /// The sign of current a diode lets through: 1 or -1; 0 for both. With an open leg: of a current that may begin; 0 for
+    /// none.
     pub only: f64,
     /// No current.
     pub open: bool,
@@ -140,14 +141,15 @@ impl Full {
     }
 
     /// States at rest around `v_out` and `i_l`.
-    pub fn initial(&self, v_out: f64, i_l: f64, load: &Load) -> States {
+    ///
+    /// `give` is the share of the current that the output receives at that instant.
+    pub fn initial(&self, v_out: f64, i_l: f64, load: &Load, give: f64) -> States {
         let mut x = [0.0; STATES];
         let cpl = self.constant_power(load, v_out);
         let i_out = load.conductance * v_out + load.current + cpl;
         let v_in = self.p.converter.v_in;
-        // power balance of a converter without losses
-        let i_in = i_l * v_out / v_in;
-        let v_c = v_out - self.p.capacitor.esr * (i_l - i_out);
+        let i_in = self.p.converter.topology.i_in(i_l, v_in, v_out);
+        let v_c = v_out - self.p.capacitor.esr * (give * i_l - i_out);
         (x[I_L], x[V_C], x[V_LOAD], x[I_CPL]) = (i_l, v_c, v_out, cpl);
         x[I_CABLE] = i_out;
         x[V_CIN] = v_in - self.p.source.resistance * i_in;
@@ -176,8 +178,8 @@ impl Full {
         self.algebra(x, path, load, t).signals
     }
 
-    /// Advances by `h` seconds from time `t`, or until the current reaches 0 if the path stops there. Returns the time
-    /// used.
+    /// Advances by `h` seconds from time `t`, or until the current reaches 0 if the path stops there, or an open leg
+    /// begins to conduct. Returns the time used.
     pub fn advance(&self, x: &mut States, path: &Path, load: &Load, span: (f64, f64), track: &mut Track) -> f64 {
         let (t, h) = span;
         // a load step changes this rate, so it is not part of `rate`
@@ -196,14 +198,14 @@ impl Full {
             *x = self.step(&start, &before, path, load, t + used, step);
             let mut after = self.algebra(x, path, load, t + used + step);
             let mut length = step;
-            let crossed = path.only != 0.0 && after.signals.i_l * path.only <= 0.0;
+            let crossed = path.only != 0.0 && left(&after, path) <= 0.0;
             // the diode has no current to begin with: no time is used, and the caller goes on with an open leg
-            if crossed && before.signals.i_l * path.only <= 0.0 {
+            if crossed && left(&before, path) <= 0.0 {
                 length = 0.0;
                 *x = start;
                 after = before;
             } else if crossed {
-                length = self.crossing(&start, &before, path, load, (t + used, step), after.signals.i_l);
+                length = self.crossing(&start, &before, path, load, (t + used, step), left(&after, path));
                 *x = self.step(&start, &before, path, load, t + used, length);
                 after = self.algebra(x, path, load, t + used + length);
             }
@@ -227,10 +229,10 @@ impl Full {
         h
     }
 
-    /// When the winding current reaches 0, by the Illinois method.
-    fn crossing(&self, x: &States, a: &Algebra, path: &Path, load: &Load, span: (f64, f64), i_end: f64) -> f64 {
+    /// When nothing is `left` of what keeps the path, by the Illinois method.
+    fn crossing(&self, x: &States, a: &Algebra, path: &Path, load: &Load, span: (f64, f64), end: f64) -> f64 {
         let (t, h) = span;
-        let (mut low, mut high) = ((0.0, a.signals.i_l), (h, i_end));
+        let (mut low, mut high) = ((0.0, left(a, path)), (h, end));
         // a bound alone: the tests take 8 turns at most, and as many halvings end at 1e-12 of the step
         for _ in 0..40 {
             let guess = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
@@ -239,7 +241,7 @@ impl Full {
                 break;
             }
             let state = self.step(x, a, path, load, t, guess);
-            let i = self.algebra(&state, path, load, t + guess).signals.i_l;
+            let i = left(&self.algebra(&state, path, load, t + guess), path);
             if i * high.1 < 0.0 {
                 low = high;
             } else {
@@ -418,6 +420,15 @@ impl Full {
                 a.slopes[SHOWN + n] = (value - x[SHOWN + n]) / self.low_pass[n];
             }
         }
+    }
+}
+
+/// What keeps a path that ends by itself, and is 0 when it does: the current of a diode; of an open leg the voltage that the
+/// diode blocks.
+fn left(a: &Algebra, path: &Path) -> f64 {
+    match path.open {
+        true => a.signals.v_out - (a.signals.v_in + path.emf),
+        false => a.signals.i_l * path.only,
     }
 }
 

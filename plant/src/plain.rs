@@ -52,6 +52,8 @@ pub(crate) struct Drive {
     pub stops_at_zero: bool,
     /// The current is 0 and stays there.
     pub open: bool,
+    /// While it is open: the output voltage below which it is not.
+    pub starts_below: f64,
 }
 
 impl Drive {
@@ -62,6 +64,7 @@ impl Drive {
         give: 1.0,
         stops_at_zero: false,
         open: true,
+        starts_below: f64::NEG_INFINITY,
     };
 }
 
@@ -126,7 +129,8 @@ impl Plain {
         load.conductance * v + load.current + constant
     }
 
-    /// Advances `(i, v)` by `h` seconds, or until the current reaches 0 if the drive stops there. Returns the time used.
+    /// Advances `(i, v)` by `h` seconds, or until the current reaches 0 if the drive stops there, or an open leg begins to
+    /// conduct. Returns the time used.
     #[inline(always)]
     pub fn advance(&self, x: &mut (f64, f64), drive: &Drive, load: &Load, h: f64, track: &mut Track) -> f64 {
         if drive.give != 1.0 {
@@ -224,7 +228,19 @@ impl Plain {
             return None;
         }
         let i_end = sum(&i);
-        if drive.stops_at_zero && i_end * i0 <= 0.0 {
+        if drive.open && v_end < drive.starts_below {
+            let mut above = v;
+            above[0] -= drive.starts_below;
+            let at = zero(&above, above[0] / (v0 - v_end));
+            x.1 = value(&v, at);
+            extremes(&v, at, x.1, track);
+            return Some(if at < 1.0 { at * h } else { h });
+        }
+        // a current that begins at 0 and rises has not crossed it
+        if drive.stops_at_zero && i_end * i0 <= 0.0 && !(i0 == 0.0 && i_end > 0.0) {
+            if i0 == 0.0 {
+                return Some(0.0);
+            }
             let at = zero(&i, i0 / (i0 - i_end));
             *x = (0.0, value(&v, at));
             extremes(&v, at, x.1, track);

@@ -337,12 +337,9 @@ impl Full {
     fn apart(&self, path: &Path, load: &Load) -> f64 {
         let esr = self.p.capacitor.esr;
         // a load at the terminals takes its part of the jump; a cable's current does not jump
-        let seen = match self.has_cable {
-            true => esr,
-            false => esr / (1.0 + esr * load.conductance),
-        };
+        let g = if self.has_cable { 0.0 } else { load.conductance };
         // 0 in every state of the leg, where `give` is 0 or 1
-        path.give * (1.0 - path.give) * seen
+        path.give * (1.0 - path.give) * esr / (1.0 + esr * g)
     }
 
     /// Output voltage and current from

@@ -48,8 +48,7 @@ pub(crate) type States = [f64; STATES];
 pub(crate) struct Path {
     /// How much of the inductor current the source delivers: 1, 0, or the duty of the averaged model.
     pub share: f64,
-    /// How much of the inductor current the output receives: 1, 0, or its mean. The output's voltage stands against the
-    /// inductor in the same share, since what the inductor loses the output gains.
+    /// How much of the current the output receives, and of its voltage stands against the inductor: 1, 0, or a mean.
     #[serde(default = "all")]
     pub give: f64,
     pub emf: f64,
@@ -141,8 +140,7 @@ impl Full {
     }
 
     /// States at rest around `v_out` and `i_l`.
-    ///
-    /// `give` is the share of the current that the output receives at that instant.
+    /// `give` is the output's share of the current then.
     pub fn initial(&self, v_out: f64, i_l: f64, load: &Load, give: f64) -> States {
         let mut x = [0.0; STATES];
         let cpl = self.constant_power(load, v_out);
@@ -336,7 +334,6 @@ impl Full {
     /// current, and then lies above its mean by the ESR's share of that current.
     fn apart(&self, path: &Path, load: &Load) -> f64 {
         let esr = self.p.capacitor.esr;
-        // a load at the terminals takes its part of the jump; a cable's current does not jump
         let g = if self.has_cable { 0.0 } else { load.conductance };
         // 0 in every state of the leg, where `give` is 0 or 1
         path.give * (1.0 - path.give) * esr / (1.0 + esr * g)

@@ -83,6 +83,7 @@ impl Question {
     /// # Errors
     /// If the parameters are not those of a converter, or it cannot rest at `v_ref` with a duty within `range`.
     pub fn new(parameters: &Parameters, v_ref: f64, step: LoadStep, range: [f64; 2]) -> Result<Self, Error> {
+        parameters.require_buck("the physical limit")?;
         let parameters = plain(parameters);
         let [from, to] = step.loads();
         let rest = |load: &Load| -> Result<(Plant, f64), Error> {
@@ -324,6 +325,7 @@ fn plain(parameters: &Parameters) -> Parameters {
 /// # Errors
 /// If the parameters are not those of a converter.
 pub fn averaged(parameters: &Parameters, v_ref: f64, step: LoadStep, range: [f64; 2]) -> Result<f64, Error> {
+    parameters.require_buck("the physical limit")?;
     let mut averaged = plain(parameters);
     averaged.converter.model = Model::Averaged;
     averaged.pwm.duty_delay = 0;

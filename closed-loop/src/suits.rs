@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use plant::Parameters;
+use plant::{Parameters, Topology};
 use policy::Policy;
 use toml_input::{Fault, Message};
 
@@ -31,9 +31,14 @@ pub fn v_ref(given: Option<f64>, policy: &Policy, file: &Path) -> Result<f64, Er
 /// # Errors
 /// If the voltage is out of reach or the control periods differ.
 pub fn suits(policy: &Policy, converter: &Parameters, v_ref: f64, file: &Path) -> Result<(), Error> {
-    let v_in = converter.converter.v_in;
-    if v_ref >= v_in {
-        let message = Message::new("a buck converter cannot hold this voltage")
+    let (v_in, topology) = (converter.converter.v_in, converter.converter.topology);
+    let held = match topology {
+        Topology::Buck => v_ref < v_in,
+        Topology::Boost => v_ref > v_in,
+        Topology::BuckBoost => true,
+    };
+    if !held {
+        let message = Message::new(format!("a {} converter cannot hold this voltage", topology.word()))
             .found(format!("v_ref = {v_ref} V, v_in = {v_in} V at the plant"));
         return Err(Fault::in_file(file, message).into());
     }

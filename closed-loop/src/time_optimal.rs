@@ -45,6 +45,7 @@ impl TimeOptimal {
     /// # Errors
     /// If the parameters are not those of a converter.
     pub fn new(parameters: &Parameters, v_ref: f64, range: [f64; 2]) -> Result<Self, Error> {
+        parameters.require_buck("the time-optimal planner")?;
         let mut parameters = parameters.clone();
         parameters.pwm.duty_delay = 0;
         parameters.sensors = plant::Sensors::default();

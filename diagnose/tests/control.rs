@@ -18,7 +18,7 @@ fn controlled(change: impl Fn(&mut Parameters)) -> Control {
     change(&mut extended);
     let request = Request {
         policy: policy::load(&folder.join("policy/policy.toml")).unwrap(),
-        losses: Losses::of(&trained_on),
+        losses: Losses::of(&trained_on).unwrap(),
         trained_on,
         v_ref: 100.0,
         load_steps: vec![LoadStep {

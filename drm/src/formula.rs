@@ -23,6 +23,7 @@
 use plant::{Model, Parameters, Rectifier};
 use policy::Coefficients;
 use serde::Serialize;
+use toml_input::Faults;
 
 /// What makes a converter differ from `v = d v_in`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -45,8 +46,11 @@ pub struct Losses {
 
 impl Losses {
     /// The losses of a plant, as long as its inductor current is positive throughout the period.
-    #[must_use]
-    pub fn of(plant: &Parameters) -> Self {
+    ///
+    /// # Errors
+    /// Another topology than the buck.
+    pub fn of(plant: &Parameters) -> Result<Self, Faults> {
+        plant.require_buck("the formula of the mapping")?;
         let switch = &plant.switch;
         let lost_duty = (switch.dead_time + switch.turn_on_delay - switch.turn_off_delay) * plant.converter.f_sw;
         let losses = Losses {
@@ -58,20 +62,20 @@ impl Losses {
             ..Losses::none(plant.converter.v_in)
         };
         if plant.converter.rectifier == Rectifier::Diode {
-            return losses;
+            return Ok(losses);
         }
         // the averaged model knows no body diodes; edges that overlap leave them no time
         let in_diodes = match plant.converter.model {
             Model::Switched => 2.0 * lost_duty.max(0.0),
             Model::Averaged => 0.0,
         };
-        Losses {
+        Ok(Losses {
             v_f: 0.0,
             r_d: switch.r_ds_on_low,
             dcr: losses.dcr + in_diodes * (switch.r_d - switch.r_ds_on_low),
             v_dead: in_diodes * switch.v_f,
             ..losses
-        }
+        })
     }
 
     /// A converter without any.
@@ -223,7 +227,7 @@ mod tests {
         (plant.switch.r_ds_on, plant.switch.r_ds_on_low) = (0.02, 0.008);
         (plant.switch.v_f, plant.switch.r_d) = (0.8, 0.05);
         (plant.switch.dead_time, plant.inductor.dcr) = (100e-9, 0.012);
-        let losses = Losses::of(&plant);
+        let losses = Losses::of(&plant).unwrap();
         let boundary = crate::Conduction::of(&plant).unwrap().boundary(12.0, 48.0);
         for i_out in [1.05 * boundary, 5.0, 12.0] {
             let settled = plant::Plant::new(&plant)

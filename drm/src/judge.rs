@@ -133,7 +133,7 @@ pub struct Steady {
 /// Runs the mapping against a known converter: `real` is the bench, `nominal` what the policy was trained on.
 ///
 /// # Errors
-/// If either is no converter.
+/// If either is no converter, or another one than a buck.
 pub fn against_plant(
     map: &DutyRatioMap,
     real: &Parameters,
@@ -142,6 +142,8 @@ pub fn against_plant(
     loads: &[LoadSetting],
     limits: Option<Interval>,
 ) -> Result<Vec<Steady>, PlantFaults> {
+    real.require_buck("the judgement of a mapping")?;
+    nominal.require_buck("the judgement of a mapping")?;
     let (mut bench, mut simulation) = (Plant::new(real)?, Plant::new(nominal)?);
     let steady = loads.iter().map(|setting| {
         let load = setting.load();

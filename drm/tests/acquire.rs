@@ -73,7 +73,7 @@ fn a_lossy_plant_is_mapped_to_better_than_30_mv_leaving_each_point_out() {
 #[test]
 fn acquired_points_lie_on_the_exact_formula() {
     let p = lossy();
-    let losses = Losses::of(&p);
+    let losses = Losses::of(&p).unwrap();
     for (point, measurement) in acquired(&p, &currents(&[3.0, 9.0])).points {
         let m = measurement.unwrap();
         let d = losses.d_real(m.v_out / m.v_in, m.i_out);
@@ -326,7 +326,7 @@ fn losses_of_the_simulation_itself_are_not_mapped_twice() {
         let map = drm::fit(&table, &FitOptions::default()).unwrap().fit.map;
         judge::against_plant(&map, &real, &nominal, 100.0, &[LoadSetting::Power(600.0)], None).unwrap()[0]
     };
-    let once = steady(Losses::of(&nominal));
+    let once = steady(Losses::of(&nominal).unwrap());
     assert!(once.with_v.abs() < 0.05, "{once:?}");
     let twice = steady(Losses::none(200.0));
     assert!((twice.with_v - 0.7).abs() < 0.05, "{twice:?}");

@@ -7,7 +7,7 @@ use toml_input::{Fault, Faults, Message};
 use crate::effects::{duty_quantisation, load_setting, minimum_on_time};
 use crate::entry::Way;
 use crate::parameters::{LoadBox, Parameters, Pwm};
-use crate::plain::{LARGEST_CHANGE, LONGEST_STEP, Number, ORDER, TERM_BEFORE, series, sum};
+use crate::plain::{All, Give, LARGEST_CHANGE, LONGEST_STEP, Number, ORDER, Part, TERM_BEFORE, series, sum};
 use crate::plant::Plant;
 use crate::signals::Load;
 
@@ -109,8 +109,26 @@ impl Batch {
         lanes.v.0.copy_from_slice(&self.v_out[first..first + LANES]);
         let off = group.t_sw - lanes.on;
         // no branch for duties of 0 and 1: an interval of length 0 leaves current and voltage as they are, to the bit
-        lanes.segment(group, lanes.on, [group.emf_on, group.r_on], Lane([0.0; LANES]));
-        lanes.segment(group, off, [group.emf_off, group.r_off], group.diode);
+        let no_diode = Lane([0.0; LANES]);
+        if group.all {
+            lanes.segment(All, group, lanes.on, [group.emf_on, group.r_on], no_diode);
+            lanes.segment(All, group, off, [group.emf_off, group.r_off], group.diode);
+        } else {
+            lanes.segment(
+                Part(group.give_on),
+                group,
+                lanes.on,
+                [group.emf_on, group.r_on],
+                no_diode,
+            );
+            lanes.segment(
+                Part(group.give_off),
+                group,
+                off,
+                [group.emf_off, group.r_off],
+                group.diode,
+            );
+        }
         for n in 0..LANES {
             // a lane that is not regular may hold nonsense; `i_l` and `v_out` still have the start of the period
             if lanes.regular[n] {
@@ -171,6 +189,10 @@ struct Group {
     r_on: Lane,
     emf_off: Lane,
     r_off: Lane,
+    give_on: Lane,
+    give_off: Lane,
+    /// The output of every lane receives all of the current all the time.
+    all: bool,
     /// 1 where a diode ends the current.
     diode: Lane,
     load: [LoadBox; LANES],
@@ -183,20 +205,24 @@ impl Group {
         // the upper diode has no lane: a current that is not positive makes its lane irregular (`flows` below)
         let off = |p: &Plant| {
             if p.legs.synchronous {
-                p.legs.lower
+                p.legs.second
             } else {
-                p.legs.lower_diode
+                p.legs.diode
             }
         };
+        let (give_on, give_off) = (lane(&|p| p.legs.main.give), lane(&|p| off(p).give));
         Group {
+            all: give_on.0.iter().chain(&give_off.0).all(|give| *give == 1.0),
+            give_on,
+            give_off,
             t_sw: lane(&|p| p.t_sw),
             inv_l: lane(&|p| p.plain.inv_l),
             inv_c: lane(&|p| p.plain.inv_c),
             longest: lane(&|p| p.plain.longest),
             last_term: lane(&|p| p.plain.last_term),
             v_fold: lane(&|p| p.plain.v_fold),
-            emf_on: lane(&|p| p.legs.upper.emf),
-            r_on: lane(&|p| p.legs.upper.r),
+            emf_on: lane(&|p| p.legs.main.emf),
+            r_on: lane(&|p| p.legs.main.r),
             emf_off: lane(&|p| off(p).emf),
             r_off: lane(&|p| off(p).r),
             diode: lane(&|p| if p.legs.synchronous { 0.0 } else { 1.0 }),
@@ -243,7 +269,7 @@ impl Lanes {
     }
 
     #[inline(always)]
-    fn segment(&mut self, group: &Group, h: Lane, drive: [Lane; 2], diode: Lane) {
+    fn segment<G: Give<Lane>>(&mut self, give: G, group: &Group, h: Lane, drive: [Lane; 2], diode: Lane) {
         let (i0, v0, power) = (self.i, self.v, self.power);
         let mut w0 = Lane([0.0; LANES]);
         for n in 0..LANES {
@@ -256,7 +282,7 @@ impl Lanes {
         }
         let (a, b) = (h * group.inv_l, h * group.inv_c);
         let load = [self.conductance, self.current, power];
-        let (i, v) = series([i0, v0, w0], [a, b], drive, load);
+        let (i, v) = series(give, [i0, v0, w0], [a, b], drive, load);
         (self.i, self.v) = (sum(&i), sum(&v));
         let rate = b * self.conductance;
         for n in 0..LANES {

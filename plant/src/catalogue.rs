@@ -3,7 +3,7 @@
 
 use crate::effects::ALL;
 use crate::entry::{Effect, Parameter, Way, choice, detail, number};
-use crate::parameters::{Carrier, Model, Parameters, Rectifier, ShortPulse};
+use crate::parameters::{Carrier, Model, Parameters, Rectifier, ShortPulse, Topology};
 
 /// Every effect, the circuit itself first.
 pub fn effects() -> impl Iterator<Item = &'static Effect> {
@@ -42,10 +42,13 @@ impl Default for Parameters {
 /// The circuit the paper writes down, and how it is modulated and sampled.
 const CIRCUIT: Effect = Effect {
     name: "converter",
-    meaning: "the loss-free buck converter, its modulator and its sampling instant",
+    meaning: "the loss-free converter, its modulator and its sampling instant",
     // another carrier or sampling instant moves the edges in the step; the averaged model has no edges at all
     needs: Way::Walk,
     parameters: &[
+        // a row of numbers, known to every way
+        choice!(converter.topology, switches_on = false, "what the leg connects the inductor to",
+            Topology: Buck = "buck", Boost = "boost", BuckBoost = "buck-boost"),
         choice!(converter.model, switches_on = true, "switching intervals, or mean values over the period",
             Model: Switched = "switched", Averaged = "averaged"),
         // both rectifiers are known to every way, so neither asks for a slower one

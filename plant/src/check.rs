@@ -4,7 +4,7 @@ use toml_input::{Fault, Faults, Message, Sink};
 
 use crate::catalogue;
 use crate::effects::duty_delay;
-use crate::parameters::Parameters;
+use crate::parameters::{Parameters, Topology};
 use crate::sensing;
 
 /// All faults of the parameters, if any.
@@ -62,6 +62,14 @@ fn partners(p: &Parameters, faults: &mut Vec<(&'static str, Message)>) {
         "cable.resistance",
         "`cable.resistance` needs `cable.inductance` and `cable.capacitance`".to_owned(),
         "give the cable about 1 uH a metre",
+    );
+    let topology = p.converter.topology;
+    require(
+        topology == Topology::Buck || p.capacitor.esl == 0.0,
+        "capacitor.esl",
+        format!("a {} converter has no `capacitor.esl`", topology.word()),
+        "its leg interrupts the current into the capacitor at every edge, and an inductance there would answer with a \
+         voltage without bound; the wires to the load are a cable",
     );
     let source = &p.source;
     require(

@@ -43,17 +43,26 @@ const OTHER_STEP: f64 = 0.25;
 /// The states: inductance current, capacitor voltage, cable, load, source, four low-passes.
 pub(crate) type States = [f64; STATES];
 
-/// What the inductor is connected to: `v_sw = share v_in + emf - r i`.
+/// What the inductor is connected to: `v_l = share v_in + emf - r i - give v_out`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Path {
     /// How much of the inductor current the source delivers: 1, 0, or the duty of the averaged model.
     pub share: f64,
+    /// How much of the current the output receives, and of its voltage stands against the inductor: 1, 0, or a mean.
+    #[serde(default = "all")]
+    pub give: f64,
     pub emf: f64,
     pub r: f64,
-    /// The sign of current a diode lets through: 1 or -1; 0 for both.
+    /// The sign of current a diode lets through: 1 or -1; 0 for both. With an open leg: of a current that may begin; 0 for
+    /// none.
     pub only: f64,
     /// No current.
     pub open: bool,
+}
+
+/// A state stored before there was a share: the output received all of the current.
+fn all() -> f64 {
+    1.0
 }
 
 /// The circuit's constants.
@@ -131,14 +140,14 @@ impl Full {
     }
 
     /// States at rest around `v_out` and `i_l`.
-    pub fn initial(&self, v_out: f64, i_l: f64, load: &Load) -> States {
+    /// `give` is the output's share of the current then.
+    pub fn initial(&self, v_out: f64, i_l: f64, load: &Load, give: f64) -> States {
         let mut x = [0.0; STATES];
         let cpl = self.constant_power(load, v_out);
         let i_out = load.conductance * v_out + load.current + cpl;
         let v_in = self.p.converter.v_in;
-        // power balance of a converter without losses
-        let i_in = i_l * v_out / v_in;
-        let v_c = v_out - self.p.capacitor.esr * (i_l - i_out);
+        let i_in = self.p.converter.topology.i_in(i_l, v_in, v_out);
+        let v_c = v_out - self.p.capacitor.esr * (give * i_l - i_out);
         (x[I_L], x[V_C], x[V_LOAD], x[I_CPL]) = (i_l, v_c, v_out, cpl);
         x[I_CABLE] = i_out;
         x[V_CIN] = v_in - self.p.source.resistance * i_in;
@@ -167,8 +176,8 @@ impl Full {
         self.algebra(x, path, load, t).signals
     }
 
-    /// Advances by `h` seconds from time `t`, or until the current reaches 0 if the path stops there. Returns the time
-    /// used.
+    /// Advances by `h` seconds from time `t`, or until the current reaches 0 if the path stops there, or an open leg
+    /// begins to conduct. Returns the time used.
     pub fn advance(&self, x: &mut States, path: &Path, load: &Load, span: (f64, f64), track: &mut Track) -> f64 {
         let (t, h) = span;
         // a load step changes this rate, so it is not part of `rate`
@@ -187,14 +196,14 @@ impl Full {
             *x = self.step(&start, &before, path, load, t + used, step);
             let mut after = self.algebra(x, path, load, t + used + step);
             let mut length = step;
-            let crossed = path.only != 0.0 && after.signals.i_l * path.only <= 0.0;
+            let crossed = path.only != 0.0 && left(&after, path) <= 0.0;
             // the diode has no current to begin with: no time is used, and the caller goes on with an open leg
-            if crossed && before.signals.i_l * path.only <= 0.0 {
+            if crossed && left(&before, path) <= 0.0 {
                 length = 0.0;
                 *x = start;
                 after = before;
             } else if crossed {
-                length = self.crossing(&start, &before, path, load, (t + used, step), after.signals.i_l);
+                length = self.crossing(&start, &before, path, load, (t + used, step), left(&after, path));
                 *x = self.step(&start, &before, path, load, t + used, length);
                 after = self.algebra(x, path, load, t + used + length);
             }
@@ -218,10 +227,10 @@ impl Full {
         h
     }
 
-    /// When the winding current reaches 0, by the Illinois method.
-    fn crossing(&self, x: &States, a: &Algebra, path: &Path, load: &Load, span: (f64, f64), i_end: f64) -> f64 {
+    /// When nothing is `left` of what keeps the path, by the Illinois method.
+    fn crossing(&self, x: &States, a: &Algebra, path: &Path, load: &Load, span: (f64, f64), end: f64) -> f64 {
         let (t, h) = span;
-        let (mut low, mut high) = ((0.0, a.signals.i_l), (h, i_end));
+        let (mut low, mut high) = ((0.0, left(a, path)), (h, end));
         // a bound alone: the tests take 8 turns at most, and as many halvings end at 1e-12 of the step
         for _ in 0..40 {
             let guess = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
@@ -230,7 +239,7 @@ impl Full {
                 break;
             }
             let state = self.step(x, a, path, load, t, guess);
-            let i = self.algebra(&state, path, load, t + guess).signals.i_l;
+            let i = left(&self.algebra(&state, path, load, t + guess), path);
             if i * high.1 < 0.0 {
                 low = high;
             } else {
@@ -287,18 +296,22 @@ impl Full {
         let l = p.converter.inductance * saturation::relative_inductance(&p.inductor, x[I_L]);
         let v_source = p.converter.v_in + input_ripple::voltage(&p.source, t);
         let (v_th, r_th) = self.thevenin(x, v_source);
-        let r = path.r + path.share * r_th + dcr::in_series(&p.inductor);
+        let r = path.r + path.share * r_th + dcr::in_series(&p.inductor) + self.apart(path, load);
         let core = p.inductor.core_conductance;
-        // v_l = (drive - v_out) / stretch, i_b = i_l + core v_l; nothing of it while no current flows
+        // v_l = (drive - give v_out) / stretch, i_b = i_l + core v_l; nothing of it while no current flows
         let i_l = if path.open { 0.0 } else { x[I_L] };
         let drive = path.share * v_th + path.emf - r * i_l;
         let stretch = 1.0 + r * core;
         let reflected = match path.open {
             true => 0.0,
-            false => (p.capacitor.esr * core + p.capacitor.esl / l) / stretch,
+            false => path.give * (p.capacitor.esr * core + p.capacitor.esl / l) / stretch,
         };
-        let (v_out, i_out) = self.output(x, load, i_l, reflected, drive);
-        let v_l = if path.open { 0.0 } else { (drive - v_out) / stretch };
+        let (v_out, i_out) = self.output(x, load, path.give, i_l, (reflected, drive));
+        let v_l = if path.open {
+            0.0
+        } else {
+            (drive - path.give * v_out) / stretch
+        };
         let i_b = i_l + core * v_l;
         let v_in = v_th - path.share * r_th * i_b;
         let signals = Signals {
@@ -317,12 +330,21 @@ impl Full {
         algebra
     }
 
+    /// What the averaged model adds to the resistance: the output stands against the inductor while it receives the
+    /// current, and then lies above its mean by the ESR's share of that current.
+    fn apart(&self, path: &Path, load: &Load) -> f64 {
+        let esr = self.p.capacitor.esr;
+        let g = if self.has_cable { 0.0 } else { load.conductance };
+        // 0 in every state of the leg, where `give` is 0 or 1
+        path.give * (1.0 - path.give) * esr / (1.0 + esr * g)
+    }
+
     /// Output voltage and current from
-    /// `v (1 + reflected) + esr i_out(v) = v_c + esr i_l + reflected drive - esl di_out/dt`.
-    fn output(&self, x: &States, load: &Load, i_l: f64, reflected: f64, drive: f64) -> (f64, f64) {
+    /// `v (1 + give reflected) + esr i_out(v) = v_c + esr give i_l + reflected drive - esl di_out/dt`.
+    fn output(&self, x: &States, load: &Load, give: f64, i_l: f64, (reflected, drive): (f64, f64)) -> (f64, f64) {
         let c = &self.p.capacitor;
-        let mut slope = 1.0 + reflected;
-        let mut right = x[V_C] + c.esr * i_l + reflected * drive;
+        let mut slope = 1.0 + give * reflected;
+        let mut right = x[V_C] + c.esr * (give * i_l) + reflected * drive;
         if self.has_cable {
             let cable = &self.p.cable;
             let divided = c.esl / cable.inductance;
@@ -360,7 +382,7 @@ impl Full {
         let (p, s) = (&self.p, a.signals);
         let c = p.converter.capacitance * derating::relative_capacitance(&p.capacitor, x[V_C]);
         a.slopes[I_L] = a.v_l / l;
-        a.slopes[V_C] = (s.i_l - s.i_out) / c;
+        a.slopes[V_C] = (path.give * s.i_l - s.i_out) / c;
         let mut v_load = s.v_out;
         if self.has_cable {
             v_load = x[V_LOAD];
@@ -392,6 +414,15 @@ impl Full {
                 a.slopes[SHOWN + n] = (value - x[SHOWN + n]) / self.low_pass[n];
             }
         }
+    }
+}
+
+/// What keeps a path that ends by itself, and is 0 when it does: the current of a diode; of an open leg the voltage that the
+/// diode blocks.
+fn left(a: &Algebra, path: &Path) -> f64 {
+    match path.open {
+        true => a.signals.v_out - (a.signals.v_in + path.emf),
+        false => a.signals.i_l * path.only,
     }
 }
 

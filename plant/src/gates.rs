@@ -45,6 +45,14 @@ impl GateTiming {
         }
     }
 
+    /// Whether a steady `duty` has the switch on just before the instant at `phase` of the period.
+    pub fn is_on_before(&self, duty: f64, phase: f64) -> bool {
+        let (start, end) = self.pulse(duty);
+        // what is true just before the start of a period belongs to the end of the one before
+        let t = if phase > 0.0 { phase * self.t_sw } else { self.t_sw };
+        start < t && t <= end
+    }
+
     /// The pulse the modulator commands, s.
     fn pulse(&self, duty: f64) -> Span {
         let (t, on) = (self.t_sw, duty * self.t_sw);
@@ -60,8 +68,8 @@ impl GateTiming {
 /// What conducts, as far as the gates decide it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Gate {
-    Upper,
-    Lower,
+    Main,
+    Second,
     Neither,
 }
 
@@ -161,10 +169,10 @@ impl Gates {
     pub fn at(&self, timing: &GateTiming, t: f64) -> Gate {
         // where delays let both gates be high the upper one counts: this circuit has no shoot-through
         if self.upper.is_high(t) {
-            return Gate::Upper;
+            return Gate::Main;
         }
         match timing.synchronous && !self.lower_off.is_high(t) {
-            true => Gate::Lower,
+            true => Gate::Second,
             false => Gate::Neither,
         }
     }

@@ -5,16 +5,23 @@ use crate::full::Path;
 use crate::gates::Gate;
 use crate::parameters::{Parameters, Rectifier};
 use crate::plain::Drive;
+use crate::topology::Shares;
 
 /// The paths of the inductor current, for both integrators.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Legs {
     pub synchronous: bool,
-    pub upper: Drive,
-    pub lower: Drive,
-    pub lower_diode: Drive,
-    pub upper_diode: Drive,
+    /// The diode conducts by itself while the output lies below the source.
+    pub starts: bool,
+    pub main: Drive,
+    pub second: Drive,
+    pub diode: Drive,
+    /// The body diode of the main switch.
+    pub body: Drive,
     paths: [Path; 4],
+    /// While no current flows.
+    open: Path,
+    v_f: f64,
     v_in: f64,
     dcr: f64,
     /// Part of the duty that delays take away.
@@ -24,15 +31,17 @@ pub(crate) struct Legs {
 impl Path {
     pub const OPEN: Path = Path {
         share: 0.0,
+        give: 1.0,
         emf: 0.0,
         r: 0.0,
         only: 0.0,
         open: true,
     };
 
-    fn closed(share: f64, emf: f64, r: f64, only: f64) -> Self {
+    fn closed((share, give): Shares, emf: f64, r: f64, only: f64) -> Self {
         Path {
             share,
+            give,
             emf,
             r,
             only,
@@ -43,39 +52,67 @@ impl Path {
 
 impl Legs {
     pub fn new(p: &Parameters) -> Self {
-        let s = &p.switch;
+        let (s, topology) = (&p.switch, p.converter.topology);
+        let (on, off) = (topology.on(), topology.off());
         let paths = [
-            Path::closed(1.0, 0.0, s.r_ds_on, 0.0),
-            Path::closed(0.0, 0.0, s.r_ds_on_low, 0.0),
-            Path::closed(0.0, -s.v_f, s.r_d, 1.0),
-            // a negative current flows back into the source, through the upper body diode
-            Path::closed(1.0, s.v_f, s.r_d, -1.0),
+            Path::closed(on, 0.0, s.r_ds_on, 0.0),
+            Path::closed(off, 0.0, s.r_ds_on_low, 0.0),
+            Path::closed(off, -s.v_f, s.r_d, 1.0),
+            // a negative current flows back through the body diode of the main switch
+            Path::closed(on, s.v_f, s.r_d, -1.0),
         ];
         let (v_in, dcr) = (p.converter.v_in, dcr::in_series(&p.inductor));
         let drive = |path: &Path| as_drive(path, v_in, dcr);
-        let (on, off) = switch_delay::edges(p);
+        let starts = topology.starts_by_itself();
+        let open = match starts {
+            // what the diode sees while it blocks, and the only sign in which a current may begin
+            true => Path { open: true, ..paths[2] },
+            false => Path::OPEN,
+        };
+        let (late_on, late_off) = switch_delay::edges(p);
         Legs {
+            starts,
+            open,
+            v_f: s.v_f,
             synchronous: p.converter.rectifier == Rectifier::Synchronous,
-            upper: drive(&paths[0]),
-            lower: drive(&paths[1]),
-            lower_diode: drive(&paths[2]),
-            upper_diode: drive(&paths[3]),
+            main: drive(&paths[0]),
+            second: drive(&paths[1]),
+            diode: drive(&paths[2]),
+            body: drive(&paths[3]),
             paths,
             v_in,
             dcr,
-            lost: (dead_time::hold_back(p) + on - off) / p.t_sw(),
+            lost: (dead_time::hold_back(p) + late_on - late_off) / p.t_sw(),
         }
     }
 
-    /// The path for a state of the gates and a current.
-    pub fn path(&self, gate: Gate, i_l: f64) -> Path {
+    /// The path for a state of the gates, a current, and how far the output lies above the source, V.
+    pub fn path(&self, gate: Gate, i_l: f64, above: f64) -> Path {
         match gate {
-            Gate::Upper => self.paths[0],
-            Gate::Lower => self.paths[1],
+            Gate::Main => self.paths[0],
+            Gate::Second => self.paths[1],
             Gate::Neither if i_l > 0.0 => self.paths[2],
             Gate::Neither if i_l < 0.0 => self.paths[3],
-            Gate::Neither => Path::OPEN,
+            Gate::Neither if self.starts && above < -self.v_f => self.paths[2],
+            Gate::Neither => self.open,
         }
+    }
+
+    /// What follows a path that ended after `used` seconds while the gates stood still, where the voltages cannot say: they
+    /// are equal at that instant, and rounding would ask again and again.
+    pub fn after(&self, path: &Path, used: f64) -> Option<Path> {
+        match path.open {
+            // the output has come down to the source
+            true => Some(self.paths[2]),
+            // no current would begin
+            false if self.starts && used == 0.0 => Some(Path::OPEN),
+            false => None,
+        }
+    }
+
+    /// The path of the steady state that a duty stands for, with the main switch on or off.
+    pub fn steady(&self, on: bool) -> &Path {
+        &self.paths[if on { 0 } else { 1 }]
     }
 
     /// The mean of the paths over a period (equation 2 of the paper, with losses; CCM).
@@ -91,8 +128,10 @@ impl Legs {
         } else {
             &self.paths[2]
         };
-        let upper = &self.paths[0];
-        Path::closed(on, (1.0 - on) * other.emf, on * upper.r + (1.0 - on) * other.r, 0.0)
+        let main = &self.paths[0];
+        let mean = |of: fn(&Path) -> f64| on * of(main) + (1.0 - on) * of(other);
+        let (share, give) = (mean(|path| path.share), mean(|path| path.give));
+        Path::closed((share, give), (1.0 - on) * other.emf, mean(|path| path.r), 0.0)
     }
 
     /// The same path for the circuit of two states.
@@ -103,12 +142,20 @@ impl Legs {
 
 fn as_drive(path: &Path, v_in: f64, dcr: f64) -> Drive {
     if path.open {
-        return Drive::OPEN;
+        return Drive {
+            starts_below: match path.only != 0.0 {
+                true => path.share * v_in + path.emf,
+                false => Drive::OPEN.starts_below,
+            },
+            ..Drive::OPEN
+        };
     }
     Drive {
         emf: path.share * v_in + path.emf,
         r: path.r + dcr,
+        give: path.give,
         stops_at_zero: path.only != 0.0,
         open: false,
+        starts_below: f64::NEG_INFINITY,
     }
 }

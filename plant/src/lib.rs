@@ -1,4 +1,4 @@
-//! DC-DC buck converter: switched and averaged, with the effects that make a bench differ from a simulation.
+//! DC-DC converters (buck, boost, buck-boost): switched and averaged, with the effects that make a bench differ from a simulation.
 //!
 //! ```
 //! use plant::{Load, Parameters, Plant};
@@ -32,6 +32,7 @@ mod reader;
 mod sensing;
 mod settle;
 mod signals;
+mod topology;
 mod walk;
 
 pub use batch::Batch;
@@ -40,7 +41,7 @@ pub use check::check;
 pub use entry::{Effect, Parameter, Way};
 pub use parameters::{
     Cable, Capacitor, Carrier, Converter, Inductor, LoadBox, Model, Parameters, Pwm, Rectifier, Sensor, Sensors,
-    ShortPulse, Source, Switch,
+    ShortPulse, Source, Switch, Topology,
 };
 pub use plant::{Plant, PlantState};
 pub use reader::REQUIRED;

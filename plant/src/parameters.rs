@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A buck converter with its modulator, load and sensors. A field that is 0 (a gain that is 1) is an effect that is absent.
+/// A converter with its modulator, load and sensors. A field that is 0 (a gain that is 1) is an effect that is absent.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Parameters {
@@ -89,7 +89,7 @@ macro_rules! blank_is_default {
         })+
     };
 }
-blank_is_default!(f64, u32, u64, Model, Rectifier, Carrier, ShortPulse);
+blank_is_default!(f64, u32, u64, Topology, Model, Rectifier, Carrier, ShortPulse);
 
 /// A table of `plant.toml`, and where it stands among the parameters; its default is neutral.
 macro_rules! table {
@@ -113,6 +113,19 @@ macro_rules! table {
             }
         }
     };
+}
+
+/// What the leg connects the inductor to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Topology {
+    /// Step-down: the leg lies between source and inductor.
+    #[default]
+    Buck,
+    /// Step-up: the leg lies between inductor and output.
+    Boost,
+    /// Inverting, up and down: the inductor lies between the leg and the return. `v_out` is the magnitude.
+    BuckBoost,
 }
 
 /// How the converter is computed.
@@ -164,6 +177,8 @@ pub enum ShortPulse {
 table! {
     /// The circuit the paper writes down.
     Converter at converter {
+        /// Buck, boost or inverting buck-boost.
+        topology: Topology,
         /// Switched or averaged.
         model: Model,
         /// Diode or second switch.

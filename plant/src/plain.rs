@@ -1,7 +1,8 @@
 //! The circuit of two states (inductor current, capacitor voltage) between two switching edges, as a power series in time.
 //!
 //! With x = t/h the coefficients of i, v and w = 1/v follow from one another:
-//! `i' = (h/L) (emf - r i - v)`, `v' = (h/C) (i - g v - J - P w)`, `v w = 1`. Six orders leave less than 1e-6 V a period
+//! `i' = (h/L) (emf - r i - s v)`, `v' = (h/C) (s i - g v - J - P w)`, `v w = 1`, s the share of the current that the output
+//! receives. Six orders leave less than 1e-6 V a period
 //! (a segment whose last term is too large is halved), cost one division, and give the interval as a polynomial in which the zero
 //! crossing of the current and the extremes of the voltage are found without another step.
 
@@ -40,23 +41,30 @@ pub(crate) struct Plain {
     pub last_term: f64,
 }
 
-/// What drives the inductor: `L di/dt = emf - r i - v`.
+/// What drives the inductor: `L di/dt = emf - r i - give v`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Drive {
     pub emf: f64,
     pub r: f64,
+    /// Share of the current that the output receives.
+    pub give: f64,
     /// The current may not change its sign.
     pub stops_at_zero: bool,
     /// The current is 0 and stays there.
     pub open: bool,
+    /// While it is open: the output voltage below which it is not.
+    pub starts_below: f64,
 }
 
 impl Drive {
     pub const OPEN: Drive = Drive {
         emf: 0.0,
         r: 0.0,
+        // of no current all or nothing are the same, and all is the faster series
+        give: 1.0,
         stops_at_zero: false,
         open: true,
+        starts_below: f64::NEG_INFINITY,
     };
 }
 
@@ -121,28 +129,58 @@ impl Plain {
         load.conductance * v + load.current + constant
     }
 
-    /// Advances `(i, v)` by `h` seconds, or until the current reaches 0 if the drive stops there. Returns the time used.
+    /// Advances `(i, v)` by `h` seconds, or until the current reaches 0 if the drive stops there, or an open leg begins to
+    /// conduct. Returns the time used.
     #[inline(always)]
     pub fn advance(&self, x: &mut (f64, f64), drive: &Drive, load: &Load, h: f64, track: &mut Track) -> f64 {
+        if drive.give != 1.0 {
+            return self.advance_part(x, drive, load, h, track);
+        }
+        self.advance_with(All, x, (drive, load), h, track)
+    }
+
+    // apart, so that the circuit whose output receives all of the current stays as short as it is
+    #[inline(never)]
+    fn advance_part(&self, x: &mut (f64, f64), drive: &Drive, load: &Load, h: f64, track: &mut Track) -> f64 {
+        self.advance_with(Part(drive.give), x, (drive, load), h, track)
+    }
+
+    #[inline(always)]
+    fn advance_with<G: Give<f64>>(
+        &self,
+        give: G,
+        x: &mut (f64, f64),
+        circuit: (&Drive, &Load),
+        h: f64,
+        track: &mut Track,
+    ) -> f64 {
         if h <= self.longest
-            && let Some(used) = self.leaf(x, drive, load, h, track, 0)
+            && let Some(used) = self.leaf(give, x, circuit, h, track, 0)
         {
             return used;
         }
-        self.split(x, drive, load, h, track, 0)
+        self.split(give, x, circuit, h, track, 0)
     }
 
     #[cold]
     #[inline(never)]
-    fn split(&self, x: &mut (f64, f64), drive: &Drive, load: &Load, h: f64, track: &mut Track, depth: u32) -> f64 {
+    fn split<G: Give<f64>>(
+        &self,
+        give: G,
+        x: &mut (f64, f64),
+        circuit: (&Drive, &Load),
+        h: f64,
+        track: &mut Track,
+        depth: u32,
+    ) -> f64 {
         let half = 0.5 * h;
         let mut used = 0.0;
         for _ in 0..2 {
             let leaf = match half <= self.longest || depth >= DEEPEST_SPLIT {
-                true => self.leaf(x, drive, load, half, track, depth),
+                true => self.leaf(give, x, circuit, half, track, depth),
                 false => None,
             };
-            let step = leaf.unwrap_or_else(|| self.split(x, drive, load, half, track, depth + 1));
+            let step = leaf.unwrap_or_else(|| self.split(give, x, circuit, half, track, depth + 1));
             used += step;
             if step < half {
                 break;
@@ -153,11 +191,11 @@ impl Plain {
 
     /// One series; nothing if it would be too coarse.
     #[inline(always)]
-    fn leaf(
+    fn leaf<G: Give<f64>>(
         &self,
+        give: G,
         x: &mut (f64, f64),
-        drive: &Drive,
-        load: &Load,
+        (drive, load): (&Drive, &Load),
         h: f64,
         track: &mut Track,
         depth: u32,
@@ -174,7 +212,13 @@ impl Plain {
         // 0 keeps a current of 0 where it is: an open leg takes the same series
         let a = if drive.open { 0.0 } else { h * self.inv_l };
         let b = h * self.inv_c;
-        let (i, v) = series([i0, v0, w0], [a, b], [drive.emf, drive.r], [g, load.current, power]);
+        let (i, v) = series(
+            give,
+            [i0, v0, w0],
+            [a, b],
+            [drive.emf, drive.r],
+            [g, load.current, power],
+        );
         let v_end = sum(&v);
         let coarse = (power != 0.0 && v[1].abs() > LARGEST_CHANGE * v0)
             || b * g > LONGEST_STEP
@@ -184,7 +228,19 @@ impl Plain {
             return None;
         }
         let i_end = sum(&i);
-        if drive.stops_at_zero && i_end * i0 <= 0.0 {
+        if drive.open && v_end < drive.starts_below {
+            let mut above = v;
+            above[0] -= drive.starts_below;
+            let at = zero(&above, above[0] / (v0 - v_end));
+            x.1 = value(&v, at);
+            extremes(&v, at, x.1, track);
+            return Some(if at < 1.0 { at * h } else { h });
+        }
+        // a current that begins at 0 and rises has not crossed it
+        if drive.stops_at_zero && i_end * i0 <= 0.0 && !(i0 == 0.0 && i_end > 0.0) {
+            if i0 == 0.0 {
+                return Some(0.0);
+            }
             let at = zero(&i, i0 / (i0 - i_end));
             *x = (0.0, value(&v, at));
             extremes(&v, at, x.1, track);
@@ -213,12 +269,41 @@ impl Number for f64 {
     }
 }
 
+/// How a series takes the share of the inductor's current that the output receives.
+pub(crate) trait Give<T: Number>: Copy {
+    /// That share of `x`.
+    fn of(self, x: T) -> T;
+}
+
+/// All of it, without a product.
+#[derive(Clone, Copy)]
+pub(crate) struct All;
+
+impl<T: Number> Give<T> for All {
+    #[inline(always)]
+    fn of(self, x: T) -> T {
+        x
+    }
+}
+
+/// A part of it.
+#[derive(Clone, Copy)]
+pub(crate) struct Part<T>(pub T);
+
+impl<T: Number> Give<T> for Part<T> {
+    #[inline(always)]
+    fn of(self, x: T) -> T {
+        self.0 * x
+    }
+}
+
 type Coefficients<T> = [T; ORDER + 1];
 type Series = Coefficients<f64>;
 
 /// Coefficients of i and v from `[i, v, 1/v]`, `[h/L, h/C]`, `[emf, r]` and `[g, J, P]`.
 #[inline(always)]
-pub(crate) fn series<T: Number>(
+pub(crate) fn series<T: Number, G: Give<T>>(
+    give: G,
     start: [T; 3],
     step: [T; 2],
     drive: [T; 2],
@@ -233,8 +318,8 @@ pub(crate) fn series<T: Number>(
     let w0;
     [i[0], v[0], w0] = start;
     cpl[0] = power * w0;
-    i[1] = a * (emf - r * i[0] - v[0]);
-    let rest = i[0] - g * v[0] - current - cpl[0];
+    i[1] = a * (emf - r * i[0] - give.of(v[0]));
+    let rest = give.of(i[0]) - g * v[0] - current - cpl[0];
     v[1] = b * rest;
     relative[1] = b * w0 * rest;
     for k in 1..ORDER {
@@ -244,8 +329,8 @@ pub(crate) fn series<T: Number>(
         }
         cpl[k] = -product;
         let over = T::of(OVER[k + 1]);
-        i[k + 1] = a * over * (-r * i[k] - v[k]);
-        let rest = i[k] - g * v[k] - cpl[k];
+        i[k + 1] = a * over * (-r * i[k] - give.of(v[k]));
+        let rest = give.of(i[k]) - g * v[k] - cpl[k];
         v[k + 1] = b * over * rest;
         relative[k + 1] = b * over * w0 * rest;
     }

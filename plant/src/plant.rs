@@ -10,9 +10,9 @@ use crate::effects::duty_delay::Queue;
 use crate::effects::{dcr, duty_quantisation, load_setting, minimum_on_time};
 use crate::entry::Way;
 use crate::full::{Full, Path, States};
-use crate::gates::{GateTiming, Gates};
+use crate::gates::{Gate, GateTiming, Gates};
 use crate::legs::Legs;
-use crate::parameters::Parameters;
+use crate::parameters::{Model, Parameters};
 use crate::plain::{Drive, Plain, Track};
 use crate::sensing::{Memory, Sensing, array};
 use crate::signals::{Load, Sample, Signals};
@@ -120,9 +120,17 @@ impl Plant {
     /// hold the voltage, delayed sensors show it. Time starts at 0, the noise goes on.
     pub fn reset_at(&mut self, v_out: f64, i_l: f64, load: &Load) -> Sample {
         let drawn = load_setting::drawn(&self.parameters.load, load);
-        let duty = (v_out / self.parameters.converter.v_in).clamp(0.0, 1.0);
+        let converter = &self.parameters.converter;
+        let duty = converter.topology.duty(converter.v_in, v_out);
+        let give = match converter.model {
+            Model::Averaged => self.legs.averaged(duty).give,
+            Model::Switched => {
+                let on = self.timing.is_on_before(duty, self.parameters.pwm.sampling_phase);
+                self.legs.steady(on).give
+            }
+        };
         let state = &mut self.state;
-        state.x = self.full.initial(v_out, i_l, &drawn);
+        state.x = self.full.initial(v_out, i_l, &drawn, give);
         state.path = Path::OPEN;
         state.time = 0.0;
         state.queue = Queue::filled(duty);
@@ -211,21 +219,19 @@ impl Plant {
         let mut track = Track::at(x.0, x.1);
         let on = duty * self.t_sw;
         if on > 0.0 {
-            self.plain.advance(&mut x, &self.legs.upper, load, on, &mut track);
+            self.plain.advance(&mut x, &self.legs.main, load, on, &mut track);
         }
         let mut rest = self.t_sw - on;
         if self.legs.synchronous {
             if rest > 0.0 {
-                self.plain.advance(&mut x, &self.legs.lower, load, rest, &mut track);
+                self.plain.advance(&mut x, &self.legs.second, load, rest, &mut track);
             }
+        } else if self.legs.starts {
+            self.freewheel(&mut x, load, rest, &mut track);
         } else {
             // exactly 0 where a diode has ended the current (`Plain::leaf`), so no tolerance is needed
             if x.0 != 0.0 && rest > 0.0 {
-                let drive: &Drive = if x.0 > 0.0 {
-                    &self.legs.lower_diode
-                } else {
-                    &self.legs.upper_diode
-                };
+                let drive: &Drive = if x.0 > 0.0 { &self.legs.diode } else { &self.legs.body };
                 rest -= self.plain.advance(&mut x, drive, load, rest, &mut track);
             }
             if rest > 0.0 {
@@ -243,6 +249,20 @@ impl Plant {
             v_in: self.parameters.converter.v_in,
         };
         self.finish(signals, track)
+    }
+
+    /// A diode leg whose current may begin by itself, with the switch off for `rest` seconds.
+    #[inline(never)]
+    fn freewheel(&self, x: &mut (f64, f64), load: &Load, mut rest: f64, track: &mut Track) {
+        let mut next = None;
+        while rest > 0.0 {
+            let above = x.1 - self.parameters.converter.v_in;
+            let path = next.unwrap_or_else(|| self.legs.path(Gate::Neither, x.0, above));
+            let used = self.plain.advance(x, &self.legs.drive(&path), load, rest, track);
+            track.discontinuous |= path.open;
+            rest = if path.only != 0.0 { rest - used } else { 0.0 };
+            next = self.legs.after(&path, used);
+        }
     }
 
     /// Lets the sensors look and stores the sample.

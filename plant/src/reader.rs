@@ -9,6 +9,7 @@ use crate::catalogue;
 use crate::check;
 use crate::entry::{Field, Parameter};
 use crate::parameters::Parameters;
+use crate::topology;
 
 impl Parameters {
     /// Reads the text of a `plant.toml`; `file` only names it in messages.
@@ -16,7 +17,7 @@ impl Parameters {
     /// # Errors
     /// All faults: syntax, unknown keys, wrong types, values out of range, effects that lack a partner.
     pub fn from_toml(file: &Path, text: &str) -> Result<Self, Faults> {
-        read(&Document::from_text(file, text)?)
+        read(&Document::from_text(file, text)?, None)
     }
 
     /// Reads a `plant.toml`.
@@ -24,11 +25,19 @@ impl Parameters {
     /// # Errors
     /// As [`Parameters::from_toml`], and a file that cannot be read.
     pub fn from_file(file: impl Into<FileName>) -> Result<Self, Faults> {
-        read(&Document::open(file)?)
+        read(&Document::open(file)?, None)
+    }
+
+    /// Reads a `plant.toml` for `what` (such as `drm fit`), which is built for the buck converter alone.
+    ///
+    /// # Errors
+    /// As [`Parameters::from_file`], and another topology.
+    pub fn buck_from_file(file: impl Into<FileName>, what: &str) -> Result<Self, Faults> {
+        read(&Document::open(file)?, Some(what))
     }
 }
 
-fn read(document: &Document) -> Result<Parameters, Faults> {
+fn read(document: &Document, for_the_buck: Option<&str>) -> Result<Parameters, Faults> {
     let mut reader = Reader {
         parameters: Parameters::default(),
         values: BTreeMap::new(),
@@ -44,6 +53,10 @@ fn read(document: &Document) -> Result<Parameters, Faults> {
                 None => document.source().name.fault(message),
             });
         }
+    }
+    let other = for_the_buck.and_then(|what| topology::other_than_buck(&reader.parameters, what));
+    if let (Some(message), Some(value)) = (other, reader.values.get("converter.topology")) {
+        reader.faults.push(value.fault(message));
     }
     document.conclude(Some(reader.parameters), reader.faults)
 }

@@ -24,7 +24,13 @@ pub struct Settled {
 #[derive(Debug, Clone, Copy)]
 pub struct Regulator {
     v_out: f64,
-    v_in: f64,
+    /// What a duty of 1 adds to the voltage at the inductor, V.
+    span: f64,
+    /// Share of the current that the output receives.
+    give: f64,
+    /// Share of a voltage error that a period corrects.
+    pace: f64,
+    most: f64,
     slowness: f64,
     /// Current per voltage error, S.
     g: f64,
@@ -38,19 +44,37 @@ impl Regulator {
     #[must_use]
     pub fn new(p: &Parameters, v_out: f64, now: &Signals) -> Self {
         let (v_in, l, c) = (p.converter.v_in, p.converter.inductance, p.converter.capacitance);
+        let topology = p.converter.topology;
+        let (on, off) = (topology.on(), topology.off());
+        let duty = topology.duty(v_in, v_out);
+        let (span, level) = (
+            (on.0 - off.0) * v_in - (on.1 - off.1) * v_out,
+            off.1 * v_out - off.0 * v_in,
+        );
+        let give = on.1 * duty + off.1 * (1.0 - duty);
         let slowness = f64::from(1 + p.pwm.duty_delay) + p.pwm.sampling_phase;
         let t = p.t_sw();
         // conductance that corrects a voltage error in about ten periods, gain that corrects a current in about four
-        let g = 0.1 / slowness * c / t;
+        let pace = match on.1 == off.1 {
+            true => 0.1,
+            // more duty first takes current from the output: a zero in the right half-plane at give span / (L i_l), with
+            // i_l = i_out / give. The loop stays at a fifth of it
+            false => 0.1_f64.min(0.2 * t * give * give * span / (l * now.i_out.abs())),
+        };
+        let g = pace / slowness * c / t;
         let k = 0.25 / slowness * l / t;
         Regulator {
             v_out,
-            v_in,
+            span,
+            give,
+            pace,
+            // an output that receives nothing cannot be held; only the buck's does at a duty of 1
+            most: if on.1 > 0.0 { 1.0 } else { 0.95 },
             slowness,
             g,
             k,
-            // without a voltage error the first duty is then v_out / v_in
-            integral: v_out - k * (now.i_out - now.i_l),
+            // without a voltage error the first duty is then that of the converter without losses
+            integral: level - k * (now.i_out / give - now.i_l),
         }
     }
 
@@ -58,11 +82,11 @@ impl Regulator {
     pub fn duty(&mut self, now: &Signals) -> f64 {
         let (g, k) = (self.g, self.k);
         let error = self.v_out - now.v_out;
-        // an integral time of ten periods, as the voltage loop. Against wind-up it stays near what the leg can give;
+        // the integral time is that of the voltage loop. Against wind-up it stays near what the leg can give;
         // wider than 0..v_in, since the proportional part is added to it
-        self.integral = (self.integral + 0.1 * k * g * error / self.slowness).clamp(-self.v_in, 2.0 * self.v_in);
-        let wanted = self.integral + k * (g * error + now.i_out - now.i_l);
-        (wanted / self.v_in).clamp(0.0, 1.0)
+        self.integral = (self.integral + self.pace * k * g * error / self.slowness).clamp(-self.span, 2.0 * self.span);
+        let wanted = self.integral + k * ((g * error + now.i_out) / self.give - now.i_l);
+        (wanted / self.span).clamp(0.0, self.most)
     }
 }
 
@@ -94,10 +118,13 @@ impl Plant {
         let p = self.parameters();
         let (v_in, l) = (p.converter.v_in, p.converter.inductance);
         let t = self.t_sample();
+        let topology = p.converter.topology;
+        let duty = topology.duty(v_in, v_out);
+        let give = topology.on().1 * duty + topology.off().1 * (1.0 - duty);
         let i_out = self.reset_at(v_out, 0.0, load).i_out;
         // sampled at the start of the on-interval the current is at its valley: half the ripple below the load's
-        let ripple = v_out * (1.0 - v_out / v_in) * t / l;
-        let mut sample = self.reset_at(v_out, (i_out - 0.5 * ripple).max(0.0), load);
+        let ripple = topology.ripple(v_in, v_out) * t / l;
+        let mut sample = self.reset_at(v_out, (i_out / give - 0.5 * ripple).max(0.0), load);
         let mut regulator = Regulator::new(self.parameters(), v_out, &sample.signals());
         let (mut duty, mut rests) = (0.0, 0);
         let mut last = sample;

@@ -80,11 +80,12 @@ impl Plant {
     fn conduct(&mut self, t: f64, h: f64, load: &Load, track: &mut Track) {
         // asked in the middle: at an end of the interval rounding would decide on which side of an edge it lies
         let gate = self.state.gates.at(&self.timing, t + 0.5 * h);
-        let mut rest = h;
+        let (mut rest, mut next) = (h, None);
         while rest > 0.0 {
-            let path = match self.parameters.converter.model {
-                Model::Switched => self.legs.path(gate, self.state.x[0]),
-                Model::Averaged => self.legs.averaged(self.state.applied),
+            let path = match (self.parameters.converter.model, next) {
+                (Model::Averaged, _) => self.legs.averaged(self.state.applied),
+                (Model::Switched, Some(path)) => path,
+                (Model::Switched, None) => self.legs.path(gate, self.state.x[0], self.above(load)),
             };
             let used = if self.way < Way::Full {
                 let mut x = (self.state.x[0], self.state.x[1]);
@@ -100,7 +101,21 @@ impl Plant {
             self.state.time += used;
             // only a diode ends its interval early; what is left then runs with an open leg
             rest = if path.only != 0.0 { rest - used } else { 0.0 };
+            next = self.legs.after(&path, used);
         }
+    }
+
+    /// How far the output lies above the source while no current flows, V; asked only where a current could begin.
+    fn above(&self, load: &Load) -> f64 {
+        if !self.legs.starts || self.state.x[0] != 0.0 {
+            return f64::INFINITY;
+        }
+        if self.way < Way::Full {
+            return self.state.x[1] - self.parameters.converter.v_in;
+        }
+        let open = crate::full::Path::OPEN;
+        let signals = self.full.signals(&self.state.x, &open, load, self.state.time);
+        signals.v_out - signals.v_in
     }
 
     /// What is true now, just before any edge that may come now.

@@ -17,7 +17,7 @@ const PICTURE: &str = "docs/pictures/plant-vs-ngspice.svg";
 
 /// One line of the chart, V and A: deviation from ngspice, and what the effect itself moves.
 struct Line {
-    name: &'static str,
+    name: String,
     deviation: [f64; 3],
     moved: [f64; 2],
 }
@@ -69,7 +69,7 @@ fn chart(lines: &[Line]) -> Result<Svg, ReportError> {
     };
     BarChart::new(
         "Plant against ngspice, effect by effect",
-        lines.iter().map(|line| line.name),
+        lines.iter().map(|line| line.name.as_str()),
     )
     .panel(panel(0, "sampled v_out and v_in", "V"))
     .panel(panel(1, "sampled i_l and i_out", "A"))

@@ -2,14 +2,40 @@
 
 use std::fmt::Write;
 
-use plant::{Load, Parameters, Rectifier};
+use plant::{Carrier, Load, Parameters, Rectifier, Topology};
 
 /// Drop of the ideal diode at a few amperes, V; taken off `v_f`.
 // N V_T ln(i / IS) of the model `DI`: 14.9 is ln(3 A / 1 uA)
 const DIODE_DROP: f64 = 0.05 * 0.025_86 * 14.9;
 
 /// What a run reads: output voltage, inductor current, load current, input voltage, low-passed output voltage.
-pub const COLUMNS: &str = "v(out) i(vil) i(vout) v(nin) v(lp)";
+#[must_use]
+pub fn columns(p: &Parameters) -> &'static str {
+    match p.converter.topology {
+        Topology::Buck | Topology::Boost => "v(out) i(vil) i(vout) v(nin) v(lp)",
+        Topology::BuckBoost => "v(out) i(vil) i(vout) v(nin,out) v(lp)",
+    }
+}
+
+/// The node to which the source returns. The inverting converter's output lies below it: its netlist counts voltages from
+/// that output, which is node 0, so that `out`, the return, is at the magnitude.
+fn common(p: &Parameters) -> &'static str {
+    match p.converter.topology {
+        Topology::Buck | Topology::Boost => "0",
+        Topology::BuckBoost => "out",
+    }
+}
+
+/// The duty at which a converter without losses holds `v_out`, from the balance of volts and seconds at its inductor.
+#[must_use]
+pub fn hold(p: &Parameters, v_out: f64) -> f64 {
+    let v_in = p.converter.v_in;
+    match p.converter.topology {
+        Topology::Buck => v_out / v_in,
+        Topology::Boost => (v_out - v_in) / v_out,
+        Topology::BuckBoost => v_out / (v_out + v_in),
+    }
+}
 
 /// Sources that a run sets: gates (1 is on), power (W), current (A) and conductance (S) of the load. Each is a voltage source
 /// `V<name>` between the node `<name>` and ground.
@@ -33,7 +59,11 @@ pub struct Circuit<'a> {
 pub fn netlist(circuit: &Circuit<'_>) -> String {
     let p = circuit.parameters;
     let mut n = "* converter\n.model DI D(IS=1e-6 N=0.05 RS=1e-4)\n".to_owned();
-    source(&mut n, p, circuit.i_l * circuit.v_out / p.converter.v_in);
+    let share = match p.converter.topology {
+        Topology::Buck | Topology::BuckBoost => hold(p, circuit.v_out),
+        Topology::Boost => 1.0,
+    };
+    source(&mut n, p, circuit.i_l * share);
     leg(&mut n, p);
     inductor(&mut n, p, circuit.i_l);
     capacitor(&mut n, circuit);
@@ -64,10 +94,10 @@ pub fn drawn(p: &Parameters, load: &Load) -> [f64; 3] {
 
 fn source(n: &mut String, p: &Parameters, i_in: f64) {
     let s = &p.source;
-    let v_in = p.converter.v_in;
+    let (v_in, common) = (p.converter.v_in, common(p));
     let _ = writeln!(
         n,
-        "Vs s0 0 SIN({v_in} {} {} 0 0 {})",
+        "Vs s0 {common} SIN({v_in} {} {} 0 0 {})",
         s.ripple,
         s.ripple_frequency.max(1e-3),
         s.ripple_phase * 360.0
@@ -81,7 +111,12 @@ fn source(n: &mut String, p: &Parameters, i_in: f64) {
     .unwrap_or_default();
     if s.c_in > 0.0 {
         let v = v_in - s.resistance * i_in;
-        let _ = writeln!(n, "Rci nin ci {:e}\nCi ci 0 {:e} ic={v}", s.esr_in.max(1e-6), s.c_in);
+        let _ = writeln!(
+            n,
+            "Rci nin ci {:e}\nCi ci {common} {:e} ic={v}",
+            s.esr_in.max(1e-6),
+            s.c_in
+        );
     }
 }
 
@@ -97,33 +132,50 @@ fn leg(n: &mut String, p: &Parameters) {
     };
     // without it the node hangs in the air while the current rests, and the step of the transient shrinks to nothing
     let _ = writeln!(n, "Rsw sw 0 3e6");
+    if p.converter.topology == Topology::Boost && p.source.c_in > 0.0 {
+        // the inductor drives its current into this node, and ngspice finds no first step without a capacitance there
+        let _ = writeln!(n, "Csw sw 0 10p");
+    }
+    // the switch from its drain to its source, and the diode from anode to cathode
+    let (main, rectifier) = match p.converter.topology {
+        Topology::Buck | Topology::BuckBoost => (("nin", "sw"), ("0", "sw")),
+        Topology::Boost => (("sw", "0"), ("sw", "out")),
+    };
     // 1e-9 S off, 0.2 uA at 200 V: 1e-12 and 1e-6 give the same 1e-6 V
-    let _ = writeln!(n, "Bu nin sw I=V(nin,sw)*(V(gu)/{:e}+1e-9)", s.r_ds_on.max(1e-4));
-    diode(n, "dl", "0", "sw");
+    let (drain, foot) = main;
+    let r_on = s.r_ds_on.max(1e-4);
+    let _ = writeln!(n, "Bu {drain} {foot} I=V({drain},{foot})*(V(gu)/{r_on:e}+1e-9)");
+    diode(n, "dl", rectifier.0, rectifier.1);
     // in a synchronous leg too: without the upper body diode its voltage comes out 22 % high at light load
-    diode(n, "du", "sw", "nin");
+    diode(n, "du", foot, drain);
     if p.converter.rectifier == Rectifier::Synchronous {
-        let _ = writeln!(n, "Bl sw 0 I=V(sw)*(V(gl)/{:e}+1e-9)", s.r_ds_on_low.max(1e-4));
+        let ((anode, cathode), r_on) = (rectifier, s.r_ds_on_low.max(1e-4));
+        let _ = writeln!(n, "Bl {cathode} {anode} I=V({cathode},{anode})*(V(gl)/{r_on:e}+1e-9)");
     }
 }
 
 fn inductor(n: &mut String, p: &Parameters, i_l: f64) {
     let (l, i) = (p.converter.inductance, &p.inductor);
+    let (from, to) = match p.converter.topology {
+        // the return of an inverting converter is its node `out`
+        Topology::Buck | Topology::BuckBoost => ("sw", "out"),
+        Topology::Boost => ("nin", "sw"),
+    };
     if i.saturation > 0.0 {
         let x = format!("(V(fl)/{})", i.i_sat);
         let value = format!("{l:e}*(1-{}*{x}*{x}/(1+{x}*{x}))", i.saturation);
         let _ = writeln!(
             n,
             // an integrator whose voltage is the current: the inductance may then follow it as an expression
-            "Cfl fl 0 1 ic={i_l}\nBfl 0 fl I=V(sw,x1)/({value})\nBil sw x1 I=V(fl)"
+            "Cfl fl 0 1 ic={i_l}\nBfl 0 fl I=V({from},x1)/({value})\nBil {from} x1 I=V(fl)"
         );
     } else {
-        let _ = writeln!(n, "L1 sw x1 {l:e} ic={i_l}");
+        let _ = writeln!(n, "L1 {from} x1 {l:e} ic={i_l}");
     }
     if i.core_conductance > 0.0 {
-        let _ = writeln!(n, "Rcore sw x1 {:e}", 1.0 / i.core_conductance);
+        let _ = writeln!(n, "Rcore {from} x1 {:e}", 1.0 / i.core_conductance);
     }
-    let _ = writeln!(n, "Vil x1 x2 0\nRl x2 out {:e}", i.dcr.max(1e-6));
+    let _ = writeln!(n, "Vil x1 x2 0\nRl x2 {to} {:e}", i.dcr.max(1e-6));
 }
 
 fn capacitor(n: &mut String, circuit: &Circuit<'_>) {
@@ -131,7 +183,7 @@ fn capacitor(n: &mut String, circuit: &Circuit<'_>) {
     let (c, k) = (p.converter.capacitance, &p.capacitor);
     // with the load gains at 1, as where there is an ESR or ESL
     let set = circuit.load;
-    let i_c = circuit.i_l - p.load.bleed * v_out - set.conductance * v_out - set.current - set.power / v_out;
+    let i_c = received(circuit) - p.load.bleed * v_out - set.conductance * v_out - set.current - set.power / v_out;
     let v_c = v_out - k.esr * i_c;
     let _ = writeln!(n, "Rc out c1 {:e}", k.esr.max(1e-6));
     match k.esl > 0.0 {
@@ -156,6 +208,23 @@ fn capacitor(n: &mut String, circuit: &Circuit<'_>) {
         );
     } else {
         let _ = writeln!(n, "C1 c2 0 {c:e} ic={v_c}");
+    }
+}
+
+/// What the output receives of the inductor's current at the start, A.
+fn received(circuit: &Circuit<'_>) -> f64 {
+    let p = circuit.parameters;
+    let (on, phase) = (hold(p, circuit.v_out), p.pwm.sampling_phase);
+    // just before the start of a period is the end of the one before
+    let phase = if phase > 0.0 { phase } else { 1.0 };
+    let conducts = match p.pwm.carrier {
+        Carrier::Trailing => phase <= on,
+        Carrier::Leading => phase > 1.0 - on,
+        Carrier::Centre => (phase - 0.5).abs() <= 0.5 * on,
+    };
+    match p.converter.topology {
+        Topology::Boost | Topology::BuckBoost if conducts => 0.0,
+        _ => circuit.i_l,
     }
 }
 

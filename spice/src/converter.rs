@@ -107,6 +107,7 @@ impl SpiceConverter {
             let message = Message::new("ngspice computes switching intervals");
             return Err(message.found("`converter.model` is \"averaged\"").into());
         }
+        parameters.require_buck("the closed loop in ngspice")?;
         let pwm = &parameters.pwm;
         // refused, not ignored: ngspice would answer for another converter
         if pwm.min_on_time > 0.0 && pwm.short_pulse == ShortPulse::Extend {

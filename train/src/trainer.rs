@@ -394,6 +394,15 @@ fn check_fit<E: Environment>(settings: &Settings, contract: &Contract, environme
         ));
         return Err(message.hint("f_sw of the plant is 1 / sample_period").into());
     }
+    let topology = "converter.topology";
+    // exploration, rewards and the converters to compare with are those of a buck; nobody has trained another
+    if environment.parameter(topology).is_some_and(|choice| choice != 0.0)
+        || settings.randomise.iter().any(|varied| varied.key == topology)
+    {
+        let message = Message::new("a training is built for the buck converter alone");
+        let message = message.found(format!("another `{topology}`")).expected("\"buck\"");
+        return Err(Fault::in_file(&settings.file, message).into());
+    }
     let unknown = settings
         .randomise
         .iter()

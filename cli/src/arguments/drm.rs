@@ -226,7 +226,10 @@ impl Reading {
     pub fn simulation(&self) -> Result<Option<Losses>, Faults> {
         match &self.trained_on {
             None => Ok(self.v_in_sim.map(Losses::none)),
-            Some(path) => Ok(Some(Losses::of(&Parameters::from_file(path.as_path())?))),
+            Some(path) => Ok(Some(Losses::of(&Parameters::buck_from_file(
+                path.as_path(),
+                "the simulation of a mapping",
+            )?)?)),
         }
     }
 

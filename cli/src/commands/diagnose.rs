@@ -28,7 +28,7 @@ use crate::output;
 
 /// Reads the records, diagnoses, writes the three files.
 pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
-    let model = Parameters::from_file(&options.model)?;
+    let model = Parameters::buck_from_file(&options.model, "`diagnose`")?;
     let mut columns = options.columns.read()?;
     if options.settled {
         columns.settled = Some(true);
@@ -134,7 +134,7 @@ fn request(options: &Diagnose, path: &Path, model: &Parameters) -> Result<Reques
     let policy = super::load(path, options.outside)?;
     super::drm::needs_mapping(&policy)?;
     let (trained_on, file) = match &options.trained_on {
-        Some(path) => (Parameters::from_file(path)?, path),
+        Some(path) => (Parameters::buck_from_file(path, "`diagnose`")?, path),
         None => (model.clone(), &options.model),
     };
     let scenario = options.scenario.as_deref().map(Scenario::load).transpose()?;
@@ -144,7 +144,7 @@ fn request(options: &Diagnose, path: &Path, model: &Parameters) -> Result<Reques
         simulate::suits(&policy, converter, v_ref, file)?;
     }
     Ok(Request {
-        losses: Losses::of(&trained_on),
+        losses: Losses::of(&trained_on)?,
         policy,
         trained_on,
         v_ref,

@@ -32,6 +32,7 @@ impl Deadbeat {
     /// # Errors
     /// If the parameters are not those of a converter.
     pub fn new(parameters: &Parameters, v_ref: f64) -> Result<Self, Error> {
+        parameters.require_buck("a classical controller")?;
         let design = Design::new(parameters, v_ref);
         let mut model = Parameters::ideal(design.v_in, design.l, design.c, 1.0 / design.t);
         model.converter.rectifier = parameters.converter.rectifier;

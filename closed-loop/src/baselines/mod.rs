@@ -117,8 +117,9 @@ impl Baseline {
     /// A controller designed for the plant with these parameters.
     ///
     /// # Errors
-    /// If the parameters are not those of a converter.
+    /// If the parameters are not those of a buck converter: the designs hold for no other.
     pub fn new(kind: Kind, parameters: &Parameters, v_ref: f64) -> Result<Self, Error> {
+        parameters.require_buck("a classical controller")?;
         let design = Design::new(parameters, v_ref);
         Ok(match kind {
             Kind::Pid => Self::Pid(Pid::new(&design)),

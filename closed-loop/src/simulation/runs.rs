@@ -1,5 +1,6 @@
 //! All controllers over all load steps.
 
+use plant::Topology;
 use toml_input::{Fault, Message};
 
 use super::findings::{Check, Findings, POLICY, Setting, Step};
@@ -42,6 +43,14 @@ pub fn simulate(mut setting: Setting, mut named: Vec<Named>, tell: &mut Tell<'_>
         differences: Vec::new(),
     });
     let mut baselines = Vec::new();
+    let topology = setting.converter.parameters().converter.topology;
+    if topology != Topology::Buck && !setting.scenario.baselines.is_empty() {
+        let word = topology.word();
+        let left_out =
+            format!("no classical controllers beside the policy: they have no design for a {word} converter");
+        setting.notes.push(left_out);
+        setting.scenario.baselines.clear();
+    }
     for kind in &setting.scenario.baselines {
         let design = Baseline::new(*kind, setting.converter.parameters(), setting.v_ref)?;
         baselines.push((kind.name(), Classical::from(design)));

@@ -104,11 +104,13 @@ impl Setting {
             return Err(Fault::in_file(file, message).into());
         };
         let set: Vec<(&str, f64)> = scenario.set.iter().map(|(key, value)| (key.as_str(), *value)).collect();
-        let nominal = varied(&Parameters::from_file(trained_on.as_path())?, &set);
+        let nominal = varied(&Parameters::buck_from_file(trained_on.as_path(), "a transfer")?, &set);
+        // `[set]` may name another
+        nominal.require_buck("a transfer")?;
         let v_ref = v_ref(scenario.v_ref, &policy, file)?;
         suits(&policy, &nominal, v_ref, trained_on)?;
         Ok(Self {
-            trained_on: Losses::of(&nominal),
+            trained_on: Losses::of(&nominal)?,
             scenario,
             policy,
             nominal,

@@ -41,7 +41,7 @@ pub fn transfer<E: Environment>(
 ) -> Result<Findings, Error> {
     let mut benches = Vec::new();
     for path in real {
-        let parameters = Parameters::from_file(path.as_path())?;
+        let parameters = Parameters::buck_from_file(path.as_path(), "a transfer")?;
         suits(&setting.policy, &parameters, setting.v_ref, path)?;
         benches.push((path, parameters));
     }
@@ -87,7 +87,7 @@ fn one<E: Environment>(
         let mut ideal = Ideal {
             inner: unmapped,
             trained_on: setting.trained_on,
-            real: Losses::of(real),
+            real: Losses::of(real)?,
             limits: setting.policy.limits.duty,
         };
         runs.push(run(EXACT, setting, &simulated, &mut ideal, progress)?);

@@ -3,6 +3,7 @@
 mod cases;
 mod compare;
 mod netlist;
+mod topologies;
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -19,13 +20,14 @@ fn judge(case: &cases::Case, found: [f64; 3]) -> (bool, String) {
         "{v:8.1e} V {i:8.1e} A, extremes {e:8.1e} V; bounds {:?}{mark}",
         case.bounds
     );
-    (within, format!("{:24} {text}", case.name))
+    (within, format!("{:36} {text}", case.name))
 }
 
 #[test]
 fn plant_and_ngspice_agree_on_every_effect() {
     let folder = tempfile::tempdir().unwrap();
-    let cases = cases::all();
+    let mut cases = cases::all();
+    cases.extend(topologies::all());
     let (next, report) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     let work = || {
         while let Some(case) = cases.get(next.fetch_add(1, Ordering::Relaxed)) {

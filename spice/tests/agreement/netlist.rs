@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use plant::Rectifier;
-use spice::circuit::{self, COLUMNS, Circuit};
+use spice::circuit::{self, Circuit};
 
 use crate::cases::Case;
 
@@ -34,7 +34,7 @@ pub fn netlist(case: &Case, data: &str) -> String {
         n,
         ".tran 100n {end:e} 0 100n uic\n.control\nset wr_singlescale\nset numdgt=10\nrun"
     );
-    let _ = writeln!(n, "wrdata {data} {COLUMNS}\nquit\n.endc\n.end");
+    let _ = writeln!(n, "wrdata {data} {}\nquit\n.endc\n.end", circuit::columns(p));
     n
 }
 

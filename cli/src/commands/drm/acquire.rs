@@ -16,7 +16,11 @@ use crate::output;
 
 /// Measures or plans.
 pub fn run(options: &Acquire) -> Result<Outcome, Failure> {
-    let parameters = options.plant.as_deref().map(Parameters::from_file).transpose()?;
+    let parameters = options
+        .plant
+        .as_deref()
+        .map(|path| Parameters::buck_from_file(path, "`drm acquire`"))
+        .transpose()?;
     let nominal = parameters.as_ref().map(|parameters| parameters.converter.v_in);
     let v_in = options.v_in.or(nominal).unwrap_or_default();
     let mut plan = Plan::new(v_in, &options.duties.0, &options.loads.settings(), options.cool_down)?;

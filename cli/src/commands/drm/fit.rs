@@ -55,7 +55,11 @@ fn fit_options(options: &Fit) -> Result<FitOptions, Failure> {
             return Err(messages::not_positive(name, value).into());
         }
     }
-    let plant = options.plant.as_deref().map(Parameters::from_file).transpose()?;
+    let plant = options
+        .plant
+        .as_deref()
+        .map(|path| Parameters::buck_from_file(path, "`drm fit`"))
+        .transpose()?;
     let continuous = plant.as_ref().is_some_and(|plant| Conduction::of(plant).is_none());
     Ok(FitOptions {
         form: match options.terms {

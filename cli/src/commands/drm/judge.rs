@@ -60,7 +60,10 @@ fn steady(options: &Judge, map: &DutyRatioMap) -> Result<Option<Vec<Steady>>, Fa
     let (Some(real), Some(nominal), Some(v_ref)) = (&options.plant, &options.nominal, options.v_ref) else {
         return Ok(None);
     };
-    let (real, nominal) = (Parameters::from_file(real)?, Parameters::from_file(nominal)?);
+    let (real, nominal) = (
+        Parameters::buck_from_file(real, "`drm judge`")?,
+        Parameters::buck_from_file(nominal, "`drm judge`")?,
+    );
     if !(v_ref > 0.0 && v_ref < real.converter.v_in.min(nominal.converter.v_in)) {
         let message = Message::new("--v-ref is out of reach").found(format!("{v_ref} V"));
         return Err(message.expected("above 0 and below the input voltages").into());

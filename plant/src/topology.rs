@@ -1,0 +1,111 @@
+//! What tells one topology from another: one row of numbers for each, and the loss-free steady state.
+//!
+//! ```text
+//! buck         v_in ── main ──┬── L ── v_out        main on: source and output; off: output alone
+//!                           second
+//! boost        v_in ── L ──┬── second ── v_out      main on: source alone; off: source and output
+//!                         main
+//! buck-boost   v_in ── main ──┬── second ── -v_out  main on: source alone; off: output alone
+//!                             L
+//! ```
+//!
+//! `second` is the diode, or the second switch with its body diode; what is not drawn goes to the return. Equations:
+//! Erickson and Maksimovic, Fundamentals of Power Electronics, chapters 2 (ratios), 5 (DCM) and 8 (right half-plane zero).
+
+use toml_input::{Fault, Faults, Message};
+
+use crate::parameters::{Parameters, Topology};
+
+/// The shares of the inductor's current that the source delivers and the output receives.
+pub(crate) type Shares = (f64, f64);
+
+impl Topology {
+    /// Its word in a plant file.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Topology::Buck => "buck",
+            Topology::Boost => "boost",
+            Topology::BuckBoost => "buck-boost",
+        }
+    }
+
+    /// Shares while the main switch conducts.
+    pub(crate) fn on(self) -> Shares {
+        match self {
+            Topology::Buck => (1.0, 1.0),
+            Topology::Boost | Topology::BuckBoost => (1.0, 0.0),
+        }
+    }
+
+    /// Shares while the diode or the second switch conducts.
+    pub(crate) fn off(self) -> Shares {
+        match self {
+            Topology::Buck | Topology::BuckBoost => (0.0, 1.0),
+            Topology::Boost => (1.0, 1.0),
+        }
+    }
+
+    /// Whether source, inductor, diode and output are in series, so that current begins without the switch as soon as the
+    /// output lies below the source.
+    pub(crate) fn starts_by_itself(self) -> bool {
+        self.off() == (1.0, 1.0)
+    }
+
+    /// The duty that holds `v_out` without losses, in continuous conduction; 0 or 1 where none does.
+    #[must_use]
+    pub fn duty(self, v_in: f64, v_out: f64) -> f64 {
+        let duty = match self {
+            Topology::Buck => v_out / v_in,
+            Topology::Boost => 1.0 - v_in / v_out,
+            Topology::BuckBoost => v_out / (v_in + v_out),
+        };
+        duty.clamp(0.0, 1.0)
+    }
+
+    /// What the source delivers of an inductor current `i_l` at that duty, A.
+    pub(crate) fn i_in(self, i_l: f64, v_in: f64, v_out: f64) -> f64 {
+        match self {
+            // by the balance of power, whose bits existing runs have
+            Topology::Buck => i_l * v_out / v_in,
+            Topology::Boost => i_l,
+            Topology::BuckBoost => i_l * self.duty(v_in, v_out),
+        }
+    }
+
+    /// Ripple of the inductor's current at that duty, times the inductance over the period, V.
+    pub(crate) fn ripple(self, v_in: f64, v_out: f64) -> f64 {
+        match self {
+            Topology::Buck => v_out * (1.0 - v_out / v_in),
+            Topology::Boost | Topology::BuckBoost => v_in * self.duty(v_in, v_out),
+        }
+    }
+}
+
+impl Parameters {
+    /// Refuses every topology but the buck, for what is built for that one alone; `what` is its name, such as `drm fit`.
+    ///
+    /// # Errors
+    /// Another topology.
+    pub fn require_buck(&self, what: &str) -> Result<(), Faults> {
+        match other_than_buck(self, what) {
+            None => Ok(()),
+            Some(message) => Err(Fault::from(message).into()),
+        }
+    }
+}
+
+/// What is said where `what` is built for the buck alone and the converter is another.
+pub(crate) fn other_than_buck(p: &Parameters, what: &str) -> Option<Message> {
+    let other = match p.converter.topology {
+        Topology::Buck => return None,
+        other => other.word(),
+    };
+    let message = Message::new(format!("{what} is built for the buck converter alone"));
+    let message = message.found(format!("`converter.topology` is \"{other}\""));
+    Some(
+        message
+            .expected("\"buck\"")
+            .hint("its formulas hold for no other topology; `simulate` takes any"),
+    )
+}

@@ -5,7 +5,7 @@
 //! that a feature looks back, over its plausible range. A feature behind another filter than a delay is a coordinate of
 //! its own, for its value depends on a whole history.
 
-use policy::{Expr, Feature, Filter, Input, Interval, Policy};
+use policy::{Expr, Feature, Input, Interval, Policy};
 use serde::Serialize;
 
 use crate::form::{Form, Replacement, rounding};

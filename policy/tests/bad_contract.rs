@@ -323,6 +323,7 @@ fn files_outside_the_root_are_refused() {
 
 /// Nothing of the file is read: a message about it would show a line of it.
 #[test]
+#[allow(clippy::disallowed_methods, reason = "a folder beside the one that `Folder` makes")]
 fn files_outside_the_contracts_folder_are_refused_unread() {
     let folder = Folder::new();
     let options = policy::ReadOptions {

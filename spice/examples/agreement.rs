@@ -7,6 +7,7 @@ use std::path::Path;
 use report::{Axis, BarChart, BarPanel, Colour, ReportError, Svg};
 
 #[path = "../tests/agreement/cases.rs"]
+#[allow(dead_code, reason = "the bounds are the test's")]
 mod cases;
 #[path = "../tests/agreement/compare.rs"]
 mod compare;

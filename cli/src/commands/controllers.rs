@@ -26,8 +26,7 @@ pub fn start(policy: &Policy, kind: ControllerKind) -> Result<Named, Error> {
     let (language, name) = match kind {
         ControllerKind::Interpreter => {
             return Ok(Named {
-                // beside a run in another format nobody could tell which is which
-                name: format!("interpreter, {}", policy.numeric_format.name()),
+                name: "interpreter".to_owned(),
                 controller: interpreter(policy)?,
             });
         }

@@ -85,8 +85,9 @@ impl Findings {
     pub fn summary(&self) -> String {
         let setting = &self.setting;
         let mut out = format!(
-            "policy  {} ({})\nplant   {}\n\n{}\n",
+            "policy  {} in {} ({})\nplant   {}\n\n{}\n",
             setting.policy.name,
+            setting.policy.numeric_format.name(),
             self.controller,
             words::plant_text(setting),
             words::explanation(setting).replace(". ", ".\n")

@@ -83,7 +83,8 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         // a step of a converter is named beside other causes; where structure is left nothing is named, not even this
         causes.extend(lattice);
     }
-    let shifts = pair.as_ref().map_or_else(Vec::new, |pair| pair.shifts(&problem, state));
+    // a model that does not explain the training records says nothing about a change between them and the others
+    let shifts = (pair.as_ref().filter(|_| explained)).map_or_else(Vec::new, |pair| pair.shifts(&problem, state));
     let near = match explained {
         true => String::new(),
         false => nearest(&named, attribution.removed(&problem)),

@@ -82,6 +82,39 @@ fn run(parameters: &Parameters, duties: [f64; 4], seed: u64, shift: f64) -> Stri
     text
 }
 
+/// A sensor that bends and rings: no cause of the list, and the same in both records.
+#[test]
+fn what_nothing_explains_is_no_change_between_the_records() {
+    let parameters = Parameters::paper_table();
+    let strange = |duties: [f64; 4], seed: u64| {
+        let text = run(&parameters, duties, seed, 0.0);
+        let bend = |(line, text): (usize, &str)| {
+            let cells: Vec<&str> = text.split(',').collect();
+            match (line, cells.as_slice()) {
+                (0, _) => format!("{text}\n"),
+                (_, [t, d, v, r]) => {
+                    let v: f64 = v.parse().unwrap();
+                    // a sensor that bends, and rings with the row
+                    let bent = v + 0.03 * (v - 98.0).powi(2) + 0.8 * (line as f64 * 2.1).sin();
+                    format!("{t},{d},{bent:.4},{r}\n")
+                }
+                _ => panic!("{text}"),
+            }
+        };
+        text.lines().enumerate().map(bend).collect::<String>()
+    };
+    let train = vec![record("train.csv", &strange([0.5, 0.55, 0.45, 0.5], 1), &parameters)];
+    let held = record("held.csv", &strange([0.48, 0.44, 0.56, 0.5], 2), &parameters);
+    let findings = diagnose(&parameters, train, &[held], &|_| {}).findings;
+    assert_eq!(findings.verdict, Verdict::Unexplained, "{}", findings.sentence);
+    assert!(
+        !findings.sentence.contains("something shifted"),
+        "{}",
+        findings.sentence
+    );
+    assert!(findings.gain.shifts.is_empty());
+}
+
 #[test]
 fn a_held_out_record_of_another_bench_is_noticed_and_one_of_the_same_is_not() {
     let mut parameters = Parameters::paper_table();

@@ -280,3 +280,45 @@ fn an_interrupted_simulation_ends_with_130_and_writes_nothing() {
         assert!(!desk.path("out").exists());
     }
 }
+
+/// The loop needs a plant alone; what has formulas for the buck says so and is left out, or refuses.
+#[test]
+fn a_boost_is_simulated_and_what_is_built_for_the_buck_says_so() {
+    let desk = Desk::new("minimal");
+    desk.write(
+        "boost.toml",
+        "[converter]\ntopology = \"boost\"\nv_in = 50.0\ninductance = 2e-3\ncapacitance = 1.5e-3\nf_sw = 10e3\n",
+    );
+    desk.write(
+        "s.toml",
+        "plant = \"boost.toml\"\nv_ref = 100.0\nload_steps = [[200, 300]]\ninstants = 1\n",
+    );
+    let said = desk.succeed("simulate s.toml --policy policy --out out");
+    for words in [
+        "no classical controllers beside the policy",
+        "limit is built for the buck converter alone",
+        "\"boost\"",
+    ] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    let listed = listing(&desk.path("out"));
+    assert!(listed.iter().any(|name| name.ends_with("-policy.csv")), "{listed:?}");
+    assert!(!listed.iter().any(|name| name.ends_with("-pid.csv")), "{listed:?}");
+    // a boost does not go below its source
+    desk.edit("boost.toml", "v_in = 50.0", "v_in = 150.0");
+    desk.refuse(
+        "simulate s.toml --policy policy --out below",
+        &["boost", "cannot hold this voltage"],
+    );
+    desk.write(
+        "run.csv",
+        "t,duty,v_out,i_out\n0,0.5,100,2\n1e-4,0.5,100,2\n2e-4,0.5,100,2\n",
+    );
+    let refusals = [
+        "diagnose --model boost.toml --train run.csv --out found",
+        "drm acquire --plant boost.toml --duties 0.4,0.5 --powers 100,200 --out points.csv",
+    ];
+    for line in refusals {
+        desk.refuse(line, &["built for the buck converter alone"]);
+    }
+}

@@ -75,6 +75,7 @@ const AIMS: [f64; 6] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.47];
 // as long as a scenario looks by default: 30 ms at 10 kHz
 const HORIZON: usize = 300;
 /// Periods at rest after which nothing more can come.
+// outlasts the duties that are under way, one or two; the tests of the limit already hold with a single one
 const AT_REST: usize = 6;
 
 impl Question {
@@ -283,6 +284,7 @@ impl Run {
             self.left = true;
             self.bound.settling = (self.periods as f64 - self.phase) * self.t;
         }
+        // below every digit of a table; 1e-4 gives the same limits in the tests
         self.at_rest = if error < 1e-6 * self.v_ref { self.at_rest + 1 } else { 0 };
     }
 }

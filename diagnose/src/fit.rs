@@ -361,7 +361,8 @@ impl Normal {
     fn step(&self, damping: f64) -> Vec<f64> {
         let mut matrix = self.matrix.clone();
         for (n, row) in matrix.iter_mut().enumerate() {
-            // a parameter without any effect has an equation of zeros
+            // a parameter without any effect has an equation of zeros; that of any other counts squared deviations in noises,
+            // and is far above this
             row[n] = row[n] * (1.0 + damping) + 1e-12;
         }
         solve(&matrix, &self.right)
@@ -399,7 +400,7 @@ pub fn solve(matrix: &[Vec<f64>], right: &[f64]) -> Vec<f64> {
                 false => 0.0,
             };
         }
-        // rounding of the sums: such a direction would get a step of any size
+        // rounding of the sums, a thousand units of binary64 for as many rows: such a direction would get a step of any size
         if l[row][row] * l[row][row] < 1e-13 * matrix[row][row] {
             l[row][row] = 0.0;
         }

@@ -13,6 +13,7 @@ use super::power_of_two;
 /// More sweeps change nothing that matters; most networks are settled after three.
 const SWEEPS: usize = 16;
 /// Largest distance of a row exponent from the layer's median.
+// the digits of binary32: a neuron that much smaller than the others is lost in their sums, whatever its exponent
 const LARGEST: i32 = 24;
 
 /// Row exponent of every output of every layer; 0 in the last layer and before what is not homogeneous.

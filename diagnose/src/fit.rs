@@ -288,6 +288,7 @@ impl Fitter<'_> {
         state: &State,
         damping: &mut f64,
     ) -> Option<(State, Vec<f64>)> {
+        // each try damps ten times more: what does not descend with a step of 1e-5 does not descend
         for _ in 0..5 {
             let step = round.normal.step(*damping);
             let mut moved = values.to_vec();

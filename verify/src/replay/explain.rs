@@ -13,7 +13,7 @@
 use interp::{Real, Trace};
 use policy::{Feature, Filter, Policy};
 
-use super::{allowed, ends};
+use super::values::{allowed, ends};
 
 /// Rows in which a relation has to hold, as a share.
 // some rows of a log are odd: a clip that only the log has, the first rows of an episode

@@ -7,6 +7,7 @@ use measured::{ColumnMap, Located, Options, Quantity, Sheet, table_faults};
 use policy::Policy;
 use toml_input::{Fault, Faults, Message};
 
+use super::values::ends;
 use crate::traces::SignalColumns;
 
 /// Rows may be apart by this much more or less than the sample period.
@@ -168,7 +169,7 @@ impl Log {
             (
                 signal.name.clone(),
                 values.iter().filter(is_outside).count(),
-                super::ends(&values),
+                ends(&values),
             )
         });
         left.filter(|(_, rows, _)| *rows > 0).collect()

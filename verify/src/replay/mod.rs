@@ -12,6 +12,7 @@
 mod explain;
 mod log;
 mod text;
+mod values;
 
 use interp::{Controller, Real, Trace};
 use policy::{Policy, Scalar};
@@ -23,6 +24,7 @@ pub use text::text;
 
 use explain::Course;
 use log::Applied;
+use values::{allowed, ends};
 
 /// What differs less than this share of the largest logged magnitude is equal.
 // a log has five digits at least, and an environment in binary32 adds in another order than the contract
@@ -149,18 +151,6 @@ pub fn replay(policy: &Policy, log: &Log, tolerance: f64, exploring: bool) -> Re
         tolerance,
         notes: log.notes.clone(),
     })
-}
-
-/// Smallest and largest.
-fn ends(values: &[f64]) -> [f64; 2] {
-    let lowest = values.iter().copied().fold(f64::INFINITY, f64::min);
-    let highest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    [lowest, highest]
-}
-
-/// How far apart two values of a feature may be.
-fn allowed(logged: &[f64], tolerance: f64) -> f64 {
-    tolerance * logged.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()))
 }
 
 fn compare(own: &[f64], logged: &[f64], log: &Log, tolerance: f64) -> Compared {

@@ -27,6 +27,8 @@ enum Part {
     Peers,
     /// Times on this machine.
     Host,
+    /// Instruction counts of what policyc makes: minutes, where the peers' builds take most of an hour.
+    Counts,
 }
 
 fn main() -> ExitCode {
@@ -36,11 +38,12 @@ fn main() -> ExitCode {
         ["--json"] => (true, Part::All, None),
         ["--peers"] => (false, Part::Peers, None),
         ["--host"] => (false, Part::Host, None),
+        ["--counts"] => (true, Part::Counts, None),
         ["--picture", path] => (false, Part::Peers, Some(PathBuf::from(path))),
         _ => {
             eprintln!(
                 "error: `bench` takes --json, --peers (Cortex-M4F alone), --picture FILE.svg (of that), --host (times on this \
-                 machine alone), or nothing"
+                 machine alone), --counts (instruction counts without peers, as JSON), or nothing"
             );
             return ExitCode::from(2);
         }
@@ -102,21 +105,21 @@ fn is_counted(target: &TargetSpec, name: &str, format: NumericFormat, assembly: 
 fn rows(part: Part) -> Result<Vec<Row>, Failure> {
     let bench = Bench::new()?;
     match part {
-        Part::All => Ok([counts(&bench, false)?, host(&bench)?].concat()),
-        Part::Peers => counts(&bench, true),
+        Part::All => Ok([counts(&bench, part)?, host(&bench)?].concat()),
+        Part::Peers | Part::Counts => counts(&bench, part),
         Part::Host => host(&bench),
     }
 }
 
 /// Instructions on the emulated cores; with `only_peers` on that of the peers.
-fn counts(bench: &Bench, only_peers: bool) -> Result<Vec<Row>, Failure> {
+fn counts(bench: &Bench, part: Part) -> Result<Vec<Row>, Failure> {
     let mut rows = Vec::new();
     for (name, path) in [
         ("bench", "bench/policy/policy.toml"),
         ("buck12", "examples/buck12/policy.toml"),
     ] {
         let policy = policy::load(&root().join(path)).map_err(|faults| Failure(faults.to_string()))?;
-        let is_wanted = |target: &&TargetSpec| !only_peers || name == "bench" && target.name == PEERS_CORE;
+        let is_wanted = |target: &&TargetSpec| part != Part::Peers || name == "bench" && target.name == PEERS_CORE;
         let emulated = targets::TARGETS.iter();
         let emulated = emulated.filter(|target| matches!(target.runner, Runner::Emulated(_)));
         for target in emulated.filter(is_wanted) {
@@ -134,7 +137,7 @@ fn counts(bench: &Bench, only_peers: bool) -> Result<Vec<Row>, Failure> {
             if target.fpu != Fpu::None && name == "bench" {
                 rows.extend(bench.naive(&policy, target)?);
             }
-            if target.name == PEERS_CORE && name == "bench" {
+            if target.name == PEERS_CORE && name == "bench" && part != Part::Counts {
                 rows.extend(peers::rows(bench, &policy, target, &root()));
             }
         }

@@ -27,7 +27,8 @@ usage: cargo xtask <command>
   book                              only the book: links, contents, mdBook
   words                             words of each page, and figures per hundred of them
   comments                          share of the lines of each crate that say why
-  bench [--json|--peers|--host]     instruction counts and times of the generated network (docs/results/kernels.md)
+  bench [--json|--counts|--peers|--host]
+                                    instruction counts and times of the generated network (docs/results/kernels.md)
   blind --seed S --out DIR ...      blind cases for the diagnosis and their score (docs/reference/blind-cases.md; --help)
 ";
 

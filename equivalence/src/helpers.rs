@@ -44,24 +44,14 @@ const MODELS: [Model; 16] = [
         arguments: &[("flag", Of::Flag), ("then", Of::Number), ("otherwise", Of::Number)],
         says: "is `flag ? then : otherwise` for a flag of 0 or 1, to the bit",
         arithmetic: PLAIN,
-        claim: |float, x, got| Claim {
-            given: vec![is_flag(float, x[0])],
-            holds: float
-                .terms
-                .equal(got, float.terms.choose(is_set(float, x[0]), x[1], x[2])),
-        },
+        claim: chosen,
     },
     Model {
         name: "select_integer",
         arguments: &[("flag", Of::Flag), ("then", Of::Integer), ("otherwise", Of::Integer)],
         says: "is `flag ? then : otherwise` for a flag of 0 or 1",
         arithmetic: PLAIN,
-        claim: |float, x, got| Claim {
-            given: vec![is_flag(float, x[0])],
-            holds: float
-                .terms
-                .equal(got, float.terms.choose(is_set(float, x[0]), x[1], x[2])),
-        },
+        claim: chosen,
     },
     Model {
         name: "within",
@@ -252,6 +242,16 @@ fn is_set(float: Float<'_>, flag: Term) -> Term {
 /// Bits of a number that is not negative: what a bound has.
 fn is_magnitude(float: Float<'_>, bits: Term) -> Term {
     float.terms.order("bvule", bits, float.constant(f64::INFINITY))
+}
+
+/// The second argument if the flag is 1, the third if it is 0.
+fn chosen(float: Float<'_>, x: &[Term], got: Term) -> Claim {
+    Claim {
+        given: vec![is_flag(float, x[0])],
+        holds: float
+            .terms
+            .equal(got, float.terms.choose(is_set(float, x[0]), x[1], x[2])),
+    }
 }
 
 fn always(float: Float<'_>, got: Term, condition: Term) -> Claim {

@@ -300,3 +300,19 @@ fn replay_names_initial_duty_time_constant_and_a_shift_of_the_duties() {
     let stdout = said(&log(0.5, 0.04));
     assert!(stdout.contains("plus 0.08"), "{stdout}");
 }
+
+/// What is left of 100 V - v_out at rest is the rounding of binary32, and no feature that is wrong.
+#[test]
+fn replay_of_a_settled_converter_is_equal_up_to_the_rounding_of_binary32() {
+    let desk = desk(&environment());
+    let mut text = "v_out,i_l,i_out,obs_0\n".to_owned();
+    for k in 0..50 {
+        let e = 1e-5 * f64::from(k % 7);
+        text += &format!("{:.9},2,2,{:.12}\n", 100.0 - e, 0.2 * e);
+    }
+    desk.write("log.csv", &text);
+    desk.succeed("replay buck12 log.csv");
+    // a tenth of a volt is not
+    desk.write("log.csv", &text.replace("2,2,0.00000", "2,2,0.02000"));
+    assert_eq!(desk.type_in("replay buck12 log.csv").code, Some(1));
+}

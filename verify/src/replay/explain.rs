@@ -100,8 +100,8 @@ struct Logged<'a> {
 }
 
 impl<'a> Logged<'a> {
-    fn new(values: &'a [f64], tolerance: f64) -> Self {
-        let allowed = allowed(values, tolerance);
+    fn new(feature: &Feature, values: &'a [f64], tolerance: f64) -> Self {
+        let allowed = allowed(feature, values, tolerance);
         let [low, high] = ends(values);
         let at = |end: f64| values.iter().filter(|value| (*value - end).abs() <= allowed).count();
         // one row has to be the highest; several of exactly one value are held there, unless all are
@@ -162,8 +162,8 @@ pub(super) fn explain(
     values: &[f64],
     tolerance: f64,
 ) -> Option<String> {
-    let logged = Logged::new(values, tolerance);
     let feature = policy.features.get(index)?;
+    let logged = Logged::new(feature, values, tolerance);
     let own = course.features.get(index)?;
     if let Some(text) = starts(feature, course, own, &logged) {
         return Some(text);

@@ -126,7 +126,7 @@ pub fn replay(policy: &Policy, log: &Log, tolerance: f64, exploring: bool) -> Re
             name: feature.name.clone(),
             own: ends(own),
             logged: logged.map(|logged| {
-                let mut compared = compare(own, logged, log, tolerance);
+                let mut compared = compare(own, logged, log, allowed(feature, logged, tolerance));
                 if compared.first_line.is_some() {
                     compared.explanation = explain::explain(policy, &course, index, logged, tolerance);
                 }
@@ -153,8 +153,7 @@ pub fn replay(policy: &Policy, log: &Log, tolerance: f64, exploring: bool) -> Re
     })
 }
 
-fn compare(own: &[f64], logged: &[f64], log: &Log, tolerance: f64) -> Compared {
-    let allowed = allowed(logged, tolerance);
+fn compare(own: &[f64], logged: &[f64], log: &Log, allowed: f64) -> Compared {
     let differences: Vec<f64> = own
         .iter()
         .zip(logged)

@@ -47,8 +47,12 @@ static {number} {n}_leaky_relu({number} x, {number} slope)
             "
 static int32_t {n}_leaky_integer(int32_t x, int32_t slope)
 {{
+#if defined(__FRAMAC__)
+    return (x < 0) ? (((x * slope) + 16384) >> 15) : x;
+#else
     const int32_t negative = x >> 31;
     return (x & ~negative) | ((((x * slope) + 16384) >> 15) & negative);
+#endif
 }}",
             n = c.n
         )]

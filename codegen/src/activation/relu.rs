@@ -34,16 +34,26 @@ static {number} {n}_relu({number} x)
             "    const {word} bits = {n}_bits(x);
     return {n}_from_bits(bits & ~(({word})0 - (bits >> {top})));"
         );
+        // what a mask leaves, intervals do not see; a NaN passes, as it does below
+        let branches = format!("    return (x <= 0.0{suffix}) ? 0.0{suffix} : x;");
         // where floats are computed in hardware a sum and a product are faster than the way through integer registers
         let body = match c.has_fpu {
             true => format!(
-                "#if defined(__GNUC__)
+                "#if defined(__FRAMAC__)
+{branches}
+#elif defined(__GNUC__)
     return (x + __builtin_fabs{suffix}(x)) * 0.5{suffix};
 #else
 {masked}
 #endif"
             ),
-            false => masked,
+            false => format!(
+                "#if defined(__FRAMAC__)
+{branches}
+#else
+{masked}
+#endif"
+            ),
         };
         vec![head, body, "}".to_owned()]
     }
@@ -60,7 +70,9 @@ static {number} {n}_relu({number} x)
 /* x if x > 0 else 0; never above 32767 */
 static int32_t {n}_positive(int32_t x)
 {{
-#if defined({u}_DSP)
+#if defined(__FRAMAC__)
+    return (x > 0) ? x : 0;
+#elif defined({u}_DSP)
     return (int32_t)__usat(x, 15);
 #else
     return x & ~{n}_below_zero((uint32_t)x);

@@ -26,7 +26,11 @@ impl Function for Softsign {
 /* x / (1 + |x|) */
 static {number} {n}_softsign({number} x)
 {{
+#if defined(__FRAMAC__)
+    return x / ({one} + {n}_magnitude(x));
+#else
     return x / ({one} + {n}_from_bits({n}_bits(x) & {magnitude}));
+#endif
 }}"
         )]
     }

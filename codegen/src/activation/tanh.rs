@@ -37,10 +37,16 @@ impl Function for Tanh {
 /* x limited to the magnitude with these bits, in integers so that loops over it can be vectorised */
 static {number} {n}_limit({number} x, {word} limit)
 {{
+#if defined(__FRAMAC__)
+    const {number} most = {n}_from_bits(limit);
+    const {number} end = (({n}_bits(x) >> {top}) != 0u) ? -most : most;
+    return ((x > -most) && (x < most)) ? x : end;
+#else
     const {word} bits = {n}_bits(x);
     const {word} magnitude = bits & {magnitude};
     const {word} below = ({word})0 - ((magnitude - limit) >> {top});
     return {n}_from_bits((bits & {sign}) | (magnitude & below) | (limit & ~below));
+#endif
 }}
 
 /* rational approximation, |error| < 4e-7 */

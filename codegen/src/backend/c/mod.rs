@@ -50,7 +50,12 @@ fn tidy(text: &str) -> String {
     let mut empty = false;
     for line in text.lines().map(str::trim_end) {
         if !(line.is_empty() && empty) {
-            tidied.push_str(line);
+            // what a template indents may be a line for the preprocessor
+            tidied.push_str(if line.trim_start().starts_with("#") {
+                line.trim_start()
+            } else {
+                line
+            });
             tidied.push('\n');
         }
         empty = line.is_empty();

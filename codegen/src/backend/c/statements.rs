@@ -25,6 +25,7 @@ pub struct Printer<'p> {
     prefix: &'p str,
     program: &'p Program,
     operands: Vec<String>,
+    ops: Vec<Op>,
     named: usize,
     /// Declarations in execution order.
     pub lines: Vec<String>,
@@ -39,6 +40,7 @@ impl<'p> Printer<'p> {
             operands: Vec::new(),
             named: 0,
             lines: Vec::new(),
+            ops: Vec::new(),
         }
     }
 
@@ -55,6 +57,7 @@ impl<'p> Printer<'p> {
                 None => self.named(op),
             };
             self.operands.push(text);
+            self.ops.push(op.clone());
         }
     }
 
@@ -66,9 +69,36 @@ impl<'p> Printer<'p> {
         };
         let name = format!("{letter}{}", self.named);
         self.named += 1;
-        let line = format!("const {kind} {name} = {};", self.computed(op));
-        self.lines.push(line);
+        let line = |value: String| format!("const {kind} {name} = {value};");
+        let computed = line(self.computed(op));
+        match self.branch(op) {
+            Some(branch) => {
+                let lines = ["#if defined(__FRAMAC__)".to_owned(), line(branch), "#else".to_owned()];
+                self.lines.extend(lines);
+                self.lines.extend([computed, "#endif".to_owned()]);
+            }
+            None => self.lines.push(computed),
+        }
         name
+    }
+
+    /// A selection by a comparison of the value that it selects, as a branch: only of that do the intervals of Frama-C see that
+    /// what is selected lies where it was compared.
+    fn branch(&self, op: &Op) -> Option<String> {
+        let Op::Select { flag, then, otherwise } = op else {
+            return None;
+        };
+        let v = |id: &ValueId| self.operands[*id].as_str();
+        let selected = |condition: String| format!("({condition}) ? {} : {}", v(then), v(otherwise));
+        match self.ops.get(*flag)? {
+            Op::Within { x, low, high } => {
+                let (x, low, high) = (v(x), v(low), v(high));
+                // numbers and NaN are parted by the first of the three alone
+                Some(selected(format!("({x} == {x}) && ({x} >= {low}) && ({x} <= {high})")))
+            }
+            Op::Above(x, limit) => Some(selected(format!("{} > {}", v(x), v(limit)))),
+            _ => None,
+        }
     }
 
     fn leaf(&self, op: &Op) -> Option<String> {

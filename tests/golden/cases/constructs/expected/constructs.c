@@ -216,6 +216,83 @@ static uint32_t constructs_flag(int condition)
 #define CONSTRUCTS_MOVES 1
 #endif
 
+#if defined(__FRAMAC__)
+/*
+ * The helpers as branches, for Frama-C alone: `policyc prove` runs it. What a mask selects its intervals do not see, and no
+ * compiler reads this. A comparison that holds is of numbers: that is admitted, since Eva does not conclude it.
+ */
+static float constructs_select(uint32_t flag, float then, float otherwise)
+{
+    return (flag != 0u) ? then : otherwise;
+}
+
+static uint32_t constructs_within(float x, float low, float high)
+{
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 1u;
+    }
+    return 0u;
+}
+
+static uint32_t constructs_outside(float x, float low, float high)
+{
+    return ((x < low) || (x > high)) ? 1u : 0u;
+}
+
+static float constructs_clamp(float x, float low, float high)
+{
+    const float raised = (x < low) ? low : x;
+    return (raised > high) ? high : raised;
+}
+
+static float constructs_magnitude(float x)
+{
+    return (x < 0.0f) ? -x : x;
+}
+
+/* 0, or the sign bit if x is outside, as below; a NaN is */
+static uint32_t constructs_far(float x, uint32_t bound)
+{
+    float high;
+    if (bound == 0x7F800000u) {
+        /* every number lies within the infinities */
+        if ((x >= 0.0f) || (x <= 0.0f)) {
+            /*@ admit !\is_NaN(x); */
+            return 0u;
+        }
+        return (uint32_t)1 << 31;
+    }
+    high = constructs_from_bits(bound);
+    if ((x >= -high) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+
+static uint32_t constructs_aside(float x, uint32_t difference, uint32_t bound)
+{
+    const float low = -constructs_from_bits(bound ^ difference);
+    const float high = constructs_from_bits(bound);
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+
+static uint32_t constructs_beyond(float x, uint32_t bound, uint32_t width)
+{
+    const float low = constructs_from_bits(bound);
+    const float high = constructs_from_bits(bound + width);
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+#else
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float constructs_select(uint32_t flag, float then, float otherwise)
 {
@@ -267,17 +344,6 @@ CONSTRUCTS_CODE CONSTRUCTS_APART static float constructs_clamp(float x, float lo
 #endif
 }
 
-/* oldest first, newest last; a line that is not primed reads as newest throughout */
-static float constructs_line_sum(const float *line, uint32_t length, float newest, uint32_t primed)
-{
-    uint32_t i;
-    float sum = constructs_select(primed, line[0], newest);
-    for (i = 1u; i < length; ++i) {
-        sum = sum + constructs_select(primed, line[i], newest);
-    }
-    return sum + newest;
-}
-
 /* The sign bit is set if |x| is above the number with these bits. Integers: a comparison of floats costs more, and a NaN is above. */
 CONSTRUCTS_SPARE static uint32_t constructs_far(float x, uint32_t bound)
 {
@@ -298,6 +364,18 @@ CONSTRUCTS_SPARE static uint32_t constructs_beyond(float x, uint32_t low, uint32
     const uint32_t above = constructs_bits(x) - low;
     return above | (width - above);
 }
+#endif
+
+/* oldest first, newest last; a line that is not primed reads as newest throughout */
+static float constructs_line_sum(const float *line, uint32_t length, float newest, uint32_t primed)
+{
+    uint32_t i;
+    float sum = constructs_select(primed, line[0], newest);
+    for (i = 1u; i < length; ++i) {
+        sum = sum + constructs_select(primed, line[i], newest);
+    }
+    return sum + newest;
+}
 
 CONSTRUCTS_SPARE static uint32_t constructs_line_far(const float *line, uint32_t length, uint32_t bound)
 {
@@ -311,7 +389,9 @@ CONSTRUCTS_SPARE static uint32_t constructs_line_far(const float *line, uint32_t
 /* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
 static float constructs_relu(float x)
 {
-#if defined(__GNUC__)
+#if defined(__FRAMAC__)
+    return (x <= 0.0f) ? 0.0f : x;
+#elif defined(__GNUC__)
     return (x + __builtin_fabsf(x)) * 0.5f;
 #else
     const uint32_t bits = constructs_bits(x);
@@ -327,10 +407,16 @@ static float constructs_leaky_relu(float x, float slope)
 /* x limited to the magnitude with these bits, in integers so that loops over it can be vectorised */
 static float constructs_limit(float x, uint32_t limit)
 {
+#if defined(__FRAMAC__)
+    const float most = constructs_from_bits(limit);
+    const float end = ((constructs_bits(x) >> 31) != 0u) ? -most : most;
+    return ((x > -most) && (x < most)) ? x : end;
+#else
     const uint32_t bits = constructs_bits(x);
     const uint32_t magnitude = bits & 0x7FFFFFFFu;
     const uint32_t below = (uint32_t)0 - ((magnitude - limit) >> 31);
     return constructs_from_bits((bits & 0x80000000u) | (magnitude & below) | (limit & ~below));
+#endif
 }
 
 /* rational approximation, |error| < 4e-7 */
@@ -354,7 +440,11 @@ static float constructs_tanh(float x)
 /* x / (1 + |x|) */
 static float constructs_softsign(float x)
 {
+#if defined(__FRAMAC__)
+    return x / (1.0f + constructs_magnitude(x));
+#else
     return x / (1.0f + constructs_from_bits(constructs_bits(x) & 0x7FFFFFFFu));
+#endif
 }
 
 /* What a measurement means before the network sees it. */
@@ -374,13 +464,25 @@ typedef struct {
 CONSTRUCTS_CODE CONSTRUCTS_APART static void constructs_sense(const constructs_state *state, const constructs_measurement *measured, constructs_front *front)
 {
     const uint32_t f0 = constructs_within(measured->v_out, 0.0f, 80.0f);
+#if defined(__FRAMAC__)
+    const float v1 = ((measured->v_out == measured->v_out) && (measured->v_out >= 0.0f) && (measured->v_out <= 80.0f)) ? measured->v_out : state->held[0];
+#else
     const float v1 = constructs_select(f0, measured->v_out, state->held[0]);
+#endif
     const float v2 = 0.009765625f * (float)measured->i_l;
     const float v3 = v2 + -20.0f;
     const uint32_t f4 = constructs_within(v3, -20.0f, 20.0f);
+#if defined(__FRAMAC__)
+    const float v5 = ((v3 == v3) && (v3 >= -20.0f) && (v3 <= 20.0f)) ? v3 : state->held[1];
+#else
     const float v5 = constructs_select(f4, v3, state->held[1]);
+#endif
     const uint32_t f6 = constructs_within(measured->i_out, -1.0f, 16.0f);
+#if defined(__FRAMAC__)
+    const float v7 = ((measured->i_out == measured->i_out) && (measured->i_out >= -1.0f) && (measured->i_out <= 16.0f)) ? measured->i_out : state->held[2];
+#else
     const float v7 = constructs_select(f6, measured->i_out, state->held[2]);
+#endif
     const uint32_t f8 = f0 & f4;
     const uint32_t f9 = f8 & f6;
     const float v10 = 48.0f - v1;
@@ -437,8 +539,13 @@ CONSTRUCTS_CODE CONSTRUCTS_APART static void constructs_sense(const constructs_s
     const float v61 = v7 * 0.0625f;
     const uint32_t f62 = f13 | f23;
     const uint32_t f63 = constructs_flag(f62 != 0u);
+#if defined(__FRAMAC__)
+    const uint32_t counted = (state->bad_count <= 3u) ? (state->bad_count + 1u) : state->bad_count;
+    const uint32_t bad_count = (f9 != 0u) ? 0u : counted;
+#else
     const uint32_t counted = state->bad_count + constructs_flag(state->bad_count <= 3u);
     const uint32_t bad_count = counted & (f9 - (uint32_t)1);
+#endif
     const uint32_t bridged = state->primed & constructs_flag(bad_count <= 3u);
     const uint32_t usable = f9 | bridged;
 
@@ -496,10 +603,17 @@ CONSTRUCTS_CODE CONSTRUCTS_TOGETHER static void constructs_guard(const construct
                          | constructs_far(state->mapping_b, 0x3CA3D70Au)
                          | constructs_far(state->mapping_c, 0x3DCCCCCCu)
                          | constructs_far(state->mapping_r, 0x3C23D70Au);
+#if defined(__FRAMAC__)
+    const uint32_t counters = ((4u - state->bad_count) >> 31) | (state->bad_count >> 31) | (((uint32_t)1 - state->primed) >> 31) | (state->primed >> 31);
+    const uint32_t sound = (((uint32_t)(stray >> 31) | counters) ^ (uint32_t)1)
+                         & constructs_flag((state->mapping_a + (state->mapping_r * -0.5f)) > 0.0f)
+                         & constructs_flag((state->mapping_a + (state->mapping_r * 12.0f)) > 0.0f);
+#else
     const uint32_t counters = (4u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
     const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1)
                          & constructs_flag((state->mapping_a + (state->mapping_r * -0.5f)) > 0.0f)
                          & constructs_flag((state->mapping_a + (state->mapping_r * 12.0f)) > 0.0f);
+#endif
     front->sound = constructs_flag((int)sound);
     front->usable &= sound;
 }
@@ -864,7 +978,11 @@ CONSTRUCTS_CODE CONSTRUCTS_APART static uint32_t constructs_choose(const constru
         const uint32_t above = constructs_flag(output > best);
         const uint32_t mask = (uint32_t)0 - above;
         best = constructs_select(above, output, best);
+#if defined(__FRAMAC__)
+        index = (mask != 0u) ? action : index;
+#else
         index = (action & mask) | (index & ~mask);
+#endif
     }
     return index;
 }
@@ -889,13 +1007,20 @@ CONSTRUCTS_CODE CONSTRUCTS_TOGETHER static void constructs_decide(const construc
     const uint32_t f13 = constructs_bits(v6) ^ constructs_bits(v12);
     const uint32_t f14 = constructs_flag(f13 != 0u);
     const uint32_t f15 = constructs_flag(v12 > state->soft_cap);
+#if defined(__FRAMAC__)
+    const float v16 = (v12 > state->soft_cap) ? state->soft_cap : v12;
+#else
     const float v16 = constructs_select(f15, state->soft_cap, v12);
+#endif
     const float v17 = constructs_clamp(v16, 0.3f, 0.67999995f);
     const uint32_t f18 = constructs_bits(v16) ^ constructs_bits(v17);
     const uint32_t f19 = constructs_flag(f18 != 0u);
     const uint32_t stray = constructs_far(v17, 0x7F800000u);
     const uint32_t trusted = constructs_flag((int)(front->sound & ~(uint32_t)(stray >> 31)));
     const uint32_t usable = front->usable & trusted;
+#if defined(__FRAMAC__)
+    /*@ split usable; */
+#endif
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
                           | (front->clipped << 3)
@@ -916,10 +1041,26 @@ CONSTRUCTS_CODE CONSTRUCTS_TOGETHER CONSTRUCTS_NO_LIBC static void constructs_ad
 {
     const float v0 = state->soft_cap + 0.0165f;
     const uint32_t f1 = constructs_flag(v0 > 0.67999995f);
+#if defined(__FRAMAC__)
+    const float v2 = (v0 > 0.67999995f) ? 0.67999995f : v0;
+#else
     const float v2 = constructs_select(f1, 0.67999995f, v0);
+#endif
     const float v3 = constructs_select(front->usable, v2, 0.35f);
     const uint32_t kept = (uint32_t)0 - front->sound;
     const uint32_t primed = state->primed & front->sound;
+#if defined(__FRAMAC__)
+    const float push0 = (kept != 0u) ? front->push[0] : 0.0f;
+    const float push1 = (kept != 0u) ? front->push[1] : 0.0f;
+    const float push2 = (kept != 0u) ? front->push[2] : 0.0f;
+    const float push3 = (kept != 0u) ? front->push[3] : 0.0f;
+    const float push4 = (kept != 0u) ? front->push[4] : 0.0f;
+    const float push5 = (kept != 0u) ? front->push[5] : 0.0f;
+    const float push6 = (kept != 0u) ? front->push[6] : 0.0f;
+    const float push7 = (kept != 0u) ? front->push[7] : 0.0f;
+    const float push8 = (kept != 0u) ? front->push[8] : 0.0f;
+    const float push9 = (kept != 0u) ? front->push[9] : 0.0f;
+#else
     const float push0 = constructs_from_bits(constructs_bits(front->push[0]) & kept);
     const float push1 = constructs_from_bits(constructs_bits(front->push[1]) & kept);
     const float push2 = constructs_from_bits(constructs_bits(front->push[2]) & kept);
@@ -930,6 +1071,7 @@ CONSTRUCTS_CODE CONSTRUCTS_TOGETHER CONSTRUCTS_NO_LIBC static void constructs_ad
     const float push7 = constructs_from_bits(constructs_bits(front->push[7]) & kept);
     const float push8 = constructs_from_bits(constructs_bits(front->push[8]) & kept);
     const float push9 = constructs_from_bits(constructs_bits(front->push[9]) & kept);
+#endif
     uint32_t i;
     (void)primed;
 
@@ -1087,6 +1229,9 @@ CONSTRUCTS_COLD CONSTRUCTS_APART static void constructs_crc(constructs_span *spa
 {
     const uint32_t to = constructs_place(span, span->to, length);
     uint32_t i;
+#if defined(__FRAMAC__)
+    /*@ loop unroll 0; */
+#endif
     for (i = constructs_place(span, span->from, length); i < to; ++i) {
         span->crc = constructs_crc_word(span->crc, constructs_bits(words[i]));
     }

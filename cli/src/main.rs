@@ -42,6 +42,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Compile(options) => commands::compile::run(options),
         Command::Replay(options) => commands::replay::run(options),
         Command::Verify(options) => commands::verify::run(options),
+        Command::Prove(options) => commands::prove::run(options),
         Command::Certify(options) => commands::certify::run(options),
         Command::Targets(options) => commands::targets::run(options),
         Command::Train(options) => commands::train::run(options),

@@ -36,6 +36,7 @@ fn the_help_of_every_command_names_its_arguments() {
                 "--json",
             ],
         ),
+        ("prove", &["<POLICY>", "--format", "--target", "--exhaustive", "--out"]),
         ("certify", &["<POLICY>", "--format", "--axis", "--at", "--out"]),
         ("demo", &["--out", "--steps"]),
         ("drm", &["acquire", "fit", "judge", "transfer"]),

@@ -41,6 +41,8 @@ pub enum Command {
     Replay(Replay),
     /// Compile the generated code and compare it with the interpreter, bit by bit
     Verify(Verify),
+    /// Prove what holds of the generated code for every input, with the provers that this machine has
+    Prove(Prove),
     /// Bound what the numeric format does to the Q values, and map where it can change an action
     Certify(Certify),
     /// List the deployment targets: processor, compilers, where verify runs them
@@ -63,7 +65,7 @@ impl Command {
     pub fn ends_by_itself(&self) -> bool {
         matches!(
             self,
-            Command::Simulate(_) | Command::Train(_) | Command::Drm(Drm::Transfer(_))
+            Command::Prove(_) | Command::Simulate(_) | Command::Train(_) | Command::Drm(Drm::Transfer(_))
         )
     }
 }
@@ -211,6 +213,28 @@ pub struct Verify {
     /// Machine-readable
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct Prove {
+    #[command(flatten)]
+    pub replacing: Replacing,
+    #[command(flatten)]
+    pub outside: Outside,
+    /// policy.toml or the folder that holds it
+    pub policy: PathBuf,
+    /// Numeric formats in the place of the contract's, separated by commas or given several times
+    #[arg(long, value_delimiter = ',', value_parser = format())]
+    pub format: Vec<NumericFormat>,
+    /// Deployment target whose C is proved
+    #[arg(long, default_value = "host")]
+    pub target: String,
+    /// Also try the conversions of integer formats with each of the 2^32 numbers: a quarter of a minute each
+    #[arg(long)]
+    pub exhaustive: bool,
+    /// Folder for proof.json and proof.html; made if missing
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
 }
 
 #[derive(Debug, Args)]

@@ -9,6 +9,7 @@ pub mod drm;
 pub mod inspect;
 pub mod new;
 mod progress_line;
+pub mod prove;
 pub mod replay;
 pub mod simulate;
 pub mod targets;

@@ -1,0 +1,60 @@
+//! `policyc prove`
+
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+use std::sync::atomic::Ordering;
+
+use prove::{Answer, Task, Watch, page, provers};
+
+use super::progress_line::ProgressLine;
+use crate::arguments::Prove;
+use crate::failure::Failure;
+use crate::interruption;
+use crate::outcome::Outcome;
+use crate::output;
+
+/// Proves, draws, writes.
+pub fn run(options: &Prove) -> Result<Outcome, Failure> {
+    let stop = interruption::stop_on_signal();
+    let target = codegen::target(&options.target)?;
+    let policy = super::load(&options.policy, options.outside)?;
+    let policies = match options.format.as_slice() {
+        [] => vec![policy],
+        formats => formats
+            .iter()
+            .map(|format| policy.clone().with_format(*format))
+            .collect(),
+    };
+    for policy in &policies {
+        // what cannot be generated is bad input here, and nothing was proved of it
+        codegen::sources(policy, target, &[codegen::Output::C], None)?;
+    }
+    let tasks: Vec<Task<'_>> = policies.iter().map(|policy| Task { policy, target }).collect();
+    let line = Mutex::new(ProgressLine::new());
+    let say = |what: &str| {
+        let mut line = line.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        line.show(|| what.to_owned());
+    };
+    let watch = Watch { say: &say, stop: &stop };
+    let claims = prove::run(&tasks, &provers(options.exhaustive), &watch);
+    line.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clear();
+    let (Ok(claims), false) = (claims, stop.load(Ordering::Relaxed)) else {
+        output::say("Interrupted; nothing written")?;
+        return Ok(Outcome::Interrupted);
+    };
+    let answer = Answer::new(&tasks, claims);
+    let mut json = serde_json::to_string_pretty(&answer)?;
+    json.push('\n');
+    let files = BTreeMap::from([
+        ("proof.json".to_owned(), json),
+        ("proof.html".to_owned(), page::page(&answer)?),
+    ]);
+    output::replace_own_texts(&options.out, &files, options.replacing)?;
+    output::say(&page::summary(&answer))?;
+    output::say(&format!("to look at: {}", options.out.join("proof.html").display()))?;
+    Ok(if answer.clears() {
+        Outcome::Done
+    } else {
+        Outcome::Different
+    })
+}

@@ -1,0 +1,197 @@
+//! Drivers of what is not a step: damaged states are marked, and the other functions.
+
+use super::driver::{BOTH, Entry, ONE, Writer, stated};
+
+impl Writer<'_> {
+    /// Every state that is not sound, one number outside at a time and all others arbitrary.
+    pub fn marked(&mut self) -> Entry {
+        let n = self.n().to_owned();
+        self.text.line(format!("static void marks({n}_state state)"));
+        self.text.lines([
+            "{".to_owned(),
+            format!("{n}_measurement measured;"),
+            format!("{n}_command command;"),
+            format!("{n}_front front;"),
+            "measure(&measured);".to_owned(),
+            format!("{n}_sense(&state, &measured, &front);"),
+            format!("{n}_guard(&state, &front);"),
+        ]);
+        let actions = self.policy.actions.len();
+        self.text.line(format!(
+            "{n}_decide(&state, &front, Frama_C_unsigned_int_interval(0u, {}u), &command);",
+            actions - 1
+        ));
+        let fallback = self.literal(self.number.nearest(self.policy.fallback.duty));
+        // FALLBACK and STATE, and no other bit
+        self.text
+            .check("marked_status", &format!("command.status == {}u", (1 << 1) | (1 << 8)));
+        self.text.check("marked_duty", &format!("command.duty == {fallback}"));
+        self.text.check("marked_action", "command.action_index == 0u");
+        self.any_command();
+        self.text.line(format!("{n}_commit(&state, &measured, &command);"));
+        self.text.check("kept_primed", "state.primed == 2u");
+        self.text.check("kept_bad", "state.bad_count == 0u");
+        for index in 0..self.invariant.memory {
+            self.text
+                .check(&format!("kept_{index}"), &format!("state.memory[{index}] == 0"));
+        }
+        self.text.lines(["}", ""]);
+        self.text.line("void prove_marked(void)");
+        self.text.line("{");
+        self.text.line(format!("{n}_state state;"));
+        for word in self.invariant.words.clone() {
+            let Some((low, high)) = word.ends else { continue };
+            let (low, high) = (self.literal(low), self.literal(high));
+            let place = format!("state.{}", word.place);
+            for outside in [format!("{place} < {low}"), format!("{place} > {high}")] {
+                self.text.lines([
+                    "arbitrary(&state);".to_owned(),
+                    format!("if ({outside}) {{"),
+                    "marks(state);".to_owned(),
+                ]);
+                self.text.line("}");
+            }
+            // one NaN stands for all: Eva does not tell them apart
+            let nan = match self.number.kind() {
+                "float" => "0x7FC00000u",
+                _ => "(uint64_t)0x7FF80000u << 32",
+            };
+            self.text.lines([
+                "arbitrary(&state);".to_owned(),
+                format!("{place} = {n}_from_bits({nan});"),
+                "marks(state);".to_owned(),
+            ]);
+        }
+        // two halves: in one interval the sign of what is counted down would be lost
+        let counters = [("bad_count", self.invariant.hold + 2), ("primed", 2)];
+        for (name, least) in counters {
+            for (low, high) in [(least, 0x7FFF_FFFF), (0x8000_0000, u32::MAX)] {
+                self.text.lines([
+                    "arbitrary(&state);".to_owned(),
+                    format!("state.{name} = Frama_C_unsigned_int_interval({low}u, {high}u);"),
+                    "marks(state);".to_owned(),
+                ]);
+            }
+        }
+        self.close();
+        if !self.invariant.rises {
+            let why = "coefficients that lie within their ends and whose slope is not above 0: a product of two numbers of the state";
+            self.not_stated.push(("mapping".to_owned(), why));
+        }
+        Entry {
+            function: "prove_marked",
+            about: "a state with a number or counter outside of its ends and all else arbitrary, every measurement and action",
+            stated: vec![
+                stated("marked", "The fallback is commanded, with FALLBACK and STATE set."),
+                stated(
+                    "kept",
+                    "The state stays marked: `primed` becomes 2, memories and the count of bad steps 0.",
+                ),
+            ],
+            runs: BOTH,
+        }
+    }
+
+    /// Start-up, coefficients, observation, integrity.
+    pub fn others(&mut self) -> Entry {
+        let n = self.n().to_owned();
+        self.open("prove_others");
+        let features = self.policy.features.len();
+        self.text.lines([
+            format!("{n}_check check;"),
+            format!("{} observation[{features}];", self.number.kind()),
+            "uint32_t answer;".to_owned(),
+            "arbitrary(&state);".to_owned(),
+            format!("{n}_init(&state);"),
+        ]);
+        for (index, word) in self.invariant.words.clone().iter().enumerate() {
+            self.keeps("init", index, word);
+        }
+        self.text
+            .check("init_counters", "state.bad_count == 0u && state.primed == 0u");
+        self.text
+            .lines(["sound(&state);".to_owned(), format!("{n}_reset(&state);")]);
+        for (index, word) in self.invariant.words.clone().iter().enumerate() {
+            self.keeps("reset", index, word);
+        }
+        let mut claims = vec![
+            stated("init", "`init` leaves a sound state, whatever was there."),
+            stated("reset", "`reset` leaves a sound state sound."),
+        ];
+        let coefficients: Vec<_> = self
+            .invariant
+            .words
+            .iter()
+            .filter(|word| word.place.starts_with("mapping_"))
+            .cloned()
+            .collect();
+        if !coefficients.is_empty() {
+            let arguments = vec!["ANY_NUMBER"; coefficients.len()].join(", ");
+            self.text.lines([
+                "sound(&state);".to_owned(),
+                format!("answer = {n}_set_mapping(&state, {arguments});"),
+            ]);
+            self.text.check("mapping_answer", "answer <= 1u");
+            claims.push(stated("mapping", "`set_mapping` answers 0 or 1, whatever it is given."));
+            let why = "what `set_mapping` takes over: its answer and its arguments are related, and intervals hold no relation";
+            self.not_stated.push(("mapping coefficients".to_owned(), why));
+        }
+        self.text.lines([
+            "arbitrary(&state);".to_owned(),
+            "measure(&measured);".to_owned(),
+            format!("{n}_observe(&state, &measured, observation);"),
+            "check.position = any_word;".to_owned(),
+            "check.crc = any_word;".to_owned(),
+            format!("answer = {n}_integrity_slice(&check, any_word);"),
+        ]);
+        self.text.check("integrity_answer", "answer <= 2u");
+        self.text.line(format!("answer = {n}_integrity();"));
+        self.text.check("integrity_flag", "answer <= 1u");
+        self.close();
+        claims.push(stated(
+            "integrity",
+            "`integrity` and `integrity_slice` give one of their answers, whatever the check holds.",
+        ));
+        Entry {
+            function: "prove_others",
+            about: "init, reset, set_mapping, observe, integrity and integrity_slice with every input",
+            stated: claims,
+            runs: BOTH,
+        }
+    }
+
+    /// The network with every observation.
+    pub fn q_values(&mut self) -> Entry {
+        let n = self.n().to_owned();
+        let (features, actions) = (self.policy.features.len(), self.policy.actions.len());
+        self.text.line("void prove_q_values(void)");
+        self.text.lines([
+            "{".to_owned(),
+            format!("{} observation[{features}];", self.number.kind()),
+            format!("{} q[{actions}];", self.number.kind()),
+        ]);
+        for index in 0..features {
+            self.text.line(format!("observation[{index}] = any_bits;"));
+        }
+        self.text.line(format!("{n}_q_values(observation, q);"));
+        if self.is_integer() {
+            // outputs are within 2^24 in units of at most 1 (contract section 6b): no NaN, whatever the observation
+            for index in 0..actions {
+                self.text.check(
+                    &format!("number_{index}"),
+                    &format!("q[{index}] >= 0 || q[{index}] <= 0"),
+                );
+            }
+        }
+        self.close();
+        Entry {
+            function: "prove_q_values",
+            about: "q_values with every observation",
+            stated: match self.is_integer() {
+                true => vec![stated("number", "Every Q value is a number, whatever the observation.")],
+                false => Vec::new(),
+            },
+            runs: ONE,
+        }
+    }
+}

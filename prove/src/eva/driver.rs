@@ -1,0 +1,402 @@
+//! Drivers in C: what Eva analyses together with the generated controller.
+//!
+//! ```text
+//!  sound state, or any bits ─┐
+//!                            ├─► one call ─► check ... what comes out
+//!  any measurement ──────────┘
+//! ```
+//!
+//! They are made from the policy and the numeric contract. Of the generated code they know its interface and, for what needs no
+//! network, the three functions of a step around it.
+
+use policy::{NumericFormat, Policy};
+
+use super::frama_c::{Machine, Numbers};
+use super::invariant::{Invariant, Shown, Word, slices};
+use super::number::Number;
+use super::text::{Labels, Text};
+
+const LITTLE: Machine = Machine("x86_32");
+const BIG: Machine = Machine("ppc_32");
+/// A step is also looked through for NaN and infinities. What is finite on one machine is so on the other: both round alike.
+const STEP: &[(Machine, Numbers)] = &[(LITTLE, Numbers::Any), (BIG, Numbers::Any), (LITTLE, Numbers::Finite)];
+/// Both byte orders, every bit pattern.
+pub(super) const BOTH: &[(Machine, Numbers)] = &[(LITTLE, Numbers::Any), (BIG, Numbers::Any)];
+/// What has no bytes in another order: arithmetic alone.
+pub(super) const ONE: &[(Machine, Numbers)] = &[(LITTLE, Numbers::Any)];
+
+/// A sentence about an entry, under the label of its checks.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Stated {
+    /// Start of the labels of all checks that together are this claim.
+    pub label: &'static str,
+    /// The sentence.
+    pub text: String,
+}
+
+/// A function of the driver.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Entry {
+    /// Name of the function.
+    pub function: &'static str,
+    /// What is called, with which inputs.
+    pub about: &'static str,
+    /// What holds after it, beside that nothing goes wrong in it.
+    pub stated: Vec<Stated>,
+    /// Machines and numbers that it is analysed under.
+    pub runs: &'static [(Machine, Numbers)],
+}
+
+/// A file of C and its entries.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Driver {
+    pub text: String,
+    pub labels: Labels,
+    pub entries: Vec<Entry>,
+    /// Claims that are left to the contract's argument: place and why.
+    pub not_stated: Vec<(String, &'static str)>,
+}
+
+/// The driver of a policy in its numeric format.
+pub(super) fn driver(policy: &Policy) -> Driver {
+    let invariant = Invariant::of(policy);
+    let mut writer = Writer {
+        policy,
+        number: Number::of(policy.numeric_format),
+        invariant,
+        text: Text::default(),
+        not_stated: Vec::new(),
+    };
+    writer.inputs();
+    let mut entries = vec![writer.step(), writer.damaged(), writer.marked()];
+    entries.extend(writer.slices());
+    entries.extend([writer.others(), writer.q_values()]);
+    let (text, labels) = writer.text.end();
+    Driver {
+        text,
+        labels,
+        entries,
+        not_stated: writer.not_stated,
+    }
+}
+
+pub(super) struct Writer<'a> {
+    pub policy: &'a Policy,
+    pub number: Number,
+    pub invariant: Invariant,
+    pub text: Text,
+    pub not_stated: Vec<(String, &'static str)>,
+}
+
+pub(super) fn stated(label: &'static str, text: impl Into<String>) -> Stated {
+    Stated {
+        label,
+        text: text.into(),
+    }
+}
+
+impl Writer<'_> {
+    pub fn literal(&self, x: f64) -> String {
+        self.number.literal(x)
+    }
+
+    /// A prefix of the policy's functions.
+    pub fn n(&self) -> &str {
+        &self.policy.name
+    }
+
+    /// Functions that make the inputs.
+    fn inputs(&mut self) {
+        let (n, kind) = (self.n().to_owned(), self.number.kind());
+        let most = self.literal(self.number.largest());
+        self.text.lines([
+            format!("#include \"{n}.c\""),
+            "#include \"__fc_builtin.h\"".to_owned(),
+            String::new(),
+            "/* every bit pattern of the type */".to_owned(),
+            format!("extern volatile {kind} any_bits;"),
+            "extern volatile uint32_t any_word;".to_owned(),
+            "extern volatile int32_t any_code;".to_owned(),
+            String::new(),
+            "#if defined(FINITE)".to_owned(),
+            format!("#define ANY_NUMBER Frama_C_{kind}_interval(-{most}, {most})"),
+            "#else".to_owned(),
+            "#define ANY_NUMBER any_bits".to_owned(),
+            "#endif".to_owned(),
+            String::new(),
+        ]);
+        self.text
+            .line(format!("static void measure({n}_measurement *measured)"));
+        self.text.line("{");
+        for signal in &self.policy.signals {
+            let any = if signal.adc.is_some() { "any_code" } else { "ANY_NUMBER" };
+            self.text.line(format!("measured->{} = {any};", signal.name));
+        }
+        self.text.lines(["}", ""]);
+        self.text.line(format!("static void arbitrary({n}_state *state)"));
+        self.text.line("{");
+        for word in &self.invariant.words {
+            self.text.line(format!("state->{} = any_bits;", word.place));
+        }
+        self.text
+            .lines(["state->bad_count = any_word;", "state->primed = any_word;", "}", ""]);
+        self.text.line(format!("static void sound({n}_state *state)"));
+        self.text.line("{");
+        for word in &self.invariant.words {
+            let value = match word.ends {
+                Some(ends) => self.between(ends),
+                None => "ANY_NUMBER".to_owned(),
+            };
+            self.text.line(format!("state->{} = {value};", word.place));
+        }
+        let most = self.invariant.hold + 1;
+        self.text.lines([
+            format!("state->bad_count = Frama_C_unsigned_int_interval(0u, {most}u);"),
+            "state->primed = Frama_C_unsigned_int_interval(0u, 1u);".to_owned(),
+            "}".to_owned(),
+            String::new(),
+        ]);
+    }
+
+    /// Any number between two.
+    pub fn between(&self, (low, high): (f64, f64)) -> String {
+        let (low, high) = (self.literal(low), self.literal(high));
+        format!("Frama_C_{}_interval({low}, {high})", self.number.kind())
+    }
+
+    /// Opens a function with a state, a measurement and a command.
+    pub fn open(&mut self, function: &str) {
+        let n = self.n().to_owned();
+        self.text.line(format!("void {function}(void)"));
+        self.text.lines([
+            "{".to_owned(),
+            format!("{n}_state state;"),
+            format!("{n}_measurement measured;"),
+            format!("{n}_command command;"),
+        ]);
+    }
+
+    /// Closes it: the last check must not hold, or nothing was analysed.
+    pub fn close(&mut self) {
+        self.text.reached();
+        self.text.lines(["}", ""]);
+    }
+
+    /// One step from every sound state.
+    fn step(&mut self) -> Entry {
+        let n = self.n().to_owned();
+        self.open("prove_step");
+        self.text.lines([
+            "sound(&state);".to_owned(),
+            "measure(&measured);".to_owned(),
+            format!("{n}_step(&state, &measured, &command);"),
+        ]);
+        self.command();
+        let mut claims = command_claims();
+        if self.invariant.rises {
+            self.text
+                .check("undamaged", &format!("(command.status & {}u) == 0u", 1 << 8));
+            claims.push(stated(
+                "undamaged",
+                "A sound state is never called damaged: STATE is clear.",
+            ));
+        }
+        self.counters();
+        let held = self.policy.signals.len();
+        for (index, word) in self.invariant.words.clone().iter().enumerate() {
+            if let Shown::ByContract(why) = word.shown {
+                self.not_stated.push((word.name.clone(), why));
+            }
+            if word.shown == Shown::Directly {
+                let label = if index < held { "held" } else { "state" };
+                self.keeps(label, index, word);
+            }
+        }
+        self.close();
+        claims.push(stated("held", "Every held sample stays within its plausible range."));
+        let others = self.invariant.words.iter().skip(held);
+        if others
+            .into_iter()
+            .any(|word| word.shown == Shown::Directly && word.ends.is_some())
+        {
+            claims.push(stated(
+                "state",
+                "Filter memories, previous duty and command, soft start and coefficients stay within their ends.",
+            ));
+        }
+        claims.push(stated("counters", self.counters_text()));
+        Entry {
+            function: "prove_step",
+            about: "one step from every sound state, every measurement",
+            stated: claims,
+            runs: STEP,
+        }
+    }
+
+    /// A number of the state is still within its ends.
+    pub fn keeps(&mut self, label: &str, index: usize, word: &Word) {
+        let Some((low, high)) = word.ends else { return };
+        let (low, high) = (self.literal(low), self.literal(high));
+        let place = format!("state.{}", word.place);
+        self.text.check(
+            &format!("{label}_{index}"),
+            &format!("{place} >= {low} && {place} <= {high}"),
+        );
+    }
+
+    /// What the command is after every step.
+    pub fn command(&mut self) {
+        let limits = self.policy.limits.duty;
+        let (low, high) = (self.number.up(limits.low), self.number.down(limits.high));
+        let fallback = self.literal(self.number.nearest(self.policy.fallback.duty));
+        let (low, high) = (self.literal(low), self.literal(high));
+        let duties = self
+            .policy
+            .actions
+            .iter()
+            .map(|action| self.number.nearest(action.duty));
+        let least = duties.clone().fold(f64::INFINITY, f64::min);
+        let most = duties.fold(f64::NEG_INFINITY, f64::max);
+        let (least, most) = (self.literal(least), self.literal(most));
+        let actions = self.policy.actions.len();
+        self.text.check(
+            "duty",
+            &format!("(command.duty >= {low} && command.duty <= {high}) || command.duty == {fallback}"),
+        );
+        self.text.check(
+            "chosen",
+            &format!("(command.duty_sim >= {least} && command.duty_sim <= {most}) || command.duty_sim == {fallback}"),
+        );
+        self.text.check("action", &format!("command.action_index < {actions}u"));
+        self.text.check("status", "command.status < 512u");
+    }
+
+    fn counters(&mut self) {
+        let most = self.invariant.hold + 1;
+        let primed = if self.invariant.rises { 1 } else { 2 };
+        self.text.check("counters_bad", &format!("state.bad_count <= {most}u"));
+        self.text
+            .check("counters_primed", &format!("state.primed <= {primed}u"));
+    }
+
+    fn counters_text(&self) -> String {
+        match self.invariant.rises {
+            true => "The count of bad steps stays at most K + 1, and `primed` is 0 or 1.",
+            false => "The count of bad steps stays at most K + 1, and `primed` is 0, 1, or 2 after coefficients that do not rise.",
+        }
+        .to_owned()
+    }
+
+    /// One step from every bit pattern.
+    fn damaged(&mut self) -> Entry {
+        let n = self.n().to_owned();
+        self.open("prove_damaged");
+        self.text.lines([
+            "arbitrary(&state);".to_owned(),
+            "measure(&measured);".to_owned(),
+            format!("{n}_step(&state, &measured, &command);"),
+        ]);
+        self.command();
+        self.close();
+        Entry {
+            function: "prove_damaged",
+            about: "one step from every bit pattern of the state, every measurement",
+            stated: command_claims(),
+            runs: BOTH,
+        }
+    }
+
+    /// Numbers that stay within their ends in slices.
+    fn slices(&mut self) -> Option<Entry> {
+        const WHY: &str = "a low-pass so fast that it would need too many slices";
+        let words = self.invariant.words.clone();
+        let mut calls = Vec::new();
+        for index in 0..self.invariant.memory {
+            let Some(word) = self.invariant.memory_word(index).cloned() else {
+                continue;
+            };
+            let (Shown::InSlices { gain }, Some((_, bound))) = (word.shown, word.ends) else {
+                continue;
+            };
+            let behind = words.iter().enumerate();
+            let kept = behind.filter(|(_, other)| **other == word || other.shown == Shown::WithSlicesOf(index));
+            let kept: Vec<(usize, Word)> = kept.map(|(at, other)| (at, other.clone())).collect();
+            let Some(ends) = slices(bound, gain) else {
+                self.not_stated
+                    .extend(kept.into_iter().map(|(_, word)| (word.name, WHY)));
+                continue;
+            };
+            self.slice_function(index, &word, &kept);
+            let pairs = ends.windows(2).map(|pair| {
+                let (low, high) = (self.number.down(pair[0]), self.number.up(pair[1]));
+                format!("slice{index}({}, {});", self.literal(low), self.literal(high))
+            });
+            calls.extend(pairs);
+        }
+        if calls.is_empty() {
+            return None;
+        }
+        self.text.line("void prove_slices(void)");
+        self.text.line("{");
+        self.text.lines(calls);
+        self.close();
+        Some(Entry {
+            function: "prove_slices",
+            about: "commit from every sound state, in slices of the memories of low-pass filters, every measurement and command",
+            stated: vec![stated(
+                "slices",
+                "The memories of low-pass filters, and what stands behind them, stay within their ends.",
+            )],
+            runs: ONE,
+        })
+    }
+
+    fn slice_function(&mut self, index: usize, word: &Word, kept: &[(usize, Word)]) {
+        let (n, kind) = (self.n().to_owned(), self.number.kind());
+        self.text
+            .line(format!("static void slice{index}({kind} low, {kind} high)"));
+        self.text.lines([
+            "{".to_owned(),
+            format!("{n}_state state;"),
+            format!("{n}_measurement measured;"),
+            format!("{n}_command command;"),
+            "sound(&state);".to_owned(),
+            format!("state.{} = Frama_C_{kind}_interval(low, high);", word.place),
+            "measure(&measured);".to_owned(),
+        ]);
+        self.any_command();
+        self.text.line(format!("{n}_commit(&state, &measured, &command);"));
+        for (at, other) in kept {
+            self.keeps("slices", *at, other);
+        }
+        self.text.lines(["}", ""]);
+    }
+
+    /// A command that the caller may have changed in whatever way.
+    pub fn any_command(&mut self) {
+        self.text.lines([
+            "command.duty = any_bits;",
+            "command.duty_sim = any_bits;",
+            "command.action_index = any_word;",
+            "command.status = any_word;",
+        ]);
+    }
+
+    /// Whether the network computes in integers.
+    pub fn is_integer(&self) -> bool {
+        matches!(self.policy.numeric_format, NumericFormat::I16 | NumericFormat::I8)
+    }
+}
+
+/// What [`Writer::command`] checks.
+fn command_claims() -> Vec<Stated> {
+    vec![
+        stated("duty", "The duty is a number within its limits, or the fallback."),
+        stated(
+            "chosen",
+            "The chosen duty lies within the table of duties, or is the fallback.",
+        ),
+        stated("action", "The action index is below the number of actions."),
+        stated("status", "No bit of the status is set that has no meaning."),
+    ]
+}

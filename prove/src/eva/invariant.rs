@@ -1,0 +1,216 @@
+//! The sound states of a policy (numeric contract, section 1), number by number.
+//!
+//! The ends come from the reference interpreter, which knows the contract alone: what the compiler made of it is not asked.
+
+use interp::{Controller, Real};
+use policy::{Filter, Policy, Scalar};
+
+/// How it is shown that a step leaves a number within its ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Shown {
+    /// Intervals are enough.
+    Directly,
+    /// The word of a low-pass with this gain k, `y + k(x - y)`: intervals forget that both y are one. In slices of y, thin
+    /// towards the ends, they are enough.
+    InSlices {
+        /// k in binary64.
+        gain: f64,
+    },
+    /// In the same slices, those of this word.
+    WithSlicesOf(usize),
+    /// Not by intervals; the argument of the contract holds.
+    ByContract(&'static str),
+}
+
+/// A number of the state.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Word {
+    /// Member of the struct, such as `memory[3]`.
+    pub place: String,
+    /// Name for people, such as `error.0.delay[2]`.
+    pub name: String,
+    /// Smallest and largest value; `None` where no step reads it.
+    pub ends: Option<(f64, f64)>,
+    /// How its ends are shown.
+    pub shown: Shown,
+}
+
+/// All sound states.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Invariant {
+    /// Numbers in the order of the state.
+    pub words: Vec<Word>,
+    /// Words of filter memory.
+    pub memory: usize,
+    /// K: bad steps bridged.
+    pub hold: u32,
+    /// Whether coefficients within their ends always give a mapping that rises.
+    pub rises: bool,
+}
+
+impl Invariant {
+    pub fn of(policy: &Policy) -> Self {
+        match policy.numeric_format.scalar() {
+            Scalar::F32 => Self::in_format::<f32>(policy),
+            Scalar::F64 => Self::in_format::<f64>(policy),
+        }
+    }
+
+    fn in_format<T: Real>(policy: &Policy) -> Self {
+        let controller = Controller::<T>::new(policy);
+        let state = controller.state();
+        let shown = memories(policy);
+        let held = (0..state.held.len()).map(|index| (format!("held[{index}]"), Shown::Directly));
+        let memory = (0..state.memory.len()).map(|word| {
+            let shown = shown.get(word).copied().unwrap_or(Shown::Directly);
+            (format!("memory[{word}]"), shown)
+        });
+        let duties = ["previous_duty", "previous_command"].map(str::to_owned);
+        let cap = state.soft_cap.map(|_| "soft_cap".to_owned());
+        let product = policy.mapping.and_then(|mapping| mapping.coefficients.r);
+        let letters = ["a", "b", "c"].into_iter().chain(product.map(|_| "r"));
+        let coefficients = letters
+            .filter(|_| policy.mapping.is_some())
+            .map(|name| format!("mapping_{name}"));
+        let others = duties.into_iter().chain(cap).chain(coefficients);
+        let places = held.chain(memory).chain(others.map(|place| (place, Shown::Directly)));
+        let ends = controller.sound_ends();
+        let words = places
+            .zip(ends.iter().zip(controller.state_names()))
+            .map(|((place, shown), (ends, name))| Word {
+                place,
+                name: name.clone(),
+                ends: ends.map(|(low, high)| (low.to_f64(), high.to_f64())),
+                shown,
+            });
+        Self {
+            words: words.collect(),
+            memory: state.memory.len(),
+            hold: policy.fallback.hold,
+            rises: rises::<T>(policy),
+        }
+    }
+
+    /// The word of that number of the filter memories.
+    pub fn memory_word(&self, index: usize) -> Option<&Word> {
+        self.words.iter().find(|word| word.place == format!("memory[{index}]"))
+    }
+}
+
+/// Whether `a + r i` is above 0 for all allowed coefficients at both ends of the load current.
+fn rises<T: Real>(policy: &Policy) -> bool {
+    let Some(mapping) = policy.mapping.filter(|mapping| mapping.coefficients.r.is_some()) else {
+        return true;
+    };
+    let least = T::up(mapping.adjust_a.low).to_f64();
+    let currents = [mapping.valid_i_out.low, mapping.valid_i_out.high].map(|i| T::nearest(i).to_f64());
+    let products = [mapping.adjust_r.low, mapping.adjust_r.high].map(|r| currents.map(|i| r * i));
+    // a margin of a percent, so that no rounding matters
+    products
+        .into_iter()
+        .flatten()
+        .all(|product| 0.99 * least + product > 0.0)
+}
+
+/// How each word of the filter memories is shown, in the order of the state.
+fn memories(policy: &Policy) -> Vec<Shown> {
+    const DERIVATIVE: &str =
+        "the bound of a filtered derivative rests on a relation between its two words, which intervals do not hold";
+    const CHAIN: &str = "a low-pass behind a low-pass would need slices of both";
+    let mut all = Vec::new();
+    for feature in &policy.features {
+        let mut behind = Shown::Directly;
+        for filter in &feature.filters {
+            let first = all.len();
+            match *filter {
+                Filter::Delay { samples } => all.extend(std::iter::repeat_n(behind, samples)),
+                Filter::MovingAverage { samples } => {
+                    all.extend(std::iter::repeat_n(behind, samples.saturating_sub(1)));
+                }
+                Filter::BackwardDifference => all.push(behind),
+                Filter::LowPass { time_constant } => {
+                    let own = match behind {
+                        Shown::Directly => Shown::InSlices {
+                            gain: policy.sample_period / (time_constant + policy.sample_period),
+                        },
+                        Shown::InSlices { .. } | Shown::WithSlicesOf(_) => Shown::ByContract(CHAIN),
+                        Shown::ByContract(why) => Shown::ByContract(why),
+                    };
+                    all.push(own);
+                    behind = match own {
+                        Shown::InSlices { .. } => Shown::WithSlicesOf(first),
+                        other => other,
+                    };
+                }
+                Filter::FilteredDerivative { .. } => {
+                    all.push(behind);
+                    behind = Shown::ByContract(DERIVATIVE);
+                    all.push(behind);
+                }
+                Filter::Integrator { .. } => {
+                    // it is clamped, whatever comes in
+                    behind = Shown::Directly;
+                    all.push(behind);
+                }
+            }
+        }
+    }
+    all
+}
+
+/// Largest number of slices of a word; with so many a run takes seconds.
+const MOST_SLICES: usize = 400;
+
+/// The ends of slices from -bound to bound, ascending; `None` where too many would be needed.
+///
+/// A slice from `lo` to `hi` is kept by `y + k(x - y)` with `|x| <= X` if `hi + k(X - lo) <= M`, that is if its width is at
+/// most `(M - hi)(1 - k)/k` and what M exceeds X by. So the distance to the end may shrink by a factor from slice to slice.
+pub(super) fn slices(bound: f64, gain: f64) -> Option<Vec<f64>> {
+    // half of what is allowed, and never more than a half: room for the roundings
+    let ratio = (1.0 + 0.5 * (1.0 - gain) / gain).min(2.0);
+    // M exceeds X by 2^-19 of itself (contract section 1), and the last slice may be a quarter of that
+    let last = bound / f64::from(1 << 21);
+    let mut distances = Vec::new();
+    let mut distance = bound;
+    while distance > last {
+        distances.push(distance);
+        if distances.len() > MOST_SLICES {
+            return None;
+        }
+        distance /= ratio;
+    }
+    let upper = distances.iter().map(|distance| bound - distance).chain([bound]);
+    let upper: Vec<f64> = upper.collect();
+    let lower = upper.iter().rev().map(|end| -end);
+    // 0 once
+    Some(lower.chain(upper.iter().skip(1).copied()).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slices_cover_the_whole_range_in_order() {
+        let ends = slices(3.0, 0.1).expect("few");
+        assert_eq!((ends[0], ends[ends.len() - 1]), (-3.0, 3.0));
+        assert!(ends.windows(2).all(|pair| pair[0] < pair[1]), "{ends:?}");
+        assert!(ends.len() < 60, "{}", ends.len());
+        assert_eq!(slices(3.0, 0.9999), None);
+    }
+
+    /// By the rule in binary64: from the slice one step stays within the bound.
+    #[test]
+    fn every_slice_is_kept() {
+        for gain in [0.001, 0.1, 0.5, 0.8, 0.95] {
+            // X from M as in section 1
+            let (bound, growth) = (100.0, 1.0 + 1.0 / 1_048_576.0);
+            let most = bound / growth / growth;
+            let ends = slices(bound, gain).expect("few");
+            for pair in ends.windows(2) {
+                let next = pair[1] + gain * (most - pair[0]);
+                assert!(next < bound * (1.0 - 1e-7), "{gain} {pair:?} {next}");
+            }
+        }
+    }
+}

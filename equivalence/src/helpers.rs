@@ -192,10 +192,10 @@ const MODELS: [Model; 16] = [
     Model {
         name: "softsign",
         arguments: &[("x", Of::Number)],
-        says: "is `fl(x / fl(1 + |x|))`",
+        says: "is `fl(x / fl(1 + |x|))` for every number x",
         arithmetic: PLAIN,
         claim: |float, x, got| Claim {
-            given: Vec::new(),
+            given: vec![float.terms.not(float.is_nan(x[0]))],
             holds: float.terms.equal(got, tables::softsign(float, x[0])),
         },
     },

@@ -41,8 +41,19 @@ pub struct Source<'a> {
 pub struct Sources<'a> {
     /// Header and source of the C core.
     pub c: Option<(Source<'a>, Source<'a>)>,
+    /// How the C is read, one set of goals each.
+    pub readings: &'a [Reading],
     /// The Rust core.
     pub rust: Option<Source<'a>>,
+}
+
+/// Who reads the C: one text holds what a compiler sees, and what Frama-C sees in the place of masks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reading {
+    /// A compiler with the extensions of GNU, on a processor without vectors; its goals are called `c.`
+    Compiler,
+    /// Frama-C, as `policyc prove` runs it: the portable text, with branches; its goals are called `eva.`
+    FramaC,
 }
 
 /// All goals of a policy and its emitted code.
@@ -54,8 +65,18 @@ pub fn goals(policy: &Policy, sources: &Sources<'_>) -> Result<Vec<Goal>, Refusa
     let spec = Spec::new(policy, &terms);
     let mut all = facts::goals(spec);
     if let Some((header, source)) = sources.c {
-        let unit = c::Unit::read((header.name, header.text), (source.name, source.text), None)?;
-        all.extend(of(spec, &c::C { spec, unit })?);
+        for reading in sources.readings {
+            let files = ((header.name, header.text), (source.name, source.text));
+            let unit = c::Unit::read(files.0, files.1, &c::defined(*reading, policy))?;
+            all.extend(of(
+                spec,
+                &c::C {
+                    spec,
+                    unit,
+                    reading: *reading,
+                },
+            )?);
+        }
     }
     if let Some(source) = sources.rust {
         let unit = rust::Unit::read(source.name, source.text)?;

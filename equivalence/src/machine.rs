@@ -144,8 +144,11 @@ impl<'a> Machine<'a> {
                 }
                 (Step::Member(name), Value::Union(members, bits)) => {
                     let kind = *members.get(name).ok_or_else(|| format!("no member `{name}`"))?;
-                    let term = bits.ok_or("a union that nobody has written")?;
-                    return Ok(Value::Number(Number { term, kind }));
+                    // nobody can compute with what is not set
+                    return Ok(match *bits {
+                        Some(term) => Value::Number(Number { term, kind }),
+                        None => Value::Unset(Some(kind)),
+                    });
                 }
                 (Step::Element(index), Value::List(elements)) => {
                     let length = elements.len();

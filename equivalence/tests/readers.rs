@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use equivalence::{Goal, Refusal, Source, Sources, goals};
+use equivalence::{Goal, Reading, Refusal, Source, Sources, goals};
 use policy::Policy;
 
 struct Code {
@@ -40,6 +40,7 @@ impl Code {
                     text: &self.c,
                 },
             )),
+            readings: &[Reading::Compiler, Reading::FramaC],
             rust: Some(Source {
                 name: "a.rs",
                 text: &self.rust,

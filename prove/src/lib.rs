@@ -4,6 +4,7 @@
 //! Policy ─► codegen ─► C ──────────┐
 //!    │                             ├─► Frama-C Eva ─► claims ─┐
 //!    └────► driver from the contract                          ├─► Report ─► proof.json, page
+//!    ├────► specification, C and Rust as terms ─► SMT solver ─┤
 //!    └────► conversion of integers, every binary32 number ────┘
 //! ```
 //!
@@ -16,12 +17,14 @@ pub mod eva;
 mod exhaustive;
 pub mod page;
 mod program;
+pub mod smt;
 
 pub use answer::Answer;
 pub use claim::{Claim, Verdict};
 pub use eva::Eva;
 pub use exhaustive::Exhaustive;
 pub use program::{Stop, Stopped};
+pub use smt::Smt;
 
 use policy::Policy;
 use targets::TargetSpec;
@@ -55,7 +58,7 @@ pub trait Prover {
 /// The provers of this crate, in the order in which they run.
 #[must_use]
 pub fn provers(exhaustive: bool) -> Vec<Box<dyn Prover>> {
-    vec![Box::new(Eva), Box::new(Exhaustive { asked: exhaustive })]
+    vec![Box::new(Smt), Box::new(Eva), Box::new(Exhaustive { asked: exhaustive })]
 }
 
 /// Asks every prover about the policy in every format.

@@ -9,6 +9,7 @@ mod drm;
 mod faults;
 mod files;
 mod interruption;
+mod prove;
 mod replay;
 mod simulate;
 mod tables;

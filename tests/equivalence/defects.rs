@@ -54,7 +54,7 @@ const fn rust(
 const DEFECTS: [Defect; 37] = [
     c(ADC, "argmax inverted", ("output > best", "output < best"), "c.action_index"),
     rust(ADC, "tie to the highest index", ("*q > best", "*q >= best"), "rust.action_index"),
-    c(ADC, "off by one in the bad count", ("state->bad_count <= 4u", "state->bad_count <= 5u"), "c.commit.counters"),
+    c(ADC, "off by one in the bad count", ("flag(state->bad_count <= 4u)", "flag(state->bad_count <= 5u)"), "c.commit.counters"),
     rust(ADC, "stale held samples", ("self.held = front.signal;", ""), "rust.commit.held"),
     c(FILTERS, "filter coefficient", ("v15 * 0.04761905f", "v15 * 0.0476191f"), "c.observation"),
     rust(FILTERS, "line one word too short", (".take(20).rev()", ".take(19).rev()"), "rust.commit.memory"),

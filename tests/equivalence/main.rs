@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use codegen::Output;
-use equivalence::{Claim, Goal, Options, Solver, Source, Sources, Verdict};
+use equivalence::{Claim, Goal, Options, Reading, Solver, Source, Sources, Verdict};
 use policy::{NumericFormat, Policy};
 
 /// The solver of `cargo xtask setup`; none if it cannot be had here.
@@ -66,6 +66,7 @@ impl Code {
                     text: c,
                 },
             )),
+            readings: &[Reading::Compiler, Reading::FramaC],
             rust: Some(Source {
                 name: &names[2],
                 text: rust,

@@ -232,6 +232,9 @@ pub struct Prove {
     /// Also try the conversions of integer formats with each of the 2^32 numbers: a quarter of a minute each
     #[arg(long)]
     pub exhaustive: bool,
+    /// Also write the goals about C and Rust as SMT-LIB 2, a file each, for a solver of your own
+    #[arg(long)]
+    pub goals: bool,
     /// Folder for proof.json and proof.html; made if missing
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,

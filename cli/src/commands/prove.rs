@@ -45,10 +45,17 @@ pub fn run(options: &Prove) -> Result<Outcome, Failure> {
     let answer = Answer::new(&tasks, claims);
     let mut json = serde_json::to_string_pretty(&answer)?;
     json.push('\n');
-    let files = BTreeMap::from([
+    let mut files = BTreeMap::from([
         ("proof.json".to_owned(), json),
         ("proof.html".to_owned(), page::page(&answer)?),
     ]);
+    for task in tasks.iter().filter(|_| options.goals) {
+        // where the code is not read there are none, and the claims say so
+        for goal in prove::smt::goals(*task).unwrap_or_default() {
+            let name = format!("{}-{}.smt2", task.policy.numeric_format.name(), goal.name);
+            files.insert(name, goal.text);
+        }
+    }
     output::replace_own_texts(&options.out, &files, options.replacing)?;
     output::say(&page::summary(&answer))?;
     output::say(&format!("to look at: {}", options.out.join("proof.html").display()))?;

@@ -2,6 +2,7 @@
 
 use super::execute::{Outside, Walk};
 use super::unit::Unit;
+use crate::Reading;
 use crate::emitted::{
     Called, Emitted, Network, command_of, command_record, list_behind, measurement_record, members_of, state_of,
     state_record, terms_of,
@@ -14,6 +15,7 @@ use crate::term::Term;
 pub(crate) struct C<'a> {
     pub spec: Spec<'a>,
     pub unit: Unit,
+    pub reading: Reading,
 }
 
 /// Where a call finds its arguments.
@@ -168,7 +170,10 @@ fn state_alone(places: &Places) -> Vec<Value> {
 
 impl Emitted for C<'_> {
     fn language(&self) -> &'static str {
-        "C"
+        match self.reading {
+            Reading::Compiler => "C",
+            Reading::FramaC => "Eva",
+        }
     }
 
     /// Whether the last layer or its caller makes the last cut depends on the target: `q_values` says it.

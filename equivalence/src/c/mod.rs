@@ -10,4 +10,4 @@ mod unit;
 mod values;
 
 pub(crate) use controller::C;
-pub(crate) use unit::Unit;
+pub(crate) use unit::{Unit, defined};

@@ -284,14 +284,34 @@ impl<'a> Parser<'a> {
     }
 
     pub(crate) fn expression(&mut self) -> Result<Expr, Fault> {
-        let condition = self.level(0)?;
+        let condition = self.either()?;
         if !self.take("?") {
             return Ok(condition);
         }
         let yes = self.expression()?;
         self.expect(":")?;
         let no = self.expression()?;
-        Ok(Expr::Choose(Box::new(condition), Box::new(yes), Box::new(no)))
+        Ok(chosen(condition, yes, no))
+    }
+
+    /// `x || y` is `x ? 1 : (y ? 1 : 0)`: no operand of the subset has an effect.
+    fn either(&mut self) -> Result<Expr, Fault> {
+        let mut left = self.both()?;
+        while self.take("||") {
+            let right = truth(self.both()?);
+            left = chosen(left, Expr::Integer(1, false), right);
+        }
+        Ok(left)
+    }
+
+    /// `x && y` is `x ? (y ? 1 : 0) : 0`.
+    fn both(&mut self) -> Result<Expr, Fault> {
+        let mut left = self.level(0)?;
+        while self.take("&&") {
+            let right = truth(self.level(0)?);
+            left = chosen(left, right, Expr::Integer(0, false));
+        }
+        Ok(left)
     }
 
     fn level(&mut self, level: usize) -> Result<Expr, Fault> {
@@ -382,6 +402,15 @@ impl<'a> Parser<'a> {
 }
 
 /// `0x1Fu`, `12`, `0.5f`, `1e-3`
+fn chosen(condition: Expr, yes: Expr, no: Expr) -> Expr {
+    Expr::Choose(Box::new(condition), Box::new(yes), Box::new(no))
+}
+
+/// 1 or 0.
+fn truth(x: Expr) -> Expr {
+    chosen(x, Expr::Integer(1, false), Expr::Integer(0, false))
+}
+
 fn literal(digits: &str) -> Result<Expr, Wrong> {
     let wrong = |_| format!("the number `{digits}`");
     if let Some(hex) = digits.strip_prefix("0x").or_else(|| digits.strip_prefix("0X")) {

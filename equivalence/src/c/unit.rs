@@ -7,11 +7,20 @@ use std::ops::Range;
 use super::parse::{Fault, Parser};
 use super::syntax::{Expr, Function, Member, Type};
 use super::tokens::{Kind, Macros, Token, tokens};
+use crate::Reading;
 use crate::machine;
 use crate::refusal::Refusal;
 
-/// The macros under which the code is read: a compiler that knows the extensions of GNU, no vectors, no assembly of a core.
-const DEFINED: [(&str, &str); 1] = [("__GNUC__", "12")];
+/// The macros under which a reader sees the code. A compiler knows the extensions of GNU, but no vectors and no assembly of a core.
+pub(crate) fn defined(reading: Reading, policy: &policy::Policy) -> Vec<(String, &'static str)> {
+    match reading {
+        Reading::Compiler => vec![("__GNUC__".to_owned(), "12")],
+        Reading::FramaC => {
+            let portable = format!("{}_PORTABLE", policy.name.to_uppercase());
+            vec![("__FRAMAC__".to_owned(), "1"), (portable, "1")]
+        }
+    }
+}
 
 const SCALARS: [(&str, machine::Kind); 11] = [
     ("float", machine::Kind::Float(policy::Scalar::F32)),
@@ -61,13 +70,16 @@ pub(crate) struct Unit {
 }
 
 impl Unit {
-    /// Reads header and source as one, as a compiler does. `union` reads bits by the union instead of a copy.
-    pub(crate) fn read(header: (&str, &str), source: (&str, &str), union: Option<&str>) -> Result<Self, Refusal> {
+    /// Reads header and source as one, as a compiler does, with these macros.
+    pub(crate) fn read(
+        header: (&str, &str),
+        source: (&str, &str),
+        defined: &[(String, &'static str)],
+    ) -> Result<Self, Refusal> {
         let mut macros = Macros::new();
-        let defined = DEFINED.iter().map(|(name, value)| (*name, *value));
-        for (name, value) in defined.chain(union.map(|name| (name, "1"))) {
-            let kind = Kind::Number(value.to_owned());
-            macros.insert(name.to_owned(), vec![Token { kind, line: 0 }]);
+        for (name, value) in defined {
+            let kind = Kind::Number((*value).to_owned());
+            macros.insert(name.clone(), vec![Token { kind, line: 0 }]);
         }
         let mut all = tokens(header.0, header.1, &mut macros)?;
         all.append(&mut tokens(source.0, source.1, &mut macros)?);

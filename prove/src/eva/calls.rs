@@ -1,44 +1,18 @@
 //! Drivers of what is not a step: damaged states are marked, and the other functions.
 
-use super::driver::{BOTH, Entry, ONE, Writer, stated};
+use policy::Shape;
+
+use super::driver::{BITS_AND_FINITE, BOTH, Entry, ONE, Writer, stated};
 
 impl Writer<'_> {
     /// Every state that is not sound, one number outside at a time and all others arbitrary.
     pub fn marked(&mut self) -> Entry {
         let n = self.n().to_owned();
-        self.text.line(format!("static void marks({n}_state state)"));
-        self.text.lines([
-            "{".to_owned(),
-            format!("{n}_measurement measured;"),
-            format!("{n}_command command;"),
-            format!("{n}_front front;"),
-            "measure(&measured);".to_owned(),
-            format!("{n}_sense(&state, &measured, &front);"),
-            format!("{n}_guard(&state, &front);"),
-        ]);
-        let actions = self.policy.actions.len();
-        self.text.line(format!(
-            "{n}_decide(&state, &front, Frama_C_unsigned_int_interval(0u, {}u), &command);",
-            actions - 1
-        ));
-        let fallback = self.literal(self.number.nearest(self.policy.fallback.duty));
-        // FALLBACK and STATE, and no other bit
-        self.text
-            .check("marked_status", &format!("command.status == {}u", (1 << 1) | (1 << 8)));
-        self.text.check("marked_duty", &format!("command.duty == {fallback}"));
-        self.text.check("marked_action", "command.action_index == 0u");
-        self.any_command();
-        self.text.line(format!("{n}_commit(&state, &measured, &command);"));
-        self.text.check("kept_primed", "state.primed == 2u");
-        self.text.check("kept_bad", "state.bad_count == 0u");
-        for index in 0..self.invariant.memory {
-            self.text
-                .check(&format!("kept_{index}"), &format!("state.memory[{index}] == 0"));
-        }
-        self.text.lines(["}", ""]);
+        self.marks();
+        self.marked_step();
         self.text.line("void prove_marked(void)");
         self.text.line("{");
-        self.text.line(format!("{n}_state state;"));
+        self.text.lines([format!("{n}_state state;"), "marked();".to_owned()]);
         for word in self.invariant.words.clone() {
             let Some((low, high)) = word.ends else { continue };
             let (low, high) = (self.literal(low), self.literal(high));
@@ -89,6 +63,65 @@ impl Writer<'_> {
                 ),
             ],
             runs: BOTH,
+            assumed: &[],
+            precision: 2,
+        }
+    }
+
+    /// The check of the state alone: so each number costs little.
+    fn marks(&mut self) {
+        let n = self.n().to_owned();
+        self.text.line(format!("static void marks({n}_state state)"));
+        self.text.lines([
+            "{".to_owned(),
+            format!("{n}_front front;"),
+            "front.usable = any_word;".to_owned(),
+            format!("{n}_guard(&state, &front);"),
+        ]);
+        self.text
+            .check("marked_found", "front.sound == 0u && front.usable == 0u");
+        self.text.lines(["}", ""]);
+    }
+
+    /// What the rest of a step does with a state that was found.
+    fn marked_step(&mut self) {
+        let n = self.n().to_owned();
+        self.text.line("static void marked(void)");
+        self.text.lines([
+            "{".to_owned(),
+            format!("{n}_state state;"),
+            format!("{n}_measurement measured;"),
+            format!("{n}_command command;"),
+            format!("{n}_front front;"),
+            "arbitrary(&state);".to_owned(),
+            "measure(&measured);".to_owned(),
+            format!("{n}_sense(&state, &measured, &front);"),
+            "front.sound = 0u;".to_owned(),
+            "front.usable = 0u;".to_owned(),
+        ]);
+        let last = self.policy.actions.len() - 1;
+        self.text.line(format!(
+            "{n}_decide(&state, &front, Frama_C_unsigned_int_interval(0u, {last}u), &command);"
+        ));
+        let fallback = self.literal(self.number.nearest(self.policy.fallback.duty));
+        // FALLBACK and STATE, and no other bit
+        self.text
+            .check("marked_status", &format!("command.status == {}u", (1 << 1) | (1 << 8)));
+        self.text.check("marked_duty", &format!("command.duty == {fallback}"));
+        self.text.check("marked_action", "command.action_index == 0u");
+        self.kept();
+        self.text.lines(["}", ""]);
+    }
+
+    fn kept(&mut self) {
+        let n = self.n().to_owned();
+        self.any_command();
+        self.text.line(format!("{n}_advance(&state, &front, &command);"));
+        self.text.check("kept_primed", "state.primed == 2u");
+        self.text.check("kept_bad", "state.bad_count == 0u");
+        for index in 0..self.invariant.memory {
+            self.text
+                .check(&format!("kept_{index}"), &format!("state.memory[{index}] == 0"));
         }
     }
 
@@ -157,6 +190,8 @@ impl Writer<'_> {
             about: "init, reset, set_mapping, observe, integrity and integrity_slice with every input",
             stated: claims,
             runs: BOTH,
+            assumed: &[],
+            precision: 2,
         }
     }
 
@@ -164,6 +199,8 @@ impl Writer<'_> {
     pub fn q_values(&mut self) -> Entry {
         let n = self.n().to_owned();
         let (features, actions) = (self.policy.features.len(), self.policy.actions.len());
+        let kind = self.number.kind();
+        let e = if kind == "float" { "f" } else { "" };
         self.text.line("void prove_q_values(void)");
         self.text.lines([
             "{".to_owned(),
@@ -171,7 +208,14 @@ impl Writer<'_> {
             format!("{} q[{actions}];", self.number.kind()),
         ]);
         for index in 0..features {
-            self.text.line(format!("observation[{index}] = any_bits;"));
+            let far = self.far(index);
+            self.text.lines([
+                "#if defined(FINITE)".to_owned(),
+                format!("observation[{index}] = Frama_C_{kind}_interval(-{far}{e}, {far}{e});"),
+                "#else".to_owned(),
+                format!("observation[{index}] = any_bits;"),
+                "#endif".to_owned(),
+            ]);
         }
         self.text.line(format!("{n}_q_values(observation, q);"));
         if self.is_integer() {
@@ -186,12 +230,48 @@ impl Writer<'_> {
         self.close();
         Entry {
             function: "prove_q_values",
-            about: "q_values with every observation",
+            about: match self.is_integer() {
+                true => "q_values with every observation",
+                false => "q_values with every observation; finite numbers up to 2^20 times the observation's bound",
+            },
             stated: match self.is_integer() {
                 true => vec![stated("number", "Every Q value is a number, whatever the observation.")],
                 false => Vec::new(),
             },
-            runs: ONE,
+            runs: if self.is_integer() { ONE } else { BITS_AND_FINITE },
+            assumed: &[],
+            precision: self.sums_precision(),
         }
+    }
+
+    /// The stored answers, with a network that gives any.
+    pub fn self_test(&mut self) -> Entry {
+        let n = self.n().to_owned();
+        self.text.lines([
+            "void prove_self_test(void)".to_owned(),
+            "{".to_owned(),
+            format!("const uint32_t answer = {n}_self_test();"),
+        ]);
+        // vectors of the self test, contract section 11
+        self.text.check("self_test", "answer <= 16u");
+        self.close();
+        Entry {
+            function: "prove_self_test",
+            about: "self_test, whatever the network answers",
+            stated: vec![stated("self_test", "`self_test` gives 0 or the number of a vector.")],
+            runs: ONE,
+            assumed: &["q_values"],
+            precision: 2,
+        }
+    }
+
+    /// Sums and hinges need no relations between values; a rational function of one value in numerator and denominator does.
+    fn sums_precision(&self) -> u8 {
+        let hinges = self
+            .policy
+            .layers
+            .iter()
+            .all(|layer| matches!(layer.activation.shape(), Shape::Hinge { .. }));
+        if hinges && !self.is_integer() { 0 } else { 2 }
     }
 }

@@ -20,6 +20,10 @@ const LITTLE: Machine = Machine("x86_32");
 const BIG: Machine = Machine("ppc_32");
 /// A step is also looked through for NaN and infinities. What is finite on one machine is so on the other: both round alike.
 const STEP: &[(Machine, Numbers)] = &[(LITTLE, Numbers::Any), (BIG, Numbers::Any), (LITTLE, Numbers::Finite)];
+/// The choice of an action takes most of the time of a step, and what follows takes any.
+const ACTION: &[&str] = &["choose"];
+/// Arithmetic alone; without a NaN from a sound state and finite measurements.
+pub(super) const BITS_AND_FINITE: &[(Machine, Numbers)] = &[(LITTLE, Numbers::Any), (LITTLE, Numbers::Finite)];
 /// Both byte orders, every bit pattern.
 pub(super) const BOTH: &[(Machine, Numbers)] = &[(LITTLE, Numbers::Any), (BIG, Numbers::Any)];
 /// What has no bytes in another order: arithmetic alone.
@@ -45,6 +49,10 @@ pub(super) struct Entry {
     pub stated: Vec<Stated>,
     /// Machines and numbers that it is analysed under.
     pub runs: &'static [(Machine, Numbers)],
+    /// Functions of the policy, without its prefix, whose contract stands for their text. Another entry shows the contract.
+    pub assumed: &'static [&'static str],
+    /// Frama-C's `-eva-precision`: 2 keeps equalities between values, which sums of a network do not need.
+    pub precision: u8,
 }
 
 /// A file of C and its entries.
@@ -68,9 +76,16 @@ pub(super) fn driver(policy: &Policy) -> Driver {
         not_stated: Vec::new(),
     };
     writer.inputs();
-    let mut entries = vec![writer.step(), writer.damaged(), writer.marked()];
+    // the longest runs first, so that no core waits for one of them at the end
+    let mut entries = vec![writer.q_values(), writer.marked()];
     entries.extend(writer.slices());
-    entries.extend([writer.others(), writer.q_values()]);
+    entries.extend([
+        writer.others(),
+        writer.choose(),
+        writer.step(),
+        writer.damaged(),
+        writer.self_test(),
+    ]);
     let (text, labels) = writer.text.end();
     Driver {
         text,
@@ -105,65 +120,6 @@ impl Writer<'_> {
         &self.policy.name
     }
 
-    /// Functions that make the inputs.
-    fn inputs(&mut self) {
-        let (n, kind) = (self.n().to_owned(), self.number.kind());
-        let most = self.literal(self.number.largest());
-        self.text.lines([
-            format!("#include \"{n}.c\""),
-            "#include \"__fc_builtin.h\"".to_owned(),
-            String::new(),
-            "/* every bit pattern of the type */".to_owned(),
-            format!("extern volatile {kind} any_bits;"),
-            "extern volatile uint32_t any_word;".to_owned(),
-            "extern volatile int32_t any_code;".to_owned(),
-            String::new(),
-            "#if defined(FINITE)".to_owned(),
-            format!("#define ANY_NUMBER Frama_C_{kind}_interval(-{most}, {most})"),
-            "#else".to_owned(),
-            "#define ANY_NUMBER any_bits".to_owned(),
-            "#endif".to_owned(),
-            String::new(),
-        ]);
-        self.text
-            .line(format!("static void measure({n}_measurement *measured)"));
-        self.text.line("{");
-        for signal in &self.policy.signals {
-            let any = if signal.adc.is_some() { "any_code" } else { "ANY_NUMBER" };
-            self.text.line(format!("measured->{} = {any};", signal.name));
-        }
-        self.text.lines(["}", ""]);
-        self.text.line(format!("static void arbitrary({n}_state *state)"));
-        self.text.line("{");
-        for word in &self.invariant.words {
-            self.text.line(format!("state->{} = any_bits;", word.place));
-        }
-        self.text
-            .lines(["state->bad_count = any_word;", "state->primed = any_word;", "}", ""]);
-        self.text.line(format!("static void sound({n}_state *state)"));
-        self.text.line("{");
-        for word in &self.invariant.words {
-            let value = match word.ends {
-                Some(ends) => self.between(ends),
-                None => "ANY_NUMBER".to_owned(),
-            };
-            self.text.line(format!("state->{} = {value};", word.place));
-        }
-        let most = self.invariant.hold + 1;
-        self.text.lines([
-            format!("state->bad_count = Frama_C_unsigned_int_interval(0u, {most}u);"),
-            "state->primed = Frama_C_unsigned_int_interval(0u, 1u);".to_owned(),
-            "}".to_owned(),
-            String::new(),
-        ]);
-    }
-
-    /// Any number between two.
-    pub fn between(&self, (low, high): (f64, f64)) -> String {
-        let (low, high) = (self.literal(low), self.literal(high));
-        format!("Frama_C_{}_interval({low}, {high})", self.number.kind())
-    }
-
     /// Opens a function with a state, a measurement and a command.
     pub fn open(&mut self, function: &str) {
         let n = self.n().to_owned();
@@ -180,6 +136,39 @@ impl Writer<'_> {
     pub fn close(&mut self) {
         self.text.reached();
         self.text.lines(["}", ""]);
+    }
+
+    /// The network and its argmax, from every bit pattern; from a sound state with finite measurements without a NaN.
+    fn choose(&mut self) -> Entry {
+        let n = self.n().to_owned();
+        self.text.lines([
+            "void prove_choose(void)".to_owned(),
+            "{".to_owned(),
+            format!("{n}_state state;"),
+            format!("{n}_measurement measured;"),
+            "uint32_t index;".to_owned(),
+            "#if defined(FINITE)".to_owned(),
+            "sound(&state);".to_owned(),
+            "#else".to_owned(),
+            "arbitrary(&state);".to_owned(),
+            "#endif".to_owned(),
+            "measure(&measured);".to_owned(),
+            format!("index = {n}_choose(&state, &measured);"),
+        ]);
+        self.text
+            .check("index", &format!("index < {}u", self.policy.actions.len()));
+        self.close();
+        Entry {
+            function: "prove_choose",
+            about: "the choice of an action from every bit pattern of the state, every measurement; finite numbers from every sound state",
+            stated: vec![stated(
+                "index",
+                "The network and its argmax give an index below the number of actions.",
+            )],
+            runs: BITS_AND_FINITE,
+            assumed: if self.is_integer() { &[] } else { &["q_values"] },
+            precision: 2,
+        }
     }
 
     /// One step from every sound state.
@@ -230,6 +219,8 @@ impl Writer<'_> {
             about: "one step from every sound state, every measurement",
             stated: claims,
             runs: STEP,
+            assumed: ACTION,
+            precision: 2,
         }
     }
 
@@ -303,11 +294,15 @@ impl Writer<'_> {
             about: "one step from every bit pattern of the state, every measurement",
             stated: command_claims(),
             runs: BOTH,
+            assumed: ACTION,
+            precision: 2,
         }
     }
 
     /// Numbers that stay within their ends in slices.
     fn slices(&mut self) -> Option<Entry> {
+        const FIRST: &str =
+            "the memory is the input itself then: `y + k(x - y)` with `y = x`, which intervals take for two numbers";
         const WHY: &str = "a low-pass so fast that it would need too many slices";
         let words = self.invariant.words.clone();
         let mut calls = Vec::new();
@@ -321,11 +316,13 @@ impl Writer<'_> {
             let behind = words.iter().enumerate();
             let kept = behind.filter(|(_, other)| **other == word || other.shown == Shown::WithSlicesOf(index));
             let kept: Vec<(usize, Word)> = kept.map(|(at, other)| (at, other.clone())).collect();
+            let first = (format!("{} at the first sample", word.name), FIRST);
             let Some(ends) = slices(bound, gain) else {
                 self.not_stated
                     .extend(kept.into_iter().map(|(_, word)| (word.name, WHY)));
                 continue;
             };
+            self.not_stated.push(first);
             self.slice_function(index, &word, &kept);
             let pairs = ends.windows(2).map(|pair| {
                 let (low, high) = (self.number.down(pair[0]), self.number.up(pair[1]));
@@ -345,9 +342,11 @@ impl Writer<'_> {
             about: "commit from every sound state, in slices of the memories of low-pass filters, every measurement and command",
             stated: vec![stated(
                 "slices",
-                "The memories of low-pass filters, and what stands behind them, stay within their ends.",
+                "Behind the first sample, the memories of low-pass filters and what stands behind them stay within their ends.",
             )],
             runs: ONE,
+            assumed: ACTION,
+            precision: 2,
         })
     }
 
@@ -360,12 +359,20 @@ impl Writer<'_> {
             format!("{n}_state state;"),
             format!("{n}_measurement measured;"),
             format!("{n}_command command;"),
+            format!("{n}_front front;"),
             "sound(&state);".to_owned(),
             format!("state.{} = Frama_C_{kind}_interval(low, high);", word.place),
+            "state.primed = 1u;".to_owned(),
             "measure(&measured);".to_owned(),
         ]);
         self.any_command();
-        self.text.line(format!("{n}_commit(&state, &measured, &command);"));
+        // what decides has no part in it: whatever it says of the state
+        self.text.lines([
+            format!("{n}_sense(&state, &measured, &front);"),
+            "front.sound = Frama_C_unsigned_int_interval(0u, 1u);".to_owned(),
+            "front.usable = Frama_C_unsigned_int_interval(0u, 1u);".to_owned(),
+            format!("{n}_advance(&state, &front, &command);"),
+        ]);
         for (at, other) in kept {
             self.keeps("slices", *at, other);
         }

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
+use super::driver::Entry;
 use super::text::{self, Labels};
 use crate::program::{self, Stop};
 
@@ -68,12 +69,18 @@ pub(super) fn analyse(
     folder: &Path,
     policy: &str,
     labels: &Labels,
-    entry: &str,
+    entry: &Entry,
     machine: Machine,
     numbers: Numbers,
     stop: &Stop,
 ) -> Result<Found, program::Stopped> {
     let begun = Instant::now();
+    let Entry {
+        function: entry,
+        assumed,
+        precision,
+        ..
+    } = entry;
     let table = folder.join(format!("{entry}-{}-{numbers:?}.csv", machine.0));
     let finite = match numbers {
         Numbers::Any => "",
@@ -98,7 +105,7 @@ pub(super) fn analyse(
     // loops have up to 1024 turns (the width of a layer), and every one is to be seen apart
     command.args([
         "-eva-precision",
-        "2",
+        &precision.to_string(),
         "-eva-auto-loop-unroll",
         "1024",
         "-eva-interprocedural-splits",
@@ -112,6 +119,9 @@ pub(super) fn analyse(
     command
         .arg("-eva-slevel-function")
         .arg(format!("{policy}_guard:0,{policy}_sense:0"));
+    for function in *assumed {
+        command.arg("-eva-use-spec").arg(format!("{policy}_{function}"));
+    }
     command.args(["-eva-no-show-progress", "-eva-msg-key=-initial-state,-final-states"]);
     command.arg("-then").arg("-report-csv").arg(&table);
     let output = program::run(&mut command, PATIENCE, stop);
@@ -127,8 +137,10 @@ pub(super) fn analyse(
             });
         }
     };
+    // shown where the text of the function is analysed
+    let given = |function: &str| assumed.iter().any(|own| function == format!("{policy}_{own}"));
     let mut found = match std::fs::read_to_string(&table) {
-        Ok(text) if output.status.success() => read(&text, labels),
+        Ok(text) if output.status.success() => read(&text, labels, &given),
         _ => Found {
             failure: last_words(&output),
             ..Found::default()
@@ -160,13 +172,16 @@ fn last_words(output: &std::process::Output) -> String {
 pub(super) const FILE: &str = "driver.c";
 
 /// Reads the table of properties: directory, file, line, function, kind, status, text.
-fn read(table: &str, labels: &Labels) -> Found {
+fn read(table: &str, labels: &Labels, given: &dyn Fn(&str) -> bool) -> Found {
     let mut found = Found::default();
     for line in table.lines().skip(1) {
         let cells: Vec<&str> = line.split('\t').collect();
         let [_, file, line, function, kind, status, text] = cells[..] else {
             continue;
         };
+        if kind == "postcondition" && given(function) {
+            continue;
+        }
         let proved = status == "Valid" || status.starts_with("Considered valid");
         let unreached = status == "Dead";
         // the table does not name checks

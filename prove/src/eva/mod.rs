@@ -3,6 +3,7 @@
 mod calls;
 mod driver;
 mod frama_c;
+mod inputs;
 mod invariant;
 mod number;
 mod text;
@@ -51,23 +52,25 @@ impl Prover for Eva {
             Ok(files) => files.files,
             Err(error) => return Ok(vec![not_run(task, &error.to_string())]),
         };
-        analyse(task, &files, &tool, watch)
+        analyse(task, &files, None, &tool, watch)
     }
 }
 
-/// Proves with other sources in the place of the generated ones: for tests that plant defects. The files are by name.
+/// Proves with other sources in the place of the generated ones: for tests that plant defects. The files are by name; `only` is one
+/// driver, such as `prove_step`, whose claims then rest on what nobody has shown.
 ///
 /// # Errors
 /// If the run was stopped.
 pub fn prove_sources(
     task: Task<'_>,
     files: &BTreeMap<String, String>,
+    only: Option<&str>,
     watch: &Watch<'_>,
 ) -> Result<Vec<Claim>, Stopped> {
     let Some(tool) = frama_c::version(watch.stop) else {
         return Ok(vec![not_run(task, INSTALL)]);
     };
-    analyse(task, files, &tool, watch)
+    analyse(task, files, only, &tool, watch)
 }
 
 /// Whether Frama-C runs here.
@@ -107,17 +110,21 @@ fn not_run(task: Task<'_>, why: &str) -> Claim {
 fn analyse(
     task: Task<'_>,
     files: &BTreeMap<String, String>,
+    only: Option<&str>,
     tool: &str,
     watch: &Watch<'_>,
 ) -> Result<Vec<Claim>, Stopped> {
-    let driver = driver::driver(task.policy);
+    let mut driver = driver::driver(task.policy);
+    driver
+        .entries
+        .retain(|entry| only.is_none_or(|only| entry.function == only));
     let folder = match put(files, &driver.text) {
         Ok(folder) => folder,
         Err(error) => return Ok(vec![not_run(task, &format!("no folder for temporary files: {error}"))]),
     };
     let jobs = jobs(&driver);
     let found = run_all(folder.path(), task, &driver.labels, &jobs, watch)?;
-    let mut claims = Vec::new();
+    let mut parts: Vec<(&Entry, Vec<Claim>)> = Vec::new();
     for entry in &driver.entries {
         let runs: Vec<(Job<'_>, &Found)> = jobs
             .iter()
@@ -125,8 +132,10 @@ fn analyse(
             .filter(|(job, _)| job.entry == entry)
             .map(|(job, found)| (*job, found))
             .collect();
-        claims.extend(claims_of(task, entry, &runs, tool));
+        parts.push((entry, claims_of(task, entry, &runs, tool)));
     }
+    rest_on_others(&mut parts);
+    let mut claims: Vec<Claim> = parts.into_iter().flat_map(|(_, claims)| claims).collect();
     let left = driver.not_stated.iter().enumerate();
     claims.extend(left.map(|(index, (place, why))| Claim {
         name: format!("left-{index}"),
@@ -194,7 +203,7 @@ fn run_all(
                         folder,
                         &policy.name,
                         labels,
-                        job.entry.function,
+                        job.entry,
                         job.machine,
                         job.numbers,
                         watch.stop,
@@ -208,6 +217,33 @@ fn run_all(
     let results = results.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
     // every index below the count was taken by a thread
     results.into_iter().map(|found| found.unwrap_or(Err(Stopped))).collect()
+}
+
+/// A claim that was shown with a contract in the place of a function holds if that contract was shown.
+///
+/// That no NaN arises rests on the same claim there; all else on what was shown for all bit patterns, finite numbers among them.
+fn rest_on_others(parts: &mut [(&Entry, Vec<Claim>)]) {
+    let finite = |claim: &Claim| claim.name.ends_with(FINITE);
+    // a choice rests on the network, and a step on the choice: one turn for each
+    for _ in 0..2 {
+        let open: Vec<(&str, bool)> = parts
+            .iter()
+            .flat_map(|(entry, claims)| claims.iter().map(|claim| (entry.function, claim)))
+            .filter(|(_, claim)| claim.verdict != Verdict::Proved)
+            .map(|(function, claim)| (function, finite(claim)))
+            .collect();
+        for (entry, claims) in parts.iter_mut() {
+            for base in entry.assumed {
+                let function = format!("prove_{base}");
+                let shaky = |claim: &Claim| open.iter().any(|(own, of)| *own == function && *of == finite(claim));
+                let shown = claims.iter_mut().filter(|claim| claim.verdict == Verdict::Proved);
+                for claim in shown.filter(|claim| shaky(claim)) {
+                    claim.verdict = Verdict::Unproven;
+                    claim.reason = format!("it rests on what is claimed of `{base}`, and that is not shown");
+                }
+            }
+        }
+    }
 }
 
 /// What the runs of an entry say together.
@@ -235,8 +271,13 @@ fn claims_of(task: Task<'_>, entry: &Entry, runs: &[(Job<'_>, &Found)], tool: &s
             details: judged.into_iter().flat_map(|(_, details)| details).collect(),
         }
     };
-    let no_error = runs.iter().map(|(job, found)| alarms(job, found)).collect();
-    let mut claims = vec![claim("runs", NO_ERROR, no_error)];
+    let no_error = |numbers| {
+        let own = runs.iter().filter(move |(job, _)| job.numbers == numbers);
+        own.map(|(job, found)| alarms(job, found)).collect::<Vec<_>>()
+    };
+    let mut claims = vec![claim("runs", NO_ERROR, no_error(Numbers::Any))];
+    let finite = no_error(Numbers::Finite);
+    claims.extend((!finite.is_empty()).then(|| claim(FINITE, NO_NAN, finite)));
     for stated in &entry.stated {
         let judged = runs
             .iter()
@@ -249,7 +290,11 @@ fn claims_of(task: Task<'_>, entry: &Entry, runs: &[(Job<'_>, &Found)], tool: &s
 
 /// What Eva looks for everywhere.
 const NO_ERROR: &str = "No access outside of an object, no uninitialised read, no overflow of a signed integer, no wrong shift, no \
-                        division by zero, no conversion of a float that does not fit; where numbers are finite, no NaN and no infinity arises.";
+                        division by zero, no conversion of a float that does not fit.";
+
+/// Name of the claim about finite numbers.
+const FINITE: &str = "finite";
+const NO_NAN: &str = "Where numbers are finite, no NaN and no infinity arises, and nothing else goes wrong.";
 
 fn setting(job: &Job<'_>) -> String {
     format!("{}, {}", job.machine.0, job.numbers.name())

@@ -9,7 +9,7 @@ const LAYERS: &[&[&str]] = &[
     &["random", "toml-input", "targets", "templates", "report"],
     &["policy", "plant", "measured"],
     &["certify"],
-    &["interp", "codegen", "drm"],
+    &["interp", "codegen", "drm", "equivalence"],
     &["closed-loop"],
     &[
         "policy-macro",
@@ -18,7 +18,6 @@ const LAYERS: &[&[&str]] = &[
         "spice",
         "diagnose",
         "verify",
-        "equivalence",
         "prove",
     ],
     &["cli", "example-build-rust", "example-build-c", "example-embedded-hal"],

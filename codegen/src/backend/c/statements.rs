@@ -57,7 +57,7 @@ impl<'p> Printer<'p> {
                 None => self.named(op),
             };
             self.operands.push(text);
-            self.ops.push(op.clone());
+            self.ops.push(*op);
         }
     }
 

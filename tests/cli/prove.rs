@@ -1,0 +1,35 @@
+//! `policyc prove`: what it writes, and that it names what it did not run.
+
+use serde_json::Value;
+
+use super::{Desk, run};
+
+/// Without provers on the path nothing is proved, which is said, and is no failure of the policy.
+#[test]
+fn provers_that_are_missing_are_named_with_the_command_that_installs_them() {
+    let desk = Desk::new("minimal");
+    let empty = desk.path("empty");
+    std::fs::create_dir(&empty).unwrap();
+    let mut command = desk.command();
+    command
+        .args("prove policy --out proof --goals".split(' '))
+        .env("PATH", &empty);
+    let ran = run(&mut command);
+    let said = ran.stdout;
+    assert_eq!(ran.code, Some(0), "{said}{}", ran.stderr);
+    assert!(said.contains("apt-get install frama-c-base"), "{said}");
+    assert!(said.contains("pip install bitwuzla"), "{said}");
+    let proof: Value = serde_json::from_str(&desk.read("proof/proof.json")).unwrap();
+    assert_eq!(proof.pointer("/holds"), Some(&Value::Bool(false)), "nothing is proved");
+    // the goals are there for a solver of one's own
+    let goal = desk.read("proof/f32-c.duty.smt2");
+    assert!(goal.contains("(check-sat)"), "{goal}");
+    assert!(desk.path("proof/proof.html").exists());
+}
+
+#[test]
+fn a_policy_that_is_none_leaves_no_folder() {
+    let desk = Desk::new("minimal");
+    desk.refuse("prove nowhere --out proof", &["nowhere"]);
+    assert!(!desk.path("proof").exists());
+}

@@ -1,0 +1,100 @@
+//! What `docs/reference/prove.md` claims: the generated C is proved, and no planted defect is.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod defects;
+
+use std::collections::BTreeMap;
+
+use codegen::Output;
+use policy::{NumericFormat, Policy};
+use prove::{Claim, Eva, Prover, Stop, Task, Verdict, Watch};
+
+fn load(path: &str) -> Policy {
+    policy::load(&tests::root().join(path).join("policy.toml")).unwrap_or_else(|faults| panic!("{faults}"))
+}
+
+fn in_format(path: &str, format: NumericFormat) -> Policy {
+    let mut policy = load(path);
+    policy.numeric_format = format;
+    policy
+}
+
+fn task(policy: &Policy) -> Task<'_> {
+    Task {
+        policy,
+        target: targets::find("host").unwrap(),
+    }
+}
+
+fn sources(policy: &Policy) -> BTreeMap<String, String> {
+    codegen::sources(policy, task(policy).target, &[Output::C], None)
+        .unwrap()
+        .files
+}
+
+fn watched<T>(run: impl FnOnce(&Watch<'_>) -> T) -> T {
+    let stop = Stop::new(false);
+    run(&Watch {
+        say: &|_| {},
+        stop: &stop,
+    })
+}
+
+/// All claims that a run tried are proved; those that it leaves say why.
+fn assert_proved(policy: &Policy) {
+    let claims = watched(|watch| Eva.prove(task(policy), watch)).unwrap();
+    let title = format!("{} in {}", policy.name, policy.numeric_format.name());
+    for claim in &claims {
+        let Claim {
+            name, reason, details, ..
+        } = claim;
+        match claim.verdict {
+            Verdict::Proved => {}
+            Verdict::NotRun => assert!(!reason.is_empty(), "{title}: {name}"),
+            verdict => panic!("{title}: {name} is {}: {reason} {details:?}", verdict.words()),
+        }
+    }
+    let proved = claims.iter().filter(|claim| claim.verdict == Verdict::Proved).count();
+    // step, damage, marks, choice, network, start-up, integrity, self test: each with a claim at least
+    assert!(proved >= 20, "{title}: {proved} claims");
+}
+
+#[test]
+fn nothing_goes_wrong_in_a_small_controller() {
+    assert_proved(&load("tests/golden/cases/minimal"));
+    assert_proved(&in_format("tests/golden/cases/minimal", NumericFormat::I16));
+}
+
+#[test]
+fn nothing_goes_wrong_in_any_construct() {
+    if tests::full() {
+        for format in [NumericFormat::F32, NumericFormat::F64] {
+            assert_proved(&in_format("tests/golden/cases/constructs", format));
+        }
+        for format in [
+            NumericFormat::F32,
+            NumericFormat::F64,
+            NumericFormat::I16,
+            NumericFormat::I8,
+        ] {
+            assert_proved(&in_format("examples/buck12", format));
+        }
+    }
+}
+
+#[test]
+fn nothing_goes_wrong_in_random_policies() {
+    let count = if tests::full() { 50 } else { 1 };
+    for seed in 4200..4200 + count {
+        let folder = tests::random::policy(seed).unwrap();
+        let mut policy = policy::load(&folder.path()).unwrap();
+        let formats = [
+            NumericFormat::F32,
+            NumericFormat::I16,
+            NumericFormat::F64,
+            NumericFormat::I8,
+        ];
+        policy.numeric_format = formats[(seed % 4) as usize];
+        assert_proved(&policy);
+    }
+}

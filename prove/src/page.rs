@@ -152,6 +152,6 @@ fn provenance(answer: &Answer) -> Section {
 fn meaning() -> Section {
     Section::new("How to read it")
         .text("A claim is proved for every input that it names, not for a sample of them. Claims of one table share the runs that decided them, and their time.")
-        .text("The C analysed is the portable text. Where a compiler gets masks in the place of branches, the analysis gets the branches: that both give the same bits is no claim of this page, but `policyc verify` compares them.")
+        .text("The C analysed is the portable text. Where a compiler gets masks, Eva gets branches. Claims that begin with `C:` and with `Eva:` say that both do what the contract says.")
         .text("Trusted are the provers, the preprocessor, and that the compiler of the firmware computes binary32 and binary64 as IEEE 754 says.")
 }

@@ -4,7 +4,7 @@
 //! A random stream comes to most of these places only now and then. A kit of a few hundred steps has no time for that.
 
 use interp::Sample;
-use policy::{Interval, Policy, Scalar, Signal};
+use policy::{Expr, Input, Interval, Policy, Scalar, Signal};
 
 use crate::traces::{Event, nudged, sample_of};
 
@@ -40,8 +40,62 @@ pub fn moves(policy: &Policy) -> Vec<Move> {
         }
         moves.push(Event::Step(good.clone()));
     }
+    clips(policy, &good, &mut moves);
     let settled = std::iter::once(Move::Settle).chain(moves.into_iter().map(Move::Do));
     settled.chain(coefficients(policy, &good)).collect()
+}
+
+/// The farthest corners of each clipped source: one end, the other twice, and back, so that a difference to the sample before is far
+/// both ways, too. The ends of one signal at a time do not reach the clip of a source of several.
+fn clips(policy: &Policy, good: &[Sample], moves: &mut Vec<Event>) {
+    let scalar = policy.numeric_format.scalar();
+    let mut known: Vec<[Vec<Sample>; 2]> = Vec::new();
+    for feature in policy.features.iter().filter(|feature| feature.clip.is_some()) {
+        let corner = |sign: f64| -> Vec<Sample> {
+            let far = |(index, signal): (usize, &Signal)| {
+                let weight = sign * weight(&feature.source, index);
+                match weight {
+                    0.0 => good[index],
+                    _ if weight < 0.0 => inner(scalar, signal, signal.range.low),
+                    _ => inner(scalar, signal, signal.range.high),
+                }
+            };
+            policy.signals.iter().enumerate().map(far).collect()
+        };
+        let corners = [corner(-1.0), corner(1.0)];
+        let [low, high] = &corners;
+        // nothing measured goes in, or the same corners have been visited
+        if low == high
+            || known
+                .iter()
+                .any(|[a, b]| (a, b) == (low, high) || (a, b) == (high, low))
+        {
+            continue;
+        }
+        let steps = [low, high, high, low, low].map(|samples| Event::Step(samples.clone()));
+        moves.extend(steps);
+        moves.push(Event::Step(good.to_vec()));
+        known.push(corners);
+    }
+}
+
+/// A sample at that end of a range, or the next to it that is inside whatever the conversion rounds.
+fn inner(scalar: Scalar, signal: &Signal, end: f64) -> Sample {
+    let range = signal.range;
+    let inside = end + 1e-3 * (0.5 * (range.low + range.high) - end);
+    sample_of(scalar, signal, if signal.adc.is_some() { inside } else { end })
+}
+
+/// What a source rises by with a signal.
+fn weight(source: &Expr, index: usize) -> f64 {
+    match source {
+        Expr::Input(Input::Signal(own)) if *own == index => 1.0,
+        Expr::Input(_) | Expr::Constant(_) => 0.0,
+        Expr::Neg(x) => -weight(x, index),
+        Expr::Add(x, y) => weight(x, index) + weight(y, index),
+        Expr::Sub(x, y) => weight(x, index) - weight(y, index),
+        Expr::Scale(factor, x) => factor * weight(x, index),
+    }
 }
 
 /// A sample in the middle of each range.
@@ -121,4 +175,46 @@ fn coefficients(policy: &Policy, good: &[Sample]) -> Vec<Move> {
     moves.push(set(own_values));
     moves.extend(step());
     moves
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn golden(case: &str) -> Policy {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/golden/cases");
+        policy::load(&folder.join(case).join("policy.toml")).unwrap_or_else(|faults| panic!("{faults}"))
+    }
+
+    /// The oracle is the source's own range: what its corners give, computed apart from the moves.
+    #[test]
+    fn a_clip_that_needs_several_signals_at_their_ends_is_reached() {
+        let mut policy = golden("minimal");
+        let [v, i] = [0, 1].map(|index| Expr::Input(Input::Signal(index)));
+        // v from 0 to 250 and i from -5 to 60: the difference goes from -360 to 270, with one signal in the middle only to 195
+        policy.features[0].source = Expr::Sub(Box::new(v), Box::new(Expr::Scale(6.0, Box::new(i))));
+        policy.features[0].clip = Some(Interval {
+            low: -300.0,
+            high: 260.0,
+        });
+        let numbers = |samples: &[Sample]| -> Vec<f64> {
+            let number = |sample: &Sample| match sample {
+                Sample::Physical(number) => f64::from(*number),
+                Sample::Wide(number) => *number,
+                Sample::Code(_) => panic!("no codes here"),
+            };
+            samples.iter().map(number).collect()
+        };
+        let values: Vec<f64> = moves(&policy)
+            .iter()
+            .filter_map(|next| match next {
+                Move::Do(Event::Step(samples)) => Some(numbers(samples)),
+                _ => None,
+            })
+            .filter(|x| (0.0..=250.0).contains(&x[0]) && (-5.0..=60.0).contains(&x[1]))
+            .map(|x| x[0] - 6.0 * x[1])
+            .collect();
+        assert!(values.iter().any(|value| *value > 260.0), "{values:?}");
+        assert!(values.iter().any(|value| *value < -300.0), "{values:?}");
+    }
 }

@@ -26,7 +26,7 @@ pub fn channel(problem: &Problem, residual: &[f64], record: usize, channel: usiz
 }
 
 /// Standard deviation of each channel's noise: from second differences of the residual, which hardly see what is slow,
-/// by their median, which hardly sees what is rare. Infinite for a channel that no record has.
+/// by the smaller of them, which hardly see what is rare. Infinite for a channel that no record has.
 #[must_use]
 pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
     std::array::from_fn(|n| {
@@ -58,22 +58,35 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
             .any(|r| r.measured[n].iter().any(|v| v.is_finite()));
         match (has, typical.is_finite()) {
             (false, _) => f64::INFINITY,
-            (true, true) => (typical * problem.sigma[n]).max(least),
+            (true, true) => (typical * problem.sigma[n]).max(least).hypot(metered(problem, n)),
             // too few points to tell noise from anything: a share of what is measured, that of a good meter
             (true, false) => 2e-3 * scale,
         }
     })
 }
 
+/// What a level of the load that is a mean of metered rows adds to the noise of the inductor current, which follows the load: the
+/// meter's own noise. A mean over n rows is off by s / sqrt n, as is the other current's: together the sum over the level scatters as
+/// if each row had both.
+fn metered(problem: &Problem, n: usize) -> f64 {
+    let of_records = problem.records.iter().filter(|_| n == 1);
+    of_records.filter_map(|record| record.metered).fold(0.0, f64::max)
+}
+
 /// Standard deviation of noise by second differences of the triples that count; NaN where there are too few.
 pub(crate) fn scatter(values: &[f64], counts: impl Fn(&[f64]) -> bool) -> f64 {
     let triples = values.windows(3).filter(|triple| counts(triple));
-    let second: Vec<f64> = triples.map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
-    match second.len() {
-        0..5 => f64::NAN,
-        // median of |x| over sigma, and three independent terms with weights 1, -2, 1
-        _ => median(second) / 0.674_49 / 6f64.sqrt(),
+    let mut second: Vec<f64> = triples.map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
+    if second.len() < 5 {
+        return f64::NAN;
     }
+    second.sort_by(f64::total_cmp);
+    // the smaller four fifths: a mean, since the median of values on the steps of a converter is a step itself, a quarter off
+    // where a step is half the noise
+    let kept = &second[..second.len() - second.len() / 5];
+    let mean = kept.iter().sum::<f64>() / kept.len() as f64;
+    // their mean over sigma for a normal distribution, and three independent terms with weights 1, -2, 1
+    mean / 0.558_61 / 6f64.sqrt()
 }
 
 /// A converter coarser than the noise shows one value nearly always: its rounding error is then the same in all rows, which
@@ -231,4 +244,49 @@ pub fn is_discontinuous(record: &Record, row: usize, ripple: f64) -> bool {
     let v = record.measured[0][row];
     let drawn = v * load.conductance + load.current + if v > 0.0 { load.power / v } else { 0.0 };
     drawn.is_finite() && drawn < 0.5 * ripple
+}
+
+#[cfg(test)]
+mod tests {
+    use super::scatter;
+
+    /// Twelve uniform numbers of a linear congruential generator make a normal one.
+    fn normal(state: &mut u64) -> f64 {
+        let uniform = |_| {
+            *state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (*state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+        };
+        (0..12).map(uniform).sum()
+    }
+
+    #[test]
+    fn the_steps_of_a_converter_hardly_change_the_noise_that_is_seen() {
+        let mut state = 7;
+        for step in [0.01, 0.3, 0.6, 0.8, 1.0] {
+            let each = (0..40).map(|_| {
+                let values: Vec<f64> = (0..240).map(|_| (normal(&mut state) / step).round() * step).collect();
+                scatter(&values, |_| true)
+            });
+            let all: Vec<f64> = each.collect();
+            // Sheppard: rounding adds a twelfth of the square of the step
+            let expected = (1.0f64 + step * step / 12.0).sqrt();
+            let mean = all.iter().sum::<f64>() / 40.0 / expected;
+            let spread = (all.iter().map(|seen| (seen / expected - mean).powi(2)).sum::<f64>() / 40.0).sqrt();
+            assert!(
+                (mean - 1.0).abs() < 0.04 && spread < 0.1,
+                "step {step}: {mean} with {spread}"
+            );
+        }
+    }
+
+    #[test]
+    fn rare_leaps_hardly_change_the_noise_that_is_seen() {
+        let mut state = 7;
+        let values: Vec<f64> = (0..1000)
+            .map(|n| normal(&mut state) + if n % 100 == 0 { 50.0 } else { 0.0 })
+            .collect();
+        assert!((scatter(&values, |_| true) - 1.0).abs() < 0.15);
+    }
 }

@@ -46,22 +46,100 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
             scatter(&shown, |triple| triple.iter().all(|v| *v != 0.0))
         };
         // the median: one noisy record must not hide what the others show
-        let typical = median((0..problem.records.len()).map(of));
+        let typical = median((0..problem.records.len()).map(of)) * unsure(problem, n);
         let steps = problem.records.iter().map(|r| r.lattice[n].max(r.resolution[n]));
         let lattice = steps.fold(0.0, f64::max);
         let scale = [problem.bases.v, problem.bases.i, problem.bases.i, problem.bases.v_in][n];
         // step / sqrt 12: the standard deviation of rounding
-        let least = (lattice / 12f64.sqrt()).max(1e-5 * scale).max(stuck(problem, n));
+        let least = (lattice / 12f64.sqrt())
+            .max(least_share(problem) * scale)
+            .max(stuck(problem, n));
         let has = problem
             .records
             .iter()
             .any(|r| r.measured[n].iter().any(|v| v.is_finite()));
         match (has, typical.is_finite()) {
             (false, _) => f64::INFINITY,
-            (true, true) => (typical * problem.sigma[n]).max(least).hypot(metered(problem, n)),
+            (true, true) => (typical * problem.sigma[n])
+                .min(most(problem, n, scale))
+                .max(least)
+                .hypot(metered(problem, n)),
             // too few points to tell noise from anything: a share of what is measured, that of a good meter
             (true, false) => 2e-3 * scale,
         }
+    })
+}
+
+/// Most noise of settled points, as a share of the signal: poor meters have 0.5 %. The noise of a table is read off its rows, and
+/// without a bound rows in disorder would show themselves as noise.
+const POOR_METER: f64 = 5e-3;
+
+/// The most noise of a channel, of size `scale`.
+fn most(problem: &Problem, n: usize, scale: f64) -> f64 {
+    let mut records = problem
+        .records
+        .iter()
+        .filter(|r| r.measured[n].iter().any(|v| v.is_finite()));
+    match records.all(|record| record.settled && !record.repeated) {
+        true => POOR_METER * scale,
+        false => f64::INFINITY,
+    }
+}
+
+/// Fewer values than this show their noise so badly that a cause would be named by chance.
+const FEW: f64 = 50.0;
+
+/// How much more the noise of few values may be than it shows: its standard error is 1.6 / sqrt n (second differences).
+fn unsure(problem: &Problem, n: usize) -> f64 {
+    let records = problem.records.iter().filter(|record| !record.repeated);
+    let count = records
+        .flat_map(|record| &record.measured[n])
+        .filter(|v| v.is_finite())
+        .count() as f64;
+    if count > 0.0 && count < FEW {
+        1.0 + 1.6 / count.sqrt()
+    } else {
+        1.0
+    }
+}
+
+/// The least noise, as a share of the signal. A row a period is sampled with 13 bits at best (1e-4), and two simulators of
+/// one circuit differ by as much; settled points are means, and good meters show five digits.
+fn least_share(problem: &Problem) -> f64 {
+    if problem.records.iter().all(|record| record.settled) {
+        1e-5
+    } else {
+        1e-4
+    }
+}
+
+/// A record over time with noise below this share of its signal was not measured: a fifth of the above.
+const TOO_CLEAN: f64 = 2e-5;
+
+/// What to say of records over time that are too clean to be measured; `residual` is that of the model as given.
+#[must_use]
+pub fn too_clean(problem: &Problem, residual: &[f64]) -> Option<String> {
+    let scales = [problem.bases.v, problem.bases.i, problem.bases.i, problem.bases.v_in];
+    let clean = |(index, record): (usize, &Record)| {
+        let is_clean = |n: &usize| {
+            let shown: Vec<f64> = channel(problem, residual, index, *n)
+                .into_iter()
+                .filter(|v| *v != 0.0)
+                .collect();
+            let noise = scatter(&shown, |_| true) * problem.sigma[*n];
+            // a coarse converter hides what noise there is
+            noise < TOO_CLEAN * scales[*n] && record.lattice[*n] < TOO_CLEAN * scales[*n]
+        };
+        let has = |n: &usize| record.measured[*n].iter().any(|v| v.is_finite());
+        let mut measured = (0..2).filter(has).peekable();
+        (!record.settled && measured.peek().is_some() && measured.all(|n| is_clean(&n))).then(|| record.name.clone())
+    };
+    let names: Vec<String> = problem.records.iter().enumerate().filter_map(clean).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "{}: too clean to be measured, noise below 2e-5 of the signals. A simulation? Nothing below a noise of 1e-4 is named in it",
+            names.join(", ")
+        )
     })
 }
 

@@ -12,6 +12,7 @@ use crate::problem::{Problem, dot};
 use crate::profile::Profile;
 use crate::progress::{Listener, Progress};
 use crate::search::{Searcher, TIE, gained};
+use crate::shape::structures;
 
 /// Causes that are fitted with free instants from where they fit without. As many as are fitted after a linear look in the search: a
 /// convention.
@@ -45,6 +46,12 @@ pub fn attribute(problem: Problem, null: State, say: Listener<'_>) -> (Problem, 
     let candidates = candidates(&problem.base.plant, &problem.bases);
     let basis = problem.basis(&null.model, &null.starts, &null.residual);
     let search = searcher(&problem, &candidates, &basis, &null, say);
+    if crate::balance::broken(&problem).is_some() {
+        // no cause mends them: a search would take its longest and find nothing
+        let unmoved = (0..candidates.len()).map(|cause| search.fitter.unmoved(cause, 0.0));
+        let attribution = grown(&search, unmoved.collect(), None);
+        return (problem, attribution);
+    }
     let singles = search.singles("each cause alone");
     let Some((freed, near)) = needs_instants(&search, &singles) else {
         let attribution = grown(&search, singles, None);
@@ -129,9 +136,13 @@ fn grown(search: &Searcher<'_>, singles: Vec<Fit>, known: Option<Fit>) -> Attrib
         Some(fit) => search.inflation(fit),
         None => noise::inflation(problem, &null.residual),
     };
-    let rivals = best
-        .as_ref()
-        .map_or_else(Vec::new, |fit| search.rivals(fit, &evidence, &singles));
+    // what leaves structure explains nothing, and nobody asks what would explain it as well
+    let leaves_structure = |fit: &Fit| !structures(problem, null, &fit.state, inflation).is_empty();
+    let rivals = match &best {
+        Some(fit) if leaves_structure(fit) => vec![Vec::new(); fit.causes.len()],
+        Some(fit) => search.rivals(fit, &evidence, &singles),
+        None => Vec::new(),
+    };
     Attribution {
         null: null.clone(),
         singles,

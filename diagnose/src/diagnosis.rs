@@ -4,6 +4,7 @@ use plant::Parameters;
 
 use crate::attribute::{Attribution, attribute};
 use crate::control::Request;
+use crate::doubts;
 use crate::drive::Model;
 use crate::findings::{Evidence, Findings, Gain, Hidden, Named, Noise, Value, Verdict};
 use crate::fit::State;
@@ -16,7 +17,7 @@ use crate::progress::{Listener, Progress};
 use crate::quantised;
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
 use crate::sampling;
-use crate::shape::{Structure, structures};
+use crate::shape::structures;
 use crate::words::{nearest, sentence, shifted};
 
 /// Everything a report shows.
@@ -50,19 +51,29 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     let (problem, null, outliers) = prepared(train, &base);
     let (mut problem, mut attribution) = attribute(problem, null, say);
     instants::note(&mut problem, &attribution.state().starts);
-    let others = crate::ties::other_pairs(&problem, &attribution, say);
-    // they stand in the place of all causes together: said once, at the first
-    for rivals in attribution.rivals.iter_mut().take(1) {
-        rivals.extend(others.iter().cloned());
-    }
-    let mut profiles = profiles(&problem, &attribution, say);
     // what is too small for a cause still leaves no structure
     let structure = structures(&problem, &attribution.null, attribution.state(), attribution.inflation);
+    let mut profiles = if structure.is_empty() {
+        let others = crate::ties::other_pairs(&problem, &attribution, say);
+        // they stand in the place of all causes together: said once, at the first
+        for rivals in attribution.rivals.iter_mut().take(1) {
+            rivals.extend(others.iter().cloned());
+        }
+        profiles(&problem, &attribution, say)
+    } else {
+        // a value that explains nothing is worth no profile
+        crate::profile::parabolas(&problem, &attribution)
+    };
     // behind the profiles: whether a cause is nothing is read off its intervals
     let nothing = attribution.leave_out_nothing(&problem, &mut profiles);
     let named = named(&attribution, &profiles);
+    let doubts = doubts::of(&problem, &attribution, &profiles, &structure);
     let lattice = quantised::cause(&problem);
-    let verdict = verdict(&named, &lattice, &structure);
+    let verdict = verdict(
+        &named,
+        &lattice,
+        structure.is_empty() && !doubts::forbids(&named, &doubts),
+    );
     let explained = verdict != Verdict::Unexplained;
     say(Progress::Stage("held-out records"));
     // what does not explain the records is no better model
@@ -90,15 +101,16 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         false => nearest(&named, attribution.removed(&problem)),
     };
     let findings = Findings {
-        sentence: sentence(verdict, &causes, &structure) + &near + &shifted(&shifts),
+        sentence: sentence(verdict, &causes, &structure, &doubts::said(&doubts)) + &near + &shifted(&shifts),
         verdict,
         partial: if explained { Vec::new() } else { named },
         causes,
         structure,
+        doubts: doubts::said(&doubts),
         not_detectable: hidden(&problem, &attribution),
         next_experiments,
         noise: Noise {
-            repairs: notes(&problem, pair.as_ref(), &nothing),
+            repairs: notes(&problem, &attribution, pair.as_ref(), &nothing),
             ..noise_of(&problem, &attribution, &outliers, trim)
         },
         gain: Gain {
@@ -213,9 +225,9 @@ fn each_once(sets: impl Iterator<Item = Vec<&'static str>>) -> Vec<Vec<&'static 
     })
 }
 
-fn verdict(named: &[Named], lattice: &Option<Named>, structure: &[Structure]) -> Verdict {
+fn verdict(named: &[Named], lattice: &Option<Named>, holds: bool) -> Verdict {
     // before anything else: where the truth is not on the list, its best cause imitates it with a wrong value
-    if !structure.is_empty() {
+    if !holds {
         return Verdict::Unexplained;
     }
     if named.iter().any(|cause| !cause.rivals.is_empty()) {
@@ -278,10 +290,11 @@ fn by_text<'a>(records: impl Iterator<Item = &'a Record>) -> Vec<String> {
 }
 
 /// What was repaired, assumed or noticed.
-fn notes(problem: &Problem, pair: Option<&Pair>, nothing: &[&str]) -> Vec<String> {
+fn notes(problem: &Problem, attribution: &Attribution, pair: Option<&Pair>, nothing: &[&str]) -> Vec<String> {
     let held = pair.map_or(&[][..], |pair| &pair.problem.records);
     let records = problem.records.iter().chain(held);
     let mut notes = by_text(records);
+    notes.extend(noise::too_clean(problem, &attribution.null.residual));
     notes.extend(quantised::note(problem));
     notes.extend(nothing.iter().map(|id| {
         format!("{id} would fit a little better, by less than two simulators of one circuit differ: not named")

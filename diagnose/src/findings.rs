@@ -132,6 +132,8 @@ pub struct Findings {
     pub partial: Vec<Named>,
     /// Structure that is left.
     pub structure: Vec<Structure>,
+    /// Why causes are no explanation although they leave no structure, in words.
+    pub doubts: Vec<String>,
     /// Causes that would have to be large to be seen.
     pub not_detectable: Vec<Hidden>,
     /// Experiments that would separate what is tied.

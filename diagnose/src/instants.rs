@@ -178,6 +178,19 @@ pub(crate) fn note(problem: &mut Problem, starts: &Starts) {
                  them",
                 late.len()
             ));
+            let at_limit = |late: &&f64| late.abs() > FARTHEST - NEGLIGIBLE;
+            let ended: Vec<String> = (late.iter().zip(&record.free_steps))
+                .filter(|(late, _)| at_limit(late))
+                .map(|(_, row)| format!("{:.6} s", record.time[*row]))
+                .collect();
+            if !ended.is_empty() {
+                record.repairs.push(format!(
+                    "{} of these load steps end at the limit of one period, at t = {}: their rows may be wrong by a period and more. \
+                     Is the column of the load shifted against the others?",
+                    ended.len(),
+                    ended.join(", ")
+                ));
+            }
         }
     }
 }

@@ -18,10 +18,12 @@
 //! answer and [`extend`] and [`page`] write it down. See docs/reference/diagnosis.md.
 
 pub mod attribute;
+mod balance;
 pub mod basis;
 pub mod causes;
 pub mod control;
 pub mod diagnosis;
+mod doubts;
 pub mod drive;
 mod duty_steps;
 pub mod extend;
@@ -43,6 +45,7 @@ pub mod record;
 mod sampling;
 mod search;
 pub mod shape;
+mod small;
 mod spectrum;
 pub mod ties;
 mod words;

@@ -201,6 +201,7 @@ fn planned(problem: &Problem, plan: Plan) -> (String, Record) {
         settled: false,
         repeated: false,
         scatter: [f64::NAN; CHANNELS],
+        metered: None,
         sampled: None,
         dense: true,
         segments: std::iter::once(0..ROWS).collect(),

@@ -26,7 +26,7 @@ pub fn channel(problem: &Problem, residual: &[f64], record: usize, channel: usiz
 }
 
 /// Standard deviation of each channel's noise: from second differences of the residual, which hardly see what is slow,
-/// by their median, which hardly sees what is rare. Infinite for a channel that no record has.
+/// by the smaller of them, which hardly see what is rare. Infinite for a channel that no record has.
 #[must_use]
 pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
     std::array::from_fn(|n| {
@@ -46,34 +46,125 @@ pub fn sigma(problem: &Problem, residual: &[f64]) -> [f64; CHANNELS] {
             scatter(&shown, |triple| triple.iter().all(|v| *v != 0.0))
         };
         // the median: one noisy record must not hide what the others show
-        let typical = median((0..problem.records.len()).map(of));
+        let typical = median((0..problem.records.len()).map(of)) * unsure(problem, n);
         let steps = problem.records.iter().map(|r| r.lattice[n].max(r.resolution[n]));
         let lattice = steps.fold(0.0, f64::max);
         let scale = [problem.bases.v, problem.bases.i, problem.bases.i, problem.bases.v_in][n];
         // step / sqrt 12: the standard deviation of rounding
-        let least = (lattice / 12f64.sqrt()).max(1e-5 * scale).max(stuck(problem, n));
+        let least = (lattice / 12f64.sqrt())
+            .max(least_share(problem) * scale)
+            .max(stuck(problem, n));
         let has = problem
             .records
             .iter()
             .any(|r| r.measured[n].iter().any(|v| v.is_finite()));
         match (has, typical.is_finite()) {
             (false, _) => f64::INFINITY,
-            (true, true) => (typical * problem.sigma[n]).max(least),
+            (true, true) => (typical * problem.sigma[n])
+                .min(most(problem, n, scale))
+                .max(least)
+                .hypot(metered(problem, n)),
             // too few points to tell noise from anything: a share of what is measured, that of a good meter
             (true, false) => 2e-3 * scale,
         }
     })
 }
 
+/// Most noise of settled points, as a share of the signal: poor meters have 0.5 %. The noise of a table is read off its rows, and
+/// without a bound rows in disorder would show themselves as noise.
+const POOR_METER: f64 = 5e-3;
+
+/// The most noise of a channel, of size `scale`.
+fn most(problem: &Problem, n: usize, scale: f64) -> f64 {
+    let mut records = problem
+        .records
+        .iter()
+        .filter(|r| r.measured[n].iter().any(|v| v.is_finite()));
+    match records.all(|record| record.settled && !record.repeated) {
+        true => POOR_METER * scale,
+        false => f64::INFINITY,
+    }
+}
+
+/// Fewer values than this show their noise so badly that a cause would be named by chance.
+const FEW: f64 = 50.0;
+
+/// How much more the noise of few values may be than it shows: its standard error is 1.6 / sqrt n (second differences).
+fn unsure(problem: &Problem, n: usize) -> f64 {
+    let records = problem.records.iter().filter(|record| !record.repeated);
+    let count = records
+        .flat_map(|record| &record.measured[n])
+        .filter(|v| v.is_finite())
+        .count() as f64;
+    if count > 0.0 && count < FEW {
+        1.0 + 1.6 / count.sqrt()
+    } else {
+        1.0
+    }
+}
+
+/// The least noise, as a share of the signal. A row a period is sampled with 13 bits at best (1e-4), and two simulators of
+/// one circuit differ by as much; settled points are means, and good meters show five digits.
+fn least_share(problem: &Problem) -> f64 {
+    if problem.records.iter().all(|record| record.settled) {
+        1e-5
+    } else {
+        1e-4
+    }
+}
+
+/// A record over time with noise below this share of its signal was not measured: a fifth of the above.
+const TOO_CLEAN: f64 = 2e-5;
+
+/// What to say of records over time that are too clean to be measured; `residual` is that of the model as given.
+#[must_use]
+pub fn too_clean(problem: &Problem, residual: &[f64]) -> Option<String> {
+    let scales = [problem.bases.v, problem.bases.i, problem.bases.i, problem.bases.v_in];
+    let clean = |(index, record): (usize, &Record)| {
+        let is_clean = |n: &usize| {
+            let shown: Vec<f64> = channel(problem, residual, index, *n)
+                .into_iter()
+                .filter(|v| *v != 0.0)
+                .collect();
+            let noise = scatter(&shown, |_| true) * problem.sigma[*n];
+            // a coarse converter hides what noise there is
+            noise < TOO_CLEAN * scales[*n] && record.lattice[*n] < TOO_CLEAN * scales[*n]
+        };
+        let has = |n: &usize| record.measured[*n].iter().any(|v| v.is_finite());
+        let mut measured = (0..2).filter(has).peekable();
+        (!record.settled && measured.peek().is_some() && measured.all(|n| is_clean(&n))).then(|| record.name.clone())
+    };
+    let names: Vec<String> = problem.records.iter().enumerate().filter_map(clean).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "{}: too clean to be measured, noise below 2e-5 of the signals. A simulation? Nothing below a noise of 1e-4 is named in it",
+            names.join(", ")
+        )
+    })
+}
+
+/// What a level of the load that is a mean of metered rows adds to the noise of the inductor current, which follows the load: the
+/// meter's own noise. A mean over n rows is off by s / sqrt n, as is the other current's: together the sum over the level scatters as
+/// if each row had both.
+fn metered(problem: &Problem, n: usize) -> f64 {
+    let of_records = problem.records.iter().filter(|_| n == 1);
+    of_records.filter_map(|record| record.metered).fold(0.0, f64::max)
+}
+
 /// Standard deviation of noise by second differences of the triples that count; NaN where there are too few.
 pub(crate) fn scatter(values: &[f64], counts: impl Fn(&[f64]) -> bool) -> f64 {
     let triples = values.windows(3).filter(|triple| counts(triple));
-    let second: Vec<f64> = triples.map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
-    match second.len() {
-        0..5 => f64::NAN,
-        // median of |x| over sigma, and three independent terms with weights 1, -2, 1
-        _ => median(second) / 0.674_49 / 6f64.sqrt(),
+    let mut second: Vec<f64> = triples.map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
+    if second.len() < 5 {
+        return f64::NAN;
     }
+    second.sort_by(f64::total_cmp);
+    // the smaller four fifths: a mean, since the median of values on the steps of a converter is a step itself, a quarter off
+    // where a step is half the noise
+    let kept = &second[..second.len() - second.len() / 5];
+    let mean = kept.iter().sum::<f64>() / kept.len() as f64;
+    // their mean over sigma for a normal distribution, and three independent terms with weights 1, -2, 1
+    mean / 0.558_61 / 6f64.sqrt()
 }
 
 /// A converter coarser than the noise shows one value nearly always: its rounding error is then the same in all rows, which
@@ -231,4 +322,49 @@ pub fn is_discontinuous(record: &Record, row: usize, ripple: f64) -> bool {
     let v = record.measured[0][row];
     let drawn = v * load.conductance + load.current + if v > 0.0 { load.power / v } else { 0.0 };
     drawn.is_finite() && drawn < 0.5 * ripple
+}
+
+#[cfg(test)]
+mod tests {
+    use super::scatter;
+
+    /// Twelve uniform numbers of a linear congruential generator make a normal one.
+    fn normal(state: &mut u64) -> f64 {
+        let uniform = |_| {
+            *state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (*state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+        };
+        (0..12).map(uniform).sum()
+    }
+
+    #[test]
+    fn the_steps_of_a_converter_hardly_change_the_noise_that_is_seen() {
+        let mut state = 7;
+        for step in [0.01, 0.3, 0.6, 0.8, 1.0] {
+            let each = (0..40).map(|_| {
+                let values: Vec<f64> = (0..240).map(|_| (normal(&mut state) / step).round() * step).collect();
+                scatter(&values, |_| true)
+            });
+            let all: Vec<f64> = each.collect();
+            // Sheppard: rounding adds a twelfth of the square of the step
+            let expected = (1.0f64 + step * step / 12.0).sqrt();
+            let mean = all.iter().sum::<f64>() / 40.0 / expected;
+            let spread = (all.iter().map(|seen| (seen / expected - mean).powi(2)).sum::<f64>() / 40.0).sqrt();
+            assert!(
+                (mean - 1.0).abs() < 0.04 && spread < 0.1,
+                "step {step}: {mean} with {spread}"
+            );
+        }
+    }
+
+    #[test]
+    fn rare_leaps_hardly_change_the_noise_that_is_seen() {
+        let mut state = 7;
+        let values: Vec<f64> = (0..1000)
+            .map(|n| normal(&mut state) + if n % 100 == 0 { 50.0 } else { 0.0 })
+            .collect();
+        assert!((scatter(&values, |_| true) - 1.0).abs() < 0.15);
+    }
 }

@@ -136,6 +136,34 @@ pub fn profiles(problem: &Problem, attribution: &Attribution, say: Listener<'_>)
     })
 }
 
+/// What covariances say of the parameters: intervals without a fit.
+#[must_use]
+pub fn parabolas(problem: &Problem, attribution: &Attribution) -> Vec<Profile> {
+    let Some(best) = &attribution.best else {
+        return Vec::new();
+    };
+    let fitter = attribution.fitter(problem);
+    let of = |(number, place): (usize, &(usize, usize))| {
+        let candidate = &attribution.candidates[place.0];
+        let knob = &candidate.form.knobs[place.1];
+        let (value, [low, high, _]) = (best.values[number], fitter.range(*place));
+        let reach = TWO_SIDED
+            * (best.covariance[number][number] * attribution.inflation)
+                .max(0.0)
+                .sqrt();
+        Profile {
+            member: best.causes.iter().position(|cause| *cause == place.0).unwrap_or(0),
+            name: knob.name,
+            unit: knob.unit(),
+            value,
+            interval: [value - reach, value + reach].map(|end| end.clamp(low, high)),
+            own: candidate.own[place.1],
+            curve: vec![(value, 0.0)],
+        }
+    };
+    fitter.places(&best.causes).iter().enumerate().map(of).collect()
+}
+
 /// How far a step of a duty counter may be off on one side: within a piece of equal counts the cost grows smoothly, at its end
 /// it jumps.
 fn alike(step: f64, side: f64, cost: &dyn Fn(f64) -> f64) -> f64 {

@@ -3,6 +3,7 @@
 mod align;
 mod channels;
 mod digits;
+mod levels;
 mod logged;
 mod raw;
 mod rows;
@@ -51,6 +52,8 @@ pub struct Record {
     /// Standard deviation of the noise of such rows, by channel. A mean of many is not taken for better than one: what an
     /// instrument gets wrong does not average out.
     pub scatter: [f64; CHANNELS],
+    /// Noise of the meter whose current is the load, A; nothing if the load was set, or is taken as it was measured.
+    pub metered: Option<f64>,
     /// What a settled point holds; nothing if the data have to say it.
     pub sampled: Option<Sampled>,
     /// There is a row in each period, gaps apart.
@@ -111,6 +114,7 @@ impl Record {
             settled: lines.settled,
             repeated: lines.repeated,
             scatter: lines.scatter,
+            metered: lines.metered,
             sampled: lines.sampled,
             dense: lines.dense,
             segments: lines.segments,

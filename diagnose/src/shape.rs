@@ -5,6 +5,7 @@ use crate::level::ACCURACY;
 use crate::noise::{self, BLOCK, channel};
 use crate::problem::Problem;
 use crate::record::CHANNEL_NAMES;
+use crate::small;
 use crate::spectrum::strongest_line;
 
 /// Structure is seen where block means scatter this much more than white noise of the same size would let them: twice as much,
@@ -40,9 +41,18 @@ pub struct Structure {
 pub fn structures(problem: &Problem, null: &State, state: &State, inflation: f64) -> Vec<Structure> {
     let mut found = Vec::new();
     for (index, record) in problem.records.iter().enumerate() {
+        let disorder = small::disorder(problem, state, index);
+        if disorder.is_some() {
+            found.extend(disorder);
+            continue;
+        }
         for (n, name) in CHANNEL_NAMES.iter().enumerate() {
             let values = channel(problem, &state.residual, index, n);
             let left = noise::left(&values);
+            let before = noise::left(&channel(problem, &null.residual, index, n));
+            if left.blocks < 5 {
+                found.extend(small::structure(problem, index, n, &values, before.square));
+            }
             // fewer block means tell no scatter
             if left.blocks < 5 {
                 continue;
@@ -52,7 +62,6 @@ pub fn structures(problem: &Problem, null: &State, state: &State, inflation: f64
             // a coarse converter leaves patterns that are none of the plant's
             let step = record.lattice[n];
             let coarse = step > 1.5 * problem.sigma[n] && left.square.sqrt() * problem.sigma[n] < step;
-            let before = noise::left(&channel(problem, &null.residual, index, n));
             // a simulator that is off by ACCURACY leaves that share of what was there, in squares
             let slow = left.slow > 1.0 + SLOW.max(SIGMAS * scatter) + ACCURACY * ACCURACY * before.slow;
             // fast structure: white, but 1.6 times as large as the noise that second differences showed

@@ -8,7 +8,7 @@ use crate::shape::Structure;
 const MOST_SAID: usize = 3;
 
 /// The verdict in a sentence.
-pub fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure]) -> String {
+pub fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure], doubts: &[String]) -> String {
     let list = |causes: &[Named]| {
         let words = causes.iter().map(|cause| {
             let values = cause.parameters.iter().map(|(name, v)| {
@@ -55,14 +55,16 @@ pub fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure]) -> 
             )
         }
         Verdict::Unexplained => {
-            let shapes: Vec<String> = structure
+            let shapes = structure
                 .iter()
-                .map(|s| format!("{} of {}: {}", s.channel, s.record, s.shape))
-                .collect();
-            format!(
-                "None of the known causes explains the records; left is {}.",
-                shapes.join("; ")
-            )
+                .map(|s| format!("{} of {}: {}", s.channel, s.record, s.shape));
+            let shapes: Vec<String> = shapes.collect();
+            let left = match shapes.is_empty() {
+                true => String::new(),
+                false => format!("; left is {}", shapes.join("; ")),
+            };
+            let doubts: String = doubts.iter().map(|doubt| format!("; {doubt}")).collect();
+            format!("None of the known causes explains the records{left}{doubts}.")
         }
     }
 }

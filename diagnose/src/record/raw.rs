@@ -13,6 +13,7 @@ const NAMES: [&str; 9] = [
     "t", "duty", "v_out", "i_l", "i_out", "v_in", "r_load", "i_load", "p_load",
 ];
 /// What may say the load: set, or else measured.
+const SET_LOADS: [&str; 3] = ["r_load", "i_load", "p_load"];
 const LOADS: [&str; 4] = ["r_load", "i_load", "p_load", "i_out"];
 
 /// A table with its signals found.
@@ -177,6 +178,12 @@ impl<'a> Raw<'a> {
             let text = format!("{missing} rows without duty: that of the row before is held");
             self.repairs.push(text);
         }
+    }
+
+    /// Whether only the meter of the load current knows the load.
+    pub fn is_load_measured(&self) -> bool {
+        let is_set = SET_LOADS.iter().any(|name| self.values(name).is_some());
+        !is_set && self.measured("i_out").is_some()
     }
 
     pub fn loads(&self) -> Result<Vec<Load>, Faults> {

@@ -5,6 +5,7 @@ use plant::{Load, Parameters};
 use toml_input::{Faults, Message};
 
 use super::channels::{CHANNELS, FEWEST, FEWEST_SETTLED, QUANTITIES, Segment};
+use super::levels;
 use super::logged;
 use super::raw::Raw;
 
@@ -18,6 +19,8 @@ pub struct Lines {
     pub settled: bool,
     pub repeated: bool,
     pub scatter: [f64; CHANNELS],
+    /// Noise of the meter whose current is the load, A; nothing if the load was set, or is taken as it was measured.
+    pub metered: Option<f64>,
     pub sampled: Option<Sampled>,
     pub dense: bool,
     pub segments: Vec<Segment>,
@@ -35,6 +38,7 @@ impl Lines {
             settled: true,
             repeated: false,
             scatter: [f64::NAN; CHANNELS],
+            metered: None,
             sampled: None,
             dense: true,
             segments: Vec::new(),
@@ -68,7 +72,8 @@ impl Raw<'_> {
         }
         let (rows, phase) = self.align(step, t_sw, map.phase)?;
         self.enough(&rows, FEWEST)?;
-        let lines = self.picked(&rows, phase)?;
+        let mut lines = self.picked(&rows, phase)?;
+        self.take_levels(&mut lines, &rows);
         Ok(Lines {
             time: (0..rows.len()).map(|n| self.start + n as f64 * t_sw).collect(),
             segments: segments(&rows, &lines.duty, &lines.load),
@@ -99,6 +104,28 @@ impl Raw<'_> {
             measured: QUANTITIES.map(|name| self.pick(name, rows).unwrap_or_default()),
             ..Lines::empty(phase)
         })
+    }
+
+    /// Where only a meter knows the load, the load without the noise of the meter.
+    fn take_levels(&mut self, lines: &mut Lines, rows: &[Option<usize>]) {
+        if !self.is_load_measured() {
+            return;
+        }
+        let (Some(i_out), v_out) = (self.pick("i_out", rows), self.pick("v_out", rows)) else {
+            return;
+        };
+        let digit = self.lattice("i_out").max(self.resolution("i_out"));
+        match levels::find(&i_out, &v_out.unwrap_or_default(), digit, lines.phase) {
+            Some(found) => {
+                self.repairs.push(found.words);
+                (lines.load, lines.metered) = (found.load, Some(found.noise));
+            }
+            None => self.repairs.push(
+                "i_out is taken for the load as it was measured, noise and all: it is neither levels nor straight lines with white \
+                 noise. A column i_load or r_load of what was set drives the model better"
+                    .to_owned(),
+            ),
+        }
     }
 
     fn enough(&self, rows: &[Option<usize>], fewest: usize) -> Result<(), Faults> {

@@ -10,6 +10,7 @@ use crate::parallel;
 use crate::problem::dot;
 use crate::progress::{self, Listener};
 use crate::shape::structures;
+use crate::small;
 
 /// An explanation within this of the best is as good, in chi-square: three standard deviations of one parameter ...
 pub(crate) const TIE: f64 = 9.0;
@@ -32,6 +33,10 @@ const BEGUN: usize = 2;
 /// Most causes named. Records of one converter hold 5 to 15 independent directions; blind cases hide at most two effects, and the
 /// third place is for one that a second imitates in part.
 const MOST: usize = 3;
+/// A search ends with two causes where they leave this mean square over that of the noise, and this share of what there was: a third of
+/// the error. Where two causes are hidden the best two leave next to nothing; three are never hidden. Conventions.
+const HOPELESS: f64 = 10.0;
+const STILL_THERE: f64 = 0.1;
 /// Candidates that are fitted after a linear look at all. A convention: each costs a fit.
 const LOOKED_AT: usize = 5;
 /// Further sets that are tried as the start of a larger one, and candidates that are fitted beside each. Conventions: they bound
@@ -144,7 +149,9 @@ impl Searcher<'_> {
     /// without each that no longer helps, and where structure is left with each replaced by a better one.
     pub fn grow(&self, singles: &[Fit]) -> (Option<Fit>, Vec<f64>) {
         let null = self.fitter.null;
+        let most = small::most_parameters(self.fitter.problem);
         let mut leaders = singles.to_vec();
+        leaders.retain(|fit| fit.values.len() <= most);
         self.sort(&mut leaders);
         let Some(first) = leaders.first() else {
             return (None, Vec::new());
@@ -153,7 +160,7 @@ impl Searcher<'_> {
             return (None, Vec::new());
         }
         let mut best = self.polished(first);
-        while best.causes.len() < MOST {
+        while best.causes.len() < MOST && best.values.len() < most && !self.is_hopeless(&best) {
             let stage = format!("more than {}", self.names(&best));
             let mut larger = self.forward(&best, LOOKED_AT, &stage);
             // two causes that resemble each other are best found from the one that explains less alone
@@ -163,6 +170,7 @@ impl Searcher<'_> {
                     larger.extend(self.forward(leader, LOOKED_AT_BY_LEADERS, &stage));
                 }
             }
+            larger.retain(|fit| fit.values.len() <= most);
             self.sort(&mut larger);
             let Some(next) = larger.first() else { break };
             if !self.is_worth(&best, next) {
@@ -175,6 +183,14 @@ impl Searcher<'_> {
             leaders = larger;
         }
         self.backward(best)
+    }
+
+    /// Whether two causes and more leave most of the error: a third repairs no such thing, and each costs as long as all before.
+    fn is_hopeless(&self, fit: &Fit) -> bool {
+        let count = self.fitter.problem.count().max(1) as f64;
+        fit.causes.len() > 1
+            && fit.state.chi2 > HOPELESS * count
+            && fit.state.chi2 > STILL_THERE * self.fitter.null.chi2
     }
 
     /// The single cause that explains most for its parameters, brought to its end; nothing if none is worth it.

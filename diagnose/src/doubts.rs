@@ -1,0 +1,98 @@
+//! Why causes that leave no structure are no explanation all the same: they end where they may go no further.
+
+use crate::attribute::Attribution;
+use crate::balance;
+use crate::causes::Search;
+use crate::findings::Named;
+use crate::problem::Problem;
+use crate::profile::Profile;
+use crate::shape::Structure;
+use crate::small;
+use crate::words::{si, unit};
+
+/// A value so near to its bound, as a share of its range, is at it: a fit stops there because it may not go on.
+const AT_BOUND: f64 = 0.01;
+/// A lower bound below this share of the upper one is where an effect ends to be one, not where it is cut off.
+const NO_EFFECT: f64 = 0.05;
+
+/// A doubt.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Doubt {
+    /// A value at its bound: whatever else would do as well, it is not this.
+    Bound(String),
+    /// An interval that reaches it: nothing is explained, a tie may be left.
+    Open(String),
+    /// More freedom than the data have.
+    Freedom(String),
+    /// No converter of this kind gives the records.
+    Kind(String),
+}
+
+/// The doubts about an explanation.
+pub fn of(problem: &Problem, attribution: &Attribution, profiles: &[Profile], structure: &[Structure]) -> Vec<Doubt> {
+    let mut list: Vec<Doubt> = balance::broken(problem).map(Doubt::Kind).into_iter().collect();
+    let Some(best) = &attribution.best else {
+        return match list.is_empty() {
+            true => freedom(problem, structure),
+            false => list,
+        };
+    };
+    let mut place = 0;
+    let mut member = usize::MAX;
+    for profile in profiles {
+        place = if profile.member == member { place + 1 } else { 0 };
+        member = profile.member;
+        let Some(candidate) = best.causes.get(member).map(|cause| &attribution.candidates[*cause]) else {
+            continue;
+        };
+        // whole periods and counts have no range, and a phase comes round again
+        let is_round = candidate.form.search == Search::Line && profile.name == "phase";
+        if !candidate.form.is_smooth() || is_round {
+            continue;
+        }
+        let Some([low, high, _]) = candidate.ranges.get(place).copied() else {
+            continue;
+        };
+        let is_natural = low >= 0.0 && low <= NO_EFFECT * high;
+        let near = AT_BOUND * (high - low);
+        let at = |value: f64| value > high - near || value < low + near && !is_natural;
+        let end = if profile.value > 0.5 * (low + high) { high } else { low };
+        let [found, end] = [profile.value, end].map(|value| si(value, unit(profile.unit)));
+        let name = format!("{} of {}", profile.name, candidate.cause.id);
+        if at(profile.value) {
+            list.push(Doubt::Bound(format!(
+                "{name} ends at the limit of what is tried, {found} of {end}: the cause is another"
+            )));
+        } else if place < candidate.sizes() && profile.interval.into_iter().any(at) {
+            list.push(Doubt::Open(format!(
+                "{name} is not held by the records: its interval reaches the limit of what is tried, {end}"
+            )));
+        }
+    }
+    list.extend(freedom(problem, structure));
+    list
+}
+
+fn freedom(problem: &Problem, structure: &[Structure]) -> Vec<Doubt> {
+    let said = small::freedom(problem).filter(|_| !structure.is_empty());
+    said.map(Doubt::Freedom).into_iter().collect()
+}
+
+/// Whether the doubts leave no explanation.
+pub fn forbids(named: &[Named], doubts: &[Doubt]) -> bool {
+    let tied = named.iter().any(|cause| !cause.rivals.is_empty());
+    doubts.iter().any(|doubt| match doubt {
+        Doubt::Bound(_) => !named.is_empty(),
+        Doubt::Open(_) => !named.is_empty() && !tied,
+        Doubt::Freedom(_) => false,
+        Doubt::Kind(_) => true,
+    })
+}
+
+/// The doubts in words.
+pub fn said(doubts: &[Doubt]) -> Vec<String> {
+    let words = |doubt: &Doubt| match doubt {
+        Doubt::Bound(words) | Doubt::Open(words) | Doubt::Freedom(words) | Doubt::Kind(words) => words.clone(),
+    };
+    doubts.iter().map(words).collect()
+}

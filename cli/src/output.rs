@@ -81,16 +81,22 @@ pub fn write_results(
     say(&format!("{summary}\n{count} files in {out}; to look at: {out}/{page}"))
 }
 
-/// Writes one file that must not exist yet.
+/// Writes one file, and others by name beside it, none of which may exist yet.
 ///
 /// # Errors
-/// If it exists or cannot be written.
-pub fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
-    if fs::symlink_metadata(path).is_ok() {
-        let message = Message::new(format!("{} exists already; nothing written", path.display()));
-        return Err(message.hint("move it away or choose another name with --out").into());
+/// If one exists or cannot be written.
+pub fn write_new_all(path: &Path, text: &str, beside: &BTreeMap<String, Vec<u8>>) -> Result<(), Failure> {
+    let (folder, name) = split(path)?;
+    let mut files = beside.clone();
+    files.insert(name, text.as_bytes().to_vec());
+    for name in files.keys() {
+        let path = path.with_file_name(name);
+        if fs::symlink_metadata(&path).is_ok() {
+            let message = Message::new(format!("{} exists already; nothing written", path.display()));
+            return Err(message.hint("move it away or choose another name with --out").into());
+        }
     }
-    write_one(path, text)
+    write_all(folder, &files)
 }
 
 /// Writes one file that bears policyc's name; an older one of its own is replaced.
@@ -357,8 +363,8 @@ mod tests {
     fn an_existing_contract_is_never_overwritten() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("policy.toml");
-        write_new(&path, "mine").unwrap();
-        assert!(write_new(&path, "other").is_err());
+        write_new_all(&path, "mine", &BTreeMap::new()).unwrap();
+        assert!(write_new_all(&path, "other", &BTreeMap::new()).is_err());
         assert_eq!(fs::read_to_string(path).unwrap(), "mine");
     }
 }

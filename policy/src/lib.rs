@@ -38,8 +38,9 @@ pub use faults::{Faults, Skeleton};
 pub use memory::memory_bounds;
 pub use model::*;
 pub use raw::{RawPolicy, ReadOptions, read};
-pub use scaffold::new_contract;
+pub use scaffold::{Draft, DraftFeature, draft, new_contract, seen_from};
 pub use toml_input::{Fault, Place};
+pub use weights::{NamedTensor, chains, named_tensors};
 
 /// Reads and checks the contract at `path`.
 ///

@@ -11,7 +11,7 @@ use crate::catalogue;
 use crate::faults::Faults;
 use crate::limits::MAX_WEIGHT_BYTES;
 use crate::raw::Binary;
-use crate::weights::{Outline, outline};
+use crate::weights::outline;
 
 /// Text of a commented contract for the network in `weights`, to be written to `contract`, whose folder need not exist
 /// yet; nothing is written here.
@@ -32,7 +32,18 @@ pub fn new_contract(weights: &Path, contract: &Path) -> Result<String, Faults> {
     });
     let seen = faults.keep(seen_from(contract, weights).map_err(|message| name.fault(message)));
     let golden = weights.with_file_name("golden.safetensors").is_file();
-    let text = outline.zip(seen).map(|(outline, seen)| text(&seen, golden, &outline));
+    let text = outline.zip(seen).map(|(outline, weights)| {
+        draft(&Draft {
+            weights,
+            inputs: outline.inputs,
+            outputs: outline.outputs,
+            chains: outline.chains,
+            hidden: outline.hidden,
+            bias: outline.bias,
+            golden,
+            ..Draft::default()
+        })
+    });
     faults
         .conclude(text, || name.fault(catalogue::incomplete()))
         .map_err(|faults| Faults {
@@ -44,7 +55,10 @@ pub fn new_contract(weights: &Path, contract: &Path) -> Result<String, Faults> {
 
 /// How a contract names a file: from the contract's folder, with `/` on every system; the whole path where there is no
 /// way from one to the other.
-fn seen_from(contract: &Path, file: &Path) -> Result<String, Message> {
+///
+/// # Errors
+/// If there is none, or TOML cannot hold it.
+pub fn seen_from(contract: &Path, file: &Path) -> Result<String, Message> {
     // `.` also where the path is a name alone, whose parent is empty
     let folder = |path: &Path| Path::new(".").join(path.parent().unwrap_or(Path::new("")));
     // the file itself may be a link: its name counts, not what it leads to
@@ -90,30 +104,72 @@ fn resolved(folder: &Path) -> Option<PathBuf> {
     }))
 }
 
-/// `golden`: whether `golden.safetensors` lies beside the weights.
-fn text(weights: &str, golden: bool, outline: &Outline) -> String {
-    let folder = &weights[..weights.rfind('/').map_or(0, |slash| slash + 1)];
-    // TOML's own quotes and escapes: a path may hold both
-    let file = toml::Value::String(weights.to_owned()).to_string();
-    let Outline {
+/// What is known of a network for which a contract is to be written.
+#[derive(Debug, Clone, Default)]
+pub struct Draft {
+    /// Path of the weights as the contract names it: [`seen_from`].
+    pub weights: String,
+    /// Network inputs.
+    pub inputs: usize,
+    /// Actions.
+    pub outputs: usize,
+    /// Layer names, first to last, of each chain that could be meant.
+    pub chains: Vec<String>,
+    /// Whether there is a hidden layer.
+    pub hidden: bool,
+    /// Whether any layer has a bias.
+    pub bias: bool,
+    /// The activations behind the hidden layers as TOML: `"relu"`, or a list.
+    pub activation: Option<String>,
+    /// Whether `golden.safetensors` lies beside the weights.
+    pub golden: bool,
+    /// Lines about the whole, without `#`.
+    pub about: Vec<String>,
+    /// What is known of each input; may be shorter than `inputs`.
+    pub features: Vec<DraftFeature>,
+}
+
+/// What is known of one network input.
+#[derive(Debug, Clone, Default)]
+pub struct DraftFeature {
+    /// `scale * x + offset`.
+    pub affine: Option<(f64, f64)>,
+    /// Smallest and largest value that the network has seen, and who says so.
+    pub clip: Option<(f64, f64, String)>,
+}
+
+/// Text of a contract to be filled in.
+#[must_use]
+pub fn draft(draft: &Draft) -> String {
+    let Draft {
+        weights,
         inputs,
         outputs,
-        chains,
         ..
-    } = outline;
+    } = draft;
+    let folder = &weights[..weights.rfind('/').map_or(0, |slash| slash + 1)];
+    // TOML's own quotes and escapes: a path may hold both
+    let file = toml::Value::String(weights.clone()).to_string();
     let mut text = format!(
         "# Contract of a trained policy: {inputs} inputs, {outputs} actions.\n\
          # Replace every \"TODO\"; until then the check names those that are left. Units are SI.\n"
     );
+    for line in &draft.about {
+        let _ = writeln!(text, "# {line}");
+    }
     text += HEAD;
     for input in 0..*inputs {
-        let _ = write!(text, "\n# network input {input}{FEATURE}");
+        let _ = write!(
+            text,
+            "\n# network input {input}{FEATURE}{}",
+            normalisation(draft.features.get(input))
+        );
     }
     let _ = write!(text, "\n[network]\nweights = {file}\n");
     if weights.starts_with("..") || Path::new(weights).is_absolute() {
         text += "# outside this folder: copy it here, or say --allow-outside to every command\n";
     }
-    match chains.as_slice() {
+    match draft.chains.as_slice() {
         [only] => drop(writeln!(text, "# layers found, first to last: {only}")),
         // no choice is made here: a chain that was not meant would give a controller all the same
         several => {
@@ -124,14 +180,18 @@ fn text(weights: &str, golden: bool, outline: &Outline) -> String {
             text += "prefix = \"TODO\"\n";
         }
     }
-    if outline.hidden {
-        let written: Vec<String> = Activation::EACH.iter().map(|each| each.written()).collect();
-        let _ = writeln!(text, "hidden_activation = \"TODO\"   # {}", written.join(", "));
+    match &draft.activation {
+        _ if !draft.hidden => {}
+        Some(written) => drop(writeln!(text, "hidden_activation = {written}")),
+        None => {
+            let written: Vec<String> = Activation::EACH.iter().map(|each| each.written()).collect();
+            let _ = writeln!(text, "hidden_activation = \"TODO\"   # {}", written.join(", "));
+        }
     }
-    if !outline.bias {
+    if !draft.bias {
         text += "bias = false                 # the file holds none\n";
     }
-    let beside = if golden { "" } else { "# " };
+    let beside = if draft.golden { "" } else { "# " };
     let golden = toml::Value::String(format!("{folder}golden.safetensors"));
     let _ = writeln!(
         text,
@@ -143,6 +203,20 @@ fn text(weights: &str, golden: bool, outline: &Outline) -> String {
     }
     text += "]\n";
     text + TAIL
+}
+
+/// Scale, offset and clip of a feature.
+fn normalisation(known: Option<&DraftFeature>) -> String {
+    let mut text = String::new();
+    match known.and_then(|feature| feature.affine) {
+        Some((scale, offset)) => drop(writeln!(text, "scale = {scale:?}\noffset = {offset:?}")),
+        None => text += AFFINE,
+    }
+    match known.and_then(|feature| feature.clip.as_ref()) {
+        Some((low, high, who)) => drop(writeln!(text, "clip = [{low:?}, {high:?}]   # {who}")),
+        None => text += CLIP,
+    }
+    text
 }
 
 const HEAD: &str = "\
@@ -170,8 +244,14 @@ source = \"TODO\"              # affine in signals, parameters, previous_duty, p
 # filters = [{ delay = 1 }]  # first to last; also { integrator = { min = -1.0, max = 1.0 } }, \"backward_difference\",
 #                            # { low_pass = { time_constant = 1e-3 } }, { filtered_derivative = { cutoff = 500.0 } },
 #                            # { moving_average = 4 }
+";
+
+const AFFINE: &str = "\
 # scale = 1.0                # normalisation of the training: scale * x + offset, then clip
 # offset = 0.0
+";
+
+const CLIP: &str = "\
 # clip = [-1.0, 1.0]
 ";
 

@@ -31,7 +31,7 @@ pub struct Arguments {
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Write a commented contract for a safetensors file, to be filled in
+    /// Write a commented contract for a trained network, to be filled in
     New(New),
     /// Show what a policy means: signals, features, network, actions, mapping, limits, sizes
     Inspect(Inspect),
@@ -72,11 +72,22 @@ impl Command {
 
 #[derive(Debug, Args)]
 pub struct New {
-    /// Network weights
+    /// What the trainer saved: safetensors, a torch file (.pt, .pth), or a model of stable-baselines3 (.zip)
     pub weights: PathBuf,
-    /// File to write; must not exist yet. It names the weights as seen from its folder
+    /// File to write; must not exist yet. It names the weights as seen from its folder; those that had to be joined or folded
+    /// are written beside it
     #[arg(long, value_name = "FILE", default_value = "policy.toml")]
     pub out: PathBuf,
+    /// Entry of a checkpoint that holds the network, such as model_state_dict
+    #[arg(long, value_name = "NAME")]
+    pub inside: Option<String>,
+    /// Number of actions, where several outputs belong to each: QR-DQN
+    #[arg(long, value_name = "N")]
+    pub actions: Option<usize>,
+    /// What stable-baselines3's VecNormalize saved: scale, offset and clip of the features. A vecnormalize.pkl beside the model
+    /// is taken without this
+    #[arg(long, value_name = "FILE")]
+    pub vecnormalize: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

@@ -8,7 +8,7 @@ pub(crate) mod header;
 pub(crate) mod layers;
 pub(crate) mod tensors;
 
-use toml_input::{Fault, Sink};
+use toml_input::{Fault, FileName, Sink};
 
 use crate::activation::Activation;
 use crate::contract::network::Network;
@@ -18,6 +18,7 @@ use crate::raw::Binary;
 use chain::{Chain, Ends};
 use explain::Scene;
 use layers::{Dense, Layers};
+pub use tensors::NamedTensor;
 use tensors::Tensors;
 
 /// The layers of the network, without bounds, and what was converted or left out.
@@ -74,6 +75,38 @@ pub(crate) fn read(
     Some(Weights { layers, notes })
 }
 
+/// All tensors of a safetensors file that somebody saved, whatever they mean.
+///
+/// # Errors
+/// If `bytes` are no sound safetensors file, or a tensor has an unfit name or holds a number that is not finite. `file` only
+/// names it in messages.
+pub fn named_tensors(file: &FileName, bytes: Vec<u8>) -> Result<Vec<NamedTensor>, toml_input::Faults> {
+    let file = Binary {
+        name: file.clone(),
+        bytes,
+    };
+    let mut faults = Sink::new();
+    let tensors = header::open(&file, &mut faults).map(|opened| tensors::named(&file, &opened, &mut faults));
+    faults.conclude(tensors, || file.name.fault(crate::catalogue::incomplete()))
+}
+
+/// Chains of dense layers that could be meant, as indices into `layers`: name, inputs and outputs of each.
+#[must_use]
+pub fn chains(layers: &[(String, usize, usize)]) -> Vec<Vec<usize>> {
+    let dense = |(index, (stem, inputs, outputs)): (usize, &(String, usize, usize))| Dense {
+        stem: stem.clone(),
+        weight: index,
+        bias: None,
+        transposed: false,
+        inputs: *inputs,
+        outputs: *outputs,
+    };
+    let mut dense: Vec<Dense> = layers.iter().enumerate().map(dense).collect();
+    dense.sort_by(|a, b| layers::Place::of(&a.stem).cmp(&layers::Place::of(&b.stem)));
+    let back = |chain: Chain| chain.into_iter().map(|index| dense[index].weight).collect();
+    whole_chains(&dense).into_iter().map(back).collect()
+}
+
 /// What a file of weights says about a network when there is no contract yet.
 pub(crate) struct Outline {
     pub inputs: usize,
@@ -86,6 +119,19 @@ pub(crate) struct Outline {
     pub chains: Vec<String>,
 }
 
+/// The chains that could be meant where nothing is known of the ends.
+fn whole_chains(layers: &[Dense]) -> Vec<Chain> {
+    let ends = Ends {
+        inputs: None,
+        outputs: None,
+    };
+    let (found, _) = chain::candidates(layers, ends);
+    // with open ends a part of a chain fits as well as the whole
+    let part_of = |a: &Chain, b: &Chain| a.len() < b.len() && a.iter().all(|layer| b.contains(layer));
+    let is_whole = |chain: &&Chain| !found.iter().any(|other| part_of(chain, other));
+    found.iter().filter(is_whole).cloned().collect()
+}
+
 /// The network in `file`, if all chains that could be meant have the same ends.
 pub(crate) fn outline(file: &Binary, faults: &mut Sink) -> Option<Outline> {
     let opened = header::open(file, faults)?;
@@ -95,17 +141,11 @@ pub(crate) fn outline(file: &Binary, faults: &mut Sink) -> Option<Outline> {
         inputs: None,
         outputs: None,
     };
-    let (found, _) = chain::candidates(&grouped.dense, ends);
-    // with open ends a part of a chain fits as well as the whole
-    let part_of = |a: &Chain, b: &Chain| a.len() < b.len() && a.iter().all(|layer| b.contains(layer));
-    let chains: Vec<&Chain> = found
-        .iter()
-        .filter(|chain| !found.iter().any(|other| part_of(chain, other)))
-        .collect();
+    let chains = whole_chains(&grouped.dense);
     let dense = |index: usize| &grouped.dense[index];
     let sizes = |chain: &Chain| Some((dense(*chain.first()?).inputs, dense(*chain.last()?).outputs));
     let names: Vec<String> = chains.iter().map(|chain| chain_names(&grouped.dense, chain)).collect();
-    let Some((inputs, outputs)) = chains.first().and_then(|chain| sizes(chain)) else {
+    let Some((inputs, outputs)) = chains.first().and_then(sizes) else {
         let scene = Scene {
             file: &file.name,
             tensors: &tensors.list,

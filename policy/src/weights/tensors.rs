@@ -1,5 +1,6 @@
 //! Tensors as finite binary32 numbers.
 
+use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 use toml_input::{Message, Sink};
 
@@ -73,6 +74,47 @@ pub(crate) fn convert(file: &Binary, tensors: &SafeTensors<'_>, faults: &mut Sin
         ));
     }
     (faults.count() == before).then_some(result)
+}
+
+/// A tensor as the file holds it.
+#[derive(Debug, Clone)]
+pub struct NamedTensor {
+    /// Its name in the file.
+    pub name: String,
+    /// Its axes, outermost first.
+    pub shape: Vec<usize>,
+    /// Its elements, the last axis running fastest; `None` where they are no floats. Not rounded.
+    pub values: Option<Vec<f64>>,
+}
+
+/// Every tensor, sorted by name; those of floats are finite.
+pub(crate) fn named(file: &Binary, tensors: &SafeTensors<'_>, faults: &mut Sink) -> Vec<NamedTensor> {
+    let mut views = tensors.tensors();
+    views.sort_by(|(a, _), (b, _)| a.cmp(b));
+    let one = |(name, view): &(String, TensorView<'_>)| {
+        sound(name, view.shape())?;
+        let values = match view.dtype() {
+            Dtype::F32 | Dtype::F64 | Dtype::F16 | Dtype::BF16 => Some(wide(view.dtype(), view.data())?),
+            _ => None,
+        };
+        let odd = values.iter().flatten().position(|value| !value.is_finite());
+        match odd.and_then(|index| Some((index, *values.as_ref()?.get(index)?))) {
+            Some((index, value)) => Err(catalogue::not_finite(index, value)),
+            None => Ok(NamedTensor {
+                name: name.clone(),
+                shape: view.shape().to_vec(),
+                values,
+            }),
+        }
+    };
+    let mut list = Vec::new();
+    for view in &views {
+        match one(view) {
+            Ok(tensor) => list.push(tensor),
+            Err(message) => faults.push(file.name.tensor_fault(&view.0, message)),
+        }
+    }
+    list
 }
 
 /// Whether a tensor's name can be printed and its shape holds anything.

@@ -9,7 +9,7 @@ const LAYERS: &[&[&str]] = &[
     &["random", "toml-input", "targets", "templates", "report"],
     &["policy", "plant", "measured"],
     &["certify"],
-    &["interp", "codegen", "drm", "equivalence"],
+    &["import", "interp", "codegen", "drm", "equivalence"],
     &["closed-loop"],
     &[
         "policy-macro",
@@ -45,6 +45,7 @@ const FORBIDDEN: &[Forbidden] = &[
     Forbidden {
         from: &[
             "policy",
+            "import",
             "certify",
             "interp",
             "codegen",

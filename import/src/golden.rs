@@ -1,0 +1,103 @@
+//! Golden answers from the tensors as they were saved: an oracle that knows neither the chain that was recognised nor the
+//! interpreter.
+
+use std::collections::BTreeMap;
+
+use policy::Activation;
+use random::{Random, SplitMix};
+use toml_input::Message;
+
+use crate::network::{Layer, rounded, written};
+
+const SEED: u64 = 1;
+const COUNT: usize = 64;
+// below it the choice could be another one after rounding to binary32: some sixteen layers of 64 sums of half a unit
+const SMALLEST_GAP: f64 = 1e-4;
+// bounds so narrow, or a network so flat, that nothing is decided: better no golden answers than a search without end
+const MOST_DRAWS: usize = 100 * COUNT;
+
+/// What observations are drawn from, and the layers to put them through; the outputs are averaged in groups of `quantiles`.
+pub(crate) struct Oracle<'a> {
+    pub bounds: &'a [(f64, f64)],
+    pub layers: &'a [Layer],
+    pub quantiles: usize,
+    pub activation: Activation,
+}
+
+/// A golden file, if the network decides often enough within the bounds.
+pub(crate) fn answers(oracle: &Oracle<'_>) -> Result<Option<Vec<u8>>, Message> {
+    let mut draws = SplitMix::new(SEED);
+    let (mut obs, mut q, mut action) = (Vec::new(), Vec::new(), Vec::new());
+    let mut actions = 0;
+    for _ in 0..MOST_DRAWS {
+        if action.len() == COUNT {
+            break;
+        }
+        // as binary32, which is what the file holds
+        let draw = |(low, high): &(f64, f64)| f64::from(draws.uniform(*low, *high) as f32);
+        let observation: Vec<f64> = oracle.bounds.iter().map(draw).collect();
+        let values = oracle.outputs(&observation);
+        let Some(best) = decided(&values) else { continue };
+        actions = values.len();
+        obs.extend(observation);
+        q.extend(values);
+        action.push(best);
+    }
+    if action.len() < COUNT {
+        return Ok(None);
+    }
+    let chosen = action.iter().flat_map(|index: &i32| index.to_le_bytes()).collect();
+    let said = format!(
+        "plain products in f64 of the tensors as saved, by policyc new; {COUNT} observations drawn uniformly, seed {SEED}, those left out \
+         whose two largest values are closer than {SMALLEST_GAP:e} of the largest"
+    );
+    // one key alone: the crate writes several in the order of a hash map
+    let metadata = BTreeMap::from([("oracle".to_owned(), said)]);
+    let tensors = [
+        ("obs".to_owned(), vec![COUNT, oracle.bounds.len()], rounded(&obs)?),
+        ("q".to_owned(), vec![COUNT, actions], rounded(&q)?),
+        ("action".to_owned(), vec![COUNT], chosen),
+    ];
+    written(&tensors, &metadata).map(Some)
+}
+
+impl Oracle<'_> {
+    fn outputs(&self, observation: &[f64]) -> Vec<f64> {
+        let mut values = observation.to_vec();
+        for (index, layer) in self.layers.iter().enumerate() {
+            values = layer.apply(&values);
+            if index + 1 < self.layers.len() {
+                values
+                    .iter_mut()
+                    .for_each(|value| *value = exact(self.activation, *value));
+            }
+        }
+        let actions = values.len() / self.quantiles.max(1);
+        let mean =
+            |action: usize| values.iter().skip(action).step_by(actions.max(1)).sum::<f64>() / self.quantiles as f64;
+        (0..actions).map(mean).collect()
+    }
+}
+
+/// The function itself, not the contract's bits of it.
+fn exact(activation: Activation, x: f64) -> f64 {
+    match activation {
+        Activation::Identity => x,
+        Activation::Relu => x.max(0.0),
+        Activation::Tanh => libm::tanh(x),
+        Activation::Softsign => x / (1.0 + x.abs()),
+        Activation::LeakyRelu { slope } => x.max(slope * x),
+    }
+}
+
+/// The largest value's index, if it is clearly the largest.
+fn decided(values: &[f64]) -> Option<i32> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    let at = |index: &usize| values.get(*index).copied().unwrap_or_default();
+    order.sort_by(|a, b| at(b).total_cmp(&at(a)));
+    let [best, next, ..] = order.as_slice() else {
+        return None;
+    };
+    let largest = values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+    (at(best) - at(next) > SMALLEST_GAP * largest).then(|| i32::try_from(*best).ok())?
+}

@@ -1,0 +1,207 @@
+//! What a trainer saved, read without running it: a file to a contract to fill in, and the weights it names.
+//!
+//! ```text
+//!   file ──► reader ──► named tensors ──► recognise ──► Network: a plain chain, and what was folded, in words
+//!            safetensors, torch, SB3  │                     │
+//!                                     └──► golden ──┐       └──► Draft ──► policy.toml
+//!                                                   └──► golden.safetensors     weights.safetensors
+//! ```
+//!
+//! A file is data here: nothing that it names is called, imported or executed. Every size that it claims is held against its
+//! own length before anything is allocated. What users see: docs/reference/saved-models.md.
+
+mod golden;
+mod network;
+mod numpy;
+mod pickle;
+mod read;
+mod recognise;
+mod sb3;
+mod torch;
+mod vecnormalize;
+mod zip;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use policy::limits::MAX_WEIGHT_BYTES;
+use policy::{Draft, DraftFeature, seen_from};
+use toml_input::{Faults, FileName, Message};
+
+pub use network::{Layer, Network};
+use read::Loaded;
+use recognise::{Recognised, Refusal, recognise};
+
+/// What the caller says beside the file.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// How many actions there are, where the tensors do not say it.
+    pub actions: Option<usize>,
+    /// The entry of a checkpoint that holds the network.
+    pub inside: Option<String>,
+    /// What VecNormalize saved; without it a `vecnormalize.pkl` beside the file is taken.
+    pub vecnormalize: Option<PathBuf>,
+}
+
+/// Files to write, by name, into the contract's folder, and what to tell the user.
+#[derive(Debug, Clone)]
+pub struct NewPolicy {
+    /// Text of the contract.
+    pub contract: String,
+    /// What lies beside it: weights, golden answers. Empty where the contract names the file itself.
+    pub beside: BTreeMap<String, Vec<u8>>,
+    /// What was recognised, a sentence each.
+    pub said: Vec<String>,
+}
+
+/// The names of what is written beside a contract.
+const WEIGHTS: &str = "weights.safetensors";
+const GOLDEN: &str = "golden.safetensors";
+/// What VecNormalize's page calls its file.
+const STATISTICS: &str = "vecnormalize.pkl";
+
+/// A contract for the network in `file`, to be written to `contract`; nothing is written here.
+///
+/// # Errors
+/// If the file is not sound, holds what is not compiled, or does not say which of its networks is the policy.
+pub fn new_policy(file: &Path, contract: &Path, options: &Options) -> Result<NewPolicy, Faults> {
+    let name = FileName::new(file);
+    let bytes = name.read(MAX_WEIGHT_BYTES).map_err(|message| name.fault(message))?;
+    let loaded = read::read(&name, bytes, options)?;
+    let network = match recognise(&loaded.tensors, &loaded.known).map_err(|refusal| placed(&name, refusal))? {
+        Recognised::Network(network) => Some(network),
+        Recognised::Undecided => None,
+    };
+    let statistics = statistics(file, options)?;
+    match network {
+        Some(network) if !network.plain || !loaded.is_safetensors || !statistics.is_empty() => {
+            written(&name, contract, &loaded, &network, &statistics)
+        }
+        // several chains side by side, or none: the contract's own reader explains, or asks for the prefix
+        None if !loaded.is_safetensors => Err(name.fault(recognise::undecided_message(&loaded.tensors)).into()),
+        _ => Ok(NewPolicy {
+            contract: policy::new_contract(file, contract)?,
+            beside: BTreeMap::new(),
+            said: Vec::new(),
+        }),
+    }
+}
+
+/// Normalisation of the observations, if any was saved.
+fn statistics(file: &Path, options: &Options) -> Result<Vec<DraftFeature>, Faults> {
+    let beside = file.with_file_name(STATISTICS);
+    let path = match &options.vecnormalize {
+        Some(path) => path,
+        None if beside.is_file() => &beside,
+        None => return Ok(Vec::new()),
+    };
+    let name = FileName::new(path);
+    let bytes = name.read(MAX_WEIGHT_BYTES).map_err(|message| name.fault(message))?;
+    vecnormalize::read(&bytes).map_err(|message| name.fault(message).into())
+}
+
+/// A contract that names weights of its own.
+fn written(
+    name: &FileName,
+    contract: &Path,
+    loaded: &Loaded,
+    network: &Network,
+    statistics: &[DraftFeature],
+) -> Result<NewPolicy, Faults> {
+    let inputs = network.layers.first().map_or(0, |layer| layer.inputs);
+    if !statistics.is_empty() && statistics.len() != inputs {
+        let message = Message::new("the statistics of VecNormalize are of another observation")
+            .found(format!("{} values", statistics.len()))
+            .expected(format!("{inputs}, one for each network input"));
+        return Err(name.fault(message).into());
+    }
+    let golden = golden_answers(loaded, network, statistics).map_err(|message| name.fault(message))?;
+    let mut said = loaded.about.clone();
+    said.extend(network.said.iter().cloned());
+    if !statistics.is_empty() {
+        said.push("VecNormalize: scale = 1/sqrt(var + epsilon), offset = -mean/sqrt(var + epsilon), then clip, all computed in f64".to_owned());
+    }
+    let weights = seen_from(contract, &contract.with_file_name(WEIGHTS)).map_err(|message| name.fault(message))?;
+    let draft = Draft {
+        weights,
+        inputs,
+        outputs: network.layers.last().map_or(0, |layer| layer.outputs),
+        chains: vec![chain(network)],
+        hidden: network.layers.len() > 1,
+        bias: true,
+        activation: loaded.activation.map(|activation| activation.written()),
+        golden: golden.is_some(),
+        about: said.clone(),
+        features: if statistics.is_empty() {
+            of_bounds(&loaded.bounds)
+        } else {
+            statistics.to_vec()
+        },
+    };
+    let mut beside = BTreeMap::from([(WEIGHTS.to_owned(), network.to_safetensors(name)?)]);
+    beside.extend(golden.map(|bytes| (GOLDEN.to_owned(), bytes)));
+    Ok(NewPolicy {
+        contract: policy::draft(&draft),
+        beside,
+        said,
+    })
+}
+
+/// Golden answers where the file says of what and through which layers.
+fn golden_answers(loaded: &Loaded, network: &Network, statistics: &[DraftFeature]) -> Result<Option<Vec<u8>>, Message> {
+    let (Some((layers, quantiles)), Some(activation)) = (&loaded.original, loaded.activation) else {
+        return Ok(None);
+    };
+    // within a deviation of the mean, where the training has been; never beyond the clip
+    let normal = |feature: &DraftFeature| {
+        let clip = feature.clip.as_ref().map_or(1.0, |(_, high, _)| high.min(1.0));
+        (-clip, clip)
+    };
+    let bounds: Vec<(f64, f64)> = if statistics.is_empty() {
+        loaded.bounds.clone()
+    } else {
+        statistics.iter().map(normal).collect()
+    };
+    let inputs = network.layers.first().map_or(0, |layer| layer.inputs);
+    if bounds.len() != inputs || !bounds.iter().all(is_range) {
+        return Ok(None);
+    }
+    golden::answers(&golden::Oracle {
+        bounds: &bounds,
+        layers,
+        quantiles: *quantiles,
+        activation,
+    })
+}
+
+// beyond it a bound stands for none: gymnasium's spaces end at the largest float
+const LARGEST_BOUND: f64 = 1e30;
+
+fn is_range((low, high): &(f64, f64)) -> bool {
+    low < high && low.abs() < LARGEST_BOUND && high.abs() < LARGEST_BOUND
+}
+
+/// A clip for each bounded observation.
+fn of_bounds(bounds: &[(f64, f64)]) -> Vec<DraftFeature> {
+    let feature = |bound: &(f64, f64)| DraftFeature {
+        affine: None,
+        clip: is_range(bound).then(|| (bound.0, bound.1, "bounds of the observation space".to_owned())),
+    };
+    bounds.iter().map(feature).collect()
+}
+
+/// The layers as they are called in the weights that are written.
+fn chain(network: &Network) -> String {
+    let names: Vec<String> = (0..network.layers.len())
+        .map(|index| format!("layer_{index}"))
+        .collect();
+    names.join(" > ")
+}
+
+fn placed(file: &FileName, refusal: Refusal) -> Faults {
+    let message: Message = *refusal.message;
+    match refusal.tensor {
+        Some(tensor) => file.tensor_fault(&tensor, message).into(),
+        None => file.fault(message).into(),
+    }
+}

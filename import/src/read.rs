@@ -1,0 +1,116 @@
+//! Which reader a file is for, by its content and not by its name.
+
+use std::collections::BTreeSet;
+
+use policy::{Activation, NamedTensor};
+use toml_input::{Faults, FileName, Message};
+
+use crate::network::Layer;
+use crate::recognise::Known;
+use crate::zip::Archive;
+use crate::{Options, sb3, torch, zip};
+
+/// What a reader found.
+#[derive(Debug, Default)]
+pub(crate) struct Loaded {
+    pub tensors: Vec<NamedTensor>,
+    pub is_safetensors: bool,
+    pub known: Known,
+    pub activation: Option<Activation>,
+    /// Bounds of the observations, infinite where there are none; empty if the file says nothing.
+    pub bounds: Vec<(f64, f64)>,
+    /// The layers by the names of the library alone, and how many quantiles are averaged behind them.
+    pub original: Option<(Vec<Layer>, usize)>,
+    pub about: Vec<String>,
+}
+
+/// Reads a file of any format.
+pub(crate) fn read(name: &FileName, bytes: Vec<u8>, options: &Options) -> Result<Loaded, Faults> {
+    let fault = |message: Message| Faults::from(name.fault(message));
+    if torch::is_bare_pickle(&bytes) {
+        return Err(fault(torch::legacy()));
+    }
+    if !zip::is_archive(&bytes) {
+        return Ok(Loaded {
+            tensors: policy::named_tensors(name, bytes)?,
+            is_safetensors: true,
+            known: Known {
+                actions: options.actions,
+                ..Known::default()
+            },
+            ..Loaded::default()
+        });
+    }
+    let archive = Archive::open(&bytes).map_err(fault)?;
+    if sb3::is_model(&archive) {
+        return model(&archive, options).map_err(fault);
+    }
+    if torch::root(&archive).is_none() {
+        return Err(fault(no_model(&archive)));
+    }
+    let torch = torch::read(&archive, options.inside.as_deref()).map_err(fault)?;
+    let mut about = torch.said;
+    let activation = activation(&torch.modules);
+    if let Some(activation) = activation {
+        about.push(format!(
+            "the only activation in the module that was saved: {}",
+            activation.label()
+        ));
+    }
+    Ok(Loaded {
+        tensors: torch.tensors,
+        known: Known {
+            actions: options.actions,
+            epsilons: torch.epsilons,
+        },
+        activation,
+        about,
+        ..Loaded::default()
+    })
+}
+
+fn model(archive: &Archive<'_>, options: &Options) -> Result<Loaded, Message> {
+    let model = sb3::read(archive)?;
+    if let Some(said) = options.actions.filter(|said| *said != model.actions) {
+        return Err(Message::new("--actions is not the number of actions of this model")
+            .found(said.to_string())
+            .expected(format!("{}, as its action space says", model.actions)));
+    }
+    Ok(Loaded {
+        tensors: model.tensors,
+        is_safetensors: false,
+        known: Known {
+            actions: Some(model.actions),
+            ..Known::default()
+        },
+        activation: Some(model.activation),
+        bounds: model.bounds,
+        original: model.original,
+        about: model.about,
+    })
+}
+
+/// The activation of a module that holds one kind alone.
+fn activation(modules: &[(String, String)]) -> Option<Activation> {
+    let class =
+        |(_, class): &'_ (String, String)| class.strip_prefix("torch.nn.modules.activation.").map(str::to_owned);
+    let kinds: BTreeSet<String> = modules.iter().filter_map(class).collect();
+    match kinds.iter().collect::<Vec<_>>().as_slice() {
+        // a slope stands among the module's attributes, not in its class
+        [only] if *only != "LeakyReLU" => sb3::torch_activation(only),
+        _ => None,
+    }
+}
+
+fn no_model(archive: &Archive<'_>) -> Message {
+    let names: Vec<String> = archive
+        .members
+        .keys()
+        .take(6)
+        .map(|name| name.escape_debug().to_string())
+        .collect();
+    Message::new("this archive holds no model that is read")
+        .found(format!("{} members: {}", archive.members.len(), names.join(", ")))
+        .expected("`data.pkl` of torch.save, or `data` and `policy.pth` of stable-baselines3")
+        .hint("a .keras file: save the weights of each layer with safetensors.numpy.save_file")
+}

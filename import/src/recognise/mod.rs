@@ -1,0 +1,147 @@
+//! Named tensors to one plain chain of dense layers.
+//!
+//! ```text
+//!   refused::check   what no chain computes is refused by name: recurrence, convolution, LayerNorm, continuous heads
+//!   names::parse     tensors to dense layers and batch norms, by the names of a dozen libraries
+//!   heads            value networks are left out; of a dueling pair the advantage stays
+//!   norm             batch norms go into the dense layer beside them
+//!   order            the one path through all that is left
+//!   heads::quantiles the mean over quantiles goes into the last layer
+//! ```
+//!
+//! The invariant: a layer is left out only for a reason that is told. A chain that fits by accident computes something
+//! else.
+
+pub(crate) mod heads;
+pub(crate) mod names;
+mod norm;
+mod refused;
+
+pub(crate) use refused::continuous as refused_continuous;
+
+use policy::NamedTensor;
+use policy::limits::{MAX_ACTIONS, MIN_ACTIONS};
+use toml_input::Message;
+
+use crate::network::{Layer, Network};
+
+/// A refusal, and the tensor that it is about.
+#[derive(Debug)]
+pub(crate) struct Refusal {
+    pub tensor: Option<String>,
+    pub message: Box<Message>,
+}
+
+impl Refusal {
+    pub fn of(tensor: &str, message: Message) -> Self {
+        Refusal {
+            tensor: Some(tensor.to_owned()),
+            message: Box::new(message),
+        }
+    }
+}
+
+impl From<Message> for Refusal {
+    fn from(message: Message) -> Self {
+        Refusal {
+            tensor: None,
+            message: Box::new(message),
+        }
+    }
+}
+
+/// What the caller knows beside the tensors.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Known {
+    /// How many actions there are.
+    pub actions: Option<usize>,
+    /// Epsilon of the batch norms by their names, where the file says it.
+    pub epsilons: Vec<(String, f64)>,
+}
+
+/// What a set of tensors is.
+pub(crate) enum Recognised {
+    Network(Network),
+    /// Several chains of the same ends, or none: plain names that the contract's own rules must explain.
+    Undecided,
+}
+
+/// The network in `tensors`.
+pub(crate) fn recognise(tensors: &[NamedTensor], known: &Known) -> Result<Recognised, Refusal> {
+    refused::check(tensors)?;
+    let mut parsed = names::parse(tensors, known)?;
+    heads::leave_out_values(&mut parsed)?;
+    norm::fold(&mut parsed)?;
+    let Some(mut network) = order(parsed)? else {
+        return Ok(Recognised::Undecided);
+    };
+    heads::quantiles(&mut network, known)?;
+    let actions = network.layers.last().map_or(0, |layer| layer.outputs);
+    if !(MIN_ACTIONS..=MAX_ACTIONS).contains(&actions) {
+        return Err(refused::too_many_actions(actions).into());
+    }
+    if let Some(said) = known.actions.filter(|said| *said != actions) {
+        return Err(
+            Message::new("the network has another number of outputs than there are actions")
+                .found(format!("{actions} outputs"))
+                .expected(format!("{said} actions"))
+                .into(),
+        );
+    }
+    Ok(Recognised::Network(network))
+}
+
+/// What to say of tensors in which no rule finds one chain.
+pub(crate) fn undecided_message(tensors: &[NamedTensor]) -> Message {
+    refused::more_than_a_chain(&names::only_dense(tensors))
+}
+
+/// The path through all layers, if there is exactly one.
+fn order(parsed: names::Parsed) -> Result<Option<Network>, Refusal> {
+    let shapes = |layer: &Layer| (layer.name.clone(), layer.inputs, layer.outputs);
+    let found = policy::chains(&parsed.layers.iter().map(shapes).collect::<Vec<_>>());
+    let mut whole = found.iter().filter(|chain| chain.len() == parsed.layers.len());
+    let (Some(chain), None) = (whole.next(), whole.next()) else {
+        return undecided(&parsed, &found);
+    };
+    if let Some(name) = parsed.strangers.first() {
+        return Err(refused::stranger(name));
+    }
+    let mut said = parsed.said;
+    let layers: Vec<Layer> = chain
+        .iter()
+        .filter_map(|&index| parsed.layers.get(index).cloned())
+        .collect();
+    if !parsed.plain {
+        let names: Vec<&str> = layers.iter().map(|layer| layer.name.as_str()).collect();
+        said.insert(0, format!("layers, first to last: {}", names.join(" > ")));
+    }
+    Ok(Some(Network {
+        layers,
+        plain: parsed.plain,
+        choice_only: parsed.choice_only,
+        said,
+    }))
+}
+
+/// Several networks side by side are a question that a contract answers with `prefix`; a layer that could stand behind a
+/// chain is not: the chain would be a part, taken for the whole.
+fn undecided(parsed: &names::Parsed, found: &[Vec<usize>]) -> Result<Option<Network>, Refusal> {
+    let inside = |index: usize| found.iter().any(|chain| chain.contains(&index));
+    let ends: Vec<usize> = found
+        .iter()
+        .filter_map(|chain| Some(parsed.layers.get(*chain.last()?)?.outputs))
+        .collect();
+    let behind = parsed
+        .layers
+        .iter()
+        .enumerate()
+        .find(|(index, layer)| !inside(*index) && ends.contains(&layer.inputs));
+    if let Some((_, layer)) = behind {
+        return Err(Refusal::of(&layer.name, refused::more_than_a_chain(&parsed.layers)));
+    }
+    if parsed.plain || parsed.layers.is_empty() {
+        return Ok(None);
+    }
+    Err(refused::more_than_a_chain(&parsed.layers).into())
+}

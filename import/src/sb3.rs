@@ -1,0 +1,280 @@
+//! The archive that stable-baselines3 saves: `data` is JSON about the training, `policy.pth` holds the tensors.
+//!
+//! What is a Python object in `data` stands there as text, and as a pickle in base64. Texts are taken where they are exact,
+//! the pickle where numbers are wanted to the bit.
+
+use policy::{Activation, NamedTensor};
+use serde_json::Value;
+use toml_input::Message;
+
+use crate::network::Layer;
+use crate::numpy;
+use crate::pickle::{Item, Pickle};
+use crate::recognise::names::only_dense;
+use crate::recognise::refused_continuous;
+use crate::torch;
+use crate::zip::Archive;
+
+/// What an archive says beside its tensors.
+#[derive(Debug)]
+pub(crate) struct Model {
+    pub tensors: Vec<NamedTensor>,
+    pub actions: usize,
+    pub activation: Activation,
+    /// Lower and upper bound of each observation, infinite where it has none.
+    pub bounds: Vec<(f64, f64)>,
+    pub about: Vec<String>,
+    /// The layers by the names of the library alone, and how many quantiles are averaged behind them.
+    pub original: Option<(Vec<Layer>, usize)>,
+}
+
+/// A policy class that is read: where its layers lie, and its activation unless `policy_kwargs` has another.
+struct Class {
+    name: &'static str,
+    algorithm: &'static str,
+    trunk: &'static str,
+    head: Option<&'static str>,
+    activation: Activation,
+}
+
+const CLASSES: [Class; 3] = [
+    Class {
+        name: "stable_baselines3.dqn.policies.DQNPolicy",
+        algorithm: "DQN",
+        trunk: "q_net.q_net.",
+        head: None,
+        activation: Activation::Relu,
+    },
+    Class {
+        name: "sb3_contrib.qrdqn.policies.QRDQNPolicy",
+        algorithm: "QR-DQN",
+        trunk: "quantile_net.quantile_net.",
+        head: None,
+        activation: Activation::Relu,
+    },
+    Class {
+        name: "stable_baselines3.common.policies.ActorCriticPolicy",
+        algorithm: "PPO or A2C",
+        trunk: "mlp_extractor.policy_net.",
+        head: Some("action_net"),
+        activation: Activation::Tanh,
+    },
+];
+
+const CONTINUOUS: [&str; 4] = ["sac", "td3", "tqc", "crossq"];
+
+/// Whether an archive is one of stable-baselines3.
+pub(crate) fn is_model(archive: &Archive<'_>) -> bool {
+    archive.get("data").is_some() && archive.get("policy.pth").is_some()
+}
+
+/// Reads a model.
+pub(crate) fn read(archive: &Archive<'_>) -> Result<Model, Message> {
+    let data = archive.get("data").unwrap_or_default();
+    let data: Value = serde_json::from_slice(data).map_err(|error| {
+        Message::new("`data` in the archive is not JSON")
+            .found(error.to_string())
+            .expected("what model.save(...) writes")
+    })?;
+    let class = class(&data)?;
+    let actions = actions(&data, class)?;
+    let kwargs = data.get("policy_kwargs").unwrap_or(&Value::Null);
+    if let Some(extractor) =
+        text(kwargs, "features_extractor_class").filter(|class| !class.contains("FlattenExtractor"))
+    {
+        return Err(other(
+            "a features extractor of its own is not compiled",
+            extractor,
+            "the FlattenExtractor, which is the default",
+        ));
+    }
+    let activation = activation(kwargs, class)?;
+    let bounds = bounds(&data)?;
+    let policy = Archive::open(archive.get("policy.pth").unwrap_or_default())?;
+    let tensors = torch::read(&policy, None)?.tensors;
+    let version = archive
+        .get("_stable_baselines3_version")
+        .and_then(|bytes| std::str::from_utf8(bytes).ok());
+    let discount = data.get("gamma").and_then(Value::as_f64);
+    let mut about = vec![format!(
+        "{} of stable-baselines3 {}{}",
+        class.algorithm,
+        printable(version.unwrap_or("(version unknown)")),
+        discount.map_or_else(String::new, |discount| format!(", discount {discount}"))
+    )];
+    let net = kwargs.get("net_arch").filter(|net| !net.is_null());
+    about.push(match net {
+        Some(net) => format!("net_arch {}", printable(&net.to_string())),
+        None => "net_arch: the library's default".to_owned(),
+    });
+    let original = original(&tensors, class, actions);
+    Ok(Model {
+        tensors,
+        actions,
+        activation,
+        bounds,
+        about,
+        original,
+    })
+}
+
+fn class(data: &Value) -> Result<&'static Class, Message> {
+    let pickle = pickled(data, "policy_class")?;
+    let Item::Global(name) = pickle.item(pickle.root) else {
+        return Err(other(
+            "the policy's class is not named",
+            "no name",
+            "a class of stable-baselines3",
+        ));
+    };
+    if let Some(class) = CLASSES.iter().find(|class| class.name == name) {
+        return Ok(class);
+    }
+    if name.split('.').any(|part| CONTINUOUS.contains(&part)) {
+        return Err(refused_continuous(&format!("`{}`", printable(name))));
+    }
+    if name.to_ascii_lowercase().contains("recurrent") {
+        return Err(other("a recurrent policy (LSTM) is not compiled", name, "an MlpPolicy")
+            .hint("give the network its past as features instead: delays, differences and low-passes are filters of the contract"));
+    }
+    let expected: Vec<&str> = CLASSES.iter().map(|class| class.name).collect();
+    Err(other("this policy class is not read", name, &expected.join(", ")).hint(
+        "if it computes a chain of dense layers, save that alone: torch.save(model.policy.q_net.state_dict(), \"weights.pt\")",
+    ))
+}
+
+fn actions(data: &Value, class: &Class) -> Result<usize, Message> {
+    let space = data.get("action_space").unwrap_or(&Value::Null);
+    let kind = text(space, ":type:").unwrap_or("none");
+    if kind.ends_with(".Box'>") {
+        return Err(refused_continuous(&format!(
+            "{} with a Box action space",
+            class.algorithm
+        )));
+    }
+    let number = |key: &str| match space.get(key) {
+        Some(Value::String(text)) => text.parse::<usize>().ok(),
+        Some(value) => value.as_u64().and_then(|n| usize::try_from(n).ok()),
+        None => None,
+    };
+    match number("n") {
+        Some(actions) if kind.ends_with(".Discrete'>") => Ok(actions),
+        _ => Err(other(
+            "the action space is not one table of actions",
+            kind,
+            "gymnasium.spaces.Discrete",
+        )
+        .hint("write the combinations of a MultiDiscrete as one Discrete table")),
+    }
+}
+
+fn activation(kwargs: &Value, class: &Class) -> Result<Activation, Message> {
+    let Some(given) = text(kwargs, "activation_fn") else {
+        return Ok(class.activation);
+    };
+    let name = given.trim_end_matches("'>").rsplit('.').next().unwrap_or(given);
+    torch_activation(name).ok_or_else(|| {
+        let known: Vec<String> = Activation::EACH.iter().map(|each| each.written()).collect();
+        other("this activation is not compiled", name, &known.join(", "))
+            .hint("train with one of these: policy_kwargs = dict(activation_fn=...)")
+    })
+}
+
+/// The activation that a class of torch.nn makes without arguments.
+pub(crate) fn torch_activation(class: &str) -> Option<Activation> {
+    Some(match class {
+        "ReLU" => Activation::Relu,
+        "Tanh" => Activation::Tanh,
+        "Softsign" => Activation::Softsign,
+        "Identity" => Activation::Identity,
+        "LeakyReLU" => Activation::LeakyRelu { slope: 0.01 },
+        _ => return None,
+    })
+}
+
+fn bounds(data: &Value) -> Result<Vec<(f64, f64)>, Message> {
+    let space = data.get("observation_space").unwrap_or(&Value::Null);
+    let kind = text(space, ":type:").unwrap_or("none");
+    let expected = "gymnasium.spaces.Box of floats";
+    if !kind.ends_with(".Box'>") {
+        return Err(other("the observation space is no box", kind, expected));
+    }
+    let pickle = pickled(data, "observation_space")?;
+    let of = |key: &str| numpy::array(&pickle, pickle.get(pickle.attributes(pickle.root), key)?);
+    match (of("low"), of("high")) {
+        (Some(low), Some(high)) if low.len() == high.len() => Ok(low.into_iter().zip(high).collect()),
+        _ => Err(other(
+            "the bounds of the observation space cannot be read",
+            kind,
+            expected,
+        )),
+    }
+}
+
+/// The layers by the library's own names, and nothing inferred: what golden answers are computed from.
+fn original(tensors: &[NamedTensor], class: &Class, actions: usize) -> Option<(Vec<Layer>, usize)> {
+    let mut numbered: Vec<(usize, Layer)> = Vec::new();
+    let mut head = None;
+    for layer in only_dense(tensors) {
+        if let Some(number) = layer.name.strip_prefix(class.trunk).and_then(|rest| rest.parse().ok()) {
+            numbered.push((number, layer));
+        } else if Some(layer.name.as_str()) == class.head {
+            head = Some(layer);
+        }
+    }
+    numbered.sort_by_key(|(number, _)| *number);
+    let mut layers: Vec<Layer> = numbered.into_iter().map(|(_, layer)| layer).collect();
+    layers.extend(head);
+    let outputs = layers.last()?.outputs;
+    (actions > 0 && outputs % actions == 0).then(|| (layers, outputs / actions))
+}
+
+/// A pickle that stands in `data` in base64.
+fn pickled(data: &Value, key: &str) -> Result<Pickle, Message> {
+    let value = data.get(key).unwrap_or(&Value::Null);
+    let bytes = text(value, ":serialized:").and_then(base64);
+    Pickle::read(&bytes.ok_or_else(|| {
+        other(
+            "`data` in the archive is incomplete",
+            &format!("no `{key}`"),
+            "what model.save(...) writes",
+        )
+    })?)
+}
+
+fn text<'a>(value: &'a Value, key: &str) -> Option<&'a str> {
+    value.get(key).and_then(Value::as_str)
+}
+
+fn base64(text: &str) -> Option<Vec<u8>> {
+    let mut bytes = Vec::with_capacity(text.len() / 4 * 3);
+    let (mut bits, mut count) = (0_u32, 0);
+    for digit in text.trim_end_matches('=').bytes() {
+        let value = match digit {
+            b'A'..=b'Z' => digit - b'A',
+            b'a'..=b'z' => digit - b'a' + 26,
+            b'0'..=b'9' => digit - b'0' + 52,
+            b'+' => 62,
+            b'/' => 63,
+            _ => return None,
+        };
+        bits = (bits << 6) | u32::from(value);
+        count += 6;
+        if count >= 8 {
+            count -= 8;
+            bytes.push((bits >> count) as u8);
+            bits &= (1 << count) - 1;
+        }
+    }
+    Some(bytes)
+}
+
+/// Text of a file for a comment in a contract: one line.
+fn printable(text: &str) -> String {
+    let short: String = text.trim().chars().take(80).collect();
+    short.escape_debug().to_string().replace("\\\"", "\"")
+}
+
+fn other(what: &str, found: &str, expected: &str) -> Message {
+    Message::new(what).found(printable(found)).expected(expected)
+}

@@ -1,0 +1,270 @@
+//! Models that torch and stable-baselines3 saved, against what these libraries compute: tests/fixtures/trainers/make.py.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::disallowed_methods)]
+
+mod common;
+
+use std::path::{Path, PathBuf};
+
+use common::{filled, run, write};
+use import::Options;
+use safetensors::SafeTensors;
+
+fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../tests/fixtures/trainers")
+        .join(name)
+}
+
+fn expected(name: &str, tensor: &str) -> Vec<f32> {
+    let bytes = std::fs::read(fixture(&format!("{name}.expected.safetensors"))).unwrap();
+    let tensors = SafeTensors::deserialize(&bytes).unwrap();
+    let data = tensors.tensor(tensor).unwrap().data().to_vec();
+    data.as_chunks::<4>().0.iter().map(|b| f32::from_le_bytes(*b)).collect()
+}
+
+fn actions(name: &str) -> Vec<usize> {
+    expected(name, "action")
+        .iter()
+        .map(|bits| bits.to_bits() as usize)
+        .collect()
+}
+
+/// The policy of a saved model: written, every TODO filled in, and checked with its golden answers.
+fn policy_of(file: &str, options: &Options) -> (tempfile::TempDir, import::NewPolicy, policy::Policy) {
+    let folder = tempfile::tempdir().unwrap();
+    let new = import::new_policy(&fixture(file), &folder.path().join("policy.toml"), options)
+        .unwrap_or_else(|faults| panic!("{file}: {faults}"));
+    let policy = filled(folder.path(), &new);
+    (folder, new, policy)
+}
+
+/// Every choice as the library's, every output within 1e-5 of the largest, but for a constant where only the choice counts.
+fn assert_equals_library(policy: &policy::Policy, name: &str, activation: fn(f64) -> f64, choice_only: bool) {
+    let (obs, q, chosen) = (expected(name, "obs"), expected(name, "q"), actions(name));
+    let count = policy.actions.len();
+    assert_eq!(chosen.len(), 64);
+    for (row, expected) in q.chunks_exact(count).enumerate() {
+        let x: Vec<f64> = obs[row * 6..(row + 1) * 6].iter().map(|x| f64::from(*x)).collect();
+        let found = run(policy, &x, activation);
+        let best = (0..count).fold(0, |best, a| if found[a] > found[best] { a } else { best });
+        assert_eq!(best, chosen[row], "{name}, row {row}");
+        let largest = expected
+            .iter()
+            .fold(0.0_f64, |largest, q| largest.max(f64::from(q.abs())));
+        let shift = if choice_only {
+            f64::from(expected[0]) - found[0]
+        } else {
+            0.0
+        };
+        for (found, expected) in found.iter().zip(expected) {
+            let apart = (found + shift - f64::from(*expected)).abs();
+            assert!(apart <= 1e-5 * largest, "{name}, row {row}: {found} {expected}");
+        }
+    }
+}
+
+fn refusal(file: &Path) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let new = import::new_policy(file, &folder.path().join("policy.toml"), &Options::default());
+    new.err()
+        .unwrap_or_else(|| panic!("{} is taken", file.display()))
+        .to_string()
+}
+
+fn relu(x: f64) -> f64 {
+    x.max(0.0)
+}
+
+#[test]
+fn a_dqn_of_sb3_brings_architecture_bounds_and_golden_answers() {
+    let (_folder, new, policy) = policy_of("sb3_dqn.zip", &Options::default());
+    assert_equals_library(&policy, "sb3_dqn", relu, false);
+    assert_eq!(policy.golden.as_ref().map(|golden| golden.count), Some(64));
+    for line in [
+        "DQN of stable-baselines3 2.9.2, discount 0.97",
+        "hidden_activation = \"relu\"",
+        "clip = [-1.5, 1.5]",
+        "\ngolden = \"golden.safetensors\"",
+    ] {
+        assert!(new.contract.contains(line), "{line}\n{}", new.contract);
+    }
+    assert_eq!(new.contract.matches("# action ").count(), 5);
+}
+
+#[test]
+fn the_vecnormalize_of_a_ppo_becomes_scale_offset_and_clip() {
+    let options = Options {
+        vecnormalize: Some(fixture("sb3_ppo_vecnormalize.pkl")),
+        ..Options::default()
+    };
+    let (_folder, new, policy) = policy_of("sb3_ppo.zip", &options);
+    assert!(
+        new.contract.contains("hidden_activation = \"tanh\""),
+        "{}",
+        new.contract
+    );
+    assert_equals_library(&policy, "sb3_ppo", f64::tanh, false);
+    let (raw, normal) = (
+        expected("sb3_ppo_vecnormalize", "raw"),
+        expected("sb3_ppo_vecnormalize", "normal"),
+    );
+    let mut clipped = 0;
+    for (index, (raw, normal)) in raw.iter().zip(&normal).enumerate() {
+        let feature = &policy.features[index % 6];
+        let clip = feature.clip.unwrap();
+        let (raw, normal) = (f64::from(*raw), f64::from(*normal));
+        let x = feature.scale * raw + feature.offset;
+        let found = x.clamp(clip.low, clip.high);
+        clipped += usize::from(found != x);
+        assert!(
+            (found - normal).abs() <= 2e-6 * normal.abs().max(1.0),
+            "{index}: {found} {normal}"
+        );
+    }
+    // epsilon is a thousandth, beside a variance of a thousandth: a scale without it would be 1.4 times as large
+    assert!(clipped > 64, "{clipped}");
+}
+
+#[test]
+fn statistics_beside_a_model_are_taken_unasked() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::copy(fixture("sb3_ppo.zip"), folder.path().join("model.zip")).unwrap();
+    std::fs::copy(
+        fixture("sb3_ppo_vecnormalize.pkl"),
+        folder.path().join("vecnormalize.pkl"),
+    )
+    .unwrap();
+    let new = import::new_policy(
+        &folder.path().join("model.zip"),
+        &folder.path().join("policy.toml"),
+        &Options::default(),
+    );
+    assert!(
+        new.unwrap()
+            .contract
+            .contains("clip = [-4.0, 4.0]   # clip_obs of VecNormalize")
+    );
+    std::fs::copy(fixture("sb3_a2c.zip"), folder.path().join("vecnormalize.pkl")).unwrap();
+    let faults = refusal(&folder.path().join("model.zip"));
+    assert!(faults.contains("vecnormalize.pkl"), "{faults}");
+}
+
+#[test]
+fn a2c_and_quantiles_of_sb3_are_read() {
+    let (_folder, new, policy) = policy_of("sb3_a2c.zip", &Options::default());
+    assert!(new.contract.contains("hidden_activation = \"relu\""));
+    assert_equals_library(&policy, "sb3_a2c", relu, false);
+    let (_folder, new, policy) = policy_of("sb3_qrdqn.zip", &Options::default());
+    assert!(new.contract.contains("mean over 10 quantiles"), "{}", new.contract);
+    assert_equals_library(&policy, "sb3_qrdqn", relu, false);
+}
+
+#[test]
+fn torch_files_of_every_kind_are_read() {
+    for file in ["state_dict.pth", "whole_module.pt"] {
+        let (_folder, new, policy) = policy_of(file, &Options::default());
+        assert_equals_library(&policy, "state_dict", relu, false);
+        // a state dict does not say it
+        let said = new.contract.contains("hidden_activation = \"relu\"");
+        assert_eq!(said, file == "whole_module.pt", "{}", new.contract);
+    }
+    let (_folder, new, policy) = policy_of("checkpoint.pt", &Options::default());
+    assert!(new.said[0].contains("`model_state_dict`"), "{:?}", new.said);
+    assert_equals_library(&policy, "state_dict", relu, false);
+    let (_folder, _, policy) = policy_of("dueling.pth", &Options::default());
+    assert_equals_library(&policy, "dueling", relu, true);
+    let (_folder, new, policy) = policy_of("batch_norm_module.pt", &Options::default());
+    assert_equals_library(&policy, "batch_norm_module", relu, false);
+    // the module holds its epsilon
+    assert!(!new.said.iter().any(|line| line.contains("default")), "{:?}", new.said);
+}
+
+#[test]
+fn continuous_models_of_sb3_are_refused_by_name() {
+    for (file, name) in [
+        ("sb3_sac.zip", "SACPolicy"),
+        ("sb3_td3.zip", "TD3Policy"),
+        ("sb3_ddpg.zip", "TD3Policy"),
+        ("sb3_ppo_continuous.zip", "Box action space"),
+    ] {
+        let faults = refusal(&fixture(file));
+        assert!(
+            faults.contains("commands a number") && faults.contains(name),
+            "{file}: {faults}"
+        );
+    }
+}
+
+#[test]
+fn a_planted_call_is_refused_by_name_and_does_not_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let planted = folder.path().join("planted.pt");
+    std::fs::copy(fixture("planted.pt"), &planted).unwrap();
+    let faults = refusal(&planted);
+    assert!(faults.contains("`posix.system`"), "{faults}");
+    assert!(!folder.path().join("planted-was-here").exists());
+    assert!(!Path::new("planted-was-here").exists());
+}
+
+#[test]
+fn the_format_before_archives_is_refused_with_the_line_that_converts_it() {
+    let faults = refusal(&fixture("legacy.pth"));
+    assert!(faults.contains("torch.save(torch.load("), "{faults}");
+}
+
+/// Every prefix and every changed byte of an archive is read or refused, and soon.
+#[test]
+fn a_damaged_archive_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["state_dict.pth", "sb3_dqn.zip"] {
+        let whole = std::fs::read(fixture(name)).unwrap();
+        let file = folder.path().join(name);
+        let begun = std::time::Instant::now();
+        for cut in (0..whole.len()).step_by(197) {
+            write(&file, &whole[..cut]);
+            refusal(&file);
+        }
+        for at in (0..whole.len()).step_by(61) {
+            let mut damaged = whole.clone();
+            damaged[at] ^= 0xff;
+            write(&file, &damaged);
+            let _ = import::new_policy(&file, &folder.path().join("policy.toml"), &Options::default());
+        }
+        assert!(begun.elapsed().as_secs() < 20, "{:?}", begun.elapsed());
+    }
+}
+
+/// A directory of an archive with one member that claims `size` bytes.
+fn claiming(size: u32, method: u16) -> Vec<u8> {
+    let mut bytes = b"PK\x03\x04".to_vec();
+    bytes.extend([0; 22]);
+    bytes.extend([8, 0, 0, 0]);
+    bytes.extend(b"data.pkl");
+    let directory = u32::try_from(bytes.len()).unwrap();
+    bytes.extend(b"PK\x01\x02");
+    bytes.extend([0; 6]);
+    bytes.extend(method.to_le_bytes());
+    bytes.extend([0; 8]);
+    bytes.extend(size.to_le_bytes());
+    bytes.extend(size.to_le_bytes());
+    bytes.extend([8, 0, 0, 0, 0, 0]);
+    bytes.extend([0; 12]);
+    bytes.extend(b"data.pkl");
+    bytes.extend(b"PK\x05\x06\0\0\0\0\x01\0\x01\0");
+    bytes.extend([0; 4]);
+    bytes.extend(directory.to_le_bytes());
+    bytes.extend([0; 2]);
+    bytes
+}
+
+#[test]
+fn a_size_beyond_the_file_is_refused_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("bomb.pt");
+    let begun = std::time::Instant::now();
+    write(&file, &claiming(u32::MAX - 1, 0));
+    assert!(refusal(&file).contains("4294967294 bytes in a file of"));
+    write(&file, &claiming(10, 8));
+    assert!(refusal(&file).contains("is compressed"));
+    assert!(begun.elapsed().as_millis() < 200);
+}

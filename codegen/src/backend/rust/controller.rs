@@ -397,7 +397,7 @@ fn checks(program: &Program) -> TokenStream {
     let kind = number::kind(scalar);
     let checksum = integrity::checksum(Element::Float(scalar));
     let [low, width, answers] = ["box_low", "box_width", "answers"].map(|name| tables::values(program, name));
-    let vectors = size(VECTORS);
+    let (vectors, count) = (size(VECTORS), word(VECTORS as u32));
     let (seed, multiplier, increment, unit) = (
         word(SEED),
         word(LCG.0),
@@ -418,21 +418,22 @@ fn checks(program: &Program) -> TokenStream {
             static BOX_WIDTH: [#kind; FEATURES] = #width;
             static ANSWERS: [u32; #vectors] = #answers;
             let mut random: u32 = #seed;
-            let mut failed = 0_u32;
+            // first answers in a row that are right: a fault in this count shows in a sound build, too
+            let mut good = 0_u32;
             let mut vector = 0_u32;
             for answer in &ANSWERS {
-                vector = vector.wrapping_add(1);
                 let mut observation = [#zero; FEATURES];
                 for ((value, low), width) in observation.iter_mut().zip(&BOX_LOW).zip(&BOX_WIDTH) {
                     random = random.wrapping_mul(#multiplier).wrapping_add(#increment);
                     *value = *low + *width * ((random >> 8) as #kind * #unit);
                 }
                 let crc = !#checksum(u32::MAX, &Self::q_values(&observation));
-                if failed == 0 && crc != *answer {
-                    failed = vector;
+                vector = vector.wrapping_add(1);
+                if good.wrapping_add(1) == vector && crc == *answer {
+                    good = vector;
                 }
             }
-            if failed == 0 { Ok(()) } else { Err(failed) }
+            if good == #count { Ok(()) } else { Err(good.wrapping_add(1)) }
         }
         /// CRC-32 over the tables: whether they are as generated.
         #[must_use]

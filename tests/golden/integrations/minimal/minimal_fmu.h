@@ -25,7 +25,7 @@
  *   6 status (output): status bits; 65536 is added while the coefficients are refused
  */
 #define MINIMAL_FMU_VARIABLES 6u
-#define MINIMAL_FMU_TOKEN "{63e2249b-097d-f370-864e-f2a36aedd7b5}"
+#define MINIMAL_FMU_TOKEN "{68896b68-46ef-ebf7-222c-39376c231015}"
 #define MINIMAL_FMU_PERIOD 0.0001
 
 /* Types of variables. */

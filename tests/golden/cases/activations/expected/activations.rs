@@ -627,10 +627,9 @@ impl Controller {
             1575237642, 3111760343, 1307219815,
         ];
         let mut random: u32 = 625341585;
-        let mut failed = 0_u32;
+        let mut good = 0_u32;
         let mut vector = 0_u32;
         for answer in &ANSWERS {
-            vector = vector.wrapping_add(1);
             let mut observation = [0.0_f32; FEATURES];
             for ((value, low), width) in observation
                 .iter_mut()
@@ -641,11 +640,12 @@ impl Controller {
                 *value = *low + *width * ((random >> 8) as f32 * 0.000000059604645);
             }
             let crc = !crc_floats(u32::MAX, &Self::q_values(&observation));
-            if failed == 0 && crc != *answer {
-                failed = vector;
+            vector = vector.wrapping_add(1);
+            if good.wrapping_add(1) == vector && crc == *answer {
+                good = vector;
             }
         }
-        if failed == 0 { Ok(()) } else { Err(failed) }
+        if good == 16 { Ok(()) } else { Err(good.wrapping_add(1)) }
     }
     /// CRC-32 over the tables: whether they are as generated.
     #[must_use]

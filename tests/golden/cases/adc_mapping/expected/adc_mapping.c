@@ -941,7 +941,7 @@ ADC_MAPPING_COLD uint32_t adc_mapping_self_test(void)
     float observation[ADC_MAPPING_FEATURES];
     float q[ADC_MAPPING_ACTIONS];
     uint32_t random = 0x2545F491u;
-    uint32_t failed = 0u;
+    uint32_t good = 0u; /* first answers in a row that are right: a fault in this count shows in a sound build, too */
     uint32_t vector;
     uint32_t i;
     adc_mapping_span span;
@@ -956,9 +956,9 @@ ADC_MAPPING_COLD uint32_t adc_mapping_self_test(void)
         span.crc = 0xFFFFFFFFu;
         adc_mapping_q_values(observation, q);
         adc_mapping_crc(&span, q, ADC_MAPPING_ACTIONS);
-        if ((failed == 0u) && ((span.crc ^ 0xFFFFFFFFu) != adc_mapping_answers[vector])) {
-            failed = vector + 1u;
+        if ((good == vector) && ((span.crc ^ 0xFFFFFFFFu) == adc_mapping_answers[vector])) {
+            good = vector + 1u;
         }
     }
-    return failed;
+    return (good == 16u) ? 0u : (good + 1u);
 }

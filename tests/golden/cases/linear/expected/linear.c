@@ -663,7 +663,7 @@ LINEAR_COLD uint32_t linear_self_test(void)
     float observation[LINEAR_FEATURES];
     float q[LINEAR_ACTIONS];
     uint32_t random = 0x2545F491u;
-    uint32_t failed = 0u;
+    uint32_t good = 0u; /* first answers in a row that are right: a fault in this count shows in a sound build, too */
     uint32_t vector;
     uint32_t i;
     linear_span span;
@@ -678,9 +678,9 @@ LINEAR_COLD uint32_t linear_self_test(void)
         span.crc = 0xFFFFFFFFu;
         linear_q_values(observation, q);
         linear_crc(&span, q, LINEAR_ACTIONS);
-        if ((failed == 0u) && ((span.crc ^ 0xFFFFFFFFu) != linear_answers[vector])) {
-            failed = vector + 1u;
+        if ((good == vector) && ((span.crc ^ 0xFFFFFFFFu) == linear_answers[vector])) {
+            good = vector + 1u;
         }
     }
-    return failed;
+    return (good == 16u) ? 0u : (good + 1u);
 }

@@ -741,7 +741,7 @@ MINIMAL_COLD uint32_t minimal_self_test(void)
     float observation[MINIMAL_FEATURES];
     float q[MINIMAL_ACTIONS];
     uint32_t random = 0x2545F491u;
-    uint32_t failed = 0u;
+    uint32_t good = 0u; /* first answers in a row that are right: a fault in this count shows in a sound build, too */
     uint32_t vector;
     uint32_t i;
     minimal_span span;
@@ -756,9 +756,9 @@ MINIMAL_COLD uint32_t minimal_self_test(void)
         span.crc = 0xFFFFFFFFu;
         minimal_q_values(observation, q);
         minimal_crc(&span, q, MINIMAL_ACTIONS);
-        if ((failed == 0u) && ((span.crc ^ 0xFFFFFFFFu) != minimal_answers[vector])) {
-            failed = vector + 1u;
+        if ((good == vector) && ((span.crc ^ 0xFFFFFFFFu) == minimal_answers[vector])) {
+            good = vector + 1u;
         }
     }
-    return failed;
+    return (good == 16u) ? 0u : (good + 1u);
 }

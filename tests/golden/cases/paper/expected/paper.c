@@ -935,7 +935,7 @@ PAPER_COLD uint32_t paper_self_test(void)
     float observation[PAPER_FEATURES];
     float q[PAPER_ACTIONS];
     uint32_t random = 0x2545F491u;
-    uint32_t failed = 0u;
+    uint32_t good = 0u; /* first answers in a row that are right: a fault in this count shows in a sound build, too */
     uint32_t vector;
     uint32_t i;
     paper_span span;
@@ -950,9 +950,9 @@ PAPER_COLD uint32_t paper_self_test(void)
         span.crc = 0xFFFFFFFFu;
         paper_q_values(observation, q);
         paper_crc(&span, q, PAPER_ACTIONS);
-        if ((failed == 0u) && ((span.crc ^ 0xFFFFFFFFu) != paper_answers[vector])) {
-            failed = vector + 1u;
+        if ((good == vector) && ((span.crc ^ 0xFFFFFFFFu) == paper_answers[vector])) {
+            good = vector + 1u;
         }
     }
-    return failed;
+    return (good == 16u) ? 0u : (good + 1u);
 }

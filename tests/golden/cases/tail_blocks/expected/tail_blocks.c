@@ -973,7 +973,7 @@ TAIL_BLOCKS_COLD uint32_t tail_blocks_self_test(void)
     float observation[TAIL_BLOCKS_FEATURES];
     float q[TAIL_BLOCKS_ACTIONS];
     uint32_t random = 0x2545F491u;
-    uint32_t failed = 0u;
+    uint32_t good = 0u; /* first answers in a row that are right: a fault in this count shows in a sound build, too */
     uint32_t vector;
     uint32_t i;
     tail_blocks_span span;
@@ -988,9 +988,9 @@ TAIL_BLOCKS_COLD uint32_t tail_blocks_self_test(void)
         span.crc = 0xFFFFFFFFu;
         tail_blocks_q_values(observation, q);
         tail_blocks_crc(&span, q, TAIL_BLOCKS_ACTIONS);
-        if ((failed == 0u) && ((span.crc ^ 0xFFFFFFFFu) != tail_blocks_answers[vector])) {
-            failed = vector + 1u;
+        if ((good == vector) && ((span.crc ^ 0xFFFFFFFFu) == tail_blocks_answers[vector])) {
+            good = vector + 1u;
         }
     }
-    return failed;
+    return (good == 16u) ? 0u : (good + 1u);
 }

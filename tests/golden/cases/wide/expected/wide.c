@@ -1092,7 +1092,7 @@ WIDE_COLD uint32_t wide_self_test(void)
     double observation[WIDE_FEATURES];
     double q[WIDE_ACTIONS];
     uint32_t random = 0x2545F491u;
-    uint32_t failed = 0u;
+    uint32_t good = 0u; /* first answers in a row that are right: a fault in this count shows in a sound build, too */
     uint32_t vector;
     uint32_t i;
     wide_span span;
@@ -1107,9 +1107,9 @@ WIDE_COLD uint32_t wide_self_test(void)
         span.crc = 0xFFFFFFFFu;
         wide_q_values(observation, q);
         wide_crc(&span, q, WIDE_ACTIONS);
-        if ((failed == 0u) && ((span.crc ^ 0xFFFFFFFFu) != wide_answers[vector])) {
-            failed = vector + 1u;
+        if ((good == vector) && ((span.crc ^ 0xFFFFFFFFu) == wide_answers[vector])) {
+            good = vector + 1u;
         }
     }
-    return failed;
+    return (good == 16u) ? 0u : (good + 1u);
 }

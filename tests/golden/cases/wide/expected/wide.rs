@@ -1188,10 +1188,9 @@ impl Controller {
             4156085897, 4109533157, 3327860556, 3489072670,
         ];
         let mut random: u32 = 625341585;
-        let mut failed = 0_u32;
+        let mut good = 0_u32;
         let mut vector = 0_u32;
         for answer in &ANSWERS {
-            vector = vector.wrapping_add(1);
             let mut observation = [0.0_f64; FEATURES];
             for ((value, low), width) in observation
                 .iter_mut()
@@ -1203,11 +1202,12 @@ impl Controller {
                     + *width * ((random >> 8) as f64 * 0.00000005960464477539063);
             }
             let crc = !crc_numbers(u32::MAX, &Self::q_values(&observation));
-            if failed == 0 && crc != *answer {
-                failed = vector;
+            vector = vector.wrapping_add(1);
+            if good.wrapping_add(1) == vector && crc == *answer {
+                good = vector;
             }
         }
-        if failed == 0 { Ok(()) } else { Err(failed) }
+        if good == 16 { Ok(()) } else { Err(good.wrapping_add(1)) }
     }
     /// CRC-32 over the tables: whether they are as generated.
     #[must_use]

@@ -57,6 +57,8 @@ pub struct NewPolicy {
 
 /// The names of what is written beside a contract.
 const WEIGHTS: &str = "weights.safetensors";
+/// Where the file that is read has the first name.
+const CHAIN: &str = "chain.safetensors";
 const GOLDEN: &str = "golden.safetensors";
 /// What VecNormalize's page calls its file.
 const STATISTICS: &str = "vecnormalize.pkl";
@@ -138,7 +140,12 @@ fn written(
             "{GOLDEN} was computed from the tensors as saved, in f64; the trainer's own answers check more"
         ));
     }
-    let weights = seen_from(contract, &contract.with_file_name(WEIGHTS)).map_err(|message| name.fault(message))?;
+    let own = contract.with_file_name(WEIGHTS);
+    let is_taken = own
+        .canonicalize()
+        .is_ok_and(|own| name.path.canonicalize().is_ok_and(|file| file == own));
+    let file = if is_taken { CHAIN } else { WEIGHTS };
+    let weights = seen_from(contract, &contract.with_file_name(file)).map_err(|message| name.fault(message))?;
     let draft = Draft {
         weights,
         inputs,
@@ -155,7 +162,7 @@ fn written(
             statistics.to_vec()
         },
     };
-    let mut beside = BTreeMap::from([(WEIGHTS.to_owned(), network.to_safetensors(name)?)]);
+    let mut beside = BTreeMap::from([(file.to_owned(), network.to_safetensors(name)?)]);
     beside.extend(golden.map(|bytes| (GOLDEN.to_owned(), bytes)));
     Ok(NewPolicy {
         contract: policy::draft(&draft),

@@ -1,4 +1,4 @@
-//! Batch norms are folded into the dense layer beside them.
+//! Batch norms are folded into the dense layer beside them; what is written is not in its own way.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::disallowed_methods)]
 
 mod common;
@@ -54,4 +54,14 @@ fn a_batch_norm_is_folded_where_its_place_is_known() {
     let saved = Saved::new(&unnumbered);
     let faults = import::new_policy(&saved.weights(), &saved.contract(), &import::Options::default()).unwrap_err();
     assert!(faults.to_string().contains("which side of the activation"), "{faults}");
+}
+
+#[test]
+fn weights_of_the_name_that_new_writes_are_not_in_the_way() {
+    let saved = Saved::new(&[dense("fc1", 16, 6), dense("value", 1, 16), dense("adv", 5, 16)].concat());
+    let weights = saved.contract().with_file_name("weights.safetensors");
+    std::fs::rename(saved.weights(), &weights).unwrap();
+    let new = import::new_policy(&weights, &saved.contract(), &import::Options::default()).unwrap();
+    assert_eq!(new.beside.keys().collect::<Vec<_>>(), ["chain.safetensors"]);
+    assert_eq!(saved.filled(&new).layers.len(), 2);
 }

@@ -13,6 +13,7 @@
 mod golden;
 mod network;
 mod numpy;
+mod onnx;
 mod pickle;
 mod read;
 mod recognise;
@@ -56,6 +57,8 @@ pub struct NewPolicy {
 
 /// The names of what is written beside a contract.
 const WEIGHTS: &str = "weights.safetensors";
+/// Where the file that is read has the first name.
+const CHAIN: &str = "chain.safetensors";
 const GOLDEN: &str = "golden.safetensors";
 /// What VecNormalize's page calls its file.
 const STATISTICS: &str = "vecnormalize.pkl";
@@ -68,6 +71,17 @@ pub fn new_policy(file: &Path, contract: &Path, options: &Options) -> Result<New
     let name = FileName::new(file);
     let bytes = name.read(MAX_WEIGHT_BYTES).map_err(|message| name.fault(message))?;
     let loaded = read::read(&name, bytes, options)?;
+    if let Some(graph) = &loaded.graph {
+        recognise::fits(&graph.network, options.actions).map_err(|refusal| placed(&name, refusal))?;
+        let own = statistics(file, options)?;
+        if !own.is_empty() && !graph.features.is_empty() {
+            let message = Message::new("the graph normalises its observations already")
+                .hint("leave out the statistics of VecNormalize");
+            return Err(name.fault(message).into());
+        }
+        let features = if own.is_empty() { graph.features.clone() } else { own };
+        return written(&name, contract, &loaded, &graph.network, &features);
+    }
     let network = match recognise(&loaded.tensors, &loaded.known).map_err(|refusal| placed(&name, refusal))? {
         Recognised::Network(network) => Some(network),
         Recognised::Undecided => None,
@@ -118,10 +132,20 @@ fn written(
     let golden = golden_answers(loaded, network, statistics).map_err(|message| name.fault(message))?;
     let mut said = loaded.about.clone();
     said.extend(network.said.iter().cloned());
-    if !statistics.is_empty() {
+    if !statistics.is_empty() && loaded.graph.as_ref().is_none_or(|graph| graph.features.is_empty()) {
         said.push("VecNormalize: scale = 1/sqrt(var + epsilon), offset = -mean/sqrt(var + epsilon), then clip, all computed in f64".to_owned());
     }
-    let weights = seen_from(contract, &contract.with_file_name(WEIGHTS)).map_err(|message| name.fault(message))?;
+    if golden.is_some() {
+        said.push(format!(
+            "{GOLDEN} was computed from the tensors as saved, in f64; the trainer's own answers check more"
+        ));
+    }
+    let own = contract.with_file_name(WEIGHTS);
+    let is_taken = own
+        .canonicalize()
+        .is_ok_and(|own| name.path.canonicalize().is_ok_and(|file| file == own));
+    let file = if is_taken { CHAIN } else { WEIGHTS };
+    let weights = seen_from(contract, &contract.with_file_name(file)).map_err(|message| name.fault(message))?;
     let draft = Draft {
         weights,
         inputs,
@@ -129,7 +153,7 @@ fn written(
         chains: vec![chain(network)],
         hidden: network.layers.len() > 1,
         bias: true,
-        activation: loaded.activation.map(|activation| activation.written()),
+        activation: activation(loaded),
         golden: golden.is_some(),
         about: said.clone(),
         features: if statistics.is_empty() {
@@ -138,13 +162,29 @@ fn written(
             statistics.to_vec()
         },
     };
-    let mut beside = BTreeMap::from([(WEIGHTS.to_owned(), network.to_safetensors(name)?)]);
+    let mut beside = BTreeMap::from([(file.to_owned(), network.to_safetensors(name)?)]);
     beside.extend(golden.map(|bytes| (GOLDEN.to_owned(), bytes)));
     Ok(NewPolicy {
         contract: policy::draft(&draft),
         beside,
         said,
     })
+}
+
+/// The activations behind the hidden layers, as TOML.
+fn activation(loaded: &Loaded) -> Option<String> {
+    let Some(graph) = &loaded.graph else {
+        return loaded.activation.map(|activation| activation.written());
+    };
+    let written: Vec<String> = graph
+        .activations
+        .iter()
+        .map(|activation| activation.written())
+        .collect();
+    match written.split_first() {
+        Some((first, rest)) if rest.iter().all(|other| other == first) => Some(first.clone()),
+        _ => Some(format!("[{}]", written.join(", "))),
+    }
 }
 
 /// Golden answers where the file says of what and through which layers.

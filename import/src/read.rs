@@ -8,7 +8,7 @@ use toml_input::{Faults, FileName, Message};
 use crate::network::Layer;
 use crate::recognise::Known;
 use crate::zip::Archive;
-use crate::{Options, sb3, torch, zip};
+use crate::{Options, onnx, sb3, torch, zip};
 
 /// What a reader found.
 #[derive(Debug, Default)]
@@ -22,6 +22,8 @@ pub(crate) struct Loaded {
     /// The layers by the names of the library alone, and how many quantiles are averaged behind them.
     pub original: Option<(Vec<Layer>, usize)>,
     pub about: Vec<String>,
+    /// A graph needs no recognition: its network, activations and features.
+    pub graph: Option<onnx::Model>,
 }
 
 /// Reads a file of any format.
@@ -29,6 +31,12 @@ pub(crate) fn read(name: &FileName, bytes: Vec<u8>, options: &Options) -> Result
     let fault = |message: Message| Faults::from(name.fault(message));
     if torch::is_bare_pickle(&bytes) {
         return Err(fault(torch::legacy()));
+    }
+    if onnx::is_model(&bytes) {
+        return Ok(Loaded {
+            graph: Some(onnx::read(name, &bytes).map_err(fault)?),
+            ..Loaded::default()
+        });
     }
     if !zip::is_archive(&bytes) {
         return Ok(Loaded {
@@ -87,6 +95,7 @@ fn model(archive: &Archive<'_>, options: &Options) -> Result<Loaded, Message> {
         bounds: model.bounds,
         original: model.original,
         about: model.about,
+        graph: None,
     })
 }
 

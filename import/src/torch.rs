@@ -4,6 +4,7 @@
 //! map of attributes with the name of its class.
 
 use policy::NamedTensor;
+use policy::limits::MAX_TENSOR_NAME_CHARS;
 use toml_input::Message;
 
 use crate::pickle::{Id, Item, Object, Pickle};
@@ -154,6 +155,10 @@ impl<'a> Walk<'a> {
         }
         if self.is_tensor(id) {
             let tensor = self.tensor(id, name)?;
+            // counters have no axis; names go into messages and comments
+            if tensor.values.is_some() {
+                sound(name, &tensor.shape)?;
+            }
             self.found.tensors.push(tensor);
             return Ok(());
         }
@@ -296,6 +301,21 @@ fn place(index: usize, offset: usize, shape: &[usize], strides: &[usize]) -> Opt
         rest /= size;
     }
     Some(place)
+}
+
+/// Whether a name can stand in messages and comments, and the tensor holds anything; as in safetensors.
+fn sound(name: &str, shape: &[usize]) -> Result<(), Message> {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '.' | '/' | ':' | '-');
+    if name.is_empty() || name.len() > MAX_TENSOR_NAME_CHARS || !name.chars().all(allowed) {
+        let short: String = name.chars().take(MAX_TENSOR_NAME_CHARS).collect();
+        return Err(Message::new("this tensor name is not safe to print")
+            .found(format!("\"{}\"", short.escape_debug()))
+            .expected("1 to 128 of A-Z, a-z, 0-9, _ . / : -"));
+    }
+    if shape.contains(&0) {
+        return Err(odd(name));
+    }
+    Ok(())
 }
 
 fn odd(name: &str) -> Message {

@@ -212,11 +212,85 @@ fn the_format_before_archives_is_refused_with_the_line_that_converts_it() {
     assert!(faults.contains("torch.save(torch.load("), "{faults}");
 }
 
+#[test]
+fn an_onnx_graph_is_read_with_and_without_external_data() {
+    for file in ["gemm.onnx", "external.onnx"] {
+        let (_folder, new, policy) = policy_of(file, &Options::default());
+        assert!(
+            new.contract.contains("hidden_activation = \"relu\""),
+            "{}",
+            new.contract
+        );
+        assert_equals_library(&policy, "gemm", relu, false);
+    }
+}
+
+#[test]
+fn the_normalisation_of_a_graph_becomes_features() {
+    let (_folder, _, policy) = policy_of("normalised.onnx", &Options::default());
+    let (obs, normal) = (expected("normalised", "obs"), expected("normalised", "normal"));
+    let (q, chosen) = (expected("normalised", "q"), actions("normalised"));
+    for (row, chosen) in chosen.iter().enumerate() {
+        let mut x = Vec::new();
+        for (index, feature) in policy.features.iter().enumerate() {
+            let found = feature.scale * f64::from(obs[row * 6 + index]) + feature.offset;
+            assert!((found - f64::from(normal[row * 6 + index])).abs() <= 2e-6 * found.abs().max(1.0));
+            x.push(found);
+        }
+        let found = run(&policy, &x, relu);
+        let best = (0..5).fold(0, |best, a| if found[a] > found[best] { a } else { best });
+        assert_eq!(best, *chosen);
+        for (found, q) in found.iter().zip(&q[row * 5..]) {
+            assert!(
+                (found - f64::from(*q)).abs() <= 1e-5 * found.abs().max(1.0),
+                "{found} {q}"
+            );
+        }
+    }
+}
+
+#[test]
+fn an_odd_graph_is_refused_by_its_node() {
+    let faults = refusal(&fixture("branching.onnx"));
+    assert!(
+        faults.contains("branches") && faults.contains("Gemm `/a/Gemm`"),
+        "{faults}"
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let whole = std::fs::read(fixture("gemm.onnx")).unwrap();
+    let at = whole.windows(6).position(|six| six == b"\"\x04Relu").unwrap();
+    let mut other = whole.clone();
+    other[at + 2..at + 6].copy_from_slice(b"Gelu");
+    let file = folder.path().join("gelu.onnx");
+    write(&file, &other);
+    let faults = refusal(&file);
+    assert!(faults.contains("Gelu `/network/network.1/Relu`"), "{faults}");
+}
+
+#[test]
+fn external_data_outside_the_folder_are_refused_unread() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = std::fs::read(fixture("external.onnx")).unwrap();
+    let name = b"external.onnx.data";
+    for elsewhere in [b"../etc/passwd/aaaa", b"/etc/passwd/aaaaaa"] {
+        let mut other = whole.clone();
+        while let Some(at) = other.windows(name.len()).position(|here| here == name) {
+            other[at..at + name.len()].copy_from_slice(elsewhere);
+        }
+        let file = folder.path().join("external.onnx");
+        write(&file, &other);
+        assert!(refusal(&file).contains("outside its folder"));
+    }
+    let file = folder.path().join("alone.onnx");
+    write(&file, &whole);
+    assert!(refusal(&file).contains("external.onnx.data"));
+}
+
 /// Every prefix and every changed byte of an archive is read or refused, and soon.
 #[test]
 fn a_damaged_archive_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    for name in ["state_dict.pth", "sb3_dqn.zip"] {
+    for name in ["state_dict.pth", "sb3_dqn.zip", "gemm.onnx"] {
         let whole = std::fs::read(fixture(name)).unwrap();
         let file = folder.path().join(name);
         let begun = std::time::Instant::now();

@@ -291,14 +291,14 @@ fn odd_tensor_names_are_refused() {
 
 #[test]
 fn files_of_other_kinds_get_a_hint_how_to_export() {
-    file_fault(b"PK\x03\x04 and so on and on", &["zip archive", "save_file"]);
+    file_fault(b"PK\x03\x04 and so on and on", &["zip archive", "policyc new"]);
     file_fault(b"\x80\x04\x95 and so on", &["pickle", "never opened", "save_file"]);
     file_fault(b"\x89HDF\r\n\x1a\n and so on", &["HDF5"]);
     file_fault(
         b"version https://git-lfs.github.com/spec/v1\noid sha256:0\n",
         &["git-lfs pointer", "git lfs pull"],
     );
-    file_fault(b"\x08\x07\x12\x07pytorch\x1a\x052.0.0:\x80", &["ONNX"]);
+    file_fault(b"\x08\x07\x12\x07pytorch\x1a\x052.0.0:\x80", &["ONNX", "policyc new"]);
 }
 
 #[test]

@@ -72,7 +72,7 @@ impl Command {
 
 #[derive(Debug, Args)]
 pub struct New {
-    /// What the trainer saved: safetensors, a torch file (.pt, .pth), or a model of stable-baselines3 (.zip)
+    /// What the trainer saved: safetensors, a torch file (.pt, .pth), a model of stable-baselines3 (.zip), or ONNX
     pub weights: PathBuf,
     /// File to write; must not exist yet. It names the weights as seen from its folder; those that had to be joined or folded
     /// are written beside it

@@ -20,7 +20,7 @@ mod refused;
 pub(crate) use refused::continuous as refused_continuous;
 
 use policy::NamedTensor;
-use policy::limits::{MAX_ACTIONS, MIN_ACTIONS};
+use policy::limits::{MAX_ACTIONS, MAX_FEATURES, MAX_LAYERS, MAX_WIDTH, MIN_ACTIONS};
 use toml_input::Message;
 
 use crate::network::{Layer, Network};
@@ -76,11 +76,32 @@ pub(crate) fn recognise(tensors: &[NamedTensor], known: &Known) -> Result<Recogn
         return Ok(Recognised::Undecided);
     };
     heads::quantiles(&mut network, known)?;
+    fits(&network, known.actions)?;
+    Ok(Recognised::Network(network))
+}
+
+/// Whether a contract can hold the network; `said` is the number of actions, if somebody said it.
+pub(crate) fn fits(network: &Network, said: Option<usize>) -> Result<(), Refusal> {
     let actions = network.layers.last().map_or(0, |layer| layer.outputs);
     if !(MIN_ACTIONS..=MAX_ACTIONS).contains(&actions) {
         return Err(refused::too_many_actions(actions).into());
     }
-    if let Some(said) = known.actions.filter(|said| *said != actions) {
+    let inputs = network.layers.first().map_or(0, |layer| layer.inputs);
+    if inputs > MAX_FEATURES {
+        return Err(
+            Message::new("the network takes more inputs than a contract has features")
+                .found(format!("{inputs} inputs"))
+                .expected(format!("at most {MAX_FEATURES}"))
+                .into(),
+        );
+    }
+    if let Some(layer) = network.layers.iter().find(|layer| layer.outputs > MAX_WIDTH) {
+        let message = Message::new("the layer is too wide")
+            .found(format!("{} outputs", layer.outputs))
+            .expected(format!("at most {MAX_WIDTH}"));
+        return Err(Refusal::of(&layer.name, message));
+    }
+    if let Some(said) = said.filter(|said| *said != actions) {
         return Err(
             Message::new("the network has another number of outputs than there are actions")
                 .found(format!("{actions} outputs"))
@@ -88,7 +109,13 @@ pub(crate) fn recognise(tensors: &[NamedTensor], known: &Known) -> Result<Recogn
                 .into(),
         );
     }
-    Ok(Recognised::Network(network))
+    if network.layers.len() > MAX_LAYERS {
+        return Err(Message::new("the network has too many layers")
+            .found(network.layers.len().to_string())
+            .expected(format!("at most {MAX_LAYERS}"))
+            .into());
+    }
+    Ok(())
 }
 
 /// What to say of tensors in which no rule finds one chain.

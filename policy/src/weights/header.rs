@@ -126,7 +126,7 @@ fn foreign(bytes: &[u8]) -> Option<toml_input::Message> {
     if begins(b"PK\x03\x04") {
         return Some(catalogue::other_format(
             "a zip archive, as torch.save and stable-baselines3 write",
-            EXPORT,
+            "`policyc new <this file>` reads it, and writes weights.safetensors beside the contract",
         ));
     }
     // the opcode PROTO and its version; pickles of protocols 0 and 1 have no such mark
@@ -147,7 +147,7 @@ fn foreign(bytes: &[u8]) -> Option<toml_input::Message> {
     }
     // a protobuf whose field 1 is a number (ir_version), and soon field 2, a text (0x12)
     if begins(b"\x08") && bytes.iter().take(64).any(|&b| b == b':' || b == 0x12) && !plausible_length(bytes) {
-        let hint = "convert an ONNX model's initialisers to safetensors: numpy_helper.to_array, then save_file";
+        let hint = "`policyc new <this file>` reads it, and writes weights.safetensors beside the contract";
         return Some(catalogue::other_format("what looks like an ONNX model", hint));
     }
     None

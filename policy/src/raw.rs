@@ -1,5 +1,7 @@
 //! The files of a policy as they are, every value with its place.
 
+use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
 use toml_input::{Document, Fault, FileName, Message, Origin, Sink, Source, Value};
@@ -16,8 +18,8 @@ pub struct ReadOptions {
     /// Folder that every file must lie in, by its path alone (links are not followed); a relative path of the
     /// contract is then taken from here, and messages name files relative to it.
     pub root: Option<PathBuf>,
-    /// Files that a program carries inside: name and content. A file named here is not looked for on disk.
-    pub embedded: &'static [(&'static str, &'static [u8])],
+    /// Files that a program carries inside or holds in memory: name and content. A file named here is not looked for on disk.
+    pub embedded: BTreeMap<PathBuf, Cow<'static, [u8]>>,
     /// Files that the contract names must lie in its own folder, by the path alone. A contract from elsewhere could name any
     /// file of this machine, and a message about it would show a line of it.
     pub own_folder: bool,
@@ -26,18 +28,22 @@ pub struct ReadOptions {
 }
 
 impl ReadOptions {
-    /// Options for a policy that a program carries inside.
-    #[must_use]
-    pub fn embedded(files: &'static [(&'static str, &'static [u8])]) -> Self {
+    /// Options for a policy that a program carries inside or holds in memory.
+    pub fn embedded<P, B>(files: impl IntoIterator<Item = (P, B)>) -> Self
+    where
+        P: Into<PathBuf>,
+        B: Into<Cow<'static, [u8]>>,
+    {
+        let files = files.into_iter().map(|(name, bytes)| (name.into(), bytes.into()));
         ReadOptions {
-            embedded: files,
+            embedded: files.collect(),
             ..ReadOptions::default()
         }
     }
 
     fn content(&self, name: &FileName, limit: u64) -> Result<Vec<u8>, Message> {
-        let inside = self.embedded.iter().find(|(known, _)| name.path == Path::new(known));
-        inside.map_or_else(|| name.read(limit), |(_, bytes)| Ok(bytes.to_vec()))
+        let inside = self.embedded.get(&name.path);
+        inside.map_or_else(|| name.read(limit), |bytes| Ok(bytes.to_vec()))
     }
 
     /// Options with [`ReadOptions::root`] set.

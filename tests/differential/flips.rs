@@ -5,6 +5,8 @@
 //!                                                                     └► C, Rust     ─► the same words
 //! ```
 
+mod campaign;
+
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
@@ -371,7 +373,9 @@ fn interpreter_c_and_rust_agree_to_the_bit_after_each_flip() {
         (Output::Rust, &["rustc", "--edition=2021", "-O"]),
         (Output::Rust, &["rustc", "--edition=2021"]),
     ];
-    let policies = [example(), constructs(), constructs().with_format(NumericFormat::I16)];
+    let integers = [NumericFormat::I16, NumericFormat::I8].map(|format| constructs().with_format(format));
+    let [i16, i8] = integers;
+    let policies = [example(), constructs(), i16, i8];
     for policy in policies {
         let flips = flips(&policy);
         let answers: Vec<Vec<u32>> = flips.iter().flat_map(|flip| answered(&policy, flip)).collect();

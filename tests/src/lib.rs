@@ -1,7 +1,8 @@
-//! Shared by the tests: places, policies drawn at random, tool runs.
+//! Shared by the tests: places, policies drawn at random and long runs over them, tool runs.
 
 pub mod fixture;
 pub mod random;
+pub mod shards;
 pub mod tools;
 
 use std::path::{Path, PathBuf};

@@ -1,13 +1,12 @@
-//! Policies drawn at random from a seed: every kind of signal, feature, filter, activation, action, mapping and limit,
+//! Policies drawn at random from a seed, for tests and fuzz targets: every kind of signal, feature, filter, activation, action, mapping and limit,
 //! with ties, zeros of both signs and subnormal weights.
 
 use std::fmt::Write;
-use std::path::Path;
 
 use policy::Activation;
 use random::{Random, SplitMix};
-use safetensors::Dtype;
 use safetensors::tensor::TensorView;
+use safetensors::{Dtype, SafeTensorError};
 
 /// A policy folder.
 pub struct Folder {
@@ -25,20 +24,47 @@ impl Folder {
     }
 }
 
+/// The files of a policy folder.
+pub struct Files {
+    /// `policy.toml`
+    pub contract: String,
+    /// `weights.safetensors`
+    pub weights: Vec<u8>,
+    /// `drm.toml`, whether the contract names it or not
+    pub mapping: String,
+}
+
 /// Writes the policy of that seed into a temporary folder.
 ///
 /// # Errors
 /// If the folder cannot be written.
 pub fn policy(seed: u64) -> std::io::Result<Folder> {
     let folder = tempfile::tempdir()?;
+    let files = files(seed).map_err(std::io::Error::other)?;
+    let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes);
+    write("policy.toml", files.contract.as_bytes())?;
+    write("weights.safetensors", &files.weights)?;
+    write("drm.toml", files.mapping.as_bytes())?;
+    let contract = files.contract;
+    Ok(Folder { folder, contract })
+}
+
+/// The policy of that seed, in memory.
+///
+/// # Errors
+/// If its tensors make no file: a fault of this module.
+pub fn files(seed: u64) -> Result<Files, SafeTensorError> {
     let mut rng = SplitMix::new(seed);
     let features = 1 + rng.below(9);
     let actions = 2 + rng.below(32);
     let hidden: Vec<usize> = (0..1 + rng.below(4)).map(|_| 1 + rng.below(40)).collect();
     let contract = contract(&mut rng, seed, features, actions, hidden.len());
-    weights(&mut rng, folder.path(), features, &hidden, actions)?;
-    std::fs::write(folder.path().join("policy.toml"), &contract)?;
-    Ok(Folder { folder, contract })
+    let (weights, mapping) = weights(&mut rng, features, &hidden, actions)?;
+    Ok(Files {
+        contract,
+        weights,
+        mapping,
+    })
 }
 
 fn contract(rng: &mut SplitMix, seed: u64, features: usize, actions: usize, hidden: usize) -> String {
@@ -180,11 +206,10 @@ fn protection(text: &mut String, rng: &mut SplitMix, signals: usize) {
 /// Weights and, used or not, a mapping.
 fn weights(
     rng: &mut SplitMix,
-    folder: &Path,
     features: usize,
     hidden: &[usize],
     actions: usize,
-) -> std::io::Result<()> {
+) -> Result<(Vec<u8>, String), SafeTensorError> {
     let widths: Vec<usize> = std::iter::once(features)
         .chain(hidden.iter().copied())
         .chain([actions])
@@ -210,10 +235,7 @@ fn weights(
         .iter()
         .map(|(name, shape, data)| TensorView::new(Dtype::F32, shape.clone(), data).map(|view| (name.clone(), view)))
         .collect();
-    let file = views
-        .and_then(|views| safetensors::serialize(views, None))
-        .map_err(std::io::Error::other)?;
-    std::fs::write(folder.join("weights.safetensors"), file)?;
+    let file = safetensors::serialize(views?, None)?;
     let product = if rng.one_in(2) {
         format!("r = {:?}\n", rng.uniform(-1e-3, 1e-3))
     } else {
@@ -224,8 +246,9 @@ fn weights(
         rng.uniform(-0.003, 0.003),
         rng.uniform(-0.05, 0.05),
     );
-    let text = format!("a = {a:?}\nb = {b:?}\nc = {c:?}\n{product}[valid]\ni_out = [0.0, 20.0]\nd_sim = [0.2, 0.8]\n");
-    std::fs::write(folder.join("drm.toml"), text)
+    let mapping =
+        format!("a = {a:?}\nb = {b:?}\nc = {c:?}\n{product}[valid]\ni_out = [0.0, 20.0]\nd_sim = [0.2, 0.8]\n");
+    Ok((file, mapping))
 }
 
 fn weight(rng: &mut SplitMix, spread: f64) -> f32 {

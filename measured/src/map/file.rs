@@ -26,7 +26,19 @@ impl ColumnMap {
     /// # Errors
     /// A file that cannot be read, unknown keys, wrong types, a quantity that is mapped twice.
     pub fn open(path: &Path) -> Result<Self, Faults> {
-        Document::open(path)?.read(|root, faults| {
+        Self::of_document(&Document::open(path)?)
+    }
+
+    /// [`ColumnMap::open`] of a text; `file` only names it in messages.
+    ///
+    /// # Errors
+    /// As [`ColumnMap::open`], apart from the file.
+    pub fn from_text(file: &Path, text: &str) -> Result<Self, Faults> {
+        Self::of_document(&Document::from_text(file, text)?)
+    }
+
+    fn of_document(document: &Document) -> Result<Self, Faults> {
+        document.read(|root, faults| {
             let mut map = ColumnMap::default();
             map.read_keys(root, faults);
             map.read_records(root, faults);

@@ -32,6 +32,9 @@ const CONSTRUCTS: &[(&str, &[u8])] = &[
 /// Control steps of the policy in a kit unless the user asks for another number.
 // a step takes 4 (6 + signals) bytes of constant memory (docs/integrations/kit.md): 18 kB with three signals
 pub const DEFAULT_STEPS: u32 = 500;
+/// More control steps than a kit may have.
+// 7 MB of constant memory: more than a board has, and a file that compilers still take
+pub const MOST_STEPS: u32 = 200_000;
 /// Control steps of each controller of the construct suite.
 // a convention, as the seed: with it the moves reach all that a test below asks for
 const SUITE_STEPS: u32 = 300;
@@ -86,7 +89,7 @@ pub fn material(policy: &Policy, target: &TargetSpec, steps: u32) -> Result<Mate
 /// # Errors
 /// If it does not pass the check: a fault of this program.
 pub fn constructs() -> Result<Policy, VerifyError> {
-    let options = ReadOptions::embedded(CONSTRUCTS);
+    let options = ReadOptions::embedded(CONSTRUCTS.iter().copied());
     let raw = policy::read("policy.toml".as_ref(), &options);
     raw.and_then(policy::check)
         .map_err(|faults| VerifyError::Constructs(faults.to_string()))

@@ -11,6 +11,7 @@ use crate::fit::State;
 use crate::gain::{self, Pair};
 use crate::instants;
 use crate::noise::{self, Outlier};
+use crate::preflight;
 use crate::problem::Problem;
 use crate::profile::{Profile, profiles};
 use crate::progress::{Listener, Progress};
@@ -49,6 +50,9 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     let base = Model::new(model);
     say(Progress::Stage("noise and initial states"));
     let (problem, null, outliers) = prepared(train, &base);
+    let mut odd = preflight::readings(&problem, &null);
+    odd.extend(spikes(&problem, &outliers));
+    odd.extend(preflight::sources(&problem.records, heldout, &base));
     let (mut problem, mut attribution) = attribute(problem, null, say);
     instants::note(&mut problem, &attribution.state().starts);
     // what is too small for a cause still leaves no structure
@@ -110,7 +114,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         not_detectable: hidden(&problem, &attribution),
         next_experiments,
         noise: Noise {
-            repairs: notes(&problem, &attribution, pair.as_ref(), &nothing),
+            repairs: [odd, notes(&problem, &attribution, pair.as_ref(), &nothing)].concat(),
             ..noise_of(&problem, &attribution, &outliers, trim)
         },
         gain: Gain {
@@ -287,6 +291,26 @@ fn by_text<'a>(records: impl Iterator<Item = &'a Record>) -> Vec<String> {
     }
     let said = |(text, names): (&str, Vec<&str>)| format!("{}: {text}", names.join(", "));
     list.into_iter().map(said).collect()
+}
+
+/// Spikes that are listed by their places; more are counted.
+const LISTED: usize = 3;
+
+/// What is said of outliers.
+fn spikes(problem: &Problem, outliers: &[Outlier]) -> Option<String> {
+    let place = |one: &Outlier| {
+        let record = &problem.records[one.record];
+        format!(
+            "{} of {} at t = {:.6} s",
+            CHANNEL_NAMES[one.channel], record.name, record.time[one.row]
+        )
+    };
+    let listed: Vec<String> = outliers.iter().take(LISTED).map(place).collect();
+    let more = match outliers.len().saturating_sub(LISTED) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    (!outliers.is_empty()).then(|| format!("spikes of single rows are left out: {}{more}", listed.join(", ")))
 }
 
 /// What was repaired, assumed or noticed.

@@ -37,6 +37,7 @@ pub mod next;
 pub mod noise;
 pub mod page;
 mod parallel;
+pub mod preflight;
 pub mod problem;
 pub mod profile;
 pub mod progress;

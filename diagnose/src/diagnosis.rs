@@ -13,13 +13,14 @@ use crate::instants;
 use crate::noise::{self, Outlier};
 use crate::preflight;
 use crate::problem::Problem;
-use crate::profile::{Profile, profiles};
+use crate::profile::{Profile, parabolas, profiles};
 use crate::progress::{Listener, Progress};
 use crate::quantised;
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
 use crate::sampling;
-use crate::shape::structures;
+use crate::shape::{Structure, structures};
 use crate::words::{nearest, sentence, shifted};
+use crate::worth::{self, Worth};
 
 /// Everything a report shows.
 #[derive(Debug)]
@@ -50,24 +51,12 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     let base = Model::new(model);
     say(Progress::Stage("noise and initial states"));
     let (problem, null, outliers) = prepared(train, &base);
-    let mut odd = preflight::readings(&problem, &null);
-    odd.extend(spikes(&problem, &outliers));
-    odd.extend(preflight::sources(&problem.records, heldout, &base));
+    let mut odd = noticed(&problem, &null, &outliers, heldout);
     let (mut problem, mut attribution) = attribute(problem, null, say);
     instants::note(&mut problem, &attribution.state().starts);
     // what is too small for a cause still leaves no structure
     let structure = structures(&problem, &attribution.null, attribution.state(), attribution.inflation);
-    let mut profiles = if structure.is_empty() {
-        let others = crate::ties::other_pairs(&problem, &attribution, say);
-        // they stand in the place of all causes together: said once, at the first
-        for rivals in attribution.rivals.iter_mut().take(1) {
-            rivals.extend(others.iter().cloned());
-        }
-        profiles(&problem, &attribution, say)
-    } else {
-        // a value that explains nothing is worth no profile
-        crate::profile::parabolas(&problem, &attribution)
-    };
+    let mut profiles = held_by_data(&problem, &mut attribution, &structure, say);
     // behind the profiles: whether a cause is nothing is read off its intervals
     let nothing = attribution.leave_out_nothing(&problem, &mut profiles);
     let named = named(&attribution, &profiles);
@@ -100,6 +89,13 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     }
     // a model that does not explain the training records says nothing about a change between them and the others
     let shifts = (pair.as_ref().filter(|_| explained)).map_or_else(Vec::new, |pair| pair.shifts(&problem, state));
+    let partial_gain = match explained || named.is_empty() {
+        true => Vec::new(),
+        false => partial_gain(&problem, &attribution, heldout, &base),
+    };
+    if !explained {
+        odd.extend(other_carrier(&problem, &attribution));
+    }
     let near = match explained {
         true => String::new(),
         false => nearest(&named, attribution.removed(&problem)),
@@ -109,6 +105,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         verdict,
         partial: if explained { Vec::new() } else { named },
         causes,
+        partial_gain,
         structure,
         doubts: doubts::said(&doubts),
         not_detectable: hidden(&problem, &attribution),
@@ -153,6 +150,53 @@ impl Diagnosis {
             Err(error) => self.findings.gain.closed_loop_missing = Some(error.to_string()),
         }
     }
+}
+
+/// Another carrier that fits better; with the model as given, too, since a cause may have bent to what the carrier does.
+fn other_carrier(problem: &Problem, attribution: &Attribution) -> Option<String> {
+    let states = [attribution.state(), &attribution.null];
+    states
+        .into_iter()
+        .find_map(|state| worth::other_carrier(problem, state))
+}
+
+/// What is seen before any fit.
+fn noticed(problem: &Problem, null: &State, outliers: &[Outlier], heldout: &[Record]) -> Vec<String> {
+    let mut odd = preflight::readings(problem, null);
+    odd.extend(spikes(problem, outliers));
+    odd.extend(preflight::sources(&problem.records, heldout, &problem.base));
+    odd
+}
+
+/// How well the data hold the parameters; other pairs of causes become rivals. What leaves structure explains nothing, and its
+/// values are worth neither.
+fn held_by_data(
+    problem: &Problem,
+    attribution: &mut Attribution,
+    structure: &[Structure],
+    say: Listener<'_>,
+) -> Vec<Profile> {
+    if !structure.is_empty() {
+        return parabolas(problem, attribution);
+    }
+    let others = crate::ties::other_pairs(problem, attribution, say);
+    // they stand in the place of all causes together: said once, at the first
+    for rivals in attribution.rivals.iter_mut().take(1) {
+        rivals.extend(others.iter().cloned());
+    }
+    profiles(problem, attribution, say)
+}
+
+/// What causes that explain only a part would gain, first where no fit has seen it.
+fn partial_gain(problem: &Problem, attribution: &Attribution, heldout: &[Record], base: &Model) -> Vec<Worth> {
+    let partial = attribution.state();
+    let mut list = Vec::new();
+    if !heldout.is_empty() {
+        let trim = partial.starts.trim_or_none();
+        list = worth::of_held(&gain::hold(heldout, base, &partial.model, problem.sigma, trim));
+    }
+    list.extend(worth::of_training(problem, &attribution.null, partial));
+    list
 }
 
 /// The model without the trim of the edges that stands beside every fit.

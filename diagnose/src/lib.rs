@@ -50,3 +50,4 @@ mod small;
 mod spectrum;
 pub mod ties;
 mod words;
+pub mod worth;

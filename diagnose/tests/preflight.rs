@@ -226,3 +226,25 @@ fn a_held_out_record_that_is_a_training_record_is_found() {
     let held = [read("second", &one), read("third", &other)];
     assert_eq!(preflight::repeated(&train, &held), [("second", "first")]);
 }
+
+/// The table is another bench's by nothing but the carrier of the plant file.
+#[test]
+fn a_wrong_carrier_is_named_and_a_part_of_the_error_leaves_a_partial_plant() {
+    let mut random = Noise(25);
+    let mut wrong = model();
+    (wrong.pwm.carrier, wrong.pwm.sampling_phase) = (plant::Carrier::Trailing, 0.5);
+    let [train, held] = [clean(&mut random), clean(&mut random)].map(|table| table.without(&["i_out", "v_in"]));
+    let [train, held] = [("first", train), ("second", held)].map(|(name, table)| table.read(name, &wrong).unwrap());
+    let found = diagnose::diagnosis::diagnose(&wrong, vec![train], &[held], &|_| ());
+    let findings = &found.findings;
+    let notes = findings.noise.repairs.join("\n");
+    println!("{}\n{notes}", findings.sentence);
+    assert_eq!(findings.verdict, diagnose::findings::Verdict::Unexplained);
+    assert!(notes.contains("carrier = \"centre\""), "{notes}");
+    let partial = diagnose::extend::partial_toml(&found).unwrap();
+    assert!(
+        partial.starts_with("# PARTIAL") && partial.contains("(held-out)"),
+        "{partial}"
+    );
+    assert!(findings.partial_gain.iter().any(|worth| worth.heldout));
+}

@@ -11,14 +11,16 @@ use crate::fit::State;
 use crate::gain::{self, Pair};
 use crate::instants;
 use crate::noise::{self, Outlier};
+use crate::preflight;
 use crate::problem::Problem;
-use crate::profile::{Profile, profiles};
+use crate::profile::{Profile, parabolas, profiles};
 use crate::progress::{Listener, Progress};
 use crate::quantised;
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
 use crate::sampling;
-use crate::shape::structures;
+use crate::shape::{Structure, structures};
 use crate::words::{nearest, sentence, shifted};
+use crate::worth::{self, Worth};
 
 /// Everything a report shows.
 #[derive(Debug)]
@@ -49,21 +51,12 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     let base = Model::new(model);
     say(Progress::Stage("noise and initial states"));
     let (problem, null, outliers) = prepared(train, &base);
+    let mut odd = noticed(&problem, &null, &outliers, heldout);
     let (mut problem, mut attribution) = attribute(problem, null, say);
     instants::note(&mut problem, &attribution.state().starts);
     // what is too small for a cause still leaves no structure
     let structure = structures(&problem, &attribution.null, attribution.state(), attribution.inflation);
-    let mut profiles = if structure.is_empty() {
-        let others = crate::ties::other_pairs(&problem, &attribution, say);
-        // they stand in the place of all causes together: said once, at the first
-        for rivals in attribution.rivals.iter_mut().take(1) {
-            rivals.extend(others.iter().cloned());
-        }
-        profiles(&problem, &attribution, say)
-    } else {
-        // a value that explains nothing is worth no profile
-        crate::profile::parabolas(&problem, &attribution)
-    };
+    let mut profiles = held_by_data(&problem, &mut attribution, &structure, say);
     // behind the profiles: whether a cause is nothing is read off its intervals
     let nothing = attribution.leave_out_nothing(&problem, &mut profiles);
     let named = named(&attribution, &profiles);
@@ -96,6 +89,13 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     }
     // a model that does not explain the training records says nothing about a change between them and the others
     let shifts = (pair.as_ref().filter(|_| explained)).map_or_else(Vec::new, |pair| pair.shifts(&problem, state));
+    let partial_gain = match explained || named.is_empty() {
+        true => Vec::new(),
+        false => partial_gain(&problem, &attribution, heldout, &base),
+    };
+    if !explained {
+        odd.extend(other_carrier(&problem, &attribution));
+    }
     let near = match explained {
         true => String::new(),
         false => nearest(&named, attribution.removed(&problem)),
@@ -105,12 +105,13 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         verdict,
         partial: if explained { Vec::new() } else { named },
         causes,
+        partial_gain,
         structure,
         doubts: doubts::said(&doubts),
         not_detectable: hidden(&problem, &attribution),
         next_experiments,
         noise: Noise {
-            repairs: notes(&problem, &attribution, pair.as_ref(), &nothing),
+            repairs: [odd, notes(&problem, &attribution, pair.as_ref(), &nothing)].concat(),
             ..noise_of(&problem, &attribution, &outliers, trim)
         },
         gain: Gain {
@@ -149,6 +150,53 @@ impl Diagnosis {
             Err(error) => self.findings.gain.closed_loop_missing = Some(error.to_string()),
         }
     }
+}
+
+/// Another carrier that fits better; with the model as given, too, since a cause may have bent to what the carrier does.
+fn other_carrier(problem: &Problem, attribution: &Attribution) -> Option<String> {
+    let states = [attribution.state(), &attribution.null];
+    states
+        .into_iter()
+        .find_map(|state| worth::other_carrier(problem, state))
+}
+
+/// What is seen before any fit.
+fn noticed(problem: &Problem, null: &State, outliers: &[Outlier], heldout: &[Record]) -> Vec<String> {
+    let mut odd = preflight::readings(problem, null);
+    odd.extend(spikes(problem, outliers));
+    odd.extend(preflight::sources(&problem.records, heldout, &problem.base));
+    odd
+}
+
+/// How well the data hold the parameters; other pairs of causes become rivals. What leaves structure explains nothing, and its
+/// values are worth neither.
+fn held_by_data(
+    problem: &Problem,
+    attribution: &mut Attribution,
+    structure: &[Structure],
+    say: Listener<'_>,
+) -> Vec<Profile> {
+    if !structure.is_empty() {
+        return parabolas(problem, attribution);
+    }
+    let others = crate::ties::other_pairs(problem, attribution, say);
+    // they stand in the place of all causes together: said once, at the first
+    for rivals in attribution.rivals.iter_mut().take(1) {
+        rivals.extend(others.iter().cloned());
+    }
+    profiles(problem, attribution, say)
+}
+
+/// What causes that explain only a part would gain, first where no fit has seen it.
+fn partial_gain(problem: &Problem, attribution: &Attribution, heldout: &[Record], base: &Model) -> Vec<Worth> {
+    let partial = attribution.state();
+    let mut list = Vec::new();
+    if !heldout.is_empty() {
+        let trim = partial.starts.trim_or_none();
+        list = worth::of_held(&gain::hold(heldout, base, &partial.model, problem.sigma, trim));
+    }
+    list.extend(worth::of_training(problem, &attribution.null, partial));
+    list
 }
 
 /// The model without the trim of the edges that stands beside every fit.
@@ -287,6 +335,26 @@ fn by_text<'a>(records: impl Iterator<Item = &'a Record>) -> Vec<String> {
     }
     let said = |(text, names): (&str, Vec<&str>)| format!("{}: {text}", names.join(", "));
     list.into_iter().map(said).collect()
+}
+
+/// Spikes that are listed by their places; more are counted.
+const LISTED: usize = 3;
+
+/// What is said of outliers.
+fn spikes(problem: &Problem, outliers: &[Outlier]) -> Option<String> {
+    let place = |one: &Outlier| {
+        let record = &problem.records[one.record];
+        format!(
+            "{} of {} at t = {:.6} s",
+            CHANNEL_NAMES[one.channel], record.name, record.time[one.row]
+        )
+    };
+    let listed: Vec<String> = outliers.iter().take(LISTED).map(place).collect();
+    let more = match outliers.len().saturating_sub(LISTED) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    (!outliers.is_empty()).then(|| format!("spikes of single rows are left out: {}{more}", listed.join(", ")))
 }
 
 /// What was repaired, assumed or noticed.

@@ -7,6 +7,7 @@ use plant::Parameters;
 
 use crate::diagnosis::Diagnosis;
 use crate::drive::Model;
+use crate::findings::Verdict;
 
 /// A trim of the edges that moves the duty by less than this share of a period is none.
 // a microvolt in a volt of the source: no sensor shows it, and the fit leaves such remains. In the file it would read as a finding
@@ -53,8 +54,38 @@ pub fn extended_plant(diagnosis: &Diagnosis) -> Parameters {
 #[must_use]
 pub fn extended_toml(diagnosis: &Diagnosis) -> String {
     let findings = &diagnosis.findings;
-    let trim = told(diagnosis.trim);
-    let after = extended_plant(diagnosis);
+    let mut text = format!(
+        "# The model with what was found. {}\n",
+        findings.sentence.replace('\n', " ")
+    );
+    for cause in findings.causes.iter().filter(|cause| !cause.rivals.is_empty()) {
+        let rivals: Vec<String> = cause.rivals.iter().map(|ids| ids.join(" + ")).collect();
+        let _ = writeln!(text, "# {} stands for a tie with {}.", cause.id, rivals.join(", "));
+    }
+    written(diagnosis, text, &extended_plant(diagnosis), told(diagnosis.trim))
+}
+
+/// Text of `plant.partial.toml`: the model with causes that explain only a part; nothing with another verdict, or without such a part.
+#[must_use]
+pub fn partial_toml(diagnosis: &Diagnosis) -> Option<String> {
+    let findings = &diagnosis.findings;
+    if findings.verdict != Verdict::Unexplained || findings.partial.is_empty() {
+        return None;
+    }
+    let state = diagnosis.attribution.state();
+    let trim = told(state.starts.trim_or_none());
+    let mut text = String::from(
+        "# PARTIAL: these causes do not explain the records. Their values imitate something else, and are no measurement.\n\
+         # To look at, not to train on; the model as it was given is in plant.extended.toml.\n",
+    );
+    for worth in &findings.partial_gain {
+        let _ = writeln!(text, "# {}", worth.words());
+    }
+    Some(written(diagnosis, text, &as_plant(&state.model, trim), trim))
+}
+
+/// A plant file below the comment `text`.
+fn written(diagnosis: &Diagnosis, mut text: String, after: &Parameters, trim: f64) -> String {
     let before = &diagnosis.problem.base.plant;
     let mut notes: BTreeMap<&str, String> = BTreeMap::new();
     let best = diagnosis
@@ -75,14 +106,6 @@ pub fn extended_toml(diagnosis: &Diagnosis) -> String {
             }
         }
     }
-    let mut text = format!(
-        "# The model with what was found. {}\n",
-        findings.sentence.replace('\n', " ")
-    );
-    for cause in findings.causes.iter().filter(|cause| !cause.rivals.is_empty()) {
-        let rivals: Vec<String> = cause.rivals.iter().map(|ids| ids.join(" + ")).collect();
-        let _ = writeln!(text, "# {} stands for a tie with {}.", cause.id, rivals.join(", "));
-    }
     if trim != 0.0 {
         let _ = writeln!(
             text,
@@ -92,7 +115,7 @@ pub fn extended_toml(diagnosis: &Diagnosis) -> String {
     }
     let mut tables: BTreeMap<&str, String> = BTreeMap::new();
     for parameter in plant::parameters() {
-        let (was, is) = (parameter.get(before), parameter.get(&after));
+        let (was, is) = (parameter.get(before), parameter.get(after));
         let needed = plant::REQUIRED.contains(&parameter.key);
         // a number that came back to neutral is written all the same: a reader looks for what has changed
         if is == parameter.neutral && !needed && was == is {

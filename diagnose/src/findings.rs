@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::gain::{Held, Shift};
 use crate::shape::Structure;
+use crate::worth::Worth;
 
 /// The answer in a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -130,6 +131,8 @@ pub struct Findings {
     pub causes: Vec<Named>,
     /// What explains part of it where the verdict is `unexplained`.
     pub partial: Vec<Named>,
+    /// What that part would gain.
+    pub partial_gain: Vec<Worth>,
     /// Structure that is left.
     pub structure: Vec<Structure>,
     /// Why causes are no explanation although they leave no structure, in words.

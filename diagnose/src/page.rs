@@ -89,6 +89,10 @@ fn causes(diagnosis: &Diagnosis) -> Section {
     if !findings.partial.is_empty() {
         section = section.text("The best of the known causes leave structure and are not named as causes:");
         section = section.table(table("Partial explanation", &findings.partial));
+        section = section.text("What it would gain, root mean square; none of it is an explanation:");
+        for worth in &findings.partial_gain {
+            section = section.text(worth.words());
+        }
     }
     for one in &findings.structure {
         section = section.text(format!("{} of {}: {}", one.channel, one.record, one.shape));

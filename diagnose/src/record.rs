@@ -2,6 +2,7 @@
 
 mod align;
 mod channels;
+mod clipped;
 mod digits;
 mod levels;
 mod logged;
@@ -124,6 +125,7 @@ impl Record {
         let labels = QUANTITIES.map(|name| raw.label(name));
         record.report_holes(&labels);
         record.leave_out_stuck(&labels);
+        record.leave_out_clipped(&labels);
         if record.measured.iter().flatten().all(|value| value.is_nan()) {
             let message = Message::new("nothing is measured in this record")
                 .expected("a column v_out, i_l, i_out or v_in that is not constant");
@@ -171,6 +173,22 @@ impl Record {
                 self.repairs
                     .push(format!("{empty} of {all} rows without {name}: not used"));
             }
+        }
+    }
+
+    /// What lies at the end of an instrument's range was larger.
+    fn leave_out_clipped(&mut self, labels: &[String; CHANNELS]) {
+        for (n, values) in self.measured.iter_mut().enumerate().filter(|_| !self.settled) {
+            let step = self.lattice[n].max(self.resolution[n]);
+            let Some((end, count)) = clipped::at(values, step) else {
+                continue;
+            };
+            let name = &labels[n];
+            self.repairs.push(format!(
+                "{count} rows of {name} lie at {end}, as if cut off at the end of a range: left out. Was the range of the \
+                 instrument too small?"
+            ));
+            values.iter_mut().filter(|v| **v == end).for_each(|v| *v = f64::NAN);
         }
     }
 

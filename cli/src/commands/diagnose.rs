@@ -7,9 +7,10 @@ use std::time::Instant;
 
 use ::diagnose::control::Request;
 use ::diagnose::diagnosis::diagnose;
-use ::diagnose::extend::extended_toml;
+use ::diagnose::extend::{extended_toml, partial_toml};
 use ::diagnose::findings::Findings;
 use ::diagnose::page::page;
+use ::diagnose::preflight;
 use ::diagnose::progress::Progress;
 use ::diagnose::record::Record;
 use closed_loop::Scenario;
@@ -17,7 +18,7 @@ use closed_loop::scenario::Task;
 use drm::formula::Losses;
 use measured::ColumnMap;
 use plant::{Faults, Parameters};
-use toml_input::Sink;
+use toml_input::{Fault, Message, Sink};
 
 use super::progress_line::ProgressLine;
 use super::simulate;
@@ -61,6 +62,9 @@ pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
         ("plant.extended.toml".to_owned(), extended_toml(&diagnosis)),
         ("report.html".to_owned(), page(&diagnosis)?),
     ]);
+    if let Some(partial) = partial_toml(&diagnosis) {
+        files.insert("plant.partial.toml".to_owned(), partial);
+    }
     if let Some(control) = &diagnosis.control {
         files.insert("drm.toml".to_owned(), control.mapping.clone());
     }
@@ -78,6 +82,9 @@ fn answer(options: &Diagnose, columns: &ColumnMap, findings: &Findings) -> Resul
         lines.push(format!(
             "note: no record is called `{name}`: its section of the column map is not used"
         ));
+    }
+    for worth in &findings.partial_gain {
+        lines.push(format!("partial: {}", worth.words()));
     }
     lines.extend(findings.noise.repairs.iter().map(|repair| format!("note: {repair}")));
     if let Some(reason) = &findings.gain.closed_loop_missing {
@@ -173,5 +180,16 @@ fn records(options: &Diagnose, columns: &ColumnMap, model: &Parameters) -> Resul
     };
     let (train, heldout) = (read(&options.train), read(&options.heldout));
     faults.propagate()?;
+    let again = preflight::repeated(&train, &heldout);
+    let message = |(held, train): (&str, &str)| {
+        Message::new(format!(
+            "the held-out record `{held}` is the training record `{train}` again"
+        ))
+        .expected("a record that no fit has seen")
+        .hint("it would judge a fit by what was fitted: leave it out, or cut the record in two")
+    };
+    let file = options.heldout.first().map_or(Path::new(""), PathBuf::as_path);
+    let again = again.into_iter().map(|pair| Fault::in_file(file, message(pair)));
+    again.collect::<Sink>().propagate()?;
     Ok((train, heldout))
 }

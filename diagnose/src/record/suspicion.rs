@@ -31,6 +31,8 @@ const AS_PROBE: f64 = 1.1;
 const AS_OTHER: f64 = 0.05;
 /// ... and this far from what d makes. Losses, a tenth of the source at most, lie between.
 const NOT_AS_OWN: f64 = 0.2;
+/// A voltage is that of another kind of converter within this share: losses of a tenth.
+const AS_KIND: f64 = 0.1;
 /// Drawn current over half the ripple from which on a current surely never rests: at rest the voltage is above d v_in, at any factor.
 const CONTINUOUS: f64 = 1.2;
 
@@ -44,6 +46,12 @@ pub fn of(record: &Record, parameters: &Parameters, sources: &[Source; CHANNELS]
     let mut odd = sized(record, parameters, &labels);
     if odd.is_empty() && !duty.stated {
         odd = other_duty(record, parameters, &duty.header);
+    }
+    if odd.is_empty() {
+        odd = other_kind(record, parameters);
+    }
+    if odd.is_empty() {
+        odd = other_load(record, parameters, sources);
     }
     if odd.is_empty() {
         odd = probes(record, parameters, sources);
@@ -123,6 +131,60 @@ fn other_duty(record: &Record, parameters: &Parameters, header: &str) -> Vec<Mes
         .hint(format!(
             "turn it by a map file: duty = {{ name = {header:?}, scale = -1.0, offset = 1.0 }} under [columns]; if it is right: \
              --map duty={header}*1"
+        ));
+    vec![message]
+}
+
+/// Voltages that a boost or a buck-boost gives.
+fn other_kind(record: &Record, parameters: &Parameters) -> Vec<Message> {
+    let v_in = parameters.converter.v_in * record.v_in_ratio;
+    let off = |of: &dyn Fn(f64) -> f64| {
+        let each = record.measured[0].iter().zip(&record.duty);
+        median(each.map(|(v, d)| (v / v_in / of(*d) - 1.0).abs()))
+    };
+    let kinds: [(&str, &dyn Fn(f64) -> f64); 2] = [("boost", &|d| 1.0 / (1.0 - d)), ("buck-boost", &|d| d / (1.0 - d))];
+    // one duty is one number, which a wrong probe makes as well
+    let duties = record
+        .duty
+        .iter()
+        .fold((1.0f64, 0.0f64), |(low, high), d| (low.min(*d), high.max(*d)));
+    if duties.1 - duties.0 < AS_OTHER {
+        return Vec::new();
+    }
+    let fits = kinds.into_iter().find(|(_, of)| off(*of) < AS_KIND);
+    let Some((name, _)) = fits.filter(|_| off(&|d| d) > NOT_AS_OWN) else {
+        return Vec::new();
+    };
+    vec![
+        Message::new(format!("the voltages are those of a {name}, and the model is a buck"))
+            .found(format!(
+                "{} at a duty of {}",
+                shown_in(median(record.measured[0].iter().copied()), "V"),
+                shown(median(record.duty.iter().copied()))
+            ))
+            .expected("about v_in times the duty")
+            .hint("diagnose knows bucks only; is the record of another converter?"),
+    ]
+}
+
+/// A load that draws other currents than its setting, with all meters of one mind.
+fn other_load(record: &Record, parameters: &Parameters, sources: &[Source; CHANNELS]) -> Vec<Message> {
+    let sizes = sizes(record, parameters);
+    let over = |n: usize| Some(typical(&record.measured[n])? / sizes[n]?);
+    let (Some(v), Some(i_l), Some(i_out)) = (over(0), over(1), over(2)) else {
+        return Vec::new();
+    };
+    let agreed = ratio(v, 1.0) < AS_PROBE && ratio(i_l, i_out) < AS_PROBE && ratio(i_out, 1.0) > FAR;
+    if !agreed || sources.iter().any(|source| source.stated) || !is_continuous(record, parameters) {
+        return Vec::new();
+    }
+    let found = typical(&record.measured[2]).unwrap_or(f64::NAN);
+    let message = Message::new("the load that was set is not the load that was drawn")
+        .found(format!("both meters show about {}", shown_in(found, "A")))
+        .expected(format!("about {} at the set load", shown_in(sizes[2].unwrap_or(f64::NAN), "A")))
+        .hint(format!(
+            "correct r_load, i_load or p_load, by a map: --map r_load=COLUMN*{:.3}; or leave them out and let i_out be the load",
+            1.0 / i_out
         ));
     vec![message]
 }
@@ -222,6 +284,10 @@ pub fn typical(values: &[f64]) -> Option<f64> {
 
 fn ratio(a: f64, b: f64) -> f64 {
     (a / b).max(b / a)
+}
+
+fn shown_in(value: f64, unit: &str) -> String {
+    report::quantity(value, unit, 3)
 }
 
 fn shown(value: f64) -> String {

@@ -116,7 +116,9 @@ fn one<T: Flip>(policy: &Policy, twin: &mut Controller<T>, damaged: &State<T>, s
         let (good, bad) = (traces.0.command, traces.1.command);
         let duty = bad.duty.to_f64();
         let is_fallback = bits(bad.duty) == fallback;
-        count.wrong |= u64::from(!is_fallback && !(duty >= limits.low && duty <= limits.high));
+        // a NaN is in no range
+        let is_within = (limits.low..=limits.high).contains(&duty);
+        count.wrong |= u64::from(!is_fallback && !is_within);
         count.changed |= u64::from(bits(good.duty) != bits(bad.duty));
         let is_seen = bad.status & status::STATE != 0;
         if at == 0 {

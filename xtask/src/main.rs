@@ -29,6 +29,8 @@ usage: cargo xtask <command>
   comments                          share of the lines of each crate that say why
   bench [--json|--counts|--peers|--host]
                                     instruction counts and times of the generated network (docs/results/kernels.md)
+  random --out DIR [--policies N] [--shard I/N] ...
+                                    policies drawn at random, every build against the interpreter (docs/evidence.md; --help)
   blind --seed S --out DIR ...      blind cases for the diagnosis and their score (docs/reference/blind-cases.md; --help)
 ";
 
@@ -41,6 +43,7 @@ enum Command {
     Book,
     Words,
     Comments,
+    Random(Vec<String>),
     Blind(Vec<String>),
     Bench(Vec<String>),
     Help,
@@ -71,6 +74,7 @@ fn parse(arguments: &[String]) -> Result<Command, String> {
     };
     let command = match name.as_str() {
         "test" => return parse_test(rest),
+        "random" => return Ok(Command::Random(rest.to_vec())),
         "blind" => return Ok(Command::Blind(rest.to_vec())),
         "bench" => return Ok(Command::Bench(rest.to_vec())),
         "setup" | "install" => Command::Install,
@@ -128,6 +132,7 @@ fn run(command: Command) -> Result<bool, String> {
         )),
         Command::Words => listed(&rules::words(&Workspace::load()?)?),
         Command::Comments => listed(&rules::comments(&Workspace::load()?)?),
+        Command::Random(arguments) => random(&Workspace::load()?, &arguments),
         Command::Blind(arguments) => blind(&Workspace::load()?, &arguments),
         Command::Bench(arguments) => other_crate(&Workspace::load()?, "bench", &arguments),
     }
@@ -152,6 +157,13 @@ fn blind(workspace: &Workspace, arguments: &[String]) -> Result<bool, String> {
         process::run(&mut build, &process::Output::Terminal)?;
     }
     other_crate(workspace, "blind", arguments)
+}
+
+fn random(workspace: &Workspace, arguments: &[String]) -> Result<bool, String> {
+    // no `-p` and no release: the tests have built all of it, with overflow checks in the interpreter
+    let mut command = workspace.cargo(&["run", "--quiet", "--bin", "random-policies", "--"]);
+    let status = command.args(arguments).status();
+    Ok(status.map_err(|error| format!("cargo: {error}"))?.success())
 }
 
 fn other_crate(workspace: &Workspace, name: &str, arguments: &[String]) -> Result<bool, String> {

@@ -165,7 +165,7 @@ fn campaign<T: Flip>(policy: &Policy, runs: usize) -> Vec<(String, Count)> {
 }
 
 #[test]
-fn a_flipped_state_bit_gives_no_wrong_duty_in_any_format_and_a_flipped_coefficient_is_seen() {
+fn a_flipped_state_bit_gives_no_wrong_duty_in_any_format() {
     let mut table = String::from(
         "| format | word | flips | commands changed | wrong duty | seen at once | changed unseen | lasting unseen | steps to heal |\n|---|---|---:|---:|---:|---:|---:|---:|---:|\n",
     );

@@ -50,19 +50,15 @@ impl Reading {
     fn words(self, record: &Record) -> String {
         let name = &record.name;
         match self {
-            Reading::Shifted(by) => format!(
-                "{name}: what was measured looks shifted by {} {} against duty and load, {}: move the columns, or say it with the \
-                 time (t = {{ name = \"t\", offset = {:e} }} under [columns] of a map file, and `phase`)",
-                by.abs(),
-                if by.abs() == 1 { "row" } else { "rows" },
-                if by > 0 { "late" } else { "early" },
-                -by as f64
-                    * record
-                        .time
-                        .windows(2)
-                        .map(|t| t[1] - t[0])
-                        .fold(f64::INFINITY, f64::min)
-            ),
+            Reading::Shifted(by) => {
+                let rows = if by.abs() == 1 { "row" } else { "rows" };
+                let (late, way) = if by > 0 { ("late", "up") } else { ("early", "down") };
+                let by = by.abs();
+                format!(
+                    "{name}: what was measured looks shifted by {by} {rows} against duty and load, {late}: if a trigger or a buffer of the \
+                     logger did it, move the measured columns {by} {rows} {way} in the file"
+                )
+            }
             Reading::Exchanged(a, b) => {
                 let [a, b] = [a, b].map(|n| CHANNEL_NAMES[n]);
                 format!("{name}: the columns {a} and {b} look exchanged; if so: --map {a}={b},{b}={a}")

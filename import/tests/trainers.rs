@@ -91,6 +91,22 @@ fn a_dqn_of_sb3_brings_architecture_bounds_and_golden_answers() {
     assert_eq!(new.contract.matches("# action ").count(), 5);
 }
 
+/// A training with a seed leaves generators of random numbers in the spaces that VecNormalize saves.
+#[test]
+fn the_vecnormalize_of_a_seeded_training_says_the_same() {
+    let contract = |name: &str| {
+        let options = Options {
+            vecnormalize: Some(fixture(name)),
+            ..Options::default()
+        };
+        policy_of("sb3_ppo.zip", &options).1.contract
+    };
+    assert_eq!(
+        contract("sb3_seeded_vecnormalize.pkl"),
+        contract("sb3_ppo_vecnormalize.pkl")
+    );
+}
+
 #[test]
 fn the_vecnormalize_of_a_ppo_becomes_scale_offset_and_clip() {
     let options = Options {

@@ -241,9 +241,9 @@ const FEATURE: &str = "
 [[feature]]
 name = \"TODO\"
 source = \"TODO\"              # affine in signals, parameters, previous_duty, previous_command: v_ref - v_out
-# filters = [{ delay = 1 }]  # first to last; also { integrator = { min = -1.0, max = 1.0 } }, \"backward_difference\",
+# filters = [{ delay = 1 }]  # first to last; also { integrator = { min = -1.0, max = 1.0 } }, { moving_average = 4 },
 #                            # { low_pass = { time_constant = 1e-3 } }, { filtered_derivative = { cutoff = 500.0 } },
-#                            # { moving_average = 4 }
+#                            # \"backward_difference\": (x - the sample before) / sample_period
 ";
 
 const AFFINE: &str = "\

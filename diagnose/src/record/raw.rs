@@ -258,13 +258,17 @@ fn incomplete(sheet: &Sheet, located: &Located) -> Sink {
     }
     if !LOADS.into_iter().any(has) {
         let message = Message::new("nothing says what the load is").found(sheet.listed());
-        let hint = "give r_load, i_load or p_load as a column, or for the whole record: --map r_load=10, or under \
-                    [constants] in the map file";
+        let hint = "give r_load, i_load or p_load as a column if the load was set, i_out if its current was measured; or for the \
+                    whole record: --map r_load=10, or under [constants] in the map file";
         list.push(sheet.header_fault(message.expected("r_load, i_load, p_load or i_out").hint(hint)));
     }
     let map = proposal(&sheet.guesses(located, &Quantity::all(&NAMES)));
     if let (Some(first), Some(map)) = (list.first_mut(), map) {
-        let proposed = format!("these columns look like it, check each: {map}");
+        let metered = match map.contains("i_load=") {
+            true => " (i_load is a load that was set; if a meter showed it, write i_out in its place)",
+            false => "",
+        };
+        let proposed = format!("these columns look like it, check each: {map}{metered}");
         first.hint = Some(match first.hint.take() {
             Some(hint) if has("duty") => format!("{hint}; {proposed}"),
             _ => proposed,

@@ -10,7 +10,7 @@ use super::{Id, Item, Object};
 const MOST_ITEMS: usize = 1_000_000;
 
 /// Functions that build data and do nothing else.
-const BUILDERS: [&str; 33] = [
+const BUILDERS: [&str; 35] = [
     "__builtin__.bytearray",
     "__builtin__.complex",
     "__builtin__.set",
@@ -37,6 +37,8 @@ const BUILDERS: [&str; 33] = [
     "numpy.ndarray",
     "numpy.random._pickle.__bit_generator_ctor",
     "numpy.random._pickle.__generator_ctor",
+    "numpy.random._pickle.__randomstate_ctor",
+    "numpy.random.bit_generator.__pyx_unpickle_SeedSequence",
     "torch.Size",
     "torch._tensor._rebuild_from_type_v2",
     "torch._utils._rebuild_parameter",

@@ -84,7 +84,8 @@ fn nothing_goes_wrong_in_any_construct() {
 
 #[test]
 fn nothing_goes_wrong_in_random_policies() {
-    let count = if tests::full() { 50 } else { 1 };
+    // a minute each where others build
+    let count = if tests::full() { 50 } else { 0 };
     for seed in 4200..4200 + count {
         let folder = tests::random::policy(seed).unwrap();
         let mut policy = policy::load(&folder.path()).unwrap();

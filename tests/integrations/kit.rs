@@ -180,7 +180,7 @@ fn an_edit_where_random_moves_seldom_come_fails() {
         ),
         ("measured->i_out, -1.0f, 40.0f", "measured->i_out, -1.0f, 40.04f"),
         ("buck12_flag(output > best)", "buck12_flag(output >= best)"),
-        ("(4u - state->bad_count)", "(5u - state->bad_count)"),
+        ("(4u - state->bad_count) |", "(5u - state->bad_count) |"),
         ("check->position = span.to;", ""),
         ("? check->position : 0u;", "? check->position : 1u;"),
     ];

@@ -209,7 +209,8 @@ mod tests {
             let ends = slices(bound, gain).expect("few");
             for pair in ends.windows(2) {
                 let next = pair[1] + gain * (most - pair[0]);
-                assert!(next < bound * (1.0 - 1e-7), "{gain} {pair:?} {next}");
+                // the bound is a number of the format, so what is not above it is not rounded above it
+                assert!(next <= bound, "{gain} {pair:?} {next}");
             }
         }
     }

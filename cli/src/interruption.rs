@@ -4,9 +4,9 @@
 //! among it: from then on nothing may be said or written that comes of their failing.
 
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
@@ -28,15 +28,24 @@ const PATIENCE: Duration = Duration::from_secs(10);
 /// # Errors
 /// If signals cannot be handled.
 pub fn watch() -> Result<Option<TempDir>, Failure> {
+    // held while the folder is made: a signal in between waits and then finds it
+    let folder = Arc::new(Mutex::new(None::<PathBuf>));
+    let mut made = lock(&folder);
+    let known = Arc::clone(&folder);
+    ctrlc::set_handler(move || match STOP.get() {
+        Some(stop) if !stop.swap(true, Ordering::Relaxed) => {}
+        _ => end(lock(&known).as_deref()),
+    })?;
     // where there is no folder for temporary files, the command that needs one says so
     let scratch = tempfile::Builder::new().prefix("policyc-").tempdir().ok();
     let scratch = scratch.filter(|folder| tempfile::env::override_temp_dir(folder.path()).is_ok());
-    let folder = scratch.as_ref().map(|folder| folder.path().to_owned());
-    ctrlc::set_handler(move || match STOP.get() {
-        Some(stop) if !stop.swap(true, Ordering::Relaxed) => {}
-        _ => end(folder.as_deref()),
-    })?;
+    *made = scratch.as_ref().map(|folder| folder.path().to_owned());
     Ok(scratch)
+}
+
+/// A path is whole whoever panicked with the lock in hand.
+fn lock(folder: &Mutex<Option<PathBuf>>) -> MutexGuard<'_, Option<PathBuf>> {
+    folder.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// For a command that keeps what it has done: the first signal sets this flag, only the second ends the program.

@@ -8,6 +8,7 @@ mod one_of;
 mod outcome;
 mod output;
 mod ownership;
+mod staging;
 
 use std::process::ExitCode;
 

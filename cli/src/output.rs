@@ -1,42 +1,50 @@
 //! The only writer of files: all or nothing, under a lock, through temporary files in the same folder.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File, OpenOptions};
+use std::fs;
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use toml_input::Message;
 
 use crate::failure::Failure;
 use crate::interruption;
 use crate::ownership::{self, Replacing};
-
-/// Start of the names of temporary files; leftovers of an interrupted run are removed by the next.
-const TEMPORARY: &str = ".policyc-tmp-";
+use crate::staging::{self, Staged};
 
 /// Writes files into a folder: either all of them are there afterwards or none has changed.
 ///
 /// # Errors
 /// If the folder cannot be made or written, or a destination is a folder or a symbolic link.
 pub fn write_all(folder: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<(), Failure> {
+    write_if(folder, files, || Ok(()))
+}
+
+/// [`write_all`] if nothing in the folder speaks against it. `check` runs under the lock: what it sees is what is replaced, and
+/// not what another run has half written.
+fn write_if(
+    folder: &Path,
+    files: &BTreeMap<String, Vec<u8>>,
+    check: impl FnOnce() -> Result<(), Failure>,
+) -> Result<(), Failure> {
     interruption::go_no_further_if_ending();
-    let destinations: Vec<(PathBuf, &[u8])> = files
-        .iter()
-        .map(|(name, content)| (folder.join(name), content.as_slice()))
-        .collect();
-    for (path, _) in &destinations {
-        check_destination(path)?;
+    for name in files.keys() {
+        check_destination(&folder.join(name))?;
     }
     fs::create_dir_all(folder).map_err(|error| cannot("make the folder", folder, &error))?;
-    let _lock = lock(folder);
-    remove_leftovers(folder);
-    let mut staged = Staged { files: Vec::new() };
-    for (index, (path, content)) in destinations.iter().enumerate() {
+    let _lock = staging::lock(folder);
+    check()?;
+    let mut staged = Staged::new(folder);
+    for (name, content) in files {
         staged
-            .stage(folder, index, path, content)
-            .map_err(|error| cannot("write", path, &error))?;
+            .stage(name, content)
+            .map_err(|error| cannot("write", &folder.join(name), &error))?;
     }
-    staged.publish()
+    staged
+        .publish()
+        .map_err(|(path, error)| cannot("replace", &path, &error))?;
+    staging::remove_leftovers(folder);
+    Ok(())
 }
 
 /// [`write_all`] where files of others may stand: they are kept. What does not bear policyc's name goes on record.
@@ -45,11 +53,7 @@ pub fn write_all(folder: &Path, files: &BTreeMap<String, Vec<u8>>) -> Result<(),
 /// If a file of others is in the way ([`ownership::check`]); else as [`write_all`].
 pub fn replace_own(folder: &Path, files: BTreeMap<String, Vec<u8>>, replacing: Replacing) -> Result<(), Failure> {
     let files = ownership::recorded(files)?;
-    for name in files.keys() {
-        check_destination(&folder.join(name))?;
-    }
-    ownership::check(folder, &files, replacing)?;
-    write_all(folder, &files)
+    write_if(folder, &files, || ownership::check(folder, &files, replacing))
 }
 
 /// [`replace_own`] for text.
@@ -75,8 +79,7 @@ pub fn write_results(
     summary: &str,
     page: &str,
 ) -> Result<(), Failure> {
-    check_new_folder(folder)?;
-    write_all(folder, &bytes_of(files))?;
+    write_if(folder, &bytes_of(files), || check_new_folder(folder))?;
     let (count, out) = (files.len(), folder.display());
     say(&format!("{summary}\n{count} files in {out}; to look at: {out}/{page}"))
 }
@@ -89,14 +92,14 @@ pub fn write_new_all(path: &Path, text: &str, beside: &BTreeMap<String, Vec<u8>>
     let (folder, name) = split(path)?;
     let mut files = beside.clone();
     files.insert(name, text.as_bytes().to_vec());
-    for name in files.keys() {
-        let path = path.with_file_name(name);
-        if fs::symlink_metadata(&path).is_ok() {
-            let message = Message::new(format!("{} exists already; nothing written", path.display()));
-            return Err(message.hint("move it away or choose another name with --out").into());
-        }
-    }
-    write_all(folder, &files)
+    write_if(folder, &files, || {
+        let mut paths = files.keys().map(|name| folder.join(name));
+        let Some(path) = paths.find(|path| fs::symlink_metadata(path).is_ok()) else {
+            return Ok(());
+        };
+        let message = Message::new(format!("{} exists already; nothing written", path.display()));
+        Err(message.hint("move it away or choose another name with --out").into())
+    })
 }
 
 /// Writes one file that bears policyc's name; an older one of its own is replaced.
@@ -105,10 +108,8 @@ pub fn write_new_all(path: &Path, text: &str, beside: &BTreeMap<String, Vec<u8>>
 /// If a file of others is in the way, or it cannot be written.
 pub fn replace_own_one(path: &Path, text: &str, replacing: Replacing) -> Result<(), Failure> {
     let (folder, name) = split(path)?;
-    check_destination(path)?;
     let file = BTreeMap::from([(name, text.as_bytes().to_vec())]);
-    ownership::check(folder, &file, replacing)?;
-    write_all(folder, &file)
+    write_if(folder, &file, || ownership::check(folder, &file, replacing))
 }
 
 /// Writes one file; an older one is replaced, so the caller has looked at it.
@@ -145,7 +146,7 @@ pub fn check_new_folder(folder: &Path) -> Result<(), Failure> {
     for entry in entries.flatten() {
         let name = entry.file_name();
         let name = name.to_string_lossy();
-        if !name.starts_with(TEMPORARY) {
+        if !staging::is_leftover(&name) {
             let message = Message::new(format!("{} is not empty; nothing written", folder.display()));
             let message = message.found(name.escape_debug().to_string());
             return Err(message.hint("choose another --out, or move it away").into());
@@ -187,101 +188,6 @@ fn check_destination(path: &Path) -> Result<(), Failure> {
     Err(message
         .hint("policyc replaces plain files only; choose another --out")
         .into())
-}
-
-/// Two runs into one folder take turns. Where folders cannot be locked, the renames alone keep each file whole.
-fn lock(folder: &Path) -> Option<File> {
-    let file = File::open(folder).ok()?;
-    file.lock().ok()?;
-    Some(file)
-}
-
-fn remove_leftovers(folder: &Path) {
-    let Ok(entries) = fs::read_dir(folder) else { return };
-    for entry in entries.flatten() {
-        if entry.file_name().to_string_lossy().starts_with(TEMPORARY) {
-            // a leftover that cannot be removed does no harm
-            let _ = fs::remove_file(entry.path());
-        }
-    }
-}
-
-struct StagedFile {
-    temporary: PathBuf,
-    backup: PathBuf,
-    destination: PathBuf,
-    had_backup: bool,
-    published: bool,
-}
-
-/// Files written under temporary names; dropped without `publish` they vanish.
-struct Staged {
-    files: Vec<StagedFile>,
-}
-
-impl Staged {
-    fn stage(&mut self, folder: &Path, index: usize, destination: &Path, content: &[u8]) -> io::Result<()> {
-        let temporary = folder.join(format!("{TEMPORARY}{}-{index}", std::process::id()));
-        let backup = folder.join(format!("{TEMPORARY}{}-{index}-old", std::process::id()));
-        let mut file = OpenOptions::new().write(true).create_new(true).open(&temporary)?;
-        let destination = destination.to_owned();
-        self.files.push(StagedFile {
-            temporary,
-            backup,
-            destination,
-            had_backup: false,
-            published: false,
-        });
-        file.write_all(content)?;
-        file.sync_all()
-    }
-
-    fn publish(mut self) -> Result<(), Failure> {
-        for file in &mut self.files {
-            let result = file.publish();
-            result.map_err(|error| cannot("replace", &file.destination, &error))?;
-        }
-        for file in &mut self.files {
-            if file.had_backup {
-                let _ = fs::remove_file(&file.backup);
-            }
-        }
-        self.files.clear();
-        Ok(())
-    }
-}
-
-impl StagedFile {
-    fn publish(&mut self) -> io::Result<()> {
-        if fs::symlink_metadata(&self.destination).is_ok() {
-            // a second name for the old file: the destination is never missing, whenever the run is interrupted
-            fs::hard_link(&self.destination, &self.backup)
-                .or_else(|_| fs::copy(&self.destination, &self.backup).map(|_| ()))?;
-            self.had_backup = true;
-        }
-        fs::rename(&self.temporary, &self.destination)?;
-        self.published = true;
-        Ok(())
-    }
-}
-
-impl Drop for Staged {
-    /// Puts back what was there before.
-    fn drop(&mut self) {
-        for file in self.files.iter().rev() {
-            // nothing more can be done where putting back fails, too
-            let _ = match (file.published, file.had_backup) {
-                (true, true) => fs::rename(&file.backup, &file.destination),
-                (true, false) => fs::remove_file(&file.destination),
-                (false, had_backup) => {
-                    if had_backup {
-                        let _ = fs::remove_file(&file.backup);
-                    }
-                    fs::remove_file(&file.temporary)
-                }
-            };
-        }
-    }
 }
 
 #[cfg(test)]
@@ -340,23 +246,57 @@ mod tests {
         assert_eq!(fs::read_to_string(folder.path().join("precious")).unwrap(), "old");
     }
 
-    #[test]
-    fn a_failed_publication_puts_the_old_files_back() {
-        let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("a"), "old a").unwrap();
-        fs::write(folder.path().join("b"), "old b").unwrap();
-        let mut staged = Staged { files: Vec::new() };
-        for (index, name) in ["a", "b"].iter().enumerate() {
-            staged
-                .stage(folder.path(), index, &folder.path().join(name), b"new")
-                .unwrap();
+    /// A run that another one's half-written folder is shown to, or that finds what a killed one left.
+    fn half_written(folder: &Path, version: &str) -> (BTreeMap<String, Vec<u8>>, Staged) {
+        let files =
+            BTreeMap::from(["a.c", "t.csv"].map(|name| (name.to_owned(), format!("{version} {name}").into_bytes())));
+        let files = ownership::recorded(files).unwrap();
+        let mut staged = Staged::new(folder);
+        for (name, content) in &files {
+            staged.stage(name, content).unwrap();
         }
-        // the second rename cannot succeed any more
-        fs::remove_file(&staged.files[1].temporary).unwrap();
-        assert!(staged.publish().is_err());
-        assert_eq!(names(folder.path()), ["a", "b"]);
-        assert_eq!(fs::read_to_string(folder.path().join("a")).unwrap(), "old a");
-        assert_eq!(fs::read_to_string(folder.path().join("b")).unwrap(), "old b");
+        (files, staged)
+    }
+
+    const KEEP: Replacing = Replacing { force: false };
+
+    #[test]
+    fn a_run_waits_for_the_other_before_it_looks_whose_the_files_are() {
+        let folder = tempfile::tempdir().unwrap();
+        replace_own(folder.path(), files(&["a.c", "t.csv"]), KEEP).unwrap();
+        let lock = staging::lock(folder.path()).unwrap();
+        let (_, mut staged) = half_written(folder.path(), "newer");
+        staged.publish_first(1).unwrap();
+        let (sender, receiver) = std::sync::mpsc::channel();
+        std::thread::scope(|scope| {
+            scope.spawn(|| sender.send(replace_own(folder.path(), files(&["a.c", "t.csv"]), KEEP).is_ok()));
+            // long enough for a run that does not wait to have seen the edited file; too short can only miss the fault
+            assert!(
+                receiver.recv_timeout(std::time::Duration::from_millis(200)).is_err(),
+                "did not wait"
+            );
+            staged.publish().unwrap();
+            drop(lock);
+        });
+        assert!(receiver.recv().unwrap(), "refused its own files");
+    }
+
+    #[test]
+    fn what_a_killed_run_half_replaced_is_no_edit() {
+        for published in 0..=3 {
+            let folder = tempfile::tempdir().unwrap();
+            replace_own(folder.path(), files(&["a.c", "t.csv"]), KEEP).unwrap();
+            let (_, mut staged) = half_written(folder.path(), "newer");
+            staged.publish_first(published).unwrap();
+            std::mem::forget(staged);
+            replace_own(folder.path(), files(&["a.c", "t.csv"]), KEEP).unwrap();
+            assert_eq!(
+                names(folder.path()),
+                ["a.c", "policyc-files.json", "t.csv"],
+                "{published}"
+            );
+            assert_eq!(fs::read_to_string(folder.path().join("t.csv")).unwrap(), "new t.csv");
+        }
     }
 
     #[test]

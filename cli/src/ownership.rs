@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use codegen::manifest::{self, FileEntry};
@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 use toml_input::Message;
 
 use crate::failure::Failure;
+use crate::staging;
 
 /// The record of what was written to a folder and does not say so itself.
 pub const RECORD: &str = "policyc-files.json";
@@ -44,16 +45,34 @@ struct Record {
     files: BTreeMap<String, FileEntry>,
 }
 
-impl Record {
-    /// That of a folder, from all files that hold one; what cannot be read vouches for nothing.
+/// What a folder says about its files.
+#[derive(Default)]
+struct Records {
+    /// The policy whose code it holds.
+    name: Option<String>,
+    /// A file may be what its folder's record says, or what that of a run says which was killed while it replaced files.
+    files: BTreeMap<String, Vec<FileEntry>>,
+}
+
+impl Records {
+    /// Those of a folder; what cannot be read vouches for nothing.
     fn of(folder: &Path) -> Self {
-        let read = |name: &str| -> Option<Record> { serde_json::from_slice(&fs::read(folder.join(name)).ok()?).ok() };
-        let mut all = Record::default();
-        for record in [manifest::FILE, RECORD].into_iter().filter_map(read) {
-            all.name = all.name.or(record.name);
-            all.files.extend(record.files);
+        let standing = [manifest::FILE, RECORD].map(|name| folder.join(name));
+        let read = |path: PathBuf| -> Option<Record> { serde_json::from_slice(&fs::read(path).ok()?).ok() };
+        let mut all = Records::default();
+        for record in standing.into_iter().filter_map(read) {
+            all.name = all.name.or(record.name.clone());
+            all.add(record);
         }
+        let left = staging::leftovers(folder).into_iter().filter_map(read);
+        left.for_each(|record| all.add(record));
         all
+    }
+
+    fn add(&mut self, record: Record) {
+        for (name, entry) in record.files {
+            self.files.entry(name).or_default().push(entry);
+        }
     }
 }
 
@@ -83,13 +102,16 @@ pub fn check(folder: &Path, files: &BTreeMap<String, Vec<u8>>, replacing: Replac
     if replacing.force {
         return Ok(());
     }
-    let record = Record::of(folder);
+    let records = Records::of(folder);
     for (name, content) in files {
         let path = folder.join(name);
         let Ok(existing) = fs::read(&path) else { continue };
         // a record knows more than the mark, which an edit leaves in its place
-        let (is_own, what) = match record.files.get(name) {
-            Some(entry) => (is_recorded(entry, &existing), "was edited since policyc wrote it"),
+        let (is_own, what) = match records.files.get(name) {
+            Some(entries) => {
+                let is_own = entries.iter().any(|entry| is_recorded(entry, &existing));
+                (is_own, "was edited since policyc wrote it")
+            }
             None => (bears_mark(&existing), "was not written by policyc"),
         };
         if existing == *content || is_own {
@@ -108,7 +130,7 @@ pub fn check(folder: &Path, files: &BTreeMap<String, Vec<u8>>, replacing: Replac
 /// # Errors
 /// If the manifest there names another policy, unless `--force` gives it up.
 pub fn check_policy(folder: &Path, policy: &str, replacing: Replacing) -> Result<(), Failure> {
-    match Record::of(folder).name {
+    match Records::of(folder).name {
         Some(other) if other != policy && !replacing.force => {
             let message = format!("{} holds the code of another policy; nothing written", folder.display());
             let hint = "give each policy a folder of its own, or give the other up with --force";

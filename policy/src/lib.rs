@@ -26,6 +26,7 @@ pub mod model;
 mod names;
 mod notes;
 mod raw;
+mod resized;
 pub mod rounding;
 mod scaffold;
 pub mod scales;

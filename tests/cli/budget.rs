@@ -29,6 +29,56 @@ fn a_small_network_meets_its_period_at_a_usual_clock_and_misses_it_at_a_slow_one
     desk.succeed("verify policy --generated out --steps 10");
 }
 
+/// The advice is taken: a network of the size that is named meets its period, one a step wider does not.
+#[test]
+fn a_network_that_fits_is_named() {
+    let desk = Desk::new("minimal");
+    let example = tests::example();
+    let said = desk.succeed(&format!(
+        "compile {} --target cortex-m4f --clock 20MHz --out out",
+        example.display()
+    ));
+    let line = said
+        .lines()
+        .find(|line| line.contains("cut down to"))
+        .unwrap_or_else(|| panic!("{said}"));
+    let sizes = line
+        .split("cut down to ")
+        .nth(1)
+        .unwrap()
+        .split(" takes")
+        .next()
+        .unwrap();
+    let sizes: Vec<usize> = sizes.split(" -> ").map(|size| size.parse().unwrap()).collect();
+    assert_eq!((sizes[0], sizes[3]), (6, 12), "{line}");
+    assert!(sizes[1] == sizes[2] && (4..64).contains(&sizes[1]), "{line}");
+    let nearest = said.lines().find(|line| line.contains("next to it comes")).unwrap();
+    let format = nearest
+        .split("next to it comes ")
+        .nth(1)
+        .unwrap()
+        .split(' ')
+        .next()
+        .unwrap();
+    let policy = policy::load(&example).unwrap();
+    let fits = |width: usize| {
+        let cut = policy
+            .clone()
+            .with_format(policy::NumericFormat::find(format).unwrap())
+            .cut_to(width)
+            .unwrap();
+        let target = targets::find("cortex-m4f").unwrap();
+        let files = codegen::generate(&cut, target, &[codegen::Output::C], None)
+            .unwrap()
+            .files;
+        let costs = verify::costs::StepCosts::of(&cut, target, &[codegen::Language::C], &files);
+        let clock = verify::budget::Clock { hz: 20e6 };
+        let fit = |costs| verify::budget::Budget::of(costs, clock, cut.sample_period).unwrap().fit;
+        costs.measured().any(|costs| fit(costs) == verify::budget::Fit::Met)
+    };
+    assert!(fits(sizes[1]) && !fits(sizes[1] + 4), "{line}");
+}
+
 #[test]
 fn a_processor_without_floats_is_sent_to_integers() {
     let desk = Desk::new("minimal");

@@ -105,7 +105,7 @@ fn assert_random_policies_are_equal(seeds: Range<u64>, format: NumericFormat, st
 
 #[test]
 fn random_policies_are_equal() {
-    let count = if tests::full() { 200 } else { 48 };
+    let count = if tests::full() { 200 } else { 24 };
     assert_random_policies_are_equal(0..count, NumericFormat::F32, 3000);
 }
 

@@ -1,5 +1,8 @@
 //! What a step costs: the count of executed instructions does not depend on the data, no library, little stack.
 
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, OnceLock};
+
 use codegen::Output;
 use policy::{NumericFormat, Policy};
 use targets::{Fpu, Runner, TargetSpec};
@@ -17,16 +20,29 @@ fn emulated(has_fpu: bool) -> impl Iterator<Item = &'static TargetSpec> {
         .filter(move |target| matches!(target.runner, Runner::Emulated(_)) && (target.fpu != Fpu::None) == has_fpu)
 }
 
-/// Costs of every build of the target.
-fn costs(policy: &Policy, target: &'static TargetSpec) -> Vec<Costs> {
-    let files = codegen::generate(policy, target, &Output::CORES, None).unwrap().files;
-    let compilers: Vec<String> = super::compilers(target).into_iter().map(str::to_owned).collect();
-    let builds = toolchain::builds(target, &compilers, &[]);
-    let costs = builds.iter().map(|build| {
-        let costs = measure(policy, target, &files, build);
-        costs.unwrap_or_else(|error| panic!("{} {}: {error}", target.name, build.name()))
-    });
-    costs.collect()
+/// Costs of every build of the target for the example in a format. Several tests ask for the same, and measuring takes long.
+fn costs(format: NumericFormat, target: &'static TargetSpec) -> Vec<Costs> {
+    type Measured = BTreeMap<(&'static str, &'static str), Arc<OnceLock<Vec<Costs>>>>;
+    static MEASURED: Mutex<Measured> = Mutex::new(BTreeMap::new());
+    let cell = Arc::clone(
+        MEASURED
+            .lock()
+            .unwrap()
+            .entry((format.name(), target.name))
+            .or_default(),
+    );
+    cell.get_or_init(|| {
+        let policy = example().with_format(format);
+        let files = codegen::generate(&policy, target, &Output::CORES, None).unwrap().files;
+        let compilers: Vec<String> = super::compilers(target).into_iter().map(str::to_owned).collect();
+        let builds = toolchain::builds(target, &compilers, &[]);
+        let costs = builds.iter().map(|build| {
+            let costs = measure(&policy, target, &files, build);
+            costs.unwrap_or_else(|error| panic!("{} {}: {error}", target.name, build.name()))
+        });
+        costs.collect()
+    })
+    .clone()
 }
 
 /// Helpers of the compilers' libraries for processors without FPU: floats and wide products. No C library.
@@ -63,7 +79,7 @@ const BRANCHES: [(&str, &str, u64); 1] = [("dspace-ds1202", "rustc", 24)];
 #[test]
 fn the_instruction_count_does_not_depend_on_the_data_where_floats_are_hardware() {
     for target in emulated(true) {
-        for costs in costs(&example(), target) {
+        for costs in costs(NumericFormat::F32, target) {
             check_core(target, &costs);
             println!("{} {costs:?}", target.name);
             let spread = costs.instructions_max - costs.instructions_min;
@@ -105,12 +121,8 @@ fn allowed_spread(target: &TargetSpec, build: &str) -> u64 {
 #[test]
 fn nor_does_that_of_the_integer_formats() {
     for format in [NumericFormat::I16, NumericFormat::I8] {
-        let policy = example().with_format(format);
         for (target, around) in emulated(true).map(|t| (t, 0)).chain(emulated(false).map(|t| (t, 320))) {
-            let files = codegen::generate(&policy, target, &Output::CORES, None).unwrap().files;
-            let compilers: Vec<String> = super::compilers(target).into_iter().map(str::to_owned).collect();
-            for build in toolchain::builds(target, &compilers, &["-O2".to_owned(), "-O".to_owned()]) {
-                let costs = measure(&policy, target, &files, &build).unwrap();
+            for costs in costs(format, target) {
                 println!("{} {} {costs:?}", target.name, format.name());
                 let spread = costs.instructions_max - costs.instructions_min;
                 let allowed = allowed_spread(target, &costs.build) + around;
@@ -124,7 +136,7 @@ fn nor_does_that_of_the_integer_formats() {
 #[test]
 fn without_fpu_only_the_float_library_is_called_and_its_count_varies() {
     for target in emulated(false) {
-        for costs in costs(&example(), target) {
+        for costs in costs(NumericFormat::F32, target) {
             check_core(target, &costs);
             println!("{} {costs:?}", target.name);
             assert!(
@@ -145,15 +157,13 @@ fn the_estimated_stack_is_near_the_painted_one() {
     for target in emulated(true) {
         let files = codegen::generate(&policy, target, &[Output::C], None).unwrap().files;
         let compiler = [target.c_compilers[0].program.to_owned()];
+        let measured = costs(NumericFormat::F32, target);
         for build in toolchain::builds(target, &compiler, &[]) {
-            let painted = measure(&policy, target, &files, &build).unwrap().stack_bytes;
+            let name = build.name();
+            let painted = measured.iter().find(|costs| costs.build == name).unwrap().stack_bytes;
             let estimated = estimate(&policy, target, &files, &build).unwrap().estimated_stack_bytes;
-            println!(
-                "{} {}: estimated {estimated}, painted {painted}",
-                target.name,
-                build.name()
-            );
-            assert!(estimated.abs_diff(painted) <= 32, "{} {}", target.name, build.name());
+            println!("{} {name}: estimated {estimated}, painted {painted}", target.name);
+            assert!(estimated.abs_diff(painted) <= 32, "{} {name}", target.name);
         }
     }
 }
@@ -186,7 +196,7 @@ fn without_the_emulator_compile_says_what_it_estimates() {
 #[test]
 fn the_example_takes_less_than_540_bytes_of_stack_on_a_cortex_m4f() {
     let target = targets::find("cortex-m4f").unwrap();
-    for costs in costs(&example(), target) {
+    for costs in costs(NumericFormat::F32, target) {
         assert!(costs.stack_bytes > 256 && costs.stack_bytes < 540, "{costs:?}");
     }
 }
@@ -196,7 +206,7 @@ fn the_example_takes_less_than_540_bytes_of_stack_on_a_cortex_m4f() {
 fn in_integers_the_example_takes_256_bytes_of_stack_on_a_cortex_m4f() {
     let target = targets::find("cortex-m4f").unwrap();
     for format in [NumericFormat::I16, NumericFormat::I8] {
-        for costs in costs(&example().with_format(format), target) {
+        for costs in costs(format, target) {
             let most = if costs.build.starts_with("arm-none-eabi-gcc") {
                 256
             } else {

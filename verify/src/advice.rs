@@ -8,6 +8,7 @@ use targets::TargetSpec;
 
 use crate::budget::{Budget, Clock, Fit};
 use crate::costs::StepCosts;
+use crate::fitting::{Bench, Fitting};
 use crate::measure::Costs;
 
 /// Whether a step of `outputs`' cores fits into its period at a clock, and which numeric format would if it does not: one
@@ -57,8 +58,8 @@ pub fn lines(
         own.chain(others.iter().cloned())
             .min_by(|a, b| a.share.1.total_cmp(&b.share.1))
     };
-    lines.push(match fits.cloned().or_else(nearest) {
-        Some(Proposal { format, build, share }) if share.1 <= 1.0 => format!(
+    match fits.cloned().or_else(nearest) {
+        Some(Proposal { format, build, share }) if share.1 <= 1.0 => lines.push(format!(
             "  = hint: --format {} takes {:.0} to {:.0} % with {build}{}",
             format.name(),
             100.0 * share.0,
@@ -68,20 +69,66 @@ pub fn lines(
             } else {
                 ""
             }
+        )),
+        Some(nearest) => lines.extend(too_slow(policy, target, outputs, clock, &nearest)?),
+        None => lines.push(
+            "  = hint: no numeric format fits: a faster clock, a longer period or a smaller network is needed"
+                .to_owned(),
         ),
-        Some(Proposal { format, build, share }) => format!(
-            "  = hint: no numeric format fits; next to it comes {} with {build}, {:.0} to {:.0} %: it fills a period of \
-             {:.0} us, or the present one at {:.0} MHz. A smaller network would do, or another period; train again for either",
-            format.name(),
+    }
+    Ok(lines)
+}
+
+/// What would help where no format fits: another clock or period, a smaller network, another activation.
+fn too_slow(
+    policy: &Policy,
+    target: &'static TargetSpec,
+    outputs: &[Output],
+    clock: Clock,
+    nearest: &Proposal,
+) -> Result<Vec<String>, CodegenError> {
+    let Proposal { format, build, share } = nearest;
+    let mut lines = vec![format!(
+        "  = hint: no numeric format fits; next to it comes {} with {build}, {:.0} to {:.0} %: it fills a period of {:.0} us, or the \
+         present one at {:.0} MHz",
+        format.name(),
+        100.0 * share.0,
+        100.0 * share.1,
+        (1e6 * policy.sample_period * share.1).ceil(),
+        (1e-6 * clock.hz * share.1).ceil()
+    )];
+    let bench = Bench {
+        target,
+        outputs,
+        build,
+        clock,
+    };
+    let policy = policy.clone().with_format(*format);
+    if let Some(share) = bench.with_relu(&policy)? {
+        lines.push(format!(
+            "  = hint: trained with relu the same network takes {:.0} to {:.0} %",
             100.0 * share.0,
-            100.0 * share.1,
-            (1e6 * period * share.1).ceil(),
-            (1e-6 * clock.hz * share.1).ceil()
+            100.0 * share.1
+        ));
+    }
+    lines.push(match bench.widest(&policy)? {
+        Some(Fitting { sizes, share }) => format!(
+            "  = hint: this network cut down to {} takes {:.0} to {:.0} % there: train one of that size",
+            arrows(&sizes),
+            100.0 * share.0,
+            100.0 * share.1
         ),
-        None => "  = hint: no numeric format fits: a faster clock, a longer period or a smaller network is needed"
-            .to_owned(),
+        None => {
+            "  = hint: not even four neurons in each hidden layer fit: another clock or period it must be".to_owned()
+        }
     });
     Ok(lines)
+}
+
+/// `6 -> 24 -> 12`
+fn arrows(sizes: &[usize]) -> String {
+    let texts: Vec<String> = sizes.iter().map(usize::to_string).collect();
+    texts.join(" -> ")
 }
 
 /// What can be said without a model: how many cycles there are, and how many instructions, in the other formats as well.

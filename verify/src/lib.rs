@@ -15,7 +15,7 @@
 //! | who answers | [`runner`]: [`runner::Runner`] has one implementation per way of running a build |
 //! | a loop closed around a build | [`live`] |
 //! | what differs | [`compare`], [`report`]; in words: [`text`] |
-//! | what a step costs | [`mod@measure`], [`elf`]; of all builds: [`costs`]; whether it fits into its period: [`budget`], [`advice`] |
+//! | what a step costs | [`mod@measure`], [`elf`]; of all builds: [`costs`]; whether it fits into its period: [`budget`], [`advice`], [`fitting`] |
 //! | archives of FMUs | [`fmu`] |
 //! | what the format does to decisions | [`decisions`] |
 //! | a log of the trainer against the contract | [`replay`] |
@@ -29,6 +29,7 @@ pub mod drift;
 pub mod drivers;
 pub mod elf;
 pub mod estimate;
+pub mod fitting;
 pub mod fmu;
 pub mod folder;
 mod golden;

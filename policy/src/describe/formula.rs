@@ -13,7 +13,7 @@ pub fn formula(feature: &Feature, signals: &[Signal]) -> String {
     let atom = !source.contains([' ', '+', '-', '*', '/']);
     let mut text = source;
     for filter in &feature.filters {
-        text = format!("{}({text})", filter_name(filter));
+        text = format!("{}({text}){}", filter_name(filter), over_period(filter));
     }
     // a scale before a sum needs parentheses; behind a name or a filter they stand already
     let closed = atom || !feature.filters.is_empty();
@@ -42,6 +42,14 @@ fn filter_name(filter: &Filter) -> String {
         Filter::FilteredDerivative { time_constant } => format!("derivative[{time_constant} s]"),
         Filter::MovingAverage { samples } => format!("average{samples}"),
         Filter::Integrator { min, max, .. } => format!("integral[{min}, {max}]"),
+    }
+}
+
+/// A difference is a rate: of one sample to the next, over the control period.
+fn over_period(filter: &Filter) -> &'static str {
+    match filter {
+        Filter::BackwardDifference => "/T",
+        _ => "",
     }
 }
 

@@ -28,6 +28,26 @@ fn desk() -> Desk {
     desk
 }
 
+/// The same figures as those of a contract that says the format, and others than in binary32.
+#[test]
+fn a_format_on_the_command_line_is_that_of_the_contract() {
+    let desk = desk();
+    let asked = desk.succeed("simulate s.toml --policy policy --format i8 --out asked");
+    let plain = desk.succeed("simulate s.toml --policy policy --out plain");
+    desk.edit(
+        "policy/policy.toml",
+        "name = \"buck12\"",
+        "name = \"buck12\"\nnumeric_format = \"i8\"",
+    );
+    let stated = desk.succeed("simulate s.toml --policy policy --out stated");
+    assert_eq!(asked.replace("asked", "stated"), stated);
+    assert_ne!(asked.replace("asked", "plain"), plain);
+    assert_eq!(
+        desk.read("asked/200-500W-policy.csv"),
+        desk.read("stated/200-500W-policy.csv")
+    );
+}
+
 #[test]
 fn a_simulation_leaves_figures_trajectories_and_pictures() {
     let desk = desk();

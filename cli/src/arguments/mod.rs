@@ -292,6 +292,9 @@ pub struct Simulate {
     /// policy.toml or the folder that holds it
     #[arg(long, value_name = "POLICY")]
     pub policy: PathBuf,
+    /// Numeric format in the place of the contract's
+    #[arg(long, value_parser = format())]
+    pub format: Option<NumericFormat>,
     /// Plant file in the place of the scenario's
     #[arg(long, value_name = "PLANT")]
     pub plant: Option<PathBuf>,

@@ -21,7 +21,7 @@ pub fn run(options: &Simulate) -> Result<Outcome, Failure> {
     let stop = interruption::stop_on_signal();
     output::check_new_folder(&options.out)?;
     let scenario = Scenario::load(&options.scenario)?;
-    let policy = super::load(&options.policy, options.outside)?;
+    let policy = super::load_as(&options.policy, options.outside, options.format)?;
     let setting = Setting::new(&options.scenario, scenario, policy, options.plant.as_deref())?;
     let found = all(options, setting);
     if stop.load(Ordering::Relaxed) {

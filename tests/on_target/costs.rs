@@ -20,22 +20,24 @@ fn emulated(has_fpu: bool) -> impl Iterator<Item = &'static TargetSpec> {
         .filter(move |target| matches!(target.runner, Runner::Emulated(_)) && (target.fpu != Fpu::None) == has_fpu)
 }
 
-/// Costs of every build of the target for the example in a format. Several tests ask for the same, and measuring takes long.
-fn costs(format: NumericFormat, target: &'static TargetSpec) -> Vec<Costs> {
-    type Measured = BTreeMap<(&'static str, &'static str), Arc<OnceLock<Vec<Costs>>>>;
+/// Costs of the builds of the target at these levels, at all if there are none, for the example in a format. Several tests
+/// ask for the same, and measuring takes long.
+fn costs(format: NumericFormat, target: &'static TargetSpec, levels: &[&str]) -> Vec<Costs> {
+    type Measured = BTreeMap<(&'static str, &'static str, String), Arc<OnceLock<Vec<Costs>>>>;
     static MEASURED: Mutex<Measured> = Mutex::new(BTreeMap::new());
     let cell = Arc::clone(
         MEASURED
             .lock()
             .unwrap()
-            .entry((format.name(), target.name))
+            .entry((format.name(), target.name, levels.join(" ")))
             .or_default(),
     );
     cell.get_or_init(|| {
         let policy = example().with_format(format);
         let files = codegen::generate(&policy, target, &Output::CORES, None).unwrap().files;
         let compilers: Vec<String> = super::compilers(target).into_iter().map(str::to_owned).collect();
-        let builds = toolchain::builds(target, &compilers, &[]);
+        let levels: Vec<String> = levels.iter().map(ToString::to_string).collect();
+        let builds = toolchain::builds(target, &compilers, &levels);
         let costs = builds.iter().map(|build| {
             let costs = measure(&policy, target, &files, build);
             costs.unwrap_or_else(|error| panic!("{} {}: {error}", target.name, build.name()))
@@ -79,7 +81,7 @@ const BRANCHES: [(&str, &str, u64); 1] = [("dspace-ds1202", "rustc", 24)];
 #[test]
 fn the_instruction_count_does_not_depend_on_the_data_where_floats_are_hardware() {
     for target in emulated(true) {
-        for costs in costs(NumericFormat::F32, target) {
+        for costs in costs(NumericFormat::F32, target, &[]) {
             check_core(target, &costs);
             println!("{} {costs:?}", target.name);
             let spread = costs.instructions_max - costs.instructions_min;
@@ -122,7 +124,7 @@ fn allowed_spread(target: &TargetSpec, build: &str) -> u64 {
 fn nor_does_that_of_the_integer_formats() {
     for format in [NumericFormat::I16, NumericFormat::I8] {
         for (target, around) in emulated(true).map(|t| (t, 0)).chain(emulated(false).map(|t| (t, 320))) {
-            for costs in costs(format, target) {
+            for costs in costs(format, target, &["-O2", "-O"]) {
                 println!("{} {} {costs:?}", target.name, format.name());
                 let spread = costs.instructions_max - costs.instructions_min;
                 let allowed = allowed_spread(target, &costs.build) + around;
@@ -136,7 +138,7 @@ fn nor_does_that_of_the_integer_formats() {
 #[test]
 fn without_fpu_only_the_float_library_is_called_and_its_count_varies() {
     for target in emulated(false) {
-        for costs in costs(NumericFormat::F32, target) {
+        for costs in costs(NumericFormat::F32, target, &[]) {
             check_core(target, &costs);
             println!("{} {costs:?}", target.name);
             assert!(
@@ -157,7 +159,7 @@ fn the_estimated_stack_is_near_the_painted_one() {
     for target in emulated(true) {
         let files = codegen::generate(&policy, target, &[Output::C], None).unwrap().files;
         let compiler = [target.c_compilers[0].program.to_owned()];
-        let measured = costs(NumericFormat::F32, target);
+        let measured = costs(NumericFormat::F32, target, &[]);
         for build in toolchain::builds(target, &compiler, &[]) {
             let name = build.name();
             let painted = measured.iter().find(|costs| costs.build == name).unwrap().stack_bytes;
@@ -196,7 +198,7 @@ fn without_the_emulator_compile_says_what_it_estimates() {
 #[test]
 fn the_example_takes_less_than_540_bytes_of_stack_on_a_cortex_m4f() {
     let target = targets::find("cortex-m4f").unwrap();
-    for costs in costs(NumericFormat::F32, target) {
+    for costs in costs(NumericFormat::F32, target, &[]) {
         assert!(costs.stack_bytes > 256 && costs.stack_bytes < 540, "{costs:?}");
     }
 }
@@ -206,7 +208,7 @@ fn the_example_takes_less_than_540_bytes_of_stack_on_a_cortex_m4f() {
 fn in_integers_the_example_takes_256_bytes_of_stack_on_a_cortex_m4f() {
     let target = targets::find("cortex-m4f").unwrap();
     for format in [NumericFormat::I16, NumericFormat::I8] {
-        for costs in costs(format, target) {
+        for costs in costs(format, target, &[]) {
             let most = if costs.build.starts_with("arm-none-eabi-gcc") {
                 256
             } else {

@@ -103,6 +103,15 @@ pub(crate) fn state_record(spec: Spec<'_>, state: &State) -> Value {
     for (name, coefficient) in ["a", "b", "c", "r"].into_iter().zip(&state.coefficients) {
         members.insert(format!("mapping_{name}"), float(coefficient));
     }
+    let word = Kind::Integer {
+        bits: spec.float.width(),
+        signed: false,
+    };
+    members.extend(
+        state
+            .check
+            .map(|check| ("mapping_check".to_owned(), value(check, word))),
+    );
     Value::Record(members)
 }
 
@@ -128,6 +137,7 @@ pub(crate) fn state_of(value: &Value, like: &State) -> Result<State, Wrong> {
     for (name, coefficient) in ["a", "b", "c", "r"].into_iter().zip(&mut state.coefficients) {
         *coefficient = term(&format!("mapping_{name}"))?;
     }
+    state.check = like.check.map(|_| term("mapping_check")).transpose()?;
     state.bad_count = term("bad_count")?;
     state.primed = term("primed")?;
     Ok(state)

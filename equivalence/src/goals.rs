@@ -192,8 +192,8 @@ fn state_groups(spec: Spec<'_>, emitted: &State, specified: &State) -> Vec<Group
         ),
         (
             "coefficients",
-            "the coefficients as they are",
-            list("coefficient", &emitted.coefficients, &specified.coefficients, float),
+            "the coefficients and their check word as they are",
+            coefficients(spec, emitted, specified),
         ),
         (
             "counters",
@@ -205,6 +205,18 @@ fn state_groups(spec: Spec<'_>, emitted: &State, specified: &State) -> Vec<Group
         ),
     ];
     all.into_iter().filter(|(_, _, pairs)| !pairs.is_empty()).collect()
+}
+
+fn coefficients(spec: Spec<'_>, emitted: &State, specified: &State) -> Vec<Pair> {
+    let float = Kind::Float(spec.float.format);
+    let word = Kind::Integer {
+        bits: spec.float.width(),
+        signed: false,
+    };
+    let checks = emitted.check.zip(specified.check);
+    let mut pairs = list("coefficient", &emitted.coefficients, &specified.coefficients, float);
+    pairs.extend(checks.map(|(x, y)| pair("mapping_check", x, y, word)));
+    pairs
 }
 
 fn commit(
@@ -278,7 +290,11 @@ fn around(
     let pairs = state_pairs(spec, &emitted.init(state)?, &spec::initial(spec, state));
     add("init", "`init` leaves the state of section 1", &pairs);
     let pairs = state_pairs(spec, &emitted.reset(state)?, &spec::reset(spec, state));
-    add("reset", "`reset` leaves the same, but keeps the coefficients", &pairs);
+    add(
+        "reset",
+        "`reset` leaves the same, but keeps the coefficients and their check word",
+        &pairs,
+    );
     if state.coefficients.is_empty() {
         return Ok(());
     }
@@ -292,9 +308,11 @@ fn around(
     for (old, new) in specified.coefficients.iter_mut().zip(&new) {
         *old = spec.terms.choose(accepted, *new, *old);
     }
+    let check = spec::check_word(spec, &new);
+    specified.check = state.check.map(|old| spec.terms.choose(accepted, check, old));
     let mut pairs = state_pairs(spec, &after, &specified);
     pairs.push(pair("accepted", said, spec.terms.number(accepted, 32), U32));
-    let text = "`set_mapping` takes exactly the coefficients that section 8 accepts, and changes nothing else";
+    let text = "`set_mapping` takes exactly the coefficients that section 8 accepts, writes their check word, and changes nothing else";
     add("set_mapping", text, &pairs);
     Ok(())
 }

@@ -59,6 +59,7 @@ impl<T: Real> Controller<T> {
             previous_command: initial_duty,
             soft_cap: limits.soft_start.map(|soft| soft.from),
             mapping: mapping.as_ref().map(|mapping| mapping.initial),
+            mapping_check: mapping.as_ref().map(|mapping| mapping.initial.check_word()),
             bad_count: 0,
             primed: 0,
         };
@@ -87,6 +88,8 @@ impl<T: Real> Controller<T> {
             previous_command: self.initial_duty,
             soft_cap: self.limits.soft_start.map(|soft| soft.from),
             mapping: self.state.mapping,
+            // not computed anew: a damaged coefficient would pass for a good one
+            mapping_check: self.state.mapping_check,
             bad_count: 0,
             primed: 0,
         };
@@ -188,7 +191,8 @@ impl<T: Real> Controller<T> {
         let fits = state.held.len() == self.state.held.len()
             && state.memory.len() == self.state.memory.len()
             && state.soft_cap.is_some() == self.state.soft_cap.is_some()
-            && state.mapping.map(|m| m.r.is_some()) == self.state.mapping.map(|m| m.r.is_some());
+            && state.mapping.map(|m| m.r.is_some()) == self.state.mapping.map(|m| m.r.is_some())
+            && state.mapping_check.is_some() == self.state.mapping_check.is_some();
         if fits {
             self.state.clone_from(state);
         }
@@ -216,6 +220,7 @@ impl<T: Real> Controller<T> {
         let accepted = self.mapping.as_ref().is_some_and(|mapping| mapping.accepts(new));
         if accepted {
             self.state.mapping = Some(new);
+            self.state.mapping_check = Some(new.check_word());
         }
         accepted
     }
@@ -283,7 +288,7 @@ impl<T: Real> Controller<T> {
         };
         trace.expired = trace.bad_count > self.hold;
         trace.primed = state.primed & 1 == 1; // 2 is the mark of a damaged state
-        trace.sound = self.sound.holds(state, self.mapping.as_ref());
+        trace.sound = self.sound.holds(state);
         trace.usable = trace.sound && (trace.all_valid || (trace.primed && !trace.expired));
 
         let inputs = Inputs {

@@ -28,6 +28,7 @@ pub(crate) fn state_names<T: Real>(policy: &Policy, features: &[Feature<T>], sta
     if let Some(coefficients) = &state.mapping {
         names.extend(["mapping.a", "mapping.b", "mapping.c"].map(str::to_owned));
         names.extend(coefficients.r.map(|_| "mapping.r".to_owned()));
+        names.push("mapping.check".to_owned());
     }
     names.extend(["bad_count", "primed"].map(str::to_owned));
     names

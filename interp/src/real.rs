@@ -54,8 +54,19 @@ pub trait Real:
     /// The same number as binary64, exact in both formats.
     fn to_f64(self) -> f64;
 
+    /// The bits; those of a binary32 number are the low ones.
+    fn bits(self) -> u64;
+
+    /// As many low bits as a number of the format has.
+    fn low_bits(bits: u64) -> u64;
+
+    /// Appends as many low bits as a number of the format has, as 32-bit words, the low one first.
+    fn append_bits(bits: u64, words: &mut Vec<u32>);
+
     /// Appends the bits as 32-bit words, the low one of a binary64 number first.
-    fn append_words(self, words: &mut Vec<u32>);
+    fn append_words(self, words: &mut Vec<u32>) {
+        Self::append_bits(self.bits(), words);
+    }
 
     /// `acc_o = fl(acc_o + fl(w_io * x_i))` for i = 0, 1, ...: the order within one output is that of contract
     /// section 6, outputs advance side by side. `weights` is `[inputs][outputs]`, `acc` enters as the bias.
@@ -128,8 +139,16 @@ impl Real for f32 {
         f64::from(self)
     }
 
-    fn append_words(self, words: &mut Vec<u32>) {
-        words.push(self.to_bits());
+    fn bits(self) -> u64 {
+        u64::from(self.to_bits())
+    }
+
+    fn low_bits(bits: u64) -> u64 {
+        u64::from(bits as u32)
+    }
+
+    fn append_bits(bits: u64, words: &mut Vec<u32>) {
+        words.push(bits as u32);
     }
 
     accumulate!();
@@ -163,8 +182,15 @@ impl Real for f64 {
         self
     }
 
-    fn append_words(self, words: &mut Vec<u32>) {
-        let bits = self.to_bits();
+    fn bits(self) -> u64 {
+        self.to_bits()
+    }
+
+    fn low_bits(bits: u64) -> u64 {
+        bits
+    }
+
+    fn append_bits(bits: u64, words: &mut Vec<u32>) {
         words.extend([bits as u32, (bits >> 32) as u32]);
     }
 

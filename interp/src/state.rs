@@ -15,6 +15,17 @@ pub struct Coefficients<T> {
     pub r: Option<T>,
 }
 
+impl<T: Real> Coefficients<T> {
+    /// The check word that stands beside them in the state (section 1), as wide as the format.
+    #[must_use]
+    pub fn check_word(&self) -> u64 {
+        // not 0, so that words that are all 0 do not belong together; a word of the format has one byte again and again
+        let constant = T::low_bits(0x4B4B_4B4B_4B4B_4B4B);
+        let own = [Some(self.a), Some(self.b), Some(self.c), self.r];
+        own.into_iter().flatten().fold(constant, |word, x| word ^ x.bits())
+    }
+}
+
 /// Everything a controller remembers from one step to the next, in the order of contract section 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct State<T> {
@@ -30,6 +41,8 @@ pub struct State<T> {
     pub soft_cap: Option<T>,
     /// `None` without a mapping.
     pub mapping: Option<Coefficients<T>>,
+    /// Check word of the coefficients, as wide as the format; `None` without a mapping.
+    pub mapping_check: Option<u64>,
     /// Consecutive bad steps, saturating at K + 1.
     pub bad_count: u32,
     /// 1 if the filter memories hold samples, else 0; 2 after a state that was not sound.
@@ -44,7 +57,7 @@ impl<T: Real> State<T> {
         words
     }
 
-    /// The numbers among the words, in their order; the two counters stand behind them.
+    /// The numbers among the words, in their order; the check word and the two counters stand behind them.
     pub fn numbers_mut(&mut self) -> impl Iterator<Item = &mut T> {
         let mapping = self
             .mapping
@@ -65,6 +78,9 @@ impl<T: Real> State<T> {
         let numbers = self.held.iter().chain(&self.memory).copied().chain(duties);
         for number in numbers.chain(self.soft_cap).chain(mapping.flatten()) {
             number.append_words(words);
+        }
+        if let Some(check) = self.mapping_check {
+            T::append_bits(check, words);
         }
         words.extend([self.bad_count, self.primed]);
     }

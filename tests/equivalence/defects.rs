@@ -51,7 +51,7 @@ const fn rust(
 
 /// One a language and kind first: a plain run takes the first of them.
 #[rustfmt::skip]
-const DEFECTS: [Defect; 37] = [
+const DEFECTS: [Defect; 39] = [
     c(ADC, "argmax inverted", ("output > best", "output < best"), "c.action_index"),
     rust(ADC, "tie to the highest index", ("*q > best", "*q >= best"), "rust.action_index"),
     c(ADC, "off by one in the bad count", ("flag(state->bad_count <= 4u)", "flag(state->bad_count <= 5u)"), "c.commit.counters"),
@@ -68,7 +68,8 @@ const DEFECTS: [Defect; 37] = [
     c(ADC, "fallback missing", ("adc_mapping_select(usable, v17, 0.0f)", "v17"), "c.duty"),
     c(ADC, "soft start goes on after a fallback", ("adc_mapping_select(front->usable, v2, 0.1f)", "v2"), "c.commit.soft_cap"),
     c(ADC, "damaged state not marked", ("(front->usable + (uint32_t)2) - (front->sound << 1)", "front->usable"), "c.commit.counters"),
-    c(ADC, "a coefficient not guarded", ("| adc_mapping_far(state->mapping_r, 0x3C23D70Au)", ""), "c.status"),
+    c(ADC, "a coefficient not guarded", ("state->mapping_check ^ 0x4B4B4B4Bu ^ adc_mapping_bits(state->mapping_a)", "state->mapping_check ^ 0x4B4B4B4Bu"), "c.status"),
+    c(ADC, "the check word of old coefficients", ("state->mapping_check = 0x4B4B4B4Bu ^ adc_mapping_bits(a)", "state->mapping_check = 0x4B4B4B4Bu ^ adc_mapping_bits(state->mapping_b)"), "c.set_mapping"),
     c(ADC, "coefficient accepted too far", ("adc_mapping_within(a, 0.8f, 1.25f)", "adc_mapping_within(a, 0.8f, 1.5f)"), "c.set_mapping"),
     c(ADC, "sign of a coefficient at the start", ("state->mapping_b = -0.0015f", "state->mapping_b = 0.0015f"), "c.init"),
     c(FILTERS, "wrong feature order", ("front->observation[0] = v8;", "front->observation[0] = v13;"), "c.observation"),
@@ -86,6 +87,7 @@ const DEFECTS: [Defect; 37] = [
     rust(ADC, "index of a damaged state", ("action_index & 0_u32.wrapping_sub(trusted)", "action_index"), "rust.action_index"),
     rust(ADC, "held one period too short", ("flag(bad_count <= 4)", "flag(bad_count <= 3)"), "rust.status"),
     rust(ADC, "counters not guarded", ("((stray | counters) >> 31)", "(stray >> 31)"), "rust.status"),
+    rust(ADC, "the check word not asked", ("| any(self.mapping_flips())", ""), "rust.status"),
     rust(ADC, "reset forgets a coefficient", ("mapping_a: self.mapping_a,", ""), "rust.reset"),
     rust(FILTERS, "limit of an integrator", ("clamp(v37, -0.5, 0.75)", "clamp(v37, -0.75, 0.75)"), "rust.observation"),
     rust(FILTERS, "the newest sample left out of a mean", ("sum + newest", "sum"), "rust.observation"),

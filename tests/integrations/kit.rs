@@ -167,7 +167,8 @@ fn an_edited_constant_of_mapping_limits_or_status_fails() {
 }
 
 /// What a random run of some hundred steps meets seldom or never: limits far from the actions, the last bridged sample, the
-/// end of a range, equal values of two actions, a state that is not sound, the position of a sliced check.
+/// end of a range, equal values of two actions, a state that is not sound, a coefficient that another check word stands
+/// beside, the position of a sliced check.
 #[test]
 fn an_edit_where_random_moves_seldom_come_fails() {
     let policy = example();
@@ -181,6 +182,15 @@ fn an_edit_where_random_moves_seldom_come_fails() {
         ("measured->i_out, -1.0f, 40.0f", "measured->i_out, -1.0f, 40.04f"),
         ("buck12_flag(output > best)", "buck12_flag(output >= best)"),
         ("(4u - state->bad_count) |", "(5u - state->bad_count) |"),
+        ("^ buck12_bits(state->mapping_c);", ";"),
+        (
+            "state->mapping_check = 0x4B4B4B4Bu",
+            "state->mapping_check = 0x4B4B4B4Au",
+        ),
+        (
+            "buck12_any(buck12_mapping_flips(state))",
+            "(buck12_any(buck12_mapping_flips(state)) & 1u)",
+        ),
         ("check->position = span.to;", ""),
         ("? check->position : 0u;", "? check->position : 1u;"),
     ];

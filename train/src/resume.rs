@@ -188,6 +188,7 @@ fn read_state(from: &mut Reader<'_>) -> Result<State<f32>, Error> {
         previous_command: duties[1],
         soft_cap,
         mapping,
+        mapping_check: mapping.map(|own| own.check_word()),
         bad_count: u32::try_from(from.u64()?).map_err(|_| other())?,
         primed: u32::try_from(from.u64()?).map_err(|_| other())?,
     })

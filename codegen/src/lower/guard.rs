@@ -2,10 +2,10 @@
 
 use policy::{Expr, Input, Policy, Scalar};
 
-use crate::program::{Coefficient, Guard, Guarded, Literal, MappingCode, Place, SignalPort, Within};
+use crate::program::{Guard, Guarded, Literal, Place, SignalPort, Within};
 
 /// Ranges of all parts of the state that a source, a filter or a limiter reads.
-pub fn lower(policy: &Policy, signals: &[SignalPort], mapping: Option<&MappingCode>) -> Guard {
+pub fn lower(policy: &Policy, signals: &[SignalPort]) -> Guard {
     let scalar = policy.numeric_format.scalar();
     let within = |place: Place, range: (Literal, Literal)| Guarded {
         place,
@@ -36,16 +36,10 @@ pub fn lower(policy: &Policy, signals: &[SignalPort], mapping: Option<&MappingCo
         let range = hull([Literal::nearest(scalar, soft.from), max].into_iter());
         numbers.push(within(Place::SoftCap, range));
     }
-    let coefficients = mapping.iter().flat_map(|mapping| &mapping.coefficients);
-    numbers.extend(coefficients.map(|(name, _, low, high)| within(Place::Coefficient(*name), (*low, *high))));
-    let rising = mapping.filter(|mapping| mapping.coefficients.iter().any(|(name, ..)| *name == Coefficient::R));
-    // the slope a + r i is a line in i: positive at both ends, it is positive between them
-    let rising = rising.map_or_else(Vec::new, |mapping| vec![mapping.valid_i_out.0, mapping.valid_i_out.1]);
     Guard {
         numbers,
         // the counter stops one above K
         bad_count: policy.fallback.hold.saturating_add(1),
-        rising,
     }
 }
 

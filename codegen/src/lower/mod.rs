@@ -49,7 +49,7 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
         .map(|signal| signal_port(scalar, signal))
         .collect();
     let mapping = policy.mapping.as_ref().map(|map| mapping(scalar, map));
-    let guard = guard::lower(policy, &signals, mapping.as_ref());
+    let guard = guard::lower(policy, &signals);
     let state = state::members(policy, &signals, memory_words, mapping.as_ref());
     Program {
         name: policy.name.clone(),
@@ -126,5 +126,9 @@ fn mapping(scalar: Scalar, mapping: &policy::Mapping) -> MappingCode {
             Literal::nearest(scalar, mapping.valid_i_out.low),
             Literal::nearest(scalar, mapping.valid_i_out.high),
         ),
+        check_constant: match scalar {
+            Scalar::F32 => 0x4B4B_4B4B,
+            Scalar::F64 => 0x4B4B_4B4B_4B4B_4B4B,
+        },
     }
 }

@@ -2,7 +2,7 @@
 
 use policy::Policy;
 
-use crate::program::{Literal, MappingCode, SignalPort, StateMember, StateValue};
+use crate::program::{Literal, MappingCode, SignalPort, StateMember, StateValue, bits};
 
 /// The members in contract order; numbers first, so that in binary64 they lie without a gap.
 pub fn members(
@@ -40,6 +40,14 @@ pub fn members(
         let meaning = "coefficient of the duty ratio mapping";
         let name = format!("mapping_{}", name.name());
         members.push(member(&name, meaning, StateValue::Coefficient(*value)));
+    }
+    if let Some(mapping) = mapping {
+        let coefficients = mapping.coefficients.iter();
+        let check = coefficients.fold(mapping.check_constant, |check, (_, value, ..)| {
+            check ^ bits(scalar, value.value())
+        });
+        let meaning = "check word of the coefficients: a flipped bit of one of them is seen";
+        members.push(member("mapping_check", meaning, StateValue::Check(check)));
     }
     let meaning = "consecutive steps with an invalid sample";
     members.push(member("bad_count", meaning, StateValue::Word));

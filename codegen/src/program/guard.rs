@@ -3,16 +3,17 @@
 //! ```text
 //!  state ─► Guarded ... ─► sign bit set if outside ─┐
 //!                                                   ├─ or ─► sound: 1, or 0 and the step answers with the fallback
-//!  bad_count, primed ─────────────────────────────--┘
+//!  coefficients, their check word ─► flipped bits ──┤
+//!  bad_count, primed ───────────────────────────────┘
 //! ```
 //!
 //! Numbers are compared by their bits as integers: that is a subtraction where a comparison of floats with its move of flags
-//! takes four instructions, and a NaN, whose magnitude is above that of every number, is outside of everything.
+//! takes four instructions, and a NaN, whose magnitude is above that of every number, is outside of everything. Coefficients
+//! are not compared: their check word sees every flipped bit, also one that an interval has inside.
 
 use policy::Scalar;
 
-use super::literal::Literal;
-use super::ops::Coefficient;
+use super::literal::{Literal, bits};
 
 /// What a sound state lies within (contract section 1).
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -21,8 +22,6 @@ pub struct Guard {
     pub numbers: Vec<Guarded>,
     /// Largest `bad_count`.
     pub bad_count: u32,
-    /// Load currents at which the four-term form must rise with the duty.
-    pub rising: Vec<Literal>,
 }
 
 /// A number of the state, or several of one bound, and what it lies within.
@@ -52,8 +51,6 @@ pub enum Place {
     PreviousCommand,
     /// Rising upper limit.
     SoftCap,
-    /// Coefficient of the mapping.
-    Coefficient(Coefficient),
 }
 
 /// A range by the bits of its ends; the fewer instructions the more is known of it.
@@ -86,10 +83,7 @@ impl Within {
     /// The range from `low` to `high`.
     #[must_use]
     pub fn of(scalar: Scalar, (low, high): (Literal, Literal)) -> Self {
-        let bits = |value: f64| match scalar {
-            Scalar::F32 => u64::from((value as f32).to_bits()),
-            Scalar::F64 => value.to_bits(),
-        };
+        let bits = |value| bits(scalar, value);
         let (low, high) = (low.value(), high.value());
         // the cheapest form first: clear the sign, subtract
         if low == -high {

@@ -58,11 +58,16 @@ impl Literal {
     }
 }
 
-/// The words of a number: the low one of a binary64 number first.
-pub fn words(scalar: Scalar, value: f64) -> impl Iterator<Item = u32> {
-    let bits = match scalar {
+/// The bits of a number; those of a binary32 number are the low ones.
+pub fn bits(scalar: Scalar, value: f64) -> u64 {
+    match scalar {
         Scalar::F32 => u64::from((value as f32).to_bits()),
         Scalar::F64 => value.to_bits(),
-    };
+    }
+}
+
+/// The words of a number: the low one of a binary64 number first.
+pub fn words(scalar: Scalar, value: f64) -> impl Iterator<Item = u32> {
+    let bits = bits(scalar, value);
     [bits as u32, (bits >> 32) as u32].into_iter().take(scalar.words())
 }

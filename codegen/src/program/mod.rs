@@ -20,19 +20,21 @@ use targets::Widths;
 
 pub use guard::{Guard, Guarded, Place, Within};
 pub use literal::Literal;
-pub(crate) use literal::words;
+pub(crate) use literal::{bits, words};
 pub use loops::{Add, Arithmetic, Buffer, Cut, From, Inner, IntegerCode, IntegerInput, Kept, Layer, Loop};
 pub use loops::{Network, Part, Piece, Shape, Sink, Store, Sums, Turns};
 pub use ops::{Advance, Block, Coefficient, Decide, Front, Op, Push, SignalPort, StateMember, StateValue, ValueId};
 pub use tables::{Element, Slice, Strip, Table};
 
-/// Coefficients, their run-time intervals and the condition that keeps the mapping increasing.
+/// Coefficients, their run-time intervals and the condition that keeps the mapping increasing, and what vouches for them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MappingCode {
     /// Coefficient, value after `init`, lowest and highest value accepted at run time; `R` in the four-term form only.
     pub coefficients: Vec<(Coefficient, Literal, Literal, Literal)>,
     /// Validity range of the load current.
     pub valid_i_out: (Literal, Literal),
+    /// What the bits of all coefficients are combined with, by exclusive or, into their check word.
+    pub check_constant: u64,
 }
 
 /// Where the program comes from and under which conditions its bits hold.

@@ -217,6 +217,8 @@ pub enum StateValue {
     Number(Literal),
     /// A number that is set at run time and that a reset keeps.
     Coefficient(Literal),
+    /// The check word of the coefficients, as wide as a number, with these bits before the first step; a reset keeps it.
+    Check(u64),
     /// A word, 0 before the first step.
     Word,
 }
@@ -227,7 +229,7 @@ impl StateValue {
     pub fn words(&self, number: usize) -> usize {
         match self {
             StateValue::Numbers(values) => number * values.len(),
-            StateValue::Number(_) | StateValue::Coefficient(_) => number,
+            StateValue::Number(_) | StateValue::Coefficient(_) | StateValue::Check(_) => number,
             StateValue::Word => 1,
         }
     }

@@ -156,6 +156,7 @@ pub(crate) fn commit(spec: Spec<'_>, state: &State, sensed: &Sensed, duty: Term,
         previous_command: duty,
         soft_cap,
         coefficients: state.coefficients.clone(),
+        check: state.check,
         bad_count: terms.choose(sensed.sound, sensed.bad, spec.counter(0)),
         primed: terms.choose(sensed.sound, primed, spec.counter(2)),
     }

@@ -11,7 +11,7 @@ pub(crate) mod tables;
 
 pub(crate) use decide::{Command, best, commit, decide};
 pub(crate) use sense::{Sensed, measurement, sense};
-pub(crate) use state::{State, accepted, initial, reset};
+pub(crate) use state::{State, accepted, check_word, initial, reset};
 
 use policy::{Interval, Policy, Scalar};
 

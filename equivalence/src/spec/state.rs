@@ -16,6 +16,8 @@ pub(crate) struct State {
     pub soft_cap: Option<Term>,
     /// a, b, c and in the four-term form r; none without a mapping.
     pub coefficients: Vec<Term>,
+    /// Their check word, as wide as the format; none without a mapping.
+    pub check: Option<Term>,
     pub bad_count: Term,
     pub primed: Term,
 }
@@ -43,6 +45,7 @@ impl State {
                 .iter()
                 .map(|(name, _, _)| number(&format!("mapping_{name}")))
                 .collect(),
+            check: (spec.policy.mapping.is_some()).then(|| spec.terms.input("word_mapping_check", spec.float.width())),
             bad_count: spec.terms.input("bad_count", 32),
             primed: spec.terms.input("primed", 32),
         }
@@ -83,7 +86,10 @@ impl State {
         if let Some((cap, (low, high))) = self.soft_cap.zip(spec.soft_range()) {
             all.push(float.within(cap, low, high));
         }
-        all.push(accepted(spec, &self.coefficients));
+        all.extend(
+            self.check
+                .map(|check| terms.equal(check, check_word(spec, &self.coefficients))),
+        );
         all.push(terms.order("bvule", self.bad_count, spec.counter(spec.hold() + 1)));
         all.push(terms.order("bvule", self.primed, spec.counter(1)));
         terms.all(all)
@@ -137,6 +143,15 @@ fn coefficients(spec: Spec<'_>) -> Vec<(&'static str, f64, policy::Interval)> {
     all
 }
 
+/// Section 1: the check word of coefficients, whose terms are their bits.
+pub(crate) fn check_word(spec: Spec<'_>, coefficients: &[Term]) -> Term {
+    // 4B in every byte
+    let constant = 0x4B4B_4B4B_4B4B_4B4B >> (64 - spec.float.width());
+    let constant = spec.terms.bits(constant, spec.float.width());
+    let combined = |word, bits: &Term| spec.terms.binary("bvxor", word, *bits);
+    coefficients.iter().fold(constant, combined)
+}
+
 /// Section 8: whether coefficients are accepted at run time. True without a mapping.
 pub(crate) fn accepted(spec: Spec<'_>, values: &[Term]) -> Term {
     let float = spec.float;
@@ -154,7 +169,7 @@ pub(crate) fn accepted(spec: Spec<'_>, values: &[Term]) -> Term {
     spec.terms.all(all)
 }
 
-/// The state after `reset`, which keeps the coefficients of the state before.
+/// The state after `reset`, which keeps the coefficients of the state before and their check word.
 pub(crate) fn reset(spec: Spec<'_>, before: &State) -> State {
     let limits = &spec.policy.limits;
     let held = spec.policy.signals.iter().map(|signal| {
@@ -180,6 +195,7 @@ pub(crate) fn reset(spec: Spec<'_>, before: &State) -> State {
         previous_command: spec.nearest(limits.initial_duty),
         soft_cap: limits.soft_start.map(|start| spec.nearest(start.from)),
         coefficients: before.coefficients.clone(),
+        check: before.check,
         bad_count: spec.counter(0),
         primed: spec.counter(0),
     }
@@ -187,11 +203,13 @@ pub(crate) fn reset(spec: Spec<'_>, before: &State) -> State {
 
 /// The state after `init`: the coefficients are those of the file.
 pub(crate) fn initial(spec: Spec<'_>, before: &State) -> State {
+    let coefficients: Vec<Term> = coefficients(spec)
+        .iter()
+        .map(|(_, value, _)| spec.nearest(*value))
+        .collect();
     State {
-        coefficients: coefficients(spec)
-            .iter()
-            .map(|(_, value, _)| spec.nearest(*value))
-            .collect(),
+        check: before.check.map(|_| check_word(spec, &coefficients)),
+        coefficients,
         ..reset(spec, before)
     }
 }

@@ -8,6 +8,7 @@ impl Writer<'_> {
         let (n, kind) = (self.n().to_owned(), self.number.kind());
         let most = self.literal(self.number.largest());
         self.text.lines([format!("#include \"{n}.h\""), String::new()]);
+        self.vouches();
         self.contracts();
         self.text.lines([
             format!("#include \"{n}.c\""),
@@ -38,6 +39,7 @@ impl Writer<'_> {
         for word in &self.invariant.words {
             self.text.line(format!("state->{} = any_bits;", word.place));
         }
+        self.check_word(false);
         self.text
             .lines(["state->bad_count = any_word;", "state->primed = any_word;", "}", ""]);
         self.text.line(format!("static void sound({n}_state *state)"));
@@ -49,6 +51,7 @@ impl Writer<'_> {
             };
             self.text.line(format!("state->{} = {value};", word.place));
         }
+        self.check_word(true);
         let most = self.invariant.hold + 1;
         self.text.lines([
             format!("state->bad_count = Frama_C_unsigned_int_interval(0u, {most}u);"),
@@ -56,6 +59,35 @@ impl Writer<'_> {
             "}".to_owned(),
             String::new(),
         ]);
+    }
+
+    /// That the check word of a sound state is that of the coefficients: a relation, which intervals do not hold. So it is a
+    /// contract of the function that compares them, and stands for its text where a step begins with a sound state.
+    fn vouches(&mut self) {
+        if self.policy.mapping.is_none() {
+            return;
+        }
+        let (n, word) = (self.n().to_owned(), self.number.word());
+        self.text.lines([
+            format!("extern volatile {word} any_check;"),
+            "static uint32_t vouched;".to_owned(),
+            String::new(),
+            "/*@ assigns \\result \\from *state, vouched;".to_owned(),
+            "  @ ensures vouched: vouched == 0 || \\result == 0;".to_owned(),
+            "  @*/".to_owned(),
+            format!("static {word} {n}_mapping_flips(const {n}_state *state);"),
+            String::new(),
+        ]);
+    }
+
+    /// The check word: any, and whether it is taken for that of the coefficients.
+    fn check_word(&mut self, vouched: bool) {
+        if self.policy.mapping.is_some() {
+            self.text.lines([
+                "state->mapping_check = any_check;".to_owned(),
+                format!("vouched = {}u;", u32::from(vouched)),
+            ]);
+        }
     }
 
     /// Contracts of the network and of the choice of an action: shown by the entries that analyse them, given to all others.

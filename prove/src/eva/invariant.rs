@@ -44,8 +44,6 @@ pub(super) struct Invariant {
     pub memory: usize,
     /// K: bad steps bridged.
     pub hold: u32,
-    /// Whether coefficients within their ends always give a mapping that rises.
-    pub rises: bool,
 }
 
 impl Invariant {
@@ -87,7 +85,6 @@ impl Invariant {
             words: words.collect(),
             memory: state.memory.len(),
             hold: policy.fallback.hold,
-            rises: rises::<T>(policy),
         }
     }
 
@@ -95,21 +92,6 @@ impl Invariant {
     pub fn memory_word(&self, index: usize) -> Option<&Word> {
         self.words.iter().find(|word| word.place == format!("memory[{index}]"))
     }
-}
-
-/// Whether `a + r i` is above 0 for all allowed coefficients at both ends of the load current.
-fn rises<T: Real>(policy: &Policy) -> bool {
-    let Some(mapping) = policy.mapping.filter(|mapping| mapping.coefficients.r.is_some()) else {
-        return true;
-    };
-    let least = T::up(mapping.adjust_a.low).to_f64();
-    let currents = [mapping.valid_i_out.low, mapping.valid_i_out.high].map(|i| T::nearest(i).to_f64());
-    let products = [mapping.adjust_r.low, mapping.adjust_r.high].map(|r| currents.map(|i| r * i));
-    // a margin of a percent, so that no rounding matters
-    products
-        .into_iter()
-        .flatten()
-        .all(|product| 0.99 * least + product > 0.0)
 }
 
 /// How each word of the filter memories is shown, in the order of the state.

@@ -23,6 +23,14 @@ impl Number {
         }
     }
 
+    /// Name of the unsigned integer of the same width.
+    pub fn word(self) -> &'static str {
+        match self.scalar {
+            Scalar::F32 => "uint32_t",
+            Scalar::F64 => "uint64_t",
+        }
+    }
+
     /// A number of the format as a literal that reads back to the bit.
     pub fn literal(self, x: f64) -> String {
         // the shortest decimal text of a number reads back as itself

@@ -232,8 +232,10 @@ pub struct Source {
     pub duty_stray: String,
     /// Terms of a word whose sign bit is set if the state is not sound.
     pub guard: Vec<String>,
-    /// Conditions that are 1 if it is.
-    pub guard_conditions: Vec<String>,
+    /// Check word of the coefficients in the state; empty without a mapping.
+    pub mapping_held: String,
+    /// The same of those that `set_mapping` is given.
+    pub mapping_given: String,
     /// Largest count of bad steps.
     pub most_bad: String,
     /// Terms of the status word.

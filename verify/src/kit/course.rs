@@ -201,11 +201,22 @@ fn between(low: Sample, high: Sample) -> Option<Sample> {
     })
 }
 
+/// What becomes of the mapping's check word.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum CheckWord {
+    Kept,
+    /// That of the coefficients.
+    Anew,
+    /// These bits flip.
+    Flipped(u64),
+}
+
 /// Parts of the state that get other values.
 #[derive(Debug, Clone, PartialEq)]
 struct Damage<T> {
     /// Place among the numbers, and the value.
     numbers: Vec<(usize, T)>,
+    check: CheckWord,
     /// `bad_count` and `primed`.
     counters: Option<(u32, u32)>,
 }
@@ -214,6 +225,7 @@ impl<T: Real> Damage<T> {
     fn of_numbers(numbers: Vec<(usize, T)>) -> Self {
         Damage {
             numbers,
+            check: CheckWord::Kept,
             counters: None,
         }
     }
@@ -224,6 +236,11 @@ impl<T: Real> Damage<T> {
                 *number = *value;
             }
         }
+        state.mapping_check = match self.check {
+            CheckWord::Kept => state.mapping_check,
+            CheckWord::Anew => state.mapping.map(|own| own.check_word()),
+            CheckWord::Flipped(bits) => state.mapping_check.map(|check| check ^ bits),
+        };
         if let Some((bad_count, primed)) = self.counters {
             (state.bad_count, state.primed) = (bad_count, primed);
         }
@@ -236,7 +253,10 @@ fn damages<T: Real>(policy: &Policy, fresh: &Controller<T>) -> Vec<Damage<T>> {
     let (scalar, hold) = (policy.numeric_format.scalar(), policy.fallback.hold);
     let ends = fresh.sound_ends().into_iter().enumerate();
     let ends: Vec<(usize, (T, T))> = ends.filter_map(|(at, ends)| Some((at, ends?))).collect();
-    let all = |pick: fn((T, T)) -> T| Damage::of_numbers(ends.iter().map(|(at, ends)| (*at, pick(*ends))).collect());
+    let all = |pick: fn((T, T)) -> T| Damage {
+        check: CheckWord::Anew,
+        ..Damage::of_numbers(ends.iter().map(|(at, ends)| (*at, pick(*ends))).collect())
+    };
     let mut damages = vec![all(|ends| ends.0), all(|ends| ends.1)];
     for &(at, (low, high)) in &ends {
         let (below, above) = (scalar.next_down(low.to_f64()), scalar.next_up(high.to_f64()));
@@ -252,11 +272,37 @@ fn damages<T: Real>(policy: &Policy, fresh: &Controller<T>) -> Vec<Damage<T>> {
         (0, u32::MAX),
     ];
     damages.extend(counters.map(|counters| Damage {
-        numbers: Vec::new(),
         counters: Some(counters),
+        ..Damage::of_numbers(Vec::new())
     }));
+    damages.extend(of_mapping(scalar, fresh.state()));
     damages.extend(end_of_soft_start(policy, scalar, fresh.state()));
     damages
+}
+
+/// Coefficients of the mapping; they are the last of the numbers.
+fn coefficients<T: Real>(state: &State<T>) -> usize {
+    state
+        .mapping
+        .map_or(0, |mapping| if mapping.r.is_some() { 4 } else { 3 })
+}
+
+/// What the check word of the mapping alone sees: its own bits, and coefficients that go to the next number or change sign.
+fn of_mapping<T: Real>(scalar: Scalar, state: &State<T>) -> Vec<Damage<T>> {
+    // the ends of each half: where a number is two words, one of them could be left out
+    let bits = (0..32 * scalar.words()).filter(|bit| [0, 31].contains(&(bit % 32)));
+    let flips = bits.filter(|_| state.mapping_check.is_some()).map(|bit| Damage {
+        check: CheckWord::Flipped(1 << bit),
+        ..Damage::of_numbers(Vec::new())
+    });
+    let mut own = state.clone();
+    let numbers: Vec<T> = own.numbers_mut().map(|x| *x).collect();
+    let first = numbers.len() - coefficients(state);
+    let changed = numbers.into_iter().enumerate().skip(first).flat_map(|(at, x)| {
+        let next = T::nearest(scalar.next_up(x.to_f64()));
+        [next, -x].map(|x| Damage::of_numbers(vec![(at, x)]))
+    });
+    flips.chain(changed).collect()
 }
 
 /// The cap that one more step brings to the upper limit, and its neighbours.
@@ -266,12 +312,9 @@ fn end_of_soft_start<T: Real>(policy: &Policy, scalar: Scalar, state: &State<T>)
     };
     let high = policy.limits.duty.high;
     let before = scalar.nearest(high - (high - soft.from) / f64::from(soft.steps));
-    let mapping = state
-        .mapping
-        .map_or(0, |mapping| if mapping.r.is_some() { 4 } else { 3 });
-    // the cap stands before the coefficients, and the two counters are no numbers
+    // the cap stands before the coefficients
     let numbers = state.clone().numbers_mut().count();
-    let at = numbers - mapping - 1;
+    let at = numbers - coefficients(state) - 1;
     let caps = [scalar.next_down(before), before, scalar.next_up(before)];
     caps.map(|cap| Damage::of_numbers(vec![(at, T::nearest(cap))])).to_vec()
 }

@@ -2,14 +2,18 @@
 
 use policy::Scalar;
 
-use super::number::{self, number};
+use super::number;
 use super::statements::unsigned;
-use crate::program::{Guarded, Literal, Place, Program, Within};
+use crate::program::{Guarded, Place, Program, Within};
 
 /// Terms of a word whose sign bit is set if a number of the state is outside.
 pub fn terms(program: &Program) -> Vec<String> {
+    let n = &program.name;
     let terms = program.guard.numbers.iter().map(|guarded| term(program, guarded));
-    terms.collect()
+    let flips = program.mapping.iter();
+    terms
+        .chain(flips.map(|_| format!("{n}_any({n}_mapping_flips(state))")))
+        .collect()
 }
 
 /// The same of one number.
@@ -26,15 +30,15 @@ pub fn stray(program: &Program, x: &str, within: Within) -> String {
     }
 }
 
-/// The counters in the same way, and conditions that are 1 in a sound state.
-pub fn conditions(program: &Program) -> Vec<String> {
+/// The check word of coefficients that stand behind `prefix`; empty without a mapping.
+pub fn check_word(program: &Program, prefix: &str) -> String {
     let n = &program.name;
-    let zero = number(program.scalar(), Literal::exact(0.0));
-    let rising = program.guard.rising.iter().map(|current| {
-        let current = number(program.scalar(), *current);
-        format!("{n}_flag((state->mapping_a + (state->mapping_r * {current})) > {zero})")
-    });
-    rising.collect()
+    let Some(mapping) = &program.mapping else {
+        return String::new();
+    };
+    let bits = mapping.coefficients.iter();
+    let bits = bits.map(|(name, ..)| format!(" ^ {n}_bits({prefix}{})", name.name()));
+    word(program.scalar(), mapping.check_constant) + &bits.collect::<String>()
 }
 
 fn term(program: &Program, guarded: &Guarded) -> String {
@@ -53,13 +57,12 @@ fn term(program: &Program, guarded: &Guarded) -> String {
         Place::PreviousDuty => "state->previous_duty".to_owned(),
         Place::PreviousCommand => "state->previous_command".to_owned(),
         Place::SoftCap => "state->soft_cap".to_owned(),
-        Place::Coefficient(name) => format!("state->mapping_{}", name.name()),
     };
     stray(program, &place, guarded.within)
 }
 
 /// Bits as an unsigned literal; C90 has none of 64 bits.
-fn word(scalar: Scalar, bits: u64) -> String {
+pub fn word(scalar: Scalar, bits: u64) -> String {
     match scalar {
         Scalar::F32 => unsigned(bits as u32),
         Scalar::F64 => {

@@ -170,6 +170,10 @@ fn state(program: &Program) -> (Vec<Member>, Vec<String>, Vec<String>) {
                 init.push(set(name.clone(), value));
                 format!("{kind} {name}")
             }
+            StateValue::Check(bits) => {
+                init.push(format!("state->{name} = {};", guard::word(scalar, *bits)));
+                format!("{} {name}", number::kind(scalar).word)
+            }
             StateValue::Word => {
                 reset.push(format!("state->{name} = 0u;"));
                 format!("uint32_t {name}")
@@ -216,7 +220,8 @@ fn source(program: &Program) -> Source {
         duty: decide.operand(program.decide.duty),
         duty_stray: guard::stray(program, &decide.operand(program.decide.duty), program.decide.within),
         guard: guard::terms(program),
-        guard_conditions: guard::conditions(program),
+        mapping_held: guard::check_word(program, "state->mapping_"),
+        mapping_given: guard::check_word(program, ""),
         most_bad: unsigned(program.guard.bad_count),
         status_terms: bits
             .map(|(bit, flag)| format!("({} << {bit})", decide.operand(*flag)))

@@ -5,11 +5,11 @@ use proc_macro2::{Ident, TokenStream};
 use quote::quote;
 
 use super::number::{self, number};
-use super::statements::{Printer, coefficient_field};
+use super::statements::Printer;
 use super::tokens::{ident, size, word};
-use super::{guard, integrity, network, tables};
+use super::{guard, integrity, mapping, network, tables};
 use crate::lower::known_answers::{LCG, SEED, UNIT, VECTORS};
-use crate::program::{Coefficient, Element, Literal, Program, StateMember, StateValue};
+use crate::program::{Element, Literal, Program, StateMember, StateValue};
 
 /// Type and implementation.
 pub fn items(program: &Program, name: &Ident) -> TokenStream {
@@ -24,7 +24,7 @@ pub fn items(program: &Program, name: &Ident) -> TokenStream {
     let decide = decide(program);
     let advance = advance(program);
     let (eval, step) = bodies(program);
-    let set_mapping = set_mapping(program);
+    let set_mapping = mapping::set_mapping(program);
     let checks = checks(program);
     let q_values = network::q_values(program);
     quote! {
@@ -135,14 +135,19 @@ fn member(scalar: Scalar, member: &StateMember) -> (TokenStream, TokenStream) {
             let value = number(scalar, *value);
             (quote!(#name: #kind), quote!(#name: #value))
         }
+        StateValue::Check(bits) => {
+            let (kind, bits) = (number::word(scalar), guard::unsuffixed(scalar, *bits));
+            (quote!(#name: #kind), quote!(#name: #bits))
+        }
         StateValue::Word => (quote!(#name: u32), quote!(#name: 0)),
     }
 }
 
 fn lifecycle(program: &Program) -> TokenStream {
     let scalar = program.scalar();
-    let coefficients = (program.state.iter()).filter(|member| matches!(member.value, StateValue::Coefficient(_)));
-    let kept: Vec<Ident> = coefficients.map(|member| ident(&member.name)).collect();
+    let kept = |member: &&StateMember| matches!(member.value, StateValue::Coefficient(_) | StateValue::Check(_));
+    let kept = program.state.iter().filter(kept);
+    let kept: Vec<Ident> = kept.map(|member| ident(&member.name)).collect();
     let fresh = if kept.is_empty() {
         quote!(Self::new())
     } else {
@@ -153,6 +158,10 @@ fn lifecycle(program: &Program) -> TokenStream {
         match &member.value {
             StateValue::Numbers(_) => number::all_words(scalar, &quote!(self.#name)),
             StateValue::Number(_) | StateValue::Coefficient(_) => number::words(scalar, &quote!(self.#name)),
+            StateValue::Check(_) => match scalar {
+                Scalar::F32 => quote!(core::iter::once(self.#name)),
+                Scalar::F64 => quote!([self.#name as u32, (self.#name >> 32) as u32]),
+            },
             StateValue::Word => quote!(core::iter::once(self.#name)),
         }
     });
@@ -355,41 +364,6 @@ fn advance(program: &Program) -> TokenStream {
             self.primed = front.usable.wrapping_add(2).wrapping_sub(sound << 1);
         }
     }
-}
-
-fn set_mapping(program: &Program) -> Option<TokenStream> {
-    let mapping = program.mapping.as_ref()?;
-    let scalar = program.scalar();
-    let kind = number::kind(scalar);
-    let names: Vec<_> = mapping
-        .coefficients
-        .iter()
-        .map(|(name, ..)| ident(name.name()))
-        .collect();
-    let fields = mapping.coefficients.iter().map(|(name, ..)| coefficient_field(*name));
-    let mut conditions: Vec<TokenStream> = Vec::new();
-    for (name, _, low, high) in &mapping.coefficients {
-        let (name, low, high) = (ident(name.name()), number(scalar, *low), number(scalar, *high));
-        conditions.push(quote!((#name >= #low) & (#name <= #high)));
-    }
-    if mapping.coefficients.iter().any(|(name, ..)| *name == Coefficient::R) {
-        let (low, high): (Literal, Literal) = mapping.valid_i_out;
-        for end in [low, high].map(|end| number(scalar, end)) {
-            conditions.push(quote!((a + r * #end > 0.0)));
-        }
-    }
-    Some(quote! {
-        /// Replaces the coefficients of the duty ratio mapping. False, changing nothing, if one is outside its
-        /// interval or the mapping would not increase with the duty.
-        #[must_use]
-        pub fn set_mapping(&mut self, #(#names: #kind),*) -> bool {
-            let accepted = #(#conditions)&*;
-            if accepted {
-                #(self.#fields = #names;)*
-            }
-            accepted
-        }
-    })
 }
 
 fn checks(program: &Program) -> TokenStream {

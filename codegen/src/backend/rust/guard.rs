@@ -4,9 +4,8 @@ use policy::Scalar;
 use proc_macro2::{Literal as Token, TokenStream};
 use quote::quote;
 
-use super::number::{self, number};
-use super::statements::coefficient_field;
 use super::tokens::size;
+use super::{mapping, number};
 use crate::program::{Guarded, Place, Program, Within};
 
 /// The functions that compare, and the method that says whether the state is sound.
@@ -21,30 +20,36 @@ pub fn method(program: &Program) -> TokenStream {
         Scalar::F32 => quote!(stray),
         Scalar::F64 => quote!((stray >> 32) as u32),
     };
-    let mut sound = quote!(((#top | counters) >> 31) ^ 1);
-    for current in &program.guard.rising {
-        let current = number(program.scalar(), *current);
-        sound = quote!((#sound) & flag(self.mapping_a + self.mapping_r * #current > 0.0));
-    }
+    let flips = program
+        .mapping
+        .as_ref()
+        .map(|mapping| mapping::flips(program.scalar(), mapping));
+    let coefficients = flips.is_some().then(|| quote!(| any(self.mapping_flips())));
     quote! {
+        #flips
         /// 1 if the state is one that the controller can have written: a flipped bit that would decide the duty gives 0.
         #[inline(always)]
         fn sound(&self) -> u32 {
-            let stray = #(#terms)|*;
+            let stray = #(#terms)|* #coefficients;
             // each counter beside its difference: from 2^31 on the difference alone would look small again
             let counters = #most.wrapping_sub(self.bad_count) | self.bad_count | 1_u32.wrapping_sub(self.primed) | self.primed;
             // behind a barrier: of what is known to be 0 or 1 the optimiser makes a branch
-            core::hint::black_box(#sound)
+            core::hint::black_box(((#top | counters) >> 31) ^ 1)
         }
+    }
+}
+
+/// Bits as a literal.
+pub fn unsuffixed(scalar: Scalar, bits: u64) -> Token {
+    match scalar {
+        Scalar::F32 => Token::u32_unsuffixed(bits as u32),
+        Scalar::F64 => Token::u64_unsuffixed(bits),
     }
 }
 
 /// A word whose sign bit is set if `x` is outside.
 pub fn stray(scalar: Scalar, x: &TokenStream, within: Within) -> TokenStream {
-    let bits = |bits: u64| match scalar {
-        Scalar::F32 => Token::u32_unsuffixed(bits as u32),
-        Scalar::F64 => Token::u64_unsuffixed(bits),
-    };
+    let bits = |bits| unsuffixed(scalar, bits);
     match within {
         Within::Magnitude { bound } => {
             let bound = bits(bound);
@@ -81,10 +86,6 @@ fn term(scalar: Scalar, guarded: &Guarded) -> TokenStream {
         Place::PreviousDuty => quote!(self.previous_duty),
         Place::PreviousCommand => quote!(self.previous_command),
         Place::SoftCap => quote!(self.soft_cap),
-        Place::Coefficient(name) => {
-            let name = coefficient_field(name);
-            quote!(self.#name)
-        }
     };
     stray(scalar, &place, guarded.within)
 }
@@ -92,9 +93,10 @@ fn term(scalar: Scalar, guarded: &Guarded) -> TokenStream {
 /// The comparisons: integers, because a comparison of floats costs more and a NaN must be outside.
 pub fn helpers(scalar: Scalar) -> TokenStream {
     let kind = number::kind(scalar);
-    let (bits, magnitude, top) = match scalar {
-        Scalar::F32 => (quote!(u32), quote!(0x7FFF_FFFF), quote!(31)),
-        Scalar::F64 => (quote!(u64), quote!(0x7FFF_FFFF_FFFF_FFFF), quote!(63)),
+    let bits = number::word(scalar);
+    let (magnitude, top) = match scalar {
+        Scalar::F32 => (quote!(0x7FFF_FFFF), quote!(31)),
+        Scalar::F64 => (quote!(0x7FFF_FFFF_FFFF_FFFF), quote!(63)),
     };
     quote! {
         /// The sign bit is set if |x| is above the number with the bits `bound`.
@@ -116,6 +118,12 @@ pub fn helpers(scalar: Scalar) -> TokenStream {
         fn beyond(x: #kind, low: #bits, width: #bits) -> #bits {
             let above = x.to_bits().wrapping_sub(low);
             above | width.wrapping_sub(above)
+        }
+        /// The sign bit is set if any bit is.
+        #[inline(always)]
+        #[allow(dead_code)]
+        fn any(bits: #bits) -> #bits {
+            bits | (0 as #bits).wrapping_sub(bits)
         }
     }
 }

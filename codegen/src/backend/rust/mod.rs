@@ -9,6 +9,7 @@ mod integer_loops;
 mod integrity;
 pub(crate) mod kernels;
 mod loops;
+mod mapping;
 mod network;
 pub(crate) mod number;
 mod statements;

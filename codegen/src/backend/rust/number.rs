@@ -15,6 +15,14 @@ pub fn kind(scalar: Scalar) -> TokenStream {
     }
 }
 
+/// The unsigned integer of the same width.
+pub fn word(scalar: Scalar) -> TokenStream {
+    match scalar {
+        Scalar::F32 => quote!(u32),
+        Scalar::F64 => quote!(u64),
+    }
+}
+
 /// A literal without suffix; the context gives the type.
 pub fn number(scalar: Scalar, literal: Literal) -> TokenStream {
     match scalar {

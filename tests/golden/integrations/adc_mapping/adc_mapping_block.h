@@ -43,7 +43,7 @@ typedef struct {
 } adc_mapping_block_work;
 
 /* Memory of one block in doubles. */
-#define ADC_MAPPING_BLOCK_WORK 6
+#define ADC_MAPPING_BLOCK_WORK 7
 typedef char adc_mapping_block_work_fits[(sizeof(adc_mapping_block_work) <= ADC_MAPPING_BLOCK_WORK * sizeof(double)) ? 1 : -1];
 
 /* What the block answers. */

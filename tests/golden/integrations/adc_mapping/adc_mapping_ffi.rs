@@ -14,7 +14,7 @@ pub const FEATURES: usize = 3;
 /// Number of actions.
 pub const ACTIONS: usize = 3;
 /// Length of the state in words.
-pub const STATE_WORDS: usize = 11;
+pub const STATE_WORDS: usize = 12;
 /// Control period in seconds.
 pub const SAMPLE_PERIOD: f64 = 0.00002;
 /// Bits of [`Command::status`].

@@ -269,6 +269,11 @@ static uint32_t activations_beyond(float x, uint32_t bound, uint32_t width)
     }
     return stray;
 }
+
+ACTIVATIONS_SPARE static uint32_t activations_any(uint32_t bits)
+{
+    return (bits != 0u) ? ((uint32_t)1 << 31) : 0u;
+}
 #else
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float activations_select(uint32_t flag, float then, float otherwise)
@@ -328,6 +333,12 @@ ACTIVATIONS_SPARE static uint32_t activations_beyond(float x, uint32_t low, uint
 {
     const uint32_t above = activations_bits(x) - low;
     return above | (width - above);
+}
+
+/* The sign bit is set if any bit is. */
+ACTIVATIONS_SPARE static uint32_t activations_any(uint32_t bits)
+{
+    return bits | ((uint32_t)0 - bits);
 }
 #endif
 

@@ -135,6 +135,12 @@ fn beyond(x: f32, low: u32, width: u32) -> u32 {
     let above = x.to_bits().wrapping_sub(low);
     above | width.wrapping_sub(above)
 }
+/// The sign bit is set if any bit is.
+#[inline(always)]
+#[allow(dead_code)]
+fn any(bits: u32) -> u32 {
+    bits | (0 as u32).wrapping_sub(bits)
+}
 static DUTIES: [f32; ACTIONS] = [0.4, 0.5, 0.6];
 /// x limited to the magnitude with these bits, in integers so that loops over it can be vectorised
 #[inline(always)]

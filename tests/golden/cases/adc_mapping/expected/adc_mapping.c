@@ -253,6 +253,11 @@ static uint32_t adc_mapping_beyond(float x, uint32_t bound, uint32_t width)
     }
     return stray;
 }
+
+ADC_MAPPING_SPARE static uint32_t adc_mapping_any(uint32_t bits)
+{
+    return (bits != 0u) ? ((uint32_t)1 << 31) : 0u;
+}
 #else
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float adc_mapping_select(uint32_t flag, float then, float otherwise)
@@ -324,6 +329,12 @@ ADC_MAPPING_SPARE static uint32_t adc_mapping_beyond(float x, uint32_t low, uint
 {
     const uint32_t above = adc_mapping_bits(x) - low;
     return above | (width - above);
+}
+
+/* The sign bit is set if any bit is. */
+ADC_MAPPING_SPARE static uint32_t adc_mapping_any(uint32_t bits)
+{
+    return bits | ((uint32_t)0 - bits);
 }
 #endif
 
@@ -435,6 +446,12 @@ ADC_MAPPING_CODE ADC_MAPPING_APART static void adc_mapping_sense(const adc_mappi
     front->clipped = f20;
 }
 
+/* Bits that flipped in the coefficients of the mapping or in their check word: 0 as init and set_mapping leave them. */
+ADC_MAPPING_CODE ADC_MAPPING_TOGETHER static uint32_t adc_mapping_mapping_flips(const adc_mapping_state *state)
+{
+    return state->mapping_check ^ 0x4B4B4B4Bu ^ adc_mapping_bits(state->mapping_a) ^ adc_mapping_bits(state->mapping_b) ^ adc_mapping_bits(state->mapping_c) ^ adc_mapping_bits(state->mapping_r);
+}
+
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
 ADC_MAPPING_CODE ADC_MAPPING_TOGETHER static void adc_mapping_guard(const adc_mapping_state *state, adc_mapping_front *front)
 {
@@ -442,20 +459,13 @@ ADC_MAPPING_CODE ADC_MAPPING_TOGETHER static void adc_mapping_guard(const adc_ma
                          | adc_mapping_aside(state->held[1], 0x01000000u, 0x41800000u)
                          | adc_mapping_aside(state->previous_command, 0x3F666666u, 0x3F666666u)
                          | adc_mapping_beyond(state->soft_cap, 0x3DCCCCCDu, 0x01999999u)
-                         | adc_mapping_beyond(state->mapping_a, 0x3F4CCCCDu, 0x00533333u)
-                         | adc_mapping_far(state->mapping_b, 0x3CA3D70Au)
-                         | adc_mapping_far(state->mapping_c, 0x3DCCCCCCu)
-                         | adc_mapping_far(state->mapping_r, 0x3C23D70Au);
+                         | adc_mapping_any(adc_mapping_mapping_flips(state));
 #if defined(__FRAMAC__)
     const uint32_t counters = ((5u - state->bad_count) >> 31) | (state->bad_count >> 31) | (((uint32_t)1 - state->primed) >> 31) | (state->primed >> 31);
-    const uint32_t sound = (((uint32_t)(stray >> 31) | counters) ^ (uint32_t)1)
-                         & adc_mapping_flag((state->mapping_a + (state->mapping_r * -1.0f)) > 0.0f)
-                         & adc_mapping_flag((state->mapping_a + (state->mapping_r * 14.0f)) > 0.0f);
+    const uint32_t sound = (((uint32_t)(stray >> 31) | counters) ^ (uint32_t)1);
 #else
     const uint32_t counters = (5u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
-    const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1)
-                         & adc_mapping_flag((state->mapping_a + (state->mapping_r * -1.0f)) > 0.0f)
-                         & adc_mapping_flag((state->mapping_a + (state->mapping_r * 14.0f)) > 0.0f);
+    const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1);
 #endif
     front->sound = adc_mapping_flag((int)sound);
     front->usable &= sound;
@@ -841,6 +851,7 @@ ADC_MAPPING_COLD void adc_mapping_init(adc_mapping_state *state)
     state->mapping_b = -0.0015f;
     state->mapping_c = 0.004f;
     state->mapping_r = 0.0007f;
+    state->mapping_check = 0xCFB9CDEAu;
 }
 
 ADC_MAPPING_COLD uint32_t adc_mapping_set_mapping(adc_mapping_state *state, float a, float b, float c, float r)
@@ -857,6 +868,7 @@ ADC_MAPPING_COLD uint32_t adc_mapping_set_mapping(adc_mapping_state *state, floa
         state->mapping_b = b;
         state->mapping_c = c;
         state->mapping_r = r;
+        state->mapping_check = 0x4B4B4B4Bu ^ adc_mapping_bits(a) ^ adc_mapping_bits(b) ^ adc_mapping_bits(c) ^ adc_mapping_bits(r);
     }
     return accepted;
 }

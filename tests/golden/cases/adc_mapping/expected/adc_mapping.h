@@ -23,7 +23,7 @@ extern "C" {
 #define ADC_MAPPING_SIGNALS 2u
 #define ADC_MAPPING_FEATURES 3u
 #define ADC_MAPPING_ACTIONS 3u
-#define ADC_MAPPING_STATE_WORDS 11u
+#define ADC_MAPPING_STATE_WORDS 12u
 #define ADC_MAPPING_TABLE_NUMBERS 62u
 #define ADC_MAPPING_SAMPLE_PERIOD 2e-5
 
@@ -68,6 +68,7 @@ typedef struct {
     float mapping_b; /* coefficient of the duty ratio mapping */
     float mapping_c; /* coefficient of the duty ratio mapping */
     float mapping_r; /* coefficient of the duty ratio mapping */
+    uint32_t mapping_check; /* check word of the coefficients: a flipped bit of one of them is seen */
     uint32_t bad_count; /* consecutive steps with an invalid sample */
     uint32_t primed; /* 1 once the filters hold good samples, 2 after a damaged state */
 } adc_mapping_state;

@@ -14,7 +14,7 @@ pub const FEATURES: usize = 3;
 /// Number of actions.
 pub const ACTIONS: usize = 3;
 /// Length of the state in words.
-pub const STATE_WORDS: usize = 11;
+pub const STATE_WORDS: usize = 12;
 /// Control period in seconds.
 pub const SAMPLE_PERIOD: f64 = 0.00002;
 /// Bits of [`Command::status`].
@@ -136,6 +136,12 @@ fn aside(x: f32, difference: u32, high: u32) -> u32 {
 fn beyond(x: f32, low: u32, width: u32) -> u32 {
     let above = x.to_bits().wrapping_sub(low);
     above | width.wrapping_sub(above)
+}
+/// The sign bit is set if any bit is.
+#[inline(always)]
+#[allow(dead_code)]
+fn any(bits: u32) -> u32 {
+    bits | (0 as u32).wrapping_sub(bits)
 }
 static DUTIES: [f32; ACTIONS] = [0.3, 0.5, 0.7];
 /// x limited to the magnitude with these bits, in integers so that loops over it can be vectorised
@@ -393,6 +399,7 @@ pub struct Controller {
     mapping_b: f32,
     mapping_c: f32,
     mapping_r: f32,
+    mapping_check: u32,
     bad_count: u32,
     primed: u32,
 }
@@ -419,6 +426,7 @@ impl Controller {
             mapping_b: -0.0015,
             mapping_c: 0.004,
             mapping_r: 0.0007,
+            mapping_check: 3485060586,
             bad_count: 0,
             primed: 0,
         }
@@ -430,6 +438,7 @@ impl Controller {
             mapping_b: self.mapping_b,
             mapping_c: self.mapping_c,
             mapping_r: self.mapping_r,
+            mapping_check: self.mapping_check,
             ..Self::new()
         };
     }
@@ -446,6 +455,7 @@ impl Controller {
             .chain(core::iter::once(self.mapping_b.to_bits()))
             .chain(core::iter::once(self.mapping_c.to_bits()))
             .chain(core::iter::once(self.mapping_r.to_bits()))
+            .chain(core::iter::once(self.mapping_check))
             .chain(core::iter::once(self.bad_count))
             .chain(core::iter::once(self.primed));
         for (word, value) in words.iter_mut().zip(state) {
@@ -492,6 +502,8 @@ impl Controller {
             self.mapping_b = b;
             self.mapping_c = c;
             self.mapping_r = r;
+            self.mapping_check = 1263225675 ^ a.to_bits() ^ b.to_bits() ^ c.to_bits()
+                ^ r.to_bits();
         }
         accepted
     }
@@ -532,23 +544,23 @@ impl Controller {
             clipped: f20,
         }
     }
+    /// Bits that flipped in the coefficients of the mapping or in their check word: 0 as `new` and `set_mapping` leave them.
+    #[inline(always)]
+    fn mapping_flips(&self) -> u32 {
+        self.mapping_check ^ 1263225675 ^ self.mapping_a.to_bits()
+            ^ self.mapping_b.to_bits() ^ self.mapping_c.to_bits()
+            ^ self.mapping_r.to_bits()
+    }
     /// 1 if the state is one that the controller can have written: a flipped bit that would decide the duty gives 0.
     #[inline(always)]
     fn sound(&self) -> u32 {
         let stray = aside(self.held[0], 1101004800, 1101004800)
             | aside(self.held[1], 16777216, 1098907648)
             | aside(self.previous_command, 1063675494, 1063675494)
-            | beyond(self.soft_cap, 1036831949, 26843545)
-            | beyond(self.mapping_a, 1061997773, 5452595)
-            | far(self.mapping_b, 1017370378) | far(self.mapping_c, 1036831948)
-            | far(self.mapping_r, 1008981770);
+            | beyond(self.soft_cap, 1036831949, 26843545) | any(self.mapping_flips());
         let counters = 5u32.wrapping_sub(self.bad_count) | self.bad_count
             | 1_u32.wrapping_sub(self.primed) | self.primed;
-        core::hint::black_box(
-            ((((stray | counters) >> 31) ^ 1)
-                & flag(self.mapping_a + self.mapping_r * -1.0 > 0.0))
-                & flag(self.mapping_a + self.mapping_r * 14.0 > 0.0),
-        )
+        core::hint::black_box(((stray | counters) >> 31) ^ 1)
     }
     /// [`Self::sense`], and what a damaged state forbids.
     #[inline(always)]

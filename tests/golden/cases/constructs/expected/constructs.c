@@ -296,6 +296,11 @@ static uint32_t constructs_beyond(float x, uint32_t bound, uint32_t width)
     }
     return stray;
 }
+
+CONSTRUCTS_SPARE static uint32_t constructs_any(uint32_t bits)
+{
+    return (bits != 0u) ? ((uint32_t)1 << 31) : 0u;
+}
 #else
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float constructs_select(uint32_t flag, float then, float otherwise)
@@ -367,6 +372,12 @@ CONSTRUCTS_SPARE static uint32_t constructs_beyond(float x, uint32_t low, uint32
 {
     const uint32_t above = constructs_bits(x) - low;
     return above | (width - above);
+}
+
+/* The sign bit is set if any bit is. */
+CONSTRUCTS_SPARE static uint32_t constructs_any(uint32_t bits)
+{
+    return bits | ((uint32_t)0 - bits);
 }
 #endif
 
@@ -585,6 +596,12 @@ CONSTRUCTS_CODE CONSTRUCTS_APART static void constructs_sense(const constructs_s
     front->clipped = f63;
 }
 
+/* Bits that flipped in the coefficients of the mapping or in their check word: 0 as init and set_mapping leave them. */
+CONSTRUCTS_CODE CONSTRUCTS_TOGETHER static uint32_t constructs_mapping_flips(const constructs_state *state)
+{
+    return state->mapping_check ^ 0x4B4B4B4Bu ^ constructs_bits(state->mapping_a) ^ constructs_bits(state->mapping_b) ^ constructs_bits(state->mapping_c) ^ constructs_bits(state->mapping_r);
+}
+
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
 CONSTRUCTS_CODE CONSTRUCTS_TOGETHER static void constructs_guard(const constructs_state *state, constructs_front *front)
 {
@@ -603,20 +620,13 @@ CONSTRUCTS_CODE CONSTRUCTS_TOGETHER static void constructs_guard(const construct
                          | constructs_beyond(state->previous_duty, 0x3CA3D70Au, 0x028F5C29u)
                          | constructs_beyond(state->previous_command, 0x3CA3D70Au, 0x028A3D70u)
                          | constructs_beyond(state->soft_cap, 0x3EB33333u, 0x007AE147u)
-                         | constructs_beyond(state->mapping_a, 0x3F4CCCCDu, 0x00533333u)
-                         | constructs_far(state->mapping_b, 0x3CA3D70Au)
-                         | constructs_far(state->mapping_c, 0x3DCCCCCCu)
-                         | constructs_far(state->mapping_r, 0x3C23D70Au);
+                         | constructs_any(constructs_mapping_flips(state));
 #if defined(__FRAMAC__)
     const uint32_t counters = ((4u - state->bad_count) >> 31) | (state->bad_count >> 31) | (((uint32_t)1 - state->primed) >> 31) | (state->primed >> 31);
-    const uint32_t sound = (((uint32_t)(stray >> 31) | counters) ^ (uint32_t)1)
-                         & constructs_flag((state->mapping_a + (state->mapping_r * -0.5f)) > 0.0f)
-                         & constructs_flag((state->mapping_a + (state->mapping_r * 12.0f)) > 0.0f);
+    const uint32_t sound = (((uint32_t)(stray >> 31) | counters) ^ (uint32_t)1);
 #else
     const uint32_t counters = (4u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
-    const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1)
-                         & constructs_flag((state->mapping_a + (state->mapping_r * -0.5f)) > 0.0f)
-                         & constructs_flag((state->mapping_a + (state->mapping_r * 12.0f)) > 0.0f);
+    const uint32_t sound = (((stray | counters) >> 31) ^ (uint32_t)1);
 #endif
     front->sound = constructs_flag((int)sound);
     front->usable &= sound;
@@ -1184,6 +1194,7 @@ CONSTRUCTS_COLD void constructs_init(constructs_state *state)
     state->mapping_b = -0.0025f;
     state->mapping_c = 0.006f;
     state->mapping_r = 0.0009f;
+    state->mapping_check = 0xCE443D17u;
 }
 
 CONSTRUCTS_COLD uint32_t constructs_set_mapping(constructs_state *state, float a, float b, float c, float r)
@@ -1200,6 +1211,7 @@ CONSTRUCTS_COLD uint32_t constructs_set_mapping(constructs_state *state, float a
         state->mapping_b = b;
         state->mapping_c = c;
         state->mapping_r = r;
+        state->mapping_check = 0x4B4B4B4Bu ^ constructs_bits(a) ^ constructs_bits(b) ^ constructs_bits(c) ^ constructs_bits(r);
     }
     return accepted;
 }

@@ -23,7 +23,7 @@ extern "C" {
 #define CONSTRUCTS_SIGNALS 3u
 #define CONSTRUCTS_FEATURES 12u
 #define CONSTRUCTS_ACTIONS 5u
-#define CONSTRUCTS_STATE_WORDS 27u
+#define CONSTRUCTS_STATE_WORDS 28u
 #define CONSTRUCTS_TABLE_NUMBERS 299u
 #define CONSTRUCTS_SAMPLE_PERIOD 0.0001
 
@@ -79,6 +79,7 @@ typedef struct {
     float mapping_b; /* coefficient of the duty ratio mapping */
     float mapping_c; /* coefficient of the duty ratio mapping */
     float mapping_r; /* coefficient of the duty ratio mapping */
+    uint32_t mapping_check; /* check word of the coefficients: a flipped bit of one of them is seen */
     uint32_t bad_count; /* consecutive steps with an invalid sample */
     uint32_t primed; /* 1 once the filters hold good samples, 2 after a damaged state */
 } constructs_state;

@@ -228,6 +228,11 @@ static uint32_t linear_beyond(float x, uint32_t bound, uint32_t width)
     }
     return stray;
 }
+
+LINEAR_SPARE static uint32_t linear_any(uint32_t bits)
+{
+    return (bits != 0u) ? ((uint32_t)1 << 31) : 0u;
+}
 #else
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float linear_select(uint32_t flag, float then, float otherwise)
@@ -287,6 +292,12 @@ LINEAR_SPARE static uint32_t linear_beyond(float x, uint32_t low, uint32_t width
 {
     const uint32_t above = linear_bits(x) - low;
     return above | (width - above);
+}
+
+/* The sign bit is set if any bit is. */
+LINEAR_SPARE static uint32_t linear_any(uint32_t bits)
+{
+    return bits | ((uint32_t)0 - bits);
 }
 #endif
 

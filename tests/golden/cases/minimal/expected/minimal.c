@@ -237,6 +237,11 @@ static uint32_t minimal_beyond(float x, uint32_t bound, uint32_t width)
     }
     return stray;
 }
+
+MINIMAL_SPARE static uint32_t minimal_any(uint32_t bits)
+{
+    return (bits != 0u) ? ((uint32_t)1 << 31) : 0u;
+}
 #else
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float minimal_select(uint32_t flag, float then, float otherwise)
@@ -296,6 +301,12 @@ MINIMAL_SPARE static uint32_t minimal_beyond(float x, uint32_t low, uint32_t wid
 {
     const uint32_t above = minimal_bits(x) - low;
     return above | (width - above);
+}
+
+/* The sign bit is set if any bit is. */
+MINIMAL_SPARE static uint32_t minimal_any(uint32_t bits)
+{
+    return bits | ((uint32_t)0 - bits);
 }
 #endif
 

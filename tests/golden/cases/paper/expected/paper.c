@@ -259,6 +259,11 @@ static uint32_t paper_beyond(float x, uint32_t bound, uint32_t width)
     }
     return stray;
 }
+
+PAPER_SPARE static uint32_t paper_any(uint32_t bits)
+{
+    return (bits != 0u) ? ((uint32_t)1 << 31) : 0u;
+}
 #else
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float paper_select(uint32_t flag, float then, float otherwise)
@@ -330,6 +335,12 @@ PAPER_SPARE static uint32_t paper_beyond(float x, uint32_t low, uint32_t width)
 {
     const uint32_t above = paper_bits(x) - low;
     return above | (width - above);
+}
+
+/* The sign bit is set if any bit is. */
+PAPER_SPARE static uint32_t paper_any(uint32_t bits)
+{
+    return bits | ((uint32_t)0 - bits);
 }
 #endif
 
@@ -446,6 +457,12 @@ PAPER_CODE PAPER_APART static void paper_sense(const paper_state *state, const p
     front->clipped = f37;
 }
 
+/* Bits that flipped in the coefficients of the mapping or in their check word: 0 as init and set_mapping leave them. */
+PAPER_CODE PAPER_TOGETHER static uint32_t paper_mapping_flips(const paper_state *state)
+{
+    return state->mapping_check ^ 0x4B4B4B4Bu ^ paper_bits(state->mapping_a) ^ paper_bits(state->mapping_b) ^ paper_bits(state->mapping_c);
+}
+
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
 PAPER_CODE PAPER_TOGETHER static void paper_guard(const paper_state *state, paper_front *front)
 {
@@ -453,9 +470,7 @@ PAPER_CODE PAPER_TOGETHER static void paper_guard(const paper_state *state, pape
                          | paper_aside(state->held[1], 0x7DA00000u, 0x42200000u)
                          | paper_line_far(&state->memory[0], 2u, 0x43AF000Eu)
                          | paper_line_far(&state->memory[2], 2u, 0x437A0000u)
-                         | paper_beyond(state->mapping_a, 0x3EF851ECu, 0x00FFFFFFu)
-                         | paper_aside(state->mapping_b, 0x00115405u, 0x3D5566CFu)
-                         | paper_aside(state->mapping_c, 0x00656041u, 0x3E5A1CACu);
+                         | paper_any(paper_mapping_flips(state));
 #if defined(__FRAMAC__)
     const uint32_t counters = ((4u - state->bad_count) >> 31) | (state->bad_count >> 31) | (((uint32_t)1 - state->primed) >> 31) | (state->primed >> 31);
     const uint32_t sound = (((uint32_t)(stray >> 31) | counters) ^ (uint32_t)1);
@@ -839,6 +854,7 @@ PAPER_COLD void paper_init(paper_state *state)
     state->mapping_a = 0.97f;
     state->mapping_b = 0.0021f;
     state->mapping_c = 0.013f;
+    state->mapping_check = 0x736E4774u;
 }
 
 PAPER_COLD uint32_t paper_set_mapping(paper_state *state, float a, float b, float c)
@@ -851,6 +867,7 @@ PAPER_COLD uint32_t paper_set_mapping(paper_state *state, float a, float b, floa
         state->mapping_a = a;
         state->mapping_b = b;
         state->mapping_c = c;
+        state->mapping_check = 0x4B4B4B4Bu ^ paper_bits(a) ^ paper_bits(b) ^ paper_bits(c);
     }
     return accepted;
 }

@@ -23,7 +23,7 @@ extern "C" {
 #define PAPER_SIGNALS 2u
 #define PAPER_FEATURES 6u
 #define PAPER_ACTIONS 9u
-#define PAPER_STATE_WORDS 13u
+#define PAPER_STATE_WORDS 14u
 #define PAPER_TABLE_NUMBERS 113u
 #define PAPER_SAMPLE_PERIOD 0.0001
 
@@ -70,6 +70,7 @@ typedef struct {
     float mapping_a; /* coefficient of the duty ratio mapping */
     float mapping_b; /* coefficient of the duty ratio mapping */
     float mapping_c; /* coefficient of the duty ratio mapping */
+    uint32_t mapping_check; /* check word of the coefficients: a flipped bit of one of them is seen */
     uint32_t bad_count; /* consecutive steps with an invalid sample */
     uint32_t primed; /* 1 once the filters hold good samples, 2 after a damaged state */
 } paper_state;

@@ -14,7 +14,7 @@ pub const FEATURES: usize = 6;
 /// Number of actions.
 pub const ACTIONS: usize = 9;
 /// Length of the state in words.
-pub const STATE_WORDS: usize = 13;
+pub const STATE_WORDS: usize = 14;
 /// Control period in seconds.
 pub const SAMPLE_PERIOD: f64 = 0.0001;
 /// Bits of [`Command::status`].
@@ -136,6 +136,12 @@ fn aside(x: f32, difference: u32, high: u32) -> u32 {
 fn beyond(x: f32, low: u32, width: u32) -> u32 {
     let above = x.to_bits().wrapping_sub(low);
     above | width.wrapping_sub(above)
+}
+/// The sign bit is set if any bit is.
+#[inline(always)]
+#[allow(dead_code)]
+fn any(bits: u32) -> u32 {
+    bits | (0 as u32).wrapping_sub(bits)
 }
 static DUTIES: [f32; ACTIONS] = [0.45, 0.5, 0.55, 0.35, 0.45, 0.55, 0.525, 0.575, 0.6];
 /// So that no vector of weights lies across two lines of the cache.
@@ -421,6 +427,7 @@ pub struct Controller {
     mapping_a: f32,
     mapping_b: f32,
     mapping_c: f32,
+    mapping_check: u32,
     bad_count: u32,
     primed: u32,
 }
@@ -447,6 +454,7 @@ impl Controller {
             mapping_a: 0.97,
             mapping_b: 0.0021,
             mapping_c: 0.013,
+            mapping_check: 1936607092,
             bad_count: 0,
             primed: 0,
         }
@@ -457,6 +465,7 @@ impl Controller {
             mapping_a: self.mapping_a,
             mapping_b: self.mapping_b,
             mapping_c: self.mapping_c,
+            mapping_check: self.mapping_check,
             ..Self::new()
         };
     }
@@ -472,6 +481,7 @@ impl Controller {
             .chain(core::iter::once(self.mapping_a.to_bits()))
             .chain(core::iter::once(self.mapping_b.to_bits()))
             .chain(core::iter::once(self.mapping_c.to_bits()))
+            .chain(core::iter::once(self.mapping_check))
             .chain(core::iter::once(self.bad_count))
             .chain(core::iter::once(self.primed));
         for (word, value) in words.iter_mut().zip(state) {
@@ -516,6 +526,7 @@ impl Controller {
             self.mapping_a = a;
             self.mapping_b = b;
             self.mapping_c = c;
+            self.mapping_check = 1263225675 ^ a.to_bits() ^ b.to_bits() ^ c.to_bits();
         }
         accepted
     }
@@ -586,6 +597,12 @@ impl Controller {
             clipped: f37,
         }
     }
+    /// Bits that flipped in the coefficients of the mapping or in their check word: 0 as `new` and `set_mapping` leave them.
+    #[inline(always)]
+    fn mapping_flips(&self) -> u32 {
+        self.mapping_check ^ 1263225675 ^ self.mapping_a.to_bits()
+            ^ self.mapping_b.to_bits() ^ self.mapping_c.to_bits()
+    }
     /// 1 if the state is one that the controller can have written: a flipped bit that would decide the duty gives 0.
     #[inline(always)]
     fn sound(&self) -> u32 {
@@ -603,9 +620,7 @@ impl Controller {
                 .skip(2)
                 .take(2)
                 .fold(0, |stray, word| stray | far(*word, 1132068864))
-            | beyond(self.mapping_a, 1056461292, 16777215)
-            | aside(self.mapping_b, 1135621, 1029007055)
-            | aside(self.mapping_c, 6643777, 1046092972);
+            | any(self.mapping_flips());
         let counters = 4u32.wrapping_sub(self.bad_count) | self.bad_count
             | 1_u32.wrapping_sub(self.primed) | self.primed;
         core::hint::black_box(((stray | counters) >> 31) ^ 1)

@@ -343,6 +343,11 @@ static uint32_t tail_blocks_beyond(float x, uint32_t bound, uint32_t width)
     }
     return stray;
 }
+
+TAIL_BLOCKS_SPARE static uint32_t tail_blocks_any(uint32_t bits)
+{
+    return (bits != 0u) ? ((uint32_t)1 << 31) : 0u;
+}
 #else
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static float tail_blocks_select(uint32_t flag, float then, float otherwise)
@@ -402,6 +407,12 @@ TAIL_BLOCKS_SPARE static uint32_t tail_blocks_beyond(float x, uint32_t low, uint
 {
     const uint32_t above = tail_blocks_bits(x) - low;
     return above | (width - above);
+}
+
+/* The sign bit is set if any bit is. */
+TAIL_BLOCKS_SPARE static uint32_t tail_blocks_any(uint32_t bits)
+{
+    return bits | ((uint32_t)0 - bits);
 }
 #endif
 

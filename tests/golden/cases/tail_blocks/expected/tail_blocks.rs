@@ -137,6 +137,12 @@ fn beyond(x: f32, low: u32, width: u32) -> u32 {
     let above = x.to_bits().wrapping_sub(low);
     above | width.wrapping_sub(above)
 }
+/// The sign bit is set if any bit is.
+#[inline(always)]
+#[allow(dead_code)]
+fn any(bits: u32) -> u32 {
+    bits | (0 as u32).wrapping_sub(bits)
+}
 static DUTIES: [f32; ACTIONS] = [
     0.31,
     0.33,

@@ -321,6 +321,11 @@ static uint64_t wide_beyond(double x, uint64_t bound, uint64_t width)
     }
     return stray;
 }
+
+WIDE_SPARE static uint64_t wide_any(uint64_t bits)
+{
+    return (bits != 0u) ? ((uint64_t)1 << 63) : 0u;
+}
 #else
 /* flag (0 or 1) ? then : otherwise, without a branch */
 static double wide_select(uint32_t flag, double then, double otherwise)
@@ -364,6 +369,12 @@ WIDE_SPARE static uint64_t wide_beyond(double x, uint64_t low, uint64_t width)
 {
     const uint64_t above = wide_bits(x) - low;
     return above | (width - above);
+}
+
+/* The sign bit is set if any bit is. */
+WIDE_SPARE static uint64_t wide_any(uint64_t bits)
+{
+    return bits | ((uint64_t)0 - bits);
 }
 #endif
 
@@ -572,6 +583,12 @@ WIDE_CODE WIDE_APART static void wide_sense(const wide_state *state, const wide_
     front->clipped = f63;
 }
 
+/* Bits that flipped in the coefficients of the mapping or in their check word: 0 as init and set_mapping leave them. */
+WIDE_CODE WIDE_TOGETHER static uint64_t wide_mapping_flips(const wide_state *state)
+{
+    return state->mapping_check ^ (((uint64_t)0x4B4B4B4Bu << 32) | 0x4B4B4B4Bu) ^ wide_bits(state->mapping_a) ^ wide_bits(state->mapping_b) ^ wide_bits(state->mapping_c) ^ wide_bits(state->mapping_r);
+}
+
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
 WIDE_CODE WIDE_TOGETHER static void wide_guard(const wide_state *state, wide_front *front)
 {
@@ -590,20 +607,13 @@ WIDE_CODE WIDE_TOGETHER static void wide_guard(const wide_state *state, wide_fro
                          | wide_beyond(state->previous_duty, (((uint64_t)0x3F947AE1u << 32) | 0x47AE147Bu), (((uint64_t)0x0051EB85u << 32) | 0x1EB851EBu))
                          | wide_beyond(state->previous_command, (((uint64_t)0x3F947AE1u << 32) | 0x47AE147Bu), (((uint64_t)0x005147AEu << 32) | 0x147AE148u))
                          | wide_beyond(state->soft_cap, (((uint64_t)0x3FD66666u << 32) | 0x66666666u), (((uint64_t)0x000F5C28u << 32) | 0xF5C28F5Du))
-                         | wide_beyond(state->mapping_a, (((uint64_t)0x3FE99999u << 32) | 0x9999999Au), (((uint64_t)0x000A6666u << 32) | 0x66666666u))
-                         | wide_far(state->mapping_b, (((uint64_t)0x3F947AE1u << 32) | 0x47AE147Bu))
-                         | wide_far(state->mapping_c, (((uint64_t)0x3FB99999u << 32) | 0x9999999Au))
-                         | wide_far(state->mapping_r, (((uint64_t)0x3F847AE1u << 32) | 0x47AE147Bu));
+                         | wide_any(wide_mapping_flips(state));
 #if defined(__FRAMAC__)
     const uint32_t counters = ((4u - state->bad_count) >> 31) | (state->bad_count >> 31) | (((uint32_t)1 - state->primed) >> 31) | (state->primed >> 31);
-    const uint32_t sound = (((uint32_t)(stray >> 63) | counters) ^ (uint32_t)1)
-                         & wide_flag((state->mapping_a + (state->mapping_r * -0.5)) > 0.0)
-                         & wide_flag((state->mapping_a + (state->mapping_r * 12.0)) > 0.0);
+    const uint32_t sound = (((uint32_t)(stray >> 63) | counters) ^ (uint32_t)1);
 #else
     const uint32_t counters = (4u - state->bad_count) | state->bad_count | ((uint32_t)1 - state->primed) | state->primed;
-    const uint32_t sound = ((((uint32_t)(stray >> 32) | counters) >> 31) ^ (uint32_t)1)
-                         & wide_flag((state->mapping_a + (state->mapping_r * -0.5)) > 0.0)
-                         & wide_flag((state->mapping_a + (state->mapping_r * 12.0)) > 0.0);
+    const uint32_t sound = ((((uint32_t)(stray >> 32) | counters) >> 31) ^ (uint32_t)1);
 #endif
     front->sound = wide_flag((int)sound);
     front->usable &= sound;
@@ -974,6 +984,7 @@ WIDE_COLD void wide_init(wide_state *state)
     state->mapping_b = -0.0025;
     state->mapping_c = 0.006;
     state->mapping_r = 0.0009;
+    state->mapping_check = (((uint64_t)0xCBEAA580u << 32) | 0xBF5EFE23u);
 }
 
 WIDE_COLD uint32_t wide_set_mapping(wide_state *state, double a, double b, double c, double r)
@@ -990,6 +1001,7 @@ WIDE_COLD uint32_t wide_set_mapping(wide_state *state, double a, double b, doubl
         state->mapping_b = b;
         state->mapping_c = c;
         state->mapping_r = r;
+        state->mapping_check = (((uint64_t)0x4B4B4B4Bu << 32) | 0x4B4B4B4Bu) ^ wide_bits(a) ^ wide_bits(b) ^ wide_bits(c) ^ wide_bits(r);
     }
     return accepted;
 }

@@ -23,7 +23,7 @@ extern "C" {
 #define WIDE_SIGNALS 3u
 #define WIDE_FEATURES 12u
 #define WIDE_ACTIONS 5u
-#define WIDE_STATE_WORDS 52u
+#define WIDE_STATE_WORDS 54u
 #define WIDE_TABLE_NUMBERS 299u
 #define WIDE_SAMPLE_PERIOD 0.0001
 
@@ -79,6 +79,7 @@ typedef struct {
     double mapping_b; /* coefficient of the duty ratio mapping */
     double mapping_c; /* coefficient of the duty ratio mapping */
     double mapping_r; /* coefficient of the duty ratio mapping */
+    uint64_t mapping_check; /* check word of the coefficients: a flipped bit of one of them is seen */
     uint32_t bad_count; /* consecutive steps with an invalid sample */
     uint32_t primed; /* 1 once the filters hold good samples, 2 after a damaged state */
 } wide_state;

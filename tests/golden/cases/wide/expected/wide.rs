@@ -14,7 +14,7 @@ pub const FEATURES: usize = 12;
 /// Number of actions.
 pub const ACTIONS: usize = 5;
 /// Length of the state in words.
-pub const STATE_WORDS: usize = 52;
+pub const STATE_WORDS: usize = 54;
 /// Control period in seconds.
 pub const SAMPLE_PERIOD: f64 = 0.0001;
 /// Bits of [`Command::status`].
@@ -138,6 +138,12 @@ fn aside(x: f64, difference: u64, high: u64) -> u64 {
 fn beyond(x: f64, low: u64, width: u64) -> u64 {
     let above = x.to_bits().wrapping_sub(low);
     above | width.wrapping_sub(above)
+}
+/// The sign bit is set if any bit is.
+#[inline(always)]
+#[allow(dead_code)]
+fn any(bits: u64) -> u64 {
+    bits | (0 as u64).wrapping_sub(bits)
 }
 static DUTIES: [f64; ACTIONS] = [0.275, 0.4, 0.525, 0.5, 0.7];
 /// x limited to the magnitude with these bits, in integers so that loops over it can be vectorised
@@ -706,6 +712,7 @@ pub struct Controller {
     mapping_b: f64,
     mapping_c: f64,
     mapping_r: f64,
+    mapping_check: u64,
     bad_count: u32,
     primed: u32,
 }
@@ -734,6 +741,7 @@ impl Controller {
             mapping_b: -0.0025,
             mapping_c: 0.006,
             mapping_r: 0.0009,
+            mapping_check: 14693738706634735139,
             bad_count: 0,
             primed: 0,
         }
@@ -745,6 +753,7 @@ impl Controller {
             mapping_b: self.mapping_b,
             mapping_c: self.mapping_c,
             mapping_r: self.mapping_r,
+            mapping_check: self.mapping_check,
             ..Self::new()
         };
     }
@@ -799,6 +808,7 @@ impl Controller {
                 self.mapping_r.to_bits() as u32,
                 (self.mapping_r.to_bits() >> 32) as u32,
             ])
+            .chain([self.mapping_check as u32, (self.mapping_check >> 32) as u32])
             .chain(core::iter::once(self.bad_count))
             .chain(core::iter::once(self.primed));
         for (word, value) in words.iter_mut().zip(state) {
@@ -845,6 +855,8 @@ impl Controller {
             self.mapping_b = b;
             self.mapping_c = c;
             self.mapping_r = r;
+            self.mapping_check = 5425512962855750475 ^ a.to_bits() ^ b.to_bits()
+                ^ c.to_bits() ^ r.to_bits();
         }
         accepted
     }
@@ -986,6 +998,13 @@ impl Controller {
             clipped: f63,
         }
     }
+    /// Bits that flipped in the coefficients of the mapping or in their check word: 0 as `new` and `set_mapping` leave them.
+    #[inline(always)]
+    fn mapping_flips(&self) -> u64 {
+        self.mapping_check ^ 5425512962855750475 ^ self.mapping_a.to_bits()
+            ^ self.mapping_b.to_bits() ^ self.mapping_c.to_bits()
+            ^ self.mapping_r.to_bits()
+    }
     /// 1 if the state is one that the controller can have written: a flipped bit that would decide the duty gives 0.
     #[inline(always)]
     fn sound(&self) -> u32 {
@@ -1019,17 +1038,10 @@ impl Controller {
             | beyond(self.previous_duty, 4581421828931458171, 23058430092136939)
             | beyond(self.previous_command, 4581421828931458171, 22878286107042120)
             | beyond(self.soft_cap, 4599976659396224614, 4323455642275677)
-            | beyond(self.mapping_a, 4605380978949069210, 2927339757790822)
-            | far(self.mapping_b, 4581421828931458171)
-            | far(self.mapping_c, 4591870180066957722)
-            | far(self.mapping_r, 4576918229304087675);
+            | any(self.mapping_flips());
         let counters = 4u32.wrapping_sub(self.bad_count) | self.bad_count
             | 1_u32.wrapping_sub(self.primed) | self.primed;
-        core::hint::black_box(
-            (((((stray >> 32) as u32 | counters) >> 31) ^ 1)
-                & flag(self.mapping_a + self.mapping_r * -0.5 > 0.0))
-                & flag(self.mapping_a + self.mapping_r * 12.0 > 0.0),
-        )
+        core::hint::black_box((((stray >> 32) as u32 | counters) >> 31) ^ 1)
     }
     /// [`Self::sense`], and what a damaged state forbids.
     #[inline(always)]

@@ -4,7 +4,7 @@ use plant::Parameters;
 
 use crate::attribute::{Attribution, attribute};
 use crate::control::Request;
-use crate::doubts;
+use crate::doubts::{self, Doubt};
 use crate::drive::Model;
 use crate::findings::{Evidence, Findings, Gain, Hidden, Named, Noise, Value, Verdict};
 use crate::fit::State;
@@ -60,15 +60,32 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     // behind the profiles: whether a cause is nothing is read off its intervals
     let nothing = attribution.leave_out_nothing(&problem, &mut profiles);
     let named = named(&attribution, &profiles);
-    let doubts = doubts::of(&problem, &attribution, &profiles, &structure);
+    let mut doubts = doubts::of(&problem, &attribution, &profiles, &structure);
     let lattice = quantised::cause(&problem);
-    let verdict = verdict(
+    let mut verdict = verdict(
         &named,
         &lattice,
         structure.is_empty() && !doubts::forbids(&named, &doubts),
     );
-    let explained = verdict != Verdict::Unexplained;
     say(Progress::Stage("held-out records"));
+    let held_with = |state: &State, trim: f64| {
+        (!heldout.is_empty()).then(|| gain::hold(heldout, &base, &state.model, problem.sigma, trim))
+    };
+    let found = attribution.state();
+    let mut pair = held_with(found, found.starts.trim_or_none());
+    // what is no more than the step of a converter has no values that could fail to hold
+    if let (Verdict::Explained, Some(pair), false) = (verdict, &pair, named.is_empty()) {
+        let fails = pair.doubts(&problem, found);
+        if !fails.is_empty() {
+            verdict = Verdict::Unexplained;
+        }
+        doubts.extend(fails.into_iter().map(Doubt::HeldOut));
+    }
+    let explained = verdict != Verdict::Unexplained;
+    let partial_gain = match explained || named.is_empty() {
+        true => Vec::new(),
+        false => partial_gain(&problem, &attribution, pair.as_ref()),
+    };
     // what does not explain the records is no better model
     let state = if explained {
         attribution.state()
@@ -77,7 +94,9 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     };
     let trim = if explained { state.starts.trim_or_none() } else { 0.0 };
     let extended = state.model.clone();
-    let pair = (!heldout.is_empty()).then(|| gain::hold(heldout, &base, &extended, problem.sigma, trim));
+    if !explained {
+        pair = held_with(state, trim);
+    }
     let next_experiments = match explained {
         true => crate::next::experiments(&problem, &attribution, say),
         false => Vec::new(),
@@ -89,10 +108,6 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     }
     // a model that does not explain the training records says nothing about a change between them and the others
     let shifts = (pair.as_ref().filter(|_| explained)).map_or_else(Vec::new, |pair| pair.shifts(&problem, state));
-    let partial_gain = match explained || named.is_empty() {
-        true => Vec::new(),
-        false => partial_gain(&problem, &attribution, heldout, &base),
-    };
     if !explained {
         odd.extend(other_carrier(&problem, &attribution));
     }
@@ -184,18 +199,16 @@ fn held_by_data(
     for rivals in attribution.rivals.iter_mut().take(1) {
         rivals.extend(others.iter().cloned());
     }
+    for (member, rival) in crate::ties::in_part(problem, attribution, say) {
+        attribution.rivals[member].push(rival);
+    }
     profiles(problem, attribution, say)
 }
 
 /// What causes that explain only a part would gain, first where no fit has seen it.
-fn partial_gain(problem: &Problem, attribution: &Attribution, heldout: &[Record], base: &Model) -> Vec<Worth> {
-    let partial = attribution.state();
-    let mut list = Vec::new();
-    if !heldout.is_empty() {
-        let trim = partial.starts.trim_or_none();
-        list = worth::of_held(&gain::hold(heldout, base, &partial.model, problem.sigma, trim));
-    }
-    list.extend(worth::of_training(problem, &attribution.null, partial));
+fn partial_gain(problem: &Problem, attribution: &Attribution, held: Option<&Pair>) -> Vec<Worth> {
+    let mut list = held.map_or_else(Vec::new, worth::of_held);
+    list.extend(worth::of_training(problem, &attribution.null, attribution.state()));
     list
 }
 

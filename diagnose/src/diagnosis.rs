@@ -4,11 +4,11 @@ use plant::Parameters;
 
 use crate::attribute::{Attribution, attribute};
 use crate::control::Request;
-use crate::doubts;
+use crate::doubts::{self, Doubt};
 use crate::drive::Model;
 use crate::findings::{Evidence, Findings, Gain, Hidden, Named, Noise, Value, Verdict};
 use crate::fit::State;
-use crate::gain::{self, Pair};
+use crate::gain::{self, Pair, Shift};
 use crate::instants;
 use crate::noise::{self, Outlier};
 use crate::preflight;
@@ -60,15 +60,30 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     // behind the profiles: whether a cause is nothing is read off its intervals
     let nothing = attribution.leave_out_nothing(&problem, &mut profiles);
     let named = named(&attribution, &profiles);
-    let doubts = doubts::of(&problem, &attribution, &profiles, &structure);
+    let mut doubts = doubts::of(&problem, &attribution, &profiles, &structure);
     let lattice = quantised::cause(&problem);
-    let verdict = verdict(
-        &named,
-        &lattice,
-        structure.is_empty() && !doubts::forbids(&named, &doubts),
-    );
-    let explained = verdict != Verdict::Unexplained;
+    let holds = structure.is_empty() && !doubts::forbids(&named, &doubts);
+    let mut verdict = verdict(&named, &lattice, holds);
     say(Progress::Stage("held-out records"));
+    let found = attribution.state();
+    let mut pair = held(&problem, heldout, &base, found, found.starts.trim_or_none());
+    // what is no more than the step of a converter has no values that could fail to hold
+    if verdict == Verdict::Explained && !named.is_empty() {
+        let fails = pair.as_ref().map_or_else(Vec::new, |pair| pair.doubts(&problem, found));
+        verdict = if fails.is_empty() {
+            verdict
+        } else {
+            Verdict::Unexplained
+        };
+        doubts.extend(fails.into_iter().map(Doubt::HeldOut));
+    }
+    let explained = verdict != Verdict::Unexplained;
+    // of what was found: where the model as given is far off, so are the instants of load steps that fit it best
+    let notes = notes(&problem, &attribution, pair.as_ref(), &nothing);
+    let partial_gain = match explained || named.is_empty() {
+        true => Vec::new(),
+        false => partial_gain(&problem, &attribution, pair.as_ref()),
+    };
     // what does not explain the records is no better model
     let state = if explained {
         attribution.state()
@@ -77,29 +92,21 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     };
     let trim = if explained { state.starts.trim_or_none() } else { 0.0 };
     let extended = state.model.clone();
-    let pair = (!heldout.is_empty()).then(|| gain::hold(heldout, &base, &extended, problem.sigma, trim));
-    let next_experiments = match explained {
-        true => crate::next::experiments(&problem, &attribution, say),
-        false => Vec::new(),
-    };
-    let mut causes = if explained { named.clone() } else { Vec::new() };
-    if explained {
-        // a step of a converter is named beside other causes; where structure is left nothing is named, not even this
-        causes.extend(lattice);
+    // the figures are those of the file that is written
+    if !explained {
+        pair = held(&problem, heldout, &base, state, trim);
     }
+    let next_experiments = explained.then(|| crate::next::experiments(&problem, &attribution, say));
+    let mut causes = if explained { named.clone() } else { Vec::new() };
+    // a step of a converter is named beside other causes; where structure is left nothing is named, not even this
+    causes.extend(lattice.filter(|_| explained));
     // a model that does not explain the training records says nothing about a change between them and the others
     let shifts = (pair.as_ref().filter(|_| explained)).map_or_else(Vec::new, |pair| pair.shifts(&problem, state));
-    let partial_gain = match explained || named.is_empty() {
-        true => Vec::new(),
-        false => partial_gain(&problem, &attribution, heldout, &base),
-    };
+    let mut near = String::new();
     if !explained {
         odd.extend(other_carrier(&problem, &attribution));
+        near = nearest(&named, attribution.removed(&problem));
     }
-    let near = match explained {
-        true => String::new(),
-        false => nearest(&named, attribution.removed(&problem)),
-    };
     let findings = Findings {
         sentence: sentence(verdict, &causes, &structure, &doubts::said(&doubts)) + &near + &shifted(&shifts),
         verdict,
@@ -109,18 +116,12 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         structure,
         doubts: doubts::said(&doubts),
         not_detectable: hidden(&problem, &attribution),
-        next_experiments,
+        next_experiments: next_experiments.unwrap_or_default(),
         noise: Noise {
-            repairs: [odd, notes(&problem, &attribution, pair.as_ref(), &nothing)].concat(),
+            repairs: [odd, notes].concat(),
             ..noise_of(&problem, &attribution, &outliers, trim)
         },
-        gain: Gain {
-            heldout: pair.as_ref().map_or_else(Vec::new, Pair::errors),
-            mean_square: pair.as_ref().map_or([f64::NAN; 2], |pair| pair.total().into()),
-            shifts,
-            closed_loop: None,
-            closed_loop_missing: None,
-        },
+        gain: gain_of(pair.as_ref(), shifts),
     };
     Diagnosis {
         findings,
@@ -149,6 +150,22 @@ impl Diagnosis {
             }
             Err(error) => self.findings.gain.closed_loop_missing = Some(error.to_string()),
         }
+    }
+}
+
+/// The held-out records with the model as given and with `state`, if there are any.
+fn held(problem: &Problem, heldout: &[Record], base: &Model, state: &State, trim: f64) -> Option<Pair> {
+    (!heldout.is_empty()).then(|| gain::hold(heldout, base, &state.model, problem.sigma, trim))
+}
+
+/// What held-out records say; the closed loop comes later, if at all.
+fn gain_of(pair: Option<&Pair>, shifts: Vec<Shift>) -> Gain {
+    Gain {
+        heldout: pair.map_or_else(Vec::new, Pair::errors),
+        mean_square: pair.map_or([f64::NAN; 2], |pair| pair.total().into()),
+        shifts,
+        closed_loop: None,
+        closed_loop_missing: None,
     }
 }
 
@@ -184,18 +201,16 @@ fn held_by_data(
     for rivals in attribution.rivals.iter_mut().take(1) {
         rivals.extend(others.iter().cloned());
     }
+    for (member, rival) in crate::ties::in_part(problem, attribution, say) {
+        attribution.rivals[member].push(rival);
+    }
     profiles(problem, attribution, say)
 }
 
 /// What causes that explain only a part would gain, first where no fit has seen it.
-fn partial_gain(problem: &Problem, attribution: &Attribution, heldout: &[Record], base: &Model) -> Vec<Worth> {
-    let partial = attribution.state();
-    let mut list = Vec::new();
-    if !heldout.is_empty() {
-        let trim = partial.starts.trim_or_none();
-        list = worth::of_held(&gain::hold(heldout, base, &partial.model, problem.sigma, trim));
-    }
-    list.extend(worth::of_training(problem, &attribution.null, partial));
+fn partial_gain(problem: &Problem, attribution: &Attribution, held: Option<&Pair>) -> Vec<Worth> {
+    let mut list = held.map_or_else(Vec::new, worth::of_held);
+    list.extend(worth::of_training(problem, &attribution.null, attribution.state()));
     list
 }
 

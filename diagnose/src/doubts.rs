@@ -12,14 +12,28 @@ use crate::words::{si, unit};
 
 /// A value so near to its bound, as a share of its range, is at it: a fit stops there because it may not go on.
 const AT_BOUND: f64 = 0.01;
-/// A lower bound below this share of the upper one is where an effect ends to be one, not where it is cut off.
+/// A lower bound of a size below this share of the upper one is where an effect ends to be one, not where it is cut off.
 const NO_EFFECT: f64 = 0.05;
+
+/// Whether `value` lies at an end of its range `low` to `high` where it is cut off; `is_size` if the parameter makes the effect and does
+/// not only shape it: at the lowest capacitance a source's resistance is as large as ever.
+fn is_cut_off([low, high]: [f64; 2], is_size: bool, value: f64) -> bool {
+    let (near, is_natural) = (
+        AT_BOUND * (high - low),
+        is_size && low >= 0.0 && low <= NO_EFFECT * high,
+    );
+    // over a range of decades a share of it is far above its lower end
+    let near_low = if low > 0.0 { near.min(AT_BOUND * low) } else { near };
+    value > high - near || value < low + near_low && !is_natural
+}
 
 /// A doubt.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Doubt {
     /// A value at its bound: whatever else would do as well, it is not this.
     Bound(String),
+    /// Values that do not hold in records that no fit has seen.
+    HeldOut(String),
     /// An interval that reaches it: nothing is explained, a tie may be left.
     Open(String),
     /// More freedom than the data have.
@@ -53,9 +67,7 @@ pub fn of(problem: &Problem, attribution: &Attribution, profiles: &[Profile], st
         let Some([low, high, _]) = candidate.ranges.get(place).copied() else {
             continue;
         };
-        let is_natural = low >= 0.0 && low <= NO_EFFECT * high;
-        let near = AT_BOUND * (high - low);
-        let at = |value: f64| value > high - near || value < low + near && !is_natural;
+        let at = |value: f64| is_cut_off([low, high], place < candidate.sizes(), value);
         let end = if profile.value > 0.5 * (low + high) { high } else { low };
         let [found, end] = [profile.value, end].map(|value| si(value, unit(profile.unit)));
         let name = format!("{} of {}", profile.name, candidate.cause.id);
@@ -84,7 +96,7 @@ pub fn forbids(named: &[Named], doubts: &[Doubt]) -> bool {
     doubts.iter().any(|doubt| match doubt {
         Doubt::Bound(_) => !named.is_empty(),
         Doubt::Open(_) => !named.is_empty() && !tied,
-        Doubt::Freedom(_) => false,
+        Doubt::Freedom(_) | Doubt::HeldOut(_) => false,
         Doubt::Kind(_) => true,
     })
 }
@@ -92,7 +104,27 @@ pub fn forbids(named: &[Named], doubts: &[Doubt]) -> bool {
 /// The doubts in words.
 pub fn said(doubts: &[Doubt]) -> Vec<String> {
     let words = |doubt: &Doubt| match doubt {
-        Doubt::Bound(words) | Doubt::Open(words) | Doubt::Freedom(words) | Doubt::Kind(words) => words.clone(),
+        Doubt::Bound(words)
+        | Doubt::Open(words)
+        | Doubt::Freedom(words)
+        | Doubt::HeldOut(words)
+        | Doubt::Kind(words) => words.clone(),
     };
     doubts.iter().map(words).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_cut_off;
+
+    #[test]
+    fn a_size_may_end_at_nothing_and_a_shape_may_end_nowhere() {
+        let range = [1e-5, 1.0];
+        assert!(!is_cut_off(range, true, 1e-5));
+        assert!(is_cut_off(range, false, 1e-5));
+        assert!(is_cut_off(range, true, 0.995) && is_cut_off(range, false, 0.995));
+        // of five decades a hundredth is three
+        assert!(!is_cut_off(range, false, 1e-3));
+        assert!(is_cut_off([0.5, 1.5], true, 0.504));
+    }
 }

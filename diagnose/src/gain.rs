@@ -1,14 +1,17 @@
 //! What the extension is worth on records that no fit has seen.
 
 use measured::DutyIs;
+use plant::Rectifier;
 
 use crate::drive::Model;
 use crate::fit::State;
 use crate::instants;
+use crate::level::ACCURACY;
 use crate::noise;
 use crate::problem::{Problem, dot};
 use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS, Record};
 use crate::sampling;
+use crate::words::si;
 
 /// Which rows of a record are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -70,6 +73,18 @@ pub struct Held {
     pub rows: usize,
 }
 
+impl Held {
+    /// In words.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let [before, after, floor] = [self.rmse_before, self.rmse_after, self.floor].map(|value| si(value, self.unit));
+        format!(
+            "held-out: {} of {}: error {before} before, {after} after, noise {floor}",
+            self.channel, self.record
+        )
+    }
+}
+
 /// A held-out record that the extended model fits much worse than the training records: something else was different there.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Shift {
@@ -98,6 +113,8 @@ const STRETCHES: usize = 8;
 /// Mean square error over that of the training records from which on a record is another bench's: the errors are 1.6 times as
 /// large, as in [`crate::shape`]. A convention.
 const MUCH_WORSE: f64 = 2.5;
+/// The channel of the load current.
+const LOAD_CURRENT: usize = 2;
 
 /// A held-out record with both simulations, for pictures.
 #[derive(Debug, Clone)]
@@ -256,6 +273,40 @@ impl Pair {
         })
     }
 
+    /// Where the extended model leaves much more than in the training records, though none of it is the same throughout, as a sensor
+    /// that has shifted would leave: what was found does not hold there.
+    #[must_use]
+    pub fn doubts(&self, training: &Problem, at: &State) -> Vec<String> {
+        let shifts = self.shifts(training, at);
+        let is_more = |shift: &&Shift| {
+            let place = self
+                .problem
+                .records
+                .iter()
+                .position(|record| record.name == shift.record);
+            let channel = CHANNEL_NAMES.iter().position(|name| *name == shift.channel);
+            let (Some(index), Some(n)) = (place, channel) else {
+                return false;
+            };
+            // the current that is the load says nothing about the converter
+            if shift.throughout || n == LOAD_CURRENT && self.problem.records[index].metered.is_some() {
+                return false;
+            }
+            let before = noise::left(&noise::channel(&self.problem, &self.before.residual, index, n)).square;
+            let after = noise::left(&noise::channel(&self.problem, &self.after.residual, index, n)).square;
+            // a simulator that is off by ACCURACY leaves that share of what was there, in squares, as in `shape`
+            after > MUCH_WORSE * (after / (shift.ratio * shift.ratio)) + ACCURACY * ACCURACY * before
+        };
+        let words = |shift: &Shift| {
+            format!(
+                "{} of the held-out record {} is {:.1} times as far from the model with these causes as the training records: they do \
+                 not hold there",
+                shift.channel, shift.record, shift.ratio
+            )
+        };
+        shifts.iter().filter(is_more).map(words).collect()
+    }
+
     /// Records that the extended model does not fit as it fits the training records; `training` are the training records at that model.
     #[must_use]
     pub fn shifts(&self, training: &Problem, at: &State) -> Vec<Shift> {
@@ -323,13 +374,15 @@ const TRANSIENT: usize = 30;
 /// CCM or DCM by the drawn current against half the ripple.
 fn is_in(regime: Regime, problem: &Problem, record: &Record, row: usize) -> bool {
     let p = &problem.base.plant.converter;
-    let d = record.duty[row];
-    let ripple = p.v_in * d * (1.0 - d) / (p.inductance * p.f_sw);
+    let (d, v_in) = (record.duty[row], p.v_in * record.v_in_ratio);
+    let v_ccm = d * v_in;
+    let ripple = v_ccm * (1.0 - d) / (p.inductance * p.f_sw);
+    let is_discontinuous = p.rectifier == Rectifier::Diode && noise::is_discontinuous(record, row, v_ccm, ripple);
     let moved = |n: usize| record.duty[n] != record.duty[n - 1] || record.load[n] != record.load[n - 1];
     match regime {
         Regime::All => true,
-        Regime::Continuous => !noise::is_discontinuous(record, row, ripple),
-        Regime::Discontinuous => noise::is_discontinuous(record, row, ripple),
+        Regime::Continuous => !is_discontinuous,
+        Regime::Discontinuous => is_discontinuous,
         Regime::Transient => !record.settled && (row.saturating_sub(TRANSIENT).max(1)..=row).any(moved),
     }
 }

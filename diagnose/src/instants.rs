@@ -19,6 +19,7 @@ use crate::level::threshold;
 use crate::parallel;
 use crate::problem::{Problem, Starts, dot};
 use crate::record::{CHANNELS, Record};
+use crate::slopes::{LoadStep, load_steps};
 
 /// Steps closer to where the record has them are where the record has them: of about that size (5 us at 10 kHz, .1 V at 150 uF)
 /// is what two simulators of one load step differ by.
@@ -37,27 +38,29 @@ const LOAD_SENSOR: usize = 2;
 const LEAPS_BEFORE: usize = 2;
 const LEAPS_BEHIND: usize = 2;
 
-/// Rows of load steps whose instant could be estimated: with nothing else of the load near, inside a stretch.
-fn steps(record: &Record) -> Vec<usize> {
+/// Load steps whose instant could be estimated: with nothing else of the load near, inside a stretch.
+fn steps(record: &Record) -> Vec<LoadStep> {
     if record.settled || !record.dense {
         return Vec::new();
     }
-    let load = &record.load;
-    let changes: Vec<usize> = (1..load.len()).filter(|n| load[*n] != load[*n - 1]).collect();
-    let alone = |row: usize| changes.iter().all(|n| *n == row || n.abs_diff(row) >= 2 * FREE_APART);
-    let inside = |row: usize| {
-        let mut segments = record.segments.iter();
-        segments.any(|s| s.start + FREE_APART <= row && row + FREE_APART <= s.end)
+    let all = load_steps(&record.load);
+    let alone = |step: &LoadStep| {
+        let mut others = all.iter().filter(|other| *other != step);
+        others.all(|other| step.first.abs_diff(other.last).min(other.first.abs_diff(step.last)) >= 2 * FREE_APART)
     };
-    let mut rows: Vec<usize> = changes.iter().copied().filter(|n| alone(*n) && inside(*n)).collect();
-    rows.truncate(MOST);
-    rows
+    let inside = |step: &LoadStep| {
+        let mut segments = record.segments.iter();
+        segments.any(|s| s.start + FREE_APART <= step.first && step.last + FREE_APART <= s.end)
+    };
+    let mut steps: Vec<LoadStep> = all.iter().copied().filter(|step| alone(step) && inside(step)).collect();
+    steps.truncate(MOST);
+    steps
 }
 
 /// The problem with free instants in the records that are much better with them, and where the model of `at` then stands; nothing
 /// where none is.
 pub(crate) fn freed(problem: &Problem, at: &State, inflation: f64) -> Option<(Problem, State)> {
-    let all: Vec<Vec<usize>> = problem.records.iter().map(steps).collect();
+    let all: Vec<Vec<LoadStep>> = problem.records.iter().map(steps).collect();
     let tried = free(problem, &all)?;
     let state = scanned(&tried, &at.model, &at.starts);
     let needs = |index: usize| {
@@ -66,8 +69,8 @@ pub(crate) fn freed(problem: &Problem, at: &State, inflation: f64) -> Option<(Pr
         moved && gain >= threshold(all[index].len(), inflation)
     };
     let kept = all.iter().enumerate();
-    let kept: Vec<Vec<usize>> = kept
-        .map(|(index, rows)| if needs(index) { rows.clone() } else { Vec::new() })
+    let kept: Vec<Vec<LoadStep>> = kept
+        .map(|(index, steps)| if needs(index) { steps.clone() } else { Vec::new() })
         .collect();
     if kept == all {
         return Some((tried, state));
@@ -78,18 +81,24 @@ pub(crate) fn freed(problem: &Problem, at: &State, inflation: f64) -> Option<(Pr
 }
 
 /// The problem with these steps free; nothing if there are none. The load sensor is not compared around them: what it shows leaps with
-/// the load, so that a fit would be caught at the instants of its samples.
-fn free(problem: &Problem, steps: &[Vec<usize>]) -> Option<Problem> {
+/// the load, so that a fit would be caught at the instants of its samples. A slope becomes a sudden step: in its middle it moves the
+/// same charge, and between two periods nobody sees more of it.
+fn free(problem: &Problem, steps: &[Vec<LoadStep>]) -> Option<Problem> {
     let mut freed = problem.clone();
-    for ((record, masked), rows) in freed.records.iter_mut().zip(&mut freed.masked).zip(steps) {
-        for row in rows {
-            let near = row.saturating_sub(LEAPS_BEFORE)..row + LEAPS_BEHIND;
+    for ((record, masked), steps) in freed.records.iter_mut().zip(&mut freed.masked).zip(steps) {
+        let phase = record.phase;
+        for step in steps {
+            let near = step.first.saturating_sub(LEAPS_BEFORE)..step.last + LEAPS_BEHIND;
             masked[LOAD_SENSOR]
                 .get_mut(near)
                 .into_iter()
                 .for_each(|part| part.fill(true));
+            let (old, new) = (record.load[step.first - 1], record.load[step.last]);
+            for row in step.first..step.last {
+                record.load[row] = if row < step.row(phase) { old } else { new };
+            }
         }
-        record.free_steps.clone_from(rows);
+        record.free_steps = steps.iter().map(|step| step.row(phase)).collect();
     }
     (count(&freed) > 0).then_some(freed)
 }
@@ -221,6 +230,7 @@ mod tests {
         }
         let sheet = Sheet::parse(Path::new("run.csv"), text.into(), &Record::file_options()).unwrap();
         let record = Record::read(&sheet, &ColumnMap::default(), &Parameters::paper_table()).unwrap();
-        assert_eq!(steps(&record), [12, 34]);
+        let rows: Vec<usize> = steps(&record).iter().map(|step| step.first).collect();
+        assert_eq!(rows, [12, 34]);
     }
 }

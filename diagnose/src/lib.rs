@@ -46,6 +46,7 @@ pub mod record;
 mod sampling;
 mod search;
 pub mod shape;
+mod slopes;
 mod small;
 mod spectrum;
 pub mod ties;

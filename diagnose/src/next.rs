@@ -13,6 +13,10 @@ use crate::record::{CHANNELS, Record};
 /// Rows of a planned experiment: 30 ms at 10 kHz, nine periods of the paper's filter, as long as the records of the blind cases.
 const ROWS: usize = 300;
 
+/// Separation from which on an experiment is worth doing: the three standard deviations within which two explanations are a tie. With less
+/// it would end in the same tie.
+const LEAST: f64 = 3.0;
+
 /// An experiment and what it would tell apart.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Experiment {
@@ -24,7 +28,7 @@ pub struct Experiment {
     pub separation: f64,
 }
 
-/// For every tie the experiments by predicted separation, best first.
+/// For every tie the experiments by predicted separation, best first; none where none of them would break it.
 #[must_use]
 pub fn experiments(problem: &Problem, attribution: &Attribution, say: Listener<'_>) -> Vec<Experiment> {
     let Some(best) = &attribution.best else {
@@ -50,6 +54,7 @@ pub fn experiments(problem: &Problem, attribution: &Attribution, say: Listener<'
             separates: [name(&best.causes), name(&rival.causes)],
             separation: separation(problem, record, &best.state.model, &rival.state.model),
         });
+        scored.retain(|experiment| experiment.separation >= LEAST);
         scored.sort_by(|a, b| b.separation.total_cmp(&a.separation));
         list.extend(scored.into_iter().take(2));
     }

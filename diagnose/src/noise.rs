@@ -315,13 +315,13 @@ pub fn left(values: &[f64]) -> Left {
     }
 }
 
-/// Whether a row runs in DCM, as far as the sampled current says.
+/// Whether a row runs in DCM: whether the load draws less than half the `ripple` at the voltage `v_ccm` that the duty makes in CCM, where
+/// the current begins to rest. The measured voltage is higher in DCM, and need not have been measured.
 #[must_use]
-pub fn is_discontinuous(record: &Record, row: usize, ripple: f64) -> bool {
+pub fn is_discontinuous(record: &Record, row: usize, v_ccm: f64, ripple: f64) -> bool {
     let load = &record.load[row];
-    let v = record.measured[0][row];
-    let drawn = v * load.conductance + load.current + if v > 0.0 { load.power / v } else { 0.0 };
-    drawn.is_finite() && drawn < 0.5 * ripple
+    let power = if v_ccm > 0.0 { load.power / v_ccm } else { 0.0 };
+    v_ccm * load.conductance + load.current + power < 0.5 * ripple
 }
 
 #[cfg(test)]

@@ -132,7 +132,11 @@ fn ties(diagnosis: &Diagnosis) -> Section {
     let findings = &diagnosis.findings;
     let section = Section::new("Ties and the next experiment");
     if findings.next_experiments.is_empty() {
-        return section.text("No tie to be broken.");
+        let is_tied = findings.causes.iter().any(|cause| !cause.rivals.is_empty());
+        return section.text(match is_tied {
+            true => "None of the experiments that are tried would break the tie.",
+            false => "No tie to be broken.",
+        });
     }
     let heading = "Separation: standard deviations between the two explanations, initial states free. The best experiment of \
                    each tie; all are in diagnosis.json.";

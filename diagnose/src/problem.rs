@@ -5,12 +5,17 @@ use crate::causes::{Bases, Knob};
 use crate::drive::{Begin, Model, Start, simulate};
 use crate::median::median;
 use crate::record::{CHANNELS, Record};
+use crate::slopes::load_steps;
 
 /// Growth of a state over a segment of an unstable record, in time constants: an error of the initial state grows e^2, sevenfold,
 /// and the least-squares problem stays close to linear. At 4 it grows 55-fold. A convention.
 const MOST_GROWTH: f64 = 2.0;
 /// Shortest segment of an unstable record, rows: each costs two unknowns, of 30 rows of two signals.
 const SHORTEST: usize = 30;
+
+/// The channels in which a load step leaps.
+const OUTPUT_VOLTAGE: usize = 0;
+const LOAD_CURRENT: usize = 2;
 
 /// The problem.
 #[derive(Debug, Clone)]
@@ -67,6 +72,22 @@ impl Starts {
     }
 }
 
+/// Rows that are not scored from the start: what the load did before a sample inside a slope is not in the table, and the voltage
+/// leaps with it by the series resistance of the capacitor. The current of the inductor does not.
+fn in_slopes(record: &Record) -> [Vec<bool>; CHANNELS] {
+    let mut masked = std::array::from_fn(|_| vec![false; record.rows()]);
+    // between rows further apart nobody takes a load for one of a slope
+    for step in load_steps(&record.load)
+        .iter()
+        .filter(|_| record.dense && !record.settled)
+    {
+        for channel in [OUTPUT_VOLTAGE, LOAD_CURRENT] {
+            masked[channel][step.first..step.last].fill(true);
+        }
+    }
+    masked
+}
+
 impl Problem {
     /// Sets the problem up; noise and outliers are those of [`crate::noise`].
     #[must_use]
@@ -82,11 +103,8 @@ impl Problem {
             offsets.push(total);
             total += record.rows() * CHANNELS;
         }
-        let masked = records
-            .iter()
-            .map(|record| std::array::from_fn(|_| vec![false; record.rows()]));
         Problem {
-            masked: masked.collect(),
+            masked: records.iter().map(in_slopes).collect(),
             sigma: [1.0; CHANNELS],
             bases,
             base,

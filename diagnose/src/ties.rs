@@ -1,9 +1,11 @@
 //! Explanations that share no cause with the leading one and fit as well.
 
 use crate::attribute::Attribution;
+use crate::causes::Search;
 use crate::fit::Fit;
+use crate::level::ACCURACY;
 use crate::parallel;
-use crate::problem::Problem;
+use crate::problem::{Problem, axpy, dot};
 use crate::progress::{self, Listener};
 use crate::search::gained;
 
@@ -19,6 +21,79 @@ const LOOKS_AS_GOOD: f64 = 0.97;
 /// them. Conventions for time.
 const MOST_SETTLED: usize = 80;
 const MOST: usize = 8;
+
+/// A parameter this many standard deviations from the model's own value is one that the explanation needs: 95 %.
+const NEEDED: f64 = 2.0;
+/// Causes that are fitted in the place of one parameter, and how far from a tie they may look at first order, in ties. Both as for rivals of one
+/// cause: conventions for time, and for what first order does not show.
+const MOST_IN_PART: usize = 4;
+const NEAR: f64 = 5.0;
+
+/// What may stand in the place of one parameter of a cause that has several, with other values of the rest: for each the member of the
+/// leading explanation and the fit, with that parameter at the model's own value.
+///
+/// Resistance of the switch and of the diode together are a resistance of the winding and of one of them. Neither cause as a whole has
+/// a rival then, and the winding would never be named.
+#[must_use]
+pub fn in_part(problem: &Problem, attribution: &Attribution, say: Listener<'_>) -> Vec<(usize, Fit)> {
+    let Some(best) = attribution.best.as_ref() else {
+        return Vec::new();
+    };
+    let fitter = attribution.fitter(problem);
+    let places = fitter.places(&best.causes);
+    let columns_of = |cause: &usize| fitter.sensitivity(*cause, &best.state);
+    let columns: Vec<Vec<f64>> = best.causes.iter().flat_map(columns_of).collect();
+    // counts and whole periods have no columns
+    if columns.len() != places.len() {
+        return Vec::new();
+    }
+    let is_other = |cause: &usize| {
+        let own = attribution.candidates[*cause].form.search == Search::Own;
+        own && best.causes.iter().all(|known| !attribution.same(*known, *cause))
+    };
+    let others: Vec<usize> = (0..attribution.candidates.len()).filter(is_other).collect();
+    let other_columns = parallel::map(&others, columns_of);
+    let tie =
+        |member: usize| (TIE * attribution.inflation).max(4.0 * ACCURACY * ACCURACY * attribution.evidence[member]);
+    let mut looks = Vec::new();
+    for (number, place) in places.iter().enumerate() {
+        let candidate = &attribution.candidates[place.0];
+        let off = candidate.own[place.1] - best.values[number];
+        let is_needed = off.abs()
+            > NEEDED
+                * (best.covariance[number][number] * attribution.inflation)
+                    .max(0.0)
+                    .sqrt();
+        if candidate.own.len() < 2 || candidate.form.search != Search::Own || !is_needed {
+            continue;
+        }
+        let member = best.causes.iter().position(|cause| *cause == place.0).unwrap_or(0);
+        let mut left = best.state.residual.clone();
+        axpy(&mut left, -off / fitter.range(*place)[2], &columns[number]);
+        let kept: Vec<Vec<f64>> = (0..columns.len())
+            .filter(|n| *n != number)
+            .map(|n| columns[n].clone())
+            .collect();
+        for (other, own) in others.iter().zip(&other_columns) {
+            let lost = dot(&left, &left) - gained(&[&kept[..], &own[..]].concat(), &left) - best.state.chi2;
+            if lost < NEAR * tie(member) {
+                looks.push((lost, number, member, *other));
+            }
+        }
+    }
+    looks.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.3).cmp(&(b.1, b.3))));
+    looks.truncate(MOST_IN_PART);
+    let fits = progress::map(say, "parts of causes", &looks, |(_, number, member, other)| {
+        let causes = [&best.causes[..], &[*other]].concat();
+        let mut values = best.values.clone();
+        let place = places[*number];
+        values[*number] = attribution.candidates[place.0].own[place.1];
+        values.extend(&attribution.candidates[*other].own);
+        (*member, fitter.holding(&causes, &values, &best.state, Some(*number)))
+    });
+    let holds = |(member, fit): &(usize, Fit)| fit.state.chi2 <= best.state.chi2 + tie(*member);
+    fits.into_iter().filter(holds).collect()
+}
 
 /// Pairs of causes beside a leading pair with which they have nothing in common; the best first.
 #[must_use]

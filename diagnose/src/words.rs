@@ -39,15 +39,31 @@ pub fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure], dou
         Verdict::Consistent => "The model explains the records within their noise: nothing to correct.".to_owned(),
         Verdict::Explained => format!("What the model gets wrong is {}.", list(causes)),
         Verdict::Ambiguous => {
-            let ties = causes.iter().filter(|cause| !cause.rivals.is_empty()).map(|cause| {
-                let rivals: Vec<String> = cause.rivals.iter().map(|ids| ids.join(" + ")).collect();
+            let of = |cause: &Named| {
+                let (inside, whole): (Vec<_>, Vec<_>) = cause.rivals.iter().partition(|ids| ids.contains(&cause.id));
+                // what stands beside all causes takes a part of them
+                let extra = inside
+                    .iter()
+                    .flat_map(|ids| ids.iter().filter(|id| causes.iter().all(|own| own.id != **id)));
+                let extra: Vec<&str> = extra.copied().collect();
+                let part = format!("{} may in part be {}", cause.id, extra.join(" or "));
+                let rivals: Vec<String> = whole.iter().map(|ids| ids.join(" + ")).collect();
+                if rivals.is_empty() {
+                    return part;
+                }
                 let more = match rivals.len().saturating_sub(MOST_SAID) {
                     0 => String::new(),
                     more => format!(", or {more} others"),
                 };
                 let said = rivals[..rivals.len().min(MOST_SAID)].join(", or ");
-                format!("{} cannot be told from {said}{more}", cause.id)
-            });
+                let whole = format!("{} cannot be told from {said}{more}", cause.id);
+                if extra.is_empty() {
+                    whole
+                } else {
+                    format!("{whole}; {part}")
+                }
+            };
+            let ties = causes.iter().filter(|cause| !cause.rivals.is_empty()).map(of);
             format!(
                 "Best explanation: {}. But {}.",
                 list(causes),

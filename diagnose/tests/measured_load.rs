@@ -71,6 +71,37 @@ fn a_capacitor_that_lost_a_fifth_is_found_below_a_noisy_load_current() {
     assert!((c / 120e-6 - 1.0).abs() < 0.02, "{c}");
 }
 
+/// An electronic load takes half a period from one level to the next: rows lie in some of its slopes.
+fn slopes() -> Bench {
+    Bench { slope: 0.55, ..steps() }
+}
+
+#[test]
+fn a_load_that_slopes_from_level_to_level_is_one_step_inside_a_period() {
+    for noise in [0.02, 0.05] {
+        let found = diagnosed(&slopes(), noise);
+        assert_eq!(found.findings.verdict, Verdict::Consistent, "noise {noise} A");
+        let notes = found.findings.noise.repairs.join("\n");
+        for wanted in [
+            "a load current of 5 levels, with",
+            "4 load steps are taken to lie inside a switching period",
+        ] {
+            assert!(notes.contains(wanted), "{wanted}: {notes}");
+        }
+        assert!(!notes.contains("shifted"), "{notes}");
+    }
+}
+
+#[test]
+fn a_capacitor_that_lost_a_fifth_is_found_below_a_load_that_slopes() {
+    let bench = Bench {
+        capacitance: 120e-6,
+        ..slopes()
+    };
+    let c = leading(&diagnosed(&bench, 0.05), "c_wrong");
+    assert!((c / 120e-6 - 1.0).abs() < 0.02, "{c}");
+}
+
 #[test]
 fn a_duty_step_at_a_resistor_is_no_step_of_the_load() {
     let bench = Bench {

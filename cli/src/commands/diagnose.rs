@@ -9,6 +9,7 @@ use ::diagnose::control::Request;
 use ::diagnose::diagnosis::diagnose;
 use ::diagnose::extend::{extended_toml, partial_toml};
 use ::diagnose::findings::Findings;
+use ::diagnose::gain::Regime;
 use ::diagnose::page::page;
 use ::diagnose::preflight;
 use ::diagnose::progress::Progress;
@@ -86,6 +87,15 @@ fn answer(options: &Diagnose, columns: &ColumnMap, findings: &Findings) -> Resul
     for worth in &findings.partial_gain {
         lines.push(format!("partial: {}", worth.words()));
     }
+    // with a part the figures of the model as given stand in its lines
+    let unsaid = findings
+        .gain
+        .heldout
+        .iter()
+        .filter(|_| findings.partial_gain.is_empty());
+    for held in unsaid.filter(|held| held.regime == Regime::All) {
+        lines.push(held.words());
+    }
     lines.extend(findings.noise.repairs.iter().map(|repair| format!("note: {repair}")));
     if let Some(reason) = &findings.gain.closed_loop_missing {
         lines.push(format!(
@@ -130,9 +140,21 @@ impl Shown {
                 let left = spent / done.max(1) as f64 * total.saturating_sub(done) as f64;
                 let (now, stage) = (self.begun.elapsed().as_secs_f64(), &self.stage);
                 self.line
-                    .show(|| format!("{now:6.1} s  {stage}: {done} of {total}, about {left:.0} s left"));
+                    .show(|| format!("{now:6.1} s  {stage}: {done} of {total}{}", remaining(left)));
             }
         }
+    }
+}
+
+/// Least time left that is worth a word, s: the pieces of a stage differ by more, and one that takes longer than those before it would
+/// be "about 0 s left" for long.
+const WORTH_SAYING: f64 = 5.0;
+
+/// What is said of the time that is left.
+fn remaining(seconds: f64) -> String {
+    match seconds >= WORTH_SAYING {
+        true => format!(", about {seconds:.0} s left"),
+        false => String::new(),
     }
 }
 
@@ -179,7 +201,7 @@ fn records(options: &Diagnose, columns: &ColumnMap, model: &Parameters) -> Resul
         files.iter().filter_map(one).collect::<Vec<_>>()
     };
     let (train, heldout) = (read(&options.train), read(&options.heldout));
-    faults.propagate()?;
+    faults.propagate().map_err(said_once)?;
     let again = preflight::repeated(&train, &heldout);
     let message = |(held, train): (&str, &str)| {
         Message::new(format!(
@@ -192,4 +214,56 @@ fn records(options: &Diagnose, columns: &ColumnMap, model: &Parameters) -> Resul
     let again = again.into_iter().map(|pair| Fault::in_file(file, message(pair)));
     again.collect::<Sink>().propagate()?;
     Ok((train, heldout))
+}
+
+/// The same fault of several files once, with the names of the others: records of one logger share their header.
+fn said_once(mut faults: Faults) -> Faults {
+    let mut list: Vec<(Fault, Vec<String>)> = Vec::new();
+    for fault in faults.list {
+        let is_same = |known: &Fault| {
+            let mut other = known.clone();
+            other.file.clone_from(&fault.file);
+            other == fault
+        };
+        match list.iter_mut().find(|(known, _)| is_same(known)) {
+            Some((_, others)) => others.push(format!("`{}`", fault.file.display())),
+            None => list.push((fault, Vec::new())),
+        }
+    }
+    let told = |(mut fault, others): (Fault, Vec<String>)| {
+        if !others.is_empty() {
+            fault.problem = format!("{}; the same in {}", fault.problem, others.join(", "));
+        }
+        fault
+    };
+    faults.list = list.into_iter().map(told).collect();
+    faults
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use toml_input::{Fault, Faults, Message};
+
+    use super::{remaining, said_once};
+
+    #[test]
+    fn a_fault_of_three_files_is_said_once() {
+        let fault = |file: &str, problem: &str| Fault::in_file(Path::new(file), Message::new(problem));
+        let mut all = Faults::from(fault("a.csv", "no load"));
+        all.list.extend([
+            fault("b.csv", "no load"),
+            fault("b.csv", "no duty"),
+            fault("c.csv", "no load"),
+        ]);
+        let said: Vec<String> = said_once(all).iter().map(|fault| fault.problem.clone()).collect();
+        assert_eq!(said, ["no load; the same in `b.csv`, `c.csv`", "no duty"]);
+    }
+
+    #[test]
+    fn a_few_seconds_left_are_not_worth_a_word() {
+        assert_eq!(remaining(0.4), "");
+        assert_eq!(remaining(35.2), ", about 35 s left");
+    }
 }

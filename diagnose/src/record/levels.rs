@@ -12,6 +12,7 @@
 use plant::Load;
 
 use crate::noise;
+use crate::slopes::load_steps;
 
 /// Logarithms of the number of rows that a cut must gain in chi-square. The largest of n squares of white noise is about 2 ln n,
 /// and passes 4 ln n once in n records.
@@ -129,10 +130,17 @@ pub fn find(i_out: &[f64], v_out: &[f64], digit: f64, phase: f64) -> Option<Leve
     }
     let is_load = load.iter().all(|load| load.conductance >= 0.0 && load.power >= 0.0);
     is_load.then(|| Levels {
-        words: rows.words(form, &cuts),
+        words: rows.words(form, &cuts, &in_slopes(form, &load, &known)),
         load,
         noise,
     })
+}
+
+/// Places among the `known` rows that lie in a slope from one level to the next; lines have slopes of their own.
+fn in_slopes(form: Form, load: &[Load], known: &[usize]) -> Vec<usize> {
+    let steps = load_steps(load).into_iter().filter(|_| form != Form::Line);
+    let rows = steps.flat_map(|step| step.first..step.last);
+    rows.filter_map(|row| known.binary_search(&row).ok()).collect()
 }
 
 /// Sums over the rows before each, of all products that least squares needs.
@@ -271,13 +279,15 @@ impl Rows {
             && shown.slow < 1.0 + scatter(shown.blocks as f64)
     }
 
-    fn words(&self, form: Form, cuts: &[usize]) -> String {
-        let count = cuts.len() + 1;
+    /// What to say; `in_slopes` are places of rows that lie between two levels.
+    fn words(&self, form: Form, cuts: &[usize], in_slopes: &[usize]) -> String {
+        let mut stretches = self.stretches(cuts);
+        stretches.retain(|(from, _)| !in_slopes.contains(from));
+        let count = stretches.len();
         let what = match count {
             1 => "1 level".to_owned(),
             count => format!("{count} levels"),
         };
-        let stretches = self.stretches(cuts);
         let level = |(from, to): &(usize, usize)| self.values[*from..*to].iter().sum::<f64>() / (to - from) as f64;
         let small = stretches
             .windows(2)
@@ -287,8 +297,13 @@ impl Rows {
             (Form::Line, _) | (_, 0) => String::new(),
             (_, small) => format!("; {small} of its steps are so small that the row is not sure"),
         };
+        let between = match in_slopes.len() {
+            0 => String::new(),
+            1 => ", with 1 row in the slope between two,".to_owned(),
+            rows => format!(", with {rows} rows in the slopes between them,"),
+        };
         format!(
-            "i_out is taken for a {} of {what} without the noise of its meter ({}){unsure}",
+            "i_out is taken for a {} of {what}{between} without the noise of its meter ({}){unsure}",
             form.words(),
             crate::words::si(self.noise, "A")
         )

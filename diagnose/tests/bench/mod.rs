@@ -14,6 +14,9 @@ use toml_input::Faults;
 /// Longest step of the integration, periods.
 const STEP: f64 = 1.0 / 24.0;
 
+/// Pieces of a period in which a load that slopes is one.
+const PIECES: u32 = 64;
+
 /// How the switch, the inductor and the source are wired.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Wiring {
@@ -46,6 +49,8 @@ pub struct Bench {
     pub load: Vec<(f64, f64, f64)>,
     /// Load current that grows, A a period.
     pub ramp: f64,
+    /// Periods that a load step takes from one level to the next.
+    pub slope: f64,
     /// Gain and offset of `v_out`, `i_l`, `i_out`, `v_in`.
     pub gain: [f64; 4],
     pub offset: [f64; 4],
@@ -70,6 +75,7 @@ impl Default for Bench {
             duty: vec![(0, 0.5)],
             load: vec![(0.0, 0.0, 5.0)],
             ramp: 0.0,
+            slope: 0.0,
             gain: [1.0; 4],
             offset: [0.0; 4],
         }
@@ -190,9 +196,22 @@ impl Bench {
     }
 
     fn load_at(&self, periods: f64) -> (f64, f64) {
-        let last = self.load.iter().rev().find(|(at, ..)| *at <= periods + 1e-9);
-        let (_, conductance, current) = *last.unwrap_or(&self.load[0]);
-        (conductance, current + self.ramp * periods.max(0.0))
+        let last = self
+            .load
+            .iter()
+            .rposition(|(at, ..)| *at <= periods + 1e-9)
+            .unwrap_or(0);
+        let (at, conductance, current) = self.load[last];
+        let before = self.load[last.saturating_sub(1)];
+        let share = if self.slope > 0.0 {
+            ((periods - at) / self.slope).min(1.0)
+        } else {
+            1.0
+        };
+        (
+            before.1 + share * (conductance - before.1),
+            before.2 + share * (current - before.2) + self.ramp * periods.max(0.0),
+        )
     }
 
     /// Output voltage and load current.
@@ -270,6 +289,10 @@ impl Bench {
                     .map(|(at, ..)| at - row)
                     .filter(|at| (0.0..1.0).contains(at)),
             );
+            if self.slope > 0.0 {
+                // the load is one between two marks
+                marks.extend((1..PIECES).map(|n| f64::from(n) / f64::from(PIECES)));
+            }
             marks.sort_by(f64::total_cmp);
             for pair in marks.windows(2) {
                 let middle = 0.5 * (pair[0] + pair[1]);

@@ -1,0 +1,119 @@
+//! What records that no fit has seen say of an explanation. The records come from a circuit that shares nothing with the plant (`bench`).
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod bench;
+
+use bench::{Bench, Noise, model};
+use diagnose::diagnosis::{Diagnosis, diagnose};
+use diagnose::drive::Model;
+use diagnose::extend::partial_toml;
+use diagnose::findings::Verdict;
+use diagnose::gain::{Regime, hold};
+use diagnose::record::Record;
+
+fn record(name: &str, bench: &Bench, seed: u64) -> Record {
+    let columns = [("v_out", 0.1, 0.061), ("i_l", 0.05, 0.0049), ("i_out", 0.05, 0.0049)];
+    let table = bench.run().measured(&columns, &mut Noise(seed)).without(&["v_in"]);
+    table.read(name, &model()).unwrap()
+}
+
+/// A winding of 0.4 ohm in the place of 0.1, and duty steps at a steady current, which hardly show the capacitor.
+fn duty_steps() -> Bench {
+    Bench {
+        dcr: 0.4,
+        rows: 240,
+        duty: vec![(0, 0.5), (60, 0.42), (120, 0.55), (180, 0.47)],
+        ..Bench::default()
+    }
+}
+
+/// Load steps of the same bench.
+fn load_steps() -> Bench {
+    Bench {
+        duty: vec![(0, 0.5)],
+        load: vec![(0.0, 0.0, 5.0), (60.4, 0.0, 9.0), (120.7, 0.0, 4.0), (180.2, 0.0, 7.0)],
+        ..duty_steps()
+    }
+}
+
+fn diagnosed(held: &Bench) -> Diagnosis {
+    let found = diagnose(
+        &model(),
+        vec![record("train", &duty_steps(), 3)],
+        &[record("held", held, 4)],
+        &|_| (),
+    );
+    println!("{}\n{:?}", found.findings.sentence, found.findings.gain.mean_square);
+    found
+}
+
+#[test]
+fn what_holds_in_a_held_out_record_of_another_kind_stays_explained() {
+    let findings = diagnosed(&load_steps()).findings;
+    assert_eq!(findings.verdict, Verdict::Explained, "{}", findings.sentence);
+    assert_eq!(
+        findings.causes.iter().map(|cause| cause.id).collect::<Vec<_>>(),
+        ["dcr"]
+    );
+}
+
+/// A capacitor of 40 uF rings at load steps as none of 150 uF does, and nothing of it is the same throughout.
+#[test]
+fn what_does_not_hold_in_a_held_out_record_is_no_explanation() {
+    let held = Bench {
+        capacitance: 40e-6,
+        ..load_steps()
+    };
+    let found = diagnosed(&held);
+    let findings = &found.findings;
+    assert_eq!(findings.verdict, Verdict::Unexplained, "{}", findings.sentence);
+    assert!(
+        findings
+            .doubts
+            .iter()
+            .any(|doubt| doubt.contains("of the held-out record held is")),
+        "{:?}",
+        findings.doubts
+    );
+    // what was found is shown as the part that it is
+    assert!(findings.causes.is_empty());
+    assert_eq!(
+        findings.partial.iter().map(|cause| cause.id).collect::<Vec<_>>(),
+        ["dcr"]
+    );
+    assert!(findings.partial_gain.iter().any(|worth| worth.heldout));
+    let partial = partial_toml(&found).unwrap();
+    assert!(
+        partial.contains("dcr = 0.4") || partial.contains("dcr = 0.39"),
+        "{partial}"
+    );
+}
+
+/// The current of the inductor rests at 0.3 A, since half its ripple is 1.25 A: 200 V 0.5 (1 - 0.5) / (2 mH 10 kHz) / 2.
+#[test]
+fn rows_at_a_light_load_are_counted_as_dcm_without_a_voltage_too() {
+    let bench = Bench {
+        rows: 60,
+        load: vec![(0.0, 0.0, 0.3)],
+        ..Bench::default()
+    };
+    let table = bench
+        .run()
+        .without(&["v_in", "v_out", "i_out"])
+        .with("i_load", vec![0.3; 60]);
+    let record = table
+        .measured(&[("i_l", 0.01, 1e-3)], &mut Noise(5))
+        .read("light", &model())
+        .unwrap();
+    let base = Model::new(&model());
+    let pair = hold(&[record], &base, &base, [f64::NAN, 0.01, f64::NAN, f64::NAN], 0.0);
+    let rows = |regime: Regime| {
+        let held = pair.errors().into_iter().filter(|held| held.regime == regime);
+        held.map(|held| held.rows).sum::<usize>()
+    };
+    assert_eq!(
+        (rows(Regime::Continuous), rows(Regime::Discontinuous)),
+        (0, rows(Regime::All))
+    );
+}

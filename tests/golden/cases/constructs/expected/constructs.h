@@ -58,12 +58,12 @@ typedef struct {
  * Observation:
  *   error = clip(0.1 * (v_ref - v_out), -2, 2)
  *   delayed = 0.05 * delay3(v_out - v_ref) + 0.25
- *   slope = clip(0.00001 * difference(v_out), -1, 1)
+ *   slope = clip(0.00001 * difference(v_out)/T, -1, 1)
  *   smooth = 0.05 * low_pass[0.001 s](i_l) - 0.125
  *   slope_smooth = 0.0001 * derivative[0.002 s](i_l - i_out)
  *   mean = 0.02 * average5(v_out)
  *   sum = 30 * integral[-0.02, 0.03](v_ref - v_out)
- *   chain = 0.00001 * difference(average2(delay1(i_out)))
+ *   chain = 0.00001 * difference(average2(delay1(i_out)))/T
  *   affine = 0.1 * (-(2 * i_out + v_out / v_ref) * 0.25)
  *   duty_before = previous_duty
  *   command_before = 2 * previous_command - 1

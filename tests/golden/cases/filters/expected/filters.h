@@ -56,13 +56,13 @@ typedef struct {
  * State of one controller, owned by the caller. Every member is one 32-bit word or an array of them.
  * Observation:
  *   delayed = clip(0.1 * delay20(v_ref - v_out), -5, 5)
- *   slope = 0.000001 * difference(v_out)
+ *   slope = 0.000001 * difference(v_out)/T
  *   smooth = 0.05 * low_pass[0.001 s](i_l) - 0.25
  *   cut = 0.05 * low_pass[0.0003183098861837907 s](i_l)
  *   slope_smooth = 0.001 * derivative[0.002 s](v_out)
  *   mean = 0.02 * average40(v_out)
  *   sum = integral[-0.5, 0.75](v_ref - v_out)
- *   chain = clip(0.00001 * low_pass[0.0001 s](difference(average2(delay1(i_l)))), -1, 1)
+ *   chain = clip(0.00001 * low_pass[0.0001 s](difference(average2(delay1(i_l)))/T), -1, 1)
  */
 typedef struct {
     float held[2]; /* last good samples */

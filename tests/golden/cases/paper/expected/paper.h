@@ -57,10 +57,10 @@ typedef struct {
  * Observation:
  *   e = clip(0.01 * (v - v_ref), -2, 2)
  *   e_del = clip(0.01 * delay1(v - v_ref), -2, 2)
- *   de_dt = clip(0.00001 * difference(v - v_ref), -2, 2)
+ *   de_dt = clip(0.00001 * difference(v - v_ref)/T, -2, 2)
  *   v_now = clip(0.01 * v, 0, 2.5)
  *   v_del = clip(0.01 * delay1(v), 0, 2.5)
- *   dv_dt = clip(0.00001 * difference(v), -2, 2)
+ *   dv_dt = clip(0.00001 * difference(v)/T, -2, 2)
  */
 typedef struct {
     float held[2]; /* last good samples */

@@ -50,28 +50,49 @@ struct Record {
 struct Records {
     /// The policy whose code it holds.
     name: Option<String>,
-    /// A file may be what its folder's record says, or what that of a run says which was killed while it replaced files.
-    files: BTreeMap<String, Vec<FileEntry>>,
+    /// What its records say.
+    standing: BTreeMap<String, Vec<FileEntry>>,
+    /// What those of a run say which was killed while it replaced files. They vouch for a file and accuse none: what they speak of
+    /// may never have come into its place.
+    left: BTreeMap<String, Vec<FileEntry>>,
 }
 
 impl Records {
     /// Those of a folder; what cannot be read vouches for nothing.
     fn of(folder: &Path) -> Self {
-        let standing = [manifest::FILE, RECORD].map(|name| folder.join(name));
         let read = |path: PathBuf| -> Option<Record> { serde_json::from_slice(&fs::read(path).ok()?).ok() };
+        let add = |map: &mut BTreeMap<String, Vec<FileEntry>>, record: Record| {
+            for (name, entry) in record.files {
+                map.entry(name).or_default().push(entry);
+            }
+        };
         let mut all = Records::default();
+        let standing = [manifest::FILE, RECORD].map(|name| folder.join(name));
         for record in standing.into_iter().filter_map(read) {
             all.name = all.name.or(record.name.clone());
-            all.add(record);
+            add(&mut all.standing, record);
         }
         let left = staging::leftovers(folder).into_iter().filter_map(read);
-        left.for_each(|record| all.add(record));
+        left.for_each(|record| add(&mut all.left, record));
         all
     }
 
-    fn add(&mut self, record: Record) {
-        for (name, entry) in record.files {
-            self.files.entry(name).or_default().push(entry);
+    /// Whether a file is policyc's, and what is said if not.
+    fn judge(&self, name: &str, existing: &[u8]) -> (bool, &'static str) {
+        let vouches = |map: &BTreeMap<String, Vec<FileEntry>>| {
+            let mut entries = map.get(name).into_iter().flatten();
+            entries.any(|entry| is_recorded(entry, existing))
+        };
+        // a record knows more than the mark, which an edit leaves in its place
+        match self.standing.contains_key(name) {
+            true => {
+                let is_own = vouches(&self.standing) || vouches(&self.left);
+                (is_own, "was edited since policyc wrote it")
+            }
+            false => (
+                vouches(&self.left) || bears_mark(existing),
+                "was not written by policyc",
+            ),
         }
     }
 }
@@ -106,14 +127,7 @@ pub fn check(folder: &Path, files: &BTreeMap<String, Vec<u8>>, replacing: Replac
     for (name, content) in files {
         let path = folder.join(name);
         let Ok(existing) = fs::read(&path) else { continue };
-        // a record knows more than the mark, which an edit leaves in its place
-        let (is_own, what) = match records.files.get(name) {
-            Some(entries) => {
-                let is_own = entries.iter().any(|entry| is_recorded(entry, &existing));
-                (is_own, "was edited since policyc wrote it")
-            }
-            None => (bears_mark(&existing), "was not written by policyc"),
-        };
+        let (is_own, what) = records.judge(name, &existing);
         if existing == *content || is_own {
             continue;
         }
@@ -241,6 +255,25 @@ mod tests {
             panic!("must fail")
         };
         assert!(faults.to_string().contains("edited since"), "{faults}");
+    }
+
+    /// A killed run had staged its record, and another version of this file that never came into its place.
+    #[test]
+    fn what_a_killed_run_meant_to_write_accuses_nobody() {
+        let folder = tempfile::tempdir().unwrap();
+        let meant = Record {
+            files: BTreeMap::from([("a.rs".to_owned(), FileEntry::of(b"// by policyc 0: newer"))]),
+            ..Record::default()
+        };
+        let meant = serde_json::to_string(&meant).unwrap();
+        put(
+            folder.path(),
+            &files(&[("a.rs", "// by policyc 0"), (".policyc-tmp-1-0-0", &meant)]),
+        );
+        let new = files(&[("a.rs", "// by policyc 0: newest")]);
+        assert!(check(folder.path(), &new, KEEP).is_ok());
+        put(folder.path(), &files(&[("a.rs", "// mine")]));
+        assert!(check(folder.path(), &new, KEEP).is_err());
     }
 
     #[test]

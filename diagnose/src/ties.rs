@@ -22,8 +22,9 @@ const LOOKS_AS_GOOD: f64 = 0.97;
 const MOST_SETTLED: usize = 80;
 const MOST: usize = 8;
 
-/// A parameter this many standard deviations from the model's own value is one that the explanation needs: 95 %.
-const NEEDED: f64 = 2.0;
+/// A parameter is one that the explanation needs if to put it back to the model's own value costs this many ties: with less, a part of a
+/// tie is all that another cause would have to gain, which each of them does.
+const NEEDED: f64 = 4.0;
 /// Causes that are fitted in the place of one parameter, and how far from a tie they may look at first order, in ties. Both as for rivals of one
 /// cause: conventions for time, and for what first order does not show.
 const MOST_IN_PART: usize = 4;
@@ -59,15 +60,12 @@ pub fn in_part(problem: &Problem, attribution: &Attribution, say: Listener<'_>) 
     for (number, place) in places.iter().enumerate() {
         let candidate = &attribution.candidates[place.0];
         let off = candidate.own[place.1] - best.values[number];
-        let is_needed = off.abs()
-            > NEEDED
-                * (best.covariance[number][number] * attribution.inflation)
-                    .max(0.0)
-                    .sqrt();
+        let member = best.causes.iter().position(|cause| *cause == place.0).unwrap_or(0);
+        // chi-square of putting it back, all else following, at first order
+        let is_needed = off * off > NEEDED * tie(member) * best.covariance[number][number].max(0.0);
         if candidate.own.len() < 2 || candidate.form.search != Search::Own || !is_needed {
             continue;
         }
-        let member = best.causes.iter().position(|cause| *cause == place.0).unwrap_or(0);
         let mut left = best.state.residual.clone();
         axpy(&mut left, -off / fitter.range(*place)[2], &columns[number]);
         let kept: Vec<Vec<f64>> = (0..columns.len())

@@ -5,6 +5,9 @@ use crate::bounds;
 use crate::digests;
 use crate::model::{Layer, Policy};
 
+/// Least bias of a neuron whose cost is asked.
+const ALIVE: f32 = 1e-3;
+
 impl Policy {
     /// The widest hidden layer; 0 where there is none.
     #[must_use]
@@ -52,6 +55,10 @@ impl Policy {
         };
         let mut inputs: Vec<_> = policy.features.iter().map(|feature| feature.bound).collect();
         for layer in &mut policy.layers {
+            if !layer.activation.is_identity() {
+                // above nothing: a neuron that is provably 0 would be left out, and what is left would cost too little
+                layer.bias.iter_mut().for_each(|bias| *bias = bias.abs().max(ALIVE));
+            }
             layer.bounds = bounds::layer(&inputs, &layer.weights, &layer.bias, layer.activation).ok()?;
             inputs.clone_from(&layer.bounds);
         }

@@ -8,7 +8,7 @@ use targets::TargetSpec;
 
 use crate::budget::{Budget, Clock, Fit};
 use crate::costs::StepCosts;
-use crate::fitting::{Bench, Fitting};
+use crate::fitting::{Bench, Fitting, Widest};
 use crate::measure::Costs;
 
 /// Whether a step of `outputs`' cores fits into its period at a clock, and which numeric format would if it does not: one
@@ -70,7 +70,7 @@ pub fn lines(
                 ""
             }
         )),
-        Some(nearest) => lines.extend(too_slow(policy, target, outputs, clock, &nearest)?),
+        Some(nearest) => lines.extend(too_slow(policy, target, outputs, clock, &nearest)),
         None => lines.push(
             "  = hint: no numeric format fits: a faster clock, a longer period or a smaller network is needed"
                 .to_owned(),
@@ -86,7 +86,7 @@ fn too_slow(
     outputs: &[Output],
     clock: Clock,
     nearest: &Proposal,
-) -> Result<Vec<String>, CodegenError> {
+) -> Vec<String> {
     let Proposal { format, build, share } = nearest;
     let mut lines = vec![format!(
         "  = hint: no numeric format fits; next to it comes {} with {build}, {:.0} to {:.0} %: it fills a period of {:.0} us, or the \
@@ -104,25 +104,24 @@ fn too_slow(
         clock,
     };
     let policy = policy.clone().with_format(*format);
-    if let Some(share) = bench.with_relu(&policy)? {
+    if let Some(share) = bench.with_relu(&policy) {
         lines.push(format!(
             "  = hint: trained with relu the same network takes {:.0} to {:.0} %",
             100.0 * share.0,
             100.0 * share.1
         ));
     }
-    lines.push(match bench.widest(&policy)? {
-        Some(Fitting { sizes, share }) => format!(
+    match bench.widest(&policy) {
+        Widest::Fits(Fitting { sizes, share }) => lines.push(format!(
             "  = hint: this network cut down to {} takes {:.0} to {:.0} % there: train one of that size",
             arrows(&sizes),
             100.0 * share.0,
             100.0 * share.1
-        ),
-        None => {
-            "  = hint: not even four neurons in each hidden layer fit: another clock or period it must be".to_owned()
-        }
-    });
-    Ok(lines)
+        )),
+        Widest::None => lines.push("  = hint: not even four neurons in each hidden layer fit".to_owned()),
+        Widest::Unknown => {}
+    }
+    lines
 }
 
 /// `6 -> 24 -> 12`

@@ -1,8 +1,8 @@
 //! Which network would fit into a control period. Nothing is reckoned: the policy's own network is cut to size, built and
 //! counted under the target's emulator.
 
+use codegen::Output;
 use codegen::output::languages;
-use codegen::{CodegenError, Output};
 use policy::Policy;
 use policy::activation::{Activation, Shape};
 use targets::TargetSpec;
@@ -37,59 +37,66 @@ pub struct Bench<'a> {
     pub clock: Clock,
 }
 
+/// What was found.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Widest {
+    /// The widest network that fits.
+    Fits(Fitting),
+    /// Not even four neurons in each hidden layer fit.
+    None,
+    /// There is nothing to cut, or one of the networks could not be built and counted.
+    Unknown,
+}
+
 impl Bench<'_> {
-    /// The policy with its hidden layers cut to the largest width that fits; `None` if not even [`STEP`] neurons do.
-    ///
-    /// # Errors
-    /// If code for a smaller network cannot be generated.
-    pub fn widest(&self, policy: &Policy) -> Result<Option<Fitting>, CodegenError> {
-        let fits = |steps: usize| -> Result<Option<Fitting>, CodegenError> {
-            let Some(cut) = policy.cut_to(steps * STEP) else {
-                return Ok(None);
-            };
-            let fitting = self.share(&cut)?.filter(|share| share.1 <= 1.0);
-            Ok(fitting.map(|share| Fitting {
+    /// The policy with its hidden layers cut to the largest width that fits. The policy as it is does not.
+    #[must_use]
+    pub fn widest(&self, policy: &Policy) -> Widest {
+        let most = policy.widest_hidden();
+        if most <= STEP {
+            return Widest::Unknown;
+        }
+        let tried = |steps: usize| {
+            let cut = policy.cut_to(steps * STEP)?;
+            let share = self.share(&cut)?;
+            Some(Fitting {
                 sizes: sizes(&cut),
                 share,
-            }))
+            })
         };
-        let Some(mut best) = fits(1)? else { return Ok(None) };
+        let mut best = None;
         // a wider network takes longer, so the widest that fits lies between these two
-        let (mut fitting, mut missing) = (1, policy.widest_hidden().div_ceil(STEP));
+        let (mut fitting, mut missing) = (0, most.div_ceil(STEP));
         while missing > fitting + 1 {
-            let middle = fitting.midpoint(missing);
-            match fits(middle)? {
-                Some(found) => (best, fitting) = (found, middle),
-                None => missing = middle,
+            // the smallest first: where not even that fits, nothing else is tried
+            let middle = if fitting == 0 { 1 } else { fitting.midpoint(missing) };
+            match tried(middle) {
+                None => return Widest::Unknown,
+                Some(found) if found.share.1 <= 1.0 => (best, fitting) = (Some(found), middle),
+                Some(_) => missing = middle,
             }
         }
-        Ok(Some(best))
+        best.map_or(Widest::None, Widest::Fits)
     }
 
-    /// The share with ReLU in the place of an activation that is a formula; `None` where there is none such.
-    ///
-    /// # Errors
-    /// If its code cannot be generated.
-    pub fn with_relu(&self, policy: &Policy) -> Result<Option<(f64, f64)>, CodegenError> {
+    /// The share with ReLU in the place of an activation that is a formula; `None` where there is none such, or where it cannot
+    /// be counted.
+    #[must_use]
+    pub fn with_relu(&self, policy: &Policy) -> Option<(f64, f64)> {
         let is_formula = |layer: &policy::model::Layer| matches!(layer.activation.shape(), Shape::Sigmoid(_));
         if !policy.layers.iter().any(is_formula) {
-            return Ok(None);
+            return None;
         }
-        match policy.activated_by(Activation::Relu) {
-            Some(policy) => self.share(&policy),
-            None => Ok(None),
-        }
+        self.share(&policy.activated_by(Activation::Relu)?)
     }
 
-    /// What a step takes; `None` where it does not run here.
-    fn share(&self, policy: &Policy) -> Result<Option<(f64, f64)>, CodegenError> {
+    /// What a step takes; `None` where it cannot be built or does not run here.
+    fn share(&self, policy: &Policy) -> Option<(f64, f64)> {
         let cores: Vec<Output> = languages(self.outputs).iter().map(|language| language.core()).collect();
-        let files = codegen::sources(policy, self.target, &cores, None)?.files;
-        let costs = self
-            .find(policy, &files)
-            .and_then(|build| measure(policy, self.target, &files, &build).ok());
-        let budget = costs.and_then(|costs| Budget::of(&costs, self.clock, policy.sample_period));
-        Ok(budget.map(|budget| budget.share))
+        let files = codegen::sources(policy, self.target, &cores, None).ok()?.files;
+        let build = self.find(policy, &files)?;
+        let costs = measure(policy, self.target, &files, &build).ok()?;
+        Budget::of(&costs, self.clock, policy.sample_period).map(|budget| budget.share)
     }
 
     fn find(&self, policy: &Policy, files: &Files) -> Option<Build> {

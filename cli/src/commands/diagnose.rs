@@ -223,7 +223,7 @@ fn said_once(mut faults: Faults) -> Faults {
         let is_same = |known: &Fault| {
             let mut other = known.clone();
             other.file.clone_from(&fault.file);
-            other == fault
+            known.file != fault.file && other == fault
         };
         match list.iter_mut().find(|(known, _)| is_same(known)) {
             Some((_, others)) => others.push(format!("`{}`", fault.file.display())),

@@ -177,8 +177,8 @@ mod tests {
         (result, lane.steps_compared())
     }
 
-    /// Words of a step's answer: 6 observations, 12 Q values, 4 of the command, 12 of the state, purity.
-    const STEP: usize = 6 + 12 + 4 + 12 + 1;
+    /// Words of a step's answer: 6 observations, 12 Q values, 4 of the command, 13 of the state, purity.
+    const STEP: usize = 6 + 12 + 4 + 13 + 1;
 
     #[test]
     fn equal_words_are_equal() {

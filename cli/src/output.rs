@@ -247,7 +247,7 @@ mod tests {
     }
 
     /// A run that another one's half-written folder is shown to, or that finds what a killed one left.
-    fn half_written(folder: &Path, version: &str) -> (BTreeMap<String, Vec<u8>>, Staged) {
+    fn half_written(folder: &Path, version: &str) -> Staged {
         let files =
             BTreeMap::from(["a.c", "t.csv"].map(|name| (name.to_owned(), format!("{version} {name}").into_bytes())));
         let files = ownership::recorded(files).unwrap();
@@ -255,7 +255,7 @@ mod tests {
         for (name, content) in &files {
             staged.stage(name, content).unwrap();
         }
-        (files, staged)
+        staged
     }
 
     const KEEP: Replacing = Replacing { force: false };
@@ -265,7 +265,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         replace_own(folder.path(), files(&["a.c", "t.csv"]), KEEP).unwrap();
         let lock = staging::lock(folder.path()).unwrap();
-        let (_, mut staged) = half_written(folder.path(), "newer");
+        let mut staged = half_written(folder.path(), "newer");
         staged.publish_first(1).unwrap();
         let (sender, receiver) = std::sync::mpsc::channel();
         std::thread::scope(|scope| {
@@ -286,7 +286,7 @@ mod tests {
         for published in 0..=3 {
             let folder = tempfile::tempdir().unwrap();
             replace_own(folder.path(), files(&["a.c", "t.csv"]), KEEP).unwrap();
-            let (_, mut staged) = half_written(folder.path(), "newer");
+            let mut staged = half_written(folder.path(), "newer");
             staged.publish_first(published).unwrap();
             std::mem::forget(staged);
             replace_own(folder.path(), files(&["a.c", "t.csv"]), KEEP).unwrap();

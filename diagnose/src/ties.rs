@@ -3,11 +3,10 @@
 use crate::attribute::Attribution;
 use crate::causes::Search;
 use crate::fit::Fit;
-use crate::level::ACCURACY;
 use crate::parallel;
 use crate::problem::{Problem, axpy, dot};
 use crate::progress::{self, Listener};
-use crate::search::gained;
+use crate::search::{self, gained};
 
 /// As for rivals of one cause: chi-square within three standard deviations of one parameter, times the scatter, or this share of
 /// what is explained. The share is fifty times that for rivals of one cause, since nothing of the leading pair is kept. A convention in
@@ -54,8 +53,7 @@ pub fn in_part(problem: &Problem, attribution: &Attribution, say: Listener<'_>) 
     };
     let others: Vec<usize> = (0..attribution.candidates.len()).filter(is_other).collect();
     let other_columns = parallel::map(&others, columns_of);
-    let tie =
-        |member: usize| (TIE * attribution.inflation).max(4.0 * ACCURACY * ACCURACY * attribution.evidence[member]);
+    let tie = |member: usize| (TIE * attribution.inflation).max(search::TIE_SHARE * attribution.evidence[member]);
     let mut looks = Vec::new();
     for (number, place) in places.iter().enumerate() {
         let candidate = &attribution.candidates[place.0];

@@ -40,8 +40,11 @@ pub fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure], dou
         Verdict::Explained => format!("What the model gets wrong is {}.", list(causes)),
         Verdict::Ambiguous => {
             let of = |cause: &Named| {
-                let (inside, whole): (Vec<_>, Vec<_>) = cause.rivals.iter().partition(|ids| ids.contains(&cause.id));
                 // what stands beside all causes takes a part of them
+                let is_beside = |ids: &&Vec<&str>| {
+                    ids.contains(&cause.id) && ids.iter().any(|id| causes.iter().all(|own| own.id != *id))
+                };
+                let (inside, whole): (Vec<_>, Vec<_>) = cause.rivals.iter().partition(is_beside);
                 let extra = inside
                     .iter()
                     .flat_map(|ids| ids.iter().filter(|id| causes.iter().all(|own| own.id != **id)));

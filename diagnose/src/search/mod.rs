@@ -15,7 +15,7 @@ use crate::small;
 /// An explanation within this of the best is as good, in chi-square: three standard deviations of one parameter ...
 pub(crate) const TIE: f64 = 9.0;
 /// ... or within this share of what the cause explains: twice the accuracy, squared.
-const TIE_SHARE: f64 = 4.0 * ACCURACY * ACCURACY;
+pub(crate) const TIE_SHARE: f64 = 4.0 * ACCURACY * ACCURACY;
 /// What is this many times as far off may come within it when its fit is brought to an end. Rough fits stop at a gain of 0.5 a
 /// step; the factor trades time for a rival that a rough fit leaves far off. A convention.
 const NEAR: f64 = 5.0;

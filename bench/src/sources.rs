@@ -13,7 +13,7 @@ const SLICE: u32 = 32;
 /// Program in C for a board.
 pub fn c(policy: &Policy) -> String {
     let name = &policy.name;
-    let (features, actions) = (policy.features.len(), policy.actions.len());
+    let (features, actions) = (policy.features.len(), policy.outputs());
     let helpers = c_helpers(policy.numeric_format.scalar());
     let mut fields = String::new();
     for signal in &policy.signals {
@@ -133,7 +133,7 @@ pub fn naive(policy: &Policy) -> (String, String) {
 /// Program in C for a board around [`naive`].
 pub fn naive_main(policy: &Policy) -> String {
     let helpers = c_helpers(Scalar::F32);
-    let (features, actions) = (policy.features.len(), policy.actions.len());
+    let (features, actions) = (policy.features.len(), policy.outputs());
     format!(
         r#"#include "board.h"
 #include "naive.h"
@@ -162,7 +162,7 @@ int main(void)
 /// is the number, from 1, of an observation with a Q value further off than `limit` times its largest; 0 if there is none.
 pub fn peer_main(policy: &Policy, start: &str, limit: f64) -> String {
     let helpers = c_helpers(Scalar::F32);
-    let (features, actions) = (policy.features.len(), policy.actions.len());
+    let (features, actions) = (policy.features.len(), policy.outputs());
     format!(
         r#"#include "board.h"
 #include "naive.h"
@@ -202,7 +202,7 @@ int main(void)
 pub fn rust(policy: &Policy) -> String {
     let number = rust_number(policy);
     let name = &policy.name;
-    let (features, actions) = (policy.features.len(), policy.actions.len());
+    let (features, actions) = (policy.features.len(), policy.outputs());
     let fields: Vec<String> = policy
         .signals
         .iter()
@@ -291,7 +291,7 @@ fn rust_number(policy: &Policy) -> &'static str {
 pub fn host(policy: &Policy) -> String {
     let helpers = c_helpers(policy.numeric_format.scalar());
     let name = &policy.name;
-    let (features, actions) = (policy.features.len(), policy.actions.len());
+    let (features, actions) = (policy.features.len(), policy.outputs());
     format!(
         r#"#define _POSIX_C_SOURCE 199309L
 #include <stdio.h>
@@ -329,7 +329,7 @@ int main(void)
 pub fn host_rust(policy: &Policy) -> String {
     let number = rust_number(policy);
     let name = &policy.name;
-    let (features, actions) = (policy.features.len(), policy.actions.len());
+    let (features, actions) = (policy.features.len(), policy.outputs());
     format!(
         r#"#[path = "{name}.rs"]
 #[allow(dead_code)]

@@ -408,8 +408,8 @@ fn described(policy: &Policy, input: Input) -> (String, String, Interval) {
             None => ("?".to_owned(), String::new(), Interval { low: 0.0, high: 0.0 }),
         },
         Input::PreviousDuty => {
-            let mut actions = policy.actions.iter().map(|action| action.duty);
-            ("previous_duty".to_owned(), String::new(), duties(&mut actions))
+            let mut chosen = policy.head.duties().into_iter();
+            ("previous_duty".to_owned(), String::new(), duties(&mut chosen))
         }
         Input::PreviousCommand => {
             let limits = policy.limits.duty;

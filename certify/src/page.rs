@@ -87,7 +87,7 @@ pub fn map(policy: &Policy, certificate: &Certificate) -> Result<Option<Svg>, Re
             .collect()
     };
     let duty = |action: &Option<usize>| {
-        let action = action.and_then(|action| policy.actions.get(action));
+        let action = action.and_then(|action| policy.actions().get(action));
         action.map_or(f64::NAN, |action| action.duty)
     };
     let cells: Vec<f64> = map.actions.iter().map(duty).collect();
@@ -164,7 +164,7 @@ fn bounds(policy: &Policy, certificate: &Certificate) -> Section {
         .number("duty", 4)
         .text("every state")
         .text("every observation of the box");
-    for (index, action) in policy.actions.iter().enumerate() {
+    for (index, action) in policy.actions().iter().enumerate() {
         let bound = |bounds: &[f64]| Cell::Text(bounds.get(index).map(|b| digits(*b)).unwrap_or_default());
         table = table.row([
             Cell::Text(index.to_string()),

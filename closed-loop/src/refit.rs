@@ -6,7 +6,7 @@ use drm::acquire::{Bench, Hold, LoadSetting, Plan, PlanPoint, Protocol, measure}
 use drm::formula::Losses;
 use drm::{Conduction, DutyRatioMap, FitOptions, Table, TableOptions};
 use plant::{Load, Parameters, Signals};
-use policy::{Action, Interval, Policy};
+use policy::{Interval, Policy};
 use toml_input::Message;
 
 use crate::environment::{Environment, LoadPath, Start};
@@ -91,7 +91,7 @@ impl Refit<'_> {
     /// If a load or voltage makes no sense.
     pub fn plan(&self, v_in: f64) -> Result<Plan, Error> {
         let own = self.nominal.converter.v_in;
-        let (low, high) = duties(&self.policy.actions);
+        let (low, high) = duties(&self.policy);
         let low = (low * own).max((1.0 - BESIDE) * self.v_ref);
         // 3 % for what a real converter loses at full duty
         let high = (high * own).min((1.0 + BESIDE) * self.v_ref).min(0.97 * v_in.min(own));
@@ -174,7 +174,7 @@ impl Refit<'_> {
 
     /// Whether the policy's duty limits cut off what the mapping makes of its actions.
     fn cut_off(&self, map: &DutyRatioMap) -> Option<String> {
-        let (low, high) = duties(&self.policy.actions);
+        let (low, high) = duties(&self.policy);
         let mapped = DutyRatioMap {
             valid_d_sim: Interval { low, high },
             ..*map
@@ -207,8 +207,8 @@ pub fn needs_mapping(policy: &Policy) -> Result<(), Error> {
     Ok(())
 }
 
-/// Smallest and largest duty of the actions.
-fn duties(actions: &[Action]) -> (f64, f64) {
-    let all = actions.iter().map(|action| action.duty);
+/// Smallest and largest duty before the mapping.
+fn duties(policy: &Policy) -> (f64, f64) {
+    let all = policy.head.duties().into_iter();
     all.fold((1.0, 0.0), |(low, high), duty| (duty.min(low), duty.max(high)))
 }

@@ -7,7 +7,7 @@ use crate::backend::fmu::Fmi;
 use crate::backend::kit::Material;
 use crate::files::{CodegenError, GeneratedFiles};
 use crate::output::Output;
-use crate::program::{Element, Literal, Op, Program};
+use crate::program::{Block, Element, Literal, Op, Program};
 use crate::stamp::stamp;
 use crate::{backend, lower, manifest, output};
 
@@ -69,13 +69,18 @@ fn check_subnormals(program: &Program, target: &TargetSpec) -> Result<(), Codege
         let found = table.values.iter().filter(|value| is_flushed(value));
         found.map(|value| (format!("the table `{}`", table.name), value.value()))
     });
-    let constants = program.front.block.ops.iter().filter_map(|op| match op {
-        Op::Constant(value) => Some(*value),
-        _ => None,
-    });
-    let in_features = constants.map(|value| ("the features".to_owned(), value));
-    let in_duties = program.duties.iter().map(|value| ("the duties".to_owned(), *value));
+    let constants = |block: &Block, place: &str| {
+        let constant = |op: &Op| match op {
+            Op::Constant(value) => Some((place.to_owned(), *value)),
+            _ => None,
+        };
+        block.ops.iter().filter_map(constant).collect::<Vec<_>>().into_iter()
+    };
+    let in_features = constants(&program.front.block, "the features");
+    let in_command = constants(&program.decide.block, "the continuous head, the mapping or the limits");
+    let in_duties = program.head.duties().iter().map(|value| ("the duties".to_owned(), *value));
     let elsewhere = in_features
+        .chain(in_command)
         .chain(in_duties)
         .filter(|(_, value)| is_flushed(value))
         .map(|(place, value)| (place, value.value()));

@@ -122,7 +122,7 @@ pub fn sizes(policy: &Policy, target: &TargetSpec) -> Sizes {
         signals: policy.signals.len(),
         features: policy.features.len(),
         layers: policy.layers.iter().map(|layer| layer.outputs).collect(),
-        actions: policy.actions.len(),
+        actions: policy.outputs(),
         macs: program.macs(),
         table_bytes: program.table_bytes(),
         state_bytes: 4 * program.state_words(),

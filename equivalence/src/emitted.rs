@@ -63,7 +63,7 @@ impl<'a> Network<'a> {
             true => ("output", I32),
             false => ("q", Kind::Float(self.spec.float.format)),
         };
-        let actions = 0..self.spec.policy.actions.len();
+        let actions = 0..self.spec.policy.outputs();
         let terms = actions.map(|n| match self.fixed {
             Some(value) => self.spec.terms.bits(value, start.1.width()),
             None => self

@@ -9,6 +9,7 @@ use crate::spec::{self, Command, Sensed, Spec, State};
 use crate::term::Term;
 
 /// What a step is about: any state, any measurement, any command for `commit`.
+#[derive(Clone)]
 struct Given {
     state: State,
     measurement: Vec<Term>,
@@ -30,6 +31,24 @@ impl Given {
             assumptions,
         }
     }
+
+    /// With one more assumption.
+    fn with(&self, assumption: Option<Assumption>) -> Self {
+        let mut given = self.clone();
+        given.assumptions.extend(assumption);
+        given
+    }
+}
+
+/// Of an output that is a NaN a curve by masks makes another number than section 7b. The check of a policy bounds every output
+/// over all sound states; of another state the command is the fallback, whatever the network says.
+fn numbers(spec: Spec<'_>, sensed: &Sensed, numbers: &[Term]) -> Option<Assumption> {
+    let (terms, float) = (spec.terms, spec.float);
+    let all: Vec<Term> = numbers.iter().map(|x| terms.not(float.is_nan(*x))).collect();
+    (!numbers.is_empty()).then(|| Assumption {
+        term: terms.or(terms.not(sensed.sound), terms.all(all)),
+        text: "of a sound state the network's output, and the quotient of its curve, are numbers".into(),
+    })
 }
 
 /// All goals about one language's controller.
@@ -37,9 +56,10 @@ pub(crate) fn of(spec: Spec<'_>, emitted: &dyn Emitted) -> Result<Vec<Goal>, Ref
     let given = Given::new(spec);
     let mut goals = Vec::new();
     let evaluated = emitted.eval(&given.state, &given.measurement)?;
-    let index = spec::best(spec, emitted.to_cut()?, &evaluated.outputs);
-    let command = spec::decide(spec, &given.state, &given.sensed, index);
-    eval(spec, emitted, &given, &evaluated, &command, &mut goals);
+    let choice = spec::choose(spec, emitted.to_cut()?, &evaluated.outputs);
+    let command = spec::decide(spec, &given.state, &given.sensed, &choice);
+    let of_head = given.with(numbers(spec, &given.sensed, &choice.numbers));
+    eval(spec, emitted, &of_head, &evaluated, &command, &mut goals);
     let any = Command {
         duty: spec.terms.input("command_duty", spec.float.width()),
         duty_sim: spec.terms.input("command_duty_sim", spec.float.width()),
@@ -125,7 +145,7 @@ fn eval(
     add("observation", text, &observed);
     if let Some(found) = &called.command {
         let text =
-            "`eval` commands the duty of sections 7 to 9: argmax, mapping, slew limit, soft start, limits, fallback";
+            "`eval` commands the duty of sections 7 to 9: argmax or continuous head, mapping, slew limit, soft start, limits, fallback";
         add("duty", text, &[pair("duty", found.duty, command.duty, float)]);
         let text = "`eval` says the duty of the chosen action, or the fallback";
         add(

@@ -41,7 +41,7 @@ fn policy_of(file: &str, options: &Options) -> (tempfile::TempDir, import::NewPo
 /// Every choice as the library's, every output within 1e-5 of the largest, but for a constant where only the choice counts.
 fn assert_equals_library(policy: &policy::Policy, name: &str, activation: fn(f64) -> f64, choice_only: bool) {
     let (obs, q, chosen) = (expected(name, "obs"), expected(name, "q"), actions(name));
-    let count = policy.actions.len();
+    let count = policy.outputs();
     assert_eq!(chosen.len(), 64);
     for (row, expected) in q.chunks_exact(count).enumerate() {
         let x: Vec<f64> = obs[row * 6..(row + 1) * 6].iter().map(|x| f64::from(*x)).collect();

@@ -4,11 +4,12 @@ use ndarray::{Array1, ArrayView1};
 use policy::Policy;
 
 use crate::feature::{Feature, Inputs};
+use crate::head::Head;
 use crate::integer;
 use crate::limits::Limits;
 use crate::mapping::Mapping;
 use crate::names::state_names;
-use crate::network::{Layer, argmax};
+use crate::network::Layer;
 use crate::real::Real;
 use crate::sanitise::{InputError, Sample, Signal};
 use crate::sound::Sound;
@@ -22,8 +23,7 @@ pub struct Controller<T> {
     signals: Vec<Signal<T>>,
     features: Vec<Feature<T>>,
     network: Network<T>,
-    /// Duty per action.
-    table: Vec<T>,
+    head: Head<T>,
     pub(crate) mapping: Option<Mapping<T>>,
     limits: Limits<T>,
     initial_duty: T,
@@ -68,7 +68,7 @@ impl<T: Real> Controller<T> {
             signals,
             features,
             network: Network::new(policy),
-            table: policy.actions.iter().map(|action| T::nearest(action.duty)).collect(),
+            head: Head::new(policy),
             mapping,
             limits,
             initial_duty,
@@ -93,6 +93,11 @@ impl<T: Real> Controller<T> {
             bad_count: 0,
             primed: 0,
         };
+    }
+
+    /// Outputs of the network.
+    pub(crate) fn outputs(&self) -> usize {
+        self.head.outputs()
     }
 
     /// What the controller remembers.
@@ -121,13 +126,11 @@ impl<T: Real> Controller<T> {
     pub fn eval_into(&self, samples: &[Sample], trace: &mut Trace<T>) -> Result<(), InputError> {
         self.sense(samples, trace)?;
         self.observe_into(trace);
-        trace.action_index = {
-            self.network.run(trace.observation.view(), &mut trace.layers);
-            if let Some(last) = trace.layers.last() {
-                trace.q_values.assign(&last.post_activation);
-            }
-            argmax(trace.q_values.view()) as u32
-        };
+        self.network.run(trace.observation.view(), &mut trace.layers);
+        if let Some(last) = trace.layers.last() {
+            trace.q_values.assign(&last.post_activation);
+        }
+        (trace.action_index, trace.duty_sim) = self.head.decide(trace.q_values.view());
         self.act(trace);
         Ok(())
     }
@@ -174,10 +177,11 @@ impl<T: Real> Controller<T> {
     }
 
     /// Sections 8 and 9 for an action chosen elsewhere, behind [`Controller::sense_into`]: fills in the command. An index
-    /// beyond the last action counts as the last.
+    /// beyond the last action counts as the last. A continuous head has no actions to choose from: the initial duty is
+    /// commanded.
     pub fn choose(&self, trace: &mut Trace<T>, action_index: u32) {
-        let last = self.table.len().saturating_sub(1);
-        trace.action_index = action_index.min(last as u32);
+        let chosen = self.head.choose(action_index);
+        (trace.action_index, trace.duty_sim) = chosen.unwrap_or((0, self.initial_duty));
         self.act(trace);
     }
 
@@ -199,7 +203,7 @@ impl<T: Real> Controller<T> {
         fits
     }
 
-    /// Q values of an observation, one per action (section 6). Values need not lie within the observation's bounds.
+    /// Outputs of the network for an observation: Q values, one per action, or the output of a continuous head (section 6). Values need not lie within the observation's bounds.
     pub fn q_values(&self, observation: &ArrayView1<'_, T>) -> Result<Array1<T>, InputError> {
         let expected = self.features.len();
         if observation.len() != expected {
@@ -248,7 +252,7 @@ impl<T: Real> Controller<T> {
                 .collect(),
             observation: Array1::from_elem(self.features.len(), T::ZERO),
             layers: self.network.blank(),
-            q_values: Array1::from_elem(self.table.len(), T::ZERO),
+            q_values: Array1::from_elem(self.head.outputs(), T::ZERO),
             action_index: 0,
             duty_sim: T::ZERO,
             mapped: T::ZERO,
@@ -315,10 +319,10 @@ impl<T: Real> Controller<T> {
         }
     }
 
-    /// Sections 8 and 9, from the action index to the command.
+    /// Sections 8 and 9, from the chosen duty to the command.
     fn act(&self, trace: &mut Trace<T>) {
         let state = &self.state;
-        let d = self.table[trace.action_index as usize];
+        let d = trace.duty_sim;
         let mut bits = if trace.features.iter().any(|feature| feature.clipped) {
             status::CLIPPED
         } else {
@@ -337,7 +341,6 @@ impl<T: Real> Controller<T> {
         let limited = self.limits.apply(t, state.previous_command, state.soft_cap);
         bits |= limited.status;
 
-        trace.duty_sim = d;
         trace.mapped = t;
         trace.slewed = limited.slewed;
         trace.soft_started = limited.soft_started;

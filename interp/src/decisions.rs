@@ -8,14 +8,25 @@ use ndarray::{Array1, aview1};
 use policy::{Golden, NumericFormat, Policy, Scalar};
 use serde::Serialize;
 
+use crate::duties::{Duties, duties};
 use crate::{Controller, Real, argmax};
 
 /// Changes that are told one by one: the worst of them; a user looks at one or two.
 const TOLD: usize = 3;
 
-/// The trainer's decisions against those of the numeric format.
+/// What the numeric format does to the trainer's decisions.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Decisions {
+#[serde(untagged)]
+pub enum Decisions {
+    /// Which actions are chosen.
+    Choice(Choices),
+    /// Which duties a continuous head commands.
+    Continuous(Duties),
+}
+
+/// The trainer's choices against those of the numeric format.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Choices {
     /// Name of the format.
     pub numeric_format: &'static str,
     /// Observations that were compared: all golden vectors.
@@ -53,6 +64,39 @@ pub struct Change {
 }
 
 impl Decisions {
+    /// The format does no more to them than allowed.
+    #[must_use]
+    pub fn kept(&self) -> bool {
+        match self {
+            Decisions::Choice(choices) => choices.kept(),
+            Decisions::Continuous(duties) => duties.kept(),
+        }
+    }
+
+    /// Name of the format.
+    #[must_use]
+    pub fn numeric_format(&self) -> &'static str {
+        match self {
+            Decisions::Choice(choices) => choices.numeric_format,
+            Decisions::Continuous(duties) => duties.numeric_format,
+        }
+    }
+
+    /// The entry of `[network]` that accepts them.
+    #[must_use]
+    pub fn remedy(&self) -> String {
+        match self {
+            Decisions::Choice(choices) => format!("golden_decisions = {}", choices.accepting_share()),
+            // rounded up to two digits
+            Decisions::Continuous(duties) => {
+                let unit = 10_f64.powf(duties.largest.log10().floor() - 1.0);
+                format!("golden_duty = {:.1e}", (duties.largest / unit).ceil() * unit)
+            }
+        }
+    }
+}
+
+impl Choices {
     /// No more decisions changed than allowed; ties are no changes.
     #[must_use]
     pub fn kept(&self) -> bool {
@@ -74,9 +118,12 @@ impl Decisions {
 
 /// Answers the golden observations in the policy's format; `None` if the policy has none.
 ///
-/// `allowed` is the share of decisions that may change, in the place of the contract's.
+/// `allowed` is the share of choices that may change, in the place of the contract's; a continuous head has none.
 #[must_use]
 pub fn decisions(policy: &Policy, allowed: Option<f64>) -> Option<Decisions> {
+    if let Some(head) = policy.head.continuous() {
+        return duties(policy, head).map(Decisions::Continuous);
+    }
     let golden = policy.golden.as_ref()?;
     let found = match policy.numeric_format.scalar() {
         Scalar::F32 => actions::<f32>(policy, golden),
@@ -84,23 +131,23 @@ pub fn decisions(policy: &Policy, allowed: Option<f64>) -> Option<Decisions> {
     };
     let reference = reference(policy, golden);
     let allowed = allowed.unwrap_or_else(|| golden.allowed_changes(policy.numeric_format));
-    Some(weigh(policy, golden, &reference, &found, allowed))
+    Some(Decisions::Choice(weigh(policy, golden, &reference, &found, allowed)))
 }
 
 /// The actions in the policy's own format.
 fn actions<T: Real>(policy: &Policy, golden: &Golden) -> Vec<usize> {
-    let answers = answers::<T>(policy, golden);
+    let answers = answers::<T>(&Controller::new(policy), golden);
     answers.iter().map(|q| argmax(q.view())).collect()
 }
 
-/// Q values of each golden observation; a controller that refuses an observation, which the check rules out, chooses 0.
-pub(crate) fn answers<T: Real>(policy: &Policy, golden: &Golden) -> Vec<Array1<T>> {
-    let controller = Controller::<T>::new(policy);
-    let rows = golden.observations.chunks_exact(policy.features.len().max(1));
+/// Outputs for each golden observation; a controller that refuses an observation, which the check rules out, gives 0.
+pub(crate) fn answers<T: Real>(controller: &Controller<T>, golden: &Golden) -> Vec<Array1<T>> {
+    let features = golden.observations.len() / golden.count.max(1);
+    let rows = golden.observations.chunks_exact(features.max(1));
     rows.map(|row| {
         let observation: Vec<T> = row.iter().map(|x| T::widen(*x)).collect();
-        let q_values = controller.q_values(&aview1(&observation));
-        q_values.unwrap_or_else(|_| Array1::from_elem(policy.actions.len(), T::ZERO))
+        let outputs = controller.q_values(&aview1(&observation));
+        outputs.unwrap_or_else(|_| Array1::from_elem(controller.outputs(), T::ZERO))
     })
     .collect()
 }
@@ -108,16 +155,16 @@ pub(crate) fn answers<T: Real>(policy: &Policy, golden: &Golden) -> Vec<Array1<T
 /// The trainer's Q values; where it gave actions only, those of its network in binary64.
 fn reference(policy: &Policy, golden: &Golden) -> Vec<Vec<f64>> {
     if !golden.q_values.is_empty() {
-        let rows = golden.q_values.chunks_exact(policy.actions.len().max(1));
+        let rows = golden.q_values.chunks_exact(policy.outputs().max(1));
         return rows.map(|row| row.iter().copied().map(f64::from).collect()).collect();
     }
     // binary64 stands for exact arithmetic: the format at hand must not be its own judge
     let exact = policy.clone().with_format(NumericFormat::F64);
-    let answers = answers::<f64>(&exact, golden);
+    let answers = answers::<f64>(&Controller::new(&exact), golden);
     answers.into_iter().map(|q| q.to_vec()).collect()
 }
 
-fn weigh(policy: &Policy, golden: &Golden, reference: &[Vec<f64>], found: &[usize], allowed: f64) -> Decisions {
+fn weigh(policy: &Policy, golden: &Golden, reference: &[Vec<f64>], found: &[usize], allowed: f64) -> Choices {
     // losses are shares of what the trainer tells apart, not of the whole box of observations: Q spans far more
     // there than where a converter works, so that every loss would look small
     let spans = reference.iter().map(|q| {
@@ -159,7 +206,7 @@ fn weigh(policy: &Policy, golden: &Golden, reference: &[Vec<f64>], found: &[usiz
     let changed = worst.len();
     worst.sort_by(|a, b| b.loss.total_cmp(&a.loss).then(a.row.cmp(&b.row)));
     worst.truncate(TOLD);
-    Decisions {
+    Choices {
         numeric_format: policy.numeric_format.name(),
         observations: golden.count,
         changed,

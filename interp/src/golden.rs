@@ -3,12 +3,13 @@
 use std::fmt;
 
 use ndarray::aview1;
-use policy::{Golden, NumericFormat, Policy, Scalar};
+use policy::{Golden, Head, NumericFormat, Policy, Scalar};
 use serde::Serialize;
 use toml_input::Message;
 
-use crate::decisions::{Decisions, answers, decisions};
-use crate::{Real, argmax};
+use crate::decisions::{Choices, Decisions, answers, decisions};
+use crate::duties;
+use crate::{Controller, Real, argmax};
 
 /// Known answers of the trainer against the interpreter or a build.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -21,6 +22,13 @@ pub struct GoldenResult {
     pub actions_equal: usize,
     /// Largest |Q - golden| relative to the largest |Q| of its vector; `None` if the trainer gave actions only.
     pub worst_relative_error: Option<f64>,
+    /// Largest |duty - golden| of a continuous head as a share of its range; `None` for a choice.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub worst_duty_error: Option<f64>,
+    /// Largest |duty - duty of the golden output| as that share: small where the network is right and only the way from its
+    /// output to the duty is another.
+    #[serde(skip)]
+    pub output_error: Option<f64>,
     /// Allowed error.
     pub tolerance: f64,
     /// The answers are those of a network that was rounded to integers: told, not judged. The trainer's network is judged
@@ -30,13 +38,13 @@ pub struct GoldenResult {
 }
 
 impl GoldenResult {
-    /// All Q values within the tolerance, or all actions equal where the trainer gave no Q values; or rounded. With Q values
+    /// All duties, or all Q values within the tolerance, or all actions equal where the trainer gave no Q values; or rounded. With Q values
     /// the actions are [`Decisions`], which know ties.
     #[must_use]
     pub fn passed(&self) -> bool {
         let actions = self.actions_equal == self.actions_compared;
-        let read = self
-            .worst_relative_error
+        let read = (self.worst_duty_error)
+            .or(self.worst_relative_error)
             .map_or(actions, |error| error <= self.tolerance);
         self.rounded || read
     }
@@ -52,6 +60,12 @@ impl fmt::Display for GoldenResult {
                 self.actions_equal, self.actions_compared
             ));
         }
+        if let Some(error) = self.worst_duty_error {
+            parts.push(format!(
+                "largest error of the duty {error:.1e} of its range (allowed {:.0e})",
+                self.tolerance
+            ));
+        }
         if let Some(error) = self.worst_relative_error {
             parts.push(format!(
                 "largest relative error of Q {error:.1e} (allowed {:.0e})",
@@ -63,9 +77,38 @@ impl fmt::Display for GoldenResult {
     }
 }
 
-/// Compares Q values, a row for each golden vector, with the trainer's; rows that are missing count as wrong.
+/// Compares the network's outputs, a row for each golden vector, with the trainer's answers; rows that are missing count as
+/// wrong.
 #[must_use]
-pub fn judge(golden: &Golden, answers: &[&[f64]]) -> GoldenResult {
+pub fn judge(golden: &Golden, head: &Head, answers: &[&[f64]]) -> GoldenResult {
+    match head {
+        Head::Choice(_) => judge_choices(golden, answers),
+        Head::Continuous(head) => judge_duties(golden, head, answers),
+    }
+}
+
+fn judge_duties(golden: &Golden, head: &policy::Continuous, answers: &[&[f64]]) -> GoldenResult {
+    // `zip` below leaves out what is missing, and must not pass it
+    let missing = if answers.len() < golden.count { f64::INFINITY } else { 0.0 };
+    let found = || answers.iter().filter_map(|row| row.first()).map(|output| head.duty(*output));
+    let worst = |expected: &[f64]| {
+        let errors = expected.iter().zip(found()).map(|(e, f)| duties::error(head, *e, f));
+        errors.fold(missing, f64::max)
+    };
+    let from_outputs: Vec<f64> = golden.q_values.iter().map(|y| head.duty(f64::from(*y))).collect();
+    GoldenResult {
+        vectors: golden.count,
+        actions_compared: 0,
+        actions_equal: 0,
+        worst_relative_error: None,
+        worst_duty_error: duties::given(head, golden).map(|expected| worst(&expected)),
+        output_error: (!from_outputs.is_empty()).then(|| worst(&from_outputs)),
+        tolerance: golden.tolerance,
+        rounded: false,
+    }
+}
+
+fn judge_choices(golden: &Golden, answers: &[&[f64]]) -> GoldenResult {
     let actions_equal = golden
         .action_indices
         .iter()
@@ -86,6 +129,8 @@ pub fn judge(golden: &Golden, answers: &[&[f64]]) -> GoldenResult {
         actions_compared: golden.action_indices.len(),
         actions_equal,
         worst_relative_error: (!golden.q_values.is_empty()).then_some(worst),
+        worst_duty_error: None,
+        output_error: None,
         tolerance: golden.tolerance,
         rounded: false,
     }
@@ -124,11 +169,11 @@ pub fn golden_result(policy: &Policy) -> Option<GoldenResult> {
         Scalar::F64 => wide::<f64>(&policy, golden),
     };
     let rows: Vec<&[f64]> = rows.iter().map(Vec::as_slice).collect();
-    Some(judge(golden, &rows))
+    Some(judge(golden, &policy.head, &rows))
 }
 
 fn wide<T: Real + Into<f64>>(policy: &Policy, golden: &Golden) -> Vec<Vec<f64>> {
-    let rows = answers::<T>(policy, golden);
+    let rows = answers::<T>(&Controller::new(policy), golden);
     rows.into_iter()
         .map(|q| q.into_iter().map(Into::into).collect())
         .collect()
@@ -142,6 +187,7 @@ pub fn refusal(policy: &Policy) -> Option<Message> {
     let result = golden_result(policy)?;
     if !result.passed() {
         let found = match result.worst_relative_error {
+            _ if result.worst_duty_error.is_some() => result.to_string(),
             Some(error) => format!("a relative error of Q of {error:.1e}, allowed {:.0e}", result.tolerance),
             None => format!("{} of {} actions equal", result.actions_equal, result.actions_compared),
         };
@@ -152,13 +198,23 @@ pub fn refusal(policy: &Policy) -> Option<Message> {
         );
     }
     let changed = decisions(policy, None).filter(|decisions| !decisions.kept())?;
-    let Decisions {
+    let Choices {
         numeric_format,
         observations,
         changed,
         allowed,
         ..
-    } = changed;
+    } = match changed {
+        Decisions::Choice(choices) => choices,
+        Decisions::Continuous(duties) => {
+            let found = format!(
+                "an error of {:.1e} of its range in {}, allowed {:.0e}",
+                duties.largest, duties.numeric_format, duties.allowed
+            );
+            let message = Message::new("the numeric format changes the trainer's duties more than allowed");
+            return Some(message.found(found).hint("to accept it: golden_duty in [network], a share of the range from 0 to 1"));
+        }
+    };
     Some(
         Message::new("the numeric format changes more of the trainer's decisions than allowed")
             .found(format!(
@@ -174,10 +230,18 @@ pub fn refusal(policy: &Policy) -> Option<Message> {
 const MISREAD: &str = "look at hidden_activation, the order of layers, transpose, and in the golden file at the order of obs's \
                            columns and at the first action, which is 0: the contract says something else than the trainer did";
 
+/// The same of a continuous head.
+const MISREAD_DUTY: &str = "look at squash or clip, scale and offset in [actions], at hidden_activation, the order of layers, transpose, and \
+                            in the golden file at the order of obs's columns: the contract says something else than the trainer did";
+
 /// All actions equal, and Q values off by no more than this share: their sums were made in another order. Sums of 64 products
 /// in binary32, ordered otherwise, were seen to differ by 8.5e-6. A share of its own and none of the tolerance, for a wide
 /// tolerance does not make a wrong network one that was rounded.
 const ROUNDING: f64 = 1e-4;
+
+/// What to look at where the network is right and its duties are not.
+const SCALED: &str = "the network's outputs are the trainer's: squash or clip, scale and offset in [actions] make another duty of them \
+                      than the training did";
 
 /// What to look at where the same network was computed otherwise.
 const ROUNDED: &str = "every action is equal: the trainer adds in another order, or in another format; golden_tolerance in \
@@ -187,6 +251,10 @@ impl GoldenResult {
     /// What to look at, if it has not passed.
     #[must_use]
     pub fn hint(&self) -> &'static str {
+        if self.worst_duty_error.is_some() {
+            let is_read = self.output_error.is_some_and(|error| error <= self.tolerance);
+            return if is_read { SCALED } else { MISREAD_DUTY };
+        }
         let is_near = self.worst_relative_error.is_some_and(|error| error <= ROUNDING);
         let is_equal = self.actions_compared > 0 && self.actions_equal == self.actions_compared;
         if is_near && is_equal { ROUNDED } else { MISREAD }
@@ -207,13 +275,15 @@ mod tests {
             observations: vec![0.0, 1.0],
             q_values: vec![1.0, -4.0, 2.0, 3.0],
             action_indices: vec![0, 1],
+            duties: Vec::new(),
             tolerance: 1e-5,
             decisions: None,
+            duty_error: None,
         }
     }
 
     fn judged(q: [f64; 4]) -> GoldenResult {
-        judge(&golden(), &[&q[..2], &q[2..]])
+        judge_choices(&golden(), &[&q[..2], &q[2..]])
     }
 
     #[test]
@@ -223,6 +293,8 @@ mod tests {
             actions_compared: 2,
             actions_equal: equal,
             worst_relative_error: Some(error),
+            worst_duty_error: None,
+            output_error: None,
             tolerance,
             rounded: false,
         };
@@ -246,7 +318,7 @@ mod tests {
     #[test]
     fn nan_and_missing_answers_do_not_pass() {
         assert!(!judged([f64::NAN, -4.0, 2.0, 3.0]).passed());
-        assert!(!judge(&golden(), &[&[1.0, -4.0]]).passed());
+        assert!(!judge_choices(&golden(), &[&[1.0, -4.0]]).passed());
     }
 
     #[test]
@@ -254,5 +326,54 @@ mod tests {
         let result = judged([1.0, -4.0, 3.0, 2.999_999_9]);
         assert_eq!(result.actions_equal, 1);
         assert!(!result.passed());
+    }
+
+    fn head() -> policy::Continuous {
+        policy::Continuous {
+            squash: policy::Squash::Clip(policy::Interval { low: 0.0, high: 1.0 }),
+            scale: 0.5,
+            offset: 0.25,
+        }
+    }
+
+    /// Outputs .2 and .6 with the duties that the head makes of them.
+    fn duties() -> Golden {
+        Golden {
+            q_values: vec![0.2, 0.6],
+            action_indices: Vec::new(),
+            duties: vec![0.35, 0.55],
+            ..golden()
+        }
+    }
+
+    #[test]
+    fn the_error_of_a_duty_is_a_share_of_the_heads_range() {
+        let error = |answers: [f64; 2]| judge_duties(&duties(), &head(), &[&answers[..1], &answers[1..]]);
+        assert!(error([0.2, 0.6]).passed());
+        let off = error([0.2, 0.7]);
+        assert!(!off.passed());
+        // .05 of a range of .5
+        assert!((off.worst_duty_error.unwrap() - 0.1).abs() < 1e-6);
+        assert_eq!(off.hint(), MISREAD_DUTY);
+        assert!(!error([f64::NAN, 0.6]).passed());
+        assert!(!judge_duties(&duties(), &head(), &[&[0.2]]).passed(), "a row is missing");
+        // cut off by the clip: the same duty, and so the same answer
+        let saturated = Golden {
+            q_values: vec![1.5, 3.0],
+            duties: Vec::new(),
+            ..duties()
+        };
+        assert!(judge_duties(&saturated, &head(), &[&[2.0], &[1.0]]).passed());
+    }
+
+    #[test]
+    fn right_outputs_with_other_duties_blame_scale_and_offset() {
+        let golden = Golden {
+            duties: vec![0.35, 0.65],
+            ..duties()
+        };
+        let result = judge_duties(&golden, &head(), &[&[0.2], &[0.6]]);
+        assert!(!result.passed());
+        assert_eq!(result.hint(), SCALED);
     }
 }

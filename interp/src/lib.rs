@@ -9,6 +9,7 @@
 //! | 2 sanitise | `sanitise` |
 //! | 3, 4, 5 source, filters, observation | `feature`, `filter` |
 //! | 6, 7 network, argmax | `network`; in integers `integer` |
+//! | 7, 7b argmax, continuous head | `head` |
 //! | 8 action, mapping | `mapping` |
 //! | 9 limits and status | `limits`, [`status`] |
 //! | 10 commit | [`controller`] |
@@ -28,9 +29,11 @@
 mod activation;
 pub mod controller;
 pub mod decisions;
+pub mod duties;
 mod feature;
 mod filter;
 pub mod golden;
+mod head;
 mod integer;
 mod limits;
 mod mapping;

@@ -3,6 +3,7 @@
 use policy::{Expr, Input, Policy};
 
 use crate::controller::Controller;
+use crate::head::Head;
 use crate::mapping::Mapping;
 use crate::real::{Range, Real};
 use crate::state::State;
@@ -28,7 +29,7 @@ impl<T: Real> Sound<T> {
         // reset and fallback write these two without a limiter, and a contract may put them outside of the limits
         let start = [policy.limits.initial_duty, policy.fallback.duty].map(T::nearest);
         let limits = Range::inwards(policy.limits.duty);
-        let duties = policy.actions.iter().map(|action| T::nearest(action.duty));
+        let duties = Head::new(policy).duties();
         let slewed = policy.limits.slew.is_some();
         Self {
             held: policy

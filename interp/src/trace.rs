@@ -9,7 +9,7 @@ use crate::real::Real;
 pub struct Command<T> {
     /// Duty to apply, 0..1.
     pub duty: T,
-    /// Duty of the chosen action before the mapping; the fallback duty in a fallback.
+    /// Duty before the mapping, of the chosen action or of a continuous head; the fallback duty in a fallback.
     pub duty_sim: T,
     /// Chosen action; always a valid index, not applied in a fallback.
     pub action_index: u32,
@@ -77,11 +77,11 @@ pub struct Trace<T> {
     pub observation: Array1<T>,
     /// Per layer (6).
     pub layers: Vec<LayerTrace<T>>,
-    /// Output of the network, one value per action.
+    /// Output of the network: one value per action, or the one of a continuous head.
     pub q_values: Array1<T>,
-    /// Greedy action (7).
+    /// Greedy action (7); 0 of a continuous head (7b).
     pub action_index: u32,
-    /// Entry of the action table (8).
+    /// Entry of the action table (8), or the duty of a continuous head (7b).
     pub duty_sim: T,
     /// After the mapping; equal to `duty_sim` without one (8).
     pub mapped: T,

@@ -15,7 +15,7 @@
 
 use crate::activation::{Activation, Shape};
 use crate::limits::MAX_MAGNITUDE;
-use crate::model::{Action, Expr, Fallback, Filter, Input, Interval, Limits, Signal};
+use crate::model::{Expr, Fallback, Filter, Input, Interval, Limits, Signal};
 use crate::rounding::{inward_f32, nearest_f32};
 
 /// Closed interval of binary32 values.
@@ -139,7 +139,7 @@ pub(crate) struct Inputs {
 
 impl Inputs {
     /// Ranges after the sanitiser: signals inwards-rounded, remembered duties the hull of all they can be.
-    pub fn new(signals: &[Signal], actions: &[Action], limits: &Limits, fallback: &Fallback) -> Self {
+    pub fn new(signals: &[Signal], duties: &[f64], limits: &Limits, fallback: &Fallback) -> Self {
         let inward = |interval| {
             // never 0: `interval_f32` has refused what holds no binary32 number
             let (low, high) = inward_f32(interval).unwrap_or((0.0, 0.0));
@@ -150,9 +150,7 @@ impl Inputs {
         let limit = inward(limits.duty);
         Inputs {
             signals: signals.iter().map(|signal| inward(signal.range)).collect(),
-            previous_duty: actions
-                .iter()
-                .fold(start, |hull, action| hull.hull(nearest_f32(action.duty))),
+            previous_duty: duties.iter().fold(start, |hull, duty| hull.hull(nearest_f32(*duty))),
             previous_command: start.hull(limit.low).hull(limit.high),
         }
     }

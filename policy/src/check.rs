@@ -18,7 +18,7 @@ use crate::contract::{actions, features, head, mapping, network, protection, sig
 use crate::digests;
 use crate::faults::Faults;
 use crate::limits::MAX_FEATURES;
-use crate::model::{Action, Digests, Feature, Golden, Interval, Layer, Mapping, Policy, Signal};
+use crate::model::{Digests, Feature, Golden, Head, Interval, Layer, Mapping, Policy, Signal};
 use crate::notes::{left_out, on_duties, unused};
 use crate::raw::RawPolicy;
 use crate::weights::{self, Weights};
@@ -57,16 +57,17 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     // all sections have been asked for by now: a key that is left is one that nobody knows
     root.finish(faults);
 
-    let (feature_count, action_count) = (features.count, actions.count);
+    let (feature_count, output_count) = (features.count, actions.outputs);
+    let duties = actions.head.duties();
     // a count of 0 is a faulty list: the widths of the weights cannot be judged by it
-    let sizes = (feature_count > 0 && action_count > 0).then_some((feature_count, action_count));
+    let sizes = (feature_count > 0 && output_count > 0).then_some((feature_count, output_count));
     let mut weights = network
         .as_ref()
         .zip(raw.weights.as_ref())
         .and_then(|(n, file)| weights::read(file, n, sizes, faults));
     let signals: Option<Vec<Signal>> = signals.list.into_iter().collect();
     let inputs = match (&signals, &limits, &fallback) {
-        (Some(signals), Some(limits), Some(fallback)) => Some(Inputs::new(signals, &actions.list, limits, fallback)),
+        (Some(signals), Some(limits), Some(fallback)) => Some(Inputs::new(signals, &duties, limits, fallback)),
         _ => None,
     };
     let bounded = match (&inputs, head.sample_period) {
@@ -80,11 +81,11 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
         bound_layers(raw, known, &mut weights.layers, faults);
     }
     if let (Some(Some(mapping)), Some(inputs)) = (&mapping, &inputs) {
-        bound_mapping(raw, mapping, inputs, &actions.list, faults);
+        bound_mapping(raw, mapping, inputs, &duties, faults);
     }
     // with sizes that the network does not have, every vector would be a fault of its own
     let Weights { layers, mut notes } = weights?;
-    let golden = golden(raw, network.as_ref(), sizes, known, faults);
+    let golden = golden(raw, network.as_ref(), sizes, &actions.head, known, faults);
     notes.extend(golden.as_ref().and_then(Option::as_ref).and_then(left_out));
     notes.extend(unused(
         &head.parameters,
@@ -96,7 +97,7 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     let limits = limits?;
     notes.extend(on_duties(
         &limits,
-        &actions.list,
+        &duties,
         mapping.as_ref().and_then(Option::as_ref),
         known,
     ));
@@ -108,7 +109,7 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
         signals: signals?,
         features: complete.then_some(bounded)?,
         layers,
-        actions: actions.list,
+        head: actions.head,
         mapping: mapping?,
         limits,
         fallback: fallback?,
@@ -149,12 +150,18 @@ fn golden(
     raw: &RawPolicy,
     network: Option<&network::Network<'_>>,
     sizes: Option<(usize, usize)>,
+    head: &Head,
     features: &[Feature],
     faults: &mut Sink,
 ) -> Option<Option<Golden>> {
     let Some(file) = &raw.golden else { return Some(None) };
-    let (count, actions) = sizes?;
-    weights::golden::read(file, count, features, actions, network?.golden, faults).map(Some)
+    let (count, outputs) = sizes?;
+    let shape = weights::golden::Shape {
+        features: count,
+        outputs,
+        is_continuous: head.continuous().is_some(),
+    };
+    weights::golden::read(file, shape, features, network?.golden, faults).map(Some)
 }
 
 fn bound_layers(raw: &RawPolicy, features: &[Feature], layers: &mut [Layer], faults: &mut Sink) {
@@ -178,14 +185,14 @@ fn bound_layers(raw: &RawPolicy, features: &[Feature], layers: &mut [Layer], fau
     }
 }
 
-fn bound_mapping(raw: &RawPolicy, mapping: &Mapping, inputs: &Inputs, actions: &[Action], faults: &mut Sink) {
+fn bound_mapping(raw: &RawPolicy, mapping: &Mapping, inputs: &Inputs, duties: &[f64], faults: &mut Sink) {
     let Some(current) = inputs.signal(mapping.load_current) else {
         return;
     };
     let duties = Interval {
         // no duty is negative: a box from 0 holds them all
         low: 0.0,
-        high: actions.iter().fold(0.0, |high, action| action.duty.max(high)),
+        high: duties.iter().fold(0.0, |high, duty| duty.max(high)),
     };
     if let Err(magnitude) = mapping::magnitude_fits(mapping, current, duties) {
         let file = raw

@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 
 use crate::activation::Activation;
 use crate::model::{
-    Action, Digests, Expr, Fallback, Feature, Filter, Interval, Layer, Limits, Mapping, NumericFormat, Policy, Signal,
+    Action, Continuous, Digests, Expr, Fallback, Feature, Filter, Interval, Layer, Limits, Mapping, NumericFormat, Policy, Signal,
 };
 
 #[derive(Serialize)]
@@ -26,6 +26,9 @@ struct Contract<'a> {
     features: Vec<Observed<'a>>,
     activations: Vec<Activation>,
     actions: &'a [Action],
+    // left out where there is none: contracts from before there was one keep their digest
+    #[serde(skip_serializing_if = "Option::is_none")]
+    continuous: Option<&'a Continuous>,
     limits: &'a Limits,
     fallback: &'a Fallback,
 }
@@ -88,7 +91,8 @@ pub(crate) fn of(policy: &Policy) -> Digests {
         signals: &policy.signals,
         features: policy.features.iter().map(Observed::of).collect(),
         activations: policy.layers.iter().map(|layer| layer.activation).collect(),
-        actions: &policy.actions,
+        actions: policy.actions(),
+        continuous: policy.head.continuous(),
         limits: &policy.limits,
         fallback: &policy.fallback,
     };

@@ -29,7 +29,7 @@ pub struct Skeleton {
     pub signals: Vec<(String, bool)>,
     /// How many features the contract lists, faulty ones included, if that can be told.
     pub features: Option<usize>,
-    /// How many actions it lists.
+    /// How many outputs the network has by the actions that it lists.
     pub actions: Option<usize>,
 }
 
@@ -49,7 +49,7 @@ impl Faults {
                 name: Some(policy.name.clone()),
                 signals: policy.signals.iter().map(signal).collect(),
                 features: Some(policy.features.len()),
-                actions: Some(policy.actions.len()),
+                actions: Some(policy.outputs()),
             }),
         }
     }

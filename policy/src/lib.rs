@@ -19,6 +19,7 @@ pub mod describe;
 mod digests;
 mod expression;
 mod faults;
+mod head;
 mod interval;
 pub mod limits;
 mod memory;

@@ -34,7 +34,7 @@ fn source(expr: &Expr, policy: &Policy) -> f64 {
             // the parser made the index from a signal that is there
             signal.map_or(0.0, |signal| signal.range.low.abs().max(signal.range.high.abs()))
         }
-        // duties are within 0..1
+        // duties are within 0..1, those of a continuous head in either arithmetic: `contract::continuous` has seen to it
         Expr::Input(Input::PreviousDuty | Input::PreviousCommand) => 1.0,
         Expr::Constant(value) => value.abs() * GROWTH,
         Expr::Neg(x) => source(x, policy),

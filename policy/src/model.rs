@@ -9,6 +9,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use crate::activation::Activation;
+pub use crate::head::{Action, Continuous, Head, Pair, Squash};
 pub use crate::interval::Interval;
 
 /// Number format in which the whole controller computes (`docs/reference/numeric-contract.md`).
@@ -121,8 +122,8 @@ pub struct Policy {
     pub features: Vec<Feature>,
     /// Dense layers, first to last; `layers[0].inputs == features.len()`.
     pub layers: Vec<Layer>,
-    /// Duty per network output; same length as the last layer's outputs, at least 2.
-    pub actions: Vec<Action>,
+    /// What the outputs of the last layer mean.
+    pub head: Head,
     /// Duty ratio mapping, if any.
     pub mapping: Option<Mapping>,
     /// Limits of the commanded duty.
@@ -137,6 +138,29 @@ pub struct Policy {
     pub notes: Vec<String>,
     /// Every file that was read, the contract first; for rebuild tracking.
     pub files: Vec<PathBuf>,
+}
+
+impl Policy {
+    /// Outputs of the network: values of the last layer.
+    #[must_use]
+    pub fn outputs(&self) -> usize {
+        self.head.outputs()
+    }
+
+    /// The discrete actions; none where the head is continuous.
+    #[must_use]
+    pub fn actions(&self) -> &[Action] {
+        self.head.actions()
+    }
+
+    /// The same, to be changed: what a test or a search does to a policy that it has checked.
+    #[must_use]
+    pub fn actions_mut(&mut self) -> &mut [Action] {
+        match &mut self.head {
+            Head::Choice(actions) => actions,
+            Head::Continuous(_) => &mut [],
+        }
+    }
 }
 
 /// A measured quantity.
@@ -266,26 +290,6 @@ pub struct Layer {
     pub bounds: Vec<Interval>,
 }
 
-/// One discrete action.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Action {
-    /// Duty `xi + c * phi` in binary64.
-    pub duty: f64,
-    /// The pair it came from, if the contract gave pairs.
-    pub pair: Option<Pair>,
-}
-
-/// The paper's action form: duty = xi + c phi.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Pair {
-    /// Centre duty.
-    pub xi: f64,
-    /// Step.
-    pub phi: f64,
-    /// -1, 0 or 1.
-    pub c: i8,
-}
-
 /// Duty ratio mapping `d_real = a d_sim + b i_out + c (+ r i_out d_sim)`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Mapping {
@@ -382,14 +386,20 @@ pub struct Golden {
     pub outside: usize,
     /// Row-major `[count][features]`.
     pub observations: Vec<f32>,
-    /// Row-major `[count][actions]`; may be empty if the trainer gave actions only.
+    /// Row-major `[count][outputs]`; may be empty if the trainer gave actions or duties only.
     pub q_values: Vec<f32>,
-    /// `[count]`; may be empty if the trainer gave Q values only.
+    /// `[count]`; empty if the trainer gave Q values only, and for a continuous head.
     pub action_indices: Vec<u32>,
-    /// Allowed |Q - golden| relative to the largest |Q| of the vector.
+    /// `[count]`: what a continuous head makes of the observation; empty for a choice, or if the trainer gave outputs only.
+    pub duties: Vec<f32>,
+    /// Allowed |Q - golden| relative to the largest |Q| of the vector; for a continuous head the allowed error of its duty
+    /// as a share of its range.
     pub tolerance: f64,
     /// Share of the vectors, 0..1, whose action the numeric format may change; `None` if the contract does not say.
     pub decisions: Option<f64>,
+    /// Largest error of the duty of a continuous head, as a share of its range, that the numeric format may cause; `None`
+    /// if the contract does not say.
+    pub duty_error: Option<f64>,
 }
 
 impl Golden {
@@ -401,6 +411,16 @@ impl Golden {
         const INTEGER: f64 = 0.02;
         let usual = if format.is_integer() { INTEGER } else { 0.0 };
         self.decisions.unwrap_or(usual)
+    }
+
+    /// Error of the duty of a continuous head, as a share of its range, that the format may cause: what the contract says;
+    /// otherwise the tolerance for real formats, which compute the trainer's network, and a thousandth for integers.
+    #[must_use]
+    pub fn allowed_duty_error(&self, format: NumericFormat) -> f64 {
+        /// A step of a 10-bit pulse width over the head's range.
+        const INTEGER: f64 = 1e-3;
+        let usual = if format.is_integer() { INTEGER } else { self.tolerance };
+        self.duty_error.unwrap_or(usual)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::model::{Action, Expr, Feature, Golden, Input, Limits, Mapping, Signal};
+use crate::model::{Expr, Feature, Golden, Input, Limits, Mapping, Signal};
 
 /// Golden observations that the controller never sees, because the training left the range of a signal.
 pub fn left_out(golden: &Golden) -> Option<String> {
@@ -16,27 +16,25 @@ pub fn left_out(golden: &Golden) -> Option<String> {
 }
 
 /// What the limits and the mapping make of the duties, where a reader may not expect it.
-pub fn on_duties(limits: &Limits, actions: &[Action], mapping: Option<&Mapping>, features: &[Feature]) -> Vec<String> {
+pub fn on_duties(limits: &Limits, duties: &[f64], mapping: Option<&Mapping>, features: &[Feature]) -> Vec<String> {
     let mut notes: Vec<String> = outside_at_first(limits).into_iter().collect();
-    notes.extend(unlike_any_action(limits, actions, features));
-    match only_duty(limits, actions, mapping) {
+    notes.extend(unlike_any_action(limits, duties, features));
+    match only_duty(limits, duties, mapping) {
         Some(duty) => notes.push(format!(
             "every action commands the duty {duty}: the limits leave no other, and nothing is left to control with"
         )),
-        None => notes.extend(beyond_limits(limits, actions, mapping)),
+        None => notes.extend(beyond_limits(limits, duties, mapping)),
     }
     if let Some(mapping) = mapping {
-        notes.extend(beyond_mapping(limits, actions, mapping));
+        notes.extend(beyond_mapping(limits, duties, mapping));
     }
     notes
 }
 
 /// A first observation with a duty that the training hardly had.
-fn unlike_any_action(limits: &Limits, actions: &[Action], features: &[Feature]) -> Option<String> {
+fn unlike_any_action(limits: &Limits, duties: &[f64], features: &[Feature]) -> Option<String> {
     let first = limits.initial_duty;
-    let (low, high) = actions.iter().fold((1.0_f64, 0.0_f64), |(low, high), action| {
-        (low.min(action.duty), high.max(action.duty))
-    });
+    let (low, high) = (duties.iter()).fold((1.0_f64, 0.0_f64), |(low, high), duty| (low.min(*duty), high.max(*duty)));
     let is_read = features.iter().any(|feature| reads_duty(&feature.source));
     (is_read && !(low..=high).contains(&first)).then(|| {
         format!(
@@ -103,23 +101,21 @@ fn reads(expr: &Expr, index: usize) -> bool {
 ///
 /// The mapping applies outside its range, too: the status bit says so. Both ends of the range of the load current are looked
 /// at, since a mapped duty is linear in it.
-fn beyond_mapping(limits: &Limits, actions: &[Action], mapping: &Mapping) -> Vec<String> {
+fn beyond_mapping(limits: &Limits, duties: &[f64], mapping: &Mapping) -> Vec<String> {
     let mut notes = Vec::new();
     let range = mapping.valid_d_sim;
-    let outside = |action: &&Action| action.duty < range.low || action.duty > range.high;
-    let duties: Vec<String> = actions.iter().filter(outside).map(|a| a.duty.to_string()).collect();
-    if !duties.is_empty() {
+    let outside = |duty: &&f64| **duty < range.low || **duty > range.high;
+    let beyond: Vec<String> = duties.iter().filter(outside).map(f64::to_string).collect();
+    if !beyond.is_empty() {
         notes.push(format!(
             "duties outside the range of the mapping, d_sim {} to {}: {}",
             range.low,
             range.high,
-            duties.join(", ")
+            beyond.join(", ")
         ));
     }
     let ends = [mapping.valid_i_out.low, mapping.valid_i_out.high];
-    let all = actions
-        .iter()
-        .flat_map(|action| ends.map(|i| mapped(mapping, action.duty, i)));
+    let all = (duties.iter()).flat_map(|duty| ends.map(|i| mapped(mapping, *duty, i)));
     let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), duty| {
         (low.min(duty), high.max(duty))
     });
@@ -134,19 +130,19 @@ fn beyond_mapping(limits: &Limits, actions: &[Action], mapping: &Mapping) -> Vec
 
 /// The duty that the limits make of all actions, if these differ and nobody asked for a fixed duty by equal limits. A mapped duty is linear in the load current: if both
 /// ends of its range leave the same one, so does everything between.
-fn only_duty(limits: &Limits, actions: &[Action], mapping: Option<&Mapping>) -> Option<f64> {
-    let own = actions.first()?.duty;
-    if limits.duty.low == limits.duty.high || actions.iter().all(|action| action.duty == own) {
+fn only_duty(limits: &Limits, duties: &[f64], mapping: Option<&Mapping>) -> Option<f64> {
+    let own = *duties.first()?;
+    if limits.duty.low == limits.duty.high || duties.iter().all(|duty| *duty == own) {
         return None;
     }
     // without a mapping the current has no effect, and any two values do
     let ends = mapping.map_or([0.0; 2], |m| [m.valid_i_out.low, m.valid_i_out.high]);
-    let limited = |action: &Action, i: f64| {
-        let duty = mapping.map_or(action.duty, |mapping| mapped(mapping, action.duty, i));
+    let limited = |duty: f64, i: f64| {
+        let duty = mapping.map_or(duty, |mapping| mapped(mapping, duty, i));
         duty.clamp(limits.duty.low, limits.duty.high)
     };
-    let first = limited(actions.first()?, ends[0]);
-    let all = actions.iter().flat_map(|action| ends.map(|i| limited(action, i)));
+    let first = limited(own, ends[0]);
+    let all = duties.iter().flat_map(|duty| ends.map(|i| limited(*duty, i)));
     all.into_iter().all(|duty| duty == first).then_some(first)
 }
 
@@ -157,17 +153,13 @@ fn mapped(mapping: &Mapping, d: f64, i: f64) -> f64 {
 }
 
 /// Actions that the duty limits cut off even without a mapping.
-fn beyond_limits(limits: &Limits, actions: &[Action], mapping: Option<&Mapping>) -> Option<String> {
+fn beyond_limits(limits: &Limits, duties: &[f64], mapping: Option<&Mapping>) -> Option<String> {
     if mapping.is_some() {
         return None;
     }
-    let cut = |action: &&Action| action.duty < limits.duty.low || action.duty > limits.duty.high;
-    let duties: Vec<_> = actions
-        .iter()
-        .filter(cut)
-        .map(|action| action.duty.to_string())
-        .collect();
-    (!duties.is_empty()).then(|| format!("duties outside the limits are cut off: {}", duties.join(", ")))
+    let cut = |duty: &&f64| **duty < limits.duty.low || **duty > limits.duty.high;
+    let beyond: Vec<_> = duties.iter().filter(cut).map(f64::to_string).collect();
+    (!beyond.is_empty()).then(|| format!("duties outside the limits are cut off: {}", beyond.join(", ")))
 }
 
 /// A duty before the first step that the limits do not hold.
@@ -220,7 +212,7 @@ mod tests {
             soft_start: None,
             initial_duty: 0.3,
         };
-        let actions = [0.4, 0.5].map(|duty| Action { duty, pair: None });
+        let actions = [0.4, 0.5];
         assert_eq!(only_duty(&limits(0.6, 0.9), &actions, None), Some(0.6));
         assert_eq!(only_duty(&limits(0.3, 0.45), &actions, None), None, "0.4 and 0.45");
         assert_eq!(
@@ -240,17 +232,13 @@ mod tests {
     }
 
     fn notes(duties: &[f64], valid: Interval, limits: Interval) -> Vec<String> {
-        let action = |duty: &f64| Action {
-            duty: *duty,
-            pair: None,
-        };
         let limits = Limits {
             duty: limits,
             slew: None,
             soft_start: None,
             initial_duty: 0.3,
         };
-        beyond_mapping(&limits, &duties.iter().map(action).collect::<Vec<_>>(), &mapping(valid))
+        beyond_mapping(&limits, duties, &mapping(valid))
     }
 
     #[test]

@@ -248,6 +248,9 @@ fn skeleton(contract: &Document) -> Skeleton {
         name,
         signals,
         features: count(&["feature"]),
-        actions: count(&["actions", "duties"]),
+        actions: match contract.peek(&["actions", "continuous"]) {
+            Some(_) => Some(1),
+            None => count(&["actions", "duties"]),
+        },
     }
 }

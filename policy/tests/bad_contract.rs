@@ -8,7 +8,7 @@ use policy::Place;
 fn the_small_policy_is_accepted() {
     let policy = Folder::new().policy();
     assert_eq!(
-        (policy.features.len(), policy.layers.len(), policy.actions.len()),
+        (policy.features.len(), policy.layers.len(), policy.outputs()),
         (2, 2, 3)
     );
     assert_eq!(policy.files.len(), 3);

@@ -32,9 +32,9 @@ fn pairs_give_duties_pair_by_pair() {
     let policy = Folder::new()
         .replace("duties = [0.44, 0.50, 0.56]", "pairs = [{ xi = 0.5, phi = 0.05 }]")
         .policy();
-    let duties: Vec<f64> = policy.actions.iter().map(|action| action.duty).collect();
+    let duties: Vec<f64> = policy.actions().iter().map(|action| action.duty).collect();
     assert_eq!(duties, [0.5 - 0.05, 0.5, 0.5 + 0.05]);
-    assert_eq!(policy.actions[2].pair.map(|pair| pair.c), Some(1));
+    assert_eq!(policy.actions()[2].pair.map(|pair| pair.c), Some(1));
     let pairs = |text: &str| format!("pairs = [{text}]");
     let duties = "duties = [0.44, 0.50, 0.56]";
     contract_fault(

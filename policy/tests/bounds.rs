@@ -140,7 +140,7 @@ fn exercise(policy: &Policy, seed: u64, steps: usize) {
         .collect();
     for _ in 0..steps {
         let signals: Vec<f32> = ranges.iter().map(|(low, high)| random.within(*low, *high)).collect();
-        let duty = f(policy.actions[random.below(policy.actions.len())].duty);
+        let duty = f(policy.actions()[random.below(policy.outputs())].duty);
         let duties = [duty, random.within(low, high)];
         for (feature, lines) in policy.features.iter().zip(&mut lines) {
             let mut x = evaluate(&feature.source, &signals, duties);

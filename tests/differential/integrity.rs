@@ -100,7 +100,7 @@ fn said(policy: &Policy, language: Language, edit: &dyn Fn(&str) -> String, coun
 fn numbers(policy: &Policy) -> usize {
     let layers = policy.layers.iter();
     let layers: usize = layers.map(|layer| layer.inputs * layer.outputs + layer.outputs).sum();
-    layers + policy.actions.len()
+    layers + policy.outputs()
 }
 
 #[test]

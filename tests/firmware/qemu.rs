@@ -113,8 +113,8 @@ fn the_image_regulates_and_its_duties_are_the_interpreters_to_the_bit() {
 fn a_duty_off_by_one_bit_is_another_checksum() {
     let mut policy = example();
     let honest = interpreted(&policy);
-    let duty = policy.actions[5].duty as f32;
-    policy.actions[5].duty = f64::from(f32::from_bits(duty.to_bits() + 1));
+    let duty = policy.actions()[5].duty as f32;
+    policy.actions_mut()[5].duty = f64::from(f32::from_bits(duty.to_bits() + 1));
     assert_ne!(interpreted(&policy).checksum, honest.checksum);
 }
 

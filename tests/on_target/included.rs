@@ -54,7 +54,7 @@ fn the_macro_gives_the_same_bits_on_every_processor_with_rust() {
 #[test]
 fn another_policy_than_the_included_one_is_found() {
     let mut policy = policy();
-    for action in &mut policy.actions {
+    for action in policy.actions_mut() {
         let duty = action.duty as f32;
         action.duty = f64::from(f32::from_bits(duty.to_bits() + 1));
     }

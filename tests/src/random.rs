@@ -57,8 +57,12 @@ pub fn files(seed: u64) -> Result<Files, SafeTensorError> {
     let mut rng = SplitMix::new(seed);
     let features = 1 + rng.below(9);
     let actions = 2 + rng.below(32);
+    // from a stream of its own: the policies of all other seeds stay what they were
+    let mut head = SplitMix::new(seed ^ HEAD);
+    let head = head.one_in(4).then(|| continuous(&mut head));
+    let actions = if head.is_some() { 1 } else { actions };
     let hidden: Vec<usize> = (0..1 + rng.below(4)).map(|_| 1 + rng.below(40)).collect();
-    let contract = contract(&mut rng, seed, features, actions, hidden.len());
+    let contract = contract(&mut rng, seed, [features, actions, hidden.len()], head.as_deref());
     let (weights, mapping) = weights(&mut rng, features, &hidden, actions)?;
     Ok(Files {
         contract,
@@ -67,7 +71,7 @@ pub fn files(seed: u64) -> Result<Files, SafeTensorError> {
     })
 }
 
-fn contract(rng: &mut SplitMix, seed: u64, features: usize, actions: usize, hidden: usize) -> String {
+fn contract(rng: &mut SplitMix, seed: u64, [features, actions, hidden]: [usize; 3], head: Option<&str>) -> String {
     let mut text = format!(
         "name = \"random{seed}\"\nsample_period = {:?}\n\n",
         rng.uniform(1e-5, 1e-3)
@@ -100,7 +104,10 @@ fn contract(rng: &mut SplitMix, seed: u64, features: usize, actions: usize, hidd
     let kinds = Activation::EACH;
     let activations: Vec<String> = (0..hidden).map(|_| kinds[rng.below(kinds.len())].written()).collect();
     let _ = writeln!(text, "hidden_activation = [{}]\n", activations.join(", "));
-    action_table(&mut text, rng, actions);
+    match head {
+        Some(head) => drop(writeln!(text, "[actions]\n{head}\n")),
+        None => action_table(&mut text, rng, actions),
+    }
     protection(&mut text, rng, signals);
     text
 }
@@ -147,6 +154,22 @@ fn filter(rng: &mut SplitMix) -> String {
         3 => format!("{{ filtered_derivative = {{ time_constant = {tau:?} }} }}"),
         4 => format!("{{ moving_average = {} }}", 2 + rng.below(6)),
         _ => "{ integrator = { min = -0.5, max = 0.75, initial = 0.1 } }".to_owned(),
+    }
+}
+
+/// Bits in which the seed of the head's stream differs from that of the rest.
+const HEAD: u64 = 0x0068_6561_6400_0000;
+
+/// A continuous head of any form whose duties stay within 0..1: with and without scale and offset, of both signs.
+fn continuous(rng: &mut SplitMix) -> String {
+    let (scale, offset) = (rng.uniform(0.05, 0.45), rng.uniform(0.46, 0.54));
+    match rng.below(6) {
+        0 => format!("continuous = {{ squash = \"tanh\", scale = {scale:?}, offset = {offset:?} }}"),
+        1 => format!("continuous = {{ squash = \"tanh\", scale = -{scale:?}, offset = {offset:?} }}"),
+        2 => format!("continuous = {{ squash = \"softsign\", scale = {scale:?}, offset = {offset:?} }}"),
+        3 => format!("continuous = {{ clip = [{:?}, {offset:?}] }}", offset - scale),
+        4 => format!("continuous = {{ clip = [-1.0, 1.0], scale = {scale:?}, offset = {offset:?} }}"),
+        _ => format!("continuous = {{ clip = [0.25, 2.0], scale = {scale:?} }}"),
     }
 }
 

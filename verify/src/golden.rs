@@ -1,7 +1,7 @@
 //! Known answers of the trainer, as events for a build and as bits from it.
 
 use interp::golden;
-use policy::{Golden, Policy, Scalar};
+use policy::{Golden, Head, Policy, Scalar};
 
 use crate::protocol::numbers;
 use crate::report::GoldenResult;
@@ -20,8 +20,8 @@ pub(crate) fn events(policy: &Policy) -> Vec<Event> {
 }
 
 /// Judges the Q values, given as bits, that answer [`events`]; values that are missing count as wrong.
-pub(crate) fn judge(golden: &Golden, scalar: Scalar, actions: usize, words: &[u32]) -> GoldenResult {
+pub(crate) fn judge(golden: &Golden, scalar: Scalar, head: &Head, words: &[u32]) -> GoldenResult {
     let q_values = numbers(scalar, words);
-    let answers: Vec<&[f64]> = q_values.chunks_exact(actions).collect();
-    golden::judge(golden, &answers)
+    let answers: Vec<&[f64]> = q_values.chunks_exact(head.outputs().max(1)).collect();
+    golden::judge(golden, head, &answers)
 }

@@ -73,7 +73,7 @@ impl<'a> Lane<'a> {
         if let Some(known) = &self.policy.golden {
             self.golden = Some(GoldenResult {
                 rounded: self.policy.numeric_format.is_integer(),
-                ..golden::judge(known, self.layout.scalar(), self.policy.actions.len(), words)
+                ..golden::judge(known, self.layout.scalar(), &self.policy.head, words)
             });
         }
         self.judge(chunk, answer)

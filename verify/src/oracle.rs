@@ -62,7 +62,7 @@ impl<T: Real> Oracle<T> {
             steps: 0,
             checksum: Crc32::new(),
             coverage: Coverage {
-                actions: vec![0; policy.actions.len()],
+                actions: vec![0; policy.outputs()],
                 ..Coverage::default()
             },
         }

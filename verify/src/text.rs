@@ -2,7 +2,8 @@
 
 use std::fmt::{self, Write};
 
-use interp::decisions::Decisions;
+use interp::decisions::{Choices, Decisions};
+use interp::duties::Duties;
 use interp::golden::{GoldenResult, UNPROVEN};
 use policy::Policy;
 use report::{grouped, quantity};
@@ -79,15 +80,21 @@ pub fn report(policy: &Policy, report: &Report, drift: Option<&Drift>) -> Result
     let read = report.golden.as_ref().is_none_or(GoldenResult::passed);
     // the decisions of a network that was read wrongly say nothing about its format
     if let Some(decisions) = report.decisions.as_ref().filter(|decisions| read && !decisions.kept()) {
+        let (policy, format) = (&report.policy, decisions.numeric_format());
+        match decisions {
+            Decisions::Choice(_) => writeln!(
+                out,
+                "DIFFERENT: {policy} in {format} decides otherwise than its trainer's network more often than allowed"
+            )?,
+            Decisions::Continuous(_) => writeln!(
+                out,
+                "DIFFERENT: {policy} in {format} commands other duties than its trainer's network by more than allowed"
+            )?,
+        }
+        let remedy = decisions.remedy();
         writeln!(
             out,
-            "DIFFERENT: {} in {} decides otherwise than its trainer's network more often than allowed",
-            report.policy, decisions.numeric_format
-        )?;
-        let share = decisions.accepting_share();
-        writeln!(
-            out,
-            "  = hint: to accept them for good: golden_decisions = {share} in [network] of the contract"
+            "  = hint: to accept them for good: {remedy} in [network] of the contract"
         )?;
     }
     Ok(out)
@@ -97,7 +104,53 @@ pub fn report(policy: &Policy, report: &Report, drift: Option<&Drift>) -> Result
 /// shares of the operating range of Q, duties 0..1.
 #[must_use]
 pub fn decisions(policy: &Policy, decisions: &Decisions) -> Vec<String> {
-    let Decisions {
+    match decisions {
+        Decisions::Choice(decisions) => choices(policy, decisions),
+        Decisions::Continuous(duties) => self::duties(policy, duties),
+    }
+}
+
+fn duties(policy: &Policy, duties: &Duties) -> Vec<String> {
+    let Duties {
+        numeric_format,
+        observations,
+        range,
+        largest,
+        mean,
+        allowed,
+        worst,
+    } = duties;
+    let word = if duties.kept() { "" } else { "DIFFERENT: " };
+    let mut lines = vec![format!(
+        "duties in {numeric_format}: {word}off by at most {} of their range {}, on average {} (allowed {}), {observations} observations",
+        quantity(*largest, "", 2),
+        quantity(*range, "", 3),
+        quantity(*mean, "", 2),
+        quantity(*allowed, "", 3),
+    )];
+    lines.extend(worst.as_ref().map(|worst| {
+        format!(
+            "  most at golden vector {}: duty {:.6} becomes {:.6}, at {}",
+            worst.row,
+            worst.expected,
+            worst.found,
+            place(policy, &worst.observation)
+        )
+    }));
+    lines
+}
+
+/// An observation by the names of its features.
+fn place(policy: &Policy, observation: &[f32]) -> String {
+    let values = policy.features.iter().zip(observation);
+    let place: Vec<String> = values
+        .map(|(feature, value)| format!("{} = {value}", feature.name))
+        .collect();
+    place.join(", ")
+}
+
+fn choices(policy: &Policy, decisions: &Choices) -> Vec<String> {
+    let Choices {
         numeric_format,
         observations,
         changed,
@@ -124,17 +177,13 @@ pub fn decisions(policy: &Policy, decisions: &Decisions) -> Vec<String> {
         "  they give up at most {largest_loss:.2} and on average {mean_loss:.4} of the operating range of Q, which is {}",
         quantity(*operating_range, "", 3)
     ));
-    let values = policy.features.iter().zip(&change.observation);
-    let place: Vec<String> = values
-        .map(|(feature, value)| format!("{} = {value}", feature.name))
-        .collect();
-    let duty = |action: usize| policy.actions.get(action).map_or(f64::NAN, |action| action.duty);
+    let duty = |action: usize| policy.actions().get(action).map_or(f64::NAN, |action| action.duty);
     lines.push(format!(
         "  most at golden vector {}: duty {} becomes {}, at {}",
         change.row,
         duty(change.expected),
         duty(change.found),
-        place.join(", ")
+        place(policy, &change.observation)
     ));
     lines
 }

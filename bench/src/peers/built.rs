@@ -164,7 +164,7 @@ impl<'a> Site<'a> {
 
     /// Parameters of `peer_q_values` in Rust.
     fn parameters(&self) -> String {
-        let (features, actions) = (self.policy.features.len(), self.policy.actions.len());
+        let (features, actions) = (self.policy.features.len(), self.policy.outputs());
         format!("o: *const [f32; {features}], q: *mut [f32; {actions}]")
     }
 }
@@ -194,7 +194,7 @@ fn emlearn(site: &Site) -> Result<Vec<String>, Failure> {
         "#include \"{}\"\nvoid peer_q_values(const float *o, float *q)\n{{\n    (void)network_regress(o, {}, q, {});\n}}\n",
         site.folder.join("emlearn.h").display(),
         site.policy.features.len(),
-        site.policy.actions.len()
+        site.policy.outputs()
     );
     site.bench.put("emlearn.c", &text)?;
     let code = "import emlearn, os; print(os.path.dirname(emlearn.__file__))";

@@ -10,7 +10,7 @@ use targets::TargetSpec;
 use toml_input::Message;
 use verify::costs::StepCosts;
 use verify::fmu::Archive;
-use verify::{Files, UNPROVEN, advice, text};
+use verify::{Decisions, Files, UNPROVEN, advice, text};
 
 use crate::arguments::Compile;
 use crate::failure::Failure;
@@ -50,13 +50,23 @@ fn load(options: &Compile) -> Result<Policy, Failure> {
     match verify::decisions(&policy, options.golden_decisions).filter(|decisions| !decisions.kept()) {
         None => Ok(policy),
         Some(decisions) => {
-            let problem =
-                "the numeric format changes more of the trainer's decisions than allowed; nothing was written";
-            let share = decisions.accepting_share();
-            let hint = format!(
-                "see what they cost with `policyc certify` and `policyc simulate`; to accept them, golden_decisions = {share} in \
-                 [network] of the contract, which `verify` reads too, or --golden-decisions {share} for this run"
-            );
+            let remedy = decisions.remedy();
+            let (problem, hint) = match &decisions {
+                Decisions::Choice(choices) => (
+                    "the numeric format changes more of the trainer's decisions than allowed; nothing was written",
+                    format!(
+                        "see what they cost with `policyc certify` and `policyc simulate`; to accept them, {remedy} in \
+                         [network] of the contract, which `verify` reads too, or --golden-decisions {} for this run",
+                        choices.accepting_share()
+                    ),
+                ),
+                Decisions::Continuous(_) => (
+                    "the numeric format changes the trainer's duties more than allowed; nothing was written",
+                    format!(
+                        "see what it costs with `policyc simulate`; to accept it, {remedy} in [network] of the contract"
+                    ),
+                ),
+            };
             let found = text::decisions(&policy, &decisions).join("\n");
             Err(Message::new(problem).found(found).hint(hint).into())
         }

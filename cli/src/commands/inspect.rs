@@ -25,9 +25,11 @@ pub fn run(options: &Inspect) -> Result<Outcome, Failure> {
     match verify::decisions(&policy, None).is_some_and(|decisions| !decisions.kept()) {
         false => Ok(Outcome::Done),
         true => {
-            eprintln!(
-                "\nDIFFERENT: the numeric format changes more of the trainer's decisions than the contract allows"
-            );
+            let decided = match policy.head.continuous() {
+                Some(_) => "the trainer's duties more",
+                None => "more of the trainer's decisions",
+            };
+            eprintln!("\nDIFFERENT: the numeric format changes {decided} than the contract allows");
             Ok(Outcome::Different)
         }
     }
@@ -43,6 +45,8 @@ struct View<'p> {
     features: &'p [policy::Feature],
     layers: Vec<LayerView<'p>>,
     actions: &'p [policy::Action],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    continuous: Option<&'p policy::Continuous>,
     mapping: Option<policy::Mapping>,
     limits: policy::Limits,
     fallback: policy::Fallback,
@@ -81,7 +85,8 @@ fn view(policy: &Policy) -> View<'_> {
                 bound: describe::hull(layer.bounds.iter().copied()),
             })
             .collect(),
-        actions: &policy.actions,
+        actions: policy.actions(),
+        continuous: policy.head.continuous(),
         mapping: policy.mapping,
         limits: policy.limits,
         fallback: policy.fallback,

@@ -23,7 +23,7 @@ mod text;
 use policy::Activation;
 use proc_macro2::TokenStream;
 
-use crate::program::Network;
+use crate::program::{Network, Program};
 
 pub(crate) use number::Number;
 pub(crate) use text::rust_cut;
@@ -57,6 +57,13 @@ pub(crate) fn used(network: &Network) -> impl Iterator<Item = Activation> {
     kinds().filter(|kind| network.activates(|activation| activation.word() == kind.word()))
 }
 
+/// The kinds of a network and of the head behind it, in that order.
+pub(crate) fn used_by(program: &Program) -> impl Iterator<Item = Activation> {
+    let of_head = |kind: &Activation| program.head.curve().is_some_and(|curve| curve.word() == kind.word());
+    let of_network = |kind: &Activation| program.network.activates(|activation| activation.word() == kind.word());
+    kinds().filter(move |kind| of_network(kind) || of_head(kind))
+}
+
 /// Functions for floats that every Rust file has, whether it calls them or not: those of straight lines.
 pub(crate) fn rust_lines(rust: &Rust) -> TokenStream {
     kinds()
@@ -73,10 +80,10 @@ pub(crate) fn rust_integer_lines() -> TokenStream {
         .collect()
 }
 
-/// Functions in Rust of the curves that the network has.
-pub(crate) fn rust_curves(network: &Network, rust: &Rust) -> TokenStream {
-    used(network)
+/// Functions in Rust of the curves that the network and its head have.
+pub(crate) fn rust_curves(program: &Program) -> TokenStream {
+    used_by(program)
         .filter(|kind| kind.limit().is_some())
-        .map(|kind| text_of(kind).rust_helper(rust))
+        .map(|kind| text_of(kind).rust_helper(&Rust::of(program)))
         .collect()
 }

@@ -65,7 +65,7 @@ pub fn view(program: &Program, title: &str) -> BlockView {
         // in doubles, which hold two words each
         work: (program.state_words() + 1).div_ceil(2),
         features: program.feature_count(),
-        actions: program.duties.len(),
+        actions: program.head.outputs(),
     }
 }
 

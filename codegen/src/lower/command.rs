@@ -11,6 +11,7 @@
 
 use policy::{Mapping, Policy, Scalar};
 
+use super::head;
 use crate::program::{Advance, Block, Coefficient, Decide, Literal, Op, ValueId, Within};
 
 /// One bit of the status word.
@@ -66,7 +67,7 @@ pub fn decide(policy: &Policy) -> Decide {
         status.push((bit("CLIPPED"), block.value(Op::Clipped)));
     }
     // each limiter takes what the one before left, in the order of section 9: the duty limits have the last word
-    let duty_sim = block.value(Op::ChosenDuty);
+    let duty_sim = head::duty(policy, &mut block);
     let mut duty = duty_sim;
     if let Some(map) = &policy.mapping {
         let outside;

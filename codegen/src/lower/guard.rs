@@ -2,6 +2,7 @@
 
 use policy::{Expr, Input, Policy, Scalar};
 
+use super::head;
 use crate::program::{Guard, Guarded, Literal, Place, SignalPort, Within};
 
 /// Ranges of all parts of the state that a source, a filter or a limiter reads.
@@ -22,10 +23,7 @@ pub fn lower(policy: &Policy, signals: &[SignalPort]) -> Guard {
     let start = [policy.limits.initial_duty, policy.fallback.duty].map(|duty| Literal::nearest(scalar, duty));
     let (min, max) = Literal::inward(scalar, policy.limits.duty);
     if read(Input::PreviousDuty) {
-        let duties = policy
-            .actions
-            .iter()
-            .map(|action| Literal::nearest(scalar, action.duty));
+        let duties = head::duties(policy);
         numbers.push(within(Place::PreviousDuty, hull(start.into_iter().chain(duties))));
     }
     if read(Input::PreviousCommand) || policy.limits.slew.is_some() {

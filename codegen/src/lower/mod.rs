@@ -3,6 +3,7 @@
 pub mod command;
 mod front;
 mod guard;
+mod head;
 mod integer;
 pub mod known_answers;
 mod loops;
@@ -19,7 +20,7 @@ use targets::TargetSpec;
 use crate::crc::{crc32_words, nibble_table};
 use crate::files::TOOL;
 use crate::output::Language;
-use crate::program::{Coefficient, Element, Literal, MappingCode, Program, Provenance, SignalPort, Table};
+use crate::program::{Coefficient, Element, Head, Literal, MappingCode, Program, Provenance, SignalPort, Table};
 
 /// Lowers a policy for a target; the loops of its network are those that suit the language's compilers.
 #[must_use]
@@ -27,18 +28,16 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
     let scalar = policy.numeric_format.scalar();
     let (front, memory_words) = front::lower(policy);
     let (network, mut tables) = network::lower(policy, target, language);
-    let duties: Vec<_> = policy
-        .actions
-        .iter()
-        .map(|action| Literal::nearest(scalar, action.duty))
-        .collect();
+    let head = head::lower(policy);
     // on the finished tables: the answers are those of what is printed, not of the policy a second time
     let answers = known_answers::lower(policy, &network, &tables);
-    tables.push(Table {
-        // a flipped duty would be commanded as it is
-        is_checked: true,
-        ..Table::plain("duties", Element::Float(scalar), duties.iter().copied())
-    });
+    if let Head::Choice(duties) = &head {
+        tables.push(Table {
+            // a flipped duty would be commanded as it is
+            is_checked: true,
+            ..Table::plain("duties", Element::Float(scalar), duties.iter().copied())
+        });
+    }
     // what follows needs no check: a wrong step gives another checksum, a wrong answer fails the self test
     tables.push(Table::words("crc_steps", &nibble_table()));
     tables.extend(answers);
@@ -80,7 +79,7 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
         memory_words,
         front,
         network,
-        duties,
+        head,
         mapping,
         decide: command::decide(policy),
         guard,

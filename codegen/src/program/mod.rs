@@ -10,6 +10,7 @@
 //! loops which walk the tables from end to end; a backend prints the nodes, and the known answers are computed on them.
 
 mod guard;
+mod head;
 mod literal;
 mod loops;
 mod ops;
@@ -19,6 +20,7 @@ use policy::{Digests, NumericFormat, Scalar};
 use targets::Widths;
 
 pub use guard::{Guard, Guarded, Place, Within};
+pub use head::Head;
 pub use literal::Literal;
 pub(crate) use literal::{bits, words};
 pub use loops::{Add, Arithmetic, Buffer, Cut, From, Inner, IntegerCode, IntegerInput, Kept, Layer, Loop};
@@ -82,8 +84,8 @@ pub struct Program {
     pub front: Front,
     /// Network.
     pub network: Network,
-    /// Duty per action.
-    pub duties: Vec<Literal>,
+    /// What the outputs of the network mean.
+    pub head: Head,
     /// Mapping, if any.
     pub mapping: Option<MappingCode>,
     /// Chosen duty to command.

@@ -55,6 +55,10 @@ pub enum Op {
     Coefficient(Coefficient),
     /// Duty of the action that argmax chose.
     ChosenDuty,
+    /// The one output of a continuous head.
+    Output,
+    /// A value behind the curve of the program's head.
+    Squash(ValueId),
     /// Constant.
     Constant(Literal),
     /// Sign change, exact.

@@ -149,7 +149,7 @@ impl C<'_> {
         });
         let mut list = |value: Value, length: usize| walk.machine.put(Value::List(vec![value; length]));
         let observation = list(zero, self.spec.policy.features.len()).element(0);
-        let q = list(Value::Unset(None), self.spec.policy.actions.len()).element(0);
+        let q = list(Value::Unset(None), self.spec.policy.outputs()).element(0);
         let arguments = [&observation, &q].map(|place| Value::Place(place.clone()));
         walk.call(&self.named("q_values"), arguments.to_vec())?;
         let first = walk.machine.read(&q).and_then(|value| number(&value));

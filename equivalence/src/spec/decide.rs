@@ -1,8 +1,8 @@
 //! Sections 7 to 10: from Q values to the command, and the state behind it.
 
-use policy::Scalar;
+use policy::{Activation, Scalar, Squash};
 
-use super::{Sensed, Spec, State, status};
+use super::{Sensed, Spec, State, status, tables};
 use crate::term::Term;
 
 /// What leaves the controller.
@@ -13,9 +13,71 @@ pub(crate) struct Command {
     pub status: Term,
 }
 
+/// What sections 7 to 8 make of the network's outputs.
+pub(crate) struct Chosen {
+    pub index: Term,
+    /// Before the mapping.
+    pub duty: Term,
+    /// Numbers on the way that are no NaN: the check of the policy bounds an output, and the curve is defined for every number.
+    pub numbers: Vec<Term>,
+}
+
+/// The greedy action and its duty (sections 7 and 8), or the duty of a continuous head (section 7b).
+pub(crate) fn choose(spec: Spec<'_>, to_cut: u32, outputs: &[Term]) -> Chosen {
+    let (Some(head), [output]) = (spec.policy.head.continuous(), outputs) else {
+        let index = best(spec, to_cut, outputs);
+        return Chosen {
+            index,
+            duty: chosen_duty(spec, index),
+            numbers: Vec::new(),
+        };
+    };
+    let float = spec.float;
+    let output = as_number(spec, to_cut, *output);
+    let mut numbers = vec![output];
+    let squashed = match head.squash {
+        Squash::Clip(clip) => {
+            let (low, high) = spec.ends(clip);
+            float.clamp(output, low, high)
+        }
+        Squash::Curve(Activation::Softsign) => tables::softsign(float, output),
+        Squash::Curve(_) => {
+            let (quotient, squashed) = tables::tanh(float, output);
+            numbers.push(quotient);
+            squashed
+        }
+    };
+    let scaled = match head.scale {
+        1.0 => squashed,
+        scale => float.mul(squashed, spec.nearest(scale)),
+    };
+    let duty = match head.offset {
+        0.0 => scaled,
+        offset => float.add(scaled, spec.nearest(offset)),
+    };
+    Chosen {
+        index: spec.counter(0),
+        duty,
+        numbers,
+    }
+}
+
+/// An output as section 6b gives it: integer / 2^(its exponent).
+fn as_number(spec: Spec<'_>, to_cut: u32, output: Term) -> Term {
+    let scales = policy::scales::of(spec.policy);
+    let exponent = scales.as_ref().and_then(|scales| scales.layers.last()?.outputs.first().copied());
+    let Some(exponent) = exponent else { return output };
+    let cut = match to_cut {
+        0 => output,
+        bits => spec.terms.binary("bvashr", output, spec.counter(u64::from(bits))),
+    };
+    let unit = spec.float.constant(policy::scales::power_of_two(-exponent));
+    spec.float.mul(spec.float.of_i32(cut), unit)
+}
+
 /// The argmax of what the network answered. In integer formats that are integers of one exponent, whose order is that of the Q values
 /// (section 6b); `to_cut` bits of each are still to be shifted out.
-pub(crate) fn best(spec: Spec<'_>, to_cut: u32, outputs: &[Term]) -> Term {
+fn best(spec: Spec<'_>, to_cut: u32, outputs: &[Term]) -> Term {
     if !spec.policy.numeric_format.is_integer() {
         return argmax(spec, outputs);
     }
@@ -59,7 +121,7 @@ fn argmax(spec: Spec<'_>, q_values: &[Term]) -> Term {
 /// The entry of the table of duties.
 fn chosen_duty(spec: Spec<'_>, index: Term) -> Term {
     let terms = spec.terms;
-    let mut duties = spec.policy.actions.iter().enumerate().rev();
+    let mut duties = spec.policy.actions().iter().enumerate().rev();
     let last = duties
         .next()
         .map_or(spec.zero(), |(_, action)| spec.nearest(action.duty));
@@ -69,11 +131,11 @@ fn chosen_duty(spec: Spec<'_>, index: Term) -> Term {
     })
 }
 
-/// Sections 8 and 9; `index` is the argmax.
-pub(crate) fn decide(spec: Spec<'_>, state: &State, sensed: &Sensed, index: Term) -> Command {
+/// Sections 8 and 9.
+pub(crate) fn decide(spec: Spec<'_>, state: &State, sensed: &Sensed, choice: &Chosen) -> Command {
     let (terms, float, policy) = (spec.terms, spec.float, spec.policy);
     let none = terms.truth(false);
-    let chosen = chosen_duty(spec, index);
+    let (chosen, index) = (choice.duty, choice.index);
     let (mut t, mut outside) = (chosen, none);
     if let (Some(mapping), [a, b, c, rest @ ..]) = (&policy.mapping, state.coefficients.as_slice()) {
         let current = sensed.signals[mapping.load_current];

@@ -1,7 +1,7 @@
 //! The specification: what the numeric contract says of one step, as terms.
 //!
 //! Generated from [`Policy`] and `docs/reference/numeric-contract.md` alone, section by section; nothing here knows what the emitted code
-//! looks like. The network is outside: an action index goes into [`decide`], an observation leaves [`sense`].
+//! looks like. The network is outside: its outputs go into [`choose`], an observation leaves [`sense`].
 
 mod decide;
 mod filter;
@@ -9,7 +9,7 @@ mod sense;
 mod state;
 pub(crate) mod tables;
 
-pub(crate) use decide::{Command, best, commit, decide};
+pub(crate) use decide::{Command, choose, commit, decide};
 pub(crate) use sense::{Sensed, measurement, sense};
 pub(crate) use state::{State, accepted, check_word, initial, reset};
 

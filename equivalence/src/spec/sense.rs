@@ -7,6 +7,7 @@ use super::{Spec, State};
 use crate::term::Term;
 
 /// What a step knows before the network runs.
+#[derive(Clone)]
 pub(crate) struct Sensed {
     pub sound: Term,
     pub all_valid: Term,

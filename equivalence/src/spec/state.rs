@@ -1,6 +1,6 @@
 //! Section 1: the state, which states are sound, and what `init` and `reset` leave. Section 8: coefficients set at run time.
 
-use policy::{Expr, Feature, Filter, Input, Mapping, memory_bounds};
+use policy::{Expr, Feature, Filter, Head, Input, Mapping, Squash, memory_bounds};
 
 use super::Spec;
 use crate::term::Term;
@@ -72,12 +72,7 @@ impl State {
         let limits = &spec.policy.limits;
         let start = [limits.initial_duty, spec.policy.fallback.duty].map(|duty| spec.format().nearest(duty));
         if reads(spec, Input::PreviousDuty) {
-            let actions = spec
-                .policy
-                .actions
-                .iter()
-                .map(|action| spec.format().nearest(action.duty));
-            all.push(between(spec, self.previous_duty, actions.chain(start)));
+            all.push(between(spec, self.previous_duty, duties(spec).into_iter().chain(start)));
         }
         let range = [spec.format().up(limits.duty.low), spec.format().down(limits.duty.high)];
         if reads(spec, Input::PreviousCommand) || limits.slew.is_some() {
@@ -93,6 +88,26 @@ impl State {
         all.push(terms.order("bvule", self.bad_count, spec.counter(spec.hold() + 1)));
         all.push(terms.order("bvule", self.primed, spec.counter(1)));
         terms.all(all)
+    }
+}
+
+/// The duties of all actions, or those of a continuous head at both ends of its squash (section 7b).
+fn duties(spec: Spec<'_>) -> Vec<f64> {
+    let format = spec.format();
+    match &spec.policy.head {
+        Head::Choice(actions) => actions.iter().map(|action| format.nearest(action.duty)).collect(),
+        Head::Continuous(head) => {
+            let ends = match head.squash {
+                Squash::Curve(_) => [-1.0, 1.0],
+                Squash::Clip(clip) => [clip.low, clip.high],
+            };
+            // binary64 has more than twice the digits of binary32: what is rounded to it first is rounded no other way
+            ends.map(|s| {
+                let scaled = format.nearest(format.nearest(s) * format.nearest(head.scale));
+                format.nearest(scaled + format.nearest(head.offset))
+            })
+            .to_vec()
+        }
     }
 }
 

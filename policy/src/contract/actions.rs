@@ -1,51 +1,75 @@
-//! `[actions]`: the duty of each network output.
+//! `[actions]`: the duty of each network output, or one output as a duty.
 
 use toml_input::{Sink, Table, Value};
 
-use super::duty;
+use super::{continuous, duty};
 use crate::catalogue;
 use crate::limits::{MAX_ACTIONS, MIN_ACTIONS};
-use crate::model::{Action, Pair};
+use crate::model::{Action, Head, Pair};
 
-/// The actions and how many the contract lists, faulty ones included; `count` is 0 if that is unknown.
-#[derive(Default)]
+/// What the outputs of the network mean, as far as it could be read.
 pub(crate) struct Actions {
-    pub list: Vec<Action>,
-    pub count: usize,
+    pub head: Head,
+    /// Outputs of the network by the contract, faulty actions included; 0 if that is unknown.
+    pub outputs: usize,
+}
+
+impl Default for Actions {
+    fn default() -> Self {
+        Self {
+            head: Head::Choice(Vec::new()),
+            outputs: 0,
+        }
+    }
+}
+
+/// Discrete actions, and how many the contract lists, faulty ones included.
+#[derive(Default)]
+struct Listed {
+    list: Vec<Action>,
+    count: usize,
 }
 
 pub(crate) fn read(root: &mut Table<'_>, faults: &mut Sink) -> Actions {
-    let hint = "give [actions] with `duties = [...]` or `pairs = [...]`, one per network output";
+    let hint = "give [actions] with `duties = [...]` or `pairs = [...]`, one per network output, or `continuous = {...}`";
     let Some(mut section) = root
         .required("actions", hint, faults)
         .and_then(|v| v.table("[actions]", faults))
     else {
         return Actions::default();
     };
-    let (duties, pairs) = (section.optional("duties"), section.optional("pairs"));
-    let (value, actions) = match (duties, pairs) {
-        (Some(value), None) => (value.clone(), from_duties(&value, faults)),
-        (None, Some(value)) => (value.clone(), from_pairs(&value, faults)),
-        (both, _) => {
-            // the arms above took exactly one: it is both or none
-            let count = if both.is_some() { 2 } else { 0 };
-            faults.push(section.fault(catalogue::exactly_one_of("[actions]", "`duties`, `pairs`", count)));
-            section.finish(faults);
-            return Actions::default();
+    let forms = ["duties", "pairs", "continuous"].map(|key| section.optional(key));
+    let actions = match &forms {
+        [Some(value), None, None] => chosen(value, from_duties(value, faults), faults),
+        [None, Some(value), None] => chosen(value, from_pairs(value, faults), faults),
+        [None, None, Some(value)] => continuous::read(value, faults).map(|head| Actions {
+            head: Head::Continuous(head),
+            outputs: 1,
+        }),
+        _ => {
+            let count = forms.iter().flatten().count();
+            let message = catalogue::exactly_one_of("[actions]", "`duties`, `pairs`, `continuous`", count);
+            faults.push(section.fault(message));
+            None
         }
     };
     section.finish(faults);
-    let Some(actions) = actions else {
-        return Actions::default();
-    };
-    if !(MIN_ACTIONS..=MAX_ACTIONS).contains(&actions.count) {
-        let message = catalogue::count("actions", actions.count, MIN_ACTIONS, MAX_ACTIONS);
-        faults.push(value.fault(message));
-    }
-    actions
+    actions.unwrap_or_default()
 }
 
-fn from_duties(value: &Value<'_>, faults: &mut Sink) -> Option<Actions> {
+fn chosen(value: &Value<'_>, listed: Option<Listed>, faults: &mut Sink) -> Option<Actions> {
+    let Listed { list, count } = listed?;
+    if !(MIN_ACTIONS..=MAX_ACTIONS).contains(&count) {
+        let message = catalogue::count("actions", count, MIN_ACTIONS, MAX_ACTIONS);
+        faults.push(value.fault(message));
+    }
+    Some(Actions {
+        head: Head::Choice(list),
+        outputs: count,
+    })
+}
+
+fn from_duties(value: &Value<'_>, faults: &mut Sink) -> Option<Listed> {
     let items = value.list("an array of duty ratios", faults)?;
     // one fault for the whole list, instead of one for every whole number in it
     if has_decimal_commas(&items) {
@@ -54,7 +78,7 @@ fn from_duties(value: &Value<'_>, faults: &mut Sink) -> Option<Actions> {
     }
     let duties = items.iter().filter_map(|item| duty(item, faults));
     let list: Vec<_> = duties.map(|duty| Action { duty, pair: None }).collect();
-    Some(Actions {
+    Some(Listed {
         list,
         count: items.len(),
     })
@@ -76,9 +100,9 @@ fn has_decimal_commas(items: &[Value<'_>]) -> bool {
             .any(|pair| whole(&pair[1]).is_some_and(|x| x > 1.0))
 }
 
-fn from_pairs(value: &Value<'_>, faults: &mut Sink) -> Option<Actions> {
+fn from_pairs(value: &Value<'_>, faults: &mut Sink) -> Option<Listed> {
     let items = value.list("an array of pairs: [{ xi = 0.5, phi = 0.05 }]", faults)?;
-    let mut actions = Actions::default();
+    let mut actions = Listed::default();
     let mut known = true;
     for item in &items {
         match pair(item, faults) {

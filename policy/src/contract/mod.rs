@@ -1,6 +1,7 @@
 //! The sections of `policy.toml`, one file each: keys, values, and what must hold between them.
 
 pub(crate) mod actions;
+mod continuous;
 pub(crate) mod features;
 pub(crate) mod filters;
 pub(crate) mod head;

@@ -1,7 +1,7 @@
 //! The parts of a policy, a text each: a heading behind an empty line, then a line for each thing that there is.
 
 use crate::describe::formula::formula;
-use crate::model::{Fallback, Interval, Mapping, Policy};
+use crate::model::{Continuous, Fallback, Head, Interval, Mapping, Policy, Squash};
 
 /// Characters of a line of actions, with which it still fits into a terminal beside its indentation.
 const LINE: usize = 96;
@@ -79,12 +79,15 @@ pub fn network(policy: &Policy) -> String {
     out
 }
 
-/// Duties of the actions, several a line.
+/// Duties of the actions, several a line, or the formula of a continuous head.
 #[must_use]
 pub fn actions(policy: &Policy) -> String {
+    if let Some(head) = policy.head.continuous() {
+        return continuous(head);
+    }
     let mut out = "\nactions (argmax of Q, lowest index wins)\n".to_owned();
     let texts = policy
-        .actions
+        .actions()
         .iter()
         .enumerate()
         .map(|(index, action)| match action.pair {
@@ -103,6 +106,20 @@ pub fn actions(policy: &Policy) -> String {
         line.push_str(&text);
     }
     out + &format!("  {line}\n")
+}
+
+fn continuous(head: &Continuous) -> String {
+    let squashed = match head.squash {
+        Squash::Curve(curve) => format!("{}(y)", curve.word()),
+        Squash::Clip(clip) => format!("y clipped to {}", range(clip)),
+    };
+    let ends = Head::Continuous(*head).duties().into_iter();
+    format!(
+        "\naction (continuous, y is the network's output)\n  duty = {} * {squashed} {:+}, in {}\n",
+        head.scale,
+        head.offset,
+        range(hull(ends.map(|duty| Interval { low: duty, high: duty })))
+    )
 }
 
 /// The mapping as a formula, with its valid range and what may be adjusted at run time.

@@ -169,6 +169,15 @@ pub(crate) fn golden_missing(name: &str, expected: &str) -> Message {
         .hint("the tensors are called obs, q and action: rename those that are there")
 }
 
+pub(crate) fn golden_continuous(rows: usize) -> Message {
+    Message::new("golden vectors of a continuous head need the tensor `duty`")
+        .expected(format!("`duty` f32 [{rows}] or `output` f32 [{rows}], or both"))
+        .hint(
+            "duty is what the trainer's actor asks for, as a duty: its action taken through scale and offset; output is the \
+             network's last layer, before squash or clip",
+        )
+}
+
 pub(crate) fn golden_shape(found: &[usize], features: usize) -> Message {
     let hint = match found {
         [first, _] if *first == features => "the vectors stand in columns: save the transposed array, `obs.T.copy()`",

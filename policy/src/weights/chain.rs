@@ -45,9 +45,10 @@ fn chains_of(layers: &[Dense], members: &[usize], ends: Ends) -> Vec<Chain> {
     let mut chains: Vec<Chain> = Vec::new();
     for group in groups(layers, members) {
         for chain in orders(layers, &group, ends) {
-            // a single output leaves nothing to choose: a value net beside the policy
+            // a single output leaves nothing to choose: a value net beside the policy, unless the contract asks for one
+            let is_asked = ends.outputs == Some(1);
             let chooses = chain.last().is_some_and(|&last| layers[last].outputs >= MIN_ACTIONS);
-            if chooses && !chains.contains(&chain) {
+            if (chooses || is_asked) && !chains.contains(&chain) {
                 chains.push(chain);
             }
         }

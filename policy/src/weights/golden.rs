@@ -1,4 +1,5 @@
-//! Known answers from the trainer: `obs` [n, features], `q` [n, actions], `action` [n].
+//! Known answers from the trainer: `obs` [n, features] with `q` [n, actions] and `action` [n] of a choice, or with `output` [n]
+//! and `duty` [n] of a continuous head.
 
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
@@ -15,19 +16,38 @@ pub(crate) struct Limits {
     pub tolerance: f64,
     /// Share of changed actions, 0..1.
     pub decisions: Option<f64>,
+    /// Error of a continuous head's duty, as a share of its range.
+    pub duty_error: Option<f64>,
     /// Share of observations, 0..1, that may lie outside of what the controller can see, and are left out.
     pub outside: f64,
+}
+
+/// What the contract says of a vector.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Shape {
+    pub features: usize,
+    pub outputs: usize,
+    /// The output becomes a duty, in the place of a choice.
+    pub is_continuous: bool,
+}
+
+/// What the trainer made of the observations; a part that it did not give is empty.
+#[derive(Default)]
+struct Answers {
+    q_values: Vec<f32>,
+    action_indices: Vec<u32>,
+    duties: Vec<f32>,
 }
 
 /// Reads and checks the vectors; `bounds` are checked only if every feature is known.
 pub(crate) fn read(
     file: &Binary,
-    features: usize,
+    shape: Shape,
     bounds: &[Feature],
-    actions: usize,
     limits: Limits,
     faults: &mut Sink,
 ) -> Option<Golden> {
+    let Shape { features, outputs, .. } = shape;
     let opened = header::open(file, faults)?;
     let before = faults.count();
     for (name, view) in opened.iter() {
@@ -52,41 +72,77 @@ pub(crate) fn read(
         faults.push(file.name.tensor_fault("obs", message));
         return None;
     };
-    let (q, action) = (view("q"), view("action"));
-    if q.is_none() && action.is_none() {
-        let expected = format!("`q` f32 [{rows}, {actions}] or `action` i32 [{rows}], or both");
-        faults.push(
-            file.name
-                .fault(catalogue::golden_missing("q", &expected).found(names(&opened))),
-        );
+    let (first, second) = if shape.is_continuous { ("output", "duty") } else { ("q", "action") };
+    let (first, second) = ((first, view(first)), (second, view(second)));
+    if first.1.is_none() && second.1.is_none() {
+        let missing = if shape.is_continuous {
+            catalogue::golden_continuous(rows)
+        } else {
+            let expected = format!("`q` f32 [{rows}, {outputs}] or `action` i32 [{rows}], or both");
+            catalogue::golden_missing("q", &expected)
+        };
+        faults.push(file.name.fault(missing.found(names(&opened))));
         return None;
     }
     let obs = part(file, "obs", faults, floats(&observations, &[rows, features]));
-    let q_values = q.map(|view| part(file, "q", faults, floats(&view, &[rows, actions])));
-    let indices = action.map(|view| part(file, "action", faults, integers(&view, rows, actions)));
+    let answers = if shape.is_continuous {
+        numbers(file, rows, [first, second], faults)
+    } else {
+        choices(file, [rows, outputs], [first, second], faults)
+    };
     let seen = obs.as_deref().map(|obs| seen(obs, rows, bounds));
     if let Some(seen) = &seen {
         part(file, "obs", faults, seen.enough(rows, limits.outside));
     }
+    let (observations, seen, answers) = (obs?, seen?, answers?);
+    let golden = Golden {
+        count: seen.rows.len(),
+        outside: rows - seen.rows.len(),
+        observations: seen.keep(&observations, features),
+        q_values: seen.keep(&answers.q_values, outputs),
+        action_indices: seen.keep(&answers.action_indices, 1),
+        duties: seen.keep(&answers.duties, 1),
+        tolerance: limits.tolerance,
+        decisions: limits.decisions,
+        duty_error: limits.duty_error,
+    };
+    (faults.count() == before).then_some(golden)
+}
+
+/// A tensor that may be there, by its name.
+type Named<'a> = (&'static str, Option<TensorView<'a>>);
+
+/// Q values and greedy actions.
+fn choices(file: &Binary, [rows, actions]: [usize; 2], parts: [Named<'_>; 2], faults: &mut Sink) -> Option<Answers> {
+    let [(q, q_values), (action, indices)] = parts;
+    let q_values = q_values.map(|view| part(file, q, faults, floats(&view, &[rows, actions])));
+    let indices = indices.map(|view| part(file, action, faults, integers(&view, rows, actions)));
     let (q_values, action_indices) = (
         q_values.unwrap_or(Some(Vec::new())),
         indices.unwrap_or(Some(Vec::new())),
     );
     if let (Some(q), Some(chosen)) = (&q_values, &action_indices) {
-        part(file, "action", faults, greedy(q, chosen, actions));
+        part(file, action, faults, greedy(q, chosen, actions));
     }
-    let (observations, seen) = (obs?, seen?);
-    let (q_values, action_indices) = (q_values?, action_indices?);
-    let golden = Golden {
-        count: seen.rows.len(),
-        outside: rows - seen.rows.len(),
-        observations: seen.keep(&observations, features),
-        q_values: seen.keep(&q_values, actions),
-        action_indices: seen.keep(&action_indices, 1),
-        tolerance: limits.tolerance,
-        decisions: limits.decisions,
-    };
-    (faults.count() == before).then_some(golden)
+    Some(Answers {
+        q_values: q_values?,
+        action_indices: action_indices?,
+        duties: Vec::new(),
+    })
+}
+
+/// Outputs and duties of a continuous head, as `[rows]` or as a column.
+fn numbers(file: &Binary, rows: usize, parts: [Named<'_>; 2], faults: &mut Sink) -> Option<Answers> {
+    let [q_values, duties] = parts.map(|(name, view)| {
+        let Some(view) = view else { return Some(Vec::new()) };
+        let shape: &[usize] = if view.shape().len() == 1 { &[rows] } else { &[rows, 1] };
+        part(file, name, faults, floats(&view, shape))
+    });
+    Some(Answers {
+        q_values: q_values?,
+        action_indices: Vec::new(),
+        duties: duties?,
+    })
 }
 
 /// The number of vectors, if the shape is `[rows, features]`.
@@ -109,9 +165,9 @@ fn part<T>(file: &Binary, tensor: &str, faults: &mut Sink, result: Result<T, Mes
         .ok()
 }
 
-fn floats(view: &TensorView<'_>, shape: &[usize; 2]) -> Result<Vec<f32>, Message> {
+fn floats(view: &TensorView<'_>, shape: &[usize]) -> Result<Vec<f32>, Message> {
     if view.shape() != shape {
-        let is_transposed = view.shape() == [shape[1], shape[0]];
+        let is_transposed = shape.len() == 2 && view.shape().iter().eq(shape.iter().rev());
         let hint = is_transposed.then(|| "save the transposed array: `.T.copy()`".to_owned());
         return Err(catalogue::wrong_shape("this tensor", view.shape(), shape, hint));
     }

@@ -125,7 +125,12 @@ fn whole_chains(layers: &[Dense]) -> Vec<Chain> {
         inputs: None,
         outputs: None,
     };
-    let (found, _) = chain::candidates(layers, ends);
+    let (mut found, _) = chain::candidates(layers, ends);
+    if found.is_empty() {
+        // nothing chooses: then one output is what there is, a continuous actor
+        let outputs = Some(1);
+        (found, _) = chain::candidates(layers, Ends { outputs, ..ends });
+    }
     // with open ends a part of a chain fits as well as the whole
     let part_of = |a: &Chain, b: &Chain| a.len() < b.len() && a.iter().all(|layer| b.contains(layer));
     let is_whole = |chain: &&Chain| !found.iter().any(|other| part_of(chain, other));

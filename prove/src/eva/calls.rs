@@ -103,10 +103,11 @@ impl Writer<'_> {
             "front.sound = 0u;".to_owned(),
             "front.usable = 0u;".to_owned(),
         ]);
-        let last = self.policy.actions.len() - 1;
-        self.text.line(format!(
-            "{n}_decide(&state, &front, Frama_C_unsigned_int_interval(0u, {last}u), &command);"
-        ));
+        let chosen = match self.is_output() {
+            true => "ANY_NUMBER".to_owned(),
+            false => format!("Frama_C_unsigned_int_interval(0u, {}u)", self.policy.outputs() - 1),
+        };
+        self.text.line(format!("{n}_decide(&state, &front, {chosen}, &command);"));
         let fallback = self.literal(self.number.nearest(self.policy.fallback.duty));
         // FALLBACK and STATE, and no other bit
         self.text
@@ -202,7 +203,7 @@ impl Writer<'_> {
     /// The network with every observation.
     pub fn q_values(&mut self) -> Entry {
         let n = self.n().to_owned();
-        let (features, actions) = (self.policy.features.len(), self.policy.actions.len());
+        let (features, actions) = (self.policy.features.len(), self.policy.outputs());
         let kind = self.number.kind();
         let e = if kind == "float" { "f" } else { "" };
         self.text.line("void prove_q_values(void)");

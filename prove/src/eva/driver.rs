@@ -148,24 +148,38 @@ impl Writer<'_> {
             "{".to_owned(),
             format!("{n}_state state;"),
             format!("{n}_measurement measured;"),
-            "uint32_t index;".to_owned(),
+            match self.is_output() {
+                true => format!("{} output;", self.number.kind()),
+                false => "uint32_t index;".to_owned(),
+            },
             "#if defined(FINITE)".to_owned(),
             "sound(&state);".to_owned(),
             "#else".to_owned(),
             "arbitrary(&state);".to_owned(),
             "#endif".to_owned(),
             "measure(&measured);".to_owned(),
-            format!("index = {n}_choose(&state, &measured);"),
+            format!("{} = {n}_choose(&state, &measured);", if self.is_output() { "output" } else { "index" }),
         ]);
-        self.text
-            .check("index", &format!("index < {}u", self.policy.actions.len()));
+        if self.is_output() {
+            self.text.line("#if defined(FINITE)");
+            self.text.check("index", "\\is_finite(output)");
+            self.text.line("#endif");
+        } else {
+            self.text.check("index", &format!("index < {}u", self.policy.outputs()));
+        }
         self.close();
         Entry {
             function: "prove_choose",
-            about: "the choice of an action from every bit pattern of the state, every measurement; finite numbers from every sound state",
+            about: match self.is_output() {
+                true => "the network's output from every bit pattern of the state, every measurement; finite numbers from every sound state",
+                false => "the choice of an action from every bit pattern of the state, every measurement; finite numbers from every sound state",
+            },
             stated: vec![stated(
                 "index",
-                "The network and its argmax give an index below the number of actions.",
+                match self.is_output() {
+                    true => "From every sound state the network gives a finite number.",
+                    false => "The network and its argmax give an index below the number of actions.",
+                },
             )],
             runs: BITS_AND_FINITE,
             assumed: if self.is_integer() { &[] } else { &["q_values"] },
@@ -244,15 +258,11 @@ impl Writer<'_> {
         let (low, high) = (self.number.up(limits.low), self.number.down(limits.high));
         let fallback = self.literal(self.number.nearest(self.policy.fallback.duty));
         let (low, high) = (self.literal(low), self.literal(high));
-        let duties = self
-            .policy
-            .actions
-            .iter()
-            .map(|action| self.number.nearest(action.duty));
-        let least = duties.clone().fold(f64::INFINITY, f64::min);
-        let most = duties.fold(f64::NEG_INFINITY, f64::max);
+        let duties = self.number.duties(&self.policy.head);
+        let least = duties.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = duties.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let (least, most) = (self.literal(least), self.literal(most));
-        let actions = self.policy.actions.len();
+        let actions = self.policy.outputs();
         self.text.check(
             "duty",
             &format!("(command.duty >= {low} && command.duty <= {high}) || command.duty == {fallback}"),
@@ -382,6 +392,11 @@ impl Writer<'_> {
         ]);
     }
 
+    /// Whether the head is continuous.
+    pub fn is_output(&self) -> bool {
+        self.policy.head.continuous().is_some()
+    }
+
     /// Whether the network computes in integers.
     pub fn is_integer(&self) -> bool {
         matches!(self.policy.numeric_format, NumericFormat::I16 | NumericFormat::I8)
@@ -394,7 +409,7 @@ fn command_claims() -> Vec<Stated> {
         stated("duty", "The duty is a number within its limits, or the fallback."),
         stated(
             "chosen",
-            "The chosen duty lies within the table of duties, or is the fallback.",
+            "The chosen duty lies between the least and the largest of all duties, or is the fallback.",
         ),
         stated("action", "The action index is below the number of actions."),
         stated("status", "No bit of the status is set that has no meaning."),

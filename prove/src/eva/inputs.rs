@@ -93,13 +93,22 @@ impl Writer<'_> {
     /// Contracts of the network and of the choice of an action: shown by the entries that analyse them, given to all others.
     fn contracts(&mut self) {
         let (n, kind) = (self.n().to_owned(), self.number.kind());
-        let (features, actions) = (self.policy.features.len(), self.policy.actions.len());
-        self.text.lines([
-            "/*@ assigns \\result \\from *state, *measured;".to_owned(),
-            format!("  @ ensures index: \\result < {actions}u;"),
-            "  @*/".to_owned(),
-            format!("static uint32_t {n}_choose(const {n}_state *state, const {n}_measurement *measured);"),
-        ]);
+        let (features, actions) = (self.policy.features.len(), self.policy.outputs());
+        let assigns = "/*@ assigns \\result \\from *state, *measured;";
+        let answer = if self.is_output() {
+            // where bit patterns are looked at, the output may be one that is no number
+            let finite = "  @ ensures finite: \\is_finite(\\result);";
+            self.text.lines(["#if defined(FINITE)", assigns, finite, "  @*/"]);
+            self.text.lines(["#else", assigns, "  @*/", "#endif"]);
+            kind
+        } else {
+            let index = format!("  @ ensures index: \\result < {actions}u;");
+            self.text.lines([assigns, &index, "  @*/"]);
+            "uint32_t"
+        };
+        self.text.line(format!(
+            "static {answer} {n}_choose(const {n}_state *state, const {n}_measurement *measured);"
+        ));
         let bits = format!(
             "  @ assigns q[0 .. {last}] \\from observation[0 .. {}];\n  @ ensures written: \\initialized(q + (0 .. {last}));",
             features - 1,

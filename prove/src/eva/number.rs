@@ -1,6 +1,6 @@
 //! Numbers of a policy's format as C text.
 
-use policy::{NumericFormat, Scalar};
+use policy::{Head, NumericFormat, Scalar};
 
 /// The C type of the numbers around the network.
 #[derive(Debug, Clone, Copy)]
@@ -42,6 +42,19 @@ impl Number {
 
     pub fn nearest(self, x: f64) -> f64 {
         self.scalar.nearest(x)
+    }
+
+    /// The duties of all actions, or those of a continuous head at both ends of its squash (contract section 7b).
+    pub fn duties(self, head: &Head) -> Vec<f64> {
+        match head {
+            Head::Choice(actions) => actions.iter().map(|action| self.nearest(action.duty)).collect(),
+            Head::Continuous(head) => {
+                let (ends, scale, offset) = (head.squashed(), self.nearest(head.scale), self.nearest(head.offset));
+                // binary64 has more than twice the digits of binary32: what is rounded to it first is rounded no other way
+                let duty = |s: f64| self.nearest(self.nearest(self.nearest(s) * scale) + offset);
+                vec![duty(ends.low), duty(ends.high)]
+            }
+        }
     }
 
     pub fn up(self, x: f64) -> f64 {

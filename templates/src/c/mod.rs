@@ -184,6 +184,8 @@ pub struct Header {
     pub measurement: Vec<Member>,
     /// Members of the state, in contract order.
     pub state: Vec<Member>,
+    /// Whether the one output becomes a duty, without a choice.
+    pub is_output: bool,
     /// One comment line per feature.
     pub features: Vec<String>,
 }
@@ -208,8 +210,14 @@ pub struct Source {
     pub helpers: Helpers,
     /// Functions for floats of the activations that occur.
     pub activations: Vec<String>,
-    /// Number of actions.
+    /// Outputs of the network.
     pub actions: usize,
+    /// Whether the one output becomes a duty, without a choice.
+    pub is_output: bool,
+    /// Type of what the network hands on to the command.
+    pub answer: &'static str,
+    /// Its name.
+    pub answered: &'static str,
     /// A number below every Q value.
     pub lowest: &'static str,
     /// Declarations of `sense`.
@@ -228,6 +236,8 @@ pub struct Source {
     pub decide: Vec<String>,
     /// Value of the duty in a usable step.
     pub duty: String,
+    /// Value of the duty before the mapping in a usable step.
+    pub duty_sim: String,
     /// Word whose sign bit is set if that is not within the limits.
     pub duty_stray: String,
     /// Terms of a word whose sign bit is set if the state is not sound.

@@ -71,7 +71,7 @@ static uint32_t set_mapping({n}_state *state, const double *values)
         signals = policy.signals.len(),
         count = coefficients.len(),
         features = policy.features.len(),
-        actions = policy.actions.len(),
+        actions = policy.outputs(),
         period = policy.sample_period,
         fallback = policy.fallback.duty,
         lows = arrives(|range| range.low),

@@ -322,7 +322,7 @@ fn end_of_soft_start<T: Real>(policy: &Policy, scalar: Scalar, state: &State<T>)
 /// Appends the words of a chunk in the form of the kit: its layout is that of [`crate::protocol`].
 fn append(policy: &Policy, layout: &Layout, chunk: &Chunk, trace: &mut Trace) {
     let number = layout.scalar().words();
-    let values = number * (policy.features.len() + policy.actions.len());
+    let values = number * (policy.features.len() + policy.outputs());
     let (mut input, mut expected) = (chunk.input.as_slice(), chunk.expected.as_slice());
     for event in &chunk.events {
         let answer = take(&mut expected, layout.answer(event).len());

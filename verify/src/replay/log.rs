@@ -248,7 +248,7 @@ fn check_period(policy: &Policy, sheet: &Sheet, time: &[f64], begins: &[bool]) -
 
 fn indices(policy: &Policy, sheet: &Sheet, located: &Located, values: &[f64]) -> Result<Vec<u32>, Faults> {
     let mut faults = table_faults();
-    let most = policy.actions.len();
+    let most = policy.actions().len();
     let index = |(row, value): (usize, &f64)| {
         if value.fract() == 0.0 && *value >= 0.0 && *value < most as f64 {
             return *value as u32;

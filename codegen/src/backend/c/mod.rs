@@ -99,7 +99,7 @@ fn header(program: &Program) -> Header {
         constants: vec![
             count("SIGNALS", program.signals.len()),
             count("FEATURES", program.feature_count()),
-            count("ACTIONS", program.duties.len()),
+            count("ACTIONS", program.head.outputs()),
             count("STATE_WORDS", program.state_words()),
             count("TABLE_NUMBERS", program.table_numbers()),
             ("SAMPLE_PERIOD", format!("{:?}", program.sample_period)),
@@ -118,6 +118,7 @@ fn header(program: &Program) -> Header {
             .map(|signal| measurement_member(program, signal))
             .collect(),
         state: state(program).0,
+        is_output: program.head.is_output(),
         features: program.features.iter().map(|(_, formula)| formula.clone()).collect(),
     }
 }
@@ -201,6 +202,10 @@ fn source(program: &Program) -> Source {
     let pushed: Vec<usize> = front.pushes.iter().map(|push| push.value).collect();
     let coefficients = program.mapping.iter().flat_map(|mapping| &mapping.coefficients);
     let soft_cap = program.advance.soft_cap.map(|value| advance.operand(value));
+    let (answer, answered) = match program.head.is_output() {
+        true => (number::kind(program.scalar()).name, "output"),
+        false => ("uint32_t", "index"),
+    };
     Source {
         common: common(program),
         wide_char: wide_char(program),
@@ -210,7 +215,10 @@ fn source(program: &Program) -> Source {
         crc_kinds: tables::crc_kinds(program),
         helpers: helpers(program),
         activations: activations(program),
-        actions: program.duties.len(),
+        actions: program.head.outputs(),
+        is_output: program.head.is_output(),
+        answer,
+        answered,
         lowest: number::lowest(program.scalar()),
         signals: operands(&front.signals),
         observation: operands(&front.observation),
@@ -218,6 +226,7 @@ fn source(program: &Program) -> Source {
         valid: sense.operand(front.all_valid),
         clipped: front.clipped.map(|flag| sense.operand(flag)),
         duty: decide.operand(program.decide.duty),
+        duty_sim: decide.operand(program.decide.duty_sim),
         duty_stray: guard::stray(program, &decide.operand(program.decide.duty), program.decide.within),
         guard: guard::terms(program),
         mapping_held: guard::check_word(program, "state->mapping_"),
@@ -282,7 +291,7 @@ fn integer_view(program: &Program, code: &IntegerCode) -> IntegerView {
 /// Functions of the activations in floats. A network of integers calls those alone that take its sums as numbers.
 fn activations(program: &Program) -> Vec<String> {
     let is_integer = program.network.integer().is_some();
-    activation::used(&program.network)
+    activation::used_by(program)
         .filter(|kind| !is_integer || kind.limit().is_some())
         .flat_map(|kind| text_of(kind).c_helper(&number::names(program)))
         .collect()

@@ -117,6 +117,7 @@ impl<'p> Printer<'p> {
             Op::SoftCap => "state->soft_cap".into(),
             Op::Coefficient(name) => format!("state->mapping_{}", name.name()),
             Op::ChosenDuty => "chosen".into(),
+            Op::Output => "output".into(),
             Op::Constant(literal) => number::number(self.program.scalar(), *literal),
             // a flag behind its barrier: of what is known to be 0 or 1 clang makes a branch on RISC-V
             Op::Primed => format!("{}_flag((int)(state->primed & 1u))", self.program.name),
@@ -154,6 +155,10 @@ impl<'p> Printer<'p> {
             }
             Op::Within { x, low, high } => format!("{p}_within({}, {}, {})", v(x), v(low), v(high)),
             Op::Outside { x, low, high } => format!("{p}_outside({}, {}, {})", v(x), v(low), v(high)),
+            Op::Squash(x) => {
+                let curve = self.program.head.curve().map_or("", policy::Activation::word);
+                format!("{p}_{curve}({})", v(x))
+            }
             Op::Difference(x, y) => match self.program.scalar() {
                 Scalar::F32 => format!("{p}_bits({}) ^ {p}_bits({})", v(x), v(y)),
                 Scalar::F64 => format!("{p}_differing({}, {})", v(x), v(y)),

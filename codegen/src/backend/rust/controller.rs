@@ -266,19 +266,27 @@ fn decide(program: &Program) -> TokenStream {
         Scalar::F32 => quote!((stray >> 31)),
         Scalar::F64 => quote!(((stray >> 63) as u32)),
     };
-    let kind = number::kind(program.scalar());
-    let (lowest, greater) = network::argmax(program);
+    let network::Choice {
+        about,
+        about_apart,
+        kind,
+        name,
+        body,
+        index,
+    } = network::choice(program);
+    let number_kind = number::kind(program.scalar());
+    let duty_sim = printer.operand(decide.duty_sim);
     let apart = program.senses_again.then(|| {
         quote! {
-            /// The greedy action for a measurement, with a stack of its own.
+            #[doc = #about_apart]
             // apart, so that its numbers are off the stack while the network runs
             #[inline(never)]
-            fn choose_for(&self, measured: &Measurement) -> (u32, #kind) {
+            fn choose_for(&self, measured: &Measurement) -> #kind {
                 Self::choose(&self.sense(measured).observation)
             }
             /// What a step does behind the network.
             #[inline(never)]
-            fn settle(&mut self, measured: &Measurement, chosen: (u32, #kind)) -> Command {
+            fn settle(&mut self, measured: &Measurement, chosen: #kind) -> Command {
                 let (front, sound) = self.guarded(measured);
                 let command = self.decide(&front, sound, chosen);
                 self.advance(&front, sound, &command);
@@ -288,27 +296,14 @@ fn decide(program: &Program) -> TokenStream {
     });
     quote! {
         #apart
-        /// Network and argmax: index and duty of the greedy action.
+        #[doc = #about]
         #[inline(always)]
-        fn choose(observation: &[#kind; FEATURES]) -> (u32, #kind) {
-            let mut best = #lowest;
-            let mut chosen = DUTIES[0];
-            let mut action_index = 0_u32;
-            let mut action = 0_u32;
-            // the lowest index wins among equals, a NaN never does
-            for (q, duty) in network(observation).iter().zip(&DUTIES) {
-                let above = flag(*q > best);
-                let mask = 0_u32.wrapping_sub(above);
-                best = #greater(above, *q, best);
-                chosen = select(above, *duty, chosen);
-                action_index = (action & mask) | (action_index & !mask);
-                action = action.wrapping_add(1);
-            }
-            (action_index, chosen)
+        fn choose(observation: &[#number_kind; FEATURES]) -> #kind {
+            #body
         }
         /// Mapping, limits, status.
         #[inline(always)]
-        fn decide(&self, front: &Front, sound: u32, (action_index, chosen): (u32, #kind)) -> Command {
+        fn decide(&self, front: &Front, sound: u32, #name: #kind) -> Command {
             #(#statements)*
             let stray = #stray;
             let trusted = core::hint::black_box(sound & !#is_stray);
@@ -316,8 +311,8 @@ fn decide(program: &Program) -> TokenStream {
             let status = #(#terms)|*;
             Command {
                 duty: select(usable, #duty, #fallback),
-                duty_sim: select(usable, chosen, #fallback),
-                action_index: action_index & 0_u32.wrapping_sub(trusted),
+                duty_sim: select(usable, #duty_sim, #fallback),
+                action_index: #index,
                 status: (status & 0_u32.wrapping_sub(usable))
                     | (status::FALLBACK & usable.wrapping_sub(1))
                     | (status::STATE & trusted.wrapping_sub(1)),

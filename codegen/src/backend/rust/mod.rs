@@ -77,7 +77,8 @@ pub fn items(program: &Program, type_name: &str) -> TokenStream {
 fn constants(program: &Program) -> TokenStream {
     let signals = size(program.signals.len());
     let features = size(program.feature_count());
-    let actions = size(program.duties.len());
+    let actions = size(program.head.outputs());
+    let counted = if program.head.is_output() { " Outputs of the network." } else { " Number of actions." };
     let state_words = size(program.state_words());
     let period = Literal::f64_unsuffixed(program.sample_period);
     let bits = STATUS.iter().map(|bit| {
@@ -90,7 +91,7 @@ fn constants(program: &Program) -> TokenStream {
         pub const SIGNALS: usize = #signals;
         /// Length of the observation.
         pub const FEATURES: usize = #features;
-        /// Number of actions.
+        #[doc = #counted]
         pub const ACTIONS: usize = #actions;
         /// Length of the state in words.
         pub const STATE_WORDS: usize = #state_words;
@@ -114,6 +115,10 @@ fn types(program: &Program, layout: &TokenStream) -> TokenStream {
         let doc = doc.trim_end();
         quote! { #[doc = #doc] pub #name: #kind }
     });
+    let [duty_sim, action_index] = match program.head.is_output() {
+        true => [" Duty of the actor, before the mapping.", " Always 0: the head is continuous."],
+        false => [" Duty of the chosen action, before the mapping.", " Greedy action."],
+    };
     quote! {
         /// One sample of every signal.
         #[derive(Debug, Clone, Copy, PartialEq)]
@@ -125,9 +130,9 @@ fn types(program: &Program, layout: &TokenStream) -> TokenStream {
         pub struct Command {
             /// Commanded duty, 0..1: mapped and limited.
             pub duty: #number,
-            /// Duty of the chosen action, before the mapping.
+            #[doc = #duty_sim]
             pub duty_sim: #number,
-            /// Greedy action.
+            #[doc = #action_index]
             pub action_index: u32,
             /// Bits of [`status`].
             pub status: u32,

@@ -7,7 +7,7 @@ use quote::quote;
 use super::number;
 use super::tokens::size;
 use super::{integer, kernels, loops, tables};
-use crate::activation::{Rust, rust_curves};
+use crate::activation::rust_curves;
 use crate::assembly;
 use crate::program::{Arithmetic, Program};
 
@@ -15,27 +15,82 @@ use crate::program::{Arithmetic, Program};
 pub fn items(program: &Program) -> TokenStream {
     let scalar = program.scalar();
     let kind = number::kind(scalar);
-    let duties = tables::values(program, "duties");
-    let curves = rust_curves(&program.network, &Rust::of(program));
+    let duties = (!program.head.is_output()).then(|| {
+        let duties = tables::values(program, "duties");
+        quote! { static DUTIES: [#kind; ACTIONS] = #duties; }
+    });
+    let curves = rust_curves(program);
     let network = match &program.network.arithmetic {
         Arithmetic::Real { fused, .. } => real(program, *fused),
         Arithmetic::Integer(code) => integer::items(program, code),
     };
     quote! {
-        static DUTIES: [#kind; ACTIONS] = #duties;
+        #duties
         #curves
         #network
     }
 }
 
-/// What argmax compares: type, value below all others, name of the selection.
-pub fn argmax(program: &Program) -> (TokenStream, TokenStream) {
-    match program.network.arithmetic {
-        Arithmetic::Real { scalar, .. } => {
-            let kind = number::kind(scalar);
-            (quote!(#kind::MIN), quote!(select))
-        }
+/// What the network hands on to the command.
+pub struct Choice {
+    /// What it is.
+    pub about: &'static str,
+    /// What it is for a measurement.
+    pub about_apart: &'static str,
+    /// Its type.
+    pub kind: TokenStream,
+    /// Its name, or the names of its parts.
+    pub name: TokenStream,
+    /// From `observation` to it.
+    pub body: TokenStream,
+    /// The action index of a command from it.
+    pub index: TokenStream,
+}
+
+/// The greedy action and its duty, or the output of a continuous head.
+pub fn choice(program: &Program) -> Choice {
+    let kind = number::kind(program.scalar());
+    if program.head.is_output() {
+        let outputs = q_values(program);
+        return Choice {
+            about: " Network: its output.",
+            about_apart: " The network's output for a measurement, with a stack of its own.",
+            kind,
+            name: quote!(output),
+            body: quote! {
+                let [output] = #outputs;
+                output
+            },
+            index: quote!(0),
+        };
+    }
+    // what argmax compares: a value below all others, and the name of the selection
+    let (lowest, greater) = match program.network.arithmetic {
+        Arithmetic::Real { .. } => (quote!(#kind::MIN), quote!(select)),
         Arithmetic::Integer(_) => (quote!(i32::MIN), quote!(select_integer)),
+    };
+    Choice {
+        about: " Network and argmax: index and duty of the greedy action.",
+        about_apart: " The greedy action for a measurement, with a stack of its own.",
+        kind: quote!((u32, #kind)),
+        name: quote!((action_index, chosen)),
+        body: quote! {
+            let mut best = #lowest;
+            let mut chosen = DUTIES[0];
+            let mut action_index = 0_u32;
+            let mut action = 0_u32;
+            // the lowest index wins among equals, a NaN never does
+            for (q, duty) in network(observation).iter().zip(&DUTIES) {
+                let above = flag(*q > best);
+                let mask = 0_u32.wrapping_sub(above);
+                best = #greater(above, *q, best);
+                chosen = select(above, *duty, chosen);
+                action_index = (action & mask) | (action_index & !mask);
+                action = action.wrapping_add(1);
+            }
+            (action_index, chosen)
+        },
+        index: quote!(action_index & 0_u32.wrapping_sub(trusted)),
     }
 }
 

@@ -82,6 +82,7 @@ impl<'p> Printer<'p> {
                 quote!(self.#name)
             }
             Op::ChosenDuty => quote!(chosen),
+            Op::Output => quote!(output),
             Op::Constant(literal) => number(self.program.scalar(), *literal),
             // behind a barrier: of what is known to be 0 or 1 the optimiser makes a branch
             Op::Primed => quote!(core::hint::black_box(self.primed & 1)),
@@ -124,6 +125,10 @@ impl<'p> Printer<'p> {
                         quote!((#x.to_bits() ^ #y.to_bits()) as u32 | ((#x.to_bits() ^ #y.to_bits()) >> 32) as u32)
                     }
                 }
+            }
+            Op::Squash(x) => {
+                let curve = self.program.head.curve().map_or("", policy::Activation::word);
+                call(curve, &[v(x)])
             }
             Op::NotZero(x) => {
                 let x = v(x);

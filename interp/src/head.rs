@@ -1,0 +1,177 @@
+//! From the outputs of the network to a duty (contract sections 7, 7b and 8).
+
+use ndarray::ArrayView1;
+use policy::{Policy, Squash};
+
+use crate::activation::activate;
+use crate::network::argmax;
+use crate::real::{Range, Real};
+
+/// What the outputs mean, in the format.
+#[derive(Debug, Clone)]
+pub(crate) enum Head<T> {
+    /// Duty per action.
+    Choice(Vec<T>),
+    /// One output as a duty.
+    Continuous(Continuous<T>),
+}
+
+/// Section 7b.
+#[derive(Debug, Clone)]
+pub(crate) struct Continuous<T> {
+    squash: Squash,
+    /// The ends of the clip, or +-1.
+    ends: Range<T>,
+    /// `None` where it is exactly 1.
+    scale: Option<T>,
+    /// `None` where it is exactly 0.
+    offset: Option<T>,
+}
+
+impl<T: Real> Head<T> {
+    pub fn new(policy: &Policy) -> Self {
+        match &policy.head {
+            policy::Head::Choice(actions) => {
+                Self::Choice(actions.iter().map(|action| T::nearest(action.duty)).collect())
+            }
+            policy::Head::Continuous(head) => {
+                let (low, high) = match head.squash {
+                    Squash::Curve(_) => (-1.0, 1.0),
+                    Squash::Clip(clip) => (clip.low, clip.high),
+                };
+                Self::Continuous(Continuous {
+                    squash: head.squash,
+                    ends: Range {
+                        lo: T::nearest(low),
+                        hi: T::nearest(high),
+                    },
+                    // left out by what the contract says, not by what it rounds to
+                    scale: (head.scale != 1.0).then(|| T::nearest(head.scale)),
+                    offset: (head.offset != 0.0).then(|| T::nearest(head.offset)),
+                })
+            }
+        }
+    }
+
+    /// Outputs of the network.
+    pub fn outputs(&self) -> usize {
+        match self {
+            Self::Choice(table) => table.len(),
+            Self::Continuous(_) => 1,
+        }
+    }
+
+    /// Action index and duty of a network's outputs.
+    pub fn decide(&self, outputs: ArrayView1<'_, T>) -> (u32, T) {
+        match self {
+            Self::Choice(table) => {
+                let index = argmax(outputs);
+                (index as u32, table[index])
+            }
+            Self::Continuous(head) => (0, head.duty(outputs[0])),
+        }
+    }
+
+    /// Index and duty of an action that was chosen elsewhere; `None` where there are none.
+    pub fn choose(&self, action_index: u32) -> Option<(u32, T)> {
+        match self {
+            Self::Choice(table) => {
+                let index = (action_index as usize).min(table.len().checked_sub(1)?);
+                Some((index as u32, table[index]))
+            }
+            Self::Continuous(_) => None,
+        }
+    }
+
+    /// The duties of all actions, or those at both ends.
+    pub fn duties(&self) -> Vec<T> {
+        match self {
+            Self::Choice(table) => table.clone(),
+            Self::Continuous(head) => [head.ends.lo, head.ends.hi].map(|s| head.scaled(s)).to_vec(),
+        }
+    }
+}
+
+impl<T: Real> Continuous<T> {
+    pub fn duty(&self, output: T) -> T {
+        let mut s = [output];
+        match self.squash {
+            Squash::Curve(curve) => activate(curve, s.iter_mut()),
+            Squash::Clip(_) => s[0] = self.ends.clamp(output),
+        }
+        self.scaled(s[0])
+    }
+
+    fn scaled(&self, s: T) -> T {
+        let scaled = self.scale.map_or(s, |scale| s * scale);
+        self.offset.map_or(scaled, |offset| scaled + offset)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::aview1;
+    use policy::{Activation, Interval};
+
+    use super::*;
+
+    fn head(squash: Squash, [lo, hi]: [f32; 2], scale: Option<f32>, offset: Option<f32>) -> Head<f32> {
+        Head::Continuous(Continuous {
+            squash,
+            ends: Range { lo, hi },
+            scale,
+            offset,
+        })
+    }
+
+    fn tanh(scale: Option<f32>, offset: Option<f32>) -> Head<f32> {
+        head(Squash::Curve(Activation::Tanh), [-1.0, 1.0], scale, offset)
+    }
+
+    #[test]
+    fn an_output_is_squashed_then_scaled_then_shifted() {
+        let (index, duty) = tanh(Some(0.45), Some(0.5)).decide(aview1(&[0.3_f32]));
+        assert_eq!(index, 0);
+        // libm's tanh in the place of the contract's: 4e-7 at most beside it
+        let expected = f64::from(0.3_f32).tanh() * f64::from(0.45_f32) + 0.5;
+        assert!((f64::from(duty) - expected).abs() < 4e-7, "{duty} {expected}");
+        // shifted first it would be another number
+        assert!((f64::from(duty) - 0.45 * (0.3_f64.tanh() + 0.5)).abs() > 1e-2);
+    }
+
+    #[test]
+    fn a_clip_acts_before_scale_and_offset() {
+        let clip = Squash::Clip(Interval { low: -1.0, high: 1.0 });
+        let clipped = head(clip, [-1.0, 1.0], Some(0.25), Some(0.5));
+        for (output, duty) in [(-7.0, 0.25), (7.0, 0.75), (0.5, 0.625), (f32::INFINITY, 0.75)] {
+            assert_eq!(clipped.decide(aview1(&[output])).1, duty, "{output}");
+        }
+    }
+
+    #[test]
+    fn every_duty_lies_between_those_of_both_ends() {
+        for squashed in [tanh(Some(0.45), Some(0.5)), tanh(Some(-0.3), Some(0.55)), tanh(Some(0.1), None)] {
+            let ends = squashed.duties();
+            let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+            for bits in (0..=f32::MAX.to_bits()).step_by(100_003) {
+                for x in [f32::from_bits(bits), -f32::from_bits(bits)] {
+                    let duty = squashed.decide(aview1(&[x])).1;
+                    assert!((low..=high).contains(&duty), "{x}: {duty}");
+                }
+            }
+            assert_eq!(squashed.decide(aview1(&[f32::MAX])).1, ends[1], "the end is reached");
+        }
+    }
+
+    #[test]
+    fn a_scale_of_1_and_an_offset_of_0_change_no_bit() {
+        // -0 + 0 would be +0
+        assert_eq!(tanh(None, None).decide(aview1(&[-0.0_f32])).1.to_bits(), 1 << 31);
+    }
+
+    #[test]
+    fn nothing_can_be_chosen_from_a_continuous_head() {
+        assert_eq!(tanh(None, None).choose(3), None);
+        assert_eq!(Head::Choice(vec![0.1_f32, 0.2]).choose(3), Some((1, 0.2)));
+    }
+}

@@ -40,7 +40,7 @@ static {number} {n}_limit({number} x, {word} limit)
 #if defined(__FRAMAC__)
     const {number} most = {n}_from_bits(limit);
     const {number} end = (({n}_bits(x) >> {top}) != 0u) ? -most : most;
-    return ((x > -most) && (x < most)) ? x : end;
+    return ((x == x) && (x > -most) && (x < most)) ? x : end;
 #else
     const {word} bits = {n}_bits(x);
     const {word} magnitude = bits & {magnitude};

@@ -9,7 +9,7 @@
 //! They are made from the policy and the numeric contract. Of the generated code they know its interface and, for what needs no
 //! network, the three functions of a step around it.
 
-use policy::{NumericFormat, Policy};
+use policy::{Activation, NumericFormat, Policy, Squash};
 
 use super::frama_c::{Machine, Numbers};
 use super::invariant::{Invariant, Shown, Word, slices};
@@ -38,6 +38,8 @@ pub(super) struct Stated {
     pub label: &'static str,
     /// The sentence.
     pub text: String,
+    /// It is checked where numbers are finite, and only there.
+    pub is_finite_only: bool,
 }
 
 /// A function of the driver.
@@ -109,6 +111,7 @@ pub(super) fn stated(label: &'static str, text: impl Into<String>) -> Stated {
     Stated {
         label,
         text: text.into(),
+        is_finite_only: false,
     }
 }
 
@@ -160,13 +163,14 @@ impl Writer<'_> {
             "measure(&measured);".to_owned(),
             format!("{} = {n}_choose(&state, &measured);", if self.is_output() { "output" } else { "index" }),
         ]);
-        if self.is_output() {
-            self.text.line("#if defined(FINITE)");
-            self.text.check("index", "\\is_finite(output)");
-            self.text.line("#endif");
+        let stated = if self.is_output() {
+            // that it is finite is what the runs with finite numbers show of everything
+            Vec::new()
         } else {
             self.text.check("index", &format!("index < {}u", self.policy.outputs()));
-        }
+            let text = "The network and its argmax give an index below the number of actions.";
+            vec![stated("index", text)]
+        };
         self.close();
         Entry {
             function: "prove_choose",
@@ -174,13 +178,7 @@ impl Writer<'_> {
                 true => "the network's output from every bit pattern of the state, every measurement; finite numbers from every sound state",
                 false => "the choice of an action from every bit pattern of the state, every measurement; finite numbers from every sound state",
             },
-            stated: vec![stated(
-                "index",
-                match self.is_output() {
-                    true => "From every sound state the network gives a finite number.",
-                    false => "The network and its argmax give an index below the number of actions.",
-                },
-            )],
+            stated,
             runs: BITS_AND_FINITE,
             assumed: if self.is_integer() { &[] } else { &["q_values"] },
             precision: 2,
@@ -197,20 +195,22 @@ impl Writer<'_> {
             format!("{n}_step(&state, &measured, &command);"),
         ]);
         self.command();
-        let mut claims = command_claims();
-        self.text
-            .check("undamaged", &format!("(command.status & {}u) == 0u", 1 << 8));
-        claims.push(stated(
-            "undamaged",
-            "A sound state is never called damaged: STATE is clear.",
-        ));
+        let mut claims = self.command_claims();
+        self.where_it_holds(|text| text.check("undamaged", &format!("(command.status & {}u) == 0u", 1 << 8)));
+        claims.push(Stated {
+            is_finite_only: self.passes_nan(),
+            ..stated(
+                "undamaged",
+                "A sound state is never called damaged: STATE is clear.",
+            )
+        });
         self.counters();
         let held = self.policy.signals.len();
         for (index, word) in self.invariant.words.clone().iter().enumerate() {
             if let Shown::ByContract(why) = word.shown {
                 self.not_stated.push((word.name.clone(), why));
             }
-            if word.shown == Shown::Directly {
+            if word.shown == Shown::Directly && !(self.passes_nan() && word.place == "previous_duty") {
                 let label = if index < held { "held" } else { "state" };
                 self.keeps(label, index, word);
             }
@@ -267,10 +267,9 @@ impl Writer<'_> {
             "duty",
             &format!("(command.duty >= {low} && command.duty <= {high}) || command.duty == {fallback}"),
         );
-        self.text.check(
-            "chosen",
-            &format!("(command.duty_sim >= {least} && command.duty_sim <= {most}) || command.duty_sim == {fallback}"),
-        );
+        let chosen =
+            format!("(command.duty_sim >= {least} && command.duty_sim <= {most}) || command.duty_sim == {fallback}");
+        self.where_it_holds(|text| text.check("chosen", &chosen));
         self.text.check("action", &format!("command.action_index < {actions}u"));
         self.text.check("status", "command.status < 512u");
     }
@@ -292,10 +291,17 @@ impl Writer<'_> {
         ]);
         self.command();
         self.close();
+        let mut claims = self.command_claims();
+        if self.passes_nan() {
+            claims.retain(|claim| !claim.is_finite_only);
+            let why = "a NaN of a damaged state passes the clip of the head: that it leads to the fallback is a relation, which intervals do not \
+                       hold; the goals of `equivalence` say so";
+            self.not_stated.push(("duty_sim of a damaged state".to_owned(), why));
+        }
         Entry {
             function: "prove_damaged",
             about: "one step from every bit pattern of the state, every measurement",
-            stated: command_claims(),
+            stated: claims,
             runs: BOTH,
             assumed: ACTION,
             precision: 2,
@@ -392,6 +398,40 @@ impl Writer<'_> {
         ]);
     }
 
+    /// What [`Writer::command`] checks.
+    fn command_claims(&self) -> Vec<Stated> {
+        vec![
+            stated("duty", "The duty is a number within its limits, or the fallback."),
+            Stated {
+                is_finite_only: self.passes_nan(),
+                ..stated(
+                    "chosen",
+                    "The chosen duty lies between the least and the largest of all duties, or is the fallback.",
+                )
+            },
+            stated("action", "The action index is below the number of actions."),
+            stated("status", "No bit of the status is set that has no meaning."),
+        ]
+    }
+
+    /// A check that holds where the network's output is a number: everywhere, but for a head that passes a NaN on.
+    fn where_it_holds(&mut self, check: impl FnOnce(&mut Text)) {
+        let is_limited = self.passes_nan();
+        if is_limited {
+            self.text.line("#if defined(FINITE)");
+        }
+        check(&mut self.text);
+        if is_limited {
+            self.text.line("#endif");
+        }
+    }
+
+    /// Whether the head makes a NaN of a NaN: a clip does, a curve by masks does not.
+    pub fn passes_nan(&self) -> bool {
+        let head = self.policy.head.continuous();
+        head.is_some_and(|head| matches!(head.squash, Squash::Clip(_)) || head.squash == Squash::Curve(Activation::Softsign))
+    }
+
     /// Whether the head is continuous.
     pub fn is_output(&self) -> bool {
         self.policy.head.continuous().is_some()
@@ -403,15 +443,4 @@ impl Writer<'_> {
     }
 }
 
-/// What [`Writer::command`] checks.
-fn command_claims() -> Vec<Stated> {
-    vec![
-        stated("duty", "The duty is a number within its limits, or the fallback."),
-        stated(
-            "chosen",
-            "The chosen duty lies between the least and the largest of all duties, or is the fallback.",
-        ),
-        stated("action", "The action index is below the number of actions."),
-        stated("status", "No bit of the status is set that has no meaning."),
-    ]
-}
+

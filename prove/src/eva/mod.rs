@@ -281,6 +281,7 @@ fn claims_of(task: Task<'_>, entry: &Entry, runs: &[(Job<'_>, &Found)], tool: &s
     for stated in &entry.stated {
         let judged = runs
             .iter()
+            .filter(|(job, _)| !stated.is_finite_only || job.numbers == Numbers::Finite)
             .map(|(job, found)| checks(job, found, stated.label))
             .collect();
         claims.push(claim(stated.label, &stated.text, judged));

@@ -141,6 +141,15 @@ pub fn q_values(code: &IntegerCode, has_fpu: bool) -> TokenStream {
     if !has_fpu {
         return quote!(network(observation).map(q_value));
     }
+    let value = number(code, has_fpu, &quote!(q));
+    quote!(network(observation).map(|q| #value))
+}
+
+/// An output of the network as a number.
+pub fn number(code: &IntegerCode, has_fpu: bool, output: &TokenStream) -> TokenStream {
+    if !has_fpu {
+        return quote!(q_value(#output));
+    }
     let unit = float(code.q_unit.single());
-    quote!(network(observation).map(|q| q as f32 * #unit))
+    quote!(#output as f32 * #unit)
 }

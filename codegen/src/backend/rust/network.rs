@@ -51,15 +51,18 @@ pub struct Choice {
 pub fn choice(program: &Program) -> Choice {
     let kind = number::kind(program.scalar());
     if program.head.is_output() {
-        let outputs = q_values(program);
+        let output = match &program.network.arithmetic {
+            Arithmetic::Real { .. } => quote!(outputs[0]),
+            Arithmetic::Integer(code) => integer::number(code, program.has_fpu, &quote!(outputs[0])),
+        };
         return Choice {
             about: " Network: its output.",
             about_apart: " The network's output for a measurement, with a stack of its own.",
             kind,
             name: quote!(output),
             body: quote! {
-                let [output] = #outputs;
-                output
+                let outputs = network(observation);
+                #output
             },
             index: quote!(0),
         };

@@ -474,8 +474,8 @@ impl Controller {
     /// Network: its output.
     #[inline(always)]
     fn choose(observation: &[f32; FEATURES]) -> f32 {
-        let [output] = network(observation);
-        output
+        let outputs = network(observation);
+        outputs[0]
     }
     /// Mapping, limits, status.
     #[inline(always)]

@@ -425,7 +425,7 @@ static float constructs_limit(float x, uint32_t limit)
 #if defined(__FRAMAC__)
     const float most = constructs_from_bits(limit);
     const float end = ((constructs_bits(x) >> 31) != 0u) ? -most : most;
-    return ((x > -most) && (x < most)) ? x : end;
+    return ((x == x) && (x > -most) && (x < most)) ? x : end;
 #else
     const uint32_t bits = constructs_bits(x);
     const uint32_t magnitude = bits & 0x7FFFFFFFu;

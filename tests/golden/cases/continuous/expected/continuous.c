@@ -371,7 +371,7 @@ static float continuous_limit(float x, uint32_t limit)
 #if defined(__FRAMAC__)
     const float most = continuous_from_bits(limit);
     const float end = ((continuous_bits(x) >> 31) != 0u) ? -most : most;
-    return ((x > -most) && (x < most)) ? x : end;
+    return ((x == x) && (x > -most) && (x < most)) ? x : end;
 #else
     const uint32_t bits = continuous_bits(x);
     const uint32_t magnitude = bits & 0x7FFFFFFFu;

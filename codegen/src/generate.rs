@@ -78,7 +78,11 @@ fn check_subnormals(program: &Program, target: &TargetSpec) -> Result<(), Codege
     };
     let in_features = constants(&program.front.block, "the features");
     let in_command = constants(&program.decide.block, "the continuous head, the mapping or the limits");
-    let in_duties = program.head.duties().iter().map(|value| ("the duties".to_owned(), *value));
+    let in_duties = program
+        .head
+        .duties()
+        .iter()
+        .map(|value| ("the duties".to_owned(), *value));
     let elsewhere = in_features
         .chain(in_command)
         .chain(in_duties)

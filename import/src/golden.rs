@@ -22,6 +22,8 @@ pub(crate) struct Oracle<'a> {
     pub layers: &'a [Layer],
     pub quantiles: usize,
     pub activation: Activation,
+    /// The one output is a command, not a choice.
+    pub is_actor: bool,
 }
 
 /// A golden file, if the network decides often enough within the bounds.
@@ -33,11 +35,13 @@ pub(crate) fn answers(oracle: &Oracle<'_>) -> Result<Option<Vec<u8>>, Message> {
         if action.len() == COUNT {
             break;
         }
+        // a number is never a choice between two that are near
         // as binary32, which is what the file holds
         let draw = |(low, high): &(f64, f64)| f64::from(draws.uniform(*low, *high) as f32);
         let observation: Vec<f64> = oracle.bounds.iter().map(draw).collect();
         let values = oracle.outputs(&observation);
-        let Some(best) = decided(&values) else { continue };
+        let best = if oracle.is_actor { Some(0) } else { decided(&values) };
+        let Some(best) = best else { continue };
         actions = values.len();
         obs.extend(observation);
         q.extend(values);
@@ -47,6 +51,18 @@ pub(crate) fn answers(oracle: &Oracle<'_>) -> Result<Option<Vec<u8>>, Message> {
         return Ok(None);
     }
     let chosen = action.iter().flat_map(|index: &i32| index.to_le_bytes()).collect();
+    if oracle.is_actor {
+        let said = format!(
+            "plain products in f64 of the tensors as saved, by policyc new; {COUNT} observations drawn uniformly, seed {SEED}; output is the \
+             last layer's, before tanh or clip"
+        );
+        let metadata = BTreeMap::from([("oracle".to_owned(), said)]);
+        let tensors = [
+            ("obs".to_owned(), vec![COUNT, oracle.bounds.len()], rounded(&obs)?),
+            ("output".to_owned(), vec![COUNT, 1], rounded(&q)?),
+        ];
+        return written(&tensors, &metadata).map(Some);
+    }
     let said = format!(
         "plain products in f64 of the tensors as saved, by policyc new; {COUNT} observations drawn uniformly, seed {SEED}, those left out \
          whose two largest values are closer than {SMALLEST_GAP:e} of the largest"

@@ -10,6 +10,7 @@
 //! A file is data here: nothing that it names is called, imported or executed. Every size that it claims is held against its
 //! own length before anything is allocated. What users see: docs/reference/saved-models.md.
 
+mod actor;
 mod golden;
 mod network;
 mod numpy;
@@ -72,7 +73,9 @@ pub fn new_policy(file: &Path, contract: &Path, options: &Options) -> Result<New
     let bytes = name.read(MAX_WEIGHT_BYTES).map_err(|message| name.fault(message))?;
     let loaded = read::read(&name, bytes, options)?;
     if let Some(graph) = &loaded.graph {
-        recognise::fits(&graph.network, options.actions).map_err(|refusal| placed(&name, refusal))?;
+        if loaded.actor.is_none() {
+            recognise::fits(&graph.network, options.actions).map_err(|refusal| placed(&name, refusal))?;
+        }
         let own = statistics(file, options)?;
         if !own.is_empty() && !graph.features.is_empty() {
             let message = Message::new("the graph normalises its observations already")
@@ -81,6 +84,13 @@ pub fn new_policy(file: &Path, contract: &Path, options: &Options) -> Result<New
         }
         let features = if own.is_empty() { graph.features.clone() } else { own };
         return written(&name, contract, &loaded, &graph.network, &features);
+    }
+    if let (Some(_), Some(network)) = (loaded.actor, loaded.actor_network()) {
+        let outputs = network.layers.last().map_or(0, |layer| layer.outputs);
+        if outputs != 1 {
+            return Err(name.fault(actor::several(outputs)).into());
+        }
+        return written(&name, contract, &loaded, &network, &statistics(file, options)?);
     }
     let network = match recognise(&loaded.tensors, &loaded.known).map_err(|refusal| placed(&name, refusal))? {
         Recognised::Network(network) => Some(network),
@@ -132,6 +142,7 @@ fn written(
     let golden = golden_answers(loaded, network, statistics).map_err(|message| name.fault(message))?;
     let mut said = loaded.about.clone();
     said.extend(network.said.iter().cloned());
+    said.extend(loaded.actor.map(actor::Actor::said));
     if !statistics.is_empty() && loaded.graph.as_ref().is_none_or(|graph| graph.features.is_empty()) {
         said.push("VecNormalize: scale = 1/sqrt(var + epsilon), offset = -mean/sqrt(var + epsilon), then clip, all computed in f64".to_owned());
     }
@@ -155,6 +166,7 @@ fn written(
         bias: true,
         activation: activation(loaded),
         golden: golden.is_some(),
+        continuous: loaded.actor.map(actor::Actor::entry),
         about: said.clone(),
         features: if statistics.is_empty() {
             of_bounds(&loaded.bounds)
@@ -211,6 +223,7 @@ fn golden_answers(loaded: &Loaded, network: &Network, statistics: &[DraftFeature
         layers,
         quantiles: *quantiles,
         activation,
+        is_actor: loaded.actor.is_some(),
     })
 }
 

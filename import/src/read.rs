@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use policy::{Activation, NamedTensor};
 use toml_input::{Faults, FileName, Message};
 
-use crate::network::Layer;
+use crate::actor::Actor;
+use crate::network::{Layer, Network};
 use crate::recognise::Known;
 use crate::zip::Archive;
 use crate::{Options, onnx, sb3, torch, zip};
@@ -22,8 +23,24 @@ pub(crate) struct Loaded {
     /// The layers by the names of the library alone, and how many quantiles are averaged behind them.
     pub original: Option<(Vec<Layer>, usize)>,
     pub about: Vec<String>,
+    /// The command is a number; the network is that of `original`, or of the graph.
+    pub actor: Option<Actor>,
     /// A graph needs no recognition: its network, activations and features.
     pub graph: Option<onnx::Model>,
+}
+
+impl Loaded {
+    /// The layers of an actor that a library names.
+    pub fn actor_network(&self) -> Option<Network> {
+        let (layers, _) = self.original.as_ref()?;
+        let names: Vec<&str> = layers.iter().map(|layer| layer.name.as_str()).collect();
+        Some(Network {
+            said: vec![format!("layers, first to last: {}", names.join(" > "))],
+            layers: layers.clone(),
+            plain: false,
+            choice_only: false,
+        })
+    }
 }
 
 /// Reads a file of any format.
@@ -33,8 +50,10 @@ pub(crate) fn read(name: &FileName, bytes: Vec<u8>, options: &Options) -> Result
         return Err(fault(torch::legacy()));
     }
     if onnx::is_model(&bytes) {
+        let graph = onnx::read(name, &bytes).map_err(fault)?;
         return Ok(Loaded {
-            graph: Some(onnx::read(name, &bytes).map_err(fault)?),
+            actor: graph.actor,
+            graph: Some(graph),
             ..Loaded::default()
         });
     }
@@ -95,6 +114,7 @@ fn model(archive: &Archive<'_>, options: &Options) -> Result<Loaded, Message> {
         bounds: model.bounds,
         original: model.original,
         about: model.about,
+        actor: model.actor,
         graph: None,
     })
 }

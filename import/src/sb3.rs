@@ -7,6 +7,7 @@ use policy::{Activation, NamedTensor};
 use serde_json::Value;
 use toml_input::Message;
 
+use crate::actor::{self, Actor, Squash};
 use crate::network::Layer;
 use crate::numpy;
 use crate::pickle::{Item, Pickle};
@@ -26,6 +27,8 @@ pub(crate) struct Model {
     pub about: Vec<String>,
     /// The layers by the names of the library alone, and how many quantiles are averaged behind them.
     pub original: Option<(Vec<Layer>, usize)>,
+    /// The command is a number.
+    pub actor: Option<Actor>,
 }
 
 /// A policy class that is read: where its layers lie, and its activation unless `policy_kwargs` has another.
@@ -35,15 +38,18 @@ struct Class {
     trunk: &'static str,
     head: Option<&'static str>,
     activation: Activation,
+    /// Its command is a number by a tanh; of the others the action space says whether it is one.
+    is_tanh: bool,
 }
 
-const CLASSES: [Class; 3] = [
+const CLASSES: [Class; 5] = [
     Class {
         name: "stable_baselines3.dqn.policies.DQNPolicy",
         algorithm: "DQN",
         trunk: "q_net.q_net.",
         head: None,
         activation: Activation::Relu,
+        is_tanh: false,
     },
     Class {
         name: "sb3_contrib.qrdqn.policies.QRDQNPolicy",
@@ -51,6 +57,7 @@ const CLASSES: [Class; 3] = [
         trunk: "quantile_net.quantile_net.",
         head: None,
         activation: Activation::Relu,
+        is_tanh: false,
     },
     Class {
         name: "stable_baselines3.common.policies.ActorCriticPolicy",
@@ -58,10 +65,28 @@ const CLASSES: [Class; 3] = [
         trunk: "mlp_extractor.policy_net.",
         head: Some("action_net"),
         activation: Activation::Tanh,
+        is_tanh: false,
+    },
+    Class {
+        name: "stable_baselines3.sac.policies.SACPolicy",
+        algorithm: "SAC",
+        trunk: "actor.latent_pi.",
+        head: Some("actor.mu"),
+        activation: Activation::Relu,
+        is_tanh: true,
+    },
+    Class {
+        name: "stable_baselines3.td3.policies.TD3Policy",
+        algorithm: "TD3 or DDPG",
+        trunk: "actor.mu.",
+        head: None,
+        activation: Activation::Relu,
+        is_tanh: true,
     },
 ];
 
-const CONTINUOUS: [&str; 4] = ["sac", "td3", "tqc", "crossq"];
+/// Continuous classes of sb3-contrib whose layers are called otherwise.
+const CONTINUOUS: [&str; 2] = ["tqc", "crossq"];
 
 /// Whether an archive is one of stable-baselines3.
 pub(crate) fn is_model(archive: &Archive<'_>) -> bool {
@@ -77,7 +102,11 @@ pub(crate) fn read(archive: &Archive<'_>) -> Result<Model, Message> {
             .expected("what model.save(...) writes")
     })?;
     let class = class(&data)?;
-    let actions = actions(&data, class)?;
+    let actor = actor(&data, class)?;
+    let actions = match actor {
+        Some(_) => 1,
+        None => actions(&data, class)?,
+    };
     let kwargs = data.get("policy_kwargs").unwrap_or(&Value::Null);
     if let Some(extractor) =
         text(kwargs, "features_extractor_class").filter(|class| !class.contains("FlattenExtractor"))
@@ -115,7 +144,35 @@ pub(crate) fn read(archive: &Archive<'_>) -> Result<Model, Message> {
         bounds,
         about,
         original,
+        actor,
     })
+}
+
+/// The actor of a class or of an action space that is a box; `None` of a table of actions.
+fn actor(data: &Value, class: &Class) -> Result<Option<Actor>, Message> {
+    let space = data.get("action_space").unwrap_or(&Value::Null);
+    let kind = text(space, ":type:").unwrap_or("none");
+    if !kind.ends_with(".Box'>") {
+        return Ok(None);
+    }
+    // with a squash of its own, or with noise that depends on the state, the layers behind the mean are others
+    let kwargs = data.get("policy_kwargs").unwrap_or(&Value::Null);
+    let is_on = |value: Option<&Value>| value.and_then(Value::as_bool).unwrap_or(false);
+    if is_on(data.get("use_sde")) || is_on(kwargs.get("squash_output")) {
+        return Err(other(
+            "noise that depends on the state is not read",
+            "use_sde or squash_output",
+            "neither",
+        )
+        .hint("save the mean's layers as safetensors, and write continuous = {...} in [actions]"));
+    }
+    let [(low, high)] = *box_ends(data, "action_space")? else {
+        return Err(actor::several(box_ends(data, "action_space")?.len()));
+    };
+    Ok(Some(Actor {
+        squash: if class.is_tanh { Squash::Tanh } else { Squash::Clip },
+        space: Some((low, high)),
+    }))
 }
 
 fn class(data: &Value) -> Result<&'static Class, Message> {
@@ -146,9 +203,9 @@ fn class(data: &Value) -> Result<&'static Class, Message> {
 fn actions(data: &Value, class: &Class) -> Result<usize, Message> {
     let space = data.get("action_space").unwrap_or(&Value::Null);
     let kind = text(space, ":type:").unwrap_or("none");
-    if kind.ends_with(".Box'>") {
+    if class.is_tanh {
         return Err(refused_continuous(&format!(
-            "{} with a Box action space",
+            "{} without a Box action space",
             class.algorithm
         )));
     }
@@ -199,14 +256,20 @@ fn bounds(data: &Value) -> Result<Vec<(f64, f64)>, Message> {
     if !kind.ends_with(".Box'>") {
         return Err(other("the observation space is no box", kind, expected));
     }
-    let pickle = pickled(data, "observation_space")?;
+    box_ends(data, "observation_space")
+        .map_err(|_| other("the bounds of the observation space cannot be read", kind, expected))
+}
+
+/// Lower and upper end of each number of a box.
+fn box_ends(data: &Value, key: &str) -> Result<Vec<(f64, f64)>, Message> {
+    let pickle = pickled(data, key)?;
     let of = |key: &str| numpy::array(&pickle, pickle.get(pickle.attributes(pickle.root), key)?);
     match (of("low"), of("high")) {
         (Some(low), Some(high)) if low.len() == high.len() => Ok(low.into_iter().zip(high).collect()),
         _ => Err(other(
-            "the bounds of the observation space cannot be read",
-            kind,
-            expected,
+            "the bounds of a space cannot be read",
+            key,
+            "gymnasium.spaces.Box of floats",
         )),
     }
 }

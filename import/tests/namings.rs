@@ -244,7 +244,7 @@ fn the_quantiles_of_qr_dqn_become_their_mean() {
 }
 
 #[test]
-fn continuous_actors_are_refused() {
+fn continuous_actors_are_refused_where_the_tensors_do_not_say_what_is_made_of_the_mean() {
     let continuous = "commands a number";
     let sac = [
         dense("latent_pi.0", 64, 6),

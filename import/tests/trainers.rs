@@ -195,19 +195,46 @@ fn torch_files_of_every_kind_are_read() {
     assert!(!new.said.iter().any(|line| line.contains("default")), "{:?}", new.said);
 }
 
+/// `predict(obs, deterministic=True)` of the library, in units of the action space, which are duties here.
 #[test]
-fn continuous_models_of_sb3_are_refused_by_name() {
-    for (file, name) in [
-        ("sb3_sac.zip", "SACPolicy"),
-        ("sb3_td3.zip", "TD3Policy"),
-        ("sb3_ddpg.zip", "TD3Policy"),
-        ("sb3_ppo_continuous.zip", "Box action space"),
+fn continuous_models_of_sb3_command_the_duties_of_the_library() {
+    for (name, activation) in [
+        ("sb3_sac_duty", relu as fn(f64) -> f64),
+        ("sb3_td3_duty", relu),
+        ("sb3_ppo_duty", f64::tanh),
     ] {
-        let faults = refusal(&fixture(file));
-        assert!(
-            faults.contains("commands a number") && faults.contains(name),
-            "{file}: {faults}"
-        );
+        let (_folder, new, policy) = policy_of(&format!("{name}.zip"), &Options::default());
+        assert!(new.beside.contains_key("golden.safetensors"), "{name}");
+        let head = policy.head.continuous().unwrap_or_else(|| panic!("{name}"));
+        let (obs, duties) = (expected(name, "obs"), expected(name, "duty"));
+        assert_eq!(duties.len(), 64);
+        let inside = duties.iter().filter(|duty| (0.11..0.84).contains(*duty)).count();
+        assert!(inside > 20, "{name}: {inside} duties that nothing cut off");
+        for (row, duty) in duties.iter().enumerate() {
+            let x: Vec<f64> = obs[row * 6..(row + 1) * 6].iter().map(|x| f64::from(*x)).collect();
+            let found = head.duty(run(&policy, &x, activation)[0]);
+            // of a span of .75: 1e-5 of the range
+            assert!(
+                (found - f64::from(*duty)).abs() < 7.5e-6,
+                "{name}, row {row}: {found} {duty}"
+            );
+        }
+    }
+}
+
+#[test]
+fn an_action_space_that_is_no_duty_leaves_scale_and_offset_open() {
+    for (file, known) in [
+        ("sb3_sac.zip", "{ squash = \"tanh\", scale = \"TODO\""),
+        ("sb3_td3.zip", "{ squash = \"tanh\", scale = \"TODO\""),
+        ("sb3_ddpg.zip", "{ squash = \"tanh\", scale = \"TODO\""),
+        ("sb3_ppo_continuous.zip", "{ clip = [-1.0, 1.0], scale = \"TODO\""),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let new = import::new_policy(&fixture(file), &folder.path().join("policy.toml"), &Options::default());
+        let contract = new.unwrap_or_else(|faults| panic!("{file}: {faults}")).contract;
+        assert!(contract.contains(known), "{file}: {contract}");
+        assert!(contract.contains("the action space is -1.0 to 1.0"), "{file}");
     }
 }
 

@@ -111,5 +111,8 @@ fn in_format<T: Real>(policy: &Policy, golden: &Golden) -> Vec<f64> {
     let controller = Controller::<T>::new(policy);
     let head = Head::<T>::new(policy);
     let answers = answers(&controller, golden);
-    answers.iter().map(|outputs| head.decide(outputs.view()).1.to_f64()).collect()
+    answers
+        .iter()
+        .map(|outputs| head.decide(outputs.view()).1.to_f64())
+        .collect()
 }

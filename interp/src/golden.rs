@@ -89,8 +89,17 @@ pub fn judge(golden: &Golden, head: &Head, answers: &[&[f64]]) -> GoldenResult {
 
 fn judge_duties(golden: &Golden, head: &policy::Continuous, answers: &[&[f64]]) -> GoldenResult {
     // `zip` below leaves out what is missing, and must not pass it
-    let missing = if answers.len() < golden.count { f64::INFINITY } else { 0.0 };
-    let found = || answers.iter().filter_map(|row| row.first()).map(|output| head.duty(*output));
+    let missing = if answers.len() < golden.count {
+        f64::INFINITY
+    } else {
+        0.0
+    };
+    let found = || {
+        answers
+            .iter()
+            .filter_map(|row| row.first())
+            .map(|output| head.duty(*output))
+    };
     let worst = |expected: &[f64]| {
         let errors = expected.iter().zip(found()).map(|(e, f)| duties::error(head, *e, f));
         errors.fold(missing, f64::max)
@@ -212,7 +221,11 @@ pub fn refusal(policy: &Policy) -> Option<Message> {
                 duties.largest, duties.numeric_format, duties.allowed
             );
             let message = Message::new("the numeric format changes the trainer's duties more than allowed");
-            return Some(message.found(found).hint("to accept it: golden_duty in [network], a share of the range from 0 to 1"));
+            return Some(
+                message
+                    .found(found)
+                    .hint("to accept it: golden_duty in [network], a share of the range from 0 to 1"),
+            );
         }
     };
     Some(
@@ -356,7 +369,10 @@ mod tests {
         assert!((off.worst_duty_error.unwrap() - 0.1).abs() < 1e-6);
         assert_eq!(off.hint(), MISREAD_DUTY);
         assert!(!error([f64::NAN, 0.6]).passed());
-        assert!(!judge_duties(&duties(), &head(), &[&[0.2]]).passed(), "a row is missing");
+        assert!(
+            !judge_duties(&duties(), &head(), &[&[0.2]]).passed(),
+            "a row is missing"
+        );
         // cut off by the clip: the same duty, and so the same answer
         let saturated = Golden {
             q_values: vec![1.5, 3.0],

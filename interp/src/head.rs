@@ -150,7 +150,11 @@ mod tests {
 
     #[test]
     fn every_duty_lies_between_those_of_both_ends() {
-        for squashed in [tanh(Some(0.45), Some(0.5)), tanh(Some(-0.3), Some(0.55)), tanh(Some(0.1), None)] {
+        for squashed in [
+            tanh(Some(0.45), Some(0.5)),
+            tanh(Some(-0.3), Some(0.55)),
+            tanh(Some(0.1), None),
+        ] {
             let ends = squashed.duties();
             let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
             for bits in (0..=f32::MAX.to_bits()).step_by(100_003) {

@@ -11,7 +11,8 @@ use sha2::{Digest, Sha256};
 
 use crate::activation::Activation;
 use crate::model::{
-    Action, Continuous, Digests, Expr, Fallback, Feature, Filter, Interval, Layer, Limits, Mapping, NumericFormat, Policy, Signal,
+    Action, Continuous, Digests, Expr, Fallback, Feature, Filter, Interval, Layer, Limits, Mapping, NumericFormat,
+    Policy, Signal,
 };
 
 #[derive(Serialize)]

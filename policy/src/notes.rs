@@ -34,7 +34,9 @@ pub fn on_duties(limits: &Limits, duties: &[f64], mapping: Option<&Mapping>, fea
 /// A first observation with a duty that the training hardly had.
 fn unlike_any_action(limits: &Limits, duties: &[f64], features: &[Feature]) -> Option<String> {
     let first = limits.initial_duty;
-    let (low, high) = (duties.iter()).fold((1.0_f64, 0.0_f64), |(low, high), duty| (low.min(*duty), high.max(*duty)));
+    let (low, high) = (duties.iter()).fold((1.0_f64, 0.0_f64), |(low, high), duty| {
+        (low.min(*duty), high.max(*duty))
+    });
     let is_read = features.iter().any(|feature| reads_duty(&feature.source));
     (is_read && !(low..=high).contains(&first)).then(|| {
         format!(

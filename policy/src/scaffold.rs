@@ -123,6 +123,8 @@ pub struct Draft {
     pub activation: Option<String>,
     /// Whether `golden.safetensors` lies beside the weights.
     pub golden: bool,
+    /// The entry `continuous` of `[actions]`, where the command is known to be a number.
+    pub continuous: Option<String>,
     /// Lines about the whole, without `#`.
     pub about: Vec<String>,
     /// What is known of each input; may be shorter than `inputs`.
@@ -150,8 +152,12 @@ pub fn draft(draft: &Draft) -> String {
     let folder = &weights[..weights.rfind('/').map_or(0, |slash| slash + 1)];
     // TOML's own quotes and escapes: a path may hold both
     let file = toml::Value::String(weights.clone()).to_string();
+    let answers = match outputs {
+        1 => "one output".to_owned(),
+        _ => format!("{outputs} actions"),
+    };
     let mut text = format!(
-        "# Contract of a trained policy: {inputs} inputs, {outputs} actions.\n\
+        "# Contract of a trained policy: {inputs} inputs, {answers}.\n\
          # Replace every \"TODO\"; until then the check names those that are left. Units are SI.\n"
     );
     for line in &draft.about {
@@ -195,14 +201,35 @@ pub fn draft(draft: &Draft) -> String {
     let golden = toml::Value::String(format!("{folder}golden.safetensors"));
     let _ = writeln!(
         text,
-        "{beside}golden = {golden}   # obs [n, inputs], q [n, actions], action [n] from the trainer"
+        "{beside}golden = {golden}   # obs [n, inputs], {} from the trainer",
+        if *outputs == 1 {
+            "output [n], duty [n]"
+        } else {
+            "q [n, actions], action [n]"
+        }
     );
-    text += "\n[actions]                    # duty ratio of each network output, 0 to 1\nduties = [\n";
-    for output in 0..*outputs {
-        let _ = writeln!(text, "    \"TODO\",   # action {output}");
-    }
-    text += "]\n";
+    text += &actions(draft.continuous.as_deref(), *outputs);
     text + TAIL
+}
+
+fn actions(continuous: Option<&str>, outputs: usize) -> String {
+    let actor =
+        "\n[actions]                    # one output, which becomes a duty: squash or clip, then scale and offset\n";
+    match continuous {
+        Some(entry) => format!("{actor}{entry}\n"),
+        // weights do not say what stood behind them
+        None if outputs == 1 => format!(
+            "{actor}continuous = {{ squash = \"TODO\", scale = \"TODO\", offset = \"TODO\" }}   # or {{ clip = [lo, hi] }}: a clipped mean\n"
+        ),
+        None => {
+            let mut text =
+                "\n[actions]                    # duty ratio of each network output, 0 to 1\nduties = [\n".to_owned();
+            for output in 0..outputs {
+                let _ = writeln!(text, "    \"TODO\",   # action {output}");
+            }
+            text + "]\n"
+        }
+    }
 }
 
 /// Scale, offset and clip of a feature.

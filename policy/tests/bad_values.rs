@@ -23,7 +23,7 @@ fn actions_are_two_to_256_duties_or_pairs() {
     contract_fault(
         "[actions]\n",
         "¦[actions]\npairs = []\n",
-        &["exactly one of `duties`, `pairs`", "2"],
+        &["exactly one of `duties`, `pairs`, `continuous`", "2"],
     );
 }
 
@@ -49,6 +49,64 @@ fn pairs_give_duties_pair_by_pair() {
     );
     contract_fault(duties, &pairs("{ xi = 0.5, phi = 0.05, c = [1, ¦1] }"), &["1 twice"]);
     contract_fault(duties, &pairs("¦{ phi = 0.05 }"), &["`xi` is missing"]);
+}
+
+const DUTIES: &str = "duties = [0.44, 0.50, 0.56]";
+
+#[test]
+fn a_continuous_head_says_what_is_wrong_with_it() {
+    let wrong = |entry: &str, says: &[&str]| contract_fault(DUTIES, &format!("continuous = {entry}"), says);
+    wrong(
+        "¦{ scale = 0.4 }",
+        &["exactly one of `squash`, `clip`", "(hi - lo) / 2"],
+    );
+    wrong(
+        "¦{ squash = \"tanh\", clip = [0.1, 0.9] }",
+        &["exactly one of `squash`, `clip`", "2"],
+    );
+    wrong(
+        "{ squash = ¦\"relu\", scale = 0.4, offset = 0.5 }",
+        &["`squash`", "tanh, softsign"],
+    );
+    wrong(
+        "{ squash = \"tanh\", scale = ¦0.0, offset = 0.5 }",
+        &["`scale`", "one duty"],
+    );
+    wrong("{ clip = ¦[0.9, 0.1] }", &["0.9", "0.1"]);
+    wrong("{ clip = [0.1, 0.9], ¦ofset = 0.1 }", &["ofset"]);
+    // a tanh of -1 to 1 is no duty as it is
+    wrong(
+        "¦{ squash = \"tanh\" }",
+        &["not a duty ratio", "-1", "0 to 1", "(hi + lo) / 2"],
+    );
+    wrong(
+        "¦{ squash = \"tanh\", scale = 0.5, offset = 0.6 }",
+        &["not a duty ratio", "1.1"],
+    );
+    wrong(
+        "¦{ clip = [-1.0, 1.0], scale = 0.4, offset = 0.3 }",
+        &["not a duty ratio"],
+    );
+    // 0.5 is the number, not the table
+    contract_fault(DUTIES, "continuous = ¦0.5", &["continuous"]);
+}
+
+#[test]
+fn the_ends_of_a_continuous_head_are_held_within_0_and_1_in_both_arithmetics() {
+    let entry = "continuous = { squash = \"tanh\", scale = 0.45, offset = 0.5500000003 }";
+    let faults = Folder::new().replace(DUTIES, entry).faults();
+    assert_says(&faults.faults.list[0], &["not a duty ratio"]);
+    // refused by binary64 alone: in binary32 the sum is 1
+    assert_eq!(0.45_f32 + 0.550_000_000_3_f64 as f32, 1.0);
+}
+
+#[test]
+fn a_network_of_several_outputs_is_no_continuous_head() {
+    let faults = Folder::new()
+        .replace(DUTIES, "continuous = { squash = \"tanh\", scale = 0.4, offset = 0.5 }")
+        .faults();
+    let said = faults.to_string();
+    assert!(said.contains("3"), "{said}");
 }
 
 #[test]

@@ -47,6 +47,8 @@ pub struct GoldenVectors {
 struct Sketch {
     features: usize,
     actions: usize,
+    /// Whether it commands a number in the place of an action.
+    is_continuous: bool,
     weights: Option<(String, Range<usize>)>,
     golden: Option<String>,
     mapping: Option<String>,
@@ -62,6 +64,14 @@ impl Contract {
         let read = |path: &Path| std::fs::read(path).map_err(|error| Error::from(of_file(path, &error)));
         let text = String::from_utf8_lossy(&read(path)?).into_owned();
         let sketch = sketch(&text);
+        if sketch.is_continuous {
+            let message =
+                Message::new("the training is that of a DQN, which chooses, and this contract commands a number")
+                    .found("continuous in [actions]")
+                    .expected("duties or pairs")
+                    .hint("train such an actor with a library, and read what it saved: policyc new model.zip");
+            return Err(Fault::in_file(path, message).into());
+        }
         let mut beside = Files::new();
         if let Some(mapping) = &sketch.mapping {
             let folder = path.parent().unwrap_or(Path::new(""));
@@ -184,6 +194,7 @@ fn sketch(text: &str) -> Sketch {
     Sketch {
         features: list(root.get("feature")),
         actions: list(entry("actions", "duties")) + pairs,
+        is_continuous: entry("actions", "continuous").is_some(),
         weights: entry("network", "weights").and_then(string),
         golden: entry("network", "golden").and_then(string).map(|(name, _)| name),
         mapping: entry("mapping", "file").and_then(string).map(|(name, _)| name),

@@ -105,9 +105,7 @@ impl Layout {
             .iter()
             .enumerate()
             .flat_map(|(n, feature)| number(format!("observation[{n}] ({})", feature.name)));
-        let network: Vec<Word> = (0..policy.outputs())
-            .flat_map(|n| number(format!("q[{n}]")))
-            .collect();
+        let network: Vec<Word> = (0..policy.outputs()).flat_map(|n| number(format!("q[{n}]"))).collect();
         let state: Vec<Word> = state_names
             .iter()
             .flat_map(|name| match name.as_str() {

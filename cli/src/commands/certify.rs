@@ -24,6 +24,13 @@ pub fn run(options: &Certify) -> Result<Outcome, Failure> {
         let message = message.found("f64").expected("one of f32, f32-fma, i16, i8");
         return Err(message.hint("--format f32").into());
     }
+    if policy.head.continuous().is_some() {
+        let message = Message::new("the certificate is about choices, and this policy commands a number");
+        let message = message.found("continuous in [actions]").expected("duties or pairs");
+        return Err(message
+            .hint("`policyc verify` tells what the numeric format does to its duties at the golden observations")
+            .into());
+    }
     let slice = slice(&policy, options)?;
     let controller = Controller::<f32>::new(&policy);
     let q_values = |observation: &[f32]| match controller.q_values(&aview1(observation)) {

@@ -65,7 +65,9 @@ pub(crate) fn choose(spec: Spec<'_>, to_cut: u32, outputs: &[Term]) -> Chosen {
 /// An output as section 6b gives it: integer / 2^(its exponent).
 fn as_number(spec: Spec<'_>, to_cut: u32, output: Term) -> Term {
     let scales = policy::scales::of(spec.policy);
-    let exponent = scales.as_ref().and_then(|scales| scales.layers.last()?.outputs.first().copied());
+    let exponent = scales
+        .as_ref()
+        .and_then(|scales| scales.layers.last()?.outputs.first().copied());
     let Some(exponent) = exponent else { return output };
     let cut = match to_cut {
         0 => output,

@@ -14,8 +14,8 @@ mod wire;
 use policy::{Activation, DraftFeature};
 use toml_input::{FileName, Message};
 
+use crate::actor::{self, Actor, Squash};
 use crate::network::{Layer, Network};
-use crate::recognise::refused_continuous;
 use model::{Constant, Graph, Node};
 
 /// What a graph computes.
@@ -26,6 +26,8 @@ pub(crate) struct Model {
     pub activations: Vec<Activation>,
     /// What stands before the first layer; empty if nothing does.
     pub features: Vec<DraftFeature>,
+    /// Where it ends in a tanh: the command is a number.
+    pub actor: Option<Actor>,
 }
 
 /// Whether `bytes` begin as a model does: field 1, the version of the format, and no header of safetensors.
@@ -263,8 +265,18 @@ impl Walk<'_> {
         let inputs = self.layers.first().map(|layer| layer.inputs);
         let inputs =
             inputs.ok_or_else(|| other("the graph holds no dense layer", "none", "Gemm, or MatMul and Add"))?;
+        let mut actor = None;
         match self.activations.pop() {
-            Some(Some(Activation::Tanh)) => return Err(refused_continuous("a graph that ends in Tanh")),
+            Some(Some(Activation::Tanh)) => {
+                let outputs = self.layers.last().map_or(0, |layer| layer.outputs);
+                if outputs != 1 {
+                    return Err(actor::several(outputs));
+                }
+                actor = Some(Actor {
+                    squash: Squash::Tanh,
+                    space: None,
+                });
+            }
             Some(Some(last)) => {
                 return Err(other(
                     "an activation stands behind the last layer",
@@ -313,6 +325,7 @@ impl Walk<'_> {
                 .map(|each| each.unwrap_or(Activation::Identity))
                 .collect(),
             features,
+            actor,
         })
     }
 }

@@ -8,9 +8,9 @@ use super::Refusal;
 use super::names::parts;
 use crate::network::Layer;
 
-/// The way out of a head that is not there yet.
-pub(crate) const DISCRETE: &str = "what is read: DQN, double, dueling and quantile DQN, and PPO or A2C with a Discrete action space. Train on a \
-     table of duties (gymnasium.spaces.Discrete), or give the duty as one of them";
+/// The way out of tensors that are more than the mean.
+pub(crate) const MEAN: &str = "save trunk and mean alone, first to last, with safetensors.torch.save_file; the contract says the rest: \
+     continuous = { squash = \"tanh\", scale = ..., offset = ... }, or { clip = [lo, hi] }";
 
 /// Refuses what is not compiled.
 pub(crate) fn check(tensors: &[NamedTensor]) -> Result<(), Refusal> {
@@ -108,12 +108,12 @@ fn categorical() -> Message {
         )
 }
 
-/// A head whose command is a number.
+/// A head whose command is a number, in a file that does not say what is made of it.
 pub(crate) fn continuous(found: &str) -> Message {
-    Message::new("this policy commands a number, not a choice: such a head is not compiled yet")
+    Message::new("this policy commands a number, and its tensors do not say how: what squashes and scales it is code of the trainer")
         .found(found)
-        .expected("one output for each action, the largest of which is chosen")
-        .hint(DISCRETE)
+        .expected("the .zip of stable-baselines3, an ONNX graph, or the layers of the mean alone")
+        .hint(MEAN)
 }
 
 fn layer_norm() -> Message {
@@ -136,7 +136,7 @@ pub(crate) fn too_many_actions(found: usize) -> Message {
     let hint = if found > MAX_ACTIONS {
         "a distributional network has several outputs for each action: with the mean over quantiles (QR-DQN) say --actions N; C51 is not compiled"
     } else {
-        "a single output is a value or a continuous command, which is not compiled yet"
+        "a single output is a value, or a continuous command: of that give the .zip of stable-baselines3 or an ONNX graph, or plain layers"
     };
     Message::new("the outputs are no table of actions")
         .found(format!("{found} outputs"))

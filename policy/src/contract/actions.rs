@@ -31,7 +31,8 @@ struct Listed {
 }
 
 pub(crate) fn read(root: &mut Table<'_>, faults: &mut Sink) -> Actions {
-    let hint = "give [actions] with `duties = [...]` or `pairs = [...]`, one per network output, or `continuous = {...}`";
+    let hint =
+        "give [actions] with `duties = [...]` or `pairs = [...]`, one per network output, or `continuous = {...}`";
     let Some(mut section) = root
         .required("actions", hint, faults)
         .and_then(|v| v.table("[actions]", faults))

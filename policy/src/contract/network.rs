@@ -63,9 +63,14 @@ pub(crate) fn read<'a>(root: &mut Table<'a>, faults: &mut Sink) -> Option<Networ
             faults,
         )
     });
-    let duty_error = section
-        .optional("golden_duty")
-        .and_then(|v| share(&v, "golden_duty", "the duty's range that the numeric format may cost", faults));
+    let duty_error = section.optional("golden_duty").and_then(|v| {
+        share(
+            &v,
+            "golden_duty",
+            "the duty's range that the numeric format may cost",
+            faults,
+        )
+    });
     let outside = section
         .optional("golden_outside")
         .and_then(|v| share(&v, "golden_outside", "golden observations that may be left out", faults));

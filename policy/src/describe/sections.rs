@@ -114,10 +114,18 @@ fn continuous(head: &Continuous) -> String {
         Squash::Clip(clip) => format!("y clipped to {}", range(clip)),
     };
     let ends = Head::Continuous(*head).duties().into_iter();
+    let scale = if head.scale == 1.0 {
+        String::new()
+    } else {
+        format!("{} * ", head.scale)
+    };
+    let offset = match head.offset {
+        0.0 => String::new(),
+        offset if offset < 0.0 => format!(" - {}", -offset),
+        offset => format!(" + {offset}"),
+    };
     format!(
-        "\naction (continuous, y is the network's output)\n  duty = {} * {squashed} {:+}, in {}\n",
-        head.scale,
-        head.offset,
+        "\naction (continuous, y is the network's output)\n  duty = {scale}{squashed}{offset}, in {}\n",
         range(hull(ends.map(|duty| Interval { low: duty, high: duty })))
     )
 }

@@ -72,7 +72,11 @@ pub(crate) fn read(
         faults.push(file.name.tensor_fault("obs", message));
         return None;
     };
-    let (first, second) = if shape.is_continuous { ("output", "duty") } else { ("q", "action") };
+    let (first, second) = if shape.is_continuous {
+        ("output", "duty")
+    } else {
+        ("q", "action")
+    };
     let (first, second) = ((first, view(first)), (second, view(second)));
     if first.1.is_none() && second.1.is_none() {
         let missing = if shape.is_continuous {

@@ -107,7 +107,8 @@ impl Writer<'_> {
             true => "ANY_NUMBER".to_owned(),
             false => format!("Frama_C_unsigned_int_interval(0u, {}u)", self.policy.outputs() - 1),
         };
-        self.text.line(format!("{n}_decide(&state, &front, {chosen}, &command);"));
+        self.text
+            .line(format!("{n}_decide(&state, &front, {chosen}, &command);"));
         let fallback = self.literal(self.number.nearest(self.policy.fallback.duty));
         // FALLBACK and STATE, and no other bit
         self.text

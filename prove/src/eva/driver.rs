@@ -161,7 +161,10 @@ impl Writer<'_> {
             "arbitrary(&state);".to_owned(),
             "#endif".to_owned(),
             "measure(&measured);".to_owned(),
-            format!("{} = {n}_choose(&state, &measured);", if self.is_output() { "output" } else { "index" }),
+            format!(
+                "{} = {n}_choose(&state, &measured);",
+                if self.is_output() { "output" } else { "index" }
+            ),
         ]);
         let stated = if self.is_output() {
             // that it is finite is what the runs with finite numbers show of everything
@@ -175,8 +178,12 @@ impl Writer<'_> {
         Entry {
             function: "prove_choose",
             about: match self.is_output() {
-                true => "the network's output from every bit pattern of the state, every measurement; finite numbers from every sound state",
-                false => "the choice of an action from every bit pattern of the state, every measurement; finite numbers from every sound state",
+                true => {
+                    "the network's output from every bit pattern of the state, every measurement; finite numbers from every sound state"
+                }
+                false => {
+                    "the choice of an action from every bit pattern of the state, every measurement; finite numbers from every sound state"
+                }
             },
             stated,
             runs: BITS_AND_FINITE,
@@ -199,10 +206,7 @@ impl Writer<'_> {
         self.where_it_holds(|text| text.check("undamaged", &format!("(command.status & {}u) == 0u", 1 << 8)));
         claims.push(Stated {
             is_finite_only: self.passes_nan(),
-            ..stated(
-                "undamaged",
-                "A sound state is never called damaged: STATE is clear.",
-            )
+            ..stated("undamaged", "A sound state is never called damaged: STATE is clear.")
         });
         self.counters();
         let held = self.policy.signals.len();
@@ -429,7 +433,9 @@ impl Writer<'_> {
     /// Whether the head makes a NaN of a NaN: a clip does, a curve by masks does not.
     pub fn passes_nan(&self) -> bool {
         let head = self.policy.head.continuous();
-        head.is_some_and(|head| matches!(head.squash, Squash::Clip(_)) || head.squash == Squash::Curve(Activation::Softsign))
+        head.is_some_and(|head| {
+            matches!(head.squash, Squash::Clip(_)) || head.squash == Squash::Curve(Activation::Softsign)
+        })
     }
 
     /// Whether the head is continuous.
@@ -442,5 +448,3 @@ impl Writer<'_> {
         matches!(self.policy.numeric_format, NumericFormat::I16 | NumericFormat::I8)
     }
 }
-
-

@@ -78,7 +78,11 @@ fn constants(program: &Program) -> TokenStream {
     let signals = size(program.signals.len());
     let features = size(program.feature_count());
     let actions = size(program.head.outputs());
-    let counted = if program.head.is_output() { " Outputs of the network." } else { " Number of actions." };
+    let counted = if program.head.is_output() {
+        " Outputs of the network."
+    } else {
+        " Number of actions."
+    };
     let state_words = size(program.state_words());
     let period = Literal::f64_unsuffixed(program.sample_period);
     let bits = STATUS.iter().map(|bit| {
@@ -116,7 +120,10 @@ fn types(program: &Program, layout: &TokenStream) -> TokenStream {
         quote! { #[doc = #doc] pub #name: #kind }
     });
     let [duty_sim, action_index] = match program.head.is_output() {
-        true => [" Duty of the actor, before the mapping.", " Always 0: the head is continuous."],
+        true => [
+            " Duty of the actor, before the mapping.",
+            " Always 0: the head is continuous.",
+        ],
         false => [" Duty of the chosen action, before the mapping.", " Greedy action."],
     };
     quote! {

@@ -91,7 +91,7 @@ impl Refit<'_> {
     /// If a load or voltage makes no sense.
     pub fn plan(&self, v_in: f64) -> Result<Plan, Error> {
         let own = self.nominal.converter.v_in;
-        let (low, high) = duties(&self.policy);
+        let (low, high) = duties(self.policy);
         let low = (low * own).max((1.0 - BESIDE) * self.v_ref);
         // 3 % for what a real converter loses at full duty
         let high = (high * own).min((1.0 + BESIDE) * self.v_ref).min(0.97 * v_in.min(own));
@@ -174,7 +174,7 @@ impl Refit<'_> {
 
     /// Whether the policy's duty limits cut off what the mapping makes of its actions.
     fn cut_off(&self, map: &DutyRatioMap) -> Option<String> {
-        let (low, high) = duties(&self.policy);
+        let (low, high) = duties(self.policy);
         let mapped = DutyRatioMap {
             valid_d_sim: Interval { low, high },
             ..*map

@@ -5,46 +5,73 @@ use toml_input::Message;
 /// What bounds the output of an actor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Squash {
-    /// tanh, then from +-1 to the ends of the action space: SAC, TD3, DDPG.
+    /// tanh: SAC, TD3, DDPG.
     Tanh,
-    /// The mean itself, clipped to the action space: PPO, A2C.
-    Clip,
+    /// The output itself between two ends: PPO, A2C.
+    Clip(f64, f64),
 }
 
 /// An actor with one command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Actor {
     pub squash: Squash,
-    /// Ends of the action space; `None` where the file does not say them.
-    pub space: Option<(f64, f64)>,
+    /// Scale and offset behind it; `None` where the file does not say them.
+    pub affine: Option<(f64, f64)>,
 }
 
 impl Actor {
-    /// The entry `continuous` of `[actions]`, with what to think of it beside. An action space within 0..1 is taken for duties.
-    pub fn entry(self) -> String {
-        // numbers of a space are binary32: 0.1 and not 0.10000000149011612
-        let short = |x: f64| format!("{:?}", x as f32).parse().unwrap_or(x);
-        let Some((low, high)) = self.space.map(|(low, high)| (short(low), short(high))) else {
-            return "continuous = { squash = \"tanh\", scale = \"TODO\", offset = \"TODO\" }   # duty = scale * tanh(y) + offset".to_owned();
+    /// A tanh whose ends are those of an action space.
+    pub fn of_space(low: f64, high: f64) -> Self {
+        let (low, high) = (short(low), short(high));
+        Self {
+            squash: Squash::Tanh,
+            affine: Some((0.5 * (high - low), 0.5 * (high + low))),
+        }
+    }
+
+    /// A mean that is clipped to an action space.
+    pub fn clipped(low: f64, high: f64) -> Self {
+        Self {
+            squash: Squash::Clip(short(low), short(high)),
+            affine: Some((1.0, 0.0)),
+        }
+    }
+
+    /// Least and largest command, in the units of the file.
+    fn ends(self) -> Option<(f64, f64)> {
+        let (scale, offset) = self.affine?;
+        let (low, high) = match self.squash {
+            Squash::Tanh => (-1.0, 1.0),
+            Squash::Clip(low, high) => (low, high),
         };
-        let is_duty = low >= 0.0 && high <= 1.0;
-        let whose = format!("the action space is {low:?} to {high:?}");
-        match (self.squash, is_duty) {
-            (Squash::Tanh, true) => {
-                let (scale, offset) = (0.5 * (high - low), 0.5 * (high + low));
+        let (one, other) = (scale * low + offset, scale * high + offset);
+        Some((one.min(other), one.max(other)))
+    }
+
+    /// The entry `continuous` of `[actions]`, with what to think of it beside. A command within 0..1 is taken for a duty.
+    pub fn entry(self) -> String {
+        let squash = match self.squash {
+            Squash::Tanh => "squash = \"tanh\"".to_owned(),
+            Squash::Clip(low, high) => format!("clip = [{low:?}, {high:?}]"),
+        };
+        match (self.affine, self.ends()) {
+            (Some((scale, offset)), Some((low, high))) if low >= 0.0 && high <= 1.0 => {
+                let scaled = match (scale, offset) {
+                    (1.0, 0.0) => String::new(),
+                    _ => format!(", scale = {scale:?}, offset = {offset:?}"),
+                };
                 format!(
-                    "continuous = {{ squash = \"tanh\", scale = {scale:?}, offset = {offset:?} }}   # {whose}, taken for the duty"
+                    "continuous = {{ {squash}{scaled} }}   # the command is {low:?} to {high:?}, taken for the duty"
                 )
             }
-            (Squash::Clip, true) => {
-                format!("continuous = {{ clip = [{low:?}, {high:?}] }}   # {whose}, taken for the duty")
+            (_, ends) => {
+                let whose = ends.map_or_else(String::new, |(low, high)| {
+                    format!("; the training's own command is {low:?} to {high:?}")
+                });
+                format!(
+                    "continuous = {{ {squash}, scale = \"TODO\", offset = \"TODO\" }}   # duty = scale * s + offset, s behind it{whose}"
+                )
             }
-            (Squash::Tanh, false) => format!(
-                "continuous = {{ squash = \"tanh\", scale = \"TODO\", offset = \"TODO\" }}   # duty = scale * tanh(y) + offset; {whose}"
-            ),
-            (Squash::Clip, false) => format!(
-                "continuous = {{ clip = [{low:?}, {high:?}], scale = \"TODO\", offset = \"TODO\" }}   # duty = scale * y + offset; {whose}"
-            ),
         }
     }
 
@@ -54,9 +81,14 @@ impl Actor {
             Squash::Tanh => {
                 "a continuous actor: the duty is a tanh of the one output; of SAC that is its mean".to_owned()
             }
-            Squash::Clip => "a continuous actor: the duty is the mean, clipped to the action space".to_owned(),
+            Squash::Clip(..) => "a continuous actor: the duty is the mean, clipped to the action space".to_owned(),
         }
     }
+}
+
+/// Numbers of a space are binary32: 0.1 and not 0.10000000149011612.
+fn short(x: f64) -> f64 {
+    format!("{:?}", x as f32).parse().unwrap_or(x)
 }
 
 /// An actor with several commands.

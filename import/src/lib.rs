@@ -73,7 +73,9 @@ pub fn new_policy(file: &Path, contract: &Path, options: &Options) -> Result<New
     let bytes = name.read(MAX_WEIGHT_BYTES).map_err(|message| name.fault(message))?;
     let loaded = read::read(&name, bytes, options)?;
     if let Some(graph) = &loaded.graph {
-        if loaded.actor.is_none() {
+        // one output that nothing squashes is a command whose way to a duty the contract leaves open
+        let is_command = graph.network.layers.last().is_some_and(|layer| layer.outputs == 1);
+        if !is_command {
             recognise::fits(&graph.network, options.actions).map_err(|refusal| placed(&name, refusal))?;
         }
         let own = statistics(file, options)?;

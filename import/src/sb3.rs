@@ -7,7 +7,7 @@ use policy::{Activation, NamedTensor};
 use serde_json::Value;
 use toml_input::Message;
 
-use crate::actor::{self, Actor, Squash};
+use crate::actor::{self, Actor};
 use crate::network::Layer;
 use crate::numpy;
 use crate::pickle::{Item, Pickle};
@@ -169,9 +169,10 @@ fn actor(data: &Value, class: &Class) -> Result<Option<Actor>, Message> {
     let [(low, high)] = *box_ends(data, "action_space")? else {
         return Err(actor::several(box_ends(data, "action_space")?.len()));
     };
-    Ok(Some(Actor {
-        squash: if class.is_tanh { Squash::Tanh } else { Squash::Clip },
-        space: Some((low, high)),
+    Ok(Some(if class.is_tanh {
+        Actor::of_space(low, high)
+    } else {
+        Actor::clipped(low, high)
     }))
 }
 

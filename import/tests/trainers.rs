@@ -223,6 +223,33 @@ fn continuous_models_of_sb3_command_the_duties_of_the_library() {
 }
 
 #[test]
+fn graphs_that_end_in_a_command_are_read_with_what_scales_it() {
+    for (name, activation, entry) in [
+        (
+            "tanh_actor",
+            relu as fn(f64) -> f64,
+            "squash = \"tanh\", scale = 0.375, offset = 0.475",
+        ),
+        ("clipped_actor", f64::tanh, "clip = [-1.0, 1.0], scale = 0.3"),
+    ] {
+        let (_folder, new, policy) = policy_of(&format!("{name}.onnx"), &Options::default());
+        assert!(new.contract.contains(entry), "{}", new.contract);
+        let head = policy.head.continuous().unwrap_or_else(|| panic!("{name}"));
+        let (obs, duties) = (expected(name, "obs"), expected(name, "duty"));
+        for (row, duty) in duties.iter().enumerate() {
+            let x: Vec<f64> = obs[row * 6..(row + 1) * 6].iter().map(|x| f64::from(*x)).collect();
+            let found = head.duty(run(&policy, &x, activation)[0]);
+            assert!(
+                (found - f64::from(*duty)).abs() < 6e-6,
+                "{name}, row {row}: {found} {duty}"
+            );
+        }
+        let inside = duties.iter().filter(|duty| (0.21..0.79).contains(*duty)).count();
+        assert!(inside > 10, "{name}: {inside} duties that nothing cut off");
+    }
+}
+
+#[test]
 fn an_action_space_that_is_no_duty_leaves_scale_and_offset_open() {
     for (file, known) in [
         ("sb3_sac.zip", "{ squash = \"tanh\", scale = \"TODO\""),
@@ -234,7 +261,7 @@ fn an_action_space_that_is_no_duty_leaves_scale_and_offset_open() {
         let new = import::new_policy(&fixture(file), &folder.path().join("policy.toml"), &Options::default());
         let contract = new.unwrap_or_else(|faults| panic!("{file}: {faults}")).contract;
         assert!(contract.contains(known), "{file}: {contract}");
-        assert!(contract.contains("the action space is -1.0 to 1.0"), "{file}");
+        assert!(contract.contains("own command is -1.0 to 1.0"), "{file}");
     }
 }
 

@@ -43,6 +43,7 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
 /// The policy in the format asked for; refused if its network does not give the trainer's answers.
 fn load(options: &Compile) -> Result<Policy, Failure> {
     let policy = super::load_as(&options.policy, options.outside, options.format)?;
+    super::no_choices(&policy, options.golden_decisions)?;
     if let Some(golden) = verify::golden_result(&policy).filter(|golden| !golden.passed()) {
         let message = Message::new("the network does not give the trainer's golden answers; nothing was written");
         return Err(message.found(golden.to_string()).hint(golden.hint()).into());

@@ -60,3 +60,15 @@ fn load_as(path: &Path, outside: Outside, format: Option<NumericFormat>) -> Resu
         None => policy,
     })
 }
+
+/// Refuses a share of decisions for a policy that has none.
+fn no_choices(policy: &Policy, golden_decisions: Option<f64>) -> Result<(), Failure> {
+    if golden_decisions.is_none() || policy.head.continuous().is_none() {
+        return Ok(());
+    }
+    let message = Message::new("--golden-decisions is a share of choices, and this policy commands a number");
+    Err(message
+        .found("continuous in [actions]")
+        .hint("golden_duty in [network] of the contract says how far the duty may be off, as a share of its range")
+        .into())
+}

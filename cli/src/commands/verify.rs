@@ -33,6 +33,7 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
         (None, None) => None,
     };
     let policy = super::load_as(&options.policy, options.outside, written)?;
+    super::no_choices(&policy, options.golden_decisions)?;
     let recorded = options
         .trace
         .iter()

@@ -44,6 +44,8 @@ pub(crate) fn read(file: &FileName, bytes: &[u8]) -> Result<Model, Message> {
         clip: None,
         layers: Vec::new(),
         activations: Vec::new(),
+        cut: None,
+        scaled: None,
         ended: None,
         said: Vec::new(),
     };
@@ -95,6 +97,10 @@ struct Walk<'a> {
     layers: Vec<Layer>,
     /// Behind the layers that have one.
     activations: Vec<Option<Activation>>,
+    /// Ends of a clip behind the last layer.
+    cut: Option<(f64, f64)>,
+    /// Scale and offset behind a tanh or a clip that ends the network.
+    scaled: Option<(f64, f64)>,
     /// The node that ended the chain.
     ended: Option<String>,
     said: Vec<String>,
@@ -120,12 +126,13 @@ impl Walk<'_> {
             "Gemm" | "MatMul" => self.layer(node, value),
             "Add" | "Sub" | "Mul" | "Div" => self.arithmetic(node, value),
             "Clip" if self.layers.is_empty() && self.clip.is_none() => {
-                let bound = |index: usize| {
-                    self.constant(node, index)
-                        .and_then(|constant| constant.values.first().copied())
-                };
-                let (low, high) = bound(1).zip(bound(2)).ok_or_else(|| unknown(node))?;
+                let (low, high) = self.ends(node).ok_or_else(|| unknown(node))?;
                 self.clip = Some((low, high));
+                Ok(())
+            }
+            // PPO's mean, clipped to its action space
+            "Clip" if self.activations.last() == Some(&None) && self.is_one() && self.cut.is_none() => {
+                self.cut = Some(self.ends(node).ok_or_else(|| unknown(node))?);
                 Ok(())
             }
             "Relu" => self.activation(node, Activation::Relu),
@@ -147,6 +154,21 @@ impl Walk<'_> {
         }
     }
 
+    /// Both ends of a `Clip`.
+    fn ends(&self, node: &Node) -> Option<(f64, f64)> {
+        let bound = |index: usize| self.constant(node, index)?.values.first().copied();
+        bound(1).zip(bound(2)).filter(|(low, high)| low < high)
+    }
+
+    /// Whether the last layer has one output, and something makes a command of it.
+    fn is_one(&self) -> bool {
+        self.layers.last().is_some_and(|layer| layer.outputs == 1)
+    }
+
+    fn is_command(&self) -> bool {
+        self.is_one() && (self.cut.is_some() || self.activations.last() == Some(&Some(Activation::Tanh)))
+    }
+
     fn end(&mut self, node: &Node) -> Result<(), Message> {
         self.ended = Some(named(node));
         Ok(())
@@ -157,6 +179,9 @@ impl Walk<'_> {
     }
 
     fn activation(&mut self, node: &Node, activation: Activation) -> Result<(), Message> {
+        if self.cut.is_some() {
+            return Err(unknown(node));
+        }
         match self.activations.last_mut() {
             Some(free @ None) => {
                 *free = Some(activation);
@@ -195,7 +220,9 @@ impl Walk<'_> {
             None if node.inputs.len() > 2 => return Err(unknown(node)),
             None => vec![0.0; outputs],
         };
-        if self.layers.last().is_some_and(|last| last.outputs != inputs) || outputs == 0 || inputs == 0 {
+        // behind a command there is no layer
+        let is_behind = self.cut.is_some() || self.scaled.is_some();
+        if is_behind || self.layers.last().is_some_and(|last| last.outputs != inputs) || outputs == 0 || inputs == 0 {
             return Err(unknown(node));
         }
         let weights = (0..outputs).flat_map(|output| (0..inputs).map(move |input| (output, input)));
@@ -226,8 +253,16 @@ impl Walk<'_> {
         };
         let steps: Option<Vec<(f64, f64)>> = constant.iter().map(|c| step(*c)).collect();
         let steps = steps.ok_or_else(|| unknown(node))?;
-        let Some(layer) = self.layers.last_mut() else {
+        if self.layers.is_empty() {
             return self.before(node, &steps);
+        }
+        if let ([(scale, shift)], true) = (steps.as_slice(), self.is_command()) {
+            let (own, offset) = self.scaled.unwrap_or((1.0, 0.0));
+            self.scaled = Some((own * scale, offset * scale + shift));
+            return Ok(());
+        }
+        let Some(layer) = self.layers.last_mut().filter(|_| self.cut.is_none()) else {
+            return Err(unknown(node));
         };
         if self.activations.last() != Some(&None) || !(steps.len() == 1 || steps.len() == layer.outputs) {
             return Err(unknown(node));
@@ -274,7 +309,7 @@ impl Walk<'_> {
                 }
                 actor = Some(Actor {
                     squash: Squash::Tanh,
-                    space: None,
+                    affine: Some(self.scaled.unwrap_or((1.0, 0.0))),
                 });
             }
             Some(Some(last)) => {
@@ -284,7 +319,13 @@ impl Walk<'_> {
                     "the values of the actions",
                 ));
             }
-            _ => {}
+            _ => {
+                let clipped = self.cut.map(|(low, high)| Actor {
+                    affine: Some(self.scaled.unwrap_or((1.0, 0.0))),
+                    ..Actor::clipped(low, high)
+                });
+                actor = clipped;
+            }
         }
         let names: Vec<&str> = self.layers.iter().map(|layer| layer.name.as_str()).collect();
         self.said

@@ -35,6 +35,8 @@ pub(super) struct Course {
     features: Vec<FeatureCourse>,
     signals: Vec<Vec<f64>>,
     pub actions: Vec<u32>,
+    /// Before the mapping.
+    pub duties: Vec<f64>,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -51,6 +53,7 @@ impl Course {
             features: vec![FeatureCourse::default(); policy.features.len()],
             signals: vec![Vec::new(); policy.signals.len()],
             actions: Vec::new(),
+            duties: Vec::new(),
         }
     }
 
@@ -64,6 +67,7 @@ impl Course {
             course.push(signal.to_f64());
         }
         self.actions.push(trace.action_index);
+        self.duties.push(trace.duty_sim.to_f64());
     }
 
     /// What the network sees of a feature.

@@ -26,6 +26,8 @@ pub struct Log {
     pub(super) observed: Vec<Option<Vec<f64>>>,
     /// The trainer's choice in each row.
     pub(super) actions: Option<Vec<u32>>,
+    /// What a continuous actor commanded in each row, as a duty before the mapping.
+    pub(super) commanded: Option<Vec<f64>>,
     /// The duty before each row.
     pub(super) previous_duty: Option<Vec<f64>>,
     /// What stands behind each row.
@@ -62,7 +64,7 @@ impl Log {
     ///
     /// Columns: every signal by its name, in its unit (as for [`Recorded`](crate::traces::Recorded)). If there: observations as
     /// `obs_0`, `obs_1`, ... in the network's order, or `obs_NAME`, or the feature's name; `action`, from 0; `duty`, what the
-    /// action commanded; `previous_duty`, where the environment has its own; `episode`, which begins anew where it changes; `t` in
+    /// action commanded, which of a continuous head is compared in the place of an action; `previous_duty`, where the environment has its own; `episode`, which begins anew where it changes; `t` in
     /// seconds.
     ///
     /// # Errors
@@ -109,9 +111,15 @@ impl Log {
         if let Some(time) = time {
             check_period(policy, &sheet, &time, &begins)?;
         }
+        let is_continuous = policy.head.continuous().is_some();
+        if let (true, Some(_), None, Some(column)) = (is_continuous, &action, &duty, located.signal("action")) {
+            return Err(column.fault(&sheet, 0, no_index()).into());
+        }
         let actions = action
+            .filter(|_| !is_continuous)
             .map(|action| indices(policy, &sheet, &located, &action))
             .transpose()?;
+        let commanded = duty.clone().filter(|_| is_continuous);
         let applied = match (&actions, duty) {
             (Some(actions), _) => Applied::Actions(actions.clone()),
             (None, Some(duties)) => Applied::Duties(duties),
@@ -123,6 +131,7 @@ impl Log {
             begins,
             observed,
             actions,
+            commanded,
             previous_duty,
             applied,
             notes,
@@ -136,10 +145,10 @@ impl Log {
         self.samples.len()
     }
 
-    /// Whether it holds an observation or an action to compare with.
+    /// Whether it holds an observation, an action or the duty of a continuous actor to compare with.
     #[must_use]
     pub fn compares(&self) -> bool {
-        self.actions.is_some() || self.observed.iter().any(Option::is_some)
+        self.actions.is_some() || self.commanded.is_some() || self.observed.iter().any(Option::is_some)
     }
 
     /// Its columns, for a fault.
@@ -244,6 +253,13 @@ fn check_period(policy: &Policy, sheet: &Sheet, time: &[f64], begins: &[bool]) -
         }
     }
     Ok(())
+}
+
+fn no_index() -> Message {
+    Message::new("the policy commands a number, and an action of the log is an index")
+        .found("a column `action` and none called `duty`")
+        .expected("`duty`: what the actor commanded, as a duty before the mapping")
+        .hint("an action in units of the trainer's action space becomes a duty by scale and offset of [actions]")
 }
 
 fn indices(policy: &Policy, sheet: &Sheet, located: &Located, values: &[f64]) -> Result<Vec<u32>, Faults> {

@@ -39,7 +39,7 @@ pub struct Replay {
     pub episodes: usize,
     /// One entry per feature, in the order of the network's inputs.
     pub features: Vec<FeatureResult>,
-    /// The network's choice beside the logged one; `None` if the log has no actions.
+    /// The network's choice or duty beside the logged one; `None` if the log has none.
     pub actions: Option<ActionResult>,
     /// Signals with samples outside their plausible range: name, rows, smallest and largest logged value. They were taken as they
     /// are; the controller will hold the last good sample.
@@ -138,18 +138,31 @@ pub fn replay(policy: &Policy, log: &Log, tolerance: f64, exploring: bool) -> Re
         rows: log.rows(),
         episodes: log.begins.iter().filter(|begins| **begins).count(),
         features: features.collect(),
-        actions: log.actions.as_ref().map(|logged| {
-            let other = |row: &usize| logged.get(*row) != course.actions.get(*row);
-            let others: Vec<usize> = (0..log.rows()).filter(other).collect();
-            ActionResult {
-                equal: log.rows() - others.len(),
-                first_line: others.first().map(|row| log.line(*row)),
-                exploring,
-            }
-        }),
+        actions: commands(policy, log, &course, tolerance, exploring),
         outside: log.outside(policy),
         tolerance,
         notes: log.notes.clone(),
+    })
+}
+
+/// The choices of a log, or the duties of a continuous actor in it; `None` if it has neither.
+fn commands(policy: &Policy, log: &Log, course: &Course, tolerance: f64, exploring: bool) -> Option<ActionResult> {
+    let others: Vec<usize> = match (&log.actions, policy.head.continuous().zip(log.commanded.as_ref())) {
+        (Some(logged), _) => {
+            let other = |row: &usize| logged.get(*row) != course.actions.get(*row);
+            (0..log.rows()).filter(other).collect()
+        }
+        (None, Some((head, logged))) => {
+            let near = |row: usize| Some((logged.get(row)? - course.duties.get(row)?).abs() <= tolerance * head.span());
+            // what is no number is not near
+            (0..log.rows()).filter(|row| near(*row) != Some(true)).collect()
+        }
+        (None, None) => return None,
+    };
+    Some(ActionResult {
+        equal: log.rows() - others.len(),
+        first_line: others.first().map(|row| log.line(*row)),
+        exploring,
     })
 }
 

@@ -32,7 +32,8 @@ pub fn text(policy: &Policy, replay: &Replay) -> String {
     for feature in &replay.features {
         out += &row(feature, rows, width);
     }
-    let words = words(replay);
+    let is_continuous = policy.head.continuous().is_some();
+    let words = words(replay, is_continuous);
     if !words.is_empty() {
         out.push('\n');
     }
@@ -40,7 +41,7 @@ pub fn text(policy: &Policy, replay: &Replay) -> String {
         out += &format!("  {line}\n");
     }
     out.push('\n');
-    out += &verdict(replay);
+    out += &verdict(replay, is_continuous);
     out.push('\n');
     out
 }
@@ -62,7 +63,7 @@ fn range([low, high]: [f64; 2]) -> String {
 }
 
 /// What is to be said below the table.
-fn words(replay: &Replay) -> Vec<String> {
+fn words(replay: &Replay, is_continuous: bool) -> Vec<String> {
     let mut words = Vec::new();
     for (feature, compared) in replay.compared() {
         let name = &feature.name;
@@ -85,7 +86,8 @@ fn words(replay: &Replay) -> Vec<String> {
             (Some(line), true) => format!(", first other in line {line}: explored"),
             (Some(line), false) => format!(", first other in line {line}"),
         };
-        words.push(format!("action equal in {equal} of {rows}{told}"));
+        let command = if is_continuous { "duty" } else { "action" };
+        words.push(format!("{command} equal in {equal} of {rows}{told}"));
     }
     for (signal, rows, [low, high]) in &replay.outside {
         words.push(format!(
@@ -104,7 +106,7 @@ fn is_still(compared: &Compared) -> bool {
     low == high
 }
 
-fn verdict(replay: &Replay) -> String {
+fn verdict(replay: &Replay, is_continuous: bool) -> String {
     let compared = replay.compared().count();
     let of = replay.features.len();
     if !replay.equal() {
@@ -113,6 +115,9 @@ fn verdict(replay: &Replay) -> String {
             .filter(|(_, compared)| compared.first_line.is_some())
             .count();
         return match others {
+            0 if is_continuous => "DIFFERENT: the observations are equal, the duties are not. A trainer who explores: --exploring. Otherwise look \
+                  at squash or clip, scale and offset in [actions], and at the golden vectors"
+                .to_owned(),
             0 => "DIFFERENT: the observations are equal, the actions are not. A trainer who explores: --exploring. Otherwise look at \
                   the order of [actions], and at the golden vectors"
                 .to_owned(),
@@ -122,6 +127,7 @@ fn verdict(replay: &Replay) -> String {
     }
     match (compared, &replay.actions) {
         (0, None) => "NOTHING COMPARED: the log has no observations and no actions".to_owned(),
+        (0, Some(_)) if is_continuous => "equal: the duties (the log has no observations)".to_owned(),
         (0, Some(_)) => "equal: the actions (the log has no observations)".to_owned(),
         (compared, _) if compared < of => format!("equal: the {compared} of {of} features that the log has"),
         _ => format!(

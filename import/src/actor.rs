@@ -86,6 +86,11 @@ impl Actor {
     }
 }
 
+/// Scale and offset of a graph, which are binary32; 1 and 0 where it has none.
+pub(crate) fn scaled(found: Option<(f64, f64)>) -> (f64, f64) {
+    found.map_or((1.0, 0.0), |(scale, offset)| (short(scale), short(offset)))
+}
+
 /// Numbers of a space are binary32: 0.1 and not 0.10000000149011612.
 fn short(x: f64) -> f64 {
     format!("{:?}", x as f32).parse().unwrap_or(x)

@@ -1,6 +1,7 @@
 //! The program `policyc` as a user meets it: exit codes, texts, files.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod actor;
 mod budget;
 mod certify;
 mod commands;

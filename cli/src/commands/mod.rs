@@ -19,6 +19,7 @@ pub mod verify;
 use std::path::{Path, PathBuf};
 
 use policy::{NumericFormat, Policy, ReadOptions};
+use toml_input::Message;
 
 use crate::arguments::Outside;
 use crate::failure::Failure;

@@ -300,17 +300,16 @@ impl Walk<'_> {
         let inputs = self.layers.first().map(|layer| layer.inputs);
         let inputs =
             inputs.ok_or_else(|| other("the graph holds no dense layer", "none", "Gemm, or MatMul and Add"))?;
-        let mut actor = None;
-        match self.activations.pop() {
+        let actor = match self.activations.pop() {
             Some(Some(Activation::Tanh)) => {
                 let outputs = self.layers.last().map_or(0, |layer| layer.outputs);
                 if outputs != 1 {
                     return Err(actor::several(outputs));
                 }
-                actor = Some(Actor {
+                Some(Actor {
                     squash: Squash::Tanh,
-                    affine: Some(self.scaled.unwrap_or((1.0, 0.0))),
-                });
+                    affine: Some(actor::scaled(self.scaled)),
+                })
             }
             Some(Some(last)) => {
                 return Err(other(
@@ -319,14 +318,11 @@ impl Walk<'_> {
                     "the values of the actions",
                 ));
             }
-            _ => {
-                let clipped = self.cut.map(|(low, high)| Actor {
-                    affine: Some(self.scaled.unwrap_or((1.0, 0.0))),
-                    ..Actor::clipped(low, high)
-                });
-                actor = clipped;
-            }
-        }
+            _ => self.cut.map(|(low, high)| Actor {
+                affine: Some(actor::scaled(self.scaled)),
+                ..Actor::clipped(low, high)
+            }),
+        };
         let names: Vec<&str> = self.layers.iter().map(|layer| layer.name.as_str()).collect();
         self.said
             .insert(0, format!("layers, first to last: {}", names.join(" > ")));

@@ -368,7 +368,16 @@ mod tests {
         // .05 of a range of .5
         assert!((off.worst_duty_error.unwrap() - 0.1).abs() < 1e-6);
         assert_eq!(off.hint(), MISREAD_DUTY);
-        assert!(!error([f64::NAN, 0.6]).passed());
+        let low = Golden {
+            q_values: vec![-1.0, 0.6],
+            duties: vec![0.25, 0.55],
+            ..duties()
+        };
+        assert!(judge_duties(&low, &head(), &[&[-1.0], &[0.6]]).passed());
+        assert!(
+            !judge_duties(&low, &head(), &[&[f64::NAN], &[0.6]]).passed(),
+            "no number is no end of the clip"
+        );
         assert!(
             !judge_duties(&duties(), &head(), &[&[0.2]]).passed(),
             "a row is missing"

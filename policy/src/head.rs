@@ -115,7 +115,10 @@ impl Continuous {
                 // the reader lets no other shape through
                 Shape::Hinge { .. } => output,
             },
-            Squash::Clip(clip) => output.max(clip.low).min(clip.high),
+            // section 4: a NaN stays one, which `max` and `min` would make an end of
+            Squash::Clip(clip) if output < clip.low => clip.low,
+            Squash::Clip(clip) if output > clip.high => clip.high,
+            Squash::Clip(_) => output,
         };
         self.scale * squashed + self.offset
     }

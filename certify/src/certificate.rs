@@ -1,6 +1,6 @@
 //! Everything that is said about a policy in a numeric format.
 
-use policy::{Digests, Interval, NumericFormat, Policy};
+use policy::{Continuous, Digests, Interval, NumericFormat, Policy};
 use serde::Serialize;
 
 use crate::cover::{Map, Share, Slice, StateBound};
@@ -54,8 +54,12 @@ pub struct Certificate {
     pub copies: Vec<AffineCopy>,
     /// Proven for every state.
     pub state_bound: StateBound,
-    /// Share of the states in proven boxes, estimated.
-    pub proven_share: Share,
+    /// Where the command is a number: all bounds are of the duty then, and nothing is said of actions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub continuous: Option<Continuous>,
+    /// Share of the states in proven boxes, estimated; `None` of a continuous actor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub proven_share: Option<Share>,
     /// At the states drawn for the share.
     pub measured: Measured,
     /// Around and at the golden observations, if the policy has them.
@@ -93,6 +97,7 @@ impl Certificate {
         uniform: &mut dyn FnMut() -> f64,
     ) -> Self {
         let certifier = Certifier::new(policy);
+        let is_choice = policy.head.continuous().is_none();
         let domain = Domain::of(policy, Memory::Free);
         // the same states for the share and for what is seen, so that the two can be held against each other
         let points: Vec<Vec<f64>> = (0..effort.samples).map(|_| domain.draw(uniform)).collect();
@@ -105,10 +110,13 @@ impl Certificate {
             coordinates: domain.coordinates().to_vec(),
             copies: domain.copies(),
             state_bound: certifier.state_bound(&domain, effort.boxes),
-            proven_share: certifier.share(&domain, &points, effort.depth),
+            continuous: policy.head.continuous().copied(),
+            proven_share: is_choice.then(|| certifier.share(&domain, &points, effort.depth)),
             measured: certifier.measure(observations.iter().map(Vec::as_slice), q_values),
             golden: golden(policy, &certifier, q_values),
-            map: slice.map(|slice| certifier.map(&Domain::of(policy, slice.memory), slice, q_values)),
+            map: slice
+                .filter(|_| is_choice)
+                .map(|slice| certifier.map(&Domain::of(policy, slice.memory), slice, q_values)),
         }
     }
 }
@@ -123,7 +131,10 @@ fn golden(policy: &Policy, certifier: &Certifier, q_values: &QValues<'_>) -> Opt
     };
     Some(Golden {
         measured: certifier.measure(observations(), q_values),
-        neighbourhoods: RADII.map(neighbourhood).to_vec(),
+        neighbourhoods: match policy.head.continuous() {
+            Some(_) => Vec::new(),
+            None => RADII.map(neighbourhood).to_vec(),
+        },
     })
 }
 

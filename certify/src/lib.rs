@@ -11,6 +11,7 @@
 //! println!("|Q - real Q| <= {}", certifier.box_bound().largest);
 //! ```
 
+mod actor;
 mod certificate;
 mod cover;
 mod domain;
@@ -24,7 +25,7 @@ mod past;
 mod propagate;
 mod slice;
 
-use policy::{Interval, Policy};
+use policy::{Continuous, Interval, Policy};
 use serde::Serialize;
 
 pub use certificate::{Certificate, Effort, Golden, Neighbourhood};
@@ -41,14 +42,16 @@ use propagate::Enclosure;
 pub struct Certifier {
     network: Network,
     observations: Domain,
+    /// Where the command is a number: bounds are then of the duty.
+    head: Option<Continuous>,
 }
 
-/// Proven bound of |Q in the format - real Q|.
+/// Proven bound of |Q in the format - real Q|, or of a continuous actor of |duty in the format - real duty|.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Bound {
     /// Of the largest.
     pub largest: f64,
-    /// Per action.
+    /// Per action; one of a continuous actor.
     pub per_action: Vec<f64>,
 }
 
@@ -68,6 +71,7 @@ impl Certifier {
         Self {
             network: Network::new(policy),
             observations: Domain::observations(policy),
+            head: policy.head.continuous().copied(),
         }
     }
 
@@ -82,6 +86,10 @@ impl Certifier {
     #[must_use]
     pub fn bound_over(&self, domain: &Domain, cell: &[Interval]) -> Bound {
         let enclosure = self.enclose(domain, cell);
+        if let Some(head) = &self.head {
+            let bound = actor::duty_bound(head, enclosure.q_value(0), enclosure.error_bound(0));
+            return Bound::of(vec![bound]);
+        }
         Bound::of(
             (0..enclosure.real.len())
                 .map(|action| enclosure.error_bound(action))

@@ -7,7 +7,7 @@ use crate::Certifier;
 use crate::form::Form;
 use crate::network::Network;
 
-/// Q values of an observation in the policy's numeric format; the interpreter's, so that this crate shares nothing with it.
+/// Q values of an observation in the policy's numeric format, or the duty of a continuous actor; the interpreter's, so that this crate shares nothing with it.
 pub type QValues<'a> = dyn Fn(&[f32]) -> Vec<f64> + 'a;
 
 /// Differences seen at observations.
@@ -15,7 +15,7 @@ pub type QValues<'a> = dyn Fn(&[f32]) -> Vec<f64> + 'a;
 pub struct Measured {
     /// Observations looked at.
     pub observations: usize,
-    /// Largest |Q in the format - real Q|.
+    /// Largest |Q in the format - real Q|, or |duty in the format - real duty|.
     pub largest_error: f64,
     /// Largest less smallest real Q value of one observation, the mean over all.
     pub mean_spread: f64,
@@ -59,6 +59,13 @@ impl Certifier {
     pub(crate) fn add(&self, measured: &mut Measured, observation: &[f32], q_values: &QValues<'_>) -> bool {
         let real = self.real(observation);
         let held = q_values(observation);
+        if let Some(head) = &self.head {
+            let duty = real.centre.first().map_or(f64::NAN, |y| head.duty(*y));
+            let error = held.first().map_or(f64::INFINITY, |held| (duty - held).abs());
+            measured.largest_error = measured.largest_error.max(error);
+            measured.observations += 1;
+            return false;
+        }
         let errors = real.centre.iter().zip(&held).map(|(real, held)| (real - held).abs());
         measured.largest_error = errors.fold(measured.largest_error, f64::max);
         let (low, high) = real

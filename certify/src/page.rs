@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use policy::{Interval, Policy};
+use policy::{Continuous, Interval, Policy};
 use report::{Axis, Cell, HeatMap, Page, Ramp, ReportError, Section, Svg, Table, Verdict, grouped, quantity};
 
 use crate::{Certificate, Coordinate, Domain, Map, Measured, Memory, Share};
@@ -10,6 +10,9 @@ use crate::{Certificate, Coordinate, Domain, Map, Measured, Memory, Share};
 /// The answer in a few lines; errors have the unit of Q.
 #[must_use]
 pub fn summary(certificate: &Certificate) -> String {
+    if let Some(head) = &certificate.continuous {
+        return of_actor(certificate, head);
+    }
     let bound = certificate.state_bound.bound.largest;
     let measured = &certificate.measured;
     let mut lines = vec![
@@ -26,12 +29,14 @@ pub fn summary(certificate: &Certificate) -> String {
             grouped(measured.observations as u64),
             digits(measured.mean_spread)
         ),
+    ];
+    lines.extend(certificate.proven_share.as_ref().map(|share| {
         format!(
             "  action provably unchanged: {} of the states; seen to change at {}",
-            share_text(&certificate.proven_share),
+            share_text(share),
             changed_text(measured)
-        ),
-    ];
+        )
+    }));
     if let Some(golden) = &certificate.golden {
         lines.push(format!(
             "  golden observations: largest error {}, action changed at {}; the worst change gives up {} of {} between real Q values",
@@ -48,6 +53,32 @@ pub fn summary(certificate: &Certificate) -> String {
             changed_text(&map.measured)
         ));
     }
+    lines.join("\n")
+}
+
+fn of_actor(certificate: &Certificate, head: &Continuous) -> String {
+    let measured = &certificate.measured;
+    let mut lines = vec![
+        format!(
+            "{} in {}: |duty - real duty| <= {} for every state, {} for every observation of the clamped box (proven); the duty's range is {}",
+            certificate.name,
+            certificate.numeric_format.name(),
+            digits(certificate.state_bound.bound.largest),
+            digits(certificate.box_bound.largest),
+            digits(head.span())
+        ),
+        format!(
+            "  largest seen: {} at {} states",
+            digits(measured.largest_error),
+            grouped(measured.observations as u64)
+        ),
+    ];
+    lines.extend(certificate.golden.as_ref().map(|golden| {
+        format!(
+            "  golden observations: largest error {}",
+            digits(golden.measured.largest_error)
+        )
+    }));
     lines.join("\n")
 }
 
@@ -132,10 +163,13 @@ fn thinned(map: &Map) -> Vec<(f64, f64)> {
 /// Never, in fact: its tables have the columns that they say.
 pub fn page(policy: &Policy, certificate: &Certificate, picture: Option<Svg>) -> Result<String, ReportError> {
     let format = certificate.numeric_format.name();
+    if let Some(head) = &certificate.continuous {
+        return actor_page(policy, certificate, head);
+    }
     let sentence = format!(
         "In {format} no Q value differs from real arithmetic by more than {} in any state; the action provably stays the same in {} of the states.",
         digits(certificate.state_bound.bound.largest),
-        share_text(&certificate.proven_share)
+        certificate.proven_share.as_ref().map(share_text).unwrap_or_default()
     );
     let golden = certificate.golden.as_ref().map(|golden| &golden.measured);
     let (verdict, sentence) = match golden {
@@ -156,6 +190,44 @@ pub fn page(policy: &Policy, certificate: &Certificate, picture: Option<Svg>) ->
         page = page.section(map_section(policy, map, picture));
     }
     page.section(meaning(policy, certificate)).html()
+}
+
+/// The page of a continuous actor: no actions, no map.
+fn actor_page(policy: &Policy, certificate: &Certificate, head: &Continuous) -> Result<String, ReportError> {
+    let format = certificate.numeric_format.name();
+    let bound = certificate.state_bound.bound.largest;
+    let sentence = format!(
+        "In {format} no duty differs from real arithmetic by more than {} in any state, which is {:.2} % of the duty's range.",
+        digits(bound),
+        100.0 * bound / head.span()
+    );
+    let mut pairs = vec![
+        ("proven for every state", digits(bound)),
+        (
+            "proven for every observation of the clamped box",
+            digits(certificate.box_bound.largest),
+        ),
+        (
+            "largest seen",
+            format!(
+                "{} at {} random states",
+                digits(certificate.measured.largest_error),
+                grouped(certificate.measured.observations as u64)
+            ),
+        ),
+    ];
+    pairs.extend(certificate.golden.as_ref().map(|golden| {
+        (
+            "largest seen at the golden observations",
+            digits(golden.measured.largest_error),
+        )
+    }));
+    pairs.push(("range of the duty", digits(head.span())));
+    Page::new(format!("{}: what {format} does to the duty", certificate.name))
+        .verdict(Verdict::Note, sentence)
+        .section(Section::new("Error of the duty before the mapping").pairs(pairs))
+        .section(meaning(policy, certificate))
+        .html()
 }
 
 fn bounds(policy: &Policy, certificate: &Certificate) -> Section {
@@ -201,7 +273,7 @@ fn shares(certificate: &Certificate) -> Section {
     let mut pairs = vec![
         (
             "states whose action provably cannot change".to_owned(),
-            share_text(&certificate.proven_share),
+            certificate.proven_share.as_ref().map(share_text).unwrap_or_default(),
         ),
         (
             "random states at which it was seen to change".to_owned(),

@@ -40,11 +40,14 @@ pub enum Doubt {
     Freedom(String),
     /// No converter of this kind gives the records.
     Kind(String),
+    /// What stands beside every fit for the edges of the gate is more than edges.
+    Edges(String),
 }
 
 /// The doubts about an explanation.
 pub fn of(problem: &Problem, attribution: &Attribution, profiles: &[Profile], structure: &[Structure]) -> Vec<Doubt> {
     let mut list: Vec<Doubt> = balance::broken(problem).map(Doubt::Kind).into_iter().collect();
+    list.extend(edges(attribution));
     let Some(best) = &attribution.best else {
         return match list.is_empty() {
             true => freedom(problem, structure),
@@ -85,6 +88,19 @@ pub fn of(problem: &Problem, attribution: &Attribution, profiles: &[Profile], st
     list
 }
 
+/// A trim that no gate needs is left out of the model that is written, which then does not give the records any more.
+fn edges(attribution: &Attribution) -> Option<Doubt> {
+    let state = attribution.state();
+    let trim = state.starts.trim_of_nobody()?;
+    let time = si(trim.abs() * state.model.plant.t_sw(), unit("s"));
+    let way = if trim > 0.0 { "longer" } else { "shorter" };
+    Some(Doubt::Edges(format!(
+        "beside all causes the switch has to be on {time} {way}, {:.2} % of the period, which is more than edges of a gate are taken for: \
+         look at dead times, delays and what the switching node does, above all where the inductor's current is below 0",
+        100.0 * trim.abs()
+    )))
+}
+
 fn freedom(problem: &Problem, structure: &[Structure]) -> Vec<Doubt> {
     let said = small::freedom(problem).filter(|_| !structure.is_empty());
     said.map(Doubt::Freedom).into_iter().collect()
@@ -97,7 +113,7 @@ pub fn forbids(named: &[Named], doubts: &[Doubt]) -> bool {
         Doubt::Bound(_) => !named.is_empty(),
         Doubt::Open(_) => !named.is_empty() && !tied,
         Doubt::Freedom(_) | Doubt::HeldOut(_) => false,
-        Doubt::Kind(_) => true,
+        Doubt::Kind(_) | Doubt::Edges(_) => true,
     })
 }
 
@@ -108,7 +124,8 @@ pub fn said(doubts: &[Doubt]) -> Vec<String> {
         | Doubt::Open(words)
         | Doubt::Freedom(words)
         | Doubt::HeldOut(words)
-        | Doubt::Kind(words) => words.clone(),
+        | Doubt::Kind(words)
+        | Doubt::Edges(words) => words.clone(),
     };
     doubts.iter().map(words).collect()
 }

@@ -65,6 +65,12 @@ impl Starts {
         }
     }
 
+    /// The trim where it is more than what gates do: something else has to be behind it.
+    #[must_use]
+    pub fn trim_of_nobody(&self) -> Option<f64> {
+        (self.trim.abs() > MOST_TRIM).then_some(self.trim)
+    }
+
     /// The trim; 0 where it is so large that it must stand for something else.
     #[must_use]
     pub fn trim_or_none(&self) -> f64 {

@@ -217,6 +217,11 @@ impl<T: Real> Controller<T> {
         Ok(layers.pop().map(|last| last.post_activation).unwrap_or_default())
     }
 
+    /// Action index and duty before the mapping of a network's outputs (sections 7 and 7b), as many as there are.
+    pub fn decide(&self, outputs: &ArrayView1<'_, T>) -> Option<(u32, T)> {
+        (outputs.len() == self.head.outputs()).then(|| self.head.decide(*outputs))
+    }
+
     /// Replaces the mapping coefficients if the contract allows them (section 8); `false` and no change otherwise,
     /// also without a mapping or with `r` against the mapping's form.
     pub fn set_mapping(&mut self, a: T, b: T, c: T, r: Option<T>) -> bool {

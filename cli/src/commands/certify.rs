@@ -24,16 +24,19 @@ pub fn run(options: &Certify) -> Result<Outcome, Failure> {
         let message = message.found("f64").expected("one of f32, f32-fma, i16, i8");
         return Err(message.hint("--format f32").into());
     }
-    if policy.head.continuous().is_some() {
-        let message = Message::new("the certificate is about choices, and this policy commands a number");
-        let message = message.found("continuous in [actions]").expected("duties or pairs");
-        return Err(message
-            .hint("`policyc verify` tells what the numeric format does to its duties at the golden observations")
-            .into());
+    let is_actor = policy.head.continuous().is_some();
+    if is_actor && !(options.axis.is_empty() && options.at.is_empty()) {
+        let message = Message::new("a map shows where actions are proven, and this policy commands a number");
+        return Err(message.found("--axis or --at").hint("leave them out").into());
     }
-    let slice = slice(&policy, options)?;
+    let slice = if is_actor { None } else { slice(&policy, options)? };
     let controller = Controller::<f32>::new(&policy);
     let q_values = |observation: &[f32]| match controller.q_values(&aview1(observation)) {
+        Ok(outputs) if is_actor => controller
+            .decide(&outputs.view())
+            .map(|(_, duty)| f64::from(duty))
+            .into_iter()
+            .collect(),
         Ok(q_values) => q_values.iter().map(|q| f64::from(*q)).collect(),
         Err(_) => Vec::new(),
     };

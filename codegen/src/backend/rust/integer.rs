@@ -38,6 +38,16 @@ pub fn items(program: &Program, code: &IntegerCode) -> TokenStream {
         " Sums of one block of outputs, within +-{} for every input.",
         code.accumulator_bound
     );
+    // argmax selects by it; without one only some activations do
+    let idle = program.head.is_output().then(|| quote!(#[allow(dead_code)]));
+    let selection = quote! {
+        #[inline(always)]
+        #idle
+        fn select_integer(flag: u32, then: i32, otherwise: i32) -> i32 {
+            let mask = 0_u32.wrapping_sub(flag) as i32;
+            (then & mask) | (otherwise & !mask)
+        }
+    };
     quote! {
         #extremes
         /// x in the units of an input, rounded half up, from low to high. The mantissa is shifted by what x's exponent is
@@ -54,11 +64,7 @@ pub fn items(program: &Program, code: &IntegerCode) -> TokenStream {
         }
         #q_value
         #lines
-        #[inline(always)]
-        fn select_integer(flag: u32, then: i32, otherwise: i32) -> i32 {
-            let mask = 0_u32.wrapping_sub(flag) as i32;
-            (then & mask) | (otherwise & !mask)
-        }
+        #selection
         /// Aligned to words, as the loops in assembly load them.
         #[repr(align(4))]
         struct Words<T>(T);

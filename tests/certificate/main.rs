@@ -7,7 +7,7 @@ mod marabou;
 use certify::{Certifier, Domain, Memory};
 use interp::{Controller, Sample};
 use ndarray::aview1;
-use policy::{Interval, NumericFormat, Policy};
+use policy::{Activation, Continuous, Head, Interval, NumericFormat, Policy, Squash};
 use random::{Random, SplitMix};
 
 fn example(format: NumericFormat) -> Policy {
@@ -50,6 +50,22 @@ fn argmax(q_values: &[f64]) -> usize {
     q_values.iter().position(|q| *q == largest).unwrap()
 }
 
+/// What a continuous actor makes of its output in real arithmetic.
+fn real_duty(head: &Continuous, y: f64) -> f64 {
+    let s = match head.squash {
+        Squash::Curve(Activation::Tanh) => y.tanh(),
+        Squash::Curve(_) => y / (1.0 + y.abs()),
+        Squash::Clip(clip) => y.clamp(clip.low, clip.high),
+    };
+    head.scale * s + head.offset
+}
+
+/// The same in the format.
+fn held_duty(controller: &Controller<f32>, y: f64) -> f64 {
+    let (_, duty) = controller.decide(&aview1(&[y as f32])).unwrap();
+    f64::from(duty)
+}
+
 /// Boxes and points of a policy's observations: how near the bounds come, or what contradicts them.
 fn check(policy: &Policy, rng: &mut SplitMix, boxes: usize) -> (f64, usize) {
     let certifier = Certifier::new(policy);
@@ -78,7 +94,10 @@ fn check(policy: &Policy, rng: &mut SplitMix, boxes: usize) -> (f64, usize) {
                     "{} {:?} action {n} at {observation:?}",
                     policy.name, policy.numeric_format
                 );
-                let error = (held[n] - real[n]).abs();
+                let error = match &policy.head {
+                    Head::Choice(_) => (held[n] - real[n]).abs(),
+                    Head::Continuous(head) => (held_duty(&controller, held[n]) - real_duty(head, real[n])).abs(),
+                };
                 assert!(
                     error <= bound.per_action[n],
                     "{place}: {error} > {}",

@@ -51,6 +51,8 @@ impl Inputs {
                 None => {
                     let message = Message::new(format!("the plant has no signal `{}`", signal.name));
                     let message = message.expected(format!("one of {}", SIGNALS.join(", ")));
+                    let message =
+                        message.hint("call it so in a copy of the contract: the plant is measured by these names");
                     Err(message.did_you_mean(&signal.name, SIGNALS).into())
                 }
             }

@@ -331,3 +331,20 @@ fn cut_unstable(record: &mut Record, base: &Model, v: f64) {
     }
     record.segments = pieces;
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_trim_goes_into_a_model_or_is_nobodys() {
+        for (trim, is_edges) in [(0.0, true), (-0.0014, true), (0.0016, false), (-0.0073, false)] {
+            let starts = Starts {
+                trim,
+                ..Starts::default()
+            };
+            assert_eq!(starts.trim_of_nobody().is_none(), is_edges, "{trim}");
+            assert_eq!(starts.trim_or_none(), if is_edges { trim } else { 0.0 });
+        }
+    }
+}

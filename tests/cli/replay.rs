@@ -89,6 +89,11 @@ fn replay_of_a_log_that_the_contract_explains_is_equal_to_the_last_feature() {
     let said = desk(&environment()).succeed("replay buck12 log.csv");
     assert!(said.contains("120 samples") && said.contains("2 episodes"), "{said}");
     assert!(said.contains("equal: all 6 features"), "{said}");
+    // v_out swings by 3 V: nothing is seen of where the features are cut off
+    assert!(
+        said.contains("comes to neither end of the clip of e, -20 to 20"),
+        "{said}"
+    );
 }
 
 #[test]

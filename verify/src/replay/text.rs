@@ -1,6 +1,6 @@
 //! A replay in words.
 
-use policy::Policy;
+use policy::{Feature, Filter, Policy};
 use report::grouped;
 
 use super::explain::number;
@@ -33,7 +33,7 @@ pub fn text(policy: &Policy, replay: &Replay) -> String {
         out += &row(feature, rows, width);
     }
     let is_continuous = policy.head.continuous().is_some();
-    let words = words(replay, is_continuous);
+    let words = words(policy, replay);
     if !words.is_empty() {
         out.push('\n');
     }
@@ -63,7 +63,8 @@ fn range([low, high]: [f64; 2]) -> String {
 }
 
 /// What is to be said below the table.
-fn words(replay: &Replay, is_continuous: bool) -> Vec<String> {
+fn words(policy: &Policy, replay: &Replay) -> Vec<String> {
+    let is_continuous = policy.head.continuous().is_some();
     let mut words = Vec::new();
     for (feature, compared) in replay.compared() {
         let name = &feature.name;
@@ -78,6 +79,15 @@ fn words(replay: &Replay, is_continuous: bool) -> Vec<String> {
         } else if is_still(compared) && replay.rows > 1 {
             words.push(format!("{name} does not move in this log, which shows little of it"));
         }
+    }
+    let unreached: Vec<String> = (policy.features.iter().zip(&replay.features))
+        .filter_map(unreached)
+        .collect();
+    if !unreached.is_empty() {
+        words.push(format!(
+            "this log comes to neither end of {}: it shows nothing of them",
+            unreached.join(", ")
+        ));
     }
     if let Some(actions) = &replay.actions {
         let (equal, rows) = (grouped(actions.equal as u64), grouped(replay.rows as u64));
@@ -99,6 +109,24 @@ fn words(replay: &Replay, is_continuous: bool) -> Vec<String> {
         ));
     }
     words
+}
+
+/// A clip, or the clamp of an integrator, that an equal feature never came to: the log is equal whatever its ends are.
+fn unreached((feature, result): (&Feature, &FeatureResult)) -> Option<String> {
+    let compared = result.logged.as_ref()?;
+    let (word, low, high) = match (feature.clip, feature.filters.last()) {
+        (Some(clip), _) => ("clip", clip.low, clip.high),
+        (None, Some(Filter::Integrator { min, max, .. })) => {
+            let ends = [min, max].map(|end| feature.scale * end + feature.offset);
+            ("clamp", ends[0].min(ends[1]), ends[0].max(ends[1]))
+        }
+        _ => return None,
+    };
+    // what lies at an end is off it by roundings of binary32 at most
+    let slack = 1e-6 * (high - low);
+    let is_inside = result.own[0] > low + slack && result.own[1] < high - slack;
+    (compared.first_line.is_none() && !is_still(compared) && is_inside)
+        .then(|| format!("the {word} of {}, {} to {}", feature.name, number(low), number(high)))
 }
 
 fn is_still(compared: &Compared) -> bool {

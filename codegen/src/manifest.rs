@@ -97,6 +97,9 @@ pub struct Sizes {
     /// Integer formats: proven bound of |Q - Q in real arithmetic| over the clamped box of observations.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub q_error_bound: Option<f64>,
+    /// The same of the duty of a continuous actor, |duty - duty in real arithmetic| before the mapping.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub duty_error_bound: Option<f64>,
 }
 
 /// One generated file.
@@ -118,6 +121,8 @@ pub fn sizes(policy: &Policy, target: &TargetSpec) -> Sizes {
     if removed.iter().all(|count| *count == 0) {
         removed.clear();
     }
+    let bound = (policy.numeric_format.is_integer()).then(|| certify::Certifier::new(policy).box_bound().largest);
+    let is_actor = policy.head.continuous().is_some();
     Sizes {
         signals: policy.signals.len(),
         features: policy.features.len(),
@@ -128,10 +133,8 @@ pub fn sizes(policy: &Policy, target: &TargetSpec) -> Sizes {
         state_bytes: 4 * program.state_words(),
         accumulator_bound: program.network.integer().map(|code| code.accumulator_bound),
         removed_neurons: removed,
-        q_error_bound: policy
-            .numeric_format
-            .is_integer()
-            .then(|| certify::Certifier::new(policy).box_bound().largest),
+        q_error_bound: bound.filter(|_| !is_actor),
+        duty_error_bound: bound.filter(|_| is_actor),
     }
 }
 

@@ -45,6 +45,13 @@ pub fn notes<'a>(
             quantity(bound, "", 3)
         ));
     }
+    if let Some(bound) = sizes.duty_error_bound {
+        notes.push(format!(
+            "no duty of the actor is further than {} from real arithmetic, for every observation the clips let through, however rare; \
+             `policyc inspect` tells how far it is at the trainer's own observations, and `policyc certify` says more",
+            quantity(bound, "", 3)
+        ));
+    }
     notes
 }
 

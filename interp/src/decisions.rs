@@ -109,7 +109,7 @@ impl Choices {
         self.changed as f64 / self.observations.max(1) as f64
     }
 
-    /// The smallest number of two digits that accepts [`Decisions::share`].
+    /// The smallest number of two digits that accepts [`Choices::share`].
     #[must_use]
     pub fn accepting_share(&self) -> f64 {
         (self.share() * 100.0).ceil() / 100.0

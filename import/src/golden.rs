@@ -103,6 +103,18 @@ fn exact(activation: Activation, x: f64) -> f64 {
         Activation::Tanh => libm::tanh(x),
         Activation::Softsign => x / (1.0 + x.abs()),
         Activation::LeakyRelu { slope } => x.max(slope * x),
+        Activation::Sigmoid => 1.0 / (1.0 + libm::exp(-x)),
+        Activation::HardSigmoid => (x + 3.0).clamp(0.0, 6.0) / 6.0,
+        Activation::Elu if x > 0.0 => x,
+        Activation::Elu => libm::expm1(x),
+        Activation::Softplus => x.max(0.0) + libm::log1p(libm::exp(-x.abs())),
+        Activation::Silu => x / (1.0 + libm::exp(-x)),
+        Activation::Gelu => 0.5 * x * libm::erfc(-x * std::f64::consts::FRAC_1_SQRT_2),
+        Activation::GeluTanh => {
+            let inner = (2.0 / std::f64::consts::PI).sqrt() * (x + 0.044_715 * x * x * x);
+            0.5 * x * (1.0 + libm::tanh(inner))
+        }
+        Activation::HardSwish => x * (x + 3.0).clamp(0.0, 6.0) / 6.0,
     }
 }
 

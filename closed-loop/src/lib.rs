@@ -34,6 +34,6 @@ pub use environment::{Environment, LoadPath, Start};
 pub use faults::Error;
 pub use load_step::{LoadKind, LoadStep};
 pub use scenario_file::Scenario;
-pub use suits::{held_by, suits, v_ref};
+pub use suits::{held_by, holds_power, suits, v_ref};
 pub use tables::{COLUMNS, MetricsCsv, cells, comparison, evaluation_csv, limit_cells, table, trajectory_csv};
 pub use unusable::unusable;

@@ -14,7 +14,7 @@ use toml_input::Message;
 
 use crate::faults::Error;
 use crate::load_step::LoadStep;
-use crate::scenario::SETTLED;
+use crate::scenario::settled_band;
 use crate::time_optimal::{Target, TimeOptimal};
 
 /// The smallest figures that can be reached; each may need another sequence of duties.
@@ -24,13 +24,15 @@ pub struct Bound {
     pub deviation: f64,
     /// Largest error to the side of the step (dip where the load rises, else overshoot), between the samples too, V.
     pub extreme: f64,
-    /// From the step to the last sample outside +-0.5 V, s.
+    /// From the step to the last sample outside the settling band, s.
     pub settling: f64,
 }
 
 /// The limits of one load step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Limit {
+    /// Half width of the band that settling refers to, V ([`settled_band`]).
+    pub band: f64,
     /// Load step at a sampling instant, which shows it.
     pub at_sample: Bound,
     /// Load step at the worst of the instants that are tried.
@@ -68,9 +70,9 @@ const BEHIND: f64 = 1e-6;
 /// Broken periods of full effort.
 // parts of one period: how finely the effort is cut. A convention: the tests hold from 1 on, in a third of the time
 const PARTS: usize = 16;
-/// Aims beyond `v_ref` for the settling time, V.
-// the last one is just inside of the band of 0.5 V
-const AIMS: [f64; 6] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.47];
+/// Aims beyond `v_ref` for the settling time, as shares of the settling band.
+// the last one is just inside of the band
+const AIMS: [f64; 6] = [0.0, 0.2, 0.4, 0.6, 0.8, 0.94];
 /// Periods that are looked at.
 // as long as a scenario looks by default: 30 ms at 10 kHz
 const HORIZON: usize = 300;
@@ -135,6 +137,7 @@ impl Question {
             }
         });
         Limit {
+            band: settled_band(self.v_ref),
             at_sample,
             worst,
             behind,
@@ -154,7 +157,9 @@ impl Question {
             }));
             tried
         };
-        for beyond in AIMS {
+        let band = settled_band(self.v_ref);
+        for aim in AIMS {
+            let beyond = aim * band;
             attempt(Strategy { effort: 0.0, beyond });
         }
         // more full effort first helps the deviation, then the swing to the other side grows beyond it
@@ -163,8 +168,8 @@ impl Question {
             let effort = part as f64 / PARTS as f64;
             let tried = attempt(Strategy { effort, beyond: 0.0 });
             least = least.min(tried.deviation);
-            // clearly past the least, in share and in volts; a convention, the tests hold with a share of 1.0 as well
-            if tried.deviation > 1.2 * least + 0.1 {
+            // clearly past the least, in share and in bands; a convention, the tests hold with a share of 1.0 as well
+            if tried.deviation > 1.2 * least + 0.2 * band {
                 break;
             }
         }
@@ -207,7 +212,7 @@ impl Question {
             let sample = plant.sample();
             let (mut v, mut i) = (sample.v_out, sample.i_l);
             // inside the band counts only once the voltage has left it: at the step it is still at `v_ref`
-            entered |= n > 0 && (v - self.v_ref).abs() < SETTLED && run.left;
+            entered |= n > 0 && (v - self.v_ref).abs() < run.band && run.left;
             for duty in &pending {
                 (v, i) = planner.predict(v, i, *duty, &self.to);
             }
@@ -241,7 +246,9 @@ struct Run {
     phase: f64,
     periods: usize,
     at_rest: usize,
-    /// The voltage has been outside of the settling band.
+    /// Half width of the settling band, V.
+    band: f64,
+    /// The voltage has been outside of it.
     left: bool,
     bound: Bound,
 }
@@ -260,6 +267,7 @@ impl Run {
             phase,
             periods: 0,
             at_rest: 0,
+            band: settled_band(question.v_ref),
             left: false,
             bound,
         }
@@ -280,7 +288,7 @@ impl Run {
             .bound
             .extreme
             .max(if swing.is_finite() { swing } else { f64::INFINITY });
-        if error > SETTLED {
+        if error > self.band {
             self.left = true;
             self.bound.settling = (self.periods as f64 - self.phase) * self.t;
         }

@@ -12,8 +12,11 @@ use crate::environment::{Environment, LoadPath, Start};
 use crate::faults::Error;
 use crate::load_step::{LoadKind, LoadStep};
 
-/// Half width of the band that settling refers to, V.
-pub const SETTLED: f64 = 0.5;
+/// Half width of the band that settling refers to, V: half a percent of the reference, the 0.5 V of the paper's 100 V.
+#[must_use]
+pub fn settled_band(v_ref: f64) -> f64 {
+    v_ref / 200.0
+}
 
 /// Load steps to be run.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,7 +57,9 @@ impl Default for Task {
 pub struct Metrics {
     /// Largest |e| after the step, V.
     pub deviation: f64,
-    /// From the step to the last sample outside +-0.5 V, s; 0 if none is.
+    /// Half width of the band that settling refers to, V ([`settled_band`]).
+    pub band: f64,
+    /// From the step to the last sample outside the band, s; 0 if none is.
     pub settling: f64,
     /// |mean e| over the tail, V.
     pub tail_mean: f64,
@@ -72,12 +77,19 @@ impl Metrics {
     pub fn worst(self, other: Self) -> Self {
         Self {
             deviation: self.deviation.max(other.deviation),
+            band: self.band.max(other.band),
             settling: self.settling.max(other.settling),
             tail_mean: self.tail_mean.max(other.tail_mean),
             tail_max: self.tail_max.max(other.tail_max),
             pre_error: self.pre_error.max(other.pre_error),
             ripple: self.ripple.max(other.ripple),
         }
+    }
+
+    /// Whether the run ended inside the band.
+    #[must_use]
+    pub fn is_settled(&self) -> bool {
+        self.tail_max <= self.band
     }
 }
 
@@ -216,6 +228,7 @@ impl<E: Environment, C: FnMut(&Sample) -> f64> Loop<E, C> {
     ) -> Metrics {
         let t_sample = self.environment.t_sample();
         let mut metrics = Metrics {
+            band: settled_band(self.v_ref),
             pre_error: self.pre.iter().copied().fold(0.0, f64::max),
             ..Metrics::default()
         };
@@ -234,7 +247,7 @@ impl<E: Environment, C: FnMut(&Sample) -> f64> Loop<E, C> {
             // `f64::max` ignores a NaN, so a run that diverged would look good
             let size = if error.is_finite() { error.abs() } else { f64::INFINITY };
             metrics.deviation = metrics.deviation.max(size);
-            if size > SETTLED {
+            if size > metrics.band {
                 metrics.settling = ((n + 1) as f64 - phase) * t_sample;
             }
             if n + tail >= after {

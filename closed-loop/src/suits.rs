@@ -26,6 +26,25 @@ pub fn v_ref(given: Option<f64>, policy: &Policy, file: &Path) -> Result<f64, Er
     })
 }
 
+/// Whether a load of constant power is one around `v_ref` V at this converter; `file` is where the converter was named.
+///
+/// # Errors
+/// If it folds back to a resistor too near: it would draw another power there, without a word.
+pub fn holds_power(converter: &Parameters, v_ref: f64, file: &Path) -> Result<(), Error> {
+    let fold = converter.load.v_fold;
+    // a dip to half of the reference is none that a load keeps its regulation through
+    if fold <= 0.5 * v_ref {
+        return Ok(());
+    }
+    let message = Message::new("the loads of constant power are resistors at this voltage")
+        .found(format!(
+            "load.v_fold = {fold} V, below which a load is a resistor, and v_ref = {v_ref} V"
+        ))
+        .expected(format!("at most half of v_ref, {} V", 0.5 * v_ref))
+        .hint(format!("v_fold = {} in [load] of the plant's file", 0.25 * v_ref));
+    Err(Fault::in_file(file, message).into())
+}
+
 /// Whether a policy can hold `v_ref` V at a converter; `file` is where the converter was named.
 ///
 /// # Errors
@@ -53,4 +72,27 @@ pub fn suits(policy: &Policy, converter: &Parameters, v_ref: f64, file: &Path) -
         return Err(Fault::in_file(file, message).into());
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The default of 5 V is far below the paper's 100 V, and above a point-of-load converter's output.
+    #[test]
+    fn loads_that_fold_above_half_of_the_reference_are_refused() {
+        let plant = Path::new("plant.toml");
+        let default = Parameters::default();
+        assert!(holds_power(&default, 100.0, plant).is_ok() && holds_power(&default, 10.0, plant).is_ok());
+        let refused = holds_power(&default, 1.0, plant).map_err(|error| error.to_string());
+        let Err(refused) = refused else { panic!("taken") };
+        for part in [
+            "resistors at this voltage",
+            "load.v_fold = 5 V",
+            "v_fold = 0.25 in [load]",
+            "plant.toml",
+        ] {
+            assert!(refused.contains(part), "{refused}");
+        }
+    }
 }

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use crate::controller::Trajectory;
 use crate::limit::Limit;
 use crate::load_step::{LoadKind, LoadStep};
-use crate::scenario::{Finding, Metrics, SETTLED};
+use crate::scenario::{Finding, Metrics};
 
 /// The columns of [`Metrics`] in a CSV file.
 const FIGURES: &str = "deviation_V,settling_s,tail_mean_V,tail_max_V,pre_error_V,ripple_V";
@@ -70,8 +70,8 @@ pub fn comparison<'a>(
 pub fn limit_cells(limit: &Limit) -> [String; 2] {
     let (a, b) = (&limit.at_sample, &limit.worst);
     [
-        pair(a.deviation, b.deviation, 2),
-        pair(1e3 * a.settling, 1e3 * b.settling, 2),
+        pair(a.deviation, b.deviation, digits(limit.band)),
+        pair(1e3 * a.settling, 1e3 * b.settling, SETTLING),
     ]
 }
 
@@ -79,20 +79,36 @@ pub fn limit_cells(limit: &Limit) -> [String; 2] {
 #[must_use]
 pub fn cells(finding: &Finding) -> [String; 6] {
     let (a, b) = (&finding.at_sample, &finding.worst);
+    let digits = digits(b.band);
     [
-        pair(a.deviation, b.deviation, 2),
+        pair(a.deviation, b.deviation, digits),
         format!("{} / {}", settling(a), settling(b)),
-        pair(a.tail_max, b.tail_max, 3),
-        pair(a.tail_mean, b.tail_mean, 3),
-        pair(a.pre_error, b.pre_error, 3),
-        pair(a.ripple, b.ripple, 3),
+        pair(a.tail_max, b.tail_max, digits + 1),
+        pair(a.tail_mean, b.tail_mean, digits + 1),
+        pair(a.pre_error, b.pre_error, digits + 1),
+        pair(a.ripple, b.ripple, digits + 1),
     ]
 }
 
 /// In ms; `>` where the run ended outside of the band.
 fn settling(m: &Metrics) -> String {
-    let unsettled = if m.tail_max > SETTLED { ">" } else { "" };
-    format!("{unsettled}{:.2}", 1e3 * m.settling)
+    let unsettled = if m.is_settled() { "" } else { ">" };
+    format!("{unsettled}{:.SETTLING$}", 1e3 * m.settling)
+}
+
+/// Decimals of a settling time in ms.
+const SETTLING: usize = 2;
+
+/// Decimals of a deviation in V: two where the band is the 0.5 V of a 100 V converter, more where it is narrower, so that the band
+/// has at least two digits everywhere.
+#[must_use]
+pub fn digits(band: f64) -> usize {
+    let mut digits = 2;
+    // 1e-9 V: a band of nothing, of a run that has not been, must end the loop
+    while digits < 9 && band > 1e-9 && band * 10_f64.powi(digits - 1) < 1.0 {
+        digits += 1;
+    }
+    digits.unsigned_abs() as usize
 }
 
 fn pair(x: f64, y: f64, digits: usize) -> String {
@@ -197,4 +213,14 @@ pub fn trajectory_csv(trajectory: &Trajectory, kind: LoadKind) -> String {
         );
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_converter_of_one_volt_shows_millivolts() {
+        assert_eq!([0.5, 0.24, 0.06, 0.0165, 0.005, 0.0].map(digits), [2, 2, 3, 3, 4, 2]);
+    }
 }

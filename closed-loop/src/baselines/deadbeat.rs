@@ -1,6 +1,6 @@
 //! Predictive control with an exact model.
 
-use plant::{Load, Parameters, Signals};
+use plant::{Load, Parameters, Rectifier, Signals};
 
 use super::Design;
 use crate::faults::Error;
@@ -20,6 +20,8 @@ pub struct Deadbeat {
     correction: f64,
     /// Current expected at the next sample, A.
     expected: Option<f64>,
+    /// The current stops at 0 A.
+    has_diode: bool,
 }
 
 /// Share of the error of the predicted current that is learnt each period.
@@ -40,10 +42,12 @@ impl Deadbeat {
         // as given, because 1 / t may round: model and plant must have the same period to the bit
         model.converter.f_sw = parameters.converter.f_sw;
         model.pwm.carrier = parameters.pwm.carrier;
+        model.load.v_fold = parameters.load.v_fold;
         model.pwm.sampling_phase = parameters.pwm.sampling_phase;
         Ok(Self {
             planner: TimeOptimal::new(&model, v_ref, [0.0, 1.0])?,
             pending: vec![design.rest(); design.delay],
+            has_diode: parameters.converter.rectifier == Rectifier::Diode,
             correction: 0.0,
             expected: None,
             design,
@@ -57,7 +61,7 @@ impl Deadbeat {
         let gain = self.design.v_in * self.design.t / self.design.l;
         // a current that rests at 0 A does so at many duties, and says nothing of losses
         if let Some(expected) = self.expected
-            && i > 0.0
+            && (i > 0.0 || !self.has_diode)
         {
             self.correction += LEARNING * (expected - i) / gain;
         }
@@ -67,9 +71,11 @@ impl Deadbeat {
             // with a delay the next sample is decided by the oldest duty under way
             expected = expected.or(Some(i));
         }
+        let valley = load.power / self.design.v_ref - self.design.half_ripple();
         let target = Target {
             v_out: self.design.v_ref,
-            i_l: (load.power / self.design.v_ref - self.design.half_ripple()).max(0.0),
+            // a diode blocks: only a synchronous leg has a valley below 0
+            i_l: if self.has_diode { valley.max(0.0) } else { valley },
         };
         let planned = self.planner.duty(v, i, &load, target);
         let duty = (planned + self.correction).clamp(0.0, 1.0);

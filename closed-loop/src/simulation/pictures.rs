@@ -6,7 +6,7 @@ use toml_input::Message;
 use super::findings::{POLICY, Setting, Step};
 use crate::baselines::Kind;
 use crate::faults::{Error, told};
-use crate::scenario::{Record, SETTLED};
+use crate::scenario::{Record, settled_band};
 
 /// A classical controller that deviates more than so many times the policy would only flatten the picture.
 const DRAWN: f64 = 5.0;
@@ -51,7 +51,8 @@ pub(super) fn picture(setting: &Setting, step: &Step) -> Result<Svg, Error> {
         current = current.series(line(of(|record| record.sample.i_l)));
         duty = duty.series(Series::step(name.as_str(), time.clone(), of(|record| record.duty)).colour(colour));
     }
-    voltage = voltage.y_zone(setting.v_ref - SETTLED, setting.v_ref + SETTLED, "settled");
+    let band = settled_band(setting.v_ref);
+    voltage = voltage.y_zone(setting.v_ref - band, setting.v_ref + band, "settled");
     let [from, to] = step
         .step
         .loads()

@@ -3,7 +3,8 @@
 use report::grouped;
 
 use super::findings::{Check, Findings, Setting, Step};
-use crate::scenario::SETTLED;
+use crate::scenario::settled_band;
+use crate::tables::digits;
 
 /// The plant's file and the numbers that were replaced.
 pub(super) fn plant_text(setting: &Setting) -> String {
@@ -13,13 +14,25 @@ pub(super) fn plant_text(setting: &Setting) -> String {
     })
 }
 
+/// The settling band with its unit: `0.5 V`, `16.5 mV`.
+pub(crate) fn band_text(v_ref: f64) -> String {
+    let band = settled_band(v_ref);
+    // shortest digits of the number rounded to four: 3.3 / 200 is not 0.0165 to the last bit
+    let short = |x: f64| format!("{x:.3e}").parse::<f64>().unwrap_or(x);
+    match digits(band) {
+        2 => format!("{} V", short(band)),
+        _ => format!("{} mV", short(1e3 * band)),
+    }
+}
+
 /// What the figures are of.
 pub(super) fn explanation(setting: &Setting) -> String {
     let task = &setting.scenario.task;
     format!(
-        "True voltages at the sampling instants, errors from {} V, settled within {SETTLED} V. Each pair: worst of {} \
+        "True voltages at the sampling instants, errors from {} V, settled within {}. Each pair: worst of {} \
          sampling instants / worst of {} instants and phases.",
         setting.v_ref,
+        band_text(setting.v_ref),
         task.sampling_instants,
         task.all_instants().len(),
     )
@@ -29,7 +42,10 @@ pub(super) fn explanation(setting: &Setting) -> String {
 pub(super) fn unsettled(found: &Findings) -> Option<String> {
     let lost = |step: &&Step| {
         let policy = step.courses.first();
-        policy.is_some_and(|(_, policy)| policy.finding.worst.tail_max.max(policy.finding.worst.pre_error) > SETTLED)
+        policy.is_some_and(|(_, policy)| {
+            let worst = &policy.finding.worst;
+            worst.tail_max.max(worst.pre_error) > worst.band
+        })
     };
     let steps: Vec<String> = found
         .steps
@@ -39,7 +55,8 @@ pub(super) fn unsettled(found: &Findings) -> Option<String> {
         .collect();
     (!steps.is_empty()).then(|| {
         format!(
-            "the policy does not settle within {SETTLED} V of {} V before or after {}",
+            "the policy does not settle within {} of {} V before or after {}",
+            band_text(found.setting.v_ref),
             found.setting.v_ref,
             steps.join(", ")
         )

@@ -7,8 +7,9 @@ use report::{Cell, Page, Section, Table, Verdict};
 use super::findings::{Findings, MAPPED, Real, Run};
 use super::pictures;
 use crate::faults::{Error, told};
-use crate::scenario::{Metrics, SETTLED};
-use crate::tables::{COLUMNS, MetricsCsv, cells, comparison};
+use crate::scenario::Metrics;
+use crate::simulation::band_text;
+use crate::tables::{COLUMNS, MetricsCsv, cells, comparison, digits};
 
 /// Name of the page with everything on it, among the files.
 pub const PAGE: &str = "report.html";
@@ -125,12 +126,13 @@ fn explanation(found: &Findings) -> String {
     let task = &setting.scenario.task;
     format!(
         "Policy {} ({}) at real converters simulated by {}. True voltages at the sampling instants, errors from {} V, \
-         settled within {SETTLED} V; worst of {} sampling instants / of {} instants and phases. Steady state: the last {} \
+         settled within {}; worst of {} sampling instants / of {} instants and phases. Steady state: the last {} \
          of {} control periods after the step.",
         setting.policy.name,
         found.controller,
         found.simulator,
         setting.v_ref,
+        band_text(setting.v_ref),
         task.sampling_instants,
         task.all_instants().len(),
         task.tail,
@@ -157,13 +159,14 @@ const HEADINGS: [&str; 6] = [
 fn lines(found: &Findings) -> Vec<[String; 6]> {
     let line = |converter: &str, run: &Run| {
         let m = largest(run);
-        let unsettled = if m.tail_max > SETTLED { ">" } else { "" };
+        let unsettled = if m.is_settled() { "" } else { ">" };
+        let digits = digits(m.band);
         [
             converter.to_owned(),
             run.name.to_owned(),
-            format!("{:.3}", m.tail_mean),
-            format!("{:.3}", m.tail_max),
-            format!("{:.2}", m.deviation),
+            format!("{:.*}", digits + 1, m.tail_mean),
+            format!("{:.*}", digits + 1, m.tail_max),
+            format!("{:.digits$}", m.deviation),
             format!("{unsettled}{:.2}", 1e3 * m.settling),
         ]
     };

@@ -4,7 +4,7 @@ use report::{Axis, Chart, Colour, Panel, Series, Svg};
 
 use super::findings::{EXACT, Findings, Real};
 use crate::faults::{Error, told};
-use crate::scenario::{Record, SETTLED};
+use crate::scenario::{Record, settled_band};
 
 /// Shown before the step, in control periods, and at most after it.
 const BEFORE: f64 = 20.0;
@@ -37,7 +37,8 @@ pub(super) fn picture(found: &Findings, real: &Real, index: usize) -> Result<Svg
             duty = duty.series(Series::step(run.name, time, of(|record| record.duty)).colour(colour));
         }
     }
-    voltage = voltage.y_zone(setting.v_ref - SETTLED, setting.v_ref + SETTLED, "settled");
+    let band = settled_band(setting.v_ref);
+    voltage = voltage.y_zone(setting.v_ref - band, setting.v_ref + band, "settled");
     let x = Axis::new("time from the load step")
         .unit("s")
         .range(window[0], window[1]);

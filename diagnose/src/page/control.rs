@@ -1,7 +1,7 @@
 //! The section on the closed loop.
 
 use closed_loop::controller::Period;
-use closed_loop::scenario::{Metrics, SETTLED};
+use closed_loop::scenario::{Metrics, settled_band};
 use report::{Axis, Chart, Panel, ReportError, Section, Series, Svg, Table};
 
 use super::colours::{EXTENDED, MEASURED, MODEL};
@@ -69,7 +69,8 @@ fn picture(control: &Control) -> Result<Svg, ReportError> {
         duty = duty.series(Series::step(name, time, of(|period| period.record.duty)).colour(colour));
     }
     let v_ref = control.findings.v_ref;
-    let voltage = voltage.y_zone(v_ref - SETTLED, v_ref + SETTLED, "settled");
+    let band = settled_band(v_ref);
+    let voltage = voltage.y_zone(v_ref - band, v_ref + band, "settled");
     Chart::new(
         control.shown_step.clone(),
         Axis::new("time from the load step").unit("s"),
@@ -81,7 +82,7 @@ fn picture(control: &Control) -> Result<Svg, ReportError> {
 
 fn table(found: &ClosedLoop) -> Table {
     let caption = "Each figure the worst of all instants: mean and largest error in steady state, largest error after the \
-                   step, time to the last sample beyond 0.5 V";
+                   step, time to the last sample outside half a percent of the reference";
     let mut table = Table::new(caption).text("load step").text("");
     for heading in ["mean V", "largest V", "after the step V"] {
         table = table.number(heading, 3);
@@ -90,7 +91,7 @@ fn table(found: &ClosedLoop) -> Table {
     for step in &found.steps {
         let runs = RUNS.into_iter().zip([&step.simulation, &step.before, &step.after]);
         for (name, m) in runs.take(if found.refitted { 3 } else { 2 }) {
-            let settled = match m.tail_max > SETTLED {
+            let settled = match !m.is_settled() {
                 true => "not".to_owned(),
                 false => format!("{:.1}", 1e3 * m.settling),
             };

@@ -194,7 +194,7 @@ pub struct Requirement {
     pub instants: Instants,
     /// Largest |e| after the step, V.
     pub deviation: Option<f64>,
-    /// From the step to the last sample outside +-0.5 V, s.
+    /// From the step to the last sample outside half a percent of `v_ref`, s.
     pub settling: Option<f64>,
     /// Largest |e| in the tail, V.
     pub tail: Option<f64>,

@@ -35,6 +35,7 @@ pub fn run(options: &Train) -> Result<Outcome, Failure> {
     }
     let contract = Contract::load(&settings.contract, &settings.hidden)?;
     let converter = Converter::load(FileName::named_by_a_file(&settings.plant), &settings.set)?;
+    closed_loop::holds_power(converter.parameters(), settings.reward.v_ref, &settings.plant)?;
     let kept = Kept::new(&options.out);
     let course = Course {
         threads: options.threads,

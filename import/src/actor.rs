@@ -9,6 +9,10 @@ pub(crate) enum Squash {
     Tanh,
     /// The output itself between two ends: PPO, A2C.
     Clip(f64, f64),
+    /// The output itself between the ends of an action space that the file does not hold.
+    ClipToSpace,
+    /// The file does not say.
+    Unknown,
 }
 
 /// An actor with one command.
@@ -38,11 +42,12 @@ impl Actor {
     }
 
     /// Least and largest command, in the units of the file.
-    fn ends(self) -> Option<(f64, f64)> {
+    pub fn ends(self) -> Option<(f64, f64)> {
         let (scale, offset) = self.affine?;
         let (low, high) = match self.squash {
             Squash::Tanh => (-1.0, 1.0),
             Squash::Clip(low, high) => (low, high),
+            Squash::ClipToSpace | Squash::Unknown => return None,
         };
         let (one, other) = (scale * low + offset, scale * high + offset);
         Some((one.min(other), one.max(other)))
@@ -53,6 +58,16 @@ impl Actor {
         let squash = match self.squash {
             Squash::Tanh => "squash = \"tanh\"".to_owned(),
             Squash::Clip(low, high) => format!("clip = [{low:?}, {high:?}]"),
+            // ends that are no duties are refused until a scale stands beside them: nothing wrong can pass
+            Squash::ClipToSpace => {
+                return "continuous = { clip = [\"TODO\", \"TODO\"] }   # ends of the action space; if its action is no duty, \
+                        scale and offset, too: duty = scale * s + offset"
+                    .to_owned();
+            }
+            Squash::Unknown => {
+                return "continuous = { squash = \"TODO\", scale = \"TODO\", offset = \"TODO\" }   # or { clip = [lo, hi] }: a clipped mean"
+                    .to_owned();
+            }
         };
         match (self.affine, self.ends()) {
             (Some((scale, offset)), Some((low, high))) if low >= 0.0 && high <= 1.0 => {
@@ -81,7 +96,10 @@ impl Actor {
             Squash::Tanh => {
                 "a continuous actor: the duty is a tanh of the one output; of SAC that is its mean".to_owned()
             }
-            Squash::Clip(..) => "a continuous actor: the duty is the mean, clipped to the action space".to_owned(),
+            Squash::Clip(..) | Squash::ClipToSpace => {
+                "a continuous actor: the duty is the mean, clipped to the action space".to_owned()
+            }
+            Squash::Unknown => "a continuous actor: what squashes and scales its one output is yours to say".to_owned(),
         }
     }
 }
@@ -92,7 +110,7 @@ pub(crate) fn scaled(found: Option<(f64, f64)>) -> (f64, f64) {
 }
 
 /// Numbers of a space are binary32: 0.1 and not 0.10000000149011612.
-fn short(x: f64) -> f64 {
+pub(crate) fn short(x: f64) -> f64 {
     format!("{:?}", x as f32).parse().unwrap_or(x)
 }
 

@@ -10,6 +10,7 @@
 //! A file is data here: nothing that it names is called, imported or executed. Every size that it claims is held against its
 //! own length before anything is allocated. What users see: docs/reference/saved-models.md.
 
+mod activations;
 mod actor;
 mod golden;
 mod network;
@@ -144,7 +145,10 @@ fn written(
     let golden = golden_answers(loaded, network, statistics).map_err(|message| name.fault(message))?;
     let mut said = loaded.about.clone();
     said.extend(network.said.iter().cloned());
-    said.extend(loaded.actor.map(actor::Actor::said));
+    let definition = network.definition.as_ref();
+    let actor = definition.map(|definition| definition.actor).or(loaded.actor);
+    said.extend(actor.map(actor::Actor::said));
+    said.extend(definition.iter().flat_map(|definition| definition.said.iter().cloned()));
     if !statistics.is_empty() && loaded.graph.as_ref().is_none_or(|graph| graph.features.is_empty()) {
         said.push("VecNormalize: scale = 1/sqrt(var + epsilon), offset = -mean/sqrt(var + epsilon), then clip, all computed in f64".to_owned());
     }
@@ -166,14 +170,14 @@ fn written(
         chains: vec![chain(network)],
         hidden: network.layers.len() > 1,
         bias: true,
-        activation: activation(loaded),
+        activation: activation(loaded, network),
         golden: golden.is_some(),
-        continuous: loaded.actor.map(actor::Actor::entry),
+        continuous: actor.map(actor::Actor::entry),
         about: said.clone(),
-        features: if statistics.is_empty() {
-            of_bounds(&loaded.bounds)
-        } else {
-            statistics.to_vec()
+        features: match definition {
+            _ if !statistics.is_empty() => statistics.to_vec(),
+            Some(definition) if definition.is_normalised => vec![open(); inputs],
+            _ => of_bounds(&loaded.bounds),
         },
     };
     let mut beside = BTreeMap::from([(file.to_owned(), network.to_safetensors(name)?)]);
@@ -186,9 +190,13 @@ fn written(
 }
 
 /// The activations behind the hidden layers, as TOML.
-fn activation(loaded: &Loaded) -> Option<String> {
+fn activation(loaded: &Loaded, network: &Network) -> Option<String> {
     let Some(graph) = &loaded.graph else {
-        return loaded.activation.map(|activation| activation.written());
+        let defined = || network.definition.as_ref()?.activation.clone();
+        return loaded
+            .activation
+            .map(|activation| activation.written())
+            .or_else(defined);
     };
     let written: Vec<String> = graph
         .activations
@@ -236,11 +244,19 @@ fn is_range((low, high): &(f64, f64)) -> bool {
     low < high && low.abs() < LARGEST_BOUND && high.abs() < LARGEST_BOUND
 }
 
+/// A feature of a training that normalised it, with numbers that are not here.
+fn open() -> DraftFeature {
+    DraftFeature {
+        is_open: true,
+        ..DraftFeature::default()
+    }
+}
+
 /// A clip for each bounded observation.
 fn of_bounds(bounds: &[(f64, f64)]) -> Vec<DraftFeature> {
     let feature = |bound: &(f64, f64)| DraftFeature {
-        affine: None,
         clip: is_range(bound).then(|| (bound.0, bound.1, "bounds of the observation space".to_owned())),
+        ..DraftFeature::default()
     };
     bounds.iter().map(feature).collect()
 }

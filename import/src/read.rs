@@ -1,15 +1,14 @@
 //! Which reader a file is for, by its content and not by its name.
 
-use std::collections::BTreeSet;
-
 use policy::{Activation, NamedTensor};
 use toml_input::{Faults, FileName, Message};
 
+use crate::activations::Parameters;
 use crate::actor::Actor;
 use crate::network::{Layer, Network};
 use crate::recognise::Known;
 use crate::zip::Archive;
-use crate::{Options, onnx, sb3, torch, zip};
+use crate::{Options, activations, onnx, sb3, torch, zip};
 
 /// What a reader found.
 #[derive(Debug, Default)]
@@ -39,6 +38,7 @@ impl Loaded {
             layers: layers.clone(),
             plain: false,
             choice_only: false,
+            definition: None,
         })
     }
 }
@@ -120,15 +120,21 @@ fn model(archive: &Archive<'_>, options: &Options) -> Result<Loaded, Message> {
 }
 
 /// The activation of a module that holds one kind alone.
-fn activation(modules: &[(String, String)]) -> Option<Activation> {
-    let class =
-        |(_, class): &'_ (String, String)| class.strip_prefix("torch.nn.modules.activation.").map(str::to_owned);
-    let kinds: BTreeSet<String> = modules.iter().filter_map(class).collect();
-    match kinds.iter().collect::<Vec<_>>().as_slice() {
-        // a slope stands among the module's attributes, not in its class
-        [only] if *only != "LeakyReLU" => sb3::torch_activation(only),
-        _ => None,
-    }
+fn activation(modules: &[torch::Module]) -> Option<Activation> {
+    let folder = "torch.nn.modules.activation.";
+    let all = modules.iter().filter(|module| module.class.starts_with(folder));
+    let kinds: Vec<(&str, Parameters<'_>)> = all
+        .map(|module| {
+            let parameters = Parameters {
+                number: module.number,
+                approximate: module.approximate.as_deref(),
+            };
+            (module.class.strip_prefix(folder).unwrap_or_default(), parameters)
+        })
+        .collect();
+    let (class, parameters) = *kinds.first()?;
+    let is_one = kinds.iter().all(|kind| *kind == (class, parameters));
+    is_one.then(|| activations::of_torch(class, parameters)).flatten()
 }
 
 fn no_model(archive: &Archive<'_>) -> Message {

@@ -14,11 +14,19 @@ use crate::zip::Archive;
 #[derive(Debug, Default)]
 pub(crate) struct Torch {
     pub tensors: Vec<NamedTensor>,
-    /// Classes of the modules, by their names in the module that was saved.
-    pub modules: Vec<(String, String)>,
+    pub modules: Vec<Module>,
     /// Epsilon of the modules that have one.
     pub epsilons: Vec<(String, f64)>,
     pub said: Vec<String>,
+}
+
+/// A module of a whole module that was saved: its class, and what an activation holds.
+#[derive(Debug)]
+pub(crate) struct Module {
+    pub class: String,
+    /// `negative_slope` or `alpha`.
+    pub number: Option<f64>,
+    pub approximate: Option<String>,
 }
 
 /// Keys of what belongs to the training alone.
@@ -30,7 +38,9 @@ const MOST_VISITS: usize = 200_000;
 
 /// Whether `bytes` are in the format that torch wrote before version 1.6, or a pickle that is none of torch's.
 pub(crate) fn is_bare_pickle(bytes: &[u8]) -> bool {
-    matches!(bytes, [0x80, 2..=5, ..])
+    // a header of safetensors may be 0x0280 bytes long: its length is a number of 8 bytes, and `{` follows
+    let is_length = bytes.get(4..9) == Some(b"\0\0\0\0{");
+    matches!(bytes, [0x80, 2..=5, ..]) && !is_length
 }
 
 pub(crate) fn legacy() -> Message {
@@ -165,7 +175,16 @@ impl<'a> Walk<'a> {
         let pickle = self.pickle;
         let attributes = pickle.attributes(id);
         if let (Item::Object(object), Some(modules)) = (pickle.item(id), pickle.get(attributes, "_modules")) {
-            self.found.modules.push((name.to_owned(), object.class.clone()));
+            let attribute = |key| pickle.get(attributes, key);
+            self.found.modules.push(Module {
+                class: object.class.clone(),
+                number: attribute("negative_slope")
+                    .or_else(|| attribute("alpha"))
+                    .and_then(|id| pickle.number(id)),
+                approximate: attribute("approximate")
+                    .and_then(|id| pickle.text(id))
+                    .map(str::to_owned),
+            });
             if let Some(epsilon) = pickle.get(attributes, "eps").and_then(|id| pickle.number(id)) {
                 self.found.epsilons.push((name.to_owned(), epsilon));
             }

@@ -136,6 +136,8 @@ pub struct Draft {
 pub struct DraftFeature {
     /// `scale * x + offset`.
     pub affine: Option<(f64, f64)>,
+    /// The training scaled it by numbers that nobody has said yet: not to be taken for 1 and 0.
+    pub is_open: bool,
     /// Smallest and largest value that the network has seen, and who says so.
     pub clip: Option<(f64, f64, String)>,
 }
@@ -237,6 +239,9 @@ fn normalisation(known: Option<&DraftFeature>) -> String {
     let mut text = String::new();
     match known.and_then(|feature| feature.affine) {
         Some((scale, offset)) => drop(writeln!(text, "scale = {scale:?}\noffset = {offset:?}")),
+        None if known.is_some_and(|feature| feature.is_open) => {
+            text += "scale = \"TODO\"             # of the training\noffset = \"TODO\"\n";
+        }
         None => text += AFFINE,
     }
     match known.and_then(|feature| feature.clip.as_ref()) {

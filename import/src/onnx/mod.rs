@@ -343,6 +343,7 @@ impl Walk<'_> {
                 .map(|affine| DraftFeature {
                     affine: Some(affine),
                     clip: clip.clone(),
+                    ..DraftFeature::default()
                 })
                 .collect();
             self.said.push(
@@ -354,6 +355,7 @@ impl Walk<'_> {
                 layers: self.layers,
                 plain: false,
                 choice_only: false,
+                definition: None,
                 said: self.said,
             },
             activations: self

@@ -3,6 +3,7 @@
 //! A row whose word the contract does not know yet is still a name that is known: it is refused by that name.
 
 use policy::Activation;
+use toml_input::Message;
 
 /// The names of one activation, and the function itself.
 struct Row {
@@ -34,6 +35,9 @@ pub(crate) const SILU: &str = "silu";
 /// Word of `x * hard_sigmoid(x)`.
 pub(crate) const HARD_SWISH: &str = "hard_swish";
 
+/// Word of `log(1 + exp(x))`.
+pub(crate) const SOFTPLUS: &str = "softplus";
+
 const ROWS: [Row; 12] = [
     row("relu", "ReLU", "Relu", |x| x.max(0.0)),
     row("tanh", "Tanh", "Tanh", libm::tanh),
@@ -49,7 +53,7 @@ const ROWS: [Row; 12] = [
         0.5 * x * (1.0 + libm::tanh((2.0 / std::f64::consts::PI).sqrt() * (x + 0.044_715 * x * x * x)))
     }),
     row("sigmoid", "Sigmoid", "Sigmoid", sigmoid),
-    row("softplus", "Softplus", "Softplus", |x| {
+    row(SOFTPLUS, "Softplus", "Softplus", |x| {
         x.max(0.0) + libm::log1p(libm::exp(-x.abs()))
     }),
     row("hard_sigmoid", "Hardsigmoid", "HardSigmoid", hard_sigmoid),
@@ -89,10 +93,33 @@ pub(crate) fn of_torch(class: &str, parameters: Parameters<'_>) -> Option<Activa
     }
 }
 
-/// The activation of an ONNX operation that needs no attribute.
-pub(crate) fn of_onnx(operation: &str) -> Option<Activation> {
+/// The refusal of a class of `torch.nn`.
+pub(crate) fn not_compiled(class: &str, parameters: Parameters<'_>) -> Message {
+    let row = ROWS.iter().find(|row| row.torch == class && !row.torch.is_empty());
+    let word = match parameters.approximate {
+        Some("tanh") => GELU_TANH,
+        _ => row.map_or(class, |row| row.word),
+    };
+    let found = match parameters.number {
+        Some(number) => format!("{class} of {number}"),
+        None => class.to_owned(),
+    };
+    refusal(word, &found)
+}
+
+/// The refusal of an activation that is known by name.
+pub(crate) fn refusal(word: &str, found: &str) -> Message {
+    let known: Vec<String> = Activation::EACH.iter().map(|each| each.written()).collect();
+    Message::new(format!("this activation is not compiled: {word}"))
+        .found(found)
+        .expected(known.join(", "))
+        .hint("train with one of these")
+}
+
+/// The word for an ONNX operation by its name alone; the contract may not know it.
+pub(crate) fn word_of_onnx(operation: &str) -> Option<&'static str> {
     let row = ROWS.iter().find(|row| row.onnx == operation && !row.onnx.is_empty())?;
-    Activation::find(row.word)
+    Some(row.word)
 }
 
 /// The function itself, not the contract's bits of it; `None` of one that is not in the table.
@@ -146,7 +173,7 @@ mod tests {
             assert_eq!(of_torch(row.torch, Parameters::default()), Activation::find(row.word));
         }
         for row in ROWS.iter().filter(|row| !row.onnx.is_empty()) {
-            assert_eq!(of_onnx(row.onnx), Activation::find(row.word));
+            assert_eq!(word_of_onnx(row.onnx), Some(row.word));
         }
         let number = |number| Parameters {
             number: Some(number),
@@ -158,6 +185,6 @@ mod tests {
             Some(Activation::LeakyRelu { slope: 0.2 })
         );
         assert_eq!(of_torch("PReLU", number(0.2)), None);
-        assert_eq!(of_onnx(""), None);
+        assert_eq!(word_of_onnx(""), None);
     }
 }

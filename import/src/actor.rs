@@ -1,12 +1,13 @@
 //! Continuous actors: the way from the last layer to a command, as the contract's `[actions]` says it.
 
+use policy::{Activation, Shape};
 use toml_input::Message;
 
 /// What bounds the output of an actor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Squash {
-    /// tanh: SAC, TD3, DDPG.
-    Tanh,
+    /// A curve with two ends: tanh of SAC, TD3 and DDPG.
+    Curve(Activation),
     /// The output itself between two ends: PPO, A2C.
     Clip(f64, f64),
     /// The output itself between the ends of an action space that the file does not hold.
@@ -23,12 +24,22 @@ pub(crate) struct Actor {
     pub affine: Option<(f64, f64)>,
 }
 
+/// The tanh of SAC, TD3 and DDPG.
+pub(crate) const TANH: Squash = Squash::Curve(Activation::Tanh);
+
+impl Squash {
+    /// A curve that a contract takes behind its last layer.
+    pub fn curve(activation: Activation) -> Option<Self> {
+        matches!(activation.shape(), Shape::Sigmoid(_)).then_some(Self::Curve(activation))
+    }
+}
+
 impl Actor {
     /// A tanh whose ends are those of an action space.
     pub fn of_space(low: f64, high: f64) -> Self {
         let (low, high) = (short(low), short(high));
         Self {
-            squash: Squash::Tanh,
+            squash: TANH,
             affine: Some((0.5 * (high - low), 0.5 * (high + low))),
         }
     }
@@ -45,7 +56,8 @@ impl Actor {
     pub fn ends(self) -> Option<(f64, f64)> {
         let (scale, offset) = self.affine?;
         let (low, high) = match self.squash {
-            Squash::Tanh => (-1.0, 1.0),
+            Squash::Curve(curve) if curve.word().contains("sigmoid") => (0.0, 1.0),
+            Squash::Curve(_) => (-1.0, 1.0),
             Squash::Clip(low, high) => (low, high),
             Squash::ClipToSpace | Squash::Unknown => return None,
         };
@@ -56,7 +68,7 @@ impl Actor {
     /// The entry `continuous` of `[actions]`, with what to think of it beside. A command within 0..1 is taken for a duty.
     pub fn entry(self) -> String {
         let squash = match self.squash {
-            Squash::Tanh => "squash = \"tanh\"".to_owned(),
+            Squash::Curve(curve) => format!("squash = {}", curve.written()),
             Squash::Clip(low, high) => format!("clip = [{low:?}, {high:?}]"),
             // ends that are no duties are refused until a scale stands beside them: nothing wrong can pass
             Squash::ClipToSpace => {
@@ -93,8 +105,11 @@ impl Actor {
     /// What was recognised, in a sentence.
     pub fn said(self) -> String {
         match self.squash {
-            Squash::Tanh => {
-                "a continuous actor: the duty is a tanh of the one output; of SAC that is its mean".to_owned()
+            Squash::Curve(curve) => {
+                format!(
+                    "a continuous actor: the duty is a {} of the one output; of SAC that is its mean",
+                    curve.word()
+                )
             }
             Squash::Clip(..) | Squash::ClipToSpace => {
                 "a continuous actor: the duty is the mean, clipped to the action space".to_owned()

@@ -13,6 +13,8 @@
 mod activations;
 mod actor;
 mod golden;
+mod hdf5;
+mod mat;
 mod network;
 mod numpy;
 mod onnx;

@@ -8,7 +8,7 @@ use crate::actor::Actor;
 use crate::network::{Layer, Network};
 use crate::recognise::Known;
 use crate::zip::Archive;
-use crate::{Options, activations, onnx, sb3, torch, zip};
+use crate::{Options, activations, hdf5, mat, onnx, sb3, torch, zip};
 
 /// What a reader found.
 #[derive(Debug, Default)]
@@ -57,10 +57,18 @@ pub(crate) fn read(name: &FileName, bytes: Vec<u8>, options: &Options) -> Result
             ..Loaded::default()
         });
     }
+    if hdf5::is_file(&bytes) {
+        return Err(fault(hdf5::refused(&bytes)));
+    }
     if !zip::is_archive(&bytes) {
+        let is_mat = mat::is_mat(&bytes);
         return Ok(Loaded {
-            tensors: policy::named_tensors(name, bytes)?,
-            is_safetensors: true,
+            tensors: if is_mat {
+                mat::read(&bytes).map_err(fault)?
+            } else {
+                policy::named_tensors(name, bytes)?
+            },
+            is_safetensors: !is_mat,
             known: Known {
                 actions: options.actions,
                 ..Known::default()
@@ -77,7 +85,7 @@ pub(crate) fn read(name: &FileName, bytes: Vec<u8>, options: &Options) -> Result
     }
     let torch = torch::read(&archive, options.inside.as_deref()).map_err(fault)?;
     let mut about = torch.said;
-    let activation = activation(&torch.modules);
+    let activation = activation(&torch.modules).map_err(fault)?;
     if let Some(activation) = activation {
         about.push(format!(
             "the only activation in the module that was saved: {}",
@@ -120,21 +128,27 @@ fn model(archive: &Archive<'_>, options: &Options) -> Result<Loaded, Message> {
 }
 
 /// The activation of a module that holds one kind alone.
-fn activation(modules: &[torch::Module]) -> Option<Activation> {
+fn activation(modules: &[torch::Module]) -> Result<Option<Activation>, Message> {
     let folder = "torch.nn.modules.activation.";
-    let all = modules.iter().filter(|module| module.class.starts_with(folder));
-    let kinds: Vec<(&str, Parameters<'_>)> = all
-        .map(|module| {
-            let parameters = Parameters {
-                number: module.number,
-                approximate: module.approximate.as_deref(),
-            };
-            (module.class.strip_prefix(folder).unwrap_or_default(), parameters)
-        })
-        .collect();
-    let (class, parameters) = *kinds.first()?;
-    let is_one = kinds.iter().all(|kind| *kind == (class, parameters));
-    is_one.then(|| activations::of_torch(class, parameters)).flatten()
+    let mut kinds = Vec::new();
+    for module in modules {
+        let Some(class) = module.class.strip_prefix(folder) else {
+            continue;
+        };
+        // behind the last layer it keeps the order of the outputs
+        if ["Softmax", "LogSoftmax"].contains(&class) {
+            continue;
+        }
+        let parameters = Parameters {
+            number: module.number,
+            approximate: module.approximate.as_deref(),
+        };
+        kinds.push(
+            activations::of_torch(class, parameters).ok_or_else(|| activations::not_compiled(class, parameters))?,
+        );
+    }
+    let is_one = kinds.iter().all(|kind| kinds.first() == Some(kind));
+    Ok(kinds.first().copied().filter(|_| is_one))
 }
 
 fn no_model(archive: &Archive<'_>) -> Message {
@@ -144,8 +158,13 @@ fn no_model(archive: &Archive<'_>) -> Message {
         .take(6)
         .map(|name| name.escape_debug().to_string())
         .collect();
+    if archive.get("model.weights.h5").is_some() {
+        return Message::new("a .keras file is not read")
+            .found("a .keras file: its weights are HDF5")
+            .expected("ONNX, safetensors, a torch file, or a model of stable-baselines3")
+            .hint(hdf5::KERAS);
+    }
     Message::new("this archive holds no model that is read")
         .found(format!("{} members: {}", archive.members.len(), names.join(", ")))
         .expected("`data.pkl` of torch.save, or `data` and `policy.pth` of stable-baselines3")
-        .hint("a .keras file: save the weights of each layer with safetensors.numpy.save_file")
 }

@@ -232,9 +232,9 @@ fn activation(kwargs: &Value, class: &Class) -> Result<Activation, Message> {
         return Ok(class.activation);
     };
     let name = given.trim_end_matches("'>").rsplit('.').next().unwrap_or(given);
-    activations::of_torch(name, activations::Parameters::default()).ok_or_else(|| {
-        let known: Vec<String> = Activation::EACH.iter().map(|each| each.written()).collect();
-        other("this activation is not compiled", name, &known.join(", "))
+    let plain = activations::Parameters::default();
+    activations::of_torch(name, plain).ok_or_else(|| {
+        activations::not_compiled(&printable(name), plain)
             .hint("train with one of these: policy_kwargs = dict(activation_fn=...)")
     })
 }

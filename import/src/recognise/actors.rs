@@ -10,7 +10,7 @@ use toml_input::Message;
 use super::heads::is_value;
 use super::names::parts;
 use super::{Known, Refusal};
-use crate::actor::{self, Actor, Squash};
+use crate::actor::{self, Actor, Squash, TANH};
 
 /// What the definition of an actor adds to its tensors.
 #[derive(Debug, Clone, PartialEq)]
@@ -149,7 +149,7 @@ fn cleanrl(names: &Names<'_>) -> Result<Option<Definition>, Refusal> {
         );
         return Ok(Some(Definition {
             activation: fixed("relu", "CleanRL's definition"),
-            ..defined(Squash::Tanh, Some((one(scale)?, one(bias)?)), &said)
+            ..defined(TANH, Some((one(scale)?, one(bias)?)), &said)
         }));
     }
     if !(names.has("actor_mean") && names.leaf("actor_logstd").is_some()) {
@@ -194,13 +194,13 @@ fn stable_baselines(names: &Names<'_>) -> Result<Option<Definition>, Refusal> {
     };
     Ok(if is_gaussian {
         let does = "the action is tanh(mu), from -1 to 1, scaled to the action space";
-        Some(definition(Squash::Tanh, "relu", "SAC", does))
+        Some(definition(TANH, "relu", "SAC", does))
     } else if is_clipped {
         let does = "the action is action_net's output, clipped to the action space";
         Some(definition(Squash::ClipToSpace, "tanh", "PPO or A2C", does))
     } else if names.has_sequence("mu") {
         let does = "the action is a tanh of mu, from -1 to 1, scaled to the action space";
-        Some(definition(Squash::Tanh, "relu", "TD3 or DDPG", does))
+        Some(definition(TANH, "relu", "TD3 or DDPG", does))
     } else {
         None
     })
@@ -224,7 +224,7 @@ fn tianshou(names: &Names<'_>, known: &Known) -> Option<Definition> {
                 scaled to the action space";
     is_one.then(|| Definition {
         activation,
-        ..defined(Squash::Tanh, None, said)
+        ..defined(TANH, None, said)
     })
 }
 

@@ -112,7 +112,11 @@ fn role(name: &str, rank: usize) -> Option<(String, Role, bool)> {
             };
             return Some((stem.to_owned(), role, false));
         }
-        _ => return None,
+        // a struct of MATLAB
+        _ => {
+            let (layer, role) = numbered(leaf)?;
+            return Some((format!("{stem}.{layer}"), role, false));
+        }
     };
     (!stem.is_empty()).then(|| (stem.to_owned(), role, known))
 }

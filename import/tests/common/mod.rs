@@ -1,6 +1,8 @@
 //! Files of weights and the policies that come of them.
 #![allow(dead_code, reason = "each test uses its own part")]
 
+pub mod library;
+
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 

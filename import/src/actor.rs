@@ -65,6 +65,11 @@ impl Actor {
         Some((one.min(other), one.max(other)))
     }
 
+    /// The ends of the command, where it is taken for the duty.
+    pub fn duties(self) -> Option<(f64, f64)> {
+        self.ends().filter(|(low, high)| *low >= 0.0 && *high <= 1.0)
+    }
+
     /// The entry `continuous` of `[actions]`, with what to think of it beside. A command within 0..1 is taken for a duty.
     pub fn entry(self) -> String {
         let squash = match self.squash {
@@ -81,18 +86,18 @@ impl Actor {
                     .to_owned();
             }
         };
-        match (self.affine, self.ends()) {
-            (Some((scale, offset)), Some((low, high))) if low >= 0.0 && high <= 1.0 => {
+        match (self.affine, self.duties()) {
+            (Some((scale, offset)), Some((low, high))) => {
                 let scaled = match (scale, offset) {
                     (1.0, 0.0) => String::new(),
                     _ => format!(", scale = {scale:?}, offset = {offset:?}"),
                 };
                 format!(
-                    "continuous = {{ {squash}{scaled} }}   # the command is {low:?} to {high:?}, taken for the duty"
+                    "continuous = {{ {squash}{scaled} }}   # check: the command is {low:?} to {high:?}, taken for the duty"
                 )
             }
-            (_, ends) => {
-                let whose = ends.map_or_else(String::new, |(low, high)| {
+            _ => {
+                let whose = self.ends().map_or_else(String::new, |(low, high)| {
                     format!("; the training's own command is {low:?} to {high:?}")
                 });
                 format!(

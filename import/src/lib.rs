@@ -175,6 +175,7 @@ fn written(
         activation: activation(loaded, network),
         golden: golden.is_some(),
         continuous: actor.map(actor::Actor::entry),
+        duties: actor.and_then(actor::Actor::duties),
         about: said.clone(),
         features: match definition {
             _ if !statistics.is_empty() => statistics.to_vec(),

@@ -133,7 +133,6 @@ pub fn filled(folder: &std::path::Path, new: &import::NewPolicy) -> policy::Poli
     }
     let mut text = new
         .contract
-        .replacen("name = \"TODO\"", "name = \"buck\"", 1)
         .replacen("name = \"TODO\"", "name = \"v_out\"", 1)
         .replace("range = [\"TODO\", \"TODO\"]", "range = [-1e4, 1e4]")
         .replace("source = \"TODO\"", "source = \"v_out\"")

@@ -69,7 +69,7 @@ fn cleanrl() -> Vec<Row> {
                     "hidden_activation = \"tanh\"   # as in CleanRL's definition: check",
                     "continuous = { clip = [\"TODO\", \"TODO\"] }",
                     "NormalizeObservation",
-                    "scale = \"TODO\"             # of the training",
+                    "source = \"TODO\", scale = \"TODO\", offset = \"TODO\" }",
                 ],
             ),
         ),

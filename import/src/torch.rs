@@ -8,6 +8,7 @@ use policy::limits::MAX_TENSOR_NAME_CHARS;
 use toml_input::Message;
 
 use crate::pickle::{Id, Item, Object, Pickle};
+use crate::recognise::is_mean;
 use crate::zip::Archive;
 
 /// What a torch file holds.
@@ -103,6 +104,9 @@ impl<'a> Walk<'a> {
     /// Where the network begins: at the root, or at the only entry that holds one.
     fn start(&mut self, inside: Option<&str>) -> Result<(Id, Option<String>), Message> {
         let root = self.pickle.root;
+        if let Some(list) = self.pickle.list(root) {
+            return self.one_of(list, inside);
+        }
         let entries = self.pickle.entries(root);
         if let Some(key) = inside {
             let found = self.pickle.get(entries, key).map(|id| (id, None));
@@ -129,6 +133,41 @@ impl<'a> Walk<'a> {
             [] => Ok((root, None)),
             _ => Err(self.several("the checkpoint holds more than one network", "", entries)),
         }
+    }
+
+    /// CleanRL's files for continuous actions save actor and critics as a tuple.
+    fn one_of(&self, list: &[Id], inside: Option<&str>) -> Result<(Id, Option<String>), Message> {
+        let numbered = list.iter().enumerate().filter(|(_, id)| self.holds_tensors(**id));
+        let networks: Vec<(usize, Id)> = numbered.map(|(index, id)| (index, *id)).collect();
+        let chosen = match inside {
+            Some(key) => networks.iter().filter(|(index, _)| index.to_string() == key).collect(),
+            None => {
+                let keys = |id: Id| {
+                    self.pickle
+                        .entries(id)
+                        .iter()
+                        .filter_map(|(key, _)| self.pickle.text(*key))
+                };
+                let is_actor = |id: Id| keys(id).any(is_mean);
+                let actors: Vec<_> = networks.iter().filter(|(_, id)| is_actor(*id)).collect();
+                if networks.len() == 1 {
+                    networks.iter().collect()
+                } else {
+                    actors
+                }
+            }
+        };
+        let [(index, id)] = chosen.as_slice() else {
+            let numbers: Vec<String> = networks.iter().map(|(index, _)| index.to_string()).collect();
+            return Err(
+                Message::new("the file holds a tuple of networks, and none is an actor by its names alone")
+                    .found(format!("{} networks", networks.len()))
+                    .expected(format!("one of {}", numbers.join(", ")))
+                    .hint("say which: --inside NUMBER"),
+            );
+        };
+        let said = format!("of the {} networks of the tuple number {index} is read", networks.len());
+        Ok((*id, Some(said)))
     }
 
     fn several(&self, what: &str, found: &str, entries: &[(Id, Id)]) -> Message {

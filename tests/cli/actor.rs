@@ -5,7 +5,7 @@ use safetensors::SafeTensors;
 use super::Desk;
 
 /// The rest of a contract for the environment of tests/fixtures/trainers/make.py.
-const REST: &str = r#"name = "actor"
+pub const REST: &str = r#"name = "actor"
 sample_period = 1e-4
 signal = [
   { name = "v_out", unit = "V", range = [0.0, 250.0] },
@@ -21,7 +21,7 @@ feature = [
   { name = "p", source = "i_out - 5", scale = 0.2, clip = [-1.0, 1.0] },
 ]
 "#;
-const PROTECTION: &str = "[limits]\nduty = [0.1, 0.9]\n\n[fallback]\nduty = 0.0\nhold = 3\n";
+pub const PROTECTION: &str = "[limits]\nduty = [0.1, 0.9]\n\n[fallback]\nduty = 0.0\nhold = 3\n";
 
 /// What `new` made of the archive of an actor, filled in.
 fn desk(model: &str) -> Desk {

@@ -142,7 +142,10 @@ fn new_writes_a_skeleton_whose_gaps_inspect_names_one_by_one() {
     );
     let skeleton = desk.read("policy/fresh.toml");
     assert_eq!(skeleton.matches("# network input ").count(), 6, "{skeleton}");
-    assert!(skeleton.contains(&format!("duties = [{}]", ["\"TODO\""; 9].join(", "))), "{skeleton}");
+    assert!(
+        skeleton.contains(&format!("duties = [{}]", ["\"TODO\""; 9].join(", "))),
+        "{skeleton}"
+    );
     let faults = desk.refuse(
         "inspect policy/fresh.toml",
         &[

@@ -48,6 +48,11 @@ pub(crate) fn is_beside(name: &str) -> bool {
     parts(name).any(|part| BESIDE.contains(&part) || ["q1", "q2"].contains(&part))
 }
 
+/// Whether a tensor is one of the layer that gives an actor's mean.
+pub(crate) fn is_mean(name: &str) -> bool {
+    parts(name).any(|part| ["fc_mu", "fc_mean", "actor_mean", "mu"].contains(&part))
+}
+
 /// The tensors of one file, without those of critics.
 struct Names<'a>(Vec<&'a NamedTensor>);
 

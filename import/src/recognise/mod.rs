@@ -26,7 +26,7 @@ use policy::limits::{MAX_ACTIONS, MAX_FEATURES, MAX_LAYERS, MAX_WIDTH, MIN_ACTIO
 use toml_input::Message;
 
 use crate::network::{Layer, Network};
-pub(crate) use actors::Definition;
+pub(crate) use actors::{Definition, is_mean};
 
 /// A refusal, and the tensor that it is about.
 #[derive(Debug)]

@@ -62,7 +62,7 @@ impl Actor {
             Squash::ClipToSpace | Squash::Unknown => return None,
         };
         let (one, other) = (scale * low + offset, scale * high + offset);
-        Some((one.min(other), one.max(other)))
+        Some((short(one.min(other)), short(one.max(other))))
     }
 
     /// The ends of the command, where it is taken for the duty.

@@ -174,6 +174,7 @@ fn written(
         bias: true,
         activation: activation(loaded, network),
         golden: golden.is_some(),
+        is_drawn: golden.is_some(),
         continuous: actor.map(actor::Actor::entry),
         duties: actor.and_then(actor::Actor::duties),
         about: said.clone(),

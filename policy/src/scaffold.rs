@@ -123,6 +123,8 @@ pub struct Draft {
     pub activation: Option<String>,
     /// Whether `golden.safetensors` lies beside the weights.
     pub golden: bool,
+    /// Whether its observations were drawn from the bounds of the training, and not recorded.
+    pub is_drawn: bool,
     /// The entry `continuous` of `[actions]`, where the command is known to be a number.
     pub continuous: Option<String>,
     /// Least and largest duty that the network can command, where that is known.
@@ -210,6 +212,10 @@ pub fn draft(draft: &Draft) -> String {
             "q [n, actions], action [n]"
         }
     );
+    if draft.is_drawn {
+        // a drawn row is no evidence that a feature is wrong: bounds of a training reach beyond what sensors show
+        text += "golden_outside = 0.95           # they were drawn from the bounds: those that the sensors cannot show are left out\n";
+    }
     text += &actions(draft.continuous.as_deref(), *outputs);
     text + &protection(draft.duties)
 }
@@ -257,10 +263,11 @@ fn feature(input: usize, known: Option<&DraftFeature>) -> String {
 /// `[limits]` and `[fallback]`, with the ends of the command where they are known.
 fn protection(duties: Option<(f64, f64)>) -> String {
     let (low, high) = duties.unwrap_or((0.0, 1.0));
+    let limits = format!("duty = [{low:?}, {high:?}]");
     format!(
         "{MAPPING}
 [limits]
-duty = [{low:?}, {high:?}]            # check: smallest and largest duty the hardware may see
+{limits:<28} # check: smallest and largest duty the hardware may see
 # slew = 0.01                # largest change per sample period
 # soft_start = {{ from = 0.1, steps = 1000 }}
 # initial_duty = 0.5         # duty before the first step, for previous_duty and slew; otherwise the fallback duty

@@ -66,7 +66,10 @@ fn becomes_verified_code(folder: &Path, trained: &Trained, observations: usize) 
     let desk = Desk::new("minimal");
     std::fs::create_dir(desk.path("trained")).unwrap();
     std::fs::copy(folder.join(trained.file), desk.path(trained.file)).unwrap();
-    desk.succeed(&format!("new {}{} --out trained/policy.toml", trained.file, trained.options));
+    desk.succeed(&format!(
+        "new {}{} --out trained/policy.toml",
+        trained.file, trained.options
+    ));
     let draft = desk.read("trained/policy.toml");
     let (network, limits) = (draft.find("[network]").unwrap(), draft.find("[limits]").unwrap());
     let mut rest = draft[network..limits].to_owned();

@@ -62,6 +62,20 @@ fn the_actor_of_an_archive_becomes_code_that_commands_the_librarys_duties() {
     assert!(manifest.contains("\"actions\": 1"), "{manifest}");
 }
 
+/// The limits that `new` writes are the ends of the action space, of which binary32 has neighbours.
+#[test]
+fn limits_at_the_ends_of_the_command_cut_nothing_off() {
+    let desk = desk("sb3_sac_duty.zip");
+    for (limits, is_cut) in [("[0.1, 0.85]", false), ("[0.1, 0.849]", true)] {
+        let draft = desk.read("actor/policy.toml");
+        let from = draft.find("[limits]\nduty = ").unwrap();
+        let line = draft[from..].lines().nth(1).unwrap().to_owned();
+        desk.edit("actor/policy.toml", &line, &format!("duty = {limits}"));
+        let ran = desk.type_in("inspect actor");
+        assert_eq!(ran.stderr.contains("are cut off"), is_cut, "{limits}: {}", ran.stderr);
+    }
+}
+
 #[test]
 fn a_format_that_costs_too_much_of_the_duty_is_refused_until_the_contract_accepts_it() {
     let desk = desk("sb3_ppo_duty.zip");

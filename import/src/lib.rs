@@ -2,7 +2,8 @@
 //!
 //! ```text
 //!   file ──► reader ──► named tensors ──► recognise ──► Network: a plain chain, and what was folded, in words
-//!            safetensors, torch, SB3  │                     │
+//!            safetensors, torch, SB3, │                     │
+//!            MAT, numpy               │                     │
 //!                                     └──► golden ──┐       └──► Draft ──► policy.toml
 //!                                                   └──► golden.safetensors     weights.safetensors
 //! ```
@@ -12,6 +13,7 @@
 
 mod activations;
 mod actor;
+mod arrays;
 mod golden;
 mod hdf5;
 mod mat;

@@ -8,7 +8,7 @@ use crate::actor::Actor;
 use crate::network::{Layer, Network};
 use crate::recognise::Known;
 use crate::zip::Archive;
-use crate::{Options, activations, hdf5, mat, onnx, sb3, torch, zip};
+use crate::{Options, activations, arrays, hdf5, mat, onnx, sb3, torch, zip};
 
 /// What a reader found.
 #[derive(Debug, Default)]
@@ -47,7 +47,17 @@ impl Loaded {
 pub(crate) fn read(name: &FileName, bytes: Vec<u8>, options: &Options) -> Result<Loaded, Faults> {
     let fault = |message: Message| Faults::from(name.fault(message));
     if torch::is_bare_pickle(&bytes) {
-        return Err(fault(torch::legacy()));
+        let tensors = arrays::read(&bytes)
+            .map_err(fault)?
+            .ok_or_else(|| fault(torch::legacy()))?;
+        return Ok(Loaded {
+            tensors,
+            known: Known {
+                actions: options.actions,
+                ..Known::default()
+            },
+            ..Loaded::default()
+        });
     }
     if onnx::is_model(&bytes) {
         let graph = onnx::read(name, &bytes).map_err(fault)?;

@@ -362,7 +362,7 @@ fn place(index: usize, offset: usize, shape: &[usize], strides: &[usize]) -> Opt
 }
 
 /// Whether a name can stand in messages and comments, and the tensor holds anything; as in safetensors.
-fn sound(name: &str, shape: &[usize]) -> Result<(), Message> {
+pub(crate) fn sound(name: &str, shape: &[usize]) -> Result<(), Message> {
     let allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '.' | '/' | ':' | '-');
     if name.is_empty() || name.len() > MAX_TENSOR_NAME_CHARS || !name.chars().all(allowed) {
         let short: String = name.chars().take(MAX_TENSOR_NAME_CHARS).collect();

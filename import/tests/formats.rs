@@ -29,6 +29,15 @@ fn variables_structs_and_cells_of_mat_files_are_read() {
     }
 }
 
+/// RLlib's checkpoints hold a `module_state.pkl` of this kind.
+#[test]
+fn numpy_arrays_in_a_pickle_are_read() {
+    for file in ["arrays_2.pkl", "arrays_5.pkl"] {
+        let (_folder, _, policy) = policy_of(file, &Options::default());
+        assert_equals_library(&policy, "state_dict", relu, false);
+    }
+}
+
 #[test]
 fn a_mat_file_of_version_7_3_is_refused_with_the_line_that_saves_an_older_one() {
     let faults = refusal(&fixture("new.mat"));

@@ -28,6 +28,7 @@ fn refused(name: &str, bytes: &[u8], reason: &str) {
 fn damaged_files_are_refused_at_once() {
     let folder = tempfile::tempdir().unwrap();
     for name in [
+        "arrays_2.pkl",
         "flat.mat",
         "struct.mat",
         "cells.mat",
@@ -206,6 +207,11 @@ fn hostile_pickles_are_refused_at_once() {
     let idle = [&b"\x80\x02}q\x00"[..], &b"h\x000".repeat(20_000_000)].concat();
     for (name, program, reason) in [
         ("fetched and dropped", idle, "operations"),
+        (
+            "a planted call",
+            b"\x80\x02cposix\nsystem\n(U\x04truetR.".to_vec(),
+            "`posix.system`",
+        ),
         ("nested lists", lists, "values"),
         ("nested dicts", dicts, "deeper"),
         ("a dict of itself", shared, "deeper"),
@@ -220,5 +226,15 @@ fn hostile_pickles_are_refused_at_once() {
         ("an empty stack", b"\x80\x02u.".to_vec(), "ends in the middle"),
     ] {
         refused(name, &whole(&program), reason);
+        // the same without an archive
+        refused(
+            name,
+            &program,
+            if reason == "deeper" {
+                "before version 1.6"
+            } else {
+                reason
+            },
+        );
     }
 }

@@ -110,10 +110,10 @@ pub fn new_policy(file: &Path, contract: &Path, options: &Options) -> Result<New
         }
         // several chains side by side, or none: the contract's own reader explains, or asks for the prefix
         None if !loaded.is_safetensors => Err(name.fault(recognise::undecided_message(&loaded.tensors)).into()),
-        _ => Ok(NewPolicy {
+        plain => Ok(NewPolicy {
             contract: policy::new_contract(file, contract)?,
             beside: BTreeMap::new(),
-            said: Vec::new(),
+            said: plain.map_or_else(Vec::new, |network| network.said),
         }),
     }
 }

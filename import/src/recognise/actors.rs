@@ -203,7 +203,7 @@ fn stable_baselines(names: &Names<'_>) -> Result<Option<Definition>, Refusal> {
     } else if is_clipped {
         let does = "the action is action_net's output, clipped to the action space";
         Some(definition(Squash::ClipToSpace, "tanh", "PPO or A2C", does))
-    } else if names.has_sequence("mu") {
+    } else if names.has_sequence("mu") && !names.0.iter().any(|tensor| is_beside(&tensor.name)) {
         let does = "the action is a tanh of mu, from -1 to 1, scaled to the action space";
         Some(definition(TANH, "relu", "TD3 or DDPG", does))
     } else {
@@ -260,6 +260,20 @@ fn rllib(names: &Names<'_>, known: &Known) -> Result<Option<Definition>, Refusal
         is_mean_of_two: !is_free && outputs == 2,
         ..defined(squash, None, said)
     }))
+}
+
+/// What to say of a table of actions whose names could be those of several commands with their deviations.
+pub(crate) fn doubt(tensors: &[&NamedTensor], known: &Known) -> Option<String> {
+    let names = Names(tensors.to_vec());
+    let of = |folder: &str| names.outputs(folder).filter(|outputs| outputs.is_multiple_of(2));
+    let outputs = of("pi.net.mlp").or_else(|| of("module.0.module"))?;
+    known.actions.is_none().then(|| {
+        format!(
+            "{outputs} outputs are taken for {outputs} actions: the names of {} commands with their deviations would be the same, and these are not \
+             compiled",
+            outputs / 2
+        )
+    })
 }
 
 fn torchrl(names: &Names<'_>, known: &Known) -> Result<Option<Definition>, Refusal> {

@@ -92,6 +92,7 @@ pub(crate) fn recognise(tensors: &[NamedTensor], known: &Known) -> Result<Recogn
         return Ok(Recognised::Undecided);
     };
     heads::quantiles(&mut network, known)?;
+    network.said.extend(actors::doubt(&own, known));
     fits(&network, known.actions)?;
     Ok(Recognised::Network(network))
 }

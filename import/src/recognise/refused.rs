@@ -81,6 +81,15 @@ fn refusal(tensor: &NamedTensor, all: &[&NamedTensor], is_actor: bool) -> Option
                 .hint("its quantiles are drawn anew at each step; train DQN or QR-DQN"),
         );
     }
+    let stem = tensor.name.get(..tensor.name.len() - leaf.len()).unwrap_or_default();
+    if leaf == "running_mean" && all.iter().any(|other| other.name == format!("{stem}steps")) {
+        return Some(
+            Message::new("a BatchRenorm (CrossQ) is not read")
+                .found("running statistics that count their steps")
+                .expected("BatchNorm1d, or no norm")
+                .hint("its epsilon is not that of a batch norm, and the file does not hold it: train with TQC, SAC or without a norm"),
+        );
+    }
     is_layer_norm(tensor, leaf, all).then(layer_norm)
 }
 

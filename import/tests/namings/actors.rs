@@ -294,6 +294,18 @@ fn torchrl() -> Vec<Row> {
 
 /// What no library defines is asked for.
 fn unnamed() -> Vec<Row> {
+    let gaussian_of_sequences = [ending(["mu.0", "mu.2", "mu.4"], 1), dense("sigma.0", 1, 6)].concat();
+    let renorm = |stem: &str| -> Tensors {
+        let vectors = ["weight", "bias", "running_mean", "running_var"];
+        let vectors = vectors.map(|leaf| named(&format!("{stem}.{leaf}"), &[64]));
+        [&vectors[..], &[named(&format!("{stem}.steps"), &[])]].concat()
+    };
+    let crossq = [
+        dense("latent_pi.0", 64, 6),
+        renorm("latent_pi.1"),
+        dense("mu", 1, 64),
+        dense("log_std", 1, 64),
+    ];
     let own = ["fc1", "fc2", "out"];
     let open: &[&str] = &[
         "continuous = { squash = \"TODO\", scale = \"TODO\", offset = \"TODO\" }",
@@ -324,6 +336,12 @@ fn unnamed() -> Vec<Row> {
             Actor(names(own), open),
         )
         .actions(1),
+        row(
+            "mean and deviation as two sequences",
+            gaussian_of_sequences,
+            Refused(&["commands a number", "--actions 1"]),
+        ),
+        row("CrossQ's BatchRenorm", crossq.concat(), Refused(&["BatchRenorm"])),
         row(
             "Spinning Up SAC",
             gaussian(),

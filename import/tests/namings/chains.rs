@@ -1,6 +1,6 @@
 //! Tables of actions.
 
-use super::{Joined, Plain, Row, Tensors, dense, named, names, row, three};
+use super::{Doubted, Joined, Plain, Row, Tensors, dense, named, names, row, three};
 
 pub fn rows() -> Vec<Row> {
     [plain(), kernels(), joined(), dueling(), noisy(), other_tools()]
@@ -97,6 +97,7 @@ fn joined() -> Vec<Row> {
     let shared = ["encoder.encoder.net.mlp.0", "encoder.encoder.net.mlp.2", "pi.net.mlp.0"];
     let together = [three(shared), dense("vf.net.mlp.0", 1, 16)];
     let two = [super::ending(shared, 2), dense("vf.net.mlp.0", 1, 16)];
+    let four = [super::ending(shared, 4), dense("vf.net.mlp.0", 1, 16)];
     let old = [
         dense("_hidden_layers.0._model.0", 16, 6),
         dense("_hidden_layers.1._model.0", 16, 16),
@@ -146,6 +147,11 @@ fn joined() -> Vec<Row> {
             Joined(names(shared)),
         )
         .actions(2),
+        row(
+            "RLlib PPO, four outputs",
+            rllib(&four, &["pi", "vf"]),
+            Doubted(names(shared), "2 commands"),
+        ),
         row("RLlib's old models", old.concat(), Joined(names(in_old))),
         row("Tianshou PPO", ppo.concat(), Joined(names(tianshou))),
         row(

@@ -22,12 +22,14 @@ enum Becomes {
     Plain(Vec<String>),
     /// Weights of its own, of these layers.
     Joined(Vec<String>),
+    /// As the last, and a part of what is said of it.
+    Doubted(Vec<String>, &'static str),
     /// Weights of its own of a continuous actor, and parts of the text of its contract.
     Actor(Vec<String>, &'static [&'static str]),
     /// Parts of the message, which also has a way out.
     Refused(&'static [&'static str]),
 }
-use Becomes::{Actor, Joined, Plain, Refused};
+use Becomes::{Actor, Doubted, Joined, Plain, Refused};
 
 struct Row {
     name: &'static str,
@@ -99,7 +101,7 @@ fn check(row: &Row) {
             return;
         }
         Plain(stems) => (stems, true),
-        Joined(stems) | Actor(stems, _) => (stems, false),
+        Joined(stems) | Doubted(stems, _) | Actor(stems, _) => (stems, false),
     };
     let new = new.unwrap_or_else(|faults| panic!("{name}: {faults}"));
     assert_eq!(new.beside.is_empty(), is_plain, "{name}: {:?}", new.said);
@@ -110,6 +112,13 @@ fn check(row: &Row) {
     }
     let is_actor = matches!(row.becomes, Actor(..));
     assert_eq!(policy.head.continuous().is_some(), is_actor, "{name}");
+    if let Doubted(_, doubt) = row.becomes {
+        assert!(
+            new.said.iter().any(|line| line.contains(doubt)),
+            "{name}: {:?}",
+            new.said
+        );
+    }
     if let Actor(_, parts) = row.becomes {
         for part in parts {
             assert!(new.contract.contains(part), "{name}: {part}\n{}", new.contract);

@@ -3,10 +3,18 @@
 use super::{Doubted, Joined, Plain, Row, Tensors, dense, named, names, row, three};
 
 pub fn rows() -> Vec<Row> {
-    [plain(), kernels(), joined(), dueling(), noisy(), other_tools()]
-        .into_iter()
-        .flatten()
-        .collect()
+    [
+        plain(),
+        kernels(),
+        joined(),
+        of_rllib(),
+        dueling(),
+        noisy(),
+        other_tools(),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
 /// A plain chain stays in its file.
@@ -83,6 +91,40 @@ fn joined() -> Vec<Row> {
         dense("action_net", 5, 16),
         dense("value_net", 1, 16),
     ];
+    let tianshou = [
+        "actor.preprocess.model.model.0",
+        "actor.preprocess.model.model.2",
+        "actor.last.model.0",
+    ];
+    let ppo = [
+        three(tianshou),
+        dense("critic.preprocess.model.model.0", 16, 6),
+        dense("critic.preprocess.model.model.2", 16, 16),
+        dense("critic.last.model.0", 1, 16),
+    ];
+    let in_policy = [
+        "policy.model.model.model.0",
+        "policy.model.model.model.2",
+        "policy.model.model.model.4",
+    ];
+    let old_model = [
+        "model_old.module.model.model.0",
+        "model_old.module.model.model.2",
+        "model_old.module.model.model.4",
+    ];
+    let in_sb3 = ["mlp_extractor.policy_net.0", "mlp_extractor.policy_net.2", "action_net"];
+    vec![
+        row("SB3 PPO", sb3.concat(), Joined(names(in_sb3))),
+        row("Tianshou PPO", ppo.concat(), Joined(names(tianshou))),
+        row(
+            "Tianshou's DQN algorithm",
+            [three(in_policy), three(old_model)].concat(),
+            Joined(names(in_policy)),
+        ),
+    ]
+}
+
+fn of_rllib() -> Vec<Row> {
     let separate = [
         "encoder.actor_encoder.net.mlp.0",
         "encoder.actor_encoder.net.mlp.2",
@@ -111,30 +153,7 @@ fn joined() -> Vec<Row> {
         "_hidden_layers.1._model.0",
         "_logits._model.0",
     ];
-    let tianshou = [
-        "actor.preprocess.model.model.0",
-        "actor.preprocess.model.model.2",
-        "actor.last.model.0",
-    ];
-    let ppo = [
-        three(tianshou),
-        dense("critic.preprocess.model.model.0", 16, 6),
-        dense("critic.preprocess.model.model.2", 16, 16),
-        dense("critic.last.model.0", 1, 16),
-    ];
-    let in_policy = [
-        "policy.model.model.model.0",
-        "policy.model.model.model.2",
-        "policy.model.model.model.4",
-    ];
-    let old_model = [
-        "model_old.module.model.model.0",
-        "model_old.module.model.model.2",
-        "model_old.module.model.model.4",
-    ];
-    let in_sb3 = ["mlp_extractor.policy_net.0", "mlp_extractor.policy_net.2", "action_net"];
     vec![
-        row("SB3 PPO", sb3.concat(), Joined(names(in_sb3))),
         row("RLlib PPO", rllib(&apart, &["pi", "vf"]), Joined(names(separate))),
         row(
             "RLlib PPO, shared encoder",
@@ -153,12 +172,6 @@ fn joined() -> Vec<Row> {
             Doubted(names(shared), "2 commands"),
         ),
         row("RLlib's old models", old.concat(), Joined(names(in_old))),
-        row("Tianshou PPO", ppo.concat(), Joined(names(tianshou))),
-        row(
-            "Tianshou's DQN algorithm",
-            [three(in_policy), three(old_model)].concat(),
-            Joined(names(in_policy)),
-        ),
     ]
 }
 

@@ -1,14 +1,19 @@
 //! Continuous actors: the way from the last layer to a command, as the contract's `[actions]` says it.
 
+use policy::Activation;
 use toml_input::Message;
 
 /// What bounds the output of an actor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Squash {
-    /// tanh: SAC, TD3, DDPG.
-    Tanh,
+    /// A curve with two ends: tanh of SAC, TD3 and DDPG.
+    Curve(Activation),
     /// The output itself between two ends: PPO, A2C.
     Clip(f64, f64),
+    /// The output itself between the ends of an action space that the file does not hold.
+    ClipToSpace,
+    /// The file does not say.
+    Unknown,
 }
 
 /// An actor with one command.
@@ -19,12 +24,22 @@ pub(crate) struct Actor {
     pub affine: Option<(f64, f64)>,
 }
 
+/// The tanh of SAC, TD3 and DDPG.
+pub(crate) const TANH: Squash = Squash::Curve(Activation::Tanh);
+
+impl Squash {
+    /// A curve that a contract takes behind its last layer.
+    pub fn curve(activation: Activation) -> Option<Self> {
+        activation.range().map(|_| Self::Curve(activation))
+    }
+}
+
 impl Actor {
     /// A tanh whose ends are those of an action space.
     pub fn of_space(low: f64, high: f64) -> Self {
         let (low, high) = (short(low), short(high));
         Self {
-            squash: Squash::Tanh,
+            squash: TANH,
             affine: Some((0.5 * (high - low), 0.5 * (high + low))),
         }
     }
@@ -38,34 +53,50 @@ impl Actor {
     }
 
     /// Least and largest command, in the units of the file.
-    fn ends(self) -> Option<(f64, f64)> {
+    pub fn ends(self) -> Option<(f64, f64)> {
         let (scale, offset) = self.affine?;
         let (low, high) = match self.squash {
-            Squash::Tanh => (-1.0, 1.0),
+            Squash::Curve(curve) => curve.range().map(|range| (range.low, range.high))?,
             Squash::Clip(low, high) => (low, high),
+            Squash::ClipToSpace | Squash::Unknown => return None,
         };
         let (one, other) = (scale * low + offset, scale * high + offset);
-        Some((one.min(other), one.max(other)))
+        Some((short(one.min(other)), short(one.max(other))))
+    }
+
+    /// The ends of the command, where it is taken for the duty.
+    pub fn duties(self) -> Option<(f64, f64)> {
+        self.ends().filter(|(low, high)| *low >= 0.0 && *high <= 1.0)
     }
 
     /// The entry `continuous` of `[actions]`, with what to think of it beside. A command within 0..1 is taken for a duty.
     pub fn entry(self) -> String {
         let squash = match self.squash {
-            Squash::Tanh => "squash = \"tanh\"".to_owned(),
+            Squash::Curve(curve) => format!("squash = {}", curve.written()),
             Squash::Clip(low, high) => format!("clip = [{low:?}, {high:?}]"),
+            // ends that are no duties are refused until a scale stands beside them: nothing wrong can pass
+            Squash::ClipToSpace => {
+                return "continuous = { clip = [\"TODO\", \"TODO\"] }   # ends of the action space; if its action is no duty, \
+                        scale and offset, too: duty = scale * s + offset"
+                    .to_owned();
+            }
+            Squash::Unknown => {
+                return "continuous = { squash = \"TODO\", scale = \"TODO\", offset = \"TODO\" }   # or { clip = [lo, hi] }: a clipped mean"
+                    .to_owned();
+            }
         };
-        match (self.affine, self.ends()) {
-            (Some((scale, offset)), Some((low, high))) if low >= 0.0 && high <= 1.0 => {
+        match (self.affine, self.duties()) {
+            (Some((scale, offset)), Some((low, high))) => {
                 let scaled = match (scale, offset) {
                     (1.0, 0.0) => String::new(),
                     _ => format!(", scale = {scale:?}, offset = {offset:?}"),
                 };
                 format!(
-                    "continuous = {{ {squash}{scaled} }}   # the command is {low:?} to {high:?}, taken for the duty"
+                    "continuous = {{ {squash}{scaled} }}   # check: the command is {low:?} to {high:?}, taken for the duty"
                 )
             }
-            (_, ends) => {
-                let whose = ends.map_or_else(String::new, |(low, high)| {
+            _ => {
+                let whose = self.ends().map_or_else(String::new, |(low, high)| {
                     format!("; the training's own command is {low:?} to {high:?}")
                 });
                 format!(
@@ -78,10 +109,16 @@ impl Actor {
     /// What was recognised, in a sentence.
     pub fn said(self) -> String {
         match self.squash {
-            Squash::Tanh => {
-                "a continuous actor: the duty is a tanh of the one output; of SAC that is its mean".to_owned()
+            Squash::Curve(curve) => {
+                format!(
+                    "a continuous actor: the duty is a {} of the one output; of SAC that is its mean",
+                    curve.word()
+                )
             }
-            Squash::Clip(..) => "a continuous actor: the duty is the mean, clipped to the action space".to_owned(),
+            Squash::Clip(..) | Squash::ClipToSpace => {
+                "a continuous actor: the duty is the mean, clipped to the action space".to_owned()
+            }
+            Squash::Unknown => "a continuous actor: what squashes and scales its one output is yours to say".to_owned(),
         }
     }
 }
@@ -92,7 +129,7 @@ pub(crate) fn scaled(found: Option<(f64, f64)>) -> (f64, f64) {
 }
 
 /// Numbers of a space are binary32: 0.1 and not 0.10000000149011612.
-fn short(x: f64) -> f64 {
+pub(crate) fn short(x: f64) -> f64 {
     format!("{:?}", x as f32).parse().unwrap_or(x)
 }
 

@@ -2,7 +2,8 @@
 //!
 //! ```text
 //!   file ──► reader ──► named tensors ──► recognise ──► Network: a plain chain, and what was folded, in words
-//!            safetensors, torch, SB3  │                     │
+//!            safetensors, torch, SB3, │                     │
+//!            MAT, numpy               │                     │
 //!                                     └──► golden ──┐       └──► Draft ──► policy.toml
 //!                                                   └──► golden.safetensors     weights.safetensors
 //! ```
@@ -10,8 +11,12 @@
 //! A file is data here: nothing that it names is called, imported or executed. Every size that it claims is held against its
 //! own length before anything is allocated. What users see: docs/reference/saved-models.md.
 
+mod activations;
 mod actor;
+mod arrays;
 mod golden;
+mod hdf5;
+mod mat;
 mod network;
 mod numpy;
 mod onnx;
@@ -105,10 +110,10 @@ pub fn new_policy(file: &Path, contract: &Path, options: &Options) -> Result<New
         }
         // several chains side by side, or none: the contract's own reader explains, or asks for the prefix
         None if !loaded.is_safetensors => Err(name.fault(recognise::undecided_message(&loaded.tensors)).into()),
-        _ => Ok(NewPolicy {
+        plain => Ok(NewPolicy {
             contract: policy::new_contract(file, contract)?,
             beside: BTreeMap::new(),
-            said: Vec::new(),
+            said: plain.map_or_else(Vec::new, |network| network.said),
         }),
     }
 }
@@ -144,7 +149,10 @@ fn written(
     let golden = golden_answers(loaded, network, statistics).map_err(|message| name.fault(message))?;
     let mut said = loaded.about.clone();
     said.extend(network.said.iter().cloned());
-    said.extend(loaded.actor.map(actor::Actor::said));
+    let definition = network.definition.as_ref();
+    let actor = definition.map(|definition| definition.actor).or(loaded.actor);
+    said.extend(actor.map(actor::Actor::said));
+    said.extend(definition.iter().flat_map(|definition| definition.said.iter().cloned()));
     if !statistics.is_empty() && loaded.graph.as_ref().is_none_or(|graph| graph.features.is_empty()) {
         said.push("VecNormalize: scale = 1/sqrt(var + epsilon), offset = -mean/sqrt(var + epsilon), then clip, all computed in f64".to_owned());
     }
@@ -166,14 +174,16 @@ fn written(
         chains: vec![chain(network)],
         hidden: network.layers.len() > 1,
         bias: true,
-        activation: activation(loaded),
+        activation: activation(loaded, network),
         golden: golden.is_some(),
-        continuous: loaded.actor.map(actor::Actor::entry),
+        is_drawn: golden.is_some(),
+        continuous: actor.map(actor::Actor::entry),
+        duties: actor.and_then(actor::Actor::duties),
         about: said.clone(),
-        features: if statistics.is_empty() {
-            of_bounds(&loaded.bounds)
-        } else {
-            statistics.to_vec()
+        features: match definition {
+            _ if !statistics.is_empty() => statistics.to_vec(),
+            Some(definition) if definition.is_normalised => vec![open(); inputs],
+            _ => of_bounds(&loaded.bounds),
         },
     };
     let mut beside = BTreeMap::from([(file.to_owned(), network.to_safetensors(name)?)]);
@@ -186,9 +196,13 @@ fn written(
 }
 
 /// The activations behind the hidden layers, as TOML.
-fn activation(loaded: &Loaded) -> Option<String> {
+fn activation(loaded: &Loaded, network: &Network) -> Option<String> {
     let Some(graph) = &loaded.graph else {
-        return loaded.activation.map(|activation| activation.written());
+        let defined = || network.definition.as_ref()?.activation.clone();
+        return loaded
+            .activation
+            .map(|activation| activation.written())
+            .or_else(defined);
     };
     let written: Vec<String> = graph
         .activations
@@ -236,11 +250,19 @@ fn is_range((low, high): &(f64, f64)) -> bool {
     low < high && low.abs() < LARGEST_BOUND && high.abs() < LARGEST_BOUND
 }
 
+/// A feature of a training that normalised it, with numbers that are not here.
+fn open() -> DraftFeature {
+    DraftFeature {
+        is_open: true,
+        ..DraftFeature::default()
+    }
+}
+
 /// A clip for each bounded observation.
 fn of_bounds(bounds: &[(f64, f64)]) -> Vec<DraftFeature> {
     let feature = |bound: &(f64, f64)| DraftFeature {
-        affine: None,
         clip: is_range(bound).then(|| (bound.0, bound.1, "bounds of the observation space".to_owned())),
+        ..DraftFeature::default()
     };
     bounds.iter().map(feature).collect()
 }

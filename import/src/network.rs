@@ -6,6 +6,8 @@ use safetensors::Dtype;
 use safetensors::tensor::TensorView;
 use toml_input::{FileName, Message};
 
+use crate::recognise::Definition;
+
 /// A dense layer in binary64, before it is rounded: `y = W x + b`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layer {
@@ -50,6 +52,8 @@ pub struct Network {
     pub choice_only: bool,
     /// What was joined, folded, renamed or left out, a sentence each.
     pub said: Vec<String>,
+    /// Of a continuous actor: what its names say beyond the layers.
+    pub(crate) definition: Option<Definition>,
 }
 
 impl Network {

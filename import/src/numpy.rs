@@ -7,32 +7,67 @@ pub(crate) fn array(pickle: &Pickle, id: Id) -> Option<Vec<f64>> {
     if let Some(number) = pickle.number(id) {
         return Some(vec![number]);
     }
-    let Item::Object(object) = pickle.item(id) else {
-        return None;
-    };
-    let arguments = pickle.list(object.arguments)?;
-    let (dtype, bytes) = if object.class.ends_with("._frombuffer") {
-        // (bytes, dtype, shape, order)
-        let [bytes, dtype, ..] = arguments else { return None };
-        (*dtype, *bytes)
-    } else if object.class.ends_with(".scalar") {
-        let [dtype, bytes, ..] = arguments else { return None };
-        (*dtype, *bytes)
-    } else if object.class.ends_with("._reconstruct") {
-        // (version, shape, dtype, is_fortran, bytes)
-        let [_, _, dtype, _, bytes, ..] = pickle.list(object.state?)? else {
-            return None;
-        };
-        (*dtype, *bytes)
-    } else {
-        return None;
-    };
-    let bytes = match pickle.item(bytes) {
+    let parts = parts(pickle, id)?;
+    let bytes = match pickle.item(parts.bytes) {
         Item::Bytes(bytes) => bytes.clone(),
         Item::Object(object) => encoded(pickle, object)?,
         _ => return None,
     };
-    numbers(&kind(pickle, dtype)?, &bytes)
+    numbers(&kind(pickle, parts.dtype)?, &bytes)
+}
+
+/// Shape and elements of an array of floats whose last axis runs fastest.
+pub(crate) fn shaped(pickle: &Pickle, id: Id) -> Option<(Vec<usize>, Vec<f64>)> {
+    let parts = parts(pickle, id).filter(|parts| !parts.is_fortran)?;
+    let sizes = pickle.list(parts.shape?)?.iter().map(|size| pickle.size(*size));
+    let shape: Vec<usize> = sizes.collect::<Option<_>>()?;
+    if !kind(pickle, parts.dtype)?.contains('f') {
+        return None;
+    }
+    let values = array(pickle, id)?;
+    let count = shape
+        .iter()
+        .try_fold(1_usize, |product, size| product.checked_mul(*size));
+    (count == Some(values.len())).then_some((shape, values))
+}
+
+/// What an array is rebuilt from.
+struct Parts {
+    dtype: Id,
+    bytes: Id,
+    /// None of a number.
+    shape: Option<Id>,
+    is_fortran: bool,
+}
+
+fn parts(pickle: &Pickle, id: Id) -> Option<Parts> {
+    let Item::Object(object) = pickle.item(id) else {
+        return None;
+    };
+    let arguments = pickle.list(object.arguments)?;
+    let of = |dtype: &Id, bytes: &Id, shape: Option<&Id>, is_fortran| Parts {
+        dtype: *dtype,
+        bytes: *bytes,
+        shape: shape.copied(),
+        is_fortran,
+    };
+    if object.class.ends_with("._frombuffer") {
+        let [bytes, dtype, shape, order, ..] = arguments else {
+            return None;
+        };
+        Some(of(dtype, bytes, Some(shape), pickle.text(*order) == Some("F")))
+    } else if object.class.ends_with(".scalar") {
+        let [dtype, bytes, ..] = arguments else { return None };
+        Some(of(dtype, bytes, None, false))
+    } else if object.class.ends_with("._reconstruct") {
+        let [_version, shape, dtype, is_fortran, bytes, ..] = pickle.list(object.state?)? else {
+            return None;
+        };
+        let is_fortran = pickle.item(*is_fortran) == &Item::Bool(true);
+        Some(of(dtype, bytes, Some(shape), is_fortran))
+    } else {
+        None
+    }
 }
 
 /// Protocol 2 has no bytes: `_codecs.encode("...", "latin1")`, or a bytearray of such.

@@ -1,15 +1,14 @@
 //! Which reader a file is for, by its content and not by its name.
 
-use std::collections::BTreeSet;
-
 use policy::{Activation, NamedTensor};
 use toml_input::{Faults, FileName, Message};
 
+use crate::activations::Parameters;
 use crate::actor::Actor;
 use crate::network::{Layer, Network};
 use crate::recognise::Known;
 use crate::zip::Archive;
-use crate::{Options, onnx, sb3, torch, zip};
+use crate::{Options, activations, arrays, hdf5, mat, onnx, sb3, torch, zip};
 
 /// What a reader found.
 #[derive(Debug, Default)]
@@ -39,6 +38,7 @@ impl Loaded {
             layers: layers.clone(),
             plain: false,
             choice_only: false,
+            definition: None,
         })
     }
 }
@@ -47,7 +47,17 @@ impl Loaded {
 pub(crate) fn read(name: &FileName, bytes: Vec<u8>, options: &Options) -> Result<Loaded, Faults> {
     let fault = |message: Message| Faults::from(name.fault(message));
     if torch::is_bare_pickle(&bytes) {
-        return Err(fault(torch::legacy()));
+        let tensors = arrays::read(&bytes)
+            .map_err(fault)?
+            .ok_or_else(|| fault(torch::legacy()))?;
+        return Ok(Loaded {
+            tensors,
+            known: Known {
+                actions: options.actions,
+                ..Known::default()
+            },
+            ..Loaded::default()
+        });
     }
     if onnx::is_model(&bytes) {
         let graph = onnx::read(name, &bytes).map_err(fault)?;
@@ -57,10 +67,18 @@ pub(crate) fn read(name: &FileName, bytes: Vec<u8>, options: &Options) -> Result
             ..Loaded::default()
         });
     }
+    if hdf5::is_file(&bytes) {
+        return Err(fault(hdf5::refused(&bytes)));
+    }
     if !zip::is_archive(&bytes) {
+        let is_mat = mat::is_mat(&bytes);
         return Ok(Loaded {
-            tensors: policy::named_tensors(name, bytes)?,
-            is_safetensors: true,
+            tensors: if is_mat {
+                mat::read(&bytes).map_err(fault)?
+            } else {
+                policy::named_tensors(name, bytes)?
+            },
+            is_safetensors: !is_mat,
             known: Known {
                 actions: options.actions,
                 ..Known::default()
@@ -77,7 +95,7 @@ pub(crate) fn read(name: &FileName, bytes: Vec<u8>, options: &Options) -> Result
     }
     let torch = torch::read(&archive, options.inside.as_deref()).map_err(fault)?;
     let mut about = torch.said;
-    let activation = activation(&torch.modules);
+    let activation = activation(&torch.modules).map_err(fault)?;
     if let Some(activation) = activation {
         about.push(format!(
             "the only activation in the module that was saved: {}",
@@ -120,15 +138,27 @@ fn model(archive: &Archive<'_>, options: &Options) -> Result<Loaded, Message> {
 }
 
 /// The activation of a module that holds one kind alone.
-fn activation(modules: &[(String, String)]) -> Option<Activation> {
-    let class =
-        |(_, class): &'_ (String, String)| class.strip_prefix("torch.nn.modules.activation.").map(str::to_owned);
-    let kinds: BTreeSet<String> = modules.iter().filter_map(class).collect();
-    match kinds.iter().collect::<Vec<_>>().as_slice() {
-        // a slope stands among the module's attributes, not in its class
-        [only] if *only != "LeakyReLU" => sb3::torch_activation(only),
-        _ => None,
+fn activation(modules: &[torch::Module]) -> Result<Option<Activation>, Message> {
+    let folder = "torch.nn.modules.activation.";
+    let mut kinds = Vec::new();
+    for module in modules {
+        let Some(class) = module.class.strip_prefix(folder) else {
+            continue;
+        };
+        // behind the last layer it keeps the order of the outputs
+        if ["Softmax", "LogSoftmax"].contains(&class) {
+            continue;
+        }
+        let parameters = Parameters {
+            number: module.number,
+            approximate: module.approximate.as_deref(),
+        };
+        kinds.push(
+            activations::of_torch(class, parameters).ok_or_else(|| activations::not_compiled(class, parameters))?,
+        );
     }
+    let is_one = kinds.iter().all(|kind| kinds.first() == Some(kind));
+    Ok(kinds.first().copied().filter(|_| is_one))
 }
 
 fn no_model(archive: &Archive<'_>) -> Message {
@@ -138,8 +168,13 @@ fn no_model(archive: &Archive<'_>) -> Message {
         .take(6)
         .map(|name| name.escape_debug().to_string())
         .collect();
+    if archive.get("model.weights.h5").is_some() {
+        return Message::new("a .keras file is not read")
+            .found("a .keras file: its weights are HDF5")
+            .expected("ONNX, safetensors, a torch file, or a model of stable-baselines3")
+            .hint(hdf5::KERAS);
+    }
     Message::new("this archive holds no model that is read")
         .found(format!("{} members: {}", archive.members.len(), names.join(", ")))
         .expected("`data.pkl` of torch.save, or `data` and `policy.pth` of stable-baselines3")
-        .hint("a .keras file: save the weights of each layer with safetensors.numpy.save_file")
 }

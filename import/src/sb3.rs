@@ -7,6 +7,7 @@ use policy::{Activation, NamedTensor};
 use serde_json::Value;
 use toml_input::Message;
 
+use crate::activations;
 use crate::actor::{self, Actor};
 use crate::network::Layer;
 use crate::numpy;
@@ -231,22 +232,10 @@ fn activation(kwargs: &Value, class: &Class) -> Result<Activation, Message> {
         return Ok(class.activation);
     };
     let name = given.trim_end_matches("'>").rsplit('.').next().unwrap_or(given);
-    torch_activation(name).ok_or_else(|| {
-        let known: Vec<String> = Activation::EACH.iter().map(|each| each.written()).collect();
-        other("this activation is not compiled", name, &known.join(", "))
+    let plain = activations::Parameters::default();
+    activations::of_torch(name, plain).ok_or_else(|| {
+        activations::not_compiled(&printable(name), plain)
             .hint("train with one of these: policy_kwargs = dict(activation_fn=...)")
-    })
-}
-
-/// The activation that a class of torch.nn makes without arguments.
-pub(crate) fn torch_activation(class: &str) -> Option<Activation> {
-    Some(match class {
-        "ReLU" => Activation::Relu,
-        "Tanh" => Activation::Tanh,
-        "Softsign" => Activation::Softsign,
-        "Identity" => Activation::Identity,
-        "LeakyReLU" => Activation::LeakyRelu { slope: 0.01 },
-        _ => return None,
     })
 }
 

@@ -8,17 +8,26 @@ use policy::limits::MAX_TENSOR_NAME_CHARS;
 use toml_input::Message;
 
 use crate::pickle::{Id, Item, Object, Pickle};
+use crate::recognise::is_mean;
 use crate::zip::Archive;
 
 /// What a torch file holds.
 #[derive(Debug, Default)]
 pub(crate) struct Torch {
     pub tensors: Vec<NamedTensor>,
-    /// Classes of the modules, by their names in the module that was saved.
-    pub modules: Vec<(String, String)>,
+    pub modules: Vec<Module>,
     /// Epsilon of the modules that have one.
     pub epsilons: Vec<(String, f64)>,
     pub said: Vec<String>,
+}
+
+/// A module of a whole module that was saved: its class, and what an activation holds.
+#[derive(Debug)]
+pub(crate) struct Module {
+    pub class: String,
+    /// `negative_slope` or `alpha`.
+    pub number: Option<f64>,
+    pub approximate: Option<String>,
 }
 
 /// Keys of what belongs to the training alone.
@@ -30,7 +39,9 @@ const MOST_VISITS: usize = 200_000;
 
 /// Whether `bytes` are in the format that torch wrote before version 1.6, or a pickle that is none of torch's.
 pub(crate) fn is_bare_pickle(bytes: &[u8]) -> bool {
-    matches!(bytes, [0x80, 2..=5, ..])
+    // a header of safetensors may be 0x0280 bytes long: its length is a number of 8 bytes, and `{` follows
+    let is_length = bytes.get(4..9) == Some(b"\0\0\0\0{");
+    matches!(bytes, [0x80, 2..=5, ..]) && !is_length
 }
 
 pub(crate) fn legacy() -> Message {
@@ -93,6 +104,9 @@ impl<'a> Walk<'a> {
     /// Where the network begins: at the root, or at the only entry that holds one.
     fn start(&mut self, inside: Option<&str>) -> Result<(Id, Option<String>), Message> {
         let root = self.pickle.root;
+        if let Some(list) = self.pickle.list(root) {
+            return self.one_of(list, inside);
+        }
         let entries = self.pickle.entries(root);
         if let Some(key) = inside {
             let found = self.pickle.get(entries, key).map(|id| (id, None));
@@ -119,6 +133,41 @@ impl<'a> Walk<'a> {
             [] => Ok((root, None)),
             _ => Err(self.several("the checkpoint holds more than one network", "", entries)),
         }
+    }
+
+    /// CleanRL's files for continuous actions save actor and critics as a tuple.
+    fn one_of(&self, list: &[Id], inside: Option<&str>) -> Result<(Id, Option<String>), Message> {
+        let numbered = list.iter().enumerate().filter(|(_, id)| self.holds_tensors(**id));
+        let networks: Vec<(usize, Id)> = numbered.map(|(index, id)| (index, *id)).collect();
+        let chosen = match inside {
+            Some(key) => networks.iter().filter(|(index, _)| index.to_string() == key).collect(),
+            None => {
+                let keys = |id: Id| {
+                    self.pickle
+                        .entries(id)
+                        .iter()
+                        .filter_map(|(key, _)| self.pickle.text(*key))
+                };
+                let is_actor = |id: Id| keys(id).any(is_mean);
+                let actors: Vec<_> = networks.iter().filter(|(_, id)| is_actor(*id)).collect();
+                if networks.len() == 1 {
+                    networks.iter().collect()
+                } else {
+                    actors
+                }
+            }
+        };
+        let [(index, id)] = chosen.as_slice() else {
+            let numbers: Vec<String> = networks.iter().map(|(index, _)| index.to_string()).collect();
+            return Err(
+                Message::new("the file holds a tuple of networks, and none is an actor by its names alone")
+                    .found(format!("{} networks", networks.len()))
+                    .expected(format!("one of {}", numbers.join(", ")))
+                    .hint("say which: --inside NUMBER"),
+            );
+        };
+        let said = format!("of the {} networks of the tuple number {index} is read", networks.len());
+        Ok((*id, Some(said)))
     }
 
     fn several(&self, what: &str, found: &str, entries: &[(Id, Id)]) -> Message {
@@ -165,7 +214,16 @@ impl<'a> Walk<'a> {
         let pickle = self.pickle;
         let attributes = pickle.attributes(id);
         if let (Item::Object(object), Some(modules)) = (pickle.item(id), pickle.get(attributes, "_modules")) {
-            self.found.modules.push((name.to_owned(), object.class.clone()));
+            let attribute = |key| pickle.get(attributes, key);
+            self.found.modules.push(Module {
+                class: object.class.clone(),
+                number: attribute("negative_slope")
+                    .or_else(|| attribute("alpha"))
+                    .and_then(|id| pickle.number(id)),
+                approximate: attribute("approximate")
+                    .and_then(|id| pickle.text(id))
+                    .map(str::to_owned),
+            });
             if let Some(epsilon) = pickle.get(attributes, "eps").and_then(|id| pickle.number(id)) {
                 self.found.epsilons.push((name.to_owned(), epsilon));
             }
@@ -304,7 +362,7 @@ fn place(index: usize, offset: usize, shape: &[usize], strides: &[usize]) -> Opt
 }
 
 /// Whether a name can stand in messages and comments, and the tensor holds anything; as in safetensors.
-fn sound(name: &str, shape: &[usize]) -> Result<(), Message> {
+pub(crate) fn sound(name: &str, shape: &[usize]) -> Result<(), Message> {
     let allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '.' | '/' | ':' | '-');
     if name.is_empty() || name.len() > MAX_TENSOR_NAME_CHARS || !name.chars().all(allowed) {
         let short: String = name.chars().take(MAX_TENSOR_NAME_CHARS).collect();

@@ -43,6 +43,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Vec<DraftFeature>, Message> {
         DraftFeature {
             affine: Some((1.0 / deviation, -mean / deviation)),
             clip: Some((-clip, clip, "clip_obs of VecNormalize".to_owned())),
+            ..DraftFeature::default()
         }
     };
     Ok(mean.iter().zip(&var).map(feature).collect())

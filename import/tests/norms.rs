@@ -8,9 +8,10 @@ use common::{Saved, dense, named};
 #[test]
 fn a_batch_norm_is_folded_where_its_place_is_known() {
     let norm = |stem: &str, width: usize| {
-        ["weight", "bias", "running_mean", "running_var"]
-            .map(|leaf| named(&format!("{stem}.{leaf}"), &[width]))
-            .to_vec()
+        let vectors = ["weight", "bias", "running_mean", "running_var"];
+        let vectors = vectors.map(|leaf| named(&format!("{stem}.{leaf}"), &[width]));
+        // torch counts its batches beside them, without an axis
+        [&vectors[..], &[named(&format!("{stem}.num_batches_tracked"), &[])]].concat()
     };
     let x = [0.3, -1.2, 0.7, 0.1, -0.4, 0.9];
     for (name, chain, at) in [

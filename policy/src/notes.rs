@@ -159,7 +159,9 @@ fn beyond_limits(limits: &Limits, duties: &[f64], mapping: Option<&Mapping>) -> 
     if mapping.is_some() {
         return None;
     }
-    let cut = |duty: &&f64| **duty < limits.duty.low || **duty > limits.duty.high;
+    // the ends of a command are binary32, and those of the limits as they were written: a rounding is no cut
+    let rounding = f64::from(f32::EPSILON);
+    let cut = |duty: &&f64| **duty < limits.duty.low - rounding || **duty > limits.duty.high + rounding;
     let beyond: Vec<_> = duties.iter().filter(cut).map(f64::to_string).collect();
     (!beyond.is_empty()).then(|| format!("duties outside the limits are cut off: {}", beyond.join(", ")))
 }

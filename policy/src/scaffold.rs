@@ -1,5 +1,5 @@
-//! The text of a new contract for a file of weights: the counts are filled in, everything else says TODO, because
-//! weights do not say it and a guess would go unnoticed.
+//! The text of a new contract for a file of weights. What a wrong guess would make a wrong answer says TODO. What has a
+//! default that is right or harmless has it, marked with `check`: a contract is read line by line once, and not written.
 
 use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
@@ -123,8 +123,12 @@ pub struct Draft {
     pub activation: Option<String>,
     /// Whether `golden.safetensors` lies beside the weights.
     pub golden: bool,
+    /// Whether its observations were drawn from the bounds of the training, and not recorded.
+    pub is_drawn: bool,
     /// The entry `continuous` of `[actions]`, where the command is known to be a number.
     pub continuous: Option<String>,
+    /// Least and largest duty that the network can command, where that is known.
+    pub duties: Option<(f64, f64)>,
     /// Lines about the whole, without `#`.
     pub about: Vec<String>,
     /// What is known of each input; may be shorter than `inputs`.
@@ -136,6 +140,8 @@ pub struct Draft {
 pub struct DraftFeature {
     /// `scale * x + offset`.
     pub affine: Option<(f64, f64)>,
+    /// The training scaled it by numbers that nobody has said yet: not to be taken for 1 and 0.
+    pub is_open: bool,
     /// Smallest and largest value that the network has seen, and who says so.
     pub clip: Option<(f64, f64, String)>,
 }
@@ -158,19 +164,17 @@ pub fn draft(draft: &Draft) -> String {
     };
     let mut text = format!(
         "# Contract of a trained policy: {inputs} inputs, {answers}.\n\
-         # Replace every \"TODO\"; until then the check names those that are left. Units are SI.\n"
+         # Replace every \"TODO\"; until then `policyc inspect` names those that are left. What says `check` is a default to\n\
+         # look at. Units are SI.\n"
     );
     for line in &draft.about {
         let _ = writeln!(text, "# {line}");
     }
     text += HEAD;
     for input in 0..*inputs {
-        let _ = write!(
-            text,
-            "\n# network input {input}{FEATURE}{}",
-            normalisation(draft.features.get(input))
-        );
+        text += &feature(input, draft.features.get(input));
     }
+    text += "]\n";
     let _ = write!(text, "\n[network]\nweights = {file}\n");
     if weights.starts_with("..") || Path::new(weights).is_absolute() {
         text += "# outside this folder: copy it here, or say --allow-outside to every command\n";
@@ -208,8 +212,12 @@ pub fn draft(draft: &Draft) -> String {
             "q [n, actions], action [n]"
         }
     );
+    if draft.is_drawn {
+        // a drawn row is no evidence that a feature is wrong: bounds of a training reach beyond what sensors show
+        text += "golden_outside = 0.95           # they were drawn from the bounds: those that the sensors cannot show are left out\n";
+    }
     text += &actions(draft.continuous.as_deref(), *outputs);
-    text + TAIL
+    text + &protection(draft.duties)
 }
 
 fn actions(continuous: Option<&str>, outputs: usize) -> String {
@@ -222,79 +230,79 @@ fn actions(continuous: Option<&str>, outputs: usize) -> String {
             "{actor}continuous = {{ squash = \"TODO\", scale = \"TODO\", offset = \"TODO\" }}   # or {{ clip = [lo, hi] }}: a clipped mean\n"
         ),
         None => {
-            let mut text =
-                "\n[actions]                    # duty ratio of each network output, 0 to 1\nduties = [\n".to_owned();
-            for output in 0..outputs {
-                let _ = writeln!(text, "    \"TODO\",   # action {output}");
+            let mut text = format!(
+                "\n[actions]                    # duty ratio of each network output, 0 to 1, action 0 to {}\nduties = [",
+                outputs.saturating_sub(1)
+            );
+            // as many as a line of the rest holds
+            for (output, row) in (0..outputs).collect::<Vec<_>>().chunks(12).enumerate() {
+                text += if output == 0 { "" } else { ",\n          " };
+                text += &vec!["\"TODO\""; row.len()].join(", ");
             }
             text + "]\n"
         }
     }
 }
 
-/// Scale, offset and clip of a feature.
-fn normalisation(known: Option<&DraftFeature>) -> String {
-    let mut text = String::new();
+/// One row of the observation.
+fn feature(input: usize, known: Option<&DraftFeature>) -> String {
+    let mut row = format!("  {{ name = \"x{input}\", source = \"TODO\"");
     match known.and_then(|feature| feature.affine) {
-        Some((scale, offset)) => drop(writeln!(text, "scale = {scale:?}\noffset = {offset:?}")),
-        None => text += AFFINE,
+        Some((scale, offset)) => drop(write!(row, ", scale = {scale:?}, offset = {offset:?}")),
+        None if known.is_some_and(|feature| feature.is_open) => row += ", scale = \"TODO\", offset = \"TODO\"",
+        None => {}
     }
-    match known.and_then(|feature| feature.clip.as_ref()) {
-        Some((low, high, who)) => drop(writeln!(text, "clip = [{low:?}, {high:?}]   # {who}")),
-        None => text += CLIP,
+    let mut who = String::new();
+    if let Some((low, high, says)) = known.and_then(|feature| feature.clip.as_ref()) {
+        let _ = write!(row, ", clip = [{low:?}, {high:?}]");
+        who = format!("; clip: {says}");
     }
-    text
+    format!("{row} }},   # network input {input}{who}\n")
+}
+
+/// `[limits]` and `[fallback]`, with the ends of the command where they are known.
+fn protection(duties: Option<(f64, f64)>) -> String {
+    let (low, high) = duties.unwrap_or((0.0, 1.0));
+    let limits = format!("duty = [{low:?}, {high:?}]");
+    format!(
+        "{MAPPING}
+[limits]
+{limits:<28} # check: smallest and largest duty the hardware may see
+# slew = 0.01                # largest change per sample period
+# soft_start = {{ from = 0.1, steps = 1000 }}
+# initial_duty = 0.5         # duty before the first step, for previous_duty and slew; otherwise the fallback duty
+
+[fallback]
+duty = 0.0                   # check: commanded without a usable measurement; in a synchronous leg 0 keeps the lower switch on
+hold = 3                     # check: bad samples bridged with the last good one
+"
+    )
 }
 
 const HEAD: &str = "\
-name = \"TODO\"                # a-z, 0-9, _: files and symbols begin with it
+name = \"controller\"          # check: a-z, 0-9, _; files and symbols begin with it
 sample_period = \"TODO\"       # s: control period
+# parameters = { v_ref = 100.0 }   # constants for the sources below
 
-# Constants for use in the features:
-# [parameters]
-# v_ref = 100.0
+# What the firmware measures, one row each: { name = \"v_out\", unit = \"V\", range = [0.0, 250.0] }. A sample outside of its range is
+# no plausible one, and the last good one is held. With adc = { gain = 0.0625, offset = 0.0 } it arrives as an ADC code.
+signal = [
+  { name = \"TODO\", unit = \"TODO\", range = [\"TODO\", \"TODO\"] },
+]
 
-# One [[signal]] per measured quantity.
-[[signal]]
-name = \"TODO\"                # such as v_out
-unit = \"TODO\"                # such as V
-range = [\"TODO\", \"TODO\"]     # plausible; a sample outside is held
-# adc = { gain = 0.0625, offset = 0.0 }   # if it arrives as an ADC code
-
-# The observation, one [[feature]] per network input, in the order of the training.
+# The observation, one row for each network input, in the order of the training.
+#   source         affine in signals, parameters, previous_duty, previous_command: \"v_ref - v_out\"
+#   filters        first to last: [{ delay = 1 }]; also { integrator = { min = -1.0, max = 1.0 } }, { moving_average = 4 },
+#                  { low_pass = { time_constant = 1e-3 } }, { filtered_derivative = { cutoff = 500.0 } },
+#                  \"backward_difference\": (x - the sample before) / sample_period
+#   scale, offset  normalisation of the training: scale * x + offset, 1 and 0 where they are not given
+#   clip           then: [-1.0, 1.0]
+feature = [
 ";
 
-const FEATURE: &str = "
-[[feature]]
-name = \"TODO\"
-source = \"TODO\"              # affine in signals, parameters, previous_duty, previous_command: v_ref - v_out
-# filters = [{ delay = 1 }]  # first to last; also { integrator = { min = -1.0, max = 1.0 } }, { moving_average = 4 },
-#                            # { low_pass = { time_constant = 1e-3 } }, { filtered_derivative = { cutoff = 500.0 } },
-#                            # \"backward_difference\": (x - the sample before) / sample_period
-";
-
-const AFFINE: &str = "\
-# scale = 1.0                # normalisation of the training: scale * x + offset, then clip
-# offset = 0.0
-";
-
-const CLIP: &str = "\
-# clip = [-1.0, 1.0]
-";
-
-const TAIL: &str = "
+const MAPPING: &str = "
 # Duty ratio mapping from simulation to the bench, if one was measured:
 # [mapping]
 # file = \"drm.toml\"
 # load_current = \"i_out\"
-
-[limits]
-duty = [\"TODO\", \"TODO\"]      # smallest and largest duty the hardware may see
-# slew = 0.01                # largest change per sample period
-# soft_start = { from = 0.1, steps = 1000 }
-# initial_duty = 0.5         # duty before the first step, for previous_duty and slew; otherwise the fallback duty
-
-[fallback]
-duty = \"TODO\"                # commanded without a usable measurement; in a synchronous leg 0 keeps the lower switch on
-hold = \"TODO\"                # bad samples bridged with the last good one
 ";

@@ -5,7 +5,7 @@ use safetensors::SafeTensors;
 use super::Desk;
 
 /// The rest of a contract for the environment of tests/fixtures/trainers/make.py.
-const REST: &str = r#"name = "actor"
+pub const REST: &str = r#"name = "actor"
 sample_period = 1e-4
 signal = [
   { name = "v_out", unit = "V", range = [0.0, 250.0] },
@@ -21,7 +21,7 @@ feature = [
   { name = "p", source = "i_out - 5", scale = 0.2, clip = [-1.0, 1.0] },
 ]
 "#;
-const PROTECTION: &str = "[limits]\nduty = [0.1, 0.9]\n\n[fallback]\nduty = 0.0\nhold = 3\n";
+pub const PROTECTION: &str = "[limits]\nduty = [0.1, 0.9]\n\n[fallback]\nduty = 0.0\nhold = 3\n";
 
 /// What `new` made of the archive of an actor, filled in.
 fn desk(model: &str) -> Desk {
@@ -60,6 +60,20 @@ fn the_actor_of_an_archive_becomes_code_that_commands_the_librarys_duties() {
     // of the libraries' own single precision: 1e-5 of the range is allowed, less is seen
     let manifest = desk.read("code/manifest.json");
     assert!(manifest.contains("\"actions\": 1"), "{manifest}");
+}
+
+/// The limits that `new` writes are the ends of the action space, of which binary32 has neighbours.
+#[test]
+fn limits_at_the_ends_of_the_command_cut_nothing_off() {
+    let desk = desk("sb3_sac_duty.zip");
+    for (limits, is_cut) in [("[0.1, 0.85]", false), ("[0.1, 0.849]", true)] {
+        let draft = desk.read("actor/policy.toml");
+        let from = draft.find("[limits]\nduty = ").unwrap();
+        let line = draft[from..].lines().nth(1).unwrap().to_owned();
+        desk.edit("actor/policy.toml", &line, &format!("duty = {limits}"));
+        let said = desk.succeed("inspect actor");
+        assert_eq!(said.contains("are cut off"), is_cut, "{limits}: {said}");
+    }
 }
 
 #[test]

@@ -141,17 +141,20 @@ fn new_writes_a_skeleton_whose_gaps_inspect_names_one_by_one() {
             .contains("policy/fresh.toml")
     );
     let skeleton = desk.read("policy/fresh.toml");
-    assert_eq!(skeleton.matches("[[feature]]\nname").count(), 6, "{skeleton}");
-    assert_eq!(skeleton.matches("# action ").count(), 9, "{skeleton}");
+    assert_eq!(skeleton.matches("# network input ").count(), 6, "{skeleton}");
+    assert!(
+        skeleton.contains(&format!("duties = [{}]", ["\"TODO\""; 9].join(", "))),
+        "{skeleton}"
+    );
     let faults = desk.refuse(
         "inspect policy/fresh.toml",
         &[
             "TODO",
             "`name`",
             "`hidden_activation`",
-            "`hold`",
+            "`source`",
             "--> policy/fresh.toml",
-            "line 3: `name`",
+            "line 5: `sample_period`",
         ],
     );
     let gaps = skeleton
@@ -238,23 +241,15 @@ fn a_skeleton_filled_in_compiles() {
     let desk = Desk::new("linear");
     desk.succeed("new policy/weights.safetensors --out policy/filled.toml");
     for (old, new) in [
-        ("name = \"TODO\"", "name = \"filled\""),
+        ("name = \"controller\"", "name = \"filled\""),
         ("sample_period = \"TODO\"", "sample_period = 1e-4"),
-        ("name = \"TODO\"", "name = \"v_out\""),
-        ("unit = \"TODO\"", "unit = \"V\""),
-        ("[\"TODO\", \"TODO\"]", "[0.0, 250.0]"),
-        ("name = \"TODO\"\nsource = \"TODO\"", "name = \"a\"\nsource = \"v_out\""),
         (
-            "name = \"TODO\"\nsource = \"TODO\"",
-            "name = \"b\"\nsource = \"100 - v_out\"",
+            "{ name = \"TODO\", unit = \"TODO\", range = [\"TODO\", \"TODO\"] }",
+            "{ name = \"v_out\", unit = \"V\", range = [0.0, 250.0] }",
         ),
-        ("\"TODO\",   # action 0", "0.1,"),
-        ("\"TODO\",   # action 1", "0.2,"),
-        ("\"TODO\",   # action 2", "0.3,"),
-        ("\"TODO\",   # action 3", "0.4,"),
-        ("duty = [\"TODO\", \"TODO\"]", "duty = [0.0, 1.0]"),
-        ("duty = \"TODO\"", "duty = 0.0"),
-        ("hold = \"TODO\"", "hold = 3"),
+        ("source = \"TODO\"", "source = \"v_out\""),
+        ("source = \"TODO\"", "source = \"100 - v_out\""),
+        ("[\"TODO\", \"TODO\", \"TODO\", \"TODO\"]", "[0.1, 0.2, 0.3, 0.4]"),
     ] {
         desk.edit("policy/filled.toml", old, new);
     }

@@ -15,6 +15,7 @@ mod replay;
 mod simulate;
 mod tables;
 mod traces;
+mod trained;
 mod training;
 mod verify;
 

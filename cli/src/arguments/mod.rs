@@ -72,7 +72,7 @@ impl Command {
 
 #[derive(Debug, Args)]
 pub struct New {
-    /// What the trainer saved: safetensors, a torch file (.pt, .pth), a model of stable-baselines3 (.zip), or ONNX
+    /// What the trainer saved: safetensors, a torch file (.pt, .pth), a model of stable-baselines3 (.zip), ONNX, or MAT
     pub weights: PathBuf,
     /// File to write; must not exist yet. It names the weights as seen from its folder; those that had to be joined or folded
     /// are written beside it
@@ -81,7 +81,7 @@ pub struct New {
     /// Entry of a checkpoint that holds the network, such as model_state_dict
     #[arg(long, value_name = "NAME")]
     pub inside: Option<String>,
-    /// Number of actions, where several outputs belong to each: QR-DQN
+    /// Number of actions, where the tensors do not say it: of a QR-DQN, or of two outputs. 1 is a command, which is a number
     #[arg(long, value_name = "N")]
     pub actions: Option<usize>,
     /// What stable-baselines3's VecNormalize saved: scale, offset and clip of the features. A vecnormalize.pkl beside the model

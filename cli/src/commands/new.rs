@@ -22,7 +22,7 @@ pub fn run(options: &New) -> Result<Outcome, Failure> {
     }
     let path = options.out.display();
     output::say(&format!(
-        "wrote {path}: fill in what says TODO, then\n  policyc inspect {path}"
+        "wrote {path}: fill in what says TODO, look at what says check, then\n  policyc inspect {path}"
     ))?;
     Ok(Outcome::Done)
 }

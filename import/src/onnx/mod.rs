@@ -8,12 +8,14 @@
 //!
 //! A node that no rule knows, or a value that two nodes take, is refused by the node's name.
 
+mod bent;
 mod model;
 mod wire;
 
 use policy::{Activation, DraftFeature};
 use toml_input::{FileName, Message};
 
+use crate::activations;
 use crate::actor::{self, Actor, Squash};
 use crate::network::{Layer, Network};
 use model::{Constant, Graph, Node};
@@ -63,13 +65,29 @@ pub(crate) fn read(file: &FileName, bytes: &[u8]) -> Result<Model, Message> {
             return walk.finish();
         }
         let takers: Vec<&Node> = graph.nodes.iter().filter(|node| node.inputs.contains(&value)).collect();
+        if let Some(bent) = bent::find(&graph, &value, &takers) {
+            let activation = Activation::find(bent.word);
+            walk.activation(bent.node, activation.ok_or_else(|| not_compiled(bent.node, bent.word))?)?;
+            bent.value.clone_into(&mut value);
+            continue;
+        }
+        if takers.is_empty() {
+            let nodes: Vec<String> = graph.nodes.iter().take(4).map(named).collect();
+            return Err(other(
+                &format!("no node takes the value `{}`", value.escape_debug()),
+                &nodes.join(", "),
+                "one node behind another",
+            )
+            .hint(EXPORT));
+        }
         let [node] = takers.as_slice() else {
             let names: Vec<String> = takers.iter().map(|node| named(node)).collect();
             return Err(other(
                 "the graph branches, and is no chain",
                 &names.join(", "),
                 "one node behind another",
-            ));
+            )
+            .hint(EXPORT));
         };
         walk.pass(node, &value)?;
         value = node.outputs.first().cloned().unwrap_or_default();
@@ -111,8 +129,12 @@ impl Walk<'_> {
         let operation = node.operation.as_str();
         if matches!(
             operation,
-            "Identity" | "Flatten" | "Reshape" | "Squeeze" | "Unsqueeze" | "Cast" | "Dropout"
+            "Identity" | "Flatten" | "Reshape" | "Squeeze" | "Unsqueeze" | "Dropout"
         ) {
+            return Ok(());
+        }
+        // to binary32 or binary64; a whole number would be rounded. Behind the choice there is nothing to round
+        if operation == "Cast" && (self.ended.is_some() || matches!(node.integers.get("to"), Some(1 | 11))) {
             return Ok(());
         }
         if let Some(end) = &self.ended {
@@ -135,9 +157,6 @@ impl Walk<'_> {
                 self.cut = Some(self.ends(node).ok_or_else(|| unknown(node))?);
                 Ok(())
             }
-            "Relu" => self.activation(node, Activation::Relu),
-            "Tanh" => self.activation(node, Activation::Tanh),
-            "Softsign" => self.activation(node, Activation::Softsign),
             "LeakyRelu" => {
                 let slope = node.floats.get("alpha").copied().unwrap_or(0.01);
                 self.activation(node, Activation::LeakyRelu { slope })
@@ -150,7 +169,11 @@ impl Walk<'_> {
                 ));
                 self.end(node)
             }
-            _ => Err(unknown(node)),
+            _ => {
+                let word = word(node).ok_or_else(|| unknown(node))?;
+                let activation = Activation::find(word).ok_or_else(|| not_compiled(node, word))?;
+                self.activation(node, activation)
+            }
         }
     }
 
@@ -166,7 +189,8 @@ impl Walk<'_> {
     }
 
     fn is_command(&self) -> bool {
-        self.is_one() && (self.cut.is_some() || self.activations.last() == Some(&Some(Activation::Tanh)))
+        let is_curve = |last: Activation| Squash::curve(last).is_some();
+        self.is_one() && (self.cut.is_some() || self.activations.last().copied().flatten().is_some_and(is_curve))
     }
 
     fn end(&mut self, node: &Node) -> Result<(), Message> {
@@ -301,13 +325,13 @@ impl Walk<'_> {
         let inputs =
             inputs.ok_or_else(|| other("the graph holds no dense layer", "none", "Gemm, or MatMul and Add"))?;
         let actor = match self.activations.pop() {
-            Some(Some(Activation::Tanh)) => {
+            Some(Some(last)) if Squash::curve(last).is_some() => {
                 let outputs = self.layers.last().map_or(0, |layer| layer.outputs);
                 if outputs != 1 {
                     return Err(actor::several(outputs));
                 }
                 Some(Actor {
-                    squash: Squash::Tanh,
+                    squash: Squash::Curve(last),
                     affine: Some(actor::scaled(self.scaled)),
                 })
             }
@@ -343,6 +367,7 @@ impl Walk<'_> {
                 .map(|affine| DraftFeature {
                     affine: Some(affine),
                     clip: clip.clone(),
+                    ..DraftFeature::default()
                 })
                 .collect();
             self.said.push(
@@ -354,6 +379,7 @@ impl Walk<'_> {
                 layers: self.layers,
                 plain: false,
                 choice_only: false,
+                definition: None,
                 said: self.said,
             },
             activations: self
@@ -375,12 +401,38 @@ fn spread(values: &[f64], count: usize) -> Option<Vec<f64>> {
     }
 }
 
+/// The word for a node that is an activation.
+fn word(node: &Node) -> Option<&'static str> {
+    let number = |name: &str, otherwise: f64| node.floats.get(name).copied().unwrap_or(otherwise);
+    match node.operation.as_str() {
+        "Gelu" if node.texts.get("approximate").is_some_and(|by| by == "tanh") => Some(activations::GELU_TANH),
+        "Gelu" => Some(activations::GELU),
+        // other parameters make other functions, for which there is no word
+        "Elu" if number("alpha", 1.0) != 1.0 => None,
+        "HardSigmoid" if !is_sixth(node) => None,
+        operation => activations::word_of_onnx(operation),
+    }
+}
+
+/// A hard sigmoid with the slope of torch and Keras 3; that of ONNX itself is 0.2.
+fn is_sixth(node: &Node) -> bool {
+    let number = |name: &str, otherwise: f64| node.floats.get(name).copied().unwrap_or(otherwise);
+    (number("alpha", 0.2) - 1.0 / 6.0).abs() < 1e-6 && number("beta", 0.5) == 0.5
+}
+
+fn not_compiled(node: &Node, word: &str) -> Message {
+    activations::refusal(word, &named(node))
+}
+
+const EXPORT: &str =
+    "export the policy network alone, in evaluation: torch.onnx.export(net.eval(), (obs,), \"policy.onnx\")";
+
 fn unknown(node: &Node) -> Message {
     Message::new("this node is not read, or not at this place of the graph")
         .found(named(node))
         .expected(
-            "a chain of Gemm, MatMul, Add, Sub, Mul, Div with constants, Relu, Tanh, Softsign, LeakyRelu, a Clip before and an ArgMax behind, \
+            "a chain of Gemm, MatMul, Add, Sub, Mul, Div with constants, Relu, Tanh and other activations, a Clip before and an ArgMax behind, \
              and reshapes",
         )
-        .hint("export the policy network alone, in evaluation: torch.onnx.export(net.eval(), (obs,), \"policy.onnx\")")
+        .hint(EXPORT)
 }

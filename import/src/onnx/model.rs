@@ -25,6 +25,7 @@ pub(crate) struct Node {
     pub outputs: Vec<String>,
     pub floats: BTreeMap<String, f64>,
     pub integers: BTreeMap<String, i64>,
+    pub texts: BTreeMap<String, String>,
 }
 
 #[derive(Debug, Default)]
@@ -34,6 +35,23 @@ pub(crate) struct Graph {
     /// Names of what the graph takes, without constants.
     pub inputs: Vec<String>,
     pub outputs: Vec<String>,
+}
+
+impl Graph {
+    /// Keras's exporter shares one constant among layers by `Identity`.
+    fn pass_constants_on(&mut self) {
+        let Graph { nodes, constants, .. } = self;
+        // nodes stand in the order in which they are computed
+        nodes.retain(|node| {
+            let copied = match (node.operation.as_str(), node.inputs.as_slice(), node.outputs.as_slice()) {
+                ("Identity", [from], [to]) => constants.get(from).cloned().map(|constant| (to.clone(), constant)),
+                _ => None,
+            };
+            let is_used = copied.is_none();
+            constants.extend(copied);
+            is_used
+        });
+    }
 }
 
 /// Reads a model; tensors outside it lie in its own folder.
@@ -69,6 +87,7 @@ pub(crate) fn read(file: &FileName, bytes: &[u8]) -> Result<Graph, Message> {
             _ => {}
         }
     }
+    graph_read.pass_constants_on();
     // older exporters list constants among the inputs
     let Graph { constants, inputs, .. } = &mut graph_read;
     inputs.retain(|input| !constants.contains_key(input));
@@ -109,6 +128,7 @@ fn node(message: &[u8], outside: &mut Outside<'_>) -> Result<(Node, Option<Const
                         (3, Value::Number(number)) => {
                             node.integers.insert(name.clone(), number as i64);
                         }
+                        (4, Value::Bytes(bytes)) => drop(node.texts.insert(name.clone(), text(bytes)?)),
                         (5, Value::Bytes(bytes)) if node_is_constant(&name) => {
                             constant = Some(tensor(bytes, outside)?.1);
                         }

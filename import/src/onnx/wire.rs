@@ -5,6 +5,9 @@
 
 use toml_input::Message;
 
+// numbers of a tensor are one field; nodes of a policy are a few dozen
+const MOST_FIELDS: usize = 10_000;
+
 /// A value: its meaning depends on the field's number.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Value<'a> {
@@ -34,6 +37,12 @@ pub(crate) fn fields(message: &[u8]) -> Result<Vec<(u64, Value<'_>)>, Message> {
             5 => split::<4>(behind).map(|(bytes, rest)| (Value::Fixed32(bytes), rest))?,
             _ => return Err(broken()),
         };
+        if fields.len() == MOST_FIELDS {
+            return Err(Message::new("this ONNX model has more parts than a network")
+                .found(format!("more than {MOST_FIELDS} in one message"))
+                .expected("the policy network alone")
+                .hint("export the policy network alone"));
+        }
         fields.push((tag >> 3, value));
         rest = behind;
     }

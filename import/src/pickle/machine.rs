@@ -7,7 +7,9 @@ use toml_input::Message;
 use super::{Id, Item, Object};
 
 // an item takes a byte of the file and some fifty of memory: a saved policy has some thousand
-const MOST_ITEMS: usize = 1_000_000;
+const MOST_ITEMS: usize = 200_000;
+// operations that build nothing, too, take their time: five for each item are more than any pickler writes
+const MOST_STEPS: usize = 1_000_000;
 
 /// Functions that build data and do nothing else.
 const BUILDERS: [&str; 35] = [
@@ -72,7 +74,7 @@ impl<'a> Machine<'a> {
 
     /// Runs the program to its end: all items, and the one that it is about.
     pub fn run(mut self) -> Result<(Vec<Item>, Id), Message> {
-        loop {
+        for _ in 0..MOST_STEPS {
             let operation = self.byte()?;
             if operation == b'.' {
                 let root = self.pop()?;
@@ -80,6 +82,7 @@ impl<'a> Machine<'a> {
             }
             self.step(operation)?;
         }
+        Err(refused(&format!("more than {MOST_STEPS} operations")))
     }
 
     fn step(&mut self, operation: u8) -> Result<(), Message> {

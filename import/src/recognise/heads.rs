@@ -8,16 +8,10 @@ use super::{Known, Refusal, refused};
 use crate::network::{Layer, Network};
 
 /// Parts of names of networks that give a value and choose nothing.
-const VALUES: [&str; 22] = [
+const VALUES: [&str; 16] = [
     "baseline",
-    "critic",
-    "critic_encoder",
-    "critic_net",
-    "critics",
     "fc_v",
     "fc_value",
-    "qf1",
-    "qf2",
     "v",
     "v_head",
     "val",
@@ -33,18 +27,19 @@ const VALUES: [&str; 22] = [
     "vf_head",
 ];
 
-fn is_value(name: &str) -> bool {
+/// Whether a layer is one of a network that gives a value and chooses nothing.
+pub(crate) fn is_value(name: &str) -> bool {
     parts(name).any(|part| {
         let part = part.to_ascii_lowercase();
         let part = part.trim_start_matches('_');
-        VALUES.contains(&part) || part.starts_with("value_") || part.starts_with("critic_")
+        VALUES.contains(&part) || ["value_", "critic", "qf"].iter().any(|begin| part.starts_with(begin))
     })
 }
 
 fn is_advantage(name: &str) -> bool {
     parts(name).any(|part| {
         let part = part.to_ascii_lowercase();
-        part.starts_with("adv") || ["a", "fc_a", "fc_adv", "a_head"].contains(&part.as_str())
+        part.starts_with("adv") || ["a", "fc_a", "fc_adv", "a_head", "af"].contains(&part.as_str())
     })
 }
 

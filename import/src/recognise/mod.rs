@@ -1,7 +1,8 @@
 //! Named tensors to one plain chain of dense layers.
 //!
 //! ```text
-//!   refused::check   what no chain computes is refused by name: recurrence, convolution, LayerNorm, continuous heads
+//!   actors::find     whose definition a continuous actor follows, by its names
+//!   refused::check   what no chain computes is refused by name: recurrence, convolution, LayerNorm, heads nobody defines
 //!   names::parse     tensors to dense layers and batch norms, by the names of a dozen libraries
 //!   heads            value networks are left out; of a dueling pair the advantage stays
 //!   norm             batch norms go into the dense layer beside them
@@ -12,6 +13,7 @@
 //! The invariant: a layer is left out only for a reason that is told. A chain that fits by accident computes something
 //! else.
 
+mod actors;
 pub(crate) mod heads;
 pub(crate) mod names;
 mod norm;
@@ -24,6 +26,7 @@ use policy::limits::{MAX_ACTIONS, MAX_FEATURES, MAX_LAYERS, MAX_WIDTH, MIN_ACTIO
 use toml_input::Message;
 
 use crate::network::{Layer, Network};
+pub(crate) use actors::{Definition, is_mean};
 
 /// A refusal, and the tensor that it is about.
 #[derive(Debug)]
@@ -68,16 +71,67 @@ pub(crate) enum Recognised {
 
 /// The network in `tensors`.
 pub(crate) fn recognise(tensors: &[NamedTensor], known: &Known) -> Result<Recognised, Refusal> {
-    refused::check(tensors)?;
-    let mut parsed = names::parse(tensors, known)?;
+    let used: Vec<&NamedTensor> = tensors
+        .iter()
+        .filter(|tensor| !names::is_unused(&tensor.name))
+        .collect();
+    let own: Vec<&NamedTensor> = used
+        .iter()
+        .filter(|tensor| !names::is_target(&tensor.name))
+        .copied()
+        .collect();
+    if let Some(definition) = actors::find(&own, known)? {
+        return actor(&own, known, definition).map(Recognised::Network);
+    }
+    refused::check(&used, false)?;
+    let mut parsed = names::parse(&used, known)?;
+    parsed.plain &= used.len() == tensors.len();
     heads::leave_out_values(&mut parsed)?;
     norm::fold(&mut parsed)?;
     let Some(mut network) = order(parsed)? else {
         return Ok(Recognised::Undecided);
     };
     heads::quantiles(&mut network, known)?;
+    network.said.extend(actors::doubt(&own, known));
     fits(&network, known.actions)?;
     Ok(Recognised::Network(network))
+}
+
+/// Trunk and mean of an actor, as its definition has them.
+fn actor(own: &[&NamedTensor], known: &Known, definition: Definition) -> Result<Network, Refusal> {
+    let used: Vec<&NamedTensor> = own
+        .iter()
+        .filter(|tensor| !actors::is_beside(&tensor.name))
+        .copied()
+        .collect();
+    refused::check(&used, true)?;
+    let mut parsed = names::parse(&used, known)?;
+    parsed.plain = false;
+    heads::leave_out_values(&mut parsed)?;
+    norm::fold(&mut parsed)?;
+    let all = parsed.layers.clone();
+    let mut network = order(parsed)?.ok_or_else(|| refused::more_than_a_chain(&all))?;
+    if let Some(last) = network
+        .layers
+        .last_mut()
+        .filter(|last| definition.is_mean_of_two && last.outputs == 2)
+    {
+        last.weights.truncate(last.inputs);
+        last.bias.truncate(1);
+        last.outputs = 1;
+        let text = format!(
+            "of `{}` the first output is read, the mean; the second is the deviation",
+            last.name
+        );
+        network.said.push(text);
+    }
+    let outputs = network.layers.last().map_or(0, |layer| layer.outputs);
+    if outputs != 1 {
+        return Err(crate::actor::several(outputs).into());
+    }
+    sizes(&network)?;
+    network.definition = Some(definition);
+    Ok(network)
 }
 
 /// Whether a contract can hold the network; `said` is the number of actions, if somebody said it.
@@ -86,6 +140,20 @@ pub(crate) fn fits(network: &Network, said: Option<usize>) -> Result<(), Refusal
     if !(MIN_ACTIONS..=MAX_ACTIONS).contains(&actions) {
         return Err(refused::too_many_actions(actions).into());
     }
+    sizes(network)?;
+    if let Some(said) = said.filter(|said| *said != actions) {
+        return Err(
+            Message::new("the network has another number of outputs than there are actions")
+                .found(format!("{actions} outputs"))
+                .expected(format!("{said} actions"))
+                .into(),
+        );
+    }
+    Ok(())
+}
+
+/// Whether a contract can hold the inputs and the layers.
+fn sizes(network: &Network) -> Result<(), Refusal> {
     let inputs = network.layers.first().map_or(0, |layer| layer.inputs);
     if inputs > MAX_FEATURES {
         return Err(
@@ -100,14 +168,6 @@ pub(crate) fn fits(network: &Network, said: Option<usize>) -> Result<(), Refusal
             .found(format!("{} outputs", layer.outputs))
             .expected(format!("at most {MAX_WIDTH}"));
         return Err(Refusal::of(&layer.name, message));
-    }
-    if let Some(said) = said.filter(|said| *said != actions) {
-        return Err(
-            Message::new("the network has another number of outputs than there are actions")
-                .found(format!("{actions} outputs"))
-                .expected(format!("{said} actions"))
-                .into(),
-        );
     }
     if network.layers.len() > MAX_LAYERS {
         return Err(Message::new("the network has too many layers")
@@ -125,10 +185,17 @@ pub(crate) fn undecided_message(tensors: &[NamedTensor]) -> Message {
 
 /// The path through all layers, if there is exactly one.
 fn order(parsed: names::Parsed) -> Result<Option<Network>, Refusal> {
-    let shapes = |layer: &Layer| (layer.name.clone(), layer.inputs, layer.outputs);
-    let found = policy::chains(&parsed.layers.iter().map(shapes).collect::<Vec<_>>());
-    let mut whole = found.iter().filter(|chain| chain.len() == parsed.layers.len());
-    let (Some(chain), None) = (whole.next(), whole.next()) else {
+    let chains = |least: usize| {
+        let shapes = |layer: &Layer| (layer.name.clone(), layer.inputs, layer.outputs.max(least));
+        policy::chains(&parsed.layers.iter().map(shapes).collect::<Vec<_>>())
+    };
+    let whole = |found: &[Vec<usize>]| {
+        let mut whole = found.iter().filter(|chain| chain.len() == parsed.layers.len()).cloned();
+        whole.next().filter(|_| whole.next().is_none())
+    };
+    let found = chains(0);
+    // where nothing else is known a chain ends in two outputs or more: a single one is looked for as if it were two
+    let Some(chain) = whole(&found).or_else(|| whole(&chains(MIN_ACTIONS))) else {
         return undecided(&parsed, &found);
     };
     if let Some(name) = parsed.strangers.first() {
@@ -148,6 +215,7 @@ fn order(parsed: names::Parsed) -> Result<Option<Network>, Refusal> {
         plain: parsed.plain,
         choice_only: parsed.choice_only,
         said,
+        definition: None,
     }))
 }
 

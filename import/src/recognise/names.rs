@@ -61,13 +61,27 @@ pub(crate) fn only_dense(tensors: &[NamedTensor]) -> Vec<Layer> {
 }
 
 /// The parts of a tensor's name.
-pub(crate) fn parts(name: &str) -> impl Iterator<Item = &str> {
+pub(crate) fn parts(name: &str) -> impl DoubleEndedIterator<Item = &str> {
     name.strip_suffix(":0").unwrap_or(name).split(['.', '/'])
 }
 
 /// Whether the path names a target network, which training keeps beside the one in use.
-fn is_target(name: &str) -> bool {
+pub(crate) fn is_target(name: &str) -> bool {
+    is_plain_target(name) || parts(name).any(|part| part.starts_with("_target_") || part.ends_with("_old"))
+}
+
+/// Whether the contract's own reader knows it for a target network, too.
+fn is_plain_target(name: &str) -> bool {
     parts(name).any(|part| part == "target" || part.starts_with("target_") || part.ends_with("_target"))
+}
+
+/// What no output depends on: RLlib keeps the bound of a deviation beside every head, also where there is no deviation,
+pub(crate) fn is_unused(name: &str) -> bool {
+    // and torch counts the batches of a norm
+    matches!(
+        parts(name).next_back(),
+        Some("log_std_clip_param_const" | "num_batches_tracked")
+    )
 }
 
 /// Layer, role, and whether the contract's own reader knows the name.
@@ -98,7 +112,11 @@ fn role(name: &str, rank: usize) -> Option<(String, Role, bool)> {
             };
             return Some((stem.to_owned(), role, false));
         }
-        _ => return None,
+        // a struct of MATLAB
+        _ => {
+            let (layer, role) = numbered(leaf)?;
+            return Some((format!("{stem}.{layer}"), role, false));
+        }
     };
     (!stem.is_empty()).then(|| (stem.to_owned(), role, known))
 }
@@ -124,12 +142,18 @@ struct Group<'a> {
 }
 
 /// Sorts the tensors into layers.
-pub(crate) fn parse(tensors: &[NamedTensor], known: &Known) -> Result<Parsed, Refusal> {
-    let own: Vec<&NamedTensor> = tensors.iter().filter(|tensor| !is_target(&tensor.name)).collect();
+pub(crate) fn parse(tensors: &[&NamedTensor], known: &Known) -> Result<Parsed, Refusal> {
+    let own: Vec<&NamedTensor> = tensors
+        .iter()
+        .filter(|tensor| !is_target(&tensor.name))
+        .copied()
+        .collect();
     let targets_only = own.is_empty();
-    let used = if targets_only { tensors.iter().collect() } else { own };
+    let used = if targets_only { tensors.to_vec() } else { own };
     let mut parsed = Parsed {
-        plain: true,
+        plain: !tensors
+            .iter()
+            .any(|tensor| is_target(&tensor.name) && !is_plain_target(&tensor.name)),
         ..Parsed::default()
     };
     let mut groups: BTreeMap<String, Group<'_>> = BTreeMap::new();

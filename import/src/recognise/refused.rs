@@ -9,20 +9,20 @@ use super::names::parts;
 use crate::network::Layer;
 
 /// The way out of tensors that are more than the mean.
-pub(crate) const MEAN: &str = "save trunk and mean alone, first to last, with safetensors.torch.save_file; the contract says the rest: \
-     continuous = { squash = \"tanh\", scale = ..., offset = ... }, or { clip = [lo, hi] }";
+pub(crate) const MEAN: &str = "say --actions 1 if trunk and mean are a chain of dense layers: squash, scale and offset are then left to you in \
+     the contract";
 
-/// Refuses what is not compiled.
-pub(crate) fn check(tensors: &[NamedTensor]) -> Result<(), Refusal> {
+/// Refuses what is not compiled; of an actor whose definition is known, what stands behind its mean is no reason.
+pub(crate) fn check(tensors: &[&NamedTensor], is_actor: bool) -> Result<(), Refusal> {
     for tensor in tensors {
-        if let Some(message) = refusal(tensor, tensors) {
+        if let Some(message) = refusal(tensor, tensors, is_actor) {
             return Err(Refusal::of(&tensor.name, message));
         }
     }
     Ok(())
 }
 
-fn refusal(tensor: &NamedTensor, all: &[NamedTensor]) -> Option<Message> {
+fn refusal(tensor: &NamedTensor, all: &[&NamedTensor], is_actor: bool) -> Option<Message> {
     let parts: Vec<String> = parts(&tensor.name).map(str::to_ascii_lowercase).collect();
     let (leaf, folders) = parts.split_last()?;
     let is = |names: &[&str]| parts.iter().any(|part| names.contains(&part.as_str()));
@@ -57,8 +57,19 @@ fn refusal(tensor: &NamedTensor, all: &[NamedTensor]) -> Option<Message> {
         "log_std_layer",
         "action_scale",
         "action_bias",
+        "sigma_param",
     ];
-    if is(&deviation) || is(&["latent_pi", "mu", "fc_mu", "fc_mean", "actor_mean", "action_mean"]) {
+    let mean = [
+        "latent_pi",
+        "mu",
+        "mu_layer",
+        "mu_net",
+        "fc_mu",
+        "fc_mean",
+        "actor_mean",
+        "action_mean",
+    ];
+    if !is_actor && (is(&deviation) || is(&mean)) {
         return Some(continuous(
             "a continuous actor (SAC, TD3, DDPG or PPO with a Box action space)",
         ));
@@ -70,11 +81,20 @@ fn refusal(tensor: &NamedTensor, all: &[NamedTensor]) -> Option<Message> {
                 .hint("its quantiles are drawn anew at each step; train DQN or QR-DQN"),
         );
     }
+    let stem = tensor.name.get(..tensor.name.len() - leaf.len()).unwrap_or_default();
+    if leaf == "running_mean" && all.iter().any(|other| other.name == format!("{stem}steps")) {
+        return Some(
+            Message::new("a BatchRenorm (CrossQ) is not read")
+                .found("running statistics that count their steps")
+                .expected("BatchNorm1d, or no norm")
+                .hint("its epsilon is not that of a batch norm, and the file does not hold it: train with TQC, SAC or without a norm"),
+        );
+    }
     is_layer_norm(tensor, leaf, all).then(layer_norm)
 }
 
 /// A scale for each value, and no statistics of a batch beside it.
-fn is_layer_norm(tensor: &NamedTensor, leaf: &str, all: &[NamedTensor]) -> bool {
+fn is_layer_norm(tensor: &NamedTensor, leaf: &str, all: &[&NamedTensor]) -> bool {
     let scale = tensor.shape.len() == 1 && ["weight", "gamma", "scale"].contains(&leaf);
     let stem = tensor.name.get(..tensor.name.len() - leaf.len()).unwrap_or_default();
     let beside = |name: &str| all.iter().any(|other| other.name == format!("{stem}{name}"));
@@ -112,7 +132,7 @@ fn categorical() -> Message {
 pub(crate) fn continuous(found: &str) -> Message {
     Message::new("this policy commands a number, and its tensors do not say how: what squashes and scales it is code of the trainer")
         .found(found)
-        .expected("the .zip of stable-baselines3, an ONNX graph, or the layers of the mean alone")
+        .expected("the .zip of stable-baselines3, an ONNX graph, or names as CleanRL, Tianshou or RLlib give them")
         .hint(MEAN)
 }
 
@@ -136,7 +156,7 @@ pub(crate) fn too_many_actions(found: usize) -> Message {
     let hint = if found > MAX_ACTIONS {
         "a distributional network has several outputs for each action: with the mean over quantiles (QR-DQN) say --actions N; C51 is not compiled"
     } else {
-        "a single output is a value, or a continuous command: of that give the .zip of stable-baselines3 or an ONNX graph, or plain layers"
+        "a single output is a value, or a command: say --actions 1 if it is a command"
     };
     Message::new("the outputs are no table of actions")
         .found(format!("{found} outputs"))

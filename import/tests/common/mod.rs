@@ -1,6 +1,8 @@
 //! Files of weights and the policies that come of them.
 #![allow(dead_code, reason = "each test uses its own part")]
 
+pub mod library;
+
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -110,11 +112,13 @@ impl Saved {
         };
         let (shape, values) = find(&["weight", "weight_mu", "mu_W", "kernel", "vars/0", "Weights", "W"]).unwrap();
         let bias = find(&["bias", "bias_mu", "mu_bias", "vars/1", "Bias", "b"]).unwrap();
+        // of a mean and its deviation the mean alone is read
+        let values = &values[..layer.weights.len().min(values.len())];
         let same = *values == layer.weights;
         let flipped = |o: usize| values.iter().skip(o).step_by(shape[1]).copied();
         let is_flipped =
             || shape[0] == layer.inputs && (0..layer.outputs).flat_map(flipped).collect::<Vec<_>>() == layer.weights;
-        (same || is_flipped()) && bias.1 == layer.bias
+        (same || is_flipped()) && bias.1[..layer.bias.len().min(bias.1.len())] == layer.bias
     }
 }
 
@@ -129,7 +133,6 @@ pub fn filled(folder: &std::path::Path, new: &import::NewPolicy) -> policy::Poli
     }
     let mut text = new
         .contract
-        .replacen("name = \"TODO\"", "name = \"buck\"", 1)
         .replacen("name = \"TODO\"", "name = \"v_out\"", 1)
         .replace("range = [\"TODO\", \"TODO\"]", "range = [-1e4, 1e4]")
         .replace("source = \"TODO\"", "source = \"v_out\"")
@@ -137,6 +140,7 @@ pub fn filled(folder: &std::path::Path, new: &import::NewPolicy) -> policy::Poli
         .replace("hidden_activation = \"TODO\"", "hidden_activation = \"relu\"")
         .replace("sample_period = \"TODO\"", "sample_period = 1e-4")
         .replace("[\"TODO\", \"TODO\"]", "[0.25, 0.75]")
+        .replace("squash = \"TODO\"", "squash = \"tanh\"")
         .replace("hold = \"TODO\"", "hold = 2");
     for feature in 0.. {
         let next = text.replacen("name = \"TODO\"", &format!("name = \"f{feature}\""), 1);

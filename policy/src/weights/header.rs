@@ -129,8 +129,8 @@ fn foreign(bytes: &[u8]) -> Option<toml_input::Message> {
             "`policyc new <this file>` reads it, and writes weights.safetensors beside the contract",
         ));
     }
-    // the opcode PROTO and its version; pickles of protocols 0 and 1 have no such mark
-    if bytes.len() > 2 && bytes[0] == 0x80 && (2..=5).contains(&bytes[1]) {
+    // the opcode PROTO and its version; pickles of protocols 0 and 1 have no such mark. A header of 0x280 bytes has the same
+    if bytes.len() > 2 && bytes[0] == 0x80 && (2..=5).contains(&bytes[1]) && !plausible_length(bytes) {
         return Some(catalogue::other_format(
             "a python pickle (never opened here: it can run code)",
             EXPORT,

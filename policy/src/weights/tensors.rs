@@ -92,7 +92,9 @@ pub(crate) fn named(file: &Binary, tensors: &SafeTensors<'_>, faults: &mut Sink)
     let mut views = tensors.tensors();
     views.sort_by(|(a, _), (b, _)| a.cmp(b));
     let one = |(name, view): &(String, TensorView<'_>)| {
-        sound(name, view.shape())?;
+        // counters of a batch norm and ends of an action space have no axis
+        let shape = if view.shape().is_empty() { &[1] } else { view.shape() };
+        sound(name, shape)?;
         let values = match view.dtype() {
             Dtype::F32 | Dtype::F64 | Dtype::F16 | Dtype::BF16 => Some(wide(view.dtype(), view.data())?),
             _ => None,

@@ -206,13 +206,14 @@ fn reward(table: &mut Table<'_>, faults: &mut Sink) -> Option<Reward> {
     let v_ref = table.required("v_ref", hint, faults).and_then(|v| v.positive(faults));
     // without it every voltage below would be another converter's; the fault is there, and any number does to read on
     let scale = v_ref.unwrap_or(100.0);
-    Some(Reward {
-        v_ref: v_ref?,
+    let read = Reward {
+        v_ref: scale,
         // the paper's, whose converter has 100 V: 0.1 V and 1 V, and 10 a volt
         bands: table.with_default("bands", vec![(1e-3 * scale, 10.0), (1e-2 * scale, 1.0)], faults, bands),
         error_weight: table.with_default("error_weight", 1e3 / scale, faults, weight),
         duty_change_weight: table.with_default("duty_change_weight", 0.0, faults, weight),
-    })
+    };
+    v_ref.map(|_| read)
 }
 
 fn bands(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<(f64, f64)>> {
@@ -262,20 +263,28 @@ fn loads(value: &Value<'_>, faults: &mut Sink) -> Option<Loads> {
 
 fn episode(table: &mut Table<'_>, v_ref: f64, faults: &mut Sink) -> Option<Episode> {
     let hint = "constant powers that the converter meets, in W: `loads = { values = [40, 100], range = [30, 120] }` in [episode]";
-    let given = table.required("loads", hint, faults);
+    let given = table.required("loads", hint, faults).and_then(|v| loads(&v, faults));
+    // stands in where they are missing or faulty, which is a fault already: the other keys are read all the same
+    let no_loads = Loads {
+        values: Vec::new(),
+        range: [0.0, 0.0],
+        share: 0.0,
+    };
     let voltage = |v: &Value<'_>, faults: &mut Sink| v.interval_within(0.0..=1e5, faults);
     let current = |v: &Value<'_>, faults: &mut Sink| v.interval_within(-1e4..=1e4, faults);
-    Some(Episode {
+    let is_given = given.is_some();
+    let read = Episode {
         // conventions: a new load after twice the 50 periods in which the paper settles, four loads an episode; a start
         // beside rest; 40 % of the voltage is far beyond all that a controller meets, and nothing is learnt there
         steps: table.with_default("steps", 400, faults, periods),
         load_every: table.with_default("load_every", 100, faults, periods),
-        loads: given.and_then(|v| loads(&v, faults))?,
+        loads: given.unwrap_or(no_loads),
         any_phase: table.with_default("any_phase", false, faults, Value::boolean),
         initial_voltage: table.with_default("initial_voltage", [0.97 * v_ref, 1.03 * v_ref], faults, voltage),
         initial_current: table.with_default("initial_current", [-2.0, 2.0], faults, current),
         max_error: table.with_default("max_error", 0.4 * v_ref, faults, Value::positive),
-    })
+    };
+    is_given.then_some(read)
 }
 
 fn stage(table: &mut Table<'_>, faults: &mut Sink) -> Option<Stage> {

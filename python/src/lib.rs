@@ -4,8 +4,10 @@
 //! and turns the answer back. Dataclasses, gymnasium and everything that wants a library of Python stand in `lib/policyc`.
 
 mod controller;
+mod environment;
 mod faults;
 mod files;
+mod models;
 mod policy;
 
 use std::ffi::OsString;
@@ -27,6 +29,10 @@ fn _policyc(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<policy::NativePolicy>()?;
     module.add_class::<controller::Command>()?;
     module.add_class::<controller::Controller>()?;
+    module.add_class::<environment::Episodes>()?;
+    module.add_function(wrap_pyfunction!(environment::contract_facts, module)?)?;
+    module.add_function(wrap_pyfunction!(models::import_model, module)?)?;
+    module.add_function(wrap_pyfunction!(models::contract_json, module)?)?;
     module.add_function(wrap_pyfunction!(command, module)?)?;
     module.add_function(wrap_pyfunction!(files::files, module)?)
 }

@@ -110,6 +110,7 @@ impl NativePolicy {
         steps: u64,
         seed: u64,
         generated: Option<PathBuf>,
+        in_its_format: bool,
         traces: Vec<PathBuf>,
         golden_decisions: Option<f64>,
     ) -> PyResult<(bool, String, String)> {
@@ -121,7 +122,13 @@ impl NativePolicy {
             traces,
             golden_decisions,
         };
-        py.detach(|| verified(&self.policy, asked)).map_err(failed)
+        let written = asked.generated.as_deref().filter(|_| in_its_format);
+        let written = written.and_then(verify::folder::numeric_format);
+        let policy = match written {
+            Some(format) => &self.policy.clone().with_format(format),
+            None => &self.policy,
+        };
+        py.detach(|| verified(policy, asked)).map_err(failed)
     }
 
     /// Name and text of the files of a certificate, and its summary.

@@ -100,6 +100,14 @@ def test_verify_names_a_folder_that_has_drifted(tmp_path):
     assert not found.equal and "buck12.c" in str(found)
 
 
+def test_generated_code_is_verified_in_its_own_format(tmp_path):
+    policy = policyc.Policy.load("examples/buck12")
+    for name, content in policy.compile(format="i16", costs=False, golden_decisions=0.4).items():
+        (tmp_path / name).write_bytes(content)
+    found = policy.verify(generated=tmp_path, steps=200, golden_decisions=0.4)
+    assert found.equal, str(found)
+
+
 def test_certify_gives_the_files_of_the_command(program, tmp_path):
     options = ["--format", "i16", "--samples", "20", "--boxes", "20"]
     command = [program, "certify", "examples/buck12", *options, "--out", str(tmp_path / "out")]

@@ -70,7 +70,8 @@ pub fn test(
     let program = workspace.target_dir.join("debug/policyc");
     let mut pytest = Command::new(&python);
     pytest.args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "--durations=5"]);
-    pytest.arg(folders.package.join("tests"));
+    let tests = folders.package.join("tests");
+    pytest.arg(&tests).arg("--ignore").arg(tests.join("trainers"));
     pytest.current_dir(&workspace.root).env("PYTHONPATH", &folders.site);
     run(pytest.env("POLICYC_PROGRAM", &program))?;
     let mut notes = vec![counted(log)];

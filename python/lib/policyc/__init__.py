@@ -10,22 +10,34 @@ What is wrong with an input comes as :class:`Faults`, with places. The environme
 """
 
 from ._policyc import Command, Fault, Faults, __version__
+from .analysis import Diagnosis, MappingFit, Simulation, diagnose, drm_fit, simulate
 from .controller import Controller, Status, Steps
+from .exporting import export
 from .policy import Certificate, Feature, Inspection, Layer, Policy, Signal, Verification
+from .registration import register
+
+register()
 
 __all__ = [
     "Certificate",
     "Command",
     "Controller",
+    "Diagnosis",
     "Fault",
     "Faults",
     "Feature",
     "Inspection",
     "Layer",
+    "MappingFit",
     "Policy",
     "Signal",
+    "Simulation",
     "Status",
     "Steps",
     "Verification",
     "__version__",
+    "diagnose",
+    "drm_fit",
+    "export",
+    "simulate",
 ]

@@ -221,13 +221,13 @@ class Policy:
         golden_decisions: Optional[float] = None,
     ) -> Verification:
         """Builds the generated code with every compiler at hand and compares `steps` control steps with the interpreter, bit by
-        bit. `generated` is a folder of code to verify in the place of code made anew; `traces` are CSV files of measurements to
+        bit. `generated` is a folder of code to verify in the place of code made anew, in that code's format unless `format`; `traces` are CSV files of measurements to
         replay first. Raises :class:`Faults` if nothing could be compared; a difference is a result, not an error.
         """
         generated = None if generated is None else os.fspath(generated)
         paths = [os.fspath(path) for path in traces]
         native = self._in(format)
-        equal, report, text = native.verify(target, steps, seed, generated, paths, golden_decisions)
+        equal, report, text = native.verify(target, steps, seed, generated, format is None, paths, golden_decisions)
         data = json.loads(report)
         found = data["report"] or {}
         return Verification(equal, found.get("builds", []), found.get("checksum"), data, text)

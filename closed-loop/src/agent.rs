@@ -123,6 +123,13 @@ impl<T: Real> Agent<T> {
         self.trace.command.duty.to_f64()
     }
 
+    /// [`Agent::act`] with a duty before the mapping in the place of an action, for a policy that commands a number.
+    pub fn give(&mut self, duty_sim: T) -> f64 {
+        self.controller.give(&mut self.trace, duty_sim);
+        self.controller.commit_trace(&self.trace);
+        self.trace.command.duty.to_f64()
+    }
+
     /// One step of the whole controller with its own network, as the compiled code makes it.
     ///
     /// # Errors

@@ -1,5 +1,7 @@
 //! The controller: `eval`, `commit` and what lies between (contract sections 1 and 10).
 
+use std::sync::Arc;
+
 use ndarray::{Array1, ArrayView1};
 use policy::Policy;
 
@@ -20,18 +22,19 @@ use crate::trace::{Command, FeatureTrace, LayerTrace, Trace};
 /// A policy at work, in the number format `T`.
 #[derive(Debug, Clone)]
 pub struct Controller<T> {
-    signals: Vec<Signal<T>>,
-    features: Vec<Feature<T>>,
-    network: Network<T>,
-    head: Head<T>,
+    // what never changes is shared between clones: a thousand of them side by side would not fit into a cache
+    signals: Arc<[Signal<T>]>,
+    features: Arc<[Feature<T>]>,
+    network: Arc<Network<T>>,
+    head: Arc<Head<T>>,
     pub(crate) mapping: Option<Mapping<T>>,
     limits: Limits<T>,
     initial_duty: T,
     fallback: T,
     /// K: bad steps bridged.
     hold: u32,
-    pub(crate) sound: Sound<T>,
-    state_names: Vec<String>,
+    pub(crate) sound: Arc<Sound<T>>,
+    state_names: Arc<[String]>,
     state: State<T>,
 }
 
@@ -64,17 +67,17 @@ impl<T: Real> Controller<T> {
             primed: 0,
         };
         Self {
-            state_names: state_names(policy, &features, &state),
-            signals,
-            features,
-            network: Network::new(policy),
-            head: Head::new(policy),
+            state_names: state_names(policy, &features, &state).into(),
+            signals: signals.into(),
+            features: features.into(),
+            network: Network::new(policy).into(),
+            head: Head::new(policy).into(),
             mapping,
             limits,
             initial_duty,
             fallback: T::nearest(policy.fallback.duty),
             hold: policy.fallback.hold,
-            sound: Sound::new(policy),
+            sound: Sound::new(policy).into(),
             state,
         }
     }
@@ -182,6 +185,13 @@ impl<T: Real> Controller<T> {
     pub fn choose(&self, trace: &mut Trace<T>, action_index: u32) {
         let chosen = self.head.choose(action_index);
         (trace.action_index, trace.duty_sim) = chosen.unwrap_or((0, self.initial_duty));
+        self.act(trace);
+    }
+
+    /// Sections 8 and 9 for a duty before the mapping that was found elsewhere, behind [`Controller::sense_into`]: what a
+    /// continuous head is trained with.
+    pub fn give(&self, trace: &mut Trace<T>, duty_sim: T) {
+        (trace.action_index, trace.duty_sim) = (0, duty_sim);
         self.act(trace);
     }
 

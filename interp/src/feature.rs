@@ -38,16 +38,25 @@ impl<T: Real> Source<T> {
         }
     }
 
+    /// A leaf in place, since most operands are one and a call costs more than they do; other expressions by [`Source::tree`].
+    #[inline(always)]
     fn value(&self, inputs: Inputs<'_, T>) -> T {
         match self {
             Self::Input(Input::Signal(index)) => inputs.signals[*index],
             Self::Input(Input::PreviousDuty) => inputs.previous_duty,
             Self::Input(Input::PreviousCommand) => inputs.previous_command,
             Self::Constant(value) => *value,
+            _ => self.tree(inputs),
+        }
+    }
+
+    fn tree(&self, inputs: Inputs<'_, T>) -> T {
+        match self {
             Self::Neg(x) => -x.value(inputs),
             Self::Add(x, y) => x.value(inputs) + y.value(inputs),
             Self::Sub(x, y) => x.value(inputs) - y.value(inputs),
             Self::Scale(k, x) => *k * x.value(inputs),
+            Self::Input(_) | Self::Constant(_) => self.value(inputs),
         }
     }
 }

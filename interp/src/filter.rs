@@ -118,7 +118,9 @@ impl<T: Real> Filter<T> {
 
 /// Drops the oldest and appends, or fills the whole line if the state was not primed.
 fn shift<T: Real>(line: &mut [T], primed: bool, newest: T) {
-    if primed {
+    if let [only] = line {
+        *only = newest;
+    } else if primed {
         line.rotate_left(1);
         if let Some(last) = line.last_mut() {
             *last = newest;

@@ -9,7 +9,7 @@ use crate::entry::Way;
 use crate::parameters::{LoadBox, Parameters, Pwm};
 use crate::plain::{All, Give, LARGEST_CHANGE, LONGEST_STEP, Number, ORDER, Part, TERM_BEFORE, series, sum};
 use crate::plant::Plant;
-use crate::signals::Load;
+use crate::signals::{Load, Signals};
 
 /// Converters computed together in the lanes of the vector unit.
 // a convention from before it was measured: on x86-64 with SSE2, 1024 converters make 17.9 M periods a second with 2
@@ -34,14 +34,7 @@ impl Batch {
     pub fn new(parameters: &[Parameters]) -> Result<Self, Faults> {
         let plants = parameters.iter().map(Plant::new).collect::<Result<Vec<_>, _>>()?;
         for (index, plant) in plants.iter().enumerate() {
-            if plant.way > Way::Batch {
-                let message = Message::new(format!("converter {index} does not fit into a batch"))
-                    .expected(
-                        "resistances, diode voltage, load and duty quantisation only; trailing carrier, sampled at 0",
-                    )
-                    .hint("step it as a `Plant`");
-                return Err(Fault::from(message).into());
-            }
+            fits(index, plant)?;
         }
         let count = plants.len();
         // what does not fill a group is stepped one by one, so the constants of a partial group are never needed
@@ -94,6 +87,47 @@ impl Batch {
         }
     }
 
+    /// Signals of one converter at the sampling instant under `load`; its sensors show them as they are.
+    #[must_use]
+    #[inline]
+    pub fn signals(&self, index: usize, load: &Load) -> Signals {
+        let plant = &self.plants[index];
+        let drawn = load_setting::drawn(&plant.parameters.load, load);
+        Signals {
+            v_out: self.v_out[index],
+            i_l: self.i_l[index],
+            i_out: plant.plain.load_current(&drawn, self.v_out[index]),
+            v_in: plant.parameters.converter.v_in,
+        }
+    }
+
+    /// Puts another converter into the place of one; it keeps its voltage and current.
+    ///
+    /// # Errors
+    /// As [`Batch::new`].
+    pub fn replace(&mut self, index: usize, parameters: &Parameters) -> Result<(), Faults> {
+        let plant = Plant::new(parameters)?;
+        fits(index, &plant)?;
+        self.plants[index] = plant;
+        let first = index - index % LANES;
+        if let (Some(group), Some(plants)) = (
+            self.groups.get_mut(index / LANES),
+            self.plants.get(first..first + LANES),
+        ) {
+            *group = Group::new(plants);
+        }
+        Ok(())
+    }
+
+    /// One control period of one converter alone, in which the load changes: [`Plant::step_with_change`].
+    pub fn step_with_change(&mut self, index: usize, duty: f64, [before, after]: [&Load; 2], at: f64) {
+        let plant = &mut self.plants[index];
+        // at rest in this state: what a plant remembers beyond it belongs to an earlier period of the same converter
+        plant.reset_at(self.v_out[index], self.i_l[index], before);
+        let sample = plant.step_with_change(duty, before, after, at);
+        (self.i_l[index], self.v_out[index]) = (sample.i_l, sample.v_out);
+    }
+
     fn step_one(&mut self, index: usize, duty: f64, load: &Load) {
         let plant = &mut self.plants[index];
         (plant.state.x[0], plant.state.x[1]) = (self.i_l[index], self.v_out[index]);
@@ -138,6 +172,16 @@ impl Batch {
             }
         }
     }
+}
+
+fn fits(index: usize, plant: &Plant) -> Result<(), Faults> {
+    if plant.way <= Way::Batch {
+        return Ok(());
+    }
+    let message = Message::new(format!("converter {index} does not fit into a batch"))
+        .expected("resistances, diode voltage, load and duty quantisation only; trailing carrier, sampled at 0")
+        .hint("step it as a `Plant`");
+    Err(Fault::from(message).into())
 }
 
 #[derive(Debug, Clone, Copy)]

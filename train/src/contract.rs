@@ -59,12 +59,10 @@ impl Contract {
     /// Reads `path` and checks it with a network of the given hidden widths in the place of its weights.
     ///
     /// # Errors
-    /// If the file cannot be read or is not a sound contract.
+    /// If the file cannot be read or is not a sound contract, or commands a number: the training here is one that chooses.
     pub fn load(path: &Path, hidden: &[usize]) -> Result<Self, Error> {
-        let read = |path: &Path| std::fs::read(path).map_err(|error| Error::from(of_file(path, &error)));
-        let text = String::from_utf8_lossy(&read(path)?).into_owned();
-        let sketch = sketch(&text);
-        if sketch.is_continuous {
+        // before its other faults, which a contract for another kind of training need not have; unreadable files are said below
+        if std::fs::read_to_string(path).is_ok_and(|text| sketch(&text).is_continuous) {
             let message =
                 Message::new("the training is that of a DQN, which chooses, and this contract commands a number")
                     .found("continuous in [actions]")
@@ -72,6 +70,17 @@ impl Contract {
                     .hint("train such an actor with a library, and read what it saved: policyc new model.zip");
             return Err(Fault::in_file(path, message).into());
         }
+        Self::load_any(path, hidden)
+    }
+
+    /// [`Contract::load`], also of a contract that commands a number.
+    ///
+    /// # Errors
+    /// If the file cannot be read or is not a sound contract.
+    pub fn load_any(path: &Path, hidden: &[usize]) -> Result<Self, Error> {
+        let read = |path: &Path| std::fs::read(path).map_err(|error| Error::from(of_file(path, &error)));
+        let text = String::from_utf8_lossy(&read(path)?).into_owned();
+        let sketch = sketch(&text);
         let mut beside = Files::new();
         if let Some(mapping) = &sketch.mapping {
             let folder = path.parent().unwrap_or(Path::new(""));
@@ -89,7 +98,7 @@ impl Contract {
         // a contract without features or actions is refused by `policy::load`, which needs a network to get that far
         let mut widths = vec![sketch.features.max(1)];
         widths.extend_from_slice(hidden);
-        widths.push(sketch.actions.max(1));
+        widths.push(if sketch.is_continuous { 1 } else { sketch.actions.max(1) });
         // stands in for the trained one: a fault of the contract is said before a training, not after it
         let network = Network::zeros(&widths, &vec![policy::Activation::Identity; widths.len() - 1]);
         let empty = GoldenVectors {
@@ -233,7 +242,10 @@ fn files(
     let mut files = beside.clone();
     files.insert("policy.toml".to_owned(), text.as_bytes().to_vec());
     files.insert(weights.to_owned(), weights_file(network)?);
-    files.insert(golden.to_owned(), golden_file(vectors, network)?);
+    files.insert(
+        golden.to_owned(),
+        golden_file(vectors, network, sketch(text).is_continuous)?,
+    );
     Ok(files)
 }
 
@@ -258,26 +270,27 @@ fn weights_file(network: &Network) -> Result<Vec<u8>, Error> {
     safetensors_file(&tensors)
 }
 
-fn golden_file(vectors: &GoldenVectors, network: &Network) -> Result<Vec<u8>, Error> {
+fn golden_file(vectors: &GoldenVectors, network: &Network, is_continuous: bool) -> Result<Vec<u8>, Error> {
     let count = vectors.actions.len();
     let actions: Vec<u8> = vectors
         .actions
         .iter()
         .flat_map(|&action| (action as i32).to_le_bytes())
         .collect();
+    let observations = (
+        "obs".to_owned(),
+        vec![count, network.inputs()],
+        Dtype::F32,
+        bytes(&vectors.observations),
+    );
+    let outputs = vec![count, network.outputs()];
+    if is_continuous {
+        let output = ("output".to_owned(), outputs, Dtype::F32, bytes(&vectors.q_values));
+        return safetensors_file(&[observations, output]);
+    }
     safetensors_file(&[
-        (
-            "obs".to_owned(),
-            vec![count, network.inputs()],
-            Dtype::F32,
-            bytes(&vectors.observations),
-        ),
-        (
-            "q".to_owned(),
-            vec![count, network.outputs()],
-            Dtype::F32,
-            bytes(&vectors.q_values),
-        ),
+        observations,
+        ("q".to_owned(), outputs, Dtype::F32, bytes(&vectors.q_values)),
         ("action".to_owned(), vec![count], Dtype::I32, actions),
     ])
 }

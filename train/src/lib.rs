@@ -13,6 +13,8 @@
 
 mod checkpoint;
 pub mod contract;
+mod episode;
+pub mod episodes;
 mod faults;
 pub mod learner;
 pub mod network;

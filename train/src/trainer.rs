@@ -16,6 +16,7 @@ use random::{Random, Xoshiro};
 use toml_input::{Fault, Message};
 
 use crate::contract::Contract;
+use crate::episode::{Drawn, draw_change};
 use crate::faults::Error;
 use crate::learner::{Learner, TargetUpdate, greedy};
 use crate::network::Network;
@@ -23,7 +24,7 @@ pub(crate) use crate::progress::Sums;
 pub use crate::progress::{Best, Ended, Look, Progress};
 use crate::replay::ReplayBuffer;
 use crate::score::{Score, Scoring};
-use crate::settings::{Draw, Loads, Settings};
+use crate::settings::Settings;
 use closed_loop::Agent;
 use closed_loop::environment::{Environment, LoadPath, Start};
 use closed_loop::scenario::{Finding, Instant, Task, survey, survey_all};
@@ -230,50 +231,25 @@ impl<E: Environment> Trainer<E> {
     /// The load of the coming control period; it changes every so often.
     fn load_path(&mut self) -> LoadPath {
         let mut path = LoadPath::constant(self.load);
-        let episode = &self.settings.episode;
-        if (self.episode_step + 1).is_multiple_of(episode.load_every) {
-            let (loads, _) = self.settings.stage(self.step);
-            let power = draw_load(loads, &mut self.scenario);
-            let at = if episode.any_phase {
-                // above 0: at 0 the load would change at a sample that has been taken
-                1.0 - self.scenario.unit()
-            } else {
-                1.0
-            };
-            path.change = Some((at, Load::power(power)));
-        }
+        let (loads, _) = self.settings.stage(self.step);
+        let change = draw_change(&self.settings.episode, loads, self.episode_step, &mut self.scenario);
+        path.change = change.map(|(at, power)| (at, Load::power(power)));
         path
     }
 
     /// A new converter, a new load, a new start; the episode before is cut short, not ended: its last transition says so.
     fn begin_episode(&mut self) -> Result<(), Error> {
         let (loads, share) = self.settings.stage(self.step);
-        let rng = &mut self.scenario;
-        let power = draw_load(loads, rng);
-        let episode = &self.settings.episode;
-        let v_out = rng.uniform(episode.initial_voltage[0], episode.initial_voltage[1]);
-        let beside = rng.uniform(episode.initial_current[0], episode.initial_current[1]);
-        let seed = rng.bits();
-        let mut varied = Vec::new();
-        for parameter in &self.settings.randomise {
-            // `check_fit` has refused unknown keys
-            let nominal = self.nominal.parameter(&parameter.key).unwrap_or_default();
-            let drawn = match parameter.draw {
-                Draw::Value([low, high]) => rng.uniform(low, high),
-                Draw::Factor([low, high]) => nominal * rng.uniform(low, high),
-            };
-            // drawn whatever the share is: a stage of the curriculum does not shift what is drawn behind it
-            varied.push((parameter.key.as_str(), nominal + share * (drawn - nominal)));
-        }
-        self.load = Load::power(power);
+        let nominal = |key: &str| self.nominal.parameter(key).unwrap_or_default();
+        let drawn = Drawn::new(&self.settings, loads, share, &nominal, &mut self.scenario);
+        self.load = Load::power(drawn.load);
         self.agent.reset();
         self.sample = self.environment.restart(&Start {
-            v_out,
-            // a training may start at 0 V
-            i_l: (power / v_out.max(1.0) + beside).max(0.0),
+            v_out: drawn.v_out,
+            i_l: drawn.i_l(&self.load),
             load: self.load,
-            seed,
-            varied: &varied,
+            seed: drawn.seed,
+            varied: &drawn.varied,
         })?;
         self.episode_step = 0;
         self.agent.sense(&self.sample.measured)
@@ -377,15 +353,13 @@ pub fn quick_controller(
     })
 }
 
-fn draw_load(loads: &Loads, rng: &mut Xoshiro) -> f64 {
-    if !loads.values.is_empty() && rng.unit() < loads.share {
-        loads.values[rng.below(loads.values.len())]
-    } else {
-        rng.uniform(loads.range[0], loads.range[1])
-    }
-}
-
-fn check_fit<E: Environment>(settings: &Settings, contract: &Contract, environment: &E) -> Result<(), Error> {
+/// # Errors
+/// If they have different control periods, or the plant is no buck converter, or has not what is to be varied.
+pub(crate) fn check_fit<E: Environment>(
+    settings: &Settings,
+    contract: &Contract,
+    environment: &E,
+) -> Result<(), Error> {
     let (policy, plant) = (contract.policy.sample_period, environment.t_sample());
     // a decimal period and 1 / f_sw may differ by rounding
     if (policy / plant - 1.0).abs() > 1e-9 {

@@ -7,6 +7,7 @@ mod programs;
 mod rules;
 mod steps;
 mod tools;
+mod wheel;
 mod workspace;
 
 use std::process::ExitCode;
@@ -18,11 +19,12 @@ const USAGE: &str = "\
 usage: cargo xtask <command>
 
   test [--quick|--full] [--skip-install]   everything CI asks for; the last line counts the steps
-         --quick          without the crates `tests` and `blind`, rustdoc, firmware and the demo
+         --quick          without the crates `tests` and `blind`, the wheel, rustdoc, firmware and the demo
          --full           what a release asks for: 20,000 steps on every emulated target, float libraries included
          --skip-install   look for the tools, install none
   setup                             only the tools: compilers, emulators, ngspice, mdBook (also called install)
   bless                             rewrite the golden files from what the code produces now
+  wheel [--full]                    only the Python package: build, install, test
   layers                            only the layer rules
   book                              only the book: links, contents, mdBook
   words                             words of each page, and figures per hundred of them
@@ -39,6 +41,7 @@ enum Command {
     Test(Options),
     Install,
     Bless,
+    Wheel(Options),
     Layers,
     Book,
     Words,
@@ -77,6 +80,12 @@ fn parse(arguments: &[String]) -> Result<Command, String> {
         "random" => return Ok(Command::Random(rest.to_vec())),
         "blind" => return Ok(Command::Blind(rest.to_vec())),
         "bench" => return Ok(Command::Bench(rest.to_vec())),
+        "wheel" => {
+            return parse_test(rest).map(|command| match command {
+                Command::Test(options) => Command::Wheel(options),
+                other => other,
+            });
+        }
         "setup" | "install" => Command::Install,
         "bless" => Command::Bless,
         "layers" => Command::Layers,
@@ -123,6 +132,7 @@ fn run(command: Command) -> Result<bool, String> {
             Ok(true)
         }
         Command::Test(options) => Ok(steps::run_all(&Workspace::load()?, steps::ALL, options)),
+        Command::Wheel(options) => Ok(steps::run_all(&Workspace::load()?, steps::OF_THE_WHEEL, options)),
         Command::Bless => bless(&Workspace::load()?),
         Command::Layers => layers(&Workspace::load()?),
         Command::Book => Ok(steps::run_all(

@@ -11,6 +11,7 @@ use crate::process::{self, Output};
 use crate::programs;
 use crate::rules::{self, Findings};
 use crate::tools;
+use crate::wheel;
 use crate::workspace::Workspace;
 
 /// Golden files are rewritten instead of compared when this is set.
@@ -59,6 +60,11 @@ const BOOK: Step = step("book", true, book);
 /// What an author of pages wants to know.
 pub const OF_THE_BOOK: &[Step] = &[PAGES, BOOK];
 
+const WHEEL: Step = step("wheel", false, wheel);
+
+/// The Python package.
+pub const OF_THE_WHEEL: &[Step] = &[WHEEL];
+
 /// What CI asks for.
 pub const ALL: &[Step] = &[
     step("tools", true, install),
@@ -70,6 +76,7 @@ pub const ALL: &[Step] = &[
     step("fmt", true, fmt),
     step("clippy", true, clippy),
     step("test", true, test),
+    WHEEL,
     step("rustdoc", false, rustdoc),
     step("firmware", false, firmware),
     step("demo", false, demo),
@@ -259,6 +266,18 @@ fn test(context: &Context) -> Outcome {
     };
     let programs = programs::all(tests.map(String::as_str));
     programs::run(programs, command, &context.log, context.limit()).map(Done::Passed)
+}
+
+fn wheel(context: &Context) -> Outcome {
+    let Context {
+        workspace,
+        options,
+        log,
+    } = context;
+    Ok(match wheel::test(workspace, options.full, log, context.limit())? {
+        Ok(notes) => Done::Passed(notes),
+        Err(reason) => Done::Skipped(reason),
+    })
 }
 
 fn rustdoc(context: &Context) -> Outcome {

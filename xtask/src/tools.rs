@@ -143,6 +143,19 @@ const TOOLS: &[Tool] = &[
     ),
     tool("Marabou", MARABOU, Python("maraboupy==2.0.0")),
     tool("Bitwuzla", BITWUZLA, Python("bitwuzla==0.9.1")),
+    tool(
+        "maturin",
+        &["python3", "-c", "import maturin"],
+        Python("maturin==1.16.0"),
+    ),
+    tool("numpy", &["python3", "-c", "import numpy"], Python("numpy==2.4.6")),
+    tool("pandas", &["python3", "-c", "import pandas"], Python("pandas==3.1.1")),
+    tool(
+        "gymnasium",
+        &["python3", "-c", "import gymnasium"],
+        Python("gymnasium==1.4.0"),
+    ),
+    tool("pytest", &["python3", "-c", "import pytest"], Python("pytest==9.2.0")),
 ];
 
 /// Debian's Rust with the sources of `core`, which stands in where rustup has no target.
@@ -158,6 +171,18 @@ pub const WITHOUT_RUST_TARGETS: &str = "POLICYC_WITHOUT_RUST_TARGETS";
 /// The folder of the Python environment: beside what cargo builds, so that no package gets into the system's Python.
 fn python(target_dir: &Path) -> PathBuf {
     target_dir.join("python")
+}
+
+/// The Python program of that environment.
+pub fn python_program(target_dir: &Path) -> PathBuf {
+    interpreter(&python(target_dir))
+}
+
+/// Those of the tools by these names that are not there.
+pub fn lacking<'a>(target_dir: &Path, names: &[&'a str]) -> Vec<&'a str> {
+    let missing = missing(TOOLS, &python(target_dir));
+    let lacks = |name: &&&str| missing.iter().any(|tool| tool.name == **name);
+    names.iter().filter(lacks).copied().collect()
 }
 
 /// Tests leave out what needs the Python packages that this names, separated by commas.

@@ -14,9 +14,56 @@ use crate::failure::Failure;
 use crate::outcome::Outcome;
 use crate::output;
 
+/// What is asked of a certificate, beside the policy.
+#[derive(Debug, Clone)]
+pub struct Request {
+    /// Axes of the map, `NAME` or `NAME=LOW:HIGH`: two or none.
+    pub axis: Vec<String>,
+    /// Other coordinates of the map, `NAME=VALUE`.
+    pub at: Vec<String>,
+    /// States drawn for the shares.
+    pub samples: u32,
+    /// Boxes into which the states are split.
+    pub boxes: u32,
+    /// Seed of the draws.
+    pub seed: u64,
+}
+
+/// A certificate as files, by name, and in words.
+pub struct Made {
+    /// `certificate.json`, `certificate.html` and, where there is a map, `map.svg`.
+    pub files: BTreeMap<String, String>,
+    /// What the command says.
+    pub summary: String,
+}
+
 /// Proves, measures, draws, writes.
 pub fn run(options: &Certify) -> Result<Outcome, Failure> {
     let policy = super::load_as(&options.policy, options.outside, options.format)?;
+    let made = make(
+        &policy,
+        &Request {
+            axis: options.axis.clone(),
+            at: options.at.clone(),
+            samples: options.samples,
+            boxes: options.boxes,
+            seed: options.seed,
+        },
+    )?;
+    output::replace_own_texts(&options.out, &made.files, options.replacing)?;
+    output::say(&made.summary)?;
+    output::say(&format!(
+        "to look at: {}",
+        options.out.join("certificate.html").display()
+    ))?;
+    Ok(Outcome::Done)
+}
+
+/// The certificate of a policy; nothing is written.
+///
+/// # Errors
+/// If the policy computes in `f64`, or an axis is none of its states.
+pub fn make(policy: &Policy, options: &Request) -> Result<Made, Failure> {
     if policy.numeric_format == NumericFormat::F64 {
         let message = Message::new(
             "the certificate is about binary32 and integers: its box holds the observations as binary32 rounds them",
@@ -29,8 +76,8 @@ pub fn run(options: &Certify) -> Result<Outcome, Failure> {
         let message = Message::new("a map shows where actions are proven, and this policy commands a number");
         return Err(message.found("--axis or --at").hint("leave them out").into());
     }
-    let slice = if is_actor { None } else { slice(&policy, options)? };
-    let controller = Controller::<f32>::new(&policy);
+    let slice = if is_actor { None } else { slice(policy, options)? };
+    let controller = Controller::<f32>::new(policy);
     let q_values = |observation: &[f32]| match controller.q_values(&aview1(observation)) {
         Ok(outputs) if is_actor => controller
             .decide(&outputs.view())
@@ -46,31 +93,28 @@ pub fn run(options: &Certify) -> Result<Outcome, Failure> {
         samples: options.samples as usize,
         ..Effort::default()
     };
-    let certificate = Certificate::new(&policy, effort, slice.as_ref(), &q_values, &mut || rng.unit());
+    let certificate = Certificate::new(policy, effort, slice.as_ref(), &q_values, &mut || rng.unit());
     let mut json = serde_json::to_string_pretty(&certificate)?;
     json.push('\n');
-    let map = page::map(&policy, &certificate)?;
+    let map = page::map(policy, &certificate)?;
     let mut files = BTreeMap::from([
         ("certificate.json".to_owned(), json),
         (
             "certificate.html".to_owned(),
-            page::page(&policy, &certificate, map.clone())?,
+            page::page(policy, &certificate, map.clone())?,
         ),
     ]);
     if let Some(map) = map {
         files.insert("map.svg".to_owned(), map.to_string());
     }
-    output::replace_own_texts(&options.out, &files, options.replacing)?;
-    output::say(&page::summary(&certificate))?;
-    output::say(&format!(
-        "to look at: {}",
-        options.out.join("certificate.html").display()
-    ))?;
-    Ok(Outcome::Done)
+    Ok(Made {
+        files,
+        summary: page::summary(&certificate),
+    })
 }
 
 /// The slice that is asked for, of settled states unless those have fewer than two coordinates; `None` if all have.
-fn slice(policy: &Policy, options: &Certify) -> Result<Option<Slice>, Failure> {
+fn slice(policy: &Policy, options: &Request) -> Result<Option<Slice>, Failure> {
     let (memory, domain) = Domain::mapped(policy);
     let coordinates = domain.coordinates();
     let find = |name: &str| {

@@ -8,6 +8,7 @@ use codegen::{Output, manifest, notes};
 use policy::Policy;
 use targets::TargetSpec;
 use toml_input::Message;
+use verify::budget::Clock;
 use verify::costs::StepCosts;
 use verify::fmu::Archive;
 use verify::{Decisions, Files, UNPROVEN, advice, text};
@@ -19,37 +20,100 @@ use crate::output;
 use crate::ownership::{self, Replacing};
 use report::bytes;
 
+/// What is asked of a compilation, beside the policy.
+#[derive(Debug, Clone)]
+pub struct Request {
+    /// Deployment target by name.
+    pub target: String,
+    /// What to make; `c` and `rust` come along where another output calls them.
+    pub emit: Vec<Output>,
+    /// Control steps in the kit.
+    pub kit_steps: u32,
+    /// Whether the code is built and run under the target's emulator to report its costs.
+    pub costs: bool,
+    /// Clock of the processor, against which the costs are held.
+    pub clock: Option<Clock>,
+    /// Share of the golden decisions that the numeric format may change, 0..1; `None`: as the contract says.
+    pub golden_decisions: Option<f64>,
+}
+
+/// What a compilation makes.
+pub struct Made {
+    target: &'static TargetSpec,
+    outputs: Vec<Output>,
+    files: Files,
+    archives: Vec<Archive>,
+    costs: StepCosts,
+}
+
+impl Made {
+    /// Every file that the command writes, by name, the record of those without a mark included.
+    ///
+    /// # Errors
+    /// If the record cannot be written as JSON.
+    pub fn into_files(self) -> Result<BTreeMap<String, Vec<u8>>, Failure> {
+        ownership::recorded(together(&self.files, &self.archives))
+    }
+}
+
 /// Generates, then writes everything at once.
 pub fn run(options: &Compile) -> Result<Outcome, Failure> {
-    let target = codegen::target(&options.target)?;
-    let policy = load(options)?;
-    let outputs = with_cores(&options.emit);
-    let expected = verify::kit::expected(&policy, target, &outputs, options.kit_steps)?;
-    let mut files = codegen::generate(&policy, target, &outputs, expected.as_ref())?.files;
-    let costs = measure(options, &policy, target, &outputs, &mut files)?;
-    let archives = verify::fmu::archives(&policy, target, &outputs, &files)?;
+    // a name that is no target's is said before a policy is read
+    codegen::target(&options.target)?;
+    let policy = super::load_as(&options.policy, options.outside, options.format)?;
+    let made = make(
+        &policy,
+        &Request {
+            target: options.target.clone(),
+            emit: options.emit.clone(),
+            kit_steps: options.kit_steps,
+            costs: !options.no_costs,
+            clock: options.clock,
+            golden_decisions: options.golden_decisions,
+        },
+    )?;
     ownership::check_policy(&options.out, &policy.name, options.replacing)?;
-    let written = write(&options.out, &files, &archives, options.replacing)?;
-    say(&policy, target, &written, &archives)?;
-    for text in costs.texts(&policy, target, options.clock) {
+    let written = write(&options.out, &made.files, &made.archives, options.replacing)?;
+    say(&policy, made.target, &written, &made.archives)?;
+    for text in made.costs.texts(&policy, made.target, options.clock) {
         output::say(&text)?;
     }
     if let Some(clock) = options.clock {
-        output::say(&advice::lines(&policy, target, &outputs, &costs, clock)?.join("\n"))?;
+        output::say(&advice::lines(&policy, made.target, &made.outputs, &made.costs, clock)?.join("\n"))?;
     }
     Ok(Outcome::Done)
 }
 
-/// The policy in the format asked for; refused if its network does not give the trainer's answers.
-fn load(options: &Compile) -> Result<Policy, Failure> {
-    let policy = super::load_as(&options.policy, options.outside, options.format)?;
-    super::no_choices(&policy, options.golden_decisions)?;
-    if let Some(golden) = verify::golden_result(&policy).filter(|golden| !golden.passed()) {
+/// The files of a policy; nothing is written.
+///
+/// # Errors
+/// If the network does not give the trainer's answers, or there is no such target, or an output cannot be made.
+pub fn make(policy: &Policy, request: &Request) -> Result<Made, Failure> {
+    let target = codegen::target(&request.target)?;
+    check(policy, request.golden_decisions)?;
+    let outputs = with_cores(&request.emit);
+    let expected = verify::kit::expected(policy, target, &outputs, request.kit_steps)?;
+    let mut files = codegen::generate(policy, target, &outputs, expected.as_ref())?.files;
+    let costs = measure(request, policy, target, &outputs, &mut files)?;
+    let archives = verify::fmu::archives(policy, target, &outputs, &files)?;
+    Ok(Made {
+        target,
+        outputs,
+        files,
+        archives,
+        costs,
+    })
+}
+
+/// Refuses a policy whose network does not give the trainer's answers.
+fn check(policy: &Policy, golden_decisions: Option<f64>) -> Result<(), Failure> {
+    super::no_choices(policy, golden_decisions)?;
+    if let Some(golden) = verify::golden_result(policy).filter(|golden| !golden.passed()) {
         let message = Message::new("the network does not give the trainer's golden answers; nothing was written");
         return Err(message.found(golden.to_string()).hint(golden.hint()).into());
     }
-    match verify::decisions(&policy, options.golden_decisions).filter(|decisions| !decisions.kept()) {
-        None => Ok(policy),
+    match verify::decisions(policy, golden_decisions).filter(|decisions| !decisions.kept()) {
+        None => Ok(()),
         Some(decisions) => {
             let remedy = decisions.remedy();
             let (problem, hint) = match &decisions {
@@ -68,7 +132,7 @@ fn load(options: &Compile) -> Result<Policy, Failure> {
                     ),
                 ),
             };
-            let found = text::decisions(&policy, &decisions).join("\n");
+            let found = text::decisions(policy, &decisions).join("\n");
             Err(Message::new(problem).found(found).hint(hint).into())
         }
     }
@@ -76,18 +140,18 @@ fn load(options: &Compile) -> Result<Policy, Failure> {
 
 /// What a step costs under the target's emulator; it goes into the manifest, too.
 fn measure(
-    options: &Compile,
+    request: &Request,
     policy: &Policy,
     target: &TargetSpec,
     outputs: &[Output],
     files: &mut Files,
 ) -> Result<StepCosts, Failure> {
-    if options.no_costs {
+    if !request.costs {
         return Ok(StepCosts::default());
     }
     let costs = StepCosts::of(policy, target, &languages(outputs), files);
     if let (false, Some(manifest)) = (costs.builds.is_empty(), files.get_mut(manifest::FILE)) {
-        *manifest = manifest::with_costs(manifest, &costs.entries(policy, options.clock))?;
+        *manifest = manifest::with_costs(manifest, &costs.entries(policy, request.clock))?;
     }
     Ok(costs)
 }
@@ -99,16 +163,18 @@ pub fn write(
     archives: &[Archive],
     replacing: Replacing,
 ) -> Result<Vec<(PathBuf, usize)>, Failure> {
-    let texts = files.iter().map(|(name, text)| (name, text.as_bytes()));
-    let packed = archives.iter().map(|archive| (&archive.file, archive.bytes.as_slice()));
-    let all: BTreeMap<String, Vec<u8>> = texts
-        .chain(packed)
-        .map(|(name, bytes)| (name.clone(), bytes.to_vec()))
-        .collect();
+    let all = together(files, archives);
     let length = |(name, content): (&String, &Vec<u8>)| (folder.join(name), content.len());
     let written = all.iter().map(length).collect();
     output::replace_own(folder, all, replacing)?;
     Ok(written)
+}
+
+fn together(files: &Files, archives: &[Archive]) -> BTreeMap<String, Vec<u8>> {
+    let texts = files.iter().map(|(name, text)| (name, text.as_bytes()));
+    let packed = archives.iter().map(|archive| (&archive.file, archive.bytes.as_slice()));
+    let all = texts.chain(packed);
+    all.map(|(name, bytes)| (name.clone(), bytes.to_vec())).collect()
 }
 
 /// Says what was made of the policy and what was written.

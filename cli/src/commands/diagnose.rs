@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use std::time::Instant;
 
 use ::diagnose::control::Request;
-use ::diagnose::diagnosis::diagnose;
+use ::diagnose::diagnosis::{Diagnosis, diagnose};
 use ::diagnose::extend::{extended_toml, partial_toml};
 use ::diagnose::findings::Findings;
 use ::diagnose::gain::Regime;
@@ -30,48 +30,69 @@ use crate::output;
 
 /// Reads the records, diagnoses, writes the three files.
 pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
-    let model = Parameters::buck_from_file(&options.model, "`diagnose`")?;
-    let mut columns = options.columns.read()?;
-    if options.settled {
-        columns.settled = Some(true);
-    }
-    let closed_loop = options
-        .policy
-        .as_deref()
-        .map(|policy| request(options, policy, &model))
-        .transpose()?;
-    let (train, heldout) = records(options, &columns, &model)?;
-    let start = Instant::now();
-    let shown = Mutex::new(Shown::new(start));
+    let columns = columns(options)?;
+    let shown = Mutex::new(Shown::new(Instant::now()));
     let say = |what: Progress<'_>| {
         if let Ok(mut shown) = shown.lock() {
             shown.hear(what);
         }
     };
-    let mut diagnosis = diagnose(&model, train, &heldout, &say);
+    let diagnosis = found(options, &columns, &say)?;
+    if let Ok(mut shown) = shown.lock() {
+        shown.line.clear();
+    }
+    output::replace_own_texts(&options.out, &texts(&diagnosis)?, options.replacing)?;
+    answer(options, &columns, &diagnosis.findings)?;
+    Ok(Outcome::Done)
+}
+
+/// Name and text of every file of a diagnosis; nothing is written or said.
+///
+/// # Errors
+/// As [`run`].
+pub fn files(options: &Diagnose) -> Result<BTreeMap<String, String>, Failure> {
+    texts(&found(options, &columns(options)?, &|_| {})?)
+}
+
+fn columns(options: &Diagnose) -> Result<ColumnMap, Failure> {
+    let mut columns = options.columns.read()?;
+    if options.settled {
+        columns.settled = Some(true);
+    }
+    Ok(columns)
+}
+
+fn found(options: &Diagnose, columns: &ColumnMap, say: &(dyn Fn(Progress<'_>) + Sync)) -> Result<Diagnosis, Failure> {
+    let model = Parameters::buck_from_file(&options.model, "`diagnose`")?;
+    let closed_loop = options
+        .policy
+        .as_deref()
+        .map(|policy| request(options, policy, &model))
+        .transpose()?;
+    let (train, heldout) = records(options, columns, &model)?;
+    let mut diagnosis = diagnose(&model, train, &heldout, say);
     if let Some(request) = closed_loop {
         say(Progress::Stage("closed loop"));
         diagnosis.close_the_loop(request);
     }
-    if let Ok(mut shown) = shown.lock() {
-        shown.line.clear();
-    }
+    Ok(diagnosis)
+}
+
+fn texts(diagnosis: &Diagnosis) -> Result<BTreeMap<String, String>, Failure> {
     let mut json = serde_json::to_string_pretty(&diagnosis.findings)?;
     json.push('\n');
     let mut files = BTreeMap::from([
         ("diagnosis.json".to_owned(), json),
-        ("plant.extended.toml".to_owned(), extended_toml(&diagnosis)),
-        ("report.html".to_owned(), page(&diagnosis)?),
+        ("plant.extended.toml".to_owned(), extended_toml(diagnosis)),
+        ("report.html".to_owned(), page(diagnosis)?),
     ]);
-    if let Some(partial) = partial_toml(&diagnosis) {
+    if let Some(partial) = partial_toml(diagnosis) {
         files.insert("plant.partial.toml".to_owned(), partial);
     }
     if let Some(control) = &diagnosis.control {
         files.insert("drm.toml".to_owned(), control.mapping.clone());
     }
-    output::replace_own_texts(&options.out, &files, options.replacing)?;
-    answer(options, &columns, &diagnosis.findings)?;
-    Ok(Outcome::Done)
+    Ok(files)
 }
 
 /// The verdict, then what was noticed, then where the rest stands.

@@ -13,7 +13,7 @@ use crate::output;
 pub fn run(options: &Inspect) -> Result<Outcome, Failure> {
     let policy = super::load_as(&options.policy, options.outside, options.format)?;
     if options.json {
-        output::say(&serde_json::to_string_pretty(&view(&policy))?)?;
+        output::say(&json(&policy)?)?;
     } else {
         output::say(text(&policy).trim_end())?;
     }
@@ -36,6 +36,13 @@ pub fn run(options: &Inspect) -> Result<Outcome, Failure> {
 }
 
 /// What `--json` prints.
+///
+/// # Errors
+/// If a number of the policy cannot be written as JSON.
+pub fn json(policy: &Policy) -> Result<String, Failure> {
+    Ok(serde_json::to_string_pretty(&view(policy))?)
+}
+
 #[derive(Serialize)]
 struct View<'p> {
     name: &'p str,
@@ -98,7 +105,8 @@ fn view(policy: &Policy) -> View<'_> {
     }
 }
 
-fn text(policy: &Policy) -> String {
+/// The checked policy in words.
+pub fn text(policy: &Policy) -> String {
     let mut out = describe::head(policy) + &describe::signals(policy) + &describe::observation(policy);
     out += &describe::network(policy);
     for line in golden(policy) {

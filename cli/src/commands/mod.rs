@@ -54,7 +54,7 @@ fn options(outside: Outside) -> ReadOptions {
 }
 
 /// [`load`], in another numeric format if one is asked for.
-fn load_as(path: &Path, outside: Outside, format: Option<NumericFormat>) -> Result<Policy, Failure> {
+pub fn load_as(path: &Path, outside: Outside, format: Option<NumericFormat>) -> Result<Policy, Failure> {
     let policy = load(path, outside)?;
     Ok(match format {
         Some(format) => policy.with_format(format),

@@ -1,5 +1,6 @@
 //! `policyc simulate`
 
+use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 
 use closed_loop::Scenario;
@@ -20,10 +21,7 @@ pub use closed_loop::{suits, v_ref};
 pub fn run(options: &Simulate) -> Result<Outcome, Failure> {
     let stop = interruption::stop_on_signal();
     output::check_new_folder(&options.out)?;
-    let scenario = Scenario::load(&options.scenario)?;
-    let policy = super::load_as(&options.policy, options.outside, options.format)?;
-    let setting = Setting::new(&options.scenario, scenario, policy, options.plant.as_deref())?;
-    let found = all(options, setting);
+    let found = all(options, setting(options)?);
     if stop.load(Ordering::Relaxed) {
         // what failed, failed because of the signal
         output::say("Interrupted; nothing written")?;
@@ -33,6 +31,26 @@ pub fn run(options: &Simulate) -> Result<Outcome, Failure> {
     output::write_results(&options.out, &found.files()?, &found.summary(), PAGE)?;
     let equal = found.check.is_none_or(|check| check.differences.is_empty());
     Ok(if equal { Outcome::Done } else { Outcome::Different })
+}
+
+/// What is simulated.
+fn setting(options: &Simulate) -> Result<Setting, Failure> {
+    let scenario = Scenario::load(&options.scenario)?;
+    let policy = super::load_as(&options.policy, options.outside, options.format)?;
+    Ok(Setting::new(
+        &options.scenario,
+        scenario,
+        policy,
+        options.plant.as_deref(),
+    )?)
+}
+
+/// Name and text of every file of a simulation; nothing is written.
+///
+/// # Errors
+/// As [`run`].
+pub fn files(options: &Simulate) -> Result<BTreeMap<String, String>, Failure> {
+    Ok(all(options, setting(options)?)?.files()?)
 }
 
 /// Starts the controllers and simulates.

@@ -21,7 +21,7 @@ const LAYERS: &[&[&str]] = &[
         "prove",
     ],
     &["cli", "example-build-rust", "example-build-c", "example-embedded-hal"],
-    &["tests", "blind", "bench", "xtask", "firmware"],
+    &["wheel", "tests", "blind", "bench", "xtask", "firmware"],
 ];
 
 /// No crate of `from` reaches one of `to`, by whatever way.

@@ -9,31 +9,52 @@ use crate::failure::Failure;
 use crate::outcome::Outcome;
 use crate::output;
 
+/// A fitted mapping as files.
+pub struct Made {
+    /// `drm.toml`.
+    pub mapping: String,
+    /// The report as a page.
+    pub page: Option<String>,
+    /// The report in words.
+    pub text: String,
+    /// The report as JSON.
+    pub json: String,
+}
+
 /// Fits, writes, reports.
 pub fn run(options: &Fit) -> Result<Outcome, Failure> {
+    let made = make(options, options.report.is_some())?;
+    output::replace_own_one(&options.out, &made.mapping, options.replacing)?;
+    if let (Some(path), Some(page)) = (&options.report, &made.page) {
+        output::replace_own_one(path, page, options.replacing)?;
+    }
+    if options.json {
+        output::say(&made.json)?;
+    } else {
+        output::say(made.text.trim_end())?;
+        output::say(&format!("\nwrote {}", options.out.display()))?;
+    }
+    Ok(Outcome::Done)
+}
+
+/// The mapping of a table; nothing is written.
+///
+/// # Errors
+/// Faults of the table or the options, or that no mapping can be fitted.
+pub fn make(options: &Fit, with_page: bool) -> Result<Made, Failure> {
     let table = options.reading.table(&options.table, None)?;
     let report = drm::fit(&table, &fit_options(options)?)?;
     let text = drm::text(&report)?;
     let title = format!("Duty ratio mapping of {}", options.table.display());
-    let page = options
-        .report
-        .as_ref()
-        .map(|path| Ok::<_, Failure>((path, drm::page(&report, &title, &text)?)));
-    let page = page.transpose()?;
+    let page = with_page.then(|| drm::page(&report, &title, &text)).transpose()?;
     let simulation = options.reading.simulation()?;
-    let mapping =
-        report.fit.map.to_toml(&drm::comment(&report)) + &simulation.as_ref().map_or_else(String::new, simulation_toml);
-    output::replace_own_one(&options.out, &mapping, options.replacing)?;
-    if let Some((path, page)) = &page {
-        output::replace_own_one(path, page, options.replacing)?;
-    }
-    if options.json {
-        output::say(&serde_json::to_string_pretty(&report)?)?;
-    } else {
-        output::say(text.trim_end())?;
-        output::say(&format!("\nwrote {}", options.out.display()))?;
-    }
-    Ok(Outcome::Done)
+    Ok(Made {
+        mapping: report.fit.map.to_toml(&drm::comment(&report))
+            + &simulation.as_ref().map_or_else(String::new, simulation_toml),
+        page,
+        text,
+        json: serde_json::to_string_pretty(&report)?,
+    })
 }
 
 fn fit_options(options: &Fit) -> Result<FitOptions, Failure> {

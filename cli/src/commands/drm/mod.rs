@@ -1,7 +1,7 @@
 //! `policyc drm`: the duty ratio mapping
 
 mod acquire;
-mod fit;
+pub mod fit;
 mod judge;
 mod transfer;
 

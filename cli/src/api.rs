@@ -1,0 +1,56 @@
+//! What the commands make, as data: the wheel hands it to its user in the place of files.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use clap::Parser;
+use policy::{NumericFormat, Policy};
+use toml_input::Message;
+
+use crate::arguments::drm::Drm;
+use crate::arguments::{Arguments, Command, Outside};
+use crate::commands;
+use crate::failure::Failure;
+
+pub use commands::certify::{Made as Certified, Request as CertifyRequest, make as certify};
+pub use commands::compile::{Made as Compiled, Request as CompileRequest, make as compile};
+pub use commands::inspect::{json as inspect_json, text as inspect_text};
+
+/// The policy at `path`, which is a contract or its folder, in another numeric format if one is asked for.
+///
+/// # Errors
+/// All faults of its files.
+pub fn load(path: &Path, allow_outside: bool, format: Option<NumericFormat>) -> Result<Policy, Failure> {
+    commands::load_as(path, Outside { allow_outside }, format)
+}
+
+/// What `policyc simulate`, `policyc diagnose` or `policyc drm fit` would write for the command line `arguments`, the command's
+/// name first. Of a fit: `drm.toml`, `report.html`, `report.txt`, `report.json`.
+///
+/// # Errors
+/// A fault of the command line or of the files that it names; another command.
+pub fn files<'a>(arguments: impl IntoIterator<Item = &'a str>) -> Result<BTreeMap<String, String>, Failure> {
+    let line = std::iter::once("policyc").chain(arguments);
+    let arguments = Arguments::try_parse_from(line).map_err(|error| {
+        let text = error.to_string();
+        // the rest is how to call the command
+        let first = text.lines().next().unwrap_or_default();
+        Message::new(first.trim_start_matches("error: "))
+    })?;
+    match &arguments.command {
+        Command::Simulate(options) => commands::simulate::files(options),
+        Command::Diagnose(options) => commands::diagnose::files(options),
+        Command::Drm(Drm::Fit(options)) => {
+            let made = commands::drm::fit::make(options, true)?;
+            let files = [
+                ("drm.toml", Some(made.mapping)),
+                ("report.html", made.page),
+                ("report.json", Some(made.json)),
+                ("report.txt", Some(made.text)),
+            ];
+            let named = files.into_iter().map(|(name, text)| Some((name.to_owned(), text?)));
+            Ok(named.flatten().collect())
+        }
+        _ => Err(Message::new("this command has no files to hand over").into()),
+    }
+}

@@ -20,7 +20,7 @@ pub(crate) fn duty_bound(head: &Continuous, real: Interval, error: f64) -> f64 {
     let (slope, own) = match head.squash {
         Squash::Curve(curve) => match curve.shape() {
             // what binary32 makes of the curve, beside the curve
-            Shape::Sigmoid(sigmoid) => (sigmoid.slopes(hull).1, sigmoid.error_32),
+            Shape::Curve(curve) => (curve.slopes(hull).1, curve.error_32.at(hull.high)),
             Shape::Hinge { .. } => (1.0, 0.0),
         },
         // both outputs beyond one end are cut to the same number

@@ -1,6 +1,6 @@
 //! A policy's network twice: in real arithmetic, and what its numeric format makes of it.
 
-use policy::scales::{self, SIGMOID_EXPONENT, SLOPE_BITS, power_of_two, round_half_up};
+use policy::scales::{self, SLOPE_BITS, power_of_two, round_half_up};
 use policy::{Activation, NumericFormat, Policy, Shape};
 
 use crate::form::{Form, Matrix};
@@ -9,7 +9,7 @@ use crate::form::{Form, Matrix};
 const UNIT_32: f64 = 1.0 / 16_777_216.0;
 /// More than the rounding errors of a layer in the subnormal range of binary32.
 const TINY_32: f64 = 1e-40;
-/// An observation becomes an integer by rounding half up; `trunc(fl(x + 32768.5)) - 32768` behind a sigmoid is at most this
+/// An observation becomes an integer by rounding half up; `trunc(fl(x + 32768.5)) - 32768` behind a curve is at most this
 /// far from x: one half, and half of the last bit below 2^16.
 const TO_INTEGER: f64 = 0.5 + 1.0 / 512.0;
 
@@ -36,6 +36,8 @@ enum Step {
     Integer {
         /// Per output: integer / 2^exponent is the sum.
         accumulators: Vec<i32>,
+        /// The same behind the activation.
+        outputs: Vec<i32>,
         shift: u32,
     },
 }
@@ -106,6 +108,7 @@ impl Layer {
             }
             step = Step::Integer {
                 accumulators: scale.accumulators.clone(),
+                outputs: scale.outputs.clone(),
                 shift: scale.shift,
             };
         }
@@ -129,7 +132,11 @@ impl Layer {
     pub fn rounding(&self, output: usize, inputs: &[f64], magnitude: f64) -> Rounding {
         match &self.step {
             Step::Float { is_fused } => self.float_rounding(output, inputs, *is_fused),
-            Step::Integer { accumulators, shift } => self.integer_rounding(accumulators[output], *shift, magnitude),
+            Step::Integer {
+                accumulators,
+                outputs,
+                shift,
+            } => self.integer_rounding((accumulators[output], outputs[output]), *shift, magnitude),
         }
     }
 
@@ -156,15 +163,15 @@ impl Layer {
                 after: TINY_32,
                 after_relative: relative,
             },
-            Shape::Sigmoid(sigmoid) => Rounding {
+            Shape::Curve(curve) => Rounding {
                 before,
-                after: sigmoid.error_32,
-                after_relative: 0.0,
+                after: curve.error_32.absolute,
+                after_relative: curve.error_32.relative,
             },
         }
     }
 
-    fn integer_rounding(&self, accumulator: i32, shift: u32, magnitude: f64) -> Rounding {
+    fn integer_rounding(&self, (accumulator, behind): (i32, i32), shift: u32, magnitude: f64) -> Rounding {
         let unit = power_of_two(shift.cast_signed() - accumulator);
         // the bias holds half of the last bit kept, so the shift rounds to nearest
         let cut = if shift == 0 { 0.0 } else { 0.5 * unit };
@@ -182,11 +189,11 @@ impl Layer {
                     after_relative: (held - below).abs().next_up(),
                 }
             }
-            Shape::Sigmoid(sigmoid) => Rounding {
+            Shape::Curve(curve) => Rounding {
                 // the sum becomes a binary32 number; the power of two behind it rounds nothing
                 before: 1.01 * UNIT_32 * magnitude + TINY_32,
-                after: TO_INTEGER * power_of_two(-SIGMOID_EXPONENT) + sigmoid.error_32,
-                after_relative: 0.0,
+                after: TO_INTEGER * power_of_two(-behind) + curve.error_32.absolute,
+                after_relative: curve.error_32.relative,
             },
         }
     }

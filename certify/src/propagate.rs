@@ -15,7 +15,7 @@
 //! In: the observations of a cell. Out: a form of the real Q values and one of the error. The one invariant: both have the same
 //! shared symbols, so a Q value of the format is their sum, and what moves together cancels in a difference.
 
-use policy::activation::Sigmoid;
+use policy::activation::Curve;
 use policy::{Activation, Interval, Shape};
 
 use crate::form::{Form, Replacement};
@@ -159,7 +159,7 @@ fn relaxed(activation: Activation, x: Interval) -> Replacement {
     match activation.shape() {
         Shape::Hinge { .. } if activation.is_identity() => Replacement::IDENTITY,
         Shape::Hinge { below } => convex(x, below),
-        Shape::Sigmoid(sigmoid) => flattening(sigmoid, x),
+        Shape::Curve(curve) => between(curve, x),
     }
 }
 
@@ -183,15 +183,15 @@ fn convex(x: Interval, slope: f64) -> Replacement {
     }
 }
 
-/// A sigmoid less a line with its least slope over the interval does not fall: the ends enclose it.
-fn flattening(sigmoid: &Sigmoid, x: Interval) -> Replacement {
-    let (low, high) = ((sigmoid.value)(x.low), (sigmoid.value)(x.high));
-    let factor = sigmoid.slopes(x).0;
+/// A curve less a line with its least slope over the interval does not fall: the ends enclose it.
+fn between(curve: &Curve, x: Interval) -> Replacement {
+    let (low, high) = ((curve.value)(x.low), (curve.value)(x.high));
+    let factor = curve.slopes(x).0;
     let (start, end) = (low - factor * x.low, high - factor * x.high);
     Replacement {
         factor,
         shift: 0.5 * (start + end),
-        radius: 0.5 * (end - start).abs() + 2.0 * sigmoid.near + 1e-12 * (x.low.abs() + x.high.abs()),
+        radius: 0.5 * (end - start).abs() + 2.0 * curve.near.at(x.high) + 1e-12 * (x.low.abs() + x.high.abs()),
     }
 }
 
@@ -213,7 +213,7 @@ fn slopes(activation: Activation, x: Interval, y: Interval) -> (f64, f64) {
     };
     match activation.shape() {
         Shape::Hinge { below } => sides(below),
-        Shape::Sigmoid(sigmoid) => sigmoid.slopes(hull),
+        Shape::Curve(curve) => curve.slopes(hull),
     }
 }
 
@@ -226,7 +226,7 @@ mod tests {
         match activation.shape() {
             Shape::Hinge { .. } if x > 0.0 => x,
             Shape::Hinge { below } => below * x,
-            Shape::Sigmoid(sigmoid) => (sigmoid.real)(x),
+            Shape::Curve(curve) => (curve.real)(x),
         }
     }
 

@@ -1,5 +1,6 @@
 //! The mask helpers of the emitted code against their plain models, for all bit patterns.
 
+use policy::Activation;
 use policy::limits::MAX_MAGNITUDE;
 
 use crate::emitted::Emitted;
@@ -8,7 +9,7 @@ use crate::goal::{Goal, holds};
 use crate::machine::{I32, Kind, Number, U32};
 use crate::refusal::Refusal;
 use crate::smt::Arithmetic;
-use crate::spec::{Spec, tables};
+use crate::spec::{Spec, curves};
 use crate::term::Term;
 
 /// What a helper is to give: from its arguments the preconditions and the claim about the number that it gave.
@@ -38,7 +39,7 @@ struct Claim {
 
 const PLAIN: Arithmetic = Arithmetic::Uninterpreted;
 
-const MODELS: [Model; 16] = [
+const MODELS: [Model; 15] = [
     Model {
         name: "select",
         arguments: &[("flag", Of::Flag), ("then", Of::Number), ("otherwise", Of::Number)],
@@ -176,27 +177,22 @@ const MODELS: [Model; 16] = [
         },
     },
     Model {
-        name: "tanh",
+        name: "absolute",
         arguments: &[("x", Of::Number)],
-        says: "is the rational function of section 6, operation by operation, for every number x whose quotient is a number",
-        arithmetic: PLAIN,
-        claim: |float, x, got| {
-            let (quotient, model) = tables::tanh(float, x[0]);
-            let numbers = [x[0], quotient].map(|x| float.terms.not(float.is_nan(x)));
-            Claim {
-                given: numbers.to_vec(),
-                holds: float.terms.equal(got, model),
-            }
-        },
-    },
-    Model {
-        name: "softsign",
-        arguments: &[("x", Of::Number)],
-        says: "is `fl(x / fl(1 + |x|))` for every number x",
+        says: "is x without its sign, for every number x",
         arithmetic: PLAIN,
         claim: |float, x, got| Claim {
             given: vec![float.terms.not(float.is_nan(x[0]))],
-            holds: float.terms.equal(got, tables::softsign(float, x[0])),
+            holds: float.terms.equal(
+                got,
+                float.terms.choose(
+                    float
+                        .terms
+                        .equal(float.terms.binary("bvand", x[0], float.sign()), float.constant(0.0)),
+                    x[0],
+                    float.neg(x[0]),
+                ),
+            ),
         },
     },
     Model {
@@ -284,6 +280,52 @@ fn of_two(float: Float<'_>, x: &[Term], got: Term, larger: Term, other: Term) ->
     }
 }
 
+/// What a curve gives. What it takes for granted beside its argument, a goal of another helper shows.
+fn curve(float: Float<'_>, activation: Activation, x: Term, got: Term) -> Option<Claim> {
+    let curve = curves::of(float, activation, x)?;
+    let mut given: Vec<Term> = curve
+        .numbers
+        .iter()
+        .map(|x| float.terms.not(float.is_nan(*x)))
+        .collect();
+    given.extend(curve.shown);
+    Some(Claim {
+        given,
+        holds: float.terms.equal(got, curve.value),
+    })
+}
+
+/// One goal for each curve that the code has.
+fn curve_goals(spec: Spec<'_>, emitted: &dyn Emitted, goals: &mut Vec<Goal>) -> Result<(), Refusal> {
+    let language = emitted.language();
+    let x = argument(spec, "x", Of::Number);
+    for activation in Activation::EACH {
+        let word = activation.word();
+        if activation.curve().is_none() {
+            continue;
+        }
+        let Some(given) = emitted.helper(word, std::slice::from_ref(&x)) else {
+            continue;
+        };
+        let (got, obligations) = given?;
+        let Some(claim) = curve(spec.float, *activation, x.term, got.term) else {
+            continue;
+        };
+        goals.push(holds(
+            spec.float,
+            &format!("{}.helper.{word}", language.to_lowercase()),
+            format!(
+                "{language}: `{word}` is that of section 6, operation by operation, for every number that the check of a policy lets arise \
+                 and on the way to which no quotient is NaN"
+            ),
+            spec.terms.and(claim.holds, spec.terms.all(obligations)),
+            &claim.given,
+            PLAIN,
+        ));
+    }
+    Ok(())
+}
+
 /// One goal for each helper that the code has.
 pub(crate) fn goals(spec: Spec<'_>, emitted: &dyn Emitted) -> Result<Vec<Goal>, Refusal> {
     let language = emitted.language();
@@ -310,6 +352,7 @@ pub(crate) fn goals(spec: Spec<'_>, emitted: &dyn Emitted) -> Result<Vec<Goal>, 
             model.arithmetic,
         ));
     }
+    curve_goals(spec, emitted, &mut goals)?;
     Ok(goals)
 }
 

@@ -1,6 +1,6 @@
 //! Continuous actors: the way from the last layer to a command, as the contract's `[actions]` says it.
 
-use policy::{Activation, Shape};
+use policy::Activation;
 use toml_input::Message;
 
 /// What bounds the output of an actor.
@@ -30,7 +30,7 @@ pub(crate) const TANH: Squash = Squash::Curve(Activation::Tanh);
 impl Squash {
     /// A curve that a contract takes behind its last layer.
     pub fn curve(activation: Activation) -> Option<Self> {
-        matches!(activation.shape(), Shape::Sigmoid(_)).then_some(Self::Curve(activation))
+        activation.range().map(|_| Self::Curve(activation))
     }
 }
 
@@ -56,8 +56,7 @@ impl Actor {
     pub fn ends(self) -> Option<(f64, f64)> {
         let (scale, offset) = self.affine?;
         let (low, high) = match self.squash {
-            Squash::Curve(curve) if curve.word().contains("sigmoid") => (0.0, 1.0),
-            Squash::Curve(_) => (-1.0, 1.0),
+            Squash::Curve(curve) => curve.range().map(|range| (range.low, range.high))?,
             Squash::Clip(low, high) => (low, high),
             Squash::ClipToSpace | Squash::Unknown => return None,
         };

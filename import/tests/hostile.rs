@@ -186,9 +186,9 @@ fn hostile_pickles_are_refused_at_once() {
     // {"a": {"a": ...}}
     let dicts = [
         &b"\x80\x02"[..],
-        &b"}X\x01\0\0\0a".repeat(50_000),
+        &b"}X\x01\0\0\0a".repeat(30_000),
         b"}",
-        &b"s".repeat(50_000),
+        &b"s".repeat(30_000),
         b".",
     ]
     .concat();
@@ -203,8 +203,8 @@ fn hostile_pickles_are_refused_at_once() {
     }
     shared.push(b'.');
     let many = [&b"\x80\x02"[..], &b"]".repeat(40_000_000)].concat();
-    let endless = [&b"\x80\x02"[..], &b"(".repeat(900_000)].concat();
-    let idle = [&b"\x80\x02}q\x00"[..], &b"h\x000".repeat(20_000_000)].concat();
+    let endless = [&b"\x80\x02"[..], &b"(".repeat(300_000)].concat();
+    let idle = [&b"\x80\x02}q\x00"[..], &b"h\x000".repeat(5_000_000)].concat();
     for (name, program, reason) in [
         ("fetched and dropped", idle, "operations"),
         (

@@ -172,6 +172,11 @@ fn graphs_that_end_in_a_command_are_read_with_what_scales_it() {
             "squash = \"tanh\", scale = 0.375, offset = 0.475",
         ),
         ("clipped_actor", f64::tanh, "clip = [-1.0, 1.0], scale = 0.3"),
+        (
+            "sigmoid_actor",
+            relu,
+            "{ squash = \"sigmoid\" }   # check: the command is 0.0 to 1.0",
+        ),
     ] {
         let (_folder, new, policy) = policy_of(&format!("{name}.onnx"), &Options::default());
         assert!(new.contract.contains(entry), "{}", new.contract);
@@ -271,11 +276,11 @@ fn an_odd_graph_is_refused_by_its_node() {
     let whole = std::fs::read(fixture("gemm.onnx")).unwrap();
     let at = whole.windows(6).position(|six| six == b"\"\x04Relu").unwrap();
     let mut other = whole.clone();
-    other[at + 2..at + 6].copy_from_slice(b"Gelu");
-    let file = folder.path().join("gelu.onnx");
+    other[at + 2..at + 6].copy_from_slice(b"Mish");
+    let file = folder.path().join("mish.onnx");
     write(&file, &other);
     let faults = refusal(&file);
-    assert!(faults.contains("Gelu `/network/network.1/Relu`"), "{faults}");
+    assert!(faults.contains("Mish `/network/network.1/Relu`"), "{faults}");
 }
 
 #[test]

@@ -1,8 +1,9 @@
 //! Activations (contract sections 6 and 6b), from the contract's text alone.
 
 use policy::Activation;
-use policy::scales::{SIGMOID_EXPONENT, SLOPE_BITS, power_of_two};
+use policy::scales::{SLOPE_BITS, power_of_two};
 
+use crate::curves;
 use crate::integer::{rounded, shifted};
 use crate::real::{Range, Real};
 
@@ -15,13 +16,35 @@ pub fn activate<'a, T: Real>(activation: Activation, values: impl Iterator<Item 
             let slope = T::nearest(slope);
             values.for_each(|x| *x = leaky_relu(slope, *x));
         }
-        Activation::Tanh => values.for_each(|x| *x = tanh(*x)),
-        Activation::Softsign => values.for_each(|x| *x = softsign(*x)),
+        other => {
+            let function = curve::<T>(other);
+            values.for_each(|x| *x = function(*x));
+        }
     }
 }
 
-/// An output of a layer in integers from its sum, `sum / 2^accumulator` as a number (section 6b).
-pub(crate) fn integer(activation: Activation, sum: i64, accumulator: i32, shift: u32) -> i64 {
+/// The function of a curve in a format.
+fn curve<T: Real>(activation: Activation) -> fn(T) -> T {
+    match activation {
+        Activation::Tanh => tanh,
+        Activation::Softsign => softsign,
+        Activation::Sigmoid => curves::sigmoid,
+        Activation::HardSigmoid => curves::hard_sigmoid,
+        Activation::Elu => curves::elu,
+        Activation::Softplus => curves::softplus,
+        Activation::Silu => curves::silu,
+        Activation::Gelu => curves::gelu,
+        Activation::GeluTanh => curves::gelu_tanh,
+        Activation::HardSwish => curves::hard_swish,
+        Activation::Relu | Activation::LeakyRelu { .. } | Activation::Identity => {
+            unreachable!("{} is two straight lines", activation.word())
+        }
+    }
+}
+
+/// An output of a layer in integers from its sum (section 6b). Integer / 2^exponent is the number, of the sum with the first of
+/// the exponents and of the output with the second.
+pub(crate) fn integer(activation: Activation, sum: i64, exponents: (i32, i32), shift: u32) -> i64 {
     match activation {
         Activation::Identity => shifted(sum, shift),
         Activation::Relu => shifted(sum, shift).max(0),
@@ -30,22 +53,21 @@ pub(crate) fn integer(activation: Activation, sum: i64, accumulator: i32, shift:
             let y = shifted(sum, shift);
             if y > 0 { y } else { shifted(y * slope, SLOPE_BITS) }
         }
-        Activation::Tanh => through_binary32(tanh, sum, accumulator),
-        Activation::Softsign => through_binary32(softsign, sum, accumulator),
+        other => through_binary32(curve(other), sum, exponents),
     }
 }
 
 /// The sum as a binary32 number, the function of section 6, and back.
-fn through_binary32(function: fn(f32) -> f32, sum: i64, accumulator: i32) -> i64 {
+fn through_binary32(function: fn(f32) -> f32, sum: i64, (accumulator, behind): (i32, i32)) -> i64 {
     let x = sum as f32 * (power_of_two(-accumulator) as f32);
     // the sum is rounded to binary32 once; the power of two changes its exponent alone
-    let y = function(x) * (power_of_two(SIGMOID_EXPONENT) as f32);
+    let y = function(x) * (power_of_two(behind) as f32);
     // the sum is positive, so that cutting it off rounds half up; it is made in binary32, as in the contract:
     // in binary64 a value just below a half would not be rounded up to it first
     (y + 32_768.5).trunc() as i64 - 32_768
 }
 
-fn relu<T: Real>(x: T) -> T {
+pub(crate) fn relu<T: Real>(x: T) -> T {
     // not `max`, which leaves open which of two zeros it gives: of -0 the contract makes +0
     if x > T::ZERO { x } else { T::ZERO }
 }
@@ -99,65 +121,121 @@ mod tests {
         values[0]
     }
 
-    /// Every 1009th number of the format from 0 to its largest: 2 million, in order.
+    /// Every 1009th number of the format from 0 to the largest that the check of a policy lets arise: 2 million, in order.
     fn numbers() -> impl Iterator<Item = f32> {
-        (0..=f32::MAX.to_bits()).step_by(1009).map(f32::from_bits)
+        let last = policy::limits::MAX_MAGNITUDE as f32;
+        (0..=last.to_bits()).step_by(1009).map(f32::from_bits).chain([last])
     }
 
     /// What bounds and certificates take for granted, against the arithmetic of the contract.
     #[test]
     fn the_facts_of_each_activation_hold_for_the_contracts_arithmetic() {
         for each in Activation::EACH {
-            let word = each.word();
-            for x in numbers().chain([f32::MAX, 1.0, 9.0]) {
-                let (y, below) = (one(*each, x), one(*each, -x));
-                match each.shape() {
-                    Shape::Hinge { below: slope } => {
-                        assert!(y == x && below == slope as f32 * -x, "{word} {x}");
-                    }
-                    Shape::Sigmoid(sigmoid) => {
-                        let wide = f64::from(x);
-                        let apart = |value: f64| (f64::from(y) - value).abs();
-                        assert!(apart((sigmoid.real)(wide)) < sigmoid.error_32, "{word} {x}");
-                        assert!(apart((sigmoid.value)(wide)) < sigmoid.apart_32, "{word} {x}");
-                        assert!((one(*each, wide) - (sigmoid.value)(wide)).abs() < 1e-15, "{word} {x}");
-                        assert_eq!(below.to_bits(), (-y).to_bits(), "{word} {x}");
-                        assert!((0.0..=1.0).contains(&y), "{word} {x}");
-                    }
+            for x in numbers().chain([1.0, 9.0]) {
+                check(*each, x);
+                check(*each, -x);
+            }
+        }
+    }
+
+    /// Of every 4099th binary32 number that the check of a policy lets arise, or with POLICYC_FULL of every one: how near its
+    /// bound the largest error comes.
+    #[test]
+    fn every_number_of_a_curve_is_within_its_stated_errors() {
+        let step = if std::env::var_os("POLICYC_FULL").is_some() {
+            1
+        } else {
+            4099
+        };
+        let last = (policy::limits::MAX_MAGNITUDE as f32).to_bits();
+        for (each, curve) in curves() {
+            let mut worst = (0.0, 0.0);
+            for x in (0..=last).step_by(step).map(f32::from_bits).flat_map(|x| [x, -x]) {
+                let wide = f64::from(x);
+                let error = (f64::from(one(each, x)) - (curve.real)(wide)).abs();
+                let share = error / curve.error_32.at(wide);
+                if share > worst.0 {
+                    worst = (share, x);
+                }
+            }
+            println!("{}: {:.3} of the bound at {:e}", each.word(), worst.0, worst.1);
+            assert!(worst.0 < 1.0, "{} {worst:?}", each.word());
+            assert!(
+                worst.0 > 0.3,
+                "{}: a bound that nothing comes near, {worst:?}",
+                each.word()
+            );
+        }
+    }
+
+    fn check(each: Activation, x: f32) {
+        let (y, word, wide) = (one(each, x), each.word(), f64::from(x));
+        match each.shape() {
+            Shape::Hinge { below } => {
+                let expected = if x > 0.0 { x } else { below as f32 * x };
+                assert!(y == expected, "{word} {x}");
+            }
+            Shape::Curve(curve) => {
+                let apart = |value: f64| (f64::from(y) - value).abs();
+                assert!(apart((curve.real)(wide)) < curve.error_32.at(wide), "{word} {x}");
+                assert!(apart((curve.value)(wide)) < curve.apart(wide), "{word} {x}");
+                let wider = (one(each, wide) - (curve.value)(wide)).abs();
+                assert!(wider <= 1e-15 * (1.0 + wide.abs()), "{word} {x}: {wider}");
+                if let Some(range) = curve.range {
+                    assert!(range.low <= f64::from(y) && f64::from(y) <= range.high, "{word} {x}");
                 }
             }
         }
+    }
+
+    fn curves() -> impl Iterator<Item = (Activation, &'static policy::activation::Curve)> {
+        let all = Activation::EACH.iter();
+        all.filter_map(|each| Some((*each, each.curve()?)))
     }
 
     /// A rectifier gives +0 for zeros of both signs: neurons are left out because of it.
     #[test]
     fn zeros_keep_their_sign_but_behind_a_rectifier() {
         for each in Activation::EACH {
-            let signs = [0.0_f32, -0.0].map(|x| one(*each, x).to_bits() >> 31);
-            let expected = if each.is_rectifier() { [0, 0] } else { [0, 1] };
-            assert_eq!(signs, expected, "{}", each.word());
-            assert_eq!(one(*each, 0.0_f32), 0.0);
+            let of_zeros = [0.0_f32, -0.0].map(|x| one(*each, x));
+            match each.shape() {
+                Shape::Hinge { .. } => {
+                    let expected = if each.is_rectifier() { [0, 0] } else { [0, 1] };
+                    assert_eq!(of_zeros.map(|y| y.to_bits() >> 31), expected, "{}", each.word());
+                }
+                // the sign of zero is left to the formula; its value is not
+                Shape::Curve(curve) => {
+                    assert_eq!(of_zeros[0], of_zeros[1], "{}", each.word());
+                    let real = (curve.real)(0.0);
+                    assert!(
+                        (f64::from(of_zeros[0]) - real).abs() < curve.error_32.absolute,
+                        "{}",
+                        each.word()
+                    );
+                }
+            }
         }
     }
 
     #[test]
-    fn integers_behind_a_sigmoid_are_the_nearest_to_its_value() {
-        for each in Activation::EACH {
-            let Shape::Sigmoid(sigmoid) = each.shape() else {
-                continue;
-            };
-            for sum in (-40_000_i64..=40_000)
-                .step_by(7)
-                .chain([i64::from(i32::MAX), i64::from(-i32::MAX)])
-            {
-                let y = integer(*each, sum, 13, 0) as f64;
-                let expected = 16_384.0 * (sigmoid.real)(sum as f64 / 8192.0);
-                // half a unit, and what the binary32 value is off
-                assert!(
-                    (y - expected).abs() < 0.502 + 16_384.0 * sigmoid.error_32,
-                    "{} {sum}",
-                    each.word()
-                );
+    fn integers_behind_a_curve_are_the_nearest_to_its_value() {
+        for (each, curve) in curves() {
+            for exponent in [14, 11] {
+                let unit = power_of_two(exponent);
+                // sums of 13 fractional bits up to +-4.9; of a curve with two ends the largest, too
+                let far = [i64::from(i32::MAX), i64::from(-i32::MAX)]
+                    .into_iter()
+                    .filter(|_| curve.range.is_some());
+                let near = (-40_000_i64..=40_000).step_by(7);
+                let fits = near.filter(|sum| curve.range.is_some() || *sum as f64 / 8192.0 * unit < 32_000.0);
+                for sum in fits.chain(far) {
+                    let x = sum as f64 / 8192.0;
+                    let y = integer(each, sum, (13, exponent), 0) as f64;
+                    let expected = unit * (curve.real)(x);
+                    // half a unit, and what the binary32 value is off
+                    let bound = 0.502 + unit * curve.error_32.at(x);
+                    assert!((y - expected).abs() < bound, "{} {sum}: {y} {expected}", each.word());
+                }
             }
         }
     }

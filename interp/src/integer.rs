@@ -126,9 +126,9 @@ impl Layer {
         for (row, &x) in self.weights.rows().into_iter().zip(x) {
             sums.zip_mut_with(&row, |sum, &w| *sum += w * x);
         }
-        let activated = sums.iter().zip(&self.accumulators);
+        let activated = sums.iter().zip(&self.accumulators).zip(&self.exponents);
         let y: Array1<i64> = activated
-            .map(|(sum, exponent)| integer(self.activation, *sum, *exponent, self.shift))
+            .map(|((sum, from), to)| integer(self.activation, *sum, (*from, *to), self.shift))
             .collect();
         // a sum of 31 bits may be rounded here, in the trace alone; outputs are within 2^24, so each is exact
         let value = |(x, exponent): (&i64, &i32)| T::nearest(*x as f64 * power_of_two(-exponent));

@@ -28,6 +28,7 @@
 
 mod activation;
 pub mod controller;
+mod curves;
 pub mod decisions;
 pub mod duties;
 mod feature;

@@ -284,7 +284,7 @@ pub(crate) fn layer(
 fn activated(x: Interval, activation: Activation) -> Interval {
     let below = match activation.shape() {
         Shape::Hinge { below } => below,
-        Shape::Sigmoid(sigmoid) => return sigmoid.image(x),
+        Shape::Curve(curve) => return curve.image(x),
     };
     let one = |x: f64, sign: f64| {
         let y = below * x;

@@ -52,7 +52,7 @@ pub struct Continuous {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Squash {
-    /// A curve within +-1: an actor that was trained with it (TD3, DDPG, the mean of SAC).
+    /// A curve with two ends: an actor that was trained with it (TD3, DDPG, the mean of SAC).
     Curve(Activation),
     /// The output itself, clamped: an actor whose environment clips (the mean of PPO or A2C).
     Clip(Interval),
@@ -101,7 +101,7 @@ impl Continuous {
     #[must_use]
     pub fn squashed(&self) -> Interval {
         match self.squash {
-            Squash::Curve(_) => Interval { low: -1.0, high: 1.0 },
+            Squash::Curve(curve) => curve.range().unwrap_or(Interval { low: -1.0, high: 1.0 }),
             Squash::Clip(clip) => clip,
         }
     }
@@ -111,7 +111,7 @@ impl Continuous {
     pub fn duty(&self, output: f64) -> f64 {
         let squashed = match self.squash {
             Squash::Curve(curve) => match curve.shape() {
-                Shape::Sigmoid(sigmoid) => (sigmoid.value)(output),
+                Shape::Curve(curve) => (curve.value)(output),
                 // the reader lets no other shape through
                 Shape::Hinge { .. } => output,
             },

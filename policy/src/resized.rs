@@ -47,6 +47,16 @@ impl Policy {
         }))
     }
 
+    /// The policy with these activations behind its first layers; as [`Policy::cut_to`].
+    #[must_use]
+    pub fn with_activations(&self, activations: &[Activation]) -> Option<Policy> {
+        let mut given = activations.iter();
+        self.with_layers(self.layers.iter().cloned().map(|layer| Layer {
+            activation: given.next().copied().unwrap_or(layer.activation),
+            ..layer
+        }))
+    }
+
     fn with_layers(&self, layers: impl Iterator<Item = Layer>) -> Option<Policy> {
         let mut policy = Policy {
             layers: layers.collect(),

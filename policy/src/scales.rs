@@ -13,12 +13,13 @@
 
 mod rows;
 
-use crate::activation::{Activation, Shape};
+use crate::activation::{Activation, Curve, Shape};
+use crate::interval::Interval;
 use crate::model::{Layer, Policy};
 
-/// Fractional bits of what is within +-1 behind a sigmoid: 1.0 is 2^14.
+/// Fractional bits behind a curve within +-1: 1.0 is 2^14. Of other curves the most.
 // the finest exponent at which 1.0 is within 32,767
-pub const SIGMOID_EXPONENT: i32 = 14;
+pub const CURVE_EXPONENT: i32 = 14;
 /// Fractional bits of the slope of a leaky ReLU.
 // the finest exponent at which a slope below 1 is within 32,767
 pub const SLOPE_BITS: u32 = 15;
@@ -48,7 +49,7 @@ pub struct LayerScale {
     pub inputs: Vec<i32>,
     /// Exponent of each accumulator: integer / 2^exponent is the sum.
     pub accumulators: Vec<i32>,
-    /// Bits that are rounded off the accumulators; 0 in front of a sigmoid, which takes the whole sum.
+    /// Bits that are rounded off the accumulators; 0 in front of a curve, which takes the whole sum.
     pub shift: u32,
     /// Exponent of each output: integer / 2^exponent is the activation. The same for all outputs of the last layer.
     pub outputs: Vec<i32>,
@@ -154,15 +155,11 @@ fn layer(
     weight_limit: i64,
     output_limit: i64,
 ) -> LayerScale {
-    let scale = |accumulator: i32, shift: u32, bound: (i64, i64), ranges: Vec<(i64, i64)>| {
+    let scale = |accumulator: i32, shift: u32, curve: i32, bound: (i64, i64), ranges: Vec<(i64, i64)>| {
         let accumulators: Vec<i32> = rows.iter().map(|row| accumulator + row).collect();
-        let output = |exponent: &i32| match layer.activation.shape() {
-            Shape::Sigmoid(_) => SIGMOID_EXPONENT,
-            Shape::Hinge { .. } => exponent - shift.cast_signed(),
-        };
         LayerScale {
             inputs: inputs.to_vec(),
-            outputs: accumulators.iter().map(output).collect(),
+            outputs: outputs(layer.activation, &accumulators, shift, curve),
             accumulators,
             shift,
             bound,
@@ -177,11 +174,15 @@ fn layer(
         // the half that rounds the cut is added in the same 32 bits
         let high = sums.iter().map(|sum| sum.highest).max().unwrap_or_default() + half(shift);
         let limit = i64::from(i32::MAX);
-        let outputs = sums.iter().map(|sum| activated(layer.activation, *sum, shift));
-        (high <= limit && low >= -limit).then(|| scale(accumulator, shift, (low, high), outputs.collect()))
+        let curve = curve_exponent(layer.activation, &sums, accumulator);
+        let outputs = sums.iter().map(|sum| match layer.activation.curve() {
+            Some(of) => curved(of, *sum, accumulator, curve),
+            None => activated(layer.activation, *sum, shift),
+        });
+        (high <= limit && low >= -limit).then(|| scale(accumulator, shift, curve, (low, high), outputs.collect()))
     });
     // with a small enough exponent every weight and bias rounds to 0: there always is one
-    let nothing = || scale(-MAX_EXPONENT, 0, (0, 0), vec![(0, 0); layer.outputs]);
+    let nothing = || scale(-MAX_EXPONENT, 0, CURVE_EXPONENT, (0, 0), vec![(0, 0); layer.outputs]);
     usable.into_iter().next().unwrap_or_else(nothing)
 }
 
@@ -248,7 +249,7 @@ pub fn half(shift: u32) -> i64 {
 
 fn shift(sums: &[Sum], activation: Activation, limit: i64) -> u32 {
     // a curve takes the whole sum as a binary32 number
-    if activation.limit().is_some() {
+    if activation.curve().is_some() {
         return 0;
     }
     let fits = |shift: &u32| {
@@ -263,18 +264,65 @@ fn shift(sums: &[Sum], activation: Activation, limit: i64) -> u32 {
     (0..40).find(fits).unwrap_or(40)
 }
 
+/// Exponents of the outputs: what the shift leaves of the sums', or that of the curve.
+fn outputs(activation: Activation, accumulators: &[i32], shift: u32, curve: i32) -> Vec<i32> {
+    let output = |exponent: &i32| match activation.shape() {
+        Shape::Curve(_) => curve,
+        Shape::Hinge { .. } => exponent - shift.cast_signed(),
+    };
+    accumulators.iter().map(output).collect()
+}
+
+/// Exponent behind a curve: the largest at which no value leaves 16 bits.
+fn curve_exponent(activation: Activation, sums: &[Sum], accumulator: i32) -> i32 {
+    if activation.range().is_some() {
+        return CURVE_EXPONENT;
+    }
+    let highest = sums.iter().map(|sum| sum.range.1).max().unwrap_or_default();
+    // no value of a curve is above max(x, 0) + 0.75 (that of a softplus at 0 is 0.69) or below -1.01 (an ELU)
+    let most = (highest as f64 * power_of_two(-accumulator) + 0.75).max(1.01);
+    // one below the limit is room for the half that rounds
+    let fits = |exponent: &i32| most * power_of_two(*exponent) <= (ACTIVATION_LIMIT - 1) as f64;
+    // no sum fits in less than 32 bits of the finest accumulator
+    (-MAX_EXPONENT..=CURVE_EXPONENT)
+        .rev()
+        .find(fits)
+        .unwrap_or(-MAX_EXPONENT)
+}
+
+/// Smallest and largest integer behind a curve.
+fn curved(curve: &Curve, sum: Sum, accumulator: i32, exponent: i32) -> (i64, i64) {
+    let unit = power_of_two(exponent);
+    let image = match curve.range {
+        Some(range) => range,
+        None => {
+            let number = |integer: i64| integer as f64 * power_of_two(-accumulator);
+            // the sum becomes a binary32 number, rounded once: half a unit of its last place at most
+            let wider = |x: f64, sign: f64| x + sign * x.abs() * power_of_two(-23);
+            curve.image(Interval {
+                low: wider(number(sum.range.0), -1.0),
+                high: wider(number(sum.range.1), 1.0),
+            })
+        }
+    };
+    // `trunc(fl(y + 32768.5))`: beside the half at most half of the last bit below 2^16
+    (
+        (image.low * unit + 0.49).floor() as i64,
+        (image.high * unit + 0.51).floor() as i64,
+    )
+}
+
 fn activated(activation: Activation, sum: Sum, shift: u32) -> (i64, i64) {
     let rounded = |x: i64| (x + half(shift)) >> shift;
     let (low, high) = (rounded(sum.range.0), rounded(sum.range.1));
     match activation.shape() {
-        Shape::Sigmoid(_) => (-(1 << SIGMOID_EXPONENT), 1 << SIGMOID_EXPONENT),
-        Shape::Hinge { .. } if activation.is_identity() => (low, high),
-        // 0 for a rectifier, whose slope is 0 as an integer, too
-        Shape::Hinge { below } => {
+        Shape::Hinge { below } if !activation.is_identity() => {
+            // 0 for a rectifier, whose slope is 0 as an integer, too
             let slope = slope_integer(below);
             let one = |x: i64| if x > 0 { x } else { leaky(x, slope) };
             (one(low), one(high))
         }
+        _ => (low, high),
     }
 }
 

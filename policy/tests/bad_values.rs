@@ -245,7 +245,7 @@ fn activations_are_never_guessed() {
         &["hidden_activation", "\"ReLU\"", "did you mean \"relu\"?"],
     );
     let words: Vec<&str> = policy::Activation::plain().map(policy::Activation::word).collect();
-    contract_fault("\"relu\"", "¦\"sigmoid\"", &["\"sigmoid\"", &words.join(", ")]);
+    contract_fault("\"relu\"", "¦\"swoosh\"", &["\"swoosh\"", &words.join(", ")]);
     contract_fault("\"relu\"", "¦[\"relu\", \"relu\"]", &["2", "1, one per hidden layer"]);
     contract_fault("\"relu\"", "{ leaky_relu = ¦1.0 }", &["less than 1"]);
     contract_fault("\"relu\"", "¦\"leaky_relu\"", &["{ leaky_relu = 0.01 }"]);

@@ -105,11 +105,12 @@ fn activate(x: f32, activation: Activation, is_above: bool) -> f32 {
         Shape::Hinge { .. } if x > 0.0 || activation.is_identity() => x,
         Shape::Hinge { .. } if activation.is_rectifier() => 0.0,
         Shape::Hinge { below } => f(below) * x,
-        Shape::Sigmoid(sigmoid) => {
-            // the rounding to binary32 below moves a value up to 1 by at most 2^-25
-            let apart = sigmoid.apart_32 - 0.25 * f64::from(f32::EPSILON);
-            let value = (sigmoid.value)(x.into()) + if is_above { apart } else { -apart };
-            f(value.clamp(-1.0, 1.0))
+        Shape::Curve(curve) => {
+            let value = (curve.value)(x.into());
+            // the rounding to binary32 below moves a value by at most half a unit in its last place
+            let apart = curve.apart(x.into()) - 0.5 * f64::from(f32::EPSILON) * value.abs().max(1.0);
+            let value = value + if is_above { apart } else { -apart };
+            f(curve.range.map_or(value, |range| value.clamp(range.low, range.high)))
         }
     }
 }

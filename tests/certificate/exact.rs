@@ -40,7 +40,7 @@ pub fn q_values(policy: &Policy, observation: &[f32]) -> Vec<f64> {
                 Shape::Hinge { .. } if sum.0 > 0.0 => sum,
                 Shape::Hinge { below } => sum.times(below),
                 // its own error is far below that of any format
-                Shape::Sigmoid(sigmoid) => Double((sigmoid.real)(sum.0), 0.0),
+                Shape::Curve(curve) => Double((curve.real)(sum.0), 0.0),
             })
             .collect();
     }

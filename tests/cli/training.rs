@@ -20,6 +20,12 @@ hidden = [8]
 batch = 16
 warm_up = 100
 
+[reward]
+v_ref = 100.0
+
+[episode]
+loads = { values = [200, 500, 800, 1000], range = [150, 1050], share = 0.5 }
+
 [selection]
 every = 200
 load_steps = [[210, 480]]

@@ -163,11 +163,13 @@ const HEAD: u64 = 0x0068_6561_6400_0000;
 /// A continuous head of any form whose duties stay within 0..1: with and without scale and offset, of both signs.
 fn continuous(rng: &mut SplitMix) -> String {
     let (scale, offset) = (rng.uniform(0.05, 0.45), rng.uniform(0.46, 0.54));
-    match rng.below(6) {
+    match rng.below(8) {
         0 => format!("continuous = {{ squash = \"tanh\", scale = {scale:?}, offset = {offset:?} }}"),
         1 => format!("continuous = {{ squash = \"tanh\", scale = -{scale:?}, offset = {offset:?} }}"),
         2 => format!("continuous = {{ squash = \"softsign\", scale = {scale:?}, offset = {offset:?} }}"),
         3 => format!("continuous = {{ clip = [{:?}, {offset:?}] }}", offset - scale),
+        5 => format!("continuous = {{ squash = \"sigmoid\", scale = {scale:?}, offset = {offset:?} }}"),
+        6 => "continuous = { squash = \"hard_sigmoid\" }".to_owned(),
         4 => format!("continuous = {{ clip = [-1.0, 1.0], scale = {scale:?}, offset = {offset:?} }}"),
         _ => format!("continuous = {{ clip = [0.25, 2.0], scale = {scale:?} }}"),
     }

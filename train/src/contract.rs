@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use policy::{Fault, Policy};
+use policy::{Activation, Fault, Policy};
 use safetensors::Dtype;
 use safetensors::tensor::{TensorView, serialize};
 use sha2::{Digest, Sha256};
@@ -99,6 +99,14 @@ impl Contract {
         };
         let files = files(&text, &weights, &network, &golden, &empty, &beside)?;
         let policy = check(&files, path)?;
+        if let Some(foreign) = policy
+            .layers
+            .iter()
+            .map(|layer| layer.activation)
+            .find(|each| !is_trained(*each))
+        {
+            return Err(Fault::in_file(path, untrained(foreign)).into());
+        }
         Ok(Self {
             policy,
             path: path.to_owned(),
@@ -292,6 +300,23 @@ fn safetensors_file(tensors: &[(String, Vec<usize>, Dtype, Vec<u8>)]) -> Result<
         ));
     }
     serialize(views, None).map_err(error)
+}
+
+/// Whether the trainer has the slope of such a layer: it takes it from the layer's outputs.
+fn is_trained(activation: Activation) -> bool {
+    activation.curve().is_none_or(|curve| curve.slope_of_value.is_some())
+}
+
+fn untrained(activation: Activation) -> Message {
+    let trained: Vec<String> = Activation::EACH
+        .iter()
+        .filter(|each| is_trained(**each))
+        .map(|each| each.written())
+        .collect();
+    Message::new("the training has no slope for this activation: its value does not tell it")
+        .found(format!("hidden_activation {}", activation.written()))
+        .expected(trained.join(", "))
+        .hint("a network with it that a library trained is read by `policyc new`")
 }
 
 /// Loads the files as a user would; faults name the contract, not the temporary folder.

@@ -297,6 +297,10 @@ fn derive(activation: Activation, values: &[f32], delta: &mut [f32]) {
             pairs.for_each(|(d, &y)| *d = if y > 0.0 { *d } else { 0.0 })
         }
         Shape::Hinge { below } => pairs.for_each(|(d, &y)| *d = if y > 0.0 { *d } else { below as f32 * *d }),
-        Shape::Sigmoid(sigmoid) => pairs.for_each(|(d, &y)| *d *= (sigmoid.slope_32)(y)),
+        Shape::Curve(curve) => match curve.slope_of_value {
+            Some(slope) => pairs.for_each(|(d, &y)| *d *= slope(y)),
+            // a contract with such a one is refused as it is read
+            None => unreachable!("{} has no slope by its value", activation.word()),
+        },
     }
 }

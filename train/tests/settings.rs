@@ -9,8 +9,49 @@ use train::learner::{Loss, TargetUpdate};
 
 const LEAST: &str = "plant = \"p.toml\"\ncontract = \"c/policy.toml\"\nsteps = 1000\n";
 
+/// What every file needs beside [`LEAST`], a table each; behind a text that has not got it.
+const REST: [(&str, &str); 4] = [
+    ("[reward]", "v_ref = 100.0"),
+    ("[episode]", "loads = { values = [200, 500] }"),
+    ("[selection]", "load_steps = [[200, 500]]"),
+    ("[evaluation]", "load_steps = [[500, 200]]"),
+];
+
+/// The text with the tables of [`REST`] that it has not got.
 fn parse(text: &str) -> Result<Settings, String> {
+    let rest = REST.iter().filter(|(table, _)| !text.contains(table));
+    let rest: String = rest.map(|(table, key)| format!("{table}\n{key}\n")).collect();
+    parse_alone(&format!("{text}{rest}"))
+}
+
+fn parse_alone(text: &str) -> Result<Settings, String> {
     Settings::parse(text, Path::new("folder/train.toml")).map_err(|faults| faults.to_string())
+}
+
+#[test]
+fn what_no_default_can_know_is_asked_for() {
+    let message = parse_alone(LEAST).unwrap_err();
+    for part in [
+        "`v_ref` is missing in [reward]",
+        "`loads` is missing in [episode]",
+        "`load_steps` is missing in [selection]",
+        "`load_steps` is missing in [evaluation]",
+    ] {
+        assert!(message.contains(part), "{part}\n{message}");
+    }
+}
+
+/// Of another converter, every voltage is another one.
+#[test]
+fn voltages_left_out_are_shares_of_the_reference() {
+    let settings = parse(&format!("{LEAST}[reward]\nv_ref = 5.0\n")).unwrap();
+    let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
+    let [low, high] = settings.episode.initial_voltage;
+    assert!(near(low, 4.85) && near(high, 5.15) && near(settings.episode.max_error, 2.0));
+    // 5 mV, 50 mV, and as much off for an error of half of it as at 100 V
+    assert!(near(settings.reward.of(5.004, 0.0), 10.0 - 0.8));
+    assert!(near(settings.reward.of(5.04, 0.0), 1.0 - 8.0));
+    assert!(near(settings.reward.of(7.5, 0.0), -500.0));
 }
 
 #[test]
@@ -30,7 +71,6 @@ fn three_keys_are_enough_and_the_rest_is_the_papers() {
     );
     assert_eq!((learner.loss, learner.double), (Loss::Huber, false));
     assert_eq!(learner.target_update, TargetUpdate::Soft { rate: 1e-3 });
-    assert_eq!(settings.evaluation.load_steps.len(), 6);
     assert_eq!(settings.evaluation.instants, 24);
 }
 
@@ -233,7 +273,7 @@ fn a_faulty_part_of_a_table_is_not_reported_as_missing() {
 fn all_faults_come_at_once_in_the_order_of_the_file() {
     let text = "contract = 5\n[learning]\nbatch = -3\nfoo = 1\n[episode]\nsteps = true\n";
     let message = parse(text).unwrap_err();
-    assert_eq!(message.matches("error:").count(), 6, "{message}");
+    assert_eq!(message.matches("error:").count(), 7, "{message}");
     let order = [
         "`plant` is missing",
         "`contract`",

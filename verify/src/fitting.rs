@@ -4,7 +4,7 @@
 use codegen::Output;
 use codegen::output::languages;
 use policy::Policy;
-use policy::activation::{Activation, Shape};
+use policy::activation::Activation;
 use targets::TargetSpec;
 
 use crate::budget::{Budget, Clock};
@@ -83,7 +83,7 @@ impl Bench<'_> {
     /// be counted.
     #[must_use]
     pub fn with_relu(&self, policy: &Policy) -> Option<(f64, f64)> {
-        let is_formula = |layer: &policy::model::Layer| matches!(layer.activation.shape(), Shape::Sigmoid(_));
+        let is_formula = |layer: &policy::model::Layer| layer.activation.curve().is_some();
         if !policy.layers.iter().any(is_formula) {
             return None;
         }

@@ -1,6 +1,6 @@
 //! The numbers of a format on the host, for known answers.
 
-use std::ops::{Add, Div, Mul};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use policy::Scalar;
 
@@ -8,7 +8,13 @@ use super::text::Text;
 
 /// The format in which the answers are computed: `f32` or `f64`.
 pub(crate) trait Number:
-    Copy + PartialOrd + Add<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+    Copy
+    + PartialOrd
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
 {
     const SCALAR: Scalar;
     fn nearest(value: f64) -> Self;

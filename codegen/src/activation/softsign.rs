@@ -3,15 +3,21 @@
 use proc_macro2::TokenStream;
 use quote::quote;
 
+use super::curve::Function;
 use super::number::Number;
-use super::sigmoid::Function;
-use super::text::{C, Rust};
+use super::text::{C, Needs, Rust};
 use crate::backend::rust::number;
 
 pub(super) struct Softsign;
 
 impl Function for Softsign {
-    const NAME: &'static str = "softsign";
+    fn name(&self) -> &'static str {
+        "softsign"
+    }
+
+    fn needs(&self) -> Needs {
+        Needs::default()
+    }
 
     fn c(&self, c: &C<'_>) -> Vec<String> {
         let (

@@ -7,8 +7,39 @@ use quote::quote;
 use crate::backend::rust::tokens::word;
 use crate::program::{Cut, Program, Store};
 
+/// Functions of one number that curves rest on, beside their own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Needs {
+    /// The rectifier.
+    pub relu: bool,
+    /// A number without its sign.
+    pub absolute: bool,
+    /// A number limited to a magnitude.
+    pub limit: bool,
+    /// The contract's tanh.
+    pub tanh: bool,
+}
+
+impl Needs {
+    /// What either needs.
+    #[must_use]
+    pub fn and(self, other: Needs) -> Needs {
+        Needs {
+            relu: self.relu || other.relu,
+            absolute: self.absolute || other.absolute,
+            limit: self.limit || other.limit,
+            tanh: self.tanh || other.tanh,
+        }
+    }
+}
+
 /// The text of one kind.
 pub trait Text {
+    /// Functions that [`Text::c_helper`] and [`Text::rust_helper`] call.
+    fn needs(&self) -> Needs {
+        Needs::default()
+    }
+
     /// Functions that [`Text::c`] calls; empty lines part them.
     fn c_helper(&self, _c: &C<'_>) -> Vec<String> {
         Vec::new()

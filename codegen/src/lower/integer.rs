@@ -154,6 +154,7 @@ fn split(policy: &Policy, index: usize, lanes: usize, block: IntegerBlock) -> (u
 fn plan(layer: &Layer, scale: &LayerScale, (rows, chunk): (usize, usize), block: IntegerBlock) -> Plan {
     let activation = layer.activation;
     let exponent = scale.accumulators.first().copied().unwrap_or_default();
+    let behind = scale.outputs.first().copied().unwrap_or_default();
     Plan {
         shape: Shape {
             name: layer.name.clone(),
@@ -170,6 +171,7 @@ fn plan(layer: &Layer, scale: &LayerScale, (rows, chunk): (usize, usize), block:
             shift: scale.shift,
             // of a layer behind which no scale passes and of the last: there all rows have one exponent
             unit: Literal::nearest(Scalar::F32, power_of_two(-exponent)),
+            scale: Literal::nearest(Scalar::F32, power_of_two(behind)),
         }),
         activation,
     }

@@ -176,6 +176,8 @@ pub struct Cut {
     pub shift: u32,
     /// Power of two that makes the sum a number, for an activation that takes one.
     pub unit: Literal,
+    /// Power of two that makes its value an integer.
+    pub scale: Literal,
 }
 
 /// Where outputs go.

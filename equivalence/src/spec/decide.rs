@@ -1,8 +1,8 @@
 //! Sections 7 to 10: from Q values to the command, and the state behind it.
 
-use policy::{Activation, Scalar, Squash};
+use policy::{Scalar, Squash};
 
-use super::{Sensed, Spec, State, status, tables};
+use super::{Sensed, Spec, State, curves, status};
 use crate::term::Term;
 
 /// What leaves the controller.
@@ -40,12 +40,14 @@ pub(crate) fn choose(spec: Spec<'_>, to_cut: u32, outputs: &[Term]) -> Chosen {
             let (low, high) = spec.ends(clip);
             float.clamp(output, low, high)
         }
-        Squash::Curve(Activation::Softsign) => tables::softsign(float, output),
-        Squash::Curve(_) => {
-            let (quotient, squashed) = tables::tanh(float, output);
-            numbers.push(quotient);
-            squashed
-        }
+        Squash::Curve(curve) => match curves::of(float, curve, output) {
+            Some(curve) => {
+                numbers.extend(curve.numbers);
+                curve.value
+            }
+            // the reader lets no other activation through
+            None => output,
+        },
     };
     let scaled = match head.scale {
         1.0 => squashed,

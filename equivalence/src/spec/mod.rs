@@ -3,6 +3,7 @@
 //! Generated from [`Policy`] and `docs/reference/numeric-contract.md` alone, section by section; nothing here knows what the emitted code
 //! looks like. The network is outside: its outputs go into [`choose`], an observation leaves [`sense`].
 
+pub(crate) mod curves;
 mod decide;
 mod filter;
 mod sense;

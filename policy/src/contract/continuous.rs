@@ -3,7 +3,7 @@
 use toml_input::{Sink, Table, Value};
 
 use super::{number_f32, range_f32};
-use crate::activation::{Activation, Shape};
+use crate::activation::Activation;
 use crate::catalogue;
 use crate::model::{Continuous, Squash};
 
@@ -54,7 +54,7 @@ fn squash(section: &Table<'_>, curve: Option<Value<'_>>, clip: Option<Value<'_>>
 
 fn curve(value: &Value<'_>, faults: &mut Sink) -> Option<Activation> {
     let text = value.text(faults)?;
-    let curves = || Activation::plain().filter(|each| matches!(each.shape(), Shape::Sigmoid(_)));
+    let curves = || Activation::plain().filter(|each| each.range().is_some());
     if let Some(curve) = curves().find(|curve| curve.word() == text) {
         return Some(curve);
     }

@@ -62,9 +62,9 @@ fn ranges(policy: &Policy) -> Vec<Vec<f64>> {
             let products = row.iter().zip(&inputs).map(|(w, x)| f64::from(*w).abs() * x);
             products.fold(f64::from(bias).abs(), |sum, product| sum + product)
         });
-        let outputs: Vec<f64> = match layer.activation.limit() {
+        let outputs: Vec<f64> = match layer.activation.range() {
             // behind a curve its bound counts, however large the sum
-            Some(limit) => vec![limit; layer.outputs],
+            Some(range) => vec![range.low.abs().max(range.high); layer.outputs],
             None => outputs.collect(),
         };
         ranges.push(std::mem::replace(&mut inputs, outputs));

@@ -10,6 +10,7 @@ use super::{Draw, Episode, Instants, Learning, Loads, Randomised, Requirement, R
 use crate::learner::{LearnerSettings, Loss, TargetUpdate};
 use crate::optimiser::AdamSettings;
 use closed_loop::read;
+use closed_loop::scenario::Task;
 
 // any finite number
 const ANY: RangeInclusive<f64> = f64::MIN..=f64::MAX;
@@ -42,11 +43,12 @@ fn top(document: &Document, root: &mut Table<'_>, faults: &mut Sink) -> Option<S
         Some(learning(table, steps.unwrap_or(1), faults))
     });
     let reward = root.section("reward", faults, reward);
-    let episode = root.section("episode", faults, episode);
+    let v_ref = reward.as_ref().map_or(100.0, |reward| reward.v_ref);
+    let episode = root.section("episode", faults, |table, faults| episode(table, v_ref, faults));
     let curriculum = root.sections("curriculum", faults, stage);
     let randomise = root.sections("randomise", faults, randomised);
     let selection = root.section("selection", faults, selection);
-    let evaluation = root.section("evaluation", faults, |table, faults| Some(read::task(table, faults)));
+    let evaluation = root.section("evaluation", faults, task);
     let specification = root.sections("spec", faults, requirement);
     let digest = Sha256::digest(document.source().text.as_bytes());
     Some(Settings {
@@ -200,10 +202,15 @@ fn epsilon(table: &mut Table<'_>, default: (f64, f64, u64), faults: &mut Sink) -
 
 fn reward(table: &mut Table<'_>, faults: &mut Sink) -> Option<Reward> {
     let weight = |v: &Value<'_>, faults: &mut Sink| v.number_within(0.0..=f64::MAX, faults);
+    let hint = "the voltage that the policy is to hold, in V: `v_ref = 12.0` in [reward]";
+    let v_ref = table.required("v_ref", hint, faults).and_then(|v| v.positive(faults));
+    // without it every voltage below would be another converter's; the fault is there, and any number does to read on
+    let scale = v_ref.unwrap_or(100.0);
     Some(Reward {
-        v_ref: table.with_default("v_ref", 100.0, faults, Value::positive),
-        bands: table.with_default("bands", vec![(0.1, 10.0), (1.0, 1.0)], faults, bands),
-        error_weight: table.with_default("error_weight", 10.0, faults, weight),
+        v_ref: v_ref?,
+        // the paper's, whose converter has 100 V: 0.1 V and 1 V, and 10 a volt
+        bands: table.with_default("bands", vec![(1e-3 * scale, 10.0), (1e-2 * scale, 1.0)], faults, bands),
+        error_weight: table.with_default("error_weight", 1e3 / scale, faults, weight),
         duty_change_weight: table.with_default("duty_change_weight", 0.0, faults, weight),
     })
 }
@@ -253,24 +260,21 @@ fn loads(value: &Value<'_>, faults: &mut Sink) -> Option<Loads> {
     })
 }
 
-fn episode(table: &mut Table<'_>, faults: &mut Sink) -> Option<Episode> {
-    let default = Loads {
-        values: vec![200.0, 500.0, 800.0, 1000.0],
-        range: [150.0, 1050.0],
-        share: 0.5,
-    };
+fn episode(table: &mut Table<'_>, v_ref: f64, faults: &mut Sink) -> Option<Episode> {
+    let hint = "constant powers that the converter meets, in W: `loads = { values = [40, 100], range = [30, 120] }` in [episode]";
+    let given = table.required("loads", hint, faults);
     let voltage = |v: &Value<'_>, faults: &mut Sink| v.interval_within(0.0..=1e5, faults);
     let current = |v: &Value<'_>, faults: &mut Sink| v.interval_within(-1e4..=1e4, faults);
     Some(Episode {
         // conventions: a new load after twice the 50 periods in which the paper settles, four loads an episode; a start
-        // beside rest; 40 V is far beyond all that a controller meets, and nothing is learnt there
+        // beside rest; 40 % of the voltage is far beyond all that a controller meets, and nothing is learnt there
         steps: table.with_default("steps", 400, faults, periods),
         load_every: table.with_default("load_every", 100, faults, periods),
-        loads: table.with_default("loads", default, faults, loads),
+        loads: given.and_then(|v| loads(&v, faults))?,
         any_phase: table.with_default("any_phase", false, faults, Value::boolean),
-        initial_voltage: table.with_default("initial_voltage", [97.0, 103.0], faults, voltage),
+        initial_voltage: table.with_default("initial_voltage", [0.97 * v_ref, 1.03 * v_ref], faults, voltage),
         initial_current: table.with_default("initial_current", [-2.0, 2.0], faults, current),
-        max_error: table.with_default("max_error", 40.0, faults, Value::positive),
+        max_error: table.with_default("max_error", 0.4 * v_ref, faults, Value::positive),
     })
 }
 
@@ -312,8 +316,16 @@ fn randomised(table: &mut Table<'_>, faults: &mut Sink) -> Option<Randomised> {
 fn selection(table: &mut Table<'_>, faults: &mut Sink) -> Option<Selection> {
     let every = table.with_default("every", 500, faults, periods);
     let margin = table.with_default("margin", 1.0, faults, Value::positive);
-    let task = read::task(table, faults);
+    let task = task(table, faults)?;
     Some(Selection { every, margin, task })
+}
+
+/// The load steps, which no default knows: another converter's powers would be judged without a word.
+fn task(table: &mut Table<'_>, faults: &mut Sink) -> Option<Task> {
+    let hint = "pairs of powers in W, in [selection] and in [evaluation]: `load_steps = [[40, 200], [200, 40]]`";
+    let given = table.required("load_steps", hint, faults).is_some();
+    let task = read::task(table, faults);
+    given.then_some(task)
 }
 
 fn requirement(table: &mut Table<'_>, faults: &mut Sink) -> Option<Requirement> {

@@ -6,7 +6,7 @@ mod directed;
 use codegen::backend::kit::{Material, Trace};
 use codegen::{Language, Output};
 use interp::Real;
-use policy::{NumericFormat, Policy, ReadOptions, Scalar};
+use policy::{Activation, NumericFormat, Policy, ReadOptions, Scalar};
 use targets::{RowBlock, TargetSpec};
 
 use self::course::Course;
@@ -68,7 +68,10 @@ pub fn material(policy: &Policy, target: &TargetSpec, steps: u32) -> Result<Mate
         Scalar::F64 => constructs()?.with_format(NumericFormat::F64),
     };
     let suite = [("suite", target.c_row_block), ("blocks", BLOCK)].map(|(name, block)| {
-        let mut part = constructs.clone();
+        let mut part = match name {
+            "blocks" => others(&constructs),
+            _ => constructs.clone(),
+        };
         // the user may link several kits into one program
         part.name = format!("{}_kit_{name}", policy.name);
         let target = TargetSpec {
@@ -82,6 +85,22 @@ pub fn material(policy: &Policy, target: &TargetSpec, steps: u32) -> Result<Mate
         policy: trace(policy, steps)?,
         suite: suite.into_iter().collect::<Result<_, _>>()?,
     })
+}
+
+/// The construct suite with the activations that its own contract has no room for.
+fn others(constructs: &Policy) -> Policy {
+    const OTHERS: [Activation; 6] = [
+        Activation::Sigmoid,
+        Activation::GeluTanh,
+        Activation::Gelu,
+        Activation::HardSwish,
+        Activation::Softplus,
+        Activation::HardSigmoid,
+    ];
+    // sums that could leave the format: those of this network are small, and a test asks for every activation
+    constructs
+        .with_activations(&OTHERS)
+        .unwrap_or_else(|| constructs.clone())
 }
 
 /// The policy of the construct suite.

@@ -214,7 +214,7 @@ fn source(program: &Program) -> Source {
         senses_again: program.senses_again,
         crc_kinds: tables::crc_kinds(program),
         helpers: helpers(program),
-        activations: activations(program),
+        activations: activation::c_functions(program, &number::names(program)),
         actions: program.head.outputs(),
         is_output: program.head.is_output(),
         answer,
@@ -286,15 +286,6 @@ fn integer_view(program: &Program, code: &IntegerCode) -> IntegerView {
             .flat_map(|kind| text_of(kind).c_integer_helper(&number::names(program)))
             .collect(),
     }
-}
-
-/// Functions of the activations in floats. A network of integers calls those alone that take its sums as numbers.
-fn activations(program: &Program) -> Vec<String> {
-    let is_integer = program.network.integer().is_some();
-    activation::used_by(program)
-        .filter(|kind| !is_integer || kind.limit().is_some())
-        .flat_map(|kind| text_of(kind).c_helper(&number::names(program)))
-        .collect()
 }
 
 fn pushes(program: &Program) -> Vec<PushView> {

@@ -172,6 +172,11 @@ fn graphs_that_end_in_a_command_are_read_with_what_scales_it() {
             "squash = \"tanh\", scale = 0.375, offset = 0.475",
         ),
         ("clipped_actor", f64::tanh, "clip = [-1.0, 1.0], scale = 0.3"),
+        (
+            "sigmoid_actor",
+            relu,
+            "{ squash = \"sigmoid\" }   # check: the command is 0.0 to 1.0",
+        ),
     ] {
         let (_folder, new, policy) = policy_of(&format!("{name}.onnx"), &Options::default());
         assert!(new.contract.contains(entry), "{}", new.contract);

@@ -7,9 +7,9 @@ use toml_input::Message;
 use super::{Id, Item, Object};
 
 // an item takes a byte of the file and some fifty of memory: a saved policy has some thousand
-const MOST_ITEMS: usize = 200_000;
-// operations that build nothing, too, take their time: five for each item are more than any pickler writes
-const MOST_STEPS: usize = 1_000_000;
+const MOST_ITEMS: usize = 100_000;
+// operations that build nothing, too, take their time: four for each item are more than any pickler writes
+const MOST_STEPS: usize = 400_000;
 
 /// Functions that build data and do nothing else.
 const BUILDERS: [&str; 35] = [

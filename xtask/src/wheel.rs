@@ -11,10 +11,8 @@ use crate::workspace::Workspace;
 /// What the step needs beyond Rust.
 const NEEDED: [&str; 5] = ["maturin", "numpy", "pandas", "gymnasium", "pytest"];
 
-/// The libraries that trainers use, for the long form alone: they are a gigabyte.
+/// The libraries that trainers use, for the long form alone: they are gigabytes.
 const TRAINERS: [&str; 3] = ["stable-baselines3==2.9.2", "sb3-contrib==2.9.2", "onnxscript"];
-// PyTorch's own index has builds without CUDA, a tenth in size; where it cannot be reached the usual build does
-const TORCH_WITHOUT_CUDA: &str = "https://download.pytorch.org/whl/cpu";
 
 /// Where everything of it lies.
 struct Folders {
@@ -110,8 +108,7 @@ fn with_trainers(
     if !python.exists() {
         run(Command::new("python3").args(["-m", "venv"]).arg(&folders.trainers))?;
     }
-    let without_cuda = run(pip(&python).args(["torch", "--index-url", TORCH_WITHOUT_CUDA]));
-    without_cuda.or_else(|_| run(pip(&python).arg("torch")))?;
+    run(pip(&python).arg("torch"))?;
     run(pip(&python).args(TRAINERS).args(["pytest", "pandas", "gymnasium"]))?;
     run(pip(&python).args(["--no-deps", "--force-reinstall"]).arg(wheel))?;
     let mut pytest = Command::new(&python);

@@ -44,12 +44,17 @@ def test_a_saved_model_becomes_a_policy_that_answers_as_its_library_did(model, t
     assert policy.inspect().duties == pytest.approx(duties)
 
 
-@pytest.mark.parametrize("model", ["sb3_sac_duty.zip", "sb3_ppo_duty.zip", "sb3_td3_duty.zip"])
+@pytest.mark.parametrize("model", ["sb3_sac_duty.zip", "sb3_ppo_duty.zip", "sb3_td3_duty.zip", "tanh_actor.onnx", "sigmoid_actor.onnx"])
 def test_a_saved_actor_commands_what_its_library_did(model, tmp_path):
     expected = tensors(f"{TRAINERS}/{model.split('.')[0]}.expected.safetensors")
     policy = policyc.export(f"{TRAINERS}/{model}", tmp_path / "out", **SAID)
     steps = policyc.Controller(policy).step_batch(expected["obs"].astype(np.float64))
     assert np.allclose(steps.duty_sim, expected["duty"].reshape(-1), atol=1e-5)
+
+
+def test_a_clip_with_a_scale_behind_it_is_refused_and_not_guessed(tmp_path):
+    with pytest.raises(ValueError, match="policyc new"):
+        policyc.export(f"{TRAINERS}/clipped_actor.onnx", tmp_path / "out", **SAID)
 
 
 def test_what_is_missing_is_said_and_nothing_is_written(tmp_path):

@@ -157,16 +157,19 @@ def _command(
     squash, low, high = taken.continuous
     gain, shift = chain.gain, chain.shift
     if duty is not None:
-        gain = (duty[1] - duty[0]) / (high - low)
-        shift = duty[0] - gain * low
+        least, largest = min(low, high), max(low, high)
+        gain = (duty[1] - duty[0]) / (largest - least)
+        shift = duty[0] - gain * least
     ends = gain * low + shift, gain * high + shift
     # a rounding of the trainer's binary32 is no command beyond the duties
     if not -1e-6 <= min(ends) <= max(ends) <= 1 + 1e-6:
         raise ValueError(f"the action stands for {ends[0]:g} .. {ends[1]:g}, which is no duty: say `duty`, its ends")
-    if squash == "tanh":
-        half = 0.5 * (high - low)
+    if squash in models.CURVES:
+        least, largest = models.CURVES[squash]
+        scale = (high - low) / (largest - least)
+        offset = low - scale * least
         entries["actions"] = {
-            "continuous": {"squash": "tanh", "scale": gain * half, "offset": gain * (low + half) + shift}
+            "continuous": {"squash": squash, "scale": gain * scale, "offset": gain * offset + shift}
         }
     else:
         entries["actions"] = {"continuous": {"clip": [low, high], "scale": gain, "offset": shift}}

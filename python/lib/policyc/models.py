@@ -14,7 +14,21 @@ from ._policyc import import_model
 #: Below it the choice between two actions could be another one after rounding.
 SMALLEST_GAP = 1e-4
 
-ACTIVATIONS = {"ReLU": '"relu"', "Tanh": '"tanh"', "Softsign": '"softsign"'}
+#: Class in ``torch.nn``, the word of a contract, and the arguments of which it is the function.
+ACTIVATIONS: Dict[str, Tuple[str, Dict[str, Any]]] = {
+    "ReLU": ('"relu"', {}),
+    "Tanh": ('"tanh"', {}),
+    "Softsign": ('"softsign"', {}),
+    "Sigmoid": ('"sigmoid"', {}),
+    "Hardsigmoid": ('"hard_sigmoid"', {}),
+    "ELU": ('"elu"', {"alpha": 1.0}),
+    "Softplus": ('"softplus"', {"beta": 1.0}),
+    "SiLU": ('"silu"', {}),
+    "GELU": ('"gelu"', {"approximate": "none"}),
+    "Hardswish": ('"hard_swish"', {}),
+}
+#: Ends of the curves that may stand behind the last layer of a model that commands a number.
+CURVES = {"tanh": (-1.0, 1.0), "softsign": (-1.0, 1.0), "sigmoid": (0.0, 1.0), "hard_sigmoid": (0.0, 1.0)}
 SILENT = {"Flatten", "Identity", "Dropout"}
 
 
@@ -29,7 +43,7 @@ class Model:
     #: Observations ``(n, features)`` to outputs ``(n, actions)``, or to commands ``(n,)`` of a continuous one; None where nothing
     #: can answer.
     answer: Optional[Callable[[np.ndarray], np.ndarray]]
-    #: How the one output becomes the trainer's action: ``tanh`` or ``clip``, and the ends of the action; None for a choice.
+    #: How the one output becomes the trainer's action: a curve or ``clip``, and the action at both ends; None for a choice.
     continuous: Optional[Tuple[str, float, float]]
     #: Least and largest of each observation.
     bounds: Optional[Tuple[np.ndarray, np.ndarray]]
@@ -79,15 +93,23 @@ def _commanded(draft: str) -> Optional[Tuple[str, float, float]]:
     found = re.search(r"^continuous = \{ (.*?) \}", draft, re.MULTILINE)
     if found is None:
         return None
-    number = lambda key: re.search(key + r" = (-?[0-9.e+-]+)", found[1])  # noqa: E731
-    clip = re.search(r"clip = \[(.*?), (.*?)\]", found[1])
+    number = lambda key, default: float((re.search(key + r" = (-?[0-9.e+-]+)", found[1]) or ["", default])[1])  # noqa: E731
+    curve = re.search(r'squash = "(.*?)"', found[1])
+    clip = re.search(r"clip = \[(-?[0-9.e+-]+), (-?[0-9.e+-]+)\]", found[1])
     if clip is not None:
-        return "clip", float(clip[1]), float(clip[2])
-    scale, offset = number("scale"), number("offset")
-    if scale is None or offset is None:
-        return "tanh", -1.0, 1.0
-    half, middle = abs(float(scale[1])), float(offset[1])
-    return "tanh", middle - half, middle + half
+        word, low, high = "clip", float(clip[1]), float(clip[2])
+    elif curve is not None and curve[1] in CURVES:
+        word, (low, high) = curve[1], CURVES[curve[1]]
+    else:
+        raise ValueError(f"the file does not say what bounds its command: {found[0]}; write the contract with `policyc new`")
+    if word == "clip" and re.search(r"scale = -?[0-9]", found[1]):
+        # between the clip and the command: `_command` has the ends of the clip alone
+        raise ValueError(f"a clip with a scale is not read here: {found[0]}; write the contract with `policyc new`")
+    if word == "clip":
+        return word, low, high
+    # a scale that is still to be said is the action's own range
+    scale, offset = number("scale", 1.0), number("offset", 0.0)
+    return word, scale * low + offset, scale * high + offset
 
 
 def from_sb3(model: Any, folder: str) -> Model:
@@ -127,6 +149,18 @@ def from_sb3(model: Any, folder: str) -> Model:
     )
 
 
+def _word(leaf: Any) -> str:
+    """The contract's word for an activation of torch."""
+    name = type(leaf).__name__
+    word, arguments = ACTIVATIONS[name]
+    if name == "GELU" and leaf.approximate == "tanh":
+        return '"gelu_tanh"'
+    for argument, value in arguments.items():
+        if getattr(leaf, argument) != value:
+            raise ValueError(f"the layer {leaf} is not read: with {argument} = {value!r} it is")
+    return word
+
+
 def from_module(module: Any) -> Model:
     """A module of torch whose layers are called in the order in which it has them."""
     import torch
@@ -140,7 +174,7 @@ def from_module(module: Any) -> Model:
             layers.append(leaf)
             activations.append(None)
         elif name in ACTIVATIONS and layers and activations[-1] is None:
-            activations[-1] = ACTIVATIONS[name]
+            activations[-1] = _word(leaf)
         elif name == "LeakyReLU" and layers and activations[-1] is None:
             activations[-1] = f"{{ leaky_relu = {leaf.negative_slope!r} }}"
         else:
@@ -149,9 +183,10 @@ def from_module(module: Any) -> Model:
         raise ValueError("the module has no dense layer")
     *hidden, last = activations
     if last is not None:
-        if last != '"tanh"' or layers[-1].out_features != 1:
-            raise ValueError(f"an activation behind the last layer is read of one output through tanh, and not {last}")
-        squash = ("tanh", -1.0, 1.0)
+        word = last.strip('"')
+        if word not in CURVES or layers[-1].out_features != 1:
+            raise ValueError(f"an activation behind the last layer is read of one output through {', '.join(CURVES)}, and not {last}")
+        squash = (word, *CURVES[word])
     if any(one is None for one in hidden):
         raise ValueError("two dense layers follow each other without an activation that is a module")
     names = [f"layer_{index}" for index in range(len(layers))]

@@ -66,13 +66,8 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     let mut verdict = verdict(&named, &lattice, holds);
     say(Progress::Stage("held-out records"));
     let found = attribution.state();
-    let mut pair = held(
-        &problem,
-        heldout,
-        &base,
-        found,
-        found.starts.trim_or_none(model.converter.f_sw),
-    );
+    let edges = |state: &State| state.starts.trim_or_none(model.converter.f_sw);
+    let mut pair = held(&problem, heldout, &base, found, edges(found));
     // what is no more than the step of a converter has no values that could fail to hold
     if verdict == Verdict::Explained && !named.is_empty() {
         let fails = pair.as_ref().map_or_else(Vec::new, |pair| pair.doubts(&problem, found));
@@ -96,11 +91,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     } else {
         &attribution.null
     };
-    let trim = if explained {
-        state.starts.trim_or_none(model.converter.f_sw)
-    } else {
-        0.0
-    };
+    let trim = if explained { edges(state) } else { 0.0 };
     let extended = state.model.clone();
     // the figures are those of the file that is written
     if !explained {

@@ -209,7 +209,11 @@ mod tests {
                 .unwrap()
                 .contains("later than 38 % into the PWM period")
         );
-        assert!(lateness((5_000, 10_001)).unwrap().contains("Wherever in the PWM period"));
+        assert!(
+            lateness((5_000, 10_001))
+                .unwrap()
+                .contains("Wherever in the PWM period")
+        );
         // what does not fit at all is another matter
         assert_eq!(lateness((10_001, 20_000)), None);
     }

@@ -3,7 +3,7 @@
 
 use crate::drive::{FREE_APART, Model};
 use crate::parallel;
-use crate::problem::{DUTY_ACCURACY, Problem, Starts, axpy, dot};
+use crate::problem::{Problem, Starts, axpy, dot};
 use crate::record::{CHANNELS, Record, Segment};
 
 /// Change of the initial voltage (in units of the output voltage) and current (of the current) for a sensitivity: small against
@@ -82,13 +82,10 @@ impl Problem {
         };
         if !self.trim_held {
             let mut moved = starts.clone();
-            moved.trim += DUTY_ACCURACY;
+            let accuracy = self.duty_accuracy();
+            moved.trim += accuracy;
             let after = self.residual(model, &moved);
-            let raw: Vec<f64> = residual
-                .iter()
-                .zip(&after)
-                .map(|(a, b)| (a - b) / DUTY_ACCURACY)
-                .collect();
+            let raw: Vec<f64> = residual.iter().zip(&after).map(|(a, b)| (a - b) / accuracy).collect();
             let mut own = raw.clone();
             basis.project(&mut own);
             basis.trim = [raw, own];

@@ -66,7 +66,8 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     let mut verdict = verdict(&named, &lattice, holds);
     say(Progress::Stage("held-out records"));
     let found = attribution.state();
-    let mut pair = held(&problem, heldout, &base, found, found.starts.trim_or_none());
+    let edges = |state: &State| state.starts.trim_or_none(model.converter.f_sw);
+    let mut pair = held(&problem, heldout, &base, found, edges(found));
     // what is no more than the step of a converter has no values that could fail to hold
     if verdict == Verdict::Explained && !named.is_empty() {
         let fails = pair.as_ref().map_or_else(Vec::new, |pair| pair.doubts(&problem, found));
@@ -90,7 +91,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     } else {
         &attribution.null
     };
-    let trim = if explained { state.starts.trim_or_none() } else { 0.0 };
+    let trim = if explained { edges(state) } else { 0.0 };
     let extended = state.model.clone();
     // the figures are those of the file that is written
     if !explained {
@@ -379,6 +380,7 @@ fn notes(problem: &Problem, attribution: &Attribution, pair: Option<&Pair>, noth
     let mut notes = by_text(records);
     notes.extend(noise::too_clean(problem, &attribution.null.residual));
     notes.extend(quantised::note(problem));
+    notes.extend(crate::backward::note(problem));
     notes.extend(nothing.iter().map(|id| {
         format!("{id} would fit a little better, by less than two simulators of one circuit differ: not named")
     }));

@@ -91,7 +91,7 @@ pub fn of(problem: &Problem, attribution: &Attribution, profiles: &[Profile], st
 /// A trim that no gate needs is left out of the model that is written, which then does not give the records any more.
 fn edges(attribution: &Attribution) -> Option<Doubt> {
     let state = attribution.state();
-    let trim = state.starts.trim_of_nobody()?;
+    let trim = state.starts.trim_of_nobody(state.model.plant.converter.f_sw)?;
     let time = si(trim.abs() * state.model.plant.t_sw(), unit("s"));
     let way = if trim > 0.0 { "longer" } else { "shorter" };
     Some(Doubt::Edges(format!(

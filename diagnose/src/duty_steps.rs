@@ -10,7 +10,7 @@ use crate::record::{CHANNELS, Record};
 
 /// Counts per period that are looked at, and how far apart: half a count of the duty moves by less than a tenth. Below 8 counts no
 /// controller regulates; half a step of 1000 is 5e-4, the accuracy of a model of ideal edges
-/// ([`crate::problem::DUTY_ACCURACY`]).
+/// ([`crate::problem::duty_accuracy`]).
 const FEWEST: f64 = 8.0;
 const MOST: f64 = 1000.0;
 const APART: f64 = 0.1;

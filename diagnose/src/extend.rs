@@ -13,6 +13,9 @@ use crate::findings::Verdict;
 // a microvolt in a volt of the source: no sensor shows it, and the fit leaves such remains. In the file it would read as a finding
 const NO_TRIM: f64 = 1e-6;
 
+/// Where the trim is written.
+const EDGES: [&str; 2] = ["switch.turn_on_delay", "switch.turn_off_delay"];
+
 fn told(trim: f64) -> f64 {
     if trim.abs() < NO_TRIM { 0.0 } else { trim }
 }
@@ -73,7 +76,7 @@ pub fn partial_toml(diagnosis: &Diagnosis) -> Option<String> {
         return None;
     }
     let state = diagnosis.attribution.state();
-    let trim = told(state.starts.trim_or_none());
+    let trim = told(state.starts.trim_or_none(state.model.plant.converter.f_sw));
     let mut text = String::from(
         "# PARTIAL: these causes do not explain the records. Their values imitate something else, and are no measurement.\n\
          # To look at, not to train on; the model as it was given is in plant.extended.toml.\n",
@@ -139,7 +142,12 @@ fn written(diagnosis: &Diagnosis, mut text: String, after: &Parameters, trim: f6
             true => unit,
             false => {
                 let interval = notes.get(parameter.key).map_or("", String::as_str);
-                format!("  # {}; {interval}was {was:?}", parameter.unit)
+                // a reader who looks for what was found must not take these for it
+                let beside = match trim != 0.0 && EDGES.contains(&parameter.key) {
+                    true => "edges of the gate, fitted beside every cause and none itself; ",
+                    false => "",
+                };
+                format!("  # {}; {interval}{beside}was {was:?}", parameter.unit)
             }
         };
         let _ = writeln!(tables.entry(table).or_default(), "{key} = {value}{note}");

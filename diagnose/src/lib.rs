@@ -18,6 +18,7 @@
 //! answer and [`extend`] and [`page`] write it down. See docs/reference/diagnosis.md.
 
 pub mod attribute;
+mod backward;
 mod balance;
 pub mod basis;
 pub mod causes;

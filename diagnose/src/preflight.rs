@@ -8,7 +8,7 @@ use crate::drive::Model;
 use crate::fit::State;
 use crate::median::median;
 use crate::parallel;
-use crate::problem::{DUTY_ACCURACY, Problem};
+use crate::problem::{Problem, duty_accuracy};
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
 
 /// Farthest shift that is tried, rows.
@@ -21,6 +21,9 @@ const WRONG: f64 = 4.0;
 const OTHER_SOURCE: f64 = 0.06;
 /// Drawn current over half the ripple from which on the voltage follows from the duty.
 const CONTINUOUS: f64 = 1.2;
+/// Smallest duty that a source voltage is read off.
+// a convention: below it a millivolt of the output is 20 of the source
+const LEAST_DUTY: f64 = 0.05;
 
 /// Another way to read a record.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -107,13 +110,14 @@ fn best_reading(problem: &Problem, model: &Model, index: usize) -> Option<Readin
 /// Source voltage that a record's voltages and duties show, without the losses that all records share; nothing if the current may rest.
 fn shown_source(record: &Record, model: &Model) -> Option<f64> {
     let p = &model.plant.converter;
+    // a trim of the edges moves the duty by as much: by a twentieth of it, less than another source is told by
+    let least = (20.0 * duty_accuracy(p.f_sw)).max(LEAST_DUTY);
     let rows = (0..record.rows()).filter_map(|row| {
         let (v, d, load) = (record.measured[0][row], record.duty[row], &record.load[row]);
         let i = v * load.conductance + load.current + if v > 0.0 { load.power / v } else { 0.0 };
         let half = 0.5 * p.v_in * d * (1.0 - d) / (p.inductance * p.f_sw);
         let losses = model.plant.inductor.dcr * i + model.plant.switch.v_f * (1.0 - d);
-        // a trim of the edges moves the duty by as much
-        (v.is_finite() && i > CONTINUOUS * half && d > 100.0 * DUTY_ACCURACY).then_some((v + losses) / d)
+        (v.is_finite() && i > CONTINUOUS * half && d > least).then_some((v + losses) / d)
     });
     let rows: Vec<f64> = rows.collect();
     (2 * rows.len() > record.rows())

@@ -36,12 +36,24 @@ pub struct Problem {
     pub trim_held: bool,
 }
 
-/// Standard deviation of what a model of ideal edges may be off in the duty, 1: rise and fall times of the gate, 50 ns at 10 kHz. It
-/// is estimated beside every fit, so that nothing that small is called a cause. The price: what loses less than four times
-/// as much duty (200 ns of dead time) gains less than 16 of chi-square over the trim, and goes unnamed.
-pub const DUTY_ACCURACY: f64 = 5e-4;
-/// Largest trim that is put into a model: three standard deviations. More stands for a cause on nobody's list.
-const MOST_TRIM: f64 = 3.0 * DUTY_ACCURACY;
+/// What the edges of a gate add to or take from the time that the switch is on, s.
+// half-bridges of VDMOS models with resistors at their gates, in ngspice, 12 to 200 V and 20 kHz to 1 MHz: 5 to 40 ns
+const EDGES: f64 = 20e-9;
+/// The same as a share of the period, at least: half a count of a modulator with 1000, 50 ns at 10 kHz.
+const LEAST_DUTY: f64 = 5e-4;
+/// And at most: who switches faster takes faster gates. Those half-bridges were off by 0.08 to 0.96 % of their periods.
+const MOST_DUTY: f64 = 5e-3;
+/// Largest trim that is put into a model, in standard deviations. More stands for a cause on nobody's list.
+const MOST_TRIM: f64 = 3.0;
+
+/// Standard deviation of what a model of ideal edges may be off in the duty, 1, at a switching frequency in Hz: what the edges do is a
+/// time, what the modulator rounds is a share. It is estimated beside every fit, so that nothing that small is called a cause.
+/// The price: what loses less than four times as much duty (200 ns of dead time at 10 kHz, 67 ns at 300 kHz) gains less than 16 of
+/// chi-square over the trim, and goes unnamed.
+#[must_use]
+pub fn duty_accuracy(f_sw: f64) -> f64 {
+    (EDGES * f_sw).clamp(LEAST_DUTY, MOST_DUTY)
+}
 
 /// What is estimated beside every fit.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -67,14 +79,18 @@ impl Starts {
 
     /// The trim where it is more than what gates do: something else has to be behind it.
     #[must_use]
-    pub fn trim_of_nobody(&self) -> Option<f64> {
-        (self.trim.abs() > MOST_TRIM).then_some(self.trim)
+    pub fn trim_of_nobody(&self, f_sw: f64) -> Option<f64> {
+        (self.trim.abs() > MOST_TRIM * duty_accuracy(f_sw)).then_some(self.trim)
     }
 
     /// The trim; 0 where it is so large that it must stand for something else.
     #[must_use]
-    pub fn trim_or_none(&self) -> f64 {
-        if self.trim.abs() <= MOST_TRIM { self.trim } else { 0.0 }
+    pub fn trim_or_none(&self, f_sw: f64) -> f64 {
+        if self.trim_of_nobody(f_sw).is_none() {
+            self.trim
+        } else {
+            0.0
+        }
     }
 }
 
@@ -118,6 +134,12 @@ impl Problem {
             records,
             trim_held: false,
         }
+    }
+
+    /// [`duty_accuracy`] at the model's frequency.
+    #[must_use]
+    pub fn duty_accuracy(&self) -> f64 {
+        duty_accuracy(self.base.plant.converter.f_sw)
     }
 
     /// Length of the vectors.
@@ -206,7 +228,7 @@ impl Problem {
             }
         }
         if let Some(last) = out.last_mut() {
-            *last = -starts.trim / DUTY_ACCURACY;
+            *last = -starts.trim / self.duty_accuracy();
         }
         out
     }
@@ -343,8 +365,32 @@ mod tests {
                 trim,
                 ..Starts::default()
             };
-            assert_eq!(starts.trim_of_nobody().is_none(), is_edges, "{trim}");
-            assert_eq!(starts.trim_or_none(), if is_edges { trim } else { 0.0 });
+            assert_eq!(starts.trim_of_nobody(1e4).is_none(), is_edges, "{trim}");
+            assert_eq!(starts.trim_or_none(1e4), if is_edges { trim } else { 0.0 });
         }
+    }
+
+    /// The half-bridges in ngspice that [`EDGES`] tells of, each at its frequency: none needs a cause beside its edges.
+    #[test]
+    fn measured_edges_are_within_what_a_gate_may_do() {
+        for (f_sw, seconds) in [
+            (3e5, 12.3e-9),
+            (3e5, 32e-9),
+            (1e6, 6.6e-9),
+            (1.5e5, 37.7e-9),
+            (2e4, 40e-9),
+        ] {
+            let starts = Starts {
+                trim: seconds * f_sw,
+                ..Starts::default()
+            };
+            assert_eq!(starts.trim_of_nobody(f_sw), None, "{f_sw}");
+        }
+        // a dead time of 200 ns at 300 kHz does
+        let dead = Starts {
+            trim: -200e-9 * 3e5,
+            ..Starts::default()
+        };
+        assert!(dead.trim_of_nobody(3e5).is_some());
     }
 }

@@ -9,6 +9,7 @@ mod logged;
 mod raw;
 mod rows;
 mod source;
+mod stamp;
 mod suspicion;
 
 use std::path::Path;
@@ -155,10 +156,20 @@ impl Record {
         if !self.settled && self.segments.len() > 1 {
             let at = |segment: &Segment| format!("{:.6} s", self.time[segment.start]);
             let list: Vec<String> = self.segments.iter().skip(1).take(5).map(at).collect();
-            let what = if self.dense { "gaps" } else { "steps and gaps" };
+            let count = self.segments.len() - 1;
+            let s = if count == 1 { "" } else { "s" };
+            let what = match self.dense {
+                true => {
+                    let pairs = self.segments.windows(2);
+                    let lost: usize = pairs.map(|pair| pair[1].start - pair[0].end).sum();
+                    let are = if lost == 1 { "row is" } else { "rows are" };
+                    format!("{count} gap{s}, in which {lost} {are} missing")
+                }
+                false => format!("{count} step{s} and gaps"),
+            };
+            let each = if count == 1 { "it" } else { "each" };
             self.repairs.push(format!(
-                "{} {what}: simulated anew behind each, from {}",
-                self.segments.len() - 1,
+                "{what}: simulated anew behind {each}, from {}",
                 list.join(", ")
             ));
         }

@@ -39,38 +39,12 @@ pub fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure], dou
         Verdict::Consistent => "The model explains the records within their noise: nothing to correct.".to_owned(),
         Verdict::Explained => format!("What the model gets wrong is {}.", list(causes)),
         Verdict::Ambiguous => {
-            let of = |cause: &Named| {
-                // what stands beside all causes takes a part of them
-                let is_beside = |ids: &&Vec<&str>| {
-                    ids.contains(&cause.id) && ids.iter().any(|id| causes.iter().all(|own| own.id != *id))
-                };
-                let (inside, whole): (Vec<_>, Vec<_>) = cause.rivals.iter().partition(is_beside);
-                let extra = inside
-                    .iter()
-                    .flat_map(|ids| ids.iter().filter(|id| causes.iter().all(|own| own.id != **id)));
-                let extra: Vec<&str> = extra.copied().collect();
-                let part = format!("{} may in part be {}", cause.id, extra.join(" or "));
-                let rivals: Vec<String> = whole.iter().map(|ids| ids.join(" + ")).collect();
-                if rivals.is_empty() {
-                    return part;
-                }
-                let more = match rivals.len().saturating_sub(MOST_SAID) {
-                    0 => String::new(),
-                    more => format!(", or {more} others"),
-                };
-                let said = rivals[..rivals.len().min(MOST_SAID)].join(", or ");
-                let whole = format!("{} cannot be told from {said}{more}", cause.id);
-                if extra.is_empty() {
-                    whole
-                } else {
-                    format!("{whole}; {part}")
-                }
-            };
-            let ties = causes.iter().filter(|cause| !cause.rivals.is_empty()).map(of);
+            let ties = causes.iter().filter(|cause| !cause.rivals.is_empty());
+            let ties: Vec<String> = ties.map(|cause| tie(cause, causes)).collect();
             format!(
-                "Best explanation: {}. But {}.",
+                "More than one explanation fits. One is {}. {}",
                 list(causes),
-                ties.collect::<Vec<_>>().join("; ")
+                ties.join(" ")
             )
         }
         Verdict::Unexplained => {
@@ -86,6 +60,33 @@ pub fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure], dou
             format!("None of the known causes explains the records{left}{doubts}.")
         }
     }
+}
+
+/// What could stand in the place of a cause, or be a part of it: a sentence each.
+fn tie(cause: &Named, causes: &[Named]) -> String {
+    let is_other = |id: &&&str| causes.iter().all(|own| own.id != **id);
+    // what stands beside all causes takes a part of them
+    let is_beside = |ids: &&Vec<&str>| ids.contains(&cause.id) && ids.iter().any(|id| is_other(&id));
+    let (inside, whole): (Vec<_>, Vec<_>) = cause.rivals.iter().partition(is_beside);
+    let mut sentences = Vec::new();
+    let rivals: Vec<String> = whole.iter().map(|ids| ids.join(" + ")).collect();
+    if !rivals.is_empty() {
+        let more = match rivals.len().saturating_sub(MOST_SAID) {
+            0 => String::new(),
+            more => format!(", or {more} others"),
+        };
+        let said = rivals[..rivals.len().min(MOST_SAID)].join(", or ");
+        sentences.push(format!("In place of {} it could be {said}{more}.", cause.id));
+    }
+    let extra: Vec<&str> = inside
+        .iter()
+        .flat_map(|ids| ids.iter().filter(is_other))
+        .copied()
+        .collect();
+    if !extra.is_empty() {
+        sentences.push(format!("A part of {} could be {}.", cause.id, extra.join(" or ")));
+    }
+    sentences.join(" ")
 }
 
 /// Said where nothing explains the records: which causes come nearest, and the share of the error above the noise that they take away.

@@ -112,7 +112,9 @@ const SYNONYMS: [(&str, &[&str]); 9] = [
             "vsupply",
             "supplyvoltage",
             "vbus",
+            "ubus",
             "vdc",
+            "udc",
             "busvoltage",
             "eingangsspannung",
             "zwischenkreisspannung",
@@ -253,6 +255,14 @@ mod tests {
         assert_eq!(
             proposed("Zeit;Tastgrad;Spannung [mV];Spulenstrom").as_deref(),
             Some("--map 't=Zeit,duty=Tastgrad,v_out=Spannung [mV],i_l=Spulenstrom'")
+        );
+    }
+
+    #[test]
+    fn a_source_is_called_by_the_letter_of_either_language() {
+        assert_eq!(
+            proposed("Time_us;PWM_pct;Uout_V;Icoil_A;Ubus_V").as_deref(),
+            Some("--map duty=PWM_pct,v_out=Uout_V,i_l=Icoil_A,v_in=Ubus_V")
         );
     }
 

@@ -29,7 +29,7 @@ pub struct Located {
     /// Columns that no quantity was found in.
     pub unused: Vec<usize>,
     /// Quantities of the map that nobody asked for.
-    unasked: Vec<&'static str>,
+    unasked: Vec<String>,
 }
 
 impl Sheet {
@@ -63,7 +63,7 @@ impl Sheet {
             unused: (0..self.columns().len())
                 .filter(|index| !used(index) && !is_empty(index))
                 .collect(),
-            unasked: map.mapped().filter(|name| !asked(name)).collect(),
+            unasked: map.mapped().filter(|name| !asked(name)).map(str::to_owned).collect(),
             signals,
         })
     }

@@ -12,6 +12,7 @@ mod files;
 mod interruption;
 mod prove;
 mod replay;
+mod replayed_filters;
 mod simulate;
 mod tables;
 mod traces;

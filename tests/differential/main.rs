@@ -65,7 +65,7 @@ fn the_example_is_equal_in_every_build_and_gives_the_trainers_answers() {
 #[test]
 fn recorded_closed_loops_are_replayed() {
     let policy = policy::load(&tests::example()).unwrap();
-    let recorded = Recorded::open(&policy, &tests::root().join("tests/fixtures/buck12_200_1000.csv")).unwrap();
+    let recorded = Recorded::open(&policy, &tests::root().join("tests/fixtures/buck12_200_1000.csv"), "").unwrap();
     let steps = recorded.steps().len() as u64;
     assert!(steps > 500);
     let options = Options {

@@ -38,7 +38,7 @@ fn read_all(bytes: &[u8], policy: &Policy) -> [Read; 3] {
             (numbers.collect(), record.repairs)
         });
     let verify = Sheet::parse(file, bytes.to_vec(), &Options::default())
-        .and_then(|sheet| Recorded::read(policy, &sheet))
+        .and_then(|sheet| Recorded::read(policy, &sheet, ""))
         .map(|recorded| (recorded.steps().iter().flatten().map(number).collect(), recorded.notes));
     [drm, diagnose, verify]
 }

@@ -44,6 +44,9 @@ pub fn lines(
     if policy.numeric_format == NumericFormat::F32Fma {
         lines.push("  note: the model does not know fused operations; it says too little".to_owned());
     }
+    // of the build that is done first: who is in a hurry takes that one
+    let soonest = budgets.iter().min_by(|a, b| a.1.share.1.total_cmp(&b.1.share.1));
+    lines.extend(soonest.and_then(|(_, budget)| budget.lateness()));
     if budgets.iter().any(|(_, budget)| budget.fit == Fit::Met) {
         return Ok(lines);
     }

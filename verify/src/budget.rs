@@ -63,6 +63,9 @@ impl fmt::Display for Clock {
     }
 }
 
+/// Share of the period beyond which a step that is begun in its middle ends behind its end.
+const HALF: f64 = 0.5;
+
 /// Whether the model says that a step fits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -104,6 +107,23 @@ impl Budget {
                 (least, _) if least <= 1.0 => Fit::Doubtful,
                 _ => Fit::Missed,
             },
+        })
+    }
+
+    /// When the duty of a step acts, where that may be a period later than one thinks; `None` where it fits into half of the period.
+    #[must_use]
+    pub fn lateness(&self) -> Option<String> {
+        let most = self.share.1;
+        (self.fit != Fit::Missed && most > HALF).then(|| {
+            let sampled = match most < 1.0 {
+                true => format!("Sampled later than {:.0} % into the PWM period,", 100.0 * (1.0 - most)),
+                false => "Wherever in the PWM period it is sampled,".to_owned(),
+            };
+            format!(
+                "  note: a step takes up to {:.0} % of the period. {sampled} its duty can miss the next start and act one period later: \
+                 train with pwm.duty_delay = 1 in the plant file then",
+                100.0 * most
+            )
         })
     }
 
@@ -178,5 +198,23 @@ mod tests {
         assert_eq!(fit((5_000, 10_001)), Some(Fit::Doubtful));
         assert_eq!(fit((10_001, 20_000)), Some(Fit::Missed));
         assert_eq!(Budget::of(&costs(None), Clock { hz: 1e8 }, 1e-4), None);
+        let lateness = |cycles| {
+            Budget::of(&costs(Some(cycles)), Clock { hz: 1e8 }, 1e-4)
+                .unwrap()
+                .lateness()
+        };
+        assert_eq!(lateness((2_000, 4_900)), None);
+        assert!(
+            lateness((2_000, 6_200))
+                .unwrap()
+                .contains("later than 38 % into the PWM period")
+        );
+        assert!(
+            lateness((5_000, 10_001))
+                .unwrap()
+                .contains("Wherever in the PWM period")
+        );
+        // what does not fit at all is another matter
+        assert_eq!(lateness((10_001, 20_000)), None);
     }
 }

@@ -132,6 +132,10 @@ pub struct Replay {
     /// Table with a row for each control period. A column for each signal; to compare: `obs_0`, `obs_1`, ... (or `obs_NAME`) and
     /// `action`. Also read: `duty` or `previous_duty`, `episode`, `t`
     pub log: PathBuf,
+    /// Where a column has another name: signal=column, obs_0=column or signal=column*factor, separated by commas or given
+    /// several times
+    #[arg(long, value_name = "MAP")]
+    pub map: Vec<String>,
     /// Logged actions are of a trainer who explores: they are applied, and not compared
     #[arg(long)]
     pub exploring: bool,
@@ -221,6 +225,10 @@ pub struct Verify {
     /// the nearest code)
     #[arg(long, value_name = "CSV")]
     pub trace: Vec<PathBuf>,
+    /// Where a column of the recorded measurements has another name than its signal: signal=column or signal=column*factor,
+    /// separated by commas or given several times
+    #[arg(long, value_name = "MAP", requires = "trace")]
+    pub map: Vec<String>,
     /// Machine-readable
     #[arg(long)]
     pub json: bool,

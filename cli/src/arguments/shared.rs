@@ -28,10 +28,10 @@ pub enum ControllerKind {
 /// Where the quantities of a table stand that names them otherwise.
 #[derive(Debug, Args)]
 pub struct Columns {
-    /// Where the quantities stand: quantity=column, quantity=column*factor or quantity=number, separated by commas;
-    /// quantities are t, duty, v_out, i_l, i_out, v_in, r_load, i_load, p_load, v_std, settled
-    #[arg(long, value_name = "MAP", default_value = "")]
-    pub map: String,
+    /// Where the quantities stand: quantity=column, quantity=column*factor or quantity=number, separated by commas or
+    /// given several times; quantities are t, duty, v_out, i_l, i_out, v_in, r_load, i_load, p_load, v_std, settled
+    #[arg(long, value_name = "MAP")]
+    pub map: Vec<String>,
     /// The same as a file: names, factors, offsets and constants
     #[arg(long, value_name = "MAP.toml")]
     pub columns: Option<PathBuf>,
@@ -44,6 +44,6 @@ impl Columns {
             .columns
             .as_deref()
             .map_or_else(|| Ok(ColumnMap::default()), ColumnMap::open)?;
-        file.and(ColumnMap::parse(&self.map)?)
+        file.and(ColumnMap::parse(&self.map.join(","))?)
     }
 }

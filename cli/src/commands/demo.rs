@@ -72,6 +72,7 @@ pub fn run(options: &Demo) -> Result<Outcome, Failure> {
         golden_decisions: None,
         drift_only: false,
         trace: Vec::new(),
+        map: Vec::new(),
         json: false,
     })?;
     output::say("\nfiles")?;

@@ -20,7 +20,7 @@ struct Answer {
 /// Compares and reports.
 pub fn run(options: &Replay) -> Result<Outcome, Failure> {
     let policy = super::load_without_golden(&options.policy, options.outside)?;
-    let log = Log::open(&policy, &options.log)?;
+    let log = Log::open(&policy, &options.log, &options.map.join(","))?;
     if !log.compares() {
         let message = Message::new("the log has nothing to compare with").found(log.columns());
         return Err(message

@@ -34,10 +34,11 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
     };
     let policy = super::load_as(&options.policy, options.outside, written)?;
     super::no_choices(&policy, options.golden_decisions)?;
+    let map = options.map.join(",");
     let recorded = options
         .trace
         .iter()
-        .map(|path| Recorded::open(&policy, path))
+        .map(|path| Recorded::open(&policy, path, &map))
         .collect::<Result<Vec<_>, _>>()?;
     for (path, recording) in options.trace.iter().zip(&recorded) {
         let note = |note: &String| eprintln!("note: {}: {note}", path.display());

@@ -38,7 +38,7 @@ const fn searched(words: &'static str, knobs: &'static [Knob], search: Search) -
 //
 // half of the load's resistance would take a third of the voltage; the step is 0.1 ohm of 20, the least that is hidden
 const OHMS: Reach = Reach::Resistance(0.5, 0.005);
-// 20 us at 10 kHz, seven times the longest dead time hidden; the step is four times `problem::DUTY_ACCURACY`
+// 20 us at 10 kHz, seven times the longest dead time hidden; the step is four times `problem::duty_accuracy` there
 const EDGE: Reach = Reach::Time(0.0, 0.2, 0.002);
 // from a factor of two on a probe is set wrong, which the reader names (`record::suspicion`)
 const GAIN: Reach = Reach::Plain(0.5, 1.5, 0.01);

@@ -3,6 +3,7 @@
 use toml_input::{Faults, Message};
 
 use super::raw::Raw;
+use super::stamp::Clock;
 
 /// Most rows in a switching period, and most periods between rows. A period of 500 rows is an oscilloscope's (50 MHz at 100 kHz),
 /// and between rows 100 periods apart all that swings has died away. Beyond these a sampling period is more likely mistyped.
@@ -42,12 +43,19 @@ impl Raw<'_> {
                 .fault(Message::new("too few rows").expected("20 or more"))
                 .into());
         };
+        // 3.33 us in whole microseconds are 3 and 4: no step is the usual one, and their mean is
+        if self.resolution("t") > 0.01 * step {
+            let usual = steps.iter().filter(|other| (0.5..1.5).contains(&(*other / step)));
+            let (sum, count) = usual.fold((0.0, 0.0), |(sum, count), other| (sum + other, count + 1.0));
+            return Ok(sum / count);
+        }
         Ok(step)
     }
 
-    /// Rows for each control period in order (nothing in a gap), and the sampling phase; rows are `step` apart.
-    pub fn align(&mut self, step: f64, t_sw: f64, phase: Option<f64>) -> Result<(Vec<Option<usize>>, f64), Faults> {
+    /// Rows for each control period in order (nothing in a gap), and the sampling phase.
+    pub fn align(&mut self, clock: Clock, phase: Option<f64>) -> Result<(Vec<Option<usize>>, f64), Faults> {
         let time = self.values("t").unwrap_or_default();
+        let Clock { step, t_sw, .. } = clock;
         let ratio = step / t_sw;
         let (fast, slow) = ((1.0 / ratio).round(), ratio.round());
         // a convention: clocks are far better, but times are written with few digits, and f_sw is a rounded number
@@ -66,24 +74,13 @@ impl Raw<'_> {
                 );
             return Err(self.sheet.fault(message).into());
         }
-        Ok(self.place(&time, t_sw, phase, step))
+        Ok(self.place(&time, clock, phase))
     }
 
-    /// The sampling instant in the period by the first time.
-    pub fn stamped(&self, t_sw: f64) -> f64 {
-        let first = self.values("t").and_then(|time| time.first().copied()).unwrap_or(0.0);
-        let fraction = (first / t_sw).rem_euclid(1.0);
-        // what a time of few digits leaves of a whole period
-        if (1e-3..=1.0 - 1e-3).contains(&fraction) {
-            fraction
-        } else {
-            0.0
-        }
-    }
-
-    fn place(&mut self, time: &[f64], t_sw: f64, phase: Option<f64>, step: f64) -> (Vec<Option<usize>>, f64) {
+    fn place(&mut self, time: &[f64], clock: Clock, phase: Option<f64>) -> (Vec<Option<usize>>, f64) {
+        let Clock { step, t_sw, .. } = clock;
         let fraction = (time[0] / t_sw).rem_euclid(1.0);
-        let phase = phase.unwrap_or_else(|| self.stamped(t_sw));
+        let phase = phase.unwrap_or_else(|| self.stamped(time, clock));
         // here and below: between one row a period and two
         let skip = match step < 0.75 * t_sw {
             true => (phase - fraction).rem_euclid(1.0) * t_sw,
@@ -116,7 +113,7 @@ impl Raw<'_> {
         if step < 0.75 * t_sw {
             let text = format!("{used} of {} rows used: one each switching period", time.len());
             self.repairs.push(text);
-        } else if jitter > 0.02 {
+        } else if jitter > 0.02 + self.resolution("t") / t_sw {
             let text = format!("sampling instants jitter by up to {:.1} % of a period", 100.0 * jitter);
             self.repairs.push(text);
         }

@@ -1,6 +1,6 @@
 //! A table with its signals found and turned into SI units: duty, load, channels, time.
 
-use measured::{ColumnMap, Located, Quantity, Sheet, Signal, argument, proposal, table_faults};
+use measured::{ColumnMap, Located, Quantity, Sheet, Signal, proposal, table_faults};
 use plant::Load;
 use toml_input::{Fault, Faults, Message, Sink};
 
@@ -19,7 +19,7 @@ const LOADS: [&str; 4] = ["r_load", "i_load", "p_load", "i_out"];
 /// A table with its signals found.
 pub(super) struct Raw<'a> {
     pub sheet: &'a Sheet,
-    located: Located,
+    pub located: Located,
     /// Each quantity in SI, NaN where nothing was measured; nothing if it is not there.
     values: Vec<(&'static str, Vec<f64>)>,
     pub repairs: Vec<String>,
@@ -47,9 +47,13 @@ impl<'a> Raw<'a> {
         }
         let guesses = sheet.guesses(&located, &Quantity::all(&NAMES));
         // an unknown time is a question of its own
-        for (name, column) in guesses.iter().filter(|(name, _)| *name != "t") {
-            let map = argument(&format!("{name}={column}"));
-            repairs.push(format!("`{column}` looks like {name} and is not read as such: {map}"));
+        let guesses: Vec<_> = guesses.into_iter().filter(|(name, _)| *name != "t").collect();
+        if let Some(map) = proposal(&guesses) {
+            let alike: Vec<String> = guesses
+                .iter()
+                .map(|(name, column)| format!("`{column}` looks like {name}"))
+                .collect();
+            repairs.push(format!("{} and is not read as such: {map}", alike.join(", ")));
         }
         Ok(Raw {
             repairs,
@@ -265,10 +269,11 @@ fn incomplete(sheet: &Sheet, located: &Located) -> Sink {
     let map = proposal(&sheet.guesses(located, &Quantity::all(&NAMES)));
     if let (Some(first), Some(map)) = (list.first_mut(), map) {
         let metered = match map.contains("i_load=") {
-            true => " (i_load is a load that was set; if a meter showed it, write i_out in its place)",
+            true => " (i_load is a load that was set; for what a meter showed write i_out)",
             false => "",
         };
-        let proposed = format!("these columns look like it, check each: {map}{metered}");
+        // the map last: what is copied ends with the line
+        let proposed = format!("these columns look like it, check each{metered}: {map}");
         first.hint = Some(match first.hint.take() {
             Some(hint) if has("duty") => format!("{hint}; {proposed}"),
             _ => proposed,

@@ -8,6 +8,7 @@ use super::channels::{CHANNELS, FEWEST, FEWEST_SETTLED, QUANTITIES, Segment};
 use super::levels;
 use super::logged;
 use super::raw::Raw;
+use super::stamp::Clock;
 
 /// Rows as the plant can be driven by them.
 pub struct Lines {
@@ -59,9 +60,12 @@ impl Raw<'_> {
             return self.points(map);
         }
         let (step, t_sw) = (self.row_step()?, parameters.t_sw());
+        let phase = parameters.pwm.sampling_phase;
+        let clock = Clock { step, t_sw, phase };
         // who says `settled = false` wants the rows simulated as they are
         if map.settled != Some(false) && logged::is_logged(step / t_sw, parameters) {
-            let stamped = self.stamped(t_sw);
+            let time = self.values("t").unwrap_or_default();
+            let stamped = self.stamped(&time, clock);
             let sampled = map.sampled.or(map.phase.map(|_| Sampled::Instant));
             let lines = self.logged(parameters, step, map.phase.unwrap_or(stamped))?;
             return Ok(Lines { sampled, ..lines });
@@ -70,8 +74,9 @@ impl Raw<'_> {
             let note = "`sampled` of the column map is not used: rows are simulated at their instants";
             self.repairs.push(note.to_owned());
         }
-        let (rows, phase) = self.align(step, t_sw, map.phase)?;
+        let (rows, phase) = self.align(clock, map.phase)?;
         self.enough(&rows, FEWEST)?;
+        self.note_leaps();
         let mut lines = self.picked(&rows, phase)?;
         self.take_levels(&mut lines, &rows);
         Ok(Lines {

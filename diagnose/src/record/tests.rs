@@ -115,3 +115,98 @@ fn a_converter_step_is_found_and_plain_digits_are_not() {
         .collect();
     assert_eq!(lattice(&off, 3), 0.0);
 }
+
+/// Rows at 0.5 of periods of 300 kHz, as a logger writes them with `digits` behind the point.
+fn at_300_khz(write: impl Fn(f64) -> String, edit: impl Fn(usize, String) -> String) -> Record {
+    let mut parameters = Parameters::paper_table();
+    parameters.converter.f_sw = 3e5;
+    parameters.pwm.sampling_phase = 0.5;
+    let mut text = String::from("t,d,v_o,r_load,seq\n");
+    for n in 0..60 {
+        let line = format!(
+            "{},0.5,{:.3},20,{n}",
+            write((n as f64 + 0.5) / 3e5),
+            100.0 + 0.137 * (n % 7) as f64
+        );
+        let _ = writeln!(text, "{}", edit(n, line));
+    }
+    let sheet = Sheet::parse(Path::new("run.csv"), text.into(), &Record::file_options()).unwrap();
+    Record::read(&sheet, &ColumnMap::default(), &parameters).unwrap()
+}
+
+#[test]
+fn rounded_and_cut_times_leave_the_model_s_sampling_phase() {
+    for digits in [6, 7, 8] {
+        let record = at_300_khz(|t| format!("{t:.digits$}"), |_, line| line);
+        assert_eq!(
+            (record.phase, record.rows()),
+            (0.5, 60),
+            "{digits}: {:?}",
+            record.repairs
+        );
+        let cut = |t: f64| {
+            let scale = 10f64.powi(digits as i32);
+            format!("{:.digits$}", (t * scale + 1e-6).floor() / scale)
+        };
+        let record = at_300_khz(cut, |_, line| line);
+        assert_eq!(
+            (record.phase, record.rows()),
+            (0.5, 60),
+            "{digits}: {:?}",
+            record.repairs
+        );
+    }
+    // whole microseconds: the first row alone says 0.6
+    let record = at_300_khz(|t| format!("{t:.6}"), |_, line| line);
+    assert!(
+        record
+            .repairs
+            .iter()
+            .any(|note| note.contains("steps of 1.00 µs") && note.contains("0.600")),
+        "{:?}",
+        record.repairs
+    );
+}
+
+#[test]
+fn another_sampling_phase_is_seen_through_the_rounding() {
+    let record = at_300_khz(|t| format!("{:.7}", t + 0.2 / 3e5), |_, line| line);
+    assert!((record.phase - 0.7).abs() < 0.01, "{}", record.phase);
+    assert!(
+        record.repairs.iter().any(|note| note.contains("the model has 0.5")),
+        "{:?}",
+        record.repairs
+    );
+    // written exactly it is read exactly, without a word
+    let record = at_300_khz(|t| format!("{:.12}", t + 0.2 / 3e5), |_, line| line);
+    assert!((record.phase - 0.7).abs() < 1e-4);
+    let about_time = |note: &String| note.contains("times");
+    assert!(!record.repairs.iter().any(about_time), "{:?}", record.repairs);
+}
+
+#[test]
+fn lost_rows_are_counted_by_time_and_by_their_numbers() {
+    let lost = |n: usize, line: String| {
+        if (20..23).contains(&n) || n == 40 {
+            "# lost".to_owned()
+        } else {
+            line
+        }
+    };
+    let record = at_300_khz(|t| format!("{t:.9}"), lost);
+    let said = record.repairs.join("\n");
+    assert!(said.contains("2 gaps, in which 4 rows are missing"), "{said}");
+    assert!(
+        said.contains("`seq` counts rows and leaps in 2 places, first in line 25: 4 rows were lost"),
+        "{said}"
+    );
+    let whole = at_300_khz(|t| format!("{t:.9}"), |_, line| line);
+    assert!(
+        !whole
+            .repairs
+            .iter()
+            .any(|note| note.contains("lost") || note.contains("missing")),
+        "{:?}",
+        whole.repairs
+    );
+}

@@ -51,7 +51,7 @@ fn what_can_be_repaired_is_repaired_and_said() {
     let cases: Vec<(&str, String, &str)> = vec![
         ("semicolons", semicolons, "decimal commas"),
         ("repeated time", text(&repeated), "1 rows repeat the time"),
-        ("gap", text(&gap), "1 gaps"),
+        ("gap", text(&gap), "1 gap, in which 7 rows are missing"),
         ("cut", cut[..cut.len() - 12].to_owned(), "is cut off"),
         ("jitter", jitter, "jitter by up to"),
         (

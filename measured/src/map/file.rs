@@ -5,6 +5,7 @@ use std::path::Path;
 use toml_input::{Document, Faults, Sink, Table, Value};
 
 use super::{ColumnMap, DutyIs, OfRecord, Sampled, Wish, quantity};
+use crate::quantity::VOCABULARY;
 
 impl ColumnMap {
     /// Reads a map file:
@@ -103,7 +104,7 @@ impl ColumnMap {
         for (key, value) in entries {
             // the fault is left; the other entries are read all the same
             let Some(wish) = read(&value, faults) else { continue };
-            let added = quantity(&key.value).and_then(|name| self.add(name, wish));
+            let added = quantity(&key.value, &VOCABULARY).and_then(|name| self.add(name, wish));
             faults.extend(added.err().map(|message| value.source().fault(&key.span, message)));
         }
     }

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use toml_input::{Faults, Message};
 
-use crate::quantity::{Quantity, VOCABULARY};
+use crate::quantity::Quantity;
 
 /// What the duty of a record is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -38,7 +38,7 @@ pub enum Sampled {
 /// What is not mapped is found by its name ([`VOCABULARY`]).
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ColumnMap {
-    entries: Vec<(&'static str, Wish)>,
+    entries: Vec<(String, Wish)>,
     /// Sampling instant as a fraction of the PWM period; from the time column if not given.
     pub phase: Option<f64>,
     /// What the duty column holds.
@@ -75,13 +75,13 @@ pub(crate) enum Wish {
 impl ColumnMap {
     /// What is wished for a quantity.
     pub(crate) fn wish(&self, quantity: &str) -> Option<&Wish> {
-        let found = self.entries.iter().find(|(name, _)| *name == quantity);
+        let found = self.entries.iter().find(|(name, _)| name == quantity);
         found.map(|(_, wish)| wish)
     }
 
     /// The quantities that are mapped.
-    pub(crate) fn mapped(&self) -> impl Iterator<Item = &'static str> {
-        self.entries.iter().map(|(name, _)| *name)
+    pub(crate) fn mapped(&self) -> impl Iterator<Item = &str> {
+        self.entries.iter().map(|(name, _)| name.as_str())
     }
 
     /// The value of a quantity that holds for the whole table.
@@ -101,8 +101,8 @@ impl ColumnMap {
         for (name, wish) in other.entries {
             // the section of a record counts before the others: an entry of the command line would silently not hold
             // for it
-            if self.records.iter().any(|record| record.map.wish(name).is_some()) {
-                return Err(mapped_twice(name).into());
+            if self.records.iter().any(|record| record.map.wish(&name).is_some()) {
+                return Err(mapped_twice(&name).into());
             }
             self.add(name, wish)?;
         }
@@ -147,9 +147,9 @@ impl ColumnMap {
         sections.map(|record| record.name.as_str()).collect()
     }
 
-    fn add(&mut self, name: &'static str, wish: Wish) -> Result<(), Message> {
-        if self.wish(name).is_some() {
-            return Err(mapped_twice(name));
+    fn add(&mut self, name: String, wish: Wish) -> Result<(), Message> {
+        if self.wish(&name).is_some() {
+            return Err(mapped_twice(&name));
         }
         self.entries.push((name, wish));
         Ok(())
@@ -164,13 +164,14 @@ fn mapped_twice(name: &str) -> Message {
     Message::new(format!("`{name}` is mapped twice")).hint("a quantity stands in one place")
 }
 
-/// The name of the quantity that a map calls `text`.
-fn quantity(text: &str) -> Result<&'static str, Message> {
-    Quantity::find(text).map(|quantity| quantity.name).ok_or_else(|| {
-        let names: Vec<&str> = VOCABULARY.iter().map(|quantity| quantity.name).collect();
+/// The name of the quantity that a map calls `text`, of those that a command reads.
+fn quantity(text: &str, known: &[Quantity<'_>]) -> Result<String, Message> {
+    let found = known.iter().find(|quantity| quantity.is_called(text));
+    found.map(|quantity| quantity.name.to_owned()).ok_or_else(|| {
+        let names: Vec<&str> = known.iter().map(|quantity| quantity.name).collect();
         Message::new(format!("no quantity `{text}`"))
             .expected(format!("one of {}", names.join(", ")))
-            .did_you_mean(text, VOCABULARY.iter().flat_map(Quantity::names))
+            .did_you_mean(text, known.iter().flat_map(Quantity::names))
     })
 }
 

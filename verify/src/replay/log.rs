@@ -65,19 +65,19 @@ impl Log {
     /// Columns: every signal by its name, in its unit (as for [`Recorded`](crate::traces::Recorded)). If there: observations as
     /// `obs_0`, `obs_1`, ... in the network's order, or `obs_NAME`, or the feature's name; `action`, from 0; `duty`, what the
     /// action commanded, which of a continuous head is compared in the place of an action; `previous_duty`, where the environment has its own; `episode`, which begins anew where it changes; `t` in
-    /// seconds.
+    /// seconds. `map` says where a column has another name: `v_out=CH1,obs_0=x0`.
     ///
     /// # Errors
-    /// A file that cannot be read, a signal without column, cells that are no numbers, rows that are not a control period apart.
-    pub fn open(policy: &Policy, file: &Path) -> Result<Self, Faults> {
-        Self::read(policy, Sheet::open(file, &Options::default())?)
+    /// A map or a file that cannot be read, a signal without column, cells that are no numbers, rows that are not a control period apart.
+    pub fn open(policy: &Policy, file: &Path, map: &str) -> Result<Self, Faults> {
+        Self::read(policy, Sheet::open(file, &Options::default())?, map)
     }
 
     /// [`Log::open`] of a table.
     ///
     /// # Errors
     /// As [`Log::open`].
-    pub fn read(policy: &Policy, sheet: Sheet) -> Result<Self, Faults> {
+    pub fn read(policy: &Policy, sheet: Sheet, map: &str) -> Result<Self, Faults> {
         let signals = SignalColumns::new(policy);
         let observations = observation_names(policy);
         let mut wanted = signals.quantities();
@@ -98,7 +98,7 @@ impl Log {
         for (quantity, aliases) in wanted.iter_mut().skip(first).zip(&aliases) {
             quantity.aliases = aliases;
         }
-        let located = sheet.locate(&wanted, &ColumnMap::default())?;
+        let located = sheet.locate(&wanted, &ColumnMap::parse_among(map, &wanted)?)?;
         let samples = signals.samples(&sheet, &located)?;
         let mut faults = table_faults();
         let mut numbers = |name: &str| located.signal(name).map(|column| column.values(&sheet, &mut faults));

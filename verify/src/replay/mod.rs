@@ -9,10 +9,12 @@
 //!     └► his observation, his action ─► compare ─► explain
 //! ```
 
+mod chain;
 mod explain;
 mod log;
 mod text;
 mod values;
+mod variants;
 
 use interp::{Controller, Real, Trace};
 use policy::{Policy, Scalar};

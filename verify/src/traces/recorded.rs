@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use interp::Sample;
-use measured::{Cell, ColumnMap, Located, Options, Quantity, Sheet, Signal, table_faults};
+use measured::{Cell, ColumnMap, Located, Options, Quantity, Sheet, Signal, proposal, table_faults};
 use policy::Policy;
 use toml_input::{Faults, Message};
 
@@ -18,12 +18,12 @@ pub struct Recorded {
 }
 
 impl Recorded {
-    /// Reads a file.
+    /// Reads a file; `map` says where a column has another name than its signal: `v_out=CH1,i_l=CH2`.
     ///
     /// # Errors
-    /// A file that cannot be read, and those of [`Recorded::read`].
-    pub fn open(policy: &Policy, file: &Path) -> Result<Self, Faults> {
-        Self::read(policy, &Sheet::open(file, &Options::default())?)
+    /// A map or a file that cannot be read, and those of [`Recorded::read`].
+    pub fn open(policy: &Policy, file: &Path, map: &str) -> Result<Self, Faults> {
+        Self::read(policy, &Sheet::open(file, &Options::default())?, map)
     }
 
     /// Reads a table. Columns are found by the signals' names, or by other names of the same quantity; a unit behind
@@ -32,9 +32,10 @@ impl Recorded {
     ///
     /// # Errors
     /// A signal without column, two columns for one, cells that are no numbers.
-    pub fn read(policy: &Policy, sheet: &Sheet) -> Result<Self, Faults> {
+    pub fn read(policy: &Policy, sheet: &Sheet, map: &str) -> Result<Self, Faults> {
         let signals = SignalColumns::new(policy);
-        let located = sheet.locate(&signals.quantities(), &ColumnMap::default())?;
+        let quantities = signals.quantities();
+        let located = sheet.locate(&quantities, &ColumnMap::parse_among(map, &quantities)?)?;
         let steps = signals.samples(sheet, &located)?;
         Ok(Self {
             steps,
@@ -76,7 +77,9 @@ impl<'a> SignalColumns<'a> {
     pub fn samples(&self, sheet: &Sheet, located: &Located) -> Result<Vec<Vec<Sample>>, Faults> {
         let mut faults = table_faults();
         let mut columns = Vec::new();
-        for (signal, quantity) in self.policy.signals.iter().zip(&self.quantities()) {
+        let quantities = self.quantities();
+        let proposal = proposal(&sheet.guesses(located, &quantities));
+        for (signal, quantity) in self.policy.signals.iter().zip(&quantities) {
             match located.signal(&signal.name) {
                 Some(found) => columns.push((signal, found)),
                 None => {
@@ -84,7 +87,10 @@ impl<'a> SignalColumns<'a> {
                     let message = Message::new(format!("no column for the signal `{}`", signal.name))
                         .found(sheet.listed())
                         .expected(format!("a column {}", names.join(" or ")))
-                        .hint("columns are named as the signals of the policy");
+                        .hint(match &proposal {
+                            Some(map) => format!("say where it stands: {map}"),
+                            None => format!("say where it stands, --map {}=COLUMN", signal.name),
+                        });
                     faults.push(sheet.header_fault(message));
                 }
             }

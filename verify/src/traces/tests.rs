@@ -203,6 +203,7 @@ fn recorded(policy: &Policy, text: &str) -> Result<Recorded, toml_input::Faults>
     Recorded::read(
         policy,
         &measured::Sheet::parse(Path::new("trace.csv"), text.into(), &options)?,
+        "",
     )
 }
 

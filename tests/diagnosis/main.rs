@@ -147,7 +147,8 @@ fn the_extended_file_is_a_plant_for_simulate_train_and_drm_acquire() {
     write(
         "train.toml",
         &format!(
-            "plant = \"extended.toml\"\ncontract = \"{contract}\"\nsteps = 300\n[network]\nhidden = [8]\n[selection]\n\
+            "plant = \"extended.toml\"\ncontract = \"{contract}\"\nsteps = 300\n[network]\nhidden = [8]\n\
+             [reward]\nv_ref = 100.0\n[episode]\nloads = {{ values = [200, 500], range = [200, 500] }}\n[selection]\n\
              every = 300\nload_steps = [[200, 500]]\ninstants = 1\nsampling_instants = 1\nlead = 20\nafter = 20\ntail = 5\n\
              [evaluation]\nload_steps = [[200, 500]]\ninstants = 1\nsampling_instants = 1\nlead = 20\nafter = 20\ntail = 5\n"
         ),

@@ -244,7 +244,6 @@ const FAULTS: &[(&str, usize, &[&str])] = &[
     ),
     ("[selection]\nevery = 0", 5, &["1 to 1000000000"]),
     ("steps = 5", 4, &["not valid TOML", "duplicate key"]),
-    ("x = [1,", 4, &["not valid TOML"]),
 ];
 
 #[test]
@@ -258,6 +257,15 @@ fn every_fault_says_where_it_is_and_what_was_expected() {
         for part in parts.iter().copied().chain([place.as_str()]) {
             assert!(message.contains(part), "{text}\nlacks {part:?}:\n{message}");
         }
+    }
+}
+
+/// The end of the file is where a bracket is missed, so nothing may stand behind it.
+#[test]
+fn a_bracket_that_is_not_closed_is_shown_where_it_opens() {
+    let message = parse_alone(&format!("{LEAST}x = [1,\n")).unwrap_err();
+    for part in ["folder/train.toml:4:", "not valid TOML"] {
+        assert!(message.contains(part), "lacks {part:?}:\n{message}");
     }
 }
 

@@ -112,6 +112,7 @@ impl NativePolicy {
         generated: Option<PathBuf>,
         in_its_format: bool,
         traces: Vec<PathBuf>,
+        map: String,
         golden_decisions: Option<f64>,
     ) -> PyResult<(bool, String, String)> {
         let asked = Asked {
@@ -120,6 +121,7 @@ impl NativePolicy {
             seed,
             generated,
             traces,
+            map,
             golden_decisions,
         };
         let written = asked.generated.as_deref().filter(|_| in_its_format);
@@ -160,12 +162,14 @@ struct Asked<'a> {
     seed: u64,
     generated: Option<PathBuf>,
     traces: Vec<PathBuf>,
+    /// Where a column of a trace has another name than its signal: `v_out=CH1,i_l=CH2`.
+    map: String,
     golden_decisions: Option<f64>,
 }
 
 /// As the command does it: a folder that has drifted is not built.
 fn verified(policy: &Policy, asked: Asked<'_>) -> Result<(bool, String, String), Failure> {
-    let recorded = asked.traces.iter().map(|path| Recorded::open(policy, path));
+    let recorded = asked.traces.iter().map(|path| Recorded::open(policy, path, &asked.map));
     let recorded = recorded.collect::<Result<Vec<_>, _>>()?;
     let folder = asked.generated.as_deref().map(|folder| Folder::open(policy, folder));
     let folder = folder.transpose()?;

@@ -89,6 +89,18 @@ def test_verify_finds_all_builds_equal_and_says_so():
     assert found.checksum and "equal" in str(found).lower()
 
 
+def test_a_trace_with_other_columns_is_read_by_a_map(tmp_path):
+    policy = policyc.Policy.load("examples/buck12")
+    signals = [signal.name for signal in policy.inspect().signals]
+    rows = [",".join(f"CH{index}" for index, _ in enumerate(signals)), ",".join("1" for _ in signals)]
+    trace = tmp_path / "scope.csv"
+    trace.write_text("\n".join(rows) + "\n")
+    with pytest.raises(policyc.Faults, match=signals[0]):
+        policy.verify(steps=10, traces=[trace])
+    columns = {name: f"CH{index}" for index, name in enumerate(signals)}
+    assert policy.verify(steps=10, traces=[trace], map=columns).equal
+
+
 def test_verify_names_a_folder_that_has_drifted(tmp_path):
     policy = policyc.Policy.load("examples/buck12")
     for name, content in policy.compile(costs=False).items():

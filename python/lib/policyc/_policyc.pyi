@@ -79,6 +79,7 @@ class NativePolicy:
         generated: Optional[str],
         in_its_format: bool,
         traces: List[str],
+        map: str,
         golden_decisions: Optional[float],
     ) -> Tuple[bool, str, str]: ...
     def certify(

@@ -218,16 +218,21 @@ class Policy:
         seed: int = 1,
         generated: Optional[PathLike] = None,
         traces: Sequence[PathLike] = (),
+        map: Optional[Mapping[str, str]] = None,
         golden_decisions: Optional[float] = None,
     ) -> Verification:
         """Builds the generated code with every compiler at hand and compares `steps` control steps with the interpreter, bit by
-        bit. `generated` is a folder of code to verify in the place of code made anew, in that code's format unless `format`; `traces` are CSV files of measurements to
-        replay first. Raises :class:`Faults` if nothing could be compared; a difference is a result, not an error.
+        bit.
+
+        `generated` is a folder of code to verify in the place of code made anew, in that code's format unless `format`. `traces`
+        are CSV files of measurements to replay first; `map` says which column of theirs a signal is: ``{"v_out": "CH1"}``. Raises
+        :class:`Faults` if nothing could be compared; a difference is a result, not an error.
         """
         generated = None if generated is None else os.fspath(generated)
         paths = [os.fspath(path) for path in traces]
+        columns = ",".join(f"{signal}={column}" for signal, column in (map or {}).items())
         native = self._in(format)
-        equal, report, text = native.verify(target, steps, seed, generated, format is None, paths, golden_decisions)
+        equal, report, text = native.verify(target, steps, seed, generated, format is None, paths, columns, golden_decisions)
         data = json.loads(report)
         found = data["report"] or {}
         return Verification(equal, found.get("builds", []), found.get("checksum"), data, text)

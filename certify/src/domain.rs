@@ -411,6 +411,17 @@ fn described(policy: &Policy, input: Input) -> (String, String, Interval) {
             let mut chosen = policy.head.duties().into_iter();
             ("previous_duty".to_owned(), String::new(), duties(&mut chosen))
         }
+        Input::Estimate(index, estimate) => {
+            let range = policy.observers.get(index).map(|observer| observer.range(estimate));
+            let range = range.unwrap_or(Interval { low: 0.0, high: 0.0 });
+            let name = input.name(&policy.signals, &policy.observers);
+            // the clamp holds its ends rounded to the format, which may be to either side
+            let rounded = Interval {
+                low: f64::from(range.low as f32).min(range.low),
+                high: f64::from(range.high as f32).max(range.high),
+            };
+            (name, estimate.unit().to_owned(), rounded)
+        }
         Input::PreviousCommand => {
             let limits = policy.limits.duty;
             let mut ends = [limits.low, limits.high].into_iter();

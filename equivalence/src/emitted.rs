@@ -95,7 +95,7 @@ pub(crate) fn state_record(spec: Spec<'_>, state: &State) -> Value {
         ("bad_count".to_owned(), value(state.bad_count, U32)),
         ("primed".to_owned(), value(state.primed, U32)),
     ]);
-    let memory: Vec<&Term> = state.memories.iter().flatten().flatten().collect();
+    let memory: Vec<&Term> = state.memory().collect();
     if !memory.is_empty() {
         members.insert("memory".to_owned(), list(memory));
     }
@@ -128,7 +128,7 @@ pub(crate) fn state_of(value: &Value, like: &State) -> Result<State, Wrong> {
     };
     let mut state = like.clone();
     state.held = terms_of(member("held")?)?;
-    for word in state.memories.iter_mut().flatten().flatten() {
+    for word in state.memory_mut() {
         *word = words.next().ok_or("too few words of memory")?;
     }
     state.previous_duty = term("previous_duty")?;

@@ -178,7 +178,7 @@ type Group = (&'static str, &'static str, Vec<Pair>);
 
 fn state_groups(spec: Spec<'_>, emitted: &State, specified: &State) -> Vec<Group> {
     let float = Kind::Float(spec.float.format);
-    let memories = |state: &State| -> Vec<Term> { state.memories.iter().flatten().flatten().copied().collect() };
+    let memories = |state: &State| -> Vec<Term> { state.memory().copied().collect() };
     let caps = emitted.soft_cap.zip(specified.soft_cap);
     let all = [
         (
@@ -188,7 +188,7 @@ fn state_groups(spec: Spec<'_>, emitted: &State, specified: &State) -> Vec<Group
         ),
         (
             "memory",
-            "the pushed words of every filter, or +0",
+            "the pushed words of every observer and filter, or +0",
             list("memory", &memories(emitted), &memories(specified), float),
         ),
         (

@@ -12,6 +12,7 @@ use crate::limits::Limits;
 use crate::mapping::Mapping;
 use crate::names::state_names;
 use crate::network::Layer;
+use crate::observer::{Measured, Observer};
 use crate::real::Real;
 use crate::sanitise::{InputError, Sample, Signal};
 use crate::sound::Sound;
@@ -24,6 +25,7 @@ use crate::trace::{Command, FeatureTrace, LayerTrace, Trace};
 pub struct Controller<T> {
     // what never changes is shared between clones: a thousand of them side by side would not fit into a cache
     signals: Arc<[Signal<T>]>,
+    observers: Arc<[Observer<T>]>,
     features: Arc<[Feature<T>]>,
     network: Arc<Network<T>>,
     head: Arc<Head<T>>,
@@ -42,6 +44,12 @@ impl<T: Real> Controller<T> {
     /// Rounds the policy's constants to the format and initialises the state (section 1).
     pub fn new(policy: &Policy) -> Self {
         let mut words = 0;
+        let observers = policy.observers.iter().map(|observer| {
+            let start = words;
+            words += observer.words();
+            Observer::new(observer, policy.sample_period, start)
+        });
+        let observers: Vec<Observer<T>> = observers.collect();
         let features: Vec<Feature<T>> = policy
             .features
             .iter()
@@ -69,6 +77,7 @@ impl<T: Real> Controller<T> {
         Self {
             state_names: state_names(policy, &features, &state).into(),
             signals: signals.into(),
+            observers: observers.into(),
             features: features.into(),
             network: Network::new(policy).into(),
             head: Head::new(policy).into(),
@@ -257,6 +266,7 @@ impl<T: Real> Controller<T> {
             usable: false,
             sound: false,
             primed: false,
+            estimates: vec![[T::ZERO; 3]; self.observers.len()],
             features: self
                 .features
                 .iter()
@@ -310,8 +320,18 @@ impl<T: Real> Controller<T> {
         trace.sound = self.sound.holds(state);
         trace.usable = trace.sound && (trace.all_valid || (trace.primed && !trace.expired));
 
+        let measured = Measured {
+            signals: &trace.signals,
+            valid: &trace.valid,
+            primed: trace.primed,
+            previous_command: state.previous_command,
+        };
+        for (observer, estimates) in self.observers.iter().zip(&mut trace.estimates) {
+            *estimates = observer.estimates(measured, &state.memory);
+        }
         let inputs = Inputs {
             signals: &trace.signals,
+            estimates: &trace.estimates,
             previous_duty: state.previous_duty,
             previous_command: state.previous_command,
         };
@@ -387,6 +407,9 @@ impl<T: Real> Controller<T> {
     fn absorb(&mut self, trace: &Trace<T>, command: &Command<T>) {
         let state = &mut self.state;
         state.held.copy_from_slice(&trace.signals);
+        for (observer, estimates) in self.observers.iter().zip(&trace.estimates) {
+            observer.push(&mut state.memory, &trace.signals, *estimates);
+        }
         for (feature, feature_trace) in self.features.iter().zip(&trace.features) {
             feature.push(&mut state.memory, trace.primed, feature_trace);
         }

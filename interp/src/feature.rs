@@ -10,6 +10,7 @@ use crate::trace::FeatureTrace;
 #[derive(Clone, Copy)]
 pub(crate) struct Inputs<'a, T> {
     pub signals: &'a [T],
+    pub estimates: &'a [[T; 3]],
     pub previous_duty: T,
     pub previous_command: T,
 }
@@ -43,6 +44,7 @@ impl<T: Real> Source<T> {
     fn value(&self, inputs: Inputs<'_, T>) -> T {
         match self {
             Self::Input(Input::Signal(index)) => inputs.signals[*index],
+            Self::Input(Input::Estimate(index, estimate)) => inputs.estimates[*index][*estimate as usize],
             Self::Input(Input::PreviousDuty) => inputs.previous_duty,
             Self::Input(Input::PreviousCommand) => inputs.previous_command,
             Self::Constant(value) => *value,
@@ -165,6 +167,7 @@ mod tests {
         feature.filter(
             Inputs {
                 signals,
+                estimates: &[],
                 previous_duty: 0.25,
                 previous_command: 0.75,
             },

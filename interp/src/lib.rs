@@ -40,6 +40,7 @@ mod limits;
 mod mapping;
 mod names;
 mod network;
+mod observer;
 mod real;
 mod sanitise;
 mod sound;

@@ -1,6 +1,6 @@
 //! Whether a state is one that the controller can have written (contract section 1).
 
-use policy::{Expr, Input, Policy};
+use policy::{Input, Policy};
 
 use crate::controller::Controller;
 use crate::head::Head;
@@ -25,7 +25,6 @@ pub(crate) struct Sound<T> {
 
 impl<T: Real> Sound<T> {
     pub fn new(policy: &Policy) -> Self {
-        let read = |input: Input| policy.features.iter().any(|feature| reads(&feature.source, input));
         // reset and fallback write these two without a limiter, and a contract may put them outside of the limits
         let start = [policy.limits.initial_duty, policy.fallback.duty].map(T::nearest);
         let limits = Range::inwards(policy.limits.duty);
@@ -39,8 +38,8 @@ impl<T: Real> Sound<T> {
                 .collect(),
             memory: policy::memory_bounds(policy).into_iter().map(T::nearest).collect(),
             // a flip in what nothing reads decides no duty: asked, it would only stop a controller that works
-            previous_duty: read(Input::PreviousDuty).then(|| hull(start.into_iter().chain(duties))),
-            previous_command: (read(Input::PreviousCommand) || slewed)
+            previous_duty: policy.reads(Input::PreviousDuty).then(|| hull(start.into_iter().chain(duties))),
+            previous_command: (policy.reads(Input::PreviousCommand) || slewed)
                 .then(|| hull(start.into_iter().chain([limits.lo, limits.hi]))),
             soft_cap: (policy.limits.soft_start).map(|soft| hull([T::nearest(soft.from), limits.hi].into_iter())),
             hold: policy.fallback.hold,
@@ -83,15 +82,6 @@ impl<T: Real> Controller<T> {
     pub fn sound_ends(&self) -> Vec<Option<(T, T)>> {
         let ends = self.sound.ends(self.state(), self.mapping.as_ref()).into_iter();
         ends.map(|range| range.map(|range| (range.lo, range.hi))).collect()
-    }
-}
-
-fn reads(expr: &Expr, input: Input) -> bool {
-    match expr {
-        Expr::Input(own) => *own == input,
-        Expr::Constant(_) => false,
-        Expr::Neg(x) | Expr::Scale(_, x) => reads(x, input),
-        Expr::Add(x, y) | Expr::Sub(x, y) => reads(x, input) || reads(y, input),
     }
 }
 

@@ -13,9 +13,13 @@
 //! In: a checked policy, part by part. Out: a [`Box32`] or the magnitude that is too large. The invariant: every box
 //! has finite ends of at most [`MAX_MAGNITUDE`]; what the controller computes from any history of samples lies within.
 
+mod observer;
+
+pub(crate) use observer::observer;
+
 use crate::activation::{Activation, Shape};
 use crate::limits::MAX_MAGNITUDE;
-use crate::model::{Expr, Fallback, Filter, Input, Interval, Limits, Signal};
+use crate::model::{Estimate, Expr, Fallback, Filter, Input, Interval, Limits, Observer, Signal};
 use crate::rounding::{inward_f32, nearest_f32};
 
 /// Closed interval of binary32 values.
@@ -135,11 +139,18 @@ pub(crate) struct Inputs {
     signals: Vec<Box32>,
     previous_duty: Box32,
     previous_command: Box32,
+    estimates: Vec<[Box32; 3]>,
 }
 
 impl Inputs {
     /// Ranges after the sanitiser: signals inwards-rounded, remembered duties the hull of all they can be.
-    pub fn new(signals: &[Signal], duties: &[f64], limits: &Limits, fallback: &Fallback) -> Self {
+    pub fn new(
+        signals: &[Signal],
+        observers: &[Observer],
+        duties: &[f64],
+        limits: &Limits,
+        fallback: &Fallback,
+    ) -> Self {
         let inward = |interval| {
             // never 0: `interval_f32` has refused what holds no binary32 number
             let (low, high) = inward_f32(interval).unwrap_or((0.0, 0.0));
@@ -152,11 +163,22 @@ impl Inputs {
             signals: signals.iter().map(|signal| inward(signal.range)).collect(),
             previous_duty: duties.iter().fold(start, |hull, duty| hull.hull(nearest_f32(*duty))),
             previous_command: start.hull(limit.low).hull(limit.high),
+            // the last thing that a step does with an estimate is the clamp
+            estimates: observers
+                .iter()
+                .map(|observer| Estimate::ALL.map(|estimate| Box32::nearest(observer.range(estimate))))
+                .collect(),
         }
     }
 
     pub fn signal(&self, index: usize) -> Option<Box32> {
         self.signals.get(index).copied()
+    }
+
+    fn estimate(&self, index: usize, estimate: Estimate) -> Option<Box32> {
+        let ranges = self.estimates.get(index)?;
+        let own = Estimate::ALL.iter().position(|each| *each == estimate)?;
+        ranges.get(own).copied()
     }
 }
 
@@ -167,6 +189,9 @@ pub(crate) fn expression(expr: &Expr, inputs: &Inputs) -> Bounded {
         Expr::Input(Input::Signal(index)) => inputs.signal(*index).ok_or(Overflow(f64::INFINITY)),
         Expr::Input(Input::PreviousDuty) => Ok(inputs.previous_duty),
         Expr::Input(Input::PreviousCommand) => Ok(inputs.previous_command),
+        Expr::Input(Input::Estimate(index, estimate)) => {
+            inputs.estimate(*index, *estimate).ok_or(Overflow(f64::INFINITY))
+        }
         Expr::Constant(value) => Ok(Box32::point(nearest_f32(*value))),
         Expr::Neg(e) => expression(e, inputs).map(|x| Box32 {
             low: -x.high,

@@ -14,7 +14,7 @@ use toml_input::{Sink, Table};
 
 use crate::bounds::{self, Inputs, Overflow};
 use crate::catalogue;
-use crate::contract::{actions, features, head, mapping, network, protection, signals};
+use crate::contract::{actions, features, head, mapping, network, observers, protection, signals};
 use crate::digests;
 use crate::faults::Faults;
 use crate::limits::MAX_FEATURES;
@@ -43,8 +43,14 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     let mut taken = Vec::new();
     let head = head::read(&mut root, &mut taken, faults);
     let signals = signals::read(&mut root, &mut taken, faults);
+    let around = observers::Surroundings {
+        names: &signals.names,
+        signals: &signals.list,
+    };
+    let observers = observers::read(&mut root, &around, &mut taken, faults);
     let around = features::Surroundings {
         signals: &signals.names,
+        estimates: &observers.estimates,
         parameters: &head.parameters,
         period: head.sample_period,
     };
@@ -66,12 +72,17 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
         .zip(raw.weights.as_ref())
         .and_then(|(n, file)| weights::read(file, n, sizes, faults));
     let signals: Option<Vec<Signal>> = signals.list.into_iter().collect();
-    let inputs = match (&signals, &limits, &fallback) {
-        (Some(signals), Some(limits), Some(fallback)) => Some(Inputs::new(signals, &duties, limits, fallback)),
+    let whole = observers.whole();
+    let inputs = match (&signals, &whole, &limits, &fallback) {
+        (Some(signals), Some(whole), Some(limits), Some(fallback)) => {
+            Some(Inputs::new(signals, whole, &duties, limits, fallback))
+        }
         _ => None,
     };
     let bounded = match (&inputs, head.sample_period) {
-        (Some(inputs), Some(period)) => features::bounded(features.list, inputs, period, faults),
+        (Some(inputs), Some(period)) if observers::bounded(&observers, inputs, period, faults) => {
+            features::bounded(features.list, inputs, period, faults)
+        }
         _ => Vec::new(),
     };
     // a layer has to know every input: bounds of the others would be another network's
@@ -90,6 +101,7 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     notes.extend(unused(
         &head.parameters,
         signals.as_deref().unwrap_or_default(),
+        whole.as_deref().unwrap_or_default(),
         known,
         mapping.as_ref().and_then(Option::as_ref),
     ));
@@ -107,6 +119,7 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
         numeric_format: head.numeric_format,
         parameters: head.parameters,
         signals: signals?,
+        observers: whole?,
         features: complete.then_some(bounded)?,
         layers,
         head: actions.head,

@@ -12,7 +12,7 @@ use sha2::{Digest, Sha256};
 use crate::activation::Activation;
 use crate::model::{
     Action, Continuous, Digests, Expr, Fallback, Feature, Filter, Interval, Layer, Limits, Mapping, NumericFormat,
-    Policy, Signal,
+    Observer, Policy, Signal,
 };
 
 #[derive(Serialize)]
@@ -24,6 +24,8 @@ struct Contract<'a> {
     // ordered by name: the order of the keys in the file does not count
     parameters: &'a BTreeMap<String, f64>,
     signals: &'a [Signal],
+    #[serde(skip_serializing_if = "<[Observer]>::is_empty")]
+    observers: &'a [Observer],
     features: Vec<Observed<'a>>,
     activations: Vec<Activation>,
     actions: &'a [Action],
@@ -90,6 +92,7 @@ pub(crate) fn of(policy: &Policy) -> Digests {
         numeric_format: policy.numeric_format,
         parameters: &policy.parameters,
         signals: &policy.signals,
+        observers: &policy.observers,
         features: policy.features.iter().map(Observed::of).collect(),
         activations: policy.layers.iter().map(|layer| layer.activation).collect(),
         actions: policy.actions(),

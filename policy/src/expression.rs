@@ -22,6 +22,8 @@ use crate::names::REMEMBERED;
 /// Names an expression may use.
 pub(crate) struct Scope<'a> {
     pub signals: &'a [String],
+    /// What observers estimate.
+    pub estimates: &'a [(String, Input)],
     pub parameters: &'a BTreeMap<String, f64>,
 }
 
@@ -326,6 +328,9 @@ impl Parser<'_> {
         if let Some(index) = self.scope.signals.iter().position(|signal| signal == name) {
             return input(Input::Signal(index));
         }
+        if let Some((_, estimate)) = self.scope.estimates.iter().find(|(called, _)| called == name) {
+            return input(*estimate);
+        }
         if let Some(value) = self.scope.parameters.get(name) {
             return Ok(Value::Known(*value));
         }
@@ -337,7 +342,8 @@ impl Parser<'_> {
                 message.hint("delays, differences and averages go into `filters`"),
             ));
         }
-        let known = self.scope.signals.iter().chain(self.scope.parameters.keys());
+        let estimates = self.scope.estimates.iter().map(|(name, _)| name);
+        let known = self.scope.signals.iter().chain(estimates).chain(self.scope.parameters.keys());
         let known: Vec<&str> = known.map(String::as_str).chain(REMEMBERED).collect();
         Err((
             span.clone(),

@@ -26,6 +26,7 @@ mod memory;
 pub mod model;
 mod names;
 mod notes;
+mod observer;
 mod raw;
 mod resized;
 pub mod rounding;

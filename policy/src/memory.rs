@@ -3,7 +3,7 @@
 //! A check at run time compares with these bounds, so they must never be too small. They may be larger than what a filter
 //! holds: magnitudes are added where intervals would cancel, which is sound in binary64 as well as in binary32.
 
-use crate::model::{Expr, Filter, Input, Policy};
+use crate::model::{Estimate, Expr, Filter, Input, Interval, Observer, Policy};
 
 /// More than what one operation can round up by, in either format.
 // 16 unit roundoffs of binary32
@@ -17,7 +17,7 @@ const UNIT: f64 = 1.0 / 16_777_216.0;
 /// Bound of the magnitude of every word, in the order of the state.
 #[must_use]
 pub fn memory_bounds(policy: &Policy) -> Vec<f64> {
-    let mut words = Vec::new();
+    let mut words: Vec<f64> = policy.observers.iter().flat_map(|own| observed(own, policy)).collect();
     for feature in &policy.features {
         let mut x = source(&feature.source, policy);
         for filter in &feature.filters {
@@ -25,6 +25,15 @@ pub fn memory_bounds(policy: &Policy) -> Vec<f64> {
         }
     }
     words
+}
+
+/// Words of an observer: its estimates behind their clamps, and the signals that it keeps.
+fn observed(observer: &Observer, policy: &Policy) -> Vec<f64> {
+    let magnitude = |range: Interval| range.low.abs().max(range.high.abs());
+    // the ends of a clamp are rounded to nearest
+    let estimates = Estimate::ALL.map(|estimate| magnitude(observer.range(estimate)) * GROWTH);
+    let kept = observer.remembered().map(|index| source(&Expr::Input(Input::Signal(index)), policy));
+    estimates.into_iter().chain(kept).collect()
 }
 
 fn source(expr: &Expr, policy: &Policy) -> f64 {
@@ -36,6 +45,10 @@ fn source(expr: &Expr, policy: &Policy) -> f64 {
         }
         // duties are within 0..1, those of a continuous head in either arithmetic: `contract::continuous` has seen to it
         Expr::Input(Input::PreviousDuty | Input::PreviousCommand) => 1.0,
+        Expr::Input(Input::Estimate(index, estimate)) => {
+            let range = policy.observers.get(*index).map(|observer| observer.range(*estimate));
+            range.map_or(0.0, |range| range.low.abs().max(range.high.abs()) * GROWTH)
+        }
         Expr::Constant(value) => value.abs() * GROWTH,
         Expr::Neg(x) => source(x, policy),
         Expr::Add(x, y) | Expr::Sub(x, y) => (source(x, policy) + source(y, policy)) * GROWTH,

@@ -11,6 +11,7 @@ use serde::Serialize;
 use crate::activation::Activation;
 pub use crate::head::{Action, Continuous, Head, Pair, Squash};
 pub use crate::interval::Interval;
+pub use crate::observer::{Estimate, Gains, InputVoltage, Observer};
 
 /// Number format in which the whole controller computes (`docs/reference/numeric-contract.md`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -118,6 +119,8 @@ pub struct Policy {
     pub parameters: BTreeMap<String, f64>,
     /// Measured signals in the order of the measurement struct.
     pub signals: Vec<Signal>,
+    /// Models of the converter that run beside it; their estimates stand beside the signals in sources.
+    pub observers: Vec<Observer>,
     /// Observation in network input order.
     pub features: Vec<Feature>,
     /// Dense layers, first to last; `layers[0].inputs == features.len()`.
@@ -145,6 +148,17 @@ impl Policy {
     #[must_use]
     pub fn outputs(&self) -> usize {
         self.head.outputs()
+    }
+
+    /// Whether a feature's source or an observer reads this.
+    #[must_use]
+    pub fn reads(&self, input: Input) -> bool {
+        let observed = |observer: &Observer| match input {
+            Input::PreviousCommand => true,
+            Input::Signal(index) => observer.signals().any(|own| own == index),
+            Input::PreviousDuty | Input::Estimate(..) => false,
+        };
+        self.features.iter().any(|feature| feature.source.reads(input)) || self.observers.iter().any(observed)
     }
 
     /// The discrete actions; none where the head is continuous.
@@ -215,6 +229,24 @@ pub enum Input {
     PreviousDuty,
     /// Duty that last left the controller.
     PreviousCommand,
+    /// Estimate of an observer by index into [`Policy::observers`].
+    Estimate(usize, Estimate),
+}
+
+impl Input {
+    /// How messages and reports call it.
+    #[must_use]
+    pub fn name(self, signals: &[Signal], observers: &[Observer]) -> String {
+        match self {
+            Input::Signal(index) => signals.get(index).map_or("?", |signal| &signal.name).to_owned(),
+            Input::PreviousDuty => "previous_duty".to_owned(),
+            Input::PreviousCommand => "previous_command".to_owned(),
+            Input::Estimate(index, estimate) => {
+                let observer = observers.get(index).map_or("?", |observer| &observer.name);
+                format!("{observer}_{}", estimate.word())
+            }
+        }
+    }
 }
 
 /// Affine expression with constants folded (contract section 3); evaluated exactly as the tree stands.
@@ -232,6 +264,19 @@ pub enum Expr {
     Sub(Box<Expr>, Box<Expr>),
     /// Rounded product with a constant other than 1.
     Scale(f64, Box<Expr>),
+}
+
+impl Expr {
+    /// Whether it has this input anywhere.
+    #[must_use]
+    pub fn reads(&self, input: Input) -> bool {
+        match self {
+            Expr::Input(own) => *own == input,
+            Expr::Constant(_) => false,
+            Expr::Neg(x) | Expr::Scale(_, x) => x.reads(input),
+            Expr::Add(x, y) | Expr::Sub(x, y) => x.reads(input) || y.reads(input),
+        }
+    }
 }
 
 /// Discrete-time filter (contract section 4).

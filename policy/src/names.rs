@@ -64,6 +64,8 @@ pub(crate) enum Kind {
     Signal,
     Parameter,
     Feature,
+    Observer,
+    Estimate,
 }
 
 impl Kind {
@@ -73,6 +75,8 @@ impl Kind {
             Kind::Signal => "signal",
             Kind::Parameter => "parameter",
             Kind::Feature => "feature",
+            Kind::Observer => "observer",
+            Kind::Estimate => "estimate",
         }
     }
 }

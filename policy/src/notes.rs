@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::model::{Expr, Feature, Golden, Input, Limits, Mapping, Signal};
+use crate::model::{Estimate, Feature, Golden, Input, Limits, Mapping, Observer, Signal};
 
 /// Golden observations that the controller never sees, because the training left the range of a signal.
 pub fn left_out(golden: &Golden) -> Option<String> {
@@ -37,7 +37,10 @@ fn unlike_any_action(limits: &Limits, duties: &[f64], features: &[Feature]) -> O
     let (low, high) = (duties.iter()).fold((1.0_f64, 0.0_f64), |(low, high), duty| {
         (low.min(*duty), high.max(*duty))
     });
-    let is_read = features.iter().any(|feature| reads_duty(&feature.source));
+    let duties = [Input::PreviousDuty, Input::PreviousCommand];
+    let is_read = features
+        .iter()
+        .any(|feature| duties.iter().any(|duty| feature.source.reads(*duty)));
     (is_read && !(low..=high).contains(&first)).then(|| {
         format!(
             "the first observation has the duty {first}, which lies outside of all actions, {low} to {high}: the duty before the \
@@ -46,19 +49,11 @@ fn unlike_any_action(limits: &Limits, duties: &[f64], features: &[Feature]) -> O
     })
 }
 
-fn reads_duty(expr: &Expr) -> bool {
-    match expr {
-        Expr::Input(input) => matches!(input, Input::PreviousDuty | Input::PreviousCommand),
-        Expr::Constant(_) => false,
-        Expr::Neg(e) | Expr::Scale(_, e) => reads_duty(e),
-        Expr::Add(a, b) | Expr::Sub(a, b) => reads_duty(a) || reads_duty(b),
-    }
-}
-
 /// Signals and parameters that nothing refers to.
 pub(crate) fn unused(
     parameters: &BTreeMap<String, f64>,
     signals: &[Signal],
+    observers: &[Observer],
     features: &[Feature],
     mapping: Option<&Mapping>,
 ) -> Vec<String> {
@@ -68,7 +63,8 @@ pub(crate) fn unused(
         return notes;
     }
     let read = |index: usize| {
-        features.iter().any(|feature| reads(&feature.source, index))
+        features.iter().any(|feature| feature.source.reads(Input::Signal(index)))
+            || observers.iter().any(|observer| observer.signals().any(|own| own == index))
             || mapping.is_some_and(|mapping| mapping.load_current == index)
     };
     let idle = signals.iter().enumerate().filter(|(index, _)| !read(*index));
@@ -86,17 +82,15 @@ pub(crate) fn unused(
     let idle = parameters
         .keys()
         .filter(|name| !features.iter().any(|feature| word(&feature.source_text, name)));
+    let estimate = |index: usize, each| features.iter().any(|own| own.source.reads(Input::Estimate(index, each)));
+    let blind = observers
+        .iter()
+        .enumerate()
+        .filter(|(index, _)| !Estimate::ALL.iter().any(|each| estimate(*index, *each)));
+    let blind = blind.map(|(_, observer)| format!("no feature reads an estimate of observer `{}`", observer.name));
+    notes.extend(blind.collect::<Vec<_>>());
     notes.extend(idle.map(|name| format!("parameter `{name}` is not used")));
     notes
-}
-
-fn reads(expr: &Expr, index: usize) -> bool {
-    match expr {
-        Expr::Input(Input::Signal(found)) => *found == index,
-        Expr::Input(_) | Expr::Constant(_) => false,
-        Expr::Neg(e) | Expr::Scale(_, e) => reads(e, index),
-        Expr::Add(a, b) | Expr::Sub(a, b) => reads(a, index) || reads(b, index),
-    }
 }
 
 /// Actions outside the range of the mapping, and mapped duties that the limits cut off.

@@ -22,7 +22,7 @@ fn the_buck12_example_loads_without_complaint() {
     let formulas: Vec<_> = policy
         .features
         .iter()
-        .map(|f| policy::describe::formula(f, &policy.signals))
+        .map(|f| policy::describe::formula(f, &policy))
         .collect();
     assert_eq!(formulas[0], "e = clip(0.2 * (v_ref - v_out), -20, 20)");
     assert_eq!(formulas[1], "e_del = clip(0.2 * delay1(v_ref - v_out), -20, 20)");
@@ -133,10 +133,10 @@ fn signals_and_parameters_without_use_are_noted() {
 fn formulas_show_filters_scale_and_offset() {
     let filters = "filters = [{ delay = 2 }, { moving_average = 4 }]\nscale = 2\noffset = -1.5";
     let policy = Folder::new().replace("filters = [{ delay = 1 }]", filters).policy();
-    let formula = policy::describe::formula(&policy.features[1], &policy.signals);
+    let formula = policy::describe::formula(&policy.features[1], &policy);
     assert_eq!(formula, "e_del = 2 * average4(delay2(v_ref - v_out)) - 1.5");
     assert_eq!(
-        policy::describe::expression(&policy.features[1].source, &policy.signals),
+        policy::describe::expression(&policy.features[1].source, &policy),
         "100 - v_out"
     );
 }

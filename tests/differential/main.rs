@@ -130,6 +130,13 @@ fn random_policies_reach_every_status_bit_and_every_kind() {
         "[mapping]",
         "previous_duty",
         "previous_command",
+        "[[observer]]",
+        "compute_delay = 0",
+        "compute_delay = 1",
+        "input_voltage = \"s",
+        "o0_current",
+        "o0_voltage",
+        "o0_bias",
     ] {
         assert!(all.contains(word), "no random policy has {word}");
     }

@@ -221,6 +221,13 @@ fn together_the_cases_hold_every_part_of_a_contract() {
         "clip: None",
         "PreviousDuty",
         "PreviousCommand",
+        "Estimate(0, Current)",
+        "Estimate(0, Voltage)",
+        "Estimate(1, Bias)",
+        "input_voltage: Constant(",
+        "input_voltage: Signal(",
+        "compute_delay: 0",
+        "compute_delay: 1",
     ];
     let missing: Vec<_> = parts.iter().filter(|part| !shown.contains(**part)).collect();
     assert!(missing.is_empty(), "{missing:?}\n{shown}");

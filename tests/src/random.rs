@@ -72,10 +72,8 @@ pub fn files(seed: u64) -> Result<Files, SafeTensorError> {
 }
 
 fn contract(rng: &mut SplitMix, seed: u64, [features, actions, hidden]: [usize; 3], head: Option<&str>) -> String {
-    let mut text = format!(
-        "name = \"random{seed}\"\nsample_period = {:?}\n\n",
-        rng.uniform(1e-5, 1e-3)
-    );
+    let period = rng.uniform(1e-5, 1e-3);
+    let mut text = format!("name = \"random{seed}\"\nsample_period = {period:?}\n\n");
     let signals = 1 + rng.below(5);
     let _ = writeln!(
         text,
@@ -97,8 +95,17 @@ fn contract(rng: &mut SplitMix, seed: u64, [features, actions, hidden]: [usize; 
             let _ = writeln!(text, "range = [{low:?}, {:?}]\n", low + rng.uniform(1.0, 200.0));
         }
     }
+    // from a stream of its own, as the heads are
+    let mut beside = SplitMix::new(seed ^ OBSERVER);
+    let observers = if beside.one_in(3) { 1 + beside.below(2) } else { 0 };
+    for index in 0..observers {
+        observer(&mut text, &mut beside, index, signals, period);
+    }
     for index in 0..features {
-        feature(&mut text, rng, index, signals);
+        // drawn in any case, so that the rest of the policy stays what it was
+        let source = source(rng, signals);
+        let observed = (observers > 0 && !beside.one_in(3)).then(|| estimate(&mut beside, observers, signals));
+        feature(&mut text, rng, index, &observed.unwrap_or(source));
     }
     let _ = writeln!(text, "[network]\nweights = \"weights.safetensors\"");
     let kinds = Activation::EACH;
@@ -112,9 +119,47 @@ fn contract(rng: &mut SplitMix, seed: u64, [features, actions, hidden]: [usize; 
     text
 }
 
-fn feature(text: &mut String, rng: &mut SplitMix, index: usize, signals: usize) {
+/// Bits in which the seed of the observers' stream differs from that of the rest.
+const OBSERVER: u64 = 0x6f62_7365_7276_6572;
+
+/// An observer of any form: diode and synchronous leg, delay 0 and 1, input voltage as a number and as a signal.
+fn observer(text: &mut String, rng: &mut SplitMix, index: usize, signals: usize, period: f64) {
+    let (inductance, capacitance) = (period * rng.uniform(1.0, 50.0), period * rng.uniform(0.05, 2.0));
+    let low = if rng.one_in(2) { 0.0 } else { rng.uniform(-20.0, -1.0) };
+    let source = match rng.one_in(2) {
+        true => format!("{:?}", rng.uniform(5.0, 200.0)),
+        false => format!("\"s{}\"", rng.below(signals)),
+    };
+    let _ = writeln!(
+        text,
+        "[[observer]]\nname = \"o{index}\"\ninductance = {inductance:?}\ncapacitance = {capacitance:?}\n\
+         input_voltage = {source}\noutput_voltage = \"s{}\"\nload_current = \"s{}\"\ncompute_delay = {}\n\
+         gains = {{ current = {:?}, voltage = {:?}, bias = {:?} }}\ncurrent = [{low:?}, {:?}]\nbias = [{:?}, {:?}]\n",
+        rng.below(signals),
+        rng.below(signals),
+        rng.below(2),
+        rng.uniform(0.0, 1.5),
+        rng.uniform(0.0, 0.9),
+        rng.uniform(-0.1, 0.3),
+        rng.uniform(1.0, 30.0),
+        rng.uniform(-8.0, -0.5),
+        rng.uniform(0.0, 8.0),
+    );
+}
+
+/// A source over estimates.
+fn estimate(rng: &mut SplitMix, observers: usize, signals: usize) -> String {
+    let e = |rng: &mut SplitMix| format!("o{}_{}", rng.below(observers), ["current", "voltage", "bias"][rng.below(3)]);
+    match rng.below(3) {
+        0 => e(rng),
+        1 => format!("{} - s{}", e(rng), rng.below(signals)),
+        _ => format!("0.5 * ({} - {}) + k1", e(rng), e(rng)),
+    }
+}
+
+fn source(rng: &mut SplitMix, signals: usize) -> String {
     let s = |rng: &mut SplitMix| format!("s{}", rng.below(signals));
-    let source = match rng.below(7) {
+    match rng.below(7) {
         0 => s(rng),
         1 => format!("k1 - {}", s(rng)),
         2 => format!("({} - {}) / k2", s(rng), s(rng)),
@@ -122,7 +167,10 @@ fn feature(text: &mut String, rng: &mut SplitMix, index: usize, signals: usize) 
         4 => "previous_duty".to_owned(),
         5 => format!("previous_command - 0.01 * {}", s(rng)),
         _ => format!("{} + k1 * k2 - 3 * {}", s(rng), s(rng)),
-    };
+    }
+}
+
+fn feature(text: &mut String, rng: &mut SplitMix, index: usize, source: &str) {
     let _ = writeln!(text, "[[feature]]\nname = \"x{index}\"\nsource = \"{source}\"");
     let filters: Vec<String> = (0..rng.below(3)).map(|_| filter(rng)).collect();
     if !filters.is_empty() {

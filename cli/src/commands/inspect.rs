@@ -49,6 +49,8 @@ struct View<'p> {
     sample_period: f64,
     numeric_format: policy::NumericFormat,
     signals: &'p [policy::Signal],
+    #[serde(skip_serializing_if = "<[policy::Observer]>::is_empty")]
+    observers: &'p [policy::Observer],
     features: &'p [policy::Feature],
     layers: Vec<LayerView<'p>>,
     actions: &'p [policy::Action],
@@ -80,6 +82,7 @@ fn view(policy: &Policy) -> View<'_> {
         sample_period: policy.sample_period,
         numeric_format: policy.numeric_format,
         signals: &policy.signals,
+        observers: &policy.observers,
         features: &policy.features,
         layers: policy
             .layers
@@ -107,7 +110,8 @@ fn view(policy: &Policy) -> View<'_> {
 
 /// The checked policy in words.
 pub fn text(policy: &Policy) -> String {
-    let mut out = describe::head(policy) + &describe::signals(policy) + &describe::observation(policy);
+    let mut out = describe::head(policy) + &describe::signals(policy);
+    out += &(describe::observers(policy) + &describe::observation(policy));
     out += &describe::network(policy);
     for line in golden(policy) {
         out += &format!("  {line}\n");

@@ -20,10 +20,15 @@ pub fn lower(policy: &Policy) -> (Front, usize) {
         scalar: policy.numeric_format.scalar(),
         block: Block::default(),
         signals: Vec::new(),
+        estimates: Vec::new(),
         pushes: Vec::new(),
         words: 0,
     };
-    let all_valid = builder.sanitise(policy);
+    let (valid, all_valid) = builder.sanitise(policy);
+    for observer in &policy.observers {
+        let estimates = builder.observer(observer, policy.sample_period, &valid);
+        builder.estimates.push(estimates);
+    }
     let mut clipped = Vec::new();
     let mut observation = Vec::new();
     for feature in &policy.features {
@@ -46,17 +51,19 @@ pub fn lower(policy: &Policy) -> (Front, usize) {
     (front, builder.words)
 }
 
-struct Builder {
+pub(super) struct Builder {
     scalar: Scalar,
-    block: Block,
-    signals: Vec<ValueId>,
-    pushes: Vec<Push>,
+    pub(super) block: Block,
+    pub(super) signals: Vec<ValueId>,
+    /// Of each observer.
+    estimates: Vec<[ValueId; 3]>,
+    pub(super) pushes: Vec<Push>,
     words: usize,
 }
 
 impl Builder {
-    /// Fills `signals`; returns the flag that all are valid.
-    fn sanitise(&mut self, policy: &Policy) -> ValueId {
+    /// Fills `signals`; returns the flags that each is valid, and that all are.
+    fn sanitise(&mut self, policy: &Policy) -> (Vec<ValueId>, ValueId) {
         let (scalar, block) = (self.scalar, &mut self.block);
         let mut flags = Vec::new();
         for (index, signal) in policy.signals.iter().enumerate() {
@@ -82,9 +89,9 @@ impl Builder {
             }));
             flags.push(valid);
         }
-        let all = flags.into_iter().reduce(|all, one| block.value(Op::And(all, one)));
+        let all = flags.iter().copied().reduce(|all, one| block.value(Op::And(all, one)));
         // a policy has at least one signal; without any, nothing could be invalid
-        all.unwrap_or_default()
+        (flags, all.unwrap_or_default())
     }
 
     /// Observation and, with a clip, what it changed.
@@ -117,6 +124,7 @@ impl Builder {
     fn expression(&mut self, expression: &Expr) -> ValueId {
         let op = match expression {
             Expr::Input(Input::Signal(index)) => return self.signals[*index],
+            Expr::Input(Input::Estimate(index, estimate)) => return self.estimates[*index][*estimate as usize],
             Expr::Input(Input::PreviousDuty) => Op::PreviousDuty,
             Expr::Input(Input::PreviousCommand) => Op::PreviousCommand,
             Expr::Constant(value) => Op::Constant(Literal::nearest(self.scalar, *value)),
@@ -206,17 +214,17 @@ impl Builder {
         y
     }
 
-    fn constant(&mut self, value: f64) -> ValueId {
+    pub(super) fn constant(&mut self, value: f64) -> ValueId {
         self.block.constant(Literal::nearest(self.scalar, value))
     }
 
-    fn scaled(&mut self, x: ValueId, by: f64) -> ValueId {
+    pub(super) fn scaled(&mut self, x: ValueId, by: f64) -> ValueId {
         // quotients of constants are made here, in binary64: a division would be another rounding, and slow
         let by = self.constant(by);
         self.block.value(Op::Mul(x, by))
     }
 
-    fn reserve(&mut self, length: usize) -> usize {
+    pub(super) fn reserve(&mut self, length: usize) -> usize {
         let word = self.words;
         self.words += length;
         word

@@ -1,6 +1,6 @@
 //! Contract section 1: what a sound state lies within.
 
-use policy::{Expr, Input, Policy, Scalar};
+use policy::{Input, Policy, Scalar};
 
 use super::head;
 use crate::program::{Guard, Guarded, Literal, Place, SignalPort, Within};
@@ -18,15 +18,14 @@ pub fn lower(policy: &Policy, signals: &[SignalPort]) -> Guard {
         .collect();
     numbers.extend(memories(policy, scalar));
     // what nothing reads decides no duty, and each comparison is paid in every step
-    let read = |input: Input| policy.features.iter().any(|feature| reads(&feature.source, input));
     // reset and fallback write these two without a limiter, and they may lie outside of the duty limits
     let start = [policy.limits.initial_duty, policy.fallback.duty].map(|duty| Literal::nearest(scalar, duty));
     let (min, max) = Literal::inward(scalar, policy.limits.duty);
-    if read(Input::PreviousDuty) {
+    if policy.reads(Input::PreviousDuty) {
         let duties = head::duties(policy);
         numbers.push(within(Place::PreviousDuty, hull(start.into_iter().chain(duties))));
     }
-    if read(Input::PreviousCommand) || policy.limits.slew.is_some() {
+    if policy.reads(Input::PreviousCommand) || policy.limits.slew.is_some() {
         let range = hull(start.into_iter().chain([min, max]));
         numbers.push(within(Place::PreviousCommand, range));
     }
@@ -57,15 +56,6 @@ fn memories(policy: &Policy, scalar: Scalar) -> Vec<Guarded> {
         within: Within::of(scalar, (Literal::nearest(scalar, -bound.value()), bound)),
     };
     runs.into_iter().map(guarded).collect()
-}
-
-fn reads(expr: &Expr, input: Input) -> bool {
-    match expr {
-        Expr::Input(own) => *own == input,
-        Expr::Constant(_) => false,
-        Expr::Neg(x) | Expr::Scale(_, x) => reads(x, input),
-        Expr::Add(x, y) | Expr::Sub(x, y) => reads(x, input) || reads(y, input),
-    }
 }
 
 /// From the smallest to the largest of some numbers.

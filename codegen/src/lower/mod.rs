@@ -8,6 +8,7 @@ mod integer;
 pub mod known_answers;
 mod loops;
 mod network;
+mod observer;
 mod real;
 pub mod simplify;
 mod state;
@@ -72,7 +73,7 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
             .map(|feature| {
                 (
                     feature.name.clone(),
-                    policy::describe::formula(feature, &policy.signals),
+                    policy::describe::formula(feature, policy),
                 )
             })
             .collect(),

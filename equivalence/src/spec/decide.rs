@@ -213,6 +213,7 @@ pub(crate) fn commit(spec: Spec<'_>, state: &State, sensed: &Sensed, duty: Term,
     let primed = terms.number(sensed.usable, 32);
     State {
         held: sensed.signals.clone(),
+        observers: sensed.observed.iter().map(kept).collect(),
         memories: sensed
             .pushed
             .iter()

@@ -6,6 +6,7 @@
 pub(crate) mod curves;
 mod decide;
 mod filter;
+mod observer;
 mod sense;
 mod state;
 pub(crate) mod tables;

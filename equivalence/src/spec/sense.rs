@@ -1,9 +1,9 @@
 //! Sections 2 to 5: from a measurement to the observation.
 
-use policy::{Expr, Input};
+use policy::{Estimate, Expr, Input};
 
 use super::filter::filter;
-use super::{Spec, State};
+use super::{Spec, State, observer};
 use crate::term::Term;
 
 /// What a step knows before the network runs.
@@ -17,6 +17,8 @@ pub(crate) struct Sensed {
     pub primed: Term,
     pub observation: Vec<Term>,
     pub clipped: Term,
+    /// The observers' words as `commit` leaves them in a sound state.
+    pub observed: Vec<Vec<Term>>,
     /// The filters' lines as `commit` leaves them in a sound state.
     pub pushed: Vec<Vec<Vec<Term>>>,
 }
@@ -67,16 +69,26 @@ pub(crate) fn sense(spec: Spec<'_>, state: &State, measurement: &[Term]) -> Sens
         primed,
         observation: Vec::new(),
         clipped: terms.truth(false),
+        observed: Vec::new(),
         pushed: Vec::new(),
     };
-    observe(spec, state, &mut sensed);
+    let measured = observer::Measured {
+        signals: &sensed.signals,
+        valid: &valid,
+        primed,
+    };
+    let observers = spec.policy.observers.iter().zip(&state.observers);
+    let observed = observers.map(|(each, words)| observer::observe(spec, each, words, state, &measured));
+    let (estimates, words) = observed.map(|each| (each.estimates, each.words)).unzip::<_, _, Vec<_>, _>();
+    sensed.observed = words;
+    observe(spec, state, &estimates, &mut sensed);
     sensed
 }
 
-fn observe(spec: Spec<'_>, state: &State, sensed: &mut Sensed) {
+fn observe(spec: Spec<'_>, state: &State, estimates: &[[Term; 3]], sensed: &mut Sensed) {
     let (terms, float) = (spec.terms, spec.float);
     for (feature, lines) in spec.policy.features.iter().zip(&state.memories) {
-        let mut y = source(spec, &feature.source, state, &sensed.signals);
+        let mut y = source(spec, &feature.source, state, &sensed.signals, estimates);
         let mut pushed = Vec::new();
         for (each, line) in feature.filters.iter().zip(lines) {
             let filtered = filter(spec, each, line, sensed.primed, y);
@@ -100,13 +112,21 @@ fn observe(spec: Spec<'_>, state: &State, sensed: &mut Sensed) {
 }
 
 /// Section 3: every `+`, `-` and product with a constant is one rounding, as the tree stands.
-fn source(spec: Spec<'_>, expr: &Expr, state: &State, signals: &[Term]) -> Term {
+fn source(spec: Spec<'_>, expr: &Expr, state: &State, signals: &[Term], estimates: &[[Term; 3]]) -> Term {
     let float = spec.float;
-    let of = |x: &Expr| source(spec, x, state, signals);
+    let of = |x: &Expr| source(spec, x, state, signals, estimates);
     match expr {
         Expr::Input(Input::Signal(index)) => signals[*index],
         Expr::Input(Input::PreviousDuty) => state.previous_duty,
         Expr::Input(Input::PreviousCommand) => state.previous_command,
+        Expr::Input(Input::Estimate(index, estimate)) => {
+            let [current, voltage, bias] = estimates[*index];
+            match estimate {
+                Estimate::Current => current,
+                Estimate::Voltage => voltage,
+                Estimate::Bias => bias,
+            }
+        }
         Expr::Constant(value) => spec.nearest(*value),
         Expr::Neg(x) => float.neg(of(x)),
         Expr::Add(x, y) => float.add(of(x), of(y)),

@@ -9,6 +9,8 @@ use crate::term::Term;
 #[derive(Clone)]
 pub(crate) struct State {
     pub held: Vec<Term>,
+    /// By observer: current, voltage, bias, then what it keeps of the last measurement.
+    pub observers: Vec<Vec<Term>>,
     /// By feature, then filter, then word: oldest first.
     pub memories: Vec<Vec<Vec<Term>>>,
     pub previous_duty: Term,
@@ -33,10 +35,15 @@ impl State {
             });
             filters.collect()
         });
+        let observers = spec.policy.observers.iter().enumerate().map(|(n, each)| {
+            let words = 0..super::observer::words(each);
+            words.map(|w| number(&format!("observer_{n}_{w}"))).collect()
+        });
         State {
             held: (0..spec.policy.signals.len())
                 .map(|s| number(&format!("held_{s}")))
                 .collect(),
+            observers: observers.collect(),
             memories: memories.collect(),
             previous_duty: number("previous_duty"),
             previous_command: number("previous_command"),
@@ -49,6 +56,17 @@ impl State {
             bad_count: spec.terms.input("bad_count", 32),
             primed: spec.terms.input("primed", 32),
         }
+    }
+
+    /// All words of the memories, in the order of section 1.
+    pub(crate) fn memory(&self) -> impl Iterator<Item = &Term> {
+        self.observers.iter().flatten().chain(self.memories.iter().flatten().flatten())
+    }
+
+    /// The same, to be filled in.
+    pub(crate) fn memory_mut(&mut self) -> impl Iterator<Item = &mut Term> {
+        let filters = self.memories.iter_mut().flatten().flatten();
+        self.observers.iter_mut().flatten().chain(filters)
     }
 
     /// The lowest bit of the word (section 2).
@@ -65,8 +83,7 @@ impl State {
             let (low, high) = spec.inwards(signal.range);
             all.push(float.within(*held, low, high));
         }
-        let memories = self.memories.iter().flatten().flatten();
-        for (word, bound) in memories.zip(memory_bounds(spec.policy)) {
+        for (word, bound) in self.memory().zip(memory_bounds(spec.policy)) {
             all.push(float.within(*word, spec.nearest(-bound), spec.nearest(bound)));
         }
         let limits = &spec.policy.limits;
@@ -140,7 +157,9 @@ fn reads(spec: Spec<'_>, input: Input) -> bool {
         }
     }
     let features: &[Feature] = &spec.policy.features;
-    features.iter().any(|feature| in_tree(&feature.source, input))
+    // every observer is driven by the last command
+    let observed = input == Input::PreviousCommand && !spec.policy.observers.is_empty();
+    observed || features.iter().any(|feature| in_tree(&feature.source, input))
 }
 
 /// Name, value and allowed interval of every coefficient of the mapping; nothing without one.
@@ -205,6 +224,7 @@ pub(crate) fn reset(spec: Spec<'_>, before: &State) -> State {
     let zeros = |filters: &Vec<Vec<Term>>| filters.iter().map(|words| vec![spec.zero(); words.len()]).collect();
     State {
         held: held.collect(),
+        observers: zeros(&before.observers),
         memories: before.memories.iter().map(zeros).collect(),
         previous_duty: spec.nearest(limits.initial_duty),
         previous_command: spec.nearest(limits.initial_duty),

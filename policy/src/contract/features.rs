@@ -9,7 +9,7 @@ use crate::bounds::{self, Box32, Inputs, Overflow};
 use crate::catalogue;
 use crate::expression::{self, Scope};
 use crate::limits::MAX_FEATURES;
-use crate::model::{Expr, Feature, Interval};
+use crate::model::{Expr, Feature, Input, Interval};
 use crate::names::Kind;
 
 /// A feature whose bound is not known yet, with its place.
@@ -27,6 +27,7 @@ pub(crate) struct Features<'a> {
 /// What the entries refer to.
 pub(crate) struct Surroundings<'a> {
     pub signals: &'a [String],
+    pub estimates: &'a [(String, Input)],
     pub parameters: &'a BTreeMap<String, f64>,
     pub period: Option<f64>,
 }
@@ -101,6 +102,7 @@ fn source(value: &Value<'_>, around: &Surroundings<'_>, faults: &mut Sink) -> Op
     let text = value.text(faults)?;
     let scope = Scope {
         signals: around.signals,
+        estimates: around.estimates,
         parameters: around.parameters,
     };
     match expression::parse(text, &scope) {

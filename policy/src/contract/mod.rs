@@ -7,6 +7,7 @@ pub(crate) mod filters;
 pub(crate) mod head;
 pub(crate) mod mapping;
 pub(crate) mod network;
+pub(crate) mod observers;
 pub(crate) mod protection;
 pub(crate) mod signals;
 

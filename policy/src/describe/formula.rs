@@ -1,13 +1,13 @@
 //! Features as formulas for people.
 
-use crate::model::{Expr, Feature, Filter, Input, Signal};
+use crate::model::{Expr, Feature, Filter, Policy};
 
 /// One line such as `e_del = clip(0.2 * delay1(v_ref - v_out), -20, 20)`, in the user's own names; a source that
-/// was not written as text is shown from its tree with the names of `signals`.
+/// was not written as text is shown from its tree with the names of the policy.
 #[must_use]
-pub fn formula(feature: &Feature, signals: &[Signal]) -> String {
+pub fn formula(feature: &Feature, policy: &Policy) -> String {
     let source = match feature.source_text.as_str() {
-        "" => expression(&feature.source, signals),
+        "" => expression(&feature.source, policy),
         text => text.to_owned(),
     };
     let atom = !source.contains([' ', '+', '-', '*', '/']);
@@ -55,15 +55,13 @@ fn over_period(filter: &Filter) -> &'static str {
 
 /// An expression with its constants folded, fully parenthesised below the top.
 #[must_use]
-pub fn expression(expr: &Expr, signals: &[Signal]) -> String {
+pub fn expression(expr: &Expr, policy: &Policy) -> String {
     let inner = |e: &Expr| match e {
-        Expr::Input(_) | Expr::Constant(_) => expression(e, signals),
-        _ => format!("({})", expression(e, signals)),
+        Expr::Input(_) | Expr::Constant(_) => expression(e, policy),
+        _ => format!("({})", expression(e, policy)),
     };
     match expr {
-        Expr::Input(Input::Signal(index)) => signals.get(*index).map_or("?", |s| &s.name).to_owned(),
-        Expr::Input(Input::PreviousDuty) => "previous_duty".to_owned(),
-        Expr::Input(Input::PreviousCommand) => "previous_command".to_owned(),
+        Expr::Input(input) => input.name(&policy.signals, &policy.observers),
         Expr::Constant(value) => value.to_string(),
         Expr::Neg(e) => format!("-{}", inner(e)),
         Expr::Add(a, b) => format!("{} + {}", inner(a), inner(b)),

@@ -1,7 +1,7 @@
 //! The parts of a policy, a text each: a heading behind an empty line, then a line for each thing that there is.
 
 use crate::describe::formula::formula;
-use crate::model::{Continuous, Fallback, Head, Interval, Mapping, Policy, Squash};
+use crate::model::{Continuous, Estimate, Fallback, Head, Input, InputVoltage, Interval, Mapping, Policy, Squash};
 
 /// Characters of a line of actions, with which it still fits into a terminal beside its indentation.
 const LINE: usize = 96;
@@ -38,12 +38,47 @@ pub fn signals(policy: &Policy) -> String {
     out
 }
 
+/// Models of the converter with what they are told and what they correct; nothing where there is none.
+#[must_use]
+pub fn observers(policy: &Policy) -> String {
+    if policy.observers.is_empty() {
+        return String::new();
+    }
+    let mut out = "\nobservers (estimates stand beside the signals)\n".to_owned();
+    let name = |index: usize| Input::Signal(index).name(&policy.signals, &policy.observers);
+    for (index, own) in policy.observers.iter().enumerate() {
+        let source = match own.input_voltage {
+            InputVoltage::Constant(volts) => format!("{volts} V"),
+            InputVoltage::Signal(index) => name(index),
+        };
+        let delay = match own.compute_delay {
+            0 => "the duty acts in the same period",
+            _ => "the duty acts one period later",
+        };
+        out += &format!(
+            "  {}: L {} H, C {} F, V {source}, corrected by {}, loaded by {}; {delay}\n",
+            own.name,
+            own.inductance,
+            own.capacitance,
+            name(own.output_voltage),
+            name(own.load_current)
+        );
+        let gains = [own.gains.current, own.gains.voltage, own.gains.bias];
+        for (estimate, gain) in Estimate::ALL.into_iter().zip(gains) {
+            let called = Input::Estimate(index, estimate).name(&policy.signals, &policy.observers);
+            let (range, unit) = (range(own.range(estimate)), estimate.unit());
+            out += &format!("    {called}  {range} {unit}, {gain} {unit}/V\n");
+        }
+    }
+    out
+}
+
 /// Features as formulas with their bounds, and the ranges that the golden vectors have of them.
 #[must_use]
 pub fn observation(policy: &Policy) -> String {
     let mut out = "\nobservation (network input order; bound over all plausible measurements)\n".to_owned();
     for (index, feature) in policy.features.iter().enumerate() {
-        let (formula, bound) = (formula(feature, &policy.signals), range(feature.bound));
+        let (formula, bound) = (formula(feature, policy), range(feature.bound));
         let golden =
             golden_range(policy, index).map_or_else(String::new, |seen| format!(", golden in {}", range(seen)));
         out += &format!("  {index:2}  {formula}   in {bound}{golden}\n");

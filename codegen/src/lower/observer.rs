@@ -1,0 +1,137 @@
+//! Contract section 2b: models of the converter that run beside it.
+//!
+//! ```text
+//!  delay 1:  memory ─► correct ─► predict with the command under way ─► estimates, memory
+//!  delay 0:  memory ─► predict with the last command ─► correct ─► estimates, memory
+//! ```
+//!
+//! In: the observers of a policy. Out: values of the block in front of the features, and what `commit` pushes. The one
+//! invariant: both orders need the state's `previous_command` alone, so no observer waits for the network.
+
+use policy::{Estimate, InputVoltage, Observer};
+
+use super::front::Builder;
+use crate::program::{Op, Push, ValueId};
+
+/// What a prediction rests on beside the estimates.
+#[derive(Clone, Copy)]
+struct Drive {
+    duty: ValueId,
+    load_current: ValueId,
+    input_voltage: ValueId,
+}
+
+impl Builder {
+    /// The estimates of an observer; `valid` holds the flags of the signals.
+    pub fn observer(&mut self, observer: &Observer, period: f64, valid: &[ValueId]) -> [ValueId; 3] {
+        let first = self.reserve(observer.words());
+        let kept = [0, 1, 2].map(|word| self.block.value(Op::Memory(first + word)));
+        let now = Drive {
+            duty: self.block.value(Op::PreviousCommand),
+            load_current: self.signals[observer.load_current],
+            input_voltage: self.input_voltage(observer, None),
+        };
+        let estimates = if observer.compute_delay == 1 {
+            let known = self.known(observer, kept);
+            let corrected = self.corrected(observer, known, valid);
+            self.predicted(observer, corrected, now, period)
+        } else {
+            let before = Drive {
+                load_current: self.block.value(Op::Memory(first + 3)),
+                input_voltage: self.input_voltage(observer, Some(first + 4)),
+                ..now
+            };
+            let predicted = self.predicted(observer, kept, before, period);
+            let known = self.known(observer, predicted);
+            self.corrected(observer, known, valid)
+        };
+        let kept = observer.remembered().map(|index| self.signals[index]).collect::<Vec<_>>();
+        for (word, value) in estimates.into_iter().chain(kept).enumerate() {
+            self.pushes.push(Push {
+                word: first + word,
+                length: 1,
+                value,
+            });
+        }
+        estimates
+    }
+
+    /// Of this step, or of the one before from a word of the memory.
+    fn input_voltage(&mut self, observer: &Observer, before: Option<usize>) -> ValueId {
+        match (observer.input_voltage, before) {
+            (InputVoltage::Constant(volts), _) => self.constant(volts),
+            (InputVoltage::Signal(index), None) => self.signals[index],
+            (InputVoltage::Signal(_), Some(word)) => self.block.value(Op::Memory(word)),
+        }
+    }
+
+    /// The same, or where an observer begins before the first good measurement.
+    fn known(&mut self, observer: &Observer, x: [ValueId; 3]) -> [ValueId; 3] {
+        let load_current = self.signals[observer.load_current];
+        let start = [
+            self.clamped(observer, Estimate::Current, load_current),
+            self.signals[observer.output_voltage],
+            self.constant(0.0),
+        ];
+        let flag = self.block.value(Op::Primed);
+        [0, 1, 2].map(|each| {
+            self.block.value(Op::Select {
+                flag,
+                then: x[each],
+                otherwise: start[each],
+            })
+        })
+    }
+
+    fn corrected(&mut self, observer: &Observer, x: [ValueId; 3], valid: &[ValueId]) -> [ValueId; 3] {
+        let measured = self.signals[observer.output_voltage];
+        let difference = self.block.value(Op::Sub(measured, x[1]));
+        let zero = self.constant(0.0);
+        // a held sample says nothing of this instant
+        let error = self.block.value(Op::Select {
+            flag: valid[observer.output_voltage],
+            then: difference,
+            otherwise: zero,
+        });
+        let gains = [observer.gains.current, observer.gains.voltage, observer.gains.bias];
+        [0, 1, 2].map(|each| {
+            let step = self.scaled(error, gains[each]);
+            let sum = self.block.value(Op::Add(x[each], step));
+            self.clamped(observer, Estimate::ALL[each], sum)
+        })
+    }
+
+    fn predicted(&mut self, observer: &Observer, [i, v, b]: [ValueId; 3], drive: Drive, period: f64) -> [ValueId; 3] {
+        let (d, u) = (drive.duty, drive.input_voltage);
+        let (by_current, by_voltage) = (period / observer.inductance, period / observer.capacitance);
+        let square = self.block.value(Op::Mul(d, d));
+        let late = self.scaled(square, 0.5);
+        let moment = self.block.value(Op::Sub(d, late));
+        let on = self.block.value(Op::Mul(u, moment));
+        let half = self.scaled(v, 0.5);
+        let driven = self.block.value(Op::Sub(on, half));
+        let half = self.scaled(b, 0.5);
+        let driven = self.block.value(Op::Add(driven, half));
+        let step = self.scaled(driven, by_current);
+        let mean = self.block.value(Op::Add(i, step));
+        let mean = self.clamped(observer, Estimate::Current, mean);
+        let surplus = self.block.value(Op::Sub(mean, drive.load_current));
+        let step = self.scaled(surplus, by_voltage);
+        let next = self.block.value(Op::Add(v, step));
+        let next = self.clamped(observer, Estimate::Voltage, next);
+        let on = self.block.value(Op::Mul(u, d));
+        let both = self.block.value(Op::Add(v, next));
+        let half = self.scaled(both, 0.5);
+        let driven = self.block.value(Op::Sub(on, half));
+        let driven = self.block.value(Op::Add(driven, b));
+        let step = self.scaled(driven, by_current);
+        let end = self.block.value(Op::Add(i, step));
+        [self.clamped(observer, Estimate::Current, end), next, b]
+    }
+
+    fn clamped(&mut self, observer: &Observer, estimate: Estimate, x: ValueId) -> ValueId {
+        let range = observer.range(estimate);
+        let (low, high) = (self.constant(range.low), self.constant(range.high));
+        self.block.value(Op::Clamp { x, low, high })
+    }
+}

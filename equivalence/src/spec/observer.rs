@@ -1,0 +1,108 @@
+//! Section 2b: the observers.
+
+use policy::{Estimate, InputVoltage, Observer};
+
+use super::{Spec, State};
+use crate::term::Term;
+
+/// What an observer gives in one step, and its words behind the push.
+pub(crate) struct Observed {
+    pub estimates: [Term; 3],
+    pub words: Vec<Term>,
+}
+
+/// What the step knows when its observers run.
+pub(crate) struct Measured<'a> {
+    pub signals: &'a [Term],
+    pub valid: &'a [Term],
+    pub primed: Term,
+}
+
+/// What a prediction rests on beside the estimates.
+struct Drive {
+    d: Term,
+    o: Term,
+    u: Term,
+}
+
+pub(crate) fn observe(
+    spec: Spec<'_>,
+    observer: &Observer,
+    words: &[Term],
+    state: &State,
+    measured: &Measured<'_>,
+) -> Observed {
+    let signals = measured.signals;
+    let y = signals[observer.output_voltage];
+    let o = signals[observer.load_current];
+    let d = state.previous_command;
+    let (u, kept_u) = match observer.input_voltage {
+        InputVoltage::Constant(volts) => (spec.nearest(volts), None),
+        InputVoltage::Signal(index) => (signals[index], Some(signals[index])),
+    };
+    let start = [clamped(spec, observer, Estimate::Current, o), y, spec.zero()];
+    let known = |x: [Term; 3]| [0, 1, 2].map(|n| spec.terms.choose(measured.primed, x[n], start[n]));
+    let memory = [words[0], words[1], words[2]];
+    let valid = measured.valid[observer.output_voltage];
+    if observer.compute_delay == 1 {
+        let x = correct(spec, observer, known(memory), y, valid);
+        let estimates = predict(spec, observer, x, &Drive { d, o, u });
+        let words = estimates.to_vec();
+        return Observed { estimates, words };
+    }
+    let before = Drive {
+        d,
+        o: words[3],
+        u: words.get(4).copied().unwrap_or(u),
+    };
+    let x = known(predict(spec, observer, memory, &before));
+    let estimates = correct(spec, observer, x, y, valid);
+    let words = estimates.into_iter().chain([o]).chain(kept_u).collect();
+    Observed { estimates, words }
+}
+
+/// Words of an observer's memory (section 1).
+pub(crate) fn words(observer: &Observer) -> usize {
+    match (observer.compute_delay, observer.input_voltage) {
+        (1, _) => 3,
+        (_, InputVoltage::Constant(_)) => 4,
+        (_, InputVoltage::Signal(_)) => 5,
+    }
+}
+
+fn correct(spec: Spec<'_>, observer: &Observer, x: [Term; 3], y: Term, valid: Term) -> [Term; 3] {
+    let float = spec.float;
+    let e = spec.terms.choose(valid, float.sub(y, x[1]), spec.zero());
+    let one = |n: usize, estimate, gain: f64| {
+        let sum = float.add(x[n], float.mul(spec.nearest(gain), e));
+        clamped(spec, observer, estimate, sum)
+    };
+    [
+        one(0, Estimate::Current, observer.gains.current),
+        one(1, Estimate::Voltage, observer.gains.voltage),
+        one(2, Estimate::Bias, observer.gains.bias),
+    ]
+}
+
+fn predict(spec: Spec<'_>, observer: &Observer, [i, v, b]: [Term; 3], drive: &Drive) -> [Term; 3] {
+    let float = spec.float;
+    let half = spec.nearest(0.5);
+    let h = spec.nearest(spec.policy.sample_period / observer.inductance);
+    let g = spec.nearest(spec.policy.sample_period / observer.capacitance);
+    let Drive { d, o, u } = *drive;
+    let m = float.sub(d, float.mul(float.mul(d, d), half));
+    let a = float.sub(float.mul(u, m), float.mul(v, half));
+    let a = float.add(a, float.mul(b, half));
+    let a = clamped(spec, observer, Estimate::Current, float.add(i, float.mul(a, h)));
+    let next = float.add(v, float.mul(float.sub(a, o), g));
+    let next = clamped(spec, observer, Estimate::Voltage, next);
+    let s = float.sub(float.mul(u, d), float.mul(float.add(v, next), half));
+    let s = float.add(s, b);
+    let end = clamped(spec, observer, Estimate::Current, float.add(i, float.mul(s, h)));
+    [end, next, b]
+}
+
+fn clamped(spec: Spec<'_>, observer: &Observer, estimate: Estimate, x: Term) -> Term {
+    let (low, high) = spec.ends(observer.range(estimate));
+    spec.float.clamp(x, low, high)
+}

@@ -1,0 +1,138 @@
+//! Models of the converter that run beside it (contract section 2b).
+
+use policy::{Estimate, InputVoltage};
+
+use crate::real::{Range, Real};
+
+/// An observer with its constants rounded to the format and its place in the memory.
+#[derive(Debug, Clone)]
+pub(crate) struct Observer<T> {
+    /// First word in the memory of the controller.
+    start: usize,
+    delayed: bool,
+    source: Source<T>,
+    output_voltage: usize,
+    load_current: usize,
+    /// T/L.
+    by_current: T,
+    /// T/C.
+    by_voltage: T,
+    /// Corrections per volt, of the estimates in their order.
+    gains: [T; 3],
+    /// Clamps of the estimates.
+    ranges: [Range<T>; 3],
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Source<T> {
+    Constant(T),
+    Signal(usize),
+}
+
+/// What a prediction rests on beside the estimates.
+#[derive(Clone, Copy)]
+struct Drive<T> {
+    duty: T,
+    load_current: T,
+    input_voltage: T,
+}
+
+/// What the step knows when its observers run.
+#[derive(Clone, Copy)]
+pub(crate) struct Measured<'a, T> {
+    pub signals: &'a [T],
+    pub valid: &'a [bool],
+    pub primed: bool,
+    pub previous_command: T,
+}
+
+impl<T: Real> Observer<T> {
+    /// `period` in seconds; `start` is the first free word of the memory.
+    pub fn new(observer: &policy::Observer, period: f64, start: usize) -> Self {
+        let gains = observer.gains;
+        Self {
+            start,
+            delayed: observer.compute_delay == 1,
+            source: match observer.input_voltage {
+                InputVoltage::Constant(volts) => Source::Constant(T::nearest(volts)),
+                InputVoltage::Signal(index) => Source::Signal(index),
+            },
+            output_voltage: observer.output_voltage,
+            load_current: observer.load_current,
+            // quotients in binary64, rounded once: a division in the format would round differently
+            by_current: T::nearest(period / observer.inductance),
+            by_voltage: T::nearest(period / observer.capacitance),
+            gains: [gains.current, gains.voltage, gains.bias].map(T::nearest),
+            ranges: Estimate::ALL.map(|estimate| Range::nearest(observer.range(estimate))),
+        }
+    }
+
+    /// The estimates of this step: current, voltage, bias.
+    pub fn estimates(&self, measured: Measured<'_, T>, memory: &[T]) -> [T; 3] {
+        let word = |index: usize| memory[self.start + index];
+        let kept = [word(0), word(1), word(2)];
+        let now = Drive {
+            duty: measured.previous_command,
+            load_current: measured.signals[self.load_current],
+            input_voltage: match self.source {
+                Source::Constant(volts) => volts,
+                Source::Signal(index) => measured.signals[index],
+            },
+        };
+        let unprimed = [
+            self.ranges[0].clamp(now.load_current),
+            measured.signals[self.output_voltage],
+            T::ZERO,
+        ];
+        let known = |x: [T; 3]| if measured.primed { x } else { unprimed };
+        if self.delayed {
+            let corrected = self.corrected(known(kept), measured);
+            return self.predicted(corrected, now);
+        }
+        // the command of the step before acts from its measurement to this one, with what was measured then
+        let before = Drive {
+            load_current: word(3),
+            input_voltage: match self.source {
+                Source::Constant(volts) => volts,
+                Source::Signal(_) => word(4),
+            },
+            ..now
+        };
+        self.corrected(known(self.predicted(kept, before)), measured)
+    }
+
+    /// Moves the memory on by a step with these estimates.
+    pub fn push(&self, memory: &mut [T], signals: &[T], estimates: [T; 3]) {
+        let kept = match self.source {
+            _ if self.delayed => [None, None],
+            Source::Constant(_) => [Some(signals[self.load_current]), None],
+            Source::Signal(index) => [Some(signals[self.load_current]), Some(signals[index])],
+        };
+        let words = estimates.into_iter().chain(kept.into_iter().flatten());
+        for (word, x) in memory[self.start..].iter_mut().zip(words) {
+            *word = x;
+        }
+    }
+
+    fn corrected(&self, x: [T; 3], measured: Measured<'_, T>) -> [T; 3] {
+        // a held sample says nothing of this instant
+        let error = match measured.valid[self.output_voltage] {
+            true => measured.signals[self.output_voltage] - x[1],
+            false => T::ZERO,
+        };
+        [0, 1, 2].map(|each| self.ranges[each].clamp(x[each] + self.gains[each] * error))
+    }
+
+    fn predicted(&self, [i, v, b]: [T; 3], drive: Drive<T>) -> [T; 3] {
+        let half = T::nearest(0.5);
+        let (d, u) = (drive.duty, drive.input_voltage);
+        let moment = d - d * d * half;
+        let mut mean = u * moment - v * half;
+        mean = mean + b * half;
+        let mean = self.ranges[0].clamp(i + mean * self.by_current);
+        let next = self.ranges[1].clamp(v + (mean - drive.load_current) * self.by_voltage);
+        let mut sum = u * d - (v + next) * half;
+        sum = sum + b;
+        [self.ranges[0].clamp(i + sum * self.by_current), next, b]
+    }
+}

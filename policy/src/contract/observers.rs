@@ -1,0 +1,207 @@
+//! `[[observer]]`: models of the converter whose estimates stand beside the signals (contract section 2b).
+
+use toml_input::{Sink, Table, Value};
+
+use super::{Taken, name, number_f32, range_f32};
+use crate::bounds::{self, Inputs, Overflow};
+use crate::catalogue;
+use crate::limits::MAX_OBSERVERS;
+use crate::model::{Estimate, Gains, Input, InputVoltage, Interval, Observer, Signal};
+use crate::names::Kind;
+
+/// The observers and what expressions may call; a faulty one leaves its names, lest every expression that uses them be
+/// reported too.
+#[derive(Default)]
+pub(crate) struct Observers<'a> {
+    /// Names of estimates, and what they stand for.
+    pub estimates: Vec<(String, Input)>,
+    /// Index into the contract's list, so that positions hold even if one before is faulty.
+    pub list: Vec<(Value<'a>, Option<Observer>)>,
+}
+
+/// What the entries refer to.
+pub(crate) struct Surroundings<'a> {
+    pub names: &'a [String],
+    pub signals: &'a [Option<Signal>],
+}
+
+impl Observers<'_> {
+    /// All of them, if none is faulty.
+    pub fn whole(&self) -> Option<Vec<Observer>> {
+        self.list.iter().map(|(_, observer)| observer.clone()).collect()
+    }
+}
+
+pub(crate) fn read<'a>(
+    root: &mut Table<'a>,
+    around: &Surroundings<'_>,
+    taken: &mut Taken,
+    faults: &mut Sink,
+) -> Observers<'a> {
+    let mut observers = Observers::default();
+    let Some(value) = root.optional("observer") else {
+        return observers;
+    };
+    let Some(items) = value.list("[[observer]] tables", faults) else {
+        return observers;
+    };
+    if items.len() > MAX_OBSERVERS {
+        faults.push(value.fault(catalogue::count("observers", items.len(), 0, MAX_OBSERVERS)));
+        return observers;
+    }
+    for (index, item) in items.into_iter().enumerate() {
+        let written = item.peek("name").and_then(|value| value.as_text().map(str::to_owned));
+        for (name, estimate) in written.iter().flat_map(|name| Estimate::ALL.map(|estimate| (name, estimate))) {
+            let input = Input::Estimate(index, estimate);
+            observers.estimates.push((format!("{name}_{}", estimate.word()), input));
+        }
+        let observer = one(&item, around, taken, faults);
+        observers.list.push((item, observer));
+    }
+    observers
+}
+
+fn one(item: &Value<'_>, around: &Surroundings<'_>, taken: &mut Taken, faults: &mut Sink) -> Option<Observer> {
+    let mut section = item.table("[[observer]]", faults)?;
+    let hint = "an observer needs a name: with `name = \"model\"` its estimates are model_current, model_voltage and model_bias";
+    let name = section
+        .required("name", hint, faults)
+        .and_then(|value| estimates(&value, taken, faults));
+    let inductance = part(&mut section, "inductance", "L of the converter in henry: `inductance = 2e-3`", faults);
+    let capacitance = part(
+        &mut section,
+        "capacitance",
+        "C of the converter in farad: `capacitance = 150e-6`",
+        faults,
+    );
+    let hint = "V of the converter, a number or the name of a signal: `input_voltage = 200.0`";
+    let input_voltage = section
+        .required("input_voltage", hint, faults)
+        .and_then(|value| input_voltage(&value, around, faults));
+    let hint = "the signal of the output voltage: `output_voltage = \"v_out\"`";
+    let output_voltage = signal(&mut section, "output_voltage", hint, around, faults);
+    let hint = "the signal of the load current: `load_current = \"i_out\"`";
+    let load_current = signal(&mut section, "load_current", hint, around, faults);
+    let hint = "periods from a measurement to the duty that is computed of it: `compute_delay = 1` where it waits for the next period, \
+                0 where it acts in the same";
+    let compute_delay = section
+        .required("compute_delay", hint, faults)
+        .and_then(|value| value.integer(0..=1, faults));
+    let gains = gains(&mut section, faults);
+    let hint = "what the estimated current is clamped to, in A: `current = [0.0, 20.0]` with a diode, from a negative current with a synchronous leg";
+    let current = section
+        .required("current", hint, faults)
+        .and_then(|value| range_f32(&value, faults));
+    let hint = "what the bias is clamped to, in V at the switch node: `bias = [-5.0, 5.0]`";
+    let bias = section
+        .required("bias", hint, faults)
+        .and_then(|value| around_zero(&value, faults));
+    section.finish(faults);
+    let output_voltage = output_voltage?;
+    Some(Observer {
+        name: name?,
+        inductance: inductance?,
+        capacitance: capacitance?,
+        input_voltage: input_voltage?,
+        output_voltage,
+        load_current: load_current?,
+        compute_delay: compute_delay?,
+        gains: gains?,
+        current: current?,
+        voltage: around.signals.get(output_voltage)?.as_ref()?.range,
+        bias: bias?,
+    })
+}
+
+/// The observer's name, if none of those of its estimates is taken.
+fn estimates(value: &Value<'_>, taken: &mut Taken, faults: &mut Sink) -> Option<String> {
+    let own = name(value, Kind::Observer, taken, faults)?;
+    for estimate in Estimate::ALL {
+        let called = format!("{own}_{}", estimate.word());
+        if let Err(message) = super::taken_once(&called, Kind::Estimate, taken) {
+            faults.push(value.fault(message));
+            return None;
+        }
+    }
+    Some(own)
+}
+
+/// A coil or a capacitor.
+fn part(section: &mut Table<'_>, key: &'static str, hint: &str, faults: &mut Sink) -> Option<f64> {
+    section
+        .required(key, hint, faults)
+        .and_then(|value| value.positive(faults))
+}
+
+fn signal(
+    section: &mut Table<'_>,
+    key: &'static str,
+    hint: &str,
+    around: &Surroundings<'_>,
+    faults: &mut Sink,
+) -> Option<usize> {
+    let value = section.required(key, hint, faults)?;
+    named(&value, around, faults)
+}
+
+fn named(value: &Value<'_>, around: &Surroundings<'_>, faults: &mut Sink) -> Option<usize> {
+    let text = value.text(faults)?;
+    let index = around.names.iter().position(|name| name == text);
+    if index.is_none() {
+        let names = around.names.iter().map(String::as_str).filter(|name| !name.is_empty());
+        faults.push(value.fault(catalogue::unknown_name("signal", text, &names.collect::<Vec<_>>())));
+    }
+    index
+}
+
+fn input_voltage(value: &Value<'_>, around: &Surroundings<'_>, faults: &mut Sink) -> Option<InputVoltage> {
+    if value.as_text().is_some() {
+        return named(value, around, faults).map(InputVoltage::Signal);
+    }
+    let volts = value.positive(faults)?;
+    if super::fits_f32(volts) {
+        return Some(InputVoltage::Constant(volts));
+    }
+    faults.push(value.fault(catalogue::not_in_f32("input_voltage", volts)));
+    None
+}
+
+fn gains(section: &mut Table<'_>, faults: &mut Sink) -> Option<Gains> {
+    let hint = "what one volt of error corrects: `gains = { current = 0.07, voltage = 0.1, bias = 0.002 }`";
+    let mut table = section.required("gains", hint, faults)?.table("gains", faults)?;
+    let [current, voltage, bias] = Estimate::ALL.map(|estimate| {
+        let value = table.required(estimate.word(), hint, faults)?;
+        number_f32(&value, faults)
+    });
+    table.finish(faults);
+    Some(Gains {
+        current: current?,
+        voltage: voltage?,
+        bias: bias?,
+    })
+}
+
+/// A range with 0 in it: the bias starts there.
+fn around_zero(value: &Value<'_>, faults: &mut Sink) -> Option<Interval> {
+    let range = range_f32(value, faults)?;
+    if (range.low..=range.high).contains(&0.0) {
+        return Some(range);
+    }
+    let found = format!("{} to {}", range.low, range.high);
+    faults.push(value.fault(catalogue::out_of_range("bias", &found, "a range with 0 in it, where the bias starts")));
+    None
+}
+
+/// A fault for each observer that could leave the format; whether there is none.
+pub(crate) fn bounded(observers: &Observers<'_>, inputs: &Inputs, period: f64, faults: &mut Sink) -> bool {
+    let mut fits = true;
+    for (at, observer) in &observers.list {
+        let Some(observer) = observer else { continue };
+        if let Err(Overflow(magnitude)) = bounds::observer(observer, inputs, period) {
+            let what = format!("the prediction of observer `{}`", observer.name);
+            faults.push(at.fault(catalogue::may_overflow(&what, magnitude)));
+            fits = false;
+        }
+    }
+    fits
+}

@@ -6,7 +6,7 @@ use ndarray::{Array1, ArrayView1};
 use policy::Policy;
 
 use crate::feature::{Feature, Inputs};
-use crate::head::Head;
+use crate::head::{Base, Head};
 use crate::integer;
 use crate::limits::Limits;
 use crate::mapping::Mapping;
@@ -142,7 +142,8 @@ impl<T: Real> Controller<T> {
         if let Some(last) = trace.layers.last() {
             trace.q_values.assign(&last.post_activation);
         }
-        (trace.action_index, trace.duty_sim) = self.head.decide(trace.q_values.view());
+        let (index, chosen) = self.head.decide(trace.q_values.view());
+        (trace.action_index, trace.duty_sim) = (index, self.head.duty(trace.base, chosen));
         self.act(trace);
         Ok(())
     }
@@ -193,7 +194,10 @@ impl<T: Real> Controller<T> {
     /// commanded.
     pub fn choose(&self, trace: &mut Trace<T>, action_index: u32) {
         let chosen = self.head.choose(action_index);
-        (trace.action_index, trace.duty_sim) = chosen.unwrap_or((0, self.initial_duty));
+        (trace.action_index, trace.duty_sim) = match chosen {
+            Some((index, chosen)) => (index, self.head.duty(trace.base, chosen)),
+            None => (0, self.initial_duty),
+        };
         self.act(trace);
     }
 
@@ -236,7 +240,8 @@ impl<T: Real> Controller<T> {
         Ok(layers.pop().map(|last| last.post_activation).unwrap_or_default())
     }
 
-    /// Action index and duty before the mapping of a network's outputs (sections 7 and 7b), as many as there are.
+    /// Action index and duty before the mapping of a network's outputs (sections 7 and 7b), as many as there are; of a residual
+    /// head the offset, since its law needs a measurement.
     pub fn decide(&self, outputs: &ArrayView1<'_, T>) -> Option<(u32, T)> {
         (outputs.len() == self.head.outputs()).then(|| self.head.decide(*outputs))
     }
@@ -277,6 +282,7 @@ impl<T: Real> Controller<T> {
                 .collect(),
             observation: Array1::from_elem(self.features.len(), T::ZERO),
             layers: self.network.blank(),
+            base: Base::default(),
             q_values: Array1::from_elem(self.head.outputs(), T::ZERO),
             action_index: 0,
             duty_sim: T::ZERO,
@@ -335,6 +341,7 @@ impl<T: Real> Controller<T> {
             previous_duty: state.previous_duty,
             previous_command: state.previous_command,
         };
+        trace.base = self.head.base(inputs);
         for (feature, feature_trace) in self.features.iter().zip(&mut trace.features) {
             feature.filter(inputs, &state.memory, trace.primed, feature_trace);
         }

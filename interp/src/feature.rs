@@ -17,7 +17,7 @@ pub(crate) struct Inputs<'a, T> {
 
 /// A source expression with its constants rounded to the format.
 #[derive(Debug, Clone)]
-enum Source<T> {
+pub(crate) enum Source<T> {
     Input(Input),
     Constant(T),
     Neg(Box<Source<T>>),
@@ -27,7 +27,7 @@ enum Source<T> {
 }
 
 impl<T: Real> Source<T> {
-    fn new(expr: &Expr) -> Self {
+    pub fn new(expr: &Expr) -> Self {
         let boxed = |expr: &Expr| Box::new(Self::new(expr));
         match expr {
             Expr::Input(input) => Self::Input(*input),
@@ -41,7 +41,7 @@ impl<T: Real> Source<T> {
 
     /// A leaf in place, since most operands are one and a call costs more than they do; other expressions by [`Source::tree`].
     #[inline(always)]
-    fn value(&self, inputs: Inputs<'_, T>) -> T {
+    pub fn value(&self, inputs: Inputs<'_, T>) -> T {
         match self {
             Self::Input(Input::Signal(index)) => inputs.signals[*index],
             Self::Input(Input::Estimate(index, estimate)) => inputs.estimates[*index][*estimate as usize],

@@ -82,7 +82,7 @@ impl fmt::Display for GoldenResult {
 #[must_use]
 pub fn judge(golden: &Golden, head: &Head, answers: &[&[f64]]) -> GoldenResult {
     match head {
-        Head::Choice(_) => judge_choices(golden, answers),
+        Head::Choice(_) | Head::Residual(_) => judge_choices(golden, answers),
         Head::Continuous(head) => judge_duties(golden, head, answers),
     }
 }

@@ -4,6 +4,7 @@ use ndarray::ArrayView1;
 use policy::{Policy, Squash};
 
 use crate::activation::activate;
+use crate::feature::{Inputs, Source};
 use crate::network::argmax;
 use crate::real::{Range, Real};
 
@@ -12,8 +13,28 @@ use crate::real::{Range, Real};
 pub(crate) enum Head<T> {
     /// Duty per action.
     Choice(Vec<T>),
+    /// Offset per action, and what they are added to.
+    Residual(Vec<T>, Law<T>),
     /// One output as a duty.
     Continuous(Continuous<T>),
+}
+
+/// The law of control of a residual head (section 8).
+#[derive(Debug, Clone)]
+pub(crate) struct Law<T> {
+    base: Source<T>,
+    /// What is within its range in the dead zone.
+    still: Vec<(Source<T>, Range<T>)>,
+    limits: Range<T>,
+}
+
+/// What a law says in a step; the default where there is none.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Base<T> {
+    /// The law's duty, clamped to the limits.
+    pub duty: T,
+    /// Nothing is added to it: the dead zone.
+    pub still: bool,
 }
 
 /// Section 7b.
@@ -33,6 +54,26 @@ impl<T: Real> Head<T> {
         match &policy.head {
             policy::Head::Choice(actions) => {
                 Self::Choice(actions.iter().map(|action| T::nearest(action.duty)).collect())
+            }
+            policy::Head::Residual(head) => {
+                let law = Law {
+                    base: Source::new(&head.base.tree),
+                    still: (head.dead_zone.iter())
+                        .map(|still| {
+                            let within = T::nearest(still.within);
+                            (
+                                Source::new(&still.source.tree),
+                                Range {
+                                    lo: -within,
+                                    hi: within,
+                                },
+                            )
+                        })
+                        .collect(),
+                    limits: Range::inwards(head.limits),
+                };
+                let offsets = head.offsets.iter().map(|action| T::nearest(action.duty));
+                Self::Residual(offsets.collect(), law)
             }
             policy::Head::Continuous(head) => {
                 let (low, high) = match head.squash {
@@ -56,15 +97,41 @@ impl<T: Real> Head<T> {
     /// Outputs of the network.
     pub fn outputs(&self) -> usize {
         match self {
-            Self::Choice(table) => table.len(),
+            Self::Choice(table) | Self::Residual(table, _) => table.len(),
             Self::Continuous(_) => 1,
         }
     }
 
-    /// Action index and duty of a network's outputs.
+    /// What the law of a residual head says.
+    pub fn base(&self, inputs: Inputs<'_, T>) -> Base<T> {
+        let Self::Residual(_, law) = self else {
+            return Base::default();
+        };
+        Base {
+            duty: law.limits.clamp(law.base.value(inputs)),
+            still: !law.still.is_empty()
+                && law
+                    .still
+                    .iter()
+                    .all(|(source, range)| range.contains(source.value(inputs))),
+        }
+    }
+
+    /// The duty before the mapping of what [`Head::decide`] or [`Head::choose`] gave.
+    pub fn duty(&self, base: Base<T>, chosen: T) -> T {
+        match self {
+            Self::Residual(_, law) => {
+                let offset = if base.still { T::ZERO } else { chosen };
+                law.limits.clamp(base.duty + offset)
+            }
+            Self::Choice(_) | Self::Continuous(_) => chosen,
+        }
+    }
+
+    /// Action index of a network's outputs, and their duty; of a residual head the offset.
     pub fn decide(&self, outputs: ArrayView1<'_, T>) -> (u32, T) {
         match self {
-            Self::Choice(table) => {
+            Self::Choice(table) | Self::Residual(table, _) => {
                 let index = argmax(outputs);
                 (index as u32, table[index])
             }
@@ -72,10 +139,10 @@ impl<T: Real> Head<T> {
         }
     }
 
-    /// Index and duty of an action that was chosen elsewhere; `None` where there are none.
+    /// Index and duty, or offset, of an action that was chosen elsewhere; `None` where there are none.
     pub fn choose(&self, action_index: u32) -> Option<(u32, T)> {
         match self {
-            Self::Choice(table) => {
+            Self::Choice(table) | Self::Residual(table, _) => {
                 let index = (action_index as usize).min(table.len().checked_sub(1)?);
                 Some((index as u32, table[index]))
             }
@@ -83,10 +150,11 @@ impl<T: Real> Head<T> {
         }
     }
 
-    /// The duties of all actions, or those at both ends.
+    /// The duties of all actions, or those at both ends of all others.
     pub fn duties(&self) -> Vec<T> {
         match self {
             Self::Choice(table) => table.clone(),
+            Self::Residual(_, law) => vec![law.limits.lo, law.limits.hi],
             Self::Continuous(head) => [head.ends.lo, head.ends.hi].map(|s| head.scaled(s)).to_vec(),
         }
     }

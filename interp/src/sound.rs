@@ -38,7 +38,9 @@ impl<T: Real> Sound<T> {
                 .collect(),
             memory: policy::memory_bounds(policy).into_iter().map(T::nearest).collect(),
             // a flip in what nothing reads decides no duty: asked, it would only stop a controller that works
-            previous_duty: policy.reads(Input::PreviousDuty).then(|| hull(start.into_iter().chain(duties))),
+            previous_duty: policy
+                .reads(Input::PreviousDuty)
+                .then(|| hull(start.into_iter().chain(duties))),
             previous_command: (policy.reads(Input::PreviousCommand) || slewed)
                 .then(|| hull(start.into_iter().chain([limits.lo, limits.hi]))),
             soft_cap: (policy.limits.soft_start).map(|soft| hull([T::nearest(soft.from), limits.hi].into_iter())),

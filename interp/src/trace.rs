@@ -2,6 +2,7 @@
 
 use ndarray::Array1;
 
+use crate::head::Base;
 use crate::real::Real;
 
 /// What leaves the controller (contract section 9).
@@ -79,11 +80,13 @@ pub struct Trace<T> {
     pub observation: Array1<T>,
     /// Per layer (6).
     pub layers: Vec<LayerTrace<T>>,
+    /// What the law of a residual head says (8); 0 and not still of any other.
+    pub base: Base<T>,
     /// Output of the network: one value per action, or the one of a continuous head.
     pub q_values: Array1<T>,
     /// Greedy action (7); 0 of a continuous head (7b).
     pub action_index: u32,
-    /// Entry of the action table (8), or the duty of a continuous head (7b).
+    /// Entry of the action table (8), the law's duty with what is added to it (8), or the duty of a continuous head (7b).
     pub duty_sim: T,
     /// After the mapping; equal to `duty_sim` without one (8).
     pub mapped: T,

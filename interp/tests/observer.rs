@@ -85,7 +85,11 @@ fn errors(controller: &mut Controller<f64>, mut converter: Converter, delay: usi
         commanded.push(duty);
         converter.period(commanded[step], load);
         // with a delay the estimates are those of the next instant
-        let truth = if delay == 1 { [converter.current, converter.voltage] } else { before };
+        let truth = if delay == 1 {
+            [converter.current, converter.voltage]
+        } else {
+            before
+        };
         if step >= 120 {
             errors.push([seen[0] - truth[0], seen[1] - truth[1]]);
         }
@@ -174,7 +178,10 @@ fn a_current_that_is_clamped_to_0_is_that_of_a_diode() {
     };
     let (diode, both) = (light(0.0), light(-20.0));
     assert!((0.0..0.01).contains(&diode), "{diode} A");
-    assert!(both < -0.05, "{both} A: without the clamp the model has a current that flows back");
+    assert!(
+        both < -0.05,
+        "{both} A: without the clamp the model has a current that flows back"
+    );
 }
 
 /// Numbers that binary64 holds: T/L = T/C = 1/8.
@@ -182,7 +189,9 @@ fn worked_out(keys: &str) -> Controller<f64> {
     controller(
         0.25,
         [2.0, 2.0],
-        &format!("input_voltage = 8.0\ncurrent = [0.0, 16.0]\ngains = {{ current = 0.5, voltage = 0.25, bias = 0.125 }}\n{keys}"),
+        &format!(
+            "input_voltage = 8.0\ncurrent = [0.0, 16.0]\ngains = {{ current = 0.5, voltage = 0.25, bias = 0.125 }}\n{keys}"
+        ),
     )
 }
 
@@ -226,10 +235,25 @@ fn a_step_without_one_predicts_from_what_was_measured_before_and_then_corrects()
 
 #[test]
 fn a_held_sample_corrects_nothing() {
-    let predicted = at(&mut worked_out("compute_delay = 1"), &[1.0, 1.25, 0.5], [1.25, 1.0, 20.0]);
-    let held = at(&mut worked_out("compute_delay = 1"), &[1.0, 1.25, 0.5], [f32::NAN, 1.0, 20.0]);
-    assert_eq!(held.estimates, predicted.estimates, "as if the measurement were what was expected");
-    let off = at(&mut worked_out("compute_delay = 1"), &[1.0, 1.25, 0.5], [1.5, 1.0, 20.0]);
+    let predicted = at(
+        &mut worked_out("compute_delay = 1"),
+        &[1.0, 1.25, 0.5],
+        [1.25, 1.0, 20.0],
+    );
+    let held = at(
+        &mut worked_out("compute_delay = 1"),
+        &[1.0, 1.25, 0.5],
+        [f32::NAN, 1.0, 20.0],
+    );
+    assert_eq!(
+        held.estimates, predicted.estimates,
+        "as if the measurement were what was expected"
+    );
+    let off = at(
+        &mut worked_out("compute_delay = 1"),
+        &[1.0, 1.25, 0.5],
+        [1.5, 1.0, 20.0],
+    );
     assert_ne!(off.estimates, predicted.estimates);
 }
 
@@ -243,15 +267,26 @@ fn an_observer_begins_at_the_load_current_and_the_measured_voltage() {
             assert_eq!(trace.estimates[0], start);
         } else {
             let rest = at(&mut worked_out("compute_delay = 1"), &start, [3.0, 2.0, 20.0]);
-            assert_eq!(trace.estimates, rest.estimates, "the same from a memory with these numbers");
+            assert_eq!(
+                trace.estimates, rest.estimates,
+                "the same from a memory with these numbers"
+            );
         }
     }
 }
 
 #[test]
 fn estimates_are_clamped_to_their_ranges() {
-    let trace = at(&mut worked_out("compute_delay = 1"), &[16.0, 39.0, 6.0], [40.0, 0.0, 20.0]);
+    let trace = at(
+        &mut worked_out("compute_delay = 1"),
+        &[16.0, 39.0, 6.0],
+        [40.0, 0.0, 20.0],
+    );
     assert_eq!(trace.estimates[0][1..], [40.0, 6.0]);
-    let trace = at(&mut worked_out("compute_delay = 1"), &[0.0, 39.0, -6.0], [0.0, 20.0, 20.0]);
+    let trace = at(
+        &mut worked_out("compute_delay = 1"),
+        &[0.0, 39.0, -6.0],
+        [0.0, 20.0, 20.0],
+    );
     assert_eq!(trace.estimates[0][0], 0.0);
 }

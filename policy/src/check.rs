@@ -14,7 +14,7 @@ use toml_input::{Sink, Table};
 
 use crate::bounds::{self, Inputs, Overflow};
 use crate::catalogue;
-use crate::contract::{actions, features, head, mapping, network, observers, protection, signals};
+use crate::contract::{actions, features, head, mapping, network, observers, protection, residual, signals};
 use crate::digests;
 use crate::faults::Faults;
 use crate::limits::MAX_FEATURES;
@@ -56,7 +56,7 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     };
     let features = features::read(&mut root, &around, faults);
     let network = network::read(&mut root, faults);
-    let actions = actions::read(&mut root, faults);
+    let actions = actions::read(&mut root, &around, faults);
     let mapping = mapped(raw, &mut root, &signals.names, faults);
     let fallback = protection::fallback(&mut root, faults);
     let limits = protection::limits(&mut root, fallback, faults);
@@ -64,7 +64,8 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     root.finish(faults);
 
     let (feature_count, output_count) = (features.count, actions.outputs);
-    let duties = actions.head.duties();
+    let decided = residual::limited(actions.head, limits.map(|limits| limits.duty));
+    let duties = decided.duties();
     // a count of 0 is a faulty list: the widths of the weights cannot be judged by it
     let sizes = (feature_count > 0 && output_count > 0).then_some((feature_count, output_count));
     let mut weights = network
@@ -91,17 +92,21 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     if let (true, Some(weights)) = (complete, weights.as_mut()) {
         bound_layers(raw, known, &mut weights.layers, faults);
     }
+    if let (Some(base), Some(inputs)) = (raw.contract.peek(&["actions", "base"]), &inputs) {
+        residual::bounded(&decided, inputs, &base, faults);
+    }
     if let (Some(Some(mapping)), Some(inputs)) = (&mapping, &inputs) {
         bound_mapping(raw, mapping, inputs, &duties, faults);
     }
     // with sizes that the network does not have, every vector would be a fault of its own
     let Weights { layers, mut notes } = weights?;
-    let golden = golden(raw, network.as_ref(), sizes, &actions.head, known, faults);
+    let golden = golden(raw, network.as_ref(), sizes, &decided, known, faults);
     notes.extend(golden.as_ref().and_then(Option::as_ref).and_then(left_out));
     notes.extend(unused(
         &head.parameters,
         signals.as_deref().unwrap_or_default(),
         whole.as_deref().unwrap_or_default(),
+        &decided,
         known,
         mapping.as_ref().and_then(Option::as_ref),
     ));
@@ -122,7 +127,7 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
         observers: whole?,
         features: complete.then_some(bounded)?,
         layers,
-        head: actions.head,
+        head: decided,
         mapping: mapping?,
         limits,
         fallback: fallback?,

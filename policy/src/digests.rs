@@ -12,7 +12,7 @@ use sha2::{Digest, Sha256};
 use crate::activation::Activation;
 use crate::model::{
     Action, Continuous, Digests, Expr, Fallback, Feature, Filter, Interval, Layer, Limits, Mapping, NumericFormat,
-    Observer, Policy, Signal,
+    Observer, Policy, Residual, Signal,
 };
 
 #[derive(Serialize)]
@@ -32,6 +32,8 @@ struct Contract<'a> {
     // left out where there is none: contracts from before there was one keep their digest
     #[serde(skip_serializing_if = "Option::is_none")]
     continuous: Option<&'a Continuous>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    residual: Option<&'a Residual>,
     limits: &'a Limits,
     fallback: &'a Fallback,
 }
@@ -97,6 +99,7 @@ pub(crate) fn of(policy: &Policy) -> Digests {
         activations: policy.layers.iter().map(|layer| layer.activation).collect(),
         actions: policy.actions(),
         continuous: policy.head.continuous(),
+        residual: policy.head.residual(),
         limits: &policy.limits,
         fallback: &policy.fallback,
     };

@@ -343,7 +343,12 @@ impl Parser<'_> {
             ));
         }
         let estimates = self.scope.estimates.iter().map(|(name, _)| name);
-        let known = self.scope.signals.iter().chain(estimates).chain(self.scope.parameters.keys());
+        let known = self
+            .scope
+            .signals
+            .iter()
+            .chain(estimates)
+            .chain(self.scope.parameters.keys());
         let known: Vec<&str> = known.map(String::as_str).chain(REMEMBERED).collect();
         Err((
             span.clone(),

@@ -5,15 +5,49 @@ use serde::Serialize;
 
 use crate::activation::{Activation, Shape};
 use crate::interval::Interval;
-use crate::rounding::nearest_f32;
+use crate::model::Expr;
+use crate::rounding::{inward_f32, nearest_f32};
 
 /// From the last layer to a duty before the mapping.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Head {
     /// The greedy action: a duty for each output, at least 2.
     Choice(Vec<Action>),
+    /// The greedy action, whose offset is added to a law of control.
+    Residual(Residual),
     /// One output, as a number.
     Continuous(Continuous),
+}
+
+/// `duty = clamp(clamp(base) + offset)`: a law that is known, and what a network has learnt to add to it (section 8).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Residual {
+    /// Affine law in signals and estimates; its value is a duty.
+    pub base: Source,
+    /// For each output what is added to the law; `duty` of an action is an offset here, -1..1.
+    pub offsets: Vec<Action>,
+    /// Where all of these hold nothing is added; nowhere if there are none.
+    pub dead_zone: Vec<Still>,
+    /// The limits of the duty, which both clamps have.
+    pub limits: Interval,
+}
+
+/// An expression as it is computed and as it was written.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Source {
+    /// Affine, constants folded.
+    pub tree: Expr,
+    /// The text.
+    pub text: String,
+}
+
+/// `-within <= source <= within`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Still {
+    /// What is small at rest.
+    pub source: Source,
+    /// How small, in the unit of the source; > 0.
+    pub within: f64,
 }
 
 /// One discrete action.
@@ -64,15 +98,17 @@ impl Head {
     pub fn outputs(&self) -> usize {
         match self {
             Head::Choice(actions) => actions.len(),
+            Head::Residual(head) => head.offsets.len(),
             Head::Continuous(_) => 1,
         }
     }
 
-    /// The discrete actions; none of a continuous head.
+    /// The discrete actions, whose duties are offsets of a residual head; none of a continuous one.
     #[must_use]
     pub fn actions(&self) -> &[Action] {
         match self {
             Head::Choice(actions) => actions,
+            Head::Residual(head) => &head.offsets,
             Head::Continuous(_) => &[],
         }
     }
@@ -81,16 +117,38 @@ impl Head {
     #[must_use]
     pub fn continuous(&self) -> Option<&Continuous> {
         match self {
-            Head::Choice(_) => None,
+            Head::Choice(_) | Head::Residual(_) => None,
             Head::Continuous(head) => Some(head),
         }
     }
 
-    /// The duties before the mapping: those of all actions, or the two ends of a continuous head, as binary32 has them.
+    /// The residual head, if it is one.
+    #[must_use]
+    pub fn residual(&self) -> Option<&Residual> {
+        match self {
+            Head::Residual(head) => Some(head),
+            Head::Choice(_) | Head::Continuous(_) => None,
+        }
+    }
+
+    /// What it reads beside the network: a law of control and where that is left alone.
+    pub fn sources(&self) -> impl Iterator<Item = &Source> {
+        self.residual().into_iter().flat_map(|head| {
+            let still = head.dead_zone.iter().map(|still| &still.source);
+            std::iter::once(&head.base).chain(still)
+        })
+    }
+
+    /// The duties before the mapping: those of all actions, or the two ends of a continuous or a residual head, as binary32
+    /// has them.
     #[must_use]
     pub fn duties(&self) -> Vec<f64> {
         match self {
             Head::Choice(actions) => actions.iter().map(|action| action.duty).collect(),
+            Head::Residual(head) => {
+                let ends = inward_f32(head.limits);
+                ends.map_or(Vec::new(), |(low, high)| vec![f64::from(low), f64::from(high)])
+            }
             Head::Continuous(head) => head.ends_32().to_vec(),
         }
     }

@@ -13,6 +13,8 @@ pub const MAX_WIDTH: usize = 1024;
 pub const MAX_FEATURES: usize = 64;
 /// Most measured signals.
 pub const MAX_SIGNALS: usize = 32;
+/// Most conditions of a dead zone.
+pub const MAX_DEAD_ZONE: usize = 4;
 /// Most observers.
 pub const MAX_OBSERVERS: usize = 4;
 /// Most named parameters.

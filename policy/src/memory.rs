@@ -32,7 +32,9 @@ fn observed(observer: &Observer, policy: &Policy) -> Vec<f64> {
     let magnitude = |range: Interval| range.low.abs().max(range.high.abs());
     // the ends of a clamp are rounded to nearest
     let estimates = Estimate::ALL.map(|estimate| magnitude(observer.range(estimate)) * GROWTH);
-    let kept = observer.remembered().map(|index| source(&Expr::Input(Input::Signal(index)), policy));
+    let kept = observer
+        .remembered()
+        .map(|index| source(&Expr::Input(Input::Signal(index)), policy));
     estimates.into_iter().chain(kept).collect()
 }
 

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use crate::activation::Activation;
-pub use crate::head::{Action, Continuous, Head, Pair, Squash};
+pub use crate::head::{Action, Continuous, Head, Pair, Residual, Source, Squash, Still};
 pub use crate::interval::Interval;
 pub use crate::observer::{Estimate, Gains, InputVoltage, Observer};
 
@@ -150,7 +150,7 @@ impl Policy {
         self.head.outputs()
     }
 
-    /// Whether a feature's source or an observer reads this.
+    /// Whether the source of a feature or of the head, or an observer reads this.
     #[must_use]
     pub fn reads(&self, input: Input) -> bool {
         let observed = |observer: &Observer| match input {
@@ -158,7 +158,9 @@ impl Policy {
             Input::Signal(index) => observer.signals().any(|own| own == index),
             Input::PreviousDuty | Input::Estimate(..) => false,
         };
-        self.features.iter().any(|feature| feature.source.reads(input)) || self.observers.iter().any(observed)
+        let features = self.features.iter().map(|feature| &feature.source);
+        let mut sources = features.chain(self.head.sources().map(|source| &source.tree));
+        sources.any(|source| source.reads(input)) || self.observers.iter().any(observed)
     }
 
     /// The discrete actions; none where the head is continuous.
@@ -172,6 +174,7 @@ impl Policy {
     pub fn actions_mut(&mut self) -> &mut [Action] {
         match &mut self.head {
             Head::Choice(actions) => actions,
+            Head::Residual(head) => &mut head.offsets,
             Head::Continuous(_) => &mut [],
         }
     }

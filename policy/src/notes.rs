@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::model::{Estimate, Feature, Golden, Input, Limits, Mapping, Observer, Signal};
+use crate::model::{Estimate, Feature, Golden, Head, Input, Limits, Mapping, Observer, Signal};
 
 /// Golden observations that the controller never sees, because the training left the range of a signal.
 pub fn left_out(golden: &Golden) -> Option<String> {
@@ -54,6 +54,7 @@ pub(crate) fn unused(
     parameters: &BTreeMap<String, f64>,
     signals: &[Signal],
     observers: &[Observer],
+    head: &Head,
     features: &[Feature],
     mapping: Option<&Mapping>,
 ) -> Vec<String> {
@@ -63,8 +64,13 @@ pub(crate) fn unused(
         return notes;
     }
     let read = |index: usize| {
-        features.iter().any(|feature| feature.source.reads(Input::Signal(index)))
-            || observers.iter().any(|observer| observer.signals().any(|own| own == index))
+        features
+            .iter()
+            .any(|feature| feature.source.reads(Input::Signal(index)))
+            || head.sources().any(|source| source.tree.reads(Input::Signal(index)))
+            || observers
+                .iter()
+                .any(|observer| observer.signals().any(|own| own == index))
             || mapping.is_some_and(|mapping| mapping.load_current == index)
     };
     let idle = signals.iter().enumerate().filter(|(index, _)| !read(*index));
@@ -81,13 +87,17 @@ pub(crate) fn unused(
     };
     let idle = parameters
         .keys()
-        .filter(|name| !features.iter().any(|feature| word(&feature.source_text, name)));
-    let estimate = |index: usize, each| features.iter().any(|own| own.source.reads(Input::Estimate(index, each)));
+        .filter(|name| !features.iter().any(|feature| word(&feature.source_text, name)))
+        .filter(|name| !head.sources().any(|source| word(&source.text, name)));
+    let estimate = |index: usize, each| {
+        let input = Input::Estimate(index, each);
+        features.iter().any(|own| own.source.reads(input)) || head.sources().any(|own| own.tree.reads(input))
+    };
     let blind = observers
         .iter()
         .enumerate()
         .filter(|(index, _)| !Estimate::ALL.iter().any(|each| estimate(*index, *each)));
-    let blind = blind.map(|(_, observer)| format!("no feature reads an estimate of observer `{}`", observer.name));
+    let blind = blind.map(|(_, observer)| format!("nothing reads an estimate of observer `{}`", observer.name));
     notes.extend(blind.collect::<Vec<_>>());
     notes.extend(idle.map(|name| format!("parameter `{name}` is not used")));
     notes

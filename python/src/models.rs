@@ -52,7 +52,7 @@ pub fn contract_json(py: Python<'_>, path: PathBuf) -> PyResult<String> {
         "parameters": policy.parameters,
         "signals": policy.signals,
         "features": policy.features,
-        "duties": match &policy.head { Head::Choice(_) => policy.head.duties(), Head::Continuous(_) => Vec::new() },
+        "duties": match &policy.head { Head::Choice(_) => policy.head.duties(), Head::Continuous(_) | Head::Residual(_) => Vec::new() },
         "continuous": policy.head.continuous(),
         "mapping": mapping,
         "limits": policy.limits,

@@ -95,7 +95,7 @@ fn check(policy: &Policy, rng: &mut SplitMix, boxes: usize) -> (f64, usize) {
                     policy.name, policy.numeric_format
                 );
                 let error = match &policy.head {
-                    Head::Choice(_) => (held[n] - real[n]).abs(),
+                    Head::Choice(_) | Head::Residual(_) => (held[n] - real[n]).abs(),
                     Head::Continuous(head) => (held_duty(&controller, held[n]) - real_duty(head, real[n])).abs(),
                 };
                 assert!(

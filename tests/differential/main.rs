@@ -137,6 +137,8 @@ fn random_policies_reach_every_status_bit_and_every_kind() {
         "o0_current",
         "o0_voltage",
         "o0_bias",
+        "base = ",
+        "dead_zone = [",
     ] {
         assert!(all.contains(word), "no random policy has {word}");
     }

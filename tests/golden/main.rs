@@ -228,6 +228,8 @@ fn together_the_cases_hold_every_part_of_a_contract() {
         "input_voltage: Signal(",
         "compute_delay: 0",
         "compute_delay: 1",
+        "Residual(",
+        "Still {",
     ];
     let missing: Vec<_> = parts.iter().filter(|part| !shown.contains(**part)).collect();
     assert!(missing.is_empty(), "{missing:?}\n{shown}");

@@ -113,7 +113,14 @@ fn contract(rng: &mut SplitMix, seed: u64, [features, actions, hidden]: [usize; 
     let _ = writeln!(text, "hidden_activation = [{}]\n", activations.join(", "));
     match head {
         Some(head) => drop(writeln!(text, "[actions]\n{head}\n")),
-        None => action_table(&mut text, rng, actions),
+        None => {
+            let mut table = String::new();
+            action_table(&mut table, rng, actions);
+            text += &match beside.one_in(3) {
+                true => residual(&mut beside, actions, observers, signals),
+                false => table,
+            };
+        }
     }
     protection(&mut text, rng, signals);
     text
@@ -147,9 +154,44 @@ fn observer(text: &mut String, rng: &mut SplitMix, index: usize, signals: usize,
     );
 }
 
+/// Offsets of a law over signals and estimates, with and without a dead zone.
+fn residual(rng: &mut SplitMix, actions: usize, observers: usize, signals: usize) -> String {
+    let seen = |rng: &mut SplitMix| match observers {
+        0 => format!("s{}", rng.below(signals)),
+        _ => estimate(rng, observers, signals),
+    };
+    let offsets: Vec<String> = (0..actions).map(|_| format!("{:?}", rng.uniform(-0.3, 0.3))).collect();
+    let mut text = format!(
+        "[actions]\nbase = \"0.5 - {:?} * ({}) + 0.1 * previous_command\"\noffsets = [{}]\n",
+        rng.uniform(-0.02, 0.02),
+        seen(rng),
+        offsets.join(", ")
+    );
+    let zone: Vec<String> = (0..rng.below(3))
+        .map(|_| {
+            format!(
+                "{{ source = \"{}\", within = {:?} }}",
+                seen(rng),
+                rng.uniform(0.1, 30.0)
+            )
+        })
+        .collect();
+    if !zone.is_empty() {
+        let _ = writeln!(text, "dead_zone = [{}]", zone.join(", "));
+    }
+    text.push('\n');
+    text
+}
+
 /// A source over estimates.
 fn estimate(rng: &mut SplitMix, observers: usize, signals: usize) -> String {
-    let e = |rng: &mut SplitMix| format!("o{}_{}", rng.below(observers), ["current", "voltage", "bias"][rng.below(3)]);
+    let e = |rng: &mut SplitMix| {
+        format!(
+            "o{}_{}",
+            rng.below(observers),
+            ["current", "voltage", "bias"][rng.below(3)]
+        )
+    };
     match rng.below(3) {
         0 => e(rng),
         1 => format!("{} - s{}", e(rng), rng.below(signals)),

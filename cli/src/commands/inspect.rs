@@ -56,6 +56,8 @@ struct View<'p> {
     actions: &'p [policy::Action],
     #[serde(skip_serializing_if = "Option::is_none")]
     continuous: Option<&'p policy::Continuous>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    residual: Option<&'p policy::Residual>,
     mapping: Option<policy::Mapping>,
     limits: policy::Limits,
     fallback: policy::Fallback,
@@ -97,6 +99,7 @@ fn view(policy: &Policy) -> View<'_> {
             .collect(),
         actions: policy.actions(),
         continuous: policy.head.continuous(),
+        residual: policy.head.residual(),
         mapping: policy.mapping,
         limits: policy.limits,
         fallback: policy.fallback,

@@ -10,7 +10,7 @@
 //! The one invariant: every operation is one rounding of the contract, in its order, and none of them depends on a flag, so
 //! the number of executed instructions does not depend on the measurement.
 
-use policy::{Expr, Feature, Filter, Input, Policy, Scalar};
+use policy::{Expr, Feature, Filter, Input, Policy, Residual, Scalar};
 
 use crate::program::{Block, Front, Literal, Op, Push, ValueId};
 
@@ -36,6 +36,10 @@ pub fn lower(policy: &Policy) -> (Front, usize) {
         observation.push(value);
         clipped.extend(outside);
     }
+    let (base, still) = match policy.head.residual() {
+        Some(head) => builder.law(head),
+        None => (None, None),
+    };
     let block = &mut builder.block;
     // differences of bits are gathered as words: one flag for all features, not one each
     let clipped = clipped.into_iter().reduce(|all, one| block.value(Op::Or(all, one)));
@@ -45,6 +49,8 @@ pub fn lower(policy: &Policy) -> (Front, usize) {
         signals: builder.signals,
         all_valid,
         clipped,
+        base,
+        still,
         observation,
         pushes: builder.pushes,
     };
@@ -119,6 +125,22 @@ impl Builder {
                 (clamped, Some(block.value(Op::Difference(value, clamped))))
             }
         }
+    }
+
+    /// Law and dead zone of a residual head (section 8).
+    fn law(&mut self, head: &Residual) -> (Option<ValueId>, Option<ValueId>) {
+        let x = self.expression(&head.base.tree);
+        let (low, high) = Literal::inward(self.scalar, head.limits);
+        let (low, high) = (self.block.constant(low), self.block.constant(high));
+        let base = self.block.value(Op::Clamp { x, low, high });
+        let still = head.dead_zone.iter().map(|still| {
+            let x = self.expression(&still.source.tree);
+            let (low, high) = (self.constant(-still.within), self.constant(still.within));
+            self.block.value(Op::Within { x, low, high })
+        });
+        let still: Vec<ValueId> = still.collect();
+        let still = still.into_iter().reduce(|all, one| self.block.value(Op::And(all, one)));
+        (Some(base), still)
     }
 
     fn expression(&mut self, expression: &Expr) -> ValueId {

@@ -1,6 +1,6 @@
 //! Contract sections 7b and 8: from the outputs of the network to a duty before the mapping.
 
-use policy::{Continuous, Interval, Policy, Scalar, Squash};
+use policy::{Continuous, Interval, Policy, Residual, Scalar, Squash};
 
 use crate::program::{Block, Head, Literal, Op, ValueId};
 
@@ -11,6 +11,10 @@ pub fn lower(policy: &Policy) -> Head {
         policy::Head::Choice(actions) => {
             let duties = actions.iter().map(|action| Literal::nearest(scalar, action.duty));
             Head::Choice(duties.collect())
+        }
+        policy::Head::Residual(head) => {
+            let offsets = head.offsets.iter().map(|action| Literal::nearest(scalar, action.duty));
+            Head::Choice(offsets.collect())
         }
         policy::Head::Continuous(head) => Head::Output {
             curve: match head.squash {
@@ -24,8 +28,10 @@ pub fn lower(policy: &Policy) -> Head {
 /// The duty as operations.
 pub fn duty(policy: &Policy, block: &mut Block) -> ValueId {
     let scalar = policy.numeric_format.scalar();
-    let Some(head) = policy.head.continuous() else {
-        return block.value(Op::ChosenDuty);
+    let head = match &policy.head {
+        policy::Head::Choice(_) => return block.value(Op::ChosenDuty),
+        policy::Head::Residual(head) => return residual(scalar, head, block),
+        policy::Head::Continuous(head) => head,
     };
     let output = block.value(Op::Output);
     let squashed = match head.squash {
@@ -52,13 +58,36 @@ pub fn duty(policy: &Policy, block: &mut Block) -> ValueId {
     }
 }
 
-/// The duties of all actions, or of a continuous head those at both ends of its squash: all others lie between.
+/// The law's duty with the offset, but where nothing is to be added.
+fn residual(scalar: Scalar, head: &Residual, block: &mut Block) -> ValueId {
+    let mut offset = block.value(Op::ChosenDuty);
+    if !head.dead_zone.is_empty() {
+        let flag = block.value(Op::Still);
+        let then = block.constant(Literal::nearest(scalar, 0.0));
+        offset = block.value(Op::Select {
+            flag,
+            then,
+            otherwise: offset,
+        });
+    }
+    let base = block.value(Op::Base);
+    let x = block.value(Op::Add(base, offset));
+    let (low, high) = Literal::inward(scalar, head.limits);
+    let (low, high) = (block.constant(low), block.constant(high));
+    block.value(Op::Clamp { x, low, high })
+}
+
+/// The duties of all actions, or of a continuous or residual head the ends: all others lie between.
 pub fn duties(policy: &Policy) -> Vec<Literal> {
     let scalar = policy.numeric_format.scalar();
     match &policy.head {
         policy::Head::Choice(actions) => {
             let duty = |action: &policy::Action| Literal::nearest(scalar, action.duty);
             actions.iter().map(duty).collect()
+        }
+        policy::Head::Residual(head) => {
+            let (low, high) = Literal::inward(scalar, head.limits);
+            vec![low, high]
         }
         policy::Head::Continuous(head) => ends(scalar, head).to_vec(),
     }

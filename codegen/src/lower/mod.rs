@@ -70,12 +70,7 @@ pub fn lower(policy: &Policy, target: &TargetSpec, language: Language) -> Progra
         features: policy
             .features
             .iter()
-            .map(|feature| {
-                (
-                    feature.name.clone(),
-                    policy::describe::formula(feature, policy),
-                )
-            })
+            .map(|feature| (feature.name.clone(), policy::describe::formula(feature, policy)))
             .collect(),
         memory_words,
         front,

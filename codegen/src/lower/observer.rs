@@ -45,7 +45,10 @@ impl Builder {
             let known = self.known(observer, predicted);
             self.corrected(observer, known, valid)
         };
-        let kept = observer.remembered().map(|index| self.signals[index]).collect::<Vec<_>>();
+        let kept = observer
+            .remembered()
+            .map(|index| self.signals[index])
+            .collect::<Vec<_>>();
         for (word, value) in estimates.into_iter().chain(kept).enumerate() {
             self.pushes.push(Push {
                 word: first + word,

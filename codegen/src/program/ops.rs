@@ -53,8 +53,12 @@ pub enum Op {
     SoftCap,
     /// State: coefficient of the mapping.
     Coefficient(Coefficient),
-    /// Duty of the action that argmax chose.
+    /// Duty, or offset, of the action that argmax chose.
     ChosenDuty,
+    /// From `front`: what the law of a residual head says.
+    Base,
+    /// Flag from `front`: the dead zone of a residual head.
+    Still,
     /// The one output of a continuous head.
     Output,
     /// A value behind the curve of the program's head.
@@ -147,6 +151,7 @@ impl Op {
             Op::Primed
                 | Op::Usable
                 | Op::Clipped
+                | Op::Still
                 | Op::HeldSample
                 | Op::PrimedNow
                 | Op::Within { .. }
@@ -261,6 +266,10 @@ pub struct Front {
     pub all_valid: ValueId,
     /// Flag: an observation was clipped; `None` if nothing can be.
     pub clipped: Option<ValueId>,
+    /// What the law of a residual head says; `None` of another head.
+    pub base: Option<ValueId>,
+    /// Flag: nothing is added to it; `None` where there is no dead zone.
+    pub still: Option<ValueId>,
     /// Observation in network order.
     pub observation: Vec<ValueId>,
     /// Filter memory updates.

@@ -16,7 +16,7 @@ pub(crate) struct Command {
 /// What sections 7 to 8 make of the network's outputs.
 pub(crate) struct Chosen {
     pub index: Term,
-    /// Before the mapping.
+    /// Before the mapping; of a residual head the offset.
     pub duty: Term,
     /// Numbers on the way that are no NaN: the check of the policy bounds an output, and the curve is defined for every number.
     pub numbers: Vec<Term>,
@@ -139,7 +139,15 @@ fn chosen_duty(spec: Spec<'_>, index: Term) -> Term {
 pub(crate) fn decide(spec: Spec<'_>, state: &State, sensed: &Sensed, choice: &Chosen) -> Command {
     let (terms, float, policy) = (spec.terms, spec.float, spec.policy);
     let none = terms.truth(false);
-    let (chosen, index) = (choice.duty, choice.index);
+    let index = choice.index;
+    let chosen = match sensed.base {
+        Some((base, still)) => {
+            let offset = terms.choose(still, spec.zero(), choice.duty);
+            let (low, high) = spec.inwards(policy.limits.duty);
+            float.clamp(float.add(base, offset), low, high)
+        }
+        None => choice.duty,
+    };
     let (mut t, mut outside) = (chosen, none);
     if let (Some(mapping), [a, b, c, rest @ ..]) = (&policy.mapping, state.coefficients.as_slice()) {
         let current = sensed.signals[mapping.load_current];

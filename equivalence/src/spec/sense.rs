@@ -16,6 +16,8 @@ pub(crate) struct Sensed {
     pub usable: Term,
     pub primed: Term,
     pub observation: Vec<Term>,
+    /// What the law of a residual head says, clamped, and whether nothing is added to it (section 8).
+    pub base: Option<(Term, Term)>,
     pub clipped: Term,
     /// The observers' words as `commit` leaves them in a sound state.
     pub observed: Vec<Vec<Term>>,
@@ -68,6 +70,7 @@ pub(crate) fn sense(spec: Spec<'_>, state: &State, measurement: &[Term]) -> Sens
         usable,
         primed,
         observation: Vec::new(),
+        base: None,
         clipped: terms.truth(false),
         observed: Vec::new(),
         pushed: Vec::new(),
@@ -79,8 +82,24 @@ pub(crate) fn sense(spec: Spec<'_>, state: &State, measurement: &[Term]) -> Sens
     };
     let observers = spec.policy.observers.iter().zip(&state.observers);
     let observed = observers.map(|(each, words)| observer::observe(spec, each, words, state, &measured));
-    let (estimates, words) = observed.map(|each| (each.estimates, each.words)).unzip::<_, _, Vec<_>, _>();
+    let (estimates, words) = observed
+        .map(|each| (each.estimates, each.words))
+        .unzip::<_, _, Vec<_>, _>();
     sensed.observed = words;
+    sensed.base = spec.policy.head.residual().map(|head| {
+        let of = |own: &policy::Source| source(spec, &own.tree, state, &sensed.signals, &estimates);
+        let (low, high) = spec.inwards(head.limits);
+        let mut still: Vec<Term> = Vec::new();
+        for zone in &head.dead_zone {
+            still.push(float.within(of(&zone.source), spec.nearest(-zone.within), spec.nearest(zone.within)));
+        }
+        let is_still = if still.is_empty() {
+            terms.truth(false)
+        } else {
+            terms.all(still)
+        };
+        (float.clamp(of(&head.base), low, high), is_still)
+    });
     observe(spec, state, &estimates, &mut sensed);
     sensed
 }

@@ -60,7 +60,10 @@ impl State {
 
     /// All words of the memories, in the order of section 1.
     pub(crate) fn memory(&self) -> impl Iterator<Item = &Term> {
-        self.observers.iter().flatten().chain(self.memories.iter().flatten().flatten())
+        self.observers
+            .iter()
+            .flatten()
+            .chain(self.memories.iter().flatten().flatten())
     }
 
     /// The same, to be filled in.
@@ -113,6 +116,10 @@ fn duties(spec: Spec<'_>) -> Vec<f64> {
     let format = spec.format();
     match &spec.policy.head {
         Head::Choice(actions) => actions.iter().map(|action| format.nearest(action.duty)).collect(),
+        Head::Residual(_) => {
+            let limits = spec.policy.limits.duty;
+            vec![format.up(limits.low), format.down(limits.high)]
+        }
         Head::Continuous(head) => {
             let ends = match head.squash {
                 Squash::Curve(_) => [-1.0, 1.0],
@@ -157,6 +164,10 @@ fn reads(spec: Spec<'_>, input: Input) -> bool {
         }
     }
     let features: &[Feature] = &spec.policy.features;
+    let mut law = spec.policy.head.sources();
+    if law.any(|source| in_tree(&source.tree, input)) {
+        return true;
+    }
     // every observer is driven by the last command
     let observed = input == Input::PreviousCommand && !spec.policy.observers.is_empty();
     observed || features.iter().any(|feature| in_tree(&feature.source, input))

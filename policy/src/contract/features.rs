@@ -98,7 +98,8 @@ fn one(item: &Value<'_>, around: &Surroundings<'_>, taken: &mut Taken, faults: &
     })
 }
 
-fn source(value: &Value<'_>, around: &Surroundings<'_>, faults: &mut Sink) -> Option<(Expr, String)> {
+/// An expression over signals, estimates and parameters, and its text.
+pub(super) fn source(value: &Value<'_>, around: &Surroundings<'_>, faults: &mut Sink) -> Option<(Expr, String)> {
     let text = value.text(faults)?;
     let scope = Scope {
         signals: around.signals,

@@ -51,7 +51,10 @@ pub(crate) fn read<'a>(
     }
     for (index, item) in items.into_iter().enumerate() {
         let written = item.peek("name").and_then(|value| value.as_text().map(str::to_owned));
-        for (name, estimate) in written.iter().flat_map(|name| Estimate::ALL.map(|estimate| (name, estimate))) {
+        for (name, estimate) in written
+            .iter()
+            .flat_map(|name| Estimate::ALL.map(|estimate| (name, estimate)))
+        {
             let input = Input::Estimate(index, estimate);
             observers.estimates.push((format!("{name}_{}", estimate.word()), input));
         }
@@ -67,7 +70,12 @@ fn one(item: &Value<'_>, around: &Surroundings<'_>, taken: &mut Taken, faults: &
     let name = section
         .required("name", hint, faults)
         .and_then(|value| estimates(&value, taken, faults));
-    let inductance = part(&mut section, "inductance", "L of the converter in henry: `inductance = 2e-3`", faults);
+    let inductance = part(
+        &mut section,
+        "inductance",
+        "L of the converter in henry: `inductance = 2e-3`",
+        faults,
+    );
     let capacitance = part(
         &mut section,
         "capacitance",
@@ -188,7 +196,11 @@ fn around_zero(value: &Value<'_>, faults: &mut Sink) -> Option<Interval> {
         return Some(range);
     }
     let found = format!("{} to {}", range.low, range.high);
-    faults.push(value.fault(catalogue::out_of_range("bias", &found, "a range with 0 in it, where the bias starts")));
+    faults.push(value.fault(catalogue::out_of_range(
+        "bias",
+        &found,
+        "a range with 0 in it, where the bias starts",
+    )));
     None
 }
 

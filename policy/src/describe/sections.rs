@@ -1,7 +1,9 @@
 //! The parts of a policy, a text each: a heading behind an empty line, then a line for each thing that there is.
 
 use crate::describe::formula::formula;
-use crate::model::{Continuous, Estimate, Fallback, Head, Input, InputVoltage, Interval, Mapping, Policy, Squash};
+use crate::model::{
+    Continuous, Estimate, Fallback, Head, Input, InputVoltage, Interval, Mapping, Policy, Residual, Squash,
+};
 
 /// Characters of a line of actions, with which it still fits into a terminal beside its indentation.
 const LINE: usize = 96;
@@ -120,12 +122,16 @@ pub fn actions(policy: &Policy) -> String {
     if let Some(head) = policy.head.continuous() {
         return continuous(head);
     }
-    let mut out = "\nactions (argmax of Q, lowest index wins)\n".to_owned();
+    let mut out = match policy.head.residual() {
+        Some(head) => residual(head),
+        None => "\nactions (argmax of Q, lowest index wins)\n".to_owned(),
+    };
     let texts = policy
         .actions()
         .iter()
         .enumerate()
         .map(|(index, action)| match action.pair {
+            None if policy.head.residual().is_some() => format!("{index}: {:+}", action.duty),
             None => format!("{index}: {}", action.duty),
             Some(pair) => format!("{index}: {} {:+} * {} = {:.6}", pair.xi, pair.c, pair.phi, action.duty),
         });
@@ -141,6 +147,23 @@ pub fn actions(policy: &Policy) -> String {
         line.push_str(&text);
     }
     out + &format!("  {line}\n")
+}
+
+/// The law, where it is left alone, and the heading of the offsets.
+fn residual(head: &Residual) -> String {
+    let zone = head.dead_zone.iter();
+    let zone: Vec<String> = zone
+        .map(|still| format!("|{}| <= {}", still.source.text, still.within))
+        .collect();
+    let still = match zone.is_empty() {
+        true => String::new(),
+        false => format!("  nothing is added where {}\n", zone.join(" and ")),
+    };
+    format!(
+        "\nlaw\n  duty = {}, in {}\n{still}\noffsets (argmax of Q, lowest index wins)\n",
+        head.base.text,
+        range(head.limits)
+    )
 }
 
 fn continuous(head: &Continuous) -> String {

@@ -48,6 +48,7 @@ impl Number {
     pub fn duties(self, head: &Head) -> Vec<f64> {
         match head {
             Head::Choice(actions) => actions.iter().map(|action| self.nearest(action.duty)).collect(),
+            Head::Residual(head) => vec![self.up(head.limits.low), self.down(head.limits.high)],
             Head::Continuous(head) => {
                 let (ends, scale, offset) = (head.squashed(), self.nearest(head.scale), self.nearest(head.offset));
                 // binary64 has more than twice the digits of binary32: what is rounded to it first is rounded no other way

@@ -232,6 +232,10 @@ pub struct Source {
     pub valid: String,
     /// Flag that an observation was clipped, if one can be.
     pub clipped: Option<String>,
+    /// What the law of a residual head says.
+    pub base: Option<String>,
+    /// Flag that nothing is added to it, if it has a dead zone.
+    pub still: Option<String>,
     /// Declarations of `decide`.
     pub decide: Vec<String>,
     /// Value of the duty in a usable step.

@@ -225,6 +225,8 @@ fn source(program: &Program) -> Source {
         pushed: operands(&pushed),
         valid: sense.operand(front.all_valid),
         clipped: front.clipped.map(|flag| sense.operand(flag)),
+        base: front.base.map(|value| sense.operand(value)),
+        still: front.still.map(|flag| sense.operand(flag)),
         duty: decide.operand(program.decide.duty),
         duty_sim: decide.operand(program.decide.duty_sim),
         duty_stray: guard::stray(program, &decide.operand(program.decide.duty), program.decide.within),

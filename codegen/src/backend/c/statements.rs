@@ -123,6 +123,8 @@ impl<'p> Printer<'p> {
             Op::Primed => format!("{}_flag((int)(state->primed & 1u))", self.program.name),
             Op::Usable => "front->usable".into(),
             Op::Clipped => "front->clipped".into(),
+            Op::Base => "front->base".into(),
+            Op::Still => "front->still".into(),
             Op::HeldSample => "front->held".into(),
             Op::PrimedNow => "front->primed_now".into(),
             _ => return None,

@@ -191,6 +191,8 @@ fn front(program: &Program) -> TokenStream {
         quote!(push: [#kind; #pushes],)
     });
     let clipped = program.front.clipped.map(|_| quote!(clipped: u32,));
+    let base = program.front.base.map(|_| quote!(base: #kind,));
+    let still = program.front.still.map(|_| quote!(still: u32,));
     quote! {
         /// What a measurement means before the network sees it.
         struct Front {
@@ -202,6 +204,8 @@ fn front(program: &Program) -> TokenStream {
             held: u32,
             primed_now: u32,
             #clipped
+            #base
+            #still
         }
     }
 }
@@ -227,6 +231,14 @@ fn sense(program: &Program) -> TokenStream {
         let value = printer.operand(id);
         quote!(clipped: #value,)
     });
+    let base = front.base.map(|id| {
+        let value = printer.operand(id);
+        quote!(base: #value,)
+    });
+    let still = front.still.map(|id| {
+        let value = printer.operand(id);
+        quote!(still: #value,)
+    });
     quote! {
         /// Sanitise, filters, observation.
         #[inline(always)]
@@ -246,6 +258,8 @@ fn sense(program: &Program) -> TokenStream {
                 held: usable & (#valid ^ 1),
                 primed_now: usable & (self.primed ^ 1),
                 #clipped
+                #base
+                #still
             }
         }
     }

@@ -77,8 +77,11 @@ pub fn items(program: &Program, code: &IntegerCode) -> TokenStream {
             x: &[i16],
         ) -> [i32; ROWS] {
             let mut sums = *bias;
-            for (column, group) in weights.iter().zip(x.chunks_exact(#lanes)) {
-                if let [#(#names),*] = group {
+            // no `chunks_exact`: where it is not inlined, its division is a way to a panic
+            let mut rest = x;
+            for column in weights {
+                if let [#(#names),*, tail @ ..] = rest {
+                    rest = tail;
                     for (sum, weight) in sums.iter_mut().zip(column) {
                         *sum = sum #(#products)*;
                     }

@@ -88,6 +88,8 @@ impl<'p> Printer<'p> {
             Op::Primed => quote!(core::hint::black_box(self.primed & 1)),
             Op::Usable => quote!(front.usable),
             Op::Clipped => quote!(front.clipped),
+            Op::Base => quote!(front.base),
+            Op::Still => quote!(front.still),
             Op::HeldSample => quote!(front.held),
             Op::PrimedNow => quote!(front.primed_now),
             _ => return None,

@@ -11,6 +11,7 @@ pub mod baselines;
 pub mod controller;
 pub mod converter;
 mod course;
+pub mod design;
 pub mod environment;
 mod faults;
 pub mod limit;

@@ -163,6 +163,15 @@ impl Policy {
         sources.any(|source| source.reads(input)) || self.observers.iter().any(observed)
     }
 
+    /// The law of a residual head without what the network adds to it, as a policy of its own; `None` of another head.
+    #[must_use]
+    pub fn law_alone(&self) -> Option<Self> {
+        self.head.residual()?;
+        let mut law = self.clone();
+        law.actions_mut().iter_mut().for_each(|action| action.duty = 0.0);
+        Some(law)
+    }
+
     /// The discrete actions; none where the head is continuous.
     #[must_use]
     pub fn actions(&self) -> &[Action] {

@@ -250,7 +250,7 @@ fn skeleton(contract: &Document) -> Skeleton {
         features: count(&["feature"]),
         actions: match contract.peek(&["actions", "continuous"]) {
             Some(_) => Some(1),
-            None => count(&["actions", "duties"]),
+            None => count(&["actions", "duties"]).or_else(|| count(&["actions", "offsets"])),
         },
     }
 }

@@ -4,10 +4,12 @@
 mod exact;
 mod marabou;
 
+use std::collections::BTreeMap;
+
 use certify::{Certifier, Domain, Memory};
 use interp::{Controller, Sample};
 use ndarray::aview1;
-use policy::{Activation, Continuous, Head, Interval, NumericFormat, Policy, Squash};
+use policy::{Activation, Continuous, Estimate, Head, Interval, NumericFormat, Policy, Squash};
 use random::{Random, SplitMix};
 
 fn example(format: NumericFormat) -> Policy {
@@ -184,7 +186,7 @@ fn the_observation_of_a_controller_lies_where_its_coordinates_say() {
         let certifier = Certifier::new(&policy);
         let domain = Domain::of(&policy, Memory::Free);
         let mut controller = Controller::<f32>::new(&policy);
-        let mut past: Vec<(Vec<f64>, [f64; 2])> = Vec::new();
+        let mut past: Vec<BTreeMap<String, f64>> = Vec::new();
         for _ in 0..30 {
             let values: Vec<f64> = policy
                 .signals
@@ -198,9 +200,22 @@ fn the_observation_of_a_controller_lies_where_its_coordinates_say() {
                 .map(|(signal, value)| verify::traces::sample_of(policy::Scalar::F32, signal, *value))
                 .collect();
             let state = controller.state();
-            let duties = [f64::from(state.previous_duty), f64::from(state.previous_command)];
+            let duties = [
+                ("previous_duty".to_owned(), f64::from(state.previous_duty)),
+                ("previous_command".to_owned(), f64::from(state.previous_command)),
+            ];
             let trace = controller.step(&samples).unwrap();
-            past.push((trace.signals.iter().map(|x| f64::from(*x)).collect(), duties));
+            let signals = policy.signals.iter().zip(&trace.signals);
+            let signals = signals.map(|(signal, x)| (signal.name.clone(), f64::from(*x)));
+            let estimates = policy
+                .observers
+                .iter()
+                .zip(&trace.estimates)
+                .flat_map(|(observer, seen)| {
+                    let each = Estimate::ALL.into_iter().zip(seen);
+                    each.map(|(estimate, x)| (format!("{}_{}", observer.name, estimate.word()), f64::from(*x)))
+                });
+            past.push(signals.chain(estimates).chain(duties).collect());
             let observation = trace.observation.to_vec();
             let point: Vec<f64> = domain
                 .coordinates()
@@ -221,16 +236,11 @@ fn the_observation_of_a_controller_lies_where_its_coordinates_say() {
 }
 
 /// A coordinate by its name, from what the controller has seen; before the first sample everything was as then.
-fn coordinate_value(policy: &Policy, name: &str, past: &[(Vec<f64>, [f64; 2])], observation: &[f32]) -> f64 {
+fn coordinate_value(policy: &Policy, name: &str, past: &[BTreeMap<String, f64>], observation: &[f32]) -> f64 {
     if let Some(index) = policy.features.iter().position(|feature| feature.name == name) {
         return f64::from(observation[index]);
     }
     let (name, ago) = name.split_once(", ").unwrap_or((name, "0 "));
     let ago: usize = ago.split(' ').next().unwrap().parse().unwrap();
-    let (signals, duties) = &past[past.len().saturating_sub(1 + ago)];
-    match name {
-        "previous_duty" => duties[0],
-        "previous_command" => duties[1],
-        _ => signals[policy.signals.iter().position(|signal| signal.name == name).unwrap()],
-    }
+    past[past.len().saturating_sub(1 + ago)][name]
 }

@@ -210,7 +210,7 @@ fn sketch(text: &str) -> Sketch {
         .is_some_and(|value| text[value.span()].starts_with('{'));
     Sketch {
         features: list(root.get("feature")),
-        actions: list(entry("actions", "duties")) + pairs,
+        actions: list(entry("actions", "duties")) + list(entry("actions", "offsets")) + pairs,
         is_continuous: entry("actions", "continuous").is_some(),
         weights: entry("network", "weights").and_then(string),
         golden: entry("network", "golden").and_then(string).map(|(name, _)| name),

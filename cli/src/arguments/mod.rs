@@ -49,6 +49,8 @@ pub enum Command {
     Targets(Targets),
     /// Close a policy's loop on a simulated converter: load steps, classical controllers and the limit beside it
     Simulate(Simulate),
+    /// Gains of an observer and a law of control for a plant, as lines of a contract
+    Design(Design),
     /// Train a policy on a simulated converter and write its folder
     Train(Train),
     /// Compare a plant file with measured records, name what it gets wrong, and write a better one
@@ -323,6 +325,27 @@ pub struct Targets {
     /// Machine-readable, with everything the compiler knows of a target
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct Design {
+    /// Plant file; its nominal values are what is designed for, its sensor of the output voltage gives the noise
+    pub plant: PathBuf,
+    /// Voltage to hold, V
+    #[arg(long, value_name = "V")]
+    pub v_ref: f64,
+    /// Largest load current, A
+    #[arg(long, value_name = "A")]
+    pub load: f64,
+    /// Standard deviation of the measured output voltage in V, in the place of the plant's
+    #[arg(long, value_name = "V")]
+    pub noise: Option<f64>,
+    /// Standard deviations of what the model is wrong by in a period, A,V,V: current, voltage, bias
+    #[arg(long, value_name = "A,V,V", value_delimiter = ',', num_args = 3)]
+    pub model_noise: Option<Vec<f64>>,
+    /// Double pole of the law: how much of an error is left after a period
+    #[arg(long, value_name = "SHARE", default_value_t = 0.5)]
+    pub pole: f64,
 }
 
 #[derive(Debug, Args)]

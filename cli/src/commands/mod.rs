@@ -4,6 +4,7 @@ pub mod certify;
 pub mod compile;
 mod controllers;
 pub mod demo;
+pub mod design;
 pub mod diagnose;
 pub mod drm;
 pub mod inspect;

@@ -1,9 +1,11 @@
 //! All controllers over all load steps.
 
 use plant::Topology;
+use policy::Scalar;
 use toml_input::{Fault, Message};
 
 use super::findings::{Check, Findings, POLICY, Setting, Step};
+use crate::agent::Agent;
 use crate::baselines::Baseline;
 use crate::controller::{Classical, Controller, Trajectory, follow};
 use crate::course::{Course, Named, Tell};
@@ -42,7 +44,7 @@ pub fn simulate(mut setting: Setting, mut named: Vec<Named>, tell: &mut Tell<'_>
         periods: 0,
         differences: Vec::new(),
     });
-    let mut baselines = Vec::new();
+    let mut beside = law(&setting)?.into_iter().collect::<Vec<_>>();
     let topology = setting.converter.parameters().converter.topology;
     if topology != Topology::Buck && !setting.scenario.baselines.is_empty() {
         let word = topology.word();
@@ -53,7 +55,7 @@ pub fn simulate(mut setting: Setting, mut named: Vec<Named>, tell: &mut Tell<'_>
     }
     for kind in &setting.scenario.baselines {
         let design = Baseline::new(*kind, setting.converter.parameters(), setting.v_ref)?;
-        baselines.push((kind.name(), Classical::from(design)));
+        beside.push((kind.name(), Box::new(Classical::from(design))));
     }
     let load_steps = setting.scenario.load_steps.clone();
     let mut progress = Progress {
@@ -66,10 +68,10 @@ pub fn simulate(mut setting: Setting, mut named: Vec<Named>, tell: &mut Tell<'_>
         let course = policy_course(&setting, &mut named, step, check.as_mut(), &mut progress)?;
         let said = unusable(&course.shown, &setting.policy);
         let mut courses = vec![(POLICY.to_owned(), course)];
-        for (name, baseline) in &mut baselines {
+        for (name, controller) in &mut beside {
             let course = Course::new(step, &setting.scenario.task, |instant| {
                 progress.next(step, name)?;
-                run(&setting, baseline, step, instant)
+                run(&setting, controller.as_mut(), step, instant)
             });
             courses.push(((*name).to_owned(), course?));
         }
@@ -85,6 +87,21 @@ pub fn simulate(mut setting: Setting, mut named: Vec<Named>, tell: &mut Tell<'_>
         steps,
         check,
     })
+}
+
+/// What stands beside the policy in every table.
+type Beside = (&'static str, Box<dyn Controller>);
+
+/// The law that a policy adds to, on its own: what the network gains is the difference to it.
+fn law(setting: &Setting) -> Result<Option<Beside>, Error> {
+    let Some(law) = setting.policy.law_alone() else {
+        return Ok(None);
+    };
+    let controller: Box<dyn Controller> = match law.numeric_format.scalar() {
+        Scalar::F32 => Box::new(Agent::<f32>::new(&law)?),
+        Scalar::F64 => Box::new(Agent::<f64>::new(&law)?),
+    };
+    Ok(Some(("law alone", controller)))
 }
 
 fn run(

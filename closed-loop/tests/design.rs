@@ -1,0 +1,170 @@
+//! Designs against scipy and against the poles that were asked for.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+use closed_loop::design::{Design, Model, Noise, Wanted};
+use plant::Parameters;
+
+/// What `fixtures/riccati.py` prints: gains and the largest magnitude of a pole.
+const SCIPY: [([f64; 3], Noise, [f64; 3], f64); 3] = [
+    (
+        [1e-4, 2e-3, 1.5e-3],
+        Noise {
+            process: [5e-3, 1e-4, 5e-3],
+            // sqrt(0.04^2 + 0.06103515625^2 / 12)
+            measured: 0.04370859021068009,
+        },
+        [
+            0.139_301_440_528_549_65,
+            0.131_757_314_319_774_53,
+            0.106_591_794_117_005_16,
+        ],
+        0.959_204_859_629_197,
+    ),
+    (
+        [2e-6, 3.3e-6, 94e-6],
+        Noise {
+            process: [3e-3, 2e-6, 4e-4],
+            measured: 2e-3,
+        },
+        [
+            1.560_975_156_951_130_5,
+            0.241_863_601_889_057_37,
+            0.174_142_056_736_544_98,
+        ],
+        0.931_895_065_872_964_9,
+    ),
+    (
+        [1e-5, 220e-6, 47e-6],
+        Noise {
+            process: [0.1, 0.0, 0.05],
+            measured: 0.2,
+        },
+        [
+            0.398_642_850_456_912_8,
+            0.372_014_392_827_532_05,
+            0.198_113_857_284_840_82,
+        ],
+        0.977_629_193_648_703_8,
+    ),
+];
+
+#[test]
+fn gains_are_those_of_scipy() {
+    for ([period, inductance, capacitance], noise, gains, slowest) in SCIPY {
+        let filter = Model::new(period, inductance, capacitance).filter(&noise).unwrap();
+        for (own, expected) in filter.gains.iter().zip(gains) {
+            // both solve the same equation in binary64, by other ways
+            assert!((own - expected).abs() < 1e-7 * expected, "{filter:?} {gains:?}");
+        }
+        // a power of a million has one constant factor more than its pole: a millionth of its logarithm
+        assert!((filter.slowest - slowest).abs() < 1e-5, "{} {slowest}", filter.slowest);
+    }
+}
+
+fn plant() -> Parameters {
+    let mut plant = Parameters::ideal(12.0, 3.3e-6, 94e-6, 500e3);
+    plant.sensors.v_out.noise = 2e-3;
+    plant.pwm.duty_delay = 1;
+    plant
+}
+
+fn wanted() -> Wanted {
+    Wanted {
+        v_ref: 5.0,
+        load: 10.0,
+        noise: None,
+        model: None,
+        pole: 0.5,
+    }
+}
+
+/// The law's own model, stepped: the capacitor current x and the error e of a converter around its settled point.
+#[test]
+fn the_law_leaves_the_share_of_an_error_that_was_asked_for() {
+    for pole in [0.0, 0.3, 0.5, 0.8] {
+        let design = Design::new(&plant(), Wanted { pole, ..wanted() }).unwrap();
+        let (b, a) = (12.0 * 2e-6 / 3.3e-6, 2e-6 / 94e-6);
+        let (mut x, mut e) = (1.0, 0.2);
+        let mut sizes = Vec::new();
+        for _ in 0..60 {
+            let u = -design.by_current * x - design.by_voltage * e;
+            e += a * (x + 0.5 * b * u);
+            x += b * u;
+            sizes.push(x.abs() + e.abs());
+        }
+        // a double pole p decays as n p^n: the ratio of late steps is near p
+        let ratio = sizes[59] / sizes[39];
+        let late = ratio.powf(1.0 / 20.0);
+        assert!(sizes[59] < 1e-12 || (late - pole).abs() < 0.03, "{pole}: {late}");
+        assert!(
+            pole > 0.0 || sizes[2] < 1e-9,
+            "a pole of 0 is done in two periods: {sizes:?}"
+        );
+    }
+}
+
+#[test]
+fn the_lines_are_those_of_a_contract_and_carry_the_plant() {
+    let text = Design::new(&plant(), wanted()).unwrap().contract();
+    let read: toml::Table = text.parse().unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let observer = &read["observer"][0];
+    let number = |key: &str| observer[key].as_float().unwrap();
+    assert_eq!((number("inductance"), number("capacitance")), (3.3e-6, 94e-6));
+    assert_eq!(number("input_voltage"), 12.0);
+    assert_eq!(observer["compute_delay"].as_integer(), Some(1));
+    // twice 10 A, and four periods of 12 V
+    let reach = 20.0 + 4.0 * 12.0 * 2e-6 / 3.3e-6;
+    let current: Vec<f64> = observer["current"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|x| x.as_float().unwrap())
+        .collect();
+    assert_eq!(current[0], 0.0, "a diode");
+    assert!((current[1] - reach).abs() < 0.02 * reach, "{current:?}");
+    let base = read["actions"]["base"].as_str().unwrap();
+    // half of (12 - 5) V * 5/12 * 2 us / 3.3 uH
+    let half_ripple = 0.5 * 7.0 * (5.0 / 12.0) * 2.0 / 3.3;
+    assert!(base.contains(&format!("i_out + {half_ripple:.4}")), "{base}");
+    let mut synchronous = plant();
+    synchronous.converter.rectifier = plant::Rectifier::Synchronous;
+    let text = Design::new(&synchronous, wanted()).unwrap().contract();
+    assert!(text.contains("current = [-"), "{text}");
+}
+
+#[test]
+fn what_cannot_be_designed_is_refused_with_its_reason() {
+    let refused = |plant: &Parameters, wanted: Wanted| Design::new(plant, wanted).unwrap_err().to_string();
+    let said = refused(
+        &plant(),
+        Wanted {
+            v_ref: 12.0,
+            ..wanted()
+        },
+    );
+    assert!(said.contains("cannot hold") && said.contains("12 V of 12 V"), "{said}");
+    let said = refused(&plant(), Wanted { pole: 1.0, ..wanted() });
+    assert!(said.contains("pole"), "{said}");
+    let said = refused(&plant(), Wanted { load: 0.0, ..wanted() });
+    assert!(said.contains("load current"), "{said}");
+    let mut late = plant();
+    late.pwm.duty_delay = 2;
+    assert!(refused(&late, wanted()).contains("duty_delay = 2"));
+    let mut silent = plant();
+    silent.sensors.v_out.noise = 0.0;
+    let said = refused(&silent, wanted());
+    assert!(said.contains("without noise") && said.contains("--noise"), "{said}");
+    assert!(
+        Design::new(
+            &silent,
+            Wanted {
+                noise: Some(1e-3),
+                ..wanted()
+            }
+        )
+        .is_ok()
+    );
+    let mut boost = plant();
+    boost.converter.topology = plant::Topology::Boost;
+    assert!(refused(&boost, wanted()).contains("boost"));
+}

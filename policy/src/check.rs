@@ -18,7 +18,7 @@ use crate::contract::{actions, features, head, mapping, network, observers, prot
 use crate::digests;
 use crate::faults::Faults;
 use crate::limits::MAX_FEATURES;
-use crate::model::{Digests, Feature, Golden, Head, Interval, Layer, Mapping, Policy, Signal};
+use crate::model::{Digests, Fallback, Feature, Golden, Head, Interval, Layer, Limits, Mapping, Policy, Signal};
 use crate::notes::{left_out, on_duties, unused};
 use crate::raw::RawPolicy;
 use crate::weights::{self, Weights};
@@ -38,7 +38,22 @@ pub fn check(raw: RawPolicy) -> Result<Policy, Faults> {
         .map_err(|faults| raw.rejected(faults))
 }
 
-fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
+/// What the sections of a contract say, each on its own.
+struct Sections<'a> {
+    head: head::Head,
+    signals: signals::Signals,
+    observers: observers::Observers<'a>,
+    features: features::Features<'a>,
+    network: Option<network::Network<'a>>,
+    /// What the outputs mean, and how many the contract lists.
+    decided: Head,
+    outputs: usize,
+    mapping: Option<Option<Mapping>>,
+    fallback: Option<Fallback>,
+    limits: Option<Limits>,
+}
+
+fn sections<'a>(raw: &'a RawPolicy, faults: &mut Sink) -> Sections<'a> {
     let mut root = raw.contract.root();
     let mut taken = Vec::new();
     let head = head::read(&mut root, &mut taken, faults);
@@ -62,9 +77,27 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     let limits = protection::limits(&mut root, fallback, faults);
     // all sections have been asked for by now: a key that is left is one that nobody knows
     root.finish(faults);
+    Sections {
+        head,
+        signals,
+        observers,
+        features,
+        network,
+        decided: residual::limited(actions.head, limits.map(|limits| limits.duty)),
+        outputs: actions.outputs,
+        mapping,
+        fallback,
+        limits,
+    }
+}
 
-    let (feature_count, output_count) = (features.count, actions.outputs);
-    let decided = residual::limited(actions.head, limits.map(|limits| limits.duty));
+fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
+    let read = sections(raw, faults);
+    let (head, signals, observers, features) = (read.head, read.signals, read.observers, read.features);
+    let (network, mapping) = (read.network, read.mapping);
+    let (decided, output_count) = (read.decided, read.outputs);
+    let (fallback, limits) = (read.fallback, read.limits);
+    let feature_count = features.count;
     let duties = decided.duties();
     // a count of 0 is a faulty list: the widths of the weights cannot be judged by it
     let sizes = (feature_count > 0 && output_count > 0).then_some((feature_count, output_count));
@@ -81,8 +114,12 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
         _ => None,
     };
     let bounded = match (&inputs, head.sample_period) {
-        (Some(inputs), Some(period)) if observers::bounded(&observers, inputs, period, faults) => {
-            features::bounded(features.list, inputs, period, faults)
+        (Some(inputs), Some(period)) => {
+            bound_law(raw, &decided, inputs, faults);
+            match observers::bounded(&observers, inputs, period, faults) {
+                true => features::bounded(features.list, inputs, period, faults),
+                false => Vec::new(),
+            }
         }
         _ => Vec::new(),
     };
@@ -91,9 +128,6 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     let known: &[Feature] = if complete { &bounded } else { &[] };
     if let (true, Some(weights)) = (complete, weights.as_mut()) {
         bound_layers(raw, known, &mut weights.layers, faults);
-    }
-    if let (Some(base), Some(inputs)) = (raw.contract.peek(&["actions", "base"]), &inputs) {
-        residual::bounded(&decided, inputs, &base, faults);
     }
     if let (Some(Some(mapping)), Some(inputs)) = (&mapping, &inputs) {
         bound_mapping(raw, mapping, inputs, &duties, faults);
@@ -200,6 +234,12 @@ fn bound_layers(raw: &RawPolicy, features: &[Feature], layers: &mut [Layer], fau
             }
         }
         inputs.clone_from(&layer.bounds);
+    }
+}
+
+fn bound_law(raw: &RawPolicy, head: &Head, inputs: &Inputs, faults: &mut Sink) {
+    if let Some(base) = raw.contract.peek(&["actions", "base"]) {
+        residual::bounded(head, inputs, &base, faults);
     }
 }
 

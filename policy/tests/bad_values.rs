@@ -23,7 +23,7 @@ fn actions_are_two_to_256_duties_or_pairs() {
     contract_fault(
         "[actions]\n",
         "¦[actions]\npairs = []\n",
-        &["exactly one of `duties`, `pairs`, `continuous`", "2"],
+        &["exactly one of `duties`, `pairs`, `offsets`, `continuous`", "2"],
     );
 }
 

@@ -89,7 +89,7 @@ impl Design {
             return Err(message.expected("0 (as fast as can be) to less than 1").into());
         }
         let compute_delay = match plant.pwm.duty_delay {
-            delay @ 0..=1 => delay as u32,
+            delay @ 0..=1 => delay,
             delay => {
                 let message = Message::new("the duty waits longer than an observer can look ahead");
                 return Err(message

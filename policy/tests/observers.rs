@@ -1,0 +1,192 @@
+//! Observers and laws: what they mean, and what of them is refused.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+use common::*;
+use policy::{Estimate, Head, Input, InputVoltage};
+
+const OBSERVER: &str = "[[observer]]
+name = \"model\"
+inductance = 2e-3
+capacitance = 1.5e-3
+input_voltage = 200.0
+output_voltage = \"v_out\"
+load_current = \"i_out\"
+compute_delay = 1
+gains = { current = 0.1, voltage = 0.2, bias = 0.01 }
+current = [0.0, 60.0]
+bias = [-8.0, 4.0]
+
+[[feature]]
+name = \"e\"";
+
+const LAW: &str = "base = \"0.5 - 0.01 * (model_current - i_out)\"
+offsets = [-0.1, 0.0, 0.1]
+dead_zone = [{ source = \"model_voltage - v_ref\", within = 0.25 }]";
+
+fn folder() -> Folder {
+    Folder::new().replace("[[feature]]\nname = \"e\"", OBSERVER)
+}
+
+fn with_law() -> Folder {
+    folder().replace("duties = [0.44, 0.50, 0.56]", LAW)
+}
+
+/// The one fault of a folder says all of it.
+fn refused(folder: Folder, parts: &[&str]) {
+    let faults = folder.faults();
+    assert_eq!(faults.faults.list.len(), 1, "{faults}");
+    let said = faults.to_string();
+    for part in parts {
+        assert!(said.contains(part), "lacks {part:?}:\n{said}");
+    }
+}
+
+#[test]
+fn estimates_are_read_as_signals_are() {
+    let policy = folder()
+        .replace(
+            "source = \"v_ref - v_out\"\nscale",
+            "source = \"v_ref - model_voltage\"\nscale",
+        )
+        .policy();
+    let observer = &policy.observers[0];
+    assert_eq!((observer.output_voltage, observer.load_current), (0, 1));
+    assert_eq!(observer.input_voltage, InputVoltage::Constant(200.0));
+    assert_eq!(observer.range(Estimate::Voltage), policy.signals[0].range);
+    assert!(policy.features[0].source.reads(Input::Estimate(0, Estimate::Voltage)));
+    assert!(policy.reads(Input::PreviousCommand), "the command drives the model");
+    assert!(policy.reads(Input::Signal(1)), "the model is loaded by it");
+    assert!(
+        policy.notes.iter().all(|note| !note.contains("feeds no feature")),
+        "{:?}",
+        policy.notes
+    );
+    // the estimate's range bounds the feature: 100 less 0 to 250, times 0.2, clipped at 20
+    let bound = policy.features[0].bound;
+    assert!(
+        (bound.low + 20.0).abs() < 1e-5 && (bound.high - 20.0).abs() < 1e-5,
+        "{bound:?}"
+    );
+}
+
+#[test]
+fn an_observer_that_nothing_reads_is_noted() {
+    let policy = folder().policy();
+    assert!(
+        policy
+            .notes
+            .iter()
+            .any(|note| note.contains("nothing reads an estimate of observer `model`")),
+        "{:?}",
+        policy.notes
+    );
+}
+
+#[test]
+fn a_law_and_what_is_added_to_it() {
+    let policy = with_law().policy();
+    let Head::Residual(head) = &policy.head else {
+        panic!("{:?}", policy.head)
+    };
+    let offsets: Vec<f64> = head.offsets.iter().map(|action| action.duty).collect();
+    assert_eq!(offsets, [-0.1, 0.0, 0.1]);
+    assert_eq!((head.limits.low, head.limits.high), (0.4, 0.6));
+    assert_eq!(head.dead_zone[0].within, 0.25);
+    // nothing leaves the limits, so these are the ends of all duties
+    let ends = policy.head.duties();
+    assert!(ends[0] >= 0.4 && ends[1] <= 0.6 && ends.len() == 2, "{ends:?}");
+    let law = policy.law_alone().unwrap();
+    assert!(law.actions().iter().all(|action| action.duty == 0.0));
+    assert!(Folder::new().policy().law_alone().is_none());
+}
+
+#[test]
+fn equal_contracts_have_equal_digests_and_another_gain_another() {
+    let digest = |folder: Folder| folder.policy().digests.contract;
+    assert_eq!(digest(with_law()), digest(with_law()));
+    assert_ne!(
+        digest(with_law()),
+        digest(with_law().replace("voltage = 0.2", "voltage = 0.21"))
+    );
+    assert_ne!(
+        digest(with_law()),
+        digest(with_law().replace("within = 0.25", "within = 0.26"))
+    );
+    assert_ne!(
+        digest(with_law()),
+        digest(with_law().replace("0.5 - 0.01", "0.5 - 0.02"))
+    );
+}
+
+#[test]
+fn faults_of_an_observer_say_what_it_wants() {
+    let faulty = |from: &str, to: &str| folder().replace(from, to);
+    refused(
+        faulty("output_voltage = \"v_out\"", "output_voltage = \"v_ou\""),
+        &["v_ou", "did you mean `v_out`"],
+    );
+    refused(
+        faulty("load_current = \"i_out\"\ncompute", "compute"),
+        &["load_current", "the signal of the load current"],
+    );
+    refused(
+        faulty("input_voltage = 200.0", "input_voltage = \"v_in\""),
+        &["v_in", "signal"],
+    );
+    refused(
+        faulty("compute_delay = 1", "compute_delay = 2"),
+        &["compute_delay", "0", "1"],
+    );
+    refused(faulty(", bias = 0.01", ""), &["bias", "gains"]);
+    refused(faulty("inductance = 2e-3", "inductance = 0.0"), &["inductance"]);
+    refused(faulty("bias = [-8.0, 4.0]", "bias = [1.0, 4.0]"), &["bias", "0 in it"]);
+    refused(faulty("current = [0.0, 60.0]", "current = [60.0, 0.0]"), &["current"]);
+    refused(faulty("name = \"model\"", "name = \"i\"\nnome = 1"), &["nome"]);
+}
+
+#[test]
+fn names_of_estimates_clash_with_nothing() {
+    let called = folder().replace("v_ref = 100.0", "v_ref = 100.0\nmodel_bias = 1.0");
+    refused(called, &["model_bias"]);
+    // the observer is faulty, but what reads it is not reported beside it
+    let misspelt = folder().replace("inductance = 2e-3", "inductance = -1.0").replace(
+        "source = \"v_ref - v_out\"\nscale",
+        "source = \"v_ref - model_voltage\"\nscale",
+    );
+    refused(misspelt, &["inductance"]);
+    let unknown = folder().replace(
+        "source = \"v_ref - v_out\"\nscale",
+        "source = \"v_ref - model_volts\"\nscale",
+    );
+    refused(unknown, &["model_volts", "did you mean `model_voltage`"]);
+}
+
+#[test]
+fn a_prediction_that_could_leave_the_format_is_refused() {
+    let faults = folder().replace("capacitance = 1.5e-3", "capacitance = 1e-42");
+    refused(faults, &["observer `model`"]);
+}
+
+#[test]
+fn faults_of_a_law_say_what_it_wants() {
+    let faulty = |from: &str, to: &str| with_law().replace(from, to);
+    refused(
+        faulty("base = \"0.5 - 0.01 * (model_current - i_out)\"\n", ""),
+        &["`offsets` is given without `base`", "law"],
+    );
+    refused(
+        faulty("offsets = [-0.1, 0.0, 0.1]", "offsets = [-0.1, 0.0, 1.5]"),
+        &["1.5", "-1"],
+    );
+    refused(faulty("within = 0.25", "within = 0.0"), &["within"]);
+    refused(
+        faulty("model_voltage - v_ref\"", "model_volt - v_ref\""),
+        &["model_volt", "did you mean"],
+    );
+    let without = folder().replace("duties = [0.44", "base = \"0.5\"\nduties = [0.44");
+    refused(without, &["`base` is given without `offsets`"]);
+    let both = faulty("offsets = ", "duties = [0.4, 0.5, 0.6]\noffsets = ");
+    let faults = both.faults().to_string();
+    assert!(faults.contains("exactly one of"), "{faults}");
+}

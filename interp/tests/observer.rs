@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests stand outside of #[test] functions
 
+#[allow(dead_code)] // another file of tests has the rest
 mod common;
 
 use common::{Dense, PLAIN, load};

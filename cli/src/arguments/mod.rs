@@ -341,7 +341,7 @@ pub struct Design {
     #[arg(long, value_name = "V")]
     pub noise: Option<f64>,
     /// Standard deviations of what the model is wrong by in a period, A,V,V: current, voltage, bias
-    #[arg(long, value_name = "A,V,V", value_delimiter = ',', num_args = 3)]
+    #[arg(long, value_name = "A,V,V", value_delimiter = ',')]
     pub model_noise: Option<Vec<f64>>,
     /// Double pole of the law: how much of an error is left after a period
     #[arg(long, value_name = "SHARE", default_value_t = 0.5)]

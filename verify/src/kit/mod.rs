@@ -196,6 +196,8 @@ mod tests {
                 Op::Difference(..) | Op::NotZero(_) | Op::Above(..) | Op::And(..) | Op::Or(..) => {}
                 // of a continuous head alone: where one is compiled, the moves of the policy itself run them
                 Op::Output | Op::Squash(_) => {}
+                // of a law of control alone, likewise
+                Op::Base | Op::Still => {}
             }
         }
         all.to_vec()

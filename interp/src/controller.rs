@@ -7,18 +7,17 @@ use policy::Policy;
 
 use crate::feature::{Feature, Inputs};
 use crate::head::{Base, Head};
-use crate::integer;
 use crate::limits::Limits;
 use crate::mapping::Mapping;
 use crate::names::state_names;
-use crate::network::Layer;
+use crate::network::Network;
 use crate::observer::{Measured, Observer};
 use crate::real::Real;
 use crate::sanitise::{InputError, Sample, Signal};
 use crate::sound::Sound;
 use crate::state::{Coefficients, State};
 use crate::status;
-use crate::trace::{Command, FeatureTrace, LayerTrace, Trace};
+use crate::trace::{Command, FeatureTrace, Trace};
 
 /// A policy at work, in the number format `T`.
 #[derive(Debug, Clone)]
@@ -430,51 +429,5 @@ impl<T: Real> Controller<T> {
         }
         state.bad_count = if trace.sound { trace.bad_count } else { 0 }; // it may be the damaged word
         state.primed = if trace.sound { u32::from(trace.usable) } else { 2 }; // 2: seen until init or reset
-    }
-}
-
-/// The network in the policy's numeric format.
-#[derive(Debug, Clone)]
-enum Network<T> {
-    /// In the format of the controller (section 6).
-    Real(Vec<Layer<T>>),
-    /// In integers (section 6b).
-    Integer(integer::Network),
-}
-
-impl<T: Real> Network<T> {
-    fn new(policy: &Policy) -> Self {
-        let fused = policy.numeric_format == policy::NumericFormat::F32Fma;
-        match integer::Network::new(policy) {
-            Some(network) => Self::Integer(network),
-            None => Self::Real(policy.layers.iter().map(|layer| Layer::new(layer, fused)).collect()),
-        }
-    }
-
-    /// Traces of the right shape.
-    fn blank(&self) -> Vec<LayerTrace<T>> {
-        let blank = |outputs: usize| {
-            let zeros = Array1::from_elem(outputs, T::ZERO);
-            LayerTrace {
-                pre_activation: zeros.clone(),
-                post_activation: zeros,
-            }
-        };
-        match self {
-            Self::Real(layers) => layers.iter().map(|layer| blank(layer.outputs())).collect(),
-            Self::Integer(network) => network.outputs().map(blank).collect(),
-        }
-    }
-
-    fn run(&self, observation: ArrayView1<'_, T>, traces: &mut [LayerTrace<T>]) {
-        let layers = match self {
-            Self::Integer(network) => return network.run(observation, traces),
-            Self::Real(layers) => layers,
-        };
-        let mut input = observation;
-        for (layer, trace) in layers.iter().zip(traces) {
-            layer.run(input, trace);
-            input = trace.post_activation.view();
-        }
     }
 }

@@ -1,8 +1,10 @@
 //! Dense layers and argmax (contract sections 6 and 7).
 
 use ndarray::{Array1, Array2, ArrayView1};
+use policy::Policy;
 
 use crate::activation::activate;
+use crate::integer;
 use crate::real::Real;
 use crate::trace::LayerTrace;
 
@@ -56,6 +58,52 @@ pub fn argmax<T: Real>(q_values: ArrayView1<'_, T>) -> usize {
         }
     }
     index
+}
+
+/// The network in the policy's numeric format.
+#[derive(Debug, Clone)]
+pub(crate) enum Network<T> {
+    /// In the format of the controller (section 6).
+    Real(Vec<Layer<T>>),
+    /// In integers (section 6b).
+    Integer(integer::Network),
+}
+
+impl<T: Real> Network<T> {
+    pub fn new(policy: &Policy) -> Self {
+        let fused = policy.numeric_format == policy::NumericFormat::F32Fma;
+        match integer::Network::new(policy) {
+            Some(network) => Self::Integer(network),
+            None => Self::Real(policy.layers.iter().map(|layer| Layer::new(layer, fused)).collect()),
+        }
+    }
+
+    /// Traces of the right shape.
+    pub fn blank(&self) -> Vec<LayerTrace<T>> {
+        let blank = |outputs: usize| {
+            let zeros = Array1::from_elem(outputs, T::ZERO);
+            LayerTrace {
+                pre_activation: zeros.clone(),
+                post_activation: zeros,
+            }
+        };
+        match self {
+            Self::Real(layers) => layers.iter().map(|layer| blank(layer.outputs())).collect(),
+            Self::Integer(network) => network.outputs().map(blank).collect(),
+        }
+    }
+
+    pub fn run(&self, observation: ArrayView1<'_, T>, traces: &mut [LayerTrace<T>]) {
+        let layers = match self {
+            Self::Integer(network) => return network.run(observation, traces),
+            Self::Real(layers) => layers,
+        };
+        let mut input = observation;
+        for (layer, trace) in layers.iter().zip(traces) {
+            layer.run(input, trace);
+            input = trace.post_activation.view();
+        }
+    }
 }
 
 #[cfg(test)]

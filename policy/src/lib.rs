@@ -21,6 +21,7 @@ mod expression;
 mod faults;
 mod head;
 mod interval;
+mod known_answers;
 pub mod limits;
 mod memory;
 pub mod model;

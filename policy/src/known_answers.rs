@@ -1,0 +1,50 @@
+//! What the trainer says that its network answers.
+
+use crate::model::NumericFormat;
+
+/// Known answers from the trainer: observation in, Q values and action out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Golden {
+    /// Number of vectors.
+    pub count: usize,
+    /// Vectors of the file that are left out, because the controller can never see their observation.
+    pub outside: usize,
+    /// Row-major `[count][features]`.
+    pub observations: Vec<f32>,
+    /// Row-major `[count][outputs]`; may be empty if the trainer gave actions or duties only.
+    pub q_values: Vec<f32>,
+    /// `[count]`; empty if the trainer gave Q values only, and for a continuous head.
+    pub action_indices: Vec<u32>,
+    /// `[count]`: what a continuous head makes of the observation; empty for a choice, or if the trainer gave outputs only.
+    pub duties: Vec<f32>,
+    /// Allowed |Q - golden| relative to the largest |Q| of the vector; for a continuous head the allowed error of its duty
+    /// as a share of its range.
+    pub tolerance: f64,
+    /// Share of the vectors, 0..1, whose action the numeric format may change; `None` if the contract does not say.
+    pub decisions: Option<f64>,
+    /// Largest error of the duty of a continuous head, as a share of its range, that the numeric format may cause; `None`
+    /// if the contract does not say.
+    pub duty_error: Option<f64>,
+}
+
+impl Golden {
+    /// Share of the vectors whose action the format may change: what the contract says; otherwise none for real formats,
+    /// which compute the trainer's network, and 2 % for integers, whose rounding is a choice to look at.
+    #[must_use]
+    pub fn allowed_changes(&self, format: NumericFormat) -> f64 {
+        /// What is left with scales from the operating range and 64-bit sums: the best that 16 bits were seen to do.
+        const INTEGER: f64 = 0.02;
+        let usual = if format.is_integer() { INTEGER } else { 0.0 };
+        self.decisions.unwrap_or(usual)
+    }
+
+    /// Error of the duty of a continuous head, as a share of its range, that the format may cause: what the contract says;
+    /// otherwise the tolerance for real formats, which compute the trainer's network, and a thousandth for integers.
+    #[must_use]
+    pub fn allowed_duty_error(&self, format: NumericFormat) -> f64 {
+        /// A step of a 10-bit pulse width over the head's range.
+        const INTEGER: f64 = 1e-3;
+        let usual = if format.is_integer() { INTEGER } else { self.tolerance };
+        self.duty_error.unwrap_or(usual)
+    }
+}

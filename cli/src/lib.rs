@@ -37,15 +37,16 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     talk::set(arguments.loudness);
     let begun = Instant::now();
     let result = run(&arguments.command);
-    talk::tell_more(|| format!("took {:.1} s", begun.elapsed().as_secs_f64()));
     interruption::go_no_further_if_ending();
-    match result {
+    let code = match result {
         Ok(outcome) => outcome as u8,
         Err(failure) => {
             failure.print();
             2
         }
-    }
+    };
+    talk::tell_more(|| format!("took {:.1} s", begun.elapsed().as_secs_f64()));
+    code
 }
 
 fn run(command: &Command) -> Result<Outcome, Failure> {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use policy::{NumericFormat, Policy};
 use toml_input::Message;
 
@@ -15,6 +15,12 @@ use crate::failure::Failure;
 pub use commands::certify::{Made as Certified, Request as CertifyRequest, make as certify};
 pub use commands::compile::{Made as Compiled, Request as CompileRequest, make as compile};
 pub use commands::inspect::{json as inspect_json, text as inspect_text};
+
+/// All commands with their options, as clap knows them.
+#[must_use]
+pub fn command() -> clap::Command {
+    Arguments::command()
+}
 
 /// The policy at `path`, which is a contract or its folder, in another numeric format if one is asked for.
 ///

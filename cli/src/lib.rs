@@ -11,8 +11,10 @@ mod outcome;
 mod output;
 mod ownership;
 mod staging;
+mod talk;
 
 use std::ffi::OsString;
+use std::time::Instant;
 
 use clap::Parser;
 
@@ -32,15 +34,19 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
             return u8::try_from(error.exit_code()).unwrap_or(2);
         }
     };
+    talk::set(arguments.loudness);
+    let begun = Instant::now();
     let result = run(&arguments.command);
     interruption::go_no_further_if_ending();
-    match result {
+    let code = match result {
         Ok(outcome) => outcome as u8,
         Err(failure) => {
             failure.print();
             2
         }
-    }
+    };
+    talk::tell_more(|| format!("took {:.1} s", begun.elapsed().as_secs_f64()));
+    code
 }
 
 fn run(command: &Command) -> Result<Outcome, Failure> {
@@ -64,5 +70,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Simulate(options) => commands::simulate::run(options),
         Command::Demo(options) => commands::demo::run(options),
         Command::Drm(command) => commands::drm::run(command),
+        Command::Completions(options) => commands::completions::run(options),
+        Command::Manpages(options) => commands::manpages::run(options),
     }
 }

@@ -5,12 +5,14 @@ use std::fs;
 use std::io::{self, Write};
 use std::path::Path;
 
+use serde::Serialize;
 use toml_input::Message;
 
 use crate::failure::Failure;
 use crate::interruption;
 use crate::ownership::{self, Replacing};
 use crate::staging::{self, Staged};
+use crate::talk;
 
 /// Writes files into a folder: either all of them are there afterwards or none has changed.
 ///
@@ -44,6 +46,9 @@ fn write_if(
         .publish()
         .map_err(|(path, error)| cannot("replace", &path, &error))?;
     staging::remove_leftovers(folder);
+    for name in files.keys() {
+        talk::tell_more(|| format!("wrote {}", folder.join(name).display()));
+    }
     Ok(())
 }
 
@@ -69,19 +74,23 @@ fn bytes_of(files: &BTreeMap<String, String>) -> BTreeMap<String, Vec<u8>> {
     files.iter().map(bytes).collect()
 }
 
-/// Writes the results of a run to a folder that holds nothing yet, then says `summary` and what to look at.
+/// Writes the results of a run to a folder that holds nothing yet.
 ///
 /// # Errors
 /// If the folder holds something by now; else as [`write_all`].
-pub fn write_results(
-    folder: &Path,
-    files: &BTreeMap<String, String>,
-    summary: &str,
-    page: &str,
-) -> Result<(), Failure> {
-    write_if(folder, &bytes_of(files), || check_new_folder(folder))?;
+pub fn write_results(folder: &Path, files: &BTreeMap<String, String>) -> Result<(), Failure> {
+    write_if(folder, &bytes_of(files), || check_new_folder(folder))
+}
+
+/// Says what results mean and what to look at.
+///
+/// # Errors
+/// As [`say`].
+pub fn say_results(folder: &Path, files: &BTreeMap<String, String>, summary: &str, page: &str) -> Result<(), Failure> {
     let (count, out) = (files.len(), folder.display());
-    say(&format!("{summary}\n{count} files in {out}; to look at: {out}/{page}"))
+    // apart, so that no note at the end of a summary takes the blank line along
+    say(summary.trim_end())?;
+    say(&format!("\n{count} files in {out}; to look at: {out}/{page}"))
 }
 
 /// Writes one file, and others by name beside it, none of which may exist yet.
@@ -155,14 +164,34 @@ pub fn check_new_folder(folder: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Prints a line or more on standard output. A reader that has seen enough (`policyc inspect policy | head -1`) is no fault.
+/// Prints a line or more of an answer on standard output; in a quiet run its notes are left out.
+///
+/// # Errors
+/// As [`print`].
+pub fn say(text: &str) -> Result<(), Failure> {
+    match talk::heard(text) {
+        // it was a note and nothing else
+        heard if heard.is_empty() && !text.is_empty() => Ok(()),
+        heard => print(&format!("{heard}\n")),
+    }
+}
+
+/// Prints an answer for programs: one JSON value.
+///
+/// # Errors
+/// As [`print`]; if a number cannot be written as JSON.
+pub fn say_json(answer: &impl Serialize) -> Result<(), Failure> {
+    print(&(serde_json::to_string_pretty(answer)? + "\n"))
+}
+
+/// Prints a text as it is. A reader that has seen enough (`policyc inspect policy | head -1`) is no fault.
 ///
 /// # Errors
 /// If the text cannot be written.
-pub fn say(text: &str) -> Result<(), Failure> {
+pub fn print(text: &str) -> Result<(), Failure> {
     interruption::go_no_further_if_ending();
     let mut out = io::stdout().lock();
-    match writeln!(out, "{text}").and_then(|()| out.flush()) {
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         Err(error) => Err(Message::new(format!("cannot write to standard output: {error}")).into()),
         Ok(()) => Ok(()),

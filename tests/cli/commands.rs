@@ -40,6 +40,13 @@ fn the_help_of_every_command_names_its_arguments() {
         ("certify", &["<POLICY>", "--format", "--axis", "--at", "--out"]),
         ("demo", &["--out", "--steps"]),
         ("drm", &["acquire", "fit", "judge", "transfer"]),
+        ("simulate", &["<SCENARIO>", "--policy", "--out", "--json"]),
+        (
+            "train",
+            &["<SETTINGS>", "--out", "--resume", "--json", "--quiet", "--verbose"],
+        ),
+        ("completions", &["<SHELL>", "bash", "elvish"]),
+        ("manpages", &["--out", "--force"]),
     ] {
         assert!(overview.contains(&format!("\n  {command} ")), "{overview}");
         // lines are broken where the terminal ends

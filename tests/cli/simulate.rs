@@ -18,7 +18,7 @@ tail = 10
 ";
 
 /// The example policy in `policy/`, plants, and a short scenario.
-fn desk() -> Desk {
+pub fn desk() -> Desk {
     let desk = Desk::new("paper");
     std::fs::remove_dir_all(desk.path("policy")).unwrap();
     let examples = tests::root().join("examples");

@@ -42,7 +42,7 @@ after = 40
 tail = 10
 "#;
 
-fn desk() -> Desk {
+pub fn desk() -> Desk {
     let desk = Desk::new("paper");
     let examples = tests::root().join("examples");
     copy_folder(&examples.join("plants"), &desk.path("plants"));

@@ -26,6 +26,7 @@ mod resume;
 pub mod score;
 pub mod seeds;
 pub mod settings;
+pub mod summary;
 pub mod trainer;
 
 pub use closed_loop::scenario::Metrics;

@@ -2,6 +2,7 @@
 
 use crate::settings::{Instants, Requirement};
 use closed_loop::scenario::{Finding, Metrics};
+use serde::Serialize;
 
 /// Weight of what exceeds a limit against what stays below it.
 // one of the eighteen figures of six load steps that misses its limit by 2 % outweighs all that hold
@@ -15,7 +16,7 @@ const WORST_RATIO: f64 = 1e3;
 const NEIGHBOURS: f64 = 0.1;
 
 /// Whether the specification is met, and how well.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Score {
     /// Every limit holds.
     pub met: bool,

@@ -14,9 +14,9 @@ use crate::contract::Contract;
 use crate::faults::Error;
 use crate::outcome::Outcome;
 use crate::settings::Settings;
+use crate::summary::Worst;
 use crate::trainer::{Ended, Progress, Trainer};
 use closed_loop::environment::Environment;
-use closed_loop::scenario::Metrics;
 
 /// One seed's training after a run.
 #[derive(Debug)]
@@ -177,10 +177,7 @@ pub fn table(settings: &Settings, runs: &[SeedRun]) -> String {
             .to_owned();
     for run in runs {
         let Some(outcome) = &run.outcome else { continue };
-        let largest = |figure: fn(&Metrics) -> f64| {
-            let figures = outcome.findings.iter().map(|finding| figure(&finding.worst));
-            figures.fold(0.0, f64::max)
-        };
+        let worst = Worst::of(&outcome.findings);
         text.push_str(&format!(
             "{:4}  {:>15}  {:>10}  {:<9}  {:<10}  {:>11.2}  {:>11.2}  {:>6.3}  {:>6.3}\n",
             outcome.seed,
@@ -188,9 +185,9 @@ pub fn table(settings: &Settings, runs: &[SeedRun]) -> String {
             grouped(outcome.best_step),
             verdict(outcome.selected.met),
             verdict(outcome.evaluated.met),
-            largest(|metrics| metrics.deviation),
-            1e3 * largest(|metrics| metrics.settling),
-            largest(|metrics| metrics.tail_max),
+            worst.deviation,
+            1e3 * worst.settling,
+            worst.tail_max,
             outcome.selected.cost,
         ));
     }

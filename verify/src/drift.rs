@@ -40,6 +40,15 @@ pub struct Changed {
     pub found: Option<String>,
 }
 
+impl Changed {
+    /// Whether the line differs in nothing but the white space at its end.
+    #[must_use]
+    pub fn differs_at_its_end(&self) -> bool {
+        let ends = |line: &Option<String>| line.as_deref().unwrap_or_default().trim_end().to_owned();
+        self.found.is_some() && ends(&self.expected) == ends(&self.found)
+    }
+}
+
 /// Compares `folder` with the files that the policy yields.
 ///
 /// # Errors

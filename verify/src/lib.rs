@@ -19,16 +19,19 @@
 //! | archives of FMUs | [`fmu`] |
 //! | what the format does to decisions | [`decisions`] |
 //! | a log of the trainer against the contract | [`replay`] |
+//! | what was found, for other programs | [`cases`], [`exchange`] |
 //! | checked-in files against the policy | [`drift()`], [`folder`] |
 
 pub mod advice;
 pub mod budget;
+pub mod cases;
 pub mod compare;
 pub mod costs;
 pub mod drift;
 pub mod drivers;
 pub mod elf;
 pub mod estimate;
+pub mod exchange;
 pub mod fitting;
 pub mod fmu;
 pub mod folder;

@@ -276,8 +276,7 @@ fn write_drift(out: &mut String, drift: &Drift) -> fmt::Result {
     for change in &drift.changed {
         let text = |line: &Option<String>| line.clone().unwrap_or_else(|| "(end of file)".to_owned());
         writeln!(out, "  {}:{}", change.path, change.line)?;
-        let ends = |line: &Option<String>| line.as_deref().unwrap_or_default().trim_end().to_owned();
-        if change.found.is_some() && ends(&change.expected) == ends(&change.found) {
+        if change.differs_at_its_end() {
             writeln!(
                 out,
                 "    differs in the white space or line ending at its end (LF is expected)"

@@ -2,19 +2,23 @@
 
 pub mod drm;
 mod shared;
+mod shell;
+pub mod verify;
 
 use std::path::PathBuf;
 
+use ::verify::budget::Clock;
 use clap::{Args, Parser, Subcommand};
 use codegen::Output;
 use policy::NumericFormat;
-use verify::budget::Clock;
 
 use crate::one_of::OneOf;
 use crate::ownership::Replacing;
 
 use drm::Drm;
-pub use shared::{Columns, ControllerKind, Outside};
+pub use shared::{Columns, ControllerKind, Loudness, Outside};
+pub use shell::{Completions, Manpages};
+pub use verify::Verify;
 
 /// From a trained policy to verified controller code.
 ///
@@ -25,6 +29,8 @@ pub use shared::{Columns, ControllerKind, Outside};
 #[derive(Debug, Parser)]
 #[command(name = "policyc", version, max_term_width = 100)]
 pub struct Arguments {
+    #[command(flatten)]
+    pub loudness: Loudness,
     #[command(subcommand)]
     pub command: Command,
 }
@@ -60,6 +66,10 @@ pub enum Command {
     /// Duty ratio mapping: acquire settled points, fit drm.toml, judge it
     #[command(subcommand)]
     Drm(Drm),
+    /// Print what a shell needs to complete commands and options
+    Completions(Completions),
+    /// Write a manual page for each command
+    Manpages(Manpages),
 }
 
 impl Command {
@@ -142,7 +152,7 @@ pub struct Replay {
     #[arg(long)]
     pub exploring: bool,
     /// Largest difference that is equal, as a share of the largest logged magnitude of the feature
-    #[arg(long, value_name = "SHARE", default_value_t = verify::replay::TOLERANCE, value_parser = share)]
+    #[arg(long, value_name = "SHARE", default_value_t = ::verify::replay::TOLERANCE, value_parser = share)]
     pub tolerance: f64,
     /// Machine-readable
     #[arg(long)]
@@ -172,7 +182,7 @@ pub struct Compile {
     #[arg(long, value_name = "FREQUENCY", value_parser = Clock::parse, conflicts_with = "no_costs")]
     pub clock: Option<Clock>,
     /// Control steps in the kit
-    #[arg(long, value_name = "N", default_value_t = verify::kit::DEFAULT_STEPS, value_parser = clap::value_parser!(u32).range(1..=i64::from(verify::kit::MOST_STEPS)))]
+    #[arg(long, value_name = "N", default_value_t = ::verify::kit::DEFAULT_STEPS, value_parser = clap::value_parser!(u32).range(1..=i64::from(::verify::kit::MOST_STEPS)))]
     pub kit_steps: u32,
     /// Numeric format in the place of the contract's
     #[arg(long, value_parser = format())]
@@ -183,6 +193,9 @@ pub struct Compile {
     /// Folder for the generated files; made if missing
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+    /// Machine-readable
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// A share, 0..1.
@@ -192,48 +205,6 @@ fn share(text: &str) -> Result<f64, String> {
         true => Ok(number),
         false => Err("expected a number from 0 to 1, such as 0.02 for 2 %".to_owned()),
     }
-}
-
-#[derive(Debug, Args)]
-pub struct Verify {
-    #[command(flatten)]
-    pub outside: Outside,
-    /// policy.toml or the folder that holds it
-    pub policy: PathBuf,
-    /// Numeric format in the place of the contract's; with --generated, of the code in that folder unless given
-    #[arg(long, value_parser = format())]
-    pub format: Option<NumericFormat>,
-    /// Control steps to compare per build
-    #[arg(long, default_value_t = 20_000, value_parser = clap::value_parser!(u64).range(1..))]
-    pub steps: u64,
-    /// Seed of the generated measurements
-    #[arg(long, default_value_t = 1)]
-    pub seed: u64,
-    /// Deployment target: its compilers and, where it is not this machine, its emulator. Unless given: the target of the
-    /// generated folder, else host
-    #[arg(long)]
-    pub target: Option<String>,
-    /// Verify the generated code in this folder, if it is what the policy yields today; files that differ are named, and
-    /// nothing is built
-    #[arg(long, value_name = "DIR")]
-    pub generated: Option<PathBuf>,
-    /// Share of the golden decisions that the numeric format may change, 0 to 1, in the place of the contract's
-    #[arg(long, value_name = "SHARE", value_parser = share)]
-    pub golden_decisions: Option<f64>,
-    /// Only compare the files of --generated with what the policy yields today; needs no compiler
-    #[arg(long, requires = "generated", conflicts_with_all = ["steps", "seed", "trace"])]
-    pub drift_only: bool,
-    /// Recorded measurements to replay first: CSV with one column per signal, in the signal's unit (ADC signals take
-    /// the nearest code)
-    #[arg(long, value_name = "CSV")]
-    pub trace: Vec<PathBuf>,
-    /// Where a column of the recorded measurements has another name than its signal: signal=column or signal=column*factor,
-    /// separated by commas or given several times
-    #[arg(long, value_name = "MAP", requires = "trace")]
-    pub map: Vec<String>,
-    /// Machine-readable
-    #[arg(long)]
-    pub json: bool,
 }
 
 #[derive(Debug, Args)]
@@ -291,6 +262,9 @@ pub struct Certify {
     /// Folder for certificate.json, certificate.html and map.svg; made if missing
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+    /// Machine-readable
+    #[arg(long)]
+    pub json: bool,
 }
 
 #[derive(Debug, Args)]
@@ -318,6 +292,9 @@ pub struct Simulate {
     /// bit by bit
     #[arg(long)]
     pub check: bool,
+    /// Machine-readable
+    #[arg(long)]
+    pub json: bool,
 }
 
 #[derive(Debug, Args)]
@@ -364,6 +341,9 @@ pub struct Train {
     /// Go on from the checkpoints that an interrupted training left in DIR, bit for bit
     #[arg(long)]
     pub resume: bool,
+    /// Machine-readable
+    #[arg(long)]
+    pub json: bool,
 }
 
 #[derive(Debug, Args)]

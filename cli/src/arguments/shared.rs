@@ -14,6 +14,17 @@ pub struct Outside {
     pub allow_outside: bool,
 }
 
+/// How much is said beside the answer.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub struct Loudness {
+    /// Only answers and errors: no progress, no notes
+    #[arg(short, long, global = true, display_order = 902, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Also tell, on standard error, more of the progress, each file that is written, and the time it took
+    #[arg(short, long, global = true, display_order = 903)]
+    pub verbose: bool,
+}
+
 /// What runs the policy in a closed loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum ControllerKind {

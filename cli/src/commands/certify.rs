@@ -1,12 +1,14 @@
 //! `policyc certify`
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use ::certify::{Certificate, Domain, Effort, Slice, page};
 use interp::Controller;
 use ndarray::aview1;
 use policy::{Interval, NumericFormat, Policy};
 use random::{Random, SplitMix};
+use serde::Serialize;
 use toml_input::Message;
 
 use crate::arguments::Certify;
@@ -31,10 +33,22 @@ pub struct Request {
 
 /// A certificate as files, by name, and in words.
 pub struct Made {
+    /// As `certificate.json` has it.
+    pub certificate: Certificate,
     /// `certificate.json`, `certificate.html` and, where there is a map, `map.svg`.
     pub files: BTreeMap<String, String>,
     /// What the command says.
     pub summary: String,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Answer<'a> {
+    out: &'a Path,
+    files: Vec<&'a String>,
+    /// The keys of `certificate.json`.
+    #[serde(flatten)]
+    certificate: &'a Certificate,
 }
 
 /// Proves, measures, draws, writes.
@@ -51,6 +65,14 @@ pub fn run(options: &Certify) -> Result<Outcome, Failure> {
         },
     )?;
     output::replace_own_texts(&options.out, &made.files, options.replacing)?;
+    if options.json {
+        output::say_json(&Answer {
+            out: &options.out,
+            files: made.files.keys().collect(),
+            certificate: &made.certificate,
+        })?;
+        return Ok(Outcome::Done);
+    }
     output::say(&made.summary)?;
     output::say(&format!(
         "to look at: {}",
@@ -110,6 +132,7 @@ pub fn make(policy: &Policy, options: &Request) -> Result<Made, Failure> {
     Ok(Made {
         files,
         summary: page::summary(&certificate),
+        certificate,
     })
 }
 

@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 
 use codegen::output::{languages, with_cores};
 use codegen::{Output, manifest, notes};
-use policy::Policy;
+use policy::{NumericFormat, Policy};
+use serde::Serialize;
 use targets::TargetSpec;
 use toml_input::Message;
 use verify::budget::Clock;
-use verify::costs::StepCosts;
+use verify::costs::{Entry, StepCosts};
 use verify::fmu::Archive;
 use verify::{Decisions, Files, UNPROVEN, advice, text};
 
@@ -18,6 +19,7 @@ use crate::failure::Failure;
 use crate::outcome::Outcome;
 use crate::output;
 use crate::ownership::{self, Replacing};
+use crate::talk;
 use report::bytes;
 
 /// What is asked of a compilation, beside the policy.
@@ -74,14 +76,113 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
     )?;
     ownership::check_policy(&options.out, &policy.name, options.replacing)?;
     let written = write(&options.out, &made.files, &made.archives, options.replacing)?;
-    say(&policy, made.target, &written, &made.archives)?;
-    for text in made.costs.texts(&policy, made.target, options.clock) {
-        output::say(&text)?;
+    let costs = made.costs.texts(&policy, made.target, options.clock);
+    let budget = match options.clock {
+        Some(clock) => advice::lines(&policy, made.target, &made.outputs, &made.costs, clock)?,
+        None => Vec::new(),
+    };
+    if options.json {
+        say_json(options, &policy, &made, &costs, budget)?;
+        return Ok(Outcome::Done);
     }
-    if let Some(clock) = options.clock {
-        output::say(&advice::lines(&policy, made.target, &made.outputs, &made.costs, clock)?.join("\n"))?;
+    say(&policy, made.target, &written, &made.archives)?;
+    for text in &costs {
+        output::say(text)?;
+    }
+    if !budget.is_empty() {
+        output::say(&budget.join("\n"))?;
     }
     Ok(Outcome::Done)
+}
+
+/// What `--json` prints. Keys that the manifest has, too, mean the same in both.
+#[derive(Serialize)]
+struct Answer<'a> {
+    name: &'a str,
+    target: &'static str,
+    numeric_format: NumericFormat,
+    /// s
+    sample_period: f64,
+    sizes: manifest::Sizes,
+    costs: Vec<Entry<'a>>,
+    /// With a clock: whether a step fits into its period, in words.
+    budget: Vec<String>,
+    out: &'a Path,
+    files: Vec<Written>,
+    archives: Vec<Packed<'a>>,
+    notes: &'a [String],
+}
+
+#[derive(Serialize)]
+struct Written {
+    /// Below `out`.
+    path: String,
+    bytes: usize,
+}
+
+#[derive(Serialize)]
+struct Packed<'a> {
+    path: &'a str,
+    /// What the binary in it is for, and the compiler that made it.
+    platform: Option<&'a str>,
+    compiler: Option<&'a str>,
+    /// Why there is no binary.
+    missing: Option<&'a str>,
+}
+
+impl<'a> Packed<'a> {
+    fn of(archive: &'a Archive) -> Self {
+        let binary = archive.binary.as_ref();
+        Self {
+            path: &archive.file,
+            platform: binary.ok().map(|(platform, _)| *platform),
+            compiler: binary.ok().map(|(_, compiler)| *compiler),
+            missing: binary.err().map(String::as_str),
+        }
+    }
+}
+
+fn say_json(
+    options: &Compile,
+    policy: &Policy,
+    made: &Made,
+    costs: &[String],
+    budget: Vec<String>,
+) -> Result<(), Failure> {
+    let sizes = manifest::sizes(policy, made.target);
+    let files = together(&made.files, &made.archives);
+    let mut notes = noted(policy, made.target, &sizes, files.keys().map(Path::new));
+    notes.extend(costs.iter().flat_map(|text| talk::notes_of(text)));
+    notes.iter().for_each(|note| talk::note(note));
+    let written = |(path, content): (&String, &Vec<u8>)| Written {
+        path: path.clone(),
+        bytes: content.len(),
+    };
+    output::say_json(&Answer {
+        name: &policy.name,
+        target: made.target.name,
+        numeric_format: policy.numeric_format,
+        sample_period: policy.sample_period,
+        sizes,
+        costs: made.costs.entries(policy, options.clock),
+        budget,
+        out: &options.out,
+        files: files.iter().map(written).collect(),
+        archives: made.archives.iter().map(Packed::of).collect(),
+        notes: &notes,
+    })
+}
+
+/// What the user should know of the policy and its code, one sentence each.
+fn noted<'f>(
+    policy: &Policy,
+    target: &TargetSpec,
+    sizes: &manifest::Sizes,
+    files: impl Iterator<Item = &'f Path>,
+) -> Vec<String> {
+    let unproven = policy.golden.is_none().then(|| UNPROVEN.to_owned());
+    let of_policy = policy.notes.iter().cloned().chain(unproven);
+    of_policy.chain(notes(policy, target, sizes, files)).collect()
 }
 
 /// The files of a policy; nothing is written.
@@ -184,14 +285,8 @@ pub fn say(
     written: &[(PathBuf, usize)],
     archives: &[Archive],
 ) -> Result<(), Failure> {
-    for note in &policy.notes {
-        output::say(&format!("note: {note}"))?;
-    }
-    if policy.golden.is_none() {
-        output::say(&format!("note: {UNPROVEN}"))?;
-    }
     let sizes = manifest::sizes(policy, target);
-    for note in notes(policy, target, &sizes, written.iter().map(|(path, _)| path.as_path())) {
+    for note in noted(policy, target, &sizes, written.iter().map(|(path, _)| path.as_path())) {
         output::say(&format!("note: {note}"))?;
     }
     output::say(&format!("{}: {sizes}", policy.name))?;

@@ -27,6 +27,7 @@ use crate::arguments::Diagnose;
 use crate::failure::Failure;
 use crate::outcome::Outcome;
 use crate::output;
+use crate::talk;
 
 /// Reads the records, diagnoses, writes the three files.
 pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
@@ -153,7 +154,7 @@ impl Shown {
         match what {
             Progress::Stage(stage) => {
                 self.line.clear();
-                eprintln!("{:6.1} s  {stage}", self.begun.elapsed().as_secs_f64());
+                talk::tell(&format!("{:6.1} s  {stage}", self.begun.elapsed().as_secs_f64()));
                 (self.stage, self.stage_begun) = (stage.to_owned(), Instant::now());
             }
             Progress::Done { done, total } => {

@@ -2,12 +2,14 @@
 
 pub mod certify;
 pub mod compile;
+pub mod completions;
 mod controllers;
 pub mod demo;
 pub mod design;
 pub mod diagnose;
 pub mod drm;
 pub mod inspect;
+pub mod manpages;
 pub mod new;
 mod progress_line;
 pub mod prove;

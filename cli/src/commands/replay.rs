@@ -8,6 +8,7 @@ use crate::arguments::Replay;
 use crate::failure::Failure;
 use crate::outcome::Outcome;
 use crate::output;
+use crate::talk;
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -29,11 +30,11 @@ pub fn run(options: &Replay) -> Result<Outcome, Failure> {
     }
     let replay = replay::replay(&policy, &log, options.tolerance, options.exploring)?;
     for note in &replay.notes {
-        eprintln!("note: {}: {note}", options.log.display());
+        talk::note(&format!("{}: {note}", options.log.display()));
     }
     let equal = replay.equal();
     if options.json {
-        output::say(&serde_json::to_string_pretty(&Answer { equal, replay })?)?;
+        output::say_json(&Answer { equal, replay })?;
     } else {
         output::say(replay::text(&policy, &replay).trim_end())?;
     }

@@ -1,10 +1,12 @@
 //! `policyc simulate`
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::atomic::Ordering;
 
 use closed_loop::Scenario;
 use closed_loop::simulation::{Findings, PAGE, Setting, simulate};
+use serde::Serialize;
 
 use super::controllers;
 use super::progress_line::ProgressLine;
@@ -13,9 +15,20 @@ use crate::failure::Failure;
 use crate::interruption;
 use crate::outcome::Outcome;
 use crate::output;
+use crate::talk;
 
 // `diagnose` asks the same of a policy
 pub use closed_loop::{suits, v_ref};
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Answer<'a, T: Serialize> {
+    out: &'a Path,
+    files: Vec<&'a String>,
+    /// The keys of `metrics.json`.
+    #[serde(flatten)]
+    metrics: T,
+}
 
 /// Simulates, writes, reports.
 pub fn run(options: &Simulate) -> Result<Outcome, Failure> {
@@ -24,11 +37,25 @@ pub fn run(options: &Simulate) -> Result<Outcome, Failure> {
     let found = all(options, setting(options)?);
     if stop.load(Ordering::Relaxed) {
         // what failed, failed because of the signal
-        output::say("Interrupted; nothing written")?;
+        match options.json {
+            true => talk::tell("Interrupted; nothing written"),
+            false => output::say("Interrupted; nothing written")?,
+        }
         return Ok(Outcome::Interrupted);
     }
     let found = found?;
-    output::write_results(&options.out, &found.files()?, &found.summary(), PAGE)?;
+    let files = found.files()?;
+    output::write_results(&options.out, &files)?;
+    if options.json {
+        found.notes().iter().for_each(|note| talk::note(note));
+        output::say_json(&Answer {
+            out: &options.out,
+            files: files.keys().collect(),
+            metrics: found.metrics(),
+        })?;
+    } else {
+        output::say_results(&options.out, &files, &found.summary(), PAGE)?;
+    }
     let equal = found.check.is_none_or(|check| check.differences.is_empty());
     Ok(if equal { Outcome::Done } else { Outcome::Different })
 }

@@ -1,17 +1,24 @@
 //! `policyc verify`
 
+use std::path::Path;
+
+use policy::Policy;
 use serde::Serialize;
 use targets::TargetSpec;
 use toml_input::Message;
+use verify::cases::{self, Case};
 use verify::drift::Drift;
+use verify::exchange::github;
 use verify::traces::Recorded;
 use verify::{Folder, Options, Progress, Report, folder, text};
 
 use super::progress_line::ProgressLine;
 use crate::arguments::Verify;
+use crate::arguments::verify::{Asked, Service};
 use crate::failure::Failure;
 use crate::outcome::Outcome;
 use crate::output;
+use crate::talk;
 use report::grouped;
 
 /// What `--json` prints.
@@ -27,6 +34,18 @@ struct Answer {
 
 /// Compares and reports.
 pub fn run(options: &Verify) -> Result<Outcome, Failure> {
+    let answered = compare(options);
+    if let (Err(Failure(faults)), Some(Service::Github)) = (&answered, options.annotations) {
+        for fault in faults {
+            let line = fault.line_column().map_or(1, |(line, _)| line);
+            let file = fault.file.display().to_string();
+            output::print(&(github::error(&file, line, &fault.problem) + "\n"))?;
+        }
+    }
+    answered
+}
+
+fn compare(options: &Verify) -> Result<Outcome, Failure> {
     let written = match (options.format, &options.generated) {
         (Some(format), _) => Some(format),
         (None, Some(folder)) => folder::numeric_format(folder),
@@ -41,7 +60,7 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
         .map(|path| Recorded::open(&policy, path, &map))
         .collect::<Result<Vec<_>, _>>()?;
     for (path, recording) in options.trace.iter().zip(&recorded) {
-        let note = |note: &String| eprintln!("note: {}: {note}", path.display());
+        let note = |note: &String| talk::note(&format!("{}: {note}", path.display()));
         recording.notes.iter().for_each(note);
     }
     let on_disk = options
@@ -54,7 +73,7 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
         && (options.drift_only || !folder.drift.is_empty())
     {
         // a build of files that differ says the same once more, in every compiler's words
-        return files_alone(options, &policy.name, folder.drift.clone());
+        return answer(options, &policy, Some(folder.drift.clone()), None);
     }
     let mut progress = ProgressLine::new();
     let mut tell = |news| {
@@ -81,27 +100,40 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
     if !report.compared() {
         return Err(text::nothing_compared(&report).into());
     }
-    let drift = on_disk.map(|folder| folder.drift);
-    let equal = report.passed() && drift.as_ref().is_none_or(Drift::is_empty);
+    answer(options, &policy, on_disk.map(|folder| folder.drift), Some(report))
+}
+
+/// Writes and says what was found; without a report of builds it is what the files alone tell.
+fn answer(options: &Verify, policy: &Policy, drift: Option<Drift>, report: Option<Report>) -> Result<Outcome, Failure> {
+    let equal = report.as_ref().is_none_or(Report::passed) && drift.as_ref().is_none_or(Drift::is_empty);
+    let cases = cases(options, policy, drift.as_ref(), report.as_ref());
+    for Asked { sheet, file } in &options.report {
+        let text = sheet.text(&policy.name, &cases)?;
+        output::replace_own_one(file, &text, options.replacing)?;
+    }
     if options.json {
-        let report = Some(report);
-        output::say(&serde_json::to_string_pretty(&Answer { equal, drift, report })?)?;
+        output::say_json(&Answer { equal, drift, report })?;
     } else {
-        output::say(text::report(&policy, &report, drift.as_ref())?.trim_end())?;
+        let text = match (&report, &drift) {
+            (Some(report), drift) => text::report(policy, report, drift.as_ref())?,
+            (None, drift) => text::files_alone(&policy.name, &drift.clone().unwrap_or_default())?,
+        };
+        output::say(text.trim_end())?;
+    }
+    if options.annotations == Some(Service::Github) {
+        for line in github::annotations(&cases) {
+            output::print(&(line + "\n"))?;
+        }
     }
     Ok(if equal { Outcome::Done } else { Outcome::Different })
 }
 
-/// The answer of a comparison that ends with the files.
-fn files_alone(options: &Verify, policy: &str, drift: Drift) -> Result<Outcome, Failure> {
-    let equal = drift.is_empty();
-    if options.json {
-        let (drift, report) = (Some(drift), None);
-        output::say(&serde_json::to_string_pretty(&Answer { equal, drift, report })?)?;
-    } else {
-        output::say(text::files_alone(policy, &drift)?.trim_end())?;
-    }
-    Ok(if equal { Outcome::Done } else { Outcome::Different })
+fn cases(options: &Verify, policy: &Policy, drift: Option<&Drift>, report: Option<&Report>) -> Vec<Case> {
+    let folder = options.generated.as_deref().unwrap_or(Path::new("."));
+    let files = drift.map(|drift| cases::of_drift(folder, drift));
+    let contract = super::contract_path(&options.policy);
+    let builds = report.map(|report| cases::of_report(&contract, policy, report));
+    files.into_iter().chain(builds).flatten().collect()
 }
 
 /// The target that was asked for; generated code is verified as what it was generated for.

@@ -102,35 +102,47 @@ impl Findings {
         if let Some(check) = &self.check {
             out.push_str(&format!("\n{}\n", words::check_text(check)));
         }
-        for note in words::unsettled(self).iter().chain(&setting.notes) {
+        for note in self.notes() {
             out.push_str(&format!("\nnote: {note}\n"));
         }
         out
     }
+
+    /// What the user should know of the results, one sentence each.
+    #[must_use]
+    pub fn notes(&self) -> Vec<String> {
+        let unsettled = words::unsettled(self).into_iter();
+        unsettled.chain(self.setting.notes.iter().cloned()).collect()
+    }
+
+    /// What `metrics.json` holds. Figures that are not finite are null in JSON.
+    #[must_use]
+    pub fn metrics(&self) -> impl Serialize + '_ {
+        let Findings {
+            setting,
+            controller,
+            steps,
+            check,
+        } = self;
+        Json {
+            policy: &setting.policy.name,
+            controller,
+            v_ref: setting.v_ref,
+            sample_period: setting.policy.sample_period,
+            load_steps: steps.iter().map(json_step).collect(),
+            check: check.as_ref().map(|check| JsonCheck {
+                equal: check.differences.is_empty(),
+                controllers: &check.names,
+                periods: check.periods,
+                differences: &check.differences,
+            }),
+            notes: &setting.notes,
+        }
+    }
 }
 
 fn json(found: &Findings) -> Result<String, Error> {
-    let Findings {
-        setting,
-        controller,
-        steps,
-        check,
-    } = found;
-    let json = Json {
-        policy: &setting.policy.name,
-        controller,
-        v_ref: setting.v_ref,
-        sample_period: setting.policy.sample_period,
-        load_steps: steps.iter().map(json_step).collect(),
-        check: check.as_ref().map(|check| JsonCheck {
-            equal: check.differences.is_empty(),
-            controllers: &check.names,
-            periods: check.periods,
-            differences: &check.differences,
-        }),
-        notes: &setting.notes,
-    };
-    let text = serde_json::to_string_pretty(&json).map_err(told)?;
+    let text = serde_json::to_string_pretty(&found.metrics()).map_err(told)?;
     Ok(format!("{text}\n"))
 }
 

@@ -42,7 +42,7 @@ pub fn run(options: &Judge) -> Result<Outcome, Failure> {
             steady,
             beyond_repair: beyond_repair.unwrap_or_default(),
         };
-        output::say(&serde_json::to_string_pretty(&answer)?)?;
+        output::say_json(&answer)?;
         return Ok(Outcome::Done);
     }
     let mut parts = Vec::new();

@@ -31,7 +31,9 @@ pub fn run(options: &Transfer) -> Result<Outcome, Failure> {
         return Ok(Outcome::Interrupted);
     }
     let found = found?;
-    output::write_results(&options.out, &found.files()?, &found.summary(), PAGE)?;
+    let files = found.files()?;
+    output::write_results(&options.out, &files)?;
+    output::say_results(&options.out, &files, &found.summary(), PAGE)?;
     Ok(Outcome::Done)
 }
 

@@ -4,7 +4,9 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use serde::Serialize;
 use toml_input::{FileName, Message};
+use train::summary::Summary;
 use train::{
     Contract, Converter, Course, Ended, Outcome as Trained, SeedRun, Settings, scenario_table, seeds, train_all,
 };
@@ -26,6 +28,19 @@ use progress::Watcher;
 /// the selection scenarios and for writing.
 const CHECKPOINT_EVERY: Duration = Duration::from_secs(3);
 const SEEDS: &str = "seeds";
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Answer<'a> {
+    out: &'a Path,
+    /// The one figure that is another in each run.
+    seconds: f64,
+    /// After an interruption: the command that goes on.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    resume: Option<String>,
+    #[serde(flatten)]
+    summary: Summary,
+}
 
 /// Trains all seeds and writes the folders.
 pub fn run(options: &Train) -> Result<Outcome, Failure> {
@@ -49,14 +64,14 @@ pub fn run(options: &Train) -> Result<Outcome, Failure> {
     watcher.finish()?;
     let runs = result?;
     if runs.iter().any(|run| run.ended == Ended::Interrupted) {
-        return interrupted(options, &settings, &kept, &runs);
+        return interrupted(options, &settings, &kept, &runs, start.elapsed());
     }
     let Some(best) = seeds::best(&runs) else {
         return Err(Message::new("no seed was trained").into());
     };
     write(&options.out, &settings, &runs, best)?;
     kept.remove();
-    report(options, &settings, &runs, best, start)
+    report(options, &settings, &runs, best, start.elapsed())
 }
 
 /// Writes the seeds' folders, the best one's last: a folder with a `policy.toml` is a whole training.
@@ -74,10 +89,21 @@ fn report(
     settings: &Settings,
     runs: &[SeedRun],
     best: &Trained,
-    start: Instant,
+    spent: Duration,
 ) -> Result<Outcome, Failure> {
+    let missed = !settings.specification.is_empty() && !best.evaluated.met;
+    let outcome = if missed { Outcome::Different } else { Outcome::Done };
+    let seconds = spent.as_secs_f64();
+    if options.json {
+        output::say_json(&Answer {
+            out: &options.out,
+            seconds,
+            resume: None,
+            summary: Summary::new(settings, runs, Some(best)),
+        })?;
+        return Ok(outcome);
+    }
     let steps: u64 = runs.iter().map(|run| run.steps).sum();
-    let seconds = start.elapsed().as_secs_f64();
     let out = options.out.display();
     let mut text = seeds::table(settings, runs);
     text.push_str(&format!(
@@ -91,11 +117,16 @@ fn report(
         grouped(steps)
     ));
     output::say(&text)?;
-    let missed = !settings.specification.is_empty() && !best.evaluated.met;
-    Ok(if missed { Outcome::Different } else { Outcome::Done })
+    Ok(outcome)
 }
 
-fn interrupted(options: &Train, settings: &Settings, kept: &Kept, runs: &[SeedRun]) -> Result<Outcome, Failure> {
+fn interrupted(
+    options: &Train,
+    settings: &Settings,
+    kept: &Kept,
+    runs: &[SeedRun],
+    spent: Duration,
+) -> Result<Outcome, Failure> {
     for (seed, run) in settings.seeds.iter().zip(runs) {
         kept.write(*seed, &run.checkpoint)?;
     }
@@ -108,8 +139,18 @@ fn interrupted(options: &Train, settings: &Settings, kept: &Kept, runs: &[SeedRu
         let seeds: Vec<String> = options.seeds.iter().map(u64::to_string).collect();
         resume.push_str(&format!(" --seeds {}", seeds.join(",")));
     }
+    resume.push_str(" --resume");
+    if options.json {
+        output::say_json(&Answer {
+            out: &options.out,
+            seconds: spent.as_secs_f64(),
+            resume: Some(resume),
+            summary: Summary::new(settings, runs, seeds::best(runs)),
+        })?;
+        return Ok(Outcome::Interrupted);
+    }
     output::say(&format!(
-        "{}\nInterrupted; checkpoints in {}. To go on: {resume} --resume",
+        "{}\nInterrupted; checkpoints in {}. To go on: {resume}",
         seeds::table(settings, runs),
         kept.folder.display()
     ))?;

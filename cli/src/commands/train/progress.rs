@@ -11,6 +11,7 @@ use train::{Progress, SeedRun, Settings, Watch};
 
 use super::kept::Kept;
 use crate::failure::Failure;
+use crate::talk;
 use report::grouped;
 
 // a convention: a training of minutes gives a log of some ten lines
@@ -25,13 +26,17 @@ pub struct Watcher<'a> {
 }
 
 enum View {
+    /// A quiet run.
+    Nothing,
     Bars(MultiProgress, BTreeMap<u64, ProgressBar>),
     Log(BTreeMap<u64, Instant>),
 }
 
 impl<'a> Watcher<'a> {
     pub fn new(settings: &Settings, kept: &'a Kept, stop: &'a AtomicBool) -> Self {
-        let view = if std::io::stderr().is_terminal() {
+        let view = if talk::is_quiet() {
+            View::Nothing
+        } else if std::io::stderr().is_terminal() && !talk::is_verbose() {
             View::Bars(MultiProgress::new(), BTreeMap::new())
         } else {
             View::Log(BTreeMap::new())
@@ -64,6 +69,7 @@ impl Watch for Watcher<'_> {
         let Ok(mut view) = self.view.lock() else { return };
         let Progress { seed, look, .. } = *progress;
         match &mut *view {
+            View::Nothing => {}
             View::Bars(all, bars) => {
                 let bar = bars.entry(seed).or_insert_with(|| all.add(new_bar(seed, self.steps)));
                 bar.set_position(look.step);
@@ -71,7 +77,7 @@ impl Watch for Watcher<'_> {
             }
             View::Log(shown) => {
                 let last = shown.entry(seed).or_insert_with(Instant::now);
-                if last.elapsed() >= LOG_EVERY {
+                if talk::is_verbose() || last.elapsed() >= LOG_EVERY {
                     *last = Instant::now();
                     eprintln!(
                         "seed {seed}: {} of {}, {}, {} left at most",
@@ -96,6 +102,7 @@ impl Watch for Watcher<'_> {
         let Ok(mut view) = self.view.lock() else { return };
         let line = format!("seed {seed} {} after {} control periods", run.ended, grouped(run.steps));
         match &mut *view {
+            View::Nothing => {}
             View::Bars(all, bars) => {
                 if let Some(bar) = bars.remove(&seed) {
                     bar.finish_and_clear();

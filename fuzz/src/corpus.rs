@@ -74,21 +74,15 @@ impl Corpus {
     }
 }
 
-/// The letters of a message outside of quotes: what the program says, without what the input said.
+/// The letters of a message before and behind all that it quotes: what the program says, without what the input said.
 fn kind(message: &str) -> String {
-    let mut quoted = false;
-    let mut letters = String::new();
-    for c in message.chars() {
-        if c == '`' || c == '"' {
-            quoted = !quoted;
-        } else if !quoted && c.is_ascii_alphabetic() {
-            letters.push(c);
-        }
-        if letters.len() >= KIND_LETTERS {
-            break;
-        }
-    }
-    letters
+    // a name may hold a quote of its own, so the first and the last one count
+    let (before, behind) = match (message.find('`'), message.rfind('`')) {
+        (Some(first), Some(last)) => (&message[..first], &message[last..]),
+        _ => (message, ""),
+    };
+    let letters = before.chars().chain(behind.chars()).filter(char::is_ascii_alphabetic);
+    letters.take(KIND_LETTERS).collect()
 }
 
 #[cfg(test)]

@@ -28,6 +28,7 @@ mod legs;
 mod parameters;
 mod plain;
 mod plant;
+mod rate;
 mod reader;
 mod sensing;
 mod settle;

@@ -77,7 +77,8 @@ impl Corpus {
 /// The letters of a message before and behind all that it quotes: what the program says, without what the input said.
 fn kind(message: &str) -> String {
     // a name may hold a quote of its own, so the first and the last one count
-    let (before, behind) = match (message.find('`'), message.rfind('`')) {
+    let quotes = ['`', '"'];
+    let (before, behind) = match (message.find(quotes), message.rfind(quotes)) {
         (Some(first), Some(last)) => (&message[..first], &message[last..]),
         _ => (message, ""),
     };

@@ -45,7 +45,10 @@ pub(crate) fn fastest(p: &Parameters) -> (&'static str, f64) {
         let cable = &p.cable;
         let series_c = 1.0 / (1.0 / cable.capacitance + 1.0 / c);
         ask("cable.inductance", 1.0 / (cable.inductance * series_c).sqrt());
-        ask("cable.inductance", (cable.resistance + p.capacitor.esr) / cable.inductance);
+        ask(
+            "cable.inductance",
+            (cable.resistance + p.capacitor.esr) / cable.inductance,
+        );
     }
     if has_c_in(p) {
         let s = &p.source;
@@ -58,7 +61,10 @@ pub(crate) fn fastest(p: &Parameters) -> (&'static str, f64) {
         }
     }
     if p.source.ripple > 0.0 {
-        ask("source.ripple_frequency", p.source.ripple_frequency * std::f64::consts::TAU);
+        ask(
+            "source.ripple_frequency",
+            p.source.ripple_frequency * std::f64::consts::TAU,
+        );
     }
     fastest
 }

@@ -85,8 +85,8 @@ impl<E: Environment> Trainer<E> {
         from.floats_into(&mut self.learner.adam.square)?;
         let rows = from.floats()?;
         // an action is an index into the outputs of the network
-        let fits = self.replay.restore(&rows, from.count()?)
-            && self.replay.holds_actions_below(self.learner.online.outputs());
+        let fits =
+            self.replay.restore(&rows, from.count()?) && self.replay.holds_actions_below(self.learner.online.outputs());
         if !fits {
             return Err(other());
         }

@@ -12,18 +12,27 @@ fn fuzz(arguments: &[&str], out: &Path) -> Output {
 /// Runs a target with a planted fault; returns what was said and the input that was kept.
 fn found(target: &str) -> (String, Vec<u8>) {
     let folder = tempfile::tempdir().unwrap();
-    let output = fuzz(&["--target", target, "--executions", "20000", "--seed", "1"], folder.path());
+    let output = fuzz(
+        &["--target", target, "--executions", "20000", "--seed", "1"],
+        folder.path(),
+    );
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
     assert_eq!(output.status.code(), Some(1), "{said}");
     let files = std::fs::read_dir(folder.path().join(target)).unwrap().flatten();
-    let input = files.map(|file| file.path()).find(|path| path.extension().is_none()).unwrap();
+    let input = files
+        .map(|file| file.path())
+        .find(|path| path.extension().is_none())
+        .unwrap();
     (said, std::fs::read(input).unwrap())
 }
 
 #[test]
 fn a_planted_panic_is_found_and_made_short() {
     let (said, input) = found("planted-panic");
-    assert!(said.contains("panic at") && said.contains("the planted panic"), "{said}");
+    assert!(
+        said.contains("panic at") && said.contains("the planted panic"),
+        "{said}"
+    );
     assert_eq!(input, b"needle");
 }
 
@@ -79,11 +88,22 @@ fn an_unknown_target_is_refused() {
 fn equal_seeds_give_equal_inputs() {
     let folder = tempfile::tempdir().unwrap();
     let figures = || {
-        let output = fuzz(&["--target", "manifest", "--executions", "3000", "--seed", "5"], folder.path());
+        let output = fuzz(
+            &["--target", "manifest", "--executions", "3000", "--seed", "5"],
+            folder.path(),
+        );
         let said = String::from_utf8_lossy(&output.stdout).into_owned();
-        let row = said.lines().find(|line| line.starts_with("| manifest")).unwrap().to_owned();
+        let row = said
+            .lines()
+            .find(|line| line.starts_with("| manifest"))
+            .unwrap()
+            .to_owned();
         // without the rate
-        row.split('|').enumerate().filter(|(column, _)| *column != 3).map(|(_, cell)| cell.to_owned()).collect::<Vec<_>>()
+        row.split('|')
+            .enumerate()
+            .filter(|(column, _)| *column != 3)
+            .map(|(_, cell)| cell.to_owned())
+            .collect::<Vec<_>>()
     };
     assert_eq!(figures(), figures());
 }

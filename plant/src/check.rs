@@ -7,6 +7,26 @@ use crate::effects::duty_delay;
 use crate::parameters::{Parameters, Topology};
 use crate::rate;
 use crate::sensing;
+use crate::signals::Load;
+
+/// Whether a load can be simulated at a plant of these parameters.
+///
+/// # Errors
+/// If its resistance is so small that a period would take the simulation too long.
+pub fn check_load(p: &Parameters, load: &Load) -> Result<(), Message> {
+    let steps = rate::of_load(p, load) * p.t_sw();
+    if steps <= MOST_STEPS {
+        return Ok(());
+    }
+    Err(Message::new("the load resistance is too small to be simulated")
+        .found(format!(
+            "{:e} ohm: {steps:.1e} steps in a period of {:e} s",
+            1.0 / load.conductance,
+            p.t_sw()
+        ))
+        .expected(format!("at most {MOST_STEPS:e}"))
+        .hint("a short circuit is no load step; resistances are in ohm"))
+}
 
 /// All faults of the parameters, if any.
 ///

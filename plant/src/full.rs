@@ -137,12 +137,9 @@ impl Full {
     pub fn advance(&self, x: &mut States, path: &Path, load: &Load, span: (f64, f64), track: &mut Track) -> f64 {
         let (t, h) = span;
         // a load step changes this rate, so it is not part of `rate`
-        let far = match self.has_cable {
-            true => load.conductance / self.p.cable.capacitance,
-            false => load.conductance / self.p.converter.capacitance,
-        };
+        let far = rate::of_load(&self.p, load);
         // at least one step: an interval of length 0 would be 0 / 0
-        let count = (h * self.rate.max(far / rate::OTHER_STEP)).ceil().max(1.0);
+        let count = (h * self.rate.max(far)).ceil().max(1.0);
         let step = h / count;
         let mut before = self.algebra(x, path, load, t);
         extend(track, &before.signals, path);

@@ -2,6 +2,7 @@
 
 use crate::effects::dcr;
 use crate::parameters::Parameters;
+use crate::signals::Load;
 
 /// Steps per time constant: of the LC filter, and of everything else.
 // a step leaves about (h / tau)^5 / 120: 3e-9 of the filter's swing, 8e-6 of a fast transient. With these the
@@ -67,4 +68,13 @@ pub(crate) fn fastest(p: &Parameters) -> (&'static str, f64) {
         );
     }
     fastest
+}
+
+/// Steps per second that a load asks for: its resistance empties the capacitor beside it.
+pub(crate) fn of_load(p: &Parameters, load: &Load) -> f64 {
+    let beside = match p.cable.inductance > 0.0 {
+        true => p.cable.capacitance,
+        false => p.converter.capacitance,
+    };
+    load.conductance / beside / OTHER_STEP
 }

@@ -9,7 +9,8 @@ use plant::{Load, Parameters, Plant};
 use train::{Contract, Settings, Trainer};
 
 use super::Target;
-use super::seeds::{answer, at, files, refused};
+use super::folders::Desk;
+use super::seeds::{answer, at, files, read, refused};
 use crate::forms::Form;
 use crate::guard::{Answer, Limits, Reader};
 
@@ -78,6 +79,24 @@ pub(super) static TARGETS: &[Target] = &[
                 Err(_) => Answer::refused("no text"),
             }))
         },
+    },
+    Target {
+        name: "training-contract",
+        about: "a contract without its weights, as a training reads it",
+        form: Form::Bytes,
+        words: CONTRACT_WORDS,
+        limits: Limits::READER,
+        seeds: || {
+            files(&[
+                "examples/train/paper12/policy.toml",
+                "examples/train/measured/policy.toml",
+                "examples/train/wide/policy.toml",
+                "examples/train/blind/policy.toml",
+                "train/tests/fixtures/tiny/policy.toml",
+                "tests/golden/cases/continuous/policy.toml",
+            ])
+        },
+        reader: training_contract,
     },
     Target {
         name: "checkpoint",
@@ -150,6 +169,37 @@ const PLANT_WORDS: &[&str] = &[
     "cpl_fold",
     "bleed",
     "input_ripple",
+];
+const CONTRACT_WORDS: &[&str] = &[
+    "[network]",
+    "weights",
+    "golden",
+    "\"weights.safetensors\"",
+    "\"../w\"",
+    "\"/\"",
+    "\"\"",
+    "[mapping]",
+    "file",
+    "\"drm.toml\"",
+    "[[feature]]",
+    "source",
+    "[actions]",
+    "duties",
+    "pairs",
+    "continuous",
+    "hidden_activation",
+    "\"relu\"",
+    "\"tanh\"",
+    "{",
+    "}",
+    "network = {",
+    "[[signal]]",
+    "range",
+    "load_current",
+    "scale",
+    "clip",
+    "filters",
+    "numeric_format",
 ];
 const SCENARIO_WORDS: &[&str] = &[
     "plant",
@@ -267,6 +317,20 @@ fn plant_file(bytes: &[u8]) -> Answer {
             Answer::accepted("plant")
         }
     }
+}
+
+fn training_contract() -> Result<Box<Reader>, String> {
+    let desk = Desk::new()?;
+    desk.file("drm.toml", &read("examples/train/blind/drm.toml")?);
+    Ok(Box::new(move |bytes| {
+        match Contract::load_any(&desk.file("policy.toml", bytes), &[3, 2]) {
+            Ok(contract) => {
+                assert_eq!(contract.network().inputs(), contract.policy.features.len());
+                Answer::accepted("contract")
+            }
+            Err(error) => Answer::refused(error.to_string()),
+        }
+    }))
 }
 
 fn tiny() -> Result<(Settings, Contract, Converter), String> {

@@ -7,6 +7,7 @@ use policy::Policy;
 use toml_input::{Fault, Message};
 
 use crate::faults::Error;
+use crate::load_step::LoadStep;
 
 /// The voltage that the policy says it holds, V: its parameter `v_ref`.
 #[must_use]
@@ -43,6 +44,17 @@ pub fn holds_power(converter: &Parameters, v_ref: f64, file: &Path) -> Result<()
         .expected(format!("at most half of v_ref, {} V", 0.5 * v_ref))
         .hint(format!("v_fold = {} in [load] of the plant's file", 0.25 * v_ref));
     Err(Fault::in_file(file, message).into())
+}
+
+/// Whether the loads of a scenario, which was read from `file`, can be simulated at this converter.
+///
+/// # Errors
+/// If a resistance is too small.
+pub fn draws(converter: &Parameters, load_steps: &[LoadStep], file: &Path) -> Result<(), Error> {
+    for load in load_steps.iter().flat_map(LoadStep::loads) {
+        plant::check_load(converter, &load).map_err(|message| Fault::in_file(file, message))?;
+    }
+    Ok(())
 }
 
 /// Whether a policy can hold `v_ref` V at a converter; `file` is where the converter was named.

@@ -76,6 +76,21 @@ fn go_on(_: &dyn Display) -> Result<(), Error> {
 }
 
 #[test]
+fn a_short_circuit_as_a_load_is_refused_before_it_is_simulated() {
+    let file = examples().join("s.toml");
+    let text = SCENARIO.replace("load_steps = [[200, 500]]", "resistance_steps = [[50, 1e-6]]");
+    // at 1 uF a millionth of an ohm would take 400 million steps a period
+    let text = text + "set = { \"converter.capacitance\" = 1e-6 }\n";
+    let scenario = Scenario::from_toml(&file, &text).unwrap();
+    let refused = Setting::new(&file, scenario, policy(), None).map(drop);
+    let said = refused.map_err(|error| error.to_string()).unwrap_err();
+    assert!(
+        said.contains("too small to be simulated") && said.contains("s.toml"),
+        "{said}"
+    );
+}
+
+#[test]
 fn a_controller_that_differs_in_one_bit_is_named_with_its_period() {
     let both = vec![
         named("interpreter", interpreter(&policy()).unwrap()),

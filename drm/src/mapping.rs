@@ -67,11 +67,12 @@ impl DutyRatioMap {
         v_in * self.invert(d_real, i_out)
     }
 
-    /// Whether the mapped duty rises with d_sim all over the valid load current.
+    /// Whether the mapped duty rises with d_sim all over the valid load current, and without load.
     #[must_use]
     pub fn rises(&self) -> bool {
-        // the slope is a line in i_out, so its ends decide
-        self.slope(self.valid_i_out.low) > 0.0 && self.slope(self.valid_i_out.high) > 0.0
+        // the slope is a line in i_out, so its ends decide; a `drm.toml` whose a is not positive is not read
+        let currents = [0.0, self.valid_i_out.low, self.valid_i_out.high];
+        currents.into_iter().all(|i_out| self.slope(i_out) > 0.0)
     }
 
     /// Whether a point lies in the box of validity.
@@ -240,6 +241,12 @@ mod tests {
     fn a_product_term_can_turn_the_mapping_around() {
         assert!(map(Some(-0.09)).rises());
         assert!(!map(Some(-0.096)).rises(), "a + r i = 0.95 - 0.96 at 10 A");
+        let mut falls_without_load = map(Some(9.0));
+        falls_without_load.coefficients.a = -8.0;
+        assert!(
+            !falls_without_load.rises(),
+            "no contract takes a mapping whose a is not positive"
+        );
     }
 
     #[test]

@@ -147,6 +147,23 @@ fn a_huge_graph_is_refused_at_once() {
     refused("many nodes", &many, "more parts than a network");
 }
 
+#[test]
+fn weights_of_whole_numbers_are_refused_whatever_shape_they_claim() {
+    // fields of less than 128 bytes
+    let field = |number: u8, bytes: &[u8]| [&[number << 3 | 2, bytes.len() as u8][..], bytes].concat();
+    let node = [field(1, b"x"), field(1, b"w"), field(2, b"y"), field(4, b"MatMul")].concat();
+    // a row of 2^31 columns, of the type int64, without data
+    let tensor = [b"\x08\x01\x08\x80\x80\x80\x80\x08\x10\x07".to_vec(), field(8, b"w")].concat();
+    let graph = [
+        field(1, &node),
+        field(5, &tensor),
+        field(11, &field(1, b"x")),
+        field(12, &field(1, b"y")),
+    ];
+    let model = [b"\x08\x08".to_vec(), field(7, &graph.concat())].concat();
+    refused("whole numbers", &model, "this node is not read");
+}
+
 /// An archive with `data.pkl` alone, whose directory claims `size` bytes and a method of compression.
 fn archive(program: &[u8], size: u32, method: u16) -> Vec<u8> {
     let mut bytes = b"PK\x03\x04".to_vec();

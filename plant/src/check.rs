@@ -5,7 +5,28 @@ use toml_input::{Fault, Faults, Message, Sink};
 use crate::catalogue;
 use crate::effects::duty_delay;
 use crate::parameters::{Parameters, Topology};
+use crate::rate;
 use crate::sensing;
+use crate::signals::Load;
+
+/// Whether a load can be simulated at a plant of these parameters.
+///
+/// # Errors
+/// If its resistance is so small that a period would take the simulation too long.
+pub fn check_load(p: &Parameters, load: &Load) -> Result<(), Message> {
+    let steps = rate::of_load(p, load) * p.t_sw();
+    if steps <= MOST_STEPS {
+        return Ok(());
+    }
+    Err(Message::new("the load resistance is too small to be simulated")
+        .found(format!(
+            "{:e} ohm: {steps:.1e} steps in a period of {:e} s",
+            1.0 / load.conductance,
+            p.t_sw()
+        ))
+        .expected(format!("at most {MOST_STEPS:e}"))
+        .hint("a short circuit is no load step; resistances are in ohm"))
+}
 
 /// All faults of the parameters, if any.
 ///
@@ -36,7 +57,30 @@ pub(crate) fn keyed(p: &Parameters) -> Vec<(&'static str, Message)> {
     if faults.is_empty() {
         partners(p, &mut faults);
     }
+    // a cable without capacitor has no rate
+    if faults.is_empty() {
+        faults.extend(too_fast(p));
+    }
     faults
+}
+
+/// Steps of the simulation in a period at most.
+// a step takes about a quarter of a microsecond, so a period a quarter of a second. The fastest time constant of a bench,
+// 1 ns of a short cable at 10 kHz, asks for 400,000
+const MOST_STEPS: f64 = 1e6;
+
+/// A time constant that would have the simulation of a period go on for ever.
+fn too_fast(p: &Parameters) -> Option<(&'static str, Message)> {
+    let (key, rate) = rate::fastest(p);
+    let steps = rate * p.t_sw();
+    let message = || {
+        Message::new(format!("`{key}` makes a time constant too short to be simulated"))
+            .found(format!("{steps:.1e} steps in a period of {:e} s", p.t_sw()))
+            .expected(format!("at most {MOST_STEPS:e}"))
+            .hint("SI units: 1 us is 1e-6; what is not there is left out, or 0")
+    };
+    // in this form NaN is too fast as well
+    (!(steps <= MOST_STEPS)).then(|| (key, message()))
 }
 
 fn partners(p: &Parameters, faults: &mut Vec<(&'static str, Message)>) {

@@ -20,6 +20,7 @@ use serde::{Deserialize, Serialize};
 use crate::effects::{dcr, derating, input_ripple, saturation};
 use crate::parameters::Parameters;
 use crate::plain::Track;
+use crate::rate::{self, has_c_in};
 use crate::signals::{Load, Signals};
 
 /// Number of states.
@@ -33,12 +34,6 @@ const I_CPL: usize = 4;
 const V_CIN: usize = 5;
 const I_SOURCE: usize = 6;
 const SHOWN: usize = 7;
-
-/// Steps per time constant: of the LC filter, and of everything else.
-// a step leaves about (h / tau)^5 / 120: 3e-9 of the filter's swing, 8e-6 of a fast transient. With these the
-// bounds against ngspice hold (docs/results/plant.md)
-const FILTER_STEP: f64 = 0.05;
-const OTHER_STEP: f64 = 0.25;
 
 /// The states: inductance current, capacitor voltage, cable, load, source, four low-passes.
 pub(crate) type States = [f64; STATES];
@@ -90,53 +85,14 @@ impl Full {
     pub fn new(p: &Parameters) -> Self {
         let sensors = &p.sensors;
         let low_pass = [&sensors.v_out, &sensors.i_l, &sensors.i_out, &sensors.v_in].map(|s| s.low_pass);
-        // a capacitor at an ideal source changes nothing, and its current would be 0 / 0
-        let has_c_in = p.source.c_in > 0.0 && (p.source.resistance > 0.0 || p.source.inductance > 0.0);
-        let mut full = Full {
+        Full {
             p: p.clone(),
             has_cable: p.cable.inductance > 0.0,
-            has_c_in,
+            has_c_in: has_c_in(p),
             has_lag: p.load.cpl_time_constant > 0.0,
             low_pass,
-            rate: 0.0,
-        };
-        full.rate = full.fastest_rate();
-        full
-    }
-
-    fn fastest_rate(&self) -> f64 {
-        let p = &self.p;
-        // the least that saturation and derating can leave, so that the step need not follow current and voltage
-        let l = p.converter.inductance * (1.0 - p.inductor.saturation);
-        let c = p.converter.capacitance * (1.0 - p.capacitor.derating);
-        let r = dcr::in_series(&p.inductor)
-            + p.switch.r_ds_on.max(p.switch.r_ds_on_low).max(p.switch.r_d)
-            + p.source.resistance;
-        let filter = 1.0 / (l * c).sqrt() / FILTER_STEP;
-        let mut other = (r + p.capacitor.esr) / l;
-        for tau in self.low_pass.into_iter().chain([p.load.cpl_time_constant]) {
-            if tau > 0.0 {
-                other = other.max(1.0 / tau);
-            }
+            rate: rate::fastest(p).1,
         }
-        if self.has_cable {
-            let cable = &p.cable;
-            let series_c = 1.0 / (1.0 / cable.capacitance + 1.0 / c);
-            other = other.max(1.0 / (cable.inductance * series_c).sqrt());
-            other = other.max((cable.resistance + p.capacitor.esr) / cable.inductance);
-        }
-        if self.has_c_in {
-            let s = &p.source;
-            let r = s.resistance + s.esr_in;
-            other = other.max(match s.inductance > 0.0 {
-                true => (1.0 / (s.inductance * s.c_in).sqrt()).max(r / s.inductance),
-                false => 1.0 / (r * s.c_in),
-            });
-        }
-        if p.source.ripple > 0.0 {
-            other = other.max(p.source.ripple_frequency * std::f64::consts::TAU);
-        }
-        filter.max(other / OTHER_STEP)
     }
 
     /// States at rest around `v_out` and `i_l`.
@@ -181,12 +137,9 @@ impl Full {
     pub fn advance(&self, x: &mut States, path: &Path, load: &Load, span: (f64, f64), track: &mut Track) -> f64 {
         let (t, h) = span;
         // a load step changes this rate, so it is not part of `rate`
-        let far = match self.has_cable {
-            true => load.conductance / self.p.cable.capacitance,
-            false => load.conductance / self.p.converter.capacitance,
-        };
+        let far = rate::of_load(&self.p, load);
         // at least one step: an interval of length 0 would be 0 / 0
-        let count = (h * self.rate.max(far / OTHER_STEP)).ceil().max(1.0);
+        let count = (h * self.rate.max(far)).ceil().max(1.0);
         let step = h / count;
         let mut before = self.algebra(x, path, load, t);
         extend(track, &before.signals, path);

@@ -28,6 +28,7 @@ mod legs;
 mod parameters;
 mod plain;
 mod plant;
+mod rate;
 mod reader;
 mod sensing;
 mod settle;
@@ -37,7 +38,7 @@ mod walk;
 
 pub use batch::Batch;
 pub use catalogue::{effects, parameter, parameters};
-pub use check::check;
+pub use check::{check, check_load};
 pub use entry::{Effect, Parameter, Way};
 pub use parameters::{
     Cable, Capacitor, Carrier, Converter, Inductor, LoadBox, Model, Parameters, Pwm, Rectifier, Sensor, Sensors,

@@ -73,6 +73,16 @@ impl ReplayBuffer {
         fits
     }
 
+    /// Whether every stored action is one of `actions`.
+    #[must_use]
+    pub fn holds_actions_below(&self, actions: usize) -> bool {
+        let action = |row: &[f32]| row[2 * self.features];
+        // in this form NaN is no action
+        self.rows
+            .chunks_exact(self.stride())
+            .all(|row| action(row) >= 0.0 && action(row) < actions as f32)
+    }
+
     /// Stores a transition, in the place of the oldest if the ring is full.
     pub fn push(&mut self, observation: &[f32], action: u32, reward: f32, next_observation: &[f32], terminated: bool) {
         // an index is exact in binary32 up to 2^24, far beyond any number of actions

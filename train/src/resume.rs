@@ -84,7 +84,10 @@ impl<E: Environment> Trainer<E> {
         from.floats_into(&mut self.learner.adam.mean)?;
         from.floats_into(&mut self.learner.adam.square)?;
         let rows = from.floats()?;
-        if !self.replay.restore(&rows, from.count()?) {
+        // an action is an index into the outputs of the network
+        let fits =
+            self.replay.restore(&rows, from.count()?) && self.replay.holds_actions_below(self.learner.online.outputs());
+        if !fits {
             return Err(other());
         }
         self.environment.load(from.bytes()?)?;

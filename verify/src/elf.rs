@@ -96,7 +96,7 @@ impl Elf {
     #[must_use]
     pub fn flash_bytes(&self) -> u32 {
         let sections = self.kept().filter(|section| section.has_content);
-        sections.map(|section| section.size).sum()
+        total(sections)
     }
 
     /// Bytes that can be written at run time.
@@ -104,8 +104,13 @@ impl Elf {
     pub fn ram_bytes(&self) -> u32 {
         // `.data` counts here and in flash: its first values are copied at the start
         let sections = self.kept().filter(|section| section.is_writable);
-        sections.map(|section| section.size).sum()
+        total(sections)
     }
+}
+
+/// Sizes are what the file says: those of a damaged one need not fit into the memory of a target, nor into a word.
+fn total<'a>(sections: impl Iterator<Item = &'a Section>) -> u32 {
+    sections.fold(0, |sum, section| sum.saturating_add(section.size))
 }
 
 #[cfg(test)]
@@ -125,5 +130,20 @@ mod tests {
         assert_eq!(Elf::read(&header), None);
         header[4] = 2;
         assert_eq!(Elf::read(&header), None);
+    }
+
+    #[test]
+    fn sizes_beyond_a_word_are_summed_without_a_panic() {
+        let section = Section {
+            name: ".text".to_owned(),
+            size: u32::MAX,
+            is_writable: true,
+            has_content: true,
+        };
+        let elf = Elf {
+            sections: vec![section.clone(), section],
+            symbols: Vec::new(),
+        };
+        assert_eq!((elf.flash_bytes(), elf.ram_bytes()), (u32::MAX, u32::MAX));
     }
 }

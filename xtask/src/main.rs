@@ -33,6 +33,8 @@ usage: cargo xtask <command>
                                     instruction counts and times of the generated network (docs/results/kernels.md)
   random --out DIR [--policies N] [--shard I/N] ...
                                     policies drawn at random, every build against the interpreter (docs/evidence.md; --help)
+  fuzz [--seconds N|--executions N] [--target NAME] ...
+                                    damaged bytes for every reader (docs/results/fuzzing.md; --help)
   blind --seed S --out DIR ...      blind cases for the diagnosis and their score (docs/reference/blind-cases.md; --help)
 ";
 
@@ -48,6 +50,7 @@ enum Command {
     Comments,
     Random(Vec<String>),
     Blind(Vec<String>),
+    Fuzz(Vec<String>),
     Bench(Vec<String>),
     Help,
 }
@@ -80,6 +83,7 @@ fn parse(arguments: &[String]) -> Result<Command, String> {
         "random" => return Ok(Command::Random(rest.to_vec())),
         "blind" => return Ok(Command::Blind(rest.to_vec())),
         "bench" => return Ok(Command::Bench(rest.to_vec())),
+        "fuzz" => return Ok(Command::Fuzz(rest.to_vec())),
         "wheel" => {
             return parse_test(rest).map(|command| match command {
                 Command::Test(options) => Command::Wheel(options),
@@ -144,6 +148,7 @@ fn run(command: Command) -> Result<bool, String> {
         Command::Comments => listed(&rules::comments(&Workspace::load()?)?),
         Command::Random(arguments) => random(&Workspace::load()?, &arguments),
         Command::Blind(arguments) => blind(&Workspace::load()?, &arguments),
+        Command::Fuzz(arguments) => fuzz(&Workspace::load()?, &arguments),
         Command::Bench(arguments) => other_crate(&Workspace::load()?, "bench", &arguments),
     }
 }
@@ -172,6 +177,13 @@ fn blind(workspace: &Workspace, arguments: &[String]) -> Result<bool, String> {
 fn random(workspace: &Workspace, arguments: &[String]) -> Result<bool, String> {
     // no `-p` and no release: the tests have built all of it, with overflow checks in the interpreter
     let mut command = workspace.cargo(&["run", "--quiet", "--bin", "random-policies", "--"]);
+    let status = command.args(arguments).status();
+    Ok(status.map_err(|error| format!("cargo: {error}"))?.success())
+}
+
+fn fuzz(workspace: &Workspace, arguments: &[String]) -> Result<bool, String> {
+    // a profile of its own: as quick as a release, with overflow checks
+    let mut command = workspace.cargo(&["run", "--profile", "fuzz", "--quiet", "-p", "fuzz", "--"]);
     let status = command.args(arguments).status();
     Ok(status.map_err(|error| format!("cargo: {error}"))?.success())
 }

@@ -11,7 +11,7 @@ use crate::faults::Error;
 use crate::limit::{Limit, left_out};
 use crate::load_step::{LoadKind, LoadStep};
 use crate::scenario_file::Scenario;
-use crate::suits::{held_by, holds_power, suits, v_ref};
+use crate::suits::{draws, held_by, holds_power, suits, v_ref};
 
 /// Name of the policy among the controllers.
 pub const POLICY: &str = "policy";
@@ -84,6 +84,7 @@ impl Setting {
         let converter = Converter::load(name, &scenario.set)?;
         let v_ref = v_ref(scenario.v_ref, &policy, file)?;
         suits(&policy, converter.parameters(), v_ref, file)?;
+        draws(converter.parameters(), &scenario.load_steps, file)?;
         if scenario.load_steps.iter().any(|step| step.kind == LoadKind::Power) {
             holds_power(converter.parameters(), v_ref, &plant)?;
         }

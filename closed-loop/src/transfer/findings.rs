@@ -12,7 +12,7 @@ use crate::environment::varied;
 use crate::faults::Error;
 use crate::refit::{Refit, needs_mapping};
 use crate::scenario_file::Scenario;
-use crate::suits::{suits, v_ref};
+use crate::suits::{draws, suits, v_ref};
 
 /// Names of the runs.
 pub(super) const SIMULATION: &str = "simulation";
@@ -109,6 +109,7 @@ impl Setting {
         nominal.require_buck("a transfer")?;
         let v_ref = v_ref(scenario.v_ref, &policy, file)?;
         suits(&policy, &nominal, v_ref, trained_on)?;
+        draws(&nominal, &scenario.load_steps, file)?;
         Ok(Self {
             trained_on: Losses::of(&nominal)?,
             scenario,

@@ -157,10 +157,17 @@ pub fn fit(table: &Table, options: &FitOptions) -> Result<Report, Faults> {
     if options.keep_outliers {
         points = everything;
     }
-    let mut fits = forms
-        .iter()
-        .map(|form| one(&model(*form), &points, options))
-        .collect::<Result<Vec<Fit>, Faults>>()?;
+    let mut fits = Vec::new();
+    for form in &forms {
+        match one(&model(*form), &points, options) {
+            Ok(fit) => fits.push(fit),
+            // a product that turns the mapping around is no reason to refuse the form that does not have it
+            Err(_) if !fits.is_empty() => {
+                notes.push(format!("the {} form does not rise with d_sim: left out", form.name()))
+            }
+            Err(faults) => return Err(faults),
+        }
+    }
     let chosen = choose(&fits);
     let fit = fits.remove(chosen);
     let other = fits.pop();
@@ -241,7 +248,7 @@ fn choose(fits: &[Fit]) -> usize {
             // a product that the table cannot tell from its factors holds on the measured points only
             let told_apart = four.separation.directions == four.separation.predictors;
             let better = four.left_out.rms_v < CLEARLY * three.left_out.rms_v;
-            usize::from(told_apart && better && four.map.rises())
+            usize::from(told_apart && better)
         }
         _ => 0,
     }
@@ -258,10 +265,14 @@ fn one(model: &Model, points: &[Point], options: &FitOptions) -> Result<Fit, Fau
     let map = model.map(points, &pls).rounded();
     // refused, not noted: with a mapping that falls the control loop has the wrong sign
     if !map.rises() {
-        let slope = map.slope(map.valid_i_out.low).min(map.slope(map.valid_i_out.high));
+        let currents = [0.0, map.valid_i_out.low, map.valid_i_out.high];
+        let slope = currents
+            .map(|i_out| map.slope(i_out))
+            .into_iter()
+            .fold(f64::INFINITY, f64::min);
         let message = Message::new(format!("the {} mapping does not rise with d_sim", model.form.name()))
             .found(format!("slope {slope:.4} with {components} components"))
-            .expected("a + r i_out > 0 over the measured load currents");
+            .expected("a + r i_out > 0 without load and over the measured load currents");
         let hint = "a larger duty must raise the voltage: look for swapped columns, a wrong unit or bad points";
         return Err(Fault::from(message.hint(hint)).into());
     }

@@ -222,7 +222,9 @@ impl Walk<'_> {
         let weight = self
             .constant(node, 1)
             .filter(|_| node.inputs.first().is_some_and(|x| x == value));
-        let weight = weight.filter(|_| !flag("transA")).ok_or_else(|| unknown(node))?;
+        // a tensor of whole numbers has a shape and no values here: nothing holds the shape against the file
+        let is_read = |weight: &&Constant| !flag("transA") && !weight.values.is_empty();
+        let weight = weight.filter(is_read).ok_or_else(|| unknown(node))?;
         let [rows, columns] = weight.shape[..] else {
             return Err(unknown(node));
         };

@@ -22,6 +22,8 @@ const LAYERS: &[&[&str]] = &[
     ],
     &["cli", "example-build-rust", "example-build-c", "example-embedded-hal"],
     &["wheel", "tests", "blind", "bench", "xtask", "firmware"],
+    // draws its policies as `tests` does
+    &["fuzz"],
 ];
 
 /// No crate of `from` reaches one of `to`, by whatever way.

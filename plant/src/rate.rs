@@ -1,0 +1,80 @@
+//! How short the steps of the full circuit are: a share of its fastest time constant.
+
+use crate::effects::dcr;
+use crate::parameters::Parameters;
+use crate::signals::Load;
+
+/// Steps per time constant: of the LC filter, and of everything else.
+// a step leaves about (h / tau)^5 / 120: 3e-9 of the filter's swing, 8e-6 of a fast transient. With these the
+// bounds against ngspice hold (docs/results/plant.md)
+const FILTER_STEP: f64 = 0.05;
+pub(crate) const OTHER_STEP: f64 = 0.25;
+
+/// Whether the source has an input capacitor that matters.
+pub(crate) fn has_c_in(p: &Parameters) -> bool {
+    // a capacitor at an ideal source changes nothing, and its current would be 0 / 0
+    p.source.c_in > 0.0 && (p.source.resistance > 0.0 || p.source.inductance > 0.0)
+}
+
+/// Steps per second that the parts of the circuit ask for without a load, and the key of the part that asks for most.
+pub(crate) fn fastest(p: &Parameters) -> (&'static str, f64) {
+    // the least that saturation and derating can leave, so that the step need not follow current and voltage
+    let l = p.converter.inductance * (1.0 - p.inductor.saturation);
+    let c = p.converter.capacitance * (1.0 - p.capacitor.derating);
+    let r = dcr::in_series(&p.inductor)
+        + p.switch.r_ds_on.max(p.switch.r_ds_on_low).max(p.switch.r_d)
+        + p.source.resistance;
+    let mut fastest = ("converter.inductance", 1.0 / (l * c).sqrt() / FILTER_STEP);
+    let mut ask = |key: &'static str, rate: f64| {
+        if rate / OTHER_STEP > fastest.1 {
+            fastest = (key, rate / OTHER_STEP);
+        }
+    };
+    ask("converter.inductance", (r + p.capacitor.esr) / l);
+    let (sensors, load) = (&p.sensors, &p.load);
+    let lags = [
+        ("sensors.v_out.low_pass", sensors.v_out.low_pass),
+        ("sensors.i_l.low_pass", sensors.i_l.low_pass),
+        ("sensors.i_out.low_pass", sensors.i_out.low_pass),
+        ("sensors.v_in.low_pass", sensors.v_in.low_pass),
+        ("load.cpl_time_constant", load.cpl_time_constant),
+    ];
+    for (key, tau) in lags.into_iter().filter(|(_, tau)| *tau > 0.0) {
+        ask(key, 1.0 / tau);
+    }
+    if p.cable.inductance > 0.0 {
+        let cable = &p.cable;
+        let series_c = 1.0 / (1.0 / cable.capacitance + 1.0 / c);
+        ask("cable.inductance", 1.0 / (cable.inductance * series_c).sqrt());
+        ask(
+            "cable.inductance",
+            (cable.resistance + p.capacitor.esr) / cable.inductance,
+        );
+    }
+    if has_c_in(p) {
+        let s = &p.source;
+        let r = s.resistance + s.esr_in;
+        if s.inductance > 0.0 {
+            ask("source.inductance", 1.0 / (s.inductance * s.c_in).sqrt());
+            ask("source.inductance", r / s.inductance);
+        } else {
+            ask("source.c_in", 1.0 / (r * s.c_in));
+        }
+    }
+    if p.source.ripple > 0.0 {
+        ask(
+            "source.ripple_frequency",
+            p.source.ripple_frequency * std::f64::consts::TAU,
+        );
+    }
+    fastest
+}
+
+/// Steps per second that a load asks for: its resistance empties the capacitor beside it.
+pub(crate) fn of_load(p: &Parameters, load: &Load) -> f64 {
+    let beside = match p.cable.inductance > 0.0 {
+        true => p.cable.capacitance,
+        false => p.converter.capacitance,
+    };
+    load.conductance / beside / OTHER_STEP
+}

@@ -80,7 +80,8 @@ fn too_fast(p: &Parameters) -> Option<(&'static str, Message)> {
             .hint("SI units: 1 us is 1e-6; what is not there is left out, or 0")
     };
     // in this form NaN is too fast as well
-    (!(steps <= MOST_STEPS)).then(|| (key, message()))
+    let ends = steps <= MOST_STEPS;
+    (!ends).then(|| (key, message()))
 }
 
 fn partners(p: &Parameters, faults: &mut Vec<(&'static str, Message)>) {

@@ -129,7 +129,10 @@ fn install_hook() {
             let place = info
                 .location()
                 .map_or_else(|| "an unknown place".to_owned(), ToString::to_string);
-            let words = info.payload_as_str().unwrap_or("no words").to_owned();
+            let payload = info.payload();
+            let text = payload.downcast_ref::<&str>().copied();
+            let text = text.or(payload.downcast_ref::<String>().map(String::as_str));
+            let words = text.unwrap_or("no words").to_owned();
             PANIC.set(Some((place, words)));
         }));
     });

@@ -10,10 +10,10 @@ fn fuzz(arguments: &[&str], out: &Path) -> Output {
 }
 
 /// Runs a target with a planted fault; returns what was said and the input that was kept.
-fn found(target: &str) -> (String, Vec<u8>) {
+fn found(target: &str, executions: &str) -> (String, Vec<u8>) {
     let folder = tempfile::tempdir().unwrap();
     let output = fuzz(
-        &["--target", target, "--executions", "20000", "--seed", "1"],
+        &["--target", target, "--executions", executions, "--seed", "1"],
         folder.path(),
     );
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
@@ -28,7 +28,7 @@ fn found(target: &str) -> (String, Vec<u8>) {
 
 #[test]
 fn a_planted_panic_is_found_and_made_short() {
-    let (said, input) = found("planted-panic");
+    let (said, input) = found("planted-panic", "20000");
     assert!(
         said.contains("panic at") && said.contains("the planted panic"),
         "{said}"
@@ -38,28 +38,29 @@ fn a_planted_panic_is_found_and_made_short() {
 
 #[test]
 fn planted_slowness_is_found() {
-    let (said, input) = found("planted-slowness");
+    // few: each that is slow takes a third of a second
+    let (said, input) = found("planted-slowness", "60");
     assert!(said.contains("slow: 0."), "{said}");
     assert_eq!(input, b"needle");
 }
 
 #[test]
 fn planted_memory_is_found() {
-    let (said, input) = found("planted-allocation");
+    let (said, input) = found("planted-allocation", "20000");
     assert!(said.contains("memory: 8 MiB"), "{said}");
     assert_eq!(input, b"needle");
 }
 
 #[test]
 fn a_planted_loop_ends_its_process_and_leaves_its_input() {
-    let (said, input) = found("planted-loop");
+    let (said, input) = found("planted-loop", "20000");
     assert!(said.contains("hang: no answer within"), "{said}");
     assert!(input.windows(6).any(|window| window == b"needle"));
 }
 
 #[test]
 fn a_stack_that_overflows_leaves_its_input() {
-    let (said, input) = found("planted-recursion");
+    let (said, input) = found("planted-recursion", "20000");
     assert!(said.contains("death of the process"), "{said}");
     assert!(input.windows(6).any(|window| window == b"needle"));
 }

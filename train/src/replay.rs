@@ -193,4 +193,15 @@ mod tests {
         assert!(!other.restore(&rows[1..], next));
         assert!(!ReplayBuffer::new(2, 3).restore(rows, next));
     }
+
+    #[test]
+    fn an_action_that_the_network_does_not_have_is_seen() {
+        let replay = filled(4, 3);
+        assert!(replay.holds_actions_below(usize::MAX));
+        let mut odd = filled(4, 3);
+        for action in [7.0, -1.0, f32::NAN] {
+            odd.rows[4] = action;
+            assert!(!odd.holds_actions_below(5), "{action}");
+        }
+    }
 }

@@ -94,12 +94,7 @@ pub(super) fn edit(bytes: &mut Vec<u8>, words: &[&str], other: &[u8], random: &m
         9 => copy_lines(bytes, &bytes.clone(), random),
         10 => copy_lines(bytes, other, random),
         _ => {
-            let mark = random.pick(
-                &[
-                    b',', b';', b'\t', b'"', b'\'', b'.', b'=', b'[', b']', b'{', b'}', b'\n', b'#', b'-',
-                ],
-                b' ',
-            );
+            let mark = random.pick(b",;\t\"'.=[]{}\n#-", b' ');
             let at = random.below(bytes.len() + 1);
             bytes.insert(at, mark);
         }

@@ -328,7 +328,8 @@ fn training_contract() -> Result<Box<Reader>, String> {
                 assert_eq!(contract.network().inputs(), contract.policy.features.len());
                 Answer::accepted("contract")
             }
-            Err(error) => Answer::refused(error.to_string()),
+            // the lines below it quote the file
+            Err(error) => Answer::refused(error.to_string().lines().next().unwrap_or_default()),
         }
     }))
 }

@@ -67,7 +67,7 @@ fn seed(index: u16) -> Vec<u8> {
     ];
     let words = (0..120).map(|step: usize| {
         // mostly plausible numbers: after some bad steps only the fallback is commanded
-        let number = if step % 7 == 0 {
+        let number = if step.is_multiple_of(7) {
             numbers[(step / 7 + usize::from(index)) % numbers.len()]
         } else {
             12.0
@@ -111,8 +111,8 @@ fn run<T: Real>(policy: &Policy, events: &[u8]) -> Answer {
         }
         // an event between two steps now and then, by the bits of a measurement
         match samples.first() {
-            Some(Sample::Physical(x)) if x.to_bits() % 61 == 0 => controller.reset(),
-            Some(Sample::Physical(x)) if x.to_bits() % 53 == 0 => {
+            Some(Sample::Physical(x)) if x.to_bits().is_multiple_of(61) => controller.reset(),
+            Some(Sample::Physical(x)) if x.to_bits().is_multiple_of(53) => {
                 let one = T::nearest(f64::from(*x));
                 controller.set_mapping(one, one, one, None);
             }

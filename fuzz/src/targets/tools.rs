@@ -258,6 +258,9 @@ fn elf(bytes: &[u8]) -> Answer {
     }
 }
 
+/// Name, type, flags, data; link, information, size of an entry.
+type Section<'a> = (u32, u32, u32, &'a [u8], [u32; 3]);
+
 /// A small object file: code, cleared memory, one symbol. Sections as in the specification of ELF.
 fn object(is_big: bool) -> Vec<u8> {
     const NAMES: &[u8] = b"\0.text\0.bss\0.symtab\0.strtab\0";
@@ -280,8 +283,7 @@ fn object(is_big: bool) -> Vec<u8> {
     let symbol = [&word(1)[..], &word(0x101), &word(16), &[0x12, 0], &half(1)].concat();
     let symbols = [&[0; 16][..], &symbol].concat();
     let (mut content, mut rows) = (Vec::new(), [0; 40].to_vec());
-    // name, type, flags, data, link, information, size of an entry
-    let sections: [(u32, u32, u32, &[u8], [u32; 3]); 5] = [
+    let sections: [Section<'_>; 5] = [
         (1, 1, 6, &code, [0, 0, 0]),
         (7, 8, 3, &[], [0, 0, 0]),
         (12, 2, 0, &symbols, [4, 1, 16]),

@@ -230,10 +230,18 @@ fn actor_page(policy: &Policy, certificate: &Certificate, head: &Continuous) -> 
         .html()
 }
 
+/// What an action is: a duty, or what it adds to that of a law.
+fn offered(policy: &Policy) -> &'static str {
+    match policy.head.residual() {
+        Some(_) => "offset",
+        None => "duty",
+    }
+}
+
 fn bounds(policy: &Policy, certificate: &Certificate) -> Section {
     let mut table = Table::new("Proven bounds of |Q in the format - real Q|")
         .text("action")
-        .number("duty", 4)
+        .number(offered(policy), 4)
         .text("every state")
         .text("every observation of the box");
     for (index, action) in policy.actions().iter().enumerate() {

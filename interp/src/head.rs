@@ -41,7 +41,7 @@ pub struct Base<T> {
 #[derive(Debug, Clone)]
 pub(crate) struct Continuous<T> {
     squash: Squash,
-    /// The ends of the clip, or +-1.
+    /// The ends of the clip or of the curve.
     ends: Range<T>,
     /// `None` where it is exactly 1.
     scale: Option<T>,
@@ -76,15 +76,12 @@ impl<T: Real> Head<T> {
                 Self::Residual(offsets.collect(), law)
             }
             policy::Head::Continuous(head) => {
-                let (low, high) = match head.squash {
-                    Squash::Curve(_) => (-1.0, 1.0),
-                    Squash::Clip(clip) => (clip.low, clip.high),
-                };
+                let ends = head.squashed();
                 Self::Continuous(Continuous {
                     squash: head.squash,
                     ends: Range {
-                        lo: T::nearest(low),
-                        hi: T::nearest(high),
+                        lo: T::nearest(ends.low),
+                        hi: T::nearest(ends.high),
                     },
                     // left out by what the contract says, not by what it rounds to
                     scale: (head.scale != 1.0).then(|| T::nearest(head.scale)),

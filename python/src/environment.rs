@@ -98,9 +98,13 @@ impl Episodes {
         self.policy.features.iter().map(end).unzip()
     }
 
-    /// Duties of the actions; those at both ends of a policy that commands a number.
+    /// Duties of the actions, or what each adds to a law; those at both ends of a policy that commands a number.
     fn duties(&self) -> Vec<f64> {
-        self.policy.head.duties()
+        match self.policy.head.residual() {
+            // its duties are those of the law with them, of which only the ends are known
+            Some(_) => self.policy.actions().iter().map(|action| action.duty).collect(),
+            None => self.policy.head.duties(),
+        }
     }
 
     fn is_continuous(&self) -> bool {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use policy::{Head, Policy};
+use policy::{Head, InputVoltage, Observer, Policy, Residual};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde_json::{Value, json};
@@ -51,8 +51,10 @@ pub fn contract_json(py: Python<'_>, path: PathBuf) -> PyResult<String> {
         "numeric_format": policy.numeric_format.name(),
         "parameters": policy.parameters,
         "signals": policy.signals,
+        "observers": policy.observers.iter().map(|observer| self::observer(policy, observer)).collect::<Vec<_>>(),
         "features": policy.features,
         "duties": match &policy.head { Head::Choice(_) => policy.head.duties(), Head::Continuous(_) | Head::Residual(_) => Vec::new() },
+        "law": policy.head.residual().map(law),
         "continuous": policy.head.continuous(),
         "mapping": mapping,
         "limits": policy.limits,
@@ -60,6 +62,39 @@ pub fn contract_json(py: Python<'_>, path: PathBuf) -> PyResult<String> {
         "files": files(policy),
     });
     Ok(whole.to_string())
+}
+
+/// The entries of `[[observer]]`.
+fn observer(policy: &Policy, observer: &Observer) -> Value {
+    let name = |index: usize| json!(policy.signals[index].name);
+    json!({
+        "name": observer.name,
+        "inductance": observer.inductance,
+        "capacitance": observer.capacitance,
+        "input_voltage": match observer.input_voltage {
+            InputVoltage::Constant(volts) => json!(volts),
+            InputVoltage::Signal(index) => name(index),
+        },
+        "output_voltage": name(observer.output_voltage),
+        "load_current": name(observer.load_current),
+        "compute_delay": observer.compute_delay,
+        "gains": observer.gains,
+        "current": [observer.current.low, observer.current.high],
+        "bias": [observer.bias.low, observer.bias.high],
+    })
+}
+
+/// The entries of `[actions]` of a law and what is added to it.
+fn law(head: &Residual) -> Value {
+    let zone = head.dead_zone.iter();
+    let zone: Vec<Value> = zone
+        .map(|still| json!({ "source": still.source.text, "within": still.within }))
+        .collect();
+    json!({
+        "base": head.base.text,
+        "offsets": head.offsets.iter().map(|action| action.duty).collect::<Vec<_>>(),
+        "dead_zone": (!zone.is_empty()).then_some(zone),
+    })
 }
 
 fn files(policy: &Policy) -> Vec<Value> {

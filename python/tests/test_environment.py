@@ -201,3 +201,40 @@ def test_a_picture_shows_the_episode():
 def test_what_does_not_fit_is_said(arguments, error, said):
     with pytest.raises(error, match=said):
         make(**arguments)
+
+
+def test_actions_that_add_to_a_law_are_as_many_as_its_offsets():
+    env = make(
+        plant="examples/plants/paper-model.toml",
+        contract="tests/golden/cases/residual",
+        v_ref=5.0,
+        episode={"loads": {"range": [5.0, 20.0]}, "steps": 50},
+        set={"converter.v_in": 12.0, "converter.f_sw": 5e5, "load.v_fold": 1.0},
+    ).unwrapped
+    assert env.action_space.n == 5
+    assert env.duties == pytest.approx([-0.1, -0.02, 0.0, 0.02, 0.1])
+    env.reset(seed=1)
+    commanded = [env.step(action)[4]["duty"] for action in (0, 4)]
+    assert all(0.05 <= duty <= 0.95 for duty in commanded)
+
+
+@pytest.mark.parametrize("case", ["observed", "residual", "paper"])
+def test_the_contract_of_an_environment_is_written_whole(case, tmp_path):
+    import json
+    import shutil
+
+    from policyc import contract as contracts
+    from policyc._policyc import contract_json
+
+    folder = f"tests/golden/cases/{case}"
+    data = json.loads(contract_json(folder + "/policy.toml"))
+    before = policyc.Policy.load(folder).inspect()
+    entries = contracts.from_inspection(data)
+    if entries.get("mapping"):
+        entries["mapping"] = {"file": "drm.toml", **entries["mapping"]}
+        shutil.copy(folder + "/drm.toml", tmp_path)
+    shutil.copy(folder + "/weights.safetensors", tmp_path)
+    words = json.dumps([layer.activation for layer in before.layers[:-1]])
+    network = f'weights = "weights.safetensors"\nhidden_activation = {words}\n'
+    (tmp_path / "policy.toml").write_text(contracts.text(entries, network, []))
+    assert policyc.Policy.load(tmp_path).inspect().digests["contract"] == before.digests["contract"]

@@ -7,6 +7,7 @@ mod certify;
 mod ci;
 mod commands;
 mod decisions;
+mod design;
 mod drm;
 mod faults;
 mod files;

@@ -179,8 +179,13 @@ fn choices(policy: &Policy, decisions: &Choices) -> Vec<String> {
     ));
     let duty = |action: usize| policy.actions().get(action).map_or(f64::NAN, |action| action.duty);
     lines.push(format!(
-        "  most at golden vector {}: duty {} becomes {}, at {}",
+        "  most at golden vector {}: {} {} becomes {}, at {}",
         change.row,
+        if policy.head.residual().is_some() {
+            "offset"
+        } else {
+            "duty"
+        },
         duty(change.expected),
         duty(change.found),
         place(policy, &change.observation)

@@ -19,7 +19,7 @@ impl Design {
         // at the switch node: what a tenth of the source would be lost to
         let most_bias = rounded(0.1 * self.v_in, 2);
         format!(
-            "# Observer and law for {} V from {} V, {} H, {} F, a period of {} s, by `policyc design`.\n\
+            "{}# Observer and law for {} V from {} V, {} H, {} F, a period of {} s, by `policyc design`.\n\
              # Steady Kalman filter for {} V of noise and a model that is wrong by {} A, {} V and {} V a period: an error of the\n\
              # estimates decays to 37 % in {:.1} periods.\n\
              [[observer]]\n\
@@ -38,6 +38,7 @@ impl Design {
              # current of a settled converter is when the switch turns on.\n\
              [actions]\n\
              base = \"({} - model_bias) / {} - {} * (model_current - i_out + {half_ripple}) - {} * (model_voltage - {})\"\n",
+            self.at_light_load(),
             self.v_ref,
             self.v_in,
             self.inductance,
@@ -57,6 +58,19 @@ impl Design {
             self.v_in,
             short(self.by_current),
             short(self.by_voltage),
+            self.v_ref,
+        )
+    }
+
+    /// What a law of a converter with a diode does not do.
+    fn at_light_load(&self) -> String {
+        if !self.has_diode {
+            return String::new();
+        }
+        format!(
+            "# Below {} A of load the diode stops the current in every period. This law is made for one that flows: the voltage then\n\
+             # rests beside {} V.\n",
+            short(self.half_ripple),
             self.v_ref,
         )
     }

@@ -1,6 +1,6 @@
 //! Section 1: the state, which states are sound, and what `init` and `reset` leave. Section 8: coefficients set at run time.
 
-use policy::{Expr, Feature, Filter, Head, Input, Mapping, Squash, memory_bounds};
+use policy::{Activation, Expr, Feature, Filter, Head, Input, Mapping, Squash, memory_bounds};
 
 use super::Spec;
 use crate::term::Term;
@@ -122,6 +122,7 @@ fn duties(spec: Spec<'_>) -> Vec<f64> {
         }
         Head::Continuous(head) => {
             let ends = match head.squash {
+                Squash::Curve(Activation::Sigmoid | Activation::HardSigmoid) => [0.0, 1.0],
                 Squash::Curve(_) => [-1.0, 1.0],
                 Squash::Clip(clip) => [clip.low, clip.high],
             };

@@ -37,6 +37,13 @@ def normalised(feature: Mapping[str, Any], affine: Affine) -> Dict[str, Any]:
     return found
 
 
+def _actions(data: Mapping[str, Any]) -> Dict[str, Any]:
+    """The entries of ``[actions]``; none where an action is a number, whose scale the model says."""
+    if data["law"] is not None:
+        return {key: entry for key, entry in data["law"].items() if entry is not None}
+    return {"duties": data["duties"]} if data["duties"] else {}
+
+
 def from_inspection(data: Mapping[str, Any]) -> Dict[str, Any]:
     """The entries of a contract from what the package says of one."""
     pair = lambda ends: None if ends is None else [ends["low"], ends["high"]]  # noqa: E731
@@ -50,6 +57,7 @@ def from_inspection(data: Mapping[str, Any]) -> Dict[str, Any]:
         "signals": [
             {"name": s["name"], "unit": s["unit"], "range": pair(s["range"]), "adc": s["adc"]} for s in data["signals"]
         ],
+        "observers": data["observers"],
         "features": [
             {
                 "name": f["name"],
@@ -61,7 +69,7 @@ def from_inspection(data: Mapping[str, Any]) -> Dict[str, Any]:
             }
             for f in data["features"]
         ],
-        "actions": {"duties": data["duties"]} if data["duties"] else {},
+        "actions": _actions(data),
         "mapping": data["mapping"],
         "limits": limits,
         "fallback": data["fallback"],
@@ -81,6 +89,8 @@ def text(contract: Mapping[str, Any], network: str, about: Sequence[str]) -> str
         out += _table("[parameters]", contract["parameters"])
     for signal in contract["signals"]:
         out += _table("[[signal]]", signal)
+    for observer in contract.get("observers", []):
+        out += _table("[[observer]]", observer)
     for feature in contract["features"]:
         shown = {key: value for key, value in feature.items() if value != []}
         if shown.get("scale") == 1.0:

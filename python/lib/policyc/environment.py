@@ -88,7 +88,7 @@ class _Spaces:
             self._action = spaces.Discrete(len(duties))
         #: The contract's file, for :func:`policyc.export`.
         self.contract = os.path.abspath(self._episodes.contract())
-        #: Duty of each action, 0..1; of a policy that commands a number those at both ends.
+        #: Duty of each action, 0..1, or what it adds to a law; of a policy that commands a number the duties at both ends.
         self.duties = duties
         #: Control period, s.
         self.sample_period = self._episodes.sample_period()
@@ -103,7 +103,7 @@ class _Spaces:
 class ConverterEnv(_Spaces, gymnasium.Env):
     """One converter.
 
-    Observation: the features of the contract, ``float32``, within their clips. Action: an index into the contract's duties, or for
+    Observation: the features of the contract, ``float32``, within their clips. Action: an index into the contract's duties or offsets, or for
     a policy that commands a number the duty before the mapping, 0..1, shape ``(1,)``. An episode is never terminated, because
     control has no end; it is truncated when its time is over or the voltage is lost. `info` has the true state: ``v_out`` and
     ``v_in`` in V, ``i_l`` and ``i_out`` in A, what the sensors show under ``measured``, the ``duty`` that left the controller, its

@@ -149,6 +149,8 @@ def _command(
 ) -> Tuple[float, float]:
     """Fills in the actions; gain and shift from the trainer's action to a duty."""
     if taken.continuous is None:
+        if duties is not None and "base" in entries["actions"]:
+            raise ValueError("the actions of this contract add to a law: `duties` would be another controller")
         if duties is not None:
             entries["actions"] = {"duties": [float(one) for one in duties]}
         if not entries["actions"]:

@@ -58,8 +58,10 @@ class Inspection:
     signals: List[Signal]
     features: List[Feature]
     layers: List[Layer]
-    #: Duty of each action before the mapping, 0..1; empty for a continuous policy.
+    #: Duty of each action before the mapping, 0..1; empty for a continuous policy, and for one that adds to a law.
     duties: List[float]
+    #: What each action adds to the duty of the contract's law, -1..1; empty without a law.
+    offsets: List[float]
     #: Smallest and largest commanded duty, 0..1.
     duty_limits: Tuple[float, float]
     #: How many known answers of the trainer there are.
@@ -165,6 +167,7 @@ class Policy:
     def inspect(self) -> Inspection:
         """Signals, features, network, actions, limits and digests."""
         data = json.loads(self._native.inspect_json())
+        duties = [action["duty"] for action in data["actions"] if "duty" in action]
         adc = lambda adc: None if adc is None else (adc["gain"], adc["offset"])  # noqa: E731
         return Inspection(
             name=data["name"],
@@ -178,7 +181,8 @@ class Policy:
             layers=[
                 Layer(la["name"], la["inputs"], la["outputs"], _activation(la["activation"])) for la in data["layers"]
             ],
-            duties=[action["duty"] for action in data["actions"] if "duty" in action],
+            duties=[] if "residual" in data else duties,
+            offsets=duties if "residual" in data else [],
             duty_limits=_pair(data["limits"]["duty"]),
             golden_vectors=data["golden_vectors"],
             digests=data["digests"],

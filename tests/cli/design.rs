@@ -1,0 +1,99 @@
+//! `policyc design`: its lines make a contract whose law holds the voltage, and what cannot be designed is refused.
+
+use super::Desk;
+
+const PLANT: &str = "[converter]
+v_in = 12.0
+inductance = 3.3e-6
+capacitance = 94e-6
+f_sw = 500e3
+rectifier = \"synchronous\"
+[pwm]
+duty_delay = 1
+[load]
+v_fold = 1.0
+[sensors.v_out]
+noise = 2e-3
+";
+
+/// The part of a text from one line on and up to another one.
+fn between<'a>(text: &'a str, from: &str, to: &str) -> &'a str {
+    let start = text.find(from).unwrap_or_else(|| panic!("no {from}:\n{text}"));
+    let end = text[start..].find(to).map_or(text.len(), |at| start + at);
+    &text[start..end]
+}
+
+#[test]
+fn its_lines_stand_in_a_contract_and_their_law_holds_the_voltage() {
+    let desk = Desk::new("residual");
+    desk.write("plant.toml", PLANT);
+    let lines = desk.succeed("design plant.toml --v-ref 5 --load 10");
+    let contract = desk.read("policy/policy.toml");
+    let contract = contract.replace(
+        between(&contract, "[[observer]]", "\n[[feature]]"),
+        between(&lines, "[[observer]]", "\n#"),
+    );
+    let contract = contract.replace(between(&contract, "base = ", "\n"), between(&lines, "base = ", "\n"));
+    desk.write("policy/policy.toml", &contract);
+    let shown = desk.succeed("inspect policy");
+    assert!(
+        shown.contains("model_bias") && shown.contains("the duty acts one period later"),
+        "{shown}"
+    );
+    desk.write(
+        "s.toml",
+        "plant = \"plant.toml\"\nload_steps = [[10, 40], [40, 10]]\ninstants = 3\nlead = 400\nafter = 400\ntail = 50\nbaselines = []\n",
+    );
+    let said = desk.succeed("simulate s.toml --policy policy --out out");
+    let rows: Vec<&str> = said.lines().filter(|line| line.starts_with("law alone")).collect();
+    assert_eq!(rows.len(), 2, "{said}");
+    for row in rows {
+        // deviation, settling, largest error at the end; each at sampling instants / at all
+        let numbers: Vec<f64> = row.split([' ', '/']).filter_map(|word| word.parse().ok()).collect();
+        // 3 % of 5 V, after a load step that is the whole range
+        assert!(numbers[1] < 0.6 && numbers[5] < 0.15, "{row}\n{said}");
+    }
+}
+
+#[test]
+fn a_law_behind_a_diode_says_from_which_load_on_it_holds() {
+    let desk = Desk::new("linear");
+    desk.write("plant.toml", &PLANT.replace("synchronous", "diode"));
+    let said = desk.succeed("design plant.toml --v-ref 5 --load 10");
+    // half of (12 - 5) V * 5/12 * 2 us / 3.3 uH
+    assert!(said.contains("Below 0.8838 A of load"), "{said}");
+    desk.write("plant.toml", PLANT);
+    assert!(
+        !desk
+            .succeed("design plant.toml --v-ref 5 --load 10")
+            .contains("of load")
+    );
+}
+
+#[test]
+fn what_cannot_be_designed_is_exit_code_2_with_its_reason() {
+    let desk = Desk::new("linear");
+    desk.write("plant.toml", PLANT);
+    desk.write("boost.toml", &PLANT.replace("v_in", "topology = \"boost\"\nv_in"));
+    for (line, reason) in [
+        ("design plant.toml --v-ref 12 --load 10", "cannot hold"),
+        ("design plant.toml --v-ref nan --load 10", "cannot hold"),
+        ("design plant.toml --v-ref 5 --load 10 --pole 1", "pole"),
+        ("design plant.toml --v-ref 5 --load 10 --noise 0", "without noise"),
+        (
+            "design plant.toml --v-ref 5 --load 10 --model-noise 0.1,0.2",
+            "three numbers",
+        ),
+        ("design boost.toml --v-ref 20 --load 10", "boost"),
+        ("design nothing.toml --v-ref 5 --load 10", "nothing.toml"),
+    ] {
+        let ran = desk.type_in(line);
+        assert_eq!(ran.code, Some(2), "{line}\n{}{}", ran.stdout, ran.stderr);
+        assert!(
+            ran.stderr.contains(reason) && ran.stdout.is_empty(),
+            "{line}\n{}{}",
+            ran.stdout,
+            ran.stderr
+        );
+    }
+}

@@ -166,10 +166,7 @@ fn train_prints_its_seeds_and_the_evaluation_of_the_best() {
 fn a_missed_specification_is_exit_code_1_and_said_in_the_answer() {
     let desk = super::training::desk();
     let settings = desk.read("train/train.toml");
-    desk.write(
-        "train/train.toml",
-        &format!("{settings}\n[[spec]]\ndeviation = 1e-6\n"),
-    );
+    desk.write("train/train.toml", &format!("{settings}\n[[spec]]\ndeviation = 1e-6\n"));
     let ran = desk.type_in("train train/train.toml --seeds 3 --out out --json");
     assert_eq!(ran.code, Some(1), "{}{}", ran.stdout, ran.stderr);
     assert_eq!(parsed(&ran.stdout)["met"], false);

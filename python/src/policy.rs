@@ -165,7 +165,7 @@ struct Asked<'a> {
 
 /// As the command does it: a folder that has drifted is not built.
 fn verified(policy: &Policy, asked: Asked<'_>) -> Result<(bool, String, String), Failure> {
-    let recorded = asked.traces.iter().map(|path| Recorded::open(policy, path));
+    let recorded = asked.traces.iter().map(|path| Recorded::open(policy, path, ""));
     let recorded = recorded.collect::<Result<Vec<_>, _>>()?;
     let folder = asked.generated.as_deref().map(|folder| Folder::open(policy, folder));
     let folder = folder.transpose()?;

@@ -26,7 +26,7 @@ usage: cargo xtask <command>
   setup                             only the tools: compilers, emulators, ngspice, mdBook (also called install)
   bless                             rewrite the golden files from what the code produces now
   wheel [--full]                    only the Python package: build, install, test
-  release --dry-run                 packs every published crate, builds it from its package, and with the oldest compiler
+  release --dry-run                 packs every published crate, and builds the packages with the oldest compiler
   layers                            only the layer rules
   book                              only the book: links, contents, mdBook
   words                             words of each page, and figures per hundred of them

@@ -35,7 +35,7 @@ pub enum Sampled {
 
 /// Which column of a table holds which quantity, or what it was throughout; and how the table was recorded.
 ///
-/// What is not mapped is found by its name ([`VOCABULARY`]).
+/// What is not mapped is found by its name ([`VOCABULARY`](crate::VOCABULARY)).
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ColumnMap {
     entries: Vec<(String, Wish)>,

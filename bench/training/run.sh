@@ -11,7 +11,7 @@ if ! [ -e "$venv/ready" ]; then
     python3 -m venv "$venv"
     "$venv/bin/pip" install --quiet torch stable-baselines3 && touch "$venv/ready"
 fi
-cargo build --release --quiet -p train --example throughput
+cargo build --release --quiet -p policyc-train --example throughput
 ours=${CARGO_TARGET_DIR:-target}/release/examples/throughput
 pin=$(command -v taskset >/dev/null && echo "taskset -c 0" || true)
 export OMP_NUM_THREADS=1 MKL_NUM_THREADS=1

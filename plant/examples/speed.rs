@@ -1,4 +1,4 @@
-//! Control steps per second on one core: `cargo run --release -p plant --example speed`.
+//! Control steps per second on one core: `cargo run --release -p policyc-plant --example speed`.
 
 use std::time::Instant;
 

@@ -1,4 +1,4 @@
-//! Prints a page with every kind of chart: `cargo run -p report --example gallery > gallery.html`.
+//! Prints a page with every kind of chart: `cargo run -p policyc-report --example gallery > gallery.html`.
 
 use report::{
     Axis, BarChart, BarPanel, Chart, Colour, HeatMap, Page, Panel, Ramp, ReportError, Section, Series, Svg, Table,
@@ -44,7 +44,7 @@ fn main() -> Result<(), ReportError> {
                         .row(["missing".into(), f64::NAN.into(), 0.0.into()]),
                 )
                 .pairs([("f_sw", "100 kHz"), ("inductor", "47 µH")])
-                .code("cargo run -p report --example gallery > gallery.html")
+                .code("cargo run -p policyc-report --example gallery > gallery.html")
                 .details(Section::new("More").text("Hidden until opened.")),
         );
     print!("{}", page.html()?);

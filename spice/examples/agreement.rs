@@ -1,5 +1,5 @@
 //! Draws how well plant and ngspice agree, effect by effect, from the cases of the test:
-//! `cargo run --release -p spice --example agreement` writes `docs/pictures/plant-vs-ngspice.svg`.
+//! `cargo run --release -p policyc-spice --example agreement` writes `docs/pictures/plant-vs-ngspice.svg`.
 
 use std::error::Error;
 use std::path::Path;

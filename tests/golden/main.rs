@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod c;
+mod copies;
 mod determinism;
 mod rust;
 

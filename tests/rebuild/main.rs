@@ -33,7 +33,7 @@ impl Crate {
         let root = tests::root().canonicalize().unwrap();
         let manifest = format!(
             "[package]\nname = \"{name}\"\nversion = \"0.1.0\"\nedition = \"2021\"\n[workspace]\n[dependencies]\n\
-             policy-macro = {{ path = {:?} }}\n",
+             policy-macro = {{ package = \"policyc-macro\", path = {:?} }}\n",
             root.join("policy-macro")
         );
         std::fs::write(folder.path().join("Cargo.toml"), manifest).unwrap();

@@ -1,4 +1,4 @@
-//! Control periods per second of the environment on one core: `cargo run --release -p train --example episodes`.
+//! Control periods per second of the environment on one core: `cargo run --release -p policyc-train --example episodes`.
 
 use std::path::Path;
 use std::time::Instant;

@@ -1,6 +1,6 @@
 //! Trains every seed of a training file, one after the other on one core, and prints what came out as a table.
 //!
-//!     cargo run --release -p train --example seeds -- FILE [tables] [looks] [SEED ...]
+//!     cargo run --release -p policyc-train --example seeds -- FILE [tables] [looks] [SEED ...]
 //!
 //! `tables` adds the evaluation of every seed, `looks` the learning curve; seeds replace those of the file.
 

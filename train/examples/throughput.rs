@@ -1,6 +1,6 @@
 //! Whole control periods of training per second on one core: act, simulate, observe, store, one update.
 //!
-//!     cargo run --release -p train --example throughput [TRAIN.toml [RUNS]]
+//!     cargo run --release -p policyc-train --example throughput [TRAIN.toml [RUNS]]
 //!
 //! Plain DQN, 12 duties, batch 256, 6-64-64-12, one update per period (`bench/training` sets it beside
 //! Stable-Baselines3); looks at the policy are left out.

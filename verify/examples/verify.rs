@@ -1,4 +1,4 @@
-//! `cargo run --release -p verify --example verify -- <policy.toml> [steps] [seed] [compiler...]`: the report as JSON.
+//! `cargo run --release -p policyc-verify --example verify -- <policy.toml> [steps] [seed] [compiler...]`: the report as JSON.
 
 use std::error::Error;
 use std::path::Path;

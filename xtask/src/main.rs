@@ -4,6 +4,7 @@ mod book;
 mod markdown;
 mod process;
 mod programs;
+mod release;
 mod rules;
 mod steps;
 mod tools;
@@ -25,6 +26,7 @@ usage: cargo xtask <command>
   setup                             only the tools: compilers, emulators, ngspice, mdBook (also called install)
   bless                             rewrite the golden files from what the code produces now
   wheel [--full]                    only the Python package: build, install, test
+  release --dry-run                 packs every published crate, and builds the packages with the oldest compiler
   layers                            only the layer rules
   book                              only the book: links, contents, mdBook
   words                             words of each page, and figures per hundred of them
@@ -44,6 +46,7 @@ enum Command {
     Install,
     Bless,
     Wheel(Options),
+    Release,
     Layers,
     Book,
     Words,
@@ -90,6 +93,9 @@ fn parse(arguments: &[String]) -> Result<Command, String> {
                 other => other,
             });
         }
+        "release" if rest == ["--dry-run"] => return Ok(Command::Release),
+        // publishing cannot be taken back: it is typed by hand
+        "release" => return Err("`release` takes `--dry-run`; nothing is published from here".into()),
         "setup" | "install" => Command::Install,
         "bless" => Command::Bless,
         "layers" => Command::Layers,
@@ -137,6 +143,11 @@ fn run(command: Command) -> Result<bool, String> {
         }
         Command::Test(options) => Ok(steps::run_all(&Workspace::load()?, steps::ALL, options)),
         Command::Wheel(options) => Ok(steps::run_all(&Workspace::load()?, steps::OF_THE_WHEEL, options)),
+        Command::Release => Ok(steps::run_all(
+            &Workspace::load()?,
+            steps::OF_A_RELEASE,
+            Options::default(),
+        )),
         Command::Bless => bless(&Workspace::load()?),
         Command::Layers => layers(&Workspace::load()?),
         Command::Book => Ok(steps::run_all(
@@ -230,6 +241,13 @@ mod tests {
         };
         assert_eq!(parsed("test --full"), Ok(Command::Test(options)));
         assert!(parsed("test --full --quick").unwrap_err().contains("exclude"));
+    }
+
+    #[test]
+    fn a_release_is_rehearsed_and_nothing_else() {
+        assert_eq!(parsed("release --dry-run"), Ok(Command::Release));
+        assert!(parsed("release").unwrap_err().contains("--dry-run"));
+        assert!(parsed("release --now").unwrap_err().contains("--dry-run"));
     }
 
     #[test]

@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use crate::book;
 use crate::process::{self, Output};
 use crate::programs;
+use crate::release;
 use crate::rules::{self, Findings};
 use crate::tools;
 use crate::wheel;
@@ -65,9 +66,28 @@ const WHEEL: Step = step("wheel", false, wheel);
 /// The Python package.
 pub const OF_THE_WHEEL: &[Step] = &[WHEEL];
 
+const MANIFESTS: Step = step("manifests", true, |c| {
+    judged(Ok(Findings {
+        faults: release::faults(&c.workspace.crates),
+        warnings: Vec::new(),
+    }))
+});
+
+/// What a release asks for beside the tests.
+pub const OF_A_RELEASE: &[Step] = &[
+    MANIFESTS,
+    step("packages", true, |c| {
+        release::pack(c.workspace, &c.log, c.limit()).map(Done::Passed)
+    }),
+    step("oldest", true, |c| {
+        release::oldest(c.workspace, &c.log, c.limit()).map(Done::Passed)
+    }),
+];
+
 /// What CI asks for.
 pub const ALL: &[Step] = &[
     step("tools", true, install),
+    MANIFESTS,
     step("layers", true, |c| judged(rules::layers(c.workspace))),
     step("lengths", true, |c| judged(rules::lengths(c.workspace))),
     step("portable", true, |c| judged(rules::portable(c.workspace))),

@@ -21,9 +21,17 @@ pub struct Dependency {
 }
 
 /// A member of the workspace with its path dependencies.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Crate {
+    /// As ARCHITECTURE.md has it.
     pub name: String,
+    /// As the registry has it.
+    pub package: String,
+    pub version: String,
+    /// Whether it is for the registry.
+    pub is_published: bool,
+    /// What the registry shows of it and that is missing.
+    pub lacks: Vec<&'static str>,
     /// Names of its integration tests.
     pub tests: Vec<String>,
     pub dependencies: Vec<Dependency>,
@@ -33,6 +41,8 @@ pub struct Crate {
 pub struct Workspace {
     pub root: PathBuf,
     pub target_dir: PathBuf,
+    /// The oldest compiler that the program promises.
+    pub rust_version: String,
     pub crates: Vec<Crate>,
 }
 
@@ -50,6 +60,11 @@ impl Workspace {
         Ok(Self {
             root: text(metadata, "workspace_root")?.into(),
             target_dir: text(metadata, "target_directory")?.into(),
+            rust_version: packages
+                .iter()
+                .find_map(|package| package["rust_version"].as_str())
+                .unwrap_or_default()
+                .into(),
             crates: packages.iter().map(package).collect::<Result<_, _>>()?,
         })
     }
@@ -112,13 +127,37 @@ fn text<'a>(value: &'a Value, key: &str) -> Result<&'a str, String> {
         .ok_or_else(|| format!("cargo metadata: no text at `{key}`"))
 }
 
+/// What the registry shows of a crate.
+const SHOWN: [&str; 6] = [
+    "description",
+    "license",
+    "readme",
+    "keywords",
+    "categories",
+    "rust_version",
+];
+
+fn is_empty(value: &Value) -> bool {
+    value.is_null() || value.as_array().is_some_and(Vec::is_empty)
+}
+
+/// The name of a crate in this repository: that of its folder, without what tells it apart in a registry.
+fn short(package: &str) -> &str {
+    match package {
+        "policyc" => "cli",
+        "policyc-macro" => "policy-macro",
+        "policyc-build" => "policy-build",
+        other => other.strip_prefix("policyc-").unwrap_or(other),
+    }
+}
+
 fn package(package: &Value) -> Result<Crate, String> {
     let dependencies = package["dependencies"].as_array();
     let dependencies = dependencies.ok_or("cargo metadata: no `dependencies`")?;
     let own = dependencies.iter().filter(|d| d["path"].is_string());
     let dependency = |value: &Value| {
         Ok(Dependency {
-            name: text(value, "name")?.into(),
+            name: short(text(value, "name")?).into(),
             kind: match value["kind"].as_str() {
                 None => Kind::Normal,
                 Some("build") => Kind::Build,
@@ -134,7 +173,12 @@ fn package(package: &Value) -> Result<Crate, String> {
     };
     let targets = package["targets"].as_array().into_iter().flatten();
     Ok(Crate {
-        name: text(package, "name")?.into(),
+        name: short(text(package, "name")?).into(),
+        package: text(package, "name")?.into(),
+        version: text(package, "version")?.into(),
+        // no list: every registry; an empty one: none
+        is_published: package["publish"].is_null(),
+        lacks: SHOWN.into_iter().filter(|key| is_empty(&package[*key])).collect(),
         tests: targets
             .filter(is_test)
             .map(|target| Ok(text(target, "name")?.into()))
@@ -192,13 +236,16 @@ mod tests {
     fn only_path_dependencies_are_kept_with_their_kind() {
         let metadata = serde_json::json!({
             "workspace_root": "/w", "target_directory": "/w/target",
-            "packages": [{ "name": "interp", "dependencies": [
+            "packages": [{ "name": "policyc-interp", "version": "0.1.0", "publish": null, "license": "MIT", "keywords": [], "dependencies": [
                 { "name": "ndarray", "kind": null },
-                { "name": "policy", "kind": null, "path": "/w/policy" },
+                { "name": "policyc-policy", "kind": null, "path": "/w/policy" },
                 { "name": "plant", "kind": "dev", "path": "/w/plant" },
             ] }],
         });
         let workspace = Workspace::from_metadata(&metadata).unwrap();
+        let own = &workspace.crates[0];
+        assert_eq!((own.name.as_str(), own.is_published), ("interp", true));
+        assert!(own.lacks.contains(&"keywords") && !own.lacks.contains(&"license"));
         let found = &workspace.crates[0].dependencies;
         let found: Vec<_> = found.iter().map(|d| (d.name.as_str(), d.kind)).collect();
         assert_eq!(found, [("policy", Kind::Normal), ("plant", Kind::Dev)]);

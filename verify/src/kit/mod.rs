@@ -16,17 +16,12 @@ use crate::session::VerifyError;
 const CONSTRUCTS: &[(&str, &[u8])] = &[
     (
         "policy.toml",
-        // inside the program: a user of the tool has no checkout to read them from
-        include_bytes!("../../../tests/golden/cases/constructs/policy.toml"),
+        // inside the program: a user of the tool has no checkout to read them from. Copies of tests/golden/cases/constructs: a
+        // published crate holds no file of another
+        include_bytes!("constructs/policy.toml"),
     ),
-    (
-        "drm.toml",
-        include_bytes!("../../../tests/golden/cases/constructs/drm.toml"),
-    ),
-    (
-        "weights.safetensors",
-        include_bytes!("../../../tests/golden/cases/constructs/weights.safetensors"),
-    ),
+    ("drm.toml", include_bytes!("constructs/drm.toml")),
+    ("weights.safetensors", include_bytes!("constructs/weights.safetensors")),
 ];
 
 /// Control steps of the policy in a kit unless the user asks for another number.

@@ -64,10 +64,22 @@ const FORBIDDEN: &[Forbidden] = &[
 ];
 
 pub const MACRO: &str = "policy-macro";
+/// Its name in a registry, which cargo calls it by.
+const MACRO_PACKAGE: &str = "policyc-macro";
 
 /// Lists what a firmware crate compiles for `include_policy!`, one package a line.
 pub const MACRO_TREE: [&str; 11] = [
-    "tree", "-p", MACRO, "-e", "no-dev", "--target", "all", "--prefix", "none", "--format", "{p}",
+    "tree",
+    "-p",
+    MACRO_PACKAGE,
+    "-e",
+    "no-dev",
+    "--target",
+    "all",
+    "--prefix",
+    "none",
+    "--format",
+    "{p}",
 ];
 
 // `ndarray` comes with the interpreter, which holds the trainer's golden answers against the network: a controller that
@@ -91,15 +103,15 @@ pub fn check(crates: &[Crate]) -> Vec<String> {
 /// Reads the output of [`MACRO_TREE`].
 pub fn check_macro_closure(tree: &str) -> Vec<String> {
     let names: BTreeSet<&str> = tree.lines().filter_map(|line| line.split_whitespace().next()).collect();
-    if !names.contains(MACRO) {
-        return vec![format!("cargo tree does not list `{MACRO}` itself")];
+    if !names.contains(MACRO_PACKAGE) {
+        return vec![format!("cargo tree does not list `{MACRO_PACKAGE}` itself")];
     }
     let heavy = names.iter().filter(|name| {
         let is = |heavy: &&str| *name == heavy || name.starts_with(&format!("{heavy}_"));
         NOT_IN_MACRO.iter().any(is)
     });
     heavy
-        .map(|name| format!("`{MACRO}` pulls in `{name}`: firmware builds compile it each time; `cargo tree -p {MACRO} -i {name}` shows the way"))
+        .map(|name| format!("`{MACRO}` pulls in `{name}`: firmware builds compile it each time; `cargo tree -p {MACRO_PACKAGE} -i {name}` shows the way"))
         .collect()
 }
 
@@ -165,9 +177,9 @@ mod tests {
             kind: *kind,
         });
         Crate {
-            tests: Vec::new(),
             name: name.into(),
             dependencies: dependencies.collect(),
+            ..Crate::default()
         }
     }
 
@@ -267,7 +279,7 @@ mod tests {
 
     #[test]
     fn the_macro_pulls_in_nothing_heavy() {
-        let light = "policy-macro v0.1.0 (proc-macro) (/w/policy-macro)\nsyn v3.0.0\nsyn v3.0.0 (*)";
+        let light = "policyc-macro v0.1.0 (proc-macro) (/w/policy-macro)\nsyn v3.0.0\nsyn v3.0.0 (*)";
         assert_eq!(check_macro_closure(light), [""; 0]);
         let faults = check_macro_closure(&format!("{light}\naskama_derive v0.16.0\nclap v4.6.0"));
         assert_eq!(faults.len(), 2, "{faults:?}");

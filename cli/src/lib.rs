@@ -63,6 +63,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Verify(options) => commands::verify::run(options),
         Command::Prove(options) => commands::prove::run(options),
         Command::Certify(options) => commands::certify::run(options),
+        Command::Limit(options) => commands::limit::run(options),
         Command::Design(options) => commands::design::run(options),
         Command::Targets(options) => commands::targets::run(options),
         Command::Train(options) => commands::train::run(options),

@@ -79,6 +79,61 @@ pub trait Environment: Clone + Send {
     fn load(&mut self, bytes: &[u8]) -> Result<(), Error>;
 }
 
+/// A converter some of whose numbers are others than its file's, in each of its runs.
+#[derive(Debug, Clone)]
+pub struct Varied<E> {
+    nominal: E,
+    /// By key; behind them come those that a run varies itself.
+    numbers: Vec<(String, f64)>,
+}
+
+impl<E: Environment> Varied<E> {
+    /// `nominal` with these numbers, by key.
+    #[must_use]
+    pub fn new(nominal: &E, numbers: Vec<(String, f64)>) -> Self {
+        Self {
+            nominal: nominal.clone(),
+            numbers,
+        }
+    }
+}
+
+impl<E: Environment> Environment for Varied<E> {
+    fn t_sample(&self) -> f64 {
+        self.nominal.t_sample()
+    }
+
+    fn parameter(&self, key: &str) -> Option<f64> {
+        let own = self.numbers.iter().rev().find(|(name, _)| name == key);
+        own.map_or_else(|| self.nominal.parameter(key), |(_, value)| Some(*value))
+    }
+
+    fn identity(&self) -> Vec<u8> {
+        [self.nominal.identity(), format!("{:?}", self.numbers).into_bytes()].concat()
+    }
+
+    fn restart(&mut self, start: &Start<'_>) -> Result<Sample, Error> {
+        let own = self.numbers.iter().map(|(key, value)| (key.as_str(), *value));
+        let varied: Vec<(&str, f64)> = own.chain(start.varied.iter().copied()).collect();
+        self.nominal.restart(&Start {
+            varied: &varied,
+            ..*start
+        })
+    }
+
+    fn step(&mut self, duty: f64, load: &LoadPath) -> Sample {
+        self.nominal.step(duty, load)
+    }
+
+    fn save(&self) -> Result<Vec<u8>, Error> {
+        self.nominal.save()
+    }
+
+    fn load(&mut self, bytes: &[u8]) -> Result<(), Error> {
+        self.nominal.load(bytes)
+    }
+}
+
 /// `nominal` with some of its numbers replaced, by key; keys that are none of its numbers change nothing.
 #[must_use]
 pub fn varied(nominal: &Parameters, varied: &[(&str, f64)]) -> Parameters {

@@ -35,6 +35,10 @@ pub use environment::{Environment, LoadPath, Start};
 pub use faults::Error;
 pub use load_step::{LoadKind, LoadStep};
 pub use scenario_file::Scenario;
+pub use simulation::band_text;
 pub use suits::{held_by, holds_power, suits, v_ref};
-pub use tables::{COLUMNS, MetricsCsv, cells, comparison, evaluation_csv, limit_cells, table, trajectory_csv};
+pub use tables::{
+    COLUMNS, MetricsCsv, cells, comparison, digits, evaluation_csv, limit_cells, limits, table, time_digits,
+    trajectory_csv,
+};
 pub use unusable::unusable;

@@ -144,6 +144,12 @@ impl Question {
         }
     }
 
+    /// The limits at a sampling instant and at the worst of all instants, which is right behind one.
+    #[must_use]
+    pub fn of_all_instants(&self) -> Limit {
+        self.answer(&[BEHIND])
+    }
+
     /// The limits of a load step at `phase` of a period, 0 meaning at a sampling instant that shows it.
     #[must_use]
     pub fn bound(&self, phase: f64) -> Bound {

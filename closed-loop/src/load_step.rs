@@ -1,6 +1,7 @@
 //! What changes at a load step.
 
 use std::fmt;
+use std::ops::RangeInclusive;
 
 use plant::Load;
 
@@ -24,6 +25,17 @@ impl LoadKind {
             Self::Power => "W",
             Self::Current => "A",
             Self::Resistance => "ohm",
+        }
+    }
+
+    /// What a load step may be between, in [`LoadKind::unit`].
+    #[must_use]
+    pub fn range(self) -> RangeInclusive<f64> {
+        // decades beyond any bench: a slip of unit or sign is refused
+        match self {
+            Self::Power => 0.0..=1e7,
+            Self::Current => 0.0..=1e6,
+            Self::Resistance => 1e-6..=1e12,
         }
     }
 

@@ -4,11 +4,8 @@ use std::ops::RangeInclusive;
 
 use toml_input::{Message, Sink, Table, Value, messages};
 
+use crate::load_step::LoadKind;
 use crate::scenario::Task;
-
-/// Powers a load step may have, W.
-// a decade beyond the largest current times voltage of a bench: a slip of unit or sign is refused
-pub const POWER: RangeInclusive<f64> = 0.0..=1e7;
 
 /// The load steps and how they are run; what is left out is as in [`Task::default`].
 pub fn task(table: &mut Table<'_>, faults: &mut Sink) -> Task {
@@ -16,7 +13,7 @@ pub fn task(table: &mut Table<'_>, faults: &mut Sink) -> Task {
     let count = |v: &Value<'_>, faults: &mut Sink| v.integer(1..=1_000_000, faults);
     Task {
         load_steps: table.with_default("load_steps", default.load_steps, faults, |v, faults| {
-            pairs(v, "powers in W: [[200, 500]]", POWER, faults)
+            pairs(v, "powers in W: [[200, 500]]", LoadKind::Power.range(), faults)
         }),
         instants: table.with_default("instants", default.instants, faults, count),
         sampling_instants: table.with_default("sampling_instants", default.sampling_instants, faults, count),

@@ -1,6 +1,5 @@
 //! A scenario: which converter, which load steps, which classical controllers beside the policy.
 
-use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use toml_input::{Document, Faults, Message, Sink, Table, Value};
@@ -31,9 +30,6 @@ pub struct Scenario {
     pub limits: Vec<[f64; 2]>,
 }
 
-// decades beyond any bench: a slip of unit or sign is refused
-const CURRENT: RangeInclusive<f64> = 0.0..=1e6;
-const RESISTANCE: RangeInclusive<f64> = 1e-6..=1e12;
 /// Control periods of one run at most, so that a slip of the pen does not run for hours.
 const LONGEST_RUN: usize = 100_000;
 
@@ -80,8 +76,13 @@ fn top(document: &Document, folder: &Path, root: &mut Table<'_>, faults: &mut Si
             .and_then(|v| read::pairs(&v, of, range, faults))
             .unwrap_or_default()
     };
-    let currents = read_steps(currents, "currents in A: [[2, 10]]", CURRENT, faults);
-    let resistances = read_steps(resistances, "resistances in ohm: [[50, 10]]", RESISTANCE, faults);
+    let currents = read_steps(currents, "currents in A: [[2, 10]]", LoadKind::Current.range(), faults);
+    let resistances = read_steps(
+        resistances,
+        "resistances in ohm: [[50, 10]]",
+        LoadKind::Resistance.range(),
+        faults,
+    );
     let kinds = [
         (LoadKind::Power, powers),
         (LoadKind::Current, currents),

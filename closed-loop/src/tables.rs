@@ -65,13 +65,28 @@ pub fn comparison<'a>(
     out
 }
 
+/// Limits as a table for people, in the first two of [`COLUMNS`].
+#[must_use]
+pub fn limits(of: &[(LoadStep, Limit)]) -> String {
+    let [deviation, settling, ..] = COLUMNS;
+    let mut out = line("load step", &[deviation, settling].map(str::to_owned));
+    for (step, limit) in of {
+        out.push_str(&line(&step.to_string(), &limit_cells(limit)));
+    }
+    out
+}
+
 /// A limit in the first two of [`COLUMNS`].
 #[must_use]
 pub fn limit_cells(limit: &Limit) -> [String; 2] {
     let (a, b) = (&limit.at_sample, &limit.worst);
     [
         pair(a.deviation, b.deviation, digits(limit.band)),
-        pair(1e3 * a.settling, 1e3 * b.settling, SETTLING),
+        pair(
+            1e3 * a.settling,
+            1e3 * b.settling,
+            time_digits(a.settling.max(b.settling)),
+        ),
     ]
 }
 
@@ -80,9 +95,10 @@ pub fn limit_cells(limit: &Limit) -> [String; 2] {
 pub fn cells(finding: &Finding) -> [String; 6] {
     let (a, b) = (&finding.at_sample, &finding.worst);
     let digits = digits(b.band);
+    let times = time_digits(a.settling.max(b.settling));
     [
         pair(a.deviation, b.deviation, digits),
-        format!("{} / {}", settling(a), settling(b)),
+        format!("{} / {}", settling(a, times), settling(b, times)),
         pair(a.tail_max, b.tail_max, digits + 1),
         pair(a.tail_mean, b.tail_mean, digits + 1),
         pair(a.pre_error, b.pre_error, digits + 1),
@@ -91,13 +107,19 @@ pub fn cells(finding: &Finding) -> [String; 6] {
 }
 
 /// In ms; `>` where the run ended outside of the band.
-fn settling(m: &Metrics) -> String {
+fn settling(m: &Metrics, digits: usize) -> String {
     let unsettled = if m.is_settled() { "" } else { ">" };
-    format!("{unsettled}{:.SETTLING$}", 1e3 * m.settling)
+    format!("{unsettled}{:.digits$}", 1e3 * m.settling)
 }
 
-/// Decimals of a settling time in ms.
-const SETTLING: usize = 2;
+/// Decimals of a settling time in ms, of which `longest` in s is the longest beside each other: two, and more where that one would
+/// have less than two digits, down to 1 ns.
+#[must_use]
+pub fn time_digits(longest: f64) -> usize {
+    (2..6)
+        .find(|digits| longest <= 0.0 || 1e3 * longest * 10_f64.powi(*digits) >= 10.0)
+        .map_or(6, |digits| digits.unsigned_abs() as usize)
+}
 
 /// Decimals of a deviation in V: two where the band is the 0.5 V of a 100 V converter, more where it is narrower, so that the band
 /// has at least two digits everywhere.

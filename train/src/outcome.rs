@@ -9,13 +9,14 @@ use toml_input::Message;
 use crate::contract::{Files, GoldenVectors};
 use crate::faults::Error;
 use crate::network::Network;
+use crate::judge::{Judged, overall};
 use crate::score::{Score, Scoring, figures};
-use crate::settings::Instants;
+use crate::settings::{Instants, Requirement};
 use crate::trainer::{Best, Ended, Look, Trainer};
 use closed_loop::Agent;
 use closed_loop::environment::Environment;
 use closed_loop::scenario::{Finding, load_step};
-use closed_loop::{evaluation_csv, table};
+use closed_loop::{comparison, evaluation_csv, table};
 
 /// Observations among the golden vectors at most.
 // a convention: `compile` and `verify` compute each of them once, and the paper's network fits them into 40 kB
@@ -40,6 +41,10 @@ pub struct Outcome {
     pub evaluated: Score,
     /// The evaluation, load step by load step.
     pub findings: Vec<Finding>,
+    /// The evaluation on the plant, and behind it on the converters of `[[spread]]`.
+    pub judged: Vec<Judged>,
+    /// The same of the law alone that a residual policy adds to; empty without one.
+    pub law: Vec<Judged>,
     /// The policy folder: contract, weights, golden vectors, `report.txt`, `evaluation.csv`, `learning-curve.csv`.
     pub files: Files,
 }
@@ -56,15 +61,19 @@ impl<E: Environment> Trainer<E> {
                 .hint("train at least `every` control periods of [selection]")
                 .into());
         };
-        let task = &self.settings.evaluation;
-        let findings = self.survey(&best.network, task, &task.all_instants())?;
-        // the limits as they are: `margin` only makes the choice stricter than the verdict
-        let evaluated = Scoring::new(&task.load_steps, &self.settings.specification, 1.0).score(&findings);
+        let policy = self.contract.with(&best.network);
+        let judged = self.evaluate(&policy)?;
+        let law = policy.law_alone().map(|law| self.evaluate(&law)).transpose()?.unwrap_or_default();
+        let evaluated = overall(&judged);
         let golden = self.golden(&best.network)?;
         let (_, mut files) = self.contract.folder(&best.network, &golden)?;
-        let report = self.report(ended, best, &evaluated, &findings);
+        let report = self.report(ended, best, &judged, &law);
+        let findings = judged.first().map(|nominal| nominal.findings.clone()).unwrap_or_default();
         files.insert("report.txt".to_owned(), report.into_bytes());
         files.insert("evaluation.csv".to_owned(), evaluation_csv(&findings).into_bytes());
+        if judged.len() > 1 {
+            files.insert("spread.csv".to_owned(), spread_csv(&judged[1..]).into_bytes());
+        }
         files.insert("learning-curve.csv".to_owned(), curve_csv(self.curve()).into_bytes());
         Ok(Outcome {
             seed: self.seed,
@@ -73,6 +82,8 @@ impl<E: Environment> Trainer<E> {
             selected: best.score,
             evaluated,
             findings,
+            judged,
+            law,
             files,
         })
     }
@@ -105,7 +116,7 @@ impl<E: Environment> Trainer<E> {
         Ok(golden_vectors(network, &observations))
     }
 
-    fn report(&self, ended: Ended, best: &Best, evaluated: &Score, findings: &[Finding]) -> String {
+    fn report(&self, ended: Ended, best: &Best, judged: &[Judged], law: &[Judged]) -> String {
         let mut out = String::new();
         let ended = match ended {
             Ended::Met => "the selection scenarios met the specification",
@@ -127,19 +138,24 @@ impl<E: Environment> Trainer<E> {
         ];
         out.push_str(&lines.join("\n"));
         out.push_str("\n\nEvaluation: true voltages at the sampling instants; worst sampling instant / worst of all instants\n\n");
-        out.push_str(&table(findings));
+        out.push_str(&tables(judged, law));
         if !self.settings.specification.is_empty() {
-            let verdict = if evaluated.met { "met" } else { "NOT met" };
+            let verdict = if overall(judged).met { "met" } else { "NOT met" };
             // writing to a String cannot fail
-            let _ = write!(out, "\nSpecification: {verdict}\n{}", self.verdicts(findings));
+            let _ = writeln!(out, "\nSpecification: {verdict}");
+            for (place, judged) in self.places().iter().zip(judged) {
+                if !place.name.is_empty() {
+                    let _ = writeln!(out, "on {}", place.name);
+                }
+                out.push_str(&self.verdicts(place.specification, &judged.findings));
+            }
         }
         out
     }
 
     /// One line per limit.
-    fn verdicts(&self, findings: &[Finding]) -> String {
+    fn verdicts(&self, specification: &[Requirement], findings: &[Finding]) -> String {
         let mut out = String::new();
-        let specification = &self.settings.specification;
         let scoring = Scoring::new(&self.settings.evaluation.load_steps, specification, 1.0);
         for requirement in specification {
             for (_, finding) in findings
@@ -160,6 +176,56 @@ impl<E: Environment> Trainer<E> {
         }
         out
     }
+}
+
+/// The evaluation as tables for people, a converter after the other, the law alone beside the policy where there is one; and
+/// what of both did better.
+#[must_use]
+pub fn tables(judged: &[Judged], law: &[Judged]) -> String {
+    let mut out = String::new();
+    for (n, Judged { place, findings, .. }) in judged.iter().enumerate() {
+        if !place.is_empty() {
+            let _ = write!(out, "\nOn {place}:\n\n");
+        }
+        let Some(law) = law.get(n) else {
+            out.push_str(&table(findings));
+            continue;
+        };
+        for (policy, law) in findings.iter().zip(&law.findings) {
+            out.push_str(&comparison(policy.step(), [("policy", policy), ("law alone", law)], []));
+        }
+    }
+    if !law.is_empty() {
+        let [policy, law] = [overall(judged), overall(law)];
+        let verdict = match (policy.met, law.met) {
+            (true, false) => "The law alone does not meet the specification.".to_owned(),
+            (false, true) => "The law alone meets the specification: the network makes it worse.".to_owned(),
+            _ if law.cost < policy.cost => format!(
+                "The law alone is the better one (cost {:.3}, the policy {:.3}): the network adds nothing.",
+                law.cost, policy.cost
+            ),
+            _ => format!("The law alone costs {:.3}, the policy {:.3}.", law.cost, policy.cost),
+        };
+        let _ = write!(out, "\n{verdict}\n");
+    }
+    out
+}
+
+/// The evaluations on a spread as CSV: the converter in front of the columns of `evaluation.csv`.
+fn spread_csv(judged: &[Judged]) -> String {
+    let mut out = String::new();
+    for Judged { place, findings, .. } in judged {
+        let text = evaluation_csv(findings);
+        let mut lines = text.lines();
+        let head = lines.next().unwrap_or_default();
+        if out.is_empty() {
+            let _ = writeln!(out, "converter,{head}");
+        }
+        for line in lines {
+            let _ = writeln!(out, "\"{place}\",{line}");
+        }
+    }
+    out
 }
 
 fn network_shape(network: &Network) -> String {

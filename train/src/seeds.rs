@@ -17,6 +17,8 @@ use crate::settings::Settings;
 use crate::summary::Worst;
 use crate::trainer::{Ended, Progress, Trainer};
 use closed_loop::environment::Environment;
+use closed_loop::scenario::settled_band;
+use closed_loop::{digits, time_digits};
 
 /// One seed's training after a run.
 #[derive(Debug)]
@@ -178,8 +180,10 @@ pub fn table(settings: &Settings, runs: &[SeedRun]) -> String {
     for run in runs {
         let Some(outcome) = &run.outcome else { continue };
         let worst = Worst::of(&outcome.findings);
+        let volts = digits(settled_band(settings.reward.v_ref));
+        let (tail, times) = (volts + 1, time_digits(worst.settling));
         text.push_str(&format!(
-            "{:4}  {:>15}  {:>10}  {:<9}  {:<10}  {:>11.2}  {:>11.2}  {:>6.3}  {:>6.3}\n",
+            "{:4}  {:>15}  {:>10}  {:<9}  {:<10}  {:>11.volts$}  {:>11.times$}  {:>6.tail$}  {:>6.3}\n",
             outcome.seed,
             grouped(run.steps),
             grouped(outcome.best_step),

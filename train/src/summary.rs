@@ -3,6 +3,7 @@
 use closed_loop::scenario::{Finding, Metrics};
 use serde::Serialize;
 
+use crate::judge::{Judged, overall};
 use crate::outcome::Outcome;
 use crate::score::Score;
 use crate::seeds::SeedRun;
@@ -21,6 +22,23 @@ pub struct Summary {
     /// In the order of the training file.
     pub seeds: Vec<Seed>,
     /// The best seed's, load step by load step.
+    pub evaluation: Vec<Evaluated>,
+    /// The best seed's on the converters of `[[spread]]`; left out without one.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub spread: Vec<Elsewhere>,
+    /// Of the law alone that the best seed's policy adds to, on all converters; left out without a law.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub law_alone: Option<Score>,
+}
+
+/// An evaluation on another converter than that of the plant's file.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Elsewhere {
+    /// What is other, in words.
+    pub converter: String,
+    /// Against the specification of the converter.
+    pub score: Score,
+    /// Load step by load step.
     pub evaluation: Vec<Evaluated>,
 }
 
@@ -104,6 +122,8 @@ impl Summary {
             control_periods: runs.iter().map(|run| run.steps).sum(),
             seeds: seeds.map(|(seed, run)| Seed::of(*seed, run)).collect(),
             evaluation: best.map_or_else(Vec::new, |best| best.findings.iter().map(evaluated).collect()),
+            spread: best.map_or_else(Vec::new, |best| best.judged.iter().skip(1).map(elsewhere).collect()),
+            law_alone: best.filter(|best| !best.law.is_empty()).map(|best| overall(&best.law)),
         }
     }
 }
@@ -121,6 +141,14 @@ impl Seed {
                 worst: Worst::of(&outcome.findings),
             }),
         }
+    }
+}
+
+fn elsewhere(judged: &Judged) -> Elsewhere {
+    Elsewhere {
+        converter: judged.place.clone(),
+        score: judged.score,
+        evaluation: judged.findings.iter().map(evaluated).collect(),
     }
 }
 

@@ -21,13 +21,12 @@ use crate::faults::Error;
 use crate::learner::{Learner, TargetUpdate, greedy};
 use crate::network::Network;
 pub(crate) use crate::progress::Sums;
+pub use crate::judge::{Place, controller, quick_controller};
 pub use crate::progress::{Best, Ended, Look, Progress};
 use crate::replay::ReplayBuffer;
-use crate::score::{Score, Scoring};
 use crate::settings::Settings;
 use closed_loop::Agent;
 use closed_loop::environment::{Environment, LoadPath, Start};
-use closed_loop::scenario::{Finding, Instant, Task, survey, survey_all};
 
 /// Streams of a seed.
 // a stream each: what one of them draws must not move the others
@@ -285,72 +284,6 @@ impl<E: Environment> Trainer<E> {
         });
         Ok(())
     }
-
-    /// The cost grows with load steps and instants: a policy that some of them rule out is not run through the rest, and
-    /// its cost is a lower bound.
-    fn judge(&self, network: &Network) -> Result<Score, Error> {
-        let selection = &self.settings.selection;
-        let task = &selection.task;
-        let scoring = Scoring::new(&task.load_steps, &self.settings.specification, selection.margin);
-        let controller = quick_controller(&self.contract, network)?;
-        let best = self.best.as_ref().map_or(f64::INFINITY, |best| best.score.cost);
-        let instants = task.all_instants();
-        let mut score = scoring.score(&[]);
-        // one instant of each load step first: what fails there needs none of the others
-        for instants in [&instants[..1], &instants] {
-            let mut findings = Vec::new();
-            for &load_step in &task.load_steps {
-                let v_ref = self.settings.reward.v_ref;
-                findings.push(survey(&self.nominal, &controller, v_ref, task, load_step, instants)?);
-                score = scoring.score(&findings);
-                if score.cost >= best {
-                    // cut short, so nothing can be said of the rest
-                    return Ok(Score { met: false, ..score });
-                }
-            }
-        }
-        Ok(score)
-    }
-
-    /// Runs a network through scenarios on the plant as its file says, with the whole controller of the contract.
-    ///
-    /// # Errors
-    /// If the plant cannot be started.
-    pub fn survey(&self, network: &Network, task: &Task, instants: &[Instant]) -> Result<Vec<Finding>, Error> {
-        let controller = controller(&self.contract, network)?;
-        let v_ref = self.settings.reward.v_ref;
-        survey_all(&self.nominal, &controller, v_ref, task, instants)
-    }
-}
-
-/// A network at work in the controller of its contract, for [`closed_loop::scenario`]: the whole interpreter.
-///
-/// # Errors
-/// If the contract measures something that the plant does not have.
-pub fn controller(contract: &Contract, network: &Network) -> Result<impl FnMut(&Sample) -> f64 + Clone + use<>, Error> {
-    let mut agent = Agent::<f32>::new(&contract.with(network))?;
-    // the signals fit the contract since `Agent::new`; a NaN would end the run as a divergence
-    Ok(move |sample: &Sample| agent.step(&sample.measured).unwrap_or(f64::NAN))
-}
-
-/// The same to the bit, three times as fast: the contract's controller around the trainer's network.
-///
-/// # Errors
-/// As [`controller`].
-pub fn quick_controller(
-    contract: &Contract,
-    network: &Network,
-) -> Result<impl FnMut(&Sample) -> f64 + Clone + use<>, Error> {
-    let mut agent = Agent::<f32>::new(&contract.policy)?;
-    let network = network.clone();
-    let mut scratch = [Vec::new(), Vec::new()];
-    Ok(move |sample: &Sample| {
-        if agent.sense(&sample.measured).is_err() {
-            return f64::NAN;
-        }
-        network.q_values(agent.observation(), &mut scratch);
-        agent.act(greedy(&scratch[0]) as u32)
-    })
 }
 
 /// # Errors
@@ -372,22 +305,19 @@ pub(crate) fn check_fit<E: Environment>(
     // exploration, rewards and the converters to compare with are those of a buck; nobody has trained another
     if environment.parameter(topology).is_some_and(|choice| choice != 0.0)
         || settings.randomise.iter().any(|varied| varied.key == topology)
+        || settings.spread.iter().any(|spread| spread.keys().any(|key| key == topology))
     {
         let message = Message::new("a training is built for the buck converter alone");
         let message = message.found(format!("another `{topology}`")).expected("\"buck\"");
         return Err(Fault::in_file(&settings.file, message).into());
     }
-    let unknown = settings
-        .randomise
-        .iter()
-        .find(|parameter| environment.parameter(&parameter.key).is_none());
+    let randomised = settings.randomise.iter().map(|varied| ("[[randomise]]", varied.key.as_str()));
+    let spread = settings.spread.iter().flat_map(|spread| spread.keys().map(|key| ("[[spread]]", key)));
+    let unknown = randomised.chain(spread).find(|(_, key)| environment.parameter(key).is_none());
     match unknown {
         None => Ok(()),
-        Some(parameter) => {
-            let name = &parameter.key;
-            let message = Message::new(format!(
-                "[[randomise]] names `{name}`, which is not a number of the plant"
-            ));
+        Some((table, name)) => {
+            let message = Message::new(format!("{table} names `{name}`, which is not a number of the plant"));
             let hint = "write it as in the plant's file, `table.key`: `switch.v_f`";
             let known = plant::parameters().map(|parameter| parameter.key);
             Err(Fault::in_file(&settings.file, message.hint(hint).did_you_mean(name, known)).into())

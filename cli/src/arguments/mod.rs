@@ -1,6 +1,7 @@
 //! The command line.
 
 pub mod drm;
+mod plants;
 mod shared;
 mod shell;
 pub mod verify;
@@ -16,6 +17,7 @@ use crate::one_of::OneOf;
 use crate::ownership::Replacing;
 
 use drm::Drm;
+pub use plants::{Design, Limit, New};
 pub use shared::{Columns, ControllerKind, Loudness, Outside};
 pub use shell::{Completions, Manpages};
 pub use verify::Verify;
@@ -37,7 +39,7 @@ pub struct Arguments {
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Write a commented contract for a trained network, to be filled in
+    /// Write a commented contract for a trained network, to be filled in; or for a converter contract, training and scenario
     New(New),
     /// Show what a policy means: signals, features, network, actions, mapping, limits, sizes
     Inspect(Inspect),
@@ -55,6 +57,8 @@ pub enum Command {
     Targets(Targets),
     /// Close a policy's loop on a simulated converter: load steps, classical controllers and the limit beside it
     Simulate(Simulate),
+    /// What no controller can beat on a plant: the smallest deviation and the shortest settling time after a load step
+    Limit(Limit),
     /// Gains of an observer and a law of control for a plant, as lines of a contract
     Design(Design),
     /// Train a policy on a simulated converter and write its folder
@@ -80,26 +84,6 @@ impl Command {
             Command::Prove(_) | Command::Simulate(_) | Command::Train(_) | Command::Drm(Drm::Transfer(_))
         )
     }
-}
-
-#[derive(Debug, Args)]
-pub struct New {
-    /// What the trainer saved: safetensors, a torch file (.pt, .pth), a model of stable-baselines3 (.zip), ONNX, or MAT
-    pub weights: PathBuf,
-    /// File to write; must not exist yet. It names the weights as seen from its folder; those that had to be joined or folded
-    /// are written beside it
-    #[arg(long, value_name = "FILE", default_value = "policy.toml")]
-    pub out: PathBuf,
-    /// Entry of a checkpoint that holds the network, such as model_state_dict
-    #[arg(long, value_name = "NAME")]
-    pub inside: Option<String>,
-    /// Number of actions, where the tensors do not say it: of a QR-DQN, or of two outputs. 1 is a command, which is a number
-    #[arg(long, value_name = "N")]
-    pub actions: Option<usize>,
-    /// What stable-baselines3's VecNormalize saved: scale, offset and clip of the features. A vecnormalize.pkl beside the model
-    /// is taken without this
-    #[arg(long, value_name = "FILE")]
-    pub vecnormalize: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -302,27 +286,6 @@ pub struct Targets {
     /// Machine-readable, with everything the compiler knows of a target
     #[arg(long)]
     pub json: bool,
-}
-
-#[derive(Debug, Args)]
-pub struct Design {
-    /// Plant file; its nominal values are what is designed for, its sensor of the output voltage gives the noise
-    pub plant: PathBuf,
-    /// Voltage to hold, V
-    #[arg(long, value_name = "V")]
-    pub v_ref: f64,
-    /// Largest load current, A
-    #[arg(long, value_name = "A")]
-    pub load: f64,
-    /// Standard deviation of the measured output voltage in V, in the place of the plant's
-    #[arg(long, value_name = "V")]
-    pub noise: Option<f64>,
-    /// Standard deviations of what the model is wrong by in a period, A,V,V: current, voltage, bias
-    #[arg(long, value_name = "A,V,V", value_delimiter = ',')]
-    pub model_noise: Option<Vec<f64>>,
-    /// Double pole of the law: how much of an error is left after a period
-    #[arg(long, value_name = "SHARE", default_value_t = 0.5)]
-    pub pole: f64,
 }
 
 #[derive(Debug, Args)]

@@ -9,6 +9,7 @@ pub mod design;
 pub mod diagnose;
 pub mod drm;
 pub mod inspect;
+pub mod limit;
 pub mod manpages;
 pub mod new;
 mod progress_line;

@@ -1,18 +1,38 @@
 //! `policyc new`
 
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use closed_loop::limits;
+use plant::Parameters;
+use policy::seen_from;
+use toml_input::Fault;
+use train::start::{SCENARIO, Start, TRAINING, Wanted};
+
 use crate::arguments::New;
 use crate::failure::Failure;
 use crate::outcome::Outcome;
 use crate::output;
+use crate::talk;
 
-/// Writes a contract skeleton for what a trainer saved, and weights beside it where they had to be changed.
+/// Writes a contract skeleton for what a trainer saved, and weights beside it where they had to be changed; or what a
+/// training on a plant starts from.
 pub fn run(options: &New) -> Result<Outcome, Failure> {
+    match (&options.weights, &options.plant, options.v_ref.zip(options.loads)) {
+        (_, Some(plant), Some((v_ref, loads))) => for_plant(options, plant, Wanted { v_ref, loads }),
+        (Some(weights), ..) => for_weights(options, weights),
+        // the parser has asked for one of both
+        _ => Ok(Outcome::Done),
+    }
+}
+
+fn for_weights(options: &New, weights: &Path) -> Result<Outcome, Failure> {
     let known = import::Options {
         actions: options.actions,
         inside: options.inside.clone(),
         vecnormalize: options.vecnormalize.clone(),
     };
-    let new = import::new_policy(&options.weights, &options.out, &known)?;
+    let new = import::new_policy(weights, &options.out, &known)?;
     output::write_new_all(&options.out, &new.contract, &new.beside)?;
     for line in &new.said {
         output::say(line)?;
@@ -23,6 +43,39 @@ pub fn run(options: &New) -> Result<Outcome, Failure> {
     let path = options.out.display();
     output::say(&format!(
         "wrote {path}: fill in what says TODO, look at what says check, then\n  policyc inspect {path}"
+    ))?;
+    Ok(Outcome::Done)
+}
+
+fn for_plant(options: &New, file: &Path, wanted: Wanted) -> Result<Outcome, Failure> {
+    let plant = Parameters::buck_from_file(file, "`new --plant`")?;
+    let start = Start::new(&plant, file, wanted)?;
+    let out = &options.out;
+    let from_there = |path: &Path| seen_from(out, path).map_err(|message| Fault::in_file(path, message));
+    let (plant, contract) = (from_there(file)?, from_there(out)?);
+    let beside = BTreeMap::from([
+        (TRAINING.to_owned(), start.training(&contract, &plant).into_bytes()),
+        (SCENARIO.to_owned(), start.scenario(&plant).into_bytes()),
+    ]);
+    output::write_new_all(out, &start.contract(), &beside)?;
+    output::say(&format!(
+        "What no controller can beat on this plant, at sampling instants / at the worst instant:\n\n{}\n",
+        limits(start.limits()).trim_end()
+    ))?;
+    start.notes().iter().for_each(|note| talk::note(note));
+    let [training, scenario] = [TRAINING, SCENARIO].map(|name| out.with_file_name(name));
+    let folder = out.with_file_name("trained");
+    output::say(&format!(
+        "wrote {}, {} and {}: signals, loads and limits are yours to change, then\n  policyc train {} --out {}\n  policyc simulate {} \
+         --policy {} --out {}",
+        out.display(),
+        training.display(),
+        scenario.display(),
+        training.display(),
+        folder.display(),
+        scenario.display(),
+        folder.display(),
+        out.with_file_name("loop").display(),
     ))?;
     Ok(Outcome::Done)
 }

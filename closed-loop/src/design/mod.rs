@@ -61,6 +61,8 @@ pub struct Design {
     pub by_voltage: f64,
     /// How far the current at the sampling instant lies below its mean, A.
     pub half_ripple: f64,
+    /// How much farther per volt of bias, A/V: losses want a larger duty, and so another ripple.
+    pub ripple_by_bias: f64,
 }
 
 impl Design {
@@ -102,6 +104,7 @@ impl Design {
         let noise = noise(plant, wanted)?;
         let filter = model.filter(&noise)?;
         let (by_current, by_voltage) = law(&model, converter.v_in, pole);
+        let resting = v_ref / converter.v_in;
         Ok(Self {
             v_ref,
             load: wanted.load,
@@ -116,7 +119,9 @@ impl Design {
             pole,
             by_current,
             by_voltage,
-            half_ripple: 0.5 * v_ref * (1.0 - v_ref / converter.v_in) * model.by_inductance,
+            half_ripple: 0.5 * v_ref * (1.0 - resting) * model.by_inductance,
+            // of the model's half ripple `(V (d - d^2/2) - v/2 + b/2) T/L` at rest, where `V d = v - b`, by b at b = 0
+            ripple_by_bias: (resting - 0.5) * model.by_inductance,
         })
     }
 }

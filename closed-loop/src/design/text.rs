@@ -9,35 +9,18 @@ impl Design {
     /// `[[observer]]` and `base` of `[actions]` for a contract with the signals `v_out` and `i_out`.
     #[must_use]
     pub fn contract(&self) -> String {
-        let [current, voltage, bias] = self.filter.gains.map(short);
-        let reach = self.reach();
-        let lowest = if self.has_diode { 0.0 } else { -reach };
         let periods = -1.0 / self.filter.slowest.ln();
         let noise = &self.noise;
         let [i, v, b] = noise.process;
-        let half_ripple = short(self.half_ripple);
-        // at the switch node: what a tenth of the source would be lost to
-        let most_bias = rounded(0.1 * self.v_in, 2);
         format!(
             "{}# Observer and law for {} V from {} V, {} H, {} F, a period of {} s, by `policyc design`.\n\
              # Steady Kalman filter for {} V of noise and a model that is wrong by {} A, {} V and {} V a period: an error of the\n\
              # estimates decays to 37 % in {:.1} periods.\n\
-             [[observer]]\n\
-             name = \"model\"\n\
-             inductance = {:?}\n\
-             capacitance = {:?}\n\
-             input_voltage = {:?}\n\
-             output_voltage = \"v_out\"\n\
-             load_current = \"i_out\"\n\
-             compute_delay = {}\n\
-             gains = {{ current = {current}, voltage = {voltage}, bias = {bias} }}\n\
-             current = [{lowest:?}, {reach:?}]\n\
-             bias = [-{most_bias:?}, {most_bias:?}]\n\
-             \n\
-             # The law has both poles at {}: it makes up for losses by the bias, and rests {half_ripple} A below the load current, where the\n\
-             # current of a settled converter is when the switch turns on.\n\
+             {}\n\
+             # The law has both poles at {}: it makes up for losses by the bias, and rests {} A below the load current, where the\n\
+             # current of a settled converter is when the switch turns on{}.\n\
              [actions]\n\
-             base = \"({} - model_bias) / {} - {} * (model_current - i_out + {half_ripple}) - {} * (model_voltage - {})\"\n",
+             base = \"{}\"\n",
             self.at_light_load(),
             self.v_ref,
             self.v_in,
@@ -49,14 +32,62 @@ impl Design {
             short(v),
             short(b),
             periods,
-            self.inductance,
-            self.capacitance,
-            self.v_in,
-            self.compute_delay,
+            self.observer(),
             self.pole,
+            short(self.half_ripple),
+            match short(self.ripple_by_bias) == 0.0 {
+                true => "",
+                false => "; losses want another duty, which changes the ripple",
+            },
+            self.law(),
+        )
+    }
+
+    /// The table `[[observer]]`.
+    #[must_use]
+    pub fn observer(&self) -> String {
+        let [current, voltage, bias] = self.filter.gains.map(short);
+        let reach = self.reach();
+        let lowest = if self.has_diode { 0.0 } else { -reach };
+        // at the switch node: what a tenth of the source would be lost to
+        let most_bias = rounded(0.1 * self.v_in, 2);
+        format!(
+            "[[observer]]\n\
+             name = \"model\"\n\
+             inductance = {:?}\n\
+             capacitance = {:?}\n\
+             input_voltage = {:?}\n\
+             output_voltage = \"v_out\"\n\
+             load_current = \"i_out\"\n\
+             compute_delay = {}\n\
+             gains = {{ current = {current}, voltage = {voltage}, bias = {bias} }}\n\
+             current = [{lowest:?}, {reach:?}]\n\
+             bias = [-{most_bias:?}, {most_bias:?}]\n",
+            self.inductance, self.capacitance, self.v_in, self.compute_delay,
+        )
+    }
+
+    /// What charges the capacitor, A, as an expression of a contract: the mean of the estimated current without the load's.
+    #[must_use]
+    pub fn surplus(&self) -> String {
+        let by_bias = short(self.ripple_by_bias);
+        let ripple = match by_bias {
+            0.0 => String::new(),
+            _ if by_bias > 0.0 => format!(" + {by_bias} * model_bias"),
+            _ => format!(" - {} * model_bias", -by_bias),
+        };
+        format!("model_current - i_out + {}{ripple}", short(self.half_ripple))
+    }
+
+    /// The duty of the law, as an expression of a contract.
+    #[must_use]
+    pub fn law(&self) -> String {
+        format!(
+            "({} - model_bias) / {} - {} * ({}) - {} * (model_voltage - {})",
             self.v_ref,
             self.v_in,
             short(self.by_current),
+            self.surplus(),
             short(self.by_voltage),
             self.v_ref,
         )

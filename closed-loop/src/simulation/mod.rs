@@ -16,4 +16,4 @@ mod words;
 pub use files::PAGE;
 pub use findings::{Check, Findings, POLICY, Setting, Step};
 pub use runs::simulate;
-pub(crate) use words::band_text;
+pub use words::band_text;

@@ -6,7 +6,7 @@ use super::findings::{Findings, Step};
 use super::words;
 use crate::faults::{Error, told};
 use crate::scenario::Metrics;
-use crate::tables::{COLUMNS, cells, limit_cells};
+use crate::tables::{COLUMNS, cells, digits, limit_cells, time_digits};
 
 /// One HTML file; `drawn` are the pictures of the load steps in their order.
 pub(super) fn page(found: &Findings, drawn: Vec<Svg>) -> Result<String, Error> {
@@ -66,10 +66,14 @@ fn worst(found: &Findings) -> String {
     });
     largest.map_or(String::new(), |(step, course)| {
         let Metrics {
-            deviation, settling, ..
+            deviation,
+            settling,
+            band,
+            ..
         } = course.finding.worst;
+        let (volts, times) = (digits(band), time_digits(settling));
         format!(
-            "the policy's largest deviation is {deviation:.2} V, at {}, settled after {:.2} ms",
+            "the policy's largest deviation is {deviation:.volts$} V, at {}, settled after {:.times$} ms",
             step.step,
             1e3 * settling
         )

@@ -15,7 +15,8 @@ pub(super) fn plant_text(setting: &Setting) -> String {
 }
 
 /// The settling band with its unit: `0.5 V`, `16.5 mV`.
-pub(crate) fn band_text(v_ref: f64) -> String {
+#[must_use]
+pub fn band_text(v_ref: f64) -> String {
     let band = settled_band(v_ref);
     // shortest digits of the number rounded to four: 3.3 / 200 is not 0.0165 to the last bit
     let short = |x: f64| format!("{x:.3e}").parse::<f64>().unwrap_or(x);

@@ -9,7 +9,7 @@ use super::pictures;
 use crate::faults::{Error, told};
 use crate::scenario::Metrics;
 use crate::simulation::band_text;
-use crate::tables::{COLUMNS, MetricsCsv, cells, comparison, digits};
+use crate::tables::{COLUMNS, MetricsCsv, cells, comparison, digits, time_digits};
 
 /// Name of the page with everything on it, among the files.
 pub const PAGE: &str = "report.html";
@@ -167,7 +167,7 @@ fn lines(found: &Findings) -> Vec<[String; 6]> {
             format!("{:.*}", digits + 1, m.tail_mean),
             format!("{:.*}", digits + 1, m.tail_max),
             format!("{:.digits$}", m.deviation),
-            format!("{unsettled}{:.2}", 1e3 * m.settling),
+            format!("{unsettled}{:.*}", time_digits(m.settling), 1e3 * m.settling),
         ]
     };
     let real = found
@@ -211,11 +211,13 @@ fn sentence(found: &Findings) -> String {
     };
     let all = found.real.iter().filter_map(|real| gained(&real));
     let most = all.max_by(|(_, a, b), (_, c, d)| (a - b).total_cmp(&(c - d)));
+    let simulated = largest(&found.simulation);
+    let volts = digits(simulated.band) + 1;
     most.map_or(String::new(), |(name, before, after)| {
         format!(
-            "Steady-state mean error on {name}, the worst load step: {before:.3} V without a mapping, {after:.3} V with it; \
-             in simulation {:.3} V.",
-            largest(&found.simulation).tail_mean
+            "Steady-state mean error on {name}, the worst load step: {before:.volts$} V without a mapping, {after:.volts$} V with \
+             it; in simulation {:.volts$} V.",
+            simulated.tail_mean
         )
     })
 }

@@ -1,6 +1,7 @@
 //! `train.toml`: everything a training needs to know, in one file.
 
 mod read;
+mod spread;
 
 use std::path::{Path, PathBuf};
 
@@ -8,6 +9,8 @@ use crate::faults::Error;
 use crate::learner::LearnerSettings;
 use closed_loop::scenario::Task;
 use toml_input::{Document, Faults};
+
+pub use spread::Spread;
 
 /// A training, as its file says. Defaults are those of the paper (arXiv 2110.10490) and its authors' code.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,6 +41,8 @@ pub struct Settings {
     pub curriculum: Vec<Stage>,
     /// Plant parameters drawn anew for each episode.
     pub randomise: Vec<Randomised>,
+    /// Other converters on which a policy has to hold, in selection and evaluation.
+    pub spread: Vec<Spread>,
     /// Which checkpoint is kept.
     pub selection: Selection,
     /// What the kept one is reported with.

@@ -6,9 +6,11 @@ use std::path::Path;
 use sha2::{Digest, Sha256};
 use toml_input::{Document, Faults, Message, Sink, Table, Value, messages};
 
+use super::spread;
 use super::{Draw, Episode, Instants, Learning, Loads, Randomised, Requirement, Reward, Selection, Settings, Stage};
 use crate::learner::{LearnerSettings, Loss, TargetUpdate};
 use crate::optimiser::AdamSettings;
+use closed_loop::LoadKind;
 use closed_loop::read;
 use closed_loop::scenario::Task;
 
@@ -47,6 +49,7 @@ fn top(document: &Document, root: &mut Table<'_>, faults: &mut Sink) -> Option<S
     let episode = root.section("episode", faults, |table, faults| episode(table, v_ref, faults));
     let curriculum = root.sections("curriculum", faults, stage);
     let randomise = root.sections("randomise", faults, randomised);
+    let spread = root.sections("spread", faults, spread::read);
     let selection = root.section("selection", faults, selection);
     let evaluation = root.section("evaluation", faults, task);
     let specification = root.sections("spec", faults, requirement);
@@ -65,6 +68,7 @@ fn top(document: &Document, root: &mut Table<'_>, faults: &mut Sink) -> Option<S
         episode: episode?,
         curriculum,
         randomise,
+        spread,
         selection: selection?,
         evaluation: evaluation?,
         specification,
@@ -238,12 +242,12 @@ fn loads(value: &Value<'_>, faults: &mut Sink) -> Option<Loads> {
     value.read_table("loads", faults, |table, faults| {
         let values = table.optional("values").map_or(Some(Vec::new()), |v| {
             v.each("powers in W: [200, 500]", faults, |item, faults| {
-                item.number_within(read::POWER, faults)
+                item.number_within(LoadKind::Power.range(), faults)
             })
         });
-        let range = table
-            .optional("range")
-            .map_or(Some(None), |v| v.interval_within(read::POWER, faults).map(Some));
+        let range = table.optional("range").map_or(Some(None), |v| {
+            v.interval_within(LoadKind::Power.range(), faults).map(Some)
+        });
         let share = table.with_default("share", 0.5, faults, share);
         let (values, range) = (values?, range?);
         let (range, share) = match (values.first(), range) {
@@ -338,12 +342,13 @@ fn task(table: &mut Table<'_>, faults: &mut Sink) -> Option<Task> {
 }
 
 fn requirement(table: &mut Table<'_>, faults: &mut Sink) -> Option<Requirement> {
-    let load_step = table.optional("load_step").and_then(|v| v.pair(read::POWER, faults));
+    let load_step = table
+        .optional("load_step")
+        .and_then(|v| v.pair(LoadKind::Power.range(), faults));
     let instants = table.with_default("instants", Instants::Worst, faults, |v, faults| {
         v.choice(&[("worst", Instants::Worst), ("sample", Instants::Sample)], faults)
     });
-    let [deviation, settling, tail] =
-        ["deviation", "settling", "tail"].map(|key| table.optional(key).and_then(|v| v.positive(faults)));
+    let [deviation, settling, tail] = figures(table, faults);
     if deviation.or(settling).or(tail).is_none() {
         faults.push(table.fault(Message::new("a [[spec]] without a limit").expected("deviation, settling or tail")));
     }
@@ -354,4 +359,9 @@ fn requirement(table: &mut Table<'_>, faults: &mut Sink) -> Option<Requirement> 
         settling,
         tail,
     })
+}
+
+/// Limits: deviation in V, settling time in s, tail in V.
+pub(super) fn figures(table: &mut Table<'_>, faults: &mut Sink) -> [Option<f64>; 3] {
+    ["deviation", "settling", "tail"].map(|key| table.optional(key).and_then(|v| v.positive(faults)))
 }

@@ -8,7 +8,7 @@ use serde::Serialize;
 use toml_input::{FileName, Message};
 use train::summary::Summary;
 use train::{
-    Contract, Converter, Course, Ended, Outcome as Trained, SeedRun, Settings, scenario_table, seeds, train_all,
+    Contract, Converter, Course, Ended, Outcome as Trained, SeedRun, Settings, seeds, tables, train_all,
 };
 
 use crate::arguments::Train;
@@ -109,7 +109,7 @@ fn report(
     text.push_str(&format!(
         "\nSeed {}, best on the selection scenarios, in its evaluation (at sampling instants / worst of all instants):\n\n{}",
         best.seed,
-        scenario_table(&best.findings)
+        tables(&best.judged, &best.law)
     ));
     text.push_str(&format!(
         "\n{} control periods in {seconds:.1} s; policy in {out}, all seeds in {out}/{SEEDS}\n\

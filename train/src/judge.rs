@@ -1,0 +1,157 @@
+//! How a policy is judged: its controller in closed loop on the plant and on its spread.
+//!
+//! ```text
+//!  plant ───────┬─► places ─► load steps at their instants ─► findings ─► score of a place ─► mean, met by all
+//!  [[spread]] ──┘
+//! ```
+
+use plant::Sample;
+use policy::Policy;
+
+use crate::contract::Contract;
+use crate::faults::Error;
+use crate::learner::greedy;
+use crate::network::Network;
+use crate::score::{Score, Scoring};
+use crate::settings::Requirement;
+use crate::trainer::Trainer;
+use closed_loop::Agent;
+use closed_loop::environment::{Environment, Varied};
+use closed_loop::scenario::{Finding, survey, survey_all};
+
+/// A converter on which policies are judged.
+#[derive(Debug, Clone)]
+pub struct Place<'a, E> {
+    /// What is other than in the plant's file, in words; empty where nothing is.
+    pub name: String,
+    /// The converter.
+    pub converter: Varied<E>,
+    /// What a good policy does on it.
+    pub specification: &'a [Requirement],
+}
+
+/// How a policy did at one place.
+#[derive(Debug, Clone)]
+pub struct Judged {
+    /// As [`Place::name`].
+    pub place: String,
+    /// Against the specification of the place.
+    pub score: Score,
+    /// Load step by load step.
+    pub findings: Vec<Finding>,
+}
+
+impl<E: Environment> Trainer<E> {
+    /// The plant as its file says, and those of the spread.
+    pub(crate) fn places(&self) -> Vec<Place<'_, E>> {
+        let general = &self.settings.specification;
+        let place = |name, numbers, specification| Place {
+            name,
+            converter: Varied::new(&self.nominal, numbers),
+            specification,
+        };
+        let others = self.settings.spread.iter().map(|spread| {
+            let numbers = spread.numbers(|key| self.nominal.parameter(key));
+            let own = if spread.limits.is_empty() { general } else { &spread.limits };
+            place(spread.name(), numbers, own.as_slice())
+        });
+        std::iter::once(place(String::new(), Vec::new(), general.as_slice()))
+            .chain(others)
+            .collect()
+    }
+
+    /// The cost grows with load steps and instants: a policy that some of them rule out is not run through the rest, and
+    /// its cost is a lower bound.
+    pub(crate) fn judge(&self, network: &Network) -> Result<Score, Error> {
+        let selection = &self.settings.selection;
+        let task = &selection.task;
+        let controller = quick_controller(&self.contract, network)?;
+        let best = self.best.as_ref().map_or(f64::INFINITY, |best| best.score.cost);
+        let instants = task.all_instants();
+        let places = self.places();
+        let mut whole = Score { met: false, cost: 0.0 };
+        // one instant of each load step first: what fails there needs none of the others
+        for instants in [&instants[..1], &instants] {
+            whole = Score { met: true, cost: 0.0 };
+            for place in &places {
+                let scoring = Scoring::new(&task.load_steps, place.specification, selection.margin);
+                let mut findings = Vec::new();
+                let mut score = scoring.score(&[]);
+                for &load_step in &task.load_steps {
+                    let v_ref = self.settings.reward.v_ref;
+                    findings.push(survey(&place.converter, &controller, v_ref, task, load_step, instants)?);
+                    score = scoring.score(&findings);
+                    let cost = whole.cost + score.cost / places.len() as f64;
+                    if cost >= best {
+                        // cut short, so nothing can be said of the rest
+                        return Ok(Score { met: false, cost });
+                    }
+                }
+                whole = Score {
+                    met: whole.met && score.met,
+                    cost: whole.cost + score.cost / places.len() as f64,
+                };
+            }
+        }
+        Ok(whole)
+    }
+
+    /// The evaluation of a policy, the plant as its file says first; the limits are as they are, without the margin of the
+    /// selection, which only makes the choice stricter than the verdict.
+    pub(crate) fn evaluate(&self, policy: &Policy) -> Result<Vec<Judged>, Error> {
+        let task = &self.settings.evaluation;
+        let controller = of_policy(policy)?;
+        let judged = |place: Place<'_, E>| {
+            let v_ref = self.settings.reward.v_ref;
+            let findings = survey_all(&place.converter, &controller, v_ref, task, &task.all_instants())?;
+            Ok(Judged {
+                score: Scoring::new(&task.load_steps, place.specification, 1.0).score(&findings),
+                place: place.name,
+                findings,
+            })
+        };
+        self.places().into_iter().map(judged).collect()
+    }
+}
+
+/// A network at work in the controller of its contract, for [`closed_loop::scenario`]: the whole interpreter.
+///
+/// # Errors
+/// If the contract measures something that the plant does not have.
+pub fn controller(contract: &Contract, network: &Network) -> Result<impl FnMut(&Sample) -> f64 + Clone + use<>, Error> {
+    of_policy(&contract.with(network))
+}
+
+fn of_policy(policy: &Policy) -> Result<impl FnMut(&Sample) -> f64 + Clone + use<>, Error> {
+    let mut agent = Agent::<f32>::new(policy)?;
+    // the signals fit the contract since `Agent::new`; a NaN would end the run as a divergence
+    Ok(move |sample: &Sample| agent.step(&sample.measured).unwrap_or(f64::NAN))
+}
+
+/// The same to the bit, three times as fast: the contract's controller around the trainer's network.
+///
+/// # Errors
+/// As [`controller`].
+pub fn quick_controller(
+    contract: &Contract,
+    network: &Network,
+) -> Result<impl FnMut(&Sample) -> f64 + Clone + use<>, Error> {
+    let mut agent = Agent::<f32>::new(&contract.policy)?;
+    let network = network.clone();
+    let mut scratch = [Vec::new(), Vec::new()];
+    Ok(move |sample: &Sample| {
+        if agent.sense(&sample.measured).is_err() {
+            return f64::NAN;
+        }
+        network.q_values(agent.observation(), &mut scratch);
+        agent.act(greedy(&scratch[0]) as u32)
+    })
+}
+
+/// Of all places together.
+pub(crate) fn overall(judged: &[Judged]) -> Score {
+    Score {
+        met: judged.iter().all(|one| one.score.met),
+        cost: judged.iter().map(|one| one.score.cost / judged.len() as f64).sum(),
+    }
+}

@@ -1,0 +1,194 @@
+//! Contract, training and scenario for a converter that has none yet.
+//!
+//! ```text
+//!  plant ─┬─► limit of its load steps ─┬─► scales, reward, specification ─┐
+//!         └─► observer and law ────────┴─► features, base, dead zone ─────┴─► policy.toml, train.toml, scenario.toml
+//! ```
+
+mod text;
+
+use std::path::Path;
+
+use closed_loop::design::{Design, Wanted as Asked};
+use closed_loop::limit::{Limit, Question};
+use closed_loop::{LoadKind, LoadStep, holds_power};
+use plant::{Parameters, Sensor};
+use toml_input::Message;
+
+use crate::faults::Error;
+
+pub use text::{SCENARIO, TRAINING};
+
+/// What is asked beside the plant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wanted {
+    /// Voltage to hold, V.
+    pub v_ref: f64,
+    /// Smallest and largest load, constant powers in W.
+    pub loads: [f64; 2],
+}
+
+/// A start: what the files are written from.
+#[derive(Debug, Clone)]
+pub struct Start {
+    wanted: Wanted,
+    design: Design,
+    /// Duties that may be commanded.
+    duties: [f64; 2],
+    /// Of the load steps up and down.
+    limits: [(LoadStep, Limit); 2],
+    /// The same on converters with other parts, behind the factor on L and C.
+    spread: Vec<(f64, [(LoadStep, Limit); 2])>,
+    v_out: Channel,
+    i_out: Channel,
+}
+
+/// How a quantity is measured.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Channel {
+    /// Lowest and highest value, V or A.
+    range: [f64; 2],
+    /// Step and noise, V or A, where the plant has neither and they were assumed.
+    assumed: Option<[f64; 2]>,
+}
+
+/// Largest duty, where the converter leaves it.
+// a driver with a bootstrap capacitor wants some time off
+const LARGEST_DUTY: f64 = 0.95;
+/// Steps of an assumed converter: 12 bits, which every microcontroller with a PWM timer has.
+const STEPS: f64 = 4096.0;
+/// Double pole of the law.
+// of .3, .4 and .5 the one whose deviation stayed nearest to the limit with L and C 15 % low (docs/results/training.md)
+const POLE: f64 = 0.4;
+
+/// Factors on inductance and capacitance at which the policy has to hold as well.
+// what a print allows: inductors are 20 % and film or polymer capacitors 10 to 20 % parts; both off to one side is rarer
+const SPREAD: [f64; 2] = [0.85, 1.15];
+
+impl Start {
+    /// For a plant, whose nominal values the observer and the law are made for, and its file.
+    ///
+    /// # Errors
+    /// If the loads are no range, or the plant is one for which there is no observer or no limit ([`Design::new`],
+    /// [`Question::new`]).
+    pub fn new(plant: &Parameters, file: &Path, wanted: Wanted) -> Result<Self, Error> {
+        let Wanted { v_ref, loads } = wanted;
+        let [low, high] = loads;
+        let range = LoadKind::Power.range();
+        if !(range.contains(&low) && range.contains(&high) && low < high) {
+            let message = Message::new("these loads are no range").found(format!("{low} W to {high} W"));
+            return Err(message
+                .expected(format!("a smallest and a largest power from 0 to {} W", range.end()))
+                .into());
+        }
+        // what is wrong with the voltage is said better by the design than by the limit
+        let largest = high / v_ref;
+        let asked = |noise| Asked {
+            v_ref,
+            // a load of constant power draws more in a dip
+            load: 1.2 * largest,
+            noise,
+            model: None,
+            pole: POLE,
+        };
+        Design::new(plant, asked(Some(v_ref / STEPS)))?;
+        holds_power(plant, v_ref, file)?;
+        let needed = v_ref / plant.converter.v_in;
+        // 10 % is left for a load step up: more than any loss of a converter that works
+        let highest = if needed < LARGEST_DUTY / 1.1 { LARGEST_DUTY } else { 1.0 };
+        let duties = [0.0, highest];
+        let both = |plant: &Parameters| -> Result<[(LoadStep, Limit); 2], Error> {
+            let limit = |values| -> Result<(LoadStep, Limit), Error> {
+                let step = LoadStep::from(values);
+                let limit = Question::new(plant, v_ref, step, duties)?.of_all_instants();
+                Ok((step, limit))
+            };
+            Ok([limit([low, high])?, limit([high, low])?])
+        };
+        let limits = both(plant)?;
+        let other = |factor: f64| {
+            let mut other = plant.clone();
+            other.converter.inductance *= factor;
+            other.converter.capacitance *= factor;
+            Ok((factor, both(&other)?))
+        };
+        let spread = SPREAD.into_iter().map(other).collect::<Result<Vec<_>, Error>>()?;
+        let deviation = largest_of(&limits, |limit| limit.worst.extreme);
+        // room for twice the dip and the overshoot that no controller avoids
+        let v_full = text::round(f64::max(1.5 * v_ref, v_ref + 2.0 * deviation), 2);
+        let i_full = text::round(
+            f64::max(1.6 * largest, high / (v_ref - 2.0 * deviation).max(0.5 * v_ref)),
+            2,
+        );
+        let v_out = Channel::new(&plant.sensors.v_out, [0.0, v_full]);
+        let i_out = Channel::new(&plant.sensors.i_out, [-text::round(0.05 * i_full, 1), i_full]);
+        Ok(Self {
+            wanted,
+            design: Design::new(plant, asked(v_out.assumed.map(noise)))?,
+            duties,
+            limits,
+            spread,
+            v_out,
+            i_out,
+        })
+    }
+
+    /// What nothing can beat, by load step.
+    #[must_use]
+    pub fn limits(&self) -> &[(LoadStep, Limit)] {
+        &self.limits
+    }
+
+    /// What the user should know of the files.
+    #[must_use]
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        if self.v_out.assumed.is_some() || self.i_out.assumed.is_some() {
+            notes.push(
+                "the plant file has neither noise nor steps in [sensors]: converters of 12 bits with one step of noise were assumed, in \
+                 [set] of train.toml and scenario.toml"
+                    .to_owned(),
+            );
+        }
+        let smallest = self.wanted.loads[0] / self.wanted.v_ref;
+        if self.design.has_diode && smallest < self.design.half_ripple {
+            notes.push(format!(
+                "at {} W the diode stops the current in every period, below {:.3} A of load: the law is made for one that flows, and the \
+                 voltage will rest beside {} V there",
+                self.wanted.loads[0], self.design.half_ripple, self.wanted.v_ref
+            ));
+        }
+        notes
+    }
+
+    /// The largest error of the limits, V.
+    fn deviation(&self) -> f64 {
+        largest_of(&self.limits, |limit| limit.worst.deviation)
+    }
+
+    /// The load step in A.
+    fn step(&self) -> f64 {
+        let [low, high] = self.wanted.loads;
+        (high - low) / self.wanted.v_ref
+    }
+}
+
+impl Channel {
+    fn new(sensor: &Sensor, range: [f64; 2]) -> Self {
+        let is_ideal = sensor.noise == 0.0 && sensor.lsb == 0.0;
+        let step = range[1] / STEPS;
+        Self {
+            range,
+            assumed: is_ideal.then_some([step, step]),
+        }
+    }
+}
+
+/// Standard deviation of a step and a noise: a rounding is spread evenly over its step.
+fn noise([step, noise]: [f64; 2]) -> f64 {
+    (noise.powi(2) + step.powi(2) / 12.0).sqrt()
+}
+
+fn largest_of(limits: &[(LoadStep, Limit)], figure: fn(&Limit) -> f64) -> f64 {
+    limits.iter().map(|(_, limit)| figure(limit)).fold(0.0, f64::max)
+}

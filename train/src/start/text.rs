@@ -1,0 +1,260 @@
+//! The files.
+
+use closed_loop::LoadStep;
+use closed_loop::limit::Limit;
+
+use super::{Channel, Start, largest_of};
+
+/// Name of the training file.
+pub const TRAINING: &str = "train.toml";
+/// Name of the scenario.
+pub const SCENARIO: &str = "scenario.toml";
+
+// The scales are those of examples/train/measured, whose features, bands and dead zone were tuned on the converter of the paper,
+// as shares of its smallest deviation of 1.6 V and its load step of 8 A.
+
+/// Of that converter, V and A.
+const MODEL: [f64; 2] = [1.6, 8.0];
+
+impl Start {
+    /// The contract.
+    #[must_use]
+    pub fn contract(&self) -> String {
+        let design = &self.design;
+        let (v_ref, surplus) = (design.v_ref, design.surplus());
+        let [volts, amperes] = [MODEL[0] / self.deviation(), MODEL[1] / self.step()];
+        let largest = self.wanted.loads[1] / v_ref;
+        let [low, high] = self.duties;
+        format!(
+            "# A controller for {}, made by `policyc new --plant`. An observer estimates\n\
+             # inductor current, output voltage and losses; a law of control holds the voltage with them, and the network adds to\n\
+             # the law what makes it faster.\n\
+             name = \"controller\"\n\
+             sample_period = {:?}                # s: control and PWM period\n\
+             \n\
+             [parameters]\n\
+             v_ref = {v_ref:?}\n\
+             \n\
+             {}\n\
+             {}\n\
+             {}\n\
+             {}\
+             [network]\n\
+             weights = \"weights.safetensors\"       # `policyc train` writes both\n\
+             hidden_activation = \"relu\"\n\
+             golden = \"golden.safetensors\"\n\
+             \n\
+             [actions]                              # the law's duty, and what each output of the network adds to it\n\
+             base = \"{}\"\n\
+             offsets = [-0.5, -0.2, -0.1, -0.05, -0.02, -0.01, 0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5]\n\
+             dead_zone = [                          # nothing is added here: the law alone brings it to rest\n    \
+                 {{ source = \"model_voltage - v_ref\", within = {:?} }},\n    \
+                 {{ source = \"{surplus}\", within = {:?} }},\n\
+             ]\n\
+             \n\
+             [limits]\n\
+             duty = [{low:?}, {high:?}]\n\
+             initial_duty = {:?}\n\
+             \n\
+             [fallback]\n\
+             duty = 0.0\n\
+             hold = 3                               # periods that a bad sample is bridged\n",
+            self.converter(),
+            design.period,
+            self.v_out.signal("v_out", "V"),
+            self.i_out.signal("i_out", "A"),
+            design.observer(),
+            [
+                feature("e", "model_voltage - v_ref", round(volts, 3), [-5.0, 5.0]),
+                feature("e_fine", "model_voltage - v_ref", round(6.7 * volts, 3), [-2.0, 2.0]),
+                feature("i_c", &surplus, round(0.3 * amperes, 3), [-5.0, 5.0]),
+                feature("i_c_fine", &surplus, round(2.0 * amperes, 3), [-2.0, 2.0]),
+                feature("i_out", "i_out", round(2.0 / largest, 3), [-2.0, 4.0]).replace("clip", "offset = -1.0\nclip"),
+            ]
+            .concat(),
+            design.law(),
+            round(0.25 / volts, 2),
+            round(1.0 / amperes, 2),
+            round(v_ref / design.v_in, 3),
+        )
+    }
+
+    /// The training file; `contract` and `plant` are paths as seen from its folder.
+    #[must_use]
+    pub fn training(&self, contract: &str, plant: &str) -> String {
+        let [low, high] = self.wanted.loads;
+        let volts = self.deviation() / MODEL[0];
+        let bands = [(0.03, 1.0), (0.1, 0.5), (0.3, 0.2), (1.0, 0.1)];
+        let bands = bands.map(|(band, reward)| format!("[{:?}, {reward:?}]", round(band * volts, 2)));
+        // other powers than the evaluation
+        let [inner_low, inner_high] = [
+            round(low + 0.01 * (high - low), 4),
+            round(high - 0.01 * (high - low), 4),
+        ];
+        let middle = round(0.5 * (low + high), 3);
+        format!(
+            "# Trains {contract} on the plant, made by `policyc new --plant`.\n\
+             plant = {plant:?}\n\
+             contract = {contract:?}\n\
+             seeds = [0, 1, 2]\n\
+             steps = 10000                  # control periods at most; it ends when the specification is met\n\
+             {}\
+             \n\
+             [network]\n\
+             hidden = [64, 64]\n\
+             \n\
+             [learning]\n\
+             final_learning_rate = 5e-5\n\
+             discount = 0.95\n\
+             target_update = {{ soft = 2e-3 }}\n\
+             epsilon = {{ start = 1.0, end = 0.02, steps = 5000 }}\n\
+             \n\
+             [reward]\n\
+             v_ref = {:?}\n\
+             bands = [{}]    # |error| in V at most, reward\n\
+             error_weight = {:?}             # taken off per volt\n\
+             \n\
+             [episode]\n\
+             load_every = 50\n\
+             any_phase = true               # loads change anywhere in a period\n\
+             loads = {{ values = [{low:?}, {middle:?}, {high:?}], range = [{low:?}, {high:?}], share = 0.5 }}    # W\n\
+             \n\
+             [[randomise]]                  # components are not what their print says\n\
+             key = \"converter.inductance\"\n\
+             factor = [0.85, 1.15]\n\
+             \n\
+             [[randomise]]\n\
+             key = \"converter.capacitance\"\n\
+             factor = [0.85, 1.15]\n\
+             \n\
+             [selection]                    # on these load steps the best policy is kept\n\
+             every = 120\n\
+             load_steps = [[{inner_low:?}, {inner_high:?}], [{inner_high:?}, {inner_low:?}]]\n\
+             sampling_instants = 2\n\
+             instants = 12\n\
+             lead = 150\n\
+             after = 300\n\
+             tail = 60\n\
+             \n\
+             [evaluation]                   # on these it is judged\n\
+             load_steps = [[{low:?}, {high:?}], [{high:?}, {low:?}]]\n\
+             \n\
+             [[spec]]\n\
+             deviation = {:?}             # V: 1.1 of what no controller can beat\n\
+             settling = {:?}              # s: twice of it, and ten periods\n\
+             tail = {:?}                  # V\n\
+             {}",
+            self.set(),
+            self.wanted.v_ref,
+            bands.join(", "),
+            round(1.0 / volts, 2),
+            self.most_deviation(&self.limits),
+            self.most_settling(&self.limits, 10.0),
+            self.most_tail(),
+            self.elsewhere(),
+        )
+    }
+
+    /// The tables `[[spread]]`.
+    fn elsewhere(&self) -> String {
+        let table = |(factor, limits): &(f64, [(LoadStep, Limit); 2])| {
+            format!(
+                "\n[[spread]]                     # it has to hold here as well; the limit is another one\n\
+                 factor = {{ \"converter.inductance\" = {factor:?}, \"converter.capacitance\" = {factor:?} }}\n\
+                 deviation = {:?}\n\
+                 settling = {:?}              # the observer has to find the other parts first\n\
+                 tail = {:?}\n",
+                self.most_deviation(limits),
+                self.most_settling(limits, 60.0),
+                self.most_tail(),
+            )
+        };
+        self.spread.iter().map(table).collect()
+    }
+
+    /// V; a tenth more than what no controller can beat.
+    fn most_deviation(&self, limits: &[(LoadStep, Limit); 2]) -> f64 {
+        round(1.1 * largest_of(limits, |limit| limit.worst.deviation), 3)
+    }
+
+    /// s; twice what no controller can beat, and some periods.
+    fn most_settling(&self, limits: &[(LoadStep, Limit); 2], periods: f64) -> f64 {
+        round(
+            2.0 * largest_of(limits, |limit| limit.worst.settling) + periods * self.design.period,
+            3,
+        )
+    }
+
+    /// V; an estimate is hardly finer than its sensor.
+    fn most_tail(&self) -> f64 {
+        round(f64::max(1e-3 * self.wanted.v_ref, 3.0 * self.design.noise.measured), 3)
+    }
+
+    /// The scenario; `plant` is the plant's path, as seen from its folder.
+    #[must_use]
+    pub fn scenario(&self, plant: &str) -> String {
+        let [low, high] = self.wanted.loads;
+        let off = |x: f64| round(0.85 * x, 4);
+        format!(
+            "# Load steps with the trained policy, made by `policyc new --plant`. Its law stands beside it, a PID controller that\n\
+             # measures the voltage, and what no controller can beat.\n\
+             plant = {plant:?}\n\
+             load_steps = [[{low:?}, {high:?}], [{high:?}, {low:?}]]    # W\n\
+             baselines = [\"pid\"]\n\
+             {}\
+             # on a converter whose parts are 15 % smaller than their print says:\n\
+             # \"converter.inductance\" = {:?}\n\
+             # \"converter.capacitance\" = {:?}\n",
+            match self.set() {
+                none if none.is_empty() => "\n[set]\n".to_owned(),
+                some => some,
+            },
+            off(self.design.inductance),
+            off(self.design.capacitance),
+        )
+    }
+
+    fn converter(&self) -> String {
+        let design = &self.design;
+        let [low, high] = self.wanted.loads;
+        let (v_in, v_ref, kilohertz) = (design.v_in, design.v_ref, round(1e-3 / design.period, 4));
+        format!("a buck converter from {v_in} V to {v_ref} V at {kilohertz} kHz, {low} to {high} W")
+    }
+
+    /// The table `[set]`, if sensors were assumed.
+    fn set(&self) -> String {
+        let channels = [("v_out", "V", self.v_out), ("i_out", "A", self.i_out)];
+        let assumed = channels.iter().filter_map(|(name, unit, channel)| {
+            let [step, noise] = channel.assumed?;
+            Some(format!(
+                "\"sensors.{name}.lsb\" = {step:?}    # {unit}: assumed, 12 bits for {} {unit}\n\
+                 \"sensors.{name}.noise\" = {:?}    # {unit}, standard deviation: assumed\n",
+                channel.range[1],
+                round(noise, 2),
+            ))
+        });
+        let lines: String = assumed.collect();
+        match lines.is_empty() {
+            true => lines,
+            false => format!("\n[set]                          # of the plant, which does not know them\n{lines}"),
+        }
+    }
+}
+
+impl Channel {
+    fn signal(&self, name: &str, unit: &str) -> String {
+        let [low, high] = self.range;
+        format!("[[signal]]\nname = \"{name}\"\nunit = \"{unit}\"\nrange = [{low:?}, {high:?}]\n")
+    }
+}
+
+fn feature(name: &str, source: &str, scale: f64, [low, high]: [f64; 2]) -> String {
+    format!("[[feature]]\nname = \"{name}\"\nsource = \"{source}\"\nscale = {scale:?}\nclip = [{low:?}, {high:?}]\n\n")
+}
+
+/// To significant digits.
+pub(super) fn round(x: f64, digits: usize) -> f64 {
+    let text = format!("{x:.*e}", digits.saturating_sub(1));
+    // a number that was just written reads back
+    text.parse().unwrap_or(x)
+}

@@ -14,6 +14,7 @@ mod files;
 mod interruption;
 mod json;
 mod loudness;
+mod plants;
 mod prove;
 mod replay;
 mod replayed_filters;

@@ -52,7 +52,11 @@ impl<E: Environment> Trainer<E> {
         };
         let others = self.settings.spread.iter().map(|spread| {
             let numbers = spread.numbers(|key| self.nominal.parameter(key));
-            let own = if spread.limits.is_empty() { general } else { &spread.limits };
+            let own = if spread.limits.is_empty() {
+                general
+            } else {
+                &spread.limits
+            };
             place(spread.name(), numbers, own.as_slice())
         });
         std::iter::once(place(String::new(), Vec::new(), general.as_slice()))

@@ -8,8 +8,8 @@ use toml_input::Message;
 
 use crate::contract::{Files, GoldenVectors};
 use crate::faults::Error;
-use crate::network::Network;
 use crate::judge::{Judged, overall};
+use crate::network::Network;
 use crate::score::{Score, Scoring, figures};
 use crate::settings::{Instants, Requirement};
 use crate::trainer::{Best, Ended, Look, Trainer};
@@ -63,12 +63,19 @@ impl<E: Environment> Trainer<E> {
         };
         let policy = self.contract.with(&best.network);
         let judged = self.evaluate(&policy)?;
-        let law = policy.law_alone().map(|law| self.evaluate(&law)).transpose()?.unwrap_or_default();
+        let law = policy
+            .law_alone()
+            .map(|law| self.evaluate(&law))
+            .transpose()?
+            .unwrap_or_default();
         let evaluated = overall(&judged);
         let golden = self.golden(&best.network)?;
         let (_, mut files) = self.contract.folder(&best.network, &golden)?;
         let report = self.report(ended, best, &judged, &law);
-        let findings = judged.first().map(|nominal| nominal.findings.clone()).unwrap_or_default();
+        let findings = judged
+            .first()
+            .map(|nominal| nominal.findings.clone())
+            .unwrap_or_default();
         files.insert("report.txt".to_owned(), report.into_bytes());
         files.insert("evaluation.csv".to_owned(), evaluation_csv(&findings).into_bytes());
         if judged.len() > 1 {

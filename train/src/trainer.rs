@@ -18,10 +18,10 @@ use toml_input::{Fault, Message};
 use crate::contract::Contract;
 use crate::episode::{Drawn, draw_change};
 use crate::faults::Error;
+pub use crate::judge::{Place, controller, quick_controller};
 use crate::learner::{Learner, TargetUpdate, greedy};
 use crate::network::Network;
 pub(crate) use crate::progress::Sums;
-pub use crate::judge::{Place, controller, quick_controller};
 pub use crate::progress::{Best, Ended, Look, Progress};
 use crate::replay::ReplayBuffer;
 use crate::settings::Settings;
@@ -305,15 +305,26 @@ pub(crate) fn check_fit<E: Environment>(
     // exploration, rewards and the converters to compare with are those of a buck; nobody has trained another
     if environment.parameter(topology).is_some_and(|choice| choice != 0.0)
         || settings.randomise.iter().any(|varied| varied.key == topology)
-        || settings.spread.iter().any(|spread| spread.keys().any(|key| key == topology))
+        || settings
+            .spread
+            .iter()
+            .any(|spread| spread.keys().any(|key| key == topology))
     {
         let message = Message::new("a training is built for the buck converter alone");
         let message = message.found(format!("another `{topology}`")).expected("\"buck\"");
         return Err(Fault::in_file(&settings.file, message).into());
     }
-    let randomised = settings.randomise.iter().map(|varied| ("[[randomise]]", varied.key.as_str()));
-    let spread = settings.spread.iter().flat_map(|spread| spread.keys().map(|key| ("[[spread]]", key)));
-    let unknown = randomised.chain(spread).find(|(_, key)| environment.parameter(key).is_none());
+    let randomised = settings
+        .randomise
+        .iter()
+        .map(|varied| ("[[randomise]]", varied.key.as_str()));
+    let spread = settings
+        .spread
+        .iter()
+        .flat_map(|spread| spread.keys().map(|key| ("[[spread]]", key)));
+    let unknown = randomised
+        .chain(spread)
+        .find(|(_, key)| environment.parameter(key).is_none());
     match unknown {
         None => Ok(()),
         Some((table, name)) => {

@@ -233,6 +233,21 @@ const FAULTS: &[(&str, usize, &[&str])] = &[
     ),
     ("[[spec]]\nload_step = [200, 500]", 4, &["without a limit"]),
     (
+        "[[spread]]\ntail = 1",
+        4,
+        &["a [[spread]] that is the plant itself", "`factor`, `set` or both"],
+    ),
+    (
+        "[[spread]]\nfactor = { \"converter.inductanc\" = 0.9 }",
+        5,
+        &["the plant has no number", "did you mean `converter.inductance`?"],
+    ),
+    (
+        "[[spread]]\nfactor = { \"converter.v_in\" = 0 }",
+        5,
+        &["greater than 0"],
+    ),
+    (
         "[[spec]]\ninstants = \"all\"\ntail = 1",
         5,
         &["no such value", "worst, sample"],

@@ -185,6 +185,50 @@ fn training_stops_once_the_specification_is_met() {
     assert!(String::from_utf8(report).unwrap().contains("Specification: met"));
 }
 
+/// `fixtures/tiny.toml` with more lines.
+fn extended(lines: &str) -> Trainer<StandIn> {
+    let (settings, contract) = tiny();
+    let text = std::fs::read_to_string(&settings.file).unwrap() + lines;
+    let settings = train::Settings::parse(&text, &settings.file).unwrap_or_else(|faults| panic!("{faults}"));
+    Trainer::new(&settings, &contract, &StandIn::new(1.5e-3, 1), 3).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn a_policy_has_to_hold_on_every_converter_of_the_spread() {
+    let easy = "\n[[spec]]\ndeviation = 50.0\n";
+    // 196 V do what 200 V do; of 80 V no duty makes 100 V
+    let near = format!("{easy}[[spread]]\nfactor = {{ \"converter.v_in\" = 0.98 }}\n");
+    let far = format!("{easy}[[spread]]\nset = {{ \"converter.v_in\" = 80 }}\ntail = 15.0\n");
+    let mut trainer = extended(&near);
+    assert_eq!(trainer.run(&NEVER, |_| {}).unwrap(), Ended::Met);
+    let outcome = trainer.finish(Ended::Met).unwrap();
+    assert!(outcome.evaluated.met && outcome.judged.len() == 2);
+    assert_ne!(
+        outcome.judged[0].findings, outcome.judged[1].findings,
+        "another converter"
+    );
+    let steps = outcome.findings.len();
+    let csv = String::from_utf8(outcome.files["spread.csv"].clone()).unwrap();
+    assert_eq!(csv.lines().count(), 1 + 2 * steps);
+    assert!(
+        csv.starts_with("converter,from_W") && csv.contains("\n\"v_in x 0.98\","),
+        "{csv}"
+    );
+
+    let mut trainer = extended(&far);
+    assert_eq!(trainer.run(&NEVER, |_| {}).unwrap(), Ended::Budget);
+    let outcome = trainer.finish(Ended::Budget).unwrap();
+    assert!(!outcome.evaluated.met && outcome.judged[0].score.met && !outcome.judged[1].score.met);
+    let report = String::from_utf8(outcome.files["report.txt"].clone()).unwrap();
+    assert!(
+        report.contains("On v_in = 80:") && report.contains("Specification: NOT met"),
+        "{report}"
+    );
+    // its own limit, and none of the file's
+    let own = report.split("on v_in = 80").nth(1).unwrap();
+    assert!(own.contains("of 15") && !own.contains("of 50"), "{report}");
+}
+
 #[test]
 fn the_policy_folder_passes_the_check_and_its_golden_vectors_are_the_trainers() {
     let mut trainer = trainer(4);

@@ -2,6 +2,7 @@
 
 use codegen::output::languages;
 use codegen::{CodegenError, Output};
+use interp::decisions::{Decisions, decisions};
 use policy::{NumericFormat, Policy};
 use report::grouped;
 use targets::TargetSpec;
@@ -67,11 +68,7 @@ pub fn lines(
             format.name(),
             100.0 * share.0,
             100.0 * share.1,
-            if format.is_integer() {
-                "; `policyc certify` says what it does to the decision"
-            } else {
-                ""
-            }
+            what_it_changes(policy, format)
         )),
         Some(nearest) => lines.extend(too_slow(policy, target, outputs, clock, &nearest)),
         None => lines.push(
@@ -93,12 +90,13 @@ fn too_slow(
     let Proposal { format, build, share } = nearest;
     let mut lines = vec![format!(
         "  = hint: no numeric format fits; next to it comes {} with {build}, {:.0} to {:.0} %: it fills a period of {:.0} us, or the \
-         present one at {:.0} MHz",
+         present one at {:.0} MHz{}",
         format.name(),
         100.0 * share.0,
         100.0 * share.1,
         (1e6 * policy.sample_period * share.1).ceil(),
-        (1e-6 * clock.hz * share.1).ceil()
+        (1e-6 * clock.hz * share.1).ceil(),
+        what_it_changes(policy, *format)
     )];
     let bench = Bench {
         target,
@@ -125,6 +123,29 @@ fn too_slow(
         Widest::Unknown => {}
     }
     lines
+}
+
+/// What an integer format does to the decisions, in the same breath: one that is too coarse for the policy is refused.
+fn what_it_changes(policy: &Policy, format: NumericFormat) -> String {
+    if !format.is_integer() {
+        return String::new();
+    }
+    let found = decisions(&policy.clone().with_format(format), None).filter(|decisions| !decisions.kept());
+    match found {
+        None => "; `policyc certify` says what it does to the decision".to_owned(),
+        Some(decisions) => {
+            let what = match &decisions {
+                Decisions::Choice(choices) => {
+                    format!("{} of {} golden decisions", choices.changed, choices.observations)
+                }
+                Decisions::Continuous(_) => "golden duties".to_owned(),
+            };
+            format!(
+                "; it changes {what}, more than allowed, and is refused without `{}`",
+                decisions.remedy()
+            )
+        }
+    }
 }
 
 /// `6 -> 24 -> 12`

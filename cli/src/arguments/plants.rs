@@ -6,6 +6,9 @@ use clap::Args;
 use closed_loop::{LoadKind, LoadStep};
 
 #[derive(Debug, Args)]
+#[command(
+    override_usage = "policyc new <WEIGHTS> [OPTIONS]\n       policyc new --plant <FILE> --v-ref <V> --loads <W,W> [--out <FILE>]"
+)]
 pub struct New {
     /// What the trainer saved: safetensors, a torch file (.pt, .pth), a model of stable-baselines3 (.zip), ONNX, or MAT
     #[arg(required_unless_present = "plant")]

@@ -42,7 +42,7 @@ pub const STATUS: [StatusBit; 9] = [
     status_bit(
         "STATE",
         8,
-        "The state was damaged: the fallback duty is commanded until init or reset.",
+        "The state was damaged: the fallback duty is commanded until init, or until reset where the mapping is intact.",
     ),
 ];
 

@@ -22,7 +22,10 @@ impl Spread {
     #[must_use]
     pub fn name(&self) -> String {
         let short = |key: &str| key.rsplit('.').next().unwrap_or(key).to_owned();
-        let factors = self.factor.iter().map(|(key, factor)| format!("{} x {factor}", short(key)));
+        let factors = self
+            .factor
+            .iter()
+            .map(|(key, factor)| format!("{} x {factor}", short(key)));
         let numbers = self.set.iter().map(|(key, value)| format!("{} = {value}", short(key)));
         factors.chain(numbers).collect::<Vec<_>>().join(", ")
     }
@@ -45,8 +48,14 @@ impl Spread {
 }
 
 pub(super) fn read(table: &mut Table<'_>, faults: &mut Sink) -> Option<Spread> {
-    let factor = table.with_default("factor", Vec::new(), faults, factors);
-    let set = table.with_default("set", Vec::new(), faults, read::plant_numbers);
+    // what is there and wrong has its own fault
+    let factor = table
+        .optional("factor")
+        .map_or(Some(Vec::new()), |v| factors(&v, faults));
+    let set = table
+        .optional("set")
+        .map_or(Some(Vec::new()), |v| read::plant_numbers(&v, faults));
+    let (factor, set) = (factor?, set?);
     if factor.is_empty() && set.is_empty() {
         let message = Message::new("a [[spread]] that is the plant itself").expected("`factor`, `set` or both");
         let hint = "factor = { \"converter.inductance\" = 0.85, \"converter.capacitance\" = 0.85 }";
@@ -73,9 +82,7 @@ fn factors(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<(String, f64)>> {
     let mut list = Vec::new();
     for (key, value) in value.pairs(faults)? {
         read::known_parameter(&key.value, &value, faults);
-        if let Some(factor) = value.positive(faults) {
-            list.push((key.value.clone(), factor));
-        }
+        list.push((key.value.clone(), value.positive(faults)?));
     }
     Some(list)
 }

@@ -97,7 +97,7 @@ impl Start {
              plant = {plant:?}\n\
              contract = {contract:?}\n\
              seeds = [0, 1, 2]\n\
-             steps = 10000                  # control periods at most; it ends when the specification is met\n\
+             steps = 10000                  # control periods at most; `early_stop = false` uses them all\n\
              {}\
              \n\
              [network]\n\

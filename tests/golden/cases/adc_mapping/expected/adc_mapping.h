@@ -36,7 +36,7 @@ extern "C" {
 #define ADC_MAPPING_STATUS_SLEW_LIMITED   32u /* The slew limit was active. */
 #define ADC_MAPPING_STATUS_SOFT_START     64u /* The soft start was active. */
 #define ADC_MAPPING_STATUS_LIMITED       128u /* A duty limit was active. */
-#define ADC_MAPPING_STATUS_STATE         256u /* The state was damaged: the fallback duty is commanded until init or reset. */
+#define ADC_MAPPING_STATUS_STATE         256u /* The state was damaged: the fallback duty is commanded until init, or until reset where the mapping is intact. */
 
 /* One sample of every signal. */
 typedef struct {
@@ -73,7 +73,7 @@ typedef struct {
     uint32_t primed; /* 1 once the filters hold good samples, 2 after a damaged state */
 } adc_mapping_state;
 
-/* Start-up state. */
+/* Start-up state. No call may interrupt another one on the same state. */
 void adc_mapping_init(adc_mapping_state *state);
 
 /* Start-up state, but coefficients set at run time stay. */
@@ -99,7 +99,8 @@ void adc_mapping_q_values(const float *observation, float *q);
 
 /*
  * Replaces the coefficients of the duty ratio mapping. Returns 1; or 0, changing nothing, if one is outside its
- * interval or the mapping would not increase with the duty.
+ * interval or the mapping would not increase with the duty. A step that interrupts it finds a damaged state: call it in
+ * the control interrupt, or with that interrupt off.
  */
 uint32_t adc_mapping_set_mapping(adc_mapping_state *state, float a, float b, float c, float r);
 

@@ -35,7 +35,7 @@ pub mod status {
     pub const SOFT_START: u32 = 64;
     /// A duty limit was active.
     pub const LIMITED: u32 = 128;
-    /// The state was damaged: the fallback duty is commanded until init or reset.
+    /// The state was damaged: the fallback duty is commanded until init, or until reset where the mapping is intact.
     pub const STATE: u32 = 256;
 }
 static CRC_STEPS: [u32; 16] = [

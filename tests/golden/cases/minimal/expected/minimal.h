@@ -36,7 +36,7 @@ extern "C" {
 #define MINIMAL_STATUS_SLEW_LIMITED   32u /* The slew limit was active. */
 #define MINIMAL_STATUS_SOFT_START     64u /* The soft start was active. */
 #define MINIMAL_STATUS_LIMITED       128u /* A duty limit was active. */
-#define MINIMAL_STATUS_STATE         256u /* The state was damaged: the fallback duty is commanded until init or reset. */
+#define MINIMAL_STATUS_STATE         256u /* The state was damaged: the fallback duty is commanded until init, or until reset where the mapping is intact. */
 
 /* One sample of every signal. */
 typedef struct {
@@ -66,7 +66,7 @@ typedef struct {
     uint32_t primed; /* 1 once the filters hold good samples, 2 after a damaged state */
 } minimal_state;
 
-/* Start-up state. */
+/* Start-up state. No call may interrupt another one on the same state. */
 void minimal_init(minimal_state *state);
 
 /* Start-up state, but coefficients set at run time stay. */

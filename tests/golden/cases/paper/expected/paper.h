@@ -36,7 +36,7 @@ extern "C" {
 #define PAPER_STATUS_SLEW_LIMITED   32u /* The slew limit was active. */
 #define PAPER_STATUS_SOFT_START     64u /* The soft start was active. */
 #define PAPER_STATUS_LIMITED       128u /* A duty limit was active. */
-#define PAPER_STATUS_STATE         256u /* The state was damaged: the fallback duty is commanded until init or reset. */
+#define PAPER_STATUS_STATE         256u /* The state was damaged: the fallback duty is commanded until init, or until reset where the mapping is intact. */
 
 /* One sample of every signal. */
 typedef struct {
@@ -75,7 +75,7 @@ typedef struct {
     uint32_t primed; /* 1 once the filters hold good samples, 2 after a damaged state */
 } paper_state;
 
-/* Start-up state. */
+/* Start-up state. No call may interrupt another one on the same state. */
 void paper_init(paper_state *state);
 
 /* Start-up state, but coefficients set at run time stay. */
@@ -101,7 +101,8 @@ void paper_q_values(const float *observation, float *q);
 
 /*
  * Replaces the coefficients of the duty ratio mapping. Returns 1; or 0, changing nothing, if one is outside its
- * interval or the mapping would not increase with the duty.
+ * interval or the mapping would not increase with the duty. A step that interrupts it finds a damaged state: call it in
+ * the control interrupt, or with that interrupt off.
  */
 uint32_t paper_set_mapping(paper_state *state, float a, float b, float c);
 

@@ -1,0 +1,137 @@
+//! From a plant file alone: what is possible (`limit`), and what a training starts from (`new --plant`).
+
+use super::Desk;
+
+/// A synchronous converter from 48 V to 12 V at 200 kHz.
+const PLANT: &str = "[converter]
+v_in = 48.0
+inductance = 10e-6
+capacitance = 220e-6
+f_sw = 200e3
+rectifier = \"synchronous\"
+[pwm]
+duty_delay = 1
+";
+
+/// The numbers of a line behind its first column.
+fn numbers(line: &str) -> Vec<f64> {
+    line[17..]
+        .split([' ', '/', '>'])
+        .filter_map(|word| word.parse().ok())
+        .collect()
+}
+
+#[test]
+fn a_limit_is_that_of_the_circuit_and_of_the_duties() {
+    let desk = Desk::new("linear");
+    desk.write("plant.toml", PLANT);
+    let said = desk.succeed("limit plant.toml --v-ref 12 --load-step 20,120 --load-step 120,20 --current-step 1,2");
+    let row = |start: &str| {
+        numbers(
+            said.lines()
+                .find(|line| line.starts_with(start))
+                .unwrap_or_else(|| panic!("{said}")),
+        )
+    };
+    // 8.3 A less: 12 V / 10 uH take 6.94 us to bring them down, with what came before the sample and the delay of a period,
+    // 5 us each: charge / C = 8.33 A (5 us + 5 us + 6.94 us / 2) / 220 uF
+    let down = row("120 -> 20 W");
+    let charge = 8.33 * (5e-6 + 5e-6 + 6.94e-6 / 2.0) / 220e-6;
+    assert!((down[1] - charge).abs() < 0.2 * charge, "{down:?}, about {charge}");
+    assert!(
+        down[0] < down[1],
+        "a step at a sampling instant is seen at once: {down:?}"
+    );
+    assert!(row("1 -> 2 A")[1] < 0.2 * down[1], "a small step");
+    // a period is 5 us: two decimals of a millisecond would hide it
+    assert!(down[3] < 0.05 && said.contains("0.025"), "{said}");
+    let narrow = desk.succeed("limit plant.toml --v-ref 12 --load-step 20,120 --duty 0.1,0.3");
+    let wide = row("20 -> 120 W");
+    let tight = numbers(narrow.lines().find(|line| line.starts_with("20 -> 120 W")).unwrap());
+    assert!(tight[1] > 1.2 * wide[1], "{tight:?} {wide:?}");
+}
+
+#[test]
+fn a_plant_becomes_a_trained_policy_that_holds_on_its_spread() {
+    let desk = Desk::new("linear");
+    std::fs::create_dir(desk.path("parts")).unwrap();
+    desk.write("parts/plant.toml", PLANT);
+    let said = desk.succeed("new --plant parts/plant.toml --v-ref 12 --loads 20,120 --out mine/policy.toml");
+    assert!(said.contains("policyc train mine/train.toml"), "{said}");
+    let ran = desk.type_in("train mine/train.toml --out mine/trained --seeds 0");
+    assert_eq!(ran.code, Some(0), "{}{}", ran.stdout, ran.stderr);
+    for part in [
+        "law alone",
+        "On inductance x 0.85, capacitance x 0.85:",
+        "The law alone costs",
+    ] {
+        assert!(ran.stdout.contains(part), "{part}\n{}", ran.stdout);
+    }
+    assert!(
+        desk.read("mine/trained/spread.csv")
+            .contains("\"inductance x 1.15, capacitance x 1.15\",20,120,worst")
+    );
+    let said = desk.succeed("simulate mine/scenario.toml --policy mine/trained --out mine/loop");
+    let rows: Vec<Vec<f64>> = (said.lines())
+        .filter(|line| line.starts_with("policy   ") && line.contains(" / "))
+        .map(numbers)
+        .collect();
+    let limits: Vec<Vec<f64>> = (said.lines())
+        .filter(|line| line.starts_with("limit"))
+        .map(numbers)
+        .collect();
+    assert_eq!((rows.len(), limits.len()), (2, 2), "{said}");
+    for (row, limit) in rows.iter().zip(limits) {
+        assert!(
+            row[1] < 1.1 * limit[1],
+            "a tenth more than what nothing can beat\n{said}"
+        );
+        // 0.1 % of 12 V
+        assert!(row[5] < 0.012, "the tail\n{said}");
+    }
+    // nothing that is there is overwritten
+    let again = desk.type_in("new --plant parts/plant.toml --v-ref 12 --loads 20,120 --out mine/policy.toml");
+    assert_eq!(again.code, Some(2), "{}", again.stderr);
+    assert!(again.stderr.contains("exists already"), "{}", again.stderr);
+}
+
+#[test]
+fn what_has_no_start_and_no_limit_is_exit_code_2_with_its_reason() {
+    let desk = Desk::new("linear");
+    desk.write("plant.toml", PLANT);
+    desk.write("boost.toml", &PLANT.replace("v_in", "topology = \"boost\"\nv_in"));
+    for (line, reason) in [
+        ("new", "--plant"),
+        ("new --plant plant.toml", "--v-ref"),
+        ("new --plant plant.toml --v-ref 12", "--loads"),
+        ("new --plant plant.toml --v-ref 12 --loads 20", "two numbers"),
+        ("new --plant plant.toml --v-ref 12 --loads 120,20", "no range"),
+        ("new --plant plant.toml --v-ref 12 --loads 20,nan", "two numbers"),
+        ("new --plant plant.toml --v-ref 60 --loads 20,120", "cannot hold"),
+        ("new --plant plant.toml --v-ref 3 --loads 2,12", "v_fold"),
+        ("new --plant boost.toml --v-ref 60 --loads 20,120", "boost"),
+        ("new --plant nothing.toml --v-ref 12 --loads 20,120", "nothing.toml"),
+        ("new weights.safetensors --v-ref 12", "--plant"),
+        ("limit plant.toml --v-ref 12", "--load-step"),
+        ("limit plant.toml --v-ref 60 --load-step 20,120", "does not rest"),
+        ("limit plant.toml --v-ref nan --load-step 20,120", "no voltage"),
+        ("limit plant.toml --v-ref 3 --load-step 2,12", "v_fold"),
+        ("limit plant.toml --v-ref 12 --load-step=-20,120", "no load step"),
+        ("limit plant.toml --v-ref 12 --resistance-step 0,5", "no load step"),
+        (
+            "limit plant.toml --v-ref 12 --load-step 20,120 --duty 0.5,0.5",
+            "no range",
+        ),
+        ("limit boost.toml --v-ref 60 --load-step 20,120", "boost"),
+    ] {
+        let ran = desk.type_in(line);
+        assert_eq!(ran.code, Some(2), "{line}\n{}{}", ran.stdout, ran.stderr);
+        assert!(
+            ran.stderr.contains(reason) && ran.stdout.is_empty(),
+            "{line}\n{}{}",
+            ran.stdout,
+            ran.stderr
+        );
+    }
+    assert!(!desk.path("policy.toml").exists());
+}

@@ -5,7 +5,7 @@
 //!  [[spread]] ──┘
 //! ```
 
-use plant::Sample;
+use plant::{Load, Sample};
 use policy::Policy;
 
 use crate::contract::Contract;
@@ -16,7 +16,7 @@ use crate::score::{Score, Scoring};
 use crate::settings::Requirement;
 use crate::trainer::Trainer;
 use closed_loop::Agent;
-use closed_loop::environment::{Environment, Varied};
+use closed_loop::environment::{Environment, Start, Varied};
 use closed_loop::scenario::{Finding, survey, survey_all};
 
 /// A converter on which policies are judged.
@@ -62,6 +62,20 @@ impl<E: Environment> Trainer<E> {
         std::iter::once(place(String::new(), Vec::new(), general.as_slice()))
             .chain(others)
             .collect()
+    }
+
+    /// Starts each converter of the spread once, so that numbers that make none are told before the training.
+    pub(crate) fn try_out_spread(&self) -> Result<(), Error> {
+        for mut place in self.places().into_iter().skip(1) {
+            place.converter.restart(&Start {
+                v_out: 0.0,
+                i_l: 0.0,
+                load: Load::default(),
+                seed: 0,
+                varied: &[],
+            })?;
+        }
+        Ok(())
     }
 
     /// The cost grows with load steps and instants: a policy that some of them rule out is not run through the rest, and

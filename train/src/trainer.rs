@@ -97,6 +97,7 @@ impl<E: Environment> Trainer<E> {
             scratch: [Vec::new(), Vec::new()],
             started: None,
         };
+        trainer.try_out_spread()?;
         trainer.begin_episode()?;
         Ok(trainer)
     }
@@ -301,19 +302,8 @@ pub(crate) fn check_fit<E: Environment>(
         ));
         return Err(message.hint("f_sw of the plant is 1 / sample_period").into());
     }
-    let topology = "converter.topology";
     // exploration, rewards and the converters to compare with are those of a buck; nobody has trained another
-    if environment.parameter(topology).is_some_and(|choice| choice != 0.0)
-        || settings.randomise.iter().any(|varied| varied.key == topology)
-        || settings
-            .spread
-            .iter()
-            .any(|spread| spread.keys().any(|key| key == topology))
-    {
-        let message = Message::new("a training is built for the buck converter alone");
-        let message = message.found(format!("another `{topology}`")).expected("\"buck\"");
-        return Err(Fault::in_file(&settings.file, message).into());
-    }
+    let topology = "converter.topology";
     let randomised = settings
         .randomise
         .iter()
@@ -322,9 +312,20 @@ pub(crate) fn check_fit<E: Environment>(
         .spread
         .iter()
         .flat_map(|spread| spread.keys().map(|key| ("[[spread]]", key)));
-    let unknown = randomised
-        .chain(spread)
-        .find(|(_, key)| environment.parameter(key).is_none());
+    let others: Vec<(&str, &str)> = randomised.chain(spread).collect();
+    if environment.parameter(topology).is_some_and(|choice| choice != 0.0)
+        || others.iter().any(|(_, key)| *key == topology)
+    {
+        let message = Message::new("a training is built for the buck converter alone");
+        let message = message.found(format!("another `{topology}`")).expected("\"buck\"");
+        return Err(Fault::in_file(&settings.file, message).into());
+    }
+    if let Some((table, key)) = others.iter().find(|(_, key)| *key == "converter.f_sw") {
+        // the plant's period would no longer be that of the controller
+        let message = Message::new(format!("{table} has another `{key}`")).found("another control period");
+        return Err(Fault::in_file(&settings.file, message.expected("that of the contract")).into());
+    }
+    let unknown = others.iter().find(|(_, key)| environment.parameter(key).is_none());
     match unknown {
         None => Ok(()),
         Some((table, name)) => {

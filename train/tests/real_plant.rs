@@ -193,3 +193,31 @@ fn every_episode_behind_the_curriculum_has_a_converter_of_its_own() {
     // and they behave differently
     assert_eq!(witness.ends.lock().unwrap().len(), varied.len() + 1);
 }
+
+#[test]
+fn a_spread_that_makes_no_converter_is_refused_before_the_training() {
+    let (settings, contract, converter) = bench(SOFT);
+    for (lines, parts) in [
+        (
+            "factor = { \"converter.f_sw\" = 0.9 }",
+            ["[[spread]]", "converter.f_sw"],
+        ),
+        (
+            "set = { \"converter.topology\" = 1 }",
+            ["buck converter alone", "topology"],
+        ),
+        // a duty ratio of what it was is one; a thousand times the largest inductance is none
+        (
+            "factor = { \"converter.inductance\" = 1e12 }",
+            ["inductance", "out of range"],
+        ),
+    ] {
+        let text = std::fs::read_to_string(&settings.file).unwrap() + "[[spread]]\n" + lines + "\n";
+        let settings = Settings::parse(&text, &settings.file).unwrap_or_else(|faults| panic!("{faults}"));
+        let Err(error) = Trainer::new(&settings, &contract, &converter, 1) else {
+            panic!("accepted: {lines}")
+        };
+        let said = error.to_string();
+        assert!(parts.iter().all(|part| said.contains(part)), "{lines}\n{said}");
+    }
+}

@@ -17,6 +17,7 @@ mod loudness;
 mod plants;
 mod prove;
 mod replay;
+mod replayed_duties;
 mod replayed_filters;
 mod shell;
 mod simulate;

@@ -174,7 +174,7 @@ fn choices(policy: &Policy, decisions: &Choices) -> Vec<String> {
     )];
     let Some(change) = worst.first() else { return lines };
     lines.push(format!(
-        "  they give up at most {largest_loss:.2} and on average {mean_loss:.4} of the operating range of Q, which is {}",
+        "  they give up at most {largest_loss:.4} and on average {mean_loss:.4} of the operating range of Q, which is {}",
         quantity(*operating_range, "", 3)
     ));
     let duty = |action: usize| policy.actions().get(action).map_or(f64::NAN, |action| action.duty);

@@ -135,6 +135,9 @@ pub struct Replay {
     /// Logged actions are of a trainer who explores: they are applied, and not compared
     #[arg(long)]
     pub exploring: bool,
+    /// Rows at the start of each episode that are not compared, where the environment begins with another memory
+    #[arg(long, value_name = "ROWS", default_value_t = 0, hide_default_value = true)]
+    pub skip: usize,
     /// Largest difference that is equal, as a share of the largest logged magnitude of the feature
     #[arg(long, value_name = "SHARE", default_value_t = ::verify::replay::TOLERANCE, value_parser = share)]
     pub tolerance: f64,

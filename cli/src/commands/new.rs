@@ -51,7 +51,9 @@ fn for_plant(options: &New, file: &Path, wanted: Wanted) -> Result<Outcome, Fail
     let plant = Parameters::buck_from_file(file, "`new --plant`")?;
     let start = Start::new(&plant, file, wanted)?;
     let out = &options.out;
-    let from_there = |path: &Path| seen_from(out, path).map_err(|message| Fault::in_file(path, message));
+    let from_there = |path: &Path| -> Result<String, Failure> {
+        seen_from(out, path).map_err(|message| Fault::in_file(path, message).into())
+    };
     let (plant, contract) = (from_there(file)?, from_there(out)?);
     let beside = BTreeMap::from([
         (TRAINING.to_owned(), start.training(&contract, &plant).into_bytes()),

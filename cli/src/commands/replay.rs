@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use toml_input::Message;
-use verify::replay::{self, Log};
+use verify::replay::{self, Log, Wanted};
 
 use crate::arguments::Replay;
 use crate::failure::Failure;
@@ -28,7 +28,15 @@ pub fn run(options: &Replay) -> Result<Outcome, Failure> {
             .expected("columns `obs_0`, `obs_1`, ... in the network's order, or `action`, beside the signals")
             .into());
     }
-    let replay = replay::replay(&policy, &log, options.tolerance, options.exploring)?;
+    let replay = replay::replay(
+        &policy,
+        &log,
+        Wanted {
+            tolerance: options.tolerance,
+            exploring: options.exploring,
+            skip: options.skip,
+        },
+    )?;
     for note in &replay.notes {
         talk::note(&format!("{}: {note}", options.log.display()));
     }

@@ -12,7 +12,7 @@
 //! | `s x + o` of the change of one of these from row to row | a difference that is missing |
 
 use interp::{Real, Trace};
-use policy::{Feature, Policy};
+use policy::{Feature, Filter, Policy};
 
 use super::values::{allowed, ends};
 use super::variants::Trial;
@@ -295,9 +295,17 @@ fn of_itself(feature: &Feature, line: Line, logged: &Logged<'_>) -> String {
         }
     };
     keys.extend(clip);
+    let is_integral = feature
+        .filters
+        .iter()
+        .any(|filter| matches!(filter, Filter::Integrator { .. }));
+    let begun = match is_integral && line.s == 1.0 && line.o != 0.0 {
+        true => ". A log that begins in mid-run shows the same: the integral has a past there",
+        false => "",
+    };
     match keys.is_empty() {
         true => head,
-        false => format!("{head}: {} fits the log", keys.join(", ")),
+        false => format!("{head}: {} fits the log{begun}", keys.join(", ")),
     }
 }
 

@@ -28,6 +28,8 @@ pub struct Log {
     pub(super) actions: Option<Vec<u32>>,
     /// What a continuous actor commanded in each row, as a duty before the mapping.
     pub(super) commanded: Option<Vec<f64>>,
+    /// What the action of each row commanded, if the log says so.
+    pub(super) duty: Option<Vec<f64>>,
     /// The duty before each row.
     pub(super) previous_duty: Option<Vec<f64>>,
     /// What stands behind each row.
@@ -120,7 +122,7 @@ impl Log {
             .map(|action| indices(policy, &sheet, &located, &action))
             .transpose()?;
         let commanded = duty.clone().filter(|_| is_continuous);
-        let applied = match (&actions, duty) {
+        let applied = match (&actions, duty.clone()) {
             (Some(actions), _) => Applied::Actions(actions.clone()),
             (None, Some(duties)) => Applied::Duties(duties),
             (None, None) => Applied::Own,
@@ -132,6 +134,7 @@ impl Log {
             observed,
             actions,
             commanded,
+            duty,
             previous_duty,
             applied,
             notes,
@@ -194,6 +197,16 @@ impl Log {
             _ => f64::NAN,
         };
         self.samples.iter().map(value)
+    }
+
+    /// Whether a row has at least `skip` rows of its episode before it.
+    pub(super) fn is_late(&self, skip: usize) -> Vec<bool> {
+        let mut age = 0;
+        let next = |begins: &bool| {
+            age = if *begins { 0 } else { age + 1 };
+            age >= skip
+        };
+        self.begins.iter().map(next).collect()
     }
 
     pub(super) fn line(&self, row: usize) -> usize {

@@ -10,6 +10,7 @@
 //! ```
 
 mod chain;
+mod duties;
 mod explain;
 mod log;
 mod text;
@@ -17,10 +18,11 @@ mod values;
 mod variants;
 
 use interp::{Controller, Real, Trace};
-use policy::{Policy, Scalar};
+use policy::{Input, Policy, Scalar};
 use serde::Serialize;
 use toml_input::{Faults, Message};
 
+pub use duties::DutyResult;
 pub use log::Log;
 pub use text::text;
 
@@ -43,6 +45,8 @@ pub struct Replay {
     pub features: Vec<FeatureResult>,
     /// The network's choice or duty beside the logged one; `None` if the log has none.
     pub actions: Option<ActionResult>,
+    /// The duties that the log has with its actions beside those of the contract; `None` if it has none.
+    pub duties: Option<DutyResult>,
     /// Signals with samples outside their plausible range: name, rows, smallest and largest logged value. They were taken as they
     /// are; the controller will hold the last good sample.
     pub outside: Vec<(String, usize, [f64; 2])>,
@@ -96,7 +100,8 @@ impl Replay {
     #[must_use]
     pub fn equal(&self) -> bool {
         let actions = (self.actions.as_ref()).is_none_or(|actions| actions.exploring || actions.first_line.is_none());
-        actions && self.compared().all(|(_, compared)| compared.first_line.is_none())
+        let duties = self.duties.as_ref().is_none_or(|duties| duties.first_line.is_none());
+        actions && duties && self.compared().all(|(_, compared)| compared.first_line.is_none())
     }
 
     /// The features that the log has.
@@ -107,14 +112,28 @@ impl Replay {
     }
 }
 
+/// How a log is compared.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wanted {
+    /// Share of the largest logged magnitude of a feature that is still equal ([`TOLERANCE`]).
+    pub tolerance: f64,
+    /// The logged actions are those of a trainer who explores.
+    pub exploring: bool,
+    /// Rows at the start of each episode that are not compared: an environment that begins with another memory is another one
+    /// there, and nowhere else.
+    pub skip: usize,
+}
+
 /// Puts a log through the contract.
 ///
-/// `tolerance` is a share of the largest logged magnitude of a feature ([`TOLERANCE`]); with `exploring` the logged actions are
-/// those that were applied, and need not be the network's.
+/// With [`Wanted::exploring`] the logged actions are those that were applied, and need not be the network's.
 ///
 /// # Errors
 /// A duty in the log that no action of the contract commands.
-pub fn replay(policy: &Policy, log: &Log, tolerance: f64, exploring: bool) -> Result<Replay, Faults> {
+pub fn replay(policy: &Policy, log: &Log, wanted: Wanted) -> Result<Replay, Faults> {
+    let Wanted { tolerance, .. } = wanted;
+    let duties = duties::duties(policy, log);
+    let late = log.is_late(wanted.skip);
     // the environment held no sample: what the features are does not depend on what a sensor can show
     let wide = &log.widened(policy);
     let course = match policy.numeric_format.scalar() {
@@ -128,9 +147,14 @@ pub fn replay(policy: &Policy, log: &Log, tolerance: f64, exploring: bool) -> Re
             name: feature.name.clone(),
             own: ends(own),
             logged: logged.map(|logged| {
-                let mut compared = compare(own, logged, log, allowed(feature, logged, tolerance));
+                let mut compared = compare(own, logged, log, allowed(feature, logged, tolerance), &late);
                 if compared.first_line.is_some() {
-                    compared.explanation = explain::explain(policy, &course, index, logged, tolerance);
+                    let follows = (duties.as_ref()).filter(|duties| duties.first_line.is_some() && !duties.derived);
+                    compared.explanation = match follows.filter(|_| feature.source.reads(Input::PreviousDuty)) {
+                        // a line through two tables of duties would hide it in scale and offset
+                        Some(_) => Some("it follows the duties of the actions, which are others".to_owned()),
+                        None => explain::explain(policy, &course, index, logged, tolerance),
+                    };
                 }
                 compared
             }),
@@ -140,7 +164,8 @@ pub fn replay(policy: &Policy, log: &Log, tolerance: f64, exploring: bool) -> Re
         rows: log.rows(),
         episodes: log.begins.iter().filter(|begins| **begins).count(),
         features: features.collect(),
-        actions: commands(policy, log, &course, tolerance, exploring),
+        actions: commands(policy, log, &course, wanted),
+        duties,
         outside: log.outside(policy),
         tolerance,
         notes: log.notes.clone(),
@@ -148,16 +173,26 @@ pub fn replay(policy: &Policy, log: &Log, tolerance: f64, exploring: bool) -> Re
 }
 
 /// The choices of a log, or the duties of a continuous actor in it; `None` if it has neither.
-fn commands(policy: &Policy, log: &Log, course: &Course, tolerance: f64, exploring: bool) -> Option<ActionResult> {
+fn commands(policy: &Policy, log: &Log, course: &Course, wanted: Wanted) -> Option<ActionResult> {
+    let Wanted {
+        tolerance,
+        exploring,
+        skip,
+    } = wanted;
+    let late = log.is_late(skip);
+    let is_late = |row: &usize| late.get(*row).copied().unwrap_or(true);
     let others: Vec<usize> = match (&log.actions, policy.head.continuous().zip(log.commanded.as_ref())) {
         (Some(logged), _) => {
             let other = |row: &usize| logged.get(*row) != course.actions.get(*row);
-            (0..log.rows()).filter(other).collect()
+            (0..log.rows()).filter(is_late).filter(other).collect()
         }
         (None, Some((head, logged))) => {
             let near = |row: usize| Some((logged.get(row)? - course.duties.get(row)?).abs() <= tolerance * head.span());
             // what is no number is not near
-            (0..log.rows()).filter(|row| near(*row) != Some(true)).collect()
+            (0..log.rows())
+                .filter(is_late)
+                .filter(|row| near(*row) != Some(true))
+                .collect()
         }
         (None, None) => return None,
     };
@@ -168,11 +203,12 @@ fn commands(policy: &Policy, log: &Log, course: &Course, tolerance: f64, explori
     })
 }
 
-fn compare(own: &[f64], logged: &[f64], log: &Log, allowed: f64) -> Compared {
-    let differences: Vec<f64> = own
-        .iter()
-        .zip(logged)
-        .map(|(own, logged)| (own - logged).abs())
+fn compare(own: &[f64], logged: &[f64], log: &Log, allowed: f64, late: &[bool]) -> Compared {
+    let differences: Vec<f64> = (own.iter().zip(logged).enumerate())
+        .map(|(row, (own, logged))| match late.get(row) {
+            Some(false) => 0.0,
+            _ => (own - logged).abs(),
+        })
         .collect();
     // what is no number is not within anything
     let is_equal = |difference: &f64| *difference <= allowed;

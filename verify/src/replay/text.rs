@@ -99,6 +99,7 @@ fn words(policy: &Policy, replay: &Replay) -> Vec<String> {
         let command = if is_continuous { "duty" } else { "action" };
         words.push(format!("{command} equal in {equal} of {rows}{told}"));
     }
+    words.extend(replay.duties.as_ref().and_then(super::DutyResult::text));
     for (signal, rows, [low, high]) in &replay.outside {
         words.push(format!(
             "{signal}: {} to {} in the log, outside its range in {}: there the controller will hold the last good sample, and then \
@@ -142,7 +143,14 @@ fn verdict(replay: &Replay, is_continuous: bool) -> String {
             .compared()
             .filter(|(_, compared)| compared.first_line.is_some())
             .count();
+        let other_duties = (replay.duties.as_ref()).is_some_and(|duties| duties.first_line.is_some());
         return match others {
+            0 if other_duties => "DIFFERENT: the actions of the log have other duties".to_owned(),
+            0 if compared == 0 => format!(
+                "DIFFERENT: the {}. The log has no observations, which would say why: a filter that begins otherwise, a scale or a sign \
+                 all show here. Columns `obs_0`, `obs_1`, ... tell them apart. A trainer who explores: --exploring",
+                if is_continuous { "duties" } else { "actions" }
+            ),
             0 if is_continuous => "DIFFERENT: the observations are equal, the duties are not. A trainer who explores: --exploring. Otherwise look \
                   at squash or clip, scale and offset in [actions], and at the golden vectors"
                 .to_owned(),

@@ -4,6 +4,8 @@
 //! [`crate::weights::catalogue`].
 
 use toml_input::Message;
+
+use crate::model::Interval;
 pub(crate) use toml_input::messages::{
     count, crossed, exactly_one_of, missing_key, not_finite, not_one_of, not_positive, out_of_range, wrong_length,
 };
@@ -103,6 +105,25 @@ pub(crate) fn adc_codes(name: &str, low: f64, high: f64) -> Message {
     .found(format!("codes {low} to {high}"))
     .expected("codes within -16777216 to 16777216")
     .hint("gain is the physical unit per code: physical = gain * code + offset")
+}
+
+pub(crate) fn adc_shows_nothing(name: &str, shown: Interval) -> Message {
+    Message::new(format!("no two codes of the ADC are plausible values of `{name}`"))
+        .found(format!("{} to {} over all codes", shown.low, shown.high))
+        .expected("a plausible range that the codes reach")
+        .hint("a converter whose codes fall while the value rises has an offset at the other end: physical = gain * code + offset")
+}
+
+pub(crate) fn adc_saturates(name: &str, end: f64, range: Interval) -> Message {
+    Message::new(format!(
+        "an ADC at the end of its codes is a plausible value of `{name}`"
+    ))
+    .found(format!(
+        "{end} at that code, and a range of {} to {}",
+        range.low, range.high
+    ))
+    .expected("a range that ends before the codes do")
+    .hint("else a converter that is stuck at its end passes for a measurement")
 }
 
 pub(crate) fn soft_start_too_slow(increment: f64) -> Message {

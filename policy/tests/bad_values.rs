@@ -155,6 +155,33 @@ fn adc_codes_must_be_able_to_say_the_range() {
         &["`v_out`", "250000000", "16777216"],
     );
     contract_fault(unit, &with("¦{ gain = 0.1 }"), &["`offset` is missing in adc"]);
+    // 0.05 * 4095 = 204.75 V, and 250 V are plausible
+    contract_fault(
+        unit,
+        &with("{ gain = 0.05, offset = 0.0, bits = ¦12 }"),
+        &["end of its codes", "204.75", "stuck at its end"],
+    );
+    // -0.0625 * 4095 + 250 = -5.9 V is not plausible, but the first code, 250 V, is
+    contract_fault(
+        unit,
+        &with("{ gain = -0.0625, offset = 250.0, bits = ¦12 }"),
+        &["end of its codes", "250 at that code"],
+    );
+    contract_fault(
+        unit,
+        &with("{ gain = -0.0625, offset = 0.0, bits = ¦12 }"),
+        &["no two codes", "-255.9375 to 0"],
+    );
+    contract_fault(
+        unit,
+        &with("{ gain = 0.0625, offset = 0.0, bits = ¦25 }"),
+        &["`bits`", "1 to 24"],
+    );
+    // 0.0625 * 4095 = 255.9 V
+    let policy = Folder::new()
+        .replace(unit, &with("{ gain = 0.0625, offset = 0.0, bits = 12 }"))
+        .policy();
+    assert!(policy.signals[0].adc.is_some());
     let policy = Folder::new()
         .replace(unit, &with("{ gain = -0.0625, offset = 0.5 }"))
         .policy();

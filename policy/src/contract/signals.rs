@@ -1,6 +1,6 @@
 //! `[[signal]]`: what is measured.
 
-use toml_input::{Sink, Table, Value};
+use toml_input::{Message, Sink, Table, Value};
 
 use super::{Taken, name, number_f32, range_f32};
 use crate::catalogue;
@@ -88,6 +88,10 @@ fn is_visible(c: char) -> bool {
     !matches!(c, '\u{2028}' | '\u{2029}' | '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
 }
 
+/// Largest converter.
+// codes are exact in f32 up to here
+const MAX_ADC_BITS: u64 = 24;
+
 fn adc(value: &Value<'_>, range: Option<Interval>, name: &str, faults: &mut Sink) -> Option<Adc> {
     let mut section = value.table("adc", faults)?;
     let gain = section.required(
@@ -96,6 +100,8 @@ fn adc(value: &Value<'_>, range: Option<Interval>, name: &str, faults: &mut Sink
         faults,
     );
     let offset = section.required("offset", "physical value at code 0", faults);
+    let bits_value = section.optional("bits");
+    let bits = bits_value.as_ref().map(|v| v.integer(1..=MAX_ADC_BITS, faults));
     let factor = gain.as_ref().and_then(|v| number_f32(v, faults));
     let offset = offset.and_then(|v| number_f32(&v, faults));
     section.finish(faults);
@@ -112,5 +118,30 @@ fn adc(value: &Value<'_>, range: Option<Interval>, name: &str, faults: &mut Sink
         faults.push(value.fault(catalogue::adc_codes(name, a.min(b), a.max(b))));
         return None;
     }
+    if let Some((bits, value)) = bits.zip(bits_value) {
+        let last = ((1_u64 << bits?) - 1) as f64;
+        if let Some(message) = saturation(range, [offset, factor * last + offset], factor, name) {
+            faults.push(value.fault(message));
+            return None;
+        }
+    }
     Some(Adc { gain: factor, offset })
+}
+
+/// What is wrong with the range of a converter that shows `ends` at its first and its last code.
+fn saturation(range: Interval, ends: [f64; 2], gain: f64, name: &str) -> Option<Message> {
+    let [first, last] = ends;
+    let shown = Interval {
+        low: first.min(last),
+        high: first.max(last),
+    };
+    if range.high.min(shown.high) - range.low.max(shown.low) < gain.abs() {
+        return Some(catalogue::adc_shows_nothing(name, shown));
+    }
+    let within = |x: f64| range.low <= x && x <= range.high;
+    // 0 at the first code is a measurement: of a voltage of 0, say
+    [last, first]
+        .into_iter()
+        .find(|end| within(*end) && *end != 0.0)
+        .map(|end| catalogue::adc_saturates(name, end, range))
 }

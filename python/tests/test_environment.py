@@ -218,7 +218,7 @@ def test_actions_that_add_to_a_law_are_as_many_as_its_offsets():
     assert all(0.05 <= duty <= 0.95 for duty in commanded)
 
 
-@pytest.mark.parametrize("case", ["observed", "residual", "paper"])
+@pytest.mark.parametrize("case", ["observed", "residual", "adc_mapping"])
 def test_the_contract_of_an_environment_is_written_whole(case, tmp_path):
     import json
     import shutil

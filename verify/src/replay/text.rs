@@ -147,9 +147,14 @@ fn verdict(replay: &Replay, is_continuous: bool) -> String {
         return match others {
             0 if other_duties => "DIFFERENT: the actions of the log have other duties".to_owned(),
             0 if compared == 0 => format!(
-                "DIFFERENT: the {}. The log has no observations, which would say why: a filter that begins otherwise, a scale or a sign \
-                 all show here. Columns `obs_0`, `obs_1`, ... tell them apart. A trainer who explores: --exploring",
-                if is_continuous { "duties" } else { "actions" }
+                "DIFFERENT: the {}. The log has no observations, which would say why: {} all show here. Columns `obs_0`, `obs_1`, ... \
+                 tell them apart. A trainer who explores: --exploring",
+                if is_continuous { "duties" } else { "actions" },
+                if is_continuous {
+                    "a filter that begins otherwise, the scale of a feature, squash or clip, scale and offset in [actions]"
+                } else {
+                    "a filter that begins otherwise, the scale of a feature, the order of the features or of [actions]"
+                }
             ),
             0 if is_continuous => "DIFFERENT: the observations are equal, the duties are not. A trainer who explores: --exploring. Otherwise look \
                   at squash or clip, scale and offset in [actions], and at the golden vectors"

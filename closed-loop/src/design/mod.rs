@@ -14,6 +14,7 @@ use toml_input::Message;
 use crate::faults::Error;
 
 pub use kalman::{Filter, Model, Noise};
+pub use text::rounded;
 
 /// What is asked beside the plant.
 #[derive(Debug, Clone, Copy, PartialEq)]

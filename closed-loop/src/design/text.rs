@@ -118,7 +118,8 @@ fn short(x: f64) -> f64 {
 }
 
 /// To significant digits.
-fn rounded(x: f64, digits: usize) -> f64 {
+#[must_use]
+pub fn rounded(x: f64, digits: usize) -> f64 {
     let text = format!("{x:.*e}", digits.saturating_sub(1));
     // a number that was just written reads back
     text.parse().unwrap_or(x)

@@ -9,7 +9,7 @@ mod text;
 
 use std::path::Path;
 
-use closed_loop::design::{Design, Wanted as Asked};
+use closed_loop::design::{Design, Wanted as Asked, rounded};
 use closed_loop::limit::{Limit, Question};
 use closed_loop::{LoadKind, LoadStep, holds_power};
 use plant::{Parameters, Sensor};
@@ -115,13 +115,13 @@ impl Start {
         let spread = SPREAD.into_iter().map(other).collect::<Result<Vec<_>, Error>>()?;
         let deviation = largest_of(&limits, |limit| limit.worst.extreme);
         // room for twice the dip and the overshoot that no controller avoids
-        let v_full = text::round(f64::max(1.5 * v_ref, v_ref + 2.0 * deviation), 2);
-        let i_full = text::round(
+        let v_full = rounded(f64::max(1.5 * v_ref, v_ref + 2.0 * deviation), 2);
+        let i_full = rounded(
             f64::max(1.6 * largest, high / (v_ref - 2.0 * deviation).max(0.5 * v_ref)),
             2,
         );
         let v_out = Channel::new(&plant.sensors.v_out, [0.0, v_full]);
-        let i_out = Channel::new(&plant.sensors.i_out, [-text::round(0.05 * i_full, 1), i_full]);
+        let i_out = Channel::new(&plant.sensors.i_out, [-rounded(0.05 * i_full, 1), i_full]);
         Ok(Self {
             wanted,
             design: Design::new(plant, asked(v_out.assumed.map(noise)))?,

@@ -1,6 +1,7 @@
 //! The files.
 
 use closed_loop::LoadStep;
+use closed_loop::design::rounded;
 use closed_loop::limit::Limit;
 
 use super::{Channel, Start, largest_of};
@@ -65,17 +66,18 @@ impl Start {
             self.i_out.signal("i_out", "A"),
             design.observer(),
             [
-                feature("e", "model_voltage - v_ref", round(volts, 3), [-5.0, 5.0]),
-                feature("e_fine", "model_voltage - v_ref", round(6.7 * volts, 3), [-2.0, 2.0]),
-                feature("i_c", &surplus, round(0.3 * amperes, 3), [-5.0, 5.0]),
-                feature("i_c_fine", &surplus, round(2.0 * amperes, 3), [-2.0, 2.0]),
-                feature("i_out", "i_out", round(2.0 / largest, 3), [-2.0, 4.0]).replace("clip", "offset = -1.0\nclip"),
+                feature("e", "model_voltage - v_ref", rounded(volts, 3), [-5.0, 5.0]),
+                feature("e_fine", "model_voltage - v_ref", rounded(6.7 * volts, 3), [-2.0, 2.0]),
+                feature("i_c", &surplus, rounded(0.3 * amperes, 3), [-5.0, 5.0]),
+                feature("i_c_fine", &surplus, rounded(2.0 * amperes, 3), [-2.0, 2.0]),
+                feature("i_out", "i_out", rounded(2.0 / largest, 3), [-2.0, 4.0])
+                    .replace("clip", "offset = -1.0\nclip"),
             ]
             .concat(),
             design.law(),
-            round(0.25 / volts, 2),
-            round(1.0 / amperes, 2),
-            round(v_ref / design.v_in, 3),
+            rounded(0.25 / volts, 2),
+            rounded(1.0 / amperes, 2),
+            rounded(v_ref / design.v_in, 3),
         )
     }
 
@@ -85,13 +87,13 @@ impl Start {
         let [low, high] = self.wanted.loads;
         let volts = self.deviation() / MODEL[0];
         let bands = [(0.03, 1.0), (0.1, 0.5), (0.3, 0.2), (1.0, 0.1)];
-        let bands = bands.map(|(band, reward)| format!("[{:?}, {reward:?}]", round(band * volts, 2)));
+        let bands = bands.map(|(band, reward)| format!("[{:?}, {reward:?}]", rounded(band * volts, 2)));
         // other powers than the evaluation
         let [inner_low, inner_high] = [
-            round(low + 0.01 * (high - low), 4),
-            round(high - 0.01 * (high - low), 4),
+            rounded(low + 0.01 * (high - low), 4),
+            rounded(high - 0.01 * (high - low), 4),
         ];
-        let middle = round(0.5 * (low + high), 3);
+        let middle = rounded(0.5 * (low + high), 3);
         format!(
             "# Trains {contract} on the plant, made by `policyc new --plant`.\n\
              plant = {plant:?}\n\
@@ -147,7 +149,7 @@ impl Start {
             self.set(),
             self.wanted.v_ref,
             bands.join(", "),
-            round(1.0 / volts, 2),
+            rounded(1.0 / volts, 2),
             self.most_deviation(&self.limits),
             self.most_settling(&self.limits, 10.0),
             self.most_tail(),
@@ -174,12 +176,12 @@ impl Start {
 
     /// V; a tenth more than what no controller can beat.
     fn most_deviation(&self, limits: &[(LoadStep, Limit); 2]) -> f64 {
-        round(1.1 * largest_of(limits, |limit| limit.worst.deviation), 3)
+        rounded(1.1 * largest_of(limits, |limit| limit.worst.deviation), 3)
     }
 
     /// s; twice what no controller can beat, and some periods.
     fn most_settling(&self, limits: &[(LoadStep, Limit); 2], periods: f64) -> f64 {
-        round(
+        rounded(
             2.0 * largest_of(limits, |limit| limit.worst.settling) + periods * self.design.period,
             3,
         )
@@ -187,14 +189,14 @@ impl Start {
 
     /// V; an estimate is hardly finer than its sensor.
     fn most_tail(&self) -> f64 {
-        round(f64::max(1e-3 * self.wanted.v_ref, 3.0 * self.design.noise.measured), 3)
+        rounded(f64::max(1e-3 * self.wanted.v_ref, 3.0 * self.design.noise.measured), 3)
     }
 
     /// The scenario; `plant` is the plant's path, as seen from its folder.
     #[must_use]
     pub fn scenario(&self, plant: &str) -> String {
         let [low, high] = self.wanted.loads;
-        let off = |x: f64| round(0.85 * x, 4);
+        let off = |x: f64| rounded(0.85 * x, 4);
         format!(
             "# Load steps with the trained policy, made by `policyc new --plant`. Its law stands beside it, a PID controller that\n\
              # measures the voltage, and what no controller can beat.\n\
@@ -217,7 +219,7 @@ impl Start {
     fn converter(&self) -> String {
         let design = &self.design;
         let [low, high] = self.wanted.loads;
-        let (v_in, v_ref, kilohertz) = (design.v_in, design.v_ref, round(1e-3 / design.period, 4));
+        let (v_in, v_ref, kilohertz) = (design.v_in, design.v_ref, rounded(1e-3 / design.period, 4));
         format!("a buck converter from {v_in} V to {v_ref} V at {kilohertz} kHz, {low} to {high} W")
     }
 
@@ -230,7 +232,7 @@ impl Start {
                 "\"sensors.{name}.lsb\" = {step:?}    # {unit}: assumed, 12 bits for {} {unit}\n\
                  \"sensors.{name}.noise\" = {:?}    # {unit}, standard deviation: assumed\n",
                 channel.range[1],
-                round(noise, 2),
+                rounded(noise, 2),
             ))
         });
         let lines: String = assumed.collect();
@@ -250,11 +252,4 @@ impl Channel {
 
 fn feature(name: &str, source: &str, scale: f64, [low, high]: [f64; 2]) -> String {
     format!("[[feature]]\nname = \"{name}\"\nsource = \"{source}\"\nscale = {scale:?}\nclip = [{low:?}, {high:?}]\n\n")
-}
-
-/// To significant digits.
-pub(super) fn round(x: f64, digits: usize) -> f64 {
-    let text = format!("{x:.*e}", digits.saturating_sub(1));
-    // a number that was just written reads back
-    text.parse().unwrap_or(x)
 }

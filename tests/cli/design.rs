@@ -47,6 +47,12 @@ fn its_lines_stand_in_a_contract_and_their_law_holds_the_voltage() {
     let said = desk.succeed("simulate s.toml --policy policy --out out");
     let rows: Vec<&str> = said.lines().filter(|line| line.starts_with("law alone")).collect();
     assert_eq!(rows.len(), 2, "{said}");
+    // in the picture the law has a colour of its own
+    let picture = desk.read("out/10-40W.svg");
+    let colours: std::collections::BTreeSet<&str> = (picture.split("stroke=\"#").skip(1))
+        .filter_map(|text| text.get(..6))
+        .collect();
+    assert!(colours.contains("0072b2") && colours.contains("56b4e9"), "{colours:?}");
     for row in rows {
         // deviation, settling, largest error at the end; each at sampling instants / at all
         let numbers: Vec<f64> = row.split([' ', '/']).filter_map(|word| word.parse().ok()).collect();

@@ -63,7 +63,7 @@ impl Findings {
             let stem = step.step.stem();
             for (name, course) in &step.courses {
                 metrics.controller(name, &course.finding);
-                let file = format!("{stem}-{name}.csv");
+                let file = format!("{stem}-{}.csv", name.replace(' ', "-"));
                 files.insert(file, trajectory_csv(&course.shown, step.step.kind));
             }
             for (name, limit) in &step.limits {

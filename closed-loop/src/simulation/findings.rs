@@ -15,6 +15,8 @@ use crate::suits::{draws, held_by, holds_power, suits, v_ref};
 
 /// Name of the policy among the controllers.
 pub const POLICY: &str = "policy";
+/// Name of the law that a policy adds to, on its own.
+pub(super) const LAW: &str = "law alone";
 
 /// A scenario with everything it needs, all of it sound.
 #[derive(Debug, Clone)]

@@ -3,7 +3,7 @@
 use report::{Axis, Chart, Colour, Panel, Series, Svg};
 use toml_input::Message;
 
-use super::findings::{POLICY, Setting, Step};
+use super::findings::{LAW, POLICY, Setting, Step};
 use crate::baselines::Kind;
 use crate::faults::{Error, told};
 use crate::scenario::{Record, settled_band};
@@ -20,7 +20,8 @@ pub(super) fn picture(setting: &Setting, step: &Step) -> Result<Svg, Error> {
     let Some((_, policy)) = step.courses.first() else {
         return Err(Message::new("internal fault: a picture of no controller").into());
     };
-    let most = DRAWN * policy.shown.metrics.deviation.max(1.0);
+    // of a policy that hardly moves everything would be far off
+    let most = DRAWN * policy.shown.metrics.deviation.max(2.0 * settled_band(setting.v_ref));
     let (drawn, left_out): (Vec<_>, Vec<_>) = step
         .courses
         .iter()
@@ -70,6 +71,9 @@ pub(super) fn picture(setting: &Setting, step: &Step) -> Result<Svg, Error> {
 
 /// The same controller in the same colour in every picture, whichever are left out.
 fn colour(name: &str) -> Colour {
+    if name == LAW {
+        return Colour::SKY;
+    }
     let classical = Kind::ALL.iter().position(|kind| kind.name() == name);
     let colours = [Colour::ORANGE, Colour::GREEN, Colour::PURPLE, Colour::VERMILION];
     classical

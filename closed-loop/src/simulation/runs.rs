@@ -4,7 +4,7 @@ use plant::Topology;
 use policy::Scalar;
 use toml_input::{Fault, Message};
 
-use super::findings::{Check, Findings, POLICY, Setting, Step};
+use super::findings::{Check, Findings, LAW, POLICY, Setting, Step};
 use crate::agent::Agent;
 use crate::baselines::Baseline;
 use crate::controller::{Classical, Controller, Trajectory, follow};
@@ -101,7 +101,7 @@ fn law(setting: &Setting) -> Result<Option<Beside>, Error> {
         Scalar::F32 => Box::new(Agent::<f32>::new(&law)?),
         Scalar::F64 => Box::new(Agent::<f64>::new(&law)?),
     };
-    Ok(Some(("law alone", controller)))
+    Ok(Some((LAW, controller)))
 }
 
 fn run(

@@ -1,6 +1,7 @@
 //! What all curves have in common: a function of one number, and the way there and back for integers.
 
-use policy::Scalar;
+use policy::activation::Curve as Facts;
+use policy::{Activation, Scalar};
 use proc_macro2::TokenStream;
 use quote::quote;
 
@@ -30,8 +31,41 @@ pub(super) trait Function {
 /// The activation that such a function is.
 pub(super) struct Curve<F> {
     pub function: F,
+    /// Which one it is.
+    pub activation: Activation,
+}
+
+impl<F> Curve<F> {
     /// Whether all values are within +-1: then integers have the same exponent behind every layer.
-    pub has_ends: bool,
+    fn has_ends(&self) -> bool {
+        self.activation.range().is_some()
+    }
+
+    /// Where y lies for a finite x, told to a prover of intervals, which does not see that the terms of a curve come from one
+    /// number. It is what section 6 of the contract says: where the real function lies, and that less than `A + R max(x, 0)` is
+    /// between the two, which `interp` tries with every number.
+    fn admitted(&self) -> String {
+        match (self.activation.range(), self.activation.curve()) {
+            (Some(range), _) => format!("    /*@ admit {:.1} <= y <= {:.1}; */\n", range.low, range.high),
+            (None, Some(facts)) => {
+                let (low, high, slack) = beside_relu(facts);
+                format!(
+                    "    const float above = (x > 0.0f) ? x : 0.0f;
+    /*@ admit ((above + ({low:.9})) - ({slack:.9} * above)) <= y <= ((above + {high:.9}) + ({slack:.9} * above)); */\n"
+                )
+            }
+            (None, None) => String::new(),
+        }
+    }
+}
+
+/// `low - slack * max(x, 0) <= y - max(x, 0) <= high + slack * max(x, 0)` of a curve without an upper end, in binary32.
+fn beside_relu(facts: &Facts) -> (f64, f64, f64) {
+    // nine digits behind the point are written
+    const DIGIT: f64 = 1e-9;
+    let (beside, error) = (facts.beside_relu(), facts.error_32);
+    let (low, high) = (beside.low - error.absolute, beside.high + error.absolute);
+    (low - DIGIT, high + DIGIT, error.relative + DIGIT)
 }
 
 impl<F: Function> Text for Curve<F> {
@@ -50,22 +84,27 @@ impl<F: Function> Text for Curve<F> {
     fn c_integer_helper(&self, c: &C<'_>) -> Vec<String> {
         // as in `integer` below: a positive number is cut off, for a cast of a negative one would round towards 0
         let (n, name) = (c.n, self.function.name());
-        let (parameter, scale) = match self.has_ends {
+        let (parameter, scale) = match self.has_ends() {
             true => ("", "16384.0f"),
             false => (", float scale", "scale"),
         };
+        let admitted = self.admitted();
         vec![format!(
             "
 static int32_t {n}_{name}_integer(int32_t sum, float unit{parameter})
 {{
-    return (int32_t)(({n}_{name}((float)sum * unit) * {scale}) + 32768.5f) - 32768;
+    const float x = (float)sum * unit;
+    const float y = {n}_{name}(x);
+#if defined(__FRAMAC__)
+{admitted}#endif
+    return (int32_t)((y * {scale}) + 32768.5f) - 32768;
 }}"
         )]
     }
 
     fn c_integer(&self, c: &C<'_>, sum: &str, cut: &Cut) -> String {
         let unit = (c.literal)(Scalar::F32, cut.unit.value());
-        let scale = match self.has_ends {
+        let scale = match self.has_ends() {
             true => String::new(),
             false => format!(", {}", (c.literal)(Scalar::F32, cut.scale.value())),
         };
@@ -83,7 +122,7 @@ static int32_t {n}_{name}_integer(int32_t sum, float unit{parameter})
 
     fn rust_integer(&self, _store: &Store, cut: &Cut) -> TokenStream {
         let (name, unit) = (ident(self.function.name()), float(cut.unit.single()));
-        let scale = match self.has_ends {
+        let scale = match self.has_ends() {
             true => quote!(16_384.0),
             false => float(cut.scale.single()),
         };
@@ -101,5 +140,26 @@ static int32_t {n}_{name}_integer(int32_t sum, float unit{parameter})
     fn integer(&self, sum: i32, cut: &Cut) -> i32 {
         // the sum of 32768.5 is positive, so that cutting it off rounds half up
         (self.function.value(sum as f32 * cut.unit.single()) * cut.scale.single() + 32_768.5) as i32 - 32_768
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::text_of;
+    use super::*;
+
+    #[test]
+    fn what_a_prover_is_told_of_a_curve_holds_for_what_the_code_computes() {
+        let last = (policy::limits::MAX_MAGNITUDE as f32).to_bits();
+        for activation in Activation::EACH.iter().filter(|each| each.range().is_none()) {
+            let Some(facts) = activation.curve() else { continue };
+            let ((low, high, slack), text) = (beside_relu(facts), text_of(*activation));
+            for x in (0..=last).step_by(40_009).map(f32::from_bits).flat_map(|x| [x, -x]) {
+                let above = f64::from(x.max(0.0));
+                let beside = f64::from(text.single(x)) - above;
+                let inside = low - slack * above <= beside && beside <= high + slack * above;
+                assert!(inside, "{} of {x}: {beside}", activation.word());
+            }
+        }
     }
 }

@@ -54,10 +54,7 @@ pub fn text_of(activation: Activation) -> Box<dyn Text> {
 }
 
 fn of(activation: Activation, function: impl Function + 'static) -> Box<dyn Text> {
-    Box::new(Curve {
-        function,
-        has_ends: activation.range().is_some(),
-    })
+    Box::new(Curve { function, activation })
 }
 
 /// One of each kind, in the order of their functions in a file: straight lines first, then curves, which are longer.

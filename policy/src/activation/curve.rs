@@ -87,6 +87,21 @@ impl Curve {
         }
     }
 
+    /// Least and largest of `real(x) - max(x, 0)` over all x, for a curve without an upper end.
+    ///
+    /// Each of these is even (`f(x) - x = f(-x)`) or 0 above 0, and below 0 it turns at most where the function does: what is
+    /// extreme is at 0, at the turn or far below.
+    #[must_use]
+    pub fn beside_relu(&self) -> Interval {
+        let far = (self.real)(-1e6);
+        let turn = self.least.map_or(far, |(_, least)| least);
+        let zero = (self.real)(0.0);
+        Interval {
+            low: zero.min(far).min(turn),
+            high: zero.max(far).max(turn),
+        }
+    }
+
     /// Least and largest slope of the real function over an interval.
     #[must_use]
     pub fn slopes(&self, x: Interval) -> (f64, f64) {

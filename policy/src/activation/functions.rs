@@ -383,6 +383,25 @@ mod tests {
     }
 
     #[test]
+    fn a_curve_without_an_upper_end_keeps_its_distance_to_the_positive_part() {
+        for (word, curve) in curves().filter(|(_, curve)| curve.range.is_none()) {
+            let beside = curve.beside_relu();
+            let apart: Vec<f64> = grid().map(|x| (curve.real)(x) - x.max(0.0)).collect();
+            let least = apart.iter().copied().fold(f64::INFINITY, f64::min);
+            let largest = apart.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            // the grid steps by 1/250, and no curve bends by more than 1 there: it misses an extreme by less than 1e-5
+            assert!(
+                beside.low <= least && least - beside.low < 1e-5,
+                "{word}: {beside:?} {least}"
+            );
+            assert!(
+                beside.high >= largest && beside.high - largest < 1e-5,
+                "{word}: {beside:?} {largest}"
+            );
+        }
+    }
+
+    #[test]
     fn the_image_over_a_wide_interval_has_the_least_value_in_it() {
         for (word, curve) in curves() {
             let image = curve.image(Interval { low: -16.0, high: 16.0 });

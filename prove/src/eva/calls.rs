@@ -2,7 +2,8 @@
 
 use policy::Shape;
 
-use super::driver::{BITS_AND_FINITE, BOTH, Entry, ONE, Writer, stated};
+use super::driver::{BITS_AND_FINITE, BOTH, Entry, ONE, Writer};
+use super::stated::stated;
 
 impl Writer<'_> {
     /// Every state that is not sound, one number outside at a time and all others arbitrary.

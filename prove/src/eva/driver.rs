@@ -14,6 +14,7 @@ use policy::{Activation, NumericFormat, Policy, Squash};
 use super::frama_c::{Machine, Numbers};
 use super::invariant::{Invariant, Shown, Word, slices};
 use super::number::Number;
+use super::stated::{Stated, command_claims, stated};
 use super::text::{Labels, Text};
 
 const LITTLE: Machine = Machine("x86_32");
@@ -30,17 +31,6 @@ pub(super) const BITS_AND_FINITE: &[(Machine, Numbers)] = &[(LITTLE, Numbers::An
 pub(super) const BOTH: &[(Machine, Numbers)] = &[(LITTLE, Numbers::Any), (BIG, Numbers::Any)];
 /// What has no bytes in another order: arithmetic alone.
 pub(super) const ONE: &[(Machine, Numbers)] = &[(LITTLE, Numbers::Any)];
-
-/// A sentence about an entry, under the label of its checks.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Stated {
-    /// Start of the labels of all checks that together are this claim.
-    pub label: &'static str,
-    /// The sentence.
-    pub text: String,
-    /// It is checked where numbers are finite, and only there.
-    pub is_finite_only: bool,
-}
 
 /// A function of the driver.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -105,14 +95,6 @@ pub(super) struct Writer<'a> {
     pub invariant: Invariant,
     pub text: Text,
     pub not_stated: Vec<(String, &'static str)>,
-}
-
-pub(super) fn stated(label: &'static str, text: impl Into<String>) -> Stated {
-    Stated {
-        label,
-        text: text.into(),
-        is_finite_only: false,
-    }
 }
 
 impl Writer<'_> {
@@ -201,11 +183,14 @@ impl Writer<'_> {
             "measure(&measured);".to_owned(),
             format!("{n}_step(&state, &measured, &command);"),
         ]);
-        self.command();
-        let mut claims = self.command_claims();
-        self.where_it_holds(|text| text.check("undamaged", &format!("(command.status & {}u) == 0u", 1 << 8)));
+        let finite_only = self.passes_nan();
+        self.command(finite_only);
+        let mut claims = command_claims(finite_only);
+        self.where_it_holds(finite_only, |text| {
+            text.check("undamaged", &format!("(command.status & {}u) == 0u", 1 << 8))
+        });
         claims.push(Stated {
-            is_finite_only: self.passes_nan(),
+            is_finite_only: finite_only,
             ..stated("undamaged", "A sound state is never called damaged: STATE is clear.")
         });
         self.counters();
@@ -256,8 +241,8 @@ impl Writer<'_> {
         );
     }
 
-    /// What the command is after every step.
-    pub fn command(&mut self) {
+    /// What the command is after every step; of the chosen duty perhaps for finite numbers only.
+    fn command(&mut self, finite_only: bool) {
         let limits = self.policy.limits.duty;
         let (low, high) = (self.number.up(limits.low), self.number.down(limits.high));
         let fallback = self.literal(self.number.nearest(self.policy.fallback.duty));
@@ -273,7 +258,7 @@ impl Writer<'_> {
         );
         let chosen =
             format!("(command.duty_sim >= {least} && command.duty_sim <= {most}) || command.duty_sim == {fallback}");
-        self.where_it_holds(|text| text.check("chosen", &chosen));
+        self.where_it_holds(finite_only, |text| text.check("chosen", &chosen));
         self.text.check("action", &format!("command.action_index < {actions}u"));
         self.text.check("status", "command.status < 512u");
     }
@@ -293,14 +278,16 @@ impl Writer<'_> {
             "measure(&measured);".to_owned(),
             format!("{n}_step(&state, &measured, &command);"),
         ]);
-        self.command();
+        // a law of control reads the state, and its clamps pass a NaN on
+        let finite_only = self.passes_nan() || self.policy.head.residual().is_some();
+        self.command(finite_only);
         self.close();
-        let mut claims = self.command_claims();
-        if self.passes_nan() {
-            claims.retain(|claim| !claim.is_finite_only);
-            let why = "a NaN of a damaged state passes the clip of the head: that it leads to the fallback is a relation, which intervals do not \
-                       hold; the goals of `equivalence` say so";
+        let mut claims = command_claims(finite_only);
+        if finite_only {
+            let why = "a NaN of a damaged state passes the clip of the head or of the law: that it leads to the fallback is a relation, which \
+                       intervals do not hold; the goals of `equivalence` say so";
             self.not_stated.push(("duty_sim of a damaged state".to_owned(), why));
+            claims.retain(|claim| !claim.is_finite_only);
         }
         Entry {
             function: "prove_damaged",
@@ -402,30 +389,13 @@ impl Writer<'_> {
         ]);
     }
 
-    /// What [`Writer::command`] checks.
-    fn command_claims(&self) -> Vec<Stated> {
-        vec![
-            stated("duty", "The duty is a number within its limits, or the fallback."),
-            Stated {
-                is_finite_only: self.passes_nan(),
-                ..stated(
-                    "chosen",
-                    "The chosen duty lies between the least and the largest of all duties, or is the fallback.",
-                )
-            },
-            stated("action", "The action index is below the number of actions."),
-            stated("status", "No bit of the status is set that has no meaning."),
-        ]
-    }
-
-    /// A check that holds where the network's output is a number: everywhere, but for a head that passes a NaN on.
-    fn where_it_holds(&mut self, check: impl FnOnce(&mut Text)) {
-        let is_limited = self.passes_nan();
-        if is_limited {
+    /// A check that may hold for finite numbers only.
+    fn where_it_holds(&mut self, finite_only: bool, check: impl FnOnce(&mut Text)) {
+        if finite_only {
             self.text.line("#if defined(FINITE)");
         }
         check(&mut self.text);
-        if is_limited {
+        if finite_only {
             self.text.line("#endif");
         }
     }

@@ -99,7 +99,9 @@ fn memories(policy: &Policy) -> Vec<Shown> {
     const DERIVATIVE: &str =
         "the bound of a filtered derivative rests on a relation between its two words, which intervals do not hold";
     const CHAIN: &str = "a low-pass behind a low-pass would need slices of both";
-    let mut all = Vec::new();
+    // observers stand in front of the filters, and clamp what they keep
+    let observed = policy.observers.iter().map(policy::Observer::words).sum();
+    let mut all = vec![Shown::Directly; observed];
     for feature in &policy.features {
         let mut behind = Shown::Directly;
         for filter in &feature.filters {
@@ -197,5 +199,24 @@ mod tests {
                 assert!(next <= bound, "{gain} {pair:?} {next}");
             }
         }
+    }
+
+    #[test]
+    fn words_of_filters_behind_those_of_observers_are_shown_as_filters() {
+        let case = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../tests/golden/cases/observed/policy.toml"
+        );
+        let policy = policy::load(std::path::Path::new(case)).expect("a policy");
+        let invariant = Invariant::of(&policy);
+        let in_slices = |word: &&Word| matches!(word.shown, Shown::InSlices { .. });
+        let names: Vec<&str> = invariant
+            .words
+            .iter()
+            .filter(in_slices)
+            .map(|word| word.name.as_str())
+            .collect();
+        assert!(!names.is_empty(), "no low-pass");
+        assert!(names.iter().all(|name| name.contains("low_pass")), "{names:?}");
     }
 }

@@ -6,6 +6,7 @@ mod frama_c;
 mod inputs;
 mod invariant;
 mod number;
+mod stated;
 mod text;
 
 use std::collections::BTreeMap;

@@ -94,17 +94,24 @@ impl Starts {
     }
 }
 
-/// Rows that are not scored from the start: what the load did before a sample inside a slope is not in the table, and the voltage
-/// leaps with it by the series resistance of the capacitor. The current of the inductor does not.
-fn in_slopes(record: &Record) -> [Vec<bool>; CHANNELS] {
+/// A sample this near to the start of a period, in periods, is taken at the instant of a load step that stands there: which of the two
+/// came first nobody knows. Jitter of a trigger and of a table's times is smaller, and a step inside of the period is found by its
+/// instant ([`crate::instants`]).
+const AT_ONCE: f64 = 0.02;
+
+/// Rows that are not scored from the start: what the load did before a sample inside a slope, or at the very instant of one, is not in
+/// the table, and the voltage leaps with it by the series resistance of the capacitor. The current of the inductor does not.
+fn in_steps(record: &Record) -> [Vec<bool>; CHANNELS] {
     let mut masked = std::array::from_fn(|_| vec![false; record.rows()]);
+    let (before, behind) = (record.phase > 1.0 - AT_ONCE, record.phase < AT_ONCE);
     // between rows further apart nobody takes a load for one of a slope
     for step in load_steps(&record.load)
         .iter()
         .filter(|_| record.dense && !record.settled)
     {
         for channel in [OUTPUT_VOLTAGE, LOAD_CURRENT] {
-            masked[channel][step.first..step.last].fill(true);
+            let rows = step.first - usize::from(before)..step.last + usize::from(behind);
+            masked[channel][rows].fill(true);
         }
     }
     masked
@@ -126,7 +133,7 @@ impl Problem {
             total += record.rows() * CHANNELS;
         }
         Problem {
-            masked: records.iter().map(in_slopes).collect(),
+            masked: records.iter().map(in_steps).collect(),
             sigma: [1.0; CHANNELS],
             bases,
             base,

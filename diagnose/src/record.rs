@@ -10,6 +10,7 @@ mod raw;
 mod rows;
 mod source;
 mod stamp;
+mod steady;
 mod suspicion;
 
 use std::path::Path;

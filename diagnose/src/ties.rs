@@ -2,7 +2,7 @@
 
 use crate::attribute::Attribution;
 use crate::causes::Search;
-use crate::fit::Fit;
+use crate::fit::{Fit, Fitter};
 use crate::parallel;
 use crate::problem::{Problem, axpy, dot};
 use crate::progress::{self, Listener};
@@ -39,7 +39,12 @@ pub fn in_part(problem: &Problem, attribution: &Attribution, say: Listener<'_>) 
     let Some(best) = attribution.best.as_ref() else {
         return Vec::new();
     };
-    let fitter = attribution.fitter(problem);
+    // what initial states explain is taken where the fits end: from the model as given they would creep, since its drops are not there
+    let basis = problem.basis(&best.state.model, &best.state.starts, &best.state.residual);
+    let fitter = Fitter {
+        basis: &basis,
+        ..attribution.fitter(problem)
+    };
     let places = fitter.places(&best.causes);
     let columns_of = |cause: &usize| fitter.sensitivity(*cause, &best.state);
     let columns: Vec<Vec<f64>> = best.causes.iter().flat_map(columns_of).collect();
@@ -53,15 +58,19 @@ pub fn in_part(problem: &Problem, attribution: &Attribution, say: Listener<'_>) 
     };
     let others: Vec<usize> = (0..attribution.candidates.len()).filter(is_other).collect();
     let other_columns = parallel::map(&others, columns_of);
-    let tie = |member: usize| (TIE * attribution.inflation).max(search::TIE_SHARE * attribution.evidence[member]);
+    // the share is of what that parameter alone explains, not of all that its cause does: a diode's drop may be worth a hundred times
+    // its resistance
+    let tie = |cost: f64| (TIE * attribution.inflation).max(search::TIE_SHARE * cost);
     let mut looks = Vec::new();
     for (number, place) in places.iter().enumerate() {
         let candidate = &attribution.candidates[place.0];
         let off = candidate.own[place.1] - best.values[number];
         let member = best.causes.iter().position(|cause| *cause == place.0).unwrap_or(0);
         // chi-square of putting it back, all else following, at first order
-        let is_needed = off * off > NEEDED * tie(member) * best.covariance[number][number].max(0.0);
-        if candidate.own.len() < 2 || candidate.form.search != Search::Own || !is_needed {
+        let variance = best.covariance[number][number].max(0.0);
+        let is_needed = off * off > NEEDED * TIE * attribution.inflation * variance;
+        let tie = tie(off * off / variance);
+        if candidate.own.len() < 2 || candidate.form.search != Search::Own || !is_needed || variance == 0.0 {
             continue;
         }
         let mut left = best.state.residual.clone();
@@ -72,23 +81,23 @@ pub fn in_part(problem: &Problem, attribution: &Attribution, say: Listener<'_>) 
             .collect();
         for (other, own) in others.iter().zip(&other_columns) {
             let lost = dot(&left, &left) - gained(&[&kept[..], &own[..]].concat(), &left) - best.state.chi2;
-            if lost < NEAR * tie(member) {
-                looks.push((lost, number, member, *other));
+            if lost < NEAR * tie {
+                looks.push((lost, number, member, *other, tie));
             }
         }
     }
     looks.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.3).cmp(&(b.1, b.3))));
     looks.truncate(MOST_IN_PART);
-    let fits = progress::map(say, "parts of causes", &looks, |(_, number, member, other)| {
+    let fits = progress::map(say, "parts of causes", &looks, |(_, number, member, other, tie)| {
         let causes = [&best.causes[..], &[*other]].concat();
         let mut values = best.values.clone();
         let place = places[*number];
         values[*number] = attribution.candidates[place.0].own[place.1];
         values.extend(&attribution.candidates[*other].own);
-        (*member, fitter.holding(&causes, &values, &best.state, Some(*number)))
+        let fit = fitter.holding(&causes, &values, &best.state, Some(*number));
+        (fit.state.chi2 <= best.state.chi2 + tie).then_some((*member, fit))
     });
-    let holds = |(member, fit): &(usize, Fit)| fit.state.chi2 <= best.state.chi2 + tie(*member);
-    fits.into_iter().filter(holds).collect()
+    fits.into_iter().flatten().collect()
 }
 
 /// Pairs of causes beside a leading pair with which they have nothing in common; the best first.

@@ -5,7 +5,7 @@
 
 mod bench;
 
-use bench::{Bench, Noise, Table, Wiring, model};
+use bench::{Bench, Noise, Table, Wiring, model, of};
 use diagnose::drive::Model;
 use diagnose::fit::State;
 use diagnose::noise;
@@ -193,6 +193,47 @@ fn no_good_record_is_suspected() {
     for turn in 0..100 {
         let said = said(&made(&benches[turn % 4], &mut random));
         assert_eq!(said.trim(), "", "{turn}");
+    }
+}
+
+/// A small inductance: at the instant of sampling the current is half of its mean, and the duty that is the middle of all is not the
+/// one that belongs to the middle load.
+#[test]
+fn ripple_at_the_instant_of_sampling_is_no_probe() {
+    let mut random = Noise(29);
+    for (sampled, conductance) in [(0.39, 0.3), (0.39, 0.22), (0.61, 0.22), (0.0, 0.4)] {
+        let bench = Bench {
+            v_in: 24.0,
+            inductance: 22e-6,
+            capacitance: 220e-6,
+            f_sw: 200e3,
+            dcr: 0.08,
+            v_f: 0.45,
+            rows: ROWS,
+            sampled,
+            duty: vec![(0, 0.2), (40, 0.23), (75, 0.27)],
+            load: vec![(0.0, conductance, 0.0), (112.0, 0.6 * conductance, 0.0)],
+            ..Bench::default()
+        };
+        let digits = [
+            ("v_out", 0.004, 1e-3),
+            ("i_l", 0.01, 1e-3),
+            ("i_out", 0.008, 1e-3),
+            ("v_in", 0.01, 1e-3),
+        ];
+        let table = bench.run().measured(&digits, &mut random);
+        let read = table
+            .read("run", &of(&bench))
+            .map(|_| ())
+            .map_err(|faults| faults.to_string());
+        assert_eq!(read, Ok(()), "{sampled} {conductance}");
+        // half of it still is one, where the current surely never rests
+        if conductance > 0.25 {
+            let halved = scaled(table, "i_l", 0.5);
+            let faults = halved.read("run", &of(&bench)).map(|_| ()).unwrap_err().to_string();
+            let wanted = "i_l is 0.5 times what the model has";
+            assert!(faults.contains(wanted), "{sampled} {conductance}: {faults}");
+        }
     }
 }
 

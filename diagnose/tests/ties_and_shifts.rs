@@ -105,6 +105,49 @@ fn a_winding_that_diode_and_switch_imitate_together_is_named() {
     assert_eq!(findings.verdict, Verdict::Ambiguous);
 }
 
+/// A board of 24 V to 5 V whose model has no losses. The load is known by its meter alone, and steps at the very instant of a sample;
+/// the drop of the diode is worth a hundred times what its resistance is, in whose place stands that of the winding.
+#[test]
+fn a_part_of_the_diode_that_is_the_winding_is_named_beside_a_drop_that_weighs_more() {
+    let ideal = Bench {
+        v_in: 24.0,
+        inductance: 22e-6,
+        capacitance: 220e-6,
+        f_sw: 200e3,
+        dcr: 0.0,
+        esr: 0.012,
+        r_ds_on: 0.0,
+        v_f: 0.0,
+        r_d: 0.0,
+        sampled: 0.0,
+        ..Bench::default()
+    };
+    let truth = Bench {
+        dcr: 0.045,
+        r_ds_on: 0.065,
+        v_f: 0.48,
+        r_d: 0.02,
+        rows: 500,
+        duty: vec![(0, 0.24), (130, 0.26), (380, 0.22)],
+        load: vec![(0.0, 0.2, 0.0), (250.0, 0.5, 0.0)],
+        ..ideal.clone()
+    };
+    let model = of(&ideal);
+    let columns = [("v_out", 0.004, 1e-3), ("i_l", 0.01, 1e-3), ("i_out", 0.008, 1e-3)];
+    let table = truth.run().measured(&columns, &mut Noise(31)).without(&["v_in"]);
+    let findings = diagnose(&model, vec![table.read("run", &model).unwrap()], &[], &|_| {}).findings;
+    println!("{}", findings.sentence);
+    assert_eq!(findings.verdict, Verdict::Ambiguous, "{}", findings.sentence);
+    let named = findings.causes.iter().map(|cause| cause.id);
+    let mut named = named.chain(
+        findings
+            .causes
+            .iter()
+            .flat_map(|cause| cause.rivals.iter().flatten().copied()),
+    );
+    assert!(named.any(|id| id == "dcr"), "{}", findings.sentence);
+}
+
 /// A record of the converter itself with noise of 0.1 V, and `shift` V added to what is measured.
 fn run(parameters: &Parameters, duties: [f64; 4], seed: u64, shift: f64) -> String {
     let mut noisy = parameters.clone();

@@ -138,7 +138,14 @@ impl Sheet {
 
     fn no_column(&self, quantity: &str, name: &str) -> Fault {
         let message = Message::new(format!("no column `{name}` for `{quantity}`")).found(self.listed());
-        self.header_fault(message.did_you_mean(name, self.headers()))
+        let message = match nearest(name, self.headers()) {
+            Some(_) => message.did_you_mean(name, self.headers()),
+            None => message.hint(
+                "a map holds for every file: what only some of them have belongs into a map file (--columns), as \
+                 [records.NAME.columns] of these",
+            ),
+        };
+        self.header_fault(message)
     }
 
     /// The fault of a quantity that a reader needs and that is not there; `hint` follows the names it may have.

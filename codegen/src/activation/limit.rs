@@ -60,8 +60,12 @@ static {number} {n}_limit({number} x, {word} limit)
 {{
 #if defined(__FRAMAC__)
     const {number} most = {n}_from_bits(limit);
-    const {number} end = (({n}_bits(x) >> {top}) != 0u) ? -most : most;
-    return ((x == x) && (x > -most) && (x < most)) ? x : end;
+    {number} limited = (({n}_bits(x) >> {top}) != 0u) ? -most : most;
+    if ((x > -most) && (x < most)) {{
+        /*@ admit !\\is_NaN(x); */
+        limited = x;
+    }}
+    return limited;
 #else
     const {word} bits = {n}_bits(x);
     const {word} magnitude = bits & {magnitude};

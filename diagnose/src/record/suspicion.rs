@@ -6,6 +6,7 @@ use toml_input::Message;
 use super::Record;
 use super::channels::{CHANNEL_UNITS, CHANNELS, QUANTITIES};
 use super::source::Source;
+use super::steady::{self, Beside};
 use crate::median::median;
 
 /// A signal this many times larger or smaller than the model's is in another unit: units are a thousand apart, percent a hundred,
@@ -27,6 +28,11 @@ const TURNED: f64 = 0.5;
 /// no cause of the list makes a signal 1.8 times as large.
 const PROBES: [f64; 4] = [2.0, 10.0, 0.5, 0.1];
 const AS_PROBE: f64 = 1.1;
+/// Share of the current that losses may take: of the voltage, that is, at the load. A diode of half a volt at 4 V makes a tenth.
+const CURRENT_LOST: f64 = 0.15;
+/// Share of its mean by which an inductor current has to lie outside of its ripple, at whichever instant it is sampled: losses of a
+/// tenth are half of it, and a shunt of half the ratio makes more while the ripple is below 0.6 of the mean to either side.
+const APART: f64 = 0.2;
 /// The duty is taken for that of the other switch if the voltage is this near to what 1 - d makes, in units of the source, ...
 const AS_OTHER: f64 = 0.05;
 /// ... and this far from what d makes. Losses, a tenth of the source at most, lie between.
@@ -170,7 +176,7 @@ fn other_kind(record: &Record, parameters: &Parameters) -> Vec<Message> {
 /// A load that draws other currents than its setting, with all meters of one mind.
 fn other_load(record: &Record, parameters: &Parameters, sources: &[Source; CHANNELS]) -> Vec<Message> {
     let sizes = sizes(record, parameters);
-    let over = |n: usize| Some(typical(&record.measured[n])? / sizes[n]?);
+    let over = |n: usize| sizes[n].and_then(|_| Some(steady::beside(record, parameters, n)?.times));
     let (Some(v), Some(i_l), Some(i_out)) = (over(0), over(1), over(2)) else {
         return Vec::new();
     };
@@ -192,15 +198,24 @@ fn other_load(record: &Record, parameters: &Parameters, sources: &[Source; CHANN
 /// One signal that is twice or ten times what it should be, while no other is.
 fn probes(record: &Record, parameters: &Parameters, sources: &[Source; CHANNELS]) -> Vec<Message> {
     let sizes = sizes(record, parameters);
-    let over = |n: usize| Some(typical(&record.measured[n])? / sizes[n]?);
-    let known: Vec<(usize, f64)> = (0..CHANNELS).filter_map(|n| Some((n, over(n)?))).collect();
-    let off: Vec<(usize, f64)> = known
-        .iter()
-        .copied()
-        .filter(|(_, over)| ratio(*over, 1.0) > FAR)
-        .collect();
-    let [(n, over)] = off[..] else { return Vec::new() };
-    let probe = PROBES.into_iter().find(|probe| ratio(over, *probe) < AS_PROBE);
+    let known = |n: usize| sizes[n].and_then(|_| steady::beside(record, parameters, n));
+    let known: Vec<(usize, Beside)> = (0..CHANNELS).filter_map(|n| Some((n, known(n)?))).collect();
+    // at another instant of its ripple a current would be another
+    let is_off = |(n, own): &&(usize, Beside)| match n {
+        1 => own.apart > APART,
+        _ => ratio(own.times, 1.0) > FAR,
+    };
+    let off: Vec<(usize, Beside)> = known.iter().filter(is_off).copied().collect();
+    let [(n, own)] = off[..] else { return Vec::new() };
+    let (lost, ripple) = match n {
+        1 => (CURRENT_LOST, own.ripple),
+        _ => (AS_PROBE - 1.0, 0.0),
+    };
+    // what losses take off the mean is a larger share of a valley; and the instant may be another than the plant file says
+    let is_probe = |probe: &f64| {
+        ratio(own.times, *probe) < 1.0 + lost * (1.0 + ripple) || ratio(own.times_mean, *probe) < 1.0 + lost
+    };
+    let probe = PROBES.into_iter().find(is_probe);
     // a current alone may be off because the load is
     let confirmed = n == 3 || is_continuous(record, parameters) && known.len() > 1;
     let is_current = n == 1 || n == 2;
@@ -209,10 +224,12 @@ fn probes(record: &Record, parameters: &Parameters, sources: &[Source; CHANNELS]
         return Vec::new();
     };
     let (source, unit) = (&sources[n], CHANNEL_UNITS[n]);
-    let (found, size) = (over * sizes[n].unwrap_or(f64::NAN), sizes[n].unwrap_or(f64::NAN));
     let message = Message::new(format!("{} is {probe} times what the model has", source.label))
-        .found(format!("around {} {unit}", shown(found)))
-        .expected(format!("about {} {unit}, as the other signals have it", shown(size)))
+        .found(format!("around {} {unit}", shown(own.times * own.expected)))
+        .expected(format!(
+            "about {} {unit}, as the other signals have it",
+            shown(own.expected)
+        ))
         .hint(format!(
             "a probe or shunt of another ratio? {}; if it is right as it is: {}",
             mapped(n, source, 1.0 / probe),

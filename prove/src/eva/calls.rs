@@ -69,6 +69,7 @@ impl Writer<'_> {
             ],
             runs: BOTH,
             assumed: &[],
+            merged: Vec::new(),
             precision: 2,
         }
     }
@@ -198,6 +199,7 @@ impl Writer<'_> {
             stated: claims,
             runs: BOTH,
             assumed: &[],
+            merged: Vec::new(),
             precision: 2,
         }
     }
@@ -247,6 +249,7 @@ impl Writer<'_> {
             },
             runs: if self.is_integer() { ONE } else { BITS_AND_FINITE },
             assumed: &[],
+            merged: self.curves(),
             precision: self.sums_precision(),
         }
     }
@@ -268,6 +271,7 @@ impl Writer<'_> {
             stated: vec![stated("self_test", "`self_test` gives 0 or the number of a vector.")],
             runs: ONE,
             assumed: &["q_values"],
+            merged: Vec::new(),
             precision: 2,
         }
     }

@@ -45,6 +45,8 @@ pub(super) struct Entry {
     pub runs: &'static [(Machine, Numbers)],
     /// Functions of the policy, without its prefix, whose contract stands for their text. Another entry shows the contract.
     pub assumed: &'static [&'static str],
+    /// Functions of the policy, without its prefix, in which cases are not kept apart.
+    pub merged: Vec<String>,
     /// Frama-C's `-eva-precision`: 2 keeps equalities between values, which sums of a network do not need.
     pub precision: u8,
 }
@@ -170,6 +172,7 @@ impl Writer<'_> {
             stated,
             runs: BITS_AND_FINITE,
             assumed: if self.is_integer() { &[] } else { &["q_values"] },
+            merged: self.curves(),
             precision: 2,
         }
     }
@@ -226,6 +229,7 @@ impl Writer<'_> {
             stated: claims,
             runs: STEP,
             assumed: if self.policy.mapping.is_some() { VOUCHED } else { ACTION },
+            merged: Vec::new(),
             precision: 2,
         }
     }
@@ -295,6 +299,7 @@ impl Writer<'_> {
             stated: claims,
             runs: BOTH,
             assumed: ACTION,
+            merged: Vec::new(),
             precision: 2,
         }
     }
@@ -346,6 +351,7 @@ impl Writer<'_> {
             )],
             runs: ONE,
             assumed: ACTION,
+            merged: Vec::new(),
             precision: 2,
         })
     }
@@ -411,6 +417,19 @@ impl Writer<'_> {
     /// Whether the head is continuous.
     pub fn is_output(&self) -> bool {
         self.policy.head.continuous().is_some()
+    }
+
+    /// The curves of a network in integers that are computed piece by piece.
+    pub fn curves(&self) -> Vec<String> {
+        let all = self.policy.layers.iter().map(|layer| layer.activation);
+        let mut words: Vec<&str> = all
+            .filter(|activation| activation.curve().is_some() && activation.range().is_none())
+            .map(Activation::word)
+            .collect();
+        words.sort_unstable();
+        words.dedup();
+        let integer = words.into_iter().filter(|_| self.is_integer());
+        integer.map(|word| format!("{word}_integer")).collect()
     }
 
     /// Whether the network computes in integers.

@@ -78,6 +78,7 @@ pub(super) fn analyse(
     let Entry {
         function: entry,
         assumed,
+        merged,
         precision,
         ..
     } = entry;
@@ -116,9 +117,14 @@ pub(super) fn analyse(
             .arg("-eva-split-return-function")
             .arg(format!("{policy}_{function}:full"));
     }
+    // the pieces of a curve are there for its value, not to be kept apart behind it
+    let curves = merged
+        .iter()
+        .map(|name| format!(",{policy}_{name}:0"))
+        .collect::<String>();
     command
         .arg("-eva-slevel-function")
-        .arg(format!("{policy}_guard:0,{policy}_sense:0"));
+        .arg(format!("{policy}_guard:0,{policy}_sense:0{curves}"));
     for function in *assumed {
         command.arg("-eva-use-spec").arg(format!("{policy}_{function}"));
     }

@@ -408,8 +408,12 @@ static float activations_limit(float x, uint32_t limit)
 {
 #if defined(__FRAMAC__)
     const float most = activations_from_bits(limit);
-    const float end = ((activations_bits(x) >> 31) != 0u) ? -most : most;
-    return ((x == x) && (x > -most) && (x < most)) ? x : end;
+    float limited = ((activations_bits(x) >> 31) != 0u) ? -most : most;
+    if ((x > -most) && (x < most)) {
+        /*@ admit !\is_NaN(x); */
+        limited = x;
+    }
+    return limited;
 #else
     const uint32_t bits = activations_bits(x);
     const uint32_t magnitude = bits & 0x7FFFFFFFu;

@@ -352,8 +352,12 @@ static float adc_mapping_limit(float x, uint32_t limit)
 {
 #if defined(__FRAMAC__)
     const float most = adc_mapping_from_bits(limit);
-    const float end = ((adc_mapping_bits(x) >> 31) != 0u) ? -most : most;
-    return ((x == x) && (x > -most) && (x < most)) ? x : end;
+    float limited = ((adc_mapping_bits(x) >> 31) != 0u) ? -most : most;
+    if ((x > -most) && (x < most)) {
+        /*@ admit !\is_NaN(x); */
+        limited = x;
+    }
+    return limited;
 #else
     const uint32_t bits = adc_mapping_bits(x);
     const uint32_t magnitude = bits & 0x7FFFFFFFu;

@@ -319,7 +319,10 @@ CLIPPED_ACTOR_SPARE static uint32_t clipped_actor_line_far(const float *line, ui
 static float clipped_actor_softsign(float x)
 {
 #if defined(__FRAMAC__)
-    return x / (1.0f + clipped_actor_magnitude(x));
+    const float y = x / (1.0f + clipped_actor_magnitude(x));
+    /* intervals do not see that both numbers are one; an infinity gives a NaN */
+    /*@ admit \is_NaN(y) || (-1.0 <= y <= 1.0); */
+    return y;
 #else
     return x / (1.0f + clipped_actor_from_bits(clipped_actor_bits(x) & 0x7FFFFFFFu));
 #endif

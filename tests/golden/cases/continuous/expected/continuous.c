@@ -370,8 +370,12 @@ static float continuous_limit(float x, uint32_t limit)
 {
 #if defined(__FRAMAC__)
     const float most = continuous_from_bits(limit);
-    const float end = ((continuous_bits(x) >> 31) != 0u) ? -most : most;
-    return ((x == x) && (x > -most) && (x < most)) ? x : end;
+    float limited = ((continuous_bits(x) >> 31) != 0u) ? -most : most;
+    if ((x > -most) && (x < most)) {
+        /*@ admit !\is_NaN(x); */
+        limited = x;
+    }
+    return limited;
 #else
     const uint32_t bits = continuous_bits(x);
     const uint32_t magnitude = bits & 0x7FFFFFFFu;

@@ -421,8 +421,12 @@ static double wide_limit(double x, uint64_t limit)
 {
 #if defined(__FRAMAC__)
     const double most = wide_from_bits(limit);
-    const double end = ((wide_bits(x) >> 63) != 0u) ? -most : most;
-    return ((x == x) && (x > -most) && (x < most)) ? x : end;
+    double limited = ((wide_bits(x) >> 63) != 0u) ? -most : most;
+    if ((x > -most) && (x < most)) {
+        /*@ admit !\is_NaN(x); */
+        limited = x;
+    }
+    return limited;
 #else
     const uint64_t bits = wide_bits(x);
     const uint64_t magnitude = bits & (((uint64_t)1 << 63) - 1u);

@@ -114,7 +114,16 @@ pub(crate) fn adc_shows_nothing(name: &str, shown: Interval) -> Message {
         .hint("a converter whose codes fall while the value rises has an offset at the other end: physical = gain * code + offset")
 }
 
+/// What ends a range at or beyond the end of its converter: `end` is the value at the last or the first code.
 pub(crate) fn adc_saturates(name: &str, end: f64, range: Interval) -> Message {
+    // a range is stated with some room; one that is half as wide again as what the converter shows is that of another divider
+    let reached = if end > 0.0 { range.high / end } else { range.low / end };
+    let hint = if reached > 1.5 {
+        "this converter ends far inside of the range: is `gain`, with the divider or the shunt before it, that of the board? If it is, the \
+         policy needs values that nobody measures; only if it does not, end the range before the codes do"
+    } else {
+        "else a converter that is stuck at its end passes for a measurement"
+    };
     Message::new(format!(
         "an ADC at the end of its codes is a plausible value of `{name}`"
     ))
@@ -123,7 +132,7 @@ pub(crate) fn adc_saturates(name: &str, end: f64, range: Interval) -> Message {
         range.low, range.high
     ))
     .expected("a range that ends before the codes do")
-    .hint("else a converter that is stuck at its end passes for a measurement")
+    .hint(hint)
 }
 
 pub(crate) fn soft_start_too_slow(increment: f64) -> Message {
@@ -161,6 +170,12 @@ pub(crate) fn may_overflow(what: &str, magnitude: f64) -> Message {
 }
 
 // --- names ---
+
+pub(crate) fn list_in_parameters(name: &str) -> Message {
+    Message::new(format!("`{name}` stands in [parameters]")).hint(format!(
+        "in TOML what follows a [table] belongs to it: write `parameters = {{ ... }}` in one line, or each entry as [[{name}]]"
+    ))
+}
 
 pub(crate) fn bad_name(kind: &str, name: &str, hint: &str) -> Message {
     Message::new(format!("`{}` cannot be the name of a {kind}", name.escape_debug()))

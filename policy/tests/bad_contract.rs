@@ -34,6 +34,15 @@ fn an_unknown_key_names_the_nearest_known_one() {
 }
 
 #[test]
+fn a_list_below_the_parameters_is_told_where_it_belongs() {
+    contract_fault(
+        "v_ref = 100.0",
+        "v_ref = 100.0\n¦signal = [{ name = \"w\", unit = \"V\", range = [0.0, 1.0] }]",
+        &["`signal` stands in [parameters]", "in one line", "[[signal]]"],
+    );
+}
+
+#[test]
 fn a_duplicate_key_is_refused_at_its_second_place() {
     contract_fault("hold = 3", "hold = 3\n¦hold = 4", &["not valid TOML", "duplicate key"]);
 }

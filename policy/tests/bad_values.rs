@@ -161,6 +161,12 @@ fn adc_codes_must_be_able_to_say_the_range() {
         &with("{ gain = 0.05, offset = 0.0, bits = ¦12 }"),
         &["end of its codes", "204.75", "stuck at its end"],
     );
+    // 20 V: a policy that reads 250 V is not made for this divider, and a shorter range would not mend that
+    contract_fault(
+        unit,
+        &with("{ gain = 0.005, offset = 0.0, bits = ¦12 }"),
+        &["end of its codes", "20.475", "far inside of the range", "divider"],
+    );
     // -0.0625 * 4095 + 250 = -5.9 V is not plausible, but the first code, 250 V, is
     contract_fault(
         unit,

@@ -246,6 +246,10 @@ fn new_refuses_a_path_that_a_contract_cannot_hold() {
 #[test]
 fn a_skeleton_filled_in_compiles() {
     let desk = Desk::new("linear");
+    // a name without an extension is a folder
+    let said = desk.succeed("new policy/weights.safetensors --out fresh/folder");
+    assert!(said.contains("fresh/folder/policy.toml"), "{said}");
+    assert!(desk.path("fresh/folder/policy.toml").is_file());
     desk.succeed("new policy/weights.safetensors --out policy/filled.toml");
     for (old, new) in [
         ("name = \"controller\"", "name = \"filled\""),

@@ -114,12 +114,17 @@ fn too_slow(
     }
     match bench.widest(&policy) {
         Widest::Fits(Fitting { sizes, share }) => lines.push(format!(
-            "  = hint: this network cut down to {} takes {:.0} to {:.0} % there: train one of that size",
+            "  = hint: this network cut down to {} takes {:.0} to {:.0} % in {} with {build}: train one of that size; interrupt entry and \
+             drivers come on top",
             arrows(&sizes),
             100.0 * share.0,
-            100.0 * share.1
+            100.0 * share.1,
+            format.name()
         )),
-        Widest::None => lines.push("  = hint: not even four neurons in each hidden layer fit".to_owned()),
+        Widest::None => lines.push(format!(
+            "  = hint: in {} with {build} not even four neurons in each hidden layer surely fit",
+            format.name()
+        )),
         Widest::Unknown => {}
     }
     lines

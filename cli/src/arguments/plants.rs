@@ -24,8 +24,8 @@ pub struct New {
     /// With --plant: smallest and largest load, W
     #[arg(long, value_name = "W,W", value_parser = pair, requires = "plant")]
     pub loads: Option<[f64; 2]>,
-    /// File to write; must not exist yet. It names the weights as seen from its folder; those that had to be joined or folded
-    /// are written beside it
+    /// Contract to write, or folder for a policy.toml; must not exist yet. It names the weights as seen from its folder; those that
+    /// had to be joined or folded are written beside it
     #[arg(long, value_name = "FILE", default_value = "policy.toml")]
     pub out: PathBuf,
     /// Entry of a checkpoint that holds the network, such as model_state_dict

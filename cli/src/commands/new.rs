@@ -1,7 +1,7 @@
 //! `policyc new`
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use closed_loop::limits;
 use plant::Parameters;
@@ -26,21 +26,30 @@ pub fn run(options: &New) -> Result<Outcome, Failure> {
     }
 }
 
+/// A name without an extension is that of a folder, as with every other `--out`.
+fn contract(out: &Path) -> PathBuf {
+    match out.extension() {
+        None => out.join("policy.toml"),
+        Some(_) => out.to_owned(),
+    }
+}
+
 fn for_weights(options: &New, weights: &Path) -> Result<Outcome, Failure> {
+    let out = &contract(&options.out);
     let known = import::Options {
         actions: options.actions,
         inside: options.inside.clone(),
         vecnormalize: options.vecnormalize.clone(),
     };
-    let new = import::new_policy(weights, &options.out, &known)?;
-    output::write_new_all(&options.out, &new.contract, &new.beside)?;
+    let new = import::new_policy(weights, out, &known)?;
+    output::write_new_all(out, &new.contract, &new.beside)?;
     for line in &new.said {
         output::say(line)?;
     }
     for name in new.beside.keys() {
-        output::say(&format!("wrote {}", options.out.with_file_name(name).display()))?;
+        output::say(&format!("wrote {}", out.with_file_name(name).display()))?;
     }
-    let path = options.out.display();
+    let path = out.display();
     output::say(&format!(
         "wrote {path}: fill in what says TODO, look at what says check, then\n  policyc inspect {path}"
     ))?;
@@ -50,7 +59,7 @@ fn for_weights(options: &New, weights: &Path) -> Result<Outcome, Failure> {
 fn for_plant(options: &New, file: &Path, wanted: Wanted) -> Result<Outcome, Failure> {
     let plant = Parameters::buck_from_file(file, "`new --plant`")?;
     let start = Start::new(&plant, file, wanted)?;
-    let out = &options.out;
+    let out = &contract(&options.out);
     let from_there = |path: &Path| -> Result<String, Failure> {
         seen_from(out, path).map_err(|message| Fault::in_file(path, message).into())
     };

@@ -73,9 +73,16 @@ fn format(value: &Value<'_>, faults: &mut Sink) -> NumericFormat {
     })
 }
 
+/// Lists of the contract, which TOML takes for parameters if they are written below `[parameters]`.
+const LISTS: [&str; 3] = ["signal", "feature", "observer"];
+
 fn parameters(value: &Value<'_>, taken: &mut Taken, faults: &mut Sink) -> BTreeMap<String, f64> {
     let mut parameters = BTreeMap::new();
     for (key, value) in value.pairs(faults).unwrap_or_default() {
+        if value.as_list().is_some() && LISTS.contains(&key.value.as_str()) {
+            faults.push(value.source().fault(&key.span, catalogue::list_in_parameters(&key.value)));
+            continue;
+        }
         let kind = Kind::Parameter;
         let objection =
             names::objection(&key.value, kind).map(|hint| catalogue::bad_name(kind.word(), &key.value, &hint));

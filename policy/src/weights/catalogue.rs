@@ -204,11 +204,17 @@ pub(crate) fn golden_outside(row: usize, feature: &str, value: f64, low: f64, hi
 
 /// [`golden_outside`] of the first row, with how many more and what to do.
 pub(crate) fn golden_outside_rows(first: Message, outside: usize, rows: usize) -> Message {
+    const DIFFER: &str = "Either order, scale or clip of the features differ from the training, which `policyc replay` tells of a log; or the";
+    if outside == rows {
+        return first.hint(format!(
+            "all {rows} rows lie outside, and none is left to check with. {DIFFER} `range` of a signal is not that of the training"
+        ));
+    }
     let share = (1000.0 * outside as f64 / rows as f64).ceil() / 1000.0;
     let s = if outside == 1 { " lies" } else { "s lie" };
     first.hint(format!(
-        "{outside} of {rows} row{s} outside. Either order, scale or clip of the features differ from the training, which `policyc replay` \
-         tells of a log; or the training left the `range` of a signal: then golden_outside = {share} in [network] leaves these rows out"
+        "{outside} of {rows} row{s} outside. {DIFFER} training left the `range` of a signal: then golden_outside = {share} in [network] leaves \
+         these rows out"
     ))
 }
 

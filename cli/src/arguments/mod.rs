@@ -168,7 +168,7 @@ pub struct Compile {
     /// and which numeric format would
     #[arg(long, value_name = "FREQUENCY", value_parser = Clock::parse, conflicts_with = "no_costs")]
     pub clock: Option<Clock>,
-    /// Control steps in the kit
+    /// Control steps in the kit; those that lead to the places where an edit would hide, some hundred, are made in any case
     #[arg(long, value_name = "N", default_value_t = ::verify::kit::DEFAULT_STEPS, value_parser = clap::value_parser!(u32).range(1..=i64::from(::verify::kit::MOST_STEPS)))]
     pub kit_steps: u32,
     /// Numeric format in the place of the contract's

@@ -39,6 +39,7 @@ fn an_action_chosen_elsewhere_is_commanded_and_one_beyond_the_last_is_the_last()
 #[test]
 fn outputs_of_a_network_are_decided_if_they_are_as_many_as_there_are_actions() {
     let controller = of(SOURCE);
+    assert_eq!(controller.outputs(), 2);
     assert_eq!(controller.decide(&aview1(&[5.0, 6.0])), Some((1, 0.75)));
     assert_eq!(
         controller.decide(&aview1(&[6.0, 6.0])),

@@ -63,6 +63,17 @@ fn what_holds_in_a_held_out_record_of_another_kind_stays_explained() {
     );
 }
 
+/// Settled points have no inductor current, load steps do: its noise is not known, and the page has what was measured.
+#[test]
+fn a_channel_that_no_training_record_has_is_shown_and_not_compared() {
+    let columns = [("v_out", 0.1, 0.061), ("i_out", 0.05, 0.0049)];
+    let table = duty_steps().run().measured(&columns, &mut Noise(3)).without(&["v_in", "i_l"]);
+    let train = table.read("train", &model()).unwrap();
+    let found = diagnose(&model(), vec![train], &[record("held", &load_steps(), 4)], &|_| ());
+    let page = diagnose::page::page(&found).unwrap();
+    assert!(page.contains("i_l") && !page.contains("measured minus simulated i_l"));
+}
+
 /// Noise of twice the size, as of a coarser range of the scope, is no sign that the winding has another resistance.
 #[test]
 fn what_holds_in_a_noisier_held_out_record_stays_explained() {

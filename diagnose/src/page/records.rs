@@ -51,8 +51,14 @@ pub(super) fn panels(
             .series(points);
         let axis = Axis::new(format!("measured minus simulated {}", CHANNEL_NAMES[n])).unit(CHANNEL_UNITS[n]);
         let mut left = Panel::new(axis).height(100.0);
+        let mut is_compared = false;
         for (name, state, colour) in states.iter().copied() {
             let error = errors(problem, state, record, n);
+            // a channel of a held-out record that no training record has is not compared: nobody knows its noise
+            if error.iter().all(|error| error.is_nan()) {
+                continue;
+            }
+            is_compared = true;
             let simulated: Vec<f64> = measured
                 .iter()
                 .zip(&error)
@@ -61,7 +67,10 @@ pub(super) fn panels(
             panel = panel.series(Series::line(name, one.time.clone(), simulated).colour(colour));
             left = left.series(Series::line(name, one.time.clone(), error).colour(colour));
         }
-        chart = chart.panel(panel).panel(left);
+        chart = chart.panel(panel);
+        if is_compared {
+            chart = chart.panel(left);
+        }
     }
     chart.svg()
 }

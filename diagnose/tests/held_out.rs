@@ -67,7 +67,10 @@ fn what_holds_in_a_held_out_record_of_another_kind_stays_explained() {
 #[test]
 fn a_channel_that_no_training_record_has_is_shown_and_not_compared() {
     let columns = [("v_out", 0.1, 0.061), ("i_out", 0.05, 0.0049)];
-    let table = duty_steps().run().measured(&columns, &mut Noise(3)).without(&["v_in", "i_l"]);
+    let table = duty_steps()
+        .run()
+        .measured(&columns, &mut Noise(3))
+        .without(&["v_in", "i_l"]);
     let train = table.read("train", &model()).unwrap();
     let found = diagnose(&model(), vec![train], &[record("held", &load_steps(), 4)], &|_| ());
     let page = diagnose::page::page(&found).unwrap();

@@ -39,7 +39,6 @@ fn an_action_chosen_elsewhere_is_commanded_and_one_beyond_the_last_is_the_last()
 #[test]
 fn outputs_of_a_network_are_decided_if_they_are_as_many_as_there_are_actions() {
     let controller = of(SOURCE);
-    assert_eq!(controller.outputs(), 2);
     assert_eq!(controller.decide(&aview1(&[5.0, 6.0])), Some((1, 0.75)));
     assert_eq!(
         controller.decide(&aview1(&[6.0, 6.0])),
@@ -172,4 +171,37 @@ fn answers_of_the_trainer_are_compared_row_by_row() {
     // another format gives the same integers back
     let integer = policy.clone().with_format(NumericFormat::I16);
     assert!(refusal(&integer).is_some());
+}
+
+/// The law is `u / 16`, the network adds a quarter of the duty to it where u is above 5.
+fn residual(dead_zone: &str) -> Controller<f32> {
+    let contract = format!(
+        "name = \"law\"\nsample_period = 0.25\n[[signal]]\nname = \"u\"\nrange = [0.0, 10.0]\n[[signal]]\nname = \"i\"\n\
+         range = [-5.0, 5.0]\n[[feature]]\nname = \"x\"\nsource = \"u\"\n[network]\nweights = \"weights.safetensors\"\n\
+         [actions]\nbase = \"u / 16\"\noffsets = [0.0, 0.25]\n{dead_zone}\n{PLAIN}"
+    );
+    let network = Dense {
+        inputs: 1,
+        outputs: 2,
+        weights: &[0.0, 1.0],
+        bias: &[5.0, 0.0],
+    };
+    Controller::new(&load(&contract, &[], &[network]))
+}
+
+#[test]
+fn nothing_is_added_to_a_law_where_all_of_its_dead_zone_is_small() {
+    let duty = |dead_zone: &str, u: f32, i: f32| {
+        let trace = residual(dead_zone).eval(&[Physical(u), Physical(i)]).unwrap();
+        (trace.command.action_index, trace.command.duty_sim)
+    };
+    let both = "dead_zone = [{ source = \"u - 8\", within = 0.5 }, { source = \"i\", within = 1.0 }]";
+    // no dead zone: the offset is added everywhere
+    assert_eq!(duty("", 8.0, 0.0), (1, 0.75));
+    assert_eq!(duty("", 4.0, 0.0), (0, 0.25));
+    assert_eq!(duty(both, 8.0, 0.0).1, 0.5);
+    assert_eq!(duty(both, 8.0, 1.0).1, 0.5, "its end belongs to it");
+    // one of both is large
+    assert_eq!(duty(both, 8.0, 2.0).1, 0.75);
+    assert_eq!(duty(both, 9.0, 0.0).1, 0.8125);
 }

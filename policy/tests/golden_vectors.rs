@@ -95,7 +95,10 @@ fn golden_vectors_that_cannot_be_are_refused() {
     // with none left there is nothing that could be allowed
     let all = f32_tensor("obs", &[2, 2], &[21.0, 5.0, 21.0, 0.0]);
     let told = fault(&[all, q.clone()]).to_string();
-    assert!(told.contains("all 2 rows lie outside") && !told.contains("golden_outside"), "{told}");
+    assert!(
+        told.contains("all 2 rows lie outside") && !told.contains("golden_outside"),
+        "{told}"
+    );
     let nan = f32_tensor("obs", &[2, 2], &[1.0, 5.0, f32::NAN, 0.0]);
     assert_tensor(&fault(&[nan, q]), GOLDEN, "obs", &["nan at index 2"]);
     contract_fault(

@@ -395,8 +395,8 @@ mod tests {
             // than 1e-5
             let low = least - beside.low;
             let high = beside.high - largest;
-            assert!(-1e-12 <= low && low < 1e-5, "{word}: {beside:?} {least}");
-            assert!(-1e-12 <= high && high < 1e-5, "{word}: {beside:?} {largest}");
+            assert!((-1e-12..1e-5).contains(&low), "{word}: {beside:?} {least}");
+            assert!((-1e-12..1e-5).contains(&high), "{word}: {beside:?} {largest}");
         }
     }
 

@@ -80,7 +80,11 @@ fn parameters(value: &Value<'_>, taken: &mut Taken, faults: &mut Sink) -> BTreeM
     let mut parameters = BTreeMap::new();
     for (key, value) in value.pairs(faults).unwrap_or_default() {
         if value.as_list().is_some() && LISTS.contains(&key.value.as_str()) {
-            faults.push(value.source().fault(&key.span, catalogue::list_in_parameters(&key.value)));
+            faults.push(
+                value
+                    .source()
+                    .fault(&key.span, catalogue::list_in_parameters(&key.value)),
+            );
             continue;
         }
         let kind = Kind::Parameter;

@@ -5,6 +5,7 @@ mod actor;
 mod budget;
 mod certify;
 mod ci;
+mod codes;
 mod commands;
 mod decisions;
 mod design;

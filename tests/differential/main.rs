@@ -1,6 +1,7 @@
 //! Generated code against the interpreter, step by step and bit by bit; and hostile edits that must be caught.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod codes;
 mod flips;
 mod formats;
 mod integrity;

@@ -1,18 +1,13 @@
-//! Random policies in shards: a line of a file each, so that a killed run goes on where it stood, and the files of all shards
-//! merge to the same bytes in whatever order they were made.
-//!
-//! ```text
-//!  seeds ─► shard 1 of n ─► shard-1-of-n.csv ─┐
-//!        ─► shard 2 of n ─► shard-2-of-n.csv ─┴► merge ─► random.csv, table
-//! ```
+//! Random policies in shards, and the table of all of them.
 
 use std::collections::BTreeMap;
 use std::fmt::{self, Write as _};
-use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use policy::NumericFormat;
-use verify::{Options, Outcome, Report};
+use toml_input::Faults;
+use verify::Options;
+use verify::shards::{self, Entry, Head, Shard};
 
 /// Compilers in the order in which policies take turns.
 pub const COMPILERS: [&str; 3] = ["gcc", "clang", "rustc"];
@@ -41,25 +36,19 @@ pub struct Plan {
     pub policies: u64,
     /// Control steps of each policy.
     pub steps: u64,
-    /// Number of this shard, from 1.
-    pub shard: u64,
-    /// Number of shards.
-    pub count: u64,
+    /// Which part of them.
+    pub shard: Shard,
 }
 
 impl Plan {
     fn seeds(self) -> impl Iterator<Item = u64> {
-        let step = usize::try_from(self.count).unwrap_or(usize::MAX).max(1);
-        (self.first + self.shard - 1..self.first + self.policies).step_by(step)
+        let own = (0..self.policies).filter(move |index| self.shard.takes(*index));
+        own.map(move |index| self.first + index)
     }
 
-    /// The lines above the results. A file with other ones is of another run.
-    fn head(self) -> String {
-        format!("# {}, {} steps a policy\n{COLUMNS}\n", codegen::TOOL, self.steps)
-    }
-
-    fn file(self, folder: &Path) -> PathBuf {
-        folder.join(format!("shard-{}-of-{}.csv", self.shard, self.count))
+    /// A file with another one is of another run.
+    fn head(self) -> Head {
+        Head::new(&format!("{} steps a policy", self.steps), COLUMNS)
     }
 }
 
@@ -85,6 +74,12 @@ impl Row {
     #[must_use]
     pub fn is_equal(&self) -> bool {
         self.outcome == "equal"
+    }
+}
+
+impl Entry for Row {
+    fn key(&self) -> u64 {
+        self.seed
     }
 
     fn read(line: &str) -> Option<Self> {
@@ -146,25 +141,8 @@ pub fn compare(seed: u64, steps: u64) -> Row {
         ..Options::default()
     };
     match verify::run(&policy, options) {
-        Ok(report) => row(report.builds.len(), &report.checksum, &outcome(&report)),
+        Ok(report) => row(report.builds.len(), &report.checksum, &report.in_a_line()),
         Err(error) => row(0, "", &format!("not compared: {error}")),
-    }
-}
-
-/// `equal` only if every build was made and compared.
-fn outcome(report: &Report) -> String {
-    if report.builds.is_empty() {
-        return "no build".into();
-    }
-    let unequal = report.builds.iter().find(|build| build.outcome != Outcome::Equal);
-    match unequal.map(|build| (&build.build, &build.outcome)) {
-        None => "equal".into(),
-        Some((name, Outcome::Different { difference })) => {
-            format!("{name} differs at step {} in {}", difference.step, difference.what)
-        }
-        Some((name, Outcome::Failed { step, reason, .. })) => format!("{name} failed at step {step}: {reason}"),
-        Some((name, Outcome::CompileError { message })) => format!("{name} refused: {message}"),
-        Some((name, Outcome::Skipped { .. } | Outcome::Equal)) => format!("{name} is missing"),
     }
 }
 
@@ -177,108 +155,18 @@ pub fn run(
     plan: Plan,
     folder: &Path,
     compare: impl Fn(u64, u64) -> Row,
-    mut tell: impl FnMut(&Row),
-) -> Result<Vec<Row>, String> {
-    let path = plan.file(folder);
-    let told = |error: std::io::Error| format!("{}: {error}", path.display());
-    std::fs::create_dir_all(folder).map_err(told)?;
-    let mut rows = kept(plan, &path)?;
-    let mut file = std::fs::OpenOptions::new().append(true).open(&path).map_err(told)?;
-    for seed in plan.seeds() {
-        if rows.iter().any(|row| row.seed == seed) {
-            continue;
-        }
-        let row = compare(seed, plan.steps);
-        // one call of the system: a kill leaves a whole line or a torn last one, which the next run cuts off
-        file.write_all(format!("{row}\n").as_bytes()).map_err(told)?;
-        tell(&row);
-        rows.push(row);
-    }
-    Ok(rows)
-}
-
-/// The rows of a file of this shard, which is made or cut back to its last whole line.
-fn kept(plan: Plan, path: &Path) -> Result<Vec<Row>, String> {
-    let told = |error: std::io::Error| format!("{}: {error}", path.display());
-    let text = match std::fs::read_to_string(path) {
-        Ok(text) => text,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
-        Err(error) => return Err(told(error)),
-    };
-    let whole = &text[..text.rfind('\n').map_or(0, |at| at + 1)];
-    if whole.lines().count() < plan.head().lines().count() {
-        std::fs::write(path, plan.head()).map_err(told)?;
-        return Ok(Vec::new());
-    }
-    if whole.len() < text.len() {
-        std::fs::write(path, whole).map_err(told)?;
-    }
-    let (head, rows) = parsed(path, whole)?;
-    match head == plan.head() {
-        true => Ok(rows),
-        false => Err(format!(
-            "{}: of another run\n  found: {}\n  expected: {}\nname another folder",
-            path.display(),
-            head.lines().next().unwrap_or_default(),
-            plan.head().lines().next().unwrap_or_default()
-        )),
-    }
-}
-
-fn parsed(path: &Path, text: &str) -> Result<(String, Vec<Row>), String> {
-    let lines: Vec<&str> = text.lines().collect();
-    let at = lines.len().min(2);
-    let read = |(index, line): (usize, &&str)| {
-        Row::read(line).ok_or_else(|| format!("{}:{}: no line of a shard: {line}", path.display(), index + 3))
-    };
-    let rows: Result<Vec<Row>, String> = lines[at..].iter().enumerate().map(read).collect();
-    Ok((lines[..at].iter().map(|line| format!("{line}\n")).collect(), rows?))
+    tell: impl FnMut(&Row),
+) -> Result<Vec<Row>, Faults> {
+    let make = |seed| Ok(compare(seed, plan.steps));
+    shards::run(folder, plan.shard, &plan.head(), plan.seeds(), make, tell)
 }
 
 /// Merges all shards of a folder into [`MERGED`]; returns the rows, by seed.
 ///
 /// # Errors
 /// If a file cannot be read or written, if the files are of different runs, or if two of them disagree about a seed.
-pub fn merge(folder: &Path) -> Result<Vec<Row>, String> {
-    let told = |path: &Path| {
-        let path = path.display().to_string();
-        move |error: std::io::Error| format!("{path}: {error}")
-    };
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(told(folder))? {
-        let path = entry.map_err(told(folder))?.path();
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        if name.starts_with("shard-") && name.ends_with(".csv") {
-            files.push(path);
-        }
-    }
-    files.sort();
-    let mut head: Option<String> = None;
-    let mut rows: BTreeMap<u64, Row> = BTreeMap::new();
-    for path in &files {
-        let text = std::fs::read_to_string(path).map_err(told(path))?;
-        // a shard may be at work: its last line counts when it is whole
-        let (found, more) = parsed(path, &text[..text.rfind('\n').map_or(0, |at| at + 1)])?;
-        if head.get_or_insert_with(|| found.clone()) != &found {
-            return Err(format!("{}: of another run than the other shards", path.display()));
-        }
-        for row in more {
-            let seed = row.seed;
-            let known = rows.entry(seed).or_insert_with(|| row.clone());
-            if *known != row {
-                return Err(format!("two results of seed {seed}:\n  {known}\n  {row}"));
-            }
-        }
-    }
-    let rows: Vec<Row> = rows.into_values().collect();
-    let head = head.ok_or_else(|| format!("{}: no shard in it", folder.display()))?;
-    let mut text = head;
-    rows.iter().for_each(|row| {
-        let _ = writeln!(text, "{row}");
-    });
-    let path = folder.join(MERGED);
-    std::fs::write(&path, text).map_err(told(&path))?;
-    Ok(rows)
+pub fn merge(folder: &Path) -> Result<Vec<Row>, Faults> {
+    shards::merge(folder, MERGED)
 }
 
 /// A row for each format and compiler: policies, builds, policies that are not equal.

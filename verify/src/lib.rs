@@ -18,6 +18,7 @@
 //! | what a step costs | [`mod@measure`], [`elf`]; of all builds: [`costs`]; whether it fits into its period: [`budget`], [`advice`], [`fitting`] |
 //! | archives of FMUs | [`fmu`] |
 //! | what the format does to decisions | [`decisions`] |
+//! | every combination of ADC codes | [`codes`], kept in [`shards`] |
 //! | a log of the trainer against the contract | [`replay`] |
 //! | what was found, for other programs | [`cases`], [`exchange`] |
 //! | checked-in files against the policy | [`drift()`], [`folder`] |
@@ -25,6 +26,7 @@
 pub mod advice;
 pub mod budget;
 pub mod cases;
+pub mod codes;
 pub mod compare;
 pub mod costs;
 pub mod drift;
@@ -46,6 +48,7 @@ pub mod replay;
 pub mod report;
 pub mod runner;
 mod session;
+pub mod shards;
 pub mod text;
 pub mod toolchain;
 pub mod traces;

@@ -72,6 +72,27 @@ impl Report {
         all.into_iter().collect()
     }
 
+    /// `equal` only if every build was made and compared; else the first that was not equal, and what it did.
+    pub fn in_a_line(&self) -> String {
+        if self.builds.is_empty() {
+            return "no build".into();
+        }
+        let unequal = self.builds.iter().find(|build| build.outcome != Outcome::Equal);
+        match unequal.map(|build| (&build.build, &build.outcome)) {
+            None => "equal".into(),
+            Some((name, Outcome::Different { difference })) => {
+                let measured = difference.measurement.iter();
+                let at: String = measured
+                    .map(|item| format!("; {} = {}", item.signal, item.sample.value))
+                    .collect();
+                format!("{name} differs at step {} in {}{at}", difference.step, difference.what)
+            }
+            Some((name, Outcome::Failed { step, reason, .. })) => format!("{name} failed at step {step}: {reason}"),
+            Some((name, Outcome::CompileError { message })) => format!("{name} refused: {message}"),
+            Some((name, Outcome::Skipped { .. } | Outcome::Equal)) => format!("{name} is missing"),
+        }
+    }
+
     /// The builds that could not be made here.
     pub fn skipped(&self) -> impl Iterator<Item = &BuildReport> {
         self.builds

@@ -10,6 +10,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -25,6 +26,7 @@ use policy::{Policy, Scalar};
 use targets::TargetSpec;
 use toml_input::{Fault, Faults, Message, messages};
 
+use crate::codes::Grid;
 use crate::golden;
 use crate::lane::Lane;
 use crate::oracle::{Chunk, Oracle};
@@ -61,6 +63,8 @@ pub struct Options<'a> {
     pub golden_decisions: Option<f64>,
     /// Recordings to play before the random part.
     pub recorded: Vec<Recorded>,
+    /// These combinations of codes in the place of all else, a step of a fresh controller each.
+    pub codes: Option<(&'a Grid, Range<u64>)>,
     /// A build that sends nothing for so long has failed.
     pub timeout: Duration,
     /// Told how far it is.
@@ -81,6 +85,7 @@ impl Default for Options<'_> {
             assembly: false,
             golden_decisions: None,
             recorded: Vec::new(),
+            codes: None,
             // a driver's buffer of 64 kB holds some 470 steps, of 0.9 M instructions at most (floats by library on a
             // Cortex-M0+): a second or two of an emulator, and the rest is for machines under load
             timeout: Duration::from_secs(60),
@@ -200,15 +205,17 @@ fn run_in<T: Real>(policy: &Policy, options: Options<'_>) -> Result<Report, Veri
         assembly,
         golden_decisions,
         recorded,
+        codes,
         timeout,
         mut progress,
     } = options;
+    let steps = codes.as_ref().map_or(steps, |(_, range)| range.end - range.start);
     let mut tell = |news: Progress| {
         if let Some(progress) = &mut progress {
             progress(news);
         }
     };
-    // before anything is built: a mistyped name would leave no build and look like missing tools
+    // before anything is built: a mistyped name would look like missing tools
     check_names(target, &compilers)?;
     let fresh;
     let files = match generated {
@@ -246,7 +253,7 @@ fn run_in<T: Real>(policy: &Policy, options: Options<'_>) -> Result<Report, Veri
         .chunk_of(golden::events(policy))
         .map_err(VerifyError::Interpreter)?;
     let golden = golden_result(policy);
-    let mut stream = Stream::new(policy, seed, &recorded);
+    let mut stream = Stream::new(policy, seed, &recorded).after_codes(codes);
     let lanes = Lanes {
         policy,
         target,

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use ::verify::exchange::Sheet;
+use ::verify::shards::Shard;
 use clap::{Args, ValueEnum};
 use policy::NumericFormat;
 
@@ -56,9 +57,27 @@ pub struct Verify {
     /// Also print what was found, and faults of the input, as a service shows them beside the lines of a change
     #[arg(long, value_name = "SERVICE", value_enum, conflicts_with = "json")]
     pub annotations: Option<Service>,
+    #[command(flatten)]
+    pub every: EveryCode,
     /// Machine-readable
     #[arg(long)]
     pub json: bool,
+}
+
+/// Whether every combination of ADC codes is compared in the place of the stream.
+#[derive(Debug, Default, Args)]
+pub struct EveryCode {
+    /// Compare the first step of a fresh controller for every combination of ADC codes, in parts of 2^20 that are kept in --out: a
+    /// run that was stopped goes on there
+    #[arg(long, requires = "out", conflicts_with_all = ["steps", "seed", "trace", "drift_only", "report", "annotations"])]
+    pub codes: bool,
+    /// Of --codes, which parts: 2/4 takes every fourth, from the second on. Shards of other machines that are copied into the
+    /// folder of --out are merged
+    #[arg(long, value_name = "I/N", requires = "codes", default_value = "1/1")]
+    pub shard: Shard,
+    /// Folder of the results of --codes
+    #[arg(long, value_name = "DIR", requires = "codes")]
+    pub out: Option<PathBuf>,
 }
 
 /// A report to write.

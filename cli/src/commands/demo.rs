@@ -73,6 +73,7 @@ pub fn run(options: &Demo) -> Result<Outcome, Failure> {
         annotations: None,
         trace: Vec::new(),
         map: Vec::new(),
+        every: Default::default(),
         json: false,
     })?;
     output::say("\nfiles")?;

@@ -19,6 +19,7 @@ pub mod simulate;
 pub mod targets;
 pub mod train;
 pub mod verify;
+mod verify_codes;
 
 use std::path::{Path, PathBuf};
 

@@ -13,6 +13,7 @@ use verify::traces::Recorded;
 use verify::{Folder, Options, Progress, Report, folder, text};
 
 use super::progress_line::ProgressLine;
+use super::verify_codes;
 use crate::arguments::Verify;
 use crate::arguments::verify::{Asked, Service};
 use crate::failure::Failure;
@@ -75,13 +76,12 @@ fn compare(options: &Verify) -> Result<Outcome, Failure> {
         // a build of files that differ says the same once more, in every compiler's words
         return answer(options, &policy, Some(folder.drift.clone()), None);
     }
+    if let (true, Some(out)) = (options.every.codes, &options.every.out) {
+        let files = on_disk.as_ref().map(|folder| &folder.files);
+        return verify_codes::run(options, out, &policy, target, files);
+    }
     let mut progress = ProgressLine::new();
-    let mut tell = |news| {
-        progress.show(|| match news {
-            Progress::Compiling { builds } => format!("compiling {builds} builds"),
-            Progress::Running { steps, of } => format!("{} of {} steps", grouped(steps), grouped(of)),
-        });
-    };
+    let mut tell = |news| progress.show(|| told(news));
     let report = verify::run(
         &policy,
         Options {
@@ -101,6 +101,14 @@ fn compare(options: &Verify) -> Result<Outcome, Failure> {
         return Err(text::nothing_compared(&report).into());
     }
     answer(options, &policy, on_disk.map(|folder| folder.drift), Some(report))
+}
+
+/// How far a comparison is, in words.
+pub fn told(news: Progress) -> String {
+    match news {
+        Progress::Compiling { builds } => format!("compiling {builds} builds"),
+        Progress::Running { steps, of } => format!("{} of {} steps", grouped(steps), grouped(of)),
+    }
 }
 
 /// Writes and says what was found; without a report of builds it is what the files alone tell.

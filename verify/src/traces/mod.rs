@@ -11,9 +11,13 @@ mod recorded;
 #[cfg(test)]
 mod tests;
 
+use std::ops::Range;
+
 use interp::{Controller, Real, Sample};
 use policy::{Interval, Policy, Scalar};
 use random::{Random, SplitMix};
+
+use crate::codes::Grid;
 
 use edges::Edges;
 use plant::Plant;
@@ -98,6 +102,8 @@ pub struct Stream<'a> {
     plateau: Vec<Sample>,
     /// Events that come before anything random, last first.
     queued: Vec<Event>,
+    /// Combinations of codes that come before anything random, a fresh controller each.
+    codes: Option<(&'a Grid, Range<u64>)>,
 }
 
 impl<'a> Stream<'a> {
@@ -127,7 +133,14 @@ impl<'a> Stream<'a> {
             good_left: 0,
             plateau: Vec::new(),
             queued,
+            codes: None,
         }
+    }
+
+    /// The same behind a fresh controller and a step for each of these combinations.
+    #[must_use]
+    pub fn after_codes(self, codes: Option<(&'a Grid, Range<u64>)>) -> Self {
+        Self { codes, ..self }
     }
 
     /// The next event. `controller` is the interpreter in the state before it: the closed loop needs its duty, the
@@ -136,6 +149,12 @@ impl<'a> Stream<'a> {
         // nothing random in between: a recording is played whole
         if let Some(event) = self.queued.pop() {
             return event;
+        }
+        if let Some((grid, combinations)) = &mut self.codes
+            && let Some(next) = combinations.next()
+        {
+            self.queued.push(Event::Step(grid.samples(next)));
+            return Event::Init;
         }
         if self.policy.mapping.is_some() && self.rng.one_in(STEPS_PER_SET_MAPPING) {
             return self.set_mapping();

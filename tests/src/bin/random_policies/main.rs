@@ -6,6 +6,8 @@ use std::time::Instant;
 
 use clap::Parser;
 use tests::shards::{self, Plan, Row};
+use toml_input::Faults;
+use verify::shards::Shard;
 
 /// Draws policies from seeds, builds each in its turn's numeric format with its turn's compiler, and compares bits with the
 /// interpreter. A run that is stopped goes on where it stood. See docs/evidence.md.
@@ -22,8 +24,8 @@ struct Arguments {
     #[arg(long, default_value_t = 1000)]
     steps: u64,
     /// Which part: 2/4 takes every fourth policy, from the second on
-    #[arg(long, default_value = "1/1", value_name = "I/N", value_parser = part)]
-    shard: (u64, u64),
+    #[arg(long, default_value = "1/1", value_name = "I/N")]
+    shard: Shard,
     /// Folder of the results
     #[arg(long)]
     out: PathBuf,
@@ -32,36 +34,24 @@ struct Arguments {
     merge: bool,
 }
 
-fn part(text: &str) -> Result<(u64, u64), String> {
-    let parsed = text
-        .split_once('/')
-        .and_then(|(shard, count)| Some((shard.parse().ok()?, count.parse().ok()?)));
-    match parsed {
-        Some((shard, count)) if (1..=count).contains(&shard) => Ok((shard, count)),
-        _ => Err("expected I/N with 1 <= I <= N".into()),
-    }
-}
-
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(rows) if rows.iter().all(Row::is_equal) => ExitCode::SUCCESS,
         Ok(_) => ExitCode::FAILURE,
-        Err(message) => {
-            eprintln!("error: {message}");
+        Err(faults) => {
+            eprintln!("{faults}");
             ExitCode::from(2)
         }
     }
 }
 
-fn run(arguments: &Arguments) -> Result<Vec<Row>, String> {
+fn run(arguments: &Arguments) -> Result<Vec<Row>, Faults> {
     if !arguments.merge {
-        let (shard, count) = arguments.shard;
         let plan = Plan {
             first: arguments.first,
             policies: arguments.policies,
             steps: arguments.steps,
-            shard,
-            count,
+            shard: arguments.shard,
         };
         let started = Instant::now();
         let mut compared = 0;

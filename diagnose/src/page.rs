@@ -40,7 +40,10 @@ pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
     if !diagnosis.profiles.is_empty() && findings.verdict != Verdict::Unexplained {
         page = page.section(profiles(diagnosis)?);
     }
-    page = page.section(ties(diagnosis));
+    if findings.verdict != Verdict::Unexplained {
+        // where nothing is an explanation there is nothing to separate it from
+        page = page.section(ties(diagnosis));
+    }
     page.section(noise(diagnosis)).section(detectable(diagnosis)).html()
 }
 
@@ -175,12 +178,20 @@ fn held_out(diagnosis: &Diagnosis) -> Result<Option<Section>, ReportError> {
         .map(|held| format!("{} {}", held.record, held.channel))
         .collect();
     let ratio = |f: fn(&crate::gain::Held) -> f64| whole.iter().map(|held| f(held) / held.floor).collect::<Vec<_>>();
-    let panel = BarPanel::new(Axis::new("error over noise"))
-        .bars_in(MODEL, "model", ratio(|held| held.rmse_before))
-        .bars_in(EXTENDED, "extended", ratio(|held| held.rmse_after));
+    let mut panel = BarPanel::new(Axis::new("error over noise"));
+    panel = panel.bars_in(MODEL, "model", ratio(|held| held.rmse_before));
+    // without a cause there is no second model
+    let is_extended = !diagnosis.findings.causes.is_empty();
+    if is_extended {
+        panel = panel.bars_in(EXTENDED, "extended", ratio(|held| held.rmse_after));
+    }
     let svg = BarChart::new("Held-out error", names).panel(panel).svg()?;
-    let mut section =
-        Section::new("Gain on held-out records").chart(svg, "1 is the noise as estimated: where a right model ends.");
+    let title = if is_extended {
+        "Gain on held-out records"
+    } else {
+        "Held-out records"
+    };
+    let mut section = Section::new(title).chart(svg, "1 is the noise as estimated: where a right model ends.");
     for shift in &diagnosis.findings.gain.shifts {
         section = section.text(crate::words::shifted(std::slice::from_ref(shift)).trim().to_owned());
     }
@@ -188,31 +199,32 @@ fn held_out(diagnosis: &Diagnosis) -> Result<Option<Section>, ReportError> {
         .text("record")
         .text("channel")
         .text("regime");
-    table = table
-        .number("before", 4)
-        .number("after", 4)
-        .number("noise", 4)
-        .text("unit")
-        .text("reducible part removed");
+    table = match is_extended {
+        true => table.number("before", 4).number("after", 4).number("noise", 4),
+        false => table.number("error", 4).number("noise", 4),
+    };
+    table = table.text("unit");
+    if is_extended {
+        table = table.text("reducible part removed");
+    }
     for held in &diagnosis.findings.gain.heldout {
-        table = table.row([
+        let mut row: Vec<report::Cell> = vec![
             held.record.clone().into(),
             held.channel.into(),
             held.regime.word().into(),
             held.rmse_before.into(),
-            held.rmse_after.into(),
-            held.floor.into(),
-            held.unit.into(),
-            held.removed
-                .map_or_else(
-                    || "nothing above the noise".to_owned(),
-                    |r| format!("{:.0} %", 100.0 * r),
-                )
-                .into(),
-        ]);
+        ];
+        row.extend(is_extended.then(|| held.rmse_after.into()));
+        row.extend([held.floor.into(), held.unit.into()]);
+        let removed = held.removed.map_or_else(
+            || "nothing above the noise".to_owned(),
+            |removed| format!("{:.0} %", 100.0 * removed),
+        );
+        row.extend(is_extended.then(|| removed.into()));
+        table = table.row(row);
     }
     section = section.details(Section::new("By record and regime").table(table));
-    let second = records::second(diagnosis);
+    let second = is_extended.then_some("extended");
     let mut inner = Section::new("Pictures of the held-out records");
     for record in 0..pair.problem.records.len() {
         inner = inner.chart(

@@ -4,7 +4,7 @@ use crate::fit::State;
 use crate::level::ACCURACY;
 use crate::noise::{self, BLOCK, channel};
 use crate::problem::Problem;
-use crate::record::CHANNEL_NAMES;
+use crate::record::{CHANNEL_NAMES, Record};
 use crate::small;
 use crate::spectrum::strongest_line;
 
@@ -31,7 +31,7 @@ pub struct Structure {
     pub slow: f64,
     /// Correlation of neighbouring rows.
     pub correlation: f64,
-    /// In words: a line, a step, a drift, a burst, or depending on the operating point.
+    /// In words: a line, a step, a drift, a burst, or what it follows: the duty, the load, neither.
     pub shape: String,
 }
 
@@ -73,7 +73,7 @@ pub fn structures(problem: &Problem, null: &State, state: &State, inflation: f64
                     mean_square: left.square,
                     slow: left.slow,
                     correlation: left.lag1,
-                    shape: shape(problem, state, index, n, &values),
+                    shape: shape(problem, state, (index, n), &values, slow),
                 });
             }
         }
@@ -81,7 +81,7 @@ pub fn structures(problem: &Problem, null: &State, state: &State, inflation: f64
     found
 }
 
-fn shape(problem: &Problem, state: &State, index: usize, n: usize, values: &[f64]) -> String {
+fn shape(problem: &Problem, state: &State, (index, n): (usize, usize), values: &[f64], is_slow: bool) -> String {
     let total: f64 = values.iter().map(|v| v * v).sum();
     let sigma = problem.sigma[n];
     if let Some((row, share)) = burst(values, total) {
@@ -99,16 +99,42 @@ fn shape(problem: &Problem, state: &State, index: usize, n: usize, values: &[f64
     }
     let (at, step) = largest_step(values);
     let t = problem.records[index].time[at];
-    let trend = correlation_with_time(values);
+    let row: Vec<f64> = (0..values.len()).map(|n| n as f64).collect();
+    let trend = of_means(values, &row);
     // the limits below choose words only
-    if trend.abs() > 0.6 {
+    if trend.abs() > ALIKE {
         return format!("a drift over the record (correlation with time {trend:.2})");
     }
     if step.abs() > 0.5 {
         return format!("a step of {:.3} at t = {t:.4} s", step * sigma);
     }
-    let duty = correlation(values, &problem.records[index].duty);
-    format!("slow, depending on the operating point (correlation with duty {duty:.2}, with time {trend:.2})")
+    if !is_slow {
+        return "fast, without a line that stands out".to_owned();
+    }
+    followed(&problem.records[index], values, trend)
+}
+
+/// Correlation from which on one course follows another: a third of the one's square comes from the other.
+const ALIKE: f64 = 0.6;
+
+/// What a slow residual goes along with: the duty, the load, or nothing of these.
+fn followed(record: &Record, values: &[f64], trend: f64) -> String {
+    let load = record.load.iter().zip(&record.measured[0]);
+    // where no voltage was measured the current that was set is all that is known
+    let load: Vec<f64> = load
+        .map(|(load, v)| match v.is_finite() {
+            true => load.current + load.conductance * v + load.power / v.max(1e-3),
+            false => load.current,
+        })
+        .collect();
+    let [duty, load] = [&record.duty, &load].map(|course| of_means(values, course));
+    match duty.abs() >= load.abs() {
+        true if duty.abs() > ALIKE => format!("slow, following the duty (correlation {duty:.2})"),
+        false if load.abs() > ALIKE => format!("slow, following the load current (correlation {load:.2})"),
+        _ => format!(
+            "slow, following neither duty nor load nor time alone (correlations {duty:.2}, {load:.2}, {trend:.2})"
+        ),
+    }
 }
 
 /// Twenty neighbouring rows that hold most of the power.
@@ -141,17 +167,13 @@ fn largest_step(values: &[f64]) -> (usize, f64) {
     (best.0, best.1)
 }
 
-fn correlation_with_time(values: &[f64]) -> f64 {
-    let time: Vec<f64> = (0..values.len()).map(|n| n as f64).collect();
-    let means: Vec<f64> = values
-        .chunks(BLOCK)
-        .map(|b| b.iter().sum::<f64>() / b.len() as f64)
-        .collect();
-    let times: Vec<f64> = time
-        .chunks(BLOCK)
-        .map(|b| b.iter().sum::<f64>() / b.len() as f64)
-        .collect();
-    correlation(&means, &times)
+/// Correlation of block means, in which white noise weighs little.
+fn of_means(a: &[f64], b: &[f64]) -> f64 {
+    let means = |values: &[f64]| -> Vec<f64> {
+        let mean = |block: &[f64]| block.iter().sum::<f64>() / block.len() as f64;
+        values.chunks(BLOCK).map(mean).collect()
+    };
+    correlation(&means(a), &means(b))
 }
 
 /// Pearson's correlation.
@@ -169,5 +191,27 @@ pub fn correlation(a: &[f64], b: &[f64]) -> f64 {
         ab / (aa * bb).sqrt()
     } else {
         0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn white_noise_hides_no_common_course() {
+        // a stair of four levels under noise of five times its height
+        let stair: Vec<f64> = (0..4000).map(|n| f64::from(n / 1000)).collect();
+        let mut state = 1_u32;
+        let mut noise = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(state >> 8) / f64::from(1 << 24) - 0.5
+        };
+        let noisy: Vec<f64> = stair.iter().map(|level| level + 5.0 * noise()).collect();
+        let other: Vec<f64> = (0..4000).map(|_| noise()).collect();
+        // the variance of the stair is 1.25, of the mean of ten noisy values 25/120: sqrt(1.25/1.46) = 0.93
+        let correlation = of_means(&noisy, &stair);
+        assert!((correlation - 0.93).abs() < 0.03, "{correlation}");
+        assert!(of_means(&noisy, &other).abs() < 0.2);
     }
 }

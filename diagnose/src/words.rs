@@ -106,8 +106,13 @@ pub fn nearest(partial: &[Named], removed: f64) -> String {
     let list: Vec<String> = partial.iter().map(one).collect();
     match list.is_empty() {
         true => " No cause takes away a part of it that is more than noise.".to_owned(),
+        // "takes away 100 %" and "no explanation" in one sentence: what speaks against it has been said before
+        false if removed > 0.995 => format!(
+            " Nearest comes {}. That takes away the error above the noise as a whole, but what was said above speaks against it.",
+            list.join("; with ")
+        ),
         false => format!(
-            " Nearest comes {}. That takes away {:.0} % of the error above the noise, and is no explanation.",
+            " Nearest comes {}. That takes away {:.0} % of the error above the noise: too little for an explanation.",
             list.join("; with "),
             100.0 * removed
         ),

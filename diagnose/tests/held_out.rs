@@ -118,6 +118,15 @@ fn what_does_not_hold_in_a_held_out_record_is_no_explanation() {
         ["dcr"]
     );
     assert!(findings.partial_gain.iter().any(|worth| worth.heldout));
+    // nothing is extended: the page has no second model on records for which none was made, and speaks of no tie
+    let page = diagnose::page::page(&found).unwrap();
+    let (held, training) = page.split_once("Training records, measured and simulated").unwrap();
+    let held = held.split_once("Held-out records").unwrap().1;
+    assert!(
+        !held.contains("extended") && !held.contains("best of the known causes"),
+        "{held}"
+    );
+    assert!(training.contains("best of the known causes") && !training.contains("No tie"));
     let partial = partial_toml(&found).unwrap();
     assert!(
         partial.contains("dcr = 0.4") || partial.contains("dcr = 0.39"),

@@ -215,7 +215,7 @@ fn what_comes_nearest_is_said_where_nothing_explains_and_called_no_explanation()
     let said = &diagnoses().ringing_said;
     assert!(said.contains("Nearest comes "), "{said}");
     assert!(
-        said.contains("% of the error above the noise, and is no explanation"),
+        said.contains("% of the error above the noise: too little for an explanation"),
         "{said}"
     );
 }

@@ -76,7 +76,7 @@ pub(super) fn panels(
 }
 
 /// What the second simulation is, if there is one.
-pub(super) fn second(diagnosis: &Diagnosis) -> Option<&'static str> {
+fn second(diagnosis: &Diagnosis) -> Option<&'static str> {
     diagnosis.attribution.best.as_ref()?;
     Some(match diagnosis.findings.verdict {
         Verdict::Unexplained => "best of the known causes",
@@ -98,9 +98,12 @@ pub(super) fn training(diagnosis: &Diagnosis) -> Result<Section, ReportError> {
         .max_by(|a, b| square(*a).total_cmp(&square(*b)))
         .unwrap_or(0);
     let caption =
-        "The training record that the model as given misses most. Initial states are estimated for both models.";
-    let mut section =
-        Section::new("Measured, simulated, extended").chart(panels(problem, before, after, worst, second)?, caption);
+        "The training record that the model as given misses most. Initial states are estimated for each model.";
+    let title = match second {
+        Some("extended") => "Measured, simulated, extended",
+        _ => "Training records, measured and simulated",
+    };
+    let mut section = Section::new(title).chart(panels(problem, before, after, worst, second)?, caption);
     if problem.records.len() > 1 {
         let mut inner = Section::new("The other training records");
         for record in all.filter(|record| *record != worst) {

@@ -90,7 +90,7 @@ fn golden_vectors_that_cannot_be_are_refused() {
         &fault(&[outside, q.clone()]),
         GOLDEN,
         "obs",
-        &["row 1", "`e` = 21", "-20 to 20", "order, scale or clip"],
+        &["row 1", "`e` = 21", "-20 to 20", "order, scale or clip", "[parameters]"],
     );
     // with none left there is nothing that could be allowed
     let all = f32_tensor("obs", &[2, 2], &[21.0, 5.0, 21.0, 0.0]);

@@ -81,6 +81,38 @@ fn the_kit_passes_for_codes_filters_activations_and_policies_without_mapping() {
     }
 }
 
+/// Where the flash is small the parts run one after the other, and together they make the checks of the whole; the first two need
+/// no controller beside them.
+#[test]
+fn the_parts_of_the_kit_run_alone() {
+    for (policy, format) in [
+        (example(), NumericFormat::F64),
+        (golden_case("linear"), NumericFormat::F32),
+    ] {
+        let policy = policy.with_format(format);
+        let folder = tempfile::tempdir().unwrap();
+        write(&files(&policy, Output::Kit, 50), folder.path());
+        let [core, kit] = sources(&policy);
+        let checks = |part: &str, sources: &[&str]| -> u32 {
+            let flag = format!("-D{}_KIT_PART={part}", policy.name.to_uppercase());
+            let command = [&["gcc", "-O1", flag.as_str()][..], STRICT].concat();
+            build_silently(&command, sources, folder.path());
+            let ran = run_program(None, folder.path());
+            assert_eq!(ran.code, Some(0), "{part}: {ran:?}");
+            let number = ran
+                .stdout
+                .split("PASS: ")
+                .nth(1)
+                .and_then(|rest| rest.split(' ').next());
+            number.unwrap().parse().unwrap()
+        };
+        let whole = checks("0", &[&core, &kit]);
+        let parts = [checks("1", &[&kit]), checks("2", &[&kit]), checks("3", &[&core, &kit])];
+        assert!(parts.iter().all(|part| *part > 100), "{parts:?}");
+        assert_eq!(whole, parts.iter().sum::<u32>());
+    }
+}
+
 /// Runs the kit with an edited core.
 fn edited(policy: &Policy, edits: &[(&str, &str)]) -> Vec<Ran> {
     let folder = tempfile::tempdir().unwrap();

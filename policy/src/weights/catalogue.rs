@@ -204,7 +204,7 @@ pub(crate) fn golden_outside(row: usize, feature: &str, value: f64, low: f64, hi
 
 /// [`golden_outside`] of the first row, with how many more and what to do.
 pub(crate) fn golden_outside_rows(first: Message, outside: usize, rows: usize) -> Message {
-    const DIFFER: &str = "Either order, scale or clip of the features differ from the training, which `policyc replay` tells of a log; or the";
+    const DIFFER: &str = "Either order, scale or clip of the features, or a number of [parameters] such as a reference, differ from the training, which `policyc replay` tells of a log; or the";
     if outside == rows {
         return first.hint(format!(
             "all {rows} rows lie outside, and none is left to check with. {DIFFER} `range` of a signal is not that of the training"

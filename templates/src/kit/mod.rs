@@ -57,6 +57,8 @@ pub struct Kit {
     pub literal_bits: Table,
     /// Whole text of each controller of the construct suite.
     pub suite: Vec<String>,
-    /// Controllers in the order in which they are driven; the policy's is the last.
-    pub subjects: Vec<Subject>,
+    /// The same, in the order in which they are driven.
+    pub suite_subjects: Vec<Subject>,
+    /// The policy's controller.
+    pub policy_subject: [Subject; 1],
 }

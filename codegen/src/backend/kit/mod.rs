@@ -67,8 +67,9 @@ pub fn emit(program: &Program, material: &Material) -> Result<GeneratedFiles, Co
         literals: table(&Table::plain("literals", Element::Float(scalar), literals)),
         literal_bits: table(&Table::words("literal_bits", &literal_bits)),
         suite,
-        // the policy last: a difference in what it is made of is told first
-        subjects: controllers.chain([subject(&name, program, &material.policy)]).collect(),
+        // the policy comes last: a difference in what it is made of is told first
+        suite_subjects: controllers.collect(),
+        policy_subject: [subject(&name, program, &material.policy)],
     };
     Ok(GeneratedFiles {
         files: BTreeMap::from([(format!("{name}.c"), render(&view)?)]),

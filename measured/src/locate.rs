@@ -93,7 +93,8 @@ impl Sheet {
                     source,
                 }))
             }
-            None => self.by_name(quantity),
+            Some(Wish::Nothing) => Ok(None),
+            None => self.by_name(quantity, map),
         }
     }
 
@@ -104,10 +105,13 @@ impl Sheet {
         exact.or_else(|| self.headers().position(|header| split_unit(header).0 == name))
     }
 
-    fn by_name(&self, quantity: &Quantity<'_>) -> Result<Option<Signal>, Box<Fault>> {
+    fn by_name(&self, quantity: &Quantity<'_>, map: &ColumnMap) -> Result<Option<Signal>, Box<Fault>> {
+        // what the map says of a column counts before its name: a measured current called `i_load` is no load that was set
+        let mapped: Vec<usize> = map.columns().filter_map(|name| self.named(name)).collect();
         let claims = self
             .headers()
             .enumerate()
+            .filter(|(index, _)| !mapped.contains(index))
             .filter_map(|(index, header)| Some((index, quantity.scale_of(header)?)));
         let mut claims: Vec<(usize, f64)> = claims.collect();
         let name = |index: usize| self.columns()[index].name.as_str();
@@ -140,10 +144,13 @@ impl Sheet {
         let message = Message::new(format!("no column `{name}` for `{quantity}`")).found(self.listed());
         let message = match nearest(name, self.headers()) {
             Some(_) => message.did_you_mean(name, self.headers()),
-            None => message.hint(
-                "a map holds for every file: what only some of them have belongs into a map file (--columns), as \
-                 [records.NAME.columns] of these",
-            ),
+            None => {
+                let record = self.file().file_stem().unwrap_or_default().to_string_lossy();
+                message.hint(format!(
+                    "a map holds for every file. A map file (--columns) says under [records.{record}.columns] what is different in this one: \
+                     another column, or {quantity} = false where it has none"
+                ))
+            }
         };
         self.header_fault(message)
     }

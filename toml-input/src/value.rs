@@ -96,6 +96,15 @@ impl<'a> Value<'a> {
         }
     }
 
+    /// `true` or `false`, if this is one.
+    #[must_use]
+    pub fn as_boolean(&self) -> Option<bool> {
+        match self.node.value {
+            Node::Boolean(value) => Some(value),
+            _ => None,
+        }
+    }
+
     /// The elements, if this is an array.
     #[must_use]
     pub fn as_list(&self) -> Option<Vec<Value<'a>>> {

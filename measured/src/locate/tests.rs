@@ -145,3 +145,41 @@ fn a_missing_column_is_sought_among_the_names_that_people_give() {
     );
     assert!(hint("i_l").contains("--map i_l=COLUMN"), "{}", hint("i_l"));
 }
+
+/// Meters at settled points beside a logger: one map names the logger's columns, and a section takes out what the meters have not.
+#[test]
+fn a_section_takes_a_quantity_out_of_the_common_map() {
+    let map = |own: &str| {
+        let text = format!("[columns]\ni_l = \"I_L\"\n[records.a.columns]\nv_out = \"U\"\n{own}");
+        ColumnMap::from_text(Path::new("map.toml"), &text).unwrap()
+    };
+    let meters = sheet("duty,U,i_l_set\n0.5,1.5,2\n");
+    let message = meters.locate(&VOCABULARY, &map("")).unwrap_err().to_string();
+    assert!(
+        message.contains("no column `I_L`") && message.contains("[records.a.columns]"),
+        "{message}"
+    );
+    assert!(message.contains("i_l = false"), "{message}");
+    let located = meters.locate(&VOCABULARY, &map("i_l = false\n")).unwrap();
+    assert!(located.signal("i_l").is_none() && located.signal("v_out").is_some());
+    // nor is it found by its name then
+    let both = sheet("duty,U,i_l\n0.5,1.5,2\n");
+    assert!(
+        both.locate(&VOCABULARY, &map("i_l = false\n"))
+            .unwrap()
+            .signal("i_l")
+            .is_none()
+    );
+}
+
+/// `i_load` is a load that was set; whoever maps the column as a measured current has said that it is none.
+#[test]
+fn a_column_that_the_map_names_is_nothing_else_by_its_name() {
+    let text = "duty,v_out,i_load (A)\n0.5,1.5,2\n";
+    assert!(mapped(text, "").unwrap().signal("i_load").is_some());
+    let located = mapped(text, "i_out=i_load").unwrap();
+    assert!(located.signal("i_out").is_some() && located.signal("i_load").is_none());
+    // both are said to be the same only by the map itself
+    let both = mapped(text, "i_out=i_load,i_load=i_load").unwrap();
+    assert!(both.signal("i_out").is_some() && both.signal("i_load").is_some());
+}

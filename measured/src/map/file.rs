@@ -21,7 +21,7 @@ impl ColumnMap {
     /// [constants]
     /// r_load = 10.0
     /// [records.run2]              # what is different in run2.csv: the same keys and tables
-    /// columns = { v_out = "CH3 [V]" }
+    /// columns = { v_out = "CH3 [V]", i_l = false }    # false: it has none
     /// ```
     ///
     /// # Errors
@@ -117,6 +117,9 @@ fn column(value: &Value<'_>, faults: &mut Sink) -> Option<Wish> {
             scale: None,
             offset: 0.0,
         });
+    }
+    if value.as_boolean() == Some(false) {
+        return Some(Wish::Nothing);
     }
     value.read_table("a column", faults, |table, faults| {
         let name = table

@@ -70,6 +70,8 @@ pub(crate) enum Wish {
         offset: f64,
     },
     Constant(f64),
+    /// The record has none, whatever its columns are called.
+    Nothing,
 }
 
 impl ColumnMap {
@@ -84,12 +86,20 @@ impl ColumnMap {
         self.entries.iter().map(|(name, _)| name.as_str())
     }
 
+    /// The columns that are named.
+    pub(crate) fn columns(&self) -> impl Iterator<Item = &str> {
+        self.entries.iter().filter_map(|(_, wish)| match wish {
+            Wish::Column { name, .. } => Some(name.as_str()),
+            Wish::Constant(_) | Wish::Nothing => None,
+        })
+    }
+
     /// The value of a quantity that holds for the whole table.
     #[must_use]
     pub fn constant(&self, quantity: &str) -> Option<f64> {
         match self.wish(quantity)? {
             Wish::Constant(value) => Some(*value),
-            Wish::Column { .. } => None,
+            Wish::Column { .. } | Wish::Nothing => None,
         }
     }
 

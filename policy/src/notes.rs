@@ -255,6 +255,23 @@ mod tests {
     }
 
     #[test]
+    fn duties_that_reach_the_limits_are_not_cut_off() {
+        // mapped, 0.3 to 0.5 become 0.3 to 0.5 and 0.05 at 5 A
+        let mapped = |low, high| notes(&[0.3, 0.5], interval(0.0, 1.0), interval(low, high)).len();
+        assert_eq!((mapped(0.3, 0.56), mapped(0.301, 0.56), mapped(0.3, 0.549)), (0, 1, 1));
+        let limits = |low, high| Limits {
+            duty: interval(low, high),
+            slew: None,
+            soft_start: None,
+            initial_duty: 0.3,
+        };
+        let cut = |low, high| beyond_limits(&limits(low, high), &[0.3, 0.5], None);
+        assert_eq!(cut(0.3, 0.5), None);
+        assert!(cut(0.3, 0.49).is_some_and(|note| note.ends_with(": 0.5")));
+        assert!(cut(0.31, 0.5).is_some_and(|note| note.ends_with(": 0.3")));
+    }
+
+    #[test]
     fn duties_outside_the_mapping_and_mapped_duties_outside_the_limits_are_named() {
         let said = notes(&[0.1, 0.58], interval(0.2, 0.6), interval(0.05, 0.6)).join("\n");
         assert!(said.contains("d_sim 0.2 to 0.6: 0.1"), "{said}");

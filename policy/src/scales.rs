@@ -336,3 +336,36 @@ pub fn slope_integer(slope: f64) -> i64 {
 fn leaky(x: i64, slope: i64) -> i64 {
     (x * slope + half(SLOPE_BITS)) >> SLOPE_BITS
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slope_has_fifteen_fractional_bits_and_stays_below_one() {
+        // 0.01 2^15 = 327.68; half up; 2^15 itself is one more than 16 bits hold
+        for (slope, integer) in [
+            (0.0, 0),
+            (0.01, 328),
+            (0.5, 16_384),
+            (1.5 / 32_768.0, 2),
+            (0.999_999, 32_767),
+        ] {
+            assert_eq!(slope_integer(slope), integer, "{slope}");
+        }
+    }
+
+    #[test]
+    fn integers_behind_a_curve_without_ends_follow_from_the_sum() {
+        let elu = Activation::find("elu").and_then(Activation::curve).unwrap();
+        let sum = Sum {
+            range: (-(1 << 16), 1 << 16),
+            lowest: 0,
+            highest: 0,
+        };
+        // 16 fractional bits: -1 to 1, where ELU is e^-1 - 1 to 1; with 10 bits -647.3 and 1024
+        let expected = ((-1.0_f64).exp_m1() * 1024.0, 1024);
+        let (low, high) = curved(elu, sum, 16, 10);
+        assert_eq!((low, high), (expected.0.round() as i64, expected.1));
+    }
+}

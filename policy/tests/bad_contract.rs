@@ -40,6 +40,11 @@ fn a_list_below_the_parameters_is_told_where_it_belongs() {
         "v_ref = 100.0\n¦signal = [{ name = \"w\", unit = \"V\", range = [0.0, 1.0] }]",
         &["`signal` stands in [parameters]", "in one line", "[[signal]]"],
     );
+    // a list of another name is a parameter of the wrong type, and a number is no list
+    contract_fault("v_ref = 100.0", "v_ref = 100.0\nlevels = ¦[1.0, 2.0]", &["a number"]);
+    Folder::new()
+        .replace("v_ref = 100.0", "v_ref = 100.0\nobserver = 3.0")
+        .policy();
 }
 
 #[test]

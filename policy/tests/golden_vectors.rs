@@ -31,6 +31,32 @@ fn golden_vectors_are_read() {
 }
 
 #[test]
+fn observations_that_the_controller_cannot_see_are_refused_with_their_share() {
+    let q = f32_tensor("q", &[2, 3], &[0.0, 1.0, 0.5, 3.0, 1.0, 2.0]);
+    let fault = |tensors: &[Tensor]| Folder::new().golden(tensors).fault();
+    let outside = f32_tensor("obs", &[2, 2], &[1.0, 5.0, 21.0, 0.0]);
+    assert_tensor(
+        &fault(&[outside.clone(), q.clone()]),
+        "golden.safetensors",
+        "obs",
+        &["row 1", "`e` = 21", "-20 to 20", "order, scale or clip", "[parameters]"],
+    );
+    // the share is rounded up: 1 of 2 rows is 0.5
+    let told = fault(&[outside, q.clone()]).to_string();
+    assert!(
+        told.contains("1 of 2 rows lies outside") && told.contains("golden_outside = 0.5 "),
+        "{told}"
+    );
+    // with none left there is nothing that could be allowed
+    let all = f32_tensor("obs", &[2, 2], &[21.0, 5.0, 21.0, 0.0]);
+    let told = fault(&[all, q.clone()]).to_string();
+    assert!(
+        told.contains("all 2 rows lie outside") && !told.contains("golden_outside"),
+        "{told}"
+    );
+}
+
+#[test]
 fn golden_vectors_that_cannot_be_are_refused() {
     const GOLDEN: &str = "golden.safetensors";
     let obs = f32_tensor("obs", &[2, 2], &[1.0, 5.0, -2.0, -10.0]);
@@ -84,20 +110,6 @@ fn golden_vectors_that_cannot_be_are_refused() {
         GOLDEN,
         "action",
         &["row 1", "action 2", "action 0"],
-    );
-    let outside = f32_tensor("obs", &[2, 2], &[1.0, 5.0, 21.0, 0.0]);
-    assert_tensor(
-        &fault(&[outside, q.clone()]),
-        GOLDEN,
-        "obs",
-        &["row 1", "`e` = 21", "-20 to 20", "order, scale or clip", "[parameters]"],
-    );
-    // with none left there is nothing that could be allowed
-    let all = f32_tensor("obs", &[2, 2], &[21.0, 5.0, 21.0, 0.0]);
-    let told = fault(&[all, q.clone()]).to_string();
-    assert!(
-        told.contains("all 2 rows lie outside") && !told.contains("golden_outside"),
-        "{told}"
     );
     let nan = f32_tensor("obs", &[2, 2], &[1.0, 5.0, f32::NAN, 0.0]);
     assert_tensor(&fault(&[nan, q]), GOLDEN, "obs", &["nan at index 2"]);

@@ -32,6 +32,19 @@ fn with_law() -> Folder {
     folder().replace("duties = [0.44, 0.50, 0.56]", LAW)
 }
 
+#[test]
+fn a_law_is_described_with_where_it_is_left_alone() {
+    let said = policy::describe::actions(&with_law().policy());
+    for part in [
+        "duty = 0.5 - 0.01 * (model_current - i_out)",
+        "nothing is added where |model_voltage - v_ref| <= 0.25",
+        "offsets",
+        "-0.1",
+    ] {
+        assert!(said.contains(part), "lacks {part}:\n{said}");
+    }
+}
+
 /// The one fault of a folder says all of it.
 fn refused(folder: Folder, parts: &[&str]) {
     let faults = folder.faults();

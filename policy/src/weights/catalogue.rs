@@ -211,9 +211,9 @@ pub(crate) fn golden_outside_rows(first: Message, outside: usize, rows: usize) -
         ));
     }
     let share = (1000.0 * outside as f64 / rows as f64).ceil() / 1000.0;
-    let s = if outside == 1 { " lies" } else { "s lie" };
+    let lie = if outside == 1 { "lies" } else { "lie" };
     first.hint(format!(
-        "{outside} of {rows} row{s} outside. {DIFFER} training left the `range` of a signal: then golden_outside = {share} in [network] leaves \
+        "{outside} of {rows} rows {lie} outside. {DIFFER} training left the `range` of a signal: then golden_outside = {share} in [network] leaves \
          these rows out"
     ))
 }

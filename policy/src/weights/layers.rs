@@ -144,3 +144,23 @@ pub(crate) fn is_under(stem: &str, prefix: &str) -> bool {
         free || rest.is_empty() || rest.starts_with(['.', '/']) || rest.starts_with(|c: char| c.is_ascii_digit())
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::is_under;
+
+    #[test]
+    fn a_prefix_ends_where_a_part_of_the_name_ends() {
+        for (stem, prefix, under) in [
+            ("actor.0", "", true),
+            ("actor.0", "actor.", true),
+            ("actor.0", "actor", true),
+            ("actor", "actor", true),
+            ("fc1", "fc", true),
+            ("actor_target.0", "actor", false),
+            ("critic.0", "actor", false),
+        ] {
+            assert_eq!(is_under(stem, prefix), under, "{stem} under `{prefix}`");
+        }
+    }
+}

@@ -5,6 +5,7 @@ use std::path::Path;
 use toml_input::{Faults, FileName, Message};
 
 use crate::csv;
+use crate::mat;
 use crate::sheet::Sheet;
 
 /// How a file is read.
@@ -30,14 +31,9 @@ impl Default for Options {
 /// First bytes of formats that are not read, what they are, and how to get to a table.
 const FOREIGN: &[(&[u8], &str, &str)] = &[
     (
-        b"MATLAB 5.0 MAT-file",
-        "a MAT-file",
-        "in MATLAB: writetable(T, \"run.csv\")",
-    ),
-    (
-        // by first bytes and not by the extension: files are renamed, and a MAT-file of version 7.3 is HDF5
+        // by first bytes and not by the extension: files are renamed
         b"\x89HDF",
-        "an HDF5 file (a MAT-file of version 7.3 is one)",
+        "an HDF5 file",
         "export the channels as CSV",
     ),
     (b"MDF     ", "an MDF file", "export the channels as CSV"),
@@ -83,7 +79,13 @@ impl Sheet {
         // before anything is decoded: "not UTF-8" would be the lesser hint
         if let Some((_, what, hint)) = FOREIGN.iter().find(|(start, ..)| bytes.starts_with(start)) {
             let message = Message::new(format!("the file is {what}, which is not read yet"));
-            return Err(name.fault(message.expected("a table as text (CSV)").hint(*hint)).into());
+            return Err(name
+                .fault(message.expected("a table as text (CSV), or a MAT file").hint(*hint))
+                .into());
+        }
+        // one that was cut off within its first 128 bytes is a MAT file, too
+        if ::mat::is_mat(&bytes) || bytes.starts_with(b"MATLAB 5.0 MAT-file") {
+            return mat::read(name, &bytes, options.most_bytes);
         }
         csv::read(name, bytes, options)
     }

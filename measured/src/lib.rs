@@ -32,6 +32,7 @@ mod format;
 mod guess;
 mod locate;
 mod map;
+mod mat;
 mod quantity;
 mod sheet;
 mod signal;

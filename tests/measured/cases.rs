@@ -303,7 +303,7 @@ fn other_files() -> Vec<Case> {
         refused(
             "MAT",
             b"MATLAB 5.0 MAT-file, Platform: PCWIN64",
-            &["a MAT-file", "writetable"],
+            &["not a sound MAT file", "save the file again"],
         ),
         refused("MAT 7.3", b"\x89HDF\r\n\x1a\n\0", &["HDF5", "as CSV"]),
         refused("MDF4", b"MDF     4.10    asammdf", &["an MDF file", "as CSV"]),

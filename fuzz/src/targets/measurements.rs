@@ -174,6 +174,9 @@ fn record_seeds() -> Result<Vec<Vec<u8>>, String> {
     for name in ["duty-steps", "load-steps", "nothing-wrong", "power-steps"] {
         seeds.push(head(&read(&format!("examples/diagnose/records/{name}.csv"))?, ROWS));
     }
+    let layouts = ["vectors", "struct", "controldesk", "structure_with_time"];
+    let mat = layouts.map(|name| format!("tests/fixtures/records/{name}.mat"));
+    seeds.extend(files(&mat.each_ref().map(String::as_str))?);
     // settled points without time, and decimal commas
     seeds.push(text_of((0..12).map(|row| match row {
         0 => "duty;v_out;i_out;v_in".to_owned(),

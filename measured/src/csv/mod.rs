@@ -6,7 +6,7 @@
 //! ```
 //! Every cell keeps its place: a row knows where its line begins, and a line is cut again when a fault must be shown.
 
-mod number;
+pub(crate) mod number;
 mod places;
 mod split;
 mod text;

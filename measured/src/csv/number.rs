@@ -52,6 +52,11 @@ pub(crate) fn read(cell: &str) -> Option<Number> {
     })
 }
 
+/// Digits after the point that a number needs which no text was read for.
+pub(crate) fn decimals(value: f64) -> u32 {
+    read(&value.to_string()).map_or(0, |number| number.decimals)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -164,7 +164,7 @@ fn what_is_no_table_is_refused_with_its_place() {
 #[test]
 fn files_of_other_kinds_are_called_by_their_names() {
     let cases: [(&[u8], &str); 7] = [
-        (b"MATLAB 5.0 MAT-file, Platform: GLNXA64", "a MAT-file"),
+        (b"MATLAB 5.0 MAT-file, Platform: GLNXA64", "not a sound MAT file"),
         (b"\x89HDF\r\n\x1a\n", "an HDF5 file"),
         (b"MDF     4.10", "an MDF file"),
         (b"PK\x03\x04\x14", "an Excel workbook is one"),

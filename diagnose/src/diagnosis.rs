@@ -3,6 +3,7 @@
 use plant::Parameters;
 
 use crate::attribute::{Attribution, attribute};
+use crate::beside;
 use crate::control::Request;
 use crate::doubts::{self, Doubt};
 use crate::drive::Model;
@@ -80,7 +81,8 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     }
     let explained = verdict != Verdict::Unexplained;
     // of what was found: where the model as given is far off, so are the instants of load steps that fit it best
-    let notes = notes(&problem, &attribution, pair.as_ref(), &nothing);
+    let held_by = explained.then_some(&profiles[..]);
+    let notes = notes(&problem, &attribution, pair.as_ref(), &nothing, held_by);
     let partial_gain = match explained || named.is_empty() {
         true => Vec::new(),
         false => partial_gain(&problem, &attribution, pair.as_ref()),
@@ -374,7 +376,13 @@ fn spikes(problem: &Problem, outliers: &[Outlier]) -> Option<String> {
 }
 
 /// What was repaired, assumed or noticed.
-fn notes(problem: &Problem, attribution: &Attribution, pair: Option<&Pair>, nothing: &[&str]) -> Vec<String> {
+fn notes(
+    problem: &Problem,
+    attribution: &Attribution,
+    pair: Option<&Pair>,
+    nothing: &[&str],
+    explained: Option<&[Profile]>,
+) -> Vec<String> {
     let held = pair.map_or(&[][..], |pair| &pair.problem.records);
     let records = problem.records.iter().chain(held);
     let mut notes = by_text(records);
@@ -385,5 +393,10 @@ fn notes(problem: &Problem, attribution: &Attribution, pair: Option<&Pair>, noth
         format!("{id} would fit a little better, by less than two simulators of one circuit differ: not named")
     }));
     notes.extend(pair.into_iter().flat_map(|pair| pair.remarks.clone()));
+    notes.extend(
+        explained
+            .into_iter()
+            .flat_map(|profiles| beside::notes(problem, attribution, profiles)),
+    );
     notes
 }

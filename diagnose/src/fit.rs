@@ -359,6 +359,18 @@ impl Normal {
         }
     }
 
+    /// Products of the columns.
+    #[must_use]
+    pub fn matrix(&self) -> &[Vec<f64>] {
+        &self.matrix
+    }
+
+    /// The least squares.
+    #[must_use]
+    pub fn solved(&self) -> Vec<f64> {
+        self.step(0.0)
+    }
+
     fn step(&self, damping: f64) -> Vec<f64> {
         let mut matrix = self.matrix.clone();
         for (n, row) in matrix.iter_mut().enumerate() {

@@ -21,6 +21,7 @@ pub mod attribute;
 mod backward;
 mod balance;
 pub mod basis;
+pub mod beside;
 pub mod causes;
 pub mod control;
 pub mod diagnosis;

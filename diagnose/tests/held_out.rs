@@ -161,3 +161,24 @@ fn rows_at_a_light_load_are_counted_as_dcm_without_a_voltage_too() {
         (0, rows(Regime::All))
     );
 }
+
+/// At duties around a half a little more resistance in the switch looks as half of it in the winding does: too little of it to be named
+/// would change the value of the winding by more than its interval says.
+#[test]
+fn what_a_small_cause_beside_would_do_to_a_value_is_a_note() {
+    let found = diagnose(&model(), vec![record("train", &duty_steps(), 3)], &[], &|_| ()).findings;
+    let named: Vec<&str> = found.causes.iter().map(|cause| cause.id).collect();
+    assert_eq!(
+        (found.verdict, &named[..]),
+        (Verdict::Explained, &["dcr"][..]),
+        "{}",
+        found.sentence
+    );
+    let note = found.noise.repairs.iter().find(|note| note.starts_with("dcr from"));
+    let note = note.unwrap_or_else(|| panic!("{:?}", found.noise.repairs));
+    println!("{note}");
+    assert!(
+        note.contains("holds if nothing else is off") && note.contains("r_ds_on beside it"),
+        "{note}"
+    );
+}

@@ -200,10 +200,17 @@ impl Attribution {
             let sizes = candidate.sizes();
             candidate.is_nothing(&values) || sizes > 0 && own(*member).take(sizes).all(Profile::holds_own)
         };
-        let (out, kept): (Vec<usize>, Vec<usize>) = (0..best.causes.len()).partition(is_nothing);
-        if out.is_empty() {
+        let out: Vec<usize> = (0..best.causes.len()).filter(is_nothing).collect();
+        self.leave_out(problem, profiles, &out)
+    }
+
+    /// Takes causes out, by their places, and fits the others again. Their ids.
+    pub fn leave_out(&mut self, problem: &Problem, profiles: &mut Vec<Profile>, out: &[usize]) -> Vec<&'static str> {
+        let Some(best) = self.best.clone().filter(|_| !out.is_empty()) else {
             return Vec::new();
-        }
+        };
+        let own = |member: usize| profiles.iter().filter(move |profile| profile.member == member);
+        let kept: Vec<usize> = (0..best.causes.len()).filter(|member| !out.contains(member)).collect();
         let causes: Vec<usize> = kept.iter().map(|member| best.causes[*member]).collect();
         let values: Vec<f64> = kept.iter().flat_map(|m| own(*m).map(|profile| profile.value)).collect();
         let fit = (!causes.is_empty()).then(|| self.fitter(problem).from(&causes, &values, &self.null));
@@ -243,7 +250,11 @@ impl Attribution {
         let all: Vec<usize> = (0..self.candidates.len()).collect();
         let sizes = parallel::map(&all, |cause| {
             let candidate = &self.candidates[*cause];
-            let taken = self.best.as_ref().is_some_and(|fit| fit.causes.contains(cause));
+            // in any of its forms: what is named is seen
+            let taken = self
+                .best
+                .as_ref()
+                .is_some_and(|fit| fit.causes.iter().any(|own| self.same(*own, *cause)));
             // first order says something near the model's own value only
             if taken || candidate.form.search != Search::Own {
                 return None;

@@ -2,24 +2,24 @@
 
 use plant::Parameters;
 
-use crate::attribute::{Attribution, attribute};
+use crate::aside;
+use crate::attribute::Attribution;
 use crate::beside;
 use crate::control::Request;
-use crate::doubts::{self, Doubt};
+use crate::doubts;
 use crate::drive::Model;
-use crate::findings::{Evidence, Findings, Gain, Hidden, Named, Noise, Value, Verdict};
+use crate::examine::{Examined, examined, held};
+use crate::findings::{Findings, Gain, Hidden, Named, Noise, Verdict};
 use crate::fit::State;
-use crate::gain::{self, Pair, Shift};
+use crate::gain::{Pair, Shift};
 use crate::instants;
 use crate::noise::{self, Outlier};
 use crate::preflight;
 use crate::problem::Problem;
-use crate::profile::{Profile, parabolas, profiles};
+use crate::profile::Profile;
 use crate::progress::{Listener, Progress};
 use crate::quantised;
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
-use crate::sampling;
-use crate::shape::{Structure, structures};
 use crate::words::{nearest, sentence, shifted};
 use crate::worth::{self, Worth};
 
@@ -50,92 +50,117 @@ pub struct Diagnosis {
 #[must_use]
 pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say: Listener<'_>) -> Diagnosis {
     let base = Model::new(model);
-    say(Progress::Stage("noise and initial states"));
-    let (problem, null, outliers) = prepared(train, &base);
-    let mut odd = noticed(&problem, &null, &outliers, heldout);
-    let (mut problem, mut attribution) = attribute(problem, null, say);
-    instants::note(&mut problem, &attribution.state().starts);
-    // what is too small for a cause still leaves no structure
-    let structure = structures(&problem, &attribution.null, attribution.state(), attribution.inflation);
-    let mut profiles = held_by_data(&problem, &mut attribution, &structure, say);
-    // behind the profiles: whether a cause is nothing is read off its intervals
-    let nothing = attribution.leave_out_nothing(&problem, &mut profiles);
-    let named = named(&attribution, &profiles);
-    let mut doubts = doubts::of(&problem, &attribution, &profiles, &structure);
-    let lattice = quantised::cause(&problem);
-    let holds = structure.is_empty() && !doubts::forbids(&named, &doubts);
-    let mut verdict = verdict(&named, &lattice, holds);
+    // a second look begins with the records as they were read
+    let kept = train.clone();
+    let mut found = examined(train, &base, say);
+    let sources = preflight::sources(&found.problem.records, heldout, &found.problem.base);
     say(Progress::Stage("held-out records"));
-    let found = attribution.state();
-    let edges = |state: &State| state.starts.trim_or_none(model.converter.f_sw);
-    let mut pair = held(&problem, heldout, &base, found, edges(found));
-    // what is no more than the step of a converter has no values that could fail to hold
-    if verdict == Verdict::Explained && !named.is_empty() {
-        let fails = pair.as_ref().map_or_else(Vec::new, |pair| pair.doubts(&problem, found));
-        verdict = if fails.is_empty() {
-            verdict
-        } else {
-            Verdict::Unexplained
-        };
-        doubts.extend(fails.into_iter().map(Doubt::HeldOut));
+    let mut pair = found.judged(heldout, &base);
+    let mut aside = None;
+    match aside::explained_without(&kept, &found, heldout, &base, say) {
+        Some(rest) if rest.found.named.is_empty() => found.odd.push(rest.part.alone(&found.problem)),
+        Some(rest) => {
+            let whole = std::mem::replace(&mut found, rest.found);
+            (pair, aside) = (rest.pair, Some((rest.part, whole.problem)));
+        }
+        None => {}
     }
-    let explained = verdict != Verdict::Unexplained;
-    // of what was found: where the model as given is far off, so are the instants of load steps that fit it best
-    let held_by = explained.then_some(&profiles[..]);
-    let notes = notes(&problem, &attribution, pair.as_ref(), &nothing, held_by);
-    let partial_gain = match explained || named.is_empty() {
-        true => Vec::new(),
-        false => partial_gain(&problem, &attribution, pair.as_ref()),
-    };
+    let explained = found.verdict != Verdict::Unexplained;
     // what does not explain the records is no better model
-    let state = if explained {
-        attribution.state()
-    } else {
-        &attribution.null
+    let state = match explained {
+        true => found.attribution.state().clone(),
+        false => found.attribution.null.clone(),
     };
-    let trim = if explained { edges(state) } else { 0.0 };
-    let extended = state.model.clone();
+    let trim = match explained {
+        true => state.starts.trim_or_none(model.converter.f_sw),
+        false => 0.0,
+    };
+    let answer = answer(&found, pair.as_ref(), &state, sources, say);
     // the figures are those of the file that is written
     if !explained {
-        pair = held(&problem, heldout, &base, state, trim);
+        pair = held(&found.problem, heldout, &base, &state, trim);
     }
-    let next_experiments = explained.then(|| crate::next::experiments(&problem, &attribution, say));
-    let mut causes = if explained { named.clone() } else { Vec::new() };
-    // a step of a converter is named beside other causes; where structure is left nothing is named, not even this
-    causes.extend(lattice.filter(|_| explained));
-    // a model that does not explain the training records says nothing about a change between them and the others
-    let shifts = (pair.as_ref().filter(|_| explained)).map_or_else(Vec::new, |pair| pair.shifts(&problem, state));
-    let mut near = String::new();
-    if !explained {
-        odd.extend(other_carrier(&problem, &attribution));
-        near = nearest(&named, attribution.removed(&problem));
-    }
+    let set_aside = aside.map(|(part, whole)| {
+        let one = aside::shown(&mut found, part, &whole, &kept, &base);
+        // the held-out records tell of a channel that was set aside, too
+        pair = held(&found.problem, heldout, &base, &state, trim);
+        one
+    });
     let findings = Findings {
-        sentence: sentence(verdict, &causes, &structure, &doubts::said(&doubts)) + &near + &shifted(&shifts),
-        verdict,
-        partial: if explained { Vec::new() } else { named },
-        causes,
-        partial_gain,
-        structure,
-        doubts: doubts::said(&doubts),
-        not_detectable: hidden(&problem, &attribution),
-        next_experiments: next_experiments.unwrap_or_default(),
-        noise: Noise {
-            repairs: [odd, notes].concat(),
-            ..noise_of(&problem, &attribution, &outliers, trim)
+        sentence: sentence(&found, &answer.causes, set_aside.as_ref()) + &answer.near + &shifted(&answer.shifts),
+        verdict: match set_aside {
+            Some(_) => Verdict::MostlyExplained,
+            None => found.verdict,
         },
-        gain: gain_of(pair.as_ref(), shifts),
+        partial: if explained { Vec::new() } else { found.named.clone() },
+        causes: answer.causes,
+        partial_gain: answer.partial_gain,
+        set_aside,
+        structure: found.structure.clone(),
+        doubts: doubts::said(&found.doubts),
+        not_detectable: answer.not_detectable,
+        next_experiments: answer.next_experiments,
+        noise: Noise {
+            repairs: answer.notes,
+            ..noise_of(&found.problem, &found.attribution, &found.outliers, trim)
+        },
+        gain: gain_of(pair.as_ref(), answer.shifts),
     };
     Diagnosis {
         findings,
-        given: as_given(&problem, &base),
-        problem,
-        attribution,
-        profiles,
+        given: as_given(&found.problem, &base),
+        extended: state.model,
+        problem: found.problem,
+        attribution: found.attribution,
+        profiles: found.profiles,
         held: pair,
-        extended,
         trim,
         control: None,
+    }
+}
+
+/// What is said of records that were examined.
+struct Answer {
+    causes: Vec<Named>,
+    partial_gain: Vec<Worth>,
+    not_detectable: Vec<Hidden>,
+    next_experiments: Vec<crate::next::Experiment>,
+    notes: Vec<String>,
+    shifts: Vec<Shift>,
+    near: String,
+}
+
+/// What to say of `found`, whose better model is `state`.
+fn answer(found: &Examined, pair: Option<&Pair>, state: &State, sources: Vec<String>, say: Listener<'_>) -> Answer {
+    let (problem, attribution) = (&found.problem, &found.attribution);
+    let explained = found.verdict != Verdict::Unexplained;
+    let mut odd = found.odd.clone();
+    odd.extend(spikes(problem, &found.outliers));
+    odd.extend(sources);
+    let mut near = String::new();
+    if !explained {
+        odd.extend(other_carrier(problem, attribution));
+        near = nearest(&found.named, attribution.removed(problem));
+    }
+    odd.extend(notes(found, pair));
+    let mut causes = if explained { found.named.clone() } else { Vec::new() };
+    // a step of a converter is named beside other causes; where structure is left nothing is named, not even this
+    causes.extend(found.lattice.clone().filter(|_| explained));
+    Answer {
+        causes,
+        partial_gain: match explained || found.named.is_empty() {
+            true => Vec::new(),
+            false => partial_gain(problem, attribution, pair),
+        },
+        not_detectable: hidden(problem, attribution),
+        next_experiments: match explained {
+            true => crate::next::experiments(problem, attribution, say),
+            false => Vec::new(),
+        },
+        notes: odd,
+        // a model that does not explain the training records says nothing about a change between them and the others
+        shifts: (pair.filter(|_| explained)).map_or_else(Vec::new, |pair| pair.shifts(problem, state)),
+        near,
     }
 }
 
@@ -154,11 +179,6 @@ impl Diagnosis {
             Err(error) => self.findings.gain.closed_loop_missing = Some(error.to_string()),
         }
     }
-}
-
-/// The held-out records with the model as given and with `state`, if there are any.
-fn held(problem: &Problem, heldout: &[Record], base: &Model, state: &State, trim: f64) -> Option<Pair> {
-    (!heldout.is_empty()).then(|| gain::hold(heldout, base, &state.model, problem.sigma, trim))
 }
 
 /// What held-out records say; the closed loop comes later, if at all.
@@ -180,36 +200,6 @@ fn other_carrier(problem: &Problem, attribution: &Attribution) -> Option<String>
         .find_map(|state| worth::other_carrier(problem, state))
 }
 
-/// What is seen before any fit.
-fn noticed(problem: &Problem, null: &State, outliers: &[Outlier], heldout: &[Record]) -> Vec<String> {
-    let mut odd = preflight::readings(problem, null);
-    odd.extend(spikes(problem, outliers));
-    odd.extend(preflight::sources(&problem.records, heldout, &problem.base));
-    odd
-}
-
-/// How well the data hold the parameters; other pairs of causes become rivals. What leaves structure explains nothing, and its
-/// values are worth neither.
-fn held_by_data(
-    problem: &Problem,
-    attribution: &mut Attribution,
-    structure: &[Structure],
-    say: Listener<'_>,
-) -> Vec<Profile> {
-    if !structure.is_empty() {
-        return parabolas(problem, attribution);
-    }
-    let others = crate::ties::other_pairs(problem, attribution, say);
-    // they stand in the place of all causes together: said once, at the first
-    for rivals in attribution.rivals.iter_mut().take(1) {
-        rivals.extend(others.iter().cloned());
-    }
-    for (member, rival) in crate::ties::in_part(problem, attribution, say) {
-        attribution.rivals[member].push(rival);
-    }
-    profiles(problem, attribution, say)
-}
-
 /// What causes that explain only a part would gain, first where no fit has seen it.
 fn partial_gain(problem: &Problem, attribution: &Attribution, held: Option<&Pair>) -> Vec<Worth> {
     let mut list = held.map_or_else(Vec::new, worth::of_held);
@@ -222,87 +212,6 @@ fn as_given(problem: &Problem, base: &Model) -> State {
     let mut held = problem.clone();
     held.trim_held = true;
     instants::scanned(&held, base, &held.first_starts())
-}
-
-/// Noise estimated, outliers masked, initial states fitted.
-fn prepared(train: Vec<Record>, base: &Model) -> (Problem, State, Vec<Outlier>) {
-    let mut problem = Problem::new(train, base.clone());
-    let mut null = State::settle(&problem, base, &problem.first_starts(), None);
-    // noise before the instants of loggers and before outliers, which are judged in its units; and again without the
-    // outliers
-    problem.sigma = noise::sigma(&problem, &null.residual);
-    sampling::decide(&mut problem, base);
-    null = State::settle(&problem, base, &null.starts, None);
-    let outliers = noise::outliers(&problem, &null.residual);
-    for one in &outliers {
-        problem.masked[one.record][one.channel][one.row] = true;
-    }
-    null = State::settle(&problem, base, &null.starts, None);
-    problem.sigma = noise::sigma(&problem, &null.residual);
-    null = State::settle(&problem, base, &null.starts, None);
-    (problem, null, outliers)
-}
-
-fn named(attribution: &Attribution, profiles: &[Profile]) -> Vec<Named> {
-    let Some(best) = &attribution.best else {
-        return Vec::new();
-    };
-    let of = |(member, cause): (usize, &usize)| {
-        let candidate = &attribution.candidates[*cause];
-        let own = profiles.iter().filter(|profile| profile.member == member);
-        let parameters = own.map(|p| {
-            let value = Value {
-                value: p.value,
-                low: p.interval[0],
-                high: p.interval[1],
-                unit: p.unit,
-                model: p.own,
-            };
-            (p.name, value)
-        });
-        let rivals = attribution.rivals[member].iter().map(|fit| {
-            let mut ids: Vec<&str> = fit.causes.iter().map(|cause| attribution.id(*cause)).collect();
-            // two forms of one cause are one cause to a reader
-            ids.dedup();
-            ids
-        });
-        Named {
-            id: candidate.cause.id,
-            words: candidate.form.words,
-            parameters: parameters.collect(),
-            evidence: Evidence {
-                delta_chi2: attribution.evidence[member] / attribution.inflation,
-                // without the inflation: the evidence is over it already
-                threshold: crate::level::threshold(candidate.own.len(), 1.0),
-            },
-            rivals: each_once(rivals),
-        }
-    };
-    best.causes.iter().enumerate().map(of).collect()
-}
-
-/// The same ids may come from two forms of a cause.
-fn each_once(sets: impl Iterator<Item = Vec<&'static str>>) -> Vec<Vec<&'static str>> {
-    sets.fold(Vec::new(), |mut list, set| {
-        if !list.contains(&set) {
-            list.push(set);
-        }
-        list
-    })
-}
-
-fn verdict(named: &[Named], lattice: &Option<Named>, holds: bool) -> Verdict {
-    // before anything else: where the truth is not on the list, its best cause imitates it with a wrong value
-    if !holds {
-        return Verdict::Unexplained;
-    }
-    if named.iter().any(|cause| !cause.rivals.is_empty()) {
-        return Verdict::Ambiguous;
-    }
-    match named.is_empty() && lattice.is_none() {
-        true => Verdict::Consistent,
-        false => Verdict::Explained,
-    }
 }
 
 fn hidden(problem: &Problem, attribution: &Attribution) -> Vec<Hidden> {
@@ -376,27 +285,21 @@ fn spikes(problem: &Problem, outliers: &[Outlier]) -> Option<String> {
 }
 
 /// What was repaired, assumed or noticed.
-fn notes(
-    problem: &Problem,
-    attribution: &Attribution,
-    pair: Option<&Pair>,
-    nothing: &[&str],
-    explained: Option<&[Profile]>,
-) -> Vec<String> {
+fn notes(found: &Examined, pair: Option<&Pair>) -> Vec<String> {
+    let (problem, attribution) = (&found.problem, &found.attribution);
     let held = pair.map_or(&[][..], |pair| &pair.problem.records);
     let records = problem.records.iter().chain(held);
     let mut notes = by_text(records);
     notes.extend(noise::too_clean(problem, &attribution.null.residual));
     notes.extend(quantised::note(problem));
     notes.extend(crate::backward::note(problem));
-    notes.extend(nothing.iter().map(|id| {
+    notes.extend(found.nothing.iter().map(|id| {
         format!("{id} would fit a little better, by less than two simulators of one circuit differ: not named")
     }));
     notes.extend(pair.into_iter().flat_map(|pair| pair.remarks.clone()));
-    notes.extend(
-        explained
-            .into_iter()
-            .flat_map(|profiles| beside::notes(problem, attribution, profiles)),
-    );
+    // of what was found: where the model as given is far off, so are the instants of load steps that fit it best
+    if found.verdict != Verdict::Unexplained {
+        notes.extend(beside::notes(problem, attribution, &found.profiles));
+    }
     notes
 }

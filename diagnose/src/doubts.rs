@@ -32,8 +32,8 @@ fn is_cut_off([low, high]: [f64; 2], is_size: bool, value: f64) -> bool {
 pub enum Doubt {
     /// A value at its bound: whatever else would do as well, it is not this.
     Bound(String),
-    /// Values that do not hold in records that no fit has seen.
-    HeldOut(String),
+    /// Values that do not hold in a channel of records that no fit has seen.
+    HeldOut(usize, String),
     /// An interval that reaches it: nothing is explained, a tie may be left.
     Open(String),
     /// More freedom than the data have.
@@ -112,7 +112,7 @@ pub fn forbids(named: &[Named], doubts: &[Doubt]) -> bool {
     doubts.iter().any(|doubt| match doubt {
         Doubt::Bound(_) => !named.is_empty(),
         Doubt::Open(_) => !named.is_empty() && !tied,
-        Doubt::Freedom(_) | Doubt::HeldOut(_) => false,
+        Doubt::Freedom(_) | Doubt::HeldOut(..) => false,
         Doubt::Kind(_) | Doubt::Edges(_) => true,
     })
 }
@@ -123,7 +123,7 @@ pub fn said(doubts: &[Doubt]) -> Vec<String> {
         Doubt::Bound(words)
         | Doubt::Open(words)
         | Doubt::Freedom(words)
-        | Doubt::HeldOut(words)
+        | Doubt::HeldOut(_, words)
         | Doubt::Kind(words)
         | Doubt::Edges(words) => words.clone(),
     };

@@ -10,7 +10,7 @@ use crate::worth::Worth;
 
 /// The answer in a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// The model explains the data.
     Consistent,
@@ -18,6 +18,8 @@ pub enum Verdict {
     Explained,
     /// Causes explain the rest, and others would as well.
     Ambiguous,
+    /// Causes explain all but one channel or one record.
+    MostlyExplained,
     /// None of the known causes does.
     Unexplained,
 }
@@ -30,6 +32,7 @@ impl Verdict {
             Verdict::Consistent => "consistent",
             Verdict::Explained => "explained",
             Verdict::Ambiguous => "ambiguous",
+            Verdict::MostlyExplained => "mostly_explained",
             Verdict::Unexplained => "unexplained",
         }
     }
@@ -120,6 +123,25 @@ pub struct Gain {
     pub closed_loop_missing: Option<String>,
 }
 
+/// What was set aside because nothing on the list explains it, while causes explain all the rest.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Aside {
+    /// The channel, of all records.
+    pub channel: Option<&'static str>,
+    /// Or the record, with all channels.
+    pub record: Option<String>,
+    /// Its errors without and with the causes, which no fit has seen.
+    pub errors: Vec<Worth>,
+}
+
+impl Aside {
+    /// Its name.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        self.channel.or(self.record.as_deref()).unwrap_or_default()
+    }
+}
+
 /// What is written to `diagnosis.json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Findings {
@@ -133,6 +155,8 @@ pub struct Findings {
     pub partial: Vec<Named>,
     /// What that part would gain.
     pub partial_gain: Vec<Worth>,
+    /// What the verdict `mostly_explained` leaves out.
+    pub set_aside: Option<Aside>,
     /// Structure that is left.
     pub structure: Vec<Structure>,
     /// Why causes are no explanation although they leave no structure, in words.

@@ -98,7 +98,7 @@ impl State {
         state
     }
 
-    fn at(problem: &Problem, model: &Model, starts: Starts) -> Self {
+    pub(crate) fn at(problem: &Problem, model: &Model, starts: Starts) -> Self {
         let residual = problem.residual(model, &starts);
         State {
             model: model.clone(),

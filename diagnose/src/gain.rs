@@ -282,10 +282,10 @@ impl Pair {
         })
     }
 
-    /// Where the extended model leaves much more than in the training records, though none of it is the same throughout, as a sensor
-    /// that has shifted would leave: what was found does not hold there.
+    /// Channels, with words, in which the extended model leaves much more than in the training records, though none of it is the same
+    /// throughout, as a sensor that has shifted would leave: what was found does not hold there.
     #[must_use]
-    pub fn doubts(&self, training: &Problem, at: &State) -> Vec<String> {
+    pub fn doubts(&self, training: &Problem, at: &State) -> Vec<(usize, String)> {
         let shifts = self.shifts(training, at);
         let is_more = |shift: &&Shift| {
             let (index, n) = (shift.index, shift.number);
@@ -300,11 +300,12 @@ impl Pair {
             after.lag1.abs() > RELATED && after.square > MUCH_WORSE * usual + ACCURACY * ACCURACY * before.square
         };
         let words = |shift: &Shift| {
-            format!(
+            let said = format!(
                 "{} of the held-out record {} is {:.1} times as far from the model with these causes as the training records: they do \
                  not hold there",
                 shift.channel, shift.record, shift.ratio
-            )
+            );
+            (shift.number, said)
         };
         shifts.iter().filter(is_more).map(words).collect()
     }

@@ -183,9 +183,12 @@ pub(crate) fn note(problem: &mut Problem, starts: &Starts) {
             });
         if !late.is_empty() {
             record.repairs.push(format!(
-                "{} load steps are taken to lie inside a switching period, {low:+.2} to {high:+.2} periods from where the table has \
-                 them",
-                late.len()
+                "{} inside a switching period, {low:+.2} to {high:+.2} periods from where the table has {}",
+                match late.len() {
+                    1 => "1 load step is taken to lie".to_owned(),
+                    more => format!("{more} load steps are taken to lie"),
+                },
+                if late.len() == 1 { "it" } else { "them" },
             ));
             let at_limit = |late: &&f64| late.abs() > FARTHEST - NEGLIGIBLE;
             let ended: Vec<String> = (late.iter().zip(&record.free_steps))

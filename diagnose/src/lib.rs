@@ -17,6 +17,7 @@
 //! chooses among them, [`profile`], [`shape`], [`gain`] and [`next`] say how sure that is, [`control`] what it is worth under control, [`diagnosis`] holds the
 //! answer and [`extend`] and [`page`] write it down. See docs/reference/diagnosis.md.
 
+mod aside;
 pub mod attribute;
 mod backward;
 mod balance;
@@ -28,6 +29,7 @@ pub mod diagnosis;
 mod doubts;
 pub mod drive;
 mod duty_steps;
+mod examine;
 pub mod extend;
 pub mod findings;
 pub mod fit;

@@ -21,7 +21,7 @@ pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
     let findings = &diagnosis.findings;
     let mark = match findings.verdict {
         Verdict::Consistent | Verdict::Explained => report::Verdict::Pass,
-        Verdict::Ambiguous => report::Verdict::Warn,
+        Verdict::Ambiguous | Verdict::MostlyExplained => report::Verdict::Warn,
         Verdict::Unexplained => report::Verdict::Fail,
     };
     let word = findings.verdict.word();
@@ -96,6 +96,16 @@ fn causes(diagnosis: &Diagnosis) -> Section {
         for worth in &findings.partial_gain {
             section = section.text(worth.words());
         }
+    }
+    if let Some(aside) = &findings.set_aside {
+        section = section.text(format!(
+            "{} was set aside. The causes are those of all the rest; what they make of it, root mean square:",
+            aside.name()
+        ));
+        for worth in &aside.errors {
+            section = section.text(worth.words());
+        }
+        section = section.text("What is left there:");
     }
     for one in &findings.structure {
         section = section.text(format!("{} of {}: {}", one.channel, one.record, one.shape));

@@ -1,65 +1,87 @@
 //! The verdict for a reader.
 
-use crate::findings::{Named, Verdict};
+use crate::doubts;
+use crate::examine::Examined;
+use crate::findings::{Aside, Named, Verdict};
 use crate::gain::Shift;
 use crate::shape::Structure;
 
 /// Rivals of a cause that the sentence names; a reader remembers no more, and the rest stands in the list.
 const MOST_SAID: usize = 3;
 
-/// The verdict in a sentence.
-pub fn sentence(verdict: Verdict, causes: &[Named], structure: &[Structure], doubts: &[String]) -> String {
-    let list = |causes: &[Named]| {
-        let words = causes.iter().map(|cause| {
-            let values = cause.parameters.iter().map(|(name, v)| {
-                let unit = unit(v.unit);
-                let name = if *name == cause.id {
-                    String::new()
-                } else {
-                    format!("{name} ")
-                };
-                format!(
-                    "{name}{} (95 %: {} to {}; model {})",
-                    si(v.value, unit),
-                    si(v.low, unit),
-                    si(v.high, unit),
-                    si(v.model, unit)
-                )
-            });
-            format!(
-                "{} [{}]: {}",
-                cause.words,
-                cause.id,
-                values.collect::<Vec<_>>().join(", ")
-            )
-        });
-        words.collect::<Vec<_>>().join("; ")
-    };
-    match verdict {
-        Verdict::Consistent => "The model explains the records within their noise: nothing to correct.".to_owned(),
-        Verdict::Explained => format!("What the model gets wrong is {}.", list(causes)),
-        Verdict::Ambiguous => {
-            let ties = causes.iter().filter(|cause| !cause.rivals.is_empty());
-            let ties: Vec<String> = ties.map(|cause| tie(cause, causes)).collect();
-            format!(
-                "More than one explanation fits. One is {}. {}",
-                list(causes),
-                ties.join(" ")
-            )
-        }
+/// The verdict in a sentence; `aside` was left out of what was `found`, whose structure then is what it leaves there.
+pub fn sentence(found: &Examined, causes: &[Named], aside: Option<&Aside>) -> String {
+    match found.verdict {
         Verdict::Unexplained => {
-            let shapes = structure
-                .iter()
-                .map(|s| format!("{} of {}: {}", s.channel, s.record, s.shape));
-            let shapes: Vec<String> = shapes.collect();
-            let left = match shapes.is_empty() {
+            let left = match found.structure.is_empty() {
                 true => String::new(),
-                false => format!("; left is {}", shapes.join("; ")),
+                false => format!("; left is {}", shapes(&found.structure)),
             };
-            let doubts: String = doubts.iter().map(|doubt| format!("; {doubt}")).collect();
+            let doubts: String = (doubts::said(&found.doubts).iter())
+                .map(|doubt| format!("; {doubt}"))
+                .collect();
             format!("None of the known causes explains the records{left}{doubts}.")
         }
+        Verdict::Consistent => "The model explains the records within their noise: nothing to correct.".to_owned(),
+        Verdict::Explained | Verdict::Ambiguous | Verdict::MostlyExplained => {
+            let ties = causes.iter().filter(|cause| !cause.rivals.is_empty());
+            let ties: Vec<String> = ties.map(|cause| tie(cause, causes)).collect();
+            let (list, ties) = (values(causes), ties.join(" "));
+            match aside {
+                None if ties.is_empty() => format!("What the model gets wrong is {list}."),
+                None => format!("More than one explanation fits. One is {list}. {ties}"),
+                Some(aside) => {
+                    let what = match aside.channel {
+                        Some(channel) => channel.to_owned(),
+                        None => format!("the record {}", aside.name()),
+                    };
+                    let left = match found.structure.is_empty() {
+                        true => String::new(),
+                        false => format!(", where {} is left", shapes(&found.structure)),
+                    };
+                    let said = match ties.is_empty() {
+                        true => format!("this is explained: what the model gets wrong is {list}."),
+                        false => format!("more than one explanation fits. One is {list}. {ties}"),
+                    };
+                    format!("Without {what} {said} No known cause explains {what}{left}.")
+                }
+            }
+        }
     }
+}
+
+/// What is left, channel by channel.
+fn shapes(structure: &[Structure]) -> String {
+    let shape = |s: &Structure| format!("{} of {}: {}", s.channel, s.record, s.shape);
+    structure.iter().map(shape).collect::<Vec<_>>().join("; ")
+}
+
+/// Causes with their values.
+fn values(causes: &[Named]) -> String {
+    let words = causes.iter().map(|cause| {
+        let values = cause.parameters.iter().map(|(name, v)| {
+            let unit = unit(v.unit);
+            let name = if *name == cause.id {
+                String::new()
+            } else {
+                format!("{name} ")
+            };
+            format!(
+                "{name}{} (95 %: {} to {}; model {})",
+                si(v.value, unit),
+                si(v.low, unit),
+                si(v.high, unit),
+                si(v.model, unit)
+            )
+        });
+        format!(
+            "{} [{}]: {}",
+            cause.words,
+            cause.id,
+            values.collect::<Vec<_>>().join(", ")
+        )
+    });
+    words.collect::<Vec<_>>().join("; ")
 }
 
 /// What could stand in the place of a cause, or be a part of it: a sentence each.
@@ -122,25 +144,22 @@ pub fn nearest(partial: &[Named], removed: f64) -> String {
 /// Said behind the verdict: what no fit to the training records can know.
 pub fn shifted(shifts: &[Shift]) -> String {
     let one = |shift: &Shift| {
-        let place = match shift.throughout {
+        let (channel, record) = (shift.channel, &shift.record);
+        match shift.throughout {
             true => format!(
-                "lies {} {} the extended model throughout (training records: {})",
+                " In {channel} the held-out record {record} lies {} {} the extended model throughout (training records: {}): something \
+                 shifted between them.",
                 si(shift.mean.abs(), shift.unit),
                 if shift.mean > 0.0 { "above" } else { "below" },
                 si(shift.training, shift.unit)
             ),
+            // its mean says little there
             false => format!(
-                "is {:.1} times as far from the extended model as the training records, and lies {} beside it on average \
-                 (these: {})",
-                shift.ratio,
-                si(shift.mean, shift.unit),
-                si(shift.training, shift.unit)
+                " In {channel} the held-out record {record} is {:.1} times as far from the extended model as the training records: \
+                 something was different there, or these do not show it.",
+                shift.ratio
             ),
-        };
-        format!(
-            " In {} the held-out record {} {place}: something shifted between them.",
-            shift.channel, shift.record
-        )
+        }
     };
     shifts.iter().map(one).collect()
 }

@@ -114,7 +114,10 @@ fn ended(what: &str, table: &Table, model: &Parameters) -> Option<Diagnosis> {
 
 /// A cause at its bound is never named: that leaves a tie between causes that all are within.
 fn is_wrong(found: &Diagnosis) -> bool {
-    matches!(found.findings.verdict, Verdict::Explained | Verdict::Consistent)
+    matches!(
+        found.findings.verdict,
+        Verdict::Explained | Verdict::MostlyExplained | Verdict::Consistent
+    )
 }
 
 fn none_explains(tables: Vec<(String, Table)>) {

@@ -273,7 +273,11 @@ fn incomplete(sheet: &Sheet, located: &Located) -> Sink {
             false => "",
         };
         // the map last: what is copied ends with the line
-        let proposed = format!("these columns look like it, check each{metered}: {map}");
+        let record = sheet.file().file_stem().unwrap_or_default().to_string_lossy();
+        let proposed = format!(
+            "these columns look like it, check each{metered}; as [records.{record}.columns] of a map file where other files have \
+             others: {map}"
+        );
         first.hint = Some(match first.hint.take() {
             Some(hint) if has("duty") => format!("{hint}; {proposed}"),
             _ => proposed,

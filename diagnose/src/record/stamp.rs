@@ -44,8 +44,8 @@ impl Raw<'_> {
             let apart = away(first).abs();
             if digit > COARSE && apart > SAME && apart < digit {
                 self.repairs.push(format!(
-                    "times are written in steps of {steps}: they say a sampling phase of {:.3}, the model {phase}, and neither can be \
-                     told from the other; `phase` in a map file says it",
+                    "times are written in steps of {steps}: they say a sampling phase of {:.3}, which is taken; the model has \
+                     {phase}, and neither can be told from the other: `phase` in a map file says it",
                     whole(first)
                 ));
             }

@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 /// The answer in a word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// The model fits.
     Consistent,
@@ -14,6 +14,8 @@ pub enum Verdict {
     Explained,
     /// Several explanations do.
     Ambiguous,
+    /// The causes explain all but a channel or a record.
+    MostlyExplained,
     /// None does.
     Unexplained,
 }

@@ -1,0 +1,286 @@
+//! A channel or a record that nothing on the list explains, while causes explain all the rest: an instrument that does what no list
+//! has, or a run in which something else went on. Open-loop records do not feed a sensor back, so that a disturbed one spoils its own
+//! channel only.
+//!
+//! ```text
+//! in    records whose best causes leave structure
+//! look  which channel or record holds most of what is left; the whole search again without it
+//! out   causes that leave no structure in the rest, or nothing
+//! ```
+//!
+//! Invariant: a cause found so has passed all that a cause has to pass, and more: it is far above the threshold, and what was set aside
+//! does not speak against it.
+
+use crate::doubts::Doubt;
+use crate::drive::Model;
+use crate::examine::{Examined, examined};
+use crate::findings::{Aside, Verdict};
+use crate::fit::State;
+use crate::gain::{self, Pair};
+use crate::noise;
+use crate::problem::{Problem, dot};
+use crate::progress::Listener;
+use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
+use crate::shape::structures;
+use crate::worth;
+
+/// Looks without a part: each is a whole search. The causes bend to what no cause explains, so that the part that is left worst is not
+/// always the one that is disturbed, but one of two.
+const LOOKS: usize = 2;
+/// A part that is set aside holds at least this share of what is left: less would not be "all but one". A convention.
+const MAIN_PART: f64 = 0.25;
+/// Fewest rows of a record: settled points and short tables have more causes than places for structure.
+// five blocks of ten, from which on `shape` sees slow structure
+const FEWEST_ROWS: usize = 50;
+/// Fewest channels that are left: one alone is given by many causes.
+const FEWEST_CHANNELS: usize = 2;
+/// Fewest records that are left, so that not a single run decides.
+const FEWEST_RECORDS: usize = 2;
+/// Evidence over its threshold: twice as many standard deviations as for a cause that explains all of the records.
+const SURE: f64 = 4.0;
+/// The causes may make what was set aside this much worse, in squares, since what disturbs it may run against them: an effect and a
+/// disturbance of one size that follow each other to .6 do so by 1.25. A convention above it.
+const WORSE: f64 = 1.5;
+/// The channel of the load current.
+const LOAD_CURRENT: usize = 2;
+
+/// A part of the records.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// A channel of all records.
+    Channel(usize),
+    /// A record.
+    Record(usize),
+}
+
+impl Part {
+    /// Its name.
+    fn name(self, problem: &Problem) -> &str {
+        match self {
+            Part::Channel(n) => CHANNEL_NAMES[n],
+            Part::Record(index) => &problem.records[index].name,
+        }
+    }
+
+    /// Said where the model explains all but this part.
+    #[must_use]
+    pub fn alone(self, problem: &Problem) -> String {
+        let name = self.name(problem);
+        format!("without {name} the model as given explains the records: look at what was different in {name}")
+    }
+
+    fn holds(self, record: usize, channel: usize) -> bool {
+        match self {
+            Part::Channel(n) => n == channel,
+            Part::Record(index) => index == record,
+        }
+    }
+
+    /// The records without it.
+    fn taken_from(self, records: &[Record]) -> Vec<Record> {
+        let mut rest = records.to_vec();
+        match self {
+            Part::Channel(n) => rest.iter_mut().for_each(|record| record.measured[n].fill(f64::NAN)),
+            Part::Record(index) => {
+                rest.remove(index);
+            }
+        }
+        rest
+    }
+}
+
+/// An explanation of all but a part.
+#[derive(Debug)]
+pub struct Rest {
+    /// The part.
+    pub part: Part,
+    /// What the rest says.
+    pub found: Examined,
+    /// The held-out records, for the rest.
+    pub pair: Option<Pair>,
+}
+
+/// The explanation of all but one part of `records`, in which `whole` was found, if there is one; without causes where the model as
+/// given explains the rest.
+#[must_use]
+pub fn explained_without(
+    records: &[Record],
+    whole: &Examined,
+    heldout: &[Record],
+    base: &Model,
+    say: Listener<'_>,
+) -> Option<Rest> {
+    let is_short = |record: &Record| record.settled || record.rows() < FEWEST_ROWS;
+    if whole.verdict != Verdict::Unexplained || records.iter().any(is_short) {
+        return None;
+    }
+    let looks = match whole.structure.is_empty() {
+        true => spoilt_later(whole).into_iter().collect(),
+        false => parts(whole),
+    };
+    looks.into_iter().take(LOOKS).find_map(|part| {
+        let mut found = examined(part.taken_from(records), base, say);
+        if !found.named.is_empty() {
+            let weak = found.keep_sure(|evidence| evidence.delta_chi2 >= SURE * evidence.threshold);
+            found.odd.extend(weak.into_iter().map(|id| {
+                let name = part.name(&whole.problem);
+                format!("{id} would fit a little better: not named where {name} had to be set aside")
+            }));
+        }
+        let pair = found.judged(heldout, base);
+        let holds = match found.verdict {
+            Verdict::Consistent => true,
+            Verdict::Explained | Verdict::Ambiguous => is_borne(&found, part, &whole.problem, records, base),
+            Verdict::MostlyExplained | Verdict::Unexplained => false,
+        };
+        holds.then_some(Rest { part, found, pair })
+    })
+}
+
+/// The one channel in which causes that leave no structure do not hold in held-out records: what disturbs it did not show before.
+fn spoilt_later(whole: &Examined) -> Option<Part> {
+    let mut channels = whole.doubts.iter().filter_map(|doubt| match doubt {
+        Doubt::HeldOut(channel, _) => Some(*channel),
+        _ => None,
+    });
+    let first = channels.next()?;
+    (channels.all(|other| other == first) && may_miss(&whole.problem, first)).then_some(Part::Channel(first))
+}
+
+/// Parts that may be set aside, the one that holds most of what is left first.
+fn parts(whole: &Examined) -> Vec<Part> {
+    let (problem, state) = (&whole.problem, whole.attribution.state());
+    let above = |record: usize, channel: usize| {
+        let values = noise::channel(problem, &state.residual, record, channel);
+        let count = values.iter().filter(|v| **v != 0.0).count();
+        (dot(&values, &values) - count as f64).max(0.0)
+    };
+    let records = 0..problem.records.len();
+    let cells: Vec<(usize, usize, f64)> = records
+        .clone()
+        .flat_map(|record| (0..CHANNELS).map(move |channel| (record, channel)))
+        .map(|(record, channel)| (record, channel, above(record, channel)))
+        .collect();
+    let total: f64 = cells.iter().map(|cell| cell.2).sum();
+    let share = |part: Part| {
+        let own = cells
+            .iter()
+            .filter(|(record, channel, _)| part.holds(*record, *channel));
+        own.map(|cell| cell.2).sum::<f64>() / total.max(f64::MIN_POSITIVE)
+    };
+    let channels = (0..CHANNELS).filter(|n| may_miss(problem, *n)).map(Part::Channel);
+    let runs = records
+        .filter(|_| problem.records.len() > FEWEST_RECORDS)
+        .map(Part::Record);
+    let mut list: Vec<(Part, f64)> = channels.chain(runs).map(|part| (part, share(part))).collect();
+    list.retain(|(part, share)| {
+        let has_structure = whole.structure.iter().any(|one| match part {
+            Part::Channel(n) => one.channel == CHANNEL_NAMES[*n],
+            Part::Record(index) => one.record == problem.records[*index].name,
+        });
+        has_structure && *share >= MAIN_PART
+    });
+    list.sort_by(|a, b| b.1.total_cmp(&a.1));
+    list.into_iter().map(|(part, _)| part).collect()
+}
+
+/// Whether enough is measured without a channel, and it is no input of the model.
+fn may_miss(problem: &Problem, channel: usize) -> bool {
+    let is_measured = |n: usize| problem.sigma[n].is_finite();
+    let is_load = channel == LOAD_CURRENT && problem.records.iter().any(|record| record.metered.is_some());
+    let left = (0..CHANNELS).filter(|n| *n != channel && is_measured(*n)).count();
+    // the voltage or the inductor current: the others follow from them, or stand still
+    let moves = (0..2).any(|n| n != channel && is_measured(n));
+    is_measured(channel) && !is_load && left >= FEWEST_CHANNELS && moves
+}
+
+/// Whether what was set aside bears the causes.
+fn is_borne(found: &Examined, part: Part, whole: &Problem, records: &[Record], base: &Model) -> bool {
+    let [before, after] = squares(found, part, whole, records, base);
+    after <= WORSE * before
+}
+
+/// Sums of squares of what was set aside, without and with the causes.
+fn squares(found: &Examined, part: Part, whole: &Problem, records: &[Record], base: &Model) -> [f64; 2] {
+    let of = |problem: &Problem, state: &State| {
+        let cells = (0..problem.records.len()).flat_map(|record| (0..CHANNELS).map(move |n| (record, n)));
+        let own = cells.filter(|(record, n)| match part {
+            Part::Channel(channel) => channel == *n,
+            Part::Record(_) => *record == 0,
+        });
+        own.map(|(record, n)| noise::channel(problem, &state.residual, record, n))
+            .map(|values| dot(&values, &values))
+            .sum::<f64>()
+    };
+    match part {
+        Part::Channel(n) => {
+            let (problem, null, state) = with_channel(found, whole, n);
+            [of(&problem, &null), of(&problem, &state)]
+        }
+        Part::Record(index) => {
+            let pair = alone(found, &records[index], base);
+            [of(&pair.problem, &pair.before), of(&pair.problem, &pair.after)]
+        }
+    }
+}
+
+/// The record that was set aside, as if it were held out.
+fn alone(found: &Examined, record: &Record, base: &Model) -> Pair {
+    let state = found.attribution.state();
+    let trim = state.starts.trim_or_none(base.plant.converter.f_sw);
+    gain::hold(
+        std::slice::from_ref(record),
+        base,
+        &state.model,
+        found.problem.sigma,
+        trim,
+    )
+}
+
+/// What was found with the channel back in its place: the same models and initial states, which no value of it has moved.
+fn with_channel(found: &Examined, whole: &Problem, n: usize) -> (Problem, State, State) {
+    let mut problem = found.problem.clone();
+    for (record, own) in problem.records.iter_mut().zip(&whole.records) {
+        record.measured[n].clone_from(&own.measured[n]);
+    }
+    for (masked, own) in problem.masked.iter_mut().zip(&whole.masked) {
+        masked[n].clone_from(&own[n]);
+    }
+    problem.sigma[n] = whole.sigma[n];
+    let again = |state: &State| State::at(&problem, &state.model, state.starts.clone());
+    let (null, state) = (again(&found.attribution.null), again(found.attribution.state()));
+    (problem, null, state)
+}
+
+/// Puts what was set aside beside what was `found` without it, to be seen, and says what is left there.
+pub fn shown(found: &mut Examined, part: Part, whole: &Problem, records: &[Record], base: &Model) -> Aside {
+    let inflation = found.attribution.inflation;
+    match part {
+        Part::Channel(n) => {
+            let (problem, null, state) = with_channel(found, whole, n);
+            found.structure = structures(&problem, &null, &state, inflation);
+            let errors = worth::of_training(&problem, &null, &state);
+            (found.problem, found.attribution.null) = (problem, null);
+            if let Some(best) = &mut found.attribution.best {
+                best.state = state;
+            }
+            Aside {
+                channel: Some(CHANNEL_NAMES[n]),
+                record: None,
+                errors: errors
+                    .into_iter()
+                    .filter(|one| one.channel == CHANNEL_NAMES[n])
+                    .collect(),
+            }
+        }
+        Part::Record(index) => {
+            let pair = alone(found, &records[index], base);
+            found.structure = structures(&pair.problem, &pair.before, &pair.after, inflation);
+            Aside {
+                channel: None,
+                record: Some(records[index].name.clone()),
+                errors: worth::of_held(&pair),
+            }
+        }
+    }
+}

@@ -1,0 +1,226 @@
+//! Training records to an answer, before any record judges it.
+
+use crate::attribute::{Attribution, attribute};
+use crate::doubts::{self, Doubt};
+use crate::drive::Model;
+use crate::findings::{Evidence, Named, Value, Verdict};
+use crate::fit::State;
+use crate::gain::{self, Pair};
+use crate::instants;
+use crate::noise::{self, Outlier};
+use crate::preflight;
+use crate::problem::Problem;
+use crate::profile::{Profile, parabolas, profiles};
+use crate::progress::{Listener, Progress};
+use crate::quantised;
+use crate::record::Record;
+use crate::sampling;
+use crate::shape::{Structure, structures};
+
+/// What training records say.
+#[derive(Debug)]
+pub struct Examined {
+    /// The records.
+    pub problem: Problem,
+    /// What was fitted.
+    pub attribution: Attribution,
+    /// Profiles of the parameters.
+    pub profiles: Vec<Profile>,
+    /// Causes that the fit took and that are no effect.
+    pub nothing: Vec<&'static str>,
+    /// The causes.
+    pub named: Vec<Named>,
+    /// The step of a converter, if it is a cause.
+    pub lattice: Option<Named>,
+    /// What is left.
+    pub structure: Vec<Structure>,
+    /// What speaks against the causes.
+    pub doubts: Vec<Doubt>,
+    /// Rows left out.
+    pub outliers: Vec<Outlier>,
+    /// What was seen before any fit.
+    pub odd: Vec<String>,
+    /// The answer.
+    pub verdict: Verdict,
+}
+
+/// Looks for the causes in `train`.
+#[must_use]
+pub fn examined(train: Vec<Record>, base: &Model, say: Listener<'_>) -> Examined {
+    say(Progress::Stage("noise and initial states"));
+    let (problem, null, outliers) = prepared(train, base);
+    let odd = preflight::readings(&problem, &null);
+    let (mut problem, mut attribution) = attribute(problem, null, say);
+    instants::note(&mut problem, &attribution.state().starts);
+    // what is too small for a cause still leaves no structure
+    let structure = structures(&problem, &attribution.null, attribution.state(), attribution.inflation);
+    let mut profiles = held_by_data(&problem, &mut attribution, &structure, say);
+    // behind the profiles: whether a cause is nothing is read off its intervals
+    let nothing = attribution.leave_out_nothing(&problem, &mut profiles);
+    let named = named(&attribution, &profiles);
+    let doubts = doubts::of(&problem, &attribution, &profiles, &structure);
+    let lattice = quantised::cause(&problem);
+    let holds = structure.is_empty() && !doubts::forbids(&named, &doubts);
+    Examined {
+        verdict: verdict(&named, &lattice, holds),
+        problem,
+        attribution,
+        profiles,
+        nothing,
+        named,
+        lattice,
+        structure,
+        doubts,
+        outliers,
+        odd,
+    }
+}
+
+impl Examined {
+    /// Takes out the causes of whose evidence `is_sure` is not true; their ids.
+    pub fn keep_sure(&mut self, is_sure: impl Fn(&Evidence) -> bool) -> Vec<&'static str> {
+        let unsure: Vec<usize> = (0..self.named.len())
+            .filter(|member| !is_sure(&self.named[*member].evidence))
+            .collect();
+        let out = (self.attribution).leave_out(&self.problem, &mut self.profiles, &unsure);
+        if !out.is_empty() {
+            self.answer();
+        }
+        out
+    }
+
+    /// What the fit and its profiles say.
+    fn answer(&mut self) {
+        let (problem, attribution) = (&self.problem, &self.attribution);
+        self.structure = structures(problem, &attribution.null, attribution.state(), attribution.inflation);
+        self.named = named(attribution, &self.profiles);
+        self.doubts = doubts::of(problem, attribution, &self.profiles, &self.structure);
+        let holds = self.structure.is_empty() && !doubts::forbids(&self.named, &self.doubts);
+        self.verdict = verdict(&self.named, &self.lattice, holds);
+    }
+
+    /// Lets the held-out records judge; causes that do not hold in them explain nothing any more.
+    pub fn judged(&mut self, heldout: &[Record], base: &Model) -> Option<Pair> {
+        let found = self.attribution.state();
+        let trim = found.starts.trim_or_none(base.plant.converter.f_sw);
+        let pair = held(&self.problem, heldout, base, found, trim)?;
+        // what is no more than the step of a converter has no values that could fail to hold
+        if self.verdict == Verdict::Explained && !self.named.is_empty() {
+            let fails = pair.doubts(&self.problem, found);
+            if !fails.is_empty() {
+                self.verdict = Verdict::Unexplained;
+            }
+            self.doubts
+                .extend(fails.into_iter().map(|(channel, words)| Doubt::HeldOut(channel, words)));
+        }
+        Some(pair)
+    }
+}
+
+/// The held-out records with the model as given and with `state`, if there are any.
+pub fn held(problem: &Problem, heldout: &[Record], base: &Model, state: &State, trim: f64) -> Option<Pair> {
+    (!heldout.is_empty()).then(|| gain::hold(heldout, base, &state.model, problem.sigma, trim))
+}
+
+/// How well the data hold the parameters; other pairs of causes become rivals. What leaves structure explains nothing, and its
+/// values are worth neither.
+fn held_by_data(
+    problem: &Problem,
+    attribution: &mut Attribution,
+    structure: &[Structure],
+    say: Listener<'_>,
+) -> Vec<Profile> {
+    if !structure.is_empty() {
+        return parabolas(problem, attribution);
+    }
+    let others = crate::ties::other_pairs(problem, attribution, say);
+    // they stand in the place of all causes together: said once, at the first
+    for rivals in attribution.rivals.iter_mut().take(1) {
+        rivals.extend(others.iter().cloned());
+    }
+    for (member, rival) in crate::ties::in_part(problem, attribution, say) {
+        attribution.rivals[member].push(rival);
+    }
+    profiles(problem, attribution, say)
+}
+
+/// Noise estimated, outliers masked, initial states fitted.
+fn prepared(train: Vec<Record>, base: &Model) -> (Problem, State, Vec<Outlier>) {
+    let mut problem = Problem::new(train, base.clone());
+    let mut null = State::settle(&problem, base, &problem.first_starts(), None);
+    // noise before the instants of loggers and before outliers, which are judged in its units; and again without the
+    // outliers
+    problem.sigma = noise::sigma(&problem, &null.residual);
+    sampling::decide(&mut problem, base);
+    null = State::settle(&problem, base, &null.starts, None);
+    let outliers = noise::outliers(&problem, &null.residual);
+    for one in &outliers {
+        problem.masked[one.record][one.channel][one.row] = true;
+    }
+    null = State::settle(&problem, base, &null.starts, None);
+    problem.sigma = noise::sigma(&problem, &null.residual);
+    null = State::settle(&problem, base, &null.starts, None);
+    (problem, null, outliers)
+}
+
+fn named(attribution: &Attribution, profiles: &[Profile]) -> Vec<Named> {
+    let Some(best) = &attribution.best else {
+        return Vec::new();
+    };
+    let of = |(member, cause): (usize, &usize)| {
+        let candidate = &attribution.candidates[*cause];
+        let own = profiles.iter().filter(|profile| profile.member == member);
+        let parameters = own.map(|p| {
+            let value = Value {
+                value: p.value,
+                low: p.interval[0],
+                high: p.interval[1],
+                unit: p.unit,
+                model: p.own,
+            };
+            (p.name, value)
+        });
+        let rivals = attribution.rivals[member].iter().map(|fit| {
+            let mut ids: Vec<&str> = fit.causes.iter().map(|cause| attribution.id(*cause)).collect();
+            // two forms of one cause are one cause to a reader
+            ids.dedup();
+            ids
+        });
+        Named {
+            id: candidate.cause.id,
+            words: candidate.form.words,
+            parameters: parameters.collect(),
+            evidence: Evidence {
+                delta_chi2: attribution.evidence[member] / attribution.inflation,
+                // without the inflation: the evidence is over it already
+                threshold: crate::level::threshold(candidate.own.len(), 1.0),
+            },
+            rivals: each_once(rivals),
+        }
+    };
+    best.causes.iter().enumerate().map(of).collect()
+}
+
+/// The same ids may come from two forms of a cause.
+fn each_once(sets: impl Iterator<Item = Vec<&'static str>>) -> Vec<Vec<&'static str>> {
+    sets.fold(Vec::new(), |mut list, set| {
+        if !list.contains(&set) {
+            list.push(set);
+        }
+        list
+    })
+}
+
+fn verdict(named: &[Named], lattice: &Option<Named>, holds: bool) -> Verdict {
+    // before anything else: where the truth is not on the list, its best cause imitates it with a wrong value
+    if !holds {
+        return Verdict::Unexplained;
+    }
+    if named.iter().any(|cause| !cause.rivals.is_empty()) {
+        return Verdict::Ambiguous;
+    }
+    match named.is_empty() && lattice.is_none() {
+        true => Verdict::Consistent,
+        false => Verdict::Explained,
+    }
+}

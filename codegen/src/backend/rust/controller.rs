@@ -275,10 +275,10 @@ fn decide(program: &Program) -> TokenStream {
         quote!((#flag << #bit))
     });
     let fallback = number(program.scalar(), program.fallback_duty);
-    let stray = guard::stray(program.scalar(), &duty, decide.within);
-    let is_stray = match program.scalar() {
-        Scalar::F32 => quote!((stray >> 31)),
-        Scalar::F64 => quote!(((stray >> 63) as u32)),
+    // behind its limits, which lie within 0 and 1, a duty has the second highest bit only if it is no number
+    let stray = match program.scalar() {
+        Scalar::F32 => quote!((#duty.to_bits() >> 30)),
+        Scalar::F64 => quote!((#duty.to_bits() >> 62) as u32),
     };
     let network::Choice {
         about,
@@ -319,8 +319,7 @@ fn decide(program: &Program) -> TokenStream {
         #[inline(always)]
         fn decide(&self, front: &Front, sound: u32, #name: #kind) -> Command {
             #(#statements)*
-            let stray = #stray;
-            let trusted = core::hint::black_box(sound & !#is_stray);
+            let trusted = sound & !#stray;
             let usable = front.usable & trusted;
             let status = #(#terms)|*;
             Command {
@@ -380,7 +379,7 @@ fn checks(program: &Program) -> TokenStream {
     let kind = number::kind(scalar);
     let checksum = integrity::checksum(Element::Float(scalar));
     let [low, width, answers] = ["box_low", "box_width", "answers"].map(|name| tables::values(program, name));
-    let (vectors, count) = (size(VECTORS), word(VECTORS as u32));
+    let (vectors, beyond) = (size(VECTORS), word(VECTORS as u32 + 1));
     let (seed, multiplier, increment, unit) = (
         word(SEED),
         word(LCG.0),
@@ -401,8 +400,8 @@ fn checks(program: &Program) -> TokenStream {
             static BOX_WIDTH: [#kind; FEATURES] = #width;
             static ANSWERS: [u32; #vectors] = #answers;
             let mut random: u32 = #seed;
-            // first answers in a row that are right: a fault in this count shows in a sound build, too
-            let mut good = 0_u32;
+            // number of the first vector without a right answer: a fault in this count shows in a sound build, too
+            let mut next = 1_u32;
             let mut vector = 0_u32;
             for answer in &ANSWERS {
                 let mut observation = [#zero; FEATURES];
@@ -412,11 +411,11 @@ fn checks(program: &Program) -> TokenStream {
                 }
                 let crc = !#checksum(u32::MAX, &Self::q_values(&observation));
                 vector = vector.wrapping_add(1);
-                if good.wrapping_add(1) == vector && crc == *answer {
-                    good = vector;
+                if next == vector && crc == *answer {
+                    next = vector.wrapping_add(1);
                 }
             }
-            if good == #count { Ok(()) } else { Err(good.wrapping_add(1)) }
+            if next == #beyond { Ok(()) } else { Err(next) }
         }
         /// CRC-32 over the tables: whether they are as generated.
         #[must_use]

@@ -84,8 +84,6 @@ impl<'p> Printer<'p> {
             Op::ChosenDuty => quote!(chosen),
             Op::Output => quote!(output),
             Op::Constant(literal) => number(self.program.scalar(), *literal),
-            // behind a barrier: of what is known to be 0 or 1 the optimiser makes a branch
-            Op::Primed => quote!(core::hint::black_box(self.primed & 1)),
             Op::Usable => quote!(front.usable),
             Op::Clipped => quote!(front.clipped),
             Op::Base => quote!(front.base),
@@ -132,6 +130,9 @@ impl<'p> Printer<'p> {
                 let curve = self.program.head.curve().map_or("", policy::Activation::word);
                 call(curve, &[v(x)])
             }
+            // behind a barrier: of what is known to be 0 or 1 the optimiser makes a branch. No leaf, since each barrier takes
+            // three instructions
+            Op::Primed => quote!(core::hint::black_box(self.primed & 1)),
             Op::NotZero(x) => {
                 let x = v(x);
                 quote!(flag(#x != 0))
@@ -188,12 +189,12 @@ pub fn helpers(program: &Program) -> TokenStream {
         #[inline(always)]
         #[allow(dead_code)]
         fn within(x: #number, low: #number, high: #number) -> u32 {
-            flag(x >= low) & flag(x <= high)
+            u32::from(x >= low) & flag(x <= high)
         }
         #[inline(always)]
         #[allow(dead_code)]
         fn outside(x: #number, low: #number, high: #number) -> u32 {
-            flag(x < low) | flag(x > high)
+            flag((x < low) | (x > high))
         }
         #[inline(always)]
         #[allow(dead_code)]

@@ -173,6 +173,8 @@ pub fn helpers(program: &Program) -> TokenStream {
     let mask = number::bits(scalar).mask;
     let comparisons = super::guard::helpers(scalar);
     let lines = rust_lines(&Rust::of(program));
+    // `within` and `outside` have one barrier each, since a barrier takes three instructions. `within` adds its conditions: of an
+    // `and` of both rustc makes branches of different lengths on PowerPC, which has jumps for comparisons of floats
     quote! {
         /// A condition as 0 or 1. The optimiser must not know that: it would turn selections back into branches.
         #[inline(always)]
@@ -189,7 +191,7 @@ pub fn helpers(program: &Program) -> TokenStream {
         #[inline(always)]
         #[allow(dead_code)]
         fn within(x: #number, low: #number, high: #number) -> u32 {
-            u32::from(x >= low) & flag(x <= high)
+            core::hint::black_box(u32::from(x >= low).wrapping_add(u32::from(x <= high))) >> 1
         }
         #[inline(always)]
         #[allow(dead_code)]

@@ -228,7 +228,7 @@ fn an_edit_where_random_moves_seldom_come_fails() {
         ("(v26, -20.0f, 20.0f)", "(v26, -20.02f, 20.0f)"),
         ("uint32_t next = 1u;", "uint32_t next = 2u;"),
         ("next = vector + 1u;", "next = vector + 2u;"),
-        ("(next == 17u) ? 0u", "(next == 18u) ? 0u"),
+        ("(right == 16u) ? 0u", "(right == 15u) ? 0u"),
         ("check->position = span.to;", ""),
         ("? check->position : 0u;", "? check->position : 1u;"),
     ];

@@ -379,7 +379,7 @@ fn checks(program: &Program) -> TokenStream {
     let kind = number::kind(scalar);
     let checksum = integrity::checksum(Element::Float(scalar));
     let [low, width, answers] = ["box_low", "box_width", "answers"].map(|name| tables::values(program, name));
-    let (vectors, beyond) = (size(VECTORS), word(VECTORS as u32 + 1));
+    let (vectors, count) = (size(VECTORS), word(VECTORS as u32));
     let (seed, multiplier, increment, unit) = (
         word(SEED),
         word(LCG.0),
@@ -400,8 +400,10 @@ fn checks(program: &Program) -> TokenStream {
             static BOX_WIDTH: [#kind; FEATURES] = #width;
             static ANSWERS: [u32; #vectors] = #answers;
             let mut random: u32 = #seed;
-            // number of the first vector without a right answer: a fault in this count shows in a sound build, too
+            // number of the first vector without a right answer, and right answers before it: a fault in either shows in a sound
+            // build, too
             let mut next = 1_u32;
+            let mut right = 0_u32;
             let mut vector = 0_u32;
             for answer in &ANSWERS {
                 let mut observation = [#zero; FEATURES];
@@ -413,9 +415,10 @@ fn checks(program: &Program) -> TokenStream {
                 vector = vector.wrapping_add(1);
                 if next == vector && crc == *answer {
                     next = vector.wrapping_add(1);
+                    right = right.wrapping_add(1);
                 }
             }
-            if next == #beyond { Ok(()) } else { Err(next) }
+            if right == #count { Ok(()) } else { Err(next) }
         }
         /// CRC-32 over the tables: whether they are as generated.
         #[must_use]

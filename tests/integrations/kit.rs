@@ -228,7 +228,8 @@ fn an_edit_where_random_moves_seldom_come_fails() {
         ("(v26, -20.0f, 20.0f)", "(v26, -20.02f, 20.0f)"),
         ("uint32_t next = 1u;", "uint32_t next = 2u;"),
         ("next = vector + 1u;", "next = vector + 2u;"),
-        ("(right == 16u) ? 0u", "(right == 15u) ? 0u"),
+        ("(next == 17u) ?", "(next == 18u) ?"),
+        ("(16u - right)", "(17u - right)"),
         ("check->position = span.to;", ""),
         ("? check->position : 0u;", "? check->position : 1u;"),
     ];
@@ -237,6 +238,18 @@ fn an_edit_where_random_moves_seldom_come_fails() {
             ran.code == Some(1) && ran.stdout.contains("FAIL"),
             "{from} => {to}: {ran:?}"
         );
+    }
+}
+
+/// A cap that ends 0.1 % too early shows where one more step comes just below the upper limit of the duty.
+#[test]
+fn a_soft_start_that_ends_early_or_late_fails() {
+    let edits = [
+        ("_flag(v0 > 0.67999995f)", "_flag(v0 > 0.67932f)"),
+        ("_flag(v0 > 0.67999995f)", "_flag(v0 > 0.68068f)"),
+    ];
+    for (ran, (_, to)) in edited(&golden_case("constructs"), &edits).into_iter().zip(edits) {
+        assert!(ran.code == Some(1) && ran.stdout.contains("FAIL"), "{to}: {ran:?}");
     }
 }
 

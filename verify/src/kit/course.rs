@@ -337,7 +337,7 @@ fn of_mapping<T: Real>(scalar: Scalar, state: &State<T>) -> Vec<Damage<T>> {
     flips.chain(changed).collect()
 }
 
-/// The cap that one more step brings to the upper limit, and its neighbours.
+/// The cap that one more step brings to the upper limit, and its neighbours: two below, since the limit is rounded inwards.
 fn end_of_soft_start<T: Real>(policy: &Policy, scalar: Scalar, state: &State<T>) -> Vec<Damage<T>> {
     let Some(soft) = policy.limits.soft_start.filter(|_| state.soft_cap.is_some()) else {
         return Vec::new();
@@ -347,7 +347,8 @@ fn end_of_soft_start<T: Real>(policy: &Policy, scalar: Scalar, state: &State<T>)
     // the cap stands before the coefficients
     let numbers = state.clone().numbers_mut().count();
     let at = numbers - coefficients(state) - 1;
-    let caps = [scalar.next_down(before), before, scalar.next_up(before)];
+    let below = scalar.next_down(before);
+    let caps = [scalar.next_down(below), below, before, scalar.next_up(before)];
     caps.map(|cap| Damage::of_numbers(vec![(at, T::nearest(cap))])).to_vec()
 }
 

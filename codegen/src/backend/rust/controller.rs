@@ -1,13 +1,14 @@
 //! The controller type: state, step, checks.
 
 use policy::Scalar;
-use proc_macro2::{Ident, TokenStream};
+use proc_macro2::{Ident, Literal as Token, TokenStream};
 use quote::quote;
 
 use super::number::{self, number};
 use super::statements::Printer;
 use super::tokens::{ident, size, word};
 use super::{guard, integrity, mapping, network, tables};
+use crate::lower::command;
 use crate::lower::known_answers::{LCG, SEED, UNIT, VECTORS};
 use crate::program::{Element, Literal, Program, StateMember, StateValue};
 
@@ -275,6 +276,8 @@ fn decide(program: &Program) -> TokenStream {
         quote!((#flag << #bit))
     });
     let fallback = number(program.scalar(), program.fallback_duty);
+    // shifted and not masked, which is an instruction less on Arm
+    let fallback_bit = word(command::bit("FALLBACK"));
     // behind its limits, which lie within 0 and 1, a duty has the second highest bit only if it is no number
     let stray = match program.scalar() {
         Scalar::F32 => quote!((#duty.to_bits() >> 30)),
@@ -327,7 +330,7 @@ fn decide(program: &Program) -> TokenStream {
                 duty_sim: select(usable, #duty_sim, #fallback),
                 action_index: #index,
                 status: (status & 0_u32.wrapping_sub(usable))
-                    | (status::FALLBACK & usable.wrapping_sub(1))
+                    | ((usable ^ 1) << #fallback_bit)
                     | (status::STATE & trusted.wrapping_sub(1)),
             }
         }
@@ -379,7 +382,8 @@ fn checks(program: &Program) -> TokenStream {
     let kind = number::kind(scalar);
     let checksum = integrity::checksum(Element::Float(scalar));
     let [low, width, answers] = ["box_low", "box_width", "answers"].map(|name| tables::values(program, name));
-    let (vectors, count) = (size(VECTORS), word(VECTORS as u32));
+    let vectors = size(VECTORS);
+    let [count, beyond] = [VECTORS, VECTORS + 1].map(|count| Token::u32_suffixed(count as u32));
     let (seed, multiplier, increment, unit) = (
         word(SEED),
         word(LCG.0),
@@ -418,7 +422,8 @@ fn checks(program: &Program) -> TokenStream {
                     right = right.wrapping_add(1);
                 }
             }
-            if right == #count { Ok(()) } else { Err(next) }
+            let failing = if next == #beyond { #count.wrapping_sub(right) } else { next };
+            if failing == 0 { Ok(()) } else { Err(failing) }
         }
         /// CRC-32 over the tables: whether they are as generated.
         #[must_use]

@@ -29,7 +29,7 @@
  *   10 r (parameter): coefficient of the duty ratio mapping; set before a step, it counts from the one after it
  */
 #define ADC_MAPPING_FMU_VARIABLES 10u
-#define ADC_MAPPING_FMU_TOKEN "{12d7bc51-b55b-60f3-82ef-1cfa80f1c823}"
+#define ADC_MAPPING_FMU_TOKEN "{db96a248-4a47-8c9c-42d4-cecf17985843}"
 #define ADC_MAPPING_FMU_PERIOD 2e-5
 
 /* Types of variables. */

@@ -25,7 +25,7 @@
  *   6 status (output): status bits; 65536 is added while the coefficients are refused
  */
 #define MINIMAL_FMU_VARIABLES 6u
-#define MINIMAL_FMU_TOKEN "{07b80534-2fe1-671a-c8f7-d493863646a9}"
+#define MINIMAL_FMU_TOKEN "{170e8994-5fe9-6d31-30c0-a3a26a6ffd1b}"
 #define MINIMAL_FMU_PERIOD 0.0001
 
 /* Types of variables. */

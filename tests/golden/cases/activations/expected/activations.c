@@ -1355,5 +1355,5 @@ ACTIVATIONS_COLD uint32_t activations_self_test(void)
             ++right;
         }
     }
-    return (right == 16u) ? 0u : next;
+    return (next == 17u) ? (16u - right) : next;
 }

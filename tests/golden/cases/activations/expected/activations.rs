@@ -786,8 +786,7 @@ impl Controller {
             duty: select(usable, v0, 0.0),
             duty_sim: select(usable, chosen, 0.0),
             action_index: action_index & 0_u32.wrapping_sub(trusted),
-            status: (status & 0_u32.wrapping_sub(usable))
-                | (status::FALLBACK & usable.wrapping_sub(1))
+            status: (status & 0_u32.wrapping_sub(usable)) | ((usable ^ 1) << 1)
                 | (status::STATE & trusted.wrapping_sub(1)),
         }
     }
@@ -833,7 +832,8 @@ impl Controller {
                 right = right.wrapping_add(1);
             }
         }
-        if right == 16 { Ok(()) } else { Err(next) }
+        let failing = if next == 17u32 { 16u32.wrapping_sub(right) } else { next };
+        if failing == 0 { Ok(()) } else { Err(failing) }
     }
     /// CRC-32 over the tables: whether they are as generated.
     #[must_use]

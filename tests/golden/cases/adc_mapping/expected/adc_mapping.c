@@ -979,5 +979,5 @@ ADC_MAPPING_COLD uint32_t adc_mapping_self_test(void)
             ++right;
         }
     }
-    return (right == 16u) ? 0u : next;
+    return (next == 17u) ? (16u - right) : next;
 }

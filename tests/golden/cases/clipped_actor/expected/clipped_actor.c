@@ -768,5 +768,5 @@ CLIPPED_ACTOR_COLD uint32_t clipped_actor_self_test(void)
             ++right;
         }
     }
-    return (right == 16u) ? 0u : next;
+    return (next == 17u) ? (16u - right) : next;
 }

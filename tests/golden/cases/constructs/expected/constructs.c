@@ -1536,5 +1536,5 @@ CONSTRUCTS_COLD uint32_t constructs_self_test(void)
             ++right;
         }
     }
-    return (right == 16u) ? 0u : next;
+    return (next == 17u) ? (16u - right) : next;
 }

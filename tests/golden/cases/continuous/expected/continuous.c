@@ -1003,5 +1003,5 @@ CONTINUOUS_COLD uint32_t continuous_self_test(void)
             ++right;
         }
     }
-    return (right == 16u) ? 0u : next;
+    return (next == 17u) ? (16u - right) : next;
 }

@@ -1002,5 +1002,5 @@ FILTERS_COLD uint32_t filters_self_test(void)
             ++right;
         }
     }
-    return (right == 16u) ? 0u : next;
+    return (next == 17u) ? (16u - right) : next;
 }

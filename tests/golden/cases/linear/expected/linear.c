@@ -696,5 +696,5 @@ LINEAR_COLD uint32_t linear_self_test(void)
             ++right;
         }
     }
-    return (right == 16u) ? 0u : next;
+    return (next == 17u) ? (16u - right) : next;
 }

@@ -774,5 +774,5 @@ MINIMAL_COLD uint32_t minimal_self_test(void)
             ++right;
         }
     }
-    return (right == 16u) ? 0u : next;
+    return (next == 17u) ? (16u - right) : next;
 }

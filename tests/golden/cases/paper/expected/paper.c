@@ -974,5 +974,5 @@ PAPER_COLD uint32_t paper_self_test(void)
             ++right;
         }
     }
-    return (right == 16u) ? 0u : next;
+    return (next == 17u) ? (16u - right) : next;
 }

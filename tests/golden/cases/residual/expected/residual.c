@@ -1205,5 +1205,5 @@ RESIDUAL_COLD uint32_t residual_self_test(void)
             ++right;
         }
     }
-    return (right == 16u) ? 0u : next;
+    return (next == 17u) ? (16u - right) : next;
 }

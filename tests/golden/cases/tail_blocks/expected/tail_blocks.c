@@ -1006,5 +1006,5 @@ TAIL_BLOCKS_COLD uint32_t tail_blocks_self_test(void)
             ++right;
         }
     }
-    return (right == 16u) ? 0u : next;
+    return (next == 17u) ? (16u - right) : next;
 }

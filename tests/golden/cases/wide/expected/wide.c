@@ -1130,5 +1130,5 @@ WIDE_COLD uint32_t wide_self_test(void)
             ++right;
         }
     }
-    return (right == 16u) ? 0u : next;
+    return (next == 17u) ? (16u - right) : next;
 }

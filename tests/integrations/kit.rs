@@ -241,6 +241,18 @@ fn an_edit_where_random_moves_seldom_come_fails() {
     }
 }
 
+/// A term of the guard that is joined by an exclusive or shows where its neighbour is outside as well.
+#[test]
+fn a_guard_that_joins_its_terms_wrongly_fails() {
+    let edits = [
+        ("| buck12_aside(state->held[2]", "^ buck12_aside(state->held[2]"),
+        ("stray |= ", "stray ^= "),
+    ];
+    for (ran, (from, _)) in edited(&example(), &edits).into_iter().zip(edits) {
+        assert!(ran.code == Some(1) && ran.stdout.contains("FAIL"), "{from}: {ran:?}");
+    }
+}
+
 /// A cap that ends 0.1 % too early shows where one more step comes just below the upper limit of the duty.
 #[test]
 fn a_soft_start_that_ends_early_or_late_fails() {

@@ -268,7 +268,7 @@ impl<T: Real> Damage<T> {
     }
 }
 
-/// Each number of the state just outside of what a sound state holds; all of them at either end; the counters at their ends
+/// Each number of the state just outside of what a sound state holds, alone and with the next one; all of them at either end; the counters at their ends
 /// and beyond; a soft start one step before its end.
 fn damages<T: Real>(policy: &Policy, fresh: &Controller<T>) -> Vec<Damage<T>> {
     let (scalar, hold) = (policy.numeric_format.scalar(), policy.fallback.hold);
@@ -296,6 +296,13 @@ fn damages<T: Real>(policy: &Policy, fresh: &Controller<T>) -> Vec<Damage<T>> {
         let finite = [below, above].into_iter().filter(|end| end.is_finite());
         damages.extend(finite.map(|end| Damage::of_numbers(vec![(at, T::nearest(end))])));
     }
+    // neighbours at once: two terms that are wrongly joined can hide each other
+    let above = ends.iter().map(|&(at, (_, high))| (at, scalar.next_up(high.to_f64())));
+    let above: Vec<(usize, T)> = above
+        .filter(|(_, x)| x.is_finite())
+        .map(|(at, x)| (at, T::nearest(x)))
+        .collect();
+    damages.extend(above.windows(2).map(|pair| Damage::of_numbers(pair.to_vec())));
     let counters = [
         (hold.saturating_add(1), 1),
         (hold.saturating_add(2), 1),

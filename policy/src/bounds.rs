@@ -355,6 +355,12 @@ mod tests {
     }
 
     #[test]
+    fn a_mean_lies_where_its_samples_lie() {
+        let found = filter(&Filter::MovingAverage { samples: 4 }, interval(-1.0, 3.0), 1e-4);
+        assert!(matches!(found, Ok(Box32 { low: -1.0, high: 3.0 })));
+    }
+
+    #[test]
     fn a_filtered_derivative_is_no_wider_than_its_rounding_errors() {
         // k = 1000 1/s, width 4, decay .1: 4000, and 4.1 units of it for each of the ten steps that the memory keeps
         let error = 4.1 / 16_777_216.0 * 4000.0 / 0.1;

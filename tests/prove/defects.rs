@@ -31,7 +31,7 @@ const fn defect(
 
 /// One a driver first: a plain run takes the first of them.
 #[rustfmt::skip]
-const DEFECTS: [Defect; 26] = [
+const DEFECTS: [Defect; 28] = [
     defect("a turn too many over the Q values", ("action < CONSTRUCTS_ACTIONS", "action <= CONSTRUCTS_ACTIONS"), "prove_choose", "choose-runs"),
     defect("filter memory overrun", ("for (i = 0u; i < 2u; ++i)", "for (i = 0u; i < 15u; ++i)"), "prove_step", "step-runs"),
     defect("CRC table overrun", ("crc_steps[crc & 15u]", "crc_steps[crc & 31u]"), "prove_others", "others-runs"),
@@ -57,6 +57,8 @@ const DEFECTS: [Defect; 26] = [
     defect("a slice behind a table", ("(inside < length) ? inside : length", "inside"), "prove_others", "others-runs"),
     defect("an answer that there is not", ("return accepted;", "return accepted + 1u;"), "prove_others", "others-mapping"),
     defect("a division by zero", ("x / (1.0f + constructs_magnitude(x))", "x / constructs_magnitude(x)"), "prove_q_values", "q-values-finite"),
+    defect("an index that starts outside of the actions", ("uint32_t index = 0u;", "uint32_t index = 4294967295u;"), "prove_choose", "choose-index"),
+    defect("a range of the self test that is never written", ("    span.to = CONSTRUCTS_ACTIONS;\n", ""), "prove_self_test", "self-test-runs"),
     defect("a damaged state that heals unseen", ("(uint32_t)0 - front->sound);\n#if", "(uint32_t)1 - front->sound);\n#if"), "prove_marked", "marked-kept"),
 ];
 

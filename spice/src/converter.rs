@@ -20,7 +20,7 @@ const LONGEST_RUN: f64 = 1e6;
 
 /// The plant's effects that the netlist and the modulator here reproduce. One that is new there is refused until somebody
 /// writes its netlist: ngspice would otherwise answer for another converter.
-const KNOWN: [&str; 24] = [
+const KNOWN: [&str; 25] = [
     "converter",
     "dcr",
     "saturation",
@@ -40,6 +40,7 @@ const KNOWN: [&str; 24] = [
     "load_setting",
     "cable",
     "duty_delay",
+    "duty_offset",
     "duty_quantisation",
     "minimum_on_time",
     "sensor_gain",

@@ -3,8 +3,11 @@
 //! A cause has one or more forms, such as the gain of one current sensor or of both; a form is what is fitted. What the search
 //! has to know of a cause stands in its entry: nothing asks for a name.
 
+mod circuit;
+mod instruments;
 mod knob;
 mod list;
+mod surroundings;
 
 use plant::Parameters;
 
@@ -36,11 +39,25 @@ pub enum Search {
     Counter,
 }
 
+/// How usual a cause is on a bench, the most usual first: where data cannot tell two apart, the reader is told of the more usual one
+/// first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// A part or a parasitic of the circuit: each converter has them, and no data sheet has them right.
+    Part,
+    /// How something is set or works: source, load, modulator, sampling.
+    Setting,
+    /// An error of an instrument, which was calibrated once.
+    Instrument,
+}
+
 /// A cause.
 #[derive(Debug)]
 pub struct Cause {
     /// Its name in results.
     pub id: &'static str,
+    /// How usual it is.
+    pub kind: Kind,
     /// What is fitted, each by itself.
     pub forms: &'static [Form],
 }

@@ -13,11 +13,13 @@
 //!                       │            │                        │                │       │
 //! ```
 //!
-//! A part of this picture that a converter does not have keeps its state where it was, with slope 0.
+//! A part of this picture that a converter does not have keeps its state where it was, with slope 0. So do the low-passes of the
+//! sensors, which nothing here depends on: [`Lag`] moves them on behind each step.
 
 use serde::{Deserialize, Serialize};
 
 use crate::effects::{dcr, derating, input_ripple, saturation};
+use crate::lag::Lag;
 use crate::parameters::Parameters;
 use crate::plain::Track;
 use crate::rate::{self, has_c_in};
@@ -141,6 +143,7 @@ impl Full {
         // at least one step: an interval of length 0 would be 0 / 0
         let count = (h * self.rate.max(far)).ceil().max(1.0);
         let step = h / count;
+        let lags = self.lags(step);
         let mut before = self.algebra(x, path, load, t);
         extend(track, &before.signals, path);
         let mut used = 0.0;
@@ -161,10 +164,12 @@ impl Full {
                 after = self.algebra(x, path, load, t + used + length);
             }
             let middle = between(&start, x, &before.slopes, &after.slopes, length);
-            let v_mid = self.algebra(&middle, path, load, t + used + 0.5 * length).signals.v_out;
-            if let Some(v) = vertex(before.signals.v_out, v_mid, after.signals.v_out) {
+            let mid = self.algebra(&middle, path, load, t + used + 0.5 * length).signals;
+            if let Some(v) = vertex(before.signals.v_out, mid.v_out, after.signals.v_out) {
                 track.voltage(v);
             }
+            let shown = [&before.signals, &mid, &after.signals];
+            self.filter(x, shown, (length == step).then_some(&lags), length);
             used += length;
             if crossed {
                 // exactly 0, because the next path is chosen by the sign of the current
@@ -178,6 +183,33 @@ impl Full {
             before = after;
         }
         h
+    }
+
+    /// The low-passes of the sensors over a step of `h` seconds.
+    fn lags(&self, h: f64) -> [Option<Lag>; 4] {
+        self.low_pass.map(|tau| (tau > 0.0).then(|| Lag::over(h, tau)))
+    }
+
+    /// Lets the low-passes of the sensors follow what is true at the start, in the middle and at the end of a step; of one that a
+    /// crossing has shortened to `length` they are made anew.
+    fn filter(&self, x: &mut States, shown: [&Signals; 3], whole: Option<&[Option<Lag>; 4]>, length: f64) {
+        if self.low_pass == [0.0; 4] {
+            return;
+        }
+        let own;
+        let lags = match whole {
+            Some(lags) => lags,
+            None => {
+                own = self.lags(length);
+                &own
+            }
+        };
+        let [first, middle, last] = shown.map(|s| [s.v_out, s.i_l, s.i_out, s.v_in]);
+        for (n, lag) in lags.iter().enumerate() {
+            if let Some(lag) = lag {
+                x[SHOWN + n] = lag.step(x[SHOWN + n], [first[n], middle[n], last[n]]);
+            }
+        }
     }
 
     /// When nothing is `left` of what keeps the path, by the Illinois method.
@@ -360,11 +392,6 @@ impl Full {
             a.slopes[V_CIN] = (i_source - path.share * s.i_l) / source.c_in;
             if source.inductance > 0.0 {
                 a.slopes[I_SOURCE] = (a.v_source - source.resistance * i_source - s.v_in) / source.inductance;
-            }
-        }
-        for (n, value) in [s.v_out, s.i_l, s.i_out, s.v_in].into_iter().enumerate() {
-            if self.low_pass[n] > 0.0 {
-                a.slopes[SHOWN + n] = (value - x[SHOWN + n]) / self.low_pass[n];
             }
         }
     }

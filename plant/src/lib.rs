@@ -15,7 +15,8 @@
 //! - [`Plant::step`] goes from sampling instant to sampling instant, [`Batch`] does so for many ideal converters at once.
 //! - [`Parameters::from_toml`] reads a `plant.toml`.
 //!
-//! No function of libm is used but the square root, which is exact: equal input gives equal bits on every machine.
+//! No function of the machine's libm is used but the square root, which is exact; the exponential is that of the libm crate, which is
+//! Rust. Equal input gives equal bits on every machine.
 
 mod batch;
 mod catalogue;
@@ -24,6 +25,7 @@ mod effects;
 mod entry;
 mod full;
 mod gates;
+mod lag;
 mod legs;
 mod parameters;
 mod plain;

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::attribute::Attribution;
+use crate::causes::{Kind, Knob};
 use crate::fit::Fit;
 use crate::problem::Problem;
 use crate::profile::Profile;
@@ -66,12 +67,12 @@ pub fn most_usual_first(problem: &Problem, attribution: &mut Attribution) {
     let members = attribution.best.as_ref().map_or(0, |best| best.causes.len());
     for member in 0..members {
         let Some(best) = &attribution.best else { return };
-        let own = attribution.candidates[best.causes[member]].cause.kind;
+        let own = attribution.usual(best, best.causes[member]);
         let worst = best.state.chi2 + LEVEL * attribution.inflation;
         let kept: Vec<usize> = without(&best.causes, member);
         let leads = |fit: &&Fit| {
             // the rival of one cause stands last, behind those that are kept
-            let other = fit.causes.last().map(|cause| attribution.candidates[*cause].cause.kind);
+            let other = fit.causes.last().map(|cause| attribution.usual(fit, *cause));
             fit.causes.len() == kept.len() + 1
                 && fit.causes[..kept.len()] == kept
                 && other.is_some_and(|kind| kind < own)
@@ -88,7 +89,29 @@ pub fn most_usual_first(problem: &Problem, attribution: &mut Attribution) {
     }
 }
 
+/// A number so many times as large as any that is typical is none of this part: a diode of an ohm where a tenth is much. Data sheets
+/// differ by less, and converters of 400 V have other resistances than those of 5 V.
+const UNTYPICAL: f64 = 5.0;
+
 impl Attribution {
+    /// How usual a cause is in a fit, the most usual first: whether one of its numbers is beyond what is typical, then its kind.
+    fn usual(&self, fit: &Fit, cause: usize) -> (bool, Kind) {
+        let candidate = &self.candidates[cause];
+        let before: usize = (fit.causes.iter().take_while(|known| **known != cause))
+            .map(|known| self.candidates[*known].own.len())
+            .sum();
+        let own = fit.values[before..]
+            .iter()
+            .zip(&candidate.own)
+            .zip(candidate.form.knobs);
+        let is_untypical = |((value, model), knob): ((&f64, &f64), &Knob)| {
+            let parameter = knob.keys.first().and_then(|key| plant::parameter(key));
+            let most = parameter.map_or(f64::INFINITY, |parameter| parameter.typical.1.abs());
+            value.abs() > UNTYPICAL * most.max(model.abs())
+        };
+        (own.into_iter().any(is_untypical), candidate.cause.kind)
+    }
+
     /// Puts `leader`, a rival of `member`, in the place of the best; its new cause stands last.
     fn lead(&mut self, member: usize, leader: Fit) {
         let Some(best) = self.best.take() else { return };

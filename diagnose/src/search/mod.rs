@@ -153,12 +153,17 @@ impl Searcher<'_> {
         let mut leaders = singles.to_vec();
         leaders.retain(|fit| fit.values.len() <= most);
         self.sort(&mut leaders);
-        let Some(first) = leaders.first() else {
+        let is_enough = |fit: &&Fit| {
+            null.chi2 - fit.state.chi2 >= threshold(fit.values.len(), self.inflation(fit))
+                || self.stands_for_edges(null, fit)
+        };
+        let Some(first) = leaders
+            .first()
+            .filter(is_enough)
+            .or_else(|| leaders.iter().find(is_enough))
+        else {
             return (None, Vec::new());
         };
-        if null.chi2 - first.state.chi2 < threshold(first.values.len(), self.inflation(first)) {
-            return (None, Vec::new());
-        }
         let mut best = self.polished(first);
         while best.causes.len() < MOST && best.values.len() < most && !self.is_hopeless(&best) {
             let stage = format!("more than {}", self.names(&best));
@@ -171,6 +176,9 @@ impl Searcher<'_> {
                 }
             }
             larger.retain(|fit| fit.values.len() <= most);
+            if larger.iter().any(|fit| self.stands_for_edges(&best.state, fit)) {
+                larger.retain(|fit| self.stands_for_edges(&best.state, fit));
+            }
             self.sort(&mut larger);
             let Some(next) = larger.first() else { break };
             if !self.is_worth(&best, next) {
@@ -240,6 +248,14 @@ impl Searcher<'_> {
         fits.iter().filter(is_new).collect()
     }
 
+    /// Whether a fit says what the edges of the gate do, where without it they would do more than edges can: the trim that stands beside
+    /// every fit takes a dead time as its own, at a price so small that the dead time would gain too little.
+    fn stands_for_edges(&self, without: &State, fit: &Fit) -> bool {
+        let f_sw = self.fitter.problem.base.plant.converter.f_sw;
+        let is_too_much = |state: &State| state.starts.trim_of_nobody(f_sw).is_some();
+        is_too_much(without) && !is_too_much(&fit.state) && fit.state.chi2 < without.chi2
+    }
+
     /// How much structure a fit leaves.
     fn structure(&self, fit: &Fit) -> f64 {
         let left = structures(self.fitter.problem, self.fitter.null, &fit.state, 1.0);
@@ -252,6 +268,9 @@ impl Searcher<'_> {
         let gain = smaller.state.chi2 - larger.state.chi2;
         let more = larger.values.len().saturating_sub(smaller.values.len());
         let explained = self.fitter.null.chi2 - larger.state.chi2;
+        if self.stands_for_edges(&smaller.state, larger) {
+            return true;
+        }
         gain >= threshold(more, self.inflation(larger))
             && (gain >= ACCURACY * ACCURACY * explained || self.structure(larger) < 0.5 * self.structure(smaller))
     }
@@ -341,14 +360,25 @@ impl Searcher<'_> {
                 (!kept.is_empty()).then(|| self.fitter.from(&kept, &values, self.fitter.null))
             });
             let chi2 = |fit: &Option<Fit>| fit.as_ref().map_or(self.fitter.null.chi2, |fit| fit.state.chi2);
-            let evidence: Vec<f64> = fewer.iter().map(|fit| chi2(fit) - best.state.chi2).collect();
+            let inflation = self.inflation(&best);
+            let evidence = fewer.iter().enumerate().map(|(member, fit)| {
+                let lost = chi2(fit) - best.state.chi2;
+                let without = fit.as_ref().map_or(self.fitter.null, |fit| &fit.state);
+                let parameters = self.fitter.places(&best.causes[member..=member]).len();
+                match self.stands_for_edges(without, &best) {
+                    // what the trim takes over in its place is more than it may
+                    true => lost.max(threshold(parameters, inflation)),
+                    false => lost,
+                }
+            });
+            let evidence: Vec<f64> = evidence.collect();
             let weakest = members.iter().min_by(|a, b| evidence[**a].total_cmp(&evidence[**b]));
             let tiny = members.iter().find(|member| self.is_tiny(&best, **member));
             let Some(weakest) = tiny.or(weakest).copied() else {
                 return (None, Vec::new());
             };
             let parameters = self.fitter.places(&best.causes[weakest..=weakest]).len();
-            let needed = threshold(parameters, self.inflation(&best));
+            let needed = threshold(parameters, inflation);
             match (&fewer[weakest], tiny.is_some() || evidence[weakest] < needed) {
                 (Some(fewer), true) => best = fewer.clone(),
                 _ => return (Some(best), evidence),

@@ -36,6 +36,7 @@ pub mod fit;
 pub mod gain;
 pub mod instants;
 mod level;
+mod lines;
 mod median;
 pub mod next;
 pub mod noise;

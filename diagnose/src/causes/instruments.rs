@@ -4,11 +4,19 @@ use super::knob::Reach;
 use super::list::{AGE, FILTER, GAIN, form, knob, lag, searched};
 use super::{Cause, Kind, Search};
 
+// a load current between its steps does not change: a filter that is short against what is left of the period behind a step shows
+// nothing, and so no slope; and the ripple of an inductor current turns round where the filter passes a part of the period. A period
+// shows both
+const SLOW: Search = Search::OwnOr(&[&[10.0]]);
+const SLOW_APART: Search = Search::OwnOr(&[&[10.0, 10.0], &[0.0, 10.0]]);
+// as far as a sample in the middle of a period reaches behind a step at its start
+const OLD: Search = Search::OwnOr(&[&[35.0]]);
+
 pub(super) const SENSOR_LOW_PASS: Cause = Cause {
     id: "sensor_low_pass",
     kind: Kind::Instrument,
     forms: &[
-        form(
+        searched(
             "low-pass of the sensors",
             &[lag(
                 "time_constant",
@@ -19,44 +27,51 @@ pub(super) const SENSOR_LOW_PASS: Cause = Cause {
                 ],
                 FILTER,
             )],
+            SLOW,
         ),
-        form(
+        searched(
             "low-pass of the voltage sensor",
             &[lag("time_constant_v", &["sensors.v_out.low_pass"], FILTER)],
+            SLOW,
         ),
-        form(
+        searched(
             "low-pass of the inductor current sensor",
             &[lag("time_constant_i", &["sensors.i_l.low_pass"], FILTER)],
+            SLOW,
         ),
-        form(
+        searched(
             "low-pass of the load current sensor",
             &[lag("time_constant_o", &["sensors.i_out.low_pass"], FILTER)],
+            SLOW,
         ),
-        form(
+        searched(
             "low-pass of both current sensors",
             &[lag(
                 "time_constant_i",
                 &["sensors.i_l.low_pass", "sensors.i_out.low_pass"],
                 FILTER,
             )],
+            SLOW,
         ),
-        form(
+        searched(
             "low-pass of the sensors of output voltage and inductor current",
             &[lag(
                 "time_constant",
                 &["sensors.v_out.low_pass", "sensors.i_l.low_pass"],
                 FILTER,
             )],
+            SLOW,
         ),
-        form(
+        searched(
             "low-pass of the sensors of output voltage and load current",
             &[lag(
                 "time_constant",
                 &["sensors.v_out.low_pass", "sensors.i_out.low_pass"],
                 FILTER,
             )],
+            SLOW,
         ),
-        form(
+        searched(
             "low-pass of the voltage sensor, and another one of the current sensors",
             &[
                 lag("time_constant_v", &["sensors.v_out.low_pass"], FILTER),
@@ -66,6 +81,7 @@ pub(super) const SENSOR_LOW_PASS: Cause = Cause {
                     FILTER,
                 ),
             ],
+            SLOW_APART,
         ),
     ],
 };
@@ -83,13 +99,15 @@ pub(super) const SENSOR_DELAY: Cause = Cause {
             "delay of the inductor current sensor",
             &[knob("delay_i", &["sensors.i_l.delay"], AGE)],
         ),
-        form(
+        searched(
             "delay of the load current sensor",
             &[knob("delay_o", &["sensors.i_out.delay"], AGE)],
+            OLD,
         ),
-        form(
+        searched(
             "delay of both current sensors",
             &[knob("delay_i", &["sensors.i_l.delay", "sensors.i_out.delay"], AGE)],
+            OLD,
         ),
     ],
 };

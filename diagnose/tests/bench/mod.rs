@@ -238,10 +238,10 @@ impl Bench {
             (Wiring::Boost, false) => (self.v_in + open - v, i),
             (Wiring::BuckBoost, false) => (open - v, i),
         };
-        [
-            (across - self.dcr * i) / self.inductance,
-            (into - out) / self.capacitance,
-        ]
+        let rise = (across - self.dcr * i) / self.inductance;
+        // a current that has ended begins by a voltage in its direction alone
+        let rise = if i == 0.0 { rise.max(0.0) } else { rise };
+        [rise, (into - out) / self.capacitance]
     }
 
     /// What is true at the sensors.
@@ -265,18 +265,32 @@ impl Bench {
     fn advance(&self, x: &mut [f64; 2], filters: &mut [f64; 4], on: bool, load: (f64, f64), periods: f64) {
         let count = (periods / STEP).ceil().max(1.0);
         let h = periods / count / self.f_sw;
-        let moved = |x: &[f64; 2], k: &[f64; 2], h: f64| [x[0] + h * k[0], x[1] + h * k[1]];
         for _ in 0..count as usize {
             let before = self.shown(*x, on, load);
-            let a = self.slope(*x, on, load);
-            let b = self.slope(moved(x, &a, 0.5 * h), on, load);
-            let c = self.slope(moved(x, &b, 0.5 * h), on, load);
-            let d = self.slope(moved(x, &c, h), on, load);
-            for n in 0..2 {
-                x[n] += h / 6.0 * (a[n] + 2.0 * b[n] + 2.0 * c[n] + d[n]);
+            let start = *x;
+            self.step(x, on, load, h);
+            if x[0] < 0.0 {
+                // the diode ends the current inside of the step, and not at its end
+                let share = start[0] / (start[0] - x[0]);
+                *x = start;
+                self.step(x, on, load, share * h);
+                x[0] = 0.0;
+                self.step(x, on, load, (1.0 - share) * h);
+                x[0] = x[0].max(0.0);
             }
-            x[0] = x[0].max(0.0);
             self.follow(filters, before, self.shown(*x, on, load), periods / count);
+        }
+    }
+
+    /// A step by Runge and Kutta's method.
+    fn step(&self, x: &mut [f64; 2], on: bool, load: (f64, f64), h: f64) {
+        let moved = |x: &[f64; 2], k: &[f64; 2], h: f64| [x[0] + h * k[0], x[1] + h * k[1]];
+        let a = self.slope(*x, on, load);
+        let b = self.slope(moved(x, &a, 0.5 * h), on, load);
+        let c = self.slope(moved(x, &b, 0.5 * h), on, load);
+        let d = self.slope(moved(x, &c, h), on, load);
+        for n in 0..2 {
+            x[n] += h / 6.0 * (a[n] + 2.0 * b[n] + 2.0 * c[n] + d[n]);
         }
     }
 

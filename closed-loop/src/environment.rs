@@ -54,6 +54,9 @@ pub trait Environment: Clone + Send {
     /// The plant file's value of a number, by key (`switch.v_f`); nothing if there is none.
     fn parameter(&self, key: &str) -> Option<f64>;
 
+    /// Ripple of the inductor's current without losses at `v_out` V in continuous conduction, A peak to peak.
+    fn ideal_ripple(&self, v_out: f64) -> f64;
+
     /// Bytes that stand for the plant's file: equal plants, equal bytes.
     fn identity(&self) -> Vec<u8>;
 
@@ -106,6 +109,11 @@ impl<E: Environment> Environment for Varied<E> {
     fn parameter(&self, key: &str) -> Option<f64> {
         let own = self.numbers.iter().rev().find(|(name, _)| name == key);
         own.map_or_else(|| self.nominal.parameter(key), |(_, value)| Some(*value))
+    }
+
+    fn ideal_ripple(&self, v_out: f64) -> f64 {
+        // of the run that is under way, which has these numbers
+        self.nominal.ideal_ripple(v_out)
     }
 
     fn identity(&self) -> Vec<u8> {

@@ -83,6 +83,13 @@ impl Topology {
 }
 
 impl Parameters {
+    /// Ripple of the inductor's current without losses at `v_out` V in continuous conduction, A peak to peak.
+    #[must_use]
+    pub fn ideal_ripple(&self, v_out: f64) -> f64 {
+        let converter = &self.converter;
+        converter.topology.ripple(converter.v_in, v_out) * self.t_sw() / converter.inductance
+    }
+
     /// Refuses every topology but the buck, for what is built for that one alone; `what` is its name, such as `drm fit`.
     ///
     /// # Errors

@@ -119,6 +119,10 @@ impl Environment for Witness {
         self.converter.parameter(key)
     }
 
+    fn ideal_ripple(&self, v_out: f64) -> f64 {
+        self.converter.ideal_ripple(v_out)
+    }
+
     fn identity(&self) -> Vec<u8> {
         self.converter.identity()
     }

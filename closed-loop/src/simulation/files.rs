@@ -9,7 +9,7 @@ use super::{page, pictures, words};
 use crate::faults::{Error, told};
 use crate::limit::Bound;
 use crate::scenario::Metrics;
-use crate::tables::{MetricsCsv, comparison, trajectory_csv};
+use crate::tables::{MetricsCsv, at_rest, comparison, trajectory_csv};
 
 /// Name of the page with everything on it, among the files.
 pub const PAGE: &str = "report.html";
@@ -95,9 +95,11 @@ impl Findings {
         for step in &self.steps {
             let courses = step.courses.iter();
             let controllers = courses.map(|(name, course)| (name.as_str(), &course.finding));
+            let resting = controllers.clone();
             let limits = step.limits.iter().map(|(name, limit)| (name.as_str(), limit));
             out.push('\n');
             out.push_str(&comparison(step.step, controllers, limits));
+            out.push_str(&at_rest(resting));
         }
         if let Some(check) = &self.check {
             out.push_str(&format!("\n{}\n", words::check_text(check)));

@@ -37,7 +37,7 @@ pub use faults::Error;
 pub use load_step::{LoadKind, LoadStep};
 pub use scenario_file::Scenario;
 pub use simulation::band_text;
-pub use suits::{held_by, holds_power, suits, v_ref};
+pub use suits::{held_by, holds_power, reaches, suits, v_ref};
 pub use tables::{
     AT_REST, COLUMNS, MetricsCsv, at_rest, cells, comparison, digits, evaluation_csv, limit_cells, limits, rest_cells,
     table, time_digits, trajectory_csv,

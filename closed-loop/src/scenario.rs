@@ -166,7 +166,7 @@ impl<E: Environment, C: FnMut(&Sample) -> f64> Loop<E, C> {
     pub fn start(mut environment: E, controller: C, v_ref: f64, load: Load) -> Result<Self, Error> {
         let sample = environment.restart(&Start {
             v_out: v_ref,
-            i_l: load.conductance * v_ref + load.current + load.power / v_ref,
+            i_l: environment.holding_current(v_ref, load.at(v_ref)),
             load,
             seed: 0,
             varied: &[],

@@ -61,7 +61,7 @@ fn a_duty_that_alternates_shows_in_all_three_figures() {
 #[test]
 fn a_pid_controller_at_rest_does_nothing() {
     let plant = Parameters::paper_model();
-    let mut pid = Baseline::new(Kind::Pid, &plant, 100.0).unwrap();
+    let mut pid = Baseline::new(Kind::Pid, &plant, 100.0, 20.0).unwrap();
     let found = at_rest(&plant, |sample| pid.step(sample));
     assert!(
         found.duty_activity < 1e-6 && found.current_swing < 1e-4 && found.subharmonic < 1e-6,

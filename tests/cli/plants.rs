@@ -113,7 +113,7 @@ fn what_has_no_start_and_no_limit_is_exit_code_2_with_its_reason() {
         ("new --plant nothing.toml --v-ref 12 --loads 20,120", "nothing.toml"),
         ("new weights.safetensors --v-ref 12", "--plant"),
         ("limit plant.toml --v-ref 12", "--load-step"),
-        ("limit plant.toml --v-ref 60 --load-step 20,120", "does not rest"),
+        ("limit plant.toml --v-ref 60 --load-step 20,120", "less than the source"),
         ("limit plant.toml --v-ref nan --load-step 20,120", "no voltage"),
         ("limit plant.toml --v-ref 3 --load-step 2,12", "v_fold"),
         ("limit plant.toml --v-ref 12 --load-step=-20,120", "no load step"),
@@ -122,7 +122,7 @@ fn what_has_no_start_and_no_limit_is_exit_code_2_with_its_reason() {
             "limit plant.toml --v-ref 12 --load-step 20,120 --duty 0.5,0.5",
             "no range",
         ),
-        ("limit boost.toml --v-ref 60 --load-step 20,120", "boost"),
+        ("limit boost.toml --v-ref 12 --load-step 20,120", "more than the source"),
     ] {
         desk.refuse(line, &[reason]);
     }

@@ -208,7 +208,7 @@ fn a_spread_that_makes_no_converter_is_refused_before_the_training() {
         ),
         (
             "set = { \"converter.topology\" = 1 }",
-            ["buck converter alone", "topology"],
+            ["[[spread]]", "another `converter.topology`"],
         ),
         // a duty ratio of what it was is one; a thousand times the largest inductance is none
         (

@@ -8,7 +8,7 @@ use crate::load_step::{LoadKind, LoadStep};
 use crate::scenario::{Finding, Metrics};
 
 /// The columns of [`Metrics`] in a CSV file.
-const FIGURES: &str = "deviation_V,settling_s,tail_mean_V,tail_max_V,pre_error_V,ripple_V,duty_activity,current_swing,\
+pub(crate) const FIGURES: &str = "deviation_V,settling_s,tail_mean_V,tail_max_V,pre_error_V,ripple_V,duty_activity,current_swing,\
                        subharmonic,subharmonic_periods";
 
 impl Finding {
@@ -228,7 +228,7 @@ impl MetricsCsv {
     }
 }
 
-fn figures(m: &Metrics) -> String {
+pub(crate) fn figures(m: &Metrics) -> String {
     format!(
         "{},{},{},{},{},{},{},{},{},{}",
         m.deviation,

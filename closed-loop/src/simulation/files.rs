@@ -76,7 +76,18 @@ impl Findings {
         files.insert("metrics.csv".to_owned(), metrics.finish());
         files.insert("metrics.json".to_owned(), json(self)?);
         files.insert("summary.txt".to_owned(), self.summary());
-        files.insert(PAGE.to_owned(), page::page(self, drawn)?);
+        let mut maps = Vec::new();
+        if let Some(spread) = &self.spread {
+            files.insert("spread.csv".to_owned(), spread.csv());
+            maps = spread.maps()?;
+            for (name, svg) in &maps {
+                files.insert(
+                    format!("spread-{}.svg", name.replace(' ', "-")),
+                    svg.as_str().to_owned(),
+                );
+            }
+        }
+        files.insert(PAGE.to_owned(), page::page(self, drawn, maps)?);
         Ok(files)
     }
 
@@ -100,6 +111,9 @@ impl Findings {
             out.push('\n');
             out.push_str(&comparison(step.step, controllers, limits));
             out.push_str(&at_rest(resting));
+        }
+        if let Some(spread) = &self.spread {
+            out.push_str(&format!("\n{}", spread.text()));
         }
         if let Some(check) = &self.check {
             out.push_str(&format!("\n{}\n", words::check_text(check)));
@@ -125,6 +139,7 @@ impl Findings {
             controller,
             steps,
             check,
+            ..
         } = self;
         Json {
             policy: &setting.policy.name,

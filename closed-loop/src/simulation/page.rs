@@ -8,8 +8,8 @@ use crate::faults::{Error, told};
 use crate::scenario::Metrics;
 use crate::tables::{AT_REST, COLUMNS, cells, digits, limit_cells, rest_cells, time_digits};
 
-/// One HTML file; `drawn` are the pictures of the load steps in their order.
-pub(super) fn page(found: &Findings, drawn: Vec<Svg>) -> Result<String, Error> {
+/// One HTML file; `drawn` are the pictures of the load steps in their order, `maps` those of the spread.
+pub(super) fn page(found: &Findings, drawn: Vec<Svg>, maps: Vec<(String, Svg)>) -> Result<String, Error> {
     let setting = &found.setting;
     let (verdict, sentence) = verdict(found);
     let setup = [
@@ -27,6 +27,9 @@ pub(super) fn page(found: &Findings, drawn: Vec<Svg>) -> Result<String, Error> {
     for (step, picture) in found.steps.iter().zip(drawn) {
         let section = Section::new(step.step.to_string()).chart(picture, CAPTION);
         page = page.section(section.table(table(step)).table(at_rest(step)));
+    }
+    if let Some(spread) = &found.spread {
+        page = page.section(spread.section(maps));
     }
     page.html().map_err(told)
 }

@@ -4,6 +4,7 @@ use policy::Scalar;
 use toml_input::{Fault, Message};
 
 use super::findings::{Check, Findings, LAW, POLICY, Setting, Step};
+use super::spread;
 use crate::agent::Agent;
 use crate::baselines::Baseline;
 use crate::controller::{Classical, Controller, Trajectory, follow};
@@ -69,7 +70,12 @@ pub fn simulate(mut setting: Setting, mut named: Vec<Named>, tell: &mut Tell<'_>
         steps.push(Step { step, courses, limits });
         progress.done += 1;
     }
+    let mut all: Vec<(&str, &mut Box<dyn Controller>)> = Vec::new();
+    all.extend(named.first_mut().map(|first| (POLICY, &mut first.controller)));
+    all.extend(beside.iter_mut().map(|(name, controller)| (*name, controller)));
+    let spread = spread::run(&setting, &mut all, &mut |what| (progress.tell)(&format_args!("{what}")))?;
     Ok(Findings {
+        spread,
         controller: named.first().map(|named| named.name.clone()).unwrap_or_default(),
         setting,
         steps,
@@ -84,7 +90,7 @@ fn classical(setting: &mut Setting) -> Vec<Beside> {
     let i_out = loads.map(|load| load.at(v_ref)).fold(0.0, f64::max);
     let mut found: Vec<Beside> = Vec::new();
     for kind in &setting.scenario.baselines {
-        match Baseline::new(*kind, setting.converter.parameters(), v_ref, i_out) {
+        match Baseline::new(*kind, &setting.designed_on, v_ref, i_out) {
             Ok(design) => found.push((kind.name(), Box::new(Classical::from(design)))),
             Err(error) => setting.notes.extend(error.iter().map(reason)),
         }

@@ -84,7 +84,7 @@ impl Base {
     pub fn patience_in_words(&self) -> &'static str {
         match self {
             Self::Observed(_) => "ten periods",
-            Self::Measured { .. } => "four time constants of the law's voltage loop",
+            Self::Measured { .. } => "ten periods, and four time constants of its loop",
         }
     }
 

@@ -14,6 +14,8 @@ pub const SCENARIO: &str = "scenario.toml";
 // The scales are those of examples/train/measured, whose features, bands and dead zone were tuned on the converter of the paper,
 // as shares of its smallest deviation of 1.6 V and its load step of 8 A.
 
+/// Control periods behind a load step, as a scenario has by default.
+const USUAL_AFTER: usize = 300;
 /// Of that converter, V and A.
 const MODEL: [f64; 2] = [1.6, 8.0];
 
@@ -140,11 +142,12 @@ impl Start {
              sampling_instants = 2\n\
              instants = 12\n\
              lead = 150\n\
-             after = 300\n\
+             after = {}\n\
              tail = 60\n\
              \n\
              [evaluation]                   # on these it is judged\n\
              load_steps = [[{low:?}, {high:?}], [{high:?}, {low:?}]]\n\
+             {}\
              \n\
              [[spec]]\n\
              deviation = {:?}             # V: 1.1 of what no controller can beat\n\
@@ -155,6 +158,8 @@ impl Start {
             self.wanted.v_ref,
             bands.join(", "),
             rounded(1.0 / volts, 2),
+            self.after().unwrap_or(USUAL_AFTER),
+            self.after_line(),
             self.most_deviation(&self.limits),
             self.most_settling(&self.limits, 10.0),
             self.base.patience_in_words(),
@@ -178,6 +183,17 @@ impl Start {
             )
         };
         self.spread.iter().map(table).collect()
+    }
+
+    /// Control periods behind a load step, where the usual ones are not enough for the law to come to rest before the tail.
+    fn after(&self) -> Option<usize> {
+        let patience = self.base.patience();
+        (patience > 0.0).then(|| USUAL_AFTER + (patience / 50.0).ceil() as usize * 50)
+    }
+
+    fn after_line(&self) -> String {
+        let line = |after| format!("after = {after}                    # periods: its voltage loop is slow\n");
+        self.after().map_or_else(String::new, line)
     }
 
     /// V; a tenth more than what no controller can beat.
@@ -210,11 +226,13 @@ impl Start {
              load_steps = [[{low:?}, {high:?}], [{high:?}, {low:?}]]    # W\n\
              baselines = [{}]\n\
              {}\
+             {}\
              # on a converter whose parts are 15 % smaller than their print says:\n\
              # \"converter.inductance\" = {:?}\n\
              # \"converter.capacitance\" = {:?}\n",
             self.base.beside_it(),
             self.base.baselines(),
+            self.after_line(),
             match self.set() {
                 none if none.is_empty() => "\n[set]\n".to_owned(),
                 some => some,

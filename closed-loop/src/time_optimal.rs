@@ -118,15 +118,17 @@ impl TimeOptimal {
             if dv.abs() < 1e-9 * target.v_out && di.abs() < 1e-7 * a {
                 return Some(duties[0]);
             }
-            let [x, y] = match self.topology {
+            duties = match self.topology {
                 // dv = b ((1 + later) x + later y), di = a (x + y)
                 Topology::Buck => {
                     let x = dv / b - later * di / a;
-                    [x, di / a - x]
+                    [duties[0] + x, duties[1] + di / a - x]
                 }
-                _ => self.newton_step(v_out, i_l, load, duties, [end.v_out, end.i_l], [dv, di])?,
+                _ => {
+                    let [x, y] = self.newton_step(v_out, i_l, load, duties, [end.v_out, end.i_l], [dv, di])?;
+                    [duties[0] + x, duties[1] + y]
+                }
             };
-            duties = [duties[0] + x, duties[1] + y];
             if !duties.into_iter().all(allowed) {
                 return None;
             }

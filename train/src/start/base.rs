@@ -88,6 +88,14 @@ impl Base {
         }
     }
 
+    /// Why settling takes longer with other parts.
+    pub fn why_longer(&self) -> &'static str {
+        match self {
+            Self::Observed(_) => "the observer has to find the other parts first",
+            Self::Measured { .. } => "the law is not made for these parts",
+        }
+    }
+
     /// The name of the converter.
     pub fn word(&self) -> &'static str {
         match self {

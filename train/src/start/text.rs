@@ -175,10 +175,11 @@ impl Start {
                 "\n[[spread]]                     # it has to hold here as well; the limit is another one\n\
                  factor = {{ \"converter.inductance\" = {factor:?}, \"converter.capacitance\" = {factor:?} }}\n\
                  deviation = {:?}\n\
-                 settling = {:?}              # the observer has to find the other parts first\n\
+                 settling = {:?}              # {}\n\
                  tail = {:?}\n",
                 self.most_deviation(limits),
                 self.most_settling(limits, 60.0),
+                self.base.why_longer(),
                 self.most_tail(),
             )
         };

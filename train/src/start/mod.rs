@@ -97,8 +97,8 @@ impl Start {
         };
         let topology = plant.converter.topology;
         match topology {
-            Topology::Buck => drop(Design::new(plant, asked(Some(v_ref / STEPS)))?),
-            Topology::Boost | Topology::BuckBoost => drop(CurrentLaw::new(plant, v_ref, largest, file)?),
+            Topology::Buck => Design::new(plant, asked(Some(v_ref / STEPS))).map(|_| ())?,
+            Topology::Boost | Topology::BuckBoost => CurrentLaw::new(plant, v_ref, largest, file).map(|_| ())?,
         }
         holds_power(plant, v_ref, file)?;
         let needed = topology.duty(plant.converter.v_in, v_ref);

@@ -261,6 +261,11 @@ impl Environment for SpiceConverter {
         plant::parameter(key).map(|parameter| parameter.get(&self.nominal))
     }
 
+    fn ideal_ripple(&self, v_out: f64) -> f64 {
+        let parameters = self.start.as_ref().map_or(&self.nominal, |start| &start.parameters);
+        parameters.ideal_ripple(v_out)
+    }
+
     fn identity(&self) -> Vec<u8> {
         format!("ngspice {:?}", self.nominal).into_bytes()
     }

@@ -269,6 +269,13 @@ pub struct Simulate {
     /// Plant file in the place of the scenario's
     #[arg(long, value_name = "PLANT")]
     pub plant: Option<PathBuf>,
+    /// Design the classical controllers on this plant file, not on the plant they run on
+    #[arg(long, value_name = "PLANT")]
+    pub designed_on: Option<PathBuf>,
+    /// Judge all controllers on converters with other values of a number of the plant, too; the classical ones keep their design.
+    /// Given twice, every value meets every other, and the page has a map. N is 5 unless given
+    #[arg(long, value_name = "KEY=LOW,HIGH[,N]")]
+    pub spread: Vec<String>,
     /// Folder for metrics, trajectories and pictures; made if missing
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,

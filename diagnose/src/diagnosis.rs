@@ -20,7 +20,6 @@ use crate::profile::Profile;
 use crate::progress::{Listener, Progress};
 use crate::quantised;
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
-use crate::shape::Structure;
 use crate::words::{nearest, sentence, shifted, si};
 use crate::worth::{self, Worth};
 
@@ -319,15 +318,6 @@ fn notes(found: &Examined, pair: Option<&Pair>) -> Vec<String> {
         format!("{id} would fit a little better, by less than two simulators of one circuit differ: not named")
     }));
     notes.extend(pair.into_iter().flat_map(|pair| pair.remarks.clone()));
-    if !found.named.is_empty() {
-        let beside = |line: &Structure| {
-            format!(
-                "{} holds {}: no cause on the list makes it, and none of those named takes it away",
-                line.channel, line.shape
-            )
-        };
-        notes.extend(found.lines.iter().map(beside));
-    }
     notes.extend(edges(found));
     // of what was found: where the model as given is far off, so are the instants of load steps that fit it best
     if found.verdict != Verdict::Unexplained {

@@ -7,7 +7,6 @@ use crate::findings::{Evidence, Named, Value, Verdict};
 use crate::fit::State;
 use crate::gain::{self, Pair};
 use crate::instants;
-use crate::lines;
 use crate::noise::{self, Outlier};
 use crate::preflight;
 use crate::problem::Problem;
@@ -36,8 +35,6 @@ pub struct Examined {
     pub lattice: Option<Named>,
     /// What is left.
     pub structure: Vec<Structure>,
-    /// Lines up to half of the sampling rate that stand out of the noise.
-    pub lines: Vec<Structure>,
     /// What speaks against the causes.
     pub doubts: Vec<Doubt>,
     /// Rows left out.
@@ -57,8 +54,7 @@ pub fn examined(train: Vec<Record>, base: &Model, say: Listener<'_>) -> Examined
     let (mut problem, mut attribution) = attribute(problem, null, say);
     instants::note(&mut problem, &attribution.state().starts);
     // what is too small for a cause still leaves no structure
-    let lines = lines::of(&problem, &attribution.null, attribution.state());
-    let structure = left(&problem, &attribution, &lines);
+    let structure = structures(&problem, &attribution.null, attribution.state(), attribution.inflation);
     let mut profiles = held_by_data(&problem, &mut attribution, &structure, say);
     // behind the profiles: whether a cause is nothing is read off its intervals
     let nothing = attribution.leave_out_nothing(&problem, &mut profiles);
@@ -75,23 +71,10 @@ pub fn examined(train: Vec<Record>, base: &Model, say: Listener<'_>) -> Examined
         named,
         lattice,
         structure,
-        lines,
         doubts,
         outliers,
         odd,
     }
-}
-
-/// What is left: what is slow or loud, and where nothing is explained a line that stands out of the noise. Causes that explain all but a
-/// line are told, with the line beside them: it is no louder than the noise, or the channel would be wild.
-fn left(problem: &Problem, attribution: &Attribution, lines: &[Structure]) -> Vec<Structure> {
-    let mut structure = structures(problem, &attribution.null, attribution.state(), attribution.inflation);
-    if attribution.best.is_none() {
-        let is_new = |line: &&Structure| structure.iter().all(|one| one.channel != line.channel);
-        let new: Vec<Structure> = lines.iter().filter(is_new).cloned().collect();
-        structure.extend(new);
-    }
-    structure
 }
 
 impl Examined {
@@ -110,8 +93,7 @@ impl Examined {
     /// What the fit and its profiles say.
     fn answer(&mut self) {
         let (problem, attribution) = (&self.problem, &self.attribution);
-        self.lines = lines::of(problem, &attribution.null, attribution.state());
-        self.structure = left(problem, attribution, &self.lines);
+        self.structure = structures(problem, &attribution.null, attribution.state(), attribution.inflation);
         self.named = named(attribution, &self.profiles);
         self.doubts = doubts::of(problem, attribution, &self.profiles, &self.structure);
         let holds = self.structure.is_empty() && !doubts::forbids(&self.named, &self.doubts);

@@ -36,7 +36,6 @@ pub mod fit;
 pub mod gain;
 pub mod instants;
 mod level;
-mod lines;
 mod median;
 pub mod next;
 pub mod noise;

@@ -228,31 +228,3 @@ fn a_dead_time_just_beyond_what_edges_do_is_named_and_withholds_nothing() {
     };
     assert!((0.0013..=0.0023).contains(&share), "{value:?}");
 }
-
-/// A quarter of the sampling rate, a third of the noise: neither the size of a channel nor block means show it.
-#[test]
-fn a_dither_below_the_noise_is_seen() {
-    let (model, mut random) = (model(), Noise(103));
-    let [duty, load, _] = benches(&Bench::default()).map(|one| {
-        let mut table = one.run();
-        for (n, value) in table.column("i_l").iter_mut().enumerate() {
-            *value += if n & 2 == 0 { 0.02 } else { -0.02 };
-        }
-        let set = (0..ROWS).map(|n| {
-            one.load
-                .iter()
-                .rev()
-                .find(|step| step.0 <= n as f64)
-                .map_or(0.0, |step| step.2)
-        });
-        table.with("i_load", set.collect()).measured(&NOISE, &mut random)
-    });
-    let train = vec![duty.read("duty", &model).unwrap(), load.read("load", &model).unwrap()];
-    let findings = diagnose(&model, train, &[], &|_| {}).findings;
-    assert_eq!(findings.verdict, Verdict::Unexplained, "{}", findings.sentence);
-    assert!(
-        findings.sentence.contains("i_l of") && findings.sentence.contains("a line near 2.500 kHz"),
-        "{}",
-        findings.sentence
-    );
-}

@@ -25,21 +25,6 @@ pub(super) const SOURCE_IMPEDANCE: Cause = Cause {
             ],
             Search::From(&[&[4.0, 1.0], &[4.0, 20.0]]),
         ),
-        searched(
-            "resistance and inductance of the source before an input capacitor with its resistance",
-            &[
-                knob(
-                    "resistance",
-                    &["source.resistance"],
-                    Reach::ResistanceFrom(0.002, 0.5, 0.005),
-                ),
-                // with the capacitor it rings at up to half the sampling rate, where it still shows
-                knob("inductance", &["source.inductance"], Reach::Inductance(0.0, 1.0, 0.005)),
-                knob("c_in", &["source.c_in"], Reach::Capacitance(10.0, 1e6, 20.0)),
-                knob("esr_in", &["source.esr_in"], OHMS),
-            ],
-            Search::From(&[&[4.0, 4.0, 1.0, 2.0], &[4.0, 4.0, 20.0, 2.0]]),
-        ),
     ],
 };
 

@@ -2,10 +2,6 @@
 //!
 //! A folder in which the files of two runs are mixed compiles, and commands duties that no policy has. So the header defines
 //! a macro whose name is a digest of everything that decides the files, and each source asks for it.
-//!
-//! An application that was compiled with another run's header asks for nothing: its state may have another size, and the step then
-//! writes behind it. So the header also gives `init`, which every application calls, a name with that digest: the linker refuses
-//! the two.
 
 use policy::Policy;
 use targets::TargetSpec;
@@ -16,21 +12,15 @@ use crate::files::{GeneratedFiles, TOOL};
 /// Puts the stamp into the core's header, and the question for it into every C source that sees the header.
 pub(crate) fn stamp(files: &mut GeneratedFiles, policy: &Policy, target: &TargetSpec) {
     let (name, upper) = (&policy.name, policy.name.to_uppercase());
-    let run = format!("{:08x}", digest(policy, target));
-    let macro_name = format!("{upper}_RUN_{run}");
+    let macro_name = format!("{upper}_RUN_{:08x}", digest(policy, target));
     for (file, text) in &mut files.files {
         if *file == format!("{name}.h") {
             let guard = format!("#define {upper}_H\n");
             // behind the guard, so that a header which is included twice defines it once
             let line = format!(
-                "{guard}\n/* The run of policyc that wrote this file: the sources ask for it, and the linker by the name of {name}_init. */\n\
-                 #define {macro_name} 1\n#define {name}_init {name}_init_{run}\n"
+                "{guard}\n/* The run of policyc that wrote this file; the sources ask for it. */\n#define {macro_name} 1\n"
             );
             *text = text.replacen(&guard, &line, 1);
-        } else if file.ends_with(".rs") {
-            // Rust that calls the C sees no header
-            let declared = format!("#[link_name = \"{name}_init\"]");
-            *text = text.replacen(&declared, &format!("#[link_name = \"{name}_init_{run}\"]"), 1);
         } else if file.ends_with(".c") {
             // a header of the controller includes the core's, and no other header does
             let include = format!("#include \"{name}");

@@ -11,7 +11,7 @@ use crate::diagnosis::Diagnosis;
 use crate::findings::{Named, Verdict};
 use crate::gain::Regime;
 use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS};
-use crate::words::{needs, si, unit};
+use crate::words::{si, unit};
 
 /// The page as HTML.
 ///
@@ -58,7 +58,7 @@ fn causes(diagnosis: &Diagnosis) -> Section {
             .text("95 %");
         table = table.number("evidence", 0).text("rivals");
         for cause in list {
-            let rivals: Vec<String> = cause.rival_values.iter().map(|values| needs(values)).collect();
+            let rivals: Vec<String> = cause.rivals.iter().map(|ids| ids.join(" + ")).collect();
             for (name, v) in &cause.parameters {
                 let evidence = cause.evidence.delta_chi2;
                 // the step of a converter is read off, not fitted: `quantised` writes f64::MAX

@@ -74,7 +74,6 @@ pub fn cause(problem: &Problem) -> Option<Named> {
             threshold: 0.0,
         },
         rivals: Vec::new(),
-        rival_values: Vec::new(),
     })
 }
 

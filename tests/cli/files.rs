@@ -262,34 +262,6 @@ fn a_source_refuses_the_header_of_another_run() {
     }
 }
 
-/// An application of one run with the core of another has a state of another size, and the step writes behind it.
-#[test]
-fn an_application_does_not_link_with_the_core_of_another_run() {
-    let desk = Desk::new("linear");
-    desk.succeed("compile policy --out first --emit c");
-    desk.edit("policy/policy.toml", "hold = ", "hold = 1");
-    desk.succeed("compile policy --out second --emit c");
-    let main = "#include \"linear.h\"\nint main(void) { linear_state s; linear_init(&s); return 0; }\n";
-    std::fs::write(desk.path("main.c"), main).unwrap();
-    let built = |header: &str, core: &str| {
-        let mut gcc = std::process::Command::new("gcc");
-        gcc.args(["-std=c99", "-ffp-contract=off", "-I"])
-            .arg(desk.path(header))
-            .args(["-o".as_ref(), desk.path("application").as_os_str()])
-            // the core is compiled with its own header, as a stale object is
-            .arg(desk.path("main.c"))
-            .arg(desk.path(core).join("linear.c"));
-        run(&mut gcc)
-    };
-    assert_eq!(built("first", "first").code, Some(0));
-    let ran = built("first", "second");
-    assert!(
-        ran.code == Some(1) && ran.stderr.contains("undefined reference to `linear_init_"),
-        "{}",
-        ran.stderr
-    );
-}
-
 /// `buck` with an S-function has a `buck_block.c`; so has a policy of that name.
 #[test]
 fn no_policy_is_called_like_a_file_beside_another() {

@@ -69,7 +69,7 @@ pub struct Controller {
 mod c {
     use super::{Command, IntegrityCheck, Measurement, Controller};
     unsafe extern "C" {
-        #[link_name = "adc_mapping_init_be8c7b7d"]
+        #[link_name = "adc_mapping_init"]
         pub fn init(state: *mut Controller);
         #[link_name = "adc_mapping_reset"]
         pub fn reset(state: *mut Controller);

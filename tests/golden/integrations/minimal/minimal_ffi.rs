@@ -69,7 +69,7 @@ pub struct Controller {
 mod c {
     use super::{Command, IntegrityCheck, Measurement, Controller};
     unsafe extern "C" {
-        #[link_name = "minimal_init_f28cb5c4"]
+        #[link_name = "minimal_init"]
         pub fn init(state: *mut Controller);
         #[link_name = "minimal_reset"]
         pub fn reset(state: *mut Controller);

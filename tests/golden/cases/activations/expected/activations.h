@@ -11,9 +11,8 @@
 #ifndef ACTIVATIONS_H
 #define ACTIVATIONS_H
 
-/* The run of policyc that wrote this file: the sources ask for it, and the linker by the name of activations_init. */
+/* The run of policyc that wrote this file; the sources ask for it. */
 #define ACTIVATIONS_RUN_d12b23ca 1
-#define activations_init activations_init_d12b23ca
 
 #include <stdint.h>
 

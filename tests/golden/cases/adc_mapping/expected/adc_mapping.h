@@ -11,9 +11,8 @@
 #ifndef ADC_MAPPING_H
 #define ADC_MAPPING_H
 
-/* The run of policyc that wrote this file: the sources ask for it, and the linker by the name of adc_mapping_init. */
+/* The run of policyc that wrote this file; the sources ask for it. */
 #define ADC_MAPPING_RUN_be8c7b7d 1
-#define adc_mapping_init adc_mapping_init_be8c7b7d
 
 #include <stdint.h>
 

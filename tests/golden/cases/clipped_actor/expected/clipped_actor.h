@@ -11,9 +11,8 @@
 #ifndef CLIPPED_ACTOR_H
 #define CLIPPED_ACTOR_H
 
-/* The run of policyc that wrote this file: the sources ask for it, and the linker by the name of clipped_actor_init. */
+/* The run of policyc that wrote this file; the sources ask for it. */
 #define CLIPPED_ACTOR_RUN_17a0776c 1
-#define clipped_actor_init clipped_actor_init_17a0776c
 
 #include <stdint.h>
 

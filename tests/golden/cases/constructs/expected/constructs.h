@@ -11,9 +11,8 @@
 #ifndef CONSTRUCTS_H
 #define CONSTRUCTS_H
 
-/* The run of policyc that wrote this file: the sources ask for it, and the linker by the name of constructs_init. */
+/* The run of policyc that wrote this file; the sources ask for it. */
 #define CONSTRUCTS_RUN_38ef9b5b 1
-#define constructs_init constructs_init_38ef9b5b
 
 #include <stdint.h>
 

@@ -11,9 +11,8 @@
 #ifndef CONTINUOUS_H
 #define CONTINUOUS_H
 
-/* The run of policyc that wrote this file: the sources ask for it, and the linker by the name of continuous_init. */
+/* The run of policyc that wrote this file; the sources ask for it. */
 #define CONTINUOUS_RUN_504953a3 1
-#define continuous_init continuous_init_504953a3
 
 #include <stdint.h>
 

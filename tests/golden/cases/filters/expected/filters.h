@@ -11,9 +11,8 @@
 #ifndef FILTERS_H
 #define FILTERS_H
 
-/* The run of policyc that wrote this file: the sources ask for it, and the linker by the name of filters_init. */
+/* The run of policyc that wrote this file; the sources ask for it. */
 #define FILTERS_RUN_d0d75be9 1
-#define filters_init filters_init_d0d75be9
 
 #include <stdint.h>
 

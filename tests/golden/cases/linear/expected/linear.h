@@ -11,9 +11,8 @@
 #ifndef LINEAR_H
 #define LINEAR_H
 
-/* The run of policyc that wrote this file: the sources ask for it, and the linker by the name of linear_init. */
+/* The run of policyc that wrote this file; the sources ask for it. */
 #define LINEAR_RUN_aed563a3 1
-#define linear_init linear_init_aed563a3
 
 #include <stdint.h>
 

@@ -11,9 +11,8 @@
 #ifndef MINIMAL_H
 #define MINIMAL_H
 
-/* The run of policyc that wrote this file: the sources ask for it, and the linker by the name of minimal_init. */
+/* The run of policyc that wrote this file; the sources ask for it. */
 #define MINIMAL_RUN_f28cb5c4 1
-#define minimal_init minimal_init_f28cb5c4
 
 #include <stdint.h>
 

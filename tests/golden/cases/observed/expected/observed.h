@@ -11,9 +11,8 @@
 #ifndef OBSERVED_H
 #define OBSERVED_H
 
-/* The run of policyc that wrote this file: the sources ask for it, and the linker by the name of observed_init. */
+/* The run of policyc that wrote this file; the sources ask for it. */
 #define OBSERVED_RUN_2d574334 1
-#define observed_init observed_init_2d574334
 
 #include <stdint.h>
 

@@ -11,9 +11,8 @@
 #ifndef PAPER_H
 #define PAPER_H
 
-/* The run of policyc that wrote this file: the sources ask for it, and the linker by the name of paper_init. */
+/* The run of policyc that wrote this file; the sources ask for it. */
 #define PAPER_RUN_509a1eae 1
-#define paper_init paper_init_509a1eae
 
 #include <stdint.h>
 

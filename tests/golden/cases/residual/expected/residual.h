@@ -11,9 +11,8 @@
 #ifndef RESIDUAL_H
 #define RESIDUAL_H
 
-/* The run of policyc that wrote this file: the sources ask for it, and the linker by the name of residual_init. */
+/* The run of policyc that wrote this file; the sources ask for it. */
 #define RESIDUAL_RUN_b1ae556b 1
-#define residual_init residual_init_b1ae556b
 
 #include <stdint.h>
 

@@ -11,9 +11,8 @@
 #ifndef TAIL_BLOCKS_H
 #define TAIL_BLOCKS_H
 
-/* The run of policyc that wrote this file: the sources ask for it, and the linker by the name of tail_blocks_init. */
+/* The run of policyc that wrote this file; the sources ask for it. */
 #define TAIL_BLOCKS_RUN_e20b5b31 1
-#define tail_blocks_init tail_blocks_init_e20b5b31
 
 #include <stdint.h>
 

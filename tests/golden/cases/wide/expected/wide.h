@@ -11,9 +11,8 @@
 #ifndef WIDE_H
 #define WIDE_H
 
-/* The run of policyc that wrote this file: the sources ask for it, and the linker by the name of wide_init. */
+/* The run of policyc that wrote this file; the sources ask for it. */
 #define WIDE_RUN_9eaf6bdc 1
-#define wide_init wide_init_9eaf6bdc
 
 #include <stdint.h>
 

@@ -14,12 +14,12 @@
 //! ```
 //!
 //! A part of this picture that a converter does not have keeps its state where it was, with slope 0. So do the low-passes of the
-//! sensors, which nothing here depends on: [`Lag`] moves them on behind each step.
+//! sensors, which nothing here depends on: [`lag`] moves them on behind each step.
 
 use serde::{Deserialize, Serialize};
 
 use crate::effects::{dcr, derating, input_ripple, saturation};
-use crate::lag::Lag;
+use crate::lag;
 use crate::parameters::Parameters;
 use crate::plain::Track;
 use crate::rate::{self, has_c_in};
@@ -153,7 +153,7 @@ impl Full {
         // at least one step: an interval of length 0 would be 0 / 0
         let count = (h * self.rate.max(far)).ceil().max(1.0);
         let step = h / count;
-        let lags = self.lags(step);
+        let whole = lag::of_sensors(step, &self.low_pass);
         let mut before = self.algebra(x, path, load, t);
         extend(track, &before.signals, path);
         let mut used = 0.0;
@@ -178,8 +178,12 @@ impl Full {
             if let Some(v) = vertex(before.signals.v_out, mid.v_out, after.signals.v_out) {
                 track.voltage(v);
             }
-            let shown = [&before.signals, &mid, &after.signals];
-            self.filter(x, shown, (length == step).then_some(&lags), length);
+            if self.low_pass != [0.0; 4] {
+                // a crossing has shortened the step
+                let cut = (length != step).then(|| lag::of_sensors(length, &self.low_pass));
+                let shown = [&before.signals, &mid, &after.signals];
+                lag::follow(&mut x[SHOWN..], cut.as_ref().unwrap_or(&whole), shown);
+            }
             used += length;
             if crossed {
                 // exactly 0, because the next path is chosen by the sign of the current
@@ -193,33 +197,6 @@ impl Full {
             before = after;
         }
         h
-    }
-
-    /// The low-passes of the sensors over a step of `h` seconds.
-    fn lags(&self, h: f64) -> [Option<Lag>; 4] {
-        self.low_pass.map(|tau| (tau > 0.0).then(|| Lag::over(h, tau)))
-    }
-
-    /// Lets the low-passes of the sensors follow what is true at the start, in the middle and at the end of a step; of one that a
-    /// crossing has shortened to `length` they are made anew.
-    fn filter(&self, x: &mut States, shown: [&Signals; 3], whole: Option<&[Option<Lag>; 4]>, length: f64) {
-        if self.low_pass == [0.0; 4] {
-            return;
-        }
-        let own;
-        let lags = match whole {
-            Some(lags) => lags,
-            None => {
-                own = self.lags(length);
-                &own
-            }
-        };
-        let [first, middle, last] = shown.map(|s| [s.v_out, s.i_l, s.i_out, s.v_in]);
-        for (n, lag) in lags.iter().enumerate() {
-            if let Some(lag) = lag {
-                x[SHOWN + n] = lag.step(x[SHOWN + n], [first[n], middle[n], last[n]]);
-            }
-        }
     }
 
     /// When nothing is `left` of what keeps the path, by the Illinois method.

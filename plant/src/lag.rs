@@ -8,6 +8,8 @@
 //! A sensor does not act back on the circuit. So its time constant need not shorten the steps of the circuit, as it would in a
 //! Runge-Kutta method: ten microseconds beside a filter of half a millisecond cost four fifths of all steps.
 
+use crate::signals::Signals;
+
 /// What a step makes of the lag's state and of its input.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Lag {
@@ -43,6 +45,21 @@ impl Lag {
     pub fn step(&self, y: f64, input: [f64; 3]) -> f64 {
         let [first, middle, last] = self.weights;
         self.keep * y + (first * input[0] + middle * input[1] + last * input[2])
+    }
+}
+
+/// The low-passes of four sensors over a step of `h` seconds; none where the time constant is 0.
+pub(crate) fn of_sensors(h: f64, tau: &[f64; 4]) -> [Option<Lag>; 4] {
+    tau.map(|tau| (tau > 0.0).then(|| Lag::over(h, tau)))
+}
+
+/// Lets what four sensors show follow what is true at the start, in the middle and at the end of a step.
+pub(crate) fn follow(shown: &mut [f64], lags: &[Option<Lag>; 4], signals: [&Signals; 3]) {
+    let [first, middle, last] = signals.map(|s| [s.v_out, s.i_l, s.i_out, s.v_in]);
+    for (n, (shown, lag)) in shown.iter_mut().zip(lags).enumerate() {
+        if let Some(lag) = lag {
+            *shown = lag.step(*shown, [first[n], middle[n], last[n]]);
+        }
     }
 }
 

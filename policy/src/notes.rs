@@ -262,6 +262,20 @@ mod tests {
     }
 
     #[test]
+    fn a_soft_start_below_the_smallest_duty_is_told() {
+        let said = |from: f64| {
+            starts_below(&Limits {
+                duty: interval(0.4, 0.6),
+                slew: None,
+                soft_start: Some(crate::model::SoftStart { from, steps: 500 }),
+                initial_duty: 0.5,
+            })
+        };
+        assert!(said(0.05).is_some_and(|note| note.contains("the first step commands 0.4")));
+        assert_eq!((said(0.4), said(0.5)), (None, None));
+    }
+
+    #[test]
     fn a_mapping_that_covers_the_duties_has_no_note() {
         assert!(notes(&[0.3, 0.5], interval(0.2, 0.6), interval(0.2, 0.6)).is_empty());
     }

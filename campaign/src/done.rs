@@ -54,7 +54,9 @@ impl Done {
                 id: task.id.clone(),
                 kind: task.kind,
                 arguments: task.arguments.clone(),
-                inputs: inputs.map(|(path, content)| (path.clone(), content.digest.clone())).collect(),
+                inputs: inputs
+                    .map(|(path, content)| (path.clone(), content.digest.clone()))
+                    .collect(),
                 exit,
                 files: files.iter().map(digests).collect(),
             },
@@ -67,7 +69,9 @@ impl Done {
     /// # Errors
     /// If there is no record, or a file is not the one of which the record speaks.
     pub fn read(id: &str, mut files: BTreeMap<String, Vec<u8>>) -> Result<Self, Message> {
-        let record = files.remove(RECORD).ok_or_else(|| Message::new(format!("{id} has no {RECORD}")))?;
+        let record = files
+            .remove(RECORD)
+            .ok_or_else(|| Message::new(format!("{id} has no {RECORD}")))?;
         let record: Record = serde_json::from_slice(&record)
             .map_err(|error| Message::new(format!("{RECORD} of {id} is none")).found(error.to_string()))?;
         if record.id != id {

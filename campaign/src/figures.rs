@@ -49,7 +49,13 @@ const PROVE: &[Row] = &[("holds", "proof.json", "/holds")];
 /// The figures of a task's files. What a file does not say is left out.
 pub(crate) fn of(kind: Kind, files: &BTreeMap<String, Vec<u8>>) -> Figures {
     let mut read: BTreeMap<&str, Value> = BTreeMap::new();
-    for name in ["answer.json", "metrics.json", "certificate.json", "diagnosis.json", "proof.json"] {
+    for name in [
+        "answer.json",
+        "metrics.json",
+        "certificate.json",
+        "diagnosis.json",
+        "proof.json",
+    ] {
         let value = files.get(name).and_then(|bytes| serde_json::from_slice(bytes).ok());
         read.insert(name, value.unwrap_or(Value::Null));
     }
@@ -69,11 +75,18 @@ pub(crate) fn of(kind: Kind, files: &BTreeMap<String, Vec<u8>>) -> Figures {
     let at = |file: &str, place: &str| read.get(file).and_then(|value| value.pointer(place));
     match kind {
         Kind::Simulate => figures.extend(loads(at("metrics.json", "/load_steps"))),
-        Kind::Verify => figures.extend(counted("builds_", at("answer.json", "/report/builds"), "/outcome/result")),
+        Kind::Verify => figures.extend(counted(
+            "builds_",
+            at("answer.json", "/report/builds"),
+            "/outcome/result",
+        )),
         Kind::Prove => figures.extend(counted("claims_", at("proof.json", "/claims"), "/verdict")),
         Kind::Diagnose => {
             let causes = at("diagnosis.json", "/causes").and_then(Value::as_array);
-            let ids = causes.into_iter().flatten().filter_map(|cause| cause.get("id")?.as_str());
+            let ids = causes
+                .into_iter()
+                .flatten()
+                .filter_map(|cause| cause.get("id")?.as_str());
             figures.push(("causes".to_owned(), ids.collect::<Vec<_>>().join(" ").into()));
         }
         Kind::Train | Kind::Certify => {}
@@ -98,7 +111,12 @@ fn loads(steps: Option<&Value>) -> Figures {
     names.sort_by_key(|name| (name.as_str() != "policy", name.as_str()));
     let mut figures = Figures::new();
     for name in names {
-        for (figure, unit) in [("deviation", "V"), ("settling", "s"), ("tail_max", "V"), ("ripple", "V")] {
+        for (figure, unit) in [
+            ("deviation", "V"),
+            ("settling", "s"),
+            ("tail_max", "V"),
+            ("ripple", "V"),
+        ] {
             let of_step = |step: &&Value| step.get("controllers")?.get(name)?.get("worst")?.get(figure)?.as_f64();
             let worst = steps.iter().filter_map(of_step).fold(f64::NEG_INFINITY, f64::max);
             if worst.is_finite() {
@@ -117,6 +135,8 @@ fn counted(prefix: &str, list: Option<&Value>, place: &str) -> Figures {
             *counts.entry(word).or_default() += 1;
         }
     }
-    let named = counts.into_iter().map(|(word, count)| (format!("{prefix}{}", word.replace('-', "_")), count.into()));
+    let named = counts
+        .into_iter()
+        .map(|(word, count)| (format!("{prefix}{}", word.replace('-', "_")), count.into()));
     named.collect()
 }

@@ -78,7 +78,10 @@ impl Inputs {
         };
         Ok(Gathered {
             named: paths.iter().map(|path| seen(path)).collect(),
-            files: found.iter().map(|(path, content)| (seen(path), Arc::clone(content))).collect(),
+            files: found
+                .iter()
+                .map(|(path, content)| (seen(path), Arc::clone(content)))
+                .collect(),
         })
     }
 
@@ -176,11 +179,13 @@ pub(crate) fn named_in_plan(plan: &FileName, text: &str) -> Result<FileName, Mes
         Some(path) if path == name.path => Ok(name),
         // the contract in the folder that was named
         Some(_) => Ok(plan.beside(&format!("{text}/policy.toml"))),
-        None if name.path.is_dir() => {
-            Err(Message::new(format!("the folder `{text}` holds no policy.toml")).expected("a file, or the folder of a policy"))
-        }
+        None if name.path.is_dir() => Err(Message::new(format!("the folder `{text}` holds no policy.toml"))
+            .expected("a file, or the folder of a policy")),
         // in the words of every other file that cannot be found
-        None => Err(name.read(0).err().unwrap_or_else(|| Message::new(format!("`{text}` is not read")))),
+        None => Err(name
+            .read(0)
+            .err()
+            .unwrap_or_else(|| Message::new(format!("`{text}` is not read")))),
     }
 }
 
@@ -202,14 +207,26 @@ mod tests {
     #[test]
     fn what_a_file_names_is_gathered_through_files_and_folders() {
         let folder = tempfile::tempdir().unwrap();
-        write(folder.path(), "a/train.toml", "plant = \"../plants/p.toml\"\nlist = [{ policy = \"pol\" }]\nname = \"none\"\n");
+        write(
+            folder.path(),
+            "a/train.toml",
+            "plant = \"../plants/p.toml\"\nlist = [{ policy = \"pol\" }]\nname = \"none\"\n",
+        );
         write(folder.path(), "plants/p.toml", "[converter]\n");
         write(folder.path(), "a/pol/policy.toml", "[network]\nweights = \"w.bin\"\n");
         write(folder.path(), "a/pol/w.bin", "1");
         write(folder.path(), "a/other.toml", "");
         let found = gathered(folder.path(), "a/train.toml").unwrap();
         let names: Vec<&str> = found.files.keys().map(String::as_str).collect();
-        assert_eq!(names, ["in/a/pol/policy.toml", "in/a/pol/w.bin", "in/a/train.toml", "in/plants/p.toml"]);
+        assert_eq!(
+            names,
+            [
+                "in/a/pol/policy.toml",
+                "in/a/pol/w.bin",
+                "in/a/train.toml",
+                "in/plants/p.toml"
+            ]
+        );
         assert_eq!(found.named, ["in/a/train.toml"]);
     }
 

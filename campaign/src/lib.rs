@@ -19,8 +19,8 @@ mod page;
 mod plan;
 mod results;
 mod scripts;
-mod seeds;
 mod sections;
+mod seeds;
 mod task;
 
 pub use digest::sha256;

@@ -51,7 +51,11 @@ impl Results {
     fn verdict(&self) -> (Verdict, String) {
         let [done, failed, missing] = self.counts();
         let refused = self.refused().len();
-        let mut parts = vec![format!("{} of {} tasks are done", grouped(done as u64), grouped(self.rows.len() as u64))];
+        let mut parts = vec![format!(
+            "{} of {} tasks are done",
+            grouped(done as u64),
+            grouped(self.rows.len() as u64)
+        )];
         for (count, what) in [
             (failed, "failed"),
             (missing, "have not been run"),
@@ -85,7 +89,11 @@ impl Results {
         if best.is_empty() {
             return Ok(None);
         }
-        let mut table = Table::new("").text("training file").text("best seed").text("specification").text("seeds that meet it");
+        let mut table = Table::new("")
+            .text("training file")
+            .text("best seed")
+            .text("specification")
+            .text("seeds that meet it");
         for (_, heading, _, decimals) in TRAINED {
             table = table.number(heading, decimals);
         }
@@ -115,7 +123,10 @@ impl Results {
             )
             .table(table);
         Ok(Some(match self.points(&best) {
-            Some(chart) => section.chart(chart.svg()?, "Each point is a seed: the nearer to the lower left corner, the better."),
+            Some(chart) => section.chart(
+                chart.svg()?,
+                "Each point is a seed: the nearer to the lower left corner, the better.",
+            ),
             None => section,
         }))
     }
@@ -130,9 +141,11 @@ impl Results {
             for (other, state) in &self.rows {
                 let State::Done { figures, .. } = state else { continue };
                 let figure = |name| find(figures, name).and_then(Value::as_f64);
-                if let (true, Some(settling), Some(deviation)) =
-                    (other.axis("settings") == settings, figure("settling_s"), figure("deviation_V"))
-                {
+                if let (true, Some(settling), Some(deviation)) = (
+                    other.axis("settings") == settings,
+                    figure("settling_s"),
+                    figure("deviation_V"),
+                ) {
                     x.push(settling);
                     y.push(deviation);
                 }
@@ -184,7 +197,11 @@ impl Results {
                 State::Missing => ("missing", [].as_slice()),
             };
             cells.push(word.into());
-            cells.extend(names.iter().map(|name| Cell::from(find(figures, name).map(short).unwrap_or_default())));
+            cells.extend(
+                names
+                    .iter()
+                    .map(|name| Cell::from(find(figures, name).map(short).unwrap_or_default())),
+            );
             table = table.row(cells);
         }
         let heading = format!("{}: {} tasks", kind.name(), grouped(rows.len() as u64));

@@ -96,7 +96,8 @@ fn read(root: &mut Table<'_>, file: &FileName, faults: &mut Sink) -> Option<(Str
         });
         drafts.extend(of_kind.into_iter().flatten());
     }
-    if drafts.is_empty() && faults.is_empty() {
+    // a section under a wrong name is a fault already
+    if drafts.is_empty() && faults.is_empty() && root.count() <= usize::from(root.optional("name").is_some()) {
         let known = Kind::ALL.map(|kind| format!("[[{}]]", kind.name())).join(", ");
         let message = Message::new("the plan has no task").expected(format!("at least one of {known}"));
         faults.push(root.fault(message));

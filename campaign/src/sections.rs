@@ -95,7 +95,10 @@ impl Section<'_, '_, '_> {
             let with = |seed: &u64| {
                 let mut choice = vec![Word::File(named.file.clone())];
                 choice.extend(texts(["--seeds", &seed.to_string()]));
-                let axes = [("settings", Axis::Text(named.label.clone())), ("seed", Axis::Number(*seed))];
+                let axes = [
+                    ("settings", Axis::Text(named.label.clone())),
+                    ("seed", Axis::Number(*seed)),
+                ];
                 (axes, choice)
             };
             all.extend(own.iter().map(with));
@@ -103,7 +106,9 @@ impl Section<'_, '_, '_> {
         let drafts = all.into_iter().flat_map(|(axes, words)| {
             self.drafts.iter().map(move |draft| {
                 let mut draft = draft.clone();
-                draft.axes.extend(axes.clone().map(|(name, axis)| (name.to_owned(), axis)));
+                draft
+                    .axes
+                    .extend(axes.clone().map(|(name, axis)| (name.to_owned(), axis)));
                 draft.words.extend(words.clone());
                 draft
             })
@@ -131,14 +136,18 @@ impl Section<'_, '_, '_> {
         let steps = self.number("steps", 1, i64::MAX as u64).unwrap_or(20_000);
         let shards = self.number("shards", 1, 10_000).unwrap_or(1);
         let seed = self.number("seed", 0, i64::MAX as u64 / 2).unwrap_or(1);
-        let codes = self.table.with_default("codes", false, self.faults, |v, faults| v.boolean(faults));
+        let codes = self
+            .table
+            .with_default("codes", false, self.faults, |v, faults| v.boolean(faults));
         for trace in self.files("traces", None) {
             self.words(vec![Word::Text("--trace".to_owned()), Word::File(trace.file)]);
         }
         self.word("map", "--map");
         if !codes && shards > steps {
             let message = Message::new("more shards than steps");
-            let message = message.found(format!("shards {shards}, steps {steps}")).expected("shards <= steps");
+            let message = message
+                .found(format!("shards {shards}, steps {steps}"))
+                .expected("shards <= steps");
             self.faults.push(self.table.fault(message));
         }
         let shard = |number: u64| {
@@ -187,7 +196,9 @@ impl Section<'_, '_, '_> {
         let train = self.files("train", Some("measured records: `train = [\"bench.csv\"]`"));
         let heldout = self.files("heldout", None);
         let case = self.table.optional("name").and_then(|value| value.text(self.faults));
-        let case = case.map(str::to_owned).or(train.first().map(|named| named.label.clone()));
+        let case = case
+            .map(str::to_owned)
+            .or(train.first().map(|named| named.label.clone()));
         self.over(vec![Choice {
             axis: case.map(|case| ("case".to_owned(), Axis::Text(case))),
             words: listed("--train", &train),
@@ -219,7 +230,12 @@ impl Section<'_, '_, '_> {
 
     fn over_policies(&mut self) {
         let hint = "contracts or the folders that hold them: `policies = [\"buck12\"]`";
-        self.over_files("policies", "policy", (self.kind == Kind::Simulate).then_some("--policy"), Some(hint));
+        self.over_files(
+            "policies",
+            "policy",
+            (self.kind == Kind::Simulate).then_some("--policy"),
+            Some(hint),
+        );
     }
 
     fn over_formats(&mut self) {
@@ -296,7 +312,10 @@ impl Section<'_, '_, '_> {
     }
 
     fn flag(&mut self, key: &'static str, option: &str) {
-        if self.table.with_default(key, false, self.faults, |value, faults| value.boolean(faults)) {
+        if self
+            .table
+            .with_default(key, false, self.faults, |value, faults| value.boolean(faults))
+        {
             self.words(texts([option]));
         }
     }

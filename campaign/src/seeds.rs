@@ -13,7 +13,9 @@ pub(crate) fn read(value: &Value<'_>, faults: &mut Sink) -> Option<Vec<u64>> {
         return numbers(value, "seeds: [0, 1, 2] or { first = 0, count = 64 }", faults);
     }
     value.read_table("seeds", faults, |table, faults| {
-        let first = table.with_default("first", 0, faults, |value, faults| value.integer(0..=i64::MAX as u64 - MOST, faults));
+        let first = table.with_default("first", 0, faults, |value, faults| {
+            value.integer(0..=i64::MAX as u64 - MOST, faults)
+        });
         let count = table.required("count", "how many: `count = 64`", faults);
         let count = count.and_then(|value| value.integer(1..=MOST, faults))?;
         Some((first..first + count).collect())

@@ -11,6 +11,7 @@ use campaign::{Done, Kind, Plan, Task};
 use cli::api::{self, Local, Progress, Replacing, Session};
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyBytes;
 use toml_input::Message;
 
@@ -37,6 +38,13 @@ impl NativeCampaign {
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn copied(files: BTreeMap<String, PyBackedBytes>) -> BTreeMap<String, Vec<u8>> {
+    files
+        .into_iter()
+        .map(|(name, content)| (name, content.to_vec()))
+        .collect()
 }
 
 fn bytes(py: Python<'_>, files: BTreeMap<String, Vec<u8>>) -> Files<'_> {
@@ -86,7 +94,10 @@ impl NativeCampaign {
     /// Kind, command line, and path and digest of each input.
     fn shipped(&self, index: usize) -> PyResult<(&'static str, Vec<String>, BTreeMap<String, String>)> {
         let task = self.task(index)?;
-        let digests = task.inputs.iter().map(|(path, content)| (path.clone(), content.digest.clone()));
+        let digests = task
+            .inputs
+            .iter()
+            .map(|(path, content)| (path.clone(), content.digest.clone()));
         Ok((task.kind.name(), task.arguments.clone(), digests.collect()))
     }
 
@@ -98,8 +109,8 @@ impl NativeCampaign {
     }
 
     /// Keeps the result of a task.
-    fn store(&self, index: usize, exit: u8, files: BTreeMap<String, Vec<u8>>) -> PyResult<()> {
-        let done = Done::new(self.task(index)?, exit, files);
+    fn store(&self, index: usize, exit: u8, files: BTreeMap<String, PyBackedBytes>) -> PyResult<()> {
+        let done = Done::new(self.task(index)?, exit, copied(files));
         self.session.store(&done).map_err(failed)
     }
 
@@ -124,7 +135,11 @@ impl NativeCampaign {
                     // nobody may be listening any more
                     let _ = locked(&send).send(news);
                 };
-                let local = Local { jobs, stop, tell: &tell };
+                let local = Local {
+                    jobs,
+                    stop,
+                    tell: &tell,
+                };
                 local.run(session, session.pending())
             });
             let mut told = Ok(());
@@ -170,11 +185,12 @@ pub fn perform<'py>(
     py: Python<'py>,
     kind: &str,
     arguments: Vec<String>,
-    inputs: BTreeMap<String, Vec<u8>>,
+    inputs: BTreeMap<String, PyBackedBytes>,
 ) -> PyResult<(u8, Files<'py>, Option<String>)> {
     let names = Kind::ALL.map(Kind::name);
     let found = Kind::ALL.into_iter().find(|own| own.name() == kind);
     let kind = found.ok_or_else(|| raise(toml_input::messages::unknown("kind of task", kind, &names)))?;
+    let inputs = copied(inputs);
     let (performed, files) = py.detach(|| api::perform(kind, &arguments, &inputs)).map_err(failed)?;
     Ok((performed.exit, bytes(py, files), performed.reason))
 }
@@ -183,5 +199,10 @@ pub fn perform<'py>(
 #[pyfunction]
 pub fn on_ray(arguments: Vec<OsString>) -> Option<(PathBuf, PathBuf, Option<String>, [bool; 3])> {
     let asked = api::on_ray(arguments)?;
-    Some((asked.plan, asked.out, asked.address, [asked.force, asked.json, asked.quiet]))
+    Some((
+        asked.plan,
+        asked.out,
+        asked.address,
+        [asked.force, asked.json, asked.quiet],
+    ))
 }

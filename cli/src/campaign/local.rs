@@ -32,9 +32,12 @@ const KEPT_BYTES: usize = 2000;
 
 static PROGRAM: OnceLock<Vec<OsString>> = OnceLock::new();
 
-/// How this program is started from the outside: for Python, whose executable is not `policyc`. The first call counts.
+/// How this program is started from the outside: for Python, whose executable is not `policyc`. The first call counts; without words
+/// it is none.
 pub fn set_program(words: Vec<OsString>) {
-    let _ = PROGRAM.set(words);
+    if !words.is_empty() {
+        let _ = PROGRAM.set(words);
+    }
 }
 
 /// What a campaign tells on its way.
@@ -102,7 +105,10 @@ impl Local<'_> {
             }
             ended.store(true, Ordering::Relaxed);
         });
-        failure.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
+        failure
+            .into_inner()
+            .unwrap_or_else(PoisonError::into_inner)
+            .map_or(Ok(()), Err)
     }
 
     /// One thread: tasks until there are no more.
@@ -113,7 +119,9 @@ impl Local<'_> {
                 break;
             }
             let Some(index) = locked(queue).pop_front() else { break };
-            let Some(task) = session.plan.tasks.get(index) else { continue };
+            let Some(task) = session.plan.tasks.get(index) else {
+                continue;
+            };
             let Some(claim) = session.claim(task)? else { continue };
             self.one(session, task, &claim, &mut hand, seat)?;
         }
@@ -164,7 +172,9 @@ impl Local<'_> {
                     let _ = folders::remove(&claim.folder.join("out"));
                 }
                 Some(performed) => {
-                    reason = performed.reason.unwrap_or_else(|| format!("exit code {}", performed.exit));
+                    reason = performed
+                        .reason
+                        .unwrap_or_else(|| format!("exit code {}", performed.exit));
                     break;
                 }
                 None => {
@@ -188,7 +198,10 @@ fn stage(task: &Task, claim: &Claim) -> Result<Vec<String>, Failure> {
     let folder = &claim.folder;
     let inputs = task.inputs.iter().map(|(path, content)| {
         // the folder of all inputs is the first part of their paths
-        (path.strip_prefix("in/").unwrap_or(path).to_owned(), content.bytes.as_slice())
+        (
+            path.strip_prefix("in/").unwrap_or(path).to_owned(),
+            content.bytes.as_slice(),
+        )
     });
     let inputs: Vec<(String, &[u8])> = inputs.collect();
     folders::write(&folder.join("in"), inputs.iter().map(|(path, bytes)| (path, *bytes)))?;
@@ -225,7 +238,10 @@ impl Hand {
         };
         let mut command = Command::new(program);
         command.args(arguments).arg(WORKER);
-        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
         let mut child = command.spawn().map_err(|error| {
             let shown = program.to_string_lossy();
             Failure::from(Message::new(format!("cannot start a worker, {shown}: {error}")))

@@ -95,7 +95,10 @@ impl Session {
     #[must_use]
     pub fn pending(&self) -> Vec<usize> {
         let tasks = self.plan.tasks.iter().enumerate();
-        tasks.filter(|(_, task)| !self.is_done(task)).map(|(index, _)| index).collect()
+        tasks
+            .filter(|(_, task)| !self.is_done(task))
+            .map(|(index, _)| index)
+            .collect()
     }
 
     /// The task of that number, from 1, or name.
@@ -239,7 +242,9 @@ pub fn merge(from: &[PathBuf], out: &Path, replacing: Replacing) -> Result<Finis
 
 /// Refuses two results of one task: one of the machines, or the version, is not what the other is.
 fn same(id: &str, first: &Path, second: &Path, done: &Done) -> Result<(), Failure> {
-    let Some(Ok(other)) = stored(first, id)? else { return Ok(()) };
+    let Some(Ok(other)) = stored(first, id)? else {
+        return Ok(());
+    };
     if other.record == done.record {
         return Ok(());
     }
@@ -258,7 +263,9 @@ fn schedule_of(folder: &Path) -> Result<Schedule, Failure> {
     let path = folder.join(PLAN);
     let shown = folder.display();
     let text = fs::read(&path).map_err(|error| {
-        let message = Message::new(format!("{shown} is no folder of a campaign: cannot read {PLAN}: {error}"));
+        let message = Message::new(format!(
+            "{shown} is no folder of a campaign: cannot read {PLAN}: {error}"
+        ));
         Failure::from(message.hint("name the folder that was --out of policyc campaign"))
     })?;
     serde_json::from_slice(&text).map_err(|error| {
@@ -311,7 +318,9 @@ fn finish(
     folders::remove(&best).map_err(|error| folders::cannot("replace", &best, &error))?;
     let mut taken = BTreeSet::new();
     for (listed, _) in results.best() {
-        let Some(Ok(done)) = stored(out, &listed.id)? else { continue };
+        let Some(Ok(done)) = stored(out, &listed.id)? else {
+            continue;
+        };
         let name = unused(&folder_name(listed), &mut taken);
         let files = done.files.iter().filter(|(name, _)| name.as_str() != "answer.json");
         folders::write(&best.join(&name), files.map(|(name, bytes)| (name, bytes.as_slice())))?;
@@ -320,14 +329,23 @@ fn finish(
     // empty once nothing is under way
     let _ = fs::remove_dir(out.join(WORK));
     let _ = fs::remove_dir(out.join(FAILED));
-    Ok(Finished { results, files: written })
+    Ok(Finished {
+        results,
+        files: written,
+    })
 }
 
 /// The training file's path as the name of a folder: `train/paper12.toml` is `train-paper12`.
 fn folder_name(listed: &Listed) -> String {
     let settings = listed.axis("settings").map(ToString::to_string).unwrap_or_default();
     let stem = settings.strip_suffix(".toml").unwrap_or(&settings);
-    let letters = stem.chars().map(|c| if c.is_ascii_alphanumeric() || "_-".contains(c) { c } else { '-' });
+    let letters = stem.chars().map(|c| {
+        if c.is_ascii_alphanumeric() || "_-".contains(c) {
+            c
+        } else {
+            '-'
+        }
+    });
     letters.collect::<String>().trim_matches('-').to_owned()
 }
 

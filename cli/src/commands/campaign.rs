@@ -37,7 +37,9 @@ pub fn run(options: &Campaign) -> Result<Outcome, Failure> {
             .into());
     }
     if options.address.is_some() {
-        return Err(Message::new("--address is of a cluster of Ray").hint("add --engine ray").into());
+        return Err(Message::new("--address is of a cluster of Ray")
+            .hint("add --engine ray")
+            .into());
     }
     let pending = match &options.task {
         Some(task) => {
@@ -71,7 +73,12 @@ pub fn run(options: &Campaign) -> Result<Outcome, Failure> {
     if let Some(task) = &options.task {
         return alone(&session, session.find(task)?);
     }
-    answer(options.json, &options.out.display().to_string(), &session.finish()?, Some(ran))
+    answer(
+        options.json,
+        &options.out.display().to_string(),
+        &session.finish()?,
+        Some(ran),
+    )
 }
 
 /// What became of one task.
@@ -159,7 +166,9 @@ pub fn summary(out: &str, finished: &Finished, ran: Option<usize>) -> String {
     if !lines.is_empty() {
         lines.push(String::new());
     }
-    let now = ran.map(|ran| format!(" {} ran now.", grouped(ran as u64))).unwrap_or_default();
+    let now = ran
+        .map(|ran| format!(" {} ran now.", grouped(ran as u64)))
+        .unwrap_or_default();
     lines.push(format!("{}{now}", results.sentence()));
     lines.push(format!("results in {out}; to look at: {out}/report.html"));
     lines.join("\n")
@@ -198,7 +207,11 @@ fn write(options: &Campaign, session: &Session, script: &Script) -> Result<Outco
         Script::Snakemake(file) => (file, snakemake(&schedule, &call), "snakemake --cores all --snakefile"),
     };
     output::replace_own_one(file, &text, options.replacing)?;
-    output::say(&format!("{} tasks; next: {next} {}", session.plan.tasks.len(), file.display()))?;
+    output::say(&format!(
+        "{} tasks; next: {next} {}",
+        session.plan.tasks.len(),
+        file.display()
+    ))?;
     Ok(Outcome::Done)
 }
 
@@ -231,9 +244,19 @@ impl Follower {
         let each = self.begun.elapsed().as_secs_f64() / ended.max(1) as f64;
         let rest = HumanDuration(Duration::from_secs_f64((each * left as f64).clamp(0.0, 1e9)));
         let done = self.all - self.pending + counts[0];
-        let failures = if counts[1] == 0 { String::new() } else { format!(", {} failed", counts[1]) };
+        let failures = if counts[1] == 0 {
+            String::new()
+        } else {
+            format!(", {} failed", counts[1])
+        };
         if let Ok(mut line) = self.line.lock() {
-            line.show(|| format!("{done} of {} tasks done{failures}, {rest} left: {}", self.all, progress.task.title()));
+            line.show(|| {
+                format!(
+                    "{done} of {} tasks done{failures}, {rest} left: {}",
+                    self.all,
+                    progress.task.title()
+                )
+            });
         }
     }
 

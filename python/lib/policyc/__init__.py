@@ -11,6 +11,7 @@ What is wrong with an input comes as :class:`Faults`, with places. The environme
 
 from ._policyc import Command, Fault, Faults, __version__
 from .analysis import Diagnosis, MappingFit, Simulation, diagnose, drm_fit, simulate
+from .campaigns import Campaign, campaign
 from .controller import Controller, Status, Steps
 from .exporting import export
 from .policy import Certificate, Feature, Inspection, Layer, Policy, Signal, Verification
@@ -19,6 +20,7 @@ from .registration import register
 register()
 
 __all__ = [
+    "Campaign",
     "Certificate",
     "Command",
     "Controller",
@@ -36,6 +38,7 @@ __all__ = [
     "Steps",
     "Verification",
     "__version__",
+    "campaign",
     "diagnose",
     "drm_fit",
     "export",

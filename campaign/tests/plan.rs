@@ -140,7 +140,7 @@ fn faults_of_a_plan_have_their_places() {
     refused(
         "[[train]]\nsettings = \"trian.toml\"\n",
         (2, 12),
-        &["cannot find the file", "folder of the file"],
+        &["cannot find the file"],
     );
     refused(
         "[[train]]\nsettings = \"train.toml\"\nseed = 1\n",

@@ -9,6 +9,7 @@
 What is wrong with an input comes as :class:`Faults`, with places. The environment of gymnasium is ``policyc/Converter-v0``.
 """
 
+from . import drm
 from ._policyc import Command, Fault, Faults, __version__
 from .analysis import Diagnosis, MappingFit, Simulation, diagnose, drm_fit, simulate
 from .campaigns import Campaign, campaign
@@ -40,6 +41,7 @@ __all__ = [
     "__version__",
     "campaign",
     "diagnose",
+    "drm",
     "drm_fit",
     "export",
     "simulate",

@@ -72,44 +72,6 @@ def test_a_node_is_killed_and_the_result_is_that_of_the_local_engine(desk, clust
     print(f"{SEEDS} trainings on Ray, a node killed after {killed[0]}: {took:.1f} s; a second run: {second_run:.2f} s")
 
 
-def test_a_task_costs_little_beside_what_ray_takes(desk, cluster):
-    """Certificates of one box: what is left is what carries them. An empty task of Ray is what Ray itself takes."""
-    count = 200
-    plan = {"certify": [{"policies": "policy", "samples": 1, "boxes": 1, "seed": 0}]}
-    policyc.campaign(plan, "warm", engine="ray", address=cluster.address)
-
-    ray.init(address=cluster.address, log_to_driver=False, logging_level="error")
-
-    @ray.remote
-    def empty(_):
-        return None
-
-    ray.get([empty.remote(b"") for _ in range(8)])
-    begun = time.monotonic()
-    for ref in [empty.remote(b"x" * 40000) for _ in range(count)]:
-        ray.get(ref)
-    own = (time.monotonic() - begun) / count
-    from policyc import _policyc
-
-    plan = {"certify": [{"policies": "policy", "samples": 1, "boxes": list(range(1, count + 1))}]}
-    native = _policyc.NativeCampaign("plan.toml", policyc._toml.document(plan), "costs", False)
-    kind, arguments, digests = native.shipped(0)
-    inputs = {path: native.content(0, path) for path in digests}
-    begun = time.monotonic()
-    policyc.campaign(plan, "ray", engine="ray")
-    whole = (time.monotonic() - begun) / count
-    ray.shutdown()
-    # the work itself: the same tasks in this process
-    begun = time.monotonic()
-    for index in native.pending():
-        kind, arguments, _ = native.shipped(index)
-        _policyc.perform(kind, arguments, inputs)
-    work = (time.monotonic() - begun) / count
-    beside = whole - own - work
-    print(f"a task: {1e3 * whole:.2f} ms, of which {1e3 * work:.2f} ms work, {1e3 * own:.2f} ms Ray, {1e3 * beside:.2f} ms ours")
-    assert beside < 5e-3
-
-
 def test_the_command_runs_on_a_cluster(desk, cluster):
     line = [sys.executable, "-m", "policyc", "campaign", "plan.toml", "--out", "out", "--engine", "ray", "--address", cluster.address]
     run = subprocess.run(line, capture_output=True, text=True)

@@ -30,6 +30,8 @@ baselines = ["feed-forward"]
 
 fn desk() -> Desk {
     let desk = super::training::desk();
+    std::fs::remove_dir_all(desk.path("policy")).unwrap();
+    tests::tools::copy_folder(&tests::root().join("examples/buck12"), &desk.path("policy"));
     desk.write("scenario.toml", SCENARIO);
     desk.write("plan.toml", PLAN);
     desk
@@ -168,8 +170,9 @@ fn an_interrupted_campaign_goes_on_to_the_same_bytes() {
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
     let begun = Instant::now();
     let checkpoint = || {
-        let files = tests::tools::listing(&desk.path("out"));
-        files.iter().any(|name| name.ends_with("checkpoints/seed-5.bin"))
+        let tasks = std::fs::read_dir(desk.path("out/work")).into_iter().flatten().flatten();
+        let mut checkpoints = tasks.map(|task| task.path().join("out/checkpoints/seed-5.bin"));
+        checkpoints.any(|path| path.exists())
     };
     while !checkpoint() {
         assert!(begun.elapsed() < Duration::from_secs(120) && child.try_wait().unwrap().is_none());
@@ -244,6 +247,7 @@ fn slips_are_found_before_anything_runs() {
         &["train/train.toml", "did you mean `steps`?"],
     );
     desk.edit("train/train.toml", "step = 1200", "steps = 1200");
+    std::fs::create_dir(desk.path("mine")).unwrap();
     desk.write("mine/notes", "mine");
     desk.refuse("campaign plan.toml --out mine", &["is not empty"]);
     desk.refuse("campaign plan.toml --out out --task 5", &["no such task", "1 to 4"]);

@@ -88,20 +88,21 @@ fn only_what_reads_an_edited_file_runs_again() {
     );
     let again = desk.succeed("campaign plan.toml --out out");
     assert!(again.contains("1 ran now"), "{again}");
-    // a result that was edited, and one that lost a file
+    // a result that was edited, and one that lost a file; in a folder without results of what was read before
+    desk.succeed("campaign plan.toml --out other");
     let file = |end: &str| {
-        results(&desk, "out")
+        results(&desk, "other")
             .into_iter()
             .find(|(name, _)| name.ends_with(end))
             .unwrap()
             .0
     };
     let answer = file("answer.json");
-    desk.write(&format!("out/{answer}"), "{}");
-    std::fs::remove_file(desk.path(&format!("out/{}", file("metrics.json")))).unwrap();
-    let again = desk.succeed("campaign plan.toml --out out --json");
+    desk.write(&format!("other/{answer}"), "{}");
+    std::fs::remove_file(desk.path(&format!("other/{}", file("metrics.json")))).unwrap();
+    let again = desk.succeed("campaign plan.toml --out other --json");
     assert_eq!(serde_json::from_str::<serde_json::Value>(&again).unwrap()["ran"], 2);
-    assert_ne!(desk.read(&format!("out/{answer}")), "{}");
+    assert_ne!(desk.read(&format!("other/{answer}")), "{}");
 }
 
 #[test]
@@ -124,7 +125,7 @@ fn parts_of_several_machines_merge_to_the_bytes_of_one_run_in_any_order() {
         "{}",
         ran.stdout
     );
-    desk.succeed("merge a c --out a --json");
+    desk.succeed("merge a b c --out a --json");
     desk.refuse(
         "merge a policy --out d",
         &["policy is no folder of a campaign", "--out of policyc campaign"],

@@ -1,5 +1,5 @@
 //! Plans: what they multiply to, and what is wrong with them.
-#![allow(clippy::unwrap_used, clippy::disallowed_methods)] // helpers of tests stand outside of #[test] functions
+#![allow(clippy::unwrap_used, clippy::panic, clippy::disallowed_methods)] // helpers of tests stand outside of #[test] functions
 
 use std::path::Path;
 

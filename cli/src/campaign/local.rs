@@ -206,8 +206,8 @@ fn stage(task: &Task, claim: &Claim) -> Result<Vec<String>, Failure> {
     let inputs: Vec<(String, &[u8])> = inputs.collect();
     folders::write(&folder.join("in"), inputs.iter().map(|(path, bytes)| (path, *bytes)))?;
     let checkpoints = folder.join("out/checkpoints");
-    let goes_on = task.kind == Kind::Train
-        && std::fs::read_dir(checkpoints).is_ok_and(|mut entries| entries.any(|entry| is_checkpoint(entry)));
+    let goes_on =
+        task.kind == Kind::Train && std::fs::read_dir(checkpoints).is_ok_and(|mut entries| entries.any(is_checkpoint));
     let mut arguments = task.arguments.clone();
     match goes_on {
         true => arguments.push("--resume".to_owned()),

@@ -111,7 +111,10 @@ impl Results {
                 settings.map(Axis::to_string).unwrap_or_default().into(),
                 listed.axis("seed").map(Axis::to_string).unwrap_or_default().into(),
                 specification(figures).into(),
-                format!("{met} of {done}").into(),
+                match find(figures, "met") {
+                    Some(_) => format!("{met} of {done}").into(),
+                    None => "–".into(),
+                },
             ];
             cells.extend(numbers(figures));
             table = table.row(cells);
@@ -204,7 +207,8 @@ impl Results {
             );
             table = table.row(cells);
         }
-        let heading = format!("{}: {} tasks", kind.name(), grouped(rows.len() as u64));
+        let noun = if rows.len() == 1 { "task" } else { "tasks" };
+        let heading = format!("{}: {} {noun}", kind.name(), grouped(rows.len() as u64));
         let inner = Section::new(heading).table(table);
         Some(match kind {
             // dozens of seeds, of which the best stand above

@@ -1,5 +1,6 @@
 //! The command line.
 
+mod campaign;
 pub mod drm;
 mod plants;
 mod shared;
@@ -16,6 +17,7 @@ use policy::NumericFormat;
 use crate::one_of::OneOf;
 use crate::ownership::Replacing;
 
+pub use campaign::{Campaign, Engine, Merge, Script};
 use drm::Drm;
 pub use plants::{Design, Limit, New};
 pub use shared::{Columns, ControllerKind, Loudness, Outside};
@@ -65,6 +67,10 @@ pub enum Command {
     Train(Train),
     /// Compare a plant file with measured records, name what it gets wrong, and write a better one
     Diagnose(Diagnose),
+    /// Run many tasks as one: trainings, simulations, verifications, certificates, diagnoses, proofs, on all cores or a cluster
+    Campaign(Campaign),
+    /// Put the folders of a campaign that ran on several machines together
+    Merge(Merge),
     /// Inspect, compile and verify the built-in example
     Demo(Demo),
     /// Duty ratio mapping: acquire settled points, fit drm.toml, judge it
@@ -81,7 +87,11 @@ impl Command {
     pub fn ends_by_itself(&self) -> bool {
         matches!(
             self,
-            Command::Prove(_) | Command::Simulate(_) | Command::Train(_) | Command::Drm(Drm::Transfer(_))
+            Command::Campaign(_)
+                | Command::Prove(_)
+                | Command::Simulate(_)
+                | Command::Train(_)
+                | Command::Drm(Drm::Transfer(_))
         )
     }
 }

@@ -99,15 +99,12 @@ const MODELS: [Model; 15] = [
     },
     Model {
         name: "aside",
-        arguments: &[("x", Of::Number), ("difference", Of::Word), ("high", Of::Word)],
-        says: "has its highest bit set exactly if x is not between -`high ^ difference` and `high`",
+        arguments: &[("x", Of::Number), ("low", Of::Word), ("high", Of::Word)],
+        says: "has its highest bit set exactly if x is not between the numbers with the bits `low`, whose sign is set, and `high`",
         arithmetic: PLAIN,
-        claim: |float, x, got| {
-            let low = float.terms.binary("bvxor", x[1], x[2]);
-            Claim {
-                given: vec![is_magnitude(float, low), is_magnitude(float, x[2])],
-                holds: stray(float, got, float.within(x[0], float.neg(low), x[2])),
-            }
+        claim: |float, x, got| Claim {
+            given: vec![is_magnitude(float, float.neg(x[1])), is_magnitude(float, x[2])],
+            holds: stray(float, got, float.within(x[0], x[1], x[2])),
         },
     },
     Model {

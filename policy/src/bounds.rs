@@ -327,3 +327,54 @@ fn activated(x: Interval, activation: Activation) -> Interval {
         high: one(x.high, 1.0),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn interval(low: f32, high: f32) -> Box32 {
+        Box32 { low, high }
+    }
+
+    #[test]
+    fn a_product_lies_between_its_corners() {
+        let product = interval(-3.0, 2.0).times(interval(-5.0, 7.0));
+        // corners 15, -21, -10, 14
+        assert!(matches!(product, Ok(Box32 { low: -21.0, high: 15.0 })));
+        let product = interval(2.0, 3.0).times(interval(4.0, 5.0));
+        assert!(matches!(product, Ok(Box32 { low: 8.0, high: 15.0 })));
+        let product = interval(-3.0, -2.0).times(interval(4.0, 5.0));
+        assert!(matches!(product, Ok(Box32 { low: -15.0, high: -8.0 })));
+    }
+
+    #[test]
+    fn a_difference_of_samples_is_divided_by_the_period() {
+        let found = filter(&Filter::BackwardDifference, interval(-1.0, 3.0), 0.25);
+        // 4 in a quarter of a second
+        assert!(matches!(found, Ok(Box32 { low: -16.0, high: 16.0 })));
+    }
+
+    #[test]
+    fn a_mean_lies_where_its_samples_lie() {
+        let found = filter(&Filter::MovingAverage { samples: 4 }, interval(-1.0, 3.0), 1e-4);
+        assert!(matches!(found, Ok(Box32 { low: -1.0, high: 3.0 })));
+    }
+
+    #[test]
+    fn a_filtered_derivative_is_no_wider_than_its_rounding_errors() {
+        // k = 1000 1/s, width 4, decay .1: 4000, and 4.1 units of it for each of the ten steps that the memory keeps
+        let error = 4.1 / 16_777_216.0 * 4000.0 / 0.1;
+        let found = filtered_derivative(interval(-1.0, 3.0), 9e-4, 1e-4).map(|found| f64::from(found.high));
+        // outwards to the next binary32, which is 2^-12 away; k and decay are rounded to binary32
+        assert!(found.is_ok_and(|high| high > 4000.0 + 0.9 * error && high < 4000.0 + 1.1 * error + 3.0 / 4096.0));
+    }
+
+    #[test]
+    fn below_0_a_leaky_rectifier_has_its_slope() {
+        let leaky = activated(Interval { low: -8.0, high: 2.0 }, Activation::LeakyRelu { slope: 0.25 });
+        assert!(
+            leaky.high == 2.0 && leaky.low <= -2.0 && leaky.low > -2.0 - 1e-5,
+            "{leaky:?}"
+        );
+    }
+}

@@ -203,3 +203,20 @@ impl Continuous {
         [low, high].map(|s| s * self.scale + self.offset)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_duty_is_a_line_over_the_clipped_output() {
+        let head = Continuous {
+            squash: Squash::Clip(Interval { low: -1.0, high: 1.0 }),
+            scale: 0.25,
+            offset: 0.5,
+        };
+        let duties = [-3.0, 0.5, 3.0].map(|output| head.duty(output));
+        assert!(duties == [0.25, 0.625, 0.75] && head.span() == 0.5, "{duties:?}");
+        assert!(head.duty(f64::NAN).is_nan());
+    }
+}

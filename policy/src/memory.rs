@@ -101,3 +101,74 @@ fn through(filter: &Filter, x: f64, period: f64, words: &mut Vec<f64>) -> f64 {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const T: f64 = 1e-4;
+
+    /// Words and bound behind a filter for an input within +-10.
+    fn of(filter: &Filter) -> (Vec<f64>, f64) {
+        let mut words = Vec::new();
+        let y = through(filter, 10.0, T, &mut words);
+        (words, y)
+    }
+
+    /// The constants of section 1, written out.
+    fn g() -> f64 {
+        1.0 + f64::powi(2.0, -20)
+    }
+
+    fn assert_near(found: f64, expected: f64) {
+        // binary64 in another order of operations
+        assert!((found / expected - 1.0).abs() < 1e-14, "{found} {expected}");
+    }
+
+    /// The table of section 1 of the numeric contract, row by row.
+    #[test]
+    fn the_bounds_are_those_of_the_contract() {
+        assert_eq!(of(&Filter::Delay { samples: 3 }), (vec![10.0; 3], 10.0));
+        let (words, y) = of(&Filter::BackwardDifference);
+        assert_eq!(words, [10.0]);
+        assert_near(y, g() * g() * g() * 20.0 / T);
+        let (words, y) = of(&Filter::LowPass { time_constant: 1e-3 });
+        assert_near(y, g() * g() * 10.0);
+        assert_eq!(words, [y]);
+        // of an input that is 0 the rounding of subnormal numbers is left
+        let mut words = Vec::new();
+        assert_eq!(
+            through(&Filter::LowPass { time_constant: 1e-3 }, 0.0, T, &mut words),
+            1e-40
+        );
+        let (words, y) = of(&Filter::MovingAverage { samples: 4 });
+        assert_eq!(words, [10.0; 3]);
+        assert_near(y, g() * (1.0 + 8.0 * f64::powi(2.0, -24)) * 10.0);
+        let integrator = Filter::Integrator {
+            min: -3.0,
+            max: 2.0,
+            initial: 0.0,
+        };
+        let (words, y) = of(&integrator);
+        assert_near(y, 3.0 * g());
+        assert_eq!(words, [y]);
+    }
+
+    /// `g (2X/s + e/d)` with `s = tau + T`, `e = 10 u X/s + 1e-40 (1 + 1/s)`, `d = 1 - tau/s - 3u`.
+    #[test]
+    fn a_filtered_derivative_adds_up_its_rounding_errors() {
+        let (tau, u) = (9e-4, f64::powi(2.0, -24));
+        let s = tau + T;
+        let (words, y) = of(&Filter::FilteredDerivative { time_constant: tau });
+        let (e, d) = (10.0 * u * 10.0 / s + 1e-40 * (1.0 + 1.0 / s), 1.0 - tau / s - 3.0 * u);
+        assert_near(y, g() * (20.0 / s + e / d));
+        assert_eq!(words, [10.0, y]);
+        // of an input that is 0 the second term of e alone: 1e-40 (1 + 1000) / 0.1
+        let mut words = Vec::new();
+        let y = through(&Filter::FilteredDerivative { time_constant: tau }, 0.0, T, &mut words);
+        assert!((y / 1.001e-36 - 1.0).abs() < 1e-4, "{y}");
+        // a memory that does not decay holds any number of the format
+        let slow = Filter::FilteredDerivative { time_constant: 1e6 };
+        assert_eq!(of(&slow).1, f64::from(f32::MAX));
+    }
+}

@@ -131,3 +131,14 @@ impl Observer {
         Estimate::ALL.len() + self.remembered().count()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_estimate_has_the_unit_of_its_quantity() {
+        let shown = Estimate::ALL.map(|estimate| format!("{} {}", estimate.word(), estimate.unit()));
+        assert_eq!(shown, ["current A", "voltage V", "bias V"]);
+    }
+}

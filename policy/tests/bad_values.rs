@@ -167,6 +167,12 @@ fn adc_codes_must_be_able_to_say_the_range() {
         &with("{ gain = 0.005, offset = 0.0, bits = ¦12 }"),
         &["end of its codes", "20.475", "far inside of the range", "divider"],
     );
+    // code 0 is -0.5 A where -1 A is plausible, and the last code, 40.45 A, is not
+    contract_fault(
+        "unit = \"A\"",
+        "unit = \"A\"\nadc = { gain = 0.01, offset = -0.5, bits = ¦12 }",
+        &["end of its codes", "-0.5 at that code", "far inside of the range"],
+    );
     // -0.0625 * 4095 + 250 = -5.9 V is not plausible, but the first code, 250 V, is
     contract_fault(
         unit,

@@ -57,6 +57,20 @@ fn observations_that_the_controller_cannot_see_are_refused_with_their_share() {
 }
 
 #[test]
+fn observations_that_are_left_out_are_counted_in_a_note() {
+    let q = f32_tensor("q", &[2, 3], &[0.0, 1.0, 0.5, 3.0, 1.0, 2.0]);
+    let outside = f32_tensor("obs", &[2, 2], &[1.0, 5.0, 21.0, 0.0]);
+    let allowed = Folder::new()
+        .golden(&[outside, q.clone()])
+        .replace("hidden_activation", "golden_outside = 0.5\nhidden_activation");
+    let notes = allowed.policy().notes.join("\n");
+    assert!(notes.contains("1 of 2 golden observations are left out"), "{notes}");
+    let inside = f32_tensor("obs", &[2, 2], &[1.0, 5.0, 2.0, 0.0]);
+    let notes = Folder::new().golden(&[inside, q]).policy().notes.join("\n");
+    assert!(!notes.contains("left out"), "{notes}");
+}
+
+#[test]
 fn golden_vectors_that_cannot_be_are_refused() {
     const GOLDEN: &str = "golden.safetensors";
     let obs = f32_tensor("obs", &[2, 2], &[1.0, 5.0, -2.0, -10.0]);

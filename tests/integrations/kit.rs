@@ -200,7 +200,7 @@ fn an_edited_constant_of_mapping_limits_or_status_fails() {
 
 /// What a random run of some hundred steps meets seldom or never: limits far from the actions, the last bridged sample, the
 /// end of a range, equal values of two actions, a state that is not sound, a coefficient that another check word stands
-/// beside, the position of a sliced check.
+/// beside, the clip end of what a filter remembers, the number of a self-test vector, the position of a sliced check.
 #[test]
 fn an_edit_where_random_moves_seldom_come_fails() {
     let policy = example();
@@ -223,6 +223,13 @@ fn an_edit_where_random_moves_seldom_come_fails() {
             "buck12_any(buck12_mapping_flips(state))",
             "(buck12_any(buck12_mapping_flips(state)) & 1u)",
         ),
+        // clip ends of what a delay remembers: no measurement reaches them within a step or from a fresh start
+        ("(v13, -20.0f, 20.0f)", "(v13, -20.0f, 20.02f)"),
+        ("(v26, -20.0f, 20.0f)", "(v26, -20.02f, 20.0f)"),
+        ("uint32_t next = 1u;", "uint32_t next = 2u;"),
+        ("next = vector + 1u;", "next = vector + 2u;"),
+        ("(next == 17u) ?", "(next == 18u) ?"),
+        ("(16u - right)", "(17u - right)"),
         ("check->position = span.to;", ""),
         ("? check->position : 0u;", "? check->position : 1u;"),
     ];
@@ -231,6 +238,30 @@ fn an_edit_where_random_moves_seldom_come_fails() {
             ran.code == Some(1) && ran.stdout.contains("FAIL"),
             "{from} => {to}: {ran:?}"
         );
+    }
+}
+
+/// A term of the guard that is joined by an exclusive or shows where its neighbour is outside as well.
+#[test]
+fn a_guard_that_joins_its_terms_wrongly_fails() {
+    let edits = [
+        ("| buck12_aside(state->held[2]", "^ buck12_aside(state->held[2]"),
+        ("stray |= ", "stray ^= "),
+    ];
+    for (ran, (from, _)) in edited(&example(), &edits).into_iter().zip(edits) {
+        assert!(ran.code == Some(1) && ran.stdout.contains("FAIL"), "{from}: {ran:?}");
+    }
+}
+
+/// A cap that ends 0.1 % too early shows where one more step comes just below the upper limit of the duty.
+#[test]
+fn a_soft_start_that_ends_early_or_late_fails() {
+    let edits = [
+        ("_flag(v0 > 0.67999995f)", "_flag(v0 > 0.67932f)"),
+        ("_flag(v0 > 0.67999995f)", "_flag(v0 > 0.68068f)"),
+    ];
+    for (ran, (_, to)) in edited(&golden_case("constructs"), &edits).into_iter().zip(edits) {
+        assert!(ran.code == Some(1) && ran.stdout.contains("FAIL"), "{to}: {ran:?}");
     }
 }
 

@@ -6,6 +6,7 @@ mod boards;
 mod c2000;
 mod fmu;
 mod kit;
+mod kit_edits;
 mod rust;
 mod sfunction;
 

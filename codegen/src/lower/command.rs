@@ -50,7 +50,8 @@ const fn status_bit(name: &'static str, number: u32, meaning: &'static str) -> S
     StatusBit { name, number, meaning }
 }
 
-fn bit(name: &str) -> u32 {
+/// The number of the bit of that name.
+pub fn bit(name: &str) -> u32 {
     // names below are those of the table above, so that 0 is never taken for one that is missing
     STATUS.iter().find(|bit| bit.name == name).map_or(0, |bit| bit.number)
 }

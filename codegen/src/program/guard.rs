@@ -61,11 +61,11 @@ pub enum Within {
         /// Bits of the bound.
         bound: u64,
     },
-    /// `-low <= x <= high`, both not negative; zeros of both signs are inside.
+    /// `low <= x <= high`, where low is not above 0 and high not below; zeros of both signs are inside.
     Around {
-        /// Bits in which the two bounds differ.
-        difference: u64,
-        /// Bits of the upper end.
+        /// Bits of the lower end, with its sign: of 0 they are those of -0.
+        low: u64,
+        /// Bits of the upper end, without a sign.
         high: u64,
     },
     /// `low <= x <= low + width`, counted in bits, of a positive number.
@@ -104,8 +104,9 @@ impl Within {
             };
         }
         // 0 lies inside or is an end: each sign has its bound, and zeros of both signs are within it
-        let high = bits(high.abs());
-        let difference = high ^ bits(low.abs());
-        Self::Around { difference, high }
+        Self::Around {
+            low: bits(-low.abs()),
+            high: bits(high.abs()),
+        }
     }
 }

@@ -22,6 +22,10 @@ const MOST_TO_REST: usize = 4000;
 /// Places in a signal's range between which another action is looked for.
 // a convention: each costs the oracle one step
 const PLACES: usize = 33;
+/// Which of the numbers of a sound, primed state stand at their upper ends, those of even places and those of odd ones: what a filter
+/// remembers at its farthest leads a feature beyond clip ends that no measurement reaches in a step, and a filter of two words
+/// goes farthest if they stand at different ends.
+const PRIMED_PATTERNS: [[bool; 2]; 4] = [[false, false], [true, true], [false, true], [true, false]];
 /// Halvings that bring two numbers of either format next to each other.
 const HALVINGS: usize = 64;
 /// Numbers to either side of a change of action that are looked at for a tie.
@@ -103,7 +107,12 @@ impl<'a, T: Real> Course<'a, T> {
     /// A step from each state that is not sound by one number or counter, and from those that are just sound.
     pub fn damaged(&mut self) -> Result<(), InputError> {
         let usual = directed::usual(self.policy);
-        for damage in damages(self.policy, &Controller::<T>::new(self.policy)) {
+        let fresh = Controller::<T>::new(self.policy);
+        for damage in damages(self.policy, &fresh) {
+            // which NaN comes out of an operation the contract does not say
+            if damage.gives_no_number(&fresh, &usual) {
+                continue;
+            }
             self.play(Event::Init)?;
             self.put(|state| damage.apply(state));
             self.play(Event::Step(usual.clone()))?;
@@ -230,6 +239,18 @@ impl<T: Real> Damage<T> {
         }
     }
 
+    /// Whether a step from that state has a NaN among its observation or its Q values.
+    fn gives_no_number(&self, fresh: &Controller<T>, samples: &[Sample]) -> bool {
+        let mut damaged = fresh.clone();
+        let mut state = fresh.state().clone();
+        self.apply(&mut state);
+        damaged.restore(&state);
+        let is_nan = |x: &T| x.to_f64().is_nan();
+        damaged
+            .eval(samples)
+            .is_ok_and(|trace| trace.observation.iter().chain(&trace.q_values).any(is_nan))
+    }
+
     fn apply(&self, state: &mut State<T>) {
         for (at, value) in &self.numbers {
             if let Some(number) = state.numbers_mut().nth(*at) {
@@ -247,7 +268,7 @@ impl<T: Real> Damage<T> {
     }
 }
 
-/// Each number of the state just outside of what a sound state holds; all of them at either end; the counters at their ends
+/// Each number of the state just outside of what a sound state holds, alone and with the next one; all of them at either end; the counters at their ends
 /// and beyond; a soft start one step before its end.
 fn damages<T: Real>(policy: &Policy, fresh: &Controller<T>) -> Vec<Damage<T>> {
     let (scalar, hold) = (policy.numeric_format.scalar(), policy.fallback.hold);
@@ -258,12 +279,30 @@ fn damages<T: Real>(policy: &Policy, fresh: &Controller<T>) -> Vec<Damage<T>> {
         ..Damage::of_numbers(ends.iter().map(|(at, ends)| (*at, pick(*ends))).collect())
     };
     let mut damages = vec![all(|ends| ends.0), all(|ends| ends.1)];
+    damages.extend(PRIMED_PATTERNS.map(|pattern| {
+        Damage {
+            check: CheckWord::Anew,
+            counters: Some((0, 1)),
+            ..Damage::of_numbers(
+                ends.iter()
+                    .map(|&(at, (low, high))| (at, if pattern[at % 2] { high } else { low }))
+                    .collect(),
+            )
+        }
+    }));
     for &(at, (low, high)) in &ends {
         let (below, above) = (scalar.next_down(low.to_f64()), scalar.next_up(high.to_f64()));
         // what is no number gives one of many in the observation, and the contract does not say which
         let finite = [below, above].into_iter().filter(|end| end.is_finite());
         damages.extend(finite.map(|end| Damage::of_numbers(vec![(at, T::nearest(end))])));
     }
+    // neighbours at once: two terms that are wrongly joined can hide each other
+    let above = ends.iter().map(|&(at, (_, high))| (at, scalar.next_up(high.to_f64())));
+    let above: Vec<(usize, T)> = above
+        .filter(|(_, x)| x.is_finite())
+        .map(|(at, x)| (at, T::nearest(x)))
+        .collect();
+    damages.extend(above.windows(2).map(|pair| Damage::of_numbers(pair.to_vec())));
     let counters = [
         (hold.saturating_add(1), 1),
         (hold.saturating_add(2), 1),
@@ -305,7 +344,7 @@ fn of_mapping<T: Real>(scalar: Scalar, state: &State<T>) -> Vec<Damage<T>> {
     flips.chain(changed).collect()
 }
 
-/// The cap that one more step brings to the upper limit, and its neighbours.
+/// The cap that one more step brings to the upper limit, and its neighbours: two below, since the limit is rounded inwards.
 fn end_of_soft_start<T: Real>(policy: &Policy, scalar: Scalar, state: &State<T>) -> Vec<Damage<T>> {
     let Some(soft) = policy.limits.soft_start.filter(|_| state.soft_cap.is_some()) else {
         return Vec::new();
@@ -315,7 +354,8 @@ fn end_of_soft_start<T: Real>(policy: &Policy, scalar: Scalar, state: &State<T>)
     // the cap stands before the coefficients
     let numbers = state.clone().numbers_mut().count();
     let at = numbers - coefficients(state) - 1;
-    let caps = [scalar.next_down(before), before, scalar.next_up(before)];
+    let below = scalar.next_down(before);
+    let caps = [scalar.next_down(below), below, before, scalar.next_up(before)];
     caps.map(|cap| Damage::of_numbers(vec![(at, T::nearest(cap))])).to_vec()
 }
 

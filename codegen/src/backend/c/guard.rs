@@ -22,7 +22,7 @@ pub fn stray(program: &Program, x: &str, within: Within) -> String {
     let word = |bits| word(program.scalar(), bits);
     match within {
         Within::Magnitude { bound } => format!("{n}_far({x}, {})", word(bound)),
-        Within::Around { difference, high } => format!("{n}_aside({x}, {}, {})", word(difference), word(high)),
+        Within::Around { low, high } => format!("{n}_aside({x}, {}, {})", word(low), word(high)),
         Within::Beyond { low, width, negated } => {
             let x = if negated { format!("-({x})") } else { x.to_owned() };
             format!("{n}_beyond({x}, {}, {})", word(low), word(width))

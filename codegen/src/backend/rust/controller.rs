@@ -1,13 +1,14 @@
 //! The controller type: state, step, checks.
 
 use policy::Scalar;
-use proc_macro2::{Ident, TokenStream};
+use proc_macro2::{Ident, Literal as Token, TokenStream};
 use quote::quote;
 
 use super::number::{self, number};
 use super::statements::Printer;
 use super::tokens::{ident, size, word};
 use super::{guard, integrity, mapping, network, tables};
+use crate::lower::command;
 use crate::lower::known_answers::{LCG, SEED, UNIT, VECTORS};
 use crate::program::{Element, Literal, Program, StateMember, StateValue};
 
@@ -275,10 +276,12 @@ fn decide(program: &Program) -> TokenStream {
         quote!((#flag << #bit))
     });
     let fallback = number(program.scalar(), program.fallback_duty);
-    let stray = guard::stray(program.scalar(), &duty, decide.within);
-    let is_stray = match program.scalar() {
-        Scalar::F32 => quote!((stray >> 31)),
-        Scalar::F64 => quote!(((stray >> 63) as u32)),
+    // shifted and not masked, which is an instruction less on Arm
+    let fallback_bit = word(command::bit("FALLBACK"));
+    // behind its limits, which lie within 0 and 1, a duty has the second highest bit only if it is no number
+    let stray = match program.scalar() {
+        Scalar::F32 => quote!((#duty.to_bits() >> 30)),
+        Scalar::F64 => quote!((#duty.to_bits() >> 62) as u32),
     };
     let network::Choice {
         about,
@@ -319,8 +322,7 @@ fn decide(program: &Program) -> TokenStream {
         #[inline(always)]
         fn decide(&self, front: &Front, sound: u32, #name: #kind) -> Command {
             #(#statements)*
-            let stray = #stray;
-            let trusted = core::hint::black_box(sound & !#is_stray);
+            let trusted = sound & !#stray;
             let usable = front.usable & trusted;
             let status = #(#terms)|*;
             Command {
@@ -328,7 +330,7 @@ fn decide(program: &Program) -> TokenStream {
                 duty_sim: select(usable, #duty_sim, #fallback),
                 action_index: #index,
                 status: (status & 0_u32.wrapping_sub(usable))
-                    | (status::FALLBACK & usable.wrapping_sub(1))
+                    | ((usable ^ 1) << #fallback_bit)
                     | (status::STATE & trusted.wrapping_sub(1)),
             }
         }
@@ -380,7 +382,8 @@ fn checks(program: &Program) -> TokenStream {
     let kind = number::kind(scalar);
     let checksum = integrity::checksum(Element::Float(scalar));
     let [low, width, answers] = ["box_low", "box_width", "answers"].map(|name| tables::values(program, name));
-    let (vectors, count) = (size(VECTORS), word(VECTORS as u32));
+    let vectors = size(VECTORS);
+    let [count, beyond] = [VECTORS, VECTORS + 1].map(|count| Token::u32_suffixed(count as u32));
     let (seed, multiplier, increment, unit) = (
         word(SEED),
         word(LCG.0),
@@ -401,8 +404,10 @@ fn checks(program: &Program) -> TokenStream {
             static BOX_WIDTH: [#kind; FEATURES] = #width;
             static ANSWERS: [u32; #vectors] = #answers;
             let mut random: u32 = #seed;
-            // first answers in a row that are right: a fault in this count shows in a sound build, too
-            let mut good = 0_u32;
+            // number of the first vector without a right answer, and right answers before it: a fault in either shows in a sound
+            // build, too
+            let mut next = 1_u32;
+            let mut right = 0_u32;
             let mut vector = 0_u32;
             for answer in &ANSWERS {
                 let mut observation = [#zero; FEATURES];
@@ -412,11 +417,13 @@ fn checks(program: &Program) -> TokenStream {
                 }
                 let crc = !#checksum(u32::MAX, &Self::q_values(&observation));
                 vector = vector.wrapping_add(1);
-                if good.wrapping_add(1) == vector && crc == *answer {
-                    good = vector;
+                if next == vector && crc == *answer {
+                    next = vector.wrapping_add(1);
+                    right = right.wrapping_add(1);
                 }
             }
-            if good == #count { Ok(()) } else { Err(good.wrapping_add(1)) }
+            let failing = if next == #beyond { #count.wrapping_sub(right) } else { next };
+            if failing == 0 { Ok(()) } else { Err(failing) }
         }
         /// CRC-32 over the tables: whether they are as generated.
         #[must_use]

@@ -84,8 +84,6 @@ impl<'p> Printer<'p> {
             Op::ChosenDuty => quote!(chosen),
             Op::Output => quote!(output),
             Op::Constant(literal) => number(self.program.scalar(), *literal),
-            // behind a barrier: of what is known to be 0 or 1 the optimiser makes a branch
-            Op::Primed => quote!(core::hint::black_box(self.primed & 1)),
             Op::Usable => quote!(front.usable),
             Op::Clipped => quote!(front.clipped),
             Op::Base => quote!(front.base),
@@ -132,6 +130,9 @@ impl<'p> Printer<'p> {
                 let curve = self.program.head.curve().map_or("", policy::Activation::word);
                 call(curve, &[v(x)])
             }
+            // behind a barrier: of what is known to be 0 or 1 the optimiser makes a branch. No leaf, since each barrier takes
+            // three instructions
+            Op::Primed => quote!(core::hint::black_box(self.primed & 1)),
             Op::NotZero(x) => {
                 let x = v(x);
                 quote!(flag(#x != 0))
@@ -172,6 +173,8 @@ pub fn helpers(program: &Program) -> TokenStream {
     let mask = number::bits(scalar).mask;
     let comparisons = super::guard::helpers(scalar);
     let lines = rust_lines(&Rust::of(program));
+    // `within` and `outside` have one barrier each, since a barrier takes three instructions. `within` adds its conditions: of an
+    // `and` of both rustc makes branches of different lengths on PowerPC, which has jumps for comparisons of floats
     quote! {
         /// A condition as 0 or 1. The optimiser must not know that: it would turn selections back into branches.
         #[inline(always)]
@@ -188,12 +191,12 @@ pub fn helpers(program: &Program) -> TokenStream {
         #[inline(always)]
         #[allow(dead_code)]
         fn within(x: #number, low: #number, high: #number) -> u32 {
-            flag(x >= low) & flag(x <= high)
+            core::hint::black_box(u32::from(x >= low).wrapping_add(u32::from(x <= high))) >> 1
         }
         #[inline(always)]
         #[allow(dead_code)]
         fn outside(x: #number, low: #number, high: #number) -> u32 {
-            flag(x < low) | flag(x > high)
+            flag((x < low) | (x > high))
         }
         #[inline(always)]
         #[allow(dead_code)]

@@ -29,7 +29,7 @@
  *   10 r (parameter): coefficient of the duty ratio mapping; set before a step, it counts from the one after it
  */
 #define ADC_MAPPING_FMU_VARIABLES 10u
-#define ADC_MAPPING_FMU_TOKEN "{690eb45d-abcb-3bcc-10f9-d8bd00c68b92}"
+#define ADC_MAPPING_FMU_TOKEN "{db96a248-4a47-8c9c-42d4-cecf17985843}"
 #define ADC_MAPPING_FMU_PERIOD 2e-5
 
 /* Types of variables. */

@@ -25,7 +25,7 @@
  *   6 status (output): status bits; 65536 is added while the coefficients are refused
  */
 #define MINIMAL_FMU_VARIABLES 6u
-#define MINIMAL_FMU_TOKEN "{05173ce3-321c-cba7-a925-741df5f6f5cf}"
+#define MINIMAL_FMU_TOKEN "{170e8994-5fe9-6d31-30c0-a3a26a6ffd1b}"
 #define MINIMAL_FMU_PERIOD 0.0001
 
 /* Types of variables. */

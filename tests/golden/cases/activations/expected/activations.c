@@ -275,10 +275,10 @@ static uint32_t activations_far(float x, uint32_t bound)
     return stray;
 }
 
-static uint32_t activations_aside(float x, uint32_t difference, uint32_t bound)
+static uint32_t activations_aside(float x, uint32_t from, uint32_t to)
 {
-    const float low = -activations_from_bits(bound ^ difference);
-    const float high = activations_from_bits(bound);
+    const float low = activations_from_bits(from);
+    const float high = activations_from_bits(to);
     uint32_t stray = (uint32_t)1 << 31;
     if ((x >= low) && (x <= high)) {
         /*@ admit !\is_NaN(x); */
@@ -349,12 +349,12 @@ ACTIVATIONS_SPARE static uint32_t activations_far(float x, uint32_t bound)
     return bound - (activations_bits(x) & 0x7FFFFFFFu);
 }
 
-/* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
-ACTIVATIONS_SPARE static uint32_t activations_aside(float x, uint32_t difference, uint32_t high)
+/* The sign bit is set if x is below the number with the bits low, whose sign is set, or above the one with the bits high. */
+ACTIVATIONS_SPARE static uint32_t activations_aside(float x, uint32_t low, uint32_t high)
 {
-    /* a flag behind its barrier: of a mask made of a sign clang makes a branch on RISC-V */
-    const uint32_t below = activations_flag((int)(activations_bits(x) >> 31));
-    return activations_far(x, high ^ (difference & ((uint32_t)0 - below)));
+    const uint32_t bits = activations_bits(x);
+    /* each difference counts for the numbers of its sign; of a mask made of a sign compilers make a branch */
+    return ((low - bits) & bits) | ((high - bits) & ~bits);
 }
 
 /* The sign bit is set if x is not among the numbers from the one with the bits low on. */
@@ -580,9 +580,9 @@ ACTIVATIONS_CODE ACTIVATIONS_APART static void activations_sense(const activatio
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
 ACTIVATIONS_CODE ACTIVATIONS_TOGETHER static void activations_guard(const activations_state *state, activations_front *front)
 {
-    const uint32_t stray = activations_aside(state->held[0], 0x41C00000u, 0x41C00000u)
-                         | activations_aside(state->previous_duty, 0x3F19999Au, 0x3F19999Au)
-                         | activations_aside(state->previous_command, 0x3F800000u, 0x3F800000u);
+    const uint32_t stray = activations_aside(state->held[0], 0x80000000u, 0x41C00000u)
+                         | activations_aside(state->previous_duty, 0x80000000u, 0x3F19999Au)
+                         | activations_aside(state->previous_command, 0x80000000u, 0x3F800000u);
 #if defined(__FRAMAC__)
     const uint32_t counters = ((6u - state->bad_count) >> 31) | (state->bad_count >> 31) | (((uint32_t)1 - state->primed) >> 31) | (state->primed >> 31);
     const uint32_t sound = (((uint32_t)(stray >> 31) | counters) ^ (uint32_t)1);
@@ -1333,13 +1333,15 @@ ACTIVATIONS_COLD uint32_t activations_self_test(void)
     float observation[ACTIVATIONS_FEATURES];
     float q[ACTIVATIONS_ACTIONS];
     uint32_t random = 0x2545F491u;
-    uint32_t good = 0u; /* first answers in a row that are right: a fault in this count shows in a sound build, too */
+    /* number of the first vector without a right answer, and right answers before it: a fault in either shows in a sound build, too */
+    uint32_t next = 1u;
+    uint32_t right = 0u;
     uint32_t vector;
     uint32_t i;
     activations_span span;
     span.from = 0u;
     span.to = ACTIVATIONS_ACTIONS;
-    for (vector = 0u; vector < 16u; ++vector) {
+    for (vector = 1u; vector <= 16u; ++vector) {
         for (i = 0u; i < ACTIVATIONS_FEATURES; ++i) {
             random = (random * 0x0019660Du) + 0x3C6EF35Fu;
             observation[i] = activations_box_low[i] + (activations_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
@@ -1348,9 +1350,10 @@ ACTIVATIONS_COLD uint32_t activations_self_test(void)
         span.crc = 0xFFFFFFFFu;
         activations_q_values(observation, q);
         activations_crc(&span, q, ACTIVATIONS_ACTIONS);
-        if ((good == vector) && ((span.crc ^ 0xFFFFFFFFu) == activations_answers[vector])) {
-            good = vector + 1u;
+        if ((next == vector) && ((span.crc ^ 0xFFFFFFFFu) == activations_answers[vector - 1u])) {
+            next = vector + 1u;
+            ++right;
         }
     }
-    return (good == 16u) ? 0u : (good + 1u);
+    return (next == 17u) ? (16u - right) : next;
 }

@@ -230,10 +230,10 @@ static uint32_t adc_mapping_far(float x, uint32_t bound)
     return stray;
 }
 
-static uint32_t adc_mapping_aside(float x, uint32_t difference, uint32_t bound)
+static uint32_t adc_mapping_aside(float x, uint32_t from, uint32_t to)
 {
-    const float low = -adc_mapping_from_bits(bound ^ difference);
-    const float high = adc_mapping_from_bits(bound);
+    const float low = adc_mapping_from_bits(from);
+    const float high = adc_mapping_from_bits(to);
     uint32_t stray = (uint32_t)1 << 31;
     if ((x >= low) && (x <= high)) {
         /*@ admit !\is_NaN(x); */
@@ -316,12 +316,12 @@ ADC_MAPPING_SPARE static uint32_t adc_mapping_far(float x, uint32_t bound)
     return bound - (adc_mapping_bits(x) & 0x7FFFFFFFu);
 }
 
-/* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
-ADC_MAPPING_SPARE static uint32_t adc_mapping_aside(float x, uint32_t difference, uint32_t high)
+/* The sign bit is set if x is below the number with the bits low, whose sign is set, or above the one with the bits high. */
+ADC_MAPPING_SPARE static uint32_t adc_mapping_aside(float x, uint32_t low, uint32_t high)
 {
-    /* a flag behind its barrier: of a mask made of a sign clang makes a branch on RISC-V */
-    const uint32_t below = adc_mapping_flag((int)(adc_mapping_bits(x) >> 31));
-    return adc_mapping_far(x, high ^ (difference & ((uint32_t)0 - below)));
+    const uint32_t bits = adc_mapping_bits(x);
+    /* each difference counts for the numbers of its sign; of a mask made of a sign compilers make a branch */
+    return ((low - bits) & bits) | ((high - bits) & ~bits);
 }
 
 /* The sign bit is set if x is not among the numbers from the one with the bits low on. */
@@ -459,9 +459,9 @@ ADC_MAPPING_CODE ADC_MAPPING_TOGETHER static uint32_t adc_mapping_mapping_flips(
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
 ADC_MAPPING_CODE ADC_MAPPING_TOGETHER static void adc_mapping_guard(const adc_mapping_state *state, adc_mapping_front *front)
 {
-    const uint32_t stray = adc_mapping_aside(state->held[0], 0x41A00000u, 0x41A00000u)
-                         | adc_mapping_aside(state->held[1], 0x01000000u, 0x41800000u)
-                         | adc_mapping_aside(state->previous_command, 0x3F666666u, 0x3F666666u)
+    const uint32_t stray = adc_mapping_aside(state->held[0], 0x80000000u, 0x41A00000u)
+                         | adc_mapping_aside(state->held[1], 0xC0800000u, 0x41800000u)
+                         | adc_mapping_aside(state->previous_command, 0x80000000u, 0x3F666666u)
                          | adc_mapping_beyond(state->soft_cap, 0x3DCCCCCDu, 0x01999999u)
                          | adc_mapping_any(adc_mapping_mapping_flips(state));
 #if defined(__FRAMAC__)
@@ -957,13 +957,15 @@ ADC_MAPPING_COLD uint32_t adc_mapping_self_test(void)
     float observation[ADC_MAPPING_FEATURES];
     float q[ADC_MAPPING_ACTIONS];
     uint32_t random = 0x2545F491u;
-    uint32_t good = 0u; /* first answers in a row that are right: a fault in this count shows in a sound build, too */
+    /* number of the first vector without a right answer, and right answers before it: a fault in either shows in a sound build, too */
+    uint32_t next = 1u;
+    uint32_t right = 0u;
     uint32_t vector;
     uint32_t i;
     adc_mapping_span span;
     span.from = 0u;
     span.to = ADC_MAPPING_ACTIONS;
-    for (vector = 0u; vector < 16u; ++vector) {
+    for (vector = 1u; vector <= 16u; ++vector) {
         for (i = 0u; i < ADC_MAPPING_FEATURES; ++i) {
             random = (random * 0x0019660Du) + 0x3C6EF35Fu;
             observation[i] = adc_mapping_box_low[i] + (adc_mapping_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
@@ -972,9 +974,10 @@ ADC_MAPPING_COLD uint32_t adc_mapping_self_test(void)
         span.crc = 0xFFFFFFFFu;
         adc_mapping_q_values(observation, q);
         adc_mapping_crc(&span, q, ADC_MAPPING_ACTIONS);
-        if ((good == vector) && ((span.crc ^ 0xFFFFFFFFu) == adc_mapping_answers[vector])) {
-            good = vector + 1u;
+        if ((next == vector) && ((span.crc ^ 0xFFFFFFFFu) == adc_mapping_answers[vector - 1u])) {
+            next = vector + 1u;
+            ++right;
         }
     }
-    return (good == 16u) ? 0u : (good + 1u);
+    return (next == 17u) ? (16u - right) : next;
 }

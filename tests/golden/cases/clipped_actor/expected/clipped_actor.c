@@ -210,10 +210,10 @@ static uint32_t clipped_actor_far(float x, uint32_t bound)
     return stray;
 }
 
-static uint32_t clipped_actor_aside(float x, uint32_t difference, uint32_t bound)
+static uint32_t clipped_actor_aside(float x, uint32_t from, uint32_t to)
 {
-    const float low = -clipped_actor_from_bits(bound ^ difference);
-    const float high = clipped_actor_from_bits(bound);
+    const float low = clipped_actor_from_bits(from);
+    const float high = clipped_actor_from_bits(to);
     uint32_t stray = (uint32_t)1 << 31;
     if ((x >= low) && (x <= high)) {
         /*@ admit !\is_NaN(x); */
@@ -284,12 +284,12 @@ CLIPPED_ACTOR_SPARE static uint32_t clipped_actor_far(float x, uint32_t bound)
     return bound - (clipped_actor_bits(x) & 0x7FFFFFFFu);
 }
 
-/* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
-CLIPPED_ACTOR_SPARE static uint32_t clipped_actor_aside(float x, uint32_t difference, uint32_t high)
+/* The sign bit is set if x is below the number with the bits low, whose sign is set, or above the one with the bits high. */
+CLIPPED_ACTOR_SPARE static uint32_t clipped_actor_aside(float x, uint32_t low, uint32_t high)
 {
-    /* a flag behind its barrier: of a mask made of a sign clang makes a branch on RISC-V */
-    const uint32_t below = clipped_actor_flag((int)(clipped_actor_bits(x) >> 31));
-    return clipped_actor_far(x, high ^ (difference & ((uint32_t)0 - below)));
+    const uint32_t bits = clipped_actor_bits(x);
+    /* each difference counts for the numbers of its sign; of a mask made of a sign compilers make a branch */
+    return ((low - bits) & bits) | ((high - bits) & ~bits);
 }
 
 /* The sign bit is set if x is not among the numbers from the one with the bits low on. */
@@ -380,7 +380,7 @@ CLIPPED_ACTOR_CODE CLIPPED_ACTOR_APART static void clipped_actor_sense(const cli
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
 CLIPPED_ACTOR_CODE CLIPPED_ACTOR_TOGETHER static void clipped_actor_guard(const clipped_actor_state *state, clipped_actor_front *front)
 {
-    const uint32_t stray = clipped_actor_aside(state->held[0], 0x437A0000u, 0x437A0000u)
+    const uint32_t stray = clipped_actor_aside(state->held[0], 0x80000000u, 0x437A0000u)
                          | clipped_actor_far(state->memory[0], 0x3F800008u);
 #if defined(__FRAMAC__)
     const uint32_t counters = ((3u - state->bad_count) >> 31) | (state->bad_count >> 31) | (((uint32_t)1 - state->primed) >> 31) | (state->primed >> 31);
@@ -746,13 +746,15 @@ CLIPPED_ACTOR_COLD uint32_t clipped_actor_self_test(void)
     float observation[CLIPPED_ACTOR_FEATURES];
     float q[CLIPPED_ACTOR_ACTIONS];
     uint32_t random = 0x2545F491u;
-    uint32_t good = 0u; /* first answers in a row that are right: a fault in this count shows in a sound build, too */
+    /* number of the first vector without a right answer, and right answers before it: a fault in either shows in a sound build, too */
+    uint32_t next = 1u;
+    uint32_t right = 0u;
     uint32_t vector;
     uint32_t i;
     clipped_actor_span span;
     span.from = 0u;
     span.to = CLIPPED_ACTOR_ACTIONS;
-    for (vector = 0u; vector < 16u; ++vector) {
+    for (vector = 1u; vector <= 16u; ++vector) {
         for (i = 0u; i < CLIPPED_ACTOR_FEATURES; ++i) {
             random = (random * 0x0019660Du) + 0x3C6EF35Fu;
             observation[i] = clipped_actor_box_low[i] + (clipped_actor_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
@@ -761,9 +763,10 @@ CLIPPED_ACTOR_COLD uint32_t clipped_actor_self_test(void)
         span.crc = 0xFFFFFFFFu;
         clipped_actor_q_values(observation, q);
         clipped_actor_crc(&span, q, CLIPPED_ACTOR_ACTIONS);
-        if ((good == vector) && ((span.crc ^ 0xFFFFFFFFu) == clipped_actor_answers[vector])) {
-            good = vector + 1u;
+        if ((next == vector) && ((span.crc ^ 0xFFFFFFFFu) == clipped_actor_answers[vector - 1u])) {
+            next = vector + 1u;
+            ++right;
         }
     }
-    return (good == 16u) ? 0u : (good + 1u);
+    return (next == 17u) ? (16u - right) : next;
 }

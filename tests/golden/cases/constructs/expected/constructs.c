@@ -298,10 +298,10 @@ static uint32_t constructs_far(float x, uint32_t bound)
     return stray;
 }
 
-static uint32_t constructs_aside(float x, uint32_t difference, uint32_t bound)
+static uint32_t constructs_aside(float x, uint32_t from, uint32_t to)
 {
-    const float low = -constructs_from_bits(bound ^ difference);
-    const float high = constructs_from_bits(bound);
+    const float low = constructs_from_bits(from);
+    const float high = constructs_from_bits(to);
     uint32_t stray = (uint32_t)1 << 31;
     if ((x >= low) && (x <= high)) {
         /*@ admit !\is_NaN(x); */
@@ -384,12 +384,12 @@ CONSTRUCTS_SPARE static uint32_t constructs_far(float x, uint32_t bound)
     return bound - (constructs_bits(x) & 0x7FFFFFFFu);
 }
 
-/* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
-CONSTRUCTS_SPARE static uint32_t constructs_aside(float x, uint32_t difference, uint32_t high)
+/* The sign bit is set if x is below the number with the bits low, whose sign is set, or above the one with the bits high. */
+CONSTRUCTS_SPARE static uint32_t constructs_aside(float x, uint32_t low, uint32_t high)
 {
-    /* a flag behind its barrier: of a mask made of a sign clang makes a branch on RISC-V */
-    const uint32_t below = constructs_flag((int)(constructs_bits(x) >> 31));
-    return constructs_far(x, high ^ (difference & ((uint32_t)0 - below)));
+    const uint32_t bits = constructs_bits(x);
+    /* each difference counts for the numbers of its sign; of a mask made of a sign compilers make a branch */
+    return ((low - bits) & bits) | ((high - bits) & ~bits);
 }
 
 /* The sign bit is set if x is not among the numbers from the one with the bits low on. */
@@ -676,9 +676,9 @@ CONSTRUCTS_CODE CONSTRUCTS_TOGETHER static uint32_t constructs_mapping_flips(con
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
 CONSTRUCTS_CODE CONSTRUCTS_TOGETHER static void constructs_guard(const constructs_state *state, constructs_front *front)
 {
-    const uint32_t stray = constructs_aside(state->held[0], 0x42A00000u, 0x42A00000u)
+    const uint32_t stray = constructs_aside(state->held[0], 0x80000000u, 0x42A00000u)
                          | constructs_far(state->held[1], 0x41A00000u)
-                         | constructs_aside(state->held[2], 0x7E000000u, 0x41800000u)
+                         | constructs_aside(state->held[2], 0xBF800000u, 0x41800000u)
                          | constructs_line_far(&state->memory[0], 3u, 0x4300000Bu)
                          | constructs_far(state->memory[3], 0x42A00000u)
                          | constructs_far(state->memory[4], 0x41A00014u)
@@ -1514,13 +1514,15 @@ CONSTRUCTS_COLD uint32_t constructs_self_test(void)
     float observation[CONSTRUCTS_FEATURES];
     float q[CONSTRUCTS_ACTIONS];
     uint32_t random = 0x2545F491u;
-    uint32_t good = 0u; /* first answers in a row that are right: a fault in this count shows in a sound build, too */
+    /* number of the first vector without a right answer, and right answers before it: a fault in either shows in a sound build, too */
+    uint32_t next = 1u;
+    uint32_t right = 0u;
     uint32_t vector;
     uint32_t i;
     constructs_span span;
     span.from = 0u;
     span.to = CONSTRUCTS_ACTIONS;
-    for (vector = 0u; vector < 16u; ++vector) {
+    for (vector = 1u; vector <= 16u; ++vector) {
         for (i = 0u; i < CONSTRUCTS_FEATURES; ++i) {
             random = (random * 0x0019660Du) + 0x3C6EF35Fu;
             observation[i] = constructs_box_low[i] + (constructs_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
@@ -1529,9 +1531,10 @@ CONSTRUCTS_COLD uint32_t constructs_self_test(void)
         span.crc = 0xFFFFFFFFu;
         constructs_q_values(observation, q);
         constructs_crc(&span, q, CONSTRUCTS_ACTIONS);
-        if ((good == vector) && ((span.crc ^ 0xFFFFFFFFu) == constructs_answers[vector])) {
-            good = vector + 1u;
+        if ((next == vector) && ((span.crc ^ 0xFFFFFFFFu) == constructs_answers[vector - 1u])) {
+            next = vector + 1u;
+            ++right;
         }
     }
-    return (good == 16u) ? 0u : (good + 1u);
+    return (next == 17u) ? (16u - right) : next;
 }

@@ -80,12 +80,12 @@ fn select(flag: u32, then: f32, otherwise: f32) -> f32 {
 #[inline(always)]
 #[allow(dead_code)]
 fn within(x: f32, low: f32, high: f32) -> u32 {
-    flag(x >= low) & flag(x <= high)
+    core::hint::black_box(u32::from(x >= low).wrapping_add(u32::from(x <= high))) >> 1
 }
 #[inline(always)]
 #[allow(dead_code)]
 fn outside(x: f32, low: f32, high: f32) -> u32 {
-    flag(x < low) | flag(x > high)
+    flag((x < low) | (x > high))
 }
 #[inline(always)]
 #[allow(dead_code)]
@@ -125,12 +125,12 @@ fn leaky_relu(x: f32, slope: f32) -> f32 {
 fn far(x: f32, bound: u32) -> u32 {
     bound.wrapping_sub(x.to_bits() & 0x7FFF_FFFF)
 }
-/// The sign bit is set if |x| is above the bound of its sign: `high`, or below 0 what `difference` makes of it.
+/// The sign bit is set if x is below the number with the bits `low`, whose sign is set, or above the one with `high`.
 #[inline(always)]
 #[allow(dead_code)]
-fn aside(x: f32, difference: u32, high: u32) -> u32 {
-    let below = (0 as u32).wrapping_sub(core::hint::black_box(x.to_bits() >> 31));
-    far(x, high ^ (difference & below))
+fn aside(x: f32, low: u32, high: u32) -> u32 {
+    let bits = x.to_bits();
+    (low.wrapping_sub(bits) & bits) | (high.wrapping_sub(bits) & !bits)
 }
 /// The sign bit is set if x is not among the `width` numbers from that with the bits `low` on.
 #[inline(always)]
@@ -900,97 +900,66 @@ impl Controller {
         let v12: f32 = clamp(v11, -2.0, 2.0);
         let f13: u32 = v11.to_bits() ^ v12.to_bits();
         let v14: f32 = v1 - 48.0;
-        let v15: f32 = select(
-            core::hint::black_box(self.primed & 1),
-            self.memory[0],
-            v14,
-        );
-        let v16: f32 = v15 * 0.05;
-        let v17: f32 = v16 + 0.25;
-        let v18: f32 = select(
-            core::hint::black_box(self.primed & 1),
-            self.memory[3],
-            v1,
-        );
-        let v19: f32 = v1 - v18;
-        let v20: f32 = v19 * 10000.0;
-        let v21: f32 = v20 * 0.00001;
-        let v22: f32 = clamp(v21, -1.0, 1.0);
-        let f23: u32 = v21.to_bits() ^ v22.to_bits();
-        let v24: f32 = select(
-            core::hint::black_box(self.primed & 1),
-            self.memory[4],
-            v5,
-        );
-        let v25: f32 = v5 - v24;
-        let v26: f32 = v25 * 0.09090909;
-        let v27: f32 = v24 + v26;
-        let v28: f32 = v27 * 0.05;
-        let v29: f32 = v28 + -0.125;
-        let v30: f32 = v5 - v7;
-        let v31: f32 = select(
-            core::hint::black_box(self.primed & 1),
-            self.memory[5],
-            v30,
-        );
-        let v32: f32 = select(
-            core::hint::black_box(self.primed & 1),
-            self.memory[6],
-            0.0,
-        );
-        let v33: f32 = v32 * 0.95238096;
-        let v34: f32 = v30 - v31;
-        let v35: f32 = v34 * 476.1905;
-        let v36: f32 = v33 + v35;
-        let v37: f32 = v36 * 0.0001;
-        let v38: f32 = line_sum(
+        let f15: u32 = core::hint::black_box(self.primed & 1);
+        let v16: f32 = select(f15, self.memory[0], v14);
+        let v17: f32 = v16 * 0.05;
+        let v18: f32 = v17 + 0.25;
+        let v19: f32 = select(f15, self.memory[3], v1);
+        let v20: f32 = v1 - v19;
+        let v21: f32 = v20 * 10000.0;
+        let v22: f32 = v21 * 0.00001;
+        let v23: f32 = clamp(v22, -1.0, 1.0);
+        let f24: u32 = v22.to_bits() ^ v23.to_bits();
+        let v25: f32 = select(f15, self.memory[4], v5);
+        let v26: f32 = v5 - v25;
+        let v27: f32 = v26 * 0.09090909;
+        let v28: f32 = v25 + v27;
+        let v29: f32 = v28 * 0.05;
+        let v30: f32 = v29 + -0.125;
+        let v31: f32 = v5 - v7;
+        let v32: f32 = select(f15, self.memory[5], v31);
+        let v33: f32 = select(f15, self.memory[6], 0.0);
+        let v34: f32 = v33 * 0.95238096;
+        let v35: f32 = v31 - v32;
+        let v36: f32 = v35 * 476.1905;
+        let v37: f32 = v34 + v36;
+        let v38: f32 = v37 * 0.0001;
+        let v39: f32 = line_sum(
             self.memory[7],
             self.memory.iter().skip(8).take(3),
             v1,
-            core::hint::black_box(self.primed & 1),
+            f15,
         );
-        let v39: f32 = v38 * 0.2;
-        let v40: f32 = v39 * 0.02;
-        let v41: f32 = select(
-            core::hint::black_box(self.primed & 1),
-            self.memory[11],
-            0.01,
-        );
-        let v42: f32 = v10 * 0.0001;
-        let v43: f32 = v41 + v42;
-        let v44: f32 = clamp(v43, -0.02, 0.03);
-        let v45: f32 = v44 * 30.0;
-        let v46: f32 = select(
-            core::hint::black_box(self.primed & 1),
-            self.memory[12],
-            v7,
-        );
-        let v47: f32 = line_sum(
+        let v40: f32 = v39 * 0.2;
+        let v41: f32 = v40 * 0.02;
+        let v42: f32 = select(f15, self.memory[11], 0.01);
+        let v43: f32 = v10 * 0.0001;
+        let v44: f32 = v42 + v43;
+        let v45: f32 = clamp(v44, -0.02, 0.03);
+        let v46: f32 = v45 * 30.0;
+        let v47: f32 = select(f15, self.memory[12], v7);
+        let v48: f32 = line_sum(
             self.memory[13],
             self.memory.iter().skip(14).take(0),
-            v46,
-            core::hint::black_box(self.primed & 1),
+            v47,
+            f15,
         );
-        let v48: f32 = v47 * 0.5;
-        let v49: f32 = select(
-            core::hint::black_box(self.primed & 1),
-            self.memory[14],
-            v48,
-        );
-        let v50: f32 = v48 - v49;
-        let v51: f32 = v50 * 10000.0;
-        let v52: f32 = v51 * 0.00001;
-        let v53: f32 = v7 * 2.0;
-        let v54: f32 = v1 * 0.020833334;
-        let v55: f32 = v53 + v54;
-        let v56: f32 = -v55;
-        let v57: f32 = v56 * 0.25;
-        let v58: f32 = v57 * 0.1;
-        let v59: f32 = self.previous_command * 2.0;
-        let v60: f32 = v59 - 1.0;
-        let v61: f32 = v7 * 0.0625;
-        let f62: u32 = f13 | f23;
-        let f63: u32 = flag(f62 != 0);
+        let v49: f32 = v48 * 0.5;
+        let v50: f32 = select(f15, self.memory[14], v49);
+        let v51: f32 = v49 - v50;
+        let v52: f32 = v51 * 10000.0;
+        let v53: f32 = v52 * 0.00001;
+        let v54: f32 = v7 * 2.0;
+        let v55: f32 = v1 * 0.020833334;
+        let v56: f32 = v54 + v55;
+        let v57: f32 = -v56;
+        let v58: f32 = v57 * 0.25;
+        let v59: f32 = v58 * 0.1;
+        let v60: f32 = self.previous_command * 2.0;
+        let v61: f32 = v60 - 1.0;
+        let v62: f32 = v7 * 0.0625;
+        let f63: u32 = f13 | f24;
+        let f64: u32 = flag(f63 != 0);
         let counted = self.bad_count.wrapping_add(flag(self.bad_count <= 3));
         let bad_count = counted & f9.wrapping_sub(1);
         let usable = f9 | (self.primed & flag(bad_count <= 3));
@@ -998,24 +967,24 @@ impl Controller {
             signal: [v1, v5, v7],
             observation: [
                 v12,
-                v17,
-                v22,
-                v29,
-                v37,
-                v40,
-                v45,
-                v52,
-                v58,
+                v18,
+                v23,
+                v30,
+                v38,
+                v41,
+                v46,
+                v53,
+                v59,
                 self.previous_duty,
-                v60,
                 v61,
+                v62,
             ],
-            push: [v14, v1, v27, v30, v36, v1, v44, v7, v46, v48],
+            push: [v14, v1, v28, v31, v37, v1, v45, v7, v47, v49],
             bad_count,
             usable,
             held: usable & (f9 ^ 1),
             primed_now: usable & (self.primed ^ 1),
-            clipped: f63,
+            clipped: f64,
         }
     }
     /// Bits that flipped in the coefficients of the mapping or in their check word: 0 as `new` and `set_mapping` leave them.
@@ -1025,11 +994,11 @@ impl Controller {
             ^ self.mapping_b.to_bits() ^ self.mapping_c.to_bits()
             ^ self.mapping_r.to_bits()
     }
-    /// 1 if the state is one that the controller can have written: a flipped bit that would decide the duty gives 0.
-    #[inline(always)]
-    fn sound(&self) -> u32 {
-        let stray = aside(self.held[0], 1117782016, 1117782016)
-            | far(self.held[1], 1101004800) | aside(self.held[2], 2113929216, 1098907648)
+    /// The sign bit is set if the state is not one that the controller can have written: a bit flipped that would decide the duty.
+    #[inline(never)]
+    fn damage(&self) -> u32 {
+        let stray = aside(self.held[0], 2147483648, 1117782016)
+            | far(self.held[1], 1101004800) | aside(self.held[2], 3212836864, 1098907648)
             | self
                 .memory
                 .iter()
@@ -1054,10 +1023,14 @@ impl Controller {
             | far(self.memory[14], 1098907658)
             | beyond(self.previous_duty, 1017370378, 42949673)
             | beyond(self.previous_command, 1017370378, 42614128)
-            | beyond(self.soft_cap, 1051931443, 8053063) | any(self.mapping_flips());
-        let counters = 4u32.wrapping_sub(self.bad_count) | self.bad_count
-            | 1_u32.wrapping_sub(self.primed) | self.primed;
-        core::hint::black_box(((stray | counters) >> 31) ^ 1)
+            | beyond(self.soft_cap, 1051931443, 8053063)
+            | any(self.mapping_flips() | (self.primed >> 1));
+        stray | 4u32.wrapping_sub(self.bad_count) | self.bad_count
+    }
+    /// 1 if the state is one that the controller can have written, else 0.
+    #[inline(always)]
+    fn sound(&self) -> u32 {
+        core::hint::black_box((self.damage() >> 31) ^ 1)
     }
     /// [`Self::sense`], and what a damaged state forbids.
     #[inline(always)]
@@ -1125,8 +1098,7 @@ impl Controller {
         let v17: f32 = clamp(v16, 0.3, 0.67999995);
         let f18: u32 = v16.to_bits() ^ v17.to_bits();
         let f19: u32 = flag(f18 != 0);
-        let stray = far(v17, 2139095040);
-        let trusted = core::hint::black_box(sound & !(stray >> 31));
+        let trusted = sound & !(v17.to_bits() >> 30);
         let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
             | (f9 << 4) | (f14 << 5) | (f15 << 6) | (f19 << 7);
@@ -1134,8 +1106,7 @@ impl Controller {
             duty: select(usable, v17, 0.02),
             duty_sim: select(usable, chosen, 0.02),
             action_index: action_index & 0_u32.wrapping_sub(trusted),
-            status: (status & 0_u32.wrapping_sub(usable))
-                | (status::FALLBACK & usable.wrapping_sub(1))
+            status: (status & 0_u32.wrapping_sub(usable)) | ((usable ^ 1) << 1)
                 | (status::STATE & trusted.wrapping_sub(1)),
         }
     }
@@ -1214,7 +1185,8 @@ impl Controller {
             107539351, 2153348081, 96936842, 1834639503,
         ];
         let mut random: u32 = 625341585;
-        let mut good = 0_u32;
+        let mut next = 1_u32;
+        let mut right = 0_u32;
         let mut vector = 0_u32;
         for answer in &ANSWERS {
             let mut observation = [0.0_f32; FEATURES];
@@ -1228,11 +1200,13 @@ impl Controller {
             }
             let crc = !crc_floats(u32::MAX, &Self::q_values(&observation));
             vector = vector.wrapping_add(1);
-            if good.wrapping_add(1) == vector && crc == *answer {
-                good = vector;
+            if next == vector && crc == *answer {
+                next = vector.wrapping_add(1);
+                right = right.wrapping_add(1);
             }
         }
-        if good == 16 { Ok(()) } else { Err(good.wrapping_add(1)) }
+        let failing = if next == 17u32 { 16u32.wrapping_sub(right) } else { next };
+        if failing == 0 { Ok(()) } else { Err(failing) }
     }
     /// CRC-32 over the tables: whether they are as generated.
     #[must_use]

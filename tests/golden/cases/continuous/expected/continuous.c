@@ -235,10 +235,10 @@ static uint32_t continuous_far(float x, uint32_t bound)
     return stray;
 }
 
-static uint32_t continuous_aside(float x, uint32_t difference, uint32_t bound)
+static uint32_t continuous_aside(float x, uint32_t from, uint32_t to)
 {
-    const float low = -continuous_from_bits(bound ^ difference);
-    const float high = continuous_from_bits(bound);
+    const float low = continuous_from_bits(from);
+    const float high = continuous_from_bits(to);
     uint32_t stray = (uint32_t)1 << 31;
     if ((x >= low) && (x <= high)) {
         /*@ admit !\is_NaN(x); */
@@ -321,12 +321,12 @@ CONTINUOUS_SPARE static uint32_t continuous_far(float x, uint32_t bound)
     return bound - (continuous_bits(x) & 0x7FFFFFFFu);
 }
 
-/* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
-CONTINUOUS_SPARE static uint32_t continuous_aside(float x, uint32_t difference, uint32_t high)
+/* The sign bit is set if x is below the number with the bits low, whose sign is set, or above the one with the bits high. */
+CONTINUOUS_SPARE static uint32_t continuous_aside(float x, uint32_t low, uint32_t high)
 {
-    /* a flag behind its barrier: of a mask made of a sign clang makes a branch on RISC-V */
-    const uint32_t below = continuous_flag((int)(continuous_bits(x) >> 31));
-    return continuous_far(x, high ^ (difference & ((uint32_t)0 - below)));
+    const uint32_t bits = continuous_bits(x);
+    /* each difference counts for the numbers of its sign; of a mask made of a sign compilers make a branch */
+    return ((low - bits) & bits) | ((high - bits) & ~bits);
 }
 
 /* The sign bit is set if x is not among the numbers from the one with the bits low on. */
@@ -477,12 +477,12 @@ CONTINUOUS_CODE CONTINUOUS_TOGETHER static uint32_t continuous_mapping_flips(con
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
 CONTINUOUS_CODE CONTINUOUS_TOGETHER static void continuous_guard(const continuous_state *state, continuous_front *front)
 {
-    const uint32_t stray = continuous_aside(state->held[0], 0x41A00000u, 0x41A00000u)
-                         | continuous_aside(state->held[1], 0x01000000u, 0x41800000u)
+    const uint32_t stray = continuous_aside(state->held[0], 0x80000000u, 0x41A00000u)
+                         | continuous_aside(state->held[1], 0xC0800000u, 0x41800000u)
                          | continuous_far(state->memory[0], 0x4200000Bu)
                          | continuous_line_far(&state->memory[1], 2u, 0x3F800000u)
-                         | continuous_aside(state->previous_duty, 0x3F59999Au, 0x3F59999Au)
-                         | continuous_aside(state->previous_command, 0x3F666666u, 0x3F666666u)
+                         | continuous_aside(state->previous_duty, 0x80000000u, 0x3F59999Au)
+                         | continuous_aside(state->previous_command, 0x80000000u, 0x3F666666u)
                          | continuous_any(continuous_mapping_flips(state));
 #if defined(__FRAMAC__)
     const uint32_t counters = ((5u - state->bad_count) >> 31) | (state->bad_count >> 31) | (((uint32_t)1 - state->primed) >> 31) | (state->primed >> 31);
@@ -981,13 +981,15 @@ CONTINUOUS_COLD uint32_t continuous_self_test(void)
     float observation[CONTINUOUS_FEATURES];
     float q[CONTINUOUS_ACTIONS];
     uint32_t random = 0x2545F491u;
-    uint32_t good = 0u; /* first answers in a row that are right: a fault in this count shows in a sound build, too */
+    /* number of the first vector without a right answer, and right answers before it: a fault in either shows in a sound build, too */
+    uint32_t next = 1u;
+    uint32_t right = 0u;
     uint32_t vector;
     uint32_t i;
     continuous_span span;
     span.from = 0u;
     span.to = CONTINUOUS_ACTIONS;
-    for (vector = 0u; vector < 16u; ++vector) {
+    for (vector = 1u; vector <= 16u; ++vector) {
         for (i = 0u; i < CONTINUOUS_FEATURES; ++i) {
             random = (random * 0x0019660Du) + 0x3C6EF35Fu;
             observation[i] = continuous_box_low[i] + (continuous_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
@@ -996,9 +998,10 @@ CONTINUOUS_COLD uint32_t continuous_self_test(void)
         span.crc = 0xFFFFFFFFu;
         continuous_q_values(observation, q);
         continuous_crc(&span, q, CONTINUOUS_ACTIONS);
-        if ((good == vector) && ((span.crc ^ 0xFFFFFFFFu) == continuous_answers[vector])) {
-            good = vector + 1u;
+        if ((next == vector) && ((span.crc ^ 0xFFFFFFFFu) == continuous_answers[vector - 1u])) {
+            next = vector + 1u;
+            ++right;
         }
     }
-    return (good == 16u) ? 0u : (good + 1u);
+    return (next == 17u) ? (16u - right) : next;
 }

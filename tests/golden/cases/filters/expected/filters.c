@@ -229,10 +229,10 @@ static uint32_t filters_far(float x, uint32_t bound)
     return stray;
 }
 
-static uint32_t filters_aside(float x, uint32_t difference, uint32_t bound)
+static uint32_t filters_aside(float x, uint32_t from, uint32_t to)
 {
-    const float low = -filters_from_bits(bound ^ difference);
-    const float high = filters_from_bits(bound);
+    const float low = filters_from_bits(from);
+    const float high = filters_from_bits(to);
     uint32_t stray = (uint32_t)1 << 31;
     if ((x >= low) && (x <= high)) {
         /*@ admit !\is_NaN(x); */
@@ -303,12 +303,12 @@ FILTERS_SPARE static uint32_t filters_far(float x, uint32_t bound)
     return bound - (filters_bits(x) & 0x7FFFFFFFu);
 }
 
-/* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
-FILTERS_SPARE static uint32_t filters_aside(float x, uint32_t difference, uint32_t high)
+/* The sign bit is set if x is below the number with the bits low, whose sign is set, or above the one with the bits high. */
+FILTERS_SPARE static uint32_t filters_aside(float x, uint32_t low, uint32_t high)
 {
-    /* a flag behind its barrier: of a mask made of a sign clang makes a branch on RISC-V */
-    const uint32_t below = filters_flag((int)(filters_bits(x) >> 31));
-    return filters_far(x, high ^ (difference & ((uint32_t)0 - below)));
+    const uint32_t bits = filters_bits(x);
+    /* each difference counts for the numbers of its sign; of a mask made of a sign compilers make a branch */
+    return ((low - bits) & bits) | ((high - bits) & ~bits);
 }
 
 /* The sign bit is set if x is not among the numbers from the one with the bits low on. */
@@ -478,8 +478,8 @@ FILTERS_CODE FILTERS_APART static void filters_sense(const filters_state *state,
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
 FILTERS_CODE FILTERS_TOGETHER static void filters_guard(const filters_state *state, filters_front *front)
 {
-    const uint32_t stray = filters_aside(state->held[0], 0x42A00000u, 0x42A00000u)
-                         | filters_aside(state->held[1], 0x01D00000u, 0x41F00000u)
+    const uint32_t stray = filters_aside(state->held[0], 0x80000000u, 0x42A00000u)
+                         | filters_aside(state->held[1], 0xC0200000u, 0x41F00000u)
                          | filters_line_far(&state->memory[0], 20u, 0x4300000Bu)
                          | filters_far(state->memory[20], 0x42A00000u)
                          | filters_line_far(&state->memory[21], 2u, 0x41F0001Eu)
@@ -980,13 +980,15 @@ FILTERS_COLD uint32_t filters_self_test(void)
     float observation[FILTERS_FEATURES];
     float q[FILTERS_ACTIONS];
     uint32_t random = 0x2545F491u;
-    uint32_t good = 0u; /* first answers in a row that are right: a fault in this count shows in a sound build, too */
+    /* number of the first vector without a right answer, and right answers before it: a fault in either shows in a sound build, too */
+    uint32_t next = 1u;
+    uint32_t right = 0u;
     uint32_t vector;
     uint32_t i;
     filters_span span;
     span.from = 0u;
     span.to = FILTERS_ACTIONS;
-    for (vector = 0u; vector < 16u; ++vector) {
+    for (vector = 1u; vector <= 16u; ++vector) {
         for (i = 0u; i < FILTERS_FEATURES; ++i) {
             random = (random * 0x0019660Du) + 0x3C6EF35Fu;
             observation[i] = filters_box_low[i] + (filters_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
@@ -995,9 +997,10 @@ FILTERS_COLD uint32_t filters_self_test(void)
         span.crc = 0xFFFFFFFFu;
         filters_q_values(observation, q);
         filters_crc(&span, q, FILTERS_ACTIONS);
-        if ((good == vector) && ((span.crc ^ 0xFFFFFFFFu) == filters_answers[vector])) {
-            good = vector + 1u;
+        if ((next == vector) && ((span.crc ^ 0xFFFFFFFFu) == filters_answers[vector - 1u])) {
+            next = vector + 1u;
+            ++right;
         }
     }
-    return (good == 16u) ? 0u : (good + 1u);
+    return (next == 17u) ? (16u - right) : next;
 }

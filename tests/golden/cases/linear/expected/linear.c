@@ -205,10 +205,10 @@ static uint32_t linear_far(float x, uint32_t bound)
     return stray;
 }
 
-static uint32_t linear_aside(float x, uint32_t difference, uint32_t bound)
+static uint32_t linear_aside(float x, uint32_t from, uint32_t to)
 {
-    const float low = -linear_from_bits(bound ^ difference);
-    const float high = linear_from_bits(bound);
+    const float low = linear_from_bits(from);
+    const float high = linear_from_bits(to);
     uint32_t stray = (uint32_t)1 << 31;
     if ((x >= low) && (x <= high)) {
         /*@ admit !\is_NaN(x); */
@@ -279,12 +279,12 @@ LINEAR_SPARE static uint32_t linear_far(float x, uint32_t bound)
     return bound - (linear_bits(x) & 0x7FFFFFFFu);
 }
 
-/* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
-LINEAR_SPARE static uint32_t linear_aside(float x, uint32_t difference, uint32_t high)
+/* The sign bit is set if x is below the number with the bits low, whose sign is set, or above the one with the bits high. */
+LINEAR_SPARE static uint32_t linear_aside(float x, uint32_t low, uint32_t high)
 {
-    /* a flag behind its barrier: of a mask made of a sign clang makes a branch on RISC-V */
-    const uint32_t below = linear_flag((int)(linear_bits(x) >> 31));
-    return linear_far(x, high ^ (difference & ((uint32_t)0 - below)));
+    const uint32_t bits = linear_bits(x);
+    /* each difference counts for the numbers of its sign; of a mask made of a sign compilers make a branch */
+    return ((low - bits) & bits) | ((high - bits) & ~bits);
 }
 
 /* The sign bit is set if x is not among the numbers from the one with the bits low on. */
@@ -361,7 +361,7 @@ LINEAR_CODE LINEAR_APART static void linear_sense(const linear_state *state, con
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
 LINEAR_CODE LINEAR_TOGETHER static void linear_guard(const linear_state *state, linear_front *front)
 {
-    const uint32_t stray = linear_aside(state->held[0], 0x437A0000u, 0x437A0000u)
+    const uint32_t stray = linear_aside(state->held[0], 0x80000000u, 0x437A0000u)
                          | linear_far(state->memory[0], 0x3F800008u)
                          | linear_beyond(state->previous_command, 0x3ECCCCCDu, 0x004CCCCCu);
 #if defined(__FRAMAC__)
@@ -674,13 +674,15 @@ LINEAR_COLD uint32_t linear_self_test(void)
     float observation[LINEAR_FEATURES];
     float q[LINEAR_ACTIONS];
     uint32_t random = 0x2545F491u;
-    uint32_t good = 0u; /* first answers in a row that are right: a fault in this count shows in a sound build, too */
+    /* number of the first vector without a right answer, and right answers before it: a fault in either shows in a sound build, too */
+    uint32_t next = 1u;
+    uint32_t right = 0u;
     uint32_t vector;
     uint32_t i;
     linear_span span;
     span.from = 0u;
     span.to = LINEAR_ACTIONS;
-    for (vector = 0u; vector < 16u; ++vector) {
+    for (vector = 1u; vector <= 16u; ++vector) {
         for (i = 0u; i < LINEAR_FEATURES; ++i) {
             random = (random * 0x0019660Du) + 0x3C6EF35Fu;
             observation[i] = linear_box_low[i] + (linear_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
@@ -689,9 +691,10 @@ LINEAR_COLD uint32_t linear_self_test(void)
         span.crc = 0xFFFFFFFFu;
         linear_q_values(observation, q);
         linear_crc(&span, q, LINEAR_ACTIONS);
-        if ((good == vector) && ((span.crc ^ 0xFFFFFFFFu) == linear_answers[vector])) {
-            good = vector + 1u;
+        if ((next == vector) && ((span.crc ^ 0xFFFFFFFFu) == linear_answers[vector - 1u])) {
+            next = vector + 1u;
+            ++right;
         }
     }
-    return (good == 16u) ? 0u : (good + 1u);
+    return (next == 17u) ? (16u - right) : next;
 }

@@ -76,12 +76,12 @@ fn select(flag: u32, then: f32, otherwise: f32) -> f32 {
 #[inline(always)]
 #[allow(dead_code)]
 fn within(x: f32, low: f32, high: f32) -> u32 {
-    flag(x >= low) & flag(x <= high)
+    core::hint::black_box(u32::from(x >= low).wrapping_add(u32::from(x <= high))) >> 1
 }
 #[inline(always)]
 #[allow(dead_code)]
 fn outside(x: f32, low: f32, high: f32) -> u32 {
-    flag(x < low) | flag(x > high)
+    flag((x < low) | (x > high))
 }
 #[inline(always)]
 #[allow(dead_code)]
@@ -121,12 +121,12 @@ fn leaky_relu(x: f32, slope: f32) -> f32 {
 fn far(x: f32, bound: u32) -> u32 {
     bound.wrapping_sub(x.to_bits() & 0x7FFF_FFFF)
 }
-/// The sign bit is set if |x| is above the bound of its sign: `high`, or below 0 what `difference` makes of it.
+/// The sign bit is set if x is below the number with the bits `low`, whose sign is set, or above the one with `high`.
 #[inline(always)]
 #[allow(dead_code)]
-fn aside(x: f32, difference: u32, high: u32) -> u32 {
-    let below = (0 as u32).wrapping_sub(core::hint::black_box(x.to_bits() >> 31));
-    far(x, high ^ (difference & below))
+fn aside(x: f32, low: u32, high: u32) -> u32 {
+    let bits = x.to_bits();
+    (low.wrapping_sub(bits) & bits) | (high.wrapping_sub(bits) & !bits)
 }
 /// The sign bit is set if x is not among the `width` numbers from that with the bits `low` on.
 #[inline(always)]
@@ -391,36 +391,37 @@ impl Controller {
         let v1: f32 = select(f0, measured.v_out, self.held[0]);
         let v2: f32 = 100.0 - v1;
         let v3: f32 = v2 * 0.05;
-        let v4: f32 = select(
-            core::hint::black_box(self.primed & 1),
-            self.memory[0],
-            0.0,
-        );
-        let v5: f32 = v2 * 0.0001;
-        let v6: f32 = v4 + v5;
-        let v7: f32 = clamp(v6, -1.0, 1.0);
+        let f4: u32 = core::hint::black_box(self.primed & 1);
+        let v5: f32 = select(f4, self.memory[0], 0.0);
+        let v6: f32 = v2 * 0.0001;
+        let v7: f32 = v5 + v6;
+        let v8: f32 = clamp(v7, -1.0, 1.0);
         let counted = self.bad_count.wrapping_add(flag(self.bad_count <= 1));
         let bad_count = counted & f0.wrapping_sub(1);
         let usable = f0 | (self.primed & flag(bad_count <= 1));
         Front {
             signal: [v1],
-            observation: [v3, v7],
-            push: [v7],
+            observation: [v3, v8],
+            push: [v8],
             bad_count,
             usable,
             held: usable & (f0 ^ 1),
             primed_now: usable & (self.primed ^ 1),
         }
     }
-    /// 1 if the state is one that the controller can have written: a flipped bit that would decide the duty gives 0.
-    #[inline(always)]
-    fn sound(&self) -> u32 {
-        let stray = aside(self.held[0], 1132068864, 1132068864)
+    /// The sign bit is set if the state is not one that the controller can have written: a bit flipped that would decide the duty.
+    #[inline(never)]
+    fn damage(&self) -> u32 {
+        let stray = aside(self.held[0], 2147483648, 1132068864)
             | far(self.memory[0], 1065353224)
             | beyond(self.previous_command, 1053609165, 5033164);
-        let counters = 2u32.wrapping_sub(self.bad_count) | self.bad_count
-            | 1_u32.wrapping_sub(self.primed) | self.primed;
-        core::hint::black_box(((stray | counters) >> 31) ^ 1)
+        stray | 2u32.wrapping_sub(self.bad_count) | self.bad_count
+            | 1_u32.wrapping_sub(self.primed) | self.primed
+    }
+    /// 1 if the state is one that the controller can have written, else 0.
+    #[inline(always)]
+    fn sound(&self) -> u32 {
+        core::hint::black_box((self.damage() >> 31) ^ 1)
     }
     /// [`Self::sense`], and what a damaged state forbids.
     #[inline(always)]
@@ -476,16 +477,14 @@ impl Controller {
         let v5: f32 = clamp(v2, 0.4, 0.59999996);
         let f6: u32 = v2.to_bits() ^ v5.to_bits();
         let f7: u32 = flag(f6 != 0);
-        let stray = far(v5, 2139095040);
-        let trusted = core::hint::black_box(sound & !(stray >> 31));
+        let trusted = sound & !(v5.to_bits() >> 30);
         let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (f4 << 5) | (f7 << 7);
         Command {
             duty: select(usable, v5, 0.4),
             duty_sim: select(usable, chosen, 0.4),
             action_index: action_index & 0_u32.wrapping_sub(trusted),
-            status: (status & 0_u32.wrapping_sub(usable))
-                | (status::FALLBACK & usable.wrapping_sub(1))
+            status: (status & 0_u32.wrapping_sub(usable)) | ((usable ^ 1) << 1)
                 | (status::STATE & trusted.wrapping_sub(1)),
         }
     }
@@ -512,7 +511,8 @@ impl Controller {
             3850305080, 2260131101, 922557584, 3782283141,
         ];
         let mut random: u32 = 625341585;
-        let mut good = 0_u32;
+        let mut next = 1_u32;
+        let mut right = 0_u32;
         let mut vector = 0_u32;
         for answer in &ANSWERS {
             let mut observation = [0.0_f32; FEATURES];
@@ -526,11 +526,13 @@ impl Controller {
             }
             let crc = !crc_floats(u32::MAX, &Self::q_values(&observation));
             vector = vector.wrapping_add(1);
-            if good.wrapping_add(1) == vector && crc == *answer {
-                good = vector;
+            if next == vector && crc == *answer {
+                next = vector.wrapping_add(1);
+                right = right.wrapping_add(1);
             }
         }
-        if good == 16 { Ok(()) } else { Err(good.wrapping_add(1)) }
+        let failing = if next == 17u32 { 16u32.wrapping_sub(right) } else { next };
+        if failing == 0 { Ok(()) } else { Err(failing) }
     }
     /// CRC-32 over the tables: whether they are as generated.
     #[must_use]

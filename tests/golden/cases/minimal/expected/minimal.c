@@ -214,10 +214,10 @@ static uint32_t minimal_far(float x, uint32_t bound)
     return stray;
 }
 
-static uint32_t minimal_aside(float x, uint32_t difference, uint32_t bound)
+static uint32_t minimal_aside(float x, uint32_t from, uint32_t to)
 {
-    const float low = -minimal_from_bits(bound ^ difference);
-    const float high = minimal_from_bits(bound);
+    const float low = minimal_from_bits(from);
+    const float high = minimal_from_bits(to);
     uint32_t stray = (uint32_t)1 << 31;
     if ((x >= low) && (x <= high)) {
         /*@ admit !\is_NaN(x); */
@@ -288,12 +288,12 @@ MINIMAL_SPARE static uint32_t minimal_far(float x, uint32_t bound)
     return bound - (minimal_bits(x) & 0x7FFFFFFFu);
 }
 
-/* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
-MINIMAL_SPARE static uint32_t minimal_aside(float x, uint32_t difference, uint32_t high)
+/* The sign bit is set if x is below the number with the bits low, whose sign is set, or above the one with the bits high. */
+MINIMAL_SPARE static uint32_t minimal_aside(float x, uint32_t low, uint32_t high)
 {
-    /* a flag behind its barrier: of a mask made of a sign clang makes a branch on RISC-V */
-    const uint32_t below = minimal_flag((int)(minimal_bits(x) >> 31));
-    return minimal_far(x, high ^ (difference & ((uint32_t)0 - below)));
+    const uint32_t bits = minimal_bits(x);
+    /* each difference counts for the numbers of its sign; of a mask made of a sign compilers make a branch */
+    return ((low - bits) & bits) | ((high - bits) & ~bits);
 }
 
 /* The sign bit is set if x is not among the numbers from the one with the bits low on. */
@@ -382,8 +382,8 @@ MINIMAL_CODE MINIMAL_APART static void minimal_sense(const minimal_state *state,
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
 MINIMAL_CODE MINIMAL_TOGETHER static void minimal_guard(const minimal_state *state, minimal_front *front)
 {
-    const uint32_t stray = minimal_aside(state->held[0], 0x437A0000u, 0x437A0000u)
-                         | minimal_aside(state->held[1], 0x02D00000u, 0x42700000u);
+    const uint32_t stray = minimal_aside(state->held[0], 0x80000000u, 0x437A0000u)
+                         | minimal_aside(state->held[1], 0xC0A00000u, 0x42700000u);
 #if defined(__FRAMAC__)
     const uint32_t counters = ((1u - state->bad_count) >> 31) | (state->bad_count >> 31) | (((uint32_t)1 - state->primed) >> 31) | (state->primed >> 31);
     const uint32_t sound = (((uint32_t)(stray >> 31) | counters) ^ (uint32_t)1);
@@ -752,13 +752,15 @@ MINIMAL_COLD uint32_t minimal_self_test(void)
     float observation[MINIMAL_FEATURES];
     float q[MINIMAL_ACTIONS];
     uint32_t random = 0x2545F491u;
-    uint32_t good = 0u; /* first answers in a row that are right: a fault in this count shows in a sound build, too */
+    /* number of the first vector without a right answer, and right answers before it: a fault in either shows in a sound build, too */
+    uint32_t next = 1u;
+    uint32_t right = 0u;
     uint32_t vector;
     uint32_t i;
     minimal_span span;
     span.from = 0u;
     span.to = MINIMAL_ACTIONS;
-    for (vector = 0u; vector < 16u; ++vector) {
+    for (vector = 1u; vector <= 16u; ++vector) {
         for (i = 0u; i < MINIMAL_FEATURES; ++i) {
             random = (random * 0x0019660Du) + 0x3C6EF35Fu;
             observation[i] = minimal_box_low[i] + (minimal_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
@@ -767,9 +769,10 @@ MINIMAL_COLD uint32_t minimal_self_test(void)
         span.crc = 0xFFFFFFFFu;
         minimal_q_values(observation, q);
         minimal_crc(&span, q, MINIMAL_ACTIONS);
-        if ((good == vector) && ((span.crc ^ 0xFFFFFFFFu) == minimal_answers[vector])) {
-            good = vector + 1u;
+        if ((next == vector) && ((span.crc ^ 0xFFFFFFFFu) == minimal_answers[vector - 1u])) {
+            next = vector + 1u;
+            ++right;
         }
     }
-    return (good == 16u) ? 0u : (good + 1u);
+    return (next == 17u) ? (16u - right) : next;
 }

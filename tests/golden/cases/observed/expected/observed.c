@@ -239,10 +239,10 @@ static uint32_t observed_far(float x, uint32_t bound)
     return stray;
 }
 
-static uint32_t observed_aside(float x, uint32_t difference, uint32_t bound)
+static uint32_t observed_aside(float x, uint32_t from, uint32_t to)
 {
-    const float low = -observed_from_bits(bound ^ difference);
-    const float high = observed_from_bits(bound);
+    const float low = observed_from_bits(from);
+    const float high = observed_from_bits(to);
     uint32_t stray = (uint32_t)1 << 31;
     if ((x >= low) && (x <= high)) {
         /*@ admit !\is_NaN(x); */
@@ -313,12 +313,12 @@ OBSERVED_SPARE static uint32_t observed_far(float x, uint32_t bound)
     return bound - (observed_bits(x) & 0x7FFFFFFFu);
 }
 
-/* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
-OBSERVED_SPARE static uint32_t observed_aside(float x, uint32_t difference, uint32_t high)
+/* The sign bit is set if x is below the number with the bits low, whose sign is set, or above the one with the bits high. */
+OBSERVED_SPARE static uint32_t observed_aside(float x, uint32_t low, uint32_t high)
 {
-    /* a flag behind its barrier: of a mask made of a sign clang makes a branch on RISC-V */
-    const uint32_t below = observed_flag((int)(observed_bits(x) >> 31));
-    return observed_far(x, high ^ (difference & ((uint32_t)0 - below)));
+    const uint32_t bits = observed_bits(x);
+    /* each difference counts for the numbers of its sign; of a mask made of a sign compilers make a branch */
+    return ((low - bits) & bits) | ((high - bits) & ~bits);
 }
 
 /* The sign bit is set if x is not among the numbers from the one with the bits low on. */
@@ -542,8 +542,8 @@ OBSERVED_CODE OBSERVED_APART static void observed_sense(const observed_state *st
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
 OBSERVED_CODE OBSERVED_TOGETHER static void observed_guard(const observed_state *state, observed_front *front)
 {
-    const uint32_t stray = observed_aside(state->held[0], 0x42A00000u, 0x42A00000u)
-                         | observed_aside(state->held[1], 0x01C00000u, 0x41C00000u)
+    const uint32_t stray = observed_aside(state->held[0], 0x80000000u, 0x42A00000u)
+                         | observed_aside(state->held[1], 0xC0000000u, 0x41C00000u)
                          | observed_beyond(state->held[2], 0x42200000u, 0x00EC0000u)
                          | observed_far(state->memory[0], 0x41F0000Fu)
                          | observed_far(state->memory[1], 0x42A0000Au)
@@ -554,8 +554,8 @@ OBSERVED_CODE OBSERVED_TOGETHER static void observed_guard(const observed_state 
                          | observed_far(state->memory[6], 0x41C00000u)
                          | observed_far(state->memory[7], 0x430C0000u)
                          | observed_far(state->memory[8], 0x40C00024u)
-                         | observed_aside(state->previous_duty, 0x3F28F5C3u, 0x3F28F5C3u)
-                         | observed_aside(state->previous_command, 0x3F666666u, 0x3F666666u);
+                         | observed_aside(state->previous_duty, 0x80000000u, 0x3F28F5C3u)
+                         | observed_aside(state->previous_command, 0x80000000u, 0x3F666666u);
 #if defined(__FRAMAC__)
     const uint32_t counters = ((4u - state->bad_count) >> 31) | (state->bad_count >> 31) | (((uint32_t)1 - state->primed) >> 31) | (state->primed >> 31);
     const uint32_t sound = (((uint32_t)(stray >> 31) | counters) ^ (uint32_t)1);
@@ -1045,13 +1045,15 @@ OBSERVED_COLD uint32_t observed_self_test(void)
     float observation[OBSERVED_FEATURES];
     float q[OBSERVED_ACTIONS];
     uint32_t random = 0x2545F491u;
-    uint32_t good = 0u; /* first answers in a row that are right: a fault in this count shows in a sound build, too */
+    /* number of the first vector without a right answer, and right answers before it: a fault in either shows in a sound build, too */
+    uint32_t next = 1u;
+    uint32_t right = 0u;
     uint32_t vector;
     uint32_t i;
     observed_span span;
     span.from = 0u;
     span.to = OBSERVED_ACTIONS;
-    for (vector = 0u; vector < 16u; ++vector) {
+    for (vector = 1u; vector <= 16u; ++vector) {
         for (i = 0u; i < OBSERVED_FEATURES; ++i) {
             random = (random * 0x0019660Du) + 0x3C6EF35Fu;
             observation[i] = observed_box_low[i] + (observed_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
@@ -1060,9 +1062,10 @@ OBSERVED_COLD uint32_t observed_self_test(void)
         span.crc = 0xFFFFFFFFu;
         observed_q_values(observation, q);
         observed_crc(&span, q, OBSERVED_ACTIONS);
-        if ((good == vector) && ((span.crc ^ 0xFFFFFFFFu) == observed_answers[vector])) {
-            good = vector + 1u;
+        if ((next == vector) && ((span.crc ^ 0xFFFFFFFFu) == observed_answers[vector - 1u])) {
+            next = vector + 1u;
+            ++right;
         }
     }
-    return (good == 16u) ? 0u : (good + 1u);
+    return (next == 17u) ? (16u - right) : next;
 }

@@ -80,12 +80,12 @@ fn select(flag: u32, then: f32, otherwise: f32) -> f32 {
 #[inline(always)]
 #[allow(dead_code)]
 fn within(x: f32, low: f32, high: f32) -> u32 {
-    flag(x >= low) & flag(x <= high)
+    core::hint::black_box(u32::from(x >= low).wrapping_add(u32::from(x <= high))) >> 1
 }
 #[inline(always)]
 #[allow(dead_code)]
 fn outside(x: f32, low: f32, high: f32) -> u32 {
-    flag(x < low) | flag(x > high)
+    flag((x < low) | (x > high))
 }
 #[inline(always)]
 #[allow(dead_code)]
@@ -125,12 +125,12 @@ fn leaky_relu(x: f32, slope: f32) -> f32 {
 fn far(x: f32, bound: u32) -> u32 {
     bound.wrapping_sub(x.to_bits() & 0x7FFF_FFFF)
 }
-/// The sign bit is set if |x| is above the bound of its sign: `high`, or below 0 what `difference` makes of it.
+/// The sign bit is set if x is below the number with the bits `low`, whose sign is set, or above the one with `high`.
 #[inline(always)]
 #[allow(dead_code)]
-fn aside(x: f32, difference: u32, high: u32) -> u32 {
-    let below = (0 as u32).wrapping_sub(core::hint::black_box(x.to_bits() >> 31));
-    far(x, high ^ (difference & below))
+fn aside(x: f32, low: u32, high: u32) -> u32 {
+    let bits = x.to_bits();
+    (low.wrapping_sub(bits) & bits) | (high.wrapping_sub(bits) & !bits)
 }
 /// The sign bit is set if x is not among the `width` numbers from that with the bits `low` on.
 #[inline(always)]
@@ -553,155 +553,140 @@ impl Controller {
         let f8: u32 = f0 & f4;
         let f9: u32 = f8 & f6;
         let v10: f32 = clamp(v5, 0.0, 30.0);
-        let v11: f32 = select(
-            core::hint::black_box(self.primed & 1),
-            self.memory[0],
-            v10,
-        );
-        let v12: f32 = select(
-            core::hint::black_box(self.primed & 1),
-            self.memory[1],
-            v1,
-        );
-        let v13: f32 = select(
-            core::hint::black_box(self.primed & 1),
-            self.memory[2],
-            0.0,
-        );
-        let v14: f32 = v1 - v12;
-        let v15: f32 = select(f0, v14, 0.0);
-        let v16: f32 = v15 * 0.073;
-        let v17: f32 = v11 + v16;
-        let v18: f32 = clamp(v17, 0.0, 30.0);
-        let v19: f32 = v15 * 0.097;
-        let v20: f32 = v12 + v19;
-        let v21: f32 = clamp(v20, 0.0, 80.0);
-        let v22: f32 = v15 * 0.004;
-        let v23: f32 = v13 + v22;
-        let v24: f32 = clamp(v23, -6.0, 6.0);
-        let v25: f32 = self.previous_command * self.previous_command;
-        let v26: f32 = v25 * 0.5;
-        let v27: f32 = self.previous_command - v26;
-        let v28: f32 = 100.0 * v27;
-        let v29: f32 = v21 * 0.5;
-        let v30: f32 = v28 - v29;
-        let v31: f32 = v24 * 0.5;
-        let v32: f32 = v30 + v31;
-        let v33: f32 = v32 * 0.045454547;
-        let v34: f32 = v18 + v33;
-        let v35: f32 = clamp(v34, 0.0, 30.0);
-        let v36: f32 = v35 - v5;
-        let v37: f32 = v36 * 0.21276596;
-        let v38: f32 = v21 + v37;
-        let v39: f32 = clamp(v38, 0.0, 80.0);
-        let v40: f32 = 100.0 * self.previous_command;
-        let v41: f32 = v21 + v39;
-        let v42: f32 = v41 * 0.5;
-        let v43: f32 = v40 - v42;
-        let v44: f32 = v43 + v24;
-        let v45: f32 = v44 * 0.045454547;
-        let v46: f32 = v18 + v45;
-        let v47: f32 = clamp(v46, 0.0, 30.0);
-        let v48: f32 = self.memory[7] * v27;
-        let v49: f32 = self.memory[4] * 0.5;
-        let v50: f32 = v48 - v49;
-        let v51: f32 = self.memory[5] * 0.5;
-        let v52: f32 = v50 + v51;
-        let v53: f32 = v52 * 0.045454547;
-        let v54: f32 = self.memory[3] + v53;
-        let v55: f32 = clamp(v54, -10.0, 30.0);
-        let v56: f32 = v55 - self.memory[6];
-        let v57: f32 = v56 * 0.21276596;
-        let v58: f32 = self.memory[4] + v57;
-        let v59: f32 = clamp(v58, 0.0, 80.0);
-        let v60: f32 = self.memory[7] * self.previous_command;
-        let v61: f32 = self.memory[4] + v59;
-        let v62: f32 = v61 * 0.5;
-        let v63: f32 = v60 - v62;
-        let v64: f32 = v63 + self.memory[5];
-        let v65: f32 = v64 * 0.045454547;
-        let v66: f32 = self.memory[3] + v65;
-        let v67: f32 = clamp(v66, -10.0, 30.0);
-        let v68: f32 = clamp(v5, -10.0, 30.0);
-        let v69: f32 = select(core::hint::black_box(self.primed & 1), v67, v68);
-        let v70: f32 = select(core::hint::black_box(self.primed & 1), v59, v1);
-        let v71: f32 = select(
-            core::hint::black_box(self.primed & 1),
-            self.memory[5],
-            0.0,
-        );
-        let v72: f32 = v1 - v70;
-        let v73: f32 = select(f0, v72, 0.0);
-        let v74: f32 = v73 * 0.515;
-        let v75: f32 = v69 + v74;
-        let v76: f32 = clamp(v75, -10.0, 30.0);
-        let v77: f32 = v73 * 0.245;
-        let v78: f32 = v70 + v77;
-        let v79: f32 = clamp(v78, 0.0, 80.0);
-        let v80: f32 = v73 * 0.398;
-        let v81: f32 = v71 + v80;
-        let v82: f32 = clamp(v81, -12.0, 6.0);
-        let v83: f32 = v39 - 48.0;
-        let v84: f32 = v83 * 0.1;
-        let v85: f32 = clamp(v84, -2.0, 2.0);
-        let f86: u32 = v84.to_bits() ^ v85.to_bits();
-        let v87: f32 = v47 - v5;
-        let v88: f32 = v87 * 0.1;
-        let v89: f32 = clamp(v88, -2.0, 2.0);
-        let f90: u32 = v88.to_bits() ^ v89.to_bits();
-        let v91: f32 = select(
-            core::hint::black_box(self.primed & 1),
-            self.memory[8],
-            v24,
-        );
-        let v92: f32 = v24 - v91;
-        let v93: f32 = v92 * 0.00990099;
-        let v94: f32 = v91 + v93;
-        let v95: f32 = v94 * 0.2;
-        let v96: f32 = v79 - 48.0;
-        let v97: f32 = v96 * 0.1;
-        let v98: f32 = clamp(v97, -2.0, 2.0);
-        let f99: u32 = v97.to_bits() ^ v98.to_bits();
-        let v100: f32 = v76 - v47;
-        let v101: f32 = v100 * 0.1;
-        let v102: f32 = clamp(v101, -2.0, 2.0);
-        let f103: u32 = v101.to_bits() ^ v102.to_bits();
-        let v104: f32 = v82 * 0.1;
-        let v105: f32 = self.previous_duty + -0.5;
-        let f106: u32 = f86 | f90;
-        let f107: u32 = f106 | f99;
-        let f108: u32 = f107 | f103;
-        let f109: u32 = flag(f108 != 0);
+        let f11: u32 = core::hint::black_box(self.primed & 1);
+        let v12: f32 = select(f11, self.memory[0], v10);
+        let v13: f32 = select(f11, self.memory[1], v1);
+        let v14: f32 = select(f11, self.memory[2], 0.0);
+        let v15: f32 = v1 - v13;
+        let v16: f32 = select(f0, v15, 0.0);
+        let v17: f32 = v16 * 0.073;
+        let v18: f32 = v12 + v17;
+        let v19: f32 = clamp(v18, 0.0, 30.0);
+        let v20: f32 = v16 * 0.097;
+        let v21: f32 = v13 + v20;
+        let v22: f32 = clamp(v21, 0.0, 80.0);
+        let v23: f32 = v16 * 0.004;
+        let v24: f32 = v14 + v23;
+        let v25: f32 = clamp(v24, -6.0, 6.0);
+        let v26: f32 = self.previous_command * self.previous_command;
+        let v27: f32 = v26 * 0.5;
+        let v28: f32 = self.previous_command - v27;
+        let v29: f32 = 100.0 * v28;
+        let v30: f32 = v22 * 0.5;
+        let v31: f32 = v29 - v30;
+        let v32: f32 = v25 * 0.5;
+        let v33: f32 = v31 + v32;
+        let v34: f32 = v33 * 0.045454547;
+        let v35: f32 = v19 + v34;
+        let v36: f32 = clamp(v35, 0.0, 30.0);
+        let v37: f32 = v36 - v5;
+        let v38: f32 = v37 * 0.21276596;
+        let v39: f32 = v22 + v38;
+        let v40: f32 = clamp(v39, 0.0, 80.0);
+        let v41: f32 = 100.0 * self.previous_command;
+        let v42: f32 = v22 + v40;
+        let v43: f32 = v42 * 0.5;
+        let v44: f32 = v41 - v43;
+        let v45: f32 = v44 + v25;
+        let v46: f32 = v45 * 0.045454547;
+        let v47: f32 = v19 + v46;
+        let v48: f32 = clamp(v47, 0.0, 30.0);
+        let v49: f32 = self.memory[7] * v28;
+        let v50: f32 = self.memory[4] * 0.5;
+        let v51: f32 = v49 - v50;
+        let v52: f32 = self.memory[5] * 0.5;
+        let v53: f32 = v51 + v52;
+        let v54: f32 = v53 * 0.045454547;
+        let v55: f32 = self.memory[3] + v54;
+        let v56: f32 = clamp(v55, -10.0, 30.0);
+        let v57: f32 = v56 - self.memory[6];
+        let v58: f32 = v57 * 0.21276596;
+        let v59: f32 = self.memory[4] + v58;
+        let v60: f32 = clamp(v59, 0.0, 80.0);
+        let v61: f32 = self.memory[7] * self.previous_command;
+        let v62: f32 = self.memory[4] + v60;
+        let v63: f32 = v62 * 0.5;
+        let v64: f32 = v61 - v63;
+        let v65: f32 = v64 + self.memory[5];
+        let v66: f32 = v65 * 0.045454547;
+        let v67: f32 = self.memory[3] + v66;
+        let v68: f32 = clamp(v67, -10.0, 30.0);
+        let v69: f32 = clamp(v5, -10.0, 30.0);
+        let v70: f32 = select(f11, v68, v69);
+        let v71: f32 = select(f11, v60, v1);
+        let v72: f32 = select(f11, self.memory[5], 0.0);
+        let v73: f32 = v1 - v71;
+        let v74: f32 = select(f0, v73, 0.0);
+        let v75: f32 = v74 * 0.515;
+        let v76: f32 = v70 + v75;
+        let v77: f32 = clamp(v76, -10.0, 30.0);
+        let v78: f32 = v74 * 0.245;
+        let v79: f32 = v71 + v78;
+        let v80: f32 = clamp(v79, 0.0, 80.0);
+        let v81: f32 = v74 * 0.398;
+        let v82: f32 = v72 + v81;
+        let v83: f32 = clamp(v82, -12.0, 6.0);
+        let v84: f32 = v40 - 48.0;
+        let v85: f32 = v84 * 0.1;
+        let v86: f32 = clamp(v85, -2.0, 2.0);
+        let f87: u32 = v85.to_bits() ^ v86.to_bits();
+        let v88: f32 = v48 - v5;
+        let v89: f32 = v88 * 0.1;
+        let v90: f32 = clamp(v89, -2.0, 2.0);
+        let f91: u32 = v89.to_bits() ^ v90.to_bits();
+        let v92: f32 = select(f11, self.memory[8], v25);
+        let v93: f32 = v25 - v92;
+        let v94: f32 = v93 * 0.00990099;
+        let v95: f32 = v92 + v94;
+        let v96: f32 = v95 * 0.2;
+        let v97: f32 = v80 - 48.0;
+        let v98: f32 = v97 * 0.1;
+        let v99: f32 = clamp(v98, -2.0, 2.0);
+        let f100: u32 = v98.to_bits() ^ v99.to_bits();
+        let v101: f32 = v77 - v48;
+        let v102: f32 = v101 * 0.1;
+        let v103: f32 = clamp(v102, -2.0, 2.0);
+        let f104: u32 = v102.to_bits() ^ v103.to_bits();
+        let v105: f32 = v83 * 0.1;
+        let v106: f32 = self.previous_duty + -0.5;
+        let f107: u32 = f87 | f91;
+        let f108: u32 = f107 | f100;
+        let f109: u32 = f108 | f104;
+        let f110: u32 = flag(f109 != 0);
         let counted = self.bad_count.wrapping_add(flag(self.bad_count <= 3));
         let bad_count = counted & f9.wrapping_sub(1);
         let usable = f9 | (self.primed & flag(bad_count <= 3));
         Front {
             signal: [v1, v5, v7],
-            observation: [v85, v89, v95, v98, v102, v104, v105],
-            push: [v47, v39, v24, v76, v79, v82, v5, v7, v94],
+            observation: [v86, v90, v96, v99, v103, v105, v106],
+            push: [v48, v40, v25, v77, v80, v83, v5, v7, v95],
             bad_count,
             usable,
             held: usable & (f9 ^ 1),
             primed_now: usable & (self.primed ^ 1),
-            clipped: f109,
+            clipped: f110,
         }
     }
-    /// 1 if the state is one that the controller can have written: a flipped bit that would decide the duty gives 0.
-    #[inline(always)]
-    fn sound(&self) -> u32 {
-        let stray = aside(self.held[0], 1117782016, 1117782016)
-            | aside(self.held[1], 29360128, 1103101952)
+    /// The sign bit is set if the state is not one that the controller can have written: a bit flipped that would decide the duty.
+    #[inline(never)]
+    fn damage(&self) -> u32 {
+        let stray = aside(self.held[0], 2147483648, 1117782016)
+            | aside(self.held[1], 3221225472, 1103101952)
             | beyond(self.held[2], 1109393408, 15466496)
             | far(self.memory[0], 1106247695) | far(self.memory[1], 1117782026)
             | far(self.memory[2], 1086324748) | far(self.memory[3], 1106247695)
             | far(self.memory[4], 1117782026) | far(self.memory[5], 1094713356)
             | far(self.memory[6], 1103101952) | far(self.memory[7], 1124859904)
             | far(self.memory[8], 1086324772)
-            | aside(self.previous_duty, 1059648963, 1059648963)
-            | aside(self.previous_command, 1063675494, 1063675494);
-        let counters = 4u32.wrapping_sub(self.bad_count) | self.bad_count
-            | 1_u32.wrapping_sub(self.primed) | self.primed;
-        core::hint::black_box(((stray | counters) >> 31) ^ 1)
+            | aside(self.previous_duty, 2147483648, 1059648963)
+            | aside(self.previous_command, 2147483648, 1063675494);
+        stray | 4u32.wrapping_sub(self.bad_count) | self.bad_count
+            | 1_u32.wrapping_sub(self.primed) | self.primed
+    }
+    /// 1 if the state is one that the controller can have written, else 0.
+    #[inline(always)]
+    fn sound(&self) -> u32 {
+        core::hint::black_box((self.damage() >> 31) ^ 1)
     }
     /// [`Self::sense`], and what a damaged state forbids.
     #[inline(always)]
@@ -752,8 +737,7 @@ impl Controller {
         let v0: f32 = clamp(chosen, 0.05, 0.9);
         let f1: u32 = chosen.to_bits() ^ v0.to_bits();
         let f2: u32 = flag(f1 != 0);
-        let stray = far(v0, 2139095040);
-        let trusted = core::hint::black_box(sound & !(stray >> 31));
+        let trusted = sound & !(v0.to_bits() >> 30);
         let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
             | (f2 << 7);
@@ -761,8 +745,7 @@ impl Controller {
             duty: select(usable, v0, 0.0),
             duty_sim: select(usable, chosen, 0.0),
             action_index: action_index & 0_u32.wrapping_sub(trusted),
-            status: (status & 0_u32.wrapping_sub(usable))
-                | (status::FALLBACK & usable.wrapping_sub(1))
+            status: (status & 0_u32.wrapping_sub(usable)) | ((usable ^ 1) << 1)
                 | (status::STATE & trusted.wrapping_sub(1)),
         }
     }
@@ -813,7 +796,8 @@ impl Controller {
             408118974, 3483953945, 545678666, 2592108215,
         ];
         let mut random: u32 = 625341585;
-        let mut good = 0_u32;
+        let mut next = 1_u32;
+        let mut right = 0_u32;
         let mut vector = 0_u32;
         for answer in &ANSWERS {
             let mut observation = [0.0_f32; FEATURES];
@@ -827,11 +811,13 @@ impl Controller {
             }
             let crc = !crc_floats(u32::MAX, &Self::q_values(&observation));
             vector = vector.wrapping_add(1);
-            if good.wrapping_add(1) == vector && crc == *answer {
-                good = vector;
+            if next == vector && crc == *answer {
+                next = vector.wrapping_add(1);
+                right = right.wrapping_add(1);
             }
         }
-        if good == 16 { Ok(()) } else { Err(good.wrapping_add(1)) }
+        let failing = if next == 17u32 { 16u32.wrapping_sub(right) } else { next };
+        if failing == 0 { Ok(()) } else { Err(failing) }
     }
     /// CRC-32 over the tables: whether they are as generated.
     #[must_use]

@@ -236,10 +236,10 @@ static uint32_t paper_far(float x, uint32_t bound)
     return stray;
 }
 
-static uint32_t paper_aside(float x, uint32_t difference, uint32_t bound)
+static uint32_t paper_aside(float x, uint32_t from, uint32_t to)
 {
-    const float low = -paper_from_bits(bound ^ difference);
-    const float high = paper_from_bits(bound);
+    const float low = paper_from_bits(from);
+    const float high = paper_from_bits(to);
     uint32_t stray = (uint32_t)1 << 31;
     if ((x >= low) && (x <= high)) {
         /*@ admit !\is_NaN(x); */
@@ -322,12 +322,12 @@ PAPER_SPARE static uint32_t paper_far(float x, uint32_t bound)
     return bound - (paper_bits(x) & 0x7FFFFFFFu);
 }
 
-/* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
-PAPER_SPARE static uint32_t paper_aside(float x, uint32_t difference, uint32_t high)
+/* The sign bit is set if x is below the number with the bits low, whose sign is set, or above the one with the bits high. */
+PAPER_SPARE static uint32_t paper_aside(float x, uint32_t low, uint32_t high)
 {
-    /* a flag behind its barrier: of a mask made of a sign clang makes a branch on RISC-V */
-    const uint32_t below = paper_flag((int)(paper_bits(x) >> 31));
-    return paper_far(x, high ^ (difference & ((uint32_t)0 - below)));
+    const uint32_t bits = paper_bits(x);
+    /* each difference counts for the numbers of its sign; of a mask made of a sign compilers make a branch */
+    return ((low - bits) & bits) | ((high - bits) & ~bits);
 }
 
 /* The sign bit is set if x is not among the numbers from the one with the bits low on. */
@@ -466,8 +466,8 @@ PAPER_CODE PAPER_TOGETHER static uint32_t paper_mapping_flips(const paper_state 
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
 PAPER_CODE PAPER_TOGETHER static void paper_guard(const paper_state *state, paper_front *front)
 {
-    const uint32_t stray = paper_aside(state->held[0], 0x437A0000u, 0x437A0000u)
-                         | paper_aside(state->held[1], 0x7DA00000u, 0x42200000u)
+    const uint32_t stray = paper_aside(state->held[0], 0x80000000u, 0x437A0000u)
+                         | paper_aside(state->held[1], 0xBF800000u, 0x42200000u)
                          | paper_line_far(&state->memory[0], 2u, 0x43AF000Eu)
                          | paper_line_far(&state->memory[2], 2u, 0x437A0000u)
                          | paper_any(paper_mapping_flips(state));
@@ -952,13 +952,15 @@ PAPER_COLD uint32_t paper_self_test(void)
     float observation[PAPER_FEATURES];
     float q[PAPER_ACTIONS];
     uint32_t random = 0x2545F491u;
-    uint32_t good = 0u; /* first answers in a row that are right: a fault in this count shows in a sound build, too */
+    /* number of the first vector without a right answer, and right answers before it: a fault in either shows in a sound build, too */
+    uint32_t next = 1u;
+    uint32_t right = 0u;
     uint32_t vector;
     uint32_t i;
     paper_span span;
     span.from = 0u;
     span.to = PAPER_ACTIONS;
-    for (vector = 0u; vector < 16u; ++vector) {
+    for (vector = 1u; vector <= 16u; ++vector) {
         for (i = 0u; i < PAPER_FEATURES; ++i) {
             random = (random * 0x0019660Du) + 0x3C6EF35Fu;
             observation[i] = paper_box_low[i] + (paper_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
@@ -967,9 +969,10 @@ PAPER_COLD uint32_t paper_self_test(void)
         span.crc = 0xFFFFFFFFu;
         paper_q_values(observation, q);
         paper_crc(&span, q, PAPER_ACTIONS);
-        if ((good == vector) && ((span.crc ^ 0xFFFFFFFFu) == paper_answers[vector])) {
-            good = vector + 1u;
+        if ((next == vector) && ((span.crc ^ 0xFFFFFFFFu) == paper_answers[vector - 1u])) {
+            next = vector + 1u;
+            ++right;
         }
     }
-    return (good == 16u) ? 0u : (good + 1u);
+    return (next == 17u) ? (16u - right) : next;
 }

@@ -78,12 +78,12 @@ fn select(flag: u32, then: f32, otherwise: f32) -> f32 {
 #[inline(always)]
 #[allow(dead_code)]
 fn within(x: f32, low: f32, high: f32) -> u32 {
-    flag(x >= low) & flag(x <= high)
+    core::hint::black_box(u32::from(x >= low).wrapping_add(u32::from(x <= high))) >> 1
 }
 #[inline(always)]
 #[allow(dead_code)]
 fn outside(x: f32, low: f32, high: f32) -> u32 {
-    flag(x < low) | flag(x > high)
+    flag((x < low) | (x > high))
 }
 #[inline(always)]
 #[allow(dead_code)]
@@ -123,12 +123,12 @@ fn leaky_relu(x: f32, slope: f32) -> f32 {
 fn far(x: f32, bound: u32) -> u32 {
     bound.wrapping_sub(x.to_bits() & 0x7FFF_FFFF)
 }
-/// The sign bit is set if |x| is above the bound of its sign: `high`, or below 0 what `difference` makes of it.
+/// The sign bit is set if x is below the number with the bits `low`, whose sign is set, or above the one with `high`.
 #[inline(always)]
 #[allow(dead_code)]
-fn aside(x: f32, difference: u32, high: u32) -> u32 {
-    let below = (0 as u32).wrapping_sub(core::hint::black_box(x.to_bits() >> 31));
-    far(x, high ^ (difference & below))
+fn aside(x: f32, low: u32, high: u32) -> u32 {
+    let bits = x.to_bits();
+    (low.wrapping_sub(bits) & bits) | (high.wrapping_sub(bits) & !bits)
 }
 /// The sign bit is set if x is not among the `width` numbers from that with the bits `low` on.
 #[inline(always)]
@@ -542,59 +542,48 @@ impl Controller {
         let v6: f32 = v5 * 0.01;
         let v7: f32 = clamp(v6, -2.0, 2.0);
         let f8: u32 = v6.to_bits() ^ v7.to_bits();
-        let v9: f32 = select(core::hint::black_box(self.primed & 1), self.memory[0], v5);
-        let v10: f32 = v9 * 0.01;
-        let v11: f32 = clamp(v10, -2.0, 2.0);
-        let f12: u32 = v10.to_bits() ^ v11.to_bits();
-        let v13: f32 = select(
-            core::hint::black_box(self.primed & 1),
-            self.memory[1],
-            v5,
-        );
-        let v14: f32 = v5 - v13;
-        let v15: f32 = v14 * 10000.0;
-        let v16: f32 = v15 * 0.00001;
-        let v17: f32 = clamp(v16, -2.0, 2.0);
-        let f18: u32 = v16.to_bits() ^ v17.to_bits();
-        let v19: f32 = v1 * 0.01;
-        let v20: f32 = clamp(v19, 0.0, 2.5);
-        let f21: u32 = v19.to_bits() ^ v20.to_bits();
-        let v22: f32 = select(
-            core::hint::black_box(self.primed & 1),
-            self.memory[2],
-            v1,
-        );
-        let v23: f32 = v22 * 0.01;
-        let v24: f32 = clamp(v23, 0.0, 2.5);
-        let f25: u32 = v23.to_bits() ^ v24.to_bits();
-        let v26: f32 = select(
-            core::hint::black_box(self.primed & 1),
-            self.memory[3],
-            v1,
-        );
-        let v27: f32 = v1 - v26;
-        let v28: f32 = v27 * 10000.0;
-        let v29: f32 = v28 * 0.00001;
-        let v30: f32 = clamp(v29, -2.0, 2.0);
-        let f31: u32 = v29.to_bits() ^ v30.to_bits();
-        let f32: u32 = f8 | f12;
-        let f33: u32 = f32 | f18;
-        let f34: u32 = f33 | f21;
-        let f35: u32 = f34 | f25;
-        let f36: u32 = f35 | f31;
-        let f37: u32 = flag(f36 != 0);
+        let f9: u32 = core::hint::black_box(self.primed & 1);
+        let v10: f32 = select(f9, self.memory[0], v5);
+        let v11: f32 = v10 * 0.01;
+        let v12: f32 = clamp(v11, -2.0, 2.0);
+        let f13: u32 = v11.to_bits() ^ v12.to_bits();
+        let v14: f32 = select(f9, self.memory[1], v5);
+        let v15: f32 = v5 - v14;
+        let v16: f32 = v15 * 10000.0;
+        let v17: f32 = v16 * 0.00001;
+        let v18: f32 = clamp(v17, -2.0, 2.0);
+        let f19: u32 = v17.to_bits() ^ v18.to_bits();
+        let v20: f32 = v1 * 0.01;
+        let v21: f32 = clamp(v20, 0.0, 2.5);
+        let f22: u32 = v20.to_bits() ^ v21.to_bits();
+        let v23: f32 = select(f9, self.memory[2], v1);
+        let v24: f32 = v23 * 0.01;
+        let v25: f32 = clamp(v24, 0.0, 2.5);
+        let f26: u32 = v24.to_bits() ^ v25.to_bits();
+        let v27: f32 = select(f9, self.memory[3], v1);
+        let v28: f32 = v1 - v27;
+        let v29: f32 = v28 * 10000.0;
+        let v30: f32 = v29 * 0.00001;
+        let v31: f32 = clamp(v30, -2.0, 2.0);
+        let f32: u32 = v30.to_bits() ^ v31.to_bits();
+        let f33: u32 = f8 | f13;
+        let f34: u32 = f33 | f19;
+        let f35: u32 = f34 | f22;
+        let f36: u32 = f35 | f26;
+        let f37: u32 = f36 | f32;
+        let f38: u32 = flag(f37 != 0);
         let counted = self.bad_count.wrapping_add(flag(self.bad_count <= 3));
         let bad_count = counted & f4.wrapping_sub(1);
         let usable = f4 | (self.primed & flag(bad_count <= 3));
         Front {
             signal: [v1, v3],
-            observation: [v7, v11, v17, v20, v24, v30],
+            observation: [v7, v12, v18, v21, v25, v31],
             push: [v5, v5, v1, v1],
             bad_count,
             usable,
             held: usable & (f4 ^ 1),
             primed_now: usable & (self.primed ^ 1),
-            clipped: f37,
+            clipped: f38,
         }
     }
     /// Bits that flipped in the coefficients of the mapping or in their check word: 0 as `new` and `set_mapping` leave them.
@@ -603,11 +592,11 @@ impl Controller {
         self.mapping_check ^ 1263225675 ^ self.mapping_a.to_bits()
             ^ self.mapping_b.to_bits() ^ self.mapping_c.to_bits()
     }
-    /// 1 if the state is one that the controller can have written: a flipped bit that would decide the duty gives 0.
-    #[inline(always)]
-    fn sound(&self) -> u32 {
-        let stray = aside(self.held[0], 1132068864, 1132068864)
-            | aside(self.held[1], 2107637760, 1109393408)
+    /// The sign bit is set if the state is not one that the controller can have written: a bit flipped that would decide the duty.
+    #[inline(never)]
+    fn damage(&self) -> u32 {
+        let stray = aside(self.held[0], 2147483648, 1132068864)
+            | aside(self.held[1], 3212836864, 1109393408)
             | self
                 .memory
                 .iter()
@@ -620,10 +609,13 @@ impl Controller {
                 .skip(2)
                 .take(2)
                 .fold(0, |stray, word| stray | far(*word, 1132068864))
-            | any(self.mapping_flips());
-        let counters = 4u32.wrapping_sub(self.bad_count) | self.bad_count
-            | 1_u32.wrapping_sub(self.primed) | self.primed;
-        core::hint::black_box(((stray | counters) >> 31) ^ 1)
+            | any(self.mapping_flips() | (self.primed >> 1));
+        stray | 4u32.wrapping_sub(self.bad_count) | self.bad_count
+    }
+    /// 1 if the state is one that the controller can have written, else 0.
+    #[inline(always)]
+    fn sound(&self) -> u32 {
+        core::hint::black_box((self.damage() >> 31) ^ 1)
     }
     /// [`Self::sense`], and what a damaged state forbids.
     #[inline(always)]
@@ -681,8 +673,7 @@ impl Controller {
         let v7: f32 = clamp(v3, 0.3, 0.7);
         let f8: u32 = v3.to_bits() ^ v7.to_bits();
         let f9: u32 = flag(f8 != 0);
-        let stray = far(v7, 2139095040);
-        let trusted = core::hint::black_box(sound & !(stray >> 31));
+        let trusted = sound & !(v7.to_bits() >> 30);
         let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
             | (f6 << 4) | (f9 << 7);
@@ -690,8 +681,7 @@ impl Controller {
             duty: select(usable, v7, 0.0),
             duty_sim: select(usable, chosen, 0.0),
             action_index: action_index & 0_u32.wrapping_sub(trusted),
-            status: (status & 0_u32.wrapping_sub(usable))
-                | (status::FALLBACK & usable.wrapping_sub(1))
+            status: (status & 0_u32.wrapping_sub(usable)) | ((usable ^ 1) << 1)
                 | (status::STATE & trusted.wrapping_sub(1)),
         }
     }
@@ -721,7 +711,8 @@ impl Controller {
             3555269922, 3195396320, 2708232897, 4185395267,
         ];
         let mut random: u32 = 625341585;
-        let mut good = 0_u32;
+        let mut next = 1_u32;
+        let mut right = 0_u32;
         let mut vector = 0_u32;
         for answer in &ANSWERS {
             let mut observation = [0.0_f32; FEATURES];
@@ -735,11 +726,13 @@ impl Controller {
             }
             let crc = !crc_floats(u32::MAX, &Self::q_values(&observation));
             vector = vector.wrapping_add(1);
-            if good.wrapping_add(1) == vector && crc == *answer {
-                good = vector;
+            if next == vector && crc == *answer {
+                next = vector.wrapping_add(1);
+                right = right.wrapping_add(1);
             }
         }
-        if good == 16 { Ok(()) } else { Err(good.wrapping_add(1)) }
+        let failing = if next == 17u32 { 16u32.wrapping_sub(right) } else { next };
+        if failing == 0 { Ok(()) } else { Err(failing) }
     }
     /// CRC-32 over the tables: whether they are as generated.
     #[must_use]

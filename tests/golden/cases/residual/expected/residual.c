@@ -232,10 +232,10 @@ static uint32_t residual_far(float x, uint32_t bound)
     return stray;
 }
 
-static uint32_t residual_aside(float x, uint32_t difference, uint32_t bound)
+static uint32_t residual_aside(float x, uint32_t from, uint32_t to)
 {
-    const float low = -residual_from_bits(bound ^ difference);
-    const float high = residual_from_bits(bound);
+    const float low = residual_from_bits(from);
+    const float high = residual_from_bits(to);
     uint32_t stray = (uint32_t)1 << 31;
     if ((x >= low) && (x <= high)) {
         /*@ admit !\is_NaN(x); */
@@ -318,12 +318,12 @@ RESIDUAL_SPARE static uint32_t residual_far(float x, uint32_t bound)
     return bound - (residual_bits(x) & 0x7FFFFFFFu);
 }
 
-/* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
-RESIDUAL_SPARE static uint32_t residual_aside(float x, uint32_t difference, uint32_t high)
+/* The sign bit is set if x is below the number with the bits low, whose sign is set, or above the one with the bits high. */
+RESIDUAL_SPARE static uint32_t residual_aside(float x, uint32_t low, uint32_t high)
 {
-    /* a flag behind its barrier: of a mask made of a sign clang makes a branch on RISC-V */
-    const uint32_t below = residual_flag((int)(residual_bits(x) >> 31));
-    return residual_far(x, high ^ (difference & ((uint32_t)0 - below)));
+    const uint32_t bits = residual_bits(x);
+    /* each difference counts for the numbers of its sign; of a mask made of a sign compilers make a branch */
+    return ((low - bits) & bits) | ((high - bits) & ~bits);
 }
 
 /* The sign bit is set if x is not among the numbers from the one with the bits low on. */
@@ -602,12 +602,12 @@ RESIDUAL_CODE RESIDUAL_TOGETHER static uint32_t residual_mapping_flips(const res
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
 RESIDUAL_CODE RESIDUAL_TOGETHER static void residual_guard(const residual_state *state, residual_front *front)
 {
-    const uint32_t stray = residual_aside(state->held[0], 0x41000000u, 0x41000000u)
-                         | residual_aside(state->held[1], 0x7EC00000u, 0x41400000u)
+    const uint32_t stray = residual_aside(state->held[0], 0x80000000u, 0x41000000u)
+                         | residual_aside(state->held[1], 0xBF800000u, 0x41400000u)
                          | residual_far(state->memory[0], 0x41C0000Cu)
                          | residual_far(state->memory[1], 0x41000008u)
                          | residual_far(state->memory[2], 0x3F800008u)
-                         | residual_aside(state->previous_command, 0x3F733333u, 0x3F733333u)
+                         | residual_aside(state->previous_command, 0x80000000u, 0x3F733333u)
                          | residual_any(residual_mapping_flips(state));
 #if defined(__FRAMAC__)
     const uint32_t counters = ((2u - state->bad_count) >> 31) | (state->bad_count >> 31) | (((uint32_t)1 - state->primed) >> 31) | (state->primed >> 31);
@@ -1183,13 +1183,15 @@ RESIDUAL_COLD uint32_t residual_self_test(void)
     float observation[RESIDUAL_FEATURES];
     float q[RESIDUAL_ACTIONS];
     uint32_t random = 0x2545F491u;
-    uint32_t good = 0u; /* first answers in a row that are right: a fault in this count shows in a sound build, too */
+    /* number of the first vector without a right answer, and right answers before it: a fault in either shows in a sound build, too */
+    uint32_t next = 1u;
+    uint32_t right = 0u;
     uint32_t vector;
     uint32_t i;
     residual_span span;
     span.from = 0u;
     span.to = RESIDUAL_ACTIONS;
-    for (vector = 0u; vector < 16u; ++vector) {
+    for (vector = 1u; vector <= 16u; ++vector) {
         for (i = 0u; i < RESIDUAL_FEATURES; ++i) {
             random = (random * 0x0019660Du) + 0x3C6EF35Fu;
             observation[i] = residual_box_low[i] + (residual_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
@@ -1198,9 +1200,10 @@ RESIDUAL_COLD uint32_t residual_self_test(void)
         span.crc = 0xFFFFFFFFu;
         residual_q_values(observation, q);
         residual_crc(&span, q, RESIDUAL_ACTIONS);
-        if ((good == vector) && ((span.crc ^ 0xFFFFFFFFu) == residual_answers[vector])) {
-            good = vector + 1u;
+        if ((next == vector) && ((span.crc ^ 0xFFFFFFFFu) == residual_answers[vector - 1u])) {
+            next = vector + 1u;
+            ++right;
         }
     }
-    return (good == 16u) ? 0u : (good + 1u);
+    return (next == 17u) ? (16u - right) : next;
 }

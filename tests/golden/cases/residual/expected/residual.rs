@@ -78,12 +78,12 @@ fn select(flag: u32, then: f32, otherwise: f32) -> f32 {
 #[inline(always)]
 #[allow(dead_code)]
 fn within(x: f32, low: f32, high: f32) -> u32 {
-    flag(x >= low) & flag(x <= high)
+    core::hint::black_box(u32::from(x >= low).wrapping_add(u32::from(x <= high))) >> 1
 }
 #[inline(always)]
 #[allow(dead_code)]
 fn outside(x: f32, low: f32, high: f32) -> u32 {
-    flag(x < low) | flag(x > high)
+    flag((x < low) | (x > high))
 }
 #[inline(always)]
 #[allow(dead_code)]
@@ -123,12 +123,12 @@ fn leaky_relu(x: f32, slope: f32) -> f32 {
 fn far(x: f32, bound: u32) -> u32 {
     bound.wrapping_sub(x.to_bits() & 0x7FFF_FFFF)
 }
-/// The sign bit is set if |x| is above the bound of its sign: `high`, or below 0 what `difference` makes of it.
+/// The sign bit is set if x is below the number with the bits `low`, whose sign is set, or above the one with `high`.
 #[inline(always)]
 #[allow(dead_code)]
-fn aside(x: f32, difference: u32, high: u32) -> u32 {
-    let below = (0 as u32).wrapping_sub(core::hint::black_box(x.to_bits() >> 31));
-    far(x, high ^ (difference & below))
+fn aside(x: f32, low: u32, high: u32) -> u32 {
+    let bits = x.to_bits();
+    (low.wrapping_sub(bits) & bits) | (high.wrapping_sub(bits) & !bits)
 }
 /// The sign bit is set if x is not among the `width` numbers from that with the bits `low` on.
 #[inline(always)]
@@ -540,80 +540,77 @@ impl Controller {
         let v3: f32 = select(f2, measured.i_out, self.held[1]);
         let f4: u32 = f0 & f2;
         let v5: f32 = clamp(v3, -8.0, 24.0);
-        let v6: f32 = select(core::hint::black_box(self.primed & 1), self.memory[0], v5);
-        let v7: f32 = select(core::hint::black_box(self.primed & 1), self.memory[1], v1);
-        let v8: f32 = select(
-            core::hint::black_box(self.primed & 1),
-            self.memory[2],
-            0.0,
-        );
-        let v9: f32 = v1 - v7;
-        let v10: f32 = select(f0, v9, 0.0);
-        let v11: f32 = v10 * 2.1;
-        let v12: f32 = v6 + v11;
-        let v13: f32 = clamp(v12, -8.0, 24.0);
-        let v14: f32 = v10 * 0.2;
-        let v15: f32 = v7 + v14;
-        let v16: f32 = clamp(v15, 0.0, 8.0);
-        let v17: f32 = v10 * 0.05;
-        let v18: f32 = v8 + v17;
-        let v19: f32 = clamp(v18, -1.0, 1.0);
-        let v20: f32 = self.previous_command * self.previous_command;
-        let v21: f32 = v20 * 0.5;
-        let v22: f32 = self.previous_command - v21;
-        let v23: f32 = 12.0 * v22;
-        let v24: f32 = v16 * 0.5;
-        let v25: f32 = v23 - v24;
-        let v26: f32 = v19 * 0.5;
-        let v27: f32 = v25 + v26;
-        let v28: f32 = v27 * 0.6060606;
-        let v29: f32 = v13 + v28;
-        let v30: f32 = clamp(v29, -8.0, 24.0);
-        let v31: f32 = v30 - v3;
-        let v32: f32 = v31 * 0.021276595;
-        let v33: f32 = v16 + v32;
-        let v34: f32 = clamp(v33, 0.0, 8.0);
-        let v35: f32 = 12.0 * self.previous_command;
-        let v36: f32 = v16 + v34;
-        let v37: f32 = v36 * 0.5;
-        let v38: f32 = v35 - v37;
-        let v39: f32 = v38 + v19;
-        let v40: f32 = v39 * 0.6060606;
-        let v41: f32 = v13 + v40;
-        let v42: f32 = clamp(v41, -8.0, 24.0);
-        let v43: f32 = v34 - 5.0;
-        let v44: f32 = clamp(v43, -1.0, 1.0);
-        let f45: u32 = v43.to_bits() ^ v44.to_bits();
-        let v46: f32 = v42 - v3;
-        let v47: f32 = v46 * 0.1;
-        let v48: f32 = clamp(v47, -1.0, 1.0);
-        let f49: u32 = v47.to_bits() ^ v48.to_bits();
-        let v50: f32 = 5.0 - v19;
-        let v51: f32 = v50 * 0.083333336;
-        let v52: f32 = v46 * 0.04;
-        let v53: f32 = v51 - v52;
-        let v54: f32 = v43 * 0.06;
-        let v55: f32 = v53 - v54;
-        let v56: f32 = clamp(v55, 0.05, 0.95);
-        let f57: u32 = within(v43, -0.02, 0.02);
-        let f58: u32 = within(v46, -0.5, 0.5);
-        let f59: u32 = f57 & f58;
-        let f60: u32 = f45 | f49;
-        let f61: u32 = flag(f60 != 0);
+        let f6: u32 = core::hint::black_box(self.primed & 1);
+        let v7: f32 = select(f6, self.memory[0], v5);
+        let v8: f32 = select(f6, self.memory[1], v1);
+        let v9: f32 = select(f6, self.memory[2], 0.0);
+        let v10: f32 = v1 - v8;
+        let v11: f32 = select(f0, v10, 0.0);
+        let v12: f32 = v11 * 2.1;
+        let v13: f32 = v7 + v12;
+        let v14: f32 = clamp(v13, -8.0, 24.0);
+        let v15: f32 = v11 * 0.2;
+        let v16: f32 = v8 + v15;
+        let v17: f32 = clamp(v16, 0.0, 8.0);
+        let v18: f32 = v11 * 0.05;
+        let v19: f32 = v9 + v18;
+        let v20: f32 = clamp(v19, -1.0, 1.0);
+        let v21: f32 = self.previous_command * self.previous_command;
+        let v22: f32 = v21 * 0.5;
+        let v23: f32 = self.previous_command - v22;
+        let v24: f32 = 12.0 * v23;
+        let v25: f32 = v17 * 0.5;
+        let v26: f32 = v24 - v25;
+        let v27: f32 = v20 * 0.5;
+        let v28: f32 = v26 + v27;
+        let v29: f32 = v28 * 0.6060606;
+        let v30: f32 = v14 + v29;
+        let v31: f32 = clamp(v30, -8.0, 24.0);
+        let v32: f32 = v31 - v3;
+        let v33: f32 = v32 * 0.021276595;
+        let v34: f32 = v17 + v33;
+        let v35: f32 = clamp(v34, 0.0, 8.0);
+        let v36: f32 = 12.0 * self.previous_command;
+        let v37: f32 = v17 + v35;
+        let v38: f32 = v37 * 0.5;
+        let v39: f32 = v36 - v38;
+        let v40: f32 = v39 + v20;
+        let v41: f32 = v40 * 0.6060606;
+        let v42: f32 = v14 + v41;
+        let v43: f32 = clamp(v42, -8.0, 24.0);
+        let v44: f32 = v35 - 5.0;
+        let v45: f32 = clamp(v44, -1.0, 1.0);
+        let f46: u32 = v44.to_bits() ^ v45.to_bits();
+        let v47: f32 = v43 - v3;
+        let v48: f32 = v47 * 0.1;
+        let v49: f32 = clamp(v48, -1.0, 1.0);
+        let f50: u32 = v48.to_bits() ^ v49.to_bits();
+        let v51: f32 = 5.0 - v20;
+        let v52: f32 = v51 * 0.083333336;
+        let v53: f32 = v47 * 0.04;
+        let v54: f32 = v52 - v53;
+        let v55: f32 = v44 * 0.06;
+        let v56: f32 = v54 - v55;
+        let v57: f32 = clamp(v56, 0.05, 0.95);
+        let f58: u32 = within(v44, -0.02, 0.02);
+        let f59: u32 = within(v47, -0.5, 0.5);
+        let f60: u32 = f58 & f59;
+        let f61: u32 = f46 | f50;
+        let f62: u32 = flag(f61 != 0);
         let counted = self.bad_count.wrapping_add(flag(self.bad_count <= 1));
         let bad_count = counted & f4.wrapping_sub(1);
         let usable = f4 | (self.primed & flag(bad_count <= 1));
         Front {
             signal: [v1, v3],
-            observation: [v44, v48, v19],
-            push: [v42, v34, v19],
+            observation: [v45, v49, v20],
+            push: [v43, v35, v20],
             bad_count,
             usable,
             held: usable & (f4 ^ 1),
             primed_now: usable & (self.primed ^ 1),
-            clipped: f61,
-            base: v56,
-            still: f59,
+            clipped: f62,
+            base: v57,
+            still: f60,
         }
     }
     /// Bits that flipped in the coefficients of the mapping or in their check word: 0 as `new` and `set_mapping` leave them.
@@ -623,18 +620,21 @@ impl Controller {
             ^ self.mapping_b.to_bits() ^ self.mapping_c.to_bits()
             ^ self.mapping_r.to_bits()
     }
-    /// 1 if the state is one that the controller can have written: a flipped bit that would decide the duty gives 0.
-    #[inline(always)]
-    fn sound(&self) -> u32 {
-        let stray = aside(self.held[0], 1090519040, 1090519040)
-            | aside(self.held[1], 2126512128, 1094713344)
+    /// The sign bit is set if the state is not one that the controller can have written: a bit flipped that would decide the duty.
+    #[inline(never)]
+    fn damage(&self) -> u32 {
+        let stray = aside(self.held[0], 2147483648, 1090519040)
+            | aside(self.held[1], 3212836864, 1094713344)
             | far(self.memory[0], 1103101964) | far(self.memory[1], 1090519048)
             | far(self.memory[2], 1065353224)
-            | aside(self.previous_command, 1064514355, 1064514355)
-            | any(self.mapping_flips());
-        let counters = 2u32.wrapping_sub(self.bad_count) | self.bad_count
-            | 1_u32.wrapping_sub(self.primed) | self.primed;
-        core::hint::black_box(((stray | counters) >> 31) ^ 1)
+            | aside(self.previous_command, 2147483648, 1064514355)
+            | any(self.mapping_flips() | (self.primed >> 1));
+        stray | 2u32.wrapping_sub(self.bad_count) | self.bad_count
+    }
+    /// 1 if the state is one that the controller can have written, else 0.
+    #[inline(always)]
+    fn sound(&self) -> u32 {
+        core::hint::black_box((self.damage() >> 31) ^ 1)
     }
     /// [`Self::sense`], and what a damaged state forbids.
     #[inline(always)]
@@ -703,8 +703,7 @@ impl Controller {
         let v18: f32 = clamp(v15, 0.05, 0.95);
         let f19: u32 = v15.to_bits() ^ v18.to_bits();
         let f20: u32 = flag(f19 != 0);
-        let stray = far(v18, 2139095040);
-        let trusted = core::hint::black_box(sound & !(stray >> 31));
+        let trusted = sound & !(v18.to_bits() >> 30);
         let usable = front.usable & trusted;
         let status = (front.held << 0) | (front.primed_now << 2) | (front.clipped << 3)
             | (f12 << 4) | (f17 << 5) | (f20 << 7);
@@ -712,8 +711,7 @@ impl Controller {
             duty: select(usable, v18, 0.0),
             duty_sim: select(usable, v2, 0.0),
             action_index: action_index & 0_u32.wrapping_sub(trusted),
-            status: (status & 0_u32.wrapping_sub(usable))
-                | (status::FALLBACK & usable.wrapping_sub(1))
+            status: (status & 0_u32.wrapping_sub(usable)) | ((usable ^ 1) << 1)
                 | (status::STATE & trusted.wrapping_sub(1)),
         }
     }
@@ -742,7 +740,8 @@ impl Controller {
             2416909848, 2311690990, 2262140612, 2814275768,
         ];
         let mut random: u32 = 625341585;
-        let mut good = 0_u32;
+        let mut next = 1_u32;
+        let mut right = 0_u32;
         let mut vector = 0_u32;
         for answer in &ANSWERS {
             let mut observation = [0.0_f32; FEATURES];
@@ -756,11 +755,13 @@ impl Controller {
             }
             let crc = !crc_floats(u32::MAX, &Self::q_values(&observation));
             vector = vector.wrapping_add(1);
-            if good.wrapping_add(1) == vector && crc == *answer {
-                good = vector;
+            if next == vector && crc == *answer {
+                next = vector.wrapping_add(1);
+                right = right.wrapping_add(1);
             }
         }
-        if good == 16 { Ok(()) } else { Err(good.wrapping_add(1)) }
+        let failing = if next == 17u32 { 16u32.wrapping_sub(right) } else { next };
+        if failing == 0 { Ok(()) } else { Err(failing) }
     }
     /// CRC-32 over the tables: whether they are as generated.
     #[must_use]

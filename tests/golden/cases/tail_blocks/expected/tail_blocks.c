@@ -320,10 +320,10 @@ static uint32_t tail_blocks_far(float x, uint32_t bound)
     return stray;
 }
 
-static uint32_t tail_blocks_aside(float x, uint32_t difference, uint32_t bound)
+static uint32_t tail_blocks_aside(float x, uint32_t from, uint32_t to)
 {
-    const float low = -tail_blocks_from_bits(bound ^ difference);
-    const float high = tail_blocks_from_bits(bound);
+    const float low = tail_blocks_from_bits(from);
+    const float high = tail_blocks_from_bits(to);
     uint32_t stray = (uint32_t)1 << 31;
     if ((x >= low) && (x <= high)) {
         /*@ admit !\is_NaN(x); */
@@ -394,12 +394,12 @@ TAIL_BLOCKS_SPARE static uint32_t tail_blocks_far(float x, uint32_t bound)
     return bound - (tail_blocks_bits(x) & 0x7FFFFFFFu);
 }
 
-/* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
-TAIL_BLOCKS_SPARE static uint32_t tail_blocks_aside(float x, uint32_t difference, uint32_t high)
+/* The sign bit is set if x is below the number with the bits low, whose sign is set, or above the one with the bits high. */
+TAIL_BLOCKS_SPARE static uint32_t tail_blocks_aside(float x, uint32_t low, uint32_t high)
 {
-    /* a flag behind its barrier: of a mask made of a sign clang makes a branch on RISC-V */
-    const uint32_t below = tail_blocks_flag((int)(tail_blocks_bits(x) >> 31));
-    return tail_blocks_far(x, high ^ (difference & ((uint32_t)0 - below)));
+    const uint32_t bits = tail_blocks_bits(x);
+    /* each difference counts for the numbers of its sign; of a mask made of a sign compilers make a branch */
+    return ((low - bits) & bits) | ((high - bits) & ~bits);
 }
 
 /* The sign bit is set if x is not among the numbers from the one with the bits low on. */
@@ -501,8 +501,8 @@ TAIL_BLOCKS_CODE TAIL_BLOCKS_APART static void tail_blocks_sense(const tail_bloc
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
 TAIL_BLOCKS_CODE TAIL_BLOCKS_TOGETHER static void tail_blocks_guard(const tail_blocks_state *state, tail_blocks_front *front)
 {
-    const uint32_t stray = tail_blocks_aside(state->held[0], 0x437A0000u, 0x437A0000u)
-                         | tail_blocks_aside(state->held[1], 0x02D00000u, 0x42700000u)
+    const uint32_t stray = tail_blocks_aside(state->held[0], 0x80000000u, 0x437A0000u)
+                         | tail_blocks_aside(state->held[1], 0xC0A00000u, 0x42700000u)
                          | tail_blocks_line_far(&state->memory[0], 2u, 0x437A0000u)
                          | tail_blocks_beyond(state->soft_cap, 0x3E99999Au, 0x00999999u);
 #if defined(__FRAMAC__)
@@ -984,13 +984,15 @@ TAIL_BLOCKS_COLD uint32_t tail_blocks_self_test(void)
     float observation[TAIL_BLOCKS_FEATURES];
     float q[TAIL_BLOCKS_ACTIONS];
     uint32_t random = 0x2545F491u;
-    uint32_t good = 0u; /* first answers in a row that are right: a fault in this count shows in a sound build, too */
+    /* number of the first vector without a right answer, and right answers before it: a fault in either shows in a sound build, too */
+    uint32_t next = 1u;
+    uint32_t right = 0u;
     uint32_t vector;
     uint32_t i;
     tail_blocks_span span;
     span.from = 0u;
     span.to = TAIL_BLOCKS_ACTIONS;
-    for (vector = 0u; vector < 16u; ++vector) {
+    for (vector = 1u; vector <= 16u; ++vector) {
         for (i = 0u; i < TAIL_BLOCKS_FEATURES; ++i) {
             random = (random * 0x0019660Du) + 0x3C6EF35Fu;
             observation[i] = tail_blocks_box_low[i] + (tail_blocks_box_width[i] * ((float)(random >> 8) * 5.9604645e-8f));
@@ -999,9 +1001,10 @@ TAIL_BLOCKS_COLD uint32_t tail_blocks_self_test(void)
         span.crc = 0xFFFFFFFFu;
         tail_blocks_q_values(observation, q);
         tail_blocks_crc(&span, q, TAIL_BLOCKS_ACTIONS);
-        if ((good == vector) && ((span.crc ^ 0xFFFFFFFFu) == tail_blocks_answers[vector])) {
-            good = vector + 1u;
+        if ((next == vector) && ((span.crc ^ 0xFFFFFFFFu) == tail_blocks_answers[vector - 1u])) {
+            next = vector + 1u;
+            ++right;
         }
     }
-    return (good == 16u) ? 0u : (good + 1u);
+    return (next == 17u) ? (16u - right) : next;
 }

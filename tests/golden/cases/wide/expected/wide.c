@@ -298,10 +298,10 @@ static uint64_t wide_far(double x, uint64_t bound)
     return stray;
 }
 
-static uint64_t wide_aside(double x, uint64_t difference, uint64_t bound)
+static uint64_t wide_aside(double x, uint64_t from, uint64_t to)
 {
-    const double low = -wide_from_bits(bound ^ difference);
-    const double high = wide_from_bits(bound);
+    const double low = wide_from_bits(from);
+    const double high = wide_from_bits(to);
     uint64_t stray = (uint64_t)1 << 63;
     if ((x >= low) && (x <= high)) {
         /*@ admit !\is_NaN(x); */
@@ -356,12 +356,12 @@ WIDE_SPARE static uint64_t wide_far(double x, uint64_t bound)
     return bound - (wide_bits(x) & (((uint64_t)1 << 63) - 1u));
 }
 
-/* The same with two bounds: high, and below 0 what the difference of their bits makes of it. */
-WIDE_SPARE static uint64_t wide_aside(double x, uint64_t difference, uint64_t high)
+/* The sign bit is set if x is below the number with the bits low, whose sign is set, or above the one with the bits high. */
+WIDE_SPARE static uint64_t wide_aside(double x, uint64_t low, uint64_t high)
 {
-    /* a flag behind its barrier: of a mask made of a sign clang makes a branch on RISC-V */
-    const uint32_t below = wide_flag((int)(wide_bits(x) >> 63));
-    return wide_far(x, high ^ (difference & ((uint64_t)0 - below)));
+    const uint64_t bits = wide_bits(x);
+    /* each difference counts for the numbers of its sign; of a mask made of a sign compilers make a branch */
+    return ((low - bits) & bits) | ((high - bits) & ~bits);
 }
 
 /* The sign bit is set if x is not among the numbers from the one with the bits low on. */
@@ -596,9 +596,9 @@ WIDE_CODE WIDE_TOGETHER static uint64_t wide_mapping_flips(const wide_state *sta
 /* A flipped bit that would decide the duty makes the state one that the controller cannot have written. */
 WIDE_CODE WIDE_TOGETHER static void wide_guard(const wide_state *state, wide_front *front)
 {
-    const uint64_t stray = wide_aside(state->held[0], (((uint64_t)0x40540000u << 32) | 0x00000000u), (((uint64_t)0x40540000u << 32) | 0x00000000u))
+    const uint64_t stray = wide_aside(state->held[0], (((uint64_t)0x80000000u << 32) | 0x00000000u), (((uint64_t)0x40540000u << 32) | 0x00000000u))
                          | wide_far(state->held[1], (((uint64_t)0x40340000u << 32) | 0x00000000u))
-                         | wide_aside(state->held[2], (((uint64_t)0x7FC00000u << 32) | 0x00000000u), (((uint64_t)0x40300000u << 32) | 0x00000000u))
+                         | wide_aside(state->held[2], (((uint64_t)0xBFF00000u << 32) | 0x00000000u), (((uint64_t)0x40300000u << 32) | 0x00000000u))
                          | wide_line_far(&state->memory[0], 3u, (((uint64_t)0x40600001u << 32) | 0x60000600u))
                          | wide_far(state->memory[3], (((uint64_t)0x40540000u << 32) | 0x00000000u))
                          | wide_far(state->memory[4], (((uint64_t)0x40340002u << 32) | 0x80001400u))
@@ -1108,13 +1108,15 @@ WIDE_COLD uint32_t wide_self_test(void)
     double observation[WIDE_FEATURES];
     double q[WIDE_ACTIONS];
     uint32_t random = 0x2545F491u;
-    uint32_t good = 0u; /* first answers in a row that are right: a fault in this count shows in a sound build, too */
+    /* number of the first vector without a right answer, and right answers before it: a fault in either shows in a sound build, too */
+    uint32_t next = 1u;
+    uint32_t right = 0u;
     uint32_t vector;
     uint32_t i;
     wide_span span;
     span.from = 0u;
     span.to = WIDE_ACTIONS;
-    for (vector = 0u; vector < 16u; ++vector) {
+    for (vector = 1u; vector <= 16u; ++vector) {
         for (i = 0u; i < WIDE_FEATURES; ++i) {
             random = (random * 0x0019660Du) + 0x3C6EF35Fu;
             observation[i] = wide_box_low[i] + (wide_box_width[i] * ((double)(random >> 8) * 5.960464477539063e-8));
@@ -1123,9 +1125,10 @@ WIDE_COLD uint32_t wide_self_test(void)
         span.crc = 0xFFFFFFFFu;
         wide_q_values(observation, q);
         wide_crc(&span, q, WIDE_ACTIONS);
-        if ((good == vector) && ((span.crc ^ 0xFFFFFFFFu) == wide_answers[vector])) {
-            good = vector + 1u;
+        if ((next == vector) && ((span.crc ^ 0xFFFFFFFFu) == wide_answers[vector - 1u])) {
+            next = vector + 1u;
+            ++right;
         }
     }
-    return (good == 16u) ? 0u : (good + 1u);
+    return (next == 17u) ? (16u - right) : next;
 }

@@ -1,0 +1,256 @@
+//! Edits of the generated C that are drawn from a seed: does the kit find them?
+//!
+//! ```text
+//! core.c ─► lines of code ─► a token, drawn ─► another one ─► gcc ─► other machine code? ─► with the kit ─► FAIL, or printed
+//! ```
+//!
+//! An edit that the kit does not find may be one that changes nothing, such as a clip end that no measurement reaches. Whether it is
+//! a person decides, so the edits are printed.
+
+use random::{Random, SplitMix};
+
+use super::{Ran, build, example, files, golden_case, write};
+use codegen::Output;
+use policy::Policy;
+
+/// Control steps of the kit: those of `policyc compile` without a flag.
+const STEPS: u32 = verify::kit::DEFAULT_STEPS;
+/// Of this many edits one may pass without a finding, and one more: most of those that pass change nothing.
+// samples of 60 and 80 had five and six of them
+const PASSING: usize = 8;
+
+/// An edit of a text.
+struct Edit {
+    line: usize,
+    before: String,
+    after: String,
+}
+
+/// What a token may become.
+fn others(token: &str) -> Vec<String> {
+    const OPERATORS: &[(&str, &[&str])] = &[
+        ("+", &["-"]),
+        ("-", &["+"]),
+        ("*", &["+"]),
+        ("&", &["|"]),
+        ("|", &["&", "^"]),
+        ("^", &["|"]),
+        ("<<", &[">>"]),
+        (">>", &["<<"]),
+        ("<", &["<=", ">"]),
+        ("<=", &["<"]),
+        (">", &[">=", "<"]),
+        (">=", &[">"]),
+        ("==", &["!=", ">="]),
+        ("!=", &["=="]),
+        ("&&", &["||"]),
+        ("+=", &["-="]),
+        ("|=", &["&="]),
+    ];
+    if let Some((_, others)) = OPERATORS.iter().find(|(operator, _)| *operator == token) {
+        return others.iter().map(|other| (*other).to_owned()).collect();
+    }
+    if let Some(value) = token.strip_suffix('f').and_then(|digits| digits.parse::<f32>().ok()) {
+        let near = if value == 0.0 { 0.001 } else { value * 1.001 };
+        let far = if value == 0.0 { -0.001 } else { value * 0.999 };
+        return [near, far].map(|value| format!("{value:?}f")).to_vec();
+    }
+    let (digits, suffix) = match token.strip_suffix('u') {
+        Some(digits) => (digits, "u"),
+        None => (token, ""),
+    };
+    let value = match digits.strip_prefix("0x") {
+        Some(hex) => u32::from_str_radix(hex, 16),
+        None => digits.parse(),
+    };
+    value.map_or(Vec::new(), |value| {
+        [value.wrapping_add(1), value.wrapping_sub(1)]
+            .map(|value| format!("{value}{suffix}"))
+            .to_vec()
+    })
+}
+
+/// The lines of functions: no tables, no directives, no comments, and nothing that only a prover or an assembler reads.
+fn code(text: &str) -> Vec<usize> {
+    let mut lines = Vec::new();
+    // how deep in conditions, and from which depth on nothing is compiled here
+    let (mut depth, mut skipped) = (0_usize, None);
+    for (number, line) in text.lines().enumerate() {
+        let bare = line.trim_start();
+        if bare.starts_with("#if") {
+            depth += 1;
+            let is_other = ["__FRAMAC__", "_ASSEMBLY", "__cplusplus"]
+                .iter()
+                .any(|word| bare.contains(word));
+            if is_other && skipped.is_none() {
+                skipped = Some(depth);
+            }
+        } else if bare.starts_with("#else") && skipped == Some(depth) {
+            skipped = None;
+        } else if bare.starts_with("#endif") {
+            skipped = skipped.filter(|from| *from != depth);
+            depth = depth.saturating_sub(1);
+        } else if skipped.is_none()
+            && line.starts_with("    ")
+            && !bare.starts_with(['/', '*'])
+            && !bare.starts_with(|c: char| c.is_ascii_digit() || c == '-')
+        {
+            lines.push(number);
+        }
+    }
+    lines
+}
+
+/// Where the tokens of a line stand.
+fn tokens(line: &str) -> Vec<std::ops::Range<usize>> {
+    let line = line.split("/*").next().unwrap_or(line);
+    let kind = |c: char| match c {
+        _ if c.is_ascii_alphanumeric() || "._".contains(c) => 1,
+        _ if "+-*&|^<>=!".contains(c) => 2,
+        _ => 0,
+    };
+    let mut all: Vec<std::ops::Range<usize>> = Vec::new();
+    let mut last = 0;
+    for (at, c) in line.char_indices() {
+        let now = kind(c);
+        match all.last_mut() {
+            Some(range) if now == last && now != 0 => range.end = at + 1,
+            _ if now != 0 => all.push(at..at + 1),
+            _ => {}
+        }
+        last = now;
+    }
+    all
+}
+
+/// An edit, drawn: a token of any line of code, or a statement that is left out.
+fn draw(text: &str, random: &mut SplitMix) -> Option<(Edit, String)> {
+    let lines: Vec<&str> = text.lines().collect();
+    let code = code(text);
+    let line = code[random.below(code.len())];
+    let old = lines[line];
+    let is_assignment = old.ends_with(';') && old.contains(" = ") && !old.trim_start().starts_with("const");
+    let new = if is_assignment && random.below(8) == 0 {
+        String::new()
+    } else {
+        let places = tokens(old);
+        let place = places.get(random.below(places.len().max(1)))?.clone();
+        let others = others(&old[place.clone()]);
+        let other = others.get(random.below(others.len().max(1)))?;
+        format!("{}{other}{}", &old[..place.start], &old[place.end..])
+    };
+    let mut edited = lines;
+    edited[line] = &new;
+    let edited = edited.join("\n") + "\n";
+    let edit = Edit {
+        line: line + 1,
+        before: old.trim().to_owned(),
+        after: new.trim().to_owned(),
+    };
+    Some((edit, edited))
+}
+
+/// Draws so many edits that give other machine code; those that the kit does not find.
+fn missed(policy: &Policy, seed: u64, count: usize) -> Vec<Edit> {
+    let folder = tempfile::tempdir().unwrap();
+    let files = files(policy, Output::Kit, STEPS);
+    write(&files, folder.path());
+    let (core, kit) = (format!("{}.c", policy.name), format!("{}_kit.c", policy.name));
+    let compiled = |source: &str, object: &str| {
+        // an index out of bounds is a finding, too
+        let compiler = [
+            "gcc",
+            "-O1",
+            "-fsanitize=bounds",
+            "-fno-sanitize-recover=all",
+            "-w",
+            "-c",
+        ];
+        let built = build(&compiler, &[source], folder.path());
+        (built.code == Some(0)).then(|| {
+            std::fs::rename(folder.path().join("program"), folder.path().join(object)).unwrap();
+            std::fs::read(folder.path().join(object)).unwrap()
+        })
+    };
+    compiled(&kit, "kit.o").unwrap();
+    let sound = compiled(&core, "core.o").unwrap();
+    let mut random = SplitMix::new(seed);
+    let (mut tried, mut missed) = (0, Vec::new());
+    while tried < count {
+        let Some((edit, text)) = draw(&files[&core], &mut random) else {
+            continue;
+        };
+        std::fs::write(folder.path().join(&core), text).unwrap();
+        // the same machine code is no edit: a branch of another machine's, or another way to say the same
+        if compiled(&core, "core.o").is_none_or(|object| object == sound) {
+            continue;
+        }
+        let linked = build(&["gcc", "-fsanitize=bounds"], &["core.o", "kit.o"], folder.path());
+        assert_eq!(linked.code, Some(0), "{}", linked.stderr);
+        tried += 1;
+        let ran = timed(folder.path());
+        if ran.code == Some(0) {
+            missed.push(edit);
+        }
+    }
+    missed
+}
+
+/// Runs the program; a kit that does not end within a time is one that a user sees, too.
+fn timed(folder: &std::path::Path) -> Ran {
+    let program = folder.join("program");
+    tests::tools::run(std::process::Command::new("timeout").arg("20").arg(program))
+}
+
+/// `POLICYC_KIT_SEED` picks other edits, `POLICYC_KIT_EDITS` more of them.
+#[test]
+fn edits_from_a_seed_are_found() {
+    let number = |name: &str, usual: u64| std::env::var(name).map_or(usual, |text| text.parse().unwrap());
+    let usual = if tests::full() { 60 } else { 6 };
+    let (seed, count) = (
+        number("POLICYC_KIT_SEED", 77_123),
+        number("POLICYC_KIT_EDITS", usual) as usize,
+    );
+    let policies = [example(), golden_case("constructs")];
+    let mut passed = 0;
+    for (policy, seed) in policies.iter().zip(seed..) {
+        let missed = missed(policy, seed, count / 2);
+        println!(
+            "{}, seed {seed}: {} of {} not found",
+            policy.name,
+            missed.len(),
+            count / 2
+        );
+        for Edit { line, before, after } in &missed {
+            println!("  {line}: {before}\n      => {after}");
+        }
+        passed += missed.len();
+    }
+    assert!(passed <= 1 + count / PASSING, "{passed} of {count}");
+}
+
+/// What is drawn compiles to another program: edits of nothing would always be missed, and edits of tables always found.
+#[test]
+fn edits_are_drawn_from_the_code_alone() {
+    let policy = example();
+    let text = files(&policy, Output::C, STEPS).remove("buck12.c").unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    let code = code(&text);
+    assert!(
+        code.iter()
+            .any(|line| lines[*line].contains("buck12_within(measured->v_out"))
+    );
+    assert!(
+        !code
+            .iter()
+            .any(|line| lines[*line].contains("admit") || lines[*line].contains("split"))
+    );
+    let mut random = SplitMix::new(1);
+    for _ in 0..200 {
+        let Some((edit, edited)) = draw(&text, &mut random) else {
+            continue;
+        };
+        assert_ne!(edited, text, "{}", edit.before);
+        assert_eq!(edited.lines().count(), lines.len());
+    }
+}

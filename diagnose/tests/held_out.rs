@@ -98,10 +98,7 @@ fn a_page_of_a_model_that_has_no_finite_value_says_so_and_draws_the_rest() {
         best.state.residual.fill(0.0);
     }
     let page = diagnose::page::page(&found).unwrap();
-    assert!(
-        page.contains("A picture is missing here: "),
-        "{page}"
-    );
+    assert!(page.contains("A picture is missing here: "), "{page}");
     assert!(page.contains("dcr"));
 }
 

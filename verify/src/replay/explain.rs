@@ -287,7 +287,14 @@ fn starts(feature: &Feature, course: &Course, own: &FeatureCourse, logged: &Logg
 
 fn of_itself(feature: &Feature, line: Line, own: &FeatureCourse, logged: &Logged<'_>) -> Option<String> {
     let unclipped: Vec<f64> = own.unclipped.iter().map(|x| line.s * x + line.o).collect();
-    let clip = clip(feature, &logged.cut_off(&unclipped));
+    let shown = logged.cut_off(&unclipped);
+    let [low, high] = [shown[0].unwrap_or(f64::NEG_INFINITY), shown[1].unwrap_or(f64::INFINITY)];
+    let made: Vec<f64> = unclipped.iter().map(|x| x.max(low).min(high)).collect();
+    // the line was drawn without the rows at an end: where no clip makes them, a clamp in the filters does, and it is none of it all
+    if !logged.is(&made) {
+        return None;
+    }
+    let clip = clip(feature, &shown);
     let (scale, offset) = (line.s * feature.scale, line.s * feature.offset + line.o);
     let mut keys = Vec::new();
     let head = if line.s == 1.0 && line.o == 0.0 {

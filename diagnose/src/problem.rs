@@ -99,6 +99,10 @@ impl Starts {
 /// instant ([`crate::instants`]).
 const AT_ONCE: f64 = 0.02;
 
+/// A load that changes in more than this share of the rows is no load of steps: a meter's reading, row by row. Steps of a test stand
+/// tens of rows apart, and a reading without levels changes in nearly all; a convention between the two.
+const MOST_IN_STEPS: f64 = 0.5;
+
 /// Rows that are not scored from the start: what the load did before a sample inside a slope, or at the very instant of one, is not in
 /// the table, and the voltage leaps with it by the series resistance of the capacitor. The current of the inductor does not.
 fn in_steps(record: &Record) -> [Vec<bool>; CHANNELS] {
@@ -112,6 +116,13 @@ fn in_steps(record: &Record) -> [Vec<bool>; CHANNELS] {
         for channel in [OUTPUT_VOLTAGE, LOAD_CURRENT] {
             let rows = step.first - usize::from(before)..step.last + usize::from(behind);
             masked[channel][rows].fill(true);
+        }
+    }
+    // without its steps nothing would be left of the voltage, while what it leaps by from reading to reading is next to nothing
+    let most = MOST_IN_STEPS * record.rows() as f64;
+    for channel in &mut masked {
+        if channel.iter().filter(|row| **row).count() as f64 > most {
+            channel.fill(false);
         }
     }
     masked

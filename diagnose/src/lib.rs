@@ -23,6 +23,7 @@ mod backward;
 mod balance;
 pub mod basis;
 pub mod beside;
+pub mod capture;
 pub mod causes;
 pub mod control;
 pub mod diagnosis;

@@ -76,10 +76,24 @@ pub fn of_node(time: &[f64], values: &[f64]) -> Option<Edges> {
     let low = middle(f64::NEG_INFINITY, least + near)?;
     let high = middle(most - near, f64::INFINITY)?;
     let plateau = middle(least + near, most - near)?;
-    (high > low).then(|| Edges {
-        rising: Edges::of(time, values, [plateau, high]).rising,
-        falling: Edges::of(time, values, [low, high]).falling,
-    })
+    let rising = Edges::of(time, values, [plateau, high]).rising;
+    let falling = Edges::of(time, values, [low, high]).falling;
+    (high > low).then(|| wide(&rising, &falling))
+}
+
+/// The wide pulses alone: a node that rings up to the source has narrow ones.
+fn wide(rising: &Brackets, falling: &Brackets) -> Edges {
+    let pulse = |off: &[f64; 2]| {
+        let on = rising.iter().rfind(|on| on[1] <= off[0])?;
+        Some((*on, *off, middle(off) - middle(on)))
+    };
+    let pulses: Vec<_> = falling.iter().filter_map(pulse).collect();
+    let widest = pulses.iter().map(|pulse| pulse.2).fold(0.0, f64::max);
+    let kept = || pulses.iter().filter(|pulse| pulse.2 > 0.5 * widest);
+    Edges {
+        rising: kept().map(|pulse| pulse.0).collect(),
+        falling: kept().map(|pulse| pulse.1).collect(),
+    }
 }
 
 impl Edges {
@@ -133,13 +147,13 @@ fn middle(bracket: &[f64; 2]) -> f64 {
     0.5 * (bracket[0] + bracket[1])
 }
 
-/// Number of each edge, counted in periods from the first.
+/// Number of each edge, counted in periods from the middle one: an error of the period moves that least.
 fn numbers(list: &[[f64; 2]], period: f64) -> Vec<f64> {
-    let first = list.first().map_or(0.0, middle);
-    list.iter().map(|b| ((middle(b) - first) / period).round()).collect()
+    let from = list.get(list.len() / 2).map_or(0.0, middle);
+    list.iter().map(|b| ((middle(b) - from) / period).round()).collect()
 }
 
-/// Bounds that all brackets of a list leave for its first edge; crossed where they contradict each other.
+/// Bounds that all brackets of a list leave for its middle edge; crossed where they contradict each other.
 fn bounds(list: &[[f64; 2]], counts: &[f64], period: f64) -> [f64; 2] {
     let pairs = || list.iter().zip(counts);
     [
@@ -165,38 +179,102 @@ pub fn repeated(lists: &[&Brackets], rough: f64) -> (f64, Vec<Option<At>>) {
     let (mut low, mut high) = (rough * (1.0 - AROUND), rough * (1.0 + AROUND));
     for _ in 0..80 {
         let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
-        if slack(a) < slack(b) { low = a } else { high = b }
+        if slack(a) < slack(b) {
+            low = a;
+        } else {
+            high = b;
+        }
     }
     let within = 0.5 * (low + high);
-    let period = match slack(within) > 0.0 {
-        true if slack(within).is_finite() => within,
-        true => rough,
+    if slack(within) <= 0.0 {
         // edges that jitter by more than a sample: least squares
-        false => regressed(&counted).unwrap_or(rough),
+        let period = regressed(&counted).unwrap_or(rough);
+        let at = counted.iter().map(|(list, counts)| scattered(list, counts, period));
+        return (period, at.collect());
+    }
+    let periods: Vec<f64> = match slack(within).is_finite() {
+        true => {
+            let (least, most) = (
+                end(&slack, within, -AROUND * rough),
+                end(&slack, within, AROUND * rough),
+            );
+            (0..TRIED)
+                .map(|n| least + (most - least) * (n as f64 + 0.5) / TRIED as f64)
+                .collect()
+        }
+        // one edge of each kind: the period is not theirs to tell
+        false => vec![rough],
+    };
+    averaged(&counted, &periods)
+}
+
+/// Periods that are averaged over.
+const TRIED: usize = 41;
+
+/// How far a period may go to one side before brackets contradict each other.
+fn end(slack: &impl Fn(f64) -> f64, from: f64, reach: f64) -> f64 {
+    let (mut inside, mut outside) = (from, from + reach);
+    for _ in 0..60 {
+        let middle = 0.5 * (inside + outside);
+        if slack(middle) > 0.0 {
+            inside = middle;
+        } else {
+            outside = middle;
+        }
+    }
+    inside
+}
+
+/// Means over all periods and instants that the brackets allow, each as likely as any other.
+fn averaged(counted: &[(&Brackets, Vec<f64>)], periods: &[f64]) -> (f64, Vec<Option<At>>) {
+    let all = |period: f64| counted.iter().map(move |(list, counts)| bounds(list, counts, period));
+    // the volume that is left for the instants
+    let weights: Vec<f64> = periods
+        .iter()
+        .map(|period| {
+            all(*period)
+                .map(|[low, high]| high - low)
+                .filter(|w| w.is_finite())
+                .product()
+        })
+        .collect();
+    let total: f64 = weights.iter().sum();
+    let mean = |of: &dyn Fn(f64) -> f64| {
+        let sum: f64 = periods
+            .iter()
+            .zip(&weights)
+            .map(|(period, weight)| of(*period) * weight)
+            .sum();
+        sum / total
     };
     let at = |(list, counts): &(&Brackets, Vec<f64>)| {
-        let [low, high] = bounds(list, counts, period);
-        let count = list.len() as f64;
-        let mean = list
-            .iter()
-            .zip(counts)
-            .map(|(b, k)| middle(b) - k * period)
-            .sum::<f64>()
-            / count;
-        let (time, sd) = match high >= low {
-            // anywhere between the bounds
-            true => (0.5 * (low + high), (high - low) / 12f64.sqrt()),
-            false => {
-                let left = list
-                    .iter()
-                    .zip(counts)
-                    .map(|(b, k)| (middle(b) - k * period - mean).powi(2));
-                (mean, (left.sum::<f64>() / count / count).sqrt())
-            }
+        let centre = |period: f64| {
+            let [low, high] = bounds(list, counts, period);
+            0.5 * (low + high)
         };
-        (!list.is_empty()).then_some(At { time, sd })
+        let time = mean(&centre);
+        let square = |period: f64| {
+            let [low, high] = bounds(list, counts, period);
+            (high - low).powi(2) / 12.0 + (centre(period) - time).powi(2)
+        };
+        (!list.is_empty()).then(|| At {
+            time,
+            sd: mean(&square).sqrt(),
+        })
     };
-    (period, counted.iter().map(at).collect())
+    (mean(&|period| period), counted.iter().map(at).collect())
+}
+
+/// The mean of edges that scatter.
+fn scattered(list: &[[f64; 2]], counts: &[f64], period: f64) -> Option<At> {
+    let n = list.len() as f64;
+    let off = || list.iter().zip(counts).map(|(b, k)| middle(b) - k * period);
+    let time = off().sum::<f64>() / n;
+    let left = off().map(|t| (t - time).powi(2)).sum::<f64>() / n;
+    (!list.is_empty()).then(|| At {
+        time,
+        sd: (left / n).sqrt(),
+    })
 }
 
 /// The common slope of the edges over their numbers.
@@ -254,7 +332,7 @@ mod tests {
         let value = |t: &f64| match (t / period).rem_euclid(1.0) {
             phase if phase < 0.4 => 24.0,
             phase if phase < 0.7 => -0.5,
-            phase => 14.0 + 3.0 * (-(phase - 0.7) * 10.0).exp() * (phase * 60.0).sin(),
+            phase => 14.0 + 14.0 * (-(phase - 0.7) * 12.0).exp() * -((phase - 0.7) * 60.0).cos(),
         };
         let values: Vec<f64> = time.iter().map(value).collect();
         let edges = of_node(&time, &values).unwrap();

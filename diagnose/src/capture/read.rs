@@ -80,7 +80,7 @@ pub(crate) fn read(samples: &Samples, parameters: &Parameters) -> Result<Read, M
         .node
         .as_ref()
         .and_then(|v| told("v_sw", of_node(time, v), &mut notes));
-    let (period, at) = timing(samples, [pin.as_ref(), node.as_ref()], t_sw)?;
+    let (period, at) = timing(samples, [pin.as_ref(), node.as_ref()], t_sw, &mut notes)?;
     let pulse = |on: Option<At>, off: Option<At>| {
         let (on, off) = (on?, off?);
         let width = At {
@@ -163,7 +163,12 @@ fn told(name: &str, found: Option<Edges>, notes: &mut Vec<String>) -> Option<Edg
 }
 
 /// The period, and one instant of each kind of edge: pin up and down, node up and down.
-fn timing(samples: &Samples, edges: [Option<&Edges>; 2], t_sw: f64) -> Result<(f64, [Option<At>; 4]), Message> {
+fn timing(
+    samples: &Samples,
+    edges: [Option<&Edges>; 2],
+    t_sw: f64,
+    notes: &mut Vec<String>,
+) -> Result<(f64, [Option<At>; 4]), Message> {
     let expected = format!("{} within {:.0} %", said(t_sw), 100.0 * CLOCKS);
     let hint = "is `converter.f_sw` of the plant file right, and is the time in s?";
     let other = |found: f64, what: &str| {
@@ -190,6 +195,11 @@ fn timing(samples: &Samples, edges: [Option<&Edges>; 2], t_sw: f64) -> Result<(f
                 .rough_period()
                 .is_some_and(|period| (period / rough - 1.0).abs() > CLOCKS + unsure)
         };
+        if rings(node) {
+            notes.push(
+                "v_sw has more edges than the command has periods: it rings, and is not used for edges".to_owned(),
+            );
+        }
         let lists: [&Brackets; 4] = match rings(node) {
             true => [&pin.rising, &pin.falling, &none, &none],
             false => [&pin.rising, &pin.falling, &node.rising, &node.falling],

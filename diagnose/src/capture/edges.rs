@@ -55,27 +55,33 @@ pub fn levels(values: &[f64]) -> Option<[f64; 2]> {
 /// Around its extremes, as a share of what they are apart, a signal is at a level.
 const AT_LEVEL: f64 = 0.12;
 /// A plateau between them must hold this share of the samples to be one.
-const PLATEAU_SHARE: f64 = 0.02;
+// edges hold less: a tenth of a period of ten samples
+const PLATEAU_SHARE: f64 = 0.1;
 
 /// Edges of a switch node: two levels in continuous conduction. Where the current rests the node swings to the output voltage, and
 /// then rises from there.
 pub fn of_node(time: &[f64], values: &[f64]) -> Option<Edges> {
-    if let Some(levels) = levels(values) {
-        return Some(Edges::of(time, values, levels));
-    }
+    of_three(time, values).or_else(|| {
+        let edges = Edges::of(time, values, levels(values)?);
+        Some(wide(&edges.rising, &edges.falling))
+    })
+}
+
+/// Edges of a node that swings between its levels for a while.
+fn of_three(time: &[f64], values: &[f64]) -> Option<Edges> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let at = |share: f64| sorted.get((share * (sorted.len() as f64 - 1.0)) as usize).copied();
     let (least, most) = (at(0.02)?, at(0.98)?);
     let near = AT_LEVEL * (most - least);
-    let middle = |from: f64, to: f64| {
+    let middle = |from: f64, to: f64, share: f64| {
         let inside: Vec<f64> = sorted.iter().copied().filter(|v| (from..=to).contains(v)).collect();
-        let enough = inside.len() as f64 > PLATEAU_SHARE * sorted.len() as f64;
-        inside.get(inside.len() / 2).copied().filter(|_| enough)
+        let is_enough = inside.len() as f64 > share * sorted.len() as f64;
+        inside.get(inside.len() / 2).copied().filter(|_| is_enough)
     };
-    let low = middle(f64::NEG_INFINITY, least + near)?;
-    let high = middle(most - near, f64::INFINITY)?;
-    let plateau = middle(least + near, most - near)?;
+    let low = middle(f64::NEG_INFINITY, least + near, 0.0)?;
+    let high = middle(most - near, f64::INFINITY, 0.0)?;
+    let plateau = middle(least + near, most - near, PLATEAU_SHARE)?;
     let rising = Edges::of(time, values, [plateau, high]).rising;
     let falling = Edges::of(time, values, [low, high]).falling;
     (high > low).then(|| wide(&rising, &falling))

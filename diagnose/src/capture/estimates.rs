@@ -75,8 +75,6 @@ impl Estimates {
 const STRAIGHT: (f64, f64) = (0.12, 0.9);
 /// What the straight line of a current may be off in its slope: the bend by winding and saturation.
 const BENT: f64 = 0.005;
-/// Part of the largest current below which it rests.
-const RESTS: f64 = 0.05;
 
 /// Two standard deviations to either side.
 fn around(name: &'static str, (value, sd): (f64, f64), unit: &'static str, model: Option<f64>, from: &str) -> Estimate {
@@ -127,16 +125,7 @@ pub fn of(capture: &Capture, driven: &Driven, p: &Parameters) -> Estimates {
 }
 
 fn mode(capture: &Capture) -> Option<&'static str> {
-    let by_current = || {
-        let fold = capture.folds[1].as_ref().filter(|_| !capture.ac[1])?;
-        let values = || fold.value.iter().map(|v| v + fold.mean).filter(|v| v.is_finite());
-        let most = values().fold(0.0, f64::max);
-        let noise = 3.0 * fold.noise / capture.bins.periods.sqrt();
-        let resting = values().filter(|v| v.abs() < (RESTS * most).max(noise)).count() as f64;
-        Some(resting > 0.1 * capture.bins.at.len() as f64)
-    };
-    let discontinuous = capture.discontinuous.or_else(by_current)?;
-    Some(if discontinuous { "dcm" } else { "ccm" })
+    Some(if capture.discontinuous? { "dcm" } else { "ccm" })
 }
 
 fn edges(capture: &Capture, driven: &Driven, p: &Parameters, out: &mut Estimates) {

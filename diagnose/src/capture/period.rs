@@ -21,9 +21,21 @@ fn share(time: &[f64], values: &[f64], frequency: f64) -> f64 {
     if total > 0.0 { explained / total } else { 0.0 }
 }
 
+/// A signal less the line through it: a drift is no ripple.
+fn straightened(time: &[f64], values: &[f64]) -> Vec<f64> {
+    let count = time.len() as f64;
+    let (t, v) = (time.iter().sum::<f64>() / count, values.iter().sum::<f64>() / count);
+    let (up, down) = time.iter().zip(values).fold((0.0, 0.0), |(up, down), (x, y)| {
+        (up + (x - t) * (y - v), down + (x - t).powi(2))
+    });
+    let slope = if down > 0.0 { up / down } else { 0.0 };
+    time.iter().zip(values).map(|(x, y)| y - v - slope * (x - t)).collect()
+}
+
 /// The frequency that stands out of a signal, near or far from `expected`, Hz; nothing if none does.
 pub fn of(time: &[f64], values: &[f64], expected: f64) -> Option<f64> {
     let (time, values): (Vec<f64>, Vec<f64>) = time.iter().zip(values).filter(|(_, v)| v.is_finite()).unzip();
+    let values = straightened(&time, &values);
     let span = time.last()? - time.first()?;
     // at least one turn in the capture: slower is a drift
     let (low, high) = ((AROUND.0 * expected).max(0.9 / span), AROUND.1 * expected);

@@ -31,7 +31,8 @@ const RESTS: f64 = 0.2;
 
 /// Whether rows are those of a capture, `samples` a period over `periods`.
 pub(crate) fn is_capture(samples: f64, periods: f64) -> bool {
-    samples > SCOPE || samples >= SAMPLES && periods < PERIODS
+    // of so many rows less than a period are more likely times in another unit
+    samples > SCOPE && periods >= 1.0 - CLOCKS || (SAMPLES..=SCOPE).contains(&samples) && periods < PERIODS
 }
 
 /// Samples of a capture in SI units.
@@ -122,7 +123,14 @@ pub(crate) fn read(samples: &Samples, parameters: &Parameters) -> Result<Read, M
         ));
     }
     let node = node.and_then(|pulse| shown_node(pulse, samples.node.as_deref()?, &bins));
-    let resting = node.as_ref().map(|(_, resting)| *resting);
+    let by_current = || {
+        folds[1]
+            .as_ref()
+            .filter(|_| !ac[1])
+            .map(|fold| fold.rests(bins.periods))
+    };
+    let resting = node.as_ref().map(|(_, resting)| *resting).or_else(by_current);
+    let folds = folds.map(|fold| fold.map(|fold| if resting == Some(true) { fold.ringing() } else { fold }));
     let i_in = samples.i_in.as_deref().map(|v| bins.fold(v)).map(|fold| Level {
         value: fold.mean,
         sd: fold.mean_sd.hypot(accuracy(fold.mean, fold.span, fold.step)),

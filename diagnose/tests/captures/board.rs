@@ -87,7 +87,7 @@ pub fn run(name: &str, duty: f64, load: f64, v0: f64, longest: &str) -> Signals 
 /// The board at half duty and 10 ohm, run once for all tests.
 pub fn half() -> &'static Signals {
     static RUN: OnceLock<Signals> = OnceLock::new();
-    RUN.get_or_init(|| run("half", 0.5, 10.0, 11.57, "5n"))
+    RUN.get_or_init(|| run("half", 0.5, 10.0, 11.57, "10n"))
 }
 
 impl Signals {

@@ -99,7 +99,7 @@ fn a_capture_of_a_healthy_model_is_consistent() {
 fn a_capture_breaks_the_ties_of_a_duty_sweep() {
     let mut model = truth();
     (model.switch.v_f, model.switch.r_d) = (0.0, 0.0);
-    let duties = [0.3, 0.4, 0.5, 0.6, 0.7, 0.8];
+    let duties = [0.44, 0.47, 0.5, 0.53, 0.56];
     let point = |(n, duty): (usize, &f64)| {
         let load = 10.0;
         let board = run(
@@ -139,14 +139,19 @@ fn a_capture_breaks_the_ties_of_a_duty_sweep() {
 
 #[test]
 fn a_current_that_rests_is_seen_and_its_slope_still_tells_the_inductance() {
-    let board = run("light", 0.4, 100.0, 13.6, "5n");
+    let board = run("light", 0.4, 100.0, 13.6, "10n");
     let record = read(&CLEAN.table(&board), "r_load=100", &wrong()).unwrap();
     let found = diagnosed(&wrong(), vec![record]);
     assert_eq!(found.findings.captures[0].mode, Some("dcm"));
     let l = estimate(&found, "inductance");
     assert!(is_near(l.value, 100e-6, 0.05), "{l:?}");
     let late = estimate(&found, "turn_on_delay");
-    assert!((late.value - board.delays()[0]).abs() < 20e-9, "{late:?}");
+    // the node turns on somewhere in its ring: nobody's delay to 20 ns
+    assert!((late.value - board.delays()[0]).abs() < 40e-9, "{late:?}");
+    // the ring, which the plant has not, is no delay
+    let delays = ["turn_off_delay", "turn_on_delay", "dead_time", "duty_quantisation"];
+    let named = found.findings.causes.iter().find(|cause| delays.contains(&cause.id));
+    assert!(named.is_none(), "{named:?}");
 }
 
 #[test]

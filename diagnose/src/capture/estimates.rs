@@ -1,10 +1,11 @@
 //! What can be read off a capture without any fit of a model, with intervals of 95 %, and what a missing channel keeps back.
 
+mod capacitor;
+mod inductor;
+
 use plant::Parameters;
 
-use super::fold::INDEPENDENT;
-use super::{Capture, GAIN, Level, Origin};
-use crate::search::gained;
+use super::{Capture, GAIN, Level};
 use crate::words::{si, unit};
 
 /// A number that a capture shows.
@@ -71,11 +72,6 @@ impl Estimates {
     }
 }
 
-/// Part of an interval between edges over which a slope is fitted.
-const STRAIGHT: (f64, f64) = (0.12, 0.9);
-/// What the straight line of a current may be off in its slope: the bend by winding and saturation.
-const BENT: f64 = 0.005;
-
 /// Two standard deviations to either side.
 fn around(name: &'static str, (value, sd): (f64, f64), unit: &'static str, model: Option<f64>, from: &str) -> Estimate {
     Estimate {
@@ -115,11 +111,10 @@ pub fn of(capture: &Capture, driven: &Driven, p: &Parameters) -> Estimates {
         missing: Vec::new(),
     };
     edges(capture, driven, p, &mut out);
-    ripples(capture, p, &mut out);
-    let slopes = slopes(capture, driven);
-    inductance(capture, slopes, p, &mut out);
+    ripples(capture, &mut out);
+    inductor::inductance(capture, p, &mut out);
     winding(capture, driven, p, &mut out);
-    capacitor(capture, driven, p, &mut out);
+    capacitor::capacitor(capture, driven, p, &mut out);
     efficiency(capture, driven, &mut out);
     out
 }
@@ -207,7 +202,7 @@ fn edges(capture: &Capture, driven: &Driven, p: &Parameters, out: &mut Estimates
     }
 }
 
-fn ripples(capture: &Capture, _: &Parameters, out: &mut Estimates) {
+fn ripples(capture: &Capture, out: &mut Estimates) {
     for (n, name, unit) in [(1, "i_l_ripple", "A"), (0, "v_out_ripple", "V")] {
         if let Some(fold) = &capture.folds[n] {
             let bin = fold.noise / capture.bins.periods.max(1.0).sqrt();
@@ -220,117 +215,6 @@ fn ripples(capture: &Capture, _: &Parameters, out: &mut Estimates) {
                 "highest less lowest of the mean period",
             ));
         }
-    }
-}
-
-/// On-time and slopes of the current in both intervals, A/s with their standard deviations.
-struct Slopes {
-    up: (f64, f64),
-    down: (f64, f64),
-}
-
-fn slopes(capture: &Capture, _: &Driven) -> Option<Slopes> {
-    let fold = capture.folds[1].as_ref()?;
-    let place = |best: fn(f64, f64) -> bool| {
-        let mut place = 0;
-        for n in 0..fold.value.len() {
-            if best(fold.value[n], fold.value[place]) {
-                place = n;
-            }
-        }
-        capture.bins.at[place]
-    };
-    let (start, on) = match (capture.origin, &capture.node) {
-        (Origin::Node, Some(node)) => (0.0, node.pulse.width.time / capture.period),
-        // without a switch node the corners of the current say it
-        _ => {
-            let (valley, peak) = (place(|a, b| a < b), place(|a, b| a > b));
-            (valley, (peak - valley).rem_euclid(1.0))
-        }
-    };
-    let slope = |start: f64, width: f64| {
-        let (from, to) = (STRAIGHT.0 * width, STRAIGHT.1 * width);
-        let inside = capture
-            .bins
-            .at
-            .iter()
-            .zip(&fold.value)
-            .zip(&fold.sd)
-            .filter_map(|((at, v), sd)| {
-                let since = (at - start).rem_euclid(1.0);
-                ((from..to).contains(&since) && v.is_finite()).then_some((since * capture.period, *v, *sd))
-            });
-        let rows: Vec<(f64, f64, f64)> = inside.collect();
-        let n = rows.len() as f64;
-        let (t, v) = (
-            rows.iter().map(|r| r.0).sum::<f64>() / n,
-            rows.iter().map(|r| r.1).sum::<f64>() / n,
-        );
-        let (up, down) = rows.iter().fold((0.0, 0.0), |(up, down), r| {
-            (up + (r.0 - t) * (r.1 - v), down + (r.0 - t).powi(2))
-        });
-        let slope = up / down;
-        let left = rows.iter().map(|r| (r.1 - v - slope * (r.0 - t)).powi(2)).sum::<f64>() / (n - 2.0).max(1.0);
-        // what is left of a line is smooth: fewer values than bins are independent
-        let many = (n * capture.bins.periods / INDEPENDENT).max(1.0);
-        (rows.len() >= 4).then(|| (slope, (left * many.min(n) / down).sqrt()))
-    };
-    Some(Slopes {
-        up: slope(start, on)?,
-        down: slope(start + on, 1.0 - on)?,
-    })
-}
-
-/// `L = v / (di/dt)` by the leap of both at the edges, in which output voltage and winding have no part.
-fn inductance(capture: &Capture, slopes: Option<Slopes>, p: &Parameters, out: &mut Estimates) {
-    let Some(slopes) = slopes else {
-        out.missing
-            .push("i_l: inductance, and the output capacitor without the model's inductance".to_owned());
-        return;
-    };
-    let resting = out.mode == Some("dcm");
-    let bend = slopes.up.0 - slopes.down.0;
-    let (swing, what) = match &capture.node {
-        Some(node) => match node.off {
-            Some(off) => (
-                Level {
-                    value: node.on.value - off.value,
-                    // one channel: its offset is in both levels
-                    sd: GAIN * (node.on.value - off.value),
-                },
-                "slopes of i_l over the swing of v_sw",
-            ),
-            None => (
-                level(node.on.value + p.switch.v_f),
-                "slopes of i_l over the high level of v_sw",
-            ),
-        },
-        None => (
-            capture.mean(3).unwrap_or(level(p.converter.v_in)),
-            "slopes of i_l over the source voltage",
-        ),
-    };
-    let (value, sd) = match resting {
-        // the rest has no slope: the on-interval alone, with the output voltage
-        true => {
-            let v_out = capture.mean(0).map_or(f64::NAN, |v| v.value);
-            let high = capture.node.as_ref().map_or(p.converter.v_in, |node| node.on.value);
-            ((high - v_out) / slopes.up.0, slopes.up.1 / slopes.up.0)
-        }
-        false => (swing.value / bend, slopes.up.1.hypot(slopes.down.1) / bend),
-    };
-    let share = sd.hypot(swing.sd / swing.value).hypot(GAIN).hypot(BENT);
-    if value.is_finite() && value > 0.0 {
-        let model = Some(p.converter.inductance);
-        out.values
-            .push(around("inductance", (value, (value * share).abs()), "H", model, what));
-    }
-}
-
-fn level(value: f64) -> Level {
-    Level {
-        value,
-        sd: GAIN * value,
     }
 }
 
@@ -350,141 +234,6 @@ fn winding(capture: &Capture, driven: &Driven, p: &Parameters, out: &mut Estimat
             Some(p.inductor.dcr),
             "mean of v_sw less mean of v_out, over the current",
         ));
-    }
-}
-
-/// `v = esr i + q / c` over the period: the ripple of the current is measured, or that of the model.
-fn capacitor(capture: &Capture, driven: &Driven, p: &Parameters, out: &mut Estimates) {
-    let Some(v) = &capture.folds[0] else {
-        out.missing.push("v_out: the output capacitor, losses".to_owned());
-        return;
-    };
-    let (at, t) = (&capture.bins.at, capture.period);
-    let measured = capture.folds[1].as_ref();
-    let (current, from) = match measured {
-        Some(fold) => (fold.value.clone(), "ripple of v_out over that of i_l"),
-        None => {
-            let on = capture
-                .node
-                .as_ref()
-                .map_or(driven.duty, |node| node.pulse.width.time / t);
-            let ripple = p.converter.v_in * on * (1.0 - on) * t / p.converter.inductance;
-            let triangle = |at: f64| match at < on {
-                true => at / on - 0.5,
-                false => 0.5 - (at - on) / (1.0 - on),
-            };
-            let shifted = |shift: f64| {
-                at.iter()
-                    .map(|at| ripple * triangle((at - shift).rem_euclid(1.0)))
-                    .collect::<Vec<f64>>()
-            };
-            // nothing tells the instants of the switch: where the ripple itself fits best
-            let shifts = if capture.origin == Origin::Node { 1 } else { SHIFTS };
-            let tried = (0..shifts).map(|n| shifted(n as f64 / shifts as f64));
-            let left = |current: &Vec<f64>| Parallel::new(capture, v, current, driven.conductance).solved().left;
-            let best = tried.min_by(|a, b| left(a).total_cmp(&left(b)));
-            (
-                best.unwrap_or_default(),
-                "ripple of v_out over that of the model's inductance",
-            )
-        }
-    };
-    let solved = Parallel::new(capture, v, &current, driven.conductance).solved();
-    let probe = 2f64.sqrt() * GAIN;
-    let (esr, elastance) = (solved.esr, solved.elastance);
-    // a resistance below nothing fits where the ripple is below what the capture resolves
-    if esr.0 + 1.96 * esr.1 > 0.0 {
-        let sd = esr.1.hypot(probe * esr.0);
-        out.values
-            .push(around("esr", (esr.0, sd), "ohm", Some(p.capacitor.esr), from));
-    }
-    let relative = (elastance.1 / elastance.0).abs();
-    if elastance.0 > 0.0 && relative < 0.5 {
-        let value = 1.0 / elastance.0;
-        let model = Some(p.converter.capacitance);
-        out.values.push(around(
-            "capacitance",
-            (value, value * relative.hypot(probe)),
-            "F",
-            model,
-            from,
-        ));
-    } else {
-        out.missing
-            .push("a finer range of v_out: its part of the ripple says the capacitance".to_owned());
-    }
-}
-
-/// Shifts of the current that are tried where nothing tells them.
-const SHIFTS: usize = 200;
-
-/// `v = esr i + q / c + constant` over the bins, each row over its noise.
-struct Parallel {
-    columns: [Vec<f64>; 3],
-    right: Vec<f64>,
-    count: f64,
-}
-
-/// What it comes to: values with their standard deviations, and what is left.
-struct Solved {
-    esr: (f64, f64),
-    elastance: (f64, f64),
-    left: f64,
-}
-
-impl Parallel {
-    fn new(capture: &Capture, v: &super::Fold, current: &[f64], conductance: f64) -> Self {
-        let (at, t) = (&capture.bins.at, capture.period);
-        let current: Vec<f64> = current.iter().zip(&v.value).map(|(i, v)| i - conductance * v).collect();
-        let mut charge = Vec::with_capacity(at.len());
-        let mut sum = 0.0;
-        for n in 0..at.len() {
-            charge.push(sum);
-            let (next, width) = match n + 1 < at.len() {
-                true => (n + 1, at[n + 1] - at[n]),
-                false => (0, at[0] + 1.0 - at[n]),
-            };
-            sum += 0.5 * (current[n] + current[next]) * width * t;
-        }
-        // currents of a period add up to nothing; what noise leaves is spread evenly
-        for (phase, q) in at.iter().zip(&mut charge) {
-            *q -= sum * (phase - at[0]);
-        }
-        let weight = |n: usize| if capture.is_quiet(at[n]) { 1.0 / v.sd[n] } else { 0.0 };
-        let weighted = |list: &[f64]| {
-            list.iter()
-                .enumerate()
-                .map(|(n, v)| v * weight(n))
-                .collect::<Vec<f64>>()
-        };
-        Parallel {
-            columns: [weighted(&current), weighted(&charge), weighted(&vec![1.0; at.len()])],
-            right: weighted(&v.value),
-            count: (0..at.len()).filter(|n| weight(*n) > 0.0).count() as f64,
-        }
-    }
-
-    fn solved(&self) -> Solved {
-        let normal = crate::fit::Normal::new(&self.columns, &self.right);
-        let values = normal.solved();
-        let explained = gained(&self.columns, &self.right);
-        let left = (self.right.iter().map(|v| v * v).sum::<f64>() - explained).max(0.0) / (self.count - 3.0).max(1.0);
-        // what is left beyond noise is smooth: fewer values are independent
-        let many = if left > 1.0 {
-            (self.count / INDEPENDENT).max(1.0)
-        } else {
-            1.0
-        };
-        let scale = (left.max(1.0) * many).sqrt();
-        let sd = |n: usize| {
-            let unit: Vec<f64> = (0..3).map(|k| if k == n { 1.0 } else { 0.0 }).collect();
-            crate::fit::solve(normal.matrix(), &unit)[n].max(0.0).sqrt() * scale
-        };
-        Solved {
-            esr: (values[0], sd(0)),
-            elastance: (values[1], sd(1)),
-            left,
-        }
     }
 }
 

@@ -73,25 +73,13 @@ pub(crate) fn read(samples: &Samples, parameters: &Parameters) -> Result<Read, M
             .hint("a longer time base, or `converter.f_sw` is not right"));
     }
     let mut notes = Vec::new();
-    let pin = samples
-        .pin
-        .as_ref()
-        .and_then(|v| told("v_pwm", two_levels(time, v), &mut notes));
-    let node = samples
-        .node
-        .as_ref()
-        .and_then(|v| told("v_sw", of_node(time, v), &mut notes));
+    let pin = samples.pin.as_ref();
+    let pin = pin.and_then(|v| told("v_pwm", two_levels(time, v), &mut notes));
+    let node = samples.node.as_ref();
+    let node = node.and_then(|v| told("v_sw", of_node(time, v), &mut notes));
     let (period, at) = timing(samples, [pin.as_ref(), node.as_ref()], t_sw, &mut notes)?;
-    let pulse = |on: Option<At>, off: Option<At>| {
-        let (on, off) = (on?, off?);
-        let width = At {
-            time: (off.time - on.time).rem_euclid(period),
-            sd: on.sd.hypot(off.sd),
-        };
-        Some(Pulse { on, width })
-    };
     let [pin_on, pin_off, node_on, node_off] = at;
-    let (pin, node) = (pulse(pin_on, pin_off), pulse(node_on, node_off));
+    let (pin, node) = (pulse(pin_on, pin_off, period), pulse(node_on, node_off, period));
     let (origin, from) = match node {
         Some(node) => (Origin::Node, node.on.time),
         None => (
@@ -105,23 +93,18 @@ pub(crate) fn read(samples: &Samples, parameters: &Parameters) -> Result<Read, M
     }
     let (duty, applied) = duty(samples, pin, node, period, &mut notes)?;
     let folds: [Option<Fold>; CHANNELS] = std::array::from_fn(|n| samples.channels[n].as_deref().map(|v| bins.fold(v)));
-    for n in 0..CHANNELS {
-        if let (Some(values), Some(fold)) = (&samples.channels[n], &folds[n]) {
+    for (n, (values, fold)) in samples.channels.iter().zip(&folds).enumerate() {
+        if let (Some(values), Some(fold)) = (values, fold) {
             steady(n, values, fold, time, period, bins.periods)?;
         }
     }
-    let v_out = duty * parameters.converter.v_in;
-    let expected = [v_out, samples.drawn, samples.drawn, parameters.converter.v_in];
-    let ac: [bool; CHANNELS] = std::array::from_fn(|n| {
-        let coupled = |fold: &Fold| fold.mean.abs() < COUPLED * expected[n] && expected[n] > 0.0;
-        folds[n].as_ref().is_some_and(coupled)
-    });
-    for n in (0..CHANNELS).filter(|n| ac[*n]) {
-        let name = CHANNEL_NAMES[n];
-        notes.push(format!(
-            "{name} has no mean: taken as coupled through a capacitor, and only its ripple is used"
-        ));
-    }
+    let ac = coupled(
+        &folds,
+        duty * parameters.converter.v_in,
+        samples.drawn,
+        parameters,
+        &mut notes,
+    );
     let node = node.and_then(|pulse| shown_node(pulse, samples.node.as_deref()?, &bins));
     let by_current = || {
         folds[1]
@@ -152,6 +135,38 @@ pub(crate) fn read(samples: &Samples, parameters: &Parameters) -> Result<Read, M
         duty,
         applied,
         notes,
+    })
+}
+
+/// A pulse between two edges of a period.
+fn pulse(on: Option<At>, off: Option<At>, period: f64) -> Option<Pulse> {
+    let (on, off) = (on?, off?);
+    let width = At {
+        time: (off.time - on.time).rem_euclid(period),
+        sd: on.sd.hypot(off.sd),
+    };
+    Some(Pulse { on, width })
+}
+
+/// Channels that show no mean although duty and load ask for one.
+fn coupled(
+    folds: &[Option<Fold>; CHANNELS],
+    v_out: f64,
+    drawn: f64,
+    parameters: &Parameters,
+    notes: &mut Vec<String>,
+) -> [bool; CHANNELS] {
+    let expected = [v_out, drawn, drawn, parameters.converter.v_in];
+    std::array::from_fn(|n| {
+        let has_none = |fold: &Fold| fold.mean.abs() < COUPLED * expected[n] && expected[n] > 0.0;
+        let is_coupled = folds[n].as_ref().is_some_and(has_none);
+        if is_coupled {
+            let name = CHANNEL_NAMES[n];
+            notes.push(format!(
+                "{name} has no mean: taken as coupled through a capacitor, and only its ripple is used"
+            ));
+        }
+        is_coupled
     })
 }
 

@@ -29,10 +29,7 @@ impl Raw<'_> {
         }
         let duty = self.still("duty")?;
         let load = self.still_load()?;
-        let v = self
-            .measured("v_out")
-            .map(|v| median(v.into_iter()))
-            .filter(|v| *v > 0.0);
+        let v = self.measured("v_out").map(|v| median(v)).filter(|v| *v > 0.0);
         let v = v.or(duty.map(|d| d * parameters.converter.v_in)).unwrap_or(0.0);
         let power = if v > 0.0 { load.power / v } else { 0.0 };
         // the first of rows that repeat a time

@@ -261,7 +261,8 @@ fn incomplete(sheet: &Sheet, located: &Located, may_be_capture: bool) -> Sink {
     let mut list = Vec::new();
     // a capture has its duty in its edges
     if !has("duty") && !may_be_capture {
-        let hint = "; a map file can do so as well: --columns MAP.toml with [columns] duty = \"...\"";
+        let hint = "; a map file can do so as well: --columns MAP.toml with [columns] duty = \"...\". A capture of \
+                    an oscilloscope may have the pin v_pwm or the switch node v_sw instead";
         let duty = Quantity::all(&["duty"]);
         list.extend(duty.iter().map(|duty| sheet.missing(duty, hint)));
     }

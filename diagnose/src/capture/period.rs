@@ -6,6 +6,9 @@ const AROUND: (f64, f64) = (0.15, 6.0);
 /// frequencies.
 const F_VALUE: f64 = 20.0;
 
+/// Samples a period that tell its frequency: each of some thousand frequencies looks at all of them.
+const ENOUGH: f64 = 50.0;
+
 /// Power of a signal at a frequency, as a share of all; the mean is taken out together with the sinusoid.
 fn share(time: &[f64], values: &[f64], frequency: f64) -> f64 {
     let omega = std::f64::consts::TAU * frequency;
@@ -34,7 +37,12 @@ fn straightened(time: &[f64], values: &[f64]) -> Vec<f64> {
 
 /// The frequency that stands out of a signal, near or far from `expected`, Hz; nothing if none does.
 pub fn of(time: &[f64], values: &[f64], expected: f64) -> Option<f64> {
-    let (time, values): (Vec<f64>, Vec<f64>) = time.iter().zip(values).filter(|(_, v)| v.is_finite()).unzip();
+    let all = time.iter().zip(values).filter(|(_, v)| v.is_finite());
+    let known: Vec<(f64, f64)> = all.map(|(t, v)| (*t, *v)).collect();
+    let count = known.len() as f64;
+    let span = known.last()?.0 - known.first()?.0;
+    let stride = (count / (span * expected) / ENOUGH).floor().max(1.0) as usize;
+    let (time, values): (Vec<f64>, Vec<f64>) = known.into_iter().step_by(stride).unzip();
     let values = straightened(&time, &values);
     let span = time.last()? - time.first()?;
     // at least one turn in the capture: slower is a drift

@@ -14,6 +14,9 @@ use crate::median::median;
 /// Duty and load stand still in a steady state: a column may move by this share of what it holds, as loads are set and duties are written.
 const STILL: f64 = 0.01;
 
+/// Periods of a capture that are used: a steady state repeats itself, and noise is a seventh of that of one period.
+const MOST_PERIODS: f64 = 50.0;
+
 impl Raw<'_> {
     /// The capture that this table is; nothing if it is another record.
     pub fn captured(&mut self, map: &ColumnMap, parameters: &Parameters) -> Result<Option<Record>, Faults> {
@@ -29,12 +32,14 @@ impl Raw<'_> {
         }
         let duty = self.still("duty")?;
         let load = self.still_load()?;
-        let v = self.measured("v_out").map(|v| median(v)).filter(|v| *v > 0.0);
+        let v = self.measured("v_out").map(median).filter(|v| *v > 0.0);
         let v = v.or(duty.map(|d| d * parameters.converter.v_in)).unwrap_or(0.0);
         let power = if v > 0.0 { load.power / v } else { 0.0 };
         // the first of rows that repeat a time
         let mut kept: Vec<usize> = (0..time.len()).collect();
         kept.dedup_by(|b, a| time[*b] == time[*a]);
+        let end = time.first().copied().unwrap_or(0.0) + MOST_PERIODS * t_sw;
+        kept.retain(|n| time[*n] < end);
         let pick = |values: Vec<f64>| kept.iter().map(|n| values[*n]).collect::<Vec<f64>>();
         let samples = Samples {
             step,
@@ -47,8 +52,14 @@ impl Raw<'_> {
             drawn: v * load.conductance + load.current + power,
         };
         let found = read(&samples, parameters).map_err(|message| self.sheet.fault(message))?;
-        let count = time.len();
+        let (count, all) = (samples.time.len(), time.len());
         let mut repairs = self.repairs.clone();
+        if count < all {
+            repairs.push(format!(
+                "{} rows behind the first {MOST_PERIODS} periods are not used",
+                all - count
+            ));
+        }
         repairs.push(format!(
             "read as a capture: {count} rows over {:.0} whole periods of {}",
             found.capture.bins.periods,

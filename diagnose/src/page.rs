@@ -1,5 +1,6 @@
 //! The report: one page.
 
+mod captures;
 mod colours;
 mod control;
 mod records;
@@ -36,7 +37,12 @@ pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
     if let Some(control) = &diagnosis.control {
         page = page.section(control::section(control));
     }
-    page = page.section(records::training(diagnosis));
+    if let Some(section) = captures::section(diagnosis, records::second(diagnosis)) {
+        page = page.section(section);
+    }
+    if let Some(section) = records::training(diagnosis) {
+        page = page.section(section);
+    }
     if !diagnosis.profiles.is_empty() && findings.verdict != Verdict::Unexplained {
         page = page.section(profiles(diagnosis));
     }

@@ -37,6 +37,7 @@ mod settle;
 mod signals;
 mod topology;
 mod walk;
+mod waveform;
 
 pub use batch::Batch;
 pub use catalogue::{effects, parameter, parameters};
@@ -51,3 +52,4 @@ pub use reader::REQUIRED;
 pub use settle::{Regulator, Settled};
 pub use signals::{Load, Sample, Signals};
 pub use toml_input::{Fault, Faults, Place};
+pub use waveform::Waveform;

@@ -102,11 +102,7 @@ fn a_network_that_was_read_wrongly_is_told_apart_from_builds_that_differ() {
 fn an_activation_that_does_not_fit_either_is_not_proposed() {
     let desk = example();
     desk.edit("policy/policy.toml", "\"relu\"", "\"tanh\"");
-    desk.edit(
-        "policy/policy.toml",
-        "[network]",
-        "[network]\ngolden_tolerance = 1e-12",
-    );
+    desk.edit("policy/policy.toml", "[network]", "[network]\ngolden_tolerance = 1e-12");
     let ran = desk.type_in("inspect policy");
     assert!(ran.stderr.contains("hint: look at hidden_activation"), "{}", ran.stderr);
 }

@@ -105,7 +105,7 @@ pub(super) fn pictures(
 }
 
 /// What the second simulation is, if there is one.
-fn second(diagnosis: &Diagnosis) -> Option<&'static str> {
+pub(super) fn second(diagnosis: &Diagnosis) -> Option<&'static str> {
     diagnosis.attribution.best.as_ref()?;
     Some(match diagnosis.findings.verdict {
         Verdict::Unexplained => "best of the known causes",
@@ -113,7 +113,8 @@ fn second(diagnosis: &Diagnosis) -> Option<&'static str> {
     })
 }
 
-pub(super) fn training(diagnosis: &Diagnosis) -> Section {
+/// The training records that are no captures; nothing if there is none.
+pub(super) fn training(diagnosis: &Diagnosis) -> Option<Section> {
     let (problem, before, after) = (&diagnosis.problem, &diagnosis.given, diagnosis.attribution.state());
     let second = second(diagnosis);
     // in units of the noise, so that volts and amperes count alike
@@ -121,11 +122,10 @@ pub(super) fn training(diagnosis: &Diagnosis) -> Section {
         let own = (0..crate::record::CHANNELS).flat_map(|n| channel(problem, &before.residual, record, n));
         own.map(|v| v * v).sum::<f64>() / problem.records[record].rows().max(1) as f64
     };
-    let all = 0..problem.records.len();
-    let worst = all
-        .clone()
-        .max_by(|a, b| square(*a).total_cmp(&square(*b)))
-        .unwrap_or(0);
+    let all = || (0..problem.records.len()).filter(|n| problem.records[*n].capture.is_none());
+    let Some(worst) = all().max_by(|a, b| square(*a).total_cmp(&square(*b))) else {
+        return None;
+    };
     let caption =
         "The training record that the model as given misses most. Initial states are estimated for each model.";
     let title = match second {
@@ -134,19 +134,19 @@ pub(super) fn training(diagnosis: &Diagnosis) -> Section {
     };
     let states = [before, after];
     let mut section = pictures(Section::new(title), problem, states, worst, second, caption);
-    if problem.records.len() > 1 {
+    if all().count() > 1 {
         let mut inner = Section::new("The other training records");
-        for record in all.filter(|record| *record != worst) {
+        for record in all().filter(|record| *record != worst) {
             inner = pictures(inner, problem, states, record, second, "");
         }
         section = section.details(inner);
     }
     match problem.sigma[0].is_finite() {
-        true => section.chart_or_reason(
+        true => Some(section.chart_or_reason(
             by_operating_point(diagnosis),
             "Means of groups of equal size over all training records.",
-        ),
-        false => section,
+        )),
+        false => Some(section),
     }
 }
 

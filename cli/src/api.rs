@@ -1,16 +1,23 @@
 //! What the commands make, as data: the wheel hands it to its user in the place of files.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
 
 use clap::{CommandFactory, Parser};
 use policy::{NumericFormat, Policy};
 use toml_input::Message;
 
 use crate::arguments::drm::Drm;
-use crate::arguments::{Arguments, Command, Outside};
+use crate::arguments::{Arguments, Command, Engine, Outside};
 use crate::commands;
 use crate::failure::Failure;
+pub use crate::ownership::Replacing;
+
+pub use crate::campaign::{
+    Finished as FinishedCampaign, Local, Performed, Progress, Session, check as check_campaign, perform, set_program,
+};
+pub use commands::campaign::summary as campaign_summary;
 
 pub use commands::certify::{Made as Certified, Request as CertifyRequest, make as certify};
 pub use commands::compile::{Made as Compiled, Request as CompileRequest, make as compile};
@@ -59,4 +66,40 @@ pub fn files<'a>(arguments: impl IntoIterator<Item = &'a str>) -> Result<BTreeMa
         }
         _ => Err(Message::new("this command has no files to hand over").into()),
     }
+}
+
+/// A campaign that was asked for on a cluster.
+#[derive(Debug, Clone)]
+pub struct OnRay {
+    /// The plan's path.
+    pub plan: PathBuf,
+    /// Folder of the results.
+    pub out: PathBuf,
+    /// The cluster; without one it is Ray's to find.
+    pub address: Option<String>,
+    /// Whether files of others may be replaced.
+    pub force: bool,
+    /// Whether the answer is for a program.
+    pub json: bool,
+    /// Whether progress is left out.
+    pub quiet: bool,
+}
+
+/// What is asked for, if the command line (the program's name first) is one of `policyc campaign --engine ray` that runs tasks.
+/// Whatever else it is, and whatever is wrong with it, is the command's to say.
+#[must_use]
+pub fn on_ray(arguments: impl IntoIterator<Item = OsString>) -> Option<OnRay> {
+    let arguments = Arguments::try_parse_from(arguments).ok()?;
+    let Command::Campaign(campaign) = arguments.command else {
+        return None;
+    };
+    let runs = campaign.engine == Engine::Ray && !campaign.list && campaign.write.is_none();
+    runs.then_some(OnRay {
+        plan: campaign.plan,
+        out: campaign.out,
+        address: campaign.address,
+        force: campaign.replacing.force,
+        json: campaign.json,
+        quiet: arguments.loudness.quiet,
+    })
 }

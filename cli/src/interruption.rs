@@ -17,6 +17,8 @@ use crate::outcome::Outcome;
 
 /// Set by the first signal for a command that ends by itself; see [`stop_on_signal`].
 static STOP: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+/// All temporary files of the run.
+static SCRATCH: OnceLock<Arc<Mutex<Option<PathBuf>>>> = OnceLock::new();
 /// The program is being ended.
 static ENDING: AtomicBool = AtomicBool::new(false);
 
@@ -29,9 +31,9 @@ const PATIENCE: Duration = Duration::from_secs(10);
 /// If signals cannot be handled.
 pub fn watch() -> Result<Option<TempDir>, Failure> {
     // held while the folder is made: a signal in between waits and then finds it
-    let folder = Arc::new(Mutex::new(None::<PathBuf>));
-    let mut made = lock(&folder);
-    let known = Arc::clone(&folder);
+    let folder = SCRATCH.get_or_init(Arc::default);
+    let mut made = lock(folder);
+    let known = Arc::clone(folder);
     ctrlc::set_handler(move || match STOP.get() {
         Some(stop) if !stop.swap(true, Ordering::Relaxed) => {}
         _ => end(lock(&known).as_deref()),
@@ -51,6 +53,17 @@ fn lock(folder: &Mutex<Option<PathBuf>>) -> MutexGuard<'_, Option<PathBuf>> {
 /// For a command that keeps what it has done: the first signal sets this flag, only the second ends the program.
 pub fn stop_on_signal() -> Arc<AtomicBool> {
     Arc::clone(STOP.get_or_init(Arc::default))
+}
+
+/// Ends the program as a second signal does: for a worker whose campaign is gone.
+pub fn end_now() -> ! {
+    let scratch = SCRATCH.get().and_then(|folder| lock(folder).clone());
+    end(scratch.as_deref())
+}
+
+/// Whether a signal has come that [`stop_on_signal`] heeds.
+pub fn is_stopped() -> bool {
+    STOP.get().is_some_and(|stop| stop.load(Ordering::Relaxed))
 }
 
 /// An error where the user has had enough.

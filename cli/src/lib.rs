@@ -3,6 +3,7 @@
 
 pub mod api;
 mod arguments;
+mod campaign;
 mod commands;
 mod failure;
 mod interruption;
@@ -26,6 +27,12 @@ use outcome::Outcome;
 /// input or of the command line, 130 interrupted. Prints as the program does. Once a process: it takes over the signals.
 #[must_use]
 pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    if let [_, only] = arguments.as_slice()
+        && only == campaign::WORKER
+    {
+        return campaign::work() as u8;
+    }
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(error) => {
@@ -55,6 +62,11 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         interruption::stop_on_signal();
     }
     let _scratch = interruption::watch()?;
+    dispatch(command)
+}
+
+/// The command itself, as often as is wanted in a process.
+fn dispatch(command: &Command) -> Result<Outcome, Failure> {
     match command {
         Command::New(options) => commands::new::run(options),
         Command::Inspect(options) => commands::inspect::run(options),
@@ -69,6 +81,8 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Train(options) => commands::train::run(options),
         Command::Diagnose(options) => commands::diagnose::run(options),
         Command::Simulate(options) => commands::simulate::run(options),
+        Command::Campaign(options) => commands::campaign::run(options),
+        Command::Merge(options) => commands::merge::run(options),
         Command::Demo(options) => commands::demo::run(options),
         Command::Drm(command) => commands::drm::run(command),
         Command::Completions(options) => commands::completions::run(options),

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::io::{self, Write};
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
 use serde::Serialize;
 use toml_input::Message;
@@ -13,6 +14,20 @@ use crate::interruption;
 use crate::ownership::{self, Replacing};
 use crate::staging::{self, Staged};
 use crate::talk;
+
+/// Where answers go while they are kept; see [`keep_answers`].
+static KEPT: Mutex<Option<String>> = Mutex::new(None);
+
+/// What `run` would print on standard output, beside what it returns: for whoever runs a command inside of another program.
+pub fn keep_answers<T>(run: impl FnOnce() -> T) -> (T, String) {
+    let set = |value: Option<String>| {
+        let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+        std::mem::replace(&mut *kept, value)
+    };
+    set(Some(String::new()));
+    let result = run();
+    (result, set(None).unwrap_or_default())
+}
 
 /// Writes files into a folder: either all of them are there afterwards or none has changed.
 ///
@@ -190,6 +205,10 @@ pub fn say_json(answer: &impl Serialize) -> Result<(), Failure> {
 /// If the text cannot be written.
 pub fn print(text: &str) -> Result<(), Failure> {
     interruption::go_no_further_if_ending();
+    if let Some(kept) = &mut *KEPT.lock().unwrap_or_else(PoisonError::into_inner) {
+        kept.push_str(text);
+        return Ok(());
+    }
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),

@@ -60,6 +60,14 @@ impl Environment for Converter {
         plant::parameter(key).map(|parameter| parameter.get(&self.nominal))
     }
 
+    fn ideal_ripple(&self, v_out: f64) -> f64 {
+        self.plant.parameters().ideal_ripple(v_out)
+    }
+
+    fn holding_current(&self, v_out: f64, i_out: f64) -> f64 {
+        self.nominal.holding_current(v_out, i_out)
+    }
+
     fn identity(&self) -> Vec<u8> {
         // `{:?}` writes every number so that it survives the round trip: different plants give different texts
         Sha256::digest(format!("{:?}", self.nominal)).to_vec()

@@ -54,6 +54,15 @@ pub trait Environment: Clone + Send {
     /// The plant file's value of a number, by key (`switch.v_f`); nothing if there is none.
     fn parameter(&self, key: &str) -> Option<f64>;
 
+    /// Ripple of the inductor's current without losses at `v_out` V in continuous conduction, A peak to peak.
+    fn ideal_ripple(&self, v_out: f64) -> f64;
+
+    /// The inductor current that holds `v_out` V at a load of `i_out` A, A; the load's unless the output receives a part of it
+    /// only.
+    fn holding_current(&self, _v_out: f64, i_out: f64) -> f64 {
+        i_out
+    }
+
     /// Bytes that stand for the plant's file: equal plants, equal bytes.
     fn identity(&self) -> Vec<u8>;
 
@@ -106,6 +115,15 @@ impl<E: Environment> Environment for Varied<E> {
     fn parameter(&self, key: &str) -> Option<f64> {
         let own = self.numbers.iter().rev().find(|(name, _)| name == key);
         own.map_or_else(|| self.nominal.parameter(key), |(_, value)| Some(*value))
+    }
+
+    fn ideal_ripple(&self, v_out: f64) -> f64 {
+        // of the run that is under way, which has these numbers
+        self.nominal.ideal_ripple(v_out)
+    }
+
+    fn holding_current(&self, v_out: f64, i_out: f64) -> f64 {
+        self.nominal.holding_current(v_out, i_out)
     }
 
     fn identity(&self) -> Vec<u8> {

@@ -8,6 +8,7 @@
 
 pub mod agent;
 pub mod baselines;
+pub mod chatter;
 pub mod controller;
 pub mod converter;
 mod course;
@@ -36,9 +37,9 @@ pub use faults::Error;
 pub use load_step::{LoadKind, LoadStep};
 pub use scenario_file::Scenario;
 pub use simulation::band_text;
-pub use suits::{held_by, holds_power, suits, v_ref};
+pub use suits::{held_by, holds_power, reaches, suits, v_ref};
 pub use tables::{
-    COLUMNS, MetricsCsv, cells, comparison, digits, evaluation_csv, limit_cells, limits, table, time_digits,
-    trajectory_csv,
+    AT_REST, COLUMNS, MetricsCsv, at_rest, cells, comparison, digits, evaluation_csv, limit_cells, limits, rest_cells,
+    table, time_digits, trajectory_csv,
 };
 pub use unusable::unusable;

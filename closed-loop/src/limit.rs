@@ -5,10 +5,13 @@
 //! from there the time-optimal way to rest ([`TimeOptimal`]), also by way of the far edge of the settling band. The best of
 //! them counts, figure by figure.
 //!
+//! More duty at a boost or a buck-boost first takes current from the output. Its smallest deviation needs another way than its
+//! shortest settling: full effort until the current holds the voltage, and not a moment longer.
+//!
 //! The circuit is the plain one: source, switches with resistances and forward voltages, L with its resistance, C, load,
 //! bleed, and the delay of the duty. Everything else a plant file may have is left out.
 
-use plant::{Load, Model, Parameters, Plant, Sample};
+use plant::{Load, Model, Parameters, Plant, Sample, Topology};
 use serde::Serialize;
 use toml_input::Message;
 
@@ -53,11 +56,30 @@ pub struct Question {
     duty: f64,
     target: Target,
     planner: TimeOptimal,
+    /// For converters whose output answers the wrong way at first.
+    hold: Option<Hold>,
+}
+
+/// Holds the voltage where it is: the least of a way back to rest.
+///
+/// The time-optimal way goes on with full effort, and the output with its wrong answer, for as long as that saves time. The
+/// smallest deviation is had by ending the effort as soon as the current holds the voltage. What is back at `v_ref` some day
+/// has to have a little more current; holding is what that tends to.
+#[derive(Debug, Clone, Copy)]
+struct Hold {
+    duty: f64,
+    /// Duty per ampere that takes a period to correct it.
+    by_current: f64,
+    topology: Topology,
+    v_in: f64,
+    load: Load,
 }
 
 /// A sequence of duties that is tried.
 #[derive(Debug, Clone, Copy)]
-struct Strategy {
+struct Strategy<'a> {
+    /// How it goes on behind the effort, unless as fast as can be.
+    hold: Option<&'a Hold>,
     /// Periods of full effort; the last one may be broken.
     effort: f64,
     /// How far beyond `v_ref` to aim until the voltage is within the settling band, V.
@@ -86,7 +108,6 @@ impl Question {
     /// # Errors
     /// If the parameters are not those of a converter, or it cannot rest at `v_ref` with a duty within `range`.
     pub fn new(parameters: &Parameters, v_ref: f64, step: LoadStep, range: [f64; 2]) -> Result<Self, Error> {
-        parameters.require_buck("the physical limit")?;
         let parameters = plain(parameters);
         let [from, to] = step.loads();
         let rest = |load: &Load| -> Result<(Plant, f64), Error> {
@@ -104,12 +125,23 @@ impl Question {
             Err(message.found(found).into())
         };
         let (resting, duty) = rest(&from)?;
-        let (after, _) = rest(&to)?;
+        let (after, held) = rest(&to)?;
         let target = Target {
             v_out: v_ref,
             i_l: after.sample().i_l,
         };
+        let converter = &parameters.converter;
+        let (topology, t) = (converter.topology, parameters.t_sw());
+        let hold = Hold {
+            duty: held,
+            by_current: converter.inductance / t / topology.span(converter.v_in, v_ref),
+            topology,
+            v_in: converter.v_in,
+            load: to,
+        };
         Ok(Self {
+            // more effort never deepens the dip of a buck
+            hold: (topology != Topology::Buck).then_some(hold),
             from,
             to,
             v_ref,
@@ -154,7 +186,7 @@ impl Question {
     #[must_use]
     pub fn bound(&self, phase: f64) -> Bound {
         let mut best: Option<Bound> = None;
-        let mut attempt = |strategy: Strategy| {
+        let mut attempt = |strategy: Strategy<'_>| {
             let tried = self.attempt(phase, strategy);
             best = Some(best.map_or(tried, |best| Bound {
                 deviation: best.deviation.min(tried.deviation),
@@ -166,17 +198,26 @@ impl Question {
         let band = settled_band(self.v_ref);
         for aim in AIMS {
             let beyond = aim * band;
-            attempt(Strategy { effort: 0.0, beyond });
+            attempt(Strategy {
+                hold: None,
+                effort: 0.0,
+                beyond,
+            });
         }
-        // more full effort first helps the deviation, then the swing to the other side grows beyond it
-        let mut least = f64::INFINITY;
-        for part in 1..PARTS * HORIZON {
-            let effort = part as f64 / PARTS as f64;
-            let tried = attempt(Strategy { effort, beyond: 0.0 });
-            least = least.min(tried.deviation);
-            // clearly past the least, in share and in bands; a convention, the tests hold with a share of 1.0 as well
-            if tried.deviation > 1.2 * least + 0.2 * band {
-                break;
+        for hold in std::iter::once(None).chain(self.hold.iter().map(Some)) {
+            // more full effort first helps the deviation, then the swing to the other side grows beyond it
+            let mut least = f64::INFINITY;
+            for part in 1..PARTS * HORIZON {
+                let tried = attempt(Strategy {
+                    hold,
+                    effort: part as f64 / PARTS as f64,
+                    beyond: 0.0,
+                });
+                least = least.min(tried.deviation);
+                // clearly past the least, in share and in bands; a convention, the tests hold with a share of 1.0 as well
+                if tried.deviation > 1.2 * least + 0.2 * band {
+                    break;
+                }
             }
         }
         best.unwrap_or(Bound {
@@ -188,8 +229,7 @@ impl Question {
 
     /// The direction of a step: 1 where the duty must rise.
     fn direction(&self) -> f64 {
-        let i_out = |load: &Load| load.conductance * self.v_ref + load.current + load.power / self.v_ref;
-        if i_out(&self.to) >= i_out(&self.from) {
+        if self.to.at(self.v_ref) >= self.from.at(self.v_ref) {
             1.0
         } else {
             -1.0
@@ -204,7 +244,7 @@ impl Question {
         }
     }
 
-    fn attempt(&self, phase: f64, strategy: Strategy) -> Bound {
+    fn attempt(&self, phase: f64, strategy: Strategy<'_>) -> Bound {
         let (mut plant, mut planner) = (self.resting.clone(), self.planner.clone());
         let mut run = Run::new(self, phase);
         if phase > 0.0 {
@@ -227,7 +267,10 @@ impl Question {
                 v_out: self.v_ref + aim,
                 ..self.target
             };
-            let planned = planner.duty(v, i, &self.to, target);
+            let planned = match strategy.hold {
+                None => planner.duty(v, i, &self.to, target),
+                Some(hold) => hold.duty(v, i, target).clamp(self.range[0], self.range[1]),
+            };
             let share = (strategy.effort - n as f64).clamp(0.0, 1.0);
             let duty = share * self.full() + (1.0 - share) * planned;
             if delay > 0 {
@@ -240,6 +283,19 @@ impl Question {
             }
         }
         run.bound
+    }
+}
+
+/// The inductor current that holds `v_out` V under a load in continuous conduction without losses, A.
+fn holding(topology: Topology, v_in: f64, v_out: f64, load: &Load) -> f64 {
+    load.at(v_out) / topology.give(topology.duty(v_in, v_out))
+}
+
+impl Hold {
+    fn duty(&self, v_out: f64, i_l: f64, target: Target) -> f64 {
+        let holding = |v_out| holding(self.topology, self.v_in, v_out, &self.load);
+        let more = holding(v_out) - holding(target.v_out);
+        self.duty + self.by_current * (target.i_l + more - i_l)
     }
 }
 
@@ -341,7 +397,7 @@ fn plain(parameters: &Parameters) -> Parameters {
 /// # Errors
 /// If the parameters are not those of a converter.
 pub fn averaged(parameters: &Parameters, v_ref: f64, step: LoadStep, range: [f64; 2]) -> Result<f64, Error> {
-    parameters.require_buck("the physical limit")?;
+    let topology = parameters.converter.topology;
     let mut averaged = plain(parameters);
     averaged.converter.model = Model::Averaged;
     averaged.pwm.duty_delay = 0;
@@ -352,13 +408,30 @@ pub fn averaged(parameters: &Parameters, v_ref: f64, step: LoadStep, range: [f64
     plant.settle(v_ref, &from);
     let rest = plant.sample();
     let mut largest = 0.0_f64;
-    let up = to.conductance * v_ref + to.current + to.power / v_ref > rest.i_out;
+    let up = to.at(v_ref) > rest.i_out;
+    let mut last = rest;
     for _ in 0..HORIZON {
-        let sample = plant.step(if up { range[1] } else { range[0] }, &to);
+        let effort = if up { range[1] } else { range[0] };
+        let sample = plant.step(effort, &to);
+        if topology != Topology::Buck {
+            // its voltage goes the wrong way until the current is the one that holds it, and no further
+            let surplus =
+                |sample: &Sample| sample.i_l - holding(topology, parameters.converter.v_in, sample.v_out, &to);
+            let (before, behind) = (surplus(&last), surplus(&sample));
+            if (behind > 0.0) == up {
+                let share = before / (before - behind);
+                // a parabola over the period, as the current that the output gets is a straight line
+                let charge = parameters.converter.capacitance / parameters.t_sw();
+                let bend = 0.5 * topology.give(effort) * (sample.i_l - last.i_l) / charge;
+                let v = last.v_out + share * (sample.v_out - last.v_out) - bend * share * (1.0 - share);
+                return Ok(largest.max(if up { v_ref - v } else { v - v_ref }));
+            }
+            last = sample;
+        }
         let swing = if up { v_ref - sample.v_min } else { sample.v_max - v_ref };
         largest = largest.max(swing);
         // the current has overtaken the load's
-        if (sample.i_l > sample.i_out) == up {
+        if topology == Topology::Buck && (sample.i_l > sample.i_out) == up {
             break;
         }
     }

@@ -8,6 +8,7 @@
 use plant::{Load, Sample};
 use serde::Serialize;
 
+use crate::chatter::Chatter;
 use crate::environment::{Environment, LoadPath, Start};
 use crate::faults::Error;
 use crate::load_step::{LoadKind, LoadStep};
@@ -69,6 +70,9 @@ pub struct Metrics {
     pub pre_error: f64,
     /// Mean peak-to-peak voltage of a control period in the tail, V: switching ripple and what dithering adds.
     pub ripple: f64,
+    /// What the controller does over the tail, where nothing happens.
+    #[serde(flatten)]
+    pub chatter: Chatter,
 }
 
 impl Metrics {
@@ -83,6 +87,7 @@ impl Metrics {
             tail_max: self.tail_max.max(other.tail_max),
             pre_error: self.pre_error.max(other.pre_error),
             ripple: self.ripple.max(other.ripple),
+            chatter: self.chatter.worst(other.chatter),
         }
     }
 
@@ -161,7 +166,7 @@ impl<E: Environment, C: FnMut(&Sample) -> f64> Loop<E, C> {
     pub fn start(mut environment: E, controller: C, v_ref: f64, load: Load) -> Result<Self, Error> {
         let sample = environment.restart(&Start {
             v_out: v_ref,
-            i_l: load.conductance * v_ref + load.current + load.power / v_ref,
+            i_l: environment.holding_current(v_ref, load.at(v_ref)),
             load,
             seed: 0,
             varied: &[],
@@ -234,6 +239,7 @@ impl<E: Environment, C: FnMut(&Sample) -> f64> Loop<E, C> {
         };
         let tail = tail.clamp(1, after.max(1));
         let (mut sum, mut ripple) = (0.0, 0.0);
+        let (mut duties, mut currents) = (Vec::with_capacity(tail), Vec::with_capacity(tail));
         for n in 0..after {
             let (sample, load, time) = (self.sample, self.load, self.elapsed as f64);
             let change = (n == 0 && phase > 0.0).then_some((phase, to));
@@ -254,10 +260,13 @@ impl<E: Environment, C: FnMut(&Sample) -> f64> Loop<E, C> {
                 sum += error;
                 metrics.tail_max = metrics.tail_max.max(size);
                 ripple += self.sample.v_max - self.sample.v_min;
+                duties.push(duty);
+                currents.push(self.sample.i_l);
             }
         }
         metrics.tail_mean = (sum / tail as f64).abs();
         metrics.ripple = ripple / tail as f64;
+        metrics.chatter = Chatter::new(&duties, &currents, self.environment.ideal_ripple(self.v_ref));
         // a mean that is NaN would vanish in `Metrics::worst`
         if metrics.deviation.is_infinite() {
             metrics.tail_mean = f64::INFINITY;

@@ -57,22 +57,32 @@ pub fn draws(converter: &Parameters, load_steps: &[LoadStep], file: &Path) -> Re
     Ok(())
 }
 
+/// Whether the topology of a converter can make `v_ref` V; `file` is where the converter was named.
+///
+/// # Errors
+/// If it cannot.
+pub fn reaches(converter: &Parameters, v_ref: f64, file: &Path) -> Result<(), Error> {
+    let (v_in, topology) = (converter.converter.v_in, converter.converter.topology);
+    let (held, expected) = match topology {
+        Topology::Buck => (v_ref < v_in, "less than the source"),
+        Topology::Boost => (v_ref > v_in, "more than the source"),
+        Topology::BuckBoost => return Ok(()),
+    };
+    if held {
+        return Ok(());
+    }
+    let message = Message::new(format!("a {} converter cannot hold this voltage", topology.word()))
+        .found(format!("v_ref = {v_ref} V, v_in = {v_in} V at the plant"))
+        .expected(expected);
+    Err(Fault::in_file(file, message).into())
+}
+
 /// Whether a policy can hold `v_ref` V at a converter; `file` is where the converter was named.
 ///
 /// # Errors
 /// If the voltage is out of reach or the control periods differ.
 pub fn suits(policy: &Policy, converter: &Parameters, v_ref: f64, file: &Path) -> Result<(), Error> {
-    let (v_in, topology) = (converter.converter.v_in, converter.converter.topology);
-    let held = match topology {
-        Topology::Buck => v_ref < v_in,
-        Topology::Boost => v_ref > v_in,
-        Topology::BuckBoost => true,
-    };
-    if !held {
-        let message = Message::new(format!("a {} converter cannot hold this voltage", topology.word()))
-            .found(format!("v_ref = {v_ref} V, v_in = {v_in} V at the plant"));
-        return Err(Fault::in_file(file, message).into());
-    }
+    reaches(converter, v_ref, file)?;
     let (ours, theirs) = (policy.sample_period, converter.t_sw());
     // a decimal period and 1 / f_sw may differ by rounding
     if (ours - theirs).abs() > 1e-9 * theirs {

@@ -8,7 +8,8 @@ use crate::load_step::{LoadKind, LoadStep};
 use crate::scenario::{Finding, Metrics};
 
 /// The columns of [`Metrics`] in a CSV file.
-const FIGURES: &str = "deviation_V,settling_s,tail_mean_V,tail_max_V,pre_error_V,ripple_V";
+pub(crate) const FIGURES: &str = "deviation_V,settling_s,tail_mean_V,tail_max_V,pre_error_V,ripple_V,duty_activity,current_swing,\
+                       subharmonic,subharmonic_periods";
 
 impl Finding {
     /// What was stepped.
@@ -36,6 +37,37 @@ pub const COLUMNS: [&str; 6] = [
     "before V",
     "ripple V",
 ];
+
+/// The columns of a table of [`crate::chatter::Chatter`] for people, behind the first.
+pub const AT_REST: [&str; 3] = ["duty changes", "i_L swing", "line of duty"];
+
+/// What controllers do after a load step, once it is over, as a table for people: worst sampling instant / worst of all
+/// instants.
+#[must_use]
+pub fn at_rest<'a>(controllers: impl IntoIterator<Item = (&'a str, &'a Finding)>) -> String {
+    let mut out = line("at rest after it", &AT_REST.map(str::to_owned));
+    for (name, finding) in controllers {
+        out.push_str(&line(name, &rest_cells(finding)));
+    }
+    out
+}
+
+/// A finding in [`AT_REST`].
+#[must_use]
+pub fn rest_cells(finding: &Finding) -> [String; 3] {
+    let (a, b) = (&finding.at_sample.chatter, &finding.worst.chatter);
+    let line = match b.subharmonic_periods {
+        // below the last digit that is shown
+        0 => "none".to_owned(),
+        _ if b.subharmonic < 5e-5 => "none".to_owned(),
+        periods => format!("{:.4} at f/{periods}", b.subharmonic),
+    };
+    [
+        pair(a.duty_activity, b.duty_activity, 4),
+        pair(a.current_swing, b.current_swing, 2),
+        line,
+    ]
+}
 
 /// Findings as a table for people: worst sampling instant / worst of all instants.
 #[must_use]
@@ -158,7 +190,7 @@ pub fn evaluation_csv(findings: &[Finding]) -> String {
 }
 
 /// Findings of several controllers and limits on load steps as CSV: controller, load step, instants, figures in SI units,
-/// the load in the unit of its column. A limit has no tail, error before and ripple.
+/// the load in the unit of its column. A limit has the first two.
 #[derive(Debug, Clone)]
 pub struct MetricsCsv(String);
 
@@ -179,7 +211,7 @@ impl MetricsCsv {
     /// Two rows of a limit.
     pub fn limit(&mut self, name: &str, step: LoadStep, limit: &Limit) {
         for (instants, bound) in [("sample", &limit.at_sample), ("worst", &limit.worst)] {
-            let figures = format!("{},{},,,,", bound.deviation, bound.settling);
+            let figures = format!("{},{},,,,,,,,", bound.deviation, bound.settling);
             self.row(name, step, instants, &figures);
         }
     }
@@ -196,10 +228,19 @@ impl MetricsCsv {
     }
 }
 
-fn figures(m: &Metrics) -> String {
+pub(crate) fn figures(m: &Metrics) -> String {
     format!(
-        "{},{},{},{},{},{}",
-        m.deviation, m.settling, m.tail_mean, m.tail_max, m.pre_error, m.ripple
+        "{},{},{},{},{},{},{},{},{},{}",
+        m.deviation,
+        m.settling,
+        m.tail_mean,
+        m.tail_max,
+        m.pre_error,
+        m.ripple,
+        m.chatter.duty_activity,
+        m.chatter.current_swing,
+        m.chatter.subharmonic,
+        m.chatter.subharmonic_periods
     )
 }
 

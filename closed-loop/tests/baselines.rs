@@ -16,7 +16,7 @@ fn task() -> Task {
 
 fn findings(kind: Kind, parameters: &Parameters) -> Vec<Finding> {
     let task = task();
-    let mut baseline = Baseline::new(kind, parameters, 100.0).unwrap();
+    let mut baseline = Baseline::new(kind, parameters, 100.0, 10.0).unwrap();
     let controller = move |sample: &Sample| baseline.step(sample);
     let environment = Converter::new(parameters).unwrap();
     survey_all(&environment, &controller, 100.0, &task, &task.all_instants()).unwrap()
@@ -25,7 +25,7 @@ fn findings(kind: Kind, parameters: &Parameters) -> Vec<Finding> {
 /// Every instant from a fresh start.
 fn examine(kind: Kind, parameters: &Parameters, step: LoadStep) -> (Finding, Vec<Trajectory>) {
     let environment = Converter::new(parameters).unwrap();
-    let mut controller = Classical::from(Baseline::new(kind, parameters, 100.0).unwrap());
+    let mut controller = Classical::from(Baseline::new(kind, parameters, 100.0, 10.0).unwrap());
     let (task, mut finding) = (task(), Finding::new(step));
     let run = |instant| {
         let trajectory = follow(&environment, &mut controller, 100.0, &task, step, instant).unwrap();

@@ -138,7 +138,7 @@ fn narrow_duties_have_the_paper_s_limits() {
 }
 
 fn found(kind: Kind, parameters: &Parameters, task: &Task, step: [f64; 2]) -> Finding {
-    let mut baseline = Baseline::new(kind, parameters, 100.0).unwrap();
+    let mut baseline = Baseline::new(kind, parameters, 100.0, 10.0).unwrap();
     let controller = move |sample: &plant::Sample| baseline.step(sample);
     let environment = Converter::new(parameters).unwrap();
     survey(&environment, &controller, 100.0, task, step, &task.all_instants()).unwrap()

@@ -5,6 +5,7 @@ use plant::Parameters;
 use crate::aside;
 use crate::attribute::Attribution;
 use crate::beside;
+use crate::capture::estimates::{self, Driven, Estimates};
 use crate::control::Request;
 use crate::doubts;
 use crate::drive::Model;
@@ -15,7 +16,7 @@ use crate::gain::{Pair, Shift};
 use crate::instants;
 use crate::noise::{self, Outlier};
 use crate::preflight;
-use crate::problem::Problem;
+use crate::problem::{Problem, capture_drive};
 use crate::profile::Profile;
 use crate::progress::{Listener, Progress};
 use crate::quantised;
@@ -50,6 +51,17 @@ pub struct Diagnosis {
 #[must_use]
 pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say: Listener<'_>) -> Diagnosis {
     let base = Model::new(model);
+    // what a capture shows comes beside the fit of the training records only
+    let (captured, judges): (Vec<&Record>, Vec<&Record>) = heldout.iter().partition(|record| record.capture.is_some());
+    let judges: Vec<Record> = judges.into_iter().cloned().collect();
+    let unused = captured.iter().map(|record| {
+        format!(
+            "{}: a capture is not judged among held-out records, and is not used; give it with the training records",
+            record.name
+        )
+    });
+    let unused: Vec<String> = unused.collect();
+    let heldout = &judges[..];
     // a second look begins with the records as they were read
     let kept = train.clone();
     let mut found = examined(train, &base, say);
@@ -100,8 +112,9 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         doubts: doubts::said(&found.doubts),
         not_detectable: answer.not_detectable,
         next_experiments: answer.next_experiments,
+        captures: read_off(&found.problem, model),
         noise: Noise {
-            repairs: answer.notes,
+            repairs: answer.notes.into_iter().chain(unused).collect(),
             ..noise_of(&found.problem, &found.attribution, &found.outliers, trim)
         },
         gain: gain_of(pair.as_ref(), answer.shifts),
@@ -117,6 +130,27 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         trim,
         control: None,
     }
+}
+
+/// What captures show by themselves, beside the model as given.
+fn read_off(problem: &Problem, model: &Parameters) -> Vec<Estimates> {
+    let of = |record: &Record| {
+        let capture = record.capture.as_ref()?;
+        let drive = capture_drive(record, 0.0);
+        let v_out = capture
+            .mean(0)
+            .map_or(drive.duty * model.converter.v_in, |level| level.value);
+        let power = if v_out > 0.0 { drive.load.power / v_out } else { 0.0 };
+        let driven = Driven {
+            name: record.name.clone(),
+            duty: drive.duty,
+            applied: drive.applied,
+            drawn: v_out * drive.load.conductance + drive.load.current + power,
+            conductance: drive.load.conductance,
+        };
+        Some(estimates::of(capture, &driven, model))
+    };
+    problem.records.iter().filter_map(of).collect()
 }
 
 /// What is said of records that were examined.

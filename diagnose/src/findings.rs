@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use crate::capture::estimates::Estimates;
 use crate::gain::{Held, Shift};
 use crate::shape::Structure;
 use crate::worth::Worth;
@@ -165,6 +166,9 @@ pub struct Findings {
     pub not_detectable: Vec<Hidden>,
     /// Experiments that would separate what is tied.
     pub next_experiments: Vec<crate::next::Experiment>,
+    /// What was read off captures.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub captures: Vec<Estimates>,
     /// Noise.
     pub noise: Noise,
     /// Held-out gain.

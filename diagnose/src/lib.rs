@@ -15,7 +15,7 @@
 //! The way: [`record`] (from a table that `measured` read) and [`drive`] make simulated rows of a model, [`problem`] a
 //! least-squares problem with initial states as unknowns, [`fit`] moves the parameters of [`causes`], [`attribute`]
 //! chooses among them, [`profile`], [`shape`], [`gain`] and [`next`] say how sure that is, [`control`] what it is worth under control, [`diagnosis`] holds the
-//! answer and [`extend`] and [`page`] write it down. See docs/reference/diagnosis.md.
+//! answer and [`extend`] and [`page`] write it down. A [`capture`] is a record whose residuals come from inside a period. See docs/reference/diagnosis.md.
 
 mod aside;
 pub mod attribute;
@@ -23,6 +23,7 @@ mod backward;
 mod balance;
 pub mod basis;
 pub mod beside;
+pub mod capture;
 pub mod causes;
 pub mod control;
 pub mod diagnosis;

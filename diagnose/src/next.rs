@@ -211,6 +211,7 @@ fn planned(problem: &Problem, plan: Plan) -> (String, Record) {
         dense: true,
         segments: std::iter::once(0..ROWS).collect(),
         free_steps: Vec::new(),
+        capture: None,
         repairs: Vec::new(),
     };
     (plan.words, record)

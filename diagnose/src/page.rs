@@ -1,5 +1,6 @@
 //! The report: one page.
 
+mod captures;
 mod colours;
 mod control;
 mod records;
@@ -16,7 +17,7 @@ use crate::words::{si, unit};
 /// The page as HTML.
 ///
 /// # Errors
-/// None in practice: a picture whose data do not fit together.
+/// None in practice: a table whose rows do not fit its columns. A picture that cannot be drawn says so in its place.
 pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
     let findings = &diagnosis.findings;
     let mark = match findings.verdict {
@@ -27,18 +28,23 @@ pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
     let word = findings.verdict.word();
     let mut page = Page::new(format!("Diagnosis: {word}")).verdict(mark, findings.sentence.clone());
     page = page.section(causes(diagnosis));
-    if let Some(section) = held_out(diagnosis)? {
+    if let Some(section) = held_out(diagnosis) {
         page = page.section(section);
     }
     if let Some(reason) = &diagnosis.findings.gain.closed_loop_missing {
         page = page.section(control::missing(reason));
     }
     if let Some(control) = &diagnosis.control {
-        page = page.section(control::section(control)?);
+        page = page.section(control::section(control));
     }
-    page = page.section(records::training(diagnosis)?);
+    if let Some(section) = captures::section(diagnosis, records::second(diagnosis)) {
+        page = page.section(section);
+    }
+    if let Some(section) = records::training(diagnosis) {
+        page = page.section(section);
+    }
     if !diagnosis.profiles.is_empty() && findings.verdict != Verdict::Unexplained {
-        page = page.section(profiles(diagnosis)?);
+        page = page.section(profiles(diagnosis));
     }
     if findings.verdict != Verdict::Unexplained {
         // where nothing is an explanation there is nothing to separate it from
@@ -113,7 +119,7 @@ fn causes(diagnosis: &Diagnosis) -> Section {
     section
 }
 
-fn profiles(diagnosis: &Diagnosis) -> Result<Section, ReportError> {
+fn profiles(diagnosis: &Diagnosis) -> Section {
     let mut section = Section::new("How well the data hold the parameters").text(
         "Cost of holding a parameter at a value while all others and the initial states follow; below the line are the values \
          that the data allow at 95 %. The interval in the table is wider: it adds what two simulators of one circuit differ by.",
@@ -135,10 +141,10 @@ fn profiles(diagnosis: &Diagnosis) -> Result<Section, ReportError> {
             Axis::new(profile.name).unit(unit(profile.unit)),
         );
         // the level at which `profile` ends its intervals
-        let svg = chart.panel(panel.y_line(3.84, "95 %")).svg()?;
-        section = section.chart(svg, "");
+        let svg = chart.panel(panel.y_line(3.84, "95 %")).svg();
+        section = section.chart_or_reason(svg, "");
     }
-    Ok(section)
+    section
 }
 
 fn ties(diagnosis: &Diagnosis) -> Section {
@@ -171,8 +177,8 @@ fn ties(diagnosis: &Diagnosis) -> Section {
     section.table(table)
 }
 
-fn held_out(diagnosis: &Diagnosis) -> Result<Option<Section>, ReportError> {
-    let Some(pair) = &diagnosis.held else { return Ok(None) };
+fn held_out(diagnosis: &Diagnosis) -> Option<Section> {
+    let pair = diagnosis.held.as_ref()?;
     let whole: Vec<_> = diagnosis
         .findings
         .gain
@@ -181,7 +187,7 @@ fn held_out(diagnosis: &Diagnosis) -> Result<Option<Section>, ReportError> {
         .filter(|held| held.regime == Regime::All)
         .collect();
     if whole.is_empty() {
-        return Ok(None);
+        return None;
     }
     let names: Vec<String> = whole
         .iter()
@@ -195,13 +201,14 @@ fn held_out(diagnosis: &Diagnosis) -> Result<Option<Section>, ReportError> {
     if is_extended {
         panel = panel.bars_in(EXTENDED, "extended", ratio(|held| held.rmse_after));
     }
-    let svg = BarChart::new("Held-out error", names).panel(panel).svg()?;
+    let svg = BarChart::new("Held-out error", names).panel(panel).svg();
     let title = if is_extended {
         "Gain on held-out records"
     } else {
         "Held-out records"
     };
-    let mut section = Section::new(title).chart(svg, "1 is the noise as estimated: where a right model ends.");
+    let mut section =
+        Section::new(title).chart_or_reason(svg, "1 is the noise as estimated: where a right model ends.");
     for shift in &diagnosis.findings.gain.shifts {
         section = section.text(crate::words::shifted(std::slice::from_ref(shift)).trim().to_owned());
     }
@@ -237,12 +244,9 @@ fn held_out(diagnosis: &Diagnosis) -> Result<Option<Section>, ReportError> {
     let second = is_extended.then_some("extended");
     let mut inner = Section::new("Pictures of the held-out records");
     for record in 0..pair.problem.records.len() {
-        inner = inner.chart(
-            records::panels(&pair.problem, &pair.before, &pair.after, record, second)?,
-            "",
-        );
+        inner = records::pictures(inner, &pair.problem, [&pair.before, &pair.after], record, second, "");
     }
-    Ok(Some(section.details(inner)))
+    Some(section.details(inner))
 }
 
 fn noise(diagnosis: &Diagnosis) -> Section {

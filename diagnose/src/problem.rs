@@ -1,6 +1,11 @@
 //! Records, noise and model as one least-squares problem. The initial states are unknowns of no interest: they are
 //! estimated beside every fit, and the part of a signal that they can explain is projected out.
 
+use std::ops::Range;
+
+use measured::DutyIs;
+
+use crate::capture::terms::Drive;
 use crate::causes::{Bases, Knob};
 use crate::drive::{Begin, Model, Start, simulate};
 use crate::median::median;
@@ -99,6 +104,10 @@ impl Starts {
 /// instant ([`crate::instants`]).
 const AT_ONCE: f64 = 0.02;
 
+/// A load that changes in more than this share of the rows is no load of steps: a meter's reading, row by row. Steps of a test stand
+/// tens of rows apart, and a reading without levels changes in nearly all; a convention between the two.
+const MOST_IN_STEPS: f64 = 0.5;
+
 /// Rows that are not scored from the start: what the load did before a sample inside a slope, or at the very instant of one, is not in
 /// the table, and the voltage leaps with it by the series resistance of the capacitor. The current of the inductor does not.
 fn in_steps(record: &Record) -> [Vec<bool>; CHANNELS] {
@@ -112,6 +121,13 @@ fn in_steps(record: &Record) -> [Vec<bool>; CHANNELS] {
         for channel in [OUTPUT_VOLTAGE, LOAD_CURRENT] {
             let rows = step.first - usize::from(before)..step.last + usize::from(behind);
             masked[channel][rows].fill(true);
+        }
+    }
+    // without its steps nothing would be left of the voltage, while what it leaps by from reading to reading is next to nothing
+    let most = MOST_IN_STEPS * record.rows() as f64;
+    for channel in &mut masked {
+        if channel.iter().filter(|row| **row).count() as f64 > most {
+            channel.fill(false);
         }
     }
     masked
@@ -152,11 +168,21 @@ impl Problem {
     /// Length of the vectors.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.records
-            .iter()
-            .map(|record| record.rows() * CHANNELS)
-            .sum::<usize>()
-            + 1
+        self.rows() + self.records.iter().map(terms).sum::<usize>() + 1
+    }
+
+    /// Length of the part that holds rows of records.
+    fn rows(&self) -> usize {
+        self.records.iter().map(|record| record.rows() * CHANNELS).sum()
+    }
+
+    /// Where a record's capture has its residuals, if it has one.
+    #[must_use]
+    pub fn tail(&self, index: usize) -> Option<Range<usize>> {
+        let before: usize = self.records.iter().take(index).map(terms).sum();
+        let start = self.rows() + before;
+        let length = self.records.get(index).map(terms).filter(|length| *length > 0)?;
+        Some(start..start + length)
     }
 
     /// Whether there is no record.
@@ -210,6 +236,11 @@ impl Problem {
     pub fn residual(&self, model: &Model, starts: &Starts) -> Vec<f64> {
         let mut out = vec![0.0; self.len()];
         for (index, record) in self.records.iter().enumerate() {
+            if let (Some(capture), Some(range)) = (&record.capture, self.tail(index)) {
+                let left = capture.residual(model, &capture_drive(record, starts.trim));
+                out[range].copy_from_slice(&left);
+                continue;
+            }
             let shown = simulate(model, record, &starts.of(index));
             for segment in &record.segments {
                 let first = if record.settled {
@@ -254,7 +285,25 @@ impl Problem {
             })
             .sum::<usize>()
         };
-        (0..self.records.len()).map(of).sum()
+        let captured = self.records.iter().filter_map(|record| record.capture.as_ref());
+        (0..self.records.len()).map(of).sum::<usize>() + captured.map(|capture| capture.counted()).sum::<usize>()
+    }
+}
+
+/// Number of residuals of a record's capture.
+fn terms(record: &Record) -> usize {
+    record.capture.as_ref().map_or(0, |capture| capture.terms())
+}
+
+/// What drives the model in a record that is a capture.
+#[must_use]
+pub fn capture_drive(record: &Record, trim: f64) -> Drive {
+    Drive {
+        duty: record.duty.first().copied().unwrap_or(0.0),
+        load: record.load.first().copied().unwrap_or_default(),
+        v_in_ratio: record.v_in_ratio,
+        applied: matches!(record.duty_is, DutyIs::Applied | DutyIs::Direct),
+        trim,
     }
 }
 

@@ -1,6 +1,7 @@
 //! A measured record as the plant can be driven by it: one row a control period, or settled points.
 
 mod align;
+mod captured;
 mod channels;
 mod clipped;
 mod digits;
@@ -22,6 +23,8 @@ use toml_input::{Faults, Message, Sink};
 pub use channels::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS, Segment};
 use channels::{FEWEST, QUANTITIES};
 use raw::Raw;
+
+use crate::capture::Capture;
 
 /// A record.
 #[derive(Debug, Clone)]
@@ -65,6 +68,8 @@ pub struct Record {
     pub segments: Vec<Segment>,
     /// Rows of load steps whose instant in the period is estimated beside every fit ([`crate::instants`]).
     pub free_steps: Vec<usize>,
+    /// A few periods at the rate of an oscilloscope, of which the one row holds duty and load ([`crate::capture`]).
+    pub capture: Option<Box<Capture>>,
     /// What was repaired or left out, in plain words.
     pub repairs: Vec<String>,
 }
@@ -97,11 +102,14 @@ impl Record {
         let map = &*map.of(sheet.file());
         let mut raw = Raw::new(sheet, map)?;
         raw.check_duty()?;
+        if let Some(record) = raw.captured(map, parameters)? {
+            return Ok(record);
+        }
+        raw.needs_duty_and_channel()?;
         raw.report_missing_duty();
         let lines = raw.lines(map, parameters)?;
-        let name = sheet.file().file_stem().map(|name| name.to_string_lossy().into_owned());
         let mut record = Record {
-            name: name.unwrap_or_else(|| "record".to_owned()),
+            name: name_of(sheet),
             time: lines.time,
             phase: lines.phase,
             duty: lines.duty,
@@ -122,6 +130,7 @@ impl Record {
             dense: lines.dense,
             segments: lines.segments,
             free_steps: Vec::new(),
+            capture: None,
             repairs: raw.repairs.clone(),
         };
         let labels = QUANTITIES.map(|name| raw.label(name));
@@ -222,6 +231,12 @@ impl Record {
             }
         }
     }
+}
+
+/// File name without folder and extension.
+fn name_of(sheet: &Sheet) -> String {
+    let name = sheet.file().file_stem().map(|name| name.to_string_lossy().into_owned());
+    name.unwrap_or_else(|| "record".to_owned())
 }
 
 #[cfg(test)]

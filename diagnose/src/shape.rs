@@ -1,5 +1,6 @@
 //! What a residual looks like that no cause explains.
 
+use crate::capture::left;
 use crate::fit::State;
 use crate::level::ACCURACY;
 use crate::noise::{self, BLOCK, channel};
@@ -39,8 +40,9 @@ pub struct Structure {
 /// simulator may leave.
 #[must_use]
 pub fn structures(problem: &Problem, null: &State, state: &State, inflation: f64) -> Vec<Structure> {
-    let mut found = Vec::new();
-    for (index, record) in problem.records.iter().enumerate() {
+    let mut found = left::structures(problem, null, state);
+    let rows = problem.records.iter().enumerate();
+    for (index, record) in rows.filter(|(_, record)| record.capture.is_none()) {
         let disorder = small::disorder(problem, state, index);
         if disorder.is_some() {
             found.extend(disorder);

@@ -26,9 +26,15 @@ const LEFT: f64 = 0.5;
 #[must_use]
 pub fn most_parameters(problem: &Problem) -> usize {
     match problem.records.iter().all(|record| record.settled) {
-        true => (distinct(problem) / ROWS_PER_PARAMETER).max(1),
+        true => (distinct(problem) / ROWS_PER_PARAMETER).max(1) + captured(problem),
         false => usize::MAX,
     }
+}
+
+/// Numbers that captures hold beside settled points.
+fn captured(problem: &Problem) -> usize {
+    let captures = problem.records.iter().filter_map(|record| record.capture.as_ref());
+    captures.map(|capture| capture.freedom()).sum()
 }
 
 /// Settled points that do not repeat the one before.

@@ -77,6 +77,31 @@ fn a_channel_that_no_training_record_has_is_shown_and_not_compared() {
     assert!(page.contains("i_l") && !page.contains("measured minus simulated i_l"));
 }
 
+/// A picture must not cost the answer: a model whose simulation leaves every number, or in which nothing is compared, has no line.
+#[test]
+fn a_page_of_a_model_that_has_no_finite_value_says_so_and_draws_the_rest() {
+    let mut found = against(record("held", &load_steps(), 4));
+    let said = diagnose::page::page(&found).unwrap();
+    assert!(!said.contains("diverges") && !said.contains("picture is missing"));
+    let pictures = said.matches("<svg").count();
+    for (spoiled, words) in [
+        (f64::INFINITY, "its simulation diverges"),
+        (0.0, "What changes in the model"),
+    ] {
+        found.given.residual.fill(spoiled);
+        let page = diagnose::page::page(&found).unwrap();
+        assert!(page.contains(words), "{spoiled}");
+        assert_eq!(page.matches("<svg").count(), pictures, "{spoiled}");
+    }
+    // neither model: a picture with no line at all gives way to its reason, and the page stays
+    if let Some(best) = &mut found.attribution.best {
+        best.state.residual.fill(0.0);
+    }
+    let page = diagnose::page::page(&found).unwrap();
+    assert!(page.contains("A picture is missing here: "), "{page}");
+    assert!(page.contains("dcr"));
+}
+
 /// Noise of twice the size, as of a coarser range of the scope, is no sign that the winding has another resistance.
 #[test]
 fn what_holds_in_a_noisier_held_out_record_stays_explained() {

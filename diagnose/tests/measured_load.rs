@@ -6,7 +6,9 @@ mod bench;
 
 use bench::{Bench, Noise, model};
 use diagnose::diagnosis::{Diagnosis, diagnose};
+use diagnose::drive::Model;
 use diagnose::findings::Verdict;
+use diagnose::problem::Problem;
 use diagnose::record::Record;
 
 /// Load current steps at any instant of a period, at a steady duty.
@@ -179,4 +181,39 @@ fn instants_that_end_at_their_limit_are_said() {
         "{}\n{notes}",
         found.findings.sentence
     );
+}
+
+/// A table of a simulation without noise, sampled where the period starts: its load current has no levels and changes in every row.
+/// None of these changes is a step at a sample, and the voltage counts.
+#[test]
+fn a_load_that_changes_in_every_row_leaves_the_voltage_compared() {
+    let conductances = [(0.0, 0.05, 0.0), (80.0, 0.09, 0.0), (160.0, 0.04, 0.0)];
+    let bench = Bench {
+        load: conductances.to_vec(),
+        duty: (0..24)
+            .map(|n| (10 * n, 0.5 + 0.02 * f64::from(n as u32 % 3)))
+            .collect(),
+        ..steps()
+    };
+    let mut table = bench.run().without(&["v_in"]);
+    // what no level and no conductance gives: the meter's own lag
+    let meter = table.column("i_out");
+    for n in 1..meter.len() {
+        meter[n] = 0.7 * meter[n] + 0.3 * meter[n - 1];
+    }
+    let record = table.read("bench", &model()).unwrap();
+    for phase in [0.0, 0.5] {
+        let record = Record {
+            phase,
+            ..record.clone()
+        };
+        let changed = record.load.windows(2).filter(|pair| pair[0] != pair[1]).count();
+        assert!(2 * changed > record.rows(), "{changed} changes: the case is none");
+        let problem = Problem::new(vec![record], Model::new(&model()));
+        let masked = problem.masked[0][0].iter().filter(|row| **row).count();
+        assert!(
+            2 * masked < problem.records[0].rows(),
+            "{masked} rows of v_out at phase {phase}"
+        );
+    }
 }

@@ -38,7 +38,8 @@ pub struct Losses {
     pub r_on: f64,
     /// Resistance of the inductor, ohm.
     pub dcr: f64,
-    /// Share of the period that the switch is on for less than commanded: dead time plus turn-on minus turn-off delay.
+    /// Share of the period that the switch is on for less than commanded: dead time plus turn-on minus turn-off delay, minus the
+    /// modulator's offset.
     pub lost_duty: f64,
     /// What the body diodes of a synchronous leg take in the dead times, as a mean over the period, V.
     pub v_dead: f64,
@@ -52,7 +53,9 @@ impl Losses {
     pub fn of(plant: &Parameters) -> Result<Self, Faults> {
         plant.require_buck("the formula of the mapping")?;
         let switch = &plant.switch;
-        let lost_duty = (switch.dead_time + switch.turn_on_delay - switch.turn_off_delay) * plant.converter.f_sw;
+        let at_edges = (switch.dead_time + switch.turn_on_delay - switch.turn_off_delay) * plant.converter.f_sw;
+        // a modulator that is off moves the edges of both switches: no body diode conducts for it
+        let lost_duty = at_edges - plant.pwm.duty_offset;
         let losses = Losses {
             v_f: switch.v_f,
             r_d: switch.r_d,
@@ -66,7 +69,7 @@ impl Losses {
         }
         // the averaged model knows no body diodes; edges that overlap leave them no time
         let in_diodes = match plant.converter.model {
-            Model::Switched => 2.0 * lost_duty.max(0.0),
+            Model::Switched => 2.0 * at_edges.max(0.0),
             Model::Averaged => 0.0,
         };
         Ok(Losses {
@@ -227,6 +230,7 @@ mod tests {
         (plant.switch.r_ds_on, plant.switch.r_ds_on_low) = (0.02, 0.008);
         (plant.switch.v_f, plant.switch.r_d) = (0.8, 0.05);
         (plant.switch.dead_time, plant.inductor.dcr) = (100e-9, 0.012);
+        plant.pwm.duty_offset = -0.015;
         let losses = Losses::of(&plant).unwrap();
         let boundary = crate::Conduction::of(&plant).unwrap().boundary(12.0, 48.0);
         for i_out in [1.05 * boundary, 5.0, 12.0] {

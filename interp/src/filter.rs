@@ -14,12 +14,30 @@ pub(crate) struct Filter<T> {
 
 #[derive(Debug, Clone, Copy)]
 enum Kind<T> {
-    Delay { samples: usize },
-    BackwardDifference { k: T },
-    LowPass { k: T },
-    FilteredDerivative { p: T, k: T },
-    MovingAverage { samples: usize, k: T },
-    Integrator { k: T, range: Range<T>, initial: T },
+    Delay {
+        samples: usize,
+    },
+    BackwardDifference {
+        k: T,
+    },
+    LowPass {
+        k: T,
+    },
+    FilteredDerivative {
+        p: T,
+        k: T,
+    },
+    MovingAverage {
+        samples: usize,
+        k: T,
+    },
+    Integrator {
+        k: T,
+        range: Range<T>,
+        initial: T,
+        /// `None` where all is kept: the contract multiplies by no 1.
+        leak: Option<T>,
+    },
 }
 
 impl<T: Real> Filter<T> {
@@ -43,13 +61,19 @@ impl<T: Real> Filter<T> {
                 samples,
                 k: T::nearest(1.0 / samples as f64),
             },
-            Spec::Integrator { min, max, initial } => Kind::Integrator {
+            Spec::Integrator {
+                min,
+                max,
+                initial,
+                leak,
+            } => Kind::Integrator {
                 k: T::nearest(period),
                 range: Range {
                     lo: T::nearest(min),
                     hi: T::nearest(max),
                 },
                 initial: T::nearest(initial),
+                leak: (leak != 1.0).then(|| T::nearest(leak)),
             },
         };
         Self { kind, start }
@@ -100,7 +124,16 @@ impl<T: Real> Filter<T> {
                 }
                 (sum + x) * k
             }
-            Kind::Integrator { k, range, initial } => range.clamp(read(0, initial) + k * x),
+            Kind::Integrator {
+                k,
+                range,
+                initial,
+                leak,
+            } => {
+                let y1 = read(0, initial);
+                let kept = leak.map_or(y1, |leak| leak * y1);
+                range.clamp(kept + k * x)
+            }
         }
     }
 
@@ -257,12 +290,36 @@ mod tests {
             min: -1.0,
             max: 1.0,
             initial: 0.5,
+            leak: 1.0,
         };
         // T = 0.25: the first output already contains the first input; no wind-up beyond the clamp
         assert_eq!(
             run::<f32>(spec, 0.25, &[1.0, 1.0, 1.0, -1.0, -8.0, -8.0, 4.0]),
             [0.75, 1.0, 1.0, 0.75, -1.0, -1.0, 0.0]
         );
+    }
+
+    #[test]
+    fn a_leaky_integrator_keeps_its_share_of_the_value_before_also_of_initial() {
+        let spec = Spec::Integrator {
+            min: -1.0,
+            max: 1.0,
+            initial: 0.5,
+            leak: 0.75,
+        };
+        // T = 0.25: 3/8 + 1/8, 3/8 + 1/4, clamped at 1, 3/4 of it: all exact
+        assert_eq!(run::<f32>(spec, 0.25, &[0.5, 1.0, 8.0, 0.0]), [0.5, 0.625, 1.0, 0.75]);
+        // each product is rounded before the sum
+        let spec = Spec::Integrator {
+            min: -10.0,
+            max: 10.0,
+            initial: 0.0,
+            leak: 0.9,
+        };
+        let first = 1e-3_f32 * 3.3_f32;
+        let second = 0.9_f32 * first + 1e-3_f32 * 7.7_f32;
+        let inputs = [3.3_f32.into(), 7.7_f32.into()];
+        assert_eq!(run::<f32>(spec, 1e-3, &inputs), [first, second]);
     }
 
     #[test]

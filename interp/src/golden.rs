@@ -3,7 +3,7 @@
 use std::fmt;
 
 use ndarray::aview1;
-use policy::{Golden, Head, NumericFormat, Policy, Scalar};
+use policy::{Activation, Golden, Head, NumericFormat, Policy, Scalar};
 use serde::Serialize;
 use toml_input::Message;
 
@@ -29,6 +29,9 @@ pub struct GoldenResult {
     /// output to the duty is another.
     #[serde(skip)]
     pub output_error: Option<f64>,
+    /// Other activations of the hidden layers with which the same weights give every golden answer, as a contract says them.
+    #[serde(skip)]
+    pub activations: Vec<String>,
     /// Allowed error.
     pub tolerance: f64,
     /// The answers are those of a network that was rounded to integers: told, not judged. The trainer's network is judged
@@ -112,6 +115,7 @@ fn judge_duties(golden: &Golden, head: &policy::Continuous, answers: &[&[f64]]) 
         worst_relative_error: None,
         worst_duty_error: duties::given(head, golden).map(|expected| worst(&expected)),
         output_error: (!from_outputs.is_empty()).then(|| worst(&from_outputs)),
+        activations: Vec::new(),
         tolerance: golden.tolerance,
         rounded: false,
     }
@@ -140,6 +144,7 @@ fn judge_choices(golden: &Golden, answers: &[&[f64]]) -> GoldenResult {
         worst_relative_error: (!golden.q_values.is_empty()).then_some(worst),
         worst_duty_error: None,
         output_error: None,
+        activations: Vec::new(),
         tolerance: golden.tolerance,
         rounded: false,
     }
@@ -173,12 +178,34 @@ pub fn golden_result(policy: &Policy) -> Option<GoldenResult> {
         false => policy.numeric_format,
     };
     let policy = policy.clone().with_format(format);
-    let rows = match format.scalar() {
-        Scalar::F32 => wide::<f32>(&policy, golden),
-        Scalar::F64 => wide::<f64>(&policy, golden),
+    let mut result = judged(&policy, golden);
+    // actions alone may be equal by chance
+    if !result.passed() && (result.worst_relative_error.is_some() || result.worst_duty_error.is_some()) {
+        result.activations = activations(&policy, golden);
+    }
+    Some(result)
+}
+
+fn judged(policy: &Policy, golden: &Golden) -> GoldenResult {
+    let rows = match policy.numeric_format.scalar() {
+        Scalar::F32 => wide::<f32>(policy, golden),
+        Scalar::F64 => wide::<f64>(policy, golden),
     };
     let rows: Vec<&[f64]> = rows.iter().map(Vec::as_slice).collect();
-    Some(judge(golden, &policy.head, &rows))
+    judge(golden, &policy.head, &rows)
+}
+
+/// The activations with which the same weights give every golden answer.
+fn activations(policy: &Policy, golden: &Golden) -> Vec<String> {
+    let mut other = policy.clone();
+    let fitting = Activation::EACH.iter().filter(|activation| {
+        let hidden = other.layers.len().saturating_sub(1);
+        for layer in other.layers.iter_mut().take(hidden) {
+            layer.activation = **activation;
+        }
+        hidden > 0 && judged(&other, golden).passed()
+    });
+    fitting.map(|activation| activation.written()).collect()
 }
 
 fn wide<T: Real + Into<f64>>(policy: &Policy, golden: &Golden) -> Vec<Vec<f64>> {
@@ -263,7 +290,18 @@ const ROUNDED: &str = "every action is equal: the trainer adds in another order,
 impl GoldenResult {
     /// What to look at, if it has not passed.
     #[must_use]
-    pub fn hint(&self) -> &'static str {
+    pub fn hint(&self) -> String {
+        match self.activations.as_slice() {
+            [] => self.general_hint().to_owned(),
+            fitting => format!(
+                "with hidden_activation = {} the same weights give all {} golden answers",
+                fitting.join(" or "),
+                self.vectors
+            ),
+        }
+    }
+
+    fn general_hint(&self) -> &'static str {
         if self.worst_duty_error.is_some() {
             let is_read = self.output_error.is_some_and(|error| error <= self.tolerance);
             return if is_read { SCALED } else { MISREAD_DUTY };
@@ -308,6 +346,7 @@ mod tests {
             worst_relative_error: Some(error),
             worst_duty_error: None,
             output_error: None,
+            activations: Vec::new(),
             tolerance,
             rounded: false,
         };

@@ -14,7 +14,7 @@ pub struct Quantity<'a> {
 /// What the commands read, in SI units.
 ///
 /// A settled point may say how much the voltage scattered (`v_std`) and whether it had settled (`settled`).
-pub const VOCABULARY: [Quantity<'static>; 11] = [
+pub const VOCABULARY: [Quantity<'static>; 14] = [
     quantity(
         "t",
         &["time", "times", "timestamp", "timestamps", "time_stamp", "time_stamps"],
@@ -25,6 +25,9 @@ pub const VOCABULARY: [Quantity<'static>; 11] = [
     quantity("i_l", &[], "A"),
     quantity("i_out", &["i_o"], "A"),
     quantity("v_in", &[], "V"),
+    quantity("i_in", &[], "A"),
+    quantity("v_sw", &["v_switch", "switch_node"], "V"),
+    quantity("v_pwm", &["pwm_pin"], "V"),
     quantity("r_load", &[], "ohm"),
     quantity("i_load", &[], "A"),
     quantity("p_load", &[], "W"),

@@ -4,7 +4,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 use toml_input::{Fault, Faults, Message};
 
-use crate::effects::{duty_quantisation, load_setting, minimum_on_time};
+use crate::effects::{duty_offset, duty_quantisation, load_setting, minimum_on_time};
 use crate::entry::Way;
 use crate::parameters::{LoadBox, Parameters, Pwm};
 use crate::plain::{All, Give, LARGEST_CHANGE, LONGEST_STEP, Number, ORDER, Part, TERM_BEFORE, series, sum};
@@ -307,7 +307,8 @@ impl Lanes {
             lanes.power.0[n] = drawn.power;
             let (pwm, t_sw) = (&group.pwm[n], group.t_sw.0[n]);
             let duty = if duties[n] > 0.0 { duties[n].min(1.0) } else { 0.0 };
-            lanes.on.0[n] = minimum_on_time::limit(duty_quantisation::round(duty, pwm.duty_lsb), pwm, t_sw) * t_sw;
+            let shifted = duty_offset::shift(duty, pwm);
+            lanes.on.0[n] = minimum_on_time::limit(duty_quantisation::round(shifted, pwm.duty_lsb), pwm, t_sw) * t_sw;
         }
         lanes
     }

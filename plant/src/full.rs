@@ -13,11 +13,13 @@
 //!                       │            │                        │                │       │
 //! ```
 //!
-//! A part of this picture that a converter does not have keeps its state where it was, with slope 0.
+//! A part of this picture that a converter does not have keeps its state where it was, with slope 0. So do the low-passes of the
+//! sensors, which nothing here depends on: [`lag`] moves them on behind each step.
 
 use serde::{Deserialize, Serialize};
 
 use crate::effects::{dcr, derating, input_ripple, saturation};
+use crate::lag;
 use crate::parameters::Parameters;
 use crate::plain::Track;
 use crate::rate::{self, has_c_in};
@@ -25,7 +27,7 @@ use crate::signals::{Load, Signals};
 
 /// Number of states.
 // those of the drawing above, and a low-pass for each of four sensors
-pub(crate) const STATES: usize = 11;
+pub(crate) const STATES: usize = SHOWN + 4;
 const I_L: usize = 0;
 const V_C: usize = 1;
 const I_CABLE: usize = 2;
@@ -34,6 +36,9 @@ const I_CPL: usize = 4;
 const V_CIN: usize = 5;
 const I_SOURCE: usize = 6;
 const SHOWN: usize = 7;
+
+/// What changes by the circuit's equations: all but the low-passes.
+type Slopes = [f64; SHOWN];
 
 /// The states: inductance current, capacitor voltage, cable, load, source, four low-passes.
 pub(crate) type States = [f64; STATES];
@@ -67,6 +72,8 @@ pub(crate) struct Full {
     has_cable: bool,
     has_c_in: bool,
     has_lag: bool,
+    /// 1 / L, 1 / C of parts that change with neither current nor voltage.
+    linear: [Option<f64>; 2],
     low_pass: [f64; 4],
     /// Fastest rate that does not depend on the load, in steps per second.
     rate: f64,
@@ -78,15 +85,20 @@ struct Algebra {
     signals: Signals,
     v_l: f64,
     v_source: f64,
-    slopes: States,
+    slopes: Slopes,
 }
 
 impl Full {
     pub fn new(p: &Parameters) -> Self {
         let sensors = &p.sensors;
         let low_pass = [&sensors.v_out, &sensors.i_l, &sensors.i_out, &sensors.v_in].map(|s| s.low_pass);
+        let linear = [
+            (p.inductor.saturation == 0.0).then(|| 1.0 / p.converter.inductance),
+            (p.capacitor.derating == 0.0).then(|| 1.0 / p.converter.capacitance),
+        ];
         Full {
             p: p.clone(),
+            linear,
             has_cable: p.cable.inductance > 0.0,
             has_c_in: has_c_in(p),
             has_lag: p.load.cpl_time_constant > 0.0,
@@ -141,6 +153,7 @@ impl Full {
         // at least one step: an interval of length 0 would be 0 / 0
         let count = (h * self.rate.max(far)).ceil().max(1.0);
         let step = h / count;
+        let whole = lag::of_sensors(step, &self.low_pass);
         let mut before = self.algebra(x, path, load, t);
         extend(track, &before.signals, path);
         let mut used = 0.0;
@@ -161,9 +174,15 @@ impl Full {
                 after = self.algebra(x, path, load, t + used + length);
             }
             let middle = between(&start, x, &before.slopes, &after.slopes, length);
-            let v_mid = self.algebra(&middle, path, load, t + used + 0.5 * length).signals.v_out;
-            if let Some(v) = vertex(before.signals.v_out, v_mid, after.signals.v_out) {
+            let mid = self.algebra(&middle, path, load, t + used + 0.5 * length).signals;
+            if let Some(v) = vertex(before.signals.v_out, mid.v_out, after.signals.v_out) {
                 track.voltage(v);
+            }
+            if self.low_pass != [0.0; 4] {
+                // a crossing has shortened the step
+                let cut = (length != step).then(|| lag::of_sensors(length, &self.low_pass));
+                let shown = [&before.signals, &mid, &after.signals];
+                lag::follow(&mut x[SHOWN..], cut.as_ref().unwrap_or(&whole), shown);
             }
             used += length;
             if crossed {
@@ -214,7 +233,12 @@ impl Full {
         let k2 = self.algebra(&moved(x, k1, 0.5 * h), path, load, t + 0.5 * h).slopes;
         let k3 = self.algebra(&moved(x, &k2, 0.5 * h), path, load, t + 0.5 * h).slopes;
         let k4 = self.algebra(&moved(x, &k3, h), path, load, t + h).slopes;
-        std::array::from_fn(|n| x[n] + h / 6.0 * (k1[n] + 2.0 * (k2[n] + k3[n]) + k4[n]))
+        let mut end = *x;
+        let sixth = h / 6.0;
+        for n in 0..SHOWN {
+            end[n] += sixth * (k1[n] + 2.0 * (k2[n] + k3[n]) + k4[n]);
+        }
+        end
     }
 
     fn constant_power(&self, load: &Load, v: f64) -> f64 {
@@ -246,24 +270,26 @@ impl Full {
 
     fn algebra(&self, x: &States, path: &Path, load: &Load, t: f64) -> Algebra {
         let p = &self.p;
-        let l = p.converter.inductance * saturation::relative_inductance(&p.inductor, x[I_L]);
+        // divisions are what a step costs most: none for a part that does not change, nor for one that is not there
+        let per_l = self.linear[0]
+            .unwrap_or_else(|| 1.0 / (p.converter.inductance * saturation::relative_inductance(&p.inductor, x[I_L])));
         let v_source = p.converter.v_in + input_ripple::voltage(&p.source, t);
         let (v_th, r_th) = self.thevenin(x, v_source);
         let r = path.r + path.share * r_th + dcr::in_series(&p.inductor) + self.apart(path, load);
         let core = p.inductor.core_conductance;
-        // v_l = (drive - give v_out) / stretch, i_b = i_l + core v_l; nothing of it while no current flows
+        // v_l = (drive - give v_out) / (1 + r core), i_b = i_l + core v_l; nothing of it while no current flows
         let i_l = if path.open { 0.0 } else { x[I_L] };
         let drive = path.share * v_th + path.emf - r * i_l;
-        let stretch = 1.0 + r * core;
+        let shrunk = if core == 0.0 { 1.0 } else { 1.0 / (1.0 + r * core) };
         let reflected = match path.open {
             true => 0.0,
-            false => path.give * (p.capacitor.esr * core + p.capacitor.esl / l) / stretch,
+            false => path.give * (p.capacitor.esr * core + p.capacitor.esl * per_l) * shrunk,
         };
         let (v_out, i_out) = self.output(x, load, path.give, i_l, (reflected, drive));
         let v_l = if path.open {
             0.0
         } else {
-            (drive - path.give * v_out) / stretch
+            (drive - path.give * v_out) * shrunk
         };
         let i_b = i_l + core * v_l;
         let v_in = v_th - path.share * r_th * i_b;
@@ -277,18 +303,21 @@ impl Full {
             signals,
             v_l,
             v_source,
-            slopes: [0.0; STATES],
+            slopes: [0.0; SHOWN],
         };
-        self.slopes(x, path, load, l, &mut algebra);
+        self.slopes(x, path, load, per_l, &mut algebra);
         algebra
     }
 
     /// What the averaged model adds to the resistance: the output stands against the inductor while it receives the
     /// current, and then lies above its mean by the ESR's share of that current.
     fn apart(&self, path: &Path, load: &Load) -> f64 {
+        // 0 in every state of the leg, where `give` is 0 or 1
+        if path.give == 0.0 || path.give == 1.0 {
+            return 0.0;
+        }
         let esr = self.p.capacitor.esr;
         let g = if self.has_cable { 0.0 } else { load.conductance };
-        // 0 in every state of the leg, where `give` is 0 or 1
         path.give * (1.0 - path.give) * esr / (1.0 + esr * g)
     }
 
@@ -309,12 +338,21 @@ impl Full {
         let fixed = load.current + if self.has_lag { x[I_CPL] } else { 0.0 };
         slope += c.esr * load.conductance;
         right -= c.esr * fixed;
-        let mut v = right / slope;
+        let mut v = if slope == 1.0 { right } else { right / slope };
         if self.has_lag || load.power == 0.0 {
             return (v, load.conductance * v + fixed);
         }
+        // above the fold it is the larger solution of slope v^2 - right v + esr P = 0
+        let square = right * right - 4.0 * slope * c.esr * load.power;
+        let above = if square > 0.0 {
+            (right + square.sqrt()) / (2.0 * slope)
+        } else {
+            0.0
+        };
         // without ESR the voltage is that of the capacitor, whatever the load draws
-        if c.esr > 0.0 {
+        if c.esr > 0.0 && above >= self.p.load.v_fold {
+            v = above;
+        } else if c.esr > 0.0 {
             // Newton's error squares: behind the fourth turn less than 2e-16 of v is left in the tests
             for _ in 0..4 {
                 let cpl = self.constant_power(load, v);
@@ -331,11 +369,12 @@ impl Full {
         (v, load.conductance * v + fixed + self.constant_power(load, v))
     }
 
-    fn slopes(&self, x: &States, path: &Path, load: &Load, l: f64, a: &mut Algebra) {
+    fn slopes(&self, x: &States, path: &Path, load: &Load, per_l: f64, a: &mut Algebra) {
         let (p, s) = (&self.p, a.signals);
-        let c = p.converter.capacitance * derating::relative_capacitance(&p.capacitor, x[V_C]);
-        a.slopes[I_L] = a.v_l / l;
-        a.slopes[V_C] = (path.give * s.i_l - s.i_out) / c;
+        let per_c = self.linear[1]
+            .unwrap_or_else(|| 1.0 / (p.converter.capacitance * derating::relative_capacitance(&p.capacitor, x[V_C])));
+        a.slopes[I_L] = a.v_l * per_l;
+        a.slopes[V_C] = (path.give * s.i_l - s.i_out) * per_c;
         let mut v_load = s.v_out;
         if self.has_cable {
             v_load = x[V_LOAD];
@@ -362,11 +401,6 @@ impl Full {
                 a.slopes[I_SOURCE] = (a.v_source - source.resistance * i_source - s.v_in) / source.inductance;
             }
         }
-        for (n, value) in [s.v_out, s.i_l, s.i_out, s.v_in].into_iter().enumerate() {
-            if self.low_pass[n] > 0.0 {
-                a.slopes[SHOWN + n] = (value - x[SHOWN + n]) / self.low_pass[n];
-            }
-        }
     }
 }
 
@@ -379,13 +413,22 @@ fn left(a: &Algebra, path: &Path) -> f64 {
     }
 }
 
-fn moved(x: &States, slopes: &States, h: f64) -> States {
-    std::array::from_fn(|n| x[n] + h * slopes[n])
+#[inline(always)]
+fn moved(x: &States, slopes: &Slopes, h: f64) -> States {
+    let mut end = *x;
+    for n in 0..SHOWN {
+        end[n] += h * slopes[n];
+    }
+    end
 }
 
 /// The cubic through both ends and slopes, at half way.
-fn between(x0: &States, x1: &States, k0: &States, k1: &States, h: f64) -> States {
-    std::array::from_fn(|n| 0.5 * (x0[n] + x1[n]) + h / 8.0 * (k0[n] - k1[n]))
+fn between(x0: &States, x1: &States, k0: &Slopes, k1: &Slopes, h: f64) -> States {
+    let mut middle = *x0;
+    for n in 0..SHOWN {
+        middle[n] = 0.5 * (x0[n] + x1[n]) + h / 8.0 * (k0[n] - k1[n]);
+    }
+    middle
 }
 
 fn extend(track: &mut Track, signals: &Signals, path: &Path) {

@@ -53,6 +53,12 @@ impl GateTiming {
         start < t && t <= end
     }
 
+    /// When the upper gate rises and falls at a steady `duty`, s from the period's start.
+    pub fn edges(&self, duty: f64) -> [f64; 2] {
+        let (start, end) = self.pulse(duty);
+        [start + self.upper.0, end + self.upper.1]
+    }
+
     /// The pulse the modulator commands, s.
     fn pulse(&self, duty: f64) -> Span {
         let (t, on) = (self.t_sw, duty * self.t_sw);

@@ -15,7 +15,8 @@
 //! - [`Plant::step`] goes from sampling instant to sampling instant, [`Batch`] does so for many ideal converters at once.
 //! - [`Parameters::from_toml`] reads a `plant.toml`.
 //!
-//! No function of libm is used but the square root, which is exact: equal input gives equal bits on every machine.
+//! No function of the machine's libm is used but the square root, which is exact; the exponential is that of the libm crate, which is
+//! Rust. Equal input gives equal bits on every machine.
 
 mod batch;
 mod catalogue;
@@ -24,6 +25,7 @@ mod effects;
 mod entry;
 mod full;
 mod gates;
+mod lag;
 mod legs;
 mod parameters;
 mod plain;
@@ -35,6 +37,7 @@ mod settle;
 mod signals;
 mod topology;
 mod walk;
+mod waveform;
 
 pub use batch::Batch;
 pub use catalogue::{effects, parameter, parameters};
@@ -49,3 +52,4 @@ pub use reader::REQUIRED;
 pub use settle::{Regulator, Settled};
 pub use signals::{Load, Sample, Signals};
 pub use toml_input::{Fault, Faults, Place};
+pub use waveform::Waveform;

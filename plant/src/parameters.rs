@@ -203,6 +203,8 @@ table! {
         sampling_phase: f64,
         /// Whole periods a duty waits beyond the next start of a period.
         duty_delay: u32,
+        /// Added to every duty but 0 and 1, 1.
+        duty_offset: f64,
         /// Step of the duty, 1; 0 for none.
         duty_lsb: f64,
         /// Shortest pulse of the switch, s.

@@ -7,7 +7,7 @@ use toml_input::Faults;
 use crate::catalogue;
 use crate::check::check;
 use crate::effects::duty_delay::Queue;
-use crate::effects::{dcr, duty_quantisation, load_setting, minimum_on_time};
+use crate::effects::{dcr, duty_offset, duty_quantisation, load_setting, minimum_on_time};
 use crate::entry::Way;
 use crate::full::{Full, Path, States};
 use crate::gates::{Gate, GateTiming, Gates};
@@ -209,7 +209,8 @@ impl Plant {
         // not `clamp`: a duty that is NaN must not get into the state, which would never recover
         let clamped = if duty > 0.0 { duty.min(1.0) } else { 0.0 };
         let queued = self.state.queue.pass(clamped, pwm.duty_delay);
-        minimum_on_time::limit(duty_quantisation::round(queued, pwm.duty_lsb), pwm, self.t_sw)
+        let shifted = duty_offset::shift(queued, pwm);
+        minimum_on_time::limit(duty_quantisation::round(shifted, pwm.duty_lsb), pwm, self.t_sw)
     }
 
     #[inline(always)]

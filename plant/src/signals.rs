@@ -40,6 +40,12 @@ impl Load {
             ..Load::default()
         }
     }
+
+    /// What it draws at `v_out` V, A; a constant power well above the voltage at which it folds back.
+    #[must_use]
+    pub fn at(&self, v_out: f64) -> f64 {
+        self.conductance * v_out + self.current + self.power / v_out
+    }
 }
 
 /// The four signals of a converter at one instant.

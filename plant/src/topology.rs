@@ -63,6 +63,49 @@ impl Topology {
         duty.clamp(0.0, 1.0)
     }
 
+    /// What a duty of 1 adds to the voltage at the inductor, V.
+    #[must_use]
+    pub fn span(self, v_in: f64, v_out: f64) -> f64 {
+        match self {
+            Topology::Buck => v_in,
+            Topology::Boost => v_out,
+            Topology::BuckBoost => v_in + v_out,
+        }
+    }
+
+    /// What stands against the current at a duty of 0, V: the inductor's voltage is `span duty - level`.
+    #[must_use]
+    pub fn level(self, v_in: f64, v_out: f64) -> f64 {
+        match self {
+            Topology::Buck | Topology::BuckBoost => v_out,
+            Topology::Boost => v_out - v_in,
+        }
+    }
+
+    /// Share of the inductor's current that the output receives over a period.
+    #[must_use]
+    pub fn give(self, duty: f64) -> f64 {
+        match self {
+            Topology::Buck => 1.0,
+            Topology::Boost | Topology::BuckBoost => 1.0 - duty,
+        }
+    }
+
+    /// Angular frequency of the zero in the right half-plane at `v_out` V and a load of `i_out` A, rad/s: more duty first takes
+    /// current from the output. The buck has none.
+    ///
+    /// Erickson and Maksimovic, table 8.2: `D'^2 R/L` of the boost, `D'^2 R/(D L)` of the buck-boost.
+    #[must_use]
+    pub fn right_half_plane_zero(self, v_in: f64, v_out: f64, i_out: f64, inductance: f64) -> f64 {
+        match self {
+            Topology::Buck => f64::INFINITY,
+            Topology::Boost | Topology::BuckBoost => {
+                let give = self.give(self.duty(v_in, v_out));
+                give * give * self.span(v_in, v_out) / (inductance * i_out.abs())
+            }
+        }
+    }
+
     /// What the source delivers of an inductor current `i_l` at that duty, A.
     pub(crate) fn i_in(self, i_l: f64, v_in: f64, v_out: f64) -> f64 {
         match self {
@@ -74,7 +117,8 @@ impl Topology {
     }
 
     /// Ripple of the inductor's current at that duty, times the inductance over the period, V.
-    pub(crate) fn ripple(self, v_in: f64, v_out: f64) -> f64 {
+    #[must_use]
+    pub fn ripple(self, v_in: f64, v_out: f64) -> f64 {
         match self {
             Topology::Buck => v_out * (1.0 - v_out / v_in),
             Topology::Boost | Topology::BuckBoost => v_in * self.duty(v_in, v_out),
@@ -83,6 +127,20 @@ impl Topology {
 }
 
 impl Parameters {
+    /// Ripple of the inductor's current without losses at `v_out` V in continuous conduction, A peak to peak.
+    #[must_use]
+    pub fn ideal_ripple(&self, v_out: f64) -> f64 {
+        let converter = &self.converter;
+        converter.topology.ripple(converter.v_in, v_out) * self.t_sw() / converter.inductance
+    }
+
+    /// The mean inductor current that holds `v_out` V at a load of `i_out` A, without losses, A.
+    #[must_use]
+    pub fn holding_current(&self, v_out: f64, i_out: f64) -> f64 {
+        let converter = &self.converter;
+        i_out / converter.topology.give(converter.topology.duty(converter.v_in, v_out))
+    }
+
     /// Refuses every topology but the buck, for what is built for that one alone; `what` is its name, such as `drm fit`.
     ///
     /// # Errors

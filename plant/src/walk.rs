@@ -64,12 +64,12 @@ impl Plant {
         self.finish(signals, track)
     }
 
-    fn start_period(&mut self, duty: f64) {
+    pub(crate) fn start_period(&mut self, duty: f64) {
         self.state.applied = self.modulate(duty);
         self.state.gates.plan(&self.timing, self.state.applied);
     }
 
-    fn timing_edge(&self, t: f64, limit: f64) -> f64 {
+    pub(crate) fn timing_edge(&self, t: f64, limit: f64) -> f64 {
         match self.parameters.converter.model {
             Model::Switched => self.state.gates.next_edge(&self.timing, t, limit),
             Model::Averaged => limit,
@@ -77,7 +77,7 @@ impl Plant {
     }
 
     /// Advances by `h` from `t` in the PWM period; the gates do not change meanwhile.
-    fn conduct(&mut self, t: f64, h: f64, load: &Load, track: &mut Track) {
+    pub(crate) fn conduct(&mut self, t: f64, h: f64, load: &Load, track: &mut Track) {
         // asked in the middle: at an end of the interval rounding would decide on which side of an edge it lies
         let gate = self.state.gates.at(&self.timing, t + 0.5 * h);
         let (mut rest, mut next) = (h, None);
@@ -119,7 +119,7 @@ impl Plant {
     }
 
     /// What is true now, just before any edge that may come now.
-    fn signals(&self, load: &Load) -> Signals {
+    pub(crate) fn signals(&self, load: &Load) -> Signals {
         if self.way < Way::Full {
             let v_out = self.state.x[1];
             return Signals {

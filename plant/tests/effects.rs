@@ -224,6 +224,7 @@ fn series_losses_lower_the_settled_voltage_as_computed() {
         (loss(|p| p.switch.dead_time = 1e-6), 0.01),
         (loss(|p| p.switch.turn_off_delay = 1e-6), -0.01),
         (loss(|p| p.switch.turn_on_delay = 1e-6), 0.01),
+        (loss(|p| p.pwm.duty_offset = -0.01), 0.01),
     ];
     for (n, (found, expected)) in expect.into_iter().enumerate() {
         assert!(

@@ -219,10 +219,11 @@ pub(crate) fn filter(filter: &Filter, x: Box32, period: f64) -> Bounded {
             }
             sum.scale(1.0 / samples as f64)
         }
-        Filter::Integrator { min, max, .. } => {
+        Filter::Integrator { min, max, leak, .. } => {
             // the memory lies within the clamps after every step, so no history is needed
             let clamp = Box32::nearest(Interval { low: min, high: max });
-            Ok(clamp.add(x.scale(period)?)?.clamp(clamp.low, clamp.high))
+            let kept = if leak == 1.0 { clamp } else { clamp.scale(leak)? };
+            Ok(kept.add(x.scale(period)?)?.clamp(clamp.low, clamp.high))
         }
     }
 }

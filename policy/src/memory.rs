@@ -148,6 +148,7 @@ mod tests {
             min: -3.0,
             max: 2.0,
             initial: 0.0,
+            leak: 0.0,
         };
         let (words, y) = of(&integrator);
         assert_near(y, 3.0 * g());

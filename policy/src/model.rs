@@ -326,7 +326,17 @@ pub enum Filter {
         max: f64,
         /// Value at priming, within the clamp.
         initial: f64,
+        /// What is kept of the value before in each period, above 0 and at most 1; 1 keeps all.
+        // left out where it is 1, so that contracts without it keep their digest
+        #[serde(skip_serializing_if = "is_one")]
+        leak: f64,
     },
+}
+
+// serde hands over a reference
+#[allow(clippy::trivially_copy_pass_by_ref)]
+fn is_one(value: &f64) -> bool {
+    *value == 1.0
 }
 
 /// Dense layer `y = activation(W x + b)`.

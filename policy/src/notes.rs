@@ -18,6 +18,7 @@ pub fn left_out(golden: &Golden) -> Option<String> {
 /// What the limits and the mapping make of the duties, where a reader may not expect it.
 pub fn on_duties(limits: &Limits, duties: &[f64], mapping: Option<&Mapping>, features: &[Feature]) -> Vec<String> {
     let mut notes: Vec<String> = outside_at_first(limits).into_iter().collect();
+    notes.extend(starts_below(limits));
     notes.extend(unlike_any_action(limits, duties, features));
     match only_duty(limits, duties, mapping) {
         Some(duty) => notes.push(format!(
@@ -29,6 +30,17 @@ pub fn on_duties(limits: &Limits, duties: &[f64], mapping: Option<&Mapping>, fea
         notes.extend(beyond_mapping(limits, duties, mapping));
     }
     notes
+}
+
+/// A soft start that begins where no duty may lie: the limits come last, so the lowest of them is commanded at once.
+fn starts_below(limits: &Limits) -> Option<String> {
+    let (from, low) = (limits.soft_start.as_ref()?.from, limits.duty.low);
+    (from < low).then(|| {
+        format!(
+            "the soft start begins at {from}, below the smallest duty {low}: the first step commands {low} all the same, and the ramp shows \
+             from there on"
+        )
+    })
 }
 
 /// A first observation with a duty that the training hardly had.
@@ -247,6 +259,20 @@ mod tests {
             initial_duty: 0.3,
         };
         beyond_mapping(&limits, duties, &mapping(valid))
+    }
+
+    #[test]
+    fn a_soft_start_below_the_smallest_duty_is_told() {
+        let said = |from: f64| {
+            starts_below(&Limits {
+                duty: interval(0.4, 0.6),
+                slew: None,
+                soft_start: Some(crate::model::SoftStart { from, steps: 500 }),
+                initial_duty: 0.5,
+            })
+        };
+        assert!(said(0.05).is_some_and(|note| note.contains("the first step commands 0.4")));
+        assert_eq!((said(0.4), said(0.5)), (None, None));
     }
 
     #[test]

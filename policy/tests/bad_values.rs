@@ -245,6 +245,15 @@ fn filters_are_checked_one_by_one() {
         &with("{ integrator = { min = 1.0, max = 2.0, initial = ¦0.5 } }"),
         &["outside the integrator's clamps"],
     );
+    for leak in ["0.0", "-0.5", "1.001"] {
+        contract_fault(
+            one,
+            &with(&format!(
+                "{{ integrator = {{ min = -1.0, max = 1.0, leak = ¦{leak} }} }}"
+            )),
+            &["leak", "above 0 and at most 1"],
+        );
+    }
     contract_fault(one, &with("{ moving_average = ¦1 }"), &["2 to 256"]);
     let nine = ["{ delay = 1 }"; 9].join(", ");
     contract_fault(one, &format!("¦[{nine}]"), &["too many filters", "9"]);
@@ -254,7 +263,8 @@ fn filters_are_checked_one_by_one() {
 fn all_filters_of_the_contract_are_read() {
     use policy::Filter::*;
     let text = "[{ delay = 2 }, \"backward_difference\", { backward_difference = true }, { low_pass = { cutoff = 100.0 } }, \
-        { filtered_derivative = { time_constant = 1e-3 } }, { moving_average = 4 }, { integrator = { min = -1, max = 1 } }]";
+        { filtered_derivative = { time_constant = 1e-3 } }, { moving_average = 4 }, { integrator = { min = -1, max = 1 } }, \
+        { integrator = { min = -1, max = 1, leak = 0.998 } }]";
     let policy = Folder::new().replace("[{ delay = 1 }]", text).policy();
     let tau = 1.0 / (2.0 * std::f64::consts::PI * 100.0);
     assert_eq!(
@@ -269,7 +279,14 @@ fn all_filters_of_the_contract_are_read() {
             Integrator {
                 min: -1.0,
                 max: 1.0,
-                initial: 0.0
+                initial: 0.0,
+                leak: 1.0
+            },
+            Integrator {
+                min: -1.0,
+                max: 1.0,
+                initial: 0.0,
+                leak: 0.998
             }
         ]
     );

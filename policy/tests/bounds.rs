@@ -79,8 +79,16 @@ impl Line {
                 memory.remove(0);
                 sum * f(1.0 / samples as f64)
             }
-            Filter::Integrator { min, max, initial } => {
-                let y1 = memory.pop().unwrap_or(f(initial));
+            Filter::Integrator {
+                min,
+                max,
+                initial,
+                leak,
+            } => {
+                let mut y1 = memory.pop().unwrap_or(f(initial));
+                if leak != 1.0 {
+                    y1 *= f(leak);
+                }
                 let y = clamp(y1 + f(period) * x, f(min), f(max));
                 memory.push(y);
                 y
@@ -188,6 +196,7 @@ fn every_filter_stays_inside_its_bound() {
         "[{ moving_average = 256 }]",
         "[{ integrator = { min = -0.3, max = 0.1 } }]",
         "[{ low_pass = { cutoff = 300.0 } }, { filtered_derivative = { time_constant = 2e-4 } }, { delay = 2 }, \"backward_difference\"]",
+        "[{ integrator = { min = -0.3, max = 0.1, leak = 0.9 } }]",
     ]
     .iter()
     .enumerate()

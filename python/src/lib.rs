@@ -3,6 +3,7 @@
 //! Nothing is decided here: a function turns what Python gives into the types of the crates, calls them without Python's lock,
 //! and turns the answer back. Dataclasses, gymnasium and everything that wants a library of Python stand in `lib/policyc`.
 
+mod campaign;
 mod controller;
 mod environment;
 mod faults;
@@ -14,9 +15,11 @@ use std::ffi::OsString;
 
 use pyo3::prelude::*;
 
-/// Runs the command line of `policyc`, the program's name first, and returns its exit code. Prints as the program does.
+/// Runs the command line of `policyc`, the program's name first, and returns its exit code. Prints as the program does. `program` is
+/// how it starts itself again, for the workers of a campaign.
 #[pyfunction]
-fn command(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
+fn command(py: Python<'_>, arguments: Vec<OsString>, program: Vec<OsString>) -> u8 {
+    cli::api::set_program(program);
     py.detach(|| cli::main(arguments))
 }
 
@@ -33,6 +36,9 @@ fn _policyc(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(environment::contract_facts, module)?)?;
     module.add_function(wrap_pyfunction!(models::import_model, module)?)?;
     module.add_function(wrap_pyfunction!(models::contract_json, module)?)?;
+    module.add_class::<campaign::NativeCampaign>()?;
+    module.add_function(wrap_pyfunction!(campaign::perform, module)?)?;
+    module.add_function(wrap_pyfunction!(campaign::on_ray, module)?)?;
     module.add_function(wrap_pyfunction!(command, module)?)?;
     module.add_function(wrap_pyfunction!(files::files, module)?)
 }

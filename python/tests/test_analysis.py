@@ -67,3 +67,15 @@ def test_what_is_no_table_is_said():
         policyc.drm_fit({"duty": [0.5], "v_out": [100.0, 101.0]})
     with pytest.raises(TypeError, match="a table is"):
         policyc.drm_fit(np.zeros((3, 4)))
+
+
+def test_frames_of_polars_are_tables_as_well():
+    polars = pytest.importorskip("polars")
+    points = {"duty": [0.45, 0.5, 0.55] * 2, "v_out": [88.0, 98.0, 108.0, 87.0, 97.0, 107.0], "i_out": [2.0] * 3 + [6.0] * 3, "v_in": [200.0] * 6}
+    assert policyc.drm.fit(polars.DataFrame(points)).toml == policyc.drm_fit(points).toml
+    record = columns("examples/diagnose/records/nothing-wrong.csv")
+    found = policyc.diagnose("examples/blind/plant.toml", polars.DataFrame(record))
+    assert found.sentence == policyc.diagnose("examples/blind/plant.toml", record).sentence
+    rows = {"v_out": [99.0] * 4, "i_l": [10.0] * 4, "i_out": [9.8] * 4}
+    steps = policyc.Controller("examples/buck12").step_batch(polars.DataFrame(rows))
+    assert (steps.duty == policyc.Controller("examples/buck12").step_batch(np.column_stack(list(rows.values()))).duty).all()

@@ -161,6 +161,15 @@ impl Section {
         self.block(Block::Chart(svg, caption.into()))
     }
 
+    /// Chart with a caption, or the reason why it could not be drawn in its place: a picture must not cost the rest of the page.
+    #[must_use]
+    pub fn chart_or_reason(self, svg: Result<Svg, ReportError>, caption: impl Into<String>) -> Self {
+        match svg {
+            Ok(svg) => self.chart(svg, caption),
+            Err(reason) => self.text(format!("A picture is missing here: {reason}.")),
+        }
+    }
+
     /// Table.
     #[must_use]
     pub fn table(self, table: Table) -> Self {

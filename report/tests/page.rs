@@ -57,6 +57,21 @@ fn a_page_loads_nothing_and_is_the_same_each_time() {
 }
 
 #[test]
+fn a_picture_that_cannot_be_drawn_leaves_its_reason_and_the_rest_of_the_page() {
+    let empty = Chart::new("t", Axis::new("x")).panel(Panel::new(Axis::new("y")).series(Series::line(
+        "plant",
+        [0.0],
+        [f64::NAN],
+    )));
+    let section = Section::new("s")
+        .chart_or_reason(empty.svg(), "caption")
+        .text("behind it");
+    let html = Page::new("p").section(section).html().unwrap();
+    assert!(html.contains("A picture is missing here: `plant` has no value that can be drawn."));
+    assert!(html.contains("behind it") && !html.contains("<svg") && !html.contains("caption"));
+}
+
+#[test]
 fn numbers_of_a_column_have_equal_decimals() {
     let table = Table::new("").number("x", 2);
     let table = table

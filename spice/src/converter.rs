@@ -20,7 +20,7 @@ const LONGEST_RUN: f64 = 1e6;
 
 /// The plant's effects that the netlist and the modulator here reproduce. One that is new there is refused until somebody
 /// writes its netlist: ngspice would otherwise answer for another converter.
-const KNOWN: [&str; 24] = [
+const KNOWN: [&str; 25] = [
     "converter",
     "dcr",
     "saturation",
@@ -40,6 +40,7 @@ const KNOWN: [&str; 24] = [
     "load_setting",
     "cable",
     "duty_delay",
+    "duty_offset",
     "duty_quantisation",
     "minimum_on_time",
     "sensor_gain",
@@ -258,6 +259,11 @@ impl Environment for SpiceConverter {
 
     fn parameter(&self, key: &str) -> Option<f64> {
         plant::parameter(key).map(|parameter| parameter.get(&self.nominal))
+    }
+
+    fn ideal_ripple(&self, v_out: f64) -> f64 {
+        let parameters = self.start.as_ref().map_or(&self.nominal, |start| &start.parameters);
+        parameters.ideal_ripple(v_out)
     }
 
     fn identity(&self) -> Vec<u8> {

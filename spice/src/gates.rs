@@ -37,6 +37,12 @@ impl Modulator {
 fn real(p: &Parameters, duty: f64) -> f64 {
     // written anew, not taken from the plant: a shared line could be wrong in both and the comparison would not see it
     let duty = if duty.is_nan() { 0.0 } else { duty.clamp(0.0, 1.0) };
+    let has_edges = duty > 0.0 && duty < 1.0;
+    let duty = if has_edges {
+        (duty + p.pwm.duty_offset).clamp(0.0, 1.0)
+    } else {
+        duty
+    };
     let lsb = p.pwm.duty_lsb;
     let duty = if lsb > 0.0 { (duty / lsb).round() * lsb } else { duty };
     if duty * p.t_sw() < p.pwm.min_on_time {

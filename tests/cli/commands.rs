@@ -38,6 +38,11 @@ fn the_help_of_every_command_names_its_arguments() {
         ),
         ("prove", &["<POLICY>", "--format", "--target", "--exhaustive", "--out"]),
         ("certify", &["<POLICY>", "--format", "--axis", "--at", "--out"]),
+        (
+            "campaign",
+            &["<PLAN>", "--out", "--engine", "--task", "--write", "--json"],
+        ),
+        ("merge", &["<DIR>...", "--out", "--json"]),
         ("demo", &["--out", "--steps"]),
         ("drm", &["acquire", "fit", "judge", "transfer"]),
         ("simulate", &["<SCENARIO>", "--policy", "--out", "--json"]),

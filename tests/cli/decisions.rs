@@ -85,14 +85,39 @@ fn a_network_that_was_read_wrongly_is_told_apart_from_builds_that_differ() {
     for words in [
         "equal: buck12 against the interpreter",
         "does not give the trainer's golden answers",
-        "hint: look at hidden_activation",
+        "hint: with hidden_activation = \"relu\" the same weights give all 515 golden answers",
     ] {
         assert!(ran.stdout.contains(words), "{words}\n{}", ran.stdout);
     }
     assert!(!ran.stdout.contains("decides otherwise"), "{}", ran.stdout);
     let ran = desk.type_in("inspect policy");
     assert_eq!(ran.code, Some(1), "{}", ran.stderr);
+    let hint = "with hidden_activation = \"relu\" the same weights give all 515 golden answers";
+    assert!(ran.stderr.contains(hint), "{}", ran.stderr);
+    assert_refused(&desk.type_in("compile policy --no-costs --out out"), &[hint]);
+}
+
+/// Where no activation mends it, none is proposed.
+#[test]
+fn an_activation_that_does_not_fit_either_is_not_proposed() {
+    let desk = example();
+    desk.edit("policy/policy.toml", "\"relu\"", "\"tanh\"");
+    desk.edit("policy/policy.toml", "[network]", "[network]\ngolden_tolerance = 1e-12");
+    let ran = desk.type_in("inspect policy");
     assert!(ran.stderr.contains("hint: look at hidden_activation"), "{}", ran.stderr);
+}
+
+#[test]
+fn compile_says_how_many_accepted_decisions_a_format_changes() {
+    let desk = example();
+    let said = desk.succeed("compile policy --format i16 --golden-decisions 0.37 --no-costs --out out");
+    assert!(
+        said.contains("decisions in i16: 187 of 515 changed (36.3 %, allowed 37 %)"),
+        "{said}"
+    );
+    assert!(said.contains("they give up at most"), "{said}");
+    let said = desk.succeed("compile policy --no-costs --out exact");
+    assert!(!said.contains("decisions in"), "{said}");
 }
 
 #[test]

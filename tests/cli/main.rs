@@ -3,6 +3,7 @@
 
 mod actor;
 mod budget;
+mod campaign;
 mod certify;
 mod ci;
 mod codes;

@@ -73,7 +73,8 @@ fn a_plant_becomes_a_trained_policy_that_holds_on_its_spread() {
     );
     let said = desk.succeed("simulate mine/scenario.toml --policy mine/trained --out mine/loop");
     let rows: Vec<Vec<f64>> = (said.lines())
-        .filter(|line| line.starts_with("policy   ") && line.contains(" / "))
+        // not those of the table of what is done at rest, which has three columns
+        .filter(|line| line.starts_with("policy   ") && line.matches(" / ").count() > 3)
         .map(numbers)
         .collect();
     let limits: Vec<Vec<f64>> = (said.lines())
@@ -109,11 +110,14 @@ fn what_has_no_start_and_no_limit_is_exit_code_2_with_its_reason() {
         ("new --plant plant.toml --v-ref 12 --loads 20,nan", "two numbers"),
         ("new --plant plant.toml --v-ref 60 --loads 20,120", "cannot hold"),
         ("new --plant plant.toml --v-ref 3 --loads 2,12", "v_fold"),
-        ("new --plant boost.toml --v-ref 60 --loads 20,120", "boost"),
+        (
+            "new --plant boost.toml --v-ref 12 --loads 20,120",
+            "more than the source",
+        ),
         ("new --plant nothing.toml --v-ref 12 --loads 20,120", "nothing.toml"),
         ("new weights.safetensors --v-ref 12", "--plant"),
         ("limit plant.toml --v-ref 12", "--load-step"),
-        ("limit plant.toml --v-ref 60 --load-step 20,120", "does not rest"),
+        ("limit plant.toml --v-ref 60 --load-step 20,120", "less than the source"),
         ("limit plant.toml --v-ref nan --load-step 20,120", "no voltage"),
         ("limit plant.toml --v-ref 3 --load-step 2,12", "v_fold"),
         ("limit plant.toml --v-ref 12 --load-step=-20,120", "no load step"),
@@ -122,9 +126,45 @@ fn what_has_no_start_and_no_limit_is_exit_code_2_with_its_reason() {
             "limit plant.toml --v-ref 12 --load-step 20,120 --duty 0.5,0.5",
             "no range",
         ),
-        ("limit boost.toml --v-ref 60 --load-step 20,120", "boost"),
+        ("limit boost.toml --v-ref 12 --load-step 20,120", "more than the source"),
     ] {
         desk.refuse(line, &[reason]);
     }
     assert!(!desk.path("policy.toml").exists());
+}
+
+/// No observer is built for it, so its contract measures the inductor current.
+#[test]
+fn a_boost_has_a_limit_and_a_start_whose_scenario_judges_on_a_spread() {
+    let desk = Desk::new("linear");
+    desk.write("boost.toml", &PLANT.replace("v_in", "topology = \"boost\"\nv_in"));
+    let said = desk.succeed("limit boost.toml --v-ref 60 --load-step 20,120");
+    assert!(said.contains("20 -> 120 W"), "{said}");
+    desk.succeed("new --plant boost.toml --v-ref 60 --loads 20,120 --out start");
+    let contract = desk.read("start/policy.toml");
+    assert!(
+        contract.contains("name = \"i_l\"") && !contract.contains("[[observer]]"),
+        "{contract}"
+    );
+    let trained = "train start/train.toml --out trained --seeds 0";
+    desk.edit("start/train.toml", "steps = 10000", "steps = 300");
+    // so few steps meet no specification, which is exit code 1
+    let _ = desk.type_in(trained);
+    desk.edit(
+        "start/scenario.toml",
+        "baselines = [",
+        "limit = false\ninstants = 1\nsampling_instants = 1\nbaselines = [",
+    );
+    let spread =
+        "simulate start/scenario.toml --policy trained --out loop --spread converter.inductance=8.5e-6,11.5e-6,2";
+    let said = desk.succeed(spread);
+    assert!(
+        said.contains("2 converters, converter.inductance from 0.0000085 to 0.0000115"),
+        "{said}"
+    );
+    assert!(desk.read("loop/spread.csv").lines().count() > 2 * 4);
+    desk.refuse(
+        &spread.replace("--out loop", "--out more").replace(",2", ",1"),
+        &["no range", "2 to 21 values"],
+    );
 }

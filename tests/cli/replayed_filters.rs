@@ -124,7 +124,16 @@ fn an_integral_with_another_clamp_is_named_with_its_ends() {
         &["min = -0.0008", "max = 0.0025"],
     );
     is_named(NARROW, |e| clamped(e, -0.001, 0.002), &["elsewhere: max = 0.002 fits"]);
-    is_named(NARROW, rectangles, &["no min, no max"]);
+    // an end is proposed only as far as the log shows: no clamp of the log is seen
+    is_named(
+        NARROW,
+        rectangles,
+        &[
+            "goes beyond min = -0.001, down to",
+            "goes beyond max = 0.003, up to",
+            "or more fits the log",
+        ],
+    );
     is_named(
         NARROW,
         |e| rectangles(e).iter().map(|y| y.clamp(-0.001, 0.003)).collect(),
@@ -144,18 +153,79 @@ fn what_is_no_matter_of_the_integral_is_not_blamed_on_it() {
     is_named(WIDE, times(1e4), &["10000 times"]);
     let shifted = |e: &[f64]| rectangles(e).iter().map(|y| y + 0.0025).collect::<Vec<_>>();
     is_named(WIDE, shifted, &["plus 0.25"]);
-    // forgets a hundredth of itself in each period
-    is_named(
-        WIDE,
-        |e| sum(e, 0.0, |y, _, x| 0.99 * y + T * x),
-        &["no simple relation"],
-    );
     // two mistakes at once
     is_named(
         WIDE,
         |e| sum(e, 0.0, |y, x1, x| 0.9 * (y + 0.5 * T * (x + x1))),
         &["no simple relation"],
     );
+}
+
+/// The clamps of the contract are in the way of nearly all of the log, and the sum does not wind up behind them: the log passes them.
+#[test]
+fn a_clamp_that_the_log_passes_is_no_wind_up() {
+    let tight = "{ integrator = { min = -0.00005, max = 0.00005 } }";
+    let (code, line) = said(tight, rectangles);
+    assert_eq!(code, 1, "{line}");
+    assert!(line.contains("the log goes beyond max = 5e-5, up to"), "{line}");
+    assert!(line.contains("the log goes beyond min = -5e-5, down to"), "{line}");
+    assert!(!line.contains("winds up"), "{line}");
+    // what it proposes fits
+    let end = |word: &str| {
+        let rest = line
+            .split(&format!("fits the log"))
+            .find(|part| part.contains(&format!("beyond {word}")));
+        let rest = rest.unwrap().split(&format!(": {word} = ")).nth(1).unwrap();
+        rest.split(' ').next().unwrap().to_owned()
+    };
+    let mended = format!("{{ integrator = {{ min = {}, max = {} }} }}", end("min"), end("max"));
+    assert_eq!(said(&mended, rectangles).0, 0, "{mended}");
+}
+
+#[test]
+fn a_leak_is_named_with_its_share() {
+    let leaky = |leak: f64, first: f64| move |e: &[f64]| sum(e, first * T * e[0], |y, _, x| leak * y + T * x);
+    is_named(WIDE, leaky(0.998, 1.0), &["it leaks, leak = 0.998 a period"]);
+    // forgets a hundredth of itself in each period, and begins at 0
+    is_named(
+        WIDE,
+        leaky(0.99, 0.0),
+        &["leaves out the first sample", "leak = 0.99 a period"],
+    );
+    let contract = "{ integrator = { min = -1.0, max = 1.0, leak = 0.98 } }";
+    assert_eq!(said(contract, leaky(0.98, 1.0)).0, 0);
+    is_named(contract, leaky(0.9, 1.0), &["it leaks otherwise: leak = 0.9 a period"]);
+    is_named(contract, rectangles, &["it does not leak"]);
+    let clamped = |e: &[f64]| {
+        sum(e, (T * e[0]).clamp(-0.0005, 0.001), |y, _, x| {
+            (0.98 * y + T * x).clamp(-0.0005, 0.001)
+        })
+    };
+    let contract = "{ integrator = { min = -0.0005, max = 0.001 } }";
+    is_named(contract, clamped, &["it leaks, leak = 0.98 a period"]);
+}
+
+/// A factor in front of an integral is no factor behind its clamp.
+#[test]
+fn another_source_in_front_of_a_filter_is_named() {
+    let twice = |e: &[f64]| {
+        let doubled: Vec<f64> = e.iter().map(|e| 2.0 * e).collect();
+        clamped(&doubled, -0.001, 0.003)
+    };
+    is_named(NARROW, twice, &["it is the integral of 2 * (v_ref - v_out)"]);
+    // the mean of v_out in the place of that of the error
+    let desk = desk("{ low_pass = { time_constant = 3e-4 } }");
+    let errors = errors(0);
+    let current = |k: usize| 4.0 + (0.3 * k as f64).sin() * (-0.01 * k as f64).exp();
+    let currents: Vec<f64> = (0..ROWS).map(current).collect();
+    let mut text = "v_out,i_l,i_out,obs_1\n".to_owned();
+    for ((e, i), y) in errors.iter().zip(&currents).zip(low_pass(&currents, currents[0], 3e-4)) {
+        text += &format!("{:.7},{i:.7},2,{:.7}\n", 100.0 - e, 0.1 * y);
+    }
+    desk.write("log.csv", &text);
+    let ran = desk.type_in("replay buck12 log.csv");
+    let words = "behind another source: source = \"i_l\", scale = 0.1 fits the log";
+    assert!(ran.stdout.contains(words), "{}", ran.stdout);
 }
 
 fn low_pass(errors: &[f64], first: f64, tau: f64) -> Vec<f64> {
@@ -178,7 +248,11 @@ fn a_filter_with_another_time_constant_is_named_with_it() {
         |e| low_pass(e, e[0], 7e-4),
         &["low-pass has another time constant", "time_constant = 0.0007"],
     );
-    is_named(contract, |e| low_pass(e, T / 3e-4 * e[0], 2e-4), &["starts from 0"]);
+    is_named(
+        contract,
+        |e| low_pass(e, T / 3e-4 * e[0], 2e-4),
+        &["starts from 0", "--skip"],
+    );
     is_named(contract, <[f64]>::to_vec, &["without the low-pass"]);
     // a low-pass by the exact exponential is one with another factor: T / (1 - exp(-1/2)) - T
     is_named(
@@ -291,4 +365,78 @@ fn columns_of_a_recording_may_have_other_names() {
     );
     desk.refuse("verify buck12 --map v_out=Vo", &["--trace"]);
     desk.succeed("verify buck12 --trace run.csv --map v_out=Vo,i_l=IL,i_out=IO --steps 50");
+}
+
+/// `--skip` of as many rows as are named leaves the start of a low-pass out, and hardly more than that.
+#[test]
+fn the_rows_in_which_another_start_is_seen_are_told() {
+    let desk = desk("{ low_pass = { time_constant = 4e-4 } }");
+    let errors = errors(0);
+    let mut text = "v_out,i_l,i_out,obs_1\n".to_owned();
+    for (e, y) in errors.iter().zip(low_pass(&errors, 0.2 * errors[0], 4e-4)) {
+        text += &format!("{:.7},2,2,{:.7}\n", 100.0 - e, SCALE * y);
+    }
+    desk.write("log.csv", &text);
+    let ran = desk.type_in("replay buck12 log.csv");
+    assert_eq!(ran.code, Some(1));
+    let rows = ran.stdout.split("--skip ").nth(1).expect("a number of rows");
+    let rows: usize = rows.split(' ').next().unwrap().parse().unwrap();
+    // 0.8^n of 0.8 of the first value is below 1e-4 of the largest
+    assert!((38..45).contains(&rows), "{rows}");
+    desk.succeed(&format!("replay buck12 log.csv --skip {rows}"));
+    assert_eq!(
+        desk.type_in(&format!("replay buck12 log.csv --skip {}", rows - 3)).code,
+        Some(1)
+    );
+}
+
+/// The log has a turning point, and no clip there.
+#[test]
+fn the_least_value_of_a_log_is_no_clip() {
+    let twice = |e: &[f64]| low_pass(e, e[0], 3e-3).iter().map(|y| 2.0 * y).collect::<Vec<_>>();
+    let (code, line) = said("{ low_pass = { time_constant = 3e-3 } }", twice);
+    assert_eq!(code, 1);
+    assert!(
+        line.contains("it is 2 times the contract's: scale = 200 fits the log"),
+        "{line}"
+    );
+    assert!(!line.contains("clip"), "{line}");
+    // held at an end that the formula passes
+    let cut = |e: &[f64]| low_pass(e, e[0], 3e-4).iter().map(|y| y.max(-0.5)).collect::<Vec<_>>();
+    let (_, line) = said("{ low_pass = { time_constant = 3e-4 } }", cut);
+    assert!(line.contains("a clip that begins at -50"), "{line}");
+}
+
+#[test]
+fn an_end_that_the_log_never_reaches_is_told() {
+    let desk = desk("{ integrator = { min = -0.001, max = 0.9 } }");
+    let mut text = "episode,v_out,i_l,i_out,obs_1\n".to_owned();
+    for episode in 0..EPISODES {
+        let errors = errors(episode);
+        for (e, y) in errors.iter().zip(clamped(&errors, -0.001, 0.9)) {
+            text += &format!("{episode},{:.7},2,2,{:.7}\n", 100.0 - e, SCALE * y);
+        }
+    }
+    desk.write("log.csv", &text);
+    let said = desk.succeed("replay buck12 log.csv");
+    assert!(
+        said.contains("the log never reaches `max` of e_del, 0.9: not checked"),
+        "{said}"
+    );
+    assert!(!said.contains("`min` of e_del"), "{said}");
+}
+
+#[test]
+fn other_actions_send_the_reader_to_the_features_that_are_not_in_the_log() {
+    let desk = desk("{ delay = 1 }");
+    let mut text = "v_out,i_l,i_out,obs_0,action\n".to_owned();
+    for (k, e) in errors(0).iter().enumerate() {
+        text += &format!("{:.7},2,2,{:.7},{}\n", 100.0 - e, 0.2 * e, k % 12);
+    }
+    desk.write("log.csv", &text);
+    let ran = desk.type_in("replay buck12 log.csv");
+    assert_eq!(ran.code, Some(1), "{}", ran.stdout);
+    let words = "the 1 logged observation is equal, the actions are not; `e_del`, `de_dt`, `v`, `v_del` and `dv_dt` are not in the log: look \
+                 there first";
+    assert!(ran.stdout.contains(words), "{}", ran.stdout);
 }

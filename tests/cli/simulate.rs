@@ -301,9 +301,9 @@ fn an_interrupted_simulation_ends_with_130_and_writes_nothing() {
     }
 }
 
-/// The loop needs a plant alone; what has formulas for the buck says so and is left out, or refuses.
+/// The loop, its limit and classical controllers take any topology; what has formulas for the buck refuses.
 #[test]
-fn a_boost_is_simulated_and_what_is_built_for_the_buck_says_so() {
+fn a_boost_is_simulated_beside_limit_and_classical_controllers_and_what_is_built_for_the_buck_says_so() {
     let desk = Desk::new("minimal");
     desk.write(
         "boost.toml",
@@ -311,13 +311,15 @@ fn a_boost_is_simulated_and_what_is_built_for_the_buck_says_so() {
     );
     desk.write(
         "s.toml",
-        "plant = \"boost.toml\"\nv_ref = 100.0\nload_steps = [[200, 300]]\ninstants = 1\n",
+        "plant = \"boost.toml\"\nv_ref = 100.0\nload_steps = [[200, 900]]\ninstants = 1\n",
     );
     let said = desk.succeed("simulate s.toml --policy policy --out out");
     for words in [
-        "no classical controllers beside the policy",
-        "limit is built for the buck converter alone",
-        "\"boost\"",
+        "a PID controller on the voltage cannot hold this boost converter",
+        "\ncascade ",
+        "\nfeed-forward ",
+        "\ndeadbeat ",
+        "\nlimit 0..1 ",
     ] {
         assert!(said.contains(words), "{words}: {said}");
     }

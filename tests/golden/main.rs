@@ -207,6 +207,8 @@ fn together_the_cases_hold_every_part_of_a_contract() {
         "FilteredDerivative {",
         "MovingAverage {",
         "Integrator {",
+        "leak: 1.0",
+        "leak: 0.",
         "pair: Some(",
         "adc: Some(",
         "adc: None",

@@ -243,6 +243,11 @@ fn filter(rng: &mut SplitMix) -> String {
         2 => format!("{{ low_pass = {{ time_constant = {tau:?} }} }}"),
         3 => format!("{{ filtered_derivative = {{ time_constant = {tau:?} }} }}"),
         4 => format!("{{ moving_average = {} }}", 2 + rng.below(6)),
+        // no draw of its own, so that the policies of a seed stay what they are otherwise
+        _ if tau > 5e-3 => {
+            let leak = 1.0 - 10.0 * tau;
+            format!("{{ integrator = {{ min = -0.5, max = 0.75, initial = 0.1, leak = {leak:?} }} }}")
+        }
         _ => "{ integrator = { min = -0.5, max = 0.75, initial = 0.1 } }".to_owned(),
     }
 }

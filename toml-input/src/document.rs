@@ -11,7 +11,7 @@ use toml::de::DeTable;
 
 use crate::fault::{Fault, Faults, Message};
 use crate::messages;
-use crate::node::{Entries, entries};
+use crate::node::{Entries, entries, texts};
 use crate::sink::Sink;
 use crate::source::{FileName, Source, Span};
 use crate::table::Table;
@@ -106,6 +106,14 @@ impl Document {
     /// The faults in the order of the file; a fault as well if there is no value for no reason given.
     pub fn conclude<T>(&self, value: Option<T>, faults: Sink) -> Result<T, Faults> {
         faults.conclude(value, || self.source.name.fault(messages::incomplete()))
+    }
+
+    /// Every text of the file, wherever it stands, with its place.
+    #[must_use]
+    pub fn texts(&self) -> Vec<(&str, &Span)> {
+        let mut found = Vec::new();
+        self.root.iter().for_each(|(_, value)| texts(value, &mut found));
+        found
     }
 
     /// A fault at `span` of the text.

@@ -38,6 +38,16 @@ pub(crate) fn entries(table: &DeTable<'_>) -> Entries {
     list
 }
 
+/// Adds every text of a value to `found`, in the order of the file.
+pub(crate) fn texts<'a>(value: &'a At<Node>, found: &mut Vec<(&'a str, &'a Span)>) {
+    match &value.value {
+        Node::Text(text) => found.push((text, &value.span)),
+        Node::List(items) => items.iter().for_each(|item| texts(item, found)),
+        Node::Table(entries) => entries.iter().for_each(|(_, value)| texts(value, found)),
+        Node::Integer(_) | Node::Float(_) | Node::Boolean(_) | Node::Date => {}
+    }
+}
+
 fn at<T>(value: T, span: Span) -> At<T> {
     At { value, span }
 }

@@ -53,11 +53,11 @@ impl<'s> Drawn<'s> {
         }
     }
 
-    /// Inductor current at the start, A.
-    pub fn i_l(&self, load: &Load) -> f64 {
+    /// Inductor current at the start, A; `holding` is what holds a voltage at a load current, by V and A.
+    pub fn i_l(&self, load: &Load, holding: impl Fn(f64, f64) -> f64) -> f64 {
         // a training may start at 0 V
         let drawn = load.conductance * self.v_out + load.current + load.power / self.v_out.max(1.0);
-        (drawn + self.beside).max(0.0)
+        (holding(self.v_out, drawn) + self.beside).max(0.0)
     }
 }
 

@@ -16,7 +16,7 @@ use crate::trainer::{Best, Ended, Look, Trainer};
 use closed_loop::Agent;
 use closed_loop::environment::Environment;
 use closed_loop::scenario::{Finding, load_step};
-use closed_loop::{comparison, evaluation_csv, table};
+use closed_loop::{at_rest, comparison, evaluation_csv, table};
 
 /// Observations among the golden vectors at most.
 // a convention: `compile` and `verify` compute each of them once, and the paper's network fits them into 40 kB
@@ -175,9 +175,12 @@ impl<E: Environment> Trainer<E> {
                     Instants::Worst => (&finding.worst, "at all instants"),
                 };
                 let [from, to] = finding.load_step;
-                for (value, limit) in figures(metrics, requirement) {
+                for (key, value, limit) in figures(metrics, requirement) {
                     let verdict = if value <= limit { "holds" } else { "FAILS" };
-                    let _ = writeln!(out, "  {verdict}  {from} -> {to} W {instants}: {value:.6} of {limit}");
+                    let _ = writeln!(
+                        out,
+                        "  {verdict}  {from} -> {to} W {instants}: {key} {value:.6} of {limit}"
+                    );
                 }
             }
         }
@@ -194,12 +197,21 @@ pub fn tables(judged: &[Judged], law: &[Judged]) -> String {
         if !place.is_empty() {
             let _ = write!(out, "\nOn {place}:\n\n");
         }
+        let steps: Vec<String> = findings.iter().map(|finding| finding.step().to_string()).collect();
         let Some(law) = law.get(n) else {
             out.push_str(&table(findings));
+            out.push_str(&at_rest(
+                findings
+                    .iter()
+                    .zip(&steps)
+                    .map(|(finding, step)| (step.as_str(), finding)),
+            ));
             continue;
         };
         for (policy, law) in findings.iter().zip(&law.findings) {
-            out.push_str(&comparison(policy.step(), [("policy", policy), ("law alone", law)], []));
+            let both = [("policy", policy), ("law alone", law)];
+            out.push_str(&comparison(policy.step(), both, []));
+            out.push_str(&at_rest(both));
         }
     }
     if !law.is_empty() {

@@ -88,7 +88,7 @@ impl<'a> Scoring<'a> {
             Instants::Sample => figures(at_sample, requirement),
             Instants::Worst => figures(worst, requirement),
         });
-        pairs.collect()
+        pairs.map(|(_, value, limit)| (value, limit)).collect()
     }
 
     /// Whether a requirement speaks of load step `index`.
@@ -105,23 +105,28 @@ impl<'a> Scoring<'a> {
     }
 }
 
-/// The figures a requirement limits, with their limits.
+/// The figures a requirement limits: the limit's key, figure and limit.
 #[must_use]
-pub fn figures(metrics: &Metrics, requirement: &Requirement) -> Vec<(f64, f64)> {
+pub fn figures(metrics: &Metrics, requirement: &Requirement) -> Vec<(&'static str, f64, f64)> {
+    let (limits, chatter) = (&requirement.limits, &metrics.chatter);
     let pairs = [
-        (metrics.deviation, requirement.deviation),
-        (metrics.settling, requirement.settling),
-        (metrics.tail_max, requirement.tail),
+        ("deviation", metrics.deviation, limits.deviation),
+        ("settling", metrics.settling, limits.settling),
+        ("tail", metrics.tail_max, limits.tail),
+        ("duty_activity", chatter.duty_activity, limits.duty_activity),
+        ("current_swing", chatter.current_swing, limits.current_swing),
+        ("subharmonic", chatter.subharmonic, limits.subharmonic),
     ];
     pairs
         .into_iter()
-        .filter_map(|(value, limit)| Some((value, limit?)))
+        .filter_map(|(key, value, limit)| Some((key, value, limit?)))
         .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::Limits;
 
     const STEPS: [[f64; 2]; 2] = [[200.0, 500.0], [1000.0, 200.0]];
 
@@ -129,9 +134,10 @@ mod tests {
         Requirement {
             load_step,
             instants: Instants::Worst,
-            deviation: Some(deviation),
-            settling: None,
-            tail: None,
+            limits: Limits {
+                deviation: Some(deviation),
+                ..Limits::default()
+            },
         }
     }
 
@@ -163,6 +169,26 @@ mod tests {
         let scoring = Scoring::new(&load_steps, &specification, 1.0);
         let concerned: Vec<bool> = (0..4).map(|n| scoring.concerns(&specification[0], n)).collect();
         assert_eq!(concerned, [true, true, false, false]);
+    }
+
+    #[test]
+    fn a_limit_on_the_duty_s_activity_rules_out_what_chatters() {
+        let limits = Limits {
+            duty_activity: Some(0.01),
+            ..Limits::default()
+        };
+        let specification = [Requirement {
+            load_step: None,
+            instants: Instants::Worst,
+            limits,
+        }];
+        let scoring = Scoring::new(&STEPS, &specification, 1.0);
+        let mut restless = findings([0.0, 0.0]);
+        assert!(scoring.score(&restless).met);
+        restless[1].worst.chatter.duty_activity = 0.02;
+        assert!(!scoring.score(&restless).met);
+        let named = figures(&restless[1].worst, &specification[0]);
+        assert_eq!(named, [("duty_activity", 0.02, 0.01)]);
     }
 
     #[test]

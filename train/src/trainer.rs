@@ -246,7 +246,7 @@ impl<E: Environment> Trainer<E> {
         self.agent.reset();
         self.sample = self.environment.restart(&Start {
             v_out: drawn.v_out,
-            i_l: drawn.i_l(&self.load),
+            i_l: drawn.i_l(&self.load, |v_out, i_out| self.nominal.holding_current(v_out, i_out)),
             load: self.load,
             seed: drawn.seed,
             varied: &drawn.varied,
@@ -288,7 +288,7 @@ impl<E: Environment> Trainer<E> {
 }
 
 /// # Errors
-/// If they have different control periods, or the plant is no buck converter, or has not what is to be varied.
+/// If they have different control periods, or the plant has not what is to be varied.
 pub(crate) fn check_fit<E: Environment>(
     settings: &Settings,
     contract: &Contract,
@@ -302,7 +302,6 @@ pub(crate) fn check_fit<E: Environment>(
         ));
         return Err(message.hint("f_sw of the plant is 1 / sample_period").into());
     }
-    // exploration, rewards and the converters to compare with are those of a buck; nobody has trained another
     let topology = "converter.topology";
     let randomised = settings
         .randomise
@@ -313,12 +312,9 @@ pub(crate) fn check_fit<E: Environment>(
         .iter()
         .flat_map(|spread| spread.keys().map(|key| ("[[spread]]", key)));
     let others: Vec<(&str, &str)> = randomised.chain(spread).collect();
-    if environment.parameter(topology).is_some_and(|choice| choice != 0.0)
-        || others.iter().any(|(_, key)| *key == topology)
-    {
-        let message = Message::new("a training is built for the buck converter alone");
-        let message = message.found(format!("another `{topology}`")).expected("\"buck\"");
-        return Err(Fault::in_file(&settings.file, message).into());
+    if let Some((table, _)) = others.iter().find(|(_, key)| *key == topology) {
+        let message = Message::new(format!("{table} has another `{topology}`")).found("another converter");
+        return Err(Fault::in_file(&settings.file, message.expected("that of the plant")).into());
     }
     if let Some((table, key)) = others.iter().find(|(_, key)| *key == "converter.f_sw") {
         // the plant's period would no longer be that of the controller

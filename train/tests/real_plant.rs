@@ -119,6 +119,10 @@ impl Environment for Witness {
         self.converter.parameter(key)
     }
 
+    fn ideal_ripple(&self, v_out: f64) -> f64 {
+        self.converter.ideal_ripple(v_out)
+    }
+
     fn identity(&self) -> Vec<u8> {
         self.converter.identity()
     }
@@ -204,7 +208,7 @@ fn a_spread_that_makes_no_converter_is_refused_before_the_training() {
         ),
         (
             "set = { \"converter.topology\" = 1 }",
-            ["buck converter alone", "topology"],
+            ["[[spread]]", "another `converter.topology`"],
         ),
         // a duty ratio of what it was is one; a thousand times the largest inductance is none
         (

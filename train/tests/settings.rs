@@ -231,7 +231,12 @@ const FAULTS: &[(&str, usize, &[&str])] = &[
         4,
         &["`until` is missing in [[curriculum]]"],
     ),
-    ("[[spec]]\nload_step = [200, 500]", 4, &["without a limit"]),
+    (
+        "[[spec]]\nload_step = [200, 500]",
+        4,
+        &["without a limit", "duty_activity"],
+    ),
+    ("[[spec]]\nduty_activity = -1", 5, &["greater than 0"]),
     (
         "[[spread]]\ntail = 1",
         4,

@@ -103,7 +103,7 @@ type Binary = (&'static str, &'static str, Vec<u8>);
 fn binary(name: &str, target: &TargetSpec, fmi: Fmi, files: &Files) -> Result<Binary, Absence> {
     if !matches!(target.runner, Runner::Native) {
         return Err(Absence::Told(format!(
-            "the code is for {}, not for this machine",
+            "the code is for {}, not for this machine; compile once more without --target for a binary of this machine",
             target.name
         )));
     }

@@ -14,6 +14,12 @@ const NEEDED: [&str; 5] = ["maturin", "numpy", "pandas", "gymnasium", "pytest"];
 /// The libraries that trainers use, for the long form alone: they are gigabytes.
 const TRAINERS: [&str; 3] = ["stable-baselines3==2.9.2", "sb3-contrib==2.9.2", "onnxscript"];
 
+/// What a cluster of two nodes on this machine needs, for the long form alone.
+const CLUSTER: [&str; 1] = ["ray>=2.9"];
+
+/// Tests for the long form.
+const LONG: [&str; 2] = ["trainers", "clusters"];
+
 /// Where everything of it lies.
 struct Folders {
     /// The crate.
@@ -69,13 +75,16 @@ pub fn test(
     let mut pytest = Command::new(&python);
     pytest.args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "--durations=5"]);
     let tests = folders.package.join("tests");
-    pytest.arg(&tests).arg("--ignore").arg(tests.join("trainers"));
+    pytest.arg(&tests);
+    for folder in LONG {
+        pytest.arg("--ignore").arg(tests.join(folder));
+    }
     pytest.current_dir(&workspace.root).env("PYTHONPATH", &folders.site);
     run(pytest.env("POLICYC_PROGRAM", &program))?;
     let mut notes = vec![counted(log)];
     if full {
         with_trainers(&folders, &wheel, &program, &run)?;
-        notes.push(format!("with the trainers' libraries: {}", counted(log)));
+        notes.push(format!("with the trainers' libraries and Ray: {}", counted(log)));
     }
     Ok(Ok(notes))
 }
@@ -109,13 +118,16 @@ fn with_trainers(
         run(Command::new("python3").args(["-m", "venv"]).arg(&folders.trainers))?;
     }
     run(pip(&python).arg("torch"))?;
-    run(pip(&python).args(TRAINERS).args(["pytest", "pandas", "gymnasium"]))?;
+    run(pip(&python)
+        .args(TRAINERS)
+        .args(["pytest", "pandas", "polars", "gymnasium"]))?;
+    run(pip(&python).args(CLUSTER))?;
     run(pip(&python).args(["--no-deps", "--force-reinstall"]).arg(wheel))?;
     let mut pytest = Command::new(&python);
     pytest.args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "--durations=5"]);
-    pytest
-        .arg(folders.package.join("tests/trainers"))
-        .current_dir(&folders.package);
+    let tests = folders.package.join("tests");
+    pytest.args(LONG.map(|folder| tests.join(folder)));
+    pytest.current_dir(&folders.package).env("PYTHONPATH", &tests);
     run(pytest.env("POLICYC_PROGRAM", program))
 }
 

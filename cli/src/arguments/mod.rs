@@ -1,5 +1,6 @@
 //! The command line.
 
+mod campaign;
 pub mod drm;
 mod plants;
 mod shared;
@@ -16,6 +17,7 @@ use policy::NumericFormat;
 use crate::one_of::OneOf;
 use crate::ownership::Replacing;
 
+pub use campaign::{Campaign, Engine, Merge, Script};
 use drm::Drm;
 pub use plants::{Design, Limit, New};
 pub use shared::{Columns, ControllerKind, Loudness, Outside};
@@ -65,6 +67,10 @@ pub enum Command {
     Train(Train),
     /// Compare a plant file with measured records, name what it gets wrong, and write a better one
     Diagnose(Diagnose),
+    /// Run many tasks as one: trainings, simulations, verifications, certificates, diagnoses, proofs, on all cores or a cluster
+    Campaign(Campaign),
+    /// Put the folders of a campaign that ran on several machines together
+    Merge(Merge),
     /// Inspect, compile and verify the built-in example
     Demo(Demo),
     /// Duty ratio mapping: acquire settled points, fit drm.toml, judge it
@@ -81,7 +87,11 @@ impl Command {
     pub fn ends_by_itself(&self) -> bool {
         matches!(
             self,
-            Command::Prove(_) | Command::Simulate(_) | Command::Train(_) | Command::Drm(Drm::Transfer(_))
+            Command::Campaign(_)
+                | Command::Prove(_)
+                | Command::Simulate(_)
+                | Command::Train(_)
+                | Command::Drm(Drm::Transfer(_))
         )
     }
 }
@@ -269,6 +279,13 @@ pub struct Simulate {
     /// Plant file in the place of the scenario's
     #[arg(long, value_name = "PLANT")]
     pub plant: Option<PathBuf>,
+    /// Design the classical controllers on this plant file, not on the plant they run on
+    #[arg(long, value_name = "PLANT")]
+    pub designed_on: Option<PathBuf>,
+    /// Judge all controllers on converters with other values of a number of the plant, too; the classical ones keep their design.
+    /// Given twice, every value meets every other, and the page has a map. N is 5 unless given
+    #[arg(long, value_name = "KEY=LOW,HIGH[,N]")]
+    pub spread: Vec<String>,
     /// Folder for metrics, trajectories and pictures; made if missing
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,

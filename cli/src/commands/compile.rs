@@ -46,6 +46,8 @@ pub struct Made {
     files: Files,
     archives: Vec<Archive>,
     costs: StepCosts,
+    /// What the format does to the trainer's decisions, in words; empty where it changes none.
+    decisions: Vec<String>,
 }
 
 impl Made {
@@ -85,7 +87,7 @@ pub fn run(options: &Compile) -> Result<Outcome, Failure> {
         say_json(options, &policy, &made, &costs, budget)?;
         return Ok(Outcome::Done);
     }
-    say(&policy, made.target, &written, &made.archives)?;
+    say(&policy, made.target, &written, &made.archives, &made.decisions)?;
     for text in &costs {
         output::say(text)?;
     }
@@ -152,6 +154,7 @@ fn say_json(
     let sizes = manifest::sizes(policy, made.target);
     let files = together(&made.files, &made.archives);
     let mut notes = noted(policy, made.target, &sizes, files.keys().map(Path::new));
+    notes.extend(made.decisions.iter().map(|line| line.trim().to_owned()));
     notes.extend(costs.iter().flat_map(|text| talk::notes_of(text)));
     notes.iter().for_each(|note| talk::note(note));
     let written = |(path, content): (&String, &Vec<u8>)| Written {
@@ -191,7 +194,7 @@ fn noted<'f>(
 /// If the network does not give the trainer's answers, or there is no such target, or an output cannot be made.
 pub fn make(policy: &Policy, request: &Request) -> Result<Made, Failure> {
     let target = codegen::target(&request.target)?;
-    check(policy, request.golden_decisions)?;
+    let decisions = check(policy, request.golden_decisions)?;
     let outputs = with_cores(&request.emit);
     let expected = verify::kit::expected(policy, target, &outputs, request.kit_steps)?;
     let mut files = codegen::generate(policy, target, &outputs, expected.as_ref())?.files;
@@ -203,18 +206,30 @@ pub fn make(policy: &Policy, request: &Request) -> Result<Made, Failure> {
         files,
         archives,
         costs,
+        decisions,
     })
 }
 
-/// Refuses a policy whose network does not give the trainer's answers.
-fn check(policy: &Policy, golden_decisions: Option<f64>) -> Result<(), Failure> {
+/// Refuses a policy whose network does not give the trainer's answers, or whose format changes too many of them; says of the rest
+/// which are changed.
+fn check(policy: &Policy, golden_decisions: Option<f64>) -> Result<Vec<String>, Failure> {
     super::no_choices(policy, golden_decisions)?;
     if let Some(golden) = verify::golden_result(policy).filter(|golden| !golden.passed()) {
         let message = Message::new("the network does not give the trainer's golden answers; nothing was written");
         return Err(message.found(golden.to_string()).hint(golden.hint()).into());
     }
-    match verify::decisions(policy, golden_decisions).filter(|decisions| !decisions.kept()) {
-        None => Ok(()),
+    match verify::decisions(policy, golden_decisions) {
+        None => Ok(Vec::new()),
+        Some(decisions) if decisions.kept() => {
+            let changes = match &decisions {
+                Decisions::Choice(choices) => choices.changed > 0,
+                Decisions::Continuous(_) => policy.numeric_format.is_integer(),
+            };
+            // the counts; where it changes most is told by `inspect`
+            let mut lines = text::decisions(policy, &decisions);
+            lines.truncate(2);
+            Ok(if changes { lines } else { Vec::new() })
+        }
         Some(decisions) => {
             let remedy = decisions.remedy();
             let (problem, hint) = match &decisions {
@@ -284,12 +299,16 @@ pub fn say(
     target: &TargetSpec,
     written: &[(PathBuf, usize)],
     archives: &[Archive],
+    decisions: &[String],
 ) -> Result<(), Failure> {
     let sizes = manifest::sizes(policy, target);
     for note in noted(policy, target, &sizes, written.iter().map(|(path, _)| path.as_path())) {
         output::say(&format!("note: {note}"))?;
     }
     output::say(&format!("{}: {sizes}", policy.name))?;
+    for line in decisions {
+        output::say(line)?;
+    }
     for (path, length) in written {
         output::say(&format!("  {} ({})", path.display(), bytes(*length)))?;
     }

@@ -48,7 +48,7 @@ pub fn run(options: &Demo) -> Result<Outcome, Failure> {
     let target = ::targets::host();
     let files = codegen::generate(&policy, target, &Output::CORES, None)?.files;
     let written = compile::write(&generated, &files, &[], options.replacing)?;
-    compile::say(&policy, target, &written, &[])?;
+    compile::say(&policy, target, &written, &[], &[])?;
 
     let (policy, generated) = (policy_folder.display(), generated.display());
     heading(

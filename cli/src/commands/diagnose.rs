@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::Instant;
 
+use ::diagnose::capture::estimates::Estimates;
 use ::diagnose::control::Request;
 use ::diagnose::diagnosis::{Diagnosis, diagnose};
 use ::diagnose::extend::{extended_toml, partial_toml};
@@ -118,6 +119,7 @@ fn answer(options: &Diagnose, columns: &ColumnMap, findings: &Findings) -> Resul
     for held in unsaid.filter(|held| held.regime == Regime::All) {
         lines.push(held.words());
     }
+    lines.extend(findings.captures.iter().map(Estimates::words));
     lines.extend(findings.noise.repairs.iter().map(|repair| format!("note: {repair}")));
     if let Some(reason) = &findings.gain.closed_loop_missing {
         lines.push(format!(

@@ -1,7 +1,7 @@
 //! `policyc limit`
 
 use closed_loop::limit::{Question, left_out};
-use closed_loop::{LoadKind, LoadStep, band_text, holds_power, limits};
+use closed_loop::{LoadKind, LoadStep, band_text, holds_power, limits, reaches};
 use plant::Parameters;
 use toml_input::Message;
 
@@ -13,7 +13,7 @@ use crate::talk;
 
 /// Prints a table of limits.
 pub fn run(options: &Limit) -> Result<Outcome, Failure> {
-    let plant = Parameters::buck_from_file(options.plant.as_path(), "the limit")?;
+    let plant = Parameters::from_file(options.plant.as_path())?;
     let [low, high] = options.duty;
     if !(0.0..high).contains(&low) || high > 1.0 {
         let message = Message::new("--duty is no range").found(format!("{low},{high}"));
@@ -24,6 +24,7 @@ pub fn run(options: &Limit) -> Result<Outcome, Failure> {
         let message = Message::new("--v-ref is no voltage").found(options.v_ref.to_string());
         return Err(message.expected("more than 0 V").into());
     }
+    reaches(&plant, options.v_ref, &options.plant)?;
     let outside = |step: &&LoadStep| {
         let range = step.kind.range();
         step.values.iter().any(|value| !range.contains(value))

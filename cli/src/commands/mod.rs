@@ -1,5 +1,6 @@
 //! One file per command.
 
+pub mod campaign;
 pub mod certify;
 pub mod compile;
 pub mod completions;
@@ -11,8 +12,9 @@ pub mod drm;
 pub mod inspect;
 pub mod limit;
 pub mod manpages;
+pub mod merge;
 pub mod new;
-mod progress_line;
+pub mod progress_line;
 pub mod prove;
 pub mod replay;
 pub mod simulate;

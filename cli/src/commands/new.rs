@@ -57,7 +57,7 @@ fn for_weights(options: &New, weights: &Path) -> Result<Outcome, Failure> {
 }
 
 fn for_plant(options: &New, file: &Path, wanted: Wanted) -> Result<Outcome, Failure> {
-    let plant = Parameters::buck_from_file(file, "`new --plant`")?;
+    let plant = Parameters::from_file(file)?;
     let start = Start::new(&plant, file, wanted)?;
     let out = &contract(&options.out);
     let from_there = |path: &Path| -> Result<String, Failure> {

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 
 use closed_loop::Scenario;
-use closed_loop::simulation::{Findings, PAGE, Setting, simulate};
+use closed_loop::simulation::{Findings, PAGE, Setting, Spread, simulate};
 use serde::Serialize;
 
 use super::controllers;
@@ -64,12 +64,17 @@ pub fn run(options: &Simulate) -> Result<Outcome, Failure> {
 fn setting(options: &Simulate) -> Result<Setting, Failure> {
     let scenario = Scenario::load(&options.scenario)?;
     let policy = super::load_as(&options.policy, options.outside, options.format)?;
-    Ok(Setting::new(
-        &options.scenario,
-        scenario,
-        policy,
-        options.plant.as_deref(),
-    )?)
+    let setting = Setting::new(&options.scenario, scenario, policy, options.plant.as_deref())?;
+    let spread = options
+        .spread
+        .iter()
+        .map(|text| Spread::parse(text))
+        .collect::<Result<_, _>>()?;
+    let setting = setting.spread(spread)?;
+    Ok(match &options.designed_on {
+        None => setting,
+        Some(file) => setting.designed_on(file)?,
+    })
 }
 
 /// Name and text of every file of a simulation; nothing is written.

@@ -7,11 +7,12 @@ use super::Design;
 /// PI on the output voltage that sets the current of a PI on the inductor current.
 ///
 /// The tuning rule: `GAINS`, in units in which 1 is deadbeat (`L/(T v_in)` of duty per ampere, `C/T` of current per
-/// volt), so that they hold for any L, C and T.
+/// volt), so that they hold for any L, C and T. With another topology these are `L/(T V)`, V being what the duty switches to
+/// the inductor, and `C/(T D')`, and the voltage loop stays below the zero in the right half-plane (`OF_ZERO`).
 #[derive(Debug, Clone)]
 pub struct Cascade {
     v_ref: f64,
-    half_ripple: f64,
+    below_mean: f64,
     voltage: Pi,
     current: Pi,
 }
@@ -52,29 +53,30 @@ impl Cascade {
     pub fn new(design: &Design) -> Self {
         let [current, voltage, current_share, voltage_share] = GAINS[design.delay.min(1)];
         let n = design.delay.max(1) as f64;
+        let outer = f64::max(n, voltage * design.periods_of_zero(design.i_out));
         Self {
             v_ref: design.v_ref,
-            half_ripple: design.half_ripple(),
+            below_mean: design.below_mean(),
             voltage: Pi {
-                gain: voltage * design.c / design.t / n,
-                share: voltage_share / n,
+                gain: voltage * design.c / design.t / design.give() / outer,
+                share: voltage_share / outer,
                 sum: None,
                 // no limit of current is known of a plant
                 range: [f64::NEG_INFINITY, f64::INFINITY],
             },
             current: Pi {
-                gain: current * design.l / design.t / design.v_in / n,
+                gain: current * design.l / design.t / design.span() / n,
                 share: current_share / n,
                 sum: Some(design.rest()),
-                range: [0.0, 1.0],
+                range: [0.0, design.most()],
             },
         }
     }
 
     /// The duty for a measurement.
     pub fn step(&mut self, measured: &Signals) -> f64 {
-        // the sample is taken at the valley, and what the load needs is the mean
-        let i_l = measured.i_l + self.half_ripple;
+        // the sample may be taken at the valley, and what the load needs is the mean
+        let i_l = measured.i_l + self.below_mean;
         let i_ref = self.voltage.step(self.v_ref - measured.v_out, i_l);
         // its sum begins at the duty at rest, so this start is never taken
         self.current.step(i_ref - i_l, 0.0)

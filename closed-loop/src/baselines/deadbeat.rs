@@ -33,10 +33,10 @@ impl Deadbeat {
     ///
     /// # Errors
     /// If the parameters are not those of a converter.
-    pub fn new(parameters: &Parameters, v_ref: f64) -> Result<Self, Error> {
-        parameters.require_buck("a classical controller")?;
-        let design = Design::new(parameters, v_ref);
+    pub fn new(parameters: &Parameters, design: &Design) -> Result<Self, Error> {
+        let design = *design;
         let mut model = Parameters::ideal(design.v_in, design.l, design.c, 1.0 / design.t);
+        model.converter.topology = design.topology;
         model.converter.rectifier = parameters.converter.rectifier;
         model.converter.model = parameters.converter.model;
         // as given, because 1 / t may round: model and plant must have the same period to the bit
@@ -45,7 +45,7 @@ impl Deadbeat {
         model.load.v_fold = parameters.load.v_fold;
         model.pwm.sampling_phase = parameters.pwm.sampling_phase;
         Ok(Self {
-            planner: TimeOptimal::new(&model, v_ref, [0.0, 1.0])?,
+            planner: TimeOptimal::new(&model, design.v_ref, [0.0, design.most()])?,
             pending: vec![design.rest(); design.delay],
             has_diode: parameters.converter.rectifier == Rectifier::Diode,
             correction: 0.0,
@@ -58,7 +58,7 @@ impl Deadbeat {
     pub fn step(&mut self, measured: &Signals) -> f64 {
         let (mut v, mut i) = (measured.v_out, measured.i_l);
         let load = Load::power(v * measured.i_out);
-        let gain = self.design.v_in * self.design.t / self.design.l;
+        let gain = self.design.span() * self.design.t / self.design.l;
         // a current that rests at 0 A does so at many duties, and says nothing of losses
         if let Some(expected) = self.expected
             && (i > 0.0 || !self.has_diode)
@@ -71,16 +71,16 @@ impl Deadbeat {
             // with a delay the next sample is decided by the oldest duty under way
             expected = expected.or(Some(i));
         }
-        let valley = load.power / self.design.v_ref - self.design.half_ripple();
+        let valley = load.power / self.design.v_ref / self.design.give() - self.design.below_mean();
         let target = Target {
             v_out: self.design.v_ref,
             // a diode blocks: only a synchronous leg has a valley below 0
             i_l: if self.has_diode { valley.max(0.0) } else { valley },
         };
         let planned = self.planner.duty(v, i, &load, target);
-        let duty = (planned + self.correction).clamp(0.0, 1.0);
+        let duty = (planned + self.correction).clamp(0.0, self.design.most());
         // what the model is to believe: the duty less its correction
-        let believed = (duty - self.correction).clamp(0.0, 1.0);
+        let believed = (duty - self.correction).clamp(0.0, self.design.most());
         if expected.is_none() {
             expected = Some(self.planner.predict(v, i, believed, &load).1);
         }

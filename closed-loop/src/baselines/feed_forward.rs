@@ -11,11 +11,13 @@ use super::Design;
 /// (`duty = (v + L/T (i_ref - i_l))/v_in`) on current and voltage predicted over the delay. For the losses that this leaves
 /// out, an integral of the voltage error with `INTEGRAL_PERIODS` as its time, at rest only: while the correction is
 /// below the ripple.
+///
+/// With another topology the current is `i_out/D'` and the law of the current `(V_0 + L/T (i_ref - i_l))/V`, V being what the
+/// duty switches to the inductor and V_0 what stands against it; the voltage's share stays below the zero in the right
+/// half-plane (`OF_ZERO`) at the load that is measured.
 #[derive(Debug, Clone)]
 pub struct FeedForward {
     design: Design,
-    gain: f64,
-    integral: f64,
     sum: f64,
     /// Commanded, not yet in force; the oldest first.
     pending: Vec<f64>,
@@ -29,11 +31,7 @@ impl FeedForward {
     /// Designed by the rule above.
     #[must_use]
     pub fn new(design: &Design) -> Self {
-        let n = (1 + design.delay) as f64;
-        let gain = design.c / design.t / (2.0 * n);
         Self {
-            gain,
-            integral: gain / (INTEGRAL_PERIODS * n),
             sum: 0.0,
             pending: vec![design.rest(); design.delay],
             design: *design,
@@ -42,21 +40,32 @@ impl FeedForward {
 
     /// The duty for a measurement.
     pub fn step(&mut self, measured: &Signals) -> f64 {
-        let Design { l, c, t, v_ref, .. } = self.design;
-        let half_ripple = self.design.half_ripple();
+        let Design {
+            l,
+            c,
+            t,
+            v_ref,
+            topology,
+            ..
+        } = self.design;
+        let (half_ripple, below_mean) = (self.design.half_ripple(), self.design.below_mean());
+        let n = (1 + self.design.delay) as f64;
+        let gain = self.design.by_voltage(measured.i_out);
+        let integral = gain / (INTEGRAL_PERIODS * n);
         let (mut v, mut i) = (measured.v_out, measured.i_l);
         // what is commanded now acts behind these: control the state in which it will be met
         for duty in &self.pending {
-            let next = i + t / l * (duty * measured.v_in - v);
-            v += t / c * (0.5 * (i + next) + half_ripple - measured.i_out);
+            let (span, level) = (topology.span(measured.v_in, v), topology.level(measured.v_in, v));
+            let next = i + t / l * (duty * span - level);
+            v += t / c * (topology.give(*duty) * (0.5 * (i + next) + below_mean) - measured.i_out);
             i = next;
         }
-        let i_ref = measured.i_out - half_ripple + self.gain * (v_ref - v) + self.sum;
-        let wanted = (v + l / t * (i_ref - i)) / measured.v_in;
-        let duty = wanted.clamp(0.0, 1.0);
+        let i_ref = measured.i_out / self.design.give() - below_mean + gain * (v_ref - v) + self.sum;
+        let wanted = (topology.level(measured.v_in, v) + l / t * (i_ref - i)) / topology.span(measured.v_in, v);
+        let duty = wanted.clamp(0.0, self.design.most());
         // only at rest: in a transient the sum would grow by an error that is not due to losses
-        if duty == wanted && (self.gain * (v_ref - v)).abs() < half_ripple {
-            self.sum += self.integral * (v_ref - v);
+        if duty == wanted && (gain * (v_ref - v)).abs() < half_ripple {
+            self.sum += integral * (v_ref - v);
         }
         if !self.pending.is_empty() {
             self.pending.remove(0);

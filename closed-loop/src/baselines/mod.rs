@@ -4,6 +4,11 @@
 //! [`Cascade`] were found by random search for little deviation and settling time on the paper's plants and load steps, so
 //! these two are tuned to what they are shown on; [`FeedForward`] and [`Deadbeat`] follow from the circuit, but for how fast
 //! they learn its losses.
+//!
+//! A boost and a buck-boost have the same inner loops: what a duty does to the current follows from the circuit. Their output
+//! answers the wrong way at first, by a zero in the right half-plane at `D'^2 R/L` (boost) or `D'^2 R/(D L)` (buck-boost;
+//! Erickson and Maksimovic, Fundamentals of Power Electronics, table 8.2), so whatever regulates the voltage stays at
+//! [`OF_ZERO`] of it.
 
 mod cascade;
 mod deadbeat;
@@ -12,7 +17,8 @@ mod pid;
 
 use std::fmt;
 
-use plant::{Parameters, Sample, Signals};
+use plant::{Carrier, Parameters, Sample, Signals, Topology};
+use toml_input::Message;
 
 use crate::faults::Error;
 
@@ -71,14 +77,36 @@ pub struct Design {
     pub v_ref: f64,
     /// Whole periods a duty waits.
     pub delay: usize,
+    /// The converter.
+    pub topology: Topology,
+    /// Where the current is sampled: 1 at its valley, 0 at its mean, -1 at its peak.
+    pub below_mean: f64,
+    /// Largest load current, A; a buck's design does without.
+    pub i_out: f64,
 }
+
+/// Share of the zero in the right half-plane at which a voltage loop may cross over.
+// at a fifth it costs 11 degrees of phase; the regulator of `plant::settle` takes the same
+pub const OF_ZERO: f64 = 0.2;
+/// Crossover over resonance of L and C from which on the converter looks like the double integrator that `Pid` is made for.
+// below, the loop gain falls through 1 on the resonance, where nothing damps a load of constant power
+const ABOVE_RESONANCE: f64 = 2.0;
+/// Largest duty of a converter whose output receives nothing at 1, as in `plant::settle`.
+const MOST: f64 = 0.95;
 
 impl Design {
     /// Reads the nominal values off a plant.
     #[must_use]
-    pub fn new(parameters: &Parameters, v_ref: f64) -> Self {
+    pub fn new(parameters: &Parameters, v_ref: f64, i_out: f64) -> Self {
         let converter = &parameters.converter;
         Self {
+            topology: converter.topology,
+            below_mean: match parameters.pwm.carrier {
+                Carrier::Trailing => 1.0,
+                Carrier::Centre => 0.0,
+                Carrier::Leading => -1.0,
+            },
+            i_out,
             l: converter.inductance,
             c: converter.capacitance,
             t: parameters.t_sw(),
@@ -88,15 +116,52 @@ impl Design {
         }
     }
 
+    /// How far the sampled current lies below its mean over the period, A.
+    pub(crate) fn below_mean(&self) -> f64 {
+        self.below_mean * self.half_ripple()
+    }
+
     /// How far the current at the valley lies below its mean over the period, A.
-    fn half_ripple(&self) -> f64 {
-        // half of (v_in - v_ref) d t / l with d = v_ref / v_in
-        0.5 * self.v_ref * (1.0 - self.v_ref / self.v_in) * self.t / self.l
+    pub(crate) fn half_ripple(&self) -> f64 {
+        0.5 * self.topology.ripple(self.v_in, self.v_ref) * self.t / self.l
     }
 
     /// The duty that holds `v_ref` without losses.
-    fn rest(&self) -> f64 {
-        self.v_ref / self.v_in
+    pub(crate) fn rest(&self) -> f64 {
+        self.topology.duty(self.v_in, self.v_ref)
+    }
+
+    /// Share of the inductor's current that the output receives at rest.
+    pub(crate) fn give(&self) -> f64 {
+        self.topology.give(self.rest())
+    }
+
+    /// What a duty of 1 adds to the voltage at the inductor at rest, V.
+    pub(crate) fn span(&self) -> f64 {
+        self.topology.span(self.v_in, self.v_ref)
+    }
+
+    /// Control periods of the fastest crossover of a voltage loop at a load of `i_out` A: `1/(w T)`.
+    fn periods_of_zero(&self, i_out: f64) -> f64 {
+        let zero = self
+            .topology
+            .right_half_plane_zero(self.v_in, self.v_ref, i_out, self.l);
+        1.0 / (OF_ZERO * zero * self.t)
+    }
+
+    /// Current per volt of error that a voltage loop may ask for at a load of `i_out` A, A/V: half of what is missing in as many
+    /// periods as a duty takes, or what the zero leaves.
+    pub(crate) fn by_voltage(&self, i_out: f64) -> f64 {
+        let paced = f64::max(2.0 * (1 + self.delay) as f64, self.periods_of_zero(i_out));
+        self.c / self.t / paced / self.give()
+    }
+
+    /// Largest duty.
+    fn most(&self) -> f64 {
+        match self.topology {
+            Topology::Buck => 1.0,
+            Topology::Boost | Topology::BuckBoost => MOST,
+        }
     }
 }
 
@@ -114,18 +179,18 @@ pub enum Baseline {
 }
 
 impl Baseline {
-    /// A controller designed for the plant with these parameters.
+    /// A controller designed for the plant with these parameters and loads up to `i_out` A.
     ///
     /// # Errors
-    /// If the parameters are not those of a buck converter: the designs hold for no other.
-    pub fn new(kind: Kind, parameters: &Parameters, v_ref: f64) -> Result<Self, Error> {
-        parameters.require_buck("a classical controller")?;
-        let design = Design::new(parameters, v_ref);
+    /// If there is no such controller for the plant: a PID controller on the voltage of a converter whose zero in the right
+    /// half-plane lies near its resonance.
+    pub fn new(kind: Kind, parameters: &Parameters, v_ref: f64, i_out: f64) -> Result<Self, Error> {
+        let design = Design::new(parameters, v_ref, i_out);
         Ok(match kind {
-            Kind::Pid => Self::Pid(Pid::new(&design)),
+            Kind::Pid => Self::Pid(Pid::new(&designed_above_resonance(design)?)),
             Kind::Cascade => Self::Cascade(Cascade::new(&design)),
             Kind::FeedForward => Self::FeedForward(FeedForward::new(&design)),
-            Kind::Deadbeat => Self::Deadbeat(Box::new(Deadbeat::new(parameters, v_ref)?)),
+            Kind::Deadbeat => Self::Deadbeat(Box::new(Deadbeat::new(parameters, &design)?)),
         })
     }
 
@@ -143,4 +208,30 @@ impl Baseline {
             Self::Deadbeat(controller) => controller.step(measured),
         }
     }
+}
+
+/// The design, if a voltage loop may cross over well above the resonance.
+fn designed_above_resonance(design: Design) -> Result<Design, Error> {
+    let crossover = 1.0 / (design.periods_of_zero(design.i_out) * design.t);
+    let resonance = design.give() / (design.l * design.c).sqrt();
+    if crossover >= ABOVE_RESONANCE * resonance {
+        return Ok(design);
+    }
+    let hertz = |angular: f64| format!("{:.3} kHz", 1e-3 * angular / std::f64::consts::TAU);
+    let word = design.topology.word();
+    let message = Message::new(format!(
+        "a PID controller on the voltage cannot hold this {word} converter"
+    ));
+    let found = format!(
+        "a zero in the right half-plane at {} with a load of {:.3} A, a resonance at {}",
+        hertz(crossover / OF_ZERO),
+        design.i_out,
+        hertz(resonance)
+    );
+    let least = ABOVE_RESONANCE / OF_ZERO;
+    Err(message
+        .found(found)
+        .expected(format!("a zero at {least} times the resonance at least"))
+        .hint("`cascade`, `feed-forward` and `deadbeat` measure the current and do without")
+        .into())
 }

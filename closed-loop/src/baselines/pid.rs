@@ -8,7 +8,8 @@ use super::Design;
 ///
 /// The tuning rule: to a voltage controller the converter is nearly a double integrator,
 /// `(z-1)^2 E = b (z+1)/2 D` with `b = v_in T^2/(L C)`; the gains are `GAINS` over b, so that they hold for any L, C
-/// and T.
+/// and T. With another topology `b = V D' T^2/(L C)`, V being what the duty switches to the inductor, and the crossover stays
+/// below the zero in the right half-plane (`OF_ZERO`).
 #[derive(Debug, Clone)]
 pub struct Pid {
     v_ref: f64,
@@ -17,6 +18,7 @@ pub struct Pid {
     integral: f64,
     sum: f64,
     last: Option<f64>,
+    most: f64,
 }
 
 /// `b Kp`, `b Kd` and `b Ki` per period, without delay and with one period of it. Found by random search for the least
@@ -29,14 +31,19 @@ impl Pid {
     #[must_use]
     pub fn new(design: &Design) -> Self {
         let [proportional, derivative, integral] = GAINS[design.delay.min(1)];
-        let n = design.delay.max(1) as f64;
-        let unit = design.l * design.c / (design.v_in * design.t * design.t);
+        // the derivative makes the crossover: its gain over the periods
+        let n = f64::max(
+            design.delay.max(1) as f64,
+            derivative * design.periods_of_zero(design.i_out),
+        );
+        let unit = design.l * design.c / (design.span() * design.t * design.t) / design.give();
         Self {
             v_ref: design.v_ref,
             proportional: proportional * unit / (n * n),
             derivative: derivative * unit / n,
             integral: integral * unit / (n * n * n),
             sum: design.rest(),
+            most: design.most(),
             last: None,
         }
     }
@@ -48,7 +55,7 @@ impl Pid {
         let change = error - self.last.unwrap_or(error);
         self.last = Some(error);
         let wanted = self.sum + self.proportional * error + self.derivative * change;
-        let duty = wanted.clamp(0.0, 1.0);
+        let duty = wanted.clamp(0.0, self.most);
         // at a limit the sum stands still, else it winds up
         if duty == wanted {
             self.sum += self.integral * error;

@@ -5,6 +5,7 @@
 //!                          └─► double pole ─────────► base of [actions]
 //! ```
 
+mod current;
 mod kalman;
 mod text;
 
@@ -13,6 +14,7 @@ use toml_input::Message;
 
 use crate::faults::Error;
 
+pub use current::CurrentLaw;
 pub use kalman::{Filter, Model, Noise};
 pub use text::rounded;
 

@@ -9,7 +9,7 @@ use super::{page, pictures, words};
 use crate::faults::{Error, told};
 use crate::limit::Bound;
 use crate::scenario::Metrics;
-use crate::tables::{MetricsCsv, comparison, trajectory_csv};
+use crate::tables::{MetricsCsv, at_rest, comparison, trajectory_csv};
 
 /// Name of the page with everything on it, among the files.
 pub const PAGE: &str = "report.html";
@@ -76,7 +76,18 @@ impl Findings {
         files.insert("metrics.csv".to_owned(), metrics.finish());
         files.insert("metrics.json".to_owned(), json(self)?);
         files.insert("summary.txt".to_owned(), self.summary());
-        files.insert(PAGE.to_owned(), page::page(self, drawn)?);
+        let mut maps = Vec::new();
+        if let Some(spread) = &self.spread {
+            files.insert("spread.csv".to_owned(), spread.csv());
+            maps = spread.maps()?;
+            for (name, svg) in &maps {
+                files.insert(
+                    format!("spread-{}.svg", name.replace(' ', "-")),
+                    svg.as_str().to_owned(),
+                );
+            }
+        }
+        files.insert(PAGE.to_owned(), page::page(self, drawn, maps)?);
         Ok(files)
     }
 
@@ -95,9 +106,14 @@ impl Findings {
         for step in &self.steps {
             let courses = step.courses.iter();
             let controllers = courses.map(|(name, course)| (name.as_str(), &course.finding));
+            let resting = controllers.clone();
             let limits = step.limits.iter().map(|(name, limit)| (name.as_str(), limit));
             out.push('\n');
             out.push_str(&comparison(step.step, controllers, limits));
+            out.push_str(&at_rest(resting));
+        }
+        if let Some(spread) = &self.spread {
+            out.push_str(&format!("\n{}", spread.text()));
         }
         if let Some(check) = &self.check {
             out.push_str(&format!("\n{}\n", words::check_text(check)));
@@ -123,6 +139,7 @@ impl Findings {
             controller,
             steps,
             check,
+            ..
         } = self;
         Json {
             policy: &setting.policy.name,

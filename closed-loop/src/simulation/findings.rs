@@ -2,9 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use plant::Parameters;
 use policy::Policy;
 use toml_input::{Fault, FileName, Message};
 
+use super::spread::{Spread, Spreads};
 use crate::converter::Converter;
 use crate::course::Course;
 use crate::faults::Error;
@@ -29,6 +31,10 @@ pub struct Setting {
     pub plant: PathBuf,
     /// The plant, with the scenario's numbers in it.
     pub converter: Converter,
+    /// What the classical controllers are designed on: the plant, unless told otherwise.
+    pub designed_on: Parameters,
+    /// One or two numbers of the plant, on whose values all controllers are judged as well.
+    pub spread: Vec<Spread>,
     /// Voltage to hold, V.
     pub v_ref: f64,
     /// What the user should know of the scenario, one sentence each.
@@ -68,6 +74,8 @@ pub struct Findings {
     pub steps: Vec<Step>,
     /// If there was more than one controller of the policy.
     pub check: Option<Check>,
+    /// If the setting has a spread.
+    pub spread: Option<Spreads>,
 }
 
 impl Setting {
@@ -95,9 +103,47 @@ impl Setting {
             scenario,
             policy,
             plant,
+            designed_on: converter.parameters().clone(),
+            spread: Vec::new(),
             converter,
             v_ref,
         })
+    }
+}
+
+impl Setting {
+    /// The classical controllers are designed on the converter of another plant's file.
+    ///
+    /// # Errors
+    /// If the file is no plant, or one of another topology or control period, for which a design would mean nothing here.
+    pub fn designed_on(mut self, file: &Path) -> Result<Self, Error> {
+        let nominal = Parameters::from_file(FileName::new(file))?;
+        let (ours, theirs) = (self.converter.parameters(), &nominal);
+        if ours.converter.topology != theirs.converter.topology || ours.converter.f_sw != theirs.converter.f_sw {
+            let word = |p: &Parameters| format!("a {} at {} Hz", p.converter.topology.word(), p.converter.f_sw);
+            let message =
+                Message::new("a controller designed on this converter is none for the plant").found(word(theirs));
+            return Err(Fault::in_file(file, message.expected(word(ours))).into());
+        }
+        self.notes
+            .push(format!("the classical controllers are designed on {}", file.display()));
+        self.designed_on = nominal;
+        Ok(self)
+    }
+
+    /// All controllers are judged on a spread of the plant, too; the classical ones keep their design.
+    ///
+    /// # Errors
+    /// If there are more than two numbers, or one twice.
+    pub fn spread(mut self, spread: Vec<Spread>) -> Result<Self, Error> {
+        let twice = matches!(spread.as_slice(), [a, b] if a.key == b.key);
+        if spread.len() > 2 || twice {
+            let keys: Vec<&str> = spread.iter().map(|spread| spread.key.as_str()).collect();
+            let message = Message::new("a spread is of one number or of two").found(keys.join(", "));
+            return Err(message.expected("--spread once or twice, with different keys").into());
+        }
+        self.spread = spread;
+        Ok(self)
     }
 }
 

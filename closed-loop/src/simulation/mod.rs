@@ -11,9 +11,11 @@ mod findings;
 mod page;
 mod pictures;
 mod runs;
+mod spread;
 mod words;
 
 pub use files::PAGE;
 pub use findings::{Check, Findings, POLICY, Setting, Step};
 pub use runs::simulate;
+pub use spread::{Cell, Spread, Spreads};
 pub use words::band_text;

@@ -6,10 +6,10 @@ use super::findings::{Findings, Step};
 use super::words;
 use crate::faults::{Error, told};
 use crate::scenario::Metrics;
-use crate::tables::{COLUMNS, cells, digits, limit_cells, time_digits};
+use crate::tables::{AT_REST, COLUMNS, cells, digits, limit_cells, rest_cells, time_digits};
 
-/// One HTML file; `drawn` are the pictures of the load steps in their order.
-pub(super) fn page(found: &Findings, drawn: Vec<Svg>) -> Result<String, Error> {
+/// One HTML file; `drawn` are the pictures of the load steps in their order, `maps` those of the spread.
+pub(super) fn page(found: &Findings, drawn: Vec<Svg>, maps: Vec<(String, Svg)>) -> Result<String, Error> {
     let setting = &found.setting;
     let (verdict, sentence) = verdict(found);
     let setup = [
@@ -26,7 +26,10 @@ pub(super) fn page(found: &Findings, drawn: Vec<Svg>) -> Result<String, Error> {
         .section(about);
     for (step, picture) in found.steps.iter().zip(drawn) {
         let section = Section::new(step.step.to_string()).chart(picture, CAPTION);
-        page = page.section(section.table(table(step)));
+        page = page.section(section.table(table(step)).table(at_rest(step)));
+    }
+    if let Some(spread) = &found.spread {
+        page = page.section(spread.section(maps));
     }
     page.html().map_err(told)
 }
@@ -94,6 +97,19 @@ fn table(step: &Step) -> Table {
         let blank = std::iter::repeat_n(Cell::from("-"), COLUMNS.len() - 2);
         let cells = [Cell::from(name.as_str()), deviation, settling];
         table = table.row(cells.into_iter().chain(blank));
+    }
+    table
+}
+
+/// What each controller does once the load step is over.
+fn at_rest(step: &Step) -> Table {
+    let mut table = Table::new("").text("at rest after it");
+    for heading in AT_REST {
+        table = table.text(heading);
+    }
+    for (name, course) in &step.courses {
+        let cells = rest_cells(&course.finding).into_iter().map(Cell::from);
+        table = table.row([Cell::from(name.as_str())].into_iter().chain(cells));
     }
     table
 }

@@ -1,10 +1,10 @@
 //! All controllers over all load steps.
 
-use plant::Topology;
 use policy::Scalar;
 use toml_input::{Fault, Message};
 
 use super::findings::{Check, Findings, LAW, POLICY, Setting, Step};
+use super::spread;
 use crate::agent::Agent;
 use crate::baselines::Baseline;
 use crate::controller::{Classical, Controller, Trajectory, follow};
@@ -45,18 +45,7 @@ pub fn simulate(mut setting: Setting, mut named: Vec<Named>, tell: &mut Tell<'_>
         differences: Vec::new(),
     });
     let mut beside = law(&setting)?.into_iter().collect::<Vec<_>>();
-    let topology = setting.converter.parameters().converter.topology;
-    if topology != Topology::Buck && !setting.scenario.baselines.is_empty() {
-        let word = topology.word();
-        let left_out =
-            format!("no classical controllers beside the policy: they have no design for a {word} converter");
-        setting.notes.push(left_out);
-        setting.scenario.baselines.clear();
-    }
-    for kind in &setting.scenario.baselines {
-        let design = Baseline::new(*kind, setting.converter.parameters(), setting.v_ref)?;
-        beside.push((kind.name(), Box::new(Classical::from(design))));
-    }
+    beside.extend(classical(&mut setting));
     let load_steps = setting.scenario.load_steps.clone();
     let mut progress = Progress {
         tell,
@@ -81,12 +70,39 @@ pub fn simulate(mut setting: Setting, mut named: Vec<Named>, tell: &mut Tell<'_>
         steps.push(Step { step, courses, limits });
         progress.done += 1;
     }
+    let mut all: Vec<(&str, &mut Box<dyn Controller>)> = Vec::new();
+    all.extend(named.first_mut().map(|first| (POLICY, &mut first.controller)));
+    all.extend(beside.iter_mut().map(|(name, controller)| (*name, controller)));
+    let spread = spread::run(&setting, &mut all, &mut |what| (progress.tell)(&format_args!("{what}")))?;
     Ok(Findings {
+        spread,
         controller: named.first().map(|named| named.name.clone()).unwrap_or_default(),
         setting,
         steps,
         check,
     })
+}
+
+/// The classical controllers of the scenario; a reason why there is no design of one becomes a note.
+fn classical(setting: &mut Setting) -> Vec<Beside> {
+    let v_ref = setting.v_ref;
+    let loads = setting.scenario.load_steps.iter().flat_map(LoadStep::loads);
+    let i_out = loads.map(|load| load.at(v_ref)).fold(0.0, f64::max);
+    let mut found: Vec<Beside> = Vec::new();
+    for kind in &setting.scenario.baselines {
+        match Baseline::new(*kind, &setting.designed_on, v_ref, i_out) {
+            Ok(design) => found.push((kind.name(), Box::new(Classical::from(design)))),
+            Err(error) => setting.notes.extend(error.iter().map(reason)),
+        }
+    }
+    found
+}
+
+fn reason(fault: &Fault) -> String {
+    match &fault.found {
+        Some(found) => format!("{}: {found}", fault.problem),
+        None => fault.problem.clone(),
+    }
 }
 
 /// What stands beside the policy in every table.
@@ -166,10 +182,6 @@ fn limits(setting: &mut Setting, step: LoadStep) -> Vec<(String, Limit)> {
         match Question::new(setting.converter.parameters(), setting.v_ref, step, range) {
             Ok(question) => limits.push((format!("limit {low}..{high}"), question.answer(&phases))),
             Err(error) => {
-                let reason = |fault: &Fault| match &fault.found {
-                    Some(found) => format!("{}: {found}", fault.problem),
-                    None => fault.problem.clone(),
-                };
                 setting.notes.extend(error.iter().map(reason));
             }
         }

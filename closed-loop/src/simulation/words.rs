@@ -41,25 +41,29 @@ pub(super) fn explanation(setting: &Setting) -> String {
 
 /// The load steps before or after which the policy does not stay within the settling band, in words.
 pub(super) fn unsettled(found: &Findings) -> Option<String> {
-    let lost = |step: &&Step| {
-        let policy = step.courses.first();
-        policy.is_some_and(|(_, policy)| {
-            let worst = &policy.finding.worst;
-            worst.tail_max.max(worst.pre_error) > worst.band
+    let lost = |step: &Step| {
+        let worst = step.courses.first().map(|(_, policy)| &policy.finding.worst);
+        worst.map_or([false; 2], |worst| {
+            [worst.pre_error, worst.tail_max].map(|error| error > worst.band)
         })
     };
-    let steps: Vec<String> = found
-        .steps
-        .iter()
-        .filter(lost)
-        .map(|step| step.step.to_string())
-        .collect();
-    (!steps.is_empty()).then(|| {
+    let of = |side: [bool; 2], words: &str| {
+        let steps = found.steps.iter().filter(|step| lost(step) == side);
+        let steps: Vec<String> = steps.map(|step| step.step.to_string()).collect();
+        (!steps.is_empty()).then(|| format!("{words} {}", steps.join(", ")))
+    };
+    let places = [
+        of([true, false], "before"),
+        of([false, true], "after"),
+        of([true, true], "before and after"),
+    ];
+    let places: Vec<String> = places.into_iter().flatten().collect();
+    (!places.is_empty()).then(|| {
         format!(
-            "the policy does not settle within {} of {} V before or after {}",
+            "the policy does not settle within {} of {} V {}",
             band_text(found.setting.v_ref),
             found.setting.v_ref,
-            steps.join(", ")
+            places.join("; ")
         )
     })
 }

@@ -199,12 +199,21 @@ impl Builder {
                 });
                 self.scaled(sum, 1.0 / samples as f64)
             }
-            Filter::Integrator { min, max, initial } => {
+            Filter::Integrator {
+                min,
+                max,
+                initial,
+                leak,
+            } => {
                 let word = self.reserve(1);
                 let start = self.constant(initial);
                 let before = self.recall(word, start);
+                let kept = match leak == 1.0 {
+                    true => before,
+                    false => self.scaled(before, leak),
+                };
                 let step = self.scaled(x, period);
-                let sum = self.block.value(Op::Add(before, step));
+                let sum = self.block.value(Op::Add(kept, step));
                 let low = self.constant(min);
                 let high = self.constant(max);
                 let y = self.block.value(Op::Clamp { x: sum, low, high });

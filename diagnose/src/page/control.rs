@@ -13,7 +13,7 @@ const AFTER: usize = 120;
 
 const RUNS: [&str; 3] = ["in its simulation", "own mapping", "refitted mapping"];
 
-pub(super) fn section(control: &Control) -> Result<Section, ReportError> {
+pub(super) fn section(control: &Control) -> Section {
     let found = &control.findings;
     let mut section = Section::new("Under control")
         .text(format!(
@@ -21,15 +21,15 @@ pub(super) fn section(control: &Control) -> Result<Section, ReportError> {
             found.policy,
             sentence(found)
         ))
-        .chart(
-            picture(control)?,
+        .chart_or_reason(
+            picture(control),
             "The load step with the largest error, at its first instant; true voltage at the sampling instants.",
         )
         .details(Section::new("Figures of every load step").table(table(found)));
     for remark in &found.beyond_repair {
         section = section.text(format!("No mapping repairs: {remark}."));
     }
-    Ok(section)
+    section
 }
 
 /// In its place where the loop could not be closed.

@@ -22,7 +22,7 @@ fn errors(problem: &Problem, state: &State, record: usize, n: usize) -> Vec<f64>
 }
 
 /// Voltage and current of a record with both simulations, and their errors.
-pub(super) fn panels(
+fn panels(
     problem: &Problem,
     before: &State,
     after: &State,
@@ -54,8 +54,9 @@ pub(super) fn panels(
         let mut is_compared = false;
         for (name, state, colour) in states.iter().copied() {
             let error = errors(problem, state, record, n);
-            // a channel of a held-out record that no training record has is not compared: nobody knows its noise
-            if error.iter().all(|error| error.is_nan()) {
+            // a channel of a held-out record that no training record has is not compared, for nobody knows its noise; and a
+            // simulation that left every number has no line
+            if !error.iter().any(|error| error.is_finite()) {
                 continue;
             }
             is_compared = true;
@@ -75,8 +76,36 @@ pub(super) fn panels(
     chart.svg()
 }
 
+/// Adds the pictures of a record, and says which simulation has no line in them.
+pub(super) fn pictures(
+    section: Section,
+    problem: &Problem,
+    [before, after]: [&State; 2],
+    record: usize,
+    second: Option<&str>,
+    caption: &str,
+) -> Section {
+    let mut section = section.chart_or_reason(panels(problem, before, after, record, second), caption);
+    let states = std::iter::once(("model", before)).chain(second.map(|name| (name, after)));
+    for (name, state) in states {
+        let left = (0..2).filter(|n| {
+            let errors = errors(problem, state, record, *n);
+            // NaN is what nothing is compared in; infinite is an error that no number holds
+            errors.iter().any(|error| error.is_infinite()) && !errors.iter().any(|error| error.is_finite())
+        });
+        let left: Vec<&str> = left.map(|n| CHANNEL_NAMES[n]).collect();
+        if !left.is_empty() {
+            section = section.text(format!(
+                "No line of {name} for {}: its simulation diverges, beyond what can be drawn.",
+                left.join(" and ")
+            ));
+        }
+    }
+    section
+}
+
 /// What the second simulation is, if there is one.
-fn second(diagnosis: &Diagnosis) -> Option<&'static str> {
+pub(super) fn second(diagnosis: &Diagnosis) -> Option<&'static str> {
     diagnosis.attribution.best.as_ref()?;
     Some(match diagnosis.findings.verdict {
         Verdict::Unexplained => "best of the known causes",
@@ -84,7 +113,8 @@ fn second(diagnosis: &Diagnosis) -> Option<&'static str> {
     })
 }
 
-pub(super) fn training(diagnosis: &Diagnosis) -> Result<Section, ReportError> {
+/// The training records that are no captures; nothing if there is none.
+pub(super) fn training(diagnosis: &Diagnosis) -> Option<Section> {
     let (problem, before, after) = (&diagnosis.problem, &diagnosis.given, diagnosis.attribution.state());
     let second = second(diagnosis);
     // in units of the noise, so that volts and amperes count alike
@@ -92,31 +122,31 @@ pub(super) fn training(diagnosis: &Diagnosis) -> Result<Section, ReportError> {
         let own = (0..crate::record::CHANNELS).flat_map(|n| channel(problem, &before.residual, record, n));
         own.map(|v| v * v).sum::<f64>() / problem.records[record].rows().max(1) as f64
     };
-    let all = 0..problem.records.len();
-    let worst = all
-        .clone()
-        .max_by(|a, b| square(*a).total_cmp(&square(*b)))
-        .unwrap_or(0);
+    let all = || (0..problem.records.len()).filter(|n| problem.records[*n].capture.is_none());
+    let Some(worst) = all().max_by(|a, b| square(*a).total_cmp(&square(*b))) else {
+        return None;
+    };
     let caption =
         "The training record that the model as given misses most. Initial states are estimated for each model.";
     let title = match second {
         Some("extended") => "Measured, simulated, extended",
         _ => "Training records, measured and simulated",
     };
-    let mut section = Section::new(title).chart(panels(problem, before, after, worst, second)?, caption);
-    if problem.records.len() > 1 {
+    let states = [before, after];
+    let mut section = pictures(Section::new(title), problem, states, worst, second, caption);
+    if all().count() > 1 {
         let mut inner = Section::new("The other training records");
-        for record in all.filter(|record| *record != worst) {
-            inner = inner.chart(panels(problem, before, after, record, second)?, "");
+        for record in all().filter(|record| *record != worst) {
+            inner = pictures(inner, problem, states, record, second, "");
         }
         section = section.details(inner);
     }
     match problem.sigma[0].is_finite() {
-        true => Ok(section.chart(
-            by_operating_point(diagnosis)?,
+        true => Some(section.chart_or_reason(
+            by_operating_point(diagnosis),
             "Means of groups of equal size over all training records.",
         )),
-        false => Ok(section),
+        false => Some(section),
     }
 }
 
@@ -134,6 +164,10 @@ fn by_operating_point(diagnosis: &Diagnosis) -> Result<Svg, ReportError> {
             // a voltage of 0 would send the point beyond any picture
             let drawn = drawn.map(|(v, load)| load.current + load.conductance * v + load.power / v.max(1e-3));
             points.extend(drawn.zip(errors).filter(|(i, e)| i.is_finite() && e.is_finite()));
+        }
+        // a model whose simulation left every number has no point, and the other one is still worth a picture
+        if points.is_empty() {
+            continue;
         }
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         let group = points.len().div_ceil(GROUPS).max(1);

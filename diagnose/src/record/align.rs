@@ -70,7 +70,7 @@ impl Raw<'_> {
                 ))
                 .hint(
                     "is the time in us or ms? name the column `t_us`; is `converter.f_sw` right? If each row is a settled \
-                     point: --settled",
+                     point: --settled. A capture of an oscilloscope holds 8 rows a period or more, and a whole period",
                 );
             return Err(self.sheet.fault(message).into());
         }

@@ -9,9 +9,11 @@ use super::digits::{last_digit, lattice};
 use super::source::Source;
 
 /// What a record may hold.
-const NAMES: [&str; 9] = [
-    "t", "duty", "v_out", "i_l", "i_out", "v_in", "r_load", "i_load", "p_load",
+const NAMES: [&str; 12] = [
+    "t", "duty", "v_out", "i_l", "i_out", "v_in", "r_load", "i_load", "p_load", "i_in", "v_sw", "v_pwm",
 ];
+/// What only a capture has a use for.
+const OF_CAPTURES: [&str; 3] = ["i_in", "v_sw", "v_pwm"];
 /// What may say the load: set, or else measured.
 const SET_LOADS: [&str; 3] = ["r_load", "i_load", "p_load"];
 const LOADS: [&str; 4] = ["r_load", "i_load", "p_load", "i_out"];
@@ -30,7 +32,8 @@ pub(super) struct Raw<'a> {
 impl<'a> Raw<'a> {
     pub fn new(sheet: &'a Sheet, map: &ColumnMap) -> Result<Self, Faults> {
         let located = sheet.locate(&Quantity::all(&NAMES), map)?;
-        incomplete(sheet, &located).propagate()?;
+        let may_be_capture = OF_CAPTURES.iter().any(|name| located.signal(name).is_some());
+        incomplete(sheet, &located, may_be_capture).propagate()?;
         let mut faults = table_faults();
         let mut values = Vec::new();
         for name in NAMES {
@@ -62,6 +65,11 @@ impl<'a> Raw<'a> {
             values,
             start: 0.0,
         })
+    }
+
+    /// What every record but a capture needs.
+    pub fn needs_duty_and_channel(&self) -> Result<(), Faults> {
+        incomplete(self.sheet, &self.located, false).propagate()
     }
 
     pub fn rows(&self) -> usize {
@@ -248,15 +256,17 @@ impl<'a> Raw<'a> {
 }
 
 /// What no record can do without; the first fault proposes a map of the columns that look like it.
-fn incomplete(sheet: &Sheet, located: &Located) -> Sink {
+fn incomplete(sheet: &Sheet, located: &Located, may_be_capture: bool) -> Sink {
     let has = |name: &str| located.signal(name).is_some();
     let mut list = Vec::new();
-    if !has("duty") {
-        let hint = "; a map file can do so as well: --columns MAP.toml with [columns] duty = \"...\"";
+    // a capture has its duty in its edges
+    if !has("duty") && !may_be_capture {
+        let hint = "; a map file can do so as well: --columns MAP.toml with [columns] duty = \"...\". A capture of \
+                    an oscilloscope may have the pin v_pwm or the switch node v_sw instead";
         let duty = Quantity::all(&["duty"]);
         list.extend(duty.iter().map(|duty| sheet.missing(duty, hint)));
     }
-    if !QUANTITIES.into_iter().any(has) {
+    if !QUANTITIES.into_iter().any(has) && !may_be_capture {
         let message = Message::new("nothing is measured in this record").found(sheet.listed());
         list.push(sheet.header_fault(message.expected("at least one of v_out, i_l, i_out, v_in")));
     }

@@ -143,7 +143,7 @@ impl Raw<'_> {
             false => used.to_string(),
         });
         let message = message.expected(format!("{fewest} or more"));
-        let hint = "a capture of a settled point is one row of a table without `t`: note its means there";
+        let hint = "a capture has 8 rows a period or more; means of a settled point are one row of a table without `t`";
         let of_points = fewest == FEWEST_SETTLED;
         Err(self
             .sheet

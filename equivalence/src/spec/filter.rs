@@ -60,9 +60,21 @@ pub(crate) fn filter(spec: Spec<'_>, filter: &Filter, line: &[Term], primed: Ter
                 words: push(line, x),
             }
         }
-        (Filter::Integrator { min, max, initial }, [y1]) => {
+        (
+            Filter::Integrator {
+                min,
+                max,
+                initial,
+                leak,
+            },
+            [y1],
+        ) => {
             let y1 = read(*y1, spec.nearest(initial));
-            let sum = float.add(y1, float.mul(spec.nearest(period), x));
+            let kept = match leak == 1.0 {
+                true => y1,
+                false => float.mul(spec.nearest(leak), y1),
+            };
+            let sum = float.add(kept, float.mul(spec.nearest(period), x));
             let y = float.clamp(sum, spec.nearest(min), spec.nearest(max));
             Filtered {
                 y,

@@ -8,6 +8,7 @@
 
 pub(crate) mod number;
 mod places;
+mod preamble;
 mod split;
 mod text;
 mod units;
@@ -38,7 +39,11 @@ struct Line {
 /// Reads a table.
 pub(crate) fn read(name: FileName, bytes: Vec<u8>, options: &Options) -> Result<Sheet, Faults> {
     let (source, mut repairs) = text::decode(name, bytes)?;
-    let mut lines = lines(&source.text).peekable();
+    let all: Vec<Line> = lines(&source.text).collect();
+    if let Some(layout) = preamble::of(&source, &all) {
+        return captured(source, layout, &all, options, repairs);
+    }
+    let mut lines = all.into_iter().peekable();
     let stated = stated_separator(&source.text, &mut lines);
     let Some(header) = lines.next() else {
         let message =
@@ -65,6 +70,7 @@ pub(crate) fn read(name: FileName, bytes: Vec<u8>, options: &Options) -> Result<
     }
     let table = Reader {
         separator,
+        skip: 0,
         columns: titles.iter().map(|title| Column::new(title, Vec::new())).collect(),
         source: &source,
         header: &names,
@@ -82,8 +88,42 @@ pub(crate) fn read(name: FileName, bytes: Vec<u8>, options: &Options) -> Result<
         name,
         columns,
         repairs,
-        TextPlaces::new(source, separator, names, rows),
+        TextPlaces::new(source, separator, names, rows, 0),
     ))
+}
+
+/// Reads a table that an instrument wrote with a preamble.
+fn captured(
+    source: Source,
+    layout: preamble::Layout,
+    lines: &[Line],
+    options: &Options,
+    mut repairs: Vec<String>,
+) -> Result<Sheet, Faults> {
+    repairs.push(layout.note);
+    let table = Reader {
+        separator: layout.separator,
+        skip: layout.skip,
+        columns: layout
+            .titles
+            .iter()
+            .map(|title| Column::new(title, Vec::new()))
+            .collect(),
+        source: &source,
+        header: &layout.names,
+        rows: Vec::new(),
+        faults: table_faults(),
+        marks: [None, None],
+    };
+    let (mut columns, rows) = table.read(lines.get(layout.body..).unwrap_or_default(), options, &mut repairs)?;
+    if let (Some((start, step)), Some(count)) = (layout.clock, columns.first_mut()) {
+        count.values.iter_mut().for_each(|value| *value = start + *value * step);
+        count.decimals = number::decimals(step).max(number::decimals(start));
+        "t".clone_into(&mut count.name);
+    }
+    let name = source.name.clone();
+    let places = TextPlaces::new(source, layout.separator, layout.names, rows, layout.skip);
+    Ok(Sheet::of_text(name, columns, repairs, places))
 }
 
 /// The lines that are neither empty nor comments.
@@ -158,6 +198,8 @@ fn header_faults(source: &Source, line: &Line, names: &[Span]) -> Result<(), Fau
 struct Reader<'a> {
     source: &'a Source,
     separator: Separator,
+    /// Cells before the first column.
+    skip: usize,
     header: &'a [Span],
     columns: Vec<Column>,
     rows: Vec<TextRow>,
@@ -206,6 +248,7 @@ impl Reader<'_> {
                 return true;
             }
         };
+        cells.drain(..self.skip.min(cells.len()));
         // some programs end each row with a separator, but not the header
         drop_empty_end(&mut cells, self.columns.len());
         if cells.len() < self.columns.len() && may_be_cut {
@@ -247,7 +290,7 @@ impl Reader<'_> {
     fn is_header(&self, cells: &[Span]) -> bool {
         let text = |cell: &Span| &self.source.text[cell.clone()];
         let pairs = || cells.iter().zip(self.header);
-        pairs().all(|(cell, name)| text(cell) == text(name))
+        self.skip == 0 && pairs().all(|(cell, name)| text(cell) == text(name))
             // nameless columns would "repeat their header" in every row of empty cells
             && pairs().any(|(_, name)| !split_unit(text(name)).0.is_empty())
     }
@@ -274,5 +317,7 @@ fn uneven(found: usize, expected: usize, separator: Separator) -> Message {
         .hint(hint)
 }
 
+#[cfg(test)]
+mod preamble_tests;
 #[cfg(test)]
 mod tests;

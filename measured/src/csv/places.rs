@@ -20,15 +20,18 @@ pub(crate) struct TextPlaces {
     separator: Separator,
     header: Vec<Span>,
     rows: Vec<TextRow>,
+    /// Cells before the first column.
+    skip: usize,
 }
 
 impl TextPlaces {
-    pub fn new(source: Source, separator: Separator, header: Vec<Span>, rows: Vec<TextRow>) -> Self {
+    pub fn new(source: Source, separator: Separator, header: Vec<Span>, rows: Vec<TextRow>, skip: usize) -> Self {
         TextPlaces {
             source,
             separator,
             header,
             rows,
+            skip,
         }
     }
 
@@ -44,7 +47,8 @@ impl TextPlaces {
         let line = self.span(row);
         // cut again for a fault only: spans of all cells would take more memory than the numbers
         let cells = cells(&self.source.text[line.clone()], line.start, self.separator).unwrap_or_default();
-        self.source.fault(cells.get(column).unwrap_or(&line), message)
+        self.source
+            .fault(cells.get(self.skip + column).unwrap_or(&line), message)
     }
 
     pub fn row(&self, row: usize, message: Message) -> Fault {

@@ -17,6 +17,7 @@ pub(crate) mod dead_time;
 pub(crate) mod derating;
 pub(crate) mod diode;
 pub(crate) mod duty_delay;
+pub(crate) mod duty_offset;
 pub(crate) mod duty_quantisation;
 pub(crate) mod esl;
 pub(crate) mod esr;
@@ -54,6 +55,7 @@ pub(crate) const ALL: &[&Effect] = &[
     &load_setting::EFFECT,
     &cable::EFFECT,
     &duty_delay::EFFECT,
+    &duty_offset::EFFECT,
     &duty_quantisation::EFFECT,
     &minimum_on_time::EFFECT,
     &sensor_gain::EFFECT,

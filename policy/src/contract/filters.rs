@@ -195,8 +195,9 @@ fn integrator(value: &Value<'_>, faults: &mut Sink) -> Option<Filter> {
         .and_then(|v| number_f32(&v, faults));
     let start = section.optional("initial");
     let initial = start.as_ref().map_or(Some(0.0), |v| number_f32(v, faults));
+    let leak = section.optional("leak").map_or(Some(1.0), |v| leak(&v, faults));
     section.finish(faults);
-    let (min, max, initial) = (min?, max?, initial?);
+    let (min, max, initial, leak) = (min?, max?, initial?, leak?);
     // the clamp needs a number of the format between its ends
     if min > max || inward_f32(Interval { low: min, high: max }).is_none() {
         faults.push(value.fault(catalogue::crossed("integrator", min, max).hint("min must lie below max")));
@@ -213,5 +214,21 @@ fn integrator(value: &Value<'_>, faults: &mut Sink) -> Option<Filter> {
         )));
         return None;
     }
-    Some(Filter::Integrator { min, max, initial })
+    Some(Filter::Integrator {
+        min,
+        max,
+        initial,
+        leak,
+    })
+}
+
+/// What an integrator keeps in each period: 0 would be no memory, and more than 1 would grow by itself.
+fn leak(value: &Value<'_>, faults: &mut Sink) -> Option<f64> {
+    let leak = number_f32(value, faults)?;
+    if leak > 0.0 && leak <= 1.0 {
+        return Some(leak);
+    }
+    let message = catalogue::out_of_range(value.label(), &leak.to_string(), "above 0 and at most 1");
+    faults.push(value.fault(message.hint("the share of the sum that is kept in each period; 1 keeps all")));
+    None
 }

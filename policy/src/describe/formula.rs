@@ -41,7 +41,10 @@ fn filter_name(filter: &Filter) -> String {
         Filter::LowPass { time_constant } => format!("low_pass[{time_constant} s]"),
         Filter::FilteredDerivative { time_constant } => format!("derivative[{time_constant} s]"),
         Filter::MovingAverage { samples } => format!("average{samples}"),
-        Filter::Integrator { min, max, .. } => format!("integral[{min}, {max}]"),
+        Filter::Integrator {
+            min, max, leak: 1.0, ..
+        } => format!("integral[{min}, {max}]"),
+        Filter::Integrator { min, max, leak, .. } => format!("integral[{min}, {max}; {leak} kept]"),
     }
 }
 

@@ -9,8 +9,10 @@
 What is wrong with an input comes as :class:`Faults`, with places. The environment of gymnasium is ``policyc/Converter-v0``.
 """
 
+from . import drm
 from ._policyc import Command, Fault, Faults, __version__
 from .analysis import Diagnosis, MappingFit, Simulation, diagnose, drm_fit, simulate
+from .campaigns import Campaign, campaign
 from .controller import Controller, Status, Steps
 from .exporting import export
 from .policy import Certificate, Feature, Inspection, Layer, Policy, Signal, Verification
@@ -19,6 +21,7 @@ from .registration import register
 register()
 
 __all__ = [
+    "Campaign",
     "Certificate",
     "Command",
     "Controller",
@@ -36,7 +39,9 @@ __all__ = [
     "Steps",
     "Verification",
     "__version__",
+    "campaign",
     "diagnose",
+    "drm",
     "drm_fit",
     "export",
     "simulate",

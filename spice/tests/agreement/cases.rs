@@ -50,6 +50,10 @@ impl Case {
         }
         let real = |duty: f64| {
             let steps = p.pwm.duty_lsb;
+            let duty = match duty {
+                0.0 | 1.0 => duty,
+                between => (between + p.pwm.duty_offset).clamp(0.0, 1.0),
+            };
             let duty = if steps > 0.0 {
                 (duty / steps).round() * steps
             } else {
@@ -226,6 +230,7 @@ pub fn effects() -> Vec<Effect> {
             (p.cable.inductance, p.cable.resistance, p.cable.capacitance) = (2e-6, 0.02, 10e-6)
         }),
         steady("duty delay", |p| p.pwm.duty_delay = 2),
+        steady("duty offset", |p| p.pwm.duty_offset = -0.01),
         steady("duty quantisation", |p| p.pwm.duty_lsb = 0.02),
         light("minimum on-time", |p| p.pwm.min_on_time = 12e-6),
         steady("sensor low-pass", |p| p.sensors.v_out.low_pass = 80e-6),

@@ -157,6 +157,11 @@ impl Environment for HiddenConverter {
         None
     }
 
+    fn ideal_ripple(&self, v_out: f64) -> f64 {
+        let circuit = &self.bench.circuit;
+        v_out * (1.0 - v_out / circuit.v_in) * T_SW / circuit.inductance
+    }
+
     fn identity(&self) -> Vec<u8> {
         format!("{:?}", self.bench).into_bytes()
     }

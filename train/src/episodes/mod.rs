@@ -11,7 +11,7 @@
 
 mod plants;
 
-use closed_loop::{Agent, Converter, LoadKind, LoadPath};
+use closed_loop::{Agent, Converter, Environment, LoadKind, LoadPath};
 use plant::{Load, Sample};
 use random::Xoshiro;
 use toml_input::Message;
@@ -175,7 +175,7 @@ impl Episodes {
         }
         let i_l = begin
             .and_then(|begin| begin.i_l)
-            .unwrap_or_else(|| drawn.i_l(&life.load));
+            .unwrap_or_else(|| drawn.i_l(&life.load, |v_out, i_out| self.nominal.holding_current(v_out, i_out)));
         let start = closed_loop::Start {
             v_out: drawn.v_out,
             i_l,

@@ -197,12 +197,25 @@ pub struct Requirement {
     pub load_step: Option<[f64; 2]>,
     /// Over all instants, or for the step at the sampling instant only.
     pub instants: Instants,
+    /// What may not be exceeded.
+    pub limits: Limits,
+}
+
+/// Largest figures that are allowed; those not given are free.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Limits {
     /// Largest |e| after the step, V.
     pub deviation: Option<f64>,
     /// From the step to the last sample outside half a percent of `v_ref`, s.
     pub settling: Option<f64>,
     /// Largest |e| in the tail, V.
     pub tail: Option<f64>,
+    /// Root of the mean square of the duty's changes in the tail.
+    pub duty_activity: Option<f64>,
+    /// Peak to peak of the sampled inductor current in the tail, over the ripple of a loss-free converter.
+    pub current_swing: Option<f64>,
+    /// Amplitude of the strongest subharmonic line of the duty in the tail.
+    pub subharmonic: Option<f64>,
 }
 
 /// Which of a load step's instants a requirement speaks of.

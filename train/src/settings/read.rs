@@ -7,7 +7,9 @@ use sha2::{Digest, Sha256};
 use toml_input::{Document, Faults, Message, Sink, Table, Value, messages};
 
 use super::spread;
-use super::{Draw, Episode, Instants, Learning, Loads, Randomised, Requirement, Reward, Selection, Settings, Stage};
+use super::{
+    Draw, Episode, Instants, Learning, Limits, Loads, Randomised, Requirement, Reward, Selection, Settings, Stage,
+};
 use crate::learner::{LearnerSettings, Loss, TargetUpdate};
 use crate::optimiser::AdamSettings;
 use closed_loop::LoadKind;
@@ -348,20 +350,27 @@ fn requirement(table: &mut Table<'_>, faults: &mut Sink) -> Option<Requirement> 
     let instants = table.with_default("instants", Instants::Worst, faults, |v, faults| {
         v.choice(&[("worst", Instants::Worst), ("sample", Instants::Sample)], faults)
     });
-    let [deviation, settling, tail] = figures(table, faults);
-    if deviation.or(settling).or(tail).is_none() {
-        faults.push(table.fault(Message::new("a [[spec]] without a limit").expected("deviation, settling or tail")));
+    let limits = limits(table, faults);
+    if limits == Limits::default() {
+        let expected = "deviation, settling, tail, duty_activity, current_swing or subharmonic";
+        faults.push(table.fault(Message::new("a [[spec]] without a limit").expected(expected)));
     }
     Some(Requirement {
         load_step,
         instants,
-        deviation,
-        settling,
-        tail,
+        limits,
     })
 }
 
-/// Limits: deviation in V, settling time in s, tail in V.
-pub(super) fn figures(table: &mut Table<'_>, faults: &mut Sink) -> [Option<f64>; 3] {
-    ["deviation", "settling", "tail"].map(|key| table.optional(key).and_then(|v| v.positive(faults)))
+/// What a specification limits.
+pub(super) fn limits(table: &mut Table<'_>, faults: &mut Sink) -> Limits {
+    let mut limit = |key| table.optional(key).and_then(|v| v.positive(faults));
+    Limits {
+        deviation: limit("deviation"),
+        settling: limit("settling"),
+        tail: limit("tail"),
+        duty_activity: limit("duty_activity"),
+        current_swing: limit("current_swing"),
+        subharmonic: limit("subharmonic"),
+    }
 }

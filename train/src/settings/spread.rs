@@ -3,8 +3,8 @@
 use closed_loop::read;
 use toml_input::{Message, Sink, Table, Value};
 
-use super::read::figures;
-use super::{Instants, Requirement};
+use super::read::limits;
+use super::{Instants, Limits, Requirement};
 
 /// A converter beside that of the plant's file. Nothing is trained on it: a policy that is kept has to hold on it, too.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,15 +61,12 @@ pub(super) fn read(table: &mut Table<'_>, faults: &mut Sink) -> Option<Spread> {
         let hint = "factor = { \"converter.inductance\" = 0.85, \"converter.capacitance\" = 0.85 }";
         faults.push(table.fault(message.hint(hint)));
     }
-    let [deviation, settling, tail] = figures(table, faults);
     let requirement = Requirement {
         load_step: None,
         instants: Instants::Worst,
-        deviation,
-        settling,
-        tail,
+        limits: limits(table, faults),
     };
-    let is_given = deviation.or(settling).or(tail).is_some();
+    let is_given = requirement.limits != Limits::default();
     Some(Spread {
         factor,
         set,

@@ -14,6 +14,8 @@ pub const SCENARIO: &str = "scenario.toml";
 // The scales are those of examples/train/measured, whose features, bands and dead zone were tuned on the converter of the paper,
 // as shares of its smallest deviation of 1.6 V and its load step of 8 A.
 
+/// Control periods behind a load step, as a scenario has by default.
+const USUAL_AFTER: usize = 300;
 /// Of that converter, V and A.
 const MODEL: [f64; 2] = [1.6, 8.0];
 
@@ -21,15 +23,14 @@ impl Start {
     /// The contract.
     #[must_use]
     pub fn contract(&self) -> String {
-        let design = &self.design;
-        let (v_ref, surplus) = (design.v_ref, design.surplus());
+        let base = &self.base;
+        let (v_ref, surplus, voltage) = (self.wanted.v_ref, base.surplus(), base.voltage());
+        let error = format!("{voltage} - v_ref");
         let [volts, amperes] = [MODEL[0] / self.deviation(), MODEL[1] / self.step()];
         let largest = self.wanted.loads[1] / v_ref;
         let [low, high] = self.duties;
         format!(
-            "# A controller for {}, made by `policyc new --plant`. An observer estimates\n\
-             # inductor current, output voltage and losses; a law of control holds the voltage with them, and the network adds to\n\
-             # the law what makes it faster.\n\
+            "# A controller for {}, made by `policyc new --plant`. {}\n\
              name = \"controller\"\n\
              sample_period = {:?}                # s: control and PWM period\n\
              \n\
@@ -37,6 +38,7 @@ impl Start {
              v_ref = {v_ref:?}\n\
              \n\
              {}\n\
+             {}\
              {}\n\
              {}\n\
              {}\
@@ -49,7 +51,7 @@ impl Start {
              base = \"{}\"\n\
              offsets = [-0.5, -0.2, -0.1, -0.05, -0.02, -0.01, 0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5]\n\
              dead_zone = [                          # nothing is added here: the law alone brings it to rest\n    \
-                 {{ source = \"model_voltage - v_ref\", within = {:?} }},\n    \
+                 {{ source = \"{error}\", within = {:?} }},\n    \
                  {{ source = \"{surplus}\", within = {:?} }},\n\
              ]\n\
              \n\
@@ -61,23 +63,28 @@ impl Start {
              duty = 0.0\n\
              hold = 3                               # periods that a bad sample is bridged\n",
             self.converter(),
-            design.period,
+            base.story(),
+            base.period(),
             self.v_out.signal("v_out", "V"),
+            match self.i_l {
+                None => String::new(),
+                Some(channel) => format!("{}\n", channel.signal("i_l", "A")),
+            },
             self.i_out.signal("i_out", "A"),
-            design.observer(),
+            base.observer(),
             [
-                feature("e", "model_voltage - v_ref", rounded(volts, 3), [-5.0, 5.0]),
-                feature("e_fine", "model_voltage - v_ref", rounded(6.7 * volts, 3), [-2.0, 2.0]),
+                feature("e", &error, rounded(volts, 3), [-5.0, 5.0]),
+                feature("e_fine", &error, rounded(6.7 * volts, 3), [-2.0, 2.0]),
                 feature("i_c", &surplus, rounded(0.3 * amperes, 3), [-5.0, 5.0]),
                 feature("i_c_fine", &surplus, rounded(2.0 * amperes, 3), [-2.0, 2.0]),
                 feature("i_out", "i_out", rounded(2.0 / largest, 3), [-2.0, 4.0])
                     .replace("clip", "offset = -1.0\nclip"),
             ]
             .concat(),
-            design.law(),
+            base.law(),
             rounded(0.25 / volts, 2),
             rounded(1.0 / amperes, 2),
-            rounded(v_ref / design.v_in, 3),
+            rounded(base.rest(), 3),
         )
     }
 
@@ -135,23 +142,27 @@ impl Start {
              sampling_instants = 2\n\
              instants = 12\n\
              lead = 150\n\
-             after = 300\n\
+             after = {}\n\
              tail = 60\n\
              \n\
              [evaluation]                   # on these it is judged\n\
              load_steps = [[{low:?}, {high:?}], [{high:?}, {low:?}]]\n\
+             {}\
              \n\
              [[spec]]\n\
              deviation = {:?}             # V: 1.1 of what no controller can beat\n\
-             settling = {:?}              # s: twice of it, and ten periods\n\
+             settling = {:?}              # s: twice of it, and {}\n\
              tail = {:?}                  # V\n\
              {}",
             self.set(),
             self.wanted.v_ref,
             bands.join(", "),
             rounded(1.0 / volts, 2),
+            self.after().unwrap_or(USUAL_AFTER),
+            self.after_line(),
             self.most_deviation(&self.limits),
             self.most_settling(&self.limits, 10.0),
+            self.base.patience_in_words(),
             self.most_tail(),
             self.elsewhere(),
         )
@@ -164,14 +175,26 @@ impl Start {
                 "\n[[spread]]                     # it has to hold here as well; the limit is another one\n\
                  factor = {{ \"converter.inductance\" = {factor:?}, \"converter.capacitance\" = {factor:?} }}\n\
                  deviation = {:?}\n\
-                 settling = {:?}              # the observer has to find the other parts first\n\
+                 settling = {:?}              # {}\n\
                  tail = {:?}\n",
                 self.most_deviation(limits),
                 self.most_settling(limits, 60.0),
+                self.base.why_longer(),
                 self.most_tail(),
             )
         };
         self.spread.iter().map(table).collect()
+    }
+
+    /// Control periods behind a load step, where the usual ones are not enough for the law to come to rest before the tail.
+    fn after(&self) -> Option<usize> {
+        let patience = self.base.patience();
+        (patience > 0.0).then(|| USUAL_AFTER + (patience / 50.0).ceil() as usize * 50)
+    }
+
+    fn after_line(&self) -> String {
+        let line = |after| format!("after = {after}                    # periods: its voltage loop is slow\n");
+        self.after().map_or_else(String::new, line)
     }
 
     /// V; a tenth more than what no controller can beat.
@@ -182,14 +205,15 @@ impl Start {
     /// s; twice what no controller can beat, and some periods.
     fn most_settling(&self, limits: &[(LoadStep, Limit); 2], periods: f64) -> f64 {
         rounded(
-            2.0 * largest_of(limits, |limit| limit.worst.settling) + periods * self.design.period,
+            2.0 * largest_of(limits, |limit| limit.worst.settling)
+                + (periods + self.base.patience()) * self.base.period(),
             3,
         )
     }
 
     /// V; an estimate is hardly finer than its sensor.
     fn most_tail(&self) -> f64 {
-        rounded(f64::max(1e-3 * self.wanted.v_ref, 3.0 * self.design.noise.measured), 3)
+        rounded(f64::max(1e-3 * self.wanted.v_ref, 3.0 * self.base.noise()), 3)
     }
 
     /// The scenario; `plant` is the plant's path, as seen from its folder.
@@ -198,35 +222,45 @@ impl Start {
         let [low, high] = self.wanted.loads;
         let off = |x: f64| rounded(0.85 * x, 4);
         format!(
-            "# Load steps with the trained policy, made by `policyc new --plant`. Its law stands beside it, a PID controller that\n\
-             # measures the voltage, and what no controller can beat.\n\
+            "# Load steps with the trained policy, made by `policyc new --plant`. Its law stands beside it, {}\n\
              plant = {plant:?}\n\
              load_steps = [[{low:?}, {high:?}], [{high:?}, {low:?}]]    # W\n\
-             baselines = [\"pid\"]\n\
+             baselines = [{}]\n\
+             {}\
              {}\
              # on a converter whose parts are 15 % smaller than their print says:\n\
              # \"converter.inductance\" = {:?}\n\
              # \"converter.capacitance\" = {:?}\n",
+            self.base.beside_it(),
+            self.base.baselines(),
+            self.after_line(),
             match self.set() {
                 none if none.is_empty() => "\n[set]\n".to_owned(),
                 some => some,
             },
-            off(self.design.inductance),
-            off(self.design.capacitance),
+            off(self.base.inductance()),
+            off(self.base.capacitance()),
         )
     }
 
     fn converter(&self) -> String {
-        let design = &self.design;
+        let base = &self.base;
         let [low, high] = self.wanted.loads;
-        let (v_in, v_ref, kilohertz) = (design.v_in, design.v_ref, rounded(1e-3 / design.period, 4));
-        format!("a buck converter from {v_in} V to {v_ref} V at {kilohertz} kHz, {low} to {high} W")
+        let (v_in, v_ref, kilohertz) = (base.v_in(), self.wanted.v_ref, rounded(1e-3 / base.period(), 4));
+        format!(
+            "a {} converter from {v_in} V to {v_ref} V at {kilohertz} kHz, {low} to {high} W",
+            base.word()
+        )
     }
 
     /// The table `[set]`, if sensors were assumed.
     fn set(&self) -> String {
-        let channels = [("v_out", "V", self.v_out), ("i_out", "A", self.i_out)];
-        let assumed = channels.iter().filter_map(|(name, unit, channel)| {
+        let channels = [
+            Some(("v_out", "V", self.v_out)),
+            Some(("i_out", "A", self.i_out)),
+            self.i_l.map(|channel| ("i_l", "A", channel)),
+        ];
+        let assumed = channels.iter().flatten().filter_map(|(name, unit, channel)| {
             let [step, noise] = channel.assumed?;
             Some(format!(
                 "\"sensors.{name}.lsb\" = {step:?}    # {unit}: assumed, 12 bits for {} {unit}\n\

@@ -102,6 +102,10 @@ impl Environment for StandIn {
         (key == "converter.v_in").then_some(self.v_in)
     }
 
+    fn ideal_ripple(&self, v_out: f64) -> f64 {
+        v_out * (1.0 - v_out / self.v_in) * 1e-4 / 2e-3
+    }
+
     fn identity(&self) -> Vec<u8> {
         format!("{} {} {}", self.capacitance, self.v_in, self.delay).into_bytes()
     }

@@ -31,6 +31,8 @@ pub(super) struct Integral {
     pub start: Start,
     /// The sum goes on behind the clamp: only what is shown is held there.
     pub winds_up: bool,
+    /// Share of the sum that is kept in each period.
+    pub leak: f64,
 }
 
 /// What an integral adds in each row.
@@ -70,10 +72,16 @@ impl From<Filter> for Link {
             },
             Filter::FilteredDerivative { time_constant } => Link::Derivative { tau: time_constant },
             Filter::MovingAverage { samples } => Link::Average(samples),
-            Filter::Integrator { min, max, initial } => Link::Integral(Integral {
+            Filter::Integrator {
                 min,
                 max,
                 initial,
+                leak,
+            } => Link::Integral(Integral {
+                min,
+                max,
+                initial,
+                leak,
                 rule: Rule::Rectangle,
                 start: Start::Whole,
                 winds_up: false,
@@ -118,7 +126,7 @@ impl Link {
     }
 
     /// Inputs that it keeps.
-    fn words(&self) -> usize {
+    pub fn words(&self) -> usize {
         match self {
             Link::Delay(samples) => *samples,
             Link::Average(samples) => samples.saturating_sub(1),
@@ -144,7 +152,7 @@ impl Integral {
                 (self.initial, share * x)
             }
         };
-        let sum = sum + period * added;
+        let sum = self.leak * sum + period * added;
         match self.winds_up {
             true => sum,
             false => sum.clamp(self.min, self.max),
@@ -152,12 +160,19 @@ impl Integral {
     }
 }
 
-/// What a feature would be with these filters, clip included.
-pub(super) fn observation(feature: &Feature, links: &[Link], source: &[f64], begins: &[bool], period: f64) -> Vec<f64> {
+/// What these filters make of a source.
+pub(super) fn filtered(links: &[Link], source: &[f64], begins: &[bool], period: f64) -> Vec<f64> {
     let mut memories = vec![Memory::default(); links.len()];
     let rows = source.iter().zip(begins).map(|(x, begins)| {
         let chained = links.iter().zip(&mut memories);
-        let y = chained.fold(*x, |x, (link, memory)| link.next(memory, *begins, period, x));
+        chained.fold(*x, |x, (link, memory)| link.next(memory, *begins, period, x))
+    });
+    rows.collect()
+}
+
+/// What a feature would be with these filters, clip included.
+pub(super) fn observation(feature: &Feature, links: &[Link], source: &[f64], begins: &[bool], period: f64) -> Vec<f64> {
+    let rows = filtered(links, source, begins, period).into_iter().map(|y| {
         let y = feature.scale * y + feature.offset;
         match feature.clip {
             Some(clip) => y.clamp(clip.low, clip.high),

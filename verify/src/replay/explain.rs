@@ -8,6 +8,7 @@
 //! | one of its filters made otherwise, left out, or one more | the filter, its time constant |
 //! | another feature | order of the network's inputs |
 //! | `s x + o` of the feature some rows earlier or later | a delay |
+//! | its filters over a signal or another feature's source | what stands in front of the filters |
 //! | `s x + o` of a signal or of another feature's source | another source |
 //! | `s x + o` of the change of one of these from row to row | a difference that is missing |
 
@@ -22,7 +23,7 @@ use super::variants::Trial;
 const NEARLY_ALL: f64 = 0.97;
 /// Fewest rows that show a relation.
 // a line goes through any two; a third may lie on it by the few digits of a log
-const FEWEST_ROWS: usize = 4;
+pub(super) const FEWEST_ROWS: usize = 4;
 /// Longest delay that is looked for, rows.
 const LONGEST_SHIFT: isize = 4;
 /// Share of the rows in which the contract is off that a relation has to mend.
@@ -45,7 +46,7 @@ pub(super) struct Course {
 #[derive(Debug, Clone, Default)]
 pub(super) struct FeatureCourse {
     pub source: Vec<f64>,
-    unclipped: Vec<f64>,
+    pub unclipped: Vec<f64>,
     observation: Vec<f64>,
 }
 
@@ -79,7 +80,7 @@ impl Course {
     }
 
     /// Rows since the start of the episode.
-    fn ages(&self) -> Vec<usize> {
+    pub fn ages(&self) -> Vec<usize> {
         let mut age = 0;
         let next = |begins: &bool| {
             age = if *begins { 0 } else { age + 1 };
@@ -91,9 +92,9 @@ impl Course {
 
 /// A relation `s x + o`.
 #[derive(Debug, Clone, Copy)]
-struct Line {
-    s: f64,
-    o: f64,
+pub(super) struct Line {
+    pub s: f64,
+    pub o: f64,
 }
 
 /// Logged values, and how near is equal.
@@ -136,6 +137,19 @@ impl<'a> Logged<'a> {
         }
     }
 
+    /// The ends at which the log lies while these values, one for each row, go beyond them.
+    // the least and the largest value of any log have equal neighbours where it turns round: that alone is no clip
+    fn cut_off(&self, unclipped: &[f64]) -> [Option<f64>; 2] {
+        let near = 2.0 * self.allowed;
+        let beyond = |end: f64, side: f64| {
+            let is_cut = |(x, y): &(&f64, &f64)| (**y - end).abs() <= near && side * (**x - end) > near;
+            unclipped.iter().zip(self.values).filter(is_cut).count()
+        };
+        let fewest = FEWEST_ROWS.min(self.values.len().div_ceil(2));
+        let [low, high] = self.clip.unwrap_or_default();
+        [(low, -1.0), (high, 1.0)].map(|(end, side)| end.filter(|end| beyond(*end, side) >= fewest))
+    }
+
     /// Whether it moves by more than the digits of a log.
     pub fn moves(&self) -> bool {
         let [low, high] = ends(self.values);
@@ -163,7 +177,7 @@ impl<'a> Logged<'a> {
     }
 
     /// The line through `x` that nearly all inner rows lie on; `x` is `None` where a row has no such value.
-    fn line(&self, x: &[Option<f64>]) -> Option<Line> {
+    pub fn line(&self, x: &[Option<f64>]) -> Option<Line> {
         let pair = |row: &usize| Some((*row, ((*x.get(*row)?)?, *self.values.get(*row)?)));
         let (rows, pairs): (Vec<usize>, Vec<(f64, f64)>) = self.inner.iter().filter_map(pair).unzip();
         let mut ordered = pairs.clone();
@@ -213,8 +227,9 @@ pub(super) fn explain(
     if let Some(text) = trial.of_integral_rule() {
         return Some(text);
     }
-    if let Some(line) = logged.line(&all(&own.unclipped)) {
-        return Some(of_itself(feature, line, &logged));
+    let line = logged.line(&all(&own.unclipped));
+    if let Some(text) = line.and_then(|line| of_itself(feature, line, own, &logged)) {
+        return Some(text);
     }
     let same = |other: &FeatureCourse| {
         let line = logged.line(&all(&other.observation));
@@ -246,6 +261,7 @@ pub(super) fn explain(
     }
     trial
         .of_filter()
+        .or_else(|| trial.of_another_input(&candidates(policy, course)))
         .or_else(|| of_another_source(policy, course, &logged))
         .or_else(|| odd_rows(&logged))
 }
@@ -264,21 +280,29 @@ fn starts(feature: &Feature, course: &Course, own: &FeatureCourse, logged: &Logg
             return "it differs only in the first row of an episode: the training has another duty before it; look at initial_duty".to_owned();
         }
         let rows = if last == 0 { "row".to_owned() } else { format!("{} rows", last + 1) };
-        format!("it differs only in the first {rows} of an episode: the contract's filters start as if the first sample had always been there")
+        let skip = last + 1;
+        format!("it differs only in the first {rows} of an episode: the contract's filters start as if the first sample had always been there; --skip {skip} leaves them out")
     })
 }
 
-fn of_itself(feature: &Feature, line: Line, logged: &Logged<'_>) -> String {
-    let clip = logged
-        .clip
-        .map(|ends| ends.map(|end| end.map_or_else(|| "...".to_owned(), number)))
-        .map(|[low, high]| format!("clip = [{low}, {high}]"));
+fn of_itself(feature: &Feature, line: Line, own: &FeatureCourse, logged: &Logged<'_>) -> Option<String> {
+    let unclipped: Vec<f64> = own.unclipped.iter().map(|x| line.s * x + line.o).collect();
+    let shown = logged.cut_off(&unclipped);
+    let [low, high] = [shown[0].unwrap_or(f64::NEG_INFINITY), shown[1].unwrap_or(f64::INFINITY)];
+    let made: Vec<f64> = unclipped.iter().map(|x| x.max(low).min(high)).collect();
+    // the line was drawn without the rows at an end: where no clip makes them, a clamp in the filters does, and it is none of it all
+    if !logged.is(&made) {
+        return None;
+    }
+    let clip = clip(feature, &shown);
     let (scale, offset) = (line.s * feature.scale, line.s * feature.offset + line.o);
     let mut keys = Vec::new();
     let head = if line.s == 1.0 && line.o == 0.0 {
-        match &clip {
-            Some(_) => "it ends elsewhere".to_owned(),
-            None => "it is not clipped".to_owned(),
+        match (&clip, feature.clip) {
+            (Some(_), _) => "it ends elsewhere".to_owned(),
+            (None, Some(_)) => "it is not clipped".to_owned(),
+            // nothing that would differ
+            (None, None) => return None,
         }
     } else {
         if line.s != 1.0 {
@@ -303,10 +327,10 @@ fn of_itself(feature: &Feature, line: Line, logged: &Logged<'_>) -> String {
         true => ". A log that begins in mid-run shows the same: the integral has a past there",
         false => "",
     };
-    match keys.is_empty() {
+    Some(match keys.is_empty() {
         true => head,
         false => format!("{head}: {} fits the log{begun}", keys.join(", ")),
-    }
+    })
 }
 
 /// A few rows that no relation holds in, among others that are equal.
@@ -316,7 +340,29 @@ fn odd_rows(logged: &Logged<'_>) -> Option<String> {
         .then(|| format!("{off} of {rows} rows differ: look at what the environment did there"))
 }
 
-fn of_another_source(policy: &Policy, course: &Course, logged: &Logged<'_>) -> Option<String> {
+/// The key that says where the log is cut off; `None` if it is nowhere.
+fn clip(feature: &Feature, shown: &[Option<f64>; 2]) -> Option<String> {
+    let own = feature.clip.map(|clip| [clip.low, clip.high]);
+    match (shown, own) {
+        ([None, None], _) => None,
+        ([Some(low), Some(high)], _) => Some(format!("clip = [{}, {}]", number(*low), number(*high))),
+        ([low, high], Some(own)) => {
+            let [low, high] = [low.unwrap_or(own[0]), high.unwrap_or(own[1])];
+            Some(format!("clip = [{}, {}]", number(low), number(high)))
+        }
+        ([Some(low), None], None) => Some(format!(
+            "a clip that begins at {} (the log does not come to its upper end)",
+            number(*low)
+        )),
+        ([None, Some(high)], None) => Some(format!(
+            "a clip that ends at {} (the log does not come to its lower end)",
+            number(*high)
+        )),
+    }
+}
+
+/// What an environment may have put in front of a feature's filters: signals and the sources of features, by their names.
+fn candidates<'c>(policy: &Policy, course: &'c Course) -> Vec<(String, &'c Vec<f64>)> {
     let signals = policy
         .signals
         .iter()
@@ -324,7 +370,11 @@ fn of_another_source(policy: &Policy, course: &Course, logged: &Logged<'_>) -> O
         .zip(&course.signals);
     let sources = policy.features.iter().map(|feature| feature.source_text.clone());
     let sources = sources.zip(course.features.iter().map(|course| &course.source));
-    let candidates: Vec<(String, &Vec<f64>)> = signals.chain(sources).collect();
+    signals.chain(sources).collect()
+}
+
+fn of_another_source(policy: &Policy, course: &Course, logged: &Logged<'_>) -> Option<String> {
+    let candidates = candidates(policy, course);
     for shift in 0..=LONGEST_SHIFT {
         for (name, values) in &candidates {
             if let Some(line) = logged.line(&shifted(values, course, shift)) {
@@ -349,7 +399,7 @@ fn of_another_source(policy: &Policy, course: &Course, logged: &Logged<'_>) -> O
     })
 }
 
-fn all(values: &[f64]) -> Vec<Option<f64>> {
+pub(super) fn all(values: &[f64]) -> Vec<Option<f64>> {
     values.iter().copied().map(Some).collect()
 }
 
@@ -379,7 +429,7 @@ fn times(line: Line) -> String {
     text
 }
 
-fn affine(line: Line, name: &str) -> String {
+pub(super) fn affine(line: Line, name: &str) -> String {
     let mut text = match line.s {
         1.0 => name.to_owned(),
         s => format!("{} * ({name})", number(s)),

@@ -12,7 +12,9 @@
 mod chain;
 mod duties;
 mod explain;
+mod integral;
 mod log;
+mod sources;
 mod text;
 mod values;
 mod variants;

@@ -80,15 +80,7 @@ fn words(policy: &Policy, replay: &Replay) -> Vec<String> {
             words.push(format!("{name} does not move in this log, which shows little of it"));
         }
     }
-    let unreached: Vec<String> = (policy.features.iter().zip(&replay.features))
-        .filter_map(unreached)
-        .collect();
-    if !unreached.is_empty() {
-        words.push(format!(
-            "this log comes to neither end of {}: it shows nothing of them",
-            unreached.join(", ")
-        ));
-    }
+    words.extend(unreached_words(policy, replay));
     if let Some(actions) = &replay.actions {
         let (equal, rows) = (grouped(actions.equal as u64), grouped(replay.rows as u64));
         let told = match (actions.first_line, actions.exploring) {
@@ -112,22 +104,97 @@ fn words(policy: &Policy, replay: &Replay) -> Vec<String> {
     words
 }
 
-/// A clip, or the clamp of an integrator, that an equal feature never came to: the log is equal whatever its ends are.
-fn unreached((feature, result): (&Feature, &FeatureResult)) -> Option<String> {
-    let compared = result.logged.as_ref()?;
-    let (word, low, high) = match (feature.clip, feature.filters.last()) {
-        (Some(clip), _) => ("clip", clip.low, clip.high),
-        (None, Some(Filter::Integrator { min, max, .. })) => {
-            let ends = [min, max].map(|end| feature.scale * end + feature.offset);
-            ("clamp", ends[0].min(ends[1]), ends[0].max(ends[1]))
+/// Where features are cut off: the ends by their words, as what the network sees and as the contract says them, lower one first.
+struct Ends {
+    word: &'static str,
+    names: [&'static str; 2],
+    seen: [f64; 2],
+    written: [f64; 2],
+}
+
+impl Ends {
+    /// The clip of a feature, and the clamp of an integrator that is behind all but delays.
+    fn of(feature: &Feature) -> Vec<Self> {
+        let clip = feature.clip.map(|clip| Self {
+            word: "clip",
+            names: ["lower", "upper"],
+            seen: [clip.low, clip.high],
+            written: [clip.low, clip.high],
+        });
+        let mut filters = feature.filters.iter().rev();
+        let last = filters.find(|filter| !matches!(filter, Filter::Delay { .. }));
+        let clamp = last.and_then(|filter| match *filter {
+            Filter::Integrator { min, max, .. } => {
+                let seen = [min, max].map(|end| feature.scale * end + feature.offset);
+                let clamp = Self {
+                    word: "clamp",
+                    names: ["min", "max"],
+                    seen,
+                    written: [min, max],
+                };
+                Some(if feature.scale < 0.0 { clamp.turned() } else { clamp })
+            }
+            _ => None,
+        });
+        clip.into_iter().chain(clamp).collect()
+    }
+
+    fn turned(mut self) -> Self {
+        self.names.reverse();
+        self.seen.reverse();
+        self.written.reverse();
+        self
+    }
+
+    /// Whether values in `range` come to neither or only one end; an end beyond `cut` shows in no log.
+    fn unreached(&self, range: [f64; 2], cut: [f64; 2]) -> [bool; 2] {
+        let [low, high] = self.seen;
+        // what lies at an end is off it by roundings of binary32 at most
+        let slack = 1e-6 * (high - low);
+        let is_shown = [low >= cut[0], high <= cut[1]];
+        [
+            is_shown[0] && range[0] > low + slack,
+            is_shown[1] && range[1] < high - slack,
+        ]
+    }
+}
+
+/// Ends that an equal feature never came to: the log is equal whatever they are.
+fn unreached_words(policy: &Policy, replay: &Replay) -> Vec<String> {
+    let (mut both, mut one) = (Vec::new(), Vec::new());
+    for (feature, result) in policy.features.iter().zip(&replay.features) {
+        let is_told = |compared: &Compared| compared.first_line.is_none() && !is_still(compared);
+        if !result.logged.as_ref().is_some_and(is_told) {
+            continue;
         }
-        _ => return None,
-    };
-    // what lies at an end is off it by roundings of binary32 at most
-    let slack = 1e-6 * (high - low);
-    let is_inside = result.own[0] > low + slack && result.own[1] < high - slack;
-    (compared.first_line.is_none() && !is_still(compared) && is_inside)
-        .then(|| format!("the {word} of {}, {} to {}", feature.name, number(low), number(high)))
+        let name = &feature.name;
+        let clip = (feature.clip).map_or([f64::NEG_INFINITY, f64::INFINITY], |clip| [clip.low, clip.high]);
+        for ends in Ends::of(feature) {
+            let word = ends.word;
+            match ends.unreached(result.own, clip) {
+                [true, true] => {
+                    let [low, high] = ends.seen.map(number);
+                    both.push(format!("the {word} of {name}, {low} to {high}"));
+                }
+                [false, false] => {}
+                [low, _] => {
+                    let at = usize::from(!low);
+                    let (end, value) = (ends.names[at], number(ends.written[at]));
+                    one.push(match word {
+                        "clamp" => format!("the log never reaches `{end}` of {name}, {value}: not checked"),
+                        _ => format!("the log never reaches the {end} end of the clip of {name}, {value}: not checked"),
+                    });
+                }
+            }
+        }
+    }
+    let both = (!both.is_empty()).then(|| {
+        format!(
+            "this log comes to neither end of {}: it shows nothing of them",
+            both.join(", ")
+        )
+    });
+    both.into_iter().chain(one).collect()
 }
 
 fn is_still(compared: &Compared) -> bool {
@@ -156,6 +223,7 @@ fn verdict(replay: &Replay, is_continuous: bool) -> String {
                     "a filter that begins otherwise, the scale of a feature, the order of the features or of [actions]"
                 }
             ),
+            0 if compared < of => unlogged(replay, is_continuous),
             0 if is_continuous => "DIFFERENT: the observations are equal, the duties are not. A trainer who explores: --exploring. Otherwise look \
                   at squash or clip, scale and offset in [actions], and at the golden vectors"
                 .to_owned(),
@@ -177,6 +245,25 @@ fn verdict(replay: &Replay, is_continuous: bool) -> String {
             number(replay.tolerance)
         ),
     }
+}
+
+/// Other commands of equal observations, of which some are not in the log.
+fn unlogged(replay: &Replay, is_continuous: bool) -> String {
+    let missing = replay.features.iter().filter(|feature| feature.logged.is_none());
+    let missing: Vec<String> = missing.map(|feature| format!("`{}`", feature.name)).collect();
+    let (list, verb) = match missing.as_slice() {
+        [one] => (one.clone(), "is"),
+        [first @ .., last] => (format!("{} and {last}", first.join(", ")), "are"),
+        [] => (String::new(), "are"),
+    };
+    let seen = match replay.compared().count() {
+        1 => "the 1 logged observation is equal".to_owned(),
+        count => format!("the {count} logged observations are equal"),
+    };
+    let commands = if is_continuous { "duties" } else { "actions" };
+    format!(
+        "DIFFERENT: {seen}, the {commands} are not; {list} {verb} not in the log: look there first. A trainer who explores: --exploring"
+    )
 }
 
 fn counted(count: usize, noun: &str) -> String {

@@ -7,7 +7,7 @@ use crate::workspace::{Crate, Dependency, Kind};
 /// Lowest layer first; a crate depends on strictly lower layers only.
 const LAYERS: &[&[&str]] = &[
     &["random", "toml-input", "mat", "targets", "templates", "report"],
-    &["policy", "plant", "measured"],
+    &["policy", "plant", "measured", "campaign"],
     &["certify"],
     &["import", "interp", "codegen", "drm", "equivalence"],
     &["closed-loop"],

@@ -3,7 +3,7 @@
 // Network 2-4, 8 MACs, numeric format f32 (exact order, no contraction).
 // Sample period 0.0001 s.
 // Weights  sha256 bcd44b26c3f8bd29458d41a7f9ca77d48d7fd8360b9c804aa9281decca21eb73
-// Contract sha256 452c6ab1a37b552e24fd40f801b083f8ccc374a220c7f5ad75cc880dfa19c56c
+// Contract sha256 707549bf00cad1688c9711abc9ffedc74cc5c00f3221c250000d5d295f381f23
 // Mapping  sha256 none
 // Bits hold with: --edition=2021
 
@@ -393,16 +393,17 @@ impl Controller {
         let v3: f32 = v2 * 0.05;
         let f4: u32 = core::hint::black_box(self.primed & 1);
         let v5: f32 = select(f4, self.memory[0], 0.0);
-        let v6: f32 = v2 * 0.0001;
-        let v7: f32 = v5 + v6;
-        let v8: f32 = clamp(v7, -1.0, 1.0);
+        let v6: f32 = v5 * 0.998;
+        let v7: f32 = v2 * 0.0001;
+        let v8: f32 = v6 + v7;
+        let v9: f32 = clamp(v8, -1.0, 1.0);
         let counted = self.bad_count.wrapping_add(flag(self.bad_count <= 1));
         let bad_count = counted & f0.wrapping_sub(1);
         let usable = f0 | (self.primed & flag(bad_count <= 1));
         Front {
             signal: [v1],
-            observation: [v3, v8],
-            push: [v8],
+            observation: [v3, v9],
+            push: [v9],
             bad_count,
             usable,
             held: usable & (f0 ^ 1),

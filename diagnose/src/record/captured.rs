@@ -1,0 +1,142 @@
+//! A table that is a capture: a few periods at the rate of an oscilloscope become one settled row that carries them.
+
+use measured::{ColumnMap, DutyIs, Sampled};
+use plant::{Load, Parameters};
+use toml_input::{Faults, Message};
+
+use super::channels::{CHANNELS, QUANTITIES};
+use super::raw::Raw;
+use super::rows::Lines;
+use super::{Record, name_of};
+use crate::capture::{Capture, Samples, is_capture, read};
+use crate::median::median;
+
+/// Duty and load stand still in a steady state: a column may move by this share of what it holds, as loads are set and duties are written.
+const STILL: f64 = 0.01;
+
+/// Periods of a capture that are used: a steady state repeats itself, and noise is a seventh of that of one period.
+const MOST_PERIODS: f64 = 50.0;
+
+impl Raw<'_> {
+    /// The capture that this table is; nothing if it is another record.
+    pub fn captured(&mut self, map: &ColumnMap, parameters: &Parameters) -> Result<Option<Record>, Faults> {
+        let has = |name: &str| self.located.signal(name).and_then(measured::Signal::column).is_some();
+        if map.settled == Some(true) || !has("t") {
+            return Ok(None);
+        }
+        let step = self.row_step()?;
+        let (time, t_sw) = (self.values("t").unwrap_or_default(), parameters.t_sw());
+        let span = time.last().copied().unwrap_or(0.0) - time.first().copied().unwrap_or(0.0) + step;
+        if map.settled == Some(false) || !is_capture(t_sw / step, span / t_sw) {
+            return Ok(None);
+        }
+        let duty = self.still("duty")?;
+        let load = self.still_load()?;
+        let v = self.measured("v_out").map(median).filter(|v| *v > 0.0);
+        let v = v.or(duty.map(|d| d * parameters.converter.v_in)).unwrap_or(0.0);
+        let power = if v > 0.0 { load.power / v } else { 0.0 };
+        // the first of rows that repeat a time
+        let mut kept: Vec<usize> = (0..time.len()).collect();
+        kept.dedup_by(|b, a| time[*b] == time[*a]);
+        let end = time.first().copied().unwrap_or(0.0) + MOST_PERIODS * t_sw;
+        kept.retain(|n| time[*n] < end);
+        let pick = |values: Vec<f64>| kept.iter().map(|n| values[*n]).collect::<Vec<f64>>();
+        let samples = Samples {
+            step,
+            channels: QUANTITIES.map(|name| self.measured(name).map(&pick)),
+            pin: self.measured("v_pwm").map(&pick),
+            node: self.measured("v_sw").map(&pick),
+            i_in: self.measured("i_in").map(&pick),
+            time: pick(time.clone()),
+            duty,
+            drawn: v * load.conductance + load.current + power,
+        };
+        let found = read(&samples, parameters).map_err(|message| self.sheet.fault(message))?;
+        let (count, all) = (samples.time.len(), time.len());
+        let mut repairs = self.repairs.clone();
+        if count < all {
+            repairs.push(format!(
+                "{} rows behind the first {MOST_PERIODS} periods are not used",
+                all - count
+            ));
+        }
+        repairs.push(format!(
+            "read as a capture: {count} rows over {:.0} whole periods of {}",
+            found.capture.bins.periods,
+            report::quantity(found.capture.period, "s", 5)
+        ));
+        repairs.extend(found.notes);
+        let lines = Lines {
+            time: vec![0.0],
+            duty: vec![found.duty],
+            load: vec![load],
+            sampled: Some(Sampled::Mean),
+            ..Lines::empty(0.5)
+        }
+        .of_points();
+        Ok(Some(Record {
+            name: name_of(self.sheet),
+            time: lines.time,
+            phase: lines.phase,
+            duty: lines.duty,
+            load: lines.load,
+            measured: std::array::from_fn(|_| vec![f64::NAN]),
+            lattice: [0.0; CHANNELS],
+            resolution: [0.0; CHANNELS],
+            v_in_ratio: map
+                .constant("v_in")
+                .map_or(1.0, |v_in| v_in / parameters.converter.v_in),
+            duty_is: if found.applied { DutyIs::Applied } else { map.duty },
+            is_true: [true; CHANNELS],
+            settled: true,
+            repeated: false,
+            scatter: lines.scatter,
+            metered: None,
+            sampled: lines.sampled,
+            dense: true,
+            segments: lines.segments,
+            free_steps: Vec::new(),
+            capture: Some(Box::<Capture>::new(found.capture)),
+            repairs,
+        }))
+    }
+
+    /// The one value of a quantity that stands still over a capture.
+    fn still(&self, name: &'static str) -> Result<Option<f64>, Faults> {
+        let Some(values) = self.values(name) else {
+            return Ok(None);
+        };
+        let middle = median(values.iter().copied());
+        let moved = values
+            .iter()
+            .position(|v| (v - middle).abs() > STILL * middle.abs().max(1e-9));
+        match moved {
+            None => Ok(Some(middle).filter(|v| v.is_finite())),
+            Some(row) => {
+                let message = Message::new(format!("`{}` changes within a capture", self.label(name)));
+                let found = format!("{} beside {middle}", values[row]);
+                let hint = "a capture is of one steady state; a few periods with a step in them are too short for a record over time";
+                Err(self
+                    .fault(
+                        name,
+                        row,
+                        message.found(found).expected("one value throughout").hint(hint),
+                    )
+                    .into())
+            }
+        }
+    }
+
+    /// The one load of a capture; a measured current is taken with its mean.
+    fn still_load(&self) -> Result<Load, Faults> {
+        if self.is_load_measured() {
+            let drawn = self.measured("i_out").unwrap_or_default();
+            let finite: Vec<f64> = drawn.into_iter().filter(|v| v.is_finite()).collect();
+            return Ok(Load::current(finite.iter().sum::<f64>() / finite.len().max(1) as f64));
+        }
+        for name in ["r_load", "i_load", "p_load"] {
+            self.still(name)?;
+        }
+        Ok(self.loads()?.first().copied().unwrap_or_default())
+    }
+}

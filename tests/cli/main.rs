@@ -19,6 +19,7 @@ mod loudness;
 mod plants;
 mod prove;
 mod replay;
+mod replayed_clips;
 mod replayed_duties;
 mod replayed_filters;
 mod shell;

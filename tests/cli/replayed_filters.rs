@@ -22,12 +22,17 @@ fn errors(episode: usize) -> Vec<f64> {
 
 /// The example's contract with these filters in its second feature.
 fn desk(filters: &str) -> Desk {
+    desk_with(&format!("filters = [{filters}]\nscale = {SCALE}"))
+}
+
+/// The example's contract with a second feature of these keys.
+fn desk_with(keys: &str) -> Desk {
     let desk = Desk::new("minimal");
     copy_folder(&tests::root().join("examples/buck12"), &desk.path("buck12"));
     desk.edit(
         "buck12/policy.toml",
         "filters = [{ delay = 1 }]\nscale = 0.2\nclip = [-20.0, 20.0]\n\n[[feature]]\nname = \"de_dt\"",
-        &format!("filters = [{filters}]\nscale = {SCALE}\n\n[[feature]]\nname = \"de_dt\""),
+        &format!("{keys}\n\n[[feature]]\nname = \"de_dt\""),
     );
     // the trainer's observations were made with another feature
     desk.edit("buck12/policy.toml", "golden = \"golden.safetensors\"", "");
@@ -37,12 +42,19 @@ fn desk(filters: &str) -> Desk {
 /// What is said of a log whose feature is `make` of each episode's errors, times [`SCALE`].
 #[track_caller]
 fn said(filters: &str, make: impl Fn(&[f64]) -> Vec<f64>) -> (i32, String) {
-    let desk = desk(filters);
+    let scaled = |e: &[f64]| make(e).iter().map(|y| SCALE * y).collect();
+    said_with(&format!("filters = [{filters}]\nscale = {SCALE}"), scaled)
+}
+
+/// What is said of a log whose feature, of these keys in the contract, is `make` of each episode's errors.
+#[track_caller]
+pub(super) fn said_with(keys: &str, make: impl Fn(&[f64]) -> Vec<f64>) -> (i32, String) {
+    let desk = desk_with(keys);
     let mut text = "episode,v_out,i_l,i_out,obs_1\n".to_owned();
     for episode in 0..EPISODES {
         let errors = errors(episode);
         for (e, y) in errors.iter().zip(make(&errors)) {
-            text += &format!("{episode},{:.7},2,2,{:.7}\n", 100.0 - e, SCALE * y);
+            text += &format!("{episode},{:.7},2,2,{y:.7}\n", 100.0 - e);
         }
     }
     desk.write("log.csv", &text);
@@ -192,6 +204,8 @@ fn a_leak_is_named_with_its_share() {
         leaky(0.99, 0.0),
         &["leaves out the first sample", "leak = 0.99 a period"],
     );
+    // one ten-thousandth: over the 80 rows of an episode it is seen
+    is_named(WIDE, leaky(0.9999, 1.0), &["it leaks, leak = 0.9999"]);
     let contract = "{ integrator = { min = -1.0, max = 1.0, leak = 0.98 } }";
     assert_eq!(said(contract, leaky(0.98, 1.0)).0, 0);
     is_named(contract, leaky(0.9, 1.0), &["it leaks otherwise: leak = 0.9 a period"]);
@@ -203,6 +217,26 @@ fn a_leak_is_named_with_its_share() {
     };
     let contract = "{ integrator = { min = -0.0005, max = 0.001 } }";
     is_named(contract, clamped, &["it leaks, leak = 0.98 a period"]);
+}
+
+/// An integral that adds the sample of the row before, from an initial value that leaks: what is proposed has to fit.
+#[test]
+fn a_delay_behind_a_leak_is_proposed_only_where_it_fits() {
+    let before = |leak: f64, initial: f64| move |e: &[f64]| sum(e, leak * initial, |y, x1, _| leak * y + T * x1);
+    let contract = |initial: f64, more: &str| {
+        format!("{{ integrator = {{ min = -1.0, max = 1.0, initial = {initial}, leak = 0.9 }} }}{more}")
+    };
+    let behind = "{ delay = 1 } behind the integrator";
+    // from 0 nothing leaks
+    is_named(&contract(0.0, ""), before(0.9, 0.0), &[behind]);
+    let (code, line) = said(&contract(0.02, ""), before(0.9, 0.02));
+    assert_eq!(code, 1, "{line}");
+    assert!(
+        line.contains("sample of the row before") && !line.contains(behind),
+        "{line}"
+    );
+    let (code, line) = said(&contract(0.02, ", { delay = 1 }"), before(0.9, 0.02));
+    assert_eq!(code, 1, "{line}");
 }
 
 /// A factor in front of an integral is no factor behind its clamp.
@@ -226,6 +260,17 @@ fn another_source_in_front_of_a_filter_is_named() {
     let ran = desk.type_in("replay buck12 log.csv");
     let words = "behind another source: source = \"i_l\", scale = 0.1 fits the log";
     assert!(ran.stdout.contains(words), "{}", ran.stdout);
+}
+
+/// Rows that are held somewhere without reason leave the contract's own source where it is.
+#[test]
+fn the_contract_s_own_source_is_no_other_source() {
+    let held = |e: &[f64]| {
+        let mut y: Vec<f64> = low_pass(e, e[0], 3e-4).iter().map(|y| 2.0 * y).collect();
+        y[40..60].fill(9.0);
+        y
+    };
+    is_named("{ low_pass = { time_constant = 3e-4 } }", held, &["no simple relation"]);
 }
 
 fn low_pass(errors: &[f64], first: f64, tau: f64) -> Vec<f64> {

@@ -13,8 +13,9 @@
 //! | `s x + o` of the change of one of these from row to row | a difference that is missing |
 
 use interp::{Real, Trace};
-use policy::{Feature, Filter, Policy};
+use policy::{Feature, Policy};
 
+use super::itself::of_itself;
 use super::values::{allowed, ends};
 use super::variants::Trial;
 
@@ -139,7 +140,7 @@ impl<'a> Logged<'a> {
 
     /// The ends at which the log lies while these values, one for each row, go beyond them.
     // the least and the largest value of any log have equal neighbours where it turns round: that alone is no clip
-    fn cut_off(&self, unclipped: &[f64]) -> [Option<f64>; 2] {
+    pub fn cut_off(&self, unclipped: &[f64]) -> [Option<f64>; 2] {
         let near = 2.0 * self.allowed;
         let beyond = |end: f64, side: f64| {
             let is_cut = |(x, y): &(&f64, &f64)| (**y - end).abs() <= near && side * (**x - end) > near;
@@ -285,80 +286,11 @@ fn starts(feature: &Feature, course: &Course, own: &FeatureCourse, logged: &Logg
     })
 }
 
-fn of_itself(feature: &Feature, line: Line, own: &FeatureCourse, logged: &Logged<'_>) -> Option<String> {
-    let unclipped: Vec<f64> = own.unclipped.iter().map(|x| line.s * x + line.o).collect();
-    let shown = logged.cut_off(&unclipped);
-    let [low, high] = [shown[0].unwrap_or(f64::NEG_INFINITY), shown[1].unwrap_or(f64::INFINITY)];
-    let made: Vec<f64> = unclipped.iter().map(|x| x.max(low).min(high)).collect();
-    // the line was drawn without the rows at an end: where no clip makes them, a clamp in the filters does, and it is none of it all
-    if !logged.is(&made) {
-        return None;
-    }
-    let clip = clip(feature, &shown);
-    let (scale, offset) = (line.s * feature.scale, line.s * feature.offset + line.o);
-    let mut keys = Vec::new();
-    let head = if line.s == 1.0 && line.o == 0.0 {
-        match (&clip, feature.clip) {
-            (Some(_), _) => "it ends elsewhere".to_owned(),
-            (None, Some(_)) => "it is not clipped".to_owned(),
-            // nothing that would differ
-            (None, None) => return None,
-        }
-    } else {
-        if line.s != 1.0 {
-            keys.push(format!("scale = {}", number(scale)));
-        }
-        if offset != feature.offset {
-            keys.push(format!("offset = {}", number(offset)));
-        }
-        match (line.s, line.o) {
-            (-1.0, 0.0) => "it has the other sign".to_owned(),
-            (s, 0.0) => format!("it is {} times the contract's", number(s)),
-            (1.0, o) => format!("it is the contract's plus {}", number(o)),
-            (s, o) => format!("it is {} times the contract's plus {}", number(s), number(o)),
-        }
-    };
-    keys.extend(clip);
-    let is_integral = feature
-        .filters
-        .iter()
-        .any(|filter| matches!(filter, Filter::Integrator { .. }));
-    let begun = match is_integral && line.s == 1.0 && line.o != 0.0 {
-        true => ". A log that begins in mid-run shows the same: the integral has a past there",
-        false => "",
-    };
-    Some(match keys.is_empty() {
-        true => head,
-        false => format!("{head}: {} fits the log{begun}", keys.join(", ")),
-    })
-}
-
 /// A few rows that no relation holds in, among others that are equal.
 fn odd_rows(logged: &Logged<'_>) -> Option<String> {
     let (off, rows) = (logged.off.iter().filter(|off| **off).count(), logged.off.len());
     (off as f64 <= (1.0 - NEARLY_ALL) * rows as f64)
         .then(|| format!("{off} of {rows} rows differ: look at what the environment did there"))
-}
-
-/// The key that says where the log is cut off; `None` if it is nowhere.
-fn clip(feature: &Feature, shown: &[Option<f64>; 2]) -> Option<String> {
-    let own = feature.clip.map(|clip| [clip.low, clip.high]);
-    match (shown, own) {
-        ([None, None], _) => None,
-        ([Some(low), Some(high)], _) => Some(format!("clip = [{}, {}]", number(*low), number(*high))),
-        ([low, high], Some(own)) => {
-            let [low, high] = [low.unwrap_or(own[0]), high.unwrap_or(own[1])];
-            Some(format!("clip = [{}, {}]", number(low), number(high)))
-        }
-        ([Some(low), None], None) => Some(format!(
-            "a clip that begins at {} (the log does not come to its upper end)",
-            number(*low)
-        )),
-        ([None, Some(high)], None) => Some(format!(
-            "a clip that ends at {} (the log does not come to its lower end)",
-            number(*high)
-        )),
-    }
 }
 
 /// What an environment may have put in front of a feature's filters: signals and the sources of features, by their names.

@@ -5,6 +5,10 @@ use super::explain::{FEWEST_ROWS, number};
 use super::values::ends;
 use super::variants::Trial;
 
+/// Time constants of a leak that are tried first, in control periods, and how many a decade: a slow one adds up over a long log.
+// a share of a millionth is the last one that a contract in binary32 can tell from none by its second digit
+const LEAKS: [f64; 3] = [1e-3, 1e6, 12.0];
+
 impl Trial<'_> {
     /// An integral that adds by another rule or ends elsewhere, in words.
     pub fn of_integral_rule(&self) -> Option<String> {
@@ -134,16 +138,19 @@ impl Trial<'_> {
                 .into_iter()
                 .flat_map(|(rule, start)| clamps.iter().map(move |[min, max]| (rule, start, *min, *max)));
             trials.find_map(|(rule, start, min, max)| {
-                let with = |tau: f64| Integral {
+                let with = |tau: f64, digits: usize| Integral {
                     min,
                     max,
                     rule,
                     start,
-                    leak: kept(tau / (tau + self.period)),
+                    leak: kept(tau / (tau + self.period), digits),
                     ..integral
                 };
-                let tau = self.tau(|tau| self.with(at, Link::Integral(with(tau))))?;
-                let other = with(tau);
+                let link = |other: Integral| self.with(at, Link::Integral(other));
+                let tau = self.tau_among(LEAKS, |tau| link(with(tau, 5)))?;
+                // the fifth digit is that of the log's rounding where four do as well
+                let told = [4, 5].map(|digits| with(tau, digits));
+                let other = told.into_iter().find(|other| self.fits(&link(*other)))?;
                 self.allows(at, &other).then(|| self.words(&integral, &other))
             })
         })
@@ -165,7 +172,7 @@ impl Trial<'_> {
         format!(
             "the log goes beyond {key} = {}, {far} to {end}: {key} = {end} or {further} fits the log",
             number(own),
-            end = number(outward(shown)),
+            end = number(outward(shown, key)),
         )
     }
 
@@ -185,6 +192,11 @@ impl Trial<'_> {
             ),
             (Rule::Before, Start::Whole) => words.push(
                 "it adds the sample of the row before: { delay = 1 } in front of the integrator fits the log".to_owned(),
+            ),
+            // a leak takes of the initial value once more than with a delay behind it
+            (Rule::Before, _) if other.initial != 0.0 && other.leak != 1.0 => words.push(
+                "it adds the sample of the row before, and nothing in the first row of an episode; the contract adds T x at once"
+                    .to_owned(),
             ),
             (Rule::Before, _) => words.push(
                 "it adds the sample of the row before: { delay = 1 } behind the integrator fits the log from the second row of an \
@@ -224,20 +236,39 @@ fn changes(own: &Integral, other: &Integral) -> usize {
     rule + clamp + leak + usize::from(own.winds_up != other.winds_up) + 2 * usize::from(own.initial != other.initial)
 }
 
-/// A share of a sum with as many digits as are told: what it lacks to 1 with five.
-fn kept(share: f64) -> f64 {
-    let lost: f64 = format!("{:.4e}", 1.0 - share).parse().unwrap_or(1.0 - share);
+/// A share of a sum as it is told: what it lacks to 1 with so many digits.
+fn kept(share: f64, digits: usize) -> f64 {
+    let places = digits.saturating_sub(1);
+    let lost: f64 = format!("{:.places$e}", 1.0 - share).parse().unwrap_or(1.0 - share);
     // 1 - 0.002 in binary has more digits than a contract should
-    let digits = (4.0 - lost.log10().floor()).max(0.0) as usize;
+    let digits = (places as f64 - lost.log10().floor()).max(0.0) as usize;
     format!("{:.digits$}", 1.0 - lost).parse().unwrap_or(1.0 - lost)
 }
 
-/// The number of four digits next to a value, away from 0: one nearer to 0 would cut the value off.
-fn outward(value: f64) -> f64 {
+/// The number of four digits next to a value, below it for a `min` and above it for a `max`: one within would cut the value off.
+fn outward(value: f64, key: &str) -> f64 {
     if value == 0.0 {
         return value;
     }
     let step = 10f64.powf(value.abs().log10().floor() - 3.0);
     // what is such a number already is off a whole one by a rounding
-    value.signum() * (value.abs() / step - 1e-6).ceil() * step
+    match key {
+        "min" => (value / step + 1e-6).floor() * step,
+        _ => (value / step - 1e-6).ceil() * step,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clamp_that_is_proposed_holds_all_of_the_log_whatever_its_sign() {
+        for value in [0.012_345_6, -0.012_345_6, 98.765_43, -98.765_43, 0.002, -0.002] {
+            let [min, max] = ["min", "max"].map(|key| number(outward(value, key)).parse::<f64>().unwrap());
+            assert!(min <= value && value <= max, "{value}: {min} to {max}");
+            assert!(max - min <= 1.001e-3 * value.abs(), "{value}: {min} to {max}");
+        }
+        assert_eq!(outward(0.0, "min"), 0.0);
+    }
 }

@@ -13,6 +13,7 @@ mod chain;
 mod duties;
 mod explain;
 mod integral;
+mod itself;
 mod log;
 mod sources;
 mod text;

@@ -2,6 +2,7 @@
 
 use super::chain::{Integral, Link, filtered};
 use super::explain::{Line, affine, all, number};
+use super::itself::Clip;
 use super::variants::Trial;
 
 /// Rows whose input is less than this share of the largest say nothing of a factor: a digit of the log decides there.
@@ -23,12 +24,19 @@ impl Trial<'_> {
 
     /// Filters that are linear: a factor in front of them is one behind them.
     fn of_linear(&self, name: &str, values: &[f64]) -> Option<String> {
+        // the contract's own source, perhaps that of another feature, too, is no other one
+        if *values == self.own.source {
+            return None;
+        }
         let made = filtered(&self.links, values, &self.course.begins, self.period);
         let Line { s, o } = self.logged.line(&all(&made))?;
+        let unclipped: Vec<f64> = made.iter().map(|y| s * y + o).collect();
+        let clip = Clip::of(self.feature, self.logged, &unclipped)?;
         let mut keys = vec![format!("source = \"{name}\""), format!("scale = {}", number(s))];
         if o != 0.0 {
             keys.push(format!("offset = {}", number(o)));
         }
+        keys.extend(clip.key());
         Some(format!(
             "its filters stand behind another source: {} fits the log",
             keys.join(", ")

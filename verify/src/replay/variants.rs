@@ -92,7 +92,12 @@ impl<'a> Trial<'a> {
     }
 
     /// The time constant with which `links` come nearest to the log, if they explain it.
-    pub(super) fn tau(&self, links: impl Fn(f64) -> Vec<Link>) -> Option<f64> {
+    fn tau(&self, links: impl Fn(f64) -> Vec<Link>) -> Option<f64> {
+        self.tau_among(TAUS, links)
+    }
+
+    /// [`Self::tau`] between two time constants in control periods, with so many a decade tried first.
+    pub(super) fn tau_among(&self, [low, high, of_decade]: [f64; 3], links: impl Fn(f64) -> Vec<Link>) -> Option<f64> {
         let rows = self.own.source.len().min(SEARCHED);
         // a sum of sizes and not of squares: a few odd rows must not draw it away
         let off = |exponent: f64| -> f64 {
@@ -100,7 +105,6 @@ impl<'a> Trial<'a> {
             let pairs = made.iter().zip(self.logged.values);
             pairs.map(|(made, logged)| (made - logged).abs()).sum()
         };
-        let [low, high, of_decade] = TAUS;
         let step = std::f64::consts::LN_10 / of_decade;
         let count = ((high / low).ln() / step) as usize;
         let grid = (0..=count).map(|n| low.ln() + n as f64 * step);

@@ -1,0 +1,71 @@
+//! `policyc replay`: logs that end elsewhere than the contract says, and whether what is told of them fits.
+
+use super::replayed_filters::said_with;
+
+/// The voltage error times `scale`, between two ends.
+fn cut(scale: f64, low: f64, high: f64) -> impl Fn(&[f64]) -> Vec<f64> {
+    move |errors| errors.iter().map(|e| (scale * e).clamp(low, high)).collect()
+}
+
+/// A log of the contract `clip = [-1, 1]` is told with `words`, and is equal with `mended` in the contract.
+#[track_caller]
+fn is_told([scale, low, high]: [f64; 3], words: &[&str], mended: &str) {
+    let (code, line) = said_with("scale = 1.0\nclip = [-1.0, 1.0]", cut(scale, low, high));
+    assert_eq!(code, 1, "{line}");
+    for word in words {
+        assert!(line.contains(word), "`{word}` is not in: {line}");
+    }
+    let (code, line) = said_with(mended, cut(scale, low, high));
+    assert_eq!(code, 0, "{mended}: {line}");
+}
+
+const OPEN: f64 = f64::INFINITY;
+
+/// The errors go from -1.767 to 3.375.
+#[test]
+fn an_end_of_the_contract_is_kept_only_where_the_log_stays_within_it() {
+    is_told(
+        [1.0, -1.0, OPEN],
+        &["it ends elsewhere: a clip that begins at -1 and has no upper end (the log goes up to 3.375)"],
+        "scale = 1.0\nclip = [-1.0, 1000.0]",
+    );
+    is_told(
+        [1.0, -OPEN, 1.0],
+        &["it ends elsewhere: a clip that ends at 1 and has no lower end (the log goes down to -1.767)"],
+        "scale = 1.0\nclip = [-1000.0, 1.0]",
+    );
+    is_told([1.0, -OPEN, OPEN], &["it is not clipped"], "scale = 1.0");
+    is_told(
+        [1.0, -0.5, 1.0],
+        &["clip = [-0.5, 1]"],
+        "scale = 1.0\nclip = [-0.5, 1.0]",
+    );
+}
+
+#[test]
+fn the_clip_of_a_log_with_another_scale_is_told_with_it() {
+    is_told(
+        [2.0, -2.0, OPEN],
+        &[
+            "2 times",
+            "scale = 2, a clip that begins at -2 and has no upper end (the log goes up to 6.75)",
+        ],
+        "scale = 2.0\nclip = [-2.0, 1000.0]",
+    );
+    is_told(
+        [2.0, -OPEN, OPEN],
+        &["scale = 2, no clip (the log goes from -3.534 to 6.75)"],
+        "scale = 2.0",
+    );
+    // within the contract's clip nothing is to be said of it
+    is_told(
+        [0.1, -OPEN, OPEN],
+        &["scale = 0.1 fits the log"],
+        "scale = 0.1\nclip = [-1.0, 1.0]",
+    );
+    is_told(
+        [0.4, -0.4, OPEN],
+        &["scale = 0.4, a clip that begins at -0.4 and has no upper end (the log goes up to 1.35)"],
+        "scale = 0.4\nclip = [-0.4, 1000.0]",
+    );
+}

@@ -19,6 +19,7 @@ pub mod describe;
 mod digests;
 mod expression;
 mod faults;
+mod filter;
 mod head;
 mod interval;
 mod known_answers;

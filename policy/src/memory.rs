@@ -144,15 +144,18 @@ mod tests {
         let (words, y) = of(&Filter::MovingAverage { samples: 4 });
         assert_eq!(words, [10.0; 3]);
         assert_near(y, g() * (1.0 + 8.0 * f64::powi(2.0, -24)) * 10.0);
-        let integrator = Filter::Integrator {
-            min: -3.0,
-            max: 2.0,
-            initial: 0.0,
-            leak: 0.0,
-        };
-        let (words, y) = of(&integrator);
-        assert_near(y, 3.0 * g());
-        assert_eq!(words, [y]);
+        // a leak takes of the sum, and the clamp holds what is left
+        for leak in [1.0, 0.5] {
+            let integrator = Filter::Integrator {
+                min: -3.0,
+                max: 2.0,
+                initial: 0.0,
+                leak,
+            };
+            let (words, y) = of(&integrator);
+            assert_near(y, 3.0 * g());
+            assert_eq!(words, [y]);
+        }
     }
 
     /// `g (2X/s + e/d)` with `s = tau + T`, `e = 10 u X/s + 1e-40 (1 + 1/s)`, `d = 1 - tau/s - 3u`.

@@ -18,6 +18,9 @@ const MOST_GROWTH: f64 = 2.0;
 /// Shortest segment of an unstable record, rows: each costs two unknowns, of 30 rows of two signals.
 const SHORTEST: usize = 30;
 
+/// What stands in a residual where no number is simulated: far beyond any real error, and its square still a number.
+pub const LOST: f64 = 1e6;
+
 /// The channels in which a load step leaps.
 const OUTPUT_VOLTAGE: usize = 0;
 const LOAD_CURRENT: usize = 2;
@@ -230,6 +233,17 @@ impl Problem {
         self.records[record].measured[channel][row].is_finite() && !self.masked[record][channel][row]
     }
 
+    /// An error over the noise of its channel; [`LOST`] where the model is no plant or its simulation left the numbers.
+    fn scored(&self, error: f64, channel: usize) -> f64 {
+        let sigma = self.sigma[channel];
+        match error / sigma {
+            scored if scored.is_finite() => scored,
+            // nobody knows this channel's noise: it is not compared, whatever the model says
+            _ if sigma.is_infinite() => 0.0,
+            _ => LOST,
+        }
+    }
+
     /// Measured minus simulated, over the noise; 0 where nothing counts. The first row of a segment does not count: no
     /// period leads to it.
     #[must_use]
@@ -252,14 +266,7 @@ impl Problem {
                     for channel in 0..CHANNELS {
                         if self.counts(index, row, channel) {
                             let error = record.measured[channel][row] - shown[row][channel];
-                            // a model that is no plant explains nothing
-                            let error = if error.is_finite() {
-                                error
-                            } else {
-                                // far beyond any real error, and its square still a number
-                                1e6 * self.sigma[channel]
-                            };
-                            out[self.offsets[index] + row * CHANNELS + channel] = error / self.sigma[channel];
+                            out[self.offsets[index] + row * CHANNELS + channel] = self.scored(error, channel);
                         }
                     }
                 }

@@ -84,14 +84,26 @@ fn a_page_of_a_model_that_has_no_finite_value_says_so_and_draws_the_rest() {
     let said = diagnose::page::page(&found).unwrap();
     assert!(!said.contains("diverges") && !said.contains("picture is missing"));
     let pictures = said.matches("<svg").count();
+    let (starts, given) = (found.given.starts.clone(), found.given.model.clone());
+    let spoil = |edit: fn(&mut plant::Parameters)| {
+        let mut model = given.clone();
+        edit(&mut model.plant);
+        found.problem.residual(&model, &starts)
+    };
+    let no_plant = spoil(|p| p.converter.capacitance = f64::NAN);
+    let diverging = spoil(|p| p.converter.v_in = 1e308);
+    let half: Vec<f64> = [&found.given.residual[..240], &no_plant[240..]].concat();
+    let nothing = vec![0.0; no_plant.len()];
     for (spoiled, words) in [
-        (f64::INFINITY, "its simulation diverges"),
-        (0.0, "What changes in the model"),
+        (no_plant, "No line of model for v_o and i_l: its simulation diverges"),
+        (diverging, "its simulation diverges"),
+        (half, "has gaps: there its simulation diverges"),
+        (nothing, "What changes in the model"),
     ] {
-        found.given.residual.fill(spoiled);
+        found.given.residual = spoiled;
         let page = diagnose::page::page(&found).unwrap();
-        assert!(page.contains(words), "{spoiled}");
-        assert_eq!(page.matches("<svg").count(), pictures, "{spoiled}");
+        assert!(page.contains(words), "{words}");
+        assert_eq!(page.matches("<svg").count(), pictures, "{words}");
     }
     // neither model: a picture with no line at all gives way to its reason, and the page stays
     if let Some(best) = &mut found.attribution.best {

@@ -7,18 +7,21 @@ use crate::diagnosis::Diagnosis;
 use crate::findings::Verdict;
 use crate::fit::State;
 use crate::noise::channel;
-use crate::problem::Problem;
+use crate::problem::{LOST, Problem};
 use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS};
 
 /// Groups of equal size in a picture by operating point.
 const GROUPS: usize = 12;
 
-/// Measured minus simulated in the channel's unit; NaN where nothing counts.
+/// Measured minus simulated in the channel's unit; NaN where nothing counts, infinite where the simulation has no number.
 fn errors(problem: &Problem, state: &State, record: usize, n: usize) -> Vec<f64> {
     let values = channel(problem, &state.residual, record, n).into_iter();
-    values
-        .map(|v| if v == 0.0 { f64::NAN } else { v * problem.sigma[n] })
-        .collect()
+    let error = |v: f64| match v {
+        0.0 => f64::NAN,
+        LOST => f64::INFINITY,
+        _ => v * problem.sigma[n],
+    };
+    values.map(error).collect()
 }
 
 /// Voltage and current of a record with both simulations, and their errors.
@@ -88,16 +91,25 @@ pub(super) fn pictures(
     let mut section = section.chart_or_reason(panels(problem, before, after, record, second), caption);
     let states = std::iter::once(("model", before)).chain(second.map(|name| (name, after)));
     for (name, state) in states {
-        let left = (0..2).filter(|n| {
-            let errors = errors(problem, state, record, *n);
-            // NaN is what nothing is compared in; infinite is an error that no number holds
-            errors.iter().any(|error| error.is_infinite()) && !errors.iter().any(|error| error.is_finite())
-        });
-        let left: Vec<&str> = left.map(|n| CHANNEL_NAMES[n]).collect();
-        if !left.is_empty() {
+        // channels without any line, and those whose line has gaps
+        let (mut none, mut gaps) = (Vec::new(), Vec::new());
+        for n in 0..2 {
+            let errors = errors(problem, state, record, n);
+            if errors.iter().any(|error| error.is_infinite()) {
+                let is_drawn = errors.iter().any(|error| error.is_finite());
+                (if is_drawn { &mut gaps } else { &mut none }).push(CHANNEL_NAMES[n]);
+            }
+        }
+        if !none.is_empty() {
             section = section.text(format!(
                 "No line of {name} for {}: its simulation diverges, beyond what can be drawn.",
-                left.join(" and ")
+                none.join(" and ")
+            ));
+        }
+        if !gaps.is_empty() {
+            section = section.text(format!(
+                "The line of {name} for {} has gaps: there its simulation diverges, beyond what can be drawn.",
+                gaps.join(" and ")
             ));
         }
     }

@@ -112,7 +112,7 @@ fn compile_says_how_many_accepted_decisions_a_format_changes() {
     let desk = example();
     let said = desk.succeed("compile policy --format i16 --golden-decisions 0.37 --no-costs --out out");
     assert!(
-        said.contains("decisions in i16: 187 of 515 changed (36.3 %, allowed 37 %)"),
+        said.contains("decisions in i16: 187 of 515 changed (36.3 %, allowed 37.0 %)"),
         "{said}"
     );
     assert!(said.contains("they give up at most"), "{said}");

@@ -198,7 +198,7 @@ fn a_policy_that_loses_the_voltage_is_said_to() {
     let settled = desk.succeed("simulate s.toml --policy policy --out a");
     assert!(!settled.contains("does not settle"), "{settled}");
     let said = desk.succeed("simulate s.toml --policy policy --out b --plant plants/paper-table.toml");
-    let words = "the policy does not settle within 0.5 V of 100 V before or after 200 -> 500 W, 500 -> 200 W";
+    let words = "the policy does not settle within 0.5 V of 100 V before and after 200 -> 500 W, 500 -> 200 W";
     assert!(said.contains(words), "{said}");
     let page = desk.read("b/report.html");
     assert!(page.contains("verdict warn") && page.contains("does not settle"));

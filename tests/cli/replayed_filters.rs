@@ -185,7 +185,7 @@ fn a_clamp_that_the_log_passes_is_no_wind_up() {
     // what it proposes fits
     let end = |word: &str| {
         let rest = line
-            .split(&format!("fits the log"))
+            .split("fits the log")
             .find(|part| part.contains(&format!("beyond {word}")));
         let rest = rest.unwrap().split(&format!(": {word} = ")).nth(1).unwrap();
         rest.split(' ').next().unwrap().to_owned()

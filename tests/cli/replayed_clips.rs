@@ -1,6 +1,6 @@
 //! `policyc replay`: logs that end elsewhere than the contract says, and whether what is told of them fits.
 
-use super::replayed_filters::said_with;
+use super::replayed_filters::{EPISODES, SCALE, clamped, desk, errors, low_pass, said, said_with};
 
 /// The voltage error times `scale`, between two ends.
 fn cut(scale: f64, low: f64, high: f64) -> impl Fn(&[f64]) -> Vec<f64> {
@@ -68,4 +68,39 @@ fn the_clip_of_a_log_with_another_scale_is_told_with_it() {
         &["scale = 0.4, a clip that begins at -0.4 and has no upper end (the log goes up to 1.35)"],
         "scale = 0.4\nclip = [-0.4, 1000.0]",
     );
+}
+
+#[test]
+fn the_least_value_of_a_log_is_no_clip() {
+    let twice = |e: &[f64]| low_pass(e, e[0], 3e-3).iter().map(|y| 2.0 * y).collect::<Vec<_>>();
+    let (code, line) = said("{ low_pass = { time_constant = 3e-3 } }", twice);
+    assert_eq!(code, 1);
+    assert!(
+        line.contains("it is 2 times the contract's: scale = 200 fits the log"),
+        "{line}"
+    );
+    assert!(!line.contains("clip"), "{line}");
+    // held at an end that the formula passes
+    let cut = |e: &[f64]| low_pass(e, e[0], 3e-4).iter().map(|y| y.max(-0.5)).collect::<Vec<_>>();
+    let (_, line) = said("{ low_pass = { time_constant = 3e-4 } }", cut);
+    assert!(line.contains("a clip that begins at -50"), "{line}");
+}
+
+#[test]
+fn an_end_that_the_log_never_reaches_is_told() {
+    let desk = desk("{ integrator = { min = -0.001, max = 0.9 } }");
+    let mut text = "episode,v_out,i_l,i_out,obs_1\n".to_owned();
+    for episode in 0..EPISODES {
+        let errors = errors(episode);
+        for (e, y) in errors.iter().zip(clamped(&errors, -0.001, 0.9)) {
+            text += &format!("{episode},{:.7},2,2,{:.7}\n", 100.0 - e, SCALE * y);
+        }
+    }
+    desk.write("log.csv", &text);
+    let said = desk.succeed("replay buck12 log.csv");
+    assert!(
+        said.contains("the log never reaches `max` of e_del, 0.9: not checked"),
+        "{said}"
+    );
+    assert!(!said.contains("`min` of e_del"), "{said}");
 }

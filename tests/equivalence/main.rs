@@ -108,11 +108,13 @@ fn the_examples_do_what_their_contracts_say() {
     let Some(solver) = solver() else { return };
     let all = [
         "examples/buck12",
+        // its integrator leaks, which no random policy of a plain run does
+        "tests/golden/cases/linear",
         "examples/drm",
         "examples/blind/policy",
         "examples/train/wide",
     ];
-    let count = if tests::full() { all.len() } else { 1 };
+    let count = if tests::full() { all.len() } else { 2 };
     for path in &all[..count] {
         assert_proved(&load(path), &solver);
     }

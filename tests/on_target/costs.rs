@@ -111,6 +111,19 @@ fn nor_does_that_of_random_policies() {
     }
 }
 
+/// The load current leaves the range of the mapping on both sides, between the ends of its sensor. A jump over one instruction makes
+/// a number of a comparison there; two comparisons joined by an `or` were jumps over three, and the spread was 11.
+#[test]
+fn on_powerpc_no_comparison_in_rust_is_jumped_over() {
+    let target = targets::find("dspace-ds1202").unwrap();
+    let policy = policy::load(&tests::root().join("tests/golden/cases/adc_mapping/policy.toml")).unwrap();
+    let files = codegen::generate(&policy, target, &[Output::Rust], None).unwrap().files;
+    let builds = toolchain::builds(target, &[toolchain::RUSTC.to_owned()], &[]);
+    let costs = measure(&policy, target, &files, &builds[0]).unwrap();
+    let spread = costs.instructions_max - costs.instructions_min;
+    assert!(spread <= 9, "{costs:?}");
+}
+
 /// Largest spread of a build of the target.
 fn allowed_spread(target: &TargetSpec, build: &str) -> u64 {
     let exception = BRANCHES

@@ -245,7 +245,13 @@ fn filter(rng: &mut SplitMix) -> String {
         4 => format!("{{ moving_average = {} }}", 2 + rng.below(6)),
         // no draw of its own, so that the policies of a seed stay what they are otherwise
         _ if tau > 5e-3 => {
-            let leak = 1.0 - 10.0 * tau;
+            let leak = match tau {
+                // 1 in binary32, and not in binary64
+                _ if tau > 9e-3 => 0.999_999_99,
+                // keeps next to nothing
+                _ if tau > 8e-3 => 1e-3 + 100.0 * (tau - 8e-3),
+                _ => 1.0 - 10.0 * tau,
+            };
             format!("{{ integrator = {{ min = -0.5, max = 0.75, initial = 0.1, leak = {leak:?} }} }}")
         }
         _ => "{ integrator = { min = -0.5, max = 0.75, initial = 0.1 } }".to_owned(),

@@ -93,11 +93,11 @@ pub(super) fn pictures(
     for (name, state) in states {
         // channels without any line, and those whose line has gaps
         let (mut none, mut gaps) = (Vec::new(), Vec::new());
-        for n in 0..2 {
+        for (n, channel) in CHANNEL_NAMES.iter().enumerate().take(2) {
             let errors = errors(problem, state, record, n);
             if errors.iter().any(|error| error.is_infinite()) {
                 let is_drawn = errors.iter().any(|error| error.is_finite());
-                (if is_drawn { &mut gaps } else { &mut none }).push(CHANNEL_NAMES[n]);
+                (if is_drawn { &mut gaps } else { &mut none }).push(*channel);
             }
         }
         if !none.is_empty() {
@@ -135,9 +135,7 @@ pub(super) fn training(diagnosis: &Diagnosis) -> Option<Section> {
         own.map(|v| v * v).sum::<f64>() / problem.records[record].rows().max(1) as f64
     };
     let all = || (0..problem.records.len()).filter(|n| problem.records[*n].capture.is_none());
-    let Some(worst) = all().max_by(|a, b| square(*a).total_cmp(&square(*b))) else {
-        return None;
-    };
+    let worst = all().max_by(|a, b| square(*a).total_cmp(&square(*b)))?;
     let caption =
         "The training record that the model as given misses most. Initial states are estimated for each model.";
     let title = match second {

@@ -41,6 +41,8 @@ pub struct Signals {
 }
 
 /// Runs the board at a duty and a load in ohm; steps are at most `longest`.
+// ngspice reads its netlist from a file
+#[allow(clippy::disallowed_methods)]
 pub fn run(name: &str, duty: f64, load: f64, v0: f64, longest: &str) -> Signals {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     std::fs::create_dir_all(&folder).unwrap();

@@ -173,8 +173,9 @@ pub fn helpers(program: &Program) -> TokenStream {
     let mask = number::bits(scalar).mask;
     let comparisons = super::guard::helpers(scalar);
     let lines = rust_lines(&Rust::of(program));
-    // `within` and `outside` have one barrier each, since a barrier takes three instructions. `within` adds its conditions: of an
-    // `and` of both rustc makes branches of different lengths on PowerPC, which has jumps for comparisons of floats
+    // `within` and `outside` have one barrier each, since a barrier takes three instructions. They add their conditions: of an `and`
+    // or an `or` of both rustc makes branches of different lengths on PowerPC, which has jumps for comparisons of floats. The 1 behind
+    // the sum of `outside` makes of 0, 1, 2 what an `or` says, for whatever ends
     quote! {
         /// A condition as 0 or 1. The optimiser must not know that: it would turn selections back into branches.
         #[inline(always)]
@@ -196,7 +197,7 @@ pub fn helpers(program: &Program) -> TokenStream {
         #[inline(always)]
         #[allow(dead_code)]
         fn outside(x: #number, low: #number, high: #number) -> u32 {
-            flag((x < low) | (x > high))
+            core::hint::black_box(u32::from(x < low).wrapping_add(u32::from(x > high)).wrapping_add(1)) >> 1
         }
         #[inline(always)]
         #[allow(dead_code)]

@@ -1,5 +1,9 @@
 //! `policyc campaign` and `policyc merge`: what is done is kept, and results do not depend on who made them, or when.
 
+mod kept;
+mod queues;
+mod shared;
+
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
@@ -100,7 +104,7 @@ fn only_what_reads_an_edited_file_runs_again() {
     let answer = file("answer.json");
     desk.write(&format!("other/{answer}"), "{}");
     std::fs::remove_file(desk.path(&format!("other/{}", file("metrics.json")))).unwrap();
-    let again = desk.succeed("campaign plan.toml --out other --json");
+    let again = desk.succeed("campaign plan.toml --out other --json --force");
     assert_eq!(serde_json::from_str::<serde_json::Value>(&again).unwrap()["ran"], 2);
     assert_ne!(desk.read(&format!("other/{answer}")), "{}");
 }

@@ -1,6 +1,7 @@
 //! One task, in the process that calls.
 
 use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -115,8 +116,8 @@ pub fn perform(
 }
 
 /// A command line behind `policyc`.
-pub fn parsed(arguments: &[String]) -> Result<Arguments, Failure> {
-    let line = std::iter::once("policyc").chain(arguments.iter().map(String::as_str));
+pub fn parsed<S: AsRef<OsStr>>(arguments: &[S]) -> Result<Arguments, Failure> {
+    let line = std::iter::once(OsStr::new("policyc")).chain(arguments.iter().map(S::as_ref));
     Arguments::try_parse_from(line).map_err(|error| {
         let text = error.to_string();
         // the rest is how to call the command
@@ -193,7 +194,7 @@ mod tests {
 
     #[test]
     fn a_line_that_is_none_is_a_message_of_one_paragraph() {
-        let Err(Failure(faults)) = parsed(&["certify".into(), "a".into(), "--format".into(), "f61".into()]) else {
+        let Err(Failure(faults)) = parsed(&["certify", "a", "--format", "f61"]) else {
             panic!("must fail")
         };
         let text = faults.to_string();

@@ -209,7 +209,7 @@ fn more_tasks_than_a_folder_can_hold_are_refused_before_they_are_made() {
         boxes.join(", ")
     );
     refused(&text, (1, 1), &["100000", "tasks"]);
-    let settings = vec!["\"train.toml\""; 2].join(", ");
+    let settings = ["\"train.toml\""; 2].join(", ");
     let text = format!("[[train]]\nsettings = [{settings}]\nseeds = {{ count = 100000 }}\n");
     refused(&text, (1, 1), &["100000", "tasks"]);
 }

@@ -9,7 +9,8 @@ use crate::TOOL;
 use crate::digest::sha256;
 use crate::figures::{self, Figures};
 use crate::kind::Kind;
-use crate::task::Task;
+use crate::lacks;
+use crate::task::{Task, kind_of};
 
 /// The record's name in the folder of a task. It is there if the task is done.
 pub const RECORD: &str = "task.json";
@@ -78,6 +79,12 @@ impl Done {
             let message = Message::new(format!("{RECORD} of {id} is that of another task"));
             return Err(message.found(record.id).expected(id));
         }
+        if kind_of(id) != Some(record.kind) {
+            let message = Message::new(format!("{RECORD} of {id} is that of another command"));
+            return Err(message
+                .found(record.kind.name())
+                .expected("the command in the name of the task"));
+        }
         for (name, digest) in &record.files {
             match files.get(name) {
                 Some(bytes) if sha256(bytes) == *digest => {}
@@ -100,9 +107,20 @@ impl Done {
         all
     }
 
+    /// What it was made without: programs that the machine does not have, or time. The task is not done for good then.
+    #[must_use]
+    pub fn lacks(&self) -> Vec<String> {
+        lacks::of(self.record.kind, &self.files)
+    }
+
     /// Its numbers for the table of all results.
     #[must_use]
     pub fn figures(&self) -> Figures {
-        figures::of(self.record.kind, &self.files)
+        let mut figures = figures::of(self.record.kind, &self.files);
+        let lacks = self.lacks();
+        if !lacks.is_empty() {
+            figures.push((lacks::FIGURE.to_owned(), lacks.join("; ").into()));
+        }
+        figures
     }
 }

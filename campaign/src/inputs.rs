@@ -1,6 +1,6 @@
 //! The files that a task reads: those it names, and those that these name.
 //!
-//! A TOML file is searched for every text that is a path of a file beside it. This takes a file too many rather than one too few; one too
+//! A TOML file, whatever its name ends in, is searched for every text that is a path of a file beside it. This takes a file too many rather than one too few; one too
 //! few is noticed, because the command then runs without it. A task is run in a folder that holds its inputs alone, under the paths
 //! that they have from their common folder: nothing else can have a part in its result.
 
@@ -14,6 +14,9 @@ use crate::digest::sha256;
 
 /// Largest input file in bytes (256 MiB): a file is held in memory and may be sent to another machine.
 pub const MAX_INPUT_BYTES: u64 = 256 << 20;
+
+/// Largest file in bytes (1 MiB) that is looked into although it is not called `.toml`: contracts and settings are far smaller.
+const MAX_TOML_BYTES: usize = 1 << 20;
 
 /// Folder of the inputs in the folder of a task.
 const FOLDER: &str = "in";
@@ -88,8 +91,7 @@ impl Inputs {
     fn read(&mut self, path: &Path, name: &FileName) -> Result<&Known, Faults> {
         if !self.known.contains_key(path) {
             let bytes = name.read(MAX_INPUT_BYTES).map_err(|message| name.fault(message))?;
-            let is_toml = path.extension().is_some_and(|extension| extension == "toml");
-            let names = match is_toml {
+            let names = match is_toml(path, &bytes) {
                 true => named_by(name, path, &bytes)?,
                 false => Vec::new(),
             };
@@ -104,6 +106,25 @@ impl Inputs {
             None => Err(name.fault(Message::new("the file was lost")).into()),
         }
     }
+}
+
+/// Whether a file may name others. One that is called so has to be TOML; of another, such as a contract under a name of its own, the content
+/// tells.
+fn is_toml(path: &Path, bytes: &[u8]) -> bool {
+    let is_called_so = path.extension().is_some_and(|extension| extension == "toml");
+    let content = || match bytes.len() <= MAX_TOML_BYTES {
+        true => std::str::from_utf8(bytes).is_ok_and(|text| Document::from_text(path, text).is_ok()),
+        false => false,
+    };
+    is_called_so || content()
+}
+
+/// Goes out of a folder that it has gone into: in the folder of a task, into which only the files themselves are put, there is no such
+/// folder.
+fn turns_back(text: &str) -> bool {
+    let parts = Path::new(text).components();
+    let mut inside = parts.skip_while(|part| matches!(part, Component::ParentDir | Component::CurDir));
+    inside.any(|part| part == Component::ParentDir)
 }
 
 /// Files that a TOML file names, relative to its folder.
@@ -124,6 +145,12 @@ fn named_by(name: &FileName, path: &Path, bytes: &[u8]) -> Result<Vec<PathBuf>, 
             // it would be read past the folder of the task, and exist on no other machine
             let message = Message::new("a file of a campaign must not be named by its absolute path");
             let message = message.found(text).hint("name it as seen from the folder of this file");
+            faults.push(document.fault(span, message));
+        } else if turns_back(text) {
+            let message = Message::new("a path of a campaign must not lead into a folder and out of it again");
+            let message = message
+                .found(text)
+                .hint("name the file by the shortest path from the folder of this file");
             faults.push(document.fault(span, message));
         }
         names.push(file);
@@ -236,6 +263,34 @@ mod tests {
         write(folder.path(), "a.toml", "x = \"b.toml\"");
         write(folder.path(), "b.toml", "x = [\"./a.toml\", \"b.toml\"]");
         assert_eq!(gathered(folder.path(), "a.toml").unwrap().files.len(), 2);
+    }
+
+    #[test]
+    fn a_contract_under_a_name_of_its_own_brings_its_weights() {
+        let folder = tempfile::tempdir().unwrap();
+        write(folder.path(), "a.contract", "[network]\nweights = \"w.bin\"\n");
+        write(folder.path(), "w.bin", "1");
+        write(folder.path(), "a.csv", "t,v_out\n0,1\n");
+        let names: Vec<String> = gathered(folder.path(), "a.contract")
+            .unwrap()
+            .files
+            .into_keys()
+            .collect();
+        assert_eq!(names, ["in/a.contract", "in/w.bin"]);
+        assert_eq!(gathered(folder.path(), "a.csv").unwrap().files.len(), 1);
+    }
+
+    #[test]
+    fn a_path_through_a_folder_that_will_not_be_there_is_refused_at_its_place() {
+        let folder = tempfile::tempdir().unwrap();
+        write(folder.path(), "a/p.toml", "");
+        write(folder.path(), "a/extra/none", "");
+        write(folder.path(), "a/a.toml", "plant = \"extra/../p.toml\"");
+        let faults = gathered(folder.path(), "a/a.toml").err().unwrap();
+        assert_eq!(faults.list[0].line_column(), Some((1, 9)));
+        assert!(faults.to_string().contains("extra/../p.toml"), "{faults}");
+        write(folder.path(), "a/a.toml", "plant = \"./../a/p.toml\"");
+        assert!(gathered(folder.path(), "a/a.toml").is_ok());
     }
 
     #[test]

@@ -15,6 +15,7 @@ mod done;
 mod figures;
 mod inputs;
 mod kind;
+mod lacks;
 mod page;
 mod plan;
 mod results;
@@ -30,7 +31,11 @@ pub use kind::Kind;
 pub use plan::Plan;
 pub use results::{Listed, Results, Schedule, State};
 pub use scripts::{Call, slurm, snakemake};
-pub use task::{Axis, Task};
+pub use task::{Axis, Task, kind_of};
 
-/// Who wrote a file, and part of every digest: another version may compute something else.
+/// Who wrote a file.
 pub const TOOL: &str = concat!("policyc ", env!("CARGO_PKG_VERSION"));
+
+/// The version and the digest of the sources, as part of every digest: another build may compute something else. The command and the
+/// wheel of the same sources are one build; see `build.rs`.
+pub const BUILD: &str = concat!(env!("CARGO_PKG_VERSION"), env!("POLICYC_SOURCES"));

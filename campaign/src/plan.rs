@@ -12,7 +12,7 @@ use crate::sections::{self, Draft, Word};
 use crate::task::Task;
 
 /// More tasks than a folder can be listed with in a second; a plan with more is mostly a slip in a range.
-const MOST_TASKS: usize = 100_000;
+pub(crate) const MOST_TASKS: usize = 100_000;
 
 /// A checked plan: its tasks with everything that they read.
 #[derive(Debug)]

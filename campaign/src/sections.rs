@@ -1,9 +1,10 @@
 //! The sections of a plan: what each is multiplied over, and the command lines that come of it.
 
-use toml_input::{Document, FileName, Message, Place, Sink, Table, Value};
+use toml_input::{Document, FileName, Message, Place, Sink, Table, Value, messages};
 
 use crate::inputs::named_in_plan;
 use crate::kind::Kind;
+use crate::plan::MOST_TASKS;
 use crate::seeds;
 use crate::task::Axis;
 
@@ -101,6 +102,9 @@ impl Section<'_, '_, '_> {
                 ];
                 (axes, choice)
             };
+            if !self.fits(all.len().saturating_add(own.len())) {
+                return;
+            }
             all.extend(own.iter().map(with));
         }
         let drafts = all.into_iter().flat_map(|(axes, words)| {
@@ -272,7 +276,21 @@ impl Section<'_, '_, '_> {
         self.over(words.into_iter().map(choice).collect());
     }
 
+    /// Whether so many tasks can be made at all; said before they are.
+    fn fits(&mut self, count: usize) -> bool {
+        if count > MOST_TASKS {
+            let message = messages::count("tasks", count, 1, MOST_TASKS);
+            self.faults.push(self.table.fault(message));
+        }
+        count <= MOST_TASKS
+    }
+
     fn over(&mut self, choices: Vec<Choice>) {
+        if !self.fits(self.drafts.len().saturating_mul(choices.len())) {
+            // what is read on is only for its own faults
+            self.drafts.truncate(1);
+            return;
+        }
         let mut drafts = Vec::new();
         for draft in &self.drafts {
             for choice in &choices {

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use toml_input::FileName;
 
-use crate::TOOL;
+use crate::BUILD;
 use crate::digest::of_parts;
 use crate::inputs::Content;
 use crate::kind::Kind;
@@ -69,6 +69,18 @@ pub struct Task {
     pub named: Vec<FileName>,
 }
 
+/// The command in the name of a task; nothing if it is no such name. A name becomes a folder, and may come from a file of somebody else.
+#[must_use]
+pub fn kind_of(id: &str) -> Option<Kind> {
+    let (name, digest) = id.split_once('-')?;
+    let is_digit = |byte: u8| byte.is_ascii_digit() || (b'a'..=b'f').contains(&byte);
+    let is_whole = digest.len() == DIGITS && digest.bytes().all(is_digit);
+    Kind::ALL
+        .into_iter()
+        .find(|kind| kind.name() == name)
+        .filter(|_| is_whole)
+}
+
 impl Task {
     pub(crate) fn new(
         kind: Kind,
@@ -77,7 +89,7 @@ impl Task {
         inputs: BTreeMap<String, Arc<Content>>,
         named: Vec<FileName>,
     ) -> Self {
-        let own = [TOOL, kind.name(), "arguments"];
+        let own = [BUILD, kind.name(), "arguments"];
         let files = inputs
             .iter()
             .flat_map(|(path, content)| [path.as_str(), content.digest.as_str()]);

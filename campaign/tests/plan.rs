@@ -198,3 +198,18 @@ fn a_file_that_is_named_and_broken_is_a_fault_of_that_file() {
     assert_eq!(faults.list.len(), 1, "once for both seeds: {faults}");
     assert!(faults.list[0].file.ends_with("plant.toml"), "{faults}");
 }
+
+/// 2e13 tasks: the product is refused before it is made.
+#[test]
+fn more_tasks_than_a_folder_can_hold_are_refused_before_they_are_made() {
+    let boxes: Vec<String> = (1..=2000).map(|boxes| boxes.to_string()).collect();
+    let formats = vec!["\"f32\""; 10_000].join(", ");
+    let text = format!(
+        "[[certify]]\npolicies = \"a\"\nboxes = [{}]\nformats = [{formats}]\n",
+        boxes.join(", ")
+    );
+    refused(&text, (1, 1), &["100000", "tasks"]);
+    let settings = ["\"train.toml\""; 2].join(", ");
+    let text = format!("[[train]]\nsettings = [{settings}]\nseeds = {{ count = 100000 }}\n");
+    refused(&text, (1, 1), &["100000", "tasks"]);
+}

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use campaign::{Done, Plan, RECORD, Results, State};
+use campaign::{Done, Plan, RECORD, Results, Schedule, State};
 use serde_json::{Value, json};
 
 fn plan(seeds: &str) -> Plan {
@@ -124,4 +124,87 @@ fn a_result_that_was_edited_is_none() {
         Done::read("train-0000000000000000", done.folder()).is_err(),
         "of another task"
     );
+}
+
+#[test]
+fn a_name_that_leads_out_of_the_folder_is_none() {
+    let plan = plan("[1]");
+    let (text, id) = (plan.schedule().json(), &plan.tasks[0].id);
+    assert_eq!(Schedule::read(text.as_bytes()).unwrap(), plan.schedule());
+    for strange in [
+        "../../results",
+        "train-/../../results",
+        "train-0123456789abcde",
+        "train-0123456789ABCDEF",
+        "prove-0123456789abcdef",
+    ] {
+        let message = Schedule::read(text.replace(id.as_str(), strange).as_bytes()).unwrap_err();
+        let fault = toml_input::Fault::from(message);
+        assert_eq!(fault.found.as_deref(), Some(strange));
+    }
+}
+
+/// The record decides which file holds the figures.
+#[test]
+fn a_record_of_another_command_is_none() {
+    let plan = plan("[1]");
+    let mut done = Done::new(&plan.tasks[0], 0, BTreeMap::new());
+    done.record.kind = campaign::Kind::Prove;
+    let fault = toml_input::Fault::from(Done::read(&plan.tasks[0].id, done.folder()).unwrap_err());
+    assert!(fault.problem.contains("another command"), "{fault:?}");
+}
+
+/// Two plans that call one file by two paths.
+#[test]
+fn schedules_merge_to_the_same_in_any_order_with_each_task_once() {
+    let first = plan("[1]").schedule();
+    let text = first.json().replace("\"a.toml\"", "\"./a.toml\"");
+    let mut second = Schedule::read(text.replace("policyc ", "policyc 0.0.0-").as_bytes()).unwrap();
+    second.name = "an older one".to_owned();
+    let (one, other) = (first.clone().merge(second.clone()), second.merge(first.clone()));
+    assert_eq!(one, other);
+    assert_eq!(one.tasks.len(), first.tasks.len());
+    assert_eq!((one.generator, one.name.as_str()), (first.generator, "an older one"));
+}
+
+fn state_of(plan: &Plan, index: usize, name: &str, value: &Value) -> (Vec<String>, State) {
+    let files = BTreeMap::from([(name.to_owned(), value.to_string().into_bytes())]);
+    let done = Done::new(&plan.tasks[index], 0, files);
+    let (figures, exit) = (done.figures(), 0);
+    (done.lacks(), State::Done { exit, figures })
+}
+
+#[test]
+fn a_result_without_a_program_or_the_time_for_it_is_not_for_good() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("policy.toml"), "x = 1").unwrap();
+    let text = "[[verify]]\npolicies = \"policy.toml\"\n[[prove]]\npolicies = \"policy.toml\"\n";
+    let plan = Plan::from_text(&folder.path().join("plan.toml"), text).unwrap();
+    let skipped = |reason: &str| {
+        let outcome = json!({ "result": "skipped", "missing": [{ "reason": reason, "install": null }] });
+        json!({ "report": { "builds": [{ "outcome": { "result": "equal" } }, { "outcome": outcome }] } })
+    };
+    let (lacks, state) = state_of(&plan, 0, "answer.json", &skipped("clang is not on PATH"));
+    assert_eq!(lacks, ["clang is not on PATH"]);
+    assert!(!state.is_settled());
+    let results = Results::new(&plan.schedule(), [(plan.tasks[0].id.clone(), state)].into());
+    assert!(results.json().contains("\"lacks\": \"clang is not on PATH\""));
+    let (_, state) = state_of(&plan, 0, "answer.json", &skipped("the files have no Rust code"));
+    assert!(state.is_settled(), "they have none on any machine");
+    let proof = |verdict: &str, reason: &str| json!({ "claims": [{ "verdict": verdict, "reason": reason }] });
+    for (verdict, reason, is_settled) in [
+        ("proved", "", true),
+        ("refuted", "", true),
+        ("not-run", "it has no state", true),
+        ("unproven", "the solver says: unknown", true),
+        ("unproven", "no answer within 60 s", false),
+        (
+            "not-run",
+            "frama-c is not on PATH; install it: apt-get install frama-c-base",
+            false,
+        ),
+    ] {
+        let (_, state) = state_of(&plan, 1, "proof.json", &proof(verdict, reason));
+        assert_eq!(state.is_settled(), is_settled, "{reason}");
+    }
 }

@@ -24,9 +24,19 @@ pub fn keep_answers<T>(run: impl FnOnce() -> T) -> (T, String) {
         let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
         std::mem::replace(&mut *kept, value)
     };
+    /// Whatever becomes of `run`, answers are printed again.
+    struct Printed;
+    impl Drop for Printed {
+        fn drop(&mut self) {
+            *KEPT.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        }
+    }
     set(Some(String::new()));
+    let printed = Printed;
     let result = run();
-    (result, set(None).unwrap_or_default())
+    let answer = set(None).unwrap_or_default();
+    drop(printed);
+    (result, answer)
 }
 
 /// Writes files into a folder: either all of them are there afterwards or none has changed.

@@ -27,6 +27,7 @@ fn command(py: Python<'_>, arguments: Vec<OsString>, program: Vec<OsString>) -> 
 #[pymodule]
 fn _policyc(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("BUILD", ::campaign::BUILD)?;
     module.add("Faults", module.py().get_type::<faults::Faults>())?;
     module.add_class::<faults::Fault>()?;
     module.add_class::<policy::NativePolicy>()?;

@@ -52,9 +52,14 @@ def test_faults_and_failures(desk):
         policyc.campaign("plan.toml", "out", address="auto")
     assert not os.path.exists("out")
     pathlib.Path("empty.csv").write_text("t,duty,v_out\n")
-    found = policyc.campaign({"diagnose": [{"models": "plants/paper-model.toml", "train": "empty.csv"}]}, "out")
+    with pytest.raises(policyc.Faults, match="empty.csv"):
+        policyc.campaign({"diagnose": [{"models": "plants/paper-model.toml", "train": "empty.csv"}]}, "out")
+    # what only the run finds out: loads that would be resistors
+    plant = pathlib.Path("plants/paper-model.toml")
+    plant.write_text(plant.read_text() + "\n[load]\nv_fold = 90.0\n")
+    found = policyc.campaign({"train": [{"settings": "train.toml", "seeds": 1}]}, "out")
     [reason] = found.failed.values()
-    assert not found and "empty.csv" in reason
+    assert not found and "v_fold" in reason
 
 
 def test_a_task_is_performed_from_bytes_alone(desk):
@@ -126,6 +131,56 @@ def test_the_command_names_what_the_engine_needs(desk):
         pytest.skip("Ray is installed here")
     run = subprocess.run([*WHEEL, "campaign", "plan.toml", "--out", "out", "--engine", "ray"], capture_output=True, text=True)
     assert run.returncode == 2 and "policyc[ray]" in run.stderr and "Traceback" not in run.stderr
+    assert not os.path.exists("out"), "nothing is begun"
     listed = [*WHEEL, "campaign", "plan.toml", "--out", "out", "--engine", "ray", "--list", "--json"]
     run = subprocess.run(listed, capture_output=True, text=True)
     assert [task["done"] for task in json.loads(run.stdout)] == [False] * 3
+
+
+class NoRay:
+    """Ray as far as a test of what becomes of its faults needs it."""
+
+    @staticmethod
+    def is_initialized():
+        return False
+
+    @staticmethod
+    def init(**_):
+        raise RuntimeError("a story\nof three lines\nno such cluster")
+
+
+def test_a_fault_of_ray_is_one_line_and_nothing_is_begun(desk, monkeypatch, capsys):
+    from policyc import campaigns
+
+    monkeypatch.setitem(sys.modules, "ray", NoRay)
+    asked = (pathlib.Path("plan.toml"), pathlib.Path("out"), "nowhere", [False, True, True])
+    assert campaigns.from_command(asked) == 2
+    assert capsys.readouterr().err == "error: no cluster of Ray: no such cluster\n"
+    assert not os.path.exists("out")
+
+
+def test_the_answer_of_the_command_is_json_with_the_folder_as_text(desk, monkeypatch, capsys):
+    from policyc import campaigns
+
+    policyc.campaign("plan.toml", "out")
+    asked = (pathlib.Path("plan.toml"), pathlib.Path("out"), None, [False, True, True])
+    assert campaigns.from_command(asked) == 0
+    assert json.loads(capsys.readouterr().out)["out"] == "out"
+
+
+def test_tasks_of_two_threads_do_not_mix_their_folders(desk):
+    """The working folder is the process's."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    from policyc import _policyc
+
+    native = _policyc.NativeCampaign("plan.toml", None, "out", False)
+    here = os.getcwd()
+
+    def perform(index):
+        kind, arguments, digests = native.shipped(index)
+        return _policyc.perform(kind, arguments, {path: native.content(index, path) for path in digests})
+
+    with ThreadPoolExecutor(4) as pool:
+        both = list(pool.map(perform, [2, 2, 2, 2]))
+    assert os.getcwd() == here and all(answer == both[0] for answer in both) and both[0][0] == 0

@@ -1,5 +1,9 @@
 //! `policyc campaign` and `policyc merge`: what is done is kept, and results do not depend on who made them, or when.
 
+mod kept;
+mod queues;
+mod shared;
+
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
@@ -100,7 +104,7 @@ fn only_what_reads_an_edited_file_runs_again() {
     let answer = file("answer.json");
     desk.write(&format!("other/{answer}"), "{}");
     std::fs::remove_file(desk.path(&format!("other/{}", file("metrics.json")))).unwrap();
-    let again = desk.succeed("campaign plan.toml --out other --json");
+    let again = desk.succeed("campaign plan.toml --out other --json --force");
     assert_eq!(serde_json::from_str::<serde_json::Value>(&again).unwrap()["ran"], 2);
     assert_ne!(desk.read(&format!("other/{answer}")), "{}");
 }
@@ -191,13 +195,11 @@ fn an_interrupted_campaign_goes_on_to_the_same_bytes() {
 #[test]
 fn a_task_that_fails_costs_no_other_and_is_tried_again() {
     let desk = desk();
-    // what only the run finds out: a record without rows
-    desk.write("empty.csv", "t,duty,v_out\n");
-    desk.edit(
-        "plan.toml",
-        "[[train]]\nsettings = \"train/train.toml\"",
-        "[[diagnose]]\nmodels = \"plants/paper-model.toml\"\ntrain = \"empty.csv\"",
-    );
+    // what only the run finds out: loads that would be resistors
+    let plant = desk.read("plants/paper-model.toml");
+    desk.write("plants/fold.toml", &format!("{plant}\n[load]\nv_fold = 90.0\n"));
+    desk.edit("train/train.toml", "paper-model.toml", "fold.toml");
+    desk.edit("plan.toml", "train/train.toml\"", "train/train.toml\"\nseeds = 3");
     let ran = desk.type_in("campaign plan.toml --out out");
     assert_eq!(ran.code, Some(1), "{}", ran.stderr);
     assert!(
@@ -206,13 +208,12 @@ fn a_task_that_fails_costs_no_other_and_is_tried_again() {
         ran.stdout
     );
     assert!(
-        ran.stdout
-            .contains("failed diagnose: model plants/paper-model.toml, case empty.csv: "),
+        ran.stdout.contains("failed train: settings train/train.toml, seed 3: "),
         "{}",
         ran.stdout
     );
     assert!(
-        desk.read("out/results.json").contains("in/empty.csv"),
+        desk.read("out/results.json").contains("in/train/../plants/fold.toml"),
         "the reason has its place, without the machine's folders"
     );
     assert!(
@@ -226,9 +227,9 @@ fn a_task_that_fails_costs_no_other_and_is_tried_again() {
         (ran.code, json["ran"].clone(), json["counts"]["failed"].clone()),
         (Some(1), 1.into(), 1.into())
     );
-    let ran = desk.type_in("campaign plan.toml --out out --task 3");
+    let ran = desk.type_in("campaign plan.toml --out out --task 1");
     assert_eq!(ran.code, Some(2));
-    assert!(ran.stderr.contains("case empty.csv has no result"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("seed 3 has no result"), "{}", ran.stderr);
 }
 
 #[test]
@@ -248,6 +249,22 @@ fn slips_are_found_before_anything_runs() {
         &["train/train.toml", "did you mean `steps`?"],
     );
     desk.edit("train/train.toml", "step = 1200", "steps = 1200");
+    // every file of a section, and every number
+    desk.write("empty.csv", "t,duty,v_out\n");
+    let plan = format!(
+        "{PLAN}[[diagnose]]\nmodels = \"plants/paper-model.toml\"\ntrain = \"empty.csv\"\n\
+         [[verify]]\npolicies = \"policy\"\ntraces = \"empty.csv\"\n[[certify]]\npolicies = \"policy\"\nboxes = [20, 2000000]\n"
+    );
+    desk.write("plan.toml", &plan);
+    desk.edit("plants/paper-table.toml", "[converter]", "[convertor]");
+    let words = ["did you mean `converter`?", "empty.csv", "1000000", "plan.toml"];
+    let error = desk.refuse("campaign plan.toml --out out", &words);
+    assert!(
+        error.contains("4 errors") || error.matches("error: ").count() >= 4,
+        "{error}"
+    );
+    desk.edit("plants/paper-table.toml", "[convertor]", "[converter]");
+    desk.write("plan.toml", PLAN);
     std::fs::create_dir(desk.path("mine")).unwrap();
     desk.write("mine/notes", "mine");
     desk.refuse("campaign plan.toml --out mine", &["is not empty"]);

@@ -2,8 +2,10 @@
 
 use std::path::PathBuf;
 
+use clap::builder::RangedU64ValueParser;
 use clap::{Args, ValueEnum};
 
+use crate::campaign::MOST_JOBS;
 use crate::ownership::Replacing;
 
 #[derive(Debug, Clone, Args)]
@@ -22,7 +24,7 @@ pub struct Campaign {
     #[arg(long, value_name = "ADDRESS")]
     pub address: Option<String>,
     /// Tasks at a time; as many as there are cores unless given
-    #[arg(short, long, value_name = "N", default_value_t = 0, hide_default_value = true)]
+    #[arg(short, long, value_name = "N", default_value_t = 0, hide_default_value = true, value_parser = jobs())]
     pub jobs: usize,
     /// Only one task, by its number from 1 or its name, and nothing merged
     #[arg(long, value_name = "TASK", conflicts_with_all = ["jobs", "engine", "address"])]
@@ -72,6 +74,10 @@ pub enum Script {
     Slurm(PathBuf),
     /// Rules.
     Snakemake(PathBuf),
+}
+
+fn jobs() -> RangedU64ValueParser<usize> {
+    RangedU64ValueParser::new().range(0..=MOST_JOBS as u64)
 }
 
 fn script(text: &str) -> Result<Script, String> {

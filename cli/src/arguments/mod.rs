@@ -88,6 +88,7 @@ impl Command {
         matches!(
             self,
             Command::Campaign(_)
+                | Command::Merge(_)
                 | Command::Prove(_)
                 | Command::Simulate(_)
                 | Command::Train(_)

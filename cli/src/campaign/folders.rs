@@ -8,15 +8,19 @@ use std::path::Path;
 use toml_input::Message;
 
 use crate::failure::Failure;
+use crate::staging;
+
+/// Content by path.
+pub type Files = BTreeMap<String, Vec<u8>>;
 
 /// Every file of a folder and its folders, by its path from there with `/`; nothing if there is no such folder.
-pub fn read(folder: &Path) -> Result<BTreeMap<String, Vec<u8>>, Failure> {
-    let mut files = BTreeMap::new();
+pub fn read(folder: &Path) -> Result<Files, Failure> {
+    let mut files = Files::new();
     add(folder, "", &mut files).map_err(|error| cannot("read", folder, &error))?;
     Ok(files)
 }
 
-fn add(folder: &Path, prefix: &str, files: &mut BTreeMap<String, Vec<u8>>) -> io::Result<()> {
+fn add(folder: &Path, prefix: &str, files: &mut Files) -> io::Result<()> {
     let entries = match fs::read_dir(folder) {
         Ok(entries) => entries,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
@@ -37,7 +41,7 @@ fn add(folder: &Path, prefix: &str, files: &mut BTreeMap<String, Vec<u8>>) -> io
 }
 
 /// Makes a folder that holds these files alone.
-pub fn write<'a>(folder: &Path, files: impl IntoIterator<Item = (&'a String, &'a [u8])>) -> Result<(), Failure> {
+pub fn write<B: AsRef<[u8]>>(folder: &Path, files: &BTreeMap<String, B>) -> Result<(), Failure> {
     let write = || -> io::Result<()> {
         remove(folder)?;
         fs::create_dir_all(folder)?;
@@ -53,16 +57,35 @@ pub fn write<'a>(folder: &Path, files: impl IntoIterator<Item = (&'a String, &'a
     write().map_err(|error| cannot("write", folder, &error))
 }
 
-/// Puts a folder into the place of another, which goes.
-pub fn replace(new: &Path, old: &Path) -> Result<(), Failure> {
-    let replace = || -> io::Result<()> {
-        remove(old)?;
-        if let Some(parent) = old.parent() {
-            fs::create_dir_all(parent)?;
+/// Puts a folder into the place of another, which goes to `old` and stays there: nothing is ever half in its place.
+pub fn exchange(new: &Path, place: &Path, old: &Path) -> io::Result<()> {
+    remove(old)?;
+    if let Some(parent) = place.parent() {
+        fs::create_dir_all(parent)?;
+    }
+    match fs::rename(place, old) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+        _ => {}
+    }
+    fs::rename(new, place).inspect_err(|_| {
+        // unless another process has put its own there
+        let _ = fs::rename(old, place);
+    })
+}
+
+/// Whether there is a file in a folder or the folders in it; what is on its way into the folder itself does not count.
+pub fn holds_a_file(folder: &Path) -> io::Result<bool> {
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let holds = match entry.file_type()?.is_dir() {
+            true => holds_a_file(&entry.path())?,
+            false => !staging::is_leftover(&entry.file_name().to_string_lossy()),
+        };
+        if holds {
+            return Ok(true);
         }
-        fs::rename(new, old)
-    };
-    replace().map_err(|error| cannot("replace", old, &error))
+    }
+    Ok(false)
 }
 
 /// Removes a folder, if it is there.

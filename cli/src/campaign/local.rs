@@ -1,44 +1,30 @@
 //! The local engine: some workers, each fed by a thread of its own.
 
 use std::collections::VecDeque;
-use std::ffi::OsString;
-use std::io::{BufRead, BufReader, Read, Write};
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
-use std::time::{Duration, Instant};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
-use campaign::{Done, Kind, Task};
-use toml_input::Message;
+use campaign::{Done, Task};
+use toml_input::{Message, messages};
 
 use super::folders;
+use super::hand::{Hand, Seat, locked};
 use super::perform::{Performed, collect};
-use super::session::{Claim, Session};
-use super::worker::{ANSWER, Job, WORKER};
+use super::session::{Asked, Claim, Session};
+use super::stage::{is_refused, stage};
 use crate::failure::Failure;
 use crate::outcome::Outcome;
 
 /// Workers that die with a task before the task is blamed: a machine out of memory may kill one, and seldom three.
 const ATTEMPTS: usize = 3;
 
-/// Workers that have been told to stop remove their temporary files within this time.
-const PATIENCE: Duration = Duration::from_secs(12);
-
-/// How often the engine looks whether it is to stop. Nobody waits for it otherwise: threads are joined as they end.
+/// How often the engine looks whether it is to stop, and whether another process has ended a task. Nobody waits for it otherwise:
+/// threads are joined as they end.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Text of a worker's standard error that is kept for the reason of its death.
-const KEPT_BYTES: usize = 2000;
-
-static PROGRAM: OnceLock<Vec<OsString>> = OnceLock::new();
-
-/// How this program is started from the outside: for Python, whose executable is not `policyc`. The first call counts; without words
-/// it is none.
-pub fn set_program(words: Vec<OsString>) {
-    if !words.is_empty() {
-        let _ = PROGRAM.set(words);
-    }
-}
+/// Most workers at a time: each has three pipes and two threads here.
+pub const MOST_JOBS: usize = 1024;
 
 /// What a campaign tells on its way.
 #[derive(Debug, Clone, Copy)]
@@ -59,49 +45,49 @@ pub struct Local<'a> {
     pub tell: &'a (dyn Fn(Progress<'_>) + Sync),
 }
 
-/// A worker at the other end of two pipes.
-struct Hand {
-    stdout: BufReader<ChildStdout>,
-    child: Child,
-    said: std::thread::JoinHandle<String>,
-}
-
-/// Where a thread's worker is found by whoever stops it.
-type Seat = Mutex<Option<ChildStdin>>;
+/// Tasks by index, and whether another process was at work on one when it was asked for.
+type Queue = Mutex<VecDeque<(usize, bool)>>;
 
 impl Local<'_> {
-    /// Runs the tasks with these indices; the session holds what came of them.
+    /// Runs the tasks with these indices, and waits for those on which another process is at work; the session holds what came of them.
     ///
     /// # Errors
     /// If a worker cannot be started, or a result not be written.
     pub fn run(&self, session: &Session, pending: Vec<usize>) -> Result<(), Failure> {
+        if self.jobs > MOST_JOBS {
+            return Err(messages::count("jobs at a time", self.jobs, 0, MOST_JOBS).into());
+        }
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let jobs = if self.jobs == 0 { cores } else { self.jobs }.min(pending.len());
-        let queue = Mutex::new(VecDeque::from(pending));
+        let queue: Queue = Mutex::new(pending.into_iter().map(|index| (index, false)).collect());
         let failure: Mutex<Option<Failure>> = Mutex::new(None);
+        let give_up = |found: Failure| {
+            locked(&failure).get_or_insert(found);
+            // what one cannot do, the others cannot either
+            locked(&queue).clear();
+        };
         let seats: Vec<Seat> = (0..jobs).map(|_| Mutex::new(None)).collect();
         let ended = AtomicBool::new(false);
         std::thread::scope(|scope| {
-            let work = |seat| {
-                if let Err(found) = self.work(session, &queue, seat) {
-                    locked(&failure).get_or_insert(found);
-                    // what one cannot write, the others cannot either
-                    locked(&queue).clear();
-                }
-            };
-            let hands: Vec<_> = seats.iter().map(|seat| scope.spawn(move || work(seat))).collect();
-            let (seats, ended, stop) = (&seats, &ended, self.stop);
-            scope.spawn(move || {
-                while !ended.load(Ordering::Relaxed) {
-                    if stop.load(Ordering::Relaxed) {
-                        // a worker whose standard input ends clears up and goes
-                        seats.iter().for_each(|seat| drop(locked(seat).take()));
+            let work = |seat| self.work(session, &queue, seat).unwrap_or_else(give_up);
+            let (seats, ended) = (&seats, &ended);
+            let watcher = std::thread::Builder::new().spawn_scoped(scope, move || self.watch(seats, ended));
+            let mut hands = Vec::new();
+            match watcher {
+                Ok(_) => {
+                    for seat in seats {
+                        match std::thread::Builder::new().spawn_scoped(scope, move || work(seat)) {
+                            Ok(hand) => hands.push(hand),
+                            Err(error) => give_up(no_thread(&error)),
+                        }
                     }
-                    std::thread::sleep(LOOK);
                 }
-            });
+                Err(error) => give_up(no_thread(&error)),
+            }
             for hand in hands {
-                let _ = hand.join();
+                if hand.join().is_err() {
+                    give_up(Message::new("a thread of the engine broke").into());
+                }
             }
             ended.store(true, Ordering::Relaxed);
         });
@@ -111,25 +97,51 @@ impl Local<'_> {
             .map_or(Ok(()), Err)
     }
 
-    /// One thread: tasks until there are no more.
-    fn work(&self, session: &Session, queue: &Mutex<VecDeque<usize>>, seat: &Seat) -> Result<(), Failure> {
-        let mut hand = None;
-        loop {
+    /// Takes the standard input from the workers once it is to stop.
+    fn watch(&self, seats: &[Seat], ended: &AtomicBool) {
+        while !ended.load(Ordering::Relaxed) {
             if self.stop.load(Ordering::Relaxed) {
-                break;
+                // a worker whose standard input ends clears up and goes
+                seats.iter().for_each(|seat| drop(locked(seat).take()));
             }
-            let Some(index) = locked(queue).pop_front() else { break };
+            std::thread::sleep(LOOK);
+        }
+    }
+
+    /// One thread: tasks until there are no more.
+    fn work(&self, session: &Session, queue: &Queue, seat: &Seat) -> Result<(), Failure> {
+        let mut hand = None;
+        let mut result = Ok(());
+        while result.is_ok() && !self.stop.load(Ordering::Relaxed) {
+            let Some((index, again)) = locked(queue).pop_front() else {
+                break;
+            };
+            if again {
+                std::thread::sleep(LOOK);
+            }
             let Some(task) = session.plan.tasks.get(index) else {
                 continue;
             };
-            let Some(claim) = session.claim(task)? else { continue };
-            self.one(session, task, &claim, &mut hand, seat)?;
+            result = match session.claim(task, again) {
+                Ok(Asked::Claimed(claim)) => self.one(session, task, &claim, &mut hand, seat),
+                Ok(Asked::Busy) => {
+                    locked(queue).push_back((index, true));
+                    Ok(())
+                }
+                Ok(Asked::Ended) => {
+                    let reason = session.reason(task);
+                    let reason = reason.as_deref();
+                    (self.tell)(Progress { task, reason });
+                    Ok(())
+                }
+                Err(failure) => Err(failure),
+            };
         }
         locked(seat).take();
         if let Some(hand) = hand {
             hand.end();
         }
-        Ok(())
+        result
     }
 
     fn one(
@@ -145,37 +157,36 @@ impl Local<'_> {
             if self.stop.load(Ordering::Relaxed) {
                 return Ok(());
             }
-            let arguments = stage(task, claim)?;
+            let staged = stage(task, claim)?;
             let worker = match hand {
                 Some(worker) => worker,
                 None => hand.insert(Hand::start(seat)?),
             };
-            let performed = worker.perform(claim, &arguments, seat);
+            let performed = worker.perform(claim, &staged.arguments, seat);
+            // what is done is kept, however soon it is to stop
+            if let Some(performed) = performed.as_ref().filter(|performed| performed.is_done()) {
+                let files = collect(&claim.folder, task.kind, performed)?;
+                session.store(&Done::new(task, performed.exit, files))?;
+                (self.tell)(Progress { task, reason: None });
+                return Ok(());
+            }
             if self.stop.load(Ordering::Relaxed) {
                 return Ok(());
             }
             match performed {
-                Some(performed) if performed.is_done() => {
-                    let files = collect(&claim.folder, task.kind, &performed)?;
-                    session.store(&Done::new(task, performed.exit, files))?;
-                    (self.tell)(Progress { task, reason: None });
-                    return Ok(());
-                }
                 // a signal to the worker alone: as if it had died
                 Some(performed) if performed.exit == Outcome::Interrupted as u8 => {
                     reason = "the worker was interrupted".to_owned();
                     locked(seat).take();
                     hand.take().map(Hand::end);
                 }
-                Some(_) if arguments.len() > task.arguments.len() => {
-                    // what another version left cannot be gone on with
-                    let _ = folders::remove(&claim.folder.join("out"));
-                }
                 Some(performed) => {
-                    reason = performed
-                        .reason
-                        .unwrap_or_else(|| format!("exit code {}", performed.exit));
-                    break;
+                    reason = told(performed);
+                    if !staged.goes_on || !is_refused(&reason) {
+                        break;
+                    }
+                    // damaged, or of others
+                    let _ = folders::remove(&claim.folder.join("out"));
                 }
                 None => {
                     locked(seat).take();
@@ -185,129 +196,45 @@ impl Local<'_> {
             }
         }
         session.fail(task, &reason)?;
-        (self.tell)(Progress {
-            task,
-            reason: Some(&reason),
-        });
+        let reason = Some(reason.as_str());
+        (self.tell)(Progress { task, reason });
         Ok(())
     }
 }
 
-/// Puts the inputs of a task into its folder; the command line, which goes on with a training that was interrupted there.
-fn stage(task: &Task, claim: &Claim) -> Result<Vec<String>, Failure> {
-    let folder = &claim.folder;
-    let inputs = task.inputs.iter().map(|(path, content)| {
-        // the folder of all inputs is the first part of their paths
-        (
-            path.strip_prefix("in/").unwrap_or(path).to_owned(),
-            content.bytes.as_slice(),
-        )
-    });
-    let inputs: Vec<(String, &[u8])> = inputs.collect();
-    folders::write(&folder.join("in"), inputs.iter().map(|(path, bytes)| (path, *bytes)))?;
-    let checkpoints = folder.join("out/checkpoints");
-    let goes_on =
-        task.kind == Kind::Train && std::fs::read_dir(checkpoints).is_ok_and(|mut entries| entries.any(is_checkpoint));
-    let mut arguments = task.arguments.clone();
-    match goes_on {
-        true => arguments.push("--resume".to_owned()),
-        false => {
-            let out = folder.join("out");
-            folders::remove(&out).map_err(|error| folders::cannot("remove", &out, &error))?;
-        }
-    }
-    Ok(arguments)
+fn told(performed: Performed) -> String {
+    let code = performed.exit;
+    performed.reason.unwrap_or_else(|| format!("exit code {code}"))
 }
 
-fn is_checkpoint(entry: std::io::Result<std::fs::DirEntry>) -> bool {
-    entry.is_ok_and(|entry| {
-        let name = entry.file_name();
-        let name = name.to_string_lossy();
-        name.starts_with("seed-") && name.ends_with(".bin")
-    })
+fn no_thread(error: &std::io::Error) -> Failure {
+    let message = Message::new(format!("cannot start a thread: {error}"));
+    message.hint("--jobs with a smaller number").into()
 }
 
-impl Hand {
-    fn start(seat: &Seat) -> Result<Self, Failure> {
-        let words = match PROGRAM.get() {
-            Some(words) => words.clone(),
-            None => vec![std::env::current_exe()?.into_os_string()],
-        };
-        let Some((program, arguments)) = words.split_first() else {
-            return Err(Message::new("no program to start a worker with").into());
-        };
-        let mut command = Command::new(program);
-        command.args(arguments).arg(WORKER);
-        command
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped());
-        let mut child = command.spawn().map_err(|error| {
-            let shown = program.to_string_lossy();
-            Failure::from(Message::new(format!("cannot start a worker, {shown}: {error}")))
-        })?;
-        let (Some(stdin), Some(stdout), Some(stderr)) = (child.stdin.take(), child.stdout.take(), child.stderr.take())
-        else {
-            return Err(Message::new("a worker was started without its pipes").into());
-        };
-        *locked(seat) = Some(stdin);
-        Ok(Self {
-            stdout: BufReader::new(stdout),
-            child,
-            said: std::thread::spawn(move || last_of(stderr)),
-        })
-    }
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use crate::campaign::{set_program, tests::session};
 
-    /// The answer; nothing if the worker died.
-    fn perform(&mut self, claim: &Claim, arguments: &[String], seat: &Seat) -> Option<Performed> {
-        let job = Job {
-            folder: claim.folder.clone(),
-            arguments: arguments.to_vec(),
-        };
-        let line = serde_json::to_string(&job).ok()? + "\n";
-        locked(seat).as_mut()?.write_all(line.as_bytes()).ok()?;
-        loop {
-            let mut line = Vec::new();
-            if self.stdout.read_until(b'\n', &mut line).ok()? == 0 {
-                return None;
-            }
-            if let Some(answer) = line.strip_prefix(ANSWER.as_bytes()) {
-                return serde_json::from_slice(answer).ok();
-            }
-        }
+    /// A worker that answers a moment after it is to stop.
+    #[test]
+    fn what_is_done_when_it_is_to_stop_is_kept() {
+        let answer = r#"policyc-task {"exit":0,"answer":"{}","reason":null}"#;
+        let script = format!("read line; sleep 1; echo '{answer}'");
+        set_program(["sh", "-c", &script].map(Into::into).into());
+        let (_folder, session) = session("[[simulate]]\nscenarios = \"a.toml\"\npolicies = \"a.toml\"\n");
+        session.begin().unwrap();
+        let stop = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                std::thread::sleep(Duration::from_millis(300));
+                stop.store(true, Ordering::Relaxed);
+            });
+            let (stop, tell) = (&stop, &|_: Progress<'_>| {});
+            let local = Local { jobs: 1, stop, tell };
+            local.run(&session, vec![0]).unwrap();
+        });
+        assert!(session.is_done(&session.plan.tasks[0]));
     }
-
-    /// Waits for the end of a worker whose standard input has ended; what it said last, behind a colon.
-    fn end(mut self) -> String {
-        let begun = Instant::now();
-        let mut ended = self.child.try_wait();
-        while matches!(ended, Ok(None)) && begun.elapsed() < PATIENCE {
-            std::thread::sleep(Duration::from_millis(2));
-            ended = self.child.try_wait();
-        }
-        if matches!(ended, Ok(None)) {
-            let _ = self.child.kill();
-        }
-        let status = self.child.wait().map(|status| status.to_string()).unwrap_or_default();
-        let said = self.said.join().unwrap_or_default();
-        match said.trim() {
-            "" => format!(" ({status})"),
-            said => format!(" ({status}): {said}"),
-        }
-    }
-}
-
-fn last_of(mut stream: impl Read) -> String {
-    let mut kept = Vec::new();
-    let mut some = [0; 1024];
-    while let Ok(count @ 1..) = stream.read(&mut some) {
-        kept.extend_from_slice(&some[..count]);
-        let beyond = kept.len().saturating_sub(KEPT_BYTES);
-        kept.drain(..beyond);
-    }
-    String::from_utf8_lossy(&kept).into_owned()
-}
-
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

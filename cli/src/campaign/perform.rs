@@ -1,16 +1,18 @@
 //! One task, in the process that calls.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
-use campaign::Kind;
+use campaign::{BUILD, Kind};
 use clap::Parser;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use toml_input::Message;
 
 use super::folders;
-use crate::arguments::Arguments;
+use crate::arguments::{Arguments, Command};
 use crate::failure::Failure;
 use crate::interruption;
 use crate::outcome::Outcome;
@@ -29,6 +31,18 @@ pub struct Performed {
 }
 
 impl Performed {
+    /// Of a task that another build has named.
+    pub fn refused(build: &str) -> Self {
+        let message = Message::new("the worker is of another build than the campaign");
+        let message = message.found(BUILD).expected(build);
+        let Failure(faults) = Failure::from(message.hint("run it again: policyc was replaced in the meantime"));
+        Self {
+            exit: 2,
+            answer: String::new(),
+            reason: Some(faults.to_string().trim_end().to_owned()),
+        }
+    }
+
     /// Whether there is a result, be it a no.
     pub fn is_done(&self) -> bool {
         self.exit == Outcome::Done as u8 || self.exit == Outcome::Different as u8
@@ -38,10 +52,12 @@ impl Performed {
 /// Runs a command line in a folder. Changes the process's working folder: paths in results and faults are to be those of the task, and
 /// not of the machine.
 pub fn perform_in(folder: &Path, arguments: &[String]) -> Performed {
+    let mut is_alone = false;
     let performed = std::env::set_current_dir(folder)
         .map_err(|error| folders::cannot("work in", folder, &error))
         .and_then(|()| parsed(arguments))
         .map(|arguments| {
+            is_alone = starts_no_program(&arguments.command);
             talk::set(arguments.loudness);
             output::keep_answers(|| crate::dispatch(&arguments.command))
         });
@@ -50,12 +66,31 @@ pub fn perform_in(folder: &Path, arguments: &[String]) -> Performed {
         Err(failure) => (Err(failure), String::new()),
     };
     let (exit, reason) = match result {
-        // whatever it says came of the signal
+        // whatever else it says may have come of the signal, which compilers and provers got, too
+        Ok(outcome) if is_alone => (outcome as u8, None),
         _ if interruption::is_stopped() => (Outcome::Interrupted as u8, None),
         Ok(outcome) => (outcome as u8, None),
         Err(Failure(faults)) => (2, Some(faults.to_string().trim_end().to_owned())),
     };
     Performed { exit, answer, reason }
+}
+
+/// Commands that end on their own or with an error when a signal comes: what they have answered is true.
+fn starts_no_program(command: &Command) -> bool {
+    matches!(command, Command::Train(_) | Command::Certify(_) | Command::Diagnose(_))
+}
+
+/// The working folder and the kept answers are the process's: tasks of two threads would mix theirs.
+static ALONE: Mutex<()> = Mutex::new(());
+
+/// Goes back to the folder in which the process was, whatever happens in the other.
+struct WorkingFolder(PathBuf);
+
+impl Drop for WorkingFolder {
+    fn drop(&mut self) {
+        // it is where it was a moment ago, or gone
+        let _ = std::env::set_current_dir(&self.0);
+    }
 }
 
 /// A task that came from another machine with its inputs, in a folder that goes again: how it ended, and its files.
@@ -67,12 +102,12 @@ pub fn perform(
     arguments: &[String],
     inputs: &BTreeMap<String, Vec<u8>>,
 ) -> Result<(Performed, BTreeMap<String, Vec<u8>>), Failure> {
-    let before = std::env::current_dir()?;
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let folder = tempfile::Builder::new().prefix("policyc-task-").tempdir()?;
-    let inputs = inputs.iter().map(|(path, bytes)| (path, bytes.as_slice()));
     folders::write(folder.path(), inputs)?;
+    let before = WorkingFolder(std::env::current_dir()?);
     let performed = perform_in(folder.path(), arguments);
-    std::env::set_current_dir(&before).map_err(|error| folders::cannot("go back to", &before, &error))?;
+    drop(before);
     let files = match performed.is_done() {
         true => collect(folder.path(), kind, &performed)?,
         false => BTreeMap::new(),
@@ -81,8 +116,8 @@ pub fn perform(
 }
 
 /// A command line behind `policyc`.
-pub fn parsed(arguments: &[String]) -> Result<Arguments, Failure> {
-    let line = std::iter::once("policyc").chain(arguments.iter().map(String::as_str));
+pub fn parsed<S: AsRef<OsStr>>(arguments: &[S]) -> Result<Arguments, Failure> {
+    let line = std::iter::once(OsStr::new("policyc")).chain(arguments.iter().map(S::as_ref));
     Arguments::try_parse_from(line).map_err(|error| {
         let text = error.to_string();
         // the rest is how to call the command
@@ -159,7 +194,7 @@ mod tests {
 
     #[test]
     fn a_line_that_is_none_is_a_message_of_one_paragraph() {
-        let Err(Failure(faults)) = parsed(&["certify".into(), "a".into(), "--format".into(), "f61".into()]) else {
+        let Err(Failure(faults)) = parsed(&["certify", "a", "--format", "f61"]) else {
             panic!("must fail")
         };
         let text = faults.to_string();

@@ -1,76 +1,87 @@
 //! What can be known to be wrong before anything runs.
 
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::ffi::OsString;
 
-use campaign::{Kind, Plan, Task};
-use closed_loop::Scenario;
-use plant::Parameters;
-use toml_input::{FileName, Sink};
-use train::{Contract, Converter, Settings};
+use campaign::{Plan, Task};
+use toml_input::{Fault, Message, Sink};
 
 use super::perform::parsed;
-use crate::arguments::Outside;
-use crate::commands;
+use crate::arguments::Command;
+use crate::commands::{self, diagnose, simulate, train, verify};
 use crate::failure::Failure;
 
-/// Reads the command lines of tasks, and the files that they name, each once: a slip that would fail after hours is said now.
+/// Options whose numbers the plan has read already: a task for each of them is no other command line.
+const COUNTED: [&str; 4] = ["--seeds", "--seed", "--steps", "--shard"];
+
+/// Reads the command lines of tasks and every file that they name, each combination once: a slip that would fail after hours is said
+/// now.
 ///
 /// # Errors
 /// All faults.
 pub fn check(plan: &Plan, pending: &[usize]) -> Result<(), Failure> {
     let mut faults = Sink::new();
-    let mut lines: BTreeSet<Vec<&str>> = BTreeSet::new();
-    let mut files = BTreeSet::new();
+    let mut known: Vec<Fault> = Vec::new();
+    let mut lines = BTreeSet::new();
     for index in pending.iter().copied() {
         let Some(task) = plan.tasks.get(index) else { continue };
-        // seeds and shards are numbers already
-        let words: Vec<&str> = task.arguments.iter().map(|word| shape(word)).collect();
-        if lines.insert(words)
-            && let Err(Failure(found)) = parsed(&task.arguments)
-        {
-            for fault in &found {
-                let message = toml_input::Message::new(fault.problem.replace('\n', " "));
-                faults.push(plan.fault(index, message));
-            }
+        let line = here(task);
+        if !lines.insert(shape(&line)) {
+            continue;
         }
-        let paths: Vec<&Path> = task.named.iter().map(|file| file.path.as_path()).collect();
-        if files.insert((task.kind, paths))
-            && let Err(Failure(found)) = read(task)
-        {
-            faults.extend(found.list);
+        match parsed(&line) {
+            Ok(arguments) => {
+                if let Err(Failure(found)) = read(&arguments.command) {
+                    // several lines name one file, and what is wrong with it is said once
+                    let mut list = found.list;
+                    list.retain(|fault| !known.contains(fault));
+                    known.extend(list.iter().cloned());
+                    faults.extend(list);
+                }
+            }
+            Err(Failure(found)) => {
+                for fault in &found {
+                    let message = Message::new(fault.problem.replace('\n', " "));
+                    faults.push(plan.fault(index, message));
+                }
+            }
         }
     }
     Ok(faults.propagate()?)
 }
 
-fn shape(word: &str) -> &str {
-    match word.bytes().all(|byte| byte.is_ascii_digit() || byte == b'/') {
-        true => "0",
-        false => word,
-    }
+/// The command line of a task with its files where they are here.
+fn here(task: &Task) -> Vec<OsString> {
+    let mut named = task.named.iter();
+    let word = |word: &String| match task.inputs.contains_key(word) {
+        true => named.next().map_or(OsString::new(), |file| file.path.clone().into()),
+        false => word.into(),
+    };
+    task.arguments.iter().map(word).collect()
 }
 
-fn read(task: &Task) -> Result<(), Failure> {
-    let allow_outside = task.arguments.iter().any(|word| word == "--allow-outside");
-    let policy = |file: &FileName| commands::load_as(&file.path, Outside { allow_outside }, None).map(|_| ());
-    match (task.kind, task.named.as_slice()) {
-        (Kind::Train, [settings, ..]) => {
-            let settings = Settings::load(&settings.path)?;
-            Contract::load(&settings.contract, &settings.hidden)?;
-            Converter::load(FileName::named_by_a_file(&settings.plant), &settings.set)?;
-            Ok(())
+fn shape(line: &[OsString]) -> Vec<OsString> {
+    let counted = |at: usize| at.checked_sub(1).and_then(|before| line.get(before));
+    let is_counted = |at: usize| counted(at).is_some_and(|before| COUNTED.iter().any(|option| before == option));
+    let words = line.iter().enumerate();
+    words
+        .filter(|(at, _)| !is_counted(*at))
+        .map(|(_, word)| word.clone())
+        .collect()
+}
+
+fn read(command: &Command) -> Result<(), Failure> {
+    match command {
+        Command::Train(options) => train::check(options),
+        Command::Simulate(options) => simulate::check(options),
+        Command::Diagnose(options) => diagnose::check(options),
+        Command::Verify(options) => verify::check(options),
+        Command::Certify(options) => commands::load_as(&options.policy, options.outside, options.format).map(|_| ()),
+        Command::Prove(options) => {
+            let format = options.format.first().copied();
+            commands::load_as(&options.policy, options.outside, format).map(|_| ())
         }
-        (Kind::Simulate, [scenario, own, ..]) => {
-            Scenario::load(&scenario.path)?;
-            policy(own)
-        }
-        (Kind::Diagnose, [model, ..]) => {
-            Parameters::buck_from_file(&model.path, "`diagnose`")?;
-            Ok(())
-        }
-        (Kind::Verify | Kind::Certify | Kind::Prove, [own, ..]) => policy(own),
-        // what lacks a file was refused with the plan
+        // no task is one of the others
         _ => Ok(()),
     }
 }

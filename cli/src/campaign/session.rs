@@ -1,43 +1,36 @@
-//! The folder of a campaign.
+//! A plan and the folder of its results.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use campaign::{Done, Listed, Plan, RECORD, Results, Schedule, State, Task};
+use campaign::{Done, Plan, State, Task};
 use toml_input::Message;
 
+use super::finish::{Finished, finish};
 use super::folders;
+use super::stage::{is_gone_on_with, keep_for_resuming};
+use super::store::{Store, WORK};
 use crate::failure::Failure;
-use crate::output;
 use crate::ownership::Replacing;
-
-const PLAN: &str = "plan.json";
-/// A folder for each task that is done.
-const TASKS: &str = "tasks";
-/// Tasks under way. What an interrupted training left there is gone on with.
-const WORK: &str = "work";
-/// A text for each task that failed: why.
-const FAILED: &str = "failed";
-/// The policy of the best seed of each training file.
-const BEST: &str = "best";
 
 /// A plan and the folder of its results.
 pub struct Session {
     /// What is to be done.
     pub plan: Plan,
-    out: PathBuf,
-    replacing: Replacing,
+    store: Store,
     states: Mutex<BTreeMap<String, State>>,
 }
 
-/// What a campaign came to.
-pub struct Finished {
-    /// All tasks.
-    pub results: Results,
-    /// Files that were written, from the folder of the campaign.
-    pub files: Vec<String>,
+/// What became of asking for a task.
+pub enum Asked {
+    /// Nobody else works on it while this is held.
+    Claimed(Claim),
+    /// Another process works on it.
+    Busy,
+    /// Another process has ended it by now.
+    Ended,
 }
 
 /// A task that nobody else works on while this is held.
@@ -53,21 +46,17 @@ impl Session {
     /// # Errors
     /// If the folder holds something else than a campaign, or cannot be read.
     pub fn open(plan: Plan, out: &Path, replacing: Replacing) -> Result<Self, Failure> {
-        if !out.join(PLAN).is_file() {
-            output::check_new_folder(out)?;
-        }
-        let out = std::path::absolute(out)?;
+        let store = Store::open(out, replacing)?;
         let mut states = BTreeMap::new();
         for task in &plan.tasks {
             // what was edited or torn is no result: the task runs again
-            if let Some(Ok(done)) = stored(&out, &task.id)? {
+            if let Some(Ok(done)) = store.stored(&task.id)? {
                 states.insert(task.id.clone(), state(&done));
             }
         }
         Ok(Self {
             plan,
-            out,
-            replacing,
+            store,
             states: Mutex::new(states),
         })
     }
@@ -75,10 +64,16 @@ impl Session {
     /// Makes the folder and writes which tasks it is for.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// If it cannot be written, or somebody has files of their own where results are to be replaced.
     pub fn begin(&self) -> Result<(), Failure> {
-        let files = BTreeMap::from([(PLAN.to_owned(), self.plan.schedule().json())]);
-        output::replace_own_texts(&self.out, &files, self.replacing)
+        // now, and not after hours
+        for index in self.pending() {
+            if let Some(task) = self.plan.tasks.get(index) {
+                self.store.check_task(&task.id)?;
+            }
+        }
+        self.store.check_best()?;
+        self.store.write_plan(&self.plan.schedule())
     }
 
     fn states(&self) -> MutexGuard<'_, BTreeMap<String, State>> {
@@ -91,12 +86,18 @@ impl Session {
         matches!(self.states().get(&task.id), Some(State::Done { .. }))
     }
 
-    /// Indices of the tasks without a result.
+    /// Whether a task has its result for good.
+    #[must_use]
+    pub fn is_settled(&self, task: &Task) -> bool {
+        self.states().get(&task.id).is_some_and(State::is_settled)
+    }
+
+    /// Indices of the tasks that have no result for good.
     #[must_use]
     pub fn pending(&self) -> Vec<usize> {
         let tasks = self.plan.tasks.iter().enumerate();
         tasks
-            .filter(|(_, task)| !self.is_done(task))
+            .filter(|(_, task)| !self.is_settled(task))
             .map(|(index, _)| index)
             .collect()
     }
@@ -117,25 +118,40 @@ impl Session {
         })
     }
 
-    /// Takes a task, unless another process works on it, or has done it by now.
+    /// Takes a task. `again`: another process was at work on it before, and may have ended it.
     ///
     /// # Errors
     /// If the folders cannot be made.
-    pub fn claim(&self, task: &Task) -> Result<Option<Claim>, Failure> {
-        let folder = self.out.join(WORK).join(&task.id);
+    pub fn claim(&self, task: &Task, again: bool) -> Result<Asked, Failure> {
+        let folder = self.store.out.join(WORK).join(&task.id);
         fs::create_dir_all(&folder).map_err(|error| folders::cannot("make the folder", &folder, &error))?;
         let lock = File::open(&folder).ok();
         match lock.as_ref().map(File::try_lock) {
-            Some(Err(TryLockError::WouldBlock)) => return Ok(None),
+            Some(Err(TryLockError::WouldBlock)) => return Ok(Asked::Busy),
             // where folders cannot be locked, the rename alone keeps results whole
             Some(Ok(()) | Err(TryLockError::Error(_))) | None => {}
         }
-        if let Some(Ok(done)) = stored(&self.out, &task.id)? {
-            self.states().insert(task.id.clone(), state(&done));
-            let _ = folders::remove(&folder);
-            return Ok(None);
+        if !folder.is_dir() {
+            // it went with the process that held it, and the lock is of nothing
+            return Ok(Asked::Busy);
         }
-        Ok(Some(Claim { folder, _lock: lock }))
+        if let Some(Ok(done)) = self.store.stored(&task.id)? {
+            let state = state(&done);
+            if state.is_settled() || again {
+                self.states().insert(task.id.clone(), state);
+                let _ = folders::remove(&folder);
+                return Ok(Asked::Ended);
+            }
+        }
+        match self.store.reason(&task.id) {
+            Some(reason) if again => {
+                self.states().insert(task.id.clone(), State::Failed(reason));
+                return Ok(Asked::Ended);
+            }
+            // of an earlier run: whoever waits for this one must not take it for its outcome
+            _ => self.store.forget_reason(&task.id),
+        }
+        Ok(Asked::Claimed(Claim { folder, _lock: lock }))
     }
 
     /// Keeps the result of a task.
@@ -144,20 +160,26 @@ impl Session {
     /// If it cannot be written.
     pub fn store(&self, done: &Done) -> Result<(), Failure> {
         let id = &done.record.id;
-        keep(&self.out, done)?;
-        let _ = folders::remove(&self.out.join(WORK).join(id));
-        let _ = fs::remove_file(self.reason_of(id));
+        self.store.keep(done)?;
+        let _ = folders::remove(&self.store.out.join(WORK).join(id));
+        self.store.forget_reason(id);
         self.states().insert(id.clone(), state(done));
         Ok(())
     }
 
-    /// Keeps why a task has no result.
+    /// Keeps why a task has no result, and what it can be gone on with.
     ///
     /// # Errors
     /// If it cannot be written.
     pub fn fail(&self, task: &Task, reason: &str) -> Result<(), Failure> {
-        let _ = folders::remove(&self.out.join(WORK).join(&task.id));
-        output::write_one(&self.reason_of(&task.id), &format!("{reason}\n"))?;
+        let folder = self.store.out.join(WORK).join(&task.id);
+        self.store.write_reason(&task.id, reason)?;
+        match is_gone_on_with(task, &folder) {
+            true => keep_for_resuming(&folder),
+            false => {
+                let _ = folders::remove(&folder);
+            }
+        }
         self.states().insert(task.id.clone(), State::Failed(reason.to_owned()));
         Ok(())
     }
@@ -171,187 +193,111 @@ impl Session {
         }
     }
 
-    fn reason_of(&self, id: &str) -> PathBuf {
-        self.out.join(FAILED).join(format!("{id}.txt"))
-    }
-
     /// Merges: results, page, best policies.
     ///
     /// # Errors
     /// If they cannot be written.
     pub fn finish(&self) -> Result<Finished, Failure> {
-        finish(&self.out, &self.plan.schedule(), self.states().clone(), self.replacing)
+        finish(&self.store, &self.plan.schedule(), self.states().clone())
     }
 }
 
-/// Puts the folders of campaigns together.
-///
-/// # Errors
-/// If one is none, or two have different results for one task.
-pub fn merge(from: &[PathBuf], out: &Path, replacing: Replacing) -> Result<Finished, Failure> {
-    let mut schedule: Option<Schedule> = None;
-    for folder in from {
-        let read = schedule_of(folder)?;
-        match &mut schedule {
-            Some(schedule) => schedule.merge(read),
-            None => schedule = Some(read),
-        }
-    }
-    let Some(schedule) = schedule else {
-        return Err(Message::new("no folder to merge").into());
-    };
-    if !out.join(PLAN).is_file() {
-        output::check_new_folder(out)?;
-    }
-    let ids: BTreeSet<&String> = schedule.tasks.iter().map(|listed| &listed.id).collect();
-    let mut states = BTreeMap::new();
-    // the destination first: what it holds is not written again
-    let out = std::path::absolute(out)?;
-    let folders = std::iter::once(&out).chain(from);
-    let folders: Vec<&PathBuf> = folders.collect();
-    let mut kept: BTreeMap<&String, &Path> = BTreeMap::new();
-    for folder in folders {
-        for id in &ids {
-            let Some(done) = stored(folder, id)? else { continue };
-            let done = done.map_err(|message| message.found(folder.display().to_string()))?;
-            match kept.get(id) {
-                None => {
-                    if folder != &out {
-                        keep(&out, &done)?;
-                    }
-                    kept.insert(id, folder);
-                    states.insert((*id).clone(), state(&done));
-                }
-                Some(first) => same(id, first, folder, &done)?,
-            }
-        }
-    }
-    for folder in from {
-        for id in &ids {
-            let reason = fs::read_to_string(folder.join(FAILED).join(format!("{id}.txt")));
-            if let Ok(reason) = reason {
-                let failed = State::Failed(reason.trim_end().to_owned());
-                states.entry((*id).clone()).or_insert(failed);
-            }
-        }
-    }
-    let files = BTreeMap::from([(PLAN.to_owned(), schedule.json())]);
-    output::replace_own_texts(&out, &files, replacing)?;
-    finish(&out, &schedule, states, replacing)
-}
-
-/// Refuses two results of one task: one of the machines, or the version, is not what the other is.
-fn same(id: &str, first: &Path, second: &Path, done: &Done) -> Result<(), Failure> {
-    let Some(Ok(other)) = stored(first, id)? else {
-        return Ok(());
-    };
-    if other.record == done.record {
-        return Ok(());
-    }
-    let files = done.record.files.keys().chain(other.record.files.keys());
-    let differs = |name: &&String| other.record.files.get(*name) != done.record.files.get(*name);
-    let file = files.clone().find(differs).map_or(RECORD, String::as_str);
-    let message = Message::new(format!("two folders have different results for {id}"));
-    let message = message.found(format!("{file} in {} and in {}", first.display(), second.display()));
-    Err(message
-        .expected("the same bytes: version, arguments and files are the same")
-        .hint("the machines differ: their compilers, or their processors in a training; leave one folder out")
-        .into())
-}
-
-fn schedule_of(folder: &Path) -> Result<Schedule, Failure> {
-    let path = folder.join(PLAN);
-    let shown = folder.display();
-    let text = fs::read(&path).map_err(|error| {
-        let message = Message::new(format!(
-            "{shown} is no folder of a campaign: cannot read {PLAN}: {error}"
-        ));
-        Failure::from(message.hint("name the folder that was --out of policyc campaign"))
-    })?;
-    serde_json::from_slice(&text).map_err(|error| {
-        let message = Message::new(format!("{PLAN} of {shown} is none: {error}"));
-        message.into()
-    })
-}
-
-/// The result of a task in a folder, if there is one, or why it is none.
-fn stored(out: &Path, id: &str) -> Result<Option<Result<Done, Message>>, Failure> {
-    let folder = out.join(TASKS).join(id);
-    if !folder.join(RECORD).is_file() {
-        return Ok(None);
-    }
-    Ok(Some(Done::read(id, folders::read(&folder)?)))
-}
-
-fn keep(out: &Path, done: &Done) -> Result<(), Failure> {
-    let id = &done.record.id;
-    // beside its place, so that one rename puts it there
-    let new = out.join(WORK).join(format!("{id}.new"));
-    let files = done.folder();
-    folders::write(&new, files.iter().map(|(name, bytes)| (name, bytes.as_slice())))?;
-    folders::replace(&new, &out.join(TASKS).join(id))
-}
-
-fn state(done: &Done) -> State {
+pub fn state(done: &Done) -> State {
     State::Done {
         exit: done.record.exit,
         figures: done.figures(),
     }
 }
 
-fn finish(
-    out: &Path,
-    schedule: &Schedule,
-    states: BTreeMap<String, State>,
-    replacing: Replacing,
-) -> Result<Finished, Failure> {
-    let results = Results::new(schedule, states);
-    let files = BTreeMap::from([
-        ("results.json".to_owned(), results.json()),
-        ("results.csv".to_owned(), results.csv()),
-        ("report.html".to_owned(), results.page()?),
-    ]);
-    output::replace_own_texts(out, &files, replacing)?;
-    let mut written: Vec<String> = files.into_keys().collect();
-    let best = out.join(BEST);
-    // a seed that was best once would leave its files under another's
-    folders::remove(&best).map_err(|error| folders::cannot("replace", &best, &error))?;
-    let mut taken = BTreeSet::new();
-    for (listed, _) in results.best() {
-        let Some(Ok(done)) = stored(out, &listed.id)? else {
-            continue;
-        };
-        let name = unused(&folder_name(listed), &mut taken);
-        let files = done.files.iter().filter(|(name, _)| name.as_str() != "answer.json");
-        folders::write(&best.join(&name), files.map(|(name, bytes)| (name, bytes.as_slice())))?;
-        written.push(format!("{BEST}/{name}"));
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use campaign::Done;
+    use serde_json::json;
+
+    use super::*;
+    use crate::campaign::tests::session;
+
+    const VERIFY: &str = "[[verify]]\npolicies = \"a.toml\"\n";
+
+    fn skipped(session: &Session, program: &str) -> Done {
+        let outcome = json!({ "result": "skipped", "missing": [{ "reason": format!("{program} is not on PATH") }] });
+        let answer = json!({ "equal": true, "report": { "builds": [{ "outcome": outcome }] } });
+        let files = BTreeMap::from([("answer.json".to_owned(), answer.to_string().into_bytes())]);
+        Done::new(&session.plan.tasks[0], 0, files)
     }
-    // empty once nothing is under way
-    let _ = fs::remove_dir(out.join(WORK));
-    let _ = fs::remove_dir(out.join(FAILED));
-    Ok(Finished {
-        results,
-        files: written,
-    })
-}
 
-/// The training file's path as the name of a folder: `train/paper12.toml` is `train-paper12`.
-fn folder_name(listed: &Listed) -> String {
-    let settings = listed.axis("settings").map(ToString::to_string).unwrap_or_default();
-    let stem = settings.strip_suffix(".toml").unwrap_or(&settings);
-    let letters = stem.chars().map(|c| {
-        if c.is_ascii_alphanumeric() || "_-".contains(c) {
-            c
-        } else {
-            '-'
-        }
-    });
-    letters.collect::<String>().trim_matches('-').to_owned()
-}
+    #[test]
+    fn what_was_made_without_a_program_is_a_result_and_is_tried_again() {
+        let (folder, first) = session(VERIFY);
+        first.begin().unwrap();
+        first.store(&skipped(&first, "clang")).unwrap();
+        let plan = Plan::open(&folder.path().join("plan.toml")).unwrap();
+        let second = Session::open(plan, &folder.path().join("out"), Replacing { force: false }).unwrap();
+        let task = &second.plan.tasks[0];
+        assert!(second.is_done(task) && second.pending() == [0]);
+        assert!(matches!(second.claim(task, false).unwrap(), Asked::Claimed(_)));
+        // another process that worked on it has made what it can
+        assert!(matches!(second.claim(task, true).unwrap(), Asked::Ended));
+        second.begin().unwrap();
+        let whole = Done::new(task, 0, BTreeMap::new());
+        second.store(&whole).unwrap();
+        assert!(second.is_settled(task) && second.finish().unwrap().results.counts() == [1, 0, 0]);
+        assert!(!folder.path().join("out/work").exists());
+    }
 
-fn unused(name: &str, taken: &mut BTreeSet<String>) -> String {
-    let numbered = (2..).map(|number| format!("{name}-{number}"));
-    let mut names = std::iter::once(name.to_owned()).chain(numbered);
-    let free = names.find(|name| taken.insert(name.clone()));
-    free.unwrap_or_else(|| name.to_owned())
+    /// Of two machines the one that had more programs, in whatever order their folders come.
+    #[test]
+    fn of_two_results_the_one_that_lacks_less_is_merged() {
+        let made = |programs: &[&str]| {
+            let (folder, session) = session(VERIFY);
+            session.begin().unwrap();
+            let done = match programs {
+                [] => Done::new(&session.plan.tasks[0], 0, BTreeMap::new()),
+                [program, ..] => skipped(&session, program),
+            };
+            session.store(&done).unwrap();
+            (folder.path().join("out"), done, folder)
+        };
+        let (clang, whole, gcc) = (made(&["clang"]), made(&[]), made(&["gcc"]));
+        let merged = |folders: [&(PathBuf, Done, tempfile::TempDir); 3]| {
+            let out = tempfile::tempdir().unwrap();
+            let from = folders.map(|(out, ..)| out.clone());
+            let merged = crate::campaign::merge(&from, out.path(), Replacing { force: false }).unwrap();
+            assert!(merged.is_some());
+            let id = &whole.1.record.id;
+            crate::campaign::store::stored(out.path(), id)
+                .unwrap()
+                .unwrap()
+                .unwrap()
+        };
+        assert_eq!(merged([&clang, &whole, &gcc]), whole.1);
+        assert_eq!(merged([&gcc, &clang, &whole]), whole.1);
+        let first = merged([&gcc, &clang, &clang]);
+        assert!(first == merged([&clang, &gcc, &gcc]) && first.lacks().len() == 1);
+    }
+
+    #[test]
+    fn two_drivers_that_have_the_same_result_both_keep_it() {
+        let (folder, first) = session(VERIFY);
+        let plan = Plan::open(&folder.path().join("plan.toml")).unwrap();
+        let second = Session::open(plan, &folder.path().join("out"), Replacing { force: false }).unwrap();
+        let done = Done::new(
+            &first.plan.tasks[0],
+            0,
+            BTreeMap::from([("a".to_owned(), vec![0; 100_000])]),
+        );
+        std::thread::scope(|scope| {
+            for session in [&first, &second] {
+                let done = &done;
+                scope.spawn(move || {
+                    for _ in 0..50 {
+                        session.store(done).unwrap();
+                    }
+                });
+            }
+        });
+        assert_eq!(first.store.stored(&done.record.id).unwrap(), Some(Ok(done)));
+    }
 }

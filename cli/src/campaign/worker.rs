@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, mpsc};
 
+use campaign::BUILD;
 use serde::{Deserialize, Serialize};
 
-use super::perform::perform_in;
+use super::perform::{Performed, perform_in};
 use crate::failure::Failure;
 use crate::interruption;
 use crate::outcome::Outcome;
@@ -21,6 +22,8 @@ pub const ANSWER: &str = "policyc-task ";
 /// A line in.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct Job {
+    /// The build of the campaign, which named the task: another one may compute something else.
+    pub build: String,
     /// An absolute path.
     pub folder: PathBuf,
     /// The command line behind `policyc`.
@@ -59,7 +62,10 @@ fn answered() -> Result<(), Failure> {
         }
     });
     while let Ok(job) = receive.recv() {
-        let performed = perform_in(&job.folder, &job.arguments);
+        let performed = match job.build == BUILD {
+            true => perform_in(&job.folder, &job.arguments),
+            false => Performed::refused(&job.build),
+        };
         let line = format!("{ANSWER}{}\n", serde_json::to_string(&performed)?);
         let mut out = std::io::stdout().lock();
         out.write_all(line.as_bytes())?;

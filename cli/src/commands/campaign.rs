@@ -44,8 +44,12 @@ pub fn run(options: &Campaign) -> Result<Outcome, Failure> {
     let pending = match &options.task {
         Some(task) => {
             let index = session.find(task)?;
-            let is_done = session.plan.tasks.get(index).is_some_and(|task| session.is_done(task));
-            if is_done { Vec::new() } else { vec![index] }
+            let is_settled = session
+                .plan
+                .tasks
+                .get(index)
+                .is_some_and(|task| session.is_settled(task));
+            if is_settled { Vec::new() } else { vec![index] }
         }
         None => session.pending(),
     };
@@ -197,6 +201,8 @@ fn list(options: &Campaign, session: &Session) -> Result<Outcome, Failure> {
 fn write(options: &Campaign, session: &Session, script: &Script) -> Result<Outcome, Failure> {
     // a slip should not come out on the cluster
     check(&session.plan, &session.pending())?;
+    // so that the jobs find a campaign, and do not all begin one
+    session.begin()?;
     let call = Call {
         plan: options.plan.display().to_string(),
         out: options.out.display().to_string(),

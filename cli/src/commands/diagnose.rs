@@ -56,6 +56,19 @@ pub fn files(options: &Diagnose) -> Result<BTreeMap<String, String>, Failure> {
     texts(&found(options, &columns(options)?, &|_| {})?)
 }
 
+/// Reads every file that is named, and diagnoses nothing.
+///
+/// # Errors
+/// Their faults.
+pub fn check(options: &Diagnose) -> Result<(), Failure> {
+    let model = Parameters::buck_from_file(&options.model, "`diagnose`")?;
+    if let Some(policy) = &options.policy {
+        request(options, policy, &model)?;
+    }
+    records(options, &columns(options)?, &model)?;
+    Ok(())
+}
+
 fn columns(options: &Diagnose) -> Result<ColumnMap, Failure> {
     let mut columns = options.columns.read()?;
     if options.settled {

@@ -60,6 +60,14 @@ pub fn run(options: &Simulate) -> Result<Outcome, Failure> {
     Ok(if equal { Outcome::Done } else { Outcome::Different })
 }
 
+/// Reads every file that is named, and simulates nothing.
+///
+/// # Errors
+/// Their faults.
+pub fn check(options: &Simulate) -> Result<(), Failure> {
+    setting(options).map(|_| ())
+}
+
 /// What is simulated.
 fn setting(options: &Simulate) -> Result<Setting, Failure> {
     let scenario = Scenario::load(&options.scenario)?;

@@ -46,6 +46,21 @@ pub fn run(options: &Verify) -> Result<Outcome, Failure> {
     answered
 }
 
+/// Reads every file that is named, and builds nothing.
+///
+/// # Errors
+/// Their faults.
+pub fn check(options: &Verify) -> Result<(), Failure> {
+    let policy = super::load_as(&options.policy, options.outside, options.format)?;
+    traces(options, &policy).map(|_| ())
+}
+
+fn traces(options: &Verify, policy: &Policy) -> Result<Vec<Recorded>, Failure> {
+    let map = options.map.join(",");
+    let opened = options.trace.iter().map(|path| Recorded::open(policy, path, &map));
+    Ok(opened.collect::<Result<_, _>>()?)
+}
+
 fn compare(options: &Verify) -> Result<Outcome, Failure> {
     let written = match (options.format, &options.generated) {
         (Some(format), _) => Some(format),
@@ -54,12 +69,7 @@ fn compare(options: &Verify) -> Result<Outcome, Failure> {
     };
     let policy = super::load_as(&options.policy, options.outside, written)?;
     super::no_choices(&policy, options.golden_decisions)?;
-    let map = options.map.join(",");
-    let recorded = options
-        .trace
-        .iter()
-        .map(|path| Recorded::open(&policy, path, &map))
-        .collect::<Result<Vec<_>, _>>()?;
+    let recorded = traces(options, &policy)?;
     for (path, recording) in options.trace.iter().zip(&recorded) {
         let note = |note: &String| talk::note(&format!("{}: {note}", path.display()));
         recording.notes.iter().for_each(note);

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __version__: str
+BUILD: str
 
 class Fault:
     """One fault of the input."""

@@ -87,15 +87,19 @@ def campaign(
         file, text = os.fspath(plan), None
     native = NativeCampaign(file, text, os.fspath(out), overwrite)
     pending = native.pending()
-    native.begin()
     tell = _Teller(native.count(), len(pending), sys.stderr.isatty() if progress is None else progress)
     try:
         if pending and engine == "ray":
             from . import _ray
 
-            _ray.run(native, pending, address, retries, tell)
-        elif pending:
-            native.run(jobs, worker_program(), tell)
+            # before anything is written: it may not be there
+            with _ray.Cluster(address) as cluster:
+                native.begin()
+                _ray.run(native, pending, cluster, retries, tell)
+        else:
+            native.begin()
+            if pending:
+                native.run(jobs, worker_program(), tell)
     finally:
         tell.clear()
     holds, results, html, summary = native.finish()
@@ -136,11 +140,13 @@ class _Teller:
             sys.stderr.flush()
 
 
-def from_command(asked: Tuple[str, str, Optional[str], List[bool]]) -> int:
+def from_command(asked: Tuple[PathLike, PathLike, Optional[str], List[bool]]) -> int:
     """``policyc campaign --engine ray``: its exit code, as the program would end."""
     from ._policyc import Faults
 
     plan, out, address, (force, as_json, quiet) = asked
+    # paths of pathlib, which JSON has no form for
+    plan, out = os.fspath(plan), os.fspath(out)
     show: Callable[[str], None] = lambda text: print(text, file=sys.stderr)  # noqa: E731
     try:
         found = campaign(plan, out, engine="ray", address=address, overwrite=force, progress=False if quiet else None)

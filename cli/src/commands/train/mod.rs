@@ -72,6 +72,17 @@ pub fn run(options: &Train) -> Result<Outcome, Failure> {
     report(options, &settings, &runs, best, start.elapsed())
 }
 
+/// Reads every file that is named, and trains nothing.
+///
+/// # Errors
+/// Their faults.
+pub fn check(options: &Train) -> Result<(), Failure> {
+    let settings = Settings::load(&options.settings)?;
+    Contract::load(&settings.contract, &settings.hidden)?;
+    Converter::load(FileName::named_by_a_file(&settings.plant), &settings.set)?;
+    Ok(())
+}
+
 /// Writes the seeds' folders, the best one's last: a folder with a `policy.toml` is a whole training.
 fn write(out: &Path, settings: &Settings, runs: &[SeedRun], best: &Trained) -> Result<(), Failure> {
     for outcome in runs.iter().filter_map(|run| run.outcome.as_ref()) {

@@ -19,17 +19,31 @@ impl Conduction {
     /// loses no duty to dead time.
     #[must_use]
     pub fn of(plant: &Parameters) -> Option<Self> {
-        let (converter, switch) = (&plant.converter, &plant.switch);
-        let v_f = match converter.rectifier {
-            Rectifier::Diode => switch.v_f,
-            Rectifier::Synchronous => 0.0,
-        };
+        let switch = &plant.switch;
         let edges = [switch.dead_time, switch.turn_on_delay, switch.turn_off_delay];
-        let depends = converter.rectifier == Rectifier::Diode || edges != [0.0; 3];
-        (depends && converter.model == plant::Model::Switched).then_some(Conduction {
+        let depends = plant.converter.rectifier == Rectifier::Diode || edges != [0.0; 3];
+        depends.then(|| Self::of_switched(plant)).flatten()
+    }
+
+    /// Of a synchronous leg that loses no duty to dead time, whose current turns round below the boundary and changes nothing
+    /// by it; `None` of every other plant.
+    #[must_use]
+    pub fn of_turning(plant: &Parameters) -> Option<Self> {
+        match Self::of(plant) {
+            Some(_) => None,
+            None => Self::of_switched(plant),
+        }
+    }
+
+    fn of_switched(plant: &Parameters) -> Option<Self> {
+        let converter = &plant.converter;
+        (converter.model == plant::Model::Switched).then_some(Conduction {
             inductance: converter.inductance,
             f_sw: converter.f_sw,
-            v_f,
+            v_f: match converter.rectifier {
+                Rectifier::Diode => plant.switch.v_f,
+                Rectifier::Synchronous => 0.0,
+            },
         })
     }
 
@@ -66,7 +80,9 @@ mod tests {
         let mut parameters = Parameters::paper_model();
         parameters.converter.rectifier = Rectifier::Synchronous;
         assert_eq!(Conduction::of(&parameters), None);
+        assert_eq!(Conduction::of_turning(&parameters).map(|leg| leg.v_f), Some(0.0));
         parameters.switch.dead_time = 1e-6;
+        assert_eq!(Conduction::of_turning(&parameters), None);
         assert_eq!(Conduction::of(&parameters).map(|conduction| conduction.v_f), Some(0.0));
     }
 }

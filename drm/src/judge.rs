@@ -128,6 +128,8 @@ pub struct Steady {
     pub sensors: Signals,
     /// Sampled inductor current minus that of the simulation at the same point, both as their sensors show it, A.
     pub i_l_shift: f64,
+    /// Whether the point lies in the range that the mapping says it is valid in.
+    pub is_inside: bool,
 }
 
 /// Runs the mapping against a known converter: `real` is the bench, `nominal` what the policy was trained on.
@@ -169,6 +171,7 @@ pub fn against_plant(
             },
             // both as shown: a sensor that the simulation has too is no shift
             i_l_shift: seen.measured.i_l - wanted.measured.i_l,
+            is_inside: map.covers(d_sim, seen.measured.i_out),
         }
     });
     Ok(steady.collect())
@@ -244,9 +247,24 @@ pub fn steady_text(steady: &[Steady], v_ref: f64) -> Result<String, fmt::Error> 
     for s in steady {
         writeln!(
             out,
-            "{:>8.3} A {:>13.5} {:>+10.3} V {:>+10.3} V {:>+13.3} V",
-            s.i_out, s.d_needed, s.without_v, s.with_v, s.limited_v
+            "{:>8.3} A {:>13.5} {:>+10.3} V {:>+10.3} V {:>+13.3} V{}",
+            s.i_out,
+            s.d_needed,
+            s.without_v,
+            s.with_v,
+            s.limited_v,
+            if s.is_inside { "" } else { "  outside [valid]" }
         )?;
+    }
+    let outside = steady.iter().filter(|s| !s.is_inside).count();
+    if outside > 0 {
+        let text = format!(
+            "note: {outside} of {} points lie outside of the range that the mapping was fitted in ([valid] in its file): there it \
+             is continued, not measured; acquire points there, or keep the controller away",
+            steady.len()
+        );
+        writeln!(out)?;
+        wrapped(&mut out, "", &text)?;
     }
     for remark in beyond_repair(steady, v_ref) {
         writeln!(out)?;

@@ -56,20 +56,22 @@ const FAMILIES: &[(&str, &str)] = &[
 /// Beginnings of parts' names by target, one line each, for those who know their part and not its core.
 #[must_use]
 pub fn parts() -> String {
-    let of = |target: &str| {
-        // triples and cores are no parts
-        let is_part = |name: &&str| !name.starts_with("thumb") && !name.starts_with("cortex");
-        let names = FAMILIES.iter().filter(|(_, own)| *own == target).map(|(name, _)| *name);
-        names.filter(is_part).collect::<Vec<_>>().join(" ")
-    };
     let mut lines: Vec<String> = Vec::new();
     for (_, target) in FAMILIES {
-        let line = format!("  {target:14} {}", of(target));
+        let line = format!("  {target:14} {}", of_target(target).join(" "));
         if !lines.contains(&line) {
             lines.push(line);
         }
     }
     lines.join("\n")
+}
+
+/// Beginnings of the names of a target's parts.
+pub(crate) fn of_target(target: &str) -> Vec<&'static str> {
+    // triples and cores are no parts
+    let is_part = |name: &&str| !name.starts_with("thumb") && !name.starts_with("cortex");
+    let names = FAMILIES.iter().filter(|(_, own)| *own == target).map(|(name, _)| *name);
+    names.filter(is_part).collect()
 }
 
 /// The target of a part or a compiler's triple, if `name` begins as one that is known.

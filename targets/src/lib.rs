@@ -13,7 +13,7 @@ mod spec;
 
 pub use boards::{Board, BoardFile};
 pub use families::{of_part, parts};
-pub use overview::overview;
+pub use overview::{details, overview};
 pub use spec::{
     CCompiler, CycleModel, Endianness, Fma, Fpu, IntegerBlock, IntegerLoop, RowBlock, Runner, RustTarget, Sections,
     TargetSpec, Widths,

@@ -110,6 +110,21 @@ fn an_unknown_target_is_answered_with_the_known_ones() {
 }
 
 #[test]
+fn one_target_is_shown_by_its_name_or_by_a_part_of_it() {
+    let desk = Desk::new("minimal");
+    let text = desk.succeed("targets cortex-m4f");
+    for word in ["cortex-m4f: ", "arm-none-eabi-gcc", "-ffp-contract=off", "thumbv7em-none-eabihf", "stm32g4"] {
+        assert!(text.contains(word), "{word}\n{text}");
+    }
+    assert!(!text.contains("riscv"), "{text}");
+    assert_eq!(desk.succeed("targets STM32G474RE"), text);
+    assert!(desk.succeed("targets c2000-c28x").contains("taken for zero"));
+    let json: serde_json::Value = serde_json::from_str(&desk.succeed("targets cortex-m3 --json")).unwrap();
+    assert_eq!(json["name"], "cortex-m3");
+    desk.refuse("targets cortex-m5", &["unknown target", "did you mean"]);
+}
+
+#[test]
 fn inspect_shows_formulas_layers_actions_and_sizes() {
     let desk = Desk::new("paper");
     let text = desk.succeed("inspect policy");

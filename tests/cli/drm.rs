@@ -82,6 +82,42 @@ fn a_judgement_says_what_is_repaired_and_what_not() {
     assert_ne!(said, desk.succeed("drm judge points.csv --v-in-sim 190"));
 }
 
+/// A mapping continues beyond the points that it was fitted to, where nobody has measured it.
+#[test]
+fn a_judgement_marks_what_lies_outside_of_the_mapping_s_range() {
+    let desk = desk();
+    desk.succeed(&format!("drm acquire --plant real.toml {DUTIES} --out points.csv"));
+    desk.succeed("drm fit points.csv --plant real.toml --v-in-sim 200");
+    let judge = "drm judge --plant real.toml --nominal plants/paper-model.toml --v-ref 100";
+    // fitted from 2 to 10 A
+    let said = desk.succeed(&format!("{judge} --currents 5,8,14"));
+    let rows: Vec<&str> = said.lines().filter(|line| line.contains("outside [valid]")).collect();
+    assert!(rows.len() == 1 && rows[0].trim_start().starts_with("14.0"), "{said}");
+    assert!(said.contains("note: 1 of 3 points lie outside"), "{said}");
+    let said = desk.succeed(&format!("{judge} --currents 5,8"));
+    assert!(!said.contains("outside"), "{said}");
+}
+
+/// A leg whose dead time is not in the plant file: its points of light load lie off every mapping, and are named.
+#[test]
+fn points_in_which_the_current_of_a_leg_turns_round_are_named() {
+    let desk = desk();
+    let leg = REAL.replace("[switch]\n", "rectifier = \"synchronous\"\n\n[switch]\n").replace("v_f = 1.5\nr_d = 0.02\n", "");
+    assert!(leg.contains("synchronous") && !leg.contains("v_f"), "{leg}");
+    desk.write("leg.toml", &leg);
+    desk.write("believed.toml", &leg.replace("dead_time = 4e-6\n", ""));
+    // half of the ripple is 1.2 A
+    desk.succeed("drm acquire --plant leg.toml --duties 0.46:0.04:0.62 --currents 0.5,3,6,10 --out points.csv");
+    let said = desk.succeed("drm fit points.csv --plant believed.toml --v-in-sim 200 --keep-outliers --out believed-drm.toml");
+    let words = said.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(
+        words.contains("below half of the ripple") && words.contains("lines 2 to 6") && words.contains("dead_time"),
+        "{said}"
+    );
+    let said = desk.succeed("drm fit points.csv --plant leg.toml --v-in-sim 200 --out leg-drm.toml");
+    assert!(said.contains("left out") && !said.contains("below half"), "{said}");
+}
+
 /// ngspice shares no code with the plant; both measure the same steady state (docs/results/plant.md: samples agree within 1.5 mV).
 #[test]
 fn ngspice_is_measured_as_the_plant_is() {

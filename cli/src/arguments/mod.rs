@@ -304,6 +304,9 @@ pub struct Simulate {
 
 #[derive(Debug, Args)]
 pub struct Targets {
+    /// One target, or the number of a part whose target it is: all that the compiler knows of it
+    #[arg(value_name = "TARGET")]
+    pub name: Option<String>,
     /// Machine-readable, with everything the compiler knows of a target
     #[arg(long)]
     pub json: bool,

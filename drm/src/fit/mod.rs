@@ -40,8 +40,11 @@ pub struct FitOptions {
     pub components: Option<usize>,
     /// Points below the boundary of discontinuous conduction are left out.
     pub conduction: Option<Conduction>,
-    /// The current cannot rest (a synchronous leg): no boundary to look for.
-    pub always_continuous: bool,
+    /// Of a synchronous leg without dead time, whose current turns round and costs no duty by it: points below the boundary
+    /// stay in the fit, and are named, for a bench that has a dead time shows another duty there.
+    pub turns_round: Option<Conduction>,
+    /// The plant is averaged: no current of it rests, and there is no boundary to look for.
+    pub is_averaged: bool,
     /// Outliers are named, but stay in the fit.
     pub keep_outliers: bool,
     /// `a` is taken as given: for a table whose voltage does not vary.
@@ -187,9 +190,13 @@ pub fn fit(table: &Table, options: &FitOptions) -> Result<Report, Faults> {
 /// The points in continuous conduction, and the lines of the others.
 fn continuous(table: &Table, options: &FitOptions, notes: &mut Vec<String>) -> (Vec<Point>, Vec<usize>) {
     let Some(conduction) = &options.conduction else {
-        if !options.always_continuous {
-            let how = "give --plant, or --inductance and --f-sw";
-            notes.push(format!("discontinuous conduction was not looked for: {how}"));
+        match &options.turns_round {
+            Some(leg) => notes.extend(turning(&table.points, leg)),
+            None if options.is_averaged => {}
+            None => {
+                let how = "give --plant, or --inductance and --f-sw";
+                notes.push(format!("discontinuous conduction was not looked for: {how}"));
+            }
         }
         return (table.points.clone(), Vec::new());
     };
@@ -202,6 +209,23 @@ fn continuous(table: &Table, options: &FitOptions, notes: &mut Vec<String>) -> (
         notes.push(format!("within 10 % of discontinuous conduction: {lines}"));
     }
     (kept, rest.iter().map(|p| p.line).collect())
+}
+
+/// What is said of points in which the current of a synchronous leg turns round.
+fn turning(points: &[Point], leg: &Conduction) -> Option<String> {
+    let below: Vec<usize> = points
+        .iter()
+        .filter(|p| p.i_out < leg.boundary(p.v_out, p.v_in))
+        .map(|p| p.line)
+        .collect();
+    (!below.is_empty()).then(|| {
+        format!(
+            "below half of the ripple, where the inductor current turns round in each period: {}. They count, since the plant \
+             file has no dead time. A bench that has one gets its lost duty back there: write `dead_time` into [switch] \
+             (`policyc diagnose` finds it and writes plant.extended.toml) and give that file as --plant",
+            crate::table::lines(&below)
+        )
+    })
 }
 
 /// The forms to fit, the simplest first.

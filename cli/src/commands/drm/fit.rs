@@ -81,7 +81,7 @@ fn fit_options(options: &Fit) -> Result<FitOptions, Failure> {
         .as_deref()
         .map(|path| Parameters::buck_from_file(path, "`drm fit`"))
         .transpose()?;
-    let continuous = plant.as_ref().is_some_and(|plant| Conduction::of(plant).is_none());
+    let conduction = plant.as_ref().and_then(Conduction::of).or(given);
     Ok(FitOptions {
         form: match options.terms {
             Terms::Auto => None,
@@ -89,8 +89,9 @@ fn fit_options(options: &Fit) -> Result<FitOptions, Failure> {
             Terms::Four => Some(Form::FourTerm),
         },
         components: options.components.map(usize::from),
-        conduction: plant.as_ref().and_then(Conduction::of).or(given),
-        always_continuous: continuous,
+        conduction,
+        turns_round: plant.as_ref().and_then(Conduction::of_turning),
+        is_averaged: plant.as_ref().is_some_and(|plant| plant.converter.model == plant::Model::Averaged),
         keep_outliers: options.keep_outliers,
         assumed_a: options.assume_a,
     })

@@ -67,7 +67,7 @@ pub fn read(name: FileName, bytes: &[u8], most_bytes: u64) -> Result<Sheet, Faul
         column
     });
     let mut sheet = Sheet::numbered(name, columns.collect());
-    sheet.repairs = repairs;
+    sheet.repairs.splice(0..0, repairs);
     Ok(sheet)
 }
 

@@ -71,6 +71,18 @@ impl Column {
         }
     }
 
+    /// Takes the marks of instruments for missing values; how many there were.
+    fn leave_out_marks(&mut self) -> usize {
+        let marks = self.values.iter_mut().enumerate().filter(|(_, value)| is_mark(**value));
+        let marks: Vec<(usize, String)> = marks
+            .map(|(row, value)| (row, format!("{:e}", std::mem::replace(value, f64::NAN))))
+            .collect();
+        let count = marks.len();
+        self.words.extend(marks);
+        self.words.sort_by_key(|(row, _)| *row);
+        count
+    }
+
     /// What stands in a row.
     #[must_use]
     pub fn cell(&self, row: usize) -> Cell<'_> {
@@ -85,15 +97,42 @@ impl Column {
     }
 }
 
+/// From here on a number is a mark.
+// SCPI, volume 1, 7.2.1: 9.9E+37 is infinity, 9.91E+37 no number; nothing on a bench is as large
+const MARK: f64 = 9e37;
+
+fn is_mark(value: f64) -> bool {
+    value.is_finite() && value.abs() >= MARK
+}
+
+/// Takes the marks of instruments out of columns and says so.
+fn leave_out_marks(columns: &mut [Column], repairs: &mut Vec<String>) {
+    for column in columns {
+        let (count, name) = (column.leave_out_marks(), &column.name);
+        let (values, are_marks) = if count == 1 {
+            ("value", "is a mark")
+        } else {
+            ("values", "are marks")
+        };
+        if count > 0 {
+            repairs.push(format!(
+                "{count} {values} of `{name}` {are_marks} of an instrument for none or out of range (9.9e37): not measured"
+            ));
+        }
+    }
+}
+
 impl Cell<'_> {
-    /// Nothing, or a word that says so: `nan`, `na`, `n/a`, `null`, `-`.
+    /// Nothing, or a word that says so: `nan`, `na`, `n/a`, `null`, `-`, 9.9e37 of an instrument.
     #[must_use]
     pub fn is_missing(&self) -> bool {
         const WORDS: [&str; 5] = ["nan", "na", "n/a", "null", "-"];
         match self {
             Cell::Number(_) => false,
             Cell::Empty => true,
-            Cell::Word(word) => WORDS.iter().any(|missing| word.eq_ignore_ascii_case(missing)),
+            Cell::Word(word) => {
+                WORDS.iter().any(|missing| word.eq_ignore_ascii_case(missing)) || word.parse().is_ok_and(is_mark)
+            }
         }
     }
 }
@@ -101,17 +140,25 @@ impl Cell<'_> {
 impl Sheet {
     /// A sheet of a format without lines: its rows are counted from 1. All columns have the length of the first.
     #[must_use]
-    pub fn numbered(name: FileName, columns: Vec<Column>) -> Self {
+    pub fn numbered(name: FileName, mut columns: Vec<Column>) -> Self {
+        let mut repairs = Vec::new();
+        leave_out_marks(&mut columns, &mut repairs);
         Sheet {
             name,
             rows: columns.first().map_or(0, |column| column.values.len()),
             columns,
-            repairs: Vec::new(),
+            repairs,
             places: Places::Numbered,
         }
     }
 
-    pub(crate) fn of_text(name: FileName, columns: Vec<Column>, repairs: Vec<String>, places: TextPlaces) -> Self {
+    pub(crate) fn of_text(
+        name: FileName,
+        mut columns: Vec<Column>,
+        mut repairs: Vec<String>,
+        places: TextPlaces,
+    ) -> Self {
+        leave_out_marks(&mut columns, &mut repairs);
         Sheet {
             name,
             columns,
@@ -214,6 +261,13 @@ impl Sheet {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn marks_of_instruments_are_no_numbers_in_any_format() {
+        let columns = vec![Column::new("v_out", vec![1.5, -9.91e37])];
+        let sheet = Sheet::numbered(FileName::new(Path::new("run.mat")), columns);
+        assert!(sheet.columns()[0].cell(1).is_missing() && sheet.repairs.len() == 1);
+    }
 
     /// Another file format needs no more than this.
     #[test]

@@ -194,3 +194,23 @@ fn a_large_table_is_read_in_one_go() {
     assert_eq!((sheet.rows(), sheet.line(99_999)), (100_000, 100_001));
     assert_eq!(sheet.columns()[2].values[99_999], 99.25);
 }
+
+/// SCPI instruments write 9.9E+37 for a value out of range and 9.91E+37 for none.
+#[test]
+fn the_marks_of_instruments_for_no_measurement_are_missing_values() {
+    let sheet = read("t,v_out,i_l\n0,1.5,2\n1,+9.9E+37,3\n2,-9.91E+37,9.9E+37\n3,1.5,oops\n4,8e37,1\n").unwrap();
+    let v_out = &sheet.columns()[1];
+    assert!(v_out.values[1].is_nan() && v_out.values[2].is_nan());
+    assert_eq!(v_out.values[4], 8e37);
+    assert!(v_out.cell(1).is_missing() && v_out.cell(2).is_missing() && !v_out.cell(0).is_missing());
+    // words keep their order beside them
+    assert!(sheet.columns()[2].cell(2).is_missing());
+    assert_eq!(sheet.columns()[2].cell(3), Cell::Word("oops"));
+    assert_eq!(
+        sheet.repairs,
+        [
+            "2 values of `v_out` are marks of an instrument for none or out of range (9.9e37): not measured",
+            "1 value of `i_l` is a mark of an instrument for none or out of range (9.9e37): not measured"
+        ]
+    );
+}

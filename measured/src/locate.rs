@@ -80,6 +80,9 @@ impl Sheet {
                     .named(name)
                     .ok_or_else(|| Box::new(self.no_column(quantity.name, name)))?;
                 let header = &self.columns()[index].name;
+                if let (None, Some(unit)) = (scale, quantity.foreign_unit(header)) {
+                    return Err(Box::new(self.of_another_kind(quantity, name, index, unit)));
+                }
                 let source = Source::Column {
                     index,
                     // a factor of the map is the user's word: the unit behind the name then does not count
@@ -138,6 +141,21 @@ impl Sheet {
                 Err(Box::new(self.name_fault(second, message)))
             }
         }
+    }
+
+    /// What a current probe shows in volts is no current before somebody says how many amperes a volt is.
+    fn of_another_kind(&self, quantity: &Quantity<'_>, name: &str, index: usize, unit: &str) -> Fault {
+        let (wanted, own) = (quantity.name, quantity.unit);
+        let message = Message::new(format!(
+            "`{}` is mapped to `{wanted}`, which has another unit",
+            self.columns()[index].name
+        ));
+        let hint = format!(
+            "say how many {own} one {unit} is: {}, or scale = FACTOR in a map file; 10 for a probe of 100 mV/A. With *1 the numbers are \
+             taken as {own}",
+            argument(&format!("{wanted}={name}*FACTOR"))
+        );
+        self.name_fault(index, message.found(unit).expected(quantity.units()).hint(hint))
     }
 
     fn no_column(&self, quantity: &str, name: &str) -> Fault {

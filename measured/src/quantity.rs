@@ -188,11 +188,20 @@ impl Quantity<'_> {
         })
     }
 
-    /// The unit behind a name that a map gives: of the quantity's kind, or it is part of the name.
+    /// The unit behind a name that a map gives: of the quantity's kind, or it is part of the name. In brackets, one of another kind
+    /// is a fault ([`Quantity::foreign_unit`]).
     pub(crate) fn scale_behind(&self, header: &str) -> f64 {
         let (_, unit) = split_unit(header);
         let unit = unit.or_else(|| header.trim().rsplit_once(['_', ' ']).map(|(_, unit)| unit));
         unit.and_then(|unit| scale(unit, self.unit)).unwrap_or(1.0)
+    }
+
+    /// The unit in brackets or behind a stroke of a header, if it is one of another kind than this quantity's.
+    pub(crate) fn foreign_unit<'h>(&self, header: &'h str) -> Option<&'h str> {
+        let text = split_unit(header).1?;
+        // a unit of a policy's own may be none of those that are known here
+        let ((of, _), (wanted, _)) = (unit(text)?, unit(self.unit)?);
+        (of != wanted).then_some(text)
     }
 
     /// Whether `header` is the duty that was measured where another column is the one that was asked for.

@@ -183,3 +183,17 @@ fn a_column_that_the_map_names_is_nothing_else_by_its_name() {
     let both = mapped(text, "i_out=i_load,i_load=i_load").unwrap();
     assert!(both.signal("i_out").is_some() && both.signal("i_load").is_some());
 }
+
+/// Oscilloscopes call any channel Volt, with a current probe at it too.
+#[test]
+fn a_mapped_column_in_a_unit_of_another_kind_needs_a_factor() {
+    let text = "t,CH1 [Volt],CH2 [Volt],x [V]\n0,12,0.1,1\n";
+    let faults = mapped(text, "v_out=CH1,i_l=CH2").unwrap_err().to_string();
+    for words in ["`CH2 [Volt]`", "`i_l`", "A, with a prefix", "--map i_l=CH2*FACTOR"] {
+        assert!(faults.contains(words), "{words}: {faults}");
+    }
+    let located = mapped(text, "v_out=CH1,i_l=CH2*10").unwrap();
+    assert_eq!(located.signal("i_l").unwrap().scale(), 10.0);
+    // letters behind a stroke may be part of the name, and an own unit is none of these
+    assert!(mapped("i_A,u/phase\n1,2\n", "v_out=i_A,i_l=u/phase").is_ok());
+}

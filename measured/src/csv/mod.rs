@@ -80,8 +80,7 @@ pub(crate) fn read(name: FileName, bytes: Vec<u8>, options: &Options) -> Result<
     };
     let (columns, rows) = table.read(&body, options, &mut repairs)?;
     if rows.is_empty() {
-        let message = Message::new("the table has no rows").expected("rows of numbers below the header");
-        return Err(source.fault(&header.span, message).into());
+        return Err(no_rows(&source, &header.span));
     }
     let name = source.name.clone();
     Ok(Sheet::of_text(
@@ -101,6 +100,8 @@ fn captured(
     mut repairs: Vec<String>,
 ) -> Result<Sheet, Faults> {
     repairs.push(layout.note);
+    let titles: Vec<&str> = layout.titles.iter().map(String::as_str).collect();
+    twins(&source, &layout.names, &titles)?;
     let table = Reader {
         separator: layout.separator,
         skip: layout.skip,
@@ -116,6 +117,9 @@ fn captured(
         marks: [None, None],
     };
     let (mut columns, rows) = table.read(lines.get(layout.body..).unwrap_or_default(), options, &mut repairs)?;
+    if rows.is_empty() {
+        return Err(no_rows(&source, layout.names.first().unwrap_or(&(0..0))));
+    }
     if let (Some((start, step)), Some(count)) = (layout.clock, columns.first_mut()) {
         count.values.iter_mut().for_each(|value| *value = start + *value * step);
         count.decimals = number::decimals(step).max(number::decimals(start));
@@ -182,16 +186,29 @@ fn header_faults(source: &Source, line: &Line, names: &[Span]) -> Result<(), Fau
         };
         return Err(source.fault(&line.span, message.hint(hint)).into());
     }
+    let titles: Vec<&str> = names.iter().map(text).collect();
+    twins(source, names, &titles)
+}
+
+/// Names that stand in a table twice, where each has a span to show.
+fn twins(source: &Source, names: &[Span], titles: &[&str]) -> Result<(), Faults> {
     let twin = |index: &usize| {
-        let name = text(&names[*index]);
-        !name.is_empty() && names[..*index].iter().any(|other| text(other) == name)
+        let name = titles[*index];
+        !name.is_empty() && titles[..*index].contains(&name)
     };
     let fault = |index: usize| {
-        let message = Message::new(format!("two columns are called `{}`", text(&names[index])));
-        source.fault(&names[index], message.hint("remove or rename one"))
+        let message = Message::new(format!("two columns are called `{}`", titles[index]));
+        let shown = names.get(index).or(names.last()).cloned().unwrap_or(0..0);
+        source.fault(&shown, message.hint("remove or rename one"))
     };
-    let mut faults: Sink = (0..names.len()).filter(twin).map(fault).collect();
+    let mut faults: Sink = (0..titles.len()).filter(twin).map(fault).collect();
     faults.propagate()
+}
+
+/// A header above no rows.
+fn no_rows(source: &Source, header: &Span) -> Faults {
+    let message = Message::new("the table has no rows").expected("rows of numbers below the header");
+    source.fault(header, message).into()
 }
 
 /// What has been read of the rows.

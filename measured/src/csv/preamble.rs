@@ -7,8 +7,8 @@
 //! | Tektronix TDS | settings in the first two columns beside the first rows, samples in the fourth and fifth |
 //! | Tektronix, Siglent, LeCroy and relatives | lines of settings, then names or units, then samples |
 //!
-//! A text is taken for one of these by its first cell alone, so that no other table is read differently. Forms are those that public
-//! descriptions and programs that read them show.
+//! A text is taken for one of these by its first cell, and for the last only with settings above its names, so that no other table is
+//! read differently. Forms are those that public descriptions and programs that read them show.
 
 use toml_input::{Source, Span};
 
@@ -220,6 +220,17 @@ fn beside(cut: &Cut<'_>) -> Option<Layout> {
     })
 }
 
+/// Whether names, perhaps units, and rows are all there is: a table like any other, whatever its first column is called.
+fn is_plain(cut: &Cut<'_>, head: usize, count: usize) -> bool {
+    let first = cut.numbers(0);
+    // a setting has another number of cells than the rows, or words beside numbers
+    let is_setting = first.len() != count || first.iter().any(Option::is_some);
+    // `time,CH1` passes for units by its letters
+    let names_time = |cell: &&str| name(cell) == "t" && !crate::quantity::is_unit(cell);
+    let is_units = cut.are_units(head) && !cut.texts(head).first().is_some_and(names_time);
+    head == 0 || head == 1 && is_units && !is_setting
+}
+
 /// Settings above the names.
 fn above(cut: &Cut<'_>) -> Option<Layout> {
     // two lines of samples: a setting may be two numbers
@@ -236,6 +247,9 @@ fn above(cut: &Cut<'_>) -> Option<Layout> {
         Some(line) if cut.texts(line).first().is_some_and(|cell| name(cell) == "t") => (line, cut.texts(last)),
         _ => (last, Vec::new()),
     };
+    if is_plain(cut, head, count) {
+        return None;
+    }
     let names = cut.texts(head);
     // units alone: channels are counted
     let is_bare = units.is_empty()

@@ -104,3 +104,28 @@ fn a_unit_line_of_a_capture_is_heeded_and_other_tables_stay_as_they_were() {
     }
     assert_eq!(read("x,v_out\n1,2\n3,4\n").columns()[0].name, "x");
 }
+
+#[test]
+fn a_table_without_settings_above_its_names_is_read_as_any_other() {
+    for first in ["label", "type", "date", "title", "model", "segments", "path"] {
+        let text = format!("{first},duty,v_out\n-,%,mV\n1,50,1500\n2,51,1530\n");
+        let names: Vec<String> = read(&text).headers().map(str::to_owned).collect();
+        assert_eq!(names, [first, "duty [%]", "v_out [mV]"]);
+        let bare = read(&text.replace("-,%,mV\n", ""));
+        assert_eq!(bare.headers().collect::<Vec<_>>(), [first, "duty", "v_out"]);
+    }
+    // a setting in words with as many cells as the rows
+    assert_eq!(read("Title,boot\ntime,CH1\n0,1\n1,2\n").headers().next(), Some("t"));
+}
+
+#[test]
+fn a_capture_has_each_name_once_and_some_rows() {
+    let problem = |text: &str| {
+        let sheet = Sheet::parse(Path::new("scope.csv"), text.as_bytes().to_vec(), &Options::default());
+        sheet.unwrap_err().list[0].problem.clone()
+    };
+    let twice = problem("x-axis,1,1\nsecond,Volt,Volt\n0,1,2\n1e-6,1,2\n");
+    assert_eq!(twice, "two columns are called `CH1 [Volt]`");
+    let none = problem("X,CH1,Start,Increment\nSequence,Volt,0,1e-6\n");
+    assert_eq!(none, "the table has no rows");
+}

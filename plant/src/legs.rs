@@ -98,6 +98,12 @@ impl Legs {
         }
     }
 
+    /// Whether the switch node lies at the end of the main switch: that conducts, or its body diode.
+    pub fn is_on(&self, path: &Path) -> bool {
+        let main = &self.paths[0];
+        !path.open && (path.share, path.give) == (main.share, main.give)
+    }
+
     /// What follows a path that ended after `used` seconds while the gates stood still, where the voltages cannot say: they
     /// are equal at that instant, and rounding would ask again and again.
     pub fn after(&self, path: &Path, used: f64) -> Option<Path> {

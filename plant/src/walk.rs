@@ -9,7 +9,7 @@
 //! Invariant: between two instants gates and load stand still. The path changes only where a diode ends the current.
 
 use crate::entry::Way;
-use crate::full::Full;
+use crate::full::{Full, Path};
 use crate::parameters::Model;
 use crate::plain::Track;
 use crate::plant::Plant;
@@ -78,6 +78,18 @@ impl Plant {
 
     /// Advances by `h` from `t` in the PWM period; the gates do not change meanwhile.
     pub(crate) fn conduct(&mut self, t: f64, h: f64, load: &Load, track: &mut Track) {
+        self.conduct_seen(t, h, load, track, |_, _| ());
+    }
+
+    /// [`Plant::conduct`], with each path and the seconds for which it conducted.
+    pub(crate) fn conduct_seen(
+        &mut self,
+        t: f64,
+        h: f64,
+        load: &Load,
+        track: &mut Track,
+        mut see: impl FnMut(&Path, f64),
+    ) {
         // asked in the middle: at an end of the interval rounding would decide on which side of an edge it lies
         let gate = self.state.gates.at(&self.timing, t + 0.5 * h);
         let (mut rest, mut next) = (h, None);
@@ -97,6 +109,7 @@ impl Plant {
                 let span = (self.state.time, rest);
                 self.full.advance(&mut self.state.x, &path, load, span, track)
             };
+            see(&path, used);
             self.state.path = path;
             self.state.time += used;
             // only a diode ends its interval early; what is left then runs with an open leg

@@ -20,8 +20,41 @@ pub struct Waveform {
     pub discontinuous: bool,
     /// Whether the plant came to rest.
     pub rests: bool,
-    /// When the main switch turns on and off, as fractions of the period from its start; beyond 1 in the next one.
+    /// When the switch node rises and falls, as fractions of the period from its start; beyond 1 in the next one. These are the edges of
+    /// the main switch's gate where the current is positive. A negative one flows through the body diode of the main switch as soon as
+    /// the lower switch turns off.
     pub edges: [f64; 2],
+}
+
+/// Intervals in which the switch node is high, s from the start of the period.
+#[derive(Debug, Default)]
+struct Pulses {
+    list: Vec<[f64; 2]>,
+}
+
+impl Pulses {
+    /// One more part, which may go on with the last.
+    fn add(&mut self, start: f64, end: f64, same: f64) {
+        match self.list.last_mut() {
+            Some(last) if start <= last[1] + same => last[1] = end,
+            _ => self.list.push([start, end]),
+        }
+    }
+
+    /// The longest in a steady state of `period`, in which the end of a period goes on with its start; nothing if there is none, or no
+    /// end of it.
+    fn longest(mut self, period: f64, same: f64) -> Option<[f64; 2]> {
+        if let [first, .., last] = self.list[..]
+            && first[0] <= same
+            && last[1] >= period - same
+        {
+            self.list.remove(0);
+            self.list.last_mut()?[1] = period + first[1];
+        }
+        let length = |pulse: &[f64; 2]| pulse[1] - pulse[0];
+        let longest = self.list.into_iter().max_by(|a, b| length(a).total_cmp(&length(b)))?;
+        (length(&longest) < period - same).then_some(longest)
+    }
 }
 
 impl Plant {
@@ -40,6 +73,8 @@ impl Plant {
         let mut shown = Vec::with_capacity(at.len());
         let mut looks = at.iter().map(|fraction| fraction * end).peekable();
         let mut s = 0.0;
+        let legs = self.legs.clone();
+        let mut pulses = Pulses::default();
         self.start_period(duty);
         while s < end {
             if looks.next_if(|look| *look <= s + same).is_some() {
@@ -51,7 +86,13 @@ impl Plant {
             if next > end - same {
                 next = end;
             }
-            self.conduct(s, next - s, &drawn, &mut track);
+            let mut at = s;
+            self.conduct_seen(s, next - s, &drawn, &mut track, |path, used| {
+                if legs.is_on(path) {
+                    pulses.add(at, at + used, same);
+                }
+                at += used;
+            });
             s = next;
         }
         // fractions of 1 and more belong to the next period
@@ -59,7 +100,10 @@ impl Plant {
         let signals = self.signals(&drawn);
         self.finish(signals, track);
         Waveform {
-            edges: self.timing.edges(self.state.applied).map(|edge| edge / end),
+            edges: pulses
+                .longest(end, same)
+                .unwrap_or_else(|| self.timing.edges(self.state.applied))
+                .map(|edge| edge / end),
             shown,
             discontinuous: track.discontinuous,
             rests,
@@ -116,6 +160,35 @@ mod tests {
             assert!(rests);
             let (v, i) = ((sample.v_out - seen.v_out).abs(), (sample.i_l - seen.i_l).abs());
             assert!(v < 1e-6 && i < 1e-6, "{phase}: {v} V, {i} A");
+        }
+    }
+
+    /// Current that is negative while both switches are off flows back through the body diode of the upper one: the node rises when the
+    /// lower switch turns off, not when the upper one turns on.
+    #[test]
+    fn the_node_rises_before_its_gate_where_the_current_is_negative() {
+        for (load, rises, falls) in [
+            (Load::current(8.0), 0.02, 0.4),
+            (Load::current(0.1), 0.0, 0.4),
+            (Load::current(-8.0), 0.0, 0.42),
+        ] {
+            for carrier in [Carrier::Trailing, Carrier::Centre, Carrier::Leading] {
+                let mut p = Parameters::paper_table();
+                p.converter.rectifier = crate::Rectifier::Synchronous;
+                (p.inductor.dcr, p.switch.dead_time) = (0.1, 2e-6);
+                p.pwm.carrier = carrier;
+                let start = match carrier {
+                    Carrier::Trailing => 0.0,
+                    Carrier::Centre => 0.3,
+                    Carrier::Leading => 0.6,
+                };
+                let [on, off] = Plant::new(&p).unwrap().waveform(0.4, &load, &[]).edges;
+                assert!((on - start - rises).abs() < 1e-9, "{carrier:?} {load:?}: rises at {on}");
+                assert!(
+                    (off - start - falls).abs() < 1e-9,
+                    "{carrier:?} {load:?}: falls at {off}"
+                );
+            }
         }
     }
 

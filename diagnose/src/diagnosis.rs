@@ -6,6 +6,7 @@ use crate::aside;
 use crate::attribute::Attribution;
 use crate::beside;
 use crate::capture::estimates::{self, Driven, Estimates};
+use crate::capture::terms::delays;
 use crate::control::Request;
 use crate::doubts;
 use crate::drive::Model;
@@ -147,6 +148,7 @@ fn read_off(problem: &Problem, model: &Parameters) -> Vec<Estimates> {
             applied: drive.applied,
             drawn: v_out * drive.load.conductance + drive.load.current + power,
             conductance: drive.load.conductance,
+            delays: capture.pin.and_then(|_| delays(model, &drive)),
         };
         Some(estimates::of(capture, &driven, model))
     };

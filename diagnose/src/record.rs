@@ -23,6 +23,7 @@ use toml_input::{Faults, Message, Sink};
 pub use channels::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS, Segment};
 use channels::{FEWEST, QUANTITIES};
 use raw::Raw;
+pub(crate) use source::Source;
 
 use crate::capture::Capture;
 

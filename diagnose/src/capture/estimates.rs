@@ -97,6 +97,8 @@ pub struct Driven {
     pub drawn: f64,
     /// Conductance of the load, S.
     pub conductance: f64,
+    /// From the command to the switch node's rise and fall, by the model, s.
+    pub delays: Option<[f64; 2]>,
 }
 
 /// Reads off what a capture shows, beside the model `p`.
@@ -110,7 +112,8 @@ pub fn of(capture: &Capture, driven: &Driven, p: &Parameters) -> Estimates {
         values: Vec::new(),
         missing: Vec::new(),
     };
-    edges(capture, driven, p, &mut out);
+    frequency(capture, p, &mut out);
+    edges(capture, driven, &mut out);
     ripples(capture, &mut out);
     inductor::inductance(capture, p, &mut out);
     winding(capture, driven, p, &mut out);
@@ -123,18 +126,25 @@ fn mode(capture: &Capture) -> Option<&'static str> {
     Some(if capture.discontinuous? { "dcm" } else { "ccm" })
 }
 
-fn edges(capture: &Capture, driven: &Driven, p: &Parameters, out: &mut Estimates) {
+fn frequency(capture: &Capture, p: &Parameters, out: &mut Estimates) {
     let t = capture.period;
-    let f_sw = Some(p.converter.f_sw);
+    if !capture.timed {
+        out.missing.push("more periods: switching frequency".to_owned());
+        return;
+    }
     // the trigger's clock is better than 50 ppm; a period fitted to bins of one is as good as a sample over all of them
     let sd = (capture.step / 12f64.sqrt() / (capture.bins.periods * t)).max(5e-5) / t;
     out.values.push(around(
         "f_sw",
         (1.0 / t, sd),
         "Hz",
-        f_sw,
+        Some(p.converter.f_sw),
         "the period in which the samples repeat",
     ));
+}
+
+fn edges(capture: &Capture, driven: &Driven, out: &mut Estimates) {
+    let t = capture.period;
     if let Some(pin) = capture.pin {
         out.values.push(around(
             "duty_command",
@@ -163,23 +173,13 @@ fn edges(capture: &Capture, driven: &Driven, p: &Parameters, out: &mut Estimates
             let on = late(node.pulse.on.time - pin.on.time);
             let sd = node.pulse.on.sd.hypot(pin.on.sd);
             let off = late(on + width.time - pin.width.time);
-            let s = &p.switch;
-            let hold = if p.converter.rectifier == plant::Rectifier::Synchronous {
-                s.dead_time
-            } else {
-                0.0
-            };
+            let [model_on, model_off] = driven.delays.map_or([None; 2], |delays| delays.map(Some));
             let [from_on, from_off] = ["v_pwm rises to v_sw rises", "v_pwm falls to v_sw falls"];
-            let model = Some(s.turn_on_delay + hold);
-            out.values.push(around("turn_on_delay", (on, sd), "s", model, from_on));
+            out.values
+                .push(around("turn_on_delay", (on, sd), "s", model_on, from_on));
             let sd = width.sd.hypot(pin.width.sd) / 2f64.sqrt();
-            out.values.push(around(
-                "turn_off_delay",
-                (off, sd),
-                "s",
-                Some(s.turn_off_delay),
-                from_off,
-            ));
+            out.values
+                .push(around("turn_off_delay", (off, sd), "s", model_off, from_off));
         }
         None => {
             let known = if driven.applied {
@@ -204,7 +204,8 @@ fn edges(capture: &Capture, driven: &Driven, p: &Parameters, out: &mut Estimates
 
 fn ripples(capture: &Capture, out: &mut Estimates) {
     for (n, name, unit) in [(1, "i_l_ripple", "A"), (0, "v_out_ripple", "V")] {
-        if let Some(fold) = &capture.folds[n] {
+        // what was cut off was larger
+        if let Some(fold) = capture.folds[n].as_ref().filter(|fold| !fold.has_holes()) {
             let bin = fold.noise / capture.bins.periods.max(1.0).sqrt();
             let sd = (GAIN * fold.ripple()).hypot(2.0 * bin).hypot(fold.step / 12f64.sqrt());
             out.values.push(around(

@@ -16,6 +16,9 @@ const RINGING: f64 = 0.1;
 const RESTS: f64 = 0.05;
 const RESTING: f64 = 0.1;
 
+/// Part of the bins that single samples may leave empty.
+const HOLES: f64 = 0.02;
+
 /// Mean values of one channel over the period.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fold {
@@ -46,6 +49,8 @@ pub struct Bins {
     pub periods: f64,
     /// s
     pub period: f64,
+    /// Where phase 0 is, s.
+    origin: f64,
 }
 
 impl Bins {
@@ -84,10 +89,22 @@ impl Bins {
             of,
             periods,
             period,
+            origin,
         }
     }
 
-    /// One channel folded. Samples that are no number count nowhere.
+    /// Phase of an instant, fraction of the period from its origin.
+    pub fn phase(&self, t: f64) -> f64 {
+        ((t - self.origin) / self.period).rem_euclid(1.0)
+    }
+
+    /// Bin of each sample.
+    pub fn places(&self) -> &[Option<usize>] {
+        &self.of
+    }
+
+    /// One channel folded. Samples that are no number count nowhere; a bin without any has what lies on the line between its neighbours,
+    /// and a standard deviation that is infinite.
     pub fn fold(&self, values: &[f64]) -> Fold {
         let count = self.at.len();
         let (mut sum, mut square, mut number) = (vec![0.0; count], vec![0.0; count], vec![0.0; count]);
@@ -121,6 +138,16 @@ impl Bins {
         let step = quantum(&kept);
         let mean = bin_mean(&self.at, &value);
         value.iter_mut().for_each(|v| *v -= mean);
+        let known: Vec<(f64, f64)> = self
+            .at
+            .iter()
+            .copied()
+            .zip(value.iter().copied())
+            .filter(|(_, v)| v.is_finite())
+            .collect();
+        for (at, v) in self.at.iter().zip(&mut value).filter(|(_, v)| !v.is_finite()) {
+            *v = between(&known, *at);
+        }
         let finite = || value.iter().copied().filter(|v| v.is_finite());
         let ripple = finite().fold(0.0, f64::max) - finite().fold(0.0, f64::min);
         // noise of half a step and more dithers; with less, the rounding of a bin is the same in each period
@@ -128,7 +155,10 @@ impl Bins {
         let floor = SIMULATED * ripple * (count as f64 / INDEPENDENT).max(1.0).sqrt();
         let sd = number
             .iter()
-            .map(|n: &f64| (noise / n.max(1.0).sqrt()).hypot(rounding).hypot(floor).max(1e-12))
+            .map(|n: &f64| match *n > 0.0 {
+                true => (noise / n.sqrt()).hypot(rounding).hypot(floor).max(1e-12),
+                false => f64::INFINITY,
+            })
             .collect();
         let (low, high) = kept
             .iter()
@@ -163,10 +193,48 @@ impl Fold {
         resting > RESTING * self.value.len() as f64
     }
 
+    /// Value less the mean at a phase, on the line between the bins at `at`.
+    pub fn value_at(&self, at: &[f64], phase: f64) -> f64 {
+        let next = at.partition_point(|x| *x <= phase);
+        let [a, b] = match (at.len(), next) {
+            (0, _) => return f64::NAN,
+            (n, 0) => [n - 1, 0],
+            (n, next) if next == n => [n - 1, 0],
+            (_, next) => [next - 1, next],
+        };
+        on_line((at[a], self.value[a]), (at[b], self.value[b]), phase)
+    }
+
+    /// Whether parts of the period were not measured, single samples apart.
+    pub fn has_holes(&self) -> bool {
+        let count = self.sd.iter().filter(|sd| sd.is_infinite()).count();
+        count as f64 > HOLES * self.sd.len() as f64
+    }
+
     /// Highest less lowest of the mean period.
     pub fn ripple(&self) -> f64 {
         let finite = || self.value.iter().copied().filter(|v| v.is_finite());
         finite().fold(f64::NEG_INFINITY, f64::max) - finite().fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// The line between two points of a period, which closes round.
+fn on_line(a: (f64, f64), b: (f64, f64), phase: f64) -> f64 {
+    let width = (b.0 - a.0).rem_euclid(1.0);
+    match width > 0.0 {
+        true => a.1 + (b.1 - a.1) * (phase - a.0).rem_euclid(1.0) / width,
+        false => a.1,
+    }
+}
+
+/// The same between the neighbours of a phase.
+fn between(known: &[(f64, f64)], phase: f64) -> f64 {
+    let next = known.partition_point(|(at, _)| *at <= phase);
+    let before = if next == 0 { known.last() } else { known.get(next - 1) };
+    let after = known.get(next).or(known.first());
+    match (before, after) {
+        (Some(a), Some(b)) => on_line(*a, *b, phase),
+        _ => f64::NAN,
     }
 }
 
@@ -187,7 +255,7 @@ pub fn bin_mean(at: &[f64], value: &[f64]) -> f64 {
 
 /// Distance of the values of a coarse converter; 0 where nearly every value is another. Instruments write them with the rounding of
 /// their own arithmetic, so values within a thousandth of the distance are one.
-fn quantum(values: &[f64]) -> f64 {
+pub(super) fn quantum(values: &[f64]) -> f64 {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
     let span = sorted.last().copied().unwrap_or(0.0) - sorted.first().copied().unwrap_or(0.0);

@@ -37,7 +37,10 @@ pub fn structures(problem: &Problem, null: &State, state: &State) -> Vec<Structu
             let (now, was) = (noise::left(&left[bins.clone()]), noise::left(&before[bins]));
             if now.square > WILD + ACCURACY * ACCURACY * was.square {
                 let fold = capture.folds[channel].as_ref();
-                let sd = fold.map_or(0.0, |fold| fold.sd.iter().sum::<f64>() / fold.sd.len().max(1) as f64);
+                let sd = fold.map_or(0.0, |fold| {
+                    let known = || fold.sd.iter().filter(|sd| sd.is_finite());
+                    known().sum::<f64>() / known().count().max(1) as f64
+                });
                 let size = si(now.square.sqrt() * sd, CHANNEL_UNITS[channel]);
                 add(
                     channel,

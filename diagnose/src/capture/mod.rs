@@ -1,20 +1,25 @@
 //! A capture: a few periods of one steady state at the rate of an oscilloscope.
 //!
 //! ```text
-//! table ─► read ─► edges ─► period ─► fold ─► Capture ─┬─► estimates   L, ESR, delays, ... read off it, with intervals
-//!                  (v_sw, v_pwm)      (all samples)    └─► terms       residuals of the plant's own steady state,
-//!                                                                      beside those of all other records in every fit
+//! table ─► clean ─► edges ─► period ─► fold ─► alike ─► Capture ─┬─► plausible   sizes that no bench has
+//!                   (v_sw, v_pwm)      (all samples)              ├─► estimates   L, ESR, delays, ... with intervals
+//!                                                                 └─► terms       residuals of the plant's own steady state,
+//!                                                                                 beside those of all other records in every fit
 //! ```
 //! A capture stands in the list of records as one settled row in which nothing is measured. What it says comes through `terms`
 //! with its own noise: a channel of an oscilloscope and a meter of the same name have nothing in common.
 //!
 //! Invariant: bins count from an origin that `Origin` names; what the trigger did is nowhere else.
 
+mod alike;
+mod clean;
 mod edges;
 pub mod estimates;
 mod fold;
 pub mod left;
+mod node;
 mod period;
+pub(crate) mod plausible;
 mod read;
 pub mod terms;
 
@@ -67,8 +72,10 @@ pub struct Node {
 /// A capture, folded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Capture {
-    /// Switching period by the capture itself, s.
+    /// Switching period, s.
     pub period: f64,
+    /// By the capture itself; else that of the model, since nothing shows it.
+    pub timed: bool,
     /// Usual time between samples, s.
     pub step: f64,
     /// Bins of the period.
@@ -77,7 +84,7 @@ pub struct Capture {
     pub origin: Origin,
     /// Measured channels, folded.
     pub folds: [Option<Fold>; CHANNELS],
-    /// Channels that show no mean: coupled through a capacitor.
+    /// Channels that show no mean: coupled through a capacitor, or cut off.
     pub ac: [bool; CHANNELS],
     /// Command of the switch at its pin.
     pub pin: Option<Pulse>,
@@ -106,7 +113,9 @@ pub(crate) fn accuracy(value: f64, span: f64, quantum: f64) -> f64 {
 impl Capture {
     /// A mean value of a channel, if it shows one.
     pub fn mean(&self, channel: usize) -> Option<Level> {
-        let fold = self.folds[channel].as_ref().filter(|_| !self.ac[channel])?;
+        let fold = self.folds[channel]
+            .as_ref()
+            .filter(|fold| !self.ac[channel] && fold.mean.is_finite())?;
         Some(Level {
             value: fold.mean,
             sd: fold.mean_sd.hypot(accuracy(fold.mean, fold.span, fold.step)),

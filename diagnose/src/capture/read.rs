@@ -1,11 +1,11 @@
 //! From samples to a capture: which period they repeat in, what switches when, and all periods folded.
 
-use plant::Parameters;
+use plant::{Load, Parameters};
 use toml_input::Message;
 
 use super::edges::{At, Brackets, Edges, levels, of_node, repeated};
 use super::fold::{Bins, Fold};
-use super::{Capture, Level, Node, Origin, Pulse, accuracy, period};
+use super::{Capture, Level, Origin, Pulse, accuracy, alike, clean, node, period};
 use crate::record::{CHANNEL_NAMES, CHANNELS};
 
 /// Fewest samples in a period of a capture: a triangle and a parabola need some on each of their sides.
@@ -17,18 +17,12 @@ const PERIODS: f64 = 20.0;
 const SCOPE: f64 = 500.0;
 /// Switching periods of bench and model may differ by this share, as for any record.
 const CLOCKS: f64 = 0.02;
-/// Periods of a steady state have one mean: in standard deviations of the noise, ...
-const MOVED: f64 = 5.0;
-/// ... and as a share of the channel's ripple and mean, which a steady state may lose.
-const MOVED_SHARE: f64 = 0.02;
-const MOVED_RIPPLE: f64 = 0.2;
-/// A mean below this share of what duty and load ask for is none: the channel is coupled through a capacitor.
+/// A mean below this share of what duty and load ask for may be none: the channel may be coupled through a capacitor.
 const COUPLED: f64 = 0.1;
-/// Levels are read off the middle of an interval: edges ring at its start.
-const MIDDLE: (f64, f64) = (0.25, 0.75);
-/// Late in the off-interval a node above this share of its high level carries no current any more.
-const RESTS: f64 = 0.2;
-
+/// It is, if the mean is also below this share of the channel's own ripple and what offset its range may have: a probe of a wrong ratio
+/// takes the ripple along.
+const COUPLED_RIPPLE: f64 = 0.25;
+const COUPLED_OFFSET: f64 = 4.0;
 /// Whether rows are those of a capture, `samples` a period over `periods`.
 pub(crate) fn is_capture(samples: f64, periods: f64) -> bool {
     // of so many rows less than a period are more likely times in another unit
@@ -46,8 +40,9 @@ pub(crate) struct Samples {
     pub i_in: Option<Vec<f64>>,
     /// Duty that a column or a map states.
     pub duty: Option<f64>,
-    /// Mean current that the load draws at an output voltage.
-    pub drawn: f64,
+    pub load: Load,
+    /// Source voltage, V.
+    pub v_in: f64,
 }
 
 /// A capture, its duty, whether that is the switch's own, and what is to be said.
@@ -62,9 +57,10 @@ pub(crate) struct Read {
 ///
 /// # Errors
 /// Less than a whole period, another switching frequency, nothing that switches, no steady state, no duty.
-pub(crate) fn read(samples: &Samples, parameters: &Parameters) -> Result<Read, Message> {
-    let (time, t_sw) = (&samples.time, parameters.t_sw());
-    let span = time.last().copied().unwrap_or(0.0) - time.first().copied().unwrap_or(0.0) + samples.step;
+pub(crate) fn read(mut samples: Samples, parameters: &Parameters) -> Result<Read, Message> {
+    let t_sw = parameters.t_sw();
+    let span =
+        samples.time.last().copied().unwrap_or(0.0) - samples.time.first().copied().unwrap_or(0.0) + samples.step;
     if span < (1.0 - CLOCKS) * t_sw {
         let found = format!("{} of {}", said(span), said(t_sw));
         let message = Message::new("the capture is shorter than one switching period").found(found);
@@ -73,12 +69,16 @@ pub(crate) fn read(samples: &Samples, parameters: &Parameters) -> Result<Read, M
             .hint("a longer time base, or `converter.f_sw` is not right"));
     }
     let mut notes = Vec::new();
+    let largest = 0.25 * samples.v_in * t_sw / parameters.converter.inductance;
+    let cut = clean::clean(&mut samples, largest, &mut notes);
+    let samples = &samples;
+    let time = &samples.time;
     let pin = samples.pin.as_ref();
     let pin = pin.and_then(|v| told("v_pwm", two_levels(time, v), &mut notes));
     let node = samples.node.as_ref();
     let node = node.and_then(|v| told("v_sw", of_node(time, v), &mut notes));
-    let (period, at) = timing(samples, [pin.as_ref(), node.as_ref()], t_sw, &mut notes)?;
-    let [pin_on, pin_off, node_on, node_off] = at;
+    let clock = timing(samples, [pin.as_ref(), node.as_ref()], t_sw, &mut notes)?;
+    let (period, [pin_on, pin_off, node_on, node_off]) = (clock.period, clock.at);
     let (pin, node) = (pulse(pin_on, pin_off, period), pulse(node_on, node_off, period));
     let (origin, from) = match node {
         Some(node) => (Origin::Node, node.on.time),
@@ -95,24 +95,19 @@ pub(crate) fn read(samples: &Samples, parameters: &Parameters) -> Result<Read, M
     let folds: [Option<Fold>; CHANNELS] = std::array::from_fn(|n| samples.channels[n].as_deref().map(|v| bins.fold(v)));
     for (n, (values, fold)) in samples.channels.iter().zip(&folds).enumerate() {
         if let (Some(values), Some(fold)) = (values, fold) {
-            steady(n, values, fold, time, period, bins.periods)?;
+            alike::check(n, values, fold, time, &bins)?;
         }
     }
-    let ac = coupled(
-        &folds,
-        duty * parameters.converter.v_in,
-        samples.drawn,
-        parameters,
-        &mut notes,
-    );
-    let node = node.and_then(|pulse| shown_node(pulse, samples.node.as_deref()?, &bins));
-    let by_current = || {
-        folds[1]
-            .as_ref()
-            .filter(|_| !ac[1])
-            .map(|fold| fold.rests(bins.periods))
-    };
-    let resting = node.as_ref().map(|(_, resting)| *resting).or_else(by_current);
+    let ac = without_mean(&folds, cut, duty, samples, &mut notes);
+    let v_out = mean_of(&folds, &ac, 0)
+        .filter(|v| *v > 0.0)
+        .unwrap_or(duty * samples.v_in);
+    let current = folds[1].as_ref().filter(|_| !ac[1]);
+    let node = node.and_then(|pulse| node::shown(pulse, samples.node.as_deref()?, &bins, v_out, current));
+    let resting = node
+        .as_ref()
+        .map(|(_, resting)| *resting)
+        .or(current.map(|fold| fold.rests(bins.periods)));
     let folds = folds.map(|fold| fold.map(|fold| if resting == Some(true) { fold.ringing() } else { fold }));
     let i_in = samples.i_in.as_deref().map(|v| bins.fold(v)).map(|fold| Level {
         value: fold.mean,
@@ -120,13 +115,14 @@ pub(crate) fn read(samples: &Samples, parameters: &Parameters) -> Result<Read, M
     });
     let capture = Capture {
         period,
+        timed: clock.is_own,
         step: samples.step,
         origin,
         folds,
         ac,
         pin,
         node: node.map(|(node, _)| node),
-        i_in,
+        i_in: i_in.filter(|level| level.value.is_finite()),
         discontinuous: resting,
         bins,
     };
@@ -136,6 +132,12 @@ pub(crate) fn read(samples: &Samples, parameters: &Parameters) -> Result<Read, M
         applied,
         notes,
     })
+}
+
+/// The mean of a channel that shows one.
+fn mean_of(folds: &[Option<Fold>; CHANNELS], ac: &[bool; CHANNELS], channel: usize) -> Option<f64> {
+    let fold = folds[channel].as_ref().filter(|_| !ac[channel])?;
+    Some(fold.mean).filter(|mean| mean.is_finite())
 }
 
 /// A pulse between two edges of a period.
@@ -148,26 +150,36 @@ fn pulse(on: Option<At>, off: Option<At>, period: f64) -> Option<Pulse> {
     Some(Pulse { on, width })
 }
 
-/// Channels that show no mean although duty and load ask for one.
-fn coupled(
+/// Channels that show no mean: cut off, or coupled through a capacitor although duty and load ask for a mean.
+fn without_mean(
     folds: &[Option<Fold>; CHANNELS],
-    v_out: f64,
-    drawn: f64,
-    parameters: &Parameters,
+    cut: [bool; CHANNELS],
+    duty: f64,
+    samples: &Samples,
     notes: &mut Vec<String>,
 ) -> [bool; CHANNELS] {
-    let expected = [v_out, drawn, drawn, parameters.converter.v_in];
-    std::array::from_fn(|n| {
-        let has_none = |fold: &Fold| fold.mean.abs() < COUPLED * expected[n] && expected[n] > 0.0;
-        let is_coupled = folds[n].as_ref().is_some_and(has_none);
-        if is_coupled {
+    let mut without = cut;
+    let made = duty * samples.v_in;
+    // the voltage first: what the load draws depends on it
+    for n in 0..CHANNELS {
+        let v_out = mean_of(folds, &without, 0).filter(|v| *v > 0.0).unwrap_or(made);
+        let load = &samples.load;
+        let power = if v_out > 0.0 { load.power / v_out } else { 0.0 };
+        let drawn = v_out * load.conductance + load.current + power;
+        let expected = [made, drawn, drawn, samples.v_in][n];
+        let is_coupled = |fold: &Fold| {
+            let own = COUPLED_RIPPLE * fold.ripple() + COUPLED_OFFSET * accuracy(0.0, fold.span, fold.step);
+            expected > 0.0 && fold.mean.abs() < (COUPLED * expected).min(own)
+        };
+        if !without[n] && folds[n].as_ref().is_some_and(is_coupled) {
             let name = CHANNEL_NAMES[n];
             notes.push(format!(
                 "{name} has no mean: taken as coupled through a capacitor, and only its ripple is used"
             ));
+            without[n] = true;
         }
-        is_coupled
-    })
+    }
+    without
 }
 
 fn said(seconds: f64) -> String {
@@ -185,13 +197,18 @@ fn told(name: &str, found: Option<Edges>, notes: &mut Vec<String>) -> Option<Edg
     found
 }
 
-/// The period, and one instant of each kind of edge: pin up and down, node up and down.
-fn timing(
-    samples: &Samples,
-    edges: [Option<&Edges>; 2],
-    t_sw: f64,
-    notes: &mut Vec<String>,
-) -> Result<(f64, [Option<At>; 4]), Message> {
+/// When things repeat.
+struct Clock {
+    period: f64,
+    /// One instant of each kind of edge: pin up and down, node up and down.
+    at: [Option<At>; 4],
+    /// The period is that of the capture, not the model's.
+    is_own: bool,
+}
+
+/// The period, and the edges.
+fn timing(samples: &Samples, edges: [Option<&Edges>; 2], t_sw: f64, notes: &mut Vec<String>) -> Result<Clock, Message> {
+    let clock = |period: f64, at: [Option<At>; 4], is_own: bool| Clock { period, at, is_own };
     let expected = format!("{} within {:.0} %", said(t_sw), 100.0 * CLOCKS);
     let hint = "is `converter.f_sw` of the plant file right, and is the time in s?";
     let other = |found: f64, what: &str| {
@@ -231,7 +248,7 @@ fn timing(
         if (period / t_sw - 1.0).abs() > CLOCKS {
             return Err(other(period, name));
         }
-        return Ok((period, [at[0], at[1], at[2], at[3]]));
+        return Ok(clock(period, [at[0], at[1], at[2], at[3]], true));
     }
     // the channel whose period stands out: the current before the voltage
     let span = samples.time.last().unwrap_or(&0.0) - samples.time.first().unwrap_or(&0.0);
@@ -245,7 +262,7 @@ fn timing(
         let has = |edges: &Edges| !edges.rising.is_empty() && !edges.falling.is_empty();
         if has(pin) || has(node) {
             let (_, at) = repeated(&[&pin.rising, &pin.falling, &node.rising, &node.falling], t_sw);
-            return Ok((t_sw, [at[0], at[1], at[2], at[3]]));
+            return Ok(clock(t_sw, [at[0], at[1], at[2], at[3]], false));
         }
         let message = Message::new("nothing in the capture switches").found("no edge, and no ripple above its noise");
         return Err(message
@@ -257,8 +274,8 @@ fn timing(
     let tells = CLOCKS + 0.1 * t_sw / span.max(t_sw);
     match (period / t_sw - 1.0).abs() > tells {
         true => Err(other(period, name)),
-        false if span < 3.0 * t_sw => Ok((t_sw, [None; 4])),
-        false => Ok((period, [None; 4])),
+        false if span < 3.0 * t_sw => Ok(clock(t_sw, [None; 4], false)),
+        false => Ok(clock(period, [None; 4], true)),
     }
 }
 
@@ -282,6 +299,17 @@ fn duty(
                 message.hint("is v_pwm the command of the upper switch, and not inverted? Leave one of them out")
             );
         }
+        // of one that is commanded to be on while the node is low
+        if let Some(node) = node {
+            let on = node.width.time / period;
+            if (1.0 - on - shown).abs() < 0.02 && (on - shown).abs() > 0.1 {
+                let message = Message::new("v_pwm looks like the command of the lower switch");
+                let found = format!("high for {shown:.4} of the period, and v_sw for {on:.4}");
+                return Err(message
+                    .found(found)
+                    .hint("is it inverted, or at the other pin? Leave it out, or give its duty"));
+            }
+        }
         notes.push(format!("duty by the edges of v_pwm: {shown:.4}"));
         return Ok((shown, false));
     }
@@ -297,72 +325,4 @@ fn duty(
     }
     let message = Message::new("nothing says what the duty is").expected("a column duty, v_pwm or v_sw");
     Err(message.hint("--map duty=0.5 says it for the whole capture"))
-}
-
-/// A capture is of a steady state.
-fn steady(channel: usize, values: &[f64], fold: &Fold, time: &[f64], period: f64, periods: f64) -> Result<(), Message> {
-    let first = time.first().copied().unwrap_or(0.0);
-    let mean = |n: f64| {
-        let within = |t: &f64| (n * period..(n + 1.0) * period).contains(&(t - first));
-        let all = time.iter().zip(values).filter(|(t, v)| within(t) && v.is_finite());
-        let (sum, count) = all.fold((0.0, 0.0), |(sum, count), (_, v)| (sum + v, count + 1.0));
-        (sum / count, count)
-    };
-    if periods < 2.0 {
-        return Ok(());
-    }
-    let ((a, count), (b, _)) = (mean(0.0), mean(periods - 1.0));
-    let sd = (2.0f64 / count).sqrt() * fold.noise;
-    // periods that are no whole number of samples differ by one sample's share of the ripple
-    let allowed = (MOVED * sd)
-        .max(MOVED_SHARE * fold.mean.abs())
-        .max(MOVED_RIPPLE * fold.ripple())
-        .max(fold.step);
-    if (b - a).abs() <= allowed {
-        return Ok(());
-    }
-    let (name, unit) = (CHANNEL_NAMES[channel], crate::record::CHANNEL_UNITS[channel]);
-    let [from, to] = [a, b].map(|v| report::quantity(v, unit, 4));
-    let message = Message::new("the converter is not at rest in the capture").found(format!(
-        "the mean of {name} goes from {from} in the first period to {to} in the last"
-    ));
-    Err(message
-        .expected("a steady state: each period like the others")
-        .hint("a transient is a record with a row each period, 20 or more of them"))
-}
-
-/// Levels of the switch node, and whether the current rests.
-fn shown_node(pulse: Pulse, values: &[f64], bins: &Bins) -> Option<(Node, bool)> {
-    let fold = bins.fold(values);
-    let on = pulse.width.time / bins.period;
-    let level = |from: f64, to: f64| {
-        let within = bins
-            .at
-            .iter()
-            .zip(&fold.value)
-            .filter(|(at, v)| (from..to).contains(*at) && v.is_finite());
-        let all: Vec<f64> = within.map(|(_, v)| v + fold.mean).collect();
-        let value = all.iter().sum::<f64>() / all.len() as f64;
-        let noise = fold.noise / (all.len() as f64 * bins.periods).sqrt();
-        (!all.is_empty()).then(|| Level {
-            value,
-            sd: noise.hypot(accuracy(value, fold.span, fold.step)),
-        })
-    };
-    let inside = |start: f64, width: f64| level(start + MIDDLE.0 * width, start + MIDDLE.1 * width);
-    let high = inside(0.0, on)?;
-    let late = level(on + 0.85 * (1.0 - on), on + 0.95 * (1.0 - on))?;
-    let rests = late.value > RESTS * high.value;
-    Some((
-        Node {
-            pulse,
-            on: high,
-            off: inside(on, 1.0 - on).filter(|_| !rests),
-            mean: Level {
-                value: fold.mean,
-                sd: fold.mean_sd.hypot(accuracy(fold.mean, fold.span, fold.step)),
-            },
-        },
-        rests,
-    ))
 }

@@ -36,7 +36,9 @@ pub struct Shown {
     at: Vec<f64>,
     /// Values of each channel there.
     values: [Vec<f64>; CHANNELS],
-    /// On-time of the switch, fraction of the period.
+    /// When the switch node rises after the command of the upper switch, fraction of the period.
+    rise: f64,
+    /// How long the node stays high, fraction of the period.
     on: f64,
     /// The current rests for a part of the period.
     discontinuous: bool,
@@ -58,8 +60,8 @@ pub struct Drive {
 }
 
 /// The plant as an oscilloscope sees it: sensors of the controller have no part in it.
-fn seen(model: &Model, drive: &Drive) -> Parameters {
-    let mut p = model.plant.clone();
+fn seen(plant: &Parameters, drive: &Drive) -> Parameters {
+    let mut p = plant.clone();
     for sensor in sensors(&mut p) {
         *sensor = Sensor::default();
     }
@@ -79,7 +81,11 @@ fn seen(model: &Model, drive: &Drive) -> Parameters {
 
 /// One period of the model; nothing if the model is no plant.
 pub fn shown(model: &Model, drive: &Drive) -> Option<Shown> {
-    let p = seen(model, drive);
+    shown_by(&model.plant, drive)
+}
+
+fn shown_by(plant: &Parameters, drive: &Drive) -> Option<Shown> {
+    let p = seen(plant, drive);
     let mut plant = Plant::new(&p).ok()?;
     plant.reset_at(drive.duty * p.converter.v_in, 0.0, &drive.load);
     let even = (0..LOOKS).map(|n| n as f64 / LOOKS as f64);
@@ -97,9 +103,17 @@ pub fn shown(model: &Model, drive: &Drive) -> Option<Shown> {
     values.iter().flatten().all(|v| v.is_finite()).then(|| Shown {
         at: order.iter().map(|n| at(*n)).collect(),
         values,
+        rise: on,
         on: off - on,
         discontinuous: wave.discontinuous,
     })
+}
+
+/// From the command of the upper switch to the rise of the switch node, and from its end to the fall, s, by a plant.
+#[must_use]
+pub fn delays(plant: &Parameters, drive: &Drive) -> Option<[f64; 2]> {
+    let shown = shown_by(plant, drive)?;
+    Some([shown.rise, shown.rise + shown.on - drive.duty].map(|delay| delay * plant.t_sw()))
 }
 
 impl Shown {
@@ -201,7 +215,9 @@ impl Capture {
     #[must_use]
     pub fn counted(&self) -> usize {
         let quiet = self.bins.at.iter().filter(|at| self.is_quiet(**at)).count();
-        SHAPED.iter().filter(|n| self.folds[**n].is_some()).count() * quiet
+        let empty = |fold: &super::Fold| fold.sd.iter().filter(|sd| sd.is_infinite()).count();
+        let shaped = SHAPED.iter().filter_map(|n| self.folds[*n].as_ref());
+        shaped.map(|fold| quiet.saturating_sub(empty(fold))).sum::<usize>()
             + (0..CHANNELS).filter(|n| self.mean(*n).is_some()).count()
             + self.node.as_ref().map_or(0, |node| 2 + usize::from(node.off.is_some()))
     }

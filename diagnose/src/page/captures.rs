@@ -63,7 +63,10 @@ fn picture(
     for n in crate::capture::terms::SHAPED {
         let Some(fold) = &capture.folds[n] else { continue };
         is_empty = false;
-        let points = Series::points("measured", time.clone(), fold.value.clone()).colour(MEASURED);
+        // a bin without samples has the line between its neighbours
+        let bins = time.iter().copied().zip(fold.value.iter().copied()).zip(&fold.sd);
+        let (at, shown): (Vec<f64>, Vec<f64>) = bins.filter(|(_, sd)| sd.is_finite()).map(|(bin, _)| bin).unzip();
+        let points = Series::points("measured", at, shown).colour(MEASURED);
         let mut panel = Panel::new(Axis::new(format!("ripple of {}", CHANNEL_NAMES[n])).unit(CHANNEL_UNITS[n]))
             .height(150.0)
             .series(points);

@@ -2,13 +2,13 @@
 
 use measured::{ColumnMap, DutyIs, Sampled};
 use plant::{Load, Parameters};
-use toml_input::{Faults, Message};
+use toml_input::{Faults, Message, Sink};
 
 use super::channels::{CHANNELS, QUANTITIES};
 use super::raw::Raw;
 use super::rows::Lines;
-use super::{Record, name_of};
-use crate::capture::{Capture, Samples, is_capture, read};
+use super::{Record, name_of, suspicion};
+use crate::capture::{Capture, Samples, is_capture, plausible, read};
 use crate::median::median;
 
 /// Duty and load stand still in a steady state: a column may move by this share of what it holds, as loads are set and duties are written.
@@ -32,9 +32,6 @@ impl Raw<'_> {
         }
         let duty = self.still("duty")?;
         let load = self.still_load()?;
-        let v = self.measured("v_out").map(median).filter(|v| *v > 0.0);
-        let v = v.or(duty.map(|d| d * parameters.converter.v_in)).unwrap_or(0.0);
-        let power = if v > 0.0 { load.power / v } else { 0.0 };
         // the first of rows that repeat a time
         let mut kept: Vec<usize> = (0..time.len()).collect();
         kept.dedup_by(|b, a| time[*b] == time[*a]);
@@ -49,10 +46,11 @@ impl Raw<'_> {
             i_in: self.measured("i_in").map(&pick),
             time: pick(time.clone()),
             duty,
-            drawn: v * load.conductance + load.current + power,
+            load,
+            v_in: map.constant("v_in").unwrap_or(parameters.converter.v_in),
         };
-        let found = read(&samples, parameters).map_err(|message| self.sheet.fault(message))?;
         let (count, all) = (samples.time.len(), time.len());
+        let found = read(samples, parameters).map_err(|message| self.sheet.fault(message))?;
         let mut repairs = self.repairs.clone();
         if count < all {
             repairs.push(format!(
@@ -74,7 +72,7 @@ impl Raw<'_> {
             ..Lines::empty(0.5)
         }
         .of_points();
-        Ok(Some(Record {
+        let record = Record {
             name: name_of(self.sheet),
             time: lines.time,
             phase: lines.phase,
@@ -98,7 +96,30 @@ impl Raw<'_> {
             free_steps: Vec::new(),
             capture: Some(Box::<Capture>::new(found.capture)),
             repairs,
-        }))
+        };
+        self.doubts(&record, parameters).propagate()?;
+        Ok(Some(record))
+    }
+
+    /// Sizes and signs of a capture that no bench has.
+    fn doubts(&self, record: &Record, parameters: &Parameters) -> Sink {
+        let Some(capture) = &record.capture else {
+            return Sink::new();
+        };
+        // means of the channels in the place of measured points
+        let means = Record {
+            measured: std::array::from_fn(|n| vec![capture.mean(n).map_or(f64::NAN, |level| level.value)]),
+            ..record.clone()
+        };
+        let sources = QUANTITIES.map(|name| self.source(name));
+        let mut duty = self.source("duty");
+        // no map of a column mends a duty that was read off edges
+        duty.stated |= self.measured("duty").is_none();
+        let mut odd = suspicion::of(&means, parameters, &sources, &duty);
+        if odd.is_empty() {
+            odd = plausible::of(&means, capture, parameters, &sources, &self.source("v_sw"));
+        }
+        odd.into_iter().map(|message| self.sheet.fault(message)).collect()
     }
 
     /// The one value of a quantity that stands still over a capture.

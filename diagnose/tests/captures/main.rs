@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod board;
+mod damaged;
 
 use diagnose::capture::estimates::Estimate;
 use diagnose::diagnosis::{Diagnosis, diagnose};

@@ -14,7 +14,7 @@ pub(super) fn capacitor(capture: &Capture, driven: &Driven, p: &Parameters, out:
         return;
     };
     let (at, t) = (&capture.bins.at, capture.period);
-    let measured = capture.folds[1].as_ref();
+    let measured = capture.folds[1].as_ref().filter(|fold| !fold.has_holes());
     let (current, from) = match measured {
         Some(fold) => (fold.value.clone(), "ripple of v_out over that of i_l"),
         None => {

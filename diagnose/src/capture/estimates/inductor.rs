@@ -17,7 +17,7 @@ struct Slopes {
     down: (f64, f64),
 }
 
-fn slopes(capture: &Capture) -> Option<Slopes> {
+fn slopes(capture: &Capture, resting: bool) -> Option<Slopes> {
     let fold = capture.folds[1].as_ref()?;
     let place = |best: fn(f64, f64) -> bool| {
         let mut place = 0;
@@ -28,8 +28,12 @@ fn slopes(capture: &Capture) -> Option<Slopes> {
         }
         capture.bins.at[place]
     };
-    let (start, on) = match (capture.origin, &capture.node) {
-        (Origin::Node, Some(node)) => (0.0, node.pulse.width.time / capture.period),
+    let (start, on) = match (capture.origin, &capture.node, &capture.pin) {
+        (Origin::Node, Some(node), _) => (0.0, node.pulse.width.time / capture.period),
+        // bins then count from the rise of the pin
+        (Origin::Free, _, Some(pin)) if resting => (0.0, pin.width.time / capture.period),
+        // the lowest sample of a current that rests is any of the rest
+        _ if resting => return None,
         // without a switch node the corners of the current say it
         _ => {
             let (valley, peak) = (place(|a, b| a < b), place(|a, b| a > b));
@@ -38,8 +42,9 @@ fn slopes(capture: &Capture) -> Option<Slopes> {
     };
     let slope = |start: f64, width: f64| {
         let (from, to) = (STRAIGHT.0 * width, STRAIGHT.1 * width);
-        let bins = capture.bins.at.iter().zip(&fold.value);
-        let since = bins.map(|(at, v)| ((at - start).rem_euclid(1.0), *v));
+        let bins = capture.bins.at.iter().zip(&fold.value).zip(&fold.sd);
+        let measured = bins.filter(|(_, sd)| sd.is_finite()).map(|(bin, _)| bin);
+        let since = measured.map(|(at, v)| ((at - start).rem_euclid(1.0), *v));
         let inside = since.filter(|(since, v)| (from..to).contains(since) && v.is_finite());
         let rows: Vec<(f64, f64)> = inside.map(|(since, v)| (since * capture.period, v)).collect();
         let n = rows.len() as f64;
@@ -64,12 +69,15 @@ fn slopes(capture: &Capture) -> Option<Slopes> {
 
 /// `L = v / (di/dt)` by the leap of both at the edges, in which output voltage and winding have no part.
 pub(super) fn inductance(capture: &Capture, p: &Parameters, out: &mut Estimates) {
-    let Some(slopes) = slopes(capture) else {
-        out.missing
-            .push("i_l: inductance, and the output capacitor without the model's inductance".to_owned());
+    let resting = out.mode == Some("dcm");
+    let Some(slopes) = slopes(capture, resting) else {
+        let missing = match capture.folds[1].is_some() && resting {
+            true => "v_sw or v_pwm: inductance, since nothing else says where a current that rests begins to rise",
+            false => "i_l: inductance, and the output capacitor without the model's inductance",
+        };
+        out.missing.push(missing.to_owned());
         return;
     };
-    let resting = out.mode == Some("dcm");
     let bend = slopes.up.0 - slopes.down.0;
     let (swing, what) = match &capture.node {
         Some(node) => match node.off {

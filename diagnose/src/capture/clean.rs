@@ -80,25 +80,30 @@ fn keep(channel: &mut Option<Vec<f64>>, name: &str, size: f64, notes: &mut Vec<S
         *channel = None;
         return;
     }
-    let middle = median(values.iter().copied());
-    let mut apart: Vec<f64> = values
-        .iter()
-        .map(|v| (v - middle).abs())
-        .filter(|v| v.is_finite())
-        .collect();
-    apart.sort_by(f64::total_cmp);
-    let place = ((USUAL * apart.len() as f64).ceil() as usize).saturating_sub(1);
-    let allowed = WILD * apart.get(place).copied().unwrap_or(0.0).max(size);
-    let is_wild = |v: &f64| (v - middle).abs() > allowed;
-    let wild: Vec<f64> = values.iter().copied().filter(is_wild).collect();
+    let wild = leave_out_wild(values, size);
     if let Some(first) = wild.first() {
         let samples = if wild.len() == 1 { "sample" } else { "samples" };
         notes.push(format!(
             "{} {samples} of {name} far from all others, such as {first}: left out",
             wild.len()
         ));
-        values.iter_mut().filter(|v| is_wild(v)).for_each(|v| *v = f64::NAN);
     }
+}
+
+/// Takes the samples out that are none of the signal, and returns them. A signal may move by `size` times [`WILD`] at any rate.
+pub(crate) fn leave_out_wild(values: &mut [f64], size: f64) -> Vec<f64> {
+    let middle = median(values.iter().copied());
+    let apart = values.iter().map(|v| (v - middle).abs());
+    let mut apart: Vec<f64> = apart.filter(|v| v.is_finite()).collect();
+    apart.sort_by(f64::total_cmp);
+    let place = ((USUAL * apart.len() as f64).ceil() as usize).saturating_sub(1);
+    let usual = apart.get(place).copied().unwrap_or(0.0).max(SURELY * middle.abs());
+    let allowed = WILD * usual.max(size);
+    let mut wild = Vec::new();
+    for v in values.iter_mut().filter(|v| (**v - middle).abs() > allowed) {
+        wild.push(std::mem::replace(v, f64::NAN));
+    }
+    wild
 }
 
 /// The one value of a channel.

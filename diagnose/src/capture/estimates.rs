@@ -238,6 +238,9 @@ fn winding(capture: &Capture, driven: &Driven, p: &Parameters, out: &mut Estimat
     }
 }
 
+/// Two meters of current and two of voltage, each off by what an oscilloscope may be, make no more of a converter without losses.
+const MOST_EFFICIENT: f64 = 1.15;
+
 fn efficiency(capture: &Capture, driven: &Driven, out: &mut Estimates) {
     let (Some(v_in), Some(i_in)) = (capture.mean(3), capture.i_in) else {
         out.missing.push("v_in and i_in: efficiency".to_owned());
@@ -249,6 +252,11 @@ fn efficiency(capture: &Capture, driven: &Driven, out: &mut Estimates) {
         sd: 0.0,
     });
     let value = v_out.value * i_out.value / (v_in.value * i_in.value);
+    if !(0.0..MOST_EFFICIENT).contains(&value) {
+        let what = "i_in in its own direction and with its own ratio: efficiency, which would be";
+        out.missing.push(format!("{what} {value:.2}"));
+        return;
+    }
     let parts = [v_out, i_out, v_in, i_in].map(|l| (l.sd / l.value).powi(2));
     let sd = value * parts.iter().sum::<f64>().sqrt();
     out.values.push(around(

@@ -23,6 +23,7 @@ pub(crate) mod plausible;
 mod read;
 pub mod terms;
 
+pub(crate) use clean::leave_out_wild;
 pub use edges::At;
 pub use fold::{Bins, Fold};
 pub(crate) use read::{Samples, is_capture, read};

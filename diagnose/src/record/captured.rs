@@ -8,7 +8,7 @@ use super::channels::{CHANNELS, QUANTITIES};
 use super::raw::Raw;
 use super::rows::Lines;
 use super::{Record, name_of, suspicion};
-use crate::capture::{Capture, Samples, is_capture, plausible, read};
+use crate::capture::{Capture, Samples, is_capture, leave_out_wild, plausible, read};
 use crate::median::median;
 
 /// Duty and load stand still in a steady state: a column may move by this share of what it holds, as loads are set and duties are written.
@@ -150,14 +150,35 @@ impl Raw<'_> {
 
     /// The one load of a capture; a measured current is taken with its mean.
     fn still_load(&self) -> Result<Load, Faults> {
-        if self.is_load_measured() {
-            let drawn = self.measured("i_out").unwrap_or_default();
-            let finite: Vec<f64> = drawn.into_iter().filter(|v| v.is_finite()).collect();
-            return Ok(Load::current(finite.iter().sum::<f64>() / finite.len().max(1) as f64));
+        let is_measured = self.is_load_measured();
+        let said = if is_measured {
+            &["i_out"][..]
+        } else {
+            &["r_load", "i_load", "p_load"]
+        };
+        for name in said {
+            if self
+                .values(name)
+                .is_some_and(|values| values.iter().all(|v| v.is_nan()))
+            {
+                let message = Message::new(format!("`{}` is empty, and it has to say the load", self.label(name)));
+                let hint = format!("--map {name}=NUMBER says it for the whole capture");
+                return Err(self
+                    .sheet
+                    .fault(message.expected("numbers in its column").hint(hint))
+                    .into());
+            }
         }
-        for name in ["r_load", "i_load", "p_load"] {
+        if is_measured {
+            let mut drawn = self.measured("i_out").unwrap_or_default();
+            leave_out_wild(&mut drawn, 0.0);
+            drawn.retain(|v| v.is_finite());
+            return Ok(Load::current(drawn.iter().sum::<f64>() / drawn.len().max(1) as f64));
+        }
+        for name in said {
             self.still(name)?;
         }
-        Ok(self.loads()?.first().copied().unwrap_or_default())
+        // a row without a load has that of the row before: the last has one
+        Ok(self.loads()?.last().copied().unwrap_or_default())
     }
 }

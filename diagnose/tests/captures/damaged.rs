@@ -292,3 +292,46 @@ fn the_slope_of_a_current_that_rests_starts_at_an_edge() {
         "{captured:?}"
     );
 }
+
+#[test]
+fn a_load_whose_column_is_empty_or_wild_is_not_zero() {
+    let table = CLEAN.table(half());
+    for name in ["i_out", "r_load", "p_load"] {
+        let said = refused(&with(&table, name, |_| String::new()), "", &truth());
+        assert!(said.contains("is empty"), "{name}: {said}");
+    }
+    let first = with(
+        &table,
+        "r_load",
+        |n| if n == 1 { String::new() } else { "10".to_owned() },
+    );
+    let record = read(&first, "", &truth()).unwrap();
+    assert_eq!(record.load[0].conductance, 0.1);
+    let wild = with(&table, "i_out", |n| match n {
+        200 => "123456".to_owned(),
+        n => format!("{:.5}", 1.157 + 1e-4 * (n as f64).sin()),
+    });
+    let record = read(&wild, "", &truth()).unwrap();
+    assert!(is_near(record.load[0].current, 1.157, 0.01), "{:?}", record.load);
+}
+
+/// A probe of the source that is put in the other way round makes no efficiency.
+#[test]
+fn an_efficiency_that_no_converter_has_is_not_shown() {
+    let table = with(&CLEAN.table(half()), "v_in", |n| {
+        format!("{:.4}", 24.0 + 1e-3 * (n as f64).sin())
+    });
+    for (i_in, is_shown) in [(0.62, true), (-0.62, false), (0.062, false)] {
+        let table = with(&table, "i_in", |n| format!("{:.5}", i_in + 1e-4 * (n as f64).sin()));
+        let found = diagnose(
+            &truth(),
+            vec![read(&table, "r_load=10", &truth()).unwrap()],
+            &[],
+            &|_| (),
+        );
+        let captured = &found.findings.captures[0];
+        let has = captured.values.iter().any(|one| one.name == "efficiency");
+        let is_missing = captured.missing.iter().any(|text| text.contains("efficiency"));
+        assert_eq!((has, is_missing), (is_shown, !is_shown), "{i_in}: {captured:?}");
+    }
+}

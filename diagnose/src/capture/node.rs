@@ -56,3 +56,32 @@ pub(super) fn shown(
         rests,
     ))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::At;
+    use super::*;
+
+    /// 3.3 V from 24 V: the node rests far below a fifth of the source.
+    #[test]
+    fn a_node_rests_at_the_output_voltage_however_low_that_is() {
+        let period = 10.03e-6;
+        let time: Vec<f64> = (0..800).map(|n| f64::from(n) * 1e-7).collect();
+        let bins = Bins::new(&time, 1e-7, period, 0.0);
+        let at = |time: f64| At { time, sd: 1e-9 };
+        let pulse = Pulse {
+            on: at(0.0),
+            width: at(0.1 * period),
+        };
+        for (rest, is_rest) in [(3.3, true), (-0.5, false)] {
+            let value = |t: &f64| match (t / period).rem_euclid(1.0) {
+                phase if phase < 0.1 => 24.0,
+                phase if phase < 0.5 => -0.5,
+                _ => rest,
+            };
+            let values: Vec<f64> = time.iter().map(value).collect();
+            let (node, rests) = shown(pulse, &values, &bins, 3.3, None).unwrap();
+            assert_eq!((rests, node.off.is_none()), (is_rest, is_rest), "{rest}");
+        }
+    }
+}

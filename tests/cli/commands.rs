@@ -113,7 +113,13 @@ fn an_unknown_target_is_answered_with_the_known_ones() {
 fn one_target_is_shown_by_its_name_or_by_a_part_of_it() {
     let desk = Desk::new("minimal");
     let text = desk.succeed("targets cortex-m4f");
-    for word in ["cortex-m4f: ", "arm-none-eabi-gcc", "-ffp-contract=off", "thumbv7em-none-eabihf", "stm32g4"] {
+    for word in [
+        "cortex-m4f: ",
+        "arm-none-eabi-gcc",
+        "-ffp-contract=off",
+        "thumbv7em-none-eabihf",
+        "stm32g4",
+    ] {
         assert!(text.contains(word), "{word}\n{text}");
     }
     assert!(!text.contains("riscv"), "{text}");

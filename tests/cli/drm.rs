@@ -102,13 +102,16 @@ fn a_judgement_marks_what_lies_outside_of_the_mapping_s_range() {
 #[test]
 fn points_in_which_the_current_of_a_leg_turns_round_are_named() {
     let desk = desk();
-    let leg = REAL.replace("[switch]\n", "rectifier = \"synchronous\"\n\n[switch]\n").replace("v_f = 1.5\nr_d = 0.02\n", "");
+    let leg = REAL
+        .replace("[switch]\n", "rectifier = \"synchronous\"\n\n[switch]\n")
+        .replace("v_f = 1.5\nr_d = 0.02\n", "");
     assert!(leg.contains("synchronous") && !leg.contains("v_f"), "{leg}");
     desk.write("leg.toml", &leg);
     desk.write("believed.toml", &leg.replace("dead_time = 4e-6\n", ""));
     // half of the ripple is 1.2 A
     desk.succeed("drm acquire --plant leg.toml --duties 0.46:0.04:0.62 --currents 0.5,3,6,10 --out points.csv");
-    let said = desk.succeed("drm fit points.csv --plant believed.toml --v-in-sim 200 --keep-outliers --out believed-drm.toml");
+    let said =
+        desk.succeed("drm fit points.csv --plant believed.toml --v-in-sim 200 --keep-outliers --out believed-drm.toml");
     let words = said.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(
         words.contains("below half of the ripple") && words.contains("lines 2 to 6") && words.contains("dead_time"),

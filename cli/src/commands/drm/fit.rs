@@ -91,7 +91,9 @@ fn fit_options(options: &Fit) -> Result<FitOptions, Failure> {
         components: options.components.map(usize::from),
         conduction,
         turns_round: plant.as_ref().and_then(Conduction::of_turning),
-        is_averaged: plant.as_ref().is_some_and(|plant| plant.converter.model == plant::Model::Averaged),
+        is_averaged: plant
+            .as_ref()
+            .is_some_and(|plant| plant.converter.model == plant::Model::Averaged),
         keep_outliers: options.keep_outliers,
         assumed_a: options.assume_a,
     })

@@ -113,10 +113,27 @@ fn points_in_which_the_current_of_a_leg_turns_round_are_named() {
     let said =
         desk.succeed("drm fit points.csv --plant believed.toml --v-in-sim 200 --keep-outliers --out believed-drm.toml");
     let words = said.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(
-        words.contains("below half of the ripple") && words.contains("lines 2 to 6") && words.contains("dead_time"),
-        "{said}"
-    );
+    assert!(words.contains("write `dead_time` into [switch]"), "{said}");
+    let (_, named) = words.split_once("turns round in each period: lines ").unwrap();
+    let named: Vec<&str> = named.split_once('.').unwrap().0.split([' ', ',']).collect();
+    // the lines of 0.5 A, counted as an editor does
+    let table = desk.read("points.csv");
+    let light = |row: &str| {
+        row.split(',')
+            .nth(6)
+            .and_then(|i| i.parse::<f64>().ok())
+            .is_some_and(|i| i < 1.0)
+    };
+    let lines: Vec<String> = table
+        .lines()
+        .enumerate()
+        .filter(|(_, row)| light(row))
+        .map(|(n, _)| (n + 1).to_string())
+        .collect();
+    assert_eq!(lines.len(), 5, "{table}");
+    for line in &lines {
+        assert!(named.contains(&line.as_str()), "{line}: {said}");
+    }
     let said = desk.succeed("drm fit points.csv --plant leg.toml --v-in-sim 200 --out leg-drm.toml");
     assert!(said.contains("left out") && !said.contains("below half"), "{said}");
 }

@@ -105,3 +105,59 @@ fn actions_that_differ_without_observations_are_no_equal_observations() {
     assert!(text.contains("has no observations, which would say why"), "{text}");
     assert!(!text.contains("the observations are equal"), "{text}");
 }
+
+/// Increments of the duty: the law is the duty before.
+#[test]
+fn what_an_action_adds_is_held_against_the_log() {
+    let desk = Desk::new("activations");
+    let law = "base = \"previous_duty\"\noffsets = [-0.02, 0.0, 0.02]";
+    desk.edit("policy/policy.toml", "duties = [0.4, 0.5, 0.6]", law);
+    desk.edit("policy/policy.toml", "duty = 0.0\nhold", "duty = 0.5\nhold");
+    // duty before and behind each row
+    let duties = |adds: [f64; 3]| {
+        let mut duty = 0.5;
+        let of = |row: usize| {
+            let before = if row.is_multiple_of(15) { 0.5 } else { duty };
+            duty = before + adds[action(row)];
+            (before, duty)
+        };
+        (0..ROWS).map(of).collect::<Vec<_>>()
+    };
+    let said = |text: &str| {
+        desk.write("log.csv", text);
+        let ran = desk.type_in(REPLAY);
+        (ran.code, ran.stdout)
+    };
+    let forms: [(&str, fn((f64, f64)) -> String); 4] = [
+        (",duty", |pair| format!(",{:.6}", pair.1)),
+        (",previous_duty", |pair| format!(",{:.6}", pair.0)),
+        (",obs_d", |pair| format!(",{:.6}", pair.0)),
+        (",obs_d,duty", |pair| format!(",{:.6},{:.6}", pair.0, pair.1)),
+    ];
+    for (head, cells) in forms {
+        let with = |adds: [f64; 3]| {
+            let list = duties(adds);
+            log(head, |row| cells(list[row]))
+        };
+        let (code, text) = said(&with([-0.02, 0.0, 0.02]));
+        assert_eq!(code, Some(0), "{head}\n{text}");
+        for (adds, told) in [
+            (
+                [0.02, 0.0, -0.02],
+                "action 0 adds -0.02 in the contract and 0.02 in the log",
+            ),
+            (
+                [-0.03, 0.0, 0.03],
+                "offsets = [-0.03, 0, 0.03] in [actions] fits the log",
+            ),
+        ] {
+            let (code, text) = said(&with(adds));
+            assert_eq!(code, Some(1), "{head}\n{text}");
+            assert!(text.contains(told), "{head}\n{text}");
+            // a scale of the feature would turn the controller round, and everything else would be equal
+            assert!(!text.contains("scale = "), "{head}\n{text}");
+        }
+    }
+    let (code, text) = said(&log(",duty", |_| ",0.3".to_owned()));
+    assert_eq!(code, Some(1), "{text}");
+}

@@ -1,6 +1,6 @@
 //! The duties of a log against those of its actions: an index says nothing of what it commands.
 
-use policy::{Expr, Head, Input, Policy};
+use policy::{Expr, Head, Input, Policy, Residual};
 use serde::Serialize;
 
 use super::explain::number;
@@ -27,15 +27,20 @@ pub struct DutyResult {
     pub own: Vec<f64>,
     /// The duties were worked out from a feature, by its scale and offset in the contract.
     pub derived: bool,
+    /// `logged` and `own` are what the actions add to a law, and not duties.
+    pub adds: bool,
 }
 
 /// A row of the log, its action, its duty.
 type Pair = (usize, usize, f64);
 
-/// Compares; `None` where the log does not say which duty an action had, or an action adds to a law.
-pub(super) fn duties(policy: &Policy, log: &Log) -> Option<DutyResult> {
-    let Head::Choice(table) = &policy.head else {
-        return None;
+/// Compares; `None` where the log does not say which duty an action had. `commanded` is what the contract makes of the action of each
+/// row.
+pub(super) fn duties(policy: &Policy, log: &Log, commanded: &[f64]) -> Option<DutyResult> {
+    let table = match &policy.head {
+        Head::Choice(table) => table,
+        Head::Residual(head) => return added(policy, head, log, commanded),
+        Head::Continuous(_) => return None,
     };
     let own: Vec<f64> = table.iter().map(|action| action.duty).collect();
     let (source, derived, pairs) = pairs(policy, log)?;
@@ -57,7 +62,74 @@ pub(super) fn duties(policy: &Policy, log: &Log) -> Option<DutyResult> {
         logged: logged.collect(),
         own: own.clone(),
         derived,
+        adds: false,
     })
+}
+
+/// The same where an action adds to a law: what the log has more or less than the contract commands is what its action adds more or
+/// less.
+fn added(policy: &Policy, head: &Residual, log: &Log, commanded: &[f64]) -> Option<DutyResult> {
+    let own: Vec<f64> = head.offsets.iter().map(|action| action.duty).collect();
+    let (source, derived, pairs) = pairs(policy, log)?;
+    let apart = own
+        .iter()
+        .enumerate()
+        .flat_map(|(n, one)| own[..n].iter().map(move |other| (one - other).abs()));
+    let apart = apart.filter(|apart| *apart > 0.0).fold(f64::INFINITY, f64::min);
+    // a quarter of what tells two actions apart, if that is less
+    let allowed = (SAME * head.limits.high.abs()).min(0.25 * apart);
+    let is_inside = |duty: f64| head.limits.low + allowed < duty && duty < head.limits.high - allowed;
+    let mut more: Vec<Vec<f64>> = vec![Vec::new(); own.len()];
+    let mut others = Vec::new();
+    for (row, action, duty) in &pairs {
+        let command = commanded.get(*row).copied().unwrap_or(f64::NAN);
+        let is_other = (duty - command).abs() > allowed || command.is_nan();
+        if is_other {
+            others.push(*row);
+        }
+        // at a limit nobody sees what was added
+        if let Some(list) = more
+            .get_mut(*action)
+            .filter(|_| is_other && is_inside(*duty) && is_inside(command))
+        {
+            list.push(duty - command);
+        }
+    }
+    let logged = own.iter().zip(&more).enumerate().map(|(action, (own, more))| {
+        let is_there = pairs.iter().any(|pair| pair.1 == action);
+        let first = more.first().copied().unwrap_or(0.0);
+        (is_there && more.iter().all(|one| (one - first).abs() <= allowed)).then_some(own + first)
+    });
+    (!pairs.is_empty()).then(|| DutyResult {
+        rows: pairs.len(),
+        equal: pairs.len() - others.len(),
+        first_line: others.first().map(|row| log.line(*row)),
+        source,
+        logged: logged.collect(),
+        own: own.clone(),
+        derived,
+        adds: true,
+    })
+}
+
+/// The duty before each row, as the log has it: `None` where it does not say. A law may read it, and what an action adds shows only
+/// where the law began at the log's.
+pub(super) fn before(policy: &Policy, log: &Log) -> Vec<Option<f64>> {
+    if let Some(duties) = &log.previous_duty {
+        return duties.iter().copied().map(Some).collect();
+    }
+    let mut list = vec![None; log.rows()];
+    if let (Head::Residual(head), Some((_, _, pairs))) = (&policy.head, pairs(policy, log)) {
+        for (row, _, duty) in pairs {
+            let goes_on = log.begins.get(row + 1) == Some(&false);
+            // another one is no duty that these actions lead to
+            let is_duty = head.limits.low <= duty && duty <= head.limits.high;
+            if let Some(before) = list.get_mut(row + 1).filter(|_| goes_on && is_duty) {
+                *before = Some(duty);
+            }
+        }
+    }
+    list
 }
 
 /// Where the duties of the log's actions stand, and the pairs.
@@ -115,7 +187,8 @@ impl DutyResult {
         let worst = seen.iter().find(is_other).map(|(action, duty)| {
             let own = self.own.get(*action).copied().unwrap_or(f64::NAN);
             format!(
-                ": action {action} commands {} in the contract and {} in the log",
+                ": action {action} {} {} in the contract and {} in the log",
+                if self.adds { "adds" } else { "commands" },
                 number(own),
                 number(*duty)
             )
@@ -123,7 +196,8 @@ impl DutyResult {
         let remedy = match seen.len() == self.own.len() {
             true => {
                 let list: Vec<String> = seen.iter().map(|(_, duty)| number(*duty)).collect();
-                format!("; duties = [{}] in [actions] fits the log", list.join(", "))
+                let key = if self.adds { "offsets" } else { "duties" };
+                format!("; {key} = [{}] in [actions] fits the log", list.join(", "))
             }
             false => "; look at their order and their ends in [actions]".to_owned(),
         };

@@ -42,6 +42,8 @@ pub(super) struct Course {
     pub actions: Vec<u32>,
     /// Before the mapping.
     pub duties: Vec<f64>,
+    /// By the action that the trainer applied, before the mapping.
+    pub commanded: Vec<f64>,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -59,6 +61,7 @@ impl Course {
             signals: vec![Vec::new(); policy.signals.len()],
             actions: Vec::new(),
             duties: Vec::new(),
+            commanded: Vec::new(),
         }
     }
 
@@ -73,6 +76,11 @@ impl Course {
         }
         self.actions.push(trace.action_index);
         self.duties.push(trace.duty_sim.to_f64());
+    }
+
+    /// What the contract commands by the action that the trainer applied.
+    pub fn commanded<T: Real>(&mut self, trace: &Trace<T>) {
+        self.commanded.push(trace.command.duty_sim.to_f64());
     }
 
     /// What the network sees of a feature.

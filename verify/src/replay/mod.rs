@@ -135,7 +135,6 @@ pub struct Wanted {
 /// A duty in the log that no action of the contract commands.
 pub fn replay(policy: &Policy, log: &Log, wanted: Wanted) -> Result<Replay, Faults> {
     let Wanted { tolerance, .. } = wanted;
-    let duties = duties::duties(policy, log);
     let late = log.is_late(wanted.skip);
     // the environment held no sample: what the features are does not depend on what a sensor can show
     let wide = &log.widened(policy);
@@ -143,6 +142,7 @@ pub fn replay(policy: &Policy, log: &Log, wanted: Wanted) -> Result<Replay, Faul
         Scalar::F32 => course::<f32>(wide, log)?,
         Scalar::F64 => course::<f64>(wide, log)?,
     };
+    let duties = duties::duties(policy, log, &course.commanded);
     let features = policy.features.iter().enumerate().map(|(index, feature)| {
         let own = course.observation(index);
         let logged = log.observed.get(index).and_then(Option::as_ref);
@@ -152,9 +152,15 @@ pub fn replay(policy: &Policy, log: &Log, wanted: Wanted) -> Result<Replay, Faul
             logged: logged.map(|logged| {
                 let mut compared = compare(own, logged, log, allowed(feature, logged, tolerance), &late);
                 if compared.first_line.is_some() {
-                    let follows = (duties.as_ref()).filter(|duties| duties.first_line.is_some() && !duties.derived);
+                    let is_other =
+                        |duties: &&DutyResult| duties.first_line.is_some() && (duties.adds || !duties.derived);
+                    let follows = duties.as_ref().filter(is_other);
                     compared.explanation = match follows.filter(|_| feature.source.reads(Input::PreviousDuty)) {
                         // a line through two tables of duties would hide it in scale and offset
+                        Some(duties) if duties.derived => Some(
+                            "it follows the duties of the actions, which are others, or its own scale and offset are"
+                                .to_owned(),
+                        ),
                         Some(_) => Some("it follows the duties of the actions, which are others".to_owned()),
                         None => explain::explain(policy, &course, index, logged, tolerance),
                     };
@@ -243,13 +249,14 @@ fn course<T: Real>(policy: &Policy, log: &Log) -> Result<Course, Faults> {
     let mut controller = Controller::<T>::new(policy);
     let mut trace = controller.blank_trace();
     let mut course = Course::new(policy, &log.begins);
+    let before = duties::before(policy, log);
     for (row, samples) in log.samples.iter().enumerate() {
         if log.begins.get(row).copied().unwrap_or(row == 0) {
             controller.reset();
         }
-        if let Some(duty) = log.previous_duty.as_ref().and_then(|duties| duties.get(row)) {
+        if let Some(duty) = before.get(row).copied().flatten() {
             let mut state = controller.state().clone();
-            state.previous_duty = T::nearest(*duty);
+            state.previous_duty = T::nearest(duty);
             controller.restore(&state);
         }
         controller.eval_into(samples, &mut trace)?;
@@ -264,6 +271,7 @@ fn course<T: Real>(policy: &Policy, log: &Log) -> Result<Course, Faults> {
         }
         course.push(&trace);
         apply(&controller, &mut trace, &log.applied, row);
+        course.commanded(&trace);
         controller.commit_trace(&trace);
     }
     Ok(course)

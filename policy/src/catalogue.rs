@@ -55,7 +55,15 @@ pub(crate) fn decimal_commas(label: &str, found: usize) -> Message {
 pub(crate) fn duty_range(label: &str, found: f64) -> Message {
     // a little above 1 is a duty ratio that is too large; above 100 it is no percentage, and a wrong hint is worse than none
     let percent = (2.0..=100.0).contains(&found);
-    let hint = percent.then(|| format!("looks like a percentage: write {}", tidy(found / 100.0)));
+    let hint = match found {
+        // no duty is negative, and no converter has one; a step of one is
+        found if found < 0.0 => Some(
+            "if the actions change the duty before by so much, write base = \"previous_duty\" and these numbers as `offsets` in the place \
+             of `duties`"
+                .to_owned(),
+        ),
+        found => percent.then(|| format!("looks like a percentage: write {}", tidy(found / 100.0))),
+    };
     Message::new(format!("`{label}` is not a duty ratio"))
         .found(found.to_string())
         .expected("0 to 1")

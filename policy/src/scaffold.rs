@@ -239,7 +239,8 @@ fn actions(continuous: Option<&str>, outputs: usize) -> String {
                 text += if output == 0 { "" } else { ",\n          " };
                 text += &vec!["\"TODO\""; row.len()].join(", ");
             }
-            text + "]\n"
+            text + "]\n# base = \"previous_duty\"      # instead of `duties`: each output changes the duty before by its offset, -1 to 1\n\
+                    # offsets = []                # or another law in signals, parameters and estimates that it is added to\n"
         }
     }
 }

@@ -180,9 +180,14 @@ impl Trial<'_> {
         let mut words = Vec::new();
         match (other.rule, other.start) {
             (Rule::Rectangle, Start::Whole) => {}
-            (Rule::Rectangle, _) => words.push(
-                "it leaves out the first sample of an episode, which the contract adds at once (T x, a constant over the episode)".to_owned(),
-            ),
+            (Rule::Rectangle, _) => words.push(format!(
+                "it leaves out the first sample of an episode, which the contract adds at once (T x, {}); no filter does that: \
+                 let the training add it, too, or take the difference for what it is",
+                match other.leak == 1.0 {
+                    true => "a constant over the episode",
+                    false => "which the leak forgets",
+                }
+            )),
             (Rule::Trapezoid, Start::Whole) => words.push("it adds trapezoids, T (x + x1) / 2, the contract T x".to_owned()),
             (Rule::Trapezoid, Start::Half) => words.push(
                 "it adds trapezoids, T (x + x1) / 2, with 0 before the first sample; the contract adds T x".to_owned(),

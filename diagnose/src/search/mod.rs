@@ -181,17 +181,6 @@ impl Searcher<'_> {
                 larger.retain(|fit| self.stands_for_edges(&best.state, fit));
             }
             self.sort(&mut larger);
-            for l in &larger {
-                eprintln!(
-                    "LARGER {} chi2 {:.1} trim {:.2e} values {:?}; best chi2 {:.1} trim {:.2e}",
-                    self.names(l),
-                    l.state.chi2,
-                    l.state.starts.trim,
-                    l.values,
-                    best.state.chi2,
-                    best.state.starts.trim
-                );
-            }
             let Some(next) = larger.first() else { break };
             if !self.is_worth(&best, next) {
                 break;

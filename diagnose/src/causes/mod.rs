@@ -23,6 +23,9 @@ const LARGE_SHARE: f64 = 0.3;
 /// Parameters that move by less than this share of their steps (0.1 % of an inductance, 5e-4 of a gain) are no effect: of that
 /// size is what two simulators of one circuit differ by.
 const TINY: f64 = 0.05;
+/// A passive part that differs by less is the part that the model has: meters of inductance and capacitance are good for 0.5 %, and a
+/// few degrees change both by as much. So little is what an error of a neighbour looks like.
+const SAME_PART: f64 = 0.005;
 
 /// Numbers of the plant that move the edges of the gate.
 const EDGES: [&str; 4] = [
@@ -124,8 +127,13 @@ impl Candidate {
     /// Whether the cause at `values` is no effect, whatever it gains.
     #[must_use]
     pub fn is_nothing(&self, values: &[f64]) -> bool {
-        let mut sizes = values.iter().zip(&self.own).zip(&self.ranges).take(self.sizes());
-        self.sizes() > 0 && sizes.all(|((value, own), range)| (value - own).abs() < TINY * range[2])
+        let knobs = self.form.knobs.iter();
+        let least = knobs.zip(&self.own).zip(&self.ranges).map(|((knob, own), range)| {
+            let is_a_part = self.cause.kind == Kind::Part && matches!(knob.reach, Reach::Own(..));
+            (TINY * range[2]).max(if is_a_part { SAME_PART * own.abs() } else { 0.0 })
+        });
+        let mut sizes = values.iter().zip(&self.own).zip(least).take(self.sizes());
+        self.sizes() > 0 && sizes.all(|((value, own), least)| (value - own).abs() < least)
     }
 
     /// Whether it moves the edges of the gate, as the trim that stands beside every fit does.

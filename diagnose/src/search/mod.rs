@@ -177,16 +177,14 @@ impl Searcher<'_> {
             }
             larger.extend(self.with_edges(&best));
             larger.retain(|fit| fit.values.len() <= most);
-            if larger.iter().any(|fit| self.stands_for_edges(&best.state, fit)) {
-                larger.retain(|fit| self.stands_for_edges(&best.state, fit));
-            }
             self.sort(&mut larger);
-            let Some(next) = larger.first() else { break };
-            if !self.is_worth(&best, next) {
-                break;
-            }
+            // a diode takes a share of the duty, too: edges are named for what the trim does where nothing else is worth a cause
+            let of_edges = || larger.iter().find(|fit| self.stands_for_edges(&best.state, fit));
+            let first = larger.first().filter(|fit| self.is_worth(&best, fit));
+            let Some(next) = first.or_else(of_edges) else { break };
             best = self.polished(next);
-            if self.structure(&best) > 0.0 {
+            // where the edges have to do more than they can, it is another cause as well
+            if self.structure(&best) > 0.0 || self.asks_for_edges(&best.state) {
                 best = self.swapped(best);
             }
             leaders = larger;

@@ -23,7 +23,7 @@ impl Searcher<'_> {
     }
 
     /// Whether the edges of the gate do more than edges can.
-    fn asks_for_edges(&self, state: &State) -> bool {
+    pub(super) fn asks_for_edges(&self, state: &State) -> bool {
         let f_sw = self.fitter.problem.base.plant.converter.f_sw;
         state.starts.trim_of_nobody(f_sw).is_some()
     }
@@ -54,9 +54,6 @@ impl Searcher<'_> {
         let gain = smaller.state.chi2 - larger.state.chi2;
         let more = larger.values.len().saturating_sub(smaller.values.len());
         let explained = self.fitter.null.chi2 - larger.state.chi2;
-        if self.stands_for_edges(&smaller.state, larger) {
-            return true;
-        }
         gain >= threshold(more, self.inflation(larger))
             && (gain >= ACCURACY * ACCURACY * explained || self.structure(larger) < 0.5 * self.structure(smaller))
     }

@@ -2,7 +2,7 @@
 //! as well beside them.
 
 use crate::basis::Basis;
-use crate::causes::{Candidate, Search, candidates};
+use crate::causes::{Candidate, candidates};
 use crate::fit::{FINE, Fit, Fitter, ROUGH, State};
 use crate::instants;
 use crate::level::threshold;
@@ -256,7 +256,7 @@ impl Attribution {
                 .as_ref()
                 .is_some_and(|fit| fit.causes.iter().any(|own| self.same(*own, *cause)));
             // first order says something near the model's own value only
-            if taken || candidate.form.search != Search::Own {
+            if taken || !candidate.form.begins_at_own() {
                 return None;
             }
             let column = fitter.sensitivity(*cause, state).into_iter().next()?;

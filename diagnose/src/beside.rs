@@ -5,7 +5,6 @@
 //! follows from it.
 
 use crate::attribute::Attribution;
-use crate::causes::Search;
 use crate::fit::{Fitter, Normal, solve};
 use crate::problem::Problem;
 use crate::profile::Profile;
@@ -52,7 +51,7 @@ pub fn notes(problem: &Problem, attribution: &Attribution, profiles: &[Profile])
     }
     let is_other = |cause: &usize| {
         let candidate = &attribution.candidates[*cause];
-        let is_single = candidate.form.search == Search::Own && candidate.own.len() == 1;
+        let is_single = candidate.form.begins_at_own() && candidate.own.len() == 1;
         is_single && best.causes.iter().all(|known| !attribution.same(*known, *cause))
     };
     let others: Vec<usize> = (0..attribution.candidates.len()).filter(is_other).collect();

@@ -22,7 +22,7 @@ use crate::profile::Profile;
 use crate::progress::{Listener, Progress};
 use crate::quantised;
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
-use crate::words::{nearest, sentence, shifted};
+use crate::words::{nearest, sentence, shifted, si};
 use crate::worth::{self, Worth};
 
 /// Everything a report shows.
@@ -286,6 +286,27 @@ fn noise_of(problem: &Problem, attribution: &Attribution, outliers: &[Outlier], 
     }
 }
 
+/// A duty that the edges of the gate take or give, where it is more than their usual scatter: a dead time that the model lacks by so
+/// little is taken for edges, and nobody would know.
+fn edges(found: &Examined) -> Option<String> {
+    let problem = &found.problem;
+    let trim = found
+        .attribution
+        .state()
+        .starts
+        .trim_or_none(problem.base.plant.converter.f_sw);
+    let known = problem.duty_accuracy();
+    (found.verdict != Verdict::Unexplained && trim.abs() > known).then(|| {
+        let [time, volts] = [(trim * problem.bases.t_sw, "s"), (trim * problem.base.plant.converter.v_in, "V")]
+            .map(|(value, unit)| si(value.abs(), unit));
+        let (way, less) = if trim < 0.0 { ("lost", "more") } else { ("won", "less") };
+        format!(
+            "{time} of on-time are {way} in each period ({volts} at the switching node) and put down to edges of the gate: if dead time or delays of \
+             the bench are not those of the model, they are {less} by this"
+        )
+    })
+}
+
 /// What was repaired in each record; what is the same in several is said once.
 fn by_text<'a>(records: impl Iterator<Item = &'a Record>) -> Vec<String> {
     let mut list: Vec<(&str, Vec<&str>)> = Vec::new();
@@ -333,6 +354,7 @@ fn notes(found: &Examined, pair: Option<&Pair>) -> Vec<String> {
         format!("{id} would fit a little better, by less than two simulators of one circuit differ: not named")
     }));
     notes.extend(pair.into_iter().flat_map(|pair| pair.remarks.clone()));
+    notes.extend(edges(found));
     // of what was found: where the model as given is far off, so are the instants of load steps that fit it best
     if found.verdict != Verdict::Unexplained {
         notes.extend(beside::notes(problem, attribution, &found.profiles));

@@ -18,9 +18,11 @@ const NO_EFFECT: f64 = 0.05;
 /// Whether `value` lies at an end of its range `low` to `high` where it is cut off; `is_size` if the parameter makes the effect and does
 /// not only shape it: at the lowest capacitance a source's resistance is as large as ever.
 fn is_cut_off([low, high]: [f64; 2], is_size: bool, value: f64) -> bool {
+    // a resistance or an inductance of 0 is one that is not there, whether it makes the effect or shapes it
+    let is_absent = low == 0.0;
     let (near, is_natural) = (
         AT_BOUND * (high - low),
-        is_size && low >= 0.0 && low <= NO_EFFECT * high,
+        is_absent || is_size && low >= 0.0 && low <= NO_EFFECT * high,
     );
     // over a range of decades a share of it is far above its lower end
     let near_low = if low > 0.0 { near.min(AT_BOUND * low) } else { near };
@@ -143,5 +145,7 @@ mod tests {
         // of five decades a hundredth is three
         assert!(!is_cut_off(range, false, 1e-3));
         assert!(is_cut_off([0.5, 1.5], true, 0.504));
+        // ten milliohm beside an input capacitor, of ten ohm that are tried
+        assert!(!is_cut_off([0.0, 10.0], false, 0.01) && is_cut_off([0.0, 10.0], false, 9.95));
     }
 }

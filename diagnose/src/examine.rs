@@ -14,6 +14,7 @@ use crate::profile::{Profile, parabolas, profiles};
 use crate::progress::{Listener, Progress};
 use crate::quantised;
 use crate::record::Record;
+use crate::rivals::{self, RivalValue};
 use crate::sampling;
 use crate::shape::{Structure, structures};
 
@@ -138,10 +139,13 @@ fn held_by_data(
     for rivals in attribution.rivals.iter_mut().take(1) {
         rivals.extend(others.iter().cloned());
     }
+    rivals::most_usual_first(problem, attribution);
     for (member, rival) in crate::ties::in_part(problem, attribution, say) {
         attribution.rivals[member].push(rival);
     }
-    profiles(problem, attribution, say)
+    let mut profiles = profiles(problem, attribution, say);
+    rivals::widen(attribution, &mut profiles);
+    profiles
 }
 
 /// Noise estimated, outliers masked, initial states fitted.
@@ -184,8 +188,9 @@ fn named(attribution: &Attribution, profiles: &[Profile]) -> Vec<Named> {
             let mut ids: Vec<&str> = fit.causes.iter().map(|cause| attribution.id(*cause)).collect();
             // two forms of one cause are one cause to a reader
             ids.dedup();
-            ids
+            (ids, rivals::values(attribution, fit))
         });
+        let (rivals, rival_values) = each_once(rivals).into_iter().unzip();
         Named {
             id: candidate.cause.id,
             words: candidate.form.words,
@@ -195,17 +200,21 @@ fn named(attribution: &Attribution, profiles: &[Profile]) -> Vec<Named> {
                 // without the inflation: the evidence is over it already
                 threshold: crate::level::threshold(candidate.own.len(), 1.0),
             },
-            rivals: each_once(rivals),
+            rivals,
+            rival_values,
         }
     };
     best.causes.iter().enumerate().map(of).collect()
 }
 
-/// The same ids may come from two forms of a cause.
-fn each_once(sets: impl Iterator<Item = Vec<&'static str>>) -> Vec<Vec<&'static str>> {
-    sets.fold(Vec::new(), |mut list, set| {
-        if !list.contains(&set) {
-            list.push(set);
+/// A rival: its ids, and the values that it needs.
+type Rival = (Vec<&'static str>, Vec<RivalValue>);
+
+/// The same ids may come from two forms of a cause: the first fits best.
+fn each_once(sets: impl Iterator<Item = Rival>) -> Vec<Rival> {
+    sets.fold(Vec::new(), |mut list: Vec<Rival>, rival| {
+        if list.iter().all(|(ids, _)| *ids != rival.0) {
+            list.push(rival);
         }
         list
     })

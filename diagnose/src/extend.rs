@@ -8,6 +8,7 @@ use plant::Parameters;
 use crate::diagnosis::Diagnosis;
 use crate::drive::Model;
 use crate::findings::Verdict;
+use crate::words::needs;
 
 /// A trim of the edges that moves the duty by less than this share of a period is none.
 // a microvolt in a volt of the source: no sensor shows it, and the fit leaves such remains. In the file it would read as a finding
@@ -62,7 +63,7 @@ pub fn extended_toml(diagnosis: &Diagnosis) -> String {
         findings.sentence.replace('\n', " ")
     );
     for cause in findings.causes.iter().filter(|cause| !cause.rivals.is_empty()) {
-        let rivals: Vec<String> = cause.rivals.iter().map(|ids| ids.join(" + ")).collect();
+        let rivals: Vec<String> = cause.rival_values.iter().map(|values| needs(values)).collect();
         let _ = writeln!(text, "# {} stands for a tie with {}.", cause.id, rivals.join(", "));
     }
     written(diagnosis, text, &extended_plant(diagnosis), told(diagnosis.trim))

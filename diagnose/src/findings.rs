@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::capture::estimates::Estimates;
 use crate::gain::{Held, Shift};
+use crate::rivals::RivalValue;
 use crate::shape::Structure;
 use crate::worth::Worth;
 
@@ -76,6 +77,8 @@ pub struct Named {
     pub evidence: Evidence,
     /// What would explain the data as well in its place; each a set of ids.
     pub rivals: Vec<Vec<&'static str>>,
+    /// The values that each of `rivals` needs, in the same order.
+    pub rival_values: Vec<Vec<RivalValue>>,
 }
 
 /// A cause that the records cannot show unless it is large.

@@ -157,16 +157,8 @@ impl Fitter<'_> {
         let candidate = &self.candidates[cause];
         match candidate.form.search {
             Search::Own => vec![candidate.own.clone()],
-            Search::From(list) => list
-                .iter()
-                .map(|steps| {
-                    let values = steps.iter().zip(&candidate.ranges).zip(&candidate.own);
-                    let absolute = candidate.own.len() > 1;
-                    values
-                        .map(|((n, range), own)| n * range[2] + if absolute { 0.0 } else { *own })
-                        .collect()
-                })
-                .collect(),
+            Search::OwnOr(list) => [vec![candidate.own.clone()], candidate.in_steps(list)].concat(),
+            Search::From(list) => candidate.in_steps(list),
             // read off the residual by the search
             Search::Line | Search::Counter => Vec::new(),
             Search::Scan(list) => list.iter().map(|n| vec![n * candidate.ranges[0][2]]).collect(),

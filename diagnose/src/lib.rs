@@ -48,6 +48,7 @@ pub mod profile;
 pub mod progress;
 mod quantised;
 pub mod record;
+pub mod rivals;
 mod sampling;
 mod search;
 pub mod shape;

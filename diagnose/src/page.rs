@@ -12,7 +12,7 @@ use crate::diagnosis::Diagnosis;
 use crate::findings::{Named, Verdict};
 use crate::gain::Regime;
 use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS};
-use crate::words::{si, unit};
+use crate::words::{needs, si, unit};
 
 /// The page as HTML.
 ///
@@ -64,7 +64,7 @@ fn causes(diagnosis: &Diagnosis) -> Section {
             .text("95 %");
         table = table.number("evidence", 0).text("rivals");
         for cause in list {
-            let rivals: Vec<String> = cause.rivals.iter().map(|ids| ids.join(" + ")).collect();
+            let rivals: Vec<String> = cause.rival_values.iter().map(|values| needs(values)).collect();
             for (name, v) in &cause.parameters {
                 let evidence = cause.evidence.delta_chi2;
                 // the step of a converter is read off, not fitted: `quantised` writes f64::MAX

@@ -74,6 +74,7 @@ pub fn cause(problem: &Problem) -> Option<Named> {
             threshold: 0.0,
         },
         rivals: Vec::new(),
+        rival_values: Vec::new(),
     })
 }
 

@@ -1,7 +1,6 @@
 //! Explanations that share no cause with the leading one and fit as well.
 
 use crate::attribute::Attribution;
-use crate::causes::Search;
 use crate::fit::{Fit, Fitter};
 use crate::parallel;
 use crate::problem::{Problem, axpy, dot};
@@ -53,7 +52,7 @@ pub fn in_part(problem: &Problem, attribution: &Attribution, say: Listener<'_>) 
         return Vec::new();
     }
     let is_other = |cause: &usize| {
-        let own = attribution.candidates[*cause].form.search == Search::Own;
+        let own = attribution.candidates[*cause].form.begins_at_own();
         own && best.causes.iter().all(|known| !attribution.same(*known, *cause))
     };
     let others: Vec<usize> = (0..attribution.candidates.len()).filter(is_other).collect();
@@ -70,7 +69,7 @@ pub fn in_part(problem: &Problem, attribution: &Attribution, say: Listener<'_>) 
         let variance = best.covariance[number][number].max(0.0);
         let is_needed = off * off > NEEDED * TIE * attribution.inflation * variance;
         let tie = tie(off * off / variance);
-        if candidate.own.len() < 2 || candidate.form.search != Search::Own || !is_needed || variance == 0.0 {
+        if candidate.own.len() < 2 || !candidate.form.begins_at_own() || !is_needed || variance == 0.0 {
             continue;
         }
         let mut left = best.state.residual.clone();

@@ -4,6 +4,7 @@ use crate::doubts;
 use crate::examine::Examined;
 use crate::findings::{Aside, Named, Verdict};
 use crate::gain::Shift;
+use crate::rivals::RivalValue;
 use crate::shape::Structure;
 
 /// Rivals of a cause that the sentence names; a reader remembers no more, and the rest stands in the list.
@@ -89,9 +90,10 @@ fn tie(cause: &Named, causes: &[Named]) -> String {
     let is_other = |id: &&&str| causes.iter().all(|own| own.id != **id);
     // what stands beside all causes takes a part of them
     let is_beside = |ids: &&Vec<&str>| ids.contains(&cause.id) && ids.iter().any(|id| is_other(&id));
-    let (inside, whole): (Vec<_>, Vec<_>) = cause.rivals.iter().partition(is_beside);
+    let rivals = cause.rivals.iter().zip(&cause.rival_values);
+    let (inside, whole): (Vec<_>, Vec<_>) = rivals.partition(|(ids, _)| is_beside(ids));
     let mut sentences = Vec::new();
-    let rivals: Vec<String> = whole.iter().map(|ids| ids.join(" + ")).collect();
+    let rivals: Vec<String> = whole.into_iter().map(|(_, values)| needs(values)).collect();
     if !rivals.is_empty() {
         let more = match rivals.len().saturating_sub(MOST_SAID) {
             0 => String::new(),
@@ -102,13 +104,32 @@ fn tie(cause: &Named, causes: &[Named]) -> String {
     }
     let extra: Vec<&str> = inside
         .iter()
-        .flat_map(|ids| ids.iter().filter(is_other))
+        .flat_map(|(ids, _)| ids.iter().filter(is_other))
         .copied()
         .collect();
     if !extra.is_empty() {
         sentences.push(format!("A part of {} could be {}.", cause.id, extra.join(" or ")));
     }
     sentences.join(" ")
+}
+
+/// A rival with the values that it needs: `dcr 150.2 mohm + diode (v_f 1.1 V, r_d 20 mohm)`.
+#[must_use]
+pub fn needs(values: &[RivalValue]) -> String {
+    let mut causes: Vec<(&str, Vec<String>)> = Vec::new();
+    for one in values {
+        let value = si(one.value, unit(one.unit));
+        match causes.iter_mut().find(|(id, _)| *id == one.id) {
+            Some((_, list)) => list.push(format!("{} {value}", one.parameter)),
+            None => causes.push((one.id, vec![format!("{} {value}", one.parameter)])),
+        }
+    }
+    let one = |(id, list): &(&str, Vec<String>)| match &list[..] {
+        // `dcr 150 mohm`, not `dcr (dcr 150 mohm)`
+        [only] if only.starts_with(&format!("{id} ")) => only.clone(),
+        _ => format!("{id} ({})", list.join(", ")),
+    };
+    causes.iter().map(one).collect::<Vec<_>>().join(" + ")
 }
 
 /// Said where nothing explains the records: which causes come nearest, and the share of the error above the noise that they take away.

@@ -26,6 +26,8 @@ pub(crate) enum Reach {
     ResistanceFrom(f64, f64, f64),
     /// In units of t_sw i / v.
     Capacitance(f64, f64, f64),
+    /// In units of t_sw v / i.
+    Inductance(f64, f64, f64),
     /// In units of i / v.
     Conductance(f64, f64),
     /// In units of v_in.
@@ -102,6 +104,7 @@ impl Knob {
             Reach::Resistance(high, step) => by(bases.v / bases.i, 0.0, high, step),
             Reach::ResistanceFrom(low, high, step) => by(bases.v / bases.i, low, high, step),
             Reach::Capacitance(low, high, step) => by(bases.t_sw * bases.i / bases.v, low, high, step),
+            Reach::Inductance(low, high, step) => by(bases.t_sw * bases.v / bases.i, low, high, step),
             Reach::Conductance(high, step) => by(bases.i / bases.v, 0.0, high, step),
             Reach::Source(low, high, step) => by(bases.v_in, low, high, step),
             Reach::Voltage(low, high, step) => by(bases.v, low, high, step),

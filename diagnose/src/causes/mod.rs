@@ -3,8 +3,11 @@
 //! A cause has one or more forms, such as the gain of one current sensor or of both; a form is what is fitted. What the search
 //! has to know of a cause stands in its entry: nothing asks for a name.
 
+mod circuit;
+mod instruments;
 mod knob;
 mod list;
+mod surroundings;
 
 use plant::Parameters;
 
@@ -20,12 +23,26 @@ const LARGE_SHARE: f64 = 0.3;
 /// Parameters that move by less than this share of their steps (0.1 % of an inductance, 5e-4 of a gain) are no effect: of that
 /// size is what two simulators of one circuit differ by.
 const TINY: f64 = 0.05;
+/// A passive part that differs by less is the part that the model has: meters of inductance and capacitance are good for 0.5 %, and a
+/// few degrees change both by as much. So little is what an error of a neighbour looks like.
+const SAME_PART: f64 = 0.005;
+
+/// Numbers of the plant that move the edges of the gate.
+const EDGES: [&str; 4] = [
+    "switch.dead_time",
+    "switch.turn_on_delay",
+    "switch.turn_off_delay",
+    "pwm.duty_offset",
+];
 
 /// How a form is fitted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Search {
     /// From the model's own value.
     Own,
+    /// From the model's own value or, where the response is flat there, from one of these starts, as of `From`; what none of them
+    /// promises at first order is not followed.
+    OwnOr(&'static [&'static [f64]]),
     /// From each of these starts, in steps of the parameters' own steps above the model's value.
     From(&'static [&'static [f64]]),
     /// Its first parameter takes each of these values (times its step), and is not smooth in between.
@@ -36,11 +53,25 @@ pub enum Search {
     Counter,
 }
 
+/// How usual a cause is on a bench, the most usual first: where data cannot tell two apart, the reader is told of the more usual one
+/// first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// A part or a parasitic of the circuit: each converter has them, and no data sheet has them right.
+    Part,
+    /// How something is set or works: source, load, modulator, sampling.
+    Setting,
+    /// An error of an instrument, which was calibrated once.
+    Instrument,
+}
+
 /// A cause.
 #[derive(Debug)]
 pub struct Cause {
     /// Its name in results.
     pub id: &'static str,
+    /// How usual it is.
+    pub kind: Kind,
     /// What is fitted, each by itself.
     pub forms: &'static [Form],
 }
@@ -57,6 +88,12 @@ pub struct Form {
 }
 
 impl Form {
+    /// Whether the model's own value is a place to fit from, and to look from at first order.
+    #[must_use]
+    pub fn begins_at_own(&self) -> bool {
+        matches!(self.search, Search::Own | Search::OwnOr(_))
+    }
+
     /// Whether its first parameter is varied continuously.
     #[must_use]
     pub fn is_smooth(&self) -> bool {
@@ -90,15 +127,39 @@ impl Candidate {
     /// Whether the cause at `values` is no effect, whatever it gains.
     #[must_use]
     pub fn is_nothing(&self, values: &[f64]) -> bool {
-        let mut sizes = values.iter().zip(&self.own).zip(&self.ranges).take(self.sizes());
-        self.sizes() > 0 && sizes.all(|((value, own), range)| (value - own).abs() < TINY * range[2])
+        let knobs = self.form.knobs.iter();
+        let least = knobs.zip(&self.own).zip(&self.ranges).map(|((knob, own), range)| {
+            let is_a_part = self.cause.kind == Kind::Part && matches!(knob.reach, Reach::Own(..));
+            (TINY * range[2]).max(if is_a_part { SAME_PART * own.abs() } else { 0.0 })
+        });
+        let mut sizes = values.iter().zip(&self.own).zip(least).take(self.sizes());
+        self.sizes() > 0 && sizes.all(|((value, own), least)| (value - own).abs() < least)
+    }
+
+    /// Whether it moves the edges of the gate, as the trim that stands beside every fit does.
+    #[must_use]
+    pub fn is_of_edges(&self) -> bool {
+        let mut keys = self.form.knobs.iter().flat_map(|knob| knob.keys);
+        keys.all(|key| EDGES.contains(key)) && !self.form.knobs[0].keys.is_empty()
+    }
+
+    /// Starts that are given in steps of its parameters: above the model's value, or of several parameters as they are.
+    pub(crate) fn in_steps(&self, list: &[&[f64]]) -> Vec<Vec<f64>> {
+        let absolute = self.own.len() > 1;
+        let start = |steps: &&[f64]| {
+            let values = steps.iter().zip(&self.ranges).zip(&self.own);
+            values
+                .map(|((n, range), own)| n * range[2] + if absolute { 0.0 } else { *own })
+                .collect()
+        };
+        list.iter().map(start).collect()
     }
 
     /// How many of its parameters make its size: all, or the first alone where the others only shape it.
     #[must_use]
     pub fn sizes(&self) -> usize {
         match self.form.search {
-            Search::Own => self.own.len(),
+            Search::Own | Search::OwnOr(_) => self.own.len(),
             Search::From(_) | Search::Scan(_) | Search::Line => 1,
             // its step is one of counts
             Search::Counter => 0,

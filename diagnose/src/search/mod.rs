@@ -1,6 +1,7 @@
 //! The search for a set of causes: forward with several leaders, exchange, backward, and what would do as well.
 
 mod starts;
+mod weigh;
 
 use crate::causes::Search;
 use crate::fit::{FINE, Fit, Fitter, State, solve};
@@ -9,7 +10,6 @@ use crate::noise;
 use crate::parallel;
 use crate::problem::dot;
 use crate::progress::{self, Listener};
-use crate::shape::structures;
 use crate::small;
 
 /// An explanation within this of the best is as good, in chi-square: three standard deviations of one parameter ...
@@ -33,10 +33,6 @@ const BEGUN: usize = 2;
 /// Most causes named. Records of one converter hold 5 to 15 independent directions; blind cases hide at most two effects, and the
 /// third place is for one that a second imitates in part.
 const MOST: usize = 3;
-/// A search ends with two causes where they leave this mean square over that of the noise, and this share of what there was: a third of
-/// the error. Where two causes are hidden the best two leave next to nothing; three are never hidden. Conventions.
-const HOPELESS: f64 = 10.0;
-const STILL_THERE: f64 = 0.1;
 /// Candidates that are fitted after a linear look at all. A convention: each costs a fit.
 const LOOKED_AT: usize = 5;
 /// Further sets that are tried as the start of a larger one, and candidates that are fitted beside each. Conventions: they bound
@@ -86,7 +82,7 @@ impl Searcher<'_> {
 
     /// Whether the fit begins at the model's own value.
     fn begins_at_own(&self, cause: usize) -> bool {
-        self.search(cause) == Search::Own
+        self.fitter.candidates[cause].form.begins_at_own()
     }
 
     /// Whether two candidates are forms of one cause.
@@ -107,8 +103,12 @@ impl Searcher<'_> {
     pub fn singles(&self, stage: &str) -> Vec<Fit> {
         let null = self.fitter.null;
         let all: Vec<usize> = (0..self.fitter.candidates.len()).collect();
-        let first_order = parallel::map(&all, |cause| {
-            gained(&self.fitter.sensitivity(*cause, null), &null.residual)
+        let first_order = parallel::map(&all, |cause| match self.search(*cause) {
+            Search::OwnOr(_) => {
+                let best = self.begins(&Set::NONE, *cause, null).into_iter().next();
+                best.map_or(0.0, |(expected, _)| null.chi2 - expected)
+            }
+            _ => gained(&self.fitter.sensitivity(*cause, null), &null.residual),
         });
         let most = first_order.iter().copied().fold(0.0, f64::max);
         progress::map(self.say, stage, &all, |cause| {
@@ -153,12 +153,17 @@ impl Searcher<'_> {
         let mut leaders = singles.to_vec();
         leaders.retain(|fit| fit.values.len() <= most);
         self.sort(&mut leaders);
-        let Some(first) = leaders.first() else {
+        let is_enough = |fit: &&Fit| {
+            null.chi2 - fit.state.chi2 >= threshold(fit.values.len(), self.inflation(fit))
+                || self.stands_for_edges(null, fit)
+        };
+        let Some(first) = leaders
+            .first()
+            .filter(is_enough)
+            .or_else(|| leaders.iter().find(is_enough))
+        else {
             return (None, Vec::new());
         };
-        if null.chi2 - first.state.chi2 < threshold(first.values.len(), self.inflation(first)) {
-            return (None, Vec::new());
-        }
         let mut best = self.polished(first);
         while best.causes.len() < MOST && best.values.len() < most && !self.is_hopeless(&best) {
             let stage = format!("more than {}", self.names(&best));
@@ -170,27 +175,21 @@ impl Searcher<'_> {
                     larger.extend(self.forward(leader, LOOKED_AT_BY_LEADERS, &stage));
                 }
             }
+            larger.extend(self.with_edges(&best));
             larger.retain(|fit| fit.values.len() <= most);
             self.sort(&mut larger);
-            let Some(next) = larger.first() else { break };
-            if !self.is_worth(&best, next) {
-                break;
-            }
+            // a diode takes a share of the duty, too: edges are named for what the trim does where nothing else is worth a cause
+            let of_edges = || larger.iter().find(|fit| self.stands_for_edges(&best.state, fit));
+            let first = larger.first().filter(|fit| self.is_worth(&best, fit));
+            let Some(next) = first.or_else(of_edges) else { break };
             best = self.polished(next);
-            if self.structure(&best) > 0.0 {
+            // where the edges have to do more than they can, it is another cause as well
+            if self.structure(&best) > 0.0 || self.asks_for_edges(&best.state) {
                 best = self.swapped(best);
             }
             leaders = larger;
         }
         self.backward(best)
-    }
-
-    /// Whether two causes and more leave most of the error: a third repairs no such thing, and each costs as long as all before.
-    fn is_hopeless(&self, fit: &Fit) -> bool {
-        let count = self.fitter.problem.count().max(1) as f64;
-        fit.causes.len() > 1
-            && fit.state.chi2 > HOPELESS * count
-            && fit.state.chi2 > STILL_THERE * self.fitter.null.chi2
     }
 
     /// The single cause that explains most for its parameters, brought to its end; nothing if none is worth it.
@@ -238,22 +237,6 @@ impl Searcher<'_> {
             new
         };
         fits.iter().filter(is_new).collect()
-    }
-
-    /// How much structure a fit leaves.
-    fn structure(&self, fit: &Fit) -> f64 {
-        let left = structures(self.fitter.problem, self.fitter.null, &fit.state, 1.0);
-        left.iter().map(|one| one.slow.max(one.mean_square) - 1.0).sum()
-    }
-
-    /// Whether a larger set is worth its parameters: more than noise would gain, and more than the model's accuracy could
-    /// make it gain, unless it is that which takes away structure.
-    fn is_worth(&self, smaller: &Fit, larger: &Fit) -> bool {
-        let gain = smaller.state.chi2 - larger.state.chi2;
-        let more = larger.values.len().saturating_sub(smaller.values.len());
-        let explained = self.fitter.null.chi2 - larger.state.chi2;
-        gain >= threshold(more, self.inflation(larger))
-            && (gain >= ACCURACY * ACCURACY * explained || self.structure(larger) < 0.5 * self.structure(smaller))
     }
 
     /// Sets that are one cause larger: those of the candidates that look best at first order.
@@ -341,25 +324,30 @@ impl Searcher<'_> {
                 (!kept.is_empty()).then(|| self.fitter.from(&kept, &values, self.fitter.null))
             });
             let chi2 = |fit: &Option<Fit>| fit.as_ref().map_or(self.fitter.null.chi2, |fit| fit.state.chi2);
-            let evidence: Vec<f64> = fewer.iter().map(|fit| chi2(fit) - best.state.chi2).collect();
+            let inflation = self.inflation(&best);
+            let evidence = fewer.iter().enumerate().map(|(member, fit)| {
+                let lost = chi2(fit) - best.state.chi2;
+                let without = fit.as_ref().map_or(self.fitter.null, |fit| &fit.state);
+                let parameters = self.fitter.places(&best.causes[member..=member]).len();
+                match self.stands_for_edges(without, &best) {
+                    // what the trim takes over in its place is more than it may
+                    true => lost.max(threshold(parameters, inflation)),
+                    false => lost,
+                }
+            });
+            let evidence: Vec<f64> = evidence.collect();
             let weakest = members.iter().min_by(|a, b| evidence[**a].total_cmp(&evidence[**b]));
             let tiny = members.iter().find(|member| self.is_tiny(&best, **member));
             let Some(weakest) = tiny.or(weakest).copied() else {
                 return (None, Vec::new());
             };
             let parameters = self.fitter.places(&best.causes[weakest..=weakest]).len();
-            let needed = threshold(parameters, self.inflation(&best));
+            let needed = threshold(parameters, inflation);
             match (&fewer[weakest], tiny.is_some() || evidence[weakest] < needed) {
                 (Some(fewer), true) => best = fewer.clone(),
                 _ => return (Some(best), evidence),
             }
         }
-    }
-
-    /// Whether a cause beside others is so small that the difference of two simulators may look like it.
-    fn is_tiny(&self, fit: &Fit, member: usize) -> bool {
-        let cause = fit.causes[member];
-        self.fitter.candidates[cause].is_nothing(&self.values_of(fit, &[cause]))
     }
 
     /// For each cause of a set, what explains the data as well in its place.

@@ -17,7 +17,7 @@ const COUNT_STEP: f64 = 0.2;
 impl Searcher<'_> {
     /// Starts of `cause`, and the chi-square that `set` with it would have from each at first order, best first.
     pub(super) fn begins(&self, set: &Set<'_>, cause: usize, from: &State) -> Vec<(f64, Vec<f64>)> {
-        if self.begins_at_own(cause) {
+        if self.search(cause) == Search::Own {
             let mut columns = set.columns.to_vec();
             columns.extend(self.fitter.sensitivity(cause, from));
             let own = self.fitter.candidates[cause].own.clone();

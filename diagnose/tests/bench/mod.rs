@@ -54,6 +54,8 @@ pub struct Bench {
     /// Gain and offset of `v_out`, `i_l`, `i_out`, `v_in`.
     pub gain: [f64; 4],
     pub offset: [f64; 4],
+    /// Time constants of the four sensors' filters, periods.
+    pub slow: [f64; 4],
 }
 
 impl Default for Bench {
@@ -78,6 +80,7 @@ impl Default for Bench {
             slope: 0.0,
             gain: [1.0; 4],
             offset: [0.0; 4],
+            slow: [0.0; 4],
         }
     }
 }
@@ -235,25 +238,59 @@ impl Bench {
             (Wiring::Boost, false) => (self.v_in + open - v, i),
             (Wiring::BuckBoost, false) => (open - v, i),
         };
-        [
-            (across - self.dcr * i) / self.inductance,
-            (into - out) / self.capacitance,
-        ]
+        let rise = (across - self.dcr * i) / self.inductance;
+        // a current that has ended begins by a voltage in its direction alone
+        let rise = if i == 0.0 { rise.max(0.0) } else { rise };
+        [rise, (into - out) / self.capacitance]
     }
 
-    fn advance(&self, x: &mut [f64; 2], on: bool, load: (f64, f64), periods: f64) {
+    /// What is true at the sensors.
+    fn shown(&self, x: [f64; 2], on: bool, load: (f64, f64)) -> [f64; 4] {
+        let (v, out) = self.output(x, on, load);
+        [v, x[0], out, self.v_in]
+    }
+
+    /// Lets the filters of the sensors follow over a piece in which what is true changes from `before` to `after` along a line.
+    fn follow(&self, filters: &mut [f64; 4], before: [f64; 4], after: [f64; 4], periods: f64) {
+        for n in 0..4 {
+            if self.slow[n] > 0.0 {
+                let (a, rise) = (periods / self.slow[n], after[n] - before[n]);
+                // y' = (u - y) / tau for u on a line: behind it by rise / a, but for what is left of the start
+                let behind = |u: f64| u - rise / a;
+                filters[n] = behind(after[n]) + (filters[n] - behind(before[n])) * (-a).exp();
+            }
+        }
+    }
+
+    fn advance(&self, x: &mut [f64; 2], filters: &mut [f64; 4], on: bool, load: (f64, f64), periods: f64) {
         let count = (periods / STEP).ceil().max(1.0);
         let h = periods / count / self.f_sw;
-        let moved = |x: &[f64; 2], k: &[f64; 2], h: f64| [x[0] + h * k[0], x[1] + h * k[1]];
         for _ in 0..count as usize {
-            let a = self.slope(*x, on, load);
-            let b = self.slope(moved(x, &a, 0.5 * h), on, load);
-            let c = self.slope(moved(x, &b, 0.5 * h), on, load);
-            let d = self.slope(moved(x, &c, h), on, load);
-            for n in 0..2 {
-                x[n] += h / 6.0 * (a[n] + 2.0 * b[n] + 2.0 * c[n] + d[n]);
+            let before = self.shown(*x, on, load);
+            let start = *x;
+            self.step(x, on, load, h);
+            if x[0] < 0.0 {
+                // the diode ends the current inside of the step, and not at its end
+                let share = start[0] / (start[0] - x[0]);
+                *x = start;
+                self.step(x, on, load, share * h);
+                x[0] = 0.0;
+                self.step(x, on, load, (1.0 - share) * h);
+                x[0] = x[0].max(0.0);
             }
-            x[0] = x[0].max(0.0);
+            self.follow(filters, before, self.shown(*x, on, load), periods / count);
+        }
+    }
+
+    /// A step by Runge and Kutta's method.
+    fn step(&self, x: &mut [f64; 2], on: bool, load: (f64, f64), h: f64) {
+        let moved = |x: &[f64; 2], k: &[f64; 2], h: f64| [x[0] + h * k[0], x[1] + h * k[1]];
+        let a = self.slope(*x, on, load);
+        let b = self.slope(moved(x, &a, 0.5 * h), on, load);
+        let c = self.slope(moved(x, &b, 0.5 * h), on, load);
+        let d = self.slope(moved(x, &c, h), on, load);
+        for n in 0..2 {
+            x[n] += h / 6.0 * (a[n] + 2.0 * b[n] + 2.0 * c[n] + d[n]);
         }
     }
 
@@ -275,6 +312,7 @@ impl Bench {
             },
             v,
         ];
+        let mut filters = [v, x[0], out, self.v_in];
         let mut columns: [Vec<f64>; 6] = Default::default();
         // long enough that what is left of the start is far below any noise
         let lead = 400;
@@ -300,8 +338,10 @@ impl Bench {
                 let load = self.load_at(row + middle);
                 // once a period: the instant may be an edge as well
                 if n >= lead && pair[0] == self.sampled && columns[0].len() < n - lead + 1 {
-                    let (v, out) = self.output(x, on, load);
-                    let shown = [v, x[0], out, self.v_in];
+                    let mut shown = self.shown(x, on, load);
+                    for k in (0..4).filter(|k| self.slow[*k] > 0.0) {
+                        shown[k] = filters[k];
+                    }
                     columns[0].push((row + self.sampled) / self.f_sw);
                     columns[1].push(duty);
                     for k in 0..4 {
@@ -309,7 +349,7 @@ impl Bench {
                     }
                 }
                 if pair[1] > pair[0] {
-                    self.advance(&mut x, on, load, pair[1] - pair[0]);
+                    self.advance(&mut x, &mut filters, on, load, pair[1] - pair[0]);
                 }
             }
         }

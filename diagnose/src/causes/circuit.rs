@@ -1,0 +1,158 @@
+//! What the circuit itself has wrong: switch, inductor, output capacitor.
+
+use super::knob::Reach;
+use super::list::{EDGE, OHMS, form, knob, searched};
+use super::{Cause, Kind, Search};
+
+pub(super) const DCR: Cause = Cause {
+    id: "dcr",
+    kind: Kind::Part,
+    forms: &[form(
+        "resistance of the winding",
+        &[knob("dcr", &["inductor.dcr"], OHMS)],
+    )],
+};
+
+pub(super) const R_DS_ON: Cause = Cause {
+    id: "r_ds_on",
+    kind: Kind::Part,
+    forms: &[form(
+        "on-resistance of the switch",
+        &[knob("r_ds_on", &["switch.r_ds_on"], OHMS)],
+    )],
+};
+
+pub(super) const DIODE: Cause = Cause {
+    id: "diode",
+    kind: Kind::Part,
+    forms: &[
+        form(
+            "forward voltage of the diode",
+            // 20 V at 200 V: no diode drops a tenth of the source
+            &[knob("v_f", &["switch.v_f"], Reach::Source(0.0, 0.1, 0.002))],
+        ),
+        form(
+            "differential resistance of the diode",
+            &[knob("r_d", &["switch.r_d"], OHMS)],
+        ),
+        form(
+            "forward voltage and differential resistance of the diode",
+            &[
+                knob("v_f", &["switch.v_f"], Reach::Source(0.0, 0.1, 0.002)),
+                knob("r_d", &["switch.r_d"], OHMS),
+            ],
+        ),
+    ],
+};
+
+pub(super) const DEAD_TIME: Cause = Cause {
+    id: "dead_time",
+    kind: Kind::Part,
+    forms: &[form("dead time", &[knob("dead_time", &["switch.dead_time"], EDGE)])],
+};
+
+pub(super) const TURN_ON_DELAY: Cause = Cause {
+    id: "turn_on_delay",
+    kind: Kind::Part,
+    forms: &[form(
+        "turn-on delay of the switch",
+        &[knob("turn_on_delay", &["switch.turn_on_delay"], EDGE)],
+    )],
+};
+
+pub(super) const TURN_OFF_DELAY: Cause = Cause {
+    id: "turn_off_delay",
+    kind: Kind::Part,
+    forms: &[form(
+        "turn-off delay of the switch",
+        &[knob("turn_off_delay", &["switch.turn_off_delay"], EDGE)],
+    )],
+};
+
+pub(super) const ESR: Cause = Cause {
+    id: "esr",
+    kind: Kind::Part,
+    forms: &[form(
+        "series resistance of the output capacitor",
+        &[knob("esr", &["capacitor.esr"], OHMS)],
+    )],
+};
+
+pub(super) const ESL: Cause = Cause {
+    id: "esl",
+    kind: Kind::Part,
+    forms: &[form(
+        "series inductance of the output capacitor",
+        // the plant's bound, and the upper end of its typical range: no share of the converter's size
+        &[knob("esl", &["capacitor.esl"], Reach::Plain(0.0, 1e-5, 2e-7))],
+    )],
+};
+
+pub(super) const L_WRONG: Cause = Cause {
+    id: "l_wrong",
+    kind: Kind::Part,
+    forms: &[form(
+        "inductance",
+        &[knob(
+            "inductance",
+            &["converter.inductance"],
+            // beyond a third or three times it is another part; the step is a fifth of a usual tolerance (10 %)
+            Reach::Own(0.3, 3.0, 0.02),
+        )],
+    )],
+};
+
+pub(super) const C_WRONG: Cause = Cause {
+    id: "c_wrong",
+    kind: Kind::Part,
+    forms: &[form(
+        "capacitance",
+        &[knob(
+            "capacitance",
+            &["converter.capacitance"],
+            Reach::Own(0.3, 3.0, 0.02),
+        )],
+    )],
+};
+
+pub(super) const L_SATURATION: Cause = Cause {
+    id: "l_saturation",
+    kind: Kind::Part,
+    forms: &[searched(
+        "inductance that falls with current",
+        &[
+            // the bound is the plant's; it bends from below the usual current to far above, where it is a smaller L
+            knob("saturation", &["inductor.saturation"], Reach::Plain(0.0, 0.95, 0.1)),
+            knob("i_sat", &["inductor.i_sat"], Reach::Current(0.5, 5.0, 0.1)),
+        ],
+        Search::From(&[&[0.3, 6.0], &[0.3, 12.0], &[0.3, 25.0], &[4.0, 12.0]]),
+    )],
+};
+
+pub(super) const C_DERATING: Cause = Cause {
+    id: "c_derating",
+    kind: Kind::Part,
+    forms: &[searched(
+        "capacitance that falls with voltage",
+        &[
+            // as of the inductance
+            knob("derating", &["capacitor.derating"], Reach::Plain(0.0, 0.95, 0.1)),
+            knob("v_half", &["capacitor.v_half"], Reach::Voltage(0.5, 5.0, 0.1)),
+        ],
+        Search::From(&[&[0.3, 6.0], &[0.3, 12.0], &[0.3, 25.0], &[4.0, 12.0]]),
+    )],
+};
+
+pub(super) const CORE_LOSS: Cause = Cause {
+    id: "core_loss",
+    kind: Kind::Part,
+    forms: &[form(
+        "conductance across the inductance",
+        &[knob(
+            "core_conductance",
+            &["inductor.core_conductance"],
+            // a loss of a tenth of the load's power; no core is that bad
+            Reach::Conductance(0.1, 0.001),
+        )],
+    )],
+};

@@ -1,0 +1,156 @@
+//! A tie as a reader needs it: which member leads, the values that every member has, and intervals that hold whichever is true.
+
+use serde::Serialize;
+
+use crate::attribute::Attribution;
+use crate::causes::{Kind, Knob};
+use crate::fit::Fit;
+use crate::problem::Problem;
+use crate::profile::Profile;
+use crate::shape::structures;
+
+/// 95 % of a chi-square of one degree of freedom: within it the data do not say which of two is better.
+const LEVEL: f64 = 3.841;
+/// The same in standard deviations.
+const TWO_SIDED: f64 = 1.96;
+
+/// A parameter of a rival.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RivalValue {
+    /// Id of the cause.
+    pub id: &'static str,
+    /// Which parameter of it.
+    pub parameter: &'static str,
+    /// Where the rival fits best.
+    pub value: f64,
+    /// 95 % interval, as long as the rival is the explanation: of the parabola at the best value, within the reach.
+    pub low: f64,
+    /// Its upper end.
+    pub high: f64,
+    /// SI unit.
+    pub unit: &'static str,
+    /// The model's own value.
+    pub model: f64,
+}
+
+/// The values that a rival needs.
+#[must_use]
+pub fn values(attribution: &Attribution, fit: &Fit) -> Vec<RivalValue> {
+    let places =
+        (fit.causes.iter()).flat_map(|cause| (0..attribution.candidates[*cause].own.len()).map(|k| (*cause, k)));
+    let of = |(number, (cause, k)): (usize, (usize, usize))| {
+        let candidate = &attribution.candidates[cause];
+        let knob = &candidate.form.knobs[k];
+        let [low, high] = interval(attribution, fit, number, candidate.ranges[k]);
+        RivalValue {
+            id: candidate.cause.id,
+            parameter: knob.name,
+            value: fit.values[number],
+            low,
+            high,
+            unit: knob.unit(),
+            model: candidate.own[k],
+        }
+    };
+    places.enumerate().map(of).collect()
+}
+
+/// 95 % interval of one of the values of a fit, by its covariance.
+fn interval(attribution: &Attribution, fit: &Fit, number: usize, [low, high, _]: [f64; 3]) -> [f64; 2] {
+    let variance = fit.covariance[number][number].max(0.0) * attribution.inflation;
+    [-TWO_SIDED, TWO_SIDED].map(|side| (fit.values[number] + side * variance.sqrt()).clamp(low, high))
+}
+
+/// Among members of a tie that the data cannot put in order the more usual one leads: copper and diode before the gain of a probe.
+/// What it replaces becomes its rival.
+pub fn most_usual_first(problem: &Problem, attribution: &mut Attribution) {
+    let members = attribution.best.as_ref().map_or(0, |best| best.causes.len());
+    for member in 0..members {
+        let Some(best) = &attribution.best else { return };
+        let own = attribution.usual(best, best.causes[member]);
+        let worst = best.state.chi2 + LEVEL * attribution.inflation;
+        let kept: Vec<usize> = without(&best.causes, member);
+        let leads = |fit: &&Fit| {
+            // the rival of one cause stands last, behind those that are kept
+            let other = fit.causes.last().map(|cause| attribution.usual(fit, *cause));
+            fit.causes.len() == kept.len() + 1
+                && fit.causes[..kept.len()] == kept
+                && other.is_some_and(|kind| kind < own)
+                && fit.state.chi2 <= worst
+                && structures(problem, &attribution.null, &fit.state, attribution.inflation).is_empty()
+        };
+        let found = attribution.rivals[member].iter().filter(leads);
+        let Some(leader) = found.min_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2)).cloned() else {
+            continue;
+        };
+        attribution.lead(member, leader);
+        // the others have moved a place
+        return most_usual_first(problem, attribution);
+    }
+}
+
+/// A number so many times as large as any that is typical is none of this part: a diode of an ohm where a tenth is much. Data sheets
+/// differ by less, and converters of 400 V have other resistances than those of 5 V.
+const UNTYPICAL: f64 = 5.0;
+
+impl Attribution {
+    /// How usual a cause is in a fit, the most usual first: whether one of its numbers is beyond what is typical, then its kind.
+    fn usual(&self, fit: &Fit, cause: usize) -> (bool, Kind) {
+        let candidate = &self.candidates[cause];
+        let before: usize = (fit.causes.iter().take_while(|known| **known != cause))
+            .map(|known| self.candidates[*known].own.len())
+            .sum();
+        let own = fit.values[before..]
+            .iter()
+            .zip(&candidate.own)
+            .zip(candidate.form.knobs);
+        let is_untypical = |((value, model), knob): ((&f64, &f64), &Knob)| {
+            let parameter = knob.keys.first().and_then(|key| plant::parameter(key));
+            let most = parameter.map_or(f64::INFINITY, |parameter| parameter.typical.1.abs());
+            value.abs() > UNTYPICAL * most.max(model.abs())
+        };
+        (own.into_iter().any(is_untypical), candidate.cause.kind)
+    }
+
+    /// Puts `leader`, a rival of `member`, in the place of the best; its new cause stands last.
+    fn lead(&mut self, member: usize, leader: Fit) {
+        let Some(best) = self.best.take() else { return };
+        let same = |fit: &Fit| fit.causes == leader.causes;
+        let mut rivals = without(&self.rivals, member);
+        let others = self.rivals[member].iter().filter(|fit| !same(fit)).cloned();
+        rivals.push(std::iter::once(best.clone()).chain(others).collect());
+        let mut evidence = without(&self.evidence, member);
+        evidence.push(self.evidence[member] - (leader.state.chi2 - best.state.chi2));
+        (self.rivals, self.evidence, self.best) = (rivals, evidence, Some(leader));
+    }
+}
+
+fn without<T: Clone>(list: &[T], member: usize) -> Vec<T> {
+    let mut kept = list.to_vec();
+    kept.remove(member);
+    kept
+}
+
+/// Widens the interval of each parameter to the union over the explanations that have it: which of them is true, nobody knows.
+pub fn widen(attribution: &Attribution, profiles: &mut [Profile]) {
+    let Some(best) = &attribution.best else { return };
+    let places: Vec<(usize, usize)> = (best.causes.iter())
+        .flat_map(|cause| (0..attribution.candidates[*cause].own.len()).map(|k| (*cause, k)))
+        .collect();
+    if places.len() != profiles.len() {
+        return;
+    }
+    for rival in attribution.rivals.iter().flatten() {
+        let own =
+            (rival.causes.iter()).flat_map(|cause| (0..attribution.candidates[*cause].own.len()).map(|k| (*cause, k)));
+        for (number, place) in own.enumerate() {
+            let Some(profile) = places.iter().position(|known| *known == place) else {
+                continue;
+            };
+            let range = attribution.candidates[place.0].ranges[place.1];
+            let [low, high] = interval(attribution, rival, number, range);
+            let interval = &mut profiles[profile].interval;
+            *interval = [interval[0].min(low), interval[1].max(high)];
+        }
+    }
+}

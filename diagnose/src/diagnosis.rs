@@ -10,6 +10,7 @@ use crate::capture::terms::delays;
 use crate::control::Request;
 use crate::doubts;
 use crate::drive::Model;
+use crate::empirical::{self, Described};
 use crate::examine::{Examined, examined, held};
 use crate::findings::{Findings, Gain, Hidden, Named, Noise, Verdict};
 use crate::fit::State;
@@ -44,6 +45,8 @@ pub struct Diagnosis {
     pub extended: Model,
     /// Duty that its edges add, 1.
     pub trim: f64,
+    /// A term that describes what no cause explains; `extended` has it if it is written.
+    pub empirical: Option<Described>,
     /// The loop closed with a policy, if one was given.
     pub control: Option<crate::control::Control>,
 }
@@ -93,12 +96,29 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     if !explained {
         pair = held(&found.problem, heldout, &base, &state, trim);
     }
+    let mut whole_problem = None;
     let set_aside = aside.map(|(part, whole)| {
         let one = aside::shown(&mut found, part, &whole, &kept, &base);
         // the held-out records tell of a channel that was set aside, too
         pair = held(&found.problem, heldout, &base, &state, trim);
+        whole_problem = Some(whole);
         one
     });
+    let mut state = state;
+    let mut empirical = None;
+    if !explained || set_aside.is_some() {
+        say(Progress::Stage("empirical term"));
+        empirical = empirical::described(whole_problem.as_ref().unwrap_or(&found.problem), &state.model, trim);
+    }
+    if let Some(term) = &mut empirical {
+        let with = held(&term.problem, heldout, &base, &term.after, trim);
+        let against = held(&term.problem, heldout, &state.model, &term.after, trim);
+        term.judged(against.as_ref());
+        if term.findings.written {
+            state.model = term.after.model.clone();
+            pair = with;
+        }
+    }
     let findings = Findings {
         sentence: sentence(&found, &answer.causes, set_aside.as_ref()) + &answer.near + &shifted(&answer.shifts),
         verdict: match set_aside {
@@ -109,6 +129,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         causes: answer.causes,
         partial_gain: answer.partial_gain,
         set_aside,
+        empirical: empirical.as_ref().map(|term| term.findings.clone()),
         structure: found.structure.clone(),
         doubts: doubts::said(&found.doubts),
         not_detectable: answer.not_detectable,
@@ -129,6 +150,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         profiles: found.profiles,
         held: pair,
         trim,
+        empirical,
         control: None,
     }
 }

@@ -65,6 +65,9 @@ pub fn extended_toml(diagnosis: &Diagnosis) -> String {
         let rivals: Vec<String> = cause.rivals.iter().map(|ids| ids.join(" + ")).collect();
         let _ = writeln!(text, "# {} stands for a tie with {}.", cause.id, rivals.join(", "));
     }
+    if findings.empirical.as_ref().is_some_and(|term| term.written) {
+        text += "# The table [empirical] is a correction of the duty that describes what no cause explains. It is no cause and no physics.\n";
+    }
     written(diagnosis, text, &extended_plant(diagnosis), told(diagnosis.trim))
 }
 

@@ -30,6 +30,7 @@ pub mod diagnosis;
 mod doubts;
 pub mod drive;
 mod duty_steps;
+pub mod empirical;
 mod examine;
 pub mod extend;
 pub mod findings;

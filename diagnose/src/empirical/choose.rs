@@ -1,0 +1,204 @@
+//! Which terms, and what they are worth where they were not fitted.
+//!
+//! ```text
+//! path  the terms that gain most, one after the other, fitted to all rows
+//! worth each length of that path fitted without a fold, and judged in it; every fold once
+//! out   the shortest length that is about as good as the best
+//! ```
+//!
+//! All of it is free run: from the first row of a record to the last the model sees duties and loads, and no measurement.
+
+use crate::causes::Candidate;
+use crate::drive::Model;
+use crate::fit::{Fit, Fitter, Normal, ROUGH, State};
+use crate::noise;
+use crate::parallel;
+use crate::problem::{Problem, dot};
+use crate::record::CHANNELS;
+
+/// Most coefficients. More than the decade of few that a reader can look through, and the records of a bench hold no more.
+pub const MOST_TERMS: usize = 6;
+/// Terms that are fitted for each place of the path, of those that gain most at first order: which only orders them, as it does
+/// with causes.
+const TRIED: usize = 4;
+/// Parts that are left out, each once; a record alone is cut into as many.
+const FOLDS: usize = 5;
+/// A longer path has to lower the left-out error by this share: the folds are few, and their error scatters by more.
+const ABOUT: f64 = 0.03;
+/// Lengths without a better one before that end the path.
+const PATIENCE: usize = 2;
+
+/// Rows of records, as (record, first, behind the last).
+pub type Fold = Vec<(usize, usize, usize)>;
+
+/// What is left out: whole records where there are three, else stretches of them.
+pub fn folds(problem: &Problem) -> Vec<Fold> {
+    let records = &problem.records;
+    if records.len() >= 3 {
+        let count = FOLDS.min(records.len());
+        let of = |fold: usize| (0..records.len()).filter(move |n| n % count == fold);
+        return (0..count)
+            .map(|fold| of(fold).map(|n| (n, 0, records[n].rows())).collect())
+            .collect();
+    }
+    let parts = FOLDS.div_ceil(records.len().max(1));
+    let cut = |(n, rows): (usize, usize)| (0..parts).map(move |k| vec![(n, k * rows / parts, (k + 1) * rows / parts)]);
+    let rows = records.iter().map(crate::record::Record::rows);
+    rows.enumerate().flat_map(cut).collect()
+}
+
+/// A length of the path.
+#[derive(Debug, Clone)]
+pub struct Chosen {
+    /// Fitted to all rows.
+    pub fit: Fit,
+    /// Left-out error over the noise, root mean square.
+    pub error: f64,
+    /// The same of each channel; 0 where nothing was measured.
+    pub channels: [f64; CHANNELS],
+}
+
+/// Sums of squares over the noise in `fold`, by channel, and how many values.
+fn left_in(problem: &Problem, state: &State, fold: &Fold) -> [(f64, f64); CHANNELS] {
+    std::array::from_fn(|n| {
+        let mut sum = (0.0, 0.0);
+        for (record, from, to) in fold {
+            for value in &noise::channel(problem, &state.residual, *record, n)[*from..*to] {
+                sum.0 += value * value;
+                sum.1 += f64::from(u8::from(*value != 0.0));
+            }
+        }
+        sum
+    })
+}
+
+fn errors(sums: &[[(f64, f64); CHANNELS]]) -> (f64, [f64; CHANNELS]) {
+    let mean = |list: &mut dyn Iterator<Item = (f64, f64)>| {
+        let (square, count) = list.fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
+        (square / f64::max(count, 1.0)).sqrt()
+    };
+    (
+        mean(&mut sums.iter().flatten().copied()),
+        std::array::from_fn(|n| mean(&mut sums.iter().map(|fold| fold[n]))),
+    )
+}
+
+/// The error of `state` in all folds, as [`Chosen`] counts it.
+pub fn without(problem: &Problem, state: &State, folds: &[Fold]) -> (f64, [f64; CHANNELS]) {
+    let sums: Vec<_> = folds.iter().map(|fold| left_in(problem, state, fold)).collect();
+    errors(&sums)
+}
+
+/// A part of the records with what initial states explain there.
+struct Rest {
+    problem: Problem,
+    null: State,
+    basis: crate::basis::Basis,
+}
+
+impl Rest {
+    fn of(problem: &Problem, null: &State, fold: &Fold) -> Self {
+        let mut problem = problem.clone();
+        for (record, from, to) in fold {
+            for channel in &mut problem.masked[*record] {
+                channel[*from..*to].fill(true);
+            }
+        }
+        let null = State::at(&problem, &null.model, null.starts.clone());
+        Rest {
+            basis: problem.basis(&null.model, &null.starts, &null.residual),
+            null,
+            problem,
+        }
+    }
+
+    fn fitter<'a>(&'a self, candidates: &'a [Candidate]) -> Fitter<'a> {
+        Fitter {
+            problem: &self.problem,
+            candidates,
+            basis: &self.basis,
+            null: &self.null,
+            effort: ROUGH,
+        }
+    }
+}
+
+/// The terms that gain most beside `fit`, most first.
+fn next_terms(fitter: &Fitter<'_>, fit: &Fit) -> Vec<usize> {
+    let state = &fit.state;
+    let all: Vec<usize> = (0..fitter.candidates.len()).collect();
+    let columns = parallel::map(&all, |term| fitter.sensitivity(*term, state).pop().unwrap_or_default());
+    let gain = |term: usize| {
+        let mut set: Vec<Vec<f64>> = fit.causes.iter().map(|n| columns[*n].clone()).collect();
+        set.push(columns[term].clone());
+        let normal = Normal::new(&set, &state.residual);
+        let step = normal.solved();
+        set.iter()
+            .zip(step)
+            .map(|(c, k)| k * dot(c, &state.residual))
+            .sum::<f64>()
+    };
+    let mut ranked: Vec<(f64, usize)> = all
+        .into_iter()
+        .filter(|n| !fit.causes.contains(n))
+        .map(|n| (gain(n), n))
+        .filter(|(gain, _)| gain.is_finite())
+        .collect();
+    ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    ranked.into_iter().take(TRIED).map(|(_, n)| n).collect()
+}
+
+fn extended(fitter: &Fitter<'_>, from: &Fit, term: usize) -> Fit {
+    let causes: Vec<usize> = from.causes.iter().copied().chain([term]).collect();
+    let values: Vec<f64> = from.values.iter().copied().chain([0.0]).collect();
+    fitter.from(&causes, &values, &from.state)
+}
+
+/// The best length of the path, if any term can be fitted.
+pub fn chosen(problem: &Problem, null: &State, candidates: &[Candidate], folds: &[Fold]) -> Option<Chosen> {
+    let whole = Rest::of(problem, null, &Fold::new());
+    let fitter = whole.fitter(candidates);
+    let rests = parallel::map(folds, |fold| Rest::of(problem, null, fold));
+    let mut fit = Fit {
+        causes: Vec::new(),
+        values: Vec::new(),
+        state: whole.null.clone(),
+        covariance: Vec::new(),
+    };
+    let mut path: Vec<Chosen> = Vec::new();
+    let mut best = f64::INFINITY;
+    while fit.causes.len() < MOST_TERMS {
+        let terms = next_terms(&fitter, &fit);
+        let tried = parallel::map(&terms, |term| extended(&fitter, &fit, *term));
+        let least = tried
+            .into_iter()
+            .min_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2))
+            .filter(|next| next.state.chi2 < fit.state.chi2);
+        let Some(next) = least else { break };
+        fit = next;
+        let places: Vec<usize> = (0..folds.len()).collect();
+        let sums = parallel::map(&places, |n| {
+            let own = rests[*n]
+                .fitter(candidates)
+                .from(&fit.causes, &fit.values, &rests[*n].null);
+            left_in(problem, &judged(problem, &own.state.model, null), &folds[*n])
+        });
+        let (error, channels) = errors(&sums);
+        path.push(Chosen {
+            fit: fit.clone(),
+            error,
+            channels,
+        });
+        best = best.min(error);
+        let since = path.iter().rev().take_while(|one| one.error > best).count();
+        if since >= PATIENCE {
+            break;
+        }
+    }
+    path.into_iter().find(|one| one.error <= (1.0 + ABOUT) * best)
+}
+
+/// All rows at `model`; the initial states are those that fit it best, two numbers a record, and nothing else has seen the rows left out.
+fn judged(problem: &Problem, model: &Model, null: &State) -> State {
+    State::settle(problem, model, &null.starts, None)
+}

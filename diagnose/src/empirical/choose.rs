@@ -3,7 +3,7 @@
 //! ```text
 //! path  the terms that gain most, one after the other, fitted to all rows
 //! worth each length of that path fitted without a fold, and judged in it; every fold once
-//! out   the shortest length that is about as good as the best
+//! prune from the shortest length that is about as good as the best, terms without which it stays so
 //! ```
 //!
 //! All of it is free run: from the first row of a record to the last the model sees duties and loads, and no measurement.
@@ -16,8 +16,9 @@ use crate::parallel;
 use crate::problem::{Problem, dot};
 use crate::record::CHANNELS;
 
-/// Most coefficients. More than the decade of few that a reader can look through, and the records of a bench hold no more.
-pub const MOST_TERMS: usize = 6;
+/// Most coefficients. More than the decade of few that a reader can look through, and the records of a bench hold no more: with the real
+/// record of one converter the left-out error falls by a third at the seventh alone, when both straight terms are in.
+pub const MOST_TERMS: usize = 7;
 /// Terms that are fitted for each place of the path, of those that gain most at first order: which only orders them, as it does
 /// with causes.
 const TRIED: usize = 4;
@@ -25,9 +26,6 @@ const TRIED: usize = 4;
 const FOLDS: usize = 5;
 /// A longer path has to lower the left-out error by this share: the folds are few, and their error scatters by more.
 const ABOUT: f64 = 0.03;
-/// Lengths without a better one before that end the path.
-const PATIENCE: usize = 2;
-
 /// Rows of records, as (record, first, behind the last).
 pub type Fold = Vec<(usize, usize, usize)>;
 
@@ -165,8 +163,22 @@ pub fn chosen(problem: &Problem, null: &State, candidates: &[Candidate], folds: 
         state: whole.null.clone(),
         covariance: Vec::new(),
     };
+    let worth = |fit: &Fit| {
+        let places: Vec<usize> = (0..folds.len()).collect();
+        let sums = parallel::map(&places, |n| {
+            let own = rests[*n]
+                .fitter(candidates)
+                .from(&fit.causes, &fit.values, &rests[*n].null);
+            left_in(problem, &judged(problem, &own.state.model, null), &folds[*n])
+        });
+        let (error, channels) = errors(&sums);
+        Chosen {
+            fit: fit.clone(),
+            error,
+            channels,
+        }
+    };
     let mut path: Vec<Chosen> = Vec::new();
-    let mut best = f64::INFINITY;
     while fit.causes.len() < MOST_TERMS {
         let terms = next_terms(&fitter, &fit);
         let tried = parallel::map(&terms, |term| extended(&fitter, &fit, *term));
@@ -176,26 +188,25 @@ pub fn chosen(problem: &Problem, null: &State, candidates: &[Candidate], folds: 
             .filter(|next| next.state.chi2 < fit.state.chi2);
         let Some(next) = least else { break };
         fit = next;
-        let places: Vec<usize> = (0..folds.len()).collect();
-        let sums = parallel::map(&places, |n| {
-            let own = rests[*n]
-                .fitter(candidates)
-                .from(&fit.causes, &fit.values, &rests[*n].null);
-            left_in(problem, &judged(problem, &own.state.model, null), &folds[*n])
-        });
-        let (error, channels) = errors(&sums);
-        path.push(Chosen {
-            fit: fit.clone(),
-            error,
-            channels,
-        });
-        best = best.min(error);
-        let since = path.iter().rev().take_while(|one| one.error > best).count();
-        if since >= PATIENCE {
-            break;
-        }
+        path.push(worth(&fit));
     }
-    path.into_iter().find(|one| one.error <= (1.0 + ABOUT) * best)
+    let best = path.iter().map(|one| one.error).fold(f64::INFINITY, f64::min);
+    let enough = (1.0 + ABOUT) * best;
+    let mut chosen = path.into_iter().find(|one| one.error <= enough)?;
+    while chosen.fit.causes.len() > 1 {
+        // what came first may not be needed beside what came later
+        let shorter = (0..chosen.fit.causes.len()).map(|out| {
+            let (mut causes, mut values) = (chosen.fit.causes.clone(), chosen.fit.values.clone());
+            (causes.remove(out), values.remove(out));
+            worth(&fitter.from(&causes, &values, &whole.null))
+        });
+        let least = shorter.min_by(|a, b| a.error.total_cmp(&b.error));
+        let Some(one) = least.filter(|one| one.error <= enough) else {
+            break;
+        };
+        chosen = one;
+    }
+    Some(chosen)
 }
 
 /// All rows at `model`; the initial states are those that fit it best, two numbers a record, and nothing else has seen the rows left out.

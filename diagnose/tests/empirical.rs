@@ -8,15 +8,27 @@ mod bench;
 
 use std::path::Path;
 
-use bench::{Bench, Noise, Table, model};
+use bench::{Bench, Noise, Table};
 use diagnose::diagnosis::{Diagnosis, diagnose};
 use diagnose::extend::extended_toml;
 use diagnose::findings::Verdict;
 use diagnose::gain::Regime;
 use plant::Parameters;
 
-const ROWS: usize = 400;
-const NOISE: [(&str, f64, f64); 3] = [("v_out", 0.1, 0.02), ("i_l", 0.05, 5e-3), ("i_out", 0.05, 5e-3)];
+const ROWS: usize = 300;
+const NOISE: [(&str, f64, f64); 2] = [("v_out", 0.1, 0.02), ("i_l", 0.05, 5e-3)];
+
+/// Without series resistance of the capacitor: the plant is simulated ten times as fast.
+fn bench() -> Bench {
+    Bench {
+        esr: 0.0,
+        ..Bench::default()
+    }
+}
+
+fn model() -> Parameters {
+    bench::of(&bench())
+}
 
 /// What stands between the commanded duty and the switch.
 #[derive(Clone, Copy)]
@@ -50,7 +62,7 @@ fn run(bench: &Bench, modulator: Modulator, random: &mut Noise) -> Table {
     };
     let mut table = bench.run().with("i_load", vec![5.0; ROWS]);
     *table.column("duty") = commanded;
-    table.measured(&NOISE, random)
+    table.without(&["i_out", "v_in"]).measured(&NOISE, random)
 }
 
 fn diagnosed(bench: &Bench, train: Modulator, held: Modulator, seed: u64) -> Diagnosis {
@@ -75,7 +87,7 @@ fn written(found: &Diagnosis) -> Parameters {
 
 #[test]
 fn what_no_cause_explains_is_described_and_called_no_cause() {
-    let found = diagnosed(&Bench::default(), BENT, BENT, 5);
+    let found = diagnosed(&bench(), BENT, BENT, 5);
     let findings = &found.findings;
     println!("{}", findings.sentence);
     assert_eq!(findings.verdict, Verdict::Unexplained);
@@ -106,7 +118,7 @@ fn a_term_that_does_not_hold_in_a_held_out_record_is_said_and_not_written() {
         play: BENT.play,
         bend: -BENT.bend,
     };
-    let found = diagnosed(&Bench::default(), BENT, other, 6);
+    let found = diagnosed(&bench(), BENT, other, 6);
     let term = found.findings.empirical.as_ref().unwrap();
     println!("{term:#?}");
     assert!(
@@ -121,11 +133,8 @@ fn a_term_that_does_not_hold_in_a_held_out_record_is_said_and_not_written() {
 
 #[test]
 fn records_that_the_model_or_a_cause_explains_get_no_term() {
-    let wound = Bench {
-        dcr: 0.6,
-        ..Bench::default()
-    };
-    for (bench, verdict) in [(Bench::default(), Verdict::Consistent), (wound, Verdict::Explained)] {
+    let wound = Bench { dcr: 0.6, ..bench() };
+    for (bench, verdict) in [(bench(), Verdict::Consistent), (wound, Verdict::Explained)] {
         let found = diagnosed(&bench, STRAIGHT, STRAIGHT, 7);
         assert!(
             found.findings.verdict == verdict || found.findings.verdict == Verdict::Ambiguous,

@@ -10,18 +10,15 @@
 
 use crate::causes::Candidate;
 use crate::drive::Model;
-use crate::fit::{Fit, Fitter, Normal, ROUGH, State};
+use crate::fit::{Fit, Fitter, QUICK, ROUGH, State};
 use crate::noise;
 use crate::parallel;
-use crate::problem::{Problem, dot};
+use crate::problem::Problem;
 use crate::record::CHANNELS;
 
 /// Most coefficients. More than the decade of few that a reader can look through, and the records of a bench hold no more: with the real
 /// record of one converter the left-out error falls by a third at the seventh alone, when both straight terms are in.
 pub const MOST_TERMS: usize = 7;
-/// Terms that are fitted for each place of the path, of those that gain most at first order: which only orders them, as it does
-/// with causes.
-const TRIED: usize = 4;
 /// Parts that are left out, each once; a record alone is cut into as many.
 const FOLDS: usize = 5;
 /// A longer path has to lower the left-out error by this share: the folds are few, and their error scatters by more.
@@ -121,31 +118,6 @@ impl Rest {
     }
 }
 
-/// The terms that gain most beside `fit`, most first.
-fn next_terms(fitter: &Fitter<'_>, fit: &Fit) -> Vec<usize> {
-    let state = &fit.state;
-    let all: Vec<usize> = (0..fitter.candidates.len()).collect();
-    let columns = parallel::map(&all, |term| fitter.sensitivity(*term, state).pop().unwrap_or_default());
-    let gain = |term: usize| {
-        let mut set: Vec<Vec<f64>> = fit.causes.iter().map(|n| columns[*n].clone()).collect();
-        set.push(columns[term].clone());
-        let normal = Normal::new(&set, &state.residual);
-        let step = normal.solved();
-        set.iter()
-            .zip(step)
-            .map(|(c, k)| k * dot(c, &state.residual))
-            .sum::<f64>()
-    };
-    let mut ranked: Vec<(f64, usize)> = all
-        .into_iter()
-        .filter(|n| !fit.causes.contains(n))
-        .map(|n| (gain(n), n))
-        .filter(|(gain, _)| gain.is_finite())
-        .collect();
-    ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    ranked.into_iter().take(TRIED).map(|(_, n)| n).collect()
-}
-
 fn extended(fitter: &Fitter<'_>, from: &Fit, term: usize) -> Fit {
     let causes: Vec<usize> = from.causes.iter().copied().chain([term]).collect();
     let values: Vec<f64> = from.values.iter().copied().chain([0.0]).collect();
@@ -180,30 +152,35 @@ pub fn chosen(problem: &Problem, null: &State, candidates: &[Candidate], folds: 
     };
     let mut path: Vec<Chosen> = Vec::new();
     while fit.causes.len() < MOST_TERMS {
-        let terms = next_terms(&fitter, &fit);
-        let tried = parallel::map(&terms, |term| extended(&fitter, &fit, *term));
+        // all of them are fitted: at first order a product of two signals hides behind what the fit already holds
+        let terms: Vec<usize> = (0..candidates.len()).filter(|n| !fit.causes.contains(n)).collect();
+        let quick = Fitter {
+            effort: QUICK,
+            ..fitter
+        };
+        let tried = parallel::map(&terms, |term| extended(&quick, &fit, *term));
         let least = tried
             .into_iter()
             .min_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2))
             .filter(|next| next.state.chi2 < fit.state.chi2);
         let Some(next) = least else { break };
-        fit = next;
+        fit = fitter.from(&next.causes, &next.values, &next.state);
         path.push(worth(&fit));
     }
     let best = path.iter().map(|one| one.error).fold(f64::INFINITY, f64::min);
     let enough = (1.0 + ABOUT) * best;
     let mut chosen = path.into_iter().find(|one| one.error <= enough)?;
     while chosen.fit.causes.len() > 1 {
-        // what came first may not be needed beside what came later
-        let shorter = (0..chosen.fit.causes.len()).map(|out| {
-            let (mut causes, mut values) = (chosen.fit.causes.clone(), chosen.fit.values.clone());
-            (causes.remove(out), values.remove(out));
-            worth(&fitter.from(&causes, &values, &whole.null))
-        });
-        let least = shorter.min_by(|a, b| a.error.total_cmp(&b.error));
-        let Some(one) = least.filter(|one| one.error <= enough) else {
+        // what came first may not be needed beside what came later: out goes what stands least above its standard deviation
+        let (mut causes, mut values) = (chosen.fit.causes.clone(), chosen.fit.values.clone());
+        let certainty = |n: usize| values[n] * values[n] / chosen.fit.covariance[n][n].max(f64::MIN_POSITIVE);
+        let least = (0..values.len()).min_by(|a, b| certainty(*a).total_cmp(&certainty(*b)));
+        let Some(out) = least else { break };
+        (causes.remove(out), values.remove(out));
+        let one = worth(&fitter.from(&causes, &values, &whole.null));
+        if one.error > enough {
             break;
-        };
+        }
         chosen = one;
     }
     Some(chosen)

@@ -108,16 +108,8 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     let mut empirical = None;
     if !explained || set_aside.is_some() {
         say(Progress::Stage("empirical term"));
-        empirical = empirical::described(whole_problem.as_ref().unwrap_or(&found.problem), &state.model, trim);
-    }
-    if let Some(term) = &mut empirical {
-        let with = held(&term.problem, heldout, &base, &term.after, trim);
-        let against = held(&term.problem, heldout, &state.model, &term.after, trim);
-        term.judged(against.as_ref());
-        if term.findings.written {
-            state.model = term.after.model.clone();
-            pair = with;
-        }
+        let problem = whole_problem.as_ref().unwrap_or(&found.problem);
+        empirical = described(problem, heldout, &base, (&mut state.model, trim), &mut pair);
     }
     let findings = Findings {
         sentence: sentence(&found, &answer.causes, set_aside.as_ref()) + &answer.near + &shifted(&answer.shifts),
@@ -175,6 +167,24 @@ fn read_off(problem: &Problem, model: &Parameters) -> Vec<Estimates> {
         Some(estimates::of(capture, &driven, model))
     };
     problem.records.iter().filter_map(of).collect()
+}
+
+/// The term that describes what `model`, with its trim, leaves; model and held-out records follow it where it is written.
+fn described(
+    problem: &Problem,
+    heldout: &[Record],
+    base: &Model,
+    (model, trim): (&mut Model, f64),
+    pair: &mut Option<Pair>,
+) -> Option<Described> {
+    let mut term = empirical::described(problem, model, trim)?;
+    let against = held(&term.problem, heldout, model, &term.after, trim);
+    term.judged(against.as_ref());
+    if term.findings.written {
+        *pair = held(&term.problem, heldout, base, &term.after, trim);
+        *model = term.after.model.clone();
+    }
+    Some(term)
 }
 
 /// What is said of records that were examined.

@@ -1,8 +1,8 @@
 //! Which terms, and what they are worth where they were not fitted.
 //!
 //! ```text
-//! path  the terms that gain most, one after the other, fitted to all rows
-//! worth each length of that path fitted without a fold, and judged in it; every fold once
+//! worth a set of terms fitted without a fold, and judged in it; every fold once
+//! path  one term after the other: of those that gain most in the fit to all rows the one that is worth most
 //! prune from the shortest length that is about as good as the best, terms without which it stays so
 //! ```
 //!
@@ -16,9 +16,11 @@ use crate::parallel;
 use crate::problem::Problem;
 use crate::record::CHANNELS;
 
-/// Most coefficients. More than the decade of few that a reader can look through, and the records of a bench hold no more: with the real
-/// record of one converter the left-out error falls by a third at the seventh alone, when both straight terms are in.
+/// Most coefficients: few enough to be looked through. A convention; with the real record of one converter the left-out error stands
+/// from the third to the seventh.
 pub const MOST_TERMS: usize = 7;
+/// Terms of those that gain most in the fit that are judged by what is left out, for each place of the path.
+const TRIED: usize = 4;
 /// Parts that are left out, each once; a record alone is cut into as many.
 const FOLDS: usize = 5;
 /// A longer path has to lower the left-out error by this share: the folds are few, and their error scatters by more.
@@ -159,13 +161,20 @@ pub fn chosen(problem: &Problem, null: &State, candidates: &[Candidate], folds: 
             ..fitter
         };
         let tried = parallel::map(&terms, |term| extended(&quick, &fit, *term));
-        let least = tried
+        let mut ranked: Vec<Fit> = tried
             .into_iter()
-            .min_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2))
-            .filter(|next| next.state.chi2 < fit.state.chi2);
-        let Some(next) = least else { break };
-        fit = fitter.from(&next.causes, &next.values, &next.state);
-        path.push(worth(&fit));
+            .filter(|next| next.state.chi2 < fit.state.chi2)
+            .collect();
+        ranked.sort_by(|a, b| a.state.chi2.total_cmp(&b.state.chi2));
+        ranked.truncate(TRIED);
+        let judged = ranked
+            .iter()
+            .map(|next| worth(&fitter.from(&next.causes, &next.values, &next.state)));
+        let Some(next) = judged.min_by(|a, b| a.error.total_cmp(&b.error)) else {
+            break;
+        };
+        fit = next.fit.clone();
+        path.push(next);
     }
     let best = path.iter().map(|one| one.error).fold(f64::INFINITY, f64::min);
     let enough = (1.0 + ABOUT) * best;
@@ -176,7 +185,8 @@ pub fn chosen(problem: &Problem, null: &State, candidates: &[Candidate], folds: 
         let certainty = |n: usize| values[n] * values[n] / chosen.fit.covariance[n][n].max(f64::MIN_POSITIVE);
         let least = (0..values.len()).min_by(|a, b| certainty(*a).total_cmp(&certainty(*b)));
         let Some(out) = least else { break };
-        (causes.remove(out), values.remove(out));
+        causes.remove(out);
+        values.remove(out);
         let one = worth(&fitter.from(&causes, &values, &whole.null));
         if one.error > enough {
             break;

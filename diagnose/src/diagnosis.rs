@@ -106,7 +106,8 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     });
     let mut state = state;
     let mut empirical = None;
-    if !explained || set_aside.is_some() {
+    // causes that leave only noise leave nothing to describe, whatever speaks against them: a term would imitate them
+    if !found.structure.is_empty() && (!explained || set_aside.is_some()) {
         say(Progress::Stage("empirical term"));
         let problem = whole_problem.as_ref().unwrap_or(&found.problem);
         empirical = described(problem, heldout, &base, (&mut state.model, trim), &mut pair);

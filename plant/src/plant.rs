@@ -6,7 +6,7 @@ use toml_input::Faults;
 
 use crate::catalogue;
 use crate::check::check;
-use crate::effects::duty_delay::Queue;
+use crate::effects::duty_delay::{self, Queue};
 use crate::effects::empirical::Correction;
 use crate::effects::{dcr, duty_offset, duty_quantisation, load_setting, minimum_on_time};
 use crate::entry::Way;
@@ -159,24 +159,36 @@ impl Plant {
     }
 
     /// [`Plant::reset_at`] in the middle of a run: `commanded` are the duties given before, the latest last. The one in
-    /// force and those that wait are taken from its end; where it is too short they are as after [`Plant::reset_at`].
+    /// force and those that wait are taken from its end; where it is too short they are as after [`Plant::reset_at`]. What
+    /// remembers duties behind those has them as if the first had been held for ever; [`Plant::looks_back`] are enough.
     pub fn reset_within(&mut self, v_out: f64, i_l: f64, load: &Load, commanded: &[f64]) -> Sample {
         let sample = self.reset_at(v_out, i_l, load);
         let waits = self.parameters.pwm.duty_delay as usize;
         let (before, last) = commanded.split_at(commanded.len().saturating_sub(waits + 1));
-        if let Some(first) = commanded.first() {
-            self.state.slow = *first;
+        if last.len() > waits {
+            self.state.slow = commanded[0];
         }
         for duty in before {
             self.correction.follow(*duty, &mut self.state.slow);
         }
-        for duty in last {
+        for (n, duty) in last.iter().enumerate() {
+            let slow = self.state.slow;
             self.state.applied = self.modulate(*duty);
+            // what the queue gives back before it has passed on a commanded duty acted in no period
+            if n < waits {
+                self.state.slow = slow;
+            }
         }
         if self.parameters.pwm.sampling_phase > 0.0 {
             self.state.gates.plan(&self.timing, self.state.applied);
         }
         sample
+    }
+
+    /// Commanded duties that [`Plant::reset_within`] can make use of.
+    #[must_use]
+    pub fn looks_back(&self) -> usize {
+        (duty_delay::LONGEST + 1).saturating_add(self.correction.memory())
     }
 
     /// After [`Plant::reset_within`]: what the sensors of output voltage, inductor current, load current and input voltage

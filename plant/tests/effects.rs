@@ -365,3 +365,31 @@ fn the_rate_of_an_empirical_term_fades_with_its_time_constant() {
     assert!((area - expected).abs() < 0.01 * expected, "{area} {expected}");
     assert!((with[3999] - without[3999]).abs() < 1e-3);
 }
+
+/// A plant that is put into the middle of a run goes on as the run does.
+#[test]
+fn the_rate_of_an_empirical_term_remembers_duties_behind_a_segment() {
+    for delay in [0, 2] {
+        let p = changed(|p| {
+            (p.empirical.rate, p.empirical.rate_span, p.empirical.rate_time) = (0.1, 0.2, 1.7e-3);
+            p.pwm.duty_delay = delay;
+        });
+        let load = Load::resistor(20.0);
+        let mut whole = plant(&p);
+        whole.reset_within(100.0, 5.0, &load, &[0.5; 9]);
+        let mut duties = vec![0.5; 9];
+        for n in 0..40 {
+            let duty = if n < 20 { 0.5 } else { 0.6 };
+            whole.step(duty, &load);
+            duties.push(duty);
+        }
+        let now = whole.sample();
+        let mut later = plant(&p);
+        assert!(later.looks_back() >= 85, "{}", later.looks_back());
+        later.reset_within(now.v_out, now.i_l, &load, &duties);
+        for n in 0..30 {
+            let (a, b) = (whole.step(0.6, &load).v_out, later.step(0.6, &load).v_out);
+            assert!((a - b).abs() < 1e-9, "delay {delay}, period {n}: {a} V {b} V");
+        }
+    }
+}

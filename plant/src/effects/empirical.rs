@@ -17,6 +17,8 @@ use crate::parameters::{Empirical, Parameters};
 
 /// Largest coefficient, duty: more than a correction.
 const MOST: f64 = 0.5;
+/// Time constants of the rate's low-pass after which a duty counts as forgotten.
+const MEMORY: f64 = 5.0;
 
 /// Catalogue entry.
 pub const EFFECT: Effect = Effect {
@@ -219,6 +221,8 @@ pub(crate) struct Correction {
     terms: Empirical,
     /// What the low-pass takes of a duty in a period.
     share: f64,
+    /// The period, s.
+    t_sw: f64,
 }
 
 impl Correction {
@@ -226,8 +230,18 @@ impl Correction {
         Correction {
             is_on: EFFECT.is_on(p),
             share: 1.0 - (-p.t_sw() / p.empirical.rate_time).exp(),
+            t_sw: p.t_sw(),
             terms: p.empirical.clone(),
         }
+    }
+
+    /// Periods for which its rate remembers a duty, 0 without a rate.
+    pub fn memory(&self) -> usize {
+        let t = &self.terms;
+        let is_used = [t.rate, t.rate_rate, t.d_rate, t.v_rate, t.i_rate] != [0.0; 5];
+        // beyond five time constants 0.7 % of a step are left
+        let periods = (MEMORY * t.rate_time / self.t_sw).ceil();
+        if is_used { periods as usize } else { 0 }
     }
 
     /// Moves the low-pass `slow` by a period of `duty`.

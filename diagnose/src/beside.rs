@@ -6,7 +6,8 @@
 
 use crate::attribute::Attribution;
 use crate::causes::Search;
-use crate::fit::{Fitter, Normal, solve};
+use crate::fit::Fitter;
+use crate::normal::{Normal, solve};
 use crate::problem::Problem;
 use crate::profile::Profile;
 use crate::words::{si, unit};

@@ -41,6 +41,7 @@ mod level;
 mod median;
 pub mod next;
 pub mod noise;
+mod normal;
 pub mod page;
 mod parallel;
 pub mod preflight;

@@ -6,6 +6,9 @@
 //! prune from the shortest length that is about as good as the best, terms without which it stays so
 //! ```
 //!
+//! Rows that are left out choose the length and what is pruned, and all rows rank the sets: the error that is told is too good by that
+//! choice. Only held-out records, which come later, have seen none of it.
+//!
 //! All of it is free run: from the first row of a record to the last the model sees duties and loads, and no measurement.
 
 use crate::causes::Candidate;

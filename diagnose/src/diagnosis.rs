@@ -54,6 +54,7 @@ pub struct Diagnosis {
 /// Diagnoses `model` by the records `train`; `heldout` only judges. `say` hears how far it is.
 #[must_use]
 pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say: Listener<'_>) -> Diagnosis {
+    let (model, standing) = &empirical::without_standing(model);
     let base = Model::new(model);
     // what a capture shows comes beside the fit of the training records only
     let (captured, judges): (Vec<&Record>, Vec<&Record>) = heldout.iter().partition(|record| record.capture.is_some());
@@ -129,7 +130,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         next_experiments: answer.next_experiments,
         captures: read_off(&found.problem, model),
         noise: Noise {
-            repairs: answer.notes.into_iter().chain(unused).collect(),
+            repairs: answer.notes.into_iter().chain(unused).chain(standing.clone()).collect(),
             ..noise_of(&found.problem, &found.attribution, &found.outliers, trim)
         },
         gain: gain_of(pair.as_ref(), answer.shifts),

@@ -10,9 +10,11 @@ use std::path::Path;
 
 use bench::{Bench, Noise, Table};
 use diagnose::diagnosis::{Diagnosis, diagnose};
-use diagnose::extend::extended_toml;
+use diagnose::drive::{Begin, Model, simulate};
+use diagnose::extend::{extended_toml, partial_toml};
 use diagnose::findings::Verdict;
 use diagnose::gain::Regime;
+use diagnose::record::{Record, Segment};
 use plant::Parameters;
 
 const ROWS: usize = 300;
@@ -107,6 +109,12 @@ fn what_no_cause_explains_is_described_and_called_no_cause() {
     let [before, after] = held_out(&found);
     // half: the bend has no form of the term's, and play remembers longer than its rate
     assert!(after < 0.5 * before, "{before} V to {after} V");
+    if let Some(text) = partial_toml(&found) {
+        assert!(
+            text.contains("[empirical]") && !text.contains("as it was given"),
+            "{text}"
+        );
+    }
     // nothing else has moved: without the table the file is the model as given
     let plant = written(&found);
     assert!(plant.empirical != model().empirical);
@@ -147,4 +155,58 @@ fn records_that_the_model_or_a_cause_explains_get_no_term() {
         assert!(found.findings.empirical.is_none());
         assert_eq!(written(&found).empirical, model().empirical);
     }
+}
+
+/// Beside a correction that stands already, causes would be fitted to what it leaves.
+#[test]
+fn a_model_that_has_a_term_is_diagnosed_without_it() {
+    let mut given = model();
+    (given.empirical.constant, given.empirical.rate) = (0.03, 0.1);
+    let found = [model(), given].map(|model| {
+        let mut random = Noise(7);
+        let train = ["a", "b", "c"].map(|name| run(&bench(), STRAIGHT, &mut random).read(name, &model).unwrap());
+        diagnose(&model, train.to_vec(), &[], &|_| {})
+    });
+    let [plain, with] = &found;
+    assert_eq!(plain.findings.sentence, with.findings.sentence);
+    assert_eq!(extended_toml(plain), extended_toml(with));
+    let is_said = |found: &Diagnosis| {
+        found
+            .findings
+            .noise
+            .repairs
+            .iter()
+            .any(|note| note.contains("[empirical]"))
+    };
+    assert!(!is_said(plain) && is_said(with));
+}
+
+/// A record that is cut where a step of the duty still shows is simulated as the whole one.
+#[test]
+fn a_segment_begins_with_the_rate_that_the_duties_before_it_left() {
+    let mut p = model();
+    (p.empirical.rate, p.empirical.rate_span, p.empirical.rate_time) = (0.05, 0.1, 17.0 * p.t_sw());
+    let mut record = run(&bench(), STRAIGHT, &mut Noise(8)).read("a", &p).unwrap();
+    let begun = [record.measured[0][0], record.measured[1][0]];
+    let simulated = |record: &Record, states: &[[f64; 2]]| {
+        let begin = Begin {
+            states,
+            late: &[],
+            trim: 0.0,
+        };
+        simulate(&Model::new(&p), record, &begin)
+    };
+    assert!(record.segments.len() == 1 && record.segments[0].start == 0);
+    let whole = simulated(&record, &[begun]);
+    let step = (60..ROWS)
+        .find(|row| record.duty[*row] != record.duty[row - 1])
+        .unwrap();
+    let (cut, end) = (step + 10, record.segments[0].end);
+    record.segments = vec![Segment { start: 0, end: cut }, Segment { start: cut, end }];
+    let parts = simulated(&record, &[begun, [whole[cut][0], whole[cut][1]]]);
+    let apart = (cut..end).map(|row| (whole[row][0] - parts[row][0]).abs());
+    let most = apart.fold(0.0, f64::max);
+    // a segment begins with the current and the voltage of the instant, and not with where its gates were to the last nanosecond; the
+    // rate that is forgotten makes more than a volt
+    assert!(most < 0.02, "{most} V");
 }

@@ -15,6 +15,8 @@ mod terms;
 
 use std::collections::BTreeMap;
 
+use plant::Parameters;
+
 use crate::drive::{Model, simulate};
 use crate::fit::State;
 use crate::gain::{Pair, Regime};
@@ -58,6 +60,19 @@ pub struct Described {
     pub before: State,
     /// With it.
     pub after: State,
+}
+
+/// The model without a correction that it already has, and a note where it has one: beside it causes would take what it describes, or
+/// leave what it imitates.
+pub fn without_standing(model: &Parameters) -> (Parameters, Option<String>) {
+    let mut plain = model.clone();
+    plain.empirical = Parameters::default().empirical;
+    let note = (plain.empirical != model.empirical).then(|| {
+        "the model's table [empirical] is left out of the diagnosis, which compares and extends the model without it: a correction \
+         that explains nothing must not stand beside causes"
+            .to_owned()
+    });
+    (plain, note)
 }
 
 /// Whether records could show a term at all.

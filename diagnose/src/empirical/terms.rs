@@ -72,6 +72,8 @@ const CORNER: f64 = 0.005;
 /// Sets centres and spans of `plant` to the ranges of the records, in which `shown` is simulated (rows of output voltage and inductor
 /// current); the terms whose signals move.
 pub fn candidates(problem: &Problem, shown: &[[f64; 2]], plant: &mut Parameters) -> Vec<Candidate> {
+    // ranges are those of the terms that are fitted here, of which none stands yet
+    plant.empirical = Parameters::default().empirical;
     let p = &mut plant.empirical;
     let time = (plant.converter.inductance * plant.converter.capacitance).sqrt();
     // the filter takes its time whatever the duty does: what is left behind a change of the duty is left that long

@@ -13,10 +13,15 @@ const SWING: f64 = 0.005;
 /// How far the settled voltage may be from that without the term, share of it: what is farther is no correction. A convention.
 const FAR: f64 = 0.25;
 
-/// Mean and swing of the output voltage in the last third of a run, from `v` V.
-fn run(p: &Parameters, duty: f64, load: &Load, v: f64) -> Option<(f64, f64)> {
+/// Shares of the usual output voltage from which a run begins, beside rest and the corners of the term's range.
+const SHARES: [f64; 2] = [0.9, 1.1];
+
+/// Output voltage and inductor current at the beginning of a run.
+type From = (f64, f64);
+
+/// Mean and swing of the output voltage in the last third of a run.
+fn run(p: &Parameters, duty: f64, load: &Load, (v, i): From) -> Option<(f64, f64)> {
     let mut plant = Plant::new(p).ok()?;
-    let i = load.conductance * v + load.current + if v > 0.0 { load.power / v } else { 0.0 };
     plant.reset_at(v, i, load);
     let tau = (p.converter.inductance * p.converter.capacitance).sqrt() / p.t_sw();
     let periods = (LONG * tau).clamp(PERIODS.0, PERIODS.1) as usize;
@@ -31,8 +36,58 @@ fn run(p: &Parameters, duty: f64, load: &Load, v: f64) -> Option<(f64, f64)> {
     mean.is_finite().then_some((mean, high - low))
 }
 
-/// Whether `with` comes to rest at the duties and loads of the records as `without` does, from both sides.
+/// Where runs begin: both sides of `v` volts, rest, as at power-up, and the corners of the range in which the term follows the signals.
+/// Beyond those it is constant.
+fn beginnings(p: &Parameters, v: f64, load: &Load) -> Vec<From> {
+    let drawn = |v: f64| load.conductance * v + load.current + if v > 0.0 { load.power / v } else { 0.0 };
+    let t = &p.empirical;
+    let mut list: Vec<From> = SHARES.iter().map(|share| (share * v, drawn(share * v))).collect();
+    list.push((0.0, 0.0));
+    for (v_end, i_end) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
+        list.push((t.v_centre + v_end * t.v_span, t.i_centre + i_end * t.i_span));
+    }
+    list
+}
+
+/// Whether `with` comes to rest at a duty and a load as `without` does, and at one voltage wherever it begins.
+fn rests(without: &Parameters, with: &Parameters, v: f64, (duty, load): (f64, &Load)) -> bool {
+    let mut found: Vec<[f64; 2]> = Vec::new();
+    for from in beginnings(with, v, load) {
+        // no rest without the term either, as with a load of constant power that runs away in open loop: nothing to compare with
+        let Some((mean, swing)) = run(without, duty, load, from).filter(|(mean, swing)| *swing <= FAR * mean.abs())
+        else {
+            continue;
+        };
+        let Some((other, swings)) = run(with, duty, load, from) else {
+            return false;
+        };
+        let still = SWING * mean.abs();
+        if swings > 1.5 * swing + still || (other - mean).abs() > FAR * mean.abs() {
+            return false;
+        }
+        // two points of rest where the converter alone has one: which of them a run takes would be the term's choice
+        let is_other = |[alone, term]: &[f64; 2]| {
+            let same = still + swing + swings;
+            (alone - mean).abs() <= same && (term - other).abs() > 2.0 * same
+        };
+        if found.iter().any(is_other) {
+            return false;
+        }
+        found.push([mean, other]);
+    }
+    true
+}
+
+/// Whether `with` comes to rest at the duties and loads of the records as `without` does, from all sides.
 pub fn is_stable(problem: &Problem, without: &Parameters, with: &Parameters) -> bool {
+    let v = problem.bases.v;
+    crate::parallel::map(&points(problem), |(duty, load)| rests(without, with, v, (*duty, load)))
+        .into_iter()
+        .all(|rests| rests)
+}
+
+/// Duties and loads of the records, the ends of both among them.
+fn points(problem: &Problem) -> Vec<(f64, Load)> {
     let mut points: Vec<(f64, Load)> = Vec::new();
     for record in &problem.records {
         let mut rows: Vec<usize> = (0..record.rows()).collect();
@@ -50,21 +105,43 @@ pub fn is_stable(problem: &Problem, without: &Parameters, with: &Parameters) -> 
     // records repeat each other; the first in this order are as many as it takes
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     points.dedup_by(|a, b| (a.0 - b.0).abs() < 1e-3 && a.1 == b.1);
-    let rests = |&(duty, load): &(f64, Load)| {
-        [0.9, 1.1].into_iter().all(|share| {
-            let v = share * problem.bases.v;
-            let Some((mean, swing)) = run(without, duty, &load, v) else {
-                // no rest without the term either: nothing to compare with
-                return true;
-            };
-            // a load of constant power that runs away in open loop does so with any term
-            if swing > FAR * mean.abs() {
-                return true;
-            }
-            run(with, duty, &load, v).is_some_and(|(other, swings)| {
-                swings <= 1.5 * swing + SWING * mean.abs() && (other - mean).abs() <= FAR * mean.abs()
-            })
-        })
-    };
-    crate::parallel::map(&points, rests).into_iter().all(|rests| rests)
+    points
+}
+
+#[cfg(test)]
+mod tests {
+    use plant::{Load, Parameters};
+
+    use super::rests;
+
+    /// Whether a converter that rests at 24 V does so with a term.
+    fn holds(change: impl FnOnce(&mut plant::Empirical)) -> bool {
+        let mut p = Parameters::ideal(48.0, 100e-6, 100e-6, 100e3);
+        p.inductor.dcr = 0.2;
+        let mut with = p.clone();
+        let t = &mut with.empirical;
+        (t.v_centre, t.v_span, t.i_centre, t.i_span) = (24.0, 4.0, 4.0, 4.0);
+        change(t);
+        rests(&p, &with, 24.0, (0.5, &Load::resistor(6.0)))
+    }
+
+    #[test]
+    fn a_term_that_moves_the_point_of_rest_a_little_is_stable() {
+        assert!(holds(|t| t.constant = 0.02));
+        assert!(holds(|t| (t.v, t.i) = (-0.02, 0.01)));
+    }
+
+    #[test]
+    fn a_term_with_two_points_of_rest_is_not_stable() {
+        // 2.4 V of source for each volt in the range: up or down, and there it stays
+        assert!(!holds(|t| (t.v, t.v_span) = (0.05, 1.0)));
+    }
+
+    #[test]
+    fn a_term_that_holds_the_voltage_down_after_power_up_is_not_stable() {
+        // nothing at 22 to 26 V, and 19 V less below 11 V
+        assert!(!holds(
+            |t| (t.constant, t.v, t.v_centre, t.v_span) = (-0.2, 0.2, 12.0, 1.0)
+        ));
+    }
 }

@@ -200,11 +200,10 @@ fn held_out(diagnosis: &Diagnosis) -> Option<Section> {
     let ratio = |f: fn(&crate::gain::Held) -> f64| whole.iter().map(|held| f(held) / held.floor).collect::<Vec<_>>();
     let mut panel = BarPanel::new(Axis::new("error over noise"));
     panel = panel.bars_in(MODEL, "model", ratio(|held| held.rmse_before));
-    // without a cause and without an empirical term there is no second model
     let is_described = diagnosis.findings.empirical.as_ref().is_some_and(|term| term.written);
-    let is_extended = !diagnosis.findings.causes.is_empty() || is_described;
-    if is_extended {
-        let name = if is_described { empirical::NAME } else { "extended" };
+    let second = empirical::second(!diagnosis.findings.causes.is_empty(), is_described);
+    let is_extended = second.is_some();
+    if let Some(name) = second {
         panel = panel.bars_in(EXTENDED, name, ratio(|held| held.rmse_after));
     }
     let svg = BarChart::new("Held-out error", names).panel(panel).svg();
@@ -247,7 +246,6 @@ fn held_out(diagnosis: &Diagnosis) -> Option<Section> {
         table = table.row(row);
     }
     section = section.details(Section::new("By record and regime").table(table));
-    let second = is_extended.then_some(if is_described { empirical::NAME } else { "extended" });
     let mut inner = Section::new("Pictures of the held-out records");
     for record in 0..pair.problem.records.len() {
         inner = records::pictures(inner, &pair.problem, [&pair.before, &pair.after], record, second, "");

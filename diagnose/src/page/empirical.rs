@@ -6,12 +6,28 @@ use super::records::pictures;
 use crate::empirical::Described;
 
 /// What pictures call the model with it.
-pub(super) const NAME: &str = "with the empirical term";
+const NAME: &str = "with the empirical term";
+
+/// What the model of `plant.extended.toml` is called beside the one as given: what causes gain is not the term's. Nothing without
+/// either.
+pub(super) fn second(has_causes: bool, is_described: bool) -> Option<&'static str> {
+    match (has_causes, is_described) {
+        (false, false) => None,
+        (true, false) => Some("extended"),
+        (false, true) => Some(NAME),
+        (true, true) => Some("with causes and the empirical term"),
+    }
+}
 
 /// What it is, what it is worth, and one training record with it.
 pub(super) fn section(term: &Described) -> Section {
     let findings = &term.findings;
-    let mut section = Section::new("What is left is described, not explained").text(findings.sentence.clone());
+    let mut section = Section::new("What is left is described, not explained")
+        .text(findings.sentence.clone())
+        .text(
+            "The error in what was left out is too good by a little: it has chosen how many parts the term has, among sets that were \
+             ranked by all rows. Held-out records decide only whether the term is written.",
+        );
     let mut table = Table::new(
         "Root mean square errors; the initial states are estimated for each model. The fit has seen the training records alone.",
     )
@@ -59,4 +75,16 @@ pub(super) fn section(term: &Described) -> Section {
     let states = [&term.before, &term.after];
     let caption = "The training record that the model misses most.";
     pictures(section, &term.problem, states, worst, Some(NAME), caption)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{NAME, second};
+
+    #[test]
+    fn what_causes_gain_is_not_called_the_term_s() {
+        assert_eq!(second(false, true), Some(NAME));
+        assert!(second(true, true).is_some_and(|name| name.contains("causes")));
+        assert_eq!([second(true, false), second(false, false)], [Some("extended"), None]);
+    }
 }

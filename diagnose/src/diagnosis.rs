@@ -56,16 +56,7 @@ pub struct Diagnosis {
 pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say: Listener<'_>) -> Diagnosis {
     let (model, standing) = &empirical::without_standing(model);
     let base = Model::new(model);
-    // what a capture shows comes beside the fit of the training records only
-    let (captured, judges): (Vec<&Record>, Vec<&Record>) = heldout.iter().partition(|record| record.capture.is_some());
-    let judges: Vec<Record> = judges.into_iter().cloned().collect();
-    let unused = captured.iter().map(|record| {
-        format!(
-            "{}: a capture is not judged among held-out records, and is not used; give it with the training records",
-            record.name
-        )
-    });
-    let unused: Vec<String> = unused.collect();
+    let (judges, unused) = without_captures(heldout);
     let heldout = &judges[..];
     // a second look begins with the records as they were read
     let kept = train.clone();
@@ -83,15 +74,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         None => {}
     }
     let explained = found.verdict != Verdict::Unexplained;
-    // what does not explain the records is no better model
-    let state = match explained {
-        true => found.attribution.state().clone(),
-        false => found.attribution.null.clone(),
-    };
-    let trim = match explained {
-        true => state.starts.trim_or_none(model.converter.f_sw),
-        false => 0.0,
-    };
+    let (state, trim) = better(&found, model.converter.f_sw);
     let answer = answer(&found, pair.as_ref(), &state, sources, say);
     // the figures are those of the file that is written
     if !explained {
@@ -105,8 +88,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         whole_problem = Some(whole);
         one
     });
-    let mut state = state;
-    let mut empirical = None;
+    let (mut state, mut empirical) = (state, None);
     // causes that leave only noise leave nothing to describe, whatever speaks against them: a term would imitate them
     if !found.structure.is_empty() && (!explained || set_aside.is_some()) {
         say(Progress::Stage("empirical term"));
@@ -147,6 +129,31 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         empirical,
         control: None,
     }
+}
+
+/// The better model that was found, and its trim; the model as given where causes do not explain the records.
+fn better(found: &Examined, f_sw: f64) -> (State, f64) {
+    match found.verdict {
+        Verdict::Unexplained => (found.attribution.null.clone(), 0.0),
+        _ => {
+            let state = found.attribution.state().clone();
+            let trim = state.starts.trim_or_none(f_sw);
+            (state, trim)
+        }
+    }
+}
+
+/// The records that judge, and what is said of captures among them.
+fn without_captures(heldout: &[Record]) -> (Vec<Record>, Vec<String>) {
+    // what a capture shows comes beside the fit of the training records only
+    let (captured, judges): (Vec<&Record>, Vec<&Record>) = heldout.iter().partition(|record| record.capture.is_some());
+    let unused = captured.iter().map(|record| {
+        format!(
+            "{}: a capture is not judged among held-out records, and is not used; give it with the training records",
+            record.name
+        )
+    });
+    (judges.into_iter().cloned().collect(), unused.collect())
 }
 
 /// What captures show by themselves, beside the model as given.

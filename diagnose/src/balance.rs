@@ -8,7 +8,7 @@
 //! times the gain of its sensor, and its offset. But for the product of R_s, that is b0 + b1 d + b2 i + b3 d i. Points that are not of
 //! that form need no search.
 
-use crate::fit::solve;
+use crate::normal::solve;
 use crate::problem::{Problem, dot};
 use crate::record::Record;
 

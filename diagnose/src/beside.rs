@@ -5,7 +5,8 @@
 //! follows from it.
 
 use crate::attribute::Attribution;
-use crate::fit::{Fitter, Normal, solve};
+use crate::fit::Fitter;
+use crate::normal::{Normal, solve};
 use crate::problem::Problem;
 use crate::profile::Profile;
 use crate::words::{si, unit};

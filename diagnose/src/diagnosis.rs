@@ -10,6 +10,7 @@ use crate::capture::terms::delays;
 use crate::control::Request;
 use crate::doubts;
 use crate::drive::Model;
+use crate::empirical::{self, Described};
 use crate::examine::{Examined, examined, held};
 use crate::findings::{Findings, Gain, Hidden, Named, Noise, Verdict};
 use crate::fit::State;
@@ -44,6 +45,8 @@ pub struct Diagnosis {
     pub extended: Model,
     /// Duty that its edges add, 1.
     pub trim: f64,
+    /// A term that describes what no cause explains; `extended` has it if it is written.
+    pub empirical: Option<Described>,
     /// The loop closed with a policy, if one was given.
     pub control: Option<crate::control::Control>,
 }
@@ -51,17 +54,9 @@ pub struct Diagnosis {
 /// Diagnoses `model` by the records `train`; `heldout` only judges. `say` hears how far it is.
 #[must_use]
 pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say: Listener<'_>) -> Diagnosis {
+    let (model, standing) = &empirical::without_standing(model);
     let base = Model::new(model);
-    // what a capture shows comes beside the fit of the training records only
-    let (captured, judges): (Vec<&Record>, Vec<&Record>) = heldout.iter().partition(|record| record.capture.is_some());
-    let judges: Vec<Record> = judges.into_iter().cloned().collect();
-    let unused = captured.iter().map(|record| {
-        format!(
-            "{}: a capture is not judged among held-out records, and is not used; give it with the training records",
-            record.name
-        )
-    });
-    let unused: Vec<String> = unused.collect();
+    let (judges, unused) = without_captures(heldout);
     let heldout = &judges[..];
     // a second look begins with the records as they were read
     let kept = train.clone();
@@ -79,26 +74,27 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         None => {}
     }
     let explained = found.verdict != Verdict::Unexplained;
-    // what does not explain the records is no better model
-    let state = match explained {
-        true => found.attribution.state().clone(),
-        false => found.attribution.null.clone(),
-    };
-    let trim = match explained {
-        true => state.starts.trim_or_none(model.converter.f_sw),
-        false => 0.0,
-    };
+    let (state, trim) = better(&found, model.converter.f_sw);
     let answer = answer(&found, pair.as_ref(), &state, sources, say);
     // the figures are those of the file that is written
     if !explained {
         pair = held(&found.problem, heldout, &base, &state, trim);
     }
+    let mut whole_problem = None;
     let set_aside = aside.map(|(part, whole)| {
         let one = aside::shown(&mut found, part, &whole, &kept, &base);
         // the held-out records tell of a channel that was set aside, too
         pair = held(&found.problem, heldout, &base, &state, trim);
+        whole_problem = Some(whole);
         one
     });
+    let (mut state, mut empirical) = (state, None);
+    // causes that leave only noise leave nothing to describe, whatever speaks against them: a term would imitate them
+    if !found.structure.is_empty() && (!explained || set_aside.is_some()) {
+        say(Progress::Stage("empirical term"));
+        let problem = whole_problem.as_ref().unwrap_or(&found.problem);
+        empirical = described(problem, heldout, &base, (&mut state.model, trim), &mut pair);
+    }
     let findings = Findings {
         sentence: sentence(&found, &answer.causes, set_aside.as_ref()) + &answer.near + &shifted(&answer.shifts),
         verdict: match set_aside {
@@ -109,13 +105,14 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         causes: answer.causes,
         partial_gain: answer.partial_gain,
         set_aside,
+        empirical: empirical.as_ref().map(|term| term.findings.clone()),
         structure: found.structure.clone(),
         doubts: doubts::said(&found.doubts),
         not_detectable: answer.not_detectable,
         next_experiments: answer.next_experiments,
         captures: read_off(&found.problem, model),
         noise: Noise {
-            repairs: answer.notes.into_iter().chain(unused).collect(),
+            repairs: answer.notes.into_iter().chain(unused).chain(standing.clone()).collect(),
             ..noise_of(&found.problem, &found.attribution, &found.outliers, trim)
         },
         gain: gain_of(pair.as_ref(), answer.shifts),
@@ -129,8 +126,34 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         profiles: found.profiles,
         held: pair,
         trim,
+        empirical,
         control: None,
     }
+}
+
+/// The better model that was found, and its trim; the model as given where causes do not explain the records.
+fn better(found: &Examined, f_sw: f64) -> (State, f64) {
+    match found.verdict {
+        Verdict::Unexplained => (found.attribution.null.clone(), 0.0),
+        _ => {
+            let state = found.attribution.state().clone();
+            let trim = state.starts.trim_or_none(f_sw);
+            (state, trim)
+        }
+    }
+}
+
+/// The records that judge, and what is said of captures among them.
+fn without_captures(heldout: &[Record]) -> (Vec<Record>, Vec<String>) {
+    // what a capture shows comes beside the fit of the training records only
+    let (captured, judges): (Vec<&Record>, Vec<&Record>) = heldout.iter().partition(|record| record.capture.is_some());
+    let unused = captured.iter().map(|record| {
+        format!(
+            "{}: a capture is not judged among held-out records, and is not used; give it with the training records",
+            record.name
+        )
+    });
+    (judges.into_iter().cloned().collect(), unused.collect())
 }
 
 /// What captures show by themselves, beside the model as given.
@@ -153,6 +176,24 @@ fn read_off(problem: &Problem, model: &Parameters) -> Vec<Estimates> {
         Some(estimates::of(capture, &driven, model))
     };
     problem.records.iter().filter_map(of).collect()
+}
+
+/// The term that describes what `model`, with its trim, leaves; model and held-out records follow it where it is written.
+fn described(
+    problem: &Problem,
+    heldout: &[Record],
+    base: &Model,
+    (model, trim): (&mut Model, f64),
+    pair: &mut Option<Pair>,
+) -> Option<Described> {
+    let mut term = empirical::described(problem, model, trim)?;
+    let against = held(&term.problem, heldout, model, &term.after, trim);
+    term.judged(against.as_ref());
+    if term.findings.written {
+        *pair = held(&term.problem, heldout, base, &term.after, trim);
+        *model = term.after.model.clone();
+    }
+    Some(term)
 }
 
 /// What is said of records that were examined.

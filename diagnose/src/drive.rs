@@ -12,7 +12,7 @@ use plant::{Load, Parameters, Plant, Signals};
 
 use crate::record::{CHANNELS, Record, Segment};
 
-/// Duties before a segment that the plant is given: more than it can delay.
+/// Duties before a segment that the plant is given at least: more than it can delay. A rate looks back farther.
 // eight that wait and the one in force
 const HISTORY: usize = 9;
 /// Time constant that stands for the mean over a settled point, periods: it lets through less than 0.2 % of a
@@ -168,10 +168,9 @@ impl Driver<'_> {
         let first = self.period(segment.start);
         // at the start of a period its own duty is still to be commanded
         let given = if self.phase > 0.0 { first + 1 } else { first };
-        let mut history = [duty[first.min(segment.start)]; HISTORY];
-        for (place, row) in (0..HISTORY).rev().zip((0..given).rev()) {
-            history[place] = duty[row];
-        }
+        // before the record its first duty was held
+        let mut history = vec![duty[0]; HISTORY.saturating_sub(given)];
+        history.extend_from_slice(&duty[given.saturating_sub(plant.looks_back())..given]);
         let sample = plant.reset_within(start[0], start[1], &load[first], &history);
         // a slow sensor begins where it was, not at the signal of this instant
         plant.shows(std::array::from_fn(|n| self.record.measured[n][segment.start]));

@@ -66,7 +66,16 @@ pub fn extended_toml(diagnosis: &Diagnosis) -> String {
         let rivals: Vec<String> = cause.rival_values.iter().map(|values| needs(values)).collect();
         let _ = writeln!(text, "# {} stands for a tie with {}.", cause.id, rivals.join(", "));
     }
+    if is_described(diagnosis) {
+        text += "# The table [empirical] is a correction of the duty that describes what no cause explains. It is no cause and no physics.\n";
+    }
     written(diagnosis, text, &extended_plant(diagnosis), told(diagnosis.trim))
+}
+
+/// Whether the extended model has an empirical term.
+fn is_described(diagnosis: &Diagnosis) -> bool {
+    let term = diagnosis.findings.empirical.as_ref();
+    term.is_some_and(|term| term.written)
 }
 
 /// Text of `plant.partial.toml`: the model with causes that explain only a part; nothing with another verdict, or without such a part.
@@ -79,8 +88,15 @@ pub fn partial_toml(diagnosis: &Diagnosis) -> Option<String> {
     let state = diagnosis.attribution.state();
     let trim = told(state.starts.trim_or_none(state.model.plant.converter.f_sw));
     let mut text = String::from(
-        "# PARTIAL: these causes do not explain the records. Their values imitate something else, and are no measurement.\n\
-         # To look at, not to train on; the model as it was given is in plant.extended.toml.\n",
+        "# PARTIAL: these causes do not explain the records. Their values imitate something else, and are no measurement.\n",
+    );
+    let other = match is_described(diagnosis) {
+        true => "the model without them and with the correction [empirical]",
+        false => "the model as it was given",
+    };
+    let _ = writeln!(
+        text,
+        "# To look at, not to train on; {other} is in plant.extended.toml."
     );
     for worth in &findings.partial_gain {
         let _ = writeln!(text, "# {}", worth.words());

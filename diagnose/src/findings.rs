@@ -161,6 +161,8 @@ pub struct Findings {
     pub partial_gain: Vec<Worth>,
     /// What the verdict `mostly_explained` leaves out.
     pub set_aside: Option<Aside>,
+    /// A term that describes what is left and explains nothing of it.
+    pub empirical: Option<crate::empirical::Empirical>,
     /// Structure that is left.
     pub structure: Vec<Structure>,
     /// Why causes are no explanation although they leave no structure, in words.

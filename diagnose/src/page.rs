@@ -3,6 +3,7 @@
 mod captures;
 mod colours;
 mod control;
+mod empirical;
 mod records;
 
 use report::{Axis, BarChart, BarPanel, Chart, Page, Panel, ReportError, Section, Series, Table, quantity};
@@ -28,6 +29,9 @@ pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
     let word = findings.verdict.word();
     let mut page = Page::new(format!("Diagnosis: {word}")).verdict(mark, findings.sentence.clone());
     page = page.section(causes(diagnosis));
+    if let Some(term) = &diagnosis.empirical {
+        page = page.section(empirical::section(term));
+    }
     if let Some(section) = held_out(diagnosis) {
         page = page.section(section);
     }
@@ -196,10 +200,11 @@ fn held_out(diagnosis: &Diagnosis) -> Option<Section> {
     let ratio = |f: fn(&crate::gain::Held) -> f64| whole.iter().map(|held| f(held) / held.floor).collect::<Vec<_>>();
     let mut panel = BarPanel::new(Axis::new("error over noise"));
     panel = panel.bars_in(MODEL, "model", ratio(|held| held.rmse_before));
-    // without a cause there is no second model
-    let is_extended = !diagnosis.findings.causes.is_empty();
-    if is_extended {
-        panel = panel.bars_in(EXTENDED, "extended", ratio(|held| held.rmse_after));
+    let is_described = diagnosis.findings.empirical.as_ref().is_some_and(|term| term.written);
+    let second = empirical::second(!diagnosis.findings.causes.is_empty(), is_described);
+    let is_extended = second.is_some();
+    if let Some(name) = second {
+        panel = panel.bars_in(EXTENDED, name, ratio(|held| held.rmse_after));
     }
     let svg = BarChart::new("Held-out error", names).panel(panel).svg();
     let title = if is_extended {
@@ -241,7 +246,6 @@ fn held_out(diagnosis: &Diagnosis) -> Option<Section> {
         table = table.row(row);
     }
     section = section.details(Section::new("By record and regime").table(table));
-    let second = is_extended.then_some("extended");
     let mut inner = Section::new("Pictures of the held-out records");
     for record in 0..pair.problem.records.len() {
         inner = records::pictures(inner, &pair.problem, [&pair.before, &pair.after], record, second, "");

@@ -44,8 +44,8 @@ pub use catalogue::{effects, parameter, parameters};
 pub use check::{check, check_load};
 pub use entry::{Effect, Parameter, Way};
 pub use parameters::{
-    Cable, Capacitor, Carrier, Converter, Inductor, LoadBox, Model, Parameters, Pwm, Rectifier, Sensor, Sensors,
-    ShortPulse, Source, Switch, Topology,
+    Cable, Capacitor, Carrier, Converter, Empirical, Inductor, LoadBox, Model, Parameters, Pwm, Rectifier, Sensor,
+    Sensors, ShortPulse, Source, Switch, Topology,
 };
 pub use plant::{Plant, PlantState};
 pub use reader::REQUIRED;

@@ -24,6 +24,8 @@ pub struct Parameters {
     pub cable: Cable,
     /// What the controller sees.
     pub sensors: Sensors,
+    /// A correction that describes and explains nothing.
+    pub empirical: Empirical,
 }
 
 impl Parameters {
@@ -40,6 +42,7 @@ impl Parameters {
             load: Blank::blank(),
             cable: Blank::blank(),
             sensors: Blank::blank(),
+            empirical: Blank::blank(),
         }
     }
 
@@ -323,6 +326,58 @@ table! {
         i_out: Sensor,
         /// Input voltage, V.
         v_in: Sensor,
+    }
+}
+
+table! {
+    /// A correction of the duty that describes what was measured and is no physics: `crate::effects::empirical`.
+    Empirical at empirical {
+        /// Added throughout, 1.
+        constant: f64,
+        /// Per scaled duty, 1.
+        d: f64,
+        /// Per scaled output voltage, 1.
+        v: f64,
+        /// Per scaled inductor current, 1.
+        i: f64,
+        /// Per scaled rate of the duty, 1.
+        rate: f64,
+        /// Per square of the scaled duty, 1.
+        d_d: f64,
+        /// Per square of the scaled voltage, 1.
+        v_v: f64,
+        /// Per square of the scaled current, 1.
+        i_i: f64,
+        /// Per square of the scaled rate, 1.
+        rate_rate: f64,
+        /// Per product of scaled duty and voltage, 1.
+        d_v: f64,
+        /// Per product of scaled duty and current, 1.
+        d_i: f64,
+        /// Per product of scaled voltage and current, 1.
+        v_i: f64,
+        /// Per product of scaled duty and rate, 1.
+        d_rate: f64,
+        /// Per product of scaled voltage and rate, 1.
+        v_rate: f64,
+        /// Per product of scaled current and rate, 1.
+        i_rate: f64,
+        /// Middle of the range of the duty, 1.
+        d_centre: f64,
+        /// Half of that range, 1.
+        d_span: f64,
+        /// Middle of the range of the output voltage, V.
+        v_centre: f64,
+        /// Half of that range, V.
+        v_span: f64,
+        /// Middle of the range of the inductor current, A.
+        i_centre: f64,
+        /// Half of that range, A.
+        i_span: f64,
+        /// Half of the range of the rate, 1.
+        rate_span: f64,
+        /// Time constant of the low-pass of which the duty less its output is the rate, s.
+        rate_time: f64,
     }
 }
 

@@ -6,7 +6,8 @@ use toml_input::Faults;
 
 use crate::catalogue;
 use crate::check::check;
-use crate::effects::duty_delay::Queue;
+use crate::effects::duty_delay::{self, Queue};
+use crate::effects::empirical::Correction;
 use crate::effects::{dcr, duty_offset, duty_quantisation, load_setting, minimum_on_time};
 use crate::entry::Way;
 use crate::full::{Full, Path, States};
@@ -27,6 +28,7 @@ pub struct Plant {
     pub(crate) full: Full,
     pub(crate) timing: GateTiming,
     pub(crate) sensing: Sensing,
+    correction: Correction,
     /// How it has to be computed.
     pub(crate) way: Way,
     pub(crate) state: PlantState,
@@ -41,6 +43,9 @@ pub struct PlantState {
     pub(crate) gates: Gates,
     pub(crate) queue: Queue,
     pub(crate) applied: f64,
+    #[serde(default)]
+    /// The duty behind the low-pass of `effects::empirical`.
+    pub(crate) slow: f64,
     pub(crate) memory: Memory,
     pub(crate) sample: Sample,
 }
@@ -62,6 +67,7 @@ impl Plant {
             plain: Plain::new(&p.converter, r, p.load.v_fold),
             legs: Legs::new(p),
             full: Full::new(p),
+            correction: Correction::new(p),
             way: catalogue::way(p),
             timing,
             sensing,
@@ -73,6 +79,7 @@ impl Plant {
                 gates: Gates::default(),
                 queue: Queue::default(),
                 applied: 0.0,
+                slow: 0.0,
                 memory: Memory::new(p.sensors.seed, [0.0; 4]),
                 sample: Sample::default(),
             },
@@ -135,6 +142,7 @@ impl Plant {
         state.time = 0.0;
         state.queue = Queue::filled(duty);
         state.applied = duty;
+        state.slow = duty;
         state.gates = Gates::default();
         // sampled inside a PWM period, what is left of that period belongs to the duty in force
         if self.parameters.pwm.sampling_phase > 0.0 {
@@ -151,17 +159,36 @@ impl Plant {
     }
 
     /// [`Plant::reset_at`] in the middle of a run: `commanded` are the duties given before, the latest last. The one in
-    /// force and those that wait are taken from its end; where it is too short they are as after [`Plant::reset_at`].
+    /// force and those that wait are taken from its end; where it is too short they are as after [`Plant::reset_at`]. What
+    /// remembers duties behind those has them as if the first had been held for ever; [`Plant::looks_back`] are enough.
     pub fn reset_within(&mut self, v_out: f64, i_l: f64, load: &Load, commanded: &[f64]) -> Sample {
         let sample = self.reset_at(v_out, i_l, load);
         let waits = self.parameters.pwm.duty_delay as usize;
-        for duty in &commanded[commanded.len().saturating_sub(waits + 1)..] {
+        let (before, last) = commanded.split_at(commanded.len().saturating_sub(waits + 1));
+        if last.len() > waits {
+            self.state.slow = commanded[0];
+        }
+        for duty in before {
+            self.correction.follow(*duty, &mut self.state.slow);
+        }
+        for (n, duty) in last.iter().enumerate() {
+            let slow = self.state.slow;
             self.state.applied = self.modulate(*duty);
+            // what the queue gives back before it has passed on a commanded duty acted in no period
+            if n < waits {
+                self.state.slow = slow;
+            }
         }
         if self.parameters.pwm.sampling_phase > 0.0 {
             self.state.gates.plan(&self.timing, self.state.applied);
         }
         sample
+    }
+
+    /// Commanded duties that [`Plant::reset_within`] can make use of.
+    #[must_use]
+    pub fn looks_back(&self) -> usize {
+        (duty_delay::LONGEST + 1).saturating_add(self.correction.memory())
     }
 
     /// After [`Plant::reset_within`]: what the sensors of output voltage, inductor current, load current and input voltage
@@ -209,7 +236,8 @@ impl Plant {
         // not `clamp`: a duty that is NaN must not get into the state, which would never recover
         let clamped = if duty > 0.0 { duty.min(1.0) } else { 0.0 };
         let queued = self.state.queue.pass(clamped, pwm.duty_delay);
-        let shifted = duty_offset::shift(queued, pwm);
+        let corrected = (self.correction).correct(queued, &mut self.state.slow, &self.state.x);
+        let shifted = duty_offset::shift(corrected, pwm);
         minimum_on_time::limit(duty_quantisation::round(shifted, pwm.duty_lsb), pwm, self.t_sw)
     }
 

@@ -160,6 +160,8 @@ impl Plant {
     /// which would ring for ever, and a load that is unstable in open loop have a steady state as well. Where there is none
     /// (ripple of the source, a duty that jumps between two steps) the plant is only run.
     pub fn rest(&mut self, duty: f64, load: &Load) -> (Sample, bool) {
+        // a duty that stands still has no rate, however it was reached
+        self.state.slow = duty;
         self.run(WARM_UP, duty, load);
         for _ in 0..MOST_NEWTON {
             let before = *self.state();

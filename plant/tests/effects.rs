@@ -317,3 +317,79 @@ fn a_checkpoint_continues_to_the_bit() {
         assert_eq!(plant.step(0.47, &LOAD), other.step(0.47, &LOAD));
     }
 }
+
+/// The correction by its formula: a constant moves the settled voltage by its share of the source, and beyond its range a term
+/// stays what it is at the edge.
+#[test]
+fn an_empirical_term_adds_its_duty_and_stays_what_it_is_beyond_its_range() {
+    let settled = |change: &dyn Fn(&mut plant::Empirical), duty: f64| {
+        let p = changed(|p| change(&mut p.empirical));
+        let load = Load::resistor(20.0);
+        let mut plant = plant(&p);
+        plant.reset_at(duty * 200.0, duty * 10.0, &load);
+        let (sample, rests) = plant.rest(duty, &load);
+        assert!(rests);
+        sample.v_out
+    };
+    let moved =
+        |change: &dyn Fn(&mut plant::Empirical), duty: f64| (settled(change, duty) - settled(&|_| (), duty)) / 200.0;
+    let by_duty = |t: &mut plant::Empirical| (t.d, t.d_centre, t.d_span) = (0.01, 0.5, 0.1);
+    for (duty, expected) in [(0.5, 0.0), (0.55, 0.005), (0.6, 0.01), (0.7, 0.01), (0.3, -0.01)] {
+        let is = moved(&by_duty, duty);
+        assert!((is - expected).abs() < 1e-4, "{duty}: {is}");
+    }
+    assert!((moved(&|t| t.constant = 0.02, 0.4) - 0.02).abs() < 1e-4);
+    // a square, and a product with a rate, which is 0 at rest
+    let square = |t: &mut plant::Empirical| (t.d_d, t.d_centre, t.d_span, t.d_rate) = (0.01, 0.5, 0.1, 0.3);
+    assert!((moved(&square, 0.45) - 0.0025).abs() < 1e-4);
+    // a switch that is told to stay off does
+    assert!(settled(&|t| t.constant = 0.02, 0.0).abs() < 1e-6);
+}
+
+#[test]
+fn the_rate_of_an_empirical_term_fades_with_its_time_constant() {
+    let run = |rate: f64| {
+        let p = changed(|p| {
+            (p.empirical.rate, p.empirical.rate_span, p.empirical.rate_time) = (rate, 0.5, 5e-4);
+            p.converter.model = plant::Model::Averaged;
+        });
+        let load = Load::resistor(20.0);
+        let mut plant = plant(&p);
+        plant.reset_at(100.0, 5.0, &load);
+        (0..4000).map(|_| plant.step(0.6, &load).v_out).collect::<Vec<_>>()
+    };
+    let (with, without) = (run(0.05), run(0.0));
+    // the duty that is added over all: 0.05 times (0.1 / 0.5) e^(-n / 5), a geometric sum; the filter hands its area on
+    let area: f64 = with.iter().zip(&without).map(|(a, b)| a - b).sum::<f64>() / 200.0;
+    let expected = 0.05 * 0.2 / (1.0 - (-0.2f64).exp());
+    assert!((area - expected).abs() < 0.01 * expected, "{area} {expected}");
+    assert!((with[3999] - without[3999]).abs() < 1e-3);
+}
+
+/// A plant that is put into the middle of a run goes on as the run does.
+#[test]
+fn the_rate_of_an_empirical_term_remembers_duties_behind_a_segment() {
+    for delay in [0, 2] {
+        let p = changed(|p| {
+            (p.empirical.rate, p.empirical.rate_span, p.empirical.rate_time) = (0.1, 0.2, 1.7e-3);
+            p.pwm.duty_delay = delay;
+        });
+        let load = Load::resistor(20.0);
+        let mut whole = plant(&p);
+        whole.reset_within(100.0, 5.0, &load, &[0.5; 9]);
+        let mut duties = vec![0.5; 9];
+        for n in 0..40 {
+            let duty = if n < 20 { 0.5 } else { 0.6 };
+            whole.step(duty, &load);
+            duties.push(duty);
+        }
+        let now = whole.sample();
+        let mut later = plant(&p);
+        assert!(later.looks_back() >= 85, "{}", later.looks_back());
+        later.reset_within(now.v_out, now.i_l, &load, &duties);
+        for n in 0..30 {
+            let (a, b) = (whole.step(0.6, &load).v_out, later.step(0.6, &load).v_out);
+            assert!((a - b).abs() < 1e-9, "delay {delay}, period {n}: {a} V {b} V");
+        }
+    }
+}

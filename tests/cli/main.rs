@@ -11,6 +11,7 @@ mod commands;
 mod decisions;
 mod design;
 mod drm;
+mod empirical;
 mod faults;
 mod files;
 mod interruption;

@@ -133,6 +133,9 @@ fn answer(options: &Diagnose, columns: &ColumnMap, findings: &Findings) -> Resul
         lines.push(held.words());
     }
     lines.extend(findings.captures.iter().map(Estimates::words));
+    if let Some(term) = &findings.empirical {
+        lines.push(format!("described, not explained: {}", term.sentence));
+    }
     lines.extend(findings.noise.repairs.iter().map(|repair| format!("note: {repair}")));
     if let Some(reason) = &findings.gain.closed_loop_missing {
         lines.push(format!(

@@ -59,6 +59,16 @@ pub struct Knob {
 }
 
 impl Knob {
+    /// One that moves within `[low, high, step]`, whatever the converter's size.
+    pub(crate) const fn plain(name: &'static str, keys: &'static [&'static str], [low, high, step]: [f64; 3]) -> Self {
+        Knob {
+            name,
+            keys,
+            reach: Reach::Plain(low, high, step),
+            is_lag: false,
+        }
+    }
+
     /// SI unit.
     #[must_use]
     pub fn unit(&self) -> &'static str {

@@ -4,9 +4,10 @@ mod starts;
 mod weigh;
 
 use crate::causes::Search;
-use crate::fit::{FINE, Fit, Fitter, State, solve};
+use crate::fit::{FINE, Fit, Fitter, State};
 use crate::level::{ACCURACY, threshold};
 use crate::noise;
+use crate::normal::solve;
 use crate::parallel;
 use crate::problem::dot;
 use crate::progress::{self, Listener};

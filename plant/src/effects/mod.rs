@@ -19,6 +19,7 @@ pub(crate) mod diode;
 pub(crate) mod duty_delay;
 pub(crate) mod duty_offset;
 pub(crate) mod duty_quantisation;
+pub(crate) mod empirical;
 pub(crate) mod esl;
 pub(crate) mod esr;
 pub(crate) mod input_ripple;
@@ -54,6 +55,7 @@ pub(crate) const ALL: &[&Effect] = &[
     &cpl_fold::EFFECT,
     &load_setting::EFFECT,
     &cable::EFFECT,
+    &empirical::EFFECT,
     &duty_delay::EFFECT,
     &duty_offset::EFFECT,
     &duty_quantisation::EFFECT,

@@ -119,7 +119,7 @@ impl Parallel {
     }
 
     fn solved(&self) -> Solved {
-        let normal = crate::fit::Normal::new(&self.columns, &self.right);
+        let normal = crate::normal::Normal::new(&self.columns, &self.right);
         let values = normal.solved();
         let explained = gained(&self.columns, &self.right);
         let left = (self.right.iter().map(|v| v * v).sum::<f64>() - explained).max(0.0) / (self.count - 3.0).max(1.0);
@@ -132,7 +132,7 @@ impl Parallel {
         let scale = (left.max(1.0) * many).sqrt();
         let sd = |n: usize| {
             let unit: Vec<f64> = (0..3).map(|k| if k == n { 1.0 } else { 0.0 }).collect();
-            crate::fit::solve(normal.matrix(), &unit)[n].max(0.0).sqrt() * scale
+            crate::normal::solve(normal.matrix(), &unit)[n].max(0.0).sqrt() * scale
         };
         Solved {
             esr: (values[0], sd(0)),

@@ -128,3 +128,38 @@ def test_a_rescaled_action_is_followed_outwards():
 
     chain = wrappers.read(RescaleAction(RescaleAction(Inner(), 0.0, 10.0), -1.0, 1.0))
     assert [chain.gain * action + chain.shift for action in (-1.0, 0.0, 1.0)] == pytest.approx([0.25, 0.5, 0.75])
+
+
+def test_stacked_features_look_back_and_the_oldest_is_first():
+    features = [{"name": "a", "source": "x", "filters": ["backward_difference"]}, {"name": "b", "source": "y", "scale": 2.0}]
+    found = contract.stacked(features, 3)
+    assert [feature["name"] for feature in found] == ["a_back2", "b_back2", "a_back1", "b_back1", "a", "b"]
+    assert found[0]["filters"] == ["backward_difference", {"delay": 2}] and found[3]["filters"] == [{"delay": 1}]
+    assert found[1]["scale"] == 2.0 and found[4:] == features
+
+
+def test_wrappers_that_stack_are_read_in_their_order():
+    class Inner:
+        pass
+
+    class FrameStackObservation:
+        stack_size, padding_type = 3, "zero"
+
+        def __init__(self, env):
+            self.env = env
+
+    class NormalizeObservation:
+        epsilon = 0.0
+
+        def __init__(self, env, shape):
+            self.env, self.obs_rms = env, type("Statistics", (), {"mean": np.ones(shape), "var": np.full(shape, 4.0)})
+
+    chain = wrappers.read(NormalizeObservation(FrameStackObservation(NormalizeObservation(Inner(), 2)), (3, 2)))
+    one = (0.5, -0.5, None)
+    assert chain.observed == [[one] * 2, 3, [one] * 6]
+    assert any("padding" in line for line in chain.said)
+    outermost, innermost = (env for env, _ in chain.statistics)
+    outermost.update_running_mean, innermost.update_running_mean = True, False
+    with wrappers.held(chain):
+        assert not outermost.update_running_mean and not innermost.update_running_mean
+    assert outermost.update_running_mean and not innermost.update_running_mean

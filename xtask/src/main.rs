@@ -21,7 +21,8 @@ usage: cargo xtask <command>
 
   test [--quick|--full] [--skip-install]   everything CI asks for; the last line counts the steps
          --quick          without the crates `tests` and `blind`, the wheel, rustdoc, firmware and the demo
-         --full           what a release asks for: 20,000 steps on every emulated target, float libraries included
+         --full           what a release asks for: 20,000 steps on every emulated target, float libraries included; the libraries
+                          of trainers and Ray; packages and the oldest compiler
          --skip-install   look for the tools, install none
   setup                             only the tools: compilers, emulators, ngspice, mdBook (also called install)
   bless                             rewrite the golden files from what the code produces now
@@ -146,7 +147,10 @@ fn run(command: Command) -> Result<bool, String> {
         Command::Release => Ok(steps::run_all(
             &Workspace::load()?,
             steps::OF_A_RELEASE,
-            Options::default(),
+            Options {
+                full: true,
+                ..Options::default()
+            },
         )),
         Command::Bless => bless(&Workspace::load()?),
         Command::Layers => layers(&Workspace::load()?),

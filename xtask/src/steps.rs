@@ -44,62 +44,82 @@ enum Done {
 
 type Outcome = Result<Done, String>;
 
+/// The shortest form of a run that a step belongs to.
+#[derive(Clone, Copy, PartialEq, PartialOrd)]
+enum Form {
+    Quick,
+    Usual,
+    Full,
+}
+
+impl Form {
+    fn of(options: Options) -> Self {
+        match options {
+            Options { quick: true, .. } => Self::Quick,
+            Options { full: true, .. } => Self::Full,
+            Options { .. } => Self::Usual,
+        }
+    }
+}
+
 /// One thing that is tested.
 pub struct Step {
     name: &'static str,
-    in_quick: bool,
+    form: Form,
     run: fn(&Context) -> Outcome,
 }
 
-const fn step(name: &'static str, in_quick: bool, run: fn(&Context) -> Outcome) -> Step {
-    Step { name, in_quick, run }
+const fn step(name: &'static str, form: Form, run: fn(&Context) -> Outcome) -> Step {
+    Step { name, form, run }
 }
 
-const PAGES: Step = step("pages", true, |c| judged(rules::pages(c.workspace)));
-const BOOK: Step = step("book", true, book);
+const PAGES: Step = step("pages", Form::Quick, |c| judged(rules::pages(c.workspace)));
+const BOOK: Step = step("book", Form::Quick, book);
 
 /// What an author of pages wants to know.
 pub const OF_THE_BOOK: &[Step] = &[PAGES, BOOK];
 
-const WHEEL: Step = step("wheel", false, wheel);
+const WHEEL: Step = step("wheel", Form::Usual, wheel);
 
 /// The Python package.
 pub const OF_THE_WHEEL: &[Step] = &[WHEEL];
 
-const MANIFESTS: Step = step("manifests", true, |c| {
+const MANIFESTS: Step = step("manifests", Form::Quick, |c| {
     judged(Ok(Findings {
         faults: release::faults(&c.workspace.crates),
         warnings: Vec::new(),
     }))
 });
 
+const PACKAGES: Step = step("packages", Form::Full, |c| {
+    release::pack(c.workspace, &c.log, c.limit()).map(Done::Passed)
+});
+
+const OLDEST: Step = step("oldest", Form::Full, |c| {
+    release::oldest(c.workspace, &c.log, c.limit()).map(Done::Passed)
+});
+
 /// What a release asks for beside the tests.
-pub const OF_A_RELEASE: &[Step] = &[
-    MANIFESTS,
-    step("packages", true, |c| {
-        release::pack(c.workspace, &c.log, c.limit()).map(Done::Passed)
-    }),
-    step("oldest", true, |c| {
-        release::oldest(c.workspace, &c.log, c.limit()).map(Done::Passed)
-    }),
-];
+pub const OF_A_RELEASE: &[Step] = &[MANIFESTS, PACKAGES, OLDEST];
 
 /// What CI asks for.
 pub const ALL: &[Step] = &[
-    step("tools", true, install),
+    step("tools", Form::Quick, install),
     MANIFESTS,
-    step("layers", true, |c| judged(rules::layers(c.workspace))),
-    step("lengths", true, |c| judged(rules::lengths(c.workspace))),
-    step("portable", true, |c| judged(rules::portable(c.workspace))),
+    step("layers", Form::Quick, |c| judged(rules::layers(c.workspace))),
+    step("lengths", Form::Quick, |c| judged(rules::lengths(c.workspace))),
+    step("portable", Form::Quick, |c| judged(rules::portable(c.workspace))),
     PAGES,
     BOOK,
-    step("fmt", true, fmt),
-    step("clippy", true, clippy),
-    step("test", true, test),
+    step("fmt", Form::Quick, fmt),
+    step("clippy", Form::Quick, clippy),
+    step("test", Form::Quick, test),
     WHEEL,
-    step("rustdoc", false, rustdoc),
-    step("firmware", false, firmware),
-    step("demo", false, demo),
+    step("rustdoc", Form::Usual, rustdoc),
+    step("firmware", Form::Usual, firmware),
+    step("demo", Form::Usual, demo),
+    PACKAGES,
+    OLDEST,
 ];
 
 struct Context<'a> {
@@ -133,7 +153,8 @@ impl Context<'_> {
 
 /// Runs every step, also after a failing one; true when none failed.
 pub fn run_all(workspace: &Workspace, steps: &[Step], options: Options) -> bool {
-    let steps: Vec<&Step> = steps.iter().filter(|step| step.in_quick || !options.quick).collect();
+    let form = Form::of(options);
+    let steps: Vec<&Step> = steps.iter().filter(|step| step.form <= form).collect();
     let mut passed = 0;
     let mut failures = Vec::new();
     let started = Instant::now();
@@ -296,6 +317,8 @@ fn wheel(context: &Context) -> Outcome {
     } = context;
     Ok(match wheel::test(workspace, options.full, log, context.limit())? {
         Ok(notes) => Done::Passed(notes),
+        // a release is not made of what was not tested
+        Err(reason) if options.full => return Err(format!("{reason}\n  = hint: cargo xtask setup")),
         Err(reason) => Done::Skipped(reason),
     })
 }
@@ -345,6 +368,31 @@ fn demo(context: &Context) -> Outcome {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn names(options: Options) -> Vec<&'static str> {
+        let form = Form::of(options);
+        ALL.iter()
+            .filter(|step| step.form <= form)
+            .map(|step| step.name)
+            .collect()
+    }
+
+    #[test]
+    fn a_longer_form_has_the_steps_of_the_shorter_and_the_full_one_those_of_a_release() {
+        let quick = Options {
+            quick: true,
+            ..Options::default()
+        };
+        let full = Options {
+            full: true,
+            ..Options::default()
+        };
+        let (quick, usual, full) = (names(quick), names(Options::default()), names(full));
+        assert!(quick.iter().all(|name| usual.contains(name)) && usual.iter().all(|name| full.contains(name)));
+        assert!(!quick.contains(&"wheel") && usual.contains(&"wheel") && !usual.contains(&"oldest"));
+        assert!(OF_A_RELEASE.iter().all(|step| full.contains(&step.name)));
+        assert_eq!(full.len(), ALL.len());
+    }
 
     #[test]
     fn a_fault_fails_a_step_and_a_warning_does_not() {

@@ -37,6 +37,18 @@ def normalised(feature: Mapping[str, Any], affine: Affine) -> Dict[str, Any]:
     return found
 
 
+def stacked(features: Sequence[Mapping[str, Any]], count: int) -> List[Dict[str, Any]]:
+    """The features whose observation is the last `count` of `features`, the oldest first. A delay begins with what it sees first."""
+    found = [dict(feature) for feature in features]
+    for back in range(1, count):
+        delayed = [
+            {**feature, "name": f"{feature['name']}_back{back}", "filters": [*(feature.get("filters") or []), {"delay": back}]}
+            for feature in features
+        ]
+        found = delayed + found
+    return found
+
+
 def _actions(data: Mapping[str, Any]) -> Dict[str, Any]:
     """The entries of ``[actions]``; none where an action is a number, whose scale the model says."""
     if data["law"] is not None:

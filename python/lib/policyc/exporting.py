@@ -40,8 +40,8 @@ def export(
 
     `model` is one of Stable-Baselines3 (DQN, QR-DQN, PPO, A2C, SAC, TD3, DDPG), a ``torch.nn.Module`` whose layers are called in the
     order in which it has them, or the path of a saved model (ONNX, ``.zip``, ``.pt``, safetensors). `env` is what it was trained on;
-    without it the model's own. Of its wrappers VecNormalize, NormalizeObservation, FlattenObservation and RescaleAction are read, and
-    those that would change what the network sees in another way are refused by name.
+    without it the model's own. Of its wrappers VecNormalize, NormalizeObservation, VecFrameStack, FrameStackObservation,
+    FlattenObservation and RescaleAction are read, and those that would change what the network sees in another way are refused by name.
 
     Behind the wrappers an environment ``policyc/Converter-v0`` gives everything else: the contract is its own. For another one say
     `signals` (:class:`Signal` or mappings with ``name``, ``unit``, ``range``), `features` (mappings with ``name``, ``source``,
@@ -73,14 +73,11 @@ def export(
             "fallback": fallback,
         }
         entries, mapping = _entries(chain, given, taken)
-        for affine in chain.affine:
-            if len(affine) != len(entries["features"]):
-                raise ValueError(f"{len(affine)} observations are normalised, and there are {len(entries['features'])} features")
-            pairs = zip(entries["features"], affine)
-            entries["features"] = [contracts.normalised(feature, one) for feature, one in pairs]
+        entries["features"] = _observed(entries["features"], chain)
         gain, shift = _command(chain, taken, duty, entries, duties)
         if observations is None and env is not None and hasattr(model, "predict"):
-            observations = _run(model, env)
+            with wrappers.held(chain):
+                observations = _run(model, env)
         elif observations is None:
             # what the controller can ever see is known once the contract is read
             observations = _drawn(_written(os.path.join(scratch, "bounds"), entries, taken, chain, None, mapping))
@@ -140,6 +137,18 @@ def _entries(chain: wrappers.Chain, given: Dict[str, Any], taken: models.Model) 
     return {"actions": {}, **said}, None
 
 
+def _observed(features: List[Dict[str, Any]], chain: wrappers.Chain) -> List[Dict[str, Any]]:
+    """The features behind the wrappers."""
+    for step in chain.observed:
+        if isinstance(step, int):
+            features = contracts.stacked(features, step)
+        elif len(step) != len(features):
+            raise ValueError(f"{len(step)} observations are normalised, and there are {len(features)} features")
+        else:
+            features = [contracts.normalised(feature, one) for feature, one in zip(features, step)]
+    return features
+
+
 def _command(
     chain: wrappers.Chain,
     taken: models.Model,
@@ -191,17 +200,13 @@ def _drawn(policy: Policy) -> np.ndarray:
 def _run(model: Any, env: Any) -> np.ndarray:
     """A run with the model, which explores a little so that it meets more than one state."""
     is_vector = hasattr(env, "num_envs") and hasattr(env, "step_wait")
-    training = getattr(env, "training", None)
-    if training is not None:
-        # what is looked at must not change the statistics
-        env.training = False
     first = env.reset()
     observation = first if is_vector else first[0]
     seen: List[np.ndarray] = []
     draws = np.random.default_rng(1)
     while len(seen) < OBSERVATIONS:
-        rows = np.atleast_2d(np.asarray(observation, np.float32))
-        seen.extend(rows)
+        # frames lie one behind the other, as the network sees them
+        seen.extend(np.asarray(observation, np.float32).reshape(len(observation) if is_vector else 1, -1))
         action, _ = model.predict(observation, deterministic=draws.random() < 0.7)
         if is_vector:
             observation = env.step(action)[0]
@@ -209,8 +214,6 @@ def _run(model: Any, env: Any) -> np.ndarray:
             observation, _, terminated, truncated, _ = env.step(action)
             if terminated or truncated:
                 observation, _ = env.reset()
-    if training is not None:
-        env.training = training
     return np.array(seen[:OBSERVATIONS], np.float32)
 
 

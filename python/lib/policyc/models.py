@@ -135,7 +135,9 @@ def from_sb3(model: Any, folder: str) -> Model:
         return found.cpu().numpy()
 
     def commands(observations: np.ndarray) -> np.ndarray:
-        return model.predict(observations, deterministic=True)[0].reshape(-1)
+        # frames that lie one behind the other, as the model knows them
+        shaped = observations.reshape(-1, *model.observation_space.shape)
+        return model.predict(shaped, deterministic=True)[0].reshape(-1)
 
     squash = "clip" if hasattr(policy, "action_net") else "tanh"
     bounds = model.observation_space
@@ -144,7 +146,7 @@ def from_sb3(model: Any, folder: str) -> Model:
         files=files,
         answer=outputs if ends is None else commands,
         continuous=None if ends is None else (squash, *ends),
-        bounds=(bounds.low, bounds.high),
+        bounds=(bounds.low.reshape(-1), bounds.high.reshape(-1)),
         said=[f"{kind}: " + said[0], *said[1:]] if said else [kind],
     )
 

@@ -1,8 +1,9 @@
 """What stands between a converter and its trainer: wrappers of gymnasium and of Stable-Baselines3, by name, so that neither library
 is asked for."""
 
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any, List, Optional, Tuple
+from typing import Any, Callable, Dict, Iterator, List, Optional, Tuple, Union
 
 import numpy as np
 
@@ -30,8 +31,11 @@ NEUTRAL = {
     "DummyVecEnv",
 }
 
-#: What a contract says in their place.
-STACKS = {"FrameStack", "FrameStackObservation", "VecFrameStack", "DelayObservation"}
+#: They show the latest observations together, the oldest first: how many.
+STACKS: Dict[str, Callable[[Any], int]] = {
+    "FrameStackObservation": lambda env: int(env.stack_size),
+    "VecFrameStack": lambda env: int(env.stacked_obs.n_stack),
+}
 
 
 @dataclass
@@ -40,19 +44,30 @@ class Chain:
 
     #: The environment itself.
     inner: Any
-    #: Normalisations of the observation, the innermost first, a list of one for each feature.
-    affine: List[List[Affine]] = field(default_factory=list)
+    #: What becomes of the observation, the innermost first: normalisations, one for each feature, or as many frames together.
+    observed: List[Union[List[Affine], int]] = field(default_factory=list)
     #: The command of the environment from the action of the trainer: ``gain * action + shift``.
     gain: float = 1.0
     shift: float = 0.0
     said: List[str] = field(default_factory=list)
+    #: Wrappers whose statistics follow what they see, and the attribute that stops them.
+    statistics: List[Tuple[Any, str]] = field(default_factory=list)
 
 
 def _normal(rms: Any, epsilon: float, limit: Optional[float]) -> List[Affine]:
     """Scale and offset of running statistics, in binary64."""
-    mean, var = np.atleast_1d(np.asarray(rms.mean, float)), np.atleast_1d(np.asarray(rms.var, float))
+    mean, var = np.asarray(rms.mean, float).reshape(-1), np.asarray(rms.var, float).reshape(-1)
     scale = 1.0 / np.sqrt(var + epsilon)
     return [(float(s), float(-m * s), limit) for s, m in zip(scale, mean)]
+
+
+def _frames(env: Any, name: str, said: List[str]) -> int:
+    """How many observations a wrapper shows together; what a controller does in another way is said."""
+    count = STACKS[name](env)
+    is_same = getattr(env, "padding_type", "zero") == "reset"
+    differs = "" if is_same else "; before the first of an episode the controller sees the first again, and not the trainer's padding"
+    said.append(f"{count} observations stacked by {name}{differs}")
+    return count
 
 
 def _ends(space: Any) -> Tuple[float, float]:
@@ -64,20 +79,21 @@ def _ends(space: Any) -> Tuple[float, float]:
 
 def read(env: Any) -> Chain:
     """Walks from the outermost wrapper to the environment itself."""
-    chain, outwards = Chain(env), []
+    chain = Chain(env)
+    outwards: List[Union[List[Affine], int]] = []
     while True:
         name = type(env).__name__
         if name in STACKS:
-            raise ValueError(
-                f"{name}: a stack of frames is not read; give the contract a feature for each frame, with filters = "
-                "[{ delay = 1 }], [{ delay = 2 }], ..., and train on its observation"
-            )
-        if name == "VecNormalize":
+            outwards.append(_frames(env, name, chain.said))
+        elif name == "VecNormalize":
             if env.norm_obs:
                 outwards.append(_normal(env.obs_rms, env.epsilon, float(env.clip_obs)))
                 chain.said.append("observations normalised by VecNormalize")
+            # those of the reward, too
+            chain.statistics.append((env, "training"))
         elif name == "NormalizeObservation":
             outwards.append(_normal(env.obs_rms, env.epsilon, None))
+            chain.statistics.append((env, "update_running_mean"))
             chain.said.append("observations normalised by NormalizeObservation")
         elif name == "RescaleAction":
             low, high = _ends(env.env.action_space)
@@ -92,6 +108,19 @@ def read(env: Any) -> Chain:
         if inner is None and hasattr(env, "env"):
             inner = env.env
         if inner is None:
-            chain.inner, chain.affine = env, outwards[::-1]
+            chain.inner, chain.observed = env, outwards[::-1]
             return chain
         env = inner
+
+
+@contextmanager
+def held(chain: Chain) -> Iterator[None]:
+    """A look at the environment that leaves the statistics of its wrappers as they are."""
+    before = [getattr(env, name) for env, name in chain.statistics]
+    try:
+        for env, name in chain.statistics:
+            setattr(env, name, False)
+        yield
+    finally:
+        for (env, name), value in zip(chain.statistics, before):
+            setattr(env, name, value)

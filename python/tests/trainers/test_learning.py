@@ -28,12 +28,9 @@ def meets(policy, converter):
 
 def test_a_dqn_learns_the_papers_task_to_its_specification(tmp_path):
     torch.set_num_threads(1)
-    converter = {
-        "plant": "examples/plants/paper-model.toml",
-        "contract": "examples/train/paper12/policy.toml",
-        "set": {"switch.r_ds_on": 0.1, "switch.v_f": 0.8},
-    }
-    env = gymnasium.make("policyc/Converter-v0", **converter)
+    env = gymnasium.make("policyc/Converter-v0", training="examples/train/paper12.toml")
+    # of the same file
+    converter = {"plant": "examples/plants/paper-model.toml", "set": {"switch.r_ds_on": 0.1, "switch.v_f": 0.8}}
     # the settings of the training file, in the library's words
     model = stable_baselines3.DQN(
         "MlpPolicy",

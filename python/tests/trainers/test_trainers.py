@@ -114,11 +114,55 @@ def test_wrappers_are_read_or_refused_by_name(tmp_path, number):
     model = stable_baselines3.SAC("MlpPolicy", env, learning_starts=100, **small()).learn(150)
     policy = policyc.export(model, tmp_path / "policy", verify=500)
     assert policy.inspect().json["continuous"]["scale"] == pytest.approx(0.055, rel=1e-5)
-    stacked = VecFrameStack(make_vec_env("policyc/Converter-v0", 1, env_kwargs={"plant": PLANT, "contract": DUTIES, "episode": LOADS}), 2)
-    model = stable_baselines3.DQN("MlpPolicy", stacked, **small())
-    with pytest.raises(ValueError, match="delay"):
-        policyc.export(model, tmp_path / "stacked")
-    assert not (tmp_path / "stacked").exists()
+    delayed = gymnasium.wrappers.DelayObservation(gymnasium.make("policyc/Converter-v0", **{**arguments, "contract": DUTIES}), 1)
+    model = stable_baselines3.DQN("MlpPolicy", delayed, **small())
+    with pytest.raises(ValueError, match="DelayObservation"):
+        policyc.export(model, tmp_path / "delayed")
+    assert not (tmp_path / "delayed").exists()
+
+
+def test_stacked_observations_are_features_with_a_delay(tmp_path, number):
+    arguments = {"plant": PLANT, "contract": DUTIES, "episode": LOADS}
+    env = gymnasium.wrappers.FrameStackObservation(gymnasium.make("policyc/Converter-v0", **arguments), 3)
+    model = stable_baselines3.DQN("MlpPolicy", env, learning_starts=100, **small()).learn(200)
+    policy = policyc.export(model, tmp_path / "policy", verify=500)
+    assert policy.inspect().golden_vectors == 128
+    assert len(policy.inspect().features) == 3 * env.observation_space.shape[1]
+    hold(policy, model, env)
+    # a number as the action
+    arguments["contract"] = number
+    env = gymnasium.wrappers.FrameStackObservation(gymnasium.make("policyc/Converter-v0", **arguments), 2)
+    model = stable_baselines3.SAC("MlpPolicy", env, learning_starts=100, **small()).learn(150)
+    hold(policyc.export(model, tmp_path / "number", verify=500), model, env)
+
+
+def test_stacked_observations_are_read_on_either_side_of_their_normalisation(tmp_path):
+    arguments = {"plant": PLANT, "contract": DUTIES, "episode": LOADS}
+    for name, wrap in {
+        "outside": lambda env: VecFrameStack(VecNormalize(env, clip_obs=4.0), 2),
+        "inside": lambda env: VecNormalize(VecFrameStack(env, 2), clip_obs=4.0),
+    }.items():
+        vector = wrap(make_vec_env("policyc/Converter-v0", 1, env_kwargs=arguments))
+        model = stable_baselines3.PPO("MlpPolicy", vector, n_steps=100, batch_size=100, **small()).learn(200)
+        normal = vector if name == "inside" else vector.venv
+        before = normal.obs_rms.mean.copy(), normal.obs_rms.count
+        policy = policyc.export(model, tmp_path / name, verify=500)
+        assert (before[0] == normal.obs_rms.mean).all() and before[1] == normal.obs_rms.count and normal.training
+        controller = policyc.Controller(policy)
+        inner = gymnasium.make("policyc/Converter-v0", **arguments)
+        latest, info = inner.reset(seed=9)
+        before, same = latest, 0
+        for _ in range(200):
+            command = controller.step([info["measured"][signal] for signal in controller.signals])
+            if name == "inside":
+                seen = normal.normalize_obs(np.concatenate([before, latest]))
+            else:
+                seen = np.concatenate([normal.normalize_obs(before), normal.normalize_obs(latest)])
+            action, _ = model.predict(seen, deterministic=True)
+            same += command.action_index == action
+            before = latest
+            latest, _, _, _, info = inner.step(action)
+        assert same >= 199, name
 
 
 def test_a_module_of_torch_becomes_verified_code(tmp_path):

@@ -109,6 +109,8 @@ fn actions_that_differ_without_observations_are_no_equal_observations() {
 /// Increments of the duty: the law is the duty before.
 #[test]
 fn what_an_action_adds_is_held_against_the_log() {
+    /// Cells of a row from the duty before and behind it.
+    type Cells = fn((f64, f64)) -> String;
     let desk = Desk::new("activations");
     let law = "base = \"previous_duty\"\noffsets = [-0.02, 0.0, 0.02]";
     desk.edit("policy/policy.toml", "duties = [0.4, 0.5, 0.6]", law);
@@ -128,7 +130,7 @@ fn what_an_action_adds_is_held_against_the_log() {
         let ran = desk.type_in(REPLAY);
         (ran.code, ran.stdout)
     };
-    let forms: [(&str, fn((f64, f64)) -> String); 4] = [
+    let forms: [(&str, Cells); 4] = [
         (",duty", |pair| format!(",{:.6}", pair.1)),
         (",previous_duty", |pair| format!(",{:.6}", pair.0)),
         (",obs_d", |pair| format!(",{:.6}", pair.0)),

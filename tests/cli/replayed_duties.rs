@@ -162,4 +162,16 @@ fn what_an_action_adds_is_held_against_the_log() {
     }
     let (code, text) = said(&log(",duty", |_| ",0.3".to_owned()));
     assert_eq!(code, Some(1), "{text}");
+    // three digits are enough for these offsets, and two of them tell nothing of offsets of a hundredth
+    let rounded = |digits: usize, adds: [f64; 3]| {
+        let list = duties(adds);
+        said(&log(",duty", |row| format!(",{:.digits$}", list[row].1)))
+    };
+    let (code, text) = rounded(3, [-0.0203, 0.0, 0.0203]);
+    assert_eq!(code, Some(0), "{text}");
+    desk.edit("policy/policy.toml", "[-0.02, 0.0, 0.02]", "[-0.008, 0.0, 0.008]");
+    let (code, text) = rounded(2, [-0.008, 0.0, 0.008]);
+    assert!(code == Some(0) && !text.contains("are others"), "{text}");
+    let (code, text) = rounded(6, [0.008, 0.0, -0.008]);
+    assert_eq!(code, Some(1), "{text}");
 }

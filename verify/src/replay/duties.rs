@@ -76,8 +76,15 @@ fn added(policy: &Policy, head: &Residual, log: &Log, commanded: &[f64]) -> Opti
         .enumerate()
         .flat_map(|(n, one)| own[..n].iter().map(move |other| (one - other).abs()));
     let apart = apart.filter(|apart| *apart > 0.0).fold(f64::INFINITY, f64::min);
-    // a quarter of what tells two actions apart, if that is less
-    let allowed = (SAME * head.limits.high.abs()).min(0.25 * apart);
+    // a quarter of what tells two actions apart, if that is less; a step of the log, half of which the duty before is off and half
+    // the one behind
+    let rows = pairs.iter().filter_map(|pair| commanded.get(pair.0)).copied();
+    let step = rounding(pairs.iter().map(|pair| pair.2), rows);
+    let allowed = (SAME * head.limits.high.abs()).min(0.25 * apart).max(step * 1.001);
+    if allowed >= 0.5 * apart {
+        // rounded so coarsely that one action looks like its neighbour
+        return None;
+    }
     let is_inside = |duty: f64| head.limits.low + allowed < duty && duty < head.limits.high - allowed;
     let mut more: Vec<Vec<f64>> = vec![Vec::new(); own.len()];
     let mut others = Vec::new();
@@ -110,6 +117,20 @@ fn added(policy: &Policy, head: &Residual, log: &Log, commanded: &[f64]) -> Opti
         derived,
         adds: true,
     })
+}
+
+/// The decimal step to which a log was rounded: its values are multiples of it, and what the contract makes is not; 0 where there is
+/// none down to a millionth.
+fn rounding(logged: impl Iterator<Item = f64> + Clone, mut commanded: impl Iterator<Item = f64>) -> f64 {
+    let is_multiple = |value: f64, step: f64, near: f64| ((value / step).round() * step - value).abs() < near * step;
+    // binary64 of a decimal is off by less than a billionth of these steps
+    let is_written = |step: &f64| logged.clone().all(|value| is_multiple(value, *step, 1e-6));
+    // one digit of a duty says nothing to anybody, so nobody logs it
+    let found = [0.01, 1e-3, 1e-4, 1e-5, 1e-6].into_iter().find(is_written);
+    // binary32 of a duty is off by a thirtieth of the smallest
+    found
+        .filter(|step| !commanded.all(|value| is_multiple(value, *step, 0.05)))
+        .unwrap_or(0.0)
 }
 
 /// The duty before each row, as the log has it: `None` where it does not say. A law may read it, and what an action adds shows only

@@ -6,6 +6,7 @@ use toml_input::{Faults, FileName, Message};
 
 use crate::csv;
 use crate::mat;
+use crate::mdf;
 use crate::sheet::Sheet;
 
 /// How a file is read.
@@ -36,7 +37,6 @@ const FOREIGN: &[(&[u8], &str, &str)] = &[
         "an HDF5 file",
         "export the channels as CSV",
     ),
-    (b"MDF     ", "an MDF file", "export the channels as CSV"),
     (
         b"PK\x03\x04",
         "a zip archive (an Excel workbook is one)",
@@ -80,12 +80,19 @@ impl Sheet {
         if let Some((_, what, hint)) = FOREIGN.iter().find(|(start, ..)| bytes.starts_with(start)) {
             let message = Message::new(format!("the file is {what}, which is not read yet"));
             return Err(name
-                .fault(message.expected("a table as text (CSV), or a MAT file").hint(*hint))
+                .fault(
+                    message
+                        .expected("a table as text (CSV), a MAT or an MDF file")
+                        .hint(*hint),
+                )
                 .into());
         }
         // one that was cut off within its first 128 bytes is a MAT file, too
         if ::mat::is_mat(&bytes) || bytes.starts_with(b"MATLAB 5.0 MAT-file") {
             return mat::read(name, &bytes, options.most_bytes);
+        }
+        if ::mdf::is_mdf(&bytes) {
+            return mdf::read(name, &bytes, options.most_bytes);
         }
         csv::read(name, bytes, options)
     }

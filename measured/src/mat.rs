@@ -14,8 +14,8 @@ use std::collections::BTreeMap;
 use ::mat::{Error, Limits, Numbers, Value, Variable};
 use toml_input::{Faults, FileName, Message};
 
-use crate::csv::number::decimals;
-use crate::sheet::{Column, Sheet};
+use crate::logged::{Vector, called, columns, with_unit};
+use crate::sheet::Sheet;
 
 const SAVE: &str = "in MATLAB: v_out = v_out(:); save('run.mat', 't', 'v_out', '-v7'), with a vector for each quantity; or writetable(T, 'run.csv')";
 
@@ -60,13 +60,7 @@ pub fn read(name: FileName, bytes: &[u8], most_bytes: u64) -> Result<Sheet, Faul
         .map(|vector| format!("`{}` ({})", vector.path, vector.values.len()));
     leave(other.collect(), &format!("not of {rows} rows as the others"));
     leave(found.objects, "an object of MATLAB");
-    let names = headers(&taken);
-    let columns = taken.into_iter().zip(names).map(|(vector, name)| {
-        let mut column = Column::new(&name, vector.values);
-        column.decimals = column.values.iter().map(|value| decimals(*value)).max().unwrap_or(0);
-        column
-    });
-    let mut sheet = Sheet::numbered(name, columns.collect());
+    let mut sheet = Sheet::numbered(name, columns(taken));
     sheet.repairs.splice(0..0, repairs);
     Ok(sheet)
 }
@@ -90,15 +84,6 @@ fn told(error: Error) -> Message {
             .expected("a MAT file of version 7 or 6")
             .hint("copy or save the file again"),
     }
-}
-
-/// A vector on its way to a column.
-struct Vector {
-    /// Where it stands: `log.v_out`.
-    path: String,
-    /// What it is called there, with a unit if one is stated.
-    name: String,
-    values: Vec<f64>,
 }
 
 #[derive(Default)]
@@ -158,11 +143,10 @@ impl Found {
             let label = called(&text(&["Name", "name", "label"]));
             let unit = text(&["Unit", "unit"]);
             let is_axis = path.rsplit('.').next() == Some("X");
-            let name = match (label.is_empty(), is_axis, unit.as_str()) {
-                (true, true, _) => "t".to_owned(),
-                (true, false, _) => path.rsplit('.').next().unwrap_or(path).to_owned(),
-                (false, _, "" | "-") => label,
-                (false, ..) => format!("{label} [{unit}]"),
+            let name = match (label.is_empty(), is_axis) {
+                (true, true) => "t".to_owned(),
+                (true, false) => path.rsplit('.').next().unwrap_or(path).to_owned(),
+                (false, _) => with_unit(&label, &unit),
             };
             self.numbers(numbers, path, &name);
             return;
@@ -189,32 +173,12 @@ impl Found {
     }
 
     fn push(&mut self, path: &str, name: &str, values: &[f64]) {
-        let finite = |value: &f64| if value.is_finite() { *value } else { f64::NAN };
         self.vectors.push(Vector {
             path: path.to_owned(),
             name: name.to_owned(),
-            values: values.iter().map(finite).collect(),
+            values: values.to_vec(),
         });
     }
-}
-
-/// What a channel is called at the end of its path: `Model Root/Buck/"v_out"` is `v_out`.
-fn called(label: &str) -> String {
-    let last = label
-        .rsplit('/')
-        .find(|part| !part.trim().is_empty())
-        .unwrap_or_default();
-    last.trim().trim_matches(['"', '\'']).to_owned()
-}
-
-/// The names alone where nothing else has them, else the whole paths.
-fn headers(vectors: &[Vector]) -> Vec<String> {
-    let is_alone = |vector: &Vector| vectors.iter().filter(|other| other.name == vector.name).count() == 1;
-    let header = |vector: &Vector| match is_alone(vector) {
-        true => vector.name.clone(),
-        false => vector.path.clone(),
-    };
-    vectors.iter().map(header).collect()
 }
 
 #[cfg(test)]
@@ -222,6 +186,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
+    use crate::logged::headers;
     use crate::{ColumnMap, Options, VOCABULARY};
 
     /// Made by scipy, with the same table as text beside them.

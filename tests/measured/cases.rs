@@ -306,7 +306,11 @@ fn other_files() -> Vec<Case> {
             &["not a sound MAT file", "save the file again"],
         ),
         refused("MAT 7.3", b"\x89HDF\r\n\x1a\n\0", &["HDF5", "as CSV"]),
-        refused("MDF4", b"MDF     4.10    asammdf", &["an MDF file", "as CSV"]),
+        refused(
+            "MDF4",
+            b"MDF     4.10    asammdf",
+            &["not a sound MDF file", "save the file again"],
+        ),
         refused("workbook", b"PK\x03\x04\x14\0", &["Excel", "CSV"]),
         refused("gzip", b"\x1f\x8b\x08\0", &["gzip"]),
         refused("UTF-16 without mark", &unmarked, &["UTF-16 without a byte order mark"]),

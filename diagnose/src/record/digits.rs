@@ -7,13 +7,20 @@ pub fn last_digit(decimals: u32) -> f64 {
     (0..decimals).fold(1.0, |digit, _| digit / 10.0)
 }
 
+/// Digits that a value may have: binary64 has no whole numbers one apart beyond 2^53.
+const MOST_DIGITS: f64 = 9_007_199_254_740_992.0;
+
 /// The whole number of last digits of which all values are multiples apart, if it is more than one and enough values say so.
 fn whole_step(values: &[f64], digit: f64) -> Option<f64> {
+    let count = |v: &f64| {
+        let count = (v / digit).round();
+        (count.abs() <= MOST_DIGITS).then_some(count as i64)
+    };
     let counts: Vec<i64> = values
         .iter()
         .filter(|v| v.is_finite())
-        .map(|v| (v / digit).round() as i64)
-        .collect();
+        .map(count)
+        .collect::<Option<_>>()?;
     let first = *counts.first()?;
     let common = counts
         .iter()
@@ -66,5 +73,19 @@ pub fn lattice(values: &[f64], decimals: u32) -> f64 {
         step
     } else {
         0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_beyond_all_whole_numbers_have_no_step_of_the_last_digit() {
+        let ends = [f64::MAX, f64::MIN, 1e300, -1e300, 3.0, 5.0, 7.0];
+        let values: Vec<f64> = ends.iter().copied().cycle().take(4 * FEWEST).collect();
+        assert_eq!(whole_step(&values, 1.0), None);
+        let small: Vec<f64> = (0..4 * FEWEST).map(|n| (n % 9) as f64 * 0.4).collect();
+        assert!((whole_step(&small, 0.1).unwrap() - 0.4).abs() < 1e-12);
     }
 }

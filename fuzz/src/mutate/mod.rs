@@ -9,6 +9,9 @@ use crate::corpus::Corpus;
 use crate::forms::Form;
 use crate::targets::Target;
 
+/// Bytes of a part between two changes; ten times what an input may have in the end.
+const LONGEST: usize = 1 << 20;
+
 /// Changes `part`, which may be a whole input or what a container holds.
 pub fn edit(part: &mut Vec<u8>, words: &[&str], other: &[u8], random: &mut SplitMix) {
     // mostly one change, so that what lies behind the first check is reached; now and then many
@@ -23,6 +26,8 @@ pub fn edit(part: &mut Vec<u8>, words: &[&str], other: &[u8], random: &mut Split
         } else {
             bytes::edit(part, words, other, random);
         }
+        // each change may copy what is there many times, and sixteen of them would fill the memory
+        part.truncate(LONGEST);
     }
 }
 

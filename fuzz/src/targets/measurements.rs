@@ -11,7 +11,7 @@ use verify::replay::{Log, Wanted, replay};
 use verify::traces::Recorded;
 
 use super::Target;
-use super::seeds::{answer, at, files, head, read};
+use super::seeds::{answer, at, files, folder, head, read};
 use crate::forms::Form;
 use crate::guard::{Answer, Limits, Reader};
 
@@ -26,6 +26,28 @@ pub(super) static TARGETS: &[Target] = &[
         words: WORDS,
         limits: Limits::READER,
         seeds: record_seeds,
+        reader: record,
+    },
+    Target {
+        name: "mdf",
+        about: "an MDF 4 file as a record",
+        // its blocks are found by their places, so a part that grows takes the rest apart
+        form: Form::Bytes,
+        words: &[
+            "MDF     4.10",
+            "##DG",
+            "##CG",
+            "##CN",
+            "##CC",
+            "##DT",
+            "##DZ",
+            "##DL",
+            "##HL",
+            "##TX",
+            "<TX>",
+        ],
+        limits: Limits::READER,
+        seeds: || folder("tests/fixtures/records", &[".mf4", ".mdf"]),
         reader: record,
     },
     Target {

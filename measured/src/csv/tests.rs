@@ -166,7 +166,7 @@ fn files_of_other_kinds_are_called_by_their_names() {
     let cases: [(&[u8], &str); 7] = [
         (b"MATLAB 5.0 MAT-file, Platform: GLNXA64", "not a sound MAT file"),
         (b"\x89HDF\r\n\x1a\n", "an HDF5 file"),
-        (b"MDF     4.10", "an MDF file"),
+        (b"MDF     4.10", "not a sound MDF file"),
         (b"PK\x03\x04\x14", "an Excel workbook is one"),
         (b"t\0,\0v\0", "UTF-16 without a byte order mark"),
         (b"\xff\xfet", "UTF-16 text with bytes that are none"),

@@ -91,6 +91,15 @@ impl Environment for Converter {
         }
     }
 
+    fn set_source(&mut self, v_in: f64) -> Result<(), Error> {
+        let mut parameters = self.plant.parameters().clone();
+        parameters.converter.v_in = v_in;
+        let state = *self.plant.state();
+        self.plant = Plant::new(&parameters)?;
+        self.plant.restore(&state);
+        Ok(())
+    }
+
     fn save(&self) -> Result<Vec<u8>, Error> {
         // the parameters too: an episode may have varied them
         let whole = (self.plant.parameters(), self.plant.state());

@@ -1,6 +1,7 @@
 //! What a training and a scenario ask of a simulated converter.
 
 use plant::{Load, Parameters, Sample};
+use toml_input::Message;
 
 use crate::faults::Error;
 
@@ -75,6 +76,14 @@ pub trait Environment: Clone + Send {
     /// Applies a duty for one control period; the sample is taken at its end.
     fn step(&mut self, duty: f64, load: &LoadPath) -> Sample;
 
+    /// The source has this voltage from now on, V.
+    ///
+    /// # Errors
+    /// If this kind of converter cannot change it while it runs.
+    fn set_source(&mut self, _v_in: f64) -> Result<(), Error> {
+        Err(Message::new("this converter's source cannot step while it runs").into())
+    }
+
     /// Everything that changes from step to step, and the varied parameters.
     ///
     /// # Errors
@@ -141,6 +150,10 @@ impl<E: Environment> Environment for Varied<E> {
 
     fn step(&mut self, duty: f64, load: &LoadPath) -> Sample {
         self.nominal.step(duty, load)
+    }
+
+    fn set_source(&mut self, v_in: f64) -> Result<(), Error> {
+        self.nominal.set_source(v_in)
     }
 
     fn save(&self) -> Result<Vec<u8>, Error> {

@@ -60,13 +60,20 @@ impl LoadKind {
     }
 }
 
-/// A load before and after; shown as `200 -> 500 W`.
+/// What may be the source of a step of the source, V; as far apart as [`LoadKind::range`].
+pub const SOURCE_RANGE: RangeInclusive<f64> = 1e-3..=1e6;
+
+/// A load before and after, shown as `200 -> 500 W`; or a load that stays while the source steps, shown as
+/// `v_in 180 -> 220 V`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LoadStep {
     /// What the values are.
     pub kind: LoadKind,
     /// Before and after, in the unit of the kind.
     pub values: [f64; 2],
+    /// Voltage of the source before and after, V, if it is the source that steps. It steps right behind a sampling instant, the
+    /// worst there is, since a controller learns of it a whole period later.
+    pub source: Option<[f64; 2]>,
 }
 
 impl LoadStep {
@@ -76,11 +83,35 @@ impl LoadStep {
         self.values.map(|value| self.kind.load(value))
     }
 
-    /// Start of the names of its files: `200-500W`.
+    /// A step of the source, V, at a load that stays.
+    #[must_use]
+    pub fn of_source(source: [f64; 2], kind: LoadKind, load: f64) -> Self {
+        Self {
+            kind,
+            values: [load; 2],
+            source: Some(source),
+        }
+    }
+
+    /// What steps, before and after, and its unit: W, A or ohm of a load, V of the source.
+    #[must_use]
+    pub fn stepped(&self) -> ([f64; 2], &'static str) {
+        self.source
+            .map_or((self.values, self.kind.unit()), |source| (source, "V"))
+    }
+
+    /// Start of the names of its files: `200-500W`, or `v_in-180-220V`.
     #[must_use]
     pub fn stem(&self) -> String {
-        let [from, to] = self.values;
-        format!("{from}-{to}{}", self.kind.unit())
+        let ([from, to], unit) = self.stepped();
+        let what = if self.source.is_some() { "v_in-" } else { "" };
+        format!("{what}{from}-{to}{unit}")
+    }
+
+    /// Where in a period the step is at an instant of this phase: that of a source begins with the period.
+    #[must_use]
+    pub fn phase(&self, phase: f64) -> f64 {
+        if self.source.is_some() { 0.0 } else { phase }
     }
 }
 
@@ -90,13 +121,17 @@ impl From<[f64; 2]> for LoadStep {
         Self {
             kind: LoadKind::Power,
             values,
+            source: None,
         }
     }
 }
 
 impl fmt::Display for LoadStep {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [from, to] = self.values;
-        write!(f, "{from} -> {to} {}", self.kind.unit())
+        let ([from, to], unit) = (self.values, self.kind.unit());
+        match self.source {
+            None => write!(f, "{from} -> {to} {unit}"),
+            Some([before, after]) => write!(f, "v_in {before} -> {after} V"),
+        }
     }
 }

@@ -105,6 +105,8 @@ pub struct Finding {
     pub kind: LoadKind,
     /// Load before and after, in the unit of its kind: W, A or ohm.
     pub load_step: [f64; 2],
+    /// Voltage of the source before and after, V, if it is the source that steps.
+    pub source_step: Option<[f64; 2]>,
     /// The worst of the sampling instants, figure by figure.
     pub at_sample: Metrics,
     /// The worst of all instants, figure by figure.
@@ -118,6 +120,7 @@ impl Finding {
         Self {
             kind: step.kind,
             load_step: step.values,
+            source_step: step.source,
             at_sample: Metrics::default(),
             worst: Metrics::default(),
         }
@@ -159,17 +162,18 @@ pub struct Loop<E, C> {
 }
 
 impl<E: Environment, C: FnMut(&Sample) -> f64> Loop<E, C> {
-    /// Starts at `v_ref` with the load's current.
+    /// Starts at `v_ref` with the load's current, and with a source of `v_in` V if that is given.
     ///
     /// # Errors
     /// If the converter cannot be started.
-    pub fn start(mut environment: E, controller: C, v_ref: f64, load: Load) -> Result<Self, Error> {
+    pub fn start(mut environment: E, controller: C, v_ref: f64, load: Load, v_in: Option<f64>) -> Result<Self, Error> {
+        let source: Vec<(&str, f64)> = v_in.map(|v_in| ("converter.v_in", v_in)).into_iter().collect();
         let sample = environment.restart(&Start {
             v_out: v_ref,
             i_l: environment.holding_current(v_ref, load.at(v_ref)),
             load,
             seed: 0,
-            varied: &[],
+            varied: &source,
         })?;
         Ok(Self {
             environment,
@@ -180,6 +184,14 @@ impl<E: Environment, C: FnMut(&Sample) -> f64> Loop<E, C> {
             pre: Vec::new(),
             elapsed: 0,
         })
+    }
+
+    /// The source steps, right behind the sampling instant that has just been.
+    ///
+    /// # Errors
+    /// If the converter's source cannot.
+    pub fn set_source(&mut self, v_in: f64) -> Result<(), Error> {
+        self.environment.set_source(v_in)
     }
 
     /// One control period; returns the voltage error behind it.
@@ -321,15 +333,26 @@ where
     C: FnMut(&Sample) -> f64,
 {
     let t_sample = environment.t_sample();
-    let [from, to] = load_step.into().loads();
-    let mut run = Loop::start(environment, controller, v_ref, from)?;
+    let step = load_step.into();
+    let [from, to] = step.loads();
+    let phase = step.phase(instant.phase);
+    let mut run = Loop::start(
+        environment,
+        controller,
+        v_ref,
+        from,
+        step.source.map(|[before, _]| before),
+    )?;
     let mut records = Vec::new();
     let lead = task.lead + instant.periods;
     // the last period of the lead is `last_before`, in which a step at a sampling instant takes place
     run.lead(lead - 1, task.tail, |record| records.push(record));
-    run.last_before(to, instant.phase, task.tail, |record| records.push(record));
-    let metrics = run.measure(to, instant.phase, task.after, task.tail, |record| records.push(record));
-    let zero = lead as f64 + instant.phase;
+    run.last_before(to, phase, task.tail, |record| records.push(record));
+    if let Some([_, after]) = step.source {
+        run.set_source(after)?;
+    }
+    let metrics = run.measure(to, phase, task.after, task.tail, |record| records.push(record));
+    let zero = lead as f64 + phase;
     for record in &mut records {
         record.time = (record.time - zero) * t_sample;
     }
@@ -355,7 +378,8 @@ where
     let quiet = |_: Record| {};
     let step = load_step.into();
     let [from, to] = step.loads();
-    let mut run = Loop::start(environment.clone(), controller.clone(), v_ref, from)?;
+    let before = step.source.map(|[before, _]| before);
+    let mut run = Loop::start(environment.clone(), controller.clone(), v_ref, from, before)?;
     run.lead(task.lead - 1, task.tail, quiet);
     let mut finding = Finding::new(step);
     let last = instants.iter().map(|instant| instant.periods).max().unwrap_or(0);
@@ -363,8 +387,12 @@ where
         for instant in instants.iter().filter(|instant| instant.periods == period) {
             // from here on every instant has a run of its own; the lead is common to all
             let mut run = run.clone();
-            run.last_before(to, instant.phase, task.tail, quiet);
-            let metrics = run.measure(to, instant.phase, task.after, task.tail, quiet);
+            let phase = step.phase(instant.phase);
+            run.last_before(to, phase, task.tail, quiet);
+            if let Some([_, after]) = step.source {
+                run.set_source(after)?;
+            }
+            let metrics = run.measure(to, phase, task.after, task.tail, quiet);
             finding.add(*instant, metrics);
         }
         run.lead(1, task.tail, quiet);

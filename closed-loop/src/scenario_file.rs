@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use toml_input::{Document, Faults, Message, Sink, Table, Value};
+use toml_input::{Document, Faults, Message, Sink, Table, Value, messages};
 
 use crate::baselines::Kind;
-use crate::load_step::{LoadKind, LoadStep};
+use crate::load_step::{LoadKind, LoadStep, SOURCE_RANGE};
 use crate::read;
 use crate::scenario::Task;
 
@@ -62,10 +62,12 @@ fn top(document: &Document, folder: &Path, root: &mut Table<'_>, faults: &mut Si
     let set = root.with_default("set", Vec::new(), faults, read::plant_numbers);
     let v_ref = root.optional("v_ref").and_then(|v| v.positive(faults));
     let (currents, resistances) = (root.optional("current_steps"), root.optional("resistance_steps"));
+    let sources = document.peek(&["source_steps"]).is_some();
     let task = read::task(root, faults);
     check(&task, document, root, faults);
-    let default_steps = document.peek(&["load_steps"]).is_none() && currents.is_none() && resistances.is_none();
-    let powers_meant = document.peek(&["load_steps"]).is_some() || (currents.is_none() && resistances.is_none());
+    let default_steps =
+        document.peek(&["load_steps"]).is_none() && currents.is_none() && resistances.is_none() && !sources;
+    let powers_meant = document.peek(&["load_steps"]).is_some() || default_steps;
     let powers = if powers_meant {
         task.load_steps.clone()
     } else {
@@ -88,9 +90,11 @@ fn top(document: &Document, folder: &Path, root: &mut Table<'_>, faults: &mut Si
         (LoadKind::Current, currents),
         (LoadKind::Resistance, resistances),
     ];
-    let of_kind =
-        |(kind, pairs): (LoadKind, Vec<[f64; 2]>)| pairs.into_iter().map(move |values| LoadStep { kind, values });
-    let load_steps: Vec<LoadStep> = kinds.into_iter().flat_map(of_kind).collect();
+    let of_kind = |(kind, pairs): (LoadKind, Vec<[f64; 2]>)| {
+        pairs.into_iter().map(move |values| LoadStep { kind, ..values.into() })
+    };
+    let mut load_steps: Vec<LoadStep> = kinds.into_iter().flat_map(of_kind).collect();
+    source_steps(root, &mut load_steps, faults);
     if load_steps.is_empty() && faults.is_empty() {
         let hint = "load_steps = [[200, 500], [500, 200]]  # W";
         faults.push(root.fault(Message::new("a scenario without a load step").hint(hint)));
@@ -104,6 +108,55 @@ fn top(document: &Document, folder: &Path, root: &mut Table<'_>, faults: &mut Si
         task,
         baselines: root.with_default("baselines", Kind::ALL.to_vec(), faults, baselines),
         limits: root.with_default("limit", vec![[0.0, 1.0]], faults, limits),
+    })
+}
+
+/// Steps of the source behind those of the load, at `source_load` or the load before the first of these.
+fn source_steps(root: &mut Table<'_>, load_steps: &mut Vec<LoadStep>, faults: &mut Sink) {
+    let given = root.optional("source_load");
+    let load = match &given {
+        Some(value) => source_load(value, faults),
+        None => load_steps.first().map(|step| (step.kind, step.values[0])),
+    };
+    let Some(value) = root.optional("source_steps") else {
+        if let Some(value) = given.filter(|_| faults.is_empty()) {
+            faults.push(value.fault(Message::new("a load for steps of the source, and no such steps").hint(SOURCES)));
+        }
+        return;
+    };
+    let pairs = read::pairs(&value, "source voltages in V: [[180, 220]]", SOURCE_RANGE, faults).unwrap_or_default();
+    if let Some((kind, load)) = load {
+        load_steps.extend(pairs.into_iter().map(|pair| LoadStep::of_source(pair, kind, load)));
+    } else if given.is_none() {
+        let message = Message::new("steps of the source without a load").hint("source_load = { power = 500.0 }");
+        faults.push(value.fault(message));
+    }
+}
+
+/// How steps of a source are written.
+const SOURCES: &str = "source_steps = [[180, 220]]  # V";
+
+fn source_load(value: &Value<'_>, faults: &mut Sink) -> Option<(LoadKind, f64)> {
+    let kinds = [
+        ("power", LoadKind::Power),
+        ("current", LoadKind::Current),
+        ("resistance", LoadKind::Resistance),
+    ];
+    value.read_table("source_load", faults, |table, faults| {
+        let mut found = Vec::new();
+        for (key, kind) in kinds {
+            let number = table.optional(key).and_then(|v| v.number_within(kind.range(), faults));
+            found.extend(number.map(|number| (kind, number)));
+        }
+        match found.as_slice() {
+            [one] => Some(*one),
+            _ if !faults.is_empty() => None,
+            several => {
+                let keys = "`power` (W), `current` (A), `resistance` (ohm)";
+                faults.push(table.fault(messages::exactly_one_of("source_load", keys, several.len())));
+                None
+            }
+        }
     })
 }
 

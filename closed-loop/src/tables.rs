@@ -18,6 +18,7 @@ impl Finding {
         LoadStep {
             kind: self.kind,
             values: self.load_step,
+            source: self.source_step,
         }
     }
 
@@ -217,7 +218,7 @@ impl MetricsCsv {
     }
 
     fn row(&mut self, name: &str, step: LoadStep, instants: &str, figures: &str) {
-        let ([from, to], unit) = (step.values, step.kind.unit());
+        let ([from, to], unit) = step.stepped();
         let _ = writeln!(self.0, "{name},{from},{to},{unit},{instants},{figures}");
     }
 

@@ -95,7 +95,7 @@ fn resistors_and_current_sinks_are_load_steps_too() {
         (LoadKind::Power, [200.0, 1000.0]),
     ];
     let deviations = steps.map(|(kind, values)| {
-        let (finding, trajectories) = examine(Kind::Deadbeat, &parameters, LoadStep { kind, values });
+        let (finding, trajectories) = examine(Kind::Deadbeat, &parameters, LoadStep { kind, ..values.into() });
         let load = trajectories[0].periods.last().unwrap().record.load;
         assert!((kind.value(&load) - values[1]).abs() < 1e-9 * values[1]);
         assert!(finding.worst.tail_max < 0.01, "{finding:?}");

@@ -107,7 +107,7 @@ pub fn load_steps<'a>(records: impl Iterator<Item = &'a Record>, v_ref: f64) -> 
     let two_digits = |x: f64| format!("{x:.1e}").parse().unwrap_or(x);
     let [low, middle, high] = [LIGHT, 0.5, 1.0].map(|share| two_digits(share * most));
     let steps = [[low, middle], [low, high], [middle, low], [high, low]];
-    steps.map(|values| LoadStep { kind, values }).to_vec()
+    steps.map(|values| LoadStep { kind, ..values.into() }).to_vec()
 }
 
 /// Fits a mapping to `extended` and closes the loop with and without it.

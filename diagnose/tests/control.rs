@@ -24,6 +24,7 @@ fn controlled(change: impl Fn(&mut Parameters)) -> Control {
         load_steps: vec![LoadStep {
             kind: LoadKind::Power,
             values: [200.0, 600.0],
+            source: None,
         }],
         task: Task {
             instants: 1,

@@ -44,7 +44,7 @@ pub fn read(name: FileName, bytes: &[u8], most_bytes: u64) -> Result<Sheet, Faul
             .into());
     };
     let mut sheet = Sheet::numbered(name, columns(vectors(taken)));
-    let others: Vec<String> = tables.iter().flat_map(named).collect();
+    let others: Vec<String> = tables.iter().flat_map(|table| named(table)).collect();
     let mut repairs = Vec::new();
     if !others.is_empty() {
         repairs.push(format!(
@@ -155,7 +155,7 @@ fn vectors(table: Vec<Group>) -> Vec<Vector> {
 }
 
 /// The channels of a table, with its rows.
-fn named(table: &Vec<Group>) -> Vec<String> {
+fn named(table: &[Group]) -> Vec<String> {
     let rows = rows(table);
     let channels = table.iter().flat_map(|group| &group.channels);
     channels

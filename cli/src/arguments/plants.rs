@@ -91,7 +91,10 @@ impl Limit {
             (LoadKind::Resistance, &self.resistance_step),
         ];
         let of_kind = |(kind, pairs): (LoadKind, &Vec<[f64; 2]>)| {
-            let steps = pairs.iter().map(|values| LoadStep { kind, values: *values });
+            let steps = pairs.iter().map(|values| LoadStep {
+                kind,
+                ..LoadStep::from(*values)
+            });
             steps.collect::<Vec<_>>()
         };
         kinds.into_iter().flat_map(of_kind).collect()

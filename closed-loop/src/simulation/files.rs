@@ -28,10 +28,19 @@ struct Json<'a> {
 }
 
 #[derive(Serialize)]
+struct JsonLoad<'a> {
+    value: f64,
+    unit: &'a str,
+}
+
+#[derive(Serialize)]
 struct JsonStep<'a> {
     from: f64,
     to: f64,
     unit: &'a str,
+    /// The load that stays while the source steps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    load: Option<JsonLoad<'a>>,
     controllers: BTreeMap<&'a str, JsonPair<&'a Metrics>>,
     limits: BTreeMap<&'a str, JsonPair<&'a Bound>>,
 }
@@ -164,7 +173,7 @@ fn json(found: &Findings) -> Result<String, Error> {
 }
 
 fn json_step(step: &Step) -> JsonStep<'_> {
-    let [from, to] = step.step.values;
+    let ([from, to], unit) = step.step.stepped();
     let controllers = step.courses.iter().map(|(name, course)| {
         let (sample, worst) = (&course.finding.at_sample, &course.finding.worst);
         (name.as_str(), JsonPair { sample, worst })
@@ -176,7 +185,11 @@ fn json_step(step: &Step) -> JsonStep<'_> {
     JsonStep {
         from,
         to,
-        unit: step.step.kind.unit(),
+        unit,
+        load: step.step.source.map(|_| JsonLoad {
+            value: step.step.values[0],
+            unit: step.step.kind.unit(),
+        }),
         controllers: controllers.collect(),
         limits: limits.collect(),
     }

@@ -13,7 +13,7 @@ use crate::faults::Error;
 use crate::limit::{Limit, left_out};
 use crate::load_step::{LoadKind, LoadStep};
 use crate::scenario_file::Scenario;
-use crate::suits::{draws, held_by, holds_power, suits, v_ref};
+use crate::suits::{draws, held_by, holds_power, reaches, suits, v_ref};
 
 /// Name of the policy among the controllers.
 pub const POLICY: &str = "policy";
@@ -95,6 +95,11 @@ impl Setting {
         let v_ref = v_ref(scenario.v_ref, &policy, file)?;
         suits(&policy, converter.parameters(), v_ref, file)?;
         draws(converter.parameters(), &scenario.load_steps, file)?;
+        for v_in in scenario.load_steps.iter().filter_map(|step| step.source).flatten() {
+            let mut other = converter.parameters().clone();
+            other.converter.v_in = v_in;
+            reaches(&other, v_ref, file)?;
+        }
         if scenario.load_steps.iter().any(|step| step.kind == LoadKind::Power) {
             holds_power(converter.parameters(), v_ref, &plant)?;
         }
@@ -159,6 +164,13 @@ fn notes(scenario: &Scenario, policy: &Policy, converter: &Converter, v_ref: f64
     if let Some(theirs) = held_by(policy).filter(|theirs| *theirs != v_ref) {
         notes.push(format!(
             "the policy holds {theirs} V, but errors are counted from {v_ref} V"
+        ));
+    }
+    if let Some(step) = scenario.load_steps.iter().find(|step| step.source.is_some()) {
+        notes.push(format!(
+            "v_in steps right behind a sampling instant, at a load of {} {}; no limit is computed for it",
+            step.values[0],
+            step.kind.unit()
         ));
     }
     let left_out = left_out(converter.parameters());

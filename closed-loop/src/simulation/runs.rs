@@ -174,6 +174,10 @@ fn difference(name: &str, step: LoadStep, reference: &Trajectory, period: usize)
 
 /// The limits; a reason why there is none becomes a note.
 fn limits(setting: &mut Setting, step: LoadStep) -> Vec<(String, Limit)> {
+    // a note of the setting says so
+    if step.source.is_some() {
+        return Vec::new();
+    }
     let instants = setting.scenario.task.all_instants();
     let phases: Vec<f64> = instants.iter().map(|instant| instant.phase).collect();
     let mut limits = Vec::new();

@@ -239,6 +239,7 @@ pub fn close(bench: &Bench, policy: &Policy) -> Result<Figures, Error> {
         let step = LoadStep {
             kind: LoadKind::Power,
             values,
+            source: None,
         };
         let instant = task.all_instants()[0];
         let run = follow(&converter, &mut agent, v_ref, &task, step, instant)?;

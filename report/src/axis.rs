@@ -304,6 +304,16 @@ impl Settled {
         }
     }
 
+    /// Power of ten by which values are divided where they are shown; nothing on a logarithmic axis.
+    pub fn shown_exponent(&self) -> Option<i32> {
+        (!self.axis.log).then(|| self.axis.scaled_unit(self.low, self.high).0)
+    }
+
+    /// Whether the caller gave the range.
+    pub fn is_fixed(&self) -> bool {
+        self.axis.range.is_some()
+    }
+
     /// Part of the way from low to high; `None` where the value has no place.
     pub fn part(&self, value: f64) -> Option<f64> {
         let place = self.axis.place(value)?;

@@ -203,7 +203,7 @@ impl BarChart {
             below(&mut out, area, &axis.label);
         }
         out.close("svg");
-        Ok(Svg(out.finish()))
+        Ok(Svg::new(out.finish()))
     }
 
     fn columns(&self) -> Result<Svg, ReportError> {
@@ -254,7 +254,7 @@ impl BarChart {
             }
         }
         out.close("svg");
-        Ok(Svg(out.finish()))
+        Ok(Svg::new(out.finish()))
     }
 
     fn draw(&self, out: &mut Markup, panel: &BarPanel, axis: &Settled, area: Area, entries: &[Entry]) {

@@ -8,6 +8,7 @@ use crate::frame::{
     Area, BAND_OPACITY, DASH, EDGE, Entry, Head, LINE, PANEL_TITLE, Svg, TICK_ROOM, WIDTH, below, border, grid,
     rectangle, sheet, widest,
 };
+use crate::live;
 use crate::markup::{Markup, Px};
 use crate::path;
 use crate::series::{Kind, Mark, Series};
@@ -171,6 +172,14 @@ impl Chart {
 
         let mut out = sheet(&self.title, WIDTH, high);
         head.draw(&mut out);
+        let panels: Vec<live::Drawn> = (self.panels.iter().zip(&ys))
+            .map(|(panel, y)| live::Drawn {
+                y,
+                height: panel.height,
+                series: panel.series.iter().map(|series| (series, colours.of(series))).collect(),
+                marks: &panel.marks,
+            })
+            .collect();
         let last = self.panels.len() - 1;
         for (n, ((panel, y), area)) in self.panels.iter().zip(&ys).zip(areas).enumerate() {
             out.text("text", &[("x", &Px(EDGE)), ("y", &Px(area.y - 11.0))], &y.label);
@@ -183,7 +192,9 @@ impl Chart {
             }
         }
         out.close("svg");
-        Ok(Svg(out.finish()))
+        let mut svg = Svg::new(out.finish());
+        svg.live = live::data(&self.title, &x, &panels);
+        Ok(svg)
     }
 }
 

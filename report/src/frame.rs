@@ -8,18 +8,26 @@ use crate::series::Kind;
 
 /// A finished picture: one `<svg>` element, complete as a file of its own and inside an HTML page.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Svg(pub(crate) String);
+pub struct Svg {
+    markup: String,
+    /// Its data for the script of a page, if there is something that can be asked of it.
+    pub(crate) live: Option<String>,
+}
 
 impl Svg {
+    pub(crate) fn new(markup: String) -> Self {
+        Self { markup, live: None }
+    }
+
     /// The markup.
     pub fn as_str(&self) -> &str {
-        &self.0
+        &self.markup
     }
 }
 
 impl std::fmt::Display for Svg {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.0)
+        f.write_str(&self.markup)
     }
 }
 

@@ -185,7 +185,7 @@ impl HeatMap {
             self.bar(&mut out, &value, area);
         }
         out.close("svg");
-        Ok(Svg(out.finish()))
+        Ok(Svg::new(out.finish()))
     }
 
     fn value_axis(&self) -> Result<Settled, ReportError> {

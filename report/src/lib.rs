@@ -1,7 +1,8 @@
 //! Self-contained SVG charts and HTML pages. Knows nothing of what it shows, writes no file.
 //!
 //! [`Chart`] draws series in panels over a shared x axis. [`Page`] puts charts, tables and text into one HTML file
-//! without scripts, fonts or anything loaded.
+//! without fonts or anything loaded. A page with charts has one script, which is this crate's: values under the pointer, zoom, series
+//! that come and go. Where it does not run the pictures say the same, and a policy in the page lets no other run.
 //!
 //! The same input gives the same bytes on every machine: places are rounded to a tenth of a pixel, logarithms come from
 //! a library in plain Rust, order is the caller's, and there is no clock. Long series are thinned to what one column of
@@ -18,6 +19,7 @@ mod error;
 mod font;
 mod frame;
 mod heat;
+mod live;
 mod markup;
 mod number;
 mod page;

@@ -1,7 +1,8 @@
-//! HTML pages: one file, no scripts, nothing loaded.
+//! HTML pages: one file, nothing loaded, no script but that of the charts.
 
 use crate::error::ReportError;
 use crate::frame::Svg;
+use crate::live;
 use crate::markup::Markup;
 use crate::table::Table;
 
@@ -106,10 +107,19 @@ impl Page {
         );
         // whose page it is: policyc replaces its own pages, and no others
         out.leaf("meta", &[("name", &"generator"), ("content", &"policyc")]);
+        let script = self.sections.iter().any(Section::is_live).then(live::script);
+        let policy = live::content_policy(script.as_deref());
+        out.leaf(
+            "meta",
+            &[("http-equiv", &"Content-Security-Policy"), ("content", &policy)],
+        );
         out.text("title", &[], &self.title);
         out.open("style", &[]);
         // inside the page, which loads nothing
         out.raw(include_str!("page.css"));
+        if script.is_some() {
+            out.raw(live::STYLE);
+        }
         out.close("style");
         out.close("head");
         out.open("body", &[]);
@@ -133,7 +143,14 @@ impl Page {
             section.write(&mut out)?;
             out.close("section");
         }
-        for name in ["main", "body", "html"] {
+        out.close("main");
+        if let Some(script) = script {
+            // its digest stands in the policy, so not a byte beside it
+            out.raw("<script>");
+            out.raw(&script);
+            out.raw("</script>\n");
+        }
+        for name in ["body", "html"] {
             out.close(name);
         }
         Ok(out.finish())
@@ -196,6 +213,15 @@ impl Section {
         self.block(Block::Details(inner))
     }
 
+    /// Whether a chart in it has data for the script.
+    fn is_live(&self) -> bool {
+        self.blocks.iter().any(|block| match block {
+            Block::Chart(svg, _) => svg.live.is_some(),
+            Block::Details(inner) => inner.is_live(),
+            Block::Text(_) | Block::Table(_) | Block::Pairs(_) | Block::Code(_) => false,
+        })
+    }
+
     fn block(mut self, block: Block) -> Self {
         self.blocks.push(block);
         self
@@ -206,8 +232,16 @@ impl Section {
             match block {
                 Block::Text(text) => out.text("p", &[], text),
                 Block::Chart(svg, caption) => {
-                    out.open("figure", &[]);
+                    out.open("figure", if svg.live.is_some() { &[("class", &"data")] } else { &[] });
+                    // it may be wider than the screen, and is then scrolled by keys as well
+                    out.open("div", &[("class", &"still"), ("tabindex", &0)]);
                     out.raw(svg.as_str());
+                    out.close("div");
+                    if let Some(data) = &svg.live {
+                        out.raw("<script type=\"application/json\">");
+                        out.raw(data);
+                        out.raw("</script>\n");
+                    }
                     if !caption.is_empty() {
                         out.text("figcaption", &[], caption);
                     }

@@ -256,7 +256,8 @@ impl Section {
                     }
                     out.close("dl");
                 }
-                Block::Code(code) => out.text("pre", &[], code),
+                // it may be wider than the screen
+                Block::Code(code) => out.text("pre", &[("tabindex", &0)], code),
                 Block::Details(inner) => {
                     out.open("details", &[]);
                     out.text("summary", &[], &inner.heading);

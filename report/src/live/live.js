@@ -73,12 +73,12 @@
       const [min, max] = ends(), middle = (min + max) / 2, half = (max - min) / 2 * factor;
       zoom(middle - half, middle + half);
     };
-    for (const [text, label, act] of [["+", "zoom in", scaled(.5)], ["−", "zoom out", scaled(2)], ["whole", "show all", () => zoom(data.x.low, data.x.high)]]) {
+    for (const [text, label, act] of [["+", "zoom in", scaled(.5)], ["−", "zoom out", scaled(2)], ["whole", "show the whole", () => zoom(data.x.low, data.x.high)]]) {
       make("button", tools, text, { type: "button", title: label, onclick: act }).setAttribute("aria-label", label);
     }
 
     const read = at => {
-      axis.textContent = at === null ? data.x.label : `${data.x.label} ${showX(at)}`;
+      along.textContent = at === null ? data.x.label : `${data.x.label} ${showX(at)}`;
       for (const { name, cells } of rows) {
         panels.forEach((panel, index) => {
           const series = panel.series.find(series => series.name === name);
@@ -89,6 +89,29 @@
         });
       }
     };
+
+    const readout = make("table", make("div", box, "", { className: "readout", tabIndex: 0 }), "");
+    readout.parentElement.setAttribute("role", "region");
+    readout.parentElement.setAttribute("aria-label", "values under the pointer");
+    const head = make("tr", make("thead", readout), "");
+    const along = make("th", head, data.x.label, { scope: "col" });
+    for (const panel of panels) make("th", head, panel.label, { scope: "col", className: "n" });
+    const body = make("tbody", readout);
+    const names = [...new Set(panels.flatMap(panel => panel.series.map(series => series.name)))].filter(name => name);
+    for (const name of names) {
+      const row = make("tr", body);
+      const button = make("button", make("th", row, "", { scope: "row" }), "", { type: "button", title: "show or hide" });
+      button.setAttribute("aria-pressed", "true");
+      const one = panels.flatMap(panel => panel.series).find(series => series.name === name);
+      make("i", button).style.background = one.colour;
+      button.append(name);
+      button.onclick = () => {
+        const isHidden = !hidden.delete(name) && Boolean(hidden.add(name));
+        button.setAttribute("aria-pressed", String(!isHidden));
+        for (const plot of plots) plot.series.forEach((series, index) => { if (index && series.label === name) plot.setSeries(index, { show: !isHidden }); });
+      };
+      rows.push({ name, cells: panels.map(() => make("td", row, "", { className: "n" })) });
+    }
 
     const marks = panel => plot => {
       const { ctx, bbox } = plot, ratio = devicePixelRatio;
@@ -176,6 +199,7 @@
         width: width(),
         height: (innerWidth < 600 ? .75 : 1) * panel.height + (isLast ? 30 : 8),
         legend: { show: false },
+        padding: [6, 8, 0, 0],
         cursor: { sync: { key, setSeries: false }, drag: { x: true, y: false, dist: 4 }, points: { size: 6 }, focus: { prox: -1 } },
         scales: {
           x: { time: false, range: (plot, low, high) => [low ?? data.x.low, high ?? data.x.high] },
@@ -204,28 +228,6 @@
     });
     zoom(data.x.low, data.x.high);
 
-    const readout = make("table", make("div", box, "", { className: "readout", tabIndex: 0 }), "");
-    readout.parentElement.setAttribute("role", "region");
-    readout.parentElement.setAttribute("aria-label", "values under the pointer");
-    const head = make("tr", make("thead", readout), "");
-    const axis = make("th", head, data.x.label, { scope: "col" });
-    for (const panel of panels) make("th", head, panel.label, { scope: "col", className: "n" });
-    const body = make("tbody", readout);
-    const names = [...new Set(panels.flatMap(panel => panel.series.map(series => series.name)))].filter(name => name);
-    for (const name of names) {
-      const row = make("tr", body);
-      const button = make("button", make("th", row, "", { scope: "row" }), "", { type: "button", title: "show or hide" });
-      button.setAttribute("aria-pressed", "true");
-      const one = panels.flatMap(panel => panel.series).find(series => series.name === name);
-      make("i", button).style.background = one.colour;
-      button.append(name);
-      button.onclick = () => {
-        const isHidden = !hidden.delete(name) && Boolean(hidden.add(name));
-        button.setAttribute("aria-pressed", String(!isHidden));
-        for (const plot of plots) plot.series.forEach((series, index) => { if (index && series.label === name) plot.setSeries(index, { show: !isHidden }); });
-      };
-      rows.push({ name, cells: panels.map(() => make("td", row, "", { className: "n" })) });
-    }
     read(null);
     figure.classList.add("answers");
     new ResizeObserver(() => {

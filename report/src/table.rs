@@ -77,7 +77,7 @@ impl Table {
             let (what, found) = (self.caption.clone(), row.len());
             return Err(ReportError::Lengths { what, expected, found });
         }
-        out.open("div", &[("class", &"table")]);
+        out.open("div", &[("class", &"table"), ("tabindex", &0)]);
         out.open("table", &[]);
         if !self.caption.is_empty() {
             out.text("caption", &[], &self.caption);

@@ -92,7 +92,7 @@
 
     const readout = make("table", make("div", box, "", { className: "readout", tabIndex: 0 }), "");
     readout.parentElement.setAttribute("role", "region");
-    readout.parentElement.setAttribute("aria-label", "values under the pointer");
+    readout.parentElement.setAttribute("aria-label", `values under the pointer, chart ${number + 1}`);
     const head = make("tr", make("thead", readout), "");
     const along = make("th", head, data.x.label, { scope: "col" });
     for (const panel of panels) make("th", head, panel.label, { scope: "col", className: "n" });

@@ -2,8 +2,9 @@
 // Without it the pictures stand as they are; in print they always do.
 (() => {
   "use strict";
+  const FONT = "system-ui, sans-serif";
   const ink = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-  const make = (name, parent, text, properties = {}) => {
+  const make = (name, parent, text = "", properties = {}) => {
     const element = Object.assign(document.createElement(name), properties);
     if (text) element.textContent = text;
     parent.append(element);
@@ -26,7 +27,7 @@
   };
 
   // the value that a series shows at x: of a step the last before, otherwise the nearest
-  const valueAt = ({ kind, x, y }, at) => {
+  const valueAt = (kind, x, y, at) => {
     let low = 0, high = x.length;
     while (low < high) {
       const middle = (low + high) >> 1;
@@ -37,206 +38,229 @@
     return at - x[low - 1] <= x[low] - at ? y[low - 1] : y[low];
   };
 
-  const alive = (figure, number) => {
-    const data = JSON.parse(figure.querySelector("script").textContent);
-    const xs = data.xs.map(decode);
-    const key = "chart" + number;
-    const hidden = new Set();
-    const box = make("div", figure, "", { className: "live" });
-    figure.prepend(box);
-    make("p", box, data.title, { className: "title" });
-    const tools = make("div", box, "", { className: "tools" });
-    const showX = writer(data.x.high - data.x.low);
-    const plots = [];
-    const rows = [];
-    let moving = false;
+  // lines and stripes across a panel, with their labels
+  const drawMarks = (plot, marks) => {
+    const { ctx, bbox } = plot, ratio = devicePixelRatio;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    ctx.font = `${11 * ratio}px ${FONT}`;
+    for (const { on_x: isX, from, to, label } of marks) {
+      const [a, b] = [from, to].map(value => plot.valToPos(value, isX ? "x" : "y", true)).sort((a, b) => a - b);
+      ctx.strokeStyle = ctx.fillStyle = ink("--dim");
+      if (from === to) {
+        ctx.setLineDash([4 * ratio, 3 * ratio]);
+        ctx.beginPath();
+        ctx.moveTo(isX ? a : bbox.left, isX ? bbox.top : a);
+        ctx.lineTo(isX ? a : bbox.left + bbox.width, isX ? bbox.top + bbox.height : a);
+        ctx.stroke();
+        ctx.setLineDash([]);
+      } else {
+        ctx.globalAlpha = .16;
+        if (isX) ctx.fillRect(a, bbox.top, b - a, bbox.height); else ctx.fillRect(bbox.left, a, bbox.width, b - a);
+        ctx.globalAlpha = 1;
+      }
+      ctx.textAlign = isX ? "left" : "right";
+      if (isX) ctx.fillText(label, a + 5 * ratio, bbox.top + 13 * ratio);
+      else ctx.fillText(label, bbox.left + bbox.width - 6 * ratio, a + (from === to ? -4 : 13) * ratio);
+    }
+    ctx.restore();
+  };
 
-    const panels = data.panels.map(panel => ({
-      ...panel,
-      show: writer(panel.high - panel.low),
-      series: panel.series.map(series => ({ ...series, x: xs[series.x], y: decode(series.y), top: series.top && decode(series.top) })),
-    }));
+  // what uPlot draws of a series; a band is two of them with a surface between
+  const layers = panel => {
+    const tables = [], series = [{}], bands = [];
+    for (const { name, colour, kind, dashed, x, y, top } of panel.series) {
+      const line = { label: name, stroke: colour, width: kind === "band" ? 0 : 1.6, points: { show: false }, dash: dashed ? [6, 4] : undefined };
+      if (kind === "step") line.paths = uPlot.paths.stepped({ align: 1 });
+      if (kind === "points") Object.assign(line, { paths: () => null, points: { show: true, size: 7, fill: colour, stroke: colour } });
+      if (kind === "band") bands.push({ series: [series.length + 1, series.length], fill: colour + "38" });
+      for (const values of kind === "band" ? [y, top] : [y]) {
+        series.push({ ...line });
+        tables.push([x, values]);
+      }
+    }
+    return { series, bands, table: uPlot.join(tables) };
+  };
 
-    const zoom = (min, max) => {
-      const span = (data.x.high - data.x.low) / 2000;
-      if (!(max - min >= span)) return;
-      moving = true;
-      for (const plot of plots) plot.setScale("x", { min: Math.max(min, data.x.low), max: Math.min(max, data.x.high) });
-      moving = false;
-    };
-    const ends = () => [plots[0].scales.x.min, plots[0].scales.x.max];
-    const isWhole = () => {
-      const [min, max] = ends();
-      return min <= data.x.low && max >= data.x.high;
-    };
-    const scaled = factor => () => {
-      const [min, max] = ends(), middle = (min + max) / 2, half = (max - min) / 2 * factor;
-      zoom(middle - half, middle + half);
-    };
-    for (const [text, label, act] of [["+", "zoom in", scaled(.5)], ["−", "zoom out", scaled(2)], ["whole", "show the whole", () => zoom(data.x.low, data.x.high)]]) {
-      make("button", tools, text, { type: "button", title: label, onclick: act }).setAttribute("aria-label", label);
+  class Live {
+    constructor(figure, number) {
+      const data = JSON.parse(figure.querySelector("script").textContent);
+      const xs = data.xs.map(decode);
+      const series = one => ({ ...one, x: xs[one.x], y: decode(one.y), top: one.top && decode(one.top) });
+      this.x = data.x;
+      this.panels = data.panels.map(panel => ({ ...panel, show: writer(panel.high - panel.low), series: panel.series.map(series) }));
+      this.key = `chart${number}`;
+      this.hidden = new Set();
+      this.plots = [];
+      this.rows = [];
+      this.isMoving = false;
+      this.box = make("div", figure, "", { className: "live" });
+      figure.prepend(this.box);
+      make("p", this.box, data.title, { className: "title" });
+      this.addTools();
+      this.addReadout(number);
+      this.panels.forEach((panel, index) => this.addPlot(panel, index));
+      this.zoom(this.x.low, this.x.high);
+      this.read(null);
+      figure.classList.add("answers");
+      new ResizeObserver(() => this.fit()).observe(this.box);
+      matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.plots.forEach(plot => plot.redraw()));
     }
 
-    const read = at => {
-      along.textContent = at === null ? data.x.label : `${data.x.label} ${showX(at)}`;
-      for (const { name, cells } of rows) {
-        panels.forEach((panel, index) => {
+    width() {
+      return Math.max(240, this.box.clientWidth - 20);
+    }
+
+    fit() {
+      for (const plot of this.plots) if (plot.width !== this.width()) plot.setSize({ width: this.width(), height: plot.height });
+    }
+
+    ends() {
+      const { min, max } = this.plots[0].scales.x;
+      return [min, max];
+    }
+
+    isWhole() {
+      const [min, max] = this.plots.length ? this.ends() : [null, null];
+      return min === null || min === undefined || min <= this.x.low && max >= this.x.high;
+    }
+
+    // all panels show the same stretch
+    zoom(min, max) {
+      if (!(max - min >= (this.x.high - this.x.low) / 2000)) return;
+      this.isMoving = true;
+      const ends = { min: Math.max(min, this.x.low), max: Math.min(max, this.x.high) };
+      for (const plot of this.plots) plot.setScale("x", ends);
+      this.isMoving = false;
+    }
+
+    addTools() {
+      const tools = make("div", this.box, "", { className: "tools" });
+      const scaled = factor => () => {
+        const [min, max] = this.ends(), middle = (min + max) / 2, half = (max - min) / 2 * factor;
+        this.zoom(middle - half, middle + half);
+      };
+      const whole = () => this.zoom(this.x.low, this.x.high);
+      for (const [text, label, onclick] of [["+", "zoom in", scaled(.5)], ["−", "zoom out", scaled(2)], ["whole", "show the whole", whole]]) {
+        make("button", tools, text, { type: "button", title: label, onclick }).setAttribute("aria-label", label);
+      }
+    }
+
+    // the legend, with the values under the pointer
+    addReadout(number) {
+      const region = make("div", this.box, "", { className: "readout", tabIndex: 0 });
+      region.setAttribute("role", "region");
+      region.setAttribute("aria-label", `values under the pointer, chart ${number + 1}`);
+      const table = make("table", region);
+      const head = make("tr", make("thead", table));
+      this.along = make("th", head, this.x.label, { scope: "col" });
+      for (const panel of this.panels) make("th", head, panel.label, { scope: "col", className: "n" });
+      const body = make("tbody", table);
+      const all = this.panels.flatMap(panel => panel.series);
+      for (const name of new Set(all.map(series => series.name).filter(name => name))) {
+        const row = make("tr", body);
+        const button = make("button", make("th", row, "", { scope: "row" }), "", { type: "button", title: "show or hide" });
+        button.setAttribute("aria-pressed", "true");
+        make("i", button).style.background = all.find(series => series.name === name).colour;
+        button.append(name);
+        button.onclick = () => button.setAttribute("aria-pressed", String(this.toggle(name)));
+        this.rows.push({ name, cells: this.panels.map(() => make("td", row, "", { className: "n" })) });
+      }
+    }
+
+    // whether it is shown from now on
+    toggle(name) {
+      const isShown = this.hidden.delete(name);
+      if (!isShown) this.hidden.add(name);
+      for (const plot of this.plots) plot.series.forEach((series, index) => { if (index && series.label === name) plot.setSeries(index, { show: isShown }); });
+      return isShown;
+    }
+
+    read(at) {
+      const along = writer(this.x.high - this.x.low);
+      this.along.textContent = at === null ? this.x.label : `${this.x.label} ${along(at)}`;
+      for (const { name, cells } of this.rows) {
+        this.panels.forEach((panel, index) => {
           const series = panel.series.find(series => series.name === name);
           if (!series) return;
-          const value = at === null || hidden.has(name) ? null : valueAt(series, at);
-          const top = series.top && value !== null ? `…${panel.show(valueAt({ ...series, y: series.top }, at))}` : "";
-          cells[index].textContent = at === null ? "" : panel.show(value) + top;
+          const value = values => panel.show(this.hidden.has(name) ? null : valueAt(series.kind, series.x, values, at));
+          cells[index].textContent = at === null ? "" : value(series.y) + (series.top ? `…${value(series.top)}` : "");
         });
       }
-    };
-
-    const readout = make("table", make("div", box, "", { className: "readout", tabIndex: 0 }), "");
-    readout.parentElement.setAttribute("role", "region");
-    readout.parentElement.setAttribute("aria-label", `values under the pointer, chart ${number + 1}`);
-    const head = make("tr", make("thead", readout), "");
-    const along = make("th", head, data.x.label, { scope: "col" });
-    for (const panel of panels) make("th", head, panel.label, { scope: "col", className: "n" });
-    const body = make("tbody", readout);
-    const names = [...new Set(panels.flatMap(panel => panel.series.map(series => series.name)))].filter(name => name);
-    for (const name of names) {
-      const row = make("tr", body);
-      const button = make("button", make("th", row, "", { scope: "row" }), "", { type: "button", title: "show or hide" });
-      button.setAttribute("aria-pressed", "true");
-      const one = panels.flatMap(panel => panel.series).find(series => series.name === name);
-      make("i", button).style.background = one.colour;
-      button.append(name);
-      button.onclick = () => {
-        const isHidden = !hidden.delete(name) && Boolean(hidden.add(name));
-        button.setAttribute("aria-pressed", String(!isHidden));
-        for (const plot of plots) plot.series.forEach((series, index) => { if (index && series.label === name) plot.setSeries(index, { show: !isHidden }); });
-      };
-      rows.push({ name, cells: panels.map(() => make("td", row, "", { className: "n" })) });
     }
 
-    const marks = panel => plot => {
-      const { ctx, bbox } = plot, ratio = devicePixelRatio;
-      ctx.save();
-      ctx.beginPath();
-      ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
-      ctx.clip();
-      ctx.font = `${11 * ratio}px system-ui, sans-serif`;
-      for (const mark of panel.marks) {
-        const place = value => plot.valToPos(value, mark.on_x ? "x" : "y", true);
-        const a = place(mark.from), b = place(mark.to);
-        ctx.strokeStyle = ctx.fillStyle = ink("--dim");
-        if (mark.from === mark.to) {
-          ctx.setLineDash([4 * ratio, 3 * ratio]);
-          ctx.beginPath();
-          if (mark.on_x) { ctx.moveTo(a, bbox.top); ctx.lineTo(a, bbox.top + bbox.height); }
-          else { ctx.moveTo(bbox.left, a); ctx.lineTo(bbox.left + bbox.width, a); }
-          ctx.stroke();
-          ctx.setLineDash([]);
-        } else {
-          ctx.globalAlpha = .16;
-          if (mark.on_x) ctx.fillRect(Math.min(a, b), bbox.top, Math.abs(a - b), bbox.height);
-          else ctx.fillRect(bbox.left, Math.min(a, b), bbox.width, Math.abs(a - b));
-          ctx.globalAlpha = 1;
-        }
-        ctx.textAlign = mark.on_x ? "left" : "right";
-        if (mark.on_x) ctx.fillText(mark.label, Math.min(a, b) + 5 * ratio, bbox.top + 13 * ratio);
-        else ctx.fillText(mark.label, bbox.left + bbox.width - 6 * ratio, Math.min(a, b) + (mark.from === mark.to ? -4 : 13) * ratio);
-      }
-      ctx.restore();
-    };
-
-    // one finger reads, two zoom; up and down stay the page's
-    const fingers = plot => {
-      const down = new Map();
-      let held = null;
-      const x = event => plot.posToVal(event.clientX - plot.over.getBoundingClientRect().left, "x");
-      plot.over.addEventListener("pointerdown", event => {
-        if (event.pointerType === "mouse") return;
-        down.set(event.pointerId, event.clientX);
-        held = down.size === 2 ? [...down.values()].map(at => plot.posToVal(at - plot.over.getBoundingClientRect().left, "x")) : null;
-      });
-      plot.over.addEventListener("pointermove", event => {
-        if (event.pointerType === "mouse") return;
-        if (down.has(event.pointerId)) down.set(event.pointerId, event.clientX);
-        const rect = plot.over.getBoundingClientRect();
-        if (held) {
-          const [p, q] = [...down.values()].map(at => (at - rect.left) / rect.width);
-          const span = (held[1] - held[0]) / (q - p);
-          if (span > 0) zoom(held[0] - p * span, held[0] + (1 - p) * span);
-        } else {
-          plot.setCursor({ left: event.clientX - rect.left, top: event.clientY - rect.top });
-          read(x(event));
-        }
-      });
-      for (const end of ["pointerup", "pointercancel", "pointerleave"]) {
-        plot.over.addEventListener(end, event => { down.delete(event.pointerId); held = null; });
-      }
-    };
-
-    const width = () => Math.max(240, box.clientWidth);
-    panels.forEach((panel, index) => {
-      const isLast = index === panels.length - 1;
-      make("p", box, panel.label, { className: "axis" });
-      const tables = [], series = [{}], bands = [];
-      for (const one of panel.series) {
-        const common = { label: one.name, stroke: one.colour, width: 1.6, points: { show: false }, dash: one.dashed ? [6, 4] : undefined, show: true, spanGaps: false };
-        if (one.kind === "step") common.paths = uPlot.paths.stepped({ align: 1 });
-        if (one.kind === "points") Object.assign(common, { paths: () => null, points: { show: true, size: 7, fill: one.colour, stroke: one.colour } });
-        if (one.kind === "band") {
-          Object.assign(common, { width: 0 });
-          bands.push({ series: [series.length + 1, series.length], fill: one.colour + "38" });
-          series.push(common);
-          tables.push([one.x, one.y]);
-          series.push({ ...common });
-          tables.push([one.x, one.top]);
-        } else {
-          series.push(common);
-          tables.push([one.x, one.y]);
-        }
-      }
-      const place = make("div", box, "", { className: "plot" });
-      const axis = { stroke: () => ink("--dim"), font: "12px system-ui, sans-serif", grid: { stroke: () => ink("--line"), width: 1 }, ticks: { stroke: () => ink("--line"), width: 1, size: 4 } };
-      const plot = new uPlot({
-        width: width(),
+    addPlot(panel, index) {
+      const isLast = index === this.panels.length - 1;
+      make("p", this.box, panel.label, { className: "axis" });
+      const place = make("div", this.box, "", { className: "plot" });
+      const { series, bands, table } = layers(panel);
+      const line = { stroke: () => ink("--line"), width: 1 };
+      const axis = { stroke: () => ink("--dim"), font: `12px ${FONT}`, grid: line, ticks: { ...line, size: 4 } };
+      // a stretch is shown as high as its own values go, unless the chart says how high
+      const height = (_, low, high) => {
+        if (this.isWhole() || low === null || panel.fixed) return [panel.low, panel.high];
+        const free = (high - low || Math.abs(high) || 1) * .06;
+        return [low - free, high + free];
+      };
+      this.plots.push(new uPlot({
+        width: this.width(),
         height: (innerWidth < 600 ? .75 : 1) * panel.height + (isLast ? 30 : 8),
-        legend: { show: false },
         padding: [6, 8, 0, 0],
-        cursor: { sync: { key, setSeries: false }, drag: { x: true, y: false, dist: 4 }, points: { size: 6 }, focus: { prox: -1 } },
-        scales: {
-          x: { time: false, range: (plot, low, high) => [low ?? data.x.low, high ?? data.x.high] },
-          y: { range: (plot, low, high) => {
-            if (!plots.length || !plots[0].scales.x || isWhole() || low === null || panel.fixed) return [panel.low, panel.high];
-            const free = (high - low || Math.abs(high) || 1) * .06;
-            return [low - free, high + free];
-          } },
-        },
-        axes: [
-          { ...axis, size: isLast ? 30 : 6, values: isLast ? undefined : (_, ticks) => ticks.map(() => "") },
-          { ...axis, size: 58 },
-        ],
+        legend: { show: false },
+        cursor: { sync: { key: this.key, setSeries: false }, drag: { x: true, y: false, dist: 4 }, points: { size: 6 } },
+        scales: { x: { time: false, range: (_, low, high) => [low ?? this.x.low, high ?? this.x.high] }, y: { range: height } },
+        axes: [{ ...axis, size: isLast ? 30 : 6, values: isLast ? undefined : (_, ticks) => ticks.map(() => "") }, { ...axis, size: 58 }],
         series,
         bands,
         hooks: {
-          draw: [marks(panel)],
-          setCursor: [plot => { if (plot.cursor.left >= 0) read(plot.posToVal(plot.cursor.left, "x")); }],
-          setScale: [(plot, scale) => { if (scale === "x" && !moving && plots.length === panels.length) zoom(plot.scales.x.min, plot.scales.x.max); }],
-          ready: [fingers],
+          draw: [plot => drawMarks(plot, panel.marks)],
+          setCursor: [plot => { if (plot.cursor.left >= 0) this.read(plot.posToVal(plot.cursor.left, "x")); }],
+          setScale: [(plot, scale) => { if (scale === "x" && !this.isMoving && this.plots.length === this.panels.length) this.zoom(plot.scales.x.min, plot.scales.x.max); }],
+          ready: [plot => this.addFingers(plot)],
         },
-      }, uPlot.join(tables), place);
-      place.addEventListener("dblclick", () => zoom(data.x.low, data.x.high));
-      place.addEventListener("mouseleave", () => read(null));
-      plots.push(plot);
-    });
-    zoom(data.x.low, data.x.high);
+      }, table, place));
+      place.addEventListener("dblclick", () => this.zoom(this.x.low, this.x.high));
+      place.addEventListener("mouseleave", () => this.read(null));
+    }
 
-    read(null);
-    figure.classList.add("answers");
-    new ResizeObserver(() => {
-      for (const plot of plots) if (plot.width !== width()) plot.setSize({ width: width(), height: plot.height });
-    }).observe(box);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { for (const plot of plots) plot.redraw(); });
-  };
+    // one finger reads, two zoom; up and down stay the page's
+    addFingers(plot) {
+      const down = new Map();
+      let held = null;
+      const left = at => at - plot.over.getBoundingClientRect().left;
+      const onTouch = (name, act) => plot.over.addEventListener(name, event => { if (event.pointerType !== "mouse") act(event); });
+      const both = () => [...down.values()].map(left);
+      onTouch("pointerdown", event => {
+        down.set(event.pointerId, event.clientX);
+        held = down.size === 2 ? both().map(at => plot.posToVal(at, "x")) : null;
+      });
+      onTouch("pointermove", event => {
+        if (down.has(event.pointerId)) down.set(event.pointerId, event.clientX);
+        if (held) {
+          const [p, q] = both().map(at => at / plot.over.clientWidth);
+          const span = (held[1] - held[0]) / (q - p);
+          if (span > 0) this.zoom(held[0] - p * span, held[0] + (1 - p) * span);
+        } else {
+          plot.setCursor({ left: left(event.clientX), top: plot.over.clientHeight / 2 });
+          this.read(plot.posToVal(left(event.clientX), "x"));
+        }
+      });
+      for (const end of ["pointerup", "pointercancel", "pointerleave"]) {
+        onTouch(end, event => { down.delete(event.pointerId); held = null; });
+      }
+    }
+  }
 
   document.querySelectorAll("figure.data").forEach((figure, number) => {
-    try { alive(figure, number); } catch (reason) { figure.querySelector(".live")?.remove(); figure.classList.remove("answers"); console.error(reason); }
+    try {
+      new Live(figure, number);
+    } catch (reason) {
+      // the picture stays
+      figure.querySelector(".live")?.remove();
+      figure.classList.remove("answers");
+      console.error(reason);
+    }
   });
 })();

@@ -8,6 +8,7 @@
 
 pub mod agent;
 pub mod baselines;
+mod beyond;
 pub mod chatter;
 pub mod controller;
 pub mod converter;

@@ -187,3 +187,38 @@ fn a_transfer_that_is_ended_ran_nothing_more() {
     // two instants in simulation, two at the real converter, and two points of two loads at five voltages
     assert_eq!(told, 6);
 }
+
+/// The example's load steps move the voltage by more than 0.1 V and the current by more than an ampere.
+#[test]
+fn a_run_that_leaves_the_range_of_an_empirical_correction_is_told_so() {
+    let file = examples().join("s.toml");
+    let notes = |set: &str| -> Vec<String> {
+        let scenario = Scenario::from_toml(&file, &format!("{SCENARIO}[set]\n{set}")).unwrap();
+        let setting = Setting::new(&file, scenario, policy(), None).unwrap();
+        let agent = closed_loop::Agent::<f32>::new(&policy()).unwrap();
+        let found = simulate(setting, vec![named("interpreter", Box::new(agent))], &mut |_| Ok(())).unwrap();
+        let is_ours = |note: &&String| note.contains("[empirical]");
+        found.setting.notes.iter().filter(is_ours).cloned().collect()
+    };
+    let around = |v_span: f64, v: f64| {
+        format!(
+            "\"empirical.i\" = 1e-4\n\"empirical.i_centre\" = 0\n\"empirical.i_span\" = 1000\n\"empirical.v\" = {v}\n\
+             \"empirical.v_centre\" = 100\n\"empirical.v_span\" = {v_span}\n"
+        )
+    };
+    let said = notes(&around(0.05, 1e-4));
+    assert!(
+        !said.is_empty()
+            && said
+                .iter()
+                .all(|note| note.contains("`v_out` in ") && note.contains("99.95")),
+        "{said:?}"
+    );
+    assert!(
+        said.iter()
+            .all(|note| !note.contains("`i_l`") && !note.contains("`duty`")),
+        "{said:?}"
+    );
+    assert_eq!(notes(&around(50.0, 1e-4)), [""; 0], "within");
+    assert_eq!(notes(&around(0.05, 0.0)), [""; 0], "the voltage does not count");
+}

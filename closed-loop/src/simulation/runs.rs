@@ -7,6 +7,7 @@ use super::findings::{Check, Findings, LAW, POLICY, Setting, Step};
 use super::spread;
 use crate::agent::Agent;
 use crate::baselines::Baseline;
+use crate::beyond::beyond;
 use crate::controller::{Classical, Controller, Trajectory, follow};
 use crate::course::{Course, Named, Tell};
 use crate::faults::Error;
@@ -55,7 +56,10 @@ pub fn simulate(mut setting: Setting, mut named: Vec<Named>, tell: &mut Tell<'_>
     let mut steps = Vec::new();
     for step in load_steps {
         let course = policy_course(&setting, &mut named, step, check.as_mut(), &mut progress)?;
-        let said = unusable(&course.shown, &setting.policy);
+        let said = [
+            unusable(&course.shown, &setting.policy),
+            beyond(&course.shown, setting.converter.parameters()),
+        ];
         let mut courses = vec![(POLICY.to_owned(), course)];
         for (name, controller) in &mut beside {
             let course = Course::new(step, &setting.scenario.task, |instant| {
@@ -64,6 +68,7 @@ pub fn simulate(mut setting: Setting, mut named: Vec<Named>, tell: &mut Tell<'_>
             });
             courses.push(((*name).to_owned(), course?));
         }
+        let said = said.into_iter().flatten();
         setting.notes.extend(said.map(|said| format!("{step}: {said}")));
         progress.next(step, "limit")?;
         let limits = limits(&mut setting, step);

@@ -214,6 +214,38 @@ pub const EFFECT: Effect = Effect {
     ],
 };
 
+impl Empirical {
+    /// What the correction depends on, with the range in which it was fitted: duty (1), output voltage (V), inductor current (A).
+    /// Nothing if there is no correction.
+    #[must_use]
+    pub fn ranges(&self) -> Vec<(&'static str, &'static str, [f64; 2])> {
+        let t = self;
+        let range = |centre: f64, span: f64| [centre - span, centre + span];
+        let all = [
+            (
+                "duty",
+                "",
+                [t.d, t.d_d, t.d_v, t.d_i, t.d_rate],
+                range(t.d_centre, t.d_span),
+            ),
+            (
+                "v_out",
+                " V",
+                [t.v, t.v_v, t.d_v, t.v_i, t.v_rate],
+                range(t.v_centre, t.v_span),
+            ),
+            (
+                "i_l",
+                " A",
+                [t.i, t.i_i, t.d_i, t.v_i, t.i_rate],
+                range(t.i_centre, t.i_span),
+            ),
+        ];
+        let used = all.into_iter().filter(|(_, _, terms, _)| *terms != [0.0; 5]);
+        used.map(|(name, unit, _, range)| (name, unit, range)).collect()
+    }
+}
+
 /// The correction of one plant.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Correction {

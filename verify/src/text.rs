@@ -92,9 +92,17 @@ pub fn report(policy: &Policy, report: &Report, drift: Option<&Drift>) -> Result
             )?,
         }
         let remedy = decisions.remedy();
+        // the folder does not say what is accepted: whoever can edit generated files would accept for whoever verifies them
+        let once = match decisions {
+            Decisions::Choice(choices) => format!(
+                ", or for this run --golden-decisions {}, as `compile` was told",
+                choices.accepting_share()
+            ),
+            Decisions::Continuous(_) => String::new(),
+        };
         writeln!(
             out,
-            "  = hint: to accept them for good: {remedy} in [network] of the contract"
+            "  = hint: to accept them for good: {remedy} in [network] of the contract{once}"
         )?;
     }
     Ok(out)
@@ -174,7 +182,9 @@ fn choices(policy: &Policy, decisions: &Choices) -> Vec<String> {
     )];
     let Some(change) = worst.first() else { return lines };
     lines.push(format!(
-        "  they give up at most {largest_loss:.4} and on average {mean_loss:.4} of the operating range of Q, which is {}",
+        "  they give up at most {} and on average {} of the operating range of Q, which is {} (mean of best less worst Q)",
+        quantity(*largest_loss, "", 3),
+        quantity(*mean_loss, "", 3),
         quantity(*operating_range, "", 3)
     ));
     let duty = |action: usize| policy.actions().get(action).map_or(f64::NAN, |action| action.duty);

@@ -228,6 +228,7 @@ fn check(policy: &Policy, golden_decisions: Option<f64>) -> Result<Vec<String>, 
             // the counts; where it changes most is told by `inspect`
             let mut lines = text::decisions(policy, &decisions);
             lines.truncate(2);
+            lines.extend(accepted_here(policy, golden_decisions));
             Ok(if changes { lines } else { Vec::new() })
         }
         Some(decisions) => {
@@ -252,6 +253,18 @@ fn check(policy: &Policy, golden_decisions: Option<f64>) -> Result<Vec<String>, 
             Err(Message::new(problem).found(found).hint(hint).into())
         }
     }
+}
+
+/// What `verify` has to be told, too, where the command line alone accepts what the format changes.
+fn accepted_here(policy: &Policy, golden_decisions: Option<f64>) -> Option<String> {
+    let share = golden_decisions?;
+    let by_contract = verify::decisions(policy, None)?;
+    (!by_contract.kept()).then(|| {
+        format!(
+            "note: accepted for this run alone: the files do not carry it, so give `verify` --golden-decisions {share} as well, or write \
+             golden_decisions = {share} into [network] of the contract, which both read"
+        )
+    })
 }
 
 /// What a step costs under the target's emulator; it goes into the manifest, too.

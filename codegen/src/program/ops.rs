@@ -1,5 +1,7 @@
 //! The straight-line part of a step: operations, and the three blocks around the network.
 
+use policy::Scalar;
+
 use super::guard::Within;
 use super::literal::Literal;
 
@@ -200,10 +202,47 @@ pub struct SignalPort {
     pub unit: String,
     /// Whether the field is an integer ADC code.
     pub is_code: bool,
+    /// What a code means; `None` where the field is a number.
+    pub conversion: Option<Conversion>,
     /// Plausible range in the format, for the comment and the check.
     pub range: (Literal, Literal),
     /// `held` after init.
     pub initial: Literal,
+}
+
+/// `gain * code + offset`, for the comment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Conversion {
+    /// Unit per code.
+    pub gain: Literal,
+    /// Value at code 0.
+    pub offset: Literal,
+    /// Bits of the converter, if they are known.
+    pub bits: Option<u32>,
+}
+
+impl SignalPort {
+    /// What the field holds, in the words of every comment: how a code is converted, and the plausible range.
+    #[must_use]
+    pub fn meaning(&self, scalar: Scalar) -> String {
+        let unit = match self.unit.as_str() {
+            "" => String::new(),
+            unit => format!(" {unit}"),
+        };
+        let (low, high) = (self.range.0.shortest(scalar), self.range.1.shortest(scalar));
+        let plausible = format!("plausible {low} to {high}{unit}");
+        let Some(Conversion { gain, offset, bits }) = self.conversion else {
+            return plausible;
+        };
+        let bits = bits.map_or_else(String::new, |bits| format!(" of {bits} bits"));
+        let gain = gain.shortest(scalar);
+        let offset = match offset.value() {
+            0.0 => String::new(),
+            below if below < 0.0 => format!(" - {}", Literal::nearest(scalar, -below).shortest(scalar)),
+            _ => format!(" + {}", offset.shortest(scalar)),
+        };
+        format!("ADC code{bits}: {gain} * code{offset}{unit}, {plausible}")
+    }
 }
 
 /// A member of the controller's state (contract section 1).

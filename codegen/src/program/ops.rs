@@ -225,9 +225,9 @@ impl SignalPort {
     /// What the field holds, in the words of every comment: how a code is converted, and the plausible range.
     #[must_use]
     pub fn meaning(&self, scalar: Scalar) -> String {
-        let unit = match self.unit.as_str() {
-            "" => String::new(),
-            unit => format!(" {unit}"),
+        let [unit, within] = match self.unit.as_str() {
+            "" => [String::new(), String::new()],
+            unit => [format!(" {unit}"), format!(" in {unit}")],
         };
         let (low, high) = (self.range.0.shortest(scalar), self.range.1.shortest(scalar));
         let plausible = format!("plausible {low} to {high}{unit}");
@@ -241,7 +241,7 @@ impl SignalPort {
             below if below < 0.0 => format!(" - {}", Literal::nearest(scalar, -below).shortest(scalar)),
             _ => format!(" + {}", offset.shortest(scalar)),
         };
-        format!("ADC code{bits}: {gain} * code{offset}{unit}, {plausible}")
+        format!("ADC code{bits}: {gain} * code{offset}{within}, {plausible}")
     }
 }
 
@@ -337,4 +337,43 @@ pub struct Advance {
     pub block: Block,
     /// Next soft-start limit; `None` without a soft start.
     pub soft_cap: Option<ValueId>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn meaning(unit: &str, conversion: Option<(f64, f64, Option<u32>)>) -> String {
+        let literal = |x: f64| Literal::nearest(Scalar::F32, x);
+        let port = SignalPort {
+            name: "v_out".to_owned(),
+            unit: unit.to_owned(),
+            is_code: conversion.is_some(),
+            conversion: conversion.map(|(gain, offset, bits)| Conversion {
+                gain: literal(gain),
+                offset: literal(offset),
+                bits,
+            }),
+            range: (literal(0.0), literal(250.0)),
+            initial: literal(0.0),
+        };
+        port.meaning(Scalar::F32)
+    }
+
+    #[test]
+    fn a_measurement_says_how_its_code_is_converted() {
+        assert_eq!(meaning("V", None), "plausible 0.0 to 250.0 V");
+        assert_eq!(
+            meaning("V", Some((0.0625, -2.0, Some(12)))),
+            "ADC code of 12 bits: 0.0625 * code - 2.0 in V, plausible 0.0 to 250.0 V"
+        );
+        assert_eq!(
+            meaning("", Some((-0.5, 0.1, None))),
+            "ADC code: -0.5 * code + 0.1, plausible 0.0 to 250.0"
+        );
+        assert_eq!(
+            meaning("V", Some((0.0625, 0.0, None))),
+            "ADC code: 0.0625 * code in V, plausible 0.0 to 250.0 V"
+        );
+    }
 }

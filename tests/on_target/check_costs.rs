@@ -45,7 +45,7 @@ fn instructions(name: &str) -> Vec<u64> {
     let policy = policy::load(&tests::example()).unwrap();
     let files = codegen::generate(&policy, target, &[Output::C], None).unwrap().files;
     let files = ["buck12.c", "buck12.h"].map(|name| (name, files[name].as_str()));
-    let beside = ["-O2", "-std=c99", "-ffp-contract=off", "buck12.c"];
+    let beside = ["-O2", "-std=c99", "-ffp-contract=off", "buck12.c", "-lgcc"];
     let counts = counter::counts(target, PROGRAM, &files, &beside);
     let first = |line: &String| line.split(' ').next().unwrap().parse().unwrap();
     counts.iter().map(first).collect()
@@ -61,10 +61,15 @@ fn a_slice_of_the_checksum_costs_its_share_of_all_tables() {
         };
         // 5,248 weights, 140 biases and 12 duties: 5,400 numbers, of which a slice reads 64
         let share = integrity as f64 * 64.0 / 5400.0;
-        assert!((first as f64 / share - 1.0).abs() < 0.1, "{name}: {counts:?}");
+        // 64 numbers more cost their share, whatever a call costs by itself
+        let more = twice as f64 - second as f64;
+        assert!((more / share - 1.0).abs() < 0.01, "{name}: {counts:?}");
+        assert!(
+            first as f64 > share && (first as f64) < 1.2 * share,
+            "{name}: {counts:?}"
+        );
         // the same code over other numbers; the first call finds everything at 0
         assert!(first.abs_diff(second) < 50, "{name}: {counts:?}");
-        assert!((twice as f64 / first as f64 - 2.0).abs() < 0.1, "{name}: {counts:?}");
         // no known answer is cheaper than a pass through the network, which takes a load, a product and a sum each weight
         assert!(self_test > 5248, "{name}: {counts:?}");
     }

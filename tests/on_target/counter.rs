@@ -111,7 +111,12 @@ fn an_empty_passage_is_one_call_and_a_thousand_turns_are_two_thousand_instructio
             // the call of the end mark; then the call, two to set up, the loop, the return, the call of the end mark
             // jumps: the call, 999 turns, the return
             let thousand = format!("{} 0 {}", 1 + 2 + 2000 + 1 + 1, 1 + 999 + 1);
-            assert_eq!(counts(target, PROGRAM, &[], &[]), ["1 0 0", thousand.as_str()], "{}", target.name);
+            assert_eq!(
+                counts(target, PROGRAM, &[], &[]),
+                ["1 0 0", thousand.as_str()],
+                "{}",
+                target.name
+            );
         }
     }
 }

@@ -95,7 +95,7 @@ pub fn report(policy: &Policy, report: &Report, drift: Option<&Drift>) -> Result
         // the folder does not say what is accepted: whoever can edit generated files would accept for whoever verifies them
         let once = match decisions {
             Decisions::Choice(choices) => format!(
-                ", or for this run --golden-decisions {}, as `compile` was told",
+                ", or for this run --golden-decisions {} (a folder does not carry what `compile` was told)",
                 choices.accepting_share()
             ),
             Decisions::Continuous(_) => String::new(),

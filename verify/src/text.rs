@@ -91,21 +91,25 @@ pub fn report(policy: &Policy, report: &Report, drift: Option<&Drift>) -> Result
                 "DIFFERENT: {policy} in {format} commands other duties than its trainer's network by more than allowed"
             )?,
         }
-        let remedy = decisions.remedy();
-        // the folder does not say what is accepted: whoever can edit generated files would accept for whoever verifies them
-        let once = match decisions {
-            Decisions::Choice(choices) => format!(
-                ", or for this run --golden-decisions {} (a folder does not carry what `compile` was told)",
-                choices.accepting_share()
-            ),
-            Decisions::Continuous(_) => String::new(),
-        };
-        writeln!(
-            out,
-            "  = hint: to accept them for good: {remedy} in [network] of the contract{once}"
-        )?;
+        writeln!(out, "  = hint: {}", accepting(decisions))?;
     }
     Ok(out)
+}
+
+/// How what a format changes is accepted.
+// a folder does not say what is accepted: whoever can edit generated files would accept for whoever verifies them
+fn accepting(decisions: &Decisions) -> String {
+    let once = match decisions {
+        Decisions::Choice(choices) => format!(
+            ", or for this run --golden-decisions {} (a folder does not carry what `compile` was told)",
+            choices.accepting_share()
+        ),
+        Decisions::Continuous(_) => String::new(),
+    };
+    format!(
+        "to accept them for good: {} in [network] of the contract{once}",
+        decisions.remedy()
+    )
 }
 
 /// What the numeric format does to the trainer's decisions, and at which observation it does most: one line each. Losses are

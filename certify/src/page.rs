@@ -39,11 +39,10 @@ pub fn summary(certificate: &Certificate) -> String {
     }));
     if let Some(golden) = &certificate.golden {
         lines.push(format!(
-            "  golden observations: largest error {}, action changed at {}; the worst change gives up {} of {} between real Q values",
+            "  golden observations: largest error {}, action changed at {}; {}",
             digits(golden.measured.largest_error),
             changed_text(&golden.measured),
-            digits(golden.measured.largest_loss),
-            digits(golden.measured.mean_spread)
+            loss_text(&golden.measured)
         ));
     }
     if let Some(map) = &certificate.map {
@@ -80,6 +79,18 @@ fn of_actor(certificate: &Certificate, head: &Continuous) -> String {
         )
     }));
     lines.join("\n")
+}
+
+/// The largest loss in Q, and as `compile` and `verify` say it: as a share of the operating range of Q.
+fn loss_text(measured: &Measured) -> String {
+    // a network with one value for all actions has no range: a loss of 0 is 0 of it
+    let range = measured.mean_spread.max(f64::MIN_POSITIVE);
+    format!(
+        "the worst change gives up {} of Q: {} of the operating range of Q, which is {} (mean of best less worst Q)",
+        digits(measured.largest_loss),
+        digits(measured.largest_loss / range),
+        digits(measured.mean_spread)
+    )
 }
 
 /// Three significant digits.
@@ -292,11 +303,10 @@ fn shares(certificate: &Certificate) -> Section {
         pairs.push((
             "golden observations at which it was seen to change".to_owned(),
             format!(
-                "{}; largest error {}; the worst change gives up {} of {} between the real Q values",
+                "{}; largest error {}; {}",
                 changed_text(&golden.measured),
                 digits(golden.measured.largest_error),
-                digits(golden.measured.largest_loss),
-                digits(golden.measured.mean_spread)
+                loss_text(&golden.measured)
             ),
         ));
         for near in &golden.neighbourhoods {

@@ -27,6 +27,17 @@ pub(crate) struct Oracle<'a> {
     pub is_actor: bool,
 }
 
+/// What says in a file's metadata that it was made here.
+const MAKER: &str = "by policyc new";
+/// The metadata stand at the beginning, in a header of a few hundred bytes.
+const HEADER: usize = 4096;
+
+/// Whether a golden file was computed by [`answers`].
+pub(crate) fn is_computed(bytes: &[u8]) -> bool {
+    let header = bytes.get(..HEADER).unwrap_or(bytes);
+    header.windows(MAKER.len()).any(|part| part == MAKER.as_bytes())
+}
+
 /// A golden file, if the network decides often enough within the bounds.
 pub(crate) fn answers(oracle: &Oracle<'_>) -> Result<Option<Vec<u8>>, Message> {
     let Some(exact) = activations::exact(oracle.activation) else {
@@ -57,7 +68,7 @@ pub(crate) fn answers(oracle: &Oracle<'_>) -> Result<Option<Vec<u8>>, Message> {
     let chosen = action.iter().flat_map(|index: &i32| index.to_le_bytes()).collect();
     if oracle.is_actor {
         let said = format!(
-            "plain products in f64 of the tensors as saved, by policyc new; {COUNT} observations drawn uniformly, seed {SEED}; output is the \
+            "plain products in f64 of the tensors as saved, {MAKER}; {COUNT} observations drawn uniformly, seed {SEED}; output is the \
              last layer's, before tanh or clip"
         );
         let metadata = BTreeMap::from([("oracle".to_owned(), said)]);
@@ -68,7 +79,7 @@ pub(crate) fn answers(oracle: &Oracle<'_>) -> Result<Option<Vec<u8>>, Message> {
         return written(&tensors, &metadata).map(Some);
     }
     let said = format!(
-        "plain products in f64 of the tensors as saved, by policyc new; {COUNT} observations drawn uniformly, seed {SEED}, those left out \
+        "plain products in f64 of the tensors as saved, {MAKER}; {COUNT} observations drawn uniformly, seed {SEED}, those left out \
          whose two largest values are closer than {SMALLEST_GAP:e} of the largest"
     );
     // one key alone: the crate writes several in the order of a hash map

@@ -146,7 +146,11 @@ fn written(
             .expected(format!("{inputs}, one for each network input"));
         return Err(name.fault(message).into());
     }
-    let golden = golden_answers(loaded, network, statistics).map_err(|message| name.fault(message))?;
+    let given = given_answers(name)?;
+    let golden = match given {
+        Some(_) => None,
+        None => golden_answers(loaded, network, statistics).map_err(|message| name.fault(message))?,
+    };
     let mut said = loaded.about.clone();
     said.extend(network.said.iter().cloned());
     let definition = network.definition.as_ref();
@@ -156,15 +160,18 @@ fn written(
     if !statistics.is_empty() && loaded.graph.as_ref().is_none_or(|graph| graph.features.is_empty()) {
         said.push("VecNormalize: scale = 1/sqrt(var + epsilon), offset = -mean/sqrt(var + epsilon), then clip, all computed in f64".to_owned());
     }
+    if given.is_some() {
+        said.push(format!(
+            "{GOLDEN} beside the model is taken as the trainer's: its obs are what the network sees, after scale, offset and clip"
+        ));
+    }
     if golden.is_some() {
         said.push(format!(
             "{GOLDEN} was computed from the tensors as saved, in f64; the trainer's own answers check more"
         ));
     }
     let own = contract.with_file_name(WEIGHTS);
-    let is_taken = own
-        .canonicalize()
-        .is_ok_and(|own| name.path.canonicalize().is_ok_and(|file| file == own));
+    let is_taken = is_same(&own, &name.path);
     let file = if is_taken { CHAIN } else { WEIGHTS };
     let weights = seen_from(contract, &contract.with_file_name(file)).map_err(|message| name.fault(message))?;
     let draft = Draft {
@@ -175,7 +182,7 @@ fn written(
         hidden: network.layers.len() > 1,
         bias: true,
         activation: activation(loaded, network),
-        golden: golden.is_some(),
+        golden: golden.is_some() || given.is_some(),
         is_drawn: golden.is_some(),
         continuous: actor.map(actor::Actor::entry),
         duties: actor.and_then(actor::Actor::duties),
@@ -187,12 +194,30 @@ fn written(
         },
     };
     let mut beside = BTreeMap::from([(file.to_owned(), network.to_safetensors(name)?)]);
-    beside.extend(golden.map(|bytes| (GOLDEN.to_owned(), bytes)));
+    // a contract names no file of another folder unless its user says so with every command
+    let answers = given.filter(|_| !is_same(&contract.with_file_name(GOLDEN), &name.path.with_file_name(GOLDEN)));
+    beside.extend(golden.or(answers).map(|bytes| (GOLDEN.to_owned(), bytes)));
     Ok(NewPolicy {
         contract: policy::draft(&draft),
         beside,
         said,
     })
+}
+
+fn is_same(a: &Path, b: &Path) -> bool {
+    (a.canonicalize()).is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))
+}
+
+/// The trainer's own answers beside its model, which check more than what can be computed here; `None` without them, and of those
+/// that an earlier call computed.
+fn given_answers(model: &FileName) -> Result<Option<Vec<u8>>, Faults> {
+    let path = model.path.with_file_name(GOLDEN);
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let name = FileName::new(&path);
+    let bytes = name.read(MAX_WEIGHT_BYTES).map_err(|message| name.fault(message))?;
+    Ok((!golden::is_computed(&bytes)).then_some(bytes))
 }
 
 /// The activations behind the hidden layers, as TOML.

@@ -5,11 +5,20 @@ use toml_input::Message;
 
 use crate::numpy;
 use crate::pickle::{Item, Pickle};
+use crate::zip;
 
 const CLASS: &str = "stable_baselines3.common.vec_env.vec_normalize.VecNormalize";
 
 /// Scale, offset and clip of each feature from what `VecNormalize.save` wrote; none where it left observations alone.
 pub(crate) fn read(bytes: &[u8]) -> Result<Vec<DraftFeature>, Message> {
+    if zip::is_archive(bytes) {
+        return Err(other_file(
+            "an archive, as numpy.savez writes (.npz) and torch.save, too",
+        ));
+    }
+    if bytes.starts_with(b"\x93NUMPY") {
+        return Err(other_file("an array of numpy (.npy)"));
+    }
     let pickle = Pickle::read(bytes)?;
     match pickle.item(pickle.root) {
         Item::Object(object) if object.class == CLASS => {}
@@ -47,6 +56,18 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Vec<DraftFeature>, Message> {
         }
     };
     Ok(mean.iter().zip(&var).map(feature).collect())
+}
+
+/// Arrays alone do not say epsilon and clip, nor which is which: what the user knows goes into the contract by hand.
+fn other_file(found: &str) -> Message {
+    Message::new("this file is no pickle of VecNormalize")
+        .found(found)
+        .expected("what env.save(\"vecnormalize.pkl\") of a VecNormalize writes")
+        .hint(
+            "give that file; or leave --vecnormalize out and write each [[feature]] by hand, from its mean and var: scale = 1 / sqrt(var + \
+             epsilon), offset = -mean / sqrt(var + epsilon), clip = [-clip_obs, clip_obs], with epsilon 1e-8 and clip_obs 10 unless the \
+             training says otherwise",
+        )
 }
 
 fn unfit(found: &str) -> Message {

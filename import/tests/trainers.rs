@@ -323,3 +323,56 @@ fn a_damaged_archive_is_refused() {
         assert!(begun.elapsed().as_secs() < 20, "{:?}", begun.elapsed());
     }
 }
+
+/// What the trainer answered checks more than what can be computed from the tensors.
+#[test]
+fn golden_answers_beside_a_model_are_taken_and_lie_beside_its_new_weights() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    std::fs::copy(fixture("sb3_dqn.zip"), path("model.zip")).unwrap();
+    std::fs::copy(fixture("sb3_dqn.expected.safetensors"), path("golden.safetensors")).unwrap();
+    let new = |contract: &str| import::new_policy(&path("model.zip"), &path(contract), &Options::default()).unwrap();
+    let there = new("policy.toml");
+    assert!(
+        there.contract.contains("\ngolden = \"golden.safetensors\""),
+        "{}",
+        there.contract
+    );
+    assert!(!there.contract.contains("golden_outside"), "they were not drawn");
+    assert!(!there.beside.contains_key("golden.safetensors"), "it is there already");
+    assert!(
+        there.said.join(" ").contains("taken as the trainer's"),
+        "{:?}",
+        there.said
+    );
+    std::fs::create_dir(path("apart")).unwrap();
+    let apart = new("apart/policy.toml");
+    assert_eq!(apart.contract, there.contract);
+    assert_eq!(
+        apart.beside.get("golden.safetensors"),
+        Some(&std::fs::read(path("golden.safetensors")).unwrap())
+    );
+    // what an earlier call made is no answer of the trainer
+    std::fs::remove_file(path("golden.safetensors")).unwrap();
+    let drawn = new("policy.toml");
+    std::fs::write(path("golden.safetensors"), &drawn.beside["golden.safetensors"]).unwrap();
+    assert_eq!(new("apart/policy.toml").contract, drawn.contract);
+}
+
+#[test]
+fn statistics_in_a_file_of_numpy_are_refused_with_the_formula() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::copy(fixture("sb3_ppo.zip"), folder.path().join("model.zip")).unwrap();
+    for (start, kind) in [(&b"PK\x03\x04rest"[..], ".npz"), (b"\x93NUMPY\x01\x00", ".npy")] {
+        std::fs::write(folder.path().join("vecnormalize.pkl"), start).unwrap();
+        let faults = refusal(&folder.path().join("model.zip"));
+        for words in [
+            kind,
+            "scale = 1 / sqrt(var + epsilon)",
+            "offset = -mean / sqrt(var",
+            "clip = [-clip_obs",
+        ] {
+            assert!(faults.contains(words), "{words}: {faults}");
+        }
+    }
+}

@@ -169,6 +169,7 @@ mod tests {
             Some(Adc {
                 gain: 0.1,
                 offset: -3.0,
+                bits: None,
             }),
         );
         // 2^24 + 1 is not a binary32 number: fl(n) = 2^24
@@ -185,6 +186,7 @@ mod tests {
             Some(Adc {
                 gain: -0.5,
                 offset: 0.0,
+                bits: None,
             }),
         );
         // -0.5 * 0 = -0, and -0 + 0 = +0
@@ -194,7 +196,15 @@ mod tests {
     #[test]
     fn the_kind_of_sample_must_fit_the_signal() {
         let physical = signal(0.0, 1.0, None);
-        let adc = signal(0.0, 1.0, Some(Adc { gain: 1.0, offset: 0.0 }));
+        let adc = signal(
+            0.0,
+            1.0,
+            Some(Adc {
+                gain: 1.0,
+                offset: 0.0,
+                bits: None,
+            }),
+        );
         assert_eq!(
             physical.physical(2, Sample::Code(0)),
             Err(InputError::PhysicalExpected { signal: 2 })

@@ -19,7 +19,7 @@ use crate::digests;
 use crate::faults::Faults;
 use crate::limits::MAX_FEATURES;
 use crate::model::{Digests, Fallback, Feature, Golden, Head, Interval, Layer, Limits, Mapping, Policy, Signal};
-use crate::notes::{left_out, on_duties, unused};
+use crate::notes::{left_out, on_converters, on_duties, unused};
 use crate::raw::RawPolicy;
 use crate::weights::{self, Weights};
 
@@ -136,22 +136,19 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     let Weights { layers, mut notes } = weights?;
     let golden = golden(raw, network.as_ref(), sizes, &decided, known, faults);
     notes.extend(golden.as_ref().and_then(Option::as_ref).and_then(left_out));
+    let mapped = mapping.as_ref().and_then(Option::as_ref);
+    notes.extend(on_converters(signals.as_deref().unwrap_or_default()));
     notes.extend(unused(
         &head.parameters,
         signals.as_deref().unwrap_or_default(),
         whole.as_deref().unwrap_or_default(),
         &decided,
         known,
-        mapping.as_ref().and_then(Option::as_ref),
+        mapped,
     ));
     // from here on whatever is missing has left its fault
     let limits = limits?;
-    notes.extend(on_duties(
-        &limits,
-        &duties,
-        mapping.as_ref().and_then(Option::as_ref),
-        known,
-    ));
+    notes.extend(on_duties(&limits, &duties, mapped, known));
     let mut policy = Policy {
         name: head.name?,
         sample_period: head.sample_period?,

@@ -27,6 +27,10 @@ pub struct Golden {
     pub duty_error: Option<f64>,
 }
 
+/// `golden_tolerance` of a contract that does not say it.
+// a tolerance and not bits, because trainers add in an order of their own
+pub(crate) const TOLERANCE: f64 = 1e-5;
+
 impl Golden {
     /// Share of the vectors whose action the format may change: what the contract says; otherwise none for real formats,
     /// which compute the trainer's network, and 2 % for integers, whose rounding is a choice to look at.

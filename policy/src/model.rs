@@ -12,6 +12,7 @@ use crate::activation::Activation;
 pub use crate::filter::Filter;
 pub use crate::head::{Action, Continuous, Head, Pair, Residual, Source, Squash, Still};
 pub use crate::interval::Interval;
+use crate::known_answers;
 pub use crate::known_answers::Golden;
 pub use crate::observer::{Estimate, Gains, InputVoltage, Observer};
 
@@ -165,13 +166,27 @@ impl Policy {
         sources.any(|source| source.reads(input)) || self.observers.iter().any(observed)
     }
 
-    /// The law of a residual head without what the network adds to it, as a policy of its own; `None` of another head.
+    /// The law of a residual head without what the network adds to it, as a policy of its own; `None` of another head, and of a
+    /// base that reads nothing measured, such as `previous_duty`: on its own that is a constant and no law.
     #[must_use]
     pub fn law_alone(&self) -> Option<Self> {
-        self.head.residual()?;
+        let base = &self.head.residual()?.base.tree;
+        let signals = (0..self.signals.len()).map(Input::Signal);
+        let estimates = (0..self.observers.len())
+            .flat_map(|observer| Estimate::ALL.map(|estimate| Input::Estimate(observer, estimate)));
+        let mut measured = signals.chain(estimates);
+        if !measured.any(|input| base.reads(input)) {
+            return None;
+        }
         let mut law = self.clone();
         law.actions_mut().iter_mut().for_each(|action| action.duty = 0.0);
         Some(law)
+    }
+
+    /// How far a trainer's Q value may be off by rounding, as a share of the largest |Q| of its observation.
+    #[must_use]
+    pub fn golden_tolerance(&self) -> f64 {
+        (self.golden.as_ref()).map_or(known_answers::TOLERANCE, |golden| golden.tolerance)
     }
 
     /// The discrete actions; none where the head is continuous.
@@ -211,6 +226,10 @@ pub struct Adc {
     pub gain: f64,
     /// Physical value at code 0.
     pub offset: f64,
+    /// Bits of the converter, whose codes go from 0 to 2^bits - 1; `None` if the contract does not say.
+    // left out where there is none: the digests of contracts without it stay
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bits: Option<u32>,
 }
 
 /// One network input: a source through filters, then scale, offset, clip (contract sections 3 to 5).

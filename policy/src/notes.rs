@@ -61,6 +61,41 @@ fn unlike_any_action(limits: &Limits, duties: &[f64], features: &[Feature]) -> O
     })
 }
 
+/// A converter of which the plausible range uses less than this share of its codes is looked at.
+// a gain that is ten times too large leaves a tenth at most
+const USED: f64 = 1.0 / 8.0;
+/// Where the contract says no bits: fewer codes than these in the plausible range are looked at.
+// seven bits: a step of 1 % of the range is coarser than the error that a converter's control corrects
+const FEWEST_CODES: f64 = 128.0;
+
+/// Converters whose gain and plausible range do not go together. What lies beyond a converter's last code is a fault already.
+pub(crate) fn on_converters(signals: &[Signal]) -> Vec<String> {
+    let note = |signal: &Signal| {
+        let adc = signal.adc?;
+        let codes = (signal.range.high - signal.range.low) / adc.gain.abs();
+        let range = format!("{} to {} {}", signal.range.low, signal.range.high, signal.unit);
+        let range = range.trim_end();
+        let name = &signal.name;
+        let step = format!("one code is {} {}", adc.gain.abs(), signal.unit);
+        let step = step.trim_end();
+        match adc.bits {
+            Some(bits) => {
+                let all = 2.0_f64.powi(i32::try_from(bits).ok()?);
+                (codes < USED * all).then(|| {
+                    format!(
+                        "signal `{name}`: the plausible range {range} takes {codes:.0} of the {all:.0} codes of its converter; {step}: is \
+                         the gain right?"
+                    )
+                })
+            }
+            None => (codes < FEWEST_CODES).then(|| {
+                format!("signal `{name}`: the plausible range {range} has {codes:.0} codes alone; {step}: is the gain right?")
+            }),
+        }
+    };
+    signals.iter().filter_map(note).collect()
+}
+
 /// Signals and parameters that nothing refers to.
 pub(crate) fn unused(
     parameters: &BTreeMap<String, f64>,

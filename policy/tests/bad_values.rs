@@ -140,6 +140,33 @@ fn limits_slew_and_soft_start_must_work_in_f32() {
     assert_eq!(policy.limits.soft_start.map(|soft| soft.steps), Some(100));
 }
 
+/// `v_out` is plausible from 0 to 250 V.
+#[test]
+fn a_converter_of_which_little_is_used_is_noted() {
+    let unit = "unit = \"V\"\n";
+    let notes = |adc: &str| {
+        let folder = Folder::new().replace(unit, &format!("{unit}adc = {adc}\n"));
+        let notes = folder.policy().notes.into_iter();
+        notes
+            .filter(|note| note.contains("is the gain right"))
+            .collect::<Vec<_>>()
+    };
+    assert!(notes("{ gain = 0.0625, offset = 0.0, bits = 12 }").is_empty());
+    let far = notes("{ gain = 0.625, offset = 0.0, bits = 12 }").concat();
+    assert!(
+        far.contains("0 to 250 V takes 400 of the 4096 codes") && far.contains("one code is 0.625 V"),
+        "{far}"
+    );
+    // 512 codes of 4096 are an eighth
+    assert!(notes("{ gain = 0.488, offset = 0.0, bits = 12 }").is_empty());
+    assert!(notes("{ gain = 0.625, offset = 0.0 }").is_empty());
+    assert!(
+        notes("{ gain = -2.5, offset = 250.0 }")
+            .concat()
+            .contains("has 100 codes alone")
+    );
+}
+
 #[test]
 fn adc_codes_must_be_able_to_say_the_range() {
     let unit = "unit = \"V\"\n";

@@ -115,6 +115,20 @@ fn a_law_and_what_is_added_to_it() {
 }
 
 #[test]
+fn a_base_that_reads_nothing_measured_is_no_law_of_its_own() {
+    let base = |text: &str| {
+        with_law()
+            .replace("0.5 - 0.01 * (model_current - i_out)", text)
+            .policy()
+            .law_alone()
+            .is_some()
+    };
+    assert!(!base("previous_duty"), "a constant for ever");
+    assert!(!base("0.5"));
+    assert!(base("previous_duty + 0.001 * (100 - v_out)"), "an integral law");
+}
+
+#[test]
 fn equal_contracts_have_equal_digests_and_another_gain_another() {
     let digest = |folder: Folder| folder.policy().digests.contract;
     assert_eq!(digest(with_law()), digest(with_law()));

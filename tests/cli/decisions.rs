@@ -131,3 +131,47 @@ fn code_without_golden_vectors_is_said_to_be_unproven() {
         );
     }
 }
+
+/// Generated files do not say what is accepted, so that they accept nothing for whoever verifies them; the message says what to type.
+#[test]
+fn verify_of_a_folder_that_was_accepted_on_the_command_line_says_what_to_type() {
+    let desk = example();
+    let said = desk.succeed("compile policy --format i16 --golden-decisions 0.4 --no-costs --out out");
+    assert!(said.contains("give `verify` --golden-decisions 0.4 as well"), "{said}");
+    let ran = desk.type_in("verify policy --generated out --steps 100");
+    assert_eq!(ran.code, Some(1), "{}", ran.stdout);
+    assert!(
+        ran.stdout.contains("for this run --golden-decisions 0.37"),
+        "{}",
+        ran.stdout
+    );
+    assert!(
+        ran.stdout.contains("golden_decisions = 0.37 in [network]"),
+        "{}",
+        ran.stdout
+    );
+    desk.succeed("verify policy --generated out --steps 100 --golden-decisions 0.37");
+    desk.edit("policy/policy.toml", "[network]", "[network]\ngolden_decisions = 0.4");
+    let said = desk.succeed("compile policy --format i16 --golden-decisions 0.4 --no-costs --out again");
+    assert!(!said.contains("give `verify`"), "the contract accepts it: {said}");
+}
+
+/// One number, in one unit, wherever it is said: the loss of the worst change as a share of the operating range of Q.
+#[test]
+fn compile_and_certify_say_a_loss_in_the_same_unit() {
+    let desk = example();
+    let after = |said: &str, words: &str| {
+        let rest = said.split_once(words).unwrap_or_else(|| panic!("{words}\n{said}")).1;
+        rest.split(' ').next().unwrap().to_owned()
+    };
+    let compiled = desk.succeed("compile policy --format i16 --golden-decisions 0.4 --no-costs --out out");
+    let certified = desk.succeed("certify policy --format i16 --samples 20 --boxes 4 --out certificate");
+    let range = "of the operating range of Q, which is ";
+    assert_eq!(after(&compiled, range), after(&certified, range));
+    let golden = certified.split_once("golden observations").unwrap().1;
+    assert_eq!(
+        after(&compiled, "give up at most "),
+        after(golden, "of Q: "),
+        "{certified}"
+    );
+}

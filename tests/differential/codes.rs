@@ -12,6 +12,7 @@ fn coarse() -> Policy {
         signal.adc = Some(Adc {
             gain: 20.0 / 63.0,
             offset: signal.range.low,
+            bits: None,
         });
     }
     policy

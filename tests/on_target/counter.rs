@@ -37,13 +37,13 @@ fn board(target: &TargetSpec) -> Board {
     }
 }
 
-fn build(target: &TargetSpec, folder: &Path) {
+/// Builds `program.c` of the folder with these sources and flags beside those of the board.
+fn build(target: &TargetSpec, folder: &Path, beside: &[&str]) {
     let board = board(target);
     for file in board.files {
         std::fs::write(folder.join(file.name), file.text).unwrap();
     }
     std::fs::write(folder.join("counter.c"), targets::boards::COUNTER.text).unwrap();
-    std::fs::write(folder.join("program.c"), PROGRAM).unwrap();
     let mut plugin = Command::new("gcc");
     plugin.args([
         "-Wall",
@@ -68,6 +68,7 @@ fn build(target: &TargetSpec, folder: &Path) {
         .iter()
         .filter(|file| file.name.ends_with(".c") || file.name.ends_with(".S"));
     link.args(sources.map(|file| file.name))
+        .args(beside)
         .args(["program.c", "-o", "program.elf"]);
     let ran = run(link.current_dir(folder));
     assert!(
@@ -77,10 +78,14 @@ fn build(target: &TargetSpec, folder: &Path) {
     );
 }
 
-fn counts(target: &TargetSpec) -> Vec<String> {
+/// What the passages of a program cost: instructions, accesses to memory, jumps. `files` lie beside it.
+pub fn counts(target: &TargetSpec, program: &str, files: &[(&str, &str)], beside: &[&str]) -> Vec<String> {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    build(target, folder);
+    for (name, text) in files.iter().chain(&[("program.c", program)]) {
+        std::fs::write(folder.join(name), text).unwrap();
+    }
+    build(target, folder, beside);
     let image = Elf::read(&std::fs::read(folder.join("program.elf")).unwrap()).unwrap();
     let mark = |name: &str| image.address(name).unwrap();
     let plugin = format!(
@@ -106,7 +111,12 @@ fn an_empty_passage_is_one_call_and_a_thousand_turns_are_two_thousand_instructio
             // the call of the end mark; then the call, two to set up, the loop, the return, the call of the end mark
             // jumps: the call, 999 turns, the return
             let thousand = format!("{} 0 {}", 1 + 2 + 2000 + 1 + 1, 1 + 999 + 1);
-            assert_eq!(counts(target), ["1 0 0", thousand.as_str()], "{}", target.name);
+            assert_eq!(
+                counts(target, PROGRAM, &[], &[]),
+                ["1 0 0", thousand.as_str()],
+                "{}",
+                target.name
+            );
         }
     }
 }

@@ -3,6 +3,7 @@
 //! `POLICYC_TARGET_STEPS=20000` sets the steps of every build.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod check_costs;
 mod costs;
 mod counter;
 mod fallback;

@@ -253,6 +253,7 @@ mod tests {
         policy.signals[0].adc = Some(policy::Adc {
             gain: -0.3,
             offset: 20.1,
+            bits: None,
         });
         assert_eq!(ends(&Grid::of(&policy).unwrap())[0], (0, 68));
     }
@@ -261,7 +262,11 @@ mod tests {
     fn every_combination_comes_once() {
         let mut policy = policy();
         for signal in &mut policy.signals {
-            signal.adc = Some(policy::Adc { gain: 2.0, offset: 0.0 });
+            signal.adc = Some(policy::Adc {
+                gain: 2.0,
+                offset: 0.0,
+                bits: None,
+            });
         }
         let grid = Grid::of(&policy).unwrap();
         // 0..20 V: codes -1 to 11; -4..16 A: codes -3 to 9
@@ -283,6 +288,7 @@ mod tests {
         let fine = Some(policy::Adc {
             gain: 1e-8,
             offset: 0.0,
+            bits: None,
         });
         policy.signals.iter_mut().for_each(|signal| signal.adc = fine);
         let message = toml_input::Faults::from(Grid::of(&policy).unwrap_err()).to_string();

@@ -91,13 +91,25 @@ pub fn report(policy: &Policy, report: &Report, drift: Option<&Drift>) -> Result
                 "DIFFERENT: {policy} in {format} commands other duties than its trainer's network by more than allowed"
             )?,
         }
-        let remedy = decisions.remedy();
-        writeln!(
-            out,
-            "  = hint: to accept them for good: {remedy} in [network] of the contract"
-        )?;
+        writeln!(out, "  = hint: {}", accepting(decisions))?;
     }
     Ok(out)
+}
+
+/// How what a format changes is accepted.
+// a folder does not say what is accepted: whoever can edit generated files would accept for whoever verifies them
+fn accepting(decisions: &Decisions) -> String {
+    let once = match decisions {
+        Decisions::Choice(choices) => format!(
+            ", or for this run --golden-decisions {} (a folder does not carry what `compile` was told)",
+            choices.accepting_share()
+        ),
+        Decisions::Continuous(_) => String::new(),
+    };
+    format!(
+        "to accept them for good: {} in [network] of the contract{once}",
+        decisions.remedy()
+    )
 }
 
 /// What the numeric format does to the trainer's decisions, and at which observation it does most: one line each. Losses are
@@ -174,7 +186,9 @@ fn choices(policy: &Policy, decisions: &Choices) -> Vec<String> {
     )];
     let Some(change) = worst.first() else { return lines };
     lines.push(format!(
-        "  they give up at most {largest_loss:.4} and on average {mean_loss:.4} of the operating range of Q, which is {}",
+        "  they give up at most {} and on average {} of the operating range of Q, which is {} (mean of best less worst Q)",
+        quantity(*largest_loss, "", 3),
+        quantity(*mean_loss, "", 3),
         quantity(*operating_range, "", 3)
     ));
     let duty = |action: usize| policy.actions().get(action).map_or(f64::NAN, |action| action.duty);

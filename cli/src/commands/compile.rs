@@ -154,7 +154,8 @@ fn say_json(
     let sizes = manifest::sizes(policy, made.target);
     let files = together(&made.files, &made.archives);
     let mut notes = noted(policy, made.target, &sizes, files.keys().map(Path::new));
-    notes.extend(made.decisions.iter().map(|line| line.trim().to_owned()));
+    let told = |line: &String| line.trim().trim_start_matches("note: ").to_owned();
+    notes.extend(made.decisions.iter().map(told));
     notes.extend(costs.iter().flat_map(|text| talk::notes_of(text)));
     notes.iter().for_each(|note| talk::note(note));
     let written = |(path, content): (&String, &Vec<u8>)| Written {
@@ -228,6 +229,7 @@ fn check(policy: &Policy, golden_decisions: Option<f64>) -> Result<Vec<String>, 
             // the counts; where it changes most is told by `inspect`
             let mut lines = text::decisions(policy, &decisions);
             lines.truncate(2);
+            lines.extend(accepted_here(policy, golden_decisions));
             Ok(if changes { lines } else { Vec::new() })
         }
         Some(decisions) => {
@@ -252,6 +254,18 @@ fn check(policy: &Policy, golden_decisions: Option<f64>) -> Result<Vec<String>, 
             Err(Message::new(problem).found(found).hint(hint).into())
         }
     }
+}
+
+/// What `verify` has to be told, too, where the command line alone accepts what the format changes.
+fn accepted_here(policy: &Policy, golden_decisions: Option<f64>) -> Option<String> {
+    let share = golden_decisions?;
+    let by_contract = verify::decisions(policy, None)?;
+    (!by_contract.kept()).then(|| {
+        format!(
+            "note: accepted for this run alone: the files do not carry it, so give `verify` --golden-decisions {share} as well, or write \
+             golden_decisions = {share} into [network] of the contract, which both read"
+        )
+    })
 }
 
 /// What a step costs under the target's emulator; it goes into the manifest, too.

@@ -70,21 +70,9 @@ pub fn view(program: &Program, title: &str) -> BlockView {
 }
 
 fn input(scalar: Scalar, signal: &SignalPort) -> InputView {
-    let (low, high) = signal.range;
-    let kind = if signal.is_code {
-        "ADC code, plausible"
-    } else {
-        "plausible"
-    };
-    let meaning = format!(
-        "{kind} {} to {} {}",
-        low.shortest(scalar),
-        high.shortest(scalar),
-        signal.unit
-    );
     InputView {
         name: signal.name.clone(),
-        meaning: meaning.trim_end().to_owned(),
+        meaning: signal.meaning(scalar),
         is_code: signal.is_code,
     }
 }

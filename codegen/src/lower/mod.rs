@@ -21,7 +21,9 @@ use targets::TargetSpec;
 use crate::crc::{crc32_words, nibble_table};
 use crate::files::TOOL;
 use crate::output::Language;
-use crate::program::{Coefficient, Element, Head, Literal, MappingCode, Program, Provenance, SignalPort, Table};
+use crate::program::{
+    Coefficient, Conversion, Element, Head, Literal, MappingCode, Program, Provenance, SignalPort, Table,
+};
 
 /// Lowers a policy for a target; the loops of its network are those that suit the language's compilers.
 #[must_use]
@@ -94,6 +96,11 @@ fn signal_port(scalar: Scalar, signal: &policy::Signal) -> SignalPort {
         name: signal.name.clone(),
         unit: signal.unit.clone(),
         is_code: signal.adc.is_some(),
+        conversion: signal.adc.map(|adc| Conversion {
+            gain: Literal::nearest(scalar, adc.gain),
+            offset: Literal::nearest(scalar, adc.offset),
+            bits: adc.bits,
+        }),
         range,
         // held before the first good sample: a plausible one, so that the state is sound from the start
         initial: Literal::nearest(scalar, 0.0_f64.max(range.0.value()).min(range.1.value())),

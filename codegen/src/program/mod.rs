@@ -25,7 +25,9 @@ pub use literal::Literal;
 pub(crate) use literal::{bits, words};
 pub use loops::{Add, Arithmetic, Buffer, Cut, From, Inner, IntegerCode, IntegerInput, Kept, Layer, Loop};
 pub use loops::{Network, Part, Piece, Shape, Sink, Store, Sums, Turns};
-pub use ops::{Advance, Block, Coefficient, Decide, Front, Op, Push, SignalPort, StateMember, StateValue, ValueId};
+pub use ops::{
+    Advance, Block, Coefficient, Conversion, Decide, Front, Op, Push, SignalPort, StateMember, StateValue, ValueId,
+};
 pub use tables::{Element, Slice, Strip, Table};
 
 /// Coefficients, their run-time intervals and the condition that keeps the mapping increasing, and what vouches for them.

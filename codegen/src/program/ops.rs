@@ -1,5 +1,7 @@
 //! The straight-line part of a step: operations, and the three blocks around the network.
 
+use policy::Scalar;
+
 use super::guard::Within;
 use super::literal::Literal;
 
@@ -200,10 +202,47 @@ pub struct SignalPort {
     pub unit: String,
     /// Whether the field is an integer ADC code.
     pub is_code: bool,
+    /// What a code means; `None` where the field is a number.
+    pub conversion: Option<Conversion>,
     /// Plausible range in the format, for the comment and the check.
     pub range: (Literal, Literal),
     /// `held` after init.
     pub initial: Literal,
+}
+
+/// `gain * code + offset`, for the comment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Conversion {
+    /// Unit per code.
+    pub gain: Literal,
+    /// Value at code 0.
+    pub offset: Literal,
+    /// Bits of the converter, if they are known.
+    pub bits: Option<u32>,
+}
+
+impl SignalPort {
+    /// What the field holds, in the words of every comment: how a code is converted, and the plausible range.
+    #[must_use]
+    pub fn meaning(&self, scalar: Scalar) -> String {
+        let [unit, within] = match self.unit.as_str() {
+            "" => [String::new(), String::new()],
+            unit => [format!(" {unit}"), format!(" in {unit}")],
+        };
+        let (low, high) = (self.range.0.shortest(scalar), self.range.1.shortest(scalar));
+        let plausible = format!("plausible {low} to {high}{unit}");
+        let Some(Conversion { gain, offset, bits }) = self.conversion else {
+            return plausible;
+        };
+        let bits = bits.map_or_else(String::new, |bits| format!(" of {bits} bits"));
+        let gain = gain.shortest(scalar);
+        let offset = match offset.value() {
+            0.0 => String::new(),
+            below if below < 0.0 => format!(" - {}", Literal::nearest(scalar, -below).shortest(scalar)),
+            _ => format!(" + {}", offset.shortest(scalar)),
+        };
+        format!("ADC code{bits}: {gain} * code{offset}{within}, {plausible}")
+    }
 }
 
 /// A member of the controller's state (contract section 1).
@@ -298,4 +337,43 @@ pub struct Advance {
     pub block: Block,
     /// Next soft-start limit; `None` without a soft start.
     pub soft_cap: Option<ValueId>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn meaning(unit: &str, conversion: Option<(f64, f64, Option<u32>)>) -> String {
+        let literal = |x: f64| Literal::nearest(Scalar::F32, x);
+        let port = SignalPort {
+            name: "v_out".to_owned(),
+            unit: unit.to_owned(),
+            is_code: conversion.is_some(),
+            conversion: conversion.map(|(gain, offset, bits)| Conversion {
+                gain: literal(gain),
+                offset: literal(offset),
+                bits,
+            }),
+            range: (literal(0.0), literal(250.0)),
+            initial: literal(0.0),
+        };
+        port.meaning(Scalar::F32)
+    }
+
+    #[test]
+    fn a_measurement_says_how_its_code_is_converted() {
+        assert_eq!(meaning("V", None), "plausible 0.0 to 250.0 V");
+        assert_eq!(
+            meaning("V", Some((0.0625, -2.0, Some(12)))),
+            "ADC code of 12 bits: 0.0625 * code - 2.0 in V, plausible 0.0 to 250.0 V"
+        );
+        assert_eq!(
+            meaning("", Some((-0.5, 0.1, None))),
+            "ADC code: -0.5 * code + 0.1, plausible 0.0 to 250.0"
+        );
+        assert_eq!(
+            meaning("V", Some((0.0625, 0.0, None))),
+            "ADC code: 0.0625 * code in V, plausible 0.0 to 250.0 V"
+        );
+    }
 }

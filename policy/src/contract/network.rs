@@ -4,6 +4,7 @@ use toml_input::{At, Fault, Message, Sink, Table, Value};
 
 use crate::activation::Activation;
 use crate::catalogue;
+use crate::known_answers;
 use crate::limits::MAX_LAYERS;
 use crate::weights::golden::Limits;
 
@@ -53,8 +54,7 @@ pub(crate) fn read<'a>(root: &mut Table<'a>, faults: &mut Sink) -> Option<Networ
     let tolerance = section
         .optional("golden_tolerance")
         .and_then(|v| tolerance(&v, faults))
-        // a tolerance and not bits, because trainers add in an order of their own
-        .unwrap_or(1e-5);
+        .unwrap_or(known_answers::TOLERANCE);
     let decisions = section.optional("golden_decisions").and_then(|v| {
         share(
             &v,

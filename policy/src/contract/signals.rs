@@ -118,14 +118,22 @@ fn adc(value: &Value<'_>, range: Option<Interval>, name: &str, faults: &mut Sink
         faults.push(value.fault(catalogue::adc_codes(name, a.min(b), a.max(b))));
         return None;
     }
+    let bits = match bits {
+        Some(bits) => Some(u32::try_from(bits?).ok()?),
+        None => None,
+    };
     if let Some((bits, value)) = bits.zip(bits_value) {
-        let last = ((1_u64 << bits?) - 1) as f64;
+        let last = ((1_u64 << bits) - 1) as f64;
         if let Some(message) = saturation(range, [offset, factor * last + offset], factor, name) {
             faults.push(value.fault(message));
             return None;
         }
     }
-    Some(Adc { gain: factor, offset })
+    Some(Adc {
+        gain: factor,
+        offset,
+        bits,
+    })
 }
 
 /// What is wrong with the range of a converter that shows `ends` at its first and its last code.

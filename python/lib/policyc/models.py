@@ -85,6 +85,8 @@ def _drafted(file: str, actions: Optional[int] = None) -> Tuple[str, Dict[str, b
     lines = [line.split("   #")[0].rstrip() for line in section.splitlines()]
     keys = [line for line in lines if line and not line.startswith(("#", "golden"))]
     weights = {name: content for name, content in beside.items() if not name.startswith("golden")}
+    # golden answers are made anew, or given: what the reader says of its own would mislead
+    said = [line for line in said if not line.startswith("golden")]
     return "\n".join(keys) + "\n", weights, said, draft
 
 

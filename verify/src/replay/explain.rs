@@ -40,6 +40,8 @@ pub(super) struct Course {
     features: Vec<FeatureCourse>,
     signals: Vec<Vec<f64>>,
     pub actions: Vec<u32>,
+    /// What the logged action gives up of Q, as a share of the largest |Q| of its row; empty without logged actions.
+    pub lost: Vec<f64>,
     /// Before the mapping.
     pub duties: Vec<f64>,
     /// By the action that the trainer applied, before the mapping.
@@ -60,6 +62,7 @@ impl Course {
             features: vec![FeatureCourse::default(); policy.features.len()],
             signals: vec![Vec::new(); policy.signals.len()],
             actions: Vec::new(),
+            lost: Vec::new(),
             duties: Vec::new(),
             commanded: Vec::new(),
         }
@@ -76,6 +79,14 @@ impl Course {
         }
         self.actions.push(trace.action_index);
         self.duties.push(trace.duty_sim.to_f64());
+    }
+
+    /// Weighs the logged action by the Q values of the contract.
+    pub fn gives_up<T: Real>(&mut self, trace: &Trace<T>, logged: u32) {
+        let q: Vec<f64> = trace.q_values.iter().map(|q| q.to_f64()).collect();
+        let value = |action: u32| q.get(action as usize).copied().unwrap_or(f64::NAN);
+        let largest = q.iter().fold(f64::MIN_POSITIVE, |largest, q| largest.max(q.abs()));
+        self.lost.push((value(trace.action_index) - value(logged)) / largest);
     }
 
     /// What the contract commands by the action that the trainer applied.

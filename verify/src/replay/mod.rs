@@ -92,7 +92,9 @@ pub struct Compared {
 pub struct ActionResult {
     /// Rows with the logged action.
     pub equal: usize,
-    /// Line of the first other one.
+    /// Rows with another action whose Q value is the same up to the rounding that `golden_tolerance` allows: told, not judged.
+    pub ties: usize,
+    /// Line of the first other one, ties left out.
     pub first_line: Option<usize>,
     /// The log's actions are a trainer's who explores: told, not judged.
     pub exploring: bool,
@@ -190,10 +192,16 @@ fn commands(policy: &Policy, log: &Log, course: &Course, wanted: Wanted) -> Opti
     } = wanted;
     let late = log.is_late(skip);
     let is_late = |row: &usize| late.get(*row).copied().unwrap_or(true);
+    let mut ties = 0;
     let others: Vec<usize> = match (&log.actions, policy.head.continuous().zip(log.commanded.as_ref())) {
         (Some(logged), _) => {
             let other = |row: &usize| logged.get(*row) != course.actions.get(*row);
-            (0..log.rows()).filter(is_late).filter(other).collect()
+            let others = (0..log.rows()).filter(is_late).filter(other);
+            // the same measure as of golden decisions: what the trainer's own order of additions could have turned
+            let is_tie = |row: &usize| (course.lost.get(*row)).is_some_and(|lost| *lost <= policy.golden_tolerance());
+            let (tied, others) = others.partition::<Vec<usize>, _>(is_tie);
+            ties = tied.len();
+            others
         }
         (None, Some((head, logged))) => {
             let near = |row: usize| Some((logged.get(row)? - course.duties.get(row)?).abs() <= tolerance * head.span());
@@ -206,7 +214,8 @@ fn commands(policy: &Policy, log: &Log, course: &Course, wanted: Wanted) -> Opti
         (None, None) => return None,
     };
     Some(ActionResult {
-        equal: log.rows() - others.len(),
+        equal: log.rows() - others.len() - ties,
+        ties,
         first_line: others.first().map(|row| log.line(*row)),
         exploring,
     })
@@ -270,6 +279,9 @@ fn course<T: Real>(policy: &Policy, log: &Log) -> Result<Course, Faults> {
             return Err(log.fault(row, message).into());
         }
         course.push(&trace);
+        if let Some(action) = log.actions.as_ref().and_then(|actions| actions.get(row)) {
+            course.gives_up(&trace, *action);
+        }
         apply(&controller, &mut trace, &log.applied, row);
         course.commanded(&trace);
         controller.commit_trace(&trace);

@@ -89,7 +89,18 @@ fn words(policy: &Policy, replay: &Replay) -> Vec<String> {
             (Some(line), false) => format!(", first other in line {line}"),
         };
         let command = if is_continuous { "duty" } else { "action" };
-        words.push(format!("{command} equal in {equal} of {rows}{told}"));
+        let ties = match actions.ties {
+            0 => String::new(),
+            1 => ", 1 tie apart".to_owned(),
+            ties => format!(", {} ties apart", grouped(ties as u64)),
+        };
+        words.push(format!("{command} equal in {equal} of {rows}{ties}{told}"));
+        if actions.ties > 0 {
+            words.push(format!(
+                "a tie: both actions have the same Q value within golden_tolerance, {} of the largest; a rounding chose between them",
+                number(policy.golden_tolerance())
+            ));
+        }
     }
     words.extend(replay.duties.as_ref().and_then(super::DutyResult::text));
     for (signal, rows, [low, high]) in &replay.outside {

@@ -183,6 +183,7 @@ mod tests {
             &signal(Some(Adc {
                 gain: 1e-3,
                 offset: 0.0,
+                bits: None,
             })),
             &[],
         );

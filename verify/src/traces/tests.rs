@@ -212,6 +212,7 @@ fn an_adc_sample_is_the_nearest_code_and_saturates() {
     let adc = Some(policy::Adc {
         gain: -0.5,
         offset: 3.0,
+        bits: None,
     });
     let signal = policy::Signal {
         name: "x".into(),

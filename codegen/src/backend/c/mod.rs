@@ -125,23 +125,14 @@ fn header(program: &Program) -> Header {
 
 fn measurement_member(program: &Program, signal: &crate::program::SignalPort) -> Member {
     let scalar = program.scalar();
-    let (low, high) = signal.range;
     let kind = if signal.is_code {
         "int32_t"
     } else {
         number::kind(scalar).name
     };
-    let meaning = if signal.is_code { "ADC code, " } else { "" };
     Member {
         declaration: format!("{kind} {}", signal.name),
-        comment: format!(
-            "{meaning}plausible {} to {} {}",
-            low.shortest(scalar),
-            high.shortest(scalar),
-            signal.unit
-        )
-        .trim_end()
-        .to_owned(),
+        comment: signal.meaning(scalar),
     }
 }
 

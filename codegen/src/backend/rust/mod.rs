@@ -112,11 +112,8 @@ fn types(program: &Program, layout: &TokenStream) -> TokenStream {
     let number = number::kind(scalar);
     let fields = program.signals.iter().map(|signal| {
         let name = ident(&signal.name);
-        let (low, high) = (signal.range.0.shortest(scalar), signal.range.1.shortest(scalar));
         let kind = if signal.is_code { quote!(i32) } else { number.clone() };
-        let code = if signal.is_code { "ADC code; " } else { "" };
-        let doc = format!(" {code}plausible {low} to {high} {}", signal.unit);
-        let doc = doc.trim_end();
+        let doc = format!(" {}", signal.meaning(scalar));
         quote! { #[doc = #doc] pub #name: #kind }
     });
     let [duty_sim, action_index] = match program.head.is_output() {

@@ -20,8 +20,8 @@ extern "C" {
 /*
  * The controller behind ports of double.
  * inputs [ADC_MAPPING_BLOCK_INPUTS]:
- *   0 v_out: ADC code, plausible 0.0 to 20.0 V
- *   1 i_out: ADC code, plausible -4.0 to 16.0 A
+ *   0 v_out: ADC code: 0.0048828125 * code in V, plausible 0.0 to 20.0 V
+ *   1 i_out: ADC code: 0.005 * code - 4.0 in A, plausible -4.0 to 16.0 A
  *   2 enable: above 0.5 the controller works; else the duty is the fallback duty and the state is as after init
  * coefficients [ADC_MAPPING_BLOCK_PARAMETERS], of the duty ratio mapping:
  *   0 a: 0.8 to 1.25, generated 1.02

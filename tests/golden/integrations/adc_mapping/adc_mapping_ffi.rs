@@ -42,9 +42,9 @@ pub mod status {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C)]
 pub struct Measurement {
-    /// ADC code; plausible 0.0 to 20.0 V
+    /// ADC code: 0.0048828125 * code in V, plausible 0.0 to 20.0 V
     pub v_out: i32,
-    /// ADC code; plausible -4.0 to 16.0 A
+    /// ADC code: 0.005 * code - 4.0 in A, plausible -4.0 to 16.0 A
     pub i_out: i32,
 }
 /// What the controller answers.

@@ -17,8 +17,8 @@
 /*
  * One instance of the controller as a co-simulation unit, without a word of FMI: the shells of FMI 2 and FMI 3 call it.
  * Variables, by reference (0 is the time):
- *   1 v_out (input): ADC code, plausible 0.0 to 20.0 V
- *   2 i_out (input): ADC code, plausible -4.0 to 16.0 A
+ *   1 v_out (input): ADC code: 0.0048828125 * code in V, plausible 0.0 to 20.0 V
+ *   2 i_out (input): ADC code: 0.005 * code - 4.0 in A, plausible -4.0 to 16.0 A
  *   3 enable (input): true: works; false: fallback duty, state as after start
  *   4 duty (output): commanded duty, 0 to 1, for the control period that begins with the step
  *   5 action (output): index of the greedy action, from 0
@@ -29,7 +29,7 @@
  *   10 r (parameter): coefficient of the duty ratio mapping; set before a step, it counts from the one after it
  */
 #define ADC_MAPPING_FMU_VARIABLES 10u
-#define ADC_MAPPING_FMU_TOKEN "{db96a248-4a47-8c9c-42d4-cecf17985843}"
+#define ADC_MAPPING_FMU_TOKEN "{6774b135-e728-0646-d8af-c975d5578dc9}"
 #define ADC_MAPPING_FMU_PERIOD 2e-5
 
 /* Types of variables. */

@@ -40,8 +40,8 @@ extern "C" {
 
 /* One sample of every signal. */
 typedef struct {
-    int32_t v_out; /* ADC code, plausible 0.0 to 20.0 V */
-    int32_t i_out; /* ADC code, plausible -4.0 to 16.0 A */
+    int32_t v_out; /* ADC code: 0.0048828125 * code in V, plausible 0.0 to 20.0 V */
+    int32_t i_out; /* ADC code: 0.005 * code - 4.0 in A, plausible -4.0 to 16.0 A */
 } adc_mapping_measurement;
 
 /* What the controller answers. */

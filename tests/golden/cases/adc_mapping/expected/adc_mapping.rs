@@ -46,9 +46,9 @@ static CRC_STEPS: [u32; 16] = [
 /// One sample of every signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measurement {
-    /// ADC code; plausible 0.0 to 20.0 V
+    /// ADC code: 0.0048828125 * code in V, plausible 0.0 to 20.0 V
     pub v_out: i32,
-    /// ADC code; plausible -4.0 to 16.0 A
+    /// ADC code: 0.005 * code - 4.0 in A, plausible -4.0 to 16.0 A
     pub i_out: i32,
 }
 /// What the controller answers.

@@ -40,7 +40,7 @@ extern "C" {
 
 /* One sample of every signal. */
 typedef struct {
-    int32_t v_out; /* ADC code, plausible 0.0 to 250.0 V */
+    int32_t v_out; /* ADC code: 0.0625 * code in V, plausible 0.0 to 250.0 V */
 } clipped_actor_measurement;
 
 /* What the controller answers. */

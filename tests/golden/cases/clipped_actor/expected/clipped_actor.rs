@@ -46,7 +46,7 @@ static CRC_STEPS: [u32; 16] = [
 /// One sample of every signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measurement {
-    /// ADC code; plausible 0.0 to 250.0 V
+    /// ADC code: 0.0625 * code in V, plausible 0.0 to 250.0 V
     pub v_out: i32,
 }
 /// What the controller answers.

@@ -41,7 +41,7 @@ extern "C" {
 /* One sample of every signal. */
 typedef struct {
     float v_out; /* plausible 0.0 to 80.0 V */
-    int32_t i_out; /* ADC code, plausible -2.0 to 24.0 A */
+    int32_t i_out; /* ADC code: 0.0078125 * code - 2.0 in A, plausible -2.0 to 24.0 A */
     float v_in; /* plausible 40.0 to 140.0 V */
 } observed_measurement;
 

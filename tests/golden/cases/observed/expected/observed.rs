@@ -48,7 +48,7 @@ static CRC_STEPS: [u32; 16] = [
 pub struct Measurement {
     /// plausible 0.0 to 80.0 V
     pub v_out: f32,
-    /// ADC code; plausible -2.0 to 24.0 A
+    /// ADC code: 0.0078125 * code - 2.0 in A, plausible -2.0 to 24.0 A
     pub i_out: i32,
     /// plausible 40.0 to 140.0 V
     pub v_in: f32,

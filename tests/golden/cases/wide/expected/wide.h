@@ -41,7 +41,7 @@ extern "C" {
 /* One sample of every signal. */
 typedef struct {
     double v_out; /* plausible 0.0 to 80.0 V */
-    int32_t i_l; /* ADC code, plausible -20.0 to 20.0 A */
+    int32_t i_l; /* ADC code: 0.009765625 * code - 20.0 in A, plausible -20.0 to 20.0 A */
     double i_out; /* plausible -1.0 to 16.0 A */
 } wide_measurement;
 

@@ -48,7 +48,7 @@ static CRC_STEPS: [u32; 16] = [
 pub struct Measurement {
     /// plausible 0.0 to 80.0 V
     pub v_out: f64,
-    /// ADC code; plausible -20.0 to 20.0 A
+    /// ADC code: 0.009765625 * code - 20.0 in A, plausible -20.0 to 20.0 A
     pub i_l: i32,
     /// plausible -1.0 to 16.0 A
     pub i_out: f64,

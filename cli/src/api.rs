@@ -21,7 +21,8 @@ pub use commands::campaign::summary as campaign_summary;
 
 pub use commands::certify::{Made as Certified, Request as CertifyRequest, make as certify};
 pub use commands::compile::{Made as Compiled, Request as CompileRequest, make as compile};
-pub use commands::inspect::{json as inspect_json, text as inspect_text};
+pub use commands::inspect::json as inspect_json;
+pub use verify::text::inspection as inspect_text;
 
 /// All commands with their options, as clap knows them.
 #[must_use]

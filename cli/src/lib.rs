@@ -12,6 +12,7 @@ mod outcome;
 mod output;
 mod ownership;
 mod staging;
+mod studio;
 mod talk;
 
 use std::ffi::OsString;
@@ -84,6 +85,7 @@ fn dispatch(command: &Command) -> Result<Outcome, Failure> {
         Command::Campaign(options) => commands::campaign::run(options),
         Command::Merge(options) => commands::merge::run(options),
         Command::Demo(options) => commands::demo::run(options),
+        Command::Studio(options) => commands::studio::run(options),
         Command::Drm(command) => commands::drm::run(command),
         Command::Completions(options) => commands::completions::run(options),
         Command::Manpages(options) => commands::manpages::run(options),

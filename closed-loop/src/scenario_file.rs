@@ -1,8 +1,8 @@
 //! A scenario: which converter, which load steps, which classical controllers beside the policy.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use toml_input::{Document, Faults, Message, Sink, Table, Value, messages};
+use toml_input::{Document, Faults, FileName, Message, Sink, Table, Value, messages};
 
 use crate::baselines::Kind;
 use crate::load_step::{LoadKind, LoadStep, SOURCE_RANGE};
@@ -13,7 +13,7 @@ use crate::scenario::Task;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scenario {
     /// The plant's file, from the scenario's folder; nothing if the scenario leaves it open.
-    pub plant: Option<PathBuf>,
+    pub plant: Option<FileName>,
     /// Numbers of the plant that take the place of its file's, by key.
     pub set: Vec<(String, f64)>,
     /// Voltage to hold, V; nothing if it is the policy's parameter `v_ref`.
@@ -38,8 +38,8 @@ impl Scenario {
     ///
     /// # Errors
     /// All faults of the file with their places, or that it cannot be read.
-    pub fn load(path: &Path) -> Result<Self, Faults> {
-        Self::read(&Document::open(path)?)
+    pub fn load(file: impl Into<FileName>) -> Result<Self, Faults> {
+        Self::read(&Document::open(file)?)
     }
 
     /// Reads the text of a scenario; `file` names it in messages, and paths are from its folder.
@@ -51,13 +51,11 @@ impl Scenario {
     }
 
     fn read(document: &Document) -> Result<Self, Faults> {
-        let path = &document.source().name.path;
-        let folder = path.parent().unwrap_or(Path::new(""));
-        document.read(|root, faults| top(document, folder, root, faults))
+        document.read(|root, faults| top(document, root, faults))
     }
 }
 
-fn top(document: &Document, folder: &Path, root: &mut Table<'_>, faults: &mut Sink) -> Option<Scenario> {
+fn top(document: &Document, root: &mut Table<'_>, faults: &mut Sink) -> Option<Scenario> {
     let plant = root.optional("plant").and_then(|v| v.text(faults));
     let set = root.with_default("set", Vec::new(), faults, read::plant_numbers);
     let v_ref = root.optional("v_ref").and_then(|v| v.positive(faults));
@@ -100,7 +98,7 @@ fn top(document: &Document, folder: &Path, root: &mut Table<'_>, faults: &mut Si
         faults.push(root.fault(Message::new("a scenario without a load step").hint(hint)));
     }
     Some(Scenario {
-        plant: plant.map(|text| folder.join(text)),
+        plant: plant.map(|text| document.source().name.beside(text)),
         set,
         v_ref,
         load_steps,

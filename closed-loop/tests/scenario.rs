@@ -59,7 +59,7 @@ fn every_example_is_a_scenario_and_the_commented_one_says_the_defaults() {
 #[test]
 fn the_plant_is_found_from_the_scenario_s_folder() {
     assert_eq!(
-        read("plant = \"../p.toml\"").plant.unwrap(),
+        read("plant = \"../p.toml\"").plant.unwrap().path,
         Path::new("bench/../p.toml")
     );
 }

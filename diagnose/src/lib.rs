@@ -50,6 +50,7 @@ pub mod profile;
 pub mod progress;
 mod quantised;
 pub mod record;
+pub mod results;
 pub mod rivals;
 mod sampling;
 mod search;

@@ -11,6 +11,10 @@ pub fn map<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<
     let threads = std::thread::available_parallelism()
         .map_or(1, std::num::NonZero::get)
         .min(items.len());
+    // in a browser there are no threads to start
+    if threads <= 1 {
+        return items.iter().map(work).collect();
+    }
     std::thread::scope(|scope| {
         for _ in 0..threads {
             scope.spawn(|| {

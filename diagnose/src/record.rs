@@ -13,17 +13,17 @@ mod source;
 mod stamp;
 mod steady;
 mod suspicion;
-
-use std::path::Path;
+mod together;
 
 use measured::{ColumnMap, DutyIs, Options, Sampled, Sheet};
 use plant::{Load, Parameters};
-use toml_input::{Faults, Message, Sink};
+use toml_input::{Faults, FileName, Message, Sink};
 
 pub use channels::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS, Segment};
 use channels::{FEWEST, QUANTITIES};
 use raw::Raw;
 pub(crate) use source::Source;
+pub use together::open_all;
 
 use crate::capture::Capture;
 
@@ -80,7 +80,7 @@ impl Record {
     ///
     /// # Errors
     /// A file that cannot be read, and those of [`Record::read`].
-    pub fn open(file: &Path, map: &ColumnMap, parameters: &Parameters) -> Result<Self, Faults> {
+    pub fn open(file: impl Into<FileName>, map: &ColumnMap, parameters: &Parameters) -> Result<Self, Faults> {
         Self::read(&Sheet::open(file, &Self::file_options())?, map, parameters)
     }
 

@@ -33,7 +33,7 @@ use std::path::{Path, PathBuf};
 
 use policy::limits::MAX_WEIGHT_BYTES;
 use policy::{Draft, DraftFeature, seen_from};
-use toml_input::{Faults, FileName, Message};
+use toml_input::{Faults, FileName, Message, Origin};
 
 pub use network::{Layer, Network};
 use read::Loaded;
@@ -73,8 +73,8 @@ const STATISTICS: &str = "vecnormalize.pkl";
 ///
 /// # Errors
 /// If the file is not sound, holds what is not compiled, or does not say which of its networks is the policy.
-pub fn new_policy(file: &Path, contract: &Path, options: &Options) -> Result<NewPolicy, Faults> {
-    let name = FileName::new(file);
+pub fn new_policy(file: impl Into<FileName>, contract: &Path, options: &Options) -> Result<NewPolicy, Faults> {
+    let name: FileName = file.into();
     let bytes = name.read(MAX_WEIGHT_BYTES).map_err(|message| name.fault(message))?;
     let loaded = read::read(&name, bytes, options)?;
     if let Some(graph) = &loaded.graph {
@@ -83,7 +83,7 @@ pub fn new_policy(file: &Path, contract: &Path, options: &Options) -> Result<New
         if !is_command {
             recognise::fits(&graph.network, options.actions).map_err(|refusal| placed(&name, refusal))?;
         }
-        let own = statistics(file, options)?;
+        let own = statistics(&name, options)?;
         if !own.is_empty() && !graph.features.is_empty() {
             let message = Message::new("the graph normalises its observations already")
                 .hint("leave out the statistics of VecNormalize");
@@ -97,13 +97,13 @@ pub fn new_policy(file: &Path, contract: &Path, options: &Options) -> Result<New
         if outputs != 1 {
             return Err(name.fault(actor::several(outputs)).into());
         }
-        return written(&name, contract, &loaded, &network, &statistics(file, options)?);
+        return written(&name, contract, &loaded, &network, &statistics(&name, options)?);
     }
     let network = match recognise(&loaded.tensors, &loaded.known).map_err(|refusal| placed(&name, refusal))? {
         Recognised::Network(network) => Some(network),
         Recognised::Undecided => None,
     };
-    let statistics = statistics(file, options)?;
+    let statistics = statistics(&name, options)?;
     match network {
         Some(network) if !network.plain || !loaded.is_safetensors || !statistics.is_empty() => {
             written(&name, contract, &loaded, &network, &statistics)
@@ -111,7 +111,7 @@ pub fn new_policy(file: &Path, contract: &Path, options: &Options) -> Result<New
         // several chains side by side, or none: the contract's own reader explains, or asks for the prefix
         None if !loaded.is_safetensors => Err(name.fault(recognise::undecided_message(&loaded.tensors)).into()),
         plain => Ok(NewPolicy {
-            contract: policy::new_contract(file, contract)?,
+            contract: policy::new_contract(name, contract)?,
             beside: BTreeMap::new(),
             said: plain.map_or_else(Vec::new, |network| network.said),
         }),
@@ -119,14 +119,16 @@ pub fn new_policy(file: &Path, contract: &Path, options: &Options) -> Result<New
 }
 
 /// Normalisation of the observations, if any was saved.
-fn statistics(file: &Path, options: &Options) -> Result<Vec<DraftFeature>, Faults> {
-    let beside = file.with_file_name(STATISTICS);
-    let path = match &options.vecnormalize {
-        Some(path) => path,
-        None if beside.is_file() => &beside,
+fn statistics(file: &FileName, options: &Options) -> Result<Vec<DraftFeature>, Faults> {
+    let beside = FileName {
+        origin: Origin::Caller,
+        ..file.with_file_name(STATISTICS)
+    };
+    let name = match &options.vecnormalize {
+        Some(path) => FileName::new(path).among(file.held.as_ref()),
+        None if beside.is_file() => beside,
         None => return Ok(Vec::new()),
     };
-    let name = FileName::new(path);
     let bytes = name.read(MAX_WEIGHT_BYTES).map_err(|message| name.fault(message))?;
     vecnormalize::read(&bytes).map_err(|message| name.fault(message).into())
 }
@@ -170,8 +172,8 @@ fn written(
             "{GOLDEN} was computed from the tensors as saved, in f64; the trainer's own answers check more"
         ));
     }
-    let own = contract.with_file_name(WEIGHTS);
-    let is_taken = is_same(&own, &name.path);
+    let own = FileName::new(&contract.with_file_name(WEIGHTS)).among(name.held.as_ref());
+    let is_taken = own.is_same(name);
     let file = if is_taken { CHAIN } else { WEIGHTS };
     let weights = seen_from(contract, &contract.with_file_name(file)).map_err(|message| name.fault(message))?;
     let draft = Draft {
@@ -195,7 +197,8 @@ fn written(
     };
     let mut beside = BTreeMap::from([(file.to_owned(), network.to_safetensors(name)?)]);
     // a contract names no file of another folder unless its user says so with every command
-    let answers = given.filter(|_| !is_same(&contract.with_file_name(GOLDEN), &name.path.with_file_name(GOLDEN)));
+    let beside_contract = FileName::new(&contract.with_file_name(GOLDEN)).among(name.held.as_ref());
+    let answers = given.filter(|_| !beside_contract.is_same(&name.with_file_name(GOLDEN)));
     beside.extend(golden.or(answers).map(|bytes| (GOLDEN.to_owned(), bytes)));
     Ok(NewPolicy {
         contract: policy::draft(&draft),
@@ -204,18 +207,13 @@ fn written(
     })
 }
 
-fn is_same(a: &Path, b: &Path) -> bool {
-    (a.canonicalize()).is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))
-}
-
 /// The trainer's own answers beside its model, which check more than what can be computed here; `None` without them, and of those
 /// that an earlier call computed.
 fn given_answers(model: &FileName) -> Result<Option<Vec<u8>>, Faults> {
-    let path = model.path.with_file_name(GOLDEN);
-    if !path.is_file() {
+    let name = model.with_file_name(GOLDEN);
+    if !name.is_file() {
         return Ok(None);
     }
-    let name = FileName::new(&path);
     let bytes = name.read(MAX_WEIGHT_BYTES).map_err(|message| name.fault(message))?;
     Ok((!golden::is_computed(&bytes)).then_some(bytes))
 }

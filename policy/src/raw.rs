@@ -1,10 +1,9 @@
 //! The files of a policy as they are, every value with its place.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
-use toml_input::{Document, Fault, FileName, Message, Origin, Sink, Source, Value};
+use toml_input::{Document, Fault, FileName, Files, Message, Origin, Sink, Source, Value};
 
 use crate::catalogue;
 use crate::faults::{Faults, Skeleton};
@@ -18,8 +17,8 @@ pub struct ReadOptions {
     /// Folder that every file must lie in, by its path alone (links are not followed); a relative path of the
     /// contract is then taken from here, and messages name files relative to it.
     pub root: Option<PathBuf>,
-    /// Files that a program carries inside or holds in memory: name and content. A file named here is not looked for on disk.
-    pub embedded: BTreeMap<PathBuf, Cow<'static, [u8]>>,
+    /// Files that a program carries inside or holds in memory. With them nothing is looked for on disk.
+    pub files: Option<Files>,
     /// Files that the contract names must lie in its own folder, by the path alone. A contract from elsewhere could name any
     /// file of this machine, and a message about it would show a line of it.
     pub own_folder: bool,
@@ -31,19 +30,13 @@ impl ReadOptions {
     /// Options for a policy that a program carries inside or holds in memory.
     pub fn embedded<P, B>(files: impl IntoIterator<Item = (P, B)>) -> Self
     where
-        P: Into<PathBuf>,
+        P: AsRef<Path>,
         B: Into<Cow<'static, [u8]>>,
     {
-        let files = files.into_iter().map(|(name, bytes)| (name.into(), bytes.into()));
         ReadOptions {
-            embedded: files.collect(),
+            files: Some(files.into_iter().collect()),
             ..ReadOptions::default()
         }
-    }
-
-    fn content(&self, name: &FileName, limit: u64) -> Result<Vec<u8>, Message> {
-        let inside = self.embedded.get(&name.path);
-        inside.map_or_else(|| name.read(limit), |bytes| Ok(bytes.to_vec()))
     }
 
     /// Options with [`ReadOptions::root`] set.
@@ -102,8 +95,8 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<RawPolicy, Faults> {
     let given = FileName::new(path);
     let name = locate(path, options).map_err(|message| alone(given.fault(message), Vec::new()))?;
     let mut files = vec![name.path.clone()];
-    let bytes = options
-        .content(&name, MAX_TOML_BYTES)
+    let bytes = name
+        .read(MAX_TOML_BYTES)
         .map_err(|message| alone(name.fault(message), files.clone()))?;
     // before the bytes become text: "not UTF-8" would be the lesser hint for a file of weights
     if let Some(message) = not_a_contract(&bytes) {
@@ -121,7 +114,7 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<RawPolicy, Faults> {
         let read = beside(&name, text, options).and_then(|name| {
             // before it is read: a file that is missing has to cause a rebuild when it comes
             files.push(name.path.clone());
-            options.content(&name, limit).map(|bytes| Binary { name, bytes })
+            name.read(limit).map(|bytes| Binary { name, bytes })
         });
         read.map_err(|message| faults.push(value.fault(message))).ok()
     };
@@ -155,12 +148,12 @@ fn document(file: Binary, faults: &mut Sink) -> Option<Document> {
 /// The contract's path, checked against the root.
 fn locate(path: &Path, options: &ReadOptions) -> Result<FileName, Message> {
     let Some(root) = &options.root else {
-        return Ok(FileName::new(path));
+        return Ok(FileName::new(path).among(options.files.as_ref()));
     };
     let shown = path.strip_prefix(root).unwrap_or(path).display().to_string();
     let name = FileName {
         origin: Origin::Crate,
-        ..FileName::new(&root.join(path))
+        ..FileName::new(&root.join(path)).among(options.files.as_ref())
     };
     inside(root, &name).ok_or_else(|| catalogue::outside_root(&shown))
 }
@@ -179,7 +172,8 @@ fn beside(owner: &FileName, text: &str, options: &ReadOptions) -> Result<FileNam
 
 fn is_in_folder_of(owner: &FileName, name: &FileName) -> bool {
     // from the root of the file system: one of the two paths may be relative and the other not
-    let whole = |path: &Path| normalise(&std::path::absolute(path).ok()?);
+    // where there is no file system there is no working folder, and both are from the root
+    let whole = |path: &Path| normalise(&std::path::absolute(path).unwrap_or_else(|_| path.to_owned()));
     let folder = whole(&owner.path).and_then(|path| path.parent().map(Path::to_owned));
     folder
         .zip(whole(&name.path))
@@ -197,7 +191,7 @@ fn inside(root: &Path, name: &FileName) -> Option<FileName> {
     Some(FileName {
         path,
         shown,
-        origin: name.origin,
+        ..name.clone()
     })
 }
 

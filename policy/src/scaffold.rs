@@ -22,16 +22,16 @@ use crate::weights::outline;
 /// # Errors
 /// If the file is not a sound safetensors file or holds no single chain of dense layers, or a contract cannot hold its
 /// path.
-pub fn new_contract(weights: &Path, contract: &Path) -> Result<String, Faults> {
-    let name = FileName::new(weights);
+pub fn new_contract(weights: impl Into<FileName>, contract: &Path) -> Result<String, Faults> {
+    let name: FileName = weights.into();
     let mut faults = Sink::new();
     let bytes = faults.keep(name.read(MAX_WEIGHT_BYTES).map_err(|message| name.fault(message)));
     let outline = bytes.and_then(|bytes| {
         let name = name.clone();
         outline(&Binary { name, bytes }, &mut faults)
     });
-    let seen = faults.keep(seen_from(contract, weights).map_err(|message| name.fault(message)));
-    let golden = weights.with_file_name("golden.safetensors").is_file();
+    let seen = faults.keep(seen_from(contract, &name.path).map_err(|message| name.fault(message)));
+    let golden = name.with_file_name("golden.safetensors").is_file();
     let text = outline.zip(seen).map(|(outline, weights)| {
         draft(&Draft {
             weights,
@@ -89,12 +89,14 @@ pub fn seen_from(contract: &Path, file: &Path) -> Result<String, Message> {
 
 /// A folder without links and `..`, as far as it exists; the rest of the path, which is still to be made, by its text.
 fn resolved(folder: &Path) -> Option<PathBuf> {
-    let absolute = std::path::absolute(folder).ok()?;
+    // where there is no file system there is no working folder, and every path is from the root
+    let absolute = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
     let parts: Vec<Component<'_>> = absolute.components().collect();
     let existing = |count: usize| parts[..count].iter().collect::<PathBuf>().canonicalize().ok();
     let (count, real) = (1..=parts.len())
         .rev()
-        .find_map(|count| Some((count, existing(count)?)))?;
+        .find_map(|count| Some((count, existing(count)?)))
+        .unwrap_or_default();
     Some(parts[count..].iter().fold(real, |mut path, part| {
         match part {
             Component::ParentDir => drop(path.pop()),

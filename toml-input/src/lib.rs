@@ -64,16 +64,20 @@
 
 mod document;
 mod fault;
+mod files;
 pub mod messages;
 mod nearest;
 mod node;
 mod sink;
+#[cfg(feature = "snippets")]
+mod snippets;
 mod source;
 mod table;
 mod value;
 
 pub use document::{Document, MAX_SYNTAX_FAULTS, MAX_TOML_BYTES};
 pub use fault::{Fault, Faults, Message, Place};
+pub use files::Files;
 pub use nearest::{did_you_mean, nearest};
 pub use node::At;
 pub use sink::Sink;

@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use crate::fault::{Fault, Message, Place};
+use crate::files::Files;
 use crate::messages;
 
 /// Byte range in a text.
@@ -30,7 +31,7 @@ impl Origin {
     }
 }
 
-/// A file by two names: where to open it, and how to show it.
+/// A file by two names, where to open it and how to show it, and where its bytes come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileName {
     /// Path to open.
@@ -39,6 +40,8 @@ pub struct FileName {
     pub shown: PathBuf,
     /// Who named it.
     pub origin: Origin,
+    /// The files that it is one of; nothing: those on disk.
+    pub held: Option<Files>,
 }
 
 impl FileName {
@@ -49,6 +52,16 @@ impl FileName {
             path: path.to_path_buf(),
             shown: path.to_path_buf(),
             origin: Origin::Caller,
+            held: None,
+        }
+    }
+
+    /// This name, to be opened among `files` and not on disk.
+    #[must_use]
+    pub fn among(self, files: Option<&Files>) -> Self {
+        FileName {
+            held: files.cloned(),
+            ..self
         }
     }
 
@@ -72,6 +85,39 @@ impl FileName {
             path: join(&self.path),
             shown: join(&self.shown),
             origin: Origin::File,
+            held: self.held.clone(),
+        }
+    }
+
+    /// The file called `name` in the folder of this one, named by nobody yet.
+    #[must_use]
+    pub fn with_file_name(&self, name: &str) -> Self {
+        FileName {
+            path: self.path.with_file_name(name),
+            shown: self.shown.with_file_name(name),
+            ..self.clone()
+        }
+    }
+
+    /// Whether there is such a file, a regular one.
+    #[must_use]
+    pub fn is_file(&self) -> bool {
+        match &self.held {
+            Some(files) => files.get(&self.path).is_some(),
+            None => self.path.is_file(),
+        }
+    }
+
+    /// Whether both are the same file, by whatever path.
+    #[must_use]
+    pub fn is_same(&self, other: &Self) -> bool {
+        match (&self.held, &other.held) {
+            (None, None) => {
+                let real = |name: &Self| name.path.canonicalize();
+                real(self).is_ok_and(|own| real(other).is_ok_and(|other| own == other))
+            }
+            (Some(_), Some(_)) => self.is_file() && Files::key(&self.path) == Files::key(&other.path),
+            _ => false,
         }
     }
 
@@ -93,6 +139,14 @@ impl FileName {
     /// If it is no regular file, is larger than `limit` bytes, or cannot be read.
     pub fn read(&self, limit: u64) -> Result<Vec<u8>, Message> {
         let shown = self.shown.display().to_string();
+        if let Some(files) = &self.held {
+            let missing = || messages::unreadable(&shown, self.origin, &std::io::ErrorKind::NotFound.into());
+            let bytes = files.get(&self.path).ok_or_else(missing)?;
+            return match bytes.len() as u64 {
+                length if length > limit => Err(messages::file_too_large(&shown, length, limit)),
+                _ => Ok(bytes.to_vec()),
+            };
+        }
         let data = std::fs::metadata(&self.path).map_err(|e| messages::unreadable(&shown, self.origin, &e))?;
         if data.is_dir() {
             return Err(messages::is_folder(&shown));

@@ -145,6 +145,7 @@ mod tests {
         let finding = |(load_step, deviation): (&[f64; 2], f64)| Finding {
             kind: closed_loop::LoadKind::Power,
             load_step: *load_step,
+            source_step: None,
             at_sample: Metrics::default(),
             worst: Metrics {
                 deviation,

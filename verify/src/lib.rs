@@ -16,6 +16,7 @@
 //! | a loop closed around a build | [`live`] |
 //! | what differs | [`compare`], [`report`]; in words: [`text`] |
 //! | what a step costs | [`mod@measure`], [`elf`]; of all builds: [`costs`]; whether it fits into its period: [`budget`], [`advice`], [`fitting`] |
+//! | the files that `compile` makes | [`code`] |
 //! | archives of FMUs | [`fmu`] |
 //! | what the format does to decisions | [`decisions`] |
 //! | every combination of ADC codes | [`codes`], kept in [`shards`] |
@@ -26,6 +27,7 @@
 pub mod advice;
 pub mod budget;
 pub mod cases;
+pub mod code;
 pub mod codes;
 pub mod compare;
 pub mod costs;

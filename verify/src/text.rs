@@ -1,5 +1,7 @@
 //! A verification in words, for people.
 
+mod inspection;
+
 use std::fmt::{self, Write};
 
 use interp::decisions::{Choices, Decisions};
@@ -12,6 +14,8 @@ use toml_input::Message;
 use crate::drift::Drift;
 use crate::report::{BuildReport, Difference, Outcome, Report};
 use crate::toolchain::Install;
+
+pub use inspection::inspection;
 
 /// The whole report: golden vectors, decisions, a line per build, what differs, the verdict last. `drift` is that of the
 /// folder that was verified, if it was one.

@@ -7,6 +7,7 @@ mod programs;
 mod release;
 mod rules;
 mod steps;
+mod studio;
 mod tools;
 mod wheel;
 mod workspace;
@@ -27,6 +28,7 @@ usage: cargo xtask <command>
   setup                             only the tools: compilers, emulators, ngspice, mdBook (also called install)
   bless                             rewrite the golden files from what the code produces now
   wheel [--full]                    only the Python package: build, install, test
+  studio                            only the page of `policyc studio`, into target/studio
   release --dry-run                 packs every published crate, and builds the packages with the oldest compiler
   layers                            only the layer rules
   book                              only the book: links, contents, mdBook
@@ -47,6 +49,7 @@ enum Command {
     Install,
     Bless,
     Wheel(Options),
+    Studio,
     Release,
     Layers,
     Book,
@@ -97,6 +100,7 @@ fn parse(arguments: &[String]) -> Result<Command, String> {
         "release" if rest == ["--dry-run"] => return Ok(Command::Release),
         // publishing cannot be taken back: it is typed by hand
         "release" => return Err("`release` takes `--dry-run`; nothing is published from here".into()),
+        "studio" => Command::Studio,
         "setup" | "install" => Command::Install,
         "bless" => Command::Bless,
         "layers" => Command::Layers,
@@ -144,6 +148,11 @@ fn run(command: Command) -> Result<bool, String> {
         }
         Command::Test(options) => Ok(steps::run_all(&Workspace::load()?, steps::ALL, options)),
         Command::Wheel(options) => Ok(steps::run_all(&Workspace::load()?, steps::OF_THE_WHEEL, options)),
+        Command::Studio => Ok(steps::run_all(
+            &Workspace::load()?,
+            steps::OF_THE_STUDIO,
+            Options::default(),
+        )),
         Command::Release => Ok(steps::run_all(
             &Workspace::load()?,
             steps::OF_A_RELEASE,

@@ -11,6 +11,7 @@ use crate::process::{self, Output};
 use crate::programs;
 use crate::release;
 use crate::rules::{self, Findings};
+use crate::studio;
 use crate::tools;
 use crate::wheel;
 use crate::workspace::Workspace;
@@ -76,6 +77,11 @@ const fn step(name: &'static str, form: Form, run: fn(&Context) -> Outcome) -> S
 const PAGES: Step = step("pages", Form::Quick, |c| judged(rules::pages(c.workspace)));
 const BOOK: Step = step("book", Form::Quick, book);
 
+const STUDIO: Step = step("studio", Form::Usual, build_studio);
+
+/// The page of `policyc studio`.
+pub const OF_THE_STUDIO: &[Step] = &[STUDIO];
+
 /// What an author of pages wants to know.
 pub const OF_THE_BOOK: &[Step] = &[PAGES, BOOK];
 
@@ -113,6 +119,8 @@ pub const ALL: &[Step] = &[
     BOOK,
     step("fmt", Form::Quick, fmt),
     step("clippy", Form::Quick, clippy),
+    // before the tests, which open its page
+    STUDIO,
     step("test", Form::Quick, test),
     WHEEL,
     step("rustdoc", Form::Usual, rustdoc),
@@ -307,6 +315,16 @@ fn test(context: &Context) -> Outcome {
     };
     let programs = programs::all(tests.map(String::as_str));
     programs::run(programs, command, &context.log, context.limit()).map(Done::Passed)
+}
+
+fn build_studio(context: &Context) -> Outcome {
+    let output = Output::Log(context.log.clone());
+    Ok(match studio::build(context.workspace, &output, context.limit())? {
+        Ok(notes) => Done::Passed(notes),
+        // a release carries it
+        Err(reason) if context.options.full => return Err(format!("{reason}\n  = hint: cargo xtask setup")),
+        Err(reason) => Done::Skipped(reason),
+    })
 }
 
 fn wheel(context: &Context) -> Outcome {

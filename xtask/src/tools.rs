@@ -129,6 +129,7 @@ const TOOLS: &[Tool] = &[
     rust_target!("riscv32imc-unknown-none-elf"),
     rust_target!("riscv32imafc-unknown-none-elf"),
     rust_target!("powerpc-unknown-linux-gnu"),
+    rust_target!("wasm32-unknown-unknown"),
     tool("Frama-C", &["frama-c", "-version"], Apt("frama-c-base")),
     tool("ngspice", &["ngspice", "--version"], Apt("ngspice")),
     tool("ngspice's library", NGSPICE_HEADER, Apt("libngspice0-dev")),

@@ -21,7 +21,7 @@ pub use campaign::{Campaign, Engine, Merge, Script};
 use drm::Drm;
 pub use plants::{Design, Limit, New};
 pub use shared::{Columns, ControllerKind, Loudness, Outside};
-pub use shell::{Completions, Manpages};
+pub use shell::{Completions, Manpages, Studio};
 pub use verify::Verify;
 
 /// From a trained policy to verified controller code.
@@ -73,6 +73,8 @@ pub enum Command {
     Merge(Merge),
     /// Inspect, compile and verify the built-in example
     Demo(Demo),
+    /// Contract, code, decisions, closed loop and diagnosis in a page of this machine's browser; files stay in it
+    Studio(Studio),
     /// Duty ratio mapping: acquire settled points, fit drm.toml, judge it
     #[command(subcommand)]
     Drm(Drm),

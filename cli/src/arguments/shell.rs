@@ -1,4 +1,4 @@
-//! The command lines of what an installation asks for once.
+//! The command lines of what an installation asks for once, and of the page.
 
 use std::path::PathBuf;
 
@@ -22,6 +22,27 @@ pub struct Manpages {
     pub out: PathBuf,
     #[command(flatten)]
     pub replacing: Replacing,
+}
+
+#[derive(Debug, Args)]
+pub struct Studio {
+    /// Write the page into this folder, as a static site, instead of serving it
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    #[command(flatten)]
+    pub replacing: Replacing,
+    /// Port on 127.0.0.1; without it a free one
+    #[arg(
+        long,
+        value_name = "PORT",
+        default_value_t = 0,
+        hide_default_value = true,
+        conflicts_with = "out"
+    )]
+    pub port: u16,
+    /// A page that `cargo xtask studio` has made, in the place of the one inside this program
+    #[arg(long, value_name = "DIR")]
+    pub from: Option<PathBuf>,
 }
 
 /// Reads the name of a shell.

@@ -3,16 +3,16 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use codegen::output::{languages, with_cores};
-use codegen::{Output, manifest, notes};
+use codegen::output::languages;
+use codegen::{Output, manifest};
 use policy::{NumericFormat, Policy};
 use serde::Serialize;
 use targets::TargetSpec;
-use toml_input::Message;
 use verify::budget::Clock;
+use verify::code::{self, Code};
 use verify::costs::{Entry, StepCosts};
 use verify::fmu::Archive;
-use verify::{Decisions, Files, UNPROVEN, advice, text};
+use verify::{Files, advice};
 
 use crate::arguments::Compile;
 use crate::failure::Failure;
@@ -153,7 +153,7 @@ fn say_json(
 ) -> Result<(), Failure> {
     let sizes = manifest::sizes(policy, made.target);
     let files = together(&made.files, &made.archives);
-    let mut notes = noted(policy, made.target, &sizes, files.keys().map(Path::new));
+    let mut notes = code::notes(policy, made.target, &sizes, files.keys().map(Path::new));
     let told = |line: &String| line.trim().trim_start_matches("note: ").to_owned();
     notes.extend(made.decisions.iter().map(told));
     notes.extend(costs.iter().flat_map(|text| talk::notes_of(text)));
@@ -177,28 +177,24 @@ fn say_json(
     })
 }
 
-/// What the user should know of the policy and its code, one sentence each.
-fn noted<'f>(
-    policy: &Policy,
-    target: &TargetSpec,
-    sizes: &manifest::Sizes,
-    files: impl Iterator<Item = &'f Path>,
-) -> Vec<String> {
-    let unproven = policy.golden.is_none().then(|| UNPROVEN.to_owned());
-    let of_policy = policy.notes.iter().cloned().chain(unproven);
-    of_policy.chain(notes(policy, target, sizes, files)).collect()
-}
-
 /// The files of a policy; nothing is written.
 ///
 /// # Errors
 /// If the network does not give the trainer's answers, or there is no such target, or an output cannot be made.
 pub fn make(policy: &Policy, request: &Request) -> Result<Made, Failure> {
     let target = codegen::target(&request.target)?;
-    let decisions = check(policy, request.golden_decisions)?;
-    let outputs = with_cores(&request.emit);
-    let expected = verify::kit::expected(policy, target, &outputs, request.kit_steps)?;
-    let mut files = codegen::generate(policy, target, &outputs, expected.as_ref())?.files;
+    super::no_choices(policy, request.golden_decisions)?;
+    let Code {
+        outputs,
+        mut files,
+        decisions,
+    } = code::make(
+        policy,
+        target,
+        &request.emit,
+        request.kit_steps,
+        request.golden_decisions,
+    )?;
     let costs = measure(request, policy, target, &outputs, &mut files)?;
     let archives = verify::fmu::archives(policy, target, &outputs, &files)?;
     Ok(Made {
@@ -208,63 +204,6 @@ pub fn make(policy: &Policy, request: &Request) -> Result<Made, Failure> {
         archives,
         costs,
         decisions,
-    })
-}
-
-/// Refuses a policy whose network does not give the trainer's answers, or whose format changes too many of them; says of the rest
-/// which are changed.
-fn check(policy: &Policy, golden_decisions: Option<f64>) -> Result<Vec<String>, Failure> {
-    super::no_choices(policy, golden_decisions)?;
-    if let Some(golden) = verify::golden_result(policy).filter(|golden| !golden.passed()) {
-        let message = Message::new("the network does not give the trainer's golden answers; nothing was written");
-        return Err(message.found(golden.to_string()).hint(golden.hint()).into());
-    }
-    match verify::decisions(policy, golden_decisions) {
-        None => Ok(Vec::new()),
-        Some(decisions) if decisions.kept() => {
-            let changes = match &decisions {
-                Decisions::Choice(choices) => choices.changed > 0,
-                Decisions::Continuous(_) => policy.numeric_format.is_integer(),
-            };
-            // the counts; where it changes most is told by `inspect`
-            let mut lines = text::decisions(policy, &decisions);
-            lines.truncate(2);
-            lines.extend(accepted_here(policy, golden_decisions));
-            Ok(if changes { lines } else { Vec::new() })
-        }
-        Some(decisions) => {
-            let remedy = decisions.remedy();
-            let (problem, hint) = match &decisions {
-                Decisions::Choice(choices) => (
-                    "the numeric format changes more of the trainer's decisions than allowed; nothing was written",
-                    format!(
-                        "see what they cost with `policyc certify` and `policyc simulate`; to accept them, {remedy} in \
-                         [network] of the contract, which `verify` reads too, or --golden-decisions {} for this run",
-                        choices.accepting_share()
-                    ),
-                ),
-                Decisions::Continuous(_) => (
-                    "the numeric format changes the trainer's duties more than allowed; nothing was written",
-                    format!(
-                        "see what it costs with `policyc simulate`; to accept it, {remedy} in [network] of the contract"
-                    ),
-                ),
-            };
-            let found = text::decisions(policy, &decisions).join("\n");
-            Err(Message::new(problem).found(found).hint(hint).into())
-        }
-    }
-}
-
-/// What `verify` has to be told, too, where the command line alone accepts what the format changes.
-fn accepted_here(policy: &Policy, golden_decisions: Option<f64>) -> Option<String> {
-    let share = golden_decisions?;
-    let by_contract = verify::decisions(policy, None)?;
-    (!by_contract.kept()).then(|| {
-        format!(
-            "note: accepted for this run alone: the files do not carry it, so give `verify` --golden-decisions {share} as well, or write \
-             golden_decisions = {share} into [network] of the contract, which both read"
-        )
     })
 }
 
@@ -316,7 +255,7 @@ pub fn say(
     decisions: &[String],
 ) -> Result<(), Failure> {
     let sizes = manifest::sizes(policy, target);
-    for note in noted(policy, target, &sizes, written.iter().map(|(path, _)| path.as_path())) {
+    for note in code::notes(policy, target, &sizes, written.iter().map(|(path, _)| path.as_path())) {
         output::say(&format!("note: {note}"))?;
     }
     output::say(&format!("{}: {sizes}", policy.name))?;

@@ -5,22 +5,17 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::Instant;
 
-use ::diagnose::capture::estimates::Estimates;
 use ::diagnose::control::Request;
 use ::diagnose::diagnosis::{Diagnosis, diagnose};
-use ::diagnose::extend::{extended_toml, partial_toml};
-use ::diagnose::findings::Findings;
-use ::diagnose::gain::Regime;
-use ::diagnose::page::page;
-use ::diagnose::preflight;
 use ::diagnose::progress::Progress;
-use ::diagnose::record::Record;
+use ::diagnose::record::{Record, open_all};
+use ::diagnose::results;
 use closed_loop::Scenario;
 use closed_loop::scenario::Task;
 use drm::formula::Losses;
 use measured::ColumnMap;
 use plant::{Faults, Parameters};
-use toml_input::{Fault, Message, Sink};
+use toml_input::FileName;
 
 use super::progress_line::ProgressLine;
 use super::simulate;
@@ -43,8 +38,19 @@ pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
     if let Ok(mut shown) = shown.lock() {
         shown.line.clear();
     }
-    output::replace_own_texts(&options.out, &texts(&diagnosis)?, options.replacing)?;
-    answer(options, &columns, &diagnosis.findings)?;
+    output::replace_own_texts(&options.out, &results::files(&diagnosis)?, options.replacing)?;
+    let named: Vec<&Path> = options
+        .train
+        .iter()
+        .chain(&options.heldout)
+        .map(PathBuf::as_path)
+        .collect();
+    let mut lines = results::answer(&columns, &named, &diagnosis.findings);
+    if lines.len() > 1 {
+        lines.push(String::new());
+    }
+    lines.push(format!("report: {}/report.html", options.out.display()));
+    output::say(&lines.join("\n"))?;
     Ok(Outcome::Done)
 }
 
@@ -53,7 +59,7 @@ pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
 /// # Errors
 /// As [`run`].
 pub fn files(options: &Diagnose) -> Result<BTreeMap<String, String>, Failure> {
-    texts(&found(options, &columns(options)?, &|_| {})?)
+    Ok(results::files(&found(options, &columns(options)?, &|_| {})?)?)
 }
 
 /// Reads every file that is named, and diagnoses nothing.
@@ -67,6 +73,11 @@ pub fn check(options: &Diagnose) -> Result<(), Failure> {
     }
     records(options, &columns(options)?, &model)?;
     Ok(())
+}
+
+fn records(options: &Diagnose, columns: &ColumnMap, model: &Parameters) -> Result<(Vec<Record>, Vec<Record>), Faults> {
+    let named = |files: &[PathBuf]| files.iter().map(FileName::from).collect::<Vec<_>>();
+    open_all(&named(&options.train), &named(&options.heldout), columns, model)
 }
 
 fn columns(options: &Diagnose) -> Result<ColumnMap, Failure> {
@@ -91,63 +102,6 @@ fn found(options: &Diagnose, columns: &ColumnMap, say: &(dyn Fn(Progress<'_>) + 
         diagnosis.close_the_loop(request);
     }
     Ok(diagnosis)
-}
-
-fn texts(diagnosis: &Diagnosis) -> Result<BTreeMap<String, String>, Failure> {
-    let mut json = serde_json::to_string_pretty(&diagnosis.findings)?;
-    json.push('\n');
-    let mut files = BTreeMap::from([
-        ("diagnosis.json".to_owned(), json),
-        ("plant.extended.toml".to_owned(), extended_toml(diagnosis)),
-        ("report.html".to_owned(), page(diagnosis)?),
-    ]);
-    if let Some(partial) = partial_toml(diagnosis) {
-        files.insert("plant.partial.toml".to_owned(), partial);
-    }
-    if let Some(control) = &diagnosis.control {
-        files.insert("drm.toml".to_owned(), control.mapping.clone());
-    }
-    Ok(files)
-}
-
-/// The verdict, then what was noticed, then where the rest stands.
-fn answer(options: &Diagnose, columns: &ColumnMap, findings: &Findings) -> Result<(), Failure> {
-    let (word, sentence) = (findings.verdict.word(), &findings.sentence);
-    let mut lines = vec![format!("verdict: {word}\n{sentence}\n")];
-    let files = options.train.iter().chain(&options.heldout);
-    for name in columns.sections_without(&files.map(PathBuf::as_path).collect::<Vec<_>>()) {
-        lines.push(format!(
-            "note: no record is called `{name}`: its section of the column map is not used"
-        ));
-    }
-    for worth in &findings.partial_gain {
-        lines.push(format!("partial: {}", worth.words()));
-    }
-    // with a part the figures of the model as given stand in its lines
-    let unsaid = findings
-        .gain
-        .heldout
-        .iter()
-        .filter(|_| findings.partial_gain.is_empty());
-    for held in unsaid.filter(|held| held.regime == Regime::All) {
-        lines.push(held.words());
-    }
-    lines.extend(findings.captures.iter().map(Estimates::words));
-    if let Some(term) = &findings.empirical {
-        lines.push(format!("described, not explained: {}", term.sentence));
-    }
-    lines.extend(findings.noise.repairs.iter().map(|repair| format!("note: {repair}")));
-    if let Some(reason) = &findings.gain.closed_loop_missing {
-        lines.push(format!(
-            "note: no mapping and no closed loop on the extended model: {reason}"
-        ));
-    }
-    if lines.len() > 1 {
-        lines.push(String::new());
-    }
-    lines.push(format!("report: {}/report.html", options.out.display()));
-    output::say(&lines.join("\n"))?;
-    Ok(())
 }
 
 /// Progress on standard error: a line for each stage, and how much of it is done.
@@ -233,73 +187,9 @@ fn short_task() -> Task {
     }
 }
 
-/// All records, or all their faults.
-fn records(options: &Diagnose, columns: &ColumnMap, model: &Parameters) -> Result<(Vec<Record>, Vec<Record>), Faults> {
-    let mut faults = Sink::new();
-    let mut read = |files: &[PathBuf]| {
-        let one = |file: &PathBuf| faults.keep(Record::open(file, columns, model));
-        files.iter().filter_map(one).collect::<Vec<_>>()
-    };
-    let (train, heldout) = (read(&options.train), read(&options.heldout));
-    faults.propagate().map_err(said_once)?;
-    let again = preflight::repeated(&train, &heldout);
-    let message = |(held, train): (&str, &str)| {
-        Message::new(format!(
-            "the held-out record `{held}` is the training record `{train}` again"
-        ))
-        .expected("a record that no fit has seen")
-        .hint("it would judge a fit by what was fitted: leave it out, or cut the record in two")
-    };
-    let file = options.heldout.first().map_or(Path::new(""), PathBuf::as_path);
-    let again = again.into_iter().map(|pair| Fault::in_file(file, message(pair)));
-    again.collect::<Sink>().propagate()?;
-    Ok((train, heldout))
-}
-
-/// The same fault of several files once, with the names of the others: records of one logger share their header.
-fn said_once(mut faults: Faults) -> Faults {
-    let mut list: Vec<(Fault, Vec<String>)> = Vec::new();
-    for fault in faults.list {
-        let is_same = |known: &Fault| {
-            let mut other = known.clone();
-            other.file.clone_from(&fault.file);
-            known.file != fault.file && other == fault
-        };
-        match list.iter_mut().find(|(known, _)| is_same(known)) {
-            Some((_, others)) => others.push(format!("`{}`", fault.file.display())),
-            None => list.push((fault, Vec::new())),
-        }
-    }
-    let told = |(mut fault, others): (Fault, Vec<String>)| {
-        if !others.is_empty() {
-            fault.problem = format!("{}; the same in {}", fault.problem, others.join(", "));
-        }
-        fault
-    };
-    faults.list = list.into_iter().map(told).collect();
-    faults
-}
-
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
-    use toml_input::{Fault, Faults, Message};
-
-    use super::{remaining, said_once};
-
-    #[test]
-    fn a_fault_of_three_files_is_said_once() {
-        let fault = |file: &str, problem: &str| Fault::in_file(Path::new(file), Message::new(problem));
-        let mut all = Faults::from(fault("a.csv", "no load"));
-        all.list.extend([
-            fault("b.csv", "no load"),
-            fault("b.csv", "no duty"),
-            fault("c.csv", "no load"),
-        ]);
-        let said: Vec<String> = said_once(all).iter().map(|fault| fault.problem.clone()).collect();
-        assert_eq!(said, ["no load; the same in `b.csv`, `c.csv`", "no duty"]);
-    }
+    use super::remaining;
 
     #[test]
     fn a_few_seconds_left_are_not_worth_a_word() {

@@ -3,6 +3,7 @@
 use codegen::manifest;
 use policy::{Activation, Interval, Policy, describe};
 use serde::Serialize;
+use verify::text::inspection;
 
 use crate::arguments::Inspect;
 use crate::failure::Failure;
@@ -15,7 +16,7 @@ pub fn run(options: &Inspect) -> Result<Outcome, Failure> {
     if options.json {
         output::say(&json(&policy)?)?;
     } else {
-        output::say(text(&policy).trim_end())?;
+        output::say(inspection(&policy).trim_end())?;
     }
     if let Some(golden) = verify::golden_result(&policy).filter(|golden| !golden.passed()) {
         eprintln!("\nDIFFERENT: the network does not give the trainer's golden answers");
@@ -109,33 +110,4 @@ fn view(policy: &Policy) -> View<'_> {
         sizes: manifest::sizes(policy, ::targets::host()),
         notes: &policy.notes,
     }
-}
-
-/// The checked policy in words.
-pub fn text(policy: &Policy) -> String {
-    let mut out = describe::head(policy) + &describe::signals(policy);
-    out += &(describe::observers(policy) + &describe::observation(policy));
-    out += &describe::network(policy);
-    for line in golden(policy) {
-        out += &format!("  {line}\n");
-    }
-    out += &(describe::actions(policy) + &describe::mapping(policy) + &describe::limits(policy));
-    out += &format!("\nsize\n  {}\n", manifest::sizes(policy, ::targets::host()));
-    out += &describe::digests(policy);
-    for note in &policy.notes {
-        out += &format!("\nnote: {note}\n");
-    }
-    out
-}
-
-/// What the trainer's vectors show of the network, and what the numeric format does to his decisions.
-fn golden(policy: &Policy) -> Vec<String> {
-    let Some(golden) = verify::golden_result(policy) else {
-        return vec![verify::UNPROVEN.to_owned()];
-    };
-    let mut lines = vec![format!("{} golden vectors from the trainer: {golden}", golden.vectors)];
-    if let Some(decisions) = verify::decisions(policy, None) {
-        lines.extend(verify::text::decisions(policy, &decisions));
-    }
-    lines
 }

@@ -18,6 +18,7 @@ pub mod progress_line;
 pub mod prove;
 pub mod replay;
 pub mod simulate;
+pub mod studio;
 pub mod targets;
 pub mod train;
 pub mod verify;

@@ -7,6 +7,7 @@ use std::sync::atomic::Ordering;
 use closed_loop::Scenario;
 use closed_loop::simulation::{Findings, PAGE, Setting, Spread, simulate};
 use serde::Serialize;
+use toml_input::FileName;
 
 use super::controllers;
 use super::progress_line::ProgressLine;
@@ -72,7 +73,12 @@ pub fn check(options: &Simulate) -> Result<(), Failure> {
 fn setting(options: &Simulate) -> Result<Setting, Failure> {
     let scenario = Scenario::load(&options.scenario)?;
     let policy = super::load_as(&options.policy, options.outside, options.format)?;
-    let setting = Setting::new(&options.scenario, scenario, policy, options.plant.as_deref())?;
+    let setting = Setting::new(
+        &options.scenario,
+        scenario,
+        policy,
+        options.plant.as_deref().map(FileName::new),
+    )?;
     let spread = options
         .spread
         .iter()

@@ -84,13 +84,12 @@ impl Setting {
     ///
     /// # Errors
     /// If no plant or no voltage to hold is named, the plant's file is none, or policy and plant do not suit each other.
-    pub fn new(file: &Path, scenario: Scenario, policy: Policy, plant: Option<&Path>) -> Result<Self, Error> {
-        let named = |plant: PathBuf| (FileName::named_by_a_file(&plant), plant);
-        let given = plant.map(|path| (FileName::new(path), path.to_owned()));
-        let Some((name, plant)) = given.or_else(|| scenario.plant.clone().map(named)) else {
+    pub fn new(file: &Path, scenario: Scenario, policy: Policy, plant: Option<FileName>) -> Result<Self, Error> {
+        let Some(name) = plant.or_else(|| scenario.plant.clone()) else {
             let message = Message::new("no plant").hint("plant = \"../plants/paper-model.toml\", or --plant PLANT");
             return Err(Fault::in_file(file, message).into());
         };
+        let plant = name.path.clone();
         let converter = Converter::load(name, &scenario.set)?;
         let v_ref = v_ref(scenario.v_ref, &policy, file)?;
         suits(&policy, converter.parameters(), v_ref, file)?;

@@ -104,11 +104,11 @@ impl Setting {
             return Err(Fault::in_file(file, message).into());
         };
         let set: Vec<(&str, f64)> = scenario.set.iter().map(|(key, value)| (key.as_str(), *value)).collect();
-        let nominal = varied(&Parameters::buck_from_file(trained_on.as_path(), "a transfer")?, &set);
+        let nominal = varied(&Parameters::buck_from_file(trained_on.clone(), "a transfer")?, &set);
         // `[set]` may name another
         nominal.require_buck("a transfer")?;
         let v_ref = v_ref(scenario.v_ref, &policy, file)?;
-        suits(&policy, &nominal, v_ref, trained_on)?;
+        suits(&policy, &nominal, v_ref, &trained_on.path)?;
         draws(&nominal, &scenario.load_steps, file)?;
         if let Some(step) = scenario.load_steps.iter().find(|step| step.source.is_some()) {
             let message = Message::new("a transfer has no steps of the source").found(step.to_string());

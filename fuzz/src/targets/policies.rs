@@ -226,8 +226,8 @@ impl Folder {
 
     /// The policy with `bytes` in the place of one of its files.
     fn with(&self, name: &str, bytes: &[u8]) -> Result<Policy, policy::Faults> {
-        let mut options = ReadOptions::embedded(self.files.iter().map(|(name, bytes)| (name.clone(), bytes.clone())));
-        options.embedded.insert(name.into(), bytes.to_vec().into());
+        let held = self.files.iter().map(|(name, bytes)| (name.clone(), bytes.clone()));
+        let mut options = ReadOptions::embedded(held.chain([(name.into(), bytes.to_vec())]));
         // a contract that names another file must not lead out of the memory
         options.own_folder = true;
         policy::load_with(Path::new("policy.toml"), &options)

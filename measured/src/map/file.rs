@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use toml_input::{Document, Faults, Sink, Table, Value};
+use toml_input::{Document, Faults, FileName, Sink, Table, Value};
 
 use super::{ColumnMap, DutyIs, OfRecord, Sampled, Wish, quantity};
 use crate::quantity::VOCABULARY;
@@ -26,8 +26,8 @@ impl ColumnMap {
     ///
     /// # Errors
     /// A file that cannot be read, unknown keys, wrong types, a quantity that is mapped twice.
-    pub fn open(path: &Path) -> Result<Self, Faults> {
-        Self::of_document(&Document::open(path)?)
+    pub fn open(file: impl Into<FileName>) -> Result<Self, Faults> {
+        Self::of_document(&Document::open(file)?)
     }
 
     /// [`ColumnMap::open`] of a text; `file` only names it in messages.

@@ -20,8 +20,10 @@ const LAYERS: &[&[&str]] = &[
         "verify",
         "prove",
     ],
+    // above what it calls, below the command that serves its page
+    &["studio"],
     &["cli", "example-build-rust", "example-build-c", "example-embedded-hal"],
-    &["wheel", "tests", "blind", "bench", "xtask", "firmware"],
+    &["studio-wasm", "wheel", "tests", "blind", "bench", "xtask", "firmware"],
     // draws its policies as `tests` does
     &["fuzz"],
 ];

@@ -1,0 +1,35 @@
+//! The generated code.
+
+use std::path::Path;
+
+use codegen::{Output, manifest};
+use serde::Serialize;
+use toml_input::{Faults, messages};
+
+use crate::answer::Contract;
+use crate::contract::load;
+use crate::session::{Reply, Session, texts};
+
+#[derive(Serialize)]
+struct Compiled {
+    sizes: String,
+    notes: Vec<String>,
+}
+
+/// What `policyc compile --no-costs` would write, apart from archives.
+pub(crate) fn compile(session: &Session, of: &Contract, emit: &[String], target: &str) -> Result<Reply, Faults> {
+    let target = codegen::target(target)?;
+    let names: Vec<&str> = Output::ALL.iter().map(|output| output.name()).collect();
+    let output = |name: &String| Output::find(name).ok_or_else(|| messages::unknown("output", name, &names));
+    let emit = emit.iter().map(output).collect::<Result<Vec<_>, _>>()?;
+    let policy = load(session, of)?;
+    let code = verify::code::make(&policy, target, &emit, verify::kit::DEFAULT_STEPS, None)?;
+    let sizes = manifest::sizes(&policy, target);
+    let mut notes = verify::code::notes(&policy, target, &sizes, code.files.keys().map(Path::new));
+    notes.extend(code.decisions.iter().map(|line| line.trim().to_owned()));
+    let answer = Compiled {
+        sizes: sizes.to_string(),
+        notes,
+    };
+    Reply::with(&answer, texts(code.files))
+}

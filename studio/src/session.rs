@@ -1,0 +1,121 @@
+//! Files, and answers about them.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::Serialize;
+use serde_json::Value;
+use toml_input::{Faults, FileName, Files, Message};
+
+use crate::answer::{Made, Refused, Request};
+use crate::{code, contract, loops, map, records};
+
+/// Hears how far a long piece of work is.
+pub type Tell = fn(&str);
+
+/// Files of a user in memory, and what was made of them last.
+#[derive(Debug, Clone, Default)]
+pub struct Session {
+    files: Files,
+    made: BTreeMap<String, Vec<u8>>,
+}
+
+/// What a request makes: an answer, and files beside it.
+pub(crate) struct Reply {
+    pub answer: Value,
+    pub made: BTreeMap<String, Vec<u8>>,
+}
+
+impl Reply {
+    /// An answer alone.
+    pub fn of(answer: &impl Serialize) -> Result<Self, Faults> {
+        Self::with(answer, BTreeMap::new())
+    }
+
+    /// An answer, whose `files` list what was made.
+    pub fn with(answer: &impl Serialize, made: BTreeMap<String, Vec<u8>>) -> Result<Self, Faults> {
+        let told = |error: serde_json::Error| Message::new(error.to_string());
+        let mut answer = serde_json::to_value(answer).map_err(told)?;
+        let listed: Vec<Made> = made
+            .iter()
+            .map(|(name, bytes)| Made {
+                name: name.clone(),
+                bytes: bytes.len(),
+            })
+            .collect();
+        if let (Value::Object(fields), false) = (&mut answer, listed.is_empty()) {
+            fields.insert("files".to_owned(), serde_json::to_value(listed).map_err(told)?);
+        }
+        Ok(Reply { answer, made })
+    }
+}
+
+impl Session {
+    /// Takes a file in, in the place of one of the same path.
+    pub fn put(&mut self, path: &str, bytes: Vec<u8>) {
+        self.files.insert(Path::new(path), bytes);
+    }
+
+    /// Takes a file away.
+    pub fn forget(&mut self, path: &str) {
+        self.files.remove(Path::new(path));
+    }
+
+    /// A file that the last request made.
+    #[must_use]
+    pub fn made(&self, name: &str) -> Option<&[u8]> {
+        self.made.get(name).map(Vec::as_slice)
+    }
+
+    /// Answers `request`, a [`Request`] in JSON, in JSON. `tell` hears of long work.
+    pub fn ask(&mut self, request: &[u8], tell: Tell) -> String {
+        let asked = serde_json::from_slice::<Request>(request);
+        let asked =
+            asked.map_err(|error| Message::new("the page asks what is not understood").found(error.to_string()));
+        let reply = asked.map_err(Faults::from).and_then(|asked| self.reply(asked, tell));
+        let (answer, made) = match reply {
+            Ok(Reply { answer, made }) => (answer, made),
+            // texts and numbers alone: this cannot fail
+            Err(faults) => (
+                serde_json::to_value(Refused::from(faults)).unwrap_or_default(),
+                BTreeMap::new(),
+            ),
+        };
+        self.made = made;
+        answer.to_string()
+    }
+
+    fn reply(&self, request: Request, tell: Tell) -> Result<Reply, Faults> {
+        match request {
+            Request::Choices => contract::choices(),
+            Request::Read(of) => contract::read(self, &of),
+            Request::New {
+                file,
+                contract,
+                actions,
+            } => contract::new(self, &file, &contract, actions),
+            Request::Compile { of, emit, target } => code::compile(self, &of, &emit, &target),
+            Request::Map(wanted) => map::map(self, &wanted),
+            Request::Loop(step) => loops::step(self, &step),
+            Request::Simulate { of, scenario } => loops::simulate(self, &of, &scenario, tell),
+            Request::Diagnose(wanted) => records::diagnose(self, &wanted, tell),
+        }
+    }
+
+    /// A file of the session by its path, named by the user.
+    pub(crate) fn named(&self, path: &str) -> FileName {
+        FileName::new(Path::new(path)).among(Some(&self.files))
+    }
+
+    pub(crate) fn files(&self) -> &Files {
+        &self.files
+    }
+}
+
+/// Texts as bytes.
+pub(crate) fn texts(files: BTreeMap<String, String>) -> BTreeMap<String, Vec<u8>> {
+    files
+        .into_iter()
+        .map(|(name, text)| (name, text.into_bytes()))
+        .collect()
+}

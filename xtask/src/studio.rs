@@ -1,0 +1,76 @@
+//! The page of `policyc studio`: the compiler as WebAssembly, the page's own files, and the examples that it offers.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use serde_json::Value;
+
+use crate::process::{self, Output};
+use crate::tools;
+use crate::workspace::Workspace;
+
+/// What the step needs beyond Rust; its name among the tools.
+pub const TARGET: &str = "wasm32-unknown-unknown";
+
+/// Where the page is made: `policyc studio --from target/studio`.
+pub fn folder(workspace: &Workspace) -> PathBuf {
+    workspace.target_dir.join("studio")
+}
+
+/// Builds the page; what there is to say of it. `Err` of the first is why it is left out.
+///
+/// # Errors
+/// What failed.
+pub fn build(workspace: &Workspace, output: &Output, limit: Duration) -> Result<Result<Vec<String>, String>, String> {
+    if !tools::lacking(&workspace.target_dir, &[TARGET]).is_empty() {
+        return Ok(Err(format!(
+            "not there: {TARGET}; the studio is NOT built, and its page is NOT tested"
+        )));
+    }
+    let arguments = ["build", "-p", "studio-wasm", "--profile", "studio", "--target", TARGET];
+    process::run_within(&mut workspace.cargo(&arguments), output, limit)?;
+    let out = folder(workspace);
+    if out.exists() {
+        std::fs::remove_dir_all(&out).map_err(|error| told(&out, &error))?;
+    }
+    let page = workspace.root.join("studio/page");
+    let mut copied = 0;
+    let mut copy = |from: &Path, name: &str| -> Result<(), String> {
+        let to = out.join(name);
+        let parent = to.parent().unwrap_or(&out);
+        std::fs::create_dir_all(parent).map_err(|error| told(parent, &error))?;
+        copied += 1;
+        std::fs::copy(from, &to).map(drop).map_err(|error| told(from, &error))
+    };
+    for entry in std::fs::read_dir(&page).map_err(|error| told(&page, &error))? {
+        let path = entry.map_err(|error| told(&page, &error))?.path();
+        copy(&path, &path.file_name().unwrap_or_default().to_string_lossy())?;
+    }
+    // one style for what the command writes and what the page shows
+    copy(&workspace.root.join("report/src/page.css"), "report.css")?;
+    let built = workspace.target_dir.join(TARGET).join("studio/studio_wasm.wasm");
+    copy(&built, "studio.wasm")?;
+    for example in examples(&page)? {
+        copy(
+            &workspace.root.join("examples").join(&example),
+            &format!("examples/{example}"),
+        )?;
+    }
+    let bytes = std::fs::metadata(&built).map_or(0, |data| data.len());
+    Ok(Ok(vec![format!("{copied} files, studio.wasm of {} kB", bytes / 1000)]))
+}
+
+/// Every file that an example names, below `examples/`.
+fn examples(page: &Path) -> Result<BTreeSet<String>, String> {
+    let file = page.join("examples.json");
+    let text = std::fs::read_to_string(&file).map_err(|error| told(&file, &error))?;
+    let list: Value = serde_json::from_str(&text).map_err(|error| format!("{}: {error}", file.display()))?;
+    let files = list.as_array().into_iter().flatten();
+    let files = files.flat_map(|example| example["files"].as_array().into_iter().flatten());
+    Ok(files.filter_map(Value::as_str).map(str::to_owned).collect())
+}
+
+fn told(path: &Path, error: &std::io::Error) -> String {
+    format!("{}: {error}", path.display())
+}

@@ -11,12 +11,17 @@ fn main() -> Result<(), String> {
     println!("cargo::rerun-if-env-changed={FOLDER}");
     let mut files = Vec::new();
     if let Some(folder) = std::env::var_os(FOLDER).map(PathBuf::from) {
-        let folder = folder.canonicalize().map_err(|error| format!("{FOLDER}: {}: {error}", folder.display()))?;
+        let folder = folder
+            .canonicalize()
+            .map_err(|error| format!("{FOLDER}: {}: {error}", folder.display()))?;
         println!("cargo::rerun-if-changed={}", folder.display());
         walk(&folder, &mut files)?;
         files.sort();
         if !files.contains(&folder.join("studio.wasm")) {
-            return Err(format!("{FOLDER}: {} holds no studio.wasm: `cargo xtask studio` makes it", folder.display()));
+            return Err(format!(
+                "{FOLDER}: {} holds no studio.wasm: `cargo xtask studio` makes it",
+                folder.display()
+            ));
         }
         return write(&folder, &files);
     }
@@ -28,7 +33,12 @@ fn write(folder: &Path, files: &[PathBuf]) -> Result<(), String> {
     for file in files {
         let name = file.strip_prefix(folder).map_err(|error| error.to_string())?;
         let name = name.to_string_lossy().replace('\\', "/");
-        writeln!(text, "    ({name:?}, include_bytes!({:?})),", file.display().to_string()).map_err(|error| error.to_string())?;
+        writeln!(
+            text,
+            "    ({name:?}, include_bytes!({:?})),",
+            file.display().to_string()
+        )
+        .map_err(|error| error.to_string())?;
     }
     text.push_str("];\n");
     let out = std::env::var_os("OUT_DIR").ok_or("no OUT_DIR")?;

@@ -47,7 +47,9 @@ struct Parameter {
 /// What there is to choose from.
 pub(crate) fn choices() -> Result<Reply, Faults> {
     // an FMU holds a binary that a compiler of this machine makes
-    let outputs = Output::ALL.iter().filter(|output| !matches!(output, Output::Fmu2 | Output::Fmu3));
+    let outputs = Output::ALL
+        .iter()
+        .filter(|output| !matches!(output, Output::Fmu2 | Output::Fmu3));
     let parameters = plant::parameters().map(|p| Parameter {
         key: p.key,
         unit: p.unit,
@@ -99,7 +101,9 @@ pub(crate) fn read(session: &Session, of: &Contract) -> Result<Reply, Faults> {
 fn different(policy: &Policy) -> Option<String> {
     if let Some(golden) = verify::golden_result(policy).filter(|golden| !golden.passed()) {
         let hint = golden.hint();
-        return Some(format!("the network does not give the trainer's golden answers\n  = hint: {hint}"));
+        return Some(format!(
+            "the network does not give the trainer's golden answers\n  = hint: {hint}"
+        ));
     }
     let kept = verify::decisions(policy, None).is_none_or(|decisions| decisions.kept());
     (!kept).then(|| "the numeric format changes more of the trainer's decisions than the contract allows".to_owned())
@@ -119,8 +123,11 @@ pub(crate) fn new(session: &Session, file: &str, contract: &str, actions: Option
     let contract = Path::new(contract);
     let new = import::new_policy(session.named(file), contract, &options)?;
     let beside = |name: &str| contract.with_file_name(name).display().to_string();
-    let mut made: std::collections::BTreeMap<_, _> =
-        new.beside.into_iter().map(|(name, bytes)| (beside(&name), bytes)).collect();
+    let mut made: std::collections::BTreeMap<_, _> = new
+        .beside
+        .into_iter()
+        .map(|(name, bytes)| (beside(&name), bytes))
+        .collect();
     made.insert(contract.display().to_string(), new.contract.into_bytes());
     Reply::with(&New { said: new.said }, made)
 }

@@ -102,7 +102,10 @@ pub(crate) fn step(session: &Session, step: &Step) -> Result<Reply, Faults> {
     let steps = found.steps.iter().map(|step| OneStep {
         from: step.step.values[0],
         to: step.step.values[1],
-        band: step.courses.first().map_or(0.0, |(_, course)| course.shown.metrics.band),
+        band: step
+            .courses
+            .first()
+            .map_or(0.0, |(_, course)| course.shown.metrics.band),
         curves: (step.courses.iter())
             .map(|(name, course)| Curve::of(name.clone(), course, -before))
             .collect(),
@@ -140,7 +143,9 @@ fn setting(session: &Session, step: &Step, policy: Policy) -> Result<Setting, Fa
     let scenario = Scenario {
         set: within(&step.set)?,
         v_ref: step.v_ref,
-        load_steps: (step.steps.iter()).map(|values| LoadStep { kind, values: *values }).collect(),
+        load_steps: (step.steps.iter())
+            .map(|values| LoadStep { kind, values: *values })
+            .collect(),
         default_steps: false,
         task: Task {
             instants: 1,
@@ -160,7 +165,9 @@ fn setting(session: &Session, step: &Step, policy: Policy) -> Result<Setting, Fa
 /// Numbers of a plant within what it allows.
 fn within(set: &[(String, f64)]) -> Result<Vec<(String, f64)>, Faults> {
     for (key, value) in set {
-        let Some(parameter) = plant::parameter(key) else { continue };
+        let Some(parameter) = plant::parameter(key) else {
+            continue;
+        };
         let (low, high) = parameter.allowed;
         if !(low..=high).contains(value) {
             let message = messages::out_of_range(key, &value.to_string(), &format!("{low} to {high}"));

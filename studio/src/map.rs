@@ -91,7 +91,12 @@ fn cells<T: Real>(policy: &Policy, wanted: &Wanted, axes: [usize; 2], mut at: Ve
     for row in 0..wanted.y.cells {
         for column in 0..wanted.x.cells {
             (at[axes[0]], at[axes[1]]) = (wanted.x.centre(column), wanted.y.centre(row));
-            let samples: Vec<Sample> = policy.signals.iter().zip(&at).map(|(signal, x)| sample(policy, signal, *x)).collect();
+            let samples: Vec<Sample> = policy
+                .signals
+                .iter()
+                .zip(&at)
+                .map(|(signal, x)| sample(policy, signal, *x))
+                .collect();
             controller.eval_into(&samples, &mut trace)?;
             map.duties.push(trace.duty_sim.to_f64());
             if chooses {

@@ -40,7 +40,10 @@ struct Diagnosed {
 
 /// What `policyc diagnose` writes and says.
 pub(crate) fn diagnose(session: &Session, wanted: &Wanted, tell: Tell) -> Result<Reply, Faults> {
-    let columns = wanted.columns.as_deref().map(|file| ColumnMap::open(session.named(file)));
+    let columns = wanted
+        .columns
+        .as_deref()
+        .map(|file| ColumnMap::open(session.named(file)));
     let columns = columns.unwrap_or_else(|| Ok(ColumnMap::default()))?;
     let columns = columns.and(ColumnMap::parse(&wanted.map)?)?;
     let model = plant_of(session, &wanted.model, "`diagnose`")?;

@@ -70,12 +70,16 @@ impl Session {
     /// Answers `request`, a [`Request`] in JSON, in JSON. `tell` hears of long work.
     pub fn ask(&mut self, request: &[u8], tell: Tell) -> String {
         let asked = serde_json::from_slice::<Request>(request);
-        let asked = asked.map_err(|error| Message::new("the page asks what is not understood").found(error.to_string()));
+        let asked =
+            asked.map_err(|error| Message::new("the page asks what is not understood").found(error.to_string()));
         let reply = asked.map_err(Faults::from).and_then(|asked| self.reply(asked, tell));
         let (answer, made) = match reply {
             Ok(Reply { answer, made }) => (answer, made),
             // texts and numbers alone: this cannot fail
-            Err(faults) => (serde_json::to_value(Refused::from(faults)).unwrap_or_default(), BTreeMap::new()),
+            Err(faults) => (
+                serde_json::to_value(Refused::from(faults)).unwrap_or_default(),
+                BTreeMap::new(),
+            ),
         };
         self.made = made;
         answer.to_string()
@@ -110,5 +114,8 @@ impl Session {
 
 /// Texts as bytes.
 pub(crate) fn texts(files: BTreeMap<String, String>) -> BTreeMap<String, Vec<u8>> {
-    files.into_iter().map(|(name, text)| (name, text.into_bytes())).collect()
+    files
+        .into_iter()
+        .map(|(name, text)| (name, text.into_bytes()))
+        .collect()
 }

@@ -102,7 +102,10 @@ mod tests {
             assert!(Path::new(path).is_file());
             assert!(!named(path).is_file());
             let held = problem(&named(path));
-            assert_eq!(held, problem(&FileName::new(Path::new("no-such.toml"))).replace("no-such.toml", path));
+            assert_eq!(
+                held,
+                problem(&FileName::new(Path::new("no-such.toml"))).replace("no-such.toml", path)
+            );
         }
     }
 

@@ -10,7 +10,11 @@ impl Faults {
     /// A text for each fault; what is still to be filled in comes first, in one text. `coloured`: with the codes of a terminal.
     #[must_use]
     pub fn snippets(&self, coloured: bool) -> Vec<String> {
-        let renderer = if coloured { Renderer::styled() } else { Renderer::plain() };
+        let renderer = if coloured {
+            Renderer::styled()
+        } else {
+            Renderer::plain()
+        };
         let (gaps, faults): (Vec<&Fault>, Vec<&Fault>) = self.iter().partition(|fault| fault.is_gap);
         let mut texts: Vec<String> = match gaps.as_slice() {
             [] => Vec::new(),

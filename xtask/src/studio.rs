@@ -24,7 +24,9 @@ pub fn folder(workspace: &Workspace) -> PathBuf {
 /// What failed.
 pub fn build(workspace: &Workspace, output: &Output, limit: Duration) -> Result<Result<Vec<String>, String>, String> {
     if !tools::lacking(&workspace.target_dir, &[TARGET]).is_empty() {
-        return Ok(Err(format!("not there: {TARGET}; the studio is NOT built, and its page is NOT tested")));
+        return Ok(Err(format!(
+            "not there: {TARGET}; the studio is NOT built, and its page is NOT tested"
+        )));
     }
     let arguments = ["build", "-p", "studio-wasm", "--profile", "studio", "--target", TARGET];
     process::run_within(&mut workspace.cargo(&arguments), output, limit)?;
@@ -50,7 +52,10 @@ pub fn build(workspace: &Workspace, output: &Output, limit: Duration) -> Result<
     let built = workspace.target_dir.join(TARGET).join("studio/studio_wasm.wasm");
     copy(&built, "studio.wasm")?;
     for example in examples(&page)? {
-        copy(&workspace.root.join("examples").join(&example), &format!("examples/{example}"))?;
+        copy(
+            &workspace.root.join("examples").join(&example),
+            &format!("examples/{example}"),
+        )?;
     }
     let bytes = std::fs::metadata(&built).map_or(0, |data| data.len());
     Ok(Ok(vec![format!("{copied} files, studio.wasm of {} kB", bytes / 1000)]))

@@ -32,7 +32,13 @@ pub struct Studio {
     #[command(flatten)]
     pub replacing: Replacing,
     /// Port on 127.0.0.1; without it a free one
-    #[arg(long, value_name = "PORT", default_value_t = 0, hide_default_value = true, conflicts_with = "out")]
+    #[arg(
+        long,
+        value_name = "PORT",
+        default_value_t = 0,
+        hide_default_value = true,
+        conflicts_with = "out"
+    )]
     pub port: u16,
     /// A page that `cargo xtask studio` has made, in the place of the one inside this program
     #[arg(long, value_name = "DIR")]

@@ -9,9 +9,9 @@ use policy::{NumericFormat, Policy};
 use serde::Serialize;
 use targets::TargetSpec;
 use verify::budget::Clock;
+use verify::code::{self, Code};
 use verify::costs::{Entry, StepCosts};
 use verify::fmu::Archive;
-use verify::code::{self, Code};
 use verify::{Files, advice};
 
 use crate::arguments::Compile;
@@ -187,7 +187,13 @@ pub fn make(policy: &Policy, request: &Request) -> Result<Made, Failure> {
         outputs,
         mut files,
         decisions,
-    } = code::make(policy, target, &request.emit, request.kit_steps, request.golden_decisions)?;
+    } = code::make(
+        policy,
+        target,
+        &request.emit,
+        request.kit_steps,
+        request.golden_decisions,
+    )?;
     let costs = measure(request, policy, target, &outputs, &mut files)?;
     let archives = verify::fmu::archives(policy, target, &outputs, &files)?;
     Ok(Made {

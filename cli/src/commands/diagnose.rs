@@ -39,7 +39,12 @@ pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
         shown.line.clear();
     }
     output::replace_own_texts(&options.out, &results::files(&diagnosis)?, options.replacing)?;
-    let named: Vec<&Path> = options.train.iter().chain(&options.heldout).map(PathBuf::as_path).collect();
+    let named: Vec<&Path> = options
+        .train
+        .iter()
+        .chain(&options.heldout)
+        .map(PathBuf::as_path)
+        .collect();
     let mut lines = results::answer(&columns, &named, &diagnosis.findings);
     if lines.len() > 1 {
         lines.push(String::new());

@@ -73,7 +73,12 @@ pub fn check(options: &Simulate) -> Result<(), Failure> {
 fn setting(options: &Simulate) -> Result<Setting, Failure> {
     let scenario = Scenario::load(&options.scenario)?;
     let policy = super::load_as(&options.policy, options.outside, options.format)?;
-    let setting = Setting::new(&options.scenario, scenario, policy, options.plant.as_deref().map(FileName::new))?;
+    let setting = Setting::new(
+        &options.scenario,
+        scenario,
+        policy,
+        options.plant.as_deref().map(FileName::new),
+    )?;
     let spread = options
         .spread
         .iter()

@@ -7,7 +7,7 @@ use super::site::Site;
 
 /// What may be run and loaded: the page's own files and WebAssembly, nothing else. index.html says the same for a server of yours.
 pub const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self'; style-src 'self'; \
-                          connect-src 'self'; base-uri 'none'; form-action 'none'";
+                          connect-src 'self'; img-src 'self'; base-uri 'none'; form-action 'none'";
 
 /// An answer: its head, and the content.
 #[derive(Debug, PartialEq, Eq)]
@@ -67,6 +67,7 @@ fn media(path: &str) -> &'static str {
         "css" => "text/css; charset=utf-8",
         "js" => "text/javascript; charset=utf-8",
         "json" => "application/json",
+        "svg" => "image/svg+xml",
         "wasm" => "application/wasm",
         "toml" | "csv" | "txt" => "text/plain; charset=utf-8",
         _ => "application/octet-stream",
@@ -79,7 +80,11 @@ mod tests {
 
     fn site() -> Site {
         let folder = tempfile::tempdir().unwrap();
-        for (name, text) in [("index.html", "page"), ("studio.wasm", "code"), ("examples/a/p.toml", "x = 1")] {
+        for (name, text) in [
+            ("index.html", "page"),
+            ("studio.wasm", "code"),
+            ("examples/a/p.toml", "x = 1"),
+        ] {
             let path = folder.path().join(name);
             std::fs::create_dir_all(path.parent().unwrap()).unwrap();
             std::fs::write(path, text).unwrap();
@@ -101,9 +106,17 @@ mod tests {
             ("/studio.wasm", "code", "application/wasm"),
             ("/examples/a/p.toml", "x = 1", "text/plain"),
         ] {
-            let found = answer(&site, 80, &format!("GET {target} HTTP/1.1\r\nHost: localhost:80\r\n\r\n"));
+            let found = answer(
+                &site,
+                80,
+                &format!("GET {target} HTTP/1.1\r\nHost: localhost:80\r\n\r\n"),
+            );
             assert_eq!(found.content, content.as_bytes(), "{target}");
-            assert!(found.head.contains(media) && found.head.contains(&format!("Content-Length: {}", content.len())), "{}", found.head);
+            assert!(
+                found.head.contains(media) && found.head.contains(&format!("Content-Length: {}", content.len())),
+                "{}",
+                found.head
+            );
         }
         let head = answer(&site, 80, "HEAD / HTTP/1.1\r\nHost: 127.0.0.1:80\r\n\r\n");
         assert!(head.content.is_empty() && head.head.contains("Content-Length: 4"));
@@ -111,18 +124,39 @@ mod tests {
 
     #[test]
     fn another_host_none_or_two_are_refused_whatever_they_ask() {
-        for host in ["evil.example:80", "evil.example", "127.0.0.1", "127.0.0.1:81", "127.0.0.1:80.evil.example", ""] {
-            assert_eq!(status(&format!("GET / HTTP/1.1\r\nHost: {host}\r\n\r\n")), "421", "{host}");
+        for host in [
+            "evil.example:80",
+            "evil.example",
+            "127.0.0.1",
+            "127.0.0.1:81",
+            "127.0.0.1:80.evil.example",
+            "",
+        ] {
+            assert_eq!(
+                status(&format!("GET / HTTP/1.1\r\nHost: {host}\r\n\r\n")),
+                "421",
+                "{host}"
+            );
         }
         assert_eq!(status("GET / HTTP/1.1\r\n\r\n"), "421");
-        assert_eq!(status("GET / HTTP/1.1\r\nHost: 127.0.0.1:80\r\nHost: evil.example\r\n\r\n"), "421");
+        assert_eq!(
+            status("GET / HTTP/1.1\r\nHost: 127.0.0.1:80\r\nHost: evil.example\r\n\r\n"),
+            "421"
+        );
     }
 
     #[test]
     fn nothing_but_reading_of_known_files_is_done() {
         let asked = |line: &str| status(&format!("{line}\r\nhost: 127.0.0.1:80\r\n\r\n"));
         assert_eq!(asked("POST / HTTP/1.1"), "405");
-        for path in ["/../Cargo.toml", "//etc/passwd", "/%2e%2e/x", "/examples", "/examples/a/../a/p.toml", "/index.html/"] {
+        for path in [
+            "/../Cargo.toml",
+            "//etc/passwd",
+            "/%2e%2e/x",
+            "/examples",
+            "/examples/a/../a/p.toml",
+            "/index.html/",
+        ] {
             assert_eq!(asked(&format!("GET {path} HTTP/1.1")), "404", "{path}");
         }
         assert_eq!(asked("GET http://127.0.0.1/ HTTP/1.1"), "400");

@@ -34,7 +34,9 @@ impl Site {
                 .hint("cargo xtask studio, then policyc studio --from target/studio; POLICYC_STUDIO=target/studio while it is built puts it into policyc")
                 .into());
         }
-        let files = EMBEDDED.iter().map(|(name, bytes)| ((*name).to_owned(), Cow::Borrowed(*bytes)));
+        let files = EMBEDDED
+            .iter()
+            .map(|(name, bytes)| ((*name).to_owned(), Cow::Borrowed(*bytes)));
         Ok(Site { files: files.collect() })
     }
 
@@ -49,7 +51,8 @@ impl Site {
         if missing.is_empty() {
             return Ok(Site { files });
         }
-        let message = Message::new("this folder holds no page of the studio").found(format!("no {}", missing.join(", no ")));
+        let message =
+            Message::new("this folder holds no page of the studio").found(format!("no {}", missing.join(", no ")));
         let message = message.hint("`cargo xtask studio` makes it in target/studio of a checkout");
         Err(FileName::new(folder).fault(message).into())
     }
@@ -61,7 +64,10 @@ impl Site {
 
     /// All files, to be written.
     pub fn into_files(self) -> BTreeMap<String, Vec<u8>> {
-        self.files.into_iter().map(|(name, bytes)| (name, bytes.into_owned())).collect()
+        self.files
+            .into_iter()
+            .map(|(name, bytes)| (name, bytes.into_owned()))
+            .collect()
     }
 }
 
@@ -70,16 +76,23 @@ fn walk(folder: &Path, before: &str, files: &mut BTreeMap<String, Cow<'static, [
     let told = |error: std::io::Error| name.fault(Message::new("this folder cannot be read").found(error.to_string()));
     for entry in std::fs::read_dir(folder).map_err(told)? {
         let path = entry.map_err(told)?.path();
-        let Some(own) = path.file_name().and_then(|own| own.to_str()) else { continue };
+        let Some(own) = path.file_name().and_then(|own| own.to_str()) else {
+            continue;
+        };
         let shown = format!("{before}{own}");
         if path.is_dir() {
             walk(&path, &format!("{shown}/"), files)?;
         } else {
             let file = FileName::new(&path);
-            files.insert(shown, file.read(MOST_BYTES).map_err(|message| file.fault(message))?.into());
+            files.insert(
+                shown,
+                file.read(MOST_BYTES).map_err(|message| file.fault(message))?.into(),
+            );
         }
         if files.len() > MOST_FILES {
-            return Err(name.fault(Message::new("this folder holds too many files for a page")).into());
+            return Err(name
+                .fault(Message::new("this folder holds too many files for a page"))
+                .into());
         }
     }
     Ok(())

@@ -65,7 +65,8 @@ pub extern "C" fn put(name: usize) {
 pub extern "C" fn forget(name: usize) {
     PAGE.with_borrow_mut(|page| {
         let bytes = std::mem::take(&mut page.room);
-        page.session.forget(&String::from_utf8_lossy(&bytes[..name.min(bytes.len())]));
+        page.session
+            .forget(&String::from_utf8_lossy(&bytes[..name.min(bytes.len())]));
     });
 }
 

@@ -38,7 +38,7 @@ function panelSvg(panel, x, top, width, height, xTicks, root) {
     const [from, to] = panel.zone;
     root.append(svg("rect", { class: "zone", x: inner.left, y: y(to), width: inner.right - inner.left, height: y(from) - y(to) }));
   }
-  for (const value of ticks(low, high, Math.max(2, height / 45))) {
+  for (const value of ticks(low, high, Math.max(3, height / 40))) {
     root.append(svg("path", { class: "grid", d: `M${inner.left},${y(value)}H${inner.right}` }));
     root.append(svg("text", { x: inner.left - 6, y: y(value) + 4, "text-anchor": "end" }, digits(value)));
   }

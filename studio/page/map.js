@@ -42,7 +42,9 @@ export class DecisionMap {
   /// Where a signal is looked at first: near the voltage that is held, or all of its range.
   range({ name, range }) {
     const held = this.studio.policy.v_ref;
-    return name === "v_out" && held ? [0.95 * held, 1.05 * held] : [Math.max(range.low, 0), range.high];
+    if (name === "v_out" && held) return [0.95 * held, 1.05 * held];
+    // a plausible range reaches far beyond what a converter carries
+    return [Math.max(range.low, 0), Math.max(range.low, 0) + (range.high - Math.max(range.low, 0)) / 4];
   }
 
   middle(signal) {
@@ -115,7 +117,7 @@ export class DecisionMap {
     paint(scale, 64, 1, (column) => column / 63);
     const chosen = actions.length ? ` ${new Set(actions).size} actions are chosen here.` : "";
     at("map").replaceChildren(
-      make("div", { class: "scale" }, `duty ${digits(low)}`, scale, digits(high)),
+      make("div", { class: "scale" }, make("span", {}, `duty ${digits(low)}`), scale, make("span", {}, digits(high))),
       make("div", { class: "plot" },
         make("div", { class: "ends up" }, make("span", {}, digits(y.low)), make("span", {}, y.signal), make("span", {}, digits(y.high))), canvas,
         make("span"), make("div", { class: "ends" }, make("span", {}, digits(x.low)), make("span", {}, x.signal), make("span", {}, digits(x.high)))),

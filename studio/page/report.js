@@ -3,9 +3,9 @@
 import { make } from "./dom.js";
 
 export function report(html) {
-  const page = new DOMParser().parseFromString(html, "text/html");
+  // its own style is report.css as well
+  const page = new DOMParser().parseFromString(html.replace(/<style>[^]*?<\/style>/, ""), "text/html");
   const host = make("div", { class: "report" });
-  // its own style, which is this page's too, stays behind with its head
   host.append(...[...page.querySelector("main").childNodes].map((node) => document.importNode(node, true)));
   return host;
 }

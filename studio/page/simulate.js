@@ -39,5 +39,5 @@ export function whole(studio, loop) {
       button.disabled = false;
     }
   });
-  at("whole").replaceChildren(make("h2", {}, "As policyc simulate"), make("div", { class: "row" }, select, button), out);
+  at("whole").replaceChildren(make("h2", {}, "As policyc simulate"), make("div", { class: "out" }, select, button), out);
 }

@@ -194,6 +194,7 @@ class Studio {
 
   /// Another contract or plant.
   other() {
+    if (!this.example) this.say("");
     this.loop.reset();
     this.map.reset();
     at("compiled").replaceChildren();

@@ -7,7 +7,7 @@ use super::site::Site;
 
 /// What may be run and loaded: the page's own files and WebAssembly, nothing else. index.html says the same for a server of yours.
 pub const POLICY: &str = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self'; style-src 'self'; \
-                          connect-src 'self'; base-uri 'none'; form-action 'none'";
+                          connect-src 'self'; img-src 'self'; base-uri 'none'; form-action 'none'";
 
 /// An answer: its head, and the content.
 #[derive(Debug, PartialEq, Eq)]
@@ -67,6 +67,7 @@ fn media(path: &str) -> &'static str {
         "css" => "text/css; charset=utf-8",
         "js" => "text/javascript; charset=utf-8",
         "json" => "application/json",
+        "svg" => "image/svg+xml",
         "wasm" => "application/wasm",
         "toml" | "csv" | "txt" => "text/plain; charset=utf-8",
         _ => "application/octet-stream",

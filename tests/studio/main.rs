@@ -1,0 +1,228 @@
+//! The page of `policyc studio` in a browser, against the command: the same code, trajectories, diagnosis and faults.
+
+mod browser;
+
+use std::collections::BTreeMap;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use serde_json::Value;
+use tests::root;
+use tests::tools::{policyc, run};
+
+use browser::Browser;
+
+/// Ten times what it takes on two cores.
+const PATIENCE: Duration = Duration::from_secs(300);
+
+/// The page that `cargo xtask studio` has made; none where WebAssembly cannot be built.
+fn page() -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("studio");
+    let made = folder.join("studio.wasm").is_file();
+    if !made {
+        eprintln!("no page of the studio (`cargo xtask studio`): NOT tested");
+    }
+    made.then_some(folder)
+}
+
+/// A server of a folder, which ends with the test.
+struct Server(Child, String);
+
+impl Server {
+    fn of(folder: &Path) -> Self {
+        let mut command = Command::new(policyc());
+        command.arg("studio").arg("--from").arg(folder).stdout(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().unwrap())
+            .read_line(&mut line)
+            .unwrap();
+        let address = line.split_whitespace().nth(1).unwrap().to_owned();
+        Server(child, address)
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn copy(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let path = entry.unwrap().path();
+        let target = to.join(path.file_name().unwrap());
+        match path.is_dir() {
+            true => copy(&path, &target),
+            false => drop(std::fs::copy(&path, target).unwrap()),
+        }
+    }
+}
+
+/// What the command writes to know its own files again; a download has none.
+const RECORD: &str = "policyc-files.json";
+
+/// Digests of the files in a folder, without the [`RECORD`].
+fn digests(folder: &Path) -> BTreeMap<String, String> {
+    let mut found = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        if name != RECORD {
+            found.insert(name, policy::sha256(&std::fs::read(&path).unwrap()));
+        }
+    }
+    found
+}
+
+fn listed(value: &Value) -> BTreeMap<String, String> {
+    serde_json::from_value(value.clone()).unwrap()
+}
+
+fn command(arguments: &[&str]) -> tests::tools::Ran {
+    run(Command::new(policyc())
+        .current_dir(root().join("examples"))
+        .args(arguments))
+}
+
+#[test]
+fn the_page_makes_of_every_example_what_the_command_makes() {
+    let Some(folder) = page() else { return };
+    let temporary = tempfile::tempdir().unwrap();
+    let site = temporary.path().join("site");
+    copy(&folder, &site);
+    for (name, text) in [
+        ("test.html", include_str!("test.html")),
+        ("test.js", include_str!("test.js")),
+    ] {
+        std::fs::write(site.join(name), text).unwrap();
+    }
+    let server = Server::of(&site);
+    let mut browser = Browser::start(&temporary.path().join("profile"));
+    browser.ask(
+        "Page.navigate",
+        serde_json::json!({"url": format!("{}test.html", server.1)}),
+    );
+    let found = browser.value("window.found", PATIENCE);
+    let found: Value = serde_json::from_str(found.as_str().unwrap()).unwrap();
+    assert!(found["error"].is_null(), "{}", found["error"]);
+    let policies = found["policies"].as_object().unwrap();
+    assert_eq!(policies.len(), 4);
+    let out = |name: &str| temporary.path().join(name).display().to_string();
+    for (index, (contract, page)) in policies.iter().enumerate() {
+        assert_eq!(page["faults"], serde_json::json!([null, null, null]), "{contract}");
+        let folder = out(&format!("code-{index}"));
+        let arguments = [
+            "compile",
+            contract,
+            "--allow-outside",
+            "--no-costs",
+            "--emit",
+            "c,rust,kit,sfunction",
+            "--out",
+            &folder,
+        ];
+        let ran = command(&arguments);
+        assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+        assert_eq!(listed(&page["code"]), digests(Path::new(&folder)), "{contract}");
+        let inspected = command(&["inspect", contract, "--allow-outside"]);
+        assert_eq!(page["inspect"].as_str().unwrap(), inspected.stdout, "{contract}");
+        // the plant is named by the same path in both, as pages show it
+        let plant = root().join("examples").join(page["plant"].as_str().unwrap());
+        let scenario = out(&format!("scenario-{index}.toml"));
+        let text = format!(
+            "plant = {:?}\n{}",
+            plant.display().to_string(),
+            found["scenario"].as_str().unwrap()
+        );
+        std::fs::write(&scenario, text).unwrap();
+        let folder = out(&format!("loop-{index}"));
+        let ran = command(&[
+            "simulate",
+            &scenario,
+            "--policy",
+            contract,
+            "--allow-outside",
+            "--out",
+            &folder,
+        ]);
+        assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+        let shows_path = |name: &String| ["summary.txt", "report.html"].contains(&name.as_str());
+        let alike = |files: BTreeMap<String, String>| {
+            files
+                .into_iter()
+                .filter(|(name, _)| !shows_path(name))
+                .collect::<Vec<_>>()
+        };
+        let written = alike(digests(Path::new(&folder)));
+        assert!(written.len() >= 8, "{written:?}");
+        assert_eq!(alike(listed(&page["loop"])), written, "{contract}");
+    }
+    let folder = out("diagnosis");
+    let record = "diagnose/records/nothing-wrong.csv";
+    let ran = command(&[
+        "diagnose",
+        "--model",
+        "blind/plant.toml",
+        "--train",
+        record,
+        "--out",
+        &folder,
+    ]);
+    assert!(
+        ran.stdout.starts_with(&format!(
+            "verdict: {}\n",
+            found["diagnosis"]["verdict"].as_str().unwrap()
+        )),
+        "{}",
+        ran.stdout
+    );
+    assert_eq!(listed(&found["diagnosis"]["made"]), digests(Path::new(&folder)));
+    // a planted fault, with the command's text
+    let broken = temporary.path().join("buck12");
+    copy(&root().join("examples/buck12"), &broken);
+    let text = std::fs::read_to_string(broken.join("policy.toml")).unwrap();
+    std::fs::write(
+        broken.join("policy.toml"),
+        text.replace("sample_period", "sample_perod"),
+    )
+    .unwrap();
+    let ran = run(Command::new(policyc())
+        .current_dir(temporary.path())
+        .args(["inspect", "buck12/policy.toml"]));
+    let texts: Vec<&str> = found["faults"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter_map(Value::as_str)
+        .collect();
+    assert_eq!(texts.join("\n\n") + "\n", ran.stderr);
+}
+
+#[test]
+fn the_page_opens_an_example_and_shows_its_loop() {
+    let Some(folder) = page() else { return };
+    let temporary = tempfile::tempdir().unwrap();
+    let server = Server::of(&folder);
+    let mut browser = Browser::start(temporary.path());
+    let address = format!("{}#loop", server.1);
+    browser.ask("Page.navigate", serde_json::json!({ "url": address }));
+    browser.value(
+        "document.getElementById('status')?.textContent.startsWith('Ready')",
+        PATIENCE,
+    );
+    let pick =
+        "{ const e = document.getElementById('examples'); e.value = '0'; e.dispatchEvent(new Event('change')); true }";
+    browser.value(pick, PATIENCE);
+    let curves = browser.value("document.querySelectorAll('#loop .curve').length || null", PATIENCE);
+    assert_eq!(curves.as_u64(), Some(6), "policy and PID in three panels");
+    let width = browser.value(
+        "document.documentElement.scrollWidth - document.documentElement.clientWidth + 1",
+        PATIENCE,
+    );
+    assert_eq!(width.as_i64(), Some(1), "nothing sticks out");
+}

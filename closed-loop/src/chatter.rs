@@ -91,14 +91,15 @@ fn amplitude(duties: &[f64], periods: u32) -> f64 {
     let n = duties.len() as f64;
     let (mut real, mut imaginary) = (0.0, 0.0);
     for (k, duty) in duties.iter().enumerate() {
-        let weight = 1.0 - (std::f64::consts::TAU * k as f64 / n).cos();
-        let (sin, cos) = (std::f64::consts::TAU * (k % periods as usize) as f64 / f64::from(periods)).sin_cos();
+        // not `f64::cos`: that of each platform ends in other digits, and a metric is the same everywhere
+        let weight = 1.0 - libm::cos(std::f64::consts::TAU * k as f64 / n);
+        let (sin, cos) = libm::sincos(std::f64::consts::TAU * (k % periods as usize) as f64 / f64::from(periods));
         real += weight * duty * cos;
         imaginary += weight * duty * sin;
     }
     // the weights add up to n. At half the sampling frequency both halves of the spectrum are one line
     let halves = if periods == 2 { 1.0 } else { 2.0 };
-    halves * real.hypot(imaginary) / n
+    halves * libm::hypot(real, imaginary) / n
 }
 
 #[cfg(test)]

@@ -45,7 +45,8 @@ impl Axis {
     /// The signal's index.
     fn index(&self, policy: &Policy) -> Result<usize, Faults> {
         let message = |text: &str| Faults::from(Message::new(text).found(&self.signal));
-        if !(1..=MOST_CELLS).contains(&self.cells) || !(self.low < self.high) {
+        if !(1..=MOST_CELLS).contains(&self.cells) || self.low.partial_cmp(&self.high) != Some(std::cmp::Ordering::Less)
+        {
             return Err(message("an axis of a map goes up, in at least one cell"));
         }
         let found = policy.signals.iter().position(|signal| signal.name == self.signal);

@@ -1,4 +1,5 @@
 //! The page of `policyc studio` in a browser, against the command: the same code, trajectories, diagnosis and faults.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod browser;
 
@@ -17,14 +18,19 @@ use browser::Browser;
 /// Ten times what it takes on two cores.
 const PATIENCE: Duration = Duration::from_secs(300);
 
-/// The page that `cargo xtask studio` has made; none where WebAssembly cannot be built.
+/// The page that `cargo xtask studio` has made; none where WebAssembly cannot be built, or no browser shows it.
 fn page() -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("studio");
     let made = folder.join("studio.wasm").is_file();
     if !made {
         eprintln!("no page of the studio (`cargo xtask studio`): NOT tested");
     }
-    made.then_some(folder)
+    let browser = Command::new("chromium").arg("--version").output();
+    let is_there = browser.is_ok_and(|output| output.status.success());
+    if !is_there {
+        eprintln!("no chromium: the page of the studio is NOT tested");
+    }
+    (made && is_there).then_some(folder)
 }
 
 /// A server of a folder, which ends with the test.

@@ -132,6 +132,7 @@ const TOOLS: &[Tool] = &[
     rust_target!("wasm32-unknown-unknown"),
     tool("Frama-C", &["frama-c", "-version"], Apt("frama-c-base")),
     tool("ngspice", &["ngspice", "--version"], Apt("ngspice")),
+    tool("Chromium", &["chromium", "--version"], Apt("chromium")),
     tool("ngspice's library", NGSPICE_HEADER, Apt("libngspice0-dev")),
     // FMPy builds an FMU's sources with the cmake that it brings along
     tool("make", &["make", "--version"], Apt("make")),

@@ -95,12 +95,10 @@ fn command(arguments: &[&str]) -> tests::tools::Ran {
         .args(arguments))
 }
 
-#[test]
-fn the_page_makes_of_every_example_what_the_command_makes() {
-    let Some(folder) = page() else { return };
-    let temporary = tempfile::tempdir().unwrap();
-    let site = temporary.path().join("site");
-    copy(&folder, &site);
+/// What the page makes of every example, by the script of the test.
+fn made_by_the_page(folder: &Path, temporary: &Path) -> Value {
+    let site = temporary.join("site");
+    copy(folder, &site);
     for (name, text) in [
         ("test.html", include_str!("test.html")),
         ("test.js", include_str!("test.js")),
@@ -108,105 +106,82 @@ fn the_page_makes_of_every_example_what_the_command_makes() {
         std::fs::write(site.join(name), text).unwrap();
     }
     let server = Server::of(&site);
-    let mut browser = Browser::start(&temporary.path().join("profile"));
-    browser.ask(
-        "Page.navigate",
-        serde_json::json!({"url": format!("{}test.html", server.1)}),
-    );
+    let mut browser = Browser::start(&temporary.join("profile"));
+    let address = format!("{}test.html", server.1);
+    browser.ask("Page.navigate", serde_json::json!({ "url": address }));
     let found = browser.value("window.found", PATIENCE);
     let found: Value = serde_json::from_str(found.as_str().unwrap()).unwrap();
     assert!(found["error"].is_null(), "{}", found["error"]);
+    found
+}
+
+fn the_same_code(contract: &str, page: &Value, folder: &str) {
+    assert_eq!(page["faults"], serde_json::json!([null, null, null]), "{contract}");
+    let emit = ["--no-costs", "--emit", "c,rust,kit,sfunction", "--out", folder];
+    let ran = command(&[&["compile", contract, "--allow-outside"][..], &emit].concat());
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    assert_eq!(listed(&page["code"]), digests(Path::new(folder)), "{contract}");
+    let inspected = command(&["inspect", contract, "--allow-outside"]);
+    assert_eq!(page["inspect"].as_str().unwrap(), inspected.stdout, "{contract}");
+}
+
+fn the_same_loop(contract: &str, page: &Value, scenario: &Value, file: &str, folder: &str) {
+    // the plant is named by the same path in both, as pages show it
+    let plant = root().join("examples").join(page["plant"].as_str().unwrap());
+    let plant = plant.display().to_string();
+    let text = format!("plant = {plant:?}\n{}", scenario.as_str().unwrap());
+    std::fs::write(file, text).unwrap();
+    let policy = ["--policy", contract, "--allow-outside", "--out", folder];
+    let ran = command(&[&["simulate", file][..], &policy].concat());
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    let shows_path = |name: &str| ["summary.txt", "report.html"].contains(&name);
+    let alike = |files: BTreeMap<String, String>| {
+        let files = files.into_iter().filter(|(name, _)| !shows_path(name));
+        files.collect::<Vec<_>>()
+    };
+    let written = alike(digests(Path::new(folder)));
+    assert!(written.len() >= 8, "{written:?}");
+    assert_eq!(alike(listed(&page["loop"])), written, "{contract}");
+}
+
+fn the_same_diagnosis(page: &Value, folder: &str) {
+    let record = "diagnose/records/nothing-wrong.csv";
+    let arguments = ["diagnose", "--model", "blind/plant.toml", "--train", record];
+    let ran = command(&[&arguments[..], &["--out", folder]].concat());
+    let verdict = format!("verdict: {}\n", page["verdict"].as_str().unwrap());
+    assert!(ran.stdout.starts_with(&verdict), "{}", ran.stdout);
+    assert_eq!(listed(&page["made"]), digests(Path::new(folder)));
+}
+
+/// A planted fault, with the command's text.
+fn the_same_faults(page: &Value, temporary: &Path) {
+    let broken = temporary.join("buck12");
+    copy(&root().join("examples/buck12"), &broken);
+    let contract = broken.join("policy.toml");
+    let text = std::fs::read_to_string(&contract).unwrap();
+    std::fs::write(&contract, text.replace("sample_period", "sample_perod")).unwrap();
+    let mut inspect = Command::new(policyc());
+    inspect.current_dir(temporary).args(["inspect", "buck12/policy.toml"]);
+    let ran = run(&mut inspect);
+    let texts = page.as_array().unwrap().iter().filter_map(Value::as_str);
+    assert_eq!(texts.collect::<Vec<_>>().join("\n\n") + "\n", ran.stderr);
+}
+
+#[test]
+fn the_page_makes_of_every_example_what_the_command_makes() {
+    let Some(folder) = page() else { return };
+    let temporary = tempfile::tempdir().unwrap();
+    let found = made_by_the_page(&folder, temporary.path());
     let policies = found["policies"].as_object().unwrap();
     assert_eq!(policies.len(), 4);
     let out = |name: &str| temporary.path().join(name).display().to_string();
     for (index, (contract, page)) in policies.iter().enumerate() {
-        assert_eq!(page["faults"], serde_json::json!([null, null, null]), "{contract}");
-        let folder = out(&format!("code-{index}"));
-        let arguments = [
-            "compile",
-            contract,
-            "--allow-outside",
-            "--no-costs",
-            "--emit",
-            "c,rust,kit,sfunction",
-            "--out",
-            &folder,
-        ];
-        let ran = command(&arguments);
-        assert_eq!(ran.code, Some(0), "{}", ran.stderr);
-        assert_eq!(listed(&page["code"]), digests(Path::new(&folder)), "{contract}");
-        let inspected = command(&["inspect", contract, "--allow-outside"]);
-        assert_eq!(page["inspect"].as_str().unwrap(), inspected.stdout, "{contract}");
-        // the plant is named by the same path in both, as pages show it
-        let plant = root().join("examples").join(page["plant"].as_str().unwrap());
-        let scenario = out(&format!("scenario-{index}.toml"));
-        let text = format!(
-            "plant = {:?}\n{}",
-            plant.display().to_string(),
-            found["scenario"].as_str().unwrap()
-        );
-        std::fs::write(&scenario, text).unwrap();
-        let folder = out(&format!("loop-{index}"));
-        let ran = command(&[
-            "simulate",
-            &scenario,
-            "--policy",
-            contract,
-            "--allow-outside",
-            "--out",
-            &folder,
-        ]);
-        assert_eq!(ran.code, Some(0), "{}", ran.stderr);
-        let shows_path = |name: &String| ["summary.txt", "report.html"].contains(&name.as_str());
-        let alike = |files: BTreeMap<String, String>| {
-            files
-                .into_iter()
-                .filter(|(name, _)| !shows_path(name))
-                .collect::<Vec<_>>()
-        };
-        let written = alike(digests(Path::new(&folder)));
-        assert!(written.len() >= 8, "{written:?}");
-        assert_eq!(alike(listed(&page["loop"])), written, "{contract}");
+        the_same_code(contract, page, &out(&format!("code-{index}")));
+        let [file, folder] = [format!("scenario-{index}.toml"), format!("loop-{index}")].map(|name| out(&name));
+        the_same_loop(contract, page, &found["scenario"], &file, &folder);
     }
-    let folder = out("diagnosis");
-    let record = "diagnose/records/nothing-wrong.csv";
-    let ran = command(&[
-        "diagnose",
-        "--model",
-        "blind/plant.toml",
-        "--train",
-        record,
-        "--out",
-        &folder,
-    ]);
-    assert!(
-        ran.stdout.starts_with(&format!(
-            "verdict: {}\n",
-            found["diagnosis"]["verdict"].as_str().unwrap()
-        )),
-        "{}",
-        ran.stdout
-    );
-    assert_eq!(listed(&found["diagnosis"]["made"]), digests(Path::new(&folder)));
-    // a planted fault, with the command's text
-    let broken = temporary.path().join("buck12");
-    copy(&root().join("examples/buck12"), &broken);
-    let text = std::fs::read_to_string(broken.join("policy.toml")).unwrap();
-    std::fs::write(
-        broken.join("policy.toml"),
-        text.replace("sample_period", "sample_perod"),
-    )
-    .unwrap();
-    let ran = run(Command::new(policyc())
-        .current_dir(temporary.path())
-        .args(["inspect", "buck12/policy.toml"]));
-    let texts: Vec<&str> = found["faults"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .filter_map(Value::as_str)
-        .collect();
-    assert_eq!(texts.join("\n\n") + "\n", ran.stderr);
+    the_same_diagnosis(&found["diagnosis"], &out("diagnosis"));
+    the_same_faults(&found["faults"], temporary.path());
 }
 
 #[test]

@@ -7,6 +7,9 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
+/// Without a screen, for root, and with as little shared memory as a container has.
+pub const FLAGS: [&str; 4] = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"];
+
 pub struct Browser {
     child: Child,
     input: ChildStdin,
@@ -19,10 +22,12 @@ impl Browser {
     /// Started with a profile in `folder`.
     pub fn start(folder: &Path) -> Self {
         // the browser reads at descriptor 3 and writes at 4
-        let line = "exec chromium --headless --no-sandbox --disable-gpu --remote-debugging-pipe \"--user-data-dir=$0\" 3<&0 4>&1 \
-                    0</dev/null 1>/dev/null 2>&1";
+        let flags = FLAGS.join(" ");
+        let line = format!(
+            "exec chromium {flags} --remote-debugging-pipe \"--user-data-dir=$0\" 3<&0 4>&1 0</dev/null 1>/dev/null 2>&1"
+        );
         let mut child = Command::new("sh")
-            .args(["-c", line])
+            .args(["-c", &line])
             .arg(folder)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())

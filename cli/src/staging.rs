@@ -38,6 +38,8 @@ struct StagedFile {
     temporary: PathBuf,
     backup: PathBuf,
     destination: PathBuf,
+    /// Folders that were made for it, the outer ones first.
+    folders: Vec<PathBuf>,
     had_backup: bool,
     published: bool,
 }
@@ -84,6 +86,7 @@ impl Staged {
             temporary,
             backup,
             destination: self.folder.join(name),
+            folders: Vec::new(),
             had_backup: false,
             published: false,
         });
@@ -117,6 +120,17 @@ impl Staged {
 
 impl StagedFile {
     fn publish(&mut self) -> io::Result<()> {
+        // the name may lead into folders: those that are missing, from the innermost out
+        let missing = self
+            .destination
+            .ancestors()
+            .skip(1)
+            .take_while(|folder| !folder.exists());
+        let missing: Vec<PathBuf> = missing.map(Path::to_owned).collect();
+        for folder in missing.into_iter().rev() {
+            fs::create_dir(&folder)?;
+            self.folders.push(folder);
+        }
         if fs::symlink_metadata(&self.destination).is_ok() {
             // a second name for the old file: the destination is never missing, whenever the run is interrupted
             fs::hard_link(&self.destination, &self.backup)
@@ -144,6 +158,9 @@ impl Drop for Staged {
                     fs::remove_file(&file.temporary)
                 }
             };
+            for folder in file.folders.iter().rev() {
+                let _ = fs::remove_dir(folder);
+            }
         }
     }
 }
@@ -168,6 +185,25 @@ mod tests {
         assert!(leftovers(folder.path()).is_empty());
         assert_eq!(fs::read_to_string(path("a")).unwrap(), "old a");
         assert_eq!(fs::read_to_string(path("b")).unwrap(), "old b");
+    }
+
+    #[test]
+    fn folders_of_a_name_are_made_and_go_again_with_a_failed_publication() {
+        let folder = tempfile::tempdir().unwrap();
+        let stage = || {
+            let mut staged = Staged::new(folder.path());
+            for name in ["a/b/c", "a/d"] {
+                staged.stage(name, b"new").unwrap();
+            }
+            staged
+        };
+        let staged = stage();
+        fs::remove_file(&staged.files[1].temporary).unwrap();
+        assert!(staged.publish().is_err());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+        assert!(stage().publish().is_ok());
+        assert_eq!(fs::read_to_string(folder.path().join("a/b/c")).unwrap(), "new");
+        assert_eq!(fs::read_to_string(folder.path().join("a/d")).unwrap(), "new");
     }
 
     #[test]

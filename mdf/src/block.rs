@@ -22,7 +22,7 @@ pub struct Blocks<'a> {
     bytes: &'a [u8],
     visits: Cell<usize>,
     /// Bytes of records that may still be unpacked.
-    pub bytes_left: Cell<usize>,
+    bytes_left: Cell<usize>,
     /// The bound of them.
     pub most_bytes: usize,
     /// Values that may still be decoded.
@@ -112,13 +112,17 @@ fn inner(xml: &str) -> String {
 impl Blocks<'_> {
     /// Takes so many values from those that may still be decoded.
     pub fn take_values(&self, count: usize) -> Result<(), Error> {
+        self.take(&self.values_left, count)
+    }
+
+    /// Takes so many bytes of records from those that may still be unpacked.
+    pub fn take_bytes(&self, count: usize) -> Result<(), Error> {
+        self.take(&self.bytes_left, count)
+    }
+
+    fn take(&self, from: &Cell<usize>, count: usize) -> Result<(), Error> {
         let most = self.most_bytes;
-        let left = self
-            .values_left
-            .get()
-            .checked_sub(count)
-            .ok_or(Error::Unpacked { most })?;
-        self.values_left.set(left);
+        from.set(from.get().checked_sub(count).ok_or(Error::Unpacked { most })?);
         Ok(())
     }
 }

@@ -20,7 +20,9 @@ impl<'a> Blocks<'a> {
             block = self.at(block.link(0).ok_or(block.short())?, &["DL", "LD"])?;
         }
         match block.id {
-            b"DT" => self.take(block.data.len()).map(|()| Some(Cow::Borrowed(block.data))),
+            b"DT" => self
+                .take_bytes(block.data.len())
+                .map(|()| Some(Cow::Borrowed(block.data))),
             b"DZ" => Ok(Some(Cow::Owned(self.unpacked(block)?))),
             b"DL" => self.list(block).map(|bytes| Some(Cow::Owned(bytes))),
             _ => Ok(None),
@@ -35,24 +37,13 @@ impl<'a> Blocks<'a> {
                 if block.id == b"DZ" {
                     bytes.append(&mut self.unpacked(block)?);
                 } else {
-                    self.take(block.data.len())?;
+                    self.take_bytes(block.data.len())?;
                     bytes.extend_from_slice(block.data);
                 }
             }
             let Some(next) = list.link(0) else { return Ok(bytes) };
             list = self.at(next, &["DL"])?;
         }
-    }
-
-    fn take(&self, length: usize) -> Result<(), Error> {
-        let most = self.most_bytes;
-        let left = self
-            .bytes_left
-            .get()
-            .checked_sub(length)
-            .ok_or(Error::Unpacked { most })?;
-        self.bytes_left.set(left);
-        Ok(())
     }
 
     /// DZ: type of what is packed, way, its parameter, lengths before and behind, bytes.
@@ -66,7 +57,7 @@ impl<'a> Blocks<'a> {
         }
         let most = self.most_bytes;
         let length = usize::try_from(block.long(8)?).map_err(|_| Error::Unpacked { most })?;
-        self.take(length)?;
+        self.take_bytes(length)?;
         let packed = usize::try_from(block.long(16)?).ok();
         let packed = packed
             .and_then(|packed| block.data.get(24..)?.get(..packed))

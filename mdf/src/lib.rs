@@ -161,6 +161,9 @@ fn data_group(
     Ok(())
 }
 
+#[cfg(test)]
+mod tests;
+
 fn broken(block: &'static str, at: u64) -> Error {
     Error::Broken { block, at }
 }

@@ -11,7 +11,7 @@ const VIEWS = ["contract", "code", "map", "loop", "records"];
 
 /// What a file is for, by its name and content.
 function kind(path, content) {
-  if (/\.(csv|txt|tsv|mat)$/i.test(path)) return "record";
+  if (/\.(csv|txt|tsv|mat|mf4)$/i.test(path)) return "record";
   if (/\.(zip|onnx|pt|pth|safetensors|npz|npy)$/i.test(path)) return "model";
   if (!/\.toml$/i.test(path)) return "other";
   const text = decode(content);

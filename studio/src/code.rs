@@ -26,7 +26,7 @@ pub(crate) fn compile(session: &Session, of: &Contract, emit: &[String], target:
     let code = verify::code::make(&policy, target, &emit, verify::kit::DEFAULT_STEPS, None)?;
     let sizes = manifest::sizes(&policy, target);
     let mut notes = verify::code::notes(&policy, target, &sizes, code.files.keys().map(Path::new));
-    notes.extend(code.decisions.iter().map(|line| line.trim().to_owned()));
+    notes.extend(verify::code::decision_notes(&code.decisions));
     let answer = Compiled {
         sizes: sizes.to_string(),
         notes,

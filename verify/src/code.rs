@@ -24,6 +24,12 @@ pub struct Code {
     pub decisions: Vec<String>,
 }
 
+/// [`Code::decisions`] as notes beside others, without a mark of their own.
+pub fn decision_notes(decisions: &[String]) -> impl Iterator<Item = String> {
+    let told = |line: &String| line.trim().trim_start_matches("note: ").to_owned();
+    decisions.iter().map(told)
+}
+
 /// Generates the files of `emit`; `kit_steps` control steps are in a kit. `golden_decisions`: share of the golden decisions that the
 /// numeric format may change, 0..1; nothing: as the contract says.
 ///

@@ -154,8 +154,7 @@ fn say_json(
     let sizes = manifest::sizes(policy, made.target);
     let files = together(&made.files, &made.archives);
     let mut notes = code::notes(policy, made.target, &sizes, files.keys().map(Path::new));
-    let told = |line: &String| line.trim().trim_start_matches("note: ").to_owned();
-    notes.extend(made.decisions.iter().map(told));
+    notes.extend(code::decision_notes(&made.decisions));
     notes.extend(costs.iter().flat_map(|text| talk::notes_of(text)));
     notes.iter().for_each(|note| talk::note(note));
     let written = |(path, content): (&String, &Vec<u8>)| Written {

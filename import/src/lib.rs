@@ -148,7 +148,8 @@ fn written(
             .expected(format!("{inputs}, one for each network input"));
         return Err(name.fault(message).into());
     }
-    let given = given_answers(name)?;
+    let outputs = network.layers.last().map_or(0, |layer| layer.outputs);
+    let given = given_answers(name, inputs, outputs)?;
     let golden = match given {
         Some(_) => None,
         None => golden_answers(loaded, network, statistics).map_err(|message| name.fault(message))?,
@@ -179,7 +180,7 @@ fn written(
     let draft = Draft {
         weights,
         inputs,
-        outputs: network.layers.last().map_or(0, |layer| layer.outputs),
+        outputs,
         chains: vec![chain(network)],
         hidden: network.layers.len() > 1,
         bias: true,
@@ -209,13 +210,24 @@ fn written(
 
 /// The trainer's own answers beside its model, which check more than what can be computed here; `None` without them, and of those
 /// that an earlier call computed.
-fn given_answers(model: &FileName) -> Result<Option<Vec<u8>>, Faults> {
-    let name = model.with_file_name(GOLDEN);
+///
+/// # Errors
+/// Of answers that no network with so many inputs and outputs gives: a contract that names them is refused.
+fn given_answers(model: &FileName, inputs: usize, outputs: usize) -> Result<Option<Vec<u8>>, Faults> {
+    let name = FileName {
+        origin: Origin::Caller,
+        ..model.with_file_name(GOLDEN)
+    };
     if !name.is_file() {
         return Ok(None);
     }
     let bytes = name.read(MAX_WEIGHT_BYTES).map_err(|message| name.fault(message))?;
-    Ok((!golden::is_computed(&bytes)).then_some(bytes))
+    if golden::is_computed(&bytes) {
+        return Ok(None);
+    }
+    // a choice has two actions at least
+    policy::golden_fits(&name, bytes.clone(), inputs, outputs, outputs == 1)?;
+    Ok(Some(bytes))
 }
 
 /// The activations behind the hidden layers, as TOML.

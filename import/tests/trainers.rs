@@ -359,6 +359,24 @@ fn golden_answers_beside_a_model_are_taken_and_lie_beside_its_new_weights() {
     assert_eq!(new("apart/policy.toml").contract, drawn.contract);
 }
 
+/// A contract that named them would be refused by every command.
+#[test]
+fn golden_answers_of_another_network_are_refused_with_the_way_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let twelve = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/buck12/golden.safetensors");
+    for (model, foreign, words) in [
+        ("sb3_dqn.zip", twelve.clone(), "tensor `q`"),
+        ("sb3_sac.zip", fixture("sb3_dqn.expected.safetensors"), "`output`"),
+    ] {
+        std::fs::copy(fixture(model), path("model.zip")).unwrap();
+        std::fs::copy(foreign, path("golden.safetensors")).unwrap();
+        let text = refusal(&path("model.zip"));
+        assert!(text.contains(words), "{model}: {text}");
+        assert!(text.contains("move that of another network away"), "{model}: {text}");
+    }
+}
+
 #[test]
 fn statistics_in_a_file_of_numpy_are_refused_with_the_formula() {
     let folder = tempfile::tempdir().unwrap();

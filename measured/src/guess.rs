@@ -4,7 +4,7 @@ use crate::locate::Located;
 use crate::quantity::{Quantity, is_unit, split_unit};
 use crate::sheet::Sheet;
 
-/// Names that are met in files, without case, umlauts and punctuation. One that could be two quantities (`current`, `voltage` beside
+/// What one word alone means, without case, umlauts and punctuation. One that could be two quantities (`current`, `voltage` beside
 /// another) stands where it is most often right: the user decides.
 const SYNONYMS: [(&str, &[&str]); 9] = [
     (
@@ -40,86 +40,10 @@ const SYNONYMS: [(&str, &[&str]); 9] = [
             "aussteuergrad",
         ],
     ),
-    (
-        "v_out",
-        &[
-            "vout",
-            "vo",
-            "uout",
-            "uo",
-            "ua",
-            "uaus",
-            "vaus",
-            "voutput",
-            "outv",
-            "outputvoltage",
-            "voltageout",
-            "voltage",
-            "vload",
-            "loadvoltage",
-            "vc",
-            "ausgangsspannung",
-            "spannung",
-            "lastspannung",
-        ],
-    ),
-    (
-        "i_l",
-        &[
-            "il",
-            "iind",
-            "icoil",
-            "iinductor",
-            "inductorcurrent",
-            "coilcurrent",
-            "ilind",
-            "ispule",
-            "idrossel",
-            "spulenstrom",
-            "drosselstrom",
-        ],
-    ),
-    (
-        "i_out",
-        &[
-            "iout",
-            "io",
-            "ia",
-            "iaus",
-            "ioutput",
-            "outi",
-            "outputcurrent",
-            "currentout",
-            "loadcurrent",
-            "current",
-            "ausgangsstrom",
-            "laststrom",
-            "strom",
-        ],
-    ),
-    (
-        "v_in",
-        &[
-            "vin",
-            "vi",
-            "uin",
-            "ue",
-            "uein",
-            "vein",
-            "vinput",
-            "inputvoltage",
-            "voltagein",
-            "vsupply",
-            "supplyvoltage",
-            "vbus",
-            "ubus",
-            "vdc",
-            "udc",
-            "busvoltage",
-            "eingangsspannung",
-            "zwischenkreisspannung",
-        ],
-    ),
+    ("v_out", &["voltage", "spannung", "vc", "uc"]),
+    ("i_l", &[]),
+    ("i_out", &["current", "strom"]),
+    ("v_in", &[]),
     (
         "r_load",
         &[
@@ -133,6 +57,37 @@ const SYNONYMS: [(&str, &[&str]); 9] = [
     ),
     ("i_load", &["iload", "iset", "loadset", "setcurrent", "sollstrom"]),
     ("p_load", &["pload", "plast", "pset", "loadpower", "lastleistung"]),
+];
+
+/// Names of a voltage and of a current, in a name that says its place as well: `vout`, `Ausgangsspannung`, `U_Last`.
+const KINDS: [(char, &[&str]); 2] = [
+    ('v', &["spannung", "voltage", "volt", "v", "u"]),
+    ('i', &["strom", "current", "i"]),
+];
+
+/// Places in the converter. The single letters are those of textbooks: a German output is `a`, its input `e`.
+const PLACES: [(&str, &[&str]); 3] = [
+    ("out", &["out", "output", "o", "aus", "ausgang", "a", "load", "last"]),
+    (
+        "in",
+        &[
+            "in",
+            "input",
+            "i",
+            "ein",
+            "eingang",
+            "e",
+            "bus",
+            "dc",
+            "dcbus",
+            "dclink",
+            "supply",
+            "source",
+            "quelle",
+            "zwischenkreis",
+        ],
+    ),
+    ("l", &["l", "ind", "inductor", "coil", "choke", "lind", "spule", "spulen", "drossel"]),
 ];
 
 /// Words that say how something was measured, not what.
@@ -149,7 +104,7 @@ impl Sheet {
             .filter(|(name, _)| located.signal(name).is_none() && wanted.iter().any(|quantity| quantity.name == *name));
         let column = |(name, synonyms): &(&'static str, &[&str])| {
             let mut unused = located.unused.iter().filter_map(|index| self.columns().get(*index));
-            let found = unused.find(|column| synonyms.contains(&plain(&column.name).as_str()))?;
+            let found = unused.find(|column| is_alike(&column.name, name, synonyms))?;
             Some((*name, found.name.as_str()))
         };
         missing.filter_map(column).collect()
@@ -160,7 +115,7 @@ impl Sheet {
     /// A column that is called like a quantity.
     pub(crate) fn resembling(&self, quantity: &str) -> Option<&str> {
         let (_, synonyms) = SYNONYMS.iter().find(|(name, _)| *name == quantity)?;
-        self.headers().find(|header| synonyms.contains(&plain(header).as_str()))
+        self.headers().find(|header| is_alike(header, quantity, synonyms))
     }
 }
 
@@ -196,6 +151,36 @@ pub fn argument(map: &str) -> String {
         true => format!("--map {map}"),
         false => format!("--map '{map}'"),
     }
+}
+
+/// Whether a header may mean a quantity: by a word that alone means it, or by kind and place.
+fn is_alike(header: &str, quantity: &str, synonyms: &[&str]) -> bool {
+    let name = plain(header);
+    let is_elsewhere = || SYNONYMS.iter().any(|(_, others)| others.contains(&name.as_str()));
+    synonyms.contains(&name.as_str()) || (!is_elsewhere() && placed(&name) == Some(quantity))
+}
+
+/// The quantity of a name that is a kind and a place and nothing else, in either order: `uaus`, `outv`, `eingangsspannung`.
+fn placed(name: &str) -> Option<&'static str> {
+    let place_of = |rest: &str| {
+        // the joint of a German compound: Ausgang-s-spannung
+        let is_of = |known: &&str| *known == rest || rest.strip_suffix('s') == Some(*known) && known.len() > 3;
+        PLACES.iter().find(|(_, words)| words.iter().any(|word| is_of(&word))).map(|(place, _)| *place)
+    };
+    let pairs = KINDS.iter().flat_map(|(kind, words)| words.iter().map(move |word| (*kind, *word)));
+    pairs
+        .filter_map(|(kind, word)| {
+            let behind = name.strip_prefix(word).and_then(place_of);
+            let place = behind.or_else(|| name.strip_suffix(word).and_then(place_of))?;
+            Some(match (kind, place) {
+                ('v', "out") => "v_out",
+                ('v', "in") => "v_in",
+                ('i', "out") => "i_out",
+                ('i', "l") => "i_l",
+                _ => return None,
+            })
+        })
+        .next()
 }
 
 /// A header without unit, case, umlauts, punctuation and manner of measuring.
@@ -256,6 +241,41 @@ mod tests {
             proposed("Zeit;Tastgrad;Spannung [mV];Spulenstrom").as_deref(),
             Some("--map 't=Zeit,duty=Tastgrad,v_out=Spannung [mV],i_l=Spulenstrom'")
         );
+    }
+
+    #[test]
+    fn a_name_of_kind_and_place_is_understood_in_either_order_and_language() {
+        for (header, quantity) in [
+            ("I_Last", Some("i_out")),
+            ("U_Last", Some("v_out")),
+            ("Laststrom", Some("i_out")),
+            ("Ausgangsspannung [V]", Some("v_out")),
+            ("Zwischenkreisspannung", Some("v_in")),
+            ("InputVoltage", Some("v_in")),
+            ("voltage_in", Some("v_in")),
+            ("Drosselstrom_A", Some("i_l")),
+            ("u_dc", Some("v_in")),
+            ("Uoutput", Some("v_out")),
+            ("Iload", Some("i_load")),
+            ("R_Last", Some("r_load")),
+            // neither is a quantity that is read, or says which
+            ("Iin", None),
+            ("v_l", None),
+            ("v_ref", None),
+            ("i", None),
+            ("u", None),
+            ("Vout_old", None),
+            ("vi_loop", None),
+        ] {
+            // everything else is there
+            let guessed = proposed(&format!("lamp;{header}"));
+            let expected = quantity.map(|quantity| format!("{quantity}="));
+            assert_eq!(
+                guessed.as_deref().map(|map| map.contains(expected.as_deref().unwrap_or("?"))),
+                expected.as_ref().map(|_| true),
+                "{header}: {guessed:?}"
+            );
+        }
     }
 
     #[test]

@@ -121,6 +121,21 @@ fn range((low, high): (f64, f64)) -> String {
     format!("{} .. {}", written(low), written(high))
 }
 
+/// What holds where the key is left out, as a file would write it.
+fn default(parameter: &plant::Parameter) -> String {
+    let (low, high) = parameter.allowed;
+    match parameter.choices().first() {
+        Some(word) => (*word).to_owned(),
+        // where a file must say it, the neutral value of a catalogue is none that a plant takes
+        None if NEEDED.contains(&parameter.key) => "must be given".to_owned(),
+        None if (low..=high).contains(&parameter.neutral) => written(parameter.neutral),
+        None => "with the effect".to_owned(),
+    }
+}
+
+/// The four numbers that every file gives.
+const NEEDED: [&str; 4] = ["converter.v_in", "converter.inductance", "converter.capacitance", "converter.f_sw"];
+
 /// The table of keys as the page has to show it; numbers that all sensors have stand once.
 fn table() -> Vec<String> {
     let mut lines = Vec::new();
@@ -140,7 +155,8 @@ fn table() -> Vec<String> {
                 words => (words.join(", "), String::new()),
             };
             lines.push(format!(
-                "| {name} | {needs} | `{key}` | {unit} | {allowed} | {typical} | {} |",
+                "| {name} | {needs} | `{key}` | {unit} | {} | {allowed} | {typical} | {} |",
+                default(parameter),
                 parameter.meaning
             ));
             (name, needs) = ("", "");
@@ -153,7 +169,7 @@ fn table() -> Vec<String> {
 #[test]
 fn the_pages_table_is_that_of_the_catalogue() {
     const PAGE: &str = "../docs/reference/plant-file.md";
-    const HEAD: &str = "| effect | needs | key | unit | allowed | typical | meaning |\n|---|---|---|---|---|---|---|\n";
+    const HEAD: &str = "| effect | needs | key | unit | default | allowed | typical | meaning |\n|---|---|---|---|---|---|---|---|\n";
     let page = std::fs::read_to_string(PAGE).unwrap();
     let start = page.find(HEAD).expect("the table's head") + HEAD.len();
     let end = start + page[start..].find("\n\n").unwrap();

@@ -9,6 +9,7 @@ mod counter;
 mod fallback;
 mod formats;
 mod included;
+mod saved;
 
 use std::collections::BTreeMap;
 

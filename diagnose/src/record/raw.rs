@@ -44,8 +44,9 @@ impl<'a> Raw<'a> {
         faults.propagate()?;
         let mut repairs = located.notes(sheet, &[]);
         let is_column = |name: &str| located.signal(name).is_some_and(|signal| signal.column().is_some());
-        // beside a measured load current nobody takes one for the other
-        if is_column("i_load") && !is_column("i_out") {
+        let is_set = |name: &str| values.iter().any(|(known, of)| *known == name && of.iter().any(|value| *value != 0.0));
+        // beside a measured load current nobody takes one for the other, and zeros are no load
+        if is_column("i_load") && is_set("i_load") && !is_column("i_out") {
             repairs.push("i_load is read as the load that was set; a measured load current is i_out".to_owned());
         }
         let guesses = sheet.guesses(&located, &Quantity::all(&NAMES));
@@ -155,9 +156,19 @@ impl<'a> Raw<'a> {
             .found(why)
             .expected("a time `t`, `time` or `timestamps`, in s or with its unit: `t_us`")
             .hint(format!(
-                "--map t={name} if it is the time; --settled if each row is a settled operating point"
+                "if it is the time, its name has to be said: {}. Only where each row is an operating point that had settled, whatever \
+                 this column counts: --settled",
+                self.whole_map(name)
             ));
         Err(self.sheet.name_fault(column, message).into())
+    }
+
+    /// A map that says the time and whatever else looks like a quantity: nobody wants to be asked column by column.
+    fn whole_map(&self, time: &str) -> String {
+        let guesses = self.sheet.guesses(&self.located, &Quantity::all(&NAMES));
+        let others = guesses.into_iter().filter(|(name, _)| *name != "t");
+        let all: Vec<_> = std::iter::once(("t", time)).chain(others).collect();
+        proposal(&all).unwrap_or_default()
     }
 
     pub fn check_duty(&self) -> Result<(), Faults> {

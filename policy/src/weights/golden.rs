@@ -3,7 +3,7 @@
 
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
-use toml_input::{Message, Sink};
+use toml_input::{Faults, FileName, Message, Sink};
 
 use super::{catalogue, header, tensors};
 use crate::model::{Feature, Golden};
@@ -111,6 +111,44 @@ pub(crate) fn read(
         duty_error: limits.duty_error,
     };
     (faults.count() == before).then_some(golden)
+}
+
+/// Whether golden answers could be those of a network with so many inputs and outputs; `is_continuous` where its one output
+/// becomes a duty. What a contract says of them, their ranges and the limits of a difference, is not judged.
+///
+/// # Errors
+/// The faults that a contract which names the file would meet.
+pub fn golden_fits(
+    name: &FileName,
+    bytes: Vec<u8>,
+    inputs: usize,
+    outputs: usize,
+    is_continuous: bool,
+) -> Result<(), Faults> {
+    let file = Binary {
+        name: name.clone(),
+        bytes,
+    };
+    let shape = Shape {
+        features: inputs,
+        outputs,
+        is_continuous,
+    };
+    let limits = Limits {
+        tolerance: f64::INFINITY,
+        decisions: None,
+        duty_error: None,
+        outside: 1.0,
+    };
+    let mut faults = Sink::new();
+    read(&file, shape, &[], limits, &mut faults);
+    if !faults.is_empty() {
+        let message = Message::new("these are not the answers of this network")
+            .found("a golden file beside the model, which is taken as its trainer's")
+            .hint("move that of another network away, or the model into a folder of its own");
+        faults.push(name.fault(message));
+    }
+    faults.propagate()
 }
 
 /// A tensor that may be there, by its name.

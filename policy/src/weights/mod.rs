@@ -18,6 +18,7 @@ use crate::raw::Binary;
 use chain::{Chain, Ends};
 use explain::Scene;
 use layers::{Dense, Layers};
+pub use golden::golden_fits;
 pub use tensors::NamedTensor;
 use tensors::Tensors;
 

@@ -338,7 +338,9 @@ fn edges(found: &Examined) -> Option<String> {
         .trim_or_none(problem.base.plant.converter.f_sw);
     let known = problem.duty_accuracy();
     (found.verdict != Verdict::Unexplained && trim.abs() > known).then(|| {
-        let [time, volts] = [(trim * problem.bases.t_sw, "s"), (trim * problem.base.plant.converter.v_in, "V")]
+        let p = &problem.base.plant.converter;
+        let node = p.topology.span(p.v_in, problem.bases.v);
+        let [time, volts] = [(trim * problem.bases.t_sw, "s"), (trim * node, "V")]
             .map(|(value, unit)| si(value.abs(), unit));
         let (way, less) = if trim < 0.0 { ("lost", "more") } else { ("won", "less") };
         format!(

@@ -3,7 +3,10 @@
 
 use std::ops::Range;
 
+use plant::Topology;
+
 use crate::basis::Basis;
+use crate::ideal;
 use crate::parallel;
 use crate::problem::{Problem, dot};
 use crate::record::{CHANNELS, Record};
@@ -102,6 +105,9 @@ fn response(problem: &Problem, counts: f64) -> Vec<f64> {
     out
 }
 
+/// Least share of the current that an output receives: a duty of nearly 1 would make the current of a boost large without bound.
+const GIVE: f64 = 0.05;
+
 /// A share of the period of `row`.
 fn advanced(
     problem: &Problem,
@@ -114,15 +120,25 @@ fn advanced(
     let p = &problem.base.plant;
     let duty = record.duty[row];
     let rounded = (libm::floor(duty * counts + 0.5) / counts).min(1.0);
-    let pushed = p.converter.v_in * record.v_in_ratio * (rounded - duty);
+    let (topology, moved) = (p.converter.topology, rounded - duty);
+    let v_in = p.converter.v_in * record.v_in_ratio;
+    let pushed = topology.span(v_in, problem.bases.v) * moved;
+    // what the output receives of the inductor's current, and how much less of it while the duty is longer
+    let give = topology.give(duty);
+    let kept = match topology {
+        Topology::Buck => 0.0,
+        Topology::Boost | Topology::BuckBoost => {
+            ideal::drawn(&record.load[row], problem.bases.v) / give.max(GIVE) * moved
+        }
+    };
     let r = p.inductor.dcr + 0.5 * (p.switch.r_ds_on + p.switch.r_d);
     let load = &record.load[row];
     // to small changes a constant power is a negative conductance
     let g = load.conductance - load.power / (problem.bases.v * problem.bases.v);
     let h = share * problem.bases.t_sw / FINE as f64;
     for _ in 0..FINE {
-        i += h / p.converter.inductance * (pushed - v - r * i);
-        v += h / p.converter.capacitance * (i - g * v);
+        i += h / p.converter.inductance * (pushed - give * v - r * i);
+        v += h / p.converter.capacitance * (give * i - kept - g * v);
     }
     (v, i)
 }

@@ -5,6 +5,7 @@ use plant::Rectifier;
 
 use crate::drive::Model;
 use crate::fit::State;
+use crate::ideal::{self, Ideal};
 use crate::instants;
 use crate::level::ACCURACY;
 use crate::noise;
@@ -314,11 +315,11 @@ impl Pair {
     #[must_use]
     pub fn shifts(&self, training: &Problem, at: &State) -> Vec<Shift> {
         let mut list = Vec::new();
-        let v_in = self.problem.base.plant.converter.v_in;
+        let ideal = Ideal::at(&self.problem.base.plant, 1.0);
         for (index, record) in self.problem.records.iter().enumerate() {
             // where power alone is drawn, small errors grow: they say nothing about the bench
             let unstable = record.load.iter().zip(&record.duty).any(|(load, d)| {
-                let v = d * v_in;
+                let v = ideal.volts(*d);
                 load.power > load.conductance * v * v
             });
             if record.settled || unstable {
@@ -379,10 +380,9 @@ const TRANSIENT: usize = 30;
 /// CCM or DCM by the drawn current against half the ripple.
 fn is_in(regime: Regime, problem: &Problem, record: &Record, row: usize) -> bool {
     let p = &problem.base.plant.converter;
-    let (d, v_in) = (record.duty[row], p.v_in * record.v_in_ratio);
-    let v_ccm = d * v_in;
-    let ripple = v_ccm * (1.0 - d) / (p.inductance * p.f_sw);
-    let is_discontinuous = p.rectifier == Rectifier::Diode && noise::is_discontinuous(record, row, v_ccm, ripple);
+    let (d, ideal) = (record.duty[row], Ideal::of(record, &problem.base.plant));
+    let mean = ideal.inductor(ideal::drawn(&record.load[row], ideal.volts(d)), d);
+    let is_discontinuous = p.rectifier == Rectifier::Diode && mean < ideal.half(d);
     let moved = |n: usize| record.duty[n] != record.duty[n - 1] || record.load[n] != record.load[n - 1];
     match regime {
         Regime::All => true,

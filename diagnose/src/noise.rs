@@ -315,15 +315,6 @@ pub fn left(values: &[f64]) -> Left {
     }
 }
 
-/// Whether a row runs in DCM: whether the load draws less than half the `ripple` at the voltage `v_ccm` that the duty makes in CCM, where
-/// the current begins to rest. The measured voltage is higher in DCM, and need not have been measured.
-#[must_use]
-pub fn is_discontinuous(record: &Record, row: usize, v_ccm: f64, ripple: f64) -> bool {
-    let load = &record.load[row];
-    let power = if v_ccm > 0.0 { load.power / v_ccm } else { 0.0 };
-    v_ccm * load.conductance + load.current + power < 0.5 * ripple
-}
-
 #[cfg(test)]
 mod tests {
     use super::scatter;

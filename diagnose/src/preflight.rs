@@ -6,6 +6,7 @@
 
 use crate::drive::Model;
 use crate::fit::State;
+use crate::ideal::{self, Ideal};
 use crate::median::median;
 use crate::parallel;
 use crate::problem::{Problem, duty_accuracy};
@@ -19,8 +20,6 @@ const LEFT: f64 = 0.2;
 const WRONG: f64 = 4.0;
 /// Sources of two records that differ by this share were set so: losses differ by less, and so do supplies.
 const OTHER_SOURCE: f64 = 0.06;
-/// Drawn current over half the ripple from which on the voltage follows from the duty.
-const CONTINUOUS: f64 = 1.2;
 /// Smallest duty that a source voltage is read off.
 // a convention: below it a millivolt of the output is 20 of the source
 const LEAST_DUTY: f64 = 0.05;
@@ -110,14 +109,16 @@ fn best_reading(problem: &Problem, model: &Model, index: usize) -> Option<Readin
 /// Source voltage that a record's voltages and duties show, without the losses that all records share; nothing if the current may rest.
 fn shown_source(record: &Record, model: &Model) -> Option<f64> {
     let p = &model.plant.converter;
+    let ideal = Ideal::at(&model.plant, 1.0);
     // a trim of the edges moves the duty by as much: by a twentieth of it, less than another source is told by
     let least = (20.0 * duty_accuracy(p.f_sw)).max(LEAST_DUTY);
     let rows = (0..record.rows()).filter_map(|row| {
         let (v, d, load) = (record.measured[0][row], record.duty[row], &record.load[row]);
-        let i = v * load.conductance + load.current + if v > 0.0 { load.power / v } else { 0.0 };
-        let half = 0.5 * p.v_in * d * (1.0 - d) / (p.inductance * p.f_sw);
-        let losses = model.plant.inductor.dcr * i + model.plant.switch.v_f * (1.0 - d);
-        (v.is_finite() && i > CONTINUOUS * half && d > least).then_some((v + losses) / d)
+        let drawn = ideal::drawn(load, v);
+        let losses = model.plant.inductor.dcr * ideal.inductor(drawn, d) + model.plant.switch.v_f * (1.0 - d);
+        // at a duty of 1 a boost holds no voltage
+        let is_told = v.is_finite() && ideal.never_rests(drawn, d) && (least..1.0 - least).contains(&d);
+        is_told.then(|| ideal.source(v, d, losses))
     });
     let rows: Vec<f64> = rows.collect();
     (2 * rows.len() > record.rows())

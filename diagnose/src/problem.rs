@@ -8,6 +8,7 @@ use measured::DutyIs;
 use crate::capture::terms::Drive;
 use crate::causes::{Bases, Knob};
 use crate::drive::{Begin, Model, Start, simulate};
+use crate::ideal::{self, Ideal};
 use crate::median::median;
 use crate::record::{CHANNELS, Record};
 use crate::slopes::load_steps;
@@ -220,12 +221,15 @@ impl Problem {
             let values = &record.measured[channel];
             values.iter().skip(row).take(3).copied().find(|v| v.is_finite())
         };
-        let v_in = self.base.plant.converter.v_in * record.v_in_ratio;
-        let v = near(0).unwrap_or(record.duty[row] * v_in);
-        let load = &record.load[row];
-        let drawn = v * load.conductance + load.current + if v > 0.0 { load.power / v } else { 0.0 };
-        let i = near(1).or(near(2)).unwrap_or(drawn);
-        [v.max(0.0), if record.settled { drawn } else { i }]
+        let (ideal, duty) = (Ideal::of(record, &self.base.plant), record.duty[row]);
+        let v = near(0).unwrap_or_else(|| ideal.volts(duty));
+        let drawn = ideal.inductor(ideal::drawn(&record.load[row], v), duty);
+        let i = near(1)
+            .or_else(|| Some(ideal.inductor(near(2)?, duty)))
+            .unwrap_or(drawn);
+        // without bound where no steady state is
+        let finite = |value: f64| if value.is_finite() { value } else { 0.0 };
+        [finite(v.max(0.0)), finite(if record.settled { drawn } else { i })]
     }
 
     /// Whether a value counts.
@@ -361,13 +365,14 @@ fn share_source_voltage(records: &mut [Record], v_in: f64) {
 
 fn bases(records: &[Record], base: &Model) -> Bases {
     let v_in = base.plant.converter.v_in;
+    let ideal = Ideal::at(&base.plant, 1.0);
     let voltage = |r: &Record| {
         (0..r.rows())
             .map(|n| {
                 if r.measured[0][n].is_finite() {
                     r.measured[0][n]
                 } else {
-                    r.duty[n] * v_in
+                    ideal.volts(r.duty[n])
                 }
             })
             .collect::<Vec<_>>()

@@ -87,7 +87,12 @@ const PLACES: [(&str, &[&str]); 3] = [
             "zwischenkreis",
         ],
     ),
-    ("l", &["l", "ind", "inductor", "coil", "choke", "lind", "spule", "spulen", "drossel"]),
+    (
+        "l",
+        &[
+            "l", "ind", "inductor", "coil", "choke", "lind", "spule", "spulen", "drossel",
+        ],
+    ),
 ];
 
 /// Words that say how something was measured, not what.
@@ -165,9 +170,14 @@ fn placed(name: &str) -> Option<&'static str> {
     let place_of = |rest: &str| {
         // the joint of a German compound: Ausgang-s-spannung
         let is_of = |known: &&str| *known == rest || rest.strip_suffix('s') == Some(*known) && known.len() > 3;
-        PLACES.iter().find(|(_, words)| words.iter().any(|word| is_of(&word))).map(|(place, _)| *place)
+        PLACES
+            .iter()
+            .find(|(_, words)| words.iter().any(|word| is_of(&word)))
+            .map(|(place, _)| *place)
     };
-    let pairs = KINDS.iter().flat_map(|(kind, words)| words.iter().map(move |word| (*kind, *word)));
+    let pairs = KINDS
+        .iter()
+        .flat_map(|(kind, words)| words.iter().map(move |word| (*kind, *word)));
     pairs
         .filter_map(|(kind, word)| {
             let behind = name.strip_prefix(word).and_then(place_of);
@@ -271,7 +281,9 @@ mod tests {
             let guessed = proposed(&format!("lamp;{header}"));
             let expected = quantity.map(|quantity| format!("{quantity}="));
             assert_eq!(
-                guessed.as_deref().map(|map| map.contains(expected.as_deref().unwrap_or("?"))),
+                guessed
+                    .as_deref()
+                    .map(|map| map.contains(expected.as_deref().unwrap_or("?"))),
                 expected.as_ref().map(|_| true),
                 "{header}: {guessed:?}"
             );

@@ -63,6 +63,16 @@ impl Topology {
         duty.clamp(0.0, 1.0)
     }
 
+    /// The output voltage that a duty makes without losses, in continuous conduction, V; without bound at a duty of 1 but for the buck.
+    #[must_use]
+    pub fn voltage(self, v_in: f64, duty: f64) -> f64 {
+        match self {
+            Topology::Buck => duty * v_in,
+            Topology::Boost => v_in / (1.0 - duty),
+            Topology::BuckBoost => v_in * duty / (1.0 - duty),
+        }
+    }
+
     /// What a duty of 1 adds to the voltage at the inductor, V.
     #[must_use]
     pub fn span(self, v_in: f64, v_out: f64) -> f64 {

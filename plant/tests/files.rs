@@ -134,7 +134,12 @@ fn default(parameter: &plant::Parameter) -> String {
 }
 
 /// The four numbers that every file gives.
-const NEEDED: [&str; 4] = ["converter.v_in", "converter.inductance", "converter.capacitance", "converter.f_sw"];
+const NEEDED: [&str; 4] = [
+    "converter.v_in",
+    "converter.inductance",
+    "converter.capacitance",
+    "converter.f_sw",
+];
 
 /// The table of keys as the page has to show it; numbers that all sensors have stand once.
 fn table() -> Vec<String> {
@@ -169,7 +174,8 @@ fn table() -> Vec<String> {
 #[test]
 fn the_pages_table_is_that_of_the_catalogue() {
     const PAGE: &str = "../docs/reference/plant-file.md";
-    const HEAD: &str = "| effect | needs | key | unit | default | allowed | typical | meaning |\n|---|---|---|---|---|---|---|---|\n";
+    const HEAD: &str =
+        "| effect | needs | key | unit | default | allowed | typical | meaning |\n|---|---|---|---|---|---|---|---|\n";
     let page = std::fs::read_to_string(PAGE).unwrap();
     let start = page.find(HEAD).expect("the table's head") + HEAD.len();
     let end = start + page[start..].find("\n\n").unwrap();

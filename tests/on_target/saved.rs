@@ -39,7 +39,11 @@ fn saved_networks_are_equal_on(target: &str) {
             .unwrap_or_else(|faults| panic!("{file}: {faults}"));
         let policy = common::filled(folder.path(), &new);
         let report = super::run(&policy, target, &super::compilers(target), &["-O2", "-O"], 150);
-        assert_eq!(report.builds.len(), super::compilers(target).len(), "{file}: {report:?}");
+        assert_eq!(
+            report.builds.len(),
+            super::compilers(target).len(),
+            "{file}: {report:?}"
+        );
         super::assert_equal(&report, &format!("{file} on {}\n{}", target.name, new.contract));
     }
 }

@@ -67,12 +67,20 @@ pub fn files(options: &Diagnose) -> Result<BTreeMap<String, String>, Failure> {
 /// # Errors
 /// Their faults.
 pub fn check(options: &Diagnose) -> Result<(), Failure> {
-    let model = Parameters::buck_from_file(&options.model, "`diagnose`")?;
+    let model = model(options)?;
     if let Some(policy) = &options.policy {
         request(options, policy, &model)?;
     }
     records(options, &columns(options)?, &model)?;
     Ok(())
+}
+
+/// The model; a mapping is refitted for the buck alone.
+fn model(options: &Diagnose) -> Result<Parameters, Faults> {
+    match options.policy {
+        Some(_) => Parameters::buck_from_file(&options.model, "`diagnose --policy`"),
+        None => Parameters::from_file(&options.model),
+    }
 }
 
 fn records(options: &Diagnose, columns: &ColumnMap, model: &Parameters) -> Result<(Vec<Record>, Vec<Record>), Faults> {
@@ -89,7 +97,7 @@ fn columns(options: &Diagnose) -> Result<ColumnMap, Failure> {
 }
 
 fn found(options: &Diagnose, columns: &ColumnMap, say: &(dyn Fn(Progress<'_>) + Sync)) -> Result<Diagnosis, Failure> {
-    let model = Parameters::buck_from_file(&options.model, "`diagnose`")?;
+    let model = model(options)?;
     let closed_loop = options
         .policy
         .as_deref()
@@ -157,7 +165,7 @@ fn request(options: &Diagnose, path: &Path, model: &Parameters) -> Result<Reques
     let policy = super::load(path, options.outside)?;
     super::drm::needs_mapping(&policy)?;
     let (trained_on, file) = match &options.trained_on {
-        Some(path) => (Parameters::buck_from_file(path, "`diagnose`")?, path),
+        Some(path) => (Parameters::buck_from_file(path, "`diagnose --policy`")?, path),
         None => (model.clone(), &options.model),
     };
     let scenario = options.scenario.as_deref().map(Scenario::load).transpose()?;

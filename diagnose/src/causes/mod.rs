@@ -9,7 +9,7 @@ mod knob;
 mod list;
 mod surroundings;
 
-use plant::Parameters;
+use plant::{Parameters, Topology};
 
 use crate::drive::Model;
 use knob::Reach;
@@ -199,8 +199,14 @@ pub fn candidates(parameters: &Parameters, bases: &Bases) -> Vec<Candidate> {
         }
     };
     let causes = CAUSES.iter().enumerate();
+    // the plant has no such inductance where the leg interrupts the capacitor's current at every edge
+    let is_known = |form: &Form| {
+        parameters.converter.topology == Topology::Buck
+            || !form.knobs.iter().any(|knob| knob.keys.contains(&"capacitor.esl"))
+    };
     causes
         .flat_map(|(number, cause)| cause.forms.iter().map(move |form| (number, cause, form)))
+        .filter(|(_, _, form)| is_known(form))
         .map(|(number, cause, form)| candidate(number, cause, form))
         .collect()
 }

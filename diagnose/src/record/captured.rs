@@ -1,7 +1,7 @@
 //! A table that is a capture: a few periods at the rate of an oscilloscope become one settled row that carries them.
 
 use measured::{ColumnMap, DutyIs, Sampled};
-use plant::{Load, Parameters};
+use plant::{Load, Parameters, Topology};
 use toml_input::{Faults, Message, Sink};
 
 use super::channels::{CHANNELS, QUANTITIES};
@@ -29,6 +29,12 @@ impl Raw<'_> {
         let span = time.last().copied().unwrap_or(0.0) - time.first().copied().unwrap_or(0.0) + step;
         if map.settled == Some(false) || !is_capture(t_sw / step, span / t_sw) {
             return Ok(None);
+        }
+        if parameters.converter.topology != Topology::Buck {
+            let message = Message::new("captures are read of a buck alone")
+                .found(format!("a model of a {}", parameters.converter.topology.word()))
+                .hint("a record of one row for each period, or of settled points, is diagnosed for every topology");
+            return Err(self.sheet.fault(message).into());
         }
         let duty = self.still("duty")?;
         let load = self.still_load()?;

@@ -16,6 +16,7 @@ use toml_input::{Faults, Message};
 use super::channels::{CHANNELS, FEWEST_SETTLED, QUANTITIES};
 use super::raw::Raw;
 use super::rows::Lines;
+use crate::ideal::Ideal;
 use crate::noise;
 
 /// Rows further apart than this share of the filter's period do not show how it swings. A controller that holds its duty
@@ -80,7 +81,7 @@ impl Raw<'_> {
     pub fn logged(&mut self, parameters: &Parameters, step: f64, phase: f64) -> Result<Lines, Faults> {
         let loads = self.loads()?;
         let duty = super::rows::held(self.values("duty").unwrap_or_default());
-        let v = super::suspicion::typical(&duty).unwrap_or(0.5) * parameters.converter.v_in;
+        let v = Ideal::at(parameters, 1.0).volts(super::suspicion::typical(&duty).unwrap_or(0.5));
         let stretches = self.stretches(&duty, &loads, v, step);
         let columns: [Option<Vec<f64>>; CHANNELS] = QUANTITIES.map(|name| self.measured(name));
         let mut lines = Lines::empty(phase);

@@ -44,7 +44,11 @@ impl<'a> Raw<'a> {
         faults.propagate()?;
         let mut repairs = located.notes(sheet, &[]);
         let is_column = |name: &str| located.signal(name).is_some_and(|signal| signal.column().is_some());
-        let is_set = |name: &str| values.iter().any(|(known, of)| *known == name && of.iter().any(|value| *value != 0.0));
+        let is_set = |name: &str| {
+            values
+                .iter()
+                .any(|(known, of)| *known == name && of.iter().any(|value| *value != 0.0))
+        };
         // beside a measured load current nobody takes one for the other, and zeros are no load
         if is_column("i_load") && is_set("i_load") && !is_column("i_out") {
             repairs.push("i_load is read as the load that was set; a measured load current is i_out".to_owned());

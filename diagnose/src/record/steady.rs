@@ -3,6 +3,7 @@
 use plant::{Carrier, Parameters};
 
 use super::Record;
+use crate::ideal::Ideal;
 use crate::median::median;
 
 /// Mean values and ripple of a period, ideal converter, continuous conduction.
@@ -12,6 +13,8 @@ struct Steady {
     v: f64,
     /// Mean current that the load draws at it, A.
     drawn: f64,
+    /// Mean current of the inductor, A.
+    inductor: f64,
     /// Half of the inductor current's ripple, A.
     half: f64,
     /// Where in the ripple it is sampled: -1 in the valley, 1 at the peak.
@@ -43,7 +46,11 @@ pub fn beside(record: &Record, parameters: &Parameters, channel: usize) -> Optio
             let v_in = parameters.converter.v_in * record.v_in_ratio;
             let (expected, mean, half) = match channel {
                 0 => (steady.v, steady.v, 0.0),
-                1 => (steady.drawn + steady.place * steady.half, steady.drawn, steady.half),
+                1 => (
+                    steady.inductor + steady.place * steady.half,
+                    steady.inductor,
+                    steady.half,
+                ),
                 2 => (steady.drawn, steady.drawn, 0.0),
                 _ => (v_in, v_in, 0.0),
             };
@@ -73,17 +80,24 @@ pub fn beside(record: &Record, parameters: &Parameters, channel: usize) -> Optio
 
 impl Steady {
     fn of(record: &Record, parameters: &Parameters, row: usize) -> Option<Self> {
-        let (p, d, load) = (&parameters.converter, record.duty[row], record.load[row]);
-        let v_in = p.v_in * record.v_in_ratio;
-        let v = d * v_in;
+        let (d, load) = (record.duty[row], record.load[row]);
+        let ideal = Ideal::of(record, parameters);
+        let v = ideal.volts(d);
         let drawn = load.conductance * v + load.current + load.power / v;
         let half = match record.settled {
             // meters of settled points show means
             true => 0.0,
-            false => 0.5 * v * (1.0 - d) / (p.inductance * p.f_sw),
+            false => ideal.half(d),
         };
         let place = place(parameters.pwm.carrier, d, record.phase);
-        (v > 0.0 && drawn.is_finite()).then_some(Self { v, drawn, half, place })
+        let inductor = ideal.inductor(drawn, d);
+        (v > 0.0 && inductor.is_finite()).then_some(Self {
+            v,
+            drawn,
+            inductor,
+            half,
+            place,
+        })
     }
 }
 

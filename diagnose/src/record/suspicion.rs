@@ -1,12 +1,13 @@
 //! Signals whose size or sign says that they are not what their column is called, or not in its unit.
 
-use plant::Parameters;
+use plant::{Parameters, Topology};
 use toml_input::Message;
 
 use super::Record;
 use super::channels::{CHANNEL_UNITS, CHANNELS, QUANTITIES};
 use super::source::Source;
 use super::steady::{self, Beside};
+use crate::ideal::{self, Ideal};
 use crate::median::median;
 
 /// A signal this many times larger or smaller than the model's is in another unit: units are a thousand apart, percent a hundred,
@@ -39,8 +40,6 @@ const AS_OTHER: f64 = 0.05;
 const NOT_AS_OWN: f64 = 0.2;
 /// A voltage is that of another kind of converter within this share: losses of a tenth.
 const AS_KIND: f64 = 0.1;
-/// Drawn current over half the ripple from which on a current surely never rests: at rest the voltage is above d v_in, at any factor.
-const CONTINUOUS: f64 = 1.2;
 
 /// What is wrong with a record, as far as signs and sizes tell; signs first, since a turned signal has no size to speak of.
 pub fn of(record: &Record, parameters: &Parameters, sources: &[Source; CHANNELS], duty: &Source) -> Vec<Message> {
@@ -72,7 +71,9 @@ fn turned(record: &Record, parameters: &Parameters, sources: &[Source; CHANNELS]
     let message = |n: usize| {
         let (size, found, source) = (sizes[n]?, median(record.measured[n].iter().copied()), &sources[n]);
         let is_current = n == 1 || n == 2;
-        let is_turned = found < -TURNED * size && !source.stated && (is_drawn || !is_current);
+        // in its valley the current of a synchronous leg at light load is negative by right
+        let swings = n == 1 && !record.settled && !is_continuous(record, parameters);
+        let is_turned = found < -TURNED * size && !source.stated && (is_drawn || !is_current) && !swings;
         let unit = CHANNEL_UNITS[n];
         is_turned.then(|| {
             Message::new(format!("{} has the turned sign", source.label))
@@ -99,28 +100,24 @@ fn mapped(n: usize, source: &Source, factor: f64) -> String {
 
 /// The median of the drawn current, with its sign, at the voltage that the duty makes.
 fn drawn(record: &Record, parameters: &Parameters) -> Option<f64> {
-    let v_in = parameters.converter.v_in * record.v_in_ratio;
-    let each = record.load.iter().zip(&record.duty).map(|(load, duty)| {
-        let v = duty * v_in;
-        load.conductance * v + load.current + if v > 0.0 { load.power / v } else { 0.0 }
-    });
-    Some(median(each)).filter(|drawn| drawn.is_finite())
+    let ideal = Ideal::of(record, parameters);
+    let each = record.load.iter().zip(&record.duty);
+    Some(median(each.map(|(load, duty)| ideal::drawn(load, ideal.volts(*duty))))).filter(|drawn| drawn.is_finite())
 }
 
 /// Whether the inductor current surely never rests: a voltage then follows from the duty alone.
 fn is_continuous(record: &Record, parameters: &Parameters) -> bool {
-    let p = &parameters.converter;
     let d = median(record.duty.iter().copied());
-    let half = 0.5 * p.v_in * record.v_in_ratio * d * (1.0 - d) / (p.inductance * p.f_sw);
-    drawn(record, parameters).is_some_and(|drawn| drawn > CONTINUOUS * half)
+    drawn(record, parameters).is_some_and(|drawn| Ideal::of(record, parameters).never_rests(drawn, d))
 }
 
 /// A duty that is that of the lower switch.
 fn other_duty(record: &Record, parameters: &Parameters, header: &str) -> Vec<Message> {
-    let v_in = parameters.converter.v_in * record.v_in_ratio;
+    let ideal = Ideal::of(record, parameters);
     let off = |duty: &dyn Fn(f64) -> f64| {
         let each = record.measured[0].iter().zip(&record.duty);
-        median(each.map(|(v, d)| (v / v_in - duty(*d)).abs()))
+        // as a share of the source, where a boost's voltages lie further apart than a buck's
+        median(each.map(|(v, d)| (v - ideal.volts(duty(*d))).abs() / ideal.v_in))
     };
     let (own, other) = (off(&|d| d), off(&|d| 1.0 - d));
     // the ripple is that of both
@@ -141,14 +138,15 @@ fn other_duty(record: &Record, parameters: &Parameters, header: &str) -> Vec<Mes
     vec![message]
 }
 
-/// Voltages that a boost or a buck-boost gives.
+/// Voltages that another topology gives.
 fn other_kind(record: &Record, parameters: &Parameters) -> Vec<Message> {
-    let v_in = parameters.converter.v_in * record.v_in_ratio;
-    let off = |of: &dyn Fn(f64) -> f64| {
+    let ideal = Ideal::of(record, parameters);
+    let off = |of: Topology, beside: &dyn Fn(f64, f64) -> f64| {
         let each = record.measured[0].iter().zip(&record.duty);
-        median(each.map(|(v, d)| (v / v_in / of(*d) - 1.0).abs()))
+        median(
+            each.map(|(v, d)| (v - of.voltage(ideal.v_in, *d)).abs() / beside(of.voltage(ideal.v_in, *d), ideal.v_in)),
+        )
     };
-    let kinds: [(&str, &dyn Fn(f64) -> f64); 2] = [("boost", &|d| 1.0 / (1.0 - d)), ("buck-boost", &|d| d / (1.0 - d))];
     // one duty is one number, which a wrong probe makes as well
     let duties = record
         .duty
@@ -157,19 +155,28 @@ fn other_kind(record: &Record, parameters: &Parameters) -> Vec<Message> {
     if duties.1 - duties.0 < AS_OTHER {
         return Vec::new();
     }
-    let fits = kinds.into_iter().find(|(_, of)| off(*of) < AS_KIND);
-    let Some((name, _)) = fits.filter(|_| off(&|d| d) > NOT_AS_OWN) else {
+    let is_other = |of: &Topology| *of != ideal.topology && off(*of, &|volts, _| volts) < AS_KIND;
+    let fits = [Topology::Boost, Topology::BuckBoost, Topology::Buck]
+        .into_iter()
+        .find(is_other);
+    let Some(other) = fits.filter(|_| off(ideal.topology, &|_, v_in| v_in) > NOT_AS_OWN) else {
         return Vec::new();
     };
+    let (name, own) = (other.word(), ideal.topology.word());
     vec![
-        Message::new(format!("the voltages are those of a {name}, and the model is a buck"))
+        Message::new(format!("the voltages are those of a {name}, and the model is a {own}"))
             .found(format!(
                 "{} at a duty of {}",
                 shown_in(median(record.measured[0].iter().copied()), "V"),
                 shown(median(record.duty.iter().copied()))
             ))
-            .expected("about v_in times the duty")
-            .hint("diagnose knows bucks only; is the record of another converter?"),
+            .expected(format!(
+                "about {}",
+                shown_in(ideal.volts(median(record.duty.iter().copied())), "V")
+            ))
+            .hint(format!(
+                "is the record of another converter? If it is a {name}, `topology = {name:?}` under [converter] of the plant file"
+            )),
     ]
 }
 
@@ -261,9 +268,12 @@ fn sized(record: &Record, parameters: &Parameters, labels: &[&str; CHANNELS]) ->
             }
         }
     }
+    // a current that rests is sampled as 0 or nearly: too small is no size there
+    let rests = !record.settled && !is_continuous(record, parameters);
     let off = known
         .iter()
-        .filter(|(_, size, found)| ratio(*found, *size) > OTHER_UNIT);
+        .filter(|(_, size, found)| ratio(*found, *size) > OTHER_UNIT)
+        .filter(|(n, size, found)| !(*n == 1 && rests && found < size));
     let message = |(n, size, found): &(usize, f64, f64)| {
         let (name, unit) = (labels[*n], CHANNEL_UNITS[*n]);
         Message::new(format!("{name} is not in {unit}, or not of this converter"))
@@ -278,9 +288,9 @@ fn sized(record: &Record, parameters: &Parameters, labels: &[&str; CHANNELS]) ->
 
 /// What the model has on average: nothing where that is too small or unknown.
 fn sizes(record: &Record, parameters: &Parameters) -> [Option<f64>; CHANNELS] {
-    let v_in = parameters.converter.v_in * record.v_in_ratio;
+    let ideal = Ideal::of(record, parameters);
     let duty = typical(&record.duty).filter(|duty| *duty > LEAST);
-    let v_o = duty.map(|duty| duty * v_in);
+    let v_o = duty.map(|duty| ideal.volts(duty)).filter(|volts| volts.is_finite());
     let drawn = v_o.and_then(|v| {
         let each: Vec<f64> = record
             .load
@@ -289,7 +299,8 @@ fn sizes(record: &Record, parameters: &Parameters) -> [Option<f64>; CHANNELS] {
             .collect();
         typical(&each).filter(|i| *i > LEAST)
     });
-    [v_o, drawn, drawn, Some(v_in)]
+    let inductor = drawn.zip(duty).map(|(drawn, duty)| ideal.inductor(drawn, duty));
+    [v_o, inductor, drawn, Some(ideal.v_in)]
 }
 
 /// The middle size of a signal; nothing if it is empty or 0.

@@ -17,8 +17,8 @@ use crate::model::Layer;
 use crate::raw::Binary;
 use chain::{Chain, Ends};
 use explain::Scene;
-use layers::{Dense, Layers};
 pub use golden::golden_fits;
+use layers::{Dense, Layers};
 pub use tensors::NamedTensor;
 use tensors::Tensors;
 

@@ -1,0 +1,75 @@
+//! What a record's converter shows at rest without losses, in continuous conduction: sizes to judge by, before any simulation.
+
+use plant::{Load, Parameters, Topology};
+
+use crate::record::Record;
+
+/// Mean inductor current over half its ripple from which on it surely never rests: at rest the voltage is above that of the duty, at
+/// any factor.
+const CONTINUOUS: f64 = 1.2;
+
+/// The loss-free converter at the source voltage of a record.
+#[derive(Debug, Clone, Copy)]
+pub struct Ideal {
+    /// Which of the three it is.
+    pub topology: Topology,
+    /// Source voltage of the record, V.
+    pub v_in: f64,
+    /// Inductance over the period, ohm.
+    slope: f64,
+}
+
+impl Ideal {
+    /// At the source voltage of a record.
+    pub fn of(record: &Record, parameters: &Parameters) -> Self {
+        Self::at(parameters, record.v_in_ratio)
+    }
+
+    /// At a share of the model's source voltage.
+    pub fn at(parameters: &Parameters, v_in_ratio: f64) -> Self {
+        let p = &parameters.converter;
+        Self {
+            topology: p.topology,
+            v_in: p.v_in * v_in_ratio,
+            slope: p.inductance * p.f_sw,
+        }
+    }
+
+    /// Output voltage that a duty makes, V.
+    pub fn volts(&self, duty: f64) -> f64 {
+        self.topology.voltage(self.v_in, duty)
+    }
+
+    /// Mean inductor current that delivers `drawn` at a duty, A.
+    pub fn inductor(&self, drawn: f64, duty: f64) -> f64 {
+        drawn / self.topology.give(duty)
+    }
+
+    /// Half the ripple of the inductor current, A.
+    pub fn half(&self, duty: f64) -> f64 {
+        let volts = match self.topology {
+            Topology::Buck => self.v_in * duty * (1.0 - duty),
+            Topology::Boost | Topology::BuckBoost => self.v_in * duty,
+        };
+        0.5 * volts / self.slope
+    }
+
+    /// Whether the inductor current surely never rests: a voltage then follows from the duty alone.
+    pub fn never_rests(&self, drawn: f64, duty: f64) -> bool {
+        self.inductor(drawn, duty) > CONTINUOUS * self.half(duty)
+    }
+
+    /// Source voltage that makes an output voltage at a duty, when `drop` is lost at the inductor over a period, V.
+    pub fn source(&self, volts: f64, duty: f64, drop: f64) -> f64 {
+        match self.topology {
+            Topology::Buck => (volts + drop) / duty,
+            Topology::Boost => volts * (1.0 - duty) + drop,
+            Topology::BuckBoost => (volts * (1.0 - duty) + drop) / duty,
+        }
+    }
+}
+
+/// What a load draws at a voltage, A.
+pub fn drawn(load: &Load, volts: f64) -> f64 {
+    load.conductance * volts + load.current + if volts > 0.0 { load.power / volts } else { 0.0 }
+}

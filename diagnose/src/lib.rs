@@ -59,5 +59,6 @@ mod slopes;
 mod small;
 mod spectrum;
 pub mod ties;
+pub mod timing;
 mod words;
 pub mod worth;

@@ -13,7 +13,8 @@ use crate::diagnosis::Diagnosis;
 use crate::findings::{Named, Verdict};
 use crate::gain::Regime;
 use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS};
-use crate::words::{needs, si, unit};
+use crate::timing;
+use crate::words::{needs, si, told, unit};
 
 /// The page as HTML.
 ///
@@ -80,9 +81,12 @@ fn causes(diagnosis: &Diagnosis) -> Section {
                 table = table.row([
                     format!("{} ({})", cause.id, cause.words).into(),
                     (*name).into(),
-                    si(v.model, unit(v.unit)).into(),
-                    si(v.value, unit(v.unit)).into(),
-                    format!("{} to {}", si(v.low, unit(v.unit)), si(v.high, unit(v.unit))).into(),
+                    told(cause.id, v.model, v.unit).into(),
+                    told(cause.id, v.value, v.unit).into(),
+                    match timing::word(cause.id, v.value) {
+                        Some(_) => "read off the current".into(),
+                        None => format!("{} to {}", si(v.low, unit(v.unit)), si(v.high, unit(v.unit))).into(),
+                    },
                     evidence,
                     rivals.join(", ").into(),
                 ]);

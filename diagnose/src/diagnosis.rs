@@ -7,6 +7,7 @@ use crate::attribute::Attribution;
 use crate::beside;
 use crate::capture::estimates::{self, Driven, Estimates};
 use crate::capture::terms::delays;
+use crate::compared;
 use crate::control::Request;
 use crate::doubts;
 use crate::drive::Model;
@@ -98,8 +99,13 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         let problem = whole_problem.as_ref().unwrap_or(&found.problem);
         empirical = described(problem, heldout, &base, (&mut state.model, trim), &mut pair);
     }
+    let compared = compared::of(&found.problem, &kept, heldout);
     let findings = Findings {
-        sentence: sentence(&found, &answer.causes, set_aside.as_ref()) + &answer.near + &shifted(&answer.shifts),
+        sentence: sentence(&found, &answer.causes, set_aside.as_ref())
+            + &answer.near
+            + &compared.sentence()
+            + &shifted(&answer.shifts),
+        compared,
         verdict: match set_aside {
             Some(_) => Verdict::MostlyExplained,
             None => found.verdict,

@@ -212,6 +212,7 @@ fn planned(problem: &Problem, plan: Plan) -> (String, Record) {
         segments: std::iter::once(0..ROWS).collect(),
         free_steps: Vec::new(),
         capture: None,
+        unread: Vec::new(),
         repairs: Vec::new(),
     };
     (plan.words, record)

@@ -27,7 +27,12 @@ pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
         Verdict::Ambiguous | Verdict::MostlyExplained => report::Verdict::Warn,
         Verdict::Unexplained => report::Verdict::Fail,
     };
-    let word = findings.verdict.word();
+    let word = findings.headline();
+    // what leaves out a channel is no answer to rely on, whatever it says
+    let mark = match (mark, findings.compared.leaves_out()) {
+        (report::Verdict::Pass, true) => report::Verdict::Warn,
+        (mark, _) => mark,
+    };
     let mut page = Page::new(format!("Diagnosis: {word}")).verdict(mark, findings.sentence.clone());
     page = page.section(causes(diagnosis));
     if let Some(term) = &diagnosis.empirical {

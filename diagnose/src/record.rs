@@ -14,6 +14,7 @@ mod stamp;
 mod steady;
 mod suspicion;
 mod together;
+mod unread;
 
 use measured::{ColumnMap, DutyIs, Options, Sampled, Sheet};
 use plant::{Load, Parameters};
@@ -24,6 +25,7 @@ use channels::{FEWEST, QUANTITIES};
 use raw::Raw;
 pub(crate) use source::Source;
 pub use together::open_all;
+pub use unread::{Unread, quantity};
 
 use crate::capture::Capture;
 
@@ -71,6 +73,8 @@ pub struct Record {
     pub free_steps: Vec<usize>,
     /// A few periods at the rate of an oscilloscope, of which the one row holds duty and load ([`crate::capture`]).
     pub capture: Option<Box<Capture>>,
+    /// Columns of channels that the model predicts and that are not compared.
+    pub unread: Vec<Unread>,
     /// What was repaired or left out, in plain words.
     pub repairs: Vec<String>,
 }
@@ -132,6 +136,7 @@ impl Record {
             segments: lines.segments,
             free_steps: Vec::new(),
             capture: None,
+            unread: raw.unread.clone(),
             repairs: raw.repairs.clone(),
         };
         let labels = QUANTITIES.map(|name| raw.label(name));
@@ -225,6 +230,7 @@ impl Record {
                     "column {name} is constant at {}: not taken as measured",
                     finite[0]
                 ));
+                self.unread.extend(Unread::stuck(n, name));
                 values.fill(f64::NAN);
             }
             if values.is_empty() {

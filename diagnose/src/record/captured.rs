@@ -95,6 +95,7 @@ impl Raw<'_> {
             segments: lines.segments,
             free_steps: Vec::new(),
             capture: Some(Box::<Capture>::new(found.capture)),
+            unread: self.unread.clone(),
             repairs,
         };
         self.doubts(&record, parameters).propagate()?;

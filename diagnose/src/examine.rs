@@ -18,6 +18,7 @@ use crate::rivals::{self, RivalValue};
 use crate::sampling;
 use crate::shape::{Structure, structures};
 use crate::timing::{self, Timing};
+use crate::unsure_levels;
 
 /// What training records say.
 #[derive(Debug)]
@@ -65,6 +66,7 @@ pub fn examined(train: Vec<Record>, base: &Model, say: Listener<'_>) -> Examined
     }
     let (mut problem, mut attribution) = attribute(problem, null, say);
     instants::note(&mut problem, &attribution.state().starts);
+    unsure_levels::note(&mut problem, attribution.state());
     // what is too small for a cause still leaves no structure
     let structure = structures(&problem, &attribution.null, attribution.state(), attribution.inflation);
     let mut profiles = held_by_data(&problem, &mut attribution, &structure, say);
@@ -176,6 +178,7 @@ fn prepared(train: Vec<Record>, base: &Model) -> (Problem, State, Vec<Outlier>) 
     // outliers
     problem.sigma = noise::sigma(&problem, &null.residual);
     sampling::decide(&mut problem, base);
+    unsure_levels::free(&mut problem, base, &mut null);
     null = State::settle(&problem, base, &null.starts, None);
     let outliers = noise::outliers(&problem, &null.residual);
     for one in &outliers {

@@ -61,5 +61,6 @@ mod small;
 mod spectrum;
 pub mod ties;
 pub mod timing;
+mod unsure_levels;
 mod words;
 pub mod worth;

@@ -23,6 +23,7 @@ use toml_input::{Faults, FileName, Message, Sink};
 pub use channels::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS, Segment};
 use channels::{FEWEST, QUANTITIES};
 use raw::Raw;
+pub use levels::{Level, Part};
 pub(crate) use source::Source;
 pub use together::open_all;
 pub use unread::{Unread, quantity};
@@ -63,6 +64,10 @@ pub struct Record {
     pub scatter: [f64; CHANNELS],
     /// Noise of the meter whose current is the load, A; nothing if the load was set, or is taken as it was measured.
     pub metered: Option<f64>,
+    /// Levels that were read off that meter.
+    pub levels: Vec<Level>,
+    /// Those of them that are estimated beside every fit.
+    pub free_levels: Vec<Level>,
     /// What a settled point holds; nothing if the data have to say it.
     pub sampled: Option<Sampled>,
     /// There is a row in each period, gaps apart.
@@ -131,6 +136,8 @@ impl Record {
             repeated: lines.repeated,
             scatter: lines.scatter,
             metered: lines.metered,
+            levels: lines.levels,
+            free_levels: Vec::new(),
             sampled: lines.sampled,
             dense: lines.dense,
             segments: lines.segments,

@@ -90,6 +90,8 @@ impl Raw<'_> {
             repeated: false,
             scatter: lines.scatter,
             metered: None,
+            levels: Vec::new(),
+            free_levels: Vec::new(),
             sampled: lines.sampled,
             dense: true,
             segments: lines.segments,

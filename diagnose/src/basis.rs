@@ -1,5 +1,5 @@
-//! What initial states, instants of load steps and the edges of the gate can explain of a signal: an orthonormal basis, to project
-//! it out and to move the estimates.
+//! What initial states, instants of load steps, unsure levels of a load and the edges of the gate can explain of a signal: an orthonormal
+//! basis, to project it out and to move the estimates.
 
 use crate::drive::{FREE_APART, Model};
 use crate::parallel;
@@ -22,8 +22,27 @@ const UNSEEN: f64 = 1e-6;
 #[derive(Debug, Clone)]
 pub struct Basis {
     spans: Vec<Span>,
-    /// Sensitivity to the trim, as it is and without what the others explain; empty if the trim is held.
-    trim: [Vec<f64>; 2],
+    /// What acts across segments, in this order, each without what stands before it.
+    across: Vec<Across>,
+}
+
+/// An unknown that acts across segments.
+#[derive(Debug, Clone)]
+struct Across {
+    unknown: Unknown,
+    /// Sensitivity, as it is.
+    raw: Vec<f64>,
+    /// Without what segments and the unknowns before it explain.
+    own: Vec<f64>,
+}
+
+/// Which one.
+#[derive(Debug, Clone, Copy)]
+enum Unknown {
+    /// A free level of a record's load, standard deviations.
+    Level(usize, usize),
+    /// The trim of the edges.
+    Trim,
 }
 
 /// One segment: columns over `from..to`, and the triangle that leads from them back to the estimates.
@@ -78,19 +97,45 @@ impl Problem {
         }
         let mut basis = Basis {
             spans,
-            trim: [Vec::new(), Vec::new()],
+            across: Vec::new(),
         };
+        for (unknown, raw) in self.moved_levels(model, starts, residual) {
+            basis.add(unknown, raw);
+        }
         if !self.trim_held {
             let mut moved = starts.clone();
             let accuracy = self.duty_accuracy();
             moved.trim += accuracy;
             let after = self.residual(model, &moved);
             let raw: Vec<f64> = residual.iter().zip(&after).map(|(a, b)| (a - b) / accuracy).collect();
-            let mut own = raw.clone();
-            basis.project(&mut own);
-            basis.trim = [raw, own];
+            basis.add(Unknown::Trim, raw);
         }
         basis
+    }
+
+    /// Sensitivity to each free level of a load, a standard deviation.
+    fn moved_levels(&self, model: &Model, starts: &Starts, residual: &[f64]) -> Vec<(Unknown, Vec<f64>)> {
+        let most = starts.levels.iter().map(Vec::len).max().unwrap_or(0);
+        let numbers: Vec<usize> = (0..most).collect();
+        // the first level of all records is moved at once, then the second: nothing leads from one record to the next
+        let columns = parallel::map(&numbers, |n| {
+            let mut moved = starts.clone();
+            for levels in &mut moved.levels {
+                levels.iter_mut().skip(*n).take(1).for_each(|by| *by += 1.0);
+            }
+            let after = self.residual(model, &moved);
+            let of = |record: usize| {
+                let mut raw = vec![0.0; residual.len()];
+                let rows = self.offsets[record]..self.offsets[record] + self.records[record].rows() * CHANNELS;
+                for place in rows.chain([self.level(record, *n)]) {
+                    raw[place] = residual[place] - after[place];
+                }
+                (Unknown::Level(record, *n), raw)
+            };
+            let records = (0..self.records.len()).filter(|record| starts.levels[*record].len() > *n);
+            records.map(of).collect::<Vec<_>>()
+        });
+        columns.into_iter().flatten().collect()
     }
 
     /// All segments, without columns as yet. Settled points have no initial state.
@@ -164,6 +209,13 @@ impl Span {
     }
 }
 
+impl Across {
+    /// How far the unknown moves to explain most of `u`.
+    fn share(&self, u: &[f64]) -> f64 {
+        dot(&self.own, u) / dot(&self.own, &self.own)
+    }
+}
+
 impl Basis {
     /// Takes out of `u` what initial states explain.
     pub fn project(&self, u: &mut [f64]) {
@@ -174,25 +226,37 @@ impl Basis {
                 axpy(part, -share, q);
             }
         }
-        let own = &self.trim[1];
-        if !own.is_empty() {
-            axpy(u, -dot(own, u) / dot(own, own), own);
+        for across in &self.across {
+            axpy(u, -across.share(u), &across.own);
+        }
+    }
+
+    /// Takes in an unknown that acts across segments.
+    fn add(&mut self, unknown: Unknown, raw: Vec<f64>) {
+        let mut own = raw.clone();
+        self.project(&mut own);
+        // what is not seen beside the others stays where it is
+        if dot(&own, &own) > UNSEEN * UNSEEN {
+            self.across.push(Across { unknown, raw, own });
         }
     }
 
     /// Moves `starts` to where they explain most of `u`, a residual.
     pub fn absorb(&self, u: &[f64], starts: &mut Starts) {
-        let [raw, own] = &self.trim;
-        let trimmed;
-        let mut u = u;
-        if !own.is_empty() {
-            let step = dot(own, u) / dot(own, own);
-            starts.trim += step;
-            let mut rest = u.to_vec();
-            axpy(&mut rest, -step, raw);
-            trimmed = rest;
-            u = &trimmed;
+        let mut rest = Vec::new();
+        // the last first: none of those before it holds a part of it
+        for across in self.across.iter().rev() {
+            if rest.is_empty() {
+                rest = u.to_vec();
+            }
+            let step = across.share(&rest);
+            axpy(&mut rest, -step, &across.raw);
+            match across.unknown {
+                Unknown::Level(record, place) => starts.levels[record][place] += step,
+                Unknown::Trim => starts.trim += step,
+            }
         }
+        let u = if rest.is_empty() { u } else { &rest[..] };
         for span in &self.spans {
             let moves = span.moves(&u[span.from..span.to]);
             let start = &mut starts.states[span.record][span.segment];

@@ -7,6 +7,7 @@ use crate::attribute::Attribution;
 use crate::beside;
 use crate::capture::estimates::{self, Driven, Estimates};
 use crate::capture::terms::delays;
+use crate::compared;
 use crate::control::Request;
 use crate::doubts;
 use crate::drive::Model;
@@ -23,7 +24,7 @@ use crate::profile::Profile;
 use crate::progress::{Listener, Progress};
 use crate::quantised;
 use crate::record::{CHANNEL_NAMES, CHANNELS, Record};
-use crate::words::{nearest, sentence, shifted, si};
+use crate::words::{nearest, other_carrier as other_carrier_said, sentence, shifted, si};
 use crate::worth::{self, Worth};
 
 /// Everything a report shows.
@@ -65,9 +66,12 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     say(Progress::Stage("held-out records"));
     let mut pair = found.judged(heldout, &base);
     let mut aside = None;
-    match aside::explained_without(&kept, &found, heldout, &base, say) {
+    // with the carrier that was found
+    let taken = found.problem.base.clone();
+    match aside::explained_without(&kept, &found, heldout, &taken, say) {
         Some(rest) if rest.found.named.is_empty() => found.odd.push(rest.part.alone(&found.problem)),
-        Some(rest) => {
+        Some(mut rest) => {
+            rest.found.read_before(&found);
             let whole = std::mem::replace(&mut found, rest.found);
             (pair, aside) = (rest.pair, Some((rest.part, whole.problem)));
         }
@@ -82,7 +86,7 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
     }
     let mut whole_problem = None;
     let set_aside = aside.map(|(part, whole)| {
-        let one = aside::shown(&mut found, part, &whole, &kept, &base);
+        let one = aside::shown(&mut found, part, &whole, &kept, &taken);
         // the held-out records tell of a channel that was set aside, too
         pair = held(&found.problem, heldout, &base, &state, trim);
         whole_problem = Some(whole);
@@ -95,8 +99,13 @@ pub fn diagnose(model: &Parameters, train: Vec<Record>, heldout: &[Record], say:
         let problem = whole_problem.as_ref().unwrap_or(&found.problem);
         empirical = described(problem, heldout, &base, (&mut state.model, trim), &mut pair);
     }
+    let compared = compared::of(&found.problem, &kept, heldout);
     let findings = Findings {
-        sentence: sentence(&found, &answer.causes, set_aside.as_ref()) + &answer.near + &shifted(&answer.shifts),
+        sentence: sentence(&found, &answer.causes, set_aside.as_ref())
+            + &answer.near
+            + &compared.sentence()
+            + &shifted(&answer.shifts),
+        compared,
         verdict: match set_aside {
             Some(_) => Verdict::MostlyExplained,
             None => found.verdict,
@@ -217,12 +226,12 @@ fn answer(found: &Examined, pair: Option<&Pair>, state: &State, sources: Vec<Str
     let mut near = String::new();
     if !explained {
         odd.extend(other_carrier(problem, attribution));
-        near = nearest(&found.named, attribution.removed(problem));
+        near = nearest(&found.named, attribution.removed(problem)) + &other_carrier_said(found);
     }
     odd.extend(notes(found, pair));
     let mut causes = if explained { found.named.clone() } else { Vec::new() };
     // a step of a converter is named beside other causes; where structure is left nothing is named, not even this
-    causes.extend(found.lattice.clone().filter(|_| explained));
+    causes.extend(found.read_off.iter().filter(|_| explained).cloned());
     Answer {
         causes,
         partial_gain: match explained || found.named.is_empty() {

@@ -7,6 +7,8 @@
 //!
 //! A row is a PWM period. Samples that come whole periods later are moved by rows; the rest is the plant's phase.
 
+use std::borrow::Cow;
+
 use measured::{DutyIs, Sampled};
 use plant::{Load, Parameters, Plant, Signals};
 
@@ -31,6 +33,8 @@ pub struct Begin<'a> {
     pub states: &'a [Start],
     /// How much later than the record says each of its free load steps was, periods.
     pub late: &'a [f64],
+    /// How far each of its free levels of the load is off, standard deviations.
+    pub levels: &'a [f64],
     /// Duty that the gate's edges add.
     pub trim: f64,
 }
@@ -114,6 +118,7 @@ pub fn simulate(model: &Model, record: &Record, begin: &Begin<'_>) -> Vec<[f64; 
     p.pwm.sampling_phase = phase;
     let driver = Driver {
         record,
+        load: shifted_load(record, begin.levels),
         whole: whole as isize,
         phase,
         steps: record
@@ -142,6 +147,8 @@ pub fn simulate(model: &Model, record: &Record, begin: &Begin<'_>) -> Vec<[f64; 
 
 struct Driver<'a> {
     record: &'a Record,
+    /// The load, unsure levels where they are now.
+    load: Cow<'a, [Load]>,
     /// Periods by which the sampling instants lie later than the rows say.
     whole: isize,
     phase: f64,
@@ -164,7 +171,7 @@ impl Driver<'_> {
     }
 
     fn run(&self, plant: &mut Plant, segment: &Segment, start: &Start, shown: &mut [[f64; CHANNELS]]) {
-        let (duty, load) = (&self.record.duty, &self.record.load);
+        let (duty, load) = (&self.record.duty, &self.load);
         let first = self.period(segment.start);
         // at the start of a period its own duty is still to be commanded
         let given = if self.phase > 0.0 { first + 1 } else { first };
@@ -193,7 +200,7 @@ impl Driver<'_> {
     fn moved(&self, n: usize) -> Option<Drawn<'_>> {
         let near = |step: &&(usize, f64)| self.period(n).abs_diff(step.0) < FREE_APART;
         let (row, late) = *self.steps.iter().find(near)?;
-        let load = &self.record.load;
+        let load = &self.load;
         let (old, new) = (load.get(row.checked_sub(1)?)?, load.get(row)?);
         // the sample of row n is taken at n + whole + phase, in periods of the record
         let since = row as f64 + late - (self.whole as f64 + self.phase) - (n as f64 - 1.0);
@@ -211,11 +218,23 @@ impl Driver<'_> {
     }
 
     fn settle(&self, plant: &mut Plant, row: usize, start: &Start, shown: &mut [[f64; CHANNELS]]) {
-        let (duty, load) = (self.record.duty[row], &self.record.load[row]);
+        let (duty, load) = (self.record.duty[row], &self.load[row]);
         plant.reset_within(start[0], start[1], load, &[duty; HISTORY]);
         let (last, _) = plant.rest(duty, load);
         shown[row] = array(&last.measured);
     }
+}
+
+/// The load of a record whose free levels are off by so many standard deviations.
+fn shifted_load<'a>(record: &'a Record, levels: &[f64]) -> Cow<'a, [Load]> {
+    if levels.iter().all(|by| *by == 0.0) {
+        return Cow::Borrowed(&record.load);
+    }
+    let mut load = record.load.clone();
+    for (level, by) in record.free_levels.iter().zip(levels) {
+        level.shift(&mut load, *by);
+    }
+    Cow::Owned(load)
 }
 
 /// All sensors.

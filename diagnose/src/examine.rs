@@ -17,6 +17,8 @@ use crate::record::Record;
 use crate::rivals::{self, RivalValue};
 use crate::sampling;
 use crate::shape::{Structure, structures};
+use crate::timing::{self, Timing};
+use crate::unsure_levels;
 
 /// What training records say.
 #[derive(Debug)]
@@ -31,8 +33,8 @@ pub struct Examined {
     pub nothing: Vec<&'static str>,
     /// The causes.
     pub named: Vec<Named>,
-    /// The step of a converter, if it is a cause.
-    pub lattice: Option<Named>,
+    /// What is read off the records and not fitted: another carrier, the step of a converter.
+    pub read_off: Vec<Named>,
     /// What is left.
     pub structure: Vec<Structure>,
     /// What speaks against the causes.
@@ -49,10 +51,22 @@ pub struct Examined {
 #[must_use]
 pub fn examined(train: Vec<Record>, base: &Model, say: Listener<'_>) -> Examined {
     say(Progress::Stage("noise and initial states"));
-    let (problem, null, outliers) = prepared(train, base);
-    let odd = preflight::readings(&problem, &null);
+    let (mut problem, mut null, mut outliers) = prepared(train.clone(), base);
+    let mut odd = preflight::readings(&problem, &null);
+    let mut read_off = Vec::new();
+    match timing::of(&problem, &null) {
+        Some(Timing::Other(cause, carrier, said)) => {
+            // everything else is sought in the converter that the bench seems to be
+            (problem, null, outliers) = prepared(train, &timing::with(base, carrier));
+            read_off.push(cause);
+            odd.push(said);
+        }
+        Some(Timing::Perhaps(said)) => odd.push(said),
+        None => {}
+    }
     let (mut problem, mut attribution) = attribute(problem, null, say);
     instants::note(&mut problem, &attribution.state().starts);
+    unsure_levels::note(&mut problem, attribution.state());
     // what is too small for a cause still leaves no structure
     let structure = structures(&problem, &attribution.null, attribution.state(), attribution.inflation);
     let mut profiles = held_by_data(&problem, &mut attribution, &structure, say);
@@ -60,16 +74,16 @@ pub fn examined(train: Vec<Record>, base: &Model, say: Listener<'_>) -> Examined
     let nothing = attribution.leave_out_nothing(&problem, &mut profiles);
     let named = named(&attribution, &profiles);
     let doubts = doubts::of(&problem, &attribution, &profiles, &structure);
-    let lattice = quantised::cause(&problem);
+    read_off.extend(quantised::cause(&problem));
     let holds = structure.is_empty() && !doubts::forbids(&named, &doubts);
     Examined {
-        verdict: verdict(&named, &lattice, holds),
+        verdict: verdict(&named, &read_off, holds),
         problem,
         attribution,
         profiles,
         nothing,
         named,
-        lattice,
+        read_off,
         structure,
         doubts,
         outliers,
@@ -78,6 +92,14 @@ pub fn examined(train: Vec<Record>, base: &Model, say: Listener<'_>) -> Examined
 }
 
 impl Examined {
+    /// Takes over what was read off more of the same records before.
+    pub fn read_before(&mut self, whole: &Examined) {
+        let is_new = |cause: &&Named| self.read_off.iter().all(|known| known.id != cause.id);
+        let before: Vec<Named> = whole.read_off.iter().filter(is_new).cloned().collect();
+        self.read_off.splice(0..0, before);
+        self.odd.splice(0..0, whole.odd.iter().cloned());
+    }
+
     /// Takes out the causes of whose evidence `is_sure` is not true; their ids.
     pub fn keep_sure(&mut self, is_sure: impl Fn(&Evidence) -> bool) -> Vec<&'static str> {
         let unsure: Vec<usize> = (0..self.named.len())
@@ -97,7 +119,7 @@ impl Examined {
         self.named = named(attribution, &self.profiles);
         self.doubts = doubts::of(problem, attribution, &self.profiles, &self.structure);
         let holds = self.structure.is_empty() && !doubts::forbids(&self.named, &self.doubts);
-        self.verdict = verdict(&self.named, &self.lattice, holds);
+        self.verdict = verdict(&self.named, &self.read_off, holds);
     }
 
     /// Lets the held-out records judge; causes that do not hold in them explain nothing any more.
@@ -156,6 +178,7 @@ fn prepared(train: Vec<Record>, base: &Model) -> (Problem, State, Vec<Outlier>) 
     // outliers
     problem.sigma = noise::sigma(&problem, &null.residual);
     sampling::decide(&mut problem, base);
+    unsure_levels::free(&mut problem, base, &mut null);
     null = State::settle(&problem, base, &null.starts, None);
     let outliers = noise::outliers(&problem, &null.residual);
     for one in &outliers {
@@ -220,7 +243,7 @@ fn each_once(sets: impl Iterator<Item = Rival>) -> Vec<Rival> {
     })
 }
 
-fn verdict(named: &[Named], lattice: &Option<Named>, holds: bool) -> Verdict {
+fn verdict(named: &[Named], read_off: &[Named], holds: bool) -> Verdict {
     // before anything else: where the truth is not on the list, its best cause imitates it with a wrong value
     if !holds {
         return Verdict::Unexplained;
@@ -228,7 +251,7 @@ fn verdict(named: &[Named], lattice: &Option<Named>, holds: bool) -> Verdict {
     if named.iter().any(|cause| !cause.rivals.is_empty()) {
         return Verdict::Ambiguous;
     }
-    match named.is_empty() && lattice.is_none() {
+    match named.is_empty() && read_off.is_empty() {
         true => Verdict::Consistent,
         false => Verdict::Explained,
     }

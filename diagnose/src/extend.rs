@@ -106,7 +106,7 @@ pub fn partial_toml(diagnosis: &Diagnosis) -> Option<String> {
 
 /// A plant file below the comment `text`.
 fn written(diagnosis: &Diagnosis, mut text: String, after: &Parameters, trim: f64) -> String {
-    let before = &diagnosis.problem.base.plant;
+    let before = &diagnosis.given.model.plant;
     let mut notes: BTreeMap<&str, String> = BTreeMap::new();
     let best = diagnosis
         .attribution

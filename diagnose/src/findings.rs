@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::capture::estimates::Estimates;
+use crate::compared::Compared;
 use crate::gain::{Held, Shift};
 use crate::rivals::RivalValue;
 use crate::shape::Structure;
@@ -153,6 +154,8 @@ pub struct Findings {
     pub verdict: Verdict,
     /// The same in a sentence.
     pub sentence: String,
+    /// Which channels it rests on.
+    pub compared: Compared,
     /// Named causes; empty if none is needed or none explains the data.
     pub causes: Vec<Named>,
     /// What explains part of it where the verdict is `unexplained`.
@@ -178,4 +181,12 @@ pub struct Findings {
     pub noise: Noise,
     /// Held-out gain.
     pub gain: Gain,
+}
+
+impl Findings {
+    /// The verdict with what it does not speak for: `explained in i_l alone; v_out was not read`.
+    #[must_use]
+    pub fn headline(&self) -> String {
+        format!("{}{}", self.verdict.word(), self.compared.limits())
+    }
 }

@@ -12,6 +12,7 @@ use crate::noise;
 use crate::problem::{Problem, dot};
 use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS, Record};
 use crate::sampling;
+use crate::unsure_levels;
 use crate::words::si;
 
 /// Which rows of a record are compared.
@@ -150,7 +151,10 @@ pub fn hold(records: &[Record], base: &Model, extended: &Model, sigma: [f64; CHA
     problem.trim_held = true;
     sampling::decide(&mut problem, extended);
     let remarks = other_chains(&mut problem, base, extended, trim);
-    let before = State::settle(&problem, base, &problem.first_starts(), None);
+    let mut before = State::settle(&problem, base, &problem.first_starts(), None);
+    if unsure_levels::free(&mut problem, extended, &mut before) {
+        before = State::settle(&problem, base, &before.starts, None);
+    }
     let mut starts = before.starts.clone();
     starts.trim = trim;
     let after = State::settle(&problem, extended, &starts, None);

@@ -95,7 +95,13 @@ fn free(problem: &Problem, steps: &[Vec<LoadStep>]) -> Option<Problem> {
                 .for_each(|part| part.fill(true));
             let (old, new) = (record.load[step.first - 1], record.load[step.last]);
             for row in step.first..step.last {
-                record.load[row] = if row < step.row(phase) { old } else { new };
+                let is_old = row < step.row(phase);
+                record.load[row] = if is_old { old } else { new };
+                // an unsure level moves with all rows that have it
+                let like = if is_old { step.first - 1 } else { step.last };
+                for level in record.free_levels.iter_mut().filter(|level| level.rows.contains(&like)) {
+                    level.rows = level.rows.start.min(row)..level.rows.end.max(row + 1);
+                }
             }
         }
         record.free_steps = steps.iter().map(|step| step.row(phase)).collect();

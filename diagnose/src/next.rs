@@ -207,11 +207,14 @@ fn planned(problem: &Problem, plan: Plan) -> (String, Record) {
         repeated: false,
         scatter: [f64::NAN; CHANNELS],
         metered: None,
+        levels: Vec::new(),
+        free_levels: Vec::new(),
         sampled: None,
         dense: true,
         segments: std::iter::once(0..ROWS).collect(),
         free_steps: Vec::new(),
         capture: None,
+        unread: Vec::new(),
         repairs: Vec::new(),
     };
     (plan.words, record)

@@ -13,7 +13,8 @@ use crate::diagnosis::Diagnosis;
 use crate::findings::{Named, Verdict};
 use crate::gain::Regime;
 use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS};
-use crate::words::{needs, si, unit};
+use crate::timing;
+use crate::words::{needs, si, told, unit};
 
 /// The page as HTML.
 ///
@@ -26,7 +27,12 @@ pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
         Verdict::Ambiguous | Verdict::MostlyExplained => report::Verdict::Warn,
         Verdict::Unexplained => report::Verdict::Fail,
     };
-    let word = findings.verdict.word();
+    let word = findings.headline();
+    // what leaves out a channel is no answer to rely on, whatever it says
+    let mark = match (mark, findings.compared.leaves_out()) {
+        (report::Verdict::Pass, true) => report::Verdict::Warn,
+        (mark, _) => mark,
+    };
     let mut page = Page::new(format!("Diagnosis: {word}")).verdict(mark, findings.sentence.clone());
     page = page.section(causes(diagnosis));
     if let Some(term) = &diagnosis.empirical {
@@ -80,9 +86,12 @@ fn causes(diagnosis: &Diagnosis) -> Section {
                 table = table.row([
                     format!("{} ({})", cause.id, cause.words).into(),
                     (*name).into(),
-                    si(v.model, unit(v.unit)).into(),
-                    si(v.value, unit(v.unit)).into(),
-                    format!("{} to {}", si(v.low, unit(v.unit)), si(v.high, unit(v.unit))).into(),
+                    told(cause.id, v.model, v.unit).into(),
+                    told(cause.id, v.value, v.unit).into(),
+                    match timing::word(cause.id, v.value) {
+                        Some(_) => "read off the current".into(),
+                        None => format!("{} to {}", si(v.low, unit(v.unit)), si(v.high, unit(v.unit))).into(),
+                    },
                     evidence,
                     rivals.join(", ").into(),
                 ]);

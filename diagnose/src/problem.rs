@@ -39,7 +39,8 @@ pub struct Problem {
     pub sigma: [f64; CHANNELS],
     /// Rows that are not scored, for each record and channel: outliers.
     pub masked: Vec<[Vec<bool>; CHANNELS]>,
-    /// Start of each record in the vectors; their last element is the trim over its accuracy.
+    /// Start of each record in the vectors; behind the rows and captures stand the free levels of the load, and last the trim over its
+    /// accuracy.
     pub offsets: Vec<usize>,
     /// The trim is not estimated.
     pub trim_held: bool,
@@ -71,6 +72,8 @@ pub struct Starts {
     pub states: Vec<Vec<Start>>,
     /// How much later than the table says each free load step of each record was, periods.
     pub late: Vec<Vec<f64>>,
+    /// How far each free level of the load of each record is off, standard deviations.
+    pub levels: Vec<Vec<f64>>,
     /// Duty added by the edges of the gate, 1.
     pub trim: f64,
 }
@@ -82,6 +85,7 @@ impl Starts {
         Begin {
             states: &self.states[record],
             late: &self.late[record],
+            levels: self.levels.get(record).map_or(&[], Vec::as_slice),
             trim: self.trim,
         }
     }
@@ -172,7 +176,14 @@ impl Problem {
     /// Length of the vectors.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.rows() + self.records.iter().map(terms).sum::<usize>() + 1
+        self.level(self.records.len(), 0) + 1
+    }
+
+    /// Where the vectors have what is known before of a free level of a record's load.
+    #[must_use]
+    pub fn level(&self, record: usize, place: usize) -> usize {
+        let before = self.records.iter().take(record).map(|one| one.free_levels.len());
+        self.rows() + self.records.iter().map(terms).sum::<usize>() + before.sum::<usize>() + place
     }
 
     /// Length of the part that holds rows of records.
@@ -211,6 +222,11 @@ impl Problem {
                 .records
                 .iter()
                 .map(|record| vec![0.0; record.free_steps.len()])
+                .collect(),
+            levels: self
+                .records
+                .iter()
+                .map(|record| vec![0.0; record.free_levels.len()])
                 .collect(),
             trim: 0.0,
         }
@@ -274,6 +290,11 @@ impl Problem {
                         }
                     }
                 }
+            }
+        }
+        for (index, levels) in starts.levels.iter().enumerate() {
+            for (place, by) in levels.iter().enumerate() {
+                out[self.level(index, place)] = -by;
             }
         }
         if let Some(last) = out.last_mut() {

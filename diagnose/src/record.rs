@@ -14,6 +14,7 @@ mod stamp;
 mod steady;
 mod suspicion;
 mod together;
+mod unread;
 
 use measured::{ColumnMap, DutyIs, Options, Sampled, Sheet};
 use plant::{Load, Parameters};
@@ -22,8 +23,10 @@ use toml_input::{Faults, FileName, Message, Sink};
 pub use channels::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS, Segment};
 use channels::{FEWEST, QUANTITIES};
 use raw::Raw;
+pub use levels::{Level, Part};
 pub(crate) use source::Source;
 pub use together::open_all;
+pub use unread::{Unread, quantity};
 
 use crate::capture::Capture;
 
@@ -61,6 +64,10 @@ pub struct Record {
     pub scatter: [f64; CHANNELS],
     /// Noise of the meter whose current is the load, A; nothing if the load was set, or is taken as it was measured.
     pub metered: Option<f64>,
+    /// Levels that were read off that meter.
+    pub levels: Vec<Level>,
+    /// Those of them that are estimated beside every fit.
+    pub free_levels: Vec<Level>,
     /// What a settled point holds; nothing if the data have to say it.
     pub sampled: Option<Sampled>,
     /// There is a row in each period, gaps apart.
@@ -71,6 +78,8 @@ pub struct Record {
     pub free_steps: Vec<usize>,
     /// A few periods at the rate of an oscilloscope, of which the one row holds duty and load ([`crate::capture`]).
     pub capture: Option<Box<Capture>>,
+    /// Columns of channels that the model predicts and that are not compared.
+    pub unread: Vec<Unread>,
     /// What was repaired or left out, in plain words.
     pub repairs: Vec<String>,
 }
@@ -127,11 +136,14 @@ impl Record {
             repeated: lines.repeated,
             scatter: lines.scatter,
             metered: lines.metered,
+            levels: lines.levels,
+            free_levels: Vec::new(),
             sampled: lines.sampled,
             dense: lines.dense,
             segments: lines.segments,
             free_steps: Vec::new(),
             capture: None,
+            unread: raw.unread.clone(),
             repairs: raw.repairs.clone(),
         };
         let labels = QUANTITIES.map(|name| raw.label(name));
@@ -225,6 +237,7 @@ impl Record {
                     "column {name} is constant at {}: not taken as measured",
                     finite[0]
                 ));
+                self.unread.extend(Unread::stuck(n, name));
                 values.fill(f64::NAN);
             }
             if values.is_empty() {

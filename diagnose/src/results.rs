@@ -41,7 +41,7 @@ fn told(error: impl ToString) -> Message {
 /// What the command says: the verdict, then what was noticed. `files` are those of the records.
 #[must_use]
 pub fn answer(columns: &ColumnMap, files: &[&Path], findings: &Findings) -> Vec<String> {
-    let (word, sentence) = (findings.verdict.word(), &findings.sentence);
+    let (word, sentence) = (findings.headline(), &findings.sentence);
     let mut lines = vec![format!("verdict: {word}\n{sentence}\n")];
     for name in columns.sections_without(files) {
         lines.push(format!(

@@ -6,6 +6,7 @@ use crate::findings::{Aside, Named, Verdict};
 use crate::gain::Shift;
 use crate::rivals::RivalValue;
 use crate::shape::Structure;
+use crate::timing;
 
 /// Rivals of a cause that the sentence names; a reader remembers no more, and the rest stands in the list.
 const MOST_SAID: usize = 3;
@@ -61,6 +62,9 @@ fn shapes(structure: &[Structure]) -> String {
 fn values(causes: &[Named]) -> String {
     let words = causes.iter().map(|cause| {
         let values = cause.parameters.iter().map(|(name, v)| {
+            if let (Some(value), Some(model)) = (timing::word(cause.id, v.value), timing::word(cause.id, v.model)) {
+                return format!("{value} (model {model})");
+            }
             let unit = unit(v.unit);
             let name = if *name == cause.id {
                 String::new()
@@ -83,6 +87,19 @@ fn values(causes: &[Named]) -> String {
         )
     });
     words.collect::<Vec<_>>().join("; ")
+}
+
+/// A value of a cause, in its unit or as the word that stands for it.
+pub fn told(id: &str, value: f64, of: &'static str) -> String {
+    timing::word(id, value).map_or_else(|| si(value, unit(of)), str::to_owned)
+}
+
+/// Said behind the verdict where nothing explains the records, and their carrier is another all the same.
+pub fn other_carrier(found: &Examined) -> String {
+    let carrier = found.read_off.iter().find(|cause| cause.id == timing::ID);
+    carrier.map_or_else(String::new, |cause| {
+        format!(" That is so with the carrier that the current shows, {}, too.", values(std::slice::from_ref(cause)))
+    })
 }
 
 /// What could stand in the place of a cause, or be a part of it: a sentence each.

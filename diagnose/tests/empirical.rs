@@ -191,6 +191,7 @@ fn a_segment_begins_with_the_rate_that_the_duties_before_it_left() {
     let simulated = |record: &Record, states: &[[f64; 2]]| {
         let begin = Begin {
             states,
+            levels: &[],
             late: &[],
             trim: 0.0,
         };

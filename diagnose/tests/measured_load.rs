@@ -63,6 +63,41 @@ fn a_healthy_bench_with_a_noisy_load_current_is_consistent() {
     }
 }
 
+/// Light loads at which the current rests in each period: nothing but the load's own resistance holds the voltage, and a level that is read off
+/// a noisy meter a hundredth of an ampere wrong drifts by tenths of a volt.
+fn light() -> Bench {
+    Bench {
+        load: vec![
+            (0.0, 0.0, 5.0),
+            (40.45, 0.0, 0.5),
+            (96.92, 0.0, 3.4),
+            (143.51, 0.0, 0.3),
+            (191.18, 0.0, 0.7),
+        ],
+        ..steps()
+    }
+}
+
+#[test]
+fn a_level_of_a_noisy_meter_is_uncertain_while_the_current_rests() {
+    for (noise, seed) in [(0.03, 3), (0.05, 5), (0.05, 6), (0.1, 7), (0.1, 8)] {
+        let found = diagnose(&model(), vec![record(&light(), noise, seed)], &[record(&light(), noise, seed + 10)], &|_| ());
+        println!("{noise} {seed}: {:?} {}\n{:#?}", found.findings.verdict, found.findings.sentence, found.findings.noise);
+        assert_eq!(found.findings.verdict, Verdict::Consistent, "noise {noise} A, seed {seed}");
+    }
+}
+
+#[test]
+fn a_capacitor_that_lost_a_fifth_is_found_while_the_current_rests() {
+    let bench = Bench {
+        capacitance: 120e-6,
+        ..light()
+    };
+    let found = diagnose(&model(), vec![record(&bench, 0.05, 3)], &[record(&bench, 0.05, 4)], &|_| ());
+    let c = leading(&found, "c_wrong");
+    assert!((c / 120e-6 - 1.0).abs() < 0.02, "{c}");
+}
+
 #[test]
 fn a_capacitor_that_lost_a_fifth_is_found_below_a_noisy_load_current() {
     let bench = Bench {

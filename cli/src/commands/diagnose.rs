@@ -51,7 +51,10 @@ pub fn run(options: &Diagnose) -> Result<Outcome, Failure> {
     }
     lines.push(format!("report: {}/report.html", options.out.display()));
     output::say(&lines.join("\n"))?;
-    Ok(Outcome::Done)
+    Ok(match diagnosis.findings.compared.leaves_out() {
+        true => Outcome::Different,
+        false => Outcome::Done,
+    })
 }
 
 /// Name and text of every file of a diagnosis; nothing is written or said.

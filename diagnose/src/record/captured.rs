@@ -96,11 +96,14 @@ impl Raw<'_> {
             repeated: false,
             scatter: lines.scatter,
             metered: None,
+            levels: Vec::new(),
+            free_levels: Vec::new(),
             sampled: lines.sampled,
             dense: true,
             segments: lines.segments,
             free_steps: Vec::new(),
             capture: Some(Box::<Capture>::new(found.capture)),
+            unread: self.unread.clone(),
             repairs,
         };
         self.doubts(&record, parameters).propagate()?;

@@ -9,6 +9,8 @@
 //! the voltage's own noise. So the rows are cut into stretches of one level each. A cut is a change point of least squares; what is
 //! left must be white, or else the load is no such thing and stays as it was measured.
 
+use std::ops::Range;
+
 use plant::Load;
 
 use crate::noise;
@@ -82,11 +84,52 @@ impl Form {
     }
 }
 
+/// Fewer rows than these between two changes are no level, but lie in the slope from one to the next.
+const FEWEST_ROWS: usize = 4;
+
+/// A level of a load that its meter shows, and how unsure it is.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Level {
+    /// Rows that have it.
+    pub rows: Range<usize>,
+    /// Which number of the load it is.
+    pub part: Part,
+    /// Standard deviation, in the unit of that number.
+    pub sd: f64,
+}
+
+/// A number of a load.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// A current, A.
+    Current,
+    /// A conductance, S.
+    Conductance,
+    /// A power, W.
+    Power,
+}
+
+impl Level {
+    /// Adds `by` standard deviations to its rows.
+    pub fn shift(&self, load: &mut [Load], by: f64) {
+        for load in load.get_mut(self.rows.clone()).into_iter().flatten() {
+            let number = match self.part {
+                Part::Current => &mut load.current,
+                Part::Conductance => &mut load.conductance,
+                Part::Power => &mut load.power,
+            };
+            *number += by * self.sd;
+        }
+    }
+}
+
 /// A load that was found.
 #[derive(Debug)]
 pub struct Levels {
     /// For each row.
     pub load: Vec<Load>,
+    /// Its levels, each as unsure as the meter's noise makes it.
+    pub levels: Vec<Level>,
     /// Noise of the meter, A.
     pub noise: f64,
     /// What to say of it.
@@ -120,9 +163,11 @@ pub fn find(i_out: &[f64], v_out: &[f64], digit: f64, phase: f64) -> Option<Leve
     }
     let (_, form, rows, cuts) = best?;
     let mut load = Vec::with_capacity(i_out.len());
+    let mut levels = Vec::new();
     for (from, to) in rows.stretches(&cuts) {
         let fit = rows.fit(from, to);
         let end = if to == known.len() { i_out.len() } else { known[to] };
+        levels.extend(rows.level(form, (from, to), load.len()..end));
         while load.len() < end {
             // a row's load is that of its period, whose middle a sample need not be
             load.push(form.load(rows.place(load.len() as f64 + 0.5 - phase), fit));
@@ -132,6 +177,7 @@ pub fn find(i_out: &[f64], v_out: &[f64], digit: f64, phase: f64) -> Option<Leve
     is_load.then(|| Levels {
         words: rows.words(form, &cuts, &in_slopes(form, &load, &known)),
         load,
+        levels,
         noise,
     })
 }
@@ -200,6 +246,23 @@ impl Rows {
         } else {
             [if aa > 0.0 { ai / aa } else { 0.0 }, 0.0]
         }
+    }
+
+    /// A stretch as a level; a line has none.
+    fn level(&self, form: Form, (from, to): (usize, usize), rows: Range<usize>) -> Option<Level> {
+        let part = match form {
+            Form::Current => Part::Current,
+            Form::Resistor => Part::Conductance,
+            Form::Power => Part::Power,
+            Form::Line => return None,
+        };
+        let weight = self.sum(from, to)[0];
+        (to - from >= FEWEST_ROWS && weight > 0.0).then(|| Level {
+            rows,
+            part,
+            // of least squares with one regressor
+            sd: self.noise / weight.sqrt(),
+        })
     }
 
     /// Chi-square of a stretch.

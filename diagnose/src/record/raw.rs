@@ -7,6 +7,7 @@ use toml_input::{Fault, Faults, Message, Sink};
 use super::channels::QUANTITIES;
 use super::digits::{last_digit, lattice};
 use super::source::Source;
+use super::unread::Unread;
 
 /// What a record may hold.
 const NAMES: [&str; 12] = [
@@ -25,6 +26,8 @@ pub(super) struct Raw<'a> {
     /// Each quantity in SI, NaN where nothing was measured; nothing if it is not there.
     values: Vec<(&'static str, Vec<f64>)>,
     pub repairs: Vec<String>,
+    /// Columns that look like a channel and are not read as such.
+    pub unread: Vec<Unread>,
     /// Time of the first row that is used, s.
     pub start: f64,
 }
@@ -55,16 +58,20 @@ impl<'a> Raw<'a> {
         }
         let guesses = sheet.guesses(&located, &Quantity::all(&NAMES));
         // an unknown time is a question of its own
-        let guesses: Vec<_> = guesses.into_iter().filter(|(name, _)| *name != "t").collect();
+        let is_open = |name: &str| name != "t" && !map.says_none(name);
+        let guesses: Vec<_> = guesses.into_iter().filter(|(name, _)| is_open(name)).collect();
+        let mut unread = Vec::new();
         if let Some(map) = proposal(&guesses) {
             let alike: Vec<String> = guesses
                 .iter()
                 .map(|(name, column)| format!("`{column}` looks like {name}"))
                 .collect();
             repairs.push(format!("{} and is not read as such: {map}", alike.join(", ")));
+            unread.extend(guesses.iter().filter_map(|(name, column)| Unread::looks_like(name, column)));
         }
         Ok(Raw {
             repairs,
+            unread,
             sheet,
             located,
             values,

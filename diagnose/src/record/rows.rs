@@ -5,7 +5,7 @@ use plant::{Load, Parameters};
 use toml_input::{Faults, Message};
 
 use super::channels::{CHANNELS, FEWEST, FEWEST_SETTLED, QUANTITIES, Segment};
-use super::levels;
+use super::levels::{self, Level};
 use super::logged;
 use super::raw::Raw;
 use super::stamp::Clock;
@@ -22,6 +22,8 @@ pub struct Lines {
     pub scatter: [f64; CHANNELS],
     /// Noise of the meter whose current is the load, A; nothing if the load was set, or is taken as it was measured.
     pub metered: Option<f64>,
+    /// Levels of such a load.
+    pub levels: Vec<Level>,
     pub sampled: Option<Sampled>,
     pub dense: bool,
     pub segments: Vec<Segment>,
@@ -40,6 +42,7 @@ impl Lines {
             repeated: false,
             scatter: [f64::NAN; CHANNELS],
             metered: None,
+            levels: Vec::new(),
             sampled: None,
             dense: true,
             segments: Vec::new(),
@@ -123,7 +126,7 @@ impl Raw<'_> {
         match levels::find(&i_out, &v_out.unwrap_or_default(), digit, lines.phase) {
             Some(found) => {
                 self.repairs.push(found.words);
-                (lines.load, lines.metered) = (found.load, Some(found.noise));
+                (lines.load, lines.metered, lines.levels) = (found.load, Some(found.noise), found.levels);
             }
             None => self.repairs.push(
                 "i_out is taken for the load as it was measured, noise and all: it is neither levels nor straight lines with white \

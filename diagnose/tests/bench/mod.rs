@@ -41,8 +41,10 @@ pub struct Bench {
     /// Duty that is lost at each rising edge, periods.
     pub lost: f64,
     pub rows: usize,
-    /// Sampling instant in the period, carrier centre-aligned.
+    /// Sampling instant in the period.
     pub sampled: f64,
+    /// Where in the period the switch is on: 0 first, 0.5 in the middle, 1 last.
+    pub carrier: f64,
     /// Duties from rows on.
     pub duty: Vec<(usize, f64)>,
     /// Conductance and current from instants on, periods.
@@ -74,6 +76,7 @@ impl Default for Bench {
             lost: 0.0,
             rows: 200,
             sampled: 0.5,
+            carrier: 0.5,
             duty: vec![(0, 0.5)],
             load: vec![(0.0, 0.0, 5.0)],
             ramp: 0.0,
@@ -319,7 +322,8 @@ impl Bench {
         for n in 0..lead + self.rows {
             let row = n as f64 - f64::from(lead as u32);
             let duty = self.duty_at(n.saturating_sub(lead));
-            let (rise, fall) = (0.5 - 0.5 * duty + self.lost, 0.5 + 0.5 * duty);
+            let on = self.carrier * (1.0 - duty);
+            let (rise, fall) = (on + self.lost, on + duty);
             let mut marks = vec![0.0, rise, fall, self.sampled, 1.0];
             marks.extend(
                 self.load

@@ -81,6 +81,12 @@ impl ColumnMap {
         found.map(|(_, wish)| wish)
     }
 
+    /// Whether the map says that the record has none of a quantity, whatever its columns are called.
+    #[must_use]
+    pub fn says_none(&self, quantity: &str) -> bool {
+        self.wish(quantity) == Some(&Wish::Nothing)
+    }
+
     /// The quantities that are mapped.
     pub(crate) fn mapped(&self) -> impl Iterator<Item = &str> {
         self.entries.iter().map(|(name, _)| name.as_str())

@@ -74,7 +74,7 @@ fn wanted() -> Wanted {
         load: 10.0,
         noise: None,
         model: None,
-        pole: 0.5,
+        pole: None,
     }
 }
 
@@ -82,7 +82,7 @@ fn wanted() -> Wanted {
 #[test]
 fn the_law_leaves_the_share_of_an_error_that_was_asked_for() {
     for pole in [0.0, 0.3, 0.5, 0.8] {
-        let design = Design::new(&plant(), Wanted { pole, ..wanted() }).unwrap();
+        let design = Design::new(&plant(), Wanted { pole: Some(pole), ..wanted() }).unwrap();
         let (b, a) = (12.0 * 2e-6 / 3.3e-6, 2e-6 / 94e-6);
         let (mut x, mut e) = (1.0, 0.2);
         let mut sizes = Vec::new();
@@ -147,7 +147,7 @@ fn what_cannot_be_designed_is_refused_with_its_reason() {
         },
     );
     assert!(said.contains("cannot hold") && said.contains("12 V of 12 V"), "{said}");
-    let said = refused(&plant(), Wanted { pole: 1.0, ..wanted() });
+    let said = refused(&plant(), Wanted { pole: Some(1.0), ..wanted() });
     assert!(said.contains("pole"), "{said}");
     let said = refused(&plant(), Wanted { load: 0.0, ..wanted() });
     assert!(said.contains("load current"), "{said}");

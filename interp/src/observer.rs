@@ -14,6 +14,8 @@ pub(crate) struct Observer<T> {
     carrier: OnTime,
     /// The output's share of the current per volt at the duty that holds the voltage, and the clamp of the surplus.
     hold: Option<(T, Range<T>)>,
+    /// Inductor current per ampere of load at the start.
+    start_by_load: T,
     source: Source<T>,
     output_voltage: usize,
     load_current: usize,
@@ -62,6 +64,7 @@ impl<T: Real> Observer<T> {
             hold: observer
                 .hold
                 .map(|hold| (T::nearest(hold.share), Range::nearest(hold.range))),
+            start_by_load: T::nearest(observer.hold.map_or(1.0, |hold| hold.start)),
             source: match observer.input_voltage {
                 InputVoltage::Constant(volts) => Source::Constant(T::nearest(volts)),
                 InputVoltage::Signal(index) => Source::Signal(index),
@@ -89,7 +92,7 @@ impl<T: Real> Observer<T> {
             },
         };
         let unprimed = [
-            self.ranges[0].clamp(now.load_current),
+            self.ranges[0].clamp(now.load_current * self.start_by_load),
             measured.signals[self.output_voltage],
             T::ZERO,
         ];

@@ -99,6 +99,8 @@ pub struct Hold {
     pub voltage: f64,
     /// The output's share of the inductor's current per volt of input voltage and bias, at the duty that holds it, 1/V.
     pub share: f64,
+    /// Inductor current per ampere of load at that duty without a bias, where the input voltage is a number; else 1.
+    pub start: f64,
     /// What the surplus is clamped to, A.
     pub range: Interval,
 }

@@ -133,7 +133,26 @@ fn what_has_no_start_and_no_limit_is_exit_code_2_with_its_reason() {
     assert!(!desk.path("policy.toml").exists());
 }
 
-/// No observer is built for it, so its contract measures the inductor current.
+/// A plant file that says how the inductor current is measured has a contract that measures it.
+#[test]
+fn a_sensor_of_the_inductor_current_takes_the_place_of_the_observer() {
+    let desk = Desk::new("linear");
+    let boost = PLANT.replace("v_in", "topology = \"boost\"\nv_in") + "[sensors.i_l]\nlsb = 0.01\n";
+    desk.write("boost.toml", &boost);
+    let said = desk.type_in("new --plant boost.toml --v-ref 60 --loads 20,120 --out start");
+    assert_eq!(said.code, Some(0), "{}", said.stderr);
+    assert!(said.stderr.contains("has a sensor of the inductor current"), "{}", said.stderr);
+    let contract = desk.read("start/policy.toml");
+    assert!(
+        contract.contains("name = \"i_l\"") && !contract.contains("[[observer]]"),
+        "{contract}"
+    );
+    // a buck's law has nothing that needs it
+    desk.write("buck.toml", &format!("{PLANT}[sensors.i_l]\nlsb = 0.01\n"));
+    desk.succeed("new --plant buck.toml --v-ref 12 --loads 20,120 --out buck");
+    assert!(desk.read("buck/policy.toml").contains("[[observer]]"));
+}
+
 #[test]
 fn a_boost_has_a_limit_and_a_start_whose_scenario_judges_on_a_spread() {
     let desk = Desk::new("linear");
@@ -143,7 +162,7 @@ fn a_boost_has_a_limit_and_a_start_whose_scenario_judges_on_a_spread() {
     desk.succeed("new --plant boost.toml --v-ref 60 --loads 20,120 --out start");
     let contract = desk.read("start/policy.toml");
     assert!(
-        contract.contains("name = \"i_l\"") && !contract.contains("[[observer]]"),
+        contract.contains("model_surplus") && !contract.contains("name = \"i_l\""),
         "{contract}"
     );
     let trained = "train start/train.toml --out trained --seeds 0";

@@ -146,9 +146,12 @@ impl Design {
         // a slow loop asks for less than what the voltage itself does to the current
         let sign = if by_voltage < 0.0 { '+' } else { '-' };
         format!(
-            "{rest} - {} * ({}) {sign} {} * (model_voltage - {v_ref})",
+            "{rest} - {} * {} {sign} {} * (model_voltage - {v_ref})",
             short(self.by_current),
-            self.surplus(),
+            match own.topology {
+                Topology::Buck => format!("({})", self.surplus()),
+                Topology::Boost | Topology::BuckBoost => self.surplus(),
+            },
             by_voltage.abs(),
         )
     }

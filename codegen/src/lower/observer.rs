@@ -82,6 +82,10 @@ impl Builder {
     /// The same, or where an observer begins before the first good measurement.
     fn known(&mut self, observer: &Observer, x: [ValueId; 3]) -> [ValueId; 3] {
         let load_current = self.signals[observer.load_current];
+        let load_current = match observer.hold {
+            None => load_current,
+            Some(hold) => self.scaled(load_current, hold.start),
+        };
         let start = [
             self.clamped(observer, Estimate::Current, load_current),
             self.signals[observer.output_voltage],

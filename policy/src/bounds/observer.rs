@@ -98,6 +98,7 @@ impl Ranges {
     }
 
     fn surplus(&self, hold: Hold, carrier: OnTime) -> Result<(), Overflow> {
+        self.load.scale(hold.start)?;
         let share = self.source.add(self.bias)?.scale(hold.share)?;
         let mut mean = self.current;
         if carrier == OnTime::Trailing {

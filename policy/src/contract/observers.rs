@@ -203,13 +203,18 @@ fn held(
         }
     };
     let share = 1.0 / whole;
-    if !super::fits_f32(share) {
+    let start = match source {
+        InputVoltage::Constant(volts) => whole / volts,
+        InputVoltage::Signal(_) => 1.0,
+    };
+    if !super::fits_f32(share) || !super::fits_f32(start) {
         faults.push(value.fault(catalogue::not_in_f32("hold", voltage)));
         return None;
     }
     Some(Hold {
         voltage,
         share,
+        start,
         // a share of 0 to 1 of the current, less the load
         range: Interval {
             low: current.low.min(0.0) - loads.high,

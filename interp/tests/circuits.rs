@@ -197,7 +197,8 @@ fn the_surplus_of_a_settled_converter_is_none_whatever_it_loses() {
         let half_ripple = if carrier == "centre" { 0.0 } else { 0.5 * V_IN * rest * PERIOD / INDUCTANCE };
         let blind = V_IN / span * (current + half_ripple) - last.load;
         assert!(blind > 0.1, "{topology} {carrier}: {blind} A");
-        assert!(held(0.9 * voltage).estimates[3] > 0.2, "a smaller voltage needs less");
+        // 5 % more of the current for the output of the buck-boost, 11 % more for that of the boost
+        assert!(held(0.9 * voltage).estimates[3] > 0.1, "a smaller voltage needs less");
     }
 }
 

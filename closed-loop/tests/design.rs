@@ -78,7 +78,9 @@ const SCIPY: [([f64; 4], Noise, [f64; 3], f64); 5] = [
 #[test]
 fn gains_are_those_of_scipy() {
     for ([period, inductance, capacitance, give], noise, gains, slowest) in SCIPY {
-        let filter = Model::new(period, inductance, capacitance, give).filter(&noise).unwrap();
+        let filter = Model::new(period, inductance, capacitance, give)
+            .filter(&noise)
+            .unwrap();
         for (own, expected) in filter.gains.iter().zip(gains) {
             // both solve the same equation in binary64, by other ways
             assert!((own - expected).abs() < 1e-7 * expected, "{filter:?} {gains:?}");
@@ -109,7 +111,14 @@ fn wanted() -> Wanted {
 #[test]
 fn the_law_leaves_the_share_of_an_error_that_was_asked_for() {
     for pole in [0.0, 0.3, 0.5, 0.8] {
-        let design = Design::new(&plant(), Wanted { pole: Some(pole), ..wanted() }).unwrap();
+        let design = Design::new(
+            &plant(),
+            Wanted {
+                pole: Some(pole),
+                ..wanted()
+            },
+        )
+        .unwrap();
         let (b, a) = (12.0 * 2e-6 / 3.3e-6, 2e-6 / 94e-6);
         let (mut x, mut e) = (1.0, 0.2);
         let mut sizes = Vec::new();
@@ -194,7 +203,11 @@ fn the_lines_of_a_boost_and_of_a_buck_boost_hold_their_voltage_at_the_duty_of_th
             _ => (17.0, 12.0 / 17.0),
         };
         let whole = 3.3e-6 / 2e-6 / span / give;
-        assert!((design.by_current - 0.7 * whole).abs() < 1e-12, "{} {whole}", design.by_current);
+        assert!(
+            (design.by_current - 0.7 * whole).abs() < 1e-12,
+            "{} {whole}",
+            design.by_current
+        );
     }
 }
 
@@ -209,7 +222,13 @@ fn what_cannot_be_designed_is_refused_with_its_reason() {
         },
     );
     assert!(said.contains("cannot hold") && said.contains("12 V of 12 V"), "{said}");
-    let said = refused(&plant(), Wanted { pole: Some(1.0), ..wanted() });
+    let said = refused(
+        &plant(),
+        Wanted {
+            pole: Some(1.0),
+            ..wanted()
+        },
+    );
     assert!(said.contains("pole"), "{said}");
     let said = refused(&plant(), Wanted { load: 0.0, ..wanted() });
     assert!(said.contains("load current"), "{said}");
@@ -233,7 +252,10 @@ fn what_cannot_be_designed_is_refused_with_its_reason() {
     let mut boost = plant();
     boost.converter.topology = Topology::Boost;
     let said = refused(&boost, wanted());
-    assert!(said.contains("boost") && said.contains("more than the source"), "{said}");
+    assert!(
+        said.contains("boost") && said.contains("more than the source"),
+        "{said}"
+    );
     let mut late = plant();
     late.pwm.carrier = plant::Carrier::Leading;
     assert!(refused(&late, wanted()).contains("leading"));

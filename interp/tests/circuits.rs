@@ -152,7 +152,10 @@ fn estimates_follow_every_circuit_with_either_carrier_at_either_delay() {
             let seen = drive(&keys(topology, carrier), converter, delay, rest, 0.02);
             let (amperes, volts) = (worst(&seen, 0), worst(&seen, 1));
             // the trapezoid of the prediction leaves some hundredths of a ripple of 1 A and of one of 0.1 to 0.3 V
-            assert!(amperes < 0.1 && volts < 0.03, "{topology} {carrier} {delay}: {amperes} A, {volts} V");
+            assert!(
+                amperes < 0.1 && volts < 0.03,
+                "{topology} {carrier} {delay}: {amperes} A, {volts} V"
+            );
         }
     }
 }
@@ -191,10 +194,18 @@ fn the_surplus_of_a_settled_converter_is_none_whatever_it_loses() {
         let last = held(voltage);
         let [current, .., surplus] = last.estimates;
         // of a load of about 4 A; the voltage falls while the output receives nothing, which the mean duty does not know
-        assert!(surplus.abs() < 0.03, "{topology} {carrier}: {surplus} A of {} A", last.load);
+        assert!(
+            surplus.abs() < 0.03,
+            "{topology} {carrier}: {surplus} A of {} A",
+            last.load
+        );
         // without the bias the losses would be missing: 0.2 ohm times the current is 5 % of the source
         let span = if topology == "boost" { voltage } else { V_IN + voltage };
-        let half_ripple = if carrier == "centre" { 0.0 } else { 0.5 * V_IN * rest * PERIOD / INDUCTANCE };
+        let half_ripple = if carrier == "centre" {
+            0.0
+        } else {
+            0.5 * V_IN * rest * PERIOD / INDUCTANCE
+        };
         let blind = V_IN / span * (current + half_ripple) - last.load;
         assert!(blind > 0.1, "{topology} {carrier}: {blind} A");
         // 5 % more of the current for the output of the buck-boost, 11 % more for that of the boost
@@ -276,5 +287,9 @@ fn a_surplus_stays_in_its_range() {
     let (trace, _) = worked_out("topology = \"boost\"\nhold = 1.0", [16.0, 4.0, 6.0], -1.0);
     assert_eq!(trace.estimates[0][3], 17.0);
     let (trace, _) = worked_out("topology = \"boost\"\nhold = 16.0", [0.0, 64.0, -6.0], 20.0);
-    assert!((-20.0..-19.0).contains(&trace.estimates[0][3]), "{:?}", trace.estimates[0]);
+    assert!(
+        (-20.0..-19.0).contains(&trace.estimates[0][3]),
+        "{:?}",
+        trace.estimates[0]
+    );
 }

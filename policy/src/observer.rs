@@ -145,12 +145,7 @@ impl Estimate {
     /// Those that are kept, in the order of the state.
     pub const STATE: [Estimate; 3] = [Estimate::Current, Estimate::Voltage, Estimate::Bias];
     /// All of them, in their order.
-    pub const ALL: [Estimate; 4] = [
-        Estimate::Current,
-        Estimate::Voltage,
-        Estimate::Bias,
-        Estimate::Surplus,
-    ];
+    pub const ALL: [Estimate; 4] = [Estimate::Current, Estimate::Voltage, Estimate::Bias, Estimate::Surplus];
 
     /// What stands behind the observer's name.
     #[must_use]

@@ -259,11 +259,15 @@ fn a_circuit_with_a_voltage_to_hold_has_a_surplus() {
 fn a_faulty_circuit_is_refused() {
     refused(boosted("topology = \"bost\""), &["bost", "did you mean", "boost"]);
     refused(boosted("carrier = \"leading\""), &["leading", "trailing, centre"]);
-    refused(boosted("hold = 100.0"), &["no surplus", "a buck converter", "model_current - i_out"]);
+    refused(
+        boosted("hold = 100.0"),
+        &["no surplus", "a buck converter", "model_current - i_out"],
+    );
     refused(boosted("topology = \"boost\"\nhold = 0.0"), &["hold"]);
     refused(boosted("topology = \"boost\"\nhold = 1e-60"), &["hold", "f32"]);
     refused(
-        boosted("topology = \"buck-boost\"\nhold = 100.0").replace("input_voltage = 200.0", "input_voltage = \"v_out\""),
+        boosted("topology = \"buck-boost\"\nhold = 100.0")
+            .replace("input_voltage = 200.0", "input_voltage = \"v_out\""),
         &["no surplus", "input voltage is a signal"],
     );
     // without a voltage to hold there is no such estimate

@@ -90,6 +90,54 @@ fn the_law_of_a_buck_boost_holds_the_voltage_with_losses_that_it_does_not_know()
     }
 }
 
+/// The voltage to hold is a signal, which the firmware sets; generated C and Rust get it as the interpreter does.
+#[test]
+fn a_policy_that_is_told_its_reference_follows_a_step_of_it() {
+    let desk = Desk::new("residual");
+    desk.write("plant.toml", PLANT);
+    rows_of_the_law(&desk, "[[10, 20], [20, 10]]");
+    let steps = |steps: &str| {
+        let lines = "plant = \"plant.toml\"\nreference_load = { power = 20 }\ninstants = 2\nlead = 400\nafter = 400\ntail = 50\n";
+        desk.write("r.toml", &format!("{lines}reference_steps = {steps}\n"));
+    };
+    steps("[[4, 5], [5, 4]]");
+    desk.refuse(
+        "simulate r.toml --policy policy --out told",
+        &["holds one voltage", "the signal `v_ref`"],
+    );
+    let signal = "[[signal]]\nname = \"v_ref\"\nunit = \"V\"\nrange = [3.0, 6.0]\n";
+    let contract = desk.read("policy/policy.toml");
+    let contract = contract
+        .replace("[parameters]\nv_ref = 5.0\n", signal)
+        .replace("base = \"(5 - ", "base = \"(v_ref - ")
+        .replace("(model_voltage - 5)", "(model_voltage - v_ref)");
+    desk.write("policy/policy.toml", &contract);
+    let said = desk.succeed("simulate r.toml --policy policy --check --out told");
+    assert!(
+        said.contains("equal to the bit") && said.contains("the deviation is the overshoot"),
+        "{said}"
+    );
+    for step in ["v_ref 4 -> 5 V", "v_ref 5 -> 4 V"] {
+        let table = between(&said, step, "at rest after it");
+        let row = table.lines().find(|line| line.starts_with("law alone")).unwrap();
+        let numbers = numbers(row);
+        // an overshoot of less than a tenth of the volt; at rest 0.5 % of the reference, since the ripple is that at 5 V
+        assert!(numbers[1] < 0.1 && numbers[5] < 0.025, "{row}\n{said}");
+        assert!(!table.contains("pid") && !table.contains("limit"), "{table}");
+    }
+    steps("[[4, 7]]");
+    desk.refuse(
+        "simulate r.toml --policy policy --out more",
+        &["no such reference", "3 to 6 V"],
+    );
+    steps("[[4, 5]]");
+    desk.write(
+        "t.toml",
+        "plant = \"plant.toml\"\ncontract = \"policy/policy.toml\"\n[reward]\nv_ref = 5.0\n",
+    );
+    desk.refuse("train t.toml --out trained", &["nothing sets the signal `v_ref`"]);
+}
+
 #[test]
 fn a_law_behind_a_diode_says_from_which_load_on_it_holds() {
     let desk = Desk::new("linear");

@@ -102,12 +102,23 @@ fn twelve_volts_become_minus_five_near_the_limit_with_smaller_parts() {
     desk.write("plant.toml", &std::fs::read_to_string(example).unwrap());
     desk.succeed("new --plant plant.toml --v-ref 5 --loads 2,15 --out mine");
     desk.succeed("train mine/train.toml --out mine/trained --seeds 0");
-    desk.edit("mine/scenario.toml", "# \"converter.inductance\"", "\"converter.inductance\"");
-    desk.edit("mine/scenario.toml", "# \"converter.capacitance\"", "\"converter.capacitance\"");
+    desk.edit(
+        "mine/scenario.toml",
+        "# \"converter.inductance\"",
+        "\"converter.inductance\"",
+    );
+    desk.edit(
+        "mine/scenario.toml",
+        "# \"converter.capacitance\"",
+        "\"converter.capacitance\"",
+    );
     let said = desk.succeed("simulate mine/scenario.toml --policy mine/trained --out mine/loop");
     let limits = rows(&said, "limit");
     for (law, limit) in rows(&said, "law alone").iter().zip(&limits) {
-        assert!(law[1] < 1.1 * limit[1], "a tenth more than what nothing can beat\n{said}");
+        assert!(
+            law[1] < 1.1 * limit[1],
+            "a tenth more than what nothing can beat\n{said}"
+        );
     }
     // what a training asks for is of the harder of both
     let hardest = limits.iter().map(|limit| limit[1]).fold(0.0, f64::max);
@@ -172,7 +183,11 @@ fn a_sensor_of_the_inductor_current_takes_the_place_of_the_observer() {
     desk.write("boost.toml", &boost);
     let said = desk.type_in("new --plant boost.toml --v-ref 60 --loads 20,120 --out start");
     assert_eq!(said.code, Some(0), "{}", said.stderr);
-    assert!(said.stderr.contains("has a sensor of the inductor current"), "{}", said.stderr);
+    assert!(
+        said.stderr.contains("has a sensor of the inductor current"),
+        "{}",
+        said.stderr
+    );
     let contract = desk.read("start/policy.toml");
     assert!(
         contract.contains("name = \"i_l\"") && !contract.contains("[[observer]]"),

@@ -160,7 +160,10 @@ fn observer(text: &mut String, rng: &mut SplitMix, index: usize, signals: usize,
 /// Circuit, carrier and, where there can be one, voltage to hold of an observer.
 fn circuit(rng: &mut SplitMix, source_is_signal: bool) -> String {
     let topology = ["buck", "boost", "buck-boost"][rng.below(3)];
-    let mut text = format!("topology = \"{topology}\"\ncarrier = \"{}\"\n", ["trailing", "centre"][rng.below(2)]);
+    let mut text = format!(
+        "topology = \"{topology}\"\ncarrier = \"{}\"\n",
+        ["trailing", "centre"][rng.below(2)]
+    );
     let hold = rng.uniform(1.0, 200.0);
     // what has no surplus: a source that is divided by
     if topology == "boost" || (topology == "buck-boost" && !source_is_signal) {

@@ -95,12 +95,7 @@ impl Design {
                 .expected("trailing or centre")
                 .into());
         }
-        let model = Model::new(
-            nominal.period,
-            nominal.inductance,
-            nominal.capacitance,
-            nominal.give,
-        );
+        let model = Model::new(nominal.period, nominal.inductance, nominal.capacitance, nominal.give);
         let noise = noise(plant, wanted)?;
         let filter = model.filter(&noise)?;
         let (by_current, by_voltage) = match nominal.topology {

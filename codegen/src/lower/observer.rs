@@ -206,14 +206,7 @@ impl Builder {
     }
 
     /// What would charge the capacitor at the duty that holds the voltage.
-    fn surplus(
-        &mut self,
-        observer: &Observer,
-        hold: Hold,
-        [i, b]: [ValueId; 2],
-        now: Drive,
-        period: f64,
-    ) -> ValueId {
+    fn surplus(&mut self, observer: &Observer, hold: Hold, [i, b]: [ValueId; 2], now: Drive, period: f64) -> ValueId {
         let u = now.input_voltage;
         let driven = self.block.value(Op::Add(u, b));
         let share = self.scaled(driven, hold.share);

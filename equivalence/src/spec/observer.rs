@@ -41,7 +41,9 @@ pub(crate) fn observe(
         InputVoltage::Constant(volts) => (spec.nearest(volts), None),
         InputVoltage::Signal(index) => (signals[index], Some(signals[index])),
     };
-    let held = observer.hold.map_or(o, |hold| spec.float.mul(o, spec.nearest(hold.start)));
+    let held = observer
+        .hold
+        .map_or(o, |hold| spec.float.mul(o, spec.nearest(hold.start)));
     let start = [clamped(spec, observer, Estimate::Current, held), y, spec.zero()];
     let known = |x: [Term; 3]| [0, 1, 2].map(|n| spec.terms.choose(measured.primed, x[n], start[n]));
     let memory = [words[0], words[1], words[2]];

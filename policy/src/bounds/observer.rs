@@ -54,7 +54,9 @@ pub(crate) fn observer(observer: &Observer, inputs: &Inputs, period: f64) -> Res
         Circuit::Buck => ranges.buck(observer.carrier),
         Circuit::Boost | Circuit::BuckBoost => ranges.switched_output(observer.topology, observer.carrier),
     }?;
-    observer.hold.map_or(Ok(()), |hold| ranges.surplus(hold, observer.carrier))
+    observer
+        .hold
+        .map_or(Ok(()), |hold| ranges.surplus(hold, observer.carrier))
 }
 
 impl Ranges {

@@ -6,9 +6,7 @@ use super::{Taken, name, number_f32, range_f32};
 use crate::bounds::{self, Inputs, Overflow};
 use crate::catalogue;
 use crate::limits::MAX_OBSERVERS;
-use crate::model::{
-    Circuit, Estimate, Gains, Hold, Input, InputVoltage, Interval, Observer, OnTime, Signal,
-};
+use crate::model::{Circuit, Estimate, Gains, Hold, Input, InputVoltage, Interval, Observer, OnTime, Signal};
 use crate::names::Kind;
 
 /// The observers and what expressions may call; a faulty one leaves its names, lest every expression that uses them be

@@ -247,7 +247,11 @@ impl Start {
     fn converter(&self) -> String {
         let base = &self.base;
         let [low, high] = self.wanted.loads;
-        let (v_in, v_ref, kilohertz) = (base.nominal().v_in, self.wanted.v_ref, rounded(1e-3 / base.nominal().period, 4));
+        let (v_in, v_ref, kilohertz) = (
+            base.nominal().v_in,
+            self.wanted.v_ref,
+            rounded(1e-3 / base.nominal().period, 4),
+        );
         format!(
             "a {} converter from {v_in} V to {v_ref} V at {kilohertz} kHz, {low} to {high} W",
             base.nominal().topology.word()

@@ -47,6 +47,13 @@ fn rows_of_the_law(desk: &Desk, load_steps: &str) -> (String, Vec<String>) {
     (said, rows)
 }
 
+/// A law that is mapped rests beside its voltage: the observer sees the mapped duty and has no bias for it.
+fn unmap(desk: &Desk) {
+    let contract = desk.read("policy/policy.toml");
+    let without = contract.replace(between(&contract, "[mapping]", "\n["), "");
+    desk.write("policy/policy.toml", &without);
+}
+
 /// Deviation, settling, largest error at the end; each at sampling instants and at all.
 fn numbers(row: &str) -> Vec<f64> {
     row.split([' ', '/']).filter_map(|word| word.parse().ok()).collect()
@@ -78,6 +85,7 @@ fn its_lines_stand_in_a_contract_and_their_law_holds_the_voltage() {
 #[test]
 fn the_law_of_a_buck_boost_holds_the_voltage_with_losses_that_it_does_not_know() {
     let desk = Desk::new("residual");
+    unmap(&desk);
     let lossy = "rectifier = \"synchronous\"\n[inductor]\ndcr = 0.02\n[capacitor]\nesr = 0.001";
     let plant = PLANT.replace("v_in", "topology = \"buck-boost\"\nv_in");
     desk.write("plant.toml", &plant.replace("rectifier = \"synchronous\"", lossy));
@@ -95,6 +103,7 @@ fn the_law_of_a_buck_boost_holds_the_voltage_with_losses_that_it_does_not_know()
 fn a_policy_that_is_told_its_reference_follows_a_step_of_it() {
     let desk = Desk::new("residual");
     desk.write("plant.toml", PLANT);
+    unmap(&desk);
     rows_of_the_law(&desk, "[[10, 20], [20, 10]]");
     let steps = |steps: &str| {
         let lines = "plant = \"plant.toml\"\nreference_load = { power = 20 }\ninstants = 2\nlead = 400\nafter = 400\ntail = 50\n";
@@ -121,8 +130,8 @@ fn a_policy_that_is_told_its_reference_follows_a_step_of_it() {
         let table = between(&said, step, "at rest after it");
         let row = table.lines().find(|line| line.starts_with("law alone")).unwrap();
         let numbers = numbers(row);
-        // an overshoot of less than a tenth of the volt; at rest 0.5 % of the reference, since the ripple is that at 5 V
-        assert!(numbers[1] < 0.1 && numbers[5] < 0.025, "{row}\n{said}");
+        // settled within 50 periods, and at rest 0.2 % of the reference: half the ripple in the law is that at 5 V
+        assert!(numbers[3] < 0.1 && numbers[5] < 0.01, "{row}\n{said}");
         assert!(!table.contains("pid") && !table.contains("limit"), "{table}");
     }
     steps("[[4, 7]]");
@@ -130,12 +139,12 @@ fn a_policy_that_is_told_its_reference_follows_a_step_of_it() {
         "simulate r.toml --policy policy --out more",
         &["no such reference", "3 to 6 V"],
     );
-    steps("[[4, 5]]");
-    desk.write(
-        "t.toml",
-        "plant = \"plant.toml\"\ncontract = \"policy/policy.toml\"\n[reward]\nv_ref = 5.0\n",
+    desk.succeed("new --plant plant.toml --v-ref 5 --loads 10,20 --out mine");
+    desk.edit("mine/policy.toml", "[parameters]\nv_ref = 5.0\n", signal);
+    desk.refuse(
+        "train mine/train.toml --out trained",
+        &["nothing sets the signal `v_ref`"],
     );
-    desk.refuse("train t.toml --out trained", &["nothing sets the signal `v_ref`"]);
 }
 
 #[test]

@@ -92,7 +92,10 @@ impl Start {
             pole: None,
         };
         let topology = plant.converter.topology;
-        Design::new(plant, asked(Some(v_ref / STEPS)))?;
+        match measures_inductor(plant) {
+            false => Design::new(plant, asked(Some(v_ref / STEPS))).map(|_| ())?,
+            true => CurrentLaw::new(plant, v_ref, largest).map(|_| ())?,
+        }
         holds_power(plant, v_ref, file)?;
         let needed = topology.duty(plant.converter.v_in, v_ref);
         // 10 % is left for a load step up: more than any loss of a converter that works

@@ -198,7 +198,10 @@ fn a_sensor_of_the_inductor_current_takes_the_place_of_the_observer() {
     desk.write("last.toml", &boost.replace("[pwm]\n", last));
     desk.succeed("new --plant last.toml --v-ref 60 --loads 20,120 --out last");
     desk.write("last.toml", &PLANT.replace("[pwm]\n", last));
-    desk.refuse("new --plant last.toml --v-ref 12 --loads 20,120 --out none", &["leading", "trailing or centre"]);
+    desk.refuse(
+        "new --plant last.toml --v-ref 12 --loads 20,120 --out none",
+        &["leading", "trailing or centre"],
+    );
     // a buck's law has nothing that needs it
     desk.write("buck.toml", &format!("{PLANT}[sensors.i_l]\nlsb = 0.01\n"));
     desk.succeed("new --plant buck.toml --v-ref 12 --loads 20,120 --out buck");

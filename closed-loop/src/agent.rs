@@ -8,8 +8,10 @@ use toml_input::Message;
 
 use crate::faults::Error;
 
-/// The names that a contract's signals may have.
-const SIGNALS: [&str; 4] = ["v_out", "i_l", "i_out", "v_in"];
+/// The names that a contract's signals may have: what is measured, and the voltage to hold, which the firmware sets.
+const SIGNALS: [&str; 5] = ["v_out", "i_l", "i_out", "v_in", REFERENCE];
+/// The signal that is no measurement.
+pub const REFERENCE: &str = "v_ref";
 
 /// A policy's controller at a plant, in the floats `T`: those of the policy's format, or binary32 where the last bit does
 /// not matter.
@@ -26,6 +28,8 @@ pub struct Inputs {
     scalar: Scalar,
     inputs: Vec<Input>,
     samples: Vec<Sample>,
+    /// Voltage to hold, V; no number until it is set.
+    reference: f64,
 }
 
 /// Where a signal comes from.
@@ -62,12 +66,24 @@ impl Inputs {
             scalar: policy.numeric_format.scalar(),
             samples: vec![Sample::Code(0); inputs.len()],
             inputs,
+            reference: f64::NAN,
         })
+    }
+
+    /// The voltage to hold, V, of a contract that has it as its signal `v_ref`.
+    pub fn set_reference(&mut self, v_ref: f64) {
+        self.reference = v_ref;
     }
 
     /// The samples of a measurement, in the order of the contract: numbers, or the codes of its converters.
     pub fn samples(&mut self, measured: &Signals) -> &[Sample] {
-        let values = [measured.v_out, measured.i_l, measured.i_out, measured.v_in];
+        let values = [
+            measured.v_out,
+            measured.i_l,
+            measured.i_out,
+            measured.v_in,
+            self.reference,
+        ];
         for (sample, input) in self.samples.iter_mut().zip(&self.inputs) {
             let x = values[input.signal];
             *sample = match (input.adc, self.scalar) {
@@ -85,14 +101,31 @@ impl<T: Real> Agent<T> {
     /// The controller of `policy` in its initial state.
     ///
     /// # Errors
-    /// If the contract measures something that the plant does not have.
+    /// If the contract measures something that the plant does not have, or wants to be told the voltage to hold.
     pub fn new(policy: &Policy) -> Result<Self, Error> {
+        if policy.signals.iter().any(|signal| signal.name == REFERENCE) {
+            let message = Message::new("nothing sets the signal `v_ref` here");
+            let hint = "`simulate` does; make it a number in [parameters] of a copy, and train that";
+            return Err(message.hint(hint).into());
+        }
+        Self::told(policy)
+    }
+
+    /// The same, of a contract that may have the voltage to hold as a signal: whoever runs it sets it.
+    ///
+    /// # Errors
+    /// If the contract measures something that the plant does not have.
+    pub fn told(policy: &Policy) -> Result<Self, Error> {
         let controller = Controller::new(policy);
         Ok(Self {
             trace: controller.blank_trace(),
             inputs: Inputs::new(policy)?,
             controller,
         })
+    }
+
+    pub(crate) fn inputs_mut(&mut self) -> &mut Inputs {
+        &mut self.inputs
     }
 
     /// Forgets everything, as a controller does that is switched on.

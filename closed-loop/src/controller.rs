@@ -31,6 +31,9 @@ pub trait Controller {
     /// If it cannot be started.
     fn restart(&mut self) -> Result<(), Error>;
 
+    /// The voltage to hold from now on, V, for those that are told.
+    fn set_reference(&mut self, _v_ref: f64) {}
+
     /// One control period.
     ///
     /// # Errors
@@ -42,6 +45,10 @@ impl<T: Real> Controller for Agent<T> {
     fn restart(&mut self) -> Result<(), Error> {
         self.reset();
         Ok(())
+    }
+
+    fn set_reference(&mut self, v_ref: f64) {
+        self.inputs_mut().set_reference(v_ref);
     }
 
     fn step(&mut self, measured: &Signals) -> Result<Answer, Error> {
@@ -61,8 +68,8 @@ impl<T: Real> Controller for Agent<T> {
 /// If the contract measures something that the plant does not have.
 pub fn interpreter(policy: &Policy) -> Result<Box<dyn Controller>, Error> {
     Ok(match policy.numeric_format.scalar() {
-        Scalar::F32 => Box::new(Agent::<f32>::new(policy)?),
-        Scalar::F64 => Box::new(Agent::<f64>::new(policy)?),
+        Scalar::F32 => Box::new(Agent::<f32>::told(policy)?),
+        Scalar::F64 => Box::new(Agent::<f64>::told(policy)?),
     })
 }
 
@@ -128,6 +135,10 @@ impl<F: FnMut(Call<'_>) -> Result<Option<Answer>, Error>> External<F> {
 impl<F: FnMut(Call<'_>) -> Result<Option<Answer>, Error>> Controller for External<F> {
     fn restart(&mut self) -> Result<(), Error> {
         (self.ask)(Call::Restart).map(|_| ())
+    }
+
+    fn set_reference(&mut self, v_ref: f64) {
+        self.inputs.set_reference(v_ref);
     }
 
     fn step(&mut self, measured: &Signals) -> Result<Answer, Error> {
@@ -205,6 +216,9 @@ pub fn follow<E: Environment>(
     instant: Instant,
 ) -> Result<Trajectory, Error> {
     controller.restart()?;
+    let [before, after] = step.held(v_ref);
+    controller.set_reference(before);
+    let lead = task.lead + instant.periods;
     let (mut answers, mut failure) = (Vec::new(), None);
     let ask = |sample: &Sample| {
         let blank = Answer {
@@ -212,6 +226,10 @@ pub fn follow<E: Environment>(
             action: None,
             status: 0,
         };
+        // the sample at the step is the first that finds the new one
+        if answers.len() == lead && step.reference.is_some() {
+            controller.set_reference(after);
+        }
         // the run goes to its end, but a controller that has failed is not asked again
         let answer = if failure.is_some() {
             blank

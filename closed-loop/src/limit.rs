@@ -108,9 +108,11 @@ impl Question {
     /// # Errors
     /// If the parameters are not those of a converter, or it cannot rest at `v_ref` with a duty within `range`.
     pub fn new(parameters: &Parameters, v_ref: f64, step: LoadStep, range: [f64; 2]) -> Result<Self, Error> {
-        if step.source.is_some() {
+        if step.keeps_load() {
             let message = Message::new(format!("no limit is computed for {step}"));
-            return Err(message.found("the search knows one source voltage").into());
+            return Err(message
+                .found("the search knows one voltage of the source and one to hold")
+                .into());
         }
         let parameters = plain(parameters);
         let [from, to] = step.loads();

@@ -56,7 +56,7 @@ impl Default for Task {
 /// What is measured on one load step.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Metrics {
-    /// Largest |e| after the step, V.
+    /// Largest |e| after the step, V; after a step of the reference the overshoot.
     pub deviation: f64,
     /// Half width of the band that settling refers to, V ([`settled_band`]).
     pub band: f64,
@@ -107,6 +107,8 @@ pub struct Finding {
     pub load_step: [f64; 2],
     /// Voltage of the source before and after, V, if it is the source that steps.
     pub source_step: Option<[f64; 2]>,
+    /// Voltage to hold before and after, V, if it is the reference that steps.
+    pub reference_step: Option<[f64; 2]>,
     /// The worst of the sampling instants, figure by figure.
     pub at_sample: Metrics,
     /// The worst of all instants, figure by figure.
@@ -121,6 +123,7 @@ impl Finding {
             kind: step.kind,
             load_step: step.values,
             source_step: step.source,
+            reference_step: step.reference,
             at_sample: Metrics::default(),
             worst: Metrics::default(),
         }
@@ -156,6 +159,8 @@ pub struct Loop<E, C> {
     sample: Sample,
     load: Load,
     v_ref: f64,
+    /// Sign of a step of the reference, beyond which an error is an overshoot; 0 without one.
+    direction: f64,
     /// |e| of the latest samples before the step, as many as the tail has.
     pre: Vec<f64>,
     elapsed: usize,
@@ -181,17 +186,25 @@ impl<E: Environment, C: FnMut(&Sample) -> f64> Loop<E, C> {
             sample,
             load,
             v_ref,
+            direction: 0.0,
             pre: Vec::new(),
             elapsed: 0,
         })
     }
 
-    /// The source steps, right behind the sampling instant that has just been.
+    /// What steps beside the load: the source right behind the sampling instant that has just been, the voltage to hold at it.
     ///
     /// # Errors
     /// If the converter's source cannot.
-    pub fn set_source(&mut self, v_in: f64) -> Result<(), Error> {
-        self.environment.set_source(v_in)
+    pub fn disturb(&mut self, step: &LoadStep) -> Result<(), Error> {
+        if let Some([before, after]) = step.reference {
+            self.v_ref = after;
+            self.direction = (after - before).signum();
+        }
+        match step.source {
+            Some([_, after]) => self.environment.set_source(after),
+            None => Ok(()),
+        }
     }
 
     /// One control period; returns the voltage error behind it.
@@ -264,7 +277,13 @@ impl<E: Environment, C: FnMut(&Sample) -> f64> Loop<E, C> {
             });
             // `f64::max` ignores a NaN, so a run that diverged would look good
             let size = if error.is_finite() { error.abs() } else { f64::INFINITY };
-            metrics.deviation = metrics.deviation.max(size);
+            // on the way to another reference the error is what was asked for
+            let beyond = match self.direction {
+                0.0 => size,
+                side if size.is_finite() => (side * error).max(0.0),
+                _ => size,
+            };
+            metrics.deviation = metrics.deviation.max(beyond);
             if size > metrics.band {
                 metrics.settling = ((n + 1) as f64 - phase) * t_sample;
             }
@@ -339,7 +358,7 @@ where
     let mut run = Loop::start(
         environment,
         controller,
-        v_ref,
+        step.held(v_ref)[0],
         from,
         step.source.map(|[before, _]| before),
     )?;
@@ -348,9 +367,7 @@ where
     // the last period of the lead is `last_before`, in which a step at a sampling instant takes place
     run.lead(lead - 1, task.tail, |record| records.push(record));
     run.last_before(to, phase, task.tail, |record| records.push(record));
-    if let Some([_, after]) = step.source {
-        run.set_source(after)?;
-    }
+    run.disturb(&step)?;
     let metrics = run.measure(to, phase, task.after, task.tail, |record| records.push(record));
     let zero = lead as f64 + phase;
     for record in &mut records {
@@ -379,7 +396,13 @@ where
     let step = load_step.into();
     let [from, to] = step.loads();
     let before = step.source.map(|[before, _]| before);
-    let mut run = Loop::start(environment.clone(), controller.clone(), v_ref, from, before)?;
+    let mut run = Loop::start(
+        environment.clone(),
+        controller.clone(),
+        step.held(v_ref)[0],
+        from,
+        before,
+    )?;
     run.lead(task.lead - 1, task.tail, quiet);
     let mut finding = Finding::new(step);
     let last = instants.iter().map(|instant| instant.periods).max().unwrap_or(0);
@@ -389,9 +412,7 @@ where
             let mut run = run.clone();
             let phase = step.phase(instant.phase);
             run.last_before(to, phase, task.tail, quiet);
-            if let Some([_, after]) = step.source {
-                run.set_source(after)?;
-            }
+            run.disturb(&step)?;
             let metrics = run.measure(to, phase, task.after, task.tail, quiet);
             finding.add(*instant, metrics);
         }

@@ -1,11 +1,12 @@
 //! A scenario: which converter, which load steps, which classical controllers beside the policy.
 
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use toml_input::{Document, Faults, FileName, Message, Sink, Table, Value, messages};
 
 use crate::baselines::Kind;
-use crate::load_step::{LoadKind, LoadStep, SOURCE_RANGE};
+use crate::load_step::{LoadKind, LoadStep, REFERENCE_RANGE, SOURCE_RANGE};
 use crate::read;
 use crate::scenario::Task;
 
@@ -60,11 +61,12 @@ fn top(document: &Document, root: &mut Table<'_>, faults: &mut Sink) -> Option<S
     let set = root.with_default("set", Vec::new(), faults, read::plant_numbers);
     let v_ref = root.optional("v_ref").and_then(|v| v.positive(faults));
     let (currents, resistances) = (root.optional("current_steps"), root.optional("resistance_steps"));
-    let sources = document.peek(&["source_steps"]).is_some();
+    let others = ["source_steps", "reference_steps"];
+    let others = others.iter().any(|key| document.peek(&[key]).is_some());
     let task = read::task(root, faults);
     check(&task, document, root, faults);
     let default_steps =
-        document.peek(&["load_steps"]).is_none() && currents.is_none() && resistances.is_none() && !sources;
+        document.peek(&["load_steps"]).is_none() && currents.is_none() && resistances.is_none() && !others;
     let powers_meant = document.peek(&["load_steps"]).is_some() || default_steps;
     let powers = if powers_meant {
         task.load_steps.clone()
@@ -92,7 +94,10 @@ fn top(document: &Document, root: &mut Table<'_>, faults: &mut Sink) -> Option<S
         pairs.into_iter().map(move |values| LoadStep { kind, ..values.into() })
     };
     let mut load_steps: Vec<LoadStep> = kinds.into_iter().flat_map(of_kind).collect();
-    source_steps(root, &mut load_steps, faults);
+    let first = load_steps.first().map(|step| (step.kind, step.values[0]));
+    for beside in [SOURCE, REFERENCE] {
+        beside.read(root, first, &mut load_steps, faults);
+    }
     if load_steps.is_empty() && faults.is_empty() {
         let hint = "load_steps = [[200, 500], [500, 200]]  # W";
         faults.push(root.fault(Message::new("a scenario without a load step").hint(hint)));
@@ -109,38 +114,78 @@ fn top(document: &Document, root: &mut Table<'_>, faults: &mut Sink) -> Option<S
     })
 }
 
-/// Steps of the source behind those of the load, at `source_load` or the load before the first of these.
-fn source_steps(root: &mut Table<'_>, load_steps: &mut Vec<LoadStep>, faults: &mut Sink) {
-    let given = root.optional("source_load");
-    let load = match &given {
-        Some(value) => source_load(value, faults),
-        None => load_steps.first().map(|step| (step.kind, step.values[0])),
-    };
-    let Some(value) = root.optional("source_steps") else {
-        if let Some(value) = given.filter(|_| faults.is_empty()) {
-            faults.push(value.fault(Message::new("a load for steps of the source, and no such steps").hint(SOURCES)));
+/// Steps of something else, at a load that stays.
+struct Beside {
+    steps: &'static str,
+    load: &'static str,
+    /// What steps, in a sentence.
+    what: &'static str,
+    /// How the list is written.
+    list: &'static str,
+    /// How the file says it.
+    hint: &'static str,
+    range: RangeInclusive<f64>,
+    make: fn([f64; 2], LoadKind, f64) -> LoadStep,
+}
+
+const SOURCE: Beside = Beside {
+    steps: "source_steps",
+    load: "source_load",
+    what: "the source",
+    list: "source voltages in V: [[180, 220]]",
+    hint: "source_steps = [[180, 220]]  # V",
+    range: SOURCE_RANGE,
+    make: LoadStep::of_source,
+};
+
+const REFERENCE: Beside = Beside {
+    steps: "reference_steps",
+    load: "reference_load",
+    what: "the reference",
+    list: "voltages to hold in V: [[10, 12]]",
+    hint: "reference_steps = [[10, 12]]  # V",
+    range: REFERENCE_RANGE,
+    make: LoadStep::of_reference,
+};
+
+impl Beside {
+    /// The steps behind those of the load, at their own load or at `first`, the one before the first load step.
+    fn read(
+        self,
+        root: &mut Table<'_>,
+        first: Option<(LoadKind, f64)>,
+        load_steps: &mut Vec<LoadStep>,
+        faults: &mut Sink,
+    ) {
+        let given = root.optional(self.load);
+        let load = match &given {
+            Some(value) => standing_load(value, self.load, faults),
+            None => first,
+        };
+        let Some(value) = root.optional(self.steps) else {
+            if let Some(value) = given.filter(|_| faults.is_empty()) {
+                let message = format!("a load for steps of {}, and no such steps", self.what);
+                faults.push(value.fault(Message::new(message).hint(self.hint)));
+            }
+            return;
+        };
+        let pairs = read::pairs(&value, self.list, self.range, faults).unwrap_or_default();
+        if let Some((kind, load)) = load {
+            load_steps.extend(pairs.into_iter().map(|pair| (self.make)(pair, kind, load)));
+        } else if given.is_none() {
+            let message = Message::new(format!("steps of {} without a load", self.what));
+            faults.push(value.fault(message.hint(format!("{} = {{ power = 500.0 }}", self.load))));
         }
-        return;
-    };
-    let pairs = read::pairs(&value, "source voltages in V: [[180, 220]]", SOURCE_RANGE, faults).unwrap_or_default();
-    if let Some((kind, load)) = load {
-        load_steps.extend(pairs.into_iter().map(|pair| LoadStep::of_source(pair, kind, load)));
-    } else if given.is_none() {
-        let message = Message::new("steps of the source without a load").hint("source_load = { power = 500.0 }");
-        faults.push(value.fault(message));
     }
 }
 
-/// How steps of a source are written.
-const SOURCES: &str = "source_steps = [[180, 220]]  # V";
-
-fn source_load(value: &Value<'_>, faults: &mut Sink) -> Option<(LoadKind, f64)> {
+fn standing_load(value: &Value<'_>, key: &'static str, faults: &mut Sink) -> Option<(LoadKind, f64)> {
     let kinds = [
         ("power", LoadKind::Power),
         ("current", LoadKind::Current),
         ("resistance", LoadKind::Resistance),
     ];
-    value.read_table("source_load", faults, |table, faults| {
+    value.read_table(key, faults, |table, faults| {
         let mut found = Vec::new();
         for (key, kind) in kinds {
             let number = table.optional(key).and_then(|v| v.number_within(kind.range(), faults));
@@ -151,7 +196,7 @@ fn source_load(value: &Value<'_>, faults: &mut Sink) -> Option<(LoadKind, f64)> 
             _ if !faults.is_empty() => None,
             several => {
                 let keys = "`power` (W), `current` (A), `resistance` (ohm)";
-                faults.push(table.fault(messages::exactly_one_of("source_load", keys, several.len())));
+                faults.push(table.fault(messages::exactly_one_of(key, keys, several.len())));
                 None
             }
         }

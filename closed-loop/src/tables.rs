@@ -19,6 +19,7 @@ impl Finding {
             kind: self.kind,
             values: self.load_step,
             source: self.source_step,
+            reference: self.reference_step,
         }
     }
 

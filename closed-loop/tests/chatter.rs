@@ -23,6 +23,7 @@ fn at_rest(parameters: &Parameters, controller: impl FnMut(&Sample) -> f64) -> C
         kind: LoadKind::Resistance,
         values: [5.0, 5.0],
         source: None,
+        reference: None,
     };
     let first = Instant { periods: 0, phase: 0.0 };
     let environment = Converter::new(parameters).unwrap();

@@ -2,12 +2,12 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use closed_loop::design::{Design, Model, Noise, Wanted};
-use plant::Parameters;
+use plant::{Parameters, Topology};
 
 /// What `fixtures/riccati.py` prints: gains and the largest magnitude of a pole.
-const SCIPY: [([f64; 3], Noise, [f64; 3], f64); 3] = [
+const SCIPY: [([f64; 4], Noise, [f64; 3], f64); 5] = [
     (
-        [1e-4, 2e-3, 1.5e-3],
+        [1e-4, 2e-3, 1.5e-3, 1.0],
         Noise {
             process: [5e-3, 1e-4, 5e-3],
             // sqrt(0.04^2 + 0.06103515625^2 / 12)
@@ -21,7 +21,7 @@ const SCIPY: [([f64; 3], Noise, [f64; 3], f64); 3] = [
         0.959_204_859_629_197,
     ),
     (
-        [2e-6, 3.3e-6, 94e-6],
+        [2e-6, 3.3e-6, 94e-6, 1.0],
         Noise {
             process: [3e-3, 2e-6, 4e-4],
             measured: 2e-3,
@@ -34,7 +34,7 @@ const SCIPY: [([f64; 3], Noise, [f64; 3], f64); 3] = [
         0.931_895_065_872_964_9,
     ),
     (
-        [1e-5, 220e-6, 47e-6],
+        [1e-5, 220e-6, 47e-6, 1.0],
         Noise {
             process: [0.1, 0.0, 0.05],
             measured: 0.2,
@@ -46,12 +46,41 @@ const SCIPY: [([f64; 3], Noise, [f64; 3], f64); 3] = [
         ],
         0.977_629_193_648_703_8,
     ),
+    // a boost at a duty of a half, and a buck-boost at 5/17
+    (
+        [1e-5, 68e-6, 100e-6, 0.5],
+        Noise {
+            process: [2e-3, 1e-5, 6e-4],
+            measured: 0.02,
+        },
+        [
+            0.105_075_774_766_308_68,
+            0.099_952_874_194_659_09,
+            0.028_461_244_056_168_896,
+        ],
+        0.968_388_990_575_872_2,
+    ),
+    (
+        [2.5e-6, 6.8e-6, 150e-6, 12.0 / 17.0],
+        Noise {
+            process: [2e-3, 6e-6, 3e-4],
+            measured: 2e-3,
+        },
+        [
+            1.283_229_424_787_994_3,
+            0.166_379_977_010_846_95,
+            0.136_954_191_309_567_65,
+        ],
+        0.951_324_735_109_939_5,
+    ),
 ];
 
 #[test]
 fn gains_are_those_of_scipy() {
-    for ([period, inductance, capacitance], noise, gains, slowest) in SCIPY {
-        let filter = Model::new(period, inductance, capacitance).filter(&noise).unwrap();
+    for ([period, inductance, capacitance, give], noise, gains, slowest) in SCIPY {
+        let filter = Model::new(period, inductance, capacitance, give)
+            .filter(&noise)
+            .unwrap();
         for (own, expected) in filter.gains.iter().zip(gains) {
             // both solve the same equation in binary64, by other ways
             assert!((own - expected).abs() < 1e-7 * expected, "{filter:?} {gains:?}");
@@ -74,7 +103,7 @@ fn wanted() -> Wanted {
         load: 10.0,
         noise: None,
         model: None,
-        pole: 0.5,
+        pole: None,
     }
 }
 
@@ -82,7 +111,14 @@ fn wanted() -> Wanted {
 #[test]
 fn the_law_leaves_the_share_of_an_error_that_was_asked_for() {
     for pole in [0.0, 0.3, 0.5, 0.8] {
-        let design = Design::new(&plant(), Wanted { pole, ..wanted() }).unwrap();
+        let design = Design::new(
+            &plant(),
+            Wanted {
+                pole: Some(pole),
+                ..wanted()
+            },
+        )
+        .unwrap();
         let (b, a) = (12.0 * 2e-6 / 3.3e-6, 2e-6 / 94e-6);
         let (mut x, mut e) = (1.0, 0.2);
         let mut sizes = Vec::new();
@@ -136,6 +172,45 @@ fn the_lines_are_those_of_a_contract_and_carry_the_plant() {
     assert!(text.contains("current = [-"), "{text}");
 }
 
+/// The current that a switch in the middle of the period samples is its mean: nothing has to be added.
+#[test]
+fn a_carrier_in_the_middle_stands_in_the_observer_and_leaves_no_ripple_in_the_law() {
+    let mut plant = plant();
+    plant.pwm.carrier = plant::Carrier::Centre;
+    let text = Design::new(&plant, wanted()).unwrap().contract();
+    assert!(text.contains("carrier = \"centre\"\n"), "{text}");
+    assert!(text.contains("* (model_current - i_out) -"), "{text}");
+}
+
+#[test]
+fn the_lines_of_a_boost_and_of_a_buck_boost_hold_their_voltage_at_the_duty_of_their_circuit() {
+    for (topology, v_ref, word, rest) in [
+        (Topology::Boost, 20.0, "boost", "1 - (12 + model_bias) / 20 - "),
+        (Topology::BuckBoost, 5.0, "buck-boost", "(5 - model_bias) / (12 + 5) - "),
+    ] {
+        let mut plant = plant();
+        plant.converter.topology = topology;
+        let design = Design::new(&plant, Wanted { v_ref, ..wanted() }).unwrap();
+        let read: toml::Table = design.contract().parse().unwrap();
+        let observer = &read["observer"][0];
+        assert_eq!(observer["topology"].as_str(), Some(word));
+        assert_eq!(observer["hold"].as_float(), Some(v_ref));
+        let base = read["actions"]["base"].as_str().unwrap();
+        assert!(base.starts_with(rest), "{base}");
+        // a current that is 1 A short, in the output, asks for 0.7 of what brings it back in a period
+        let (span, give) = match topology {
+            Topology::Boost => (20.0, 0.6),
+            _ => (17.0, 12.0 / 17.0),
+        };
+        let whole = 3.3e-6 / 2e-6 / span / give;
+        assert!(
+            (design.by_current - 0.7 * whole).abs() < 1e-12,
+            "{} {whole}",
+            design.by_current
+        );
+    }
+}
+
 #[test]
 fn what_cannot_be_designed_is_refused_with_its_reason() {
     let refused = |plant: &Parameters, wanted: Wanted| Design::new(plant, wanted).unwrap_err().to_string();
@@ -147,7 +222,13 @@ fn what_cannot_be_designed_is_refused_with_its_reason() {
         },
     );
     assert!(said.contains("cannot hold") && said.contains("12 V of 12 V"), "{said}");
-    let said = refused(&plant(), Wanted { pole: 1.0, ..wanted() });
+    let said = refused(
+        &plant(),
+        Wanted {
+            pole: Some(1.0),
+            ..wanted()
+        },
+    );
     assert!(said.contains("pole"), "{said}");
     let said = refused(&plant(), Wanted { load: 0.0, ..wanted() });
     assert!(said.contains("load current"), "{said}");
@@ -169,6 +250,13 @@ fn what_cannot_be_designed_is_refused_with_its_reason() {
         .is_ok()
     );
     let mut boost = plant();
-    boost.converter.topology = plant::Topology::Boost;
-    assert!(refused(&boost, wanted()).contains("boost"));
+    boost.converter.topology = Topology::Boost;
+    let said = refused(&boost, wanted());
+    assert!(
+        said.contains("boost") && said.contains("more than the source"),
+        "{said}"
+    );
+    let mut late = plant();
+    late.pwm.carrier = plant::Carrier::Leading;
+    assert!(refused(&late, wanted()).contains("leading"));
 }

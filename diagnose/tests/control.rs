@@ -25,6 +25,7 @@ fn controlled(change: impl Fn(&mut Parameters)) -> Control {
             kind: LoadKind::Power,
             values: [200.0, 600.0],
             source: None,
+            reference: None,
         }],
         task: Task {
             instants: 1,

@@ -270,7 +270,7 @@ impl<T: Real> Controller<T> {
             usable: false,
             sound: false,
             primed: false,
-            estimates: vec![[T::ZERO; 3]; self.observers.len()],
+            estimates: vec![[T::ZERO; 4]; self.observers.len()],
             features: self
                 .features
                 .iter()

@@ -10,7 +10,7 @@ use crate::trace::FeatureTrace;
 #[derive(Clone, Copy)]
 pub(crate) struct Inputs<'a, T> {
     pub signals: &'a [T],
-    pub estimates: &'a [[T; 3]],
+    pub estimates: &'a [[T; 4]],
     pub previous_duty: T,
     pub previous_command: T,
 }

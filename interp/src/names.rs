@@ -14,7 +14,7 @@ pub(crate) fn state_names<T: Real>(policy: &Policy, features: &[Feature<T>], sta
         .map(|signal| format!("held.{}", signal.name))
         .collect();
     for observer in &policy.observers {
-        let estimates = policy::Estimate::ALL.map(|estimate| estimate.word().to_owned());
+        let estimates = policy::Estimate::STATE.map(|estimate| estimate.word().to_owned());
         let kept = ["last_load_current", "last_input_voltage"].map(str::to_owned);
         let words = estimates.into_iter().chain(kept).take(observer.words());
         names.extend(words.map(|word| format!("{}.{word}", observer.name)));

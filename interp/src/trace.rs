@@ -72,8 +72,8 @@ pub struct Trace<T> {
     pub sound: bool,
     /// The state was primed on entry.
     pub primed: bool,
-    /// Per observer: current in A, voltage and bias in V (2b).
-    pub estimates: Vec<[T; 3]>,
+    /// Per observer: current in A, voltage and bias in V, and the surplus in A, 0 without a voltage to hold (2b).
+    pub estimates: Vec<[T; 4]>,
     /// Per feature (3 to 5).
     pub features: Vec<FeatureTrace<T>>,
     /// Input of the network, one value per feature (5).

@@ -139,7 +139,7 @@ pub(crate) struct Inputs {
     signals: Vec<Box32>,
     previous_duty: Box32,
     previous_command: Box32,
-    estimates: Vec<[Box32; 3]>,
+    estimates: Vec<[Box32; 4]>,
 }
 
 impl Inputs {

@@ -204,6 +204,12 @@ pub(crate) fn unknown_name(kind: &str, name: &str, known: &[&str]) -> Message {
         .did_you_mean(name, known.iter().copied())
 }
 
+pub(crate) fn no_surplus(of: &str, instead: &str) -> Message {
+    Message::new(format!("no surplus is estimated for {of}"))
+        .found("hold")
+        .hint(instead)
+}
+
 pub(crate) fn bad_unit(found: &str) -> Message {
     Message::new("this unit cannot be printed in a comment")
         .found(format!("\"{}\"", found.escape_debug()))

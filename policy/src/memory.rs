@@ -31,7 +31,7 @@ pub fn memory_bounds(policy: &Policy) -> Vec<f64> {
 fn observed(observer: &Observer, policy: &Policy) -> Vec<f64> {
     let magnitude = |range: Interval| range.low.abs().max(range.high.abs());
     // the ends of a clamp are rounded to nearest
-    let estimates = Estimate::ALL.map(|estimate| magnitude(observer.range(estimate)) * GROWTH);
+    let estimates = Estimate::STATE.map(|estimate| magnitude(observer.range(estimate)) * GROWTH);
     let kept = observer
         .remembered()
         .map(|index| source(&Expr::Input(Input::Signal(index)), policy));

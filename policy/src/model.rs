@@ -14,7 +14,7 @@ pub use crate::head::{Action, Continuous, Head, Pair, Residual, Source, Squash, 
 pub use crate::interval::Interval;
 use crate::known_answers;
 pub use crate::known_answers::Golden;
-pub use crate::observer::{Estimate, Gains, InputVoltage, Observer};
+pub use crate::observer::{Circuit, Estimate, Gains, Hold, InputVoltage, Observer, OnTime};
 
 /// Number format in which the whole controller computes (`docs/reference/numeric-contract.md`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

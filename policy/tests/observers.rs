@@ -3,7 +3,7 @@
 
 mod common;
 use common::*;
-use policy::{Estimate, Head, Input, InputVoltage};
+use policy::{Circuit, Estimate, Head, Input, InputVoltage, OnTime};
 
 const OBSERVER: &str = "[[observer]]
 name = \"model\"
@@ -216,4 +216,64 @@ fn faults_of_a_law_say_what_it_wants() {
     let both = faulty("offsets = ", "duties = [0.4, 0.5, 0.6]\noffsets = ");
     let faults = both.faults().to_string();
     assert!(faults.contains("exactly one of"), "{faults}");
+}
+
+/// A boost from the 200 V of the observer above.
+fn boosted(keys: &str) -> Folder {
+    folder().replace("name = \"model\"\n", &format!("name = \"model\"\n{keys}\n"))
+}
+
+#[test]
+fn a_circuit_with_a_voltage_to_hold_has_a_surplus() {
+    let policy = boosted("topology = \"boost\"\ncarrier = \"centre\"\nhold = 400.0")
+        .replace(
+            "source = \"v_ref - v_out\"\nscale",
+            "source = \"v_ref - model_surplus\"\nscale",
+        )
+        .policy();
+    let observer = &policy.observers[0];
+    assert_eq!((observer.topology, observer.carrier), (Circuit::Boost, OnTime::Centre));
+    let hold = observer.hold.unwrap();
+    // 1/400 V, and twice the current of the load
+    assert_eq!((hold.voltage, hold.share, hold.start), (400.0, 0.0025, 2.0));
+    // a current of 0 to 60 A less the load
+    let load = policy.signals[1].range;
+    let range = observer.range(Estimate::Surplus);
+    assert_eq!((range.low, range.high), (-load.high, 60.0 - load.low));
+    assert_eq!(observer.words(), 3, "the surplus is no state");
+    assert!(policy.features[0].source.reads(Input::Estimate(0, Estimate::Surplus)));
+    let said = policy::describe::observers(&policy);
+    for part in ["boost, on in the middle", "model_surplus", "at 400 V"] {
+        assert!(said.contains(part), "{said}");
+    }
+    let plain = folder().policy();
+    let spelled = boosted("topology = \"buck\"\ncarrier = \"trailing\"").policy();
+    assert_eq!(
+        plain.digests.contract, spelled.digests.contract,
+        "what was the only circuit is the usual one"
+    );
+    assert_ne!(plain.digests.contract, policy.digests.contract);
+}
+
+#[test]
+fn a_faulty_circuit_is_refused() {
+    refused(boosted("topology = \"bost\""), &["bost", "did you mean", "boost"]);
+    refused(boosted("carrier = \"leading\""), &["leading", "trailing, centre"]);
+    refused(
+        boosted("hold = 100.0"),
+        &["no surplus", "a buck converter", "model_current - i_out"],
+    );
+    refused(boosted("topology = \"boost\"\nhold = 0.0"), &["hold"]);
+    refused(boosted("topology = \"boost\"\nhold = 1e-60"), &["hold", "f32"]);
+    refused(
+        boosted("topology = \"buck-boost\"\nhold = 100.0")
+            .replace("input_voltage = 200.0", "input_voltage = \"v_out\""),
+        &["no surplus", "input voltage is a signal"],
+    );
+    // without a voltage to hold there is no such estimate
+    let blind = boosted("topology = \"boost\"").replace(
+        "source = \"v_ref - v_out\"\nscale",
+        "source = \"v_ref - model_surplus\"\nscale",
+    );
+    refused(blind, &["model_surplus"]);
 }

@@ -69,6 +69,9 @@ fn observer(policy: &Policy, observer: &Observer) -> Value {
     let name = |index: usize| json!(policy.signals[index].name);
     json!({
         "name": observer.name,
+        "topology": observer.topology,
+        "carrier": observer.carrier,
+        "hold": observer.hold.map(|hold| hold.voltage),
         "inductance": observer.inductance,
         "capacitance": observer.capacitance,
         "input_voltage": match observer.input_voltage {

@@ -68,3 +68,15 @@ fn what_an_archive_knows_is_never_asked_for() {
         );
     }
 }
+
+#[test]
+fn the_way_from_a_plant_file_to_minus_five_volts_takes_nine_lines_of_own_writing() {
+    let page = std::fs::read_to_string(tests::root().join("docs/tutorials/own-converter.md")).unwrap();
+    let (_, text) = page.split_once("```toml,file=inverting.toml\n").unwrap();
+    let lines = code(text.split("```").next().unwrap());
+    let own: Vec<&String> = lines.iter().filter(|line| !line.starts_with('[')).collect();
+    assert_eq!(own.len(), 9, "{own:#?}");
+    assert!(page.contains("Nine lines are yours"), "the page says another number");
+    let example = std::fs::read_to_string(tests::root().join("examples/plants/buck-boost-12-5.toml")).unwrap();
+    assert_eq!(lines, code(&example), "the example is the page's converter");
+}

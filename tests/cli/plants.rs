@@ -72,15 +72,7 @@ fn a_plant_becomes_a_trained_policy_that_holds_on_its_spread() {
             .contains("\"inductance x 1.15, capacitance x 1.15\",20,120,worst")
     );
     let said = desk.succeed("simulate mine/scenario.toml --policy mine/trained --out mine/loop");
-    let rows: Vec<Vec<f64>> = (said.lines())
-        // not those of the table of what is done at rest, which has three columns
-        .filter(|line| line.starts_with("policy   ") && line.matches(" / ").count() > 3)
-        .map(numbers)
-        .collect();
-    let limits: Vec<Vec<f64>> = (said.lines())
-        .filter(|line| line.starts_with("limit"))
-        .map(numbers)
-        .collect();
+    let (rows, limits) = (rows(&said, "policy   "), rows(&said, "limit"));
     assert_eq!((rows.len(), limits.len()), (2, 2), "{said}");
     for (row, limit) in rows.iter().zip(limits) {
         assert!(
@@ -94,6 +86,56 @@ fn a_plant_becomes_a_trained_policy_that_holds_on_its_spread() {
     let again = desk.type_in("new --plant parts/plant.toml --v-ref 12 --loads 20,120 --out mine/policy.toml");
     assert_eq!(again.code, Some(2), "{}", again.stderr);
     assert!(again.stderr.contains("exists already"), "{}", again.stderr);
+}
+
+/// Rows of the tables of `simulate`, one a load step; not those of the table of what is done at rest, which has three columns.
+fn rows(said: &str, name: &str) -> Vec<Vec<f64>> {
+    let is_row = |line: &&str| line.starts_with(name) && (name == "limit" || line.matches(" / ").count() > 3);
+    said.lines().filter(is_row).map(numbers).collect()
+}
+
+/// 12 bits, noise and a period of delay; L and C of 85 %.
+#[test]
+fn twelve_volts_become_minus_five_near_the_limit_with_smaller_parts() {
+    let desk = Desk::new("linear");
+    let example = tests::root().join("examples/plants/buck-boost-12-5.toml");
+    desk.write("plant.toml", &std::fs::read_to_string(example).unwrap());
+    desk.succeed("new --plant plant.toml --v-ref 5 --loads 2,15 --out mine");
+    desk.succeed("train mine/train.toml --out mine/trained --seeds 0");
+    desk.edit(
+        "mine/scenario.toml",
+        "# \"converter.inductance\"",
+        "\"converter.inductance\"",
+    );
+    desk.edit(
+        "mine/scenario.toml",
+        "# \"converter.capacitance\"",
+        "\"converter.capacitance\"",
+    );
+    let said = desk.succeed("simulate mine/scenario.toml --policy mine/trained --out mine/loop");
+    let limits = rows(&said, "limit");
+    for (law, limit) in rows(&said, "law alone").iter().zip(&limits) {
+        assert!(
+            law[1] < 1.1 * limit[1],
+            "a tenth more than what nothing can beat\n{said}"
+        );
+    }
+    // what a training asks for is of the harder of both
+    let hardest = limits.iter().map(|limit| limit[1]).fold(0.0, f64::max);
+    let policy = rows(&said, "policy   ");
+    assert_eq!((limits.len(), policy.len()), (2, 2), "{said}");
+    for row in policy {
+        // 0.1 % of 5 V at rest
+        assert!(row[1] < 1.1 * hardest && row[5] < 0.005, "{said}");
+    }
+    for (file, power) in [("2-15W-policy.csv", 15.0), ("15-2W-policy.csv", 2.0)] {
+        let record = desk.read(&format!("mine/loop/{file}"));
+        let last: Vec<f64> = (record.lines().last().unwrap().split(','))
+            .map(|cell| cell.parse().unwrap_or(f64::NAN))
+            .collect();
+        let (v_out, i_out) = (last[2], last[4]);
+        assert!((i_out - power / v_out).abs() < 0.01 * power / v_out, "{last:?}");
+    }
 }
 
 #[test]
@@ -133,7 +175,39 @@ fn what_has_no_start_and_no_limit_is_exit_code_2_with_its_reason() {
     assert!(!desk.path("policy.toml").exists());
 }
 
-/// No observer is built for it, so its contract measures the inductor current.
+/// A plant file that says how the inductor current is measured has a contract that measures it.
+#[test]
+fn a_sensor_of_the_inductor_current_takes_the_place_of_the_observer() {
+    let desk = Desk::new("linear");
+    let boost = PLANT.replace("v_in", "topology = \"boost\"\nv_in") + "[sensors.i_l]\nlsb = 0.01\n";
+    desk.write("boost.toml", &boost);
+    let said = desk.type_in("new --plant boost.toml --v-ref 60 --loads 20,120 --out start");
+    assert_eq!(said.code, Some(0), "{}", said.stderr);
+    assert!(
+        said.stderr.contains("has a sensor of the inductor current"),
+        "{}",
+        said.stderr
+    );
+    let contract = desk.read("start/policy.toml");
+    assert!(
+        contract.contains("name = \"i_l\"") && !contract.contains("[[observer]]"),
+        "{contract}"
+    );
+    // an estimate needs to know where in the ripple it is
+    let last = "[pwm]\ncarrier = \"leading\"\n";
+    desk.write("last.toml", &boost.replace("[pwm]\n", last));
+    desk.succeed("new --plant last.toml --v-ref 60 --loads 20,120 --out last");
+    desk.write("last.toml", &PLANT.replace("[pwm]\n", last));
+    desk.refuse(
+        "new --plant last.toml --v-ref 12 --loads 20,120 --out none",
+        &["leading", "trailing or centre"],
+    );
+    // a buck's law has nothing that needs it
+    desk.write("buck.toml", &format!("{PLANT}[sensors.i_l]\nlsb = 0.01\n"));
+    desk.succeed("new --plant buck.toml --v-ref 12 --loads 20,120 --out buck");
+    assert!(desk.read("buck/policy.toml").contains("[[observer]]"));
+}
+
 #[test]
 fn a_boost_has_a_limit_and_a_start_whose_scenario_judges_on_a_spread() {
     let desk = Desk::new("linear");
@@ -143,7 +217,7 @@ fn a_boost_has_a_limit_and_a_start_whose_scenario_judges_on_a_spread() {
     desk.succeed("new --plant boost.toml --v-ref 60 --loads 20,120 --out start");
     let contract = desk.read("start/policy.toml");
     assert!(
-        contract.contains("name = \"i_l\"") && !contract.contains("[[observer]]"),
+        contract.contains("model_surplus") && !contract.contains("name = \"i_l\""),
         "{contract}"
     );
     let trained = "train start/train.toml --out trained --seeds 0";

@@ -19,16 +19,19 @@ const STEPS: [LoadStep; 3] = [
         kind: LoadKind::Power,
         values: [200.0, 1000.0],
         source: None,
+        reference: None,
     },
     LoadStep {
         kind: LoadKind::Power,
         values: [1000.0, 200.0],
         source: None,
+        reference: None,
     },
     LoadStep {
         kind: LoadKind::Resistance,
         values: [50.0, 12.0],
         source: None,
+        reference: None,
     },
 ];
 

@@ -141,6 +141,10 @@ fn random_policies_reach_every_status_bit_and_every_kind() {
         "o0_current",
         "o0_voltage",
         "o0_bias",
+        "o0_surplus",
+        "topology = \"boost\"",
+        "topology = \"buck-boost\"",
+        "carrier = \"centre\"",
         "base = ",
         "dead_zone = [",
     ] {

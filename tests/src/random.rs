@@ -98,13 +98,13 @@ fn contract(rng: &mut SplitMix, seed: u64, [features, actions, hidden]: [usize; 
     // from a stream of its own, as the heads are
     let mut beside = SplitMix::new(seed ^ OBSERVER);
     let observers = if beside.one_in(3) { 1 + beside.below(2) } else { 0 };
-    for index in 0..observers {
-        observer(&mut text, &mut beside, index, signals, period);
-    }
+    let observers: Vec<bool> = (0..observers)
+        .map(|index| observer(&mut text, &mut beside, index, signals, period))
+        .collect();
     for index in 0..features {
         // drawn in any case, so that the rest of the policy stays what it was
         let source = source(rng, signals);
-        let observed = (observers > 0 && !beside.one_in(3)).then(|| estimate(&mut beside, observers, signals));
+        let observed = (!observers.is_empty() && !beside.one_in(3)).then(|| estimate(&mut beside, &observers, signals));
         feature(&mut text, rng, index, &observed.unwrap_or(source));
     }
     let _ = writeln!(text, "[network]\nweights = \"weights.safetensors\"");
@@ -117,7 +117,7 @@ fn contract(rng: &mut SplitMix, seed: u64, [features, actions, hidden]: [usize; 
             let mut table = String::new();
             action_table(&mut table, rng, actions);
             text += &match beside.one_in(3) {
-                true => residual(&mut beside, actions, observers, signals),
+                true => residual(&mut beside, actions, &observers, signals),
                 false => table,
             };
         }
@@ -129,17 +129,19 @@ fn contract(rng: &mut SplitMix, seed: u64, [features, actions, hidden]: [usize; 
 /// Bits in which the seed of the observers' stream differs from that of the rest.
 const OBSERVER: u64 = 0x6f62_7365_7276_6572;
 
-/// An observer of any form: diode and synchronous leg, delay 0 and 1, input voltage as a number and as a signal.
-fn observer(text: &mut String, rng: &mut SplitMix, index: usize, signals: usize, period: f64) {
+/// An observer of any form: each circuit and carrier, diode and synchronous leg, delay 0 and 1, input voltage as a number and
+/// as a signal; whether it has a surplus.
+fn observer(text: &mut String, rng: &mut SplitMix, index: usize, signals: usize, period: f64) -> bool {
     let (inductance, capacitance) = (period * rng.uniform(1.0, 50.0), period * rng.uniform(0.05, 2.0));
     let low = if rng.one_in(2) { 0.0 } else { rng.uniform(-20.0, -1.0) };
     let source = match rng.one_in(2) {
         true => format!("{:?}", rng.uniform(5.0, 200.0)),
         false => format!("\"s{}\"", rng.below(signals)),
     };
+    let circuit = circuit(rng, source.starts_with('"'));
     let _ = writeln!(
         text,
-        "[[observer]]\nname = \"o{index}\"\ninductance = {inductance:?}\ncapacitance = {capacitance:?}\n\
+        "[[observer]]\nname = \"o{index}\"\n{circuit}inductance = {inductance:?}\ncapacitance = {capacitance:?}\n\
          input_voltage = {source}\noutput_voltage = \"s{}\"\nload_current = \"s{}\"\ncompute_delay = {}\n\
          gains = {{ current = {:?}, voltage = {:?}, bias = {:?} }}\ncurrent = [{low:?}, {:?}]\nbias = [{:?}, {:?}]\n",
         rng.below(signals),
@@ -152,12 +154,28 @@ fn observer(text: &mut String, rng: &mut SplitMix, index: usize, signals: usize,
         rng.uniform(-8.0, -0.5),
         rng.uniform(0.0, 8.0),
     );
+    circuit.contains("hold")
+}
+
+/// Circuit, carrier and, where there can be one, voltage to hold of an observer.
+fn circuit(rng: &mut SplitMix, source_is_signal: bool) -> String {
+    let topology = ["buck", "boost", "buck-boost"][rng.below(3)];
+    let mut text = format!(
+        "topology = \"{topology}\"\ncarrier = \"{}\"\n",
+        ["trailing", "centre"][rng.below(2)]
+    );
+    let hold = rng.uniform(1.0, 200.0);
+    // what has no surplus: a source that is divided by
+    if topology == "boost" || (topology == "buck-boost" && !source_is_signal) {
+        let _ = writeln!(text, "hold = {hold:?}");
+    }
+    text
 }
 
 /// Offsets of a law over signals and estimates, with and without a dead zone.
-fn residual(rng: &mut SplitMix, actions: usize, observers: usize, signals: usize) -> String {
+fn residual(rng: &mut SplitMix, actions: usize, observers: &[bool], signals: usize) -> String {
     let seen = |rng: &mut SplitMix| match observers {
-        0 => format!("s{}", rng.below(signals)),
+        [] => format!("s{}", rng.below(signals)),
         _ => estimate(rng, observers, signals),
     };
     let offsets: Vec<String> = (0..actions).map(|_| format!("{:?}", rng.uniform(-0.3, 0.3))).collect();
@@ -183,14 +201,12 @@ fn residual(rng: &mut SplitMix, actions: usize, observers: usize, signals: usize
     text
 }
 
-/// A source over estimates.
-fn estimate(rng: &mut SplitMix, observers: usize, signals: usize) -> String {
+/// A source over estimates of observers, each of which has a surplus or not.
+fn estimate(rng: &mut SplitMix, observers: &[bool], signals: usize) -> String {
     let e = |rng: &mut SplitMix| {
-        format!(
-            "o{}_{}",
-            rng.below(observers),
-            ["current", "voltage", "bias"][rng.below(3)]
-        )
+        let own = rng.below(observers.len());
+        let words = ["current", "voltage", "bias", "surplus"];
+        format!("o{own}_{}", words[rng.below(if observers[own] { 4 } else { 3 })])
     };
     match rng.below(3) {
         0 => e(rng),

@@ -146,6 +146,7 @@ mod tests {
             kind: closed_loop::LoadKind::Power,
             load_step: *load_step,
             source_step: None,
+            reference_step: None,
             at_sample: Metrics::default(),
             worst: Metrics {
                 deviation,

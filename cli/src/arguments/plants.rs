@@ -56,9 +56,10 @@ pub struct Design {
     /// Standard deviations of what the model is wrong by in a period, A,V,V: current, voltage, bias
     #[arg(long, value_name = "A,V,V", value_delimiter = ',')]
     pub model_noise: Option<Vec<f64>>,
-    /// Double pole of the law: how much of an error is left after a period
-    #[arg(long, value_name = "SHARE", default_value_t = 0.5)]
-    pub pole: f64,
+    /// Pole of the law: how much of an error is left after a period; 0.5 unless given. In a boost or a buck-boost it is that of
+    /// the current, 0.3 unless given
+    #[arg(long, value_name = "SHARE")]
+    pub pole: Option<f64>,
 }
 
 #[derive(Debug, Args)]

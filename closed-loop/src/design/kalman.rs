@@ -7,13 +7,15 @@ use crate::faults::Error;
 
 type Matrix = [[f64; 3]; 3];
 
-/// A period of the model, linear in current, voltage and bias.
+/// A period of the model, linear in current, voltage and bias around a duty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Model {
     /// T/L, A/V.
     pub by_inductance: f64,
     /// T/C, V/A.
     pub by_capacitance: f64,
+    /// Share of the inductor's current that the output receives, and of its voltage that stands against the current.
+    pub give: f64,
 }
 
 /// Standard deviations.
@@ -53,10 +55,11 @@ const STEPS: usize = 100_000;
 const STILL: f64 = 1e-11;
 
 impl Model {
-    /// From the period in s, L in H and C in F.
+    /// From the period in s, L in H, C in F and the output's share of the current, which is 1 for a buck.
     #[must_use]
-    pub fn new(period: f64, inductance: f64, capacitance: f64) -> Self {
+    pub fn new(period: f64, inductance: f64, capacitance: f64, give: f64) -> Self {
         Self {
+            give,
             by_inductance: period / inductance,
             by_capacitance: period / capacitance,
         }
@@ -64,13 +67,13 @@ impl Model {
 
     /// The state after a period without duty and load.
     fn transition(&self) -> Matrix {
-        let (h, g) = (self.by_inductance, self.by_capacitance);
+        let (h, g, r) = (self.by_inductance, self.by_capacitance, self.give);
         // the derivatives of the contract's prediction: mean current, voltage, current (section 2b)
-        let voltage = [g, 1.0 - 0.5 * g * h, 0.5 * g * h];
+        let voltage = [g * r, 1.0 - 0.5 * g * r * h * r, 0.5 * g * r * h];
         let current = [
-            1.0 - 0.5 * h * voltage[0],
-            -0.5 * h * (1.0 + voltage[1]),
-            h * (1.0 - 0.5 * voltage[2]),
+            1.0 - 0.5 * h * r * voltage[0],
+            -0.5 * h * r * (1.0 + voltage[1]),
+            h * (1.0 - 0.5 * r * voltage[2]),
         ];
         [current, voltage, [0.0, 0.0, 1.0]]
     }
@@ -148,10 +151,10 @@ fn slowest(matrix: &Matrix) -> f64 {
         }
         let scaled = power.map(|row| row.map(|x| x / size));
         power = product(&scaled, &scaled);
-        scale = 2.0 * (scale + size.ln());
+        scale = 2.0 * (scale + libm::log(size));
     }
     let size = power.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
-    ((scale + size.ln()) / 2.0_f64.powi(SQUARES)).exp()
+    libm::exp((scale + libm::log(size)) / 2.0_f64.powi(SQUARES))
 }
 
 fn diagonal(values: [f64; 3]) -> Matrix {

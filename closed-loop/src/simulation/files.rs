@@ -186,7 +186,7 @@ fn json_step(step: &Step) -> JsonStep<'_> {
         from,
         to,
         unit,
-        load: step.step.source.map(|_| JsonLoad {
+        load: step.step.keeps_load().then(|| JsonLoad {
             value: step.step.values[0],
             unit: step.step.kind.unit(),
         }),

@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use plant::Parameters;
-use policy::Policy;
+use policy::{Interval, Policy};
 use toml_input::{Fault, FileName, Message};
 
 use super::spread::{Spread, Spreads};
+use crate::agent::REFERENCE;
 use crate::converter::Converter;
 use crate::course::Course;
 use crate::faults::Error;
@@ -91,7 +92,14 @@ impl Setting {
         };
         let plant = name.path.clone();
         let converter = Converter::load(name, &scenario.set)?;
-        let v_ref = v_ref(scenario.v_ref, &policy, file)?;
+        let references: Vec<f64> = (scenario.load_steps.iter().filter_map(|step| step.reference))
+            .flatten()
+            .collect();
+        let v_ref = v_ref(scenario.v_ref.or(references.first().copied()), &policy, file)?;
+        for voltage in references.iter().copied().chain([v_ref]) {
+            told(&policy, voltage, !references.is_empty(), file)?;
+            reaches(converter.parameters(), voltage, file)?;
+        }
         suits(&policy, converter.parameters(), v_ref, file)?;
         draws(converter.parameters(), &scenario.load_steps, file)?;
         for v_in in scenario.load_steps.iter().filter_map(|step| step.source).flatten() {
@@ -100,7 +108,8 @@ impl Setting {
             reaches(&other, v_ref, file)?;
         }
         if scenario.load_steps.iter().any(|step| step.kind == LoadKind::Power) {
-            holds_power(converter.parameters(), v_ref, &plant)?;
+            let lowest = references.iter().copied().fold(v_ref, f64::min);
+            holds_power(converter.parameters(), lowest, &plant)?;
         }
         Ok(Self {
             notes: notes(&scenario, &policy, &converter, v_ref),
@@ -151,6 +160,26 @@ impl Setting {
     }
 }
 
+/// Whether a policy can be told to hold a voltage; `steps` asks for it.
+fn told(policy: &Policy, voltage: f64, steps: bool, file: &Path) -> Result<(), Error> {
+    let signal = policy.signals.iter().find(|signal| signal.name == REFERENCE);
+    let Some(signal) = signal else {
+        if !steps {
+            return Ok(());
+        }
+        let message = Message::new("a step of the reference, and a policy that holds one voltage");
+        let message = message.expected("a contract with the signal `v_ref`, which the firmware sets");
+        return Err(Fault::in_file(file, message).into());
+    };
+    let Interval { low, high } = signal.range;
+    if (low..=high).contains(&voltage) {
+        return Ok(());
+    }
+    let message = Message::new("the policy takes no such reference").found(format!("{voltage} V"));
+    let message = message.expected(format!("{low} to {high} V, the range of its signal `v_ref`"));
+    Err(Fault::in_file(file, message).into())
+}
+
 fn notes(scenario: &Scenario, policy: &Policy, converter: &Converter, v_ref: f64) -> Vec<String> {
     let mut notes = Vec::new();
     if scenario.default_steps {
@@ -168,6 +197,14 @@ fn notes(scenario: &Scenario, policy: &Policy, converter: &Converter, v_ref: f64
     if let Some(step) = scenario.load_steps.iter().find(|step| step.source.is_some()) {
         notes.push(format!(
             "v_in steps right behind a sampling instant, at a load of {} {}; no limit is computed for it",
+            step.values[0],
+            step.kind.unit()
+        ));
+    }
+    if let Some(step) = scenario.load_steps.iter().find(|step| step.reference.is_some()) {
+        notes.push(format!(
+            "v_ref steps at a sampling instant, at a load of {} {}: the deviation is the overshoot, errors are counted from the new \
+             reference; no limit is computed for it, and the classical controllers, which hold one voltage, are left out",
             step.values[0],
             step.kind.unit()
         ));

@@ -52,8 +52,9 @@ pub(super) fn picture(setting: &Setting, step: &Step) -> Result<Svg, Error> {
         current = current.series(line(of(|record| record.sample.i_l)));
         duty = duty.series(Series::step(name.as_str(), time.clone(), of(|record| record.duty)).colour(colour));
     }
-    let band = settled_band(setting.v_ref);
-    voltage = voltage.y_zone(setting.v_ref - band, setting.v_ref + band, "settled");
+    let [_, v_ref] = step.step.held(setting.v_ref);
+    let band = settled_band(v_ref);
+    voltage = voltage.y_zone(v_ref - band, v_ref + band, "settled");
     let [from, to] = step
         .step
         .loads()
@@ -62,9 +63,7 @@ pub(super) fn picture(setting: &Setting, step: &Step) -> Result<Svg, Error> {
     for (name, limit) in &step.limits {
         voltage = voltage.y_line(setting.v_ref + side * limit.at_sample.deviation, name.as_str());
     }
-    let x = Axis::new("time from the load step")
-        .unit("s")
-        .range(window[0], window[1]);
+    let x = Axis::new("time from the step").unit("s").range(window[0], window[1]);
     let chart = Chart::new(title, x).panel(voltage).panel(current).panel(duty);
     chart.svg().map_err(told)
 }

@@ -61,7 +61,9 @@ pub fn simulate(mut setting: Setting, mut named: Vec<Named>, tell: &mut Tell<'_>
             beyond(&course.shown, setting.converter.parameters()),
         ];
         let mut courses = vec![(POLICY.to_owned(), course)];
-        for (name, controller) in &mut beside {
+        // the classical controllers hold one voltage
+        let beside = beside.iter_mut().filter(|(name, _)| knows(name, step));
+        for (name, controller) in beside {
             let course = Course::new(step, &setting.scenario.task, |instant| {
                 progress.next(step, name)?;
                 run(&setting, controller.as_mut(), step, instant)
@@ -86,6 +88,11 @@ pub fn simulate(mut setting: Setting, mut named: Vec<Named>, tell: &mut Tell<'_>
         steps,
         check,
     })
+}
+
+/// Whether a controller has a part in a step: of the reference only those know that are told.
+pub(super) fn knows(name: &str, step: LoadStep) -> bool {
+    step.reference.is_none() || [POLICY, LAW].contains(&name)
 }
 
 /// The classical controllers of the scenario; a reason why there is no design of one becomes a note.
@@ -119,8 +126,8 @@ fn law(setting: &Setting) -> Result<Option<Beside>, Error> {
         return Ok(None);
     };
     let controller: Box<dyn Controller> = match law.numeric_format.scalar() {
-        Scalar::F32 => Box::new(Agent::<f32>::new(&law)?),
-        Scalar::F64 => Box::new(Agent::<f64>::new(&law)?),
+        Scalar::F32 => Box::new(Agent::<f32>::told(&law)?),
+        Scalar::F64 => Box::new(Agent::<f64>::told(&law)?),
     };
     Ok(Some((LAW, controller)))
 }
@@ -180,7 +187,7 @@ fn difference(name: &str, step: LoadStep, reference: &Trajectory, period: usize)
 /// The limits; a reason why there is none becomes a note.
 fn limits(setting: &mut Setting, step: LoadStep) -> Vec<(String, Limit)> {
     // a note of the setting says so
-    if step.source.is_some() {
+    if step.keeps_load() {
         return Vec::new();
     }
     let instants = setting.scenario.task.all_instants();

@@ -12,6 +12,7 @@ use report::{Axis, HeatMap, Section, Svg, Table};
 use toml_input::Message;
 
 use super::findings::Setting;
+use super::runs::knows;
 use crate::controller::{Controller, follow};
 use crate::converter::Converter;
 use crate::environment::varied;
@@ -145,7 +146,7 @@ fn cell(
     let mut worst = Vec::new();
     for (name, controller) in controllers {
         let mut metrics = Metrics::default();
-        for step in &setting.scenario.load_steps {
+        for step in setting.scenario.load_steps.iter().filter(|step| knows(name, **step)) {
             for instant in task.all_instants() {
                 let trajectory = follow(&converter, controller.as_mut(), setting.v_ref, &task, *step, instant)?;
                 metrics = metrics.worst(trajectory.metrics);

@@ -110,8 +110,9 @@ impl Setting {
         let v_ref = v_ref(scenario.v_ref, &policy, file)?;
         suits(&policy, &nominal, v_ref, &trained_on.path)?;
         draws(&nominal, &scenario.load_steps, file)?;
-        if let Some(step) = scenario.load_steps.iter().find(|step| step.source.is_some()) {
-            let message = Message::new("a transfer has no steps of the source").found(step.to_string());
+        if let Some(step) = scenario.load_steps.iter().find(|step| step.keeps_load()) {
+            let message =
+                Message::new("a transfer has no steps of the source or the reference").found(step.to_string());
             let message = message.hint("both converters have source voltages of their own: `simulate` each of them");
             return Err(Fault::in_file(file, message).into());
         }

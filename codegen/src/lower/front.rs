@@ -10,7 +10,7 @@
 //! The one invariant: every operation is one rounding of the contract, in its order, and none of them depends on a flag, so
 //! the number of executed instructions does not depend on the measurement.
 
-use policy::{Expr, Feature, Filter, Input, Policy, Residual, Scalar};
+use policy::{Estimate, Expr, Feature, Filter, Input, Policy, Residual, Scalar};
 
 use crate::program::{Block, Front, Literal, Op, Push, ValueId};
 
@@ -25,8 +25,11 @@ pub fn lower(policy: &Policy) -> (Front, usize) {
         words: 0,
     };
     let (valid, all_valid) = builder.sanitise(policy);
-    for observer in &policy.observers {
-        let estimates = builder.observer(observer, policy.sample_period, &valid);
+    for (index, observer) in policy.observers.iter().enumerate() {
+        // what nothing reads is left out: compilers would warn of it
+        let is_read = policy.reads(Input::Estimate(index, Estimate::Surplus));
+        let hold = observer.hold.filter(|_| is_read);
+        let estimates = builder.observer(observer, hold, policy.sample_period, &valid);
         builder.estimates.push(estimates);
     }
     let mut clipped = Vec::new();
@@ -62,7 +65,7 @@ pub(super) struct Builder {
     pub(super) block: Block,
     pub(super) signals: Vec<ValueId>,
     /// Of each observer.
-    estimates: Vec<[ValueId; 3]>,
+    estimates: Vec<[ValueId; 4]>,
     pub(super) pushes: Vec<Push>,
     words: usize,
 }

@@ -8,7 +8,7 @@
 //! In: the observers of a policy. Out: values of the block in front of the features, and what `commit` pushes. The one
 //! invariant: both orders need the state's `previous_command` alone, so no observer waits for the network.
 
-use policy::{Estimate, InputVoltage, Observer};
+use policy::{Circuit, Estimate, Hold, InputVoltage, Observer, OnTime};
 
 use super::front::Builder;
 use crate::program::{Op, Push, ValueId};
@@ -22,8 +22,14 @@ struct Drive {
 }
 
 impl Builder {
-    /// The estimates of an observer; `valid` holds the flags of the signals.
-    pub fn observer(&mut self, observer: &Observer, period: f64, valid: &[ValueId]) -> [ValueId; 3] {
+    /// The estimates of an observer, among them its surplus at `hold`, or 0; `valid` holds the flags of the signals.
+    pub fn observer(
+        &mut self,
+        observer: &Observer,
+        hold: Option<Hold>,
+        period: f64,
+        valid: &[ValueId],
+    ) -> [ValueId; 4] {
         let first = self.reserve(observer.words());
         let kept = [0, 1, 2].map(|word| self.block.value(Op::Memory(first + word)));
         let now = Drive {
@@ -56,7 +62,12 @@ impl Builder {
                 value,
             });
         }
-        estimates
+        let [i, v, b] = estimates;
+        let surplus = match hold {
+            None => self.constant(0.0),
+            Some(hold) => self.surplus(observer, hold, [i, b], now, period),
+        };
+        [i, v, b, surplus]
     }
 
     /// Of this step, or of the one before from a word of the memory.
@@ -71,6 +82,10 @@ impl Builder {
     /// The same, or where an observer begins before the first good measurement.
     fn known(&mut self, observer: &Observer, x: [ValueId; 3]) -> [ValueId; 3] {
         let load_current = self.signals[observer.load_current];
+        let load_current = match observer.hold {
+            None => load_current,
+            Some(hold) => self.scaled(load_current, hold.start),
+        };
         let start = [
             self.clamped(observer, Estimate::Current, load_current),
             self.signals[observer.output_voltage],
@@ -104,12 +119,24 @@ impl Builder {
         })
     }
 
-    fn predicted(&mut self, observer: &Observer, [i, v, b]: [ValueId; 3], drive: Drive, period: f64) -> [ValueId; 3] {
+    fn predicted(&mut self, observer: &Observer, x: [ValueId; 3], drive: Drive, period: f64) -> [ValueId; 3] {
+        match observer.topology {
+            Circuit::Buck => self.buck(observer, x, drive, period),
+            Circuit::Boost | Circuit::BuckBoost => self.switched_output(observer, x, drive, period),
+        }
+    }
+
+    fn buck(&mut self, observer: &Observer, [i, v, b]: [ValueId; 3], drive: Drive, period: f64) -> [ValueId; 3] {
         let (d, u) = (drive.duty, drive.input_voltage);
         let (by_current, by_voltage) = (period / observer.inductance, period / observer.capacitance);
-        let square = self.block.value(Op::Mul(d, d));
-        let late = self.scaled(square, 0.5);
-        let moment = self.block.value(Op::Sub(d, late));
+        let moment = match observer.carrier {
+            OnTime::Trailing => {
+                let square = self.block.value(Op::Mul(d, d));
+                let late = self.scaled(square, 0.5);
+                self.block.value(Op::Sub(d, late))
+            }
+            OnTime::Centre => self.scaled(d, 0.5),
+        };
         let on = self.block.value(Op::Mul(u, moment));
         let half = self.scaled(v, 0.5);
         let driven = self.block.value(Op::Sub(on, half));
@@ -130,6 +157,73 @@ impl Builder {
         let step = self.scaled(driven, by_current);
         let end = self.block.value(Op::Add(i, step));
         [self.clamped(observer, Estimate::Current, end), next, b]
+    }
+
+    /// A boost or a buck-boost: the output receives the current while the switch is off.
+    fn switched_output(
+        &mut self,
+        observer: &Observer,
+        [i, v, b]: [ValueId; 3],
+        drive: Drive,
+        period: f64,
+    ) -> [ValueId; 3] {
+        let (d, u) = (drive.duty, drive.input_voltage);
+        let (by_current, by_voltage) = (period / observer.inductance, period / observer.capacitance);
+        let one = self.constant(1.0);
+        let off = self.block.value(Op::Sub(one, d));
+        let forward = match observer.topology {
+            Circuit::BuckBoost => self.block.value(Op::Mul(u, d)),
+            _ => u,
+        };
+        let driven = self.across(forward, off, v, b);
+        let mut mean = self.scaled(driven, 0.5);
+        if observer.carrier == OnTime::Trailing {
+            let on = self.block.value(Op::Mul(u, d));
+            let half = self.scaled(on, 0.5);
+            mean = self.block.value(Op::Add(mean, half));
+        }
+        let step = self.scaled(mean, by_current);
+        let mean = self.block.value(Op::Add(i, step));
+        let mean = self.clamped(observer, Estimate::Current, mean);
+        let received = self.block.value(Op::Mul(off, mean));
+        let surplus = self.block.value(Op::Sub(received, drive.load_current));
+        let step = self.scaled(surplus, by_voltage);
+        let next = self.block.value(Op::Add(v, step));
+        let next = self.clamped(observer, Estimate::Voltage, next);
+        let both = self.block.value(Op::Add(v, next));
+        let middle = self.scaled(both, 0.5);
+        let driven = self.across(forward, off, middle, b);
+        let step = self.scaled(driven, by_current);
+        let end = self.block.value(Op::Add(i, step));
+        [self.clamped(observer, Estimate::Current, end), next, b]
+    }
+
+    /// The mean voltage at the inductor of a boost or a buck-boost at the output voltage v.
+    fn across(&mut self, forward: ValueId, off: ValueId, v: ValueId, b: ValueId) -> ValueId {
+        let against = self.block.value(Op::Mul(off, v));
+        let driven = self.block.value(Op::Sub(forward, against));
+        self.block.value(Op::Add(driven, b))
+    }
+
+    /// What would charge the capacitor at the duty that holds the voltage.
+    fn surplus(&mut self, observer: &Observer, hold: Hold, [i, b]: [ValueId; 2], now: Drive, period: f64) -> ValueId {
+        let u = now.input_voltage;
+        let driven = self.block.value(Op::Add(u, b));
+        let share = self.scaled(driven, hold.share);
+        let mean = match observer.carrier {
+            OnTime::Centre => i,
+            OnTime::Trailing => {
+                let one = self.constant(1.0);
+                let duty = self.block.value(Op::Sub(one, share));
+                let on = self.block.value(Op::Mul(u, duty));
+                let half = self.scaled(on, 0.5);
+                let step = self.scaled(half, period / observer.inductance);
+                self.block.value(Op::Add(i, step))
+            }
+        };
+        let received = self.block.value(Op::Mul(share, mean));
+        let surplus = self.block.value(Op::Sub(received, now.load_current));
+        self.clamped(observer, Estimate::Surplus, surplus)
     }
 
     fn clamped(&mut self, observer: &Observer, estimate: Estimate, x: ValueId) -> ValueId {

@@ -104,7 +104,7 @@ pub(crate) fn sense(spec: Spec<'_>, state: &State, measurement: &[Term]) -> Sens
     sensed
 }
 
-fn observe(spec: Spec<'_>, state: &State, estimates: &[[Term; 3]], sensed: &mut Sensed) {
+fn observe(spec: Spec<'_>, state: &State, estimates: &[[Term; 4]], sensed: &mut Sensed) {
     let (terms, float) = (spec.terms, spec.float);
     for (feature, lines) in spec.policy.features.iter().zip(&state.memories) {
         let mut y = source(spec, &feature.source, state, &sensed.signals, estimates);
@@ -131,7 +131,7 @@ fn observe(spec: Spec<'_>, state: &State, estimates: &[[Term; 3]], sensed: &mut 
 }
 
 /// Section 3: every `+`, `-` and product with a constant is one rounding, as the tree stands.
-fn source(spec: Spec<'_>, expr: &Expr, state: &State, signals: &[Term], estimates: &[[Term; 3]]) -> Term {
+fn source(spec: Spec<'_>, expr: &Expr, state: &State, signals: &[Term], estimates: &[[Term; 4]]) -> Term {
     let float = spec.float;
     let of = |x: &Expr| source(spec, x, state, signals, estimates);
     match expr {
@@ -139,11 +139,12 @@ fn source(spec: Spec<'_>, expr: &Expr, state: &State, signals: &[Term], estimate
         Expr::Input(Input::PreviousDuty) => state.previous_duty,
         Expr::Input(Input::PreviousCommand) => state.previous_command,
         Expr::Input(Input::Estimate(index, estimate)) => {
-            let [current, voltage, bias] = estimates[*index];
+            let [current, voltage, bias, surplus] = estimates[*index];
             match estimate {
                 Estimate::Current => current,
                 Estimate::Voltage => voltage,
                 Estimate::Bias => bias,
+                Estimate::Surplus => surplus,
             }
         }
         Expr::Constant(value) => spec.nearest(*value),

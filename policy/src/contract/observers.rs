@@ -6,7 +6,7 @@ use super::{Taken, name, number_f32, range_f32};
 use crate::bounds::{self, Inputs, Overflow};
 use crate::catalogue;
 use crate::limits::MAX_OBSERVERS;
-use crate::model::{Estimate, Gains, Input, InputVoltage, Interval, Observer, Signal};
+use crate::model::{Circuit, Estimate, Gains, Hold, Input, InputVoltage, Interval, Observer, OnTime, Signal};
 use crate::names::Kind;
 
 /// The observers and what expressions may call; a faulty one leaves its names, lest every expression that uses them be
@@ -53,7 +53,7 @@ pub(crate) fn read<'a>(
         let written = item.peek("name").and_then(|value| value.as_text().map(str::to_owned));
         for (name, estimate) in written
             .iter()
-            .flat_map(|name| Estimate::ALL.map(|estimate| (name, estimate)))
+            .flat_map(|name| estimates_of(&item).map(move |estimate| (name, estimate)))
         {
             let input = Input::Estimate(index, estimate);
             observers.estimates.push((format!("{name}_{}", estimate.word()), input));
@@ -64,12 +64,21 @@ pub(crate) fn read<'a>(
     observers
 }
 
+/// Whatever else may be wrong with an entry: the surplus is there with a voltage to hold.
+fn estimates_of(item: &Value<'_>) -> impl Iterator<Item = Estimate> {
+    let has_surplus = item.peek("hold").is_some();
+    let surplus = has_surplus.then_some(Estimate::Surplus);
+    Estimate::STATE.into_iter().chain(surplus)
+}
+
 fn one(item: &Value<'_>, around: &Surroundings<'_>, taken: &mut Taken, faults: &mut Sink) -> Option<Observer> {
     let mut section = item.table("[[observer]]", faults)?;
     let hint = "an observer needs a name: with `name = \"model\"` its estimates are model_current, model_voltage and model_bias";
     let name = section
         .required("name", hint, faults)
-        .and_then(|value| estimates(&value, taken, faults));
+        .and_then(|value| estimates(item, &value, taken, faults));
+    let topology = word(&mut section, "topology", &Circuit::EACH, Circuit::Buck, faults);
+    let carrier = word(&mut section, "carrier", &OnTime::EACH, OnTime::Trailing, faults);
     let inductance = part(
         &mut section,
         "inductance",
@@ -104,27 +113,37 @@ fn one(item: &Value<'_>, around: &Surroundings<'_>, taken: &mut Taken, faults: &
     let bias = section
         .required("bias", hint, faults)
         .and_then(|value| around_zero(&value, faults));
+    let hold = section.optional("hold");
     section.finish(faults);
-    let output_voltage = output_voltage?;
+    let (output_voltage, load_current) = (output_voltage?, load_current?);
+    let (topology, input_voltage, current) = (topology?, input_voltage?, current?);
+    let loads = around.signals.get(load_current)?.as_ref()?.range;
+    let hold = match hold {
+        None => None,
+        Some(value) => Some(held(&value, topology, input_voltage, [current, loads], faults)?),
+    };
     Some(Observer {
         name: name?,
+        topology,
+        carrier: carrier?,
+        hold,
         inductance: inductance?,
         capacitance: capacitance?,
-        input_voltage: input_voltage?,
+        input_voltage,
         output_voltage,
-        load_current: load_current?,
+        load_current,
         compute_delay: compute_delay?,
         gains: gains?,
-        current: current?,
+        current,
         voltage: around.signals.get(output_voltage)?.as_ref()?.range,
         bias: bias?,
     })
 }
 
 /// The observer's name, if none of those of its estimates is taken.
-fn estimates(value: &Value<'_>, taken: &mut Taken, faults: &mut Sink) -> Option<String> {
+fn estimates(item: &Value<'_>, value: &Value<'_>, taken: &mut Taken, faults: &mut Sink) -> Option<String> {
     let own = name(value, Kind::Observer, taken, faults)?;
-    for estimate in Estimate::ALL {
+    for estimate in estimates_of(item) {
         let called = format!("{own}_{}", estimate.word());
         if let Err(message) = super::taken_once(&called, Kind::Estimate, taken) {
             faults.push(value.fault(message));
@@ -132,6 +151,74 @@ fn estimates(value: &Value<'_>, taken: &mut Taken, faults: &mut Sink) -> Option<
         }
     }
     Some(own)
+}
+
+/// One of some words, or the usual one.
+fn word<T: Copy>(
+    section: &mut Table<'_>,
+    key: &'static str,
+    each: &[(&'static str, T)],
+    usual: T,
+    faults: &mut Sink,
+) -> Option<T> {
+    let Some(value) = section.optional(key) else {
+        return Some(usual);
+    };
+    let text = value.text(faults)?;
+    let found = each.iter().find(|(word, _)| *word == text);
+    if found.is_none() {
+        let words: Vec<&str> = each.iter().map(|(word, _)| *word).collect();
+        faults.push(value.fault(catalogue::unknown_name(key, text, &words)));
+    }
+    found.map(|(_, of)| *of)
+}
+
+/// The voltage to hold, with what the surplus is clamped to.
+fn held(
+    value: &Value<'_>,
+    topology: Circuit,
+    source: InputVoltage,
+    [current, loads]: [Interval; 2],
+    faults: &mut Sink,
+) -> Option<Hold> {
+    let voltage = value.positive(faults)?;
+    let whole = match (topology, source) {
+        (Circuit::Buck, _) => {
+            faults.push(value.fault(catalogue::no_surplus(
+                "a buck converter",
+                "its output receives the whole current: a source `model_current - i_out` says it",
+            )));
+            return None;
+        }
+        (Circuit::Boost, _) => voltage,
+        (Circuit::BuckBoost, InputVoltage::Constant(volts)) => volts + voltage,
+        (Circuit::BuckBoost, InputVoltage::Signal(_)) => {
+            faults.push(value.fault(catalogue::no_surplus(
+                "a buck-boost converter whose input voltage is a signal",
+                "the output's share of the current would need a division: give the input voltage as a number, or leave `hold` out",
+            )));
+            return None;
+        }
+    };
+    let share = 1.0 / whole;
+    let start = match source {
+        InputVoltage::Constant(volts) => whole / volts,
+        InputVoltage::Signal(_) => 1.0,
+    };
+    if !super::fits_f32(share) || !super::fits_f32(start) {
+        faults.push(value.fault(catalogue::not_in_f32("hold", voltage)));
+        return None;
+    }
+    Some(Hold {
+        voltage,
+        share,
+        start,
+        // a share of 0 to 1 of the current, less the load
+        range: Interval {
+            low: current.low.min(0.0) - loads.high,
+            high: current.high.max(0.0) - loads.low,
+        },
+    })
 }
 
 /// A coil or a capacitor.
@@ -177,7 +264,7 @@ fn input_voltage(value: &Value<'_>, around: &Surroundings<'_>, faults: &mut Sink
 fn gains(section: &mut Table<'_>, faults: &mut Sink) -> Option<Gains> {
     let hint = "what one volt of error corrects: `gains = { current = 0.07, voltage = 0.1, bias = 0.002 }`";
     let mut table = section.required("gains", hint, faults)?.table("gains", faults)?;
-    let [current, voltage, bias] = Estimate::ALL.map(|estimate| {
+    let [current, voltage, bias] = Estimate::STATE.map(|estimate| {
         let value = table.required(estimate.word(), hint, faults)?;
         number_f32(&value, faults)
     });

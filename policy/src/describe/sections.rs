@@ -2,7 +2,8 @@
 
 use crate::describe::formula::formula;
 use crate::model::{
-    Continuous, Estimate, Fallback, Head, Input, InputVoltage, Interval, Mapping, Policy, Residual, Squash,
+    Circuit, Continuous, Estimate, Fallback, Head, Input, InputVoltage, Interval, Mapping, Observer, OnTime, Policy,
+    Residual, Squash,
 };
 
 /// Characters of a line of actions, with which it still fits into a terminal beside its indentation.
@@ -58,21 +59,37 @@ pub fn observers(policy: &Policy) -> String {
             _ => "the duty acts one period later",
         };
         out += &format!(
-            "  {}: L {} H, C {} F, V {source}, corrected by {}, loaded by {}; {delay}\n",
+            "  {}: {}L {} H, C {} F, V {source}, corrected by {}, loaded by {}; {delay}\n",
             own.name,
+            circuit(own),
             own.inductance,
             own.capacitance,
             name(own.output_voltage),
             name(own.load_current)
         );
         let gains = [own.gains.current, own.gains.voltage, own.gains.bias];
-        for (estimate, gain) in Estimate::ALL.into_iter().zip(gains) {
+        for (estimate, gain) in Estimate::STATE.into_iter().zip(gains) {
             let called = Input::Estimate(index, estimate).name(&policy.signals, &policy.observers);
             let (range, unit) = (range(own.range(estimate)), estimate.unit());
             out += &format!("    {called}  {range} {unit}, {gain} {unit}/V\n");
         }
+        if let Some(hold) = own.hold {
+            let called = Input::Estimate(index, Estimate::Surplus).name(&policy.signals, &policy.observers);
+            out += &format!("    {called}  {} A, at {} V\n", range(hold.range), hold.voltage);
+        }
     }
     out
+}
+
+/// What differs from a buck converter whose switch turns on first.
+fn circuit(own: &Observer) -> String {
+    let word = Circuit::EACH.iter().find(|(_, each)| *each == own.topology);
+    let word = word.map_or("", |(word, _)| word);
+    match (own.topology, own.carrier) {
+        (Circuit::Buck, OnTime::Trailing) => String::new(),
+        (_, OnTime::Trailing) => format!("{word}, "),
+        (_, OnTime::Centre) => format!("{word}, on in the middle of the period, "),
+    }
 }
 
 /// Features as formulas with their bounds, and the ranges that the golden vectors have of them.

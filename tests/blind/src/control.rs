@@ -240,6 +240,7 @@ pub fn close(bench: &Bench, policy: &Policy) -> Result<Figures, Error> {
             kind: LoadKind::Power,
             values,
             source: None,
+            reference: None,
         };
         let instant = task.all_instants()[0];
         let run = follow(&converter, &mut agent, v_ref, &task, step, instant)?;

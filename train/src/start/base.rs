@@ -1,13 +1,13 @@
 //! What the network adds to: a law, behind an observer where there is one.
 
-use closed_loop::design::{CurrentLaw, Design};
+use closed_loop::design::{CurrentLaw, Design, Nominal};
 
 /// A law of control and what it needs.
 #[derive(Debug, Clone)]
 pub(super) enum Base {
-    /// Of a buck converter, whose inductor current is estimated.
+    /// The inductor current is estimated.
     Observed(Design),
-    /// Of another one, whose inductor current is measured.
+    /// It is measured, in a boost or a buck-boost.
     Measured {
         /// The law.
         law: CurrentLaw,
@@ -16,35 +16,13 @@ pub(super) enum Base {
     },
 }
 
-/// Picks the same field of either.
-macro_rules! either {
-    ($base:expr, $field:ident) => {
-        match $base {
-            Base::Observed(design) => design.$field.clone(),
-            Base::Measured { law, .. } => law.$field.clone(),
-        }
-    };
-}
-
 impl Base {
-    pub fn has_diode(&self) -> bool {
-        either!(self, has_diode)
-    }
-
-    pub fn period(&self) -> f64 {
-        either!(self, period)
-    }
-
-    pub fn v_in(&self) -> f64 {
-        either!(self, v_in)
-    }
-
-    pub fn inductance(&self) -> f64 {
-        either!(self, inductance)
-    }
-
-    pub fn capacitance(&self) -> f64 {
-        either!(self, capacitance)
+    /// The converter that it is made for.
+    pub fn nominal(&self) -> &Nominal {
+        match self {
+            Self::Observed(design) => &design.nominal,
+            Self::Measured { law, .. } => &law.nominal,
+        }
     }
 
     /// Standard deviation of the measured output voltage, V.
@@ -55,36 +33,17 @@ impl Base {
         }
     }
 
-    /// The load current at which a diode just lets the current flow throughout the period, A.
-    pub fn least_load(&self) -> f64 {
-        match self {
-            Self::Observed(design) => design.half_ripple,
-            Self::Measured { law, .. } => law.half_ripple * law.give,
-        }
-    }
-
-    /// The duty at rest, without losses.
-    pub fn rest(&self) -> f64 {
-        match self {
-            Self::Observed(design) => design.v_ref / design.v_in,
-            Self::Measured { law, .. } => law.rest,
-        }
-    }
-
     /// Control periods in which the law brings back a voltage that no effort can hurry, beside what the limit takes.
     pub fn patience(&self) -> f64 {
-        match self {
-            Self::Observed(_) => 0.0,
-            // four time constants: 2 % is left, of a deviation that is a few bands
-            Self::Measured { law, .. } => 4.0 * law.loop_periods(),
-        }
+        // four time constants: 2 % is left, of a deviation that is a few bands
+        self.nominal().loop_periods().map_or(0.0, |periods| 4.0 * periods)
     }
 
     /// What the settling time is granted beside the limit's.
     pub fn patience_in_words(&self) -> &'static str {
-        match self {
-            Self::Observed(_) => "ten periods",
-            Self::Measured { .. } => "ten periods, and four time constants of its loop",
+        match self.nominal().loop_periods() {
+            None => "ten periods",
+            Some(_) => "ten periods, and four time constants of its loop",
         }
     }
 
@@ -93,14 +52,6 @@ impl Base {
         match self {
             Self::Observed(_) => "the observer has to find the other parts first",
             Self::Measured { .. } => "the law is not made for these parts",
-        }
-    }
-
-    /// The name of the converter.
-    pub fn word(&self) -> &'static str {
-        match self {
-            Self::Observed(_) => "buck",
-            Self::Measured { law, .. } => law.topology.word(),
         }
     }
 
@@ -152,19 +103,17 @@ impl Base {
 
     /// What else stands in the tables of the scenario, as its opening comment goes on.
     pub fn beside_it(&self) -> &'static str {
-        match self {
-            Self::Observed(_) => "a PID controller that\n# measures the voltage, and what no controller can beat.",
-            Self::Measured { .. } => {
-                "classical controllers\n# that measure voltage and currents, and what no controller can beat."
-            }
+        match self.nominal().loop_periods() {
+            None => "a PID controller that\n# measures the voltage, and what no controller can beat.",
+            Some(_) => "classical controllers\n# that measure voltage and currents, and what no controller can beat.",
         }
     }
 
     /// Classical controllers of the scenario, as a list of the file.
     pub fn baselines(&self) -> &'static str {
-        match self {
-            Self::Observed(_) => "\"pid\"",
-            Self::Measured { .. } => "\"cascade\", \"feed-forward\", \"deadbeat\"",
+        match self.nominal().loop_periods() {
+            None => "\"pid\"",
+            Some(_) => "\"cascade\", \"feed-forward\", \"deadbeat\"",
         }
     }
 }

@@ -43,7 +43,7 @@ pub struct Start {
     spread: Vec<(f64, [(LoadStep, Limit); 2])>,
     v_out: Channel,
     i_out: Channel,
-    /// Measured where there is no observer.
+    /// Measured by the classical controllers of a boost or a buck-boost, and by the law itself where there is no observer.
     i_l: Option<Channel>,
 }
 
@@ -61,10 +61,6 @@ struct Channel {
 const LARGEST_DUTY: f64 = 0.95;
 /// Steps of an assumed converter: 12 bits, which every microcontroller with a PWM timer has.
 const STEPS: f64 = 4096.0;
-/// Double pole of the law.
-// of .3, .4, .5 and .6 the one whose law, with L and C 15 % low, stayed within 7 % of the limit on the four
-// examples/plants/buck-*.toml: .4 exceeds it by 23 % on one of them, .6 by 13 %
-const POLE: f64 = 0.5;
 /// Factors on inductance and capacitance at which the policy has to hold as well.
 // what a print allows: inductors are 20 % and film or polymer capacitors 10 to 20 % parts; both off to one side is rarer
 const SPREAD: [f64; 2] = [0.85, 1.15];
@@ -93,12 +89,12 @@ impl Start {
             load: 1.2 * largest,
             noise,
             model: None,
-            pole: POLE,
+            pole: None,
         };
         let topology = plant.converter.topology;
-        match topology {
-            Topology::Buck => Design::new(plant, asked(Some(v_ref / STEPS))).map(|_| ())?,
-            Topology::Boost | Topology::BuckBoost => CurrentLaw::new(plant, v_ref, largest, file).map(|_| ())?,
+        match measures_inductor(plant) {
+            false => Design::new(plant, asked(Some(v_ref / STEPS))).map(|_| ())?,
+            true => CurrentLaw::new(plant, v_ref, largest).map(|_| ())?,
         }
         holds_power(plant, v_ref, file)?;
         let needed = topology.duty(plant.converter.v_in, v_ref);
@@ -132,10 +128,10 @@ impl Start {
         let i_out = Channel::new(&plant.sensors.i_out, [-rounded(0.05 * i_full, 1), i_full]);
         Ok(Self {
             wanted,
-            base: match topology {
-                Topology::Buck => Base::Observed(Design::new(plant, asked(v_out.assumed.map(noise)))?),
-                Topology::Boost | Topology::BuckBoost => Base::Measured {
-                    law: CurrentLaw::new(plant, v_ref, largest, file)?,
+            base: match measures_inductor(plant) {
+                false => Base::Observed(Design::new(plant, asked(v_out.assumed.map(noise)))?),
+                true => Base::Measured {
+                    law: CurrentLaw::new(plant, v_ref, largest)?,
                     noise: noise(
                         v_out
                             .assumed
@@ -170,19 +166,20 @@ impl Start {
                     .to_owned(),
             );
         }
-        if self.i_l.is_some() {
+        if matches!(self.base, Base::Measured { .. }) {
             notes.push(
-                "an observer is built for the buck converter alone: this contract measures the inductor current, and its law has no \
+                "the plant file has a sensor of the inductor current: this contract measures it, and its law has neither observer nor \
                  integral, so losses leave the voltage a little beside its reference"
                     .to_owned(),
             );
         }
         let smallest = self.wanted.loads[0] / self.wanted.v_ref;
-        if self.base.has_diode() && smallest < self.base.least_load() {
+        let nominal = self.base.nominal();
+        if nominal.has_diode && smallest < nominal.least_load() {
             notes.push(format!(
                 "at {} W the diode stops the current in every period, below {:.3} A of load: the law is made for one that flows, and the \
                  voltage will rest beside {} V there",
-                self.wanted.loads[0], self.base.least_load(), self.wanted.v_ref
+                self.wanted.loads[0], nominal.least_load(), self.wanted.v_ref
             ));
         }
         notes
@@ -218,6 +215,13 @@ impl Channel {
             assumed: is_ideal.then_some([step, step]),
         }
     }
+}
+
+/// Whether the plant file says how the inductor current is measured, where a law can do without the observer: that of a boost or a
+/// buck-boost.
+fn measures_inductor(plant: &Parameters) -> bool {
+    let sensor = &plant.sensors.i_l;
+    plant.converter.topology != Topology::Buck && (sensor.noise > 0.0 || sensor.lsb > 0.0)
 }
 
 /// Standard deviation of a step and a noise: a rounding is spread evenly over its step.

@@ -4,6 +4,7 @@ use closed_loop::LoadStep;
 use closed_loop::design::rounded;
 use closed_loop::limit::Limit;
 
+use super::base::Base;
 use super::{Channel, Start, largest_of};
 
 /// Name of the training file.
@@ -64,11 +65,11 @@ impl Start {
              hold = 3                               # periods that a bad sample is bridged\n",
             self.converter(),
             base.story(),
-            base.period(),
+            base.nominal().period,
             self.v_out.signal("v_out", "V"),
-            match self.i_l {
-                None => String::new(),
-                Some(channel) => format!("{}\n", channel.signal("i_l", "A")),
+            match (&self.base, self.i_l) {
+                (Base::Measured { .. }, Some(channel)) => format!("{}\n", channel.signal("i_l", "A")),
+                _ => String::new(),
             },
             self.i_out.signal("i_out", "A"),
             base.observer(),
@@ -84,7 +85,7 @@ impl Start {
             base.law(),
             rounded(0.25 / volts, 2),
             rounded(1.0 / amperes, 2),
-            rounded(base.rest(), 3),
+            rounded(base.nominal().rest, 3),
         )
     }
 
@@ -206,7 +207,7 @@ impl Start {
     fn most_settling(&self, limits: &[(LoadStep, Limit); 2], periods: f64) -> f64 {
         rounded(
             2.0 * largest_of(limits, |limit| limit.worst.settling)
-                + (periods + self.base.patience()) * self.base.period(),
+                + (periods + self.base.patience()) * self.base.nominal().period,
             3,
         )
     }
@@ -238,18 +239,22 @@ impl Start {
                 none if none.is_empty() => "\n[set]\n".to_owned(),
                 some => some,
             },
-            off(self.base.inductance()),
-            off(self.base.capacitance()),
+            off(self.base.nominal().inductance),
+            off(self.base.nominal().capacitance),
         )
     }
 
     fn converter(&self) -> String {
         let base = &self.base;
         let [low, high] = self.wanted.loads;
-        let (v_in, v_ref, kilohertz) = (base.v_in(), self.wanted.v_ref, rounded(1e-3 / base.period(), 4));
+        let (v_in, v_ref, kilohertz) = (
+            base.nominal().v_in,
+            self.wanted.v_ref,
+            rounded(1e-3 / base.nominal().period, 4),
+        );
         format!(
             "a {} converter from {v_in} V to {v_ref} V at {kilohertz} kHz, {low} to {high} W",
-            base.word()
+            base.nominal().topology.word()
         )
     }
 

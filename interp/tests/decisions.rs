@@ -35,7 +35,7 @@ fn chooser(golden: Golden) -> Policy {
 fn choices(policy: &Policy, allowed: Option<f64>) -> Choices {
     match decisions(policy, allowed).unwrap() {
         Decisions::Choice(choices) => choices,
-        Decisions::Continuous(duties) => panic!("{duties:?}"),
+        other => panic!("{other:?}"),
     }
 }
 

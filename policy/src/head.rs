@@ -99,6 +99,9 @@ pub enum Squash {
 pub struct Schedule {
     /// Affine law in signals and estimates that the products are added to; its value is a duty.
     pub base: Source,
+    /// Sound bound of the base in f32 arithmetic, over all plausible measurements.
+    #[serde(skip)]
+    pub base_bound: Interval,
     /// In the order of the network's outputs, which is that of the sum.
     pub gains: Vec<Gain>,
     /// Where all of these hold the base alone is commanded; nowhere if there are none.

@@ -44,9 +44,10 @@ pub(super) fn read(
     Some(Actions {
         head: Head::Schedule(Schedule {
             base: law?,
+            base_bound: Interval { low: 0.0, high: 0.0 },
             gains: gains?,
             dead_zone: zone?,
-            // filled in by `residual::limited`, when they have been read
+            // both are filled in later: by `bounded`, and by `residual::limited` when the limits have been read
             limits: Interval { low: 0.0, high: 1.0 },
         }),
         outputs: items.len(),
@@ -125,7 +126,7 @@ fn factor(
     }
 }
 
-/// Fills in the bounds of all factors; a fault if a product or a partial sum could leave the format.
+/// Fills in the bounds of base and factors; a fault if a product or a partial sum could leave the format.
 pub(crate) fn bounded(
     head: &mut Head,
     features: &[Feature],
@@ -148,6 +149,7 @@ fn sums(
 ) -> Result<(), (String, Overflow)> {
     let base = bounds::expression(&head.base.tree, inputs);
     let mut sum = base.map_err(|overflow| (format!("`{}` in [actions]", head.base.text), overflow))?;
+    head.base_bound = sum.interval();
     for (index, gain) in head.gains.iter_mut().enumerate() {
         let within = |overflow| (format!("the sum of the law up to gain {index}"), overflow);
         let factor = match &gain.factor {

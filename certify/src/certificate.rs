@@ -94,8 +94,8 @@ impl Certificate {
     #[must_use]
     pub fn duty_span(&self) -> Option<f64> {
         let of_law = |head: &Schedule| head.limits.high - head.limits.low;
-        let actor = self.continuous.as_ref().map(Continuous::span);
-        actor.or_else(|| self.schedule.as_ref().map(of_law))
+        let of_actor = self.continuous.as_ref().map(Continuous::span);
+        of_actor.or_else(|| self.schedule.as_ref().map(of_law))
     }
 
     /// Bounds, shares and map of a policy; `uniform` draws from 0..1.

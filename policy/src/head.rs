@@ -189,6 +189,16 @@ impl Head {
         }
     }
 
+    /// Distance between the least and the largest duty of a head without a choice: the unit of errors of its duty.
+    #[must_use]
+    pub fn duty_span(&self) -> Option<f64> {
+        match self {
+            Head::Choice(_) | Head::Residual(_) => None,
+            Head::Continuous(head) => Some(head.span()),
+            Head::Schedule(head) => Some(head.limits.high - head.limits.low),
+        }
+    }
+
     /// Whether it chooses one of several actions.
     #[must_use]
     pub fn is_choice(&self) -> bool {

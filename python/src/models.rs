@@ -28,6 +28,7 @@ pub fn import_model(
         actions,
         inside,
         vecnormalize,
+        ..import::Options::default()
     };
     let new = py
         .detach(|| import::new_policy(&file, &contract, &options))

@@ -18,6 +18,7 @@ use toml_input::{FileName, Message};
 use crate::activations;
 use crate::actor::{self, Actor, Squash};
 use crate::network::{Layer, Network};
+use crate::recognise;
 use model::{Constant, Graph, Node};
 
 /// What a graph computes.
@@ -37,11 +38,17 @@ pub(crate) fn is_model(bytes: &[u8]) -> bool {
     bytes.first() == Some(&8) && bytes.get(8) != Some(&b'{')
 }
 
-/// Reads a model.
-pub(crate) fn read(file: &FileName, bytes: &[u8]) -> Result<Model, Message> {
+/// Reads a model, of which one output may be picked, or all may be gains.
+pub(crate) fn read(
+    file: &FileName,
+    bytes: &[u8],
+    (picked, gains): (Option<usize>, bool),
+) -> Result<Model, Message> {
     let graph = model::read(file, bytes)?;
     let mut walk = Walk {
         graph: &graph,
+        picked,
+        gains,
         affine: None,
         clip: None,
         layers: Vec::new(),
@@ -71,6 +78,9 @@ pub(crate) fn read(file: &FileName, bytes: &[u8]) -> Result<Model, Message> {
             bent.value.clone_into(&mut value);
             continue;
         }
+        if let Some(node) = normed(&takers) {
+            return Err(recognise::layer_norm().found(named(node)).hint(LAYER_NORM));
+        }
         if takers.is_empty() {
             let nodes: Vec<String> = graph.nodes.iter().take(4).map(named).collect();
             return Err(other(
@@ -99,6 +109,19 @@ pub(crate) fn read(file: &FileName, bytes: &[u8]) -> Result<Model, Message> {
     ))
 }
 
+/// The way out of a norm over the values of a step.
+const LAYER_NORM: &str = "it divides by the deviation of the values of each step, which no dense layer can hold; train without it, or with \
+                          BatchNorm1d, which is folded: the exporter does so in evaluation";
+
+/// A norm over the values of a step: one node, or several that begin with a mean over the values. Only such a norm takes that.
+fn normed<'a>(takers: &[&'a Node]) -> Option<&'a Node> {
+    let is_norm = |node: &&&Node| {
+        let operation = node.operation.as_str();
+        operation == "ReduceMean" || operation == "RMSNormalization" || operation.ends_with("LayerNormalization")
+    };
+    takers.iter().find(is_norm).copied()
+}
+
 fn named(node: &Node) -> String {
     format!("{} `{}`", node.operation.escape_debug(), node.name.escape_debug())
 }
@@ -109,6 +132,10 @@ fn other(what: &str, found: &str, expected: &str) -> Message {
 
 struct Walk<'a> {
     graph: &'a Graph,
+    /// The output that is the duty.
+    picked: Option<usize>,
+    /// The outputs are gains.
+    gains: bool,
     /// `scale * x + offset` of each input, or one for all.
     affine: Option<(Vec<f64>, Vec<f64>)>,
     clip: Option<(f64, f64)>,
@@ -185,7 +212,8 @@ impl Walk<'_> {
 
     /// Whether the last layer has one output, and something makes a command of it.
     fn is_one(&self) -> bool {
-        self.layers.last().is_some_and(|layer| layer.outputs == 1)
+        let is_known = self.picked.is_some() || self.gains;
+        self.layers.last().is_some_and(|layer| is_known || layer.outputs == 1)
     }
 
     fn is_command(&self) -> bool {
@@ -282,7 +310,13 @@ impl Walk<'_> {
         if self.layers.is_empty() {
             return self.before(node, &steps);
         }
-        if let ([(scale, shift)], true) = (steps.as_slice(), self.is_command()) {
+        let of_all = self.layers.last().is_some_and(|layer| layer.outputs == steps.len());
+        let own = match (steps.as_slice(), self.picked) {
+            ([one], _) => Some(*one),
+            (several, Some(output)) if of_all => several.get(output).copied(),
+            _ => None,
+        };
+        if let (Some((scale, shift)), true) = (own, self.is_command()) {
             let (own, offset) = self.scaled.unwrap_or((1.0, 0.0));
             self.scaled = Some((own * scale, offset * scale + shift));
             return Ok(());
@@ -329,7 +363,7 @@ impl Walk<'_> {
         let actor = match self.activations.pop() {
             Some(Some(last)) if Squash::curve(last).is_some() => {
                 let outputs = self.layers.last().map_or(0, |layer| layer.outputs);
-                if outputs != 1 {
+                if !self.is_one() {
                     return Err(actor::several(outputs));
                 }
                 Some(Actor {
@@ -376,14 +410,18 @@ impl Walk<'_> {
                 "the normalisation of the graph is scale, offset and clip of the features, computed in f64".to_owned(),
             );
         }
+        let mut network = Network {
+            layers: self.layers,
+            plain: false,
+            choice_only: false,
+            definition: None,
+            said: self.said,
+        };
+        if let Some(output) = self.picked {
+            network.keep_output(output)?;
+        }
         Ok(Model {
-            network: Network {
-                layers: self.layers,
-                plain: false,
-                choice_only: false,
-                definition: None,
-                said: self.said,
-            },
+            network,
             activations: self
                 .activations
                 .into_iter()

@@ -203,8 +203,9 @@ fn source(program: &Program) -> Source {
     let soft_cap = program.advance.soft_cap.map(|value| advance.operand(value));
     let (answer, answered) = match program.head {
         Head::Choice(_) => ("uint32_t", "index"),
-        // of gains the template makes an array
-        Head::Output { .. } | Head::Gains { .. } => (number::kind(program.scalar()).name, "output"),
+        Head::Output { .. } => (number::kind(program.scalar()).name, "output"),
+        // the template makes an array of them
+        Head::Gains { .. } => (number::kind(program.scalar()).name, "outputs"),
     };
     Source {
         common: common(program),

@@ -239,7 +239,9 @@ fn tianshou(names: &Names<'_>, known: &Known) -> Option<Definition> {
             ..defined(Squash::Unknown, None, said)
         });
     }
-    let is_one = names.outputs("last.model") == Some(1) && known.actions.is_none_or(|actions| actions == 1);
+    let outputs = names.outputs("last.model");
+    let is_said = outputs.is_some() && (known.output.is_some() || known.gains);
+    let is_one = is_said || outputs == Some(1) && known.actions.is_none_or(|actions| actions == 1);
     let said = "Tianshou's ContinuousActorDeterministic (TD3, DDPG) by the names of its tensors: the action is max_action * tanh(last), which is \
                 scaled to the action space";
     is_one.then(|| Definition {
@@ -254,7 +256,8 @@ fn rllib(names: &Names<'_>, known: &Known) -> Result<Option<Definition>, Refusal
     };
     let is_free = names.leaf("log_std").is_some();
     let is_command = is_free || known.actions == Some(1);
-    if outputs == 2 && !is_free && known.actions.is_none() {
+    let is_said = known.output.is_some() || known.gains;
+    if outputs == 2 && !is_free && known.actions.is_none() && !is_said {
         return Err(two_or_one("pi.net.mlp"));
     }
     if !is_command {
@@ -311,6 +314,7 @@ fn torchrl(names: &Names<'_>, known: &Known) -> Result<Option<Definition>, Refus
         return Ok(None);
     }
     match known.actions {
+        None if known.output.is_some() || known.gains => Ok(None),
         None => Err(two_or_one("module.0.module")),
         Some(1) => {
             let said = "TorchRL's NormalParamExtractor by --actions 1: the first of two outputs is the mean, which a TanhNormal squashes by tanh and a \

@@ -53,8 +53,20 @@ fn cleanrl() -> Vec<Row> {
         row(
             "CleanRL TD3, three commands",
             with(ending(fc, 3), several),
-            Refused(&["commands several numbers", "3 outputs"]),
+            Refused(&["commands several numbers", "3 outputs", "--output N", "--gains"]),
         ),
+        row(
+            "CleanRL TD3, the first of three commands",
+            with(ending(fc, 3), several),
+            Actor(names(fc), &["squash = \"tanh\"", "output 0 of 3 is the duty; 1 and 2 are left out"]),
+        )
+        .output(0),
+        row(
+            "CleanRL TD3, a fourth of three commands",
+            with(ending(fc, 3), several),
+            Refused(&["--output names none", "0 to 2"]),
+        )
+        .output(3),
         row(
             "CleanRL SAC",
             with([ending(sac, 1), deviation].concat(), buffers),
@@ -78,8 +90,17 @@ fn cleanrl() -> Vec<Row> {
             ppo(2),
             Refused(&["commands several numbers"]),
         ),
+        row(
+            "CleanRL PPO, the first of two commands",
+            ppo(2),
+            Actor(names(mean), &["output 0 of 2 is the duty; 1 is left out"]),
+        )
+        .output(0),
     ]
 }
+
+/// What is said of a command that was picked.
+const OF_TWO: &[&str] = &["output 0 of 2 is the duty; 1 is left out", "continuous = {"];
 
 fn stable_baselines() -> Vec<Row> {
     let sac = |prefix: &str, outputs: usize| -> Tensors {
@@ -132,6 +153,13 @@ fn stable_baselines() -> Vec<Row> {
             sac("", 2),
             Refused(&["commands several numbers"]),
         ),
+        row("SB3 SAC, the first of two commands", sac("", 2), Actor(stems.clone(), OF_TWO)).output(0),
+        row(
+            "SB3 TD3, the first of two commands",
+            ending(td3, 2),
+            Actor(names(td3), OF_TWO),
+        )
+        .output(0),
         row(
             "SB3 SAC with use_sde",
             with(
@@ -213,6 +241,12 @@ fn tianshou() -> Vec<Row> {
             [ending(mean, 2), dense("sigma.model.0", 2, 16)].concat(),
             Refused(&["commands several numbers"]),
         ),
+        row(
+            "Tianshou SAC, the first of two commands",
+            [ending(mean, 2), dense("sigma.model.0", 2, 16)].concat(),
+            Actor(names(mean), OF_TWO),
+        )
+        .output(0),
     ]
 }
 
@@ -257,6 +291,12 @@ fn rllib() -> Vec<Row> {
             Actor(names(stems), parts),
         ),
         row(
+            "RLlib PPO, free_log_std, the first of two commands",
+            with(ppo(2), &[("pi.log_std", &[2])]),
+            Actor(names(stems), OF_TWO),
+        )
+        .output(0),
+        row(
             "RLlib SAC",
             [ending(sac, 2), critics.concat()].concat(),
             Actor(names(sac), sac_parts),
@@ -275,6 +315,7 @@ fn torchrl() -> Vec<Row> {
     let stems = ["module.0.module.0", "module.0.module.2", "module.0.module.4"];
     let inner = ["module.0.module.0.0", "module.0.module.0.2", "module.0.module.0.4"];
     let ends: &[(&str, &[usize])] = &[("module.1.action_low", &[]), ("module.1.action_high", &[])];
+    let two_ends: &[(&str, &[usize])] = &[("module.1.action_low", &[2]), ("module.1.action_high", &[2])];
     let parts: &[&str] = &["continuous = { squash = \"tanh\", scale = ", "TorchRL's TanhModule"];
     let open: &[&str] = &["the first output is read, the mean", "continuous = { squash = \"TODO\""];
     vec![
@@ -283,6 +324,17 @@ fn torchrl() -> Vec<Row> {
             with(ending(stems, 1), ends),
             Actor(names(stems), parts),
         ),
+        row(
+            "TorchRL TD3, two commands",
+            with(ending(stems, 2), two_ends),
+            Refused(&["commands several numbers"]),
+        ),
+        row(
+            "TorchRL TD3, the first of two commands",
+            with(ending(stems, 2), two_ends),
+            Actor(names(stems), OF_TWO),
+        )
+        .output(0),
         row(
             "TorchRL PPO, SAC, or two actions",
             ending(inner, 2),
@@ -336,6 +388,12 @@ fn unnamed() -> Vec<Row> {
             Actor(names(own), open),
         )
         .actions(1),
+        row(
+            "three outputs, of which one is the command",
+            ending(own, 3),
+            Actor(names(own), &["output 0 of 3 is the duty", "continuous = { squash = \"TODO\""]),
+        )
+        .output(0),
         row(
             "mean and deviation as two sequences",
             gaussian_of_sequences,

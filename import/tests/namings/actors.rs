@@ -142,7 +142,7 @@ fn stable_baselines() -> Vec<Row> {
     };
     let ppo_parts: &[&str] = &["continuous = { clip = [\"TODO\", \"TODO\"] }", "# tanh unless you gave"];
     vec![
-        row("SB3 SAC actor", sac("", 1), Actor(stems, sac_parts)),
+        row("SB3 SAC actor", sac("", 1), Actor(stems.clone(), sac_parts)),
         row(
             "SB3 SAC policy",
             [sac("actor.", 1), critics.clone()].concat(),
@@ -153,7 +153,7 @@ fn stable_baselines() -> Vec<Row> {
             sac("", 2),
             Refused(&["commands several numbers"]),
         ),
-        row("SB3 SAC, the first of two commands", sac("", 2), Actor(stems.clone(), OF_TWO)).output(0),
+        row("SB3 SAC, the first of two commands", sac("", 2), Actor(stems, OF_TWO)).output(0),
         row(
             "SB3 TD3, the first of two commands",
             ending(td3, 2),

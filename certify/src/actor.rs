@@ -11,7 +11,11 @@ pub(crate) const TINY_32: f64 = 1e-40;
 ///
 /// The duty is `scale * s + offset`, and `s` moves by at most its largest slope times the error, wherever between the two outputs.
 pub(crate) fn duty_bound(head: &Continuous, real: Interval, error: f64) -> f64 {
-    let Squashed { error: squashed, own, largest } = squashed(Some(head.squash), real, error);
+    let Squashed {
+        error: squashed,
+        own,
+        largest,
+    } = squashed(Some(head.squash), real, error);
     let scale = head.scale.abs();
     // scale, offset, product and sum are rounded once each, at magnitudes of at most these
     let rounded = 4.0 * UNIT_32 * (scale * largest + head.offset.abs()) + TINY_32;

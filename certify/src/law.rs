@@ -73,7 +73,11 @@ mod tests {
         Schedule {
             gains: vec![
                 gain(Some(Squash::Curve(Activation::Tanh)), FACTORS[0], None),
-                gain(Some(Squash::Clip(Interval { low: -1.0, high: 0.5 })), FACTORS[1], limits),
+                gain(
+                    Some(Squash::Clip(Interval { low: -1.0, high: 0.5 })),
+                    FACTORS[1],
+                    limits,
+                ),
                 gain(None, FACTORS[2], limits),
             ],
             base: base.clone(),
@@ -94,7 +98,9 @@ mod tests {
                 None => y,
             };
             let g = s * gain.scale as f32 + gain.offset as f32;
-            let g = gain.limits.map_or(g, |limits| g.clamp(limits.low as f32, limits.high as f32));
+            let g = gain
+                .limits
+                .map_or(g, |limits| g.clamp(limits.low as f32, limits.high as f32));
             d += if matches!(gain.factor, Factor::One) { g } else { g * x };
         }
         f64::from(d.clamp(0.05, 0.95))
@@ -124,12 +130,18 @@ mod tests {
                 }
             }
         }
-        assert!(largest > 0.5, "a bound that is far above all that happens says nothing: {largest}");
+        assert!(
+            largest > 0.5,
+            "a bound that is far above all that happens says nothing: {largest}"
+        );
     }
 
     #[test]
     fn the_limits_of_the_duty_bound_the_error() {
-        let wide = Interval { low: -100.0, high: 100.0 };
+        let wide = Interval {
+            low: -100.0,
+            high: 100.0,
+        };
         let bound = duty_bound(&head(), &[(wide, 50.0); 3]);
         assert!(bound < 0.91 && bound > 0.2, "{bound}");
     }

@@ -90,11 +90,7 @@ impl Certifier {
         let outputs = 0..enclosure.real.len();
         Bound::of(match &self.head {
             Head::Choice(_) | Head::Residual(_) => outputs.map(|action| enclosure.error_bound(action)).collect(),
-            Head::Continuous(head) => vec![actor::duty_bound(
-                head,
-                enclosure.q_value(0),
-                enclosure.error_bound(0),
-            )],
+            Head::Continuous(head) => vec![actor::duty_bound(head, enclosure.q_value(0), enclosure.error_bound(0))],
             Head::Schedule(head) => {
                 let outputs: Vec<_> = outputs
                     .map(|output| (enclosure.q_value(output), enclosure.error_bound(output)))

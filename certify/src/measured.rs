@@ -62,7 +62,11 @@ impl Certifier {
         let error = match &self.head {
             Head::Choice(_) | Head::Residual(_) => return None,
             _ if !whole => f64::INFINITY,
-            Head::Continuous(head) => real.iter().zip(held).map(|(y, held)| (head.duty(*y) - held).abs()).sum(),
+            Head::Continuous(head) => real
+                .iter()
+                .zip(held)
+                .map(|(y, held)| (head.duty(*y) - held).abs())
+                .sum(),
             Head::Schedule(head) => {
                 let errors = head.gains.iter().zip(real.iter().zip(held));
                 errors

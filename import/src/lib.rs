@@ -101,7 +101,14 @@ pub fn new_policy(file: impl Into<FileName>, contract: &Path, options: &Options)
         if outputs != 1 && !options.gains {
             return Err(name.fault(actor::several(outputs)).into());
         }
-        return written(&name, contract, &loaded, &network, &statistics(&name, options)?, options);
+        return written(
+            &name,
+            contract,
+            &loaded,
+            &network,
+            &statistics(&name, options)?,
+            options,
+        );
     }
     let network = match recognise(&loaded.tensors, &loaded.known).map_err(|refusal| placed(&name, refusal))? {
         Recognised::Network(network) => Some(network),

@@ -69,10 +69,14 @@ impl Network {
         if output >= of {
             return Err(no_output(output, of));
         }
-        (last.weights, last.bias) = (last.row(output).to_vec(), last.bias.get(output).copied().into_iter().collect());
+        (last.weights, last.bias) = (
+            last.row(output).to_vec(),
+            last.bias.get(output).copied().into_iter().collect(),
+        );
         last.outputs = 1;
         self.plain = false;
-        self.said.push(format!("output {output} of {of} is the duty; {}", left_out(output, of)));
+        self.said
+            .push(format!("output {output} of {of} is the duty; {}", left_out(output, of)));
         Ok(())
     }
 
@@ -106,7 +110,10 @@ pub(crate) fn no_output(output: usize, of: usize) -> Message {
 
 /// What stands beside the one that is kept.
 pub(crate) fn left_out(kept: usize, of: usize) -> String {
-    let others: Vec<String> = (0..of).filter(|index| *index != kept).map(|index| index.to_string()).collect();
+    let others: Vec<String> = (0..of)
+        .filter(|index| *index != kept)
+        .map(|index| index.to_string())
+        .collect();
     match others.as_slice() {
         [] => "there is no other".to_owned(),
         [one] => format!("{one} is left out"),

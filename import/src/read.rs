@@ -62,6 +62,7 @@ pub(crate) fn read(name: &FileName, bytes: Vec<u8>, options: &Options) -> Result
         let graph = onnx::read(name, &bytes, (options.output, options.gains)).map_err(fault)?;
         return Ok(Loaded {
             actor: graph.actor,
+            commands: graph.commands.clone(),
             graph: Some(graph),
             ..Loaded::default()
         });

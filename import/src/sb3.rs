@@ -9,8 +9,8 @@ use policy::{Activation, NamedTensor};
 use serde_json::Value;
 use toml_input::Message;
 
-use crate::activations;
 use crate::Options;
+use crate::activations;
 use crate::actor::Actor;
 use crate::network::Layer;
 use crate::numpy;

@@ -32,10 +32,10 @@ fn refused(file: &str, options: &Options) -> String {
 
 /// Whether a policy gives these columns of the five logits that the library gave.
 fn assert_columns(policy: &policy::Policy, columns: std::ops::Range<usize>) {
-    let (obs, logits) = (expected("sb3_ppo", "obs"), expected("sb3_ppo", "q"));
+    let (obs, logits) = (expected("sb3_a2c", "obs"), expected("sb3_a2c", "q"));
     for (x, expected) in obs.chunks_exact(6).zip(logits.chunks_exact(5)) {
         let x: Vec<f64> = x.iter().map(|x| f64::from(*x)).collect();
-        let found = run(policy, &x, f64::tanh);
+        let found = run(policy, &x, |v| v.max(0.0));
         let expected = &expected[columns.clone()];
         assert_eq!(found.len(), expected.len());
         for (found, expected) in found.iter().zip(expected) {
@@ -47,11 +47,19 @@ fn assert_columns(policy: &policy::Policy, columns: std::ops::Range<usize>) {
 #[test]
 fn a_multidiscrete_is_refused_until_its_dimension_is_said() {
     let faults = refusal(&fixture("sb3_multidiscrete.zip"));
-    for part in ["several tables of actions", "[2, 3]", "--output N", "one Discrete table"] {
+    for part in [
+        "several tables of actions",
+        "[2, 3]",
+        "--output N",
+        "one Discrete table",
+    ] {
         assert!(faults.contains(part), "{part}: {faults}");
     }
     let faults = refused("sb3_multidiscrete.zip", &output(2));
-    assert!(faults.contains("--output names none") && faults.contains("0 to 1"), "{faults}");
+    assert!(
+        faults.contains("--output names none") && faults.contains("0 to 1"),
+        "{faults}"
+    );
     let faults = refused("sb3_dqn.zip", &output(0));
     assert!(faults.contains("one table of actions"), "{faults}");
 }
@@ -63,7 +71,11 @@ fn of_a_multidiscrete_the_logits_of_one_dimension_are_kept() {
         assert_eq!(policy.actions().len(), columns.len());
         let said = format!("dimension {dimension} of the MultiDiscrete [2, 3] chooses the duty");
         let left = format!("{other} is left out");
-        assert!(new.contract.contains(&said) && new.contract.contains(&left), "{}", new.contract);
+        assert!(
+            new.contract.contains(&said) && new.contract.contains(&left),
+            "{}",
+            new.contract
+        );
         assert!(policy.golden.is_some(), "computed of the same logits");
         assert_columns(&policy, columns);
     }
@@ -72,28 +84,37 @@ fn of_a_multidiscrete_the_logits_of_one_dimension_are_kept() {
 #[test]
 fn of_several_commands_of_sb3_one_is_kept_with_its_own_ends() {
     let faults = refusal(&fixture("sb3_several.zip"));
-    assert!(faults.contains("commands several numbers") && faults.contains("--output N"), "{faults}");
+    assert!(
+        faults.contains("commands several numbers") && faults.contains("--output N"),
+        "{faults}"
+    );
     let (_folder, new, policy) = policy_of("sb3_several.zip", &output(0));
     assert!(
-        new.contract.contains("clip = [0.1, 0.85] }   # check: the command is 0.1 to 0.85"),
+        new.contract
+            .contains("clip = [0.1, 0.85] }   # check: the command is 0.1 to 0.85"),
         "{}",
         new.contract
     );
     assert!(
-        new.contract.contains("output 0 of 5 is the duty; 1, 2, 3 and 4 are left out"),
+        new.contract
+            .contains("output 0 of 5 is the duty; 1, 2, 3 and 4 are left out"),
         "{}",
         new.contract
     );
     assert_columns(&policy, 0..1);
-    let (_folder, new, policy) = policy_of("sb3_several.zip", &output(3));
-    assert!(new.contract.contains("own command is -2.0 to 2.0"), "{}", new.contract);
-    assert_columns(&policy, 3..4);
+    let (_folder, new, policy) = policy_of("sb3_several.zip", &output(1));
+    assert!(new.contract.contains("own command is -1.0 to 1.0"), "{}", new.contract);
+    assert_columns(&policy, 1..2);
 }
 
 #[test]
 fn the_commands_of_sb3_as_gains_keep_their_own_ends() {
     let (_folder, new, policy) = policy_of("sb3_several.zip", &gains());
-    for entry in ["clip = [0.1, 0.85] },   # g0", "clip = [0.0, 0.05] },   # g2", "clip = [0.0, 40.0] },   # g4"] {
+    for entry in [
+        "clip = [0.1, 0.85] },   # g0",
+        "clip = [0.0, 0.05] },   # g2",
+        "clip = [0.0, 40.0] },   # g4",
+    ] {
         assert!(new.contract.contains(entry), "{entry}\n{}", new.contract);
     }
     let Head::Schedule(head) = &policy.head else {
@@ -102,7 +123,12 @@ fn the_commands_of_sb3_as_gains_keep_their_own_ends() {
     assert_eq!(head.gains.len(), 5);
     let ends = head.gains[3].ends();
     assert_eq!((ends.low, ends.high), (-2.0, 2.0));
-    assert!(policy.golden.as_ref().is_some_and(|golden| golden.q_values.len() == 5 * golden.count));
+    assert!(
+        policy
+            .golden
+            .as_ref()
+            .is_some_and(|golden| golden.q_values.len() == 5 * golden.count)
+    );
     assert_columns(&policy, 0..5);
     let faults = refused("sb3_dqn.zip", &gains());
     assert!(faults.contains("this model chooses"), "{faults}");
@@ -114,18 +140,28 @@ fn of_several_commands_of_a_graph_one_is_kept_with_its_own_scale() {
     assert!(faults.contains("commands several numbers"), "{faults}");
     let (_folder, new, policy) = policy_of("several_actor.onnx", &output(0));
     assert!(
-        new.contract.contains("squash = \"tanh\", scale = 0.375, offset = 0.475 }"),
+        new.contract
+            .contains("squash = \"tanh\", scale = 0.375, offset = 0.475 }"),
         "{}",
         new.contract
     );
     assert_eq!(policy.outputs(), 1);
     let (_folder, new, _) = policy_of("several_actor.onnx", &output(2));
     assert!(
-        new.contract.contains("squash = \"tanh\", scale = 0.02, offset = 0.03 }"),
+        new.contract
+            .contains("squash = \"tanh\", scale = 0.02, offset = 0.03 }"),
         "{}",
         new.contract
     );
     assert!(new.contract.contains("0 and 1 are left out"), "{}", new.contract);
+    let (_folder, new, policy) = policy_of("several_actor.onnx", &gains());
+    assert_eq!(policy.head.schedule().map(|head| head.gains.len()), Some(3));
+    for entry in [
+        "scale = 0.375, offset = 0.475 },   # g0",
+        "scale = 0.02, offset = 0.03 },   # g2",
+    ] {
+        assert!(new.contract.contains(entry), "{entry}\n{}", new.contract);
+    }
 }
 
 #[test]
@@ -138,9 +174,10 @@ fn the_row_of_the_picked_output_is_kept() {
     let last = policy.layers.last().unwrap();
     assert_eq!(last.weights, saved.values("fc_mu.weight")[16..32]);
     assert_eq!(last.bias, saved.values("fc_mu.bias")[1..2]);
-    let head = policy.head.continuous().unwrap();
-    assert_eq!(head.scale as f32, saved.values("action_scale")[1]);
-    assert_eq!(head.offset as f32, saved.values("action_bias")[1]);
+    // from -scale to scale around the bias: no duty, so the contract leaves scale and offset open
+    let (scale, bias) = (saved.values("action_scale")[1], saved.values("action_bias")[1]);
+    let own = format!("own command is {:?} to {:?}", bias - scale, bias + scale);
+    assert!(new.contract.contains(&own), "{own}\n{}", new.contract);
 }
 
 #[test]

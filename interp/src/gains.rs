@@ -159,7 +159,11 @@ fn duty_error(head: &Schedule, expected: f64, law: &[f64], gains: &[f64]) -> Opt
     let (low, high) = (head.limits.low, head.limits.high);
     // in the dead zone the base alone is commanded, and an observation does not say whether it is one
     let of = |duty: f64| (expected - duty.clamp(low, high)).abs();
-    let rest = if head.dead_zone.is_empty() { f64::INFINITY } else { of(*base) };
+    let rest = if head.dead_zone.is_empty() {
+        f64::INFINITY
+    } else {
+        of(*base)
+    };
     let error = of(sum).min(rest) / (high - low).max(f64::MIN_POSITIVE);
     Some(if error.is_nan() { f64::INFINITY } else { error })
 }

@@ -8,8 +8,8 @@ use serde::Serialize;
 
 use crate::decisions::answers;
 pub use crate::refusal::refusal;
-use crate::{duties, gains};
 use crate::{Controller, Real, argmax};
+use crate::{duties, gains};
 
 /// Known answers of the trainer against the interpreter or a build.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -325,7 +325,7 @@ mod tests {
             actions_equal: equal,
             worst_relative_error: Some(error),
             worst_duty_error: None,
-        worst_gain_error: None,
+            worst_gain_error: None,
             output_error: None,
             activations: Vec::new(),
             tolerance,

@@ -34,10 +34,20 @@ pub fn refusal(policy: &Policy) -> Option<Message> {
     } = match changed {
         Decisions::Choice(choices) => choices,
         Decisions::Continuous(duties) => {
-            return Some(numbers_changed("duties", duties.largest, duties.numeric_format, duties.allowed));
+            return Some(numbers_changed(
+                "duties",
+                duties.largest,
+                duties.numeric_format,
+                duties.allowed,
+            ));
         }
         Decisions::Schedule(gains) => {
-            return Some(numbers_changed("gains", gains.largest, gains.numeric_format, gains.allowed));
+            return Some(numbers_changed(
+                "gains",
+                gains.largest,
+                gains.numeric_format,
+                gains.allowed,
+            ));
         }
     };
     Some(
@@ -53,9 +63,11 @@ pub fn refusal(policy: &Policy) -> Option<Message> {
 
 /// Duties or gains that are off by more than the contract allows.
 fn numbers_changed(what: &str, largest: f64, numeric_format: &str, allowed: f64) -> Message {
-    Message::new(format!("the numeric format changes the trainer's {what} more than allowed"))
-        .found(format!(
-            "an error of {largest:.1e} of its range in {numeric_format}, allowed {allowed:.0e}"
-        ))
-        .hint("to accept it: golden_duty in [network], a share of the range from 0 to 1")
+    Message::new(format!(
+        "the numeric format changes the trainer's {what} more than allowed"
+    ))
+    .found(format!(
+        "an error of {largest:.1e} of its range in {numeric_format}, allowed {allowed:.0e}"
+    ))
+    .hint("to accept it: golden_duty in [network], a share of the range from 0 to 1")
 }

@@ -54,9 +54,7 @@ fn the_duty_is_base_and_gains_times_factors() {
 fn products_are_added_in_the_order_of_the_gains() {
     let big = "{ source = \"u\", clip = [-1, 1], scale = 33554432.0 }";
     let small = "{ clip = [-1, 1], scale = 0.5 }";
-    let of = |gains: [&str; 3], outputs: [f32; 3]| {
-        duty(&outputs, &format!("gains = [{}]", gains.join(", ")), 4.0, 0.0)
-    };
+    let of = |gains: [&str; 3], outputs: [f32; 3]| duty(&outputs, &format!("gains = [{}]", gains.join(", ")), 4.0, 0.0);
     // 2^25 - 2^25 + 0.5, and 0.5 + 2^25 - 2^25, which ends at the lower limit
     assert_eq!(of([big, big, small], [0.25, -0.25, 1.0]), 0.5);
     assert_eq!(of([small, big, big], [1.0, 0.25, -0.25]), 0.125);
@@ -70,8 +68,17 @@ fn each_gain_has_its_own_squash_scale_offset_and_limits() {
     let gain = |map: &str, output: f32| duty(&[output], &format!("gains = [{{ source = \"u\", {map} }}]"), 1.0, 0.0);
     assert_eq!(gain("clip = [-1, 1], scale = 0.25, offset = 0.5", 7.0), 0.75);
     assert_eq!(gain("clip = [-1, 1], scale = -0.25, offset = 0.5", 7.0), 0.25);
-    assert_eq!(gain("clip = [-1, 1], scale = 0.25, offset = 0.5, limits = [0.4, 0.625]", 7.0), 0.625);
-    assert_eq!(gain("clip = [-1, 1], scale = 0.25, offset = 0.5, limits = [0.375, 0.6]", -7.0), 0.375);
+    assert_eq!(
+        gain("clip = [-1, 1], scale = 0.25, offset = 0.5, limits = [0.4, 0.625]", 7.0),
+        0.625
+    );
+    assert_eq!(
+        gain(
+            "clip = [-1, 1], scale = 0.25, offset = 0.5, limits = [0.375, 0.6]",
+            -7.0
+        ),
+        0.375
+    );
     assert_eq!(gain("scale = 0.25, offset = 0.5, limits = [-3.0, 3.0]", 0.5), 0.625);
     // without squash and clip the limits act on what scale and offset made
     assert_eq!(gain("scale = 0.5, offset = 0.25, limits = [0.5, 0.75]", 64.0), 0.75);
@@ -85,7 +92,9 @@ fn a_feature_is_taken_behind_its_filters_and_before_scale_offset_and_clip() {
     let mut controller = Controller::<f32>::new(&policy(&[1.0], actions));
     // the integral of 4 over 0.25 s a step: 1, 2, 3, and there its own clamp
     for expected in [0.625, 0.75, 0.875, 0.875] {
-        let trace = controller.step(&[Sample::Physical(4.0), Sample::Physical(0.0)]).unwrap();
+        let trace = controller
+            .step(&[Sample::Physical(4.0), Sample::Physical(0.0)])
+            .unwrap();
         assert_eq!(trace.duty_sim, expected);
     }
 }
@@ -123,5 +132,9 @@ fn nothing_can_be_chosen_and_gains_are_given_for_outputs() {
     let outputs = ndarray::aview1(&[0.5_f32, 3.0]);
     assert_eq!(controller.gains(&outputs), Some(vec![0.25, 1.0]));
     assert_eq!(controller.decide(&outputs), None);
-    assert_eq!(controller.gains(&ndarray::aview1(&[0.5_f32])), None, "one output is missing");
+    assert_eq!(
+        controller.gains(&ndarray::aview1(&[0.5_f32])),
+        None,
+        "one output is missing"
+    );
 }

@@ -216,7 +216,9 @@ impl Head {
             Factor::Source(source) => Some(source),
             Factor::Feature(_) | Factor::One => None,
         });
-        base.into_iter().chain(zone.iter().map(|still| &still.source)).chain(factors)
+        base.into_iter()
+            .chain(zone.iter().map(|still| &still.source))
+            .chain(factors)
     }
 
     /// The duties before the mapping: those of all actions, or the two ends of any other head, as binary32 has them.

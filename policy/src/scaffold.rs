@@ -230,7 +230,11 @@ pub fn draft(draft: &Draft) -> String {
 }
 
 fn law(gains: &[String]) -> String {
-    let rows: String = gains.iter().enumerate().map(|(output, gain)| format!("  {gain},   # g{output}\n")).collect();
+    let rows: String = gains
+        .iter()
+        .enumerate()
+        .map(|(output, gain)| format!("  {gain},   # g{output}\n"))
+        .collect();
     format!(
         "\n[actions]                    # the outputs y are the gains of one law: duty = base + g0 * source + g1 * source + ...\n\
          # base = \"v_ref / 200\"       # what stands in front; 0 if it is left out\n\

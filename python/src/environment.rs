@@ -45,10 +45,11 @@ fn contract(path: &Path) -> Result<Contract, train::Error> {
 
 /// An action of an environment is a duty or its index; the gains of a law are neither.
 fn schedules(path: &Path) -> train::Error {
-    let message = Message::new("the environment takes duties, and in this contract the network gives the gains of a law")
-        .found("gains in [actions]")
-        .expected("duties, pairs, offsets or continuous")
-        .hint("train the gains in an environment of your own, and give its network to this contract");
+    let message =
+        Message::new("the environment takes duties, and in this contract the network gives the gains of a law")
+            .found("gains in [actions]")
+            .expected("duties, pairs, offsets or continuous")
+            .hint("train the gains in an environment of your own, and give its network to this contract");
     Fault::in_file(path, message).into()
 }
 

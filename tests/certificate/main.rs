@@ -85,12 +85,7 @@ fn errors(
 }
 
 /// Error of the law's duty at a base and factors that are drawn, most of them at an end of what they can be.
-fn law_error(
-    head: &Schedule,
-    controller: &Controller<f32>,
-    (held, real): (&[f64], &[f64]),
-    rng: &mut SplitMix,
-) -> f64 {
+fn law_error(head: &Schedule, controller: &Controller<f32>, (held, real): (&[f64], &[f64]), rng: &mut SplitMix) -> f64 {
     let mut drawn = |range: Interval| match rng.below(3) {
         0 => range.low as f32,
         1 => range.high as f32,

@@ -99,7 +99,11 @@ pub(crate) fn sense(spec: Spec<'_>, state: &State, measurement: &[Term]) -> Sens
             let (low, high) = (spec.nearest(-zone.within), spec.nearest(zone.within));
             float.within(of(&zone.source), low, high)
         });
-        if zone.is_empty() { terms.truth(false) } else { terms.all(within) }
+        if zone.is_empty() {
+            terms.truth(false)
+        } else {
+            terms.all(within)
+        }
     };
     sensed.base = match &spec.policy.head {
         Head::Choice(_) | Head::Continuous(_) => None,

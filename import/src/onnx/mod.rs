@@ -9,7 +9,9 @@
 //! A node that no rule knows, or a value that two nodes take, is refused by the node's name.
 
 mod bent;
+mod command;
 mod model;
+mod norm;
 mod wire;
 
 use policy::{Activation, DraftFeature};
@@ -18,7 +20,6 @@ use toml_input::{FileName, Message};
 use crate::activations;
 use crate::actor::{self, Actor, Squash};
 use crate::network::{Layer, Network};
-use crate::recognise;
 use model::{Constant, Graph, Node};
 
 /// What a graph computes.
@@ -31,6 +32,8 @@ pub(crate) struct Model {
     pub features: Vec<DraftFeature>,
     /// Where it ends in a tanh: the command is a number.
     pub actor: Option<Actor>,
+    /// Each command, where the outputs are gains.
+    pub commands: Vec<Actor>,
 }
 
 /// Whether `bytes` begin as a model does: field 1, the version of the format, and no header of safetensors.
@@ -39,11 +42,7 @@ pub(crate) fn is_model(bytes: &[u8]) -> bool {
 }
 
 /// Reads a model, of which one output may be picked, or all may be gains.
-pub(crate) fn read(
-    file: &FileName,
-    bytes: &[u8],
-    (picked, gains): (Option<usize>, bool),
-) -> Result<Model, Message> {
+pub(crate) fn read(file: &FileName, bytes: &[u8], (picked, gains): (Option<usize>, bool)) -> Result<Model, Message> {
     let graph = model::read(file, bytes)?;
     let mut walk = Walk {
         graph: &graph,
@@ -78,8 +77,8 @@ pub(crate) fn read(
             bent.value.clone_into(&mut value);
             continue;
         }
-        if let Some(node) = normed(&takers) {
-            return Err(recognise::layer_norm().found(named(node)).hint(LAYER_NORM));
+        if let Some(refusal) = norm::refusal(&takers) {
+            return Err(refusal);
         }
         if takers.is_empty() {
             let nodes: Vec<String> = graph.nodes.iter().take(4).map(named).collect();
@@ -109,19 +108,6 @@ pub(crate) fn read(
     ))
 }
 
-/// The way out of a norm over the values of a step.
-const LAYER_NORM: &str = "it divides by the deviation of the values of each step, which no dense layer can hold; train without it, or with \
-                          BatchNorm1d, which is folded: the exporter does so in evaluation";
-
-/// A norm over the values of a step: one node, or several that begin with a mean over the values. Only such a norm takes that.
-fn normed<'a>(takers: &[&'a Node]) -> Option<&'a Node> {
-    let is_norm = |node: &&&Node| {
-        let operation = node.operation.as_str();
-        operation == "ReduceMean" || operation == "RMSNormalization" || operation.ends_with("LayerNormalization")
-    };
-    takers.iter().find(is_norm).copied()
-}
-
 fn named(node: &Node) -> String {
     format!("{} `{}`", node.operation.escape_debug(), node.name.escape_debug())
 }
@@ -144,8 +130,8 @@ struct Walk<'a> {
     activations: Vec<Option<Activation>>,
     /// Ends of a clip behind the last layer.
     cut: Option<(f64, f64)>,
-    /// Scale and offset behind a tanh or a clip that ends the network.
-    scaled: Option<(f64, f64)>,
+    /// Scale and offset behind a tanh or a clip that ends the network: one for all outputs, or one for each.
+    scaled: Option<Vec<(f64, f64)>>,
     /// The node that ended the chain.
     ended: Option<String>,
     said: Vec<String>,
@@ -208,17 +194,6 @@ impl Walk<'_> {
     fn ends(&self, node: &Node) -> Option<(f64, f64)> {
         let bound = |index: usize| self.constant(node, index)?.values.first().copied();
         bound(1).zip(bound(2)).filter(|(low, high)| low < high)
-    }
-
-    /// Whether the last layer has one output, and something makes a command of it.
-    fn is_one(&self) -> bool {
-        let is_known = self.picked.is_some() || self.gains;
-        self.layers.last().is_some_and(|layer| is_known || layer.outputs == 1)
-    }
-
-    fn is_command(&self) -> bool {
-        let is_curve = |last: Activation| Squash::curve(last).is_some();
-        self.is_one() && (self.cut.is_some() || self.activations.last().copied().flatten().is_some_and(is_curve))
     }
 
     fn end(&mut self, node: &Node) -> Result<(), Message> {
@@ -310,16 +285,11 @@ impl Walk<'_> {
         if self.layers.is_empty() {
             return self.before(node, &steps);
         }
-        let of_all = self.layers.last().is_some_and(|layer| layer.outputs == steps.len());
-        let own = match (steps.as_slice(), self.picked) {
-            ([one], _) => Some(*one),
-            (several, Some(output)) if of_all => several.get(output).copied(),
-            _ => None,
-        };
-        if let (Some((scale, shift)), true) = (own, self.is_command()) {
-            let (own, offset) = self.scaled.unwrap_or((1.0, 0.0));
-            self.scaled = Some((own * scale, offset * scale + shift));
-            return Ok(());
+        if self.is_command() {
+            return self.behind_command(node, &steps);
+        }
+        if self.is_bounded() {
+            return Err(actor::several(self.outputs()));
         }
         let Some(layer) = self.layers.last_mut().filter(|_| self.cut.is_none()) else {
             return Err(unknown(node));
@@ -362,13 +332,12 @@ impl Walk<'_> {
             inputs.ok_or_else(|| other("the graph holds no dense layer", "none", "Gemm, or MatMul and Add"))?;
         let actor = match self.activations.pop() {
             Some(Some(last)) if Squash::curve(last).is_some() => {
-                let outputs = self.layers.last().map_or(0, |layer| layer.outputs);
                 if !self.is_one() {
-                    return Err(actor::several(outputs));
+                    return Err(actor::several(self.outputs()));
                 }
                 Some(Actor {
                     squash: Squash::Curve(last),
-                    affine: Some(actor::scaled(self.scaled)),
+                    affine: None,
                 })
             }
             Some(Some(last)) => {
@@ -378,11 +347,18 @@ impl Walk<'_> {
                     "the values of the actions",
                 ));
             }
-            _ => self.cut.map(|(low, high)| Actor {
-                affine: Some(actor::scaled(self.scaled)),
-                ..Actor::clipped(low, high)
-            }),
+            _ => self.cut.map(|(low, high)| Actor::clipped(low, high)),
         };
+        let of = |output: usize| {
+            actor.map(|actor| Actor {
+                affine: Some(actor::scaled(self.affine_of(output))),
+                ..actor
+            })
+        };
+        let commands = (0..self.outputs())
+            .filter_map(|output| of(output).filter(|_| self.gains))
+            .collect();
+        let actor = of(self.picked.unwrap_or(0));
         let names: Vec<&str> = self.layers.iter().map(|layer| layer.name.as_str()).collect();
         self.said
             .insert(0, format!("layers, first to last: {}", names.join(" > ")));
@@ -429,6 +405,7 @@ impl Walk<'_> {
                 .collect(),
             features,
             actor,
+            commands,
         })
     }
 }

@@ -41,8 +41,12 @@ pub(super) fn read(data: &Value, is_tanh: bool, options: &Options) -> Result<Spa
         return Err(refused_continuous("SAC, TD3 or DDPG without a Box action space"));
     }
     if options.gains {
-        return Err(other("--gains are numbers, and this model chooses", kind, "gymnasium.spaces.Box")
-            .hint("leave out --gains, and give a duty for each action"));
+        return Err(other(
+            "--gains are numbers, and this model chooses",
+            kind,
+            "gymnasium.spaces.Box",
+        )
+        .hint("leave out --gains, and give a duty for each action"));
     }
     if kind.ends_with(".MultiDiscrete'>") {
         return dimension(space, options.output);
@@ -204,7 +208,10 @@ impl Part {
             }
             let width: usize = tensor.shape.iter().skip(1).product();
             let kept = self.rows.start * width..self.rows.end * width;
-            tensor.values = tensor.values.as_ref().and_then(|values| Some(values.get(kept)?.to_vec()));
+            tensor.values = tensor
+                .values
+                .as_ref()
+                .and_then(|values| Some(values.get(kept)?.to_vec()));
             tensor.shape[0] = self.rows.len();
         }
         Ok(())
@@ -220,7 +227,14 @@ mod tests {
         let of = |text: &str| numbers(&Value::from(text));
         assert_eq!(of("[5 3]"), Some(vec![5, 3]));
         assert_eq!(of("[ 5 12  3]"), Some(vec![5, 12, 3]));
-        for wrong in ["[5 ... 3]", "[[5 3]\n [2 2]]", "[5 -3]", "[5 0]", "5", "[5 99999999999]"] {
+        for wrong in [
+            "[5 ... 3]",
+            "[[5 3]\n [2 2]]",
+            "[5 -3]",
+            "[5 0]",
+            "5",
+            "[5 99999999999]",
+        ] {
             assert_eq!(of(wrong), None, "{wrong}");
         }
         assert_eq!(numbers(&serde_json::json!([5, 3])), Some(vec![5, 3]));

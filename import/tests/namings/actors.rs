@@ -58,7 +58,10 @@ fn cleanrl() -> Vec<Row> {
         row(
             "CleanRL TD3, the first of three commands",
             with(ending(fc, 3), several),
-            Actor(names(fc), &["squash = \"tanh\"", "output 0 of 3 is the duty; 1 and 2 are left out"]),
+            Actor(
+                names(fc),
+                &["squash = \"tanh\"", "output 0 of 3 is the duty; 1 and 2 are left out"],
+            ),
         )
         .output(0),
         row(
@@ -391,7 +394,10 @@ fn unnamed() -> Vec<Row> {
         row(
             "three outputs, of which one is the command",
             ending(own, 3),
-            Actor(names(own), &["output 0 of 3 is the duty", "continuous = { squash = \"TODO\""]),
+            Actor(
+                names(own),
+                &["output 0 of 3 is the duty", "continuous = { squash = \"TODO\""],
+            ),
         )
         .output(0),
         row(

@@ -45,7 +45,13 @@ pub fn rows() -> Vec<Row> {
         ),
         row(
             "LayerNorm of Keras",
-            with(q(), &[("layer_normalization/gamma", &[16]), ("layer_normalization/beta", &[16])]),
+            with(
+                q(),
+                &[
+                    ("layer_normalization/gamma", &[16]),
+                    ("layer_normalization/beta", &[16]),
+                ],
+            ),
             Refused(&["LayerNorm"]),
         ),
         row(

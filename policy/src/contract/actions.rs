@@ -33,12 +33,7 @@ struct Listed {
 }
 
 /// `features` are the names of all features, if all are known.
-pub(crate) fn read(
-    root: &mut Table<'_>,
-    around: &Surroundings<'_>,
-    features: &[String],
-    faults: &mut Sink,
-) -> Actions {
+pub(crate) fn read(root: &mut Table<'_>, around: &Surroundings<'_>, features: &[String], faults: &mut Sink) -> Actions {
     let hint = "give [actions] with `duties = [...]` or `pairs = [...]`, one per network output, with `base` and `offsets`, with \
          `continuous = {...}`, or with `gains = [...]`";
     let Some(mut section) = root

@@ -141,12 +141,7 @@ pub(crate) fn bounded(
     }
 }
 
-fn sums(
-    head: &mut Schedule,
-    features: &[Feature],
-    inputs: &Inputs,
-    period: f64,
-) -> Result<(), (String, Overflow)> {
+fn sums(head: &mut Schedule, features: &[Feature], inputs: &Inputs, period: f64) -> Result<(), (String, Overflow)> {
     let base = bounds::expression(&head.base.tree, inputs);
     let mut sum = base.map_err(|overflow| (format!("`{}` in [actions]", head.base.text), overflow))?;
     head.base_bound = sum.interval();
@@ -179,7 +174,10 @@ pub(crate) fn outputs_bounded(head: &Head, outputs: &[Interval], at: &Value<'_>,
         let scaled = Box32::nearest(*output).scale(gain.scale);
         let shifted = scaled.and_then(|scaled| scaled.add(Box32::point(gain.offset as f32)));
         if let Err(Overflow(magnitude)) = shifted {
-            faults.push(at.fault(catalogue::may_overflow(&format!("gain {index} before its limits"), magnitude)));
+            faults.push(at.fault(catalogue::may_overflow(
+                &format!("gain {index} before its limits"),
+                magnitude,
+            )));
         }
     }
 }

@@ -184,7 +184,9 @@ pub(crate) fn golden_continuous(rows: usize, outputs: usize) -> Message {
 
 pub(crate) fn golden_law(text: &str) -> Message {
     Message::new("the golden duties cannot be held against the law: an observation does not tell all that it reads")
-        .found(format!("`{text}`, which is no number and no source of a feature without filters"))
+        .found(format!(
+            "`{text}`, which is no number and no source of a feature without filters"
+        ))
         .expected("a base that is a number, and factors that are features or such sources")
         .hint("give `output`, the network's last layer before squash or clip, in the place of `duty`")
 }

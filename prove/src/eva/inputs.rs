@@ -116,7 +116,8 @@ impl Writer<'_> {
                 self.text.lines(["#if defined(FINITE)", &assigns, &written]);
                 let finite = |index| format!("  @ ensures finite_{index}: \\is_finite(outputs[{index}]);");
                 self.text.lines((0..count).map(finite).collect::<Vec<_>>());
-                self.text.lines(["  @*/", "#else", &assigns, &written, "  @*/", "#endif"]);
+                self.text
+                    .lines(["  @*/", "#else", &assigns, &written, "  @*/", "#endif"]);
                 ("void", format!(", {kind} *outputs"))
             }
         };

@@ -12,7 +12,8 @@ use std::collections::BTreeMap;
 
 use templates::Template;
 use templates::c::{
-    Common, HeadView, Header, Helpers, IntegerView, Member, NetworkView, PushView, RealView, Source, StatusBit, WideChar,
+    Common, HeadView, Header, Helpers, IntegerView, Member, NetworkView, PushView, RealView, Source, StatusBit,
+    WideChar,
 };
 
 use crate::activation::{self, text_of};
@@ -20,7 +21,8 @@ use crate::backend::banner;
 use crate::files::{CodegenError, GeneratedFiles};
 use crate::lower::STATUS;
 use crate::program::{
-    Arithmetic, Buffer, Coefficient, Element, Head, IntegerCode, Kept, Literal, Loop, Op, Program, StateMember, StateValue,
+    Arithmetic, Buffer, Coefficient, Element, Head, IntegerCode, Kept, Literal, Loop, Op, Program, StateMember,
+    StateValue,
 };
 use number::number;
 use statements::{Printer, float, unsigned};

@@ -96,7 +96,7 @@ fn what_makes_no_gain_is_refused_at_its_place() {
         ),
         ("{ squash = \"tanh\", limits = ¦[3.0, 2.0] }", &["crossed"]),
         ("{ squash = \"tanh\", ¦gain = 2.0 }", &["unknown key `gain`"]),
-        ("{ source = ¦\"v_out * i_out\", squash = \"tanh\" }", &["v_out"]),
+        ("{ source = \"v_out ¦* i_out\", squash = \"tanh\" }", &["not affine"]),
     ] {
         fault(&one(gain), parts);
     }

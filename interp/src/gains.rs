@@ -167,3 +167,124 @@ fn duty_error(head: &Schedule, expected: f64, law: &[f64], gains: &[f64]) -> Opt
     let error = of(sum).min(rest) / (high - low).max(f64::MIN_POSITIVE);
     Some(if error.is_nan() { f64::INFINITY } else { error })
 }
+
+#[cfg(test)]
+mod tests {
+    use policy::{Expr, Factor, Gain, Interval, Source, Squash};
+
+    use super::*;
+
+    /// duty = 0.3 + g0 x + g1 within 0.1 to 0.9, with g0 of -0.5 to 0.5 and g1 of 0 to 0.2.
+    fn head() -> Schedule {
+        let clip = |low, high| Some(Squash::Clip(Interval { low, high }));
+        let source = Source {
+            tree: Expr::Constant(0.3),
+            text: "0.3".to_owned(),
+        };
+        let gain = |factor, squash, scale| Gain {
+            factor,
+            squash,
+            scale,
+            offset: 0.0,
+            limits: None,
+            factor_bound: Interval { low: -4.0, high: 4.0 },
+        };
+        Schedule {
+            gains: vec![
+                gain(Factor::Feature(0), clip(-1.0, 1.0), 0.5),
+                gain(Factor::One, clip(0.0, 0.2), 1.0),
+            ],
+            base: source,
+            base_bound: Interval { low: 0.3, high: 0.3 },
+            dead_zone: Vec::new(),
+            limits: Interval { low: 0.1, high: 0.9 },
+        }
+    }
+
+    /// Factors 1 and 2; outputs .5 and .1, and -.25 and .2, with the duties of the law.
+    fn golden() -> Golden {
+        Golden {
+            count: 2,
+            outside: 0,
+            observations: vec![1.0, 2.0],
+            q_values: vec![0.5, 0.1, -0.25, 0.2],
+            action_indices: Vec::new(),
+            duties: vec![0.65, 0.25],
+            law: vec![0.3, 1.0, 1.0, 0.3, 2.0, 1.0],
+            tolerance: 1e-5,
+            decisions: None,
+            duty_error: None,
+        }
+    }
+
+    fn judged(golden: &Golden, answers: [[f64; 2]; 2]) -> GoldenResult {
+        judge(golden, &head(), &[&answers[0], &answers[1]])
+    }
+
+    const RIGHT: [[f64; 2]; 2] = [[0.5, 0.1], [-0.25, 0.2]];
+
+    #[test]
+    fn right_outputs_pass_and_their_duties_too() {
+        let result = judged(&golden(), RIGHT);
+        assert!(result.passed(), "{result}");
+        assert!(result.worst_gain_error.unwrap() < 1e-7 && result.worst_duty_error.unwrap() < 1e-6);
+        // cut off by the clip: the same gain
+        let saturated = Golden {
+            q_values: vec![0.5, 0.1, -0.25, 7.0],
+            ..golden()
+        };
+        assert!(judged(&saturated, RIGHT).passed());
+    }
+
+    #[test]
+    fn the_error_of_a_gain_is_a_share_of_its_own_range() {
+        let result = judged(&golden(), [[0.5, 0.1], [-0.25, 0.15]]);
+        assert!(!result.passed());
+        // .05 of .2
+        assert!((result.worst_gain_error.unwrap() - 0.25).abs() < 1e-6);
+        // .05 of .8
+        assert!((result.worst_duty_error.unwrap() - 0.0625).abs() < 1e-6);
+    }
+
+    #[test]
+    fn right_gains_with_other_duties_blame_the_law() {
+        let swapped = Golden {
+            law: vec![0.3, 2.0, 1.0, 0.3, 1.0, 1.0],
+            ..golden()
+        };
+        let result = judged(&swapped, RIGHT);
+        assert!(!result.passed());
+        assert!(result.hint().contains("base, sources, features and the order of gains"), "{}", result.hint());
+    }
+
+    #[test]
+    fn rows_that_do_not_tell_the_law_are_left_out_and_missing_rows_are_not() {
+        let hidden = Golden {
+            law: vec![0.3, f64::NAN, 1.0, 0.3, 2.0, 1.0],
+            q_values: Vec::new(),
+            duties: vec![0.9, 0.25],
+            ..golden()
+        };
+        assert!(judged(&hidden, RIGHT).passed());
+        assert!(!judge(&golden(), &head(), &[&RIGHT[0]]).passed());
+        assert!(!judged(&golden(), [[f64::NAN, 0.1], [-0.25, 0.2]]).passed());
+    }
+
+    /// An observation does not say whether the step is in the dead zone: the base alone is right as well.
+    #[test]
+    fn with_a_dead_zone_the_base_is_an_answer_too() {
+        let mut head = head();
+        let still = Golden {
+            q_values: Vec::new(),
+            duties: vec![0.3, 0.25],
+            ..golden()
+        };
+        let answers: [&[f64]; 2] = [&RIGHT[0], &RIGHT[1]];
+        assert!(!judge(&still, &head, &answers).passed());
+        head.dead_zone = vec![policy::Still {
+            source: head.base.clone(),
+            within: 1.0,
+        }];
+        assert!(judge(&still, &head, &answers).passed());
+    }
+}

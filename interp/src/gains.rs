@@ -254,7 +254,11 @@ mod tests {
         };
         let result = judged(&swapped, RIGHT);
         assert!(!result.passed());
-        assert!(result.hint().contains("base, sources, features and the order of gains"), "{}", result.hint());
+        assert!(
+            result.hint().contains("base, sources, features and the order of gains"),
+            "{}",
+            result.hint()
+        );
     }
 
     #[test]

@@ -18,10 +18,22 @@ fn desk() -> Desk {
     let mut text = draft[network..limits].to_owned();
     for (from, to) in [
         ("{ source = \"TODO\", clip = [0.1, 0.85] }", "{ clip = [0.1, 0.85] }"),
-        ("source = \"TODO\", clip = [-1.0", "source = \"(100 - v_out) / 1000\", clip = [-1.0"),
-        ("source = \"TODO\", clip = [0.0, 0.05]", "feature = \"e_del\", clip = [0.0, 0.05]"),
-        ("source = \"TODO\", clip = [-2.0", "source = \"0.001 * (i_out - i_l)\", clip = [-2.0"),
-        ("source = \"TODO\", clip = [0.0, 40.0]", "source = \"0.0001 * i_out\", clip = [0.0, 40.0]"),
+        (
+            "source = \"TODO\", clip = [-1.0",
+            "source = \"(100 - v_out) / 1000\", clip = [-1.0",
+        ),
+        (
+            "source = \"TODO\", clip = [0.0, 0.05]",
+            "feature = \"e_del\", clip = [0.0, 0.05]",
+        ),
+        (
+            "source = \"TODO\", clip = [-2.0",
+            "source = \"0.001 * (i_out - i_l)\", clip = [-2.0",
+        ),
+        (
+            "source = \"TODO\", clip = [0.0, 40.0]",
+            "source = \"0.0001 * i_out\", clip = [0.0, 40.0]",
+        ),
     ] {
         assert!(text.contains(from), "{from}\n{text}");
         text = text.replacen(from, to, 1);
@@ -58,7 +70,10 @@ fn a_format_that_costs_too_much_of_a_gain_is_refused_until_the_contract_accepts_
     desk.edit("law/policy.toml", "golden_duty = 1e-6", "golden_duty = 0.9");
     desk.succeed("compile law --format i8 --emit c --out code --no-costs");
     assert!(desk.read("code/manifest.json").contains("duty_error_bound"));
-    desk.refuse("verify law --golden-decisions 0.5", &["gains in [actions]", "golden_duty"]);
+    desk.refuse(
+        "verify law --golden-decisions 0.5",
+        &["gains in [actions]", "golden_duty"],
+    );
 }
 
 #[test]
@@ -67,7 +82,10 @@ fn a_certificate_is_about_the_duty_of_the_law() {
     let said = desk.succeed("certify law --format i16 --out certificate --boxes 100 --samples 50");
     assert!(said.contains("|duty - real duty| <= "), "{said}");
     assert!(desk.read("certificate/certificate.json").contains("\"schedule\""));
-    desk.refuse("certify law --axis v_out --axis i_l --out other", &["commands a number"]);
+    desk.refuse(
+        "certify law --axis v_out --axis i_l --out other",
+        &["commands a number"],
+    );
 }
 
 #[test]
@@ -91,4 +109,3 @@ fn replay_compares_the_duties_of_a_log_with_those_of_the_law() {
     assert_eq!(ran.code, Some(1), "{}{}", ran.stdout, ran.stderr);
     assert!(ran.stdout.contains("base and factors of a law"), "{}", ran.stdout);
 }
-

@@ -126,14 +126,10 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     // a layer has to know every input: bounds of the others would be another network's
     let complete = feature_count > 0 && bounded.len() == feature_count;
     let known: &[Feature] = if complete { &bounded } else { &[] };
-    if let (Some(inputs), Some(period), Some(at)) = (&inputs, head.sample_period, gains(raw)) {
-        schedule::bounded(&mut decided, known, inputs, period, &at, faults);
-    }
+    bound_gains(raw, &mut decided, known, (inputs.as_ref(), head.sample_period), faults);
     if let (true, Some(weights)) = (complete, weights.as_mut()) {
         bound_layers(raw, known, &mut weights.layers, faults);
-        if let (Some(last), Some(at)) = (weights.layers.last(), gains(raw)) {
-            schedule::outputs_bounded(&decided, &last.bounds, &at, faults);
-        }
+        bound_outputs(raw, &decided, &weights.layers, faults);
     }
     if let (Some(Some(mapping)), Some(inputs)) = (&mapping, &inputs) {
         bound_mapping(raw, mapping, inputs, &duties, faults);
@@ -243,6 +239,24 @@ fn bound_layers(raw: &RawPolicy, features: &[Feature], layers: &mut [Layer], fau
 /// Where the contract schedules gains.
 fn gains(raw: &RawPolicy) -> Option<toml_input::Value<'_>> {
     raw.contract.peek(&["actions", "gains"])
+}
+
+fn bound_gains(
+    raw: &RawPolicy,
+    head: &mut Head,
+    features: &[Feature],
+    around: (Option<&Inputs>, Option<f64>),
+    faults: &mut Sink,
+) {
+    if let ((Some(inputs), Some(period)), Some(at)) = (around, gains(raw)) {
+        schedule::bounded(head, features, inputs, period, &at, faults);
+    }
+}
+
+fn bound_outputs(raw: &RawPolicy, head: &Head, layers: &[Layer], faults: &mut Sink) {
+    if let (Some(last), Some(at)) = (layers.last(), gains(raw)) {
+        schedule::outputs_bounded(head, &last.bounds, &at, faults);
+    }
 }
 
 fn bound_law(raw: &RawPolicy, head: &Head, inputs: &Inputs, faults: &mut Sink) {

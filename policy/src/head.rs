@@ -365,17 +365,17 @@ mod tests {
             factor_bound: Interval { low: 1.0, high: 1.0 },
         };
         let clip = Some(Squash::Clip(Interval { low: -1.0, high: 1.0 }));
-        let cut = Some(Interval { low: 0.25, high: 0.625 });
+        let cut = Interval { low: 0.25, high: 0.625 };
         let values = |gain: &Gain| [-9.0, 0.25, 9.0].map(|output| gain.value(output));
         let all = gain(clip, -0.5, None);
         assert_eq!(values(&all), [1.0, 0.375, 0.0]);
         assert_eq!(all.ends(), Interval { low: 0.0, high: 1.0 });
-        let limited = gain(clip, -0.5, cut);
+        let limited = gain(clip, -0.5, Some(cut));
         assert_eq!(values(&limited), [0.625, 0.375, 0.25]);
-        assert_eq!((limited.ends(), limited.span()), (cut.unwrap(), 0.375));
-        let plain = gain(None, 0.25, cut);
+        assert_eq!((limited.ends(), limited.span()), (cut, 0.375));
+        let plain = gain(None, 0.25, Some(cut));
         assert_eq!(values(&plain), [0.25, 0.5625, 0.625]);
-        assert_eq!(plain.ends(), cut.unwrap());
+        assert_eq!(plain.ends(), cut);
         assert!(all.value(f64::NAN).is_nan() && limited.value(f64::NAN).is_nan());
     }
 

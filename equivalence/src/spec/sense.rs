@@ -93,7 +93,15 @@ pub(crate) fn sense(spec: Spec<'_>, state: &State, measurement: &[Term]) -> Sens
         .map(|each| (each.estimates, each.words))
         .unzip::<_, _, Vec<_>, _>();
     sensed.observed = words;
-    let of = |own: &policy::Source| source(spec, &own.tree, state, &sensed.signals, &estimates);
+    observe(spec, state, &estimates, &mut sensed);
+    law(spec, state, &estimates, &mut sensed);
+    sensed
+}
+
+/// What a law of control says before the network does (sections 7c and 8).
+fn law(spec: Spec<'_>, state: &State, estimates: &[[Term; 3]], sensed: &mut Sensed) {
+    let (terms, float) = (spec.terms, spec.float);
+    let of = |own: &policy::Source| source(spec, &own.tree, state, &sensed.signals, estimates);
     let is_still = |zone: &[policy::Still]| {
         let within = zone.iter().map(|zone| {
             let (low, high) = (spec.nearest(-zone.within), spec.nearest(zone.within));
@@ -105,25 +113,24 @@ pub(crate) fn sense(spec: Spec<'_>, state: &State, measurement: &[Term]) -> Sens
             terms.all(within)
         }
     };
-    sensed.base = match &spec.policy.head {
-        Head::Choice(_) | Head::Continuous(_) => None,
+    let (base, factors) = match &spec.policy.head {
+        Head::Choice(_) | Head::Continuous(_) => return,
         Head::Residual(head) => {
             let (low, high) = spec.inwards(head.limits);
-            Some((float.clamp(of(&head.base), low, high), is_still(&head.dead_zone)))
+            let base = float.clamp(of(&head.base), low, high);
+            ((base, is_still(&head.dead_zone)), Vec::new())
         }
-        Head::Schedule(head) => Some((of(&head.base), is_still(&head.dead_zone))),
+        Head::Schedule(head) => {
+            let factors = head.gains.iter().map(|gain| match &gain.factor {
+                Factor::Source(own) => Some(of(own)),
+                Factor::Feature(index) => sensed.filtered.get(*index).copied(),
+                Factor::One => None,
+            });
+            ((of(&head.base), is_still(&head.dead_zone)), factors.collect())
+        }
     };
-    observe(spec, state, &estimates, &mut sensed);
-    if let Head::Schedule(head) = &spec.policy.head {
-        let of = |own: &policy::Source| source(spec, &own.tree, state, &sensed.signals, &estimates);
-        let factors = head.gains.iter().map(|gain| match &gain.factor {
-            Factor::Source(own) => Some(of(own)),
-            Factor::Feature(index) => sensed.filtered.get(*index).copied(),
-            Factor::One => None,
-        });
-        sensed.factors = factors.collect();
-    }
-    sensed
+    sensed.base = Some(base);
+    sensed.factors = factors;
 }
 
 fn observe(spec: Spec<'_>, state: &State, estimates: &[[Term; 3]], sensed: &mut Sensed) {

@@ -3,10 +3,18 @@
 use super::{Actor, Refused, Row, Tensors, dense, ending, named, names, row, with};
 
 pub fn rows() -> Vec<Row> {
-    [cleanrl(), stable_baselines(), tianshou(), rllib(), torchrl(), unnamed()]
-        .into_iter()
-        .flatten()
-        .collect()
+    [
+        cleanrl(),
+        stable_baselines(),
+        tianshou(),
+        rllib(),
+        torchrl(),
+        unnamed(),
+        picked(),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
 /// The scale and bias that `Saved` draws are no duties, so scale and offset stay open here; tests/trainers.rs has real ones.
@@ -56,21 +64,6 @@ fn cleanrl() -> Vec<Row> {
             Refused(&["commands several numbers", "3 outputs", "--output N", "--gains"]),
         ),
         row(
-            "CleanRL TD3, the first of three commands",
-            with(ending(fc, 3), several),
-            Actor(
-                names(fc),
-                &["squash = \"tanh\"", "output 0 of 3 is the duty; 1 and 2 are left out"],
-            ),
-        )
-        .output(0),
-        row(
-            "CleanRL TD3, a fourth of three commands",
-            with(ending(fc, 3), several),
-            Refused(&["--output names none", "0 to 2"]),
-        )
-        .output(3),
-        row(
             "CleanRL SAC",
             with([ending(sac, 1), deviation].concat(), buffers),
             Actor(names(sac), sac_parts),
@@ -93,12 +86,44 @@ fn cleanrl() -> Vec<Row> {
             ppo(2),
             Refused(&["commands several numbers"]),
         ),
+    ]
+}
+
+/// One of several commands.
+fn picked() -> Vec<Row> {
+    let several: &[(&str, &[usize])] = &[("action_scale", &[3]), ("action_bias", &[3])];
+    let fc = ["fc1", "fc2", "fc_mu"];
+    let mean = ["actor_mean.0", "actor_mean.2", "actor_mean.4"];
+    let sac = ["latent_pi.0", "latent_pi.2", "mu"];
+    let td3 = ["actor.mu.0", "actor.mu.2", "actor.mu.4"];
+    let of_three: &[&str] = &["squash = \"tanh\"", "output 0 of 3 is the duty; 1 and 2 are left out"];
+    let td3_of_three = || with(ending(fc, 3), several);
+    vec![
         row(
-            "CleanRL PPO, the first of two commands",
-            ppo(2),
-            Actor(names(mean), &["output 0 of 2 is the duty; 1 is left out"]),
+            "CleanRL TD3, the first of three",
+            td3_of_three(),
+            Actor(names(fc), of_three),
         )
         .output(0),
+        row(
+            "CleanRL TD3, a fourth of three",
+            td3_of_three(),
+            Refused(&["--output names none", "0 to 2"]),
+        )
+        .output(3),
+        row(
+            "CleanRL PPO, the first of two",
+            with(ending(mean, 2), &[("actor_logstd", &[1, 2])]),
+            Actor(names(mean), OF_TWO),
+        )
+        .output(0),
+        row(
+            "SB3 SAC, the first of two",
+            [ending(sac, 2), dense("log_std", 2, 16)].concat(),
+            Actor(names(sac), OF_TWO),
+        )
+        .output(0),
+        row("SB3 TD3, the first of two", ending(td3, 2), Actor(names(td3), OF_TWO)).output(0),
     ]
 }
 
@@ -145,7 +170,7 @@ fn stable_baselines() -> Vec<Row> {
     };
     let ppo_parts: &[&str] = &["continuous = { clip = [\"TODO\", \"TODO\"] }", "# tanh unless you gave"];
     vec![
-        row("SB3 SAC actor", sac("", 1), Actor(stems.clone(), sac_parts)),
+        row("SB3 SAC actor", sac("", 1), Actor(stems, sac_parts)),
         row(
             "SB3 SAC policy",
             [sac("actor.", 1), critics.clone()].concat(),
@@ -156,13 +181,6 @@ fn stable_baselines() -> Vec<Row> {
             sac("", 2),
             Refused(&["commands several numbers"]),
         ),
-        row("SB3 SAC, the first of two commands", sac("", 2), Actor(stems, OF_TWO)).output(0),
-        row(
-            "SB3 TD3, the first of two commands",
-            ending(td3, 2),
-            Actor(names(td3), OF_TWO),
-        )
-        .output(0),
         row(
             "SB3 SAC with use_sde",
             with(

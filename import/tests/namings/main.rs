@@ -143,6 +143,7 @@ fn every_naming_is_read_right_or_refused_with_a_way_out() {
         .into_iter()
         .chain(actors::rows())
         .chain(refused::rows())
+        .chain(refused::layer_norms())
         .collect();
     assert!(table.len() >= 35, "{} rows", table.len());
     table.iter().for_each(check);

@@ -34,6 +34,40 @@ pub fn rows() -> Vec<Row> {
             Refused(&["LayerNorm"]),
         ),
         row(
+            "BatchNorm beside layers without numbers",
+            with([dense("fc1", 16, 6), dense("fc2", 5, 16)].concat(), norm),
+            Refused(&["which side of the activation"]),
+        ),
+        row("LSTM", recurrent("lstm"), Refused(&["recurrent"])),
+        row("GRU", recurrent("rnn"), Refused(&["recurrent"])),
+        row(
+            "convolution",
+            with(q(), &[("cnn.0.weight", &[8, 6, 3])]),
+            Refused(&["convolution"]),
+        ),
+        row(
+            "two heads",
+            [dense("body.0", 16, 6), dense("left", 5, 16), dense("right", 5, 16)].concat(),
+            Refused(&["more than one chain"]),
+        ),
+        row(
+            "a tensor that nobody knows",
+            with(q(), &[("network.gain", &[16])]),
+            Refused(&["network.gain"]),
+        ),
+        row(
+            "one transposed weight",
+            mixed.to_vec(),
+            Refused(&["others as [inputs, outputs]"]),
+        ),
+    ]
+}
+
+/// A scale for each value without statistics, by the names of several libraries.
+pub fn layer_norms() -> Vec<Row> {
+    let q = || three(["network.0", "network.2", "network.4"]);
+    vec![
+        row(
             "LayerNorm by its own name",
             with(q(), &[("layer_norm1.weight", &[16]), ("layer_norm1.bias", &[16])]),
             Refused(&["LayerNorm", "layer_norm1.weight", "BatchNorm1d"]),
@@ -66,33 +100,6 @@ pub fn rows() -> Vec<Row> {
                 &[("latent_pi.1.weight", &[16]), ("latent_pi.1.bias", &[16])],
             ),
             Refused(&["LayerNorm", "latent_pi.1"]),
-        ),
-        row(
-            "BatchNorm beside layers without numbers",
-            with([dense("fc1", 16, 6), dense("fc2", 5, 16)].concat(), norm),
-            Refused(&["which side of the activation"]),
-        ),
-        row("LSTM", recurrent("lstm"), Refused(&["recurrent"])),
-        row("GRU", recurrent("rnn"), Refused(&["recurrent"])),
-        row(
-            "convolution",
-            with(q(), &[("cnn.0.weight", &[8, 6, 3])]),
-            Refused(&["convolution"]),
-        ),
-        row(
-            "two heads",
-            [dense("body.0", 16, 6), dense("left", 5, 16), dense("right", 5, 16)].concat(),
-            Refused(&["more than one chain"]),
-        ),
-        row(
-            "a tensor that nobody knows",
-            with(q(), &[("network.gain", &[16])]),
-            Refused(&["network.gain"]),
-        ),
-        row(
-            "one transposed weight",
-            mixed.to_vec(),
-            Refused(&["others as [inputs, outputs]"]),
         ),
     ]
 }

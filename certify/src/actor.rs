@@ -3,31 +3,19 @@
 use policy::{Continuous, Interval, Shape, Squash};
 
 /// Unit roundoff of binary32.
-const UNIT_32: f64 = 1.0 / 16_777_216.0;
+pub(crate) const UNIT_32: f64 = 1.0 / 16_777_216.0;
 /// More than the rounding errors of a few operations in the subnormal range of binary32.
-const TINY_32: f64 = 1e-40;
+pub(crate) const TINY_32: f64 = 1e-40;
 
 /// Bound of |duty in the format - real duty|, where the real output lies in `real` and that of the format is at most `error` off.
 ///
 /// The duty is `scale * s + offset`, and `s` moves by at most its largest slope times the error, wherever between the two outputs.
 pub(crate) fn duty_bound(head: &Continuous, real: Interval, error: f64) -> f64 {
-    let hull = Interval {
-        low: (real.low - error).next_down(),
-        high: (real.high + error).next_up(),
-    };
-    let Interval { low, high } = head.squashed();
-    let largest = low.abs().max(high.abs());
-    let (slope, own) = match head.squash {
-        Squash::Curve(curve) => match curve.shape() {
-            // what binary32 makes of the curve, beside the curve
-            Shape::Curve(curve) => (curve.slopes(hull).1, curve.error_32.at(hull.high)),
-            Shape::Hinge { .. } => (1.0, 0.0),
-        },
-        // both outputs beyond one end are cut to the same number
-        Squash::Clip(clip) if hull.low >= clip.high || hull.high <= clip.low => (0.0, UNIT_32 * largest),
-        Squash::Clip(_) => (1.0, UNIT_32 * largest),
-    };
-    let squashed = slope * error + own + TINY_32;
+    let Squashed {
+        error: squashed,
+        own,
+        largest,
+    } = squashed(Some(head.squash), real, error);
     let scale = head.scale.abs();
     // scale, offset, product and sum are rounded once each, at magnitudes of at most these
     let rounded = 4.0 * UNIT_32 * (scale * largest + head.offset.abs()) + TINY_32;
@@ -35,6 +23,42 @@ pub(crate) fn duty_bound(head: &Continuous, real: Interval, error: f64) -> f64 {
     let most = head.span() + rounded + scale * own;
     // 1e-12: more than this line rounds
     ((scale * squashed + rounded).min(most)) * (1.0 + 1e-6)
+}
+
+/// An output behind its squash.
+pub(crate) struct Squashed {
+    /// Bound of how far that of the format is off.
+    pub error: f64,
+    /// The part of it that the squash itself makes in binary32.
+    pub own: f64,
+    /// Largest magnitude.
+    pub largest: f64,
+}
+
+/// An output of which the real value lies in `real`, and that of the format at most `error` off; `None` takes it as it is.
+pub(crate) fn squashed(squash: Option<Squash>, real: Interval, error: f64) -> Squashed {
+    let hull = Interval {
+        low: (real.low - error).next_down(),
+        high: (real.high + error).next_up(),
+    };
+    let Interval { low, high } = squash.map_or(hull, |squash| squash.ends());
+    let largest = low.abs().max(high.abs());
+    let (slope, own) = match squash {
+        None => (1.0, 0.0),
+        Some(Squash::Curve(curve)) => match curve.shape() {
+            // what binary32 makes of the curve, beside the curve
+            Shape::Curve(curve) => (curve.slopes(hull).1, curve.error_32.at(hull.high)),
+            Shape::Hinge { .. } => (1.0, 0.0),
+        },
+        // both outputs beyond one end are cut to the same number
+        Some(Squash::Clip(clip)) if hull.low >= clip.high || hull.high <= clip.low => (0.0, UNIT_32 * largest),
+        Some(Squash::Clip(_)) => (1.0, UNIT_32 * largest),
+    };
+    Squashed {
+        error: slope * error + own + TINY_32,
+        own,
+        largest,
+    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Everything that is said about a policy in a numeric format.
 
-use policy::{Continuous, Digests, Interval, NumericFormat, Policy};
+use policy::{Continuous, Digests, Interval, NumericFormat, Policy, Schedule};
 use serde::Serialize;
 
 use crate::cover::{Map, Share, Slice, StateBound};
@@ -57,7 +57,10 @@ pub struct Certificate {
     /// Where the command is a number: all bounds are of the duty then, and nothing is said of actions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub continuous: Option<Continuous>,
-    /// Share of the states in proven boxes, estimated; `None` of a continuous actor.
+    /// The same of a law whose gains the network gives; seen errors are with the largest factors of the gains.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub schedule: Option<Schedule>,
+    /// Share of the states in proven boxes, estimated; `None` of a head without a choice.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub proven_share: Option<Share>,
     /// At the states drawn for the share.
@@ -87,6 +90,14 @@ pub struct Neighbourhood {
 }
 
 impl Certificate {
+    /// Distance between the least and the largest duty, where all bounds are of the duty.
+    #[must_use]
+    pub fn duty_span(&self) -> Option<f64> {
+        let of_law = |head: &Schedule| head.limits.high - head.limits.low;
+        let of_actor = self.continuous.as_ref().map(Continuous::span);
+        of_actor.or_else(|| self.schedule.as_ref().map(of_law))
+    }
+
     /// Bounds, shares and map of a policy; `uniform` draws from 0..1.
     #[must_use]
     pub fn new(
@@ -97,7 +108,7 @@ impl Certificate {
         uniform: &mut dyn FnMut() -> f64,
     ) -> Self {
         let certifier = Certifier::new(policy);
-        let is_choice = policy.head.continuous().is_none();
+        let is_choice = policy.head.is_choice();
         let domain = Domain::of(policy, Memory::Free);
         // the same states for the share and for what is seen, so that the two can be held against each other
         let points: Vec<Vec<f64>> = (0..effort.samples).map(|_| domain.draw(uniform)).collect();
@@ -111,6 +122,7 @@ impl Certificate {
             copies: domain.copies(),
             state_bound: certifier.state_bound(&domain, effort.boxes),
             continuous: policy.head.continuous().copied(),
+            schedule: policy.head.schedule().cloned(),
             proven_share: is_choice.then(|| certifier.share(&domain, &points, effort.depth)),
             measured: certifier.measure(observations.iter().map(Vec::as_slice), q_values),
             golden: golden(policy, &certifier, q_values),
@@ -131,9 +143,9 @@ fn golden(policy: &Policy, certifier: &Certifier, q_values: &QValues<'_>) -> Opt
     };
     Some(Golden {
         measured: certifier.measure(observations(), q_values),
-        neighbourhoods: match policy.head.continuous() {
-            Some(_) => Vec::new(),
-            None => RADII.map(neighbourhood).to_vec(),
+        neighbourhoods: match policy.head.is_choice() {
+            false => Vec::new(),
+            true => RADII.map(neighbourhood).to_vec(),
         },
     })
 }

@@ -16,6 +16,7 @@ mod certificate;
 mod cover;
 mod domain;
 mod form;
+mod law;
 mod measured;
 mod network;
 mod neurons;
@@ -25,7 +26,7 @@ mod past;
 mod propagate;
 mod slice;
 
-use policy::{Continuous, Interval, Policy};
+use policy::{Head, Interval, Policy};
 use serde::Serialize;
 
 pub use certificate::{Certificate, Effort, Golden, Neighbourhood};
@@ -42,16 +43,16 @@ use propagate::Enclosure;
 pub struct Certifier {
     network: Network,
     observations: Domain,
-    /// Where the command is a number: bounds are then of the duty.
-    head: Option<Continuous>,
+    /// Where it makes no choice bounds are of the duty.
+    head: Head,
 }
 
-/// Proven bound of |Q in the format - real Q|, or of a continuous actor of |duty in the format - real duty|.
+/// Proven bound of |Q in the format - real Q|, or of a head without a choice of |duty in the format - real duty|.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Bound {
     /// Of the largest.
     pub largest: f64,
-    /// Per action; one of a continuous actor.
+    /// Per action; one of a head without a choice.
     pub per_action: Vec<f64>,
 }
 
@@ -71,7 +72,7 @@ impl Certifier {
         Self {
             network: Network::new(policy),
             observations: Domain::observations(policy),
-            head: policy.head.continuous().copied(),
+            head: policy.head.clone(),
         }
     }
 
@@ -86,15 +87,17 @@ impl Certifier {
     #[must_use]
     pub fn bound_over(&self, domain: &Domain, cell: &[Interval]) -> Bound {
         let enclosure = self.enclose(domain, cell);
-        if let Some(head) = &self.head {
-            let bound = actor::duty_bound(head, enclosure.q_value(0), enclosure.error_bound(0));
-            return Bound::of(vec![bound]);
-        }
-        Bound::of(
-            (0..enclosure.real.len())
-                .map(|action| enclosure.error_bound(action))
-                .collect(),
-        )
+        let outputs = 0..enclosure.real.len();
+        Bound::of(match &self.head {
+            Head::Choice(_) | Head::Residual(_) => outputs.map(|action| enclosure.error_bound(action)).collect(),
+            Head::Continuous(head) => vec![actor::duty_bound(head, enclosure.q_value(0), enclosure.error_bound(0))],
+            Head::Schedule(head) => {
+                let outputs: Vec<_> = outputs
+                    .map(|output| (enclosure.q_value(output), enclosure.error_bound(output)))
+                    .collect();
+                vec![law::duty_bound(head, &outputs)]
+            }
+        })
     }
 
     /// Enclosures of the real Q values over a cell of a domain.

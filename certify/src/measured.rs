@@ -1,13 +1,13 @@
 //! What is seen at single observations, beside what is proven.
 
-use policy::Interval;
+use policy::{Head, Interval};
 use serde::Serialize;
 
 use crate::Certifier;
 use crate::form::Form;
 use crate::network::Network;
 
-/// Q values of an observation in the policy's numeric format, or the duty of a continuous actor; the interpreter's, so that this crate shares nothing with it.
+/// Q values of an observation in the policy's numeric format, the duty of a continuous actor, or the gains of a gain schedule; the interpreter's, so that this crate shares nothing with it.
 pub type QValues<'a> = dyn Fn(&[f32]) -> Vec<f64> + 'a;
 
 /// Differences seen at observations.
@@ -55,13 +55,33 @@ impl Certifier {
         measured
     }
 
+    /// Error of the duty of a head without a choice, of real outputs and what the format makes of them; infinite if that is too
+    /// little. Of a gain schedule with the largest factors, for an observation does not say them.
+    fn duty_error(&self, real: &[f64], held: &[f64]) -> Option<f64> {
+        let whole = real.len() == held.len();
+        let error = match &self.head {
+            Head::Choice(_) | Head::Residual(_) => return None,
+            _ if !whole => f64::INFINITY,
+            Head::Continuous(head) => real
+                .iter()
+                .zip(held)
+                .map(|(y, held)| (head.duty(*y) - held).abs())
+                .sum(),
+            Head::Schedule(head) => {
+                let errors = head.gains.iter().zip(real.iter().zip(held));
+                errors
+                    .map(|(gain, (y, held))| gain.largest_factor() * (gain.value(*y) - held).abs())
+                    .sum()
+            }
+        };
+        Some(error)
+    }
+
     /// Adds one observation; whether its action changes.
     pub(crate) fn add(&self, measured: &mut Measured, observation: &[f32], q_values: &QValues<'_>) -> bool {
         let real = self.real(observation);
         let held = q_values(observation);
-        if let Some(head) = &self.head {
-            let duty = real.centre.first().map_or(f64::NAN, |y| head.duty(*y));
-            let error = held.first().map_or(f64::INFINITY, |held| (duty - held).abs());
+        if let Some(error) = self.duty_error(&real.centre, &held) {
             measured.largest_error = measured.largest_error.max(error);
             measured.observations += 1;
             return false;

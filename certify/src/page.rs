@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use policy::{Continuous, Interval, Policy};
+use policy::{Interval, Policy};
 use report::{Axis, Cell, HeatMap, Page, Ramp, ReportError, Section, Svg, Table, Verdict, grouped, quantity};
 
 use crate::{Certificate, Coordinate, Domain, Map, Measured, Memory, Share};
@@ -10,8 +10,8 @@ use crate::{Certificate, Coordinate, Domain, Map, Measured, Memory, Share};
 /// The answer in a few lines; errors have the unit of Q.
 #[must_use]
 pub fn summary(certificate: &Certificate) -> String {
-    if let Some(head) = &certificate.continuous {
-        return of_actor(certificate, head);
+    if let Some(span) = certificate.duty_span() {
+        return of_actor(certificate, span);
     }
     let bound = certificate.state_bound.bound.largest;
     let measured = &certificate.measured;
@@ -55,7 +55,7 @@ pub fn summary(certificate: &Certificate) -> String {
     lines.join("\n")
 }
 
-fn of_actor(certificate: &Certificate, head: &Continuous) -> String {
+fn of_actor(certificate: &Certificate, span: f64) -> String {
     let measured = &certificate.measured;
     let mut lines = vec![
         format!(
@@ -64,7 +64,7 @@ fn of_actor(certificate: &Certificate, head: &Continuous) -> String {
             certificate.numeric_format.name(),
             digits(certificate.state_bound.bound.largest),
             digits(certificate.box_bound.largest),
-            digits(head.span())
+            digits(span)
         ),
         format!(
             "  largest seen: {} at {} states",
@@ -174,8 +174,8 @@ fn thinned(map: &Map) -> Vec<(f64, f64)> {
 /// Never, in fact: its tables have the columns that they say.
 pub fn page(policy: &Policy, certificate: &Certificate, picture: Option<Svg>) -> Result<String, ReportError> {
     let format = certificate.numeric_format.name();
-    if let Some(head) = &certificate.continuous {
-        return actor_page(policy, certificate, head);
+    if let Some(span) = certificate.duty_span() {
+        return actor_page(policy, certificate, span);
     }
     let sentence = format!(
         "In {format} no Q value differs from real arithmetic by more than {} in any state; the action provably stays the same in {} of the states.",
@@ -203,14 +203,14 @@ pub fn page(policy: &Policy, certificate: &Certificate, picture: Option<Svg>) ->
     page.section(meaning(policy, certificate)).html()
 }
 
-/// The page of a continuous actor: no actions, no map.
-fn actor_page(policy: &Policy, certificate: &Certificate, head: &Continuous) -> Result<String, ReportError> {
+/// The page of a head without a choice: no actions, no map.
+fn actor_page(policy: &Policy, certificate: &Certificate, span: f64) -> Result<String, ReportError> {
     let format = certificate.numeric_format.name();
     let bound = certificate.state_bound.bound.largest;
     let sentence = format!(
         "In {format} no duty differs from real arithmetic by more than {} in any state, which is {:.2} % of the duty's range.",
         digits(bound),
-        100.0 * bound / head.span()
+        100.0 * bound / span
     );
     let mut pairs = vec![
         ("proven for every state", digits(bound)),
@@ -233,7 +233,7 @@ fn actor_page(policy: &Policy, certificate: &Certificate, head: &Continuous) -> 
             digits(golden.measured.largest_error),
         )
     }));
-    pairs.push(("range of the duty", digits(head.span())));
+    pairs.push(("range of the duty", digits(span)));
     Page::new(format!("{}: what {format} does to the duty", certificate.name))
         .verdict(Verdict::Note, sentence)
         .section(Section::new("Error of the duty before the mapping").pairs(pairs))

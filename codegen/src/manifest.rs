@@ -122,7 +122,7 @@ pub fn sizes(policy: &Policy, target: &TargetSpec) -> Sizes {
         removed.clear();
     }
     let bound = (policy.numeric_format.is_integer()).then(|| certify::Certifier::new(policy).box_bound().largest);
-    let is_actor = policy.head.continuous().is_some();
+    let is_actor = !policy.head.is_choice();
     Sizes {
         signals: policy.signals.len(),
         features: policy.features.len(),

@@ -144,7 +144,7 @@ fn eval(
     let text = "the network gets the observation of sections 2 to 5: held samples, filters, scales and clips";
     add("observation", text, &observed);
     if let Some(found) = &called.command {
-        let text = "`eval` commands the duty of sections 7 to 9: argmax or continuous head, mapping, slew limit, soft start, limits, fallback";
+        let text = "`eval` commands the duty of sections 7 to 9: argmax, continuous head or gain schedule, mapping, slew limit, soft start, limits, fallback";
         add("duty", text, &[pair("duty", found.duty, command.duty, float)]);
         let text = "`eval` says the duty of the chosen action, or the fallback";
         add(

@@ -106,6 +106,22 @@ impl Actor {
         }
     }
 
+    /// An entry of `gains` in `[actions]`; its ends are those of the training's own command.
+    pub fn gain(self) -> String {
+        let factor = "source = \"TODO\"";
+        let squash = match self.squash {
+            Squash::Curve(curve) => format!("squash = {}", curve.written()),
+            Squash::Clip(low, high) => format!("clip = [{low:?}, {high:?}]"),
+            Squash::ClipToSpace => "clip = [\"TODO\", \"TODO\"]".to_owned(),
+            Squash::Unknown => "squash = \"TODO\"".to_owned(),
+        };
+        match self.affine {
+            Some((1.0, 0.0)) => format!("{{ {factor}, {squash} }}"),
+            Some((scale, offset)) => format!("{{ {factor}, {squash}, scale = {scale:?}, offset = {offset:?} }}"),
+            None => format!("{{ {factor}, {squash}, scale = \"TODO\", offset = \"TODO\" }}"),
+        }
+    }
+
     /// What was recognised, in a sentence.
     pub fn said(self) -> String {
         match self.squash {
@@ -138,5 +154,8 @@ pub(crate) fn several(found: usize) -> Message {
     Message::new("this actor commands several numbers, and one duty is compiled")
         .found(format!("{found} outputs"))
         .expected("an action space of one number")
-        .hint("a converter with several legs gets a controller for each; or give the duty alone as the action")
+        .hint(
+            "say --output N if one of them is the duty: the others are left out, and of several legs each gets a controller of its own; say \
+             --gains if they are the gains of a law",
+        )
 }

@@ -74,7 +74,7 @@ pub(crate) fn answers(oracle: &Oracle<'_>) -> Result<Option<Vec<u8>>, Message> {
         let metadata = BTreeMap::from([("oracle".to_owned(), said)]);
         let tensors = [
             ("obs".to_owned(), vec![COUNT, oracle.bounds.len()], rounded(&obs)?),
-            ("output".to_owned(), vec![COUNT, 1], rounded(&q)?),
+            ("output".to_owned(), vec![COUNT, actions], rounded(&q)?),
         ];
         return written(&tensors, &metadata).map(Some);
     }

@@ -31,7 +31,7 @@ mod zip;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use policy::limits::MAX_WEIGHT_BYTES;
+use policy::limits::{MAX_GAINS, MAX_WEIGHT_BYTES};
 use policy::{Draft, DraftFeature, seen_from};
 use toml_input::{Faults, FileName, Message, Origin};
 
@@ -46,6 +46,10 @@ pub struct Options {
     pub actions: Option<usize>,
     /// The entry of a checkpoint that holds the network.
     pub inside: Option<String>,
+    /// Which output of several is the duty, or which dimension of a MultiDiscrete; the others are left out.
+    pub output: Option<usize>,
+    /// The outputs are the gains of a law: all of them are kept.
+    pub gains: bool,
     /// What VecNormalize saved; without it a `vecnormalize.pkl` beside the file is taken.
     pub vecnormalize: Option<PathBuf>,
 }
@@ -80,7 +84,7 @@ pub fn new_policy(file: impl Into<FileName>, contract: &Path, options: &Options)
     if let Some(graph) = &loaded.graph {
         // one output that nothing squashes is a command whose way to a duty the contract leaves open
         let is_command = graph.network.layers.last().is_some_and(|layer| layer.outputs == 1);
-        if !is_command {
+        if !is_command && !options.gains {
             recognise::fits(&graph.network, options.actions).map_err(|refusal| placed(&name, refusal))?;
         }
         let own = statistics(&name, options)?;
@@ -90,14 +94,21 @@ pub fn new_policy(file: impl Into<FileName>, contract: &Path, options: &Options)
             return Err(name.fault(message).into());
         }
         let features = if own.is_empty() { graph.features.clone() } else { own };
-        return written(&name, contract, &loaded, &graph.network, &features);
+        return written(&name, contract, &loaded, &graph.network, &features, options);
     }
     if let (Some(_), Some(network)) = (loaded.actor, loaded.actor_network()) {
         let outputs = network.layers.last().map_or(0, |layer| layer.outputs);
-        if outputs != 1 {
+        if outputs != 1 && !options.gains {
             return Err(name.fault(actor::several(outputs)).into());
         }
-        return written(&name, contract, &loaded, &network, &statistics(&name, options)?);
+        return written(
+            &name,
+            contract,
+            &loaded,
+            &network,
+            &statistics(&name, options)?,
+            options,
+        );
     }
     let network = match recognise(&loaded.tensors, &loaded.known).map_err(|refusal| placed(&name, refusal))? {
         Recognised::Network(network) => Some(network),
@@ -106,7 +117,7 @@ pub fn new_policy(file: impl Into<FileName>, contract: &Path, options: &Options)
     let statistics = statistics(&name, options)?;
     match network {
         Some(network) if !network.plain || !loaded.is_safetensors || !statistics.is_empty() => {
-            written(&name, contract, &loaded, &network, &statistics)
+            written(&name, contract, &loaded, &network, &statistics, options)
         }
         // several chains side by side, or none: the contract's own reader explains, or asks for the prefix
         None if !loaded.is_safetensors => Err(name.fault(recognise::undecided_message(&loaded.tensors)).into()),
@@ -140,6 +151,7 @@ fn written(
     loaded: &Loaded,
     network: &Network,
     statistics: &[DraftFeature],
+    options: &Options,
 ) -> Result<NewPolicy, Faults> {
     let inputs = network.layers.first().map_or(0, |layer| layer.inputs);
     if !statistics.is_empty() && statistics.len() != inputs {
@@ -158,7 +170,12 @@ fn written(
     said.extend(network.said.iter().cloned());
     let definition = network.definition.as_ref();
     let actor = definition.map(|definition| definition.actor).or(loaded.actor);
-    said.extend(actor.map(actor::Actor::said));
+    let outputs = network.layers.last().map_or(0, |layer| layer.outputs);
+    let gains = match options.gains {
+        true => gains(loaded, actor, outputs).map_err(|message| name.fault(message))?,
+        false => Vec::new(),
+    };
+    said.extend(actor.filter(|_| gains.is_empty()).map(actor::Actor::said));
     said.extend(definition.iter().flat_map(|definition| definition.said.iter().cloned()));
     if !statistics.is_empty() && loaded.graph.as_ref().is_none_or(|graph| graph.features.is_empty()) {
         said.push("VecNormalize: scale = 1/sqrt(var + epsilon), offset = -mean/sqrt(var + epsilon), then clip, all computed in f64".to_owned());
@@ -188,7 +205,8 @@ fn written(
         golden: golden.is_some() || given.is_some(),
         is_drawn: golden.is_some(),
         continuous: actor.map(actor::Actor::entry),
-        duties: actor.and_then(actor::Actor::duties),
+        duties: actor.filter(|_| gains.is_empty()).and_then(actor::Actor::duties),
+        gains,
         about: said.clone(),
         features: match definition {
             _ if !statistics.is_empty() => statistics.to_vec(),
@@ -206,6 +224,24 @@ fn written(
         beside,
         said,
     })
+}
+
+/// The entries of `gains`, one for each output, as far as the file says how a command becomes one.
+fn gains(loaded: &Loaded, actor: Option<actor::Actor>, outputs: usize) -> Result<Vec<String>, Message> {
+    if !(1..=MAX_GAINS).contains(&outputs) {
+        return Err(Message::new("the outputs are no gains of a law")
+            .found(format!("{outputs} outputs"))
+            .expected(format!("1 to {MAX_GAINS}"))
+            .hint("leave out --gains if the network chooses among actions"));
+    }
+    if loaded.commands.len() == outputs {
+        return Ok(loaded.commands.iter().map(|own| own.gain()).collect());
+    }
+    let actor = actor.unwrap_or(actor::Actor {
+        squash: actor::Squash::Unknown,
+        affine: None,
+    });
+    Ok(vec![actor.gain(); outputs])
 }
 
 /// The trainer's own answers beside its model, which check more than what can be computed here; `None` without them, and of those

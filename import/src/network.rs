@@ -57,6 +57,29 @@ pub struct Network {
 }
 
 impl Network {
+    /// Keeps one output of several and says what is left out.
+    ///
+    /// # Errors
+    /// If there is no such output.
+    pub(crate) fn keep_output(&mut self, output: usize) -> Result<(), Message> {
+        let Some(last) = self.layers.last_mut() else {
+            return Ok(());
+        };
+        let of = last.outputs;
+        if output >= of {
+            return Err(no_output(output, of));
+        }
+        (last.weights, last.bias) = (
+            last.row(output).to_vec(),
+            last.bias.get(output).copied().into_iter().collect(),
+        );
+        last.outputs = 1;
+        self.plain = false;
+        self.said
+            .push(format!("output {output} of {of} is the duty; {}", left_out(output, of)));
+        Ok(())
+    }
+
     /// The layers as a safetensors file, rounded once to binary32: `layer_0.weight`, `layer_0.bias`, ...
     ///
     /// # Errors
@@ -74,6 +97,27 @@ impl Network {
             tensors.push((format!("layer_{index}.bias"), vec![layer.outputs], bias));
         }
         written(&tensors, &BTreeMap::new()).map_err(|message| file.fault(message).into())
+    }
+}
+
+/// An output, or a dimension, that is not there.
+pub(crate) fn no_output(output: usize, of: usize) -> Message {
+    Message::new("--output names none of the outputs")
+        .found(output.to_string())
+        .expected(format!("0 to {}", of.saturating_sub(1)))
+        .hint("they are counted from 0, in the order of the action space")
+}
+
+/// What stands beside the one that is kept.
+pub(crate) fn left_out(kept: usize, of: usize) -> String {
+    let others: Vec<String> = (0..of)
+        .filter(|index| *index != kept)
+        .map(|index| index.to_string())
+        .collect();
+    match others.as_slice() {
+        [] => "there is no other".to_owned(),
+        [one] => format!("{one} is left out"),
+        [first @ .., last] => format!("{} and {last} are left out", first.join(", ")),
     }
 }
 

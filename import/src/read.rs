@@ -6,7 +6,7 @@ use toml_input::{Faults, FileName, Message};
 use crate::activations::Parameters;
 use crate::actor::Actor;
 use crate::network::{Layer, Network};
-use crate::recognise::Known;
+use crate::recognise::{self, Known};
 use crate::zip::Archive;
 use crate::{Options, activations, arrays, hdf5, mat, onnx, sb3, torch, zip};
 
@@ -22,6 +22,8 @@ pub(crate) struct Loaded {
     /// The layers by the names of the library alone, and how many quantiles are averaged behind them.
     pub original: Option<(Vec<Layer>, usize)>,
     pub about: Vec<String>,
+    /// Each command of a model whose outputs are gains.
+    pub commands: Vec<Actor>,
     /// The command is a number; the network is that of `original`, or of the graph.
     pub actor: Option<Actor>,
     /// A graph needs no recognition: its network, activations and features.
@@ -52,17 +54,15 @@ pub(crate) fn read(name: &FileName, bytes: Vec<u8>, options: &Options) -> Result
             .ok_or_else(|| fault(torch::legacy()))?;
         return Ok(Loaded {
             tensors,
-            known: Known {
-                actions: options.actions,
-                ..Known::default()
-            },
+            known: known(options),
             ..Loaded::default()
         });
     }
     if onnx::is_model(&bytes) {
-        let graph = onnx::read(name, &bytes).map_err(fault)?;
+        let graph = onnx::read(name, &bytes, (options.output, options.gains)).map_err(fault)?;
         return Ok(Loaded {
             actor: graph.actor,
+            commands: graph.commands.clone(),
             graph: Some(graph),
             ..Loaded::default()
         });
@@ -79,10 +79,7 @@ pub(crate) fn read(name: &FileName, bytes: Vec<u8>, options: &Options) -> Result
                 policy::named_tensors(name, bytes)?
             },
             is_safetensors: !is_mat,
-            known: Known {
-                actions: options.actions,
-                ..Known::default()
-            },
+            known: known(options),
             ..Loaded::default()
         });
     }
@@ -95,6 +92,7 @@ pub(crate) fn read(name: &FileName, bytes: Vec<u8>, options: &Options) -> Result
     }
     let torch = torch::read(&archive, options.inside.as_deref()).map_err(fault)?;
     let mut about = torch.said;
+    norms(&torch.modules).map_err(fault)?;
     let activation = activation(&torch.modules).map_err(fault)?;
     if let Some(activation) = activation {
         about.push(format!(
@@ -105,8 +103,8 @@ pub(crate) fn read(name: &FileName, bytes: Vec<u8>, options: &Options) -> Result
     Ok(Loaded {
         tensors: torch.tensors,
         known: Known {
-            actions: options.actions,
             epsilons: torch.epsilons,
+            ..known(options)
         },
         activation,
         about,
@@ -114,8 +112,34 @@ pub(crate) fn read(name: &FileName, bytes: Vec<u8>, options: &Options) -> Result
     })
 }
 
+/// What the caller knows beside the tensors.
+fn known(options: &Options) -> Known {
+    Known {
+        actions: options.actions,
+        output: options.output,
+        gains: options.gains,
+        epsilons: Vec::new(),
+    }
+}
+
+/// Norms over the values of a step, by their classes: without a scale of their own they leave no tensor.
+fn norms(modules: &[torch::Module]) -> Result<(), Message> {
+    let folder = "torch.nn.modules.normalization.";
+    let mut norms = modules.iter().filter_map(|module| module.class.strip_prefix(folder));
+    match norms.next() {
+        Some("LayerNorm") => Err(recognise::layer_norm().found("a module of the class LayerNorm")),
+        Some(other) => {
+            let message = Message::new("this norm is not compiled").found(other.escape_debug().to_string());
+            Err(message
+                .expected("dense layers, or batch norms, whose statistics are constants")
+                .hint("it divides by what the values of each step are; train without it, or with BatchNorm1d"))
+        }
+        None => Ok(()),
+    }
+}
+
 fn model(archive: &Archive<'_>, options: &Options) -> Result<Loaded, Message> {
-    let model = sb3::read(archive)?;
+    let model = sb3::read(archive, options)?;
     if let Some(said) = options.actions.filter(|said| *said != model.actions) {
         return Err(Message::new("--actions is not the number of actions of this model")
             .found(said.to_string())
@@ -132,6 +156,7 @@ fn model(archive: &Archive<'_>, options: &Options) -> Result<Loaded, Message> {
         bounds: model.bounds,
         original: model.original,
         about: model.about,
+        commands: model.commands,
         actor: model.actor,
         graph: None,
     })

@@ -3,12 +3,15 @@
 //! What is a Python object in `data` stands there as text, and as a pickle in base64. Texts are taken where they are exact,
 //! the pickle where numbers are wanted to the bit.
 
+mod space;
+
 use policy::{Activation, NamedTensor};
 use serde_json::Value;
 use toml_input::Message;
 
+use crate::Options;
 use crate::activations;
-use crate::actor::{self, Actor};
+use crate::actor::Actor;
 use crate::network::Layer;
 use crate::numpy;
 use crate::pickle::{Item, Pickle};
@@ -30,6 +33,8 @@ pub(crate) struct Model {
     pub original: Option<(Vec<Layer>, usize)>,
     /// The command is a number.
     pub actor: Option<Actor>,
+    /// Each command, where the outputs are gains.
+    pub commands: Vec<Actor>,
 }
 
 /// A policy class that is read: where its layers lie, and its activation unless `policy_kwargs` has another.
@@ -95,7 +100,7 @@ pub(crate) fn is_model(archive: &Archive<'_>) -> bool {
 }
 
 /// Reads a model.
-pub(crate) fn read(archive: &Archive<'_>) -> Result<Model, Message> {
+pub(crate) fn read(archive: &Archive<'_>, options: &Options) -> Result<Model, Message> {
     let data = archive.get("data").unwrap_or_default();
     let data: Value = serde_json::from_slice(data).map_err(|error| {
         Message::new("`data` in the archive is not JSON")
@@ -103,11 +108,7 @@ pub(crate) fn read(archive: &Archive<'_>) -> Result<Model, Message> {
             .expected("what model.save(...) writes")
     })?;
     let class = class(&data)?;
-    let actor = actor(&data, class)?;
-    let actions = match actor {
-        Some(_) => 1,
-        None => actions(&data, class)?,
-    };
+    let space = space::read(&data, class.is_tanh, options)?;
     let kwargs = data.get("policy_kwargs").unwrap_or(&Value::Null);
     if let Some(extractor) =
         text(kwargs, "features_extractor_class").filter(|class| !class.contains("FlattenExtractor"))
@@ -121,7 +122,11 @@ pub(crate) fn read(archive: &Archive<'_>) -> Result<Model, Message> {
     let activation = activation(kwargs, class)?;
     let bounds = bounds(&data)?;
     let policy = Archive::open(archive.get("policy.pth").unwrap_or_default())?;
-    let tensors = torch::read(&policy, None)?.tensors;
+    let mut tensors = torch::read(&policy, None)?.tensors;
+    if let Some(part) = &space.part {
+        let last = last_layer(&tensors, class);
+        part.cut(&mut tensors, &last)?;
+    }
     let version = archive
         .get("_stable_baselines3_version")
         .and_then(|bytes| std::str::from_utf8(bytes).ok());
@@ -137,44 +142,18 @@ pub(crate) fn read(archive: &Archive<'_>) -> Result<Model, Message> {
         Some(net) => format!("net_arch {}", printable(&net.to_string())),
         None => "net_arch: the library's default".to_owned(),
     });
-    let original = original(&tensors, class, actions);
+    about.extend(space.part.map(|part| part.said));
+    let original = original(&tensors, class, space.actions);
     Ok(Model {
         tensors,
-        actions,
+        actions: space.actions,
         activation,
         bounds,
         about,
         original,
-        actor,
+        actor: space.commands.first().copied(),
+        commands: space.commands,
     })
-}
-
-/// The actor of a class or of an action space that is a box; `None` of a table of actions.
-fn actor(data: &Value, class: &Class) -> Result<Option<Actor>, Message> {
-    let space = data.get("action_space").unwrap_or(&Value::Null);
-    let kind = text(space, ":type:").unwrap_or("none");
-    if !kind.ends_with(".Box'>") {
-        return Ok(None);
-    }
-    // with a squash of its own, or with noise that depends on the state, the layers behind the mean are others
-    let kwargs = data.get("policy_kwargs").unwrap_or(&Value::Null);
-    let is_on = |value: Option<&Value>| value.and_then(Value::as_bool).unwrap_or(false);
-    if is_on(data.get("use_sde")) || is_on(kwargs.get("squash_output")) {
-        return Err(other(
-            "noise that depends on the state is not read",
-            "use_sde or squash_output",
-            "neither",
-        )
-        .hint("save the mean's layers as safetensors, and write continuous = {...} in [actions]"));
-    }
-    let [(low, high)] = *box_ends(data, "action_space")? else {
-        return Err(actor::several(box_ends(data, "action_space")?.len()));
-    };
-    Ok(Some(if class.is_tanh {
-        Actor::of_space(low, high)
-    } else {
-        Actor::clipped(low, high)
-    }))
 }
 
 fn class(data: &Value) -> Result<&'static Class, Message> {
@@ -202,31 +181,6 @@ fn class(data: &Value) -> Result<&'static Class, Message> {
     ))
 }
 
-fn actions(data: &Value, class: &Class) -> Result<usize, Message> {
-    let space = data.get("action_space").unwrap_or(&Value::Null);
-    let kind = text(space, ":type:").unwrap_or("none");
-    if class.is_tanh {
-        return Err(refused_continuous(&format!(
-            "{} without a Box action space",
-            class.algorithm
-        )));
-    }
-    let number = |key: &str| match space.get(key) {
-        Some(Value::String(text)) => text.parse::<usize>().ok(),
-        Some(value) => value.as_u64().and_then(|n| usize::try_from(n).ok()),
-        None => None,
-    };
-    match number("n") {
-        Some(actions) if kind.ends_with(".Discrete'>") => Ok(actions),
-        _ => Err(other(
-            "the action space is not one table of actions",
-            kind,
-            "gymnasium.spaces.Discrete",
-        )
-        .hint("write the combinations of a MultiDiscrete as one Discrete table")),
-    }
-}
-
 fn activation(kwargs: &Value, class: &Class) -> Result<Activation, Message> {
     let Some(given) = text(kwargs, "activation_fn") else {
         return Ok(class.activation);
@@ -251,7 +205,7 @@ fn bounds(data: &Value) -> Result<Vec<(f64, f64)>, Message> {
 }
 
 /// Lower and upper end of each number of a box.
-fn box_ends(data: &Value, key: &str) -> Result<Vec<(f64, f64)>, Message> {
+pub(super) fn box_ends(data: &Value, key: &str) -> Result<Vec<(f64, f64)>, Message> {
     let pickle = pickled(data, key)?;
     let of = |key: &str| numpy::array(&pickle, pickle.get(pickle.attributes(pickle.root), key)?);
     match (of("low"), of("high")) {
@@ -282,8 +236,18 @@ fn original(tensors: &[NamedTensor], class: &Class, actions: usize) -> Option<(V
     (actions > 0 && outputs % actions == 0).then(|| (layers, outputs / actions))
 }
 
+/// Name of the layer whose rows are the outputs.
+fn last_layer(tensors: &[NamedTensor], class: &Class) -> String {
+    if let Some(head) = class.head {
+        return head.to_owned();
+    }
+    let number = |layer: &Layer| layer.name.strip_prefix(class.trunk)?.parse::<usize>().ok();
+    let last = only_dense(tensors).iter().filter_map(number).max();
+    format!("{}{}", class.trunk, last.unwrap_or_default())
+}
+
 /// A pickle that stands in `data` in base64.
-fn pickled(data: &Value, key: &str) -> Result<Pickle, Message> {
+pub(super) fn pickled(data: &Value, key: &str) -> Result<Pickle, Message> {
     let value = data.get(key).unwrap_or(&Value::Null);
     let bytes = text(value, ":serialized:").and_then(base64);
     Pickle::read(&bytes.ok_or_else(|| {
@@ -295,7 +259,7 @@ fn pickled(data: &Value, key: &str) -> Result<Pickle, Message> {
     })?)
 }
 
-fn text<'a>(value: &'a Value, key: &str) -> Option<&'a str> {
+pub(super) fn text<'a>(value: &'a Value, key: &str) -> Option<&'a str> {
     value.get(key).and_then(Value::as_str)
 }
 
@@ -323,11 +287,11 @@ fn base64(text: &str) -> Option<Vec<u8>> {
 }
 
 /// Text of a file for a comment in a contract: one line.
-fn printable(text: &str) -> String {
+pub(super) fn printable(text: &str) -> String {
     let short: String = text.trim().chars().take(80).collect();
     short.escape_debug().to_string().replace("\\\"", "\"")
 }
 
-fn other(what: &str, found: &str, expected: &str) -> Message {
+pub(super) fn other(what: &str, found: &str, expected: &str) -> Message {
     Message::new(what).found(printable(found)).expected(expected)
 }

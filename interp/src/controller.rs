@@ -141,8 +141,14 @@ impl<T: Real> Controller<T> {
         if let Some(last) = trace.layers.last() {
             trace.q_values.assign(&last.post_activation);
         }
-        let (index, chosen) = self.head.decide(trace.q_values.view());
-        (trace.action_index, trace.duty_sim) = (index, self.head.duty(trace.base, chosen));
+        let scheduled = self.head.scheduled(trace.base, &trace.factors, trace.q_values.view());
+        (trace.action_index, trace.duty_sim) = match scheduled {
+            Some(duty) => (0, duty),
+            None => {
+                let (index, chosen) = self.head.decide(trace.q_values.view());
+                (index, self.head.duty(trace.base, chosen))
+            }
+        };
         self.act(trace);
         Ok(())
     }
@@ -189,7 +195,7 @@ impl<T: Real> Controller<T> {
     }
 
     /// Sections 8 and 9 for an action chosen elsewhere, behind [`Controller::sense_into`]: fills in the command. An index
-    /// beyond the last action counts as the last. A continuous head has no actions to choose from: the initial duty is
+    /// beyond the last action counts as the last. A head without a choice has no actions to choose from: the initial duty is
     /// commanded.
     pub fn choose(&self, trace: &mut Trace<T>, action_index: u32) {
         let chosen = self.head.choose(action_index);
@@ -240,9 +246,21 @@ impl<T: Real> Controller<T> {
     }
 
     /// Action index and duty before the mapping of a network's outputs (sections 7 and 7b), as many as there are; of a residual
-    /// head the offset, since its law needs a measurement.
+    /// head the offset, since its law needs a measurement. `None` of a gain schedule too, whose duty needs one: [`Self::gains`].
     pub fn decide(&self, outputs: &ArrayView1<'_, T>) -> Option<(u32, T)> {
-        (outputs.len() == self.head.outputs()).then(|| self.head.decide(*outputs))
+        let decides = outputs.len() == self.head.outputs() && !matches!(*self.head, Head::Schedule(_));
+        decides.then(|| self.head.decide(*outputs))
+    }
+
+    /// The gains that a gain schedule makes of a network's outputs (section 7c), as many as there are; `None` of any other head.
+    pub fn gains(&self, outputs: &ArrayView1<'_, T>) -> Option<Vec<T>> {
+        match &*self.head {
+            Head::Schedule(head) if head.gains().len() == outputs.len() => {
+                let both = head.gains().iter().zip(outputs);
+                Some(both.map(|(gain, output)| gain.of(*output)).collect())
+            }
+            _ => None,
+        }
     }
 
     /// Replaces the mapping coefficients if the contract allows them (section 8); `false` and no change otherwise,
@@ -282,6 +300,7 @@ impl<T: Real> Controller<T> {
             observation: Array1::from_elem(self.features.len(), T::ZERO),
             layers: self.network.blank(),
             base: Base::default(),
+            factors: vec![T::ZERO; self.head.factor_count()],
             q_values: Array1::from_elem(self.head.outputs(), T::ZERO),
             action_index: 0,
             duty_sim: T::ZERO,
@@ -344,6 +363,7 @@ impl<T: Real> Controller<T> {
         for (feature, feature_trace) in self.features.iter().zip(&mut trace.features) {
             feature.filter(inputs, &state.memory, trace.primed, feature_trace);
         }
+        self.head.factors(inputs, &trace.features, &mut trace.factors);
         Ok(())
     }
 

@@ -9,6 +9,7 @@ use policy::{Golden, NumericFormat, Policy, Scalar};
 use serde::Serialize;
 
 use crate::duties::{Duties, duties};
+use crate::gains::{Gains, gains};
 use crate::{Controller, Real, argmax};
 
 /// Changes that are told one by one: the worst of them; a user looks at one or two.
@@ -22,6 +23,8 @@ pub enum Decisions {
     Choice(Choices),
     /// Which duties a continuous head commands.
     Continuous(Duties),
+    /// Which gains a gain schedule sets.
+    Schedule(Gains),
 }
 
 /// The trainer's choices against those of the numeric format.
@@ -70,6 +73,7 @@ impl Decisions {
         match self {
             Decisions::Choice(choices) => choices.kept(),
             Decisions::Continuous(duties) => duties.kept(),
+            Decisions::Schedule(gains) => gains.kept(),
         }
     }
 
@@ -79,6 +83,7 @@ impl Decisions {
         match self {
             Decisions::Choice(choices) => choices.numeric_format,
             Decisions::Continuous(duties) => duties.numeric_format,
+            Decisions::Schedule(gains) => gains.numeric_format,
         }
     }
 
@@ -87,13 +92,16 @@ impl Decisions {
     pub fn remedy(&self) -> String {
         match self {
             Decisions::Choice(choices) => format!("golden_decisions = {}", choices.accepting_share()),
-            // rounded up to two digits
-            Decisions::Continuous(duties) => {
-                let unit = 10_f64.powf(duties.largest.log10().floor() - 1.0);
-                format!("golden_duty = {:.1e}", (duties.largest / unit).ceil() * unit)
-            }
+            Decisions::Continuous(duties) => accepting_error(duties.largest),
+            Decisions::Schedule(gains) => accepting_error(gains.largest),
         }
     }
+}
+
+/// The entry that accepts an error of duties or gains, rounded up to two digits.
+fn accepting_error(largest: f64) -> String {
+    let unit = 10_f64.powf(largest.log10().floor() - 1.0);
+    format!("golden_duty = {:.1e}", (largest / unit).ceil() * unit)
 }
 
 impl Choices {
@@ -118,11 +126,14 @@ impl Choices {
 
 /// Answers the golden observations in the policy's format; `None` if the policy has none.
 ///
-/// `allowed` is the share of choices that may change, in the place of the contract's; a continuous head has none.
+/// `allowed` is the share of choices that may change, in the place of the contract's; a head without a choice has none.
 #[must_use]
 pub fn decisions(policy: &Policy, allowed: Option<f64>) -> Option<Decisions> {
     if let Some(head) = policy.head.continuous() {
         return duties(policy, head).map(Decisions::Continuous);
+    }
+    if let Some(head) = policy.head.schedule() {
+        return gains(policy, head).map(Decisions::Schedule);
     }
     let golden = policy.golden.as_ref()?;
     let found = match policy.numeric_format.scalar() {

@@ -5,11 +5,11 @@ use std::fmt;
 use ndarray::aview1;
 use policy::{Activation, Golden, Head, NumericFormat, Policy, Scalar};
 use serde::Serialize;
-use toml_input::Message;
 
-use crate::decisions::{Choices, Decisions, answers, decisions};
-use crate::duties;
+use crate::decisions::answers;
+pub use crate::refusal::refusal;
 use crate::{Controller, Real, argmax};
+use crate::{duties, gains};
 
 /// Known answers of the trainer against the interpreter or a build.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -22,9 +22,12 @@ pub struct GoldenResult {
     pub actions_equal: usize,
     /// Largest |Q - golden| relative to the largest |Q| of its vector; `None` if the trainer gave actions only.
     pub worst_relative_error: Option<f64>,
-    /// Largest |duty - golden| of a continuous head as a share of its range; `None` for a choice.
+    /// Largest |duty - golden| of a continuous head or a gain schedule as a share of its range; `None` for a choice.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_duty_error: Option<f64>,
+    /// Largest |gain - golden gain| of a gain schedule as a share of that gain's range; `None` of any other head.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub worst_gain_error: Option<f64>,
     /// Largest |duty - duty of the golden output| as that share: small where the network is right and only the way from its
     /// output to the duty is another.
     #[serde(skip)]
@@ -46,9 +49,15 @@ impl GoldenResult {
     #[must_use]
     pub fn passed(&self) -> bool {
         let actions = self.actions_equal == self.actions_compared;
-        let read = (self.worst_duty_error)
-            .or(self.worst_relative_error)
-            .map_or(actions, |error| error <= self.tolerance);
+        let errors = match [self.worst_duty_error, self.worst_gain_error] {
+            [None, None] => [self.worst_relative_error, None],
+            errors => errors,
+        };
+        let mut given = errors.iter().flatten().peekable();
+        let read = match given.peek() {
+            None => actions,
+            Some(_) => given.all(|error| *error <= self.tolerance),
+        };
         self.rounded || read
     }
 }
@@ -66,6 +75,12 @@ impl fmt::Display for GoldenResult {
         if let Some(error) = self.worst_duty_error {
             parts.push(format!(
                 "largest error of the duty {error:.1e} of its range (allowed {:.0e})",
+                self.tolerance
+            ));
+        }
+        if let Some(error) = self.worst_gain_error {
+            parts.push(format!(
+                "largest error of a gain {error:.1e} of its range (allowed {:.0e})",
                 self.tolerance
             ));
         }
@@ -87,6 +102,7 @@ pub fn judge(golden: &Golden, head: &Head, answers: &[&[f64]]) -> GoldenResult {
     match head {
         Head::Choice(_) | Head::Residual(_) => judge_choices(golden, answers),
         Head::Continuous(head) => judge_duties(golden, head, answers),
+        Head::Schedule(head) => gains::judge(golden, head, answers),
     }
 }
 
@@ -114,6 +130,7 @@ fn judge_duties(golden: &Golden, head: &policy::Continuous, answers: &[&[f64]]) 
         actions_equal: 0,
         worst_relative_error: None,
         worst_duty_error: duties::given(head, golden).map(|expected| worst(&expected)),
+        worst_gain_error: None,
         output_error: (!from_outputs.is_empty()).then(|| worst(&from_outputs)),
         activations: Vec::new(),
         tolerance: golden.tolerance,
@@ -143,6 +160,7 @@ fn judge_choices(golden: &Golden, answers: &[&[f64]]) -> GoldenResult {
         actions_equal,
         worst_relative_error: (!golden.q_values.is_empty()).then_some(worst),
         worst_duty_error: None,
+        worst_gain_error: None,
         output_error: None,
         activations: Vec::new(),
         tolerance: golden.tolerance,
@@ -180,7 +198,7 @@ pub fn golden_result(policy: &Policy) -> Option<GoldenResult> {
     let policy = policy.clone().with_format(format);
     let mut result = judged(&policy, golden);
     // actions alone may be equal by chance
-    if !result.passed() && (result.worst_relative_error.is_some() || result.worst_duty_error.is_some()) {
+    if !result.passed() && (result.worst_relative_error.is_some() || result.is_of_numbers()) {
         result.activations = activations(&policy, golden);
     }
     Some(result)
@@ -215,57 +233,6 @@ fn wide<T: Real + Into<f64>>(policy: &Policy, golden: &Golden) -> Vec<Vec<f64>> 
         .collect()
 }
 
-/// Why no code should be made of a policy: it was not read as the trainer meant, or its format changes more of his decisions
-/// than the contract allows. `None` if neither, or without golden vectors.
-#[must_use]
-pub fn refusal(policy: &Policy) -> Option<Message> {
-    // reading comes first: of a network that was read wrongly the decisions say nothing about the format
-    let result = golden_result(policy)?;
-    if !result.passed() {
-        let found = match result.worst_relative_error {
-            _ if result.worst_duty_error.is_some() => result.to_string(),
-            Some(error) => format!("a relative error of Q of {error:.1e}, allowed {:.0e}", result.tolerance),
-            None => format!("{} of {} actions equal", result.actions_equal, result.actions_compared),
-        };
-        return Some(
-            Message::new("the network does not give the trainer's golden answers")
-                .found(found)
-                .hint(result.hint()),
-        );
-    }
-    let changed = decisions(policy, None).filter(|decisions| !decisions.kept())?;
-    let Choices {
-        numeric_format,
-        observations,
-        changed,
-        allowed,
-        ..
-    } = match changed {
-        Decisions::Choice(choices) => choices,
-        Decisions::Continuous(duties) => {
-            let found = format!(
-                "an error of {:.1e} of its range in {}, allowed {:.0e}",
-                duties.largest, duties.numeric_format, duties.allowed
-            );
-            let message = Message::new("the numeric format changes the trainer's duties more than allowed");
-            return Some(
-                message
-                    .found(found)
-                    .hint("to accept it: golden_duty in [network], a share of the range from 0 to 1"),
-            );
-        }
-    };
-    Some(
-        Message::new("the numeric format changes more of the trainer's decisions than allowed")
-            .found(format!(
-                "{changed} of {observations} changed in {numeric_format}, allowed {} %",
-                // to hundredths of a percent: 100 * 0.07 is 7.000000000000001
-                (1e4 * allowed).round() / 100.0
-            ))
-            .hint("`policyc inspect` tells what they cost; to accept them: golden_decisions in [network], a share from 0 to 1"),
-    )
-}
-
 /// What to look at when the network does not give the trainer's answers.
 const MISREAD: &str = "look at hidden_activation, the order of layers, transpose, and in the golden file at the order of obs's \
                            columns and at the first action, which is 0: the contract says something else than the trainer did";
@@ -287,7 +254,16 @@ const SCALED: &str = "the network's outputs are the trainer's: squash or clip, s
 const ROUNDED: &str = "every action is equal: the trainer adds in another order, or in another format; golden_tolerance in \
                        [network] says how far its Q values may be off";
 
+/// What to look at where the gains are right and the duties are not.
+const LAW: &str = "the gains are the trainer's: base, sources, features and the order of gains in [actions] make another duty of them \
+                   than the training did";
+
 impl GoldenResult {
+    /// Whether duties or gains were compared, and no choice.
+    pub(crate) fn is_of_numbers(&self) -> bool {
+        self.worst_duty_error.is_some() || self.worst_gain_error.is_some()
+    }
+
     /// What to look at, if it has not passed.
     #[must_use]
     pub fn hint(&self) -> String {
@@ -302,7 +278,10 @@ impl GoldenResult {
     }
 
     fn general_hint(&self) -> &'static str {
-        if self.worst_duty_error.is_some() {
+        if self.worst_gain_error.is_some_and(|error| error <= self.tolerance) {
+            return LAW;
+        }
+        if self.is_of_numbers() {
             let is_read = self.output_error.is_some_and(|error| error <= self.tolerance);
             return if is_read { SCALED } else { MISREAD_DUTY };
         }
@@ -327,6 +306,7 @@ mod tests {
             q_values: vec![1.0, -4.0, 2.0, 3.0],
             action_indices: vec![0, 1],
             duties: Vec::new(),
+            law: Vec::new(),
             tolerance: 1e-5,
             decisions: None,
             duty_error: None,
@@ -345,6 +325,7 @@ mod tests {
             actions_equal: equal,
             worst_relative_error: Some(error),
             worst_duty_error: None,
+            worst_gain_error: None,
             output_error: None,
             activations: Vec::new(),
             tolerance,

@@ -1,12 +1,13 @@
-//! From the outputs of the network to a duty (contract sections 7, 7b and 8).
+//! From the outputs of the network to a duty (contract sections 7, 7b, 7c and 8).
 
 use ndarray::ArrayView1;
-use policy::{Policy, Squash};
+use policy::{Factor, Policy, Squash};
 
 use crate::activation::activate;
 use crate::feature::{Inputs, Source};
 use crate::network::argmax;
 use crate::real::{Range, Real};
+use crate::trace::FeatureTrace;
 
 /// What the outputs mean, in the format.
 #[derive(Debug, Clone)]
@@ -17,6 +18,8 @@ pub(crate) enum Head<T> {
     Residual(Vec<T>, Law<T>),
     /// One output as a duty.
     Continuous(Continuous<T>),
+    /// The outputs as gains of a law.
+    Schedule(Schedule<T>),
 }
 
 /// The law of control of a residual head (section 8).
@@ -31,10 +34,42 @@ pub(crate) struct Law<T> {
 /// What a law says in a step; the default where there is none.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Base<T> {
-    /// The law's duty, clamped to the limits.
+    /// The law's duty; of a residual head clamped to the limits, of a gain schedule the base as it is.
     pub duty: T,
     /// Nothing is added to it: the dead zone.
     pub still: bool,
+}
+
+/// Section 7c.
+#[derive(Debug, Clone)]
+pub(crate) struct Schedule<T> {
+    base: Source<T>,
+    still: Vec<(Source<T>, Range<T>)>,
+    gains: Vec<Gain<T>>,
+    limits: Range<T>,
+}
+
+/// A gain and what it is multiplied with.
+#[derive(Debug, Clone)]
+pub(crate) struct Gain<T> {
+    factor: Multiplied<T>,
+    /// `None` takes the output as it is.
+    squash: Option<Squash>,
+    /// The ends of the clip.
+    clip: Option<Range<T>>,
+    /// `None` where it is exactly 1.
+    scale: Option<T>,
+    /// `None` where it is exactly 0.
+    offset: Option<T>,
+    limits: Option<Range<T>>,
+}
+
+#[derive(Debug, Clone)]
+enum Multiplied<T> {
+    Source(Source<T>),
+    /// Behind its filters.
+    Feature(usize),
+    Nothing,
 }
 
 /// Section 7b.
@@ -58,18 +93,7 @@ impl<T: Real> Head<T> {
             policy::Head::Residual(head) => {
                 let law = Law {
                     base: Source::new(&head.base.tree),
-                    still: (head.dead_zone.iter())
-                        .map(|still| {
-                            let within = T::nearest(still.within);
-                            (
-                                Source::new(&still.source.tree),
-                                Range {
-                                    lo: -within,
-                                    hi: within,
-                                },
-                            )
-                        })
-                        .collect(),
+                    still: still(&head.dead_zone),
                     limits: Range::inwards(head.limits),
                 };
                 let offsets = head.offsets.iter().map(|action| T::nearest(action.duty));
@@ -88,6 +112,12 @@ impl<T: Real> Head<T> {
                     offset: (head.offset != 0.0).then(|| T::nearest(head.offset)),
                 })
             }
+            policy::Head::Schedule(head) => Self::Schedule(Schedule {
+                base: Source::new(&head.base.tree),
+                still: still(&head.dead_zone),
+                gains: head.gains.iter().map(Gain::new).collect(),
+                limits: Range::inwards(head.limits),
+            }),
         }
     }
 
@@ -96,22 +126,56 @@ impl<T: Real> Head<T> {
         match self {
             Self::Choice(table) | Self::Residual(table, _) => table.len(),
             Self::Continuous(_) => 1,
+            Self::Schedule(head) => head.gains.len(),
         }
     }
 
-    /// What the law of a residual head says.
+    /// What the law of a residual head or of a gain schedule says.
     pub fn base(&self, inputs: Inputs<'_, T>) -> Base<T> {
-        let Self::Residual(_, law) = self else {
-            return Base::default();
+        let (duty, still) = match self {
+            Self::Residual(_, law) => (law.limits.clamp(law.base.value(inputs)), &law.still),
+            Self::Schedule(head) => (head.base.value(inputs), &head.still),
+            Self::Choice(_) | Self::Continuous(_) => return Base::default(),
         };
+        let within = |(source, range): &(Source<T>, Range<T>)| range.contains(source.value(inputs));
         Base {
-            duty: law.limits.clamp(law.base.value(inputs)),
-            still: !law.still.is_empty()
-                && law
-                    .still
-                    .iter()
-                    .all(|(source, range)| range.contains(source.value(inputs))),
+            duty,
+            still: !still.is_empty() && still.iter().all(within),
         }
+    }
+
+    /// What the gains are multiplied with, 1 where that is nothing; nothing of any other head.
+    pub fn factors(&self, inputs: Inputs<'_, T>, features: &[FeatureTrace<T>], to: &mut [T]) {
+        let Self::Schedule(head) = self else { return };
+        for (gain, to) in head.gains.iter().zip(to) {
+            *to = match &gain.factor {
+                Multiplied::Source(source) => source.value(inputs),
+                Multiplied::Feature(index) => features[*index].filter_output(),
+                Multiplied::Nothing => T::nearest(1.0),
+            };
+        }
+    }
+
+    /// How many of them there are.
+    pub fn factor_count(&self) -> usize {
+        match self {
+            Self::Schedule(head) => head.gains.len(),
+            Self::Choice(_) | Self::Residual(..) | Self::Continuous(_) => 0,
+        }
+    }
+
+    /// The duty of a gain schedule, of its outputs and factors (section 7c); `None` of any other head.
+    pub fn scheduled(&self, base: Base<T>, factors: &[T], outputs: ArrayView1<'_, T>) -> Option<T> {
+        let Self::Schedule(head) = self else { return None };
+        let mut d = base.duty;
+        for ((gain, x), y) in head.gains.iter().zip(factors).zip(outputs) {
+            let g = gain.of(*y);
+            d = d + match gain.factor {
+                Multiplied::Source(_) | Multiplied::Feature(_) => g * *x,
+                Multiplied::Nothing => g,
+            };
+        }
+        Some(head.limits.clamp(if base.still { base.duty } else { d }))
     }
 
     /// The duty before the mapping of what [`Head::decide`] or [`Head::choose`] gave.
@@ -121,7 +185,7 @@ impl<T: Real> Head<T> {
                 let offset = if base.still { T::ZERO } else { chosen };
                 law.limits.clamp(base.duty + offset)
             }
-            Self::Choice(_) | Self::Continuous(_) => chosen,
+            Self::Choice(_) | Self::Continuous(_) | Self::Schedule(_) => chosen,
         }
     }
 
@@ -133,6 +197,8 @@ impl<T: Real> Head<T> {
                 (index as u32, table[index])
             }
             Self::Continuous(head) => (0, head.duty(outputs[0])),
+            // a measurement makes a duty of them: `scheduled`
+            Self::Schedule(head) => (0, head.limits.lo),
         }
     }
 
@@ -143,7 +209,7 @@ impl<T: Real> Head<T> {
                 let index = (action_index as usize).min(table.len().checked_sub(1)?);
                 Some((index as u32, table[index]))
             }
-            Self::Continuous(_) => None,
+            Self::Continuous(_) | Self::Schedule(_) => None,
         }
     }
 
@@ -152,8 +218,59 @@ impl<T: Real> Head<T> {
         match self {
             Self::Choice(table) => table.clone(),
             Self::Residual(_, law) => vec![law.limits.lo, law.limits.hi],
+            Self::Schedule(head) => vec![head.limits.lo, head.limits.hi],
             Self::Continuous(head) => [head.ends.lo, head.ends.hi].map(|s| head.scaled(s)).to_vec(),
         }
+    }
+}
+
+fn still<T: Real>(zone: &[policy::Still]) -> Vec<(Source<T>, Range<T>)> {
+    let one = |still: &policy::Still| {
+        let within = T::nearest(still.within);
+        let range = Range {
+            lo: -within,
+            hi: within,
+        };
+        (Source::new(&still.source.tree), range)
+    };
+    zone.iter().map(one).collect()
+}
+
+impl<T: Real> Gain<T> {
+    fn new(gain: &policy::Gain) -> Self {
+        Self {
+            factor: match &gain.factor {
+                Factor::Source(source) => Multiplied::Source(Source::new(&source.tree)),
+                Factor::Feature(index) => Multiplied::Feature(*index),
+                Factor::One => Multiplied::Nothing,
+            },
+            squash: gain.squash,
+            clip: match gain.squash {
+                Some(Squash::Clip(clip)) => Some(Range::nearest(clip)),
+                Some(Squash::Curve(_)) | None => None,
+            },
+            scale: (gain.scale != 1.0).then(|| T::nearest(gain.scale)),
+            offset: (gain.offset != 0.0).then(|| T::nearest(gain.offset)),
+            limits: gain.limits.map(Range::nearest),
+        }
+    }
+
+    /// The gain of an output.
+    pub fn of(&self, output: T) -> T {
+        let mut s = [output];
+        if let Some(Squash::Curve(curve)) = self.squash {
+            activate(curve, s.iter_mut());
+        }
+        let s = self.clip.map_or(s[0], |clip| clip.clamp(s[0]));
+        let scaled = self.scale.map_or(s, |scale| s * scale);
+        let shifted = self.offset.map_or(scaled, |offset| scaled + offset);
+        self.limits.map_or(shifted, |limits| limits.clamp(shifted))
+    }
+}
+
+impl<T: Real> Schedule<T> {
+    pub fn gains(&self) -> &[Gain<T>] {
+        &self.gains
     }
 }
 

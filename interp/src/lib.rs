@@ -9,7 +9,7 @@
 //! | 2 sanitise | `sanitise` |
 //! | 3, 4, 5 source, filters, observation | `feature`, `filter` |
 //! | 6, 7 network, argmax | `network`; in integers `integer` |
-//! | 7, 7b argmax, continuous head | `head` |
+//! | 7, 7b, 7c argmax, continuous head, gain schedule | `head` |
 //! | 8 action, mapping | `mapping` |
 //! | 9 limits and status | `limits`, [`status`] |
 //! | 10 commit | [`controller`] |
@@ -33,6 +33,7 @@ pub mod decisions;
 pub mod duties;
 mod feature;
 mod filter;
+pub mod gains;
 pub mod golden;
 mod head;
 mod integer;
@@ -42,6 +43,7 @@ mod names;
 mod network;
 mod observer;
 mod real;
+mod refusal;
 mod sanitise;
 mod sound;
 pub mod state;

@@ -80,11 +80,13 @@ pub struct Trace<T> {
     pub observation: Array1<T>,
     /// Per layer (6).
     pub layers: Vec<LayerTrace<T>>,
-    /// What the law of a residual head says (8); 0 and not still of any other.
+    /// What the law of a residual head (8) or the base of a gain schedule (7c) says; 0 and not still of any other.
     pub base: Base<T>,
-    /// Output of the network: one value per action, or the one of a continuous head.
+    /// What the gains of a gain schedule are multiplied with, 1 where that is nothing (7c); empty of any other head.
+    pub factors: Vec<T>,
+    /// Output of the network: one value per action or gain, or the one of a continuous head.
     pub q_values: Array1<T>,
-    /// Greedy action (7); 0 of a continuous head (7b).
+    /// Greedy action (7); 0 of a continuous head (7b) and a gain schedule (7c).
     pub action_index: u32,
     /// Entry of the action table (8), the law's duty with what is added to it (8), or the duty of a continuous head (7b).
     pub duty_sim: T,

@@ -18,6 +18,7 @@ fn golden(observations: &[f32], q_values: &[f32], actions: &[u32]) -> Golden {
         q_values: q_values.to_vec(),
         action_indices: actions.to_vec(),
         duties: Vec::new(),
+        law: Vec::new(),
         tolerance: 1e-4,
         decisions: None,
         duty_error: None,
@@ -34,7 +35,7 @@ fn chooser(golden: Golden) -> Policy {
 fn choices(policy: &Policy, allowed: Option<f64>) -> Choices {
     match decisions(policy, allowed).unwrap() {
         Decisions::Choice(choices) => choices,
-        Decisions::Continuous(duties) => panic!("{duties:?}"),
+        other => panic!("{other:?}"),
     }
 }
 

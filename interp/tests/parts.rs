@@ -145,6 +145,7 @@ fn answers_of_the_trainer_are_compared_row_by_row() {
         q_values: vec![3.0, 6.0, 4.0, 2.0, 1.0, 8.0],
         action_indices: vec![1, 0, 1],
         duties: Vec::new(),
+        law: Vec::new(),
         tolerance: 1e-4,
         decisions: None,
         duty_error: None,

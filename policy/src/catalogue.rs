@@ -70,6 +70,18 @@ pub(crate) fn duty_range(label: &str, found: f64) -> Message {
         .maybe_hint(hint)
 }
 
+pub(crate) fn unbounded_gain() -> Message {
+    Message::new("nothing bounds this gain")
+        .found("neither `squash` nor `clip` nor `limits`")
+        .expected("at least one of them")
+}
+
+pub(crate) fn one_gain(gain: f64) -> Message {
+    Message::new("these limits leave one gain, whatever the network says")
+        .found(gain.to_string())
+        .expected("limits that scale and offset reach into")
+}
+
 /// A quotient by 100 without the binary noise (0.44 rather than 0.44000000000000006).
 pub(crate) fn tidy(x: f64) -> f64 {
     // nobody types a duty or a period with more decimals; the binary noise lies behind the sixteenth digit

@@ -14,7 +14,7 @@ use toml_input::{Sink, Table};
 
 use crate::bounds::{self, Inputs, Overflow};
 use crate::catalogue;
-use crate::contract::{actions, features, head, mapping, network, observers, protection, residual, signals};
+use crate::contract::{actions, features, head, mapping, network, observers, protection, residual, schedule, signals};
 use crate::digests;
 use crate::faults::Faults;
 use crate::limits::MAX_FEATURES;
@@ -71,7 +71,7 @@ fn sections<'a>(raw: &'a RawPolicy, faults: &mut Sink) -> Sections<'a> {
     };
     let features = features::read(&mut root, &around, faults);
     let network = network::read(&mut root, faults);
-    let actions = actions::read(&mut root, &around, faults);
+    let actions = actions::read(&mut root, &around, &features.names(), faults);
     let mapping = mapped(raw, &mut root, &signals.names, faults);
     let fallback = protection::fallback(&mut root, faults);
     let limits = protection::limits(&mut root, fallback, faults);
@@ -95,7 +95,7 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     let read = sections(raw, faults);
     let (head, signals, observers, features) = (read.head, read.signals, read.observers, read.features);
     let (network, mapping) = (read.network, read.mapping);
-    let (decided, output_count) = (read.decided, read.outputs);
+    let (mut decided, output_count) = (read.decided, read.outputs);
     let (fallback, limits) = (read.fallback, read.limits);
     let feature_count = features.count;
     let duties = decided.duties();
@@ -126,8 +126,10 @@ fn whole(raw: &RawPolicy, faults: &mut Sink) -> Option<Policy> {
     // a layer has to know every input: bounds of the others would be another network's
     let complete = feature_count > 0 && bounded.len() == feature_count;
     let known: &[Feature] = if complete { &bounded } else { &[] };
+    bound_gains(raw, &mut decided, known, (inputs.as_ref(), head.sample_period), faults);
     if let (true, Some(weights)) = (complete, weights.as_mut()) {
         bound_layers(raw, known, &mut weights.layers, faults);
+        bound_outputs(raw, &decided, &weights.layers, faults);
     }
     if let (Some(Some(mapping)), Some(inputs)) = (&mapping, &inputs) {
         bound_mapping(raw, mapping, inputs, &duties, faults);
@@ -208,7 +210,7 @@ fn golden(
     let shape = weights::golden::Shape {
         features: count,
         outputs,
-        is_continuous: head.continuous().is_some(),
+        head,
     };
     weights::golden::read(file, shape, features, network?.golden, faults).map(Some)
 }
@@ -231,6 +233,29 @@ fn bound_layers(raw: &RawPolicy, features: &[Feature], layers: &mut [Layer], fau
             }
         }
         inputs.clone_from(&layer.bounds);
+    }
+}
+
+/// Where the contract schedules gains.
+fn gains(raw: &RawPolicy) -> Option<toml_input::Value<'_>> {
+    raw.contract.peek(&["actions", "gains"])
+}
+
+fn bound_gains(
+    raw: &RawPolicy,
+    head: &mut Head,
+    features: &[Feature],
+    around: (Option<&Inputs>, Option<f64>),
+    faults: &mut Sink,
+) {
+    if let ((Some(inputs), Some(period)), Some(at)) = (around, gains(raw)) {
+        schedule::bounded(head, features, inputs, period, &at, faults);
+    }
+}
+
+fn bound_outputs(raw: &RawPolicy, head: &Head, layers: &[Layer], faults: &mut Sink) {
+    if let (Some(last), Some(at)) = (layers.last(), gains(raw)) {
+        schedule::outputs_bounded(head, &last.bounds, &at, faults);
     }
 }
 

@@ -12,7 +12,7 @@ use sha2::{Digest, Sha256};
 use crate::activation::Activation;
 use crate::model::{
     Action, Continuous, Digests, Expr, Fallback, Feature, Filter, Interval, Layer, Limits, Mapping, NumericFormat,
-    Observer, Policy, Residual, Signal,
+    Observer, Policy, Residual, Schedule, Signal,
 };
 
 #[derive(Serialize)]
@@ -34,6 +34,8 @@ struct Contract<'a> {
     continuous: Option<&'a Continuous>,
     #[serde(skip_serializing_if = "Option::is_none")]
     residual: Option<&'a Residual>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    schedule: Option<&'a Schedule>,
     limits: &'a Limits,
     fallback: &'a Fallback,
 }
@@ -100,6 +102,7 @@ pub(crate) fn of(policy: &Policy) -> Digests {
         actions: policy.actions(),
         continuous: policy.head.continuous(),
         residual: policy.head.residual(),
+        schedule: policy.head.schedule(),
         limits: &policy.limits,
         fallback: &policy.fallback,
     };

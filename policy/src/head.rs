@@ -1,5 +1,5 @@
-//! What the outputs of the network mean: a choice among duties, or one number that becomes a duty (contract sections 7
-//! and 8).
+//! What the outputs of the network mean: a choice among duties, one number that becomes a duty, or the gains of a law
+//! (contract sections 7, 7b, 7c and 8).
 
 use serde::Serialize;
 
@@ -17,6 +17,8 @@ pub enum Head {
     Residual(Residual),
     /// One output, as a number.
     Continuous(Continuous),
+    /// The outputs are the gains of a law of control.
+    Schedule(Schedule),
 }
 
 /// `duty = clamp(clamp(base) + offset)`: a law that is known, and what a network has learnt to add to it (section 8).
@@ -92,6 +94,52 @@ pub enum Squash {
     Clip(Interval),
 }
 
+/// `duty = clamp(base + g_0 x_0 + g_1 x_1 + ...)`: a law of control whose gains the network gives (section 7c).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Schedule {
+    /// Affine law in signals and estimates that the products are added to; its value is a duty.
+    pub base: Source,
+    /// Sound bound of the base in f32 arithmetic, over all plausible measurements.
+    #[serde(skip)]
+    pub base_bound: Interval,
+    /// In the order of the network's outputs, which is that of the sum.
+    pub gains: Vec<Gain>,
+    /// Where all of these hold the base alone is commanded; nowhere if there are none.
+    pub dead_zone: Vec<Still>,
+    /// The limits of the duty, to which the sum is clamped.
+    pub limits: Interval,
+}
+
+/// One gain: `clamp(scale * s + offset)`, where `s` is an output of the network behind its squash.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Gain {
+    /// What it is multiplied with.
+    pub factor: Factor,
+    /// What bounds the output; `None` takes it as it is, and there are limits then.
+    pub squash: Option<Squash>,
+    /// Gain per unit of `s`; not 0.
+    pub scale: f64,
+    /// Gain at `s = 0`.
+    pub offset: f64,
+    /// Where the gain is cut off.
+    pub limits: Option<Interval>,
+    /// Sound bound of the factor in f32 arithmetic, over all plausible measurements; 1 without one.
+    #[serde(skip)]
+    pub factor_bound: Interval,
+}
+
+/// What a gain is multiplied with.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Factor {
+    /// An affine expression.
+    Source(Source),
+    /// The value of that feature behind its filters, before scale, offset and clip.
+    Feature(usize),
+    /// Nothing: the gain is added as it is.
+    One,
+}
+
 impl Head {
     /// Outputs of the network.
     #[must_use]
@@ -100,16 +148,17 @@ impl Head {
             Head::Choice(actions) => actions.len(),
             Head::Residual(head) => head.offsets.len(),
             Head::Continuous(_) => 1,
+            Head::Schedule(head) => head.gains.len(),
         }
     }
 
-    /// The discrete actions, whose duties are offsets of a residual head; none of a continuous one.
+    /// The discrete actions, whose duties are offsets of a residual head; none of a head without a choice.
     #[must_use]
     pub fn actions(&self) -> &[Action] {
         match self {
             Head::Choice(actions) => actions,
             Head::Residual(head) => &head.offsets,
-            Head::Continuous(_) => &[],
+            Head::Continuous(_) | Head::Schedule(_) => &[],
         }
     }
 
@@ -117,8 +166,8 @@ impl Head {
     #[must_use]
     pub fn continuous(&self) -> Option<&Continuous> {
         match self {
-            Head::Choice(_) | Head::Residual(_) => None,
             Head::Continuous(head) => Some(head),
+            Head::Choice(_) | Head::Residual(_) | Head::Schedule(_) => None,
         }
     }
 
@@ -127,26 +176,58 @@ impl Head {
     pub fn residual(&self) -> Option<&Residual> {
         match self {
             Head::Residual(head) => Some(head),
-            Head::Choice(_) | Head::Continuous(_) => None,
+            Head::Choice(_) | Head::Continuous(_) | Head::Schedule(_) => None,
         }
     }
 
-    /// What it reads beside the network: a law of control and where that is left alone.
-    pub fn sources(&self) -> impl Iterator<Item = &Source> {
-        self.residual().into_iter().flat_map(|head| {
-            let still = head.dead_zone.iter().map(|still| &still.source);
-            std::iter::once(&head.base).chain(still)
-        })
+    /// The gain schedule, if it is one.
+    #[must_use]
+    pub fn schedule(&self) -> Option<&Schedule> {
+        match self {
+            Head::Schedule(head) => Some(head),
+            Head::Choice(_) | Head::Residual(_) | Head::Continuous(_) => None,
+        }
     }
 
-    /// The duties before the mapping: those of all actions, or the two ends of a continuous or a residual head, as binary32
-    /// has them.
+    /// Distance between the least and the largest duty of a head without a choice: the unit of errors of its duty.
+    #[must_use]
+    pub fn duty_span(&self) -> Option<f64> {
+        match self {
+            Head::Choice(_) | Head::Residual(_) => None,
+            Head::Continuous(head) => Some(head.span()),
+            Head::Schedule(head) => Some(head.limits.high - head.limits.low),
+        }
+    }
+
+    /// Whether it chooses one of several actions.
+    #[must_use]
+    pub fn is_choice(&self) -> bool {
+        matches!(self, Head::Choice(_) | Head::Residual(_))
+    }
+
+    /// What it reads beside the network: a law of control, where that is left alone, and what gains are multiplied with.
+    pub fn sources(&self) -> impl Iterator<Item = &Source> {
+        let (base, zone, gains): (_, &[Still], &[Gain]) = match self {
+            Head::Choice(_) | Head::Continuous(_) => (None, &[], &[]),
+            Head::Residual(head) => (Some(&head.base), &head.dead_zone, &[]),
+            Head::Schedule(head) => (Some(&head.base), &head.dead_zone, &head.gains),
+        };
+        let factors = gains.iter().filter_map(|gain| match &gain.factor {
+            Factor::Source(source) => Some(source),
+            Factor::Feature(_) | Factor::One => None,
+        });
+        base.into_iter()
+            .chain(zone.iter().map(|still| &still.source))
+            .chain(factors)
+    }
+
+    /// The duties before the mapping: those of all actions, or the two ends of any other head, as binary32 has them.
     #[must_use]
     pub fn duties(&self) -> Vec<f64> {
         match self {
             Head::Choice(actions) => actions.iter().map(|action| action.duty).collect(),
-            Head::Residual(head) => {
-                let ends = inward_f32(head.limits);
+            Head::Residual(Residual { limits, .. }) | Head::Schedule(Schedule { limits, .. }) => {
+                let ends = inward_f32(*limits);
                 ends.map_or(Vec::new(), |(low, high)| vec![f64::from(low), f64::from(high)])
             }
             Head::Continuous(head) => head.ends_32().to_vec(),
@@ -154,31 +235,50 @@ impl Head {
     }
 }
 
-impl Continuous {
-    /// Least and largest value behind the squash.
+impl Squash {
+    /// Least and largest value behind it.
     #[must_use]
-    pub fn squashed(&self) -> Interval {
-        match self.squash {
+    pub fn ends(&self) -> Interval {
+        match self {
             Squash::Curve(curve) => curve.range().unwrap_or(Interval { low: -1.0, high: 1.0 }),
-            Squash::Clip(clip) => clip,
+            Squash::Clip(clip) => *clip,
         }
     }
 
-    /// The duty of an output in binary64: a reference for what a numeric format makes of it, not its bits.
+    /// The value of an output in binary64: a reference for what a numeric format makes of it, not its bits.
     #[must_use]
-    pub fn duty(&self, output: f64) -> f64 {
-        let squashed = match self.squash {
+    pub fn value(&self, output: f64) -> f64 {
+        match self {
             Squash::Curve(curve) => match curve.shape() {
                 Shape::Curve(curve) => (curve.value)(output),
                 // the reader lets no other shape through
                 Shape::Hinge { .. } => output,
             },
-            // section 4: a NaN stays one, which `max` and `min` would make an end of
-            Squash::Clip(clip) if output < clip.low => clip.low,
-            Squash::Clip(clip) if output > clip.high => clip.high,
-            Squash::Clip(_) => output,
-        };
-        self.scale * squashed + self.offset
+            Squash::Clip(clip) => clamped(output, *clip),
+        }
+    }
+}
+
+/// Section 4: a NaN stays one, which `max` and `min` would make an end of.
+fn clamped(x: f64, Interval { low, high }: Interval) -> f64 {
+    match x {
+        x if x < low => low,
+        x if x > high => high,
+        x => x,
+    }
+}
+
+impl Continuous {
+    /// Least and largest value behind the squash.
+    #[must_use]
+    pub fn squashed(&self) -> Interval {
+        self.squash.ends()
+    }
+
+    /// The duty of an output in binary64: a reference for what a numeric format makes of it, not its bits.
+    #[must_use]
+    pub fn duty(&self, output: f64) -> f64 {
+        self.scale * self.squash.value(output) + self.offset
     }
 
     /// Distance between the least and the largest duty: the unit of errors.
@@ -204,9 +304,80 @@ impl Continuous {
     }
 }
 
+impl Gain {
+    /// The gain of an output in binary64: a reference for what a numeric format makes of it, not its bits.
+    #[must_use]
+    pub fn value(&self, output: f64) -> f64 {
+        let squashed = self.squash.map_or(output, |squash| squash.value(output));
+        let gain = self.scale * squashed + self.offset;
+        self.limits.map_or(gain, |limits| clamped(gain, limits))
+    }
+
+    /// Least and largest gain, as binary32 has them: rounded products and sums keep the order of what they round.
+    #[must_use]
+    pub fn ends(&self) -> Interval {
+        let nearest = |x: f64| f64::from(nearest_f32(x));
+        let limits = self.limits.map(|limits| Interval {
+            low: nearest(limits.low),
+            high: nearest(limits.high),
+        });
+        let Some(squash) = self.squash else {
+            // the reader asks for limits where nothing else bounds the output
+            return limits.unwrap_or(Interval { low: 0.0, high: 0.0 });
+        };
+        let Interval { low, high } = squash.ends();
+        let ends = [low, high].map(|s| {
+            let gain = f64::from(nearest_f32(s) * nearest_f32(self.scale) + nearest_f32(self.offset));
+            limits.map_or(gain, |limits| clamped(gain, limits))
+        });
+        Interval {
+            low: ends[0].min(ends[1]),
+            high: ends[0].max(ends[1]),
+        }
+    }
+
+    /// Distance between the least and the largest gain: the unit of errors.
+    #[must_use]
+    pub fn span(&self) -> f64 {
+        let Interval { low, high } = self.ends();
+        high - low
+    }
+
+    /// Largest magnitude of the factor.
+    #[must_use]
+    pub fn largest_factor(&self) -> f64 {
+        self.factor_bound.low.abs().max(self.factor_bound.high.abs())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_gain_is_squashed_scaled_shifted_and_cut_off() {
+        let gain = |squash: Option<Squash>, scale: f64, limits: Option<Interval>| Gain {
+            factor: Factor::One,
+            squash,
+            scale,
+            offset: 0.5,
+            limits,
+            factor_bound: Interval { low: 1.0, high: 1.0 },
+        };
+        let clip = Some(Squash::Clip(Interval { low: -1.0, high: 1.0 }));
+        let cut = Interval { low: 0.25, high: 0.625 };
+        let values = |gain: &Gain| [-9.0, 0.25, 9.0].map(|output| gain.value(output));
+        let all = gain(clip, -0.5, None);
+        assert_eq!(values(&all), [1.0, 0.375, 0.0]);
+        assert_eq!(all.ends(), Interval { low: 0.0, high: 1.0 });
+        let limited = gain(clip, -0.5, Some(cut));
+        assert_eq!(values(&limited), [0.625, 0.375, 0.25]);
+        assert_eq!((limited.ends(), limited.span()), (cut, 0.375));
+        let plain = gain(None, 0.25, Some(cut));
+        assert_eq!(values(&plain), [0.25, 0.5625, 0.625]);
+        assert_eq!(plain.ends(), cut);
+        assert!(all.value(f64::NAN).is_nan() && limited.value(f64::NAN).is_nan());
+    }
 
     #[test]
     fn a_duty_is_a_line_over_the_clipped_output() {

@@ -15,15 +15,19 @@ pub struct Golden {
     pub q_values: Vec<f32>,
     /// `[count]`; empty if the trainer gave Q values only, and for a continuous head.
     pub action_indices: Vec<u32>,
-    /// `[count]`: what a continuous head makes of the observation; empty for a choice, or if the trainer gave outputs only.
+    /// `[count]`: what a continuous head or a gain schedule makes of the observation; empty for a choice, or if the trainer gave
+    /// outputs only.
     pub duties: Vec<f32>,
-    /// Allowed |Q - golden| relative to the largest |Q| of the vector; for a continuous head the allowed error of its duty
-    /// as a share of its range.
+    /// Row-major `[count][1 + gains]`: base and factors of a gain schedule, as far as the observation tells them; NaN in rows where
+    /// a clip hides one. Empty of any other head, and without duties.
+    pub law: Vec<f64>,
+    /// Allowed |Q - golden| relative to the largest |Q| of the vector; for a continuous head the allowed error of its duty,
+    /// and for a gain schedule of each gain and of the duty, as a share of its range.
     pub tolerance: f64,
     /// Share of the vectors, 0..1, whose action the numeric format may change; `None` if the contract does not say.
     pub decisions: Option<f64>,
-    /// Largest error of the duty of a continuous head, as a share of its range, that the numeric format may cause; `None`
-    /// if the contract does not say.
+    /// Largest error of the duty of a continuous head, or of a gain, as a share of its range, that the numeric format may cause;
+    /// `None` if the contract does not say.
     pub duty_error: Option<f64>,
 }
 
@@ -42,7 +46,7 @@ impl Golden {
         self.decisions.unwrap_or(usual)
     }
 
-    /// Error of the duty of a continuous head, as a share of its range, that the format may cause: what the contract says;
+    /// Error of the duty of a continuous head, or of a gain, as a share of its range, that the format may cause: what the contract says;
     /// otherwise the tolerance for real formats, which compute the trainer's network, and a thousandth for integers.
     #[must_use]
     pub fn allowed_duty_error(&self, format: NumericFormat) -> f64 {

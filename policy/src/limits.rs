@@ -15,6 +15,8 @@ pub const MAX_FEATURES: usize = 64;
 pub const MAX_SIGNALS: usize = 32;
 /// Most conditions of a dead zone.
 pub const MAX_DEAD_ZONE: usize = 4;
+/// Most gains of a law that the network schedules.
+pub const MAX_GAINS: usize = 16;
 /// Most observers.
 pub const MAX_OBSERVERS: usize = 4;
 /// Most named parameters.

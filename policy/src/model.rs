@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::activation::Activation;
 pub use crate::filter::Filter;
-pub use crate::head::{Action, Continuous, Head, Pair, Residual, Source, Squash, Still};
+pub use crate::head::{Action, Continuous, Factor, Gain, Head, Pair, Residual, Schedule, Source, Squash, Still};
 pub use crate::interval::Interval;
 use crate::known_answers;
 pub use crate::known_answers::Golden;
@@ -189,7 +189,7 @@ impl Policy {
         (self.golden.as_ref()).map_or(known_answers::TOLERANCE, |golden| golden.tolerance)
     }
 
-    /// The discrete actions; none where the head is continuous.
+    /// The discrete actions; none where the head makes no choice.
     #[must_use]
     pub fn actions(&self) -> &[Action] {
         self.head.actions()
@@ -201,7 +201,7 @@ impl Policy {
         match &mut self.head {
             Head::Choice(actions) => actions,
             Head::Residual(head) => &mut head.offsets,
-            Head::Continuous(_) => &mut [],
+            Head::Continuous(_) | Head::Schedule(_) => &mut [],
         }
     }
 }

@@ -129,6 +129,8 @@ pub struct Draft {
     pub is_drawn: bool,
     /// The entry `continuous` of `[actions]`, where the command is known to be a number.
     pub continuous: Option<String>,
+    /// The entries of `gains` in `[actions]`, where the outputs are the gains of a law.
+    pub gains: Vec<String>,
     /// Least and largest duty that the network can command, where that is known.
     pub duties: Option<(f64, f64)>,
     /// Lines about the whole, without `#`.
@@ -160,7 +162,9 @@ pub fn draft(draft: &Draft) -> String {
     let folder = &weights[..weights.rfind('/').map_or(0, |slash| slash + 1)];
     // TOML's own quotes and escapes: a path may hold both
     let file = toml::Value::String(weights.clone()).to_string();
+    let is_law = !draft.gains.is_empty();
     let answers = match outputs {
+        _ if is_law => format!("{outputs} gains of a law"),
         1 => "one output".to_owned(),
         _ => format!("{outputs} actions"),
     };
@@ -208,18 +212,36 @@ pub fn draft(draft: &Draft) -> String {
     let _ = writeln!(
         text,
         "{beside}golden = {golden}   # obs [n, inputs], {} from the trainer",
-        if *outputs == 1 {
-            "output [n], duty [n]"
-        } else {
-            "q [n, actions], action [n]"
+        match outputs {
+            _ if is_law => "output [n, gains]",
+            1 => "output [n], duty [n]",
+            _ => "q [n, actions], action [n]",
         }
     );
     if draft.is_drawn {
         // a drawn row is no evidence that a feature is wrong: bounds of a training reach beyond what sensors show
         text += "golden_outside = 0.95           # they were drawn from the bounds: those that the sensors cannot show are left out\n";
     }
-    text += &actions(draft.continuous.as_deref(), *outputs);
+    text += &match is_law {
+        true => law(&draft.gains),
+        false => actions(draft.continuous.as_deref(), *outputs),
+    };
     text + &protection(draft.duties)
+}
+
+fn law(gains: &[String]) -> String {
+    let rows: String = gains
+        .iter()
+        .enumerate()
+        .map(|(output, gain)| format!("  {gain},   # g{output}\n"))
+        .collect();
+    format!(
+        "\n[actions]                    # the outputs y are the gains of one law: duty = base + g0 * source + g1 * source + ...\n\
+         # base = \"v_ref / 200\"       # what stands in front; 0 if it is left out\n\
+         # Each gain is scale * squash(y) + offset, and with limits = [lo, hi] cut off there. In the place of source also\n\
+         # feature = \"x0\": a feature behind its filters, such as an integrator; without either the gain is added as it is.\n\
+         gains = [\n{rows}]\n"
+    )
 }
 
 fn actions(continuous: Option<&str>, outputs: usize) -> String {

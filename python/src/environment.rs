@@ -8,7 +8,7 @@ use plant::Signals;
 use policy::Policy;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use toml_input::{FileName, Message, messages};
+use toml_input::{Fault, FileName, Message, messages};
 use train::episodes::{Actions, Begin, Episodes as Inner, Given};
 use train::{Contract, Settings};
 
@@ -41,6 +41,16 @@ fn contract(path: &Path) -> Result<Contract, train::Error> {
         path.to_owned()
     };
     Contract::load_any(&path, &[])
+}
+
+/// An action of an environment is a duty or its index; the gains of a law are neither.
+fn schedules(path: &Path) -> train::Error {
+    let message =
+        Message::new("the environment takes duties, and in this contract the network gives the gains of a law")
+            .found("gains in [actions]")
+            .expected("duties, pairs, offsets or continuous")
+            .hint("train the gains in an environment of your own, and give its network to this contract");
+    Fault::in_file(path, message).into()
 }
 
 fn signals(signals: &Signals) -> [(&'static str, f64); 4] {
@@ -78,6 +88,9 @@ impl Episodes {
                 None => Settings::load(&file)?,
             };
             let contract = contract(&settings.contract)?;
+            if contract.policy.head.schedule().is_some() {
+                return Err(schedules(&settings.contract));
+            }
             let plant = FileName::named_by_a_file(&settings.plant);
             let nominal = Converter::load(plant, &settings.set)?;
             let inner = Inner::new(&settings, &contract, &nominal, count, (kind, profile))?;

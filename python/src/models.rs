@@ -28,6 +28,7 @@ pub fn import_model(
         actions,
         inside,
         vecnormalize,
+        ..import::Options::default()
     };
     let new = py
         .detach(|| import::new_policy(&file, &contract, &options))
@@ -53,9 +54,10 @@ pub fn contract_json(py: Python<'_>, path: PathBuf) -> PyResult<String> {
         "signals": policy.signals,
         "observers": policy.observers.iter().map(|observer| self::observer(policy, observer)).collect::<Vec<_>>(),
         "features": policy.features,
-        "duties": match &policy.head { Head::Choice(_) => policy.head.duties(), Head::Continuous(_) | Head::Residual(_) => Vec::new() },
+        "duties": match &policy.head { Head::Choice(_) => policy.head.duties(), Head::Continuous(_) | Head::Residual(_) | Head::Schedule(_) => Vec::new() },
         "law": policy.head.residual().map(law),
         "continuous": policy.head.continuous(),
+        "schedule": policy.head.schedule(),
         "mapping": mapping,
         "limits": policy.limits,
         "fallback": policy.fallback,

@@ -84,7 +84,7 @@ pub(crate) fn map(session: &Session, wanted: &Wanted) -> Result<Reply, Faults> {
 fn cells<T: Real>(policy: &Policy, wanted: &Wanted, axes: [usize; 2], mut at: Vec<f64>) -> Result<Map, Faults> {
     let controller = Controller::<T>::new(policy);
     let mut trace = controller.blank_trace();
-    let chooses = policy.head.continuous().is_none();
+    let chooses = policy.head.is_choice();
     let mut map = Map {
         duties: Vec::with_capacity(wanted.x.cells * wanted.y.cells),
         actions: Vec::new(),

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use certify::{Certifier, Domain, Memory};
 use interp::{Controller, Sample};
 use ndarray::aview1;
-use policy::{Activation, Continuous, Estimate, Head, Interval, NumericFormat, Policy, Squash};
+use policy::{Activation, Continuous, Estimate, Factor, Gain, Head, Interval, NumericFormat, Policy, Schedule, Squash};
 use random::{Random, SplitMix};
 
 fn example(format: NumericFormat) -> Policy {
@@ -56,6 +56,8 @@ fn argmax(q_values: &[f64]) -> usize {
 fn real_duty(head: &Continuous, y: f64) -> f64 {
     let s = match head.squash {
         Squash::Curve(Activation::Tanh) => y.tanh(),
+        Squash::Curve(Activation::Sigmoid) => 1.0 / (1.0 + (-y).exp()),
+        Squash::Curve(Activation::HardSigmoid) => ((y + 3.0) / 6.0).clamp(0.0, 1.0),
         Squash::Curve(_) => y / (1.0 + y.abs()),
         Squash::Clip(clip) => y.clamp(clip.low, clip.high),
     };
@@ -66,6 +68,57 @@ fn real_duty(head: &Continuous, y: f64) -> f64 {
 fn held_duty(controller: &Controller<f32>, y: f64) -> f64 {
     let (_, duty) = controller.decide(&aview1(&[y as f32])).unwrap();
     f64::from(duty)
+}
+
+/// What is bounded: errors of Q values, or of the duty.
+fn errors(
+    policy: &Policy,
+    controller: &Controller<f32>,
+    (held, real): (&[f64], &[f64]),
+    rng: &mut SplitMix,
+) -> Vec<f64> {
+    match &policy.head {
+        Head::Choice(_) | Head::Residual(_) => held.iter().zip(real).map(|(held, real)| (held - real).abs()).collect(),
+        Head::Continuous(head) => vec![(held_duty(controller, held[0]) - real_duty(head, real[0])).abs()],
+        Head::Schedule(head) => vec![law_error(head, controller, (held, real), rng)],
+    }
+}
+
+/// Error of the law's duty at a base and factors that are drawn, most of them at an end of what they can be.
+fn law_error(head: &Schedule, controller: &Controller<f32>, (held, real): (&[f64], &[f64]), rng: &mut SplitMix) -> f64 {
+    let mut drawn = |range: Interval| match rng.below(3) {
+        0 => range.low as f32,
+        1 => range.high as f32,
+        _ => rng.uniform(range.low, range.high) as f32,
+    };
+    let base = drawn(head.base_bound);
+    let outputs: Vec<f32> = held.iter().map(|y| *y as f32).collect();
+    let gains = controller.gains(&aview1(&outputs)).unwrap();
+    let (mut d, mut exact) = (base, f64::from(base));
+    for ((gain, g), y) in head.gains.iter().zip(gains).zip(real) {
+        let x = drawn(gain.factor_bound);
+        d += if matches!(gain.factor, Factor::One) { g } else { g * x };
+        exact += real_gain(gain, *y) * f64::from(x);
+    }
+    let (low, high) = (head.limits.low, head.limits.high);
+    (f64::from(d).clamp(low, high) - exact.clamp(low, high)).abs()
+}
+
+/// A gain in exact arithmetic, up to the rounding of binary64.
+fn real_gain(gain: &Gain, y: f64) -> f64 {
+    let s = match gain.squash {
+        None => y,
+        Some(squash) => real_duty(
+            &Continuous {
+                squash,
+                scale: 1.0,
+                offset: 0.0,
+            },
+            y,
+        ),
+    };
+    let g = gain.scale * s + gain.offset;
+    gain.limits.map_or(g, |limits| g.clamp(limits.low, limits.high))
 }
 
 /// Boxes and points of a policy's observations: how near the bounds come, or what contradicts them.
@@ -91,15 +144,16 @@ fn check(policy: &Policy, rng: &mut SplitMix, boxes: usize) -> (f64, usize) {
             }
             let observation: Vec<f32> = point.iter().map(|x| *x as f32).collect();
             let (real, held) = (exact::q_values(policy, &observation), held(&controller, &observation));
-            for n in 0..real.len() {
-                let place = format!(
-                    "{} {:?} action {n} at {observation:?}",
-                    policy.name, policy.numeric_format
+            let place = |n: usize| format!("{} {:?} {n} at {observation:?}", policy.name, policy.numeric_format);
+            for (n, range) in q_ranges.iter().enumerate() {
+                assert!(
+                    range.low <= real[n] && real[n] <= range.high,
+                    "{}: real Q outside",
+                    place(n)
                 );
-                let error = match &policy.head {
-                    Head::Choice(_) | Head::Residual(_) => (held[n] - real[n]).abs(),
-                    Head::Continuous(head) => (held_duty(&controller, held[n]) - real_duty(head, real[n])).abs(),
-                };
+            }
+            for (n, error) in errors(policy, &controller, (&held, &real), rng).into_iter().enumerate() {
+                let place = place(n);
                 assert!(
                     error <= bound.per_action[n],
                     "{place}: {error} > {}",
@@ -108,10 +162,6 @@ fn check(policy: &Policy, rng: &mut SplitMix, boxes: usize) -> (f64, usize) {
                 assert!(
                     bound.per_action[n] <= whole.per_action[n] * 1.000_001,
                     "{place}: a part beyond the whole"
-                );
-                assert!(
-                    q_ranges[n].low <= real[n] && real[n] <= q_ranges[n].high,
-                    "{place}: real Q outside"
                 );
                 nearest = nearest.max(error / bound.per_action[n]);
             }

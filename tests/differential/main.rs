@@ -110,6 +110,23 @@ fn random_policies_are_equal() {
     assert_random_policies_are_equal(0..count, NumericFormat::F32, 3000);
 }
 
+/// Of the seeds drawn above one in five has gains: here all have, in every format.
+#[test]
+fn random_gain_schedules_are_equal_in_every_format() {
+    let count = if tests::full() { 60 } else { 8 };
+    let with_gains = |seed: &u64| tests::random::policy(*seed).unwrap().contract.contains("gains = [");
+    let seeds: Vec<u64> = (5000..).filter(with_gains).take(count).collect();
+    for (turn, seed) in seeds.into_iter().enumerate() {
+        let folder = tests::random::policy(seed).unwrap();
+        let policy = policy::load(&folder.path()).unwrap_or_else(|faults| panic!("{}\n{faults}", folder.contract));
+        for (at, format) in NumericFormat::ALL.into_iter().enumerate() {
+            let compiler = COMPILERS[(turn + at) % 3];
+            let report = run(&policy.clone().with_format(format), 1000, seed, &[compiler]);
+            assert_equal(&report, &format!("{} {compiler}\n{}", format.name(), folder.contract));
+        }
+    }
+}
+
 #[test]
 fn random_policies_reach_every_status_bit_and_every_kind() {
     let contracts: Vec<String> = (0..200)
@@ -147,6 +164,9 @@ fn random_policies_reach_every_status_bit_and_every_kind() {
         "carrier = \"centre\"",
         "base = ",
         "dead_zone = [",
+        "gains = [",
+        "feature = \"x",
+        "limits = [",
     ] {
         assert!(all.contains(word), "no random policy has {word}");
     }

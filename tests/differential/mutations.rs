@@ -261,3 +261,32 @@ fn unsafe_math_optimisations_are_refused_with_gcc() {
         report.builds
     );
 }
+
+/// What makes another law of a gain schedule: another order of the sum, a gain without its limits, another sign, exchanged gains.
+#[test]
+fn another_law_of_the_same_gains_is_caught() {
+    let path = tests::root().join("tests/golden/cases/scheduled/policy.toml");
+    let policy = policy::load(&path).unwrap();
+    for (core, compiler, from, to) in [
+        (Output::C, "gcc", "v10 = v5 + v9", "v10 = front->base + (v4 + v9)"),
+        (Output::C, "gcc", "scheduled_clamp(v2, 0.004f, 0.02f)", "v2"),
+        (Output::C, "gcc", "v15 * -0.05f", "v15 * 0.05f"),
+        (
+            Output::C,
+            "gcc",
+            "scheduled_tanh(outputs[0])",
+            "scheduled_tanh(outputs[3])",
+        ),
+        (
+            Output::Rust,
+            "rustc",
+            "v10: f32 = v5 + v9",
+            "v10: f32 = front.base + (v4 + v9)",
+        ),
+        (Output::Rust, "rustc", "clamp(v11, -0.002, 0.005)", "v11"),
+        (Output::Rust, "rustc", "v17: f32 = v14 + v16", "v17: f32 = v14 - v16"),
+    ] {
+        let files = edited(&policy, core, &|text| text.replacen(from, to, 1));
+        assert_caught(&verify_files(&policy, &files, compiler, &[]));
+    }
+}

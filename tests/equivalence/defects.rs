@@ -25,6 +25,8 @@ const ADC: &str = "tests/golden/cases/adc_mapping";
 const FILTERS: &str = "tests/golden/cases/filters";
 /// An integrator with a leak.
 const LINEAR: &str = "tests/golden/cases/linear";
+/// A law whose gains the network gives.
+const GAINS: &str = "tests/golden/cases/scheduled";
 
 const fn c(policy: &'static str, what: &'static str, edit: (&'static str, &'static str), goal: &'static str) -> Defect {
     Defect {
@@ -52,11 +54,11 @@ const fn rust(
 }
 
 /// Defects that a plain run proves, too: the first of the list.
-const PLAIN: usize = 8;
+const PLAIN: usize = 10;
 
 /// One a language and kind first: a plain run takes the first of them.
 #[rustfmt::skip]
-const DEFECTS: [Defect; 46] = [
+const DEFECTS: [Defect; 53] = [
     c(ADC, "argmax inverted", ("output > best", "output < best"), "c.action_index"),
     rust(ADC, "tie to the highest index", ("*q > best", "*q >= best"), "rust.action_index"),
     c(ADC, "off by one in the bad count", ("flag(state->bad_count <= 4u)", "flag(state->bad_count <= 5u)"), "c.commit.counters"),
@@ -65,6 +67,13 @@ const DEFECTS: [Defect; 46] = [
     rust(FILTERS, "line one word too short", (".take(20).rev()", ".take(19).rev()"), "rust.commit.memory"),
     c(LINEAR, "leak left out", ("v4 * 0.998f", "v4"), "c.observation"),
     rust(LINEAR, "leak on the sum", ("let v8: f32 = v6 + v7", "let v8: f32 = (v5 + v7) * 0.998"), "rust.observation"),
+    c(GAINS, "products added in another order", ("v10 = v5 + v9", "v10 = front->base + (v4 + v9)"), "c.duty_sim"),
+    rust(GAINS, "limits of a gain left out", ("clamp(v2, 0.004, 0.02)", "v2"), "rust.duty_sim"),
+    c(GAINS, "sign of a gain", ("v15 * -0.05f", "v15 * 0.05f"), "c.duty_sim"),
+    c(GAINS, "gains exchanged", ("scheduled_tanh(outputs[0])", "scheduled_tanh(outputs[3])"), "c.duty_sim"),
+    c(GAINS, "a factor behind its scale", ("front->factor[1] = ", "front->factor[1] = 200.0f * "), "c.duty_sim"),
+    rust(GAINS, "dead zone left out", ("select(front.still, front.base, v17)", "v17"), "rust.duty_sim"),
+    rust(GAINS, "base left out", ("front.base + v4", "v4"), "rust.duty_sim"),
     c(ADC, "missing clip", ("adc_mapping_clamp(v10, -4.0f, 4.0f)", "v10"), "c.observation"),
     c(ADC, "tie to the highest index", ("output > best", "output >= best"), "c.action_index"),
     c(ADC, "wrong status bit", ("front->clipped << 3", "front->clipped << 4"), "c.status"),

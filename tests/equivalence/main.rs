@@ -110,11 +110,13 @@ fn the_examples_do_what_their_contracts_say() {
         "examples/buck12",
         // its integrator leaks, which no random policy of a plain run does
         "tests/golden/cases/linear",
+        // gains of every map
+        "tests/golden/cases/scheduled",
         "examples/drm",
         "examples/blind/policy",
         "examples/train/wide",
     ];
-    let count = if tests::full() { all.len() } else { 2 };
+    let count = if tests::full() { all.len() } else { 3 };
     for path in &all[..count] {
         assert_proved(&load(path), &solver);
     }

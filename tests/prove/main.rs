@@ -66,6 +66,16 @@ fn nothing_goes_wrong_in_a_small_controller() {
 }
 
 #[test]
+fn nothing_goes_wrong_where_the_network_gives_gains() {
+    // a minute each where others build
+    if tests::full() {
+        for format in [NumericFormat::F32, NumericFormat::I16] {
+            assert_proved(&in_format("tests/golden/cases/scheduled", format));
+        }
+    }
+}
+
+#[test]
 fn nothing_goes_wrong_in_any_construct() {
     if tests::full() {
         for format in [NumericFormat::F32, NumericFormat::F64] {

@@ -24,6 +24,16 @@ impl Folder {
     }
 }
 
+/// What `[actions]` says.
+enum Head {
+    /// Drawn from the stream of the rest.
+    Choice,
+    /// Its entry.
+    Continuous(String),
+    /// That many gains, from this stream.
+    Gains(SplitMix, usize),
+}
+
 /// The files of a policy folder.
 pub struct Files {
     /// `policy.toml`
@@ -60,9 +70,16 @@ pub fn files(seed: u64) -> Result<Files, SafeTensorError> {
     // from a stream of its own: the policies of all other seeds stay what they were
     let mut head = SplitMix::new(seed ^ HEAD);
     let head = head.one_in(4).then(|| continuous(&mut head));
-    let actions = if head.is_some() { 1 } else { actions };
+    // from another one, which has the last word
+    let mut schedule = SplitMix::new(seed ^ SCHEDULE);
+    let gains = schedule.one_in(5).then(|| 1 + schedule.below(4));
+    let (head, actions) = match (gains, head) {
+        (Some(count), _) => (Head::Gains(schedule, count), count),
+        (None, Some(text)) => (Head::Continuous(text), 1),
+        (None, None) => (Head::Choice, actions),
+    };
     let hidden: Vec<usize> = (0..1 + rng.below(4)).map(|_| 1 + rng.below(40)).collect();
-    let contract = contract(&mut rng, seed, [features, actions, hidden.len()], head.as_deref());
+    let contract = contract(&mut rng, seed, [features, actions, hidden.len()], head);
     let (weights, mapping) = weights(&mut rng, features, &hidden, actions)?;
     Ok(Files {
         contract,
@@ -71,7 +88,7 @@ pub fn files(seed: u64) -> Result<Files, SafeTensorError> {
     })
 }
 
-fn contract(rng: &mut SplitMix, seed: u64, [features, actions, hidden]: [usize; 3], head: Option<&str>) -> String {
+fn contract(rng: &mut SplitMix, seed: u64, [features, actions, hidden]: [usize; 3], head: Head) -> String {
     let period = rng.uniform(1e-5, 1e-3);
     let mut text = format!("name = \"random{seed}\"\nsample_period = {period:?}\n\n");
     let signals = 1 + rng.below(5);
@@ -112,8 +129,9 @@ fn contract(rng: &mut SplitMix, seed: u64, [features, actions, hidden]: [usize; 
     let activations: Vec<String> = (0..hidden).map(|_| kinds[rng.below(kinds.len())].written()).collect();
     let _ = writeln!(text, "hidden_activation = [{}]\n", activations.join(", "));
     match head {
-        Some(head) => drop(writeln!(text, "[actions]\n{head}\n")),
-        None => {
+        Head::Continuous(head) => drop(writeln!(text, "[actions]\n{head}\n")),
+        Head::Gains(mut own, count) => text += &gains(&mut own, count, [features, observers, signals]),
+        Head::Choice => {
             let mut table = String::new();
             action_table(&mut table, rng, actions);
             text += &match beside.one_in(3) {
@@ -290,6 +308,73 @@ fn continuous(rng: &mut SplitMix) -> String {
         4 => format!("continuous = {{ clip = [-1.0, 1.0], scale = {scale:?}, offset = {offset:?} }}"),
         _ => format!("continuous = {{ clip = [0.25, 2.0], scale = {scale:?} }}"),
     }
+}
+
+/// Bits in which the seed of the gain schedule's stream differs from that of the rest.
+const SCHEDULE: u64 = 0x6761_696e_7300_0000;
+
+/// Gains of every map and factor, with and without limits, base and dead zone.
+fn gains(rng: &mut SplitMix, count: usize, [features, observers, signals]: [usize; 3]) -> String {
+    let seen = |rng: &mut SplitMix| match observers > 0 && rng.one_in(2) {
+        true => estimate(rng, observers, signals),
+        false => source(rng, signals),
+    };
+    let base = match rng.below(4) {
+        0 => None,
+        1 => Some("previous_duty".to_owned()),
+        2 => Some("0.5".to_owned()),
+        _ => Some(format!("0.4 - {:?} * ({})", rng.uniform(-0.005, 0.005), seen(rng))),
+    };
+    let mut list = Vec::new();
+    for _ in 0..count {
+        let (factor, size) = match rng.below(5) {
+            0 => (String::new(), 0.2),
+            1 | 2 => (format!("feature = \"x{}\", ", rng.below(features)), 0.01),
+            _ => (format!("source = \"{}\", ", seen(rng)), 0.005),
+        };
+        list.push(format!("  {{ {factor}{} }}", gain(rng, size)));
+    }
+    let mut text = format!("[actions]\ngains = [\n{},\n]\n", list.join(",\n"));
+    if let Some(base) = &base {
+        let _ = writeln!(text, "base = \"{base}\"");
+        if rng.one_in(3) {
+            let (source, within) = (seen(rng), rng.uniform(0.1, 60.0));
+            let _ = writeln!(text, "dead_zone = [{{ source = \"{source}\", within = {within:?} }}]");
+        }
+    }
+    text.push('\n');
+    text
+}
+
+/// The map of a gain of about that size, of either sign.
+fn gain(rng: &mut SplitMix, size: f64) -> String {
+    let scale = size * rng.uniform(0.1, 1.0) * if rng.one_in(3) { -1.0 } else { 1.0 };
+    let offset = match rng.one_in(3) {
+        true => 0.0,
+        false => size * rng.uniform(-1.0, 1.0),
+    };
+    let squash = match rng.below(7) {
+        0 => Some("squash = \"tanh\""),
+        1 => Some("squash = \"softsign\""),
+        2 => Some("squash = \"sigmoid\""),
+        3 => Some("squash = \"hard_sigmoid\""),
+        4 => Some("clip = [-1.0, 0.75]"),
+        5 => Some("clip = [0.25, 3.0]"),
+        _ => None,
+    };
+    let mut text = squash.map_or(String::new(), |squash| format!("{squash}, "));
+    // about what an output of a half makes, which each of the maps reaches
+    let (middle, width) = (offset + 0.5 * scale, 0.4 * scale.abs());
+    let limited = squash.is_none() || rng.one_in(3);
+    let _ = write!(text, "scale = {scale:?}");
+    if offset != 0.0 {
+        let _ = write!(text, ", offset = {offset:?}");
+    }
+    if limited {
+        let (low, high) = (middle - width * rng.unit(), middle + width * rng.uniform(0.1, 1.0));
+        let _ = write!(text, ", limits = [{low:?}, {high:?}]");
+    }
+    text
 }
 
 fn action_table(text: &mut String, rng: &mut SplitMix, actions: usize) {

@@ -47,8 +47,8 @@ pub struct GoldenVectors {
 struct Sketch {
     features: usize,
     actions: usize,
-    /// Whether it commands a number in the place of an action.
-    is_continuous: bool,
+    /// The entry of `[actions]` by which it makes no choice, and the outputs that it takes.
+    numbers: Option<(&'static str, usize)>,
     weights: Option<(String, Range<usize>)>,
     golden: Option<String>,
     mapping: Option<String>,
@@ -62,10 +62,11 @@ impl Contract {
     /// If the file cannot be read or is not a sound contract, or commands a number: the training here is one that chooses.
     pub fn load(path: &Path, hidden: &[usize]) -> Result<Self, Error> {
         // before its other faults, which a contract for another kind of training need not have; unreadable files are said below
-        if std::fs::read_to_string(path).is_ok_and(|text| sketch(&text).is_continuous) {
+        let text = std::fs::read_to_string(path).unwrap_or_default();
+        if let Some((entry, _)) = sketch(&text).numbers {
             let message =
                 Message::new("the training is that of a DQN, which chooses, and this contract commands a number")
-                    .found("continuous in [actions]")
+                    .found(format!("{entry} in [actions]"))
                     .expected("duties or pairs")
                     .hint("train such an actor with a library, and read what it saved: policyc new model.zip");
             return Err(Fault::in_file(path, message).into());
@@ -98,7 +99,7 @@ impl Contract {
         // a contract without features or actions is refused by `policy::load`, which needs a network to get that far
         let mut widths = vec![sketch.features.max(1)];
         widths.extend_from_slice(hidden);
-        widths.push(if sketch.is_continuous { 1 } else { sketch.actions.max(1) });
+        widths.push(sketch.numbers.map_or(sketch.actions, |(_, outputs)| outputs).max(1));
         // stands in for the trained one: a fault of the contract is said before a training, not after it
         let network = Network::zeros(&widths, &vec![policy::Activation::Identity; widths.len() - 1]);
         let empty = GoldenVectors {
@@ -211,7 +212,11 @@ fn sketch(text: &str) -> Sketch {
     Sketch {
         features: list(root.get("feature")),
         actions: list(entry("actions", "duties")) + list(entry("actions", "offsets")) + pairs,
-        is_continuous: entry("actions", "continuous").is_some(),
+        numbers: match (entry("actions", "continuous"), entry("actions", "gains")) {
+            (Some(_), _) => Some(("continuous", 1)),
+            (None, Some(gains)) => Some(("gains", list(Some(gains)))),
+            (None, None) => None,
+        },
         weights: entry("network", "weights").and_then(string),
         golden: entry("network", "golden").and_then(string).map(|(name, _)| name),
         mapping: entry("mapping", "file").and_then(string).map(|(name, _)| name),
@@ -244,7 +249,7 @@ fn files(
     files.insert(weights.to_owned(), weights_file(network)?);
     files.insert(
         golden.to_owned(),
-        golden_file(vectors, network, sketch(text).is_continuous)?,
+        golden_file(vectors, network, sketch(text).numbers.is_some())?,
     );
     Ok(files)
 }
@@ -270,7 +275,7 @@ fn weights_file(network: &Network) -> Result<Vec<u8>, Error> {
     safetensors_file(&tensors)
 }
 
-fn golden_file(vectors: &GoldenVectors, network: &Network, is_continuous: bool) -> Result<Vec<u8>, Error> {
+fn golden_file(vectors: &GoldenVectors, network: &Network, is_number: bool) -> Result<Vec<u8>, Error> {
     let count = vectors.actions.len();
     let actions: Vec<u8> = vectors
         .actions
@@ -284,7 +289,7 @@ fn golden_file(vectors: &GoldenVectors, network: &Network, is_continuous: bool) 
         bytes(&vectors.observations),
     );
     let outputs = vec![count, network.outputs()];
-    if is_continuous {
+    if is_number {
         let output = ("output".to_owned(), outputs, Dtype::F32, bytes(&vectors.q_values));
         return safetensors_file(&[observations, output]);
     }

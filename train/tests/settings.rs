@@ -78,16 +78,19 @@ fn three_keys_are_enough_and_the_rest_is_the_papers() {
 fn a_contract_that_commands_a_number_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("policy.toml");
-    std::fs::write(
-        &path,
-        "[actions]\ncontinuous = { squash = \"tanh\", scale = 0.4, offset = 0.5 }\n",
-    )
-    .unwrap();
-    let refused = train::Contract::load(&path, &[4]).unwrap_err().to_string();
-    assert!(
-        refused.contains("commands a number") && refused.contains("policy.toml"),
-        "{refused}"
-    );
+    for (actions, entry) in [
+        (
+            "continuous = { squash = \"tanh\", scale = 0.4, offset = 0.5 }",
+            "continuous in [actions]",
+        ),
+        ("gains = [{ squash = \"tanh\" }]", "gains in [actions]"),
+    ] {
+        std::fs::write(&path, format!("[actions]\n{actions}\n")).unwrap();
+        let refused = train::Contract::load(&path, &[4]).unwrap_err().to_string();
+        for part in ["commands a number", "policy.toml", entry] {
+            assert!(refused.contains(part), "{part}: {refused}");
+        }
+    }
 }
 
 #[test]

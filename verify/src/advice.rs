@@ -144,6 +144,7 @@ fn what_it_changes(policy: &Policy, format: NumericFormat) -> String {
                     format!("{} of {} golden decisions", choices.changed, choices.observations)
                 }
                 Decisions::Continuous(_) => "golden duties".to_owned(),
+                Decisions::Schedule(_) => "golden gains".to_owned(),
             };
             format!(
                 "; it changes {what}, more than allowed, and is refused without `{}`",

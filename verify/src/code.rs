@@ -90,7 +90,7 @@ fn accepted(policy: &Policy, golden_decisions: Option<f64>) -> Result<Vec<String
         Some(decisions) if decisions.kept() => {
             let changes = match &decisions {
                 Decisions::Choice(choices) => choices.changed > 0,
-                Decisions::Continuous(_) => policy.numeric_format.is_integer(),
+                Decisions::Continuous(_) | Decisions::Schedule(_) => policy.numeric_format.is_integer(),
             };
             // the counts; where it changes most is told by `inspect`
             let mut lines = text::decisions(policy, &decisions);
@@ -111,13 +111,19 @@ fn accepted(policy: &Policy, golden_decisions: Option<f64>) -> Result<Vec<String
                 ),
                 Decisions::Continuous(_) => (
                     "the numeric format changes the trainer's duties more than allowed; nothing was written",
-                    format!(
-                        "see what it costs with `policyc simulate`; to accept it, {remedy} in [network] of the contract"
-                    ),
+                    of_numbers(&remedy),
+                ),
+                Decisions::Schedule(_) => (
+                    "the numeric format changes the trainer's gains more than allowed; nothing was written",
+                    of_numbers(&remedy),
                 ),
             };
             let found = text::decisions(policy, &decisions).join("\n");
             Err(Message::new(problem).found(found).hint(hint))
         }
     }
+}
+
+fn of_numbers(remedy: &str) -> String {
+    format!("see what it costs with `policyc simulate`; to accept it, {remedy} in [network] of the contract")
 }

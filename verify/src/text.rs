@@ -6,6 +6,7 @@ use std::fmt::{self, Write};
 
 use interp::decisions::{Choices, Decisions};
 use interp::duties::Duties;
+use interp::gains::Gains;
 use interp::golden::{GoldenResult, UNPROVEN};
 use policy::Policy;
 use report::{grouped, quantity};
@@ -94,6 +95,10 @@ pub fn report(policy: &Policy, report: &Report, drift: Option<&Drift>) -> Result
                 out,
                 "DIFFERENT: {policy} in {format} commands other duties than its trainer's network by more than allowed"
             )?,
+            Decisions::Schedule(_) => writeln!(
+                out,
+                "DIFFERENT: {policy} in {format} sets other gains than its trainer's network by more than allowed"
+            )?,
         }
         writeln!(out, "  = hint: {}", accepting(decisions))?;
     }
@@ -108,7 +113,7 @@ fn accepting(decisions: &Decisions) -> String {
             ", or for this run --golden-decisions {} (a folder does not carry what `compile` was told)",
             choices.accepting_share()
         ),
-        Decisions::Continuous(_) => String::new(),
+        Decisions::Continuous(_) | Decisions::Schedule(_) => String::new(),
     };
     format!(
         "to accept them for good: {} in [network] of the contract{once}",
@@ -123,6 +128,7 @@ pub fn decisions(policy: &Policy, decisions: &Decisions) -> Vec<String> {
     match decisions {
         Decisions::Choice(decisions) => choices(policy, decisions),
         Decisions::Continuous(duties) => self::duties(policy, duties),
+        Decisions::Schedule(gains) => self::gains(policy, gains),
     }
 }
 
@@ -148,6 +154,35 @@ fn duties(policy: &Policy, duties: &Duties) -> Vec<String> {
         format!(
             "  most at golden vector {}: duty {:.6} becomes {:.6}, at {}",
             worst.row,
+            worst.expected,
+            worst.found,
+            place(policy, &worst.observation)
+        )
+    }));
+    lines
+}
+
+fn gains(policy: &Policy, gains: &Gains) -> Vec<String> {
+    let Gains {
+        numeric_format,
+        observations,
+        largest,
+        mean,
+        allowed,
+        worst,
+    } = gains;
+    let word = if gains.kept() { "" } else { "DIFFERENT: " };
+    let mut lines = vec![format!(
+        "gains in {numeric_format}: {word}off by at most {} of their ranges, on average {} (allowed {}), {observations} observations",
+        quantity(*largest, "", 2),
+        quantity(*mean, "", 2),
+        quantity(*allowed, "", 3),
+    )];
+    lines.extend(worst.as_ref().map(|worst| {
+        format!(
+            "  most at golden vector {}: gain {} of {:.6} becomes {:.6}, at {}",
+            worst.row,
+            worst.gain,
             worst.expected,
             worst.found,
             place(policy, &worst.observation)

@@ -34,6 +34,13 @@ pub struct New {
     /// Number of actions, where the tensors do not say it: of a QR-DQN, or of two outputs. 1 is a command, which is a number
     #[arg(long, value_name = "N")]
     pub actions: Option<usize>,
+    /// Which of several outputs is the duty, counted from 0; of a MultiDiscrete action space which dimension. The others are left
+    /// out, and named
+    #[arg(long, value_name = "N", conflicts_with = "gains")]
+    pub output: Option<usize>,
+    /// The outputs are the gains of a law of control, which the contract says: `gains` in [actions]
+    #[arg(long)]
+    pub gains: bool,
     /// What stable-baselines3's VecNormalize saved: scale, offset and clip of the features. A vecnormalize.pkl beside the model
     /// is taken without this
     #[arg(long, value_name = "FILE")]

@@ -93,7 +93,7 @@ pub fn make(policy: &Policy, options: &Request) -> Result<Made, Failure> {
         let message = message.found("f64").expected("one of f32, f32-fma, i16, i8");
         return Err(message.hint("--format f32").into());
     }
-    let is_actor = policy.head.continuous().is_some();
+    let is_actor = !policy.head.is_choice();
     if is_actor && !(options.axis.is_empty() && options.at.is_empty()) {
         let message = Message::new("a map shows where actions are proven, and this policy commands a number");
         return Err(message.found("--axis or --at").hint("leave them out").into());
@@ -101,11 +101,12 @@ pub fn make(policy: &Policy, options: &Request) -> Result<Made, Failure> {
     let slice = if is_actor { None } else { slice(policy, options)? };
     let controller = Controller::<f32>::new(policy);
     let q_values = |observation: &[f32]| match controller.q_values(&aview1(observation)) {
-        Ok(outputs) if is_actor => controller
-            .decide(&outputs.view())
-            .map(|(_, duty)| f64::from(duty))
-            .into_iter()
-            .collect(),
+        Ok(outputs) if is_actor => {
+            let gains = controller.gains(&outputs.view());
+            let duty = || controller.decide(&outputs.view()).map(|(_, duty)| vec![duty]);
+            let numbers = gains.or_else(duty).unwrap_or_default();
+            numbers.into_iter().map(f64::from).collect()
+        }
         Ok(q_values) => q_values.iter().map(|q| f64::from(*q)).collect(),
         Err(_) => Vec::new(),
     };

@@ -1,7 +1,7 @@
 //! `policyc inspect`
 
 use codegen::manifest;
-use policy::{Activation, Interval, Policy, describe};
+use policy::{Activation, Head, Interval, Policy, describe};
 use serde::Serialize;
 use verify::text::inspection;
 
@@ -26,9 +26,10 @@ pub fn run(options: &Inspect) -> Result<Outcome, Failure> {
     match verify::decisions(&policy, None).is_some_and(|decisions| !decisions.kept()) {
         false => Ok(Outcome::Done),
         true => {
-            let decided = match policy.head.continuous() {
-                Some(_) => "the trainer's duties more",
-                None => "more of the trainer's decisions",
+            let decided = match policy.head {
+                Head::Continuous(_) => "the trainer's duties more",
+                Head::Schedule(_) => "the trainer's gains more",
+                Head::Choice(_) | Head::Residual(_) => "more of the trainer's decisions",
             };
             eprintln!("\nDIFFERENT: the numeric format changes {decided} than the contract allows");
             Ok(Outcome::Different)
@@ -59,6 +60,8 @@ struct View<'p> {
     continuous: Option<&'p policy::Continuous>,
     #[serde(skip_serializing_if = "Option::is_none")]
     residual: Option<&'p policy::Residual>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    schedule: Option<&'p policy::Schedule>,
     mapping: Option<policy::Mapping>,
     limits: policy::Limits,
     fallback: policy::Fallback,
@@ -101,6 +104,7 @@ fn view(policy: &Policy) -> View<'_> {
         actions: policy.actions(),
         continuous: policy.head.continuous(),
         residual: policy.head.residual(),
+        schedule: policy.head.schedule(),
         mapping: policy.mapping,
         limits: policy.limits,
         fallback: policy.fallback,

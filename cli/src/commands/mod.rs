@@ -72,12 +72,16 @@ pub fn load_as(path: &Path, outside: Outside, format: Option<NumericFormat>) -> 
 
 /// Refuses a share of decisions for a policy that has none.
 fn no_choices(policy: &Policy, golden_decisions: Option<f64>) -> Result<(), Failure> {
-    if golden_decisions.is_none() || policy.head.continuous().is_none() {
+    if golden_decisions.is_none() || policy.head.is_choice() {
         return Ok(());
     }
     let message = Message::new("--golden-decisions is a share of choices, and this policy commands a number");
+    let found = match policy.head.schedule() {
+        Some(_) => "gains in [actions]",
+        None => "continuous in [actions]",
+    };
     Err(message
-        .found("continuous in [actions]")
-        .hint("golden_duty in [network] of the contract says how far the duty may be off, as a share of its range")
+        .found(found)
+        .hint("golden_duty in [network] of the contract says how far duty or gain may be off, as a share of its range")
         .into())
 }

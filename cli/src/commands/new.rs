@@ -38,6 +38,8 @@ fn for_weights(options: &New, weights: &Path) -> Result<Outcome, Failure> {
     let out = &contract(&options.out);
     let known = import::Options {
         actions: options.actions,
+        output: options.output,
+        gains: options.gains,
         inside: options.inside.clone(),
         vecnormalize: options.vecnormalize.clone(),
     };

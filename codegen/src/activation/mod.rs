@@ -75,7 +75,8 @@ pub(crate) fn used(network: &Network) -> impl Iterator<Item = Activation> {
 
 /// The kinds of a network and of the head behind it, in that order.
 pub(crate) fn used_by(program: &Program) -> impl Iterator<Item = Activation> {
-    let of_head = |kind: &Activation| program.head.curve().is_some_and(|curve| curve.word() == kind.word());
+    let heads = || program.head.curves().iter().flatten();
+    let of_head = move |kind: &Activation| heads().any(|curve| curve.word() == kind.word());
     let of_network = |kind: &Activation| program.network.activates(|activation| activation.word() == kind.word());
     kinds().filter(move |kind| of_network(kind) || of_head(kind))
 }

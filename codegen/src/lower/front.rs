@@ -10,7 +10,7 @@
 //! The one invariant: every operation is one rounding of the contract, in its order, and none of them depends on a flag, so
 //! the number of executed instructions does not depend on the measurement.
 
-use policy::{Estimate, Expr, Feature, Filter, Input, Policy, Residual, Scalar};
+use policy::{Estimate, Expr, Factor, Feature, Filter, Head, Input, Policy, Residual, Scalar, Still};
 
 use crate::program::{Block, Front, Literal, Op, Push, ValueId};
 
@@ -34,15 +34,13 @@ pub fn lower(policy: &Policy) -> (Front, usize) {
     }
     let mut clipped = Vec::new();
     let mut observation = Vec::new();
+    let mut filtered = Vec::new();
     for feature in &policy.features {
-        let (value, outside) = builder.feature(feature, policy.sample_period);
+        let (value, outside) = builder.feature(feature, policy.sample_period, &mut filtered);
         observation.push(value);
         clipped.extend(outside);
     }
-    let (base, still) = match policy.head.residual() {
-        Some(head) => builder.law(head),
-        None => (None, None),
-    };
+    let law = builder.law(&policy.head, &filtered);
     let block = &mut builder.block;
     // differences of bits are gathered as words: one flag for all features, not one each
     let clipped = clipped.into_iter().reduce(|all, one| block.value(Op::Or(all, one)));
@@ -52,12 +50,21 @@ pub fn lower(policy: &Policy) -> (Front, usize) {
         signals: builder.signals,
         all_valid,
         clipped,
-        base,
-        still,
+        base: law.base,
+        factors: law.factors,
+        still: law.still,
         observation,
         pushes: builder.pushes,
     };
     (front, builder.words)
+}
+
+/// What a law of control says before the network does.
+#[derive(Default)]
+struct Law {
+    base: Option<ValueId>,
+    still: Option<ValueId>,
+    factors: Vec<ValueId>,
 }
 
 pub(super) struct Builder {
@@ -103,12 +110,18 @@ impl Builder {
         (flags, all.unwrap_or_default())
     }
 
-    /// Observation and, with a clip, what it changed.
-    fn feature(&mut self, feature: &Feature, sample_period: f64) -> (ValueId, Option<ValueId>) {
+    /// Observation and, with a clip, what it changed; adds the value behind the filters.
+    fn feature(
+        &mut self,
+        feature: &Feature,
+        sample_period: f64,
+        filtered: &mut Vec<ValueId>,
+    ) -> (ValueId, Option<ValueId>) {
         let mut value = self.expression(&feature.source);
         for filter in &feature.filters {
             value = self.filter(*filter, value, sample_period);
         }
+        filtered.push(value);
         let (scalar, block) = (self.scalar, &mut self.block);
         if feature.scale != 1.0 {
             let scale = block.constant(Literal::nearest(scalar, feature.scale));
@@ -130,20 +143,46 @@ impl Builder {
         }
     }
 
-    /// Law and dead zone of a residual head (section 8).
-    fn law(&mut self, head: &Residual) -> (Option<ValueId>, Option<ValueId>) {
-        let x = self.expression(&head.base.tree);
-        let (low, high) = Literal::inward(self.scalar, head.limits);
-        let (low, high) = (self.block.constant(low), self.block.constant(high));
-        let base = self.block.value(Op::Clamp { x, low, high });
-        let still = head.dead_zone.iter().map(|still| {
+    /// Law and dead zone of a residual head (section 8) or of a gain schedule (section 7c); `filtered` are the features behind
+    /// their filters.
+    fn law(&mut self, head: &Head, filtered: &[ValueId]) -> Law {
+        match head {
+            Head::Choice(_) | Head::Continuous(_) => Law::default(),
+            Head::Residual(head) => {
+                let x = self.expression(&head.base.tree);
+                let (low, high) = Literal::inward(self.scalar, head.limits);
+                let (low, high) = (self.block.constant(low), self.block.constant(high));
+                Law {
+                    base: Some(self.block.value(Op::Clamp { x, low, high })),
+                    still: self.still(&head.dead_zone),
+                    factors: Vec::new(),
+                }
+            }
+            Head::Schedule(head) => {
+                let base = self.expression(&head.base.tree);
+                let factors = head.gains.iter().filter_map(|gain| match &gain.factor {
+                    Factor::Source(source) => Some(self.expression(&source.tree)),
+                    Factor::Feature(index) => filtered.get(*index).copied(),
+                    Factor::One => None,
+                });
+                let factors = factors.collect();
+                Law {
+                    base: Some(base),
+                    still: self.still(&head.dead_zone),
+                    factors,
+                }
+            }
+        }
+    }
+
+    fn still(&mut self, zone: &[Still]) -> Option<ValueId> {
+        let still = zone.iter().map(|still| {
             let x = self.expression(&still.source.tree);
             let (low, high) = (self.constant(-still.within), self.constant(still.within));
             self.block.value(Op::Within { x, low, high })
         });
         let still: Vec<ValueId> = still.collect();
-        let still = still.into_iter().reduce(|all, one| self.block.value(Op::And(all, one)));
-        (Some(base), still)
+        still.into_iter().reduce(|all, one| self.block.value(Op::And(all, one)))
     }
 
     fn expression(&mut self, expression: &Expr) -> ValueId {

@@ -1,6 +1,6 @@
-//! Contract sections 7b and 8: from the outputs of the network to a duty before the mapping.
+//! Contract sections 7b, 7c and 8: from the outputs of the network to a duty before the mapping.
 
-use policy::{Continuous, Interval, Policy, Residual, Scalar, Squash};
+use policy::{Continuous, Factor, Gain, Interval, Policy, Residual, Scalar, Schedule, Squash};
 
 use crate::program::{Block, Head, Literal, Op, ValueId};
 
@@ -17,11 +17,18 @@ pub fn lower(policy: &Policy) -> Head {
             Head::Choice(offsets.collect())
         }
         policy::Head::Continuous(head) => Head::Output {
-            curve: match head.squash {
-                Squash::Curve(curve) => Some(curve),
-                Squash::Clip(_) => None,
-            },
+            curve: curve(Some(head.squash)),
         },
+        policy::Head::Schedule(head) => Head::Gains {
+            curves: head.gains.iter().map(|gain| curve(gain.squash)).collect(),
+        },
+    }
+}
+
+fn curve(squash: Option<Squash>) -> Option<policy::Activation> {
+    match squash {
+        Some(Squash::Curve(curve)) => Some(curve),
+        Some(Squash::Clip(_)) | None => None,
     }
 }
 
@@ -31,31 +38,78 @@ pub fn duty(policy: &Policy, block: &mut Block) -> ValueId {
     let head = match &policy.head {
         policy::Head::Choice(_) => return block.value(Op::ChosenDuty),
         policy::Head::Residual(head) => return residual(scalar, head, block),
+        policy::Head::Schedule(head) => return schedule(scalar, head, block),
         policy::Head::Continuous(head) => head,
     };
     let output = block.value(Op::Output);
-    let squashed = match head.squash {
-        Squash::Curve(_) => block.value(Op::Squash(output)),
-        Squash::Clip(clip) => {
-            let low = block.constant(Literal::nearest(scalar, clip.low));
-            let high = block.constant(Literal::nearest(scalar, clip.high));
-            block.value(Op::Clamp { x: output, low, high })
-        }
+    mapped(scalar, Some(head.squash), (head.scale, head.offset), (output, 0), block)
+}
+
+/// A value, the output of that index, behind squash, scale and offset.
+fn mapped(
+    scalar: Scalar,
+    squash: Option<Squash>,
+    (scale, offset): (f64, f64),
+    (output, index): (ValueId, usize),
+    block: &mut Block,
+) -> ValueId {
+    let squashed = match squash {
+        Some(Squash::Curve(_)) => block.value(Op::Squash(output, index)),
+        Some(Squash::Clip(clip)) => clamped(scalar, clip, output, block),
+        None => output,
     };
-    let scaled = match head.scale {
+    let scaled = match scale {
         1.0 => squashed,
         scale => {
             let scale = block.constant(Literal::nearest(scalar, scale));
             block.value(Op::Mul(squashed, scale))
         }
     };
-    match head.offset {
+    match offset {
         0.0 => scaled,
         offset => {
             let offset = block.constant(Literal::nearest(scalar, offset));
             block.value(Op::Add(scaled, offset))
         }
     }
+}
+
+/// A value between ends that are rounded to nearest.
+fn clamped(scalar: Scalar, ends: Interval, x: ValueId, block: &mut Block) -> ValueId {
+    let low = block.constant(Literal::nearest(scalar, ends.low));
+    let high = block.constant(Literal::nearest(scalar, ends.high));
+    block.value(Op::Clamp { x, low, high })
+}
+
+/// The law with its products added one after the other, in the order of the gains.
+fn schedule(scalar: Scalar, head: &Schedule, block: &mut Block) -> ValueId {
+    let base = block.value(Op::Base);
+    let (mut sum, mut multiplied) = (base, 0);
+    for (index, gain) in head.gains.iter().enumerate() {
+        let Gain { factor, squash, .. } = gain;
+        let output = block.value(Op::Gain(index));
+        let mut value = mapped(scalar, *squash, (gain.scale, gain.offset), (output, index), block);
+        if let Some(limits) = gain.limits {
+            value = clamped(scalar, limits, value, block);
+        }
+        if !matches!(factor, Factor::One) {
+            let factor = block.value(Op::Factor(multiplied));
+            multiplied += 1;
+            value = block.value(Op::Mul(value, factor));
+        }
+        sum = block.value(Op::Add(sum, value));
+    }
+    if !head.dead_zone.is_empty() {
+        let flag = block.value(Op::Still);
+        sum = block.value(Op::Select {
+            flag,
+            then: base,
+            otherwise: sum,
+        });
+    }
+    let (low, high) = Literal::inward(scalar, head.limits);
+    let (low, high) = (block.constant(low), block.constant(high));
+    block.value(Op::Clamp { x: sum, low, high })
 }
 
 /// The law's duty with the offset, but where nothing is to be added.
@@ -77,7 +131,7 @@ fn residual(scalar: Scalar, head: &Residual, block: &mut Block) -> ValueId {
     block.value(Op::Clamp { x, low, high })
 }
 
-/// The duties of all actions, or of a continuous or residual head the ends: all others lie between.
+/// The duties of all actions, or of any other head the ends: all others lie between.
 pub fn duties(policy: &Policy) -> Vec<Literal> {
     let scalar = policy.numeric_format.scalar();
     match &policy.head {
@@ -85,8 +139,8 @@ pub fn duties(policy: &Policy) -> Vec<Literal> {
             let duty = |action: &policy::Action| Literal::nearest(scalar, action.duty);
             actions.iter().map(duty).collect()
         }
-        policy::Head::Residual(head) => {
-            let (low, high) = Literal::inward(scalar, head.limits);
+        policy::Head::Residual(Residual { limits, .. }) | policy::Head::Schedule(Schedule { limits, .. }) => {
+            let (low, high) = Literal::inward(scalar, *limits);
             vec![low, high]
         }
         policy::Head::Continuous(head) => ends(scalar, head).to_vec(),

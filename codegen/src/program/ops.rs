@@ -57,14 +57,18 @@ pub enum Op {
     Coefficient(Coefficient),
     /// Duty, or offset, of the action that argmax chose.
     ChosenDuty,
-    /// From `front`: what the law of a residual head says.
+    /// From `front`: what the law of a residual head or the base of a gain schedule says.
     Base,
-    /// Flag from `front`: the dead zone of a residual head.
+    /// Flag from `front`: the dead zone of a residual head or a gain schedule.
     Still,
+    /// From `front`: what a gain is multiplied with, counted over those that are multiplied.
+    Factor(usize),
     /// The one output of a continuous head.
     Output,
-    /// A value behind the curve of the program's head.
-    Squash(ValueId),
+    /// An output of a gain schedule.
+    Gain(usize),
+    /// A value behind the curve that the program's head has for the output of that index.
+    Squash(ValueId, usize),
     /// Constant.
     Constant(Literal),
     /// Sign change, exact.
@@ -305,8 +309,10 @@ pub struct Front {
     pub all_valid: ValueId,
     /// Flag: an observation was clipped; `None` if nothing can be.
     pub clipped: Option<ValueId>,
-    /// What the law of a residual head says; `None` of another head.
+    /// What the law of a residual head or the base of a gain schedule says; `None` of another head.
     pub base: Option<ValueId>,
+    /// What the gains of a gain schedule are multiplied with, in their order.
+    pub factors: Vec<ValueId>,
     /// Flag: nothing is added to it; `None` where there is no dead zone.
     pub still: Option<ValueId>,
     /// Observation in network order.

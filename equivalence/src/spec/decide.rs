@@ -1,6 +1,6 @@
 //! Sections 7 to 10: from Q values to the command, and the state behind it.
 
-use policy::{Scalar, Squash};
+use policy::{Gain, Head, Scalar, Squash};
 
 use super::{Sensed, Spec, State, curves, status};
 use crate::term::Term;
@@ -16,31 +16,75 @@ pub(crate) struct Command {
 /// What sections 7 to 8 make of the network's outputs.
 pub(crate) struct Chosen {
     pub index: Term,
-    /// Before the mapping; of a residual head the offset.
+    /// Before the mapping; of a residual head the offset, and of a gain schedule nothing.
     pub duty: Term,
+    /// Of a gain schedule.
+    pub gains: Vec<Term>,
     /// Numbers on the way that are no NaN: the check of the policy bounds an output, and the curve is defined for every number.
     pub numbers: Vec<Term>,
 }
 
-/// The greedy action and its duty (sections 7 and 8), or the duty of a continuous head (section 7b).
+/// The greedy action and its duty (sections 7 and 8), the duty of a continuous head (section 7b), or the gains of a gain schedule
+/// (section 7c).
 pub(crate) fn choose(spec: Spec<'_>, to_cut: u32, outputs: &[Term]) -> Chosen {
-    let (Some(head), [output]) = (spec.policy.head.continuous(), outputs) else {
-        let index = best(spec, to_cut, outputs);
-        return Chosen {
-            index,
-            duty: chosen_duty(spec, index),
-            numbers: Vec::new(),
-        };
+    let mut numbers = Vec::new();
+    let (duty, gains) = match (&spec.policy.head, outputs) {
+        (Head::Continuous(head), [output]) => {
+            let map = (Some(head.squash), head.scale, head.offset);
+            let output = as_number(spec, to_cut, *output);
+            (mapped(spec, map, output, &mut numbers), Vec::new())
+        }
+        (Head::Schedule(head), outputs) => {
+            let both = head.gains.iter().zip(outputs);
+            let gains = both.map(|(gain, output)| {
+                let output = as_number(spec, to_cut, *output);
+                scheduled(spec, gain, output, &mut numbers)
+            });
+            (spec.zero(), gains.collect())
+        }
+        _ => {
+            let index = best(spec, to_cut, outputs);
+            return Chosen {
+                index,
+                duty: chosen_duty(spec, index),
+                gains: Vec::new(),
+                numbers,
+            };
+        }
     };
+    Chosen {
+        index: spec.counter(0),
+        duty,
+        gains,
+        numbers,
+    }
+}
+
+/// A gain of its output: squash, scale, offset, then its limits.
+fn scheduled(spec: Spec<'_>, gain: &Gain, output: Term, numbers: &mut Vec<Term>) -> Term {
+    let value = mapped(spec, (gain.squash, gain.scale, gain.offset), output, numbers);
+    gain.limits.map_or(value, |limits| {
+        let (low, high) = spec.ends(limits);
+        spec.float.clamp(value, low, high)
+    })
+}
+
+/// An output behind squash, scale and offset.
+fn mapped(
+    spec: Spec<'_>,
+    (squash, scale, offset): (Option<Squash>, f64, f64),
+    output: Term,
+    numbers: &mut Vec<Term>,
+) -> Term {
     let float = spec.float;
-    let output = as_number(spec, to_cut, *output);
-    let mut numbers = vec![output];
-    let squashed = match head.squash {
-        Squash::Clip(clip) => {
+    numbers.push(output);
+    let squashed = match squash {
+        None => output,
+        Some(Squash::Clip(clip)) => {
             let (low, high) = spec.ends(clip);
             float.clamp(output, low, high)
         }
-        Squash::Curve(curve) => match curves::of(float, curve, output) {
+        Some(Squash::Curve(curve)) => match curves::of(float, curve, output) {
             Some(curve) => {
                 numbers.extend(curve.numbers);
                 curve.value
@@ -49,18 +93,13 @@ pub(crate) fn choose(spec: Spec<'_>, to_cut: u32, outputs: &[Term]) -> Chosen {
             None => output,
         },
     };
-    let scaled = match head.scale {
+    let scaled = match scale {
         1.0 => squashed,
         scale => float.mul(squashed, spec.nearest(scale)),
     };
-    let duty = match head.offset {
+    match offset {
         0.0 => scaled,
         offset => float.add(scaled, spec.nearest(offset)),
-    };
-    Chosen {
-        index: spec.counter(0),
-        duty,
-        numbers,
     }
 }
 
@@ -141,6 +180,15 @@ pub(crate) fn decide(spec: Spec<'_>, state: &State, sensed: &Sensed, choice: &Ch
     let none = terms.truth(false);
     let index = choice.index;
     let chosen = match sensed.base {
+        Some((base, still)) if policy.head.schedule().is_some() => {
+            let mut sum = base;
+            for (gain, factor) in choice.gains.iter().zip(&sensed.factors) {
+                let term = factor.map_or(*gain, |factor| float.mul(*gain, factor));
+                sum = float.add(sum, term);
+            }
+            let (low, high) = spec.inwards(policy.limits.duty);
+            float.clamp(terms.choose(still, base, sum), low, high)
+        }
         Some((base, still)) => {
             let offset = terms.choose(still, spec.zero(), choice.duty);
             let (low, high) = spec.inwards(policy.limits.duty);

@@ -1,6 +1,6 @@
 //! Sections 2 to 5: from a measurement to the observation.
 
-use policy::{Estimate, Expr, Input};
+use policy::{Estimate, Expr, Factor, Head, Input};
 
 use super::filter::filter;
 use super::{Spec, State, observer};
@@ -16,8 +16,13 @@ pub(crate) struct Sensed {
     pub usable: Term,
     pub primed: Term,
     pub observation: Vec<Term>,
-    /// What the law of a residual head says, clamped, and whether nothing is added to it (section 8).
+    /// What the law of a residual head says, clamped, or the base of a gain schedule, and whether nothing is added to it (sections
+    /// 7c and 8).
     pub base: Option<(Term, Term)>,
+    /// What each gain of a gain schedule is multiplied with; `None` where that is nothing (section 7c).
+    pub factors: Vec<Option<Term>>,
+    /// The features behind their filters.
+    pub filtered: Vec<Term>,
     pub clipped: Term,
     /// The observers' words as `commit` leaves them in a sound state.
     pub observed: Vec<Vec<Term>>,
@@ -71,6 +76,8 @@ pub(crate) fn sense(spec: Spec<'_>, state: &State, measurement: &[Term]) -> Sens
         primed,
         observation: Vec::new(),
         base: None,
+        factors: Vec::new(),
+        filtered: Vec::new(),
         clipped: terms.truth(false),
         observed: Vec::new(),
         pushed: Vec::new(),
@@ -86,22 +93,44 @@ pub(crate) fn sense(spec: Spec<'_>, state: &State, measurement: &[Term]) -> Sens
         .map(|each| (each.estimates, each.words))
         .unzip::<_, _, Vec<_>, _>();
     sensed.observed = words;
-    sensed.base = spec.policy.head.residual().map(|head| {
-        let of = |own: &policy::Source| source(spec, &own.tree, state, &sensed.signals, &estimates);
-        let (low, high) = spec.inwards(head.limits);
-        let mut still: Vec<Term> = Vec::new();
-        for zone in &head.dead_zone {
-            still.push(float.within(of(&zone.source), spec.nearest(-zone.within), spec.nearest(zone.within)));
-        }
-        let is_still = if still.is_empty() {
+    observe(spec, state, &estimates, &mut sensed);
+    law(spec, state, &estimates, &mut sensed);
+    sensed
+}
+
+/// What a law of control says before the network does (sections 7c and 8).
+fn law(spec: Spec<'_>, state: &State, estimates: &[[Term; 3]], sensed: &mut Sensed) {
+    let (terms, float) = (spec.terms, spec.float);
+    let of = |own: &policy::Source| source(spec, &own.tree, state, &sensed.signals, estimates);
+    let is_still = |zone: &[policy::Still]| {
+        let within = zone.iter().map(|zone| {
+            let (low, high) = (spec.nearest(-zone.within), spec.nearest(zone.within));
+            float.within(of(&zone.source), low, high)
+        });
+        if zone.is_empty() {
             terms.truth(false)
         } else {
-            terms.all(still)
-        };
-        (float.clamp(of(&head.base), low, high), is_still)
-    });
-    observe(spec, state, &estimates, &mut sensed);
-    sensed
+            terms.all(within)
+        }
+    };
+    let (base, factors) = match &spec.policy.head {
+        Head::Choice(_) | Head::Continuous(_) => return,
+        Head::Residual(head) => {
+            let (low, high) = spec.inwards(head.limits);
+            let base = float.clamp(of(&head.base), low, high);
+            ((base, is_still(&head.dead_zone)), Vec::new())
+        }
+        Head::Schedule(head) => {
+            let factors = head.gains.iter().map(|gain| match &gain.factor {
+                Factor::Source(own) => Some(of(own)),
+                Factor::Feature(index) => sensed.filtered.get(*index).copied(),
+                Factor::One => None,
+            });
+            ((of(&head.base), is_still(&head.dead_zone)), factors.collect())
+        }
+    };
+    sensed.base = Some(base);
+    sensed.factors = factors;
 }
 
 fn observe(spec: Spec<'_>, state: &State, estimates: &[[Term; 4]], sensed: &mut Sensed) {
@@ -115,6 +144,7 @@ fn observe(spec: Spec<'_>, state: &State, estimates: &[[Term; 4]], sensed: &mut 
             pushed.push(filtered.words);
         }
         sensed.pushed.push(pushed);
+        sensed.filtered.push(y);
         if feature.scale != 1.0 {
             y = float.mul(y, spec.nearest(feature.scale));
         }

@@ -111,12 +111,13 @@ impl State {
     }
 }
 
-/// The duties of all actions, or those of a continuous head at both ends of its squash (section 7b).
+/// The duties of all actions, those of a continuous head at both ends of its squash (section 7b), or the
+/// limits of a law (sections 7c and 8).
 fn duties(spec: Spec<'_>) -> Vec<f64> {
     let format = spec.format();
     match &spec.policy.head {
         Head::Choice(actions) => actions.iter().map(|action| format.nearest(action.duty)).collect(),
-        Head::Residual(_) => {
+        Head::Residual(_) | Head::Schedule(_) => {
             let limits = spec.policy.limits.duty;
             vec![format.up(limits.low), format.down(limits.high)]
         }

@@ -11,7 +11,7 @@ use crate::forms::Form;
 use crate::guard::{Answer, Limits, Reader};
 
 /// Cases of the golden tests: between them every key of a contract.
-const CASES: [&str; 11] = [
+const CASES: [&str; 12] = [
     "activations",
     "adc_mapping",
     "clipped_actor",
@@ -21,6 +21,7 @@ const CASES: [&str; 11] = [
     "linear",
     "minimal",
     "paper",
+    "scheduled",
     "tail_blocks",
     "wide",
 ];

@@ -9,7 +9,9 @@
 //! A node that no rule knows, or a value that two nodes take, is refused by the node's name.
 
 mod bent;
+mod command;
 mod model;
+mod norm;
 mod wire;
 
 use policy::{Activation, DraftFeature};
@@ -30,6 +32,8 @@ pub(crate) struct Model {
     pub features: Vec<DraftFeature>,
     /// Where it ends in a tanh: the command is a number.
     pub actor: Option<Actor>,
+    /// Each command, where the outputs are gains.
+    pub commands: Vec<Actor>,
 }
 
 /// Whether `bytes` begin as a model does: field 1, the version of the format, and no header of safetensors.
@@ -37,11 +41,13 @@ pub(crate) fn is_model(bytes: &[u8]) -> bool {
     bytes.first() == Some(&8) && bytes.get(8) != Some(&b'{')
 }
 
-/// Reads a model.
-pub(crate) fn read(file: &FileName, bytes: &[u8]) -> Result<Model, Message> {
+/// Reads a model, of which one output may be picked, or all may be gains.
+pub(crate) fn read(file: &FileName, bytes: &[u8], (picked, gains): (Option<usize>, bool)) -> Result<Model, Message> {
     let graph = model::read(file, bytes)?;
     let mut walk = Walk {
         graph: &graph,
+        picked,
+        gains,
         affine: None,
         clip: None,
         layers: Vec::new(),
@@ -70,6 +76,9 @@ pub(crate) fn read(file: &FileName, bytes: &[u8]) -> Result<Model, Message> {
             walk.activation(bent.node, activation.ok_or_else(|| not_compiled(bent.node, bent.word))?)?;
             bent.value.clone_into(&mut value);
             continue;
+        }
+        if let Some(refusal) = norm::refusal(&takers) {
+            return Err(refusal);
         }
         if takers.is_empty() {
             let nodes: Vec<String> = graph.nodes.iter().take(4).map(named).collect();
@@ -109,6 +118,10 @@ fn other(what: &str, found: &str, expected: &str) -> Message {
 
 struct Walk<'a> {
     graph: &'a Graph,
+    /// The output that is the duty.
+    picked: Option<usize>,
+    /// The outputs are gains.
+    gains: bool,
     /// `scale * x + offset` of each input, or one for all.
     affine: Option<(Vec<f64>, Vec<f64>)>,
     clip: Option<(f64, f64)>,
@@ -117,8 +130,8 @@ struct Walk<'a> {
     activations: Vec<Option<Activation>>,
     /// Ends of a clip behind the last layer.
     cut: Option<(f64, f64)>,
-    /// Scale and offset behind a tanh or a clip that ends the network.
-    scaled: Option<(f64, f64)>,
+    /// Scale and offset behind a tanh or a clip that ends the network: one for all outputs, or one for each.
+    scaled: Option<Vec<(f64, f64)>>,
     /// The node that ended the chain.
     ended: Option<String>,
     said: Vec<String>,
@@ -181,16 +194,6 @@ impl Walk<'_> {
     fn ends(&self, node: &Node) -> Option<(f64, f64)> {
         let bound = |index: usize| self.constant(node, index)?.values.first().copied();
         bound(1).zip(bound(2)).filter(|(low, high)| low < high)
-    }
-
-    /// Whether the last layer has one output, and something makes a command of it.
-    fn is_one(&self) -> bool {
-        self.layers.last().is_some_and(|layer| layer.outputs == 1)
-    }
-
-    fn is_command(&self) -> bool {
-        let is_curve = |last: Activation| Squash::curve(last).is_some();
-        self.is_one() && (self.cut.is_some() || self.activations.last().copied().flatten().is_some_and(is_curve))
     }
 
     fn end(&mut self, node: &Node) -> Result<(), Message> {
@@ -282,10 +285,11 @@ impl Walk<'_> {
         if self.layers.is_empty() {
             return self.before(node, &steps);
         }
-        if let ([(scale, shift)], true) = (steps.as_slice(), self.is_command()) {
-            let (own, offset) = self.scaled.unwrap_or((1.0, 0.0));
-            self.scaled = Some((own * scale, offset * scale + shift));
-            return Ok(());
+        if self.is_command() {
+            return self.behind_command(node, &steps);
+        }
+        if self.is_bounded() {
+            return Err(actor::several(self.outputs()));
         }
         let Some(layer) = self.layers.last_mut().filter(|_| self.cut.is_none()) else {
             return Err(unknown(node));
@@ -328,13 +332,12 @@ impl Walk<'_> {
             inputs.ok_or_else(|| other("the graph holds no dense layer", "none", "Gemm, or MatMul and Add"))?;
         let actor = match self.activations.pop() {
             Some(Some(last)) if Squash::curve(last).is_some() => {
-                let outputs = self.layers.last().map_or(0, |layer| layer.outputs);
-                if outputs != 1 {
-                    return Err(actor::several(outputs));
+                if !self.is_one() {
+                    return Err(actor::several(self.outputs()));
                 }
                 Some(Actor {
                     squash: Squash::Curve(last),
-                    affine: Some(actor::scaled(self.scaled)),
+                    affine: None,
                 })
             }
             Some(Some(last)) => {
@@ -344,11 +347,18 @@ impl Walk<'_> {
                     "the values of the actions",
                 ));
             }
-            _ => self.cut.map(|(low, high)| Actor {
-                affine: Some(actor::scaled(self.scaled)),
-                ..Actor::clipped(low, high)
-            }),
+            _ => self.cut.map(|(low, high)| Actor::clipped(low, high)),
         };
+        let of = |output: usize| {
+            actor.map(|actor| Actor {
+                affine: Some(actor::scaled(self.affine_of(output))),
+                ..actor
+            })
+        };
+        let commands = (0..self.outputs())
+            .filter_map(|output| of(output).filter(|_| self.gains))
+            .collect();
+        let actor = of(self.picked.unwrap_or(0));
         let names: Vec<&str> = self.layers.iter().map(|layer| layer.name.as_str()).collect();
         self.said
             .insert(0, format!("layers, first to last: {}", names.join(" > ")));
@@ -376,14 +386,18 @@ impl Walk<'_> {
                 "the normalisation of the graph is scale, offset and clip of the features, computed in f64".to_owned(),
             );
         }
+        let mut network = Network {
+            layers: self.layers,
+            plain: false,
+            choice_only: false,
+            definition: None,
+            said: self.said,
+        };
+        if let Some(output) = self.picked {
+            network.keep_output(output)?;
+        }
         Ok(Model {
-            network: Network {
-                layers: self.layers,
-                plain: false,
-                choice_only: false,
-                definition: None,
-                said: self.said,
-            },
+            network,
             activations: self
                 .activations
                 .into_iter()
@@ -391,6 +405,7 @@ impl Walk<'_> {
                 .collect(),
             features,
             actor,
+            commands,
         })
     }
 }

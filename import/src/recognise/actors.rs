@@ -11,6 +11,7 @@ use super::heads::is_value;
 use super::names::parts;
 use super::{Known, Refusal};
 use crate::actor::{self, Actor, Squash, TANH};
+use crate::network::no_output;
 
 /// What the definition of an actor adds to its tensors.
 #[derive(Debug, Clone, PartialEq)]
@@ -103,7 +104,7 @@ impl<'a> Names<'a> {
 pub(crate) fn find(tensors: &[&NamedTensor], known: &Known) -> Result<Option<Definition>, Refusal> {
     let own = tensors.iter().filter(|tensor| !is_value(&tensor.name)).copied();
     let names = Names(own.collect());
-    if let Some(definition) = cleanrl(&names)? {
+    if let Some(definition) = cleanrl(&names, known)? {
         return Ok(Some(definition));
     }
     if let Some(definition) = stable_baselines(&names)? {
@@ -111,8 +112,14 @@ pub(crate) fn find(tensors: &[&NamedTensor], known: &Known) -> Result<Option<Def
     }
     let of_a_library = [tianshou(&names, known), rllib(&names, known)?, torchrl(&names, known)?];
     let found = of_a_library.into_iter().flatten().next();
-    // somebody said that there is one command
-    Ok(found.or_else(|| (known.actions == Some(1)).then(|| defined(Squash::Unknown, None, "by --actions 1"))))
+    // somebody said that there is one command, or what the several are
+    let said = match known {
+        Known { gains: true, .. } => Some("by --gains"),
+        Known { output: Some(_), .. } => Some("by --output"),
+        Known { actions: Some(1), .. } => Some("by --actions 1"),
+        Known { .. } => None,
+    };
+    Ok(found.or_else(|| said.map(|said| defined(Squash::Unknown, None, said))))
 }
 
 fn defined(squash: Squash, affine: Option<(f64, f64)>, said: &str) -> Definition {
@@ -135,7 +142,7 @@ fn default(word: &str, whose: &str) -> Option<String> {
     Some(format!("\"TODO\"   # {word} unless you gave {whose} another one"))
 }
 
-fn cleanrl(names: &Names<'_>) -> Result<Option<Definition>, Refusal> {
+fn cleanrl(names: &Names<'_>, known: &Known) -> Result<Option<Definition>, Refusal> {
     let scale = names.leaf("action_scale").zip(names.leaf("action_bias"));
     for (mean, file) in [
         ("fc_mu", "td3_continuous_action.py or ddpg_continuous_action.py"),
@@ -144,17 +151,13 @@ fn cleanrl(names: &Names<'_>) -> Result<Option<Definition>, Refusal> {
         let Some((scale, bias)) = scale.filter(|_| names.has(mean)) else {
             continue;
         };
-        let one = |tensor: &NamedTensor| match tensor.values.as_deref() {
-            Some([one]) => Ok(actor::short(*one)),
-            _ => Err(Refusal::of(&tensor.name, actor::several(tensor.shape.iter().product()))),
-        };
         let said = format!(
             "CleanRL's {file} by the names of its tensors: the action is tanh({mean}) * action_scale + action_bias, with ReLU between. Is that \
              your definition?"
         );
         return Ok(Some(Definition {
             activation: fixed("relu", "CleanRL's definition"),
-            ..defined(TANH, Some((one(scale)?, one(bias)?)), &said)
+            ..defined(TANH, own(scale, known)?.zip(own(bias, known)?), &said)
         }));
     }
     if !(names.has("actor_mean") && names.leaf("actor_logstd").is_some()) {
@@ -173,6 +176,18 @@ fn cleanrl(names: &Names<'_>) -> Result<Option<Definition>, Refusal> {
             .to_owned(),
     );
     Ok(Some(definition))
+}
+
+/// The number of the one command, or of the one that is picked; `None` of several gains, which the contract lists.
+fn own(tensor: &NamedTensor, known: &Known) -> Result<Option<f64>, Refusal> {
+    let values = tensor.values.as_deref().unwrap_or_default();
+    match (values, known.output) {
+        ([one], _) => Ok(Some(actor::short(*one))),
+        (several, Some(output)) if output < several.len() => Ok(several.get(output).copied().map(actor::short)),
+        (several, Some(output)) => Err(Refusal::of(&tensor.name, no_output(output, several.len()))),
+        (_, None) if known.gains => Ok(None),
+        (_, None) => Err(Refusal::of(&tensor.name, actor::several(tensor.shape.iter().product()))),
+    }
 }
 
 fn stable_baselines(names: &Names<'_>) -> Result<Option<Definition>, Refusal> {
@@ -224,7 +239,9 @@ fn tianshou(names: &Names<'_>, known: &Known) -> Option<Definition> {
             ..defined(Squash::Unknown, None, said)
         });
     }
-    let is_one = names.outputs("last.model") == Some(1) && known.actions.is_none_or(|actions| actions == 1);
+    let outputs = names.outputs("last.model");
+    let is_said = outputs.is_some() && (known.output.is_some() || known.gains);
+    let is_one = is_said || outputs == Some(1) && known.actions.is_none_or(|actions| actions == 1);
     let said = "Tianshou's ContinuousActorDeterministic (TD3, DDPG) by the names of its tensors: the action is max_action * tanh(last), which is \
                 scaled to the action space";
     is_one.then(|| Definition {
@@ -239,7 +256,8 @@ fn rllib(names: &Names<'_>, known: &Known) -> Result<Option<Definition>, Refusal
     };
     let is_free = names.leaf("log_std").is_some();
     let is_command = is_free || known.actions == Some(1);
-    if outputs == 2 && !is_free && known.actions.is_none() {
+    let is_said = known.output.is_some() || known.gains;
+    if outputs == 2 && !is_free && known.actions.is_none() && !is_said {
         return Err(two_or_one("pi.net.mlp"));
     }
     if !is_command {
@@ -279,11 +297,13 @@ pub(crate) fn doubt(tensors: &[&NamedTensor], known: &Known) -> Option<String> {
 fn torchrl(names: &Names<'_>, known: &Known) -> Result<Option<Definition>, Refusal> {
     let activation = default("tanh", "TorchRL's MLP");
     if let Some((low, high)) = names.leaf("action_low").zip(names.leaf("action_high")) {
-        let ends = low.values.as_deref().zip(high.values.as_deref());
-        let Some(([low], [high])) = ends else {
-            return Err(Refusal::of(&low.name, actor::several(low.shape.iter().product())));
+        let actor = match own(low, known)?.zip(own(high, known)?) {
+            Some((low, high)) => Actor::of_space(low, high),
+            None => Actor {
+                squash: TANH,
+                affine: None,
+            },
         };
-        let actor = Actor::of_space(*low, *high);
         let said = "TorchRL's TanhModule by the names of its tensors: the action is a tanh from action_low to action_high. Is that your definition?";
         return Ok(Some(Definition {
             activation,
@@ -294,6 +314,7 @@ fn torchrl(names: &Names<'_>, known: &Known) -> Result<Option<Definition>, Refus
         return Ok(None);
     }
     match known.actions {
+        None if known.output.is_some() || known.gains => Ok(None),
         None => Err(two_or_one("module.0.module")),
         Some(1) => {
             let said = "TorchRL's NormalParamExtractor by --actions 1: the first of two outputs is the mean, which a TanhNormal squashes by tanh and a \

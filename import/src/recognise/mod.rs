@@ -20,6 +20,7 @@ mod norm;
 mod refused;
 
 pub(crate) use refused::continuous as refused_continuous;
+pub(crate) use refused::layer_norm;
 
 use policy::NamedTensor;
 use policy::limits::{MAX_ACTIONS, MAX_FEATURES, MAX_LAYERS, MAX_WIDTH, MIN_ACTIONS};
@@ -58,6 +59,10 @@ impl From<Message> for Refusal {
 pub(crate) struct Known {
     /// How many actions there are.
     pub actions: Option<usize>,
+    /// Which output is the duty.
+    pub output: Option<usize>,
+    /// The outputs are gains.
+    pub gains: bool,
     /// Epsilon of the batch norms by their names, where the file says it.
     pub epsilons: Vec<(String, f64)>,
 }
@@ -125,8 +130,11 @@ fn actor(own: &[&NamedTensor], known: &Known, definition: Definition) -> Result<
         );
         network.said.push(text);
     }
+    if let Some(output) = known.output {
+        network.keep_output(output)?;
+    }
     let outputs = network.layers.last().map_or(0, |layer| layer.outputs);
-    if outputs != 1 {
+    if outputs != 1 && !known.gains {
         return Err(crate::actor::several(outputs).into());
     }
     sizes(&network)?;

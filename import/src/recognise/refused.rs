@@ -136,7 +136,7 @@ pub(crate) fn continuous(found: &str) -> Message {
         .hint(MEAN)
 }
 
-fn layer_norm() -> Message {
+pub(crate) fn layer_norm() -> Message {
     Message::new("a LayerNorm is not compiled")
         .found("a scale for each value, without running statistics")
         .expected("dense layers, or batch norms, whose statistics are constants")

@@ -3,10 +3,18 @@
 use super::{Actor, Refused, Row, Tensors, dense, ending, named, names, row, with};
 
 pub fn rows() -> Vec<Row> {
-    [cleanrl(), stable_baselines(), tianshou(), rllib(), torchrl(), unnamed()]
-        .into_iter()
-        .flatten()
-        .collect()
+    [
+        cleanrl(),
+        stable_baselines(),
+        tianshou(),
+        rllib(),
+        torchrl(),
+        unnamed(),
+        picked(),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
 /// The scale and bias that `Saved` draws are no duties, so scale and offset stay open here; tests/trainers.rs has real ones.
@@ -53,7 +61,7 @@ fn cleanrl() -> Vec<Row> {
         row(
             "CleanRL TD3, three commands",
             with(ending(fc, 3), several),
-            Refused(&["commands several numbers", "3 outputs"]),
+            Refused(&["commands several numbers", "3 outputs", "--output N", "--gains"]),
         ),
         row(
             "CleanRL SAC",
@@ -80,6 +88,47 @@ fn cleanrl() -> Vec<Row> {
         ),
     ]
 }
+
+/// One of several commands.
+fn picked() -> Vec<Row> {
+    let several: &[(&str, &[usize])] = &[("action_scale", &[3]), ("action_bias", &[3])];
+    let fc = ["fc1", "fc2", "fc_mu"];
+    let mean = ["actor_mean.0", "actor_mean.2", "actor_mean.4"];
+    let sac = ["latent_pi.0", "latent_pi.2", "mu"];
+    let td3 = ["actor.mu.0", "actor.mu.2", "actor.mu.4"];
+    let of_three: &[&str] = &["squash = \"tanh\"", "output 0 of 3 is the duty; 1 and 2 are left out"];
+    let td3_of_three = || with(ending(fc, 3), several);
+    vec![
+        row(
+            "CleanRL TD3, the first of three",
+            td3_of_three(),
+            Actor(names(fc), of_three),
+        )
+        .output(0),
+        row(
+            "CleanRL TD3, a fourth of three",
+            td3_of_three(),
+            Refused(&["--output names none", "0 to 2"]),
+        )
+        .output(3),
+        row(
+            "CleanRL PPO, the first of two",
+            with(ending(mean, 2), &[("actor_logstd", &[1, 2])]),
+            Actor(names(mean), OF_TWO),
+        )
+        .output(0),
+        row(
+            "SB3 SAC, the first of two",
+            [ending(sac, 2), dense("log_std", 2, 16)].concat(),
+            Actor(names(sac), OF_TWO),
+        )
+        .output(0),
+        row("SB3 TD3, the first of two", ending(td3, 2), Actor(names(td3), OF_TWO)).output(0),
+    ]
+}
+
+/// What is said of a command that was picked.
+const OF_TWO: &[&str] = &["output 0 of 2 is the duty; 1 is left out", "continuous = {"];
 
 fn stable_baselines() -> Vec<Row> {
     let sac = |prefix: &str, outputs: usize| -> Tensors {
@@ -213,6 +262,12 @@ fn tianshou() -> Vec<Row> {
             [ending(mean, 2), dense("sigma.model.0", 2, 16)].concat(),
             Refused(&["commands several numbers"]),
         ),
+        row(
+            "Tianshou SAC, the first of two commands",
+            [ending(mean, 2), dense("sigma.model.0", 2, 16)].concat(),
+            Actor(names(mean), OF_TWO),
+        )
+        .output(0),
     ]
 }
 
@@ -257,6 +312,12 @@ fn rllib() -> Vec<Row> {
             Actor(names(stems), parts),
         ),
         row(
+            "RLlib PPO, free_log_std, the first of two commands",
+            with(ppo(2), &[("pi.log_std", &[2])]),
+            Actor(names(stems), OF_TWO),
+        )
+        .output(0),
+        row(
             "RLlib SAC",
             [ending(sac, 2), critics.concat()].concat(),
             Actor(names(sac), sac_parts),
@@ -275,6 +336,7 @@ fn torchrl() -> Vec<Row> {
     let stems = ["module.0.module.0", "module.0.module.2", "module.0.module.4"];
     let inner = ["module.0.module.0.0", "module.0.module.0.2", "module.0.module.0.4"];
     let ends: &[(&str, &[usize])] = &[("module.1.action_low", &[]), ("module.1.action_high", &[])];
+    let two_ends: &[(&str, &[usize])] = &[("module.1.action_low", &[2]), ("module.1.action_high", &[2])];
     let parts: &[&str] = &["continuous = { squash = \"tanh\", scale = ", "TorchRL's TanhModule"];
     let open: &[&str] = &["the first output is read, the mean", "continuous = { squash = \"TODO\""];
     vec![
@@ -283,6 +345,17 @@ fn torchrl() -> Vec<Row> {
             with(ending(stems, 1), ends),
             Actor(names(stems), parts),
         ),
+        row(
+            "TorchRL TD3, two commands",
+            with(ending(stems, 2), two_ends),
+            Refused(&["commands several numbers"]),
+        ),
+        row(
+            "TorchRL TD3, the first of two commands",
+            with(ending(stems, 2), two_ends),
+            Actor(names(stems), OF_TWO),
+        )
+        .output(0),
         row(
             "TorchRL PPO, SAC, or two actions",
             ending(inner, 2),
@@ -336,6 +409,15 @@ fn unnamed() -> Vec<Row> {
             Actor(names(own), open),
         )
         .actions(1),
+        row(
+            "three outputs, of which one is the command",
+            ending(own, 3),
+            Actor(
+                names(own),
+                &["output 0 of 3 is the duty", "continuous = { squash = \"TODO\""],
+            ),
+        )
+        .output(0),
         row(
             "mean and deviation as two sequences",
             gaussian_of_sequences,

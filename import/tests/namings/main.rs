@@ -35,6 +35,7 @@ struct Row {
     name: &'static str,
     tensors: Tensors,
     actions: Option<usize>,
+    output: Option<usize>,
     becomes: Becomes,
 }
 
@@ -44,6 +45,7 @@ fn row(name: &'static str, tensors: impl Into<Tensors>, becomes: Becomes) -> Row
         name,
         tensors,
         actions: None,
+        output: None,
         becomes,
     }
 }
@@ -53,6 +55,14 @@ impl Row {
     fn actions(self, count: usize) -> Self {
         Row {
             actions: Some(count),
+            ..self
+        }
+    }
+
+    /// With `--output`.
+    fn output(self, output: usize) -> Self {
+        Row {
+            output: Some(output),
             ..self
         }
     }
@@ -88,6 +98,7 @@ fn check(row: &Row) {
     let saved = Saved::new(&row.tensors);
     let options = import::Options {
         actions: row.actions,
+        output: row.output,
         ..import::Options::default()
     };
     let new = import::new_policy(&saved.weights(), &saved.contract(), &options);
@@ -132,6 +143,7 @@ fn every_naming_is_read_right_or_refused_with_a_way_out() {
         .into_iter()
         .chain(actors::rows())
         .chain(refused::rows())
+        .chain(refused::layer_norms())
         .collect();
     assert!(table.len() >= 35, "{} rows", table.len());
     table.iter().for_each(check);

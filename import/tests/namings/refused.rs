@@ -62,3 +62,44 @@ pub fn rows() -> Vec<Row> {
         ),
     ]
 }
+
+/// A scale for each value without statistics, by the names of several libraries.
+pub fn layer_norms() -> Vec<Row> {
+    let q = || three(["network.0", "network.2", "network.4"]);
+    vec![
+        row(
+            "LayerNorm by its own name",
+            with(q(), &[("layer_norm1.weight", &[16]), ("layer_norm1.bias", &[16])]),
+            Refused(&["LayerNorm", "layer_norm1.weight", "BatchNorm1d"]),
+        ),
+        row(
+            "LayerNorm without a bias",
+            with(q(), &[("ln.weight", &[16])]),
+            Refused(&["LayerNorm"]),
+        ),
+        row(
+            "LayerNorm of Keras",
+            with(
+                q(),
+                &[
+                    ("layer_normalization/gamma", &[16]),
+                    ("layer_normalization/beta", &[16]),
+                ],
+            ),
+            Refused(&["LayerNorm"]),
+        ),
+        row(
+            "LayerNorm of Flax",
+            with(q(), &[("LayerNorm_0/scale", &[16]), ("LayerNorm_0/bias", &[16])]),
+            Refused(&["LayerNorm"]),
+        ),
+        row(
+            "LayerNorm in an actor of stable-baselines3",
+            with(
+                [dense("latent_pi.0", 16, 6), dense("mu", 1, 16), dense("log_std", 1, 16)].concat(),
+                &[("latent_pi.1.weight", &[16]), ("latent_pi.1.bias", &[16])],
+            ),
+            Refused(&["LayerNorm", "latent_pi.1"]),
+        ),
+    ]
+}

@@ -1,9 +1,10 @@
-//! `[actions]`: the duty of each network output, what each adds to a law of control, or one output as a duty.
+//! `[actions]`: the duty of each network output, what each adds to a law of control, one output as a duty, or all of them as the
+//! gains of a law.
 
 use toml_input::{Sink, Table, Value};
 
 use super::features::Surroundings;
-use super::{continuous, duty, residual};
+use super::{continuous, duty, residual, schedule};
 use crate::catalogue;
 use crate::limits::{MAX_ACTIONS, MIN_ACTIONS};
 use crate::model::{Action, Head, Pair};
@@ -31,32 +32,36 @@ struct Listed {
     count: usize,
 }
 
-pub(crate) fn read(root: &mut Table<'_>, around: &Surroundings<'_>, faults: &mut Sink) -> Actions {
-    let hint = "give [actions] with `duties = [...]` or `pairs = [...]`, one per network output, with `base` and `offsets`, or with \
-         `continuous = {...}`";
+/// `features` are the names of all features, if all are known.
+pub(crate) fn read(root: &mut Table<'_>, around: &Surroundings<'_>, features: &[String], faults: &mut Sink) -> Actions {
+    let hint = "give [actions] with `duties = [...]` or `pairs = [...]`, one per network output, with `base` and `offsets`, with \
+         `continuous = {...}`, or with `gains = [...]`";
     let Some(mut section) = root
         .required("actions", hint, faults)
         .and_then(|v| v.table("[actions]", faults))
     else {
         return Actions::default();
     };
-    let forms = ["duties", "pairs", "offsets", "continuous"].map(|key| section.optional(key));
+    let forms = ["duties", "pairs", "offsets", "continuous", "gains"].map(|key| section.optional(key));
     let base = section.optional("base");
     let dead_zone = section.optional("dead_zone");
-    if let (Some(value), [_, _, None, _]) = (base.as_ref().or(dead_zone.as_ref()), &forms) {
+    if let (Some(value), [_, _, None, _, None]) = (base.as_ref().or(dead_zone.as_ref()), &forms) {
         faults.push(value.fault(catalogue::needs_other(value.label(), "offsets")));
     }
+    let law = (base.as_ref(), dead_zone.as_ref());
     let actions = match &forms {
-        [Some(value), None, None, None] => chosen(value, from_duties(value, faults), faults),
-        [None, Some(value), None, None] => chosen(value, from_pairs(value, faults), faults),
-        [None, None, Some(value), None] => residual::read(value, base.as_ref(), dead_zone.as_ref(), around, faults),
-        [None, None, None, Some(value)] => continuous::read(value, faults).map(|head| Actions {
+        [Some(value), None, None, None, None] => chosen(value, from_duties(value, faults), faults),
+        [None, Some(value), None, None, None] => chosen(value, from_pairs(value, faults), faults),
+        [None, None, Some(value), None, None] => residual::read(value, law.0, law.1, around, faults),
+        [None, None, None, Some(value), None] => continuous::read(value, faults).map(|head| Actions {
             head: Head::Continuous(head),
             outputs: 1,
         }),
+        [None, None, None, None, Some(value)] => schedule::read(value, law, around, features, faults),
         _ => {
             let count = forms.iter().flatten().count();
-            let message = catalogue::exactly_one_of("[actions]", "`duties`, `pairs`, `offsets`, `continuous`", count);
+            let known = "`duties`, `pairs`, `offsets`, `continuous`, `gains`";
+            let message = catalogue::exactly_one_of("[actions]", known, count);
             faults.push(section.fault(message));
             None
         }

@@ -52,7 +52,7 @@ fn squash(section: &Table<'_>, curve: Option<Value<'_>>, clip: Option<Value<'_>>
     }
 }
 
-fn curve(value: &Value<'_>, faults: &mut Sink) -> Option<Activation> {
+pub(super) fn curve(value: &Value<'_>, faults: &mut Sink) -> Option<Activation> {
     let text = value.text(faults)?;
     let curves = || Activation::plain().filter(|each| each.range().is_some());
     if let Some(curve) = curves().find(|curve| curve.word() == text) {
@@ -64,7 +64,7 @@ fn curve(value: &Value<'_>, faults: &mut Sink) -> Option<Activation> {
 }
 
 /// A factor that keeps its sign and size in binary32, and is not 0: such a head would command one duty.
-fn scale(value: &Value<'_>, faults: &mut Sink) -> Option<f64> {
+pub(super) fn scale(value: &Value<'_>, faults: &mut Sink) -> Option<f64> {
     let number = number_f32(value, faults)?;
     if number != 0.0 {
         return Some(number);

@@ -24,6 +24,15 @@ pub(crate) struct Features<'a> {
     pub count: usize,
 }
 
+impl Features<'_> {
+    /// The names of all, in their order; nothing if one is faulty, for the place of the others is not known then.
+    pub fn names(&self) -> Vec<String> {
+        let whole = self.list.len() == self.count;
+        let names = self.list.iter().filter(|_| whole);
+        names.map(|own| own.feature.name.clone()).collect()
+    }
+}
+
 /// What the entries refer to.
 pub(crate) struct Surroundings<'a> {
     pub signals: &'a [String],
@@ -135,9 +144,15 @@ pub(crate) fn bounded(list: Vec<Unbounded<'_>>, inputs: &Inputs, period: f64, fa
 }
 
 fn bound(feature: &Feature, inputs: &Inputs, period: f64) -> Result<Box32, Overflow> {
+    let x = filtered(feature, inputs, period)?;
+    bounds::observation(x, feature.scale, feature.offset, feature.clip)
+}
+
+/// Bound of a feature behind the last of its filters.
+pub(super) fn filtered(feature: &Feature, inputs: &Inputs, period: f64) -> Result<Box32, Overflow> {
     let mut x = bounds::expression(&feature.source, inputs)?;
     for filter in &feature.filters {
         x = bounds::filter(filter, x, period)?;
     }
-    bounds::observation(x, feature.scale, feature.offset, feature.clip)
+    Ok(x)
 }

@@ -10,6 +10,7 @@ pub(crate) mod network;
 pub(crate) mod observers;
 pub(crate) mod protection;
 pub(crate) mod residual;
+pub(crate) mod schedule;
 pub(crate) mod signals;
 
 use toml_input::{Sink, Value};

@@ -8,7 +8,7 @@ use super::fits_f32;
 use crate::bounds::{self, Inputs, Overflow};
 use crate::catalogue;
 use crate::limits::{MAX_ACTIONS, MAX_DEAD_ZONE, MIN_ACTIONS};
-use crate::model::{Action, Head, Interval, Residual, Source, Still};
+use crate::model::{Action, Head, Interval, Residual, Schedule, Source, Still};
 
 pub(super) fn read(
     offsets: &Value<'_>,
@@ -50,6 +50,7 @@ pub(super) fn read(
 pub(crate) fn limited(head: Head, limits: Option<Interval>) -> Head {
     match (head, limits) {
         (Head::Residual(head), Some(limits)) => Head::Residual(Residual { limits, ..head }),
+        (Head::Schedule(head), Some(limits)) => Head::Schedule(Schedule { limits, ..head }),
         (head, _) => head,
     }
 }
@@ -64,7 +65,7 @@ pub(crate) fn bounded(head: &Head, inputs: &Inputs, at: &Value<'_>, faults: &mut
     }
 }
 
-fn source(value: &Value<'_>, around: &Surroundings<'_>, faults: &mut Sink) -> Option<Source> {
+pub(super) fn source(value: &Value<'_>, around: &Surroundings<'_>, faults: &mut Sink) -> Option<Source> {
     let (tree, text) = features::source(value, around, faults)?;
     Some(Source { tree, text })
 }
@@ -79,7 +80,7 @@ fn offset(item: &Value<'_>, faults: &mut Sink) -> Option<Action> {
     Some(Action { duty, pair: None })
 }
 
-fn still(value: &Value<'_>, around: &Surroundings<'_>, faults: &mut Sink) -> Option<Vec<Still>> {
+pub(super) fn still(value: &Value<'_>, around: &Surroundings<'_>, faults: &mut Sink) -> Option<Vec<Still>> {
     let hint = "where nothing is added: `dead_zone = [{ source = \"model_voltage - v_ref\", within = 0.25 }]`";
     let items = value.list("an array of { source, within }", faults)?;
     if !(1..=MAX_DEAD_ZONE).contains(&items.len()) {

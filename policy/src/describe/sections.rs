@@ -2,8 +2,8 @@
 
 use crate::describe::formula::formula;
 use crate::model::{
-    Circuit, Continuous, Estimate, Fallback, Head, Input, InputVoltage, Interval, Mapping, Observer, OnTime, Policy,
-    Residual, Squash,
+    Circuit, Continuous, Estimate, Factor, Fallback, Head, Input, InputVoltage, Interval, Mapping, Observer, OnTime, Policy,
+    Residual, Schedule, Squash, Still,
 };
 
 /// Characters of a line of actions, with which it still fits into a terminal beside its indentation.
@@ -133,11 +133,14 @@ pub fn network(policy: &Policy) -> String {
     out
 }
 
-/// Duties of the actions, several a line, or the formula of a continuous head.
+/// Duties of the actions, several a line, or the formulas of a head without a choice.
 #[must_use]
 pub fn actions(policy: &Policy) -> String {
     if let Some(head) = policy.head.continuous() {
         return continuous(head);
+    }
+    if let Some(head) = policy.head.schedule() {
+        return schedule(head, policy);
     }
     let mut out = match policy.head.residual() {
         Some(head) => residual(head),
@@ -168,41 +171,79 @@ pub fn actions(policy: &Policy) -> String {
 
 /// The law, where it is left alone, and the heading of the offsets.
 fn residual(head: &Residual) -> String {
-    let zone = head.dead_zone.iter();
-    let zone: Vec<String> = zone
-        .map(|still| format!("|{}| <= {}", still.source.text, still.within))
-        .collect();
-    let still = match zone.is_empty() {
-        true => String::new(),
-        false => format!("  nothing is added where {}\n", zone.join(" and ")),
-    };
     format!(
-        "\nlaw\n  duty = {}, in {}\n{still}\noffsets (argmax of Q, lowest index wins)\n",
+        "\nlaw\n  duty = {}, in {}\n{}\noffsets (argmax of Q, lowest index wins)\n",
         head.base.text,
-        range(head.limits)
+        range(head.limits),
+        still(&head.dead_zone)
     )
 }
 
+/// Where nothing is added to a law; empty where that is nowhere.
+fn still(zone: &[Still]) -> String {
+    let zone: Vec<String> = (zone.iter())
+        .map(|still| format!("|{}| <= {}", still.source.text, still.within))
+        .collect();
+    match zone.is_empty() {
+        true => String::new(),
+        false => format!("  nothing is added where {}\n", zone.join(" and ")),
+    }
+}
+
 fn continuous(head: &Continuous) -> String {
-    let squashed = match head.squash {
-        Squash::Curve(curve) => format!("{}(y)", curve.word()),
-        Squash::Clip(clip) => format!("y clipped to {}", range(clip)),
-    };
     let ends = Head::Continuous(*head).duties().into_iter();
-    let scale = if head.scale == 1.0 {
-        String::new()
-    } else {
-        format!("{} * ", head.scale)
+    format!(
+        "\naction (continuous, y is the network's output)\n  duty = {}, in {}\n",
+        mapped_output(Some(head.squash), "y", (head.scale, head.offset)),
+        range(hull(ends.map(|duty| Interval { low: duty, high: duty })))
+    )
+}
+
+/// The law with its gains, then each gain as a formula of its output.
+fn schedule(head: &Schedule, policy: &Policy) -> String {
+    let product = |(index, gain): (usize, &crate::model::Gain)| match &gain.factor {
+        Factor::Source(source) => format!(" + g{index} * ({})", source.text),
+        Factor::Feature(own) => {
+            let feature = policy.features.get(*own).map_or("?", |feature| &feature.name);
+            format!(" + g{index} * {feature} before scale, offset and clip")
+        }
+        Factor::One => format!(" + g{index}"),
     };
-    let offset = match head.offset {
+    let products: String = head.gains.iter().enumerate().map(product).collect();
+    let mut out = format!(
+        "\nlaw (summed in this order)\n  duty = {}{products}, in {}\n{}\ngains (y0, y1, ... are the network's outputs)\n",
+        head.base.text,
+        range(head.limits),
+        still(&head.dead_zone)
+    );
+    for (index, gain) in head.gains.iter().enumerate() {
+        let formula = mapped_output(gain.squash, &format!("y{index}"), (gain.scale, gain.offset));
+        let factor = match gain.factor {
+            Factor::One => String::new(),
+            Factor::Source(_) | Factor::Feature(_) => format!(", times {}", range(gain.factor_bound)),
+        };
+        out += &format!("  g{index} = {formula}, in {}{factor}\n", range(gain.ends()));
+    }
+    out
+}
+
+/// `0.4 * tanh(y) + 0.5`
+fn mapped_output(squash: Option<Squash>, output: &str, (scale, offset): (f64, f64)) -> String {
+    let squashed = match squash {
+        Some(Squash::Curve(curve)) => format!("{}({output})", curve.word()),
+        Some(Squash::Clip(clip)) => format!("{output} clipped to {}", range(clip)),
+        None => output.to_owned(),
+    };
+    let scale = match scale {
+        1.0 => String::new(),
+        scale => format!("{scale} * "),
+    };
+    let offset = match offset {
         0.0 => String::new(),
         offset if offset < 0.0 => format!(" - {}", -offset),
         offset => format!(" + {offset}"),
     };
-    format!(
-        "\naction (continuous, y is the network's output)\n  duty = {scale}{squashed}{offset}, in {}\n",
-        range(hull(ends.map(|duty| Interval { low: duty, high: duty })))
-    )
+    format!("{scale}{squashed}{offset}")
 }
 
 /// The mapping as a formula, with its valid range and what may be adjusted at run time.

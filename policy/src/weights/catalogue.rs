@@ -169,13 +169,26 @@ pub(crate) fn golden_missing(name: &str, expected: &str) -> Message {
         .hint("the tensors are called obs, q and action: rename those that are there")
 }
 
-pub(crate) fn golden_continuous(rows: usize) -> Message {
-    Message::new("golden vectors of a continuous head need the tensor `duty`")
-        .expected(format!("`duty` f32 [{rows}] or `output` f32 [{rows}], or both"))
+pub(crate) fn golden_continuous(rows: usize, outputs: usize) -> Message {
+    let (head, of_each) = match outputs {
+        1 => ("continuous head", format!("[{rows}]")),
+        _ => ("gain schedule", format!("[{rows}, {outputs}]")),
+    };
+    Message::new(format!("golden vectors of a {head} need the tensor `duty` or `output`"))
+        .expected(format!("`duty` f32 [{rows}] or `output` f32 {of_each}, or both"))
         .hint(
             "duty is what the trainer's actor asks for, as a duty: its action taken through scale and offset; output is the \
              network's last layer, before squash or clip",
         )
+}
+
+pub(crate) fn golden_law(text: &str) -> Message {
+    Message::new("the golden duties cannot be held against the law: an observation does not tell all that it reads")
+        .found(format!(
+            "`{text}`, which is no number and no source of a feature without filters"
+        ))
+        .expected("a base that is a number, and factors that are features or such sources")
+        .hint("give `output`, the network's last layer before squash or clip, in the place of `duty`")
 }
 
 pub(crate) fn golden_shape(found: &[usize], features: usize) -> Message {

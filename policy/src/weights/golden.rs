@@ -1,12 +1,13 @@
 //! Known answers from the trainer: `obs` [n, features] with `q` [n, actions] and `action` [n] of a choice, or with `output` [n]
-//! and `duty` [n] of a continuous head.
+//! and `duty` [n] of a continuous head, or with `output` [n, gains] and `duty` [n] of a gain schedule.
 
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 use toml_input::{Faults, FileName, Message, Sink};
 
+use super::told::Told;
 use super::{catalogue, header, tensors};
-use crate::model::{Feature, Golden};
+use crate::model::{Feature, Golden, Head};
 use crate::raw::Binary;
 
 /// What the contract allows a network that answers them.
@@ -24,11 +25,11 @@ pub(crate) struct Limits {
 
 /// What the contract says of a vector.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Shape {
+pub(crate) struct Shape<'a> {
     pub features: usize,
     pub outputs: usize,
-    /// The output becomes a duty, in the place of a choice.
-    pub is_continuous: bool,
+    /// What the outputs become.
+    pub head: &'a Head,
 }
 
 /// What the trainer made of the observations; a part that it did not give is empty.
@@ -42,7 +43,7 @@ struct Answers {
 /// Reads and checks the vectors; `bounds` are checked only if every feature is known.
 pub(crate) fn read(
     file: &Binary,
-    shape: Shape,
+    shape: Shape<'_>,
     bounds: &[Feature],
     limits: Limits,
     faults: &mut Sink,
@@ -72,37 +73,41 @@ pub(crate) fn read(
         faults.push(file.name.tensor_fault("obs", message));
         return None;
     };
-    let (first, second) = if shape.is_continuous {
-        ("output", "duty")
-    } else {
-        ("q", "action")
-    };
+    let is_choice = shape.head.is_choice();
+    let (first, second) = if is_choice { ("q", "action") } else { ("output", "duty") };
     let (first, second) = ((first, view(first)), (second, view(second)));
     if first.1.is_none() && second.1.is_none() {
-        let missing = if shape.is_continuous {
-            catalogue::golden_continuous(rows)
-        } else {
+        let missing = if is_choice {
             let expected = format!("`q` f32 [{rows}, {outputs}] or `action` i32 [{rows}], or both");
             catalogue::golden_missing("q", &expected)
+        } else {
+            catalogue::golden_continuous(rows, outputs)
         };
         faults.push(file.name.fault(missing.found(names(&opened))));
         return None;
     }
     let obs = part(file, "obs", faults, floats(&observations, &[rows, features]));
-    let answers = if shape.is_continuous {
-        numbers(file, rows, [first, second], faults)
-    } else {
+    let has_duty = !is_choice && second.1.is_some() && !bounds.is_empty();
+    let answers = if is_choice {
         choices(file, [rows, outputs], [first, second], faults)
+    } else {
+        numbers(file, [rows, outputs], [first, second], faults)
+    };
+    let told = match (shape.head, has_duty) {
+        (Head::Schedule(head), true) => part(file, "duty", faults, Told::of(head, bounds)),
+        _ => Some(Told::default()),
     };
     let seen = obs.as_deref().map(|obs| seen(obs, rows, bounds));
     if let Some(seen) = &seen {
         part(file, "obs", faults, seen.enough(rows, limits.outside));
     }
     let (observations, seen, answers) = (obs?, seen?, answers?);
+    let observations = seen.keep(&observations, features);
     let golden = Golden {
         count: seen.rows.len(),
         outside: rows - seen.rows.len(),
-        observations: seen.keep(&observations, features),
+        law: told?.law(&observations, bounds),
+        observations,
         q_values: seen.keep(&answers.q_values, outputs),
         action_indices: seen.keep(&answers.action_indices, 1),
         duties: seen.keep(&answers.duties, 1),
@@ -173,11 +178,13 @@ fn choices(file: &Binary, [rows, actions]: [usize; 2], parts: [Named<'_>; 2], fa
     })
 }
 
-/// Outputs and duties of a continuous head, as `[rows]` or as a column.
-fn numbers(file: &Binary, rows: usize, parts: [Named<'_>; 2], faults: &mut Sink) -> Option<Answers> {
-    let [q_values, duties] = parts.map(|(name, view)| {
+/// Outputs and duties of a head without a choice; one number a row as `[rows]` or as a column.
+fn numbers(file: &Binary, [rows, outputs]: [usize; 2], parts: [Named<'_>; 2], faults: &mut Sink) -> Option<Answers> {
+    let [first, second] = parts;
+    let [q_values, duties] = [(first, outputs), (second, 1)].map(|((name, view), width)| {
         let Some(view) = view else { return Some(Vec::new()) };
-        let shape: &[usize] = if view.shape().len() == 1 { &[rows] } else { &[rows, 1] };
+        let is_flat = width == 1 && view.shape().len() == 1;
+        let shape: &[usize] = if is_flat { &[rows] } else { &[rows, width] };
         part(file, name, faults, floats(&view, shape))
     });
     Some(Answers {

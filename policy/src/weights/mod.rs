@@ -7,6 +7,7 @@ pub(crate) mod golden;
 pub(crate) mod header;
 pub(crate) mod layers;
 pub(crate) mod tensors;
+mod told;
 
 use toml_input::{Fault, FileName, Sink};
 

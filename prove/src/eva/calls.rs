@@ -3,6 +3,7 @@
 use policy::Shape;
 
 use super::driver::{BITS_AND_FINITE, BOTH, Entry, ONE, Writer};
+use super::head::Answer;
 use super::stated::stated;
 
 impl Writer<'_> {
@@ -105,9 +106,15 @@ impl Writer<'_> {
             "front.sound = 0u;".to_owned(),
             "front.usable = 0u;".to_owned(),
         ]);
-        let chosen = match self.is_output() {
-            true => "ANY_NUMBER".to_owned(),
-            false => format!("Frama_C_unsigned_int_interval(0u, {}u)", self.policy.outputs() - 1),
+        let chosen = match self.answer() {
+            Answer::Output => "ANY_NUMBER".to_owned(),
+            Answer::Index => format!("Frama_C_unsigned_int_interval(0u, {}u)", self.policy.outputs() - 1),
+            Answer::Gains(count) => {
+                self.text.line(format!("{} outputs[{count}];", self.number.kind()));
+                let any = (0..count).map(|index| format!("outputs[{index}] = ANY_NUMBER;"));
+                self.text.lines(any.collect::<Vec<_>>());
+                "outputs".to_owned()
+            }
         };
         self.text
             .line(format!("{n}_decide(&state, &front, {chosen}, &command);"));

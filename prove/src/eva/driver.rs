@@ -9,9 +9,10 @@
 //! They are made from the policy and the numeric contract. Of the generated code they know its interface and, for what needs no
 //! network, the three functions of a step around it.
 
-use policy::{Activation, NumericFormat, Policy, Squash};
+use policy::{Activation, NumericFormat, Policy};
 
 use super::frama_c::{Machine, Numbers};
+use super::head::Answer;
 use super::invariant::{Invariant, Shown, Word, slices};
 use super::number::Number;
 use super::stated::{Stated, command_claims, stated};
@@ -135,9 +136,10 @@ impl Writer<'_> {
             "{".to_owned(),
             format!("{n}_state state;"),
             format!("{n}_measurement measured;"),
-            match self.is_output() {
-                true => format!("{} output;", self.number.kind()),
-                false => "uint32_t index;".to_owned(),
+            match self.answer() {
+                Answer::Index => "uint32_t index;".to_owned(),
+                Answer::Output => format!("{} output;", self.number.kind()),
+                Answer::Gains(count) => format!("{} outputs[{count}];", self.number.kind()),
             },
             "#if defined(FINITE)".to_owned(),
             "sound(&state);".to_owned(),
@@ -145,27 +147,29 @@ impl Writer<'_> {
             "arbitrary(&state);".to_owned(),
             "#endif".to_owned(),
             "measure(&measured);".to_owned(),
-            format!(
-                "{} = {n}_choose(&state, &measured);",
-                if self.is_output() { "output" } else { "index" }
-            ),
+            match self.answer() {
+                Answer::Index => format!("index = {n}_choose(&state, &measured);"),
+                Answer::Output => format!("output = {n}_choose(&state, &measured);"),
+                Answer::Gains(_) => format!("{n}_choose(&state, &measured, outputs);"),
+            },
         ]);
-        let stated = if self.is_output() {
+        let stated = match self.answer() {
             // that it is finite is what the runs with finite numbers show of everything
-            Vec::new()
-        } else {
-            self.text.check("index", &format!("index < {}u", self.policy.outputs()));
-            let text = "The network and its argmax give an index below the number of actions.";
-            vec![stated("index", text)]
+            Answer::Output | Answer::Gains(_) => Vec::new(),
+            Answer::Index => {
+                self.text.check("index", &format!("index < {}u", self.policy.outputs()));
+                let text = "The network and its argmax give an index below the number of actions.";
+                vec![stated("index", text)]
+            }
         };
         self.close();
         Entry {
             function: "prove_choose",
-            about: match self.is_output() {
-                true => {
+            about: match self.answer() {
+                Answer::Output | Answer::Gains(_) => {
                     "the network's output from every bit pattern of the state, every measurement; finite numbers from every sound state"
                 }
-                false => {
+                Answer::Index => {
                     "the choice of an action from every bit pattern of the state, every measurement; finite numbers from every sound state"
                 }
             },
@@ -208,6 +212,12 @@ impl Writer<'_> {
             }
         }
         self.close();
+        if self.takes_output_as_it_is() {
+            let why = "an output that nothing squashes is bounded by the check of the policy, over the network's whole box: intervals do not \
+                       know that box, so that no sum behind it is infinite is left to the check";
+            self.not_stated.push(("a gain without squash and clip".to_owned(), why));
+            claims.retain(|claim| !claim.is_finite_only);
+        }
         claims.push(stated("held", "Every held sample stays within its plausible range."));
         let others = self.invariant.words.iter().skip(held);
         if others
@@ -227,7 +237,7 @@ impl Writer<'_> {
             function: "prove_step",
             about: "one step from every sound state, every measurement",
             stated: claims,
-            runs: STEP,
+            runs: if self.takes_output_as_it_is() { BOTH } else { STEP },
             assumed: if self.policy.mapping.is_some() { VOUCHED } else { ACTION },
             merged: Vec::new(),
             precision: 2,
@@ -283,7 +293,7 @@ impl Writer<'_> {
             format!("{n}_step(&state, &measured, &command);"),
         ]);
         // a law of control reads the state, and its clamps pass a NaN on
-        let finite_only = self.passes_nan() || self.policy.head.residual().is_some();
+        let finite_only = self.passes_nan() || self.reads_state();
         self.command(finite_only);
         self.close();
         let mut claims = command_claims(finite_only);
@@ -404,19 +414,6 @@ impl Writer<'_> {
         if finite_only {
             self.text.line("#endif");
         }
-    }
-
-    /// Whether the head makes a NaN of a NaN: a clip does, a curve by masks does not.
-    pub fn passes_nan(&self) -> bool {
-        let head = self.policy.head.continuous();
-        head.is_some_and(|head| {
-            matches!(head.squash, Squash::Clip(_)) || head.squash == Squash::Curve(Activation::Softsign)
-        })
-    }
-
-    /// Whether the head is continuous.
-    pub fn is_output(&self) -> bool {
-        self.policy.head.continuous().is_some()
     }
 
     /// The curves of a network in integers that are computed piece by piece.

@@ -1,6 +1,7 @@
 //! What the drivers begin with: any measurement, any state, sound states, and the contracts of what other entries show.
 
 use super::driver::Writer;
+use super::head::Answer;
 
 impl Writer<'_> {
     /// Functions that make the inputs.
@@ -95,19 +96,33 @@ impl Writer<'_> {
         let (n, kind) = (self.n().to_owned(), self.number.kind());
         let (features, actions) = (self.policy.features.len(), self.policy.outputs());
         let assigns = "/*@ assigns \\result \\from *state, *measured;";
-        let answer = if self.is_output() {
-            // where bit patterns are looked at, the output may be one that is no number
-            let finite = "  @ ensures finite: \\is_finite(\\result);";
-            self.text.lines(["#if defined(FINITE)", assigns, finite, "  @*/"]);
-            self.text.lines(["#else", assigns, "  @*/", "#endif"]);
-            kind
-        } else {
-            let index = format!("  @ ensures index: \\result < {actions}u;");
-            self.text.lines([assigns, &index, "  @*/"]);
-            "uint32_t"
+        let (answer, outputs) = match self.answer() {
+            Answer::Output => {
+                // where bit patterns are looked at, the output may be one that is no number
+                let finite = "  @ ensures finite: \\is_finite(\\result);";
+                self.text.lines(["#if defined(FINITE)", assigns, finite, "  @*/"]);
+                self.text.lines(["#else", assigns, "  @*/", "#endif"]);
+                (kind, String::new())
+            }
+            Answer::Index => {
+                let index = format!("  @ ensures index: \\result < {actions}u;");
+                self.text.lines([assigns, &index, "  @*/"]);
+                ("uint32_t", String::new())
+            }
+            Answer::Gains(count) => {
+                let range = format!("(0 .. {})", count - 1);
+                let assigns = format!("/*@ assigns outputs[0 .. {}] \\from *state, *measured;", count - 1);
+                let written = format!("  @ ensures written: \\initialized(outputs + {range});");
+                self.text.lines(["#if defined(FINITE)", &assigns, &written]);
+                let finite = |index| format!("  @ ensures finite_{index}: \\is_finite(outputs[{index}]);");
+                self.text.lines((0..count).map(finite).collect::<Vec<_>>());
+                self.text
+                    .lines(["  @*/", "#else", &assigns, &written, "  @*/", "#endif"]);
+                ("void", format!(", {kind} *outputs"))
+            }
         };
         self.text.line(format!(
-            "static {answer} {n}_choose(const {n}_state *state, const {n}_measurement *measured);"
+            "static {answer} {n}_choose(const {n}_state *state, const {n}_measurement *measured{outputs});"
         ));
         let bits = format!(
             "  @ assigns q[0 .. {last}] \\from observation[0 .. {}];\n  @ ensures written: \\initialized(q + (0 .. {last}));",

@@ -3,6 +3,7 @@
 mod calls;
 mod driver;
 mod frama_c;
+mod head;
 mod inputs;
 mod invariant;
 mod number;

@@ -1,6 +1,6 @@
 //! Numbers of a policy's format as C text.
 
-use policy::{Head, NumericFormat, Scalar};
+use policy::{Head, NumericFormat, Residual, Scalar, Schedule};
 
 /// The C type of the numbers around the network.
 #[derive(Debug, Clone, Copy)]
@@ -44,11 +44,13 @@ impl Number {
         self.scalar.nearest(x)
     }
 
-    /// The duties of all actions, or those of a continuous head at both ends of its squash (contract section 7b).
+    /// The duties of all actions, those of a continuous head at both ends of its squash (contract section 7b), or the limits of a law.
     pub fn duties(self, head: &Head) -> Vec<f64> {
         match head {
             Head::Choice(actions) => actions.iter().map(|action| self.nearest(action.duty)).collect(),
-            Head::Residual(head) => vec![self.up(head.limits.low), self.down(head.limits.high)],
+            Head::Residual(Residual { limits, .. }) | Head::Schedule(Schedule { limits, .. }) => {
+                vec![self.up(limits.low), self.down(limits.high)]
+            }
             Head::Continuous(head) => {
                 let (ends, scale, offset) = (head.squashed(), self.nearest(head.scale), self.nearest(head.offset));
                 // binary64 has more than twice the digits of binary32: what is rounded to it first is rounded no other way

@@ -51,6 +51,11 @@ def stacked(features: Sequence[Mapping[str, Any]], count: int) -> List[Dict[str,
 
 def _actions(data: Mapping[str, Any]) -> Dict[str, Any]:
     """The entries of ``[actions]``; none where an action is a number, whose scale the model says."""
+    if data["schedule"] is not None:
+        raise ValueError(
+            "the network of this contract gives the gains of a law, which a model does not say: save the model, and write the law with "
+            "`policyc new MODEL --gains`"
+        )
     if data["law"] is not None:
         return {key: entry for key, entry in data["law"].items() if entry is not None}
     return {"duties": data["duties"]} if data["duties"] else {}

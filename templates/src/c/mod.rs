@@ -170,6 +170,17 @@ pub struct WideChar {
     pub int_max: u64,
 }
 
+/// What the outputs of the network become.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum HeadView {
+    /// The greedy action of argmax.
+    Choice,
+    /// One output, a duty.
+    Output,
+    /// All outputs, gains of a law.
+    Gains,
+}
+
 /// `<name>.h`
 #[derive(Debug, Template)]
 #[template(path = "c/header.h.jinja", escape = "none")]
@@ -184,8 +195,8 @@ pub struct Header {
     pub measurement: Vec<Member>,
     /// Members of the state, in contract order.
     pub state: Vec<Member>,
-    /// Whether the one output becomes a duty, without a choice.
-    pub is_output: bool,
+    /// What the outputs become.
+    pub head: HeadView,
     /// One comment line per feature.
     pub features: Vec<String>,
 }
@@ -212,8 +223,8 @@ pub struct Source {
     pub activations: Vec<String>,
     /// Outputs of the network.
     pub actions: usize,
-    /// Whether the one output becomes a duty, without a choice.
-    pub is_output: bool,
+    /// What the outputs become.
+    pub head: HeadView,
     /// Type of what the network hands on to the command.
     pub answer: &'static str,
     /// Its name.
@@ -234,6 +245,8 @@ pub struct Source {
     pub clipped: Option<String>,
     /// What the law of a residual head says.
     pub base: Option<String>,
+    /// What gains are multiplied with.
+    pub factors: Vec<String>,
     /// Flag that nothing is added to it, if it has a dead zone.
     pub still: Option<String>,
     /// Declarations of `decide`.

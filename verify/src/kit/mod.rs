@@ -190,7 +190,9 @@ mod tests {
                 Op::HeldSample | Op::PrimedNow | Op::Within { .. } | Op::Outside { .. } => {}
                 Op::Difference(..) | Op::NotZero(_) | Op::Above(..) | Op::And(..) | Op::Or(..) => {}
                 // of a continuous head alone: where one is compiled, the moves of the policy itself run them
-                Op::Output | Op::Squash(_) => {}
+                Op::Output | Op::Squash(..) => {}
+                // of a gain schedule alone, likewise
+                Op::Gain(_) | Op::Factor(_) => {}
                 // of a law of control alone, likewise
                 Op::Base | Op::Still => {}
             }

@@ -113,7 +113,7 @@ impl Log {
         if let Some(time) = time {
             check_period(policy, &sheet, &time, &begins)?;
         }
-        let is_continuous = policy.head.continuous().is_some();
+        let is_continuous = !policy.head.is_choice();
         if let (true, Some(_), None, Some(column)) = (is_continuous, &action, &duty, located.signal("action")) {
             return Err(column.fault(&sheet, 0, no_index()).into());
         }

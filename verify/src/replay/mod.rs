@@ -193,7 +193,7 @@ fn commands(policy: &Policy, log: &Log, course: &Course, wanted: Wanted) -> Opti
     let late = log.is_late(skip);
     let is_late = |row: &usize| late.get(*row).copied().unwrap_or(true);
     let mut ties = 0;
-    let others: Vec<usize> = match (&log.actions, policy.head.continuous().zip(log.commanded.as_ref())) {
+    let others: Vec<usize> = match (&log.actions, policy.head.duty_span().zip(log.commanded.as_ref())) {
         (Some(logged), _) => {
             let other = |row: &usize| logged.get(*row) != course.actions.get(*row);
             let others = (0..log.rows()).filter(is_late).filter(other);
@@ -203,8 +203,8 @@ fn commands(policy: &Policy, log: &Log, course: &Course, wanted: Wanted) -> Opti
             ties = tied.len();
             others
         }
-        (None, Some((head, logged))) => {
-            let near = |row: usize| Some((logged.get(row)? - course.duties.get(row)?).abs() <= tolerance * head.span());
+        (None, Some((span, logged))) => {
+            let near = |row: usize| Some((logged.get(row)? - course.duties.get(row)?).abs() <= tolerance * span);
             // what is no number is not near
             (0..log.rows())
                 .filter(is_late)

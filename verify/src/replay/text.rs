@@ -32,7 +32,7 @@ pub fn text(policy: &Policy, replay: &Replay) -> String {
     for feature in &replay.features {
         out += &row(feature, rows, width);
     }
-    let is_continuous = policy.head.continuous().is_some();
+    let is_continuous = !policy.head.is_choice();
     let words = words(policy, replay);
     if !words.is_empty() {
         out.push('\n');
@@ -64,7 +64,7 @@ fn range([low, high]: [f64; 2]) -> String {
 
 /// What is to be said below the table.
 fn words(policy: &Policy, replay: &Replay) -> Vec<String> {
-    let is_continuous = policy.head.continuous().is_some();
+    let is_continuous = !policy.head.is_choice();
     let mut words = Vec::new();
     for (feature, compared) in replay.compared() {
         let name = &feature.name;
@@ -229,7 +229,7 @@ fn verdict(replay: &Replay, is_continuous: bool) -> String {
                  tell them apart. A trainer who explores: --exploring",
                 if is_continuous { "duties" } else { "actions" },
                 if is_continuous {
-                    "a filter that begins otherwise, the scale of a feature, squash or clip, scale and offset in [actions]"
+                    "a filter that begins otherwise, the scale of a feature, squash or clip, scale and offset in [actions], base and factors of a law"
                 } else {
                     "a filter that begins otherwise, the scale of a feature, the order of the features or of [actions]"
                 }

@@ -12,7 +12,8 @@ use std::collections::BTreeMap;
 
 use templates::Template;
 use templates::c::{
-    Common, Header, Helpers, IntegerView, Member, NetworkView, PushView, RealView, Source, StatusBit, WideChar,
+    Common, HeadView, Header, Helpers, IntegerView, Member, NetworkView, PushView, RealView, Source, StatusBit,
+    WideChar,
 };
 
 use crate::activation::{self, text_of};
@@ -20,7 +21,8 @@ use crate::backend::banner;
 use crate::files::{CodegenError, GeneratedFiles};
 use crate::lower::STATUS;
 use crate::program::{
-    Arithmetic, Buffer, Coefficient, Element, IntegerCode, Kept, Literal, Loop, Op, Program, StateMember, StateValue,
+    Arithmetic, Buffer, Coefficient, Element, Head, IntegerCode, Kept, Literal, Loop, Op, Program, StateMember,
+    StateValue,
 };
 use number::number;
 use statements::{Printer, float, unsigned};
@@ -118,8 +120,16 @@ fn header(program: &Program) -> Header {
             .map(|signal| measurement_member(program, signal))
             .collect(),
         state: state(program).0,
-        is_output: program.head.is_output(),
+        head: head_view(program),
         features: program.features.iter().map(|(_, formula)| formula.clone()).collect(),
+    }
+}
+
+fn head_view(program: &Program) -> HeadView {
+    match program.head {
+        Head::Choice(_) => HeadView::Choice,
+        Head::Output { .. } => HeadView::Output,
+        Head::Gains { .. } => HeadView::Gains,
     }
 }
 
@@ -193,9 +203,11 @@ fn source(program: &Program) -> Source {
     let pushed: Vec<usize> = front.pushes.iter().map(|push| push.value).collect();
     let coefficients = program.mapping.iter().flat_map(|mapping| &mapping.coefficients);
     let soft_cap = program.advance.soft_cap.map(|value| advance.operand(value));
-    let (answer, answered) = match program.head.is_output() {
-        true => (number::kind(program.scalar()).name, "output"),
-        false => ("uint32_t", "index"),
+    let (answer, answered) = match program.head {
+        Head::Choice(_) => ("uint32_t", "index"),
+        Head::Output { .. } => (number::kind(program.scalar()).name, "output"),
+        // the template makes an array of them
+        Head::Gains { .. } => (number::kind(program.scalar()).name, "outputs"),
     };
     Source {
         common: common(program),
@@ -207,7 +219,7 @@ fn source(program: &Program) -> Source {
         helpers: helpers(program),
         activations: activation::c_functions(program, &number::names(program)),
         actions: program.head.outputs(),
-        is_output: program.head.is_output(),
+        head: head_view(program),
         answer,
         answered,
         lowest: number::lowest(program.scalar()),
@@ -217,6 +229,7 @@ fn source(program: &Program) -> Source {
         valid: sense.operand(front.all_valid),
         clipped: front.clipped.map(|flag| sense.operand(flag)),
         base: front.base.map(|value| sense.operand(value)),
+        factors: operands(&front.factors),
         still: front.still.map(|flag| sense.operand(flag)),
         duty: decide.operand(program.decide.duty),
         duty_sim: decide.operand(program.decide.duty_sim),

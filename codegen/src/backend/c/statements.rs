@@ -118,6 +118,8 @@ impl<'p> Printer<'p> {
             Op::Coefficient(name) => format!("state->mapping_{}", name.name()),
             Op::ChosenDuty => "chosen".into(),
             Op::Output => "output".into(),
+            Op::Gain(i) => format!("outputs[{i}]"),
+            Op::Factor(i) => format!("front->factor[{i}]"),
             Op::Constant(literal) => number::number(self.program.scalar(), *literal),
             // a flag behind its barrier: of what is known to be 0 or 1 clang makes a branch on RISC-V
             Op::Primed => format!("{}_flag((int)(state->primed & 1u))", self.program.name),
@@ -157,8 +159,8 @@ impl<'p> Printer<'p> {
             }
             Op::Within { x, low, high } => format!("{p}_within({}, {}, {})", v(x), v(low), v(high)),
             Op::Outside { x, low, high } => format!("{p}_outside({}, {}, {})", v(x), v(low), v(high)),
-            Op::Squash(x) => {
-                let curve = self.program.head.curve().map_or("", policy::Activation::word);
+            Op::Squash(x, output) => {
+                let curve = self.program.head.curve(*output).map_or("", policy::Activation::word);
                 format!("{p}_{curve}({})", v(x))
             }
             Op::Difference(x, y) => match self.program.scalar() {

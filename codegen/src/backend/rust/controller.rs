@@ -193,6 +193,11 @@ fn front(program: &Program) -> TokenStream {
     });
     let clipped = program.front.clipped.map(|_| quote!(clipped: u32,));
     let base = program.front.base.map(|_| quote!(base: #kind,));
+    let factors = program.front.factors.len();
+    let factor = (factors > 0).then(|| {
+        let factors = size(factors);
+        quote!(factor: [#kind; #factors],)
+    });
     let still = program.front.still.map(|_| quote!(still: u32,));
     quote! {
         /// What a measurement means before the network sees it.
@@ -206,6 +211,7 @@ fn front(program: &Program) -> TokenStream {
             primed_now: u32,
             #clipped
             #base
+            #factor
             #still
         }
     }
@@ -236,6 +242,10 @@ fn sense(program: &Program) -> TokenStream {
         let value = printer.operand(id);
         quote!(base: #value,)
     });
+    let factor = (!front.factors.is_empty()).then(|| {
+        let values = list(&front.factors);
+        quote!(factor: #values,)
+    });
     let still = front.still.map(|id| {
         let value = printer.operand(id);
         quote!(still: #value,)
@@ -260,6 +270,7 @@ fn sense(program: &Program) -> TokenStream {
                 primed_now: usable & (self.primed ^ 1),
                 #clipped
                 #base
+                #factor
                 #still
             }
         }

@@ -39,7 +39,7 @@ pub fn items(program: &Program, code: &IntegerCode) -> TokenStream {
         code.accumulator_bound
     );
     // argmax selects by it; without one only some activations do
-    let idle = program.head.is_output().then(|| quote!(#[allow(dead_code)]));
+    let idle = (!program.head.is_choice()).then(|| quote!(#[allow(dead_code)]));
     let selection = quote! {
         #[inline(always)]
         #idle

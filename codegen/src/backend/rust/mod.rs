@@ -20,7 +20,7 @@ use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
 use crate::lower::STATUS;
-use crate::program::Program;
+use crate::program::{Head, Program};
 use tokens::{ident, size, word};
 
 /// Name of the controller type unless the user gives one.
@@ -78,10 +78,9 @@ fn constants(program: &Program) -> TokenStream {
     let signals = size(program.signals.len());
     let features = size(program.feature_count());
     let actions = size(program.head.outputs());
-    let counted = if program.head.is_output() {
-        " Outputs of the network."
-    } else {
-        " Number of actions."
+    let counted = match program.head.is_choice() {
+        true => " Number of actions.",
+        false => " Outputs of the network.",
     };
     let state_words = size(program.state_words());
     let period = Literal::f64_unsuffixed(program.sample_period);
@@ -116,12 +115,16 @@ fn types(program: &Program, layout: &TokenStream) -> TokenStream {
         let doc = format!(" {}", signal.meaning(scalar));
         quote! { #[doc = #doc] pub #name: #kind }
     });
-    let [duty_sim, action_index] = match program.head.is_output() {
-        true => [
+    let [duty_sim, action_index] = match &program.head {
+        Head::Output { .. } => [
             " Duty of the actor, before the mapping.",
             " Always 0: the head is continuous.",
         ],
-        false => [" Duty of the chosen action, before the mapping.", " Greedy action."],
+        Head::Gains { .. } => [
+            " Duty of the law, before the mapping.",
+            " Always 0: the network gives gains.",
+        ],
+        Head::Choice(_) => [" Duty of the chosen action, before the mapping.", " Greedy action."],
     };
     quote! {
         /// One sample of every signal.

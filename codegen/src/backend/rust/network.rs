@@ -15,7 +15,7 @@ use crate::program::{Arithmetic, Program};
 pub fn items(program: &Program) -> TokenStream {
     let scalar = program.scalar();
     let kind = number::kind(scalar);
-    let duties = (!program.head.is_output()).then(|| {
+    let duties = program.head.is_choice().then(|| {
         let duties = tables::values(program, "duties");
         quote! { static DUTIES: [#kind; ACTIONS] = #duties; }
     });
@@ -64,6 +64,16 @@ pub fn choice(program: &Program) -> Choice {
                 let outputs = network(observation);
                 #output
             },
+            index: quote!(0),
+        };
+    }
+    if program.head.is_gains() {
+        return Choice {
+            about: " Network: its outputs.",
+            about_apart: " The network's outputs for a measurement, with a stack of its own.",
+            kind: quote!([#kind; ACTIONS]),
+            name: quote!(outputs),
+            body: quote!(Self::q_values(observation)),
             index: quote!(0),
         };
     }

@@ -83,6 +83,8 @@ impl<'p> Printer<'p> {
             }
             Op::ChosenDuty => quote!(chosen),
             Op::Output => quote!(output),
+            Op::Gain(i) => indexed(quote!(outputs), *i),
+            Op::Factor(i) => indexed(quote!(front.factor), *i),
             Op::Constant(literal) => number(self.program.scalar(), *literal),
             Op::Usable => quote!(front.usable),
             Op::Clipped => quote!(front.clipped),
@@ -126,8 +128,8 @@ impl<'p> Printer<'p> {
                     }
                 }
             }
-            Op::Squash(x) => {
-                let curve = self.program.head.curve().map_or("", policy::Activation::word);
+            Op::Squash(x, output) => {
+                let curve = self.program.head.curve(*output).map_or("", policy::Activation::word);
                 call(curve, &[v(x)])
             }
             // behind a barrier: of what is known to be 0 or 1 the optimiser makes a branch. No leaf, since each barrier takes

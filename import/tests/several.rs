@@ -1,0 +1,204 @@
+//! Models with several outputs: one command of several, one table of several, the gains of a law; and norms over the values of a
+//! step. tests/fixtures/trainers/spaces.py
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::disallowed_methods)]
+
+mod common;
+
+use common::library::{expected, fixture, policy_of, refusal};
+use common::{Saved, dense, run};
+use import::Options;
+use policy::Head;
+
+fn output(output: usize) -> Options {
+    Options {
+        output: Some(output),
+        ..Options::default()
+    }
+}
+
+fn gains() -> Options {
+    Options {
+        gains: true,
+        ..Options::default()
+    }
+}
+
+/// The refusal of a model of the fixtures.
+fn refused(file: &str, options: &Options) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let new = import::new_policy(&fixture(file), &folder.path().join("policy.toml"), options);
+    new.err().unwrap_or_else(|| panic!("{file} is taken")).to_string()
+}
+
+/// Whether a policy gives these columns of the five logits that the library gave.
+fn assert_columns(policy: &policy::Policy, columns: std::ops::Range<usize>) {
+    let (obs, logits) = (expected("sb3_a2c", "obs"), expected("sb3_a2c", "q"));
+    for (x, expected) in obs.chunks_exact(6).zip(logits.chunks_exact(5)) {
+        let x: Vec<f64> = x.iter().map(|x| f64::from(*x)).collect();
+        let found = run(policy, &x, |v| v.max(0.0));
+        let expected = &expected[columns.clone()];
+        assert_eq!(found.len(), expected.len());
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - f64::from(*expected)).abs() < 1e-4, "{found} {expected}");
+        }
+    }
+}
+
+#[test]
+fn a_multidiscrete_is_refused_until_its_dimension_is_said() {
+    let faults = refusal(&fixture("sb3_multidiscrete.zip"));
+    for part in [
+        "several tables of actions",
+        "[2, 3]",
+        "--output N",
+        "one Discrete table",
+    ] {
+        assert!(faults.contains(part), "{part}: {faults}");
+    }
+    let faults = refused("sb3_multidiscrete.zip", &output(2));
+    assert!(
+        faults.contains("--output names none") && faults.contains("0 to 1"),
+        "{faults}"
+    );
+    let faults = refused("sb3_dqn.zip", &output(0));
+    assert!(faults.contains("one table of actions"), "{faults}");
+}
+
+#[test]
+fn of_a_multidiscrete_the_logits_of_one_dimension_are_kept() {
+    for (dimension, columns, other) in [(0, 0..2, 1), (1, 2..5, 0)] {
+        let (_folder, new, policy) = policy_of("sb3_multidiscrete.zip", &output(dimension));
+        assert_eq!(policy.actions().len(), columns.len());
+        let said = format!("dimension {dimension} of the MultiDiscrete [2, 3] chooses the duty");
+        let left = format!("{other} is left out");
+        assert!(
+            new.contract.contains(&said) && new.contract.contains(&left),
+            "{}",
+            new.contract
+        );
+        assert!(policy.golden.is_some(), "computed of the same logits");
+        assert_columns(&policy, columns);
+    }
+}
+
+#[test]
+fn of_several_commands_of_sb3_one_is_kept_with_its_own_ends() {
+    let faults = refusal(&fixture("sb3_several.zip"));
+    assert!(
+        faults.contains("commands several numbers") && faults.contains("--output N"),
+        "{faults}"
+    );
+    let (_folder, new, policy) = policy_of("sb3_several.zip", &output(0));
+    assert!(
+        new.contract
+            .contains("clip = [0.1, 0.85] }   # check: the command is 0.1 to 0.85"),
+        "{}",
+        new.contract
+    );
+    assert!(
+        new.contract
+            .contains("output 0 of 5 is the duty; 1, 2, 3 and 4 are left out"),
+        "{}",
+        new.contract
+    );
+    assert_columns(&policy, 0..1);
+    let (_folder, new, policy) = policy_of("sb3_several.zip", &output(1));
+    assert!(new.contract.contains("own command is -1.0 to 1.0"), "{}", new.contract);
+    assert_columns(&policy, 1..2);
+}
+
+#[test]
+fn the_commands_of_sb3_as_gains_keep_their_own_ends() {
+    let (_folder, new, policy) = policy_of("sb3_several.zip", &gains());
+    for entry in [
+        "clip = [0.1, 0.85] },   # g0",
+        "clip = [0.0, 0.05] },   # g2",
+        "clip = [0.0, 40.0] },   # g4",
+    ] {
+        assert!(new.contract.contains(entry), "{entry}\n{}", new.contract);
+    }
+    let Head::Schedule(head) = &policy.head else {
+        panic!("{:?}", policy.head)
+    };
+    assert_eq!(head.gains.len(), 5);
+    let ends = head.gains[3].ends();
+    assert_eq!((ends.low, ends.high), (-2.0, 2.0));
+    assert!(
+        policy
+            .golden
+            .as_ref()
+            .is_some_and(|golden| golden.q_values.len() == 5 * golden.count)
+    );
+    assert_columns(&policy, 0..5);
+    let faults = refused("sb3_dqn.zip", &gains());
+    assert!(faults.contains("this model chooses"), "{faults}");
+}
+
+#[test]
+fn of_several_commands_of_a_graph_one_is_kept_with_its_own_scale() {
+    let faults = refusal(&fixture("several_actor.onnx"));
+    assert!(faults.contains("commands several numbers"), "{faults}");
+    let (_folder, new, policy) = policy_of("several_actor.onnx", &output(0));
+    assert!(
+        new.contract
+            .contains("squash = \"tanh\", scale = 0.375, offset = 0.475 }"),
+        "{}",
+        new.contract
+    );
+    assert_eq!(policy.outputs(), 1);
+    let (_folder, new, _) = policy_of("several_actor.onnx", &output(2));
+    assert!(
+        new.contract
+            .contains("squash = \"tanh\", scale = 0.02, offset = 0.03 }"),
+        "{}",
+        new.contract
+    );
+    assert!(new.contract.contains("0 and 1 are left out"), "{}", new.contract);
+    let (_folder, new, policy) = policy_of("several_actor.onnx", &gains());
+    assert_eq!(policy.head.schedule().map(|head| head.gains.len()), Some(3));
+    for entry in [
+        "scale = 0.375, offset = 0.475 },   # g0",
+        "scale = 0.02, offset = 0.03 },   # g2",
+    ] {
+        assert!(new.contract.contains(entry), "{entry}\n{}", new.contract);
+    }
+}
+
+#[test]
+fn the_row_of_the_picked_output_is_kept() {
+    let tensors = [dense("fc1", 16, 6), dense("fc_mu", 3, 16)].concat();
+    let scales = [common::named("action_scale", &[3]), common::named("action_bias", &[3])];
+    let saved = Saved::new(&[tensors, scales.to_vec()].concat());
+    let new = import::new_policy(&saved.weights(), &saved.contract(), &output(1)).unwrap();
+    let policy = saved.filled(&new);
+    let last = policy.layers.last().unwrap();
+    assert_eq!(last.weights, saved.values("fc_mu.weight")[16..32]);
+    assert_eq!(last.bias, saved.values("fc_mu.bias")[1..2]);
+    // from -scale to scale around the bias: no duty, so the contract leaves scale and offset open
+    let (scale, bias) = (saved.values("action_scale")[1], saved.values("action_bias")[1]);
+    let own = format!("own command is {:?} to {:?}", bias - scale, bias + scale);
+    assert!(new.contract.contains(&own), "{own}\n{}", new.contract);
+}
+
+#[test]
+fn tensors_become_gains_where_somebody_says_so() {
+    let saved = Saved::new(&[dense("fc1", 16, 6), dense("out", 3, 16)].concat());
+    let new = import::new_policy(&saved.weights(), &saved.contract(), &gains()).unwrap();
+    let policy = saved.filled(&new);
+    assert_eq!(policy.head.schedule().map(|head| head.gains.len()), Some(3));
+    assert!(new.contract.contains("# base = \"v_ref / 200\""), "{}", new.contract);
+}
+
+#[test]
+fn a_norm_over_the_values_of_a_step_is_refused_in_every_form() {
+    for (file, found) in [
+        ("layer_norm.onnx", "LayerNormalization `norm`"),
+        ("layer_norm_steps.onnx", "ReduceMean `mean`"),
+        ("layer_norm_module.pt", "a module of the class LayerNorm"),
+    ] {
+        let faults = refusal(&fixture(file));
+        for part in ["a LayerNorm is not compiled", found, "hint:", "BatchNorm1d"] {
+            assert!(faults.contains(part), "{file}, {part}: {faults}");
+        }
+    }
+}

@@ -1,0 +1,48 @@
+//! What the head of a policy means for a driver.
+
+use policy::{Activation, Head, Squash};
+
+use super::driver::Writer;
+
+/// What the network hands on to the command.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Answer {
+    /// The index of an action.
+    Index,
+    /// One number.
+    Output,
+    /// So many numbers.
+    Gains(usize),
+}
+
+impl Writer<'_> {
+    /// Whether the head makes a NaN of a NaN: a clip does, a curve by masks does not.
+    pub fn passes_nan(&self) -> bool {
+        let passes = |squash: Squash| matches!(squash, Squash::Clip(_) | Squash::Curve(Activation::Softsign));
+        match &self.policy.head {
+            Head::Choice(_) | Head::Residual(_) => false,
+            Head::Continuous(head) => passes(head.squash),
+            Head::Schedule(head) => head.gains.iter().any(|gain| gain.squash.is_none_or(passes)),
+        }
+    }
+
+    /// Whether a law of control reads the state, beside what the network says.
+    pub fn reads_state(&self) -> bool {
+        matches!(self.policy.head, Head::Residual(_) | Head::Schedule(_))
+    }
+
+    /// Whether something is made of an output before anything bounds it.
+    pub fn takes_output_as_it_is(&self) -> bool {
+        let gains = self.policy.head.schedule().map_or(&[][..], |head| &head.gains);
+        gains.iter().any(|gain| gain.squash.is_none())
+    }
+
+    /// What the network hands on to the command.
+    pub fn answer(&self) -> Answer {
+        match &self.policy.head {
+            Head::Choice(_) | Head::Residual(_) => Answer::Index,
+            Head::Continuous(_) => Answer::Output,
+            Head::Schedule(head) => Answer::Gains(head.gains.len()),
+        }
+    }
+}

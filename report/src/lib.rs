@@ -11,6 +11,7 @@
 //! Pictures bring their own white background and an Okabe-Ito palette, so they can be read on a dark page and with any
 //! colour vision.
 
+mod alt;
 mod axis;
 mod bars;
 mod chart;
@@ -21,6 +22,7 @@ mod frame;
 mod heat;
 mod live;
 mod markup;
+mod marks;
 mod number;
 mod page;
 mod path;

@@ -3,7 +3,7 @@
 use crate::error::ReportError;
 use crate::frame::Svg;
 use crate::live;
-use crate::markup::Markup;
+use crate::markup::{Attributes, Markup};
 use crate::table::Table;
 
 /// How the verdict of a page came out; it is written as a word, not by colour alone.
@@ -45,6 +45,7 @@ pub struct Page {
     title: String,
     verdict: Option<(Verdict, String)>,
     sections: Vec<Section>,
+    made: Option<Section>,
 }
 
 /// A heading and what stands below it, in the order added.
@@ -62,7 +63,11 @@ enum Block {
     Pairs(Vec<(String, String)>),
     Code(String),
     Details(Section),
+    Pick(String, Vec<Section>),
 }
+
+/// Where a page says how it was made.
+const MADE: &str = "made";
 
 impl Page {
     /// Page without sections.
@@ -71,6 +76,7 @@ impl Page {
             title: title.into(),
             verdict: None,
             sections: Vec::new(),
+            made: None,
         }
     }
 
@@ -85,6 +91,19 @@ impl Page {
     #[must_use]
     pub fn section(mut self, section: Section) -> Self {
         self.sections.push(section);
+        self
+    }
+
+    /// The command that makes the page, and what it read, by name and value; every picture then links to it. Paths are those that the
+    /// user gave.
+    #[must_use]
+    pub fn made<K: Into<String>, V: Into<String>>(
+        mut self,
+        command: impl Into<String>,
+        inputs: impl IntoIterator<Item = (K, V)>,
+    ) -> Self {
+        let section = Section::new("How this page was made").code(command);
+        self.made = Some(section.pairs(inputs));
         self
     }
 
@@ -135,13 +154,15 @@ impl Page {
             out.text("span", &[], sentence);
             out.close("p");
         }
+        let mut writing = Writing {
+            is_made: self.made.is_some(),
+            ..Writing::default()
+        };
         for section in &self.sections {
-            out.open("section", &[]);
-            if !section.heading.is_empty() {
-                out.text("h2", &[], &section.heading);
-            }
-            section.write(&mut out)?;
-            out.close("section");
+            section.whole(&mut out, &[], &mut writing)?;
+        }
+        if let Some(made) = &self.made {
+            made.whole(&mut out, &[("id", &MADE)], &mut writing)?;
         }
         out.close("main");
         if let Some(script) = script {
@@ -155,6 +176,14 @@ impl Page {
         }
         Ok(out.finish())
     }
+}
+
+/// What is known of the page while it is written.
+#[derive(Debug, Default)]
+struct Writing {
+    is_made: bool,
+    /// Choices so far: each has a name of its own.
+    picks: usize,
 }
 
 impl Section {
@@ -213,11 +242,19 @@ impl Section {
         self.block(Block::Details(inner))
     }
 
+    /// Sections of which one is shown at a time, picked by its heading; `what` says what is picked. In print all of them stand. One
+    /// alone needs no choice, and has its heading.
+    #[must_use]
+    pub fn pick(self, what: impl Into<String>, sections: Vec<Section>) -> Self {
+        self.block(Block::Pick(what.into(), sections))
+    }
+
     /// Whether a chart in it has data for the script.
     fn is_live(&self) -> bool {
         self.blocks.iter().any(|block| match block {
             Block::Chart(svg, _) => svg.live.is_some(),
             Block::Details(inner) => inner.is_live(),
+            Block::Pick(_, sections) => sections.iter().any(Section::is_live),
             Block::Text(_) | Block::Table(_) | Block::Pairs(_) | Block::Code(_) => false,
         })
     }
@@ -227,23 +264,40 @@ impl Section {
         self
     }
 
-    fn write(&self, out: &mut Markup) -> Result<(), ReportError> {
+    fn whole(&self, out: &mut Markup, attributes: Attributes, writing: &mut Writing) -> Result<(), ReportError> {
+        out.open("section", attributes);
+        if !self.heading.is_empty() {
+            out.text("h2", &[], &self.heading);
+        }
+        self.write(out, writing)?;
+        out.close("section");
+        Ok(())
+    }
+
+    fn write(&self, out: &mut Markup, writing: &mut Writing) -> Result<(), ReportError> {
         for block in &self.blocks {
             match block {
                 Block::Text(text) => out.text("p", &[], text),
                 Block::Chart(svg, caption) => {
                     out.open("figure", if svg.live.is_some() { &[("class", &"data")] } else { &[] });
-                    // it may be wider than the screen, and is then scrolled by keys as well
-                    out.open("div", &[("class", &"still"), ("tabindex", &0)]);
-                    out.raw(svg.as_str());
-                    out.close("div");
+                    // the style shows one of both, as there is room
+                    for (class, picture) in [("still wide", svg.as_str()), ("still narrow", svg.narrow.as_str())] {
+                        out.open("div", &[("class", &class)]);
+                        out.raw(picture);
+                        out.close("div");
+                    }
                     if let Some(data) = &svg.live {
                         out.raw("<script type=\"application/json\">");
                         out.raw(data);
                         out.raw("</script>\n");
                     }
-                    if !caption.is_empty() {
-                        out.text("figcaption", &[], caption);
+                    if writing.is_made || !caption.is_empty() {
+                        out.open("figcaption", &[]);
+                        out.text("span", &[], caption);
+                        if writing.is_made {
+                            out.text("a", &[("href", &format_args!("#{MADE}"))], "Its command.");
+                        }
+                        out.close("figcaption");
                     }
                     out.close("figure");
                 }
@@ -261,11 +315,36 @@ impl Section {
                 Block::Details(inner) => {
                     out.open("details", &[]);
                     out.text("summary", &[], &inner.heading);
-                    inner.write(out)?;
+                    inner.write(out, writing)?;
                     out.close("details");
                 }
+                Block::Pick(what, sections) => pick(out, what, sections, writing)?,
             }
         }
         Ok(())
     }
+}
+
+/// A button for each section, in front of it: so the style alone can tell which one is shown, and no script is needed.
+fn pick(out: &mut Markup, what: &str, sections: &[Section], writing: &mut Writing) -> Result<(), ReportError> {
+    if let [only] = sections {
+        return only.whole(out, &[], writing);
+    }
+    let number = writing.picks;
+    writing.picks += 1;
+    out.open("div", &[("class", &"pick"), ("role", &"group"), ("aria-label", &what)]);
+    for (n, section) in sections.iter().enumerate() {
+        let id = format!("pick-{number}-{n}");
+        let name = format!("pick-{number}");
+        let mut attributes: Vec<(&str, &dyn std::fmt::Display)> =
+            vec![("type", &"radio"), ("id", &id), ("name", &name), ("autocomplete", &"off")];
+        if n == 0 {
+            attributes.push(("checked", &"checked"));
+        }
+        out.leaf("input", &attributes);
+        out.text("label", &[("for", &id)], &section.heading);
+        section.whole(out, &[], writing)?;
+    }
+    out.close("div");
+    Ok(())
 }

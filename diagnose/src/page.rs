@@ -2,17 +2,20 @@
 
 mod captures;
 mod colours;
+pub mod comparison;
 mod control;
 mod empirical;
 mod records;
+mod spectrum;
 
 use report::{Axis, BarChart, BarPanel, Chart, Page, Panel, ReportError, Section, Series, Table, quantity};
 
 use self::colours::{EXTENDED, MODEL};
 use crate::diagnosis::Diagnosis;
 use crate::findings::{Named, Verdict};
-use crate::gain::Regime;
-use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS};
+use crate::gain::{Regime, Shift};
+use crate::noise::channel;
+use crate::record::{CHANNEL_NAMES, CHANNEL_UNITS, CHANNELS};
 use crate::words::{needs, si, unit};
 
 /// The page as HTML.
@@ -21,19 +24,18 @@ use crate::words::{needs, si, unit};
 /// None in practice: a table whose rows do not fit its columns. A picture that cannot be drawn says so in its place.
 pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
     let findings = &diagnosis.findings;
-    let mark = match findings.verdict {
-        Verdict::Consistent | Verdict::Explained => report::Verdict::Pass,
-        Verdict::Ambiguous | Verdict::MostlyExplained => report::Verdict::Warn,
-        Verdict::Unexplained => report::Verdict::Fail,
-    };
-    let word = findings.verdict.word();
-    let mut page = Page::new(format!("Diagnosis: {word}")).verdict(mark, findings.sentence.clone());
-    page = page.section(causes(diagnosis));
-    if let Some(term) = &diagnosis.empirical {
-        page = page.section(empirical::section(term));
+    let list = comparison::compared(diagnosis);
+    let mut page = Page::new(title(findings.verdict));
+    page = page.verdict_as(mark(findings.verdict), word(findings.verdict), headline(diagnosis, &list));
+    if !list.is_empty() {
+        page = page.section(comparison::section(&list));
     }
     if let Some(section) = held_out(diagnosis) {
         page = page.section(section);
+    }
+    page = page.section(causes(diagnosis));
+    if let Some(term) = &diagnosis.empirical {
+        page = page.section(empirical::section(term));
     }
     if let Some(reason) = &diagnosis.findings.gain.closed_loop_missing {
         page = page.section(control::missing(reason));
@@ -55,6 +57,45 @@ pub fn page(diagnosis: &Diagnosis) -> Result<String, ReportError> {
         page = page.section(ties(diagnosis));
     }
     page.section(noise(diagnosis)).section(detectable(diagnosis)).html()
+}
+
+/// A colour says how sure the answer is; green alone is a model that is right.
+fn mark(verdict: Verdict) -> report::Verdict {
+    match verdict {
+        Verdict::Consistent => report::Verdict::Pass,
+        Verdict::Explained => report::Verdict::Note,
+        Verdict::Ambiguous | Verdict::MostlyExplained => report::Verdict::Warn,
+        Verdict::Unexplained => report::Verdict::Fail,
+    }
+}
+
+fn word(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Consistent => "model holds",
+        Verdict::Explained => "explained",
+        Verdict::Ambiguous => "ambiguous",
+        Verdict::MostlyExplained => "mostly explained",
+        Verdict::Unexplained => "unexplained",
+    }
+}
+
+fn title(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Consistent => "Diagnosis: the model agrees with the records",
+        Verdict::Explained => "Diagnosis: the model is off, and why is known",
+        Verdict::Ambiguous => "Diagnosis: the model is off, and more than one reason fits",
+        Verdict::MostlyExplained => "Diagnosis: the model is off, and most of it is explained",
+        Verdict::Unexplained => "Diagnosis: the model is off, and no known cause explains it",
+    }
+}
+
+/// The volts before and after, then the causes.
+fn headline(diagnosis: &Diagnosis, list: &[comparison::Compared]) -> String {
+    let sentence = &diagnosis.findings.sentence;
+    match comparison::volts(list) {
+        Some(volts) => format!("{volts} {sentence}"),
+        None => sentence.clone(),
+    }
 }
 
 fn causes(diagnosis: &Diagnosis) -> Section {
@@ -200,8 +241,7 @@ fn held_out(diagnosis: &Diagnosis) -> Option<Section> {
     let ratio = |f: fn(&crate::gain::Held) -> f64| whole.iter().map(|held| f(held) / held.floor).collect::<Vec<_>>();
     let mut panel = BarPanel::new(Axis::new("error over noise"));
     panel = panel.bars_in(MODEL, "model", ratio(|held| held.rmse_before));
-    let is_described = diagnosis.findings.empirical.as_ref().is_some_and(|term| term.written);
-    let second = empirical::second(!diagnosis.findings.causes.is_empty(), is_described);
+    let second = comparison::second_held(diagnosis);
     let is_extended = second.is_some();
     if let Some(name) = second {
         panel = panel.bars_in(EXTENDED, name, ratio(|held| held.rmse_after));
@@ -245,12 +285,32 @@ fn held_out(diagnosis: &Diagnosis) -> Option<Section> {
         row.extend(is_extended.then(|| removed.into()));
         table = table.row(row);
     }
-    section = section.details(Section::new("By record and regime").table(table));
-    let mut inner = Section::new("Pictures of the held-out records");
-    for record in 0..pair.problem.records.len() {
-        inner = records::pictures(inner, &pair.problem, [&pair.before, &pair.after], record, second, "");
+    let square = |record: usize| {
+        let own = (0..CHANNELS).flat_map(|n| channel(&pair.problem, &pair.before.residual, record, n));
+        own.map(|v| v * v).sum::<f64>() / pair.problem.records[record].rows().max(1) as f64
+    };
+    let also = |record: usize| {
+        let own = |shift: &&Shift| shift.record == pair.problem.records[record].name;
+        let shifts = diagnosis.findings.gain.shifts.iter().filter(own);
+        let place = |shift: &Shift| CHANNEL_NAMES.iter().position(|name| *name == shift.channel);
+        shifts.filter_map(place).collect::<Vec<_>>()
+    };
+    let count = pair.problem.records.len();
+    let worst = (0..count).max_by(|a, b| square(*a).total_cmp(&square(*b)))?;
+    let draw = |section: Section, record: usize, caption: &str| {
+        let states = [&pair.before, &pair.after];
+        records::pictures(section, &pair.problem, states, record, second, &also(record), caption)
+    };
+    let caption = "The held-out record that the model as given misses most. No fit has seen it; its initial state is estimated for each model.";
+    section = draw(section, worst, caption).details(Section::new("By record and regime").table(table));
+    if count > 1 {
+        let mut inner = Section::new("The other held-out records");
+        for record in (0..count).filter(|record| *record != worst) {
+            inner = draw(inner, record, "");
+        }
+        section = section.details(inner);
     }
-    Some(section.details(inner))
+    Some(section)
 }
 
 fn noise(diagnosis: &Diagnosis) -> Section {

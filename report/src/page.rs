@@ -1,5 +1,6 @@
 //! HTML pages: one file, nothing loaded, no script but that of the charts.
 
+use crate::command;
 use crate::error::ReportError;
 use crate::frame::Svg;
 use crate::live;
@@ -43,9 +44,8 @@ impl Verdict {
 #[derive(Debug, Clone)]
 pub struct Page {
     title: String,
-    verdict: Option<(Verdict, String)>,
+    verdict: Option<(Verdict, &'static str, String)>,
     sections: Vec<Section>,
-    made: Option<Section>,
 }
 
 /// A heading and what stands below it, in the order added.
@@ -66,9 +66,6 @@ enum Block {
     Pick(String, Vec<Section>),
 }
 
-/// Where a page says how it was made.
-const MADE: &str = "made";
-
 impl Page {
     /// Page without sections.
     pub fn new(title: impl Into<String>) -> Self {
@@ -76,14 +73,21 @@ impl Page {
             title: title.into(),
             verdict: None,
             sections: Vec::new(),
-            made: None,
         }
     }
 
     /// The answer in one sentence, at the top.
     #[must_use]
-    pub fn verdict(mut self, verdict: Verdict, sentence: impl Into<String>) -> Self {
-        self.verdict = Some((verdict, sentence.into()));
+    pub fn verdict(self, verdict: Verdict, sentence: impl Into<String>) -> Self {
+        // a note judges nothing: its sentence stands alone
+        let word = if verdict == Verdict::Note { "" } else { verdict.class() };
+        self.verdict_as(verdict, word, sentence)
+    }
+
+    /// As [`verdict`](Page::verdict) with a word of its own; none if it is empty.
+    #[must_use]
+    pub fn verdict_as(mut self, verdict: Verdict, word: &'static str, sentence: impl Into<String>) -> Self {
+        self.verdict = Some((verdict, word, sentence.into()));
         self
     }
 
@@ -91,19 +95,6 @@ impl Page {
     #[must_use]
     pub fn section(mut self, section: Section) -> Self {
         self.sections.push(section);
-        self
-    }
-
-    /// The command that makes the page, and what it read, by name and value; every picture then links to it. Paths are those that the
-    /// user gave.
-    #[must_use]
-    pub fn made<K: Into<String>, V: Into<String>>(
-        mut self,
-        command: impl Into<String>,
-        inputs: impl IntoIterator<Item = (K, V)>,
-    ) -> Self {
-        let section = Section::new("How this page was made").code(command);
-        self.made = Some(section.pairs(inputs));
         self
     }
 
@@ -144,26 +135,20 @@ impl Page {
         out.open("body", &[]);
         out.open("main", &[]);
         out.text("h1", &[], &self.title);
-        if let Some((verdict, sentence)) = &self.verdict {
+        if let Some((verdict, word, sentence)) = &self.verdict {
             let class = verdict.class();
             out.open("p", &[("class", &format_args!("verdict {class}"))]);
-            // a note judges nothing: its sentence stands alone
-            if *verdict != Verdict::Note {
-                out.text("strong", &[], class);
+            if !word.is_empty() {
+                out.text("strong", &[], word);
             }
             out.text("span", &[], sentence);
             out.close("p");
         }
-        let mut writing = Writing {
-            is_made: self.made.is_some(),
-            ..Writing::default()
-        };
+        let mut picks = 0;
         for section in &self.sections {
-            section.whole(&mut out, &[], &mut writing)?;
+            section.whole(&mut out, &[], &mut picks)?;
         }
-        if let Some(made) = &self.made {
-            made.whole(&mut out, &[("id", &MADE)], &mut writing)?;
-        }
+        out.raw(command::SECTION);
         out.close("main");
         if let Some(script) = script {
             // its digest stands in the policy, so not a byte beside it
@@ -176,14 +161,6 @@ impl Page {
         }
         Ok(out.finish())
     }
-}
-
-/// What is known of the page while it is written.
-#[derive(Debug, Default)]
-struct Writing {
-    is_made: bool,
-    /// Choices so far: each has a name of its own.
-    picks: usize,
 }
 
 impl Section {
@@ -264,17 +241,17 @@ impl Section {
         self
     }
 
-    fn whole(&self, out: &mut Markup, attributes: Attributes, writing: &mut Writing) -> Result<(), ReportError> {
+    pub(crate) fn whole(&self, out: &mut Markup, attributes: Attributes, picks: &mut usize) -> Result<(), ReportError> {
         out.open("section", attributes);
         if !self.heading.is_empty() {
             out.text("h2", &[], &self.heading);
         }
-        self.write(out, writing)?;
+        self.write(out, picks)?;
         out.close("section");
         Ok(())
     }
 
-    fn write(&self, out: &mut Markup, writing: &mut Writing) -> Result<(), ReportError> {
+    fn write(&self, out: &mut Markup, picks: &mut usize) -> Result<(), ReportError> {
         for block in &self.blocks {
             match block {
                 Block::Text(text) => out.text("p", &[], text),
@@ -291,14 +268,10 @@ impl Section {
                         out.raw(data);
                         out.raw("</script>\n");
                     }
-                    if writing.is_made || !caption.is_empty() {
-                        out.open("figcaption", &[]);
-                        out.text("span", &[], caption);
-                        if writing.is_made {
-                            out.text("a", &[("href", &format_args!("#{MADE}"))], "Its command.");
-                        }
-                        out.close("figcaption");
-                    }
+                    out.open("figcaption", &[]);
+                    out.text("span", &[], caption);
+                    out.raw(command::LINK);
+                    out.close("figcaption");
                     out.close("figure");
                 }
                 Block::Table(table) => table.write(out)?,
@@ -315,10 +288,10 @@ impl Section {
                 Block::Details(inner) => {
                     out.open("details", &[]);
                     out.text("summary", &[], &inner.heading);
-                    inner.write(out, writing)?;
+                    inner.write(out, picks)?;
                     out.close("details");
                 }
-                Block::Pick(what, sections) => pick(out, what, sections, writing)?,
+                Block::Pick(what, sections) => pick(out, what, sections, picks)?,
             }
         }
         Ok(())
@@ -326,12 +299,13 @@ impl Section {
 }
 
 /// A button for each section, in front of it: so the style alone can tell which one is shown, and no script is needed.
-fn pick(out: &mut Markup, what: &str, sections: &[Section], writing: &mut Writing) -> Result<(), ReportError> {
+fn pick(out: &mut Markup, what: &str, sections: &[Section], picks: &mut usize) -> Result<(), ReportError> {
     if let [only] = sections {
-        return only.whole(out, &[], writing);
+        return only.whole(out, &[], picks);
     }
-    let number = writing.picks;
-    writing.picks += 1;
+    // each choice has a name of its own
+    let number = *picks;
+    *picks += 1;
     out.open("div", &[("class", &"pick"), ("role", &"group"), ("aria-label", &what)]);
     for (n, section) in sections.iter().enumerate() {
         let id = format!("pick-{number}-{n}");
@@ -343,7 +317,7 @@ fn pick(out: &mut Markup, what: &str, sections: &[Section], writing: &mut Writin
         }
         out.leaf("input", &attributes);
         out.text("label", &[("for", &id)], &section.heading);
-        section.whole(out, &[], writing)?;
+        section.whole(out, &[], picks)?;
     }
     out.close("div");
     Ok(())

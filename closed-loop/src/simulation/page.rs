@@ -24,10 +24,11 @@ pub(super) fn page(found: &Findings, drawn: Vec<Svg>, maps: Vec<(String, Svg)>) 
     let mut page = Page::new(format!("{} in closed loop", setting.policy.name))
         .verdict(verdict, sentence)
         .section(about);
-    for (step, picture) in found.steps.iter().zip(drawn) {
+    let steps = found.steps.iter().zip(drawn).map(|(step, picture)| {
         let section = Section::new(step.step.to_string()).chart(picture, CAPTION);
-        page = page.section(section.table(table(step)).table(at_rest(step)));
-    }
+        section.table(table(step)).table(at_rest(step))
+    });
+    page = page.section(Section::new("Load steps").pick("load step", steps.collect()));
     if let Some(spread) = &found.spread {
         page = page.section(spread.section(maps));
     }

@@ -59,9 +59,10 @@ pub fn files<'a>(arguments: impl IntoIterator<Item = &'a str>) -> Result<BTreeMa
         Command::Diagnose(options) => commands::diagnose::files(options),
         Command::Drm(Drm::Fit(options)) => {
             let made = commands::drm::fit::make(options, true)?;
+            let page = commands::drm::fit::signed(options, &made)?;
             let files = [
                 ("drm.toml", Some(made.mapping)),
-                ("report.html", commands::drm::fit::signed(options, &made)?),
+                ("report.html", page),
                 ("report.json", Some(made.json)),
                 ("report.txt", Some(made.text)),
             ];

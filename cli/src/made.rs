@@ -18,17 +18,21 @@ thread_local! {
 const WITH_VALUE: [&str; 3] = ["--out", "--report", "--threads"];
 const WITHOUT_VALUE: [&str; 7] = ["--force", "--json", "--resume", "-q", "--quiet", "-v", "--verbose"];
 
+/// Options with their values.
+pub type Out<'a> = &'a [(&'a str, &'a str)];
+
 /// From here on the command line is this one, behind the program's name.
 pub fn heed(arguments: impl IntoIterator<Item = OsString>) {
     let words = arguments.into_iter().map(|word| word.to_string_lossy().into_owned());
     TYPED.with(|typed| *typed.borrow_mut() = words.collect());
 }
 
-/// Puts the command, which writes into `out`, and its inputs on every page among the files.
+/// Puts the command and its inputs on every page among the files. `out` are the options that say where it writes, with names that could
+/// be anybody's.
 ///
 /// # Errors
 /// None in practice.
-pub fn signed(files: &mut BTreeMap<String, String>, out: &str, read: &[(&'static str, String)]) -> Result<(), Failure> {
+pub fn signed(files: &mut BTreeMap<String, String>, out: Out<'_>, read: &[(&'static str, String)]) -> Result<(), Failure> {
     let pages = files.iter_mut().filter(|(name, _)| name.ends_with(".html"));
     for (_, page) in pages {
         *page = signed_page(page, out, read)?;
@@ -40,7 +44,7 @@ pub fn signed(files: &mut BTreeMap<String, String>, out: &str, read: &[(&'static
 ///
 /// # Errors
 /// None in practice.
-pub fn signed_page(page: &str, out: &str, read: &[(&'static str, String)]) -> Result<String, Failure> {
+pub fn signed_page(page: &str, out: Out<'_>, read: &[(&'static str, String)]) -> Result<String, Failure> {
     let command = TYPED.with(|typed| command(&typed.borrow(), out));
     match command {
         Some(command) => Ok(report::made(page, &command, read.to_vec())?),
@@ -48,7 +52,7 @@ pub fn signed_page(page: &str, out: &str, read: &[(&'static str, String)]) -> Re
     }
 }
 
-fn command(typed: &[String], out: &str) -> Option<CommandLine> {
+fn command(typed: &[String], out: Out<'_>) -> Option<CommandLine> {
     let mut words = typed.iter().map(String::as_str).peekable();
     let mut name = format!("policyc {}", words.next()?);
     if name == "policyc drm" {
@@ -66,7 +70,7 @@ fn command(typed: &[String], out: &str) -> Option<CommandLine> {
             command = command.argument(word);
         }
     }
-    Some(command.option("--out", out))
+    Some(out.iter().fold(command, |command, (name, value)| command.option(name, value)))
 }
 
 #[cfg(test)]
@@ -77,7 +81,7 @@ mod tests {
     fn a_page_has_the_command_but_where_it_writes_and_how_it_speaks() {
         let typed = "drm fit my.csv --out /somewhere/else.toml --terms 3 --json --report=/tmp/a.html -q";
         let typed: Vec<String> = typed.split(' ').map(str::to_owned).collect();
-        let command = command(&typed, "drm.toml").expect("a command");
+        let command = command(&typed, &[("--out", "drm.toml")]).expect("a command");
         assert_eq!(command.to_string(), "policyc drm fit my.csv --terms 3 --out drm.toml");
     }
 }

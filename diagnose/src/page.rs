@@ -179,10 +179,13 @@ fn profiles(diagnosis: &Diagnosis) -> Section {
         let id = diagnosis.attribution.id(cause);
         let panel = Panel::new(Axis::new("cost in chi-square")).height(90.0);
         let panel = panel
-            .series(Series::line("profile", x.clone(), y.clone()))
-            .series(Series::points("fitted", x, y));
+            .series(Series::line("cost", x.clone(), y.clone()))
+            .series(Series::points("", x, y));
         let chart = Chart::new(
-            format!("{id}: {}", profile.name),
+            match id == profile.name {
+                true => format!("Cost of holding {id}"),
+                false => format!("Cost of holding {} of {id}", profile.name),
+            },
             Axis::new(profile.name).unit(unit(profile.unit)),
         );
         // the level at which `profile` ends its intervals

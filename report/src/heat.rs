@@ -50,6 +50,8 @@ enum Colours {
 
 /// Colour of a cell without value.
 const MISSING: Colour = Colour(0xd0, 0xd3, 0xd8);
+/// Around a dot; not the paper, which a dark page replaces.
+const RIM: Colour = Colour(0xfe, 0xfe, 0xfe);
 /// Steps of a smooth ramp; more cannot be told apart.
 // fewer colours also make fewer paths, each of a whole map
 const STEPS: f64 = 64.0;
@@ -180,7 +182,7 @@ impl HeatMap {
             });
             let data = path::dots(&points.collect::<Vec<_>>());
             // dark on a light rim is seen on every colour of the map
-            for (colour, size) in [(Colour::PAPER, 7.0), (Colour::INK, 4.0)] {
+            for (colour, size) in [(RIM, 7.0), (Colour::INK, 4.0)] {
                 out.leaf(
                     "path",
                     &[

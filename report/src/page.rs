@@ -257,8 +257,9 @@ impl Section {
                 Block::Text(text) => out.text("p", &[], text),
                 Block::Chart(svg, caption) => {
                     out.open("figure", if svg.live.is_some() { &[("class", &"data")] } else { &[] });
-                    // the style shows one of both, as there is room
-                    for (class, picture) in [("still wide", svg.as_str()), ("still narrow", svg.narrow.as_str())] {
+                    // the style shows one of both, as there is room; beside a live chart one is for print alone, and narrow
+                    let both = [("still wide", svg.as_str()), ("still narrow", svg.narrow.as_str())];
+                    for (class, picture) in both.into_iter().skip(usize::from(svg.live.is_some())) {
                         out.open("div", &[("class", &class)]);
                         out.raw(picture);
                         out.close("div");

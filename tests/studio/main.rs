@@ -1,8 +1,6 @@
 //! The page of `policyc studio` in a browser, against the command: the same code, trajectories, diagnosis and faults.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-mod browser;
-
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -10,10 +8,9 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use serde_json::Value;
+use tests::browser::Browser;
 use tests::root;
 use tests::tools::{policyc, run};
-
-use browser::Browser;
 
 /// Ten times what it takes on two cores.
 const PATIENCE: Duration = Duration::from_secs(300);
@@ -25,13 +22,7 @@ fn page() -> Option<PathBuf> {
     if !made {
         eprintln!("no page of the studio (`cargo xtask studio`): NOT tested");
     }
-    // one that is there may still not start, as in a container without what it asks for
-    let mut browser = Command::new("timeout");
-    browser
-        .args(["60", "chromium", "--dump-dom"])
-        .args(browser::FLAGS)
-        .arg("about:blank");
-    let is_there = browser.output().is_ok_and(|output| output.status.success());
+    let is_there = Browser::is_there();
     if !is_there {
         eprintln!("no chromium that starts: the page of the studio is NOT tested");
     }

@@ -66,7 +66,7 @@ pub fn run(options: &Certify) -> Result<Outcome, Failure> {
         },
     )?;
     let read = [("policy", options.policy.display().to_string())];
-    made::signed(&mut made.files, "certificate", &read)?;
+    made::signed(&mut made.files, &[("--out", "certificate")], &read)?;
     output::replace_own_texts(&options.out, &made.files, options.replacing)?;
     if options.json {
         output::say_json(&Answer {

@@ -130,7 +130,7 @@ fn page(
         notes: &notes,
     })?;
     let read = [("policy", options.policy.display().to_string())];
-    made::signed_page(&page, "generated", &read)
+    made::signed_page(&page, &[("--out", "generated"), ("--report", "report.html")], &read)
 }
 
 /// What `--json` prints. Keys that the manifest has, too, mean the same in both.

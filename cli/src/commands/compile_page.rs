@@ -132,7 +132,7 @@ fn layers(policy: &Policy) -> Section {
             Cell::from(layer.name.as_str()),
             layer.inputs.to_string().into(),
             layer.outputs.to_string().into(),
-            format!("{:?}", layer.activation).to_lowercase().into(),
+            layer.activation.word().into(),
             grouped((layer.weights.len() + layer.bias.len()) as u64).into(),
         ]);
     }

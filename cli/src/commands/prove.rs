@@ -51,7 +51,7 @@ pub fn run(options: &Prove) -> Result<Outcome, Failure> {
         ("proof.html".to_owned(), page::page(&answer)?),
     ]);
     let read = [("policy", options.policy.display().to_string())];
-    made::signed(&mut files, "proof", &read)?;
+    made::signed(&mut files, &[("--out", "proof")], &read)?;
     for task in tasks.iter().filter(|_| options.goals) {
         // where the code is not read there are none, and the claims say so
         for goal in prove::smt::goals(*task).unwrap_or_default() {

@@ -105,7 +105,7 @@ fn signed(options: &Simulate, found: &Findings) -> Result<BTreeMap<String, Strin
     let path = |path: &Path| path.display().to_string();
     let mut read = vec![("scenario", path(&options.scenario)), ("policy", path(&options.policy))];
     read.extend(options.plant.iter().map(|plant| ("plant", path(plant))));
-    made::signed(&mut files, "simulation", &read)?;
+    made::signed(&mut files, &[("--out", "simulation")], &read)?;
     Ok(files)
 }
 

@@ -123,6 +123,7 @@
       this.addTools();
       this.addReadout(number);
       this.panels.forEach((panel, index) => this.addPlot(panel, index));
+      make("p", this.box, data.x.label, { className: "axis along" });
       this.zoom(this.x.low, this.x.high);
       this.read(null);
       figure.classList.add("answers");
@@ -195,7 +196,11 @@
         make("i", button).style.background = all.find(series => series.name === name).colour;
         button.append(name);
         button.onclick = () => button.setAttribute("aria-pressed", String(this.toggle(name)));
-        this.rows.push({ name, cells: this.panels.map(() => make("td", row, "", { className: "n" })) });
+        this.rows.push({ name, cells: this.panels.map(panel => {
+          const cell = make("td", row, "", { className: "n" });
+          cell.dataset.of = panel.label;
+          return cell;
+        }) });
       }
     }
 

@@ -39,7 +39,7 @@ pub fn run(options: &Transfer) -> Result<Outcome, Failure> {
         ("policy", options.policy.display().to_string()),
         ("converters", real.join(", ")),
     ];
-    made::signed(&mut files, "transfer", &read)?;
+    made::signed(&mut files, &[("--out", "transfer")], &read)?;
     output::write_results(&options.out, &files)?;
     output::say_results(&options.out, &files, &found.summary(), PAGE)?;
     Ok(Outcome::Done)

@@ -98,7 +98,7 @@ fn write(options: &Train, settings: &Settings, runs: &[SeedRun], best: &Trained)
         ("contract", settings.contract.display().to_string()),
         ("plant", settings.plant.display().to_string()),
     ];
-    let page = made::signed_page(&page::page(settings, runs, best)?, "policy", &read)?;
+    let page = made::signed_page(&page::page(settings, runs, best)?, &[("--out", "policy")], &read)?;
     files.insert(PAGE.to_owned(), page.into_bytes());
     output::write_all(out, &files)
 }

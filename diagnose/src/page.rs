@@ -143,10 +143,7 @@ fn causes(diagnosis: &Diagnosis) -> Section {
     if !findings.partial.is_empty() {
         section = section.text("The best of the known causes leave structure and are not named as causes:");
         section = section.table(table("Partial explanation", &findings.partial));
-        section = section.text("What it would gain, root mean square; none of it is an explanation:");
-        for worth in &findings.partial_gain {
-            section = section.text(worth.words());
-        }
+        section = section.text("What it would gain stands in the table above, under after. None of it is an explanation.");
     }
     if let Some(aside) = &findings.set_aside {
         section = section.text(format!(
@@ -325,10 +322,13 @@ fn noise(diagnosis: &Diagnosis) -> Section {
         }
     }
     pairs.push((
-        "scatter over independent noise".to_owned(),
+        "scatter of sums of errors over that of white noise".to_owned(),
         format!("{:.2}", noise.inflation),
     ));
-    pairs.push(("duty added by the edges".to_owned(), format!("{:.1e}", noise.trim)));
+    pairs.push((
+        "duty that the edges of the gate add".to_owned(),
+        quantity(noise.trim, "", 2),
+    ));
     let mut section = Section::new("Noise and data").pairs(pairs);
     for text in &noise.repairs {
         section = section.text(text.clone());

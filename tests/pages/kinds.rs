@@ -19,10 +19,11 @@ const SCENARIO: &str = "plant = \"plants/paper-model.toml\"\nload_steps = [[200,
     lead = 20\nafter = 40\ntail = 10\nlimit = false\nbaselines = [\"feed-forward\"]\n";
 
 /// Name, what is typed in, and the page.
-const TYPED: [(&str, &str, &str); 10] = [
+const TYPED: [(&str, &str, &str); 11] = [
     ("simulate", "simulate simulate/sb3-buck12.toml --policy buck12 --out simulated", "simulated/report.html"),
     ("train", "train training.toml --out trained", "trained/report.html"),
     ("compile", "compile buck12 --emit c,rust --no-costs --out code --report compiled.html", "compiled.html"),
+    ("verify", "verify buck12 --generated code --drift-only --report html=verified.html", "verified.html"),
     ("certify", "certify buck12 --format i16 --samples 50 --boxes 50 --out certified", "certified/certificate.html"),
     ("fit", "drm fit far.csv --plant drm/plants/far.toml --trained-on plants/sb3-buck12.toml --out far.toml --report fitted.html", "fitted.html"),
     (

@@ -203,3 +203,51 @@ fn the_page_opens_an_example_and_shows_its_loop() {
     );
     assert_eq!(width.as_i64(), Some(1), "nothing sticks out");
 }
+
+/// What stable-baselines3 saved, dropped into the page: a contract to fill in, with its weights.
+#[test]
+fn a_model_of_a_trainer_is_dropped_and_becomes_a_contract() {
+    let Some(folder) = page() else { return };
+    let temporary = tempfile::tempdir().unwrap();
+    let site = temporary.path().join("site");
+    copy(&folder, &site);
+    for name in ["sb3_dqn.zip", "gemm.onnx"] {
+        let model = root().join("tests/fixtures/trainers").join(name);
+        std::fs::copy(model, site.join("examples").join(name)).unwrap();
+    }
+    let server = Server::of(&site);
+    let mut browser = Browser::start(&temporary.path().join("profile"));
+    for name in ["sb3_dqn.zip", "gemm.onnx"] {
+        browser.ask("Page.navigate", serde_json::json!({ "url": format!("{}?{name}#contract", server.1) }));
+        let ready = format!("location.search === '?{name}' && document.getElementById('status')?.textContent.startsWith('Ready')");
+        browser.value(&ready, PATIENCE);
+        let drop = format!(
+            "fetch('examples/{name}').then((answer) => answer.blob()).then((blob) => {{ const data = new DataTransfer(); \
+             data.items.add(new File([blob], '{name}')); \
+             document.documentElement.dispatchEvent(new DragEvent('drop', {{ dataTransfer: data, bubbles: true, cancelable: true }})); return true; }})"
+        );
+        browser.value(&drop, PATIENCE);
+        let contract = browser.value("document.getElementById('edit').value", PATIENCE);
+        assert!(contract.as_str().unwrap().contains("[network]"), "{name}: {contract}");
+    }
+}
+
+#[test]
+fn the_views_are_reached_by_keys() {
+    let Some(folder) = page() else { return };
+    let temporary = tempfile::tempdir().unwrap();
+    let server = Server::of(&folder);
+    let mut browser = Browser::start(temporary.path());
+    browser.ask("Page.navigate", serde_json::json!({ "url": format!("{}#contract", server.1) }));
+    browser.value("document.getElementById('status')?.textContent.startsWith('Ready')", PATIENCE);
+    browser.value("{ document.getElementById('tab-contract').focus(); true }", PATIENCE);
+    for (key, view) in [("ArrowRight", "code"), ("End", "records"), ("ArrowRight", "contract"), ("ArrowLeft", "records"), ("Home", "contract")] {
+        for kind in ["keyDown", "keyUp"] {
+            browser.ask("Input.dispatchKeyEvent", serde_json::json!({ "type": kind, "key": key, "code": key }));
+        }
+        let shown = format!(
+            "document.activeElement.id === 'tab-{view}' && !document.getElementById('panel-{view}').hidden && location.hash === '#{view}'"
+        );
+        browser.value(&shown, PATIENCE);
+    }
+}

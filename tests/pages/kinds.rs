@@ -12,7 +12,7 @@ const TRAINING: &str = "plant = \"plants/paper-model.toml\"\ncontract = \"paper1
     [episode]\nloads = { values = [200, 500, 800], range = [150, 1050], share = 0.5 }\n\
     [selection]\nevery = 200\nload_steps = [[210, 480]]\ninstants = 2\nlead = 20\nafter = 40\ntail = 10\n\
     [evaluation]\nload_steps = [[200, 500]]\ninstants = 2\nlead = 20\nafter = 40\ntail = 10\n\
-    [[specification]]\ndeviation = 5.0\nsettling = 5e-3\ntail = 0.5\n";
+    [[spec]]\ndeviation = 5.0\nsettling = 5e-3\ntail = 0.5\n";
 const PLAN: &str = "name = \"Two kinds\"\n[[simulate]]\nscenarios = \"short.toml\"\npolicies = \"buck12\"\n\
     plants = [\"plants/paper-model.toml\", \"plants/paper-table.toml\"]\n";
 const SCENARIO: &str = "plant = \"plants/paper-model.toml\"\nload_steps = [[200, 500], [500, 200]]\ninstants = 1\nsampling_instants = 1\n\

@@ -12,6 +12,11 @@
     if (size < 11) found.push(`letters of ${size.toFixed(1)} pixels: ${text.textContent}`);
     if (box.left < sheet.left - 1 || box.right > sheet.right + 1) found.push(`cut: ${text.textContent}`);
   }
+  for (const still of document.querySelectorAll("figure.answers .still")) if (still.checkVisibility()) found.push("a picture stands twice");
+  for (const figure of document.querySelectorAll("figure")) {
+    const isHidden = figure.closest("details:not([open])") || !figure.checkVisibility();
+    if (!isHidden && ![...figure.querySelectorAll("svg, canvas")].some(picture => picture.checkVisibility())) found.push("a figure without a picture");
+  }
   // what is drawn on a canvas has letters as its script says, in pixels of the screen
   for (const element of document.querySelectorAll(".live *")) {
     const own = [...element.childNodes].some(node => node.nodeType === Node.TEXT_NODE && node.textContent.trim());

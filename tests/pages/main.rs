@@ -144,7 +144,7 @@ fn planted_faults_of_a_page_are_found() {
                 <div style=\"width: 2000px\">wide</div><p style=\"color: #ccc; background: #fff\">pale</p>\
                 <svg role=\"img\" aria-label=\"words alone\" viewBox=\"0 0 900 100\" width=\"300\" height=\"33\">\
                 <text x=\"10\" y=\"50\" font-size=\"12\">small</text><text x=\"880\" y=\"50\" font-size=\"60\">cut off</text></svg>\
-                <div style=\"height: 3000px\"></div><div style=\"height: 3000px\">far</div></main></body></html>";
+                <div style=\"height: 20000px\"></div><div>far</div></main></body></html>";
     std::fs::write(&page, text).unwrap();
     let mut browser = Browser::start(&temporary.path().join("profile"));
     open(&mut browser, &page, 390, false);
